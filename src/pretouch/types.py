@@ -91,7 +91,7 @@ class ImuReadings:
     """
 
     unit: IntArray
-    """(M,) index of the unit in the skin."""
+    """(M,) index of the unit in the skin, of one with zones that of its first."""
     stamp: FloatArray
     """(M,) instant of each sample [s]."""
     acceleration: FloatArray

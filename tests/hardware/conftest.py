@@ -14,6 +14,6 @@ def bench():
 @pytest.fixture
 def unfiltered(monkeypatch):
     """Without the filter in the kernel, as on other systems: the receiver must throw away all garbage itself."""
-    monkeypatch.setattr("pretouch.hardware.receiver.attach_filter", lambda _: False)
+    monkeypatch.setattr("pretouch.hardware.receiver.attach_filter", lambda *_: False)
     with Bench() as made:
         yield made

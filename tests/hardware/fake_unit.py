@@ -6,6 +6,7 @@ from dataclasses import replace
 from pretouch.hardware.keys import Keys, UnitKey
 from pretouch.hardware.receiver import SkinReceiver
 from pretouch.hardware.wire import Beacon, Flag, Hello, Mac, Sample, decode_beacon, session_mac
+from pretouch.sensing.network import NetworkUnits
 
 KEYS = Keys(UnitKey(f"unit {n}", n, bytes([n]) * 32) for n in (3, 4, 5))
 IDS = ("unit 3", "unit 4")
@@ -66,10 +67,12 @@ class FakeUnit:
 class Bench:
     """A receiver under a clock that is set by hand, and a socket that stands for all units."""
 
-    def __init__(self, start: float = 100.0, drawn: int = 0, **more: object) -> None:
+    def __init__(
+        self, start: float = 100.0, drawn: int = 0, units: NetworkUnits | tuple[str, ...] = IDS, **more: object
+    ) -> None:
         self.now = start
         self._drawn = drawn
-        self.receiver = SkinReceiver(IDS, KEYS, clock=lambda: self.now, draw=self._draw, **more)
+        self.receiver = SkinReceiver(units, KEYS, clock=lambda: self.now, draw=self._draw, **more)
         self.socket = self.new_socket()
         self.units = [FakeUnit(KEYS[id], start - 50.0 - 7.0 * k) for k, id in enumerate(IDS)]
 

@@ -96,7 +96,7 @@ def test_each_flipped_bit_of_a_beacon_makes_it_worthless(bench):
 @pytest.mark.parametrize("filtered", [False, True])
 def test_every_other_length_is_refused(filtered, monkeypatch):
     if not filtered:
-        monkeypatch.setattr("pretouch.hardware.receiver.attach_filter", lambda _: False)
+        monkeypatch.setattr("pretouch.hardware.receiver.attach_filter", lambda *_: False)
     with Bench() as bench:
         bench.join()
         sample, hello = bench.units[0].sample(bench.now), bench.units[0].hello(bench.now)

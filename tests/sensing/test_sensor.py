@@ -174,11 +174,15 @@ def test_a_zone_that_the_sensor_does_not_have_is_refused(paper_skin, zone):
         replace(paper_skin.units[0], sensor=VL53L5CX(), zone=zone)
 
 
-def test_units_with_zones_are_not_asked_for_over_the_network(panda_model, paper_skin):
-    assert paper_skin.network_ids == paper_skin.ids
+def test_a_unit_speaks_over_the_network_once_for_all_its_zones(panda_model, paper_skin):
+    assert (paper_skin.network.ids, set(paper_skin.network.zones)) == (paper_skin.ids, {1})
+    assert np.array_equal(paper_skin.T_link_board, paper_skin.T_link_sensor)
     zoned = Skin([paper_skin.units[0], replace(paper_skin.units[1], sensor=VL53L5CX())], panda_model)
-    with pytest.raises(SkinError, match="hand_right: readings of zones cannot come over the units' network yet"):
-        _ = zoned.network_ids
+    assert (zoned.network.ids, zoned.network.zones) == (("hand_left", "hand_right"), (1, 4))
+    assert list(zoned.network.first) == zoned.first.tolist() == [0, 1]
+    assert zoned.network.rows == len(zoned) == 17
+    assert zoned.board.tolist() == [0, *[1] * 16]
+    assert zoned.T_link_board[16] == pytest.approx(paper_skin.T_link_sensor[1], abs=1e-12)
 
 
 def test_eight_by_eight_zones_measure_slower():

@@ -71,7 +71,7 @@ def _units(command: "Live", skin: "Skin") -> Iterator["RealUnits | None"]:
     from pretouch.hardware.network_skin import NetworkSkin
     from pretouch.viewer.real_units import RealUnits
 
-    with NetworkSkin(skin.network_ids, load_keys(Path(command.keys)), command.units_host, command.units_port) as source:
+    with NetworkSkin(skin.network, load_keys(Path(command.keys)), command.units_host, command.units_port) as source:
         heard = "anywhere" if command.units_host == EVERYWHERE else f"{command.units_host} only"
         print(f"Receiving units from {heard}, at UDP port {source.address[1]}.", flush=True)
         yield RealUnits(source)

@@ -30,6 +30,7 @@ from pretouch.perception.scene_filter import no_fixtures
 from pretouch.recording.skin_recording import SkinRecording
 from pretouch.robot.model import RobotModel
 from pretouch.robot.named import robot_named
+from pretouch.sensing.network import NetworkUnits
 from pretouch.sensing.skin import load_skin
 from pretouch.signals import Terminated
 from pretouch.types import FloatArray
@@ -55,9 +56,9 @@ def _monitored(command: "Monitor", duration: float, write: Callable[[Any], None]
             f"The address to listen on is empty: give {HOST}, or {EVERYWHERE} for every address of this machine."
         )
     keys = load_keys(keys_file(command.keys))
-    ids, posture = _watched(command, tuple(keys))
+    units, posture = _watched(command, tuple(keys))
     with ExitStack() as stack:
-        receiver = stack.enter_context(SkinReceiver(ids, keys, command.host, command.port))
+        receiver = stack.enter_context(SkinReceiver(units, keys, command.host, command.port))
         recording = stack.enter_context(SkinRecording(Path(command.record))) if command.record else None
         updates = watch(receiver, HealthParams(), duration, posture)
         try:
@@ -86,8 +87,8 @@ def _duration(command: "Monitor") -> float:
     return command.duration or (_ONCE_S if command.once else math.inf)
 
 
-def _watched(command: "Monitor", all_ids: tuple[str, ...]) -> tuple[tuple[str, ...], Posture | None]:
-    """Names of the units to watch, and the posture they are to agree with, if one is given."""
+def _watched(command: "Monitor", all_ids: tuple[str, ...]) -> tuple[NetworkUnits, Posture | None]:
+    """The units to watch, and the posture they are to agree with, if one is given."""
     if command.skin and command.units:
         raise HardwareError("Both --skin and --units are given: leave one of them out.")
     if command.posture and not command.skin:
@@ -96,12 +97,12 @@ def _watched(command: "Monitor", all_ids: tuple[str, ...]) -> tuple[tuple[str, .
         ids = words(command.units) or all_ids
         if not ids:
             raise HardwareError(f"{command.keys} holds no unit: `pretouch skin provision` or `skin keys` adds one.")
-        return ids, None
+        return NetworkUnits.of(ids), None
     model = RobotModel(robot_named(command.arm))
     skin = load_skin(Path(command.skin), model)
     if not command.posture:
-        return skin.network_ids, None
-    return skin.network_ids, Posture(
+        return skin.network, None
+    return skin.network, Posture(
         _posture(command.posture, model), ModelCheck(model, skin, no_fixtures(), ModelCheckParams())
     )
 

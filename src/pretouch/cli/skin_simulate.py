@@ -76,7 +76,7 @@ def keys_for(place: Path, skin: Skin) -> Keys:
     """Return the keys of a file, made for the skin's units if it is not there."""
     if place.exists():
         return keys_or_none(place)
-    keys = with_new(Keys(), skin.network_ids)
+    keys = with_new(Keys(), skin.network.ids)
     save_keys(keys, place)
     _say(f"Made keys for {len(keys)} units: {place}")
     return keys

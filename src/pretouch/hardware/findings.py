@@ -83,6 +83,13 @@ def _range_finder(unit: UnitHealth, params: HealthParams) -> Iterator[Finding]:
             f"{unit.unit} repeats {unit.distance_m:.3f} m to the last digit, so its range finder hangs: restart the"
             " unit, and replace the sensor if this happens again.",
         )  # fmt: skip
+    zones, told = unit.standing.zones, unit.standing.zones_told
+    if told not in (0, zones):
+        yield Finding(
+            unit.unit, "fault", "zones",
+            f"{unit.unit} sends {_square(told)}, but the skin file has {_square(zones)}, so its readings are not used:"
+            " set zones and type of its sensor in the skin file, or provision and flash the unit for them.",
+        )  # fmt: skip
     failed = {status: count for status, count in unit.statuses.items() if status not in _MEASURED}
     if failed:
         kinds = ", ".join(f"{count} {status}" for status, count in sorted(failed.items()))
@@ -101,6 +108,10 @@ def _range_finder(unit: UnitHealth, params: HealthParams) -> Iterator[Finding]:
         " scatters by {value} mm from reading to reading (limit {limit} mm): clean its window, and remove anything"
         " shiny or moving in front of it.",
     )  # fmt: skip
+
+
+def _square(side: int) -> str:
+    return f"{side} x {side} zones" if side > 1 else "a single range"
 
 
 def _touch_sensor(unit: UnitHealth, params: HealthParams) -> Iterator[Finding]:

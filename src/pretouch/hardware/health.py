@@ -121,6 +121,10 @@ class UnitStatus:
     """Most its clock can be off by [s], infinite while it is not known."""
     stuck: bool = False
     """Whether its readings repeat to the last digit."""
+    zones: int = 1
+    """Zones along each side of its sensor, by the skin."""
+    zones_told: int = 0
+    """The same by its newest range, 0 before the first."""
     firmware: int = 0
     """Major version * 256 + minor version, 0 before it has said."""
     reset: int = Reset.UNKNOWN

@@ -17,6 +17,7 @@ from pretouch.hardware.wire import (
     NONCE_SIZE,
     PREFIX,
     TAKES_TOUCH,
+    TAKES_ZONES,
     Beacon,
     Hello,
     Mac,
@@ -162,8 +163,8 @@ class AnsweredChallenges:
 class Session:
     """One challenge of a unit and one nonce of the receiver."""
 
-    def __init__(self, key: Mac, hello: Hello, nonce: bytes, now: float, index: int) -> None:
-        self.hello, self.nonce = hello, nonce
+    def __init__(self, key: Mac, hello: Hello, nonce: bytes, now: float, index: int, zones: bool) -> None:
+        self.hello, self.nonce, self._zones = hello, nonce, zones
         self.index = index
         """Its place in the order in which the unit's sessions were offered."""
         self.offered = self.asked = now
@@ -180,14 +181,16 @@ class Session:
         self.number += 1
         self.sent[self.number] = now
         self.sent.pop(self.number - _REMEMBERED, None)
-        return Beacon(self.hello.unit, self.number, self.nonce, TAKES_TOUCH).encode(key, self.hello.challenge)
+        takes = TAKES_TOUCH | (TAKES_ZONES if self._zones else 0)
+        return Beacon(self.hello.unit, self.number, self.nonce, takes).encode(key, self.hello.challenge)
 
 
 class Link:
     """What the receiver knows of one unit's sessions."""
 
-    def __init__(self, key: bytes, params: LinkParams, draw: Callable[[int], bytes]) -> None:
-        """Know of no session; `draw` gives so many random bytes."""
+    def __init__(self, key: bytes, params: LinkParams, draw: Callable[[int], bytes], zones: bool = False) -> None:
+        """Know of no session; `draw` gives so many random bytes. With `zones`, samples may carry those."""
+        self._zones = zones
         self._key, self._params, self._draw = Mac(key), params, draw
         self.live: Session | None = None
         self._pending: dict[bytes, Session] = {}
@@ -225,7 +228,7 @@ class Link:
                 return None
             del pending[next(iter(pending)) if exhausted is None else exhausted]
         self._offers += 1
-        pending[hello.challenge] = Session(self._key, hello, self._draw(NONCE_SIZE), now, self._offers)
+        pending[hello.challenge] = Session(self._key, hello, self._draw(NONCE_SIZE), now, self._offers, self._zones)
         return pending[hello.challenge]
 
     def sample(self, datagram: memoryview, sequence: int, now: float) -> tuple[Session, Sample, int] | str:

@@ -21,6 +21,7 @@ from pretouch.hardware.receiver import keys_of, touch_readings
 from pretouch.hardware.receiver_process import SharedOutputs, Traffic, serve
 from pretouch.hardware.traffic import ImuBatch, Received, UnitTraffic, imu_batch, imu_readings
 from pretouch.hardware.udp import demand_port
+from pretouch.sensing.network import NetworkUnits
 from pretouch.signals import kept_from_children
 from pretouch.types import ImuReadings, RangeReadings, RangeStatus, TouchReadings
 
@@ -33,7 +34,7 @@ class NetworkSkin:
 
     def __init__(
         self,
-        ids: Sequence[str],
+        units: NetworkUnits | Sequence[str],
         keys: Keys,
         host: str = "127.0.0.1",
         port: int = 0,
@@ -44,7 +45,7 @@ class NetworkSkin:
         """Start a receiver; one that cannot listen, or not have its priority, is a HardwareError.
 
         Args:
-            ids: see `SkinReceiver`.
+            units: see `SkinReceiver`.
             keys: see `SkinReceiver`.
             host: see `SkinReceiver`.
             port: see `SkinReceiver`.
@@ -52,21 +53,30 @@ class NetworkSkin:
             priority: of its process in the scheduling class SCHED_FIFO, 1 to 99, below that of the control loop; None
                 leaves the class as it is.
         """
-        units = keys_of(ids, keys)
+        self.network = NetworkUnits.of(units)
+        """Whom it hears."""
+        known, rows = keys_of(self.network.ids, keys), self.network.rows
         demand_port(host, port)
         if current_process().daemon:
             raise HardwareError("A daemonic process cannot start a receiver: create this process with daemon=False.")
         self._owner = os.getpid()
         self._params = params or LinkParams()
-        self._outputs = SharedOutputs(tuple(ids), self._params.samples_most)
-        none = np.full(len(units), int(RangeStatus.NONE))
-        self._nothing = RangeReadings(np.full(len(units), -np.inf), np.zeros(len(units)), none)
-        self._no_traffic = Traffic(tuple(UnitTraffic(unit.id, unit.number) for unit in units), {}, 0)
+        self._outputs = SharedOutputs(self.network, self._params.samples_most)
+        none = np.full(rows, int(RangeStatus.NONE))
+        self._nothing = RangeReadings(np.full(rows, -np.inf), np.zeros(rows), none)
+        self._no_traffic = Traffic(
+            tuple(
+                UnitTraffic(unit.id, unit.number, zones=side)
+                for unit, side in zip(known, self.network.zones, strict=True)
+            ),
+            {},
+            0,
+        )
         self._imu: list[Received] = []
         self._samples: list[Received] = []
         context = get_context("spawn")
         ours, theirs = context.Pipe(duplex=False)
-        arguments = (self._owner, units, (host, port), self._params, priority, self._outputs, theirs)
+        arguments = (self._owner, known, (host, port), self._params, priority, self._outputs, theirs)
         self._process = context.Process(target=serve, args=arguments, daemon=True)
         with kept_from_children({SIGINT}):
             self._process.start()
@@ -104,7 +114,7 @@ class NetworkSkin:
         self._process.join()
 
     def read(self) -> RangeReadings:
-        """Return the newest reading of each unit, stamped with the earliest instant it can be of."""
+        """Return the newest reading of each unit and zone, stamped with the earliest instant it can be of."""
         value = self._outputs.readings()
         if value is None:
             return self._nothing
@@ -130,7 +140,7 @@ class NetworkSkin:
 
     def imu(self) -> ImuReadings:
         """Return the IMU samples that came since the last call of this or of `take_imu`, for a control step."""
-        return imu_readings(self.take_imu())
+        return imu_readings(self.take_imu(), self.network)
 
     def traffic(self) -> Traffic:
         """Return what the receiver has counted, not older than 0.6 s while it lives."""

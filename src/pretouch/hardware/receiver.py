@@ -20,27 +20,20 @@ from pretouch.hardware.udp import attach_filter, bind
 from pretouch.hardware.unit_endpoint import NO_READING, NO_TOUCH, Address, UnitEndpoint
 from pretouch.hardware.wire import (
     HELLO_SIZE,
-    IMU_MOST,
-    IMU_SAMPLE,
     MAGIC,
-    PREFIX,
-    SAMPLE,
     SAMPLE_LEAST,
     VERSION,
-    Flag,
     Kind,
+    largest_sample,
+    sample_size,
 )
+from pretouch.sensing.network import NetworkUnits
 from pretouch.types import FloatArray, RangeReadings, TouchReadings
 
 _HEAD = struct.Struct("<4sHHI")
 """Magic, version and kind as one; number of the unit; and, of a sample, flags and sequence."""
 _SAMPLE = MAGIC + bytes([VERSION, Kind.SAMPLE])
 _HELLO = MAGIC + bytes([VERSION, Kind.HELLO])
-_COUNTS = {SAMPLE_LEAST + n * IMU_SAMPLE.size: n for n in range(IMU_MOST + 2)}
-"""IMU samples in a sample datagram of each size; a touch reading is as long as one of them."""
-_TOUCH = int(Flag.TOUCH)
-_COUNT_AT = PREFIX.size + SAMPLE.size - struct.calcsize("<BBHII")
-"""Where a sample says how many."""
 _LEAST = min(HELLO_SIZE, SAMPLE_LEAST)
 _BEACON_CHECK_S = 0.02
 """Time between two looks for beacons that are due [s]."""
@@ -77,7 +70,7 @@ class SkinReceiver:
 
     def __init__(
         self,
-        ids: Sequence[str],
+        units: NetworkUnits | Sequence[str],
         keys: Keys,
         host: str = "127.0.0.1",
         port: int = 0,
@@ -90,7 +83,8 @@ class SkinReceiver:
         """Listen.
 
         Args:
-            ids: the skin's units in their order; one without a key is a HardwareError.
+            units: `Skin.network`, or in their order the ids of units without zones; one without a key is a
+                HardwareError.
             keys: of all units.
             host: address to listen at; 0.0.0.0 for every one of this machine.
             port: 0 lets the system choose one; one that is taken is a HardwareError.
@@ -101,16 +95,19 @@ class SkinReceiver:
                 to be taken.
         """
         self._params = params or LinkParams()
-        units = keys_of(ids, keys)
-        self.table = np.array([NO_READING]).T.repeat(len(units), axis=1)
+        self.network = NetworkUnits.of(units)
+        """Whom it hears."""
+        sides, first, rows = self.network.zones, self.network.first, self.network.rows
+        known = keys_of(self.network.ids, keys)
+        self.table = np.array([NO_READING]).T.repeat(rows, axis=1)
         """Stamps [s], distances [m] and statuses of the newest readings, (3, K); not to be written to."""
-        self.touch_table = np.array([NO_TOUCH]).T.repeat(len(units), axis=1)
+        self.touch_table = np.array([NO_TOUCH]).T.repeat(rows, axis=1)
         """Stamps [s], contacts, forces [N] and statuses of the newest touch readings, (4, K); as that."""
         self._endpoints = [
-            UnitEndpoint(i, unit, self._params, draw, self.table[:, i], self.touch_table[:, i])
-            for i, unit in enumerate(units)
+            UnitEndpoint(i, unit, self._params, draw, self.table.T[k : k + side**2], self.touch_table[:, k], side)
+            for i, (unit, k, side) in enumerate(zip(known, first, sides, strict=True))
         ]
-        self._by_number = {unit.number: endpoint for unit, endpoint in zip(units, self._endpoints, strict=True)}
+        self._by_number = {unit.number: endpoint for unit, endpoint in zip(known, self._endpoints, strict=True)}
         self.units: tuple[UnitTraffic, ...] = tuple(endpoint.traffic for endpoint in self._endpoints)
         self.rejected: dict[str, int] = dict.fromkeys(REASONS, 0)
         """How many datagrams were thrown away, by reason (`traffic.REASONS`)."""
@@ -125,7 +122,7 @@ class SkinReceiver:
         self._buffer = bytearray(2048)
         self._view = memoryview(self._buffer)
         self._socket = bind(host, port, 1024 * self._params.buffer_kib)
-        self.filtered = attach_filter(self._socket)
+        self.filtered = attach_filter(self._socket, largest_sample(sides))
         """Whether the kernel drops, uncounted, what is not ours by its size, magic, version or kind."""
         self._poll = select.poll()
         self._poll.register(self._socket, select.POLLIN)
@@ -183,7 +180,7 @@ class SkinReceiver:
         self._next_beacon_check = now
 
     def readings(self) -> RangeReadings:
-        """Return the newest reading of each unit, stamped with the earliest instant it can be of."""
+        """Return the newest reading of each unit and zone, stamped with the earliest instant it can be of."""
         stamp, distance, status = self.table
         return RangeReadings(stamp.copy(), distance.copy(), status.astype(np.int64))
 
@@ -231,10 +228,9 @@ class SkinReceiver:
         """Take in one datagram: return None for a sample, "" for a hello, or why it is thrown away."""
         if size < _LEAST:
             return "size"
-        head, number, flags, sequence = _HEAD.unpack_from(datagram)
+        head, number, _, sequence = _HEAD.unpack_from(datagram)
         if head == _SAMPLE:
-            count = _COUNTS.get(size)
-            if count is None or datagram[_COUNT_AT] + bool(flags & _TOUCH) != count:
+            if size < SAMPLE_LEAST or sample_size(datagram) != size:
                 return "size"
         elif head != _HELLO:
             return "format"

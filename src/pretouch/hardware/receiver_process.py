@@ -6,7 +6,7 @@ import pickle
 import struct
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from signal import SIGINT
@@ -17,7 +17,8 @@ from pretouch.hardware.link import LinkParams
 from pretouch.hardware.mailbox import Mailbox, Ring
 from pretouch.hardware.receiver import SkinReceiver
 from pretouch.hardware.traffic import Received, UnitTraffic
-from pretouch.hardware.wire import SAMPLE_MOST, TAG_SIZE, sample_of
+from pretouch.hardware.wire import SAMPLE_MOST, TAG_SIZE, largest_sample, sample_of
+from pretouch.sensing.network import NetworkUnits
 from pretouch.signals import leave_to_parent
 
 _PAUSE_S = 0.008
@@ -35,7 +36,6 @@ _SUSPENDED_S = 0.02
 
 _RECORD = struct.Struct("<Hdddd")
 """Index of the unit; arrival, stamp, offset, bound; then the datagram without its tag."""
-_RECORD_MOST = _RECORD.size + SAMPLE_MOST - TAG_SIZE
 
 
 @dataclass(frozen=True)
@@ -52,11 +52,14 @@ class Traffic:
 class SharedOutputs:
     """Where a receiver puts what it has; as an argument of a process that is being spawned it is the same there."""
 
-    def __init__(self, ids: tuple[str, ...], samples_most: int) -> None:
-        self._readings = Mailbox(24 * len(ids))
-        self._touch = Mailbox(32 * len(ids))
-        self._traffic = Mailbox(4096 + sum(2048 + len(id.encode()) for id in ids))
-        self._samples = Ring(samples_most, _RECORD_MOST)
+    def __init__(self, units: NetworkUnits | Sequence[str], samples_most: int) -> None:
+        self.network = NetworkUnits.of(units)
+        """Whose they are."""
+        ids, largest = self.network.ids, largest_sample(self.network.zones)
+        self._readings = Mailbox(24 * self.network.rows)
+        self._touch = Mailbox(32 * self.network.rows)
+        self._traffic = Mailbox(4096 + sum(2048 + largest - SAMPLE_MOST + len(id.encode()) for id in ids))
+        self._samples = Ring(samples_most, _RECORD.size + largest - TAG_SIZE)
 
     def put_readings(self, table: bytes) -> None:
         """Give stamps, distances and statuses, (3, K) float64."""
@@ -156,9 +159,7 @@ class ReceiverService:
     ) -> None:  # fmt: skip
         """Listen; see `SkinReceiver` and `SuspendWatch`."""
         self._records: list[bytes] = []
-        self.receiver = SkinReceiver(
-            [unit.id for unit in units], Keys(units), *address, params=params, deliver=self._keep
-        )
+        self.receiver = SkinReceiver(outputs.network, Keys(units), *address, params=params, deliver=self._keep)
         self._outputs, self._watch = outputs, SuspendWatch(suspended)
 
     def step(self) -> None:

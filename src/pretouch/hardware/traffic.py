@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from pretouch.hardware.wire import Reset, Sample, imu_values
+from pretouch.sensing.network import NetworkUnits
 from pretouch.types import FloatArray, ImuReadings
 
 UnitState = Literal["never heard", "greeting", "live", "silent"]
@@ -70,6 +71,12 @@ class UnitTraffic:
     """From the making of a sample to its arrival [s], the most it can have been; mean of about the last 16."""
     stuck: bool = False
     """Whether its readings repeat to the last digit."""
+    zones: int = 1
+    """Zones along each side of its sensor, by the skin."""
+    zones_told: int = 0
+    """The same by its newest range, 1 of one without zones; 0 before the first."""
+    misfits: int = 0
+    """Ranges that were no reading because of other zones than the skin's."""
     sample: Sample | None = None
     """Its last sample."""
 
@@ -79,7 +86,7 @@ class Received:
     """A sample as it arrived, for recordings."""
 
     unit: int
-    """Index in the skin."""
+    """Index in the `NetworkUnits` of the skin."""
     arrival: float
     """When it was taken in [s], host's clock."""
     stamp: float
@@ -96,7 +103,7 @@ class ImuBatch:
     """Consecutive IMU samples of one unit, sensor frame."""
 
     unit: int
-    """Index in the skin."""
+    """Index in the `NetworkUnits` of the skin."""
     stamp: FloatArray
     """(M,) instants [s]: the newest is the earliest it can have been; the others lie before it by the nominal period,
     which a sensor keeps to some per cent."""
@@ -122,11 +129,11 @@ def imu_batch(received: Received) -> ImuBatch | None:
     return ImuBatch(received.unit, stamp, acceleration, angular_velocity, sample.imu_index)
 
 
-def imu_readings(batches: Sequence[ImuBatch]) -> ImuReadings:
-    """Return the IMU samples of several units as a control step takes them."""
+def imu_readings(batches: Sequence[ImuBatch], units: NetworkUnits) -> ImuReadings:
+    """Return the IMU samples of several of these units as a control step takes them."""
     none = [np.zeros((0, 3))]
     return ImuReadings(
-        np.repeat([b.unit for b in batches], [len(b.stamp) for b in batches]).astype(np.int64),
+        np.repeat([units.first[b.unit] for b in batches], [len(b.stamp) for b in batches]).astype(np.int64),
         np.concatenate([np.zeros(0), *(b.stamp for b in batches)]),
         np.concatenate(none + [b.acceleration for b in batches]),
         np.concatenate(none + [b.angular_velocity for b in batches]),

@@ -56,11 +56,14 @@ def _widen(opened: socket.socket, buffer_bytes: int) -> None:
         opened.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, buffer_bytes)
 
 
-def attach_filter(opened: socket.socket) -> bool:
-    """Let the kernel drop what has not size, magic, version and kind of hello or sample; return whether it does."""
+def attach_filter(opened: socket.socket, sample_most: int = SAMPLE_MOST) -> bool:
+    """Let the kernel drop what has not size, magic, version and kind of hello or sample; return whether it does.
+
+    Samples are of `sample_most` bytes at most.
+    """
     if sys.platform != "linux":
         return False
-    program = _program()
+    program = _program(sample_most)
     code = ctypes.create_string_buffer(program, len(program))
     # struct sock_fprog: number of instructions, pointer to them
     wanted = struct.pack("HP", len(program) // _INSTRUCTION.size, ctypes.addressof(code))
@@ -78,7 +81,7 @@ _UDP_HEADER = 8
 """What the filter sees in front of the datagram [B]."""
 
 
-def _program() -> bytes:
+def _program(sample_most: int) -> bytes:
     start = [int.from_bytes(MAGIC + bytes([VERSION, kind]), "big") for kind in (Kind.SAMPLE, Kind.HELLO)]
     steps = [
         (_WORD, 0, 0, _UDP_HEADER),
@@ -88,7 +91,7 @@ def _program() -> bytes:
         (_EQUAL, 4, 3, HELLO_SIZE + _UDP_HEADER),
         (_LENGTH, 0, 0, 0),
         (_AT_LEAST, 0, 1, SAMPLE_LEAST + _UDP_HEADER),
-        (_ABOVE, 0, 1, SAMPLE_MOST + _UDP_HEADER),
+        (_ABOVE, 0, 1, sample_most + _UDP_HEADER),
         (_RETURN, 0, 0, 0),
         (_RETURN, 0, 0, 0xFFFF),
     ]

@@ -3,12 +3,14 @@
 import math
 from collections.abc import Callable
 
+import numpy as np
+
 from pretouch.hardware.keys import UnitKey
 from pretouch.hardware.link import Link, LinkParams, Session
 from pretouch.hardware.traffic import Received, UnitTraffic
 from pretouch.hardware.unit_clock import UnitClock
-from pretouch.hardware.wire import NO_FORCE, Flag, Sample, touch_part
-from pretouch.types import FloatArray, RangeStatus, TouchStatus
+from pretouch.hardware.wire import NO_FORCE, ZONE, ZONES, Flag, Sample, touch_part
+from pretouch.types import FloatArray, IntArray, RangeStatus, TouchStatus
 
 _LEAST = 10
 """Readings that must be alike; fewer may be so by chance."""
@@ -22,7 +24,7 @@ class StuckDetector:
         """Call a unit stuck whose readings are alike for so long [s]."""
         self._after = after
         self.stuck = False
-        self._values: tuple[int, ...] = ()
+        self._values: tuple[int | bytes, ...] = ()
         self._alikes, self._values_since = 0, math.inf
         self.forget_stream()
 
@@ -42,6 +44,7 @@ class StuckDetector:
             sample.range_signal,
             sample.range_ambient,
             sample.range_spads,
+            sample.zones,
         )
         if values != self._values:
             self._values, self._alikes, self._values_since = values, 0, now
@@ -70,18 +73,19 @@ class UnitEndpoint:
 
     def __init__(
         self, index: int, unit: UnitKey, params: LinkParams, draw: Callable[[int], bytes], reading: FloatArray,
-        touch: FloatArray,
+        touch: FloatArray, zones: int = 1,
     ) -> None:  # fmt: skip
-        """Know nothing yet of the unit with this index in the skin.
+        """Know nothing yet of the unit with this index in the `NetworkUnits` of the skin.
 
-        Stamp, distance and status of its range go to `reading`, those of `NO_TOUCH` to `touch`.
+        Stamp, distance and status of its range, or of each of its `zones` along a side squared, go to the rows of
+        `reading`, those of `NO_TOUCH` to `touch`.
         """
         self._reading, self._touch = reading, touch
-        self.traffic = UnitTraffic(unit.id, unit.number)
+        self.traffic = UnitTraffic(unit.id, unit.number, zones=zones)
         self.address: Address | None = None
         """Where its last sample came from, as the socket knows it."""
         self._index, self._params = index, params
-        self._link = Link(unit.key, params, draw)
+        self._link = Link(unit.key, params, draw, zones > 1)
         self._clock = UnitClock(1e-6 * params.drift_ppm, params.clock_window_s)
         self._stuck = StuckDetector(params.stuck_after_s)
         self._session: Session | None = None
@@ -122,7 +126,8 @@ class UnitEndpoint:
         self._tell_time(session, sample, now)
         if sample.touch:
             self._take_touch(sample)
-        stamp = self._take_reading(sample, now) if sample.flags & _RANGE_NEW else math.nan
+        new = sample.flags & _RANGE_NEW and self._fits(sample)
+        stamp = self._take_reading(sample, now) if new else math.nan
         return Received(self._index, now, stamp, traffic.offset, traffic.bound, sample)
 
     def beacon_due(self, now: float) -> bool:
@@ -181,6 +186,14 @@ class UnitEndpoint:
             known = traffic.latency
             traffic.latency = latency if math.isnan(known) else known + 0.0625 * (latency - known)
 
+    def _fits(self, sample: Sample) -> bool:
+        """Whether a range has the zones of the skin's sensor; otherwise where each looks is not known."""
+        traffic = self.traffic
+        traffic.zones_told = sample.zones[0] if sample.zones else 1
+        fits = traffic.zones_told == traffic.zones
+        traffic.misfits += not fits
+        return fits
+
     def _take_reading(self, sample: Sample, now: float) -> float:
         """Keep a reading if it is the newest; return its stamp, NaN if it cannot be told."""
         traffic, clock = self.traffic, self._clock
@@ -193,7 +206,14 @@ class UnitEndpoint:
             return math.nan
         if newest and stamp > traffic.last_reading_stamp:
             traffic.last_reading_stamp = stamp
-            self._reading[:] = stamp, 1e-3 * sample.range_mm, _STUCK if traffic.stuck else sample.range_status
+            mm: int | IntArray = sample.range_mm
+            status: int | IntArray = sample.range_status
+            if sample.zones:
+                zones = np.frombuffer(sample.zones, ZONE, offset=ZONES.size)
+                mm, status = zones["mm"], zones["status"]
+            stamps, distances, statuses = self._reading.T
+            stamps[:], distances[:] = stamp, 1e-3 * mm
+            statuses[:] = _STUCK if traffic.stuck else status
         return stamp
 
     def _take_touch(self, sample: Sample) -> None:

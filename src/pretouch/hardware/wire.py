@@ -10,6 +10,7 @@ Three kinds, all little-endian, each ended by the first 16 bytes of an HMAC-SHA2
 """
 
 import struct
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum, IntFlag
 from hashlib import sha256
@@ -18,6 +19,7 @@ from hmac import compare_digest
 import numpy as np
 
 from pretouch.sensing.imu_scale import counts_of
+from pretouch.sensing.sensor import MOST_ZONES
 from pretouch.types import FloatArray
 
 MAGIC = b"PT"
@@ -40,8 +42,13 @@ TOUCH = struct.Struct("<BBHII")
 """Behind the IMU samples of a sample with `Flag.TOUCH`: the fields of `TouchPart` in their order."""
 NO_FORCE = 0xFFFFFFFF
 """In place of a force [mN] that is not measured."""
-TAKES_TOUCH = 1
-"""In a beacon: a sample may carry a touch reading. A unit that is not told so sends none."""
+ZONES = struct.Struct("<BB")
+"""Behind those in a sample with `Flag.ZONES`: zones along a side, and 0. A `ZONE` for each of them follows, in the
+order of `pretouch.sensing.skin.Skin`."""
+ZONE = np.dtype([("mm", "<u2"), ("sigma", "<u2"), ("status", "u1")])
+"""What a zone measured: as `range_mm`, `range_sigma` and `range_status` of a `Sample`."""
+TAKES_TOUCH, TAKES_ZONES = 1, 2
+"""In a beacon: a sample may carry a touch reading, or the zones of a range. A unit that is not told so sends none."""
 IMU_MOST = 32
 """Most IMU samples in a datagram."""
 
@@ -50,6 +57,9 @@ BEACON_SIZE = PREFIX.size + BEACON.size + TAG_SIZE
 SAMPLE_LEAST = PREFIX.size + SAMPLE.size + TAG_SIZE
 """Size of a sample without any of the IMU [B]."""
 SAMPLE_MOST = SAMPLE_LEAST + IMU_MOST * IMU_SAMPLE.size + TOUCH.size
+"""Size of the largest sample of a range finder without zones [B]."""
+_COUNT_AT = PREFIX.size + struct.calcsize("<HIQIIHhHBBHIHHHH")
+"""Where a sample says how many IMU samples it has."""
 
 NO_TEMPERATURE = -32768
 LONGEST_US = 0xFFFFFFFF
@@ -86,6 +96,11 @@ class Flag(IntFlag):
     """The range finder has had nothing new for more than two of its periods."""
     TOUCH = 128
     """It holds a touch reading."""
+    ZONES = 256
+    """It holds the zones of a range."""
+
+
+_TOUCH, _ZONES = int(Flag.TOUCH), int(Flag.ZONES)
 
 
 class Reset(IntEnum):
@@ -163,7 +178,7 @@ class Beacon:
     """Grows with each beacon of a session, from 1."""
     nonce: bytes
     takes: int = 0
-    """What samples may carry besides: `TAKES_TOUCH`, or 0."""
+    """What samples may carry besides: `TAKES_TOUCH`, `TAKES_ZONES`."""
 
     def encode(self, key: Mac, challenge: bytes) -> bytes:
         """As a datagram under the unit's key, for the unit that sent this challenge."""
@@ -237,6 +252,8 @@ class Sample:
     """`imu_count` times `IMU_SAMPLE`."""
     touch: bytes = b""
     """One `TOUCH` with `Flag.TOUCH`, else nothing."""
+    zones: bytes = b""
+    """`ZONES` and each zone's `ZONE` with `Flag.ZONES`, else nothing. The fields of the range are of the nearest."""
 
     def encode(self, session: Mac) -> bytes:
         """As a datagram of a session."""
@@ -246,7 +263,7 @@ class Sample:
             self.range_age_us, self.range_sigma, self.range_signal, self.range_ambient, self.range_spads,
             self.imu_count, self.imu_scale, self.imu_rate_hz, self.imu_index, self.imu_age_us,
         )  # fmt: skip
-        body += self.imu + self.touch
+        body += self.imu + self.touch + self.zones
         return body + session.tag(body)
 
 
@@ -259,14 +276,42 @@ def decode_sample(datagram: bytes | memoryview, session: Mac) -> Sample | None:
 
 
 def sample_of(body: bytes | memoryview) -> Sample | None:
-    """Return what the bytes of a sample before its tag say; None if its count does not go with its length."""
+    """Return what the bytes of a sample before its tag say; None if its counts do not go with its length."""
+    if sample_size(body) != len(body) + TAG_SIZE:
+        return None
     unit: int = PREFIX.unpack_from(body)[3]
     sample = Sample(unit, *SAMPLE.unpack_from(body, PREFIX.size))
     rest = bytes(body[PREFIX.size + SAMPLE.size :])
-    end = sample.imu_count * IMU_SAMPLE.size
-    sample.imu, sample.touch = rest[:end], rest[end:]
-    wanted = TOUCH.size if sample.flags & Flag.TOUCH else 0
-    return sample if len(sample.imu) == end and len(sample.touch) == wanted else None
+    imu = sample.imu_count * IMU_SAMPLE.size
+    touch = imu + (TOUCH.size if sample.flags & _TOUCH else 0)
+    sample.imu, sample.touch, sample.zones = rest[:imu], rest[imu:touch], rest[touch:]
+    return sample
+
+
+def sample_size(datagram: bytes | memoryview) -> int:
+    """Return the size [B] of a sample by its own flags and counts, 0 by counts that no sample has.
+
+    A datagram shorter than `SAMPLE_LEAST` - `TAG_SIZE` has none to go by.
+    """
+    flags, count = datagram[PREFIX.size] | datagram[PREFIX.size + 1] << 8, datagram[_COUNT_AT]
+    if count > IMU_MOST:
+        return 0
+    size = SAMPLE_LEAST + count * IMU_SAMPLE.size + (TOUCH.size if flags & _TOUCH else 0)
+    if flags & _ZONES:
+        at = size - TAG_SIZE
+        side = datagram[at] if at < len(datagram) else 0
+        size = size + zones_size(side) if 1 <= side <= MOST_ZONES else 0
+    return size
+
+
+def largest_sample(sides: Sequence[int]) -> int:
+    """Return the size of the largest sample of units with so many zones along a side each [B]."""
+    return SAMPLE_MOST + max((zones_size(side) for side in sides if side > 1), default=0)
+
+
+def zones_size(side: int) -> int:
+    """Return what so many zones along a side add to a sample [B]."""
+    return ZONES.size + side**2 * ZONE.itemsize
 
 
 @dataclass(frozen=True, slots=True)

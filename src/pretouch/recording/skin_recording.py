@@ -120,7 +120,9 @@ class SkinRecording:
         sample = heard.sample
         ours = unit, heard.arrival, heard.stamp, heard.offset, heard.bound
         given = (getattr(sample, name) for name in self._fields)
-        message = make(UNIT_SAMPLE, *ours, *given, np.frombuffer(sample.imu + sample.touch, dtype=np.uint8))
+        message = make(
+            UNIT_SAMPLE, *ours, *given, np.frombuffer(sample.imu + sample.touch + sample.zones, dtype=np.uint8)
+        )
         name = f"/skin/{topic_name(unit)}/sample"
         yield Item(name, UNIT_SAMPLE, sample.sequence, time, encoded(UNIT_SAMPLE, message))
         if new and heard.stamp == heard.stamp:

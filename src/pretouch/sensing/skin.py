@@ -15,6 +15,7 @@ from pretouch.errors import SkinError
 from pretouch.groups import Cones, SkinArrays
 from pretouch.robot.description import RobotDescription
 from pretouch.robot.model import RobotModel
+from pretouch.sensing.network import NetworkUnits
 from pretouch.sensing.seat import seat
 from pretouch.sensing.sensor import PAPER_SENSOR, Sensor, cones_of
 from pretouch.sensing.sensor_types import own_type, sensor_called, sensor_tables, tables_of
@@ -69,10 +70,16 @@ class Skin:
         """The B units as they are mounted: those with zones whole."""
         self.first: IntArray = np.array([k for k, unit in enumerate(self.units) if not unit.zone], dtype=np.int64)
         """(B,) index of each one's first zone, or its own."""
+        self.board: IntArray = np.cumsum([not unit.zone for unit in self.units], dtype=np.int64) - 1
+        """(K,) index of the mounted unit each belongs to."""
+        self.network = NetworkUnits(tuple(u.id for u in self.mounted), tuple(u.sensor.zones for u in self.mounted))
+        """The same units as they speak over the network."""
         self.link: IntArray = np.array([model.link_index(u.link) for u in self.units], dtype=np.int64)
         """(K,) index of the link each unit sits on."""
         self.T_link_sensor: FloatArray = np.array([u.T_link_sensor for u in self.units]).reshape(-1, 4, 4)
         """(K, 4, 4)."""
+        self.T_link_board: FloatArray = np.array([u.T_link_sensor for u in self.mounted]).reshape(-1, 4, 4)[self.board]
+        """(K, 4, 4) pose of the mounted unit each belongs to: the IMU's."""
         self.position_sigma: FloatArray = np.array([u.position_sigma for u in self.units], dtype=np.float64)
         """(K,) standard deviation of each unit's position [m]."""
         self.orientation_sigma: FloatArray = np.array([u.orientation_sigma for u in self.units], dtype=np.float64)
@@ -88,17 +95,6 @@ class Skin:
 
     def __len__(self) -> int:
         return len(self.units)
-
-    @property
-    def network_ids(self) -> tuple[str, ...]:
-        """The ids of units that send datagrams; a SkinError where one has zones, which a datagram has no room for."""
-        if len(self.mounted) < len(self.units):
-            zoned = ", ".join(unit.id for unit in self.mounted if unit.sensor.zones > 1)
-            raise SkinError(
-                f"{zoned}: readings of zones cannot come over the units' network yet: simulate them (`pretouch live`),"
-                " send each zone's as a sensor_msgs/Range over ROS 2, or write a `pretouch.ports.Skin`."
-            )
-        return self.ids
 
 
 def _check_count(count: int) -> None:

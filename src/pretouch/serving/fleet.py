@@ -1,7 +1,7 @@
 """The simulated units of a skin, each behind its own UDP socket and its own stretch of a simulated network."""
 
 import socket
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from itertools import count
 
@@ -10,6 +10,7 @@ import numpy as np
 from pretouch.checks import Checked, NonNegative
 from pretouch.errors import HardwareError
 from pretouch.hardware.keys import Keys
+from pretouch.sensing.network import NetworkUnits
 from pretouch.serving.network import Channel, NetworkParams
 from pretouch.serving.unit import SimulatedUnit, UnitParams
 from pretouch.sim.imu import ImuParams, ImuSample
@@ -40,26 +41,32 @@ class Fleet:
     """All units of a skin. `step` moves them on; nothing happens in between."""
 
     def __init__(
-        self, ids: Sequence[str], keys: Keys, params: FleetParams, seed: int, address: tuple[str, int]
+        self, units: NetworkUnits | Iterable[str], keys: Keys, params: FleetParams, seed: int, address: tuple[str, int]
     ) -> None:
-        """Switch the units on; the seed decides clocks, challenges, reboots and the network's course.
+        """Switch the units on: `Skin.network`, or the ids of units without zones.
+
+        The seed decides clocks, challenges, reboots and the network's course.
 
         A unit without a key, and an address that cannot be found, are a HardwareError.
         """
+        network = NetworkUnits.of(units)
+        ids = self.ids = network.ids
         missing = [name for name in ids if name not in keys]
         if missing:
             raise HardwareError(f"No key for unit {', '.join(missing)}: create keys for all units of the skin.")
         family, self._found = _resolved(address)
         self.receiver = address
         """Name or address, and port, of the receiver."""
-        self.ids = tuple(ids)
         seeds = np.random.SeedSequence([seed, 6]).spawn(len(ids))
         rngs = [[np.random.default_rng(s) for s in one.spawn(3)] for one in seeds]
         self.units = tuple(
-            SimulatedUnit(keys[name], params.unit, own, params.imu, _reboots(params.reboot_every_s, own))
-            for name, (own, _, _) in zip(ids, rngs, strict=True)
+            SimulatedUnit(keys[name], params.unit, own, params.imu, _reboots(params.reboot_every_s, own), side)
+            for name, side, (own, _, _) in zip(ids, network.zones, rngs, strict=True)
         )
         """In the order of the skin."""
+        self._rows = [
+            (unit, zone) for unit, side in zip(self.units, network.zones, strict=True) for zone in range(side**2)
+        ]
         self._up = [Channel[bytes](params.network.up, rng) for _, rng, _ in rngs]
         self._down = [Channel[bytes](params.network.down, rng) for _, _, rng in rngs]
         self._sockets = [socket.socket(family, socket.SOCK_DGRAM) for _ in ids]
@@ -71,16 +78,17 @@ class Fleet:
         """Datagrams that the machine would not send, as while its network is down."""
 
     def take_range(self, sample: RangeSample) -> None:
-        """Let a unit's range finder measure."""
-        self.units[sample.unit].take_range(sample)
+        """Let a unit's range finder measure, or one of its zones."""
+        unit, zone = self._rows[sample.unit]
+        unit.take_range(sample, zone)
 
     def take_touch(self, sample: TouchSample) -> None:
         """Let a unit's touch sensor measure."""
-        self.units[sample.unit].take_touch(sample)
+        self._rows[sample.unit][0].take_touch(sample)
 
     def take_imu(self, sample: ImuSample) -> None:
         """Let a unit's IMU take a sample."""
-        self.units[sample.unit].take_imu(sample)
+        self._rows[sample.unit][0].take_imu(sample)
 
     def step(self, clock: Callable[[], float]) -> int:
         """Hand on what has come, do what is due, send what has arrived by now; return how many were sent.

@@ -63,9 +63,9 @@ class SimulateOptions(Checked):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        unknown = sorted((self.silenced | self.stuck) - set(self.skin.ids))
+        unknown = sorted((self.silenced | self.stuck) - set(self.skin.network.ids))
         if unknown:
-            raise HardwareError(f"Unknown unit {', '.join(unknown)}: choose from {', '.join(self.skin.ids)}.")
+            raise HardwareError(f"Unknown unit {', '.join(unknown)}: choose from {', '.join(self.skin.network.ids)}.")
         if self.seed < 0:
             raise ParameterError(f"SimulateOptions.seed is {self.seed}: it must be at least 0.")
 
@@ -85,10 +85,10 @@ class SimulatedArm:
         A receiver that cannot be found, and a unit without a key, are a HardwareError.
         """
         skin, seed = options.skin, options.seed
-        self.fleet = Fleet(skin.network_ids, options.keys, options.fleet, seed, (options.host, options.port))
+        self.fleet = Fleet(skin.network, options.keys, options.fleet, seed, (options.host, options.port))
         """Its units."""
         try:
-            for name, unit in zip(skin.ids, self.fleet.units, strict=True):
+            for name, unit in zip(self.fleet.ids, self.fleet.units, strict=True):
                 unit.silent, unit.stuck = name in options.silenced, name in options.stuck
             self.plant = Plant(options.model, scene or SceneSpec(), PlantParams(), q, seed)
             self.clock = RealTime(self.plant, period, late)

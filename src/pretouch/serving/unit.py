@@ -15,6 +15,9 @@ from pretouch.hardware.wire import (
     LONGEST_US,
     NO_FORCE,
     TAKES_TOUCH,
+    TAKES_ZONES,
+    ZONE,
+    ZONES,
     Flag,
     Hello,
     Mac,
@@ -34,7 +37,8 @@ FIRMWARE = 0x0001
 """Version that a simulated unit reports: 0.1, that of `firmware/`."""
 FIFO_MOST = 682
 """IMU samples that the LSM6DS3's FIFO of 8 kB holds (data sheet)."""
-_RANGE_PERIOD_S = 0.02
+_RANGE_PERIOD_S, _FRAME_PERIOD_S = 0.02, 1 / 15
+"""Longest time from one range to the next of a sensor without zones, and of one with them [s]."""
 _ROUNDING_S = 1e-9
 _LAST = 0xFFFFFFFF
 """Last sequence number of a session."""
@@ -69,7 +73,7 @@ class SimulatedUnit:
 
     def __init__(
         self, key: UnitKey, params: UnitParams, rng: np.random.Generator, imu: ImuParams | None = None,
-        reboots: Iterable[float] = (),
+        reboots: Iterable[float] = (), zones: int = 1,
     ) -> None:  # fmt: skip
         """Be on since a random time; out of session.
 
@@ -79,7 +83,9 @@ class SimulatedUnit:
             rng: for its clock, its challenges and the spread of its hellos.
             imu: how its IMU is set, if it has one.
             reboots: when it is to begin anew [s], in order; there may be no end of them.
+            zones: of its range finder along each side.
         """
+        self._zones = zones
         self.key, self._params, self._rng = key, params, rng
         self._mac = Mac(key.key)
         self._rate = 1.0 + 1e-6 * params.drift_ppm * float(rng.uniform(-1, 1))
@@ -97,8 +103,8 @@ class SimulatedUnit:
 
     def _forget(self) -> None:
         """Know nothing, as after a reset."""
-        self._measuring: deque[RangeSample] = deque()
-        self._range: RangeSample | None = None
+        self._measuring: deque[list[RangeSample]] = deque()
+        self._range: list[RangeSample] = []
         self._range_new, self._stream = False, 0
         self._touch: TouchSample | None = None
         self._touch_new = False
@@ -125,10 +131,16 @@ class SimulatedUnit:
         self._began, self._up, self._reset = now, now + self._params.boot_s, Reset.WATCHDOG
         self._forget()
 
-    def take_range(self, sample: RangeSample) -> None:
-        """Let its range finder measure; it has the reading `UnitParams.ready_s` later."""
-        if sample.time >= self._up:
-            self._measuring.append(sample)
+    def take_range(self, sample: RangeSample, zone: int = 0) -> None:
+        """Let its range finder measure, with a zone of it; it has the reading `UnitParams.ready_s` later.
+
+        What zones measure at one time is one reading. A zone that measures nothing then has status NONE.
+        """
+        if sample.time < self._up:
+            return
+        if not self._measuring or self._measuring[-1][0].time != sample.time:
+            self._measuring.append([_nothing(sample.time)] * self._zones**2)
+        self._measuring[-1][zone] = sample
 
     def take_touch(self, sample: TouchSample) -> None:
         """Let its touch sensor measure: a pin that its loop looks at in each pass."""
@@ -144,13 +156,20 @@ class SimulatedUnit:
         force = NO_FORCE if np.isnan(seen.force) else round(1e3 * seen.force)
         return TouchPart(int(seen.contact), TouchStatus.OK, 0, force, self._since(seen.time, now)).encode()
 
+    def _zones_part(self) -> bytes:
+        """Return the zones of a new range for a receiver that takes them, else nothing."""
+        if self._zones == 1 or not (self._range_new and self._takes & TAKES_ZONES):
+            return b""
+        rows = [(_field(seen.distance, 1e3), _field(seen.sigma, 4e3), seen.status) for seen in self._range]
+        return ZONES.pack(self._zones, 0) + np.array(rows, ZONE).tobytes()
+
     def _look_at_range(self, now: float) -> None:
         """Take the readings that are ready."""
-        while self._measuring and self._measuring[0].time + self._params.ready_s <= now + _ROUNDING_S:
+        while self._measuring and self._measuring[0][0].time + self._params.ready_s <= now + _ROUNDING_S:
             ready = self._measuring.popleft()
             self._range_new = True
-            if self.stuck and self._range is not None:
-                self._range = self._range._replace(time=ready.time)
+            if self.stuck and self._range:
+                self._range = [sample._replace(time=ready[0].time) for sample in self._range]
             else:
                 self._range, self._stream = ready, self._stream + 1 if self._stream < 255 else 128
 
@@ -217,18 +236,22 @@ class SimulatedUnit:
             return None
         self._sampled = now
         flags = Flag.RANGE_NEW if self._range_new else Flag(0)
-        if self._range is not None and now - self._range.time > 2 * _RANGE_PERIOD_S:
+        period = _RANGE_PERIOD_S if self._zones == 1 else _FRAME_PERIOD_S
+        if self._range and now - self._range[0].time > 2 * period:
             flags |= Flag.RANGE_LATE
         if self._fifo_lost:
             flags |= Flag.IMU_LOST
         touch = self._touch_part(now)
         if touch:
             flags |= Flag.TOUCH
+        zones = self._zones_part()
+        if zones:
+            flags |= Flag.ZONES
         self._range_new, self._touch_new, self._fifo_lost = False, False, False
         first, count = self._fifo_first, min(len(self._fifo), IMU_MOST)
         imu = [self._fifo.popleft() for _ in range(count)]
         self._fifo_first += count
-        seen = self._range or RangeSample(0, now, 0.0, RangeStatus.NONE, 0.0, 0.0, 0.0, 0.0)
+        seen = _nearest(self._range) if self._range else _nothing(now)
         return Sample(
             unit=self.key.number, flags=int(flags), sequence=0, time_us=self._own(now), beacon=0, beacon_hold_us=0,
             battery_mv=_BATTERY_MV, temperature_cdeg=_TEMPERATURE_CDEG, bus_errors=0, range_stream=self._stream,
@@ -237,7 +260,7 @@ class SimulatedUnit:
             range_ambient=_field(seen.ambient, 128.0), range_spads=_field(seen.spads, 256.0),
             imu_count=count, imu_scale=self._imu_scale, imu_rate_hz=self._imu_rate, imu_index=first,
             imu_age_us=self._since(imu[-1].time, now) if imu else 0,
-            imu=b"".join(IMU_SAMPLE.pack(*sample.counts) for sample in imu), touch=touch,
+            imu=b"".join(IMU_SAMPLE.pack(*sample.counts) for sample in imu), touch=touch, zones=zones,
         )  # fmt: skip
 
     def _sealed(self, sample: Sample, now: float, session: Mac) -> bytes:
@@ -246,6 +269,21 @@ class SimulatedUnit:
         sample.sequence, sample.beacon = self._sequence, self._beacon
         sample.beacon_hold_us = self._since(self._heard, now)
         return sample.encode(session)
+
+
+_SHOWS = (
+    RangeStatus.OK, RangeStatus.NO_WRAP_CHECK, RangeStatus.MERGED, RangeStatus.MIN_RANGE, RangeStatus.MIN_CLIPPED,
+)  # fmt: skip
+"""Statuses with a target."""
+
+
+def _nearest(zones: list[RangeSample]) -> RangeSample:
+    """Return the zone with the nearest target: what a receiver is told that takes one range alone."""
+    return min(zones, key=lambda seen: (seen.status not in _SHOWS, seen.distance))
+
+
+def _nothing(time: float) -> RangeSample:
+    return RangeSample(0, time, 0.0, RangeStatus.NONE, 0.0, 0.0, 0.0, 0.0)
 
 
 def _field(value: float, units: float) -> int:

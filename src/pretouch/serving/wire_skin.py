@@ -39,11 +39,11 @@ class WireSkin:
         the arm.
         """
         self._plant = plant
-        keys, rng = made_keys(skin.network_ids, seed), np.random.default_rng([seed, 8])
-        self.receiver = SkinReceiver(skin.network_ids, keys, clock=lambda: plant.time, draw=rng.bytes, params=link)
+        keys, rng = made_keys(skin.network.ids, seed), np.random.default_rng([seed, 8])
+        self.receiver = SkinReceiver(skin.network, keys, clock=lambda: plant.time, draw=rng.bytes, params=link)
         """What came of it all: traffic of each unit, what was rejected, samples."""
         try:
-            self.fleet = Fleet(skin.network_ids, keys, params, seed, self.receiver.address)
+            self.fleet = Fleet(skin.network, keys, params, seed, self.receiver.address)
             """The units, to be silenced, stuck, rebooted."""
         except BaseException:
             self.receiver.close()
@@ -78,7 +78,7 @@ class WireSkin:
 
     def imu(self) -> ImuReadings:
         """Return the IMU samples that came since the last call."""
-        return imu_readings(self.receiver.take_imu())
+        return imu_readings(self.receiver.take_imu(), self.receiver.network)
 
     def _step(self, now: float) -> None:
         self._taken_in += self.fleet.step(lambda: now)

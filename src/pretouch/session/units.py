@@ -57,10 +57,10 @@ class UnitCheck:
         """Take the units of a skin on an arm, and what stands around it."""
         self._units, self._skin, self._robot = units, skin, robot
         self._health = HealthParams()
-        self._windows = [UnitWindow(name, self._health.window_s) for name in skin.ids]
+        self._windows = [UnitWindow(name, self._health.window_s) for name in skin.network.ids]
         self._model = ModelCheck(model, skin, fixtures, ModelCheckParams())
         self._taken = 0.0
-        self._arrivals = [-np.inf] * len(skin)
+        self._arrivals = [-np.inf] * len(skin.mounted)
 
     def wait(self, clock: Clock, patience: float, steady: float) -> None:
         """Wait until all units have been heard for a while without a break; those that are not are a HardwareError.

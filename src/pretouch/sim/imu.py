@@ -66,7 +66,7 @@ class ImuSample(NamedTuple):
     """One sample of one sensor's FIFO."""
 
     unit: int
-    """Index of the unit in the skin."""
+    """Index of the unit in the skin, of one with zones that of its first."""
     time: float
     """When it was taken [s]."""
     counts: IntArray
@@ -129,10 +129,11 @@ class Imus:
         self, plant: Plant, skin: Skin, params: ImuParams, seed: int, send: Callable[[ImuSample], None]
     ) -> None:
         """Mount the sensors; the seed decides errors, rates, phases and noise."""
-        self._plant, self._send = plant, send
-        rng, count, dt = np.random.default_rng([seed, 5]), len(skin), plant.params.period_s
+        self._plant, self._send, self._first = plant, send, skin.first
+        link = skin.link[skin.first]
+        rng, count, dt = np.random.default_rng([seed, 5]), len(skin.mounted), plant.params.period_s
         self.rate: FloatArray = params.rate_hz * (1.0 + params.rate_error * rng.uniform(-1, 1, count))
-        """(K,) true rate of each sensor [Hz]."""
+        """(B,) true rate of each sensor [Hz]."""
         due = rng.uniform(0, 1, count) / self.rate
         mix, bias = _errors(params, count, rng)
         self._rng, self._draws, self._drawn = rng, np.zeros((0, 6)), 0
@@ -142,12 +143,12 @@ class Imus:
         follow = 1.0 - np.exp(-2 * np.pi * bandwidth * dt)
         most = count * (int(dt * self.rate.max(initial=0.0)) + 2)
         self._taken = _Taken(np.zeros(most, np.int64), np.zeros(most), np.zeros((most, 6), np.int64))
-        root = plant.mj_model.body_rootid[skin.link].astype(np.int64)
+        root = plant.mj_model.body_rootid[link].astype(np.int64)
         data = plant.mj_data
         # views into the simulation's memory, taken once
         self._given = flattened(
             _Bodies(data.xpos, data.xmat, data.subtree_com, data.cvel, data.cacc),
-            _Mounting(skin.link, root, skin.T_link_sensor),
+            _Mounting(link, root, skin.T_link_board[skin.first]),
             _Sensors(self.rate, mix, bias, noise, imu_counts(params), follow, dt),
             _Memory(np.full((count, 6), np.nan), due),
             self._taken,
@@ -172,7 +173,7 @@ class Imus:
         taken = _take.flat(time - dt, self._shaken(), self._draws[self._drawn :], *self._given)
         self._drawn += taken
         for i in range(taken):
-            self._send(ImuSample(int(room.unit[i]), float(room.time[i]), room.counts[i].copy()))
+            self._send(ImuSample(int(self._first[room.unit[i]]), float(room.time[i]), room.counts[i].copy()))
 
     def _shaken(self) -> FloatArray:
         """Return the vibration (K, 3) [m/s^2] at the accelerometers, one step after the last call."""

@@ -148,7 +148,7 @@ class Controls:
         self._number(stiffness, self._set_stiffness, "stiffness", lambda: simulation.settings.stiffness / 1000.0)
         with gui.add_folder("Sensor units"):
             if simulation.real:
-                self.unit_panel = UnitPanel(gui, simulation.real.source, simulation.skin.ids)
+                self.unit_panel = UnitPanel(gui, simulation.real.source, simulation.skin.network.ids)
             else:
                 self._fault_controls()
 

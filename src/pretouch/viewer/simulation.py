@@ -241,7 +241,9 @@ class LiveSimulation:
         if self.recording is None:
             return
         for batch in imu:
-            self.recording.imu(self.skin.ids[batch.unit], batch.stamp, batch.acceleration, batch.angular_velocity)
+            self.recording.imu(
+                self.skin.network.ids[batch.unit], batch.stamp, batch.acceleration, batch.angular_velocity
+            )
         forces = [(time, force + self._pushes.at(time)) for time, force in log]
         self.recording.record(cycle, truth_of(forces, touches, hand))
         if self.recording.trouble:

@@ -144,7 +144,7 @@ def listen(state: ImpactState, body: Body, sample: Sample, p: AccelerometerParam
     speed, behind, excess = s.speed.copy(), s.behind.copy(), s.excess * math.exp(-period / p.memory_s)
     likelihood = np.zeros((BINS, len(model.parts)))
     judged = _listen(
-        sample.kin, model.mechanism, skin.arrays, robot.qd_commanded, imu,
+        sample.kin, model.mechanism, skin.arrays._replace(T_link_sensor=skin.T_link_board), robot.qd_commanded, imu,
         (
             number, gap, (measured, heard, expected, moved, steps), (mean, spread, usual, seen), speed, behind
         ),

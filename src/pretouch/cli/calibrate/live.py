@@ -88,11 +88,11 @@ def _session(command: "Calibrate", model: RobotModel) -> Iterator[Session]:
     skin = skin_for(model, command.skin)
     keys = keys_for(keys_file(command.live.keys), skin)
     host = command.live.units_host
-    with NetworkSkin(skin.network_ids, keys, host, command.live.units_port) as source:
+    with NetworkSkin(skin.network, keys, host, command.live.units_port) as source:
         here = HOST if host == EVERYWHERE else host
         options = SimulateOptions(model, skin, keys, here, source.address[1], hand=False, seed=command.seed)
         with SimulatedArm(options, model.description.q_ready, PerformParams().period_s, late=CATCH_UP_S) as arm:
-            yield Session(arm, model, source, skin.network_ids)
+            yield Session(arm, model, source, skin.network.ids)
         if arm.clock.left_out:
             print(f"This machine is too slow by {arm.clock.left_out:.1f} s for the simulation: its data have gaps.")
 

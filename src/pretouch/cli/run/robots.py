@@ -53,7 +53,7 @@ def _simulated(command: "Run", setup: RunSetup) -> Iterator[OpenedRobot]:
     from pretouch.session.simulated import SimulatedSessionArm
     from pretouch.sim.scene import SceneSpec
 
-    model, keys = RobotModel(setup.model.description), made_keys(setup.skin.network_ids, command.seed)
+    model, keys = RobotModel(setup.model.description), made_keys(setup.skin.network.ids, command.seed)
     with network_units(command, setup, keys) as units:
         port = units.address[1] if units else 9
         options = SimulateOptions(model, setup.skin, keys, HOST, port, hand=False, seed=command.seed)

@@ -205,7 +205,7 @@ def network_units(command: "Run", setup: RunSetup, keys: Keys | None = None) -> 
     c = command.units
     keys = load_keys(keys_file(c.keys)) if keys is None else keys
     with children_undisturbed():
-        receiver = NetworkSkin(setup.skin.network_ids, keys, c.units_host, c.units_port)
+        receiver = NetworkSkin(setup.skin.network, keys, c.units_host, c.units_port)
     with receiver as units:
         print(f"Receiving units at {units.address[0]}:{units.address[1]}.", flush=True)
         yield units

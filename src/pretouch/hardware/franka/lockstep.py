@@ -134,7 +134,7 @@ class LockstepSkin:
         """Listen for the skin's units; what the receiver draws comes from the seed, so that runs repeat."""
         self._now = 0.0
         draw = np.random.default_rng([seed, 8]).bytes
-        self.receiver = SkinReceiver(skin.network_ids, keys, host, port, clock=lambda: self._now, draw=draw)
+        self.receiver = SkinReceiver(skin.network, keys, host, port, clock=lambda: self._now, draw=draw)
 
     def __call__(self, time: float) -> RangeReadings:
         """Take in what has come by a robot time [s]; return the newest reading of each unit."""

@@ -34,7 +34,7 @@ class ServedUnits:
         A receiver that cannot be found, and a unit without a key, are a HardwareError.
         """
         skin, imu = setup.skin, ImuParams()
-        self._fleet = Fleet(skin.network_ids, setup.keys, FleetParams(imu=imu), seed, setup.address)
+        self._fleet = Fleet(skin.network, setup.keys, FleetParams(imu=imu), seed, setup.address)
         self.offset: float | None = None
         """What their time is ahead of the plant's [s]; None: they measure nothing yet."""
         RangeFinders(plant, skin, RangeFinderParams(), seed, lambda s: self._hand_on(s, self._fleet.take_range))

@@ -1,0 +1,177 @@
+"""Zones from a simulated sensor over units, sockets and receiver to the rows of a skin."""
+
+from dataclasses import replace
+from struct import pack
+
+import numpy as np
+import pytest
+
+from pretouch.control.path import Circle
+from pretouch.control.posture import brought_to
+from pretouch.hardware.findings import findings
+from pretouch.hardware.health import HealthParams, UnitWindow
+from pretouch.hardware.wire import (
+    IMU_MOST,
+    SAMPLE_LEAST,
+    Flag,
+    Mac,
+    Sample,
+    decode_sample,
+    largest_sample,
+    sample_size,
+    zones_size,
+)
+from pretouch.sensing.network import NetworkUnits
+from pretouch.sensing.sensor import VL53L5CX
+from pretouch.sensing.skin import Skin
+from pretouch.sensing.unit import TouchPatch
+from pretouch.serving.fleet import FleetParams
+from pretouch.serving.wire_skin import WireSkin
+from pretouch.sim.imu import ImuParams, Imus
+from pretouch.sim.plant import Plant
+from pretouch.sim.plant_params import PlantParams
+from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
+from pretouch.sim.scene import Box, SceneSpec
+from pretouch.types import RangeStatus
+
+SESSION = Mac(bytes(range(32)))
+PLAIN = Sample(*[7, 1, 1, 5_000_000], *[0] * 13, 2, *[0] * 4, imu=bytes(24))
+FOUR = b"\x02\x00" + b"".join(pack("<HHB", 100 * k + 1, 8 * k, k) for k in (1, 2, 3, 4))
+"""2 x 2 zones: 101, 201, 301, 401 mm, standard deviations of 2, 4, 6, 8 mm, statuses 1 to 4."""
+
+
+def test_zones_go_behind_the_imu_samples_and_touch():
+    whole = replace(PLAIN, flags=1 | Flag.TOUCH | Flag.ZONES, touch=bytes(12), zones=FOUR)
+    datagram = whole.encode(SESSION)
+    assert datagram[6:8] == b"\x81\x01"
+    assert datagram[62 + 24 + 12 : -16].hex() == "0200" + "6500080001" + "c900100002" + "2d01180003" + "9101200004"
+    assert len(datagram) == SAMPLE_LEAST + 24 + 12 + 22 == sample_size(datagram)
+    assert decode_sample(datagram, SESSION) == whole
+
+
+def test_the_largest_sample_fits_a_frame_of_ethernet():
+    zones = b"\x08\x00" + bytes(5 * 64)
+    most = replace(
+        PLAIN, flags=1 | Flag.TOUCH | Flag.ZONES, imu_count=IMU_MOST, imu=bytes(12 * 32), touch=bytes(12), zones=zones
+    )
+    assert len(most.encode(SESSION)) == largest_sample([1, 4, 8]) == 796 < 1472
+    assert largest_sample([1, 1]) == 474
+    assert zones_size(4) == 82
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        replace(PLAIN, flags=1 | Flag.ZONES),  # the flag without the bytes
+        replace(PLAIN, zones=FOUR),  # the bytes without the flag
+        replace(PLAIN, flags=1 | Flag.ZONES, zones=FOUR[:-1]),
+        replace(PLAIN, flags=1 | Flag.ZONES, zones=FOUR + b"\0"),
+        replace(PLAIN, flags=1 | Flag.ZONES, zones=b"\x03" + FOUR[1:]),  # of other counts
+        replace(PLAIN, flags=1 | Flag.ZONES, zones=b"\0\0"),
+        replace(PLAIN, flags=1 | Flag.ZONES, zones=b"\x09\0" + bytes(5 * 81)),
+        replace(PLAIN, flags=1 | Flag.ZONES, zones=FOUR, imu_count=1),
+        replace(PLAIN, flags=1 | Flag.ZONES | Flag.TOUCH, zones=FOUR),
+        replace(PLAIN, imu_count=IMU_MOST + 1, imu=bytes(12 * (IMU_MOST + 1))),
+    ],
+)
+def test_a_length_that_does_not_go_with_the_flags_is_refused(wrong):
+    assert decode_sample(wrong.encode(SESSION), SESSION) is None
+
+
+def test_what_is_cut_off_or_garbled_before_its_tag_raises_nothing():
+    body = replace(PLAIN, flags=1 | Flag.ZONES, zones=FOUR).encode(SESSION)[:-16]
+    rng = np.random.default_rng(0)
+    for cut in range(SAMPLE_LEAST - 16, len(body)):
+        assert decode_sample(body[:cut] + SESSION.tag(body[:cut]), SESSION) is None
+    for _ in range(2000):
+        bad = bytearray(body)
+        for place in rng.integers(6, len(bad), 3).tolist():
+            bad[place] = int(rng.integers(256))
+        back = decode_sample(bytes(bad) + SESSION.tag(bad), SESSION)
+        assert back is None or len(back.zones) == (zones_size(back.zones[0]) if back.flags & Flag.ZONES else 0)
+
+
+def test_rows_of_units_with_zones():
+    units = NetworkUnits(("a", "b", "c"), (1, 4, 2))
+    assert (units.first, units.rows) == ((0, 1, 17), 21)
+    assert NetworkUnits.of(["a", "b"]) == NetworkUnits(("a", "b"), (1, 1))
+    assert NetworkUnits.of([]).first == ()
+
+
+@pytest.fixture
+def arm(panda_model) -> Plant:
+    start = brought_to(panda_model, Circle().point(0.0))
+    wall = Box("wall", (0.9, 0.0, 0.5), (0.05, 2.0, 2.0), 25_000.0)
+    return Plant(panda_model, SceneSpec(boxes=(wall,)), PlantParams(), start, 0)
+
+
+@pytest.fixture
+def zoned(panda_model, paper_skin) -> Skin:
+    """Three units: 4 x 4 zones, a single range, and 8 x 8 zones with a touch sensor."""
+    a, b, c = paper_skin.units[:3]
+    last = replace(c, sensor=VL53L5CX(zones=8), touch=TouchPatch())
+    return Skin([replace(a, sensor=VL53L5CX()), b, last], panda_model)
+
+
+def test_readings_of_zones_are_those_measured_to_the_millimetre(arm, zoned):
+    with WireSkin(arm, zoned, RangeFinderParams(), FleetParams(), 0) as skin:
+        rows = []
+        RangeFinders(arm, zoned, RangeFinderParams(), 0, lambda s: rows.append((s.unit, s.time, s.distance, s.status)))
+        told = []
+        for _ in range(150):
+            arm.advance(0.01)
+            told.append(skin.read())
+        touch = skin.touch()
+        assert sum(skin.receiver.rejected.values()) == 0
+        assert [(u.zones, u.zones_told, u.misfits) for u in skin.receiver.units] == [(4, 4, 0), (1, 1, 0), (8, 8, 0)]
+    assert len(told[-1].stamp) == len(zoned) == 16 + 1 + 64
+    seen = 0
+    for k in range(len(zoned)):
+        mine = np.array([row[1:] for row in rows if row[0] == k])
+        for stamp, distance, status in {(r.stamp[k], r.distance[k], r.status[k]) for r in told}:
+            if np.isfinite(stamp):
+                at = np.searchsorted(mine[:, 0], stamp - 5e-6)
+                assert mine[at, 0] - stamp < 0.006
+                assert distance == pytest.approx(mine[at, 1], abs=0.51e-3)
+                assert status == mine[at, 2]
+                seen += 1
+    assert seen > 16 * 50 + 40 + 64 * 12
+    assert all(len(set(told[-1].stamp[a:b])) == 1 for a, b in ((0, 16), (17, 81)))
+    assert touch is not None
+    assert np.flatnonzero(touch.status == 0).tolist() == [17], "a unit's touch sensor is told at its first zone"
+
+
+def test_a_unit_with_zones_has_one_imu_in_its_own_axes(arm, panda_model, zoned, paper_skin):
+    whole = Skin(list(paper_skin.units[:3]), panda_model)
+    with WireSkin(arm, zoned, RangeFinderParams(), FleetParams(imu=ImuParams()), 0) as skin:
+        true = []
+        Imus(arm, whole, ImuParams(), 0, lambda s: true.append((s.unit, s.counts.tolist())))
+        sent = []
+        Imus(arm, zoned, ImuParams(), 0, lambda s: sent.append((s.unit, s.counts.tolist())))
+        arm.advance(0.5)
+        imu = skin.imu()
+    assert set(imu.unit.tolist()) == {0, 16, 17} == set(zoned.first.tolist())
+    assert sent == [(int(zoned.first[unit]), counts) for unit, counts in true]
+
+
+def test_a_receiver_that_takes_no_zones_gets_the_nearest(arm, panda_model, zoned, monkeypatch):
+    monkeypatch.setattr("pretouch.hardware.link.TAKES_ZONES", 0)
+    rows = []
+    with WireSkin(arm, zoned, RangeFinderParams(), FleetParams(), 0) as skin:
+        RangeFinders(arm, zoned, RangeFinderParams(), 0, lambda s: rows.append((s.unit, s.distance, s.status)))
+        arm.advance(1.0)
+        samples = [one for one in skin.receiver.take_samples() if one.unit == 0]
+        assert not any(one.sample.zones or one.sample.flags & Flag.ZONES for one in samples)
+        assert skin.receiver.units[0].misfits == sum(one.sample.flags & 1 for one in samples) > 30
+        assert skin.read().status[:16].tolist() == [RangeStatus.NONE] * 16, "it is not known where the nearest is"
+        assert skin.read().status[16] != RangeStatus.NONE
+        health = judged(skin, 1)
+    measured = np.array([row[1:] for row in rows if row[0] < 16]).reshape(-1, 16, 2)
+    nearest = {round(1000 * min((s not in (0, 13), d) for d, s in frame)[1]) for frame in measured.tolist()}
+    assert {one.sample.range_mm for one in samples if one.sample.flags & 1} <= nearest
+    assert [(f.unit, f.level) for f in health if f.what == "zones"] == [("hand_left", "fault"), ("hand_front", "fault")]
+
+
+def judged(skin: WireSkin, time: float):
+    windows = [UnitWindow(unit.id, 10.0) for unit in skin.receiver.units]
+    return findings([w.health(time, u) for w, u in zip(windows, skin.receiver.units, strict=True)], HealthParams())
