@@ -128,12 +128,17 @@ def _touch_sensor(unit: UnitHealth, params: HealthParams) -> Iterator[Finding]:
     )  # fmt: skip
 
 
+_FAST = 4
+_FEW_ZONES = "measure 4 x 4 zones, which is faster."
+_SUPPLY = "check its wiring and supply, and its radio if samples are lost."
+
+
 def _rates(unit: UnitHealth, params: HealthParams) -> Iterator[Finding]:
     if _unbroken(unit, params):
         yield from _beyond(
             unit, "rate", unit.rate_hz, (params.rate_hz, params.rate_fault_hz),
-            " gives {value} readings a second (limit {limit}): check its wiring and supply, and its radio if samples"
-            " are lost.",
+            " gives {value} readings a second (limit {limit}): "
+            + (_FEW_ZONES if unit.standing.zones_told > _FAST else _SUPPLY),
             digits=1, below=True,
         )  # fmt: skip
     if unit.range_late >= params.range_late:

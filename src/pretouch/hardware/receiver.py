@@ -83,8 +83,7 @@ class SkinReceiver:
         """Listen.
 
         Args:
-            units: `Skin.network`, or in their order the ids of units without zones; one without a key is a
-                HardwareError.
+            units: `Skin.network`, or the ids of units without zones; one without a key is a HardwareError.
             keys: of all units.
             host: address to listen at; 0.0.0.0 for every one of this machine.
             port: 0 lets the system choose one; one that is taken is a HardwareError.
