@@ -80,9 +80,9 @@ def test_every_field_of_every_sample_comes_back(place):
         assert len(unit.samples) == 100
         for number, kept in enumerate(unit.samples, 1):
             sent = sample(number)
-            plain = [name for name in Sample.__slots__ if name not in ("imu", "touch")]
+            plain = [name for name in Sample.__slots__ if name not in ("imu", "touch", "zones")]
             assert all(getattr(kept, name) == getattr(sent, name) for name in plain)
-            assert kept.imu.tobytes() == sent.imu + sent.touch
+            assert kept.imu.tobytes() == sent.imu + sent.touch + sent.zones
             assert kept.arrival == arrival(number)
             assert kept.stamp == stamp(number) or number <= 2
             assert (kept.offset, kept.bound) == (90.0, 1e-4)
