@@ -44,6 +44,16 @@ def test_a_unit_with_zones_is_suggested_and_shown_whole(tmp_path, capsys, panda_
     assert (len(made), len(made.mounted), made.mounted[-1].sensor.zones) == (23, 8, 4)
 
 
+def test_types_are_chosen_under_a_budget(tmp_path, capsys, panda_model):
+    told = ["skin", "coverage", "--postures", "2", "--usd", "100", "--bytes", "20000", "--sensor", "vl53l1x,vl53l7cx"]
+    assert main([*told, "--out", str(tmp_path / "more.toml"), "--json", str(tmp_path / "numbers.json")]) == 0
+    more = load_skin(tmp_path / "more.toml", panda_model).mounted[7:]
+    assert sum(unit.sensor.price_usd for unit in more) <= 100
+    assert len(more) == 2
+    told = json.loads((tmp_path / "numbers.json").read_text())["suggested"]["units"]
+    assert [one["sensor"] for one in told] == [unit.sensor.label for unit in more]
+
+
 def test_an_imported_arm_has_its_own_skin(tmp_path, capsys):
     from tests.importing.made import six_axis, written
 

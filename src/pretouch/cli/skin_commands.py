@@ -45,9 +45,14 @@ class Coverage:
     seed: int = 0
     """Seed of the random postures and paths: the same seed gives the same numbers."""
     suggest: int = 0
-    """Number of additional units to place where they help most."""
+    """Number of additional units to place where they help most; 0: none, or as many as --usd and --bytes allow."""
+    usd: float = 0.0
+    """Most that additional units may cost [USD], by the price_usd of their type; 0: no bound."""
+    bytes: float = 0.0
+    """Most that additional units may send in a second [B/s], without IMU; 0: no bound."""
     sensor: str = "vl53l1x"
-    """Type of the sensor of additional units: vl53l1x, vl53l5cx, vl53l7cx, or one that the skin file describes."""
+    """Types of sensor to choose from for additional units, separated by commas: vl53l1x, vl53l5cx, vl53l7cx,
+    capacitive, or what the skin file describes."""
     out: str = ""
     """Skin file to write, with --suggest: the existing units and the new ones."""
     figure: str = ""
