@@ -12,6 +12,9 @@ from binascii import hexlify, unhexlify
 PATH = "config.json"
 KEY_SIZE = 32
 _KEPT = ("unit", "ssid", "password", "host", "port", "battery_full_mv")
+_SENSOR = ("sensor", "zones")
+"""Of a unit with a range finder other than the VL53L1X."""
+SENSORS = ("vl53l1x", "vl53l5cx", "vl53l7cx")
 _TOUCH = ("touch_ohm", "touch_least_mn", "touch_mn_per_us")
 """Of a unit with a touch sensor: see docs/how-to/wiring.md."""
 
@@ -75,6 +78,14 @@ class Config:
         if self.touch_ohm:
             self.touch_least_mn = _whole(line, "touch_least_mn", 1, 100_000)
             self.touch_mn_per_us = _whole(line, "touch_mn_per_us", 1, 10_000)
+        self.sensor = line.get("sensor", SENSORS[0])
+        if self.sensor not in SENSORS:
+            raise ConfigError("sensor must be one of " + ", ".join(SENSORS))
+        self.zones = 1
+        if self.sensor != SENSORS[0]:
+            self.zones = _whole(line, "zones", 4, 8)
+            if self.zones not in (4, 8):
+                raise ConfigError("zones must be 4 or 8")
 
     @property
     def key(self):
@@ -91,6 +102,8 @@ class Config:
         fields = {name: getattr(self, name) for name in _KEPT}
         if self.touch_ohm:
             fields.update({name: getattr(self, name) for name in _TOUCH})
+        if self.zones > 1:
+            fields.update({name: getattr(self, name) for name in _SENSOR})
         fields["key"] = self._hex
         text = json.dumps(fields)
         with open(path + ".new", "w") as file:

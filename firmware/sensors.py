@@ -101,13 +101,17 @@ class Watched:
 
 
 class RangeFinder(Watched):
-    """The VL53L1X of a unit: the newest measurement, and how old its middle is at most. `new`: it waits to be told."""
+    """The range finder of a unit: the newest measurement, how old its middle is at most. `new`: it waits to be told.
+
+    `zones` are those of a device that has some, as they stand in a sample, else nothing.
+    """
 
     ERROR, RESTARTED = wire.RANGE_BUS_ERROR, wire.RANGE_RESTARTED
 
     def __init__(self, device, clock, bus):
         super().__init__(device.begin, clock, bus)
         self._device = device
+        self.zones = getattr(device, "zones", b"")
         self._stream = None
         self._known = False
         self._calibrated_cdeg = None
@@ -161,8 +165,8 @@ class RangeFinder(Watched):
         self.new = self._known = True
         self._well()
 
-    def put(self, sample, now):
-        """Tell the newest measurement, and the flags, in a sample as of now."""
+    def put(self, sample, now, takes_zones=False):
+        """Tell the newest measurement, and the flags, in a sample as of now; zones to whom they are welcome."""
         age = self._clock.diff(now, self._middle) if self._known else _FORGET_US
         late = not self._up or self._clock.diff(now, self._fresh) > 2 * self._device.period_us
         if age >= _FORGET_US:
@@ -173,6 +177,9 @@ class RangeFinder(Watched):
             sample.range_stream, sample.range_status, sample.range_mm = device.stream, device.status, device.mm
             sample.range_sigma, sample.range_signal = device.sigma, device.signal
             sample.range_ambient, sample.range_spads = device.ambient, device.spads
+            if self.zones and takes_zones:
+                sample.zones = self.zones
+                sample.flags |= wire.ZONES
         if self._known:
             sample.range_age_us = age
         sample.flags |= self.take_flags() | (wire.RANGE_NEW if self.new else 0) | (wire.RANGE_LATE if late else 0)

@@ -53,7 +53,7 @@ def serve(board, clock, config):
     watchdog = board.open_watchdog()
     board.full_speed()
     station = Station(board.open_wlan(), config.ssid, config.password, clock)
-    unit = build(board, clock, config)
+    unit = build(board, clock, config, watchdog.feed)
     while True:
         watchdog.feed()
         station.step(clock.ticks())
@@ -61,14 +61,24 @@ def serve(board, clock, config):
         time.sleep_ms(1)
 
 
-def build(board, clock, config):
-    """Return the unit of a configuration."""
+def build(board, clock, config, feed):
+    """Return the unit of a configuration; `feed` feeds the watchdog in what takes long."""
     port = Datagrams(open_socket, address(config.host, config.port))
     link = Link(config.unit, config.key, port, clock, board.draw, _VERSION_ON_WIRE, board.reset_cause())
     i2c, bus = board.open_bus(), Bus()
-    range_finder, imu = RangeFinder(VL53L1X(i2c), clock, bus), Imu(LSM6DS3(i2c), clock, bus)
+    range_finder = RangeFinder(range_finder_of(i2c, config, feed), clock, bus)
+    imu = Imu(LSM6DS3(i2c), clock, bus)
     battery = board.open_battery(config.battery_full_mv)
     return Unit(config.unit, link, range_finder, imu, bus, clock, battery, touch_of(board, clock, config))
+
+
+def range_finder_of(i2c, config, feed):
+    """Return the driver of the range finder of a configuration; one with zones is loaded where there is one."""
+    if config.zones == 1:
+        return VL53L1X(i2c)
+    from vl53l5cx import VL53L5CX
+
+    return VL53L5CX(i2c, config.zones, 60 if config.sensor == "vl53l7cx" else 45, feed)
 
 
 def touch_of(board, clock, config):

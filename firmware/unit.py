@@ -26,7 +26,7 @@ class Unit:
         self._clock = clock
         self._battery_mv = battery_mv
         self._touch = touch
-        self._sample = Sample(number)
+        self._sample = Sample(number, len(range_finder.zones))
         self._cycles = 0
         self._last = clock.ticks()
 
@@ -56,7 +56,7 @@ class Unit:
         self._imu.step(sample.imu, now)
         now = self._clock.ticks()
         sample.flags = 0
-        self._range_finder.put(sample, now)
+        self._range_finder.put(sample, now, self._link.takes_zones)
         self._imu.put(sample, now)
         if self._touch is not None and self._link.takes_touch:
             self._touch.put(sample, now)

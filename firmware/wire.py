@@ -18,9 +18,10 @@ RANGE_RESTARTED = const(16)
 IMU_RESTARTED = const(32)
 RANGE_LATE = const(64)
 TOUCH = const(128)
+ZONES = const(256)
 
-TAKES_TOUCH = const(1)
-"""In a beacon: a sample may carry a touch reading."""
+TAKES_TOUCH, TAKES_ZONES = const(1), const(2)
+"""In a beacon: a sample may carry a touch reading, or the zones of a range."""
 TOUCH_OK, TOUCH_FAILED = const(0), const(1)
 NO_FORCE = const(0xFFFFFFFF)
 
@@ -86,9 +87,12 @@ def open_beacon(datagram, unit, challenge, mac):
 class Sample:
     """What the unit says next, field by field, and the datagram made of it. The units are those of the wire."""
 
-    def __init__(self, unit):
+    def __init__(self, unit, zones_size=0):
+        """`zones_size` is the most that zones take [B]."""
         self._unit = unit
-        self._datagram = memoryview(bytearray(_SAMPLE_HEAD + IMU_MOST * IMU_SAMPLE_SIZE + _TOUCH_SIZE + TAG_SIZE))
+        most = _SAMPLE_HEAD + IMU_MOST * IMU_SAMPLE_SIZE + _TOUCH_SIZE + zones_size + TAG_SIZE
+        self._datagram = memoryview(bytearray(most))
+        self.zones = b""
         self.imu = self._datagram[_SAMPLE_HEAD : _SAMPLE_HEAD + IMU_MOST * IMU_SAMPLE_SIZE]
         self.flags = self.sequence = self.time_us = self.beacon = self.beacon_hold_us = 0
         self.battery_mv = self.bus_errors = 0
@@ -117,5 +121,8 @@ class Sample:
                 self.touch_force_mn, self.touch_age_us,
             )  # fmt: skip
             end += _TOUCH_SIZE
+        if self.flags & ZONES:
+            self._datagram[end : end + len(self.zones)] = self.zones
+            end += len(self.zones)
         self._datagram[end : end + TAG_SIZE] = mac.whole(self._datagram[:end])[:TAG_SIZE]
         return self._datagram[: end + TAG_SIZE]

@@ -82,7 +82,7 @@ def compiled(folder: Path) -> dict[str, bytes]:
 
 
 @contextmanager
-def running_unit(port: int, folder: Path) -> Iterator[None]:
+def running_unit(port: int, folder: Path, script: str = SCRIPT) -> Iterator[None]:
     """A unit that sends to this port of 127.0.0.1."""
     node = shutil.which("node")
     if node is None or not harness.PACKAGE.exists():
@@ -92,7 +92,7 @@ def running_unit(port: int, folder: Path) -> Iterator[None]:
     command = [node, harness.HERE / "unit.mjs", harness.PACKAGE]
     with subprocess.Popen(command, stdin=subprocess.PIPE, text=True) as process:
         assert process.stdin is not None
-        process.stdin.write(json.dumps({"files": files, "script": SCRIPT, "port": port}) + "\n")
+        process.stdin.write(json.dumps({"files": files, "script": script, "port": port}) + "\n")
         process.stdin.flush()
         yield
 

@@ -18,9 +18,10 @@ session = wire.session_mac(mac, {CHALLENGE!r}, {NONCE!r})
 """
 SAY_SAMPLES = """
 for fields in json.load(open(FILE)):
-    sample = wire.Sample(fields["unit"])
+    sample = wire.Sample(fields["unit"], 322)
+    sample.zones = unhexlify(fields["zones"])
     for name in fields:
-        if name not in ("unit", "imu", "touch"):
+        if name not in ("unit", "imu", "touch", "zones"):
             setattr(sample, name, fields[name])
     imu = unhexlify(fields["imu"])
     sample.imu[:len(imu)] = imu
@@ -55,6 +56,9 @@ def samples() -> list[wire.Sample]:
         sample.imu = rng.bytes(sample.imu_count * wire.IMU_SAMPLE.size)
         if sample.flags & wire.Flag.TOUCH:
             sample.touch = rng.bytes(wire.TOUCH.size)
+        if sample.flags & wire.Flag.ZONES:
+            side = int(rng.integers(1, 9))
+            sample.zones = bytes([side]) + rng.bytes(wire.zones_size(side) - 1)
         made.append(sample)
     return made
 
@@ -62,7 +66,7 @@ def samples() -> list[wire.Sample]:
 def test_samples_are_the_bytes_the_receiver_encodes(unit_python: Run) -> None:
     made = samples()
     content = json.dumps(
-        [dataclasses.asdict(sample) | {"imu": sample.imu.hex(), "touch": sample.touch.hex()} for sample in made]
+        [dataclasses.asdict(s) | {name: getattr(s, name).hex() for name in ("imu", "touch", "zones")} for s in made]
     )
     said = [bytes.fromhex(line) for line in in_unit(unit_python, content, SAY_SAMPLES)]
     assert said == [sample.encode(SESSION) for sample in made]

@@ -128,6 +128,10 @@ class Provision:
     """UDP port of the receiver."""
     battery_full_mv: int = 0
     """Battery voltage at the full scale of the unit's converter [mV] (docs/how-to/wiring.md); 0: no battery."""
+    sensor: str = "vl53l1x"
+    """Range finder of the unit: vl53l1x, vl53l5cx or vl53l7cx (docs/how-to/flashing.md)."""
+    zones: int = 4
+    """Zones along each side of its range finder, 4 or 8, if it has some."""
     touch_ohm: int = 0
     """Resistor from the touch sensor's pin to ground [ohm] (docs/how-to/wiring.md); 0: no touch sensor."""
     touch_least_mn: int = 500

@@ -23,7 +23,7 @@ def provision_unit(command: "Provision") -> None:
     unit = _unit(keys, command.id, command.number, place)
     with SerialLine(Path(command.device)):  # what is wrong is said before the password is asked for
         network = Network(command.ssid, "", command.host, command.port, command.battery_full_mv,
-            command.touch_ohm, command.touch_least_mn, command.touch_mn_per_us,
+            command.touch_ohm, command.touch_least_mn, command.touch_mn_per_us, command.sensor, command.zones,
         )  # fmt: skip
     network = replace(network, password=_password(command))
     with SerialLine(Path(command.device)) as line:

@@ -42,6 +42,10 @@ class Line(Protocol):
         ...
 
 
+SENSORS = ("vl53l1x", "vl53l5cx", "vl53l7cx")
+"""Range finders that the firmware knows; the first has no zones."""
+
+
 @dataclass(frozen=True)
 class Network:
     """Where a unit sends: what cannot be is a HardwareError."""
@@ -59,6 +63,10 @@ class Network:
     """Smallest force that is a touch [mN]."""
     touch_mn_per_us: int = 10
     """Force by the touch sensor's conductance [mN/uS]: of the FSR 402 about 10, to be calibrated."""
+    sensor: str = "vl53l1x"
+    """Range finder of the unit: one of `SENSORS`."""
+    zones: int = 4
+    """Zones along each side of its range finder, 4 or 8, if it has some."""
 
     def __post_init__(self) -> None:
         if not 1 <= _size(self.ssid, "network's name") <= _SSID_MOST or "\0" in self.ssid:
@@ -86,7 +94,11 @@ class Network:
                 f"The battery voltage at the converter's full scale is {self.battery_full_mv} mV: give 0 to"
                 f" {_FULL_MOST_MV}, for example 5000."
             )
-
+        if self.sensor not in SENSORS or self.zones not in (4, 8):
+            raise HardwareError(
+                f"The unit's sensor is {self.sensor!r} with {self.zones} zones along a side: choose from"
+                f" {', '.join(SENSORS)}, and 4 or 8."
+            )
         limits = {"touch_ohm": (0, 1_000_000), "touch_least_mn": (1, 100_000), "touch_mn_per_us": (1, 10_000)}
         for name, (least, most) in limits.items():
             if not least <= getattr(self, name) <= most:
@@ -142,6 +154,8 @@ def provision(line: Line, key: UnitKey, network: Network, timeout: float = ANSWE
         "password": network.password, "host": network.host, "port": network.port,
         "battery_full_mv": network.battery_full_mv,
     }  # fmt: skip
+    if network.sensor != SENSORS[0]:
+        told |= {"sensor": network.sensor, "zones": network.zones}
     if network.touch_ohm:
         told |= {name: getattr(network, name) for name in ("touch_ohm", "touch_least_mn", "touch_mn_per_us")}
     data = json.dumps(told, ensure_ascii=False).encode() + b"\n"  # units join no halves of \u escapes

@@ -55,6 +55,19 @@ def a_touch_sensor_is_kept_where_there_is_one():
     assert _refused(touch_ohm=3300, touch_least_mn=1).startswith("touch_mn_per_us must be")
 
 
+def a_range_finder_with_zones_is_kept_where_there_is_one():
+    Config(dict(LINE, sensor="vl53l7cx", zones=8)).save()
+    assert (load().sensor, load().zones) == ("vl53l7cx", 8)
+    Config(LINE).save()
+    with open(PATH) as file:
+        assert "zones" not in file.read()
+    assert (load().sensor, load().zones) == ("vl53l1x", 1)
+    assert _refused(sensor="vl53l8cx") == "sensor must be one of vl53l1x, vl53l5cx, vl53l7cx"
+    assert _refused(sensor=5).startswith("sensor must be one of")
+    assert _refused(sensor="vl53l5cx") == "zones must be a whole number from 4 to 8"
+    assert _refused(sensor="vl53l5cx", zones=5) == "zones must be 4 or 8"
+
+
 def the_fingerprint_is_of_the_key():
     assert Config(LINE).fingerprint == "4773d12e"
 

@@ -103,10 +103,14 @@ class FakeReceiver:
         values = struct.unpack_from(SAMPLE, body)
         sample = {FIELDS[i]: values[i] for i in range(len(FIELDS))}
         rest = body[struct.calcsize(SAMPLE) :]
-        sample["imu"], sample["touch"] = rest[: 12 * sample["count"]], None
+        end = 12 * sample["count"]
+        sample["imu"], sample["touch"], sample["zones"] = rest[:end], None, b""
         if sample["flags"] & 128:
-            sample["touch"] = struct.unpack("<BBHII", rest[12 * sample["count"] :])
-        else:
-            assert len(rest) == 12 * sample["count"]
+            sample["touch"] = struct.unpack("<BBHII", rest[end : end + 12])
+            end += 12
+        if sample["flags"] & 256:
+            sample["zones"] = rest[end:]
+            end += 2 + 5 * rest[end] ** 2
+        assert len(rest) == end
         assert len(sample["imu"]) == 12 * sample["count"]
         self.samples.append(sample)

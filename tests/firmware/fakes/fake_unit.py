@@ -6,34 +6,40 @@ from fake_bus import Clock as FakeClock
 from fake_lsm6ds3 import FakeLsm6ds3
 from fake_receiver import Draw, FakeReceiver, FakeTime
 from fake_vl53l1x import FakeVl53l1x
+from fake_vl53l5cx import FakeVl53l5cx
 from link import Link
 from lsm6ds3 import LSM6DS3
 from sensors import Bus, Imu, RangeFinder, Touch
 from unit import Unit
 from vl53l1x import VL53L1X
+from vl53l5cx import VL53L5CX
 
 KEY = bytes(range(32))
 
 
 class FakeUnit:
-    def __init__(self, start_us=0, touch=None):
-        """`touch` is the device of its touch sensor, if it has one."""
+    def __init__(self, start_us=0, touch=None, zones=1):
+        """`touch` is the device of its touch sensor, if it has one; `zones` are along a side of its range finder."""
         self.now = FakeClock(start_us)
         time = FakeTime(self.now)
         self.bus = FakeBus(self.now)
         self.vl53l1x, self.lsm6ds3 = FakeVl53l1x(self.now), FakeLsm6ds3(self.now)
-        self.bus.add(self.vl53l1x)
+        self.vl53l5cx = FakeVl53l5cx(self.now)
+        self.bus.add(self.vl53l1x if zones == 1 else self.vl53l5cx)
         self.bus.add(self.lsm6ds3)
         self.receiver = FakeReceiver(7, KEY)
         self.battery_mv = 3900
         self.errors = Bus()
         clock = Clock(time)
         sleep_ms = self.now.sleep_ms
+        device = VL53L1X(self.bus, 0x29, sleep_ms)
+        if zones > 1:
+            device = VL53L5CX(self.bus, zones, sleep_ms=sleep_ms)
         imu = LSM6DS3(self.bus, None, sleep_ms, self.now.ticks_us, time.ticks_diff)
         self.unit = Unit(
             7,
             Link(7, KEY, self.receiver, clock, Draw(), 1, 1),
-            RangeFinder(VL53L1X(self.bus, 0x29, sleep_ms), clock, self.errors),
+            RangeFinder(device, clock, self.errors),
             Imu(imu, clock, self.errors),
             self.errors,
             clock,
