@@ -10,6 +10,7 @@ import termios
 import threading
 import tty
 import types
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -125,6 +126,15 @@ def test_a_new_unit_is_told_its_key_and_says_so(unit, tmp_path, password, capsys
     assert "hand-1 is number 1 with the key " + fingerprint(key.key) in said
     assert key.key.hex() not in said
     assert "correct horse" not in said
+
+
+def test_a_unit_is_told_its_range_finder_where_that_has_zones(unit, tmp_path, password):
+    assert cli.main(arguments(unit, tmp_path, password, "--sensor", "vl53l5cx", "--zones", "8")) == 0
+    stored = json.loads((tmp_path / "config.json").read_text().splitlines()[0])
+    assert (stored["sensor"], stored["zones"]) == ("vl53l5cx", 8)
+    for wrong in ({"sensor": "vl53l8cx"}, {"sensor": "vl53l5cx", "zones": 5}):
+        with pytest.raises(HardwareError, match="choose from vl53l1x, vl53l5cx, vl53l7cx, and 4 or 8"):
+            replace(NETWORK, **wrong)
 
 
 def test_the_same_unit_is_told_again_without_ado_and_another_one_only_if_asked(unit, tmp_path, password, capsys):
