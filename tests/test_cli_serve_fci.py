@@ -21,7 +21,8 @@ from pretouch.robot.description import fr3, panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin
 from pretouch.serving.fci.arm import ArmSetup, ServedArm
-from pretouch.serving.fci.wire import CONNECT, HEADER, PANDA
+from pretouch.serving.fci.motion import Setpoint
+from pretouch.serving.fci.wire import CONNECT, HEADER, PANDA, Impedance
 from pretouch.sim.scene import SceneSpec
 
 
@@ -79,6 +80,10 @@ def test_its_units_are_heard_in_real_time(tmp_path: Path) -> None:
         (["--units", "127.0.0.1:7337"], "needs --keys"),
         (["--hand", "--scene", "static"], "--hand needs --scene empty"),
         (["--seed", "-1"], "give 0 or more"),
+        (["--scene", "static", "--box", "1,1,1:1,1,1"], "--box needs --scene empty"),
+        (["--box", "1,1,1"], "give centre and edges, such as 0.5,0.3,0.4:0.3,0.04,0.24"),
+        (["--box", "0,0,nan:1,1,1"], "--box is '0,0,nan:1,1,1'"),
+        (["--box", "0.4,0,0.5:0.3,0.3,0.3"], "The arm touches something where it stands at first"),
         (["--scene", "static", "--stiffness", "0"], "--stiffness is 0 N/m: give more than 0"),
         (["--scene", "static", "--stiffness", "nan"], "--stiffness is nan N/m"),
         (["--truth", "/nowhere/truth.csv"], "The truth cannot be written"),
@@ -98,8 +103,8 @@ def test_a_person_types_pushes() -> None:
         typed = TypedPushes(arm, terminal)
         assert typed.possible
         assert not typed.take()
-        os.write(ours, b"-y\n0,0,4:0.5\n0,1")
-        for _ in range(2):  # a terminal gives a line at a time
+        os.write(ours, b"-y\n0,0,4:0.5\n0.1:3,0,0\n0,1")
+        for _ in range(3):  # a terminal gives a line at a time
             assert not typed.take()
         arm.step(None)
         np.testing.assert_array_equal(arm.true_force, [0.0, -15.0, 4.0])
@@ -107,7 +112,41 @@ def test_a_person_types_pushes() -> None:
         typed.take()
         arm.step(None)
         np.testing.assert_array_equal(arm.true_force, [0.0, -14.0, 4.0])
+        for _ in range(100):  # a tenth of a second from when it was typed
+            arm.step(None)
+        np.testing.assert_array_equal(arm.true_force, [3.0, -14.0, 4.0])
     os.close(ours)
+
+
+def test_a_program_types_in_place_of_a_person_and_ends_the_server_by_ending(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "pretouch.cli", "serve-fci", "--port", "0", "--lockstep", "--stdin"]
+    done = subprocess.run(command, input="time\nharder\n", capture_output=True, text=True, timeout=60.0, cwd=tmp_path)
+    assert done.returncode == 0
+    listening, time, refused = done.stdout.splitlines()
+    assert listening.startswith("Listening at")
+    assert time == "The arm's time is 0.000 s."
+    assert refused.startswith("'harder' is not a push")
+
+
+def test_what_is_typed_while_the_arm_comes_to_rest_waits_until_it_has() -> None:
+    arm = ServedArm(ArmSetup(RobotModel(panda()), "panda", panda().q_ready, SceneSpec()))
+    arm.begin(Impedance.JOINT)
+    arm.step(Setpoint(np.zeros(7)))
+    arm.step(Setpoint(np.zeros(7), finished=True))
+    ours, theirs = os.pipe()
+    with os.fdopen(ours) as read, os.fdopen(theirs, "w") as written:
+        typed = TypedPushes(arm, read, program=True)
+        written.write("0,15,0\n")
+        written.flush()
+        while not arm.settled:
+            assert not typed.take()
+            arm.step(None)
+            assert not arm.true_force.any()
+        assert not typed.take()
+        arm.step(None)
+        np.testing.assert_array_equal(arm.true_force, [0.0, 15.0, 0.0])
+        written.close()
+        assert typed.take()
 
 
 def test_a_push_that_is_over_is_said_with_what_the_arm_measured_of_it(capsys: pytest.CaptureFixture[str]) -> None:

@@ -80,3 +80,18 @@ def test_each_hint_works_in_an_installation_from_a_wheel(built: Path):
         assert "Traceback" not in done.stderr
         assert ": run " not in done.stderr
         assert otherwise in done.stderr
+
+
+@pytest.mark.slow
+def test_pytest_finds_the_fixture_of_a_wheel_and_warns_of_nothing(built: Path):
+    done = ran(sys.executable, "-m", "venv", "tester", folder=built)
+    assert done.returncode == 0, done.stderr
+    python = str(built / "tester/bin/python")
+    done = ran(
+        python, "-m", "pip", "install", "-q", f"dist/pretouch-{VERSION}-py3-none-any.whl", "pytest", folder=built
+    )
+    assert done.returncode == 0, done.stderr
+    # begun by a program that has imported the package before
+    program = "import sys, pretouch, pytest; sys.exit(pytest.main(['-W', 'error', '--fixtures', 'dist']))"
+    done = ran(python, "-c", program, folder=built)
+    assert "franka_server" in done.stdout, done.stderr

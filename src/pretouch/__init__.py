@@ -1,7 +1,8 @@
 """Contact-anticipating control for robot arms with onboard proximity sensing.
 
 What a program of your own needs is here by name and loaded when it is asked for: `import pretouch` loads nothing. The
-names stand in `__init__.pyi`.
+names stand in `__init__.pyi`. (PYTEST_DONT_REWRITE: a program that has imported this and then begins a test run is not
+warned that pytest came too late to rewrite assertions.)
 """
 
 import re

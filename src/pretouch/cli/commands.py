@@ -206,7 +206,9 @@ class ServeFci:
     side: Literal["+y", "-y"] = "+y"
     """Side of the board."""
     stiffness: float = 25_000.0
-    """Contact stiffness of the board [N/m], greater than 0."""
+    """Contact stiffness of board and boxes [N/m], greater than 0."""
+    box: tuple[str, ...] = ()
+    """Boxes in the empty scene, each X,Y,Z:DX,DY,DZ: centre and edges [m], base frame."""
     start: Literal["ready", "path"] = "ready"
     """Initial posture of the arm: its usual one, or that at the start of the path."""
     seed: int = 0
@@ -222,6 +224,9 @@ class ServeFci:
     """File of the keys of the units, the same as the receiver's."""
     skin: str = ""
     """Skin file; by default the seven units that come with the package."""
+    stdin: bool = False
+    """Take what a person would type, such as 0.5:0,15,0:0.2 (0.5 s from now), from the standard input though it is no
+    terminal, and end with it."""
     truth: str = ""
     """CSV file for the ground truth: true force on the arm and joint positions, each millisecond."""
     drop: str = ""

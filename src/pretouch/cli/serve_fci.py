@@ -29,19 +29,23 @@ from pretouch.serving.simulate import VisitingHand
 from pretouch.signals import ended
 from pretouch.sim.hand import HandScript
 from pretouch.sim.paper_scenes import dynamic_pushes, static_path, static_scene
-from pretouch.sim.scene import HandSpec, SceneSpec
+from pretouch.sim.scene import Box, HandSpec, SceneSpec
 from pretouch.types import FloatArray
 
 if TYPE_CHECKING:
     from pretouch.cli.commands import ServeFci
 
 _say = partial(print, flush=True)
-_STOP = (b"stop", b"release")
+_STOP = ("stop", "release")
 """What is typed for the user stop."""
+_TIME = "time"
+"""What is typed to be told the arm's time."""
 _LAG_S = 0.2
 """How long the arm's estimate of a push that has ended is still looked at [s]."""
 _STIFFEST = 1e6
-"""Largest stiffness of the board [N/m]."""
+"""Largest stiffness of board and boxes [N/m]."""
+_LARGEST_M = 10.0
+"""Largest edge of a box [m]."""
 
 
 def serve_fci(command: "ServeFci") -> None:
@@ -57,50 +61,61 @@ def serve_fci(command: "ServeFci") -> None:
         host, port = server.address
         pace = "lockstep" if c.lockstep else "real time"
         _say(f"Listening at {host}:{port} (FCI {server.protocol.version}, {pace}).")
-        typed = TypedPushes(arm, sys.stdin)
-        if typed.possible:
+        typed = TypedPushes(arm, sys.stdin, c.stdin)
+        if typed.possible and not c.stdin:
             _say(
                 "Type +x, -x, +y, -y, +z or -z and Enter to push the hand, or a force such as 0,15,0 [N];"
-                " stop presses the user stop, release releases it."
+                " stop presses the user stop, release releases it, time tells the arm's time."
             )
         server.serve(lambda: ended() or typed.take())
 
 
 class TypedPushes:
-    """Pushes that a person at the terminal types, one a line."""
+    """Pushes that a person at the terminal types, one a line, or a program writes."""
 
-    def __init__(self, arm: ServedArm, source: TextIO) -> None:
-        """Take the arm that is pushed, and what is typed at; only a terminal is listened to."""
-        self._arm, self._text = arm, b""
+    def __init__(self, arm: ServedArm, source: TextIO, program: bool = False) -> None:
+        """Take the arm that is pushed, and what is typed at: a terminal, or a pipe of a `program`, which ends it."""
+        self._arm, self._text, self._program = arm, b"", program
         self._push: TcpPush | None = None
         self._rest, self._largest = np.zeros(3), 0.0
-        self._descriptor = source.fileno() if source.isatty() else -1
+        self._descriptor = source.fileno() if program or source.isatty() else -1
 
     @property
     def possible(self) -> bool:
-        """Whether there is a terminal."""
+        """Whether there is somebody to listen to."""
         return self._descriptor >= 0
 
     def take(self) -> bool:
-        """Have what was typed come, and say how it was measured; always False, so that a server goes on."""
+        """Have what was typed come, and say how it was measured; True once the program that typed has gone."""
         self._follow()
-        if not self.possible or not select.select([self._descriptor], [], [], 0)[0]:
+        # while the arm still swings after a motion, its time would depend on when the line arrived
+        if not self.possible or not (self._arm.moving or self._arm.settled):
+            return False
+        if not select.select([self._descriptor], [], [], 0)[0]:
             return False
         read = os.read(self._descriptor, 4096)
         if not read:
             self._descriptor = -1
+            return self._program
         *lines, self._text = (self._text + read).split(b"\n")
         for line in filter(bytes.strip, lines):
-            if line.strip() in _STOP:
-                self._arm.press_stop(line.strip() == b"stop")
-                continue
-            try:
-                self._push = typed_push(line.decode(errors="replace"), self._arm.pushes.now)
-                self._arm.pushes.add(self._push)
-                self._rest, self._largest = self._estimate(), 0.0
-            except ParameterError as error:
-                _say(str(error))
+            self._do(line.decode(errors="replace").strip())
         return False
+
+    def _do(self, line: str) -> None:
+        now = self._arm.pushes.now
+        if line in _STOP:
+            self._arm.press_stop(line == "stop")
+            return
+        if line == _TIME:
+            _say(f"The arm's time is {now:.3f} s.")
+            return
+        try:
+            self._push = typed_push(line, now)
+            self._arm.pushes.add(self._push)
+            self._rest, self._largest = self._estimate(), 0.0
+        except ParameterError as error:
+            _say(str(error))
 
     def _follow(self) -> None:
         """Note how much of the newest push the arm's own estimate shows, and say it once the push is over."""
@@ -127,6 +142,8 @@ def _setup(c: "ServeFci") -> ArmSetup:
     model = RobotModel(robot_named(c.robot))
     if c.hand and c.scene != "empty":
         raise ParameterError(f"--hand needs --scene empty: {c.scene} is the scene of an experiment.")
+    if c.box and c.scene != "empty":
+        raise ParameterError(f"--box needs --scene empty: {c.scene} is the scene of an experiment.")
     if not 0 < c.stiffness <= _STIFFEST:
         raise ParameterError(f"--stiffness is {c.stiffness:g} N/m: give more than 0, and at most {_STIFFEST:g}.")
     if c.seed < 0:
@@ -145,10 +162,25 @@ def _scene(c: "ServeFci", model: RobotModel) -> tuple[SceneSpec, HandScript | No
             return static_scene(c.trajectory, c.side, c.stiffness, c.seed), None, static_path(c.trajectory, c.side)
         case "dynamic":
             return SceneSpec(hand=HandSpec()), Pusher(model, dynamic_pushes(c.seed)), Circle()
-    path = static_path(c.trajectory, c.side)
+    path, boxes = static_path(c.trajectory, c.side), tuple(_box(text, c.stiffness) for text in c.box)
     if c.hand:
-        return SceneSpec(hand=HandSpec(start=VisitingHand.away)), VisitingHand(model.ee), path
-    return SceneSpec(), None, path
+        return SceneSpec(boxes, HandSpec(start=VisitingHand.away)), VisitingHand(model.ee), path
+    return SceneSpec(boxes), None, path
+
+
+def _box(text: str, stiffness: float) -> Box:
+    """Read a box from X,Y,Z:DX,DY,DZ."""
+    center, _, size = text.partition(":")
+    try:
+        (x, y, z), (dx, dy, dz) = (map(float, part.split(",")) for part in (center, size))
+    except ValueError:
+        x = y = z = dx = dy = dz = np.nan
+    if not np.all(np.isfinite([x, y, z])) or not all(0 < side <= _LARGEST_M for side in (dx, dy, dz)):
+        raise ParameterError(
+            f"--box is {text!r}: give centre and edges, such as 0.5,0.3,0.4:0.3,0.04,0.24 [m], with edges of up to"
+            f" {_LARGEST_M:g} m."
+        )
+    return Box(f"box {text}", (x, y, z), (dx / 2, dy / 2, dz / 2), stiffness)
 
 
 def _units(c: "ServeFci", model: RobotModel) -> UnitsSetup | None:
@@ -173,7 +205,7 @@ def _truth(place: str) -> Iterator[Callable[[float, ServedArm], None]]:
         Path(place).touch()
     except OSError as error:
         raise ParameterError(f"The truth cannot be written to {place} ({error.strerror}): give another file.") from None
-    with Path(place).open("w", newline="") as file:
+    with Path(place).open("w", buffering=1, newline="") as file:  # each line at once: others may read it meanwhile
         table = csv.writer(file)
         table.writerow(["time_s", *(f"force_{axis}_N" for axis in "xyz"), *(f"q{i}_rad" for i in range(1, 8))])
 

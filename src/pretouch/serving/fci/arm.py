@@ -5,7 +5,7 @@ from typing import Self
 
 import numpy as np
 
-from pretouch.errors import RobotModelError
+from pretouch.errors import ParameterError, RobotModelError
 from pretouch.robot.model import RobotModel
 from pretouch.serving.fci.collision import Contacts, default_behavior
 from pretouch.serving.fci.frames import frames_of
@@ -76,6 +76,11 @@ class ServedArm:
         self._since_motion, self._stop_pressed = _COMES_TO_REST, False
         for _ in range(round(SETTLE_S / PERIOD_S)):
             self._pass_time()
+            if self.plant.true_force.any():  # from within an object it would be flung out
+                raise ParameterError(
+                    "The arm touches something where it stands at first: give another place to the object, or another"
+                    " posture to the arm."
+                )
 
     def __enter__(self) -> Self:
         return self

@@ -1,13 +1,16 @@
 """Forces of known size on the end-effector: what a client's estimate can be compared with."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pretouch.errors import ParameterError
-from pretouch.sim.plant import Plant
 from pretouch.types import FloatArray
+
+if TYPE_CHECKING:  # who only writes pushes down needs no simulation
+    from pretouch.sim.plant import Plant
 
 _LASTING_S = 0.5
 """How long a push lasts unless it says so [s]."""
@@ -55,24 +58,29 @@ def push_of(text: str) -> TcpPush:
 
 
 def typed_push(text: str, now: float) -> TcpPush:
-    """Read a push that begins now [s] from an axis, as +y or -x, or from FX,FY,FZ or FX,FY,FZ:DURATION [N, s]."""
+    """Read what is typed now [s]: an axis, as +y or -x, FX,FY,FZ or FX,FY,FZ:DURATION, or a push that comes T from now.
+
+    The latter as of `push_of` [s, N, s].
+    """
     plain = text.strip().lower()
     if plain in AXES:
         x, y, z = AXES[plain]
         return TcpPush(now, (_TYPED_N * x, _TYPED_N * y, _TYPED_N * z), _TYPED_S)
+    at_once = "," in plain.partition(":")[0]
     try:
-        return push_of(f"{now}:{plain}")
+        push = push_of(f"0:{plain}" if at_once else plain)
     except ParameterError:
         raise ParameterError(
             f"{plain!r} is not a push: type an axis, such as +y, or a force, such as 0,15,0 [N], of at most {_MOST_N:g}"
             " N."
         ) from None
+    return replace(push, start=now + push.start)
 
 
 class Pushes:
     """Pushes an arm at the end-effector, at the times of a clock that begins with the plant's at `begin`."""
 
-    def __init__(self, plant: Plant, pushes: tuple[TcpPush, ...], begin: float) -> None:
+    def __init__(self, plant: "Plant", pushes: tuple[TcpPush, ...], begin: float) -> None:
         self._plant, self._pushes, self._begin, self._link = plant, pushes, begin, plant.model.ee
         self.force: FloatArray = _NONE
         """(3,) the force now [N]."""
