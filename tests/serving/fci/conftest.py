@@ -156,14 +156,14 @@ class RawClient:
     def first_of_motion(self) -> np.void:
         return self.state_where(lambda state: state["robot_mode"] == 2)
 
-    def command(self, message_id: int, qd: Any, finished: bool = False) -> None:
+    def command(self, message_id: int, values: Any, finished: bool = False, field: str = "dq_c") -> None:
         command = np.zeros((), self.protocol.command)
-        command["message_id"], command["dq_c"], command["motion_generation_finished"] = message_id, qd, finished
+        command["message_id"], command[field], command["motion_generation_finished"] = message_id, values, finished
         self.udp.sendto(command.tobytes(), self.robot_udp)
 
-    def turn(self, state: np.void, qd: Any, finished: bool = False) -> np.void:
+    def turn(self, state: np.void, values: Any, finished: bool = False, field: str = "dq_c") -> np.void:
         """Answer a state and return the next."""
-        self.command(int(state["message_id"]), qd, finished)
+        self.command(int(state["message_id"]), values, finished, field)
         return self.state_where(lambda new: new["message_id"] > state["message_id"])
 
     def close(self) -> None:

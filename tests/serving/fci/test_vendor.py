@@ -26,6 +26,22 @@ def test_a_motion_ends_where_its_velocities_lead(serve: Any, kind: RobotKind) ->
     np.testing.assert_allclose(done["after"]["q"], done["after"]["q_d"], atol=5e-3)
 
 
+def test_a_motion_through_positions_ends_where_they_lead(serve: Any, kind: RobotKind) -> None:
+    done = serve(kind).ask("positions", 1.0)
+    assert done["error"] is None
+    assert done["after"]["mode"] == "idle"
+    np.testing.assert_allclose(np.subtract(done["after"]["q_d"], done["first"]["q_d"]), 0.1, atol=1e-5)
+    np.testing.assert_allclose(done["after"]["q"], done["after"]["q_d"], atol=5e-3)
+
+
+def test_positions_begun_elsewhere_are_refused_by_the_vendors_name(serve: Any, kind: RobotKind) -> None:
+    done = serve(kind).ask("positions", 1.0, 0.2)
+    assert "joint_position_motion_generator_start_pose_invalid" in done["error"]
+    assert done["after"]["last_motion_errors"] == ["joint_position_motion_generator_start_pose_invalid"]
+    np.testing.assert_array_equal(done["after"]["q_d"], done["first"]["q_d"])
+    assert done["recovered"]["mode"] == "idle"
+
+
 @pytest.mark.slow
 def test_two_runs_are_the_same_to_the_last_bit(serve: Any, kind: RobotKind) -> None:
     runs, truths = [], []
@@ -121,7 +137,7 @@ def test_what_is_not_served_is_refused_in_the_vendors_words(serve: Any, kind: Ro
     assert len(errors) >= 3
     for error in errors.values():
         assert error == 'libfranka: Move command rejected: command not possible in the current mode ("Idle")!'
-    assert "only joint velocities are served" in " ".join(served.said)
+    assert "only joint positions and velocities are served" in " ".join(served.said)
 
 
 def test_the_fr3s_library_computes_with_our_model(serve: Any) -> None:

@@ -52,28 +52,31 @@ def _names(errors):
     return sorted(name for name in dir(errors) if not name.startswith("_") and getattr(errors, name) is True)
 
 
-def _control(lib, robot, on_state):
-    """Call `on_state(state, time) -> (velocities, finished)` for each state of a motion; return the error, or None."""
-    time = 0.0
+_COMMANDS = {"joint_velocity": "JointVelocities", "joint_position": "JointPositions"}
+
+
+def _control(lib, robot, on_state, what="joint_velocity"):
+    """Call `on_state(state, time) -> (values, finished)` for each state of a motion; return the error, or None."""
+    time, made = 0.0, getattr(lib, _COMMANDS[what])
     try:
-        if hasattr(robot, "control_joint_velocity"):
+        if hasattr(robot, f"control_{what}"):
 
             def called(state, duration):
                 nonlocal time
                 time += duration.to_sec()
-                velocities, finished = on_state(state, time)
-                command = lib.JointVelocities(velocities)
+                values, finished = on_state(state, time)
+                command = made(values)
                 command.motion_finished = finished
                 return command
 
-            robot.control_joint_velocity(called, lib.ControllerMode.kJointImpedance, False, 1000.0)
+            getattr(robot, f"control_{what}")(called, lib.ControllerMode.kJointImpedance, False, 1000.0)
             return None
-        control, finished = robot.start_joint_velocity_control(lib.ControllerMode.JointImpedance), False
+        control, finished = getattr(robot, f"start_{what}_control")(lib.ControllerMode.JointImpedance), False
         while not finished:
             state, duration = control.readOnce()
             time += duration.to_sec()
-            velocities, finished = on_state(state, time)
-            command = lib.JointVelocities(velocities)
+            values, finished = on_state(state, time)
+            command = made(values)
             command.motion_finished = finished
             control.writeOnce(command)
     except Exception as error:
@@ -113,6 +116,23 @@ def move(lib, robot, kind, seconds, jump=0.0):
     }  # fmt: skip
 
 
+def positions(lib, robot, kind, seconds, off=0.0):
+    """Move each joint by 0.1 rad through its positions, begun off by so much [rad]."""
+    _behavior(robot, kind, 90.0, 90.0)
+    told = []
+
+    def on_state(state, time):
+        told.append(_told(state))
+        share = min(time / seconds, 1.0)
+        moved = off + 0.1 * (share - math.sin(2 * math.pi * share) / (2 * math.pi))
+        return [q + moved for q in told[0]["q_d"]], time >= seconds
+
+    error = _control(lib, robot, on_state, "joint_position")
+    after = _told(robot.read_once())
+    robot.automatic_error_recovery()
+    return {"error": error, "first": told[0], "last": told[-1], "after": after, "recovered": _fresh(robot)}
+
+
 def hold(lib, robot, kind, seconds, force):
     """Stand still in a motion, with a collision threshold [N], and tell all states."""
     _behavior(robot, kind, 90.0, force)
@@ -150,16 +170,16 @@ def settings(lib, robot, kind):
 def refused(lib, robot, kind):
     """Ask for what is not served."""
     if kind == "fr3":
-        modes = ["joint_position", "cartesian_pose", "cartesian_velocity"]
+        modes = ["cartesian_pose", "cartesian_velocity"]
         asked = {
             n: (lambda n=n: getattr(robot, f"start_{n}_control")(lib.ControllerMode.JointImpedance)) for n in modes
         }
         asked["torque"] = robot.start_torque_control
         return {name: _error(do) for name, do in asked.items()}
-    q, mode = robot.read_once().q_d, lib.ControllerMode.kJointImpedance
-    pose = robot.read_once().O_T_EE_d
+    pose, mode = robot.read_once().O_T_EE_d, lib.ControllerMode.kJointImpedance
+    still = lib.CartesianVelocities([0.0] * 6)
     return {
-        "joint_position": _error(lambda: robot.control_joint_position(lambda *_: lib.JointPositions(q), mode)),
+        "cartesian_velocity": _error(lambda: robot.control_cartesian_velocity(lambda *_: still, mode)),
         "cartesian_pose": _error(lambda: robot.control_cartesian_pose(lambda *_: lib.CartesianPose(pose), mode)),
         "torque": _error(lambda: robot.control(lambda *_: lib.Torques([0.0] * 7))),
         "model": _error(robot.load_model),
@@ -196,7 +216,7 @@ def main():
     except Exception as error:
         print(json.dumps({"error": str(error)}), flush=True)
     else:
-        done = {f.__name__: f for f in (state, move, hold, settings, refused, model)}[what](
+        done = {f.__name__: f for f in (state, move, positions, hold, settings, refused, model)}[what](
             lib, robot, kind, *map(float, values)
         )
         print(json.dumps(done), flush=True)

@@ -9,11 +9,12 @@ from pretouch.errors import ParameterError, RobotModelError
 from pretouch.robot.model import RobotModel
 from pretouch.serving.fci.collision import Contacts, default_behavior
 from pretouch.serving.fci.frames import frames_of
+from pretouch.serving.fci.kinds import KINDS
 from pretouch.serving.fci.limits import PERIOD_S, motion_limits
 from pretouch.serving.fci.motion import Ending, Motion, Setpoint
 from pretouch.serving.fci.pushes import Pushes, TcpPush
 from pretouch.serving.fci.units import ServedUnits, UnitsSetup
-from pretouch.serving.fci.wire import JOINTS, Impedance, RobotKind, RobotMode
+from pretouch.serving.fci.wire import JOINTS, Generator, Impedance, RobotKind, RobotMode
 from pretouch.sim.hand import Hand, HandScript
 from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams
@@ -104,9 +105,10 @@ class ServedArm:
         """Whether it no longer swings after a motion, either."""
         return self.at_rest and self._since_motion >= _COMES_TO_REST
 
-    def begin(self, impedance: Impedance) -> None:
-        """Begin a motion, at rest and without errors: whoever calls it has looked."""
-        self.motion, self.mode, self.reflex_reason = Motion(self.limits, impedance), RobotMode.MOVE, ()
+    def begin(self, generator: Generator, impedance: Impedance) -> None:
+        """Begin a motion of a kind that is served, at rest and without errors: whoever calls it has looked."""
+        self.motion = Motion(self.limits, impedance, KINDS[generator](self.limits))
+        self.mode, self.reflex_reason = RobotMode.MOVE, ()
 
     def stop(self) -> None:
         """End the motion: the arm brakes."""

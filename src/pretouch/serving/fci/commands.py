@@ -2,6 +2,7 @@
 
 import struct
 from enum import IntEnum
+from typing import NamedTuple
 
 import numpy as np
 
@@ -9,6 +10,7 @@ from pretouch.serving.fci.arm import ServedArm
 from pretouch.serving.fci.collision import CollisionBehavior
 from pretouch.serving.fci.frames import pose_of
 from pretouch.serving.fci.inertia import Inertial
+from pretouch.serving.fci.kinds import KINDS
 from pretouch.serving.fci.wire import Generator, Impedance
 from pretouch.types import FloatArray
 
@@ -31,12 +33,19 @@ _CARTESIAN_LIMIT = bytes(8 * 3) + np.eye(4).tobytes() + b"\0"
 """A virtual wall: size, pose, and that it is not active."""
 
 
-def wanted_motion(body: bytes) -> Impedance | None:
-    """Read the request to move: the controller, or None where the motion is not served."""
+class WantedMotion(NamedTuple):
+    """A motion that is served."""
+
+    generator: Generator
+    impedance: Impedance
+
+
+def wanted_motion(body: bytes) -> WantedMotion | None:
+    """Read the request to move; None where the motion is not served."""
     controller, generator = struct.unpack_from("<II", body)
-    if generator != Generator.JOINT_VELOCITY or controller not in (Impedance.JOINT, Impedance.CARTESIAN):
+    if generator not in KINDS or controller not in (Impedance.JOINT, Impedance.CARTESIAN):
         return None
-    return Impedance(controller)
+    return WantedMotion(Generator(generator), Impedance(controller))
 
 
 def set_or_get(arm: ServedArm, name: str, body: bytes) -> bytes:

@@ -75,15 +75,15 @@ class RequestHandler:
                 self._state.frames_changed()
 
     def _begin(self, request: Request) -> None:
-        arm, impedance = self._arm, wanted_motion(request.body)
+        arm, wanted = self._arm, wanted_motion(request.body)
         self._settle()
-        if impedance is None:
-            self._say("Refused: only joint velocities are served, with joint or Cartesian impedance.")
-        if arm.mode is not RobotMode.IDLE or not arm.at_rest or impedance is None:
+        if wanted is None:
+            self._say("Refused: only joint positions and velocities are served, with joint or Cartesian impedance.")
+        if arm.mode is not RobotMode.IDLE or not arm.at_rest or wanted is None:
             self._answer("Move", request.identifier, self._status("not possible"))
             return
         self._begins()
-        arm.begin(impedance)
+        arm.begin(*wanted)
         self._move = request.identifier
         self._answer("Move", request.identifier, self._status("started"))
 

@@ -1,4 +1,4 @@
-"""What the robot allows a joint velocity motion, by the names of the vendor's errors. Pure."""
+"""What the robot allows the joints of a motion, by the names of the vendor's errors. Pure."""
 
 from dataclasses import dataclass
 

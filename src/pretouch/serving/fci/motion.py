@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pretouch.serving.fci.kinds import MotionKind
 from pretouch.serving.fci.limits import PERIOD_S, MotionLimits
 from pretouch.serving.fci.wire import Impedance
 from pretouch.types import FloatArray
@@ -21,8 +22,8 @@ _COUNTED = 100
 class Setpoint:
     """What a command says."""
 
-    qd: FloatArray
-    """(n,) joint velocities for the next millisecond [rad/s]."""
+    values: FloatArray
+    """Of the field that counts in this kind of motion."""
     finished: bool = False
     """Whether the motion ends with it."""
 
@@ -38,12 +39,12 @@ class Ending:
 
 
 class Motion:
-    """A joint velocity motion from its request until it ends."""
+    """A motion from its request until it ends."""
 
-    def __init__(self, limits: MotionLimits, impedance: Impedance) -> None:
+    def __init__(self, limits: MotionLimits, impedance: Impedance, kind: MotionKind) -> None:
         """Begin at rest."""
         n = len(limits.qd)
-        self._limits, self.impedance = limits, impedance
+        self._limits, self.impedance, self.kind = limits, impedance, kind
         self.qd, self.qdd = np.zeros(n), np.zeros(n)
         """Commanded velocities [rad/s] and accelerations [rad/s^2], (n,)."""
         self.begun = False
@@ -63,15 +64,16 @@ class Motion:
         """
         if setpoint is None:
             return self._without(q)
-        self.begun, self._lost = True, 0
+        first, self.begun, self._lost = not self.begun, True, 0
         self._received.append(True)
-        if not np.all(np.isfinite(setpoint.qd)):
-            return Ending("input error", ("joint_motion_generator_velocity_limits_violation",))
+        if not np.all(np.isfinite(setpoint.values)):
+            return Ending("input error", (self.kind.not_a_number,))
         if setpoint.finished:
             if self._limits.ends_at_rest(self.qd):
                 return Ending("success")
             return Ending("reflex", ("joint_motion_generator_velocity_discontinuity",))
-        return self._moved(q, setpoint.qd)
+        asked = self.kind.asked(setpoint.values, q, first)
+        return Ending("reflex", asked.errors) if asked.errors else self._moved(q, asked.qd)
 
     def _without(self, q: FloatArray) -> Ending | None:
         """Go on with the same acceleration, as the robot does for a lost command."""

@@ -155,11 +155,11 @@ class FciServer:
             drop = self._options.drop
             lost = drop is not None and motion.begun and drop.takes(self._of_motion)
         self._of_motion += motion is not None and (motion.begun or not lost)
-        if lost or command is None:
+        if lost or command is None or motion is None:
             return None
         names = command.dtype.names or ()
         finished = any(command[name] for name in names if name.endswith("_finished"))
-        return Setpoint(np.array(command["dq_c"]), bool(finished))
+        return Setpoint(np.array(command[motion.kind.field]), bool(finished))
 
     def _take_command(self) -> None:
         """Take in what came by UDP, and keep the newest command that is one for this millisecond."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from pretouch.serving.fci.arm import ServedArm
 from pretouch.serving.fci.frames import pose
-from pretouch.serving.fci.wire import ERRORS, Generator, Impedance, Protocol
+from pretouch.serving.fci.wire import ERRORS, Impedance, Protocol
 from pretouch.types import FloatArray
 
 _GRAVITY = (0.0, 0.0, -9.81)
@@ -39,7 +39,7 @@ class StateDatagram:
         self._write_joints()
         self._write_poses()
         motion = arm.motion
-        to["motion_generator_mode"][...] = 0 if motion is None else Generator.JOINT_VELOCITY + 1
+        to["motion_generator_mode"][...] = 0 if motion is None else motion.kind.generator + 1
         to["controller_mode"][...] = Impedance.NONE if motion is None else motion.impedance
         to["robot_mode"][...] = arm.mode
         to["control_command_success_rate"][...] = arm.success_rate
