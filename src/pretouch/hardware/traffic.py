@@ -129,11 +129,12 @@ def imu_batch(received: Received) -> ImuBatch | None:
     return ImuBatch(received.unit, stamp, acceleration, angular_velocity, sample.imu_index)
 
 
-def imu_readings(batches: Sequence[ImuBatch], units: NetworkUnits) -> ImuReadings:
-    """Return the IMU samples of several of these units as a control step takes them."""
+def imu_readings(batches: Sequence[ImuBatch], units: NetworkUnits | None = None) -> ImuReadings:
+    """Return the IMU samples of several of these units as a control step takes them; by default none has zones."""
+    rows = [b.unit if units is None else units.first[b.unit] for b in batches]
     none = [np.zeros((0, 3))]
     return ImuReadings(
-        np.repeat([units.first[b.unit] for b in batches], [len(b.stamp) for b in batches]).astype(np.int64),
+        np.repeat(rows, [len(b.stamp) for b in batches]).astype(np.int64),
         np.concatenate([np.zeros(0), *(b.stamp for b in batches)]),
         np.concatenate(none + [b.acceleration for b in batches]),
         np.concatenate(none + [b.angular_velocity for b in batches]),
