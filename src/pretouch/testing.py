@@ -57,8 +57,7 @@ class FrankaServer:
         """
         self.host = _free_address()
         """Its address; the port is the only one that the vendor's libraries know."""
-        self.said: list[str] = []
-        """What it said so far, line by line, such as why a motion ended."""
+        self._said: list[str] = []
         self._folder, self._begun = TemporaryDirectory(), ""
         self._truth = Path(self._folder.name) / "truth.csv"
         ours = {"host": self.host, "stdin": True, "truth": self._truth}
@@ -69,7 +68,7 @@ class FrankaServer:
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, bufsize=0,
         )  # fmt: skip
         try:
-            self._wait_for("Listening at", _STARTS_S)
+            self._wait_for("Listening at", _STARTS_S, 0)
         except BaseException:
             self.close()
             raise
@@ -100,10 +99,17 @@ class FrankaServer:
         self._type("stop" if pressed else "release")
 
     @property
+    def said(self) -> tuple[str, ...]:
+        """What it said so far, line by line, such as why a motion ended."""
+        self._drain()
+        return tuple(self._said)
+
+    @property
     def truth(self) -> Truth:
         """What truly happened until now. Between motions only: in a motion the server waits for a command."""
+        seen = len(self.said)
         self._type("time")
-        self._wait_for("The arm's time is", _ANSWERS_S)
+        self._wait_for("The arm's time is", _ANSWERS_S, seen)
         _, *lines = self._truth.read_text().splitlines()
         rows = np.array([line.split(",") for line in lines], dtype=np.float64).reshape(-1, 11)
         return Truth(rows[:, 0], rows[:, 1:4], rows[:, 4:])
@@ -119,8 +125,7 @@ class FrankaServer:
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()
-        while self._listen(0.0):
-            pass
+        self._drain()
         for pipe in (process.stdin, process.stdout):
             if pipe is not None:
                 pipe.close()
@@ -133,26 +138,32 @@ class FrankaServer:
         except (BrokenPipeError, ValueError):  # ended by itself, or closed
             raise RobotError(f"The simulated robot has ended: {' '.join(self.said)}") from None
 
-    def _wait_for(self, beginning: str, most: float) -> None:
-        """Wait for a new line with a beginning, up to a time [s]."""
-        until, seen = time.monotonic() + most, len(self.said)
+    def _wait_for(self, beginning: str, most: float, seen: int) -> None:
+        """Wait for a line with a beginning, behind so many others, up to a time [s]."""
+        until = time.monotonic() + most
         while not any(line.startswith(beginning) for line in self.said[seen:]):
             if not self._listen(until - time.monotonic()):
                 why = "has ended" if time.monotonic() < until else f"does not answer within {most:g} s"
                 raise RobotError(f"The simulated robot {why}: {' '.join(self.said[seen:]) or 'is it in a motion?'}")
+
+    def _drain(self) -> None:
+        while self._listen(0.0):
+            pass
 
     def _listen(self, seconds: float) -> bool:
         """Take in what it says next, waiting up to a time [s] for it; False if it says nothing or has ended.
 
         No thread does that: a test may fork. Between two calls the pipe holds about a thousand lines.
         """
-        assert self._process.stdout is not None  # noqa: S101  a pipe, as asked for
-        source = self._process.stdout.fileno()
+        pipe = self._process.stdout
+        if pipe is None or pipe.closed:
+            return False
+        source = pipe.fileno()
         if not select.select([source], [], [], max(0.0, seconds))[0]:
             return False
         read = os.read(source, 65536)
         *lines, self._begun = (self._begun + read.decode(errors="replace")).split("\n")
-        self.said += lines
+        self._said += lines
         return bool(read)
 
 
