@@ -156,14 +156,20 @@ class RawClient:
     def first_of_motion(self) -> np.void:
         return self.state_where(lambda state: state["robot_mode"] == 2)
 
-    def command(self, message_id: int, values: Any, finished: bool = False, field: str = "dq_c") -> None:
+    def command(
+        self, message_id: int, values: Any, finished: bool = False, field: str = "dq_c", elbow: Any = None
+    ) -> None:
         command = np.zeros((), self.protocol.command)
         command["message_id"], command[field], command["motion_generation_finished"] = message_id, values, finished
+        if elbow is not None:
+            command["valid_elbow"], command["elbow_c"] = 1, elbow
         self.udp.sendto(command.tobytes(), self.robot_udp)
 
-    def turn(self, state: np.void, values: Any, finished: bool = False, field: str = "dq_c") -> np.void:
+    def turn(
+        self, state: np.void, values: Any, finished: bool = False, field: str = "dq_c", elbow: Any = None
+    ) -> np.void:
         """Answer a state and return the next."""
-        self.command(int(state["message_id"]), values, finished, field)
+        self.command(int(state["message_id"]), values, finished, field, elbow)
         return self.state_where(lambda new: new["message_id"] > state["message_id"])
 
     def close(self) -> None:

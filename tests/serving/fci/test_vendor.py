@@ -42,6 +42,22 @@ def test_positions_begun_elsewhere_are_refused_by_the_vendors_name(serve: Any, k
     assert done["recovered"]["mode"] == "idle"
 
 
+def test_the_end_effector_goes_where_its_velocities_and_poses_lead(serve: Any, kind: RobotKind) -> None:
+    done = serve(kind).ask("cartesian", 1.0)
+    assert done["errors"] == [None, None]
+    first, there, after = (np.array(done[name]["O_T_EE_d"]) for name in ("first", "there", "after"))
+    np.testing.assert_allclose(there - first, 0.1 * np.eye(16)[13], atol=3e-4)
+    np.testing.assert_allclose(after - there, -0.1 * np.eye(16)[13], atol=1e-5)
+
+
+def test_a_pose_begun_elsewhere_is_refused_by_the_vendors_name(serve: Any, kind: RobotKind) -> None:
+    done = serve(kind).ask("cartesian", 1.0, 0.01)
+    assert done["errors"][0] is None
+    assert "cartesian_position_motion_generator_start_pose_invalid" in done["errors"][1]
+    np.testing.assert_allclose(done["after"]["O_T_EE_d"], done["there"]["O_T_EE_d"], atol=1e-6)
+    assert done["recovered"]["mode"] == "idle"
+
+
 @pytest.mark.slow
 def test_two_runs_are_the_same_to_the_last_bit(serve: Any, kind: RobotKind) -> None:
     runs, truths = [], []
@@ -134,10 +150,9 @@ def test_what_is_not_served_is_refused_in_the_vendors_words(serve: Any, kind: Ro
     errors = served.ask("refused")
     if kind == "panda":
         assert errors.pop("model") == "libfranka: Server reports error when loading model library."
-    assert len(errors) >= 3
-    for error in errors.values():
-        assert error == 'libfranka: Move command rejected: command not possible in the current mode ("Idle")!'
-    assert "only joint positions and velocities are served" in " ".join(served.said)
+    refused = errors["torque"]
+    assert refused == 'libfranka: Move command rejected: command not possible in the current mode ("Idle")!'
+    assert "only positions and velocities are served" in " ".join(served.said)
 
 
 def test_the_fr3s_library_computes_with_our_model(serve: Any) -> None:

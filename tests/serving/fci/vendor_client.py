@@ -52,10 +52,13 @@ def _names(errors):
     return sorted(name for name in dir(errors) if not name.startswith("_") and getattr(errors, name) is True)
 
 
-_COMMANDS = {"joint_velocity": "JointVelocities", "joint_position": "JointPositions"}
+_COMMANDS = {
+    "joint_velocity": "JointVelocities", "joint_position": "JointPositions",
+    "cartesian_velocity": "CartesianVelocities", "cartesian_pose": "CartesianPose",
+}  # fmt: skip
 
 
-def _control(lib, robot, on_state, what="joint_velocity"):
+def _control(lib, robot, on_state, what="joint_velocity", limited=False):
     """Call `on_state(state, time) -> (values, finished)` for each state of a motion; return the error, or None."""
     time, made = 0.0, getattr(lib, _COMMANDS[what])
     try:
@@ -69,7 +72,7 @@ def _control(lib, robot, on_state, what="joint_velocity"):
                 command.motion_finished = finished
                 return command
 
-            getattr(robot, f"control_{what}")(called, lib.ControllerMode.kJointImpedance, False, 1000.0)
+            getattr(robot, f"control_{what}")(called, lib.ControllerMode.kJointImpedance, limited, 1000.0)
             return None
         control, finished = getattr(robot, f"start_{what}_control")(lib.ControllerMode.JointImpedance), False
         while not finished:
@@ -133,6 +136,30 @@ def positions(lib, robot, kind, seconds, off=0.0):
     return {"error": error, "first": told[0], "last": told[-1], "after": after, "recovered": _fresh(robot)}
 
 
+def cartesian(lib, robot, kind, seconds, off=0.0):
+    """Move the end-effector by 0.1 m along y by velocities, then back by poses, begun off by so much [m]."""
+    _behavior(robot, kind, 90.0, 90.0)
+    told = []
+
+    def by_velocity(state, time):
+        told.append(_told(state))
+        share = min(time / seconds, 1.0)
+        return [0.0, 0.1 / seconds * (1 - math.cos(2 * math.pi * share)), 0.0, 0.0, 0.0, 0.0], time >= seconds
+
+    def by_pose(state, time):
+        told.append(_told(state))
+        share, pose = min(time / seconds, 1.0), list(there["O_T_EE_d"])
+        pose[13] += off - 0.1 * (share - math.sin(2 * math.pi * share) / (2 * math.pi))
+        return pose, time >= seconds
+
+    errors = [_control(lib, robot, by_velocity, "cartesian_velocity", limited=True)]
+    there = _fresh(robot)
+    errors.append(_control(lib, robot, by_pose, "cartesian_pose"))
+    after = _fresh(robot)
+    robot.automatic_error_recovery()
+    return {"errors": errors, "first": told[0], "there": there, "after": after, "recovered": _fresh(robot)}
+
+
 def hold(lib, robot, kind, seconds, force):
     """Stand still in a motion, with a collision threshold [N], and tell all states."""
     _behavior(robot, kind, 90.0, force)
@@ -170,17 +197,8 @@ def settings(lib, robot, kind):
 def refused(lib, robot, kind):
     """Ask for what is not served."""
     if kind == "fr3":
-        modes = ["cartesian_pose", "cartesian_velocity"]
-        asked = {
-            n: (lambda n=n: getattr(robot, f"start_{n}_control")(lib.ControllerMode.JointImpedance)) for n in modes
-        }
-        asked["torque"] = robot.start_torque_control
-        return {name: _error(do) for name, do in asked.items()}
-    pose, mode = robot.read_once().O_T_EE_d, lib.ControllerMode.kJointImpedance
-    still = lib.CartesianVelocities([0.0] * 6)
+        return {"torque": _error(robot.start_torque_control)}
     return {
-        "cartesian_velocity": _error(lambda: robot.control_cartesian_velocity(lambda *_: still, mode)),
-        "cartesian_pose": _error(lambda: robot.control_cartesian_pose(lambda *_: lib.CartesianPose(pose), mode)),
         "torque": _error(lambda: robot.control(lambda *_: lib.Torques([0.0] * 7))),
         "model": _error(robot.load_model),
     }
@@ -216,7 +234,7 @@ def main():
     except Exception as error:
         print(json.dumps({"error": str(error)}), flush=True)
     else:
-        done = {f.__name__: f for f in (state, move, positions, hold, settings, refused, model)}[what](
+        done = {f.__name__: f for f in (state, move, positions, cartesian, hold, settings, refused, model)}[what](
             lib, robot, kind, *map(float, values)
         )
         print(json.dumps(done), flush=True)

@@ -7,9 +7,10 @@ import numpy as np
 
 from pretouch.errors import ParameterError, RobotModelError
 from pretouch.robot.model import RobotModel
+from pretouch.serving.fci.cartesian import CARTESIAN_LIMITS, Body, CartesianPose, CartesianVelocity
 from pretouch.serving.fci.collision import Contacts, default_behavior
 from pretouch.serving.fci.frames import frames_of
-from pretouch.serving.fci.kinds import KINDS
+from pretouch.serving.fci.kinds import JointPosition, JointVelocity, MotionKind
 from pretouch.serving.fci.limits import PERIOD_S, motion_limits
 from pretouch.serving.fci.motion import Ending, Motion, Setpoint
 from pretouch.serving.fci.pushes import Pushes, TcpPush
@@ -101,14 +102,31 @@ class ServedArm:
         return self.motion is None and not self.qd.any()
 
     @property
+    def singular(self) -> bool:
+        """Whether it is so near a singularity that it does not know the wrench on its end-effector, either."""
+        return self.report.wrench is None
+
+    @property
     def settled(self) -> bool:
         """Whether it no longer swings after a motion, either."""
         return self.at_rest and self._since_motion >= _COMES_TO_REST
 
     def begin(self, generator: Generator, impedance: Impedance) -> None:
         """Begin a motion of a kind that is served, at rest and without errors: whoever calls it has looked."""
-        self.motion = Motion(self.limits, impedance, KINDS[generator](self.limits))
+        self.motion = Motion(self.limits, impedance, self._kind(generator))
         self.mode, self.reflex_reason = RobotMode.MOVE, ()
+
+    def _kind(self, generator: Generator) -> MotionKind:
+        body = Body(self.model, self.frames, CARTESIAN_LIMITS[self.kind])
+        match generator:
+            case Generator.JOINT_POSITION:
+                return JointPosition(self.limits)
+            case Generator.JOINT_VELOCITY:
+                return JointVelocity()
+            case Generator.CARTESIAN_POSITION:
+                return CartesianPose(body)
+            case Generator.CARTESIAN_VELOCITY:
+                return CartesianVelocity(body)
 
     def stop(self) -> None:
         """End the motion: the arm brakes."""

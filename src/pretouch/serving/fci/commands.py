@@ -10,7 +10,6 @@ from pretouch.serving.fci.arm import ServedArm
 from pretouch.serving.fci.collision import CollisionBehavior
 from pretouch.serving.fci.frames import pose_of
 from pretouch.serving.fci.inertia import Inertial
-from pretouch.serving.fci.kinds import KINDS
 from pretouch.serving.fci.wire import Generator, Impedance
 from pretouch.types import FloatArray
 
@@ -43,7 +42,7 @@ class WantedMotion(NamedTuple):
 def wanted_motion(body: bytes) -> WantedMotion | None:
     """Read the request to move; None where the motion is not served."""
     controller, generator = struct.unpack_from("<II", body)
-    if generator not in KINDS or controller not in (Impedance.JOINT, Impedance.CARTESIAN):
+    if generator not in list(Generator) or controller not in (Impedance.JOINT, Impedance.CARTESIAN):
         return None
     return WantedMotion(Generator(generator), Impedance(controller))
 

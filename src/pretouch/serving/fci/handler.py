@@ -8,7 +8,7 @@ from pretouch.serving.fci.connections import Connection, Disconnected, Request
 from pretouch.serving.fci.motion import Ending
 from pretouch.serving.fci.state import StateDatagram
 from pretouch.serving.fci.urdf import urdf_of
-from pretouch.serving.fci.wire import Protocol, RobotMode
+from pretouch.serving.fci.wire import OF_END_EFFECTOR, Protocol, RobotMode
 
 _NO_LIBRARY = b"\1"
 """Answer to the request for a binary model library: there is none."""
@@ -78,9 +78,12 @@ class RequestHandler:
         arm, wanted = self._arm, wanted_motion(request.body)
         self._settle()
         if wanted is None:
-            self._say("Refused: only joint positions and velocities are served, with joint or Cartesian impedance.")
+            self._say("Refused: only positions and velocities are served, with joint or Cartesian impedance.")
         if arm.mode is not RobotMode.IDLE or not arm.at_rest or wanted is None:
             self._answer("Move", request.identifier, self._status("not possible"))
+            return
+        if wanted.generator in OF_END_EFFECTOR and arm.singular:
+            self._answer("Move", request.identifier, self._status("singular"))
             return
         self._begins()
         arm.begin(*wanted)

@@ -1,6 +1,5 @@
-"""Kinds of motion: which field of a command counts, and which joint velocities it asks for. A kind is one motion's."""
+"""Kinds of motion: which fields of a command count, and which joint velocities they ask for. A kind is one motion's."""
 
-from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -23,43 +22,87 @@ class MotionKind(Protocol):
     """One kind of motion."""
 
     generator: Generator
-    field: str
-    """Of a command, the one that counts."""
     not_a_number: str
     """The error of a command that is not finite."""
+    moves_at_end: str
+    """The error of a motion that ends while it moves."""
+    joints: str
+    """What the errors of the joints' limits begin with."""
+
+    @property
+    def commanded(self) -> FloatArray | None:
+        """Velocities (2, 7) of end-effector [m/s, rad/s] and elbow [rad/s] and their rates, where these are commanded.
+
+        The end-effector's are as of the base frame, at its origin.
+        """
+        ...
+
+    def read(self, command: np.void) -> FloatArray:
+        """Return what counts of a command."""
+        ...
 
     def asked(self, values: FloatArray, q: FloatArray, first: bool) -> Asked:
-        """Return what finite values of the field ask for.
+        """Return what a command asks for.
 
         Args:
-            values: of the field.
+            values: that count of it, finite.
             q: (7,) commanded positions so far [rad].
             first: whether no command has come before.
         """
         ...
 
+    def bridged(self, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> Asked:
+        """Return what is done in place of a lost command: the same acceleration once more.
 
-class JointVelocity:
+        Args:
+            q: (7,) commanded positions so far [rad].
+            qd: (7,) commanded velocities [rad/s].
+            qdd: (7,) commanded accelerations [rad/s^2].
+        """
+        ...
+
+
+class _OfJoints:
+    """What both kinds of motion of the joints have in common."""
+
+    moves_at_end = "joint_motion_generator_velocity_discontinuity"
+    joints = "joint_motion_generator"
+    commanded = None
+
+    def bridged(self, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> Asked:
+        """Go on with the same acceleration of the joints."""
+        return Asked(qd + qdd * PERIOD_S)
+
+
+class JointVelocity(_OfJoints):
     """Velocities (7,) [rad/s]."""
 
-    generator, field = Generator.JOINT_VELOCITY, "dq_c"
+    generator = Generator.JOINT_VELOCITY
     not_a_number = "joint_motion_generator_velocity_limits_violation"
+
+    def read(self, command: np.void) -> FloatArray:
+        """Return the velocities."""
+        return np.array(command["dq_c"])
 
     def asked(self, values: FloatArray, q: FloatArray, first: bool) -> Asked:
         """Take them as they are."""
         return Asked(values)
 
 
-class JointPosition:
+class JointPosition(_OfJoints):
     """Positions (7,) [rad], differentiated backwards as the vendor's documents say."""
 
-    generator, field = Generator.JOINT_POSITION, "q_c"
+    generator = Generator.JOINT_POSITION
     not_a_number = "joint_motion_generator_position_limits_violation"
 
     def __init__(self, limits: MotionLimits) -> None:
         # The vendor does not say how far the first may be from where the arm is. The acceleration limit would catch
         # what is farther than this; by its name this error says better what is wrong, and on the robot it comes alone.
         self._start_within = limits.qdd * PERIOD_S**2  # [rad]
+
+    def read(self, command: np.void) -> FloatArray:
+        """Return the positions."""
+        return np.array(command["q_c"])
 
     def asked(self, values: FloatArray, q: FloatArray, first: bool) -> Asked:
         """Go there within the millisecond; the first must be where the arm is commanded to be already."""
@@ -68,10 +111,3 @@ class JointPosition:
         if first and np.any(np.abs(values - q) > self._start_within):
             return Asked(qd, ("joint_position_motion_generator_start_pose_invalid",))
         return Asked(qd)
-
-
-KINDS: dict[Generator, Callable[[MotionLimits], MotionKind]] = {
-    Generator.JOINT_POSITION: JointPosition,
-    Generator.JOINT_VELOCITY: lambda _limits: JointVelocity(),
-}
-"""Those that are served."""

@@ -16,7 +16,7 @@ _JERK: dict[RobotKind, tuple[float, ...]] = {
     "fr3": (5000.0,) * 7,
 }
 """Jerk limits [rad/s^3] (libfranka, `rate_limiting.h`)."""
-_SLACK = 1e-3
+SLACK = 1e-3
 """Fraction beyond a limit that rounding may take."""
 
 
@@ -37,7 +37,9 @@ class MotionLimits:
     envelope: SpeedEnvelope | None
     """Limits of the speed that depend on the position, if there are any."""
 
-    def violated(self, q: FloatArray, qd: FloatArray, qdd: FloatArray, wanted: FloatArray) -> tuple[str, ...]:
+    def violated(
+        self, q: FloatArray, qd: FloatArray, qdd: FloatArray, wanted: FloatArray, whose: str = "joint_motion_generator"
+    ) -> tuple[str, ...]:
         """Return the errors (none: it may be followed) of a velocity wanted next.
 
         Args:
@@ -45,6 +47,7 @@ class MotionLimits:
             qd: (n,) commanded velocities [rad/s].
             qdd: (n,) commanded accelerations [rad/s^2].
             wanted: (n,) velocities for the next millisecond [rad/s].
+            whose: what the names of the errors begin with.
         """
         with np.errstate(over="ignore", invalid="ignore"):
             acceleration = (wanted - qd) / PERIOD_S
@@ -54,11 +57,11 @@ class MotionLimits:
         # written so that a number that is none is a violation
         within = {
             "velocity_limits_violation": np.all((wanted >= low) & (wanted <= high)),
-            "velocity_discontinuity": np.all(np.abs(acceleration) <= self.qdd * (1 + _SLACK)),
-            "acceleration_discontinuity": np.all(np.abs(jerk) <= self.qddd * (1 + _SLACK)),
+            "velocity_discontinuity": np.all(np.abs(acceleration) <= self.qdd * (1 + SLACK)),
+            "acceleration_discontinuity": np.all(np.abs(jerk) <= self.qddd * (1 + SLACK)),
             "position_limits_violation": np.all((following >= self.q_min) & (following <= self.q_max)),
         }
-        return tuple(f"joint_motion_generator_{name}" for name, kept in within.items() if not kept)
+        return tuple(f"{whose}_{name}" for name, kept in within.items() if not kept)
 
     def ends_at_rest(self, qd: FloatArray) -> bool:
         """Whether a motion may end at commanded velocities (n,) [rad/s]: the acceleration limit stops it at once."""
@@ -70,13 +73,13 @@ class MotionLimits:
 
     def _speeds(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Least and greatest velocities (n,) [rad/s] at q (n,) [rad]."""
-        fastest = self.qd * (1 + _SLACK)
+        fastest = self.qd * (1 + SLACK)
         if self.envelope is None:
             return -fastest, fastest
         e = self.envelope
         up = np.sqrt(np.maximum(0.0, e.slope * (e.q_upper - q))) - e.offset
         down = np.sqrt(np.maximum(0.0, e.slope * (q - e.q_lower))) - e.offset
-        spare = _SLACK * self.qd
+        spare = SLACK * self.qd
         return -np.minimum(fastest, np.maximum(0.0, down) + spare), np.minimum(fastest, np.maximum(0.0, up) + spare)
 
 

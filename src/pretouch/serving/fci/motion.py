@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pretouch.serving.fci.kinds import MotionKind
+from pretouch.serving.fci.kinds import Asked, MotionKind
 from pretouch.serving.fci.limits import PERIOD_S, MotionLimits
 from pretouch.serving.fci.wire import Impedance
 from pretouch.types import FloatArray
@@ -23,7 +23,7 @@ class Setpoint:
     """What a command says."""
 
     values: FloatArray
-    """Of the field that counts in this kind of motion."""
+    """What counts of it in this kind of motion."""
     finished: bool = False
     """Whether the motion ends with it."""
 
@@ -71,9 +71,8 @@ class Motion:
         if setpoint.finished:
             if self._limits.ends_at_rest(self.qd):
                 return Ending("success")
-            return Ending("reflex", ("joint_motion_generator_velocity_discontinuity",))
-        asked = self.kind.asked(setpoint.values, q, first)
-        return Ending("reflex", asked.errors) if asked.errors else self._moved(q, asked.qd)
+            return Ending("reflex", (self.kind.moves_at_end,))
+        return self._moved(q, self.kind.asked(setpoint.values, q, first))
 
     def _without(self, q: FloatArray) -> Ending | None:
         """Go on with the same acceleration, as the robot does for a lost command."""
@@ -83,12 +82,12 @@ class Motion:
         if not self.begun:
             return None
         self._received.append(False)
-        return self._moved(q, self.qd + self.qdd * PERIOD_S)
+        return self._moved(q, self.kind.bridged(q, self.qd, self.qdd))
 
-    def _moved(self, q: FloatArray, wanted: FloatArray) -> Ending | None:
-        errors = self._limits.violated(q, self.qd, self.qdd, wanted)
+    def _moved(self, q: FloatArray, asked: Asked) -> Ending | None:
+        errors = asked.errors or self._limits.violated(q, self.qd, self.qdd, asked.qd, self.kind.joints)
         if errors:
             return Ending("reflex", errors)
-        self.qdd = (wanted - self.qd) / PERIOD_S
-        self.qd = wanted
+        self.qdd = (asked.qd - self.qd) / PERIOD_S
+        self.qd = asked.qd
         return None

@@ -12,6 +12,8 @@ from pretouch.types import FloatArray
 _GRAVITY = (0.0, 0.0, -9.81)
 """Acceleration of a base at rest as the vendor gives it, whatever the truth [m/s^2]."""
 
+_STILL = np.zeros(7)
+
 
 class StateDatagram:
     """One datagram, written again and again."""
@@ -69,7 +71,11 @@ class StateDatagram:
         O_T_EE_d = pose(desired, flange) @ F_T_EE
         to["O_T_EE_d"][:] = to["O_T_EE_c"][:] = _columns(O_T_EE_d)
         twist = arm.model.jacobian(desired, flange, O_T_EE_d[:3, 3]) @ arm.qd
-        to["O_dP_EE_d"][:] = to["O_dP_EE_c"][:] = twist
+        to["O_dP_EE_d"][:] = twist
+        commanded = None if arm.motion is None else arm.motion.kind.commanded
+        velocity, rate = (np.append(twist, 0.0), _STILL) if commanded is None else commanded
+        to["O_dP_EE_c"][:], to["O_ddP_EE_c"][:] = velocity[:6], rate[:6]
+        to["delbow_c"][0], to["ddelbow_c"][0] = velocity[6], rate[6]
         kin = arm.model.kinematics(report.q)
         O_T_EE = pose(kin, flange) @ F_T_EE
         to["O_T_EE"][:] = _columns(O_T_EE)

@@ -42,6 +42,10 @@ class Generator(IntEnum):
     CARTESIAN_VELOCITY = 3
 
 
+OF_END_EFFECTOR = (Generator.CARTESIAN_POSITION, Generator.CARTESIAN_VELOCITY)
+"""Those that command the end-effector."""
+
+
 class Impedance(IntEnum):
     """Controllers, as requests and states number them."""
 
