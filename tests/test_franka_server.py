@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pretouch import testing
 from pretouch.errors import ParameterError, RobotError
 from pretouch.serving.fci.wire import ERRORS, PORT, PROTOCOLS, RobotKind
 from pretouch.testing import FrankaServer
@@ -116,6 +117,23 @@ def test_the_user_stop_ends_a_motion(franka_server: Any, connected: Any) -> None
     assert client.ended() == "emergency"
     server.press_stop(pressed=False)
     client.state_where(lambda s: s["robot_mode"] == 1)
+
+
+def test_in_a_motion_the_truth_is_not_told_and_that_is_said(
+    franka_server: Any, connected: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    server = franka_server()
+    client = connected(server, "panda")
+    assert client.begin() == "started"
+    client.turn(client.first_of_motion(), _STILL)
+    monkeypatch.setattr(testing, "_ANSWERS_S", 0.2)
+    with pytest.raises(RobotError, match=r"does not answer within 0\.2 s: is it in a motion\?"):
+        _ = server.truth
+
+
+def test_each_option_of_the_command_is_one_of_the_fixture(franka_server: Any) -> None:
+    server = franka_server(lockstep=False, push=["0:0,5,0", "1:0,5,0"], start="path", patience=3)
+    assert server.said == (f"Listening at {server.host}:{PORT} (FCI 5, real time).",)
 
 
 @pytest.mark.parametrize(
