@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from tests.following_arm import Arm
 
+from pretouch.desired import joint_velocities
 from pretouch.errors import ParameterError
 from pretouch.params import PerceptionParams, UnseenSpeed
 from pretouch.perception.scene_filter import Fixtures, no_fixtures
@@ -15,6 +16,7 @@ from pretouch.robot.body import no_capsules
 from pretouch.sensing.sensor import Sensor
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit
+from pretouch.types import Inputs
 
 SPEED = UnseenSpeed().speed_m_s
 SIGHT = PerceptionParams()
@@ -111,6 +113,24 @@ def test_an_arm_on_its_path_keeps_to_the_bound_and_to_the_path(panda_model, pape
     assert 0.05 < speeds["bound"] < 0.5 * speeds["as asked"]
     assert off[1] < 0.003
     assert steps[-1].speed_scale == pytest.approx(speeds["bound"] / speeds["as asked"], rel=0.1)
+
+
+def test_a_commander_in_joint_space_is_bounded_too(panda_model):
+    bound = replace(PROFILES["paper"], unseen=UnseenSpeed())
+    asked, done = 0.8 * np.eye(7)[0], {}
+    for name, chosen in (("as asked", PROFILES["paper"]), ("bound", bound)):
+        arm = Arm(panda_model, Skin((), panda_model), chosen)
+        for _ in range(200):
+            desired = joint_velocities(arm.time, asked)
+            step, arm.state = arm.controller.step(
+                arm.state, Inputs(arm.time, arm.robot(), arm.readings(), desired=desired)
+            )
+            arm.qd, arm.q, arm.time = step.command, arm.q + step.command * 0.01, arm.time + 0.01
+        done[name] = step.command
+    assert done["as asked"] == pytest.approx(asked, abs=0.02)
+    # slower as a whole: the direction stays
+    assert done["bound"] / done["bound"][0] == pytest.approx(asked / asked[0], abs=0.05)
+    assert fastest_onto(panda_model, done["bound"]) == pytest.approx(SPEED, rel=0.1)
 
 
 def test_a_singular_posture_bounds_all_the_same(panda_model):
