@@ -4,6 +4,8 @@ from pathlib import Path
 
 import pytest
 
+from pretouch.sensing.skin import load_skin
+
 EXAMPLES = sorted((Path(__file__).parents[1] / "examples").glob("*.py"))
 ELSEWHERE = "07_first_controller", "09_libfranka_program"
 """The tutorial's runs below; the other against an arm: `tests/hardware/franka/test_shielded_program.py`."""
@@ -25,6 +27,11 @@ def test_the_first_program_is_the_tutorials_and_does_what_the_tutorial_says(caps
     assert max(speed.values()) > 0.25
     assert speed[max(speed)] < 0.1  # slow before the touch
     assert [words[2] for words in told if words[2] != "hold"][-1] == "react"
+
+
+def test_the_skin_with_zones_is_one(panda_model):
+    skin = load_skin(EXAMPLES[0].with_name("panda_zones.toml"), panda_model)
+    assert (len(skin.mounted), len(skin)) == (15, 240)
 
 
 def test_the_readmes_program_runs_as_it_is_written(capsys):

@@ -128,8 +128,13 @@ text (section V-C). `pretouch`: ours, each departure from the paper one switch (
 docs/explanation/anticipation.md, docs/explanation/reaction.md)."""
 
 
-SHORT = {"paper-off": "paper:approach=none"}
-"""Short names that tables of results use for variants."""
+SHORT = {
+    "paper-off": "paper:approach=none",
+    "pretouch-zones": "pretouch:perception.self_margin_m=0.09:perception.out_of_view_s=5:approach.margin_m=0.05"
+    ":approach.tangential.speed_m_s=0.04",
+}
+"""Short names of variants: `paper-off` of tables of results, `pretouch-zones` for skins of sensors with zones, which
+are noisier, see what the arm meets early and lose it, and put it up to half a zone aside (docs/results/skins.md)."""
 
 
 def profile_names() -> tuple[str, ...]:
