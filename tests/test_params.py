@@ -268,7 +268,7 @@ def test_the_order_of_changes_does_not_matter():
         ("paper:reduction.enabled=0", "reduction.enabled is '0': choose from yes, no"),
         ("paper:restriction.mode=firm", "restriction.mode is 'firm': choose from off, hard, slack, floor, braking"),
         ("paper:detect.d_max_m=nan", "MovingThresholds.d_max_m is nan: it must be finite"),
-        ("paper:detect=magic", "There is no Detector called 'magic': choose from thresholds, sequential, fixed"),
+        ("paper:detect=magic", "There is no Detector called 'magic': choose from thresholds, sequential,.* fixed"),
         ("paper:detect.cues=touch", "The parameter 'detect.cues' is unknown: choose from f_base_n"),
         ("paper:detection.use_touch=maybe", "detection.use_touch is 'maybe': choose from yes, no"),
         ("pretouch:detect.localise=none:detect.localise.force_n=3", "detect.localise is none: choose it first"),
