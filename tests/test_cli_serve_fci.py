@@ -76,6 +76,7 @@ def test_its_units_are_heard_in_real_time(tmp_path: Path) -> None:
         (["--host", "192.0.2.1"], "Listening on 192.0.2.1:1337 failed"),
         (["--drop", "3"], "as 3/50"),
         (["--push", "1:2"], "as 2.0:0,15,0:0.5"),
+        (["--object", "0.1:1"], "--object is '0.1:1': give width and mass, such as 0.04:0.5"),
         (["--units", "7337"], "give address and port"),
         (["--units", "127.0.0.1:7337"], "needs --keys"),
         (["--hand", "--scene", "static"], "--hand needs --scene empty"),

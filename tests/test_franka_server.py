@@ -17,10 +17,11 @@ import pytest
 
 from pretouch import testing
 from pretouch.errors import ParameterError, RobotError
-from pretouch.serving.fci.wire import ERRORS, PORT, PROTOCOLS, RobotKind
+from pretouch.serving.fci.wire import ERRORS, GRIPPER_PORT, PORT, PROTOCOLS, RobotKind
 from pretouch.testing import FrankaServer
 from tests.needs import skip_for
 from tests.serving.fci.conftest import RawClient
+from tests.serving.fci.test_gripper import GripperClient
 
 pytest_plugins = ["pytester", "pretouch.pytest_plugin"]
 
@@ -106,6 +107,24 @@ def test_a_person_comes_and_pushes(franka_server: Any, connected: Any) -> None:
     assert not sizes[:4000].any()
 
 
+def test_an_object_is_grasped_and_loads_the_arm_the_same_each_time(franka_server: Any, connected: Any) -> None:
+    truths = []
+    for _ in range(2):
+        server = franka_server(object="0.04:0.8")
+        client, gripper = connected(server, "panda"), GripperClient((server.host, GRIPPER_PORT))
+        gripper.connect()
+        _motion(client, 0.2)
+        assert gripper.request(2, 0.04, 0.005, 0.005, 0.1, 20.0) == 0
+        _motion(client, 0.2)
+        gripper.close()
+        truths.append(server.truth)
+    # the arm comes to rest after each motion, and with what it has grasped
+    assert len(truths[0].time) == 200 + 500 + 500 + 200 + 500
+    sagged = truths[0].q[200 + 500 + 500 - 1] - truths[0].q[200 + 500 - 1]
+    assert 1e-4 < np.abs(sagged).max() < 0.05
+    np.testing.assert_array_equal(truths[0].q, truths[1].q)
+
+
 def test_the_user_stop_ends_a_motion(franka_server: Any, connected: Any) -> None:
     server = franka_server()
     client = connected(server, "panda")
@@ -133,7 +152,7 @@ def test_in_a_motion_the_truth_is_not_told_and_that_is_said(
 
 def test_each_option_of_the_command_is_one_of_the_fixture(franka_server: Any) -> None:
     server = franka_server(lockstep=False, push=["0:0,5,0", "1:0,5,0"], start="path", patience=3)
-    assert server.said == (f"Listening at {server.host}:{PORT} (FCI 5, real time).",)
+    assert server.said == (f"Listening at {server.host}:{PORT} (FCI 5, real time), gripper at port 1338.",)
 
 
 @pytest.mark.parametrize(
@@ -194,7 +213,7 @@ def test_whatever_a_test_does_its_server_ends_and_what_it_said_is_reported(pytes
     done = pytester.runpytest_subprocess("-p", "pretouch.pytest_plugin", "-W", "error")
     done.assert_outcomes(failed=1, passed=1)
     host = (pytester.path / "host").read_text()
-    done.stdout.fnmatch_lines([f"{host}:", f"*Listening at {host}:1337 (FCI 5, lockstep).", "*Client 127.* connected."])
+    done.stdout.fnmatch_lines([f"{host}:", f"*Listening at {host}:1337 (FCI 5, lockstep)*", "*Client 127.* connected."])
     with socket.socket() as nobody, pytest.raises(ConnectionRefusedError):
         nobody.connect((host, PORT))
 

@@ -191,7 +191,7 @@ class ServeFci:
     host: str = "127.0.0.1"
     """Address to serve at. Anyone who can reach it can move the simulated arm."""
     port: int = 1337
-    """TCP port; the vendor's library supports no other. 0 lets the system choose one."""
+    """TCP port; the vendor's library supports no other. The gripper has the next. 0 lets the system choose both."""
     lockstep: bool = False
     """Send each state only after the command for the last one: repeatable, and faster than real time."""
     patience: float = 60.0
@@ -218,6 +218,8 @@ class ServeFci:
     1000 N. T counts from the start of the server; in lockstep, from the first motion on, while the arm moves."""
     hand: bool = False
     """Let a person's hand come and go before the arm, in the empty scene."""
+    object: str = ""
+    """What lies between the fingers of the gripper, WIDTH:KG, such as 0.04:0.5 [m, kg]; by default nothing."""
     units: str = ""
     """HOST:PORT of the receiver of the arm's sensor units; by default they are switched off."""
     keys: str = ""

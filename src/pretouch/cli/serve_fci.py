@@ -21,6 +21,7 @@ from pretouch.robot.model import RobotModel
 from pretouch.robot.named import robot_named
 from pretouch.sensing.skin import skin_for
 from pretouch.serving.fci.arm import ArmSetup, ServedArm
+from pretouch.serving.fci.gripper import object_of
 from pretouch.serving.fci.options import ServeOptions, drop_of
 from pretouch.serving.fci.pushes import TcpPush, push_of, typed_push
 from pretouch.serving.fci.server import FciServer
@@ -60,7 +61,8 @@ def serve_fci(command: "ServeFci") -> None:
     ):
         host, port = server.address
         pace = "lockstep" if c.lockstep else "real time"
-        _say(f"Listening at {host}:{port} (FCI {server.protocol.version}, {pace}).")
+        gripper = f"gripper at port {server.gripper_address[1]}"
+        _say(f"Listening at {host}:{port} (FCI {server.protocol.version}, {pace}), {gripper}.")
         typed = TypedPushes(arm, sys.stdin, c.stdin)
         if typed.possible and not c.stdin:
             _say(
@@ -150,7 +152,8 @@ def _setup(c: "ServeFci") -> ArmSetup:
         raise ParameterError(f"--seed is {c.seed}: give 0 or more.")
     scene, hand, path = _scene(c, model)
     q = brought_to(model, path.point(0.0)) if c.start == "path" else model.description.q_ready.copy()
-    return ArmSetup(model, c.robot, q, scene, hand, tuple(map(push_of, c.push)), _units(c, model), c.seed)
+    pushes, gripped = tuple(map(push_of, c.push)), object_of(c.object) if c.object else None
+    return ArmSetup(model, c.robot, q, scene, hand, pushes, _units(c, model), gripped, c.seed)
 
 
 def _scene(c: "ServeFci", model: RobotModel) -> tuple[SceneSpec, HandScript | None, ArmPath]:

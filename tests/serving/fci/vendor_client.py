@@ -227,6 +227,25 @@ def _flat(matrix):
     return np.array(matrix).reshape(-1, order="F")
 
 
+def gripper(lib, robot, kind):
+    """Home, grasp, close further, open, grasp something narrower, stop; then what fails, and a second client."""
+    hand = lib.Gripper(sys.argv[2])
+    told = [hand.read_once()]
+    results = []
+    for what, *values in (
+        ("homing",), ("grasp", 0.041, 0.1, 20.0), ("move", 0.01, 0.1), ("move", 0.08, 0.1), ("grasp", 0.03, 0.1, 20.0),
+        ("stop",),
+    ):  # fmt: skip
+        results.append(getattr(hand, what)(*values))
+        told.append(hand.read_once())
+    first, *after = told
+    return {
+        "first": [first.width, first.max_width, first.is_grasped, first.temperature], "results": results,
+        "widths": [one.width for one in after], "grasped": [one.is_grasped for one in after],
+        "failed": _error(lambda: hand.move(0.2, 0.1)), "second": _error(lambda: lib.Gripper(sys.argv[2])),
+    }  # fmt: skip
+
+
 def main():
     kind, host, what, *values = sys.argv[1:]
     try:
@@ -234,9 +253,9 @@ def main():
     except Exception as error:
         print(json.dumps({"error": str(error)}), flush=True)
     else:
-        done = {f.__name__: f for f in (state, move, positions, cartesian, hold, settings, refused, model)}[what](
-            lib, robot, kind, *map(float, values)
-        )
+        done = {f.__name__: f for f in (state, move, positions, cartesian, hold, settings, refused, model, gripper)}[
+            what
+        ](lib, robot, kind, *map(float, values))
         print(json.dumps(done), flush=True)
     os._exit(0)
 

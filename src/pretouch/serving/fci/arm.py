@@ -10,6 +10,7 @@ from pretouch.robot.model import RobotModel
 from pretouch.serving.fci.cartesian import CARTESIAN_LIMITS, Body, CartesianPose, CartesianVelocity
 from pretouch.serving.fci.collision import Contacts, default_behavior
 from pretouch.serving.fci.frames import frames_of
+from pretouch.serving.fci.gripper import Gripper, GripperObject
 from pretouch.serving.fci.kinds import JointPosition, JointVelocity, MotionKind
 from pretouch.serving.fci.limits import PERIOD_S, motion_limits
 from pretouch.serving.fci.motion import Ending, Motion, Setpoint
@@ -43,6 +44,8 @@ class ArmSetup:
     """Forces at the end-effector; their time begins as the arm has settled."""
     units: UnitsSetup | None = None
     """Its sensor units, if they are switched on."""
+    object: GripperObject | None = None
+    """What lies between the fingers of its gripper."""
     seed: int = 0
     """Decides the arm's errors and noise."""
 
@@ -65,6 +68,8 @@ class ServedArm:
         if setup.hand is not None:
             Hand(self.plant, setup.hand)
         self.pushes = Pushes(self.plant, setup.pushes, SETTLE_S)
+        self.gripper = Gripper(setup.object)
+        """As it is now: `carry` changes it."""
         self.mode = RobotMode.IDLE
         self.errors: tuple[str, ...] = ()
         """What is wrong now, by the vendor's names."""
@@ -150,6 +155,13 @@ class ServedArm:
     def forget_settings(self) -> None:
         """Undo what a client has set: the next one finds the arm as it was delivered."""
         self.contacts.behavior, self.frames = default_behavior(), frames_of(self.model)
+
+    def carry(self, gripper: Gripper) -> None:
+        """Carry a gripper in another state from now on; with another load the arm swings, as after a motion."""
+        if gripper.load_kg != self.gripper.load_kg:
+            self.plant.grip(gripper.load_kg)
+            self._since_motion = 0
+        self.gripper = gripper
 
     def step(self, setpoint: Setpoint | None) -> Ending | None:
         """Let a millisecond pass under the command that came for it, None if none did; say how a motion ended."""

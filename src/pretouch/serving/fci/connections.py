@@ -1,13 +1,16 @@
 """The TCP side of the server: who is connected, and the requests that come. Nothing here blocks."""
 
 import socket
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from pretouch.errors import RobotError
-from pretouch.serving.fci.wire import HEADER, REQUEST_MOST, Protocol
+from pretouch.serving.fci.wire import CONNECT, REQUEST_MOST, Interface
 
 _WAITING_MOST = 16
 """So many connections may be open without having asked to be served."""
+READS_BEFORE_REFUSAL = 8
+"""Before another client is refused, the requests of the current one are read so many times."""
 _READ_MOST = 4096
 _KEEPALIVE_S = 5
 """A client whose machine is gone is given up after about so long [s]."""
@@ -26,9 +29,19 @@ class Request:
     """One request of a client."""
 
     name: str
-    """As of `Protocol.requests`."""
+    """As of `Interface.requests`."""
     identifier: int
     body: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Greeting:
+    """What a client has said that is to be served."""
+
+    udp: tuple[str, int]
+    """Where it takes states."""
+    requests: list[Request]
+    """What it has asked for at once."""
 
 
 class Connection:
@@ -44,7 +57,7 @@ class Connection:
             if hasattr(socket, option):
                 sock.setsockopt(socket.IPPROTO_TCP, getattr(socket, option), value)
 
-    def requests(self, protocol: Protocol) -> list[Request]:
+    def requests(self, interface: Interface) -> list[Request]:
         """Return the requests that have come; raise Disconnected if the other end closed, or sends anything else."""
         try:
             data = self.sock.recv(_READ_MOST)
@@ -56,22 +69,23 @@ class Connection:
             raise Disconnected(CLOSED)
         self._received += data
         found = []
-        while (request := self._next(protocol)) is not None:
+        while (request := self._next(interface)) is not None:
             found.append(request)
         return found
 
-    def _next(self, protocol: Protocol) -> Request | None:
-        if len(self._received) < HEADER.size:
+    def _next(self, interface: Interface) -> Request | None:
+        header = interface.header
+        if len(self._received) < header.size:
             return None
-        number, identifier, size = HEADER.unpack_from(self._received)
-        if number >= len(protocol.requests) or not HEADER.size <= size <= REQUEST_MOST:
-            raise Disconnected(f"message {number} of {size} B is not part of FCI {protocol.version}")
-        name = protocol.requests[number]
-        if size - HEADER.size != protocol.sizes[name]:
-            raise Disconnected(f"{name} has {size - HEADER.size} B instead of {protocol.sizes[name]} B")
+        number, identifier, size = header.unpack_from(self._received)
+        if number >= len(interface.requests) or not header.size <= size <= REQUEST_MOST:
+            raise Disconnected(f"message {number} of {size} B is not part of {interface.name} {interface.version}")
+        name = interface.requests[number]
+        if size - header.size != interface.sizes[name]:
+            raise Disconnected(f"{name} has {size - header.size} B instead of {interface.sizes[name]} B")
         if len(self._received) < size:
             return None
-        body, self._received = self._received[HEADER.size : size], self._received[size:]
+        body, self._received = self._received[header.size : size], self._received[size:]
         return Request(name, identifier, body)
 
     def send(self, message: bytes) -> None:
@@ -120,6 +134,34 @@ class Listener:
         self.waiting.append(Connection(sock, peer))
         if len(self.waiting) > _WAITING_MOST:
             self.waiting.pop(0).close()
+
+    def greet(self, connection: Connection, interface: Interface, say: Callable[[str], None]) -> Greeting | None:
+        """Read the protocol version of a connection; the first with that of the robot is served, no other waits."""
+        if connection not in self.waiting:
+            return None
+        try:
+            requests = connection.requests(interface)
+            if not requests:
+                return None
+            if requests[0].name != "Connect":
+                raise Disconnected(f"asks for {requests[0].name} before it has connected")
+            version, port = CONNECT.unpack(requests[0].body)
+            fits = version == interface.version
+            answer = interface.status.pack(not fits) + interface.version.to_bytes(2, "little")
+            connection.send(interface.reply("Connect", requests[0].identifier, answer))
+            if version == 0:  # asks only whether anybody answers
+                raise Disconnected(CLOSED)
+            if not fits:
+                raise Disconnected(f"speaks {interface.name} {version}, this robot {interface.version}")
+        except Disconnected as why:
+            self.waiting.remove(connection)
+            connection.close()
+            if str(why) != CLOSED:
+                say(f"Not served: {connection.peer} {why}.")
+            return None
+        self.waiting.remove(connection)
+        self.clear()
+        return Greeting((connection.peer, port), requests[1:])
 
     def clear(self) -> None:
         """Refuse all that wait."""

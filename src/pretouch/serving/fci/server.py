@@ -8,22 +8,22 @@ from typing import Self
 
 import numpy as np
 
+from pretouch.errors import RobotError
 from pretouch.serving.fci.arm import ServedArm
-from pretouch.serving.fci.connections import CLOSED, Connection, Disconnected, Listener
+from pretouch.serving.fci.connections import READS_BEFORE_REFUSAL, Connection, Disconnected, Listener
+from pretouch.serving.fci.gripper_server import GripperServer
 from pretouch.serving.fci.handler import RequestHandler
 from pretouch.serving.fci.limits import PERIOD_S
 from pretouch.serving.fci.motion import Setpoint
 from pretouch.serving.fci.options import ServeOptions
 from pretouch.serving.fci.state import StateDatagram
 from pretouch.serving.fci.urdf import urdf_of
-from pretouch.serving.fci.wire import CONNECT, PROTOCOLS
+from pretouch.serving.fci.wire import PROTOCOLS
 
 _LATE_S = 0.003
 """A machine that is later than this leaves the time out [s]: states in a burst could not be answered in time."""
 _DATAGRAMS_MOST = 256
 """So many datagrams are looked at in one go: a flood must not stop the clock."""
-_READS_BEFORE_REFUSAL = 8
-"""Before another client is refused, the requests of the current one are read so many times."""
 _FIRST_WAITS_S = (0.25, 0.75)
 """In lockstep, how long the first state of a motion, and each that follows, stands without an answer [s]: the vendor's
 clients answer the second one, and give up after a second without a state."""
@@ -53,6 +53,13 @@ class FciServer:
         host, port = self._listener.sock.getsockname()
         self.address: tuple[str, int] = (host, port)
         """Where it listens."""
+        try:
+            self._gripper = GripperServer((host, options.port and port + 1), arm, options.lockstep, say)
+        except RobotError:
+            self._listener.close()
+            raise
+        self.gripper_address = self._gripper.address
+        """Where the hand does: at the next port."""
         self._udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._udp.bind((host, 0))
         self._udp.setblocking(False)
@@ -80,6 +87,7 @@ class FciServer:
             self._client.close()
         self._listener.close()
         self._udp.close()
+        self._gripper.close()
 
     def serve(self, done: Callable[[], bool] = lambda: False) -> None:
         """Serve until `done` says so, or, if asked to serve once, until the client has disconnected."""
@@ -182,16 +190,18 @@ class FciServer:
     def _poll_sockets(self, until: float, for_command: bool = False) -> None:
         """Poll all sockets until an instant [s], or until a command has come."""
         while True:
-            timeout = max(0.0, until - time.monotonic())
+            timeout = max(0.0, min(until, self._gripper.due) - time.monotonic())
             client = [] if self._client is None else [self._client.sock]
             waiting = {c.sock: c for c in self._listener.waiting}
-            ready, _, _ = select.select([self._udp, self._listener.sock, *client, *waiting], [], [], timeout)
+            own = [self._udp, self._listener.sock, *client, *waiting]
+            ready, _, _ = select.select([*own, *self._gripper.sockets], [], [], timeout)
+            self._gripper.serve(ready)
             if self._udp in ready:
                 self._take_command()
             if client and client[0] in ready:
                 self._serve_requests()
             if self._listener.sock in ready:
-                for _ in range(_READS_BEFORE_REFUSAL):  # a client that has gone makes room for the next
+                for _ in range(READS_BEFORE_REFUSAL):  # a client that has gone makes room for the next
                     self._serve_requests()
                 self._listener.admit(taken=self._client is not None)
             for sock in ready:
@@ -203,31 +213,11 @@ class FciServer:
                 return
 
     def _check_protocol(self, connection: Connection) -> None:
-        """Read the protocol version of a connection; the first with that of the robot is served."""
-        if connection not in self._listener.waiting:
-            return
-        try:
-            requests = connection.requests(self.protocol)
-            if not requests:
-                return
-            if requests[0].name != "Connect":
-                raise Disconnected(f"asks for {requests[0].name} before it has connected")
-            version, port = CONNECT.unpack(requests[0].body)
-            fits = version == self.protocol.version
-            answer = bytes([not fits]) + self.protocol.version.to_bytes(2, "little")
-            connection.send(self.protocol.reply("Connect", requests[0].identifier, answer))
-            if version == 0:  # asks only whether anybody answers
-                raise Disconnected(CLOSED)
-            if not fits:
-                raise Disconnected(f"speaks FCI {version}, this robot {self.protocol.version}")
-        except Disconnected as why:
-            self._listener.waiting.remove(connection)
-            connection.close()
-            if str(why) != CLOSED:
-                self._say(f"Not served: {connection.peer} {why}.")
-            return
-        self._serve_client(connection, port)
-        self._attempt(lambda handler: handler.serve(requests[1:]))
+        """Serve a connection that has the protocol version of the robot."""
+        greeting = self._listener.greet(connection, self.protocol, self._say)
+        if greeting is not None:
+            self._serve_client(connection, greeting.udp)
+            self._attempt(lambda handler: handler.serve(greeting.requests))
 
     def _serve_requests(self) -> None:
         """Serve the client's requests."""
@@ -235,10 +225,8 @@ class FciServer:
         if client is not None:
             self._attempt(lambda handler: handler.serve(client.requests(self.protocol)))
 
-    def _serve_client(self, connection: Connection, port: int) -> None:
-        self._listener.waiting.remove(connection)
-        self._listener.clear()
-        self._client, self._client_udp, self._served = connection, (connection.peer, port), True
+    def _serve_client(self, connection: Connection, udp: tuple[str, int]) -> None:
+        self._client, self._client_udp, self._served = connection, udp, True
         self._handler = RequestHandler(
             connection, self.protocol, self._arm, self._state, self._settle, self._begin_motion, self._say
         )

@@ -1,4 +1,4 @@
-"""The Franka Control Interface on the wire: protocol 5 of the Panda and 10 of the FR3. Little endian, packed."""
+"""The Franka Control Interface on the wire: of the Panda (5), the FR3 (10) and the hand (3). Little endian, packed."""
 
 import struct
 from dataclasses import dataclass
@@ -9,6 +9,9 @@ import numpy as np
 
 PORT = 1337
 """TCP port of the interface; the vendor's clients know no other."""
+GRIPPER_PORT = 1338
+"""That of the hand."""
+_BYTE = struct.Struct("<B")
 HEADER = struct.Struct("<III")
 """Number of the command, identifier of the request, size of the whole message [B]."""
 REQUEST_MOST = 1024
@@ -118,28 +121,41 @@ _COMMON = {
 """Sizes of the bodies of requests [B] that are the same in both protocols."""
 
 
-@dataclass(frozen=True)
-class Protocol:
-    """One version of the interface."""
+@dataclass(frozen=True, kw_only=True)
+class Interface:
+    """Requests and their answers, in one version."""
 
+    name: str
+    """As it is named to people."""
     version: int
     """Both sides must have the same."""
+    header: struct.Struct = HEADER
+    """Begins each message."""
+    status: struct.Struct = _BYTE
+    """Begins the body of each answer."""
+    requests: tuple[str, ...]
+    """Names of the requests, by their numbers."""
+    sizes: dict[str, int]
+    """Sizes of their bodies [B]."""
+
+    def reply(self, name: str, identifier: int, body: bytes) -> bytes:
+        """Return the answer to a request."""
+        return self.header.pack(self.requests.index(name), identifier, self.header.size + len(body)) + body
+
+
+@dataclass(frozen=True, kw_only=True)
+class Protocol(Interface):
+    """One version of the interface of the arm."""
+
+    name: str = "FCI"
     kind: RobotKind
     """The robot that speaks it."""
     state: np.dtype[np.void]
     """Datagram from the robot, once each millisecond."""
     command: np.dtype[np.void]
     """Datagram to the robot, in answer to each state of a motion."""
-    requests: tuple[str, ...]
-    """Names of the requests, by their numbers."""
-    sizes: dict[str, int]
-    """Sizes of their bodies [B]."""
     move: tuple[str, ...]
     """What becomes of a motion, by the numbers in the answers to the request to move."""
-
-    def reply(self, name: str, identifier: int, body: bytes) -> bytes:
-        """Return the answer to a request."""
-        return HEADER.pack(self.requests.index(name), identifier, HEADER.size + len(body)) + body
 
 
 PANDA = Protocol(
@@ -176,5 +192,21 @@ FR3 = Protocol(
     ),
 )  # fmt: skip
 """FR3, libfranka 0.18 and later."""
+
+GRASP = struct.Struct("<5d")
+"""Body of the request to grasp: width [m], tolerances inwards and outwards [m], speed [m/s], force [N]."""
+MOVE_FINGERS = struct.Struct("<2d")
+"""Body of the request to move the fingers: width [m] and speed [m/s]."""
+GRIPPER_STATE = struct.Struct("<Idd?H")
+"""Datagram from the hand: its time [ms], width [m], largest width [m], whether it grasps, temperature [deg C]."""
+GRIPPER = Interface(
+    name="the protocol of the hand",
+    version=3,
+    header=struct.Struct("<HII"),
+    status=struct.Struct("<H"),
+    requests=("Connect", "Homing", "Grasp", "Move", "Stop"),
+    sizes={"Connect": CONNECT.size, "Homing": 0, "Grasp": GRASP.size, "Move": MOVE_FINGERS.size, "Stop": 0},
+)
+"""Franka Hand, the same with both arms."""
 
 PROTOCOLS: dict[RobotKind, Protocol] = {"panda": PANDA, "fr3": FR3}
