@@ -39,9 +39,9 @@ class Measure:
     by 12 for a page whose memory stays flat, and by 211 for sensors with zones, and by 171
     and 1 for what the arm runs into by itself (coverage), and points that are kept where nobody looks any more, which
     is a parameter of a profile; and by 227 and 1 for a bound on the speed where no unit looks, which is another, and by
-    399 and 4 for capacitive electrodes and the map that is learnt of them, 185 and 1 for
-    zones in datagrams, 104 and 1 for budgets of units, 5 for a profile of skins with zones, 18 for provisioning those with zones,
-    638 and 4 for a fixture of other people's tests and three more kinds of motion of a simulated Franka.
+    399 and 4 for capacitive electrodes and the map that is learnt of them, 185 and 1 for zones in datagrams, 104 and 1
+    for budgets of units, 23 for provisioning units with zones and for a profile of such skins, 1002 and 6 for a fixture
+    of other people's tests, three more kinds of motion and the gripper of a simulated Franka.
     """
 
     name: str
@@ -69,9 +69,9 @@ def measures() -> list[Measure]:
         value for group in fields(PROFILES["pretouch"]) for value in _values(getattr(PROFILES["pretouch"], group.name))
     ]
     return [
-        Measure("lines of the product, comments aside", product.lines, 58_724, 35_000),
-        Measure("files of the product", len(product.files), 485, 300),
-        Measure("lines of product and lab, likewise", product.lines + lab.lines, 81_597, 50_000),
+        Measure("lines of the product, comments aside", product.lines, 59_088, 35_000),
+        Measure("files of the product", len(product.files), 487, 300),
+        Measure("lines of product and lab, likewise", product.lines + lab.lines, 81_961, 50_000),
         Measure("lines of the largest file", longest_file[1], 350, 350, str(longest_file[0].relative_to(ROOT / "src"))),
         Measure("most parameters of a function", widest.parameters, 8, 8, widest.place),
         Measure("functions of more than 8 parameters", sum(f.parameters > 8 for f in functions), 0, 0),
