@@ -129,6 +129,7 @@ def pushed_arm(tmp_path_factory, panda_model):
     return moving.external_csv(tmp_path_factory.mktemp("torques") / "arm.csv"), moving
 
 
+@pytest.mark.slow
 def test_joint_torques_are_detected_on_by_pretouch_and_paper(capsys, pushed_arm, tmp_path):
     numbers, page, figure = tmp_path / "a.json", tmp_path / "a.html", tmp_path / "a.png"
     detect(pushed_arm[0], Choice(), json_file=numbers, out=page)

@@ -146,6 +146,7 @@ def test_a_terminal_shows_a_table_that_changes(keys, port, tmp_path, capsys, mon
     assert "units live" not in said
 
 
+@pytest.mark.slow
 def test_a_disk_that_is_full_is_said_and_the_exit_code_tells_of_it(keys, port, tmp_path, capsys):
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)

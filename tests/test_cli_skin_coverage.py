@@ -34,6 +34,7 @@ def test_numbers_figure_and_a_skin_with_more_units(tmp_path, capsys, panda_model
     assert "exists already: give another name, or --replace" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_unit_with_zones_is_suggested_and_shown_whole(tmp_path, capsys, panda_model):
     told = ["skin", "coverage", "--postures", "2", "--suggest", "1", "--sensor", "vl53l5cx"]
     assert main([*told, "--out", str(tmp_path / "more.toml")]) == 0
@@ -44,6 +45,7 @@ def test_a_unit_with_zones_is_suggested_and_shown_whole(tmp_path, capsys, panda_
     assert (len(made), len(made.mounted), made.mounted[-1].sensor.zones) == (23, 8, 4)
 
 
+@pytest.mark.slow
 def test_types_are_chosen_under_a_budget(tmp_path, capsys, panda_model):
     told = ["skin", "coverage", "--postures", "2", "--usd", "100", "--bytes", "20000", "--sensor", "vl53l1x,vl53l7cx"]
     assert main([*told, "--out", str(tmp_path / "more.toml"), "--json", str(tmp_path / "numbers.json")]) == 0

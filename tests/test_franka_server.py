@@ -86,6 +86,7 @@ def test_pushes_come_when_they_are_wanted_and_the_truth_is_the_same_each_time(
         np.testing.assert_array_equal(getattr(truths[0], name), getattr(truths[1], name))
 
 
+@pytest.mark.slow
 def test_a_box_is_run_into_and_the_server_says_why_the_motion_ended(franka_server: Any, connected: Any) -> None:
     server = franka_server(robot="fr3", box=("0.35,0.3,0.5:0.6,0.1,0.6",))
     state = _motion(connected(server, "fr3"), 4.0, [0.4, 0, 0, 0, 0, 0, 0])
@@ -97,6 +98,7 @@ def test_a_box_is_run_into_and_the_server_says_why_the_motion_ended(franka_serve
     assert any("cartesian_reflex" in line for line in server.said)
 
 
+@pytest.mark.slow
 def test_a_person_comes_and_pushes(franka_server: Any, connected: Any) -> None:
     server = franka_server(scene="dynamic", seed=1)
     client = connected(server, "panda")
@@ -107,6 +109,7 @@ def test_a_person_comes_and_pushes(franka_server: Any, connected: Any) -> None:
     assert not sizes[:4000].any()
 
 
+@pytest.mark.slow
 def test_an_object_is_grasped_and_loads_the_arm_the_same_each_time(franka_server: Any, connected: Any) -> None:
     truths = []
     for _ in range(2):
@@ -252,6 +255,7 @@ def test_pytest_finds_it_and_nothing_else_of_the_product_needs_pytest() -> None:
     assert need == ["pytest_plugin.py"]
 
 
+@pytest.mark.slow
 def test_the_example_of_the_how_to_passes_and_finds_a_program_that_goes_on(pytester: pytest.Pytester) -> None:
     """In one process with the vendor's library, which holds the interpreter while it waits for a state."""
     if find_spec("pylibfranka") is None:

@@ -72,6 +72,7 @@ CHANGED = {
 """Kinds of results whose keys depend on a file."""
 
 
+@pytest.mark.slow
 def test_a_change_of_a_file_changes_all_keys_that_depend_on_it_and_no_other(source, monkeypatch):
     before = named(source, monkeypatch)
     assert all(before.values())

@@ -234,6 +234,7 @@ def test_ctrl_c_and_sigterm_leave_a_whole_file(tmp_path, number, code):
     assert recorded.stamps()[-1] >= last
 
 
+@pytest.mark.slow
 def test_a_program_that_ends_without_closing_leaves_a_whole_file(tmp_path):
     last, code, errors = ended(tmp_path / "a.mcap", "exit", 0.0, None)
     assert (code, errors) == (0, "")

@@ -49,6 +49,7 @@ def simulated(options: SimulateOptions, receiver: SkinReceiver, until) -> list[s
     return said
 
 
+@pytest.mark.slow
 def test_units_send_in_real_time_what_a_receiver_of_the_same_keys_believes(options, receiver, paper_skin):
     said = simulated(
         options(receiver.address), receiver,

@@ -69,6 +69,7 @@ def assert_kept(arm: RobotModel, plan: Plan, params: PlanParams, rate: float = 1
     assert coarse.min() >= params.clearance_m
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["panda", "fr3"])
 def test_the_motion_planned_by_default_keeps_all_limits(name: str):
     assert_kept(model(name), planned(name), PlanParams(), rate=100.0)
