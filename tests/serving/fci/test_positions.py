@@ -146,6 +146,12 @@ class Follower:
             self.q = wanted
         return ending
 
+    def go_on(self, speed: float) -> Ending:
+        """Go on at a speed until that is refused."""
+        while (ending := self.go(speed)) is None:
+            pass
+        return ending
+
 
 def _reflex(name: str) -> Ending:
     return Ending("reflex", (f"joint_motion_generator_{name}",))
@@ -167,17 +173,11 @@ def test_each_limit_of_a_motion_through_positions_has_its_own_name(kind: RobotKi
 def test_a_position_beyond_the_end_of_a_joint_has_its_name() -> None:
     follower = Follower("panda", _MODELS["panda"].q_max[6] - 0.02)
     assert follower.speed_up(0.1, 1.0) is None
-    ending = None
-    while ending is None:
-        ending = follower.go(0.1)
-    assert ending == _reflex("position_limits_violation")
+    assert follower.go_on(0.1) == _reflex("position_limits_violation")
     assert 0.0 <= follower.limits.q_max[6] - follower.q[6] < 0.1 * _MS
 
 
 def test_towards_the_end_of_a_joint_the_fr3_must_be_slower() -> None:
     follower = Follower("fr3", _MODELS["fr3"].q_max[6] - 0.2)
     assert follower.speed_up(0.3, 1.0) is None
-    ending = None
-    while ending is None:
-        ending = follower.go(0.3)
-    assert ending == _reflex("velocity_limits_violation")
+    assert follower.go_on(0.3) == _reflex("velocity_limits_violation")
