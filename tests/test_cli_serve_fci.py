@@ -22,7 +22,7 @@ from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin
 from pretouch.serving.fci.arm import ArmSetup, ServedArm
 from pretouch.serving.fci.motion import Setpoint
-from pretouch.serving.fci.wire import CONNECT, HEADER, PANDA, Generator, Impedance
+from pretouch.serving.fci.wire import CONNECT, HEADER, PANDA, Controller, Generator
 from pretouch.sim.scene import SceneSpec
 
 
@@ -131,7 +131,7 @@ def test_a_program_types_in_place_of_a_person_and_ends_the_server_by_ending(tmp_
 
 def test_what_is_typed_while_the_arm_comes_to_rest_waits_until_it_has() -> None:
     arm = ServedArm(ArmSetup(RobotModel(panda()), "panda", panda().q_ready, SceneSpec()))
-    arm.begin(Generator.JOINT_VELOCITY, Impedance.JOINT)
+    arm.begin(Generator.JOINT_VELOCITY, Controller.JOINT_IMPEDANCE)
     arm.step(Setpoint(np.zeros(7)))
     arm.step(Setpoint(np.zeros(7), finished=True))
     ours, theirs = os.pipe()

@@ -98,6 +98,10 @@ class FrankaServer:
         """Press the user stop, or release it."""
         self._type("stop" if pressed else "release")
 
+    def guide(self, pressed: bool = True) -> None:
+        """Press the buttons at the flange, or release them: an arm at rest then gives way to pushes."""
+        self._type("guide" if pressed else "let go")
+
     @property
     def said(self) -> tuple[str, ...]:
         """What it said so far, line by line, such as why a motion ended."""

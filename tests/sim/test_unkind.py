@@ -39,7 +39,13 @@ def lost(speeds: FloatArray, **given: float) -> FloatArray:
         joints = Joints(np.zeros(1), np.array([speed]), np.zeros(1))
         generator = MotionGenerator(np.zeros(1), moved, 0.001, 1.0)
         _, taken = drive(
-            none, 5.0 * one, joints, generator, Impedance(none, none, 90.0 * one), friction, Cogging(none, one, none)
+            none,
+            5.0 * one,
+            joints,
+            generator,
+            Impedance(none, none, none, 90.0 * one),
+            friction,
+            Cogging(none, one, none),
         )
         found.append(taken[0])
     return np.array(found)

@@ -37,8 +37,13 @@ if TYPE_CHECKING:
     from pretouch.cli.commands import ServeFci
 
 _say = partial(print, flush=True)
-_STOP = ("stop", "release")
-"""What is typed for the user stop."""
+_BUTTONS: dict[str, Callable[[ServedArm], None]] = {
+    "stop": ServedArm.press_stop,
+    "release": lambda arm: arm.press_stop(False),
+    "guide": ServedArm.press_guiding,
+    "let go": lambda arm: arm.press_guiding(False),
+}
+"""What is typed for the user stop and the buttons at the flange."""
 _TIME = "time"
 """What is typed to be told the arm's time."""
 _LAG_S = 0.2
@@ -67,7 +72,8 @@ def serve_fci(command: "ServeFci") -> None:
         if typed.possible and not c.stdin:
             _say(
                 "Type +x, -x, +y, -y, +z or -z and Enter to push the hand, or a force such as 0,15,0 [N];"
-                " stop presses the user stop, release releases it, time tells the arm's time."
+                " stop presses the user stop, release releases it; guide presses the buttons at the flange, let go"
+                " releases them; time tells the arm's time."
             )
         server.serve(lambda: ended() or typed.take())
 
@@ -106,8 +112,8 @@ class TypedPushes:
 
     def _do(self, line: str) -> None:
         now = self._arm.pushes.now
-        if line in _STOP:
-            self._arm.press_stop(line == "stop")
+        if line in _BUTTONS:
+            _BUTTONS[line](self._arm)
             return
         if line == _TIME:
             _say(f"The arm's time is {now:.3f} s.")

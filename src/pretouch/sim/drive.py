@@ -30,6 +30,7 @@ class Impedance(NamedTuple):
 
     stiffness: FloatArray  # [Nm/rad]
     damping: FloatArray  # [Nm s/rad]
+    feed_forward: FloatArray  # torques beside those of spring and damper [Nm]
     tau_max: FloatArray  # torque limits [Nm]
 
 
@@ -87,10 +88,11 @@ def drive(
         # positions integrate the set-points as they are: through the low-pass they would lag behind for good
         q_d[i] += qd_set[i] * generator.dt
         qd_d[i] += generator.follow * (qd_set[i] - qd_d[i])
-        # tau = K (q_d - q) + D (qd_d - qd) + C qd + g
+        # tau = K (q_d - q) + D (qd_d - qd) + tau_ff + C qd + g
         spring = impedance.stiffness[i] * (q_d[i] - joints.q[i])
         damper = impedance.damping[i] * (qd_d[i] - joints.qd[i])
-        tau[i] = min(max(spring + damper + bias[i], -impedance.tau_max[i]), impedance.tau_max[i])
+        wanted = spring + damper + impedance.feed_forward[i] + bias[i]
+        tau[i] = min(max(wanted, -impedance.tau_max[i]), impedance.tau_max[i])
         # Gaz et al. 2019; the second term makes it vanish at rest
         f1, f2, f3 = friction.f1[i], friction.f2[i], friction.f3[i]
         lost[i] = f1 / (1 + np.exp(-f2 * (joints.qd[i] + f3))) - f1 / (1 + np.exp(-f2 * f3))

@@ -14,7 +14,7 @@ from pretouch.robot.model import RobotModel
 from pretouch.serving.fci.kinds import JointVelocity
 from pretouch.serving.fci.limits import motion_limits as served_limits
 from pretouch.serving.fci.motion import Motion, Setpoint
-from pretouch.serving.fci.wire import Impedance
+from pretouch.serving.fci.wire import Controller
 from tests.hardware.franka.made import CheckingArm, middle
 
 
@@ -120,7 +120,7 @@ def test_bursts_of_lost_commands_at_any_time_break_no_limit_of_the_served_arm(
     model, draw = {"panda": panda_model, "fr3": fr3_model}[kind], np.random.default_rng([seed, 15])
     limits = motion_limits(model, kind)
     arm, limiter = CheckingArm(limits, middle(limits)), SetPointLimiter(limits, LimiterParams())
-    motion, burst = Motion(served_limits(model, kind), Impedance.JOINT, JointVelocity()), Bursts(draw)
+    motion, burst = Motion(served_limits(model, kind), Controller.JOINT_IMPEDANCE, JointVelocity()), Bursts(draw)
     # set-points that change often meet the limits of speed, others those of position
     changes = (0.05, 0.01)[seed % 2]
     wanted, lost = np.zeros(7), 0

@@ -13,7 +13,7 @@ from pretouch.serving.fci.frames import frames_of
 from pretouch.serving.fci.limits import motion_limits
 from pretouch.serving.fci.motion import Ending, Motion, Setpoint
 from pretouch.serving.fci.options import Drop
-from pretouch.serving.fci.wire import ERRORS, Impedance, RobotKind
+from pretouch.serving.fci.wire import ERRORS, Controller, RobotKind
 
 _MS = 1e-3
 _MOVE = 2
@@ -182,7 +182,7 @@ class Follower:
     def __init__(self, kind: RobotKind) -> None:
         model = RobotModel(panda() if kind == "panda" else fr3())
         body = Body(model, frames_of(model), CARTESIAN_LIMITS[kind])
-        self.motion = Motion(motion_limits(model, kind), Impedance.JOINT, CartesianVelocity(body))
+        self.motion = Motion(motion_limits(model, kind), Controller.JOINT_IMPEDANCE, CartesianVelocity(body))
         self.q = model.description.q_ready.copy()
 
     def led(self, axis: int, to: float, rate: float) -> Ending | None:

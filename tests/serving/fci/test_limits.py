@@ -19,7 +19,7 @@ from pretouch.serving.fci.options import drop_of
 from pretouch.serving.fci.pushes import TcpPush, push_of
 from pretouch.serving.fci.state import StateDatagram, by_robot_at
 from pretouch.serving.fci.urdf import urdf_of
-from pretouch.serving.fci.wire import PANDA, Generator, Impedance, RobotMode
+from pretouch.serving.fci.wire import PANDA, Controller, Generator, RobotMode
 from pretouch.sim.scene import SceneSpec
 
 _MODELS = {"panda": RobotModel(panda()), "fr3": RobotModel(fr3())}
@@ -73,7 +73,7 @@ def test_braking_keeps_the_acceleration_limit_and_ends_at_rest(speeds: list[floa
 
 def test_a_motion_that_breaks_off_ends_in_braking_at_the_acceleration_limit() -> None:
     arm = ServedArm(ArmSetup(RobotModel(panda()), "panda", _READY.copy(), SceneSpec()))
-    arm.begin(Generator.JOINT_VELOCITY, Impedance.JOINT)
+    arm.begin(Generator.JOINT_VELOCITY, Controller.JOINT_IMPEDANCE)
     for k in range(1, 501):
         assert arm.step(Setpoint(2e-3 * k * np.eye(7)[6])) is None
     assert arm.step(Setpoint(np.full(7, np.nan))) is not None
@@ -88,7 +88,7 @@ def test_a_motion_that_breaks_off_ends_in_braking_at_the_acceleration_limit() ->
 
 
 def test_nineteen_lost_commands_are_bridged_at_the_same_acceleration() -> None:
-    motion = Motion(_limits("panda"), Impedance.JOINT, JointVelocity())
+    motion = Motion(_limits("panda"), Controller.JOINT_IMPEDANCE, JointVelocity())
     for k in range(1, 4):
         assert motion.follow(_READY, Setpoint(np.full(7, 1e-3 * k))) is None
     for _ in range(19):
@@ -99,7 +99,7 @@ def test_nineteen_lost_commands_are_bridged_at_the_same_acceleration() -> None:
 
 
 def test_the_first_command_has_to_come_in_half_a_second() -> None:
-    motion = Motion(_limits("panda"), Impedance.JOINT, JointVelocity())
+    motion = Motion(_limits("panda"), Controller.JOINT_IMPEDANCE, JointVelocity())
     endings = [motion.follow(_READY, None) for _ in range(FIRST_WITHIN)]
     assert endings[:-1] == [None] * (FIRST_WITHIN - 1)
     assert endings[-1] == Ending("reflex", ("communication_constraints_violation",))

@@ -11,7 +11,7 @@ from pretouch.serving.fci.kinds import JointPosition
 from pretouch.serving.fci.limits import MotionLimits, motion_limits
 from pretouch.serving.fci.motion import Ending, Motion, Setpoint
 from pretouch.serving.fci.options import Drop
-from pretouch.serving.fci.wire import ERRORS, Impedance, RobotKind
+from pretouch.serving.fci.wire import ERRORS, Controller, RobotKind
 
 _MODELS = {"panda": RobotModel(panda()), "fr3": RobotModel(fr3())}
 _READY = panda().q_ready
@@ -122,7 +122,7 @@ class Follower:
 
     def __init__(self, kind: RobotKind, q: float) -> None:
         self.limits: MotionLimits = motion_limits(_MODELS[kind], kind)
-        self.motion = Motion(self.limits, Impedance.JOINT, JointPosition(self.limits))
+        self.motion = Motion(self.limits, Controller.JOINT_IMPEDANCE, JointPosition(self.limits))
         self.q = _READY.copy()
         self.q[6] = q
         assert self.motion.follow(self.q, Setpoint(self.q)) is None

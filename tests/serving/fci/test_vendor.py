@@ -145,14 +145,19 @@ def test_what_is_set_is_told(serve: Any, kind: RobotKind) -> None:
     assert "invalid argument" in done["refused"]["collision"]
 
 
-def test_what_is_not_served_is_refused_in_the_vendors_words(serve: Any, kind: RobotKind) -> None:
-    served = serve(kind)
-    errors = served.ask("refused")
-    if kind == "panda":
-        assert errors.pop("model") == "libfranka: Server reports error when loading model library."
-    refused = errors["torque"]
-    assert refused == 'libfranka: Move command rejected: command not possible in the current mode ("Idle")!'
-    assert "only positions and velocities are served" in " ".join(served.said)
+def test_torques_hold_the_arm_as_their_springs_say(serve: Any, kind: RobotKind) -> None:
+    pushes = (TcpPush(0.5, (0.0, 12.0, 0.0), 2.0),)
+    done = serve(kind, {"pushes": pushes}).ask("torques", 2.0)
+    assert done["error"] is None
+    moved = np.subtract(done["last"]["q"], done["begun"])
+    # 12 N at 0.307 m from joint 1's axis, on 600 Nm/rad
+    assert moved[0] == pytest.approx(12.0 * 0.307 / 600.0, abs=1e-3)
+    np.testing.assert_allclose(done["last"]["tau_J_d"], -600.0 * moved, atol=1.5)
+    assert done["after"]["mode"] == "idle"
+
+
+def test_the_pandas_library_is_refused_in_the_vendors_words(serve: Any) -> None:
+    assert serve("panda").ask("refused")["model"] == "libfranka: Server reports error when loading model library."
 
 
 def test_the_fr3s_library_computes_with_our_model(serve: Any) -> None:

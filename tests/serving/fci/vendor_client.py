@@ -54,7 +54,7 @@ def _names(errors):
 
 _COMMANDS = {
     "joint_velocity": "JointVelocities", "joint_position": "JointPositions",
-    "cartesian_velocity": "CartesianVelocities", "cartesian_pose": "CartesianPose",
+    "cartesian_velocity": "CartesianVelocities", "cartesian_pose": "CartesianPose", "torque": "Torques",
 }  # fmt: skip
 
 
@@ -62,7 +62,8 @@ def _control(lib, robot, on_state, what="joint_velocity", limited=False):
     """Call `on_state(state, time) -> (values, finished)` for each state of a motion; return the error, or None."""
     time, made = 0.0, getattr(lib, _COMMANDS[what])
     try:
-        if hasattr(robot, f"control_{what}"):
+        mode, alone = lib.ControllerMode, what == "torque"
+        if hasattr(robot, "control"):
 
             def called(state, duration):
                 nonlocal time
@@ -72,9 +73,11 @@ def _control(lib, robot, on_state, what="joint_velocity", limited=False):
                 command.motion_finished = finished
                 return command
 
-            getattr(robot, f"control_{what}")(called, lib.ControllerMode.kJointImpedance, limited, 1000.0)
+            begin = robot.control if alone else getattr(robot, f"control_{what}")
+            begin(called, *(() if alone else (mode.kJointImpedance,)), limited, 1000.0)
             return None
-        control, finished = getattr(robot, f"start_{what}_control")(lib.ControllerMode.JointImpedance), False
+        control = getattr(robot, f"start_{what}_control")(*(() if alone else (mode.JointImpedance,)))
+        finished = False
         while not finished:
             state, duration = control.readOnce()
             time += duration.to_sec()
@@ -194,14 +197,24 @@ def settings(lib, robot, kind):
     return {"state": _fresh(robot), "refused": refused, "turned": turned}
 
 
+def torques(lib, robot, kind, seconds):
+    """Hold the arm by springs and dampers of one's own, with the library's limit of the torque's rate."""
+    _behavior(robot, kind, 90.0, 90.0)
+    begun, told = list(robot.read_once().q), []
+
+    def on_state(state, time):
+        told.append(_told(state))
+        wanted = [600.0 * (q0 - q) - 40.0 * dq for q0, q, dq in zip(begun, state.q, state.dq, strict=True)]
+        held = [max(-1.0, min(1.0, w - last)) + last for w, last in zip(wanted, state.tau_J_d, strict=True)]
+        return held, time >= seconds
+
+    error = _control(lib, robot, on_state, "torque")
+    return {"error": error, "last": told[-1], "begun": begun, "after": _told(robot.read_once())}
+
+
 def refused(lib, robot, kind):
     """Ask for what is not served."""
-    if kind == "fr3":
-        return {"torque": _error(robot.start_torque_control)}
-    return {
-        "torque": _error(lambda: robot.control(lambda *_: lib.Torques([0.0] * 7))),
-        "model": _error(robot.load_model),
-    }
+    return {"model": _error(robot.load_model)}
 
 
 def _error(do):
@@ -253,9 +266,8 @@ def main():
     except Exception as error:
         print(json.dumps({"error": str(error)}), flush=True)
     else:
-        done = {f.__name__: f for f in (state, move, positions, cartesian, hold, settings, refused, model, gripper)}[
-            what
-        ](lib, robot, kind, *map(float, values))
+        known = (state, move, positions, cartesian, torques, hold, settings, refused, model, gripper)
+        done = {f.__name__: f for f in known}[what](lib, robot, kind, *map(float, values))
         print(json.dumps(done), flush=True)
     os._exit(0)
 

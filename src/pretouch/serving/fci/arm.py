@@ -9,14 +9,22 @@ from pretouch.errors import ParameterError, RobotModelError
 from pretouch.robot.model import RobotModel
 from pretouch.serving.fci.cartesian import CARTESIAN_LIMITS, Body, CartesianPose, CartesianVelocity
 from pretouch.serving.fci.collision import Contacts, default_behavior
+from pretouch.serving.fci.controllers import (
+    CARTESIAN_STIFFNESS,
+    CartesianImpedance,
+    DriveController,
+    ExternalTorques,
+    guiding,
+)
 from pretouch.serving.fci.frames import frames_of
 from pretouch.serving.fci.gripper import Gripper, GripperObject
-from pretouch.serving.fci.kinds import JointPosition, JointVelocity, MotionKind
+from pretouch.serving.fci.inertia import Inertial, announce, inertials
+from pretouch.serving.fci.kinds import JointPosition, JointVelocity, MotionKind, NoMotion
 from pretouch.serving.fci.limits import PERIOD_S, motion_limits
 from pretouch.serving.fci.motion import Ending, Motion, Setpoint
 from pretouch.serving.fci.pushes import Pushes, TcpPush
 from pretouch.serving.fci.units import ServedUnits, UnitsSetup
-from pretouch.serving.fci.wire import JOINTS, Generator, Impedance, RobotKind, RobotMode
+from pretouch.serving.fci.wire import JOINTS, Controller, Generator, RobotKind, RobotMode
 from pretouch.sim.hand import Hand, HandScript
 from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams
@@ -55,11 +63,12 @@ class ServedArm:
 
     def __init__(self, setup: ArmSetup) -> None:
         """Let it stand; its time begins."""
-        model = setup.model
-        if model.n != JOINTS:
+        if setup.model.n != JOINTS:
             raise RobotModelError(
-                f"{model.description.name} has {model.n} joints: FCI supports only arms with {JOINTS} joints."
+                f"{setup.model.description.name} has {setup.model.n} joints: FCI supports only arms with {JOINTS}"
+                " joints."
             )
+        model = RobotModel(setup.model.description)  # its own: what a client says of loads changes it
         self.model, self.kind = model, setup.kind
         self.plant = Plant(model, setup.scene, PlantParams(), setup.q, setup.seed)
         self.limits, self.contacts, self.frames = motion_limits(model, setup.kind), Contacts(), frames_of(model)
@@ -80,6 +89,12 @@ class ServedArm:
         """Fraction of the last commands of the motion that came in time; 0 while none runs."""
         self.qd, self.qdd = np.zeros(JOINTS), np.zeros(JOINTS)
         """Commanded velocities [rad/s] and accelerations [rad/s^2], (7,)."""
+        self.cartesian_stiffness = CARTESIAN_STIFFNESS
+        """(6,) of the Cartesian impedance, in the stiffness frame [N/m, Nm/rad]."""
+        self.guiding_axes = np.ones(JOINTS, np.bool_)
+        """Which axes of the end-effector, and whether the elbow, can be moved by hand in guiding mode."""
+        self._flange, self._announced = inertials(model)[self.frames.flange], self.frames.load
+        self._drives: DriveController | None = None
         self._since_motion, self._stop_pressed = _COMES_TO_REST, False
         for _ in range(round(SETTLE_S / PERIOD_S)):
             self._pass_time()
@@ -114,16 +129,34 @@ class ServedArm:
     @property
     def settled(self) -> bool:
         """Whether it no longer swings after a motion, either."""
-        return self.at_rest and self._since_motion >= _COMES_TO_REST
+        return self.at_rest and self._since_motion >= _COMES_TO_REST and not self._led
 
-    def begin(self, generator: Generator, impedance: Impedance) -> None:
+    @property
+    def _led(self) -> bool:
+        """Whether somebody moves it by hand, or is about to."""
+        return self.mode is RobotMode.GUIDING and self.pushes.under_way
+
+    @property
+    def body(self) -> Body:
+        """The arm and its end-effector as they are set now."""
+        return Body(self.model, self.frames, CARTESIAN_LIMITS[self.kind])
+
+    def begin(self, generator: Generator, controller: Controller) -> None:
         """Begin a motion of a kind that is served, at rest and without errors: whoever calls it has looked."""
-        self.motion = Motion(self.limits, impedance, self._kind(generator))
+        external = None
+        match controller:
+            case Controller.EXTERNAL:
+                self._drives = external = ExternalTorques(self.model.description.tau_max, self.torques.desired)
+            case Controller.CARTESIAN_IMPEDANCE:
+                self._drives = CartesianImpedance(self.plant, self.body, self.cartesian_stiffness, self.plant.stiffness)
+        self.motion = Motion(self.limits, controller, self._kind(generator), external)
         self.mode, self.reflex_reason = RobotMode.MOVE, ()
 
     def _kind(self, generator: Generator) -> MotionKind:
-        body = Body(self.model, self.frames, CARTESIAN_LIMITS[self.kind])
+        body = self.body
         match generator:
+            case Generator.NONE:
+                return NoMotion()
             case Generator.JOINT_POSITION:
                 return JointPosition(self.limits)
             case Generator.JOINT_VELOCITY:
@@ -136,25 +169,59 @@ class ServedArm:
     def stop(self) -> None:
         """End the motion: the arm brakes."""
         self.motion, self._since_motion, self.success_rate = None, 0, 0.0
+        self._hold()
         if self.mode is RobotMode.MOVE:
             self.mode = RobotMode.IDLE
+
+    def _hold(self) -> None:
+        """Have the drives' own joint impedance act: from where the arm is, it brakes."""
+        if self._drives is not None:
+            self._drives, self.qd = None, self.report.qd
+            self.plant.hold()
 
     def press_stop(self, pressed: bool = True) -> None:
         """Press the user stop, or release it: a motion ends, and none begins until then."""
         self._stop_pressed = pressed
-        if pressed and not self.moving:
-            self.mode = RobotMode.USER_STOPPED
-        elif self.mode is RobotMode.USER_STOPPED:
-            self.mode = RobotMode.REFLEX if self.errors else RobotMode.IDLE
+        self.press_guiding(False)
+
+    def press_guiding(self, pressed: bool = True) -> None:
+        """Press the buttons at the flange, or release them: at rest, the arm gives way along the axes that are free."""
+        if not pressed and self.mode is RobotMode.GUIDING:
+            self._hold()
+            self._since_motion = 0
+        elif pressed and self.at_rest and not self._stop_pressed:
+            self._drives = guiding(self.plant, self.body, self.guiding_axes)
+        if not self.moving:
+            self.mode = self._unmoved_mode
+
+    @property
+    def _unmoved_mode(self) -> RobotMode:
+        """The mode of an arm that neither moves nor is guided."""
+        if self._stop_pressed:
+            return RobotMode.USER_STOPPED
+        if self._drives is not None:
+            return RobotMode.GUIDING
+        return RobotMode.REFLEX if self.errors else RobotMode.IDLE
 
     def recover(self) -> None:
         """Forget errors."""
-        self.errors, self.mode = (), RobotMode.USER_STOPPED if self._stop_pressed else RobotMode.IDLE
+        self.errors = ()
         self.contacts.forget()
+        self.mode = self._unmoved_mode
 
     def forget_settings(self) -> None:
         """Undo what a client has set: the next one finds the arm as it was delivered."""
         self.contacts.behavior, self.frames = default_behavior(), frames_of(self.model)
+        self.cartesian_stiffness, self.guiding_axes = CARTESIAN_STIFFNESS, np.ones(JOINTS, np.bool_)
+        self.plant.set_stiffness(np.array(self.plant.params.stiffness_nm_rad))
+        self.announce(self.frames.load)
+
+    def announce(self, load: Inertial) -> None:
+        """Have the arm's own computer count a load at the flange, in the flange's frame."""
+        if load.mass or self._announced.mass:
+            announce(self.model, self.frames.flange, self._flange, load)
+            self._since_motion = 0  # it holds another weight: the arm swings
+        self.frames.load = self._announced = load
 
     def carry(self, gripper: Gripper) -> None:
         """Carry a gripper in another state from now on; with another load the arm swings, as after a motion."""
@@ -178,15 +245,18 @@ class ServedArm:
         if self.motion is None:
             slower = self.limits.braked(self.qd)
             self.qd, self.qdd = slower, (slower - self.qd) / PERIOD_S
-            self._since_motion += 1
+            self._since_motion = 0 if self._led else self._since_motion + 1
         self.plant.command(self.qd)
         self._pass_time()
-        return self._check_contacts() or ending
+        return self._check_contacts() or self._check_joints() or ending
 
     def _pass_time(self) -> None:
+        asked = None if self._drives is None else self._drives.torques()
+        if asked is not None:
+            self.plant.drive_by(asked)
         self.plant.advance(PERIOD_S)
         self.report = self.plant.read()
-        self.torques.update(self.report.q)
+        self.torques.update(self.report.q, asked)
         self.true_force = self.plant.true_force + self.pushes.force
         """(3,) all forces on the arm [N], base frame."""
         self.plant.take_log()
@@ -195,11 +265,21 @@ class ServedArm:
         """Look for contacts; a collision is a reflex, which ends a motion."""
         wrench = np.zeros(6) if self.report.wrench is None else self.report.wrench
         reflexes = self.contacts.update(self.report.tau_ext, wrench, self.qdd)
-        if not reflexes or self.mode is RobotMode.REFLEX:
+        if not reflexes or self.mode in (RobotMode.REFLEX, RobotMode.GUIDING):
             return None
         moved = self.moving
         self._end(reflexes)
         return Ending("reflex", reflexes) if moved else None
+
+    def _check_joints(self) -> Ending | None:
+        """Look where torques lead the joints: commanded motions are checked before they are followed."""
+        if self.motion is None or self.motion.controller is not Controller.EXTERNAL:
+            return None
+        errors = self.limits.left(self.report.q, self.report.qd)
+        if not errors:
+            return None
+        self._end(errors)
+        return Ending("reflex", errors)
 
     def _end(self, errors: tuple[str, ...]) -> None:
         self.stop()
@@ -228,15 +308,16 @@ class JointTorques:
     def _keep(self, _time: float) -> None:
         self._before = self._qd.copy()
 
-    def update(self, q: FloatArray) -> None:
-        """Take in a physics step that led to measured positions q (n,) [rad]."""
+    def update(self, q: FloatArray, asked: FloatArray | None = None) -> None:
+        """Take in a physics step that led to measured positions q (n,) [rad], under torques (n,) if any were asked."""
         p, gravity = self._plant.params, np.empty(len(q))
         self._plant.model.mass_matrix_and_bias(q, self._still, gravity)
         lost = self._lost(self._before)
         motor = self._applied + lost
         measured = motor - p.armature_kg_m2 * self._qdd - p.friction_compensated * lost
         self.rate = (measured - self.measured) / p.period_s if self._known else self._still
-        self.measured, self.desired, self._known = measured, motor - gravity, True
+        self.measured, self._known = measured, True
+        self.desired = motor - gravity if asked is None else asked
 
     def _lost(self, qd: FloatArray) -> FloatArray:
         """Torques (n,) [Nm] lost to friction at velocities qd (n,) [rad/s]."""

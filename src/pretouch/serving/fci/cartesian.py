@@ -147,7 +147,7 @@ class _OfEndEffector(ABC):
         reached = q
         for _ in range(_NEWTON_STEPS):
             now, J = self._body.end_effector(reached)
-            missing = _difference(T, now)
+            missing = difference(T, now)
             if elbow is not None:
                 J, missing = np.vstack([J, np.eye(JOINTS)[_ELBOW]]), np.append(missing, elbow - reached[_ELBOW])
             reached = reached + np.linalg.pinv(J) @ missing
@@ -174,7 +174,7 @@ class CartesianPose(_OfEndEffector):
         T = pose_of(field)
         if T is None:
             return Asked(np.zeros(JOINTS), (self.not_a_number,))
-        twist = _difference(T, self._body.end_effector(q)[0]) / PERIOD_S
+        twist = difference(T, self._body.end_effector(q)[0]) / PERIOD_S
         # how far it may be off at first is our choice, as for positions of joints
         line, turn, _ = (most * PERIOD_S for most in self._body.limits.acceleration)
         if first and (math.hypot(*twist[:3]) > line or math.hypot(*twist[3:]) > turn):
@@ -191,7 +191,7 @@ def _advanced(T: FloatArray, twist: FloatArray) -> FloatArray:
     return there
 
 
-def _difference(there: FloatArray, here: FloatArray) -> FloatArray:
+def difference(there: FloatArray, here: FloatArray) -> FloatArray:
     """Translation [m] and rotation vector [rad] (6,) from a pose (4, 4) to another, base frame."""
     D = there[:3, :3] @ here[:3, :3].T
     sines = 0.5 * np.array([D[2, 1] - D[1, 2], D[0, 2] - D[2, 0], D[1, 0] - D[0, 1]])

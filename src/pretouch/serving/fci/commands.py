@@ -1,6 +1,5 @@
 """What the robot answers to requests that change how it is set, and to those for what is not served."""
 
-import struct
 from enum import IntEnum
 from typing import NamedTuple
 
@@ -8,9 +7,10 @@ import numpy as np
 
 from pretouch.serving.fci.arm import ServedArm
 from pretouch.serving.fci.collision import CollisionBehavior
+from pretouch.serving.fci.controllers import CARTESIAN_LEAST, CARTESIAN_STIFFNESS, JOINT_MOST_NM_RAD
 from pretouch.serving.fci.frames import pose_of
 from pretouch.serving.fci.inertia import Inertial
-from pretouch.serving.fci.wire import Generator, Impedance
+from pretouch.serving.fci.wire import MOVE, Controller, Generator, Protocol
 from pretouch.types import FloatArray
 
 _EIGENVALUE_SLACK = 1e-9
@@ -36,15 +36,18 @@ class WantedMotion(NamedTuple):
     """A motion that is served."""
 
     generator: Generator
-    impedance: Impedance
+    controller: Controller
 
 
-def wanted_motion(body: bytes) -> WantedMotion | None:
+def wanted_motion(protocol: Protocol, body: bytes) -> WantedMotion | None:
     """Read the request to move; None where the motion is not served."""
-    controller, generator = struct.unpack_from("<II", body)
-    if generator not in list(Generator) or controller not in (Impedance.JOINT, Impedance.CARTESIAN):
+    controller, generator, *_ = MOVE.unpack_from(body)
+    interpolated = any(body[MOVE.size : MOVE.size + 1])
+    if generator not in protocol.generators or controller not in tuple(Controller)[: Controller.NONE] or interpolated:
         return None
-    return WantedMotion(Generator(generator), Impedance(controller))
+    if generator == Generator.NONE and controller != Controller.EXTERNAL:
+        return None
+    return WantedMotion(Generator(generator), Controller(controller))
 
 
 def set_or_get(arm: ServedArm, name: str, body: bytes) -> bytes:
@@ -54,6 +57,7 @@ def set_or_get(arm: ServedArm, name: str, body: bytes) -> bytes:
     if name == "GetCartesianLimit":
         return bytes([Status.SUCCESS]) + _CARTESIAN_LIMIT
     if name == "SetGuidingMode":
+        arm.guiding_axes = np.frombuffer(body, "u1") != 0
         return bytes([Status.SUCCESS])
     values = np.frombuffer(body, "<f8").copy()
     if not np.all(np.abs(values) <= _LARGEST):
@@ -71,8 +75,21 @@ def _set(arm: ServedArm, name: str, values: FloatArray) -> bool:
         return _set_frame(arm, name, values)
     if name == "SetLoad":
         return _set_load(arm, values)
-    # stiffnesses and filters: taken, and the simulated joints' own stay what they are
+    if name == "SetJointImpedance":
+        sound = _within(values, 0.0, JOINT_MOST_NM_RAD)
+        if sound:
+            arm.plant.set_stiffness(values)
+        return sound
+    if name == "SetCartesianImpedance":
+        sound = _within(values, CARTESIAN_LEAST, CARTESIAN_STIFFNESS)
+        arm.cartesian_stiffness = values if sound else arm.cartesian_stiffness
+        return sound
+    # filters: taken, and the simulated ones stay what they are
     return bool(np.all(values >= 0) and np.any(values > 0))
+
+
+def _within(values: FloatArray, least: FloatArray | float, most: FloatArray | float) -> bool:
+    return bool(np.all((values >= least) & (values <= most)))
 
 
 def _set_frame(arm: ServedArm, name: str, values: FloatArray) -> bool:
@@ -90,5 +107,5 @@ def _set_load(arm: ServedArm, values: FloatArray) -> bool:
     mass, com, inertia = float(values[0]), values[1:4], values[4:13].reshape(3, 3).T
     if mass < 0 or not np.allclose(inertia, inertia.T) or np.linalg.eigvalsh(inertia)[0] < -_EIGENVALUE_SLACK:
         return False
-    arm.frames.load = Inertial(mass, com, inertia)
+    arm.announce(Inertial(mass, com, inertia))
     return True

@@ -49,7 +49,7 @@ class Frames:
     EE_T_K: FloatArray = field(default_factory=lambda: np.eye(4))
     """(4, 4) stiffness frame, in which the external wrench acts, on the end-effector."""
     load: Inertial = field(default_factory=lambda: Inertial(0.0, np.zeros(3), np.zeros((3, 3))))
-    """What the client says that the hand carries; the simulated arm's own payload stays what it is."""
+    """What the client says that the hand carries, in the flange's frame."""
 
     @property
     def F_T_EE(self) -> FloatArray:

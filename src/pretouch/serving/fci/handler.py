@@ -23,7 +23,7 @@ class RequestHandler:
     ) -> None:  # fmt: skip
         """Serve a client.
 
-        `settle` is called before what waits for the arm to be at rest, and `begins` before a motion begins.
+        `settle` is called where the arm is to come to rest before it goes on, and `begins` before a motion begins.
         """
         self._client, self._protocol, self._arm, self._state = client, protocol, arm, state
         self._settle, self._begins, self._say = settle, begins, say
@@ -71,14 +71,16 @@ class RequestHandler:
             case "GetRobotModel":
                 self._answer(name, identifier, bytes([Status.SUCCESS]) + urdf_of(arm.model).encode())
             case _:
-                self._answer(name, identifier, set_or_get(arm, name, request.body))
+                answer = set_or_get(arm, name, request.body)
+                self._settle()
+                self._answer(name, identifier, answer)
                 self._state.frames_changed()
 
     def _begin(self, request: Request) -> None:
-        arm, wanted = self._arm, wanted_motion(request.body)
+        arm, wanted = self._arm, wanted_motion(self._protocol, request.body)
         self._settle()
         if wanted is None:
-            self._say("Refused: only positions and velocities are served, with joint or Cartesian impedance.")
+            self._say("Refused: this motion is not served, such as one that the robot interpolates by itself.")
         if arm.mode is not RobotMode.IDLE or not arm.at_rest or wanted is None:
             self._answer("Move", request.identifier, self._status("not possible"))
             return

@@ -46,6 +46,20 @@ def hand_of(model: RobotModel, flange: int) -> Inertial:
     return combined(parts)
 
 
+def announce(model: RobotModel, flange: int, own: Inertial, load: Inertial) -> None:
+    """Have a model that is one arm's alone count a load at the flange, beside the flange's own mass.
+
+    Both are in the flange's frame.
+    """
+    both = combined([own, load])
+    moments, axes = np.linalg.eigh(both.inertia)
+    axes[:, 2] *= np.sign(np.linalg.det(axes))
+    mj, data = model.scratch
+    mj.body_mass[flange], mj.body_ipos[flange], mj.body_inertia[flange] = both.mass, both.com, moments
+    mujoco.mju_mat2Quat(mj.body_iquat[flange], axes.reshape(-1))
+    mujoco.mj_setConst(mj, data)
+
+
 def combined(parts: list[Inertial]) -> Inertial:
     """Return several bodies in one frame as one."""
     mass = sum(part.mass for part in parts)

@@ -89,6 +89,16 @@ class JointVelocity(_OfJoints):
         return Asked(values)
 
 
+class NoMotion(JointVelocity):
+    """None beside the torques of an external controller: the joints are asked for no velocity."""
+
+    generator = Generator.NONE
+
+    def read(self, command: np.void) -> FloatArray:
+        """Return zeros, whatever the command says."""
+        return np.zeros_like(command["dq_c"])
+
+
 class JointPosition(_OfJoints):
     """Positions (7,) [rad], differentiated backwards as the vendor's documents say."""
 

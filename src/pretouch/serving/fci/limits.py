@@ -19,6 +19,9 @@ _JERK: dict[RobotKind, tuple[float, ...]] = {
 SLACK = 1e-3
 """Fraction beyond a limit that rounding may take."""
 
+_STANDS = 0.05
+"""A joint that is measured slower than this may stand: six times the noise [rad/s]."""
+
 
 @dataclass(frozen=True, slots=True)
 class MotionLimits:
@@ -59,9 +62,23 @@ class MotionLimits:
             "velocity_limits_violation": np.all((wanted >= low) & (wanted <= high)),
             "velocity_discontinuity": np.all(np.abs(acceleration) <= self.qdd * (1 + SLACK)),
             "acceleration_discontinuity": np.all(np.abs(jerk) <= self.qddd * (1 + SLACK)),
-            "position_limits_violation": np.all((following >= self.q_min) & (following <= self.q_max)),
+            # a joint that is beyond may go back
+            "position_limits_violation": np.all(
+                ((following >= self.q_min) | (wanted >= 0)) & ((following <= self.q_max) | (wanted <= 0))
+            ),
         }
         return tuple(f"{whose}_{name}" for name, kept in within.items() if not kept)
+
+    def left(self, q: FloatArray, qd: FloatArray) -> tuple[str, ...]:
+        """Return the errors (none: within) of joints that are measured at q [rad] and qd [rad/s], both (n,).
+
+        A joint beyond a limit of its position that stands or goes back is no error.
+        """
+        found = {
+            "joint_position_limits_violation": ((q > self.q_max) & (qd > _STANDS)) | ((q < self.q_min) & (qd < -_STANDS)),
+            "joint_velocity_violation": np.abs(qd) > self.qd,
+        }
+        return tuple(name for name, wrong in found.items() if wrong.any())
 
     def ends_at_rest(self, qd: FloatArray) -> bool:
         """Whether a motion may end at commanded velocities (n,) [rad/s]: the acceleration limit stops it at once."""

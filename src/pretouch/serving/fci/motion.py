@@ -1,13 +1,14 @@
 """One motion: commands in, what the joints are to do, or why it ended. Pure but for its own memory."""
 
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from pretouch.serving.fci.controllers import ExternalTorques
 from pretouch.serving.fci.kinds import Asked, MotionKind
 from pretouch.serving.fci.limits import PERIOD_S, MotionLimits
-from pretouch.serving.fci.wire import Impedance
+from pretouch.serving.fci.wire import JOINTS, Controller
 from pretouch.types import FloatArray
 
 LOST_MOST = 20
@@ -26,6 +27,8 @@ class Setpoint:
     """What counts of it in this kind of motion."""
     finished: bool = False
     """Whether the motion ends with it."""
+    torques: FloatArray = field(default_factory=lambda: np.zeros(JOINTS))
+    """(7,) for an external controller [Nm]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,10 +44,12 @@ class Ending:
 class Motion:
     """A motion from its request until it ends."""
 
-    def __init__(self, limits: MotionLimits, impedance: Impedance, kind: MotionKind) -> None:
-        """Begin at rest."""
+    def __init__(
+        self, limits: MotionLimits, controller: Controller, kind: MotionKind, external: ExternalTorques | None = None
+    ) -> None:
+        """Begin at rest; an external controller takes the torques."""
         n = len(limits.qd)
-        self._limits, self.impedance, self.kind = limits, impedance, kind
+        self._limits, self.controller, self.kind, self._external = limits, controller, kind, external
         self.qd, self.qdd = np.zeros(n), np.zeros(n)
         """Commanded velocities [rad/s] and accelerations [rad/s^2], (n,)."""
         self.begun = False
@@ -68,11 +73,14 @@ class Motion:
         self._received.append(True)
         if not np.all(np.isfinite(setpoint.values)):
             return Ending("input error", (self.kind.not_a_number,))
+        if self._external is not None and not np.all(np.isfinite(setpoint.torques)):
+            return Ending("input error", ("controller_torque_discontinuity",))
         if setpoint.finished:
             if self._limits.ends_at_rest(self.qd):
                 return Ending("success")
             return Ending("reflex", (self.kind.moves_at_end,))
-        return self._moved(q, self.kind.asked(setpoint.values, q, first))
+        errors = () if self._external is None else self._external.take(setpoint.torques)
+        return Ending("reflex", errors) if errors else self._moved(q, self.kind.asked(setpoint.values, q, first))
 
     def _without(self, q: FloatArray) -> Ending | None:
         """Go on with the same acceleration, as the robot does for a lost command."""

@@ -91,6 +91,11 @@ class Pushes:
         """The time of the pushes [s]."""
         return self._plant.time - self._begin
 
+    @property
+    def under_way(self) -> bool:
+        """Whether one is due or lasts."""
+        return any(push.start + push.duration > self.now for push in self._pushes)
+
     def add(self, push: TcpPush) -> None:
         """Have another one come; those that are over are forgotten."""
         self._pushes = (*(p for p in self._pushes if p.start + p.duration > self.now), push)

@@ -167,7 +167,7 @@ class FciServer:
             return None
         names = command.dtype.names or ()
         finished = any(command[name] for name in names if name.endswith("_finished"))
-        return Setpoint(motion.kind.read(command), bool(finished))
+        return Setpoint(motion.kind.read(command), bool(finished), command["tau_J_d"].copy())
 
     def _take_command(self) -> None:
         """Take in what came by UDP, and keep the newest command that is one for this millisecond."""

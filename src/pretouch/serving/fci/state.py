@@ -6,7 +6,7 @@ import numpy as np
 
 from pretouch.serving.fci.arm import ServedArm
 from pretouch.serving.fci.frames import pose
-from pretouch.serving.fci.wire import ERRORS, Impedance, Protocol
+from pretouch.serving.fci.wire import ERRORS, Controller, Protocol
 from pretouch.types import FloatArray
 
 _GRAVITY = (0.0, 0.0, -9.81)
@@ -42,7 +42,7 @@ class StateDatagram:
         self._write_poses()
         motion = arm.motion
         to["motion_generator_mode"][...] = 0 if motion is None else motion.kind.generator + 1
-        to["controller_mode"][...] = Impedance.NONE if motion is None else motion.impedance
+        to["controller_mode"][...] = Controller.NONE if motion is None else motion.controller
         to["robot_mode"][...] = arm.mode
         to["control_command_success_rate"][...] = arm.success_rate
         for name, errors in (("errors", arm.errors), ("reflex_reason", arm.reflex_reason)):

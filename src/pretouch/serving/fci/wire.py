@@ -43,17 +43,19 @@ class Generator(IntEnum):
     JOINT_VELOCITY = 1
     CARTESIAN_POSITION = 2
     CARTESIAN_VELOCITY = 3
+    NONE = 4
+    """Torques alone; the Panda's protocol has none, its clients send velocities of 0 beside them."""
 
 
 OF_END_EFFECTOR = (Generator.CARTESIAN_POSITION, Generator.CARTESIAN_VELOCITY)
 """Those that command the end-effector."""
 
 
-class Impedance(IntEnum):
+class Controller(IntEnum):
     """Controllers, as requests and states number them."""
 
-    JOINT = 0
-    CARTESIAN = 1
+    JOINT_IMPEDANCE = 0
+    CARTESIAN_IMPEDANCE = 1
     EXTERNAL = 2
     NONE = 3
 
@@ -111,8 +113,10 @@ _COMMAND = [
     ("motion_generation_finished", "u1", ()), ("tau_J_d", "<f8", (7,)),
 ]  # fmt: skip
 
-_MOVE_SIZE = struct.calcsize("<II") + 2 * struct.calcsize("<ddd")
-"""Controller and motion generator, and how far the motion may leave its path and its goal."""
+MOVE = struct.Struct("<II6d")
+"""Begins the body of the request to move: controller, motion generator, and how far the motion may leave its path and
+its goal. The FR3's goes on with whether the robot interpolates by itself between few commands, and velocities for it.
+"""
 _COMMON = {
     "Connect": CONNECT.size, "StopMove": 0, "SetCollisionBehavior": 8 * 52, "SetJointImpedance": 8 * JOINTS,
     "SetCartesianImpedance": 8 * 6, "SetGuidingMode": 7, "SetEEToK": 8 * 16, "SetNEToEE": 8 * 16, "SetLoad": 8 * 13,
@@ -154,6 +158,8 @@ class Protocol(Interface):
     """Datagram from the robot, once each millisecond."""
     command: np.dtype[np.void]
     """Datagram to the robot, in answer to each state of a motion."""
+    generators: tuple[Generator, ...]
+    """Motion generators that it knows."""
     move: tuple[str, ...]
     """What becomes of a motion, by the numbers in the answers to the request to move."""
 
@@ -168,7 +174,8 @@ PANDA = Protocol(
         "SetCartesianImpedance", "SetGuidingMode", "SetEEToK", "SetNEToEE", "SetLoad", "SetFilters",
         "AutomaticErrorRecovery", "LoadModelLibrary",
     ),
-    sizes={**_COMMON, "Move": _MOVE_SIZE, "GetCartesianLimit": 4, "SetFilters": 8 * 5, "LoadModelLibrary": 2},
+    sizes={**_COMMON, "Move": MOVE.size, "GetCartesianLimit": 4, "SetFilters": 8 * 5, "LoadModelLibrary": 2},
+    generators=tuple(Generator)[: Generator.NONE],
     move=(
         "success", "started", "preempted", "not possible", "singular", "invalid", "reflex", "emergency",
         "input error", "aborted",
@@ -185,7 +192,8 @@ FR3 = Protocol(
         "Connect", "Move", "StopMove", "SetCollisionBehavior", "SetJointImpedance", "SetCartesianImpedance",
         "SetGuidingMode", "SetEEToK", "SetNEToEE", "SetLoad", "AutomaticErrorRecovery", "GetRobotModel",
     ),
-    sizes={**_COMMON, "Move": _MOVE_SIZE + 1 + 8 * JOINTS, "GetRobotModel": 0},
+    sizes={**_COMMON, "Move": MOVE.size + 1 + 8 * JOINTS, "GetRobotModel": 0},
+    generators=tuple(Generator),
     move=(
         "success", "started", "preempted", "preempted by safety", "rejected by safety", "not possible", "singular",
         "invalid", "reflex", "emergency", "input error", "aborted",
