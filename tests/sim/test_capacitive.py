@@ -71,7 +71,7 @@ def test_the_baseline_drifts_as_far_as_is_said(panda_model):
     skin = Skin(
         [SensorUnit("e", link, np.diag([1.0, 1.0, 1.0, 1.0]) + 0.09 * np.eye(4, k=3), sensor=SENSOR)], panda_model
     )
-    electrodes = Electrodes(skin, data, geoms_of(model, data), 0)
+    electrodes = Electrodes(skin, skin.link, data, geoms_of(model, data), 0)
     signals = np.array([electrodes.measure(0, 100.0 * k, 0.0)[3] for k in range(2000)])
     assert 0 in electrodes
     assert signals.std() == pytest.approx(DRIFT, rel=0.1)

@@ -9,7 +9,7 @@ from pretouch.compiled import entry
 from pretouch.sensing.sensor import Capacitive, cone_rays
 from pretouch.sensing.skin import Skin
 from pretouch.sim.rays import Geoms, cast, placed_rays
-from pretouch.types import FloatArray, RangeStatus
+from pretouch.types import FloatArray, IntArray, RangeStatus
 
 ELECTRODE_M = 0.03
 """Size of the electrode: at this distance its signal of a wall is half of that of a touch [m]. Ours."""
@@ -70,10 +70,11 @@ def field(electrode: Electrode, position: FloatArray, rotation: FloatArray, geom
 class Electrodes:
     """The electrodes among the units of a skin, in a simulated room. Each has a baseline of its own that drifts."""
 
-    def __init__(self, skin: Skin, data: mujoco.MjData, geoms: Geoms, seed: int) -> None:
+    def __init__(self, skin: Skin, bodies: IntArray, data: mujoco.MjData, geoms: Geoms, seed: int) -> None:
+        """Mount those of a skin whose units sit on such bodies (K,) of MuJoCo's."""
         self._units = {k: unit.sensor for k, unit in enumerate(skin.units) if isinstance(unit.sensor, Capacitive)}
         self._mounted = {
-            k: electrode_on(sensor, int(skin.link[k]), skin.T_link_sensor[k]) for k, sensor in self._units.items()
+            k: electrode_on(sensor, int(bodies[k]), skin.T_link_sensor[k]) for k, sensor in self._units.items()
         }
         self._room = data.xpos, data.xmat, geoms
         self._rng = np.random.default_rng([seed, _STREAM])

@@ -79,22 +79,55 @@ def take_steps(
         )  # fmt: skip
         arm.qd_before[:] = joints.qd
         mj_step(world.model, world.data)
-        # the state after the step goes with the torques that led to it
-        computer.q[:] = joints.q
-        computer.qd[:] = joints.qd + velocity_noise[step]
-        measured = sensed(tau, lost, torque_noise[step], computer.q, world.qdd, arm.sensors)
-        _dynamics(arm.nominal, computer.q, computer.qd, mass_matrix, computer.bias)
-        computer.residual[:], computer.integral[:] = _follow(
-            computer.integral, computer.mass_matrix, mass_matrix, computer.bias, computer.qd, measured, computer.gain,
-            computer.dt,
-        )  # fmt: skip
-        computer.mass_matrix[:] = mass_matrix
+        _conclude(arm, tau, lost, velocity_noise[step], torque_noise[step], mass_matrix)
         if len(past):
-            past[step, 0], past[step, 1], past[step, 2] = computer.q, computer.qd, arm.generator.q_d
-            past[step, 3], past[step, 4] = qd_set, computer.residual
+            _report(arm, qd_set, past[step])
         if world.contacts[0] > 0.0:
             return step + 1
     return len(velocity_noise)
+
+
+@entry
+def begin_step(qd_set: FloatArray, arm: SimulatedArm) -> tuple[FloatArray, FloatArray]:
+    """Drive an arm in a step that another takes; return what `end_step` is to be given of it."""
+    arm.qd_before[:] = arm.joints.qd
+    return drive(qd_set, arm.computer.bias, arm.joints, arm.generator, arm.impedance, arm.friction, arm.cogging)
+
+
+@entry
+def end_step(
+    qd_set: FloatArray, tau: FloatArray, lost: FloatArray, velocity_noise: FloatArray, torque_noise: FloatArray,
+    past: FloatArray, arm: SimulatedArm,
+) -> None:  # fmt: skip
+    """Have the arm's own computer measure after the step, as `take_steps` does of one step; `past` is (5, n)."""
+    _conclude(arm, tau, lost, velocity_noise, torque_noise, np.empty_like(arm.computer.mass_matrix))
+    _report(arm, qd_set, past)
+
+
+@compiled
+def _conclude(
+    arm: SimulatedArm, tau: FloatArray, lost: FloatArray, velocity_noise: FloatArray, torque_noise: FloatArray,
+    mass_matrix: FloatArray,
+) -> None:  # fmt: skip
+    """Measure after a step that was driven by `tau` (n,), of which friction took `lost` (n,) [Nm]."""
+    computer = arm.computer
+    # the state after the step goes with the torques that led to it
+    computer.q[:] = arm.joints.q
+    computer.qd[:] = arm.joints.qd + velocity_noise
+    measured = sensed(tau, lost, torque_noise, computer.q, arm.world.qdd, arm.sensors)
+    _dynamics(arm.nominal, computer.q, computer.qd, mass_matrix, computer.bias)
+    computer.residual[:], computer.integral[:] = _follow(
+        computer.integral, computer.mass_matrix, mass_matrix, computer.bias, computer.qd, measured, computer.gain,
+        computer.dt,
+    )  # fmt: skip
+    computer.mass_matrix[:] = mass_matrix
+
+
+@compiled
+def _report(arm: SimulatedArm, qd_set: FloatArray, past: FloatArray) -> None:
+    """Write (5, n) what the arm's interface knows after a step."""
+    computer = arm.computer
+    past[0], past[1], past[2], past[3], past[4] = computer.q, computer.qd, arm.generator.q_d, qd_set, computer.residual
 
 
 @compiled

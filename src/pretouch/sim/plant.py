@@ -1,190 +1,42 @@
 """The simulated arm behind its joint velocity interface: 1 kHz physics, joint impedance, sensors, observer."""
 
 from bisect import bisect_left
-from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, replace
 from itertools import accumulate, repeat
-from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
 
-from pretouch.compiled import flattened
-from pretouch.contact.observer import observer_init, wrench_from_torques
 from pretouch.errors import ParameterError
 from pretouch.robot.model import RobotModel
-from pretouch.sim.drive import Cogging, Friction, Impedance, Joints, MotionGenerator, TorqueSensors
-from pretouch.sim.physics import Computer, Nominal, SimulatedArm, World, take_steps
+from pretouch.sim.arm_in_world import TOUCH_N as TOUCH_N
+from pretouch.sim.arm_in_world import ArmInWorld
+from pretouch.sim.arm_in_world import PointForce as PointForce
+from pretouch.sim.arm_in_world import Touch as Touch
+from pretouch.sim.physics import take_steps
 from pretouch.sim.plant_params import PlantParams
-from pretouch.sim.scene import CONTACTS, ArmError, CableSpec, SceneSpec, build, stiffen
+from pretouch.sim.scene import SceneSpec, build, stiffen
 from pretouch.sim.under_way import ROUNDING_S
-from pretouch.types import FloatArray, RobotState
-
-TOUCH_N = 1.0
-"""True force above which there is a contact [N]."""
-_NO_FORCE = np.zeros(3)
-_Past = tuple[float, FloatArray]
-"""An instant, and (5, n) q, qd, q_d, qd_d and external torques at it."""
+from pretouch.types import FloatArray
 
 
-@dataclass(frozen=True, slots=True)
-class Touch:
-    """The beginning of a contact of the arm, after none."""
-
-    time: float
-    """[s]"""
-    link: int
-    """Index of the link that touches."""
-    velocity: FloatArray
-    """(3,) velocity of the touching point of the link before the contact [m/s], base frame."""
-
-
-class PointForce(NamedTuple):
-    """A force on the arm at a point of it, base frame."""
-
-    link: int
-    """Index of the link it acts on."""
-    point: FloatArray
-    """(3,) where [m]."""
-    force: FloatArray
-    """(3,) on the arm [N]."""
-
-
-class Plant:
-    """One arm of a kind, in a scene: the port `Robot`.
-
-    The control law and the observer use the nominal model and what the sensors say; the physics has other masses,
-    a payload, joint friction, and contacts. What a real arm's owner cannot know is under `true_...`.
-    """
+class Plant(ArmInWorld):
+    """The arm that a scene is built round, and the time in it."""
 
     def __init__(self, model: RobotModel, scene: SceneSpec, params: PlantParams, q: FloatArray, seed: int) -> None:
         """Build an arm at rest at q (n,) [rad]; the seed decides its errors and its noise."""
-        params.check_joints(model.n, len(model.links))
-        self.model, self.scene, self.params, self._n = model, scene, params, model.n
-        rng = np.random.default_rng([seed, 1])
-        self._rng = np.random.default_rng([seed, 2])
-        self.error = ArmError(
-            mass_factor=1.0 + params.mass_error * rng.uniform(-1, 1, len(model.links)),
-            payload=params.payload_max_kg * rng.uniform(),
-            armature=params.armature_kg_m2,
-            cable=CableSpec(params.cable_n_m, params.cable_slack_m, params.cable_kg, params.cable_friction_n)
-            if params.cable_n_m else None,
-        )  # fmt: skip
-        self._offset = np.array(params.torque_offset_nm) * rng.uniform(-1, 1, self._n)
-        self._wander = np.random.default_rng([seed, 3])
-        self._ripple_phase = rng.uniform(0, 2 * np.pi, self._n)
-        self._know(params)
-        self.mj_model = build(model, scene, self.error)
-        self.mj_data = mujoco.MjData(self.mj_model)
-        self._arm_geoms = {g for g in range(self.mj_model.ngeom) if self._on_arm(g)}
+        super().__init__(model, params, seed)
+        self.scene = scene
         self._before_step: list[Callable[[float], float | None]] = []
         self._idle_until: list[float] = []
-        self._reset(q)
-
-    def _know(self, params: PlantParams) -> None:
-        """Put what is known of one arm in the place of what was drawn; the draws are the same either way."""
-        if params.offsets_nm:
-            self._offset = np.array(params.offsets_nm)
-        if params.ripple_phases_rad:
-            self._ripple_phase = np.array(params.ripple_phases_rad)
-        if params.mass_factors:
-            self.error = replace(self.error, mass_factor=np.array(params.mass_factors))
-        if params.payload_kg is not None:
-            self.error = replace(self.error, payload=params.payload_kg)
-
-    @property
-    def offset_nm(self) -> FloatArray:
-        """Errors (n,) of the torque sensors that stay [Nm], which a real arm's owner cannot know."""
-        return self._offset
-
-    def _on_arm(self, geom: int) -> bool:
-        body = int(self.mj_model.geom_bodyid[geom])
-        return body < len(self.model.links) and bool(self.model.moved_by[body].any())
-
-    def _reset(self, q: FloatArray) -> None:
-        n, data = self._n, self.mj_data
-        # views into the simulation's memory, taken once: MuJoCo's attribute look-ups cost as much as the arithmetic
-        joints = Joints(data.qpos[:n], data.qvel[:n], data.qfrc_applied[:n])
-        self._q = joints.q
-        self.link_position, self.link_rotation = data.xpos, data.xmat.reshape(-1, 3, 3)
-        """(L', 3) origins [m] and (L', 3, 3) orientations of the links, then of whatever else moves; base frame."""
-        self._q[:] = q
-        mujoco.mj_forward(self.mj_model, data)
-        mass, bias = self.model.mass_matrix_and_bias(q, np.zeros(n), np.zeros(n))
-        inertia, stiffness = np.diag(mass) + self.params.armature_kg_m2, np.array(self.params.stiffness_nm_rad)
-        damping = 2.0 * self.params.damping_ratio * np.sqrt(stiffness * inertia)
-        # at rest the impedance settles where it holds what the model does not know; start there, not with a jerk
-        self._q_d, self._qd_set = q + (data.qfrc_bias[:n] - bias) / stiffness, np.zeros(n)
-        dt = self.params.period_s
-        zero = observer_init(mass, np.zeros(n))
-        self._computer = Computer(
-            q.copy(), np.zeros(n), bias, zero.residual, zero.integral, mass, self.params.observer_gain_1_s, dt
-        )
-        self._group(joints, Impedance(stiffness, damping, self.model.description.tau_max))
         self.time = 0.0
-        self._states: deque[_Past] = deque(maxlen=1 + round(self.params.state_delay_s / dt))
-        self._late_commands: deque[tuple[float, FloatArray]] = deque()
-        self._states.append(self._now())
-        self.true_force = _NO_FORCE
-        """(3,) sum of the contact forces on the arm by everything else, base frame [N], at the last physics step."""
-        self.true_log: list[tuple[float, FloatArray]] = []
-        """(time, true_force) of every physics step since the log was last taken."""
-        self.touches: list[Touch] = []
-        """Each beginning of a contact since then."""
-        mujoco.mj_forward(self.mj_model, data)
-
-    def _group(self, joints: Joints, impedance: Impedance) -> None:
-        """Put together what `take_steps` is given."""
-        p, n = self.params, self._n
-        keep = float(np.exp(-2 * np.pi * p.torque_noise_hz * p.period_s))
-        follow = 1.0 - float(np.exp(-2 * np.pi * p.set_point_hz * p.period_s))
-        generator = MotionGenerator(self._q_d, np.zeros(n), p.period_s, follow)
-        self._cold, self._drift = np.array([p.cold_friction]), np.zeros(n)
-        f1, f2, f3 = np.array([p.friction_f1_nm, p.friction_f2_s_rad, p.friction_f3_rad_s])
-        friction = Friction(
-            f1, f2, f3, np.zeros(n), p.bristle_nm,
-            p.bristle_rad, p.stribeck, p.stribeck_rad_s, p.load_friction, self._cold,
-        )  # fmt: skip
-        ripple, cycles = np.array([p.ripple_nm, p.ripple_cycles])
-        self._err = self._offset.copy()
-        sensors = TorqueSensors(
-            self._err, ripple, cycles, self._ripple_phase, np.zeros(n), keep, p.armature_kg_m2,
-            p.friction_compensated, np.stack([self._computer.bias, np.zeros(n)]), 2 * np.pi * p.ring_hz * p.period_s,
-            p.ring_damping,
-        )  # fmt: skip
-        cogging = Cogging(p.cogging * ripple, cycles, self._ripple_phase)
-        data, (known, scratch) = self.mj_data, self.model.scratch
-        counted = int(self.mj_model.sensor(CONTACTS).adr[0])
-        world = World(self.mj_model._address, data._address, data.qacc[:n], data.sensordata[counted : counted + 1])
-        nominal = Nominal(known._address, scratch._address, scratch.qpos, scratch.qvel)
-        self._qd_before = np.zeros(n)
-        self._arm = flattened(
-            SimulatedArm(
-                world, joints, generator, impedance, friction, cogging, sensors, nominal, self._computer,
-                self._qd_before,
-            )
-        )  # fmt: skip
-        # what is added to coloured noise at each step, so that its variance stays that of the sensor
-        self._torque_noise = np.array(p.torque_noise_nm) * np.sqrt(1 - keep**2)
+        built = build(model, scene, self.error)
+        self._enter(built, mujoco.MjData(built), 0, 0, q)
 
     def before_each_step(self, call: Callable[[float], float | None]) -> None:
-        """Have `call(time)` run before each physics step: hands and sensors are driven so.
-
-        It may return until when it has nothing to do [s]. While nobody has, steps are taken in one go.
-        """
+        """Have `call(time)` run before each physics step, as `ArmInWorld` says."""
         self._before_step.append(call)
         self._idle_until.append(-np.inf)
-
-    def take_log(self) -> tuple[list[tuple[float, FloatArray]], list[Touch]]:
-        """Return `true_log` and `touches`, and begin both anew: in a run without an end they would fill the memory."""
-        taken, self.true_log, self.touches = (self.true_log, self.touches), [], []
-        return taken
-
-    @property
-    def touching(self) -> bool:
-        """Whether any two things touch, the arm or not."""
-        return bool(self.mj_data.ncon)
 
     def stiffen(self, thing: str, stiffness: float) -> None:
         """Give the contacts with a thing of the scene, by name, another stiffness [N/m].
@@ -193,29 +45,6 @@ class Plant:
         took.
         """
         stiffen(self.mj_model, thing, stiffness, self.scene.damping_ratio)
-
-    # the port Robot
-
-    def read(self) -> RobotState:
-        """Return what the arm's interface reports now."""
-        p = self.params
-        time, (q, qd, q_d, qd_set, tau_ext) = self._states[0] if p.state_delay_s else self._now()
-        kin = self.model.kinematics(q)
-        wrench = wrench_from_torques(self.model.ee_jacobian(kin), tau_ext, p.wrench_damping, p.singular_value_min)
-        late = p.stamp_jitter_s * self._wander.uniform() if p.stamp_jitter_s else 0.0
-        return RobotState(time + late, q, qd, q_d, qd_set, tau_ext, wrench)
-
-    def command(self, qd: FloatArray) -> None:
-        """Take joint velocities (n,) [rad/s] as the set-point."""
-        wanted = np.array(qd, dtype=np.float64)
-        if self.params.command_delay_s:
-            self._late_commands.append((self.time + self.params.command_delay_s, wanted))
-        else:
-            self._qd_set = wanted
-
-    def _now(self) -> _Past:
-        own = self._computer
-        return self.time, np.array([own.q, own.qd, self._q_d, self._qd_set, own.residual])
 
     def advance(self, duration: float) -> None:
         """Let time pass [s], in whole physics steps."""
@@ -250,26 +79,6 @@ class Plant:
             self._qd_set = late.popleft()[1]
         return min(until, late[0][0] - 2 * ROUNDING_S) if late else until  # too early does no harm
 
-    def _note_contacts(self, times: list[float]) -> None:
-        """Note what touched in steps that ended at these instants [s]: nothing, but for the last of them."""
-        touched = self.true_force is not _NO_FORCE
-        self.true_force = self._contact_force() if self.touching else _NO_FORCE
-        self.true_log += zip(times[:-1], repeat(_NO_FORCE))
-        self.true_log.append((self.time, self.true_force))
-        if self.true_force is not _NO_FORCE and not (touched and len(times) == 1):
-            self.touches.append(self._touch(self._qd_before))
-
-    def _age(self, duration: float) -> None:
-        """Let the arm warm up and its sensors drift (Ornstein-Uhlenbeck) for a time [s]."""
-        p = self.params
-        self._cold[0] = p.cold_friction * np.exp(-self.time / p.warm_up_s)
-        if p.drift_nm:
-            keep = np.exp(-duration / p.drift_s)
-            self._drift = keep * self._drift + p.drift_nm * np.sqrt(1.0 - keep**2) * self._wander.standard_normal(
-                self._n
-            )
-            self._err[:] = self._offset + self._drift
-
     def grip(self, load_kg: float) -> None:
         """Carry a load at the TCP from now on [kg]; 0 puts it down. An arm that was built without a payload cannot."""
         if not self.error.payload > 0.0:
@@ -277,40 +86,6 @@ class Plant:
                 "This arm has nothing at its TCP that could grip: give PlantParams.payload_kg above 0."
             )
         self.mj_model.body("payload").mass[:] = self.error.payload + load_kg
-
-    def _touch(self, qd: FloatArray) -> Touch:
-        """Describe the first contact there is; `qd` (n,) are the joint velocities before it [rad/s]."""
-        contact, sign = next(found for found in map(self._on_the_arm, range(self.mj_data.ncon)) if found[1])
-        geom = int(contact.geom2) if sign > 0 else int(contact.geom1)
-        link = int(self.mj_model.geom_bodyid[geom])
-        kin = self.model.kinematics(self._q)
-        return Touch(self.time, link, self.model.jacobian(kin, link, contact.pos.copy())[:3] @ qd)
-
-    def contact_forces(self) -> list[PointForce]:
-        """Return the forces of all contacts of the arm with anything else, at the last physics step."""
-        found, wrench = [], np.zeros(6)
-        for i in range(self.mj_data.ncon):
-            contact, sign = self._on_the_arm(i)
-            if sign:
-                mujoco.mj_contactForce(self.mj_model, self.mj_data, i, wrench)
-                geom = int(contact.geom2) if sign > 0 else int(contact.geom1)
-                force = sign * (contact.frame.reshape(3, 3).T @ wrench[:3])
-                found.append(PointForce(int(self.mj_model.geom_bodyid[geom]), contact.pos.copy(), force))
-        return found
-
-    def _contact_force(self) -> FloatArray:
-        """Sum of contact forces on the arm (3,) [N], base frame; `_NO_FORCE` itself if nothing touches it."""
-        total = _NO_FORCE
-        for one in self.contact_forces():
-            total = total + one.force
-        return total
-
-    def _on_the_arm(self, number: int) -> tuple[Any, int]:
-        """Return a contact, and the sign its force has on the arm: MuJoCo's acts on the second geom; 0 elsewhere."""
-        contact = self.mj_data.contact[number]
-        if int(contact.geom2) in self._arm_geoms:
-            return contact, 1
-        return contact, -1 if int(contact.geom1) in self._arm_geoms else 0
 
 
 class PlantClock:

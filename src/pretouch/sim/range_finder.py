@@ -11,8 +11,8 @@ from pretouch.compiled import compiled, entry, flattened
 from pretouch.errors import ParameterError
 from pretouch.sensing.sensor import PAPER_SENSOR, Sensor, cone_rays
 from pretouch.sensing.skin import Skin
+from pretouch.sim.arm_in_world import ArmInWorld
 from pretouch.sim.capacitive import Electrodes
-from pretouch.sim.plant import Plant
 from pretouch.sim.rays import Geoms, cast, geoms_of, placed_rays
 from pretouch.sim.under_way import ROUNDING_S, UnderWay
 from pretouch.types import FloatArray, IntArray, RangeReadings, RangeStatus
@@ -95,7 +95,7 @@ class RangeFinders:
     """
 
     def __init__(
-        self, plant: Plant, skin: Skin, params: RangeFinderParams, seed: int,
+        self, plant: ArmInWorld, skin: Skin, params: RangeFinderParams, seed: int,
         send: Callable[[RangeSample], None] | None = None,
     ) -> None:  # fmt: skip
         """Mount the sensors on a simulated arm; the seed decides offsets, phases, noise and losses.
@@ -111,10 +111,11 @@ class RangeFinders:
         self._send, self._light = send, np.random.default_rng([seed, 4])
         offset = params.offset_max_m * self._rng.uniform(-1, 1, count)
         cone = np.array(cones).reshape(count, rays, 3)
-        mounting = _Mounting(data.xpos, data.xmat, skin.link, skin.T_link_sensor, cone, offset)
+        bodies = plant.first_body + skin.link
+        mounting = _Mounting(data.xpos, data.xmat, bodies, skin.T_link_sensor, cone, offset)
         geoms = geoms_of(plant.mj_model, data)
         self._mounted, self._errors = flattened(mounting, geoms), _errors(params)
-        self._electrodes = Electrodes(skin, data, geoms, seed)
+        self._electrodes = Electrodes(skin, bodies, data, geoms, seed)
         boards: dict[str, list[int]] = {}
         for unit, board in enumerate(skin.boards):
             boards.setdefault(board, []).append(unit)

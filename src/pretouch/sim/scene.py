@@ -1,6 +1,7 @@
 """What stands in the simulated room: the arm on its pedestal, a floor, static objects and a hand."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -11,6 +12,8 @@ from pretouch.types import FloatArray
 
 CONTACTS = "contacts"
 """Name of the sensor that counts the contacts of a scene."""
+ARM_STIFFNESS = 100_000.0
+"""Of two arms' contacts with each other, stiff covers on both [N/m]; an assumption."""
 _IMPEDANCE = 0.01
 """Constant solver impedance d of all contacts; with it and an elliptic cone solref means N/m, see `stiffen`."""
 
@@ -53,12 +56,43 @@ class GhostSpec:
 
 
 @dataclass(frozen=True)
+class BasePose:
+    """Where an arm stands, upright, in the base frame of another."""
+
+    position: tuple[float, float, float]
+    """[m]"""
+    yaw: float
+    """About z [rad]."""
+
+    @property
+    def rotation(self) -> FloatArray:
+        """R (3, 3) that turns a vector in its own base frame into the other's."""
+        c, s = float(np.cos(self.yaw)), float(np.sin(self.yaw))
+        return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+    def inverse(self) -> "BasePose":
+        """Return where the other arm stands in the base frame of this one."""
+        x, y, z = (-self.rotation.T @ self.position).tolist()
+        return BasePose((x, y, z), -self.yaw)
+
+
+@dataclass(frozen=True)
+class SecondArmSpec:
+    """Another arm in the scene, on a pedestal of the same kind: moved by `pretouch.sim.second_arm`."""
+
+    model: RobotModel
+    base: BasePose
+    error: "ArmError"
+
+
+@dataclass(frozen=True)
 class SceneSpec:
     """What to build round the arm."""
 
     boxes: tuple[Box, ...] = ()
     hand: HandSpec | None = None
     ghost: GhostSpec | None = None
+    second: SecondArmSpec | None = None
     floor_height: float = -0.2
     """Height of the floor in the base frame [m]: the arm stands on a pedestal, or its hand would reach below it."""
     pedestal_radius: float = 0.1
@@ -115,10 +149,48 @@ class ArmError:
 def build(model: RobotModel, spec: SceneSpec, error: ArmError) -> mujoco.MjModel:
     """Build the MuJoCo model of a scene. Only declared pairs touch.
 
-    Each moving capsule touches floor, boxes and hand; the hand also touches all that stands still.
+    Each moving capsule touches floor, boxes and hand, and those of a second arm; the hand also touches all that stands
+    still.
     """
-    mj = mujoco.MjSpec.from_file(str(model.description.mjcf))
+    mj, own = _arm(model, error)
     mj.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    second = _ArmGeoms([], []) if spec.second is None else _add_second(mj, spec, spec.second)
+    stiffness = _add_objects(mj, spec)
+    pairs = [(link, thing) for link in own.moving + second.moving for thing in stiffness]
+    pairs += [(link, other) for link in own.moving for other in second.moving + second.still]
+    pairs += [(still, link) for still in [*own.still, "pedestal"] for link in second.moving]
+    if spec.hand:
+        still = [*own.still, "pedestal", *second.still, *stiffness]
+        pairs += [(thing, "hand") for thing in still if thing != "hand"]
+    for one, other in pairs:
+        mj.add_pair(
+            geomname1=one, geomname2=other, condim=3, friction=[0.5, 0.5, 0.005, 0.0001, 0.0001],
+            solimp=[_IMPEDANCE, _IMPEDANCE, 0.001, 0.5, 2.0],
+        )  # fmt: skip
+    found = 1 << int(mujoco.mjtConDataField.mjCONDATA_FOUND)
+    mj.add_sensor(name=CONTACTS, type=mujoco.mjtSensor.mjSENS_CONTACT, intprm=[found, 0, 1])
+    built = mj.compile()
+    _err(built, 0, error.mass_factor)
+    if spec.second:
+        _err(built, body_before_second(built), spec.second.error.mass_factor)
+    mujoco.mj_setConst(built, mujoco.MjData(built))
+    for geom in second.moving + second.still:
+        stiffen(built, geom, ARM_STIFFNESS, spec.damping_ratio)
+    for thing, of_it in stiffness.items():
+        stiffen(built, thing, of_it, spec.damping_ratio)
+    return built
+
+
+class _ArmGeoms(NamedTuple):
+    """Names of an arm's geoms."""
+
+    moving: list[str]
+    still: list[str]
+
+
+def _arm(model: RobotModel, error: ArmError) -> tuple[mujoco.MjSpec, _ArmGeoms]:
+    """Return an arm without its actuators and with what it carries."""
+    mj = mujoco.MjSpec.from_file(str(model.description.mjcf))
     for actuator in list(mj.actuators):
         mj.delete(actuator)
     for joint in mj.joints:
@@ -132,25 +204,49 @@ def build(model: RobotModel, spec: SceneSpec, error: ArmError) -> mujoco.MjModel
         body.explicitinertial = True
     if error.cable:
         _add_cable(mj, model, error.cable)
-    stiffness = _add_objects(mj, spec)
-    pairs = [(link, thing) for link in arm for thing in stiffness]
-    if spec.hand:
-        pairs += [(still, "hand") for still in [*base, "pedestal", *stiffness] if still != "hand"]
-    for one, other in pairs:
-        mj.add_pair(
-            geomname1=one, geomname2=other, condim=3, friction=[0.5, 0.5, 0.005, 0.0001, 0.0001],
-            solimp=[_IMPEDANCE, _IMPEDANCE, 0.001, 0.5, 2.0],
-        )  # fmt: skip
-    found = 1 << int(mujoco.mjtConDataField.mjCONDATA_FOUND)
-    mj.add_sensor(name=CONTACTS, type=mujoco.mjtSensor.mjSENS_CONTACT, intprm=[found, 0, 1])
-    built = mj.compile()
-    links = len(model.links)
-    built.body_mass[:links] *= error.mass_factor
-    built.body_inertia[:links] *= error.mass_factor[:, None]
-    mujoco.mj_setConst(built, mujoco.MjData(built))
-    for thing, of_it in stiffness.items():
-        stiffen(built, thing, of_it, spec.damping_ratio)
-    return built
+    return mj, _ArmGeoms(arm, base)
+
+
+def _err(built: mujoco.MjModel, world: int, mass_factor: FloatArray) -> None:
+    """Give the links of the arm whose link 0 has the index `world` other masses."""
+    links = slice(world + 1, world + len(mass_factor))
+    built.body_mass[links] *= mass_factor[1:]
+    built.body_inertia[links] *= mass_factor[1:, None]
+
+
+def _add_second(mj: mujoco.MjSpec, spec: SceneSpec, second: SecondArmSpec) -> _ArmGeoms:
+    """Stand another arm in the scene, on its pedestal."""
+    arm, geoms = _arm(second.model, second.error)
+    x, y, z = second.base.position
+    half = second.base.yaw / 2
+    frame = mj.worldbody.add_frame(pos=[x, y, z], quat=[np.cos(half), 0.0, 0.0, np.sin(half)])
+    mj.attach(arm, prefix=_SECOND, frame=frame)
+    _add_pedestal(mj, f"{_SECOND}pedestal", spec, (x, y, z))
+    return _ArmGeoms(
+        [_SECOND + name for name in geoms.moving], [*(_SECOND + name for name in geoms.still), f"{_SECOND}pedestal"]
+    )
+
+
+_SECOND = "second_"
+"""Begins the names of all that belongs to the second arm."""
+
+
+def body_before_second(built: mujoco.MjModel) -> int:
+    """Return the index of the body before the second arm's first: its links follow, as those of an arm the world."""
+    return next(i for i in range(built.nbody) if built.body(i).name.startswith(_SECOND)) - 1
+
+
+def joint_of_second(built: mujoco.MjModel) -> int:
+    """Return the index of the second arm's first joint."""
+    return next(j for j in range(built.njnt) if built.joint(j).name.startswith(_SECOND))
+
+
+def _add_pedestal(mj: mujoco.MjSpec, name: str, spec: SceneSpec, at: tuple[float, float, float]) -> None:
+    x, y, z = at
+    mj.worldbody.add_geom(
+        name=name, type=mujoco.mjtGeom.mjGEOM_CAPSULE, fromto=[x, y, spec.floor_height, x, y, z - spec.pedestal_radius],
+        size=[spec.pedestal_radius, 0, 0], contype=0, conaffinity=0,
+    )  # fmt: skip
 
 
 def _add_cable(mj: mujoco.MjSpec, model: RobotModel, cable: CableSpec) -> None:
@@ -174,11 +270,8 @@ def _add_objects(mj: mujoco.MjSpec, spec: SceneSpec) -> dict[str, float]:
     world = mj.worldbody
     off = {"contype": 0, "conaffinity": 0}
     kind = mujoco.mjtGeom
-    low, radius = spec.floor_height, spec.pedestal_radius
-    world.add_geom(name="floor", type=kind.mjGEOM_PLANE, size=[3, 3, 0.1], pos=[0, 0, low], **off)
-    world.add_geom(
-        name="pedestal", type=kind.mjGEOM_CAPSULE, fromto=[0, 0, low, 0, 0, -radius], size=[radius, 0, 0], **off
-    )
+    world.add_geom(name="floor", type=kind.mjGEOM_PLANE, size=[3, 3, 0.1], pos=[0, 0, spec.floor_height], **off)
+    _add_pedestal(mj, "pedestal", spec, (0, 0, 0))
     stiffness = {"floor": 100_000.0}
     for thing in spec.boxes:
         world.add_geom(name=thing.name, type=kind.mjGEOM_BOX, size=thing.half_size, pos=thing.center, **off)

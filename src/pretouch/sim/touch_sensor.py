@@ -10,7 +10,7 @@ from pretouch.checks import Checked, Fraction, NonNegative, Positive
 from pretouch.ports import Skin as SkinPort
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import TouchPatch
-from pretouch.sim.plant import Plant, PointForce
+from pretouch.sim.arm_in_world import ArmInWorld, PointForce
 from pretouch.sim.under_way import ROUNDING_S, UnderWay
 from pretouch.types import FloatArray, RangeReadings, TouchReadings, TouchStatus
 
@@ -86,7 +86,7 @@ class TouchSensors:
     """
 
     def __init__(
-        self, plant: Plant, skin: Skin, params: TouchSensorParams, seed: int, laid: Forces = no_forces,
+        self, plant: ArmInWorld, skin: Skin, params: TouchSensorParams, seed: int, laid: Forces = no_forces,
         send: Callable[[TouchSample], None] | None = None,
     ) -> None:  # fmt: skip
         """Mount the sensors on a simulated arm; the seed decides their errors, phases, noise, losses, false touches.

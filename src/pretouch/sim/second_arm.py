@@ -1,0 +1,74 @@
+"""A second arm in a simulated scene: it moves in the world of the first, but errs and senses by itself."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from pretouch.robot.model import RobotModel
+from pretouch.sim.arm_in_world import ArmInWorld
+from pretouch.sim.physics import begin_step, end_step
+from pretouch.sim.plant import Plant
+from pretouch.sim.plant_params import PlantParams
+from pretouch.sim.scene import BasePose, SecondArmSpec, body_before_second, joint_of_second
+from pretouch.sim.under_way import ROUNDING_S
+from pretouch.types import FloatArray, RobotState
+
+
+class SecondArm(ArmInWorld):
+    """An arm in another's world, whose `PlantClock` lets its time pass too.
+
+    Make it, build the first arm with its `spec` in the scene, then let it `join` that. Joint positions, torques and
+    its estimated force are in its own base frame; all that is true of contacts is in the world's.
+    """
+
+    def __init__(self, model: RobotModel, base: BasePose, params: PlantParams, seed: int) -> None:
+        """Draw an arm that stands at `base`; the seed decides its errors and its noise."""
+        super().__init__(model, params, seed)
+        self.spec = SecondArmSpec(model, base, self.error)
+        """What the scene needs to know of it."""
+        self._base = base
+        self._torques: tuple[FloatArray, FloatArray] | None = None
+        """Of the step under way."""
+
+    def join(self, first: Plant, q: FloatArray) -> None:
+        """Begin at rest at q (n,) [rad], in the world of an arm whose scene has the `spec`."""
+        self._first, self.time = first, first.time
+        built = first.mj_model
+        self._enter(built, first.mj_data, joint_of_second(built), body_before_second(built), q)
+        first.before_each_step(self._begin)
+
+    def before_each_step(self, call: Callable[[float], float | None]) -> None:
+        """Have `call(time)` run before each physics step, as `ArmInWorld` says."""
+        self._first.before_each_step(call)
+
+    def read(self) -> RobotState:
+        """Return what the arm's interface reports now."""
+        self.catch_up()
+        return super().read()
+
+    def catch_up(self) -> None:
+        """Measure what the last physics step made of the arm, where time has passed since: `read` does it too."""
+        if self._torques is None or self._first.time == self.time:
+            return
+        p, n = self.params, self._n
+        draws, past = self._rng.standard_normal((2, n)), np.empty((5, n))
+        self._age(p.period_s)
+        self.time = self._first.time
+        end_step.flat(
+            self._qd_set, *self._torques, p.velocity_noise_rad_s * draws[0], self._torque_noise * draws[1], past,
+            *self._arm,
+        )  # fmt: skip
+        self._torques = None
+        if p.state_delay_s:
+            self._states.append((self.time, past))
+        self._note_contacts([self.time])
+
+    def _begin(self, time: float) -> None:
+        """Drive the arm in the step that begins now."""
+        self.catch_up()
+        while self._late_commands and self._late_commands[0][0] <= time + ROUNDING_S:
+            self._qd_set = self._late_commands.popleft()[1]
+        self._torques = begin_step.flat(self._qd_set, *self._arm)
+
+    def _in_base(self, point: FloatArray) -> FloatArray:
+        return np.asarray(self._base.rotation.T @ (point - self._base.position))
