@@ -266,3 +266,15 @@ def test_the_example_of_the_how_to_passes_and_finds_a_program_that_goes_on(pytes
     pytester.runpytest_subprocess("-p", "pretouch.pytest_plugin", "-W", "error").assert_outcomes(passed=1)
     pytester.makepyfile(example.replace("> 10", "> 1000"))
     pytester.runpytest_subprocess("-p", "pretouch.pytest_plugin", "-W", "error").assert_outcomes(failed=1)
+
+
+def test_guided_by_hand_the_arm_goes_where_it_is_pushed(franka_server: Any) -> None:
+    server = franka_server()
+    server.guide()
+    server.push((0, 15, 0), seconds=0.3)
+    server.guide(pressed=False)
+    truth = server.truth
+    assert truth.force[:, 1].max() == 15
+    assert truth.q[-1, 0] - truth.q[0, 0] > 0.05
+    # let go, it brakes
+    assert np.abs(truth.q[-1] - truth.q[-50]).max() < 5e-3

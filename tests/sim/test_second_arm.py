@@ -83,7 +83,8 @@ def test_both_feel_the_same_touch(panda_model):
             break
     # each was pushed back, along its own x axis
     assert first.true_force[0] < -5.0
-    assert first.touches and second.touches
+    assert first.touches
+    assert second.touches
     assert second.touches[0].velocity[0] > 0.05
     assert {force.link for force in second.contact_forces()} <= set(range(1, len(panda_model.links)))
     first.advance(0.05)

@@ -84,6 +84,7 @@ class TypedPushes:
     def __init__(self, arm: ServedArm, source: TextIO, program: bool = False) -> None:
         """Take the arm that is pushed, and what is typed at: a terminal, or a pipe of a `program`, which ends it."""
         self._arm, self._text, self._program = arm, b"", program
+        self._lines: list[str] = []
         self._push: TcpPush | None = None
         self._rest, self._largest = np.zeros(3), 0.0
         self._descriptor = source.fileno() if program or source.isatty() else -1
@@ -97,18 +98,22 @@ class TypedPushes:
         """Have what was typed come, and say how it was measured; True once the program that typed has gone."""
         self._follow()
         # while the arm still swings after a motion, its time would depend on when the line arrived
-        if not self.possible or not (self._arm.moving or self._arm.settled):
+        if not self.possible or not self._ready:
             return False
-        if not select.select([self._descriptor], [], [], 0)[0]:
-            return False
-        read = os.read(self._descriptor, 4096)
-        if not read:
-            self._descriptor = -1
-            return self._program
-        *lines, self._text = (self._text + read).split(b"\n")
-        for line in filter(bytes.strip, lines):
-            self._do(line.decode(errors="replace").strip())
+        if select.select([self._descriptor], [], [], 0)[0]:
+            read = os.read(self._descriptor, 4096)
+            if not read:
+                self._descriptor = -1
+                return self._program
+            *lines, self._text = (self._text + read).split(b"\n")
+            self._lines += filter(None, (line.decode(errors="replace").strip() for line in lines))
+        while self._lines and self._ready:
+            self._do(self._lines.pop(0))
         return False
+
+    @property
+    def _ready(self) -> bool:
+        return self._arm.moving or self._arm.settled
 
     def _do(self, line: str) -> None:
         now = self._arm.pushes.now

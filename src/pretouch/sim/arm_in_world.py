@@ -116,16 +116,19 @@ class ArmInWorld:
         self._q[:] = q
         mujoco.mj_forward(mj_model, data)
         mass, bias = self.model.mass_matrix_and_bias(q, np.zeros(n), np.zeros(n))
-        inertia, stiffness = np.diag(mass) + self.params.armature_kg_m2, np.array(self.params.stiffness_nm_rad)
-        damping = 2.0 * self.params.damping_ratio * np.sqrt(stiffness * inertia)
+        self.stiffness = np.array(self.params.stiffness_nm_rad)
+        """Of the joint impedance (n,) [Nm/rad]; `set_stiffness` changes it."""
+        self._impedance = Impedance(
+            self.stiffness.copy(), self._damping(mass), np.zeros(n), self.model.description.tau_max
+        )
         # at rest the impedance settles where it holds what the model does not know; start there, not with a jerk
-        self._q_d, self._qd_set = q + (data.qfrc_bias[own] - bias) / stiffness, np.zeros(n)
+        self._q_d, self._qd_set = q + (data.qfrc_bias[own] - bias) / self.stiffness, np.zeros(n)
         dt = self.params.period_s
         zero = observer_init(mass, np.zeros(n))
         self._computer = Computer(
             q.copy(), np.zeros(n), bias, zero.residual, zero.integral, mass, self.params.observer_gain_1_s, dt
         )
-        self._group(joints, Impedance(stiffness, damping, self.model.description.tau_max), data.qacc[own])
+        self._group(joints, data.qacc[own])
         self._states: deque[_Past] = deque(maxlen=1 + round(self.params.state_delay_s / dt))
         self._late_commands: deque[tuple[float, FloatArray]] = deque()
         self._states.append(self._now())
@@ -141,12 +144,12 @@ class ArmInWorld:
         link = int(self.mj_model.geom_bodyid[geom]) - self.first_body
         return 0 <= link < len(self.model.links) and bool(self.model.moved_by[link].any())
 
-    def _group(self, joints: Joints, impedance: Impedance, qdd: FloatArray) -> None:
+    def _group(self, joints: Joints, qdd: FloatArray) -> None:
         """Put together what physics steps are given."""
         p, n = self.params, self._n
         keep = float(np.exp(-2 * np.pi * p.torque_noise_hz * p.period_s))
         follow = 1.0 - float(np.exp(-2 * np.pi * p.set_point_hz * p.period_s))
-        generator = MotionGenerator(self._q_d, np.zeros(n), p.period_s, follow)
+        self._generator = generator = MotionGenerator(self._q_d, np.zeros(n), p.period_s, follow)
         self._cold, self._drift = np.array([p.cold_friction]), np.zeros(n)
         f1, f2, f3 = np.array([p.friction_f1_nm, p.friction_f2_s_rad, p.friction_f3_rad_s])
         friction = Friction(
@@ -168,7 +171,7 @@ class ArmInWorld:
         self._qd_before = np.zeros(n)
         self._arm = flattened(
             SimulatedArm(
-                world, joints, generator, impedance, friction, cogging, sensors, nominal, self._computer,
+                world, joints, generator, self._impedance, friction, cogging, sensors, nominal, self._computer,
                 self._qd_before,
             )
         )  # fmt: skip
@@ -203,6 +206,38 @@ class ArmInWorld:
             self._late_commands.append((self.time + self.params.command_delay_s, wanted))
         else:
             self._qd_set = wanted
+
+    # its drives, for an interface that lets a client set them
+
+    @property
+    def desired(self) -> tuple[FloatArray, FloatArray]:
+        """Positions [rad] and velocities [rad/s] (n,) that the motion generator asks for."""
+        return self._q_d, self._generator.qd_d
+
+    def drive_by(self, tau: FloatArray) -> None:
+        """Have torques (n,) beyond gravity's [Nm] act in the next physics steps in place of the joint impedance."""
+        impedance, own = self._impedance, self._computer
+        _, gravity = self.model.mass_matrix_and_bias(own.q, np.zeros(self._n), np.empty(self._n))
+        impedance.stiffness[:] = impedance.damping[:] = 0.0
+        # the drives add what the model says of Coriolis torques, too, which a commanded torque has to itself
+        impedance.feed_forward[:] = tau + gravity - own.bias
+
+    def hold(self) -> None:
+        """Have the joint impedance act again, where the arm is, within its limits, and with the velocities it has."""
+        impedance, own = self._impedance, self._computer
+        impedance.stiffness[:], impedance.damping[:] = self.stiffness, self._damping(own.mass_matrix)
+        impedance.feed_forward[:] = 0.0
+        self._q_d[:], self._generator.qd_d[:] = np.clip(own.q, self.model.q_min, self.model.q_max), own.qd
+
+    def set_stiffness(self, stiffness: FloatArray) -> None:
+        """Give the joint impedance another stiffness (n,) [Nm/rad], with the same damping ratio."""
+        self.stiffness = stiffness.copy()
+        self._impedance.stiffness[:] = stiffness
+        self._impedance.damping[:] = self._damping(self._computer.mass_matrix)
+
+    def _damping(self, mass_matrix: FloatArray) -> FloatArray:
+        inertia = np.diag(mass_matrix) + self.params.armature_kg_m2
+        return 2.0 * self.params.damping_ratio * np.sqrt(self.stiffness * inertia)
 
     def _now(self) -> _Past:
         own = self._computer
