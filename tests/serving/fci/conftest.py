@@ -66,7 +66,7 @@ class Served:
 
     def ask(self, what: str, *values: float, kind: str = "") -> dict[str, Any]:
         """Have a vendor's client do something (see `vendor_client.py`)."""
-        name = "panda_py" if (kind or self.arm.kind) == "panda" else "pylibfranka"
+        name = "pylibfranka" if (kind or self.arm.kind) == "fr3" else "panda_py"
         if find_spec(name) is None:
             skip_for("make franka")
         command = [sys.executable, str(_VENDOR), kind or self.arm.kind, self.host, what, *map(str, values)]

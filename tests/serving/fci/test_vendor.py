@@ -1,9 +1,11 @@
 """The vendor's own, unmodified clients against the server, in lockstep."""
 
+import shutil
 from typing import Any
 
 import numpy as np
 import pytest
+from tests.needs import skip_for
 
 from pretouch.robot.description import fr3, panda
 from pretouch.robot.model import RobotModel
@@ -156,19 +158,18 @@ def test_torques_hold_the_arm_as_their_springs_say(serve: Any, kind: RobotKind) 
     assert done["after"]["mode"] == "idle"
 
 
-def test_the_pandas_library_is_refused_in_the_vendors_words(serve: Any) -> None:
-    assert serve("panda").ask("refused")["model"] == "libfranka: Server reports error when loading model library."
-
-
-def test_the_fr3s_library_computes_with_our_model(serve: Any) -> None:
-    served = serve("fr3")
-    told, model = served.ask("model"), served.arm.model
+@pytest.mark.parametrize(("client", "rough"), [("fr3", 1.0), ("panda", 1e-9), ("panda-python", 1e-9)])
+def test_the_vendors_library_computes_with_our_model(serve: Any, client: str, rough: float) -> None:
+    served = serve("fr3" if client == "fr3" else "panda")
+    if client != "fr3" and shutil.which("cc") is None:
+        skip_for("apt install gcc libc6-dev")
+    told, model = served.ask("model", kind=client), served.arm.model
     q = np.array(told["q"])
     dynamics = model.dynamics(q, np.zeros(7))
-    np.testing.assert_allclose(np.reshape(told["gravity"], 7), dynamics.gravity, atol=2e-2)
-    np.testing.assert_allclose(np.reshape(told["mass"], (7, 7)), dynamics.mass_matrix, atol=2e-3)
+    np.testing.assert_allclose(np.reshape(told["gravity"], 7), dynamics.gravity, atol=2e-2 * rough)
+    np.testing.assert_allclose(np.reshape(told["mass"], (7, 7)), dynamics.mass_matrix, atol=2e-3 * rough)
     jacobian = np.reshape(told["jacobian"], (6, 7), order="F")
-    np.testing.assert_allclose(jacobian, model.ee_jacobian(model.kinematics(q)), atol=1e-5)
+    np.testing.assert_allclose(jacobian, model.ee_jacobian(model.kinematics(q)), atol=1e-5 * rough)
 
 
 @pytest.mark.parametrize(("client", "kind"), [("panda", "fr3"), ("fr3", "panda")])

@@ -16,6 +16,15 @@ def _panda(host):
     return lib, lib.Robot(host)
 
 
+def _panda_python(host):
+    import panda_py
+    from panda_py import libfranka as lib
+
+    global kept
+    kept = panda_py.Panda(host)
+    return lib, kept.get_robot()
+
+
 def _fr3(host):
     import pylibfranka as lib
 
@@ -212,11 +221,6 @@ def torques(lib, robot, kind, seconds):
     return {"error": error, "last": told[-1], "begun": begun, "after": _told(robot.read_once())}
 
 
-def refused(lib, robot, kind):
-    """Ask for what is not served."""
-    return {"model": _error(robot.load_model)}
-
-
 def _error(do):
     try:
         do()
@@ -228,8 +232,9 @@ def _error(do):
 def model(lib, robot, kind):
     """What the library computes with the model it was given."""
     made, state = robot.load_model(), robot.read_once()
+    jacobian = made.zero_jacobian(state) if kind == "fr3" else made.zero_jacobian(lib.Frame.kEndEffector, state)
     return {
-        "q": list(state.q), "jacobian": list(map(float, _flat(made.zero_jacobian(state)))),
+        "q": list(state.q), "jacobian": list(map(float, _flat(jacobian))),
         "gravity": list(made.gravity(state)), "mass": list(map(float, _flat(made.mass(state)))),
     }  # fmt: skip
 
@@ -262,11 +267,11 @@ def gripper(lib, robot, kind):
 def main():
     kind, host, what, *values = sys.argv[1:]
     try:
-        lib, robot = (_panda if kind == "panda" else _fr3)(host)
+        lib, robot = {"panda": _panda, "panda-python": _panda_python, "fr3": _fr3}[kind](host)
     except Exception as error:
         print(json.dumps({"error": str(error)}), flush=True)
     else:
-        known = (state, move, positions, cartesian, torques, hold, settings, refused, model, gripper)
+        known = (state, move, positions, cartesian, torques, hold, settings, model, gripper)
         done = {f.__name__: f for f in known}[what](lib, robot, kind, *map(float, values))
         print(json.dumps(done), flush=True)
     os._exit(0)

@@ -5,13 +5,11 @@ from collections.abc import Callable
 from pretouch.serving.fci.arm import ServedArm
 from pretouch.serving.fci.commands import Status, set_or_get, wanted_motion
 from pretouch.serving.fci.connections import Connection, Disconnected, Request
+from pretouch.serving.fci.model_library import library_answer
 from pretouch.serving.fci.motion import Ending
 from pretouch.serving.fci.state import StateDatagram
 from pretouch.serving.fci.urdf import urdf_of
 from pretouch.serving.fci.wire import OF_END_EFFECTOR, Protocol, RobotMode
-
-_NO_LIBRARY = b"\1"
-"""Answer to the request for a binary model library: there is none."""
 
 
 class RequestHandler:
@@ -67,7 +65,7 @@ class RequestHandler:
                 else:
                     self._when_at_rest(name, identifier)
             case "LoadModelLibrary":
-                self._answer(name, identifier, _NO_LIBRARY)
+                self._answer(name, identifier, library_answer(arm.model, request.body, self._say))
             case "GetRobotModel":
                 self._answer(name, identifier, bytes([Status.SUCCESS]) + urdf_of(arm.model).encode())
             case _:

@@ -39,7 +39,7 @@ def hand_of(model: RobotModel, flange: int) -> Inertial:
     kin = model.kinematics(model.description.q_ready)
     R, origin = kin.rotation[flange], kin.position[flange]
     parts = [
-        _moved(inertial, R.T @ kin.rotation[link], R.T @ (kin.position[link] - origin))
+        moved(inertial, R.T @ kin.rotation[link], R.T @ (kin.position[link] - origin))
         for link, inertial in enumerate(inertials(model))
         if link > flange and inertial.mass > 0
     ]
@@ -73,6 +73,6 @@ def combined(parts: list[Inertial]) -> Inertial:
     return Inertial(mass, com, inertia)
 
 
-def _moved(inertial: Inertial, R: FloatArray, p: FloatArray) -> Inertial:
+def moved(inertial: Inertial, R: FloatArray, p: FloatArray) -> Inertial:
     """Return a body in another frame, in which its own one is turned by R (3, 3) and at p (3,) [m]."""
     return Inertial(inertial.mass, R @ inertial.com + p, R @ inertial.inertia @ R.T)
