@@ -80,6 +80,7 @@ def test_its_units_are_heard_in_real_time(tmp_path: Path) -> None:
         (["--units", "7337"], "give address and port"),
         (["--units", "127.0.0.1:7337"], "needs --keys"),
         (["--hand", "--scene", "static"], "--hand needs --scene empty"),
+        (["--scene", "nonesuch"], "--scene is nonesuch: give empty, static, dynamic, or an MJCF file"),
         (["--seed", "-1"], "give 0 or more"),
         (["--scene", "static", "--box", "1,1,1:1,1,1"], "--box needs --scene empty"),
         (["--box", "1,1,1"], "give centre and edges, such as 0.5,0.3,0.4:0.3,0.04,0.24"),

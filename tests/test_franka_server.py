@@ -99,6 +99,19 @@ def test_a_box_is_run_into_and_the_server_says_why_the_motion_ended(franka_serve
 
 
 @pytest.mark.slow
+def test_what_stands_in_a_file_is_run_into(franka_server: Any, connected: Any, tmp_path: Path) -> None:
+    world = tmp_path / "world.xml"
+    # the box of the test before, seen from a corner of the room
+    board = '<geom type="box" size=".3 .05 .3" pos="1.35 2.3 1.2"/>'
+    world.write_text(f'<mujoco><worldbody><site name="base" pos="1 2 .7"/>{board}</worldbody></mujoco>')
+    server = franka_server(robot="fr3", scene=world)
+    state = _motion(connected(server, "fr3"), 4.0, [0.4, 0, 0, 0, 0, 0, 0])
+    assert state["robot_mode"] == _REFLEX
+    assert np.linalg.norm(server.truth.force, axis=1).max() > 20.0
+    assert server.truth.q[-1, 0] > 0.05
+
+
+@pytest.mark.slow
 def test_a_person_comes_and_pushes(franka_server: Any, connected: Any) -> None:
     server = franka_server(scene="dynamic", seed=1)
     client = connected(server, "panda")

@@ -199,8 +199,9 @@ class ServeFci:
     grace: float = 0.01
     """In real time, extra time beyond its millisecond to wait for a command [s]: this machine may be slow. 0 is as
     strict as the robot."""
-    scene: Literal["empty", "static", "dynamic"] = "empty"
-    """Surroundings: nothing, the board of the static experiment, or the person of the dynamic one."""
+    scene: Literal["empty", "static", "dynamic"] | Path = "empty"
+    """Surroundings: nothing, the board of the static experiment, the person of the dynamic one, or a world of your own
+    from an MJCF file, in which the arm stands at the site `base`, or else at the origin."""
     trajectory: Literal["circle", "line"] = "circle"
     """Path of the static experiment, beside which its board stands."""
     side: Literal["+y", "-y"] = "+y"

@@ -154,9 +154,9 @@ class TypedPushes:
 def _setup(c: "ServeFci") -> ArmSetup:
     model = RobotModel(robot_named(c.robot))
     if c.hand and c.scene != "empty":
-        raise ParameterError(f"--hand needs --scene empty: {c.scene} is the scene of an experiment.")
+        raise ParameterError(f"--hand needs --scene empty, and it is {c.scene}.")
     if c.box and c.scene != "empty":
-        raise ParameterError(f"--box needs --scene empty: {c.scene} is the scene of an experiment.")
+        raise ParameterError(f"--box needs --scene empty, and it is {c.scene}.")
     if not 0 < c.stiffness <= _STIFFEST:
         raise ParameterError(f"--stiffness is {c.stiffness:g} N/m: give more than 0, and at most {_STIFFEST:g}.")
     if c.seed < 0:
@@ -177,6 +177,10 @@ def _scene(c: "ServeFci", model: RobotModel) -> tuple[SceneSpec, HandScript | No
         case "dynamic":
             return SceneSpec(hand=HandSpec()), Pusher(model, dynamic_pushes(c.seed)), Circle()
     path, boxes = static_path(c.trajectory, c.side), tuple(_box(text, c.stiffness) for text in c.box)
+    if isinstance(c.scene, Path):
+        if not c.scene.is_file():
+            raise ParameterError(f"--scene is {c.scene}: give empty, static, dynamic, or an MJCF file.")
+        return SceneSpec(world=c.scene), None, path
     if c.hand:
         return SceneSpec(boxes, HandSpec(start=VisitingHand.away)), VisitingHand(model.ee), path
     return SceneSpec(boxes), None, path

@@ -10,23 +10,26 @@ import mujoco
 import numpy as np
 
 from pretouch.compiled import compiled
-from pretouch.sim.mujoco_calls import mju_rayGeom
+from pretouch.sim.mujoco_calls import mj_rayHfield, mj_rayMesh, mju_rayGeom
 from pretouch.types import FloatArray, IntArray
 
+_MESH, _HFIELD = int(mujoco.mjtGeom.mjGEOM_MESH), int(mujoco.mjtGeom.mjGEOM_HFIELD)
 _MARGIN_M2 = 1e-9
 """Rounding must not make a ray miss what it touches [m^2]."""
 
 
 class Geoms(NamedTuple):
-    """The visible geoms (G,) of a scene, all of the kinds that the simulation is built of, in MuJoCo's memory."""
+    """The visible geoms (G,) of a scene, in MuJoCo's memory."""
 
     seen: IntArray  # (V,) those that are visible
-    kind: IntArray  # (G,) plane, sphere, capsule or box
+    kind: IntArray  # (G,) plane, sphere, capsule, box, mesh and so on
     body: IntArray  # (G,)
     size: FloatArray  # (G, 3)
     reach: FloatArray  # (G,) radius of a ball round each [m]; 0 of a plane, which has none
     position: FloatArray  # (G, 3) centres [m], base frame
     rotation: FloatArray  # (G, 9) rows of the rotation matrices
+    model: int  # address of the simulation's model
+    data: int  # address of its data
 
 
 def geoms_of(model: mujoco.MjModel, data: mujoco.MjData) -> Geoms:
@@ -37,7 +40,7 @@ def geoms_of(model: mujoco.MjModel, data: mujoco.MjData) -> Geoms:
         alpha[~own] = model.mat_rgba[model.geom_matid[~own], 3]
     return Geoms(
         np.flatnonzero(alpha), model.geom_type, model.geom_bodyid, model.geom_size, model.geom_rbound, data.geom_xpos,
-        data.geom_xmat,
+        data.geom_xmat, model._address, data._address,
     )  # fmt: skip
 
 
@@ -69,6 +72,21 @@ def placed_rays(
 
 
 @compiled
+def _along(geoms: Geoms, geom: int, origin: FloatArray, ray: FloatArray, normal: FloatArray) -> float:
+    """Return the distance [m] at which a ray meets a geom, -1 if it does not; into `normal` (3,) comes that there."""
+    kind = geoms.kind[geom]
+    start, along, there = origin.ctypes.data, ray.ctypes.data, normal.ctypes.data
+    if kind == _MESH:
+        return mj_rayMesh(geoms.model, geoms.data, geom, start, along, there)
+    if kind == _HFIELD:
+        return mj_rayHfield(geoms.model, geoms.data, geom, start, along, there)
+    position, rotation, size = geoms.position[geom], geoms.rotation[geom], geoms.size[geom]
+    return mju_rayGeom(
+        position.ctypes.data, rotation.ctypes.data, size.ctypes.data, start, along, kind, there
+    )  # fmt: skip
+
+
+@compiled
 def cast(
     origin: FloatArray, rays: FloatArray, geoms: Geoms, without: int, farthest: float
 ) -> tuple[FloatArray, FloatArray, IntArray]:
@@ -93,10 +111,7 @@ def cast(
             # past its ball, or with it behind
             if bounded and away - (along * along if along > 0.0 else 0.0) > reach * reach + _MARGIN_M2:
                 continue
-            distance = mju_rayGeom(
-                geoms.position[geom].ctypes.data, geoms.rotation[geom].ctypes.data, geoms.size[geom].ctypes.data,
-                origin.ctypes.data, rays[k].ctypes.data, geoms.kind[geom], there.ctypes.data,
-            )  # fmt: skip
+            distance = _along(geoms, geom, origin, rays[k], there)
             if distance >= 0.0 and (distance < nearest[k] or nearest[k] < 0.0):
                 nearest[k], met[k] = distance, geom
                 normal[k] = there

@@ -1,6 +1,7 @@
 """What stands in the simulated room: the arm on its pedestal, a floor, static objects and a hand."""
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import NamedTuple
 
 import mujoco
@@ -8,6 +9,7 @@ import numpy as np
 
 from pretouch.perception.scene_filter import Fixtures, floor_and_pedestal
 from pretouch.robot.model import RobotModel
+from pretouch.sim.world_file import attach_world
 from pretouch.types import FloatArray
 
 CONTACTS = "contacts"
@@ -99,6 +101,8 @@ class SceneSpec:
     """[m]"""
     damping_ratio: float = 0.1
     """Damping of a contact as a fraction of critical for 2 kg."""
+    world: Path | None = None
+    """MJCF file of what is there in place of floor and pedestal; no recording draws that again."""
 
 
 def described(spec: SceneSpec) -> dict[str, object]:
@@ -147,20 +151,23 @@ class ArmError:
 
 
 def build(model: RobotModel, spec: SceneSpec, error: ArmError) -> mujoco.MjModel:
-    """Build the MuJoCo model of a scene. Only declared pairs touch.
+    """Build the MuJoCo model of a scene. Only declared pairs touch, and what a world's file lets touch.
 
     Each moving capsule touches floor, boxes and hand, and those of a second arm; the hand also touches all that stands
-    still.
+    still, but in a world.
     """
     mj, own = _arm(model, error)
     mj.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    if spec.world:
+        attach_world(mj, spec.world)
+    pedestal = [] if spec.world else ["pedestal"]
     second = _ArmGeoms([], []) if spec.second is None else _add_second(mj, spec, spec.second)
     stiffness = _add_objects(mj, spec)
     pairs = [(link, thing) for link in own.moving + second.moving for thing in stiffness]
     pairs += [(link, other) for link in own.moving for other in second.moving + second.still]
-    pairs += [(still, link) for still in [*own.still, "pedestal"] for link in second.moving]
+    pairs += [(still, link) for still in [*own.still, *pedestal] for link in second.moving]
     if spec.hand:
-        still = [*own.still, "pedestal", *second.still, *stiffness]
+        still = [*own.still, *pedestal, *second.still, *stiffness]
         pairs += [(thing, "hand") for thing in still if thing != "hand"]
     for one, other in pairs:
         mj.add_pair(
@@ -270,9 +277,11 @@ def _add_objects(mj: mujoco.MjSpec, spec: SceneSpec) -> dict[str, float]:
     world = mj.worldbody
     off = {"contype": 0, "conaffinity": 0}
     kind = mujoco.mjtGeom
-    world.add_geom(name="floor", type=kind.mjGEOM_PLANE, size=[3, 3, 0.1], pos=[0, 0, spec.floor_height], **off)
-    _add_pedestal(mj, "pedestal", spec, (0, 0, 0))
-    stiffness = {"floor": 100_000.0}
+    stiffness: dict[str, float] = {}
+    if not spec.world:
+        world.add_geom(name="floor", type=kind.mjGEOM_PLANE, size=[3, 3, 0.1], pos=[0, 0, spec.floor_height], **off)
+        _add_pedestal(mj, "pedestal", spec, (0, 0, 0))
+        stiffness["floor"] = 100_000.0
     for thing in spec.boxes:
         world.add_geom(name=thing.name, type=kind.mjGEOM_BOX, size=thing.half_size, pos=thing.center, **off)
         stiffness[thing.name] = thing.stiffness

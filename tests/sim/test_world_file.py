@@ -1,0 +1,171 @@
+"""Worlds from MJCF files round the simulated arm: bodies that fall, what touches the arm, rays, and what is refused."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from tests.sim.ranging import EXACT, FORWARD, NO_ERROR, ORIGIN
+
+from pretouch.errors import ParameterError
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import Skin
+from pretouch.sensing.unit import SensorUnit
+from pretouch.sim.plant import Plant
+from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
+from pretouch.sim.rays import cast, geoms_of
+from pretouch.sim.scene import SceneSpec
+from pretouch.types import RangeStatus
+
+World = Callable[..., Plant]
+_FLOOR = '<geom name="floor" type="plane" size="0 0 1" pos="0 0 -0.75"/>'
+
+
+@pytest.fixture
+def world(panda_model: RobotModel, tmp_path: Path) -> World:
+    """An arm in the world of a file, which holds some bodies and whatever stands beside its worldbody."""
+
+    def make(bodies: str, beside: str = "") -> Plant:
+        file = tmp_path / "world.xml"
+        file.write_text(f"<mujoco>{beside}<worldbody>{bodies}</worldbody></mujoco>")
+        return Plant(panda_model, SceneSpec(world=file), NO_ERROR, panda_model.description.q_ready.copy(), seed=0)
+
+    return make
+
+
+def test_a_free_body_falls_and_rests(world: World) -> None:
+    # the names of the arm's are not taken
+    cube = '<body name="panda_link0" pos="1 0.5 0"><freejoint/><geom type="box" size=".05 .05 .05" mass="2"/></body>'
+    plant = world(_FLOOR + cube)
+    height = plant.mj_data.qpos[9:10]
+    plant.advance(0.3)
+    # semi-implicit Euler: g dt^2 (1 + 2 + ... + n)
+    assert height[0] == pytest.approx(-9.81e-6 * 300 * 301 / 2, abs=1e-9)
+    plant.advance(2.0)
+    assert height[0] == pytest.approx(-0.7, abs=1e-3)
+    assert plant.mj_data.qvel[7:] == pytest.approx(np.zeros(6), abs=1e-3)
+    assert plant.touching
+    assert not plant.true_force.any()
+
+
+def test_a_weight_on_the_wrist_is_felt_with_its_weight(world: World, panda_model: RobotModel) -> None:
+    sliding = '<joint type="slide" axis="0 0 1"/><geom type="box" size=".05 .05 .02" mass="1.5"/>'
+    plant = world(f'<body pos="0.3 0 0.9">{sliding}</body>')
+    plant.advance(0.05)
+    assert not plant.true_force.any()
+    assert plant.mj_data.qvel[7] == pytest.approx(-9.81 * 0.05, rel=1e-6)
+    plant.advance(2.0)
+    assert plant.true_force[2] == pytest.approx(-1.5 * 9.81, rel=1e-3)
+    expected = np.zeros(7)
+    kin = panda_model.kinematics(plant.mj_data.qpos[:7])
+    for one in plant.contact_forces():
+        expected += panda_model.jacobian(kin, one.link, one.point)[:3].T @ one.force
+    told = np.mean([_advanced(plant, 0.01).read().tau_ext for _ in range(30)], axis=0)
+    assert np.abs(expected).max() > 2.0
+    np.testing.assert_allclose(told, expected, atol=1.0)
+
+
+def _advanced(plant: Plant, duration: float) -> Plant:
+    plant.advance(duration)
+    return plant
+
+
+def test_the_arm_stands_where_the_file_has_its_base(world: World) -> None:
+    box = '<body name="box" pos="1 0.6 0.7"><geom type="box" size=".1 .1 .1"/></body>'
+    assert world(box).mj_data.body("world/box").xpos == pytest.approx([1.0, 0.6, 0.7])
+    # turned to the left by 90 degrees: what is 0.6 m to the left of it in the world is before it
+    data = world('<site name="base" pos="1 0 0.5" euler="0 0 90"/>' + box).mj_data
+    assert data.body("world/box").xpos == pytest.approx([0.6, 0.0, 0.2])
+    assert data.body("panda_link0").xpos == pytest.approx(np.zeros(3))
+
+
+def test_the_physics_is_computed_as_the_arms_and_nothing_is_said_of_it(
+    world: World, capfd: pytest.CaptureFixture[str]
+) -> None:
+    visual = '<visual><map znear="0.3"/><headlight ambient="1 1 1"/></visual><statistic extent="3"/>'
+    key = '<keyframe><key name="home" qpos="0 0 1 1 0 0 0"/></keyframe>'
+    settings = '<option timestep="0.01" integrator="RK4"/><size memory="1M" nuser_geom="2"/>'
+    plant = world(_FLOOR + '<body><freejoint/><geom size=".1"/></body>', settings + visual + key)
+    assert plant.mj_model.opt.timestep == 0.001
+    assert plant.mj_model.opt.integrator == mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    assert plant.mj_data.qpos[:7] == pytest.approx(plant.model.description.q_ready)
+    assert capfd.readouterr().err == ""
+
+
+_SHAPES = """
+<asset>
+  <mesh name="wedge" vertex="0 0 0  .3 0 0  0 .3 0  .3 .3 0  0 0 .2  .3 0 .2"/>
+  <hfield name="hills" nrow="3" ncol="3" size=".5 .5 .2 .1" elevation="0 1 0 1 0 1 0 1 .5"/>
+</asset>"""
+_ROOM = (
+    _FLOOR
+    + """
+<body pos=".6 .2 .1"><freejoint/><geom type="mesh" mesh="wedge" mass="1"/></body>
+<geom type="hfield" hfield="hills" pos="-.5 .5 -.3"/>
+<geom type="cylinder" size=".1 .2" pos="-.5 -.5 .3"/>
+<geom type="ellipsoid" size=".1 .2 .3" pos=".5 -.5 .3"/>
+<body mocap="true" pos="0 -.7 .5"><geom type="box" size=".1 .1 .1"/></body>
+"""
+)
+
+
+def test_rays_meet_what_mujoco_finds_in_it(world: World) -> None:
+    plant = world(_ROOM, _SHAPES)
+    built, data, rng = plant.mj_model, plant.mj_data, np.random.default_rng(0)
+    geoms, found, met = geoms_of(built, data), np.zeros(1, np.int32), set()
+    for _ in range(3000):
+        data.qpos[10:14] = Rotation.random(rng=rng).as_quat()
+        mujoco.mj_kinematics(built, data)
+        origin, ray = rng.uniform(-1.0, 1.0, 3), rng.normal(size=3)
+        ray /= np.linalg.norm(ray)
+        normal = np.zeros(3)
+        expected = mujoco.mj_ray(built, data, origin, ray, None, True, -1, found, normal)
+        distance, outwards, which = cast(origin, ray[None], geoms, -1, 100.0)
+        assert distance[0] == expected
+        if expected >= 0.0:
+            assert which[0] == found[0]
+            assert np.array_equal(outwards[0], normal)
+            met.add(int(built.geom_type[which[0]]))
+    kinds = ("PLANE", "HFIELD", "CAPSULE", "ELLIPSOID", "CYLINDER", "BOX", "MESH")
+    assert met == {int(getattr(mujoco.mjtGeom, f"mjGEOM_{kind}")) for kind in kinds}
+
+
+def test_units_see_a_mesh_at_its_distance(world: World, panda_model: RobotModel) -> None:
+    x, half = ORIGIN[0] + 0.4, 1.0
+    corners = " ".join(f"{i} {j * half} {k * half}" for i in (0, 0.1) for j in (-1, 1) for k in (-1, 1))
+    mesh = f'<asset><mesh name="wall" vertex="{corners}"/></asset>'
+    plant = world(f'<geom type="mesh" mesh="wall" pos="{x} 0 {ORIGIN[2]}"/>', mesh)
+    skin = Skin([SensorUnit("unit", "panda_hand", FORWARD)], panda_model)
+    finders = RangeFinders(plant, skin, RangeFinderParams(rings=0, **EXACT), 0)
+    told = _advanced(plant, 0.1) and finders.read()
+    assert told.status[0] == RangeStatus.OK
+    assert told.distance[0] == pytest.approx(0.4, abs=1e-3)
+
+
+_HINGE = '<body name="door"><joint name="hinge"/><geom size=".1" mass="1"/>{}</body>'
+
+
+@pytest.mark.parametrize(
+    ("bodies", "beside", "words"),
+    [
+        (_HINGE.format(""), '<actuator><motor joint="hinge"/></actuator>', "has actuators, which are not simulated"),
+        ("", '<option gravity="0 0 0"/>', r"has the option gravity \[0. 0. 0.\], and the arm's world has \[ 0.\s+0."),
+        ("", '<option><flag contact="disable"/></option>', "has the option disableflags 16, and the arm's world has 0"),
+        ('<site name="base" euler="0 3 0"/>', "", "moves or is tilted: the arm stands still, upright"),
+        (_HINGE.format('<site name="base"/>'), "", "The site base of the scene .* moves or is tilted"),
+        ('<geom type="mesh" mesh="nowhere"/>', "", "cannot be read as MJCF: .*nowhere"),
+        ("<sphere/>", "", "cannot be read as MJCF: .*sphere"),
+    ],
+)
+def test_what_cannot_be_used_is_named(world: World, bodies: str, beside: str, words: str) -> None:
+    with pytest.raises(ParameterError, match=f"(?s){words}"):
+        world(bodies, beside)
+
+
+def test_a_file_that_is_not_there_is_named(panda_model: RobotModel, tmp_path: Path) -> None:
+    scene: Any = SceneSpec(world=tmp_path / "none.xml")
+    with pytest.raises(ParameterError, match=r"The scene .*none\.xml cannot be read"):
+        Plant(panda_model, scene, NO_ERROR, panda_model.description.q_ready, seed=0)
