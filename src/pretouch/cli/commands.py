@@ -16,6 +16,8 @@ class Live:
 
     profile: str = "pretouch"
     """Profile to start with, or PROFILE:GROUP.FIELD=VALUE."""
+    arm: str = "panda"
+    """panda, fr3, a name that another package adds, or the folder of an imported arm: room and path are scaled to it."""
     path: str = "circle"
     """circle or line."""
     seed: int = 0
@@ -33,7 +35,7 @@ class Live:
     """File of the keys of real sensor units, which the simulated arm then carries in place of simulated ones."""
     skin: str = ""
     """Skin file; by default 34 units all over hand, wrist, forearm and elbow, and with --keys the seven of other
-    commands."""
+    commands; of an imported arm the skin in its folder."""
     opening: bool = True
     """Whether a hand comes by itself at first, until somebody drags or clicks; never with --keys or --record."""
     units_host: str = HOST

@@ -12,11 +12,12 @@ from pretouch.extras import LIVE
 from pretouch.hardware.address import EVERYWHERE, HOST
 from pretouch.profiles import profile as find_profile
 from pretouch.signals import ended
-from pretouch.viewer.room import LiveSettings, PathName, Room, live_path
+from pretouch.viewer.room import LiveSettings, PathName, Room, live_path, settings_for
 from pretouch.viewer.server import ServeOptions, browser_here, check_port
 
 if TYPE_CHECKING:
     from pretouch.cli.commands import Live
+    from pretouch.robot.model import RobotModel
     from pretouch.sensing.skin import Skin
     from pretouch.viewer.real_units import RealUnits
 
@@ -32,31 +33,44 @@ def live(command: "Live") -> None:
     settings = LiveSettings(profile=profile, path=path, seed=command.seed)
 
     from pretouch.cli.warm_up import prepare
-    from pretouch.robot.description import panda
+    from pretouch.coverage.assumed import assumptions
     from pretouch.robot.model import RobotModel
-    from pretouch.sensing.skin import LIVE_SKIN, skin_for
+    from pretouch.robot.named import robot_named
     from pretouch.viewer.live import serve_live
     from pretouch.viewer.simulation import LiveSimulation
 
-    model = RobotModel(panda())
-    skin = skin_for(model, command.skin or ("" if command.keys else LIVE_SKIN))
-    believed = skin
+    model = RobotModel(robot_named(command.arm))
+    settings = settings_for(model, settings)
+    believed = skin = _skin(command, model)
     if command.world:
         from pretouch.sim.misplacement import Misplacement, misplaced
         from pretouch.sim.randomisation import drawn, world_set
 
-        world = drawn(world_set(command.world), command.seed)
+        world = drawn(world_set(command.world), command.seed, settings.plant)
         settings = replace(settings, plant=world.plant, ranging=world.ranging)
         if not command.keys:
             believed, _ = misplaced(skin, model, Misplacement(world.position_mm, world.orientation_deg), command.seed)
     prepare(profile, lambda: Room(settings, live_path(settings), model, skin).tick(), first_contact=True)
     with _units(command, skin) as real:
         simulation = LiveSimulation(settings, model, believed, real, skin)
+        for sentence in assumptions(model, settings.placement, settings.floor):
+            print(sentence, flush=True)
+            simulation.notice = f"{simulation.notice} {sentence}".strip()
         if command.opening and not real and not command.record:
             simulation.play_opening()
         if command.record:
             simulation.start_recording(Path(command.record))
         serve_live(simulation, options, ended, partial(print, flush=True))
+
+
+def _skin(command: "Live", model: "RobotModel") -> "Skin":
+    """Return the skin that was asked for, or else the live page's for a Panda or FR3, or the one the arm has."""
+    from pretouch.robot.named import is_shipped
+    from pretouch.sensing.skin import LIVE_SKIN, skin_for
+
+    arm = model.description
+    of_page = LIVE_SKIN.with_name(f"{arm.name}_live.toml") if is_shipped(arm) and not command.keys else ""
+    return skin_for(model, command.skin or of_page)
 
 
 @contextmanager

@@ -9,8 +9,9 @@ from pretouch.control.task import rotation_error
 from pretouch.errors import ExperimentError
 from pretouch.importing.reaching import Pace, reached
 from pretouch.importing.ready import ever_apart, reach_of
-from pretouch.robot.description import fr3, panda
+from pretouch.robot.description import panda
 from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.robot.named import is_shipped
 from pretouch.robot.self_distance import capsule_ends, kinematics_of, self_distances
 from pretouch.sim.board import HandSide, Side, sign_of
 from pretouch.sim.paper_scenes import Placement
@@ -32,14 +33,15 @@ def placement_for(model: RobotModel) -> Placement:
     All along, hand as in the ready posture, the arm keeps away from singularities, its limits and itself. Raises
     ExperimentError where no such place is found. The Panda and the FR3 have the paper's own.
     """
-    if model.description.mjcf in (panda().mjcf, fr3().mjcf):
+    if is_shipped(model.description):
         return Placement()
     by_reach = reach_of(model) / reach_of(RobotModel(panda()))
     left, right = (hand_side(model, side) for side in _SIDES)
     shifts = sorted(product(_SHIFT_M, _SHIFT_M), key=lambda s: s[0] ** 2 + s[1] ** 2)
     for part, (x, z) in product(_SHRINK, shifts):
         placement = Placement(by_reach * part, x, z, left, right)
-        if all(_followed(model, placement.path(trajectory, 1.0)) for trajectory in ("circle", "line")):
+        paths = (placement.path(trajectory, 1.0) for trajectory in ("circle", "line"))
+        if all(postures_along(model, path) is not None for path in paths):
             return placement
     raise ExperimentError(
         f"{model.description.name} cannot follow the paper's paths anywhere with its hand as in q_ready: give another"
@@ -62,19 +64,21 @@ def hand_side(model: RobotModel, side: Side) -> HandSide:
     return HandSide(max(float(out[widest]), 0.02), float(away[widest, 2]))
 
 
-def _followed(model: RobotModel, path: Path) -> bool:
-    """Tell whether an arm can follow a path with its hand upright, well away from where it could not."""
+def postures_along(model: RobotModel, path: Path) -> FloatArray | None:
+    """Return postures (S, n) [rad] along a path, hand upright; None where the arm cannot follow it, or only just."""
     upright = model.kinematics(model.description.q_ready).rotation[model.ee]
     q = model.description.q_ready
     postures: list[FloatArray] = []
     for phase in np.linspace(0.0, path.length, _PLACES):
         found = _at(model, q, path.point(phase), upright, _ONWARD if postures else _TO_START)
         if found is None:
-            return False
+            return None
         q = found
         postures.append(q)
-    ends = capsule_ends(model, kinematics_of(model, np.array(postures)))
-    return float(self_distances(model, ends)[:, ever_apart(model)].min(initial=np.inf)) > _CLEAR_M
+    found = np.array(postures)
+    ends = capsule_ends(model, kinematics_of(model, found))
+    clear = float(self_distances(model, ends)[:, ever_apart(model)].min(initial=np.inf))
+    return found if clear > _CLEAR_M else None
 
 
 def _at(model: RobotModel, q: FloatArray, point: FloatArray, upright: FloatArray, pace: Pace) -> FloatArray | None:

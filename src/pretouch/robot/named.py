@@ -18,6 +18,11 @@ def robot_names() -> tuple[str, ...]:
     return (*ROBOTS, *(name for name in plugins.names(GROUP) if name not in ROBOTS))
 
 
+def is_shipped(arm: RobotDescription) -> bool:
+    """Whether an arm's model is one that comes with the package: a Panda or an FR3."""
+    return arm.mjcf in (panda().mjcf, fr3().mjcf)
+
+
 def robot_named(name: str) -> RobotDescription:
     """Return the description of an arm, by its name or by the folder or robot.toml that it was imported to.
 

@@ -42,7 +42,7 @@ _LARGEST_COMPONENT = 10.0
 PAPER_SKIN = Path(str(files("pretouch.sensing") / "data" / "panda_seven_units.toml"))
 """The file of `paper_skin` for the Panda."""
 LIVE_SKIN = PAPER_SKIN.with_name("panda_live.toml")
-"""34 units for the Panda of the live page, where people put their hands."""
+"""34 units for the Panda of the live page, where people put their hands; the FR3 has the same."""
 
 
 class Skin:

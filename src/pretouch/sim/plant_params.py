@@ -159,3 +159,11 @@ def plant_params_of(arm: RobotDescription) -> PlantParams:
         for name in (*_SCALED, *_KEPT)
     }
     return replace(own, **figures)
+
+
+def assumed_plant(arm: RobotDescription) -> str:
+    """Say what `plant_params_of` makes of an arm."""
+    return (
+        f"Joint stiffness, rotor inertia, friction, noise and offsets of the simulated {arm.name} are the Panda's, its"
+        " torques scaled by torque limits: none was measured on this arm."
+    )

@@ -107,9 +107,12 @@ class Controls:
         self._lasting = gui.add_slider("Duration [s]", 0.1, 3.0, 0.1, PUSH_S)
 
     def _hand_folder(self) -> None:
+        low, high = self._simulation.hand_space
         self._hand = [
-            self._gui.add_slider(f"{axis} [m]", low, high, 0.01, 0.0, hint="Or drag the hand.")
-            for axis, low, high in (("x", -1.0, 1.4), ("y", -1.2, 1.2), ("z", -0.15, 1.4))
+            self._gui.add_slider(
+                f"{axis} [m]", float(low[k]), float(high[k]), 0.01, 0.0, hint="Or drag the hand."
+            )
+            for k, axis in enumerate("xyz")
         ]
         for axis, slider in enumerate(self._hand):
             when_changed(slider, self._actions, partial(self._move_hand, axis), f"hand {axis}", quiet=True)

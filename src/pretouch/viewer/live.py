@@ -57,7 +57,8 @@ class LivePage:
         self.controls = Controls(server.gui, simulation, self._actions)
         self.drive = Drive(server, simulation, self._actions)
         self._scene = Scene(server, simulation.world)
-        self._status.notice = self._scene.said
+        self._status.notice = f"{self._scene.said} {simulation.notice}".strip()
+        simulation.notice = ""
         self.controls.on_view = self._scene.show
         self._scene.on_hand(self._drag)
         self._history = History(simulation.skin.first)

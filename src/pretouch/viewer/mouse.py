@@ -18,7 +18,7 @@ HAND_FORCE_N = 60.0
 GAP_M = 0.05
 """Room between the hand and everything else where it begins [m]."""
 _LOWEST, _HIGHEST = np.array([-1.0, -1.2, -1.0]), np.array([1.4, 1.2, 1.4])
-"""Corners of the space the hand is led through [m], base frame: what the arm reaches, and half a metre round it."""
+"""Corners of the space the hand is led through [m], base frame: what a Panda reaches, and half a metre round it."""
 _SHELL_M = 0.02
 _DIRECTIONS = 200
 _DEPTHS, _LOOKS = (0.4, 1.6), 121
@@ -31,17 +31,19 @@ the place's own depth counts."""
 class Mouse:
     """The script of a hand that follows a pointer."""
 
-    def __init__(self, target: FloatArray, scene: SceneSpec, hand: HandSpec) -> None:
-        """Begin with the pointer at a place (3,) [m]."""
-        self._lowest = _LOWEST.copy()
-        self._lowest[2] = max(self._lowest[2], scene.floor_height + hand.radius)
+    def __init__(self, target: FloatArray, scene: SceneSpec, hand: HandSpec, size: float = 1.0) -> None:
+        """Begin with the pointer at a place (3,) [m]. Round an arm of `size` times a Panda's there is as much space."""
+        space = max(1.0, size)
+        self.lowest, self.highest = space * _LOWEST, space * _HIGHEST
+        """Corners (3,) of the space the hand is led through [m], base frame."""
+        self.lowest[2] = max(self.lowest[2], scene.floor_height + hand.radius)
         self.target = target
         """(3,) where the hand is to be [m], base frame; to be set by `move`."""
         self.move(target)
 
     def move(self, target: FloatArray) -> None:
         """Point to a place (3,) [m], or the nearest to it in the workspace; what is no place is a ParameterError."""
-        self.target = np.clip(_place("The hand's target", target), self._lowest, _HIGHEST)
+        self.target = np.clip(_place("The hand's target", target), self.lowest, self.highest)
 
     def point(self, eye: FloatArray, place: FloatArray, model: RobotModel, q: FloatArray) -> None:
         """Point to what a person sees at a place (3,) [m] from an `eye` (3,) [m], as `move` does; see `at_depth`."""

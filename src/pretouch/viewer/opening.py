@@ -7,14 +7,13 @@ not see it runs into it at full speed.
 import numpy as np
 
 from pretouch.control.path import Path
-from pretouch.robot.model import RobotModel
-from pretouch.sim.pushes import PALM, hand_of
+from pretouch.sim.paper_scenes import Placement
 from pretouch.types import ControlStep, FloatArray, Mode
 
 _BEGIN_S = 2.2
 """Time in the simulation at which the hand sets out [s]: the arm is on its path, and the page is drawn."""
 _PHASE_M = 1.25
-"""Where on its path the arm meets the hand [m]: on the circle low, on the side of the person, after five seconds."""
+"""Where on the paper's path the arm meets the hand [m]: on the circle low, on the person's side, after five seconds."""
 _PUSH_M = 0.1
 """How far back along its path the hand pushes the arm that has touched it [m]."""
 _COME_M_S, _PUSH_M_S, _GO_M_S = 0.35, 0.2, 0.5
@@ -30,13 +29,11 @@ _HOME_M = 0.01
 class Opening:
     """Where the hand is to be in each control cycle, until `over`."""
 
-    def __init__(self, model: RobotModel, path: Path, step: ControlStep, home: FloatArray) -> None:
+    def __init__(self, placement: Placement, path: Path, step: ControlStep, home: FloatArray) -> None:
         """Begin with the first step, and with the hand at `home` (3,) [m], where it also returns to."""
-        kin = model.kinematics(step.q)
-        hand = hand_of(model)
-        palm = kin.position[hand] + kin.rotation[hand] @ PALM
-        beside = palm - kin.position[model.ee]
-        self._place, self._pushed = path.point(_PHASE_M) + beside, path.point(_PHASE_M - _PUSH_M) + beside
+        above = np.array([0.0, 0.0, (placement.left.above + placement.right.above) / 2])
+        meets = _PHASE_M * placement.scale
+        self._place, self._pushed = path.point(meets) + above, path.point(meets - _PUSH_M) + above
         self._home, self._target, self._last = home, home.copy(), step.stamp
         self._reacted: float | None = None
         self.over = False

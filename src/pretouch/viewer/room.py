@@ -6,17 +6,20 @@ from typing import Annotated, Literal, cast
 import numpy as np
 
 from pretouch.checks import Check, Checked
-from pretouch.control.path import Circle, Path, WayPoints
+from pretouch.control.path import Path, WayPoints
 from pretouch.control.posture import brought_to
+from pretouch.coverage.assumed import floor_under
+from pretouch.coverage.placement import placement_for
 from pretouch.errors import ParameterError
 from pretouch.ports import Skin as UnitPort
 from pretouch.profiles import PROFILES, Profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.sim.board import Side, board_beside
+from pretouch.sim.board import FACE_M, Side, board_beside
 from pretouch.sim.hand import Hand, PersonArm
+from pretouch.sim.paper_scenes import Placement
 from pretouch.sim.plant import Plant, PlantClock
-from pretouch.sim.plant_params import PlantParams
+from pretouch.sim.plant_params import PlantParams, plant_params_of
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
 from pretouch.sim.touch_sensor import SimulatedTouchSkin, TouchSensorParams, TouchSensors
@@ -70,6 +73,21 @@ class LiveSettings(Checked):
     hand_start: tuple[float, float, float] = (1.0, 0.5, 0.3)
     """Where the person's hand begins [m], base frame: in view, and clear of both paths; moved aside if that is inside
     something."""
+    placement: Placement = field(default_factory=Placement)
+    """Where the paper's paths are for the arm."""
+    floor: float = SceneSpec.floor_height
+    """Height of the floor in the base frame [m]."""
+
+
+def settings_for(model: RobotModel, settings: LiveSettings) -> LiveSettings:
+    """Return settings with paths, floor, the place where the hand begins and the kind of arm for an arm.
+
+    Raises ExperimentError where the arm cannot follow the paths anywhere.
+    """
+    placement = placement_for(model)
+    hand, plant = placement.point(*settings.hand_start), plant_params_of(model.description)
+    floor = floor_under(model, placement)
+    return replace(settings, placement=placement, floor=floor, hand_start=hand, plant=plant)
 
 
 _SETTLE_S = 0.2
@@ -78,10 +96,8 @@ _SETTLE_S = 0.2
 
 def live_path(settings: LiveSettings) -> Path:
     """Return the path by its name, begun on the side away from the object."""
-    far = -1.0 if settings.object == "board +y" else 1.0
-    if settings.path == "circle":
-        return Circle(start_angle=np.pi if far < 0 else 0.0)
-    return WayPoints(np.array([(0.4, 0.5 * far, 0.5), (0.4, -0.5 * far, 0.5)]), closed=True)
+    path = settings.placement.path(settings.path, 1.0 if settings.object == "board +y" else -1.0)
+    return WayPoints(path.points, closed=True) if isinstance(path, WayPoints) else path
 
 
 class Room:
@@ -98,9 +114,10 @@ class Room:
         boxes: tuple[Box, ...] = ()
         if settings.object != "none":
             side: Side = "+y" if settings.object == "board +y" else "-y"
-            boxes = (board_beside(path, side, settings.stiffness),)
-        scene = SceneSpec(boxes=boxes, hand=hand)
-        self.mouse = Mouse(np.array(settings.hand_start), scene, hand)
+            face, met_by = settings.placement.face(FACE_M, side), settings.placement.hand(side)
+            boxes = (board_beside(path, side, settings.stiffness, face, hand=met_by),)
+        scene = SceneSpec(boxes=boxes, hand=hand, floor_height=settings.floor)
+        self.mouse = Mouse(np.array(settings.hand_start), scene, hand, settings.placement.scale)
         start = clear_place(model, q, scene, self.mouse.target, hand.radius + GAP_M)
         self.mouse.move(start)
         self.scene = replace(scene, hand=replace(hand, start=tuple(start.tolist())))

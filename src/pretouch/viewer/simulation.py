@@ -59,6 +59,8 @@ class LiveSimulation:
     ) -> None:  # fmt: skip
         """Begin with the first control cycle done. Without others, the arm is a Panda with the paper's skin.
 
+        Another arm needs `room.settings_for`.
+
         With `real` units, they are what the skin's units read. Simulated ones sit where `true_skin` says, if it is
         given, whatever the controller believes.
         """
@@ -141,6 +143,11 @@ class LiveSimulation:
     # what a person does
 
     @property
+    def hand_space(self) -> tuple[FloatArray, FloatArray]:
+        """Lowest and highest corner (3,) of where the hand can be led [m], base frame."""
+        return self._room.mouse.lowest, self._room.mouse.highest
+
+    @property
     def hand_target(self) -> FloatArray:
         """Where the hand is to be (3,) [m], base frame."""
         return self._room.mouse.target
@@ -196,7 +203,7 @@ class LiveSimulation:
     def play_opening(self) -> None:
         """Begin again at time 0 with a scripted hand, which is a person's again as soon as it is moved."""
         self.reset()
-        self.opening = Opening(self.model, self.controller.path, self.frame.step, self._room.mouse.target)
+        self.opening = Opening(self.settings.placement, self.controller.path, self.frame.step, self._room.mouse.target)
 
     def reset(self, **changes: Any) -> None:
         """Begin again at time 0 with all as it is set by now, but for changes of `LiveSettings`; ends a recording."""
