@@ -7,7 +7,8 @@ not see it runs into it at full speed.
 import numpy as np
 
 from pretouch.control.path import Path
-from pretouch.sim.paper_scenes import Placement
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, FloatArray, Mode
 
 _BEGIN_S = 2.2
@@ -29,12 +30,14 @@ _HOME_M = 0.01
 class Opening:
     """Where the hand is to be in each control cycle, until `over`."""
 
-    def __init__(self, placement: Placement, path: Path, step: ControlStep, home: FloatArray) -> None:
-        """Begin with the first step, and with the hand at `home` (3,) [m], where it also returns to."""
-        above = np.array([0.0, 0.0, (placement.left.above + placement.right.above) / 2])
-        meets = _PHASE_M * placement.scale
+    def __init__(self, model: RobotModel, skin: Skin, path: Path, scale: float, home: FloatArray) -> None:
+        """Begin at time 0, with the hand at `home` (3,) [m], where it also returns to.
+
+        The path is `scale` times the paper's. The hand is as high above it as the outermost units of the arm.
+        """
+        above, meets = np.array([0.0, 0.0, _units_above(model, skin)]), _PHASE_M * scale
         self._place, self._pushed = path.point(meets) + above, path.point(meets - _PUSH_M) + above
-        self._home, self._target, self._last = home, home.copy(), step.stamp
+        self._home, self._target, self._last = home, home.copy(), 0.0
         self._reacted: float | None = None
         self.over = False
         """Whether the hand is back where it set out."""
@@ -56,3 +59,12 @@ class Opening:
         self._target = self._target + left * min(1.0, speed * elapsed / max(distance, 1e-9))
         self.over = going and distance < _HOME_M
         return self._target
+
+
+def _units_above(model: RobotModel, skin: Skin) -> float:
+    """Mean height above the end-effector, ready posture, of the units that most joints move [m]."""
+    joints = model.moved_by[skin.link].sum(axis=1)
+    outermost = np.flatnonzero(joints == joints.max())
+    kin, link = model.kinematics(model.description.q_ready), skin.link[outermost]
+    raised = np.einsum("ki,ki->k", kin.rotation[link, 2], skin.T_link_sensor[outermost, :3, 3])
+    return float((kin.position[link, 2] + raised).mean() - kin.position[model.ee, 2])

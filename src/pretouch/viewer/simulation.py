@@ -203,7 +203,8 @@ class LiveSimulation:
     def play_opening(self) -> None:
         """Begin again at time 0 with a scripted hand, which is a person's again as soon as it is moved."""
         self.reset()
-        self.opening = Opening(self.settings.placement, self.controller.path, self.frame.step, self._room.mouse.target)
+        scale = self.settings.placement.scale
+        self.opening = Opening(self.model, self._true_skin, self.controller.path, scale, self._room.mouse.target)
 
     def reset(self, **changes: Any) -> None:
         """Begin again at time 0 with all as it is set by now, but for changes of `LiveSettings`; ends a recording."""
