@@ -28,10 +28,14 @@ def floor_under(model: RobotModel, placement: Placement) -> float:
 
 
 def assumptions(model: RobotModel, placement: Placement, floor: float) -> tuple[str, ...]:
-    """Say what a simulation of an arm assumes, a sentence each; nothing of one that comes with the package."""
+    """Say what a simulation of an arm assumes, a sentence each; nothing of one that comes with the package.
+
+    Nothing is said of paths that are where the paper has them.
+    """
     arm = model.description
     if is_shipped(arm):
         return ()
+    moved = (placement.sentence(arm.name),) if placement != Placement() else ()
     low = f"The floor is at {floor:.2f} m, for on its paths the arm reaches lower than a Panda."
     lower = (low,) if floor < SceneSpec.floor_height else ()
-    return (placement.sentence(arm.name), *lower, assumed_plant(arm))
+    return (*moved, *lower, assumed_plant(arm))

@@ -14,7 +14,7 @@ from pretouch.serving.fleet import Fleet, FleetParams
 from pretouch.serving.real_time import LATE_S, RealTime
 from pretouch.sim.imu import ImuParams, Imus
 from pretouch.sim.plant import Plant
-from pretouch.sim.plant_params import PlantParams
+from pretouch.sim.plant_params import plant_params_of
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import SceneSpec
 from pretouch.sim.touch_sensor import TouchSensors
@@ -48,6 +48,8 @@ class SimulateOptions(Checked):
     """Units, their IMUs and reboots, and the network to the receiver."""
     path: Path = field(default_factory=Circle)
     """What the end-effector follows."""
+    floor: float = SceneSpec.floor_height
+    """Height of the floor below that, base frame [m]."""
     profile: Profile = field(default_factory=Profile)
     """Parameters of the controller."""
     hand: bool = True
@@ -90,7 +92,7 @@ class SimulatedArm:
         try:
             for name, unit in zip(self.fleet.ids, self.fleet.units, strict=True):
                 unit.silent, unit.stuck = name in options.silenced, name in options.stuck
-            self.plant = Plant(options.model, scene or SceneSpec(), PlantParams(), q, seed)
+            self.plant = Plant(options.model, scene or SceneSpec(), plant_params_of(options.model.description), q, seed)
             self.clock = RealTime(self.plant, period, late)
             real, fleet = self.clock.real, self.fleet
             RangeFinders(self.plant, skin, RangeFinderParams(), seed, lambda sample: fleet.take_range(real(sample)))

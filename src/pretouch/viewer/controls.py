@@ -109,9 +109,7 @@ class Controls:
     def _hand_folder(self) -> None:
         low, high = self._simulation.hand_space
         self._hand = [
-            self._gui.add_slider(
-                f"{axis} [m]", float(low[k]), float(high[k]), 0.01, 0.0, hint="Or drag the hand."
-            )
+            self._gui.add_slider(f"{axis} [m]", float(low[k]), float(high[k]), 0.01, 0.0, hint="Or drag the hand.")
             for k, axis in enumerate("xyz")
         ]
         for axis, slider in enumerate(self._hand):

@@ -38,6 +38,8 @@ def run(command: "Run", write: Callable[[Any], None]) -> int:
         _check_free(Path(command.record))
     made = run_setup(command)
     need_extra(command)
+    for sentence in made.assumed:
+        say(sentence)
     prepare(made.profile)
     if command.robot.lockstep:
         from pretouch.cli.run.lockstep import run_lockstep

@@ -21,7 +21,7 @@ _REFUSED = "The arm was not allowed to recover"
 @contextmanager
 def franka(command: "Run", setup: RunSetup) -> Iterator[OpenedRobot]:
     """Connect to the arm, set its collision behaviour by the profile's thresholds, and hear its units."""
-    kind, address = command.robot.arm, command.robot.ip
+    kind, address = command.robot.kind, command.robot.ip
     known = identity(kind, address)
     behavior = collision_behavior(setup.profile, setup.model)
     say(

@@ -35,7 +35,7 @@ def run_lockstep(command: "Run", setup: RunSetup, write: Callable[[Any], None]) 
     """
     address, seconds = command.robot.ip, command.task.seconds
     demand_answer(address)
-    with connect(address, command.robot.arm) as client, _units(command, setup) as readings_at:
+    with connect(address, command.robot.kind) as client, _units(command, setup) as readings_at:
         client.set_collision_behavior(collision_behavior(setup.profile, setup.model))
         q = client.read().q
         controller = setup.controller(q)

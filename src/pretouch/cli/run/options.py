@@ -3,12 +3,16 @@
 import socket
 from dataclasses import dataclass, field
 from ipaddress import ip_address
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal, cast
 
 import tyro
 
 from pretouch.errors import HardwareError, ParameterError, RobotError
 from pretouch.hardware.address import HOST, PORT
+from pretouch.robot.named import ROBOTS as SHIPPED
+
+if TYPE_CHECKING:
+    from pretouch.hardware.franka.client import Kind
 
 
 @dataclass(frozen=True)
@@ -17,8 +21,9 @@ class RobotOptions:
 
     robot: Literal["simulated", "franka", "ros2"] = "simulated"
     """simulated: a rehearsal without hardware. franka: over the Franka Control Interface. ros2: over topics."""
-    arm: Literal["panda", "fr3"] = "panda"
-    """Model of the arm."""
+    arm: str = "panda"
+    """Model of the arm: panda, fr3, or, but for franka, a name that another package adds or the folder of an imported
+    arm."""
     ip: str = ""
     """Address of the Franka robot."""
     lockstep: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
@@ -71,6 +76,11 @@ class RobotOptions:
     ros_interface: str = "127.0.0.1"
     """With ros2: the network interface's address."""
 
+    @property
+    def kind(self) -> "Kind":
+        """Which Franka arm it is; `check_options` has made sure that it is one."""
+        return cast("Kind", self.arm)
+
 
 @dataclass(frozen=True)
 class SkinOptions:
@@ -94,10 +104,10 @@ class TaskOptions:
 
     path: Literal["circle", "line", "hold"] = "circle"
     """circle and line: the paper's paths, started at the nearest point. hold: stay in place, and yield when touched."""
-    center: tuple[float, float, float] = (0.5, 0.0, 0.25)
-    """Centre of the circle [m], base frame."""
-    radius: float = 0.25
-    """Radius of the circle [m]."""
+    center: tuple[float, float, float] | None = None
+    """Centre of the circle [m], base frame; by default 0.5 0 0.25, for an imported arm where it reaches."""
+    radius: float | None = None
+    """Radius of the circle [m]; by default 0.25, for an imported arm scaled by its reach."""
     profile: str = "pretouch"
     """Parameters of the controller, or PROFILE:GROUP.FIELD=VALUE."""
     seconds: float = 0.0
@@ -105,7 +115,8 @@ class TaskOptions:
     approach: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
     """First move slowly to the start of the path."""
     floor: float | None = None
-    """Height of the floor below the arm, base frame [m]; by default 0, level with its base, and -0.2 in simulation."""
+    """Height of the floor below the arm, base frame [m]; by default 0, level with its base, and in simulation -0.2 or
+    what the arm needs."""
 
 
 @dataclass(frozen=True)
@@ -148,6 +159,11 @@ def check_options(command: Run) -> None:
     robot, units, kind = command.robot, command.units, command.robot.robot
     if kind == "franka" and not robot.ip:
         raise RobotError("The robot's address is missing: give it with --ip.")
+    if kind == "franka" and robot.arm not in SHIPPED:
+        raise RobotError(
+            f"--arm {robot.arm} does not go with --robot franka, which is a {' or an '.join(SHIPPED)}: rehearse it with"
+            " --robot simulated, or connect it by --robot ros2."
+        )
     odd = [_flag(name) for other, names in _ONLY.items() if other != kind for name in names if _given(robot, name)]
     if odd:
         raise RobotError(f"{', '.join(odd)} {'does' if len(odd) == 1 else 'do'} not go with --robot {kind}.")

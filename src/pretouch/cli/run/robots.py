@@ -23,7 +23,7 @@ def need_extra(command: "Run") -> None:
     """Refuse an arm whose libraries are not installed, before anything imports them."""
     match command.robot.robot:
         case "franka":
-            need_library(command.robot.arm)
+            need_library(command.robot.kind)
         case "ros2":
             ROS2.need("An arm on ROS 2")
 

@@ -4,16 +4,18 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Protocol, cast
 
 import numpy as np
 
 from pretouch.cli.skin_keys import keys_file
 from pretouch.cli.writing import check_writable
 from pretouch.contact.sequential_test import SequentialTest
-from pretouch.control.path import Circle, Path, line
+from pretouch.control.path import Circle, Path, WayPoints, line
 from pretouch.control.posture import brought_to
 from pretouch.controller import Controller
+from pretouch.coverage.assumed import assumptions, floor_under
+from pretouch.coverage.placement import placement_for
 from pretouch.desired import Desired
 from pretouch.errors import ParameterError
 from pretouch.hardware.franka.limits import LimiterParams, planned
@@ -34,13 +36,13 @@ from pretouch.session.push import Direction
 from pretouch.session.terminal import say
 from pretouch.session.units import Units
 from pretouch.signals import children_undisturbed
+from pretouch.sim.paper_scenes import Placement
 from pretouch.sim.scene import SceneSpec
 from pretouch.types import FloatArray
 
 if TYPE_CHECKING:
     from pretouch.cli.run.options import Run, TaskOptions
 
-_LINE = ((0.4, -0.5, 0.5), (0.4, 0.5, 0.5))
 _SHORTEST_M = 1e-5
 """A path must have a length: over so little an arm stands."""
 
@@ -55,6 +57,10 @@ class RunSetup:
     floor: float
     """Height of the floor below the arm, base frame [m]."""
     task: "TaskOptions"
+    placement: Placement
+    """Where the paper's paths are for the arm."""
+    assumed: tuple[str, ...]
+    """What of the arm and its path had to be assumed, a sentence each."""
 
     @property
     def fixtures(self) -> Fixtures:
@@ -76,10 +82,14 @@ class RunSetup:
         """Return the path, begun where it comes nearest to an arm at q: a circle anywhere, a line at either end."""
         here = self.model.kinematics(q).position[self.model.ee]
         if self.task.path == "circle":
-            y, z = here[1:] - self.task.center[1:]
-            return Circle(self.task.center, self.task.radius, float(np.arctan2(z, y)))
+            usual = cast(Circle, self.placement.path("circle", 1.0))
+            center = usual.center if self.task.center is None else self.task.center
+            y, z = here[1:] - center[1:]
+            radius = usual.radius if self.task.radius is None else self.task.radius
+            return Circle(center, radius, float(np.arctan2(z, y)))
         if self.task.path == "line":
-            return line(*sorted(_LINE, key=lambda end: float(np.linalg.norm(end - here))))
+            ends = cast(WayPoints, self.placement.path("line", 1.0)).points
+            return WayPoints(ends[np.argsort(np.linalg.norm(ends - here, axis=1), kind="stable")])
         x, y, z = here.tolist()
         return line((x, y, z), (x, y, z + _SHORTEST_M))
 
@@ -108,10 +118,27 @@ def run_setup(command: "Run") -> RunSetup:
     if command.robot.ros_desired:
         task = replace(task, path="hold")
     simulated = command.robot.robot == "simulated" or command.robot.lockstep
-    floor = (SceneSpec().floor_height if simulated else 0.0) if task.floor is None else task.floor
+    placement, floor = _placed(model, task, simulated)
+    assumed = assumptions(model, placement, floor) if simulated else _said(model, placement)
+    return RunSetup(model, skin, profile, floor, task, placement, assumed)
+
+
+def _placed(model: RobotModel, task: "TaskOptions", simulated: bool) -> tuple[Placement, float]:
+    """Return where the paper's paths are for an arm that is to follow one, and the height of the floor [m]."""
+    circle = task.path == "circle" and (task.center is None or task.radius is None)
+    placement = placement_for(model) if circle or task.path == "line" else Placement()
+    floor = task.floor
+    if floor is None and simulated:
+        floor = SceneSpec.floor_height if placement == Placement() else floor_under(model, placement)
+    floor = 0.0 if floor is None else floor
     if not np.isfinite(floor):
         raise ParameterError(f"--floor is {floor}: give a height in metres.")
-    return RunSetup(model, skin, profile, floor, task)
+    return placement, floor
+
+
+def _said(model: RobotModel, placement: Placement) -> tuple[str, ...]:
+    """Say where the paths of a real arm are, if that is elsewhere than the paper's."""
+    return () if placement == Placement() else (placement.sentence(model.description.name),)
 
 
 if TYPE_CHECKING:
