@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from pretouch import cli
-from pretouch.cli.run.setup import OpenedRobot
+from pretouch.cli.run.options import RobotOptions, Run, TaskOptions
+from pretouch.cli.run.setup import OpenedRobot, run_setup
 from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify
 from pretouch.recording.writer import Recording
@@ -19,6 +20,7 @@ from pretouch.session.confirmations import Identity
 from pretouch.session.preflight import PreflightParams
 from pretouch.session.push import GuidedPush, PushParams
 from pretouch.types import Mode
+from tests.other_arm import copied_panda
 
 BLIND = ("run", "--no-skin", "--profile", "blind", "--path", "hold")
 
@@ -73,11 +75,26 @@ def at_begin(monkeypatch, seconds, then):
         (("--robot", "franka", "--ip", "127.0.0.1", "--lockstep"), "needs --seconds"),
         (("--no-learnt", "--learn-anew"), "--no-learnt does not go with"),
         (("--recover",), "--recover does not go with --robot simulated"),
+        (("--robot", "franka", "--ip", "192.0.2.1", "--arm", "ur5"), "--arm ur5 does not go with --robot franka"),
+        (("--arm", "ur5"), "There is no arm 'ur5'"),
     ],
 )  # fmt: skip
 def test_what_does_not_fit_together_is_refused_in_a_sentence(words, said, capsys):
     assert cli.main(["run", *words]) == 2
     assert said in " ".join(capsys.readouterr().err.split())
+
+
+def test_an_arm_that_does_not_come_with_the_package_has_its_path_placed_and_that_is_said(tmp_path):
+    folder = str(copied_panda(tmp_path))
+    made = run_setup(Run(RobotOptions(arm=folder)))
+    assert made.assumed[0].startswith("The paper's paths for panda:")
+    at = made.model.kinematics(made.simulated_start()).position[made.model.ee]
+    assert np.linalg.norm(at - made.placement.point(0.5, 0.0, 0.25)) == pytest.approx(0.25 * made.placement.scale)
+    given = run_setup(Run(RobotOptions(arm=folder), task=TaskOptions(center=(0.45, 0.0, 0.3), radius=0.1)))
+    assert given.floor == -0.2
+    assert len(given.assumed) == 1  # of the simulated arm, not of a path that is given
+    usual = run_setup(Run())
+    assert usual.assumed == ()
 
 
 def test_a_recording_that_is_there_is_not_written_over(tmp_path, capsys):

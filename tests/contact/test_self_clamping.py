@@ -55,6 +55,19 @@ def found(model: RobotModel, torque: FloatArray, q: FloatArray = FOLDED, qd: Flo
     return find_self_clamp(model, model.kinematics(q), torque, NOISE, qd, P)
 
 
+def test_of_two_joints_alone_nothing_is_said_to_be_caught(panda_model: RobotModel) -> None:
+    # between shoulder and elbow, with a joint so quick that this gap closes as no task closes it
+    kin, qd = panda_model.kinematics(FOLDED), np.array([0.0, 0.0, 0.0, -20.0, 0.0, 0.0, 0.0])
+    at_upper, at_elbow, u = gap_of(panda_model, "panda_link2", "panda_link4", FOLDED)
+    J = [
+        panda_model.jacobian(kin, panda_model.link_index(link), at)[:3]
+        for link, at in (("panda_link4", at_elbow), ("panda_link2", at_upper))
+    ]
+    torque = (J[0] - J[1]).T @ (60.0 * u)
+    assert abs(u @ (J[0] - J[1]) @ qd) > 0.02
+    assert found(panda_model, torque, qd=qd) is None
+
+
 def test_what_pushes_upper_arm_and_forearm_apart_is_caught_between_them(panda_model: RobotModel) -> None:
     pinch = found(panda_model, squeezed(panda_model, 60.0))
     assert pinch is not None

@@ -9,7 +9,7 @@ from pretouch.robot import named
 from pretouch.robot.description import RobotDescription, fr3, panda
 from pretouch.robot.description_file import description_text
 from pretouch.robot.model import RobotModel
-from pretouch.robot.named import GROUP, robot_named, robot_names
+from pretouch.robot.named import GROUP, is_shipped, robot_named, robot_names
 from pretouch.sensing.skin import OWN_SKIN, PAPER_SKIN, skin_for
 
 
@@ -52,6 +52,12 @@ def test_what_is_no_description_is_refused(installed: dict[str, object]):
 def test_an_unknown_name_is_refused_with_those_there_are():
     with pytest.raises(RobotModelError, match=r"no arm 'pandora': take one of panda, fr3, or a folder"):
         robot_named("pandora")
+
+
+def test_only_the_packages_arms_are_shipped(tmp_path: Path):
+    assert is_shipped(panda())
+    assert is_shipped(fr3())
+    assert not is_shipped(_folder(tmp_path))
 
 
 def _folder(folder: Path) -> RobotDescription:
