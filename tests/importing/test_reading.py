@@ -147,13 +147,36 @@ def test_of_two_arms_one_has_to_be_chosen(tmp_path):
     assert "lj0, lj1" in chosen.remarks[0]
 
 
+def branching(before, after):
+    """A robot whose only chain splits in two."""
+    parts, last = [link("base")], "base"
+    for name, begin, count in (("t", "base", before), ("l", f"t{before}", after), ("r", f"t{before}", after)):
+        last = begin
+        for k in range(1, count + 1):
+            parts += [link(f"{name}{k}"), joint(f"j{name}{k}", last, f"{name}{k}", axis=f"0 {k % 2} 1")]
+            last = f"{name}{k}"
+    return f"<robot name='split'>{''.join(parts)}</robot>"
+
+
+def test_a_chain_that_branches_is_said_with_the_ends_of_its_branches(tmp_path):
+    found = arm(tmp_path, branching(3, 3))
+    assert len(found.joints) == 3
+    said = found.remarks[0]
+    assert "assumed to end at t3, where it branches towards l3, r3" in said
+    assert "last link with --ee" in said
+    assert [j.name for j in arm(tmp_path, branching(3, 3), "r3").joints] == ["jt1", "jt2", "jt3", "jr1", "jr2", "jr3"]
+    # two fingers of a whole arm are no branches to choose from
+    assert not any("branches" in remark for remark in arm(tmp_path, branching(6, 1)).remarks)
+
+
 def test_limits_that_are_missing_are_assumed_with_a_sentence(tmp_path):
     found = arm(tmp_path, six_axis(changed={1: {"kind": "continuous", "limit": ""}}))
     limits = limits_of(found)
     assert limits.q_max[0] == pytest.approx(2 * np.pi)
     assert limits.qd_max.tolist() == [1.0, 2.0, 2.0, 2.0, 2.0, 2.0]
     said = " ".join(limits.remarks)
-    for part in ("joint1: no position limits", "velocity limit of joint1: 1 rad/s", "acceleration limit of all joints",
+    for part in ("joint1: no position limits", "give each a lower and an upper one",
+                 "velocity limit of joint1: 1 rad/s", "acceleration limit of all joints",
                  "give --qdd-max", "torque limit of joint1: 50 Nm"):  # fmt: skip
         assert part in said
 

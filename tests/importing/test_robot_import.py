@@ -247,12 +247,13 @@ def test_distances_that_nothing_is_compared_with_are_no_numbers():
     assert (fit_error(np.array([])).points, np.isnan(fit_error(np.array([])).rms)) == (0, True)
 
 
-def test_links_without_inertial_are_estimated_from_their_capsules(tmp_path):
+@pytest.mark.parametrize("inertial", ["", '<inertial><mass value="2"/></inertial>'])
+def test_links_without_mass_or_inertia_are_estimated_from_their_capsules(tmp_path, inertial):
     shape = '<geometry><sphere radius="0.1"/></geometry>'
-    text = six_axis().replace(link("link3", BOX), link("link3", shape, inertial="")).replace(BOX, "<geometry/>", 4)
+    text = six_axis().replace(link("link3", BOX), link("link3", shape, inertial)).replace(BOX, "<geometry/>", 4)
     found = import_robot(written(tmp_path, text), ImportOptions(ready=READY, capsules=1))
     at = found.model.link_index("link3")
-    assert any("estimated at 1000 kg/m^3: link3 (4.2 kg)" in r for r in found.remarks)
+    assert any("estimated at 1000 kg/m^3: link3 (4.2 kg)" in r and "mass and inertia" in r for r in found.remarks)
     assert found.model._model.body_mass[at] == pytest.approx(1000 * 4 / 3 * np.pi * 0.1**3, rel=0.01)
 
 

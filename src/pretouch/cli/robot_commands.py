@@ -14,7 +14,8 @@ class Import:
     """
 
     file: tyro.conf.Positional[str]
-    """URDF file (not a xacro template) or MJCF file."""
+    """URDF file (not a xacro template) or MJCF file, or a name of the package robot_descriptions, if it is installed,
+    such as ur5e_mj_description."""
     out: str = ""
     """Folder to write robot.toml, arm.xml and skin.toml to; by default the arm's name."""
     ee: str = ""

@@ -13,9 +13,11 @@ from pretouch.cli.words import words
 from pretouch.cli.writing import numbers_to
 from pretouch.errors import ParameterError
 from pretouch.importing.body import FARTHEST, FitError
+from pretouch.importing.described import described
 from pretouch.importing.folder import check_free, write_folder
 from pretouch.importing.read import read_source
 from pretouch.importing.robot_import import Imported, ImportOptions, import_robot
+from pretouch.robot.named import is_description
 from pretouch.text_table import TextTable
 
 if TYPE_CHECKING:
@@ -27,10 +29,14 @@ _NEGLIGIBLE = 0.001
 
 def import_arm(command: "Import") -> None:
     """Import an arm, print what came of it, and write its folder."""
+    file, packages = Path(command.file), tuple(Path(folder) for folder in words(command.package_path))
+    if is_description(command.file):
+        file, package = described(command.file)
+        packages = (*packages, package)
     options = ImportOptions(
         ee=command.ee,
         name=command.name,
-        packages=tuple(Path(folder) for folder in words(command.package_path)),
+        packages=packages,
         qd_max=_numbers("--qd-max", command.qd_max),
         qdd_max=_numbers("--qdd-max", command.qdd_max),
         tau_max=_numbers("--tau-max", command.tau_max),
@@ -38,7 +44,6 @@ def import_arm(command: "Import") -> None:
         capsules=command.capsules,
         cover=command.cover,
     )
-    file = Path(command.file)
     folder = Path(command.out or _file_name(command.name or read_source(file, options.packages).name))
     check_free(folder, command.force)
     with numbers_to(command.json) as write:

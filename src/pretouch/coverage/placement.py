@@ -21,7 +21,7 @@ _SIDES: tuple[Side, Side] = ("+y", "-y")
 _SHRINK = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4)
 _SHIFT_M = (0.0, 0.05, -0.05, 0.1, -0.1, 0.15, -0.15, 0.2, -0.2)
 """What is tried, the nearest to the paper first: parts of the scale by reach, shifts along x and z."""
-_PLACES = 48
+_PLACES, _JOINTS = 48, 6
 _TO_START, _ONWARD = Pace(300, 0.1, 1e-6, 0.05), Pace(30, 0.1, 1e-6, 0.05)
 _SINGULAR, _LIMIT_RAD, _CLEAR_M = 0.05, 0.05, 0.01
 """What the arm has to keep all along: smallest singular value, distance from joint limits, and from itself."""
@@ -35,6 +35,11 @@ def placement_for(model: RobotModel) -> Placement:
     """
     if is_shipped(model.description):
         return Placement()
+    if model.n < _JOINTS:
+        raise ExperimentError(
+            f"{model.description.name} has {model.n} joints ({', '.join(model.joints)}): to follow the paths with its"
+            f" hand upright an arm needs {_JOINTS}. If its file has more, import it again with another --ee."
+        )
     by_reach = reach_of(model) / reach_of(RobotModel(panda()))
     left, right = (hand_side(model, side) for side in _SIDES)
     shifts = sorted(product(_SHIFT_M, _SHIFT_M), key=lambda s: s[0] ** 2 + s[1] ** 2)

@@ -7,6 +7,8 @@ from pretouch.importing.source import Source, SourceJoint, SourceLink, locked
 
 _ARM_JOINTS = 4
 """A branch with as many hinges that nothing leads is an arm; one with fewer is a finger."""
+_USUAL_JOINTS = 6
+"""An arm with fewer may have been cut short where it branches."""
 _GRIPPER, _FINGER = ("gripper", "finger", "jaw"), ("finger", "jaw")
 """What a single finger's joint, or its link, is called; a link called gripper may be the arm's last."""
 _NAMES = ("tcp", "tool", "grasp", "ee", "eef", "effector", "tip")
@@ -49,6 +51,7 @@ def arm_of(source: Source, ee: str = "") -> Arm:
     way = source.ancestors(end)
     joints = tuple(joint for i in way for joint in source.links[i].joints)
     _check_chain(source, end, joints)
+    remarks += [] if ee or len(joints) >= _USUAL_JOINTS else _branching(source, trunk)
     links, fixed = _with_locked(source, joints)
     if fixed:
         remarks.append(
@@ -116,6 +119,18 @@ def _trunk(source: Source) -> tuple[int, str | None]:
         if count[ahead] == 1 and (joint := _grips(source.links[ahead])):
             return at, joint
         at = ahead
+
+
+def _branching(source: Source, trunk: int) -> list[str]:
+    """Say it, where the arm ends because several branches with joints begin there."""
+    children, count = _children(source), _independent(source)
+    ends = [source.links[_last(source, children, count, i)].name for i in children[trunk] if count[i]]
+    if len(ends) < 2:
+        return []
+    return [
+        f"The arm is assumed to end at {source.links[trunk].name}, where it branches towards {', '.join(ends)}: if one"
+        " branch belongs to it, choose that one's last link with --ee."
+    ]
 
 
 def _last(source: Source, children: list[list[int]], count: list[int], at: int) -> int:

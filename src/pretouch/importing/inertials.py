@@ -45,7 +45,7 @@ def inertials_of(arm: Arm, bodies: tuple[LinkBody, ...]) -> tuple[tuple[Inertial
     if estimated:
         remarks.append(
             f"Without mass or inertia, so estimated at {DENSITY:g} kg/m^3: {', '.join(estimated)}. Simulated forces are"
-            " only as accurate as that: give the links their inertials."
+            " only as accurate as that: give each its mass and inertia in the file."
         )
     if mended:
         remarks.append(f"With an impossible inertia, whose smallest moment was raised: {', '.join(mended)}.")

@@ -41,8 +41,8 @@ def limits_of(
     endless = [joint.name for joint in arm.joints if joint.limits is None]
     if endless:
         remarks.append(
-            f"{', '.join(endless)}: no position limits in the file, so -2 pi to 2 pi is assumed; correct the range in"
-            " arm.xml."
+            f"{', '.join(endless)}: no position limits in the file, so -2 pi to 2 pi is assumed; give each a"
+            " lower and an upper one there, or correct the range in arm.xml."
         )
     ranges = np.array([joint.limits or (-_ENDLESS, _ENDLESS) for joint in arm.joints])
     speed = [joint.velocity for joint in arm.joints]

@@ -1,5 +1,6 @@
 """The arms that can be named: those of the package, those of other distributions, and folders."""
 
+import re
 from pathlib import Path
 
 from pretouch import plugins
@@ -13,9 +14,17 @@ GROUP = "pretouch.robots"
 """Entry points of other distributions: functions without arguments that return a `RobotDescription`."""
 
 
+_DESCRIPTION = re.compile(r"[a-z][a-z0-9_]*_description")
+
+
 def robot_names() -> tuple[str, ...]:
     """Return the names there are."""
     return (*ROBOTS, *(name for name in plugins.names(GROUP) if name not in ROBOTS))
+
+
+def is_description(name: str) -> bool:
+    """Whether a name is no file's or folder's, but like those of the package robot_descriptions, as ur5_description."""
+    return _DESCRIPTION.fullmatch(name) is not None and not Path(name).exists()
 
 
 def is_shipped(arm: RobotDescription) -> bool:
@@ -33,6 +42,11 @@ def robot_named(name: str) -> RobotDescription:
         return ROBOTS[name]()
     if name in plugins.names(GROUP):
         return _of_plugin(name)
+    if is_description(name):
+        raise RobotModelError(
+            f"There is no arm {name!r} yet: import it first by `pretouch robot import {name} --out"
+            f" {name.split('_')[0]}`, and name that folder."
+        )
     if not Path(name).exists():
         raise RobotModelError(
             f"There is no arm {name!r}: take one of {', '.join(robot_names())}, or a folder that"

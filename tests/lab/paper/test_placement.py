@@ -1,11 +1,29 @@
+import numpy as np
 import pytest
 
 from pretouch.control.path import Circle
 from pretouch.coverage.placement import hand_side, placement_for
 from pretouch.errors import ExperimentError
+from pretouch.robot.description import RobotDescription
+from pretouch.robot.model import RobotModel
 from pretouch.sim.board import PANDA_SIDE, HandSide
 from pretouch.sim.paper_scenes import Placement, static_path, static_scene
 from pretouch_lab.campaign import Request
+
+FIVE = "<mujoco><worldbody>{}</worldbody></mujoco>"
+
+
+@pytest.fixture
+def five_axis(tmp_path):
+    """An arm of five joints."""
+    body = "".join(
+        f'<body name="l{k}" pos="0 0 .1"><joint name="j{k}" axis="0 {k % 2} 1" range="-1 1"/>'
+        '<geom type="capsule" size=".03 .03" pos="0 0 .05" mass="1"/>'
+        for k in range(1, 6)
+    )  # fmt: skip
+    (tmp_path / "five.xml").write_text(FIVE.format(body + "</body>" * 5))
+    ones = np.ones(5)
+    return RobotModel(RobotDescription("five", tmp_path / "five.xml", "l5", ones, ones, ones, 0 * ones, "made"))
 
 
 def test_the_panda_has_the_papers_paths(panda_model):
@@ -13,6 +31,11 @@ def test_the_panda_has_the_papers_paths(panda_model):
     assert placement == Placement()
     assert static_path("circle", "-y", placement) == Circle()
     assert placement.face(0.2371, "+y") == 0.2371
+
+
+def test_an_arm_of_five_joints_is_refused_with_its_joints(five_axis):
+    with pytest.raises(ExperimentError, match=r"five has 5 joints \(j1, j2, j3, j4, j5\): .* needs 6. .*another --ee"):
+        placement_for(five_axis)
 
 
 def test_another_arm_has_them_scaled_and_moved():
