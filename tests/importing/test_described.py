@@ -36,6 +36,7 @@ def test_the_urdf_or_else_the_mjcf_is_taken_and_the_packages_folder(package):
     assert described(only) == (Path("/there/mine/a.xml"), Path("/there"))
 
 
+@pytest.mark.slow
 def test_an_arm_is_imported_by_its_name(package, tmp_path, capsys):
     file = written(tmp_path, six_axis())
     name = named(package, f"URDF_PATH = {str(file)!r}\nPACKAGE_PATH = {str(tmp_path)!r}\n")
@@ -65,9 +66,7 @@ def test_an_unknown_name_is_said_with_the_nearest(package):
 
 def test_without_the_package_it_is_said_how_to_get_it(monkeypatch):
     monkeypatch.setattr("pretouch.importing.described.find_spec", lambda name: None)
-    with pytest.raises(
-        RobotModelError, match="There is no file ur5_description, .* run pip install robot_descriptions"
-    ):
+    with pytest.raises(RobotModelError, match=r"There is no file ur5_description, .* pip install robot_descriptions"):
         described("ur5_description")
 
 
