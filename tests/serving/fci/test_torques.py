@@ -294,3 +294,24 @@ def test_impedances_within_the_vendors_limits_act(
     np.testing.assert_array_equal(now[which], values if possible else before[which])
     served.arm.forget_settings()
     np.testing.assert_array_equal(served.arm.plant.stiffness, before[0])
+
+
+def test_an_arm_that_comes_into_itself_stops() -> None:
+    arm = _arm()
+    arm.begin(Generator.JOINT_POSITION, Controller.JOINT_IMPEDANCE)
+    begun, folded = arm.report.q_commanded.copy(), np.array([0.0, 1.2, 0.0, -3.0, 0.0, 0.1, 0.785])
+    k, ending = 0, None
+    while ending is None:
+        k += 1
+        share = k / 2000 - np.sin(2 * np.pi * k / 2000) / (2 * np.pi)
+        ending = arm.step(Setpoint(begun + share * (folded - begun)))
+    assert ending == Ending("reflex", ("self_collision_avoidance_violation",))
+    assert k < 2000
+    _settled(arm)
+    # back where it came from it may go
+    arm.recover()
+    arm.begin(Generator.JOINT_POSITION, Controller.JOINT_IMPEDANCE)
+    stopped = arm.report.q_commanded.copy()
+    for k in range(2000):
+        share = k / 2000 - np.sin(2 * np.pi * k / 2000) / (2 * np.pi)
+        assert arm.step(Setpoint(stopped + share * (begun - stopped))) is None, arm.errors

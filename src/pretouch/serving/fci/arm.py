@@ -8,7 +8,7 @@ import numpy as np
 from pretouch.errors import ParameterError, RobotModelError
 from pretouch.robot.model import RobotModel
 from pretouch.serving.fci.cartesian import CARTESIAN_LIMITS, Body, CartesianPose, CartesianVelocity
-from pretouch.serving.fci.collision import Contacts, default_behavior
+from pretouch.serving.fci.collision import Contacts, SelfCollision, default_behavior
 from pretouch.serving.fci.controllers import (
     CARTESIAN_STIFFNESS,
     CartesianImpedance,
@@ -72,7 +72,7 @@ class ServedArm:
         self.model, self.kind = model, setup.kind
         self.plant = Plant(model, setup.scene, PlantParams(), setup.q, setup.seed)
         self.limits, self.contacts, self.frames = motion_limits(model, setup.kind), Contacts(), frames_of(model)
-        self.torques = JointTorques(self.plant)
+        self.torques, self._own = JointTorques(self.plant), SelfCollision(model)
         self.units = None if setup.units is None else ServedUnits(self.plant, setup.units, setup.seed)
         if setup.hand is not None:
             Hand(self.plant, setup.hand)
@@ -151,6 +151,7 @@ class ServedArm:
                 self._drives = CartesianImpedance(self.plant, self.body, self.cartesian_stiffness, self.plant.stiffness)
         self.motion = Motion(self.limits, controller, self._kind(generator), external)
         self.mode, self.reflex_reason = RobotMode.MOVE, ()
+        self._own.forget()
 
     def _kind(self, generator: Generator) -> MotionKind:
         body = self.body
@@ -272,10 +273,11 @@ class ServedArm:
         return Ending("reflex", reflexes) if moved else None
 
     def _check_joints(self) -> Ending | None:
-        """Look where torques lead the joints: commanded motions are checked before they are followed."""
-        if self.motion is None or self.motion.controller is not Controller.EXTERNAL:
+        """Look where a motion leads the joints; their limits are looked at before a commanded motion is followed."""
+        if self.motion is None:
             return None
-        errors = self.limits.left(self.report.q, self.report.qd)
+        q, driven = self.report.q, self.motion.controller is Controller.EXTERNAL
+        errors = self._own.update(q) or (self.limits.left(q, self.report.qd) if driven else ())
         if not errors:
             return None
         self._end(errors)

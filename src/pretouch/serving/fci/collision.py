@@ -1,15 +1,24 @@
-"""The robot's own reaction to external forces: thresholds, contacts, collisions. Pure but for its own memory."""
+"""The robot's own reaction to external forces and to itself: thresholds, contacts, collisions.
+
+Pure but for its own memory.
+"""
 
 from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
 
+from pretouch.robot.model import RobotModel
+from pretouch.robot.self_distance import capsule_ends, kinematics_of, self_distances
 from pretouch.serving.fci.wire import JOINTS
 from pretouch.types import BoolArray, FloatArray
 
 _DEFAULT = 20.0
 """Thresholds before any are set [Nm, N]: those the vendor's examples set."""
+_LOOKS_EVERY = 10
+"""In so many milliseconds the arm looks once whether it comes into itself."""
+_CLOSES_M = 1e-5
+"""Two parts that overlap come closer if their distance shrinks by more in that time [m]."""
 _MOVING = 1e-3
 """Commanded acceleration from which the thresholds for accelerations hold [rad/s^2]."""
 
@@ -80,6 +89,28 @@ class Contacts:
     def forget(self) -> None:
         """Forget collisions."""
         self.joint_collision, self.cartesian_collision = np.zeros(JOINTS, np.bool_), np.zeros(6, np.bool_)
+
+
+class SelfCollision:
+    """Whether parts of an arm come into each other. Those that overlap where a motion begins may part."""
+
+    def __init__(self, model: RobotModel) -> None:
+        self._model, self._count = model, 0
+        self._before: FloatArray | None = None
+
+    def forget(self) -> None:
+        """Begin anew, as for another motion."""
+        self._before, self._count = None, 0
+
+    def update(self, q: FloatArray) -> tuple[str, ...]:
+        """Take the positions q (7,) [rad] of another millisecond; return the error that they are."""
+        self._count += 1
+        if self._count % _LOOKS_EVERY:
+            return ()
+        model = self._model
+        distances = self_distances(model, capsule_ends(model, kinematics_of(model, q[None])))[0]
+        before, self._before = distances if self._before is None else self._before, distances
+        return _names((distances < 0) & (distances < before - _CLOSES_M), "self_collision_avoidance_violation")
 
 
 def _names(crossed: BoolArray, name: str) -> tuple[str, ...]:
