@@ -27,7 +27,7 @@ Recorded = Literal["first", "all"]
 """Trials to record: those of the first seed of which figures are drawn, or all."""
 
 
-_FOR_ANY_ARM = ("static",)
+_FOR_ANY_ARM = ("static", "avoidance", "dynamic", "free-motion")
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,10 @@ def joint(name, parent, child, kind="revolute", axis="0 0 1", xyz="0 0 0.2", rpy
     )
 
 
+STRONG = '<limit lower="-2.8" upper="2.8" velocity="2" effort="120"/>'
+"""Limits of joints that hold such an arm outstretched."""
+
+
 _AXES = ("0 0 1", "0 1 0", "0 1 0", "0 0 1", "0 1 0", "0 0 1")
 _LENGTHS = (0.0, 0.2, 0.25, 0.35, 0.25, 0.25, 0.25)
 
@@ -35,6 +39,19 @@ def six_axis(tail="", changed=None):
         parts.append(joint(f"joint{k + 1}", f"link{k}" if k else "base", f"link{k + 1}", **given | more))
     parts += [link("tool0", inertial=""), joint("flange", "link6", "tool0", "fixed", xyz="0 0 0.12", limit="")]
     return f'<robot name="sixer">{"".join(parts)}{tail}</robot>'
+
+
+def seven_axis():
+    """An arm of seven joints: the six of `six_axis`, and one along the upper arm."""
+    axes = ("0 0 1", "0 1 0", "0 0 1", "0 1 0", "0 0 1", "0 1 0", "0 0 1")
+    lengths = (0.3, 0.05, 0.35, 0.05, 0.3, 0.1, 0.1)
+    can = '<geometry><cylinder radius="0.05" length="0.08"/></geometry>'
+    parts = [link("base", BOX)]
+    for k, (axis, length) in enumerate(zip(axes, lengths, strict=True), 1):
+        parts.append(link(f"link{k}", can))
+        parts.append(joint(f"joint{k}", f"link{k - 1}" if k > 1 else "base", f"link{k}", axis=axis, xyz=f"0 0 {length}",
+                           limit=STRONG))  # fmt: skip
+    return f'<robot name="sevener">{"".join(parts)}</robot>'
 
 
 def small(what="collision"):

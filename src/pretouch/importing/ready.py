@@ -87,7 +87,7 @@ def proposed(model: RobotModel) -> tuple[Ready, tuple[str, ...]]:
     """Search for a good posture. Where none has its hand in front and pointing down, a sentence says so."""
     reach = reach_of(model)
     hand = np.array([_IN_FRONT * reach, 0.0, _HEIGHT * reach])
-    apart = ever_apart(model)
+    apart = ever_apart(model, _CLEAR)
     for pace in (_DRAWN if model.n > 5 else _FREE, _FREE):
         found = [rated(model, q, apart) for q in _hand_at(model, hand, pace)]
         best = max((one for one in found if _is_clear(model, one)), key=partial(_worth, model), default=None)
@@ -148,11 +148,14 @@ def pointing(model: RobotModel, kin: Kinematics) -> FloatArray:
     return axis if axis @ out >= 0 else -axis
 
 
-def ever_apart(model: RobotModel) -> BoolArray:
-    """Whether the pairs (P,) of `pairs_apart` come apart in some of many postures: in a short wrist not all do."""
+def ever_apart(model: RobotModel, by: float = 0.0) -> BoolArray:
+    """Whether the pairs (P,) of `pairs_apart` come apart, by more than `by` [m], in some of many postures.
+
+    In a short wrist not all do; nor does an upper arm that turns close above its base, whatever the posture.
+    """
     q = model.q_min + spread(_TRIED, model.n) * (model.q_max - model.q_min)
     ends = capsule_ends(model, kinematics_of(model, q))
-    return np.asarray(np.any(self_distances(model, ends) > 0, axis=0))
+    return np.asarray(np.any(self_distances(model, ends) > by, axis=0))
 
 
 def never_apart(model: RobotModel) -> tuple[tuple[str, str], ...]:

@@ -1,6 +1,6 @@
 """What the arm meets in the paper's experiments: a board beside its path (IV-A), a person who pushes it (IV-C)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import cast
 
 import numpy as np
@@ -8,9 +8,12 @@ import numpy as np
 from pretouch.control.path import Circle, Path, line
 from pretouch.sim.board import FACE_M, PANDA_SIDE, HandSide, Side, board_beside, sign_of
 from pretouch.sim.pushes import FACES, Push, against
-from pretouch.sim.scene import SceneSpec
+from pretouch.sim.scene import HandSpec, SceneSpec
 
 _LINE_END_Y, _LINE_X, _LINE_Z = 0.5, 0.4, 0.5
+_CENTER, _RADIUS_M = (0.5, 0.0, 0.25), 0.25
+_VISITED_ABOVE_M = 0.05
+"""Height of a visiting person's hand above the circle's centre, of the Panda's circle [m]."""
 _FACE_SPREAD_M = 0.05
 """The seed moves the board's face by up to this [m]."""
 _CENTER_SPREAD_M = 0.02
@@ -33,6 +36,11 @@ class Placement:
     """Where the hand meets a board at +y."""
     right: HandSide = PANDA_SIDE
     """Where the hand meets a board at -y."""
+    beside: tuple[float, float] = (0.43, 0.43)
+    """How far from the plane y = 0 a person's hand is held beside the circle, at -y and at +y [m]: the Panda's hand,
+    whose side comes to 0.35 m, passes it by 3 cm."""
+    inside: tuple[float, float] = (0.35, 0.35)
+    """The same of a hand half of which is in the way."""
 
     def point(self, x: float, y: float, z: float) -> tuple[float, float, float]:
         """Return where a point of the paper is for this arm [m]."""
@@ -41,8 +49,7 @@ class Placement:
     def path(self, trajectory: str, sign: float) -> Path:
         """Return the paper's circle or line, begun on the side away from a board on the side `sign` (1: +y)."""
         if trajectory == "circle":
-            center, radius = self.point(0.5, 0.0, 0.25), 0.25 * self.scale
-            return Circle(center, radius, np.pi if sign > 0 else 0.0)
+            return Circle(self.point(*_CENTER), _RADIUS_M * self.scale, np.pi if sign > 0 else 0.0)
         return line(self.point(_LINE_X, -_LINE_END_Y * sign, _LINE_Z), self.point(_LINE_X, _LINE_END_Y * sign, _LINE_Z))
 
     def hand(self, side: Side) -> HandSide:
@@ -53,11 +60,28 @@ class Placement:
         """Return the distance of a board's face from the plane y = 0 [m] at which it is met where the paper's is."""
         return self.scale * face + (self.hand(side).aside - self.scale * PANDA_SIDE.aside)
 
+    @property
+    def ahead(self) -> float:
+        """How much farther from the base than at the paper's paths people keep [m]."""
+        return max(0.0, self.point(*_CENTER)[0] - _CENTER[0])
+
+    def visited(self, place: str, sign: float) -> tuple[float, float, float]:
+        """Return where a person's hand is held `beside` the circle or `inside` it, on the side `sign` (1: +y) [m]."""
+        x, _, z = self.point(*_CENTER)
+        aside = (self.beside if place == "beside" else self.inside)[int(sign > 0)]
+        above = self.hand("+y" if sign > 0 else "-y").above - PANDA_SIDE.above
+        return x, sign * aside, z + above + _VISITED_ABOVE_M
+
     def sentence(self, arm: str) -> str:
-        """Say what was done to the paper's paths."""
+        """Say what was done to the paper's paths and places."""
+        if self == _UNMOVED:
+            return f"{arm} has the paper's own paths and places."
+        places = [f"{a:.2f} and {b:.2f} m" for a, b in (self.beside, self.inside)]
         return (
             f"The paper's paths for {arm}: {self.scale:.3g} times as large, moved by {self.shift_x:+.2f} m in x and"
-            f" {self.shift_z:+.2f} m in z; the board is met on the same part of them."
+            f" {self.shift_z:+.2f} m in z; the board is met on the same part of them. A person's hand beside the"
+            f" circle is {places[0]} from the plane y = 0 (at -y and at +y), one in the way {places[1]}, where the"
+            " free arm passes 3 cm from the one and through the middle of the other."
         )
 
 
@@ -77,6 +101,12 @@ def static_scene(trajectory: str, side: str, stiffness: float, seed: int, placem
     way = static_path(trajectory, side, placement)
     board = board_beside(way, on, stiffness, placement.face(face, on), aside, above, placement.hand(on))
     return SceneSpec(boxes=(board,))
+
+
+def person_scene(hand: HandSpec, placement: Placement) -> SceneSpec:
+    """Return a room with a person's hand, which sets out from beyond the arm's reach."""
+    x, y, z = hand.start
+    return SceneSpec(hand=replace(hand, start=(x + placement.ahead, y, z)))
 
 
 def dynamic_pushes(seed: int) -> tuple[Push, ...]:

@@ -163,7 +163,9 @@ def plant_params_of(arm: RobotDescription) -> PlantParams:
 
 def assumed_plant(arm: RobotDescription) -> str:
     """Say what `plant_params_of` makes of an arm."""
+    if plant_params_of(arm) == PlantParams():
+        return f"The joints of the simulated {arm.name} are those of a Panda."
     return (
         f"Joint stiffness, rotor inertia, friction, noise and offsets of the simulated {arm.name} are the Panda's, its"
-        " torques scaled by torque limits: none was measured on this arm."
+        " torques scaled by torque limits: none was measured on this arm. Compare profiles, not arms."
     )

@@ -11,7 +11,7 @@ from pretouch.types import FloatArray
 
 _HOME = np.array([1.2, 0.0, 0.8])
 _AISLE_X_M = 1.15
-"""Plane in front of the arm's reach in which a hand changes sides, so that it meets the arm only on purpose [m]."""
+"""Plane in front of the Panda's reach in which a hand changes sides, so that it meets the arm only on purpose [m]."""
 _STAND_OFF_M = 0.5
 _SPEED_M_S = 0.35
 """Speed of a reaching hand relative to the arm [m/s]."""
@@ -28,13 +28,16 @@ _CLEAR_M = 0.4
 """Distance of the robot's hand at which a person dares to come in [m]."""
 
 
-def way_round(hand: FloatArray, goal: FloatArray) -> FloatArray:
-    """Next point (3,) [m] on a way from hand to goal (3,) [m] that does not cross the arm."""
+def way_round(hand: FloatArray, goal: FloatArray, ahead: float = 0.0) -> FloatArray:
+    """Next point (3,) [m] on a way from hand to goal (3,) [m] that does not cross the arm.
+
+    The hand changes sides farther from the base by `ahead` [m] than where the Panda's reach ends.
+    """
     x, y, z = hand.tolist()
-    aside = abs(y - goal[1])
-    if x < _AISLE_X_M - 0.1:
-        return goal if aside < 0.35 else np.array([_AISLE_X_M, y, z])
-    return np.array([_AISLE_X_M, goal[1], goal[2]]) if aside > 0.1 else goal
+    aside, aisle = abs(y - goal[1]), _AISLE_X_M + ahead
+    if x < aisle - 0.1:
+        return goal if aside < 0.35 else np.array([aisle, y, z])
+    return np.array([aisle, goal[1], goal[2]]) if aside > 0.1 else goal
 
 
 @dataclass(frozen=True)
@@ -44,7 +47,7 @@ class Push:
     start: float
     """When the person reaches for the arm [s]."""
     inwards: FloatArray
-    """(3,) unit vector of the push in the frame of the robot's hand: against the normal of a face, or nearly."""
+    """(3,) unit vector of the push in the frame of `RobotHand`: against the normal of a face, or nearly."""
     force: float
     """[N]"""
     duration: float
@@ -66,6 +69,39 @@ def hand_of(model: RobotModel) -> int:
     return model.link_index(f"{model.description.name}_hand")
 
 
+@dataclass(frozen=True, eq=False)
+class RobotHand:
+    """The robot's hand as a person sees it: x to the front, y to the right, z down in the ready posture."""
+
+    link: int
+    """Index of the link it is fixed to."""
+    palm: FloatArray
+    """(3,) point the person aims at, link frame [m]."""
+    turn: FloatArray
+    """(3, 3) rotation matrix: brings vectors of the hand's frame to the link's."""
+
+    def beside(self, away: FloatArray) -> FloatArray:
+        """Return a point (3,) [m] away from the palm by a vector (3,) [m] of the hand's frame, link frame."""
+        return np.asarray(self.palm + self.turn @ away)
+
+
+_FRONT_RIGHT_DOWN = np.diag([1.0, -1.0, -1.0])
+"""Rotation from a hand's frame to the base frame, ready posture."""
+
+
+def robot_hand(model: RobotModel) -> RobotHand:
+    """Return what of an arm is pushed: a Franka's hand, or the middle of the outermost link that has a body."""
+    if f"{model.description.name}_hand" in model.links:
+        return RobotHand(hand_of(model), PALM, np.eye(3))
+    joints = model.moved_by[model.body.link].sum(axis=1)
+    link = int(model.body.link[joints == joints.max()].max())
+    own = model.body.of_links(np.array([link]))
+    low = np.minimum(own.a, own.b) - own.radius[:, None]
+    high = np.maximum(own.a, own.b) + own.radius[:, None]
+    ready = model.kinematics(model.description.q_ready).rotation[link]
+    return RobotHand(link, (low.min(axis=0) + high.max(axis=0)) / 2, ready.T @ _FRONT_RIGHT_DOWN)
+
+
 @dataclass
 class Pusher:
     """Brings the hand before a face of the robot's hand, follows it, pushes as planned, and goes home in between."""
@@ -74,9 +110,11 @@ class Pusher:
     pushes: tuple[Push, ...]
     contacts: list[tuple[float, float] | None] = field(default_factory=list)
     """(touch, release) [s] of each push so far, None for one that never touched."""
+    ahead: float = 0.0
+    """How much farther from the base than from a Panda's the person stays [m]."""
 
     def __post_init__(self) -> None:
-        self._link = hand_of(self.model)
+        self._robot = robot_hand(self.model)
         self._touch: float | None = None
         self._release = -np.inf
         self._direction = np.zeros(3)
@@ -89,15 +127,16 @@ class Pusher:
         number, withdrawing = len(self.contacts), time < self._release + 1.0
         over = number == len(self.pushes)
         if not withdrawing and (over or time < self.pushes[number].start - _LEAD_S):
-            return HandGoal(way_round(hand, _HOME), _FREE_N)
-        palm = point_on_arm(plant, self._link, PALM)
+            return HandGoal(way_round(hand, _HOME + [self.ahead, 0.0, 0.0], self.ahead), _FREE_N)
+        robot = self._robot
+        palm = point_on_arm(plant, robot.link, robot.palm)
         if withdrawing:
             return HandGoal(palm - _STAND_OFF_M * self._direction, _FREE_N)
         push = self.pushes[number]
         if self._touch is None:
-            self._direction = point_on_arm(plant, self._link, PALM + push.inwards) - palm
+            self._direction = point_on_arm(plant, robot.link, robot.beside(push.inwards)) - palm
         if time < push.start:
-            return HandGoal(way_round(hand, palm - _STAND_OFF_M * self._direction), _FREE_N)
+            return HandGoal(way_round(hand, palm - _STAND_OFF_M * self._direction, self.ahead), _FREE_N)
         self._watch(time, push, plant)
         ahead = _SPEED_M_S * (time - push.start) - _STAND_OFF_M
         return HandGoal(palm + min(ahead, _STAND_OFF_M) * self._direction, push.force)
@@ -122,7 +161,7 @@ class Holder(Pusher):
         planned = super().goal(time, hand, plant)
         if self._touch is None:
             return planned
-        palm = point_on_arm(plant, self._link, PALM)
+        palm = point_on_arm(plant, self._robot.link, self._robot.palm)
         # ahead by what stretches the person's arm to the planned force; what it takes to stay on the line comes on top
         ahead = (hand - palm) @ self._direction + planned.force_max / USUAL_ARM.stiffness
         return HandGoal(palm + ahead * self._direction, _FREE_N)
@@ -146,9 +185,11 @@ class Visitor:
 
     model: RobotModel
     visits: tuple[Visit, ...]
+    ahead: float = 0.0
+    """How much farther from the base than from a Panda's the person stays [m]."""
 
     def __post_init__(self) -> None:
-        self._link = hand_of(self.model)
+        self._robot = robot_hand(self.model)
         self._inside = False
 
     def goal(self, time: float, hand: FloatArray, plant: Plant) -> HandGoal:
@@ -156,8 +197,9 @@ class Visitor:
         for visit in self.visits:
             if visit.arrive - _LEAD_S <= time < visit.leave + 1.0:
                 outside = visit.place + np.array([0.0, np.sign(visit.place[1]) * 0.4, 0.0])
-                clear = np.linalg.norm(point_on_arm(plant, self._link, PALM) - visit.place) > _CLEAR_M
+                palm = point_on_arm(plant, self._robot.link, self._robot.palm)
+                clear = np.linalg.norm(palm - visit.place) > _CLEAR_M
                 wanted = visit.arrive <= time < visit.leave
                 self._inside = wanted and (self._inside or bool(clear))
-                return HandGoal(visit.place if self._inside else way_round(hand, outside), _FREE_N)
-        return HandGoal(way_round(hand, _HOME), _FREE_N)
+                return HandGoal(visit.place if self._inside else way_round(hand, outside, self.ahead), _FREE_N)
+        return HandGoal(way_round(hand, _HOME + [self.ahead, 0.0, 0.0], self.ahead), _FREE_N)

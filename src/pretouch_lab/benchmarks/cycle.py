@@ -17,8 +17,8 @@ from pretouch.loop import MonotonicClock
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import Profile, at_rate, profile
 from pretouch.realtime import real_time, warm_up
-from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
+from pretouch.robot.named import robot_named
 from pretouch.types import IntArray, Mode
 from pretouch_lab.benchmarks.workload import UNIT_RATE, Workload
 from pretouch_lab.rows import Row
@@ -50,6 +50,8 @@ class CycleRequest:
     """See `pretouch.realtime.real_time`."""
     seed: int = 0
     """Of the scene, the skin and the force noise."""
+    arm: str = "panda"
+    """Name of the arm, or the folder of an imported one."""
 
     def __post_init__(self) -> None:
         if not 1 <= self.cycles <= _MOST_CYCLES:
@@ -74,7 +76,7 @@ def measure(points: int, request: CycleRequest, tell: Callable[[str], None] = la
     the ticks of a clock, between which the processor sleeps and its caches cool. In a fourth the controller says where
     one stage ends and the next begins. `tell` is given what real time could not be had.
     """
-    model, params = RobotModel(panda()), request.at_rate()
+    model, params = RobotModel(robot_named(request.arm)), request.at_rate()
     work, hard, paced = (Workload(model, points, params, request.seed, new) for new in (False, True, False))
     controller = Controller(model, work.skin, no_fixtures(), work.path, params)
     warm_up(controller, work.inputs().robot)
@@ -208,6 +210,7 @@ def about(request: CycleRequest) -> Row:
     return {
         "rate_hz": request.rate,
         "profile": request.profile,
+        "arm": request.arm,
         "seed": request.seed,
         "priority": request.priority,
         "cpu": request.cpu,

@@ -8,7 +8,9 @@ import numpy as np
 
 from pretouch.control.path import Circle
 from pretouch.errors import ExperimentError
+from pretouch.importing.ready import reach_of
 from pretouch.profiles import Profile
+from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.sensor import PAPER_SENSOR
 from pretouch.sensing.skin import Skin
@@ -21,20 +23,23 @@ LARGEST_SKIN = 10_000
 _SPHERES = 40
 _SPHERE_RADIUS = 0.1
 _ROOM_CENTER, _ROOM_RADIUS = np.array([0.25, 0.0, 0.45]), 1.0
-"""The room is round, and as wide as the arm can reach [m]: every beam ends at a sphere or at its wall."""
+"""The Panda's room is round, and as wide as the arm can reach [m]: every beam ends at a sphere or at its wall."""
 _CLEAR = 0.3, 0.5
 """Nearest and farthest a sphere's surface lies from the arm at the start [m]: much nearer, eq. 6 lets nothing move."""
 _HAND = 0.1
 """Reach of the hand round its origin [m]."""
 _CIRCLE = 0.1
 """Radius of the path [m]."""
-_FIRST_LINK = "panda_link2"
+_JOINTS_BEFORE = 2
+"""Joints that move the first link with units."""
 _ABOVE = 0.006
 """Height of a unit above its link [m]."""
 _SEEN = 0.55
 """Largest first reading of a unit [m]: within d_notice of Table I."""
 _FORCE_NOISE = 0.3
 """Standard deviation of the force estimate [N]."""
+_IN_VAIN = 20
+"""Rounds over all links without a single unit after which there is none to be found."""
 _TRIES = 40
 """Places on a link that are tried before the next link: some have few that see anything."""
 _DRAWS = 4096
@@ -44,7 +49,7 @@ UNIT_RATE = 50.0
 
 
 class Workload:
-    """A Panda with K units among spheres in a room, on a circle, that does exactly as it is commanded.
+    """An arm with K units among spheres in a room, on a circle, that does exactly as it is commanded.
 
     Every unit sees something, 50 times a second, each at times of its own; with `all_new` every reading is stamped new
     in every cycle, as no real skin's are. Time is counted in cycles, so a run is the same whatever the machine does
@@ -61,8 +66,9 @@ class Workload:
         body = _Body.at(model, self._q)
         self.path = Circle(center=tuple(body.hand - [0.0, _CIRCLE, 0.0]), radius=_CIRCLE)
         around = np.array([self.path.point(s) for s in np.linspace(0, self.path.length, 32)])
-        self._centers = _spheres(rng, body, around)
-        self.skin = _skin(rng, model, units, body, self._centers)
+        wider = reach_of(model) / reach_of(RobotModel(panda()))
+        self._room = _Room(_spheres(rng, body, around), wider * _ROOM_CENTER, wider * _ROOM_RADIUS)
+        self.skin = _skin(rng, model, units, body, self._room)
         self._force = np.zeros((_DRAWS, 6))
         self._force[:, :3] = rng.normal(0.0, _FORCE_NOISE, (_DRAWS, 3))
         self._all_new = all_new
@@ -88,14 +94,14 @@ class Workload:
 
     def clearance(self) -> float:
         """Distance from the arm to the nearest sphere [m]."""
-        return float(_Body.at(self._model, self._q).distance(self._centers).min()) - _SPHERE_RADIUS
+        return float(_Body.at(self._model, self._q).distance(self._room.spheres).min()) - _SPHERE_RADIUS
 
     def _ranges(self, units: IntArray) -> FloatArray:
         """Distance (k,) [m] along the beams of some units to the nearest sphere or the wall."""
         kin = self._model.kinematics(self._q)
         R, T = kin.rotation[self.skin.link[units]], self.skin.T_link_sensor[units]
         origin = kin.position[self.skin.link[units]] + np.einsum("kij,kj->ki", R, T[:, :3, 3])
-        return _ranges(origin, np.einsum("kij,kj->ki", R, T[:, :3, 2]), self._centers)
+        return self._room.ranges(origin, np.einsum("kij,kj->ki", R, T[:, :3, 2]))
 
 
 @dataclass(frozen=True)
@@ -124,6 +130,27 @@ class _Body:
         return gap
 
 
+@dataclass(frozen=True)
+class _Room:
+    """What units see: spheres, and a round wall beyond them."""
+
+    spheres: FloatArray
+    """(S, 3) centres [m], base frame."""
+    center: FloatArray
+    """(3,) of the wall [m]."""
+    radius: float
+    """Of the wall [m]."""
+
+    def ranges(self, origin: FloatArray, beam: FloatArray) -> FloatArray:
+        """Distance (k,) [m] along rays (k, 3) to the nearest sphere, or from within to the wall."""
+        along, half = _crossing(origin, beam, self.spheres, _SPHERE_RADIUS)
+        met = (half >= 0) & (along > 0)
+        sphere = np.where(met, along - np.sqrt(np.maximum(half, 0.0)), np.inf).min(axis=1)
+        along, half = _crossing(origin, beam, self.center[None], self.radius)
+        wall: FloatArray = (along + np.sqrt(half))[:, 0]
+        return np.minimum(sphere, wall)
+
+
 def _spheres(rng: np.random.Generator, body: _Body, around: FloatArray) -> FloatArray:
     """Centres (S, 3) [m] of spheres round the arm, none near the way (P, 3) of its hand."""
     low, high = np.minimum(body.a, body.b).min(axis=0) - 1.0, np.maximum(body.a, body.b).max(axis=0) + 1.0
@@ -137,16 +164,22 @@ def _spheres(rng: np.random.Generator, body: _Body, around: FloatArray) -> Float
     return np.array(found)
 
 
-def _skin(rng: np.random.Generator, model: RobotModel, units: int, body: _Body, centers: FloatArray) -> Skin:
+def _skin(rng: np.random.Generator, model: RobotModel, units: int, body: _Body, room: _Room) -> Skin:
     """Units on all links in turn that look away from the arm, and at something near in the posture of `body`."""
     kin = model.kinematics(model.description.q_ready)
-    links = itertools.cycle(range(model.link_index(_FIRST_LINK), len(model.links)))
+    first = int(np.argmax(model.moved_by.sum(axis=1) >= _JOINTS_BEFORE))
     found: list[SensorUnit] = []
-    while len(found) < units:
-        link = next(links)
+    for tried, link in enumerate(itertools.cycle(range(first, len(model.links)))):
+        if len(found) == units:
+            break
+        if not found and tried > _IN_VAIN * len(model.links):
+            raise ExperimentError(
+                f"No unit on {model.description.name} sees past the arm, posture as in q_ready: give another q_ready in"
+                " robot.toml, more stretched out."
+            )
         for T_O_sensor in _places(rng, body, link):
             p, beam = T_O_sensor[:3, 3], T_O_sensor[:3, 2]
-            seen = float(_ranges(p[None], beam[None], centers)[0])
+            seen = float(room.ranges(p[None], beam[None])[0])
             if seen <= _SEEN and _sees_past(body, link, p, beam, seen):
                 T, R = np.eye(4), kin.rotation[link]
                 T[:3, :3], T[:3, 3] = R.T @ T_O_sensor[:3, :3], R.T @ (p - kin.position[link])
@@ -181,16 +214,6 @@ def _sees_past(body: _Body, link: int, p: FloatArray, beam: FloatArray, seen: fl
     along = np.linspace(0.0, seen, 16)
     others = body.distance(p + along[:, None] * beam)[:, body.link != link]
     return bool(np.all(others > along[:, None] * np.tan(PAPER_SENSOR.angle / 2)))
-
-
-def _ranges(origin: FloatArray, beam: FloatArray, centers: FloatArray) -> FloatArray:
-    """Distance (k,) [m] along rays (k, 3) to the nearest of the spheres, or from within to the wall of the room."""
-    along, half = _crossing(origin, beam, centers, _SPHERE_RADIUS)
-    met = (half >= 0) & (along > 0)
-    sphere = np.where(met, along - np.sqrt(np.maximum(half, 0.0)), np.inf).min(axis=1)
-    along, half = _crossing(origin, beam, _ROOM_CENTER[None], _ROOM_RADIUS)
-    wall: FloatArray = (along + np.sqrt(half))[:, 0]
-    return np.minimum(sphere, wall)
 
 
 def _crossing(

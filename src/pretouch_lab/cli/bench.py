@@ -19,6 +19,8 @@ class FreeMotion:
 
     seeds: int = 10
     """Simulated arms; each is left alone for twenty minutes, a quarter of them standing."""
+    arm: str = ""
+    """Name of an arm, or the folder of an imported one; by default the Panda."""
     out: str = ""
     """Folder for results, figures and page; by default runs/bench-free-motion."""
     json: str = ""
@@ -31,7 +33,7 @@ class FreeMotion:
         from pretouch_lab.cli.campaigns import run_all
 
         out = Path(self.out or "runs/bench-free-motion")
-        request = Request(("free-motion",), self.seeds)
+        request = Request(("free-motion",), self.seeds, arm=self.arm or None)
         run_all([(request, out)], out, self.json)
 
 
@@ -47,6 +49,8 @@ class Cycle:
     """Steps measured for each number of points."""
     profile: str = "paper"
     """Profile of the controller, or PROFILE:GROUP.FIELD=VALUE."""
+    arm: str = "panda"
+    """Name of an arm, or the folder of an imported one."""
     json: str = ""
     """File for the numbers, or - for standard output: text then goes to standard error."""
     priority: int | None = None
@@ -59,7 +63,7 @@ class Cycle:
         from pretouch_lab.benchmarks.cycle import CycleRequest
         from pretouch_lab.cli.bench_cycle import bench_cycle
 
-        request = CycleRequest(self.rate, self.cycles, self.profile, self.priority, self.cpu)
+        request = CycleRequest(self.rate, self.cycles, self.profile, self.priority, self.cpu, arm=self.arm)
         bench_cycle(_counts(self.points), request, self.json)
 
 

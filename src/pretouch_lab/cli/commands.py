@@ -63,8 +63,8 @@ class Reproduce:
     skin: str = ""
     """Skin file; by default the seven units that come with the package."""
     arm: str = ""
-    """Name of an arm, or the folder of an imported one, for the static experiment; by default the Panda. The paper's
-    paths are scaled and moved into its reach, and the skin is the arm's own."""
+    """Name of an arm, or the folder of an imported one, for static, avoidance and dynamic; by default the Panda. The
+    paper's paths and places are scaled and moved into its reach, and the skin is the arm's own."""
     world: str = ""
     """Set of simulated arms, sensors and delays: nominal, realistic, stress, or a TOML file, of which each trial's seed
     draws its own; by default the usual ones."""
@@ -78,6 +78,7 @@ class Reproduce:
 
     def run(self) -> None:
         """Run the experiments, with results, recordings, figures and page."""
+        from pretouch.sim.plant_params import assumed_plant
         from pretouch_lab.campaign import Request
         from pretouch_lab.cli.campaigns import run_all
         from pretouch_lab.domain_randomisation import folder_part
@@ -101,6 +102,7 @@ class Reproduce:
         if request.arm and not everything:
             context = request.context()
             print(context.placement.sentence(context.model.description.name))
+            print(assumed_plant(context.model.description))
         out = Path(self.out or f"runs/reproduce-{self.experiment}{folder_part(self.world)}")
         runs = [(part, out / name) for name, part in whole_paper(request)] if everything else [(request, out)]
         run_all(runs, out, self.json)

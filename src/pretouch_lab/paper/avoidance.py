@@ -4,13 +4,13 @@ from itertools import product
 
 import numpy as np
 
-from pretouch.control.path import Circle
 from pretouch.perception.closest import closest_points
 from pretouch.profiles import profile
 from pretouch.recording.run_record import RunRecord
 from pretouch.robot.model import RobotModel
+from pretouch.sim.paper_scenes import Placement, person_scene
 from pretouch.sim.pushes import Visit, Visitor
-from pretouch.sim.scene import HandSpec, SceneSpec
+from pretouch.sim.scene import HandSpec
 from pretouch.types import FloatArray
 from pretouch_lab.cell import Cell, Context, Grid
 from pretouch_lab.experiment import Experiment, Picture, Sources
@@ -25,10 +25,10 @@ DEFAULT_RESTRICTIONS = "slack"
 
 _DURATION_S = 40.0
 _VISITS_S = ((4.0, 14.0), (20.0, 30.0))
-PLACES_M = {"beside": 0.43, "inside": 0.35}
-"""Distance of the centre of the person's hand from the plane y = 0 [m]. The side of the robot's hand comes to 0.35 m on
-the free circle: beside is 3 cm clear of it, inside half of the person's hand is in its way."""
+PLACES = ("beside", "inside")
+"""Where the person's hand is: 3 cm clear of the robot's on the free circle, or half of it in its way."""
 _SPREAD_M = 0.03
+_UNMOVED = Placement()
 _COMPARED = "Speed of the end-effector and true force on the arm with a hand beside the path and inside it"
 
 
@@ -36,25 +36,24 @@ def cells(grid: Grid) -> list[Cell]:
     """A cell for each place of the hand and each controller."""
     return [
         Cell(NAME, profile, {"place": place, "restrictions": restrictions})
-        for place, (profile, restrictions) in product(PLACES_M, grid.controllers(DEFAULT_RESTRICTIONS))
+        for place, (profile, restrictions) in product(PLACES, grid.controllers(DEFAULT_RESTRICTIONS))
     ]
 
 
-def visits(place: str, seed: int) -> tuple[Visit, ...]:
+def visits(place: str, seed: int, placement: Placement = _UNMOVED) -> tuple[Visit, ...]:
     """One visit on each side of the circle, at a place that the seed varies by a few centimetres."""
     rng = np.random.default_rng([seed, 12])
     return tuple(
-        Visit(arrive, leave, np.array([0.5, side * PLACES_M[place], 0.3]) + _SPREAD_M * rng.uniform(-1, 1, 3))
+        Visit(arrive, leave, np.array(placement.visited(place, side)) + _SPREAD_M * rng.uniform(-1, 1, 3))
         for (arrive, leave), side in zip(_VISITS_S, (-1.0, 1.0), strict=True)
     )
 
 
 def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
     """Run one trial; return its row of results and what it left behind."""
-    hand = HandSpec()
-    setup = context.setup(
-        cell, seed, SceneSpec(hand=hand), Circle(), hand=Visitor(context.model, visits(str(cell.where["place"]), seed))
-    )
+    hand, where = HandSpec(), context.placement
+    person = Visitor(context.model, visits(str(cell.where["place"]), seed, where), where.ahead)
+    setup = context.setup(cell, seed, person_scene(hand, where), where.path("circle", -1.0), hand=person)
     record = play(setup, lambda step, _: step.stamp >= _DURATION_S)
     steps = record.steps
     off = [float(np.linalg.norm(s.ee_position - s.path_position)) for s in steps]

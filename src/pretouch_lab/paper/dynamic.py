@@ -2,12 +2,11 @@
 
 import numpy as np
 
-from pretouch.control.path import Circle
 from pretouch.profiles import profile
 from pretouch.recording.run_record import RunRecord
-from pretouch.sim.paper_scenes import dynamic_pushes
+from pretouch.sim.paper_scenes import dynamic_pushes, person_scene
 from pretouch.sim.pushes import Push, Pusher
-from pretouch.sim.scene import HandSpec, SceneSpec
+from pretouch.sim.scene import HandSpec
 from pretouch.traces import mean_over
 from pretouch.types import ControlStep, FloatArray
 from pretouch_lab.cell import Cell, Context, Grid
@@ -38,8 +37,9 @@ def cells(grid: Grid) -> list[Cell]:
 
 def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
     """Run one trial; return its row of results and what it left behind."""
-    person, hand = Pusher(context.model, dynamic_pushes(seed)), HandSpec()
-    setup = context.setup(cell, seed, SceneSpec(hand=hand), Circle(), hand=person)
+    hand, where = HandSpec(), context.placement
+    person = Pusher(context.model, dynamic_pushes(seed), ahead=where.ahead)
+    setup = context.setup(cell, seed, person_scene(hand, where), where.path("circle", -1.0), hand=person)
     record = play(setup, lambda step, _: step.stamp >= _DURATION_S)
     true = np.linalg.norm(record.true_force, axis=1)
     beginnings, spans = record.beginnings(), [span for span in person.contacts if span is not None]

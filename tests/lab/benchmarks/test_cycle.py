@@ -48,7 +48,7 @@ def test_first_readings_end_on_the_spheres_or_the_wall(panda_model: RobotModel, 
     R, T = kin.rotation[work.skin.link], work.skin.T_link_sensor
     origin = kin.position[work.skin.link] + (R @ T[:, :3, 3, None])[..., 0]
     points = origin + inputs.readings.distance[:, None] * (R @ T[:, :3, 2, None])[..., 0]
-    to_sphere = np.linalg.norm(points[:, None] - work._centers, axis=2) - 0.1
+    to_sphere = np.linalg.norm(points[:, None] - work._room.spheres, axis=2) - 0.1
     to_wall = np.abs(np.linalg.norm(points - [0.25, 0.0, 0.45], axis=1) - 1.0)
     np.testing.assert_allclose(np.minimum(to_sphere.min(axis=1), to_wall), 0.0, atol=1e-9)
     assert np.all(to_sphere > -1e-9)

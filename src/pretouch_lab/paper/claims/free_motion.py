@@ -4,7 +4,8 @@ from itertools import product
 
 import numpy as np
 
-from pretouch.control.path import Circle, Path, WayPoints
+from pretouch.control.path import Path, WayPoints
+from pretouch.sim.paper_scenes import Placement
 from pretouch.types import FloatArray
 from pretouch_lab.cell import Cell, Context, Grid
 from pretouch_lab.experiment import Experiment, Picture, Sources
@@ -43,6 +44,7 @@ QUICK_ALPHA = 0.3
 
 _RETURN_M_S = 0.1
 """Bound on the speed at which a standing arm goes back to where it is to stand [m/s]."""
+_UNMOVED = Placement()
 _NORMS = ("norm_median_n", "norm_p95_n", "norm_p99_n")
 
 
@@ -54,18 +56,19 @@ def cells(_grid: Grid) -> list[Cell]:
     ]
 
 
-def path(trajectory: str, speed_m_s: float) -> Path:
+def path(trajectory: str, speed_m_s: float, placement: Placement = _UNMOVED) -> Path:
     """Return the paper's circle, or its line to and fro; at no speed the point where it begins."""
-    course: Path = (
-        Circle() if trajectory == "circle" else WayPoints(np.array([[0.4, 0.5, 0.5], [0.4, -0.5, 0.5]]), True)
-    )
+    course = placement.path(trajectory, -1.0)
+    if isinstance(course, WayPoints):
+        course = WayPoints(course.points, closed=True)
     return course if speed_m_s > 0 else Standing(course.point(0.0))
 
 
 def trial(cell: Cell, seed: int, context: Context, duration_s: float = DURATION_S) -> tuple[Row, None]:
     """Run one trial; return its row of results. Its course is of no use to a figure."""
     trajectory, speed_m_s = str(cell.where["trajectory"]), float(cell.where["speed_m_s"])
-    what = Solitude(path(trajectory, speed_m_s), speed_m_s or _RETURN_M_S, duration_s=duration_s)
+    way = path(trajectory, speed_m_s, context.placement)
+    what = Solitude(way, speed_m_s or _RETURN_M_S, context.arm, duration_s)
     record = leave_alone(what, cell, seed, context)
     off = np.array([s.ee_position - s.path_position for s in record.steps if s.armed])
     force = estimates(record)
