@@ -43,8 +43,9 @@ def placement_for(model: RobotModel) -> Placement:
     """Scale the paper's paths by the arm's reach, and shrink or move them as little as lets the arm follow them.
 
     All along, hand as in the ready posture, the arm keeps away from singularities, its limits, itself and the floor,
-    and its joints hold its weight. A person's hand is then held beside the circle where the whole free arm passes it by as much as the Panda's hand does.
-    Raises ExperimentError where no such place is found. The Panda and the FR3 have the paper's own.
+    and its joints hold its weight. A person's hand is then held beside the circle where the whole free arm passes it
+    by as much as the Panda's hand does. Raises ExperimentError where no such place is found. The Panda and the FR3 have
+    the paper's own.
     """
     if is_shipped(model.description):
         return Placement()
@@ -81,9 +82,14 @@ def _visited(model: RobotModel, placement: Placement, postures: FloatArray) -> P
     beside, inside = list[float](), list[float]()
     for sign in (-1.0, 1.0):
         x, _, z = placement.visited("beside", sign)
-        aside = _STEP_M * np.arange(_STEPS, 0, -1)
+        aside = _STEP_M * np.arange(_STEPS, 0.0, -1.0)
         at = np.column_stack([np.full(len(aside), x), sign * aside, np.full(len(aside), z)])[:, None, None]
         free = (segment_distance(a, b, at, at) - radius).min(axis=(1, 2))
+        if not (free < _INSIDE_M).any():
+            raise ExperimentError(
+                f"There is no place for a person's hand in the way of {model.description.name}'s hand on the circle, at"
+                f" x = {x:.2f} m and z = {z:.2f} m: look at the capsules of its last links in arm.xml."
+            )
         beside.append(_last_free(aside, free, _BESIDE_M))
         inside.append(_last_free(aside, free, _INSIDE_M))
     return replace(placement, beside=(beside[0], beside[1]), inside=(inside[0], inside[1]))

@@ -9,7 +9,7 @@ from pretouch.sim.hand import USUAL_ARM, HandGoal, point_on_arm
 from pretouch.sim.plant import TOUCH_N, Plant
 from pretouch.types import FloatArray
 
-_HOME = np.array([1.2, 0.0, 0.8])
+_HOME, _OUTWARDS = np.array([1.2, 0.0, 0.8]), np.array([1.0, 0.0, 0.0])
 _AISLE_X_M = 1.15
 """Plane in front of the Panda's reach in which a hand changes sides, so that it meets the arm only on purpose [m]."""
 _STAND_OFF_M = 0.5
@@ -127,7 +127,7 @@ class Pusher:
         number, withdrawing = len(self.contacts), time < self._release + 1.0
         over = number == len(self.pushes)
         if not withdrawing and (over or time < self.pushes[number].start - _LEAD_S):
-            return HandGoal(way_round(hand, _HOME + [self.ahead, 0.0, 0.0], self.ahead), _FREE_N)
+            return HandGoal(way_round(hand, _HOME + self.ahead * _OUTWARDS, self.ahead), _FREE_N)
         robot = self._robot
         palm = point_on_arm(plant, robot.link, robot.palm)
         if withdrawing:
@@ -202,4 +202,4 @@ class Visitor:
                 wanted = visit.arrive <= time < visit.leave
                 self._inside = wanted and (self._inside or bool(clear))
                 return HandGoal(visit.place if self._inside else way_round(hand, outside, self.ahead), _FREE_N)
-        return HandGoal(way_round(hand, _HOME + [self.ahead, 0.0, 0.0], self.ahead), _FREE_N)
+        return HandGoal(way_round(hand, _HOME + self.ahead * _OUTWARDS, self.ahead), _FREE_N)

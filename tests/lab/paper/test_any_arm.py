@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.importing import made
 
 from pretouch.coverage.placement import placement_for
 from pretouch.errors import ExperimentError
@@ -19,6 +18,7 @@ from pretouch_lab.campaign import Request
 from pretouch_lab.cell import Cell, Context
 from pretouch_lab.paper import avoidance, dynamic
 from pretouch_lab.paper.claims import free_motion
+from tests.importing import made
 from tests.lab.limits import assert_within_limits
 
 ARMS = {
