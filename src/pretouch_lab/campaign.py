@@ -12,7 +12,7 @@ from pretouch.coverage.placement import placement_for
 from pretouch.errors import ExperimentError, SkinError
 from pretouch.params import Orientation
 from pretouch.profiles import profile, restriction_modes
-from pretouch.robot.description_file import description_text
+from pretouch.robot.description_file import files_digest
 from pretouch.robot.model import RobotModel
 from pretouch.robot.named import robot_named
 from pretouch.sensing.skin import skin_file, skin_for
@@ -136,7 +136,7 @@ def _fingerprints(request: Request) -> dict[str, str]:
         raise SkinError(f"The skin file {path} cannot be read: {error.strerror}.") from error
     digests |= digest_of(request.world or "")
     if request.arm:
-        digests["the arm's files have"] = sha256(description_text(arm).encode() + arm.mjcf.read_bytes()).hexdigest()
+        digests["the arm's files have"] = files_digest(arm)
     for name in dict.fromkeys(cell.profile for cell, _ in request.trials()):
         digests[f"the parameters of profile {name} have"] = parameters_digest(profile(name))
     return digests

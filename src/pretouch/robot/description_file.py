@@ -1,6 +1,7 @@
 """Description of an arm in a file: robot.toml, beside the MJCF that it names."""
 
 import os
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -60,6 +61,11 @@ def description_text(arm: RobotDescription) -> str:
     given = {"name": arm.name, "mjcf": arm.mjcf.name, "ee_body": arm.ee_body, "source": arm.source}
     lists = {key: [float(v) for v in getattr(arm, key)] for key in _LISTS}
     return tomli_w.dumps(given | lists)
+
+
+def files_digest(arm: RobotDescription) -> str:
+    """Return the SHA-256 of an arm's description and MJCF file."""
+    return sha256(description_text(arm).encode() + arm.mjcf.read_bytes()).hexdigest()
 
 
 def _read(path: Path) -> dict[str, Any]:

@@ -60,6 +60,17 @@ class Placement:
         """Return the distance of a board's face from the plane y = 0 [m] at which it is met where the paper's is."""
         return self.scale * face + (self.hand(side).aside - self.scale * PANDA_SIDE.aside)
 
+    def moved(self, x: float, y: float, z: float) -> tuple[float, float, float]:
+        """Return where what stands at a point of the paper's room is for this arm [m].
+
+        Within the circle's width it is scaled with it, beyond it keeps its distance from it.
+        """
+        if self == _UNMOVED:
+            return x, y, z
+        inner = min(abs(y), _RADIUS_M)
+        aside = float(np.copysign(self.scale * inner + abs(y) - inner, y))
+        return self.scale * x + self.shift_x, aside, self.scale * z + self.shift_z
+
     @property
     def ahead(self) -> float:
         """How much farther from the base than at the paper's paths people keep [m]."""

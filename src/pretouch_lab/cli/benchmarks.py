@@ -86,13 +86,27 @@ class Avoidance(BenchOptions):
     profile; by default all, and pretouch with each switch off alone."""
     scenarios: str = ""
     """Scenarios, separated by commas; by default all."""
+    arm: str = "panda"
+    """Name of an arm, or the folder of an imported one, in a folder of results of its own: give --out. The scenarios'
+    paths and obstacles are scaled and moved into its reach, and the skin is the arm's own."""
 
     def run(self) -> None:
         """Run it, with tables, figures and numbers."""
+        from pretouch.sim.plant_params import assumption
         from pretouch_lab.benchmarks.avoidance.run import AvoidanceBench
+        from pretouch_lab.benchmarks.avoidance.setting import PANDA, arm, place
 
         out, some = self.folder("bench-avoidance"), (words(self.baselines), words(self.scenarios))
-        run_bench(AvoidanceBench(out, self.quick, self.seeds, self.world, *some), self, self.json)
+        bench = AvoidanceBench(out, self.quick, self.seeds, self.world, *some, self.arm)
+        if self.arm != PANDA:
+            if self.docs:
+                raise ExperimentError(
+                    f"The arm is {self.arm!r}, and --docs writes the published tables, which are the Panda's: leave out"
+                    " --docs; tables and figures are in the run's folder."
+                )
+            described = arm(self.arm).description
+            print(place(self.arm).sentence(described.name), assumption(described), sep="\n")
+        run_bench(bench, self, self.json)
 
 
 @dataclass(frozen=True)

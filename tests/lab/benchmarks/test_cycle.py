@@ -10,6 +10,7 @@ from pretouch.controller import STAGES, Controller
 from pretouch.errors import ExperimentError
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import PROFILES, Profile, at_rate
+from pretouch.robot.description import fr3
 from pretouch.robot.model import RobotModel
 from pretouch.types import Inputs, Mode
 from pretouch_lab.benchmarks import cycle
@@ -90,6 +91,13 @@ def test_the_arm_moves_restricted_and_never_touches(panda_model: RobotModel, poi
     assert settled[-1].path_phase - settled[0].path_phase > 0.005
     assert min(clear) > 0.1
     assert all(step.contact is None for step in steps)
+
+
+def test_any_arm_has_one():
+    model = RobotModel(fr3())
+    work = Workload(model, 7, FAST, 0)
+    assert {unit.link for unit in work.skin.units} <= {f"fr3_link{k}" for k in range(2, 9)} | {"fr3_hand"}
+    assert np.isfinite(work.inputs().readings.distance).all()
 
 
 @pytest.mark.parametrize("points", [0, LARGEST_SKIN + 1])

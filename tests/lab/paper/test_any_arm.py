@@ -6,14 +6,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pretouch.control.posture import brought_to
 from pretouch.coverage.placement import placement_for
 from pretouch.errors import ExperimentError
 from pretouch.importing.folder import write_folder
 from pretouch.importing.robot_import import ImportOptions, import_robot
+from pretouch.profiles import profile
 from pretouch.robot.description import RobotDescription, panda
 from pretouch.robot.model import RobotModel
 from pretouch.sim.plant_params import assumed_plant
 from pretouch.sim.pushes import PALM, robot_hand
+from pretouch_lab.benchmarks.avoidance.scenario import scenarios
+from pretouch_lab.benchmarks.avoidance.setting import setting
+from pretouch_lab.benchmarks.avoidance.trial import play_trial
 from pretouch_lab.campaign import Request
 from pretouch_lab.cell import Cell, Context
 from pretouch_lab.paper import avoidance, dynamic
@@ -38,10 +43,15 @@ def stranger(tmp_path_factory) -> RobotDescription:
 
 
 @pytest.fixture(scope="module", params=tuple(ARMS))
-def others(request, tmp_path_factory) -> Context:
-    folder = tmp_path_factory.mktemp(request.param)
-    write_folder(import_robot(made.written(folder, ARMS[request.param]), ImportOptions()), folder / "arm")
-    return Request(("avoidance", "dynamic"), 1, arm=str(folder / "arm")).context()
+def folder(request, tmp_path_factory) -> str:
+    place = tmp_path_factory.mktemp(request.param)
+    write_folder(import_robot(made.written(place, ARMS[request.param]), ImportOptions()), place / "arm")
+    return str(place / "arm")
+
+
+@pytest.fixture(scope="module")
+def others(folder) -> Context:
+    return Request(("avoidance", "dynamic"), 1, arm=folder).context()
 
 
 def test_the_rule_finds_the_papers_places_for_a_panda_that_it_does_not_know(stranger):
@@ -97,9 +107,9 @@ def test_a_person_holds_a_hand_beside_the_circle_and_into_it(others, monkeypatch
     monkeypatch.setattr(avoidance, "_SPREAD_M", 0.0)
     rows = {}
     for place in avoidance.PLACES:
-        for profile, mode in (("blind", "off"), ("paper", "slack")):
-            cell = Cell(avoidance.NAME, profile, {"place": place, "restrictions": mode})
-            rows[place, profile], record = avoidance.trial(cell, 0, others)
+        for name, mode in (("blind", "off"), ("paper", "slack")):
+            cell = Cell(avoidance.NAME, name, {"place": place, "restrictions": mode})
+            rows[place, name], record = avoidance.trial(cell, 0, others)
             assert_within_limits(record, others.model)
     assert rows["beside", "blind"]["contact"] is False
     assert 0.01 < rows["beside", "blind"]["least_gap_m"] < 0.05  # 28 mm, but for how the arm errs
@@ -115,6 +125,22 @@ def test_a_person_pushes_it(others, monkeypatch):
     assert row["contact"] is True
     assert row["contacts"][0]["detected"] is True
     assert row["contacts"][0]["reaction_towards_person"] is False
+
+
+@pytest.mark.slow
+def test_the_scenarios_of_the_avoidance_benchmark_are_set_up_for_it(folder):
+    for scene in scenarios().values():
+        setup = setting(scene, profile("paper"), 0, folder).setup
+        assert np.allclose(
+            setup.model.kinematics(brought_to(setup.model, setup.path.point(0.0))).position[setup.model.ee],
+            setup.path.point(0.0), atol=1e-5,
+        )  # fmt: skip
+    made_for_it = setting(scenarios()["person +y"], profile("paper"), 0, folder)
+    path, person = made_for_it.setup.path, made_for_it.shape(np.zeros(3))
+    around = np.array([path.point(s) for s in np.linspace(0, path.length, 400)])
+    assert person.closest(around)[0].min() == pytest.approx(0.4, abs=1e-3)
+    row = play_trial(scenarios()["srdo"], "pretouch", 0, arm=folder)
+    assert row["duration_s"] == pytest.approx(9.0, abs=0.05)
 
 
 @pytest.mark.slow

@@ -7,7 +7,9 @@ from pretouch.errors import ExperimentError
 from pretouch.robot.description import RobotDescription
 from pretouch.robot.model import RobotModel
 from pretouch.sim.board import PANDA_SIDE, HandSide
-from pretouch.sim.paper_scenes import Placement, static_path, static_scene
+from pretouch.sim.paper_scenes import Placement, person_scene, static_path, static_scene
+from pretouch.sim.pushes import way_round
+from pretouch.sim.scene import HandSpec
 from pretouch_lab.campaign import Request
 
 FIVE = "<mujoco><worldbody>{}</worldbody></mujoco>"
@@ -47,6 +49,28 @@ def test_another_arm_has_them_scaled_and_moved():
     meets = placement.face(0.25, "+y") - 0.05
     assert meets / 0.2 == pytest.approx((0.25 - PANDA_SIDE.aside) / 0.25)
     assert "0.8 times as large, moved by -0.10 m in x and +0.15 m in z" in placement.sentence("mine")
+
+
+def test_what_stands_beside_the_circle_keeps_its_distance_from_it_and_what_is_within_is_scaled():
+    assert Placement().moved(0.5, -0.8, 0.3) == (0.5, -0.8, 0.3)
+    placement = Placement(0.8, -0.1, 0.15)
+    assert placement.moved(0.5, -0.8, 0.3) == pytest.approx((0.3, -0.75, 0.39))
+    assert placement.moved(0.5, 0.1, 0.3) == pytest.approx((0.3, 0.08, 0.39))
+
+
+def test_people_keep_away_from_an_arm_that_reaches_farther():
+    far = Placement(1.4)
+    assert far.ahead == pytest.approx(0.2)
+    assert Placement(0.8).ahead == 0.0
+    assert person_scene(HandSpec(), far).hand.start == pytest.approx((1.4, 0.0, 0.8))
+    hand = np.array([0.7, -0.8, 0.4])
+    assert way_round(hand, np.array([0.7, 0.8, 0.4]), far.ahead).tolist() == pytest.approx([1.35, -0.8, 0.4])
+
+
+def test_a_persons_hand_is_as_high_as_the_side_of_the_robots():
+    placement = Placement(0.8, 0.0, 0.0, HandSide(0.05, 0.01), HandSide(0.05, -0.08), (0.37, 0.36), (0.29, 0.28))
+    assert placement.visited("beside", -1.0) == pytest.approx((0.4, -0.37, 0.2 - 0.08 - 0.057 + 0.05))
+    assert placement.visited("inside", 1.0) == pytest.approx((0.4, 0.28, 0.2 + 0.01 - 0.057 + 0.05))
 
 
 def test_the_board_stands_where_the_hand_meets_it():

@@ -4,13 +4,15 @@ import re
 from dataclasses import dataclass
 from functools import cache, partial
 from hashlib import sha256
-from pathlib import Path
 from typing import ClassVar
 
 from pretouch.errors import ExperimentError
 from pretouch.profiles import profile
+from pretouch.robot.description_file import files_digest
+from pretouch.robot.named import robot_named
 from pretouch_lab.baselines.avoidance import ABLATED, ABLATED_IN, ABLATED_SEEDS, BASELINES, profile_text
 from pretouch_lab.benchmarks.avoidance.scenario import Scenario, scenarios
+from pretouch_lab.benchmarks.avoidance.setting import PANDA, place
 from pretouch_lab.benchmarks.avoidance.trial import keep_trial
 from pretouch_lab.benchmarks.bench import Bench, Found
 from pretouch_lab.engine import Task, rows_of
@@ -29,12 +31,16 @@ class AvoidanceBench(Bench):
     """None: all there are, and `pretouch` with each switch off alone in some scenarios."""
     names: tuple[str, ...] = ()
     """Scenarios; none: all."""
+    arm: str = PANDA
+    """Name of the arm, or the folder of an imported one."""
 
     def __post_init__(self) -> None:
         if len(set(self.baselines)) < len(self.baselines):
             raise ExperimentError(f"The baselines are {', '.join(self.baselines)}: name each once.")
         for baseline in self.baselines:
             profile_text(baseline)
+        if self.arm != PANDA:
+            place(self.arm)  # what cannot be placed is said before any process starts
         for name in self.names:
             if name not in scenarios():
                 raise ExperimentError(f"The scenario {name!r} is unknown: choose from {', '.join(scenarios())}.")
@@ -46,7 +52,8 @@ class AvoidanceBench(Bench):
 
     def choices(self) -> Row:
         """See `Bench`; a quick run shares its trials with a full one."""
-        return {"seeds": self.seeds, "world": self.world}
+        other = {} if self.arm == PANDA else {"arm": self.arm, "arm_sha256": files_digest(robot_named(self.arm))}
+        return {"seeds": self.seeds, "world": self.world, **other}
 
     def stages(self) -> list[list[Task]]:
         """Return all trials, by scenario, baseline and seed."""
@@ -62,7 +69,7 @@ class AvoidanceBench(Bench):
             for baseline in (() if self.baselines else ABLATED)
             for seed in (scene.seeds(self.seeds, self.quick)[:ABLATED_SEEDS] if scene.name in ABLATED_IN else ())
         ]
-        return [[_task(self.out, *trial, self.world) for trial in (*played, *ablated)]]
+        return [[_task(self, *trial) for trial in (*played, *ablated)]]
 
     def rows(self) -> list[Row]:
         """Return the rows of all finished trials."""
@@ -76,12 +83,12 @@ class AvoidanceBench(Bench):
         return found(self, rows) if rows else None
 
 
-def _task(out: Path, scene: Scenario, baseline: str, seed: int, world: str) -> Task:
+def _task(bench: AvoidanceBench, scene: Scenario, baseline: str, seed: int) -> Task:
     text = profile_text(baseline)
     digest = sha256(f"{baseline} {scene.name}".encode()).hexdigest()[:6]
     plain = re.sub(r"[^A-Za-z0-9.-]+", "-", f"{scene.name}_{baseline}")[:60]
-    file = out / "trials" / f"{plain}_{digest}_{_key(text)}_{seed:04d}.json"
-    return Task(file, partial(keep_trial, scene.name, baseline, seed, world), _cost(scene, baseline))
+    file = bench.out / "trials" / f"{plain}_{digest}_{_key(text)}_{seed:04d}.json"
+    return Task(file, partial(keep_trial, scene.name, baseline, seed, bench.world, bench.arm), _cost(scene, baseline))
 
 
 def _cost(scene: Scenario, baseline: str) -> float:

@@ -6,16 +6,17 @@ from functools import cache
 
 import numpy as np
 
-from pretouch.control.path import Circle, Path, line
+from pretouch.control.path import Path, line
+from pretouch.coverage.placement import placement_for
 from pretouch.profiles import Profile
-from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
-from pretouch.sensing.skin import Skin, load_skin, paper_skin
+from pretouch.robot.named import robot_named
+from pretouch.sensing.skin import Skin, load_skin, paper_skin, skin_for
 from pretouch.sim.hand import HandScript, PersonArm
 from pretouch.sim.misplacement import Misplacement, misplaced
-from pretouch.sim.paper_scenes import static_path, static_scene
+from pretouch.sim.paper_scenes import Placement, person_scene, static_path, static_scene
 from pretouch.sim.plant import Plant
-from pretouch.sim.plant_params import PlantParams
+from pretouch.sim.plant_params import PlantParams, plant_params_of
 from pretouch.sim.pushes import Visit, Visitor
 from pretouch.sim.range_finder import RangeFinderParams
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
@@ -25,6 +26,9 @@ from pretouch_lab.benchmarks.avoidance.scenario import Scenario, Table
 from pretouch_lab.benchmarks.scenario_files import scenario_path
 from pretouch_lab.trial import Setup
 
+PANDA = "panda"
+"""The arm that the scenarios are laid out for."""
+_UNMOVED, _USUAL = Placement(), PlantParams()
 _HELD_M = 0.001
 """Length of the path of a hand that is held: a path has to have one."""
 
@@ -41,23 +45,31 @@ class Setting:
 
 
 @cache
-def arm() -> RobotModel:
-    """Return the arm of all scenarios."""
-    return RobotModel(panda())
+def arm(name: str = PANDA) -> RobotModel:
+    """Return the arm of all scenarios: the Panda, or another by its name or folder."""
+    return RobotModel(robot_named(name))
 
 
 @cache
-def skin(name: str) -> Skin:
-    """Return a skin by the name that scenarios have for it."""
+def place(name: str = PANDA) -> Placement:
+    """Return where the scenarios' paths and places are for an arm."""
+    return placement_for(arm(name))
+
+
+@cache
+def skin(name: str, of: str = PANDA) -> Skin:
+    """Return a skin by the name that scenarios have for it; an arm other than the Panda has its own for each."""
+    if of != PANDA:
+        return skin_for(arm(of), "")
     return load_skin(scenario_path("dense_skin.toml"), arm()) if name == "dense" else paper_skin(arm())
 
 
-def setting(scenario: Scenario, profile: Profile, seed: int) -> Setting:
-    """Make the setting of a trial."""
-    params, model = scenario.params, arm()
-    path = path_of(params["path"])
-    placed = _obstacle(params, seed)
-    units = skin(params["skin"])
+def setting(scenario: Scenario, profile: Profile, seed: int, name: str = PANDA) -> Setting:
+    """Make the setting of a trial with the arm of a name."""
+    params, model = scenario.params, arm(name)
+    path = path_of(params["path"], place(name))
+    placed = _obstacle(params, seed, name)
+    units = skin(params["skin"], name)
     error = params.get("misplaced")
     setup = Setup(
         model=model,
@@ -67,7 +79,7 @@ def setting(scenario: Scenario, profile: Profile, seed: int) -> Setting:
         scene=placed.scene,
         path=path,
         seed=seed,
-        plant=plant_of(params.get("plant", {})),
+        plant=plant_of(params.get("plant", {}), plant_params_of(model.description)),
         ranging=RangeFinderParams(**params.get("ranging", {})),
         hand=placed.hand,
         person=placed.person,
@@ -75,19 +87,19 @@ def setting(scenario: Scenario, profile: Profile, seed: int) -> Setting:
     return Setting(setup, placed.shape, _done(params, path))
 
 
-def path_of(given: Table) -> Path:
-    """Return the path a scenario tells of."""
+def path_of(given: Table, where: Placement = _UNMOVED) -> Path:
+    """Return the path a scenario tells of, where it is for an arm."""
     if given["kind"] == "held":
-        x, y, z = given["point"]
+        x, y, z = where.point(*given["point"])
         return line((x, y, z), (x, y, z + _HELD_M))
     if "side" in given:
-        return static_path(given["kind"], given["side"])
-    return Circle()
+        return static_path(given["kind"], given["side"], where)
+    return where.path("circle", -1.0)
 
 
-def plant_of(given: Table) -> PlantParams:
+def plant_of(given: Table, usual: PlantParams = _USUAL) -> PlantParams:
     """Return the arm's errors; `friction_factor` is that of all joints' friction."""
-    own, usual = dict(given), PlantParams()
+    own = dict(given)
     factor = own.pop("friction_factor", 1.0)
     return replace(usual, friction_f1_nm=tuple(factor * f for f in usual.friction_f1_nm), **own)
 
@@ -102,19 +114,19 @@ class _Placed:
     person: PersonArm = field(default_factory=PersonArm)
 
 
-def _obstacle(params: Table, seed: int) -> _Placed:
-    given = params["obstacle"]
+def _obstacle(params: Table, seed: int, name: str) -> _Placed:
+    given, where = params["obstacle"], place(name)
     stiffness = given["contact_stiffness_n_m"]
     match given["kind"]:
         case "board":
             way = params["path"]
-            return _standing(static_scene(way["kind"], way["side"], stiffness, seed).boxes[0])
+            return _standing(static_scene(way["kind"], way["side"], stiffness, seed, where).boxes[0])
         case "box":
-            (x, y, z), (a, b, c) = given["center"], given["half_size"]
-            return _standing(Box("object", (x, y, z), (a, b, c), stiffness))
+            (x, y, _), z, (a, b, c) = where.moved(*given["center"]), given["center"][2], given["half_size"]
+            return _standing(Box("object", (x, y, z), (a, b, c), stiffness))  # it stands on the floor
         case "visitor":
-            return _visiting(given, seed)
-    return _walking(given, seed)
+            return _visiting(given, seed, name)
+    return _walking(given, seed, where)
 
 
 def _standing(box: Box) -> _Placed:
@@ -122,21 +134,24 @@ def _standing(box: Box) -> _Placed:
     return _Placed(SceneSpec(boxes=(box,)), lambda _: shape)
 
 
-def _visiting(given: Table, seed: int) -> _Placed:
+def _visiting(given: Table, seed: int, name: str) -> _Placed:
     """Place a person who holds a hand beside the path or into it on one side, as in the paper's experiment."""
-    rng = np.random.default_rng([seed, 21])
+    rng, where = np.random.default_rng([seed, 21]), place(name)
     side = rng.choice([-1.0, 1.0])
-    place = np.array([given["x_m"], side * given["y_m"], given["z_m"]]) + given["spread_m"] * rng.uniform(-1, 1, 3)
+    # as the hands of the paper's experiment are moved, from where this one is for the Panda
+    off = np.subtract(where.visited("beside", side), _UNMOVED.visited("beside", side))
+    at = np.array([given["x_m"], side * given["y_m"], given["z_m"]]) + off
     spec = HandSpec(given["radius_m"], given["mass_kg"], given["contact_stiffness_n_m"])
-    script = Visitor(arm(), (Visit(given["arrive_s"], given["leave_s"], place),))
-    return _Placed(SceneSpec(hand=spec), lambda hand: Ball(hand, spec.radius), script)
+    visit = Visit(given["arrive_s"], given["leave_s"], at + given["spread_m"] * rng.uniform(-1, 1, 3))
+    scene = person_scene(spec, where)
+    return _Placed(scene, lambda hand: Ball(hand, spec.radius), Visitor(arm(name), (visit,), where.ahead))
 
 
-def _walking(given: Table, seed: int) -> _Placed:
+def _walking(given: Table, seed: int, where: Placement) -> _Placed:
     """Place a person or a hand that comes straight in and stays; the seed draws speed, time and perhaps the side."""
     rng = np.random.default_rng([seed, 20])
     side = rng.choice([-1.0, 1.0]) if given.get("both_sides") else 1.0
-    begin, end = (np.array(given[key]) * [1.0, side, 1.0] for key in ("from", "to"))
+    begin, end = (np.array(where.moved(*given[key])) * [1.0, side, 1.0] for key in ("from", "to"))
     speed, start = rng.uniform(*given["speed_m_s"]), rng.uniform(*given["start_s"])
     x, y, z = begin.tolist()
     spec = HandSpec(given["radius_m"], given["mass_kg"], given["contact_stiffness_n_m"], (x, y, z))

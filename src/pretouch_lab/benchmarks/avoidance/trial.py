@@ -12,7 +12,7 @@ from pretouch_lab.baselines.avoidance import profile_text
 from pretouch_lab.benchmarks.avoidance import measures
 from pretouch_lab.benchmarks.avoidance.livelock import livelocks
 from pretouch_lab.benchmarks.avoidance.scenario import Scenario, scenarios
-from pretouch_lab.benchmarks.avoidance.setting import Setting, setting
+from pretouch_lab.benchmarks.avoidance.setting import PANDA, Setting, setting
 from pretouch_lab.benchmarks.avoidance.truth import Truth, truth_of
 from pretouch_lab.rows import Row
 from pretouch_lab.trial import Record, play
@@ -56,9 +56,9 @@ def course(record: Record, truth: Truth) -> dict[str, list[float]]:
     }
 
 
-def play_trial(scenario: Scenario, baseline: str, seed: int, world: str = "") -> Row:
+def play_trial(scenario: Scenario, baseline: str, seed: int, world: str = "", arm: str = PANDA) -> Row:
     """Play a trial of a baseline, as its seed draws it of a set if one is named, and return its row."""
-    made = setting(scenario, profile(profile_text(baseline)), seed)
+    made = setting(scenario, profile(profile_text(baseline)), seed, arm)
     record = play(replace(made.setup, world=world), made.done)
     names: Row = {"contender": baseline, "scenario": scenario.name, "family": scenario.family, "seed": seed}
     if world:
@@ -66,6 +66,6 @@ def play_trial(scenario: Scenario, baseline: str, seed: int, world: str = "") ->
     return {**names, **measured(record, made, scenario.params)}
 
 
-def keep_trial(name: str, baseline: str, seed: int, world: str, file: Path) -> None:
+def keep_trial(name: str, baseline: str, seed: int, world: str, arm: str, file: Path) -> None:
     """Play a trial of the scenario of a name, and write its row to a file."""
-    write_json(play_trial(scenarios()[name], baseline, seed, world), file)
+    write_json(play_trial(scenarios()[name], baseline, seed, world, arm), file)
