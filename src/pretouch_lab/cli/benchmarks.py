@@ -92,7 +92,7 @@ class Avoidance(BenchOptions):
 
     def run(self) -> None:
         """Run it, with tables, figures and numbers."""
-        from pretouch.sim.plant_params import assumption
+        from pretouch.sim.plant_params import assumed_plant
         from pretouch_lab.benchmarks.avoidance.run import AvoidanceBench
         from pretouch_lab.benchmarks.avoidance.setting import PANDA, arm, place
 
@@ -105,7 +105,7 @@ class Avoidance(BenchOptions):
                     " --docs; tables and figures are in the run's folder."
                 )
             described = arm(self.arm).description
-            print(place(self.arm).sentence(described.name), assumption(described), sep="\n")
+            print(place(self.arm).sentence(described.name), assumed_plant(described), sep="\n")
         run_bench(bench, self, self.json)
 
 
