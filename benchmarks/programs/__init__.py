@@ -1,0 +1,1 @@
+"""Other people's programs, unchanged, against simulated Franka arms."""
