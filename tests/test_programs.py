@@ -33,6 +33,7 @@ def test_one_that_says_what_it_should_and_complains_of_nothing_runs():
         # examples catch what is thrown, print it, and end with 0
         ("print('done'); print('libfranka: Move aborted!')", "fails", "libfranka: Move aborted!"),
         ("print('libfranka: Move command rejected!'); print('done')", "refused", "libfranka: Move command rejected!"),
+        ("print('Press Enter...Error occurred: none'); print('done')", "fails", "Error occurred: none"),
         ("raise ConnectionRefusedError('Connection refused')", "refused", "ConnectionRefusedError: Connection refused"),
     ],
 )

@@ -17,7 +17,9 @@ HOST, PORT = "127.0.0.1", 1337
 _STARTS_S, _ENDS_S = 120.0, 10.0
 """A server's first start compiles; an end takes less."""
 _STAND_IN = Path(__file__).parent / "stand_in"
-_COMPLAINT = re.compile(r"libfranka: |Error\b|Exception\b|Aborting|Failed|Object lost|terminate called")
+_COMPLAINT = re.compile(
+    r"libfranka: .*|^[\w.]*(Error|Exception)\b.*|Error occurred.*|Aborting.*|Failed.*|Object lost.*|terminate called.*"
+)
 """What a line says that tells of something gone wrong."""
 _REFUSAL = re.compile(r"rejected|refused|[Ii]ncompatible|Server reports error")
 """What such a line says if the robot, or whoever would listen beside it, declined what was asked for."""
@@ -111,7 +113,7 @@ def _heard(process: subprocess.Popen[bytes], ctrl_c: float, limit: float) -> tup
 def _judged(program: Program, status: int | None, text: str, seconds: float, interrupted: bool) -> Played:
     """Judge a program by its exit status, None if it did not end, and by what it said."""
     lines = [line.strip() for line in text.splitlines() if line.strip()]
-    complaints = [line for line in lines if _COMPLAINT.search(line)]
+    complaints = [found[0] for line in lines if (found := _COMPLAINT.search(line))]
     as_meant = interrupted if program.ctrl_c else status == 0
     why = (complaints or [f"ended with {status}: {lines[-1] if lines else 'it said nothing'}"])[0][:_LONGEST]
     if status is None:
