@@ -222,6 +222,10 @@ class ArmInWorld:
         # the drives add what the model says of Coriolis torques, too, which a commanded torque has to itself
         impedance.feed_forward[:] = tau + gravity - own.bias
 
+    def begin_at(self, q: FloatArray) -> None:
+        """Have the motion generator ask for q (n,) [rad], near where the arm is, at once and at rest."""
+        self._q_d[:], self._generator.qd_d[:] = q, 0.0
+
     def hold(self) -> None:
         """Have the joint impedance act again, where the arm is, within its limits, and with the velocities it has."""
         impedance, own = self._impedance, self._computer

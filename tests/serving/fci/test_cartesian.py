@@ -103,7 +103,21 @@ def test_the_first_elbow_must_be_the_arms(serve: Any, raw: Any, kind: RobotKind,
     ]
 
 
-@pytest.mark.parametrize("off", [0.1, 1e-4])
+@pytest.mark.parametrize("elbow", [True, False])
+def test_an_fr3_may_begin_with_the_pose_it_measurably_has(serve: Any, raw: Any, elbow: bool) -> None:
+    client = raw(serve("fr3"))
+    state = _begun(client, _POSE)
+    assert np.linalg.norm(state["O_T_EE"][12:15] - state["O_T_EE_c"][12:15]) > 2e-5
+    first, angle = state["O_T_EE"].astype(np.float64), state["elbow"].astype(np.float64) if elbow else None
+    for _ in range(3):
+        state = client.turn(state, first, field="O_T_EE_c", elbow=angle)
+        assert state["robot_mode"] == _MOVE, _errors(state)
+    np.testing.assert_allclose(state["O_T_EE_c"], first, atol=1e-6)
+    if elbow:
+        assert state["q_d"][2] == pytest.approx(angle[0], abs=1e-6)
+
+
+@pytest.mark.parametrize(("kind", "off"), [("panda", 0.1), ("panda", 1e-4), ("fr3", 0.1), ("fr3", 2e-3)])
 def test_the_first_pose_must_be_where_the_arm_is(serve: Any, raw: Any, kind: RobotKind, off: float) -> None:
     client = raw(serve(kind))
     state = _begun(client, _POSE)

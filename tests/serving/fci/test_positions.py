@@ -66,7 +66,7 @@ def test_lost_commands_are_bridged(serve: Any, raw: Any, kind: RobotKind) -> Non
     assert state["control_command_success_rate"] == pytest.approx(0.96)
 
 
-@pytest.mark.parametrize("off", [0.2, 1e-3, -2e-5])
+@pytest.mark.parametrize("off", [0.2, 2e-3])
 def test_the_first_position_must_be_where_the_arm_is(serve: Any, raw: Any, kind: RobotKind, off: float) -> None:
     client = raw(serve(kind))
     state = _begun(client)
@@ -76,11 +76,27 @@ def test_the_first_position_must_be_where_the_arm_is(serve: Any, raw: Any, kind:
     np.testing.assert_array_equal(after["q_d"], state["q_d"])
 
 
-def test_measured_positions_are_not_where_the_arm_is_commanded_to_be(serve: Any, raw: Any) -> None:
+@pytest.mark.parametrize("off", [0.0, 1e-3, -2e-5])
+def test_a_panda_begins_where_it_is_commanded_to_be_and_not_where_it_is(serve: Any, raw: Any, off: float) -> None:
     """The common mistake: to begin with q in place of q_d."""
+    client = raw(serve("panda"))
+    state = _begun(client)
+    first = state["q_d"] + off if off else state["q"]
+    assert _errors(client.turn(state, first, field="q_c")) == [_START]
+
+
+def test_an_fr3_may_begin_where_it_measurably_is(serve: Any, raw: Any) -> None:
     client = raw(serve("fr3"))
     state = _begun(client)
-    assert _errors(client.turn(state, state["q"], field="q_c")) == [_START]
+    q = state["q"].astype(np.float64)
+    assert np.max(np.abs(q - state["q_d"])) > 2e-5  # farther than a millisecond goes
+    state = client.turn(state, q, field="q_c")
+    np.testing.assert_allclose(state["q_d"], q, atol=1e-6)
+    np.testing.assert_array_equal(state["dq_d"], np.zeros(7))
+    for k in range(1, 51):
+        q = q + 1e-3 * k * _MS * np.eye(7)[6]
+        state = client.turn(state, q, field="q_c")
+        assert state["robot_mode"] == _MOVE, _errors(state)
 
 
 def test_a_step_of_the_positions_is_a_discontinuity(serve: Any, raw: Any, kind: RobotKind) -> None:

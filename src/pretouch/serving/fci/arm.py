@@ -239,7 +239,7 @@ class ServedArm:
             self.stop()
             self.mode = RobotMode.USER_STOPPED
         elif self.motion is not None:
-            ending = self.motion.follow(self.report.q_commanded, setpoint)
+            ending = self.motion.follow(self._place(self.motion, setpoint), setpoint)
             self.qd, self.qdd, self.success_rate = self.motion.qd, self.motion.qdd, self.motion.success_rate
             if ending is not None:
                 self._end(ending.errors)
@@ -250,6 +250,18 @@ class ServedArm:
         self.plant.command(self.qd)
         self._pass_time()
         return self._check_contacts() or self._check_joints() or ending
+
+    def _place(self, motion: Motion, setpoint: Setpoint | None) -> FloatArray:
+        """Return the commanded positions (7,) [rad]; an FR3's may begin where the arm measurably is.
+
+        The vendor's own examples begin there since libfranka 0.15 (its changelog); those for the Panda do not.
+        """
+        if self.kind == "fr3" and setpoint is not None and not motion.begun:
+            start = motion.kind.start(setpoint.values, self.report.q)
+            if start is not None:
+                self.plant.begin_at(start)
+                return start
+        return self.report.q_commanded
 
     def _pass_time(self) -> None:
         asked = None if self._drives is None else self._drives.torques()

@@ -10,7 +10,7 @@ import numpy as np
 from pretouch.control.commander import rotation_about
 from pretouch.robot.model import RobotModel
 from pretouch.serving.fci.frames import Frames, pose, pose_of
-from pretouch.serving.fci.kinds import Asked
+from pretouch.serving.fci.kinds import START_M, START_RAD, Asked
 from pretouch.serving.fci.limits import PERIOD_S, SLACK
 from pretouch.serving.fci.wire import JOINTS, Generator, RobotKind
 from pretouch.types import FloatArray
@@ -160,6 +160,10 @@ class CartesianVelocity(_OfEndEffector):
     generator, field, _size = Generator.CARTESIAN_VELOCITY, "O_dP_EE_c", 6
     not_a_number = f"{_PREFIX}_velocity_limits_violation"
 
+    def start(self, values: FloatArray, q: FloatArray) -> FloatArray | None:
+        """Leave it open: velocities begin anywhere."""
+        return None
+
     def _of_field(self, field: FloatArray, q: FloatArray, elbow: float | None, first: bool) -> Asked:
         return self._follow(q, field, elbow)
 
@@ -169,6 +173,17 @@ class CartesianPose(_OfEndEffector):
 
     generator, field, _size = Generator.CARTESIAN_POSITION, "O_T_EE_c", 16
     not_a_number = "cartesian_position_motion_generator_invalid_frame"
+
+    def start(self, values: FloatArray, q: FloatArray) -> FloatArray | None:
+        """Return positions near q with end-effector and elbow as commanded."""
+        field, elbow = np.split(values, [self._size])
+        T = pose_of(field)
+        if T is None or not np.all(np.abs(elbow[:1] - q[_ELBOW]) <= START_RAD):
+            return None
+        off = _difference(T, self._body.end_effector(q)[0])
+        if math.hypot(*off[:3]) > START_M or math.hypot(*off[3:]) > START_RAD:
+            return None
+        return self._reached(q, T, float(elbow[0]) if len(elbow) else None)
 
     def _of_field(self, field: FloatArray, q: FloatArray, elbow: float | None, first: bool) -> Asked:
         T = pose_of(field)

@@ -8,6 +8,10 @@ from pretouch.serving.fci.limits import PERIOD_S, MotionLimits
 from pretouch.serving.fci.wire import Generator
 from pretouch.types import FloatArray
 
+START_M, START_RAD = 1e-3, 1e-3
+"""How far from where the arm measurably is a motion may begin there [m, rad]: our choice. The arm's state is
+milliseconds old when the command comes, and the arm may still swing."""
+
 
 class Asked(NamedTuple):
     """What a command comes to."""
@@ -39,6 +43,10 @@ class MotionKind(Protocol):
 
     def read(self, command: np.void) -> FloatArray:
         """Return what counts of a command."""
+        ...
+
+    def start(self, values: FloatArray, q: FloatArray) -> FloatArray | None:
+        """Return the positions (7,) [rad] at which a first command begins; None if that is not near q (7,) [rad]."""
         ...
 
     def asked(self, values: FloatArray, q: FloatArray, first: bool) -> Asked:
@@ -84,6 +92,10 @@ class JointVelocity(_OfJoints):
         """Return the velocities."""
         return np.array(command["dq_c"])
 
+    def start(self, values: FloatArray, q: FloatArray) -> FloatArray | None:
+        """Leave it open: velocities begin anywhere."""
+        return None
+
     def asked(self, values: FloatArray, q: FloatArray, first: bool) -> Asked:
         """Take them as they are."""
         return Asked(values)
@@ -113,6 +125,10 @@ class JointPosition(_OfJoints):
     def read(self, command: np.void) -> FloatArray:
         """Return the positions."""
         return np.array(command["q_c"])
+
+    def start(self, values: FloatArray, q: FloatArray) -> FloatArray | None:
+        """Return the positions themselves."""
+        return values if np.all(np.abs(values - q) <= START_RAD) else None
 
     def asked(self, values: FloatArray, q: FloatArray, first: bool) -> Asked:
         """Go there within the millisecond; the first must be where the arm is commanded to be already."""
