@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 HOST, PORT = "127.0.0.1", 1337
-"""Where every server is: the port is the only one that the vendor's library knows."""
+"""Where every server is: the port is the only one that the vendor's library knows. A gripper has the next."""
 _STARTS_S, _ENDS_S = 120.0, 10.0
 """A server's first start compiles; an end takes less."""
 _STAND_IN = Path(__file__).parent / "stand_in"
@@ -141,9 +141,9 @@ def listening(command: str) -> Iterator[None]:
 
 def _await(process: subprocess.Popen[bytes], command: str) -> None:
     until = time.monotonic() + _STARTS_S
-    while not _listens(PORT):
+    while not (_listens(PORT) and _listens(PORT + 1)):
         if process.poll() is not None or time.monotonic() > until:
-            raise SystemExit(f"No server listens at port {PORT}. Try by hand: {command}")
+            raise SystemExit(f"No server listens at ports {PORT} and {PORT + 1}. Try by hand: {command}")
         time.sleep(0.1)
 
 
