@@ -4,7 +4,8 @@
         pretouch=/path/to/python franka_sim=/path/to/python franky_sim=/path/to/python'
 
 Each interpreter is one that has that simulator. The arm stands at its start, without a motion; the client is
-pylibfranka. A sign is the simulator's own: the better of both counts.
+pylibfranka. Truth and errors are norms over the joints [Nm], means over pushes along x, y and z. `error` is of the
+torques that are told, `change` of what a push changes of them. A sign is the simulator's own: the better of both counts.
 """
 
 import subprocess
@@ -23,7 +24,7 @@ _FOLDER = Path(__file__).parent / "pushed"
 
 def main() -> None:
     """Push every link along every axis, in each simulator."""
-    print("| simulator | link | truth [Nm] | error [Nm] | force [N] |\n| --- | --- | --- | --- | --- |")
+    print("| simulator | link | truth | error | change | force [N] |\n| --- | --- | --- | --- | --- | --- |")
     for pair in sys.argv[1:]:
         name, _, python = pair.partition("=")
         with subprocess.Popen(  # noqa: S603  our own script
@@ -53,11 +54,10 @@ def _measure(name: str, server: subprocess.Popen[str]) -> None:
             told[link, axis], forces[link, axis] = _read(robot)
     sign = min((1.0, -1.0), key=lambda s: float(np.linalg.norm(s * told - truth)))
     for link in range(8):
-        error = np.linalg.norm(sign * told[link] - truth[link], axis=1)
-        size = np.linalg.norm(truth[link], axis=1)
-        at = f"{link + 1}" if link < 7 else "none"
-        wrench = np.abs(forces[link]).max()
-        print(f"| {name} | {at} | {size.mean():.2f} | {error.mean():.2f} | {wrench:.1f} |", flush=True)
+        torques = (truth[link], sign * told[link] - truth[link], sign * (told[link] - told[7].mean(axis=0)) - truth[link])
+        sizes = " | ".join(f"{np.linalg.norm(each, axis=1).mean():.2f}" for each in torques)
+        at, most = f"{link + 1}" if link < 7 else "none", np.linalg.norm(forces[link], axis=1).mean()
+        print(f"| {name} | {at} | {sizes} | {most:.1f} |", flush=True)
 
 
 def _read(robot: pylibfranka.Robot) -> tuple[np.ndarray, np.ndarray]:

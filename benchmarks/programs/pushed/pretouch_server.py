@@ -12,7 +12,7 @@ from pretouch.serving.fci.server import FciServer
 from pretouch.sim.scene import SceneSpec
 
 model = RobotModel(robot_named("fr3"))
-with ServedArm(ArmSetup(model, "fr3", model.q_ready, SceneSpec())) as arm:
+with ServedArm(ArmSetup(model, "fr3", model.description.q_ready.copy(), SceneSpec())) as arm:
     plant = arm.plant
     push = LinkPush(plant.mj_model, plant.mj_data, [plant.mj_model.jnt_bodyid[joint] for joint in range(7)])
     plant.before_each_step(lambda _time: push.apply())
