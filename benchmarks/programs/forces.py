@@ -5,7 +5,7 @@
 
 Each interpreter is one that has that simulator. The arm stands at its start, without a motion; the client is
 pylibfranka. Truth and errors are norms over the joints [Nm], means over pushes along x, y and z. `error` is of the
-torques that are told, `change` of what a push changes of them. A sign is the simulator's own: the better of both counts.
+torques that are told, `change` of what a push changes of them. A sign is the simulator's own: the better one counts.
 """
 
 import subprocess
@@ -54,8 +54,9 @@ def _measure(name: str, server: subprocess.Popen[str]) -> None:
             told[link, axis], forces[link, axis] = _read(robot)
     sign = min((1.0, -1.0), key=lambda s: float(np.linalg.norm(s * told - truth)))
     for link in range(8):
-        torques = (truth[link], sign * told[link] - truth[link], sign * (told[link] - told[7].mean(axis=0)) - truth[link])
-        sizes = " | ".join(f"{np.linalg.norm(each, axis=1).mean():.2f}" for each in torques)
+        error = sign * told[link] - truth[link]
+        change = error - sign * told[7].mean(axis=0)
+        sizes = " | ".join(f"{np.linalg.norm(each, axis=1).mean():.2f}" for each in (truth[link], error, change))
         at, most = f"{link + 1}" if link < 7 else "none", np.linalg.norm(forces[link], axis=1).mean()
         print(f"| {name} | {at} | {sizes} | {most:.1f} |", flush=True)
 

@@ -23,6 +23,7 @@ from pretouch.serving.fci.kinds import JointPosition, JointVelocity, MotionKind,
 from pretouch.serving.fci.limits import PERIOD_S, motion_limits
 from pretouch.serving.fci.motion import Ending, Motion, Setpoint
 from pretouch.serving.fci.pushes import Pushes, TcpPush
+from pretouch.serving.fci.target import TargetMotion
 from pretouch.serving.fci.units import ServedUnits, UnitsSetup
 from pretouch.serving.fci.wire import JOINTS, Controller, Generator, RobotKind, RobotMode
 from pretouch.sim.hand import Hand, HandScript
@@ -141,15 +142,21 @@ class ServedArm:
         """The arm and its end-effector as they are set now."""
         return Body(self.model, self.frames, CARTESIAN_LIMITS[self.kind])
 
-    def begin(self, generator: Generator, controller: Controller) -> None:
-        """Begin a motion of a kind that is served, at rest and without errors: whoever calls it has looked."""
+    def begin(self, generator: Generator, controller: Controller, fastest: FloatArray | None = None) -> None:
+        """Begin a motion of a kind that is served, at rest and without errors: whoever calls it has looked.
+
+        With largest velocities, (7,) [rad/s], the arm itself finds the way.
+        """
         external = None
         match controller:
             case Controller.EXTERNAL:
                 self._drives = external = ExternalTorques(self.model.description.tau_max, self.torques.desired)
             case Controller.CARTESIAN_IMPEDANCE:
                 self._drives = CartesianImpedance(self.plant, self.body, self.cartesian_stiffness, self.plant.stiffness)
-        self.motion = Motion(self.limits, controller, self._kind(generator), external)
+        if fastest is None:
+            self.motion = Motion(self.limits, controller, self._kind(generator), external)
+        else:
+            self.motion = TargetMotion(self.limits, controller, fastest)
         self.mode, self.reflex_reason = RobotMode.MOVE, ()
         self._own.forget()
 
@@ -256,7 +263,7 @@ class ServedArm:
 
         The vendor's own examples begin there since libfranka 0.15 (its changelog); those for the Panda do not.
         """
-        if self.kind == "fr3" and setpoint is not None and not motion.begun:
+        if self.kind == "fr3" and setpoint is not None and motion.awaited and not motion.begun:
             start = motion.kind.start(setpoint.values, self.report.q)
             if start is not None:
                 self.plant.begin_at(start)

@@ -180,7 +180,7 @@ class CartesianPose(_OfEndEffector):
         T = pose_of(field)
         if T is None or not np.all(np.abs(elbow[:1] - q[_ELBOW]) <= START_RAD):
             return None
-        off = _difference(T, self._body.end_effector(q)[0])
+        off = difference(T, self._body.end_effector(q)[0])
         if math.hypot(*off[:3]) > START_M or math.hypot(*off[3:]) > START_RAD:
             return None
         return self._reached(q, T, float(elbow[0]) if len(elbow) else None)

@@ -10,7 +10,7 @@ from pretouch.serving.fci.collision import CollisionBehavior
 from pretouch.serving.fci.controllers import CARTESIAN_LEAST, CARTESIAN_STIFFNESS, JOINT_MOST_NM_RAD
 from pretouch.serving.fci.frames import pose_of
 from pretouch.serving.fci.inertia import Inertial
-from pretouch.serving.fci.wire import MOVE, Controller, Generator, Protocol
+from pretouch.serving.fci.wire import MOVE, Controller, Generator, Protocol, fastest_of
 from pretouch.types import FloatArray
 
 _EIGENVALUE_SLACK = 1e-9
@@ -37,17 +37,24 @@ class WantedMotion(NamedTuple):
 
     generator: Generator
     controller: Controller
+    fastest: FloatArray | None = None
+    """(7,) largest velocities [rad/s] of a motion whose way the robot finds; None if commands say the way."""
 
 
 def wanted_motion(protocol: Protocol, body: bytes) -> WantedMotion | None:
     """Read the request to move; None where the motion is not served."""
     controller, generator, *_ = MOVE.unpack_from(body)
-    interpolated = any(body[MOVE.size : MOVE.size + 1])
-    if generator not in protocol.generators or controller not in tuple(Controller)[: Controller.NONE] or interpolated:
+    if generator not in protocol.generators or controller not in tuple(Controller)[: Controller.NONE]:
         return None
     if generator == Generator.NONE and controller != Controller.EXTERNAL:
         return None
-    return WantedMotion(Generator(generator), Controller(controller))
+    fastest = fastest_of(body)
+    if fastest is not None:  # the vendor has that for positions of joints alone
+        if generator != Generator.JOINT_POSITION or controller == Controller.EXTERNAL:
+            return None
+        if not np.all((fastest > 0) & np.isfinite(fastest)):
+            return None
+    return WantedMotion(Generator(generator), Controller(controller), fastest)
 
 
 def set_or_get(arm: ServedArm, name: str, body: bytes) -> bytes:

@@ -78,7 +78,7 @@ class RequestHandler:
         arm, wanted = self._arm, wanted_motion(self._protocol, request.body)
         self._settle()
         if wanted is None:
-            self._say("Refused: this motion is not served, such as one that the robot interpolates by itself.")
+            self._say("Refused: this motion is not served.")
         if arm.mode is not RobotMode.IDLE or not arm.at_rest or wanted is None:
             self._answer("Move", request.identifier, self._status("not possible"))
             return

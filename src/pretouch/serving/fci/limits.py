@@ -56,7 +56,7 @@ class MotionLimits:
             acceleration = (wanted - qd) / PERIOD_S
             jerk = (acceleration - qdd) / PERIOD_S
             following = q + wanted * PERIOD_S
-        low, high = self._speeds(q)
+        low, high = self.speeds(q)
         # written so that a number that is none is a violation
         within = {
             "velocity_limits_violation": np.all((wanted >= low) & (wanted <= high)),
@@ -89,8 +89,8 @@ class MotionLimits:
         """Return the velocities (n,) [rad/s] one millisecond of braking later."""
         return np.asarray(np.sign(qd) * np.maximum(0.0, np.abs(qd) - self.qdd * PERIOD_S))
 
-    def _speeds(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Least and greatest velocities (n,) [rad/s] at q (n,) [rad]."""
+    def speeds(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return least and greatest velocities (n,) [rad/s] at q (n,) [rad]."""
         fastest = self.qd * (1 + SLACK)
         if self.envelope is None:
             return -fastest, fastest

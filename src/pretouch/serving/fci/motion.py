@@ -44,6 +44,9 @@ class Ending:
 class Motion:
     """A motion from its request until it ends."""
 
+    awaited = True
+    """Whether a command is due in each millisecond."""
+
     def __init__(
         self, limits: MotionLimits, controller: Controller, kind: MotionKind, external: ExternalTorques | None = None
     ) -> None:

@@ -117,9 +117,9 @@ class FciServer:
                 self.left_out += now - self._next
                 self._next = now
             self._poll_sockets(self._next)
-            if self._command is None and arm.motion is not None and arm.motion.begun:
+            if self._command is None and arm.motion is not None and arm.motion.begun and arm.motion.awaited:
                 self._poll_sockets(self._next + self._options.grace_s, for_command=True)
-        elif arm.motion is None:
+        elif arm.motion is None or not arm.motion.awaited:
             self._poll_sockets(now + PERIOD_S)
         elif arm.motion.begun:
             self._poll_sockets(now + self._options.patience_s, for_command=True)
@@ -178,11 +178,11 @@ class FciServer:
                 return
             except OSError:  # news of a state that found nobody
                 continue
-            if self._arm.motion is None or sender != self._client_udp or len(data) != self.protocol.command.itemsize:
+            motion = self._arm.motion
+            if motion is None or sender != self._client_udp or len(data) != self.protocol.command.itemsize:
                 continue
             command = np.frombuffer(data, self.protocol.command)[0]
-            number = int(command["message_id"])
-            if number == self._tick:
+            if int(command["message_id"]) == self._tick or not motion.awaited:
                 self._command = command
 
     # clients

@@ -7,6 +7,8 @@ from typing import Literal
 
 import numpy as np
 
+from pretouch.types import FloatArray
+
 PORT = 1337
 """TCP port of the interface; the vendor's clients know no other."""
 GRIPPER_PORT = 1338
@@ -123,6 +125,12 @@ _COMMON = {
     "AutomaticErrorRecovery": 0,
 }  # fmt: skip
 """Sizes of the bodies of requests [B] that are the same in both protocols."""
+
+
+def fastest_of(body: bytes) -> FloatArray | None:
+    """Read the largest velocities (7,) [rad/s] of a request to move; None unless the robot is to find the way."""
+    rest = body[MOVE.size :]
+    return np.frombuffer(rest, "<f8", offset=1) if any(rest[:1]) else None
 
 
 @dataclass(frozen=True, kw_only=True)
