@@ -68,7 +68,7 @@ def _run(known: dict[str, Any], args: argparse.Namespace, places: dict[str, str]
             if missing := _names(program.command) - {*places, "robot"}:
                 print(f"Left out: {one['title']}. Give --place {' and '.join(sorted(missing))}.")
                 break
-            words = f"{server['command']} {server['object'] if program.object else ''}"
+            words = f"{server['command']} {server.get(program.beside, '')}"
             played = play(program, words, places | {"robot": one["robot"]}, args.limit)
             print(f"{played.verdict:12} {played.seconds:6.1f} s  {program.name}  {played.why}", flush=True)
             found.setdefault(one["title"], {}).setdefault(program.name, {})[args.server] = asdict(played)

@@ -39,8 +39,8 @@ class Program:
     """What it prints when all went well."""
     ctrl_c: float = 0.0
     """After so long Ctrl-C ends it [s]; 0 if it ends by itself."""
-    object: bool = False
-    """Whether something lies between the fingers."""
+    beside: str = ""
+    """What it needs beside the robot."""
     stand_in: bool = False
     """Whether it starts a simulator of its own, in whose place it gets the server."""
 
@@ -62,7 +62,7 @@ def programs_of(one: Mapping[str, Any]) -> Iterator[Program]:
     """Give the programs of a set, as programs.toml writes it."""
     for each in one["programs"]:
         command = f"{one['command'].replace('{name}', each['name'])} {each.get('more', '')}"
-        rest = {key: each[key] for key in ("says", "ctrl_c", "object") if key in each}
+        rest = {key: each[key] for key in ("says", "ctrl_c", "beside") if key in each}
         yield Program(each["name"], command.strip(), stand_in=one.get("stand_in", False), **rest)
 
 
