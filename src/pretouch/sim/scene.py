@@ -158,10 +158,10 @@ def build(model: RobotModel, spec: SceneSpec, error: ArmError) -> mujoco.MjModel
     """
     mj, own = _arm(model, error)
     mj.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-    if spec.world:
+    second = _ArmGeoms([], []) if spec.second is None else _add_second(mj, spec, spec.second)
+    if spec.world:  # behind the arms, whose joints are found by their numbers
         attach_world(mj, spec.world)
     pedestal = [] if spec.world else ["pedestal"]
-    second = _ArmGeoms([], []) if spec.second is None else _add_second(mj, spec, spec.second)
     stiffness = _add_objects(mj, spec)
     pairs = [(link, thing) for link in own.moving + second.moving for thing in stiffness]
     pairs += [(link, other) for link in own.moving for other in second.moving + second.still]
