@@ -172,6 +172,16 @@ def test_the_vendors_library_computes_with_our_model(serve: Any, client: str, ro
     np.testing.assert_allclose(jacobian, model.ee_jacobian(model.kinematics(q)), atol=1e-5 * rough)
 
 
+@pytest.mark.slow
+def test_panda_pythons_own_motions_end_where_it_plans(serve: Any) -> None:
+    if shutil.which("cc") is None:
+        skip_for("apt install gcc libc6-dev")
+    told = serve("panda").ask("panda_python", kind="panda-python")
+    assert told["done"] == [True, True]
+    np.testing.assert_allclose(np.subtract(told["posture"], told["begun"]), 0.1, atol=2e-3)
+    np.testing.assert_allclose(told["off"], 0.0, atol=1.5e-2)  # its springs are soft, and the joints have friction
+
+
 @pytest.mark.parametrize(("client", "kind"), [("panda", "fr3"), ("fr3", "panda")])
 def test_a_library_for_another_robot_is_told_so(serve: Any, client: str, kind: RobotKind) -> None:
     error = serve(kind).ask("state", kind=client)["error"]

@@ -239,6 +239,16 @@ def model(lib, robot, kind):
     }  # fmt: skip
 
 
+def panda_python(lib, robot, kind):
+    """Let panda-python plan and control motions, by torques: to a posture, then 0.05 m up."""
+    begun = list(kept.q)
+    done = [kept.move_to_joint_position([q + 0.1 for q in begun])]
+    posture, pose = list(kept.q), kept.get_pose()
+    pose[2, 3] += 0.05
+    done.append(kept.move_to_pose(pose))
+    return {"done": done, "begun": begun, "posture": posture, "off": (kept.get_pose() - pose)[:3, 3].tolist()}
+
+
 def _flat(matrix):
     import numpy as np
 
@@ -271,7 +281,7 @@ def main():
     except Exception as error:
         print(json.dumps({"error": str(error)}), flush=True)
     else:
-        known = (state, move, positions, cartesian, torques, hold, settings, model, gripper)
+        known = (state, move, positions, cartesian, torques, hold, settings, model, gripper, panda_python)
         done = {f.__name__: f for f in known}[what](lib, robot, kind, *map(float, values))
         print(json.dumps(done), flush=True)
     os._exit(0)
