@@ -1,5 +1,7 @@
 """What is caught between two links, or between one and a fixture, and what is only a push."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ from pretouch.contact.clamp import caught_between, clamp_begun, clamp_init, gone
 from pretouch.contact.self_clamping import find_self_clamp, presses_on_fixture
 from pretouch.params import ClampParams, PinchParams
 from pretouch.robot.body import Capsules, no_capsules
+from pretouch.robot.description import RobotDescription
 from pretouch.robot.model import RobotModel
 from pretouch.robot.self_distance import nearest_points, segment_distance
 from pretouch.types import NOT_TOUCHED, FloatArray, Touched
@@ -55,17 +58,26 @@ def found(model: RobotModel, torque: FloatArray, q: FloatArray = FOLDED, qd: Flo
     return find_self_clamp(model, model.kinematics(q), torque, NOISE, qd, P)
 
 
-def test_of_two_joints_alone_nothing_is_said_to_be_caught(panda_model: RobotModel) -> None:
-    # between shoulder and elbow, with a joint so quick that this gap closes as no task closes it
-    kin, qd = panda_model.kinematics(FOLDED), np.array([0.0, 0.0, 0.0, -20.0, 0.0, 0.0, 0.0])
-    at_upper, at_elbow, u = gap_of(panda_model, "panda_link2", "panda_link4", FOLDED)
-    J = [
-        panda_model.jacobian(kin, panda_model.link_index(link), at)[:3]
-        for link, at in (("panda_link4", at_elbow), ("panda_link2", at_upper))
-    ]
-    torque = (J[0] - J[1]).T @ (60.0 * u)
-    assert abs(u @ (J[0] - J[1]) @ qd) > 0.02
-    assert found(panda_model, torque, qd=qd) is None
+MASS = '<inertial pos="0 0 0" mass="1" diaginertia=".01 .01 .01"/>'
+ROD = '<geom type="capsule" fromto="{}" size=".02"/>'
+
+
+@pytest.mark.parametrize(("joints", "caught"), [(2, False), (3, True)])
+def test_between_base_and_second_link_nothing_is_looked_for(tmp_path: Path, joints: int, caught: bool) -> None:
+    # the base has a rod 0.15 m from its axis, and the last link turns towards it: a gap of 2 cm closes at 0.1 m/s
+    links = "".join(
+        f'<body name="l{k}" pos="0 0 {0.2 * (k == 1)}">{MASS}<joint name="j{k}" axis="0 {k > 1:d} {k == 1:d}"'
+        ' range="-3 3"/>' for k in range(1, joints + 1)
+    )  # fmt: skip
+    base = f'<body name="base">{ROD.format(".15 0 0 .15 0 .3")}{links}{ROD.format("0 0 0 .4 0 0")}'
+    (tmp_path / "arm.xml").write_text(f"<mujoco><worldbody>{base}{'</body>' * (joints + 1)}</worldbody></mujoco>")
+    one, rest = np.ones(joints), np.zeros(joints)
+    model = RobotModel(RobotDescription("made", tmp_path / "arm.xml", f"l{joints}", one, one, one, rest, "made"))
+    first = np.eye(joints)[0]
+    pinch = find_self_clamp(model, model.kinematics(0.4 * first), 9.0 * first, np.eye(joints), -0.7 * first, P)
+    assert (pinch is not None) is caught
+    if pinch is not None:
+        assert pinch.force == pytest.approx(9.0 / 0.15, rel=0.1)
 
 
 def test_what_pushes_upper_arm_and_forearm_apart_is_caught_between_them(panda_model: RobotModel) -> None:

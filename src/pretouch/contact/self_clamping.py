@@ -52,8 +52,8 @@ def find_self_clamp(
     size = float(z @ z)
     for k in np.flatnonzero((gap > 0.0) & (gap < p.gap_m)):
         one, other, u = body.link[first[k]], body.link[second[k]], between[k] / length[k]
-        # of two joints alone a push from outside may ask the same: from the side, an arm of six turns only its first
-        if (model.moved_by[one] != model.moved_by[other]).sum() < _JOINTS:
+        # base and second link: what is between them turns the first joints, as a push from the side does
+        if model.moved_by[one].sum() + model.moved_by[other].sum() <= _FIRST_JOINTS:
             continue
         # it touches both links on their surfaces, where they are nearest to each other
         at_one, at_other = p1[k] + body.radius[first[k]] * u, p2[k] - body.radius[second[k]] * u
@@ -115,11 +115,12 @@ def presses_on_fixture(
 
 _LEAST_GAP_M = 0.02
 """Gap to a fixture below which the link touches the fixture itself [m]: as well as the place of a contact is known."""
-_JOINTS = 3
-"""Joints between two links from which on their torques tell what is caught from what pushes. The Panda's links with
-fewer between them do not come nearer to each other at `_CLOSING_M_S` anyway."""
+_FIRST_JOINTS = 2
+"""Joints of which the torques alone do not tell what is caught from a push: one from the side at the hand of an arm of
+six joints turns the first only."""
 _CLOSING_M_S = 0.02
-"""Speed from which a gap counts as closing [m/s]."""
+"""Speed from which a gap counts as closing [m/s]: two links with a single link between them come nearer to each other
+by less, whatever the arm does."""
 _THICKNESS_M = 0.06
 """Mean thickness of what may be caught, between finger and forearm [m]: of two gaps that explain the torques as well,
 the narrower one is taken."""
