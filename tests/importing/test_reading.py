@@ -147,6 +147,14 @@ def test_of_two_arms_one_has_to_be_chosen(tmp_path):
     assert "lj0, lj1" in chosen.remarks[0]
 
 
+def test_damping_and_friction_of_a_urdf_are_left_out_with_a_sentence(tmp_path):
+    dynamics = {2: {"more": '<dynamics damping="10" friction="1"/>'}, 3: {"more": '<dynamics damping="0"/>'}}
+    (said,) = arm(tmp_path, six_axis(changed=dynamics)).remarks
+    assert said == "Damping and friction of the joints are left out: joint2 (10 Nm s/rad, 1 Nm)."
+    with pytest.raises(RobotModelError, match="joint2: friction of <dynamics> is 'much': give a finite number"):
+        arm(tmp_path, six_axis(changed={2: {"more": '<dynamics friction="much"/>'}}))
+
+
 def branching(before, after):
     """A robot whose only chain splits in two."""
     parts, last = [link("base")], "base"

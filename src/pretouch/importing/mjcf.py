@@ -31,9 +31,12 @@ def read_mjcf(file: Path) -> Source:
     remarks = []
     if model.neq:
         remarks.append(f"{model.neq} equality constraints of the MJCF are left out.")
-    if any(np.any(values) for values in (model.dof_armature, model.dof_damping, model.dof_frictionloss,
-                                         model.jnt_stiffness)):  # fmt: skip
-        remarks.append("Armature, damping, friction and springs of the joints are left out.")
+    of_dofs = (model.dof_armature, model.dof_damping, model.dof_frictionloss)
+    told = {int(j) for j in np.flatnonzero(model.jnt_stiffness)}
+    told |= {int(model.dof_jntid[dof]) for values in of_dofs for dof in np.flatnonzero(values)}
+    if told:
+        names = ", ".join(model.joint(j).name or f"joint{j + 1}" for j in sorted(told))
+        remarks.append(f"Armature, damping, friction and springs of the joints are left out: {names}.")
     ignored = [g for g in range(model.ngeom) if _shape(model, g) is None and model.geom_bodyid[g]]
     if ignored:
         remarks.append(f"{len(ignored)} shapes that are planes, height fields or the like are left out.")

@@ -102,7 +102,18 @@ def read_urdf(root: Element, file: Path, folders: tuple[Path, ...]) -> Source:
             _shapes(element, "visual", finder),
         )  # fmt: skip
         built.append(link)
-    return Source(root.get("name") or file.stem, tuple(built))
+    return Source(root.get("name") or file.stem, tuple(built), _left_out(joints))
+
+
+def _left_out(joints: dict[str, Element]) -> tuple[str, ...]:
+    """Name the joints with damping or friction, which are not taken."""
+    said = []
+    for joint in joints.values():
+        name, dynamics = required(joint, "name"), joint.find("dynamics")
+        if dynamics is not None:
+            damping, friction = (number(dynamics, key, name, 0.0) for key in ("damping", "friction"))
+            said += [f"{name} ({damping:g} Nm s/rad, {friction:g} Nm)"] if damping or friction else []
+    return (f"Damping and friction of the joints are left out: {', '.join(said)}.",) if said else ()
 
 
 def _joints(root: Element, links: dict[str, Element]) -> dict[str, Element]:
