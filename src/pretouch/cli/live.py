@@ -33,7 +33,7 @@ def live(command: "Live") -> None:
     settings = LiveSettings(profile=profile, path=path, seed=command.seed)
 
     from pretouch.cli.warm_up import prepare
-    from pretouch.coverage.assumed import assumptions
+    from pretouch.coverage.placement import assumptions
     from pretouch.robot.model import RobotModel
     from pretouch.robot.named import robot_named
     from pretouch.viewer.live import serve_live
@@ -53,7 +53,7 @@ def live(command: "Live") -> None:
     prepare(profile, lambda: Room(settings, live_path(settings), model, skin).tick(), first_contact=True)
     with _units(command, skin) as real:
         simulation = LiveSimulation(settings, model, believed, real, skin)
-        for sentence in assumptions(model, settings.placement, settings.floor):
+        for sentence in assumptions(model, settings.placement):
             print(sentence, flush=True)
             simulation.notice = f"{simulation.notice} {sentence}".strip()
         if command.opening and not real and not command.record:

@@ -8,8 +8,7 @@ import numpy as np
 
 from pretouch.cli.skin_keys import keys_file, keys_or_none, with_new
 from pretouch.cli.words import words
-from pretouch.coverage.assumed import assumptions, floor_under
-from pretouch.coverage.placement import placement_for
+from pretouch.coverage.placement import assumptions, placement_for
 from pretouch.errors import HardwareError
 from pretouch.hardware.keys import Keys, save_keys
 from pretouch.profiles import profile as find_profile
@@ -45,11 +44,10 @@ def simulate_units(command: "Simulate") -> None:
     model = RobotModel(robot_named(c.arm))
     skin = skin_for(model, c.skin)
     placement = placement_for(model)
-    floor = floor_under(model, placement)
-    for sentence in assumptions(model, placement, floor):
+    for sentence in assumptions(model, placement):
         _say(sentence)
     options = SimulateOptions(
-        model, skin, keys_for(keys_file(c.keys), skin), c.host, c.port, fleet, placement.path("circle", -1.0), floor,
+        model, skin, keys_for(keys_file(c.keys), skin), c.host, c.port, fleet, placement.path("circle", -1.0),
         profile=profile, hand=c.hand, silenced=frozenset(words(c.silenced)),
         stuck=frozenset(words(c.stuck)), seed=c.seed, duration_s=c.duration,
     )  # fmt: skip

@@ -18,6 +18,7 @@ from pretouch.robot.named import is_shipped
 from pretouch.robot.self_distance import capsule_ends, kinematics_of, pairs_apart, segment_distance, self_distances
 from pretouch.sim.board import HandSide, Side, sign_of
 from pretouch.sim.paper_scenes import Placement
+from pretouch.sim.plant_params import assumed_plant
 from pretouch.sim.scene import SceneSpec
 from pretouch.types import BoolArray, FloatArray
 
@@ -74,6 +75,17 @@ def placement_for(model: RobotModel) -> Placement:
     )
 
 
+def assumptions(model: RobotModel, placement: Placement) -> tuple[str, ...]:
+    """Say what a simulation of an arm assumes, a sentence each; nothing of one that comes with the package.
+
+    Nothing is said of paths that are where the paper has them.
+    """
+    arm = model.description
+    if is_shipped(arm):
+        return ()
+    return (*((placement.paths_sentence(arm.name),) if placement != Placement() else ()), assumed_plant(arm))
+
+
 def _visited(model: RobotModel, placement: Placement, postures: FloatArray) -> Placement:
     """Place the hands of people beside the circle and in the way of an arm that goes through postures (S, n)."""
     ends = capsule_ends(model, kinematics_of(model, postures))
@@ -113,14 +125,6 @@ def hand_side(model: RobotModel, side: Side) -> HandSide:
     out = sign_of(side) * away[:, 1] + np.tile(hand.radius, 2)
     widest = int(np.argmax(out))
     return HandSide(max(float(out[widest]), 0.02), float(away[widest, 2]))
-
-
-def postures_along(model: RobotModel, path: Path) -> FloatArray | None:
-    """Return postures (S, n) [rad] along a path, hand upright; None where the arm cannot follow it, or only just."""
-    try:
-        return _followed(model, path, ever_apart(model, 2 * _CLEAR_M))
-    except _NotFollowed:
-        return None
 
 
 class _NotFollowed(Exception):

@@ -107,8 +107,7 @@ def run(options: SimulateOptions, done: Callable[[], bool], say: Callable[[str],
     HardwareError.
     """
     model, profile = options.model, options.profile
-    hand = HandSpec(start=VisitingHand.away) if options.hand else None
-    scene = SceneSpec(hand=hand, floor_height=options.floor)
+    scene = SceneSpec(hand=HandSpec(start=VisitingHand.away)) if options.hand else SceneSpec()
     begin = brought_to(model, options.path.point(0.0))
     with SimulatedArm(options, begin, profile.task.control_period_s, scene) as arm:
         if options.hand:

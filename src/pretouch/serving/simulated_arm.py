@@ -48,8 +48,6 @@ class SimulateOptions(Checked):
     """Units, their IMUs and reboots, and the network to the receiver."""
     path: Path = field(default_factory=Circle)
     """What the end-effector follows."""
-    floor: float = SceneSpec.floor_height
-    """Height of the floor below that, base frame [m]."""
     profile: Profile = field(default_factory=Profile)
     """Parameters of the controller."""
     hand: bool = True

@@ -83,16 +83,22 @@ class Placement:
         above = self.hand("+y" if sign > 0 else "-y").above - PANDA_SIDE.above
         return x, sign * aside, z + above + _VISITED_ABOVE_M
 
+    def paths_sentence(self, arm: str) -> str:
+        """Say what was done to the paper's paths."""
+        return (
+            f"The paper's paths for {arm}: {self.scale:.3g} times as large, moved by {self.shift_x:+.2f} m in x and"
+            f" {self.shift_z:+.2f} m in z; the board is met on the same part of them."
+        )
+
     def sentence(self, arm: str) -> str:
         """Say what was done to the paper's paths and places."""
         if self == _UNMOVED:
             return f"{arm} has the paper's own paths and places."
         places = [f"{a:.2f} and {b:.2f} m" for a, b in (self.beside, self.inside)]
         return (
-            f"The paper's paths for {arm}: {self.scale:.3g} times as large, moved by {self.shift_x:+.2f} m in x and"
-            f" {self.shift_z:+.2f} m in z; the board is met on the same part of them. A person's hand beside the"
-            f" circle is {places[0]} from the plane y = 0 (at -y and at +y), one in the way {places[1]}, where the"
-            " free arm passes 3 cm from the one and through the middle of the other."
+            f"{self.paths_sentence(arm)} A person's hand beside the circle is {places[0]} from the plane y = 0 (at -y"
+            f" and at +y), one in the way {places[1]}, where the free arm passes 3 cm from the one and through the"
+            " middle of the other."
         )
 
 

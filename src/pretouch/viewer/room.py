@@ -8,7 +8,6 @@ import numpy as np
 from pretouch.checks import Check, Checked
 from pretouch.control.path import Path, WayPoints
 from pretouch.control.posture import brought_to
-from pretouch.coverage.assumed import floor_under
 from pretouch.coverage.placement import placement_for
 from pretouch.errors import ParameterError
 from pretouch.ports import Skin as UnitPort
@@ -75,19 +74,16 @@ class LiveSettings(Checked):
     something."""
     placement: Placement = field(default_factory=Placement)
     """Where the paper's paths are for the arm."""
-    floor: float = SceneSpec.floor_height
-    """Height of the floor in the base frame [m]."""
 
 
 def settings_for(model: RobotModel, settings: LiveSettings) -> LiveSettings:
-    """Return settings with paths, floor, the place where the hand begins and the kind of arm for an arm.
+    """Return settings with the paths, the place where the hand begins, and the kind of arm for an arm.
 
     Raises ExperimentError where the arm cannot follow the paths anywhere.
     """
     placement = placement_for(model)
     hand, plant = placement.point(*settings.hand_start), plant_params_of(model.description)
-    floor = floor_under(model, placement)
-    return replace(settings, placement=placement, floor=floor, hand_start=hand, plant=plant)
+    return replace(settings, placement=placement, hand_start=hand, plant=plant)
 
 
 _SETTLE_S = 0.2
@@ -116,7 +112,7 @@ class Room:
             side: Side = "+y" if settings.object == "board +y" else "-y"
             face, met_by = settings.placement.face(FACE_M, side), settings.placement.hand(side)
             boxes = (board_beside(path, side, settings.stiffness, face, hand=met_by),)
-        scene = SceneSpec(boxes=boxes, hand=hand, floor_height=settings.floor)
+        scene = SceneSpec(boxes=boxes, hand=hand)
         self.mouse = Mouse(np.array(settings.hand_start), scene, hand, settings.placement.scale)
         start = clear_place(model, q, scene, self.mouse.target, hand.radius + GAP_M)
         self.mouse.move(start)

@@ -2,15 +2,17 @@ import numpy as np
 import pytest
 
 from pretouch.control.path import Circle
-from pretouch.coverage.placement import hand_side, placement_for
+from pretouch.coverage.placement import assumptions, hand_side, placement_for
 from pretouch.errors import ExperimentError
 from pretouch.robot.description import RobotDescription
 from pretouch.robot.model import RobotModel
+from pretouch.robot.named import robot_named
 from pretouch.sim.board import PANDA_SIDE, HandSide
 from pretouch.sim.paper_scenes import Placement, person_scene, static_path, static_scene
 from pretouch.sim.pushes import way_round
 from pretouch.sim.scene import HandSpec
 from pretouch_lab.campaign import Request
+from tests.other_arm import copied_panda
 
 FIVE = "<mujoco><worldbody>{}</worldbody></mujoco>"
 
@@ -38,6 +40,15 @@ def test_the_panda_has_the_papers_paths(panda_model):
 def test_an_arm_of_five_joints_is_refused_with_its_joints(five_axis):
     with pytest.raises(ExperimentError, match=r"five has 5 joints \(j1, j2, j3, j4, j5\): .* needs 6. .*another --ee"):
         placement_for(five_axis)
+
+
+def test_of_a_simulated_arm_it_is_said_what_is_assumed(panda_model, tmp_path):
+    assert assumptions(panda_model, Placement()) == ()
+    other = RobotModel(robot_named(str(copied_panda(tmp_path))))
+    paths, plant = assumptions(other, Placement(0.8, 0.1))
+    assert paths.startswith("The paper's paths for panda: 0.8 times as large, moved by +0.10 m in x")
+    assert "hand" not in paths
+    assert assumptions(other, Placement()) == (plant,)
 
 
 def test_another_arm_has_them_scaled_and_moved():

@@ -115,8 +115,7 @@ class TaskOptions:
     approach: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
     """First move slowly to the start of the path."""
     floor: float | None = None
-    """Height of the floor below the arm, base frame [m]; by default 0, level with its base, and in simulation -0.2 or
-    what the arm needs."""
+    """Height of the floor below the arm, base frame [m]; by default 0, level with its base, and -0.2 in simulation."""
 
 
 @dataclass(frozen=True)

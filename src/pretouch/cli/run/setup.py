@@ -14,8 +14,7 @@ from pretouch.contact.sequential_test import SequentialTest
 from pretouch.control.path import Circle, Path, WayPoints, line
 from pretouch.control.posture import brought_to
 from pretouch.controller import Controller
-from pretouch.coverage.assumed import assumptions, floor_under
-from pretouch.coverage.placement import placement_for
+from pretouch.coverage.placement import assumptions, placement_for
 from pretouch.desired import Desired
 from pretouch.errors import ParameterError
 from pretouch.hardware.franka.limits import LimiterParams, planned
@@ -118,27 +117,15 @@ def run_setup(command: "Run") -> RunSetup:
     if command.robot.ros_desired:
         task = replace(task, path="hold")
     simulated = command.robot.robot == "simulated" or command.robot.lockstep
-    placement, floor = _placed(model, task, simulated)
-    assumed = assumptions(model, placement, floor) if simulated else _said(model, placement)
-    return RunSetup(model, skin, profile, floor, task, placement, assumed)
-
-
-def _placed(model: RobotModel, task: "TaskOptions", simulated: bool) -> tuple[Placement, float]:
-    """Return where the paper's paths are for an arm that is to follow one, and the height of the floor [m]."""
-    circle = task.path == "circle" and (task.center is None or task.radius is None)
-    placement = placement_for(model) if circle or task.path == "line" else Placement()
-    floor = task.floor
-    if floor is None and simulated:
-        floor = SceneSpec.floor_height if placement == Placement() else floor_under(model, placement)
-    floor = 0.0 if floor is None else floor
+    floor = (SceneSpec().floor_height if simulated else 0.0) if task.floor is None else task.floor
     if not np.isfinite(floor):
         raise ParameterError(f"--floor is {floor}: give a height in metres.")
-    return placement, floor
-
-
-def _said(model: RobotModel, placement: Placement) -> tuple[str, ...]:
-    """Say where the paths of a real arm are, if that is elsewhere than the paper's."""
-    return () if placement == Placement() else (placement.sentence(model.description.name),)
+    circle = task.path == "circle" and (task.center is None or task.radius is None)
+    placement = placement_for(model) if circle or task.path == "line" else Placement()
+    assumed = assumptions(model, placement)
+    if not simulated:  # a real arm is what it is, wherever its path is
+        assumed = tuple(said for said in assumed if said == placement.paths_sentence(model.description.name))
+    return RunSetup(model, skin, profile, floor, task, placement, assumed)
 
 
 if TYPE_CHECKING:
