@@ -230,6 +230,17 @@ def test_what_a_person_gives_the_hand_holds_though_the_sliders_show_another_plac
     np.testing.assert_array_equal(simulation.hand_target, [1.2, y, 0.7])
 
 
+def test_what_was_said_of_the_simulation_before_is_on_the_page_at_first(simulation: LiveSimulation) -> None:
+    simulation.notice = "The paper's paths for mine: 0.8 times as large."
+    with served(ServeOptions(port=free_port()), "test") as server:
+        clock = Clock(LivePage(server, simulation))
+        clock.turn(1.0)
+        assert clock.page.notice.endswith("for mine: 0.8 times as large.")
+        click(clock.page, "Reset")
+        clock.turn(1.0)
+        assert clock.page.notice == ""
+
+
 def test_a_hand_on_the_move_and_another_view_leave_a_notice_standing(clock: Clock, simulation: LiveSimulation) -> None:
     clock.page.ask(lambda: set_speed(simulation, -1.0))
     clock.turn(0.1)
