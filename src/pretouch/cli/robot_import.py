@@ -61,9 +61,7 @@ def _imported(command: "Import", file: Path, options: ImportOptions, folder: Pat
         console.print(f"- {sentence}", markup=False, soft_wrap=True)
     if kept:
         console.print(f"The previous contents of {folder} are now in {kept}.", markup=False, soft_wrap=True)
-    console.print(
-        f"\nWritten: {folder}. Try it: pretouch reproduce static --arm {folder} --seeds 1", markup=False, soft_wrap=True
-    )
+    console.print(f"\nWritten: {folder}. Try it: pretouch live --arm {folder}", markup=False, soft_wrap=True)
     return _numbers_of(found)
 
 
