@@ -1,5 +1,6 @@
 """Motions through joint positions: by raw bytes, and each limit by itself without a server."""
 
+import time
 from typing import Any
 
 import numpy as np
@@ -131,6 +132,18 @@ def test_positions_that_are_none_end_the_motion(serve: Any, raw: Any, bad: float
     assert client.ended() in ("input error", "reflex")
     assert "joint_motion_generator_position_limits_violation" in _errors(state)
     assert np.all(np.isfinite(state["q_d"]))
+
+
+def test_in_real_time_the_first_states_of_a_motion_wait_for_their_answer_too(serve: Any, raw: Any) -> None:
+    """libfranka filters the second command with what the robot took of the first, which must not be lost."""
+    client = raw(serve("fr3", lockstep=False, grace_s=0.1))
+    _begun(client)
+    at = [time.monotonic()]
+    for _ in range(30):
+        client.state()
+        at.append(time.monotonic())
+    assert at[5] - at[0] > 0.4
+    assert min(np.diff(at[6:])) < 0.1  # a client that loads its model first is not waited for
 
 
 class Follower:

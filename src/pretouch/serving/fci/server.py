@@ -27,6 +27,8 @@ _DATAGRAMS_MOST = 256
 _FIRST_WAITS_S = (0.25, 0.75)
 """In lockstep, how long the first state of a motion, and each that follows, stands without an answer [s]: the vendor's
 clients answer the second one, and give up after a second without a state."""
+_ANSWERED = 6
+"""Of the first so many states of a motion, libfranka answers one: those before it has waited for."""
 _MOTION_EVERY = 1_000_000
 """In lockstep, each motion begins at a multiple of this [ms], so that its times do not depend on the time before it."""
 
@@ -69,7 +71,7 @@ class FciServer:
         self._handler: RequestHandler | None = None
         self._served = False
         self._tick = 0
-        self._motions = self._unanswered = self._of_motion = 0
+        self._motions = self._unanswered = self._of_motion = self._answered_until = 0
         self._command: np.void | None = None
         self._next = self._start = 0.0
         self.left_out = 0.0
@@ -117,7 +119,7 @@ class FciServer:
                 self.left_out += now - self._next
                 self._next = now
             self._poll_sockets(self._next)
-            if self._command is None and arm.motion is not None and arm.motion.begun and arm.motion.awaited:
+            if self._command is None and self._command_due:
                 self._poll_sockets(self._next + self._options.grace_s, for_command=True)
         elif arm.motion is None or not arm.motion.awaited:
             self._poll_sockets(now + PERIOD_S)
@@ -125,6 +127,12 @@ class FciServer:
             self._poll_sockets(now + self._options.patience_s, for_command=True)
         else:
             self._poll_sockets(now + _FIRST_WAITS_S[min(self._unanswered, 1)], for_command=True)
+
+    @property
+    def _command_due(self) -> bool:
+        """Whether a client that keeps up answers this state: a first command that is lost upsets libfranka's filter."""
+        motion = self._arm.motion
+        return motion is not None and motion.awaited and (motion.begun or self._tick < self._answered_until)
 
     def _pass_time(self, setpoint: Setpoint | None) -> None:
         """Let the plant move on, unless in lockstep it stands."""
@@ -236,6 +244,7 @@ class FciServer:
         """Note that a motion is about to begin."""
         self._motions += 1
         self._unanswered = self._of_motion = 0
+        self._answered_until = self._tick + _ANSWERED
         if self._options.lockstep:
             start = max(self._motions, self._tick // _MOTION_EVERY + 1) * _MOTION_EVERY
             self._tick = start - 1
