@@ -5,7 +5,6 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -22,29 +21,27 @@ from pretouch.control.joint_box import joint_limits
 from pretouch.control.motion import Motion, MotionState, joint_motion, restriction_on
 from pretouch.control.reduction import ReductionState, reduce_speed, speed_scale
 from pretouch.control.setup import motion_setup
-from pretouch.desired import Desired
 from pretouch.errors import RobotStateError, SkinError
 from pretouch.events import events_of
 from pretouch.modes import Event, ModeState, mode_init, next_mode
 from pretouch.payload import sound_payload
+from pretouch.perception.moving import beside, near_moving, sound_moving
 from pretouch.perception.obstacles import TrackState, track_init
 from pretouch.perception.outside import OutsideState, outside_silence, see_outside
-from pretouch.perception.perceive import Perception, nothing_seen, perceive, perception_setup, silent_units
+from pretouch.perception.perceive import nothing_seen, perceive, perception_setup, silent_units
 from pretouch.perception.scene_filter import Fixtures
 from pretouch.perception.unseen import unseen_on, unseen_scale
 from pretouch.profiles import Profile
 from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.sensing.skin import Skin
+from pretouch.step_parts import Given, Near
 from pretouch.types import (
     ControlStep,
     FloatArray,
     Inputs,
     Mode,
     QpOutcome,
-    RangeReadings,
     RobotState,
-    SeenPoints,
-    TouchReadings,
 )
 from pretouch.values import value
 
@@ -203,7 +200,7 @@ class Controller:
             stamp=now, mode=mode.mode, reason=mode.reason, q=robot.q, q_commanded=robot.q_commanded,
             ee_position=kin.position[model.ee], ee_velocity=motion.ee_velocity, path_position=asked.point,
             path_phase=state.path.phase, desired_velocity=np.zeros(3) if mode.mode is Mode.HOLD else desired,
-            speed_scale=scale, range_distance=near.seen.distance, obstacles=near.seen.obstacles,
+            speed_scale=scale, range_distance=near.seen.distance, obstacles=near.obstacles,
             force=np.full(3, np.nan) if robot.wrench is None else robot.wrench[:3],
             filtered_force=window.newest, thresholds=detection.thresholds, armed=detection.armed, contact=contact,
             reaction_velocity=desired if mode.mode is Mode.REACT else _STILL, restricted=motion.restricted,
@@ -222,7 +219,7 @@ class Controller:
         mark("record")
         return step, after
 
-    def _checked(self, state: ControllerState, inputs: Inputs) -> "_Given":
+    def _checked(self, state: ControllerState, inputs: Inputs) -> Given:
         """Return what of the inputs can be used, and what is wrong with the rest."""
         p, units = self.profile, self._units
         robot, events, watch = faults.examine(
@@ -235,22 +232,27 @@ class Controller:
         if heavy:
             events[Event.LOAD_UNFIT] = heavy
         load = announced(state.load, payload, robot)
+        moving, astray = sound_moving(inputs.moving, watch.stamp, p.failure.state_timeout_s)
+        if astray:
+            events[Event.MOVING_LOST] = astray
         desired, ended = commanded(inputs.desired, self.model.n, watch.stamp, p.failure)
         events |= ended
-        return _Given(robot, events, watch, readings, touches, points, load, desired, unfit or wrong, lost)
+        return Given(robot, events, watch, readings, touches, points, load, desired, moving, unfit or wrong, lost)
 
-    def _unloaded(self, given: "_Given", kin: Kinematics) -> "_Given":
+    def _unloaded(self, given: Given, kin: Kinematics) -> Given:
         """Take an announced load out of torques and force."""
         if given.load is None:
             return given
         robot, load = without_load(given.load, self.model, kin, given.robot, self.limits.period)
         return given._replace(robot=robot, load=load)
 
-    def _perceived(self, state: ControllerState, given: "_Given", kin: Kinematics) -> "_Near":
+    def _perceived(self, state: ControllerState, given: Given, kin: Kinematics) -> Near:
         """Return what is near: eq. 1 and the closest points of the body."""
-        sight, robot, now = self._sight, given.robot, given.watch.stamp
+        sight, robot, now, moving = self._sight, given.robot, given.watch.stamp, given.moving
         if sight is None:
-            return _Near(nothing_seen(given.readings, self.skin), state.tracks, state.outside)
+            return Near(nothing_seen(given.readings, self.skin), state.tracks, state.outside)
+        if moving is not None:
+            sight = beside(sight, moving, given.readings, now)
         anew = Event.TIME_BACKWARDS in given.events
         known = track_init(self._units) if anew else state.tracks
         seen, tracks = perceive(known, sight, kin, given.readings, now, robot)
@@ -258,10 +260,17 @@ class Controller:
         heard, silent = silent_units(self.skin, tracks, given.readings.status, seen.longest_silence, now, sight.params)
         outside_scale, lost = outside_silence(outside, given.lost, now, sight.params.outside)
         watched = self._units > 0 and heard >= 1.0 and not silent
-        return _Near(seen, tracks, outside, min(heard, outside_scale), watched, silent, lost)
+        return Near(
+            seen, tracks, outside, min(heard, outside_scale), watched, silent, lost,
+            None if moving is None else near_moving(moving, self.model, kin, now, self._places(outside)),
+        )  # fmt: skip
+
+    def _places(self, outside: OutsideState | None) -> int:
+        """How many units and places of outside points there are."""
+        return self._units + (0 if outside is None else len(outside.sigma))
 
     def _detected(
-        self, state: ControllerState, inputs: Inputs, given: "_Given", near: "_Near", kin: Kinematics
+        self, state: ControllerState, inputs: Inputs, given: Given, near: Near, kin: Kinematics
     ) -> tuple[Detection, WindowState, object]:
         """Tell a contact from free motion: eqs. 8-11."""
         robot, before, p = given.robot, state.window, self.profile.window
@@ -275,7 +284,7 @@ class Controller:
         detection, detector = self._detector.step(state.detector, self.body, sample)
         return detection, before if reacting and p.freeze_while_reacting else window, detector
 
-    def _asked(self, state: ControllerState, given: "_Given", kin: Kinematics, scale: float) -> tuple[Asked, float]:
+    def _asked(self, state: ControllerState, given: Given, kin: Kinematics, scale: float) -> tuple[Asked, float]:
         """Return what follows the path, or what a commander wants, slower where no unit looks, and the whole factor."""
         task, goal = self.profile.task, state.rotation_goal
         if given.desired is None:
@@ -287,7 +296,7 @@ class Controller:
         return asked.times(slower), slower * scale
 
     def _moved(
-        self, state: ControllerState, noticed: ReactionInputs, near: "_Near", mode: ModeState, asked: Asked,
+        self, state: ControllerState, noticed: ReactionInputs, near: Near, mode: ModeState, asked: Asked,
         desired: FloatArray, answer: ReactionMotion | None,
     ) -> tuple[Motion, ModeState, object, MotionState]:  # fmt: skip
         """Return the joint velocities that come nearest to what is asked: eqs. 5-7 and eq. 2."""
@@ -296,10 +305,12 @@ class Controller:
             qd, touch = answer.qd, answer.touch_speed
         elif mode.mode is Mode.TRACK:
             goal, qd = asked.rotation_goal, asked.qd
-        room = self._units + (0 if near.outside is None else len(near.outside.sigma))
-        hold = mode.mode is Mode.HOLD and qd is None
-        request = MotionRequest(desired, goal, hold, mode.mode is Mode.TRACK, qd, touch, room)
-        kin, robot, obstacles = noticed.kin, noticed.robot, near.seen.obstacles
+        places, told = self._places(near.outside), near.kept_off
+        request = MotionRequest(
+            desired, goal, mode.mode is Mode.HOLD and qd is None, mode.mode is Mode.TRACK, qd, touch,
+            places + (0 if told is None else len(told.unit)), None if told is None else places,
+        )  # fmt: skip
+        kin, robot, obstacles = noticed.kin, noticed.robot, near.obstacles
         allowed, approach = self._approach.step(state.approach, self._motion_body, kin, robot, obstacles, request)
         motion, moving = joint_motion(state.motion, self._setup, kin, robot, obstacles, request, allowed)
         qp = motion.qp
@@ -310,39 +321,6 @@ class Controller:
 
 def _points_per_link(profile: Profile) -> int:
     return 0 if profile.sight.outside is None else profile.sight.outside.per_link
-
-
-class _Given(NamedTuple):
-    """What a step is given, as far as it can be used."""
-
-    robot: RobotState
-    events: dict[Event, str]
-    watch: faults.Watch
-    readings: RangeReadings
-    touches: TouchReadings | None
-    points: SeenPoints | None
-    load: LoadState | None
-    desired: Desired | None
-    unfit: str
-    """What is wrong with readings; '' for nothing."""
-    lost: str
-    """What is wrong with points from outside."""
-
-
-class _Near(NamedTuple):
-    """What is near, and how well it is known."""
-
-    seen: Perception
-    tracks: TrackState
-    outside: OutsideState | None
-    scale: float = 1.0
-    """Factor on the speed for units and outside sources that fall silent."""
-    watched: bool = False
-    """Whether a skin watches, all of its units heard."""
-    silent: str = ""
-    """Units that are silent; '' for none."""
-    lost: str = ""
-    """What is wrong with points of outside sources, silence included."""
 
 
 _STILL = np.zeros(3)

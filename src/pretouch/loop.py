@@ -14,6 +14,7 @@ from pretouch.control.joint_box import JointLimits, box_and_brake
 from pretouch.controller import Controller, ControllerState
 from pretouch.desired import Desired
 from pretouch.errors import ParameterError
+from pretouch.moving_fixtures import MovingFixtures
 from pretouch.payload import Payload
 from pretouch.ports import Clock, Points, Robot, Skin, imu_of, touch_of
 from pretouch.signals import noted
@@ -198,6 +199,9 @@ class Options:
     desired: Callable[[], Desired | None] = lambda: None
     """What a commander asks for, asked in the loop: the newest again while there is no newer; None: the path."""
 
+    moving: Callable[[], MovingFixtures | None] = lambda: None
+    """What is known to move beside the arm, asked in the loop; None: nothing is said of any."""
+
 
 NO_OPTIONS = Options()
 
@@ -233,7 +237,7 @@ def turn(
     seen = None if points is None else points.read()
     stamp = instant(tick, controller.limits.period, report, readings, touch)
     believed = explained(controller, state, report, stamp)
-    inputs = Inputs(stamp, believed, readings, resume, touch, imu, seen, payload, desired)
+    inputs = Inputs(stamp, believed, readings, resume, touch, imu, seen, payload, desired, options.moving())
     step, after = controller.step(state, inputs)
     robot.command(step.command)
     return Cycle(inputs, state, step, after)

@@ -25,6 +25,7 @@ class Event(Enum):
     SKIN_UNFIT = auto()
     SKIN_SILENT = auto()
     POINTS_LOST = auto()
+    MOVING_LOST = auto()
     LOAD_UNFIT = auto()
     DESIRED_UNFIT = auto()
     DESIRED_STALE = auto()
@@ -109,6 +110,11 @@ TABLE: tuple[Transition, ...] = (
     Transition(
         Event.POINTS_LOST, _ANY, Mode.HOLD,
         "The outside source of points {}: check it and its clock; the arm goes on when it is heard again.",
+        soft=True,
+    ),
+    Transition(
+        Event.MOVING_LOST, _ANY, Mode.HOLD,
+        "The fixtures that move {}: check who tells of them; the arm goes on when it is told again.",
         soft=True,
     ),
     Transition(

@@ -15,6 +15,7 @@ from pretouch.arrays import IntArray as IntArray
 from pretouch.arrays import Number as Number
 from pretouch.desired import Desired
 from pretouch.limited import Limited, limited_by
+from pretouch.moving_fixtures import MovingFixtures
 from pretouch.payload import Payload
 from pretouch.values import value
 
@@ -43,10 +44,7 @@ class RangeStatus(IntEnum):
 
 @value
 class RangeReadings:
-    """The newest reading of each of K sensor units, in the order of the skin.
-
-    A unit that has never been heard has stamp -inf and status NONE.
-    """
+    """The newest reading of each of K units, in the order of the skin; of one never heard -inf, and status NONE."""
 
     stamp: FloatArray
     """(K,) instant of each measurement [s]."""
@@ -160,6 +158,8 @@ class Inputs:
     """What the arm carries; None: nothing is said, and what was said last stays."""
     desired: Desired | None = None
     """What a commander asks for, in place of the path; None: the path is followed."""
+    moving: MovingFixtures | None = None
+    """What is known to move beside the arm; None: nothing is said of any."""
 
 
 class Mode(Enum):
@@ -178,7 +178,7 @@ class Obstacles:
     """K sensed points, each with its closest point on the robot's body. Base frame."""
 
     unit: IntArray
-    """(K,) index of the sensing unit in the skin; from their number on, of an outside point (`perception.outside`)."""
+    """(K,) index of the sensing unit in the skin; from their number on, of an outside point, then a moving fixture."""
     point: FloatArray
     """(K, 3) obstacle positions, eq. 1 [m]."""
     ee_distance: FloatArray

@@ -1,5 +1,7 @@
 """The braking curve by numbers and in one dimension, and rows that come and go without a step."""
 
+import sys
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -26,7 +28,19 @@ class Sled:
     def __init__(self, across: bool = False, units: int = 1) -> None:
         self.slots, self.units = slots_init(units), units
         self.limits = BrakingLimits(
-            NOTICE, A, 0.0, 0.0, RETREAT, 0.0, NEAR if across else -np.inf, SLOWEST, TASK, TIGHTEN, LOOSEN, DT
+            NOTICE,
+            A,
+            0.0,
+            0.0,
+            RETREAT,
+            0.0,
+            NEAR if across else -np.inf,
+            SLOWEST,
+            TASK,
+            TIGHTEN,
+            LOOSEN,
+            DT,
+            sys.maxsize,
         )
 
     def rows(
@@ -45,6 +59,19 @@ class Sled:
             Rows(G, h, np.empty(k, np.int64)),
         )  # fmt: skip
         return found, G[:rows, 0] / 1000.0, h[:rows]
+
+
+def test_what_is_not_to_be_touched_is_not_approached_at_its_surface():
+    seen, kept_off = Sled(), Sled()
+    kept_off.limits = kept_off.limits._replace(untouched=0)
+    for sled, least in ((seen, TOUCH), (kept_off, 0.0)):
+        for _ in range(2000):
+            _, _, h = sled.rows(0.0, {0: (1, 0.0)})
+        assert h == pytest.approx([least])
+        # v^2 = v_c^2 + 2 a d
+        for _ in range(2000):
+            _, _, h = sled.rows(0.0, {0: (1, 0.08)})
+        assert h == pytest.approx([np.sqrt(least**2 + 2 * A * 0.08)])
 
 
 def test_the_curve_by_numbers():

@@ -239,6 +239,7 @@ def test_messages_mirror_the_types_field_by_field():
         "points",
         "payload",
         "desired",
+        "moving",
     }  # of Inputs: in messages of their own, so that older recordings open
     for kind in mirrored:
         name = {"ControlStep": "Step"}.get(kind.__name__, kind.__name__)

@@ -80,6 +80,8 @@ class BrakingLimits(NamedTuple):
     tighten_m_s2: float
     loosen_m_s2: float
     period_s: float
+    untouched: int
+    """`ObstacleArrays.unit` from which on an obstacle is not to be touched at any speed."""
 
 
 class Mass(NamedTuple):
@@ -135,6 +137,8 @@ def braking_rows(
         approach = _row(slots.link[k], slots.point[k], obstacles.direction[m], chain, row)
         # the row is n^T J, so the effective mass along the normal comes of it too
         touch = touch_speed(mass_along(mass.factor, row), touching) if mass.counts else touching.speed_max_m_s
+        if k >= s.untouched:
+            touch = 0.0
         # an object that goes away allows no more; an infinite deadband leaves its speed out
         own = max(0.0, obstacles.closing_speed[m] - s.deadband_m_s)
         cap = braking_cap(distance[m], touch, s.deceleration_m_s2, s.latency_s, s.margin_m)

@@ -1,5 +1,6 @@
 """The part `braking` of a profile: the rows of `control.braking` in place of eqs. 5-7."""
 
+import sys
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -49,6 +50,10 @@ class BrakingCurve(BrakingParams, Restriction, name="braking"):
         return _OnBody(self, body).step(state, body, kin, robot, obstacles, request)
 
 
+_ALL = sys.maxsize
+"""More units than there are: all that they show may be touched."""
+
+
 class _OnBody(Restriction):
     """A `BrakingCurve` that works for one body."""
 
@@ -60,12 +65,13 @@ class _OnBody(Restriction):
             # what is switched off never binds: no speed is above this deadband, no distance below -inf
             np.inf if p.closing_deadband_m_s is None else p.closing_deadband_m_s,
             -np.inf if across is None else across.distance_m, 0.0 if across is None else across.speed_m_s,
-            body.task.speed_m_s, p.tighten_m_s2, p.loosen_m_s2, body.limits.period,
+            body.task.speed_m_s, p.tighten_m_s2, p.loosen_m_s2, body.limits.period, _ALL,
         )  # fmt: skip
         # M is of the links alone; an impact has to stop the rotors too: I_r of docs/explanation/anticipation.md
         inertia = 0.0 if mass is None else mass.rotor_inertia_kg_m2
         self._arm = Inertia(mass is not None, inertia, body.model.mechanism.links)
-        self._numbers = flattened(touch_limits(p), self._limits, self._weight, self._arm)
+        self._touching = touch_limits(p)
+        self._numbers = flattened(self._touching, self._limits, self._weight, self._arm)
 
     def step(
         self, state: Slots, body: MotionBody, kin: Kinematics, robot: RobotState, obstacles: Obstacles,
@@ -74,11 +80,13 @@ class _OnBody(Restriction):
         slots = widened(state, request.units)
         count, most = len(obstacles.unit), MOST_ROWS * (len(slots.link) // 2)
         room = np.empty((most, len(robot.q))), np.empty(most), np.empty(count, WHOLE)
-        numbers = self._numbers
+        touching, limits = self._touching, self._limits
         if request.touch is not None:
             # a touch speed whatever the mass, and no heed of what moves by itself
-            still = self._limits._replace(deadband_m_s=np.inf)
-            numbers = flattened(TouchLimits(np.inf, 1.0, 1.0, request.touch), still, self._weight, self._arm)
+            touching, limits = TouchLimits(np.inf, 1.0, 1.0, request.touch), limits._replace(deadband_m_s=np.inf)
+        if request.untouched is not None:
+            limits = limits._replace(untouched=request.untouched)
+        numbers = self._numbers if limits is self._limits else flattened(touching, limits, self._weight, self._arm)
         return CompiledRows(
             _motion, room, self._weight, (obstacles.unit, obstacles.closing_speed, *slots, *numbers)
         ), slots

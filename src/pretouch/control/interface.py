@@ -41,7 +41,9 @@ class MotionRequest:
     """Speed at which an arm that a contact moves may touch what it sees, and then nothing drives it away from what
     comes nearer [m/s]; None for what the profile says."""
     units: int = 0
-    """How many units and outside points there are that obstacles may be of, if more than the skin has."""
+    """How many units, outside points and links beside moving fixtures obstacles may be of, if more than the units."""
+    untouched: int | None = None
+    """`Obstacles.unit` from which on obstacles are moving fixtures, not to be touched; None without."""
 
 
 @value

@@ -51,6 +51,18 @@ def no_obstacles() -> Obstacles:
     return Obstacles(np.zeros(0, np.int64), vectors, none, vectors, np.zeros(0, np.int64), vectors, none, none)
 
 
+def joined(one: Obstacles, other: Obstacles) -> Obstacles:
+    """Return both sets, the one first."""
+    return Obstacles(
+        unit=np.concatenate((one.unit, other.unit)), point=np.concatenate((one.point, other.point)),
+        ee_distance=np.concatenate((one.ee_distance, other.ee_distance)),
+        body_point=np.concatenate((one.body_point, other.body_point)), link=np.concatenate((one.link, other.link)),
+        direction=np.concatenate((one.direction, other.direction)),
+        body_distance=np.concatenate((one.body_distance, other.body_distance)),
+        closing_speed=np.concatenate((one.closing_speed, other.closing_speed)),
+    )  # fmt: skip
+
+
 @compiled
 def distances(point: FloatArray, origin: FloatArray, out: FloatArray) -> None:
     """Write the distance (K,) [m] of points (K, 3) from one point (3,)."""

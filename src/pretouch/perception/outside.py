@@ -15,7 +15,7 @@ from pretouch.compiled import entry
 from pretouch.groups import CapsuleArrays, Chain
 from pretouch.params import OutsidePoints
 from pretouch.perception.chosen_points import KeptPoints, Placed, PointNumbers, take_points
-from pretouch.perception.closest import ClosestArrays, closest, distances
+from pretouch.perception.closest import ClosestArrays, closest, distances, joined
 from pretouch.perception.closing import closing_speeds
 from pretouch.perception.obstacles import HEARD, SEEN, TrackState, track_init
 from pretouch.perception.perceive import Perception, PerceptionSetup
@@ -88,16 +88,12 @@ def see_outside(
     after = OutsideState(TrackState(before.point, direction, before.times, before.motion), state.sigma, state.heard)
     if found == 0:
         return seen, after
-    o = seen.obstacles
-    both = Obstacles(
-        unit=np.concatenate((o.unit, indices[0, :found])), point=np.concatenate((o.point, vectors[0, :found])),
-        ee_distance=np.concatenate((o.ee_distance, scalars[0, :found])),
-        body_point=np.concatenate((o.body_point, vectors[1, :found])),
-        link=np.concatenate((o.link, indices[1, :found])),
-        direction=np.concatenate((o.direction, vectors[2, :found])),
-        body_distance=np.concatenate((o.body_distance, scalars[1, :found])),
-        closing_speed=np.concatenate((o.closing_speed, scalars[2, :found])),
+    shown = Obstacles(
+        unit=indices[0, :found], link=indices[1, :found], point=vectors[0, :found], body_point=vectors[1, :found],
+        direction=vectors[2, :found], ee_distance=scalars[0, :found], body_distance=scalars[1, :found],
+        closing_speed=scalars[2, :found],
     )  # fmt: skip
+    both = joined(seen.obstacles, shown)
     return Perception(both, seen.distance, min(seen.nearest, nearest), seen.longest_silence), after
 
 

@@ -18,6 +18,7 @@ import numpy as np
 
 from pretouch.desired import Desired, DesiredKind
 from pretouch.errors import RecordingError
+from pretouch.moving_fixtures import MovingFixtures
 from pretouch.payload import Payload
 from pretouch.recording.messages import PACKAGE, decoded, encoded, fields_of
 from pretouch.recording.truth import Truth
@@ -41,6 +42,7 @@ IMU = f"{PACKAGE}/msg/ImuReadings"
 POINTS = f"{PACKAGE}/msg/SeenPoints"
 PAYLOAD = f"{PACKAGE}/msg/Payload"
 DESIRED = f"{PACKAGE}/msg/Desired"
+MOVING = f"{PACKAGE}/msg/MovingFixtures"
 
 _NAMED: dict[type, str] = {ControlStep: "Step", TouchReadings: "Touch"}
 """Messages that are not named as the classes of which they hold the fields."""
@@ -161,6 +163,7 @@ _USUAL: dict[Any, Callable[[Any], Any]] = {
 _OTHERWISE: dict[tuple[type, str], Callable[[Any], Any]] = {
     (RobotState, "tau_ext"): _torques,
     (SeenPoints, "point"): _points,
+    **{(MovingFixtures, name): _points for name in ("a", "b", "a_velocity", "b_velocity")},
 }
 
 
@@ -179,7 +182,8 @@ def encode_inputs(sequence: int, inputs: Inputs) -> tuple[bytes, bool]:
     try:
         stamp, robot = _number(inputs.stamp), _taken(RobotState, inputs.robot)
         readings, resume = _taken(RangeReadings, inputs.readings), bool(inputs.resume)
-        for kind, own in ((TouchReadings, inputs.touch), (SeenPoints, inputs.points)):
+        others = (TouchReadings, inputs.touch), (SeenPoints, inputs.points), (MovingFixtures, inputs.moving)
+        for kind, own in others:
             if own is not None:
                 _taken(kind, own)  # has a message of its own
         if not isinstance(inputs.payload, Payload | None):
@@ -219,6 +223,18 @@ def encode_touch(sequence: int, inputs: Inputs) -> bytes | None:
 def decode_touch(data: bytes) -> TouchReadings:
     """Return what units said of a touch."""
     return _made(TouchReadings, decoded(TOUCH, data))
+
+
+def encode_moving(sequence: int, inputs: Inputs) -> bytes | None:
+    """Return what was known to move beside the arm as CDR, of whole inputs; None for nothing."""
+    if inputs.moving is None:
+        return None
+    return encoded(MOVING, _taken(MovingFixtures, inputs.moving), sequence=sequence, step_stamp=_number(inputs.stamp))
+
+
+def decode_moving(data: bytes) -> MovingFixtures:
+    """Return what was known to move beside the arm."""
+    return _made(MovingFixtures, decoded(MOVING, data))
 
 
 def encode_payload(sequence: int, inputs: Inputs) -> bytes | None:

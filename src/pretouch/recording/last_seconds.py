@@ -13,11 +13,13 @@ from pretouch.recording.codec import (
     decode_desired,
     decode_imu,
     decode_inputs,
+    decode_moving,
     decode_points,
     decode_touch,
     encode_desired,
     encode_imu,
     encode_inputs,
+    encode_moving,
     encode_points,
     encode_touch,
 )
@@ -49,6 +51,7 @@ class _Passed(NamedTuple):
     imu: bytes | None
     points: bytes | None
     desired: bytes | None
+    moving: bytes | None
 
     def again(self) -> Cycle:
         if self.inputs is None:
@@ -63,6 +66,7 @@ class _Passed(NamedTuple):
             points=None if self.points is None else decode_points(self.points)[1],
             payload=self.cycle.inputs.payload,  # nobody can change it
             desired=None if self.desired is None else decode_desired(self.desired),
+            moving=None if self.moving is None else decode_moving(self.moving),
         )
         return replace(self.cycle, inputs=whole)
 
@@ -103,7 +107,7 @@ class LastSeconds:
         if self._recorder is not None:
             self._recorder.record(cycle, truth)
         data, whole = encode_inputs(0, cycle.inputs)
-        self._ring.append(self._passed(cycle, data, truth) if whole else _Passed(cycle, None, truth, *[None] * 4))
+        self._ring.append(self._passed(cycle, data, truth) if whole else _Passed(cycle, None, truth, *[None] * 5))
         begin = cycle.step.stamp - self._seconds
         while self._ring[0].cycle.step.stamp < begin:
             self._ring.popleft()
@@ -116,7 +120,16 @@ class LastSeconds:
         if given.points is not self._points[0]:
             self._points = given.points, None if given.points is None else encode_points(0, given.points, 0)
         imu = None if given.imu is None else encode_imu(0, cycle.step.stamp, given.imu)
-        return _Passed(cycle, data, truth, encode_touch(0, given), imu, self._points[1], encode_desired(0, given))
+        return _Passed(
+            cycle,
+            data,
+            truth,
+            encode_touch(0, given),
+            imu,
+            self._points[1],
+            encode_desired(0, given),
+            encode_moving(0, given),
+        )
 
     def change(self, controller: Controller) -> None:
         """Let the cycles from the next one on be those of another controller of the same arm."""

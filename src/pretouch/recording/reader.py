@@ -14,6 +14,7 @@ from pretouch.recording.codec import (
     decode_desired,
     decode_imu,
     decode_inputs,
+    decode_moving,
     decode_payload,
     decode_points,
     decode_step,
@@ -111,6 +112,9 @@ class Recorded:
         payload = raw["/pretouch/payload"].get(number)
         if inputs is not None and payload is not None:
             inputs = replace(inputs, payload=decode_payload(payload))
+        moving = raw["/pretouch/moving"].get(number)
+        if inputs is not None and moving is not None:
+            inputs = replace(inputs, moving=decode_moving(moving))
         desired = raw["/pretouch/desired"].get(number)
         if inputs is not None and desired is not None:
             inputs = replace(inputs, desired=decode_desired(desired))

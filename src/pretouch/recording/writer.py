@@ -19,6 +19,7 @@ from pretouch.recording.codec import (
     DESIRED,
     IMU,
     INPUTS,
+    MOVING,
     PAYLOAD,
     POINTS,
     STEP,
@@ -27,6 +28,7 @@ from pretouch.recording.codec import (
     encode_desired,
     encode_imu,
     encode_inputs,
+    encode_moving,
     encode_payload,
     encode_points,
     encode_step,
@@ -129,6 +131,9 @@ class Recording:
         touch = encode_touch(number, cycle.inputs) if whole else None
         if touch is not None:
             items.append(Item("/pretouch/touch", TOUCH, number, time, touch))
+        moving = encode_moving(number, cycle.inputs) if whole else None
+        if moving is not None:
+            items.append(Item("/pretouch/moving", MOVING, number, time, moving))
         payload = encode_payload(number, cycle.inputs) if whole else None
         if payload is not None:
             items.append(Item("/pretouch/payload", PAYLOAD, number, time, payload))

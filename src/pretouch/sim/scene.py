@@ -67,15 +67,10 @@ class BasePose:
     """About z [rad]."""
 
     @property
-    def rotation(self) -> FloatArray:
-        """R (3, 3) that turns a vector in its own base frame into the other's."""
-        c, s = float(np.cos(self.yaw)), float(np.sin(self.yaw))
-        return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-
-    def inverse(self) -> "BasePose":
-        """Return where the other arm stands in the base frame of this one."""
-        x, y, z = (-self.rotation.T @ self.position).tolist()
-        return BasePose((x, y, z), -self.yaw)
+    def T(self) -> FloatArray:
+        """Pose (4, 4) of its base in the base frame of the other."""
+        (x, y, z), c, s = self.position, float(np.cos(self.yaw)), float(np.sin(self.yaw))
+        return np.array([[c, -s, 0.0, x], [s, c, 0.0, y], [0.0, 0.0, 1.0, z], [0.0, 0.0, 0.0, 1.0]])
 
 
 @dataclass(frozen=True)

@@ -71,4 +71,5 @@ class SecondArm(ArmInWorld):
         self._torques = begin_step.flat(self._qd_set, *self._arm)
 
     def _in_base(self, point: FloatArray) -> FloatArray:
-        return np.asarray(self._base.rotation.T @ (point - self._base.position))
+        T = self._base.T
+        return np.asarray(T[:3, :3].T @ (point - T[:3, 3]))

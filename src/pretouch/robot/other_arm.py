@@ -1,0 +1,55 @@
+"""Another arm beside this one, as what is known to move there."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from pretouch.moving_fixtures import MovingFixtures
+from pretouch.robot.body import Capsules, no_capsules
+from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.robot.vectors import placed
+from pretouch.types import FloatArray, IntArray, RobotState
+
+
+class OtherArm:
+    """Tells where another arm is by the newest state that it reported: what `loop.Options.moving` asks."""
+
+    def __init__(
+        self, model: RobotModel, T_O_other: FloatArray, reported: Callable[[], RobotState | None],
+        standing: Capsules | None = None,
+    ) -> None:  # fmt: skip
+        """Know an arm.
+
+        Args:
+            model: of the other arm.
+            T_O_other: (4, 4) pose of its base in the base frame of the arm that is told.
+            reported: gives its newest state, stamped by the clock of the arm that is told; None before the first.
+            standing: what it stands on, on its link 0.
+        """
+        self._model, self._T, self._reported = model, T_O_other, reported
+        self._standing = no_capsules() if standing is None else standing
+
+    def __call__(self) -> MovingFixtures | None:
+        """Return where it is; None before its first state."""
+        state = self._reported()
+        return None if state is None else self.at(state)
+
+    def at(self, state: RobotState) -> MovingFixtures:
+        """Return where it is in a state of its own."""
+        model, still = self._model, self._standing
+        kin, R, t = model.kinematics(state.q), self._T[:3, :3], self._T[:3, 3]
+        (a, b), link = placed(model.capsules, kin), model.capsules.link
+        speeds = (velocities(model, kin, state.qd, link, end) @ R.T for end in (a, b))
+        rest = np.zeros((len(still), 3))
+        va, vb = (np.concatenate([speed, rest]) for speed in speeds)
+        return MovingFixtures(
+            state.stamp, np.concatenate([a, still.a]) @ R.T + t, np.concatenate([b, still.b]) @ R.T + t,
+            np.concatenate([model.capsules.radius, still.radius]), va, vb,
+        )  # fmt: skip
+
+
+def velocities(model: RobotModel, kin: Kinematics, qd: FloatArray, link: IntArray, point: FloatArray) -> FloatArray:
+    """Velocities (C, 3) [m/s] of points (C, 3) [m] on links (C,) at joint velocities qd (n,) [rad/s], base frame."""
+    turning = np.where(model.moved_by[link], qd, 0.0)
+    # sum of qd_j a_j x (p - p_j) over the joints that move the link
+    return np.einsum("cj,cji->ci", turning, np.cross(kin.axis, point[:, None] - kin.anchor))

@@ -1,0 +1,125 @@
+"""Fixtures that move: what a unit sees of them is no obstacle, and what is nearest of them is one to keep off."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tests.sim.ranging import FORWARD, ORIGIN
+
+from pretouch.moving_fixtures import MovingFixtures
+from pretouch.params import PerceptionParams
+from pretouch.perception.moving import beside, near_moving, sound_moving
+from pretouch.perception.obstacles import track_init
+from pretouch.perception.perceive import perceive, perception_setup
+from pretouch.perception.scene_filter import floor_and_pedestal
+from pretouch.robot.vectors import placed
+from pretouch.sensing.skin import Skin
+from pretouch.sensing.unit import SensorUnit
+from pretouch.types import RangeReadings
+
+MARGIN_M = 0.06
+"""Before a fixture, within which a reading is taken for it (`PerceptionParams.self_margin_m`)."""
+
+
+def ball(center, radius=0.05, velocity=(0.0, 0.0, 0.0), stamp=0.0) -> MovingFixtures:
+    at, v = np.array([center], dtype=float), np.array([velocity], dtype=float)
+    return MovingFixtures(stamp, at, at, np.array([radius]), v, v)
+
+
+def seen(model, moving: MovingFixtures | None, distance: float, now: float = 0.0) -> int:
+    """How many obstacles a unit on the hand's front shows that reads a distance [m] 10 ms before."""
+    skin = Skin([SensorUnit("ahead", "panda_hand", FORWARD)], model)
+    setup = perception_setup(model, skin, floor_and_pedestal(-0.2), PerceptionParams())
+    readings = RangeReadings(np.array([now - 0.01]), np.array([distance]), np.zeros(1, np.int64))
+    if moving is not None:
+        setup = beside(setup, moving, readings, now)
+    found, _ = perceive(track_init(1), setup, model.kinematics(model.description.q_ready), readings, now)
+    return len(found.obstacles.unit)
+
+
+def test_what_a_unit_sees_of_it_is_left_out_within_the_margin(panda_model):
+    # the ball's surface is 0.4 m before the unit; its beam is along x
+    other = ball(ORIGIN + np.array([0.45, 0.0, 0.0]))
+    assert seen(panda_model, None, 0.4) == 1
+    assert seen(panda_model, other, 0.4) == 0
+    assert seen(panda_model, other, 0.4 - 0.9 * MARGIN_M) == 0
+    # what is behind cannot be seen through it
+    assert seen(panda_model, other, 0.5) == 0
+
+
+def test_a_hand_in_front_of_it_is_still_a_person(panda_model):
+    other = ball(ORIGIN + np.array([0.45, 0.0, 0.0]))
+    assert seen(panda_model, other, 0.4 - 1.2 * MARGIN_M) == 1
+    assert seen(panda_model, other, 0.15) == 1
+
+
+def test_beside_the_beam_it_explains_nothing(panda_model):
+    # half the cone's angle is 13.5 degrees: at 0.4 m it is 0.1 m wide
+    assert seen(panda_model, ball(ORIGIN + np.array([0.4, 0.3, 0.0])), 0.4) == 1
+
+
+def test_it_is_where_it_was_when_the_unit_measured(panda_model):
+    # at 2 m/s it is now 0.2 m farther away than 0.1 s ago, and was at 0.4 m at the reading's stamp of 0.09 s
+    away = ball(ORIGIN + np.array([0.45 - 2.0 * 0.09, 0.0, 0.0]), velocity=(2.0, 0.0, 0.0))
+    assert seen(panda_model, away, 0.4, now=0.1) == 0
+    assert seen(panda_model, away, 0.4 - 1.2 * MARGIN_M, now=0.1) == 1
+
+
+def test_of_each_link_the_nearest_place_is_an_obstacle(panda_model):
+    kin = panda_model.kinematics(panda_model.description.q_ready)
+    # 0.5 m beside the base, at the height of the hand's origin
+    center = np.array([0.3, 0.5, 0.5])
+    found = near_moving(ball(center, velocity=(0.0, -0.2, 0.0), stamp=1.0), panda_model, kin, 1.0, 7)
+    assert found.unit.tolist() == list(range(7, 7 + len(panda_model.parts)))
+    assert found.link.tolist() == panda_model.parts.tolist()
+    a, b = placed(panda_model.body, kin)
+    for k, link in enumerate(found.link):
+        # the ball's distance from each capsule of the link, by its axis in ten thousand steps
+        share = np.linspace(0.0, 1.0, 10_001)[:, None]
+        gaps = [
+            np.linalg.norm(a[c] + share * (b[c] - a[c]) - center, axis=1).min() - panda_model.body.radius[c] - 0.05
+            for c in np.flatnonzero(panda_model.body.link == link)
+        ]
+        assert found.body_distance[k] == pytest.approx(min(gaps), abs=1e-6)
+        # from the body's surface to the ball's, along the direction
+        assert found.point[k] == pytest.approx(found.body_point[k] + found.body_distance[k] * found.direction[k])
+        assert np.linalg.norm(found.point[k] - center) == pytest.approx(0.05)
+        assert found.closing_speed[k] == pytest.approx(0.2 * found.direction[k][1])
+
+
+def test_a_moving_axis_comes_nearer_as_fast_as_its_nearest_point(panda_model):
+    kin = panda_model.kinematics(panda_model.description.q_ready)
+    # a rod that turns about its lower end, to the arm
+    rod = MovingFixtures(
+        0.0, np.array([[0.9, 0.0, 0.0]]), np.array([[0.9, 0.0, 1.0]]), np.array([0.03]), np.zeros((1, 3)),
+        np.array([[-0.4, 0.0, 0.0]]),
+    )  # fmt: skip
+    before, after = (near_moving(rod, panda_model, kin, t, 0) for t in (0.0, 1e-5))
+    rate = (before.body_distance - after.body_distance) / 1e-5
+    assert before.closing_speed == pytest.approx(rate, abs=1e-3)
+    assert before.closing_speed.max() > 0.1
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"a": np.zeros((2, 3))}, "shapes"),
+        ({"radius": np.array([-0.1])}, "negative"),
+        ({"b": np.full((1, 3), np.nan)}, "none"),
+        ({"b_velocity": np.full((1, 3), 1e3)}, "100 or more"),
+        ({"a": "here"}, "numbers"),
+        ({"stamp": -0.2}, "0.200 s ago"),
+        ({"stamp": np.nan}, "ago"),
+    ],
+)
+def test_what_cannot_be_used_is_said(change, said):
+    good = ball((1.0, 0.0, 0.5))
+    assert sound_moving(good, 0.02, 0.05)[1] == ""
+    found, wrong = sound_moving(replace(good, **change), 0.0, 0.05)
+    assert found is None
+    assert said in wrong
+
+
+def test_something_else_than_moving_fixtures_is_said():
+    assert sound_moving(None, 0.0, 0.05) == (None, "")
+    assert "are 7" in sound_moving(7, 0.0, 0.05)[1]
