@@ -8,7 +8,7 @@ from pretouch_lab.experiment import Experiment
 from pretouch_lab.paper import avoidance, dynamic, static
 from pretouch_lab.paper.claims import anticipation, between, detectable, free_motion, noise
 from pretouch_lab.rows import Row
-from pretouch_lab.studies import clamp, imu, mounting, pinch, tactile, vision, wire
+from pretouch_lab.studies import clamp, imu, mounting, pinch, tactile, two_arms, vision, wire
 from pretouch_lab.studies.coverage import study as coverage
 from pretouch_lab.weaknesses import (
     creeping,
@@ -45,6 +45,7 @@ REACTION = (clamp.EXPERIMENT, pinch.EXPERIMENT)
 TOUCH = (tactile.EXPERIMENT,)
 IMPACTS = (imu.EXPERIMENT,)
 VISION = (vision.EXPERIMENT,)
+TWO_ARMS = (two_arms.EXPERIMENT,)
 
 GROUPS = {
     "The paper's experiments": PAPER,
@@ -56,6 +57,7 @@ GROUPS = {
     "Touch sensors of units": TOUCH,
     "Impacts by the units' accelerometers": IMPACTS,
     "A camera beside the skin": VISION,
+    "Two arms over one table": TWO_ARMS,
 }
 """All experiments by what they are for, in the order of the page."""
 EXPERIMENTS: dict[str, Experiment] = {e.name: e for group in GROUPS.values() for e in group}
