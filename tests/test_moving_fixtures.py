@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pretouch.explanation import explain
+from pretouch.limited import Limit
 from pretouch.moving_fixtures import MovingFixtures
 from pretouch.profiles import PROFILES
 from pretouch.recording.codec import decode_moving, encode_moving
@@ -43,6 +45,9 @@ def test_an_arm_keeps_off_a_rod_on_its_path_and_takes_it_for_no_person(panda_mod
         # no unit shows it, and no person's nearness slows the arm or bends the thresholds
         assert step.obstacles.unit.min() >= len(paper_skin)
         assert step.speed_scale == 1.0
+    assert step.limited.by is Limit.APPROACH
+    assert step.limited.unit >= len(paper_skin)
+    assert "a fixture that moves is 0." in explain(step, paper_skin.ids, panda_model.links).sentence
     free = Arm(panda_model, paper_skin, profile)
     for _ in range(400):
         last = turn(free, None)
@@ -67,6 +72,14 @@ def test_far_away_it_changes_no_command(panda_model, paper_skin, profile):
         one, other = turn(plain, None), turn(given, rod(5.0, 5.0, given.time))
         assert one.command.tobytes() == other.command.tobytes()
         assert one.thresholds.parts.tobytes() == other.thresholds.parts.tobytes()
+
+
+def test_an_arm_that_sees_nothing_keeps_off_too(panda_model, paper_skin):
+    profile = replace(PRETOUCH, perception=None)
+    arm = Arm(panda_model, paper_skin, profile)
+    x, y, _ = arm.ee()
+    least = min(turn(arm, rod(x, y + 0.35, arm.time)).obstacles.body_distance.min() for _ in range(300))
+    assert 0.0 < least < 0.03
 
 
 def test_silence_of_who_tells_holds_the_arm_until_it_is_told_again(panda_model, paper_skin):

@@ -39,6 +39,7 @@ from pretouch.limited import Limited as Limited
 from pretouch.loop import Cycle as Cycle
 from pretouch.loop import MonotonicClock as MonotonicClock
 from pretouch.loop import Recorder as Recorder
+from pretouch.moving_fixtures import MovingFixtures as MovingFixtures
 from pretouch.params import WindowParams as WindowParams
 from pretouch.payload import Payload as Payload
 from pretouch.perception.closest import closest_points as closest_points
@@ -59,6 +60,7 @@ from pretouch.robot.description import fr3 as fr3
 from pretouch.robot.description import panda as panda
 from pretouch.robot.model import Kinematics as Kinematics
 from pretouch.robot.model import RobotModel as RobotModel
+from pretouch.robot.other_arm import OtherArm as OtherArm
 from pretouch.sensing.skin import Skin as Skin
 from pretouch.sensing.skin import load_skin as load_skin
 from pretouch.sensing.skin import paper_skin as paper_skin

@@ -40,6 +40,7 @@ from pretouch.types import (
     FloatArray,
     Inputs,
     Mode,
+    Obstacles,
     QpOutcome,
     RobotState,
 )
@@ -250,7 +251,8 @@ class Controller:
         """Return what is near: eq. 1 and the closest points of the body."""
         sight, robot, now, moving = self._sight, given.robot, given.watch.stamp, given.moving
         if sight is None:
-            return Near(nothing_seen(given.readings, self.skin), state.tracks, state.outside)
+            kept_off = self._kept_off(given, kin, state.outside)
+            return Near(nothing_seen(given.readings, self.skin), state.tracks, state.outside, kept_off=kept_off)
         if moving is not None:
             sight = beside(sight, moving, given.readings, now)
         anew = Event.TIME_BACKWARDS in given.events
@@ -260,10 +262,14 @@ class Controller:
         heard, silent = silent_units(self.skin, tracks, given.readings.status, seen.longest_silence, now, sight.params)
         outside_scale, lost = outside_silence(outside, given.lost, now, sight.params.outside)
         watched = self._units > 0 and heard >= 1.0 and not silent
-        return Near(
-            seen, tracks, outside, min(heard, outside_scale), watched, silent, lost,
-            None if moving is None else near_moving(moving, self.model, kin, now, self._places(outside)),
-        )  # fmt: skip
+        kept_off, scale = self._kept_off(given, kin, outside), min(heard, outside_scale)
+        return Near(seen, tracks, outside, scale, watched, silent, lost, kept_off)
+
+    def _kept_off(self, given: Given, kin: Kinematics, outside: OutsideState | None) -> Obstacles | None:
+        """Return what is nearest of that which is known to move beside the arm."""
+        if given.moving is None:
+            return None
+        return near_moving(given.moving, self.model, kin, given.watch.stamp, self._places(outside))
 
     def _places(self, outside: OutsideState | None) -> int:
         """How many units and places of outside points there are."""

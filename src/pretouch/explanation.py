@@ -92,8 +92,10 @@ class _Names:
     links: Sequence[str]
 
     def sees(self, step: ControlStep, obstacle: int) -> str:
-        """Say who sees an obstacle, and how far from the arm."""
+        """Say who sees an obstacle, or that it is known, and how far from the arm."""
         distance = max(0.0, float(step.obstacles.body_distance[obstacle]))
+        if np.isinf(step.obstacles.ee_distance[obstacle]):
+            return f"a fixture that moves is {distance:.2f} m away"
         return f"{self.who(step, obstacle)} sees something at {distance:.2f} m"
 
     def who(self, step: ControlStep, obstacle: int) -> str:

@@ -66,7 +66,9 @@ def limited_by(step: "ControlStep") -> Limited:
     if len(rows):
         by, cause = Limit.APPROACH, int(rows[near.body_distance[rows].argmin()])
     elif step.speed_scale < FULL:
-        by, cause = Limit.SLOWED, int(near.ee_distance.argmin()) if len(near.unit) else -1
+        # what is known to move there slows nothing, and is infinitely far for eq. 3
+        slows = len(near.unit) > 0 and bool(np.isfinite(near.ee_distance.min()))
+        by, cause = Limit.SLOWED, int(near.ee_distance.argmin()) if slows else -1
     share, asked = step.speed_scale, float(np.linalg.norm(step.desired_velocity))
     if asked >= ASKED_M_S and (len(rows) or joint >= 0):
         share *= min(max(float(step.ee_velocity @ step.desired_velocity) / asked**2, 0.0), 1.0)

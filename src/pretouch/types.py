@@ -182,7 +182,7 @@ class Obstacles:
     point: FloatArray
     """(K, 3) obstacle positions, eq. 1 [m]."""
     ee_distance: FloatArray
-    """(K,) distance from the end-effector origin, less the point's spread, at least 0 [m] (eqs. 3, 11)."""
+    """(K,) distance from the end-effector origin, less the spread, at least 0 [m] (eqs. 3, 11); inf: moving fixture."""
     body_point: FloatArray
     """(K, 3) closest points on the surface of the body [m]."""
     link: IntArray

@@ -72,6 +72,8 @@ def test_of_each_link_the_nearest_place_is_an_obstacle(panda_model):
     found = near_moving(ball(center, velocity=(0.0, -0.2, 0.0), stamp=1.0), panda_model, kin, 1.0, 7)
     assert found.unit.tolist() == list(range(7, 7 + len(panda_model.parts)))
     assert found.link.tolist() == panda_model.parts.tolist()
+    # it slows nothing by eq. 3
+    assert np.isinf(found.ee_distance).all()
     a, b = placed(panda_model.body, kin)
     for k, link in enumerate(found.link):
         # the ball's distance from each capsule of the link, by its axis in ten thousand steps
@@ -122,4 +124,6 @@ def test_what_cannot_be_used_is_said(change, said):
 
 def test_something_else_than_moving_fixtures_is_said():
     assert sound_moving(None, 0.0, 0.05) == (None, "")
+    none = np.zeros((0, 3))
+    assert sound_moving(MovingFixtures(0.0, none, none, np.zeros(0), none, none), 9.0, 0.05) == (None, "")
     assert "are 7" in sound_moving(7, 0.0, 0.05)[1]

@@ -36,6 +36,8 @@ def sound_moving(
     except (TypeError, ValueError, OverflowError):
         return None, "are not arrays of numbers"
     count = len(radius) if radius.ndim == 1 else -1
+    if count == 0:
+        return None, ""
     if any(part.shape != (count, 3) for part in (a, b, a_velocity, b_velocity)):
         shapes = f"{a.shape}, {b.shape}, {a_velocity.shape}, {b_velocity.shape} and {radius.shape}"
         return None, f"have ends, velocities and radii of the shapes {shapes}"
@@ -63,7 +65,7 @@ def near_moving(moving: MovingFixtures, model: RobotModel, kin: Kinematics, now:
     """Return where each link that moves is nearest to what moves beside it, one obstacle a link.
 
     Args:
-        moving: one capsule at least.
+        moving: with one capsule at least, as those that `sound_moving` returns.
         model: the arm.
         kin: its posture.
         now: instant of the step [s].
@@ -85,8 +87,7 @@ def near_moving(moving: MovingFixtures, model: RobotModel, kin: Kinematics, now:
     point = on_other[pair] - moving.radius[pair[1], None] * direction
     speed = -(direction * _velocity(moving, a, b, on_other[pair], pair[1])).sum(axis=1)
     return Obstacles(
-        unit=first + np.arange(len(own)), point=point,
-        ee_distance=np.linalg.norm(point - kin.position[model.ee], axis=1),
+        unit=first + np.arange(len(own)), point=point, ee_distance=np.full(len(own), np.inf),
         body_point=on_own[pair] + body.radius[own, None] * direction, link=body.link[own], direction=direction,
         body_distance=gap[pair], closing_speed=speed,
     )  # fmt: skip

@@ -56,7 +56,7 @@ class Scene:
         self._arm = Arm(scene, world.model, world.skin, found or capsule_surfaces(world.model), root)
         self.units = Units(scene, world.skin, world.model.links, root)
         self.trail = Trail(scene, root)
-        _pedestal(server, world, root)
+        draw_pedestal(server, world.floor_height, root)
         self._boxes: list[SceneNodeHandle] = []
         self._show_boxes(world)
 
@@ -206,9 +206,9 @@ def _floor(server: "ViserServer", world: World) -> None:
     )  # fmt: skip
 
 
-def _pedestal(server: "ViserServer", world: World, root: str) -> None:
-    """Pedestal and base frame."""
-    scene, low = server.scene, world.floor_height
+def draw_pedestal(server: "ViserServer", floor: float, root: str) -> None:
+    """Draw pedestal and base frame of an arm over a floor at a height [m]."""
+    scene, low = server.scene, floor
     if low < -0.01:
         scene.add_cylinder(
             f"{root}/pedestal", 0.1, -low, color=palette.PEDESTAL, position=(0.0, 0.0, low / 2), cast_shadow=False,

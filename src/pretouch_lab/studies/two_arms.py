@@ -6,6 +6,7 @@ import numpy as np
 
 from pretouch.robot.self_distance import nearest_points
 from pretouch.sim.plant import TOUCH_N
+from pretouch.sim.scene import HandSpec
 from pretouch.text_table import TextTable, tabulated
 from pretouch.types import FloatArray
 from pretouch_lab.cell import Cell, Context, Grid
@@ -77,7 +78,7 @@ def shows_other(side: Side, hand: FloatArray) -> float:
         if len(point):
             on_axis, of_point = nearest_points(across.a[None], across.b[None], point[:, None], point[:, None])
             from_arm = (np.linalg.norm(on_axis - of_point, axis=-1) - across.radius).min(axis=1)
-            from_hand = np.linalg.norm(point - at, axis=1)
+            from_hand = np.linalg.norm(point - at, axis=1) - HandSpec.radius
             found += bool(((from_arm < _OF_IT_M) & (from_arm < from_hand)).any())
     return found / len(side.steps)
 
