@@ -12,6 +12,7 @@ from pretouch.perception.moving import beside, near_moving, sound_moving
 from pretouch.perception.obstacles import track_init
 from pretouch.perception.perceive import perceive, perception_setup
 from pretouch.perception.scene_filter import floor_and_pedestal
+from pretouch.robot.self_distance import segment_distance
 from pretouch.robot.vectors import placed
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit
@@ -87,6 +88,17 @@ def test_of_each_link_the_nearest_place_is_an_obstacle(panda_model):
         assert found.point[k] == pytest.approx(found.body_point[k] + found.body_distance[k] * found.direction[k])
         assert np.linalg.norm(found.point[k] - center) == pytest.approx(0.05)
         assert found.closing_speed[k] == pytest.approx(0.2 * found.direction[k][1])
+
+
+def test_of_another_arm_the_nearest_capsules_are_found(panda_model):
+    kin, rng = panda_model.kinematics(panda_model.description.q_ready), np.random.default_rng(0)
+    a, b = rng.uniform(-0.8, 0.8, (2, 30, 3))
+    b[:5] = a[:5]  # balls
+    many = MovingFixtures(0.0, a, b, rng.uniform(0.02, 0.1, 30), np.zeros((30, 3)), np.zeros((30, 3)))
+    found = near_moving(many, panda_model, kin, 0.0, 0)
+    own, body = placed(panda_model.body, kin), panda_model.body
+    gap = segment_distance(own[0][:, None], own[1][:, None], a[None], b[None]) - body.radius[:, None] - many.radius
+    assert found.body_distance == pytest.approx([gap[body.link == link].min() for link in panda_model.parts])
 
 
 def test_a_moving_axis_comes_nearer_as_fast_as_its_nearest_point(panda_model):

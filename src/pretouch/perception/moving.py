@@ -1,16 +1,18 @@
 """Fixtures that move: what units see of them is left out, and where the arm is nearest to them it keeps off."""
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
+from pretouch.compiled import compiled, entry
+from pretouch.groups import CapsuleArrays
 from pretouch.moving_fixtures import MovingFixtures
 from pretouch.perception.perceive import PerceptionSetup, perception_setup
 from pretouch.robot.body import Capsules
 from pretouch.robot.model import Kinematics, RobotModel
-from pretouch.robot.self_distance import nearest_points
-from pretouch.robot.vectors import placed
-from pretouch.types import FloatArray, Obstacles, RangeReadings
+from pretouch.robot.vectors import dot, placed_capsules
+from pretouch.types import WHOLE, FloatArray, IntArray, Obstacles, RangeReadings
 
 _FARTHEST = 100.0
 """A coordinate [m] or a speed [m/s] from here on is implausible."""
@@ -71,32 +73,87 @@ def near_moving(moving: MovingFixtures, model: RobotModel, kin: Kinematics, now:
         now: instant of the step [s].
         first: index that stands for the first link in `Obstacles.unit`; those of the others follow.
     """
-    body, (own_a, own_b), (a, b) = model.body, placed(model.body, kin), moving.at(now)
-    on_own, on_other = nearest_points(own_a[:, None], own_b[:, None], a[None], b[None])
-    between = on_other - on_own
-    apart = np.linalg.norm(between, axis=-1)
-    gap = apart - body.radius[:, None] - moving.radius[None]
-    # of each link the capsule that is nearest, and of each capsule the other that is
-    other = gap.argmin(axis=1)
-    least = gap[np.arange(len(gap)), other]
-    own = np.array([np.flatnonzero(body.link == part)[least[body.link == part].argmin()] for part in model.parts])
-    pair = own, other[own]
-    length = apart[pair]
-    up = np.array([0.0, 0.0, 1.0])  # any direction will do where the axes meet
-    direction = np.where(length[:, None] > _ON_AXIS, between[pair] / np.maximum(length, _ON_AXIS)[:, None], up)
-    point = on_other[pair] - moving.radius[pair[1], None] * direction
-    speed = -(direction * _velocity(moving, a, b, on_other[pair], pair[1])).sum(axis=1)
+    (a, b), count = moving.at(now), len(model.parts)
+    link, vectors, scalars = np.empty(count, WHOLE), np.empty((3, count, 3)), np.empty((2, count))
+    _nearest.flat(
+        *kin, *model.body.arrays, model.parts, a, b, moving.radius, moving.a_velocity, moving.b_velocity,
+        link, vectors, scalars,
+    )  # fmt: skip
+    point, body_point, direction = vectors
     return Obstacles(
-        unit=first + np.arange(len(own)), point=point, ee_distance=np.full(len(own), np.inf),
-        body_point=on_own[pair] + body.radius[own, None] * direction, link=body.link[own], direction=direction,
-        body_distance=gap[pair], closing_speed=speed,
+        unit=first + np.arange(count), point=point, ee_distance=np.full(count, np.inf), body_point=body_point,
+        link=link, direction=direction, body_distance=scalars[0], closing_speed=scalars[1],
     )  # fmt: skip
 
 
-def _velocity(moving: MovingFixtures, a: FloatArray, b: FloatArray, point: FloatArray, which: FloatArray) -> FloatArray:
-    """Velocities (M, 3) [m/s] of points (M, 3) on the axes of some of the capsules."""
-    axis = (b - a)[which]
-    length2 = (axis**2).sum(axis=1)
-    along = ((point - a[which]) * axis).sum(axis=1) / np.where(length2 > 0.0, length2, 1.0)
-    start, end = moving.a_velocity[which], moving.b_velocity[which]
-    return np.asarray(start + along[:, None] * (end - start))
+class _Moving(NamedTuple):
+    """As `MovingFixtures`, at one instant."""
+
+    a: FloatArray
+    b: FloatArray
+    radius: FloatArray
+    a_velocity: FloatArray
+    b_velocity: FloatArray
+
+
+class _Room(NamedTuple):
+    """Room for what is nearest to each of P links."""
+
+    link: IntArray
+    """(P,)"""
+    vectors: FloatArray
+    """(3, P, 3) point, body point and direction."""
+    scalars: FloatArray
+    """(2, P) distance and closing speed."""
+
+
+@entry
+def _nearest(kin: Kinematics, body: CapsuleArrays, parts: IntArray, moving: _Moving, room: _Room) -> None:
+    """Write where each link of `parts` (P,) is nearest to what moves."""
+    link, own_a, own_b, own_radius = placed_capsules(body, kin)
+    between, u, v = np.empty(3), np.empty(3), np.empty(3)
+    for row in range(len(parts)):
+        room.link[row], least = parts[row], np.inf
+        for c in range(len(link)):
+            if link[c] != parts[row]:
+                continue
+            for i in range(3):
+                u[i] = own_b[c, i] - own_a[c, i]
+            for m in range(len(moving.radius)):
+                for i in range(3):
+                    v[i], between[i] = moving.b[m, i] - moving.a[m, i], own_a[c, i] - moving.a[m, i]
+                s, t = _closest(u, v, between)
+                for i in range(3):
+                    between[i] = t * v[i] - s * u[i] - between[i]  # from one axis to the other
+                apart = np.sqrt(dot(between, between))
+                gap = apart - own_radius[c] - moving.radius[m]
+                if gap >= least:
+                    continue
+                least, speed = gap, 0.0
+                for i in range(3):
+                    # any direction will do where the axes meet
+                    n = between[i] / apart if apart > _ON_AXIS else (1.0 if i == 2 else 0.0)
+                    room.vectors[0, row, i] = moving.a[m, i] + t * v[i] - moving.radius[m] * n
+                    room.vectors[1, row, i] = own_a[c, i] + s * u[i] + own_radius[c] * n
+                    room.vectors[2, row, i] = n
+                    speed -= n * (moving.a_velocity[m, i] + t * (moving.b_velocity[m, i] - moving.a_velocity[m, i]))
+                room.scalars[0, row], room.scalars[1, row] = gap, speed
+
+
+@compiled
+def _closest(u: FloatArray, v: FloatArray, w: FloatArray) -> tuple[float, float]:
+    """Where two segments of directions u and v (3,), w (3,) from the second's start to the first's, are nearest.
+
+    Each from 0 to 1, as `robot.self_distance.nearest_points` has it.
+    """
+    uu, uv, vv, uw, vw = dot(u, u), dot(u, v), dot(v, v), dot(u, w), dot(v, w)
+    area = uu * vv - uv * uv
+    s = _share(uv * vw - uw * vv, area if area > 1e-12 * uu * vv else 0.0)
+    t = _share(uv * s + vw, vv)
+    return _share(uv * t - uw, uu), t
+
+
+@compiled
+def _share(part: float, whole: float) -> float:
+    """Quotient brought into 0 to 1; 0 where there is no whole."""
+    return 0.0 if whole <= 0.0 else min(1.0, max(0.0, part / whole))
