@@ -20,6 +20,7 @@ from pretouch.sim.scene import BasePose, fixtures
 from pretouch.sim.second_arm import SecondArm
 from pretouch.viewer.arm import Arm, capsule_surfaces, quaternions
 from pretouch.viewer.expectation import expectation, in_levels
+from pretouch.viewer.frame import World
 from pretouch.viewer.scene import draw_pedestal
 from pretouch.viewer.units import Units
 from pretouch.viewer.vendor import vendor_surfaces
@@ -27,8 +28,9 @@ from pretouch.viewer.vendor import vendor_surfaces
 if TYPE_CHECKING:
     from viser import ViserServer
 
-BASE = BasePose((1.1, 0.0, 0.0), np.pi)
-"""Where it stands: face to face with the page's own arm, so that both reach over the middle."""
+_APART_M = 1.1
+"""How far it stands from the page's own arm, face to face, where both follow the paper's paths [m]: they reach over the
+middle. Arms with smaller paths stand nearer."""
 _SEEDS_APART = 1_000_000
 """Its errors and its noise are another arm's."""
 
@@ -42,10 +44,10 @@ class Across:
     cycle: Cycle
     """The newest."""
 
-    def __init__(self, model: RobotModel, skin: Skin, plant: PlantParams, seed: int) -> None:
-        """Draw the arm, for a scene to be built with its `spec`."""
+    def __init__(self, model: RobotModel, skin: Skin, plant: PlantParams, seed: int, scale: float) -> None:
+        """Draw the arm, for a scene to be built with its `spec`; paths are `scale` times the paper's."""
         self._model, self._skin, self._seed = model, skin, seed + _SEEDS_APART
-        self._arm = SecondArm(model, BASE, plant, self._seed)
+        self._arm = SecondArm(model, BasePose((_APART_M * scale, 0.0, 0.0), np.pi), plant, self._seed)
         self.spec = self._arm.spec
         """What the scene needs to know of it."""
 
@@ -56,9 +58,10 @@ class Across:
         self._units = RangeFinders(arm, self._skin, ranging, self._seed)
         self._controller = Controller(model, self._skin, known, path, profile)
         self._state = self._controller.init(arm.read())
-        back = np.asarray(np.linalg.inv(BASE.T))
+        T = self.spec.base.T
+        back = np.asarray(np.linalg.inv(T))
         self._first = OtherArm(first.model, back, first.read, known.capsules)
-        self.told = OtherArm(model, BASE.T, arm.read, known.capsules)
+        self.told = OtherArm(model, T, arm.read, known.capsules)
         """Where this arm is, for the controller of the page's own."""
 
     def turn(self, tick: float) -> None:
@@ -70,14 +73,16 @@ class Across:
 class DrawnAcross:
     """The other arm on the page, with its units."""
 
-    def __init__(self, server: "ViserServer", model: RobotModel, skin: Skin, floor: float, profile: Profile) -> None:
-        scene, root, self._model, self._skin, self._profile = server.scene, "/across", model, skin, profile
-        turn = tuple(quaternions(BASE.T[None, :3, :3])[0].tolist())
-        scene.add_frame(root, show_axes=False, position=BASE.position, wxyz=turn)
+    def __init__(self, server: "ViserServer", world: World, base: BasePose) -> None:
+        """Draw it as the page draws its own arm of a world, at another base."""
+        scene, root, model, skin = server.scene, "/across", world.model, world.skin
+        self._model, self._skin, self._profile = model, skin, world.profile
+        turn = tuple(quaternions(base.T[None, :3, :3])[0].tolist())
+        scene.add_frame(root, show_axes=False, position=base.position, wxyz=turn)
         found, _ = vendor_surfaces(model)
         self._arm = Arm(scene, model, skin, found or capsule_surfaces(model), root)
         self._units = Units(scene, skin, model.links, root)
-        draw_pedestal(server, floor, root)
+        draw_pedestal(server, world.floor_height, root)
 
     def draw(self, across: Across, now: float) -> None:
         """Show its newest cycle at a time of the machine [s]."""

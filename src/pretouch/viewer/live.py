@@ -60,8 +60,7 @@ class LivePage:
         self.drive = Drive(server, simulation, self._actions)
         self._scene = Scene(server, simulation.world)
         if simulation.across:
-            world = simulation.world
-            self._across = DrawnAcross(server, world.model, world.skin, world.floor_height, world.profile)
+            self._across = DrawnAcross(server, simulation.world, simulation.across.spec.base)
         self._status.notice = f"{self._scene.said} {simulation.notice}".strip()
         simulation.notice = ""
         self.controls.on_view = self._scene.show

@@ -122,7 +122,7 @@ class Room:
         self.across: Across | None = None
         """The other arm, if there is one."""
         if settings.scene == "two-arms":
-            self.across = Across(model, skin, settings.plant, settings.seed)
+            self.across = Across(model, skin, settings.plant, settings.seed, settings.placement.scale)
         scene = SceneSpec(boxes=boxes, hand=hand, second=self.across.spec if self.across else None)
         self.mouse = Mouse(np.array(settings.hand_start), scene, hand, settings.placement.scale)
         start = clear_place(model, q, scene, self.mouse.target, hand.radius + GAP_M)
