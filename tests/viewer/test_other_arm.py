@@ -8,6 +8,7 @@ from tests.other_arm import copied_panda
 from pretouch.control.path import Circle
 from pretouch.importing.folder import write_folder
 from pretouch.importing.robot_import import ImportOptions, import_robot
+from pretouch.profiles import profile
 from pretouch.robot.description import fr3
 from pretouch.robot.model import RobotModel
 from pretouch.robot.named import robot_named
@@ -63,7 +64,8 @@ def test_an_imported_arm_follows_its_path_and_answers_the_hand(tmp_path):
     found = import_robot(written(tmp_path, six_axis()), ImportOptions(capsules=1))
     write_folder(found, tmp_path / "six")
     model = RobotModel(robot_named(str(tmp_path / "six")))
-    simulation = LiveSimulation(settings_for(model, LiveSettings()), model, skin_for(model))
+    settings = settings_for(model, LiveSettings(profile=profile("pretouch")))
+    simulation = LiveSimulation(settings, model, skin_for(model))
     begin = simulation.frame.step.path_position
     simulation.play_opening()
     steps = simulation.advance(14.0)
