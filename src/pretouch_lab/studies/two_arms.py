@@ -4,6 +4,7 @@ from itertools import product
 
 import numpy as np
 
+from pretouch.profiles import profile
 from pretouch.robot.self_distance import nearest_points
 from pretouch.sim.plant import TOUCH_N
 from pretouch.sim.scene import HandSpec
@@ -34,14 +35,15 @@ def cells(grid: Grid) -> list[Cell]:
     return [
         Cell(NAME, name, {"knows": knows, "restrictions": mode})
         for (name, mode), knows in product(grid.controllers(DEFAULT_RESTRICTIONS), KNOWS)
+        if profile(name).perception
     ]
 
 
 def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record | None]:
     """Run one trial; return its row of results."""
-    profile = context.profile(cell)
-    played = play(context, profile, str(cell.where["knows"]), seed, _DURATION_S)
-    asked = profile.task.speed_m_s * (_DURATION_S - played.sides[0].steps[0].stamp)
+    own = context.profile(cell)
+    played = play(context, own, str(cell.where["knows"]), seed, _DURATION_S)
+    asked = own.task.speed_m_s * (_DURATION_S - played.sides[0].steps[0].stamp)
     return cell.row(seed) | results(played, asked), None
 
 

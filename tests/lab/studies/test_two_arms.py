@@ -14,7 +14,7 @@ from pretouch_lab.studies.two_arms_trial import BACK, Visits, play, visits, way
 
 
 def test_each_profile_knows_the_other_arm_in_three_ways():
-    cells = two_arms.cells(Grid(("paper", "pretouch")))
+    cells = two_arms.cells(Grid(("blind", "paper", "pretouch")))
     assert [(c.profile, c.where["knows"]) for c in cells] == [
         (name, knows) for name in ("paper", "pretouch") for knows in ("blind", "seen", "told")
     ]
