@@ -85,7 +85,7 @@ class Context:
     orientation: Orientation | None = None
     """Whether the hand's orientation is free or held, or None for the profile's own."""
     placement: Placement = field(default_factory=Placement)
-    """Where the paper's paths are for this arm: the static experiment's."""
+    """Where the paper's paths and places are for this arm."""
     world: str = ""
     """Set of the domain randomisation of which each trial's seed draws its own, or none."""
     recording: Path | None = None
