@@ -17,8 +17,8 @@ import numpy as np
 import pylibfranka
 
 PUSH_N = 15.0
-_LASTS_S, _READ_S = 1.0, 0.5
-"""How long a push lasts before it is looked at, and how long it is looked at [s]."""
+_SETTLES_S, _LASTS_S, _READ_S = 6.0, 2.0, 0.5
+"""How long the arm stands first, how long a push lasts before it is looked at, and how long it is looked at [s]."""
 _FOLDER = Path(__file__).parent / "pushed"
 
 
@@ -42,7 +42,7 @@ def _measure(name: str, server: subprocess.Popen[str]) -> None:
     while server.stdout.readline().strip() != "ready":
         if server.poll() is not None:
             raise SystemExit(f"{name}: its server has ended.")
-    time.sleep(2.0)
+    time.sleep(_SETTLES_S)
     robot = pylibfranka.Robot("127.0.0.1", pylibfranka.RealtimeConfig.kIgnore)
     truth, told, forces = np.zeros((8, 3, 7)), np.zeros((8, 3, 7)), np.zeros((8, 3, 3))
     for link in range(8):  # the last without a push
