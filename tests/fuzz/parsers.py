@@ -242,7 +242,7 @@ def _of_clients(arm: ServedArm) -> Parser:
             theirs.sendall(data[:4096])
             for request in Connection(ours, "a client").requests(protocol):
                 if request.name == "Move":
-                    wanted_motion(request.body)
+                    wanted_motion(protocol, request.body)
                 elif request.name.startswith(("Set", "Get")) and request.name != "GetRobotModel":
                     set_or_get(arm, request.name, request.body)
         assert np.all(np.isfinite(arm.frames.F_T_EE))

@@ -21,7 +21,7 @@ API = {
     "parts": ("Parts of a controller", ("contact", "control", "perception")),
     "loop": ("Loop and recordings", ("loop", "shielding", "realtime", "recording", "reporting")),
     "simulation": ("Simulation", ("sim",)),
-    "values": ("Values and errors", ("types", "payload", "desired", "limited", "errors")),
+    "values": ("Values and errors", ("types", "moving_fixtures", "payload", "desired", "limited", "errors")),
 }
 """Pages of public names: title and the modules whose names stand there."""
 PAGES = {

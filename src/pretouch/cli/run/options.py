@@ -9,7 +9,6 @@ import tyro
 
 from pretouch.errors import HardwareError, ParameterError, RobotError
 from pretouch.hardware.address import HOST, PORT
-from pretouch.robot.named import ROBOTS as SHIPPED
 
 if TYPE_CHECKING:
     from pretouch.hardware.franka.client import Kind
@@ -158,9 +157,9 @@ def check_options(command: Run) -> None:
     robot, units, kind = command.robot, command.units, command.robot.robot
     if kind == "franka" and not robot.ip:
         raise RobotError("The robot's address is missing: give it with --ip.")
-    if kind == "franka" and robot.arm not in SHIPPED:
+    if kind == "franka" and robot.arm not in ("panda", "fr3"):
         raise RobotError(
-            f"--arm {robot.arm} does not go with --robot franka, which is a {' or an '.join(SHIPPED)}: rehearse it with"
+            f"--arm {robot.arm} does not go with --robot franka, which is a panda or an fr3: rehearse it with"
             " --robot simulated, or connect it by --robot ros2."
         )
     odd = [_flag(name) for other, names in _ONLY.items() if other != kind for name in names if _given(robot, name)]
