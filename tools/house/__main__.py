@@ -42,9 +42,9 @@ class Measure:
     399 and 4 for capacitive electrodes and the map that is learnt of them, 185 and 1 for zones in datagrams, 104 and 1
     for budgets of units, 23 for provisioning units with zones and for a profile of such skins, 1002 and 6 for a fixture
     of other people's tests, three more kinds of motion and the gripper of a simulated Franka. Then by 1811 and 12 for
-    the rest of it and for other arms: torques, impedances, loads, guiding, targets and self-collision (420), the Panda's
-    model library and worlds from files (200), two arms in one world (725), arms by name on page and in rehearsals, and
-    places found by rule (430); those of the lab by 403, for what measures these.
+    the rest of it and for other arms: torques, impedances, loads, guiding, targets and self-collision (420), the
+    Panda's model library and worlds from files (200), two arms in one world (725), arms by name on page and in
+    rehearsals, and places found by rule (430); those of the lab by 403, for what measures these.
     """
 
     name: str
