@@ -7,7 +7,7 @@ import pytest
 
 from pretouch.explanation import explain
 from pretouch.limited import Limit
-from pretouch.moving_fixtures import MovingFixtures
+from pretouch.moving_fixtures import SOMEWHERE, MovingFixtures
 from pretouch.profiles import PROFILES
 from pretouch.recording.codec import decode_moving, encode_moving
 from pretouch.recording.reader import open_recording
@@ -96,6 +96,15 @@ def test_silence_of_who_tells_holds_the_arm_until_it_is_told_again(panda_model, 
         " again."
     )
     assert turn(arm, rod(5.0, 0.0, arm.time)).mode is Mode.TRACK
+
+
+def test_an_arm_holds_until_it_is_told_of_the_other_for_the_first_time(panda_model, paper_skin):
+    arm = Arm(panda_model, paper_skin, PRETOUCH)
+    assert {turn(arm, SOMEWHERE).mode for _ in range(8)} == {Mode.HOLD}
+    step = turn(arm, SOMEWHERE)
+    assert "have not been told of yet" in step.reason
+    given = Inputs(arm.time, arm.robot(), arm.readings(), moving=SOMEWHERE)
+    assert same(decode_moving(encode_moving(0, given)), SOMEWHERE)
 
 
 def test_a_recording_holds_them_to_the_bit_and_replays(panda_model, paper_skin, tmp_path):

@@ -1,5 +1,7 @@
 """What is known to move beside the arm, such as another arm: where its body is, and how fast."""
 
+import numpy as np
+
 from pretouch.arrays import FloatArray
 from pretouch.values import value
 
@@ -29,3 +31,7 @@ class MovingFixtures:
         """Return both ends (C, 3) of each axis [m] at an instant close to the stamp [s], at constant velocities."""
         after = time - self.stamp
         return self.a + after * self.a_velocity, self.b + after * self.b_velocity
+
+
+SOMEWHERE = MovingFixtures(-np.inf, np.zeros((1, 3)), np.zeros((1, 3)), np.zeros(1), np.zeros((1, 3)), np.zeros((1, 3)))
+"""Something that nobody has told of yet: the arm holds until then."""

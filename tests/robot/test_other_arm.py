@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from pretouch.perception.moving import sound_moving
 from pretouch.perception.scene_filter import floor_and_pedestal
 from pretouch.robot.other_arm import OtherArm
 from pretouch.robot.vectors import placed
@@ -16,8 +17,8 @@ def state(q, qd, stamp=2.0) -> RobotState:
     return RobotState(stamp, q, qd, q, qd, np.zeros(7), None)
 
 
-def test_it_is_nowhere_before_its_first_state(panda_model):
-    assert OtherArm(panda_model, T, lambda: None)() is None
+def test_before_its_first_state_it_is_somewhere(panda_model):
+    assert sound_moving(OtherArm(panda_model, T, lambda: None)(), 0.0, 0.05) == (None, "have not been told of yet")
 
 
 def test_its_capsules_stand_in_the_frame_of_the_arm_beside_it(panda_model):

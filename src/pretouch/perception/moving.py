@@ -47,7 +47,7 @@ def sound_moving(
     if not (np.abs(numbers) < _FARTHEST).all() or (radius < 0.0).any():
         return None, f"hold a number that is none, is {_FARTHEST:g} or more, or a negative radius"
     if not abs(now - stamp) <= longest:
-        return None, f"were last known {now - stamp:.3f} s ago"
+        return None, "have not been told of yet" if stamp == -np.inf else f"were last known {now - stamp:.3f} s ago"
     return MovingFixtures(stamp, a, b, radius, a_velocity, b_velocity), ""
 
 

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pretouch.moving_fixtures import MovingFixtures
+from pretouch.moving_fixtures import SOMEWHERE, MovingFixtures
 from pretouch.robot.body import Capsules, no_capsules
 from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.robot.vectors import placed
@@ -23,16 +23,17 @@ class OtherArm:
         Args:
             model: of the other arm.
             T_O_other: (4, 4) pose of its base in the base frame of the arm that is told.
-            reported: gives its newest state, stamped by the clock of the arm that is told; None before the first.
+            reported: gives its newest state, stamped by the clock of the arm that is told; None before the first, for
+                which the arm that is told waits.
             standing: what it stands on, on its link 0.
         """
         self._model, self._T, self._reported = model, T_O_other, reported
         self._standing = no_capsules() if standing is None else standing
 
-    def __call__(self) -> MovingFixtures | None:
-        """Return where it is; None before its first state."""
+    def __call__(self) -> MovingFixtures:
+        """Return where it is; before its first state, that it is somewhere."""
         state = self._reported()
-        return None if state is None else self.at(state)
+        return SOMEWHERE if state is None else self.at(state)
 
     def at(self, state: RobotState) -> MovingFixtures:
         """Return where it is in a state of its own."""
