@@ -44,6 +44,7 @@ def monitor(tmp_path, port, *more):
     return cli.main(["skin", "monitor", "--keys", str(tmp_path / "keys.toml"), "--port", str(port), *more])
 
 
+@pytest.mark.slow
 def test_units_that_are_well_are_shown_recorded_and_written_as_numbers(keys, port, tmp_path, capsys):
     place, numbers = tmp_path / "units.mcap", tmp_path / "health.json"
     with Desk(keys, port):

@@ -61,6 +61,7 @@ def _motion(client: RawClient, seconds: float, qd: Any = _STILL) -> np.void:
     return state
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", sorted(PROTOCOLS))
 def test_pushes_come_when_they_are_wanted_and_the_truth_is_the_same_each_time(
     franka_server: Any, connected: Any, kind: RobotKind

@@ -59,6 +59,7 @@ def instants_of_samples(place, ids, true):
         yield instants(*astuple(counters)), np.array(truth), imu
 
 
+@pytest.mark.slow
 def test_instants_are_as_steady_as_the_sensors_though_a_third_is_lost_and_units_boot(tmp_path, panda_model, paper_skin):
     place = tmp_path / "units.mcap"
     true, reboots = recorded(place, panda_model, paper_skin, NetworkParams(LOSSY, EVEN), 12.0, 7.0)

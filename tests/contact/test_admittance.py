@@ -146,6 +146,7 @@ PUSHES = st.lists(
 )
 
 
+@pytest.mark.slow
 @given(PUSHES, st.floats(-0.4, 0.4), st.integers(0, 2**31), st.floats(0.5, 15.0))
 def test_it_takes_energy_and_gives_none_whatever_is_pushed(panda_model, pushes, bias, seed, acceleration):
     """Through a lagging, noisy and biased estimate, and an arm that cannot accelerate at once."""

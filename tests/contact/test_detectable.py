@@ -52,6 +52,7 @@ def test_what_no_joint_shows_and_what_tails_forbid_is_never_found():
     assert detectable_force(all_axes, PERIOD, free, 60.0, GAIN, 3.0) == math.inf
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("misfit", [None, MisfitParams()], ids=["without misfit", "with"])
 def test_what_it_says_is_found_in_95_of_100_cases_and_less_is_not(panda_model, misfit):
     found, less = [], []

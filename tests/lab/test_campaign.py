@@ -330,6 +330,7 @@ def test_a_killed_worker_is_said_in_a_sentence(long_run):
 SLOWLY = [pytest.param(*ending, marks=pytest.mark.slow) for ending in ((signal.SIGTERM, 143), (signal.SIGKILL, -9))]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), *SLOWLY])
 def test_a_stopped_run_leaves_whole_results(long_run, number, code):
     process, out = long_run

@@ -207,6 +207,7 @@ def ended(place: Path, how: str, after: float, number: int | None) -> tuple[floa
     return last, process.returncode, errors
 
 
+@pytest.mark.slow
 def test_a_killed_process_loses_at_most_the_last_second(tmp_path):
     place = tmp_path / "a.mcap"
     last, code, _ = ended(place, "with", 2.5, signal.SIGKILL)

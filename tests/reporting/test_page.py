@@ -218,6 +218,7 @@ def test_parameters_that_are_not_the_papers_are_marked(panda_model, paper_skin):
     assert re.findall(r'<b class="other">(.*?)</b>', text) == ["8"]
 
 
+@pytest.mark.slow
 def test_an_hour_stays_small(panda_model, paper_skin):
     steps = [made.step(panda_model, stamp=0.01 * i) for i in range(100)]
     many = made.recorded(panda_model, paper_skin, [])

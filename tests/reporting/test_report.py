@@ -46,6 +46,7 @@ def test_a_report_of_a_file_is_that_of_what_was_recorded(folder):
     assert repr(told.joints) == repr(expected.joints)
 
 
+@pytest.mark.slow
 def test_the_command_writes_a_page_of_several_files(folder, tmp_path, capsys):
     place, _ = folder
     other = tmp_path / "trial.mcap"

@@ -83,6 +83,7 @@ def test_units_that_are_silent_stuck_or_reboot_are_so_at_the_receiver(options, r
     assert all(silent in line for line in said)
 
 
+@pytest.mark.slow
 def test_it_ends_by_itself_in_order_and_says_how_it_went_each_second(options):
     said = []
     begin = time.monotonic()

@@ -27,6 +27,7 @@ def checked(panda_model, paper_skin):
             yield arm, units, UnitCheck(units, panda_model, paper_skin, fixtures(scene), arm)
 
 
+@pytest.mark.slow
 def test_units_that_are_well_are_found_well_and_one_that_falls_silent_is_named(checked):
     arm, _, check = checked
     clock = MonotonicClock(0.01)

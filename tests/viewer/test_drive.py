@@ -203,6 +203,7 @@ def test_a_reset_has_a_driven_arm_stand_at_its_beginning(page: LivePage, driver:
     assert page._simulation.frame.step.mode is Mode.TRACK
 
 
+@pytest.mark.slow
 def test_a_drive_at_the_person_is_recorded_shown_again_and_replayed_to_the_bit(
     page: LivePage, driver: Visitor, tmp_path: Path
 ) -> None:

@@ -19,6 +19,7 @@ def table(tmp_path_factory):
     return place
 
 
+@pytest.mark.slow
 def test_identify_writes_arm_numbers_and_figure(table, tmp_path, capsys):
     out, figure, numbers = (tmp_path / name for name in ("arm.toml", "residual.png", "numbers.json"))
     given = ["identify", str(table), "--out", str(out), "--figure", str(figure), "--json", str(numbers)]

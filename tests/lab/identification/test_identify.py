@@ -31,6 +31,7 @@ def within(values, errors, truth, sigmas=4.0, floor=0.0):
     return np.all(np.abs(values - truth) <= sigmas * errors + floor)
 
 
+@pytest.mark.slow
 def test_offsets_friction_ripple_and_payload_come_out_within_their_errors(found):
     own, errors = found.fit.of_joints(found.fit.numbers), found.fit.of_joints(found.fit.errors)
     assert within(own[:, 0], errors[:, 0], MADE.offset)

@@ -83,6 +83,7 @@ def test_paths_begin_away_from_the_object_and_run_towards_it(trajectory, side):
     assert max(path.point(s)[1] * sign for s in np.linspace(0, path.length, 50)) > 0.2
 
 
+@pytest.mark.slow
 def test_hard_restrictions_never_touch_what_the_skin_senses(context):
     row, record = static.trial(cell("paper", "line", "+y", "hard"), 101, context)
     assert row["restrictions"] == "hard"

@@ -52,6 +52,7 @@ def test_the_indices_of_a_function_in_closed_form():
         assert 0.0 < row["total_95"] < 0.12
 
 
+@pytest.mark.slow
 def test_intervals_shrink_with_more_samples():
     few, many = (sobol_indices(made.ishigami(n), values_of(made.ishigami(n)))["rows"] for n in (64, 1024))
     assert all(a["total_95"] > 2 * b["total_95"] for a, b in zip(few, many, strict=True))

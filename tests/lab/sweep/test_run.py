@@ -147,6 +147,7 @@ def _kill_one_worker():
     os.kill(active_children()[0].pid, signal.SIGKILL)
 
 
+@pytest.mark.slow
 def test_a_cell_whose_worker_is_killed_is_played_again(tmp_path):
     run = opened_ishigami(tmp_path, samples=2)
     kills = iter([_kill_one_worker, _kill_one_worker])

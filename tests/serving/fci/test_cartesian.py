@@ -61,6 +61,7 @@ def test_velocities_lead_the_end_effector_and_are_told(serve: Any, raw: Any, kin
     np.testing.assert_allclose(end[:3, :3], rotation_about(np.eye(3)[0], 0.2) @ begin[:3, :3], atol=1e-5)
 
 
+@pytest.mark.slow
 def test_poses_lead_the_end_effector_though_commands_are_lost(serve: Any, raw: Any, kind: RobotKind) -> None:
     client = raw(serve(kind, drop=Drop(2, 50)))
     state = _begun(client, _POSE)
@@ -221,6 +222,7 @@ def test_limits_of_joints_that_follow_have_names_of_their_own(kind: RobotKind) -
     assert any(name.startswith(f"{_PREFIX}_joint_velocity") for name in outwards.errors), outwards
 
 
+@pytest.mark.slow
 def test_a_joint_that_follows_to_its_end_has_a_name_of_its_own() -> None:
     turned = Follower("panda").led(5, 0.8, 1.0)
     assert turned == Ending("reflex", (f"{_PREFIX}_joint_position_limits_violation",))

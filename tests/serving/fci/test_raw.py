@@ -296,6 +296,7 @@ def test_requests_in_pieces_and_in_one_go_are_understood(serve: Any, raw: Any) -
     assert [client.answer() for _ in range(4)] == 4 * [("SetJointImpedance", 5, b"\0")]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_nothing_that_is_sent_kills_the_server(serve: Any, raw: Any, kind: RobotKind, seed: int) -> None:
     served, rng = serve(kind, patience_s=0.02), np.random.default_rng([seed, 8])

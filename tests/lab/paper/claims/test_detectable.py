@@ -201,6 +201,7 @@ def rows(context):
     return [detectable.trial(cell("rest", "push", size), 100, context)[0] for size in (0.0, 30.0)]
 
 
+@pytest.mark.slow
 def test_a_row_says_where_it_is_from_and_all_that_was_found(rows):
     row = rows[1]
     assert list(row) == ["experiment", "motion", "shape", "size", "profile", "seed", "answers", "held"]
