@@ -82,6 +82,11 @@ def test_its_units_are_heard_in_real_time(tmp_path: Path) -> None:
         (["--hand", "--scene", "static"], "--hand needs --scene empty"),
         (["--scene", "nonesuch"], "--scene is nonesuch: give empty, static, dynamic, or an MJCF file"),
         (["--seed", "-1"], "give 0 or more"),
+        (
+            ["--start", "-0.1,0"],
+            "--start is '-0.1,0': give ready, path, or 7 joint angles between commas",
+        ),
+        (["--start", "0,0,0,0.5,0,1,0"], "-3.072 to -0.0698"),
         (["--scene", "static", "--box", "1,1,1:1,1,1"], "--box needs --scene empty"),
         (["--box", "1,1,1"], "give centre and edges, such as 0.5,0.3,0.4:0.3,0.04,0.24"),
         (["--box", "0,0,nan:1,1,1"], "--box is '0,0,nan:1,1,1'"),

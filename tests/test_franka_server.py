@@ -142,6 +142,12 @@ def test_an_object_is_grasped_and_loads_the_arm_the_same_each_time(franka_server
     np.testing.assert_array_equal(truths[0].q, truths[1].q)
 
 
+def test_it_stands_where_the_test_wants_it_to(franka_server: Any, connected: Any) -> None:
+    wanted = [-0.1, -0.5, 0.1, -2.0, 0.0, 1.6, 0.7]
+    server = franka_server(start=",".join(map(str, wanted)))
+    np.testing.assert_allclose(connected(server, "panda").state()["q"], wanted, atol=2e-2)
+
+
 def test_the_user_stop_ends_a_motion(franka_server: Any, connected: Any) -> None:
     server = franka_server()
     client = connected(server, "panda")

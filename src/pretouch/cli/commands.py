@@ -214,8 +214,9 @@ class ServeFci:
     """Contact stiffness of board and boxes [N/m], greater than 0."""
     box: tuple[str, ...] = ()
     """Boxes in the empty scene, each X,Y,Z:DX,DY,DZ: centre and edges [m], base frame."""
-    start: Literal["ready", "path"] = "ready"
-    """Initial posture of the arm: its usual one, or that at the start of the path."""
+    start: str = "ready"
+    """Initial posture of the arm: ready, its usual one, path, that at the start of the path, or seven joint angles
+    between commas [rad]."""
     seed: int = 0
     """Seed of the simulated arm and scene: each arm has different errors and noise, each scene different positions."""
     push: tuple[str, ...] = ()

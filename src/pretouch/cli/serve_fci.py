@@ -162,9 +162,28 @@ def _setup(c: "ServeFci") -> ArmSetup:
     if c.seed < 0:
         raise ParameterError(f"--seed is {c.seed}: give 0 or more.")
     scene, hand, path = _scene(c, model)
-    q = brought_to(model, path.point(0.0)) if c.start == "path" else model.description.q_ready.copy()
+    q = _posture(c.start, model, path)
     pushes, gripped = tuple(map(push_of, c.push)), object_of(c.object) if c.object else None
     return ArmSetup(model, c.robot, q, scene, hand, pushes, _units(c, model), gripped, c.seed)
+
+
+def _posture(start: str, model: RobotModel, path: ArmPath) -> FloatArray:
+    """Read where the arm stands at first (7,) [rad]."""
+    match start:
+        case "ready":
+            return model.description.q_ready.copy()
+        case "path":
+            return brought_to(model, path.point(0.0))
+    try:
+        q = np.array([float(angle) for angle in start.split(",")])
+    except ValueError:
+        q = np.array([np.nan])
+    if q.shape != (model.n,) or not np.all((q >= model.q_min) & (q <= model.q_max)):
+        limits = ", ".join(f"{low:.4g} to {high:.4g}" for low, high in zip(model.q_min, model.q_max, strict=True))
+        raise ParameterError(
+            f"--start is {start!r}: give ready, path, or {model.n} joint angles between commas, within {limits} [rad]."
+        )
+    return q
 
 
 def _scene(c: "ServeFci", model: RobotModel) -> tuple[SceneSpec, HandScript | None, ArmPath]:
