@@ -41,7 +41,7 @@ class Measure:
     is a parameter of a profile; and by 227 and 1 for a bound on the speed where no unit looks, which is another, and by
     399 and 4 for capacitive electrodes and the map that is learnt of them, 185 and 1 for zones in datagrams, 104 and 1
     for budgets of units, 23 for provisioning units with zones and for a profile of such skins, 1002 and 6 for a fixture
-    of other people's tests, three more kinds of motion and the gripper of a simulated Franka. Then by 1811 and 12 for
+    of other people's tests, three more kinds of motion and the gripper of a simulated Franka. Then by 1838 and 12 for
     the rest of it and for other arms: torques, impedances, loads, guiding, targets and self-collision (420), the
     Panda's model library and worlds from files (200), two arms in one world (725), arms by name on page and in
     rehearsals, and places found by rule (430); those of the lab by 403, for what measures these.
@@ -72,9 +72,9 @@ def measures() -> list[Measure]:
         value for group in fields(PROFILES["pretouch"]) for value in _values(getattr(PROFILES["pretouch"], group.name))
     ]
     return [
-        Measure("lines of the product, comments aside", product.lines, 60_899, 35_000),
+        Measure("lines of the product, comments aside", product.lines, 60_926, 35_000),
         Measure("files of the product", len(product.files), 499, 300),
-        Measure("lines of product and lab, likewise", product.lines + lab.lines, 84_175, 50_000),
+        Measure("lines of product and lab, likewise", product.lines + lab.lines, 84_202, 50_000),
         Measure("lines of the largest file", longest_file[1], 350, 350, str(longest_file[0].relative_to(ROOT / "src"))),
         Measure("most parameters of a function", widest.parameters, 8, 8, widest.place),
         Measure("functions of more than 8 parameters", sum(f.parameters > 8 for f in functions), 0, 0),
