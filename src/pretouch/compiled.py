@@ -92,15 +92,20 @@ def entry(function: Callable[..., Result]) -> Entry[Result]:
         if parameter not in function.__annotations__:
             raise TypeError(f"{name}() has no type for {parameter}: annotate it, so that its group is known.")
         taken.append(_Taken.of(parameter, function.__annotations__[parameter], scope))
-    code = (
+    called_by_python = (
         f"def {name}({', '.join(parameters)}):\n"
         f"{''.join(line for t in taken for line in t.before)}"
         f"    return _flat(*({' + '.join(t.apart for t in taken)}))\n"
+    )
+    flat = (
         f"def {name}_flat({', '.join(argument for t in taken for argument in t.arguments)}):\n"
         f"    return _body({', '.join(t.together for t in taken)})\n"
     )
-    # Numba keeps what it compiles beside the file that a function's code names
-    exec(compile(code, function.__code__.co_filename, "exec"), scope)  # noqa: S102  made of the names of its parameters
+    # Numba keeps what it compiles beside the file that a function's code names, and reads the text there that begins at
+    # the code's first line: both generated functions stand where the true one does.
+    above = "\n" * (function.__code__.co_firstlineno - 1)
+    for text in (called_by_python, flat):
+        exec(compile(above + text, function.__code__.co_filename, "exec"), scope)  # noqa: S102  of names of parameters
     called = scope[name]
     called.__doc__, called.__wrapped__ = function.__doc__, function
     scope["_body"] = inlined(function)

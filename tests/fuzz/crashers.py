@@ -47,7 +47,6 @@ URDF = [
     six_axis(tail="<link name='a'>" * 900 + "</link>" * 900).encode(),
 ]
 TOML = [
-    b".".join([b"a"] * 50_000) + b" = 1\n",
     b"a = " + b"[" * 50_000,
     b'a = """' * 5000,
     b'[[unit]]\nid = "u"\nlink = "panda_link5"\n' * 3000,

@@ -146,20 +146,28 @@ def test_each_zone_looks_along_its_own_beam_and_the_file_keeps_the_unit_whole(pa
     np.testing.assert_allclose(again.T_link_sensor, skin.T_link_sensor, atol=1e-12)
 
 
-def test_zones_that_a_sensor_does_not_have_are_named_with_their_line(panda_model, tmp_path):
+def test_zones_that_a_sensor_does_not_have_are_named(panda_model, tmp_path):
     text = '[sensor.mine]\nlike = "vl53l5cx"\nzones = 5\n' + UNIT.format(id="a", z=0.045)
-    with pytest.raises(SkinError, match=r"zones is 5: it measures 4 x 4 or 8 x 8. \(in .*skin.toml, line 1\)"):
+    with pytest.raises(SkinError, match=r"zones is 5: it measures 4 x 4 or 8 x 8. \(in .*skin.toml\)"):
         skin_of(tmp_path, panda_model, text)
     with pytest.raises(SkinError, match=r"zones is 9: it must be at most 8"):
         skin_of(tmp_path, panda_model, "[sensor.many]\nzones = 9\n" + UNIT.format(id="a", z=0.045))
 
 
-def test_what_is_wrong_with_a_unit_is_said_with_its_line(panda_model, tmp_path):
-    text = '# [[unit]] in a comment\n"x y" = """\n[[unit]]\n"""\n' + UNIT.format(id="a", z=0.045)
-    text += UNIT.format(id="b", z=0.02) + 'sensor = "sonar"\n'
-    line = text.split("\n").index('id = "b"')  # that of its header, counted from 1
-    with pytest.raises(SkinError, match=rf"Unit b has the sensor 'sonar': .* line {line}\)"):
+def test_an_error_in_a_unit_names_the_file_and_the_unit(panda_model, tmp_path):
+    text = UNIT.format(id="a", z=0.045) + UNIT.format(id="b", z=0.02) + 'sensor = "sonar"\n'
+    with pytest.raises(SkinError, match=r"Unit b has the sensor 'sonar': .* \(in .*skin.toml, unit 2 of 2\)"):
         skin_of(tmp_path, panda_model, text)
+    with pytest.raises(SkinError, match=r"A unit has the id None: .* \(in .*skin.toml, unit 1 of 1\)"):
+        skin_of(tmp_path, panda_model, '[[unit]]\nlink = "panda_hand"\n')
+
+
+@pytest.mark.parametrize("text", ["a = [", "a = " + "[" * 50_000, "\xff", "a = 1\na = 2"])
+def test_a_file_that_is_not_toml_is_named(panda_model, tmp_path, text):
+    file = tmp_path / "skin.toml"
+    file.write_bytes(text.encode("latin-1"))
+    with pytest.raises(SkinError, match=r"The skin file .*skin\.toml is not (valid TOML|UTF-8 text): ."):
+        load_skin(file, panda_model)
 
 
 def test_zones_of_more_units_than_a_step_can_take_are_refused(panda_model, paper_skin):

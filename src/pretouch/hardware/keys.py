@@ -13,7 +13,7 @@ import tomli_w
 
 from pretouch.errors import HardwareError
 from pretouch.hardware.wire import KEY_SIZE
-from pretouch.toml_files import parsed_toml
+from pretouch.toml_files import parse_toml
 
 _LAST_NUMBER = 0xFFFF
 _SHOWN_BITS = 64
@@ -104,7 +104,7 @@ def load_keys(path: Path) -> Keys:
     except ValueError as error:
         raise HardwareError(f"{str(path)!r} cannot be a file name: {error}.") from None
     try:
-        tables = parsed_toml(text)
+        tables = parse_toml(text)
     except ValueError as error:
         raise HardwareError(f"{path} is not a TOML file of keys: {error}.") from None
     try:

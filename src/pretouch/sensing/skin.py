@@ -28,7 +28,7 @@ from pretouch.sensing.unit import (
     mounted,
     zones_of,
 )
-from pretouch.toml_files import bytes_of, lines_of, parsed_toml
+from pretouch.toml_files import read_toml
 from pretouch.types import FloatArray, IntArray
 
 _FAR = 0.5
@@ -123,11 +123,10 @@ def _check_place(unit: SensorUnit, model: RobotModel) -> None:
 
 
 def load_skin(path: Path | str, model: RobotModel) -> Skin:
-    """Read a skin file. What is wrong with it is a SkinError that names the file, line and unit, and the way out."""
+    """Read a skin file. What is wrong with it is a SkinError that names the file and the unit, and the way out."""
     path = Path(path)
     try:
-        text = bytes_of(path)
-        data = parsed_toml(text)
+        data = read_toml(path)
     except OSError as error:
         raise SkinError(f"The skin file {path} cannot be read: {error.strerror}.") from error
     except UnicodeDecodeError as error:
@@ -137,16 +136,15 @@ def load_skin(path: Path | str, model: RobotModel) -> Skin:
     entries = data.get("unit")
     if not isinstance(entries, list) or not entries:
         raise SkinError(f"The skin file {path} has no unit: give at least one [[unit]] with id, link and pose.")
-    lines = lines_of(text.decode())
     types, units = dict[str, Sensor](), list[SensorUnit]()
     with _said_where(path):
         tables = sensor_tables(data.get("sensor", {}))
         _check_count(len(entries))
     for name, table in tables.items():
-        with _said_where(path, lines.get(("sensor", name))):
+        with _said_where(path):
             types[name] = own_type(name, table)
-    for number, entry in enumerate(entries):
-        with _said_where(path, lines.get(("unit", number))):
+    for number, entry in enumerate(entries, 1):
+        with _said_where(path, f", unit {number} of {len(entries)}"):
             units.append(_unit_from(entry, types))
             _check_place(units[-1], model)
     with _said_where(path):
@@ -154,11 +152,11 @@ def load_skin(path: Path | str, model: RobotModel) -> Skin:
 
 
 @contextmanager
-def _said_where(path: Path, line: int | None = None) -> Iterator[None]:
+def _said_where(path: Path, unit: str = "") -> Iterator[None]:
     try:
         yield
     except SkinError as error:
-        raise SkinError(f"{error} (in {path}{f', line {line}' if line else ''})") from error
+        raise SkinError(f"{error} (in {path}{unit})") from error
 
 
 def save_skin(skin: Skin, path: Path) -> None:

@@ -13,7 +13,7 @@ from pretouch.checks import is_number
 from pretouch.errors import ParameterError
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.range_finder import RangeFinderParams
-from pretouch.toml_files import parsed_toml
+from pretouch.toml_files import parse_toml
 
 FOLDER = Path(__file__).parent / "worlds"
 SETS = ("nominal", "realistic", "stress", "hard")
@@ -109,7 +109,7 @@ def world_set(name: str) -> WorldSet:
     place = FOLDER / f"{name}.toml" if name in SETS else Path(name)
     try:
         data = place.read_bytes()
-        table = parsed_toml(data)
+        table = parse_toml(data)
     except OSError as error:
         raise ParameterError(
             f"The world {name!r} is not one of {', '.join(SETS)}, and no file of that name can be read"
