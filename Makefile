@@ -6,7 +6,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: setup demo live cbf franka learn ros2 meshes browser docs micropython test test-skipped test-slow soak golden golden-values lint house bench peers \
+.PHONY: setup demo live cbf franka learn ros2 meshes browser docs micropython test test-quick test-contracts test-skipped test-slow soak golden golden-values lint house bench peers \
 	format clean
 
 setup: $(STAMP)
@@ -59,16 +59,30 @@ micropython:
 	@mkdir -p build/micropython && cp firmware/package.json build/micropython/
 	npm install --prefix build/micropython --no-package-lock --no-audit --no-fund --silent
 
-test: setup
-	$(BIN)/pytest -n 2 --dist worksteal -m "not slow" --list-skipped=build/skipped
+# what a test run says at its end: the fifty slowest tests, and what was skipped for which extra
+PYTEST := $(BIN)/pytest --durations=50 --durations-min=1
 
-# the files in which the last `make test` skipped something, once what they need is installed; nothing may be skipped now
+test: setup
+	$(PYTEST) -n 2 --dist worksteal -m "not slow" --list-skipped=build/skipped
+
+# imports, a trial, a recording and its replay, the page's start: whether another Python works
+test-quick: setup
+	$(PYTEST) -n 2 -m "not slow" tests/test_compiled.py tests/test_controller.py tests/lab/paper/test_avoidance.py \
+		tests/recording/test_writer.py tests/test_cli_replay.py tests/viewer/test_serve_live.py
+
+# the files in which the last `make test` skipped something, with the real libraries, and the page in a browser
+test-contracts: setup
+	@test ! -s build/skipped || $(PYTEST) -n 2 --dist worksteal -m "not slow" \
+		--skip-only="make meshes,make cbf,make learn" $$(cat build/skipped)
+	$(PYTEST) -n 2 --dist worksteal -m "not alone" --skip-only= tests/viewer/test_page_in_browser.py
+
+# the same files once all that they need is installed: nothing may be skipped now
 test-skipped: setup
-	@test ! -s build/skipped || $(BIN)/pytest -n 2 --dist worksteal -m "not slow" --none-skipped $$(cat build/skipped)
+	@test ! -s build/skipped || $(PYTEST) -n 2 --dist worksteal -m "not slow" --skip-only= $$(cat build/skipped)
 
 test-slow: setup
-	$(BIN)/pytest -n 2 --dist worksteal -m "slow and not alone" --none-skipped
-	$(BIN)/pytest -n 0 -m alone --none-skipped
+	$(PYTEST) -n 2 --dist worksteal -m "slow and not alone" --skip-only=
+	$(PYTEST) -n 0 -m alone --skip-only=
 
 # two hours of everything at once, as long as nothing goes wrong (SECURITY.md); MINUTES=10 for fewer
 MINUTES ?= 120

@@ -41,7 +41,7 @@ def pytest_collection_finish() -> None:
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--list-skipped", type=Path, help="write the files in which something was skipped to a file")
-    parser.addoption("--none-skipped", action="store_true", help="fail if anything was skipped")
+    parser.addoption("--skip-only", help="fail if a test was skipped but for these commands, separated by commas")
 
 
 def _skipped(config: pytest.Config) -> list[pytest.TestReport]:
@@ -55,12 +55,17 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
     if listed:
         listed.parent.mkdir(parents=True, exist_ok=True)
         listed.write_text("".join(f"{name}\n" for name in sorted({report.nodeid.split("::")[0] for report in skipped})))
-    if skipped and session.config.option.none_skipped:
+    allowed = session.config.option.skip_only
+    if allowed is not None and not {_reason(report) for report in skipped} <= set(allowed.split(",")):
         session.exitstatus = pytest.ExitCode.TESTS_FAILED
 
 
+def _reason(report: pytest.TestReport) -> str:
+    """Return why a test was skipped: the command that installs what it needs, where it says one."""
+    return report.longrepr[2].removeprefix("Skipped: ").removeprefix(NEEDS)
+
+
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
-    reasons = (report.longrepr[2].removeprefix("Skipped: ") for report in _skipped(config))
-    counts = Counter(reason.removeprefix(NEEDS) if reason.startswith(NEEDS) else reason for reason in reasons)
+    counts = Counter(_reason(report) for report in _skipped(config))
     if counts:
         terminalreporter.write_line(f"skipped: {', '.join(f'{n} for {what}' for what, n in counts.most_common())}")

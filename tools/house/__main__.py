@@ -7,7 +7,6 @@ from pathlib import Path
 from statistics import median, quantiles
 
 from tools.house.source import Source, import_cycle
-from tools.house.words import words_by_hand
 
 from pretouch.profiles import PROFILES
 
@@ -81,7 +80,6 @@ def measures() -> list[Measure]:
         Measure("lines of functions, 95th percentile", quantiles([f.lines for f in functions], n=20)[-1], 27),
         Measure("lines of the longest function", longest.lines, 60, 60, longest.place),
         *(_comments(package) for package in ("control", "contact", "perception")),
-        Measure("words of documents by hand", sum(words_by_hand(ROOT).values()), 42_000, 42_000),
         Measure("lines of README", len((ROOT / "README.md").read_text().splitlines()), 150, 150),
         Measure("parameters of a profile", len(values), 125, 140),
         Measure("booleans among them", sum(isinstance(value, bool) for value in values), 7, 6),
