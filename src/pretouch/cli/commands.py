@@ -20,8 +20,6 @@ class Live:
     """panda, fr3, a name that another package adds, or the folder of an imported arm, to which the room is scaled."""
     path: str = "circle"
     """circle or line."""
-    scene: str = "one-arm"
-    """one-arm, or two-arms: with another across the table, each told where the other is."""
     seed: int = 0
     """Seed of the simulated arm: each has different errors and noise."""
     world: str = ""

@@ -12,7 +12,7 @@ from pretouch.extras import LIVE
 from pretouch.hardware.address import EVERYWHERE, HOST
 from pretouch.profiles import profile as find_profile
 from pretouch.signals import ended
-from pretouch.viewer.room import LiveSettings, PathName, Room, SceneName, live_path, settings_for
+from pretouch.viewer.room import LiveSettings, PathName, Room, live_path, settings_for
 from pretouch.viewer.server import ServeOptions, browser_here, check_port
 
 if TYPE_CHECKING:
@@ -29,10 +29,8 @@ def live(command: "Live") -> None:
     check_port(options)  # before the seconds that the simulation takes to begin
     if command.path not in ("circle", "line"):
         raise ParameterError(f"The path is {command.path!r}: choose circle or line.")
-    if command.scene not in ("one-arm", "two-arms"):
-        raise ParameterError(f"The scene is {command.scene!r}: choose one-arm or two-arms.")
     path, profile = cast(PathName, command.path), find_profile(command.profile)
-    settings = LiveSettings(profile=profile, path=path, seed=command.seed, scene=cast(SceneName, command.scene))
+    settings = LiveSettings(profile=profile, path=path, seed=command.seed)
 
     from pretouch.cli.warm_up import prepare
     from pretouch.coverage.placement import assumptions
@@ -58,7 +56,7 @@ def live(command: "Live") -> None:
         for sentence in assumptions(model, settings.placement):
             print(sentence, flush=True)
             simulation.notice = f"{simulation.notice} {sentence}".strip()
-        if command.opening and not real and not command.record and command.scene == "one-arm":
+        if command.opening and not real and not command.record:
             simulation.play_opening()
         if command.record:
             simulation.start_recording(Path(command.record))

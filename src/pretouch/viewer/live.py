@@ -9,7 +9,6 @@ from pretouch.errors import PretouchError
 from pretouch.explanation import finds, resumable
 from pretouch.loop import MonotonicClock
 from pretouch.types import ControlStep, FloatArray
-from pretouch.viewer.across import DrawnAcross
 from pretouch.viewer.action_queue import Action, ActionQueue
 from pretouch.viewer.asked import told
 from pretouch.viewer.companions import Companions
@@ -52,15 +51,12 @@ class LivePage:
         """Whether the receiver of the real units has ended."""
         style_page(server)
         self._status = Status(server.gui)
-        self._across: DrawnAcross | None = None
-        if not simulation.real and not simulation.across:
+        if not simulation.real:
             arms = server.gui.add_dropdown("Arms", _ARMS, hint="Three: blind, paper and pretouch with one hand.")
             when_changed(arms, self._actions, self._show_arms, "arms")
         self.controls = Controls(server.gui, simulation, self._actions)
         self.drive = Drive(server, simulation, self._actions)
         self._scene = Scene(server, simulation.world)
-        if simulation.across:
-            self._across = DrawnAcross(server, simulation.world, simulation.across.spec.base)
         self._status.notice = f"{self._scene.said} {simulation.notice}".strip()
         simulation.notice = ""
         self.controls.on_view = self._scene.show
@@ -173,8 +169,6 @@ class LivePage:
             self.drive.draw(frame.step)
             if self._companions:
                 self._companions.draw(now)
-            if self._across and self._simulation.across:
-                self._across.draw(self._simulation.across, now)
             self._plots.draw(now)
             recording = self._simulation.recording
             recorded = f"recording {recording.place.name}" if recording else ""

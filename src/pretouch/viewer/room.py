@@ -10,7 +10,6 @@ from pretouch.control.path import Path, WayPoints
 from pretouch.control.posture import brought_to
 from pretouch.coverage.placement import placement_for
 from pretouch.errors import ParameterError
-from pretouch.moving_fixtures import MovingFixtures
 from pretouch.ports import Skin as UnitPort
 from pretouch.profiles import PROFILES, Profile
 from pretouch.robot.model import RobotModel
@@ -24,7 +23,6 @@ from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
 from pretouch.sim.touch_sensor import SimulatedTouchSkin, TouchSensorParams, TouchSensors
 from pretouch.types import FloatArray
-from pretouch.viewer.across import Across
 from pretouch.viewer.mouse import GAP_M, HAND_SPEED_M_S, Mouse, clear_place
 from pretouch.viewer.real_units import RealUnits
 
@@ -33,9 +31,6 @@ PathName = Literal["circle", "line"]
 
 ObjectName = Literal["none", "board -y", "board +y"]
 """What stands in the arm's way: nothing, or the static experiment's board on one side."""
-
-SceneName = Literal["one-arm", "two-arms"]
-"""Who works in the room: the arm alone, or with another across the table."""
 
 Stiffness = Annotated[float, Check(low=3_000.0, high=150_000.0)]
 """Of a contact with the arm [N/m]. On a softer one a hand that pushes hard sinks through a thin link; a stiffer one of
@@ -64,8 +59,6 @@ class LiveSettings(Checked):
     """Path of the end-effector."""
     object: ObjectName = "none"
     """What stands in its way."""
-    scene: SceneName = "one-arm"
-    """Whether another arm works across the table."""
     stiffness: Stiffness = HandSpec.stiffness
     """Stiffness of what the arm can touch, the person's hand and the object [N/m]."""
     faults: Faults = field(default_factory=Faults)
@@ -119,18 +112,12 @@ class Room:
             side: Side = "+y" if settings.object == "board +y" else "-y"
             face, met_by = settings.placement.face(FACE_M, side), settings.placement.hand(side)
             boxes = (board_beside(path, side, settings.stiffness, face, hand=met_by),)
-        self.across: Across | None = None
-        """The other arm, if there is one."""
-        if settings.scene == "two-arms":
-            self.across = Across(model, skin, settings.plant, settings.seed, settings.placement.scale)
-        scene = SceneSpec(boxes=boxes, hand=hand, second=self.across.spec if self.across else None)
+        scene = SceneSpec(boxes=boxes, hand=hand)
         self.mouse = Mouse(np.array(settings.hand_start), scene, hand, settings.placement.scale)
         start = clear_place(model, q, scene, self.mouse.target, hand.radius + GAP_M)
         self.mouse.move(start)
         self.scene = replace(scene, hand=replace(hand, start=tuple(start.tolist())))
         self.plant = Plant(model, self.scene, settings.plant, q, settings.seed)
-        if self.across:
-            self.across.join(self.plant, path, settings.profile, settings.ranging)
         self._simulated = None if real else RangeFinders(self.plant, skin, settings.ranging, settings.seed)
         self.units: UnitPort = self._simulated or cast(RealUnits, real)
         if self._simulated and len(skin.touching):
@@ -185,11 +172,4 @@ class Room:
             self.stiffness = self._wanted
             for thing in ("hand", *(box.name for box in self.scene.boxes)):
                 self.plant.stiffen(thing, self.stiffness)
-        time = self.clock.tick()
-        if self.across:
-            self.across.turn(time)
-        return time
-
-    def told(self) -> MovingFixtures | None:
-        """Where the other arm is; None without one."""
-        return self.across.told() if self.across else None
+        return self.clock.tick()

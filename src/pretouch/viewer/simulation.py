@@ -31,7 +31,6 @@ from pretouch.viewer.room import Faults, LiveSettings, PathName, Room, live_path
 
 if TYPE_CHECKING:
     from pretouch.recording.writer import Closed, Recording
-    from pretouch.viewer.across import Across
     from pretouch.viewer.real_units import RealUnits
 
 
@@ -102,11 +101,6 @@ class LiveSimulation:
         return self._room.plant.time
 
     @property
-    def across(self) -> "Across | None":
-        """The arm across the table, if there is one."""
-        return self._room.across
-
-    @property
     def stiffness(self) -> float:
         """Of the person's hand and the object [N/m], as it is now."""
         return self._room.stiffness
@@ -129,7 +123,7 @@ class LiveSimulation:
             room.mouse.move(self.opening.target(self.frame.step))
             self.opening = None if self.opening.over else self.opening
         tick = room.tick()
-        options = Options(resume=lambda: resume, desired=lambda: self.commander(tick), moving=room.told)
+        options = Options(resume=lambda: resume, desired=lambda: self.commander(tick))
         cycle = turn(self.controller, self._state, room.plant, room.units, tick, options)
         self._state = cycle.after
         hand = room.hand.position
