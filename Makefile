@@ -67,7 +67,7 @@ test: setup
 
 # imports, a trial, a recording and its replay, the page's start: whether another Python works
 test-quick: setup
-	$(PYTEST) -n 2 -m "not slow" tests/test_compiled.py tests/test_controller.py tests/lab/paper/test_avoidance.py \
+	$(PYTEST) -n 2 -m "not slow" tests/test_compiled.py tests/test_controller.py lab/tests/paper/test_avoidance.py \
 		tests/recording/test_writer.py tests/test_cli_replay.py tests/viewer/test_serve_live.py
 
 # the files in which the last `make test` skipped something, with the real libraries, and the page in a browser

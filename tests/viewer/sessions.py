@@ -4,7 +4,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
-from tests.lab.limits import assert_within_limits
+from tests.limits import assert_within_limits
 
 from pretouch.types import ControlStep, Mode
 from pretouch.viewer.simulation import LiveSimulation

@@ -1,0 +1,90 @@
+import json
+
+import numpy as np
+import pytest
+from lab.tests.identification.made import Made, free_motion
+
+from pretouch import cli
+from pretouch.sim.randomisation import drawn, world_set
+
+
+@pytest.fixture(scope="module")
+def table(tmp_path_factory):
+    samples = free_motion(Made(), seconds=40.0)
+    names = ["time_s"] + [f"{what}{j}_{unit}" for what, unit in (("q", "rad"), ("qd", "rad_s"), ("tau_ext", "Nm"))
+                          for j in range(1, 8)]  # fmt: skip
+    place = tmp_path_factory.mktemp("free") / "free.csv"
+    columns = np.column_stack([samples.stamp, samples.q, samples.qd, samples.tau])
+    np.savetxt(place, columns, delimiter=",", header=",".join(names), comments="")
+    return place
+
+
+@pytest.mark.slow
+def test_identify_writes_arm_numbers_and_figure(table, tmp_path, capsys):
+    out, figure, numbers = (tmp_path / name for name in ("arm.toml", "residual.png", "numbers.json"))
+    given = ["identify", str(table), "--out", str(out), "--figure", str(figure), "--json", str(numbers)]
+    assert cli.main(given) == 0
+    said = capsys.readouterr().out
+    assert "on the robot (--sign)" in said
+    assert "offset [Nm]" in said
+    assert figure.stat().st_size > 10_000
+    found = json.loads(numbers.read_text())
+    assert found["observer_gain_1_s"][0] == pytest.approx(45.0, rel=0.03)
+    assert found["contact_spans_s"] == []
+    plant = drawn(world_set(str(out)), 1001).plant
+    assert plant.observer_gain_1_s == pytest.approx(found["observer_gain_1_s"][0], rel=1e-4)
+
+
+def test_without_velocities_no_torque_noise_is_told_and_the_other_sign_turns_offsets_round(table, tmp_path, capsys):
+    lines = [line.split(",") for line in table.read_text().splitlines()]
+    place, numbers = tmp_path / "still.csv", tmp_path / "numbers.json"
+    place.write_text("\n".join(",".join(line[:8] + line[15:]) for line in lines) + "\n")
+    assert cli.main(["identify", str(place), "--sign", "by-robot", "--json", str(numbers)]) == 0
+    assert "Without velocities neither their noise nor the observer's gain is identified" in capsys.readouterr().out
+    of_joints = json.loads(numbers.read_text())["of_joints"]
+    told = {row["name"]: row["told"] for row in of_joints}
+    assert not any(told["torque noise [Nm]"])
+    assert all(told["offset [Nm]"])
+    assert of_joints[0]["name"] == "offset [Nm]"
+    assert of_joints[0]["values"][2] == pytest.approx(-0.2, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (["--arm", "nowhere"], "nowhere"),
+        (["--figure", "x.gif"], "no ending that says its format"),
+    ],
+)
+def test_what_cannot_be_is_refused(table, given, said, capsys):
+    assert cli.main(["identify", str(table), *given]) == 2
+    assert said in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("header", "said"),
+    [
+        ("time_s,q1_rad", "1 columns of q"),
+        ("q1_rad", "0 columns of time"),
+        ("time_s," + ",".join(f"q{j}_rad" for j in range(1, 8)), "0 columns of tau"),
+        ("time_s," + ",".join(f"q{j}_rad,tau{j}_Nm" for j in range(1, 8)), "an observer over them needs velocities"),
+    ],
+)
+def test_columns_that_are_missing_are_named(tmp_path, header, said, capsys):
+    place = tmp_path / "some.csv"
+    count = len(header.split(","))
+    place.write_text("\n".join([header, *(",".join([str(0.01 * i)] + ["0.1"] * (count - 1)) for i in range(5))]) + "\n")
+    assert cli.main(["identify", str(place)]) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_a_world_has_a_folder_of_its_own_and_is_kept_out_of_the_published_tables(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["bench", "detection", "--world", "stress", "--docs", "docs"]) == 2
+    assert "writes the published tables" in capsys.readouterr().err
+    assert cli.main(["bench", "both", "--world", "stress", "--readme", "README.md"]) == 2
+    assert "--readme writes the published tables" in capsys.readouterr().err
+    assert cli.main(["bench", "detection", "--world", "strange"]) == 2
+    assert "not one of nominal, realistic, stress" in capsys.readouterr().err
+    assert cli.main(["reproduce", "static", "--world", "strange"]) == 2
+    assert "not one of nominal, realistic, stress" in capsys.readouterr().err

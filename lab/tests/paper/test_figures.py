@@ -1,0 +1,325 @@
+from dataclasses import replace
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from shutil import copy, copytree
+
+import numpy as np
+import pytest
+from matplotlib.colors import to_rgb
+from PIL import Image
+from tests.recording.runs import controller_of, recorded_run
+
+from pretouch.errors import ExperimentError, ParameterError, PretouchError, RecordingError
+from pretouch.perception.obstacles import points_of_units
+from pretouch.profiles import profile
+from pretouch.recording.run_record import MODES, RunRecord, TrueForces
+from pretouch.sensing.skin import Skin
+from pretouch.types import Contact, Mode
+from pretouch_lab.campaign import Request, recording_file
+from pretouch_lab.cell import Cell
+from pretouch_lab.cli import figure as cli_figure
+from pretouch_lab.cli.figure import draw_figure
+from pretouch_lab.paper.claims import between
+from pretouch_lab.paper.figures import framework, marks
+from pretouch_lab.paper.figures.catalogue import CATALOGUE
+from pretouch_lab.paper.figures.circle import circle_figure
+from pretouch_lab.paper.figures.close_up import close_up_figure
+from pretouch_lab.paper.figures.compared import compared_figure
+from pretouch_lab.paper.figures.force_difference import force_difference_figure
+from pretouch_lab.paper.figures.interaction import interaction_figure
+from pretouch_lab.registry import EXPERIMENTS
+from pretouch_lab.trace import trace_of
+
+S, UNITS = 400, tuple("abcdefg")
+PAPER = profile("paper")
+TOUCHED, DETECTED = slice(300, 320), 305
+
+
+def made_trace() -> RunRecord:
+    """Four seconds at rest at y = 0.2: an object at y = 0.6 from 1 s to 2 s, and a push of 20 N along +y at 3 s."""
+    zeros = np.zeros((S, 3))
+    points = np.full((S, 7, 3), np.nan)
+    points[100:200, 1] = [0.5, 0.6, 0.3]
+    ranges = np.where(np.isfinite(points[:, :, 0]), 0.3, np.nan)
+    scale, true, reacting = np.ones(S), zeros.copy(), np.zeros(S, bool)
+    scale[100:200], scale[200:250] = 0.5, 0.8
+    true[TOUCHED, 1] = 20.0
+    reacting[DETECTED:350] = True
+    place = np.tile([0.5, 0.2, 0.3], (S, 1))
+    thresholds = np.broadcast_to(np.array([8.0, -9.0, 0.0, 0.0, 1.0, 2.0])[:, None], (S, 6, 3))
+    found = Contact(np.array([0.0, 20.0, 0.0]), np.array([False, True, False]))
+    return RunRecord(
+        time=0.01 * np.arange(S), mode=np.where(reacting, MODES.index(Mode.REACT), MODES.index(Mode.TRACK)),
+        ee_position=place, ee_velocity=zeros, path_position=place, speed_scale=scale, range_distance=ranges,
+        sensed_point=points, force=true, filtered_force=0.5 * true, thresholds=thresholds, armed=np.ones(S, bool),
+        evidence=np.zeros(S), contacts=((DETECTED, found, 0.1),), truth=TrueForces(0.01 * np.arange(S), true),
+    )  # fmt: skip
+
+
+@cache
+def drawn():
+    trace = made_trace()
+    pairs = {(t, s, p): trace for t in ("circle", "line") for s in ("-y", "+y") for p in ("blind", "paper")}
+    return {
+        "circle": circle_figure(trace, PAPER),
+        "interaction": interaction_figure(trace, UNITS, PAPER),
+        "close-up": close_up_figure(trace, UNITS, PAPER),
+        "force-difference": force_difference_figure(pairs, ["paper"]),
+        "compared": compared_figure({"pushed": {"blind": trace, "paper": trace}, "alone": {"blind": trace}}),
+    }
+
+
+def line(axes, label):
+    return next(found for found in axes.lines if found.get_label() == label)
+
+
+@pytest.mark.parametrize("name", ["circle", "interaction", "close-up", "force-difference", "compared"])
+def test_what_must_be_told_apart_differs_without_colour(name):
+    for axes in drawn()[name].axes:
+        looks = [
+            (str(found._dash_pattern), found.get_linestyle(), found.get_marker(),
+             round(np.mean(to_rgb(found.get_color())), 1), found.get_linewidth())
+            for found in axes.lines if not found.get_label().startswith("_")
+        ]  # fmt: skip
+        assert len(set(looks)) == len(looks)
+        shades = {(patch.get_label(), patch.get_hatch()) for patch in axes.patches if patch.get_label()}
+        assert len({hatch for _, hatch in shades}) >= min(2, len(shades))
+
+
+@pytest.mark.parametrize("name", ["circle", "interaction", "close-up", "force-difference"])
+def test_every_axis_says_its_unit(name):
+    figure = drawn()[name]
+    said = [figure.get_supxlabel(), figure.get_supylabel()] if figure.get_supxlabel() else []
+    for axes in figure.axes if not said else []:
+        said += [axes.get_ylabel(), *([axes.get_xlabel()] if axes.get_xlabel() else [])]
+    assert said
+    assert all("[" in words for words in said)
+
+
+def test_runs_of_flags():
+    assert marks.spans(np.array([False, True, True, False, True])) == [(1, 3), (4, 5)]
+    assert marks.spans(np.zeros(3, bool)) == []
+
+
+def test_what_is_near_counts_from_the_end_effector():
+    # 0.4 m from the end-effector's origin
+    assert marks.near(made_trace(), 0.41).nonzero()[0].tolist() == list(range(100, 200))
+    assert not marks.near(made_trace(), 0.39).any()
+
+
+def test_the_circle_is_red_while_something_is_sensed_and_green_until_it_is_free():
+    plane = drawn()["circle"].axes[0]
+    shown = {
+        name: np.flatnonzero(np.isfinite(line(plane, name).get_xdata())) for name in ("free", "avoidance", "recovery")
+    }
+    assert shown["avoidance"].tolist() == list(range(100, 200))
+    assert shown["recovery"].tolist() == list(range(200, 250))
+    assert shown["free"].tolist() == [*range(100), *range(250, S)]
+    objects = line(plane, "sensed objects")
+    assert set(zip(objects.get_xdata(), objects.get_ydata(), strict=True)) == {(0.6, 0.3)}
+    assert line(plane, "avoidance").get_color() == "tab:red"
+    assert line(plane, "recovery").get_color() == "tab:green"
+
+
+def test_the_interaction_shades_slowed_and_touched_spans_and_names_the_push():
+    top, middle, bottom = drawn()["interaction"].axes
+    for axes in (top, middle, bottom):
+        spans = {patch.get_label(): (patch.get_x(), patch.get_width()) for patch in axes.patches}
+        assert spans["slowed"] == pytest.approx((1.0, 1.5))
+        assert spans["contact and reaction"] == pytest.approx((3.0, 0.5))
+    assert [text.get_text() for text in middle.texts] == ["pushed +y"]
+    assert line(top, "activation, d_max 0.8 m").get_ydata() == [0.8, 0.8]
+    assert line(middle, "detected").get_xdata() == pytest.approx([3.05])
+
+
+def test_the_close_up_of_a_trace_without_a_touch_shows_all_of_it():
+    trace = replace(made_trace(), truth=None)
+    assert close_up_figure(trace, UNITS, PAPER).axes[1].get_xlim() == (0.0, 3.99)
+
+
+def test_the_force_difference_counts_from_the_touch_away_from_the_object():
+    against, along = (drawn()["force-difference"].axes[i] for i in (1, 0))
+    for axes, sign in ((along, 1.0), (against, -1.0)):
+        estimate = line(axes, "blind: estimate")
+        assert estimate.get_xdata()[300] == 0.0
+        assert estimate.get_ydata()[300] == sign * 20.0
+        assert line(axes, "paper: detected").get_xdata() == pytest.approx([0.05])
+    assert force_difference_figure({}, ["paper"]).axes[0].lines[:] == []
+    alone = force_difference_figure({("circle", "-y", "blind"): made_trace()}, ["blind"])
+    assert alone.get_suptitle().endswith("thresholds, blind")
+    assert len(alone.axes[0].get_legend_handles_labels()[1]) <= 4
+
+
+@pytest.mark.parametrize("function", [function for block in framework.BLOCKS for _, function in block.steps])
+def test_the_framework_names_functions_there_are(function):
+    module, name = function.rsplit(".", 1)
+    assert callable(getattr(import_module(f"pretouch.{module}"), name))
+
+
+def test_the_framework_names_types_there_are_and_says_each():
+    said = "\n".join(text.get_text() for text in framework.framework_figure().axes[0].texts)
+    for flow in framework.FLOWS:
+        if flow.type:
+            module, name = flow.type.rsplit(".", 1)
+            assert isinstance(getattr(import_module(f"pretouch.{module}"), name), type)
+            assert name in said
+        assert flow.words in said
+    for number in ("1", "2", "3", "4", "5-7", "8", "9-10", "11", "12"):
+        assert f"eq. {number}:" in said or f"eqs. {number}:" in said
+    for block in framework.BLOCKS:
+        assert block.name in said
+
+
+@pytest.fixture(scope="module")
+def recorded(context, tmp_path_factory):
+    """A recorded trial, and its record."""
+    cell, place = Cell(between.NAME, "paper", {"restrictions": "slack"}), tmp_path_factory.mktemp("trial") / "x.mcap"
+    _, record = between.trial(cell, 101, replace(context, recording=place))
+    return place, record
+
+
+@pytest.fixture(scope="module")
+def step_and_trace(recorded):
+    return recorded[1], trace_of(recorded[1])
+
+
+def test_a_record_keeps_what_each_unit_showed(step_and_trace):
+    record, trace = step_and_trace
+    for i in range(0, len(record.steps), 20):
+        step = record.steps[i]
+        np.testing.assert_array_equal(points_of_units(step.obstacles, 7), trace.sensed_point[i])
+        shown = np.flatnonzero(np.isfinite(trace.sensed_point[i, :, 0]))
+        assert shown.tolist() == sorted(step.obstacles.unit)
+        for k, unit in enumerate(step.obstacles.unit):
+            np.testing.assert_array_equal(trace.sensed_point[i, unit], step.obstacles.point[k])
+
+
+@pytest.fixture(scope="module")
+def run_folder(recorded, tmp_path_factory):
+    """A folder with two runs in it, as `pretouch demo` leaves it, all of one trial."""
+    out = tmp_path_factory.mktemp("demo")
+    for part, names in (("static", ("force-difference",)), ("people", ("circle", "interaction", "close-up"))):
+        request = Request(("static",), seeds=1)
+        request.open(out / part)
+        for cell in (cell for name in names for cell in CATALOGUE[name].cells("paper")):
+            copy(recorded[0], recording_file(out / part, cell, 0))
+    return out
+
+
+def refuse(*_args):
+    raise AssertionError("a trial was played")
+
+
+@pytest.fixture
+def nothing_played(monkeypatch):
+    refusing = {name: replace(experiment, trial=refuse) for name, experiment in EXPERIMENTS.items()}
+    monkeypatch.setattr(cli_figure, "EXPERIMENTS", refusing)
+
+
+@pytest.mark.usefixtures("nothing_played")
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_each_figure_is_drawn_from_a_run(run_folder, tmp_path, name):
+    made = draw_figure(name, run_folder, tmp_path / "new" / f"{name}.png")
+    with Image.open(made) as picture:
+        assert picture.width > 1000
+        assert np.asarray(picture.convert("L")).std() > 10
+
+
+@pytest.mark.usefixtures("nothing_played")
+@pytest.mark.parametrize(("ending", "begins"), [("png", b"\x89PNG"), ("pdf", b"%PDF"), ("svg", b"<?xml")])
+def test_the_ending_says_the_format(tmp_path, ending, begins):
+    made = draw_figure("framework", out=tmp_path / f"x.{ending}")
+    assert made.read_bytes().startswith(begins)
+
+
+@pytest.mark.usefixtures("nothing_played")
+def test_a_figure_is_written_here_by_its_name(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert str(draw_figure("framework")) == "framework.png"
+    assert [path.name for path in tmp_path.iterdir()] == ["framework.png"]
+
+
+@pytest.mark.usefixtures("nothing_played")
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"name": "square"}, "The figure 'square' is unknown: choose from circle, interaction"),
+        ({"seed": -1}, "The seed is -1"),
+        ({"profile": "brave"}, "The profile 'brave' is unknown"),
+        ({"out": "figure.jpg"}, "no ending that says its format: use .png, .pdf, .svg"),
+        ({"out": "figure"}, "no ending that says its format"),
+        ({"out": "/dev/null/x.png"}, "The figure /dev/null/x.png cannot be written .File exists.: give another"),
+        ({"out": "FOLDER.png"}, "FOLDER.png cannot be written .Is a directory.: give another"),
+        ({"out": "x" * 300 + ".png"}, "cannot be written .File name too long.: give another"),
+        ({"run": "/nowhere"}, r"The run /nowhere cannot be read \(No such file or directory\)"),
+        (
+            {"run": "EMPTY"},
+            "has no recording of avoidance_beside_slack_paper with seed 0 .*`pretouch reproduce avoidance --seeds 1",
+        ),
+        ({"run": "EMPTY", "profile": "blind"}, "avoidance_beside_off_blind .*--profiles blind`"),
+        ({"run": "RUN", "seed": 3}, "no recording of avoidance_beside_slack_paper with seed 3 .runs keep those of"),
+        ({"name": "force-difference", "profile": "blind"}, "cannot show blind, which has no proximity"),
+    ],
+)
+def test_what_cannot_be_drawn_is_said_in_a_sentence(run_folder, tmp_path, monkeypatch, changes, words):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "FOLDER.png").mkdir()
+    (tmp_path / "EMPTY").mkdir()
+    (tmp_path / "RUN").symlink_to(run_folder)
+    with pytest.raises(PretouchError, match=words) as error:
+        draw_figure(**{"name": "circle", **{k: Path(v) if k in ("out", "run") else v for k, v in changes.items()}})
+    assert isinstance(error.value, (ExperimentError, ParameterError))
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["EMPTY", "FOLDER.png", "RUN"]
+
+
+@pytest.mark.usefixtures("nothing_played")
+def test_a_damaged_run_is_named(tmp_path):
+    (cell,) = CATALOGUE["close-up"].cells("paper")
+    Request(("static",), seeds=1).open(tmp_path)
+    recording_file(tmp_path, cell, 0).write_bytes(b"no recording")
+    with pytest.raises(RecordingError, match="is not an MCAP file"):
+        draw_figure("close-up", tmp_path, tmp_path / "x.png")
+    assert not (tmp_path / "x.png").exists()
+
+
+@pytest.mark.usefixtures("nothing_played")
+def test_recordings_of_several_skins_make_no_figure(run_folder, context, tmp_path):
+    run = copytree(run_folder, tmp_path / "run")
+    other = next((run / "static" / "recordings").glob("static_circle_*blind*.mcap"))
+    other.unlink()
+    recorded_run(other, controller_of(context.model, Skin(context.skin.units[:2], context.model)), 10)
+    with pytest.raises(ExperimentError, match="are of several skins"):
+        draw_figure("force-difference", run, tmp_path / "x.png")
+
+
+def test_without_a_run_the_trials_are_played_and_told(step_and_trace, tmp_path, monkeypatch, capsys):
+    seeds = []
+
+    def play(cell, seed, _context):
+        seeds.append((cell.name, seed))
+        return {}, step_and_trace[0]
+
+    monkeypatch.setitem(EXPERIMENTS, "between", replace(EXPERIMENTS["between"], trial=play))
+    made = draw_figure("close-up", out=tmp_path / "x.svg", profile="paper-0.5m", seed=4)
+    assert made.stat().st_size > 10_000
+    assert seeds == [("between_slack_paper-0.5m", 4)]
+    assert capsys.readouterr().err == ("Playing between_slack_paper-0.5m with seed 4: about 12 s of simulated time.\n")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["circle", "interaction", "close-up", "force-difference"])
+def test_each_figure_is_drawn_from_trials_it_plays(tmp_path, name):
+    made = draw_figure(name, out=tmp_path / "x.png", seed=102)
+    with Image.open(made) as picture:
+        assert np.asarray(picture.convert("L")).std() > 10
+
+
+def test_figures_of_a_detector_without_thresholds_show_none():
+    ours = profile("pretouch")
+    for figure in (interaction_figure(made_trace(), UNITS, ours), close_up_figure(made_trace(), UNITS, ours)):
+        labels = [text for axes in figure.axes for text in axes.get_legend_handles_labels()[1]]
+        assert "bands of one sample" in labels
+        assert not {"thresholds", "thresholds without F_obs", "value of eq. 8"} & set(labels)
+        force = next(axes for axes in figure.axes if "force" in axes.get_ylabel())
+        assert line(force, "detected").get_ydata().tolist() == [20.0]

@@ -1,0 +1,105 @@
+import numpy as np
+import pytest
+from tests.other_arm import copied_panda
+
+from pretouch.control.path import Circle
+from pretouch.coverage.placement import assumptions, hand_side, placement_for
+from pretouch.errors import ExperimentError
+from pretouch.robot.description import RobotDescription
+from pretouch.robot.model import RobotModel
+from pretouch.robot.named import robot_named
+from pretouch.sim.board import PANDA_SIDE, HandSide
+from pretouch.sim.paper_scenes import Placement, person_scene, static_path, static_scene
+from pretouch.sim.pushes import way_round
+from pretouch.sim.scene import HandSpec
+from pretouch_lab.campaign import Request
+
+FIVE = "<mujoco><worldbody>{}</worldbody></mujoco>"
+
+
+@pytest.fixture
+def five_axis(tmp_path):
+    """An arm of five joints."""
+    body = "".join(
+        f'<body name="l{k}" pos="0 0 .1"><joint name="j{k}" axis="0 {k % 2} 1" range="-1 1"/>'
+        '<geom type="capsule" size=".03 .03" pos="0 0 .05" mass="1"/>'
+        for k in range(1, 6)
+    )  # fmt: skip
+    (tmp_path / "five.xml").write_text(FIVE.format(body + "</body>" * 5))
+    ones = np.ones(5)
+    return RobotModel(RobotDescription("five", tmp_path / "five.xml", "l5", ones, ones, ones, 0 * ones, "made"))
+
+
+def test_the_panda_has_the_papers_paths(panda_model):
+    placement = placement_for(panda_model)
+    assert placement == Placement()
+    assert static_path("circle", "-y", placement) == Circle()
+    assert placement.face(0.2371, "+y") == 0.2371
+
+
+def test_an_arm_of_five_joints_is_refused_with_its_joints(five_axis):
+    with pytest.raises(ExperimentError, match=r"five has 5 joints \(j1, j2, j3, j4, j5\): .* needs 6. .*another --ee"):
+        placement_for(five_axis)
+
+
+def test_of_a_simulated_arm_it_is_said_what_is_assumed(panda_model, tmp_path):
+    assert assumptions(panda_model, Placement()) == ()
+    other = RobotModel(robot_named(str(copied_panda(tmp_path))))
+    paths, plant = assumptions(other, Placement(0.8, 0.1))
+    assert paths.startswith("The paper's paths for panda: 0.8 times as large, moved by +0.10 m in x")
+    assert "hand" not in paths
+    assert assumptions(other, Placement()) == (plant,)
+
+
+def test_another_arm_has_them_scaled_and_moved():
+    placement = Placement(0.8, -0.1, 0.15, left=HandSide(0.05, 0.01))
+    circle = static_path("circle", "+y", placement)
+    assert circle.center == pytest.approx((0.3, 0.0, 0.35))
+    assert circle.radius == pytest.approx(0.2)
+    # the hand is as far out when it meets the board's face, in terms of the circle, as the Panda's
+    meets = placement.face(0.25, "+y") - 0.05
+    assert meets / 0.2 == pytest.approx((0.25 - PANDA_SIDE.aside) / 0.25)
+    assert "0.8 times as large, moved by -0.10 m in x and +0.15 m in z" in placement.sentence("mine")
+
+
+def test_what_stands_beside_the_circle_keeps_its_distance_from_it_and_what_is_within_is_scaled():
+    assert Placement().moved(0.5, -0.8, 0.3) == (0.5, -0.8, 0.3)
+    placement = Placement(0.8, -0.1, 0.15)
+    assert placement.moved(0.5, -0.8, 0.3) == pytest.approx((0.3, -0.75, 0.39))
+    assert placement.moved(0.5, 0.1, 0.3) == pytest.approx((0.3, 0.08, 0.39))
+
+
+def test_people_keep_away_from_an_arm_that_reaches_farther():
+    far = Placement(1.4)
+    assert far.ahead == pytest.approx(0.2)
+    assert Placement(0.8).ahead == 0.0
+    assert person_scene(HandSpec(), far).hand.start == pytest.approx((1.4, 0.0, 0.8))
+    hand = np.array([0.7, -0.8, 0.4])
+    assert way_round(hand, np.array([0.7, 0.8, 0.4]), far.ahead).tolist() == pytest.approx([1.35, -0.8, 0.4])
+
+
+def test_a_persons_hand_is_as_high_as_the_side_of_the_robots():
+    placement = Placement(0.8, 0.0, 0.0, HandSide(0.05, 0.01), HandSide(0.05, -0.08), (0.37, 0.36), (0.29, 0.28))
+    assert placement.visited("beside", -1.0) == pytest.approx((0.4, -0.37, 0.2 - 0.08 - 0.057 + 0.05))
+    assert placement.visited("inside", 1.0) == pytest.approx((0.4, 0.28, 0.2 + 0.01 - 0.057 + 0.05))
+
+
+def test_the_board_stands_where_the_hand_meets_it():
+    placement = Placement(0.8, 0.0, 0.0, left=HandSide(0.05, 0.01))
+    board = static_scene("line", "+y", 25e3, 0, placement).boxes[0]
+    face = board.center[1] - board.half_size[1]
+    assert 0.8 * (0.25 - 0.05 - PANDA_SIDE.aside) + 0.05 <= face <= 0.8 * (0.3 - PANDA_SIDE.aside) + 0.05
+
+
+def test_the_side_of_the_pandas_hand_is_about_what_the_board_takes_it_for(panda_model):
+    for side in ("+y", "-y"):
+        found = hand_side(panda_model, side)
+        assert found.aside == pytest.approx(PANDA_SIDE.aside, abs=0.03)
+        assert found.above == pytest.approx(PANDA_SIDE.above, abs=0.03)
+
+
+def test_other_experiments_are_refused_for_another_arm(tmp_path):
+    with pytest.raises(
+        ExperimentError, match="'pinch' is laid out for the Panda: with --arm, choose static, avoidance"
+    ):
+        Request(("pinch",), 1, arm=str(tmp_path))

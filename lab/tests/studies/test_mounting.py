@@ -1,0 +1,262 @@
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+from lab.tests.rows import made_up
+from lab.tests.width import width
+from scipy.spatial.transform import Rotation
+
+from pretouch.profiles import profile
+from pretouch.recording.reader import open_recording
+from pretouch.recording.verify import verify
+from pretouch.robot.description import panda
+from pretouch.sim.misplacement import Misplacement, misplaced
+from pretouch.sim.scene import Box, SceneSpec
+from pretouch_lab.cell import Cell, Grid
+from pretouch_lab.paper.figures.mounting import mounting_figure
+from pretouch_lab.studies import mounting
+from pretouch_lab.studies.mounting import EXACT
+from pretouch_lab.studies.mounting_tables import NAME, ROOM, summarise, tables
+from pretouch_lab.trial import Setup, play
+
+
+def cell(side: str = "+y", position: float = 0.0, orientation: float = 0.0, told: str = "untold") -> Cell:
+    return Cell(NAME, "paper", {
+        "trajectory": "line", "side": side, "position_mm": position, "orientation_deg": orientation, "told": told,
+        "restrictions": "off",
+    })  # fmt: skip
+
+
+def test_cells_are_all_errors_at_all_places_of_each_profile_that_senses():
+    cells = mounting.cells(Grid(("blind", "paper")))
+    assert len({cell.name for cell in cells}) == len(cells)
+    assert {c.profile for c in cells} == {"paper"}
+    off = [c.where for c in cells if c.where["restrictions"] == "off" and c.where["told"] == "untold"]
+    assert len(off) == 6 * len(mounting.UNTOLD)
+    assert {(w["position_mm"], w["orientation_deg"]) for w in off} == {
+        (0, 0), (2, 0), (5, 0), (10, 0), (20, 0), (30, 0), (50, 0), (0, 1), (0, 2), (0, 5), (0, 10), (0, 20), (1, 0.1),
+        (3, 0.5),
+    }  # fmt: skip
+    assert {c.where["side"] for c in cells if c.where["restrictions"] == "hard"} == {"-y", "+y"}
+
+
+def test_modes_that_are_asked_for_replace_both():
+    cells = mounting.cells(Grid(("paper",), ("slack",)))
+    assert {c.where["restrictions"] for c in cells} == {"slack"}
+    assert len({cell.name for cell in cells}) == len(cells)
+
+
+@pytest.mark.parametrize(("position", "angle"), [(0.0, 0.0), (50.0, 0.0), (0.0, 20.0), (3.0, 0.5)])
+def test_each_unit_is_off_by_exactly_the_error(panda_model, paper_skin, position, angle):
+    believed, _ = misplaced(paper_skin, panda_model, Misplacement(position, angle), seed=3)
+    assert believed.ids == paper_skin.ids
+    off = 1000 * np.linalg.norm(believed.T_link_sensor[:, :3, 3] - paper_skin.T_link_sensor[:, :3, 3], axis=1)
+    turns = [a[:3, :3].T @ b[:3, :3] for a, b in zip(paper_skin.T_link_sensor, believed.T_link_sensor, strict=True)]
+    assert off == pytest.approx(np.full(len(paper_skin), position), abs=1e-9)
+    assert np.degrees(Rotation.from_matrix(turns).magnitude()) == pytest.approx(np.full(len(paper_skin), angle))
+
+
+def test_the_same_seed_gives_the_same_direction_at_every_size(panda_model, paper_skin):
+    def directions(size: float, seed: int):
+        believed, refused = misplaced(paper_skin, panda_model, Misplacement(size, size), seed)
+        assert refused == 0, "choose seeds that need no second draw"
+        off = believed.T_link_sensor[:, :3, 3] - paper_skin.T_link_sensor[:, :3, 3]
+        turns = Rotation.from_matrix(
+            np.swapaxes(paper_skin.T_link_sensor[:, :3, :3], 1, 2) @ believed.T_link_sensor[:, :3, :3]
+        ).as_rotvec(degrees=True)
+        return off / size, turns / size
+
+    small, large = directions(0.5, 2), directions(1.0, 2)
+    assert small[0] == pytest.approx(large[0], abs=1e-9)
+    assert small[1] == pytest.approx(large[1], abs=1e-9)
+    assert np.abs(directions(0.5, 4)[0] - small[0]).max() > 1e-4
+
+
+def test_a_pose_that_no_skin_file_could_hold_is_drawn_again_and_counted(panda_model, paper_skin):
+    refused = [misplaced(paper_skin, panda_model, Misplacement(50.0), seed)[1] for seed in range(6)]
+    assert sum(refused) > 0
+    assert misplaced(paper_skin, panda_model, EXACT, 0)[1] == 0
+
+
+def test_a_skin_file_that_tells_its_error_does_so_as_a_deviation_per_axis(panda_model, paper_skin):
+    told, _ = misplaced(paper_skin, panda_model, Misplacement(3.0, 0.5, told=True), seed=1)
+    untold, _ = misplaced(paper_skin, panda_model, Misplacement(3.0, 0.5), seed=1)
+    assert np.array_equal(told.T_link_sensor, untold.T_link_sensor)
+    count = len(paper_skin)
+    assert told.position_sigma == pytest.approx(np.full(count, 0.003 / np.sqrt(3)))
+    assert told.orientation_sigma == pytest.approx(np.full(count, np.radians(0.5) / np.sqrt(3)))
+    assert untold.exact
+
+
+def test_directions_are_uniform_on_the_sphere(panda_model, paper_skin):
+    """The mean tilt of a beam turned by a small angle about a uniform axis is pi / 4 of it."""
+    tilts = []
+    for seed in range(60):
+        believed, _ = misplaced(paper_skin, panda_model, Misplacement(0.0, 2.0), seed)
+        beams = np.sum(believed.T_link_sensor[:, :3, 2] * paper_skin.T_link_sensor[:, :3, 2], axis=1)
+        tilts += np.degrees(np.arccos(beams)).tolist()
+    assert np.mean(tilts) / 2.0 == pytest.approx(np.pi / 4, abs=0.04)
+
+
+def one_step(setup: Setup, steps: int = 3):
+    return play(setup, lambda step, _: step.stamp >= 0.2 + 0.01 * steps)
+
+
+def test_units_measure_where_they_are_and_the_controller_believes_what_it_is_told(panda_model, paper_skin):
+    believed, _ = misplaced(paper_skin, panda_model, Misplacement(50.0, 20.0), seed=1)
+    path = mounting.static_path("line", "+y")
+    scene = mounting.static_scene("line", "+y", 25e3, 1)
+    setup = Setup(panda_model, paper_skin, profile("paper"), scene, path, 1)
+    right, wrong = one_step(setup), one_step(replace(setup, believed=believed))
+    assert wrong.steps[0].range_distance.tolist() == pytest.approx(right.steps[0].range_distance.tolist(), nan_ok=True)
+    unit = int(right.steps[0].obstacles.unit[0])
+    truly, taken = (
+        record.steps[0].obstacles.point[record.steps[0].obstacles.unit == unit] for record in (right, wrong)
+    )
+    kin = panda_model.kinematics(wrong.steps[0].q)
+    link = paper_skin.link[unit]
+    beam = believed.T_link_sensor[unit] @ [0.0, 0.0, wrong.steps[0].range_distance[unit], 1.0]
+    assert taken[0] == pytest.approx(kin.position[link] + kin.rotation[link] @ beam[:3], abs=1e-9)
+    assert np.linalg.norm(taken - truly) > 0.01
+
+
+def test_what_an_arm_believes_of_its_units_is_what_it_replays_by(panda_model, paper_skin, tmp_path):
+    believed, _ = misplaced(paper_skin, panda_model, Misplacement(20.0, 5.0), seed=1)
+    place, path = tmp_path / "told-wrong.mcap", mounting.static_path("line", "+y")
+    setup = Setup(panda_model, paper_skin, profile("paper"), SceneSpec(), path, 1, believed=believed, recording=place)
+    made = one_step(setup)
+    recorded = open_recording(place)
+    assert np.array_equal(recorded.runs[0].skin.T_link_sensor, believed.T_link_sensor)
+    verdict = verify(recorded)
+    assert verdict.checked == len(made.steps)
+    assert verdict.agrees
+
+
+def test_an_arm_that_believes_the_truth_does_as_if_it_were_told_nothing(panda_model, paper_skin):
+    setup = Setup(panda_model, paper_skin, profile("paper"), SceneSpec(), mounting.static_path("line", "+y"), 2)
+    same = replace(setup, believed=misplaced(paper_skin, panda_model, EXACT, 2)[0])
+    commands = [[s.command.tobytes() for s in one_step(s, 30).steps] for s in (setup, same)]
+    assert commands[0] == commands[1]
+
+
+def test_the_least_gap_is_that_of_mujoco(panda_model):
+    """Both shapes are convex, and MuJoCo finds their distance in another way."""
+    box = Box("object", (0.5, 0.35, 0.4), (0.15, 0.02, 0.12), 25e3)
+    spec = mujoco.MjSpec.from_file(str(panda().mjcf))
+    spec.worldbody.add_geom(
+        name="object", type=mujoco.mjtGeom.mjGEOM_BOX, pos=box.center, size=box.half_size, contype=1, conaffinity=1
+    )
+    model = spec.compile()
+    data, rng = mujoco.MjData(model), np.random.default_rng(8)
+    moved = {panda_model.links[i] for i in panda_model.body.link}
+    geoms = [g for g in range(model.ngeom) if model.body(int(model.geom_bodyid[g])).name in moved]
+    for _ in range(20):
+        q = rng.uniform(panda_model.q_min, panda_model.q_max)
+        data.qpos[: panda_model.n] = q
+        mujoco.mj_kinematics(model, data)
+        target = model.geom("object").id
+        found = min(mujoco.mj_geomDistance(model, data, g, target, 2.0, None) for g in geoms)
+        ours = mounting.least_gap(made_up([0.0], q=[q]), panda_model, box)
+        assert ours == pytest.approx(found, abs=1e-3) or (ours < 0 and found < 0)
+
+
+@pytest.fixture(scope="module")
+def exact(context):
+    """A trial with all units in their place."""
+    return mounting.trial(cell(), 1, context)
+
+
+def test_units_in_their_place_miss_nothing(exact):
+    row, record = exact
+    assert row["missed_fraction"] < 0.01
+    assert row["contact"]
+    assert row["detected"]
+    assert row["touch_s"] == record.first_contact()
+    assert -0.01 < row["least_gap_m"] < 0.002
+
+
+def test_readings_that_are_taken_for_nothing_are_missed(exact, context):
+    _, record = exact
+    setup = Setup(
+        context.model, context.skin, profile("paper"), mounting.static_scene("line", "+y", 25e3, 1),
+        mounting.static_path("line", "+y"), 1,
+    )  # fmt: skip
+    seen = [s for s in record.steps if len(s.obstacles.unit)]
+    cut = replace(record, steps=[_without_obstacles(s) if i % 2 else s for i, s in enumerate(seen)])
+    assert mounting.missed(cut, setup) == pytest.approx(0.5, abs=0.05)
+    assert mounting.missed(replace(record, steps=[]), setup) is None
+
+
+def _without_obstacles(step):
+    from pretouch.perception.closest import no_obstacles
+
+    made = object.__new__(type(step))
+    for name in type(step).__slots__:
+        setattr(made, name, getattr(step, name))
+    made.obstacles = no_obstacles()
+    return made
+
+
+def test_in_an_empty_room_an_arm_with_units_in_their_place_runs_free(context, monkeypatch):
+    monkeypatch.setattr(mounting, "_ROOM_S", 5.0)
+    row, _ = mounting.trial(cell(ROOM), 0, context)
+    assert (row["obstacle_fraction"], row["speed_scale"], row["false_detections"]) == (0.0, 1.0, 0)
+    assert row["travelled_m"] > 0.7
+    assert row["least_gap_m"] is None
+
+
+def row(position: float, force: float, side: str = "+y", seed: int = 0, told: str = "untold", **changes) -> dict:
+    empty = side == ROOM
+    return {
+        "experiment": NAME, **cell(side, position, told=told).where, "profile": "paper", "seed": seed,
+        "contact": not empty, "detected": not empty, "impact_speed_m_s": None if empty else 0.1,
+        **dict.fromkeys(mounting_forces(), None if empty else force), "touch_s": None if empty else 6.0,
+        "detection_delay_s": None if empty else 0.05, "missed_fraction": None if empty else 0.1,
+        "least_gap_m": None if empty else 0.0, "obstacle_fraction": 0.2 if empty else None,
+        "speed_scale": 0.9 if empty else None, "travelled_m": force if empty else None, "false_detections": 1,
+        "held": False, "refused": 1, "drawn": 8,
+    } | changes  # fmt: skip
+
+
+def mounting_forces() -> tuple[str, ...]:
+    return "filtered_at_detection_n", "raw_at_detection_n", "peak_estimate_n", "true_peak_20ms_n"
+
+
+def test_trials_are_compared_with_their_twin_without_error():
+    rows = [row(0.0, 10.0), row(0.0, 20.0, seed=1), row(50.0, 15.0), row(50.0, 40.0, seed=1, told="told")]
+    rows += [row(0.0, 5.0, ROOM), row(50.0, 4.0, ROOM), row(50.0, 12.0, side="-y")]
+    summary = summarise(rows)
+    found = {(c["side"], c["position_mm"], c["told"]): c for c in summary["cells"] if c["trajectory"] == "all"}
+    assert found["boards", 0.0, "untold"]["true_peak_20ms_n"]["median"] == 15.0
+    assert found["boards", 50.0, "untold"]["true_peak_20ms_n_ratio"] == {
+        "median": 1.5, "p10": 1.5, "p90": 1.5, "n": 1,
+    }, "the trial at -y has no twin"  # fmt: skip
+    assert found["boards", 50.0, "told"]["true_peak_20ms_n_ratio"]["median"] == 2.0
+    assert found["boards", 50.0, "untold"]["largest_true_20ms_n"] == 15.0
+    assert found[ROOM, 50.0, "untold"]["travelled_m_ratio"]["median"] == 0.8
+    forces, room = tables(summary)
+    assert [r[:2] for r in forces.rows] == [("none", ""), ("50 mm", ""), ("50 mm", "yes")]
+    assert forces.rows[1][-2:] == ("2/2", "2")
+    assert room.rows[1][4].startswith("80")
+    assert room.rows[1][-1] == "12", "one of eight poses was drawn again"
+    assert max(width(table) for table in (forces, room)) <= 80
+
+
+def test_trials_with_restrictions_have_a_table_of_their_own():
+    rows = [row(0.0, 10.0, restrictions="hard", contact=False, detected=False), row(0.0, 10.0)]
+    titles = [table.title for table in tables(summarise(rows))]
+    assert [("restrictions" in title) for title in titles] == [False, True]
+    assert summarise([]) == {"cells": []}
+    assert tables({"cells": []}) == []
+
+
+def test_the_figure_shows_each_error_by_itself():
+    both = row(3.0, 11.0, orientation_deg=0.5)
+    rows = [row(0.0, 10.0), row(50.0, 30.0), both, row(0.0, 5.0, ROOM), row(50.0, 4.0, ROOM)]
+    figure = mounting_figure(summarise(rows)["cells"])
+    forces, turned = figure.axes[:2]
+    assert forces.lines[0].get_xdata() == pytest.approx([0.0, 50.0], abs=1.0)
+    assert all(len(line.get_xdata()) == 1 for line in turned.lines)
+    assert all("[" in axes.get_xlabel() for axes in figure.axes[2:])
+    assert mounting_figure([]) is None
