@@ -9,7 +9,7 @@ import numpy as np
 
 import pretouch as pt
 
-# an arm, and two units on its hand that look forward and to the left
+# an arm, and two units on its hand that look to the left and to the right
 arm = pt.RobotModel(pt.panda())
 units = [
     pt.sensor_unit(id="left", link="panda_hand", position_m=[0, -0.108, 0.045], quaternion_wxyz=[0.7071, 0.7071, 0, 0]),
@@ -31,18 +31,18 @@ controller = pt.Controller(arm, skin, pt.fixtures(room), pt.line(start, end), pt
 
 
 class Narrator:
-    """A recorder that tells what the arm does, each time that it changes or half a second has passed."""
+    """A recorder that says what the arm does and why, at each new mode and every half second."""
 
     def __init__(self) -> None:
-        self.told, self.mode = -1.0, ""
+        self.time, self.mode = -1.0, ""
 
     def record(self, cycle: pt.Cycle) -> None:
         """Print a step that is worth it."""
         step = cycle.step
-        if step.mode.value != self.mode or step.stamp - self.told >= 0.5:
-            self.told, self.mode = step.stamp, step.mode.value
-            near, speed = step.obstacles.body_distance.min(initial=np.inf), np.linalg.norm(step.ee_velocity)
-            print(f"{step.stamp:4.1f} s  {self.mode:5}  {speed:.2f} m/s  nearest {near:4.2f} m  {step.reason}")
+        if step.mode.value != self.mode or step.stamp - self.time >= 0.5:
+            self.time, self.mode = step.stamp, step.mode.value
+            speed, sentence = np.linalg.norm(step.ee_velocity), pt.explain(step, skin.ids, arm.links).sentence
+            print(f"{step.stamp:4.1f} s  {self.mode:5}  {speed:.2f} m/s  {sentence}")
 
 
 clock = pt.PlantClock(plant, controller.limits.period)

@@ -11,6 +11,7 @@ from dataclasses import replace
 from pretouch.control.path import Circle
 from pretouch.control.posture import brought_to
 from pretouch.controller import Controller
+from pretouch.explanation import explain
 from pretouch.loop import Cycle, run
 from pretouch.profiles import profile
 from pretouch.robot.description import panda
@@ -23,18 +24,17 @@ from pretouch.sim.scene import Box, SceneSpec, fixtures
 
 
 class Narrator:
-    """A recorder that tells when the arm changes its mode."""
+    """A recorder that says what the arm does, each time that it begins to do something else."""
 
-    def __init__(self) -> None:
-        self._told = ""
+    def __init__(self, units: tuple[str, ...], links: tuple[str, ...]) -> None:
+        self._names, self._doing = (units, links), ""
 
     def record(self, cycle: Cycle) -> None:
-        """Print a step that begins a new mode."""
-        step = cycle.step
-        told = step.mode.value
-        if told != self._told:
-            self._told = told
-            print(f"{step.stamp:6.2f} s  {step.mode.value:5}  speed x {step.speed_scale:.2f}  {step.reason}")
+        """Print a step that begins something."""
+        explanation = explain(cycle.step, *self._names)
+        if explanation.doing.value != self._doing:
+            self._doing = explanation.doing.value
+            print(f"{cycle.step.stamp:6.2f} s  {self._doing:10}  {explanation.sentence}")
 
 
 def main() -> None:
@@ -50,7 +50,7 @@ def main() -> None:
     units = RangeFinders(arm, skin, RangeFinderParams(), seed=1)
     controller = Controller(model, skin, fixtures(room), path, settings)
     clock = PlantClock(arm, settings.task.control_period_s)
-    run(controller, arm, units, clock, Narrator(), lambda step: step.stamp > 12.0)
+    run(controller, arm, units, clock, Narrator(skin.ids, model.links), lambda step: step.stamp > 12.0)
 
 
 if __name__ == "__main__":

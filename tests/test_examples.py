@@ -22,11 +22,13 @@ def test_the_first_program_is_the_tutorials_and_does_what_the_tutorial_says(caps
     page = (first.parents[1] / "docs" / "tutorial" / "first-controller.md").read_text()
     assert f"```python\n{first.read_text()}```\n" in page
     runpy.run_path(str(first), run_name="__main__")
-    told = [line.split() for line in capsys.readouterr().out.splitlines()]
-    speed = {float(words[0]): float(words[3]) for words in told if words[2] == "track"}
-    assert max(speed.values()) > 0.25
-    assert speed[max(speed)] < 0.1  # slow before the touch
-    assert [words[2] for words in told if words[2] != "hold"][-1] == "react"
+    lines = [line.split(maxsplit=5) for line in capsys.readouterr().out.splitlines()]
+    tracked = [(float(speed), sentence) for _, _, mode, speed, _, sentence in lines if mode == "track"]
+    assert max(speed for speed, _ in tracked) > 0.25
+    slow, sentence = tracked[-1]  # before the touch
+    assert slow < 0.1
+    assert re.fullmatch(r"Slowed to [123]\d %: left sees something at 0\.0\d m\.", sentence)
+    assert [mode for _, _, mode, *_ in lines if mode != "hold"][-1] == "react"
 
 
 def test_the_skin_with_zones_is_one(panda_model):
@@ -34,8 +36,18 @@ def test_the_skin_with_zones_is_one(panda_model):
     assert (len(skin.mounted), len(skin)) == (15, 240)
 
 
-def test_the_readmes_program_runs_as_it_is_written(capsys):
+def test_the_readmes_program_tracks_slows_and_detects_as_it_is_written(capsys):
     readme = (EXAMPLES[0].parents[1] / "README.md").read_text()
     (block,) = re.findall(r"^```python\n(.*?)^```$", readme, re.MULTILINE | re.DOTALL)
-    exec(compile(block, "README.md", "exec"), {})  # noqa: S102  # our own text
-    assert capsys.readouterr().out.startswith("hold: No usable reading from ")
+    names = {}
+    exec(compile(block, "README.md", "exec"), names)  # noqa: S102  # our own text
+    lines = capsys.readouterr().out.splitlines()
+    moving, slowed, touched = (
+        [float(line.split()[0]) for line in lines if re.search(pattern, line)]
+        for pattern in (r"Moving at 0\.2\d m/s", r"Slowed to \d+ %: hand_left sees .* at 0\.0", "Touched at panda_hand")
+    )
+    assert moving
+    assert slowed
+    assert touched
+    assert max(moving) < min(slowed) < 3.25 < min(touched)
+    assert names["robot"].time == pytest.approx(5.0)

@@ -297,7 +297,7 @@ class ControlStep:
     stamp: float
     mode: Mode
     reason: str
-    """Why the arm is in this mode, as a sentence."""
+    """Why the arm is in this mode, as a sentence; what it does in it, and what limits it, is said by `explain`."""
     q: FloatArray
     """(n,) measured joint positions [rad]."""
     q_commanded: FloatArray
