@@ -52,6 +52,12 @@ def test_an_arm_that_nothing_limits_follows_its_path(step: ControlStep) -> None:
     assert far == Explanation(Doing.MOVING, "Moving at 0.30 m/s: hand_left sees something at 0.45 m.")
 
 
+def test_where_no_unit_is_in_use_nothing_is_said_of_what_is_near(step: ControlStep) -> None:
+    assert explain(step, (), LINKS).sentence == "Moving at 0.30 m/s: no sensor unit is in use."
+    rest = replace(step, desired_velocity=np.zeros(3))
+    assert explain(rest, (), LINKS).sentence == "In its place: no sensor unit is in use."
+
+
 def test_an_arm_too_loud_for_a_light_push_says_what_it_finds(step: ControlStep) -> None:
     assert finds(step) == ""
     assert finds(replace(step, detectable_n=14.9)) == "finds 15 N"

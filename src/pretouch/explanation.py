@@ -50,7 +50,7 @@ def explain(step: ControlStep, units: Sequence[str], links: Sequence[str]) -> Ex
 
     Args:
         step: of the controller.
-        units: ids of the skin's units, in its order.
+        units: ids of the skin's units, in its order; () where the profile has no perception, as `blind`.
         links: names of the arm's links, in the order of the model.
     """
     if step.mode is Mode.HOLD:
@@ -98,6 +98,10 @@ class _Names:
             return f"a fixture that moves is {distance:.2f} m away"
         return f"{self.who(step, obstacle)} sees something at {distance:.2f} m"
 
+    def sees_nothing(self) -> str:
+        """Say that nothing near is seen, or that there is nothing to see it with."""
+        return "nothing near is seen" if len(self.units) else "no sensor unit is in use"
+
     def who(self, step: ControlStep, obstacle: int) -> str:
         """Name the unit that sees an obstacle."""
         unit = int(step.obstacles.unit[obstacle])
@@ -117,9 +121,9 @@ def _on_the_way(step: ControlStep, names: _Names) -> Explanation:
         if off >= OFF_PATH_M:
             return Explanation(Doing.RETURNING, f"Returning to its path, {off:.2f} m away.")
         near = step.obstacles.body_distance
-        seen = f"{names.sees(step, int(near.argmin()))}." if len(near) else "nothing near is seen."
+        seen = names.sees(step, int(near.argmin())) if len(near) else names.sees_nothing()
         moves = np.linalg.norm(step.desired_velocity) >= ASKED_M_S
-        return Explanation(Doing.MOVING, (f"Moving at {speed:.2f} m/s: " if moves else "In its place: ") + seen)
+        return Explanation(Doing.MOVING, (f"Moving at {speed:.2f} m/s: " if moves else "In its place: ") + f"{seen}.")
     cause, share = limited.obstacle, limited.share if restricted else step.speed_scale
     gone = "what was seen has gone from view, a unit is late, or none looks where it goes"
     why = names.sees(step, cause) if cause >= 0 else gone

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from pretouch.loop import Cycle
+from pretouch.profiles import PROFILES
+from pretouch.sensing.skin import Skin
 from pretouch.session.progress import ProgressReporter, RunSummary
 from pretouch.types import Contact, Inputs, Mode
 from tests.following_arm import Arm
@@ -78,6 +80,17 @@ def test_contacts_are_counted_and_a_line_comes_every_five_seconds(watched):
     assert 1 <= len(lines) <= 3
     assert all(line == "TRACK In its place: nothing near is seen." for line in lines[1:])
     assert any("1 contact." in sentence for sentence in reporter.summary.sentences(0.01))
+
+
+@pytest.mark.parametrize("without", ["units", "perception"])
+def test_where_nothing_can_see_it_is_not_said_that_nothing_is_seen(panda_model, paper_skin, without):
+    skin = Skin([], panda_model) if without == "units" else paper_skin
+    arm, sentences = Arm(panda_model, skin, PROFILES["paper" if without == "units" else "blind"]), []
+    reporter = ProgressReporter(Sink(), sentences.append, "", arm.controller)
+    for _ in range(120):
+        before, robot = arm.state, arm.robot()
+        reporter.record(Cycle(Inputs(arm.time, robot, arm.readings()), before, arm.step(), arm.state))
+    assert sentences[-1].endswith(": no sensor unit is in use.")
 
 
 def test_a_force_that_was_nearly_a_contact_is_told_with_what_it_lacked(watched):

@@ -9,8 +9,10 @@ from pretouch import desired
 from pretouch.desired import Desired
 from pretouch.explanation import explain
 from pretouch.limited import Limit
+from pretouch.profiles import PROFILES
 from pretouch.types import FloatArray
 from pretouch.viewer.asked import Asked, asked_in, told
+from pretouch.viewer.room import LiveSettings
 from pretouch.viewer.simulation import LiveSimulation
 
 
@@ -95,6 +97,20 @@ def test_an_arm_at_the_end_of_its_reach_says_so(simulation: LiveSimulation) -> N
     assert step.limited.by is Limit.NOTHING
     found = told(Asked(way, 0.5 * way, None), step, simulation.skin.ids, simulation.model.links)
     assert found.sentence.endswith(" Asked 0.20 m/s, allowed 0.10 m/s: this posture allows no more.")
+
+
+def test_an_arm_without_units_says_what_limits_it(simulation: LiveSimulation) -> None:
+    step, way = simulation.frame.step, np.array([0.0, 0.2, 0.0])
+    found = told(Asked(way, 0.5 * way, None), replace(step, speed_scale=0.5), (), simulation.model.links)
+    assert found.sentence.endswith(" Asked 0.20 m/s, allowed 0.10 m/s: slowed.")
+
+
+def test_the_page_of_a_blind_arm_knows_no_unit_in_use() -> None:
+    simulation = LiveSimulation(LiveSettings(profile=PROFILES["blind"]))
+    simulation.advance(1.5)
+    found = told(None, simulation.frame.step, simulation.world.units_in_use, simulation.model.links)
+    assert found.sentence.endswith(": no sensor unit is in use.")
+    assert LiveSimulation().world.units_in_use == simulation.skin.ids
 
 
 def test_what_is_allowed_in_full_needs_no_reason_and_rest_is_named() -> None:

@@ -60,7 +60,7 @@ class ProgressReporter:
     def __init__(self, further: Recorder, tell: Callable[[str], None], latched: str, of: Controller) -> None:
         """Take another recorder, what tells a sentence without waiting, what to do where a HOLD latches, and whose."""
         self._further, self._tell, self._latched, self._period = further, tell, latched, of.limits.period
-        self._names = of.skin.ids, of.model.links
+        self._names = of.skin.ids if of.profile.perception else (), of.model.links
         self._answered = True
         self._nearest: ControlStep | None = None
         self._kind: tuple[Mode, str, bool] | None = None

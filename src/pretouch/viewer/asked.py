@@ -71,7 +71,7 @@ def told(asked: Asked | None, step: ControlStep, units: Sequence[str], links: Se
 def _why(step: ControlStep, units: Sequence[str], links: Sequence[str]) -> str:
     limited = step.limited
     near = f" near {links[limited.link]}" if limited.link >= 0 else ""
-    seen = "an outside source" if limited.unit >= len(units) else units[limited.unit]
+    seen = units[limited.unit] if 0 <= limited.unit < len(units) else "an outside source"
     match limited.by:
         case Limit.SLOWED:
             return f": slowed by what {seen} sees{near}" if limited.unit >= 0 else ": slowed"

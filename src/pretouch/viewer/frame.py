@@ -26,6 +26,11 @@ class World:
     floor_height: float
     """[m], base frame."""
 
+    @property
+    def units_in_use(self) -> tuple[str, ...]:
+        """Ids of the units whose readings the controller uses, in the skin's order; () of a blind one."""
+        return self.skin.ids if self.profile.perception else ()
+
 
 @dataclass(frozen=True, slots=True)
 class Frame:

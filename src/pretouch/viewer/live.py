@@ -176,9 +176,9 @@ class LivePage:
                 "paused" if self.controls.running.paused
                 else f"{pace.factor:.2f} × real time · {pace.updates:.0f} updates/s"
             )  # fmt: skip
-            step, skin, links = frame.step, self._simulation.skin, self._simulation.model.links
+            step, world = frame.step, self._simulation.world
             self._status.draw(
-                step.mode, told(asked, step, skin.ids, links),
+                step.mode, told(asked, step, world.units_in_use, world.model.links),
                 " · ".join(filter(None, (f"{step.stamp:.1f} s", rates, finds(step), recorded))),
                 pace.sentence(), now,
             )  # fmt: skip

@@ -189,8 +189,8 @@ class ReplayPage:
         self._play.label = "Pause" if player.playing else "Play"
         rates = f"{player.time:.2f} of {player.duration:.2f} s · stamp {step.stamp:.2f} s · {self.run_name(kept.run)}"
         rates = " · ".join(filter(None, (rates, finds(step))))
-        run = self._recorded.runs[kept.run]
-        self._status.draw(step.mode, told(asked, step, run.skin.ids, run.model.links), rates, "", now)
+        world = self._world(kept.run)
+        self._status.draw(step.mode, told(asked, step, world.units_in_use, world.model.links), rates, "", now)
 
     def run_name(self, run: int) -> str:
         """Name the controller of a run; of several, one may differ from another by nothing but its path."""
