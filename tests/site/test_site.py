@@ -1,5 +1,6 @@
 """The built site: its links, pictures and search, and that it asks nobody for anything."""
 
+import re
 from html.parser import HTMLParser
 from importlib.util import find_spec
 from pathlib import Path
@@ -10,6 +11,8 @@ from tests.needs import skip_for
 from tests.viewer.browser import chromium
 
 import pretouch
+
+ROOT = Path(__file__).parents[2]
 
 
 class Page(HTMLParser):
@@ -38,6 +41,27 @@ class Page(HTMLParser):
 
     def handle_data(self, data):
         self.text += data
+
+
+class Numbers(HTMLParser):
+    """The numbers that a page's numbered lists show, in order."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self.shown: list[int] = []
+        self._lists: list[int | None] = []
+        self.feed(path.read_text(encoding="utf-8").partition("<article")[2].partition("</article")[0])
+
+    def handle_starttag(self, tag, attrs):
+        if tag in ("ol", "ul"):
+            self._lists.append(int(dict(attrs).get("start") or 1) if tag == "ol" else None)
+        if tag == "li" and self._lists[-1] is not None:
+            self.shown.append(self._lists[-1])
+            self._lists[-1] += 1
+
+    def handle_endtag(self, tag):
+        if tag in ("ol", "ul"):
+            self._lists.pop()
 
 
 @pytest.fixture(scope="module")
@@ -96,6 +120,22 @@ def test_lists_are_lists(pages):
     assert broken == []
 
 
+def test_command_lines_are_code(pages):
+    assert [path.name for path in pages if re.search(r"<p>\s*(pretouch|make|python) ", _prose(path))] == []
+
+
+def test_numbered_lists_keep_their_numbers(site):
+    """A block that is indented by less than four blanks would end its list, and the next would begin at one."""
+    numbered = {}
+    for document in sorted((ROOT / "docs").rglob("*.md")):
+        text = re.sub(r"^ *```.*?^ *```$", "", document.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+        if numbers := re.findall(r"^ *(\d+)\. ", text, flags=re.MULTILINE):
+            page = (site / document.relative_to(ROOT / "docs")).with_suffix(".html")
+            numbered[document.name] = [int(number) for number in numbers], Numbers(page).shown
+    assert len(numbered) > 5
+    assert {name: both for name, both in numbered.items() if both[0] != both[1]} == {}
+
+
 def _prose(path):
     text = path.read_text(encoding="utf-8")
     while (start := text.find("<pre")) >= 0:
@@ -103,13 +143,16 @@ def _prose(path):
     return text
 
 
-def test_the_search_finds_things_without_a_server(site):
+def test_the_search_finds_what_is_typed_without_a_server(site):
     with chromium() as visitor:
-        asked = []
-        visitor.page.on("request", lambda request: asked.append(request.url))
-        visitor.page.goto((site / "how-to" / "run.html").as_uri())
-        visitor.page.keyboard.press("Control+k")
-        field = visitor.page.locator("input[placeholder='Search']").first
-        field.fill("touch sensor")
-        visitor.page.get_by_text("A touch sensor", exact=False).first.wait_for()
-        assert [url for url in asked if urlsplit(url).scheme in ("http", "https")] == []
+        page, requests = visitor.page, []
+        page.on("request", lambda request: requests.append(request.url))
+        page.goto((site / "how-to" / "run.html").as_uri())
+        page.keyboard.press("Control+k")
+        field = page.get_by_role("combobox", name="Search")
+        field.press_sequentially("RangeFinders")
+        page.get_by_role("option").filter(has_text="pretouch.sim.range_finder").first.wait_for()
+        assert field.input_value() == "RangeFinders"
+        field.press("Enter")
+        page.wait_for_url("**/reference/python-simulation.html*#pretouch.sim.range_finder.RangeFinders")
+        assert [url for url in requests if urlsplit(url).scheme in ("http", "https")] == []

@@ -1,4 +1,5 @@
-// A browser starts no worker for a page of the file system: the search then runs in a frame without a page.
+// A browser starts no worker for a page of the file system: the search then runs in a frame without a page. Messages
+// are copied, as between threads: the search changes what it is given, which would empty the field while one types.
 if (location.protocol === "file:") {
   window.Worker = class extends EventTarget {
     constructor(url) {
@@ -9,7 +10,7 @@ if (location.protocol === "file:") {
       document.body.append(this.frame)
       const inside = this.frame.contentWindow
       inside.postMessage = (data) => {
-        const event = new MessageEvent("message", { data })
+        const event = new MessageEvent("message", { data: structuredClone(data) })
         this.onmessage?.(event)
         this.dispatchEvent(event)
       }
@@ -19,7 +20,8 @@ if (location.protocol === "file:") {
       inside.document.body.append(script)
     }
     postMessage(data) {
-      this.loaded.then(() => this.frame.contentWindow.dispatchEvent(new MessageEvent("message", { data })))
+      const event = new MessageEvent("message", { data: structuredClone(data) })
+      this.loaded.then(() => this.frame.contentWindow.dispatchEvent(event))
     }
     terminate() {
       this.frame.remove()
