@@ -5,6 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from pretouch import loop
 from pretouch.control.path import Circle
@@ -26,6 +28,20 @@ class Liar(World):
 
     def read(self) -> RobotState:
         return self.lie(super().read())
+
+
+class Irregular(Liar):
+    """An arm whose loop is late, or whose clock is set, at some ticks; while nothing is sent it holds its velocity."""
+
+    def __init__(self, model: RobotModel, seed: int) -> None:
+        super().__init__(model, seed)
+        self.late, self.set_by = 0.0, 0.0
+        """Lateness of the next tick, and by how much the clock is set before it [s]."""
+
+    def tick(self) -> float:
+        self.now, self.q = self.now + self.late + self.set_by, self.q + self.qd * self.late
+        self.late = self.set_by = 0.0
+        return super().tick()
 
 
 def controller(model: RobotModel, name: str) -> Controller:
@@ -140,6 +156,70 @@ def test_no_finite_lie_breaks_the_acceleration_limits_by_more_than_once_their_si
     assert changes.max() <= 2 + 1e-3  # one by which a report may differ, and one from there
 
 
+@pytest.mark.parametrize("name", ["paper", "pretouch"])
+@pytest.mark.parametrize("late", [0.1, 0.5])
+def test_one_false_report_after_a_late_tick_leaves_a_standing_arm_where_it_is(panda_model, late, name):
+    arm, control = Irregular(panda_model, 0), controller(panda_model, f"{name}:task.speed_m_s=1e-6")
+    speed = np.minimum(0.95 * control.limits.qdd_max * late, 1.9 * control.limits.qd_max)
+    state = control.init(arm.read())
+
+    def false(robot: RobotState) -> RobotState:
+        return replace(robot, qd_commanded=speed)
+
+    for step in range(100):
+        arm.late, arm.lie = (late, false) if step == 20 else (0.0, Liar.lie)
+        state = loop.turn(control, state, arm, arm.skin(), arm.tick()).after
+    assert np.abs(np.array(arm.held) / (control.limits.qdd_max * DT)).max() <= 2 + 1e-3
+    assert np.abs(arm.q - panda_model.description.q_ready).max() < 0.01
+
+
+@pytest.mark.parametrize("late", [0.1, 0.3])
+def test_an_encoder_that_jumps_while_the_loop_is_late_makes_the_arm_hold_until_a_person_has_looked(panda_model, late):
+    arm, control = Irregular(panda_model, 0), controller(panda_model, "paper")
+    state, modes = control.init(arm.read()), []
+    for step in range(300):
+        if step == 150:
+            arm.late, arm.lie = late, lambda robot: replace(robot, q=robot.q + late * np.eye(7)[3])
+        resume = loop.Options(resume=lambda step=step: step == 250)
+        cycle = loop.turn(control, state, arm, arm.skin(), arm.tick(), resume)
+        state = cycle.after
+        modes.append(cycle.step.mode)
+    assert Mode.HOLD not in modes[120:150]
+    assert set(modes[150:250]) == {Mode.HOLD}
+    assert modes[-1] is not Mode.HOLD
+
+
+@pytest.mark.parametrize("name", ["paper", "paper:task.speed_m_s=1e-6", "pretouch"])
+@settings(max_examples=6)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_no_lie_at_a_late_tick_or_of_a_clock_that_is_set_breaks_the_acceleration_limits(panda_model, name, seed):
+    rng, arm = np.random.default_rng(seed), Irregular(panda_model, 0)
+    control = controller(panda_model, name)
+    step_size = control.limits.qdd_max * DT
+    state, most = control.init(arm.read()), 0.0
+    for step in range(250):
+        if step > 60:
+            arm.late = float(rng.choice([0.0] * 15 + [0.02, 0.04, 0.1, 0.5]))
+            arm.set_by = float(rng.choice([0.0] * 60 + [-0.02, -1.0, 0.03, 60.0]))
+            arm.lie = drawn(rng, step_size, arm.late) if rng.random() < 0.05 + 0.6 * (arm.late > 0.0) else Liar.lie
+        late, before, resume = arm.late + arm.set_by > 0.0, arm.qd, bool(rng.random() < 0.3)
+        options = loop.Options(resume=lambda resume=resume: resume)
+        state = loop.turn(control, state, arm, arm.skin(), arm.tick(), options).after
+        # an arm that got no commands may have braked: its word for that only brings it to rest
+        rest = np.zeros(7) if late else before
+        beyond = np.maximum(np.minimum(before, rest) - arm.qd, arm.qd - np.maximum(before, rest))
+        most = max(most, (beyond / step_size).max())
+    assert most <= 5.0
+
+
+def drawn(rng: np.random.Generator, step_size: np.ndarray, late: float) -> Lie:
+    """Draw a lie, the larger the later the tick."""
+    field = str(rng.choice(["stamp", "q", "qd", "q_commanded", "qd_commanded", "qd_commanded", "tau_ext"]))
+    size = {"stamp": 0.05, "q": 0.02 + late, "tau_ext": 50.0}.get(field, (1.0 + late / DT) * step_size)
+    lie = rng.choice([0.5, 0.9, 1.0]) * size * rng.choice([-1.0, 1.0], () if field == "stamp" else 7)
+    return lambda robot: replace(robot, **{field: getattr(robot, field) + lie})
+
+
 def test_what_the_commands_of_late_explain_is_believed_as_it_is(panda_model, arm):
     control = controller(panda_model, "paper")
     robot, state = arm.read(), control.init(arm.read())
@@ -153,8 +233,17 @@ def test_what_the_commands_of_late_explain_is_believed_as_it_is(panda_model, arm
     for honest in (np.full(7, 0.4), np.zeros(7), np.linspace(0, 0.4, 7), 0.4 + step, -step):
         np.testing.assert_array_equal(believed(honest), honest)
     np.testing.assert_array_equal(np.isnan(believed(0.4 + 1.1 * step * np.eye(7)[2])), np.eye(7)[2] == 1)
-    # a loop that was late finds an arm that has braked in the meantime
-    np.testing.assert_array_equal(believed(-4.9 * step, now=0.08), -4.9 * step)
+    # a loop that was late finds an arm that has braked in the meantime, but none that has sped up or turned round
+    fast = state.command = np.full(7, 1.5)
+    state.watch.sent = ((0.03, fast),)
+    for braked in (fast - 4.9 * step, fast + step):
+        np.testing.assert_array_equal(believed(braked, now=0.08), braked)
+    for other in (fast - 1.1 * step, fast + 1.1 * step):
+        assert np.isnan(believed(other)).all()
+    for other in (fast + 1.1 * step, fast - 5.1 * step, -fast):
+        assert np.isnan(believed(other, now=0.08)).all()
+    np.testing.assert_array_equal(believed(-step, now=5.0), -step)
+    assert np.isnan(believed(-1.1 * step, now=5.0)).all()
 
 
 @pytest.mark.parametrize("report", [None, "no arm", 3.0])

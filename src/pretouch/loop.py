@@ -247,9 +247,12 @@ def explained(controller: Controller, state: ControllerState, robot: RobotState,
     """Return an arm's report with NaN for joints that no recent command, or no motion, explains; `now` is in s.
 
     A loop that commands asks before each step: the next command may differ from the reported one by so much only, so a
-    false report would move the arm. A joint's velocity is explained between the least and the largest of the commands
-    that the report may be of, and what the acceleration limit allows since the last one; its position by speed and
-    acceleration limit since the last report. What is no report of an arm stays as it is, for the step to name.
+    false report would move the arm. An arm that gets no command holds its velocity or brakes, so a late step widens
+    what is explained towards rest only. A joint's velocity is explained between the least and the largest of the
+    commands that the report may be of, the last one braked for as long as the step is late, and one period of
+    acceleration beyond; its position by speed and acceleration limit since the last report. While a HOLD is latched a
+    person looks before the arm moves: whatever acceleration reaches since the last report is then explained. What is no
+    report of an arm stays as it is, for the step to name.
     """
     limits, command, last = controller.limits, state.command, state.watch.robot
     try:
@@ -259,22 +262,27 @@ def explained(controller: Controller, state: ControllerState, robot: RobotState,
         return robot
     if q.shape != command.shape or reported.shape != command.shape:
         return robot
+    late = max(0.0, now - state.watch.stamp - limits.period)
     moved = np.abs(q - last.q)
     if not (moved <= _ENCODER_RAD).all():  # hardly ever at 1 kHz
         # stamps may be times of arrival: states that waited together come together
         gap = max(limits.period, stamp - last.stamp)
+        accelerated = gap if state.mode.latched else max(limits.period, gap - late)
         speed = np.maximum(np.minimum(np.abs(last.qd), limits.qd_max), np.abs(command))
-        reach = speed * (gap + controller.profile.failure.state_timeout_s) + limits.qdd_max * gap**2 + _ENCODER_RAD
-        if (jumped := moved > reach).any():
+        reach = speed * (gap + controller.profile.failure.state_timeout_s) + limits.qdd_max * accelerated**2
+        if (jumped := moved > reach + _ENCODER_RAD).any():
             return replace(robot, q=np.where(jumped, np.nan, q))
-    reach = limits.qdd_max * max(limits.period, now - state.watch.stamp) + _ROUNDING_RAD_S
+    reach = limits.qdd_max * limits.period + _ROUNDING_RAD_S
     if (np.abs(reported - command) <= reach).all():  # nearly always, and all commands would cost 10 us at 1 kHz
         return robot
-    recent = np.array([command, *(earlier for _, earlier in state.watch.sent)])
-    known = (reported >= recent.min(axis=0) - reach) & (reported <= recent.max(axis=0) + reach)
+    braked = np.sign(command) * np.maximum(np.abs(command) - limits.qdd_max * late, 0.0)
+    recent = np.array([command, braked, *(earlier for _, earlier in state.watch.sent)])
+    explicable = (reported >= recent.min(axis=0) - reach) & (reported <= recent.max(axis=0) + reach)
     if stamp > state.watch.stamp:  # of after the last command, which it cannot lag behind by all of them
-        known &= np.abs(reported - command) <= reach + limits.qdd_max * _LAG_S
-    return robot if known.all() else replace(robot, qd_commanded=np.where(known, reported, np.nan))
+        reach = reach + limits.qdd_max * _LAG_S
+        explicable &= reported >= np.minimum(command, braked) - reach
+        explicable &= reported <= np.maximum(command, braked) + reach
+    return robot if explicable.all() else replace(robot, qd_commanded=np.where(explicable, reported, np.nan))
 
 
 def instant(
