@@ -81,6 +81,9 @@ STAGES = ("state", "kinematics", "perception", "contact", "mode", "path", "motio
 class Controller:
     """The line from readings to joint velocities for one arm, skin, surrounding, path and profile.
 
+    `step` believes any finite report of the arm, and a false one can move it against its acceleration limits: a loop of
+    your own calls `loop.turn` in its place, or `loop.explained` before it.
+
     `mark` gets the name of each of `STAGES` as it ends, so that a caller with a clock can see where the time goes.
     """
 
@@ -160,11 +163,7 @@ class Controller:
         return None if self.profile.approach is None else self.profile.approach.init(self._motion_body)
 
     def step(self, state: ControllerState, inputs: Inputs) -> tuple[ControlStep, ControllerState]:
-        """Run one control cycle; to be called once a period, with the state that the step before returned.
-
-        A step takes a finite report of the arm as it is, and a false one can move the arm against its acceleration
-        limits: a loop of your own has the protection of `loop.turn` only if it calls that, or `loop.explained` first.
-        """
+        """Run one control cycle, once a period, with the state of the step before; it believes any finite report."""
         p, model, mark = self.profile, self.model, self._mark
         if len(state.command) != model.n or len(state.tracks.point) != self._units:
             raise RobotStateError("The state is that of a controller for another arm or skin: begin with init().")

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from tests.ports import free_port
-from tests.viewer.visitor import CAMERA, Visitor, fetched, refusal, until, update
+from tests.viewer.visitor import CAMERA, Visitor, answered, fetched, refusal, until, update
 
 from pretouch.errors import ViewerError
 from pretouch.viewer.commander import Commander
@@ -100,6 +100,26 @@ def test_the_address_with_its_token_is_answered_and_tells_it_to_nobody_else(opti
 def test_without_the_token_there_is_a_sentence(options: ServeOptions, path: str) -> None:
     assert fetched(options, path) == (403, ADDRESS, "text/plain; charset=utf-8")
     assert refusal(options, path) == (403, ADDRESS)
+
+
+@pytest.mark.parametrize("path", [b"/\xff", b"/\xc3\xa9/", b"/{token}\xff/", b"/\xff/{token}/", "/tokén/".encode()])
+def test_a_path_that_is_not_ascii_is_refused_like_any_other(options: ServeOptions, path: bytes) -> None:
+    status, text = answered(options, path.replace(b"{token}", options.token.encode()))
+    assert (status, text) == (403, ADDRESS)
+
+
+@pytest.mark.parametrize("rest", [b"\xff", b"\xc3\xa9.js", b"%ff", b"%00", b"../%2e%2e/\xff", b"?\xff"])
+def test_behind_the_token_a_path_that_is_not_ascii_is_a_file_or_none(options: ServeOptions, rest: bytes) -> None:
+    assert answered(options, b"/" + options.token.encode() + b"/" + rest)[0] in (200, 404)
+
+
+@pytest.mark.parametrize(
+    ("header", "line"),
+    [("This page is not at", b"Host: \xff"), ("Pages of", b"Host: 127.0.0.1:{port}\r\nOrigin: http://\xff")],
+)
+def test_a_header_that_is_not_ascii_is_refused_in_a_sentence(options: ServeOptions, header: str, line: bytes) -> None:
+    status, text = answered(options, b"/", line.replace(b"{port}", str(options.port).encode()))
+    assert (status, text.startswith(header)) == (403, True)
 
 
 def test_a_page_of_somebody_else_does_not_get_in_though_it_knows_the_token(options: ServeOptions) -> None:
@@ -216,6 +236,19 @@ def test_what_is_no_message_of_a_page_is_refused_and_the_visitor_stays(liar: Vis
 def test_fields_that_no_message_has_are_left_out(page: LivePage, visitor: Visitor) -> None:
     visitor.say({**update(control(page, "Pause"), value=True), "nosuch": 1})
     until(lambda: len(page._actions) == 1)
+
+
+@pytest.mark.parametrize("depth", [2, 50, 500, 2000])
+def test_lists_in_lists_are_refused_and_the_visitor_stays(
+    unmoved: tuple[LivePage, ServeOptions], liar: Visitor, depth: int
+) -> None:
+    nested = b"\x91" * depth + b"\x90"
+    for label in ("Profile", "Clock speed", "Cones"):
+        change = msgspec.msgpack.encode(update(control(unmoved[0], label), value=None))
+        assert change.endswith(b"\xc0")
+        liar.say_raw(change[:-1] + nested)
+    liar.say_raw(msgspec.msgpack.encode({**CAMERA, "nosuch": None})[:-1] + nested)
+    assert liar.heard("NotificationShowMessage")["props"]["title"] == "Not done"
 
 
 @given(st.binary(max_size=80) | st.recursive(st.none() | st.floats() | st.text(), st.lists).map(msgspec.msgpack.encode))

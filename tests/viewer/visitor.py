@@ -3,6 +3,7 @@
 import http.client
 import itertools
 import math
+import socket
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -42,6 +43,16 @@ def fetched(options: ServeOptions, path: str = "", **headers: str) -> tuple[int,
     return answer.status, text, answer.headers["Content-Type"]
 
 
+def answered(options: ServeOptions, path: bytes, headers: bytes = b"") -> tuple[int, str]:
+    """Status and text of what is answered at a path, and with headers, of any bytes."""
+    headers = headers or f"Host: {options.host}:{options.port}".encode()
+    with socket.create_connection((options.host, options.port), PATIENCE_S) as sock:
+        sock.sendall(b"GET " + path + b" HTTP/1.1\r\n" + headers + b"\r\n\r\n")
+        answer = http.client.HTTPResponse(sock)
+        answer.begin()
+        return answer.status, answer.read().decode(errors="replace")
+
+
 class Visitor:
     """One connection to a page that is served, open while the context lasts."""
 
@@ -69,6 +80,9 @@ class Visitor:
 
     def say(self, message: dict[str, Any]) -> None:
         self._socket.send(msgspec.msgpack.encode(message))
+
+    def say_raw(self, message: bytes) -> None:
+        self._socket.send(message)
 
     def set(self, handle: Any, value: object) -> None:
         """Give a control a value, as the page does."""

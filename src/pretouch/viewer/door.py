@@ -5,11 +5,12 @@ whoever asks. So each connection is refused or begun here, and each message is r
 """
 
 import ipaddress
+import reprlib
 import secrets
 import socket
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import fields, replace
 from functools import partial
@@ -140,7 +141,8 @@ class Door:
         self, theirs: Callable[..., Response | None], connection: ServerConnection, request: Request
     ) -> Response | None:
         refusal = self._refusal(request)
-        if refusal:
+        if refusal:  # a name in it may be no ASCII, as its lone surrogates say
+            refusal = refusal.encode(errors="backslashreplace").decode()
             return connection.respond(HTTPStatus.FORBIDDEN, refusal + "\n")
         request.path = "/" + request.path.partition("?")[0].lstrip("/").partition("/")[2]
         response = theirs(connection, request)
@@ -156,7 +158,7 @@ class Door:
         if any(origin.partition("//")[2] != hosts[0] for origin in origins):
             return f"Pages of {' and '.join(origins)} may not use this one. {_ADDRESS}"
         token = request.path.partition("?")[0].lstrip("/").partition("/")[0]
-        return "" if secrets.compare_digest(token.encode(), self._token) else _ADDRESS
+        return "" if secrets.compare_digest(token.encode(errors="surrogateescape"), self._token) else _ADDRESS
 
     def _is_own(self, host: str) -> bool:
         """Whether a name is this machine's: one that somebody else chose may lead here, a number may not."""
@@ -233,16 +235,21 @@ def _understood(raw: Any) -> Any:
         heard = msgspec.convert(mapping, _KINDS[mapping["type"]])
     except (msgspec.MsgspecError, ValueError, TypeError, KeyError, RecursionError) as error:
         raise Refused("The page does not know what to do with this message: load it again.") from error
-    if not _bounded(list(mapping.values())):
+    if not _bounded(mapping.values()):
         raise Refused("A number in this message is none, or too large.")
     return heard
 
 
-def _bounded(value: object) -> bool:
-    """Whether no number of a message is NaN, infinite or too large."""
-    if isinstance(value, list):
-        return all(map(_bounded, value))
-    return not isinstance(value, int | float) or -_LARGEST <= value <= _LARGEST
+def _bounded(values: Iterable[object]) -> bool:
+    """Whether no number of a message, in lists too, is NaN, infinite or too large."""
+    left = list(values)
+    while left:
+        value = left.pop()
+        if isinstance(value, list):
+            left += value
+        elif isinstance(value, int | float) and not -_LARGEST <= value <= _LARGEST:
+            return False
+    return True
 
 
 def _checked(handle: Any, updates: dict[str, Any]) -> object:
@@ -251,11 +258,12 @@ def _checked(handle: Any, updates: dict[str, Any]) -> object:
     if list(updates) != ["value"] or props.disabled or not props.visible:
         raise Refused(f"{props.label} cannot be changed now.")
     number = isinstance(value, int | float) and not isinstance(value, bool)
-    if isinstance(handle, GuiSliderHandle) and number and _bounded(value):
+    if isinstance(handle, GuiSliderHandle) and number and _bounded([value]):
         return float(min(max(value, props.min), props.max))  # who types 0.5 begins with 0
     fits, way_out = _rule(handle, value)
     if not fits:
-        raise Refused(f"{props.label} cannot be {str(value)[:LONGEST_TEXT]}: {way_out}.")
+        text = value if isinstance(value, str) else reprlib.repr(value)  # who nests lists deeply is not followed there
+        raise Refused(f"{props.label} cannot be {text[:LONGEST_TEXT]}: {way_out}.")
     return value
 
 
