@@ -22,7 +22,7 @@ from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin
 from pretouch.serving.fci.arm import ArmSetup, ServedArm
 from pretouch.serving.fci.motion import Setpoint
-from pretouch.serving.fci.wire import CONNECT, HEADER, PANDA, Controller, Generator
+from pretouch.serving.fci.wire import CONNECT, HEADER, PANDA, Controller, Generator, RobotMode
 from pretouch.sim.scene import SceneSpec
 
 
@@ -135,11 +135,18 @@ def test_a_program_types_in_place_of_a_person_and_ends_the_server_by_ending(tmp_
     assert refused.startswith("'harder' is not a push")
 
 
-def test_what_is_typed_while_the_arm_comes_to_rest_waits_until_it_has() -> None:
+@pytest.fixture
+def swinging() -> ServedArm:
+    """An arm just after a motion."""
     arm = ServedArm(ArmSetup(RobotModel(panda()), "panda", panda().q_ready, SceneSpec()))
     arm.begin(Generator.JOINT_VELOCITY, Controller.JOINT_IMPEDANCE)
     arm.step(Setpoint(np.zeros(7)))
     arm.step(Setpoint(np.zeros(7), finished=True))
+    return arm
+
+
+def test_what_is_typed_while_the_arm_comes_to_rest_waits_until_it_has(swinging: ServedArm) -> None:
+    arm = swinging
     ours, theirs = os.pipe()
     with os.fdopen(ours) as read, os.fdopen(theirs, "w") as written:
         typed = TypedPushes(arm, read, program=True)
@@ -154,6 +161,71 @@ def test_what_is_typed_while_the_arm_comes_to_rest_waits_until_it_has() -> None:
         np.testing.assert_array_equal(arm.true_force, [0.0, 15.0, 0.0])
         written.close()
         assert typed.take()
+
+
+def test_all_that_was_typed_before_the_end_of_a_pipe_is_done(
+    swinging: ServedArm, capsys: pytest.CaptureFixture[str]
+) -> None:
+    ours, theirs = os.pipe()
+    with os.fdopen(ours) as read:
+        typed = TypedPushes(swinging, read, program=True)
+        os.write(theirs, b"time\nharder\n\n0,15,0")  # the last without an end
+        os.close(theirs)
+        while not swinging.settled:
+            assert not typed.take()
+            swinging.step(None)
+        while not typed.take():
+            swinging.step(None)
+        assert typed.take()
+    time, refused = capsys.readouterr().out.splitlines()
+    assert time.startswith("The arm's time is")
+    assert refused.startswith("'harder' is not a push")
+    swinging.step(None)
+    np.testing.assert_array_equal(swinging.true_force, [0.0, 15.0, 0.0])
+
+
+@pytest.mark.parametrize("lockstep", [False, True])
+def test_an_arm_that_is_led_by_hand_hears_what_is_typed_but_in_lockstep(lockstep: bool) -> None:
+    arm = ServedArm(ArmSetup(RobotModel(panda()), "panda", panda().q_ready, SceneSpec()))
+    ours, theirs = os.pipe()
+    with os.fdopen(ours) as read, os.fdopen(theirs, "wb", buffering=0) as written:
+        typed = TypedPushes(arm, read, program=True, lockstep=lockstep)
+        written.write(b"guide\n0,5,0:0.3\n")
+        typed.take()
+        arm.step(None)
+        written.write(b"let go\n")
+        for _ in range(100):
+            assert not typed.take()
+            arm.step(None)
+        assert (arm.mode is RobotMode.GUIDING) is lockstep
+        while not arm.settled:
+            arm.step(None)
+        typed.take()
+        assert arm.mode is RobotMode.IDLE
+
+
+def test_a_line_without_an_end_is_not_kept_whole(capsys: pytest.CaptureFixture[str]) -> None:
+    arm = ServedArm(ArmSetup(RobotModel(panda()), "panda", panda().q_ready, SceneSpec()))
+    ours, theirs = os.pipe()
+    with os.fdopen(ours) as read, os.fdopen(theirs, "wb", buffering=0) as written:
+        typed = TypedPushes(arm, read, program=True)
+        for _ in range(50):
+            written.write(b"0,15,0" + 4000 * b" ")
+            typed.take()
+        assert capsys.readouterr().out == ""
+        written.write(b"\n" + b"time\n")
+        typed.take()
+    refused, time = capsys.readouterr().out.splitlines()
+    assert refused == "A line of more than 256 characters is left out."
+    assert time.startswith("The arm's time is")
+    arm.step(None)
+    assert not arm.true_force.any()
+
+
+def test_in_lockstep_a_lasting_push_of_a_guided_arm_does_not_keep_the_server_from_ending() -> None:
+    command = [sys.executable, "-m", "pretouch.cli", "serve-fci", "--port", "0", "--lockstep", "--stdin"]
+    done = subprocess.run(command, input="guide\n0,1,0:1e6\n", capture_output=True, text=True, timeout=60.0)
+    assert done.returncode == 0
 
 
 def test_a_push_that_is_over_is_said_with_what_the_arm_measured_of_it(capsys: pytest.CaptureFixture[str]) -> None:

@@ -46,6 +46,8 @@ _BUTTONS: dict[str, Callable[[ServedArm], None]] = {
 """What is typed for the user stop and the buttons at the flange."""
 _TIME = "time"
 """What is typed to be told the arm's time."""
+_LONGEST_LINE = 256
+"""Characters of a line that is typed."""
 _LAG_S = 0.2
 """How long the arm's estimate of a push that has ended is still looked at [s]."""
 _STIFFEST = 1e6
@@ -68,7 +70,7 @@ def serve_fci(command: "ServeFci") -> None:
         pace = "lockstep" if c.lockstep else "real time"
         gripper = f"gripper at port {server.gripper_address[1]}"
         _say(f"Listening at {host}:{port} (FCI {server.protocol.version}, {pace}), {gripper}.")
-        typed = TypedPushes(arm, sys.stdin, c.stdin)
+        typed = TypedPushes(arm, sys.stdin, c.stdin, c.lockstep)
         if typed.possible and not c.stdin:
             _say(
                 "Type +x, -x, +y, -y, +z or -z and Enter to push the hand, or a force such as 0,15,0 [N];"
@@ -81,9 +83,12 @@ def serve_fci(command: "ServeFci") -> None:
 class TypedPushes:
     """Pushes that a person at the terminal types, one a line, or a program writes."""
 
-    def __init__(self, arm: ServedArm, source: TextIO, program: bool = False) -> None:
-        """Take the arm that is pushed, and what is typed at: a terminal, or a pipe of a `program`, which ends it."""
-        self._arm, self._text, self._program = arm, b"", program
+    def __init__(self, arm: ServedArm, source: TextIO, program: bool = False, lockstep: bool = False) -> None:
+        """Take the arm that is pushed, and what is typed at: a terminal, or a pipe of a `program`, which ends it.
+
+        In `lockstep` nothing is done while somebody leads the arm, whose time passes at the machine's own speed.
+        """
+        self._arm, self._text, self._program, self._lockstep = arm, b"", program, lockstep
         self._lines: list[str] = []
         self._push: TcpPush | None = None
         self._rest, self._largest = np.zeros(3), 0.0
@@ -97,26 +102,32 @@ class TypedPushes:
     def take(self) -> bool:
         """Have what was typed come, and say how it was measured; True once the program that typed has gone."""
         self._follow()
-        # while the arm still swings after a motion, its time would depend on when the line arrived
-        if not self.possible or not self._ready:
-            return False
-        if select.select([self._descriptor], [], [], 0)[0]:
-            read = os.read(self._descriptor, 4096)
-            if not read:
-                self._descriptor = -1
-                return self._program
-            *lines, self._text = (self._text + read).split(b"\n")
-            self._lines += filter(None, (line.decode(errors="replace").strip() for line in lines))
+        if self.possible and not self._lines and select.select([self._descriptor], [], [], 0)[0]:
+            self._read()
         while self._lines and self._ready:
             self._do(self._lines.pop(0))
-        return False
+        return self._program and not self.possible and not self._lines
+
+    def _read(self) -> None:
+        """Take in lines; what stands behind the last end is one at the end of all, and of a long one its beginning."""
+        read = os.read(self._descriptor, 4096)
+        *lines, self._text = (self._text + (read or b"\n")).split(b"\n")
+        self._text = self._text[: _LONGEST_LINE + 1]
+        self._lines = [line.decode(errors="replace") for line in lines if line.strip()]
+        if not read:
+            self._descriptor = -1
 
     @property
     def _ready(self) -> bool:
-        return self._arm.moving or self._arm.settled
+        # while the arm still swings after a motion, its time would depend on when the line arrived
+        return self._arm.moving or self._arm.settled or (self._arm.led and not self._lockstep)
 
     def _do(self, line: str) -> None:
         now = self._arm.pushes.now
+        if len(line) > _LONGEST_LINE:
+            _say(f"A line of more than {_LONGEST_LINE} characters is left out.")
+            return
+        line = line.strip()
         if line in _BUTTONS:
             _BUTTONS[line](self._arm)
             return

@@ -130,10 +130,10 @@ class ServedArm:
     @property
     def settled(self) -> bool:
         """Whether it no longer swings after a motion, either."""
-        return self.at_rest and self._since_motion >= _COMES_TO_REST and not self._led
+        return self.at_rest and self._since_motion >= _COMES_TO_REST and not self.led
 
     @property
-    def _led(self) -> bool:
+    def led(self) -> bool:
         """Whether somebody moves it by hand, or is about to."""
         return self.mode is RobotMode.GUIDING and self.pushes.under_way
 
@@ -253,7 +253,7 @@ class ServedArm:
         if self.motion is None:
             slower = self.limits.braked(self.qd)
             self.qd, self.qdd = slower, (slower - self.qd) / PERIOD_S
-            self._since_motion = 0 if self._led else self._since_motion + 1
+            self._since_motion = 0 if self.led else self._since_motion + 1
         self.plant.command(self.qd)
         self._pass_time()
         return self._check_contacts() or self._check_joints() or ending

@@ -70,6 +70,7 @@ class FciServer:
         self._client_udp = ("", 0)
         self._handler: RequestHandler | None = None
         self._served = False
+        self._done: Callable[[], bool] = lambda: False
         self._tick = 0
         self._motions = self._unanswered = self._of_motion = self._answered_until = 0
         self._command: np.void | None = None
@@ -94,6 +95,7 @@ class FciServer:
     def serve(self, done: Callable[[], bool] = lambda: False) -> None:
         """Serve until `done` says so, or, if asked to serve once, until the client has disconnected."""
         self._start = self._next = time.monotonic()
+        self._done = done
         while not done() and not (self._options.once and self._served and self._client is None):
             self._settle()
             self._send_state()
@@ -251,7 +253,7 @@ class FciServer:
 
     def _settle(self) -> None:
         """In lockstep, let the arm come to rest between two states: what a client sees then differs in time alone."""
-        while self._options.lockstep and not self._arm.moving and not self._arm.settled:
+        while self._options.lockstep and not self._arm.moving and not self._arm.settled and not self._done():
             self._pass_time(None)
 
     def _attempt(self, do: Callable[[RequestHandler], None]) -> None:
