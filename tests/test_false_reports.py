@@ -250,3 +250,34 @@ def test_what_the_commands_of_late_explain_is_believed_as_it_is(panda_model, arm
 def test_what_is_no_report_is_left_for_the_step_to_name(panda_model, arm, report):
     control = controller(panda_model, "paper")
     assert loop.explained(control, control.init(arm.read()), report, 0.0) is report
+
+
+@pytest.mark.parametrize("stamp", [1e308, -1e308, np.float64(1e308), 10**40, 1j, np.complex128(0.5)])
+def test_a_stamp_that_is_none_is_named_though_a_position_jumps_too(panda_model, arm, stamp):
+    arm.told = lambda robot: replace(robot, stamp=stamp, q=robot.q + 0.3)
+    said = turned(controller(panda_model, "paper"), arm, 120)
+    assert said[119].mode is Mode.TRACK
+    assert said[-1].mode is Mode.HOLD
+    assert f"its time stamp is {stamp}" in said[-1].reason
+
+
+@pytest.mark.parametrize("field", ["q", "qd", "q_commanded", "qd_commanded", "wrench"])
+def test_complex_numbers_of_an_arm_are_a_named_hold(panda_model, arm, field):
+    arm.told = lambda robot: replace(robot, **{field: getattr(robot, field) + 0.5j})
+    said = turned(controller(panda_model, "paper"), arm, 5)
+    assert said[-1].mode is Mode.HOLD
+    assert "of numbers" in said[5].reason
+
+
+@pytest.mark.parametrize("value", [1e308, -1e308, 0.5j])
+def test_readings_with_such_stamps_are_named_or_not_used(panda_model, paper_skin, value):
+    arm = Liar(panda_model, len(paper_skin))
+    control = Controller(panda_model, paper_skin, no_fixtures(), Circle(), profile("pretouch"))
+    state, skin = control.init(arm.read()), arm.skin()
+    readings = replace(skin.read(), stamp=np.full(len(paper_skin), value))
+    skin.read = lambda: readings
+    for _ in range(5):
+        cycle = loop.turn(control, state, arm, skin, arm.tick())
+        state = cycle.after
+    assert cycle.step.mode is Mode.HOLD
+    assert ("The readings do not fit" if isinstance(value, complex) else "No usable reading from") in cycle.step.reason

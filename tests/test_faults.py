@@ -5,11 +5,26 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pretouch.faults import MOST_IMU, Watch, examine, sound_imu, sound_readings, sound_robot, watch_init
+from pretouch.desired import Desired, DesiredKind, sound_desired, twist
+from pretouch.errors import ParameterError
+from pretouch.faults import (
+    MOST_IMU,
+    Watch,
+    examine,
+    sound_imu,
+    sound_points,
+    sound_readings,
+    sound_robot,
+    sound_touch,
+    watch_init,
+)
 from pretouch.modes import Event
+from pretouch.moving_fixtures import MovingFixtures
 from pretouch.params import FailureParams
+from pretouch.payload import Payload
+from pretouch.perception.moving import sound_moving
 from pretouch.sensing.sensor import PAPER_SENSOR
-from pretouch.types import ImuReadings, Inputs, RangeReadings, RangeStatus, RobotState
+from pretouch.types import ImuReadings, Inputs, RangeReadings, RangeStatus, RobotState, SeenPoints, TouchReadings
 
 PARAMS = FailureParams()  # state older than 0.05 s, step more than 0.05 s after the last, no force for 0.2 s
 PERIOD = 0.01
@@ -238,6 +253,63 @@ def test_a_clock_set_back_does_not_hide_a_missing_wrench():
     assert Event.NO_FORCE in faults
 
 
+COMPLEX = np.full(2, 0.1 + 0.0j)
+
+
+@pytest.mark.parametrize("part", [COMPLEX, list(COMPLEX), COMPLEX.tolist(), COMPLEX.astype(object)])
+@pytest.mark.parametrize(("name", "called"), PARTS)
+def test_complex_numbers_are_none_of_a_joint(name: str, called: str, part: object):
+    believed, faults, _ = judge(inputs(**{name: part}))
+    assert faults == {Event.UNUSABLE: f"{called} are not arrays of numbers"}
+    assert_last_state_moved_on(believed)
+
+
+def test_complex_numbers_are_no_force_torque_or_time():
+    _, faults, _ = judge(inputs(wrench=np.zeros(6, complex)))
+    assert faults == {Event.UNUSABLE: "its force estimate is not an array of numbers"}
+    believed, faults, _ = judge(inputs(tau_ext=COMPLEX))
+    assert faults == {}
+    assert np.isnan(believed.tau_ext).all()
+    for stamp in (np.complex128(1.01), np.array(1.01 + 0j), 1.01 + 0j):
+        _, faults, _ = judge(replace(inputs(), robot=robot(stamp)))
+        assert faults == {Event.UNUSABLE: f"its time stamp is {stamp}"}
+        _, faults, _ = judge(replace(inputs(), stamp=stamp))
+        assert faults == {Event.UNUSABLE: f"the step's time stamp is {stamp}"}
+
+
+def test_complex_numbers_are_no_touch_points_motion_fixtures_or_load():
+    z = COMPLEX
+    touch = TouchReadings(np.zeros(2), np.zeros(2, bool), np.zeros(2), np.zeros(2, np.int64))
+    points = SeenPoints(0.0, np.zeros(2), np.zeros((2, 3)), np.zeros(2))
+    moving = MovingFixtures(1.0, *np.zeros((2, 1, 3)), np.zeros(1), *np.zeros((2, 1, 3)))
+    wanted = Desired(DesiredKind.JOINT_VELOCITIES, np.ones(1), np.zeros((1, 2)))
+    for name in ("stamp", "force"):
+        assert sound_touch(replace(touch, **{name: z}), 2) == (None, "touch readings are not arrays of numbers")
+    for name, part in {"heard": z[0], "stamp": z, "point": np.zeros((2, 3), complex), "sigma": z}.items():
+        assert sound_points(replace(points, **{name: part})) == (None, "gives something other than arrays of numbers")
+    for name, part in {"stamp": z[0], "radius": z[:1], "a": np.zeros((1, 3), complex)}.items():
+        assert sound_moving(replace(moving, **{name: part}), 1.0, 1.0) == (None, "are not arrays of numbers")
+    for name, part in {"stamp": z[:1], "number": z[None]}.items():
+        assert "holds no kind, stamps and numbers" in sound_desired(replace(wanted, **{name: part}), 2, 1.0)[1]
+    with pytest.raises(ParameterError, match="is no payload: give numbers"):
+        Payload(z[0], (0.0, 0.0, 0.0))
+    with pytest.raises(TypeError, match="complex128 are not real"):
+        twist(1.0, np.zeros(3, complex))
+
+
+def test_stamps_as_large_as_a_float_can_be_are_refused_in_a_sentence():
+    for stamps in ((-1e308, 1e308), (1e308, 1.1e308), (0.0, np.nan), (-np.inf, 0.0)):
+        wanted = Desired(DesiredKind.JOINT_VELOCITIES, np.array(stamps), np.zeros((2, 2)))
+        assert sound_desired(wanted, 2, 1.0)[1].startswith("its time stamp is ")
+    _, faults, _ = judge(replace(inputs(), stamp=1e308))
+    assert faults == {Event.UNUSABLE: "the step's time stamp is 1e+308"}
+
+
+def test_numbers_too_large_for_a_float_are_none_of_a_joint():
+    _, faults, _ = judge(inputs(q=np.full(2, np.longdouble("1e4000"))))
+    assert faults == {Event.UNUSABLE: "joint positions hold inf"}
+
+
 # readings
 
 
@@ -269,6 +341,8 @@ def test_readings_that_fit_are_copied(kind: type):
         (readings(status=(0.0, np.nan)), "statuses are of type float64"),
         (readings(status=("ok", "ok")), "statuses are of type <U2"),
         (readings(stamp=("a", "b")), "not arrays of numbers"),
+        (readings(stamp=COMPLEX), "not arrays of numbers"),
+        (readings(distance=COMPLEX), "not arrays of numbers"),
         (readings(distance=[[1.0], [1.0, 2.0]]), "not arrays of numbers"),
     ],
 )
@@ -306,7 +380,8 @@ def test_imu_samples_that_can_be_none_are_left_out_and_the_others_kept() -> None
 @pytest.mark.parametrize(
     "given",
     [None, "many", imu_of(unit=np.zeros(2)), imu_of(stamp=np.zeros(3)), imu_of(acceleration=np.zeros(3)),
-     imu_of(angular_velocity="none"), imu_of(unit=np.zeros((2, 1), np.int64))],
+     imu_of(angular_velocity="none"),
+     imu_of(stamp=COMPLEX), imu_of(acceleration=np.ones((2, 3), complex)), imu_of(unit=np.zeros((2, 1), np.int64))],
 )  # fmt: skip
 def test_what_is_no_imu_samples_says_nothing(given) -> None:
     assert sound_imu(given, 2) is None

@@ -5,7 +5,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pretouch.arrays import FloatArray
+from pretouch.arrays import FloatArray, real
 from pretouch.errors import ParameterError
 from pretouch.values import value
 
@@ -46,6 +46,8 @@ _LARGEST = 1e3
 """A desired number [rad, rad/s, m, m/s] from here on is none."""
 _ROUNDING = 1e-6
 """By how much the columns of a rotation may miss unit length and right angles."""
+_LATEST = 1e12
+"""A time stamp [s] from here on is none."""
 _AHEAD_S = 60.0
 """A horizon that begins so far in the future is stamped by another clock."""
 _WIDTH = {DesiredKind.TWIST: 6, DesiredKind.POSE: 12}
@@ -57,24 +59,24 @@ def twist(stamp: ArrayLike, linear: ArrayLike, angular: ArrayLike = (0.0, 0.0, 0
     With M stamps, rows (M, 3) each. A profile that leaves the orientation free takes no angular velocity, and no
     profile more than `task.orientation_gain_1_s` [rad/s].
     """
-    v, w = np.atleast_2d(np.asarray(linear, float)), np.atleast_2d(np.asarray(angular, float))
+    v, w = np.atleast_2d(real(linear)), np.atleast_2d(real(angular))
     return _made(DesiredKind.TWIST, stamp, np.hstack([v, np.broadcast_to(w, v.shape)]))
 
 
 def joint_velocities(stamp: ArrayLike, qd: ArrayLike) -> Desired:
     """Ask for joint velocities (n,) [rad/s], or (M, n) with M stamps."""
-    return _made(DesiredKind.JOINT_VELOCITIES, stamp, np.atleast_2d(np.asarray(qd, float)))
+    return _made(DesiredKind.JOINT_VELOCITIES, stamp, np.atleast_2d(real(qd)))
 
 
 def pose(stamp: ArrayLike, T_O_ee: ArrayLike) -> Desired:
     """Ask for a pose T_O_ee (4, 4) of the end-effector in the base frame, or (M, 4, 4) with M stamps."""
-    T = np.asarray(T_O_ee, float).reshape(-1, 4, 4)
+    T = real(T_O_ee).reshape(-1, 4, 4)
     return _made(DesiredKind.POSE, stamp, np.hstack([T[:, :3, 3], T[:, :3, :3].reshape(-1, 9)]))
 
 
 def joint_positions(stamp: ArrayLike, q: ArrayLike) -> Desired:
     """Ask for joint positions (n,) [rad], or (M, n) with M stamps."""
-    return _made(DesiredKind.JOINT_POSITIONS, stamp, np.atleast_2d(np.asarray(q, float)))
+    return _made(DesiredKind.JOINT_POSITIONS, stamp, np.atleast_2d(real(q)))
 
 
 def refused(stamp: float, reason: str) -> Desired:
@@ -83,7 +85,7 @@ def refused(stamp: float, reason: str) -> Desired:
 
 
 def _made(kind: DesiredKind, stamp: ArrayLike, number: FloatArray) -> Desired:
-    stamps = np.atleast_1d(np.asarray(stamp, float))
+    stamps = np.atleast_1d(real(stamp))
     if stamps.shape != number.shape[:1]:
         raise ParameterError(f"A desired motion has {stamps.size} stamps and {len(number)} rows: give one stamp a row.")
     return Desired(kind, stamps, number)
@@ -95,7 +97,7 @@ def sound_desired(desired: Desired | None, joints: int, now: float) -> tuple[Des
         return None, ""
     try:
         kind = DesiredKind(desired.kind)
-        stamp, number = np.array(desired.stamp, dtype=np.float64), np.array(desired.number, dtype=np.float64)
+        stamp, number = real(desired.stamp), real(desired.number)
         if desired.refused:
             return None, str(desired.refused)
     except (AttributeError, TypeError, ValueError, OverflowError):
@@ -106,7 +108,10 @@ def sound_desired(desired: Desired | None, joints: int, now: float) -> tuple[Des
     wrong = ~(np.abs(number) < _LARGEST)
     if wrong.any():
         return None, f"it asks for {number[wrong][0]:g}"
-    if not (np.abs(stamp) < np.inf).all() or (np.diff(stamp) <= 0.0).any():
+    wrong = ~(np.abs(stamp) < _LATEST)
+    if wrong.any():
+        return None, f"its time stamp is {stamp[wrong][0]:g}"
+    if (np.diff(stamp) <= 0.0).any():
         return None, "its stamps do not increase"
     if stamp[0] > now + _AHEAD_S:
         return None, f"it is stamped {stamp[0] - now:.0f} s in the future"

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from pretouch.arrays import real, real_number
 from pretouch.compiled import compiled
 from pretouch.modes import Event
 from pretouch.params import FailureParams
@@ -86,7 +87,7 @@ def examine(
     """
     faults: dict[Event, str] = {}
     robot, wrong = sound_robot(inputs.robot, qd_max)
-    stamp = _time(inputs.stamp)
+    stamp = time_of(inputs.stamp)
     now = watch.stamp if stamp is None else stamp
     if robot is None:
         faults[Event.UNUSABLE] = wrong
@@ -139,10 +140,10 @@ def _moved_on(robot: RobotState, now: float, sent: tuple[tuple[float, FloatArray
     return q
 
 
-def _time(stamp: float) -> float | None:
+def time_of(stamp: float) -> float | None:
     """Return a time stamp, or None if it is none."""
     try:
-        time = float(stamp)
+        time = real_number(stamp)
     except (TypeError, ValueError, OverflowError):
         return None
     return time if abs(time) < _LATEST else None
@@ -155,8 +156,8 @@ def sound_robot(robot: RobotState, qd_max: FloatArray) -> tuple[RobotState | Non
     """
     n = len(qd_max)
     try:
-        stamp, given = _time(robot.stamp), (robot.q, robot.qd, robot.q_commanded, robot.qd_commanded)
-        tau_ext, wrench = robot.tau_ext, None if robot.wrench is None else np.array(robot.wrench, dtype=np.float64)
+        stamp, given = time_of(robot.stamp), (robot.q, robot.qd, robot.q_commanded, robot.qd_commanded)
+        tau_ext, wrench = robot.tau_ext, None if robot.wrench is None else real(robot.wrench)
     except AttributeError:
         return None, f"it is {robot!r}"
     except (TypeError, ValueError, OverflowError):
@@ -180,7 +181,7 @@ def sound_robot(robot: RobotState, qd_max: FloatArray) -> tuple[RobotState | Non
 def _numbers(given: tuple[object, ...], joints: int) -> FloatArray | None:
     """Copy what is a number a joint to one array (5, n) of float64; None if a part is something else."""
     try:
-        numbers = np.array(given, dtype=np.float64)
+        numbers = real(given)
     except (TypeError, ValueError, OverflowError):
         return None
     return numbers if numbers.shape == (len(given), joints) else None
@@ -207,7 +208,9 @@ def _misfit(given: tuple[FloatArray, ...], joints: int) -> str:
     """Name the first part of a robot's state that is no array of a number a joint, or ''."""
     for name, part in zip(_PARTS, given, strict=True):
         try:
-            shape = np.array(part, dtype=np.float64).shape
+            shape = np.shape(part)
+            if shape == (joints,):
+                real(part)
         except (TypeError, ValueError, OverflowError):
             return f"{name} are not arrays of numbers"
         if shape != (joints,):
@@ -218,8 +221,8 @@ def _misfit(given: tuple[FloatArray, ...], joints: int) -> str:
 def sound_readings(readings: RangeReadings, units: int) -> tuple[RangeReadings, str]:
     """Copy readings as arrays of float64 and int64; of those that do not fit so many units, take none and say why."""
     try:
-        stamp = np.array(readings.stamp, dtype=np.float64)
-        distance = np.array(readings.distance, dtype=np.float64)
+        stamp = real(readings.stamp)
+        distance = real(readings.distance)
         status = np.array(readings.status)
     except AttributeError:
         return _nothing(units), f"they are {readings!r}"
@@ -243,8 +246,8 @@ def sound_imu(imu: ImuReadings | None, units: int) -> ImuReadings | None:
     if imu is None:
         return None
     try:
-        unit, stamp = np.array(imu.unit), np.array(imu.stamp, dtype=np.float64)
-        motion = np.array((imu.acceleration, imu.angular_velocity), dtype=np.float64)
+        unit, stamp = np.array(imu.unit), real(imu.stamp)
+        motion = real((imu.acceleration, imu.angular_velocity))
     except (AttributeError, TypeError, ValueError, OverflowError):
         return None
     count = len(stamp) if stamp.ndim == 1 else -1
@@ -270,7 +273,7 @@ def sound_touch(touch: TouchReadings | None, units: int) -> tuple[TouchReadings 
     if touch is None:
         return None, ""
     try:
-        stamp, force = np.array(touch.stamp, dtype=np.float64), np.array(touch.force, dtype=np.float64)
+        stamp, force = real(touch.stamp), real(touch.force)
         contact, status = np.array(touch.contact), np.array(touch.status)
     except AttributeError:
         return None, f"touch readings are {touch!r}"
@@ -295,9 +298,9 @@ def sound_points(points: SeenPoints | None) -> tuple[SeenPoints | None, str]:
     if points is None:
         return None, ""
     try:
-        heard = float(points.heard)
+        heard = real_number(points.heard)
         given = points.stamp, points.point, points.sigma
-        stamp, point, sigma = (np.ascontiguousarray(part, dtype=np.float64) for part in given)
+        stamp, point, sigma = (np.ascontiguousarray(real(part, copy=False)) for part in given)
     except AttributeError:
         return None, f"gives {points!r}"
     except (TypeError, ValueError, OverflowError):

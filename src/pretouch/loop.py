@@ -9,11 +9,13 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from pretouch.arrays import real
 from pretouch.contact.residual_model import ResidualModel
 from pretouch.control.joint_box import JointLimits, box_and_brake
 from pretouch.controller import Controller, ControllerState
 from pretouch.desired import Desired
 from pretouch.errors import ParameterError
+from pretouch.faults import time_of
 from pretouch.moving_fixtures import MovingFixtures
 from pretouch.payload import Payload
 from pretouch.ports import Clock, Points, Robot, Skin, imu_of, touch_of
@@ -256,11 +258,10 @@ def explained(controller: Controller, state: ControllerState, robot: RobotState,
     """
     limits, command, last = controller.limits, state.command, state.watch.robot
     try:
-        q, reported = np.asarray(robot.q, dtype=np.float64), np.asarray(robot.qd_commanded, dtype=np.float64)
-        stamp = float(robot.stamp)
+        q, reported, stamp = real(robot.q, copy=False), real(robot.qd_commanded, copy=False), time_of(robot.stamp)
     except (AttributeError, TypeError, ValueError, OverflowError):
         return robot
-    if q.shape != command.shape or reported.shape != command.shape:
+    if stamp is None or q.shape != command.shape or reported.shape != command.shape:
         return robot
     late = max(0.0, now - state.watch.stamp - limits.period)
     moved = np.abs(q - last.q)
@@ -292,7 +293,7 @@ def instant(
     latest = tick
     for stamp in (getattr(given, "stamp", tick) for given in (report, readings, touch)):
         with suppress(TypeError, ValueError):  # the controller names what is wrong
-            stamps = np.asarray(stamp, dtype=np.float64)
+            stamps = real(stamp, copy=False)
             latest = max(latest, float(stamps[(stamps > tick) & (stamps <= tick + period)].max(initial=tick)))
     return latest
 

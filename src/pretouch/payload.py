@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass
 
+from pretouch.arrays import real_number
 from pretouch.errors import ParameterError
 
 _MOST_KG, _FARTHEST_M, _LONGEST_S = 100.0, 2.0, 10.0
@@ -28,10 +29,10 @@ class Payload:
 
     def __post_init__(self) -> None:
         try:
-            x, y, z = map(float, self.com_m)
+            x, y, z = map(real_number, self.com_m)
             given = {
-                "mass_kg": (float(self.mass_kg), _MOST_KG), "com_m": (math.hypot(x, y, z), _FARTHEST_M),
-                "within_s": (float(self.within_s), _LONGEST_S),
+                "mass_kg": (real_number(self.mass_kg), _MOST_KG), "com_m": (math.hypot(x, y, z), _FARTHEST_M),
+                "within_s": (real_number(self.within_s), _LONGEST_S),
             }  # fmt: skip
         except (TypeError, ValueError) as error:
             raise ParameterError(f"{self!r} is no payload: give numbers, com_m three of them.") from error

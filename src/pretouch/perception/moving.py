@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pretouch.arrays import real, real_number
 from pretouch.compiled import compiled, entry
 from pretouch.groups import CapsuleArrays
 from pretouch.moving_fixtures import MovingFixtures
@@ -30,9 +31,9 @@ def sound_moving(
     if moving is None:
         return None, ""
     try:
-        stamp, radius = float(moving.stamp), np.array(moving.radius, dtype=np.float64)
+        stamp, radius = real_number(moving.stamp), real(moving.radius)
         given = moving.a, moving.b, moving.a_velocity, moving.b_velocity
-        a, b, a_velocity, b_velocity = (np.array(part, dtype=np.float64) for part in given)
+        a, b, a_velocity, b_velocity = map(real, given)
     except AttributeError:
         return None, f"are {moving!r}"
     except (TypeError, ValueError, OverflowError):

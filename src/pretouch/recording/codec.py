@@ -16,6 +16,7 @@ from typing import Any, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
+from pretouch.arrays import real, real_number
 from pretouch.desired import Desired, DesiredKind
 from pretouch.errors import RecordingError
 from pretouch.moving_fixtures import MovingFixtures
@@ -114,7 +115,7 @@ def _made(kind: type, message: Any) -> Any:
 
 def _number(given: Any) -> float:
     """Return a time stamp, if as a float it is the same to the controller."""
-    number = float(given)
+    number = real_number(given)
     if not isinstance(given, float) and not abs(number) < _SENSIBLE_S:
         raise UnreadableError("a time stamp is none")
     return number
@@ -125,7 +126,7 @@ def _numbers(given: Any) -> FloatArray:
     array = np.asarray(given)
     if array.ndim != 1 or array.dtype.kind not in "fiub":
         raise UnreadableError("what should be a row of numbers is none")
-    return np.ascontiguousarray(array, dtype=np.float64)
+    return np.ascontiguousarray(real(array, copy=False))
 
 
 def _wholes(given: Any) -> IntArray:
@@ -291,8 +292,8 @@ def decode_points(data: bytes) -> tuple[int, SeenPoints]:
 def encode_imu(sequence: int, time: float, imu: ImuReadings) -> bytes | None:
     """Return IMU samples as CDR; None for what are none to a step either (`faults.sound_imu`)."""
     try:
-        unit, stamp = np.array(imu.unit), np.array(imu.stamp, dtype=np.float64)
-        parts = [np.array(part, dtype=np.float64) for part in (imu.acceleration, imu.angular_velocity)]
+        unit, stamp = np.array(imu.unit), real(imu.stamp)
+        parts = [real(part) for part in (imu.acceleration, imu.angular_velocity)]
     except (AttributeError, TypeError, ValueError, OverflowError):
         return None
     if unit.dtype.kind not in "iu" or unit.ndim != 1 or unit.shape != stamp.shape:
