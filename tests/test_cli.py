@@ -24,7 +24,6 @@ def run(capsys, *args):
         (("live", "--path", "square"), "The path is 'square': choose circle or line"),
         (("replay", "/nowhere.mcap", "--no-page"), "/nowhere.mcap cannot be read: it does not exist"),
         (("replay", "/dev/null", "--no-page"), "/dev/null is no file"),
-        (("recover", "/nowhere.mcap"), "/nowhere.mcap cannot be read"),
         (("report", "/nowhere.mcap"), "/nowhere.mcap cannot be read"),
         (("detect", "/nowhere.csv"), "/nowhere.csv does not exist"),
     ],
@@ -65,7 +64,7 @@ def test_signals_that_end_a_process_end_it_in_order(monkeypatch, number):
     assert signal.getsignal(number) is before
 
 
-@pytest.mark.parametrize("args", [(), ("dance",), ("live", "--seed", "many"), ("recover", "--nothing"), ("skin",)])
+@pytest.mark.parametrize("args", [(), ("dance",), ("live", "--seed", "many"), ("report", "--nothing"), ("skin",)])
 def test_words_it_does_not_know_end_with_code_2(capsys, args):
     try:
         code = cli.main(list(args))

@@ -1,13 +1,12 @@
-"""`pretouch replay` and `pretouch recover`: what is said of a recording, exit codes, and what the page is given."""
+"""`pretouch replay`: what is said of a recording, exit codes, and what the page is given."""
 
 import re
 import sys
 from types import SimpleNamespace
 
 import pytest
-from rosbags.highlevel import AnyReader
 
-from pretouch.cli.replay import recover, replay
+from pretouch.cli.replay import replay
 from pretouch.errors import MissingExtraError, ParameterError, RecordingError
 from pretouch.loop import Cycle
 from pretouch.recording.writer import Recording
@@ -73,7 +72,7 @@ def test_of_a_killed_run_it_is_said_what_is_missing(capsys, cut):
     assert replay(cut, page=False) == 0
     said = capsys.readouterr().out.splitlines()
     assert "the end is missing" in said[0]
-    assert "pretouch recover" in said[0]
+    assert "every whole part" in said[0]
     assert said[1].startswith("pretouch test: profile paper")
 
 
@@ -147,13 +146,3 @@ def test_what_is_no_recording_is_one_sentence(capsys, tmp_path, name):
 def test_an_unknown_profile_is_said_before_the_file_is_read(tmp_path):
     with pytest.raises(ParameterError, match="'brave' is unknown"):
         replay(tmp_path / "gone.mcap", profile="brave")
-
-
-def test_a_recovered_recording_opens_in_foreign_readers(capsys, cut, tmp_path):
-    recover(cut, tmp_path / "mended.mcap")
-    said = capsys.readouterr().out
-    assert "mended.mcap" in said
-    assert said.count("\n") == 1
-    with AnyReader([tmp_path / "mended.mcap"]) as reader:
-        assert "/wrench" in reader.topics
-    assert replay(tmp_path / "mended.mcap", page=False) == 0

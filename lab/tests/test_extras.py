@@ -52,7 +52,6 @@ ASKED = [
     (("bench", "free-motion", "--seeds", "0"), None),
     (("bench", "cycle", "--rate", "0"), None),
     (("bench", "calibration", "--skins", "0"), None),
-    (("recover", "gone.mcap"), None),
     (("detect", "gone.csv"), None),
     (("detect", "a.bag"), BAGS),
     (("detect", "force.csv", "--out", "force.png"), FIGURES),

@@ -20,7 +20,6 @@ from tests.importing.made import six_axis, written
 
 WITHOUT = {
     "live": "serves a page",
-    "recover": "writes a recording, and says so",
     "report": "writes a page",
     "skin simulate": "sends what units send",
     "skin provision": "sets a unit up, and says so",

@@ -23,7 +23,6 @@ from pretouch.hardware.traffic import Received
 from pretouch.hardware.wire import Flag, Sample, TouchPart, imu_values
 from pretouch.recording.messages import encoded, make
 from pretouch.recording.reader import open_recording
-from pretouch.recording.recover import recover
 from pretouch.recording.skin_reader import read_skin
 from pretouch.recording.skin_recording import Diagnosis, Level, SkinRecording
 from pretouch.recording.standard import IMU, header, imu_item, vector
@@ -146,20 +145,13 @@ def test_other_commands_say_what_can_be_done_with_it(place, capsys, command):
     assert said.count("\n") == 1
 
 
-def test_a_file_that_is_cut_off_is_read_and_recovered(place, tmp_path):
+def test_a_file_that_is_cut_off_gives_its_whole_part(place, tmp_path):
     whole = place.read_bytes()
     cut = tmp_path / "cut.mcap"
     cut.write_bytes(whole[: whole.rindex(b"\x0f\x04\0\0\0\0\0\0\0")])  # before the end of the data
     trace = read_skin(cut)
     assert not trace.complete
     assert trace.samples == 200
-    recovered = recover(cut)
-    assert recovered.steps == 200
-    assert "200 samples of sensor units, over 1.98 s." in recovered.said
-    assert read_skin(recovered.place).complete
-    with AnyReader([recovered.place]) as reader:
-        assert sum(c.msgcount for c in reader.connections) == 200 + 146 + 1600 + 1
-    assert "nothing to recover" in recover(place).said
 
 
 @pytest.mark.parametrize(

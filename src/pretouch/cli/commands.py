@@ -77,22 +77,6 @@ class Replay:
 
 
 @dataclass(frozen=True)
-class Recover:
-    """Repair a recording that a killed process left behind, so that every program can open it."""
-
-    file: tyro.conf.Positional[str]
-    """Recording; it is not changed."""
-    out: str = ""
-    """File to write; by default NAME.recovered.mcap beside it."""
-
-    def run(self) -> None:
-        """Write the repaired file."""
-        from pretouch.cli.replay import recover
-
-        recover(Path(self.file), Path(self.out) if self.out else None)
-
-
-@dataclass(frozen=True)
 class Detect:
     """Detect contacts in a recording of your own arm: a ROS bag, an MCAP file, a CSV or a Parquet file."""
 

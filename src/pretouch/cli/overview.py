@@ -13,7 +13,6 @@ GROUPS = {
     "Recordings": {
         "replay": "view, recompute, or compare with another profile",
         "report": "contacts, forces and distances as one page",
-        "recover": "repair the file of a killed process",
         "detect": "try the contact thresholds on data of your own arm",
     },
     "Arm and skin": {

@@ -8,7 +8,7 @@ from pathlib import Path
 from pretouch.errors import PretouchError
 
 READERS = frozenset({"detect", "identify", "replay", "report", "robot"})
-"""Commands that read files from elsewhere. Not `recover`: it writes a file as large as what it repairs."""
+"""Commands that read files from elsewhere."""
 _SHARE = 0.5
 """Share of the memory that is free which such a command may take."""
 _FILE = 4 << 30

@@ -15,7 +15,6 @@ GROUP = "pretouch.commands"
 OWN = {
     "live": "pretouch.cli.commands:Live",
     "replay": "pretouch.cli.commands:Replay",
-    "recover": "pretouch.cli.commands:Recover",
     "detect": "pretouch.cli.commands:Detect",
     "report": "pretouch.cli.commands:Report",
     "skin": "pretouch.cli.skin_commands:Skin",

@@ -1,4 +1,4 @@
-"""What `pretouch replay` and `pretouch recover` do: a recording told, recomputed, compared, shown, mended."""
+"""What `pretouch replay` does: a recording told, recomputed, compared, shown."""
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -16,7 +16,6 @@ from pretouch.cli.writing import numbers_to
 from pretouch.extras import LIVE
 from pretouch.plain_text import plain_text
 from pretouch.profiles import profile as find_profile
-from pretouch.recording import recover as recovering
 from pretouch.recording.compare import Comparison, Decisions, Found, compare
 from pretouch.recording.reader import Recorded, open_recording
 from pretouch.recording.verify import Verdict
@@ -74,11 +73,6 @@ def replay(
 
             serve_replay(recorded, options, comparison, ended)
     return int(verdict is not None and not verdict.agrees)
-
-
-def recover(place: Path, out: Path | None = None) -> None:
-    """Make a recording that was cut off open everywhere, and say what became of it."""
-    print(recovering.recover(place, out).said)
 
 
 @dataclass(frozen=True)

@@ -91,7 +91,7 @@ def read_errors_said(place: Path) -> Iterator[None]:
         raise
     except Exception as error:
         what = " ".join(str(error).split())[:200] or type(error).__name__
-        mend = "; `pretouch recover` (or `mcap recover` for files of other programs) repairs a truncated one"
+        mend = "; `mcap recover` repairs a truncated one"
         raise RecordingError(
             f"{place} cannot be read as a bag or MCAP file ({what}): give a complete"
             f" file{mend if place.suffix == '.mcap' else ''}."

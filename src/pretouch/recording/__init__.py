@@ -1,1 +1,1 @@
-"""Runs kept as MCAP files, and what can be done with them: read, recover, recompute."""
+"""Runs kept as MCAP files, and what can be done with them: read, recompute, compare."""

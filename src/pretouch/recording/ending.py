@@ -87,15 +87,6 @@ def entry_of(chunk: Chunk, start: int, places: Places) -> Entry:
     return Entry(bytes(index), written(record), {c: len(rows) for c, rows in places.items()}, min(times), max(times))
 
 
-def in_chunk(chunk: Chunk) -> Chunk:
-    """Return a chunk as it is, and a message outside one in a chunk of its own."""
-    if chunk.record[0] == Opcode.CHUNK:
-        return chunk
-    times, content = [message.log_time for message in messages(chunk)], chunk.content
-    record = written(records.Chunk("", content, max(times), min(times), zlib.crc32(content), len(content)))
-    return Chunk(chunk.start, record, "", len(content), content, chunk.end)
-
-
 def header(profile: str, library: str) -> bytes:
     """Return the begin of a file."""
     return MAGIC + written(records.Header(profile, library))

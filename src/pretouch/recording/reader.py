@@ -264,4 +264,4 @@ def _missing(place: Path, contents: Contents) -> str:
         said.append("the end is missing, as after a run that was killed")
     if not said:
         return ""
-    return f"{place}: {' and '.join(said)}; `pretouch recover {place}` writes a complete file."
+    return f"{place}: {' and '.join(said)}; every whole part of it is read."
