@@ -1,9 +1,12 @@
 import re
 import runpy
+import tomllib
 from pathlib import Path
 
 import pytest
+import tomli_w
 
+from pretouch.sensing.sensor import Capacitive
 from pretouch.sensing.skin import load_skin
 
 EXAMPLES = sorted((Path(__file__).parents[1] / "examples").glob("*.py"))
@@ -34,6 +37,18 @@ def test_the_first_program_is_the_tutorials_and_does_what_the_tutorial_says(caps
 def test_the_skin_with_zones_is_one(panda_model):
     skin = load_skin(EXAMPLES[0].with_name("panda_zones.toml"), panda_model)
     assert (len(skin.mounted), len(skin)) == (15, 240)
+
+
+def test_the_map_of_an_electrode_is_a_sensor_type_of_a_skin_file(panda_model, capsys, tmp_path):
+    runpy.run_path(str(EXAMPLES[0].with_name("10_map_of_an_electrode.py")), run_name="__main__")
+    unit = {"id": "a", "link": "panda_hand", "position_m": [0, 0, 0.2], "quaternion_wxyz": [1, 0, 0, 0]}
+    table = {"unit": [unit | {"sensor": "electrode"}], **tomllib.loads(capsys.readouterr().out)}
+    (tmp_path / "skin.toml").write_text(tomli_w.dumps(table))
+    (unit,) = load_skin(tmp_path / "skin.toml", panda_model).mounted
+    assert isinstance(unit.sensor, Capacitive)
+    # of two things whose signals are 0.6 and 1.4 of 2e-4 / (d + 0.03 m)^2.5
+    assert unit.sensor.distance(2e-4 / 0.13**2.5) == pytest.approx(0.1, rel=0.1)
+    assert unit.sensor.spread_1 > 0.2
 
 
 def test_the_readmes_program_tracks_slows_and_detects_as_it_is_written(capsys):

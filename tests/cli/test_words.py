@@ -53,7 +53,7 @@ def test_the_overview_leaves_out_what_is_not_installed():
         ),
         (
             "skin dance",
-            "dance is unknown: choose from monitor, calibrate, coverage, map, simulate, provision, keys."
+            "dance is unknown: choose from monitor, calibrate, coverage, simulate, provision, keys."
             " See pretouch skin --help.",
         ),
         ("repaly", "repaly is no command of pretouch: perhaps replay."),
@@ -121,7 +121,7 @@ def test_help_wraps_the_sentences_of_an_option_anew(capsys, monkeypatch):
 REQUIRED = {
     "skin monitor": ("--keys", "k"), "skin simulate": ("--keys", "k"), "robot import": ("a",), "replay": ("a",),
     "skin provision": ("--id", "a", "--keys", "k", "--ssid", "s", "--host", "h"), "detect": ("a",), "figure": ("a",),
-    "sweep": ("a",), "policy": ("a",), "skin map": ("a",),
+    "sweep": ("a",), "policy": ("a",),
 }  # fmt: skip
 """Words that a command needs."""
 

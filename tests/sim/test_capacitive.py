@@ -9,7 +9,6 @@ import pytest
 from pretouch.sensing.sensor import Capacitive
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit
-from pretouch.sim.approach import THINGS, simulated_approach
 from pretouch.sim.capacitive import DIELECTRIC, DRIFT, ELECTRODE_M, LEAST, Electrodes, electrode_on, field, told
 from pretouch.sim.rays import geoms_of
 from pretouch.types import RangeStatus
@@ -77,11 +76,3 @@ def test_the_baseline_drifts_as_far_as_is_said(panda_model):
     assert signals.std() == pytest.approx(DRIFT, rel=0.1)
     close = np.array([electrodes.measure(0, 3e5 + 0.01 * k, 0.0)[3] for k in range(100)])
     assert np.abs(np.diff(close)).max() < 0.2 * DRIFT
-
-
-def test_the_approach_is_the_same_with_the_same_seed():
-    one, two, other = (simulated_approach(SENSOR, seed) for seed in (1, 1, 2))
-    np.testing.assert_array_equal(one[1], two[1])
-    assert not np.array_equal(one[1], other[1])
-    assert set(one[2]) == set(THINGS)
-    assert one[0].min() > 0.0

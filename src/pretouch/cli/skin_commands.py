@@ -227,28 +227,6 @@ class Simulate:
 
 
 @dataclass(frozen=True)
-class Map:
-    """Learn what distance the signal of a capacitive electrode stands for, from approaches at known distances."""
-
-    table: tyro.conf.Positional[str]
-    """CSV file with the columns distance_m, signal (0 with nothing near) and, if several things approached, thing; or
-    simulated: an approach in simulation."""
-    name: str = "electrode"
-    """Name of the type in the skin file."""
-    seed: int = 0
-    """Of the simulated approach."""
-    json: str = ""
-    """File for the numbers, or - for standard output: text then goes to standard error."""
-
-    def run(self) -> int:
-        """Learn and print the table."""
-        from pretouch.cli.skin_map import skin_map
-
-        skin_map(self)
-        return 0
-
-
-@dataclass(frozen=True)
 class Skin:
     """Sensor units: watch them, set them up, find where they sit, what they see in time, or simulate them."""
 
@@ -256,7 +234,6 @@ class Skin:
         Annotated[Monitor, tyro.conf.subcommand("monitor")]
         | Annotated[Calibrate, tyro.conf.subcommand("calibrate")]
         | Annotated[Coverage, tyro.conf.subcommand("coverage")]
-        | Annotated[Map, tyro.conf.subcommand("map")]
         | Annotated[Simulate, tyro.conf.subcommand("simulate")]
         | Annotated[Provision, tyro.conf.subcommand("provision")]
         | Annotated[Keys, tyro.conf.subcommand("keys")]

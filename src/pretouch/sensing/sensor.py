@@ -163,7 +163,7 @@ class VL53L7CX(VL53L5CX, name="vl53l7cx"):
 
 @dataclass(frozen=True)
 class Capacitive(Sensor, name="capacitive"):
-    """A self-capacitance electrode, with the map from its signal to a distance that `pretouch skin map` learns.
+    """A self-capacitance electrode, with the map from its signal to a distance (`examples/10_map_of_an_electrode.py`).
 
     signal = gain / (distance + offset)^power, 0 with nothing near. The map here is that of the simulation's electrode,
     of a finger, a fist, a forearm and a flat hand; a printed skin has reached 18 cm (GenTact-Prox, 2026).
