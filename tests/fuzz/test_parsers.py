@@ -1,4 +1,4 @@
-"""No file or message from elsewhere is worse than a sentence, soon: what is whole is changed at random."""
+"""No damaged file and no message is worse than a sentence, soon: what is whole is changed at random."""
 
 import signal
 import time
@@ -18,7 +18,7 @@ SOON_S = 10.0
 MEMORY = 400_000_000
 """Largest memory that Python and NumPy may take for it [B]."""
 NAMES = (
-    "recording", "recording of units", "CSV of forces", "CSV of torques", "ROS bag", "URDF", "MJCF", "skin", "keys",
+    "recording", "recording of units", "CSV of forces", "CSV of torques", "ROS bag", "URDF", "skin", "keys",
     "world", "sweeps", "learnt", "description", "profile", "page", "worker", "wire", "FCI",
 )  # fmt: skip
 

@@ -13,9 +13,6 @@ from pretouch.importing.meshes import read_mesh
 from pretouch.importing.read import read_source
 from pretouch.importing.solids import surface_of
 
-BOMB = '<?xml version="1.0"?><!DOCTYPE r [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;">]><robot name="&b;"/>'
-FILE_ENTITY = '<!DOCTYPE r [<!ENTITY x SYSTEM "file:///etc/hostname">]><robot name="r"><link name="&x;"/></robot>'
-
 
 def arm(folder, text, ee=""):
     return arm_of(read_source(written(folder, text)), ee)
@@ -27,8 +24,6 @@ def arm(folder, text, ee=""):
         ("", "is not valid XML"),
         ("<robot", "is not valid XML"),
         ("<sdf/>", "starts with <sdf>: give a URDF"),
-        (BOMB, "has a document type"),
-        (FILE_ENTITY, "has a document type"),
         ('<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:macro name="x"/></robot>', "xacro template"),
         ("<robot name='r'/>", "has no links"),
         (
@@ -284,51 +279,18 @@ def test_a_binary_stl_is_read(tmp_path):
     assert (len(surface.vertices), len(surface.faces)) == (4, 2)
 
 
-ARM = '<body name="arm"><joint range="-1 1" limited="true"/><geom size=".1"/></body>'
-REPLICAS = '<replicate count="300" offset="1 0 0">'
-
-
-def mjcf(inner: str = "", beside: str = "") -> str:
-    return f"<mujoco>{beside}<worldbody>{ARM}{inner}</worldbody></mujoco>"
-
-
 @pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        (mjcf(3 * REPLICAS + '<geom size=".1"/>' + 3 * "</replicate>"), "takes more than 1 s"),
-        (mjcf('<replicate count="5000" offset="1 0 0"><geom size=".1"/></replicate>'), "ngeom is 5001, more than 5000"),
-        (mjcf(beside='<asset><texture name="m" type="2d" builtin="flat" width="90000" height="90000"/></asset>'),
-         "allocate memory|most likely because it may take 4 GiB"),
-    ],
-)  # fmt: skip
-def test_an_mjcf_that_takes_too_much_is_refused_by_its_bound(tmp_path, monkeypatch, text, message):
-    monkeypatch.setattr("pretouch.importing.mjcf._PATIENCE_S", 1.0 if "1 s" in message else 30.0)
+    "text", ["<mujoco><worldbody>", "<mujoco><worldbody><body><geom/></body></worldbody></mujoco>"]
+)
+def test_a_broken_mjcf_is_refused_in_one_sentence(tmp_path, text):
     (tmp_path / "a.xml").write_text(text)
-    with pytest.raises(RobotModelError, match=message) as told:
+    with pytest.raises(RobotModelError, match=r"a\.xml is not valid XML|a\.xml cannot be read: .*geom") as caught:
         read_source(tmp_path / "a.xml")
-    assert "\n" not in str(told.value)
+    assert "\n" not in str(caught.value)
 
 
-def test_an_mjcf_includes_what_is_in_its_folder_and_nothing_else(tmp_path):
-    folder = tmp_path / "robot"
-    folder.mkdir()
-    (tmp_path / "out.xml").write_text(mjcf())
-    (folder / "in.xml").write_text(mjcf())
-    file = folder / "a.xml"
-    file.write_text('<mujoco><include file="in.xml"/></mujoco>')
-    assert [link.name for link in read_source(file).links] == ["world", "arm"]
-    (folder / "link.xml").symlink_to(tmp_path / "out.xml")
-    for given in (tmp_path / "out.xml", "../out.xml", "link.xml"):
-        (folder / "in.xml").write_text(f'<mujoco><include file="{given}"/></mujoco>')
-        with pytest.raises(RobotModelError, match=r"outside its folder: put a copy beside it"):
-            read_source(file)
-
-
-def test_many_links_and_elements_are_refused_before_anything_is_made_of_them(tmp_path):
-    links = "".join(f'<link name="l{i}"/>' for i in range(1001))
-    (tmp_path / "a.urdf").write_text(f"<robot>{links}</robot>")
-    with pytest.raises(RobotModelError, match="has 1001 links: give at most 1000"):
-        read_source(tmp_path / "a.urdf")
-    (tmp_path / "a.urdf").write_text(f"<robot>{100_000 * '<a/>'}</robot>")
-    with pytest.raises(RobotModelError, match=r"more than 100000 elements: .*a\.urdf"):
-        read_source(tmp_path / "a.urdf")
+def test_an_mjcf_may_include_files(tmp_path):
+    body = '<body name="arm"><joint range="-1 1" limited="true"/><geom size=".1"/></body>'
+    (tmp_path / "in.xml").write_text(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
+    (tmp_path / "a.xml").write_text('<mujoco><include file="in.xml"/></mujoco>')
+    assert [link.name for link in read_source(tmp_path / "a.xml").links] == ["world", "arm"]

@@ -275,19 +275,6 @@ def test_a_message_that_is_too_short_to_be_one_is_left_out_by_every_reader(tiny,
     assert "1 damaged part left out" in open_recording(place).said
 
 
-def test_a_recording_larger_than_memory_is_one_sentence(tiny, monkeypatch):
-    monkeypatch.setattr("pretouch.recording.container._MOST_HELD", 10_000)
-    with pytest.raises(RecordingError, match=r"more than 1e-05 GB, half of this machine's memory: cut it"):
-        open_recording(tiny[0])
-
-
-def test_a_recorded_arm_with_what_no_arm_needs_is_not_compiled(tiny, tmp_path):
-    bomb = '<mujoco><worldbody><replicate count="9999"><geom size="1"/></replicate></worldbody></mujoco>'
-    opened = open_recording(run_with(tiny, tmp_path / "a.mcap", mjcf=bomb))
-    with pytest.raises(RecordingError, match=r"made again: The MJCF has an element <replicate>: leave it out"):
-        _ = opened.runs[0].model
-
-
 def test_scanning_goes_on_behind_a_record_of_a_kind_that_is_not_known(tiny):
     data, (first, *_rest) = tiny[0].read_bytes(), chunks_of(tiny[0])
     private = struct.pack("<BQ", 0x7F, 3) + b"abc"

@@ -10,7 +10,7 @@ from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
 from pretouch.errors import RobotModelError
-from pretouch.robot.description import fr3, panda
+from pretouch.robot.description import RobotDescription, fr3, panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import PAPER_SKIN, load_skin
 
@@ -284,3 +284,22 @@ def test_an_unknown_end_effector_is_refused():
 @pytest.mark.parametrize("arm", [panda, fr3])
 def test_joints_have_the_names_of_the_vendors_description(arm):
     assert RobotModel(arm()).joints == tuple(f"{arm.__name__}_joint{j}" for j in range(1, 8))
+
+
+@pytest.mark.parametrize(
+    ("geoms", "message"),
+    [(201 * '<geom type="capsule" size=".1 .1"/>', "move 201 capsules of"),
+     ('<geom type="capsule" size="900 900"/>', r"1 capsules of 2\.04e\+07 m\^2")],
+)  # fmt: skip
+def test_a_body_far_larger_than_an_arm_is_refused(tmp_path, geoms, message):
+    body = f'<body name="tip"><joint range="-1 1" limited="true"/>{geoms}</body>'
+    (tmp_path / "arm.xml").write_text(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
+    with pytest.raises(RobotModelError, match=message):
+        RobotModel(RobotDescription("a", tmp_path / "arm.xml", "tip", *np.ones((4, 1)), "test"))
+
+
+def test_what_mujoco_says_of_a_broken_file_is_one_sentence(tmp_path):
+    (tmp_path / "arm.xml").write_text("<mujoco>\n<worldbody>\n<body><geom/></body></worldbody></mujoco>")
+    with pytest.raises(RobotModelError, match=r"cannot be read: .*geom") as caught:
+        RobotModel(RobotDescription("a", tmp_path / "arm.xml", "tip", *np.ones((4, 1)), "test"))
+    assert "\n" not in str(caught.value)

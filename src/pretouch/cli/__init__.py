@@ -13,11 +13,9 @@ import tyro
 from rich.console import Console
 
 from pretouch.cli.overview import SHELLS, overview
-from pretouch.cli.reading_bounds import bounded
 from pretouch.cli.registry import Command, check_moved, command_class, command_names
 from pretouch.cli.usage_error import tidied, usage_error
 from pretouch.errors import PluginError, PretouchError, UsageError
-from pretouch.plain_text import plain_text
 from pretouch.signals import Terminated, ends_raise, exit_code
 
 # the rest of the package takes a second to import: only the commands that run something do
@@ -34,12 +32,11 @@ def main(args: list[str] | None = None) -> int:
         with ends_raise():
             try:
                 command = _read(words, errors)
-                with bounded(words[0]):
-                    code = command.run()
+                code = command.run()
             finally:
                 sys.stdout.flush()  # help ends in SystemExit: a closed pipe is noticed here, not when Python ends
     except PretouchError as error:
-        errors.print(plain_text(str(error)), markup=False)
+        errors.print(str(error), markup=False)
         return _USAGE
     except BrokenPipeError:  # the reader of a pipe has seen enough, as `head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

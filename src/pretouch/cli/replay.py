@@ -14,7 +14,6 @@ from pretouch.cli.tables import Grid
 from pretouch.cli.warm_up import prepare
 from pretouch.cli.writing import numbers_to
 from pretouch.extras import LIVE
-from pretouch.plain_text import plain_text
 from pretouch.profiles import profile as find_profile
 from pretouch.recording.compare import Comparison, Decisions, Found, compare
 from pretouch.recording.reader import Recorded, open_recording
@@ -110,7 +109,7 @@ def told(recorded: Recorded) -> str:
     stamps, run = recorded.stamps(), recorded.runs[0]
     profiles = ", then ".join(run.profile.name for run in recorded.runs)
     command = run.about.get("command")
-    what = f"{plain_text(command)}: " if isinstance(command, str) else ""
+    what = f"{command}: " if isinstance(command, str) else ""
     return (
         f"{what}profile {profiles} on {run.model.description.name} with {_many(len(run.skin.mounted), 'unit')},"
         f" {stamps[-1] - stamps[0]:.1f} s, {_many(len(recorded), 'step')}."

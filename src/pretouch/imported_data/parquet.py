@@ -11,8 +11,6 @@ from pyarrow import parquet
 from pretouch.errors import RecordingError
 from pretouch.types import FloatArray
 
-_MOST_CELLS = 100_000_000
-"""Of a table: a day of 7 joints at 100 Hz has a tenth of them."""
 _LONGEST_LIST = 64
 """Places of a list that are columns: more joints nobody has."""
 
@@ -20,11 +18,6 @@ _LONGEST_LIST = 64
 def read_parquet(place: Path) -> tuple[list[str], Callable[[list[int]], FloatArray]]:
     """Return the columns' names, and what gives some of them (N, m), NaN where a cell is empty."""
     try:
-        about = parquet.ParquetFile(place).metadata
-        if about.num_rows * about.num_columns > _MOST_CELLS:
-            raise RecordingError(
-                f"{place} has {about.num_rows} rows of {about.num_columns} columns: cut it into parts."
-            )
         table = parquet.read_table(place)
     except (OSError, pa.ArrowException) as error:
         said = " ".join(str(error).split())[:200]

@@ -16,8 +16,6 @@ from pretouch.extras import MESHES
 
 _SCHEMES = ("package://", "model://")
 SUFFIXES = (".stl", ".obj", ".dae")
-_LARGEST_FILE = 200_000_000
-"""[bytes]"""
 _MOST_TRIANGLES = 1_000_000
 
 
@@ -78,15 +76,9 @@ def read_mesh(path: Path) -> trimesh.Trimesh:
     if suffix == ".dae":
         MESHES.need(f"The mesh {path}, a COLLADA file,")
     try:
-        if not path.is_file() or path.stat().st_size > _LARGEST_FILE:
-            raise RobotModelError(
-                f"The mesh {path} is not a file of at most {_LARGEST_FILE // 10**6} MB: make it coarser."
-            )
         data = path.read_bytes()
     except OSError as error:
         raise RobotModelError(f"The mesh {path} cannot be read: {error.strerror}.") from error
-    if data.startswith(b"PK"):  # a COLLADA reader would unpack it, whatever is in it
-        raise RobotModelError(f"The mesh {path} is a ZIP archive: unpack it first.")
     try:
         mesh = _obj(data) if suffix == ".obj" else _by_trimesh(data, suffix[1:])
     except Exception as error:  # whatever a library makes of a broken file

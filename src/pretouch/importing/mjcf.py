@@ -1,32 +1,25 @@
 """Reading of MJCF files, by MuJoCo itself."""
 
-import sys
 from pathlib import Path
-from subprocess import TimeoutExpired, run
-from tempfile import TemporaryDirectory
 
 import mujoco
 import numpy as np
 from trimesh import Trimesh
 
 from pretouch.errors import RobotModelError
-from pretouch.importing import compile_apart
 from pretouch.importing.solids import Block, Cylinder, Ellipsoid, Rounded, Shape
 from pretouch.importing.source import WORLD, Inertial, Source, SourceJoint, SourceLink
 from pretouch.types import FloatArray
 
 _KINDS = {int(mujoco.mjtJoint.mjJNT_HINGE): "hinge", int(mujoco.mjtJoint.mjJNT_SLIDE): "slide"}
-_PATIENCE_S = 30.0
-"""Time [s] in which a file is compiled: robots with their meshes take under 5."""
-_MEMORY = 4 << 30
-"""Memory [bytes] that it may take."""
-_MOST = 5000
-"""Bodies, joints, shapes, actuators, equalities, meshes, of each kind."""
 
 
 def read_mjcf(file: Path) -> Source:
     """Read a robot from an MJCF file. What is wrong with it is a RobotModelError."""
-    model = _compiled(file)
+    try:
+        model = mujoco.MjModel.from_xml_path(str(file))
+    except ValueError as error:
+        raise RobotModelError(f"The MJCF file {file} cannot be read: {' '.join(str(error).split())}.") from error
     links = tuple(_link(model, body) for body in range(model.nbody))
     remarks = []
     if model.neq:
@@ -42,24 +35,6 @@ def read_mjcf(file: Path) -> Source:
         remarks.append(f"{len(ignored)} shapes that are planes, height fields or the like are left out.")
     names = model.names.split(b"\0")[0].decode("utf-8", "replace")
     return Source(names or file.stem, links, tuple(remarks))
-
-
-def _compiled(file: Path) -> mujoco.MjModel:
-    """Compile a file that somebody else may have written, in a process of its own that the system bounds."""
-    with TemporaryDirectory(prefix="pretouch-") as folder:
-        place = Path(folder) / "arm.mjb"
-        command = [sys.executable, "-P", compile_apart.__file__, file.resolve(), place, _MEMORY, _MOST]
-        try:
-            words = [str(word) for word in command]
-            done = run(words, cwd=folder, capture_output=True, timeout=_PATIENCE_S)  # noqa: S603  our own program
-            reason = "" if done.returncode == 0 else done.stderr.decode(errors="replace").strip().rpartition("\n")[2]
-            if done.returncode < 0:
-                reason = f"MuJoCo broke off, most likely because it may take {_MEMORY >> 30} GiB at most"
-        except TimeoutExpired:
-            reason = f"it takes more than {_PATIENCE_S:g} s"
-        if not reason:
-            return mujoco.MjModel.from_binary_path(str(place))
-    raise RobotModelError(f"The MJCF file {file} cannot be read: {reason}.")
 
 
 def _link(model: mujoco.MjModel, body: int) -> SourceLink:

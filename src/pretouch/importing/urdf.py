@@ -74,10 +74,6 @@ _KINDS = {"revolute": "hinge", "continuous": "hinge", "prismatic": "slide", "fix
 _OTHERS = ("planar", "floating")
 
 
-_MOST_SHAPES = 100
-"""Of a link: what its triangles have in common takes time that grows faster than they do."""
-
-
 def read_urdf(root: Element, file: Path, folders: tuple[Path, ...]) -> Source:
     """Read a robot from the root element of a URDF file. What is wrong is a RobotModelError.
 
@@ -213,8 +209,6 @@ def _shapes(link: Element, what: str, finder: MeshFinder) -> tuple[Shape, ...]:
         solid = None if geometry is None else next(iter(geometry), None)
         if solid is not None:
             shapes.append(_shape(solid, required(link, "name"), origin_of(element), finder))
-    if len(shapes) > _MOST_SHAPES:
-        raise RobotModelError(f"{required(link, 'name')} has {len(shapes)} shapes: give at most {_MOST_SHAPES} a link.")
     return tuple(shapes)
 
 

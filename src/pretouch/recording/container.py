@@ -10,11 +10,9 @@ import struct
 import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 from mcap.opcode import Opcode
-
-from pretouch.errors import RecordingError
 
 MAGIC = b"\x89MCAP0\r\n"
 
@@ -26,13 +24,7 @@ _COMPRESSION = re.compile(rb"\x04\0\0\0zstd|\x03\0\0\0lz4", re.DOTALL)
 _BLOCK, _OVERLAP = 1 << 20, 128
 _LARGEST = 1 << 26
 """A chunk, message, schema or channel of more bytes is damage: ours have 0.3 MB, those of other tools some 10 MB."""
-_MOST_DEFINED = 1 << 26
-"""Bytes of schemas and channels that are kept: ours have 40 kB."""
 _NEEDED = {Opcode.HEADER, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE, Opcode.CHUNK}
-_MOST_HELD = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 2
-"""Bytes of messages that are read from one file: half of this machine's memory."""
-_EACH = 500
-"""Bytes that a message takes beside its own."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,19 +70,11 @@ class Contents:
     """Whether the file has its end: index, footer and magic."""
     damaged: int = 0
     """Records that were left out because what they hold is damaged."""
-    _defined: int = 0
 
     def definitions(self) -> Iterator[bytes]:
         """Yield the record of each schema, then of each channel."""
         yield from (record for _, record in self.schemas.values())
         yield from (record for _, _, record in self.channels.values())
-
-    def define(self, known: dict[int, Any], number: int, entry: tuple[Any, ...]) -> None:
-        """Keep a schema or channel in the place of one with its number; ValueError for more than anybody needs."""
-        self._defined += len(entry[-1]) - len(known.get(number, (b"",))[-1])
-        if self._defined > _MOST_DEFINED:
-            raise ValueError("it defines too much")
-        known[number] = entry
 
     def of(self, channel: int) -> tuple[str, str, bytes]:
         """Return topic, type and schema record of a channel, empty where it is not known."""
@@ -229,21 +213,11 @@ def messages(chunk: Chunk) -> Iterator[Message]:
 def messages_of(
     file: BinaryIO, contents: Contents, wanted: Callable[[str, str], bool]
 ) -> Iterator[tuple[str, str, bytes, bytes]]:
-    """Go on from behind a file's first magic, and yield topic, type, schema record and CDR of the messages wanted.
-
-    RecordingError where they would take more than half of this machine's memory.
-    """
-    held = 0
+    """Go on from behind a file's first magic, and yield topic, type, schema record and CDR of the messages wanted."""
     for chunk in scan(file, contents):
         for message in messages(chunk):
             topic, kind, schema = contents.of(message.channel)
             if wanted(topic, kind):
-                held += _EACH + len(message.data)
-                if held > _MOST_HELD:
-                    raise RecordingError(
-                        f"The recording holds more than {_MOST_HELD / 1e9:.3g} GB, half of this machine's memory: cut"
-                        " it by `mcap filter`, or open it on a larger machine."
-                    )
                 yield topic, kind, schema, message.data
 
 
@@ -256,10 +230,10 @@ def _note(opcode: int, record: bytes, contents: Contents) -> None:
             contents.library, _ = _text(record, at)
         elif opcode == Opcode.SCHEMA:
             (number,) = struct.unpack_from("<H", record, at)
-            contents.define(contents.schemas, number, (_text(record, at + 2)[0], record))
+            contents.schemas[number] = _text(record, at + 2)[0], record
         elif opcode == Opcode.CHANNEL:
             number, schema = struct.unpack_from("<HH", record, at)
-            contents.define(contents.channels, number, (_text(record, at + 4)[0], schema, record))
+            contents.channels[number] = _text(record, at + 4)[0], schema, record
     except (struct.error, ValueError):
         contents.damaged += 1
 

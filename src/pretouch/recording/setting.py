@@ -23,7 +23,6 @@ from pretouch.recording.plain import JSON, as_json, from_json, sound
 from pretouch.recording.versions import versions
 from pretouch.robot.body import Capsules
 from pretouch.robot.description import RobotDescription, SpeedEnvelope, fr3, panda
-from pretouch.robot.mjcf_check import check_mjcf
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.sensor import PAPER_SENSOR, Sensor
 from pretouch.sensing.skin import Skin
@@ -187,7 +186,6 @@ def _model(m: Any) -> RobotModel:
     for installed in (panda().mjcf, fr3().mjcf):
         if installed.read_text(encoding="utf-8") == m.mjcf:
             return RobotModel(RobotDescription(mjcf=installed, envelope=envelope, **described))
-    check_mjcf(m.mjcf.encode())
     folder = FilePath(mkdtemp(prefix="pretouch-"))
     kept = folder / "arm.xml"
     kept.write_text(m.mjcf, encoding="utf-8")

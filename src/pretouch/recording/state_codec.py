@@ -164,11 +164,6 @@ class _Reading:
         self._wholes = iter(message.wholes.tolist())
         self._texts = iter(message.texts)
 
-    @property
-    def left(self) -> int:
-        """How many parts have not been taken."""
-        return len(self._parts) - self._at
-
     def none(self, name: str) -> bool:
         """Whether nothing was kept under a name: then it is taken."""
         found = self._at < len(self._parts) and self._parts[self._at][:2] == (name, "none")
@@ -240,8 +235,6 @@ def _give(parts: _Reading, name: str, hint: Any) -> Any:
         return kind(**given)
     kind_name, shape = parts.next(name)
     if kind_name == "tuple":
-        if not 0 <= int(shape) <= parts.left:
-            raise ValueError(f"{name} has {shape} parts, more than follow")
         return tuple(_give(parts, f"{name}.{i}", inner) for i, inner in enumerate(_inner(hint, int(shape))))
     if kind_name == "array":
         numbers = parts.numbers(tuple(map(int, shape.split())))

@@ -52,7 +52,9 @@ class RobotModel:
         try:
             self._model = mujoco.MjModel.from_xml_path(str(description.mjcf))
         except ValueError as error:
-            raise RobotModelError(f"{description.name}: {description.mjcf} cannot be read: {error}") from error
+            raise RobotModelError(
+                f"{description.name}: {description.mjcf} cannot be read: {' '.join(str(error).split())}"
+            ) from error
         self._model.dof_armature[:] = 0.0
         self._model.dof_damping[:] = 0.0
         self._data = mujoco.MjData(self._model)
