@@ -174,6 +174,7 @@ def test_noise_of_the_joints_is_named_where_it_is_what_hides_a_place(panda_model
     (finding,) = [finding for finding in found.units[0].findings if finding.kind == "unobservable"]
     assert "The noise of the joint positions hides it" in finding.sentence
     assert "rad/s^2" in finding.sentence
+    assert "  " not in finding.sentence
 
 
 @pytest.fixture

@@ -1,9 +1,11 @@
 """Joint positions of other programs, in the order of our joints, or a sentence that says why not."""
 
 import numpy as np
+import pyarrow as pa
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pyarrow import parquet
 
 from pretouch.errors import RecordingError
 from pretouch.imported_data.joints import read_joints
@@ -168,7 +170,7 @@ def test_a_message_without_positions_is_passed_over(tmp_path, panda_model):
         ("none.csv", "", "does not exist"),
         ("a.xlsx", "", "has an unknown format: give a file that ends in .mcap, .db3, .bag, .csv"),
         ("folder", "", "has no metadata.yaml"),
-        ("a.csv", "/joint_states", "is a CSV file and has no topics: leave out --topic"),
+        ("a.csv", "/joint_states", "is a table and has no topics: leave out --topic"),
         ("a.csv", "", "is empty"),
         ("a.mcap", "", "cannot be read as a bag or MCAP file"),
     ],
@@ -179,6 +181,17 @@ def test_what_cannot_be_opened_is_said(tmp_path, panda_model, name, topic, words
         (tmp_path / there).touch()
     with pytest.raises(RecordingError, match=words):
         read_joints(tmp_path / name, panda_model, topic)
+
+
+def test_a_parquet_file_gives_the_joints_that_a_csv_file_does(tmp_path, panda_model):
+    time = np.arange(50) / 100.0
+    columns = {"time_s": time} | {f"q{j + 1}_deg": np.rad2deg(Q[j] + 0.1 * time) for j in range(7)}
+    parquet.write_table(pa.table(columns), tmp_path / "a.parquet")
+    files = write_csv(tmp_path / "a.csv", columns), tmp_path / "a.parquet"
+    read = [read_joints(file, panda_model) for file in files]
+    np.testing.assert_allclose(read[1].trace.stamp, read[0].trace.stamp, atol=1e-9)
+    np.testing.assert_allclose(read[1].trace.q, read[0].trace.q, atol=1e-9)
+    assert read[1].said == "the columns q1_deg to q7_deg"
 
 
 CELLS = st.sampled_from(["", "0", "0.5", "nan", "1e999", "x", '"', "-1,5", "3"])

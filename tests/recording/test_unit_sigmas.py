@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 from pretouch.errors import RecordingError
-from pretouch.recording.messages import decoded, encoded
+from pretouch.recording.messages import decoded, definition, encoded
 from pretouch.recording.reader import open_recording
 from pretouch.recording.setting import RUN, decode_run, encode_run
 from pretouch.recording.verify import verify
+from pretouch.sensing.sensor import VL53L5CX
 from pretouch.sensing.skin import Skin
+from pretouch.sensing.unit import SensorUnit, TouchPatch
 from tests.fuzz.invariants import same
 from tests.recording.runs import controller_of, recorded_run
 
@@ -50,6 +52,16 @@ def test_a_recording_that_says_nothing_of_uncertainties_has_none(panda_model, pa
     skin = decode_run(silent, lambda _: {}).skin
     assert skin.exact
     assert same(skin.T_link_sensor, paper_skin.T_link_sensor)
+
+
+def test_the_message_names_all_that_is_kept_of_units(panda_model):
+    patch, sensor = TouchPatch(0.01), VL53L5CX()
+    pose = np.diag([1.0, 1.0, 1.0, 1.0]) + 0.2 * np.eye(4, k=3)
+    unit = SensorUnit("a", panda_model.links[-1], pose, 0.01, 0.02, patch, sensor)
+    data = encode_run(0, controller_of(panda_model, Skin([unit], panda_model)), {})
+    names = {key for key in json.loads(decoded(RUN, data).robot) if key.startswith("unit_")}
+    assert len(names) == 4
+    assert all(f"# {name}: " in definition(RUN) for name in names)
 
 
 def test_of_exact_units_nothing_is_said(panda_model, paper_skin):

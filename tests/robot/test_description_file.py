@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pretouch.errors import RobotModelError
-from pretouch.robot.description import panda
+from pretouch.robot.description import fr3, panda
 from pretouch.robot.description_file import description_text, load_description
 
 
@@ -23,6 +23,33 @@ def test_a_description_is_read_back_as_it_was(folder):
             if field.name != "mjcf":
                 assert np.array_equal(getattr(found, field.name), getattr(panda(), field.name))
         assert found.mjcf == folder / "panda.xml"
+
+
+def test_a_speed_envelope_is_written_and_read_back(tmp_path):
+    arm = fr3()
+    (tmp_path / arm.mjcf.name).write_bytes(arm.mjcf.read_bytes())
+    (tmp_path / "robot.toml").write_text(description_text(arm))
+    envelope = load_description(tmp_path).envelope
+    for field in dataclasses.fields(arm.envelope):
+        assert np.array_equal(getattr(envelope, field.name), getattr(arm.envelope, field.name))
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "sentence"),
+    [
+        ("offset = ", "ofset = ", "the key 'ofset' is unknown: use offset, slope"),
+        ("0.3,", '"fast",', r"offset is .*: give a list of 7 finite numbers, one a joint \[rad/s\]"),
+        ("12.0,\n    5.17", "-12.0,\n    5.17", r"slope is .*must be positive\. \(in "),
+        ("[envelope]", "[[envelope]]", r"envelope is .*: give a table \[envelope\]"),
+    ],
+)
+def test_what_is_wrong_with_an_envelope_is_said_with_key_and_value(tmp_path, before, after, sentence):
+    arm, text = fr3(), description_text(fr3())
+    (tmp_path / arm.mjcf.name).write_bytes(arm.mjcf.read_bytes())
+    assert before in text
+    (tmp_path / "robot.toml").write_text(text.replace(before, after, 1))
+    with pytest.raises(RobotModelError, match=sentence):
+        load_description(tmp_path)
 
 
 @pytest.mark.parametrize(

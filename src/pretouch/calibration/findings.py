@@ -121,7 +121,7 @@ def unknown_finding(
     elif noise is not None:
         worst = int(np.argmax(np.where(moving, noise, 0.0)))
         way_out = (
-            f" The noise of the joint positions hides it, mostly that of {model.joints[worst]}, equal to"
+            f"The noise of the joint positions hides it, mostly that of {model.joints[worst]}, equal to"
             f" {noise[worst]:.2g} rad/s^2: record positions with all their digits, each with its own stamp."
         )
     if moving.sum() == 1:

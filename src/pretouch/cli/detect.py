@@ -93,7 +93,7 @@ def gains_of(text: str) -> tuple[float, ...]:
         gains = tuple(float(word) for word in words(text))
     except ValueError:
         gains = (0.0,)
-    if not all(np.isfinite(gain) and gain != 0.0 for gain in gains):
+    if not all(np.isfinite(gain) and gain > 0.0 for gain in gains):
         raise ParameterError(f"--gains is {text!r}: give torques by current [Nm/A], one a joint, separated by commas.")
     return gains
 

@@ -60,8 +60,13 @@ class OpenTable(NamedTuple):
     """Reads columns as `read_table` does."""
 
 
-def open_table(place: Path, mapping: tuple[tuple[str, str], ...] = ()) -> OpenTable:
-    """Open a CSV or Parquet file; RecordingError for one that cannot be read, and for a mapping of columns it lacks."""
+def open_table(
+    place: Path, mapping: tuple[tuple[str, str], ...] = (), example: str = "time_s,force_x_N,force_y_N,force_z_N"
+) -> OpenTable:
+    """Open a CSV or Parquet file; RecordingError for one that cannot be read, and for a mapping of columns it lacks.
+
+    `example` is of a header, for the error of an empty file.
+    """
     if place.suffix.lower() == ".parquet":
         extras.PARQUET.need("A Parquet file")
         from pretouch.imported_data.parquet import read_parquet
@@ -69,7 +74,7 @@ def open_table(place: Path, mapping: tuple[tuple[str, str], ...] = ()) -> OpenTa
         theirs, columns = read_parquet(place)
         names = renamed(place, theirs, mapping)
         return OpenTable(names, lambda factors: in_si(place, columns(list(factors)), names, factors))
-    rows, theirs = read_header(place, "time_s,force_x_N,force_y_N,force_z_N")
+    rows, theirs = read_header(place, example)
     names = renamed(place, theirs, mapping)
     return OpenTable(names, lambda factors: read_table(place, rows, names, factors))
 

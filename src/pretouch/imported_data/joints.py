@@ -1,15 +1,14 @@
-"""Joint positions that another program recorded while an arm moved: a bag, an MCAP or a CSV file."""
+"""Joint positions that another program recorded while an arm moved: a bag, an MCAP, a CSV or a Parquet file."""
 
 import re
 from pathlib import Path
 
 import numpy as np
 
-from pretouch import extras
 from pretouch.errors import RecordingError
-from pretouch.imported_data.csv import UNITS, read_header, read_table
+from pretouch.imported_data.csv import UNITS, open_table
 from pretouch.imported_data.renaming import listed
-from pretouch.imported_data.samples import BAGS, TABLES
+from pretouch.imported_data.samples import check_exists, is_table
 from pretouch.imported_data.source import Series, check_reach, in_order
 from pretouch.robot.model import RobotModel
 from pretouch.traces import JointTrace
@@ -37,8 +36,8 @@ def read_joints(place: Path, model: RobotModel, topic: str = "") -> ImportedJoin
     """Read the positions of an arm's joints.
 
     Args:
-        place: a CSV file with a column of time and one for each joint (time_s, q1_rad or panda_joint1_deg), an MCAP
-            file or a bag with sensor_msgs/JointState.
+        place: a CSV or Parquet file with a column of time and one for each joint (time_s, q1_rad or panda_joint1_deg),
+            an MCAP file or a bag with sensor_msgs/JointState.
         model: of the arm.
         topic: of the joint states; needed if there are several.
 
@@ -46,20 +45,8 @@ def read_joints(place: Path, model: RobotModel, topic: str = "") -> ImportedJoin
         RecordingError: for what cannot be read, and for what is not clear, with the way out.
     """
     place = Path(place)
-    ending = place.suffix.lower()
-    if not place.exists():
-        raise RecordingError(f"The recording {place} does not exist: check its name.")
-    if place.is_dir() and not (place / "metadata.yaml").is_file():
-        raise RecordingError(f"The folder {place} has no metadata.yaml: give the folder of a ROS 2 bag, or a file.")
-    if place.is_dir() or ending in BAGS:
-        said, series, notes = _of_bag(place, model, topic)
-    elif ending in TABLES:
-        said, series, notes = _of_csv(place, model, topic)
-    else:
-        raise RecordingError(
-            f"{place} has an unknown format: give a file that ends in {', '.join((*BAGS, *TABLES))}, or the folder of a"
-            " bag."
-        )
+    check_exists(place)
+    said, series, notes = (_of_table if is_table(place) else _of_bag)(place, model, topic)
     series, more = _usable(place, series)
     check_reach(place, series.values, model)
     return ImportedJoints(JointTrace(series.time / 1e9, series.values), said, (*notes, *more))
@@ -84,10 +71,11 @@ def _places(place: Path, names: tuple[str, ...], model: RobotModel) -> dict[int,
     return found
 
 
-def _of_csv(place: Path, model: RobotModel, topic: str) -> tuple[str, Series, tuple[str, ...]]:
+def _of_table(place: Path, model: RobotModel, topic: str) -> tuple[str, Series, tuple[str, ...]]:
     if topic:
-        raise RecordingError(f"{place} is a CSV file and has no topics: leave out --topic.")
-    rows, names = read_header(place, "time_s,q1_rad,q2_rad and so on")
+        raise RecordingError(f"{place} is a table and has no topics: leave out --topic.")
+    opened = open_table(place, example="time_s,q1_rad,q2_rad and so on")
+    names = opened.names
     parted = [_parted(name.lower()) for name in names]
     times = [i for i, (base, _) in enumerate(parted) if base == "time"]
     if len(times) != 1:
@@ -104,7 +92,7 @@ def _of_csv(place: Path, model: RobotModel, topic: str) -> tuple[str, Series, tu
         )
     used = [times[0], *(places[j] for j in range(model.n))]
     factors = {i: _factor(place, names[i], parted[i][1], "q" if k else "time") for k, i in enumerate(used)}
-    table, time, notes = read_table(place, rows, names, factors)
+    table, time, notes = opened.read(factors)
     begin = round(float(table[0, 0]) * 1e9)
     return f"the columns {names[used[1]]} to {names[used[-1]]}", Series(begin + time, table[:, 1:]), tuple(notes)
 
@@ -125,7 +113,6 @@ def _factor(place: Path, name: str, unit: str, quantity: str) -> float:
 
 
 def _of_bag(place: Path, model: RobotModel, topic: str) -> tuple[str, Series, tuple[str, ...]]:
-    extras.BAGS.need("A bag or MCAP file")
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
 

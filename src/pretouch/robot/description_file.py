@@ -9,7 +9,7 @@ import numpy as np
 import tomli_w
 
 from pretouch.errors import RobotModelError
-from pretouch.robot.description import RobotDescription
+from pretouch.robot.description import RobotDescription, SpeedEnvelope
 from pretouch.toml_files import read_toml
 from pretouch.types import FloatArray
 
@@ -17,6 +17,7 @@ FILE = "robot.toml"
 
 _WORDS = ("name", "mjcf", "ee_body", "source")
 _LISTS = {"qd_max": "rad/s", "qdd_max": "rad/s^2", "tau_max": "Nm", "q_ready": "rad"}
+_ENVELOPE = {"offset": "rad/s", "slope": "rad/s^2", "q_upper": "rad", "q_lower": "rad"}
 _LARGEST = 1e6
 """Largest number in a file: any larger one is a mistake."""
 
@@ -30,12 +31,10 @@ def load_description(path: Path | str) -> RobotDescription:
     if path.is_dir():
         path = path / FILE
     data = _read(path)
-    unknown = sorted(set(data) - {*_WORDS, *_LISTS})
-    if unknown:
-        raise RobotModelError(f"{path}: the key {unknown[0]!r} is unknown: use {', '.join([*_WORDS, *_LISTS])}.")
+    _check_keys(path, data, (*_WORDS, *_LISTS, "envelope"))
     words = {key: _word(path, data, key) for key in _WORDS}
-    n = len(_numbers(path, data, "q_ready", None))
-    lists = {key: _numbers(path, data, key, n) for key in _LISTS}
+    n = len(_numbers(path, data, "q_ready", "rad", None))
+    lists = {key: _numbers(path, data, key, unit, n) for key, unit in _LISTS.items()}
     try:
         arm = RobotDescription(
             name=words["name"],
@@ -46,6 +45,7 @@ def load_description(path: Path | str) -> RobotDescription:
             tau_max=lists["tau_max"],
             q_ready=lists["q_ready"],
             source=words["source"],
+            envelope=_envelope(path, data["envelope"], n) if "envelope" in data else None,
         )
     except (RobotModelError, OSError) as error:  # a file's name may be too long to look for
         raise RobotModelError(f"{error} (in {path})") from error
@@ -56,7 +56,25 @@ def description_text(arm: RobotDescription) -> str:
     """Return the robot.toml that `load_description` reads back to the same arm, beside its MJCF file."""
     given = {"name": arm.name, "mjcf": arm.mjcf.name, "ee_body": arm.ee_body, "source": arm.source}
     lists = {key: [float(v) for v in getattr(arm, key)] for key in _LISTS}
-    return tomli_w.dumps(given | lists)
+    return tomli_w.dumps(given | lists | ({} if arm.envelope is None else {"envelope": _envelope_table(arm.envelope)}))
+
+
+def _envelope_table(envelope: SpeedEnvelope) -> dict[str, Any]:
+    return {key: [float(v) for v in getattr(envelope, key)] for key in _ENVELOPE} | {"source": envelope.source}
+
+
+def _envelope(path: Path, table: Any, n: int) -> SpeedEnvelope:
+    if not isinstance(table, dict):
+        raise RobotModelError(f"{path}: envelope is {_shown(table)}: give a table [envelope].")
+    _check_keys(path, table, (*_ENVELOPE, "source"))
+    numbers = {key: _numbers(path, table, key, unit, n) for key, unit in _ENVELOPE.items()}
+    return SpeedEnvelope(**numbers, source=_word(path, table, "source"))
+
+
+def _check_keys(path: Path, table: dict[str, Any], keys: tuple[str, ...]) -> None:
+    unknown = sorted(set(table) - set(keys))
+    if unknown:
+        raise RobotModelError(f"{path}: the key {unknown[0]!r} is unknown: use {', '.join(keys)}.")
 
 
 def files_digest(arm: RobotDescription) -> str:
@@ -86,13 +104,13 @@ def _word(path: Path, data: dict[str, Any], key: str) -> str:
     return value
 
 
-def _numbers(path: Path, data: dict[str, Any], key: str, n: int | None) -> FloatArray:
+def _numbers(path: Path, data: dict[str, Any], key: str, unit: str, n: int | None) -> FloatArray:
     value = data.get(key)
     ok = isinstance(value, list) and len(value) > 0 and n in (None, len(value))
     if not ok or not all(type(v) in (int, float) and abs(v) <= _LARGEST for v in value or []):
         count = "" if n is None else f"{n} "
         raise RobotModelError(
-            f"{path}: {key} is {_shown(value)}: give a list of {count}finite numbers, one a joint [{_LISTS[key]}]."
+            f"{path}: {key} is {_shown(value)}: give a list of {count}finite numbers, one a joint [{unit}]."
         )
     return np.array(value, dtype=np.float64)
 

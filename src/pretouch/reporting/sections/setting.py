@@ -35,8 +35,8 @@ _RUNS = 30
 """Stretches of one profile and path that are listed."""
 _PROFILE_COLUMNS = 6
 """Profiles that are shown side by side."""
-_ABSENT = "none"
-"""Stands for a parameter of a part that a profile has not."""
+_ABSENT = "–"
+"""Stands for a parameter of a part that a profile does not have."""
 _UNITS = {
     "_m_s_n": "(m/s)/N", "_kg_m2": "kg m²", "_rad_s2": "rad/s²", "_nm_s": "Nm s/rad", "_m_s2": "m/s²",
     "_nm_rad": "Nm/rad", "_rad_s": "rad/s", "_m_s": "m/s", "_1_s": "1/s", "_rad": "rad", "_nm": "Nm", "_kg": "kg",
@@ -135,10 +135,6 @@ def parameter_section(m: Measures) -> Html:
         note("Bold on colour: not the value of the profile paper (Table I of the paper, and what it leaves open)."),
         *([note(f"{left_out} more profiles are left out.")] if left_out > 0 else []),
     ])  # fmt: skip
-
-
-_ABSENT = "–"
-"""Stands for a parameter of a part that a profile does not have."""
 
 
 def unit_of(name: str) -> str:
