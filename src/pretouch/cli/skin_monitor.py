@@ -40,11 +40,10 @@ if TYPE_CHECKING:
 
 _ONCE_S = 5.0
 _SECOND_S = 1.0
-_INTERRUPTED = 130
 
 
 def monitor(command: "Monitor") -> int:
-    """Watch units; return 1 if one is faulty after a given time or recording failed, 130 after Ctrl-C, or else 0."""
+    """Watch units; return 1 if one is faulty after a given time or recording failed, or else 0."""
     duration = _duration(command)
     with numbers_to(command.json) as write:
         return _monitored(command, duration, write)
@@ -60,25 +59,31 @@ def _monitored(command: "Monitor", duration: float, write: Callable[[Any], None]
     with ExitStack() as stack:
         receiver = stack.enter_context(SkinReceiver(units, keys, command.host, command.port))
         recording = stack.enter_context(SkinRecording(Path(command.record))) if command.record else None
-        updates = watch(receiver, HealthParams(), duration, posture)
+        updates, last = watch(receiver, HealthParams(), duration, posture), None
         try:
-            last, code = _shown(updates, receiver, recording, command.once)
-        except Terminated:
-            if recording:
-                with suppress(OSError):  # the terminal may be gone
-                    print(recording.close(), flush=True)
+            for update in _shown(updates, receiver, recording, command.once):
+                last = update
+        except (KeyboardInterrupt, Terminated):
+            with suppress(OSError):  # the terminal may be gone
+                _conclude(last, receiver, recording, write)
             raise
-        sentence = recording.close() if recording else ""
+        _conclude(last, receiver, recording, write)
+    faulty = math.isfinite(duration) and last is not None and any(f.level == "fault" for f in last.findings)
+    return int(faulty or bool(recording and recording.trouble))
+
+
+def _conclude(
+    last: MonitorUpdate | None, receiver: SkinReceiver, recording: SkinRecording | None, write: Callable[[Any], None]
+) -> None:
+    """Close the recording, and show and write the last update."""
+    sentence = recording.close() if recording else ""
     notes = [note for note in (_nothing_received(receiver), sentence) if note]
     console = Console(highlight=False, soft_wrap=True)
     if last is not None:
         console.print(view(last, receiver.rejected, notes))
         write(_numbers(last, receiver, notes))
-        if math.isfinite(duration):
-            code = code or int(any(f.level == "fault" for f in last.findings))
     elif sentence:
         console.print(sentence, markup=False)
-    return code or int(bool(recording and recording.trouble))
 
 
 def _duration(command: "Monitor") -> float:
@@ -126,25 +131,22 @@ def _posture(text: str, model: RobotModel) -> FloatArray:
 
 def _shown(
     updates: Iterator[MonitorUpdate], receiver: SkinReceiver, recording: SkinRecording | None, quiet: bool
-) -> tuple[MonitorUpdate | None, int]:
-    """Show and record the updates until the last; return it and the exit code so far."""
-    console, last, second = Console(highlight=False, soft_wrap=True), None, 0.0
+) -> Iterator[MonitorUpdate]:
+    """Show, record and yield each update."""
+    console, second = Console(highlight=False, soft_wrap=True), 0.0
     live = None if quiet or not console.is_terminal else Live(console=console, auto_refresh=False, transient=True)
     lines = None if quiet or live else _Lines(console)
-    try:
-        with live or nullcontext():
-            for update in updates:
-                last, full = update, update.elapsed >= second
-                second += _SECOND_S * full
-                if recording:
-                    record(recording, update, receiver, full)
-                if live:
-                    live.update(view(update, receiver.rejected, _notes(receiver, recording)), refresh=True)
-                elif lines and full:
-                    lines.show(update)
-    except KeyboardInterrupt:
-        return last, _INTERRUPTED
-    return last, 0
+    with live or nullcontext():
+        for update in updates:
+            full = update.elapsed >= second
+            second += _SECOND_S * full
+            if recording:
+                record(recording, update, receiver, full)
+            if live:
+                live.update(view(update, receiver.rejected, _notes(receiver, recording)), refresh=True)
+            elif lines and full:
+                lines.show(update)
+            yield update
 
 
 class _Lines:

@@ -1,7 +1,5 @@
 """What can be said after `pretouch skin calibrate`, and which of it goes together."""
 
-import os
-import sys
 from collections.abc import Iterator
 from dataclasses import MISSING, Field, dataclass, field, fields, is_dataclass
 from pathlib import Path
@@ -143,18 +141,7 @@ def _default(one: Field[Any]) -> Any:
 
 
 def calibrate_skin(command: Calibrate, mode: Mode) -> int:
-    """Calibrate; return 1 if a unit was refused, the motion was not finished, or nobody reads on, or else 0."""
-    try:
-        code = _calibrated(command, mode)
-        sys.stdout.flush()
-    except BrokenPipeError:
-        with open(os.devnull, "w") as nowhere:  # what is still in the buffer goes there
-            os.dup2(nowhere.fileno(), sys.stdout.fileno())
-        return 1
-    return code
-
-
-def _calibrated(command: Calibrate, mode: Mode) -> int:
+    """Calibrate; return 1 if a unit was refused or the motion was not finished, or else 0."""
     from pretouch.cli.calibrate.outputs import outputs_of
     from pretouch.cli.calibrate.recording import Sources, calibrate_recording
     from pretouch.robot.model import RobotModel
