@@ -37,7 +37,7 @@ PATH = WayPoints(
     np.array([[0.4, 0.45, 0.5], [0.6, 0.2, 0.3], [0.5, -0.1, 0.7], [0.35, -0.45, 0.35], [0.55, -0.2, 0.55]]),
     closed=True,
 )
-_ALONE = "blind:threshold.f_base_n=1000:task.orientation=free"
+_ALONE = "blind:detect.f_base_n=1000:task.orientation=free"
 _DETECTORS = {"pretouch": "pretouch:detect.learn=always", "fixed": "fixed"}
 MODEL = RobotModel(panda())
 

@@ -50,10 +50,10 @@ def test_of_a_recording_of_units_it_is_said_what_can_be_done_with_it(tmp_path):
 
 
 def test_profiles_stand_side_by_side(capsys, file):
-    detect(file, Choice(), ("paper", "paper:threshold.f_base_n=31"))
+    detect(file, Choice(), ("paper", "paper:detect.f_base_n=31"))
     said = capsys.readouterr().out
-    assert "paper and paper:threshold.f_base_n=31: 0 contacts in both, 3 only in paper, 0 only in" in said
-    assert "paper:threshold.f_base_n=31: no contact in 0.2 min" in said
+    assert "paper and paper:detect.f_base_n=31: 0 contacts in both, 3 only in paper, 0 only in" in said
+    assert "paper:detect.f_base_n=31: no contact in 0.2 min" in said
     assert "time [s]" in said
 
 

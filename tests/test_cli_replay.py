@@ -100,9 +100,9 @@ def test_a_difference_ends_with_code_1(capsys, whole, monkeypatch):
 
 
 def test_another_profile_is_shown_beside_the_recorded_one(capsys, whole):
-    assert replay(whole, profile="paper:threshold.f_base_n=35", page=False) == 0
+    assert replay(whole, profile="paper:detect.f_base_n=35", page=False) == 0
     said = capsys.readouterr().out
-    assert "Contacts: paper as recorded, paper:threshold.f_base_n=35 on the same data" in said
+    assert "Contacts: paper as recorded, paper:detect.f_base_n=35 on the same data" in said
     (row,) = [line.split() for line in said.splitlines() if line.strip().startswith("2.1")]
     assert row[2:] == ["y", "-"]
     assert re.search(r"35\.\d / 35\.\d / 35\.\d N \(paper:threshold\.f_base_n=35\)", said)

@@ -161,7 +161,7 @@ def test_a_recording_that_fails_in_the_middle_is_told_at_once_and_by_the_exit_co
 
 LEARNING = (
     "run", "--no-skin", "--path", "hold", "--yes", "--profile",
-    "pretouch:perception.enabled=no:detection.learn_unseen=yes",
+    "pretouch:perception=none:detect.learn=always",
 )  # fmt: skip
 
 

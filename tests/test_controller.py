@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pretouch.controller import Controller
-from pretouch.profiles import PROFILES, Profile, with_restriction
+from pretouch.profiles import PROFILES, Profile, profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, Mode, QpOutcome
@@ -99,7 +99,7 @@ def test_after_the_reading_is_gone_the_speed_comes_back_slowly(arm: Arm):
 
 
 def test_hard_rows_hold_exactly(panda_model: RobotModel, paper_skin: Skin):
-    arm = Arm(panda_model, paper_skin, with_restriction(PAPER, "hard"))
+    arm = Arm(panda_model, paper_skin, profile("paper:approach.rows=hard"))
     arm.run(150)
     for step in arm.run(100, seen={LEFT: 0.2, RIGHT: 0.5}):
         if step.qp.outcome is QpOutcome.SOLVED:

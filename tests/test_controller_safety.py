@@ -5,17 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pretouch.control.approach_restriction import ApproachRestriction
 from pretouch.control.path import Circle, Path, line
 from pretouch.controller import Controller
 from pretouch.perception.scene_filter import no_fixtures
-from pretouch.profiles import PROFILES, Profile, with_restriction
+from pretouch.profiles import PROFILES, Profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, Inputs, Mode, QpOutcome, RangeReadings, RangeStatus, RobotState
 
 DT = 0.01
 SHORT = replace(PROFILES["paper"], window=replace(PROFILES["paper"].window, samples=5))
-HARD = with_restriction(SHORT, "hard")
+HARD = replace(SHORT, approach=ApproachRestriction(rows="hard"))
 FAULTS = [
     "q", "qd", "q_commanded", "qd_commanded", "wrench", "no wrench", "robot stamp", "step stamp", "stale", "backwards",
     "jump", "distance", "range stamp", "dead",

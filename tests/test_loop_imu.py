@@ -30,9 +30,9 @@ class Units:
         return SAMPLES
 
 
-@pytest.mark.parametrize(("use", "asked"), [("yes", 1), ("no", 0)])
-def test_only_a_profile_that_uses_imus_asks(panda_model, paper_skin, use, asked):
-    controller, units = controller_of(panda_model, paper_skin, profile(f"pretouch:detection.use_imu={use}")), Units()
+@pytest.mark.parametrize(("cues", "asked"), [("touch,imu", 1), ("touch", 0)])
+def test_only_a_profile_that_uses_imus_asks(panda_model, paper_skin, cues, asked):
+    controller, units = controller_of(panda_model, paper_skin, profile(f"pretouch:detect.cues={cues}")), Units()
     run = Run(controller)
     arm = SimpleNamespace(read=lambda: run.inputs().robot, command=lambda qd: None)
     cycle = loop.turn(controller, run.state, arm, units, 0.0)
@@ -53,7 +53,7 @@ def test_batches_of_units_become_samples_of_one_step():
 
 
 def test_without_samples_the_switch_changes_no_bit(panda_model, paper_skin):
-    switched = ("pretouch:detection.use_imu=yes", "pretouch:detection.use_imu=no")
+    switched = ("pretouch:detect.cues=touch,imu", "pretouch:detect.cues=touch")
     runs = [Run(controller_of(panda_model, paper_skin, profile(name))) for name in switched]
     for _ in range(60):
         a, b = (run.turn() for run in runs)

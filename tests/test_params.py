@@ -2,7 +2,6 @@
 
 import dataclasses
 import math
-from contextlib import suppress
 from dataclasses import fields, replace
 
 import pytest
@@ -27,15 +26,7 @@ from pretouch.params import (
     ThresholdParams,
     WindowParams,
 )
-from pretouch.profiles import (
-    PROFILES,
-    Profile,
-    profile,
-    restriction_mode,
-    restriction_modes,
-    value_of,
-    with_restriction,
-)
+from pretouch.profiles import PROFILES, Profile, profile
 from pretouch.sim.plant_params import PlantParams
 
 SETS = [
@@ -171,7 +162,7 @@ def test_ablations_take_one_use_of_proximity_away():
 
 
 def test_a_profile_is_varied_by_its_name():
-    name = "paper:window.samples=500:reduction.enabled=no:detect.compare=raw:restriction.beta=-20"
+    name = "paper:window.samples=500:slow=none:detect.compare=raw:approach.beta=-20"
     varied = profile(name)
     assert varied.name == name
     assert varied.window == WindowParams(samples=500)
@@ -179,62 +170,6 @@ def test_a_profile_is_varied_by_its_name():
     assert varied.slow is None
     assert varied.approach == ApproachRestriction(beta=-20.0)
     assert varied.task == profile("paper").task
-
-
-@pytest.mark.parametrize(
-    ("old", "new"),
-    [
-        ("paper:restriction.mode=off:reduction.enabled=no", "paper:approach=none:slow=none"),
-        ("paper:restriction.mode=hard", "paper:approach.rows=hard"),
-        ("pretouch:restriction.mode=floor:restriction.floor_m_s=0.03",
-         "pretouch:approach=paper:approach.rows=floor:approach.floor_m_s=0.03"),
-        ("paper:restriction.mode=braking:anticipation.margin_m=0.02:anticipation.tangential=yes",
-         "paper:approach=braking:task.blocked_after_s=2:approach.margin_m=0.02:approach.tangential=on"),
-        ("pretouch:restriction.d_notice_m=0.5:anticipation.null_space=no",
-         "pretouch:approach.d_notice_m=0.5:null_space=none"),
-        ("pretouch:anticipation.effective_mass=no:anticipation.closing_speed=no",
-         "pretouch:approach.effective_mass=none:approach.closing_deadband_m_s=none"),
-        ("pretouch:anticipation.body_region=chest:anticipation.null_speed_m_s=0.2",
-         "pretouch:approach.effective_mass.body_region=chest:null_space.speed_m_s=0.2"),
-        ("pretouch:anticipation.blocked_after_s=3:reduction.enabled=yes:reduction.d_max_m=0.5",
-         "pretouch:task.blocked_after_s=3:slow=on:slow.d_max_m=0.5"),
-        ("ding:baselines.ding_notice_m=0.4", "ding:approach.notice_m=0.4"),
-        ("paper:restriction.mode=flacco:baselines.flacco_size_m=0.1", "paper:approach=flacco:approach.size_m=0.1"),
-    ],
-)  # fmt: skip
-def test_what_earlier_versions_called_it_is_the_same(old: str, new: str):
-    assert replace(profile(old), name="") == replace(profile(new), name="")
-    assert profile(new) != profile(new.partition(":")[0])
-
-
-_ONCE = {
-    "reduction": "enabled d_max_m l_max_cycles",
-    "restriction": "mode v_max_m_s beta d_repulse_m d_crit_m d_notice_m floor_m_s slack_weight",
-    "anticipation": "deceleration_m_s2 latency_s margin_m touch_speed_max_m_s retreat_max_m_s effective_mass"
-    " body_region region_force_n force_fraction rotor_inertia_kg_m2 closing_speed closing_deadband_m_s tangential"
-    " tangential_distance_m tangential_speed_m_s tighten_m_s2 loosen_m_s2 null_space null_distance_m null_speed_m_s"
-    " null_joint_rad_s null_rate_rad_s2 blocked_after_s",
-    "baselines": "flacco_v_max_m_s flacco_alpha flacco_rho_m flacco_size_m ding_repulse_m ding_zero_low_m"
-    " ding_zero_high_m ding_notice_m ding_approach_m_s ding_retreat_m_s ding_weighted_m",
-}
-
-
-@pytest.mark.parametrize("old", [f"{group}.{name}" for group, names in _ONCE.items() for name in names.split()])
-def test_every_parameter_of_the_groups_that_parts_replaced_is_found_by_its_old_name(old: str):
-    found = []
-    for name in ("paper", "pretouch", "flacco", "ding"):
-        with suppress(ParameterError):
-            found.append(value_of(profile(name), old))
-    assert any(isinstance(value, bool | float | int | str) for value in found)
-
-
-def test_each_way_to_restrict_the_arm_can_be_chosen_by_its_name():
-    for mode in restriction_modes():
-        assert restriction_mode(with_restriction(profile("pretouch"), mode)) == mode
-    assert {"off", "hard", "slack", "floor", "braking", "flacco", "ding"} <= set(restriction_modes())
-    assert with_restriction(profile("pretouch"), "braking") == profile("pretouch")
-    with pytest.raises(ParameterError, match="'firm' is unknown: choose from off, hard, slack"):
-        with_restriction(profile("paper"), "firm")
 
 
 @pytest.mark.parametrize(("value", "problem"), [(-1.0, "at least 0"), (math.nan, "finite"), ("fast", "a number")])
@@ -246,7 +181,7 @@ def test_a_value_that_may_be_none_is_checked_if_it_is_not(value: object, problem
 
 def test_the_order_of_changes_does_not_matter():
     one = profile("paper:detect.f_base_n=3:detect.f_d_n=2")
-    other = profile("paper:threshold.f_d_n=2:threshold.f_base_n=3")
+    other = profile("paper:detect.f_d_n=2:detect.f_base_n=3")
     assert one.detect == other.detect == MovingThresholds(f_base_n=3.0, f_d_n=2.0)
 
 
@@ -256,21 +191,18 @@ def test_the_order_of_changes_does_not_matter():
         ("papre:task.speed_m_s=0.1", "The profile 'papre' is unknown"),
         ("paper:speed=0.1", "The group 'speed' of 'speed=0.1' is unknown: choose from perception, task, slow,"),
         ("paper:task.sped=0.1", "The parameter 'task.sped' is unknown: choose from speed_m_s,"),
-        ("pretouch:detection.confirm_samples=2", "The parameter 'detection.confirm_samples' is gone: it had one value"),
-        ("pretouch:detect.inertia=no", "The parameter 'detect.inertia' is gone: it had one value"),
-        ("pretouch:anticipation.detour=yes", "The parameter 'anticipation.detour' is gone: the arm no longer goes"),
         ("paper:task.speed_m_s", "has no value: write PATH=VALUE"),
         ("paper:", "has no value"),
         ("paper:name=x", "The group 'name' of 'name=x' is unknown"),
         ("paper:task.speed_m_s=fast", "task.speed_m_s is 'fast': write a number"),
         ("paper:task.speed_m_s=-1", "TaskParams.speed_m_s is -1.0: it must be greater than 0"),
-        ("paper:threshold.window_samples=10.5", "window.samples is '10.5': write a whole number"),
-        ("paper:reduction.enabled=0", "reduction.enabled is '0': choose from yes, no"),
-        ("paper:restriction.mode=firm", "restriction.mode is 'firm': choose from off, hard, slack, floor, braking"),
+        ("paper:window.samples=10.5", "window.samples is '10.5': write a whole number"),
+        ("paper:slow=0", "slow is '0': write on or none"),
+        ("paper:approach.rows=firm", "ApproachRestriction.rows is 'firm': choose one of hard, slack, floor"),
         ("paper:detect.d_max_m=nan", "MovingThresholds.d_max_m is nan: it must be finite"),
         ("paper:detect=magic", "There is no Detector called 'magic': choose from thresholds, sequential,.* fixed"),
         ("paper:detect.cues=touch", "The parameter 'detect.cues' is unknown: choose from f_base_n"),
-        ("paper:detection.use_touch=maybe", "detection.use_touch is 'maybe': choose from yes, no"),
+        ("pretouch:react.soft_hold=maybe", "react.soft_hold is 'maybe': write yes or no"),
         ("pretouch:detect.localise=none:detect.localise.force_n=3", "detect.localise is none: choose it first"),
         ("pretouch:detect.cues=smell", "There is no Cue called 'smell': choose from touch, imu"),
     ],

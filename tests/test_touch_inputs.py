@@ -118,7 +118,7 @@ def test_a_touch_alone_is_no_contact_and_is_not_learnt_from(panda_model, feeling
 def test_without_sensors_in_the_skin_or_without_the_switch_no_bit_changes(panda_model, paper_skin, feeling, touched):
     push = push_of(panda_model, feeling, 4, 6.0)
     plain = Course(controller_of(panda_model, paper_skin, OURS), push, None)
-    off = profile("pretouch:detection.use_touch=no")
+    off = profile("pretouch:detect.cues=none")
     for skin, chosen in ((paper_skin, OURS), (feeling, off)):
         found = Course(controller_of(panda_model, skin, chosen), push, touched)
         assert all(

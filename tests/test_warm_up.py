@@ -35,9 +35,7 @@ def recorded(controller: Controller, monkeypatch: pytest.MonkeyPatch) -> list[Co
     return steps
 
 
-@pytest.mark.parametrize(
-    "name", ["paper", "blind", "paper:restriction.mode=hard", "paper:threshold.compare=raw", "pretouch"]
-)
+@pytest.mark.parametrize("name", ["paper", "blind", "paper:approach.rows=hard", "paper:detect.compare=raw", "pretouch"])
 @pytest.mark.parametrize("rate", [100.0, 1000.0])
 def test_a_warm_up_sees_every_mode(
     panda_model: RobotModel,
@@ -112,7 +110,7 @@ sys.exit(f"compiled in the loop: {new}" if new else 0)
 
 
 @pytest.mark.parametrize(
-    ("how", "name"), [("warm", "paper"), ("warm", "paper:restriction.mode=hard"), ("warm", "blind"), ("cold", "paper")]
+    ("how", "name"), [("warm", "paper"), ("warm", "paper:approach.rows=hard"), ("warm", "blind"), ("cold", "paper")]
 )
 def test_nothing_is_compiled_after_a_warm_up(how: str, name: str):
     done = subprocess.run([sys.executable, "-c", PROBE, how, name], capture_output=True, text=True)

@@ -8,7 +8,6 @@ import pytest
 from pretouch.contact.admittance import Admittance
 from pretouch.contact.decaying_velocity import DecayingVelocity
 from pretouch.contact.reach import axis_ends
-from pretouch.errors import ParameterError
 from pretouch.modes import ModeState
 from pretouch.params import ClampParams, GiveUpParams
 from pretouch.profiles import PROFILES, Profile, profile
@@ -305,29 +304,18 @@ def test_the_paper_does_not_look_at_joint_torques(panda_model, paper_skin, name:
 
 
 @pytest.mark.parametrize(
-    ("change", "old"),
-    [
-        ("clamp=none", "clamps=no"), ("pinch=none", "pinches=no"), ("give_up=none", "gives_up=no"),
-        ("soft_hold=no", "soft_hold=no"), ("lag_s=0", "lag_s=0"), ("static_friction_nm=0", "static_friction_nm=0"),
-    ],
-)  # fmt: skip
-def test_each_of_its_parts_can_be_left_out_alone(change: str, old: str):
+    "change", ["clamp=none", "pinch=none", "give_up=none", "soft_hold=no", "lag_s=0", "static_friction_nm=0"]
+)
+def test_each_of_its_parts_can_be_left_out_alone(change: str):
     name, _, text = change.partition("=")
     ours, varied = PROFILES["pretouch"].react, profile(f"pretouch:react.{change}").react
     assert varied == replace(ours, **{name: {"none": None, "no": False, "0": 0.0}[text]}) != ours
-    assert profile(f"pretouch:reaction.{old}").react == varied
 
 
-def test_the_reaction_of_the_paper_can_be_chosen_by_its_name_of_today_and_before():
-    for text in ("pretouch:react=decay", "pretouch:reaction.method=decay"):
-        assert profile(text).react == PROFILES["paper"].react == DecayingVelocity()
-    assert profile("paper:reaction.method=admittance:reaction.clamp_nm=5:reaction.clamps=yes").react == Admittance(
-        clamp=ClampParams(torque_nm=5.0)
-    )
-    with pytest.raises(
-        ParameterError, match=r"reaction\.clamp_turns' is gone: it is a constant of pretouch\.contact now"
-    ):
-        profile("pretouch:reaction.clamp_turns=3")
+def test_the_reaction_is_a_part_chosen_by_its_name():
+    assert profile("pretouch:react=decay").react == PROFILES["paper"].react == DecayingVelocity()
+    chosen = profile("paper:react=admittance:react.clamp=on:react.clamp.torque_nm=5")
+    assert chosen.react == Admittance(clamp=ClampParams(torque_nm=5.0))
 
 
 def test_the_state_of_a_clamp_is_recorded_to_the_bit(arm: Pushed):

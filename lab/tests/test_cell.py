@@ -8,7 +8,7 @@ from pretouch_lab.registry import EXPERIMENTS
 
 def test_files_of_different_cells_differ():
     modes = ("off", "hard", "slack", "floor")
-    names = ("blind", "paper", "paper:restriction.beta=-10", "paper:restriction.beta=10", "paper:threshold.alpha=0.3")
+    names = ("blind", "paper", "paper:approach.beta=-10", "paper:approach.beta=10", "paper:window.alpha=0.3")
     grid = Grid(names[:3] + names[4:], modes, (2e3, 25e3))
     cells = [cell for experiment in EXPERIMENTS.values() for cell in experiment.cells(grid)]
     assert len({cell.name for cell in cells}) == len(cells)
@@ -16,7 +16,7 @@ def test_files_of_different_cells_differ():
         set(cell.name) <= set("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789.-_") for cell in cells
     )
     assert Cell("static", names[2]).name != Cell("static", names[3]).name
-    odd = ("paper:restriction.slack_weight=1e-3", "paper:restriction.slack_weight=1e+3")
+    odd = ("paper:approach.slack_weight=1e-3", "paper:approach.slack_weight=1e+3")
     assert Cell("static", odd[0]).name != Cell("static", odd[1]).name
 
 
@@ -27,9 +27,9 @@ def test_a_cell_that_is_named_twice_runs_once():
 
 
 def test_a_grid_gives_each_profile_its_modes():
-    grid = Grid(("blind", "paper", "paper:restriction.mode=floor"), ("slack", "hard"))
+    grid = Grid(("blind", "paper", "paper:approach.rows=floor"), ("slack", "hard"))
     assert grid.controllers("off") == [
-        ("blind", "off"), ("paper", "slack"), ("paper", "hard"), ("paper:restriction.mode=floor", "floor"),
+        ("blind", "off"), ("paper", "slack"), ("paper", "hard"), ("paper:approach.rows=floor", "floor"),
     ]  # fmt: skip
     assert Grid(("paper",)).controllers("slack") == [("paper", "slack")]
 

@@ -22,7 +22,7 @@ URDF = """<robot name="a"><link name="base"><collision><geometry><mesh filename=
 <limit lower="-1" upper="1" velocity="1" effort="1"/></joint></robot>"""
 ARM = ("run", "--robot", "franka", "--ip", "127.0.0.1")
 LAB = ("demo", "reproduce", "figure", "bench", "sweep", "identify", "learn", "policy")  # requires figures
-X = ("--vary", "threshold.f_base_n=7:20", "--samples", "2", "--processes", "1")
+X = ("--vary", "detect.f_base_n=7:20", "--samples", "2", "--processes", "1")
 # what is asked for, and the extra it needs; the others end for another reason, beyond all imports
 ASKED = [
     (("live", "--path", "spiral"), LIVE),

@@ -157,4 +157,4 @@ def test_the_page_says_what_was_run(request_and_folder):
     request, out = request_and_folder
     page = write_report([(request, out), (Request(("noise",), 1), out)], {}, out).read_text()
     assert "static, dynamic: 1 seeds, profiles blind, paper, restrictions off, slack." in page
-    assert "noise: 1 seeds, profiles blind:threshold.f_base_n=1000." in page
+    assert "noise: 1 seeds, profiles blind:detect.f_base_n=1000." in page

@@ -72,27 +72,27 @@ def as_table(value: object) -> Any:
     return [as_table(item) for item in value] if isinstance(value, tuple) else value
 
 
-def from_table(hint: Any, table: Any, where: str, unlike: list[str]) -> Any:
+def from_table(hint: Any, table: Any, where: str = "") -> Any:
     """Make the parameters of a type from what `as_table` returned.
 
-    Names that only one of this version and the table knows are added to `unlike`: what is missing gets this version's
-    default, what is unknown is left out. Raises ParameterError for a value that does not belong there.
+    Raises ParameterError for a value that does not belong there, and for names that only one of the two has.
     """
     kind, optional = _without_none(hint)
     if table is None and optional:
         return None
     if get_origin(kind) is tuple and isinstance(table, list):
         inner = get_args(kind)[0]
-        return tuple(from_table(inner, item, f"{where}.{i}", unlike) for i, item in enumerate(table))
+        return tuple(from_table(inner, item, f"{where}.{i}") for i, item in enumerate(table))
     if not is_dataclass(kind) and not _is_part(kind):
         return _plain(kind, table, where)
     if not isinstance(table, dict):
         raise ParameterError(f"{where} is {table!r}: it must be a table.")
     made = kind.called(str(table.get(_PART))) if _is_part(kind) else kind
-    hints, given = _hints(made), {key: item for key, item in table.items() if key != _PART}
-    unlike += [f"{where}.{name}".lstrip(".") for name in sorted(set(given) ^ {f.name for f in fields(made)})]
-    chosen = {name: item for name, item in given.items() if name in hints}
-    return made(**{name: from_table(hints[name], item, f"{where}.{name}", unlike) for name, item in chosen.items()})
+    hints, values = _hints(made), {key: item for key, item in table.items() if key != _PART}
+    if unlike := sorted(values.keys() ^ hints.keys()):
+        paths = ", ".join(f"{where}.{name}".lstrip(".") for name in unlike)
+        raise ParameterError(f"{made.__name__} differs in {paths}: use the version of pretouch that wrote it.")
+    return made(**{name: from_table(hints[name], item, f"{where}.{name}") for name, item in values.items()})
 
 
 def _plain(kind: Any, value: Any, where: str) -> Any:

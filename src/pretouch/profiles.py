@@ -4,12 +4,10 @@
 """
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
-from typing import Any, get_args
 
 from pretouch.checks import Checked
-from pretouch.composition import at, changed, from_table
+from pretouch.composition import changed
 from pretouch.contact.admittance import Admittance
 from pretouch.contact.decaying_velocity import DecayingVelocity
 from pretouch.contact.detector import Detector
@@ -32,7 +30,6 @@ from pretouch.params import (
     OutsidePoints,
     PerceptionParams,
     PinchParams,
-    RowKind,
     SpeedReduction,
     Tangential,
     TaskParams,
@@ -40,7 +37,6 @@ from pretouch.params import (
     WindowParams,
 )
 from pretouch.plugins import load, names
-from pretouch.renamed import REMOVED, SWITCHES, of_today
 
 GROUP = "pretouch.profiles"
 """Group of entry points under which other distributions name profiles of theirs."""
@@ -146,8 +142,8 @@ def profile(text: str) -> Profile:
     """Look a profile up: by its name, or as `NAME:CHANGE:...`, that profile with some parts or parameters changed.
 
     A change is a part by its name or a parameter by its value, as `paper:detect=sequential:task.speed_m_s=0.2`, and
-    `none` leaves a part out. Names of earlier versions are read as well. Raises ParameterError for a profile, part or
-    parameter there is not, naming those there are, and for a value that is not allowed.
+    `none` leaves a part out. Raises ParameterError for a profile, part or parameter there is not, naming those there
+    are, and for a value that is not allowed.
     """
     base, *changes = text.split(":")
     found = _named(base)
@@ -169,63 +165,18 @@ def _named(name: str) -> Profile:
 
 
 def _paths(changes: list[str]) -> dict[str, str]:
-    """Read changes, of this version's names or an earlier one's: path -> text."""
-    found: dict[str, str] = {}
+    """Read changes: path -> text."""
+    texts: dict[str, str] = {}
     groups = [f.name for f in fields(Profile) if f.name != "name"]
     for change in changes:
-        path, given, text = change.partition("=")
-        if not given:
+        path, equals, text = change.partition("=")
+        if not equals:
             raise ParameterError(f"The change {change!r} has no value: write PATH=VALUE.")
-        if path in REMOVED:
-            raise ParameterError(f"The parameter {path!r} is gone: {REMOVED[path]}")
-        found |= of_today(path, text)
-        group = next(iter(found)).partition(".")[0]
+        group = path.partition(".")[0]
         if group not in groups:
             raise ParameterError(f"The group {group!r} of {change!r} is unknown: choose from {', '.join(groups)}.")
-    return found
-
-
-def value_of(found: Profile, path: str) -> object:
-    """Return a part's or parameter's value, by its name of today or of an earlier version.
-
-    A switch of an earlier version is True or False, or its text. Raises ParameterError for a parameter there is not.
-    """
-    if path in SWITCHES:
-        for text, changes in SWITCHES[path].items():
-            if changed(found, changes) == found:
-                return {"yes": True, "no": False}.get(text, text)
-    today, *_ = _paths([f"{path}=" if path not in SWITCHES else f"{path}={next(iter(SWITCHES[path]))}"])
-    return at(found, today)
-
-
-def restriction_modes() -> tuple[str, ...]:
-    """Return the names of all ways to restrict the arm's approach: none, the rows of the paper's, and other parts."""
-    others = (name for name in Restriction.choices() if name != ApproachRestriction.name)
-    return ("off", *get_args(RowKind), *others)
-
-
-def restriction_mode(profile: Profile) -> str:
-    """Return which of `restriction_modes` a profile has."""
-    part = profile.approach
-    return "off" if part is None else part.rows if isinstance(part, ApproachRestriction) else part.name
-
-
-def with_restriction(profile: Profile, mode: str) -> Profile:
-    """Return a profile with another of `restriction_modes`; a part that stays keeps its parameters."""
-    if mode not in restriction_modes():
-        raise ParameterError(f"The restriction {mode!r} is unknown: choose from {', '.join(restriction_modes())}.")
-    switch = SWITCHES["restriction.mode"]
-    return changed(profile, switch.get(mode, {"approach": mode}))
-
-
-def profile_from(table: Mapping[str, Any]) -> tuple[Profile, tuple[str, ...]]:
-    """Make a profile from the table that `composition.as_table` makes of one.
-
-    Names what another version knew that this one does not. Raises ParameterError where a value does not belong.
-    """
-    unlike: list[str] = []
-    made = from_table(Profile, dict(table), "", unlike)
-    return made, tuple(unlike)
+        texts[path] = text
+    return texts
 
 
 def at_rate(profile: Profile, rate: float) -> Profile:

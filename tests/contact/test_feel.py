@@ -20,7 +20,7 @@ from pretouch_lab.baselines.fixed_bounds import FixedBounds
 MODEL = RobotModel(panda())
 Q = MODEL.description.q_ready
 KIN = MODEL.kinematics(Q)
-PRETOUCH = profile("pretouch:threshold.window_samples=10")
+PRETOUCH = profile("pretouch:window.samples=10")
 UNPLACED = replace(PRETOUCH, detect=replace(PRETOUCH.detect, localise=None))
 STILL = np.zeros(7)
 
@@ -116,7 +116,7 @@ def test_nothing_is_learnt_near_an_object(distance):
     [
         {"reacting": True},
         {"watched": False},
-        {"p": profile("pretouch:threshold.window_samples=10:detection.learn=no")},
+        {"p": profile("pretouch:window.samples=10:detect.learn=never")},
     ],
 )
 def test_nothing_is_learnt_while_reacting_unwatched_or_when_told_not_to(how):
@@ -136,7 +136,7 @@ def test_the_beginning_of_a_contact_is_not_learnt_without_misfit_and_with_it_cou
 
 def test_the_window_is_frozen_while_reacting_only_if_the_profile_says_so():
     force = np.array([0.0, 40.0, 0.0, 0.0, 0.0, 0.0])
-    for p, moved in ((PRETOUCH, False), (profile("paper:threshold.window_samples=10"), True)):
+    for p, moved in ((PRETOUCH, False), (profile("paper:window.samples=10"), True)):
         state = feel_init(MODEL, p)
         for _ in range(12):
             _, state = feel(state, MODEL, KIN, robot(STILL), NOTHING, False, p)
@@ -147,7 +147,7 @@ def test_the_window_is_frozen_while_reacting_only_if_the_profile_says_so():
 
 @pytest.mark.parametrize("name", ["pretouch", "fixed", "observer"])
 def test_without_torques_nothing_is_felt(name):
-    p = profile(f"{name}:threshold.window_samples=10")
+    p = profile(f"{name}:window.samples=10")
     state = feel_init(MODEL, p)
     for _ in range(12):
         found, state = feel(state, MODEL, KIN, robot(np.full(7, np.nan)), NOTHING, False, p)
@@ -157,7 +157,7 @@ def test_without_torques_nothing_is_felt(name):
 
 
 def test_fixed_bounds_by_numbers():
-    p = profile("fixed:threshold.window_samples=2")
+    p = profile("fixed:window.samples=2")
     state = feel_init(MODEL, p)
     for _ in range(3):
         found, state = feel(state, MODEL, KIN, robot(STILL), NOTHING, False, p)
@@ -171,7 +171,7 @@ def test_fixed_bounds_by_numbers():
 
 
 def test_the_papers_rule_tells_its_evidence_and_passes_torques_on():
-    p = profile("paper:threshold.window_samples=4:threshold.compare=raw")
+    p = profile("paper:window.samples=4:detect.compare=raw")
     state = feel_init(MODEL, p)
     for size in (0.0, 0.0, 0.0, 0.0, 5.0, 40.0):
         given = robot(np.full(7, size), np.array([size, 0.0, 0.0, 0.0, 0.0, 0.0]))
@@ -181,16 +181,16 @@ def test_the_papers_rule_tells_its_evidence_and_passes_torques_on():
 
 
 def test_bounds_are_read_from_a_profiles_text_and_bad_ones_refused():
-    given = profile("fixed:detection.joint_torques_nm=10,9,8")
+    given = profile("fixed:detect.joint_torques_nm=10,9,8")
     assert given.detect.joint_torques_nm == (10.0, 9.0, 8.0)
     with pytest.raises(ParameterError, match="joint_torques_nm"):
         FixedBounds(joint_torques_nm=(1.0, -1.0))
     with pytest.raises(ParameterError, match="write a number"):
-        profile("fixed:detection.joint_torques_nm=many")
+        profile("fixed:detect.joint_torques_nm=many")
 
 
 def test_the_place_of_a_push_is_told_and_changes_nothing_else_that_is_felt():
-    off = profile("pretouch:threshold.window_samples=10:detection.localise=no")
+    off = profile("pretouch:window.samples=10:detect.localise=none")
     push = 0.3 + torques(np.array([0.0, 25.0, 0.0]))
     one, two, said = SETTLED, settled(p=off), []
     for _ in range(8):

@@ -18,7 +18,7 @@ KIN = MODEL.kinematics(Q)
 J = MODEL.ee_jacobian(KIN)
 KG = J[:3].T @ np.array([0.0, 0.0, -9.81])
 STILL = np.zeros(7)
-PRETOUCH = profile("pretouch:threshold.window_samples=10:detection.relearn_after_s=1")
+PRETOUCH = profile("pretouch:window.samples=10:detect.relearn_after_s=1")
 NOTHING = no_obstacles()
 
 
@@ -67,7 +67,7 @@ def test_a_load_is_felt_and_learnt_once_it_has_lasted():
 
 @pytest.mark.parametrize(
     "how",
-    [{"near": close()}, {"watched": False}, {"p": profile("pretouch:detection.relearn_after_s=0")}],
+    [{"near": close()}, {"watched": False}, {"p": profile("pretouch:detect.relearn_after_s=0")}],
     ids=["something near", "a unit silent", "switched off"],
 )
 def test_it_is_not_learnt_near_something_unwatched_or_when_told_not_to(how):

@@ -8,6 +8,7 @@ import pytest
 from tests.control.motions import Mover
 from tests.following_arm import DT, Arm
 
+from pretouch.control.approach_restriction import ApproachRestriction
 from pretouch.control.braking import braking_cap
 from pretouch.control.interface import MotionRequest, Restricted
 from pretouch.control.joint_box import joint_limits
@@ -15,7 +16,7 @@ from pretouch.control.motion import joint_motion
 from pretouch.errors import ParameterError
 from pretouch.params import NullSpaceMotion
 from pretouch.perception.closest import closest_points, no_obstacles
-from pretouch.profiles import PROFILES, Profile, profile, with_restriction
+from pretouch.profiles import PROFILES, Profile, profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, Mode, RobotState
@@ -228,9 +229,8 @@ def test_joint_velocities_asked_for_are_the_answer_within_the_limits(panda_model
 
 
 def test_other_modes_rows_go_with_the_null_space_too(panda_model: RobotModel, paper_skin: Skin):
-    for mode in ("off", "slack", "hard"):
-        params = with_restriction(PRETOUCH, mode)
-        arm = on_its_way(panda_model, paper_skin, params)
+    for other in (None, ApproachRestriction(rows="slack"), ApproachRestriction(rows="hard")):
+        arm = on_its_way(panda_model, paper_skin, replace(PRETOUCH, approach=other))
         step = arm.run(5, seen={LEFT: 0.3})[-1]
-        assert len(step.restricted) == (mode != "off")
+        assert len(step.restricted) == (other is not None)
         assert np.isfinite(step.command).all()

@@ -9,7 +9,7 @@ import numpy as np
 from pretouch.contact.admittance import Admittance
 from pretouch.control.approach_restriction import ApproachRestriction, notice_m
 from pretouch.params import ClampParams
-from pretouch.profiles import Profile, restriction_mode
+from pretouch.profiles import Profile
 from pretouch.robot.description import SpeedEnvelope
 from pretouch.robot.model import RobotModel
 from pretouch.types import ControlStep, Mode, QpOutcome, Touched
@@ -164,11 +164,10 @@ def check_braking(step: ControlStep, e: Expected, p: Profile, model: RobotModel)
 def check_rows(step: ControlStep, p: Profile, model: RobotModel) -> None:
     """Approach velocities by finite differences: no faster than eq. 7 allows and the reported slack."""
     o, which = step.obstacles, step.restricted
-    mode = restriction_mode(p)
-    if mode in ("flacco", "ding"):
+    if p.approach is not None and p.approach.name in ("flacco", "ding"):
         return
     notice = o.body_distance < notice_m(p.approach)
-    assert np.array_equal(which, np.flatnonzero(notice & (mode != "off")))
+    assert np.array_equal(which, np.flatnonzero(notice & (p.approach is not None)))
     if not len(which) or np.abs(step.q).max() > 100.0 or np.abs(step.command).max() > 1e3:
         return  # answers to lies, beyond what differences resolve
     if isinstance(p.approach, ApproachRestriction):
@@ -178,7 +177,11 @@ def check_rows(step: ControlStep, p: Profile, model: RobotModel) -> None:
     size = 1e-7 * (1.0 + np.abs(step.command).max())
     assert (step.qp.slack >= 0.0).all()
     assert (np.abs(step.qp.slack - np.maximum(excess, 0.0)) <= size).all(), (step.qp.slack, excess)
-    if mode == "hard" and step.qp.outcome is QpOutcome.SOLVED:
+    if (
+        isinstance(p.approach, ApproachRestriction)
+        and p.approach.rows == "hard"
+        and step.qp.outcome is QpOutcome.SOLVED
+    ):
         assert step.qp.slack.max() <= 1e-7
 
 

@@ -8,7 +8,6 @@ from functools import cache
 import numpy as np
 
 from pretouch.controller import Controller, ControllerState
-from pretouch.profiles import restriction_mode
 from pretouch.robot.description import fr3, panda
 from pretouch.robot.model import RobotModel
 from pretouch.types import ControlStep, Inputs, QpOutcome, RobotState
@@ -64,7 +63,7 @@ class Course:
         self.oracle = Oracle(world.profile, world.skin.ids, robot, world.model.description.qd_max)
         p = world.profile
         self.setting = (
-            "step", f"arm {world.model.description.name}", f"restriction {restriction_mode(p)}",
+            "step", f"arm {world.model.description.name}", f"restriction {getattr(p.approach, 'name', 'none')}",
             f"detection {p.detect.name}", f"reaction {p.react.name}", f"period {p.task.control_period_s}",
             f"units {len(world.skin)}",
         )  # fmt: skip

@@ -7,9 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from pretouch.control.approach_restriction import ApproachRestriction
 from pretouch.control.path import Circle, line
+from pretouch.params import RowKind
 from pretouch.perception.scene_filter import no_fixtures
-from pretouch.profiles import PROFILES, Profile, with_restriction
+from pretouch.profiles import PROFILES, Profile
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin
@@ -26,13 +28,14 @@ K, N = len(SKIN), MODEL.n
 READY = MODEL.description.q_ready
 
 
-def restricted(mode: str, **task: object) -> Profile:
-    return replace(with_restriction(SHORT, mode), task=replace(SHORT.task, **task))
+def restricted(rows: RowKind, **task: object) -> Profile:
+    return replace(SHORT, approach=ApproachRestriction(rows=rows), task=replace(SHORT.task, **task))
 
 
 profiles = st.sampled_from([
-    *map(restricted, ("slack", "hard", "floor", "off")), restricted("hard", control_period_s=0.001),
-    restricted("slack", orientation="free"), replace(SHORT, perception=replace(SHORT.perception, self_margin_m=None)),
+    *map(restricted, ("slack", "hard", "floor")), replace(SHORT, approach=None),
+    restricted("hard", control_period_s=0.001), restricted("slack", orientation="free"),
+    replace(SHORT, perception=replace(SHORT.perception, self_margin_m=None)),
 ])  # fmt: skip
 
 

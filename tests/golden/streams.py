@@ -292,8 +292,8 @@ STREAMS = {
     "press": Stream(
         "pretouch", press, ("and a fixture",), path=(START, (START[0], 0.0, 0.1)), floor=0.3,
     ),
-    "blocked/hard": Stream("paper:restriction.mode=hard", blocked, ("infeasible", "restricted")),
-    "blocked/floor": Stream("paper:restriction.mode=floor", blocked, ("restricted", "slack")),
+    "blocked/hard": Stream("paper:approach.rows=hard", blocked, ("infeasible", "restricted")),
+    "blocked/floor": Stream("paper:approach.rows=floor", blocked, ("restricted", "slack")),
     "blocked/pretouch": Stream("pretouch", blocked, ("restricted",)),
     "silent/paper": Stream("paper", silent, ("No usable reading", "slowed")),
     "silent/pretouch": Stream("pretouch", silent, ("No usable reading", "slowed")),
@@ -304,7 +304,7 @@ STREAMS = {
     "faults/pretouch": Stream("pretouch", faulty, ("cannot be used", "Time went backwards", "do not fit")),
     "touch": Stream("pretouch", touched, ("contact", "localised"), touching=True),
     "outside-points": Stream("pretouch", outside, ("restricted", "outside source")),
-    "imu": Stream("pretouch:detection.use_imu=yes", jolted, ("contact",)),
+    "imu": Stream("pretouch:detect.cues=touch,imu", jolted, ("contact",)),
     **{f"fuzz/{name}": Stream(name, fuzz(7 + i), ("track", "react")) for i, name in enumerate(("paper", "pretouch"))},
     "fuzz/ding": Stream("ding", fuzz(9), ("track",)),
 }  # fmt: skip

@@ -41,7 +41,7 @@ def expected(force, p):
     return contacts, limits
 
 
-@pytest.mark.parametrize("name", ["paper", "paper:threshold.compare=raw", "blind:threshold.window_samples=150"])
+@pytest.mark.parametrize("name", ["paper", "paper:detect.compare=raw", "blind:window.samples=150"])
 def test_contacts_and_thresholds_are_those_of_the_plain_detector(of_force, name):
     force, p = pushed(14.0, PUSHES), profile(name)
     found = detect_imported(of_force(force), p)

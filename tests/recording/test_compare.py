@@ -72,19 +72,19 @@ def test_the_same_profile_decides_exactly_what_was_recorded(arm):
 
 def test_another_profile_decides_what_the_plain_detector_does(arm):
     force = pushed(7.0, PUSHES)
-    found = compare(played(arm, force, seen={0: 0.25}), profile("blind:threshold.window_samples=60"))
+    found = compare(played(arm, force, seen={0: 0.25}), profile("blind:window.samples=60"))
     touch, nothing = Touch(BLIND.detect, replace(BLIND.window, samples=60)), type("Nothing", (), {"point": ()})()
     limits = [touch.feel(sample, np.zeros(3), nothing)[0] for sample in force]
     np.testing.assert_allclose(found.other.upper, [t.upper for t in limits], atol=1e-9)
     np.testing.assert_allclose(found.other.lower, [t.lower for t in limits], atol=1e-9)
-    assert found.other.name == "blind:threshold.window_samples=60"
+    assert found.other.name == "blind:window.samples=60"
     assert np.any(found.recorded.upper < found.other.upper - 1.0) or np.any(
         found.recorded.lower > found.other.lower + 1.0
     )
 
 
 def test_a_contact_that_only_one_finds_is_told_apart(arm):
-    deaf = profile("paper:threshold.f_base_n=20")
+    deaf = profile("paper:detect.f_base_n=20")
     found = compare(played(arm), deaf)
     assert [round(c.time, 1) for c in found.recorded.contacts] == [2.1, 5.2]
     assert [round(c.time, 1) for c in found.other.contacts] == [2.2]

@@ -15,7 +15,7 @@ from pretouch.types import ImuReadings, Inputs
 from tests.fuzz.invariants import same
 from tests.recording.runs import Run, controller_of
 
-OURS = profile("pretouch:detection.use_imu=yes")
+OURS = profile("pretouch:detect.cues=touch,imu")
 
 
 def shaken(inputs: Inputs) -> Inputs:

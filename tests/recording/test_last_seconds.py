@@ -54,7 +54,7 @@ def test_a_latched_hold_leaves_its_last_seconds(controller, tmp_path):
 
 def test_what_is_felt_and_seen_from_outside_is_kept_too(panda_model, paper_skin, tmp_path):
     feeling = Skin([replace(unit, touch=TouchPatch()) for unit in paper_skin.units], panda_model)
-    controller = controller_of(panda_model, feeling, profile("pretouch:detection.use_imu=yes"))
+    controller = controller_of(panda_model, feeling, profile("pretouch:detect.cues=touch,imu"))
     run, kept = Run(controller), LastSeconds(controller, tmp_path / "holds", seconds=1.0)
     source = SeenPoints(0.0, np.zeros(1), np.array([[0.6, 0.2, 0.5]]), np.array([0.01]))
     for i in range(220):

@@ -165,7 +165,7 @@ def test_of_very_many_touches_those_are_listed_that_were_missed(panda_model, pap
 
 
 def test_very_many_changes_of_the_profile_are_summed_up(panda_model, paper_skin):
-    runs = [made.Run(panda_model, paper_skin, profile(f"paper:threshold.f_base_n={8 + i}")) for i in range(40)]
+    runs = [made.Run(panda_model, paper_skin, profile(f"paper:detect.f_base_n={8 + i}")) for i in range(40)]
     kept = [made.Kept(i, None, made.step(panda_model, stamp=0.01 * i)) for i in range(40)]
     changed = made.Recorded(tuple(runs), kept)
     assert "10 more changes are left out" in section(setting_section, changed)
@@ -213,7 +213,7 @@ def test_text_of_a_file_stays_text(panda_model, paper_skin):
 
 def test_parameters_that_are_not_the_papers_are_marked(panda_model, paper_skin):
     changed = one_step(panda_model, paper_skin)
-    changed.runs[0].profile = profile("paper:threshold.f_base_n=8")
+    changed.runs[0].profile = profile("paper:detect.f_base_n=8")
     text = section(parameter_section, changed)
     assert re.findall(r'<b class="other">(.*?)</b>', text) == ["8"]
 

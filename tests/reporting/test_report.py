@@ -29,7 +29,7 @@ def folder(panda_model, paper_skin, tmp_path_factory):
     with Recording(place / "trial.mcap", before, {"command": "test"}) as recording:
         for i, kept in enumerate(played):
             if i == 300:
-                changed = profile("blind:threshold.f_base_n=9")
+                changed = profile("blind:detect.f_base_n=9")
                 recording.change(Controller(panda_model, paper_skin, fixed, path, changed))
             recording.record(Cycle(kept.inputs, state, kept.step, state), kept.truth)
     return place, played
@@ -57,7 +57,7 @@ def test_the_command_writes_a_page_of_several_files(folder, tmp_path, capsys):
     text = out.read_text()
     assert f"{tmp_path.name}/trial.mcap" in text
     assert f"{place.name}/trial.mcap" in text
-    assert "blind:threshold.f_base_n=9" in text
+    assert "blind:detect.f_base_n=9" in text
 
 
 def test_a_killed_file_makes_a_page_that_says_so(folder, tmp_path):

@@ -74,7 +74,6 @@ def test_what_an_experiment_varies_stays():
         ("[plant.ripple_nm]\nvalue = 0.1\n", "give a list of numbers"),
         ("[plant.offsets_nm]\nvalue = [nan]\n", "give a list of numbers"),
         ("[ranging.mode]\nvalue = 'wide'\n", "choose one of short, long"),
-        ("[plant.payloads_kg]\nvalue = [0.5]\n", "write plant.payload_kg, value = 0.5 in place of"),
         ("[plant.payload_kg]\nvalue = [0.5]\n", "give a number"),
         ("[plant.payload_kg]\nuniform = [0.9, 1.1]\ntimes = true\n", "no usual value that it could be a factor on"),
         ("nothing", "not valid TOML"),

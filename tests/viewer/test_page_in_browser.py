@@ -110,7 +110,7 @@ def test_the_page_changes_profile_refuses_what_is_not_allowed_and_drops_a_unit(t
         visitor.choose("Profile", "blind")
         visitor.tab("Controller")
         visitor.wait_until(lambda: simulation.world.profile.name == "blind")
-        visitor.wait_until(lambda: visitor.value("Restrictions") == "off")
+        visitor.wait_until(lambda: visitor.value("Restriction") == "none")
 
         visitor.choose("Profile", "paper")
         visitor.tab("Table I")

@@ -25,7 +25,7 @@ def switched(session: LiveSimulation) -> list:
     steps = session.advance(0.3)
     session.set_profile(PROFILES["blind"])
     steps += session.advance(0.3)
-    session.set_profile(profile("paper:threshold.window_samples=40"))
+    session.set_profile(profile("paper:window.samples=40"))
     session.set_path("line")
     steps += session.advance(0.8)
     steps += poke(session)

@@ -56,7 +56,7 @@ def test_a_profile_switched_in_a_reaction_lets_it_end(running):
     steps = poke(running)
     steps += running.advance(0.5)
     phase = steps[-1].path_phase
-    running.set_profile(profile("paper:react.decay_cycles=150:restriction.mode=hard"))
+    running.set_profile(profile("paper:react.decay_cycles=150:approach.rows=hard"))
     after = running.advance(4.0)
     assert after[0].mode is Mode.REACT
     assert after[0].path_phase == phase
@@ -65,21 +65,21 @@ def test_a_profile_switched_in_a_reaction_lets_it_end(running):
 
 
 def test_another_window_length_is_filled_before_contacts_are_felt(running):
-    running.set_profile(profile("paper:threshold.window_samples=60"))
+    running.set_profile(profile("paper:window.samples=60"))
     after = running.advance(2.0)
     assert modes(after) == [Mode.HOLD, Mode.TRACK]
     assert sum(s.mode is Mode.HOLD for s in after) == pytest.approx(60, abs=1)
     assert holds(after) == {"The force window is filling"}
-    running.set_profile(profile("paper:threshold.window_samples=60:threshold.f_base_n=8"))
+    running.set_profile(profile("paper:window.samples=60:detect.f_base_n=8"))
     assert modes(running.advance(0.5)) == [Mode.TRACK], "the window is kept while its length is the same"
 
 
-@pytest.mark.parametrize("mode", ["off", "hard", "slack", "floor"])
-def test_each_restriction_is_a_parameter_like_others(running, mode):
+@pytest.mark.parametrize("change", ["=none", ".rows=hard", ".rows=slack", ".rows=floor"])
+def test_each_restriction_is_a_parameter_like_others(running, change):
     beside(running, 0.25)
-    running.set_profile(profile(f"paper:restriction.mode={mode}"))
+    running.set_profile(profile(f"paper:approach{change}"))
     after = running.advance(1.5)
-    assert (max(len(s.restricted) for s in after) > 0) == (mode != "off")
+    assert (max(len(s.restricted) for s in after) > 0) == (change != "=none")
 
 
 def test_another_speed_is_reached_gently(running):
@@ -215,7 +215,7 @@ def pressed(session: LiveSimulation) -> float:
 
 
 def test_a_stiffness_is_felt_from_the_next_touch_on(live):
-    session = live(profile=profile("blind:threshold.f_base_n=500:task.speed_m_s=0.001"), stiffness=40_000.0)
+    session = live(profile=profile("blind:detect.f_base_n=500:task.speed_m_s=0.001"), stiffness=40_000.0)
     session.advance(ARMED_S)
     below = session.frame.step.ee_position - [0.0, 0.0, 0.03]
     away = below - [0.0, 0.0, 0.1]
@@ -246,8 +246,10 @@ def test_no_command_leaves_the_limits_whatever_a_person_does(live, seed):
     names, ids = sorted(PROFILES), session.skin.ids
     wishes = (
         lambda: session.set_profile(PROFILES[names[rng.integers(len(names))]]),
-        lambda: session.set_profile(profile(f"paper:threshold.window_samples={rng.integers(20, 120)}")),
-        lambda: session.set_profile(profile(f"paper:restriction.mode={rng.choice(['off', 'hard', 'slack', 'floor'])}")),
+        lambda: session.set_profile(profile(f"paper:window.samples={rng.integers(20, 120)}")),
+        lambda: session.set_profile(
+            profile(f"paper:approach{rng.choice(['=none', '.rows=hard', '.rows=slack', '.rows=floor'])}")
+        ),
         lambda: session.set_profile(profile("paper:react.decay_cycles=50:task.position_margin_rad=0.05")),
         lambda: set_speed(session, rng.uniform(0.05, 1.0)),
         lambda: session.set_path(str(rng.choice(["circle", "line"]))),

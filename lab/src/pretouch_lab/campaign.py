@@ -11,7 +11,7 @@ from pretouch.atomic_write import write_json
 from pretouch.coverage.placement import placement_for
 from pretouch.errors import ExperimentError, SkinError
 from pretouch.params import Orientation
-from pretouch.profiles import profile, restriction_modes
+from pretouch.profiles import profile
 from pretouch.robot.description_file import files_digest
 from pretouch.robot.model import RobotModel
 from pretouch.robot.named import robot_named
@@ -21,6 +21,7 @@ from pretouch_lab.cell import Cell, Context, Grid
 from pretouch_lab.domain_randomisation import digest_of
 from pretouch_lab.engine import Task, open_folder
 from pretouch_lab.registry import EXPERIMENTS
+from pretouch_lab.restrictions import modes
 from pretouch_lab.result_key import parameters_digest, result_key
 
 Recorded = Literal["first", "all"]
@@ -73,7 +74,7 @@ class Request:
         for name in self.profiles:
             profile(name)
         for mode in self.restrictions:
-            _check_choice("restriction mode", mode, restriction_modes())
+            _check_choice("restriction mode", mode, tuple(modes()))
         if self.orientation is not None:
             _check_choice("orientation", self.orientation, get_args(Orientation))
         _check_choice("choice of trials to record", self.record, get_args(Recorded))

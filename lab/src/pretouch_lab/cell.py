@@ -8,19 +8,20 @@ from typing import Any
 
 from pretouch.control.path import Path as TaskPath
 from pretouch.params import Orientation
-from pretouch.profiles import Profile, profile, restriction_mode, with_restriction
+from pretouch.profiles import Profile, profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.sim.paper_scenes import Placement
 from pretouch.sim.plant_params import PlantParams, plant_params_of
 from pretouch.sim.range_finder import RangeFinderParams
 from pretouch.sim.scene import SceneSpec
+from pretouch_lab.restrictions import mode_of, with_mode
 from pretouch_lab.rows import Row
 from pretouch_lab.trial import Setup
 
 _OF_THE_PAPER = ("off", "hard", "slack", "floor")
 """Restriction modes of the paper's equations; any other makes a profile what it is."""
-NAMES_MODE = re.compile(":(restriction.mode|approach|approach.rows)=")
+NAMES_MODE = re.compile(r":approach(\.rows)?=")
 """How the name of a profile names a mode."""
 _SAFE = {"-y": "minus-y", "+y": "plus-y"}
 
@@ -44,7 +45,7 @@ class Grid:
         pairs = []
         for name in self.profiles:
             found = profile(name)
-            mode = restriction_mode(found)
+            mode = mode_of(found)
             fixed = found.perception is None or bool(NAMES_MODE.search(name)) or mode not in _OF_THE_PAPER
             modes = (mode,) if fixed else self.restrictions or (restrictions,)
             pairs += [(name, mode) for mode in modes]
@@ -104,7 +105,7 @@ class Context:
         """Return a cell's profile with the restriction mode of the cell, if it names one, as this run has it."""
         found = profile(cell.profile)
         if "restrictions" in cell.where:
-            found = with_restriction(found, str(cell.where["restrictions"]))
+            found = with_mode(found, str(cell.where["restrictions"]))
         return replace(found, task=replace(found.task, orientation=self.orientation or found.task.orientation))
 
     def setup(self, cell: Cell, seed: int, scene: SceneSpec, path: TaskPath, **other: Any) -> Setup:

@@ -150,11 +150,11 @@ def test_a_stream_gives_back_what_the_controller_was_given(closed_loop, tmp_path
 
 def test_the_sweep_of_one_replay_is_what_each_value_would_find_itself(closed_loop):
     _, stream = closed_loop
-    for text in ("paper", "paper:threshold.compare=raw", "blind"):
+    for text in ("paper", "paper:detect.compare=raw", "blind"):
         made = replay(stream, Baseline(text, text, "f_base_n"), model())
         assert made.onsets() == made.onsets(10.0)
         for value in (6.0, 14.0):
-            own = Baseline("own", f"{text}:threshold.f_base_n={value}", "f_base_n")
+            own = Baseline("own", f"{text}:detect.f_base_n={value}", "f_base_n")
             assert made.onsets(value) == replay(stream, own, model()).onsets()
 
 

@@ -6,7 +6,7 @@ from lab.tests.sweep.made import register
 from pretouch import cli
 
 X = ("--vary", "scene.x1=-3:3", "--vary", "scene.x2=-3:3")
-BASE = ("--vary", "threshold.f_base_n=7:20")
+BASE = ("--vary", "detect.f_base_n=7:20")
 
 
 @pytest.fixture
@@ -46,8 +46,8 @@ def test_a_sweep_shows_and_writes_what_it_says_and_is_not_played_twice(capsys, t
     ("args", "words"),
     [
         (("static",), "Nothing is varied: give --vary"),
-        (("static", "--vary", "threshold.f_base_n"), "has no value: write NAME=LOW:HIGH"),
-        (("static", *BASE, *BASE), "names threshold.f_base_n twice"),
+        (("static", "--vary", "detect.f_base_n"), "has no value: write NAME=LOW:HIGH"),
+        (("static", *BASE, *BASE), "names detect.f_base_n twice"),
         (("sensitivity", "--vary", "scene.x1=0:1"), "--vary goes with an experiment, not with sensitivity"),
         (("ishigami", *X), "contacts. It only tested the sweep"),
         (("missing.toml",), "missing.toml is neither an experiment nor a file"),

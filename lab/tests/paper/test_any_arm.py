@@ -145,7 +145,7 @@ def test_the_scenarios_of_the_avoidance_benchmark_are_set_up_for_it(folder):
 
 @pytest.mark.slow
 def test_it_is_left_alone(others):
-    cell = Cell(free_motion.NAME, "blind:threshold.f_base_n=1000", {"trajectory": "line", "speed_m_s": 0.3})
+    cell = Cell(free_motion.NAME, "blind:detect.f_base_n=1000", {"trajectory": "line", "speed_m_s": 0.3})
     row, _ = free_motion.trial(cell, 0, others, duration_s=5.0)
     assert row["path_rms_m"] < 0.02  # it turns round at both ends of the line
     assert 0.0 < row["norm_median_n"] < 20.0

@@ -17,7 +17,7 @@ from pretouch.types import Mode
 from pretouch_lab.trial import Record, Setup, play
 
 SEED = 1007
-SLOW = "pretouch:restriction.mode=off:task.speed_m_s=0.02"
+SLOW = "pretouch:approach=none:task.speed_m_s=0.02"
 
 
 def pushed(model: RobotModel, skin: Skin, params: Profile, held_s: float, until: float, boxes=()) -> tuple:
@@ -64,7 +64,7 @@ def test_pushed_against_a_board_it_opens_and_holds(panda_model, paper_skin):
 
 @pytest.mark.slow
 def test_a_board_that_stays_is_given_up(panda_model, paper_skin):
-    params = profile("pretouch:restriction.mode=off")
+    params = profile("pretouch:approach=none")
     params = replace(params, react=replace(params.react, give_up=GiveUpParams(contacts=2), patience_s=1.0))
     scene, path = static_scene("line", "+y", 25_000.0, SEED), static_path("line", "+y")
     record = play(Setup(panda_model, paper_skin, params, scene, path, SEED), lambda step, _: step.stamp > 16.0)

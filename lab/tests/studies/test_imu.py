@@ -14,7 +14,7 @@ from pretouch_lab.studies.impacts.kinds import KINDS, LINKS, pulse
 
 
 def test_only_profiles_with_the_sequential_test_are_asked():
-    changed = "pretouch:detection.imu_gain=10"
+    changed = "pretouch:detect.cues.imu.gain=10"
     assert [cell.profile for cell in imu.cells(Grid(("paper", changed)))] == [changed] * len(imu.WAYS)
     assert [cell.profile for cell in imu.cells(Grid(("paper", "blind")))] == ["pretouch"] * len(imu.WAYS)
 

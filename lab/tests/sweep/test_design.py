@@ -8,11 +8,11 @@ from pretouch.errors import ExperimentError
 from pretouch_lab.sweep.definition import Asked, sweep_of
 from pretouch_lab.sweep.design import columns, points, saltelli
 
-VARY = {"threshold.f_base_n": "7:20", "skin.units": "1:64:log", "scene.side": "-y,+y"}
+VARY = {"detect.f_base_n": "7:20", "skin.units": "1:64:log", "scene.side": "-y,+y"}
 
 
 def test_a_grid_plays_each_combination_with_the_same_arms():
-    sweep = sweep_of(Asked("static", {"threshold.f_base_n": "7:20:3", "scene.side": "-y,+y"}, design="grid", arms=4))
+    sweep = sweep_of(Asked("static", {"detect.f_base_n": "7:20:3", "scene.side": "-y,+y"}, design="grid", arms=4))
     found = points(sweep)
     assert len(found) == 3 * 2 * 4
     arms = {}
@@ -24,7 +24,7 @@ def test_a_grid_plays_each_combination_with_the_same_arms():
 def test_a_latin_hypercube_has_one_point_in_each_slice_of_each_parameter():
     sweep = sweep_of(Asked("static", VARY, design="lhs", samples=40, arms=8))
     found = points(sweep)
-    base = np.array([point.values["threshold.f_base_n"] for point in found])
+    base = np.array([point.values["detect.f_base_n"] for point in found])
     slices = np.floor((base - 7.0) / 13.0 * 40).astype(int)
     assert sorted(slices) == list(range(40))
     assert sorted(point.seed for point in found) == sorted([*range(1000, 1008)] * 5)
@@ -54,8 +54,8 @@ def test_seeds_for_development_are_none_of_the_published_ones():
 
 
 def test_values_that_go_not_together_are_found_before_anything_is_played():
-    sweep = sweep_of(Asked("static", {"threshold.f_base_n": "6:20", "threshold.f_d_n": "0:9"}, samples=16))
-    with pytest.raises(ExperimentError, match=r"go not together, threshold.f_base_n = .*greater than f_d_n.*Narrow"):
+    sweep = sweep_of(Asked("static", {"detect.f_base_n": "6:20", "detect.f_d_n": "0:9"}, samples=16))
+    with pytest.raises(ExperimentError, match=r"go not together, detect.f_base_n = .*greater than f_d_n.*Narrow"):
         points(sweep)
 
 

@@ -28,7 +28,7 @@ def test_a_cell_of_the_static_experiment_is_its_trial():
 
 def test_detectors_of_one_stream_are_one_job_and_other_sensing_is_another():
     sweep = sweep_of(Asked(
-        "free-motion", {"threshold.f_base_n": "4.5,20", "sensing.rate_hz": "10,50"},
+        "free-motion", {"detect.f_base_n": "4.5,20", "sensing.rate_hz": "10,50"},
         fix={"scene.counted_s": "3", "scene.warm_up_s": "2"}, design="grid", arms=1,
     ))  # fmt: skip
     jobs = jobs_of(sweep, [cell_of(sweep, point) for point in points(sweep)])
@@ -43,7 +43,7 @@ def test_detectors_of_one_stream_are_one_job_and_other_sensing_is_another():
 
 def test_contacts_are_felt_sooner_with_a_lower_threshold():
     sweep = sweep_of(Asked(
-        "contacts", {"threshold.f_base_n": "6,30"}, fix={"scene.contacts": "4", "scene.warm_up_s": "2"}, design="grid",
+        "contacts", {"detect.f_base_n": "6,30"}, fix={"scene.contacts": "4", "scene.warm_up_s": "2"}, design="grid",
         arms=1,
     ))  # fmt: skip
     (job,) = jobs_of(sweep, [cell_of(sweep, point) for point in points(sweep)])
@@ -53,7 +53,7 @@ def test_contacts_are_felt_sooner_with_a_lower_threshold():
 
 
 def test_a_stream_that_cannot_be_recorded_fails_all_of_its_cells_with_the_reason():
-    sweep = sweep_of(Asked("free-motion", {"threshold.f_base_n": "8,9"}, design="grid", arms=1))
+    sweep = sweep_of(Asked("free-motion", {"detect.f_base_n": "8,9"}, design="grid", arms=1))
     (job,) = jobs_of(sweep, [cell_of(sweep, point) for point in points(sweep)])
     asked = json.loads(job.written())
     for cell in asked["cells"]:

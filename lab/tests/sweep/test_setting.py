@@ -15,7 +15,7 @@ from pretouch_lab.sweep.setting import built, skin_of, world_digest
 
 def test_each_value_arrives_where_its_name_says():
     values = {
-        "threshold.f_base_n": 8.25, "restriction.mode": "floor", "reduction.enabled": False, "plant.mass_error": 0.1,
+        "detect.f_base_n": 8.25, "approach.rows": "floor", "slow": "none", "plant.mass_error": 0.1,
         "plant.kind": "payload", "sensing.latency_s": 0.1, "sensing.rate_hz": 10.0, "skin.units": 3,
         "scene.side": "+y",
     }  # fmt: skip
@@ -30,7 +30,7 @@ def test_each_value_arrives_where_its_name_says():
 
 def test_a_number_arrives_to_its_last_bit():
     value = 1 / 3 + 1e-9
-    assert built("paper", StaticScene(), {"threshold.f_std_n": value}, 0).profile.detect.f_std_n == value
+    assert built("paper", StaticScene(), {"detect.f_std_n": value}, 0).profile.detect.f_std_n == value
 
 
 def test_nothing_varied_is_the_profile_and_the_arm_of_all_other_experiments():
@@ -64,19 +64,19 @@ def test_a_cell_knows_the_file_its_world_is_of(tmp_path):
     [
         ("dance", {"a.b": "1:2"}, ExperimentError, "'dance' cannot be swept: choose from static, avoidance"),
         ("static", {}, ExperimentError, "Nothing is varied: give --vary"),
-        ("static", {"f_base_n": "1:2"}, ExperimentError, "The group 'f_base_n' of .* is unknown: choose from"),
-        ("static", {"anticipation.detour_hold_s": "1:2"}, ExperimentError, "'anticipation.detour_hold_s' is gone: the"),
-        ("static", {"threshold.f": "1:2"}, ExperimentError, "The group 'threshold' of .* is unknown"),
+        ("static", {"f_base_n": "1:2"}, ExperimentError, "The parameter 'f_base_n' is unknown: there is name"),
+        ("static", {"slow": "1:2"}, ExperimentError, "is not one of numbers: slow is 'on'"),
+        ("static", {"threshold.f": "1:2"}, ExperimentError, "The parameter 'threshold' is unknown: there is name"),
         ("static", {"scene.place": "1:2"}, ExperimentError, "scene has trajectory, side, stiffness_n_m"),
         ("static", {"plant.ripple_nm": "1:2"}, ExperimentError, "one value a joint"),
-        ("static", {"threshold.f_base_n": "3:9"}, ExperimentError, "holds 3.0, which is not allowed.*than f_d_n"),
+        ("static", {"detect.f_base_n": "3:9"}, ExperimentError, "holds 3.0, which is not allowed.*than f_d_n"),
         ("static", {"skin.units": "0:4"}, ExperimentError, "skin.units is 0: give 1 or more"),
         ("static", {"skin.units": "1:65"}, ExperimentError, "holds 65, which is not allowed.*whole number to 64"),
         ("static", {"plant.kind": "nominal,rusty"}, ExperimentError, "plant.kind=rusty is unknown"),
         ("static", {"plant.world": "none,mars"}, ExperimentError, "'mars' is not one of nominal, realistic, stress"),
         (
             "contacts",
-            {"reduction.d_max_m": "0.5:1"},
+            {"slow.d_max_m": "0.5:1"},
             ExperimentError,
             "nothing in contacts: take one of window, detect",
         ),
@@ -94,14 +94,14 @@ def test_what_cannot_be_swept_is_said_with_the_way_out(experiment, vary, error, 
         ({"samples": 100}, "samples is 100: give a power of two, 128 for one"),
         ({"arms": 0}, "arms is 0: give 1 to 1000"),
         ({"metrics": ("force",)}, "does not measure 'force': choose from peak_estimate_n"),
-        ({"fix": {"threshold.alpha": "0.2"}}, "threshold.alpha is both varied and fixed"),
+        ({"fix": {"window.alpha": "0.2"}}, "window.alpha is both varied and fixed"),
         ({"name": "../x"}, "bad one for a folder"),
         ({"profile": "brave"}, "'brave' is unknown"),
     ],
 )
 def test_options_that_cannot_be_are_said(more, words):
     with pytest.raises((ExperimentError, ParameterError), match=words):
-        sweep_of(Asked("static", {"threshold.alpha": "0:1"}, **more))
+        sweep_of(Asked("static", {"window.alpha": "0:1"}, **more))
 
 
 def test_more_units_are_those_of_fewer_and_others():

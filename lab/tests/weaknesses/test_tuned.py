@@ -9,9 +9,9 @@ from pretouch_lab.cell import Cell, Grid
 from pretouch_lab.experiment import Sources
 from pretouch_lab.weaknesses import tuned
 
-STRICT = "paper:restriction.v_max_m_s=0.04:restriction.slack_weight=1000"
-FLOOR = "paper:restriction.mode=floor"
-QUICK = "paper:restriction.v_max_m_s=0.4:restriction.slack_weight=1000"
+STRICT = "paper:approach.v_max_m_s=0.04:approach.slack_weight=1000"
+FLOOR = "paper:approach.rows=floor"
+QUICK = "paper:approach.v_max_m_s=0.4:approach.slack_weight=1000"
 
 
 def cell(scene, name, mode="slack"):
@@ -141,7 +141,7 @@ def test_cells_of_two_profiles_are_told_apart(strict):
     summary = tuned.summarise(rows)
     (table,) = tuned.tables(summary)
     assert [r[0] for r in table.rows] == [
-        "line\npaper", "line\nthresholds-only", "line\npaper\nrestriction.mode=floor",
+        "line\npaper", "line\nthresholds-only", "line\npaper\napproach.rows=floor",
     ]  # fmt: skip
     assert width(table) <= 80
     (picture,) = tuned.EXPERIMENT.draw(Sources(summary, lambda _: None, ()))

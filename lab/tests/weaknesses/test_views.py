@@ -64,7 +64,7 @@ def test_readings_are_sorted_by_what_the_model_predicts(context, panda_model, pa
     assert row["obstacle_fraction"] == 0.0
     assert row["cut_fraction"] == pytest.approx(np.mean(either - 0.06 < 0.8), abs=1e-5)
     reach = np.sort(either)[2] - 0.06 + 0.001  # from the margin before the third view on
-    far = views.seen(record, context, room, profile(f"paper:perception.self_margin_m=0.06:reduction.d_max_m={reach}"))
+    far = views.seen(record, context, room, profile(f"paper:perception.self_margin_m=0.06:slow.d_max_m={reach}"))
     assert far["cut_fraction"] == pytest.approx(3 / 7, abs=1e-5)
     nearer = views.seen(record, context, room, profile("paper:perception.self_margin_m=0.04"))
     assert nearer["unpredicted_fraction"] == pytest.approx(3 / 7, abs=1e-5)
@@ -128,11 +128,11 @@ def test_the_way_is_compared_with_blind_and_tables_fit(trials):
 
 def test_rows_of_two_modes_or_profiles_are_told_apart(trials):
     paper, other = (trials[name][0] for name in ("paper", UNFILTERED))
-    hard = {"restrictions": "hard", "profile": "paper:restriction.mode=hard"}
+    hard = {"restrictions": "hard", "profile": "paper:approach.rows=hard"}
     part = views.summarise([paper, other, paper | hard, paper | {"profile": "paper-0.5m"}])
     for table in views.tables(part):
         assert [row[1] for row in table.rows] == [
-            "paper\nslack", "paper\nslack\nno filter", "paper\nrestriction.mode=\nhard\nhard", "paper-0.5m\nslack",
+            "paper\nslack", "paper\nslack\nno filter", "paper\napproach.rows=\nhard\nhard", "paper-0.5m\nslack",
         ]  # fmt: skip
         assert width(table) <= 80
     (first, _) = views.tables(views.summarise([paper, other]))

@@ -29,10 +29,10 @@ class RepeatedContactState:
     """Whether the contact of the reaction under way is among them."""
     bound: float
     """Energy that contact may give the arm and still be one of an object at rest [J]."""
-    q: FloatArray | None = None
-    """(n,) joint positions at the last contact there [rad], None for no such location."""
-    lever: FloatArray | None = None
-    """(n,) external torques of that contact for each newton of its force [m]."""
+    q: FloatArray
+    """(n,) joint positions at the last contact there [rad]; (0,) for no such location."""
+    lever: FloatArray
+    """(n,) external torques of that contact for each newton of its force [m]; (0,) for no such location."""
     touched: float = -np.inf
     """Arc length of the last contact of all, counted or not [m]."""
 
@@ -79,7 +79,7 @@ def meet(state: RepeatedContactState, met: Met, near: bool, params: GiveUpParams
 
 def repeated_contact_init() -> RepeatedContactState:
     """Return the state of an arm that has met nothing."""
-    return RepeatedContactState(0.0, np.zeros(3), 0, False, 0.0, 0.0, False, 0.0)
+    return RepeatedContactState(0.0, np.zeros(3), 0, False, 0.0, 0.0, False, 0.0, np.zeros(0), np.zeros(0))
 
 
 def given_up(state: RepeatedContactState, params: GiveUpParams | None) -> bool:
@@ -107,8 +107,6 @@ def count_contact(state: RepeatedContactState, met: Met, near: bool, params: Giv
 
 def _same_object(state: RepeatedContactState, met: Met) -> bool:
     """Whether a contact can be with the object at rest that the arm met last at a location."""
-    if state.q is None or state.lever is None:  # as in recordings of before
-        return True
     sizes = float(np.linalg.norm(state.lever) * np.linalg.norm(met.lever))
     alike = float(state.lever @ met.lever) >= _ALIKE * sizes
     return alike and -_SHORT_M <= _farther(state.q, state.lever, met.q) <= _FARTHER_M
@@ -141,7 +139,7 @@ def forget_passed(state: RepeatedContactState, phase: float, q: FloatArray) -> R
     """Forget the location once the arm is past it: on its path, or where an object at rest would be in its way."""
     if not state.contacts:
         return state
-    there = state.q is not None and state.lever is not None and _farther(state.q, state.lever, q) > _FARTHER_M
+    there = _farther(state.q, state.lever, q) > _FARTHER_M
     return _nowhere(state) if there or phase > state.phase + _LOCATION_M else state
 
 

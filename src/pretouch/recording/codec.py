@@ -4,8 +4,6 @@ Both ways follow annotations: a message has the names of a class's fields, what 
 it, and an array with rows says so in the message's definition. What is given here is what differs from that.
 """
 
-import math
-import struct
 from collections.abc import Callable
 from dataclasses import fields, is_dataclass
 from enum import Enum
@@ -47,12 +45,6 @@ MOVING = f"{PACKAGE}/msg/MovingFixtures"
 
 _NAMED: dict[type, str] = {ControlStep: "Step", TouchReadings: "Touch"}
 """Messages that are not named as the classes of which they hold the fields."""
-_NO_PLACES = bytes(20)
-"""Lengths of the five empty rows of places that are touched: steps recorded by versions without them end before."""
-_UNKNOWN = struct.pack("<d", math.nan)
-"""The force that is found, of steps recorded by versions that did not say it."""
-_HEADER = 4
-"""Bytes before the first field, from which numbers are aligned."""
 _SENSIBLE_S = 1e12
 """A time stamp from here on [s] is shown in a sentence, as it was given."""
 _SHOWN = 500
@@ -315,23 +307,8 @@ def encode_step(sequence: int, step: ControlStep, tangent: FloatArray | None = N
 
 def decode_step(data: bytes) -> tuple[int, ControlStep, FloatArray]:
     """Return the number of a step, the step, and the path's tangent there, (0,) unless it was kept."""
-    try:
-        m = decoded(STEP, data)
-    except RecordingError:
-        m = _older_step(data)
+    m = decoded(STEP, data)
     return m.sequence, _made(ControlStep, m), m.path_tangent
-
-
-def _older_step(data: bytes) -> Any:
-    """Read a step that ends before the force that is found, or before the places that are touched."""
-    try:
-        return decoded(STEP, _with_unknown_force(data))
-    except RecordingError:
-        return decoded(STEP, _with_unknown_force(data + _NO_PLACES))
-
-
-def _with_unknown_force(data: bytes) -> bytes:
-    return data + bytes(-(len(data) - _HEADER) % len(_UNKNOWN)) + _UNKNOWN
 
 
 def encode_truth(sequence: int, truth: Truth) -> bytes:

@@ -17,7 +17,7 @@ from pretouch.control.path import Circle, Path, WayPoints
 from pretouch.controller import Controller
 from pretouch.errors import PretouchError, RecordingError
 from pretouch.perception.scene_filter import Fixtures
-from pretouch.profiles import Profile, profile_from
+from pretouch.profiles import Profile
 from pretouch.recording.messages import FORMAT, PACKAGE, decoded, encoded, make
 from pretouch.recording.plain import JSON, as_json, from_json, sound
 from pretouch.recording.versions import versions
@@ -85,8 +85,6 @@ class Run:
     about: dict[str, JSON]
     """Whatever the caller said of the run."""
     profile: Profile
-    unlike: tuple[str, ...]
-    """Parameters that the version which made it has and this one has not, or the other way round."""
     _message: Any
     _tangents: Callable[[], Tangents]
 
@@ -117,11 +115,6 @@ class Run:
 
     def controller(self) -> Controller:
         """Make the controller again, on the model, skin, fixtures and path of this run."""
-        if self.unlike:
-            raise RecordingError(
-                f"The recorded profile differs from this version in {', '.join(self.unlike)}: recompute it with the"
-                f" version that made it, {self.versions.get('pretouch', 'unknown')}."
-            )
         return sound(lambda: Controller(self.model, self.skin, self.fixtures, self.path, self.profile))
 
 
@@ -148,9 +141,9 @@ def decode_run(data: bytes, tangents: Callable[[int], Tangents]) -> Run:
             f"The recording has format {m.format}, but this version of pretouch reads up to {FORMAT}: open it with a"
             " later version."
         )
-    profile, unlike = sound(lambda: profile_from(from_json(m.profile)))
+    profile = sound(lambda: from_table(Profile, from_json(m.profile)))
     return Run(
-        m.sequence, from_json(m.versions), m.started, from_json(m.about), profile, unlike, m,
+        m.sequence, from_json(m.versions), m.started, from_json(m.about), profile, m,
         lambda: tangents(m.sequence),
     )  # fmt: skip
 
@@ -229,7 +222,7 @@ def _skin(m: Any, model: RobotModel) -> Skin:
     sigmas = from_json(m.robot).get(_SIGMAS, [[0.0, 0.0]] * len(poses))
     patches = from_json(m.robot).get(_TOUCH, [None] * len(poses))
     tables = from_json(m.robot).get(_SENSOR)
-    sensors = [from_table(Sensor, table, "unit_sensor", []) for table in tables or []] or [PAPER_SENSOR] * len(poses)
+    sensors = [from_table(Sensor, table, "unit_sensor") for table in tables or []] or [PAPER_SENSOR] * len(poses)
     zones = from_json(m.robot).get(_ZONE, [None] * len(poses))
     units = zip(m.unit_id, m.unit_link, poses, sigmas, patches, sensors, zones, strict=True)
     return Skin(

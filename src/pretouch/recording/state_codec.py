@@ -5,9 +5,8 @@ of the profile remembers is annotated with `object`, and kept with the name of t
 """
 
 from collections.abc import Iterator
-from dataclasses import MISSING, fields, is_dataclass
+from dataclasses import is_dataclass
 from enum import Enum
-from functools import cache
 from typing import Any, get_args, get_origin
 
 import numpy as np
@@ -28,14 +27,6 @@ _UNREAD = "watch.robot.tau_ext"
 def _is_made_of_fields(hint: Any) -> bool:
     """Whether a type is a dataclass or a named tuple."""
     return is_dataclass(hint) or hasattr(hint, "_fields")
-
-
-@cache
-def _with_default(kind: type) -> frozenset[str]:
-    """Names of the fields that need not be given."""
-    if not is_dataclass(kind):
-        return frozenset()
-    return frozenset(f.name for f in fields(kind) if f.default is not MISSING)
 
 
 class _Parts:
@@ -187,11 +178,6 @@ class _Reading:
             raise ValueError(f"{found!r} where {name!r} belongs")
         return kind, shape
 
-    def holds(self, name: str) -> bool:
-        """Whether the next part is one of this name, or in it."""
-        found = self._parts[self._at][0] if self._at < len(self._parts) else ""
-        return found == name or found.startswith(f"{name}.")
-
     def numbers(self, shape: tuple[int, ...]) -> Any:
         count = int(np.prod(shape))
         start, self._used = self._used, self._used + count
@@ -227,12 +213,7 @@ def _give(parts: _Reading, name: str, hint: Any) -> Any:
         hint = parts.of_part(name) if hint is object else left
     if _is_made_of_fields(hint):
         kind = hint if isinstance(hint, type) else type(hint)
-        given, may_lack = {}, _with_default(kind)
-        for field, inner in hints_of(kind):
-            whole = f"{name}.{field}" if name else field
-            if field not in may_lack or parts.holds(whole):  # what an older version did not know is as it began
-                given[field] = _give(parts, whole, inner)
-        return kind(**given)
+        return kind(*[_give(parts, f"{name}.{field}" if name else field, inner) for field, inner in hints_of(kind)])
     kind_name, shape = parts.next(name)
     if kind_name == "tuple":
         return tuple(_give(parts, f"{name}.{i}", inner) for i, inner in enumerate(_inner(hint, int(shape))))

@@ -23,8 +23,6 @@ _STREAM = 51
 _WAYS = ("value", "uniform", "log_uniform", "normal")
 _OTHER = ("times", "each", "source", "standard_error")
 _MISPLACED = ("position_mm", "orientation_deg")
-_RENAMED = {"plant.payloads_kg": "write plant.payload_kg, value = 0.5 in place of value = [0.5]"}
-"""Fields of earlier versions, and what takes their place."""
 
 Params = TypeVar("Params", PlantParams, RangeFinderParams)
 
@@ -135,8 +133,6 @@ def _spreads(place: Path, table: dict[str, Any]) -> list[Spread]:
         if part not in known or not isinstance(entries, dict):
             raise ParameterError(f"{place} has an unknown table {part!r}: use about, {', '.join(known)}.")
         for name, entry in entries.items():
-            if f"{part}.{name}" in _RENAMED:
-                raise ParameterError(f"{place} has {part}.{name}: {_RENAMED[f'{part}.{name}']}.")
             if name not in known[part]:
                 raise ParameterError(
                     f"{place} has an unknown field {part}.{name}: choose from {', '.join(known[part])}."

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 
-from pretouch.composition import differences
+from pretouch.composition import changed, differences
+from pretouch.control.interface import Restriction
 from pretouch.errors import RecordingError
-from pretouch.profiles import PROFILES, Profile, restriction_mode, restriction_modes, with_restriction
+from pretouch.profiles import PROFILES, Profile
 from pretouch.serving.fci.pushes import AXES
 from pretouch.types import FloatArray
 from pretouch.viewer.action_queue import ActionQueue
@@ -129,8 +130,10 @@ class Controls:
         gui, docs = self._gui, field_docs()
         speed = gui.add_slider("Path speed [m/s]", 0.05, 0.5, 0.05, 0.3, hint=docs["TaskParams", "speed_m_s"])
         self._number(speed, self._choose_speed, "path speed", lambda: self._profile.task.speed_m_s)
-        mode = gui.add_dropdown("Restrictions", restriction_modes(), hint=docs["Profile", "approach"])
-        self._choice(mode, self._choose_restrictions, "restrictions", lambda: restriction_mode(self._profile))
+        part = gui.add_dropdown("Restriction", ("none", *Restriction.choices()), hint=docs["Profile", "approach"])
+        self._choice(
+            part, self._choose_restriction, "restriction", lambda: getattr(self._profile.approach, "name", "none")
+        )
         with gui.add_folder("Table I", expand_by_default=False):
             for entry in TABLE_1:
                 # as text: of a field for numbers that is emptied, viser tells nobody
@@ -207,8 +210,8 @@ class Controls:
     def _choose_speed(self, speed: float) -> None:
         self._change(replace(self._profile, task=replace(self._profile.task, speed_m_s=float(speed))))
 
-    def _choose_restrictions(self, mode: str) -> None:
-        self._change(with_restriction(self._profile, mode))
+    def _choose_restriction(self, name: str) -> None:
+        self._change(changed(self._profile, {"approach": name}))
 
     def _text_of(self, entry: TableEntry) -> str:
         return entry.text(self._profile)

@@ -52,7 +52,7 @@ def test_levers_are_the_reach_of_the_arm(panda_model: RobotModel) -> None:
 
 
 def test_a_higher_threshold_of_ours_raises_the_arms(panda_model: RobotModel) -> None:
-    higher = collision_behavior(profile("paper:threshold.f_base_n=20"), panda_model)
+    higher = collision_behavior(profile("paper:detect.f_base_n=20"), panda_model)
     assert higher.upper_force[0] == collision_behavior(profile("paper"), panda_model).upper_force[0] + 10.0
 
 
@@ -118,6 +118,6 @@ def test_an_arm_that_is_pushed_yields_in_any_direction_before_it_stops_by_itself
 
 def test_a_detector_that_feels_too_late_for_the_arm_is_refused(panda_model: RobotModel) -> None:
     with pytest.raises(ParameterError, match=r"must stop by itself from 60 N on"):
-        collision_behavior(profile("pretouch:detection.offset_prior_nm=3"), panda_model)
+        collision_behavior(profile("pretouch:detect.offset_prior_nm=3"), panda_model)
     with pytest.raises(ParameterError, match=r"may miss inf N"):
-        collision_behavior(profile("pretouch:detection.contact_gain=0.5"), panda_model)
+        collision_behavior(profile("pretouch:detect.contact_gain=0.5"), panda_model)

@@ -133,7 +133,7 @@ def test_the_static_experiment_repeats_to_the_last_bit_and_the_arm_yields_away_f
     tmp_path, kind, side, push, times
 ):
     scene = "--scene", "static", "--side", side
-    words = "--profile", "paper:restriction.mode=off", "--seconds", "9"
+    words = "--profile", "paper:approach=none", "--seconds", "9"
     first, said = in_lockstep(kind, tmp_path, "a.mcap", scene, *words)
     if times > 1:
         second, _ = in_lockstep(kind, tmp_path, "b.mcap", scene, *words)

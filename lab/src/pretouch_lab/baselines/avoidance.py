@@ -7,11 +7,11 @@ from pretouch_lab.benchmarks.ablations import ablations
 BASELINES = {
     "blind": "blind",
     "flacco": "flacco",
-    "flacco-surface": "flacco:baselines.flacco_size_m=0.1",
+    "flacco-surface": "flacco:approach.size_m=0.1",
     "ding": "ding",
-    "ding-near": "ding:baselines.ding_weighted_m=0.3",
-    "paper": "paper:restriction.mode=slack",
-    "paper-off": "paper:restriction.mode=off",
+    "ding-near": "ding:approach.weighted_m=0.3",
+    "paper": "paper:approach.rows=slack",
+    "paper-off": "paper:approach=none",
     "pretouch": "pretouch",
 }
 """Profile of each baseline: the published methods as published, and with another tuning."""

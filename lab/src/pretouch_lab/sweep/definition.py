@@ -99,7 +99,7 @@ def sweep_of(asked: Asked, seeds: SeedRange = "development") -> Sweep:
     if asked.design not in get_args(Design):
         raise ExperimentError(f"The design {asked.design!r} is unknown: choose from {', '.join(get_args(Design))}.")
     if not vary:
-        raise ExperimentError("Nothing is varied: give --vary NAME=LOW:HIGH, threshold.f_base_n=5:15 for one.")
+        raise ExperimentError("Nothing is varied: give --vary NAME=LOW:HIGH, detect.f_base_n=5:15 for one.")
     if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]*", name):
         raise ExperimentError(f"The name {name!r} would be a bad one for a folder: use letters, digits and dashes.")
     for one in (*vary, *fix):

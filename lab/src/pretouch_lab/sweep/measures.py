@@ -8,7 +8,6 @@ from pretouch.checks import Checked, Positive
 from pretouch.control.approach_restriction import ApproachRestriction
 from pretouch.errors import ExperimentError
 from pretouch.profiles import Profile
-from pretouch.renamed import path_today
 from pretouch_lab.benchmarks.detection.arm import model
 from pretouch_lab.cell import Cell, Context
 from pretouch_lab.paper import avoidance, dynamic, static
@@ -44,10 +43,9 @@ class Measure:
 
     def check(self, name: str) -> None:
         """Refuse a parameter of the profile that cannot change anything here."""
-        today = path_today(name)
-        group = today.partition(".")[0]
+        group = name.partition(".")[0]
         of_profile = group in Profile.__dataclass_fields__
-        if self.groups is not None and of_profile and not {group, today} & set(self.groups):
+        if self.groups is not None and of_profile and not {group, name} & set(self.groups):
             of = f"take one of {', '.join(self.groups)}, or" if self.groups else "take one of scene, or"
             raise ExperimentError(f"The parameter {name} changes nothing in {self.name}: {of} the experiment static.")
 
@@ -132,7 +130,7 @@ def _static_cost(setting: Setting) -> float:
 
 CLOSED_LOOP = (
     Measure(
-        "static", "the arm runs into a board (paper IV-A)", "paper:restriction.mode=off", StaticScene(),
+        "static", "the arm runs into a board (paper IV-A)", "paper:approach=none", StaticScene(),
         {
             **_PEAKS, "delay_s": "time from the touch to the reaction [s]",
             "impact_speed_m_s": "speed of the touch [m/s]", "contact": "whether it touched the board",

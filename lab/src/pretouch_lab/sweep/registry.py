@@ -5,9 +5,7 @@ from pretouch_lab.sweep.measures import CLOSED_LOOP, Measure
 from pretouch_lab.sweep.streams import ON_STREAMS
 
 MEASURES: dict[str, Measure] = {m.name: m for m in (*CLOSED_LOOP, *ON_STREAMS)}
-REMOVED = {
-    "ishigami": "It only tested the sweep and is part of its tests now: try static --vary threshold.f_base_n=7:20."
-}
+REMOVED = {"ishigami": "It only tested the sweep and is part of its tests now: try static --vary detect.f_base_n=7:20."}
 """Where former experiments went, by name."""
 
 

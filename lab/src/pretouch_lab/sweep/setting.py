@@ -6,14 +6,15 @@ named one, `plant.world` for the arm and range finders that the seed draws of a 
 experiment plays.
 """
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import cache
 from numbers import Real
 from typing import Any
 
 from pretouch.checks import Checked
+from pretouch.composition import Part, at
 from pretouch.errors import ExperimentError, ParameterError
-from pretouch.profiles import Profile, profile, value_of
+from pretouch.profiles import Profile, profile
 from pretouch.sensing.skin import Skin, paper_skin
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.randomisation import WorldSet, drawn, world_set
@@ -98,10 +99,13 @@ def current(name: str, base: Profile, scene: Checked) -> Value:
 
 def _of_profile(name: str, base: Profile, others: tuple[str, ...]) -> object:
     try:
-        return value_of(base, name)
+        value = at(base, name)
     except ParameterError as error:
         also = f"Beside those of the profile there are parameters of {', '.join(others)}."
         raise ExperimentError(f"{error} {also}") from error
+    if is_dataclass(value) or value is None:  # a part, or a group that can be left out
+        return value.name if isinstance(value, Part) else "none" if value is None else "on"
+    return value
 
 
 def built(profile_text: str, scene: Checked, values: Values, seed: int) -> Setting:

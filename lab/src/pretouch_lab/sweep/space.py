@@ -1,4 +1,4 @@
-"""The range of one swept parameter, as it is written: `threshold.f_base_n=5:15`, and what lies in it."""
+"""The range of one swept parameter, as it is written: `detect.f_base_n=5:15`, and what lies in it."""
 
 import math
 from dataclasses import dataclass

@@ -9,7 +9,7 @@ import numpy as np
 
 from pretouch.control.approach_restriction import of_table_i
 from pretouch.control.path import Path, line
-from pretouch.profiles import profile, restriction_mode
+from pretouch.profiles import profile
 from pretouch.robot.model import RobotModel
 from pretouch.sim.hand import HandGoal, HandScript, point_on_arm
 from pretouch.sim.paper_scenes import static_path, static_scene
@@ -23,6 +23,7 @@ from pretouch_lab.cell import NAMES_MODE, Cell, Context, Grid
 from pretouch_lab.experiment import Experiment, Picture, Sources
 from pretouch_lab.paper import static
 from pretouch_lab.paper.static import least_sensed
+from pretouch_lab.restrictions import mode_of
 from pretouch_lab.rows import Row, cells_of, grouped, peak, rounded
 from pretouch_lab.tables import median, plain
 from pretouch_lab.trial import Record, play
@@ -68,7 +69,7 @@ def cells(grid: Grid) -> list[Cell]:
         if found.perception is None:
             continue
         if NAMES_MODE.search(name):
-            tunings.append((name, restriction_mode(found)))
+            tunings.append((name, mode_of(found)))
             continue
         values = product(SLACK_WEIGHTS, V_MAX_M_S)
         tunings += [(name + _tuning(v_max, weight), "slack") for weight, v_max in values]
@@ -80,7 +81,7 @@ def cells(grid: Grid) -> list[Cell]:
 
 
 def _tuning(v_max: float, weight: float) -> str:
-    return f":restriction.v_max_m_s={v_max:g}:restriction.slack_weight={weight:g}"
+    return f":approach.v_max_m_s={v_max:g}:approach.slack_weight={weight:g}"
 
 
 def base(cell: Row) -> str:

@@ -23,7 +23,7 @@ from pretouch_lab.rows import Row, rounded, spread
 from pretouch_lab.trial import Setup, play
 
 NAME = "detectable"
-PROFILE = "blind:threshold.f_base_n=1000"
+PROFILE = "blind:detect.f_base_n=1000"
 """No force is a contact to this controller, so the arm goes on as if nothing had happened."""
 
 SPEEDS_M_S = {"rest": 0.0, "slow": 0.06, "moving": 0.3}

@@ -17,7 +17,7 @@ from pretouch_lab.paper.claims.detectors import TABLE_I, Windowed, band, dispers
 from pretouch_lab.rows import Row, rounded
 from pretouch_lab.trial import SETTLE_S, Record, play
 
-PROFILE = "blind:threshold.f_base_n=1000"
+PROFILE = "blind:detect.f_base_n=1000"
 """Nothing is near, and no force is a contact: the course of the estimate is that of an arm that is left alone."""
 DURATION_S = 150.0
 """Time that counts [s]: that in which the window fills comes before it."""
