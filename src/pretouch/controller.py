@@ -30,7 +30,6 @@ from pretouch.perception.obstacles import TrackState, track_init
 from pretouch.perception.outside import OutsideState, outside_silence, see_outside
 from pretouch.perception.perceive import nothing_seen, perceive, perception_setup, silent_units
 from pretouch.perception.scene_filter import Fixtures
-from pretouch.perception.unseen import unseen_on, unseen_scale
 from pretouch.profiles import Profile
 from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.sensing.skin import Skin
@@ -98,7 +97,6 @@ class Controller:
         self.limits = joint_limits(model, profile.task.position_margin_rad, profile.task.control_period_s)
         see = profile.perception
         self._sight = None if see is None else perception_setup(model, skin, fixtures, see)
-        self._unseen = unseen_on(profile.unseen, model, skin, fixtures, see)
         self._motion_body = MotionBody(model, len(skin), self.limits, profile.task)
         self._approach = restriction_on(profile.approach, self._motion_body)
         self._setup = motion_setup(self._motion_body, profile.null_space, profile.failure.solver_iterations)
@@ -184,7 +182,7 @@ class Controller:
             state.path.phase, inputs.resume,
         )  # fmt: skip
         answers, react = p.react.sense(state.reaction, self.body, noticed)
-        noted = events_of(given.unfit, near.silent, near.lost, detection, window.count, state.motion.blocked, p)
+        noted = events_of(given.unfit, near.silent, near.lost, detection, window.count, p)
         events = given.events | answers | noted
         mode = next_mode(state.mode, events, inputs.resume)
         contact = detection.contact if mode.mode is Mode.REACT is not state.mode.mode else None
@@ -193,7 +191,7 @@ class Controller:
         # along the path, or as a commander asks, as fast as eqs. 3-4 leave it, or as the reaction says
         slowed = 1.0 if p.slow is None else speed_scale(near.seen.nearest, p.slow.d_max_m)
         scale, reduction = reduce_speed(state.reduction, min(near.scale, slowed), p.task.restore_cycles)
-        asked, scale = self._asked(state, given, kin, scale)
+        asked = self._asked(state, given, kin, scale)
         answer, react = p.react.move(react, self.body, noticed, mode)
         desired = asked.velocity if answer is None else answer.velocity
         mark("path")
@@ -293,16 +291,13 @@ class Controller:
         detection, detector = self._detector.step(state.detector, self.body, sample)
         return detection, before if reacting and p.freeze_while_reacting else window, detector
 
-    def _asked(self, state: ControllerState, given: Given, kin: Kinematics, scale: float) -> tuple[Asked, float]:
-        """Return what follows the path, or what a commander wants, slower where no unit looks, and the whole factor."""
+    def _asked(self, state: ControllerState, given: Given, kin: Kinematics, scale: float) -> Asked:
+        """Return what follows the path, or what a commander wants."""
         task, goal = self.profile.task, state.rotation_goal
         if given.desired is None:
             following = paths.follow(self.path, state.path, kin.position[self.model.ee], task)
-            asked = Asked(following.scaled(scale), following.point, goal, goal, None, following)
-        else:
-            asked = asked_by(given.desired, given.watch.stamp, kin, given.robot, self.model, goal, task, scale)
-        slower = 1.0 if self._unseen is None else unseen_scale(self._unseen, kin, asked.velocity, asked.qd)
-        return asked.times(slower), slower * scale
+            return Asked(following.scaled(scale), following.point, goal, goal, None, following)
+        return asked_by(given.desired, given.watch.stamp, kin, given.robot, self.model, goal, task, scale)
 
     def _moved(
         self, state: ControllerState, noticed: ReactionInputs, near: Near, mode: ModeState, asked: Asked,
@@ -316,7 +311,7 @@ class Controller:
             goal, qd = asked.rotation_goal, asked.qd
         places, told = self._places(near.outside), near.kept_off
         request = MotionRequest(
-            desired, goal, mode.mode is Mode.HOLD and qd is None, mode.mode is Mode.TRACK, qd, touch,
+            desired, goal, mode.mode is Mode.HOLD and qd is None, qd, touch,
             places + (0 if told is None else len(told.unit)), None if told is None else places,
         )  # fmt: skip
         kin, robot, obstacles = noticed.kin, noticed.robot, near.obstacles

@@ -7,13 +7,8 @@ from pretouch.modes import Event
 from pretouch.profiles import Profile
 
 
-def events_of(
-    unfit: str, silent: str, lost: str, detection: Detection, samples: int, blocked: float, p: Profile
-) -> dict[Event, str]:
-    """Name what was seen, received and detected in one step, beside what the reaction says.
-
-    `blocked` is for how long the path has been so [s].
-    """
+def events_of(unfit: str, silent: str, lost: str, detection: Detection, samples: int, p: Profile) -> dict[Event, str]:
+    """Name what was seen, received and detected in one step, beside what the reaction says."""
     events: dict[Event, str] = {}
     if unfit and p.perception is not None:
         events[Event.SKIN_UNFIT] = unfit
@@ -25,6 +20,4 @@ def events_of(
         events.setdefault(Event.NO_FORCE, f"up to {p.failure.force_timeout_s:g} s")
     elif not detection.armed:
         events[Event.WINDOW_FILLING] = f"{samples} of {p.window.samples} samples"
-    if p.task.blocked_after_s is not None and blocked >= p.task.blocked_after_s:
-        events[Event.PATH_BLOCKED] = f"{blocked:.1f} s"
     return events

@@ -33,7 +33,6 @@ class Event(Enum):
     GIVEN_UP = auto()
     PRESSED = auto()
     WINDOW_FILLING = auto()
-    PATH_BLOCKED = auto()
     CLEAR = auto()
 
 
@@ -150,10 +149,6 @@ TABLE: tuple[Transition, ...] = (
         Event.WINDOW_FILLING, _ANY, Mode.HOLD,
         "The force window is filling ({}): contacts cannot be distinguished from noise yet. The arm moves"
         " once it is full.",
-    ),
-    Transition(
-        Event.PATH_BLOCKED, frozenset({Mode.TRACK}), Mode.TRACK,
-        "An obstacle has kept the hand from its path for {}: waiting until it is clear.",
     ),
     Transition(Event.CLEAR, _ANY, Mode.TRACK, "Moving as asked."),
 )  # fmt: skip

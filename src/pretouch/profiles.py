@@ -33,7 +33,6 @@ from pretouch.params import (
     SpeedReduction,
     Tangential,
     TaskParams,
-    UnseenSpeed,
     WindowParams,
 )
 from pretouch.plugins import load, names
@@ -54,8 +53,6 @@ class Profile(Checked):
     """How the hand follows its path (eq. 2)."""
     slow: SpeedReduction | None = field(default_factory=SpeedReduction)
     """What slows the arm near obstacles (eq. 3); none: nothing but silent units does."""
-    unseen: UnseenSpeed | None = None
-    """How fast the body may go where no unit looks; none: as fast as is asked."""
     approach: Restriction | None = field(default_factory=ApproachRestriction)
     """What keeps the body from what is near (eqs. 5-7, or other rows of the QP); none: nothing does."""
     null_space: NullSpaceMotion | None = None
@@ -106,7 +103,7 @@ PROFILES: dict[str, Profile] = {
             keep_while_silent=True,
             outside=OutsidePoints(),
         ),
-        task=TaskParams(mid_joint_projected=True, blocked_after_s=2.0),
+        task=TaskParams(mid_joint_projected=True),
         slow=None,
         approach=BrakingCurve(effective_mass=EffectiveMass(), closing_deadband_m_s=0.05, tangential=Tangential()),
         null_space=NullSpaceMotion(),

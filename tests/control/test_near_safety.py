@@ -119,7 +119,7 @@ def test_in_any_posture_nothing_that_stands_is_met_faster_than_the_curve_allows(
         kin = model.kinematics(q)
         near = closest_points(kin, model.body, kin.position[model.ee], np.arange(3), things, np.eye(3))
         robot = RobotState(0.0, q, qd, q, qd, np.zeros(7), None)
-        request = MotionRequest(course, start.rotation[model.ee], tracks=True)
+        request = MotionRequest(course, start.rotation[model.ee])
         motion = mover.step(kin, robot, near, request)
         command = motion.qp.qd
         assert motion.qp.outcome is QpOutcome.SOLVED

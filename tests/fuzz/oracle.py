@@ -20,7 +20,6 @@ WORDS = {
     "filling": "The force window is filling", "clear": "Moving as asked.", "opening": "Clamped between two objects",
     "caught": "The arm was clamped between two objects", "yielding": "Yielding to a contact",
     "given up": "Given up after", "pressed": "A force that does not move the arm",
-    "path blocked": "An obstacle has kept the hand from its path",
 }  # fmt: skip
 """Cause -> words its sentence holds."""
 
@@ -31,7 +30,6 @@ MODES = {
     "clear": Mode.TRACK,
     "opening": Mode.REACT,
     "yielding": Mode.REACT,
-    "path blocked": Mode.TRACK,
 }
 """Cause -> mode; what is not here is a HOLD."""
 
@@ -181,10 +179,7 @@ class Oracle:
             return self._told(e, step)
         filling = self.samples < self.p.window.samples
         seen = {"silent": bool(e.silent), "no force": e.no_force, "overrun": e.overrun, "filling": filling}
-        # how long the path has been blocked is remembered by the arm's motion, and said only while it tracks
-        blocked = self.mode is Mode.TRACK and self.p.task.blocked_after_s is not None
-        clear = "path blocked" if blocked and WORDS["path blocked"] in step.reason else "clear"
-        return next((cause for cause, here in seen.items() if here), clear)
+        return next((cause for cause, here in seen.items() if here), "clear")
 
     def _told(self, e: Expected, step: ControlStep) -> str:
         """Take the step's word for what has a memory of its own, where nothing it was given speaks against it."""
@@ -199,9 +194,9 @@ class Oracle:
             "overrun": e.overrun,
         }
         first = next((cause for cause, here in seen.items() if here), "")
-        free = ("given up", "pressed", "filling", "path blocked", "clear")
+        free = ("given up", "pressed", "filling", "clear")
         assert first or told in free, (told, step.reason)
-        if not first and told in ("path blocked", "clear"):
+        if not first and told == "clear":
             assert self.samples >= self.p.window.samples
         return first or told
 

@@ -75,7 +75,7 @@ OURS: dict[type, dict[str, tuple[object, ...]]] = {
         "closing": (ClosingSpeed(), ClosingSpeed(0.01), ClosingSpeed(1.0), None),
         "reckon_below_minimum": (True, False), "place_at_stamp": (True, False),
     },
-    TaskParams: {"mid_joint_projected": (True, False), "blocked_after_s": (2.0, 0.05, None)},
+    TaskParams: {"mid_joint_projected": (True, False)},
     BrakingCurve: {
         "d_notice_m": (0.6, 0.2, 5.0), "slack_weight": (1000.0, 1e-2, 1e6),
         "deceleration_m_s2": (0.6, 0.01, 10.0), "latency_s": (0.06, 0.0, 1.0), "margin_m": (0.01, 0.0, 0.3),

@@ -17,8 +17,7 @@ def differing(a, b):
 
 
 def test_every_departure_of_pretouch_from_the_paper_is_switched_off_alone_somewhere():
-    # for how long a path is blocked changes what is said, and nothing that is done
-    assert differing(profile("pretouch"), profile("paper")) - set(OFF) == {"task.blocked_after_s"}
+    assert differing(profile("pretouch"), profile("paper")) - set(OFF) == set()
 
 
 @pytest.mark.parametrize("switch", OFF)

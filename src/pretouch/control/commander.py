@@ -1,7 +1,6 @@
 """What is asked of the arm in one step: along the path, or by a commander in its place."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 
@@ -33,12 +32,6 @@ class Asked:
     """(n,) joint velocities asked for in place of all that [rad/s]."""
     path: Following | None = None
     """How the path is followed; None where a commander asks."""
-
-    def times(self, factor: float) -> "Asked":
-        """Return the same asked for at another speed."""
-        if factor == 1.0:
-            return self
-        return replace(self, velocity=factor * self.velocity, qd=None if self.qd is None else factor * self.qd)
 
 
 def commanded(

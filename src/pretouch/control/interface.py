@@ -33,8 +33,6 @@ class MotionRequest:
     """(3, 3) R_O_ee to hold, if the task asks for it."""
     hold: bool = False
     """Whether to brake, whatever else is asked."""
-    tracks: bool = False
-    """Whether the arm follows its path, so that something may block it."""
     qd: FloatArray | None = None
     """(n,) joint velocities asked for in place of the task's, within the same limits [rad/s]."""
     touch: float | None = None

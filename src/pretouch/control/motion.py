@@ -23,8 +23,6 @@ class MotionState:
 
     null_velocity: FloatArray
     """(n,) joint velocity asked for in the null space [rad/s]."""
-    blocked: float = 0.0
-    """How long the arm has been kept from its path [s]; 0 where that is not counted."""
 
 
 @value
@@ -79,14 +77,15 @@ def joint_motion(
     slack, multipliers = np.empty(len(h)), np.empty(n + len(h))
     # Field by field in the order of `Step`, `Rows` and `Fixed`, 1 us faster than by groups. No type checker finds two
     # fields of one type that have changed places.
-    seen, found, ending, violated, blocked = rows.motion.flat(
+    seen, found, ending, violated = rows.motion.flat(
         robot.q, robot.qd, robot.q_commanded, robot.qd_commanded,
         o.link, o.body_point, o.direction, o.body_distance,
-        velocity, request.rotation_goal, request.hold, request.tracks, _NONE if request.qd is None else request.qd,
-        null_velocity, state.blocked, cost, qd, slack, multipliers, velocities, *kin,
+        velocity, request.rotation_goal, request.hold, _NONE if request.qd is None else request.qd,
+        null_velocity, cost, qd, slack, multipliers, velocities, *kin,
         G, h, which, *setup.fields, *rows.numbers,
     )  # fmt: skip
-    after = MotionState(null_velocity, blocked) if setup.remembers else state
+    # what remembers nothing hands its state on, and makes no new one in each step
+    after = MotionState(null_velocity) if setup.moves_away else state
     which, limit = which[:seen], h[:seen]
     if violated and hard and not request.hold and ending == SOLVED:
         qp = _with_hard_rows(setup, robot, ApproachRows(G[:found], h[:found], soft=False), speeds, cost)

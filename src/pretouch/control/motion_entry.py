@@ -9,7 +9,6 @@ from typing import NamedTuple
 import numpy as np
 
 from pretouch.compiled import compiled, entry, inlined
-from pretouch.control.blocked import time_blocked
 from pretouch.control.joint_box import box_and_brake
 from pretouch.control.null_space import NullSpaceLimits, away, cost_with_null_space
 from pretouch.control.penalty import SOLVED, Minimum, Problem, excesses, minimise
@@ -20,9 +19,8 @@ from pretouch.groups import Arm, JointArrays, NearArrays
 from pretouch.robot.model import Kinematics, jacobian_into
 from pretouch.types import FloatArray, IntArray
 
-Ended = tuple[int, int, int, bool, float]
-"""How many rows are of obstacles and how many there are, how the solver ended, whether any row is violated, and for how
-long the path has been blocked [s]."""
+Ended = tuple[int, int, int, bool]
+"""How many rows are of obstacles and how many there are, how the solver ended, and whether any row is violated."""
 
 
 class MotionNumbers(NamedTuple):
@@ -42,8 +40,6 @@ class MotionNumbers(NamedTuple):
     """Whether the mid-joint term is in the null space of the task."""
     away: NullSpaceLimits
     """How links before the hand move away in it; within no distance: they do not."""
-    blocked_s: float
-    """What a period adds to the time for which the path is blocked; 0: that is not counted."""
 
 
 class Fixed(NamedTuple):
@@ -59,18 +55,8 @@ class Asked(NamedTuple):
     velocity: FloatArray
     rotation_goal: FloatArray
     hold: bool
-    tracks: bool
     joints: FloatArray
     """(n,) joint velocities asked for [rad/s], or none."""
-
-
-class Memory(NamedTuple):
-    """What is remembered."""
-
-    null_velocity: FloatArray
-    """(n,) joint velocity asked for in the null space [rad/s]. Written to."""
-    blocked: float
-    """How long the arm has been kept from its path [s]."""
 
 
 class Answer(NamedTuple):
@@ -94,7 +80,8 @@ class Step(NamedTuple):
     robot: JointArrays
     near: NearArrays
     asked: Asked
-    memory: Memory
+    null_velocity: FloatArray
+    """(n,) joint velocity asked for in the null space, which is remembered [rad/s]. Written to."""
     answer: Answer
     kin: Kinematics
 
@@ -133,13 +120,13 @@ def given_motion(step: Step, rows: Rows, fixed: Fixed, p: Given) -> Ended:
 @inlined
 def motion_within(step: Step, allowed: Allowed, fixed: Fixed) -> Ended:
     """Write the answer, and change what is remembered."""
-    robot, asked, memory, answer, kin = step.robot, step.asked, step.memory, step.answer, step.kin
+    robot, asked, null_velocity, answer, kin = step.robot, step.asked, step.null_velocity, step.answer, step.kin
     arm, p, near = fixed.arm, fixed.numbers, step.near
     n, seen, found = len(robot.q), len(allowed.which), len(allowed.h)
     G, h, which, slack, qd = allowed.G, allowed.h, allowed.which, answer.slack[:found], answer.qd
     # of the rows only the first, those of obstacles, are n^T J of something to move away from
     if p.away.distance_m > 0.0:
-        memory.null_velocity[:] = away(memory.null_velocity, G[:seen], which, near, arm.moved_by, p.away)
+        null_velocity[:] = away(null_velocity, G[:seen], which, near, arm.moved_by, p.away)
     J = np.empty((6, n))
     jacobian_into(kin.anchor, kin.axis, arm.moved_by[arm.ee], kin.position[arm.ee], J)
     # the box starts from commanded positions and speeds, where it is exact; Jacobian and cost from measured ones
@@ -149,7 +136,7 @@ def motion_within(step: Step, allowed: Allowed, fixed: Fixed) -> Ended:
         # H and f are kept for the solver of hard rows alone
         cost = answer.cost if len(answer.cost) > 0 else np.empty((n + 1, n))
         H, f = cost[:n], cost[n]
-        _pose(J, robot.q, asked, kin.rotation[arm.ee], memory.null_velocity, p, cost)
+        _pose(J, robot.q, asked, kin.rotation[arm.ee], null_velocity, p, cost)
         minimum = Minimum(qd, slack, answer.multipliers[: n + found])
         ending = minimise(Problem(H, f, lower, upper, G, h, allowed.weight), p.budget, minimum)
     if asked.hold or ending != SOLVED:
@@ -158,18 +145,10 @@ def motion_within(step: Step, allowed: Allowed, fixed: Fixed) -> Ended:
         excesses(G, h, qd, slack)
     by_product = allowed.by_product or p.projected or p.away.distance_m > 0.0
     _hand_velocities(J, robot.qd, qd, by_product, answer.velocities)
-    violated, blocked = False, memory.blocked
+    violated = False
     for k in range(found):
         violated = violated or slack[k] > 0.0
-    if p.blocked_s > 0.0 and asked.tracks and not asked.hold:
-        hand, towards = np.empty(seen, np.bool_), np.empty((seen, 3))
-        for k in range(seen):
-            # a link that all joints move is the hand
-            hand[k] = arm.moved_by[near.link[which[k]]].all()
-            towards[k] = near.direction[which[k]]
-        moving = answer.velocities[1]
-        blocked = time_blocked(blocked, asked.velocity, moving, towards, h[:seen], hand, p.blocked_s)
-    return seen, found, ending, violated, blocked
+    return seen, found, ending, violated
 
 
 @inlined

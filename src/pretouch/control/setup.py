@@ -20,8 +20,6 @@ class MotionSetup:
     numbers: MotionNumbers
     moves_away: bool
     """Whether links before the hand move away in the null space."""
-    remembers: bool
-    """Whether anything is remembered from step to step."""
     fields: tuple[Any, ...]
     """Of `Fixed`, for compiled code."""
 
@@ -33,8 +31,5 @@ def motion_setup(body: MotionBody, null_space: NullSpaceMotion | None, budget: i
     numbers = MotionNumbers(
         cost_params(t), t.orientation_gain_1_s, t.orientation == "hold", budget, body.limits.table, model.q_mid,
         t.mid_joint_projected, NullSpaceLimits(within, p.speed_m_s, p.joint_rad_s, p.rate_rad_s2 * t.control_period_s),
-        0.0 if t.blocked_after_s is None else body.limits.period,
     )  # fmt: skip
-    # what remembers nothing hands its state on, and makes no new one in each step
-    remembers = moves_away or t.blocked_after_s is not None
-    return MotionSetup(body, numbers, moves_away, remembers, flattened(Fixed(model.arm, numbers)))
+    return MotionSetup(body, numbers, moves_away, flattened(Fixed(model.arm, numbers)))

@@ -13,7 +13,6 @@ from pretouch.params.localisation import LocalisationParams as LocalisationParam
 from pretouch.params.near import RestrictionParams as RestrictionParams
 from pretouch.params.near import RowKind as RowKind
 from pretouch.params.near import SpeedReduction as SpeedReduction
-from pretouch.params.near import UnseenSpeed as UnseenSpeed
 from pretouch.params.perception import ClosingSpeed as ClosingSpeed
 from pretouch.params.perception import OutsidePoints as OutsidePoints
 from pretouch.params.perception import PerceptionParams as PerceptionParams

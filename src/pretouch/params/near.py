@@ -1,4 +1,4 @@
-"""Parameters of what nearness does to motion in the paper (eq. 3, eqs. 5-7), and of where no unit looks."""
+"""Parameters of what nearness does to motion in the paper (eq. 3, eqs. 5-7)."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -13,20 +13,6 @@ class SpeedReduction(Checked):
 
     d_max_m: Positive = 0.8
     """Distance from the end-effector origin within which an obstacle slows the arm [m] (Table I)."""
-
-
-@dataclass(frozen=True)
-class UnseenSpeed(Checked):
-    """Bounding the speed of each rigid body times the share of what it runs into that no unit would see."""
-
-    speed_m_s: Positive = 0.1
-    """Largest speed along the outward normal of a body that sees nothing of what it meets [m/s]: ours, a third of the
-    paper's task. Twice as much for one that sees half."""
-    ahead_m: NonNegative = 0.1
-    """How far ahead of the body it has to be seen [m]: the way in which it brakes from 0.3 m/s at 0.6 m/s^2, and 25 mm
-    for a reading to come."""
-    object_radius_m: Positive = 0.05
-    """Radius of the ball that is looked for there [m]: a fist."""
 
 
 RowKind = Literal["hard", "slack", "floor"]

@@ -39,8 +39,6 @@ class TaskParams(Checked):
     joint velocities."""
     mid_joint_time_s: Positive = 5.0
     """Time t in which the mid-joint velocity would bring the joints to their middle [s]."""
-    blocked_after_s: Positive | None = None
-    """How long something near has to keep the hand from its path before the mode's reason says so [s]; none: never."""
     control_period_s: Annotated[float, Check(low=1e-4, high=1.0)] = 0.01
     """Period of the controller [s] (paper: 100 Hz)."""
     position_margin_rad: NonNegative = 0.01
