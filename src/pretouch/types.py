@@ -245,7 +245,7 @@ class Contact:
 
 @value
 class Touched:
-    """Where the arm is touched: C contacts, the surest first; none where no contact is detected. Base frame."""
+    """Where the arm is touched: C = 1 contact; none where no contact is detected. Base frame."""
 
     link: IntArray
     """(C,) index of the link that carries each place; links that the same joints move differ in place only."""

@@ -8,10 +8,10 @@ from pretouch.types import NOT_TOUCHED, Touched
 from pretouch_lab.benchmarks.detection.arm import model
 from pretouch_lab.benchmarks.detection.contacts import Touching
 from pretouch_lab.benchmarks.localization.contacts import TouchedCell, planned, touched_cells
-from pretouch_lab.benchmarks.localization.judge import Said, _one, _two, name_of
+from pretouch_lab.benchmarks.localization.judge import Said, _one, name_of
 from pretouch_lab.benchmarks.localization.limit import LINK_M, position_limit
 from pretouch_lab.benchmarks.localization.motion import wandering
-from pretouch_lab.benchmarks.localization.results import TWO, rows_by_body, tables_of
+from pretouch_lab.benchmarks.localization.results import rows_by_body, tables_of
 
 LEARNT = np.stack([np.stack([np.full(7, 0.25), np.full(7, 0.01)])] * 2)
 
@@ -49,25 +49,20 @@ def test_the_arm_wanders_from_rest_to_rest_within_its_limits():
     assert np.abs(wandering(1001, 60.0).q[0] - course.q[0]).max() > 0.1
 
 
-def test_contacts_are_those_of_the_goals_and_two_at_once_overlap_on_two_bodies():
-    _, (hand,) = planned(TouchedCell(1, "nominal", 1000))
+def test_contacts_are_those_of_the_goals():
+    _, hand = planned(TouchedCell("nominal", 1000))
     assert len(hand) == 40
     assert min(touch.force_n for touch in hand) >= 15.0
     assert min(touch.duration_s for touch in hand) >= 0.1
     assert len({touch.link for touch in hand}) == 8
-    _, (first, second) = planned(TouchedCell(2, "nominal", 1024))
-    for a, b in zip(first, second, strict=True):
-        assert 0.0 <= b.start - a.start <= 0.05
-        assert model().rigid[a.link] != model().rigid[b.link]
 
 
 def test_an_arm_has_the_same_seed_with_each_skin():
     cells = touched_cells("development", quick=True)
-    assert [(c.contacts, c.sensing, c.seed) for c in cells] == [
-        *[(1, sensing, seed) for seed in (1000, 1001) for sensing in ("nominal", "seven", "misplaced")],
-        (2, "nominal", 1024), (2, "seven", 1024),
-    ]  # fmt: skip
-    assert len(touched_cells("published", quick=False)) == 24 * 3 + 8 * 2
+    assert [(c.sensing, c.seed) for c in cells] == [
+        (sensing, seed) for seed in (1000, 1001) for sensing in ("nominal", "seven", "misplaced")
+    ]
+    assert len(touched_cells("published", quick=False)) == 24 * 3
 
 
 def test_links_that_the_same_joints_move_are_one_body():
@@ -92,19 +87,6 @@ def test_a_contact_is_judged_by_its_body_and_its_place():
     assert (missed["detected"], missed["right"], missed["error_m"]) == (False, False, None)
 
 
-def test_two_contacts_are_matched_with_the_nearer_ones():
-    a, b = touching("link4"), touching("hand", start=1.0)
-    both = Touched(
-        np.array([b.link, a.link]), np.array([true_place(b), true_place(a) + np.array([0.02, 0.0, 0.0])]),
-        np.ones((2, 3)), np.ones(2), np.ones(2),
-    )  # fmt: skip
-    row = _two(a, b, said_of(NOT_TOUCHED, NOT_TOUCHED, both))
-    assert row["two"]
-    assert row["right"]
-    assert sorted(row["errors_m"]) == [0.0, pytest.approx(0.02)]
-    assert not _two(a, b, said_of(NOT_TOUCHED, NOT_TOUCHED, NOT_TOUCHED))["two"]
-
-
 def test_torques_tell_most_of_the_hand_and_hardly_anything_of_the_first_links():
     limits = []
     for link in ("link1", "link2", "link4", "link6", "hand"):
@@ -124,16 +106,11 @@ def test_rows_say_what_was_found():
     touch = touching("hand")
     at = Touched(np.array([touch.link]), true_place(touch)[None] + 0.01, np.ones((1, 3)), np.ones(1), np.ones(1))
     found = [_one(touch, said_of(NOT_TOUCHED, at, at, at, at)), _one(touch, said_of(NOT_TOUCHED))]
-    pair = _two(touch, touching("link4"), said_of(NOT_TOUCHED))
-    one = {"contacts": 1, "skin": "none", "found": found, "median_s": 0.0004, "p99_s": 0.001}
-    two = {"contacts": 2, "skin": "none", "found": [pair], "median_s": 0.0004, "p99_s": 0.002}
-    rows = rows_by_body([one, two])
-    assert [row["link"] for row in rows] == ["hand", TWO]
-    first = rows[0]
+    rows = rows_by_body([{"skin": "none", "found": found, "median_s": 0.0004, "p99_s": 0.002}])
+    (first,) = rows
+    assert first["link"] == "hand"
     assert (first["skin"], first["contacts"], first["detected"], first["right_link"]) == ("none", 2, 1, 0.5)
     assert first["median_error_m"] == pytest.approx(0.0173, abs=1e-4)
     assert first["rate_hz"] == 500.0
-    assert rows[1]["recognised"] == 0.0
-    text = tables_of({"rows": rows})
-    assert text[0].rows[0][:4] == ("none", "hand", "2", "1")
-    assert len(text) == 2
+    (table,) = tables_of({"rows": rows})
+    assert table.rows[0][:4] == ("none", "hand", "2", "1")

@@ -25,7 +25,7 @@ def contact(force: float, without: float | None, with_touch: float | None, heard
 def said(error: float | None, right: bool = True) -> dict:
     """What was said of a contact that is `error` off; None of one that is not detected."""
     detected = error is not None
-    return {"detected": detected, "right": detected and right, "error_m": error, "two": False}
+    return {"detected": detected, "right": detected and right, "error_m": error}
 
 
 def row(contacts: list[dict], place: str = "on patch") -> dict:
@@ -68,7 +68,7 @@ def test_rows_are_counted_by_place_and_force_and_delays_compared_on_the_same_con
     contacts, where, free = tables(found)
     assert len(contacts.rows) == 5
     # 15 N and more that last 100 ms: one; all detected, the busy one too: five
-    assert where.rows[0] == ("on patch", "unseen", "all", "15 N, 100 ms and more", "1", "1 / 1", "0 / 1", "0 / 0", "1",
+    assert where.rows[0] == ("on patch", "unseen", "all", "15 N, 100 ms and more", "1", "1 / 1", "0 / 1", "1",
                              "20.0 / 1.0", "20.0 / 1.0")  # fmt: skip
     assert [row[3:5] for row in where.rows[1:]] == [("all detected", "4"), ("all detected", "1")]
     assert "1 contacts that began" in contacts.note

@@ -8,7 +8,7 @@ from pretouch.checks import Check, Checked, Fraction, NonNegative, Positive
 
 @dataclass(frozen=True)
 class LocalisationParams(Checked):
-    """How the place of a contact is inferred from the torques it makes; `detection.localise` switches it on."""
+    """How the place of a contact is inferred from the torques it makes; `detect.localise` switches it on."""
 
     friction: Positive = 0.25
     """Standard deviation of the force in each direction across the surface, as a part of the force into it [1]: that of
@@ -19,7 +19,7 @@ class LocalisationParams(Checked):
     ones are believed all the same, for the torques then say far more."""
     relative: Fraction = 0.06
     """Error of the torques as a part of them [1]: kinematics, friction that turns round under the push, motion within
-    the window. With 0.03 two contacts were said of 5, with this of 2 of 60 single ones in development trials."""
+    the window."""
     tails: Annotated[float, Check(low=3.0, high=1000.0)] = 30.0
     """Degrees of freedom of the Student distribution of the error, as in the detector."""
     independent_s: Positive = 0.01
@@ -38,9 +38,6 @@ class LocalisationParams(Checked):
     touched in 0.014 % of the time (`false_touches_per_hour`, `false_touch_s`), odds of about 14 to 1."""
     unit_m: Positive = 0.015
     """Least standard deviation of a place they give [m]: that of neighbouring places of the surface."""
-    two_odds: Fraction = 0.5
-    """Prior odds of two contacts at once against one, which says what either mistake costs as well: with 0.05, 49 % of
-    development pairs were recognised and 1 % of long single contacts taken for two, with 0.5 57 % and 4 %."""
     memory_s: NonNegative = 0.15
     """Time over which what the windows of earlier steps said of each place is averaged [s]: an arm that moves shows
     one contact from several postures."""

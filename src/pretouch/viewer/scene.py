@@ -78,7 +78,7 @@ class Scene:
         )  # fmt: skip
         self._touched = scene.add_frame(f"{root}/touched", show_axes=False)
         self._true_force = self._arrow(f"{root}/touched/true_force", palette.TRUE_FORCE)
-        self._places = [self._arrow(f"{root}/place/{number}", palette.PLACE) for number in range(2)]
+        self._place = self._arrow(f"{root}/place", palette.PLACE)
         self._hand = None if world.hand_radius is None else PersonHand(server, world.hand_radius, root)
 
     def _arrow(self, name: str, colour: palette.Colour, radius: float = 0.007) -> "ArrowsHandle":
@@ -183,13 +183,12 @@ class Scene:
                 tip = force * (min(ARROW_M_PER_N * size, ARROW_MOST_M) / size)
                 handle.points = np.array([[np.zeros(3), tip]], dtype=np.float32)
         touched = frame.step.touched
-        for number, handle in enumerate(self._places):
-            handle.visible = self._shows_forces and number < len(touched.link)
-            if handle.visible:
-                force, size = touched.force[number], float(np.linalg.norm(touched.force[number]))
-                shaft = force * (min(ARROW_M_PER_N * size, ARROW_MOST_M) / max(size, 1e-9))
-                # it ends at the place, for a contact pushes
-                handle.points = np.array([[touched.point[number] - shaft, touched.point[number]]], dtype=np.float32)
+        self._place.visible = self._shows_forces and len(touched.link) > 0
+        if self._place.visible:
+            force, size = touched.force[0], float(np.linalg.norm(touched.force[0]))
+            shaft = force * (min(ARROW_M_PER_N * size, ARROW_MOST_M) / max(size, 1e-9))
+            # it ends at the place, for a contact pushes
+            self._place.points = np.array([[touched.point[0] - shaft, touched.point[0]]], dtype=np.float32)
 
 
 def _segments(world: World, dashes: int = 80) -> FloatArray:

@@ -36,7 +36,7 @@ def compared(said: list[Row]) -> Row:
     both = [one for one in said if all(one[side]["detected"] for side in SIDES)]
     return {"contacts": len(said), "both": len(both)} | {
         side: {
-            **{name: sum(one[side][name] for one in said) for name in ("detected", "right", "two")},
+            **{name: sum(one[side][name] for one in said) for name in ("detected", "right")},
             **{f"p{part}_m": _at([one[side]["error_m"] for one in both], part) for part in (50, 90)},
         }
         for side in SIDES
@@ -62,7 +62,6 @@ COLUMNS = (
     ("n", lambda found: str(found["contacts"])),
     ("detected", _pair("detected")),
     ("right\nbody", _pair("right")),
-    ("said\ntwo", _pair("two")),
     ("both", lambda found: str(found["both"])),
     ("median\n[cm]", _errors("p50_m")),
     ("90 %\n[cm]", _errors("p90_m")),

@@ -15,7 +15,7 @@ _NEGLIGIBLE = 12.0
 
 
 class ContactArrays(NamedTuple):
-    """Room for two contacts, as of `Touched`."""
+    """Room for a contact, as of `Touched` with one row."""
 
     link: IntArray
     point: FloatArray
@@ -25,8 +25,8 @@ class ContactArrays(NamedTuple):
 
 
 @compiled
-def summarise(ln: FloatArray, candidates: Candidates, there: FloatArray, contacts: ContactArrays, k: int) -> None:
-    """Write contact k of a posterior exp(ln) (N,), not normalised, and the forces (N, 3) of the candidates [N].
+def summarise(ln: FloatArray, candidates: Candidates, there: FloatArray, contact: ContactArrays) -> None:
+    """Write the contact of a posterior exp(ln) (N,), not normalised, and the forces (N, 3) of the candidates [N].
 
     The body is the likeliest rigid one. The point is the mean on it, brought to the surface along the normal of the
     nearest candidate; a mean of points on a convex body lies inside.
@@ -57,18 +57,18 @@ def summarise(ln: FloatArray, candidates: Candidates, there: FloatArray, contact
     for i in range(3):
         above += (mean[i] - at[nearest, i]) * normal[nearest, i]
     for i in range(3):
-        contacts.point[k, i] = mean[i] - above * normal[nearest, i]
-        contacts.force[k, i] = there[nearest, i]
+        contact.point[0, i] = mean[i] - above * normal[nearest, i]
+        contact.force[0, i] = there[nearest, i]
     # second moment about the reported point, not about the mean: the error of what is reported
     V = np.zeros((3, 3))
     for c in range(first[body], first[body + 1]):
         part = math.exp(ln[c] - most) / best
         for i in range(3):
             for j in range(3):
-                V[i, j] += part * (at[c, i] - contacts.point[k, i]) * (at[c, j] - contacts.point[k, j])
-    contacts.link[k], contacts.probability[k] = candidates.surface.link[nearest], best / total
+                V[i, j] += part * (at[c, i] - contact.point[0, i]) * (at[c, j] - contact.point[0, j])
+    contact.link[0], contact.probability[0] = candidates.surface.link[nearest], best / total
     # a point anywhere between candidates, SPACING_M apart: the variance of a uniform distribution is d^2 / 12
-    contacts.sigma[k] = math.sqrt(_largest_eigenvalue(V) + SPACING_M**2 / 12.0)
+    contact.sigma[0] = math.sqrt(_largest_eigenvalue(V) + SPACING_M**2 / 12.0)
 
 
 @compiled
@@ -88,14 +88,3 @@ def _largest_eigenvalue(V: FloatArray) -> float:
     half = 0.5 * (x * (y * z - w * w) - u * (u * z - w * v) + v * (u * w - y * v))
     # rounding may take it beyond 1
     return q + 2.0 * r * math.cos(math.acos(min(1.0, max(-1.0, half))) / 3.0)
-
-
-@compiled
-def swap(contacts: ContactArrays) -> None:
-    """Exchange both contacts."""
-    link, point, force, sigma, probability = contacts
-    link[:] = link[::-1].copy()
-    point[:] = point[::-1].copy()
-    force[:] = force[::-1].copy()
-    sigma[:] = sigma[::-1].copy()
-    probability[:] = probability[::-1].copy()

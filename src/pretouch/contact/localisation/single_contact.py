@@ -22,7 +22,7 @@ from pretouch.groups import SurfaceArrays
 from pretouch.robot.model import Kinematics, jacobian_into
 from pretouch.types import BoolArray, FloatArray
 
-LEAST_N = 1.0
+_LEAST_N = 1.0
 """Force along the normal below which the one across it is no longer made smaller [N]."""
 
 
@@ -45,7 +45,7 @@ class Candidates(NamedTuple):
 
 
 @compiled
-def log_posterior(S: FloatArray, candidates: Candidates, ln: FloatArray, force: FloatArray) -> float:
+def log_posterior(S: FloatArray, candidates: Candidates, ln: FloatArray, force: FloatArray) -> bool:
     """Write ln of prior times marginal likelihood (N,) of a contact at each candidate, and its likeliest force (N, 3).
 
     Forces are in the base frame [N]. The values compare between covariances S (n, n) of the torques [Nm^2]. With
@@ -53,18 +53,18 @@ def log_posterior(S: FloatArray, candidates: Candidates, ln: FloatArray, force: 
 
         ln = ln prior - ln det L + ln of the force's freedom - (nu + n) / 2 ln(1 + (z^T S^-1 z - X) / nu).
 
-    Returns the least z^T S^-1 z - X of all candidates, -1 where S is not positive definite.
+    Returns whether S is positive definite; else nothing is written.
     """
     surface, p, kin, normal = candidates.surface, candidates.p, candidates.kin, candidates.normal
     position, rotation, link, first = kin.position, kin.rotation, surface.link, surface.first
     n = len(S)
     L, y, G, h, u = np.zeros((n, n)), np.empty(n), np.empty((6, 6)), np.empty(6), np.empty((3, 6))
     if not factor(S, L):
-        return -1.0
+        return False
     square, log_det = forward(L, candidates.torque, y), 0.0
     for j in range(n):
         log_det += math.log(L[j, j])
-    unexplained, a, lever = square, np.empty(3), np.empty(3)
+    a, lever = np.empty(3), np.empty(3)
     for body in range(len(first) - 1):
         if first[body] == first[body + 1]:
             continue
@@ -81,11 +81,10 @@ def log_posterior(S: FloatArray, candidates: Candidates, ln: FloatArray, force: 
             _unit_wrenches(normal[c], lever, u)
             explained, freedom = _likeliest_force(G, h, u, p.friction, p.force_n, a)
             rest = max(square - explained, 0.0)  # rounding may take it below 0
-            unexplained = min(unexplained, rest)
             ln[c] = freedom - 0.5 * (p.tails + n) * math.log1p(rest / p.tails) + (candidates.log_prior[c] - log_det)
             for i in range(3):
                 force[c, i] = a[0] * u[0, i] + a[1] * u[1, i] + a[2] * u[2, i]
-    return unexplained
+    return True
 
 
 @compiled
@@ -161,7 +160,7 @@ def _likeliest_force(
     # The prior across depends on the size of the force along the normal, which follows from the prior: three rounds
     # of this fixed point are enough.
     for _ in range(3):
-        across = 1.0 / (mu * max(size, LEAST_N)) ** 2
+        across = 1.0 / (mu * max(size, _LEAST_N)) ** 2
         # Cholesky factor c of g + P, the tangents first, so that the last pivot is the information on a_0 alone
         c00 = math.sqrt(g[1, 1] + across)
         c10 = g[2, 1] / c00

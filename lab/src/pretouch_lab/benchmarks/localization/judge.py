@@ -10,7 +10,7 @@ import numpy as np
 from pretouch.atomic_write import write_json
 from pretouch.profiles import profile
 from pretouch.robot.model import Kinematics
-from pretouch.types import FloatArray, IntArray, Touched
+from pretouch.types import FloatArray, Touched
 from pretouch_lab.benchmarks.detection.arm import model
 from pretouch_lab.benchmarks.detection.contacts import Touching, touches_of
 from pretouch_lab.benchmarks.detection.replay import NOTHING
@@ -67,11 +67,7 @@ def judge_touched(cell: TouchedCell, skin: str, stream: Path, file: Path) -> Non
     kept = load_stream(stream)
     touches = touches_of(kept)
     said = replayed(kept, skin, touches)
-    if cell.contacts == 1:
-        found = [_one(touch, said) for touch in touches]
-    else:
-        half = len(touches) // 2
-        found = [_two(a, b, said) for a, b in zip(touches[:half], touches[half:], strict=True)]
+    found = [_one(touch, said) for touch in touches]
     busy = np.sort(said.busy) if len(said.busy) else np.array([np.nan])
     row: Row = {
         **asdict(cell), "skin": skin, "found": found,
@@ -117,10 +113,7 @@ def judged_s(touch: Touching) -> float:
 
 
 def place_said(touch: Touching, found: Touched, q: FloatArray, when: str = "") -> Row:
-    """Hold what was said in one posture (n,) [rad] against where the contact was: of two the surer one.
-
-    `when` ends the names of its values.
-    """
+    """Hold what was said in a posture (n,) [rad] against where the contact was; `when` ends the names of values."""
     rigid, kin = model().rigid, model().kinematics(q)
     detected = len(found.link) > 0
     off = float(np.linalg.norm(found.point[0] - place_of(touch, kin))) if detected else None
@@ -129,7 +122,6 @@ def place_said(touch: Touching, found: Touched, q: FloatArray, when: str = "") -
         f"right{when}": detected and bool(rigid[found.link[0]] == rigid[touch.link]),
         f"error{when}_m": None if off is None else rounded(off, 5),
         f"taken_for{when}": name_of(int(found.link[0])) if detected else None,
-        f"two{when}": len(found.link) == 2,
         f"sigma{when}_m": rounded(float(found.sigma[0]), 5) if detected else None,
     }
 
@@ -149,21 +141,3 @@ def _one(touch: Touching, said: Said) -> Row:
     i = said.at(touch.start + judged_s(touch))
     limit = position_limit(touch, model().kinematics(said.q[i]), said.q[i], said.spread[i])
     return row | {"limit_m": rounded(limit, 5)}
-
-
-def _two(a: Touching, b: Touching, said: Said) -> Row:
-    """Judge two contacts at once."""
-    rigid, after = model().rigid, scenario("localization")["judged"]["pair_after_s"]
-    i = said.at(b.start + after)
-    found, kin = said.touched[i], model().kinematics(said.q[i])
-    row: Row = {"links": [name_of(a.link), name_of(b.link)], "forces_n": [a.force_n, b.force_n]}
-    if len(found.link) != 2:
-        return row | {"detected": len(found.link) > 0, "two": False, "right": False, "errors_m": None}
-    true = np.array([place_of(a, kin), place_of(b, kin)])
-    away = np.linalg.norm(true[:, None] - found.point[None], axis=2)
-    matched = away.diagonal() if away.trace() <= away[0, 1] + away[1, 0] else away[:, ::-1].diagonal()
-    links: IntArray = np.array([a.link, b.link])
-    return row | {
-        "detected": True, "two": True, "right": sorted(rigid[found.link]) == sorted(rigid[links]),
-        "errors_m": [rounded(float(value), 5) for value in matched],
-    }  # fmt: skip

@@ -9,22 +9,16 @@ from pretouch_lab.benchmarks.scenario_files import scenario
 from pretouch_lab.rows import Row, rounded
 from pretouch_lab.tables import plain
 
-TWO = "two at once"
-"""In place of a link, for two contacts at once."""
-
 
 def rows_by_body(replays: list[Row]) -> list[Row]:
-    """Return a row for each skin and rigid body, and one for two contacts at once."""
+    """Return a row for each skin and rigid body."""
     rows = []
     for skin in dict.fromkeys(replay["skin"] for replay in replays):
         own = [replay for replay in replays if replay["skin"] == skin]
         rate = rounded(1.0 / max(replay["p99_s"] for replay in own), 1)
-        singles = [found for replay in own if replay["contacts"] == 1 for found in replay["found"]]
+        singles = [found for replay in own for found in replay["found"]]
         for link in sorted({found["link"] for found in singles}, key=_order):
             rows.append(_of_body(skin, link, [found for found in singles if found["link"] == link], rate))
-        pairs = [found for replay in own if replay["contacts"] == 2 for found in replay["found"]]
-        if pairs:
-            rows.append(_of_pairs(skin, pairs, rate))
     return rows
 
 
@@ -41,22 +35,11 @@ def _of_body(skin: str, link: str, found: list[Row], rate: float) -> Row:
             f"right_link{when}": rounded(sum(one[f"right{when}"] for one in found) / len(found), 4),
             f"median_error{when}_m": _at([one[f"error{when}_m"] for one in detected], 50),
             f"p90_error{when}_m": _at([one[f"error{when}_m"] for one in detected], 90),
-            f"said_two{when}": sum(one[f"two{when}"] for one in found),
             f"median_sigma{when}_m": _at([one[f"sigma{when}_m"] for one in detected], 50),
         }
     taken = [one["taken_for"] for one in found if one["detected"] and not one["right"]]
     row["taken_for"] = {name: taken.count(name) for name in sorted(set(taken), key=_order)}
     return row | {"median_limit_m": _at([one["limit_m"] for one in found], 50), "rate_hz": rate}
-
-
-def _of_pairs(skin: str, found: list[Row], rate: float) -> Row:
-    errors = [value for one in found if one["errors_m"] for value in one["errors_m"]]
-    return {
-        "skin": skin, "link": TWO, "contacts": len(found), "detected": sum(one["detected"] for one in found),
-        "recognised": rounded(sum(one["two"] for one in found) / len(found), 4),
-        "right_link": rounded(sum(one["right"] for one in found) / len(found), 4),
-        "median_error_m": _at(errors, 50), "p90_error_m": _at(errors, 90), "rate_hz": rate,
-    }  # fmt: skip
 
 
 def _at(values: list[float], percent: float) -> float | None:
@@ -66,14 +49,13 @@ def _at(values: list[float], percent: float) -> float | None:
 def tables_of(results: Row) -> list[TextTable]:
     """Return the tables of what the JSON file holds."""
     judged = scenario("localization")["judged"]
-    singles = [row for row in results["rows"] if row["link"] != TWO]
-    pairs = [row for row in results["rows"] if row["link"] == TWO]
-    rates = ", ".join(f"{skin} {rate:.0f} Hz" for skin, rate in {r["skin"]: r["rate_hz"] for r in singles}.items())
-    made = [
+    rows = results["rows"]
+    rates = ", ".join(f"{skin} {rate:.0f} Hz" for skin, rate in {r["skin"]: r["rate_hz"] for r in rows}.items())
+    return [
         tabulated(
             "Where a contact is said to be",
             _SINGLES,
-            singles,
+            rows,
             f"Judged {1000 * judged['after_s']:.0f} ms after the force began to rise, or at its end if that is earlier,"
             " and once more at its end. Error: from the true place, both on the body in that posture, of what was"
             " detected, whichever body it was taken for; what was not detected is not right. hand: link 7, flange and"
@@ -82,13 +64,6 @@ def tables_of(results: Row) -> list[TextTable]:
             f" An inference takes so long that 99 of 100 would keep up with: {rates}.",
         )
     ]
-    if pairs:
-        note = (
-            f"Judged {1000 * judged['pair_after_s']:.0f} ms after the second one began, on two bodies drawn at random."
-            " Errors: of both places, where two were said. The skin sees the hand of the first one only."
-        )
-        made.append(tabulated("Two contacts at once", _PAIRS, pairs, note, 1))
-    return made
 
 
 def _percent(key: str) -> Callable[[Row], str]:
@@ -113,17 +88,6 @@ _SINGLES = (
     ("median\n[cm]", _cm("median_error_m")),
     ("90 %\n[cm]", _cm("p90_error_m")),
     ("limit\n[cm]", _cm("median_limit_m")),
-    ("said\ntwo", plain("said_two")),
     ("right\nat end", _percent("right_link_end")),
     ("median\nat end [cm]", _cm("median_error_end_m")),
-    ("two\nat end", plain("said_two_end")),
-)
-_PAIRS = (
-    ("skin", plain("skin")),
-    ("pairs", plain("contacts")),
-    ("detected", plain("detected")),
-    ("taken\nfor two", _percent("recognised")),
-    ("both bodies\nright", _percent("right_link")),
-    ("median\n[cm]", _cm("median_error_m")),
-    ("90 %\n[cm]", _cm("p90_error_m")),
 )
