@@ -329,3 +329,15 @@ def test_a_path_out_of_reach_ends_within_the_limits(
         step = arm.step(arm.inputs())
         arm.check_position_and_velocity()
     assert step.qp.outcome is QpOutcome.SOLVED
+
+
+@pytest.mark.parametrize("name", ["paper", "pretouch"])
+def test_how_long_no_force_was_given_is_said_of_all_that_time(panda_model: RobotModel, paper_skin: Skin, name: str):
+    arm = Arm(panda_model, paper_skin, PROFILES[name])
+    for i in range(360):
+        inputs = arm.inputs()
+        if i >= 120:
+            robot = replace(inputs.robot, wrench=None, tau_ext=np.full(7, np.nan))
+            inputs = replace(inputs, robot=robot)
+        step = arm.step(inputs)
+    assert "has given no force estimate for 2.40 s" in step.reason

@@ -23,8 +23,9 @@ SOFT = {
     Event.NO_FORCE,
 }  # fmt: skip
 STATES = [
-    ModeState(Mode.TRACK, "before"), ModeState(Mode.REACT, "before"), ModeState(Mode.HOLD, "before"),
-    ModeState(Mode.HOLD, "before", latched=True),
+    ModeState(Mode.TRACK, Event.CLEAR, reason="before"), ModeState(Mode.REACT, Event.REACTING, reason="before"),
+    ModeState(Mode.HOLD, Event.OVERRUN, reason="before"),
+    ModeState(Mode.HOLD, Event.UNUSABLE, reason="before", latched=True),
 ]  # fmt: skip
 
 
@@ -65,6 +66,8 @@ def test_every_set_of_events_ends_in_the_mode_the_rules_say(state: ModeState, re
         after = next_mode(state, events, resume)
         mode, latched, cause = expected(state, events, resume)
         assert (after.mode, after.latched) == (mode, latched)
+        kept = state.event if latched and cause is None else cause or Event.CLEAR
+        assert after.event is kept
         # the sentence carries the detail of its cause and of no other
         told = [] if cause in (None, Event.BLOCKED) else [cause]
         assert [e for e in events if f"<{e.name}>" in after.reason] == told
@@ -84,7 +87,7 @@ def test_every_event_has_a_row():
 
 @pytest.mark.parametrize("cause", LATCHING)
 def test_a_latched_hold_lasts_until_a_person_resumes(cause: Event):
-    state = next_mode(ModeState(Mode.TRACK, ""), {cause: "why"}, resume=False)
+    state = next_mode(ModeState(Mode.TRACK, Event.CLEAR), {cause: "why"}, resume=False)
     for _ in range(10):
         state = next_mode(state, {}, resume=False)
         assert state.mode is Mode.HOLD
@@ -95,7 +98,7 @@ def test_a_latched_hold_lasts_until_a_person_resumes(cause: Event):
 
 @pytest.mark.parametrize("cause", LATCHING)
 def test_resuming_while_the_cause_is_there_holds_again(cause: Event):
-    state = ModeState(Mode.HOLD, "", latched=True)
+    state = ModeState(Mode.HOLD, Event.UNUSABLE, latched=True)
     state = next_mode(state, {cause: "still"}, resume=True)
     assert state.mode is Mode.HOLD
     assert state.latched
@@ -103,13 +106,15 @@ def test_resuming_while_the_cause_is_there_holds_again(cause: Event):
 
 @pytest.mark.parametrize("cause", [*PASSING, Event.BLOCKED])
 def test_a_passing_cause_clears_by_itself(cause: Event):
-    state = next_mode(ModeState(Mode.TRACK, ""), {cause: "why"}, resume=False)
+    state = next_mode(ModeState(Mode.TRACK, Event.CLEAR), {cause: "why"}, resume=False)
     assert state.mode is Mode.HOLD
     assert next_mode(state, {}, resume=False).mode is Mode.TRACK
 
 
 def test_a_blocked_reaction_goes_on():
-    state = next_mode(ModeState(Mode.REACT, ""), {Event.BLOCKED: "", Event.REACTING: "1.20 s"}, resume=False)
+    state = next_mode(
+        ModeState(Mode.REACT, Event.REACTING), {Event.BLOCKED: "", Event.REACTING: "1.20 s"}, resume=False
+    )
     assert state.mode is Mode.REACT
     assert "contact" in state.reason
     assert "braking" in state.reason
@@ -118,12 +123,12 @@ def test_a_blocked_reaction_goes_on():
 
 
 def test_an_overrun_says_how_long_it_was():
-    state = next_mode(ModeState(Mode.TRACK, ""), {Event.OVERRUN: "0.080 s"}, resume=False)
+    state = next_mode(ModeState(Mode.TRACK, Event.CLEAR), {Event.OVERRUN: "0.080 s"}, resume=False)
     assert "The step before this one was 0.080 s ago, for this machine is busy" in state.reason
 
 
 def test_after_a_reaction_the_arm_follows_its_path_again():
-    state = next_mode(ModeState(Mode.TRACK, ""), {Event.CONTACT: "12.0 N"}, resume=False)
+    state = next_mode(ModeState(Mode.TRACK, Event.CLEAR), {Event.CONTACT: "12.0 N"}, resume=False)
     assert (state.mode, state.reason) == (Mode.REACT, "A contact of 12.0 N: yielding to what moves the arm.")
     state = next_mode(state, {Event.REACTING: "1.20 s"}, resume=False)
     assert (state.mode, state.reason) == (Mode.REACT, "Moving with a contact: 1.20 s left.")
@@ -131,7 +136,7 @@ def test_after_a_reaction_the_arm_follows_its_path_again():
 
 
 def test_a_contact_during_a_reaction_starts_no_other_one():
-    state = ModeState(Mode.REACT, "")
+    state = ModeState(Mode.REACT, Event.REACTING)
     after = next_mode(state, {Event.CONTACT: "30.0 N", Event.REACTING: "1.00 s"}, resume=False)
     assert "30.0 N" not in after.reason
 

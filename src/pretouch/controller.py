@@ -183,7 +183,7 @@ class Controller:
         )  # fmt: skip
         answers, react = p.react.sense(state.reaction, self.body, noticed)
         noted = events_of(given.unfit, near.silent, near.lost, detection, window.count, p)
-        events = given.events | answers | noted
+        events = noted | given.events | answers
         mode = next_mode(state.mode, events, inputs.resume)
         contact = detection.contact if mode.mode is Mode.REACT is not state.mode.mode else None
         mark("mode")
@@ -199,7 +199,8 @@ class Controller:
         mark("motion")
 
         step = ControlStep(
-            stamp=now, mode=mode.mode, reason=mode.reason, q=robot.q, q_commanded=robot.q_commanded,
+            stamp=now, mode=mode.mode, event=mode.event, detail=mode.detail, reason=mode.reason, latched=mode.latched,
+            q=robot.q, q_commanded=robot.q_commanded,
             ee_position=kin.position[model.ee], ee_velocity=motion.ee_velocity, path_position=asked.point,
             path_phase=state.path.phase, desired_velocity=np.zeros(3) if mode.mode is Mode.HOLD else desired,
             speed_scale=scale, range_distance=near.seen.distance, obstacles=near.obstacles,

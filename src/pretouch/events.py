@@ -17,7 +17,7 @@ def events_of(unfit: str, silent: str, lost: str, detection: Detection, samples:
     if lost:
         events[Event.POINTS_LOST] = lost
     if not detection.armed and p.detect.by_torques and bool(np.isnan(detection.residual).any()):
-        events.setdefault(Event.NO_FORCE, f"up to {p.failure.force_timeout_s:g} s")
+        events[Event.NO_FORCE] = f"up to {p.failure.force_timeout_s:g} s"
     elif not detection.armed:
         events[Event.WINDOW_FILLING] = f"{samples} of {p.window.samples} samples"
     return events

@@ -7,6 +7,7 @@ from enum import Enum
 import numpy as np
 
 from pretouch.limited import ASKED_M_S, FULL, Limit, binding
+from pretouch.modes import Event
 from pretouch.types import ControlStep, Mode
 
 OFF_PATH_M = 0.01
@@ -70,8 +71,8 @@ def finds(step: ControlStep) -> str:
 
 
 def resumable(step: ControlStep) -> bool:
-    """Whether a person can end the hold of a step: its sentence then says so (`modes.TABLE`)."""
-    return step.mode is Mode.HOLD and "resume" in step.reason
+    """Whether a person can end the hold of a step: one that latches, or that waits to try a location again."""
+    return step.mode is Mode.HOLD and (step.latched or step.event is Event.GIVEN_UP)
 
 
 def still(step: ControlStep) -> bool:
@@ -150,20 +151,18 @@ def _limit(step: ControlStep, names: _Names, cause: int) -> str:
 
 def _in_contact(step: ControlStep, names: _Names) -> Explanation:
     """Explain a step in which the arm reacts to a contact."""
-    if step.reason.startswith("Clamped"):
+    if step.event is Event.OPENING:
         return Explanation(Doing.CAUGHT, step.reason)
     place = f" at {names.link(int(step.touched.link[0]))}" if len(step.touched.link) else ""
     force = force_of(step)
     pushed = f"Touched{place}" + (f" with {force:.0f} N" if np.isfinite(force) else "")
     if step.contact is not None:  # it has not moved with it yet
         return Explanation(Doing.TOUCHED, f"{pushed}.")
-    cause, _, detail = step.reason.partition(": ")
     if not (len(step.touched.link) or step.evidence >= 1.0):
-        then = f"{detail[:1].upper()}{detail[1:]}"
-        if cause == "Moving with a contact":  # eq. 12 goes on whatever is measured
-            return Explanation(Doing.YIELDING, f"Moving the way it was pushed: {detail}")
-        rests = still(step)
-        return Explanation(Doing.WAITING if rests else Doing.YIELDING, f"The push has ended. {then}")
+        if step.event is Event.REACTING:  # eq. 12 goes on whatever is measured
+            return Explanation(Doing.YIELDING, f"Moving the way it was pushed: {step.detail} left.")
+        then = f" The task goes on {step.detail}." if step.event is Event.YIELDING else ""
+        return Explanation(Doing.WAITING if still(step) else Doing.YIELDING, f"The push has ended.{then}")
     if not still(step):
         speed = float(np.linalg.norm(step.ee_velocity))
         return Explanation(Doing.YIELDING, f"{pushed}: moving with the push at {speed:.2f} m/s.")

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pretouch.arrays import BoolArray
+from pretouch.modes import Mode
 from pretouch.values import value
 
 if TYPE_CHECKING:
@@ -56,9 +57,9 @@ class Limited:
 
 def limited_by(step: "ControlStep") -> Limited:
     """Return what limits the motion of a step; a row that binds comes before eq. 3, and both before the joints."""
-    if step.mode.value != "track":
+    if step.mode is not Mode.TRACK:
         link = int(step.touched.link[0]) if len(step.touched.link) else -1
-        return Limited(Limit.HOLD if step.mode.value == "hold" else Limit.CONTACT, 0.0, link=link)
+        return Limited(Limit.HOLD if step.mode is Mode.HOLD else Limit.CONTACT, 0.0, link=link)
     near, rows = step.obstacles, step.restricted[binding(step)]
     pressed = np.abs(step.qp.multipliers[: len(step.q)])
     joint = int(pressed.argmax()) if len(pressed) and pressed.max() > _PRESSED else -1
@@ -82,7 +83,7 @@ def binding(step: "ControlStep") -> BoolArray:
     bound = np.zeros(count, dtype=np.bool_)
     if count and len(qp.slack) == count:
         bound = (qp.multipliers[-count:] > _PRESSED) | (qp.slack > 1e-6)
-        if "violated" in qp.status and not bound.any():
+        if qp.violated and not bound.any():
             # a row across a normal, which the solution leaves out: it is of what is nearest
             bound[step.obstacles.body_distance[step.restricted].argmin()] = True
     return bound

@@ -2,38 +2,47 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import Enum, auto
+from enum import Enum
 
-from pretouch.types import Mode
+
+class Mode(Enum):
+    """What the arm is doing."""
+
+    TRACK = "track"
+    """Follow the path, slowed and restricted near obstacles."""
+    REACT = "react"
+    """Yield to a contact (eq. 12)."""
+    HOLD = "hold"
+    """Brake within limits, stand still, and say why."""
 
 
 class Event(Enum):
     """What can make the mode change, seen in one control step."""
 
-    UNUSABLE = auto()
-    TIME_BACKWARDS = auto()
-    STATE_STALE = auto()
-    SOLVER_FAILED = auto()
-    BLOCKED = auto()
-    OVERRUN = auto()
-    LATCHED = auto()
-    REACTING = auto()
-    CLAMPED = auto()
-    OPENING = auto()
-    YIELDING = auto()
-    CONTACT = auto()
-    SKIN_UNFIT = auto()
-    SKIN_SILENT = auto()
-    POINTS_LOST = auto()
-    MOVING_LOST = auto()
-    LOAD_UNFIT = auto()
-    DESIRED_UNFIT = auto()
-    DESIRED_STALE = auto()
-    NO_FORCE = auto()
-    GIVEN_UP = auto()
-    PRESSED = auto()
-    WINDOW_FILLING = auto()
-    CLEAR = auto()
+    UNUSABLE = "unusable"
+    TIME_BACKWARDS = "time_backwards"
+    STATE_STALE = "state_stale"
+    SOLVER_FAILED = "solver_failed"
+    BLOCKED = "blocked"
+    OVERRUN = "overrun"
+    LATCHED = "latched"
+    REACTING = "reacting"
+    CLAMPED = "clamped"
+    OPENING = "opening"
+    YIELDING = "yielding"
+    CONTACT = "contact"
+    SKIN_UNFIT = "skin_unfit"
+    SKIN_SILENT = "skin_silent"
+    POINTS_LOST = "points_lost"
+    MOVING_LOST = "moving_lost"
+    LOAD_UNFIT = "load_unfit"
+    DESIRED_UNFIT = "desired_unfit"
+    DESIRED_STALE = "desired_stale"
+    NO_FORCE = "no_force"
+    GIVEN_UP = "given_up"
+    PRESSED = "pressed"
+    WINDOW_FILLING = "window_filling"
+    CLEAR = "clear"
 
 
 @dataclass(frozen=True)
@@ -78,7 +87,7 @@ TABLE: tuple[Transition, ...] = (
         Event.BLOCKED, frozenset({Mode.REACT}), Mode.REACT,
         "Moving with a contact, but the approach limits allow no motion within the acceleration limits: braking.",
     ),
-    Transition(Event.LATCHED, frozenset({Mode.HOLD}), Mode.HOLD, "{}", latches=True),
+    Transition(Event.LATCHED, frozenset({Mode.HOLD}), Mode.HOLD, "as before", latches=True),
     Transition(
         Event.CONTACT, frozenset({Mode.TRACK, Mode.HOLD}), Mode.REACT,
         "A contact of {}: yielding to what moves the arm.",
@@ -160,18 +169,22 @@ class ModeState:
     """The mode, and why."""
 
     mode: Mode
-    reason: str
+    event: Event
+    """What made it so; of a HOLD that lasts, what began it."""
+    detail: str = ""
+    """What the event's sentence says of this step."""
+    reason: str = ""
     latched: bool = False
     soft: bool = False
     """Whether the arm may yield to a push while it holds."""
 
 
-_CLEAR = ModeState(Mode.TRACK, TABLE[-1].sentence)
+_CLEAR = ModeState(Mode.TRACK, Event.CLEAR, reason=TABLE[-1].sentence)
 
 
 def mode_init() -> ModeState:
     """Return the mode before the first step."""
-    return ModeState(Mode.HOLD, "The controller has not run yet.")
+    return ModeState(Mode.HOLD, Event.WINDOW_FILLING, reason="The controller has not run yet.")
 
 
 def next_mode(state: ModeState, events: Mapping[Event, str], resume: bool) -> ModeState:
@@ -186,7 +199,9 @@ def next_mode(state: ModeState, events: Mapping[Event, str], resume: bool) -> Mo
         return _CLEAR
     seen = {**events, Event.CLEAR: ""}
     if state.latched and not resume:
-        seen[Event.LATCHED] = state.reason
+        seen[Event.LATCHED] = ""
     row = next(row for row in TABLE if row.event in seen and state.mode in row.source)
-    soft = state.soft if row.event is Event.LATCHED else row.soft
-    return ModeState(row.target, row.sentence.format(seen[row.event]), row.latches, soft)
+    if row.event is Event.LATCHED:
+        return state
+    detail = seen[row.event]
+    return ModeState(row.target, row.event, detail, row.sentence.format(detail), row.latches, row.soft)

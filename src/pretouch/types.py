@@ -15,6 +15,8 @@ from pretouch.arrays import IntArray as IntArray
 from pretouch.arrays import Number as Number
 from pretouch.desired import Desired
 from pretouch.limited import Limited, limited_by
+from pretouch.modes import Event
+from pretouch.modes import Mode as Mode
 from pretouch.moving_fixtures import MovingFixtures
 from pretouch.payload import Payload
 from pretouch.values import value
@@ -162,17 +164,6 @@ class Inputs:
     """What is known to move beside the arm; None: nothing is said of any."""
 
 
-class Mode(Enum):
-    """What the arm is doing."""
-
-    TRACK = "track"
-    """Follow the path, slowed and restricted near obstacles."""
-    REACT = "react"
-    """Yield to a contact (eq. 12)."""
-    HOLD = "hold"
-    """Brake within limits, stand still, and say why."""
-
-
 @value
 class Obstacles:
     """K sensed points, each with its closest point on the robot's body. Base frame."""
@@ -288,6 +279,8 @@ class QpSolution:
     outcome: QpOutcome
     status: str
     """What happened, as a sentence."""
+    violated: bool = False
+    """Whether a solution violates a soft row, also one that belongs to no obstacle."""
 
 
 @value
@@ -296,8 +289,14 @@ class ControlStep:
 
     stamp: float
     mode: Mode
+    event: Event
+    """What made the mode so; of a HOLD that lasts, what began it."""
+    detail: str
+    """What `reason` says of this step, a part of its sentence."""
     reason: str
-    """Why the arm is in this mode, as a sentence; what it does in it, and what limits it, is said by `explain`."""
+    """Why the arm is in this mode, as a sentence (`modes.TABLE`); `explain` says what it does in it."""
+    latched: bool
+    """Whether the HOLD lasts until a person resumes."""
     q: FloatArray
     """(n,) measured joint positions [rad]."""
     q_commanded: FloatArray

@@ -11,6 +11,7 @@ from hypothesis.extra import numpy as npst
 from rosbags.typesys import get_types_from_msg
 
 from pretouch.errors import RecordingError
+from pretouch.modes import Event
 from pretouch.recording.codec import (
     STEP,
     decode_inputs,
@@ -77,9 +78,17 @@ def steps(draw: st.DrawFn) -> ControlStep:
         draw(rows(k)), draw(rows(k)),
     )  # fmt: skip
     contact = st.builds(Contact, row, npst.arrays(np.bool_, 3))
-    qp = QpSolution(draw(rows(n)), draw(rows(m)), draw(rows(n + m)), draw(st.sampled_from(QpOutcome)), draw(TEXT))
+    qp = QpSolution(
+        draw(rows(n)),
+        draw(rows(m)),
+        draw(rows(n + m)),
+        draw(st.sampled_from(QpOutcome)),
+        draw(TEXT),
+        draw(st.booleans()),
+    )
     return ControlStep(
-        stamp=draw(NAN_TOO), mode=draw(st.sampled_from(Mode)), reason=draw(TEXT), q=draw(rows(n)),
+        stamp=draw(NAN_TOO), mode=draw(st.sampled_from(Mode)), event=draw(st.sampled_from(Event)), detail=draw(TEXT),
+        reason=draw(TEXT), latched=draw(st.booleans()), q=draw(rows(n)),
         q_commanded=draw(rows(n)), ee_position=draw(row), ee_velocity=draw(row), path_position=draw(row),
         path_phase=draw(NAN_TOO), desired_velocity=draw(row), speed_scale=draw(NAN_TOO),
         range_distance=draw(rows(units)), obstacles=obstacles, force=draw(row), filtered_force=draw(row),
@@ -132,7 +141,7 @@ def some_step() -> ControlStep:
     none, no = np.zeros(0), np.zeros(0, np.int64)
     row, rows3 = np.zeros(3), np.zeros((0, 3))
     return ControlStep(
-        0.0, Mode.HOLD, "", none, none, row, row, row, 0.0, row, 1.0, none,
+        0.0, Mode.HOLD, Event.CLEAR, "", "", False, none, none, row, row, row, 0.0, row, 1.0, none,
         Obstacles(no, rows3, none, rows3, no, rows3, none, none), row, row, Thresholds(np.zeros((6, 3))), False, None,
         row, no, none, QpSolution(none, none, none, QpOutcome.SKIPPED, ""), none, none, 0.0,
     )  # fmt: skip

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from pretouch.contact.window import window_init
 from pretouch.errors import RecordingError
-from pretouch.modes import ModeState
+from pretouch.modes import Event, ModeState
 from pretouch.recording.messages import decoded, encoded
 from pretouch.recording.state_codec import STATE, decode_state, encode_state
 from pretouch.types import Mode
@@ -35,13 +35,14 @@ def test_each_state_of_a_run_comes_back_to_the_bit(states):
 NUMBER = st.floats() | st.sampled_from([-0.0, np.inf, -np.inf, 5e-324])
 
 
-@given(NUMBER, st.integers(0, 300), st.booleans(), st.integers(0, 2**53), st.sampled_from(Mode), st.integers(0, 5))
-def test_any_numbers_counts_and_lengths_come_back(states, number, samples, latched, count, mode, sent):
+@given(NUMBER, st.integers(0, 300), st.booleans(), st.integers(0, 2**53), st.sampled_from(Mode), st.integers(0, 5),
+       st.sampled_from(Event))  # fmt: skip
+def test_any_numbers_counts_and_lengths_come_back(states, number, samples, latched, count, mode, sent, event):
     state = states[-1]
     watch = replace(state.watch, stamp=number, sent=tuple((number, np.full(7, number)) for _ in range(sent)))
     window = replace(window_init(max(1, samples)), count=count)
     odd = replace(
-        state, watch=watch, window=window, mode=ModeState(mode, "Für ä: 'x'.", latched),
+        state, watch=watch, window=window, mode=ModeState(mode, event, "Für", "Für ä: 'x'.", latched),
         tracks=replace(state.tracks, point=np.full((0, 3), number)), command=np.full(7, number),
     )  # fmt: skip
     anew, back = decode_state(encode_state(0, odd, False))

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pretouch.control.path import Path
+from pretouch.modes import Event
 from pretouch.perception.scene_filter import Fixtures
 from pretouch.profiles import Profile
 from pretouch.robot.model import RobotModel
@@ -74,7 +75,8 @@ class ReferenceController:
         mode, phase = self.behaviour.mode, self.progress.phase
         self._remember(x, J[:3] @ qp.qd, qp.qd)
         step = ControlStep(
-            stamp=now, mode=mode, reason=self.behaviour.reason, q=robot.q, q_commanded=robot.q_commanded,
+            stamp=now, mode=mode, event=Event.CLEAR, detail="",
+            reason=self.behaviour.reason, latched=False, q=robot.q, q_commanded=robot.q_commanded,
             ee_position=x, ee_velocity=J[:3] @ robot.qd, path_position=self.path.point(phase), path_phase=phase,
             desired_velocity=np.zeros(3) if mode is Mode.HOLD else wanted, speed_scale=scale,
             range_distance=shown_by(inputs.readings),

@@ -8,6 +8,7 @@ from pretouch.control.path import Circle
 from pretouch.control.posture import brought_to
 from pretouch.controller import Controller
 from pretouch.loop import run
+from pretouch.modes import Event
 from pretouch.profiles import profile as find_profile
 from pretouch.recording.truth import Truth
 from pretouch.sim.paper_scenes import static_path, static_scene
@@ -124,7 +125,8 @@ def step(model, units=7, stamp=0.0, near=(), **changes):
     """One step at rest in the ready posture that sees and feels nothing."""
     n, zero = model.n, np.zeros(3)
     made = ControlStep(
-        stamp=stamp, mode=Mode.TRACK, reason="Moving as asked.", q=model.description.q_ready,
+        stamp=stamp, mode=Mode.TRACK, event=Event.CLEAR, detail="", reason="Moving as asked.", latched=False,
+        q=model.description.q_ready,
         q_commanded=model.description.q_ready, ee_position=np.array([0.5, 0.0, 0.5]), ee_velocity=zero,
         path_position=np.array([0.5, 0.0, 0.5]), path_phase=0.0, desired_velocity=zero, speed_scale=1.0,
         range_distance=np.full(units, np.nan), obstacles=seen(model, near), force=zero, filtered_force=zero,

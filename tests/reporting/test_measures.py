@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pretouch.modes import Event
 from pretouch.profiles import profile
 from pretouch.reporting.distances import distances
 from pretouch.reporting.gather import gather
@@ -138,12 +139,13 @@ def test_an_envelope_allows_less_towards_the_end_of_a_range():
         assert joint.speed.max == pytest.approx(1.0)
 
 
-def test_holds_are_told_by_reason_not_by_number(panda_model, paper_skin):
+def test_holds_are_told_by_their_event_not_by_their_sentence(panda_model, paper_skin):
     said = ["Filling (1 of 100).", "Filling (2 of 100).", "Silent: a.", "Following.", "Silent: a."]
     modes = [Mode.HOLD, Mode.HOLD, Mode.HOLD, Mode.TRACK, Mode.HOLD]
+    events = [Event.WINDOW_FILLING, Event.WINDOW_FILLING, Event.SKIN_SILENT, Event.CLEAR, Event.SKIN_SILENT]
     steps = [
-        made.step(panda_model, stamp=0.01 * i, mode=mode, reason=reason)
-        for i, (mode, reason) in enumerate(zip(modes, said, strict=True))
+        made.step(panda_model, stamp=0.01 * i, mode=mode, event=event, reason=reason)
+        for i, (mode, event, reason) in enumerate(zip(modes, events, said, strict=True))
     ]
     found = states(course_of(panda_model, paper_skin, steps))
     assert [(h.sentence, round(h.start, 2), round(h.duration, 2)) for h in found.holds] == [

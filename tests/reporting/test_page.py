@@ -5,6 +5,7 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
+from pretouch.modes import Event
 from pretouch.profiles import PROFILES, profile
 from pretouch.reporting.html import bad, number, percent, table
 from pretouch.reporting.measures import measure
@@ -108,7 +109,11 @@ def nothing_but_nan(model, skin):
 
 
 def holds_only(model, skin):
-    steps = [made.step(model, stamp=0.01 * i, mode=Mode.HOLD, reason=f"Reason {'abc'[i % 3]}.") for i in range(120)]
+    causes = Event.OVERRUN, Event.SKIN_SILENT, Event.NO_FORCE
+    steps = [
+        made.step(model, stamp=0.01 * i, mode=Mode.HOLD, event=causes[i % 3], reason=f"Reason {'abc'[i % 3]}.")
+        for i in range(120)
+    ]
     return made.recorded(model, skin, steps)
 
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pretouch.modes import Event
 from pretouch.session.push_outcome import PushOutcome
 from pretouch.types import Contact, ControlStep, Mode, Obstacles, QpOutcome, QpSolution, Thresholds
 
@@ -20,7 +21,8 @@ def step() -> ControlStep:
         none.astype(int), np.zeros((0, 3)), none, np.zeros((0, 3)), none.astype(int), np.zeros((0, 3)), none, none
     )
     return ControlStep(
-        stamp=0.0, mode=Mode.TRACK, reason="Moving as asked.", q=np.zeros(7), q_commanded=np.zeros(7),
+        stamp=0.0, mode=Mode.TRACK, event=Event.CLEAR, detail="", reason="Moving as asked.", latched=False,
+        q=np.zeros(7), q_commanded=np.zeros(7),
         ee_position=zero, ee_velocity=zero, path_position=zero, path_phase=0.0, desired_velocity=zero,
         speed_scale=1.0, range_distance=none, obstacles=empty, force=zero,
         filtered_force=np.array([1.0, 9.0, 1.0]), thresholds=Thresholds(parts), armed=True, contact=None,

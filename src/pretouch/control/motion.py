@@ -97,13 +97,13 @@ def joint_motion(
     return Motion(qp, which, limit, velocities[0], velocities[1]), after
 
 
-def _how_it_ended(hold: bool, ending: int, violated: bool) -> tuple[QpOutcome, str]:
-    """Return outcome and sentence for how `minimise` ended, and for whether a row is violated."""
+def _how_it_ended(hold: bool, ending: int, violated: bool) -> tuple[QpOutcome, str, bool]:
+    """Return outcome and sentence for how `minimise` ended, and whether its solution violates a row."""
     if hold:
-        return QpOutcome.SKIPPED, "not posed: the arm holds"
+        return QpOutcome.SKIPPED, "not posed: the arm holds", False
     if ending != SOLVED:
-        return QpOutcome.FAILED, ENDING[ending]
-    return QpOutcome.SOLVED, "solved, an approach row is violated" if violated else "solved"
+        return QpOutcome.FAILED, ENDING[ending], False
+    return QpOutcome.SOLVED, "solved, an approach row is violated" if violated else "solved", violated
 
 
 def _with_hard_rows(

@@ -173,9 +173,9 @@ def solve(
         return _braking(stop, rows, QpOutcome.FAILED, ENDING[ending])
     if len(slack) and not rows.soft and slack.max() > 0:
         return solve_hard(cost, lower, upper, rows, stop, budget)
-    violated = len(slack) > 0 and slack.max() > 0
+    violated = len(slack) > 0 and bool(slack.max() > 0)
     status = "solved, an approach row is violated" if violated else "solved"
-    return QpSolution(x, slack, multipliers, QpOutcome.SOLVED, status)
+    return QpSolution(x, slack, multipliers, QpOutcome.SOLVED, status, violated)
 
 
 def _room(n: int, count: int) -> Minimum:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pretouch.contact.moving_thresholds import MovingThresholds
+from pretouch.modes import Event
 from pretouch.recording.run_record import RunRecord
 from pretouch.types import BoolArray, FloatArray, IntArray, QpOutcome
 
@@ -30,6 +31,8 @@ class Course(RunRecord):
     """Names of the links of the arm."""
     run: IntArray
     """(S,) index of the run."""
+    event: tuple[Event, ...]
+    """S, what made the mode so."""
     reason: tuple[str, ...]
     """S sentences."""
     body_distance: FloatArray

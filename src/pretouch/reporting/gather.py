@@ -41,19 +41,20 @@ class _Layout:
 def gather(recorded: "Recorded") -> Course:
     """Read all cycles of a recording."""
     layout = _Layout.of(recorded.runs)
-    blocks, reasons, contacts, truths = [], [], [], []
+    blocks, events, reasons, contacts, truths = [], [], [], [], []
     done = 0
     for batch in _batches(recorded):
         run = recorded.runs[batch[0].run]
         blocks.append(_block(batch, run, layout))
+        events += [kept.step.event for kept in batch]
         reasons += [kept.step.reason for kept in batch]
         contacts += contacts_of([kept.step for kept in batch], done)
         truths.append(_truth(batch, run))
         done += len(batch)
     joined = {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
     return Course(
-        runs=tuple(recorded.runs), units=layout.units, links=layout.links, reason=tuple(reasons),
-        contacts=tuple(contacts), truth=_joined(truths), **joined,
+        runs=tuple(recorded.runs), units=layout.units, links=layout.links, event=tuple(events),
+        reason=tuple(reasons), contacts=tuple(contacts), truth=_joined(truths), **joined,
     )  # fmt: skip
 
 

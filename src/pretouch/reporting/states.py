@@ -1,6 +1,5 @@
 """What the arm was doing, why it held, and how the quadratic programs ended."""
 
-import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,19 +9,17 @@ from pretouch.reporting.course import OUTCOMES, Course
 from pretouch.reporting.numbers import Spread, durations, spread
 from pretouch.types import Mode, QpOutcome
 
-_NUMBER = re.compile(r"\d+(\.\d+)?(e[+-]?\d+)?")
-
 
 @dataclass(frozen=True)
 class Hold:
-    """One stretch of HOLD for one reason."""
+    """One stretch of HOLD by one event."""
 
     start: float
     """[s]"""
     duration: float
     """[s]"""
     sentence: str
-    """As first said; the numbers in it may have changed later."""
+    """As first said; what it says of a step may have changed later."""
 
 
 @dataclass(frozen=True)
@@ -56,15 +53,15 @@ def states(course: Course) -> States:
 
 
 def _holds(course: Course) -> tuple[Hold, ...]:
-    """Stretches of HOLD; sentences that differ by their numbers alone are one reason."""
+    """Stretches of HOLD, each by one event."""
     lasted, held = durations(course.time), course.mode == MODES.index(Mode.HOLD)
     found: list[Hold] = []
-    first, kind = -1, ""
+    first, kind = -1, None
     for i in range(len(course) + 1):
-        here = _NUMBER.sub("#", course.reason[i]) if i < len(course) and held[i] else ""
-        if here == kind:
+        here = course.event[i] if i < len(course) and held[i] else None
+        if here is kind:
             continue
-        if kind:
+        if kind is not None:
             found.append(Hold(float(course.time[first]), float(lasted[first:i].sum()), course.reason[first]))
         first, kind = i, here
     return tuple(found)

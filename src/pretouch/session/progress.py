@@ -1,6 +1,5 @@
 """Progress messages of a run, and its summary at the end."""
 
-import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -8,12 +7,12 @@ from typing import Any
 import numpy as np
 
 from pretouch.controller import Controller
-from pretouch.explanation import answers, explain, resumable
+from pretouch.explanation import Doing, answers, explain, resumable
 from pretouch.loop import Cycle, Recorder
+from pretouch.modes import Event
 from pretouch.session.push_outcome import lacked
 from pretouch.types import ControlStep, Mode
 
-_NUMBERS = re.compile(r"\d+(\.\d+)?")
 _LINE_S = 5.0
 """Time between two lines on how it goes [s]."""
 _AGAIN_S = 1.0
@@ -33,7 +32,7 @@ class RunSummary:
     unmoved: int = 0
     """Contacts that the arm did not move with, for they were below what moves it."""
     holds: dict[str, float] = field(default_factory=dict)
-    """Time held [s] by the reason, without its numbers."""
+    """Time held [s] by the sentence with which an event first held the arm."""
 
     def numbers(self, period: float) -> dict[str, Any]:
         """Return the summary for JSON."""
@@ -63,9 +62,9 @@ class ProgressReporter:
         self._names = of.skin.ids if of.profile.perception else (), of.model.links
         self._answered = True
         self._nearest: ControlStep | None = None
-        self._kind: tuple[Mode, str, bool] | None = None
+        self._kind: tuple[Mode, Event | Doing | None, bool] | None = None
         self._line_due = self._said = self._near_due = -np.inf
-        self._examples: dict[str, str] = {}
+        self._examples: dict[Event, str] = {}
         self.summary = RunSummary()
 
     def record(self, cycle: Cycle) -> None:
@@ -76,12 +75,11 @@ class ProgressReporter:
         summary.contacts += step.contact is not None
         self._count_answer(step)
         self._note_near_contact(step)
-        stem = _NUMBERS.sub("#", step.reason)
         if step.mode is Mode.HOLD:
-            reason = self._examples.setdefault(stem, step.reason)
+            reason = self._examples.setdefault(step.event, step.reason)
             summary.holds[reason] = summary.holds.get(reason, 0.0) + self._period
         found = explain(step, *self._names)
-        part = {Mode.HOLD: stem, Mode.REACT: found.doing.name, Mode.TRACK: ""}[step.mode]
+        part = {Mode.HOLD: step.event, Mode.REACT: found.doing, Mode.TRACK: None}[step.mode]
         kind = (step.mode, part, resumable(step))
         if kind == self._kind:
             if step.stamp >= self._line_due:

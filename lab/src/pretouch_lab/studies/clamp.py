@@ -7,13 +7,14 @@ import mujoco
 import numpy as np
 
 from pretouch.control.path import Circle
+from pretouch.explanation import resumable
 from pretouch.sim.board import PANDA_SIDE
 from pretouch.sim.plant import TOUCH_N, Plant
 from pretouch.sim.pushes import Holder, Push
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
 from pretouch.text_table import TextTable, tabulated
 from pretouch.traces import mean_over
-from pretouch.types import FloatArray, Mode
+from pretouch.types import FloatArray
 from pretouch_lab.cell import Cell, Context, Grid
 from pretouch_lab.experiment import Experiment
 from pretouch_lab.rows import Row, cells_of, peak, rounded
@@ -108,7 +109,7 @@ def results(force: FloatArray, record: Record) -> Row:
         "board_mean_n": rounded(float(force[touching].mean())) if touching.any() else None,
         "board_s": rounded(float(touching.sum()) / 1000.0),
         "leaning": bool(touching[-int(_FREE_S * 1000) :].mean() > 0.5),
-        "latched": last.mode is Mode.HOLD and "resume" in last.reason,
+        "latched": resumable(last),
     }
 
 

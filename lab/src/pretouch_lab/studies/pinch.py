@@ -8,6 +8,8 @@ import numpy as np
 
 from pretouch.control.path import WayPoints
 from pretouch.control.posture import brought_to
+from pretouch.explanation import resumable
+from pretouch.modes import Event
 from pretouch.robot.model import RobotModel
 from pretouch.robot.self_distance import nearest_points
 from pretouch.sim.hand import HandGoal
@@ -15,7 +17,7 @@ from pretouch.sim.plant import TOUCH_N, Plant
 from pretouch.sim.scene import HandSpec, SceneSpec
 from pretouch.text_table import TextTable, tabulated
 from pretouch.traces import mean_over
-from pretouch.types import FloatArray, Mode
+from pretouch.types import FloatArray
 from pretouch_lab.cell import Cell, Context, Grid
 from pretouch_lab.experiment import Experiment
 from pretouch_lab.rows import Row, cells_of, peak, rounded
@@ -136,7 +138,7 @@ _NAMED = {"crook": _CROOK, "floor": ("hand", "fixture")}
 def results(force: FloatArray, record: Record, named: tuple[str, str]) -> Row:
     """Numbers of one trial, given the force (T,) [N] with which the limb was squeezed at each millisecond."""
     squeezed, last = force > TOUCH_N, record.steps[-1]
-    said = [s.reason for s in record.steps if "lamped between two objects" in s.reason]
+    said = [s.reason for s in record.steps if s.event in (Event.OPENING, Event.CLAMPED)]
     return {
         "caught": bool(squeezed.any()),
         "peak_20ms_n": rounded(peak(mean_over(force, 20))),
@@ -144,7 +146,7 @@ def results(force: FloatArray, record: Record, named: tuple[str, str]) -> Row:
         "contacts": len(record.reactions()),
         "recognised": bool(said),
         "links": bool(said) and all(name in said[0] for name in named),
-        "latched": last.mode is Mode.HOLD and "resume" in last.reason,
+        "latched": resumable(last),
     }
 
 

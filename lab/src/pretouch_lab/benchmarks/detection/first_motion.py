@@ -4,13 +4,13 @@ import numpy as np
 
 from pretouch.contact.detector import Body, Detection
 from pretouch.contact.reaction import ReactionInputs
-from pretouch.modes import ModeState
+from pretouch.modes import Event, ModeState
 from pretouch.profiles import Profile
 from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import FloatArray, Mode, Obstacles, RobotState
 
-_TRACK, _REACT = ModeState(Mode.TRACK, ""), ModeState(Mode.REACT, "")
+_TRACK, _REACT = ModeState(Mode.TRACK, Event.CLEAR), ModeState(Mode.REACT, Event.REACTING)
 
 
 class FirstMotion:
