@@ -31,9 +31,9 @@ _PR_SET_TIMERSLACK, _PR_GET_TIMERSLACK = 29, 30
 """Of Linux' `prctl`."""
 
 _WARM_UP_STEPS = 3
+"""Steps of each kind: what one sees for the first time the next one remembers."""
 _PUSH_NM = 50.0
 """External torque of each joint in a contact that is made up [Nm]."""
-"""Steps of each kind: what one sees for the first time the next one remembers."""
 _NEWS_S = 0.5
 """Longest time the first state is waited for [s]: then the controller says how old the newest is."""
 _LOOK_S = 0.001

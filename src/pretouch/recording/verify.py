@@ -153,7 +153,7 @@ def verify(recorded: Recorded, progress: Callable[[int], None] = lambda done: No
     """Recompute each step from the snapshots and inputs, and compare all of it with what was recorded.
 
     With the versions and on the kind of machine that made it, bit for bit, and the state is carried from snapshot to
-    snapshot, where it is compared too. Otherwise within `difference.TOLERANCE`, beginning anew at each snapshot, and
+    snapshot, where it is compared too. Otherwise within `TOLERANCE`, beginning anew at each snapshot, and
     without the sentences. `progress` gets how many steps are done.
     """
     count = _Count()
