@@ -8,10 +8,8 @@ import pytest
 from pretouch.desired import Desired, DesiredKind, sound_desired, twist
 from pretouch.errors import ParameterError
 from pretouch.faults import (
-    MOST_IMU,
     Watch,
     examine,
-    sound_imu,
     sound_points,
     sound_readings,
     sound_robot,
@@ -24,7 +22,7 @@ from pretouch.params import FailureParams
 from pretouch.payload import Payload
 from pretouch.perception.moving import sound_moving
 from pretouch.sensing.sensor import PAPER_SENSOR
-from pretouch.types import ImuReadings, Inputs, RangeReadings, RangeStatus, RobotState, SeenPoints, TouchReadings
+from pretouch.types import Inputs, RangeReadings, RangeStatus, RobotState, SeenPoints, TouchReadings
 
 PARAMS = FailureParams()  # state older than 0.05 s, step more than 0.05 s after the last, no force for 0.2 s
 PERIOD = 0.01
@@ -351,47 +349,3 @@ def test_of_readings_that_do_not_fit_none_is_taken(given: RangeReadings, said: s
     assert said in unfit
     np.testing.assert_array_equal(sound.stamp, [-np.inf, -np.inf])
     np.testing.assert_array_equal(sound.status, int(RangeStatus.NONE))
-
-
-def imu_of(count: int = 2, **change) -> ImuReadings:
-    whole = ImuReadings(np.arange(count), np.full(count, 0.5), np.ones((count, 3)), np.ones((count, 3)))
-    return replace(whole, **change)
-
-
-def test_sound_imu_samples_are_copied() -> None:
-    given = imu_of()
-    found = sound_imu(given, 2)
-    assert found is not None
-    assert found.acceleration.tolist() == given.acceleration.tolist()
-    assert not np.shares_memory(found.acceleration, given.acceleration)
-
-
-def test_imu_samples_that_can_be_none_are_left_out_and_the_others_kept() -> None:
-    bad = np.ones((4, 3))
-    bad[1, 2], bad[2, 0] = np.nan, 1e6
-    found = sound_imu(imu_of(4, unit=np.array([0, 0, 0, 7]), acceleration=bad), 2)
-    assert found is not None
-    assert found.unit.tolist() == [0]
-    late = sound_imu(imu_of(3, unit=np.zeros(3, np.int64), stamp=np.array([np.nan, 1.0, np.inf])), 2)
-    assert late is not None
-    assert late.stamp.tolist() == [1.0]
-
-
-@pytest.mark.parametrize(
-    "given",
-    [None, "many", imu_of(unit=np.zeros(2)), imu_of(stamp=np.zeros(3)), imu_of(acceleration=np.zeros(3)),
-     imu_of(angular_velocity="none"),
-     imu_of(stamp=COMPLEX), imu_of(acceleration=np.ones((2, 3), complex)), imu_of(unit=np.zeros((2, 1), np.int64))],
-)  # fmt: skip
-def test_what_is_no_imu_samples_says_nothing(given) -> None:
-    assert sound_imu(given, 2) is None
-
-
-def test_a_flood_of_imu_samples_is_cut_to_the_newest() -> None:
-    count = 3 * MOST_IMU
-    found = sound_imu(imu_of(count, unit=np.zeros(count, np.int64), stamp=np.arange(count) / 1e3), 1)
-    assert found is not None
-    assert found.stamp.tolist() == (np.arange(2 * MOST_IMU, count) / 1e3).tolist()
-    nobody = sound_imu(imu_of(), 0)
-    assert nobody is not None
-    assert len(nobody.unit) == 0

@@ -204,7 +204,7 @@ def test_the_order_of_changes_does_not_matter():
         ("paper:detect.cues=touch", "The parameter 'detect.cues' is unknown: choose from f_base_n"),
         ("pretouch:react.soft_hold=maybe", "react.soft_hold is 'maybe': write yes or no"),
         ("pretouch:detect.localise=none:detect.localise.force_n=3", "detect.localise is none: choose it first"),
-        ("pretouch:detect.cues=smell", "There is no Cue called 'smell': choose from touch, imu"),
+        ("pretouch:detect.cues=smell", "There is no Cue called 'smell': choose from touch"),
     ],
 )
 def test_a_variation_that_cannot_be_is_refused(name, words):

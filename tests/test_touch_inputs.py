@@ -124,7 +124,7 @@ def test_without_sensors_in_the_skin_or_without_the_switch_no_bit_changes(panda_
         assert all(
             same(replace(a, reason=""), replace(b, reason="")) for a, b in zip(plain.steps, found.steps, strict=True)
         )
-    assert not PROFILES["paper"].detect.reads
+    assert not PROFILES["paper"].detect.reads_touch
 
 
 def test_touch_readings_that_do_not_fit_hold_the_arm_and_say_so(panda_model, feeling):

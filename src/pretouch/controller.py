@@ -103,8 +103,7 @@ class Controller:
         self.body = Body(model, skin, self.limits.period, fixtures.planes, fixtures.capsules)
         self._detector = profile.detect.on(self.body)
         self._units, self._most_kg = len(skin), most_kg(model)
-        self._touching = "touch" in profile.detect.reads and len(skin.touching) > 0
-        self._shaken, self._mark = "imu" in self._detector.reads, mark
+        self._touching, self._mark = profile.detect.reads_touch and len(skin.touching) > 0, mark
 
     def init(self, robot: RobotState, learnt: ResidualModel | None = None) -> ControllerState:
         """Return the state before the first step; a robot state that cannot be used is a RobotStateError.
@@ -284,10 +283,9 @@ class Controller:
         robot, before, p = given.robot, state.window, self.profile.window
         reacting = state.mode.mode is Mode.REACT
         window = add_force(before, None if robot.wrench is None else robot.wrench[:3], p)
-        imu = faults.sound_imu(inputs.imu, self._units) if self._shaken else None
         sample = Sample(
             given.watch.stamp, kin, robot, window, before.full, near.seen.obstacles, reacting, near.watched,
-            given.touches, imu, given.load.doubted_kg if given.load else 0.0,
+            given.touches, given.load.doubted_kg if given.load else 0.0,
         )  # fmt: skip
         detection, detector = self._detector.step(state.detector, self.body, sample)
         return detection, before if reacting and p.freeze_while_reacting else window, detector

@@ -12,7 +12,6 @@ from pretouch.perception.chosen_points import FARTHEST, LARGEST_SIGMA, usable
 from pretouch.types import (
     WHOLE,
     FloatArray,
-    ImuReadings,
     Inputs,
     RangeReadings,
     RangeStatus,
@@ -34,8 +33,6 @@ _STRONGEST = 1e4
 _LATEST = 1e12
 """A time stamp [s] from here on is none, whatever the clock began with."""
 
-MOST_IMU = 64
-"""IMU samples of a unit that one step takes in: two of the longest datagrams."""
 MOST_POINTS = 20_000
 """Points of outside sources that are taken in one step: what they cost stays bounded."""
 
@@ -236,27 +233,6 @@ def sound_readings(readings: RangeReadings, units: int) -> tuple[RangeReadings, 
             return _nothing(units), f"statuses are of type {status.dtype}, not whole numbers"
         status = status.astype(np.int64)
     return RangeReadings(stamp, distance, status), ""
-
-
-def sound_imu(imu: ImuReadings | None, units: int) -> ImuReadings | None:
-    """Copy the IMU samples that are plausible for so many units; None where none is.
-
-    This is no fault: they only add to the evidence of the torques, as of an arm whose units have no IMU.
-    """
-    if imu is None:
-        return None
-    try:
-        unit, stamp = np.array(imu.unit), real(imu.stamp)
-        motion = real((imu.acceleration, imu.angular_velocity))
-    except (AttributeError, TypeError, ValueError, OverflowError):
-        return None
-    count = len(stamp) if stamp.ndim == 1 else -1
-    if unit.shape != (count,) or unit.dtype.kind not in "iu" or motion.shape != (2, count, 3):
-        return None
-    sound = (unit >= 0) & (unit < units) & (np.abs(stamp) < _LATEST) & (np.abs(motion) < _LARGEST).all(axis=(0, 2))
-    # no more than a bounded step can take in: the newest
-    kept = np.flatnonzero(sound)[-MOST_IMU * units :] if units else np.zeros(0, np.int64)
-    return ImuReadings(unit[kept].astype(np.int64), stamp[kept], motion[0, kept], motion[1, kept])
 
 
 def _nothing(units: int) -> RangeReadings:

@@ -18,7 +18,7 @@ from pretouch.errors import ParameterError
 from pretouch.faults import time_of
 from pretouch.moving_fixtures import MovingFixtures
 from pretouch.payload import Payload
-from pretouch.ports import Clock, Points, Robot, Skin, imu_of, touch_of
+from pretouch.ports import Clock, Points, Robot, Skin, touch_of
 from pretouch.signals import noted
 from pretouch.types import ControlStep, FloatArray, Inputs, RangeReadings, RobotState, TouchReadings
 from pretouch.values import value
@@ -235,11 +235,10 @@ def turn(
     """Turn the controller once, at a tick [s]: read, step, command."""
     resume, payload, desired, points = options.resume(), options.payload(), options.desired(), options.points
     report, readings, touch = robot.read(), skin.read(), touch_of(skin)
-    imu = imu_of(skin) if "imu" in controller.profile.detect.reads else None
     seen = None if points is None else points.read()
     stamp = instant(tick, controller.limits.period, report, readings, touch)
     believed = explained(controller, state, report, stamp)
-    inputs = Inputs(stamp, believed, readings, resume, touch, imu, seen, payload, desired, options.moving())
+    inputs = Inputs(stamp, believed, readings, resume, touch, seen, payload, desired, options.moving())
     step, after = controller.step(state, inputs)
     robot.command(step.command)
     return Cycle(inputs, state, step, after)

@@ -2,7 +2,7 @@
 
 from typing import Protocol
 
-from pretouch.types import FloatArray, ImuReadings, RangeReadings, RobotState, SeenPoints, TouchReadings
+from pretouch.types import FloatArray, RangeReadings, RobotState, SeenPoints, TouchReadings
 
 
 class Robot(Protocol):
@@ -33,24 +33,10 @@ class TouchSkin(Skin, Protocol):
         ...
 
 
-class ImuSkin(Skin, Protocol):
-    """Sensor units that have IMUs too. A `Skin` without this method has none."""
-
-    def imu(self) -> ImuReadings:
-        """Return the IMU samples that came since the last call."""
-        ...
-
-
 def touch_of(skin: object) -> TouchReadings | None:
     """Return what units say of being touched, None of a skin that has no touch sensors."""
     touch = getattr(skin, "touch", None)
     return None if touch is None else touch()
-
-
-def imu_of(skin: object) -> ImuReadings | None:
-    """Return the IMU samples of a skin that came since the last call, None of one whose units have none."""
-    imu = getattr(skin, "imu", None)
-    return None if imu is None else imu()
 
 
 class Points(Protocol):

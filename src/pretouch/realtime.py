@@ -19,7 +19,6 @@ from pretouch.signals import ended_in_order
 from pretouch.types import (
     ControlStep,
     FloatArray,
-    ImuReadings,
     Inputs,
     RangeReadings,
     RangeStatus,
@@ -242,13 +241,10 @@ class _Rehearsal:
         if torque and robot.tau_ext is not None:
             robot = replace(robot, tau_ext=robot.tau_ext + torque)
         readings = RangeReadings(stamp, np.linspace(0.0, 1.0, units), status)
-        # of each unit one sample, so that nothing of what they are used for is compiled in the loop
-        imu = ImuReadings(np.arange(units), np.full(units, self._now - self._controller.limits.period),
-                          np.zeros((units, 3)), np.zeros((units, 3)))  # fmt: skip
         points = None
         if self._points:
             near = self._controller.model.kinematics(self._robot.q).position + np.array([0.0, 0.3, 0.1])
             count = len(near) if seen is RangeStatus.OK else 0
             points = SeenPoints(self._now, np.full(count, self._now), near[:count], np.full(count, 0.01))
-        inputs = Inputs(self._now, robot, readings, resume, imu=imu, points=points)
+        inputs = Inputs(self._now, robot, readings, resume, points=points)
         _, self._state = self._controller.step(self._state, inputs)

@@ -84,23 +84,6 @@ class TouchReadings:
 
 
 @value
-class ImuReadings:
-    """The IMU samples of a skin that came since the step before: M of them, each unit's in the order of time.
-
-    A sample is given once. There are as many as came, so that no peak between two steps is lost and none is kept twice.
-    """
-
-    unit: IntArray
-    """(M,) index of the unit in the skin, of one with zones that of its first."""
-    stamp: FloatArray
-    """(M,) instant of each sample [s]."""
-    acceleration: FloatArray
-    """(M, 3) specific force, sensor frame: at rest, that against gravity [m/s^2]."""
-    angular_velocity: FloatArray
-    """(M, 3) sensor frame [rad/s]."""
-
-
-@value
 class RobotState:
     """What the robot's own interface reports at one instant, n joints."""
 
@@ -152,8 +135,6 @@ class Inputs:
     """A person asks to leave a latched HOLD."""
     touch: TouchReadings | None = None
     """What units say of being touched; None of a skin that has no touch sensors."""
-    imu: ImuReadings | None = None
-    """None where units have no IMU, or nobody asks them."""
     points: SeenPoints | None = None
     """What outside sources see; None without one. Once given, silence of theirs stops the arm."""
     payload: Payload | None = None

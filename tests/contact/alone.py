@@ -12,14 +12,13 @@ from pretouch.contact.window import WindowState, add_force, window_init
 from pretouch.profiles import Profile
 from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.types import ImuReadings, Obstacles, RobotState, TouchReadings
+from pretouch.types import Obstacles, RobotState, TouchReadings
 
 
 @dataclass(frozen=True)
 class Given(Cue):
     """Says what it is given."""
 
-    reads = "touch"
     said: Cues | None = None
 
     def step(self, state: None, body: Body, sample: Sample) -> tuple[Cues | None, None]:
@@ -57,11 +56,10 @@ def feel(
 
 
 def sample(
-    kin: Kinematics, robot: RobotState, near: Obstacles, now: float, touches: TouchReadings | None = None,
-    imu: ImuReadings | None = None,
-) -> Sample:  # fmt: skip
+    kin: Kinematics, robot: RobotState, near: Obstacles, now: float, touches: TouchReadings | None = None
+) -> Sample:
     """A step in which units felt something."""
-    return Sample(now, kin, robot, window_init(2), True, near, touches=touches, imu=imu)
+    return Sample(now, kin, robot, window_init(2), True, near, touches=touches)
 
 
 def standing(model: RobotModel, stamp: float = 0.0) -> RobotState:

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from pretouch.robot.model import RobotModel
-from pretouch.types import ImuReadings, Inputs, RangeReadings, RangeStatus, RobotState, SeenPoints, TouchReadings
+from pretouch.types import Inputs, RangeReadings, RangeStatus, RobotState, SeenPoints, TouchReadings
 
 DT = 0.01
 READY = (0.0, -0.785398163, 0.0, -2.35619449, 0.0, 1.570796327, 0.785398163)
@@ -32,7 +32,6 @@ class Script:
         self.stamp = np.tile(self.time[:, None], (1, units))
         self.contact, self.touch_force = np.zeros((cycles, units), bool), np.full((cycles, units), 2.0)
         self.points: dict[int, np.ndarray] = {}
-        self.imu: dict[int, ImuReadings] = {}
         self.touches = False
         self.changes: dict[int, list[Change]] = {}
 
@@ -80,7 +79,6 @@ class Script:
             self.state(i),
             RangeReadings(stamp, np.round(self.distance[i], 9), self.status[i].astype(np.int64)),
             touch=self._touch(i, stamp),
-            imu=self.imu.get(i),
             points=self._points(i),
         )
         for change in self.changes.get(i, ()):

@@ -14,9 +14,9 @@ from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, paper_skin
 from pretouch.sensing.unit import TouchPatch
-from pretouch.types import ImuReadings, Inputs, RangeReadings, RangeStatus
+from pretouch.types import Inputs, RangeReadings, RangeStatus
 from tests.golden.fields import Values, forgotten, values_of
-from tests.golden.script import READY, Script
+from tests.golden.script import Script
 
 PROFILES = (
     "paper", "blind", "slowing-only", "thresholds-only", "paper-0.5m", "fixed", "observer", "pretouch", "flacco",
@@ -228,22 +228,6 @@ def outside() -> Script:
     return s
 
 
-def jolted() -> Script:
-    """Units' accelerometers measure gravity, noise, and a jolt as the arm is pushed."""
-    s = Script(260)
-    s.push(model(), 160, 175, HAND, (0.0, -20.0, 0.0))
-    kin, units = model().kinematics(np.array(READY)), skin()
-    up = np.array([kin.rotation[k].T[:, 2] @ T[:3, :3] for k, T in zip(units.link, units.T_link_sensor, strict=True)])
-    for i in range(1, len(s.time)):
-        unit = np.repeat(np.arange(len(units)), 2)
-        acceleration = 9.81 * up[unit] + 0.05 * s.rng.uniform(-1, 1, (len(unit), 3))
-        acceleration[unit >= 4] += 20.0 if i in (160, 161) else 0.0
-        turning = 0.01 * s.rng.uniform(-1, 1, (len(unit), 3))
-        stamp = s.time[i] - np.tile([0.005, 0.001], len(units))
-        s.imu[i] = ImuReadings(unit, np.round(stamp, 9), np.round(acceleration, 6), np.round(turning, 6))
-    return s
-
-
 def fuzz(seed: int) -> Callable[[], Script]:
     """Anything, for twenty cycles each."""
 
@@ -304,7 +288,6 @@ STREAMS = {
     "faults/pretouch": Stream("pretouch", faulty, ("cannot be used", "Time went backwards", "do not fit")),
     "touch": Stream("pretouch", touched, ("contact", "localised"), touching=True),
     "outside-points": Stream("pretouch", outside, ("restricted", "outside source")),
-    "imu": Stream("pretouch:detect.cues=touch,imu", jolted, ("contact",)),
     **{f"fuzz/{name}": Stream(name, fuzz(7 + i), ("track", "react")) for i, name in enumerate(("paper", "pretouch"))},
     "fuzz/ding": Stream("ding", fuzz(9), ("track",)),
 }  # fmt: skip

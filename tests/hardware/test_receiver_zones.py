@@ -10,7 +10,6 @@ from pretouch.hardware.findings import findings
 from pretouch.hardware.health import HealthParams, UnitWindow
 from pretouch.hardware.link import LinkParams
 from pretouch.hardware.receiver_process import SharedOutputs, packed
-from pretouch.hardware.traffic import imu_readings
 from pretouch.hardware.wire import TAKES_TOUCH, TAKES_ZONES, Flag, TouchPart
 from pretouch.sensing.network import NetworkUnits
 from pretouch.types import RangeStatus
@@ -49,8 +48,7 @@ def test_a_range_with_zones_is_a_row_for_each(bench):
     assert readings.status.tolist() == [5, 5, 5, 5, 0]
     assert len(set(readings.stamp[:4])) == 1
     assert bench.receiver.touch().contact.tolist() == [True, False, False, False, False]
-    imu = imu_readings(bench.receiver.take_imu(), bench.receiver.network)
-    assert imu.unit.tolist() == [0, 0, 4, 4]
+    assert [(batch.unit, len(batch.stamp)) for batch in bench.receiver.take_imu()] == [(0, 2), (1, 2)]
 
 
 def test_zones_without_a_new_range_are_no_reading(bench):

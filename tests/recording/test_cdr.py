@@ -100,7 +100,6 @@ def test_texts_that_are_none(text):
         ("RangeReadings", (np.ones(2), np.ones(2), np.ones(2))),
         ("RangeReadings", (np.ones(2), np.ones(4)[::2], np.ones(2, np.int64))),
         ("Contact", (np.ones(4), np.ones(3, np.bool_))),
-        ("ImuReadings", (-1, 0.0, np.ones(0, np.int64), np.ones(0), np.ones(0), np.ones(0))),
     ],
 )
 def test_values_that_do_not_fit_are_no_message(kind, values):

@@ -26,7 +26,6 @@ from pretouch.recording.truth import Truth
 from pretouch.types import (
     Contact,
     ControlStep,
-    ImuReadings,
     Inputs,
     Mode,
     Obstacles,
@@ -209,11 +208,10 @@ def test_inputs_of_other_types_are_kept_as_the_controller_takes_them(spoil, want
 
 
 def test_messages_mirror_the_types_field_by_field():
-    mirrored = (RobotState, RangeReadings, Obstacles, Contact, QpSolution, Touched, ControlStep, Inputs, ImuReadings)
+    mirrored = (RobotState, RangeReadings, Obstacles, Contact, QpSolution, Touched, ControlStep, Inputs)
     own = {"sequence", "time", "unreadable", "has_wrench", "has_contact", "path_tangent"}
     beside = {
         "touch",
-        "imu",
         "points",
         "payload",
         "desired",

@@ -12,7 +12,7 @@ from pretouch.recording.verify import verify
 from pretouch.recording.writer import Recording
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import TouchPatch
-from pretouch.types import ImuReadings, Mode, SeenPoints, TouchReadings
+from pretouch.types import Mode, SeenPoints, TouchReadings
 from tests.fuzz.invariants import same
 from tests.recording.runs import SHORT, Run, controller_of
 
@@ -54,7 +54,7 @@ def test_a_latched_hold_leaves_its_last_seconds(controller, tmp_path):
 
 def test_what_is_felt_and_seen_from_outside_is_kept_too(panda_model, paper_skin, tmp_path):
     feeling = Skin([replace(unit, touch=TouchPatch()) for unit in paper_skin.units], panda_model)
-    controller = controller_of(panda_model, feeling, profile("pretouch:detect.cues=touch,imu"))
+    controller = controller_of(panda_model, feeling, profile("pretouch"))
     run, kept = Run(controller), LastSeconds(controller, tmp_path / "holds", seconds=1.0)
     source = SeenPoints(0.0, np.zeros(1), np.array([[0.6, 0.2, 0.5]]), np.array([0.01]))
     for i in range(220):
@@ -66,16 +66,13 @@ def test_what_is_felt_and_seen_from_outside_is_kept_too(panda_model, paper_skin,
             touch = TouchReadings(
                 np.full(7, inputs.stamp), np.arange(7) == i % 7, np.full(7, 2.0), np.zeros(7, np.int64)
             )
-            imu = ImuReadings(
-                np.arange(7), np.full(7, inputs.stamp - 0.002), np.full((7, 3), 0.1 * i), np.full((7, 3), 0.01 * i)
-            )  # fmt: skip
-            inputs = replace(inputs, touch=touch, imu=imu, points=source)
+            inputs = replace(inputs, touch=touch, points=source)
             return broken(inputs) if i == 210 else going_on(inputs)
 
         kept.record(run.turn(given))
     kept.close()
     recorded = open_recording(kept.written[0])
-    for part in ("touch", "imu", "points"):
+    for part in ("touch", "points"):
         assert same(getattr(recorded[50].inputs, part), getattr(run.cycles[210 - 100 + 50].inputs, part)), part
     assert verify(recorded).agrees
 

@@ -5,7 +5,7 @@ from pretouch.contact.window import add_force, window_init
 from pretouch.profiles import Profile
 from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.types import ImuReadings, Obstacles, RobotState, TouchReadings
+from pretouch.types import Obstacles, RobotState, TouchReadings
 
 
 class DetectorAlone:
@@ -19,12 +19,12 @@ class DetectorAlone:
 
     def step(
         self, kin: Kinematics, robot: RobotState, near: Obstacles, reacting: bool = False, watched: bool = True,
-        touches: TouchReadings | None = None, imu: ImuReadings | None = None,
+        touches: TouchReadings | None = None,
     ) -> Detection:  # fmt: skip
-        """Take in a step: posture, robot state, obstacles, whether it reacts and is watched, touch and IMU readings."""
+        """Take in a step: posture, robot state, obstacles, whether it reacts and is watched, touch readings."""
         before, force = self.window, None if robot.wrench is None else robot.wrench[:3]
         window = add_force(before, force, self._params)
-        sample = Sample(robot.stamp, kin, robot, window, before.full, near, reacting, watched, touches, imu)
+        sample = Sample(robot.stamp, kin, robot, window, before.full, near, reacting, watched, touches)
         found, self.state = self._detector.step(self.state, self.body, sample)
         self.window = before if reacting and self._params.freeze_while_reacting else window
         return found

@@ -8,7 +8,7 @@ from pretouch_lab.experiment import Experiment
 from pretouch_lab.paper import avoidance, dynamic, static
 from pretouch_lab.paper.claims import anticipation, between, detectable, free_motion, noise
 from pretouch_lab.rows import Row
-from pretouch_lab.studies import clamp, imu, mounting, pinch, tactile, two_arms, vision, wire
+from pretouch_lab.studies import clamp, mounting, pinch, tactile, two_arms, vision, wire
 from pretouch_lab.studies.coverage import study as coverage
 from pretouch_lab.weaknesses import (
     creeping,
@@ -43,7 +43,6 @@ HARDWARE = (wire.EXPERIMENT,)
 MOUNTING = (mounting.EXPERIMENT, coverage.EXPERIMENT)
 REACTION = (clamp.EXPERIMENT, pinch.EXPERIMENT)
 TOUCH = (tactile.EXPERIMENT,)
-IMPACTS = (imu.EXPERIMENT,)
 VISION = (vision.EXPERIMENT,)
 TWO_ARMS = (two_arms.EXPERIMENT,)
 
@@ -55,7 +54,6 @@ GROUPS = {
     "Where units sit": MOUNTING,
     "Clamped between two objects": REACTION,
     "Touch sensors of units": TOUCH,
-    "Impacts by the units' accelerometers": IMPACTS,
     "A camera beside the skin": VISION,
     "Two arms over one table": TWO_ARMS,
 }

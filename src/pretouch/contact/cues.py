@@ -1,12 +1,12 @@
 """What sensor units say of a touch beside the arm's torques: where one is likelier, and where there is one."""
 
 from functools import cache
-from typing import Any, ClassVar, Self
+from typing import Any, Self
 
 import numpy as np
 
 from pretouch.composition import Part
-from pretouch.contact.detector import Body, Readings, Sample
+from pretouch.contact.detector import Body, Sample
 from pretouch.types import FloatArray, IntArray
 from pretouch.values import value
 
@@ -49,10 +49,7 @@ def together(*cues: Cues) -> Cues:
 
 
 class Cue(Part, group="pretouch.cues"):
-    """A kind of sensor on the units that says something of a touch. As a detector, it is a frozen dataclass."""
-
-    reads: ClassVar[Readings]
-    """What it takes of the units."""
+    """What the units' touch readings say of a contact. As a detector, it is a frozen dataclass."""
 
     def on(self, body: Body) -> Self:
         """Return the cue for an arm with all prepared that does not change; by default itself."""

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import field
-from typing import Any, ClassVar, Literal, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -17,7 +17,6 @@ from pretouch.types import (
     NOT_TOUCHED,
     Contact,
     FloatArray,
-    ImuReadings,
     Obstacles,
     RobotState,
     Thresholds,
@@ -25,9 +24,6 @@ from pretouch.types import (
     TouchReadings,
 )
 from pretouch.values import value
-
-Readings = Literal["touch", "imu"]
-"""What units measure beside distances."""
 
 
 @value
@@ -66,8 +62,6 @@ class Sample:
     """Whether a skin watches, all of its units heard."""
     touches: TouchReadings | None = None
     """Of the units' touch sensors; None without."""
-    imu: ImuReadings | None = None
-    """New samples of the units' accelerometers; None without."""
     doubted_kg: float = 0.0
     """How much of an announced load is taken out of torques and force anew, and may be a little off [kg]."""
 
@@ -108,9 +102,9 @@ class Detector(Part, group="pretouch.detectors"):
     """Whether it needs the external joint torques; else the force."""
 
     @property
-    def reads(self) -> frozenset[Readings]:
-        """What it takes of the units beside distances."""
-        return frozenset()
+    def reads_touch(self) -> bool:
+        """Whether it takes the units' touch readings."""
+        return False
 
     def on(self, body: Body) -> Self:
         """Return the detector for an arm with all prepared that does not change; by default itself."""

@@ -7,7 +7,7 @@ import numpy as np
 
 from pretouch.contact.announced_load import doubted
 from pretouch.contact.cues import Cue, Cues, no_cues, together
-from pretouch.contact.detector import Body, Detection, Detector, Readings, Sample, no_torques, strongest
+from pretouch.contact.detector import Body, Detection, Detector, Sample, no_torques, strongest
 from pretouch.contact.localisation.localise import LocalisationState, localisation_init, localise
 from pretouch.contact.localisation.significance import most_significant_mean
 from pretouch.contact.residual_model import ResidualModel
@@ -41,9 +41,9 @@ class SequentialTest(SequentialParams, Detector, name="sequential"):
     State = SequentialTestState
 
     @property
-    def reads(self) -> frozenset[Readings]:
-        """What its cues take of the units."""
-        return frozenset(cue.reads for cue in self.cues)
+    def reads_touch(self) -> bool:
+        """Whether any cue does."""
+        return len(self.cues) > 0
 
     def on(self, body: Body) -> "SequentialTest":
         """Return the test with its cues made for an arm."""

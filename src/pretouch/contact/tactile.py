@@ -94,7 +94,6 @@ class TouchSensors(TouchSensorParams, Cue, name="touch"):
     """The units' touch sensors: a contact is likelier on the link of a unit that is touched, and there is where."""
 
     State = TouchState
-    reads = "touch"
 
     def on(self, body: Body) -> "_TouchSensorsOn":
         """Return the cue for an arm, its touch sensors looked up."""

@@ -19,11 +19,11 @@ from pretouch.hardware.keys import Keys
 from pretouch.hardware.link import LinkParams
 from pretouch.hardware.receiver import keys_of, touch_readings
 from pretouch.hardware.receiver_process import SharedOutputs, Traffic, serve
-from pretouch.hardware.traffic import ImuBatch, Received, UnitTraffic, imu_batch, imu_readings
+from pretouch.hardware.traffic import ImuBatch, Received, UnitTraffic, imu_batch
 from pretouch.hardware.udp import demand_port
 from pretouch.sensing.network import NetworkUnits
 from pretouch.signals import kept_from_children
-from pretouch.types import ImuReadings, RangeReadings, RangeStatus, TouchReadings
+from pretouch.types import RangeReadings, RangeStatus, TouchReadings
 
 _START_S = 60.0
 """Longest time a process may take to start [s]: it imports everything anew."""
@@ -137,10 +137,6 @@ class NetworkSkin:
         self._take()
         taken, self._imu = self._imu, []
         return [batch for batch in map(imu_batch, taken) if batch is not None]
-
-    def imu(self) -> ImuReadings:
-        """Return the IMU samples that came since the last call of this or of `take_imu`, for a control step."""
-        return imu_readings(self.take_imu(), self.network)
 
     def traffic(self) -> Traffic:
         """Return what the receiver has counted, not older than 0.6 s while it lives."""

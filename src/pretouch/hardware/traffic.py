@@ -1,15 +1,13 @@
 """What a receiver tells of each unit: plain numbers, cheap to keep, for monitors and records."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from pretouch.hardware.wire import Reset, Sample, imu_values
-from pretouch.sensing.network import NetworkUnits
-from pretouch.types import FloatArray, ImuReadings
+from pretouch.types import FloatArray
 
 UnitState = Literal["never heard", "greeting", "live", "silent"]
 """Nothing genuine yet; hellos only; samples; neither any more."""
@@ -127,15 +125,3 @@ def imu_batch(received: Received) -> ImuBatch | None:
     newest = 1e-6 * (sample.time_us - sample.imu_age_us) + received.offset - received.bound
     stamp = newest + np.arange(1 - sample.imu_count, 1) / sample.imu_rate_hz
     return ImuBatch(received.unit, stamp, acceleration, angular_velocity, sample.imu_index)
-
-
-def imu_readings(batches: Sequence[ImuBatch], units: NetworkUnits | None = None) -> ImuReadings:
-    """Return the IMU samples of several of these units as a control step takes them; by default none has zones."""
-    rows = [b.unit if units is None else units.first[b.unit] for b in batches]
-    none = [np.zeros((0, 3))]
-    return ImuReadings(
-        np.repeat(rows, [len(b.stamp) for b in batches]).astype(np.int64),
-        np.concatenate([np.zeros(0), *(b.stamp for b in batches)]),
-        np.concatenate(none + [b.acceleration for b in batches]),
-        np.concatenate(none + [b.angular_velocity for b in batches]),
-    )

@@ -25,7 +25,6 @@ from pretouch.types import (
     BoolArray,
     ControlStep,
     FloatArray,
-    ImuReadings,
     Inputs,
     IntArray,
     RangeReadings,
@@ -37,7 +36,6 @@ from pretouch.types import (
 
 INPUTS, STEP, TRUTH = f"{PACKAGE}/msg/Inputs", f"{PACKAGE}/msg/Step", f"{PACKAGE}/msg/Truth"
 TOUCH = f"{PACKAGE}/msg/Touch"
-IMU = f"{PACKAGE}/msg/ImuReadings"
 POINTS = f"{PACKAGE}/msg/SeenPoints"
 PAYLOAD = f"{PACKAGE}/msg/Payload"
 DESIRED = f"{PACKAGE}/msg/Desired"
@@ -279,25 +277,6 @@ def decode_points(data: bytes) -> tuple[int, SeenPoints]:
     """Return the number of the step whose message holds the points, and those in this one."""
     m = decoded(POINTS, data)
     return m.same_as, _made(SeenPoints, m)
-
-
-def encode_imu(sequence: int, time: float, imu: ImuReadings) -> bytes | None:
-    """Return IMU samples as CDR; None for what are none to a step either (`faults.sound_imu`)."""
-    try:
-        unit, stamp = np.array(imu.unit), real(imu.stamp)
-        parts = [real(part) for part in (imu.acceleration, imu.angular_velocity)]
-    except (AttributeError, TypeError, ValueError, OverflowError):
-        return None
-    if unit.dtype.kind not in "iu" or unit.ndim != 1 or unit.shape != stamp.shape:
-        return None
-    if any(part.shape != (*stamp.shape, 3) for part in parts):
-        return None
-    return encoded(IMU, ImuReadings(unit.astype(np.int64), stamp, *parts), sequence=sequence, time=time)
-
-
-def decode_imu(data: bytes) -> ImuReadings:
-    """Return the IMU samples of a step."""
-    return _made(ImuReadings, decoded(IMU, data))
 
 
 def encode_step(sequence: int, step: ControlStep, tangent: FloatArray | None = None) -> bytes:

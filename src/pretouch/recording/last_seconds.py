@@ -11,13 +11,11 @@ from pretouch.controller import Controller
 from pretouch.loop import Cycle
 from pretouch.recording.codec import (
     decode_desired,
-    decode_imu,
     decode_inputs,
     decode_moving,
     decode_points,
     decode_touch,
     encode_desired,
-    encode_imu,
     encode_inputs,
     encode_moving,
     encode_points,
@@ -48,7 +46,6 @@ class _Passed(NamedTuple):
     inputs: bytes | None
     truth: Truth | None
     touch: bytes | None
-    imu: bytes | None
     points: bytes | None
     desired: bytes | None
     moving: bytes | None
@@ -62,7 +59,6 @@ class _Passed(NamedTuple):
         whole = replace(
             inputs,
             touch=None if self.touch is None else decode_touch(self.touch),
-            imu=None if self.imu is None else decode_imu(self.imu),
             points=None if self.points is None else decode_points(self.points)[1],
             payload=self.cycle.inputs.payload,  # nobody can change it
             desired=None if self.desired is None else decode_desired(self.desired),
@@ -119,13 +115,11 @@ class LastSeconds:
         given = cycle.inputs
         if given.points is not self._points[0]:
             self._points = given.points, None if given.points is None else encode_points(0, given.points, 0)
-        imu = None if given.imu is None else encode_imu(0, cycle.step.stamp, given.imu)
         return _Passed(
             cycle,
             data,
             truth,
             encode_touch(0, given),
-            imu,
             self._points[1],
             encode_desired(0, given),
             encode_moving(0, given),

@@ -19,14 +19,13 @@ LIBRARY = f"pretouch {pretouch.__version__}"
 PACKAGE = "pretouch_msgs"
 OWN = (
     "RobotState", "RangeReadings", "Inputs", "Obstacles", "Thresholds", "Contact", "QpSolution", "Touched", "Step",
-    "Run", "State", "Truth", "UnitSample", "Touch", "ImuReadings", "SeenPoints",
+    "Run", "State", "Truth", "UnitSample", "Touch", "SeenPoints",
     "Payload", "Desired", "MovingFixtures",
 )  # fmt: skip
 """Our types; each has a file in `msg/`."""
 _ON_TOPICS = ("Run", "Inputs", "Step", "State", "Truth", "Touch", "SeenPoints", "Payload", "Desired")
 TOPICS = {f"/pretouch/{name.lower()}": f"{PACKAGE}/msg/{name}" for name in _ON_TOPICS}
 TOPICS["/pretouch/moving"] = f"{PACKAGE}/msg/MovingFixtures"
-TOPICS["/pretouch/imu"] = f"{PACKAGE}/msg/ImuReadings"
 """Type of the messages on each of our topics."""
 
 _SECTION = f"{'=' * 80}\nMSG: "

@@ -12,7 +12,6 @@ from pretouch.controller import ControllerState
 from pretouch.errors import RecordingError
 from pretouch.recording.codec import (
     decode_desired,
-    decode_imu,
     decode_inputs,
     decode_moving,
     decode_payload,
@@ -103,12 +102,10 @@ class Recorded:
     def _inputs(self, number: int) -> Inputs | None:
         """Return all that a step was given; None where a part of it is missing."""
         raw = self._raw
-        data, touch, imu = (raw[f"/pretouch/{part}"].get(number) for part in ("inputs", "touch", "imu"))
+        data, touch = (raw[f"/pretouch/{part}"].get(number) for part in ("inputs", "touch"))
         inputs = None if data is None else decode_inputs(data)[1]
         if inputs is not None and touch is not None:
             inputs = replace(inputs, touch=decode_touch(touch))
-        if inputs is not None and imu is not None:
-            inputs = replace(inputs, imu=decode_imu(imu))
         payload = raw["/pretouch/payload"].get(number)
         if inputs is not None and payload is not None:
             inputs = replace(inputs, payload=decode_payload(payload))

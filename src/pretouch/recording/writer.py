@@ -17,7 +17,6 @@ from pretouch.controller import Controller
 from pretouch.loop import Cycle
 from pretouch.recording.codec import (
     DESIRED,
-    IMU,
     INPUTS,
     MOVING,
     PAYLOAD,
@@ -26,7 +25,6 @@ from pretouch.recording.codec import (
     TOUCH,
     TRUTH,
     encode_desired,
-    encode_imu,
     encode_inputs,
     encode_moving,
     encode_payload,
@@ -142,10 +140,6 @@ class Recording:
             items.append(Item("/pretouch/desired", DESIRED, number, time, desired))
         self._command = step.command if whole else None
         items.append(Item("/pretouch/inputs", INPUTS, number, time, data))
-        imu = getattr(cycle.inputs, "imu", None)
-        samples = None if imu is None else encode_imu(number, step.stamp, imu)
-        if samples is not None:
-            items.append(Item("/pretouch/imu", IMU, number, time, samples))
         points = cycle.inputs.points if whole else None
         if points is not None:
             if points is not self._points[0]:

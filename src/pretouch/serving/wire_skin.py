@@ -8,7 +8,6 @@ from pretouch.errors import HardwareError
 from pretouch.hardware.keys import Keys, UnitKey
 from pretouch.hardware.link import LinkParams
 from pretouch.hardware.receiver import SkinReceiver
-from pretouch.hardware.traffic import imu_readings
 from pretouch.hardware.wire import KEY_SIZE
 from pretouch.sensing.skin import Skin
 from pretouch.serving.fleet import Fleet, FleetParams
@@ -16,7 +15,7 @@ from pretouch.sim.imu import Imus
 from pretouch.sim.plant import Plant
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.touch_sensor import Forces, TouchSensors, no_forces
-from pretouch.types import ImuReadings, RangeReadings, TouchReadings
+from pretouch.types import RangeReadings, TouchReadings
 
 _PATIENCE_S = 5.0
 """The machine's own loopback may take this long to hand a datagram over [s]."""
@@ -75,10 +74,6 @@ class WireSkin:
     def touch(self) -> TouchReadings | None:
         """Return the newest touch reading of each unit; None while no unit has told one."""
         return self.receiver.touch()
-
-    def imu(self) -> ImuReadings:
-        """Return the IMU samples that came since the last call."""
-        return imu_readings(self.receiver.take_imu(), self.receiver.network)
 
     def _step(self, now: float) -> None:
         self._taken_in += self.fleet.step(lambda: now)

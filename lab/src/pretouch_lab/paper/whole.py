@@ -10,7 +10,7 @@ _MODES = ("hard", "slack", "floor")
 _STUDIES = {
     "between": 12, "anticipation": 12, "free-motion": 10, "noise": 6, "detectable": 3,
     "tuned": 4, "release": 10, "endless": 4, "dropout": 12, "creeping": 6, "retreating": 6, "views": 4, "infeasible": 6,
-    "wire": 12, "mounting": 6, "coverage": 4, "clamp": 4, "pinch": 4, "tactile": 4, "imu": 3, "vision": 4,
+    "wire": 12, "mounting": 6, "coverage": 4, "clamp": 4, "pinch": 4, "tactile": 4, "vision": 4,
     "two-arms": 3,
 }  # fmt: skip
 """Studies beside the paper's experiments, each with its number of seeds: together an hour and a quarter."""

@@ -1,1 +1,0 @@
-"""Impacts measured by the units' accelerometers: contacts, their judgement, tables."""
