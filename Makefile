@@ -11,11 +11,11 @@ STAMP := $(VENV)/.installed
 
 setup: $(STAMP)
 
-$(STAMP): pyproject.toml lab/pyproject.toml constraints.txt
+$(STAMP): pyproject.toml fci/pyproject.toml lab/pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 		{ echo "Python 3.11 or newer is needed: say make PYTHON=/path/to/python3.11"; exit 1; }
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[bags,dev,figures,live,parquet]' -e './lab[sweep]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[bags,dev,figures,live,parquet]' -e ./fci -e './lab[sweep]'
 	$(BIN)/pretouch warm-up
 	@touch $@
 
@@ -87,7 +87,7 @@ test-slow: setup
 # two hours of everything at once, as long as nothing goes wrong (SECURITY.md); MINUTES=10 for fewer
 MINUTES ?= 120
 soak: franka
-	$(BIN)/python -m tests.soak --minutes $(MINUTES)
+	$(BIN)/python -m fci.tests.soak --minutes $(MINUTES)
 
 # every field of every control step, to the bit, here and in the commit BASE (docs/explanation/design.md, golden steps)
 BASE ?= HEAD

@@ -1,4 +1,4 @@
-"""Ports for tests that have to name one before anybody listens at it."""
+"""Ports and addresses for tests that have to name one before anybody listens at it."""
 
 import os
 import socket
@@ -10,6 +10,7 @@ domains."""
 
 # processes that are started one after another begin some way apart
 _places = count(os.getpid() * 50)
+_addresses = count(1)
 
 
 def free_port() -> int:
@@ -19,6 +20,12 @@ def free_port() -> int:
         if all(_free(port, kind) for kind in (socket.SOCK_STREAM, socket.SOCK_DGRAM)):
             return port
     raise OSError(f"All ports from {PORTS[0]} to {PORTS[-1]} are taken.")
+
+
+def loopback() -> str:
+    """An address that no other test run on this machine uses at once: the vendor's libraries know one port alone."""
+    pid = os.getpid()
+    return f"127.{64 + pid // 250 % 128}.{1 + pid % 250}.{1 + next(_addresses) % 250}"
 
 
 def _free(port: int, kind: socket.SocketKind) -> bool:

@@ -9,7 +9,7 @@ from importlib.metadata import EntryPoint, EntryPoints
 import pytest
 
 from pretouch import cli, extras, plugins
-from pretouch.cli.registry import GROUP, LAB, OWN
+from pretouch.cli.registry import FCI, GROUP, LAB, OWN
 
 
 def run(capsys, *args):
@@ -78,7 +78,7 @@ def test_help_names_the_commands(capsys):
         cli.main(["--help"])
     assert stop.value.code == 0
     said = capsys.readouterr().out
-    for name in (*OWN, *LAB):
+    for name in OWN:
         assert f" {name} " in said
 
 
@@ -117,13 +117,17 @@ def installed(monkeypatch):
     return install
 
 
-@pytest.mark.parametrize("name", LAB)
-def test_a_command_of_the_lab_that_is_not_there_is_said_with_what_installs_it(installed, capsys, name):
+@pytest.mark.parametrize(
+    ("name", "owner"), [*((name, extras.LAB) for name in LAB), *((name, extras.FCI) for name in FCI)]
+)
+def test_a_command_of_another_distribution_that_is_not_there_is_said_with_what_installs_it(
+    installed, capsys, name, owner
+):
     installed()
-    code, said = run(capsys, name, "--seeds", "3")
+    code, said = run(capsys, name, "--seed", "3")
     assert code == 2
     assert said.err == (
-        f"`pretouch {name}` is a command of the lab, which is not installed: run {extras.install_command(extras.LAB)}\n"
+        f"`pretouch {name}` is a command of {owner}, which is not installed: run {extras.install_command(owner)}\n"
     )
 
 

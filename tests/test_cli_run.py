@@ -71,8 +71,6 @@ def at_begin(monkeypatch, seconds, then):
         (("--priority", "100"), "real-time priority is 100"),
         (("--units-host", ""), "--units-host is empty"),
         (("--path", "circle", "--radius", "3"), "cannot reach"),
-        (("--robot", "franka", "--ip", "192.0.2.1", "--lockstep", "--seconds", "1"), "is for a simulated arm"),
-        (("--robot", "franka", "--ip", "127.0.0.1", "--lockstep"), "needs --seconds"),
         (("--no-learnt", "--learn-anew"), "--no-learnt does not go with"),
         (("--recover",), "--recover does not go with --robot simulated"),
         (("--robot", "franka", "--ip", "192.0.2.1", "--arm", "ur5"), "--arm ur5 does not go with --robot franka"),

@@ -13,7 +13,11 @@ from pretouch.extras import ROS2
 from tests.needs import skip_without
 
 ROOT = Path(__file__).parents[1]
-DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
+DOCUMENTS = [
+    ROOT / "CONTRIBUTING.md",
+    *(ROOT / f"{top}README.md" for top in ("", "fci/")),
+    *sorted((ROOT / "docs").rglob("*.md")),
+]
 NAMED = {
     "check", "clock", "controller", "done", "fixtures", "frames", "model", "panda", "path", "profile", "receiver",
     "recorder", "robot", "skin", "skin_port", "units",

@@ -28,7 +28,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     python = str(folder / "builder/bin/python")
     done = ran(python, "-m", "pip", "install", "-q", "build", "twine", folder=folder)
     assert done.returncode == 0, done.stderr
-    for project in (ROOT, ROOT / "lab"):
+    for project in (ROOT, ROOT / "fci", ROOT / "lab"):
         done = ran(python, "-m", "build", "-q", "-o", str(folder / "dist"), str(project), folder=folder)
         assert done.returncode == 0, done.stderr
     return folder
@@ -37,7 +37,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.slow
 def test_what_an_index_is_given_is_whole_and_holds_no_more(built: Path):
     files = sorted(map(str, (built / "dist").iterdir()))
-    assert len(files) == 4
+    assert len(files) == 6
     done = ran(str(built / "builder/bin/python"), "-m", "twine", "check", "--strict", *files, folder=built)
     assert done.returncode == 0, done.stdout
     with zipfile.ZipFile(built / f"dist/pretouch-{VERSION}-py3-none-any.whl") as wheel:
@@ -49,7 +49,10 @@ def test_what_an_index_is_given_is_whole_and_holds_no_more(built: Path):
     expected = {"src", "examples", "CHANGELOG.md", "CITATION.cff", "LICENSE", "NOTICE", "README.md", "PKG-INFO"}
     assert tops == expected | {"pyproject.toml", ".gitignore"}
     assert f"version: {VERSION}\n" in (ROOT / "CITATION.cff").read_text()
-    assert tomllib.loads((ROOT / "lab/pyproject.toml").read_text())["project"]["version"] == VERSION
+    for beside in ("fci", "lab"):
+        assert tomllib.loads((ROOT / beside / "pyproject.toml").read_text())["project"]["version"] == VERSION
+    with zipfile.ZipFile(built / f"dist/pretouch_fci-{VERSION}-py3-none-any.whl") as wheel:
+        assert "pretouch_fci/model_library.c" in wheel.namelist()
 
 
 @pytest.mark.slow
@@ -65,8 +68,9 @@ def test_each_hint_works_in_an_installation_from_a_wheel(built: Path):
         "replay gone.mcap": "gone.mcap cannot be read",
         "report gone.mcap": "gone.mcap cannot be read",
         "detect a.bag": "a.bag",
-        "run --robot franka --ip 127.0.0.1 --no-skin --profile blind --lockstep --seconds 1": "127.0.0.1",
+        "run --robot franka --ip 127.0.0.1 --no-skin --profile blind --seconds 1": "127.0.0.1",
         "figure nothing": "nothing",
+        "serve-fci --seed -1": "--seed is -1",
     }
     for words, otherwise in asked.items():
         command = (str(built / "user/bin/pretouch"), *words.split())
@@ -87,9 +91,7 @@ def test_pytest_finds_the_fixture_of_a_wheel_and_warns_of_nothing(built: Path):
     done = ran(sys.executable, "-m", "venv", "tester", folder=built)
     assert done.returncode == 0, done.stderr
     python = str(built / "tester/bin/python")
-    done = ran(
-        python, "-m", "pip", "install", "-q", f"dist/pretouch-{VERSION}-py3-none-any.whl", "pytest", folder=built
-    )
+    done = ran(python, "-m", "pip", "install", "-q", "--find-links", "dist", "pretouch-fci", "pytest", folder=built)
     assert done.returncode == 0, done.stderr
     # begun by a program that has imported the package before
     program = "import sys, pretouch, pytest; sys.exit(pytest.main(['-W', 'error', '--fixtures', 'dist']))"

@@ -1,4 +1,4 @@
-"""The product goes its ways without the lab, and without anything that only figures, bags and sweeps need."""
+"""The product goes its ways without our other distributions, and without what only figures, bags and sweeps need."""
 
 import json
 import re
@@ -13,7 +13,9 @@ from tests.importing.made import six_axis, written
 
 pytestmark = pytest.mark.slow
 
-HIDDEN = ("pretouch_lab", "matplotlib", "mpl_toolkits", "rosbags", "SALib", "pyarrow", "distributed", "viser")
+HIDDEN = (
+    "pretouch_fci", "pretouch_lab", "matplotlib", "mpl_toolkits", "rosbags", "SALib", "pyarrow", "distributed", "viser",
+)  # fmt: skip
 _ALONE = f"""
 import sys
 sys.modules.update(dict.fromkeys({HIDDEN}))  # to import one of them is an ImportError
@@ -38,7 +40,7 @@ def alone(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([sys.executable, "-c", _ALONE, *words], cwd=folder, capture_output=True, text=True)
 
 
-_HELPED = "live", "skin", "run", "replay", "detect", "robot import", "serve-fci"
+_HELPED = "live", "skin", "run", "replay", "detect", "robot import"
 _EACH_HELP = f"""
 for name in {_HELPED}:
     try:
@@ -87,20 +89,14 @@ def test_an_arm_is_imported(tmp_path: Path):
     assert alone(tmp_path, "robot", "check", "arm").returncode == 0
 
 
-def test_a_simulated_arm_is_served(tmp_path: Path):
-    command = [sys.executable, "-u", "-c", _ALONE, "serve-fci", "--port", "0", "--scene", "static"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=tmp_path) as server:
-        assert server.stdout is not None
-        assert server.stdout.readline().startswith("Listening at 127.0.0.1:")
-        server.terminate()
-
-
-@pytest.mark.parametrize("name", ["reproduce", "demo"])
-def test_a_command_of_the_lab_is_a_sentence(tmp_path: Path, name: str):
+@pytest.mark.parametrize(
+    ("name", "owner"), [("reproduce", "pretouch-lab"), ("demo", "pretouch-lab"), ("serve-fci", "pretouch-fci")]
+)
+def test_a_command_of_another_distribution_is_a_sentence(tmp_path: Path, name: str, owner: str):
     done = alone(tmp_path, name)
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
-    assert "pretouch-lab" in done.stderr
+    assert owner in done.stderr
 
 
 def test_live_names_what_it_needs(tmp_path: Path):

@@ -1,7 +1,7 @@
 """Peers that take a connection and say nothing: whoever waits for one gives up with a sentence, within a bound.
 
 Of the others that wait, each has its test beside it: `hardware/franka/test_connect` (the arm's process),
-`hardware/test_provision` (a unit's line), `hardware/ros2` (topics), `serving/fci/test_raw` (clients that say nothing).
+`hardware/test_provision` (a unit's line), `hardware/ros2` (topics).
 """
 
 import http.client
@@ -11,17 +11,13 @@ from collections.abc import Iterator
 
 import pytest
 
-from pretouch import cli
-from pretouch.errors import ExperimentError, RobotError
-from pretouch.extras import FRANKA
+from pretouch.errors import ExperimentError
 from pretouch.hardware.franka import client
 from pretouch.hardware.network_skin import NetworkSkin
 from pretouch.viewer.server import ServeOptions, served
 from pretouch_lab.sweep import cluster
 from tests.hardware.fake_unit import IDS, KEYS
-from tests.hardware.franka.served import loopback
-from tests.needs import skip_without
-from tests.ports import free_port
+from tests.ports import free_port, loopback
 
 
 @pytest.fixture
@@ -37,22 +33,6 @@ def bounded() -> Iterator[None]:
     began = time.monotonic()
     yield
     assert time.monotonic() - began < 30.0
-
-
-def test_a_simulated_arm(silent: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(client, "ANSWER_S", 0.3)
-    with pytest.raises(
-        RobotError, match=rf"The machine at {silent} takes connections, but does .* within 0\.3 s: check"
-    ):
-        client.demand_answer(silent)
-
-
-def test_a_run_in_lockstep(silent: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    skip_without(FRANKA)
-    monkeypatch.setattr(client, "ANSWER_S", 0.3)
-    given = ("--robot", "franka", "--ip", silent, "--lockstep", "--seconds", "1", "--arm", "panda")
-    assert cli.main(["run", *given, "--no-skin", "--profile", "blind"]) == 2
-    assert "does not answer as an arm" in capsys.readouterr().err
 
 
 def test_a_scheduler(silent: str, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,7 +12,9 @@ from urllib.parse import unquote, urlsplit
 from pretouch.errors import MissingExtraError
 
 _CLONE = Path(__file__).parents[2]
-LAB = "pretouch-lab"
+LAB, FCI = "pretouch-lab", "pretouch-fci"
+_FOLDERS = {LAB: "lab", FCI: "fci"}
+"""Folder in a clone of each distribution beside this one."""
 
 
 @dataclass(frozen=True)
@@ -58,23 +60,24 @@ def install_command(owner: str, extra: str = "", target: str = "setup") -> str:
 
     In a clone that is a target of make, or pip of the folder in an environment other than the clone's own. Elsewhere
     it is what made the environment: pip and pipx add to a distribution that is there, wherever it came from; uvx makes
-    another environment, so it is given the origin. A missing lab is looked for beside the wheel of Pretouch too.
+    another environment, so it is given the origin. A distribution beside this one that is missing is looked for beside
+    the wheel of Pretouch too.
     """
     if (_CLONE / "lab" / "pyproject.toml").is_file():
         if Path(sys.prefix) == _CLONE / ".venv":
             there = "" if Path.cwd() == _CLONE else f"-C {shlex.quote(str(_CLONE))} "
             return f"make {there}{target}"
-        folder = _CLONE / "lab" if owner == LAB else _CLONE
+        folder = _CLONE / _FOLDERS.get(owner, "")
         return f"{_pip()} -e {_quoted(folder, extra)}"
     origin, beside, wanted = _origin(), "", _quoted(owner, extra)
-    if owner == LAB and not _installed(LAB):
+    if owner in _FOLDERS and not _installed(owner):
         wanted = _quoted(owner, extra, f"=={version('pretouch')}")
         if origin.startswith("file:"):
             beside = f"--find-links {shlex.quote(str(Path(unquote(urlsplit(origin).path)).parent))} "
     if not {"archive-v0", "environments-v2"} & set(Path(sys.prefix).parts):  # of uv's cache
         return f"{_pip()} {beside}{wanted}"
     source = f" @ {origin}" if origin else ""
-    if owner == LAB:
+    if owner in _FOLDERS:
         return f"uvx {beside}--with {wanted} --from {_quoted('pretouch', '', source)} pretouch"
     return f"uvx --from {_quoted(owner, extra, source)} pretouch"
 

@@ -10,15 +10,15 @@ import pytest
 
 from pretouch import cli
 from pretouch.cli.overview import GROUPS, SHELLS, overview
-from pretouch.cli.registry import LAB, OWN
+from pretouch.cli.registry import FCI, LAB, OWN
 from pretouch.profiles import profile
 from tests.cli.commands import COMMANDS
 
 
 def test_the_overview_fits_a_screen_and_has_each_command_once():
     names = [name for group in GROUPS.values() for name in group]
-    assert sorted(names) == sorted((*OWN, *LAB))
-    lines = overview(dict.fromkeys((*OWN, *LAB, "mine"), "Do a thing of my own. " * 5)).splitlines()
+    assert sorted(names) == sorted((*OWN, *FCI, *LAB))
+    lines = overview(dict.fromkeys((*OWN, *FCI, *LAB, "mine"), "Do a thing of my own. " * 5)).splitlines()
     assert len(lines) < 24
     assert max(map(len, lines)) <= 80
     assert "live" in lines[1]

@@ -1,7 +1,6 @@
 """Everything that reads files and messages: what it begins with, and what it may raise."""
 
 import json
-import socket
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -28,12 +27,7 @@ from pretouch.robot.description_file import description_text, load_description
 from pretouch.robot.model import RobotModel
 from pretouch.robot.residual_file import Residual, load_residual, save_residual
 from pretouch.sensing.skin import load_skin, paper_skin, skin_file
-from pretouch.serving.fci.arm import ArmSetup, ServedArm
-from pretouch.serving.fci.commands import set_or_get, wanted_motion
-from pretouch.serving.fci.connections import Connection, Disconnected
-from pretouch.serving.fci.wire import PROTOCOLS, Protocol
 from pretouch.sim.randomisation import FOLDER, world_set
-from pretouch.sim.scene import SceneSpec
 from pretouch.types import RangeStatus
 from pretouch.viewer.door import Refused, _understood
 from pretouch_lab.sweep.definition import load_sweeps
@@ -91,9 +85,9 @@ def parsers(folder: Path) -> Iterator[dict[str, Parser]]:
         "page": Parser([msgspec.msgpack.encode(CAMERA), *crashers.PAGE], _understood, (Refused,)),
         "worker": _of_workers(folder),
     }
-    with Bench() as bench, ServedArm(ArmSetup(model, "panda", model.description.q_ready, SceneSpec())) as arm:
+    with Bench() as bench:
         bench.join()
-        yield found | {"wire": _of_units(bench), "FCI": _of_clients(arm)}
+        yield found | {"wire": _of_units(bench)}
 
 
 _HUGE = b"1" + 400 * b"0"
@@ -212,35 +206,3 @@ def _of_units(bench: Bench) -> Parser:
         bench.answers()
 
     return Parser([sample[:-TAG_SIZE], hello[:-TAG_SIZE]], read, ())
-
-
-def _of_clients(arm: ServedArm) -> Parser:
-    protocol = PROTOCOLS["panda"]
-    names = [name for name in protocol.requests if name in protocol.sizes]
-    requests = [protocol.reply(name, k, _ones(protocol, name)) for k, name in enumerate(names)]
-
-    def read(data: bytes) -> None:
-        ours, theirs = _connected()
-        with ours, theirs:
-            theirs.sendall(data[:4096])
-            for request in Connection(ours, "a client").requests(protocol):
-                if request.name == "Move":
-                    wanted_motion(protocol, request.body)
-                elif request.name.startswith(("Set", "Get")) and request.name != "GetRobotModel":
-                    set_or_get(arm, request.name, request.body)
-        assert np.all(np.isfinite(arm.frames.F_T_EE))
-        assert np.all(np.isfinite(arm.frames.load.inertia))
-        arm.forget_settings()
-
-    return Parser([b"".join(requests), *requests], read, (Disconnected,), words=tuple(requests))
-
-
-def _connected() -> tuple[socket.socket, socket.socket]:
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        theirs = socket.create_connection(server.getsockname())
-        return server.accept()[0], theirs
-
-
-def _ones(protocol: Protocol, name: str) -> bytes:
-    size = protocol.sizes[name]
-    return np.ones(size // 8 + 1).tobytes()[:size]

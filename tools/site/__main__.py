@@ -13,8 +13,11 @@ from tools.site.links import Layout, source_page
 from tools.site.navigation import navigation
 
 ROOT = Path(__file__).parents[2]
-_BESIDE = {"CONTRIBUTING.md": "contributing.md", "SECURITY.md": "security.md", "CHANGELOG.md": "changelog.md"}
-"""Documents of the repository's root, and the pages that they become."""
+_BESIDE = {
+    "CONTRIBUTING.md": "contributing.md", "SECURITY.md": "security.md", "CHANGELOG.md": "changelog.md",
+    "fci/README.md": "pretouch-fci.md",
+}  # fmt: skip
+"""Documents outside `docs`, and the pages that they become."""
 
 
 def write_pages(pages: Path) -> None:

@@ -21,11 +21,12 @@ OWN = {
     "warm-up": "pretouch.cli.commands:WarmUp",
     "robot": "pretouch.cli.robot_commands:Robot",
     "run": "pretouch.cli.run.options:Run",
-    "serve-fci": "pretouch.cli.commands:ServeFci",
 }
 """Class of each command of the product: a table, because a look at all installed distributions takes time."""
 LAB = ("demo", "reproduce", "figure", "bench", "sweep", "identify", "learn", "policy")
 """Commands of the distribution pretouch-lab."""
+FCI = ("serve-fci",)
+"""Commands of the distribution pretouch-fci."""
 
 MOVED = {
     ("skin", "calibrate", "--simulate"): "`pretouch skin calibrate --simulate` is `pretouch bench calibration` now:"
@@ -51,7 +52,8 @@ def check_moved(args: Sequence[str]) -> None:
 def command_class(name: str) -> type[Command] | None:
     """Return the class of a command, None for a word that is none.
 
-    Raises PluginError for a command of the lab that is not installed, and for one that cannot be loaded.
+    Raises PluginError for a command of a distribution beside this one that is not installed, and for one that cannot
+    be loaded.
     """
     if name in OWN:
         module, _, of_it = OWN[name].partition(":")
@@ -64,15 +66,16 @@ def command_class(name: str) -> type[Command] | None:
                 " provides it, or correct it."
             )
         return found
-    if name in LAB:
-        raise PluginError(
-            f"`pretouch {name}` is a command of the lab, which is not installed:"
-            f" run {extras.install_command(extras.LAB)}"
-        )
+    for owner, commands in ((extras.LAB, LAB), (extras.FCI, FCI)):
+        if name in commands:
+            raise PluginError(
+                f"`pretouch {name}` is a command of {owner}, which is not installed:"
+                f" run {extras.install_command(owner)}"
+            )
     return None
 
 
 def command_names() -> tuple[str, ...]:
-    """Return the names of all commands that are installed: the product's, then the lab's, then others."""
+    """Return the names of all commands that are installed: the product's, the other distributions' of ours, others."""
     added = set(plugins.names(GROUP)) - set(OWN)
-    return (*OWN, *(name for name in LAB if name in added), *sorted(added - set(LAB)))
+    return (*OWN, *(name for name in (*FCI, *LAB) if name in added), *sorted(added - {*FCI, *LAB}))

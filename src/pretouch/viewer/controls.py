@@ -12,7 +12,7 @@ from pretouch.composition import changed, differences
 from pretouch.control.interface import Restriction
 from pretouch.errors import RecordingError
 from pretouch.profiles import PROFILES, Profile
-from pretouch.serving.fci.pushes import AXES
+from pretouch.sim.tcp_push import AXES
 from pretouch.types import FloatArray
 from pretouch.viewer.action_queue import ActionQueue
 from pretouch.viewer.gui import SETTLE_S, TYPED_S, add_button, add_view_boxes, put, when_changed

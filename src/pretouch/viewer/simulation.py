@@ -21,9 +21,9 @@ from pretouch.recording.truth import truth_of
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, paper_skin
-from pretouch.serving.fci.pushes import Pushes, TcpPush
 from pretouch.session.push_outcome import PushOutcome
 from pretouch.sim.scene import described, fixtures
+from pretouch.sim.tcp_push import Pushes, TcpPush
 from pretouch.types import ControlStep, FloatArray
 from pretouch.viewer.frame import Frame, World
 from pretouch.viewer.opening import Opening

@@ -18,7 +18,7 @@ from pretouch.hardware.franka.client import connect, reachable
 from pretouch.hardware.franka.state import MODES
 from pretouch.robot.model import RobotModel
 from tests.hardware.franka.made import state
-from tests.hardware.franka.served import loopback
+from tests.ports import loopback
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,6 @@
 """The limiter against an arm that checks each millisecond, and goes on by itself where a command is lost."""
 
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
 import pytest
@@ -11,10 +10,6 @@ from pretouch.hardware.franka.limiter import SetPointLimiter, refusal
 from pretouch.hardware.franka.limits import LimiterParams, MotionLimits, motion_limits, planned
 from pretouch.hardware.franka.state import FrankaState
 from pretouch.robot.model import RobotModel
-from pretouch.serving.fci.kinds import JointVelocity
-from pretouch.serving.fci.limits import motion_limits as served_limits
-from pretouch.serving.fci.motion import Motion, Setpoint
-from pretouch.serving.fci.wire import Controller
 from tests.hardware.franka.made import CheckingArm, middle
 
 
@@ -110,43 +105,6 @@ def test_an_arm_that_reports_no_numbers_in_a_motion_is_an_error_with_a_sentence(
     getattr(wrong := arm.state(), name)[joint] = np.nan
     with pytest.raises(RobotError, match=r"nan.*, which is not finite: check the arm"):
         limiter.step(wrong, [0.3] * 7)
-
-
-@pytest.mark.parametrize("seed", range(6))
-@pytest.mark.parametrize("kind", ["panda", "fr3"])
-def test_bursts_of_lost_commands_at_any_time_break_no_limit_of_the_served_arm(
-    kind: Literal["panda", "fr3"], seed: int, panda_model: RobotModel, fr3_model: RobotModel
-) -> None:
-    model, draw = {"panda": panda_model, "fr3": fr3_model}[kind], np.random.default_rng([seed, 15])
-    limits = motion_limits(model, kind)
-    arm, limiter = CheckingArm(limits, middle(limits)), SetPointLimiter(limits, LimiterParams())
-    motion, burst = Motion(served_limits(model, kind), Controller.JOINT_IMPEDANCE, JointVelocity()), Bursts(draw)
-    # set-points that change often meet the limits of speed, others those of position
-    changes = (0.05, 0.01)[seed % 2]
-    wanted, lost = np.zeros(7), 0
-    for k in range(6000):
-        if k % 10 == 0 and draw.random() < changes:
-            wanted = limits.qd_max * draw.choice([-1.0, 0.0, 0.5, 1.0], 7)
-        arm.qd, arm.qdd = motion.qd, motion.qdd
-        command = np.array(limiter.step(arm.state(), wanted.tolist()))
-        taken = None if burst.takes() else Setpoint(command)
-        lost += taken is None
-        assert motion.follow(arm.q, taken) is None, k
-        arm.q = arm.q + motion.qd * 1e-3
-    assert lost > 300
-
-
-class Bursts:
-    """Loses up to 15 commands in a row, and then takes at least ten."""
-
-    def __init__(self, draw: np.random.Generator) -> None:
-        self._draw, self._left = draw, -10
-
-    def takes(self) -> bool:
-        if self._left == -10 and self._draw.random() < 0.02:
-            self._left = int(self._draw.integers(1, 16))
-        self._left = max(-10, self._left - 1)
-        return self._left >= 0
 
 
 @pytest.mark.parametrize(

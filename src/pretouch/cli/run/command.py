@@ -41,10 +41,6 @@ def run(command: "Run", write: Callable[[Any], None]) -> int:
     for sentence in made.assumed:
         say(sentence)
     prepare(made.profile)
-    if command.robot.lockstep:
-        from pretouch.cli.run.lockstep import run_lockstep
-
-        return run_lockstep(command, made, write)
     with ExitStack() as last, opened(command, made) as found:
         try:
             return _run(command, made, found, last, write)

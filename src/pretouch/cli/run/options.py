@@ -1,8 +1,6 @@
 """What can be said after `pretouch run`, and which of it goes together."""
 
-import socket
 from dataclasses import dataclass, field
-from ipaddress import ip_address
 from typing import TYPE_CHECKING, Annotated, Literal, cast
 
 import tyro
@@ -25,8 +23,6 @@ class RobotOptions:
     arm."""
     ip: str = ""
     """Address of the Franka robot."""
-    lockstep: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
-    """The robot is a `pretouch serve-fci --lockstep` on this machine: it waits for each command."""
     confirm_push: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
     """Ask for the guided pushes even if the force sign of this robot is confirmed."""
     learnt: str = ""
@@ -187,29 +183,10 @@ def check_options(command: Run) -> None:
         raise ParameterError(f"--seconds is {command.task.seconds:g}: give 0 or more.")
     if command.seed < 0:
         raise ParameterError(f"The seed is {command.seed}: it must be at least 0.")
-    if robot.lockstep:
-        _check_lockstep(command)
-
-
-def _check_lockstep(command: Run) -> None:
-    """Raise an error for an arm that may be a real one, which would wait for nobody, and what lockstep does not do."""
-    try:
-        here = ip_address(socket.gethostbyname(command.robot.ip)).is_loopback
-    except (OSError, UnicodeError):
-        here = False
-    if not here:
-        raise RobotError(
-            "--lockstep is for a simulated arm on this machine (such as 127.0.0.1), but the arm is at"
-            f" {command.robot.ip}: leave it out."
-        )
-    if not command.task.seconds:
-        raise RobotError("A run in lockstep needs --seconds: robot time passes as fast as this machine can.")
-    if command.task.approach or command.robot.confirm_push or command.robot.recover:
-        raise RobotError("--approach, --confirm-push and --recover do not go with --lockstep: leave them out.")
 
 
 _ONLY = {
-    "franka": ("ip", "lockstep", "recover"),
+    "franka": ("ip", "recover"),
     "ros2": (
         "ros_sign", "ros_frame", "ros_command", "ros_controller", "ros_timeout", "ros_own_clock", "ros_joint_states",
         "ros_joints", "ros_wrench", "ros_torques", "ros_commands", "ros_ranges", "ros_distribution", "ros_domain",

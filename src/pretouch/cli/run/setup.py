@@ -116,7 +116,7 @@ def run_setup(command: "Run") -> RunSetup:
         )
     if command.robot.ros_desired:
         task = replace(task, path="hold")
-    simulated = command.robot.robot == "simulated" or command.robot.lockstep
+    simulated = command.robot.robot == "simulated"
     floor = (SceneSpec().floor_height if simulated else 0.0) if task.floor is None else task.floor
     if not np.isfinite(floor):
         raise ParameterError(f"--floor is {floor}: give a height in metres.")
@@ -132,16 +132,13 @@ if TYPE_CHECKING:
     from pretouch.cli.run.options import RobotOptions
 
 
-def free_motion(
-    options: "RobotOptions", controller: Controller, robot: str, remembered: bool = True
-) -> FreeMotion | None:
+def free_motion(options: "RobotOptions", controller: Controller, robot: str) -> FreeMotion | None:
     """Find what is known of a robot's free motion, and say it; None where none is kept.
 
     Args:
         options: `learnt`, `learn_anew` and `no_learnt` of them.
         controller: that moves the arm.
         robot: what it is known by.
-        remembered: whether it has a file of its own where none is named.
     """
     if not isinstance(controller.profile.detect, SequentialTest):
         if options.learnt or options.learn_anew:
@@ -150,7 +147,7 @@ def free_motion(
                 " out --learnt and --learn-anew."
             )
         return None
-    if options.no_learnt or not (options.learnt or remembered):
+    if options.no_learnt:
         return None
     file = model_file_of(robot, state_folder())
     if options.learnt:

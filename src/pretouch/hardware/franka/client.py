@@ -1,7 +1,6 @@
 """A Franka arm through the vendor's own library: one port for both, and connecting with a clear sentence."""
 
 import socket
-import struct
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
@@ -23,8 +22,6 @@ PORT = 1337
 """TCP port of the arm; the vendor's libraries have it built in."""
 ANSWER_S = 3.0
 """Longest wait for the arm to take a connection, or to answer on it [s]."""
-_CONNECT = struct.Struct("<IIIHH")
-"""Request to connect: its number, identifier and size [B], the library's version of the interface, and a UDP port."""
 _REALTIME_KERNEL = Path("/sys/kernel/realtime")
 _LIBRARIES = {"panda": "panda_py", "fr3": "pylibfranka"}
 """The vendor's library for each arm; our module of the arm's name speaks with it. They cannot share a process."""
@@ -88,8 +85,7 @@ def connect(address: str, kind: Kind, real_time: bool = False) -> Client:
     """Connect to an arm; what stands in the way is a RobotError.
 
     A machine that takes the connection and then says nothing is waited for without end: the vendor's libraries know no
-    bound. `arm.FrankaArm`, which connects in a process of its own, gives up after half a minute; lockstep calls
-    `demand_answer` first.
+    bound. `arm.FrankaArm`, which connects in a process of its own, gives up after half a minute.
 
     Args:
         address: name or IP address of the arm.
@@ -133,19 +129,3 @@ def reachable(address: str) -> str:
     except OSError as error:
         what = f"it cannot be reached ({error.strerror})"
     raise RobotError(f"No Franka arm at {address}: {what}; check the address and the cable, and activate FCI in Desk.")
-
-
-def demand_answer(address: str) -> None:
-    """Raise a RobotError unless the machine at an address answers as an arm does; for simulated arms.
-
-    It asks with version 0, which no arm speaks: the answer says so, and no session begins.
-    """
-    try:
-        with socket.create_connection((reachable(address), PORT), ANSWER_S) as asked:
-            asked.sendall(_CONNECT.pack(0, 1, _CONNECT.size, 0, 0))
-            asked.recv(1)
-    except OSError:
-        raise RobotError(
-            f"The machine at {address} takes connections, but does not answer as an arm within {ANSWER_S:g} s: check"
-            " the address, and start `pretouch serve-fci --lockstep` anew."
-        ) from None

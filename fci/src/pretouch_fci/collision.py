@@ -1,0 +1,117 @@
+"""The robot's own reaction to external forces and to itself: thresholds, contacts, collisions.
+
+Pure but for its own memory.
+"""
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from pretouch.robot.model import RobotModel
+from pretouch.robot.self_distance import capsule_ends, kinematics_of, self_distances
+from pretouch.types import BoolArray, FloatArray
+from pretouch_fci.wire import JOINTS
+
+_DEFAULT = 20.0
+"""Thresholds before any are set [Nm, N]: those the vendor's examples set."""
+_LOOKS_EVERY = 10
+"""In so many milliseconds the arm looks once whether it comes into itself."""
+_CLOSES_M = 1e-5
+"""Two parts that overlap come closer if their distance shrinks by more in that time [m]."""
+_MOVING = 1e-3
+"""Commanded acceleration from which the thresholds for accelerations hold [rad/s^2]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Thresholds:
+    """From where on there is a contact (lower) and a collision (upper)."""
+
+    lower_torque: FloatArray
+    """(7,) [Nm]"""
+    upper_torque: FloatArray
+    """(7,) [Nm]"""
+    lower_force: FloatArray
+    """(6,) [N, Nm]"""
+    upper_force: FloatArray
+    """(6,) [N, Nm]"""
+
+
+@dataclass(frozen=True, slots=True)
+class CollisionBehavior:
+    """Thresholds while the robot speeds up or slows down, and at constant speed."""
+
+    accelerating: Thresholds
+    steady: Thresholds
+
+    @classmethod
+    def of(cls, values: FloatArray) -> Self | None:
+        """Read the body (52,) of the request that sets it; None if a number in it is no threshold."""
+        if not np.all(np.isfinite(values)) or np.any(values < 0):
+            return None
+        torques, forces = values[: 4 * JOINTS].reshape(4, JOINTS), values[4 * JOINTS :].reshape(4, 6)
+        return cls(
+            Thresholds(torques[0], torques[1], forces[0], forces[1]),
+            Thresholds(torques[2], torques[3], forces[2], forces[3]),
+        )
+
+
+def default_behavior() -> CollisionBehavior:
+    """Return what holds before anything is set."""
+    same = Thresholds(*(np.full(n, _DEFAULT) for n in (JOINTS, JOINTS, 6, 6)))
+    return CollisionBehavior(same, same)
+
+
+class Contacts:
+    """Which joints and directions are in contact, and which in collision; the latter until they are forgotten."""
+
+    def __init__(self) -> None:
+        self.behavior = default_behavior()
+        self.joint_contact, self.cartesian_contact = np.zeros(JOINTS, np.bool_), np.zeros(6, np.bool_)
+        self.joint_collision, self.cartesian_collision = np.zeros(JOINTS, np.bool_), np.zeros(6, np.bool_)
+
+    def update(self, torques: FloatArray, wrench: FloatArray, qdd: FloatArray) -> tuple[str, ...]:
+        """Take external torques (7,) [Nm] and the wrench (6,) [N, Nm]; return the reflexes they cause.
+
+        `qdd` (7,) are the commanded accelerations [rad/s^2].
+        """
+        moving = bool(np.any(np.abs(qdd) > _MOVING))
+        limits = self.behavior.accelerating if moving else self.behavior.steady
+        torque, force = np.abs(torques), np.abs(wrench)
+        self.joint_contact, self.cartesian_contact = torque > limits.lower_torque, force > limits.lower_force
+        joint, cartesian = torque > limits.upper_torque, force > limits.upper_force
+        self.joint_collision, self.cartesian_collision = (
+            self.joint_collision | joint,
+            self.cartesian_collision | cartesian,
+        )
+        return _names(cartesian, "cartesian_reflex") + _names(joint, "joint_reflex")
+
+    def forget(self) -> None:
+        """Forget collisions."""
+        self.joint_collision, self.cartesian_collision = np.zeros(JOINTS, np.bool_), np.zeros(6, np.bool_)
+
+
+class SelfCollision:
+    """Whether parts of an arm come into each other. Those that overlap where a motion begins may part."""
+
+    def __init__(self, model: RobotModel) -> None:
+        self._model, self._count = model, 0
+        self._before: FloatArray | None = None
+
+    def forget(self) -> None:
+        """Begin anew, as for another motion."""
+        self._before, self._count = None, 0
+
+    def update(self, q: FloatArray) -> tuple[str, ...]:
+        """Take the positions q (7,) [rad] of another millisecond; return the error that they are."""
+        self._count += 1
+        if self._count % _LOOKS_EVERY:
+            return ()
+        model = self._model
+        distances = self_distances(model, capsule_ends(model, kinematics_of(model, q[None])))[0]
+        before, self._before = distances if self._before is None else self._before, distances
+        return _names((distances < 0) & (distances < before - _CLOSES_M), "self_collision_avoidance_violation")
+
+
+def _names(crossed: BoolArray, name: str) -> tuple[str, ...]:
+    return (name,) if np.any(crossed) else ()

@@ -1,0 +1,104 @@
+"""One motion: commands in, what the joints are to do, or why it ended. Pure but for its own memory."""
+
+from collections import deque
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pretouch.types import FloatArray
+from pretouch_fci.controllers import ExternalTorques
+from pretouch_fci.kinds import Asked, MotionKind
+from pretouch_fci.limits import PERIOD_S, MotionLimits
+from pretouch_fci.wire import JOINTS, Controller
+
+LOST_MOST = 20
+"""So many commands lost in a row end a motion."""
+FIRST_WITHIN = 500
+"""The first command of a motion has to come within so many milliseconds."""
+_COUNTED = 100
+"""The success rate is of the last so many milliseconds."""
+
+
+@dataclass(frozen=True, slots=True)
+class Setpoint:
+    """What a command says."""
+
+    values: FloatArray
+    """What counts of it in this kind of motion."""
+    finished: bool = False
+    """Whether the motion ends with it."""
+    torques: FloatArray = field(default_factory=lambda: np.zeros(JOINTS))
+    """(7,) for an external controller [Nm]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ending:
+    """How a motion ended."""
+
+    status: str
+    """As of `Protocol.move`."""
+    errors: tuple[str, ...] = ()
+    """Why, if it was a reflex."""
+
+
+class Motion:
+    """A motion from its request until it ends."""
+
+    awaited = True
+    """Whether a command is due in each millisecond."""
+
+    def __init__(
+        self, limits: MotionLimits, controller: Controller, kind: MotionKind, external: ExternalTorques | None = None
+    ) -> None:
+        """Begin at rest; an external controller takes the torques."""
+        n = len(limits.qd)
+        self._limits, self.controller, self.kind, self._external = limits, controller, kind, external
+        self.qd, self.qdd = np.zeros(n), np.zeros(n)
+        """Commanded velocities [rad/s] and accelerations [rad/s^2], (n,)."""
+        self.begun = False
+        """Whether a command has come."""
+        self._lost = 0
+        self._received: deque[bool] = deque(maxlen=_COUNTED)
+
+    @property
+    def success_rate(self) -> float:
+        """Fraction of the last commands that were received in time."""
+        return sum(self._received) / len(self._received) if self._received else 0.0
+
+    def follow(self, q: FloatArray, setpoint: Setpoint | None) -> Ending | None:
+        """Take the command of a millisecond, None if it was lost, at commanded positions q (n,) [rad].
+
+        Where it ended, the commanded velocities are the last ones: whoever moves the arm brakes from there.
+        """
+        if setpoint is None:
+            return self._without(q)
+        first, self.begun, self._lost = not self.begun, True, 0
+        self._received.append(True)
+        if not np.all(np.isfinite(setpoint.values)):
+            return Ending("input error", (self.kind.not_a_number,))
+        if self._external is not None and not np.all(np.isfinite(setpoint.torques)):
+            return Ending("input error", ("controller_torque_discontinuity",))
+        if setpoint.finished:
+            if self._limits.ends_at_rest(self.qd):
+                return Ending("success")
+            return Ending("reflex", (self.kind.moves_at_end,))
+        errors = () if self._external is None else self._external.take(setpoint.torques)
+        return Ending("reflex", errors) if errors else self._moved(q, self.kind.asked(setpoint.values, q, first))
+
+    def _without(self, q: FloatArray) -> Ending | None:
+        """Go on with the same acceleration, as the robot does for a lost command."""
+        self._lost += 1
+        if self._lost >= (LOST_MOST if self.begun else FIRST_WITHIN):
+            return Ending("reflex", ("communication_constraints_violation",))
+        if not self.begun:
+            return None
+        self._received.append(False)
+        return self._moved(q, self.kind.bridged(q, self.qd, self.qdd))
+
+    def _moved(self, q: FloatArray, asked: Asked) -> Ending | None:
+        errors = asked.errors or self._limits.violated(q, self.qd, self.qdd, asked.qd, self.kind.joints)
+        if errors:
+            return Ending("reflex", errors)
+        self.qdd = (asked.qd - self.qd) / PERIOD_S
+        self.qd = asked.qd
+        return None

@@ -1,0 +1,277 @@
+"""The server: one client at a time, states by UDP each millisecond, requests by TCP. One thread."""
+
+import select
+import socket
+import time
+from collections.abc import Callable
+from typing import Self
+
+import numpy as np
+
+from pretouch.errors import RobotError
+from pretouch_fci.arm import ServedArm
+from pretouch_fci.connections import READS_BEFORE_REFUSAL, Connection, Disconnected, Listener
+from pretouch_fci.gripper_server import GripperServer
+from pretouch_fci.handler import RequestHandler
+from pretouch_fci.limits import PERIOD_S
+from pretouch_fci.motion import Setpoint
+from pretouch_fci.options import ServeOptions
+from pretouch_fci.state import StateDatagram
+from pretouch_fci.urdf import urdf_of
+from pretouch_fci.wire import PROTOCOLS
+
+_LATE_S = 0.003
+"""A machine that is later than this leaves the time out [s]: states in a burst could not be answered in time."""
+_DATAGRAMS_MOST = 256
+"""So many datagrams are looked at in one go: a flood must not stop the clock."""
+_FIRST_WAITS_S = (0.25, 0.75)
+"""In lockstep, how long the first state of a motion, and each that follows, stands without an answer [s]: the vendor's
+clients answer the second one, and give up after a second without a state."""
+_ANSWERED = 6
+"""Of the first so many states of a motion, libfranka answers one: those before it has waited for."""
+_MOTION_EVERY = 1_000_000
+"""In lockstep, each motion begins at a multiple of this [ms], so that its times do not depend on the time before it."""
+
+
+class FciServer:
+    """Serves one arm. A context manager, for the sockets."""
+
+    def __init__(
+        self, arm: ServedArm, options: ServeOptions,
+        watch: Callable[[float, ServedArm], None] = lambda _time, _arm: None, say: Callable[[str], None] = print,
+    ) -> None:  # fmt: skip
+        """Listen; an address that cannot be had is a RobotError.
+
+        Args:
+            arm: to serve.
+            options: where, and at which pace.
+            watch: is called with the robot's time [s] and the arm after each millisecond of the plant.
+            say: is handed a line when a client comes or goes, and when a motion ends otherwise than it should.
+        """
+        self._arm, self._options, self._watch, self._say = arm, options, watch, say
+        self.protocol = PROTOCOLS[arm.kind]
+        urdf_of(arm.model)  # made while no clock runs yet
+        self._listener = Listener(options.host, options.port)
+        host, port = self._listener.sock.getsockname()
+        self.address: tuple[str, int] = (host, port)
+        """Where it listens."""
+        try:
+            self._gripper = GripperServer((host, options.port and port + 1), arm, options.lockstep, say)
+        except RobotError:
+            self._listener.close()
+            raise
+        self.gripper_address = self._gripper.address
+        """Where the hand does: at the next port."""
+        self._udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._udp.bind((host, 0))
+        self._udp.setblocking(False)
+        self._state = StateDatagram(self.protocol, arm)
+        self._client: Connection | None = None
+        self._client_udp = ("", 0)
+        self._handler: RequestHandler | None = None
+        self._served = False
+        self._done: Callable[[], bool] = lambda: False
+        self._tick = 0
+        self._motions = self._unanswered = self._of_motion = self._answered_until = 0
+        self._command: np.void | None = None
+        self._next = self._start = 0.0
+        self.left_out = 0.0
+        """Time that the machine was too slow to simulate [s]."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Disconnect the client and stop listening."""
+        if self._client is not None:
+            self._client.close()
+        self._listener.close()
+        self._udp.close()
+        self._gripper.close()
+
+    def serve(self, done: Callable[[], bool] = lambda: False) -> None:
+        """Serve until `done` says so, or, if asked to serve once, until the client has disconnected."""
+        self._start = self._next = time.monotonic()
+        self._done = done
+        while not done() and not (self._options.once and self._served and self._client is None):
+            self._settle()
+            self._send_state()
+            self._wait()
+            self._pass_time(self._setpoint())
+
+    # a millisecond
+
+    def _send_state(self) -> None:
+        if self._client is not None:
+            try:
+                self._udp.sendto(self._state.write(self._tick), self._client_udp)
+            except OSError:  # nobody there any more: its TCP connection tells
+                return
+
+    def _wait(self) -> None:
+        """Wait for the next millisecond, or in lockstep for the command."""
+        arm, now = self._arm, time.monotonic()
+        self._command = None
+        if not self._options.lockstep:
+            self._next += PERIOD_S
+            if now - self._next > _LATE_S:
+                self.left_out += now - self._next
+                self._next = now
+            self._poll_sockets(self._next)
+            if self._command is None and self._command_due:
+                self._poll_sockets(self._next + self._options.grace_s, for_command=True)
+        elif arm.motion is None or not arm.motion.awaited:
+            self._poll_sockets(now + PERIOD_S)
+        elif arm.motion.begun:
+            self._poll_sockets(now + self._options.patience_s, for_command=True)
+        else:
+            self._poll_sockets(now + _FIRST_WAITS_S[min(self._unanswered, 1)], for_command=True)
+
+    @property
+    def _command_due(self) -> bool:
+        """Whether a client that keeps up answers this state: a first command that is lost upsets libfranka's filter."""
+        motion = self._arm.motion
+        return motion is not None and motion.awaited and (motion.begun or self._tick < self._answered_until)
+
+    def _pass_time(self, setpoint: Setpoint | None) -> None:
+        """Let the plant move on, unless in lockstep it stands."""
+        arm, lockstep = self._arm, self._options.lockstep
+        begins = arm.motion is not None and not arm.motion.begun
+        if lockstep and setpoint is None and (begins or arm.settled):
+            self._unanswered += begins
+            self._tick += 1
+            return
+        if arm.units is not None:
+            arm.units.offset = PERIOD_S * self._tick + self.left_out - arm.plant.time
+        ending = arm.step(setpoint)
+        self._tick += 1
+        if ending is not None and self._handler is not None:
+            self._attempt(lambda handler: handler.motion_ended(ending))
+        self._watch(PERIOD_S * self._tick, arm)
+        if arm.units is not None:
+            arm.units.step(self._robot_time if lockstep else self._wall_time)
+        if self._handler is not None and arm.at_rest:
+            self._attempt(lambda handler: handler.at_rest())
+
+    def _robot_time(self) -> float:
+        return PERIOD_S * self._tick
+
+    def _wall_time(self) -> float:
+        return time.monotonic() - self._start
+
+    # commands
+
+    def _setpoint(self) -> Setpoint | None:
+        """Return what the command says that came for this millisecond, None if it was lost."""
+        command, motion = self._command, self._arm.motion
+        if command is None or motion is None:
+            lost = True
+        else:
+            drop = self._options.drop
+            lost = drop is not None and motion.begun and drop.takes(self._of_motion)
+        self._of_motion += motion is not None and (motion.begun or not lost)
+        if lost or command is None or motion is None:
+            return None
+        names = command.dtype.names or ()
+        finished = any(command[name] for name in names if name.endswith("_finished"))
+        return Setpoint(motion.kind.read(command), bool(finished), command["tau_J_d"].copy())
+
+    def _take_command(self) -> None:
+        """Take in what came by UDP, and keep the newest command that is one for this millisecond."""
+        for _ in range(_DATAGRAMS_MOST):
+            try:
+                data, sender = self._udp.recvfrom(2048)
+            except BlockingIOError:
+                return
+            except OSError:  # news of a state that found nobody
+                continue
+            motion = self._arm.motion
+            if motion is None or sender != self._client_udp or len(data) != self.protocol.command.itemsize:
+                continue
+            command = np.frombuffer(data, self.protocol.command)[0]
+            if int(command["message_id"]) == self._tick or not motion.awaited:
+                self._command = command
+
+    # clients
+
+    def _poll_sockets(self, until: float, for_command: bool = False) -> None:
+        """Poll all sockets until an instant [s], or until a command has come."""
+        while True:
+            timeout = max(0.0, min(until, self._gripper.due) - time.monotonic())
+            client = [] if self._client is None else [self._client.sock]
+            waiting = {c.sock: c for c in self._listener.waiting}
+            own = [self._udp, self._listener.sock, *client, *waiting]
+            ready, _, _ = select.select([*own, *self._gripper.sockets], [], [], timeout)
+            self._gripper.serve(ready)
+            if self._udp in ready:
+                self._take_command()
+            if client and client[0] in ready:
+                self._serve_requests()
+            if self._listener.sock in ready:
+                for _ in range(READS_BEFORE_REFUSAL):  # a client that has gone makes room for the next
+                    self._serve_requests()
+                self._listener.admit(taken=self._client is not None)
+            for sock in ready:
+                if sock in waiting:
+                    self._check_protocol(waiting[sock])
+            if for_command and (self._command is not None or self._arm.motion is None):
+                return
+            if time.monotonic() >= until:
+                return
+
+    def _check_protocol(self, connection: Connection) -> None:
+        """Serve a connection that has the protocol version of the robot."""
+        greeting = self._listener.greet(connection, self.protocol, self._say)
+        if greeting is not None:
+            self._serve_client(connection, greeting.udp)
+            self._attempt(lambda handler: handler.serve(greeting.requests))
+
+    def _serve_requests(self) -> None:
+        """Serve the client's requests."""
+        client = self._client
+        if client is not None:
+            self._attempt(lambda handler: handler.serve(client.requests(self.protocol)))
+
+    def _serve_client(self, connection: Connection, udp: tuple[str, int]) -> None:
+        self._client, self._client_udp, self._served = connection, udp, True
+        self._handler = RequestHandler(
+            connection, self.protocol, self._arm, self._state, self._settle, self._begin_motion, self._say
+        )
+        self._say(f"Client {connection.peer} connected.")
+
+    def _begin_motion(self) -> None:
+        """Note that a motion is about to begin."""
+        self._motions += 1
+        self._unanswered = self._of_motion = 0
+        self._answered_until = self._tick + _ANSWERED
+        if self._options.lockstep:
+            start = max(self._motions, self._tick // _MOTION_EVERY + 1) * _MOTION_EVERY
+            self._tick = start - 1
+
+    def _settle(self) -> None:
+        """In lockstep, let the arm come to rest between two states: what a client sees then differs in time alone."""
+        while self._options.lockstep and not self._arm.moving and not self._arm.settled and not self._done():
+            self._pass_time(None)
+
+    def _attempt(self, do: Callable[[RequestHandler], None]) -> None:
+        """Do something for the client; disconnect it if that fails."""
+        if self._handler is None:
+            return
+        try:
+            do(self._handler)
+        except Disconnected as why:
+            self._disconnect(str(why))
+
+    def _disconnect(self, why: str) -> None:
+        if self._client is None:
+            return
+        self._say(f"Client {self._client.peer} disconnected: {why}.")
+        self._client.close()
+        self._client = self._handler = None
+        if self._arm.moving:
+            self._arm.stop()
+        self._arm.forget_settings()
+        self._state.frames_changed()

@@ -1,0 +1,211 @@
+"""A served arm in a thread, a client that speaks bytes, and the vendor's clients, each in a process of its own.
+
+Of the product's tests these use three modules that know nothing of any distribution: `tests.needs` (what is skipped is
+said in one way), `tests.ports` and `tests.fuzz.mutations`.
+"""
+
+import itertools
+import json
+import os
+import socket
+import struct
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.needs import skip_for
+
+from pretouch.robot.description import fr3, panda
+from pretouch.robot.model import RobotModel
+from pretouch.sim.scene import SceneSpec
+from pretouch_fci.arm import ArmSetup, ServedArm
+from pretouch_fci.options import ServeOptions
+from pretouch_fci.server import FciServer
+from pretouch_fci.wire import CONNECT, HEADER, PROTOCOLS, Protocol, RobotKind
+
+_VENDOR = Path(__file__).with_name("vendor_client.py")
+_NUMBERS = itertools.count(1)
+_PATIENCE_S = 10.0
+
+
+@pytest.fixture
+def host() -> str:
+    """An address of this machine that no other test has: the vendor's clients know one port only."""
+    number = next(_NUMBERS)
+    return f"127.{1 + os.getpid() // 250 % 250}.{1 + os.getpid() % 250}.{number % 250 + 1}"
+
+
+@dataclass
+class Served:
+    """A server in a thread."""
+
+    arm: ServedArm
+    server: FciServer
+    host: str
+    said: list[str] = field(default_factory=list)
+    truth: list[list[float]] = field(default_factory=list)
+    """Time [s], true force [N] and joint positions [rad] of each millisecond of the plant."""
+    thread: threading.Thread | None = None
+    ending: threading.Event = field(default_factory=threading.Event)
+
+    def stop(self) -> None:
+        """End it, and give its address back."""
+        self.ending.set()
+        if self.thread is not None:
+            self.thread.join(_PATIENCE_S)
+            assert not self.thread.is_alive()
+        self.server.close()
+        self.arm.__exit__()
+
+    @property
+    def protocol(self) -> Protocol:
+        return self.server.protocol
+
+    def ask(self, what: str, *values: float, kind: str = "") -> dict[str, Any]:
+        """Have a vendor's client do something (see `vendor_client.py`)."""
+        name = "pylibfranka" if (kind or self.arm.kind) == "fr3" else "panda_py"
+        if find_spec(name) is None:
+            skip_for("make franka")
+        command = [sys.executable, str(_VENDOR), kind or self.arm.kind, self.host, what, *map(str, values)]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+        assert done.returncode == 0, done.stderr
+        return json.loads(done.stdout)
+
+
+Serve = Callable[..., Served]
+
+
+@pytest.fixture
+def serve(host: str) -> Iterator[Serve]:
+    """Serve an arm until the test ends."""
+    running: list[Served] = []
+
+    def start(kind: RobotKind = "panda", setup: dict[str, Any] | None = None, **options: Any) -> Served:
+        model = RobotModel(panda() if kind == "panda" else fr3())
+        arm = ServedArm(ArmSetup(**{"model": model, "kind": kind, "q": model.description.q_ready.copy(),
+                                    "scene": SceneSpec(), **(setup or {})}))  # fmt: skip
+        given = ServeOptions(**{"host": host, "lockstep": True, "patience_s": 5.0, **options})
+        served = Served(arm, None, host)  # type: ignore[arg-type]
+
+        def watch(time: float, arm: ServedArm) -> None:
+            served.truth.append([time, *arm.true_force.tolist(), *arm.plant.mj_data.qpos[:7].tolist()])
+
+        served.server = FciServer(arm, given, watch, served.said.append)
+        served.thread = threading.Thread(target=served.server.serve, args=(served.ending.is_set,))
+        served.thread.start()
+        running.append(served)
+        return served
+
+    yield start
+    for served in running:
+        served.stop()
+
+
+class RawClient:
+    """A client that speaks bytes."""
+
+    def __init__(self, served: Served) -> None:
+        self.served, self.protocol = served, served.protocol
+        self.udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.udp.bind(("127.0.0.1", 0))
+        self.udp.settimeout(_PATIENCE_S)
+        self.tcp = socket.create_connection(served.server.address, timeout=_PATIENCE_S)
+        self._identifiers = itertools.count(1)
+        self.robot_udp: Any = None
+        self.connected = b""
+
+    def connect(self, version: int) -> None:
+        self.connected = self.request("Connect", CONNECT.pack(version, self.udp.getsockname()[1]))
+
+    def send_request(self, name: str, body: bytes = b"") -> int:
+        identifier = next(self._identifiers)
+        self.tcp.sendall(self.protocol.reply(name, identifier, body))
+        return identifier
+
+    def answer(self) -> tuple[str, int, bytes]:
+        number, identifier, size = HEADER.unpack(self._read(HEADER.size))
+        return self.protocol.requests[number], identifier, self._read(size - HEADER.size)
+
+    def request(self, name: str, body: bytes = b"") -> bytes:
+        identifier = self.send_request(name, body)
+        answered = self.answer()
+        assert answered[:2] == (name, identifier)
+        return answered[2]
+
+    def begin(self, controller: int = 0, generator: int = 1) -> str:
+        body = struct.pack("<II", controller, generator)
+        status = self.request("Move", body + bytes(self.protocol.sizes["Move"] - len(body)))
+        return self.protocol.move[status[0]]
+
+    def ended(self) -> str:
+        name, _, body = self.answer()
+        assert name == "Move"
+        return self.protocol.move[body[0]]
+
+    def state(self) -> np.void:
+        data, self.robot_udp = self.udp.recvfrom(4096)
+        assert len(data) == self.protocol.state.itemsize
+        return np.frombuffer(data, self.protocol.state)[0]
+
+    def state_where(self, holds: Callable[[np.void], bool]) -> np.void:
+        return next(state for state in iter(self.state, None) if holds(state))
+
+    def first_of_motion(self) -> np.void:
+        return self.state_where(lambda state: state["robot_mode"] == 2)
+
+    def command(
+        self, message_id: int, values: Any, finished: bool = False, field: str = "dq_c", elbow: Any = None
+    ) -> None:
+        command = np.zeros((), self.protocol.command)
+        command["message_id"], command[field], command["motion_generation_finished"] = message_id, values, finished
+        if elbow is not None:
+            command["valid_elbow"], command["elbow_c"] = 1, elbow
+        self.udp.sendto(command.tobytes(), self.robot_udp)
+
+    def turn(
+        self, state: np.void, values: Any, finished: bool = False, field: str = "dq_c", elbow: Any = None
+    ) -> np.void:
+        """Answer a state and return the next."""
+        self.command(int(state["message_id"]), values, finished, field, elbow)
+        return self.state_where(lambda new: new["message_id"] > state["message_id"])
+
+    def close(self) -> None:
+        self.tcp.close()
+        self.udp.close()
+
+    def _read(self, size: int) -> bytes:
+        data = b""
+        while len(data) < size:
+            part = self.tcp.recv(size - len(data))
+            if not part:
+                raise ConnectionError("closed")
+            data += part
+        return data
+
+
+@pytest.fixture
+def raw() -> Iterator[Callable[..., RawClient]]:
+    """Make clients that speak bytes."""
+    made: list[RawClient] = []
+
+    def make(served: Served, version: int | None = None) -> RawClient:
+        client = RawClient(served)
+        made.append(client)
+        client.connect(version or served.protocol.version)
+        return client
+
+    yield make
+    for client in made:
+        client.close()
+
+
+@pytest.fixture(params=sorted(PROTOCOLS))
+def kind(request: pytest.FixtureRequest) -> RobotKind:
+    return request.param

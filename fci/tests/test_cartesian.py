@@ -1,0 +1,228 @@
+"""Motions of the end-effector: by raw bytes, and each limit by itself without a server."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pretouch.control.commander import rotation_about
+from pretouch.robot.description import fr3, panda
+from pretouch.robot.model import RobotModel
+from pretouch_fci.cartesian import CARTESIAN_LIMITS, Body, CartesianVelocity
+from pretouch_fci.frames import frames_of
+from pretouch_fci.limits import motion_limits
+from pretouch_fci.motion import Ending, Motion, Setpoint
+from pretouch_fci.options import Drop
+from pretouch_fci.wire import ERRORS, Controller, RobotKind
+
+_MS = 1e-3
+_MOVE = 2
+_POSE, _VELOCITY = 2, 3
+_PREFIX = "cartesian_motion_generator"
+_START = "cartesian_position_motion_generator_start_pose_invalid"
+_UP = np.eye(6)[2]
+_ZERO = np.zeros(7)
+
+
+def _errors(state: np.void) -> list[str]:
+    return [name for name, flag in zip(ERRORS, state["errors"], strict=True) if flag]
+
+
+def _begun(client: Any, generator: int) -> np.void:
+    assert client.begin(generator=generator) == "started"
+    return client.first_of_motion()
+
+
+def _share(k: int, of: int) -> float:
+    return k / of - np.sin(2 * np.pi * k / of) / (2 * np.pi)
+
+
+def _pose(state: np.void) -> np.ndarray:
+    return state["O_T_EE_d"].astype(np.float64).reshape(4, 4).T
+
+
+def _columns(T: np.ndarray) -> np.ndarray:
+    return T.T.ravel()
+
+
+def test_velocities_lead_the_end_effector_and_are_told(serve: Any, raw: Any, kind: RobotKind) -> None:
+    client = raw(serve(kind))
+    state = begun = _begun(client, _VELOCITY)
+    for k in range(1, 1001):
+        velocity = 0.1 * (1 - np.cos(2 * np.pi * k / 1000)) * np.array([0, 1, 0, 2, 0, 0])
+        state = client.turn(state, velocity, field="O_dP_EE_c")
+        assert state["robot_mode"] == _MOVE, _errors(state)
+        np.testing.assert_allclose(state["O_dP_EE_c"], velocity, atol=1e-6)
+    assert state["motion_generator_mode"] == _VELOCITY + 1
+    client.turn(state, np.zeros(6), finished=True, field="O_dP_EE_c")
+    assert client.ended() == "success"
+    begin, end = _pose(begun), _pose(state)
+    np.testing.assert_allclose(end[:3, 3] - begin[:3, 3], [0, 0.1, 0], atol=1e-5)
+    np.testing.assert_allclose(end[:3, :3], rotation_about(np.eye(3)[0], 0.2) @ begin[:3, :3], atol=1e-5)
+
+
+@pytest.mark.slow
+def test_poses_lead_the_end_effector_though_commands_are_lost(serve: Any, raw: Any, kind: RobotKind) -> None:
+    client = raw(serve(kind, drop=Drop(2, 50)))
+    state = _begun(client, _POSE)
+    T = begin = _pose(state)
+    for k in range(1, 2001):
+        T = begin.copy()
+        T[2, 3] += 0.1 * _share(k, 2000)
+        T[:3, :3] = rotation_about(np.eye(3)[2], 0.3 * _share(k, 2000)) @ begin[:3, :3]
+        state = client.turn(state, _columns(T), field="O_T_EE_c")
+        assert state["robot_mode"] == _MOVE, _errors(state)
+    np.testing.assert_allclose(_pose(state), T, atol=1e-5)
+    assert state["control_command_success_rate"] == pytest.approx(0.96)
+    for _ in range(3):  # the first two are lost
+        state = client.turn(state, _columns(T), finished=True, field="O_T_EE_c")
+    assert client.ended() == "success"
+
+
+def test_the_elbow_moves_while_the_end_effector_stays(serve: Any, raw: Any, kind: RobotKind) -> None:
+    client = raw(serve(kind))
+    state = begun = _begun(client, _POSE)
+    T, elbow = _pose(begun), begun["elbow_d"].astype(np.float64)
+    for k in range(1, 1001):
+        elbow[0] = begun["elbow_d"][0] + 0.2 * _share(k, 1000)
+        state = client.turn(state, _columns(T), field="O_T_EE_c", elbow=elbow)
+        assert state["robot_mode"] == _MOVE, _errors(state)
+    assert state["q_d"][2] - begun["q_d"][2] == pytest.approx(0.2, abs=1e-5)
+    np.testing.assert_allclose(_pose(state), T, atol=1e-6)
+    # bent to the other side
+    state = client.turn(state, _columns(T), field="O_T_EE_c", elbow=elbow * [1, -1])
+    assert _errors(state) == [f"{_PREFIX}_elbow_sign_inconsistent"]
+
+
+@pytest.mark.parametrize(("by", "sign"), [(0.5, 1), (0.0, -1)])
+def test_the_first_elbow_must_be_the_arms(serve: Any, raw: Any, kind: RobotKind, by: float, sign: float) -> None:
+    client = raw(serve(kind))
+    state = _begun(client, _VELOCITY)
+    elbow = (state["elbow_d"] + [by, 0]) * [1, sign]
+    assert _errors(client.turn(state, np.zeros(6), field="O_dP_EE_c", elbow=elbow)) == [
+        f"{_PREFIX}_start_elbow_invalid"
+    ]
+
+
+@pytest.mark.parametrize("elbow", [True, False])
+def test_an_fr3_may_begin_with_the_pose_it_measurably_has(serve: Any, raw: Any, elbow: bool) -> None:
+    client = raw(serve("fr3"))
+    state = _begun(client, _POSE)
+    assert np.linalg.norm(state["O_T_EE"][12:15] - state["O_T_EE_c"][12:15]) > 2e-5
+    first, angle = state["O_T_EE"].astype(np.float64), state["elbow"].astype(np.float64) if elbow else None
+    for _ in range(3):
+        state = client.turn(state, first, field="O_T_EE_c", elbow=angle)
+        assert state["robot_mode"] == _MOVE, _errors(state)
+    np.testing.assert_allclose(state["O_T_EE_c"], first, atol=1e-6)
+    if elbow:
+        assert state["q_d"][2] == pytest.approx(angle[0], abs=1e-6)
+
+
+@pytest.mark.parametrize(("kind", "off"), [("panda", 0.1), ("panda", 1e-4), ("fr3", 0.1), ("fr3", 2e-3)])
+def test_the_first_pose_must_be_where_the_arm_is(serve: Any, raw: Any, kind: RobotKind, off: float) -> None:
+    client = raw(serve(kind))
+    state = _begun(client, _POSE)
+    T = _pose(state)
+    turned = T.copy()
+    turned[:3, :3] = rotation_about(np.eye(3)[0], off) @ T[:3, :3]
+    T[0, 3] += off
+    assert _errors(client.turn(state, _columns(T), field="O_T_EE_c")) == [_START]
+    assert client.ended() == "reflex"
+    assert client.request("AutomaticErrorRecovery") == b"\0"
+    state = _begun(client, _POSE)
+    assert _errors(client.turn(state, _columns(turned), field="O_T_EE_c")) == [_START]
+
+
+def test_half_a_turn_is_a_start_elsewhere_too(serve: Any, raw: Any) -> None:
+    client = raw(serve())
+    state = _begun(client, _POSE)
+    T = _pose(state)
+    T[:3, :3] = np.diag([1.0, -1.0, -1.0]) @ T[:3, :3]
+    assert _errors(client.turn(state, _columns(T), field="O_T_EE_c")) == [_START]
+
+
+@pytest.mark.parametrize("bad", [np.full(16, np.nan), np.zeros(16), 2 * np.eye(4).ravel(), np.full(16, 1e300)])
+def test_what_is_no_pose_has_its_name(serve: Any, raw: Any, bad: np.ndarray) -> None:
+    client = raw(serve())
+    state = client.turn(_begun(client, _POSE), bad, field="O_T_EE_c")
+    assert _errors(state) == ["cartesian_position_motion_generator_invalid_frame"]
+    assert np.all(np.isfinite(state["dq_d"]))
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, 1e308])
+def test_velocities_that_are_none_end_the_motion(serve: Any, raw: Any, bad: float) -> None:
+    client = raw(serve())
+    state = client.turn(_begun(client, _VELOCITY), np.full(6, bad), field="O_dP_EE_c")
+    assert f"{_PREFIX}_velocity_limits_violation" in _errors(state)
+    assert np.all(np.isfinite(state["dq_d"]))
+
+
+def test_a_motion_of_the_end_effector_may_not_end_while_it_moves(serve: Any, raw: Any) -> None:
+    client = raw(serve())
+    state = _begun(client, _VELOCITY)
+    for k in range(1, 101):
+        state = client.turn(state, 1e-3 * k * _UP, field="O_dP_EE_c")
+        assert state["robot_mode"] == _MOVE, _errors(state)
+    state = client.turn(state, 0.1 * _UP, finished=True, field="O_dP_EE_c")
+    assert client.ended() == "reflex"
+    assert _errors(state) == [f"{_PREFIX}_velocity_discontinuity"]
+
+
+def test_no_motion_of_the_end_effector_begins_at_a_singularity(serve: Any, raw: Any, kind: RobotKind) -> None:
+    q = np.array([0.0, 0.0, np.pi / 2, -0.15 if kind == "fr3" else -0.07, 0.0, 3.2126, 0.0])
+    client = raw(serve(kind, setup={"q": q}))
+    assert [client.begin(generator=generator) for generator in (_POSE, _VELOCITY)] == ["singular", "singular"]
+    assert client.begin() == "started"
+
+
+@pytest.mark.parametrize("kind", ["panda", "fr3"])
+@pytest.mark.parametrize(("part", "axis"), [(0, 1), (1, 3), (2, 6)])
+def test_each_limit_has_its_own_name(kind: RobotKind, part: int, axis: int) -> None:
+    limits, one = CARTESIAN_LIMITS[kind], np.eye(7)[axis]
+    fast, hard, jerked = (most[part] for most in (limits.velocity, limits.acceleration, limits.jerk))
+    for factor, over in ((0.99, False), (1.01, True)):
+        cases = {
+            "velocity_limits_violation": (np.stack([fast * factor * one, _ZERO]), fast * factor),
+            "velocity_discontinuity": (np.stack([_ZERO, hard * one]), hard * factor * _MS),
+            "acceleration_discontinuity": (np.stack([_ZERO, _ZERO]), jerked * factor * _MS**2),
+        }
+        for name, (now, wanted) in cases.items():
+            named = f"{_PREFIX}_{name if part < 2 else 'elbow_limit_violation'}"
+            assert limits.violated(now, wanted * one) == ((named,) if over else ())
+
+
+class Follower:
+    """A motion of the end-effector that is always where it is commanded."""
+
+    def __init__(self, kind: RobotKind) -> None:
+        model = RobotModel(panda() if kind == "panda" else fr3())
+        body = Body(model, frames_of(model), CARTESIAN_LIMITS[kind])
+        self.motion = Motion(motion_limits(model, kind), Controller.JOINT_IMPEDANCE, CartesianVelocity(body))
+        self.q = model.description.q_ready.copy()
+
+    def led(self, axis: int, to: float, rate: float) -> Ending | None:
+        """Speed up along or about an axis at an acceleration, reached with a jerk of 500, and go on until it ends."""
+        speed = acceleration = 0.0
+        for _ in range(20_000):
+            wanted = rate if speed < to else 0.0
+            acceleration += np.clip(wanted - acceleration, -500.0 * _MS, 500.0 * _MS)
+            speed += acceleration * _MS
+            ending = self.motion.follow(self.q, Setpoint(speed * np.eye(6)[axis]))
+            if ending is not None:
+                return ending
+            self.q += self.motion.qd * _MS
+        return None
+
+
+@pytest.mark.parametrize("kind", ["panda", "fr3"])
+def test_limits_of_joints_that_follow_have_names_of_their_own(kind: RobotKind) -> None:
+    outwards = Follower(kind).led(0, 0.4, 2.0)  # until the arm is stretched
+    assert outwards is not None
+    assert outwards.status == "reflex"
+    assert any(name.startswith(f"{_PREFIX}_joint_velocity") for name in outwards.errors), outwards
+
+
+@pytest.mark.slow
+def test_a_joint_that_follows_to_its_end_has_a_name_of_its_own() -> None:
+    turned = Follower("panda").led(5, 0.8, 1.0)
+    assert turned == Ending("reflex", (f"{_PREFIX}_joint_position_limits_violation",))

@@ -1,0 +1,268 @@
+"""`pretouch serve-fci` as a command."""
+
+import csv
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pretouch.cli import main
+from pretouch.cli.skin_keys import with_new
+from pretouch.hardware.keys import Keys, save_keys
+from pretouch.hardware.receiver import SkinReceiver
+from pretouch.robot.description import fr3, panda
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import paper_skin
+from pretouch.sim.scene import SceneSpec
+from pretouch_fci.arm import ArmSetup, ServedArm
+from pretouch_fci.motion import Setpoint
+from pretouch_fci.serve import TypedPushes
+from pretouch_fci.wire import CONNECT, HEADER, PANDA, Controller, Generator, RobotMode
+
+
+def _served(*arguments: str) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "pretouch.cli", "serve-fci", "--port", "0", *arguments]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONUNBUFFERED": ""})
+
+
+def _address(server: subprocess.Popen[str]) -> tuple[str, int]:
+    assert server.stdout is not None
+    line = server.stdout.readline()
+    assert line.startswith("Listening at 127.0.0.1:")
+    return "127.0.0.1", int(line.split(":")[1].split()[0])
+
+
+def test_it_says_where_it_listens_and_ends_in_order_on_sigterm(tmp_path: Path) -> None:
+    truth = tmp_path / "truth.csv"
+    with _served("--truth", str(truth), "--scene", "static", "--start", "path", "--push", "0:0,10,0:60") as server:
+        with socket.create_connection(_address(server)) as tcp, socket.socket(type=socket.SOCK_DGRAM) as udp:
+            udp.bind(("127.0.0.1", 0))
+            tcp.sendall(PANDA.reply("Connect", 1, CONNECT.pack(5, udp.getsockname()[1])))
+            assert tcp.recv(64)[HEADER.size :] == b"\0\5\0"
+            udp.settimeout(5.0)
+            for _ in range(50):
+                assert len(udp.recv(4096)) == PANDA.state.itemsize
+        server.send_signal(signal.SIGTERM)
+        assert server.wait(10.0) == 128 + signal.SIGTERM
+    rows = list(csv.DictReader(truth.read_text().splitlines()))
+    assert len(rows) >= 50
+    assert float(rows[40]["force_y_N"]) == 10.0
+
+
+def test_its_units_are_heard_in_real_time(tmp_path: Path) -> None:
+    skin = paper_skin(RobotModel(fr3()))
+    keys = with_new(Keys(), skin.ids)
+    save_keys(keys, tmp_path / "keys.toml")
+    with SkinReceiver(skin.ids, keys) as receiver:
+        units = f"127.0.0.1:{receiver.address[1]}"
+        with _served("--robot", "fr3", "--units", units, "--keys", str(tmp_path / "keys.toml")) as server:
+            _address(server)
+            while not all(unit.accepted for unit in receiver.units):
+                receiver.receive(timeout=5.0)
+            server.terminate()
+            server.wait(10.0)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--port", "70000"], "must be at most 65535"),
+        (["--host", "192.0.2.1"], "Listening on 192.0.2.1:1337 failed"),
+        (["--drop", "3"], "as 3/50"),
+        (["--push", "1:2"], "as 2.0:0,15,0:0.5"),
+        (["--object", "0.1:1"], "--object is '0.1:1': give width and mass, such as 0.04:0.5"),
+        (["--units", "7337"], "give address and port"),
+        (["--units", "127.0.0.1:7337"], "needs --keys"),
+        (["--hand", "--scene", "static"], "--hand needs --scene empty"),
+        (["--scene", "nonesuch"], "--scene is nonesuch: give empty, static, dynamic, or an MJCF file"),
+        (["--seed", "-1"], "give 0 or more"),
+        (
+            ["--start", "-0.1,0"],
+            "--start is '-0.1,0': give ready, path, or 7 joint angles between commas",
+        ),
+        (["--start", "0,0,0,0.5,0,1,0"], "-3.072 to -0.0698"),
+        (["--scene", "static", "--box", "1,1,1:1,1,1"], "--box needs --scene empty"),
+        (["--box", "1,1,1"], "give centre and edges, such as 0.5,0.3,0.4:0.3,0.04,0.24"),
+        (["--box", "0,0,nan:1,1,1"], "--box is '0,0,nan:1,1,1'"),
+        (["--box", "0.4,0,0.5:0.3,0.3,0.3"], "The arm touches something where it stands at first"),
+        (["--scene", "static", "--stiffness", "0"], "--stiffness is 0 N/m: give more than 0"),
+        (["--scene", "static", "--stiffness", "nan"], "--stiffness is nan N/m"),
+        (["--truth", "/nowhere/truth.csv"], "The truth cannot be written"),
+    ],
+)
+def test_what_cannot_be_served_is_said_in_a_sentence(
+    arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["serve-fci", *arguments]) == 2
+    assert words in capsys.readouterr().err
+
+
+def test_a_person_types_pushes() -> None:
+    arm = ServedArm(ArmSetup(RobotModel(panda()), "panda", panda().q_ready, SceneSpec()))
+    ours, theirs = os.openpty()
+    with os.fdopen(theirs) as terminal:
+        typed = TypedPushes(arm, terminal)
+        assert typed.possible
+        assert not typed.take()
+        os.write(ours, b"-y\n0,0,4:0.5\n0.1:3,0,0\n0,1")
+        for _ in range(3):  # a terminal gives a line at a time
+            assert not typed.take()
+        arm.step(None)
+        np.testing.assert_array_equal(arm.true_force, [0.0, -15.0, 4.0])
+        os.write(ours, b",0:0.5\n")
+        typed.take()
+        arm.step(None)
+        np.testing.assert_array_equal(arm.true_force, [0.0, -14.0, 4.0])
+        for _ in range(100):  # a tenth of a second from when it was typed
+            arm.step(None)
+        np.testing.assert_array_equal(arm.true_force, [3.0, -14.0, 4.0])
+    os.close(ours)
+
+
+def test_a_program_types_in_place_of_a_person_and_ends_the_server_by_ending(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "pretouch.cli", "serve-fci", "--port", "0", "--lockstep", "--stdin"]
+    done = subprocess.run(command, input="time\nharder\n", capture_output=True, text=True, timeout=60.0, cwd=tmp_path)
+    assert done.returncode == 0
+    listening, time, refused = done.stdout.splitlines()
+    assert listening.startswith("Listening at")
+    assert time == "The arm's time is 0.000 s."
+    assert refused.startswith("'harder' is not a push")
+
+
+@pytest.fixture
+def swinging() -> ServedArm:
+    """An arm just after a motion."""
+    arm = ServedArm(ArmSetup(RobotModel(panda()), "panda", panda().q_ready, SceneSpec()))
+    arm.begin(Generator.JOINT_VELOCITY, Controller.JOINT_IMPEDANCE)
+    arm.step(Setpoint(np.zeros(7)))
+    arm.step(Setpoint(np.zeros(7), finished=True))
+    return arm
+
+
+def test_what_is_typed_while_the_arm_comes_to_rest_waits_until_it_has(swinging: ServedArm) -> None:
+    arm = swinging
+    ours, theirs = os.pipe()
+    with os.fdopen(ours) as read, os.fdopen(theirs, "w") as written:
+        typed = TypedPushes(arm, read, program=True)
+        written.write("0,15,0\n")
+        written.flush()
+        while not arm.settled:
+            assert not typed.take()
+            arm.step(None)
+            assert not arm.true_force.any()
+        assert not typed.take()
+        arm.step(None)
+        np.testing.assert_array_equal(arm.true_force, [0.0, 15.0, 0.0])
+        written.close()
+        assert typed.take()
+
+
+def test_all_that_was_typed_before_the_end_of_a_pipe_is_done(
+    swinging: ServedArm, capsys: pytest.CaptureFixture[str]
+) -> None:
+    ours, theirs = os.pipe()
+    with os.fdopen(ours) as read:
+        typed = TypedPushes(swinging, read, program=True)
+        os.write(theirs, b"time\nharder\n\n0,15,0")  # the last without an end
+        os.close(theirs)
+        while not swinging.settled:
+            assert not typed.take()
+            swinging.step(None)
+        while not typed.take():
+            swinging.step(None)
+        assert typed.take()
+    time, refused = capsys.readouterr().out.splitlines()
+    assert time.startswith("The arm's time is")
+    assert refused.startswith("'harder' is not a push")
+    swinging.step(None)
+    np.testing.assert_array_equal(swinging.true_force, [0.0, 15.0, 0.0])
+
+
+@pytest.mark.parametrize("lockstep", [False, True])
+def test_an_arm_that_is_led_by_hand_hears_what_is_typed_but_in_lockstep(lockstep: bool) -> None:
+    arm = ServedArm(ArmSetup(RobotModel(panda()), "panda", panda().q_ready, SceneSpec()))
+    ours, theirs = os.pipe()
+    with os.fdopen(ours) as read, os.fdopen(theirs, "wb", buffering=0) as written:
+        typed = TypedPushes(arm, read, program=True, lockstep=lockstep)
+        written.write(b"guide\n0,5,0:0.3\n")
+        typed.take()
+        arm.step(None)
+        written.write(b"let go\n")
+        for _ in range(100):
+            assert not typed.take()
+            arm.step(None)
+        assert (arm.mode is RobotMode.GUIDING) is lockstep
+        while not arm.settled:
+            arm.step(None)
+        typed.take()
+        assert arm.mode is RobotMode.IDLE
+
+
+def test_a_line_without_an_end_is_not_kept_whole(capsys: pytest.CaptureFixture[str]) -> None:
+    arm = ServedArm(ArmSetup(RobotModel(panda()), "panda", panda().q_ready, SceneSpec()))
+    ours, theirs = os.pipe()
+    with os.fdopen(ours) as read, os.fdopen(theirs, "wb", buffering=0) as written:
+        typed = TypedPushes(arm, read, program=True)
+        for _ in range(50):
+            written.write(b"0,15,0" + 4000 * b" ")
+            typed.take()
+        assert capsys.readouterr().out == ""
+        written.write(b"\n" + b"time\n")
+        typed.take()
+    refused, time = capsys.readouterr().out.splitlines()
+    assert refused == "A line of more than 256 characters is left out."
+    assert time.startswith("The arm's time is")
+    arm.step(None)
+    assert not arm.true_force.any()
+
+
+def test_in_lockstep_a_lasting_push_of_a_guided_arm_does_not_keep_the_server_from_ending() -> None:
+    command = [sys.executable, "-m", "pretouch.cli", "serve-fci", "--port", "0", "--lockstep", "--stdin"]
+    done = subprocess.run(command, input="guide\n0,1,0:1e6\n", capture_output=True, text=True, timeout=60.0)
+    assert done.returncode == 0
+
+
+def test_a_push_that_is_over_is_said_with_what_the_arm_measured_of_it(capsys: pytest.CaptureFixture[str]) -> None:
+    arm = ServedArm(ArmSetup(RobotModel(panda()), "panda", panda().q_ready, SceneSpec()))
+    ours, theirs = os.openpty()
+    with os.fdopen(theirs) as terminal:
+        typed = TypedPushes(arm, terminal)
+        os.write(ours, b"0,20,0:0.4\n")
+        for _ in range(650):
+            typed.take()
+            arm.step(None)
+    os.close(ours)
+    (said,) = capsys.readouterr().out.splitlines()
+    found = re.fullmatch(r"The push of 20 N is over. The arm's estimate of it came to ([\d.]+) N; .*", said)
+    assert found is not None
+    assert 15.0 < float(found[1]) < 30.0
+
+
+def test_what_is_typed_and_is_no_push_is_said(capsys: pytest.CaptureFixture[str]) -> None:
+    arm = ServedArm(ArmSetup(RobotModel(panda()), "panda", panda().q_ready, SceneSpec()))
+    ours, theirs = os.openpty()
+    with os.fdopen(theirs) as terminal:
+        typed = TypedPushes(arm, terminal)
+        os.write(ours, b"harder\n")
+        typed.take()
+        assert "'harder'" in capsys.readouterr().out
+        arm.step(None)
+        assert not arm.true_force.any()
+    os.close(ours)
+
+
+def test_nobody_types_where_there_is_no_terminal(tmp_path: Path) -> None:
+    arm = ServedArm(ArmSetup(RobotModel(panda()), "panda", panda().q_ready, SceneSpec()))
+    (tmp_path / "typed").write_text("+y\n")
+    with (tmp_path / "typed").open() as file:
+        typed = TypedPushes(arm, file)
+        assert not typed.possible
+        typed.take()
+    arm.step(None)
+    assert not arm.true_force.any()

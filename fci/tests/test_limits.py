@@ -1,0 +1,216 @@
+"""Limits, motions, collisions, pushes and the URDF, without a server."""
+
+import mujoco
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pretouch.errors import ParameterError, RobotModelError
+from pretouch.robot.description import fr3, panda
+from pretouch.robot.model import RobotModel
+from pretouch.sim.scene import SceneSpec
+from pretouch.sim.tcp_push import TcpPush
+from pretouch_fci.arm import ArmSetup, ServedArm
+from pretouch_fci.collision import CollisionBehavior, Contacts
+from pretouch_fci.frames import flange_of
+from pretouch_fci.kinds import JointVelocity
+from pretouch_fci.limits import MotionLimits, motion_limits
+from pretouch_fci.motion import FIRST_WITHIN, Ending, Motion, Setpoint
+from pretouch_fci.options import drop_of
+from pretouch_fci.pushes import push_of
+from pretouch_fci.state import StateDatagram, by_robot_at
+from pretouch_fci.urdf import urdf_of
+from pretouch_fci.wire import PANDA, Controller, Generator, RobotMode
+
+_MODELS = {"panda": RobotModel(panda()), "fr3": RobotModel(fr3())}
+_READY = panda().q_ready
+_ZERO = np.zeros(7)
+
+
+def _limits(kind: str) -> MotionLimits:
+    return motion_limits(_MODELS[kind], kind)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("kind", ["panda", "fr3"])
+def test_each_limit_has_its_own_name(kind: str) -> None:
+    limits = _limits(kind)
+    one, step = np.eye(7)[6], 1e-3
+    most_a, most_j = limits.qdd[6], limits.qddd[6]
+    name = "joint_motion_generator_{}".format
+    assert limits.violated(_READY, _ZERO, _ZERO, 0.99 * most_j * step**2 * one) == ()
+    assert limits.violated(_READY, _ZERO, _ZERO, 1.01 * most_j * step**2 * one) == (name("acceleration_discontinuity"),)
+    assert limits.violated(_READY, _ZERO, most_a * one, 1.01 * most_a * step * one) == (name("velocity_discontinuity"),)
+    fast = 1.002 * limits.qd * one
+    assert limits.violated(_READY, fast, _ZERO, fast) == (name("velocity_limits_violation"),)
+    end = _READY.copy()
+    end[1] = limits.q_max[1] - 1e-5
+    assert name("position_limits_violation") in limits.violated(end, np.full(7, 0.05), _ZERO, np.full(7, 0.05))
+    assert len(limits.violated(_READY, _ZERO, _ZERO, np.full(7, np.nan))) == 4
+
+
+def test_the_fr3s_speed_limits_are_those_the_vendor_publishes() -> None:
+    limits = _limits("fr3")
+    q = _READY.copy()
+    q[0] = 2.7
+    # libfranka, rate_limiting.h: joint 1 towards its upper end
+    most = min(2.62, max(0.0, -0.30 + np.sqrt(max(0.0, 12.0 * (2.75010 - q[0])))))
+    for factor, fits in ((0.99, True), (1.02, False)):
+        qd = np.eye(7)[0] * factor * most
+        assert (limits.violated(q, qd, _ZERO, qd) == ()) == fits
+        assert limits.violated(q, -qd, _ZERO, -qd) == ()
+
+
+@given(st.lists(st.floats(-2.0, 2.0), min_size=7, max_size=7))
+def test_braking_keeps_the_acceleration_limit_and_ends_at_rest(speeds: list[float]) -> None:
+    limits, qd = _limits("panda"), np.array(speeds)
+    for _ in range(270):
+        slower = limits.braked(qd)
+        assert np.all(np.abs(slower - qd) <= limits.qdd * 1e-3 + 1e-12)
+        assert np.all(slower * qd >= 0)
+        qd = slower
+    assert not qd.any()
+
+
+def test_a_motion_that_breaks_off_ends_in_braking_at_the_acceleration_limit() -> None:
+    arm = ServedArm(ArmSetup(RobotModel(panda()), "panda", _READY.copy(), SceneSpec()))
+    arm.begin(Generator.JOINT_VELOCITY, Controller.JOINT_IMPEDANCE)
+    for k in range(1, 501):
+        assert arm.step(Setpoint(2e-3 * k * np.eye(7)[6])) is None
+    assert arm.step(Setpoint(np.full(7, np.nan))) is not None
+    speeds = [arm.qd[6]]
+    while not arm.at_rest:
+        arm.step(None)
+        speeds.append(arm.qd[6])
+    # 1 rad/s at 20 rad/s^2
+    np.testing.assert_allclose(np.diff([1.0, *speeds])[:-1], -0.02, atol=1e-9)
+    assert len(speeds) == 50
+    assert arm.mode is RobotMode.REFLEX
+
+
+def test_nineteen_lost_commands_are_bridged_at_the_same_acceleration() -> None:
+    motion = Motion(_limits("panda"), Controller.JOINT_IMPEDANCE, JointVelocity())
+    for k in range(1, 4):
+        assert motion.follow(_READY, Setpoint(np.full(7, 1e-3 * k))) is None
+    for _ in range(19):
+        assert motion.follow(_READY, None) is None
+    np.testing.assert_allclose(motion.qd, 22e-3, atol=1e-12)
+    assert motion.success_rate == pytest.approx(3 / 22)
+    assert motion.follow(_READY, None) == Ending("reflex", ("communication_constraints_violation",))
+
+
+def test_the_first_command_has_to_come_in_half_a_second() -> None:
+    motion = Motion(_limits("panda"), Controller.JOINT_IMPEDANCE, JointVelocity())
+    endings = [motion.follow(_READY, None) for _ in range(FIRST_WITHIN)]
+    assert endings[:-1] == [None] * (FIRST_WITHIN - 1)
+    assert endings[-1] == Ending("reflex", ("communication_constraints_violation",))
+
+
+def test_thresholds_are_those_of_what_the_arm_does() -> None:
+    # lower and upper torque, accelerating then steady; then forces alike
+    body = np.concatenate([np.repeat([10.0, 20.0, 1.0, 2.0], 7), np.repeat([30.0, 60.0, 3.0, 6.0], 6)])
+    contacts, behavior = Contacts(), CollisionBehavior.of(body)
+    assert behavior is not None
+    contacts.behavior = behavior
+    torque, force = 1.5 * np.eye(7)[2], -4.0 * np.eye(6)[0]
+    assert contacts.update(torque, force, _ZERO) == ()
+    assert contacts.joint_contact.tolist() == [False, False, True, False, False, False, False]
+    assert contacts.cartesian_contact.tolist() == [True, False, False, False, False, False]
+    assert contacts.update(5 * torque, 5 * force, np.ones(7)) == ()
+    assert contacts.update(2 * torque, 2 * force, _ZERO) == ("cartesian_reflex", "joint_reflex")
+    assert contacts.update(_ZERO, np.zeros(6), _ZERO) == ()
+    assert contacts.joint_collision[2]
+    contacts.forget()
+    assert not contacts.joint_collision.any()
+
+
+@pytest.mark.parametrize("bad", [-1.0, np.nan, np.inf])
+def test_what_is_no_threshold_is_refused(bad: float) -> None:
+    assert CollisionBehavior.of(np.full(52, bad)) is None
+
+
+def test_pushes_and_drops_are_read() -> None:
+    assert push_of("2.5:0,15,-3") == TcpPush(2.5, (0.0, 15.0, -3.0), 0.5)
+    assert push_of("0:1,2,3:0.25") == TcpPush(0.0, (1.0, 2.0, 3.0), 0.25)
+    drop = drop_of("3/50")
+    assert [k for k in range(100) if drop.takes(k)] == [0, 1, 2, 50, 51, 52]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "1:0,1e9,0",
+        "1:0,0,-1001",
+        "",
+        "1",
+        "1:2",
+        "1:2,3",
+        "a:1,2,3",
+        "1:1,2,3:0",
+        "-1:1,2,3",
+        "1:nan,0,0",
+        "1:1,2,3:1:1",
+    ],
+)
+def test_what_is_no_push_is_refused(text: str) -> None:
+    with pytest.raises(ParameterError, match=r"as 2\.0:0,15,0:0\.5|give at most 1000 N along each axis"):
+        push_of(text)
+
+
+@pytest.mark.parametrize("text", ["", "3", "3/", "0/50", "50/50", "-1/3", "a/b"])
+def test_what_is_no_share_to_drop_is_refused(text: str) -> None:
+    with pytest.raises(ParameterError, match="as 3/50"):
+        drop_of(text)
+
+
+@pytest.mark.parametrize("kind", ["panda", "fr3"])
+def test_the_urdf_is_the_arm_up_to_its_flange(kind: str) -> None:
+    model = _MODELS[kind]
+    mj = mujoco.MjModel.from_xml_string(
+        urdf_of(model).replace("<link", '<mujoco><compiler fusestatic="false"/></mujoco><link', 1)
+    )
+    data, flange = mujoco.MjData(mj), flange_of(model)
+    rng = np.random.default_rng(0)
+    for _ in range(5):
+        q = rng.uniform(model.q_min, model.q_max)
+        data.qpos[:] = q
+        mujoco.mj_forward(mj, data)
+        kin = model.kinematics(q)
+        np.testing.assert_allclose(data.body("link8").xpos, kin.position[flange], atol=1e-6)
+        np.testing.assert_allclose(data.body("link8").xmat.reshape(3, 3), kin.rotation[flange], atol=1e-6)
+    ranges = mj.jnt_range
+    envelope = model.description.envelope
+    np.testing.assert_allclose(ranges[:, 1], model.q_max if envelope is None else envelope.q_upper)
+
+
+def test_the_wrench_is_by_the_robot_and_about_the_stiffness_frame() -> None:
+    # 10 N along y at a point 0.1 m in x from the frame: a moment of 1 Nm about z
+    told = by_robot_at(np.array([0.0, 10.0, 0.0, 0.0, 0.0, 0.0]), np.array([0.1, 0.0, 0.0]), np.zeros(3))
+    np.testing.assert_allclose(told, [0.0, -10.0, 0.0, 0.0, 0.0, -1.0])
+    assert not np.signbit(by_robot_at(np.zeros(6), np.ones(3), np.zeros(3))).any()
+
+
+def test_near_a_singularity_the_wrench_is_exactly_zero() -> None:
+    q = np.array([0.0, 0.0, np.pi / 2, -0.07, 0.0, 3.2126, 0.0])
+    arm = ServedArm(ArmSetup(RobotModel(panda()), "panda", q, SceneSpec()))
+    assert arm.report.wrench is None
+    state = np.frombuffer(StateDatagram(PANDA, arm).write(1), PANDA.state)[0]
+    assert state["O_F_ext_hat_K"].tolist() == state["K_F_ext_hat_K"].tolist() == [0.0] * 6
+    assert np.any(state["tau_ext_hat_filtered"])
+
+
+def test_at_rest_the_torques_hold_the_arm() -> None:
+    arm = ServedArm(ArmSetup(RobotModel(panda()), "panda", _READY.copy(), SceneSpec()))
+    gravity = arm.model.dynamics(arm.report.q, _ZERO).gravity
+    # but for what the model does not know of masses and payload
+    np.testing.assert_allclose(arm.torques.measured, gravity, atol=3.0)
+    np.testing.assert_allclose(arm.torques.desired, arm.torques.measured - gravity, atol=0.3)
+
+
+def test_an_arm_with_other_joints_does_not_speak_it() -> None:
+    class Six:
+        n = 6
+        description = panda()
+
+    with pytest.raises(RobotModelError, match="only arms with 7"):
+        ServedArm(ArmSetup(Six(), "panda", _ZERO, SceneSpec()))  # type: ignore[arg-type]

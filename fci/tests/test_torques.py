@@ -1,0 +1,317 @@
+"""Torques of a client, the impedances beside them, loads, and guiding by hand: the arm alone, and by raw bytes."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pretouch.robot.description import panda
+from pretouch.robot.model import RobotModel
+from pretouch.sim.scene import SceneSpec
+from pretouch.sim.tcp_push import TcpPush
+from pretouch_fci.arm import ArmSetup, ServedArm
+from pretouch_fci.controllers import _critical
+from pretouch_fci.gripper import GripperObject
+from pretouch_fci.inertia import Inertial
+from pretouch_fci.motion import Ending, Setpoint
+from pretouch_fci.wire import Controller, Generator, RobotKind, RobotMode
+
+_ZERO = np.zeros(7)
+_JOINT_7 = np.eye(7)[6]
+_TORQUE_ONLY = {"panda": Generator.JOINT_VELOCITY, "fr3": Generator.NONE}
+
+
+def _arm(*pushes: TcpPush, **setup: Any) -> ServedArm:
+    model = RobotModel(panda())
+    return ServedArm(ArmSetup(model, "panda", model.description.q_ready.copy(), SceneSpec(), pushes=pushes, **setup))
+
+
+def _tried(arm: ServedArm) -> ServedArm:
+    arm.begin(Generator.JOINT_VELOCITY, Controller.EXTERNAL)
+    return arm
+
+
+def _commanded(arm: ServedArm, *torques: np.ndarray) -> Ending | None:
+    """Command torques, one a millisecond, until the motion ends."""
+    endings = (arm.step(Setpoint(_ZERO, torques=tau)) for tau in torques)
+    return next((ending for ending in endings if ending is not None), None)
+
+
+def _still(arm: ServedArm, milliseconds: int) -> None:
+    for _ in range(milliseconds):
+        assert arm.step(Setpoint(_ZERO)) is None, arm.errors
+
+
+def _settled(arm: ServedArm) -> None:
+    while not arm.settled:
+        arm.step(None)
+
+
+def test_a_torque_accelerates_a_joint_as_its_inertia_says() -> None:
+    arm = _tried(_arm())
+    _commanded(arm, _ZERO)
+    before = arm.plant.mj_data.qvel[:7].copy()
+    assert _commanded(arm, *[0.9 * _JOINT_7] * 20) is None
+    mass = arm.model.dynamics(arm.report.q, _ZERO).mass_matrix + arm.plant.params.armature_kg_m2 * np.eye(7)
+    gained = np.linalg.solve(mass, 0.9 * _JOINT_7) * 0.02
+    moved = arm.plant.mj_data.qvel[:7] - before
+    # friction of joint 7 takes up to 0.13 of 0.9 Nm at 0.1 rad/s: F1 / (1 + exp(-F2 (qd + F3))), less its value at rest
+    assert 0.8 * gained[6] < moved[6] < gained[6]
+    np.testing.assert_array_equal(arm.torques.desired, 0.9 * _JOINT_7)
+
+
+def test_the_joints_are_asked_for_nothing_while_torques_act() -> None:
+    arm = _tried(_arm())
+    asked = arm.report.q_commanded.copy()
+    _commanded(arm, *[0.9 * _JOINT_7] * 200)
+    np.testing.assert_array_equal(arm.report.q_commanded, asked)
+    assert arm.report.q[6] > asked[6] + 0.05
+
+
+def test_after_torques_the_arm_brakes_and_stays_where_it_is() -> None:
+    arm = _tried(_arm())
+    _commanded(arm, *[0.9 * _JOINT_7] * 200)
+    speed, there = arm.report.qd[6], arm.report.q[6]
+    assert arm.step(Setpoint(_ZERO, finished=True)) == Ending("success")
+    _settled(arm)
+    # half a v^2 / a at 20 rad/s^2, and what the impedance swings
+    assert arm.report.q[6] == pytest.approx(there + 0.5 * speed**2 / 20.0, abs=0.02)
+    assert abs(arm.report.q_commanded[6] - arm.report.q[6]) < 1e-3
+    assert arm.mode is RobotMode.IDLE
+
+
+def test_torques_that_jump_or_are_too_large_are_refused() -> None:
+    ramp = [k * _JOINT_7 for k in range(1, 12)]
+    assert _commanded(_tried(_arm()), *ramp, 13.2 * _JOINT_7) == Ending("reflex", (
+        "controller_torque_discontinuity", "tau_j_range_violation",
+    ))  # fmt: skip
+    assert _commanded(_tried(_arm()), 2.0 * _JOINT_7) == Ending("reflex", ("controller_torque_discontinuity",))
+    assert _commanded(_tried(_arm()), *ramp, 12.001 * _JOINT_7) == Ending("reflex", ("tau_j_range_violation",))
+    assert _commanded(_tried(_arm()), np.full(7, np.nan)) == Ending("input error", ("controller_torque_discontinuity",))
+    assert _commanded(_tried(_arm()), np.full(7, 1e308)).errors[0] == "controller_torque_discontinuity"
+
+
+def test_torques_that_drive_a_joint_too_fast_or_too_far_end_in_a_reflex() -> None:
+    assert _commanded(_tried(_arm()), *[k * _JOINT_7 for k in range(1, 6)], *[6.0 * _JOINT_7] * 400) == Ending(
+        "reflex", ("joint_velocity_violation",)
+    )
+    arm = _arm()
+    ready = arm.model.description.q_ready.copy()
+    ready[6] = arm.model.q_max[6] - 0.02
+    arm = _tried(ServedArm(ArmSetup(arm.model, "panda", ready, SceneSpec())))
+    ending = _commanded(arm, *[0.9 * _JOINT_7] * 2000)
+    assert ending == Ending("reflex", ("joint_position_limits_violation",))
+    arm.recover()
+    _settled(arm)
+    assert _commanded(_tried(arm), *[max(-0.9, -0.1 * k) * _JOINT_7 for k in range(200)]) is None, "it may go back"
+    assert arm.report.q[6] < arm.model.q_max[6] - 0.02
+
+
+def test_a_lost_command_leaves_the_torques_as_they_are() -> None:
+    arm = _tried(_arm())
+    _commanded(arm, 0.9 * _JOINT_7)
+    for _ in range(19):
+        assert arm.step(None) is None
+        np.testing.assert_array_equal(arm.torques.desired, 0.9 * _JOINT_7)
+    assert arm.step(None) == Ending("reflex", ("communication_constraints_violation",))
+
+
+def test_each_protocol_serves_torques_alone_and_beside_a_motion(serve: Any, raw: Any, kind: RobotKind) -> None:
+    client = raw(serve(kind))
+    for generator in (_TORQUE_ONLY[kind], Generator.JOINT_POSITION):
+        assert client.begin(Controller.EXTERNAL, generator) == "started"
+        state = client.first_of_motion()
+        assert (state["controller_mode"], state["motion_generator_mode"]) == (Controller.EXTERNAL, generator + 1)
+        for k in range(1, 50):
+            command = np.zeros((), client.protocol.command)
+            command["message_id"], command["q_c"] = state["message_id"], state["q_d"]
+            command["tau_J_d"] = 0.01 * k * _JOINT_7
+            client.udp.sendto(command.tobytes(), client.robot_udp)
+            state = client.state_where(lambda new, old=state: new["message_id"] > old["message_id"])
+        np.testing.assert_allclose(state["tau_J_d"], 0.49 * _JOINT_7, atol=1e-7)
+        client.turn(state, state["q_d"], finished=True, field="q_c")
+        assert client.ended() == "success"
+
+
+def test_a_motion_that_the_robot_would_interpolate_is_not_possible(serve: Any, raw: Any) -> None:
+    client = raw(serve("fr3"))
+    body = np.zeros(client.protocol.sizes["Move"], np.uint8)
+    body[4 + 4 + 6 * 8] = 1
+    assert client.protocol.move[client.request("Move", body.tobytes())[0]] == "not possible"
+
+
+@pytest.mark.parametrize("frame", ["base", "turned"])
+def test_a_push_moves_the_end_effector_as_the_cartesian_stiffness_says(frame: str) -> None:
+    arm = _arm(TcpPush(0.5, (0.0, 12.0, 0.0), 2.0))
+    soft = np.array([1000.0, 300.0, 1000.0, 100.0, 100.0, 100.0])
+    if frame == "turned":  # a quarter about the end-effector's own z: its x lies along the base's y
+        R = arm.body.end_effector(arm.report.q)[0][:3, :3]
+        arm.frames.EE_T_K = np.block([[R.T, np.zeros((3, 1))], [np.zeros((1, 3)), np.eye(1)]])
+    arm.cartesian_stiffness = soft
+    arm.begin(Generator.JOINT_VELOCITY, Controller.CARTESIAN_IMPEDANCE)
+    _still(arm, 450)
+    before = arm.body.end_effector(arm.report.q)[0][:3, 3]
+    _still(arm, 2000)
+    moved = arm.body.end_effector(arm.report.q)[0][:3, 3] - before
+    # 12 N on 300 N/m
+    assert moved[1] == pytest.approx(0.04, abs=0.004)
+    assert np.abs(moved[[0, 2]]).max() < 0.006
+
+
+def test_a_push_moves_the_joints_as_their_stiffness_says() -> None:
+    arm = _arm(TcpPush(0.5, (0.0, 12.0, 0.0), 2.0))
+    arm.plant.set_stiffness(np.full(7, 200.0))
+    arm.begin(Generator.JOINT_VELOCITY, Controller.JOINT_IMPEDANCE)
+    _still(arm, 450)
+    before = arm.report.q
+    _still(arm, 2000)
+    wanted = arm.body.end_effector(before)[1][:3].T @ [0.0, 12.0, 0.0] / 200.0
+    np.testing.assert_allclose(arm.report.q - before, wanted, atol=0.1 * np.abs(wanted).max())
+
+
+@given(st.floats(0.1, 10.0), st.floats(0.0, 5000.0))
+def test_a_mass_on_a_spring_is_damped_critically(mass: float, spring: float) -> None:
+    found = _critical(np.diag([mass, 1.0]), np.diag([spring, 0.0]))
+    np.testing.assert_allclose(found, np.diag([2.0 * np.sqrt(mass * spring), 0.0]), atol=1e-9 * max(1.0, spring))
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_each_mode_of_any_arm_is_damped_critically(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    A, B = rng.normal(size=(2, 7, 7))
+    M, K = A @ A.T + np.eye(7), B @ B.T
+    # critically damped: M s^2 + D s + K has each of its roots twice, so its eigenvalues are real
+    D = _critical(M, K)
+    state = np.block([[np.zeros((7, 7)), np.eye(7)], [-np.linalg.solve(M, K), -np.linalg.solve(M, D)]])
+    roots = np.linalg.eigvals(state)
+    assert np.abs(roots.imag).max() < 1e-4 * np.abs(roots).max()
+    assert roots.real.max() < 1e-6
+
+
+def test_a_load_that_is_announced_is_no_external_force() -> None:
+    found = {}
+    for announced in (0.0, 2.0):
+        arm = _arm(object=GripperObject(0.04, 2.0))
+        if announced:
+            arm.announce(Inertial(announced, np.array([0.0, 0.0, 0.1034]), 1e-5 * np.eye(3)))
+        arm.carry(replace(arm.gripper, width=0.04, grasped=True))
+        arm.contacts.behavior = replace(arm.contacts.behavior, steady=_raised(arm), accelerating=_raised(arm))
+        _settled(arm)
+        found[announced] = np.mean([arm.step(None) or arm.report.wrench[2] for _ in range(200)])
+    assert found[0.0] - found[2.0] == pytest.approx(-2.0 * 9.81, rel=0.03)
+    assert abs(found[2.0]) < 5.0
+
+
+def _raised(arm: ServedArm) -> Any:
+    steady = arm.contacts.behavior.steady
+    return replace(steady, upper_force=5.0 * steady.upper_force, upper_torque=5.0 * steady.upper_torque)
+
+
+def test_an_announced_load_is_forgotten_with_its_client() -> None:
+    arm = _arm()
+    before = arm.model.dynamics(arm.report.q, _ZERO).mass_matrix
+    arm.announce(Inertial(1.5, np.array([0.0, 0.02, 0.1]), np.diag([1e-3, 2e-3, 3e-3])))
+    assert arm.model.dynamics(arm.report.q, _ZERO).mass_matrix[0, 0] > before[0, 0] + 0.1
+    arm.forget_settings()
+    np.testing.assert_allclose(arm.model.dynamics(arm.report.q, _ZERO).mass_matrix, before, atol=1e-12)
+
+
+def test_the_load_is_where_the_client_says() -> None:
+    arm, load = _arm(), Inertial(1.5, np.array([0.03, 0.02, 0.1]), np.diag([1e-3, 2e-3, 4e-3]))
+    q, flange = arm.report.q, arm.frames.flange
+    before = arm.model.dynamics(q, _ZERO)
+    arm.announce(load)
+    after, kin = arm.model.dynamics(q, _ZERO), arm.model.kinematics(q)
+    R = kin.rotation[flange]
+    J = arm.model.jacobian(kin, flange, kin.position[flange] + R @ load.com)
+    added = 1.5 * J[:3].T @ J[:3] + J[3:].T @ R @ load.inertia @ R.T @ J[3:]
+    np.testing.assert_allclose(after.mass_matrix - before.mass_matrix, added, atol=1e-9)
+    np.testing.assert_allclose(after.gravity - before.gravity, 1.5 * 9.81 * J[2], atol=1e-9)
+
+
+def test_guided_by_hand_the_arm_gives_way_along_the_free_axes_alone() -> None:
+    arm = _arm(TcpPush(0.1, (0.0, 15.0, 15.0), 0.5))
+    arm.guiding_axes = np.array([False, True, False, False, False, False, True])
+    arm.press_guiding()
+    assert arm.mode is RobotMode.GUIDING
+    before = arm.body.end_effector(arm.report.q)[0][:3, 3]
+    _settled(arm)
+    moved = arm.body.end_effector(arm.report.q)[0][:3, 3] - before
+    # along the end-effector's y, which points along the base's -y; z is locked: 15 N on 3000 N/m
+    assert moved[1] > 0.1
+    assert np.abs(moved[[0, 2]]).max() < 0.02
+    arm.press_guiding(False)
+    assert arm.mode is RobotMode.IDLE
+    _settled(arm)
+    there = arm.report.q
+    _still(_tried(arm), 1)
+    np.testing.assert_allclose(arm.report.q, there, atol=1e-4)
+
+
+def test_the_buttons_do_nothing_in_a_motion_and_the_user_stop_ends_guiding() -> None:
+    arm = _tried(_arm())
+    arm.press_guiding()
+    assert arm.mode is RobotMode.MOVE
+    arm = _arm()
+    arm.press_guiding()
+    arm.press_stop()
+    assert arm.mode is RobotMode.USER_STOPPED
+    arm.press_guiding()
+    assert arm.mode is RobotMode.USER_STOPPED
+    arm.press_stop(False)
+    assert arm.mode is RobotMode.IDLE
+
+
+def test_while_it_is_guided_no_motion_begins(serve: Any, raw: Any, kind: RobotKind) -> None:
+    served = serve(kind)
+    served.arm.press_guiding()
+    client = raw(served)
+    assert client.request("SetGuidingMode", b"\1\0\0\0\0\0\1") == b"\0"
+    assert served.arm.guiding_axes.tolist() == [True, False, False, False, False, False, True]
+    assert client.begin() == "not possible"
+    assert client.state()["robot_mode"] == RobotMode.GUIDING
+
+
+@pytest.mark.parametrize(("name", "values", "possible"), [
+    ("SetJointImpedance", np.full(7, 14250.0), True),
+    ("SetJointImpedance", np.full(7, 14251.0), False),
+    ("SetJointImpedance", -np.ones(7), False),
+    ("SetCartesianImpedance", np.array([10.0, 10, 10, 1, 1, 1]), True),
+    ("SetCartesianImpedance", np.array([10.0, 10, 9, 1, 1, 1]), False),
+    ("SetCartesianImpedance", np.array([10.0, 10, 10, 1, 1, 301]), False),
+])  # fmt: skip
+def test_impedances_within_the_vendors_limits_act(
+    serve: Any, raw: Any, name: str, values: np.ndarray, possible: bool
+) -> None:
+    served = serve("panda")
+    before = served.arm.plant.stiffness.copy(), served.arm.cartesian_stiffness
+    assert raw(served).request(name, values.tobytes()) == (b"\0" if possible else b"\2")
+    now = served.arm.plant.stiffness, served.arm.cartesian_stiffness
+    which = name == "SetCartesianImpedance"
+    np.testing.assert_array_equal(now[which], values if possible else before[which])
+    served.arm.forget_settings()
+    np.testing.assert_array_equal(served.arm.plant.stiffness, before[0])
+
+
+def test_an_arm_that_comes_into_itself_stops() -> None:
+    arm = _arm()
+    arm.begin(Generator.JOINT_POSITION, Controller.JOINT_IMPEDANCE)
+    begun, folded = arm.report.q_commanded.copy(), np.array([0.0, 1.2, 0.0, -3.0, 0.0, 0.1, 0.785])
+    k, ending = 0, None
+    while ending is None:
+        k += 1
+        share = k / 2000 - np.sin(2 * np.pi * k / 2000) / (2 * np.pi)
+        ending = arm.step(Setpoint(begun + share * (folded - begun)))
+    assert ending == Ending("reflex", ("self_collision_avoidance_violation",))
+    assert k < 2000
+    _settled(arm)
+    # back where it came from it may go
+    arm.recover()
+    arm.begin(Generator.JOINT_POSITION, Controller.JOINT_IMPEDANCE)
+    stopped = arm.report.q_commanded.copy()
+    for k in range(2000):
+        share = k / 2000 - np.sin(2 * np.pi * k / 2000) / (2 * np.pi)
+        assert arm.step(Setpoint(stopped + share * (begun - stopped))) is None, arm.errors

@@ -1,1 +1,0 @@
-"""The simulated arm as a server of the Franka Control Interface."""

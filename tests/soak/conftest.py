@@ -1,6 +1,0 @@
-"""The soak moves a served Franka through the vendor's library."""
-
-from pretouch.extras import FRANKA
-from tests.needs import modules_with
-
-pytest_pycollect_makemodule = modules_with(FRANKA)
