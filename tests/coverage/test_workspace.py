@@ -36,9 +36,7 @@ def test_the_hand_is_on_the_path_all_along_it(panda_model):
     np.testing.assert_allclose(along, np.cross([1.0, 0.0, 0.0], out) / 0.25, atol=1e-4)
 
 
-def test_a_box_and_the_whole_range_of_the_joints(panda_model):
-    hand = hands(panda_model, drawn(panda_model, "0.5,0.2,0.4,0.3,-0.2,0.5"))
-    assert np.all((hand > [0.3 - 1e-5, -0.2 - 1e-5, 0.4 - 1e-5]) & (hand < [0.5 + 1e-5, 0.2 + 1e-5, 0.5 + 1e-5]))
+def test_the_whole_range_of_the_joints(panda_model):
     q = drawn(panda_model, "joints")
     assert np.all((q >= panda_model.q_min) & (q <= panda_model.q_max))
     gaps = self_distances(panda_model, capsule_ends(panda_model, kinematics_of(panda_model, q)))
@@ -48,9 +46,7 @@ def test_a_box_and_the_whole_range_of_the_joints(panda_model):
 @pytest.mark.parametrize(
     ("workspace", "count", "said"),
     [
-        ("square", 4, "The workspace is 'square': give circle, line, paths, joints, or opposite corners"),
-        ("0,0,0,1,1", 4, "or opposite corners"),
-        ("2,0,0,3,1,1", 2, "reaches less than half of the box"),
+        ("square", 4, "The workspace is 'square': give circle, line, paths, joints"),
         ("circle", 1, "The number of postures is 1: give at least 2"),
     ],
 )

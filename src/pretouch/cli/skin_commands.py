@@ -18,8 +18,7 @@ class Coverage:
     arm: str = "panda"
     """panda, fr3, a name that another package adds, or the folder of an imported arm."""
     workspace: str = "paths"
-    """Postures to average over: circle, line, paths (both of the paper's), joints (their whole range), or opposite
-    corners x,y,z,x,y,z of a box of hand positions [m]."""
+    """Postures to average over: circle, line, paths (both of the paper's), or joints (their whole range)."""
     speed: float = 0.5
     """Speed of the approaching object [m/s]."""
     arm_speed: float = 0.3
@@ -45,14 +44,9 @@ class Coverage:
     seed: int = 0
     """Seed of the random postures and paths: the same seed gives the same numbers."""
     suggest: int = 0
-    """Number of additional units to place where they help most; 0: none, or as many as --usd and --bytes allow."""
-    usd: float = 0.0
-    """Most that additional units may cost [USD], by the price_usd of their type; 0: no bound."""
-    bytes: float = 0.0
-    """Most that additional units may send in a second [B/s], without IMU; 0: no bound."""
+    """Number of additional units to place where they help most."""
     sensor: str = "vl53l1x"
-    """Types of sensor to choose from for additional units, separated by commas: vl53l1x, vl53l5cx, vl53l7cx,
-    capacitive, or what the skin file describes."""
+    """Type of sensor of additional units: vl53l1x, vl53l5cx, vl53l7cx, capacitive, or what the skin file describes."""
     out: str = ""
     """Skin file to write, with --suggest: the existing units and the new ones."""
     figure: str = ""

@@ -9,10 +9,8 @@ from rich.console import Console
 from pretouch.cli.calibrate.outputs import check_free, same_file
 from pretouch.cli.skin_coverage_tables import link_table, spot_lines, suggestion_table, unit_table
 from pretouch.cli.tables import show
-from pretouch.cli.words import words
 from pretouch.cli.writing import STANDARD_OUTPUT, check_writable, numbers_to, unwritable_said
 from pretouch.coverage.blind import BlindSpot, blind_spots
-from pretouch.coverage.budget import Budget
 from pretouch.coverage.measure import Coverage, Share, covered
 from pretouch.coverage.measuring import Both, Setting, coverage_of
 from pretouch.coverage.params import CoverageParams
@@ -59,12 +57,10 @@ def _measured(command: "Asked", model: RobotModel, skin: Skin) -> dict[str, Any]
         console.print(line, markup=False, soft_wrap=True)
     numbers = _numbers(command, setting, both, spots)
     shown, new = skin, frozenset[str]()
-    budget = _budget(command)
-    if budget:
+    if command.suggest:
         own = {unit.sensor.label: unit.sensor for unit in skin.mounted}
-        sensors = [sensor_called(name, "--sensor", own) for name in words(command.sensor) or (command.sensor,)]
-        places = tuple(unit for sensor in sensors for unit in candidates(ways, skin, sensor))
-        suggested = suggest((ways, met), skin, budget, places)
+        places = candidates(ways, skin, sensor_called(command.sensor, "--sensor", own))
+        suggested = suggest((ways, met), skin, command.suggest, places)
         shown, new = Skin((*skin.units, *suggested.units), model), frozenset(unit.id for unit in suggested.units)
         found, numbers["suggested"] = _suggested(console, setting, skin, shown, suggested)
         if command.out:
@@ -74,12 +70,6 @@ def _measured(command: "Asked", model: RobotModel, skin: Skin) -> dict[str, Any]
         _draw(command.figure, ways if not new else setting.ways(1), found, shown, new)
         console.print(f"Figure: {command.figure}", markup=False, soft_wrap=True)
     return numbers
-
-
-def _budget(command: "Asked") -> Budget | None:
-    """Return what more units may take; None where none are asked for."""
-    bounds = command.suggest or None, command.usd or None, command.bytes or None
-    return Budget(*bounds) if any(bounds) else None
 
 
 def _arm_and_skin(command: "Asked") -> tuple[RobotModel, Skin, Path]:
@@ -101,9 +91,9 @@ def _check_outputs(command: "Asked", source: Path) -> None:
     """Refuse, before anything is computed, what could not be done or would be lost."""
     if command.suggest < 0:
         raise SkinError(f"--suggest is {command.suggest}: give 1 or more, or leave it out.")
-    if command.out and not _budget(command):
+    if command.out and not command.suggest:
         raise SkinError(
-            f"--out {command.out} writes the skin with the suggested units: give their number with --suggest, or --usd."
+            f"--out {command.out} writes the skin with the suggested units: give their number with --suggest."
         )
     if command.seed < 0:
         raise ParameterError(f"The seed is {command.seed}: give 0 or more.")

@@ -3,7 +3,6 @@
 import numpy as np
 
 from pretouch.coverage.blind import BLIND, BlindSpot
-from pretouch.coverage.budget import sent
 from pretouch.coverage.measure import Share
 from pretouch.coverage.measuring import Both, Setting
 from pretouch.coverage.suggest import Suggestions
@@ -69,16 +68,13 @@ def suggestion_table(suggested: Suggestions, before: Both, after: Both) -> TextT
         ("beam", lambda one: _vector(one.unit.T_link_sensor[:3, 2], 2)),
         ("gain\n[%]", lambda one: f"{100 * one.gain:.2f}"),
     )
-    price, sends = (sum(of(one.unit.sensor) for one in suggested.chosen) for of in (lambda s: s.price_usd, sent))
     return tabulated(
-        f"{len(suggested.chosen)} more units: {was[0]} before, {now[0]} after; met {was[1]} and {now[1]};"
-        f" {price:.0f} USD, {sends / 1000:.1f} kB/s",
+        f"{len(suggested.chosen)} more units: {was[0]} before, {now[0]} after; met {was[1]} and {now[1]}",
         columns,
         suggested.chosen,
-        f"Chosen one by one from {suggested.candidates} positions, each that which adds most, for what it costs, to"
-        " what comes at the arm and to what it meets, which count the same. Gains are measured on the paths used for"
-        f" choosing, before and after on others. No choice within the budget could add more than"
-        f" {100 * suggested.most:.1f} %.",
+        f"Chosen one by one from {suggested.candidates} positions, each that which adds most to what comes at"
+        " the arm and to what it meets, which count the same. Gains are measured on the paths used for choosing, before"
+        f" and after on others. No choice of as many could add more than {100 * suggested.most:.1f} %.",
     )
 
 

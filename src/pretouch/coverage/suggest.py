@@ -1,8 +1,7 @@
-"""Where more units help most: one after the other, each where it adds most to what is seen in time for what it costs.
+"""Where more units help most: one after the other, each where it adds most to what is seen in time.
 
 What a set of units sees grows with each unit, and by less the more there are (it is submodular), so N units chosen this
-way see at least 1 - 1/e, 63 %, of what the best N of the same places could add (Nemhauser, Wolsey and Fisher 1978). A
-choice by gain over cost has no such bound; what it can have missed is said all the same.
+way see at least 1 - 1/e, 63 %, of what the best N of the same places could add (Nemhauser, Wolsey and Fisher 1978).
 """
 
 from collections.abc import Sequence
@@ -11,7 +10,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pretouch.control.braking import tangents_of
-from pretouch.coverage.budget import Budget
 from pretouch.coverage.surface import surface_of
 from pretouch.coverage.ways import Ways, seen_by
 from pretouch.errors import SkinError
@@ -22,7 +20,7 @@ from pretouch.robot.model import RobotModel
 from pretouch.sensing.sensor import PAPER_SENSOR, Sensor, cones_of
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit
-from pretouch.types import BoolArray, FloatArray, IntArray
+from pretouch.types import BoolArray, FloatArray
 
 HEIGHT_M = 0.008
 """Height of a range finder above the surface [m]."""
@@ -47,8 +45,8 @@ class Suggestions:
 
     chosen: tuple[Suggestion, ...]
     most: float
-    """No choice of these places within the budget can raise the share by more: the least of (1) what the chosen ones
-    add by 1 - 1/e, where all cost the same, (2) what they add and the most that the gains left could, by each bound."""
+    """No choice of as many of these places can raise the share by more: the lesser of (1) what the chosen ones add by
+    1 - 1/e, (2) what they add and the largest gains that are left."""
     candidates: int
 
     @property
@@ -80,38 +78,28 @@ def candidates(ways: Ways, skin: Skin, sensor: Sensor = PAPER_SENSOR) -> tuple[S
     )
 
 
-def suggest(
-    ways: Sequence[Ways], skin: Skin, budget: Budget, places: tuple[SensorUnit, ...] | None = None
-) -> Suggestions:
-    """Choose places for more units within a budget, by one or more sets of ways, each of which counts the same.
+def suggest(ways: Sequence[Ways], skin: Skin, count: int, places: tuple[SensorUnit, ...] | None = None) -> Suggestions:
+    """Choose places for `count` more units, by one or more sets of ways, each of which counts the same.
 
-    Of places with the same id, as one has for several types of sensor, one is chosen. Raises SkinError for more units
-    than there are places, and for a budget too small for any.
+    Raises SkinError for more units than there are places.
     """
     places = candidates(ways[0], skin) if places is None else places
-    names = [unit.id for unit in places]
-    count, at = len(set(names)), np.unique(names, return_inverse=True)[1]
-    if budget.units is not None and budget.units > count:
+    if not 1 <= count <= len(places):
         raise SkinError(
-            f"{budget.units} more units were requested, but only {count} positions were found: request 1 to {count}."
+            f"{count} more units were requested, but {len(places)} positions were found: request 1 to {len(places)}."
         )
-    cost = budget.shares([unit.sensor for unit in places])
-    if not (cost.max(axis=1) <= 1.0).any():
-        raise SkinError(f"The budget is too small for a single unit: {100 * cost.max(axis=1).min():.0f} % of it.")
     weight = np.concatenate([some.share.ravel() for some in ways]) / len(ways)
     by_skin = _seen(ways, skin).any(axis=0)
     # each place alone: together they may be more zones than a skin has
     by_place = np.concatenate([_seen(ways, Skin([place], ways[0].model)) for place in places])
-    order, gains, left = greedy(by_place, np.where(by_skin, 0.0, weight), cost, at)
+    order, gains, left = greedy(by_place, np.where(by_skin, 0.0, weight), count)
     ids = _free_ids(skin, len(order))
     chosen = tuple(
         Suggestion(replace(places[i], id=name), gain) for name, i, gain in zip(ids, order, gains, strict=True)
     )
     added = sum(gains)
-    most = min(added + left, float(weight[~by_skin].sum()))
-    if np.ptp(cost, axis=0).max() == 0.0 and len(set(names)) == len(names):
-        most = min(most, added / (1 - 1 / np.e))
-    return Suggestions(chosen, float(most), count)
+    most = min(added + left, float(weight[~by_skin].sum()), added / (1 - 1 / np.e))
+    return Suggestions(chosen, float(most), len(places))
 
 
 def _seen(ways: Sequence[Ways], skin: Skin) -> BoolArray:
@@ -119,43 +107,22 @@ def _seen(ways: Sequence[Ways], skin: Skin) -> BoolArray:
     return np.hstack([seen_by(some, skin).reshape(len(skin.first), -1) for some in ways])
 
 
-def greedy(
-    sees: BoolArray, weight: FloatArray, cost: FloatArray, place: IntArray
-) -> tuple[list[int], list[float], float]:
-    """Choose of C sets (C, W) of weighted elements (W,), each that which adds most to those before for its cost.
-
-    Args:
-        sees: the sets.
-        weight: of the elements.
-        cost: (C, B) part of each of B bounds that each takes.
-        place: (C,) of each; one is chosen of a place.
+def greedy(sees: BoolArray, weight: FloatArray, count: int) -> tuple[list[int], list[float], float]:
+    """Choose `count` of C sets (C, W) of weighted elements (W,), each that which adds most to those before.
 
     Returns:
-        Their indices, what each added, and a bound on what any choice within the bounds could add to them.
+        Their indices, what each added, and a bound on what any other `count` could add to them. Sets that add nothing
+        are not chosen.
     """
     rest, order, gains = weight.copy(), list[int](), list[float]()
-    spent, free = np.zeros(cost.shape[1]), np.ones(len(sees), np.bool_)
-    while True:
-        gain = sees @ rest
-        fits = free & np.all(spent + cost <= 1.0 + 1e-9, axis=1)
-        if not fits.any():
-            break
-        best = int(np.where(fits, gain / cost.max(axis=1), -1.0).argmax())
-        if gain[best] <= 0.0:
-            break
+    gain = sees @ rest
+    while len(order) < count and gain.max() > 0.0:
+        best = int(gain.argmax())
         order.append(best)
         gains.append(float(gain[best]))
         rest[sees[best]] = 0.0
-        spent += cost[best]
-        free &= place != place[best]
-    return order, gains, min(_filled(gain, one) for one in cost.T)
-
-
-def _filled(gain: FloatArray, cost: FloatArray) -> float:
-    """Most that gains (C,) can add up to within one bound, of which each takes a part (C,): the last one in part."""
-    order = np.argsort(-gain / cost)
-    share = np.diff(np.minimum(np.cumsum(cost[order]), 1.0), prepend=0.0) / cost[order]
-    return float((share * gain[order]).sum())
+        gain = sees @ rest
+    return order, gains, float(np.sort(gain)[-count:].sum())
 
 
 def _looking(point: FloatArray, normal: FloatArray) -> FloatArray:

@@ -1,4 +1,4 @@
-"""The postures that coverage is averaged over: on the paper's paths, in a box, or in the joints' whole range."""
+"""The postures that coverage is averaged over: on the paper's paths, or in the joints' whole range."""
 
 from dataclasses import dataclass
 
@@ -34,21 +34,20 @@ def postures(model: RobotModel, room: Fixtures, workspace: str, count: int, rng:
     """Draw `count` postures of a workspace.
 
     `circle` and `line` are the paper's, `paths` both, the hand upright; `joints` is the whole range of the joints,
-    where the arm is clear of itself and of the room; six numbers with commas are opposite corners of a box of hand
-    positions [m], the hand upright. Raises ExperimentError for anything else, and where the arm cannot be.
+    where the arm is clear of itself and of the room. Raises ExperimentError for anything else, and where the arm cannot
+    be.
     """
     if count < 2:
         raise ExperimentError(f"The number of postures is {count}: give at least 2.")
     if workspace == "joints":
         return Postures(_anywhere(model, room, count, rng))
-    if workspace in KINDS:
-        place = placement_for(model)
-        names = ("circle", "line") if workspace == "paths" else (workspace,)
-        parts = np.array_split((np.arange(count) + rng.uniform(size=count)) / count, len(names))
-        found = [_along(model, place, name, part * len(names) % 1.0) for name, part in zip(names, parts, strict=True)]
-        return Postures(np.vstack([q for q, _ in found]), np.vstack([along for _, along in found]))
-    low, high = _corners(workspace)
-    return Postures(_in_box(model, low, high, count, rng))
+    if workspace not in KINDS:
+        raise ExperimentError(f"The workspace is {workspace!r}: give {', '.join(KINDS)}.")
+    place = placement_for(model)
+    names = ("circle", "line") if workspace == "paths" else (workspace,)
+    parts = np.array_split((np.arange(count) + rng.uniform(size=count)) / count, len(names))
+    found = [_along(model, place, name, part * len(names) % 1.0) for name, part in zip(names, parts, strict=True)]
+    return Postures(np.vstack([q for q, _ in found]), np.vstack([along for _, along in found]))
 
 
 def _along(model: RobotModel, place: Placement, name: str, parts: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -56,35 +55,6 @@ def _along(model: RobotModel, place: Placement, name: str, parts: FloatArray) ->
     phases = parts * path.length
     q = np.array([brought_to(model, path.point(phase)) for phase in phases])
     return q, np.array([path.tangent(phase) for phase in phases])
-
-
-def _corners(text: str) -> tuple[FloatArray, FloatArray]:
-    try:
-        numbers = np.array([float(part) for part in text.split(",")])
-    except ValueError:
-        numbers = np.zeros(0)
-    if len(numbers) != 6 or not np.isfinite(numbers).all():
-        raise ExperimentError(
-            f"The workspace is {text!r}: give {', '.join(KINDS)}, or opposite corners of a box of hand positions as"
-            " x,y,z,x,y,z in metres."
-        )
-    ends = numbers.reshape(2, 3)
-    return ends.min(axis=0), ends.max(axis=0)
-
-
-def _in_box(model: RobotModel, low: FloatArray, high: FloatArray, count: int, rng: np.random.Generator) -> FloatArray:
-    found: list[FloatArray] = []
-    for _ in range(2 * count):
-        try:
-            found.append(brought_to(model, rng.uniform(low, high)))
-        except ExperimentError:
-            continue
-        if len(found) == count:
-            return np.array(found)
-    raise ExperimentError(
-        f"The hand, upright as in q_ready, reaches less than half of the box from {low.tolist()} to {high.tolist()}:"
-        " give a smaller one."
-    )
 
 
 def _anywhere(model: RobotModel, room: Fixtures, count: int, rng: np.random.Generator) -> FloatArray:

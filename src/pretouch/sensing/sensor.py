@@ -50,8 +50,6 @@ class Sensor(Part, group="pretouch.sensors"):
     """Readings in a second, at most [Hz]."""
     noise: Positive = 1.0
     """Times the noise of the VL53L1X in the simulation."""
-    price_usd: Positive = 37.0
-    """About what the parts of a whole unit cost [USD] (docs/reference/bill-of-materials.md), for a choice of units."""
     own_name: str = ""
     """What a skin file calls it, where it is of a type of that file's own."""
 
@@ -134,7 +132,6 @@ class VL53L5CX(Sensor, name="vl53l5cx"):
     nearest_m: Positive = 0.02
     rate_hz: Positive = 60.0
     noise: Positive = 2.0
-    price_usd: Positive = 45.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -174,7 +171,6 @@ class Capacitive(Sensor, name="capacitive"):
     nearest_m: Positive = 0.005
     farthest_m: Positive = 0.18
     rate_hz: Positive = 60.0
-    price_usd: Positive = 20.0
     gain: Positive = 1.84e-4
     """Signal at a distance of 1 m less the offset [1]."""
     offset_m: Positive = 0.036

@@ -8,7 +8,6 @@ from itertools import product
 import numpy as np
 
 from pretouch.control.path import Circle
-from pretouch.coverage.budget import Budget
 from pretouch.coverage.measure import covered
 from pretouch.coverage.measuring import POINTS, Setting
 from pretouch.coverage.params import CoverageParams
@@ -66,7 +65,7 @@ def _prepared(model: RobotModel, skin: Skin) -> tuple[Ways, tuple[SensorUnit, ..
     setting = Setting(model, fixtures(SceneSpec()), CoverageParams(), "circle", _POSTURES)
     ways = setting.ways()
     places = candidates(ways, skin)
-    return setting.ways(1), places, suggest((ways,), skin, Budget(units=MORE), places).units
+    return setting.ways(1), places, suggest((ways,), skin, MORE, places).units
 
 
 def skin_of(kind: str, model: RobotModel, skin: Skin, seed: int) -> Skin:
