@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-import msgspec
 import numpy as np
 
 from pretouch.errors import PretouchError
@@ -29,7 +28,6 @@ from pretouch.robot.residual_file import Residual, load_residual, save_residual
 from pretouch.sensing.skin import load_skin, paper_skin, skin_file
 from pretouch.sim.randomisation import FOLDER, world_set
 from pretouch.types import RangeStatus
-from pretouch.viewer.door import Refused, _understood
 from pretouch_lab.sweep.definition import load_sweeps
 from pretouch_lab.sweep.registry import measure
 from pretouch_lab.sweep.store import Store
@@ -41,7 +39,6 @@ from tests.imported_data.joint_files import Moving
 from tests.importing.made import six_axis
 from tests.recording.runs import controller_of, recorded_run
 from tests.recording.test_skin_recording import record
-from tests.viewer.visitor import CAMERA
 
 Read = Callable[[bytes], object]
 
@@ -82,7 +79,6 @@ def parsers(folder: Path) -> Iterator[dict[str, Parser]]:
         "profile": Parser(
             [b"pretouch:detect.memory_s=100:react.reach_m=0.2"], lambda data: profile(data.decode(errors="replace"))
         ),
-        "page": Parser([msgspec.msgpack.encode(CAMERA), *crashers.PAGE], _understood, (Refused,)),
         "worker": _of_workers(folder),
     }
     with Bench() as bench:

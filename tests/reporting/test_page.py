@@ -1,10 +1,11 @@
 import re
-from dataclasses import fields, replace
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
 import pytest
 
+from pretouch.composition import describe
 from pretouch.modes import Event
 from pretouch.profiles import PROFILES, profile
 from pretouch.reporting.html import bad, number, percent, table
@@ -17,7 +18,6 @@ from pretouch.reporting.sections.setting import parameter_section, setting_secti
 from pretouch.reporting.summary import summary
 from pretouch.sensing.skin import Skin
 from pretouch.types import Mode
-from pretouch.viewer.parameters import field_docs, groups_of
 from tests.reporting import made
 
 
@@ -257,13 +257,14 @@ def test_directions_and_units_are_named():
 
 def test_units_of_all_parameters_are_those_that_their_documentation_gives():
     wrong, found = {}, 0
-    for params in (*groups_of(PROFILES["paper"]), *groups_of(PROFILES["pretouch"])):
-        for item in fields(params):
-            told = re.findall(r"\[([^\]]*)\]", field_docs().get((type(params).__name__, item.name), ""))
-            if told and told[0] != "1":
-                found += 1
-                if unit_of(item.name) not in told[0].replace("^2", "²").split(", "):
-                    wrong[item.name] = told[0], unit_of(item.name)
+    for line in (*describe(PROFILES["paper"]).splitlines(), *describe(PROFILES["pretouch"]).splitlines()):
+        path, _, text = line.partition(" = ")
+        name, told = path.rpartition(".")[2], re.findall(r"\[([^\]]*)\]", text)
+        assert ": " in text, f"{path} has no documentation"
+        if told and told[0] != "1":
+            found += 1
+            if unit_of(name) not in told[0].replace("^2", "²").split(", "):
+                wrong[name] = told[0], unit_of(name)
     assert found > 60
     assert wrong == {}
 

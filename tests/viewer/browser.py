@@ -109,10 +109,6 @@ class Visitor:
         assert box is not None
         return {key: float(value) for key, value in box.items()}
 
-    def top(self, name: str) -> float:
-        """Where a line of the status begins, from the top of the window [px]."""
-        return float(self.page.evaluate("name => document.getElementById(name).getBoundingClientRect().top", name))
-
     def wait_for(self, name: str, contained: str) -> None:
         """Wait until a line of the status holds some words; fails with all that the status says instead."""
         try:
@@ -150,10 +146,11 @@ class Visitor:
         field.press("Enter")
         field.blur()
 
-    def type_slowly(self, label: str, text: str, delay: float = 0.3) -> None:
-        """Type over what a field holds, key by key as a person does, with a delay [s] after each."""
+    def enter(self, label: str, text: str) -> None:
+        """Type over what a field holds, key by key as a person does, and press Enter."""
         self.field(label).select_text()
-        self.field(label).press_sequentially(text, delay=1000 * delay)
+        self.field(label).press_sequentially(text, delay=20)
+        self.field(label).press("Enter")
 
     def value(self, label: str) -> str:
         return str(self.field(label).input_value())

@@ -1,4 +1,4 @@
-"""Driving the arm from a page: what a visitor says comes through the door, and ends when he leaves or lets go."""
+"""Driving the arm from a page: what a visitor asks is done while that visitor is there and commands."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,14 +15,11 @@ from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify
 from pretouch.types import FloatArray, Mode
 from pretouch.viewer.asked import asked_in
-from pretouch.viewer.drive import TASKS
+from pretouch.viewer.drive import REACH_M, TASKS, Steering
 from pretouch.viewer.live import LivePage
 from pretouch.viewer.replay import frame_of, world_of
 from pretouch.viewer.server import ServeOptions, served
 from pretouch.viewer.simulation import LiveSimulation
-
-AHEAD = np.array([-2.0, -1.0, 0.0]) / np.sqrt(5.0)
-"""Where the tests' visitors look, on the level."""
 
 
 @pytest.fixture
@@ -53,10 +50,6 @@ def do(page: LivePage, visitor: Visitor, handle: Any, value: object) -> None:
     visitor.set(handle, value)
     visitor.settle()
     turns(page, 1)
-
-
-def keys(page: LivePage, visitor: Visitor, said: str) -> None:
-    do(page, visitor, control(page, "Keys"), said)
 
 
 def aim(page: LivePage, visitor: Visitor, position: FloatArray, wxyz: tuple[float, ...] = (0.0, 1.0, 0.0, 0.0)) -> None:
@@ -92,28 +85,6 @@ def test_the_arm_stands_where_it_was_until_somebody_drives(page: LivePage, drive
     assert page._simulation.frame.inputs.desired is None  # type: ignore[union-attr]
     assert np.linalg.norm(hand(page) - before) > 0.1
     assert not page.drive._target.visible
-
-
-def test_keys_move_the_hand_the_way_somebody_looks_and_released_it_rests(page: LivePage, driver: Visitor) -> None:
-    before = hand(page)
-    for number in range(10):
-        keys(page, driver, f"100 0 0 {number}")
-        turns(page, 3)
-    way = hand(page) - before
-    assert way @ AHEAD > 0.15
-    assert np.linalg.norm(way - (way @ AHEAD) * AHEAD) < 0.03
-    keys(page, driver, "0 0 0 11")
-    turns(page, 15)
-    assert speed(page) < 0.02
-    assert page._simulation.frame.step.mode is Mode.TRACK
-
-
-def test_keys_that_are_no_longer_heard_of_count_no_longer(page: LivePage, driver: Visitor) -> None:
-    keys(page, driver, "0 100 0 1")
-    turns(page, 7)
-    assert speed(page) > 0.1
-    turns(page, 20)
-    assert speed(page) < 0.02
 
 
 def test_the_hand_goes_to_a_target_that_is_dragged_and_stays(page: LivePage, driver: Visitor) -> None:
@@ -164,33 +135,16 @@ def test_who_does_not_command_drives_nothing_and_is_shown_again_where_the_target
     page, options = place
     before = page.drive._target.position
     with Visitor(page._server, options) as other:
-        other.heard("SetPositionMessage", name="/target")  # as all are shown it who come
         aim(page, other, np.array([0.3, 0.3, 0.3]))
-        np.testing.assert_allclose(other.heard("SetPositionMessage", name="/target")["position"], before)
-        keys(page, other, "100 0 0 1")
+        assert page.drive.steering.goal is None
+        aim(page, driver, before)
+        aim(page, other, np.array([0.3, 0.3, 0.3]))
+        np.testing.assert_allclose(page.drive._target.position, before)
+        do(page, other, control(page, "Task"), TASKS[0])
+        assert control(page, "Task").value == TASKS[1]
     turns(page, 5)
-    assert page.drive.steering.goal is None
+    np.testing.assert_allclose(page.drive.steering.goal[:3, 3], before)  # type: ignore[index]
     assert speed(page) < 0.01
-
-
-@pytest.mark.parametrize("said", ["100 0 0", "1e9 0 0 1", "nan 0 0 1", "abc"])
-def test_keys_that_no_page_says_are_named_and_move_nothing(page: LivePage, driver: Visitor, said: str) -> None:
-    keys(page, driver, said)
-    assert page.notice.startswith(f"Not done: The keys say {said!r}: ")
-    turns(page, 5)
-    assert speed(page) < 0.01
-
-
-def test_a_page_that_is_not_driven_hears_no_keys_and_no_target(
-    place: tuple[LivePage, ServeOptions],
-) -> None:
-    page, options = place
-    with Visitor(page._server, options) as somebody:
-        keys(page, somebody, "100 0 0 1")
-        assert "Keys cannot be changed now" in somebody.heard("NotificationShowMessage")["props"]["body"]
-        aim(page, somebody, np.array([0.3, 0.3, 0.3]))
-        turns(page, 3)
-    assert page._simulation.frame.inputs.desired is None  # type: ignore[union-attr]
 
 
 def test_a_reset_has_a_driven_arm_stand_at_its_beginning(page: LivePage, driver: Visitor) -> None:
@@ -211,8 +165,7 @@ def test_a_drive_at_the_person_is_recorded_shown_again_and_replayed_to_the_bit(
     simulation.move_hand(start + np.array([0.0, 0.4, 0.05]))
     turns(page, 60)
     simulation.start_recording(tmp_path / "drive.mcap")
-    for number in range(5):
-        keys(page, driver, f"0 0 50 {number}")
+    turns(page, 5)
     aim(page, driver, simulation.hand_target)
     turns(page, 90)
     simulation.stop_recording()
@@ -228,3 +181,26 @@ def test_a_drive_at_the_person_is_recorded_shown_again_and_replayed_to_the_bit(
     limits = [kept.step.limited for kept in recorded]
     assert {simulation.skin.ids[limit.unit] for limit in limits if limit.unit >= 0} >= {"hand_left"}
     assert max(np.linalg.norm(kept.truth.force, axis=1).max() for kept in recorded) < 30.0
+
+
+def test_a_target_counts_until_another_is_asked_and_lies_within_reach() -> None:
+    steering = Steering()
+    steering.held = True
+    assert steering(0.5).kind is DesiredKind.TWIST
+    assert not steering(0.5).number.any()
+    turned = np.diag([1.0, -1.0, -1.0])
+    steering.target(np.array([0.5, -9.0, 0.3]), turned)
+    for now in (1.0, 100.0):
+        asked = steering(now)
+        assert (asked.kind, asked.stamp.tolist()) == (DesiredKind.POSE, [now])
+        assert asked.number[0].tolist() == [0.5, -REACH_M, 0.3, *turned.ravel()]
+
+
+def test_what_is_asked_ages_while_who_asked_it_is_away() -> None:
+    steering = Steering()
+    steering.held = True
+    steering(2.0)
+    steering.held = False
+    assert [float(steering(now).stamp[0]) for now in (2.5, 9.0)] == [2.0, 2.0]
+    assert float(steering(0.3).stamp[0]) == 0.3  # after a reset it is of now at most, and ages from there
+    assert float(steering(0.4).stamp[0]) == 0.3

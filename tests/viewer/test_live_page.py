@@ -12,15 +12,15 @@ from tests.ports import free_port
 from tests.viewer.browser import seen_at
 from tests.viewer.sessions import set_speed
 
-from pretouch.profiles import PROFILES
+from pretouch.profiles import PROFILES, profile
 from pretouch.recording.reader import open_recording
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import LIVE_SKIN, load_skin
 from pretouch.types import Mode
-from pretouch.viewer.controls import toggle_recording
+from pretouch.viewer.controls import toggle_recording, with_name
 from pretouch.viewer.drive import TASKS
-from pretouch.viewer.gui import PANEL_PX, SETTLE_S, TYPED_S
+from pretouch.viewer.gui import PANEL_PX, SETTLE_S
 from pretouch.viewer.live import PERIOD_S, LivePage
 from pretouch.viewer.room import Faults, LiveSettings
 from pretouch.viewer.scene import CAMERA_FROM
@@ -52,6 +52,15 @@ def give(page: LivePage, label: str, value: object) -> None:
     control._impl.value = value
     for told in control._impl.update_cb:
         asyncio.run(told(SimpleNamespace(client_id=0, client=None, target=control)))
+
+
+def submit(page: LivePage, text: str) -> None:
+    """Type a profile as somebody at the page does, and press Enter."""
+    field = handle(page, "Profile text")
+    field._impl.value = text
+    form = page._server.gui._container_handle_from_uuid[field._impl.parent_container_id]
+    for told in form._submit_cb:
+        asyncio.run(told(SimpleNamespace(client_id=0)))
 
 
 def click(page: LivePage, label: str) -> None:
@@ -164,38 +173,47 @@ def test_a_folder_for_recordings_that_cannot_be_made_is_said(
 
 
 def test_a_number_counts_when_nobody_types_any_more(clock: Clock, simulation: LiveSimulation) -> None:
-    for typed in ("", "0", "0.", "0.0", "0.05"):
-        give(clock.page, "d_crit [m]", typed)
-        clock.page.ask(lambda: simulation.move_hand(np.array([1.0, 0.3, 0.3])), "hand", quiet=True)
+    for typed in (0.1, 0.5, 0.2):
+        give(clock.page, "Path speed [m/s]", typed)
         clock.turn(0.7)
-        assert handle(clock.page, "d_crit [m]").value == typed
-        assert simulation.world.profile.approach.d_crit_m == 0.1
+        assert simulation.world.profile.task.speed_m_s == 0.3
     clock.turn(SETTLE_S)
-    assert simulation.world.profile.approach.d_crit_m == 0.05
-    assert clock.page.notice == ""
+    assert simulation.world.profile.name == handle(clock.page, "Profile text").value == "paper:task.speed_m_s=0.2"
+
+
+def test_a_profile_is_typed_as_on_the_command_line(clock: Clock, simulation: LiveSimulation) -> None:
+    assert handle(clock.page, "Profile text").value == "paper"
+    submit(clock.page, " pretouch:task.speed_m_s=0.2 ")
+    clock.turn(0.1)
+    assert simulation.world.profile == profile("pretouch:task.speed_m_s=0.2")
+    shown = {"Profile": "pretouch", "Path speed [m/s]": 0.2, "Profile text": "pretouch:task.speed_m_s=0.2"}
+    assert {label: handle(clock.page, label).value for label in shown} == shown
 
 
 @pytest.mark.parametrize(
-    ("typed", "said"),
-    [("", ""), ("2.5", "Not done: task.restore_cycles is '2.5': write a whole number."),
-     ("many", "Not done: l_max is 'many': give a number such as 200.")],
+    ("text", "said"),
+    [("nosuch", "Not done: The profile 'nosuch' is unknown: choose from paper, "),
+     ("paper:approach.d_crit_m=0.9", "Not done: ApproachRestriction.d_notice_m is 0.6: it must be greater"),
+     ("paper:task.control_period_s=0.002", "Not done: The control period is 0.002 s, but can change only by a reset")],
 )  # fmt: skip
-def test_what_is_no_value_goes_back_to_the_one_that_holds(clock: Clock, typed: str, said: str) -> None:
-    give(clock.page, "l_max [cycles]", typed)
-    clock.turn(SETTLE_S + 0.1)
-    assert handle(clock.page, "l_max [cycles]").value == typed  # for whoever types on
-    assert clock.page.notice == said
-    clock.turn(TYPED_S - SETTLE_S)
-    assert handle(clock.page, "l_max [cycles]").value == "200"
-    assert clock.page.notice == said
+def test_a_profile_that_is_refused_stays_to_be_put_right_and_changes_nothing(
+    clock: Clock, simulation: LiveSimulation, text: str, said: str
+) -> None:
+    submit(clock.page, text)
+    clock.turn(0.1)
+    assert clock.page.notice.startswith(said)
+    assert handle(clock.page, "Profile text").value == text
+    assert simulation.world.profile == PROFILES["paper"]
+    give(clock.page, "Profile", "blind")
+    clock.turn(0.1)
+    assert handle(clock.page, "Profile text").value == "blind"
 
 
-def test_a_number_typed_counts_before_what_is_clicked_afterwards(clock: Clock, simulation: LiveSimulation) -> None:
-    give(clock.page, "F_b [N]", "8")
-    click(clock.page, "Reset parameters")
-    clock.turn(2 * SETTLE_S)
-    assert simulation.world.profile.detect.f_base_n == 10.0
-    assert handle(clock.page, "F_b [N]").value == "10"
+def test_a_changed_profile_is_named_so_that_it_can_be_found_again() -> None:
+    changed = with_name(profile("paper:detect.f_base_n=8.12345678:task.restore_cycles=150"), "paper")
+    assert changed.name == "paper:task.restore_cycles=150:detect.f_base_n=8.12345678"
+    assert profile(changed.name) == changed
+    assert with_name(PROFILES["blind"], "blind") == PROFILES["blind"]
 
 
 def test_all_controls_show_what_holds(clock: Clock, simulation: LiveSimulation) -> None:
@@ -246,7 +264,7 @@ def test_a_hand_on_the_move_and_another_view_leave_a_notice_standing(clock: Cloc
     clock.turn(0.1)
     give(clock.page, "x [m]", 0.9)
     give(clock.page, "Cones", False)
-    clock.page._drag(np.array(CAMERA_FROM), np.array([1.0, 0.4, 0.3]))
+    clock.page._drag(0, np.array(CAMERA_FROM), np.array([1.0, 0.4, 0.3]))
     clock.turn(0.1)
     assert clock.page.notice.startswith("Not done: ")
     click(clock.page, "Pause")

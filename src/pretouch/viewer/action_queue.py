@@ -28,7 +28,9 @@ class QueuedAction:
 class ActionQueue:
     """Actions in the order they were asked for, from any thread. What is done again and again keeps only the newest."""
 
-    def __init__(self) -> None:
+    def __init__(self, admits: Callable[[int], bool] = lambda visitor: True) -> None:
+        self.admits = admits
+        """Whether a visitor may act."""
         self._lock = threading.Lock()
         self._waiting: dict[object, QueuedAction] = {}
 

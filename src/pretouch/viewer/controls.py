@@ -8,19 +8,17 @@ from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 
-from pretouch.composition import changed, differences
-from pretouch.control.interface import Restriction
+from pretouch.composition import differences, field_docs
 from pretouch.errors import RecordingError
-from pretouch.profiles import PROFILES, Profile
+from pretouch.params import TaskParams
+from pretouch.profiles import SHORT, Profile, profile, profile_names
 from pretouch.sim.tcp_push import AXES
 from pretouch.types import FloatArray
 from pretouch.viewer.action_queue import ActionQueue
-from pretouch.viewer.gui import SETTLE_S, TYPED_S, add_button, add_view_boxes, put, when_changed
-from pretouch.viewer.parameters import TABLE_1, TableEntry, field_docs
+from pretouch.viewer.gui import SETTLE_S, add_button, add_view_boxes, put, when_changed
 from pretouch.viewer.room import ObjectName, PathName
 from pretouch.viewer.simulation import LiveSimulation
 from pretouch.viewer.status import legend
-from pretouch.viewer.unit_panel import UnitPanel
 
 if TYPE_CHECKING:
     from viser import GuiApi
@@ -29,6 +27,8 @@ RECORDINGS = Path("runs")
 """Folder in which recordings are kept."""
 PUSH_N, PUSH_S = 20.0, 1.0
 """Force [N] and duration [s] of a push unless a person chooses others."""
+_NAMES = (*profile_names(), *SHORT)
+_TEXT_HINT = "As on the command line, with any parameter: paper:detect.f_base_n=8:approach=none. Enter applies it."
 _NO_RESUME = "Resume: nothing waits for it"
 _RECORD_SETTLE_S = 0.3
 """Time without another click from which on one on Record counts [s]: each begins a file."""
@@ -47,10 +47,10 @@ class ClockState:
     """Control cycles that are to pass one by one, paused or not."""
 
 
-def with_name(profile: Profile, base: str) -> Profile:
+def with_name(variant: Profile, base: str) -> Profile:
     """Name a profile by the one it was made from and what is different, as `pretouch.profiles.profile` reads it."""
-    mine, theirs = (replace(p, name="") for p in (profile, PROFILES[base]))
-    return replace(profile, name=":".join([base, *differences(mine, theirs)]))
+    mine, theirs = (replace(p, name="") for p in (variant, profile(base)))
+    return replace(variant, name=":".join([base, *differences(mine, theirs)]))
 
 
 class Controls:
@@ -63,13 +63,10 @@ class Controls:
         self._gui, self._simulation, self._actions = gui, simulation, commands
         self.running = ClockState()
         self._shown: list[tuple[Any, str, Callable[[], object]]] = []
-        self._base = simulation.settings.profile.name.partition(":")[0]
-        if self._base not in PROFILES:
-            self._base = "paper"
         self.on_view: Callable[[str, bool], None] = lambda name, visible: None
         """Told which part of the scene to show or hide."""
-        self.unit_panel: UnitPanel | None = None
-        """How the units are, if they are real."""
+        self._written = ""
+        """The profile that the field shows, or showed before somebody typed."""
         self._first()
         self.refresh()
 
@@ -78,8 +75,8 @@ class Controls:
     def _first(self) -> None:
         gui, simulation = self._gui, self._simulation
         self._button("Push the hand", self._push, icon="HAND_FINGER", hint="With the force of the folder Push.")
-        profile = gui.add_dropdown("Profile", tuple(PROFILES))
-        self._choice(profile, self._choose_profile, "profile", lambda: self._base)
+        names = gui.add_dropdown("Profile", _NAMES)
+        self._choice(names, self._choose_profile, "profile", lambda: self._base)
         self._pause = self._button("Pause", self._toggle_pause, icon="PLAYER_PAUSE", color="gray")
         self._resume = self._button(
             _NO_RESUME, simulation.resume, hint="Leave a hold that waits for you.", disabled=True
@@ -127,19 +124,15 @@ class Controls:
         self._gui.add_html(legend())
 
     def _controller_folder(self) -> None:
-        gui, docs = self._gui, field_docs()
-        speed = gui.add_slider("Path speed [m/s]", 0.05, 0.5, 0.05, 0.3, hint=docs["TaskParams", "speed_m_s"])
+        gui = self._gui
+        hint = field_docs(TaskParams)["speed_m_s"]
+        speed = gui.add_slider("Path speed [m/s]", 0.05, 0.5, 0.05, 0.3, hint=hint)
         self._number(speed, self._choose_speed, "path speed", lambda: self._profile.task.speed_m_s)
-        part = gui.add_dropdown("Restriction", ("none", *Restriction.choices()), hint=docs["Profile", "approach"])
-        self._choice(
-            part, self._choose_restriction, "restriction", lambda: getattr(self._profile.approach, "name", "none")
-        )
-        with gui.add_folder("Table I", expand_by_default=False):
-            for entry in TABLE_1:
-                # as text: of a field for numbers that is emptied, viser tells nobody
-                field = gui.add_text(entry.label, entry.text(self._profile), hint=entry.hint())
-                self._typed(field, partial(self._change_entry, entry), entry.symbol, partial(self._text_of, entry))
-            self._button("Reset parameters", self._reset_parameters, hint="Back to those of the profile.")
+        form = gui.add_form(None)
+        with form:
+            self._text = gui.add_text("Profile text", "", hint=_TEXT_HINT)
+        self._shown.append((self._text, "profile text", self._profile_text))
+        form.on_submit(self._submit)
 
     def _world_folder(self) -> None:
         gui, simulation = self._gui, self._simulation
@@ -150,10 +143,8 @@ class Controls:
         hint = "Of hand and object; changes as soon as nothing touches."
         stiffness = gui.add_slider("Stiffness [kN/m]", 3.0, 150.0, 1.0, 75.0, hint=hint)
         self._number(stiffness, self._set_stiffness, "stiffness", lambda: simulation.settings.stiffness / 1000.0)
-        with gui.add_folder("Sensor units"):
-            if simulation.real:
-                self.unit_panel = UnitPanel(gui, simulation.real.source, simulation.skin.network.ids)
-            else:
+        if not simulation.real:
+            with gui.add_folder("Sensor units"):
                 self._fault_controls()
 
     def _fault_controls(self) -> None:
@@ -179,12 +170,6 @@ class Controls:
         when_changed(handle, self._actions, act, kind, SETTLE_S)
         self._shown.append((handle, kind, current))
 
-    def _typed(self, handle: Any, act: Callable[[Any], object], name: str, current: Callable[[], object]) -> None:
-        """Have a text act when nobody types in it any more, and leave standing for a while what was refused."""
-        when_changed(handle, self._actions, act, f"parameter {name}", SETTLE_S)
-        when_changed(handle, self._actions, lambda _: None, f"typed {name}", TYPED_S, quiet=True)
-        self._shown.append((handle, f"typed {name}", current))
-
     def _button(self, label: str, act: Callable[[], object], **more: Any) -> Any:
         return add_button(self._gui, self._actions, label, act, **more)
 
@@ -194,27 +179,33 @@ class Controls:
     def _profile(self) -> Profile:
         return self._simulation.settings.profile
 
-    def _change(self, profile: Profile) -> None:
-        self._simulation.set_profile(with_name(profile, self._base))
+    def _profile_text(self) -> str:
+        """What the field is to show: another profile, else what somebody typed, to be put right."""
+        if self._profile.name == self._written:
+            return str(self._text.value)
+        self._written = self._profile.name
+        return self._written
 
-    def _change_entry(self, entry: TableEntry, text: str) -> None:
-        if text.strip():  # else what holds comes back
-            self._change(entry.write_text(self._profile, text))
+    @property
+    def _base(self) -> str:
+        """Name of the profile that the session's was made from."""
+        name = self._profile.name.partition(":")[0]
+        return name if name in _NAMES else _NAMES[0]
+
+    async def _submit(self, event: Any) -> None:
+        text = self._text.value
+        if self._actions.admits(event.client_id):
+            self._actions.put(lambda: self._simulation.set_profile(profile(text.strip())), "profile text")
 
     def _choose_profile(self, base: str) -> None:
-        chosen = PROFILES[base]
-        profile = replace(chosen, task=replace(chosen.task, speed_m_s=self._profile.task.speed_m_s))
-        self._simulation.set_profile(with_name(profile, base))
-        self._base = base
+        self._set_speed(profile(base), base, self._profile.task.speed_m_s)
 
     def _choose_speed(self, speed: float) -> None:
-        self._change(replace(self._profile, task=replace(self._profile.task, speed_m_s=float(speed))))
+        self._set_speed(self._profile, self._base, float(speed))
 
-    def _choose_restriction(self, name: str) -> None:
-        self._change(changed(self._profile, {"approach": name}))
-
-    def _text_of(self, entry: TableEntry) -> str:
-        return entry.text(self._profile)
+    def _set_speed(self, variant: Profile, base: str, speed: float) -> None:
+        variant = replace(variant, task=replace(variant.task, speed_m_s=speed))
+        self._simulation.set_profile(with_name(variant, base))
 
     def _choose_object(self, name: ObjectName) -> None:
         self._simulation.reset(object=name)
@@ -224,9 +215,6 @@ class Controls:
 
     def _is_enabled(self, unit: str) -> bool:
         return unit not in self._simulation.settings.faults.silenced
-
-    def _reset_parameters(self) -> None:
-        self._choose_profile(self._base)
 
     def _push(self) -> None:
         """Push the hand as the folder says; the notice tells what became of it."""

@@ -15,8 +15,6 @@ PERIOD_S = 1.0 / 30.0
 """Time between two updates of a page [s]."""
 SETTLE_S = 0.8
 """Time without a key from which on a number that is typed counts [s]."""
-TYPED_S = 6.0
-"""Time without a key from which on a field shows what holds again: whoever pauses after 0.0 can type on [s]."""
 PANEL_PX = 330
 """Width of the panel [px]."""
 
@@ -36,13 +34,23 @@ def when_changed(
     settle: float = 0.0,
     quiet: bool = False,
 ) -> None:
-    """Queue an action on each value that a person sets; values set by the program queue nothing."""
+    """Queue an action on each value that a person sets; values set by the program queue nothing.
+
+    A control that a visitor changes who may not act shows again what it showed before.
+    """
+    before = handle.value
 
     @handle.on_update
     async def _(event: Any) -> None:
-        if event.client_id is not None:
-            value = event.target.value
+        nonlocal before
+        value = event.target.value
+        if event.client_id is None:
+            before = value
+        elif commands.admits(event.client_id):
+            before = value
             commands.put(lambda: act(value), kind, settle, quiet)
+        else:
+            put(handle, before)
 
 
 def add_button(
@@ -58,8 +66,9 @@ def add_button(
     button = gui.add_button(label, icon=getattr(Icon, icon) if icon else None, **more)
 
     @button.on_click
-    async def _(_: Any) -> None:
-        commands.put(act, f"press {label}", settle)
+    async def _(event: Any) -> None:
+        if commands.admits(event.client_id):
+            commands.put(act, f"press {label}", settle)
 
     return button
 

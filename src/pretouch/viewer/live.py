@@ -11,6 +11,7 @@ from pretouch.loop import MonotonicClock
 from pretouch.types import ControlStep, FloatArray
 from pretouch.viewer.action_queue import Action, ActionQueue
 from pretouch.viewer.asked import told
+from pretouch.viewer.commander import Commander
 from pretouch.viewer.companions import Companions
 from pretouch.viewer.controls import Controls
 from pretouch.viewer.drive import Drive
@@ -23,7 +24,7 @@ from pretouch.viewer.simulation import LiveSimulation
 from pretouch.viewer.status import Status
 
 if TYPE_CHECKING:
-    from pretouch.viewer.door import PageServer
+    from viser import ViserServer
 
 
 _ARMS = ("one arm", "three arms")
@@ -36,12 +37,11 @@ class LivePage:
     """
 
     def __init__(
-        self, server: "PageServer", simulation: LiveSimulation, say: Callable[[str], None] = lambda line: None
+        self, server: "ViserServer", simulation: LiveSimulation, say: Callable[[str], None] = lambda line: None
     ) -> None:
         self._server, self._simulation, self._say = server, simulation, say
         self._world, self._time = simulation.world, simulation.time
         self.pace = Pace()
-        self._actions = ActionQueue()
         self._pointed: FloatArray | None = None
         self._visited = False
         """Whether anybody has opened the page: an opening waits until then."""
@@ -50,12 +50,14 @@ class LivePage:
         self._receiver_ended = False
         """Whether the receiver of the real units has ended."""
         style_page(server)
+        commander = Commander(server)
+        self._actions = ActionQueue(commander.admits)
         self._status = Status(server.gui)
         if not simulation.real:
             arms = server.gui.add_dropdown("Arms", _ARMS, hint="Three: blind, paper and pretouch with one hand.")
             when_changed(arms, self._actions, self._show_arms, "arms")
         self.controls = Controls(server.gui, simulation, self._actions)
-        self.drive = Drive(server, simulation, self._actions)
+        self.drive = Drive(server, commander, simulation, self._actions)
         self._scene = Scene(server, simulation.world)
         self._status.notice = f"{self._scene.said} {simulation.notice}".strip()
         simulation.notice = ""
@@ -74,8 +76,9 @@ class LivePage:
         """Have something done between two ticks, from any thread, as `ActionQueue.put` does."""
         self._actions.put(action, kind, settle, quiet)
 
-    def _drag(self, eye: FloatArray, place: FloatArray) -> None:
-        self.ask(lambda: self._move_hand(eye, place), "hand", quiet=True)
+    def _drag(self, visitor: int, eye: FloatArray, place: FloatArray) -> None:
+        if self._actions.admits(visitor):
+            self.ask(lambda: self._move_hand(eye, place), "hand", quiet=True)
 
     def _move_hand(self, eye: FloatArray, place: FloatArray) -> None:
         self._simulation.point_hand(eye, place)
@@ -130,8 +133,6 @@ class LivePage:
     def _pass_time(self) -> list[ControlStep]:
         """Let the time of one update pass, or as many single steps as were asked for."""
         running, simulation = self.controls.running, self._simulation
-        if running.paused or running.speed < 1.0:
-            simulation.leave_out_imu()
         single, running.single = running.single, 0
         if single:
             return [simulation.single_step() for _ in range(single)]
@@ -155,7 +156,7 @@ class LivePage:
                 self._companions.begin()
             self._scene.trail.clear()
             self._history.clear()
-            self.drive.steering.stand()
+            self.drive.steering.goal = None
         self._time = self._simulation.time
         if self._simulation.world is not self._world:
             self._world = self._simulation.world
@@ -183,8 +184,6 @@ class LivePage:
                 pace.sentence(), now,
             )  # fmt: skip
             self.controls.offer_resume(resumable(step))
-            if self.controls.unit_panel:
-                self.controls.unit_panel.draw(now)
 
     def _follow_target(self, target: FloatArray | None) -> None:
         """Have the sliders show where the hand is to be, wherever that came from."""

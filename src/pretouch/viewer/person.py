@@ -19,7 +19,7 @@ from pretouch.viewer.surface import Mesh, surface_of
 if TYPE_CHECKING:
     from viser import SceneApi, ViserServer
 
-Drag = Callable[[FloatArray, FloatArray], None]
+Drag = Callable[[int, FloatArray, FloatArray], None]
 """Is told from where a person looks, and to what place in view the hand is dragged, both (3,) [m]."""
 
 BALL_M = 0.05
@@ -88,7 +88,7 @@ class PersonHand:
         async def _(event: Any) -> None:
             if event.phase == "start":
                 self._held = self._position - np.array(event.start_position)
-            act(np.array(event.client.camera.position), np.array(event.end_position) + self._held)
+            act(event.client_id, np.array(event.client.camera.position), np.array(event.end_position) + self._held)
 
     def draw(self, hand: FloatArray | None, target: FloatArray | None) -> None:
         """Show hand and target (3,) [m]; None and what is not finite are not shown."""

@@ -17,6 +17,7 @@ from pretouch.recording.surroundings import surroundings
 from pretouch.types import FloatArray
 from pretouch.viewer.action_queue import ActionQueue
 from pretouch.viewer.asked import Asked, told
+from pretouch.viewer.commander import Commander
 from pretouch.viewer.frame import Frame, World
 from pretouch.viewer.gui import PERIOD_S, add_button, add_view_boxes, put, style_page, when_changed
 from pretouch.viewer.player import Player, Timeline, TimelineEvent
@@ -74,7 +75,7 @@ class ReplayPage:
         self._server, self._recorded, self._comparison = server, recorded, comparison
         stamps = recorded.stamps()
         self.player = Player(stamps)
-        self._actions = ActionQueue()
+        self._actions = ActionQueue(Commander(server).admits)
         found = contacts_of_other(comparison, stamps) if comparison else {}
         self.timeline = Timeline(lambda i: decode_step(recorded.step_data(i))[1], len(recorded), found)
         self._run, self._drawn = 0, -1

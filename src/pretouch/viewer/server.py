@@ -1,6 +1,5 @@
 """The web server of a page: on this machine alone unless asked, on the port that was asked for, and quiet."""
 
-import ctypes
 import errno
 import ipaddress
 import logging
@@ -18,7 +17,7 @@ from pretouch.errors import ViewerError
 from pretouch.extras import LIVE
 
 if TYPE_CHECKING:
-    from pretouch.viewer.door import PageServer
+    from viser import ViserServer
 
 _PORTS_TRIED = 100
 _EVERYWHERE = {"0.0.0.0": "localhost", "::": "localhost"}  # noqa: S104  # named to be replaced
@@ -82,44 +81,26 @@ nobody add a script; a style sheet can tell by the greying."""
 
 
 @contextmanager
-def served(options: ServeOptions, title: str) -> Iterator["PageServer"]:
+def served(options: ServeOptions, title: str) -> Iterator["ViserServer"]:
     """Serve an empty page while the context lasts; a ViewerError says what is missing or in the way."""
     LIVE.need("The page")
     check_port(options)
-    from pretouch.viewer.door import Door, PageServer
+    from viser import ViserServer
+
+    from pretouch.viewer.door import Door
 
     door = Door(options)
     with _quiet():
         with door.built():
-            server = PageServer(options.host, options.port, label=title, verbose=False)
+            server = ViserServer(options.host, options.port, label=title, verbose=False)
         try:
             if server.get_port() != options.port:
                 raise _busy(options, server.get_port())
-            door.keep(server)
+            door.check(server)
             server.gui.add_html(_LOST)
-            _keep_pieces_apart()
-            server.on_client_disconnect(_give_back)
             yield server
         finally:
             server.stop()
-
-
-_MMAP_THRESHOLD = -3
-"""The C library's number for the size from which it asks the system for a piece of memory, and gives it back."""
-
-
-def _keep_pieces_apart() -> None:
-    """Hold that size at 128 kB: by itself it grows with what is freed, and each visitor leaves 0.3 MB of holes."""
-    hold = getattr(ctypes.CDLL(None), "mallopt", None)
-    if hold is not None:
-        hold(_MMAP_THRESHOLD, 1 << 17)
-
-
-def _give_back(_visitor: object) -> None:
-    """Give the system back what a visitor needed: the C library keeps 0.3 MB of each, split into small pieces."""
-    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
-    if trim is not None:
-        trim(0)
 
 
 def check_port(options: ServeOptions) -> None:

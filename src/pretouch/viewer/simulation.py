@@ -135,11 +135,6 @@ class LiveSimulation:
         self._keep(cycle, hand)
         return cycle.step
 
-    def leave_out_imu(self) -> None:
-        """Record nothing of what real units' IMUs measured up to now: the simulation does not go with their time."""
-        if self.real:
-            self.real.take_imu()
-
     # what a person does
 
     @property
@@ -245,13 +240,8 @@ class LiveSimulation:
     def _keep(self, cycle: Cycle, hand: FloatArray) -> None:
         """Empty the plant's log, into the recording if there is one."""
         log, touches = self._room.plant.take_log()
-        imu = self.real.take_imu() if self.real else []
         if self.recording is None:
             return
-        for batch in imu:
-            self.recording.imu(
-                self.skin.network.ids[batch.unit], batch.stamp, batch.acceleration, batch.angular_velocity
-            )
         forces = [(time, force + self._pushes.at(time)) for time, force in log]
         self.recording.record(cycle, truth_of(forces, touches, hand))
         if self.recording.trouble:
