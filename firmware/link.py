@@ -5,7 +5,7 @@ beacon nor an old sample verifies again.
 """
 
 from micropython import const
-from wire import BEACON_SIZE, TAKES_TOUCH, TAKES_ZONES, Mac, hello, open_beacon, session_mac
+from wire import BEACON_SIZE, Mac, hello, open_beacon, session_mac
 
 _HELLO_LEAST_US = const(75_000)
 _HELLO_SPREAD_US = const(50_000)
@@ -35,8 +35,6 @@ class Link:
         self._buffer = bytearray(_LARGEST)
         self._session = self._nonce = self._challenge = None
         self._sequence = self._beacon = 0
-        self.takes_touch = self.takes_zones = False
-        """Whether the receiver takes touch readings, zones: one that does not say so would throw the samples away."""
         self._heard = self._next_hello = clock.ticks()
 
     @property
@@ -71,7 +69,7 @@ class Link:
         beacon = open_beacon(datagram, self._unit, self._challenge, self._mac)
         if beacon is None:
             return
-        number, nonce, takes = beacon
+        number, nonce = beacon
         if not self.live:
             self._nonce = nonce
             self._session = session_mac(self._mac, self._challenge, nonce)
@@ -80,8 +78,6 @@ class Link:
             return
         self._beacon = number
         self._heard = heard
-        self.takes_touch = bool(takes & TAKES_TOUCH)
-        self.takes_zones = bool(takes & TAKES_ZONES)
 
     def _greet(self, now):
         if self._challenge is None:

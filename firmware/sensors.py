@@ -165,8 +165,8 @@ class RangeFinder(Watched):
         self.new = self._known = True
         self._well()
 
-    def put(self, sample, now, takes_zones=False):
-        """Tell the newest measurement, and the flags, in a sample as of now; zones to whom they are welcome."""
+    def put(self, sample, now):
+        """Tell the newest measurement, and the flags, in a sample as of now."""
         age = self._clock.diff(now, self._middle) if self._known else _FORGET_US
         late = not self._up or self._clock.diff(now, self._fresh) > 2 * self._device.period_us
         if age >= _FORGET_US:
@@ -177,7 +177,7 @@ class RangeFinder(Watched):
             sample.range_stream, sample.range_status, sample.range_mm = device.stream, device.status, device.mm
             sample.range_sigma, sample.range_signal = device.sigma, device.signal
             sample.range_ambient, sample.range_spads = device.ambient, device.spads
-            if self.zones and takes_zones:
+            if self.zones:
                 sample.zones = self.zones
                 sample.flags |= wire.ZONES
         if self._known:

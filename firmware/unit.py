@@ -56,9 +56,9 @@ class Unit:
         self._imu.step(sample.imu, now)
         now = self._clock.ticks()
         sample.flags = 0
-        self._range_finder.put(sample, now, self._link.takes_zones)
+        self._range_finder.put(sample, now)
         self._imu.put(sample, now)
-        if self._touch is not None and self._link.takes_touch:
+        if self._touch is not None:
             self._touch.put(sample, now)
         sample.bus_errors = self._bus.errors
         if self._link.live:

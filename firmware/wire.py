@@ -6,7 +6,7 @@ import struct
 from micropython import const
 
 TAG_SIZE = const(16)
-BEACON_SIZE = const(36)
+BEACON_SIZE = const(34)
 IMU_MOST = const(32)
 IMU_SAMPLE_SIZE = const(12)
 
@@ -20,8 +20,6 @@ RANGE_LATE = const(64)
 TOUCH = const(128)
 ZONES = const(256)
 
-TAKES_TOUCH, TAKES_ZONES = const(1), const(2)
-"""In a beacon: a sample may carry a touch reading, or the zones of a range."""
 TOUCH_OK, TOUCH_FAILED = const(0), const(1)
 NO_FORCE = const(0xFFFFFFFF)
 
@@ -33,7 +31,7 @@ _MAGIC = b"PT"
 _VERSION = const(1)
 _KIND_HELLO, _KIND_BEACON, _KIND_SAMPLE = 1, 2, 3
 _HELLO = "<2sBBHHBB8sQ"
-_BEACON = "<2sBBHHI8s"
+_BEACON = "<2sBBHI8s"
 _SAMPLE = "<2sBBHHIQIIHhHBBHIHHHHBBHII"
 _SAMPLE_HEAD = const(62)
 _TOUCH = "<BBHII"
@@ -71,17 +69,17 @@ def hello(unit, firmware, reset, challenge, uptime_us, mac):
 
 
 def open_beacon(datagram, unit, challenge, mac):
-    """Return number, nonce and what the receiver takes of a beacon to this unit for this challenge, else None."""
+    """Return number and nonce of a beacon to this unit for this challenge, else None."""
     if len(datagram) != BEACON_SIZE:
         return None
-    magic, version, kind, number_of_unit, takes, number, nonce = struct.unpack_from(_BEACON, datagram)
+    magic, version, kind, number_of_unit, number, nonce = struct.unpack_from(_BEACON, datagram)
     if (magic, version, kind, number_of_unit) != (_MAGIC, _VERSION, _KIND_BEACON, unit):
         return None
     tag = mac.whole(b"PT1BEACN", challenge, datagram[:-TAG_SIZE])
     wrong = 0
     for index in range(TAG_SIZE):
         wrong |= tag[index] ^ datagram[BEACON_SIZE - TAG_SIZE + index]
-    return None if wrong else (number, nonce, takes)
+    return None if wrong else (number, nonce)
 
 
 class Sample:

@@ -82,14 +82,14 @@ def test_a_hello_is_what_the_receiver_decodes(unit_python: Run) -> None:
 
 
 def test_a_beacon_opens_only_whole_for_its_unit_challenge_and_key(unit_python: Run) -> None:
-    beacon = wire.Beacon(unit=7, number=0xF1234567, nonce=NONCE, takes=wire.TAKES_TOUCH)
+    beacon = wire.Beacon(unit=7, number=0xF1234567, nonce=NONCE)
     good = beacon.encode(wire.Mac(KEY), CHALLENGE)
     bad = [bytes(b ^ (1 << bit % 8) * (at == bit // 8) for at, b in enumerate(good)) for bit in range(8 * len(good))]
     bad += [good[:size] for size in range(1, len(good))] + [good + b"\0"]
     bad += [dataclasses.replace(beacon, unit=8).encode(wire.Mac(KEY), CHALLENGE)]
     bad += [beacon.encode(wire.Mac(KEY), b"another1"), beacon.encode(wire.Mac(bytes(32)), CHALLENGE)]
     lines = in_unit(unit_python, "\n".join(each.hex() for each in [good, *bad]), OPEN_BEACONS)
-    assert lines == [str((0xF1234567, NONCE, 1))] + ["None"] * len(bad)
+    assert lines == [str((0xF1234567, NONCE))] + ["None"] * len(bad)
 
 
 def test_keys_of_any_length_up_to_a_block_make_the_same_mac(unit_python: Run) -> None:

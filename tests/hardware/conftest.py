@@ -9,11 +9,3 @@ from tests.hardware.fake_unit import Bench
 def bench():
     with Bench() as made:
         yield made
-
-
-@pytest.fixture
-def unfiltered(monkeypatch):
-    """Without the filter in the kernel, as on other systems: the receiver must throw away all garbage itself."""
-    monkeypatch.setattr("pretouch.hardware.receiver.attach_filter", lambda *_: False)
-    with Bench() as made:
-        yield made

@@ -92,7 +92,6 @@ CASES = {
     "imu dead": (lambda: found(heard(imu_count=0)), "warning", "imu rate", "gives 0 IMU samples a second (limit 375)"),
     "imu loss": (lambda: found(heard(imu_index=lambda n: 10 * n)), "warning", "imu loss", "loses 20% of its IMU"),
     "reboot": (lambda: found(heard(), Counts(500, 0, 1), reset=3), "warning", "reboot", "its watchdog ended a hang"),
-    "firmware that was not told": (lambda: found(heard(), firmware=0), None, "", ""),
 }  # fmt: skip
 
 
@@ -113,13 +112,6 @@ def test_each_trouble_is_named_and_nothing_else(case):
 
 def test_nothing_is_said_of_a_unit_that_is_well():
     assert found(heard()) == ()
-
-
-def test_old_firmware_is_named():
-    unit = unit_health("hand-1", heard(), NOW, UnitStatus.of(traffic(firmware=0x0003)), Counts(500))
-    (finding,) = findings([unit], HealthParams(firmware=0x0102))
-    assert finding.level == "fault"
-    assert "runs firmware 0.3 (oldest supported: 1.2)" in finding.sentence
 
 
 def test_rates_are_not_judged_before_a_unit_has_settled():
@@ -185,4 +177,4 @@ def test_every_limit_is_documented():
     assert not missing
     for f in fields(HealthParams):
         (row,) = (line for line in text.splitlines() if line.startswith(f"| `{f.name}` |"))
-        assert row.split("|")[2].split()[0] == (f"{f.default:g}" if f.name != "firmware" else "0.1"), row
+        assert row.split("|")[2].split()[0] == f"{f.default:g}", row

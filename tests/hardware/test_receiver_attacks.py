@@ -8,7 +8,7 @@ import pytest
 
 from pretouch.hardware.link import LinkParams
 from pretouch.hardware.wire import SAMPLE_LEAST, Hello, Mac, decode_beacon
-from tests.hardware.fake_unit import KEYS, PLAIN, Bench, FakeUnit
+from tests.hardware.fake_unit import KEYS, PLAIN, FakeUnit
 
 
 def counters(bench):
@@ -38,49 +38,40 @@ def test_a_unit_gone_mad_harms_only_itself(bench, changes):
         assert bench.now - readings.stamp[1] < 0.1
 
 
-def test_the_holder_of_a_key_costs_bounded_memory_and_time(bench):
+def test_the_holder_of_a_key_costs_bounded_memory(bench):
     bench.join()
     unit, endpoint = bench.units[0], bench.receiver._endpoints[0]
-    began, base, taken = bench.now, unit.us(bench.now), 0
+    base = unit.us(bench.now)
     for k in range(10_000):
         bench.now += 0.001
-        taken += bench.send(unit.sample(bench.now, time_us=base, beacon=1 + k % 2, beacon_hold_us=400_000 - k))
-    assert taken <= 200 * (bench.now - began) + 201
-    assert bench.receiver.rejected["too fast"] == 10_000 - taken
+        assert bench.send(unit.sample(bench.now, time_us=base, beacon=1 + k % 2, beacon_hold_us=400_000 - k)) == 1
     assert len(endpoint._clock._highs) <= 1024
     assert len(endpoint._clock._lows) <= 1024
 
 
-def test_twice_the_rate_of_a_unit_is_taken(bench):
-    bench.join()
-    for _ in range(500):
-        bench.now += 0.01
-        assert bench.send(bench.units[0].sample(bench.now)) == 1
-
-
-def test_each_flipped_bit_of_a_hello_makes_it_worthless(unfiltered):
-    hello = unfiltered.units[0].hello(unfiltered.now)
+def test_each_flipped_bit_of_a_hello_makes_it_worthless(bench):
+    hello = bench.units[0].hello(bench.now)
     for bit in range(8 * len(hello)):
         bad = bytearray(hello)
         bad[bit // 8] ^= 1 << bit % 8
-        unfiltered.send(bytes(bad))
-    assert unfiltered.answers() == []
-    assert unfiltered.receiver.units[0].state == "never heard"
-    unfiltered.send(hello)
-    assert len(unfiltered.answers()) == 1
+        bench.send(bytes(bad))
+    assert bench.answers() == []
+    assert bench.receiver.units[0].state == "never heard"
+    bench.send(hello)
+    assert len(bench.answers()) == 1
 
 
-def test_each_flipped_bit_of_a_sample_makes_it_worthless(unfiltered):
-    unfiltered.join()
-    before = counters(unfiltered)
-    sample = unfiltered.units[0].sample(unfiltered.now)
+def test_each_flipped_bit_of_a_sample_makes_it_worthless(bench):
+    bench.join()
+    before = counters(bench)
+    sample = bench.units[0].sample(bench.now)
     for bit in range(8 * len(sample)):
         bad = bytearray(sample)
         bad[bit // 8] ^= 1 << bit % 8
-        assert unfiltered.send(bytes(bad)) == 0
-    assert counters(unfiltered) == before
-    assert sum(unfiltered.receiver.rejected.values()) == 8 * len(sample)
-    assert unfiltered.send(sample) == 1
+        assert bench.send(bytes(bad)) == 0
+    assert counters(bench) == before
+    assert sum(bench.receiver.rejected.values()) == 8 * len(sample)
+    assert bench.send(sample) == 1
 
 
 def test_each_flipped_bit_of_a_beacon_makes_it_worthless(bench):
@@ -93,20 +84,16 @@ def test_each_flipped_bit_of_a_beacon_makes_it_worthless(bench):
     assert bench.units[0].hear(beacon, bench.now)
 
 
-@pytest.mark.parametrize("filtered", [False, True])
-def test_every_other_length_is_refused(filtered, monkeypatch):
-    if not filtered:
-        monkeypatch.setattr("pretouch.hardware.receiver.attach_filter", lambda *_: False)
-    with Bench() as bench:
-        bench.join()
-        sample, hello = bench.units[0].sample(bench.now), bench.units[0].hello(bench.now)
-        for whole in (sample, hello):
-            for size in range(len(whole)):
-                assert bench.send(whole[:size]) == 0
-            for more in (1, 12, 300, 1990, 5000):
-                assert bench.send(whole + bytes(more)) == 0
-        assert bench.answers() == []
-        assert bench.send(sample) == 1
+def test_every_other_length_is_refused(bench):
+    bench.join()
+    sample, hello = bench.units[0].sample(bench.now), bench.units[0].hello(bench.now)
+    for whole in (sample, hello):
+        for size in range(len(whole)):
+            assert bench.send(whole[:size]) == 0
+        for more in (1, 12, 300, 1990, 5000):
+            assert bench.send(whole + bytes(more)) == 0
+    assert bench.answers() == []
+    assert bench.send(sample) == 1
 
 
 def test_samples_without_any_imu_and_of_the_most_are_taken(bench):
@@ -116,18 +103,18 @@ def test_samples_without_any_imu_and_of_the_most_are_taken(bench):
     assert len(bench.units[0].sample(bench.now, imu_count=0, imu=b"")) == SAMPLE_LEAST
 
 
-def test_other_versions_kinds_and_units_are_refused_by_reason(unfiltered):
-    unfiltered.join()
-    sample = bytearray(unfiltered.units[0].sample(unfiltered.now))
+def test_other_versions_kinds_and_units_are_refused_by_reason(bench):
+    bench.join()
+    sample = bytearray(bench.units[0].sample(bench.now))
     for place, number in ((0, 0), (2, 2), (3, 2), (3, 7)):
         bad = bytearray(sample)
         bad[place] = number
-        unfiltered.send(bytes(bad))
-    assert unfiltered.receiver.rejected["format"] == 4
+        bench.send(bytes(bad))
+    assert bench.receiver.rejected["format"] == 4
     stranger = FakeUnit(KEYS["unit 5"])
-    unfiltered.send(stranger.hello(unfiltered.now))
-    assert unfiltered.receiver.rejected["unit"] == 1
-    assert unfiltered.answers() == []
+    bench.send(stranger.hello(bench.now))
+    assert bench.receiver.rejected["unit"] == 1
+    assert bench.answers() == []
 
 
 def test_the_key_of_one_unit_is_worth_nothing_for_another(bench):
@@ -175,20 +162,20 @@ def test_a_flood_between_two_calls_keeps_a_call_short_and_loses_nothing_genuine(
     assert bench.receiver.buffer_bytes > 0
 
 
-def test_a_flood_takes_no_memory(unfiltered):
-    unfiltered.join()
-    rng, unit = np.random.default_rng(0), unfiltered.units[0]
+def test_a_flood_takes_no_memory(bench):
+    bench.join()
+    rng, unit = np.random.default_rng(0), bench.units[0]
     wrong = Mac(bytes(32))
     hellos = [Hello(int(n), 0, 0, rng.bytes(8), 1).encode(wrong) for n in rng.integers(0, 65536, 300)]
     recorded = [Hello(3, 0, 0, rng.bytes(8), 1).encode(unit.mac) for _ in range(300)]
     samples = [replace(PLAIN, unit=int(n), sequence=9).encode(wrong) for n in rng.integers(0, 65536, 300)]
     random = [rng.bytes(int(n)) for n in rng.integers(0, 600, 300)]
-    sockets = [unfiltered.new_socket() for _ in range(5)]
+    sockets = [bench.new_socket() for _ in range(5)]
 
     def flood() -> None:
         for k in range(5):
-            unfiltered.send(*hellos, *recorded, *samples, *random, by=sockets[k])
-            unfiltered.now += 0.1
+            bench.send(*hellos, *recorded, *samples, *random, by=sockets[k])
+            bench.now += 0.1
 
     flood()
     tracemalloc.start()
@@ -201,4 +188,4 @@ def test_a_flood_takes_no_memory(unfiltered):
     for made in sockets:
         made.close()
     assert grown < 20_000
-    assert len(unfiltered.receiver._endpoints[0]._link._pending) <= LinkParams().pending_most
+    assert len(bench.receiver._endpoints[0]._link._pending) <= LinkParams().pending_most

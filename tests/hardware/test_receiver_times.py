@@ -3,12 +3,10 @@
 import math
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from pretouch.hardware.link import LinkParams
 from pretouch.hardware.wire import Mac, decode_beacon
-from pretouch.types import RangeStatus
 from tests.hardware.fake_unit import PLAIN, Bench
 
 
@@ -144,44 +142,6 @@ def test_beacons_are_sent_during_a_flood_that_fills_a_call():
         bench.receiver.receive()
         assert bench.receiver.taken == 1500
         assert len([d for d in bench.answers() if decode_beacon(d, bench.units[0].mac, bench.units[0].challenge)]) >= 4
-
-
-def test_after_the_hosts_clock_stood_still_nothing_is_known_until_a_beacon_is_echoed(bench):
-    bench.join()
-    bench.run(1.0)
-    traffic, unit = bench.receiver.units[0], bench.units[0]
-    bench.receiver.forget_times()
-    assert bench.receiver.readings().stamp.tolist() == [-np.inf] * 2
-    assert bench.receiver.readings().status.tolist() == [RangeStatus.NONE] * 2
-    assert math.isnan(traffic.offset)
-    unit.offset -= 60.0  # the unit's clock went on
-    assert bench.send(unit.sample(bench.now)) == 1
-    assert bench.receiver.readings().stamp[0] == -np.inf
-    bench.now += 0.02
-    bench.receiver.receive()
-    bench.deliver()
-    bench.now += 0.02
-    bench.send(unit.sample(bench.now))
-    assert bench.now - 0.06 < bench.receiver.readings().stamp[0] <= bench.now - 0.01
-    assert traffic.clock_jumps == 0
-
-
-def test_what_was_offered_before_the_hosts_clock_stood_still_tells_no_time_after_it(bench):
-    unit = bench.units[0]
-    bench.send(unit.hello(bench.now))
-    bench.deliver()
-    bench.now += 0.02
-    late = unit.sample(bench.now)
-    unit.offset -= 60.0  # the unit's clock goes on for a minute
-    bench.receiver.forget_times()
-    assert bench.send(late) == 0
-    assert bench.send(unit.sample(bench.now)) == 0
-    assert bench.receiver.readings().stamp[0] == -np.inf
-    unit.leave()
-    bench.send(unit.hello(bench.now))
-    bench.deliver()
-    assert bench.send(unit.sample(bench.now)) == 1
-    assert bench.receiver.readings().stamp[0] <= bench.now - 0.01
 
 
 def test_latency_is_told_as_a_mean_that_forgets(bench):

@@ -10,7 +10,7 @@ from pretouch.hardware.findings import findings
 from pretouch.hardware.health import HealthParams, UnitWindow
 from pretouch.hardware.link import LinkParams
 from pretouch.hardware.receiver_process import SharedOutputs, packed
-from pretouch.hardware.wire import TAKES_TOUCH, TAKES_ZONES, Flag, TouchPart
+from pretouch.hardware.wire import Flag, TouchPart
 from pretouch.sensing.network import NetworkUnits
 from pretouch.types import RangeStatus
 from tests.hardware.fake_unit import IDS, Bench
@@ -31,10 +31,6 @@ def bench():
             made.send(unit.hello(made.now))
         made.deliver()
         yield made
-
-
-def test_only_units_with_zones_are_told_that_they_are_taken(bench):
-    assert [unit.beacon.takes for unit in bench.units] == [TAKES_TOUCH | TAKES_ZONES, TAKES_TOUCH]
 
 
 def test_a_range_with_zones_is_a_row_for_each(bench):
@@ -117,19 +113,7 @@ def test_garbled_and_cut_datagrams_with_zones_change_nothing(bench):
         sent += bench.send(bytes(bad))
     assert sent == 0
     assert set(bench.receiver.readings().status) == {RangeStatus.NONE}
-    bench.now += 1.0  # forged samples use up the tries against an offer
     assert bench.send(whole) == 1
-
-
-def test_the_kernel_lets_the_zones_of_the_skin_through_and_no_larger_datagram():
-    with Bench(units=NetworkUnits(IDS, (8, 1))) as bench:
-        if not bench.receiver.filtered:
-            pytest.skip("the filter is Linux's")
-        head = bench.units[0].hello(bench.now)[:3] + b"\x03" + bytes(40)
-        bench.send(head.ljust(797, b"\0"))
-        assert bench.receiver.rejected["size"] == 0
-        bench.send(head.ljust(796, b"\0"))
-        assert bench.receiver.rejected["size"] == 1
 
 
 def test_zones_come_through_shared_memory(bench):

@@ -7,7 +7,6 @@ import pytest
 
 from pretouch.hardware import udp
 from pretouch.hardware.address import PORT
-from tests.hardware.fake_unit import Bench
 from tests.ports import PORTS, free_port
 
 linux = pytest.mark.skipif(sys.platform != "linux", reason="the options are Linux's")
@@ -41,26 +40,3 @@ def test_without_the_right_to_more_the_queue_is_as_long_as_the_system_allows():
     options = Options()
     udp._widen(options, 12345)
     assert options.asked[-1] == (socket.SO_RCVBUF, 12345)
-
-
-@linux
-def test_a_filter_that_cannot_be_had_is_done_without():
-    assert not udp.attach_filter(Options())
-
-
-@linux
-def test_the_kernel_drops_what_is_not_ours_and_nothing_else():
-    with Bench() as bench:
-        assert bench.receiver.filtered
-        bench.join()
-        sample, hello = bench.units[0].sample(bench.now), bench.units[0].hello(bench.now)
-        for datagram in (sample, hello):
-            for place in range(4):
-                bad = bytearray(datagram)
-                bad[place] ^= 128
-                bench.send(bytes(bad))
-        bench.send(b"", b"PT", hello + b"x", sample[:40], sample + bytes(400))
-        assert set(bench.receiver.rejected.values()) == {0}
-        bench.send(sample[:-1])
-        assert bench.receiver.rejected["size"] == 1
-        assert bench.send(sample) == 1

@@ -7,12 +7,9 @@ import pytest
 
 from pretouch.control.path import Circle
 from pretouch.control.posture import brought_to
-from pretouch.hardware.link import LinkParams
 from pretouch.hardware.wire import (
-    HELLO_SIZE,
     NO_FORCE,
     SAMPLE_LEAST,
-    TAKES_TOUCH,
     Flag,
     Mac,
     Sample,
@@ -28,7 +25,6 @@ from pretouch.sim.plant import Plant, PointForce
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.range_finder import RangeFinderParams
 from pretouch.sim.scene import SceneSpec
-from pretouch.types import TouchStatus
 
 SESSION = Mac(bytes(range(32)))
 PLAIN = Sample(*[7, 0, 1, 5_000_000], *[0] * 13, 2, *[0] * 4, imu=bytes(24))
@@ -126,26 +122,3 @@ def test_a_skin_without_touch_sensors_sends_the_samples_it_always_did(arm, paper
         samples = [received.sample for received in wire.receiver.take_samples()]
     assert samples
     assert not any(sample.flags & Flag.TOUCH or sample.touch for sample in samples)
-
-
-def test_a_unit_sends_no_touch_to_a_receiver_that_does_not_take_it(arm, panda_model, paper_skin, monkeypatch):
-    monkeypatch.setattr("pretouch.hardware.link.TAKES_TOUCH", 0)
-    skin = feeling(paper_skin, panda_model, 0)
-    with WireSkin(arm, skin, RangeFinderParams(), FleetParams(), 0, LinkParams(), Presser(arm, skin)) as wire:
-        arm.advance(2.0)
-        assert wire.touch() is None
-        assert sum(unit.accepted for unit in wire.receiver.units) > 500
-        assert sum(wire.receiver.rejected.values()) == 0
-    assert TAKES_TOUCH == 1
-    assert HELLO_SIZE == 42
-
-
-def test_a_receiver_forgets_touches_when_the_clock_stood_still(arm, panda_model, paper_skin):
-    skin = feeling(paper_skin, panda_model, 0)
-    with WireSkin(arm, skin, RangeFinderParams(), FleetParams(), 0, laid=Presser(arm, skin)) as wire:
-        arm.advance(2.0)
-        told = wire.touch()
-        assert told is not None
-        assert told.status[0] == TouchStatus.OK
-        wire.receiver.forget_times()
-        assert wire.touch() is None

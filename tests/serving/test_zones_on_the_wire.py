@@ -13,11 +13,11 @@ from pretouch.hardware.health import HealthParams, UnitWindow
 from pretouch.hardware.wire import (
     IMU_MOST,
     SAMPLE_LEAST,
+    SAMPLE_MOST,
     Flag,
     Mac,
     Sample,
     decode_sample,
-    largest_sample,
     sample_size,
     zones_size,
 )
@@ -32,7 +32,6 @@ from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import Box, SceneSpec
-from pretouch.types import RangeStatus
 
 SESSION = Mac(bytes(range(32)))
 PLAIN = Sample(*[7, 1, 1, 5_000_000], *[0] * 13, 2, *[0] * 4, imu=bytes(24))
@@ -54,8 +53,7 @@ def test_the_largest_sample_fits_a_frame_of_ethernet():
     most = replace(
         PLAIN, flags=1 | Flag.TOUCH | Flag.ZONES, imu_count=IMU_MOST, imu=bytes(12 * 32), touch=bytes(12), zones=zones
     )
-    assert len(most.encode(SESSION)) == largest_sample([1, 4, 8]) == 796 < 1472
-    assert largest_sample([1, 1]) == 474
+    assert len(most.encode(SESSION)) == SAMPLE_MOST == 796 < 1472
     assert zones_size(4) == 82
 
 
@@ -152,24 +150,6 @@ def test_a_unit_with_zones_has_one_imu_in_its_own_axes(arm, panda_model, zoned, 
         batches = skin.receiver.take_imu()
     assert {batch.unit for batch in batches} == {0, 1, 2}
     assert sent == [(int(zoned.first[unit]), counts) for unit, counts in true]
-
-
-def test_a_receiver_that_takes_no_zones_gets_the_nearest(arm, panda_model, zoned, monkeypatch):
-    monkeypatch.setattr("pretouch.hardware.link.TAKES_ZONES", 0)
-    rows = []
-    with WireSkin(arm, zoned, RangeFinderParams(), FleetParams(), 0) as skin:
-        RangeFinders(arm, zoned, RangeFinderParams(), 0, lambda s: rows.append((s.unit, s.distance, s.status)))
-        arm.advance(1.0)
-        samples = [one for one in skin.receiver.take_samples() if one.unit == 0]
-        assert not any(one.sample.zones or one.sample.flags & Flag.ZONES for one in samples)
-        assert skin.receiver.units[0].misfits == sum(one.sample.flags & 1 for one in samples) > 30
-        assert skin.read().status[:16].tolist() == [RangeStatus.NONE] * 16, "it is not known where the nearest is"
-        assert skin.read().status[16] != RangeStatus.NONE
-        health = judged(skin, 1)
-    measured = np.array([row[1:] for row in rows if row[0] < 16]).reshape(-1, 16, 2)
-    nearest = {round(1000 * min((s not in (0, 13), d) for d, s in frame)[1]) for frame in measured.tolist()}
-    assert {one.sample.range_mm for one in samples if one.sample.flags & 1} <= nearest
-    assert [(f.unit, f.level) for f in health if f.what == "zones"] == [("hand_left", "fault"), ("hand_front", "fault")]
 
 
 def judged(skin: WireSkin, time: float):

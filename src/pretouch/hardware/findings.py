@@ -234,13 +234,6 @@ def _unit_itself(unit: UnitHealth, params: HealthParams) -> Iterator[Finding]:
             f"{name} restarted {unit.reboots} times in {params.window_s:g} s (limit {params.reboots}):"
             f" {_ENDS.get(unit.standing.reset, 'check its supply and firmware')}.",
         )  # fmt: skip
-    firmware = unit.standing.firmware
-    if firmware and firmware < params.firmware:
-        yield Finding(
-            name, "fault", "firmware",
-            f"{name} runs firmware {version(firmware)} (oldest supported: {version(params.firmware)}): flash it again"
-            " (docs/how-to/flashing.md).",
-        )  # fmt: skip
 
 
 def _beyond(
@@ -262,8 +255,3 @@ def _formatted(value: float, limit: float, digits: int = 0) -> str:
     while digits < _MOST_DIGITS and f"{value:.{digits}f}" == f"{limit:.{digits}f}":
         digits += 1
     return f"{value:.{digits}f}"
-
-
-def version(firmware: int) -> str:
-    """Return a firmware version as text."""
-    return f"{firmware >> 8}.{firmware & 0xFF}"

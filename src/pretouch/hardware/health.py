@@ -5,11 +5,11 @@ from collections import Counter, deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
 from itertools import pairwise
-from typing import Annotated, Self
+from typing import Self
 
 import numpy as np
 
-from pretouch.checks import Check, Checked, Fraction, Positive, PositiveCount
+from pretouch.checks import Checked, Fraction, Positive, PositiveCount
 from pretouch.hardware.traffic import Received, UnitState, UnitTraffic
 from pretouch.hardware.wire import NO_TEMPERATURE, Flag, Reset, Sample, touch_part
 from pretouch.types import FloatArray, RangeStatus, TouchStatus
@@ -77,8 +77,6 @@ class HealthParams(Checked):
     """Largest share of IMU samples lost beyond those in lost datagrams: its FIFO ran over."""
     reboots: PositiveCount = 1
     """Reboots within the window that are warned of; each is a second of silence."""
-    firmware: Annotated[int, Check(low=0, high=0xFFFF)] = 0x0001
-    """Oldest firmware that is served: major version * 256 + minor version."""
 
 
 _MAD_TO_SIGMA = 1.4826

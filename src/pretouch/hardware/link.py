@@ -16,8 +16,6 @@ from pretouch.hardware.wire import (
     CHALLENGE_SIZE,
     NONCE_SIZE,
     PREFIX,
-    TAKES_TOUCH,
-    TAKES_ZONES,
     Beacon,
     Hello,
     Mac,
@@ -34,10 +32,6 @@ _CHALLENGE = slice(PREFIX.size + 4, PREFIX.size + 4 + CHALLENGE_SIZE)
 """Of a hello."""
 _REMEMBERED = 64
 """Beacons of a session whose instants are kept."""
-_CHALLENGES = 256
-"""Of one unit, that are remembered as answered."""
-_IN_VAIN = 5
-"""Answers to a challenge after which it comes last, unless its unit takes one."""
 _ROUNDING_S = 1e-9
 
 
@@ -52,17 +46,9 @@ class LinkParams(Checked):
     pending_most: PositiveCount = 4
     """Most sessions offered to one unit at once."""
     pending_expiry_s: Positive = 5.0
-    """How long an offer stands after the last hello that asked for it [s]."""
-    pending_longest_s: Positive = 30.0
-    """How long an offer stands at most [s], however often it is asked for: recorded hellos must not keep it."""
+    """How long an offer stands [s]."""
     answers_per_s: Annotated[float, Check(low=1.0)] = 20.0
     """Most hellos of one unit that are answered in a second; a unit says ten."""
-    tries_per_s: Annotated[float, Check(low=1.0)] = 200.0
-    """Most samples of one unit that are tried against its offers in a second, so that offers nobody takes do not make
-    a flood of forged samples five times as dear; a unit sends fifty."""
-    samples_per_s: Annotated[float, Check(low=1.0)] = 200.0
-    """Most genuine samples of one unit that are taken in a second, so that the holder of one key costs no more than
-    four units; a unit sends fifty, and no more than a hundred."""
     drift_ppm: Positive = 50.0
     """Largest difference in rate between a unit's clock and the host's [1e-6] (crystals of 20 ppm, their temperature,
     and the steering of the host's clock)."""
@@ -121,12 +107,8 @@ class RateLimiter:
         self._spent_to = -math.inf
         """Up to when all that comes in is spent [s]; the last second's is what can be left."""
 
-    def left(self, now: float) -> float:
-        """Return how many are left at an instant [s]."""
-        return self.rate * min(now - self._spent_to, 1.0)
-
     def spend(self, now: float) -> bool:
-        """Spend one if there is one; return whether there was."""
+        """Spend one if there is one left at an instant [s]; return whether there was."""
         spent_to = max(self._spent_to, now - 1.0) + 1.0 / self.rate
         if spent_to > now + _ROUNDING_S:
             return False
@@ -134,41 +116,13 @@ class RateLimiter:
         return True
 
 
-class AnsweredChallenges:
-    """How often challenges were answered without being taken: those of recorded hellos, answered in vain, come last."""
-
-    def __init__(self) -> None:
-        self._answers: dict[bytes, tuple[int, float]] = {}
-
-    def answers(self, challenge: bytes) -> tuple[int, float]:
-        """Return how often a challenge was answered, and when last [s]."""
-        return self._answers.get(challenge, (0, -math.inf))
-
-    def exhausted(self, challenge: bytes) -> bool:
-        """Whether a challenge was answered so often in vain that its unit hardly waits for another answer."""
-        return self.answers(challenge)[0] >= _IN_VAIN
-
-    def add(self, challenge: bytes, now: float, times: int = 1) -> None:
-        """Count an answer; the challenge answered longest ago makes room."""
-        count = self.answers(challenge)[0] + times
-        self._answers.pop(challenge, None)
-        self._answers[challenge] = count, now
-        if len(self._answers) > _CHALLENGES:
-            del self._answers[next(iter(self._answers))]
-
-    def __len__(self) -> int:
-        return len(self._answers)
-
-
 class Session:
     """One challenge of a unit and one nonce of the receiver."""
 
-    def __init__(self, key: Mac, hello: Hello, nonce: bytes, now: float, index: int, zones: bool) -> None:
-        self.hello, self.nonce, self._zones = hello, nonce, zones
-        self.index = index
-        """Its place in the order in which the unit's sessions were offered."""
-        self.offered = self.asked = now
-        """When it was offered, and asked for last [s]."""
+    def __init__(self, key: Mac, hello: Hello, nonce: bytes, now: float) -> None:
+        self.hello, self.nonce = hello, nonce
+        self.offered = now
+        """When it was offered [s]."""
         self.mac = session_mac(key, hello.challenge, nonce)
         self.window = ReplayWindow()
         self.number = 0
@@ -181,23 +135,19 @@ class Session:
         self.number += 1
         self.sent[self.number] = now
         self.sent.pop(self.number - _REMEMBERED, None)
-        takes = TAKES_TOUCH | (TAKES_ZONES if self._zones else 0)
-        return Beacon(self.hello.unit, self.number, self.nonce, takes).encode(key, self.hello.challenge)
+        return Beacon(self.hello.unit, self.number, self.nonce).encode(key, self.hello.challenge)
 
 
 class Link:
     """What the receiver knows of one unit's sessions."""
 
-    def __init__(self, key: bytes, params: LinkParams, draw: Callable[[int], bytes], zones: bool = False) -> None:
-        """Know of no session; `draw` gives so many random bytes. With `zones`, samples may carry those."""
-        self._zones = zones
+    def __init__(self, key: bytes, params: LinkParams, draw: Callable[[int], bytes]) -> None:
+        """Know of no session; `draw` gives so many random bytes."""
         self._key, self._params, self._draw = Mac(key), params, draw
         self.live: Session | None = None
         self._pending: dict[bytes, Session] = {}
-        self._offers = 0
-        self._answers, self._tries = RateLimiter(params.answers_per_s), RateLimiter(params.tries_per_s)
-        self._samples = RateLimiter(params.samples_per_s)
-        self._answered = AnsweredChallenges()
+        """Sessions on offer by their challenge, the oldest first."""
+        self._answers = RateLimiter(params.answers_per_s)
         self.beacon_due = math.inf
         """When the live session's next beacon is to be sent [s]; never while there is none."""
 
@@ -206,30 +156,17 @@ class Link:
         challenge = bytes(datagram[_CHALLENGE])
         if self.live is not None and challenge == self.live.hello.challenge:
             return "old hello"
-        if not self._affordable(challenge, now):
-            return "too many hellos"
         hello = decode_hello(datagram, self._key)
         if hello is None:
             return "tag"
-        session = self._pending.get(challenge) or self._offer(hello, now)
-        if session is None:
+        if not self._answers.spend(now):
             return "too many hellos"
-        session.asked = now
-        self._answers.spend(now)
-        self._answered.add(challenge, now)
-        return session.beacon(self._key, now)
-
-    def _offer(self, hello: Hello, now: float) -> Session | None:
-        """Offer a session, in the place of the oldest if there are enough; None if others go before."""
         pending = self._pending
-        if len(pending) >= self._params.pending_most:
-            exhausted = next((challenge for challenge in pending if self._answered.exhausted(challenge)), None)
-            if exhausted is None and self._answered.exhausted(hello.challenge):
-                return None
-            del pending[next(iter(pending)) if exhausted is None else exhausted]
-        self._offers += 1
-        pending[hello.challenge] = Session(self._key, hello, self._draw(NONCE_SIZE), now, self._offers, self._zones)
-        return pending[hello.challenge]
+        if challenge not in pending:
+            if len(pending) >= self._params.pending_most:
+                del pending[next(iter(pending))]
+            pending[challenge] = Session(self._key, hello, self._draw(NONCE_SIZE), now)
+        return pending[challenge].beacon(self._key, now)
 
     def sample(self, datagram: memoryview, sequence: int, now: float) -> tuple[Session, Sample, int] | str:
         """Return the session of what looks like a sample, what it says, and how many it shows to be lost.
@@ -242,31 +179,27 @@ class Link:
         if self.live is not None and self.live.window.admits(sequence):
             sample = decode_sample(datagram, self.live.mac)
             if sample is not None:
-                if not self._samples.spend(now):
-                    return "too fast"
                 return self.live, sample, self.live.window.take(sequence)
             reason = "tag"
-        if self._pending and not self._tries.spend(now):
-            return "too many samples"
         for session in self._pending.values():
             sample = decode_sample(datagram, session.mac) if session.window.admits(sequence) else None
             if sample is not None:
-                return session, sample, session.window.take(sequence) + self._go_live(session, now)
+                return session, sample, session.window.take(sequence) + self._go_live(session)
             reason = "tag"
         return reason
 
-    def _go_live(self, session: Session, now: float) -> int:
+    def _go_live(self, session: Session) -> int:
         """Let a session be the live one; return how many of the last one's samples never came.
 
         The unit that took it no longer heeds what was offered before: a sample held back until now must not bring it
         back.
         """
-        given_up = self.live.window.missing() if self.live else 0
+        lost = self.live.window.missing() if self.live else 0
         self.live = session
-        self._pending = {c: s for c, s in self._pending.items() if s.index > session.index}
-        self._answered.add(session.hello.challenge, now, _IN_VAIN)
+        offers = list(self._pending.items())
+        self._pending = dict(offers[offers.index((session.hello.challenge, session)) + 1 :])
         self.beacon_due = session.sent[session.number] + self._params.beacon_period_s
-        return given_up
+        return lost
 
     def beacon(self, now: float) -> bytes:
         """Return the live session's next beacon, to be sent at once; without a live session there is none."""
@@ -275,27 +208,8 @@ class Link:
         self.beacon_due = now + self._params.beacon_period_s
         return self.live.beacon(self._key, now)
 
-    def forget_offers(self) -> None:
-        """Take back what is offered."""
-        self._pending.clear()
-
     def expire(self, now: float) -> None:
         """Forget offers that were not taken."""
-        if not self._pending:
-            return
-        expiry, longest = self._params.pending_expiry_s, self._params.pending_longest_s
         for challenge, session in list(self._pending.items()):
-            if now - session.asked > expiry or now - session.offered > longest:
+            if now - session.offered > self._params.pending_expiry_s:
                 del self._pending[challenge]
-
-    def _affordable(self, challenge: bytes, now: float) -> bool:
-        """Whether a challenge may have an answer.
-
-        While answers are scarce it gets one a second, and none after five that its unit did not take: so recorded
-        hellos, sent again and again, do not use up the answers that a unit needs.
-        """
-        left = self._answers.left(now)
-        if left >= 0.5 * self._answers.rate:
-            return True
-        count, last = self._answered.answers(challenge)
-        return left >= 1.0 - _ROUNDING_S and count < _IN_VAIN and now - last >= 1.0

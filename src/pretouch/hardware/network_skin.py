@@ -83,7 +83,7 @@ class NetworkSkin:
         theirs.close()
         try:
             with ours:
-                self.address, self.buffer_bytes, self.filtered = _wait_listening(ours)
+                self.address, self.buffer_bytes = _wait_listening(ours)
         except BaseException:
             self.close()
             raise
@@ -150,8 +150,8 @@ class NetworkSkin:
         del self._samples[:-most], self._imu[:-most]
 
 
-def _wait_listening(started: Connection) -> tuple[tuple[str, int], int, bool]:
-    """Wait for the receiver to listen: return its address, length of queue [B], and whether the kernel filters."""
+def _wait_listening(started: Connection) -> tuple[tuple[str, int], int]:
+    """Wait for the receiver to listen: return its address, and the length of its queue [B]."""
     try:
         answer = (
             started.recv()

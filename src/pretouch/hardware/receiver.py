@@ -16,7 +16,7 @@ from pretouch.errors import HardwareError
 from pretouch.hardware.keys import Keys, UnitKey
 from pretouch.hardware.link import LinkParams
 from pretouch.hardware.traffic import REASONS, ImuBatch, Received, UnitTraffic, imu_batch
-from pretouch.hardware.udp import attach_filter, bind
+from pretouch.hardware.udp import bind
 from pretouch.hardware.unit_endpoint import NO_READING, NO_TOUCH, Address, UnitEndpoint
 from pretouch.hardware.wire import (
     HELLO_SIZE,
@@ -24,7 +24,6 @@ from pretouch.hardware.wire import (
     SAMPLE_LEAST,
     VERSION,
     Kind,
-    largest_sample,
     sample_size,
 )
 from pretouch.sensing.network import NetworkUnits
@@ -121,8 +120,6 @@ class SkinReceiver:
         self._buffer = bytearray(2048)
         self._view = memoryview(self._buffer)
         self._socket = bind(host, port, 1024 * self._params.buffer_kib)
-        self.filtered = attach_filter(self._socket, largest_sample(sides))
-        """Whether the kernel drops, uncounted, what is not ours by its size, magic, version or kind."""
         self._poll = select.poll()
         self._poll.register(self._socket, select.POLLIN)
         host, port = self._socket.getsockname()[:2]
@@ -170,13 +167,6 @@ class SkinReceiver:
                 return self._drain()[0]
             self._send_due_beacons()
         return 0
-
-    def forget_times(self) -> None:
-        """Know no reading and no unit's clock until the next beacons are echoed: the host's clock stood still."""
-        now = self._clock()
-        for endpoint in self._endpoints:
-            endpoint.forget_time(now)
-        self._next_beacon_check = now
 
     def readings(self) -> RangeReadings:
         """Return the newest reading of each unit and zone, stamped with the earliest instant it can be of."""

@@ -4,9 +4,8 @@ import gc
 import os
 import pickle
 import struct
-import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from signal import SIGINT
@@ -17,7 +16,7 @@ from pretouch.hardware.link import LinkParams
 from pretouch.hardware.mailbox import Mailbox, Ring
 from pretouch.hardware.receiver import SkinReceiver
 from pretouch.hardware.traffic import Received, UnitTraffic
-from pretouch.hardware.wire import SAMPLE_MOST, TAG_SIZE, largest_sample, sample_of
+from pretouch.hardware.wire import SAMPLE_MOST, TAG_SIZE, sample_of
 from pretouch.sensing.network import NetworkUnits
 from pretouch.signals import leave_to_parent
 
@@ -30,9 +29,6 @@ _TRAFFIC_PERIOD_S = 0.5
 """Time between two accounts of the traffic [s]."""
 _WAIT_S = 0.05
 """Longest wait for a datagram [s]."""
-
-_SUSPENDED_S = 0.02
-"""Growth of the time spent suspended that counts [s]."""
 
 _RECORD = struct.Struct("<Hdddd")
 """Index of the unit; arrival, stamp, offset, bound; then the datagram without its tag."""
@@ -55,11 +51,10 @@ class SharedOutputs:
     def __init__(self, units: NetworkUnits | Sequence[str], samples_most: int) -> None:
         self.network = NetworkUnits.of(units)
         """Whose they are."""
-        ids, largest = self.network.ids, largest_sample(self.network.zones)
         self._readings = Mailbox(24 * self.network.rows)
         self._touch = Mailbox(32 * self.network.rows)
-        self._traffic = Mailbox(4096 + sum(2048 + largest - SAMPLE_MOST + len(id.encode()) for id in ids))
-        self._samples = Ring(samples_most, _RECORD.size + largest - TAG_SIZE)
+        self._traffic = Mailbox(4096 + sum(2560 + len(id.encode()) for id in self.network.ids))
+        self._samples = Ring(samples_most, _RECORD.size + SAMPLE_MOST - TAG_SIZE)
 
     def put_readings(self, table: bytes) -> None:
         """Give stamps, distances and statuses, (3, K) float64."""
@@ -114,30 +109,6 @@ def _unpack(record: bytes) -> Received:
     return Received(index, arrival, stamp, offset, bound, sample)
 
 
-def suspended() -> float:
-    """Return for how long the machine was suspended since it started, or a little less [s]; 0 where it cannot tell."""
-    if sys.platform != "linux":
-        return 0.0
-    whole = time.clock_gettime(time.CLOCK_BOOTTIME)
-    return whole - time.clock_gettime(time.CLOCK_MONOTONIC)
-
-
-class SuspendWatch:
-    """Notices that the machine was suspended: `time.monotonic` stood still, and what was measured before looks new."""
-
-    def __init__(self, suspended: Callable[[], float] = suspended) -> None:
-        """Count from now on what `suspended` tells, which may be too little at times but never too much [s]."""
-        self._suspended = suspended
-        self._most = max(suspended() for _ in range(3))
-
-    def noticed(self) -> bool:
-        """Return whether it was since the last call."""
-        known, told = self._most, self._suspended()
-        if told > known:
-            self._most = told
-        return told - known > _SUSPENDED_S
-
-
 def _set_priority(priority: int | None) -> None:
     if priority is None:
         return
@@ -154,21 +125,16 @@ class ReceiverService:
     """A receiver whose readings and samples go to outlets."""
 
     def __init__(
-        self, units: tuple[UnitKey, ...], address: tuple[str, int], params: LinkParams, outputs: SharedOutputs,
-        suspended: Callable[[], float] = suspended,
-    ) -> None:  # fmt: skip
-        """Listen; see `SkinReceiver` and `SuspendWatch`."""
+        self, units: tuple[UnitKey, ...], address: tuple[str, int], params: LinkParams, outputs: SharedOutputs
+    ) -> None:
+        """Listen; see `SkinReceiver`."""
         self._records: list[bytes] = []
         self.receiver = SkinReceiver(outputs.network, Keys(units), *address, params=params, deliver=self._keep)
-        self._outputs, self._watch = outputs, SuspendWatch(suspended)
+        self._outputs = outputs
 
     def step(self) -> None:
         """Wait for datagrams if none are there, and give away what they brought."""
-        accepted = self.receiver.receive(_WAIT_S)
-        if self._watch.noticed():
-            self.receiver.forget_times()
-            self._records.clear()
-        elif not accepted:
+        if not self.receiver.receive(_WAIT_S):
             return
         self._outputs.put_readings(self.receiver.table.tobytes())
         self._outputs.put_touch(self.receiver.touch_table.tobytes())
@@ -200,7 +166,7 @@ def serve(
     gc.freeze()
     receiver = service.receiver
     with receiver:
-        started.send((receiver.address, receiver.buffer_bytes, receiver.filtered))
+        started.send((receiver.address, receiver.buffer_bytes))
         started.close()
         report_at = -1.0
         while True:

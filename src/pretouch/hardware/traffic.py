@@ -19,15 +19,12 @@ REASONS = (
     "tag",
     "replayed",
     "no session",
-    "too many samples",
-    "too fast",
     "too many hellos",
     "old hello",
 )
 """Why datagrams are thrown away: no size, or no magic, version and kind, of ours; a unit this skin lacks; a wrong tag;
-a sequence number seen already or long past; a sample of a unit without session, or more of them than are tried against
-the sessions on offer; genuine samples at a rate no unit has; more hellos than are answered; a hello of the very session
-that is live."""
+a sequence number seen already or long past; a sample of a unit without session; more hellos than are answered; a hello
+of the very session that is live."""
 
 
 @dataclass(slots=True)

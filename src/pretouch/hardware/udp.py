@@ -1,15 +1,12 @@
-"""A UDP socket that withstands a flood: a long queue, and a kernel filter where there is one."""
+"""A UDP socket with as long a queue as the system gives."""
 
-import ctypes
 import errno
 import socket
-import struct
 import sys
 
 from pretouch.errors import HardwareError
-from pretouch.hardware.wire import HELLO_SIZE, MAGIC, SAMPLE_LEAST, SAMPLE_MOST, VERSION, Kind
 
-_SO_RCVBUFFORCE, _SO_ATTACH_FILTER = 33, 26
+_SO_RCVBUFFORCE = 33
 """Of Linux."""
 
 
@@ -54,45 +51,3 @@ def _widen(opened: socket.socket, buffer_bytes: int) -> None:
             opened.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, buffer_bytes)
     else:
         opened.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, buffer_bytes)
-
-
-def attach_filter(opened: socket.socket, sample_most: int = SAMPLE_MOST) -> bool:
-    """Let the kernel drop what has not size, magic, version and kind of hello or sample; return whether it does.
-
-    Samples are of `sample_most` bytes at most.
-    """
-    if sys.platform != "linux":
-        return False
-    program = _program(sample_most)
-    code = ctypes.create_string_buffer(program, len(program))
-    # struct sock_fprog: number of instructions, pointer to them
-    wanted = struct.pack("HP", len(program) // _INSTRUCTION.size, ctypes.addressof(code))
-    try:
-        opened.setsockopt(socket.SOL_SOCKET, _SO_ATTACH_FILTER, wanted)
-    except OSError:
-        return False
-    return True
-
-
-_INSTRUCTION = struct.Struct("HBBI")
-"""Of classic BPF: code, steps if true, steps if false, constant."""
-_LENGTH, _WORD, _EQUAL, _AT_LEAST, _ABOVE, _RETURN = 0x80, 0x20, 0x15, 0x35, 0x25, 0x06
-_UDP_HEADER = 8
-"""What the filter sees in front of the datagram [B]."""
-
-
-def _program(sample_most: int) -> bytes:
-    start = [int.from_bytes(MAGIC + bytes([VERSION, kind]), "big") for kind in (Kind.SAMPLE, Kind.HELLO)]
-    steps = [
-        (_WORD, 0, 0, _UDP_HEADER),
-        (_EQUAL, 3, 0, start[0]),
-        (_EQUAL, 0, 5, start[1]),
-        (_LENGTH, 0, 0, 0),
-        (_EQUAL, 4, 3, HELLO_SIZE + _UDP_HEADER),
-        (_LENGTH, 0, 0, 0),
-        (_AT_LEAST, 0, 1, SAMPLE_LEAST + _UDP_HEADER),
-        (_ABOVE, 0, 1, sample_most + _UDP_HEADER),
-        (_RETURN, 0, 0, 0),
-        (_RETURN, 0, 0, 0xFFFF),
-    ]
-    return b"".join(_INSTRUCTION.pack(*step) for step in steps)

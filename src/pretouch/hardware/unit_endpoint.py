@@ -85,7 +85,7 @@ class UnitEndpoint:
         self.address: Address | None = None
         """Where its last sample came from, as the socket knows it."""
         self._index, self._params = index, params
-        self._link = Link(unit.key, params, draw, zones > 1)
+        self._link = Link(unit.key, params, draw)
         self._clock = UnitClock(1e-6 * params.drift_ppm, params.clock_window_s)
         self._stuck = StuckDetector(params.stuck_after_s)
         self._session: Session | None = None
@@ -154,15 +154,6 @@ class UnitEndpoint:
         traffic.firmware, traffic.reset = session.hello.firmware, session.hello.reset
         self._session, self._trusted_from, self._echoed = session, 0, 0
         self._clock.forget()
-
-    def forget_time(self, now: float) -> None:
-        """Know nothing of the unit's clock, and have no reading, until it echoes a beacon sent from an instant on."""
-        self._clock.forget()
-        self._link.forget_offers()
-        self._distrust_beacons(now)
-        traffic = self.traffic
-        traffic.offset, traffic.bound, traffic.last_reading_stamp = math.nan, math.inf, -math.inf
-        self._reading[:], self._touch[:] = NO_READING, NO_TOUCH
 
     def _distrust_beacons(self, now: float) -> None:
         """Take the time from no beacon that was sent already, and send another soon."""

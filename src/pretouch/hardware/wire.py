@@ -10,7 +10,6 @@ Three kinds, all little-endian, each ended by the first 16 bytes of an HMAC-SHA2
 """
 
 import struct
-from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum, IntFlag
 from hashlib import sha256
@@ -32,8 +31,8 @@ PREFIX = struct.Struct("<2sBBH")
 """Magic, version, kind, number of the unit."""
 HELLO = struct.Struct("<HBB8sQ")
 """After the prefix: firmware version, cause of the last reset, 0, challenge, time since it began to serve [us]."""
-BEACON = struct.Struct("<HI8s")
-"""After the prefix: what the receiver takes besides (`TAKES_TOUCH`), number of the beacon, nonce of the session."""
+BEACON = struct.Struct("<I8s")
+"""After the prefix: number of the beacon, nonce of the session."""
 SAMPLE = struct.Struct("<HIQIIHhHBBHIHHHHBBHII")
 """After the prefix: the fields of `Sample` in their order, to `imu_age_us`; `imu_count` IMU samples follow."""
 IMU_SAMPLE = struct.Struct("<6h")
@@ -47,8 +46,6 @@ ZONES = struct.Struct("<BB")
 order of `pretouch.sensing.skin.Skin`."""
 ZONE = np.dtype([("mm", "<u2"), ("sigma", "<u2"), ("status", "u1")])
 """What a zone measured: as `range_mm`, `range_sigma` and `range_status` of a `Sample`."""
-TAKES_TOUCH, TAKES_ZONES = 1, 2
-"""In a beacon: a sample may carry a touch reading, or the zones of a range. A unit that is not told so sends none."""
 IMU_MOST = 32
 """Most IMU samples in a datagram."""
 
@@ -56,8 +53,8 @@ HELLO_SIZE = PREFIX.size + HELLO.size + TAG_SIZE
 BEACON_SIZE = PREFIX.size + BEACON.size + TAG_SIZE
 SAMPLE_LEAST = PREFIX.size + SAMPLE.size + TAG_SIZE
 """Size of a sample without any of the IMU [B]."""
-SAMPLE_MOST = SAMPLE_LEAST + IMU_MOST * IMU_SAMPLE.size + TOUCH.size
-"""Size of the largest sample of a range finder without zones [B]."""
+SAMPLE_MOST = SAMPLE_LEAST + IMU_MOST * IMU_SAMPLE.size + TOUCH.size + ZONES.size + MOST_ZONES**2 * ZONE.itemsize
+"""Size of the largest sample [B]."""
 _COUNT_AT = PREFIX.size + struct.calcsize("<HIQIIHhHBBHIHHHH")
 """Where a sample says how many IMU samples it has."""
 
@@ -177,12 +174,10 @@ class Beacon:
     number: int
     """Grows with each beacon of a session, from 1."""
     nonce: bytes
-    takes: int = 0
-    """What samples may carry besides: `TAKES_TOUCH`, `TAKES_ZONES`."""
 
     def encode(self, key: Mac, challenge: bytes) -> bytes:
         """As a datagram under the unit's key, for the unit that sent this challenge."""
-        body = PREFIX.pack(MAGIC, VERSION, Kind.BEACON, self.unit) + BEACON.pack(self.takes, self.number, self.nonce)
+        body = PREFIX.pack(MAGIC, VERSION, Kind.BEACON, self.unit) + BEACON.pack(self.number, self.nonce)
         return body + key.tag(_BEACON_LABEL, challenge, body)
 
 
@@ -196,8 +191,8 @@ def decode_beacon(datagram: bytes, key: Mac, challenge: bytes) -> Beacon | None:
         return None
     if not compare_digest(key.tag(_BEACON_LABEL, challenge, body), datagram[-TAG_SIZE:]):
         return None
-    takes, number, nonce = BEACON.unpack_from(body, PREFIX.size)
-    return Beacon(unit, number, nonce, takes)
+    number, nonce = BEACON.unpack_from(body, PREFIX.size)
+    return Beacon(unit, number, nonce)
 
 
 @dataclass(slots=True)
@@ -302,11 +297,6 @@ def sample_size(datagram: bytes | memoryview) -> int:
         side = datagram[at] if at < len(datagram) else 0
         size = size + zones_size(side) if 1 <= side <= MOST_ZONES else 0
     return size
-
-
-def largest_sample(sides: Sequence[int]) -> int:
-    """Return the size of the largest sample of units with so many zones along a side each [B]."""
-    return SAMPLE_MOST + max((zones_size(side) for side in sides if side > 1), default=0)
 
 
 def zones_size(side: int) -> int:

@@ -14,8 +14,6 @@ from pretouch.hardware.wire import (
     IMU_SAMPLE,
     LONGEST_US,
     NO_FORCE,
-    TAKES_TOUCH,
-    TAKES_ZONES,
     ZONE,
     ZONES,
     Flag,
@@ -118,7 +116,7 @@ class SimulatedUnit:
         """Leave the session; what it was under is never used again."""
         self._session: Mac | None = None
         self._challenge, self._nonce = self._rng.bytes(CHALLENGE_SIZE), b""
-        self._sequence = self._beacon = self._takes = 0
+        self._sequence = self._beacon = 0
         self._heard = -np.inf
 
     @property
@@ -149,16 +147,16 @@ class SimulatedUnit:
             self._touch = sample
 
     def _touch_part(self, now: float) -> bytes:
-        """Return its touch reading for a receiver that takes one, else nothing."""
+        """Return its touch reading, if it has one."""
         seen = self._touch
-        if seen is None or not self._takes & TAKES_TOUCH:
+        if seen is None:
             return b""
         force = NO_FORCE if np.isnan(seen.force) else round(1e3 * seen.force)
         return TouchPart(int(seen.contact), TouchStatus.OK, 0, force, self._since(seen.time, now)).encode()
 
     def _zones_part(self) -> bytes:
-        """Return the zones of a new range for a receiver that takes them, else nothing."""
-        if self._zones == 1 or not (self._range_new and self._takes & TAKES_ZONES):
+        """Return the zones of a new range, if it has some."""
+        if self._zones == 1 or not self._range_new:
             return b""
         rows = [(_field(seen.distance, 1e3), _field(seen.sigma, 4e3), seen.status) for seen in self._range]
         return ZONES.pack(self._zones, 0) + np.array(rows, ZONE).tobytes()
@@ -194,7 +192,7 @@ class SimulatedUnit:
             self._session, self._nonce = session_mac(self._mac, self._challenge, beacon.nonce), beacon.nonce
         elif beacon.nonce != self._nonce or beacon.number <= self._beacon:
             return
-        self._beacon, self._heard, self._takes = beacon.number, now, beacon.takes
+        self._beacon, self._heard = beacon.number, now
 
     def tick(self, now: float) -> list[bytes]:
         """Do what is due at a time [s], and return the datagrams to send."""
@@ -278,7 +276,7 @@ _SHOWS = (
 
 
 def _nearest(zones: list[RangeSample]) -> RangeSample:
-    """Return the zone with the nearest target: what a receiver is told that takes one range alone."""
+    """Return the zone with the nearest target."""
     return min(zones, key=lambda seen: (seen.status not in _SHOWS, seen.distance))
 
 

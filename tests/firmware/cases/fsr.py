@@ -85,10 +85,9 @@ def a_broken_lead_is_a_failure_and_no_touch():
     assert not sensor.failed
 
 
-def _unit(takes=1):
+def _unit():
     sensor, pin = _sensor()
     unit = FakeUnit(touch=sensor)
-    unit.receiver.takes = takes
     unit.run(SECOND)
     return unit, pin
 
@@ -125,17 +124,8 @@ def a_broken_sensor_is_told_as_such():
     assert (contact, status, raw, force) == (0, 1, 2, 0xFFFFFFFF)
 
 
-def a_receiver_that_takes_no_touch_gets_the_samples_it_knows():
-    unit, pin = _unit(takes=0)
-    pin.press(2)
-    samples = unit.run(SECOND)
-    assert len(samples) >= 49
-    assert not any(s["flags"] & TOUCH for s in samples)
-
-
 def a_unit_without_a_sensor_says_nothing_of_touch():
     unit = FakeUnit()
-    unit.receiver.takes = 1
     samples = unit.run(2 * SECOND)
     assert len(samples) > 50
     assert not any(s["flags"] & TOUCH for s in samples)

@@ -55,7 +55,6 @@ class FakeReceiver:
         self.samples = []
         self.session = None
         self.number = 0
-        self.takes = 0
 
     def send(self, datagram):
         datagram = bytes(datagram)
@@ -73,7 +72,7 @@ class FakeReceiver:
         return self.hellos[-1][3]
 
     def beacon(self, number, nonce, challenge, unit=None):
-        body = struct.pack("<2sBBHHI8s", b"PT", 1, 2, unit or self.unit, self.takes, number, nonce)
+        body = struct.pack("<2sBBHI8s", b"PT", 1, 2, unit or self.unit, number, nonce)
         datagram = body + self.mac.whole(b"PT1BEACN", challenge, body)[:16]
         assert len(datagram) == BEACON_SIZE
         return datagram
