@@ -49,7 +49,7 @@ def test_a_file_others_can_get_at_is_refused(tmp_path, mode):
         ("[hand]\nnumber = 1", "a number and a key"),
         (f"[hand]\nnumber = 1\nkey = '{'0' * 62}'", "31 bytes, not 32"),
         (f"[hand]\nnumber = 1\nkey = '{'x' * 64}'", "hexadecimal"),
-        ("[hand]\nnumber = 1\nkey = 5", "not text"),
+        ("[hand]\nnumber = 1\nkey = 5", "hexadecimal"),
         (f"[hand]\nnumber = 0\nkey = '{'0' * 64}'", "number of unit hand is 0"),
         (f"[hand]\nnumber = true\nkey = '{'0' * 64}'", "number of unit hand is True"),
         (f"[hand]\nnumber = {'9' * 5000}\nkey = '{'0' * 64}'", "not a TOML"),

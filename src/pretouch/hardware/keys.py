@@ -3,14 +3,15 @@
 import os
 import secrets
 import stat
-import tempfile
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 
 import tomli_w
 
+from pretouch.atomic_write import atomic_write
 from pretouch.errors import HardwareError
 from pretouch.hardware.wire import KEY_SIZE
 from pretouch.toml_files import parse_toml
@@ -128,41 +129,21 @@ def _demand_private(status: os.stat_result, path: Path) -> None:
 
 
 def _unit(id: str, table: object) -> UnitKey:
-    if not id.isprintable():
-        raise HardwareError(f"The name of a unit is {id!r}: give it a printable name.")
-    if not isinstance(table, dict) or set(table) != {"number", "key"}:
-        raise HardwareError(f"Unit {id} must have a number and a key, and nothing else.")
-    if not isinstance(table["key"], str):
-        raise HardwareError(f"The key of unit {id} is not text: write it as {2 * KEY_SIZE} hexadecimal digits.")
-    try:
-        key = bytes.fromhex(table["key"])
-    except ValueError:
-        raise HardwareError(
-            f"The key of unit {id} is not hexadecimal: write it as {2 * KEY_SIZE} hexadecimal digits."
-        ) from None
-    return UnitKey(id, table["number"], key)
+    """Return the unit of a table of the file."""
+    if isinstance(table, dict) and set(table) == {"number", "key"} and isinstance(table["key"], str):
+        with suppress(ValueError):
+            return UnitKey(id, table["number"], bytes.fromhex(table["key"]))
+    raise HardwareError(
+        f"Unit {id!r} must have a number and a key of {2 * KEY_SIZE} hexadecimal digits, and nothing else."
+    )
 
 
 def save_keys(keys: Keys, path: Path) -> None:
-    """Write a file of keys that only its owner can read; it is replaced whole or, with a HardwareError, not at all.
-
-    Where the path is a symbolic link, the file it leads to is replaced.
-    """
+    """Write a file of keys that only its owner can read; it is replaced whole or, with a HardwareError, not at all."""
     tables = {unit.id: {"number": unit.number, "key": unit.key.hex()} for unit in keys.values()}
-    unfinished = None
     try:
-        place = Path(os.path.realpath(path))
-        handle, unfinished = tempfile.mkstemp(prefix=f".{place.name}.", dir=place.parent)  # mode 0600
-        with open(handle, "wb") as file:
-            tomli_w.dump(tables, file)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(unfinished, place)
-        unfinished = None
+        atomic_write(path, tomli_w.dumps(tables), private=True)
     except OSError as error:
         raise HardwareError(f"The keys cannot be written to {path}: {error.strerror}.") from None
     except ValueError as error:
         raise HardwareError(f"{str(path)!r} cannot be a file name: {error}.") from None
-    finally:
-        if unfinished is not None:
-            os.unlink(unfinished)

@@ -9,10 +9,10 @@ Three kinds, all little-endian, each ended by the first 16 bytes of an HMAC-SHA2
   earlier session never verifies.
 """
 
+import hmac
 import struct
 from dataclasses import dataclass
 from enum import IntEnum, IntFlag
-from hashlib import sha256
 from hmac import compare_digest
 
 import numpy as np
@@ -63,7 +63,6 @@ LONGEST_US = 0xFFFFFFFF
 """Largest age or hold a field can tell [us]; what is longer reads as this."""
 
 _HELLO_LABEL, _BEACON_LABEL, _SESSION_LABEL = b"PT1HELLO", b"PT1BEACN", b"PT1SESSN"
-_BLOCK = 64
 
 
 class Kind(IntEnum):
@@ -115,17 +114,14 @@ class Mac:
     """HMAC-SHA256 of one key, first 16 bytes; the key is hashed once."""
 
     def __init__(self, key: bytes) -> None:
-        padded = key.ljust(_BLOCK, b"\0") if len(key) <= _BLOCK else sha256(key).digest().ljust(_BLOCK, b"\0")
-        self._inner = sha256(bytes(b ^ 0x36 for b in padded))
-        self._outer = sha256(bytes(b ^ 0x5C for b in padded))
+        self._begun = hmac.new(key, digestmod="sha256")
 
     def whole(self, *parts: bytes | memoryview) -> bytes:
         """All 32 bytes, of parts one after the other."""
-        inner, outer = self._inner.copy(), self._outer.copy()
+        mac = self._begun.copy()
         for part in parts:
-            inner.update(part)
-        outer.update(inner.digest())
-        return outer.digest()
+            mac.update(part)
+        return mac.digest()
 
     def tag(self, *parts: bytes | memoryview) -> bytes:
         """The tag of parts one after the other."""
