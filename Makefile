@@ -6,7 +6,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: setup demo live cbf franka learn ros2 meshes browser docs micropython test test-quick test-contracts test-skipped test-slow soak golden golden-values lint house bench peers \
+.PHONY: setup demo live cbf franka learn ros2 units meshes browser docs micropython test test-quick test-contracts test-skipped test-slow soak golden golden-values lint house bench peers \
 	format clean
 
 setup: $(STAMP)
@@ -32,6 +32,10 @@ franka: setup
 # Gymnasium, and PyTorch for training: some hundred megabytes
 learn: setup
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e './lab[learn]'
+
+# what writes to sensor units over USB
+units: setup
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[units]'
 
 # DDS, which ROS 2 speaks: no ROS installation is needed
 ros2: setup

@@ -1,4 +1,4 @@
-"""The life of a unit from one reset to the next: told who it is, in its network, measuring until something fails."""
+"""The life of a unit from one reset to the next: in its network, measuring until something fails."""
 
 import io
 import sys
@@ -7,12 +7,10 @@ import time
 from board import address, open_socket, this_board
 from clock import Clock
 from config import ConfigError, load
-from console import Console
 from fsr import ForceResistor
 from link import Link
 from lsm6ds3 import LSM6DS3
 from micropython import const
-from provisioning import Provisioning
 from sensors import Bus, Imu, RangeFinder, Touch
 from unit import Unit
 from vl53l1x import VL53L1X
@@ -20,32 +18,26 @@ from wifi import Datagrams, Station
 
 VERSION = "0.1"
 _VERSION_ON_WIRE = const(1)
-_WINDOW_US = const(3_000_000)
+_WINDOW_MS = const(3000)
 
 
 def run():
-    """Serve until something fails, note what, and begin anew. Ctrl-C leads to the prompt."""
+    """Serve until something fails, note what, and begin anew. Ctrl-C, or no configuration, leads to the prompt."""
     board = this_board()
+    print("pretouch", VERSION, board.noted())
     try:
-        config = provision(board, Clock(time), Console())
-        serve(board, Clock(time), config)  # one of its own: it may have listened for longer than a clock bears
+        config = load()
+    except ConfigError as error:
+        print(error)
+        return
+    try:
+        time.sleep_ms(_WINDOW_MS)  # somebody at the serial line gets in: later the watchdog cuts them off
+        serve(board, Clock(time), config)
     except Exception as error:
         try:
             board.note(trace(error))
         finally:
             board.reset()
-
-
-def provision(board, clock, console):
-    """Return the configuration, after whoever is on the serial line had time to give another."""
-    config, fault = None, board.noted()
-    try:
-        config = load()
-    except ConfigError as error:
-        fault = str(error)
-    provisioning = Provisioning(config, {"firmware": VERSION, "board": sys.platform, "last_error": fault})
-    provisioning.listen(console, clock, _WINDOW_US)
-    return provisioning.config
 
 
 def serve(board, clock, config):

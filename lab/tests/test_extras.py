@@ -11,11 +11,11 @@ import pytest
 from pretouch import extras
 from pretouch.cli.registry import FCI, command_names
 from pretouch.errors import MissingExtraError
-from pretouch.extras import BAGS, FIGURES, FRANKA, LIVE, MESHES, ROS2
+from pretouch.extras import BAGS, FIGURES, FRANKA, LIVE, MESHES, ROS2, UNITS
 from pretouch_lab.learning import LEARN
 from pretouch_lab.sweep.run import SWEEP
 
-EXTRAS = (BAGS, FIGURES, FRANKA, MESHES, ROS2, LIVE)
+EXTRAS = (BAGS, FIGURES, FRANKA, MESHES, ROS2, LIVE, UNITS)
 
 URDF = """<robot name="a"><link name="base"><collision><geometry><mesh filename="a.dae"/></geometry></collision></link>
 <link name="tip"/><joint name="j" type="revolute"><parent link="base"/><child link="tip"/><axis xyz="0 0 1"/>
@@ -61,6 +61,7 @@ ASKED = [
     (("skin", "coverage", "gone.toml"), None),
     (("skin", "simulate", "--keys", "keys.toml", "--skin", "gone.toml"), None),
     (("skin", "provision", "--id", "a", "--keys", "k.toml", "--ssid", "a", "--host", "::"), None),
+    (("skin", "provision", "--id", "a", "--keys", "k.toml", "--ssid", "a", "--host", "10.0.0.1"), UNITS),
     (("skin", "keys", "--keys", "k.toml"), None),
     (("warm-up",), None),
 ]

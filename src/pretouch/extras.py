@@ -53,6 +53,7 @@ LIVE = Extra("live", ("viser",), "setup")
 MESHES = Extra("meshes", ("collada",), "meshes")
 PARQUET = Extra("parquet", ("pyarrow",), "setup")
 ROS2 = Extra("ros2", ("cyclonedds", "rosbags"), "ros2")
+UNITS = Extra("units", ("mpremote",), "units")
 
 
 def install_command(owner: str, extra: str = "", target: str = "setup") -> str:

@@ -134,8 +134,6 @@ class Provision:
     """Force by the touch sensor's conductance [mN/uS], as calibrated."""
     password_file: str = ""
     """File whose first line is the Wi-Fi password, instead of typing it."""
-    replace: bool = False
-    """Replace another number or key that the unit already has."""
 
     def run(self) -> int:
         """Set the unit up."""

@@ -1,4 +1,4 @@
-"""What `pretouch skin provision` does: a unit at a USB port told who it is."""
+"""What `pretouch skin provision` does: a unit at a USB port given its configuration."""
 
 import getpass
 import warnings
@@ -8,34 +8,27 @@ from typing import TYPE_CHECKING
 
 from pretouch.cli.skin_keys import free_number, keys_file, keys_or_none
 from pretouch.errors import HardwareError
+from pretouch.extras import UNITS
 from pretouch.hardware.keys import Keys, UnitKey, new_key, save_keys
-from pretouch.hardware.provision import Network, differs, fingerprint, greet, provision
-from pretouch.hardware.serial_line import SerialLine
+from pretouch.hardware.provision import Network, configuration, copy_to_unit, fingerprint
 
 if TYPE_CHECKING:
     from pretouch.cli.skin_commands import Provision
 
 
 def provision_unit(command: "Provision") -> None:
-    """Make a key if the unit has none, tell the unit, and check what it then says it is."""
+    """Make a key if the unit has none, and copy it to the unit with the rest of its configuration."""
     place = keys_file(command.keys)
     keys = keys_or_none(place)
     unit = _unit(keys, command.id, command.number, place)
-    with SerialLine(Path(command.device)):  # what is wrong is said before the password is asked for
-        network = Network(command.ssid, "", command.host, command.port, command.battery_full_mv,
-            command.touch_ohm, command.touch_least_mn, command.touch_mn_per_us, command.sensor, command.zones,
-        )  # fmt: skip
-    network = replace(network, password=_password(command))
-    with SerialLine(Path(command.device)) as line:
-        line.reset()  # a unit that was set up before listens for some seconds after that only
-        peer = greet(line)
-        print(f"At {command.device}: {peer.board}, firmware {peer.firmware}.", flush=True)
-        change = differs(peer, unit)
-        if change and not command.replace:
-            raise HardwareError(f"The unit at {command.device} was set up before: {change}; --replace changes it.")
-        if unit.id not in keys:
-            save_keys(Keys([*keys.values(), unit]), place)  # first: a unit with a key that nobody knows is mute
-        provision(line, unit, network)
+    network = Network(command.ssid, "", command.host, command.port, command.battery_full_mv,
+        command.touch_ohm, command.touch_least_mn, command.touch_mn_per_us, command.sensor, command.zones,
+    )  # fmt: skip  # what is wrong is said before the password is asked for
+    UNITS.need("Provisioning")
+    text = configuration(unit, replace(network, password=_password(command)))
+    if unit.id not in keys:
+        save_keys(Keys([*keys.values(), unit]), place)  # first: a unit with a key that nobody knows is mute
+    copy_to_unit(command.device, text)
     print(
         f"{unit.id} is number {unit.number} with the key {fingerprint(unit.key)}..., and sends to"
         f" {network.host}:{network.port}. Its key is in {place}."

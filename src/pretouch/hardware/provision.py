@@ -1,45 +1,27 @@
-"""Telling a unit over USB who it is, its key, and where it sends, by one JSON line (docs/how-to/flashing.md).
+"""A unit's configuration file, with its key and where it sends, and putting it on the unit over USB.
 
-No message and no exception here holds a key or a password.
+MicroPython's own program `mpremote` copies it. No message and no exception here holds a key or a password.
 """
 
 import ipaddress
 import json
-import time
-from collections.abc import Iterator
+import subprocess
+import sys
+import tempfile
 from dataclasses import dataclass
 from hashlib import sha256
-from typing import Any, Protocol
+from pathlib import Path
 
+from pretouch.atomic_write import atomic_write
 from pretouch.errors import HardwareError
 from pretouch.hardware.keys import UnitKey
 
-_PROTOCOL = 1
-GREET_S = 15.0
-"""How long a unit is asked who it is [s]: it begins anew when its line is opened, and takes some seconds for that."""
-ANSWER_S = 5.0
-"""How long it may take to store what it is told [s]."""
-_ASK_EVERY_S = 1.0
-_QUIET_S = 0.3
-_LONGEST = 1 << 16
-_PIECE, _PAUSE_S = 32, 0.01
-"""Bytes sent at once, and the pause after them [s]: a unit takes in few before it reads them."""
+COPY_S = 60.0
+"""How long copying may take [s]."""
 _FULL_MOST_MV = 20_000
 _NO_HOSTS, _FIRST_MULTICAST = (0, 127), 224
 """First numbers of IPv4 addresses that are no host a unit could send to; multicast and broadcast are the upper ones."""
 _SSID_MOST, _PASSWORD_LEAST, _PASSWORD_MOST = 32, 8, 63
-
-
-class Line(Protocol):
-    """A serial line."""
-
-    def write(self, data: bytes, timeout: float) -> None:
-        """Send bytes within a time [s]."""
-        ...
-
-    def read(self, timeout: float) -> bytes:
-        """Return what has come, b'' if nothing comes within a time [s]."""
-        ...
 
 
 SENSORS = ("vl53l1x", "vl53l5cx", "vl53l7cx")
@@ -109,133 +91,48 @@ class Network:
         return f"Network(ssid={self.ssid!r}, host={self.host!r}, port={self.port})"
 
 
-@dataclass(frozen=True)
-class Peer:
-    """Who a unit says it is."""
-
-    unit: int | None
-    """Its number, None of one that was never told."""
-    fingerprint: str | None
-    """Of its key."""
-    firmware: str
-    board: str
-
-
 def fingerprint(key: bytes) -> str:
     """Return what tells keys apart without showing them: the first 8 hex digits of the SHA-256."""
     return sha256(key).hexdigest()[:8]
 
 
-def greet(line: Line, timeout: float = GREET_S) -> Peer:
-    """Ask who is at the other end, again and again; nobody within a time [s] is a HardwareError."""
-    until = time.monotonic() + timeout
-    answers = _Answers(line)
-    while (now := time.monotonic()) < until:
-        line.write(b'\n{"pretouch": "hello"}\n', timeout=ANSWER_S)
-        for answer in answers.until(min(until, now + _ASK_EVERY_S)):
-            if answer.get("ok") is True:  # a refusal is of a line that boot messages had spoilt
-                answers.drain(_QUIET_S)
-                return _peer(answer)
-    if answers.rubbish:
-        raise HardwareError(
-            f"Something answers that is not a Pretouch unit ({_shown(answers.rubbish)}): flash the firmware first, and"
-            " check that nothing else uses the line."
-        )
-    raise HardwareError(
-        f"Nothing answers within {timeout:g} s: press the unit's reset button and try again; if it still does not"
-        " answer, flash the firmware."
-    )
-
-
-def provision(line: Line, key: UnitKey, network: Network, timeout: float = ANSWER_S) -> Peer:
-    """Tell a unit who it is; return what it then says it is. Refusals and wrong answers are a HardwareError."""
-    told: dict[str, int | str] = {
-        "pretouch": _PROTOCOL, "unit": key.number, "key": key.key.hex(), "ssid": network.ssid,
-        "password": network.password, "host": network.host, "port": network.port,
-        "battery_full_mv": network.battery_full_mv,
+def configuration(key: UnitKey, network: Network) -> str:
+    """Return the text of a unit's configuration file, JSON on one line."""
+    values: dict[str, int | str] = {
+        "unit": key.number, "key": key.key.hex(), "ssid": network.ssid, "password": network.password,
+        "host": network.host, "port": network.port, "battery_full_mv": network.battery_full_mv,
+        "sensor": network.sensor, "zones": 1 if network.sensor == SENSORS[0] else network.zones,
+        "touch_ohm": network.touch_ohm, "touch_least_mn": network.touch_least_mn,
+        "touch_mn_per_us": network.touch_mn_per_us,
     }  # fmt: skip
-    if network.sensor != SENSORS[0]:
-        told |= {"sensor": network.sensor, "zones": network.zones}
-    if network.touch_ohm:
-        told |= {name: getattr(network, name) for name in ("touch_ohm", "touch_least_mn", "touch_mn_per_us")}
-    data = json.dumps(told, ensure_ascii=False).encode() + b"\n"  # units join no halves of \u escapes
-    for start in range(0, len(data), _PIECE):
-        line.write(data[start : start + _PIECE], timeout)
-        time.sleep(_PAUSE_S)
-    for answer in _Answers(line).until(time.monotonic() + timeout):
-        if answer.get("ok") is not True:
-            why = str(answer.get("error"))
-            for secret in (told["key"], network.password):
-                why = why.replace(str(secret), "***") if secret else why
-            raise HardwareError(f"The unit refuses: {_shown(why.encode())}.")
-        peer = _peer(answer)
-        if (peer.unit, peer.fingerprint) != (key.number, fingerprint(key.key)):
-            raise HardwareError(
-                f"The unit says it is number {peer.unit} with the key {peer.fingerprint}, but should be {key.number}"
-                f" with {fingerprint(key.key)}: press its reset button and try again."
+    return json.dumps(values, ensure_ascii=False) + "\n"  # units join no halves of \u escapes
+
+
+def copy_to_unit(device: str, text: str, timeout: float = COPY_S) -> None:
+    """Put a configuration on the unit at a serial device, and have it begin anew; what fails is a HardwareError."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "config.json"
+        atomic_write(file, text, private=True)
+        command = "connect", device, "cp", str(file), ":config.json", "+", "reset"
+        try:
+            copied = subprocess.run(  # noqa: S603  # by words, no shell
+                [sys.executable, "-m", "mpremote", *command],
+                capture_output=True,
+                text=True,
+                timeout=timeout,
+                check=False,
             )
-        return peer
-    raise HardwareError(f"The unit does not answer within {timeout:g} s: press its reset button and try again.")
-
-
-def differs(peer: Peer, key: UnitKey) -> str:
-    """Say in what a unit that was told before is another than it shall be, or ''."""
-    if peer.unit is None or (peer.unit, peer.fingerprint) == (key.number, fingerprint(key.key)):
-        return ""
-    if peer.unit != key.number:
-        return f"it is number {peer.unit}, not {key.number}"
-    return f"it is number {peer.unit} with another key ({peer.fingerprint}, not {fingerprint(key.key)})"
-
-
-class _Answers:
-    """JSON objects with `ok` among whatever comes on a line."""
-
-    def __init__(self, line: Line) -> None:
-        self._line, self._rest = line, b""
-        self.rubbish = b""
-        """The last bytes that were no answer."""
-
-    def until(self, instant: float) -> Iterator[dict[str, Any]]:
-        """Yield answers that come before an instant [s]."""
-        while (left := instant - time.monotonic()) > 0:
-            self._rest = (self._rest + self._line.read(left))[-_LONGEST:]
-            *lines, self._rest = self._rest.split(b"\n")
-            for text in lines:
-                answer = _answer(text)
-                if answer is not None:
-                    yield answer
-                elif text.strip():
-                    self.rubbish = text.strip()
-
-    def drain(self, quiet: float) -> None:
-        """Wait until nothing more comes for a time [s]; no longer than for an answer."""
-        until = time.monotonic() + ANSWER_S
-        while self._line.read(quiet) and time.monotonic() < until:
-            pass
-        self._rest = b""
-
-
-def _answer(text: bytes) -> dict[str, Any] | None:
-    """Return an answer, with boot messages before it cut off."""
-    try:
-        found = json.loads(text[text.index(b"{") :])
-    except (ValueError, RecursionError):
-        return None
-    return found if isinstance(found, dict) and isinstance(found.get("ok"), bool) else None
-
-
-def _peer(answer: dict[str, Any]) -> Peer:
-    unit, key = answer.get("unit"), answer.get("fingerprint")
-    return Peer(
-        unit if type(unit) is int else None,
-        key if isinstance(key, str) else None,
-        _text(answer.get("firmware")),
-        _text(answer.get("board")),
-    )
-
-
-def _text(value: object) -> str:
-    return _shown(str(value).encode()) if value is not None else "unknown"
+        except subprocess.TimeoutExpired:
+            raise HardwareError(
+                f"The unit at {device} did not answer within {timeout:g} s: press its reset button and try again."
+            ) from None
+    if copied.returncode:
+        lines = (copied.stderr or copied.stdout).split("\n")
+        reason = next((line.strip() for line in reversed(lines) if line.strip()), f"code {copied.returncode}")
+        raise HardwareError(
+            f"mpremote could not write to the unit at {device} ({_printable(reason)}): start the command within 3 s"
+            " after its reset button, and see that nothing else uses the line."
+        )
 
 
 def _size(text: str, name: str) -> int:
@@ -246,6 +143,5 @@ def _size(text: str, name: str) -> int:
         raise HardwareError(f"The {name} is not Unicode text: give it in UTF-8.") from None
 
 
-def _shown(data: bytes) -> str:
-    text = data.decode(errors="replace")[:80]
-    return "".join(c if c.isprintable() else "?" for c in text)
+def _printable(text: str) -> str:
+    return "".join(c if c.isprintable() else "?" for c in text[:120])

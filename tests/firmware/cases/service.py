@@ -22,7 +22,10 @@ from vl53l1x import VL53L1X
 
 os.chdir(sys.path[0])
 KEY = "00112233445566778899aabbccddeeff" * 2
-CONFIG = {"unit": 7, "key": KEY, "ssid": "net", "password": "password", "host": "10.0.0.1", "port": 4950}
+CONFIG = {
+    "unit": 7, "key": KEY, "ssid": "net", "password": "password", "host": "10.0.0.1", "port": 4950,
+    "battery_full_mv": 0, "sensor": "vl53l1x", "zones": 1, "touch_ohm": 0, "touch_least_mn": 500, "touch_mn_per_us": 10,
+}  # fmt: skip
 SECOND = 1_000_000
 
 
@@ -163,24 +166,13 @@ def a_call_that_never_returns_lets_the_watchdog_bite():
     assert 5 * SECOND <= chip.now.now_us < 5.3 * SECOND
 
 
-class _Console:
-    """A serial line on which nobody is, until `said` at a time [us]."""
-
-    said = None
-
-    def read(self, wait_ms):
-        service.time.sleep_ms(wait_ms)
-        if _Console.said is None or service.time.clock.now_us < _Console.said[0]:
-            return b""
-        (_, line), _Console.said = _Console.said, None
-        return line
-
-    def write(self, text):
-        pass
+def _configure():
+    with open("config.json", "w") as file:
+        file.write(json.dumps(CONFIG))
 
 
 def _run(board):
-    service.this_board, service.Console = lambda: board, _Console
+    service.this_board = lambda: board
     return _reset_in(service.run)
 
 
@@ -194,7 +186,7 @@ def _reset_in(run):
 
 def an_error_nobody_expected_is_noted_and_the_unit_begins_anew():
     _Chip()
-    Config(CONFIG).save()
+    _configure()
     board = _Draw()
 
     def fail():
@@ -216,34 +208,34 @@ def a_note_may_be_any_bytes():
     assert board.noted() == "x" * 197 + "end"
 
 
-def without_a_configuration_nothing_is_sent():
+def without_a_configuration_there_is_the_prompt_and_nothing_is_sent():
     chip = _Chip()
-    try:
-        os.remove("config.json")
-    except OSError:
-        chip.now.advance(0)
-    chip.at(60 * SECOND, _enough)
+    _configure()
+    os.remove("config.json")
+    service.this_board = _Draw
+    service.run()
+    assert network.state.asked is None
+    assert chip.receiver.hellos == []
+
+
+def for_3_s_after_a_reset_there_is_no_watchdog_and_then_it_serves():
+    chip = _Chip()
+    _configure()
+    chip.at(3 * SECOND - 1000, lambda: _none_yet(chip))
+    chip.at(11 * SECOND, _enough)
     try:
         _run(_Draw())
     except _Enough:
-        assert network.state.asked is None
-        assert chip.receiver.hellos == []
+        times = [s["time_us"] for s in chip.receiver.samples]
+        assert 0 <= chip.receiver.hellos[0][2] <= times[0] <= times[-1] <= 8 * SECOND, times[-1]
+        assert len(times) > 150
+        return
+    raise AssertionError("it ended")
 
 
-def time_begins_when_it_serves_however_long_it_waited_for_its_configuration():
-    for minutes in (1, 10, 20):
-        chip = _Chip()
-        Config(CONFIG).save()
-        os.remove("config.json")
-        waited = minutes * 60 * SECOND
-        _Console.said = (waited, json.dumps(dict(CONFIG, pretouch=1)).encode() + b"\n")
-        chip.at(waited + 8 * SECOND, _enough)
-        try:
-            _run(_Draw())
-        except _Enough:
-            times = [s["time_us"] for s in chip.receiver.samples]
-            assert 0 <= chip.receiver.hellos[0][2] <= times[0] <= times[-1] <= 8 * SECOND, (minutes, times[-1])
-            assert len(times) > 150
+def _none_yet(chip):
+    assert network.state.asked is None
+    assert chip.receiver.hellos == []
 
 
 def the_radio_never_sleeps_and_its_own_network_is_off():
