@@ -4,19 +4,18 @@ from importlib.metadata import version
 
 from pretouch.errors import RobotError
 from pretouch.hardware.franka.arm import FrankaArm
-from pretouch.hardware.franka.client import Kind
+from pretouch.hardware.franka.client import LIBRARIES, Kind
 from pretouch.hardware.franka.errors import check_ready
 from pretouch.session.confirmations import Identity
 from pretouch.types import FloatArray, RobotState
 
 _NAMES: dict[Kind, str] = {"panda": "Panda", "fr3": "FR3"}
 _REFLEX = "reflex"
-_LIBRARIES: dict[Kind, str] = {"panda": "panda-python", "fr3": "pylibfranka"}
 
 
 def identity(kind: Kind, address: str) -> Identity:
     """Return what a robot at an address is known by: another library asks for the guided pushes again."""
-    library = _LIBRARIES[kind]
+    library = LIBRARIES[kind].distribution
     return Identity(kind, address, f"{library} {version(library)}")
 
 

@@ -30,9 +30,23 @@ from tests.ports import loopback
 )
 def test_a_wrong_address_is_said_at_once(address: str, what: str) -> None:
     began = time.monotonic()
-    with pytest.raises(RobotError, match=re.escape(f"No Franka arm at {address}: {what}; check the address")):
-        reachable(address)
+    with pytest.raises(RobotError, match=re.escape(f"No Franka arm at {address}: {what} (tried for ")):
+        reachable(address, "panda")
     assert time.monotonic() - began < 10.0
+
+
+@pytest.mark.parametrize(("kind", "library", "version"), [("panda", "panda-python", 5), ("fr3", "pylibfranka", 10)])
+def test_what_was_tried_is_said_and_the_way_out(kind: client.Kind, library: str, version: int) -> None:
+    sentence = (
+        rf"No Franka arm at 127\.0\.99\.99: nothing listens on port 1337 there \(tried for \d\.\d s: TCP port 1337, for"
+        rf" {library}, which speaks version {version} of the Franka Control Interface \(FCI\)\)\. Check the address and"
+        r" the cable, unlock the joints and activate FCI in Desk\."
+    )
+    with pytest.raises(RobotError, match=f"^{sentence}$"):
+        reachable("127.0.99.99", kind)
+    text = "libfranka: UDP receive: Timeout\nmore"
+    with pytest.raises(RobotError, match=f"did not continue .UDP receive: Timeout; tried for 4.. s: .*for {library}, "):
+        errors.raise_not_connected("1.2.3.4", kind, time.monotonic() - 4.0, RuntimeError(text))
 
 
 def test_a_name_that_nobody_has_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -40,8 +54,8 @@ def test_a_name_that_nobody_has_is_said(monkeypatch: pytest.MonkeyPatch) -> None
         raise socket.gaierror(socket.EAI_NONAME, "Name or service not known")
 
     monkeypatch.setattr(client.socket, "create_connection", unknown)
-    with pytest.raises(RobotError, match="No Franka arm at no-such-arm: there is no host of that name; check"):
-        reachable("no-such-arm")
+    with pytest.raises(RobotError, match=r"No Franka arm at no-such-arm: there is no host of that name \(tried for"):
+        reachable("no-such-arm", "fr3")
 
 
 def test_an_arm_that_does_not_answer_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -51,7 +65,7 @@ def test_an_arm_that_does_not_answer_is_not_waited_for(monkeypatch: pytest.Monke
 
     monkeypatch.setattr(client.socket, "create_connection", silent)
     with pytest.raises(RobotError, match="nothing answers within 3 s"):
-        reachable("172.16.0.2")
+        reachable("172.16.0.2", "fr3")
 
 
 def test_the_sentence_comes_from_the_process_too(panda_model: RobotModel) -> None:

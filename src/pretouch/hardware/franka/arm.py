@@ -8,7 +8,7 @@ from multiprocessing.connection import Connection
 from typing import Self
 
 from pretouch.errors import RobotError
-from pretouch.hardware.franka.client import Kind
+from pretouch.hardware.franka.client import Kind, attempt
 from pretouch.hardware.franka.collision import CollisionBehavior
 from pretouch.hardware.franka.limits import FrankaParams, motion_limits
 from pretouch.hardware.franka.mailboxes import Command, Feedback, Mailboxes, Request
@@ -63,7 +63,7 @@ class FrankaArm:
         theirs.close()
         try:
             with ours:
-                self.missing = _wait_connected(ours, address)
+                self.missing = _wait_connected(ours, address, kind)
                 """Sentences on what the process could not have, or ''."""
         except BaseException:
             self._process.kill()  # no motion runs yet, and it may hang in the vendor's library
@@ -198,12 +198,13 @@ class FrankaArm:
             )
 
 
-def _wait_connected(started: Connection, address: str) -> str:
+def _wait_connected(started: Connection, address: str, kind: Kind) -> str:
     """Wait for the process to be connected; return what it could not have."""
+    began = time.monotonic()
     if not started.poll(_START_S):
         raise RobotError(
-            f"The host at {address} accepts connections, but does not answer as an arm within {_START_S:g} s: check the"
-            " address."
+            f"The host at {address} accepts connections, but does not answer as an arm ({attempt(kind, began)}): check"
+            " the address, and restart the control box if it is an arm's."
         )
     try:
         connected, text = started.recv()

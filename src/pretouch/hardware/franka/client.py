@@ -1,10 +1,11 @@
 """A Franka arm through the vendor's own library: one port for both, and connecting with a clear sentence."""
 
 import socket
+import time
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
-from typing import Literal, Protocol, Self
+from typing import Literal, NamedTuple, Protocol, Self
 
 from pretouch.errors import RobotError
 from pretouch.extras import FRANKA
@@ -23,16 +24,27 @@ PORT = 1337
 ANSWER_S = 3.0
 """Longest wait for the arm to take a connection, or to answer on it [s]."""
 _REALTIME_KERNEL = Path("/sys/kernel/realtime")
-_LIBRARIES = {"panda": "panda_py", "fr3": "pylibfranka"}
-"""The vendor's library for each arm; our module of the arm's name speaks with it. They cannot share a process."""
+
+
+class Library(NamedTuple):
+    """A library that speaks with an arm; our module of the arm's name calls it. Two cannot share a process."""
+
+    module: str
+    distribution: str
+    version: int
+    """Of the Franka Control Interface that it speaks."""
+
+
+LIBRARIES: dict[Kind, Library] = {
+    "panda": Library("panda_py", "panda-python", 5), "fr3": Library("pylibfranka", "pylibfranka", 10),
+}  # fmt: skip
+"""That of each arm."""
 
 
 class Client(Protocol):
     """One connection to an arm, for one thread; a context manager."""
 
     kind: Kind
-    server_version: int
-    """Version of the Franka Control Interface that the arm speaks."""
 
     def read(self) -> FrankaState:
         """Wait for the next state, while no motion runs."""
@@ -78,7 +90,7 @@ class Client(Protocol):
 
 def need_library(kind: Kind) -> None:
     """Refuse to go on without the vendor's library for an arm, or what our own part needs: a MissingExtraError."""
-    FRANKA.need("A Franka arm", _LIBRARIES[kind], "ruckig")
+    FRANKA.need("A Franka arm", LIBRARIES[kind].module, "ruckig")
 
 
 def connect(address: str, kind: Kind, real_time: bool = False) -> Client:
@@ -98,7 +110,7 @@ def connect(address: str, kind: Kind, real_time: bool = False) -> Client:
             "The kernel of this machine has no real-time capabilities: boot one with PREEMPT_RT, or connect without"
             " demand_real_time (the arm then stops when this machine is late 20 times in a row)."
         )
-    lock = ArmLock(reachable(address))
+    lock = ArmLock(reachable(address, kind))
     try:
         opened: Client = import_module(f"pretouch.hardware.franka.{kind}").open_client(address, real_time, lock)
     except BaseException:
@@ -115,8 +127,18 @@ def has_real_time_kernel() -> bool:
         return False
 
 
-def reachable(address: str) -> str:
+def attempt(kind: Kind, began: float) -> str:
+    """Say in words what was tried to connect to an arm since an instant of `time.monotonic` [s]."""
+    library = LIBRARIES[kind]
+    return (
+        f"tried for {time.monotonic() - began:.1f} s: TCP port {PORT}, for {library.distribution}, which speaks version"
+        f" {library.version} of the Franka Control Interface (FCI)"
+    )
+
+
+def reachable(address: str, kind: Kind) -> str:
     """Return the IP address of an arm that takes connections; the vendor's libraries would wait for minutes."""
+    began = time.monotonic()
     try:
         with socket.create_connection((address, PORT), ANSWER_S) as tried:
             return str(tried.getpeername()[0])
@@ -128,4 +150,7 @@ def reachable(address: str) -> str:
         what = f"nothing listens on port {PORT} there"
     except OSError as error:
         what = f"it cannot be reached ({error.strerror})"
-    raise RobotError(f"No Franka arm at {address}: {what}; check the address and the cable, and activate FCI in Desk.")
+    raise RobotError(
+        f"No Franka arm at {address}: {what} ({attempt(kind, began)}). Check the address and the cable, unlock the"
+        " joints and activate FCI in Desk."
+    )

@@ -4,6 +4,7 @@ import re
 from typing import NoReturn
 
 from pretouch.errors import RobotError
+from pretouch.hardware.franka.client import LIBRARIES, Kind, attempt
 from pretouch.hardware.franka.state import FrankaState, error_names
 
 _RECOVER = "free it from what it touches, then let it recover"
@@ -42,18 +43,18 @@ def raise_not_recovered(state: FrankaState, address: str) -> NoReturn:
     raise RobotError(f"The arm at {address} was told to recover but is still in {_mode(state)}: {_WAY_OUT['reflex']}.")
 
 
-def raise_not_connected(address: str, ours: int, kind: str, error: Exception) -> NoReturn:
-    """Raise a RobotError for an arm that could not be connected to with a library that speaks version `ours`."""
+def raise_not_connected(address: str, kind: Kind, began: float, error: Exception) -> NoReturn:
+    """Raise a RobotError for an arm that could not be connected to, which was begun at `time.monotonic` `began` [s]."""
     text = first_line(error)
     if "incompatible" in f"{type(error).__name__} {text}".lower():
         theirs = _VERSION.search(text)
         raise RobotError(
             f"The arm at {address} speaks version {theirs[1] if theirs else 'unknown'} of the Franka Control Interface,"
-            f" but the library for kind {kind!r} speaks version {ours}: choose {_OTHER[kind]}."
+            f" but the library for kind {kind!r} speaks version {LIBRARIES[kind].version}: choose {_OTHER[kind]}."
         ) from None
     raise RobotError(
-        f"The arm at {address} accepted the connection but did not continue ({text}): end any other program that is"
-        " connected to it."
+        f"The arm at {address} accepted the connection but did not continue ({text}; {attempt(kind, began)}): end any"
+        " other program that is connected to it, and allow UDP from it through the firewall."
     ) from None
 
 

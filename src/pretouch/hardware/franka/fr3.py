@@ -14,7 +14,6 @@ class Fr3Client(VendorClient):
     """See `client.Client`."""
 
     kind: Literal["panda", "fr3"] = "fr3"
-    server_version = 10
     library: ClassVar[Any] = pylibfranka
     failures: ClassVar[tuple[type[Exception], ...]] = (RuntimeError, pylibfranka.FrankaException)
 

@@ -14,7 +14,6 @@ class PandaClient(VendorClient):
     """See `client.Client`."""
 
     kind: Literal["panda", "fr3"] = "panda"
-    server_version = 5
     library: ClassVar[Any] = libfranka
 
     def _move(self, answer: Any) -> None:

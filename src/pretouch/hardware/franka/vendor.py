@@ -1,5 +1,6 @@
 """What the vendor's two libraries have in common: all but how to connect, and how to run a motion."""
 
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, ClassVar, Literal, Self
@@ -23,18 +24,17 @@ class VendorClient:
     """
 
     kind: Literal["panda", "fr3"]
-    server_version: int
     library: ClassVar[Any]
     failures: ClassVar[tuple[type[Exception], ...]] = (RuntimeError,)
     """What the library raises."""
 
     def __init__(self, address: str, real_time: bool, lock: ArmLock) -> None:
         self._address, self._lock = address, lock
-        wanted = self.library.RealtimeConfig
+        wanted, began = self.library.RealtimeConfig, time.monotonic()
         try:
             self._robot: Any = self.library.Robot(address, wanted.kEnforce if real_time else wanted.kIgnore)
         except Exception as error:
-            errors.raise_not_connected(address, self.server_version, self.kind, error)
+            errors.raise_not_connected(address, self.kind, began, error)
 
     def read(self) -> FrankaState:
         """Wait for the next state."""
