@@ -12,7 +12,6 @@ from pretouch.errors import CalibrationError, RobotModelError
 from pretouch.sensing.skin import Skin
 from pretouch.traces import ImuTrace
 from pretouch_lab.studies.calibration.random_skin import random_skin
-from tests.calibration import made
 from tests.calibration.faulty import joints_late, on_the_table, slipped, without_joints
 from tests.calibration.made import EXACT, MovingArm, Noise, pose_error, turned
 
@@ -175,28 +174,3 @@ def test_noise_of_the_joints_is_named_where_it_is_what_hides_a_place(panda_model
     assert "The noise of the joint positions hides it" in finding.sentence
     assert "rad/s^2" in finding.sentence
     assert "  " not in finding.sentence
-
-
-@pytest.fixture
-def leaning_by(moving_arm, pair, monkeypatch):
-    def data(degrees: float) -> CalibrationData:
-        angle = np.deg2rad(degrees)
-        monkeypatch.setattr(made, "UP", 9.81 * np.array([np.sin(angle), 0.0, np.cos(angle)]))
-        return moving_arm.data(pair)
-
-    return data
-
-
-def test_an_arm_that_leans_is_named_and_its_units_are_found(panda_model, pair, leaning_by):
-    found = calibrate(panda_model, leaning_by(1.0))
-    (finding,) = found.findings
-    assert (finding.kind, finding.refused) == ("leaning", False)
-    # up is on the side of +x of the base's z, so the arm leans to the other side
-    assert "leans by 1.0 degrees, mostly towards -x of its base" in finding.sentence
-    for unit, true in zip(found.units, pair.units, strict=True):
-        assert unit.accepted
-        assert np.linalg.norm(pose_error(true.T_link_sensor, unit.place.T_link_sensor)[3:]) < 1e-3
-
-
-def test_an_arm_that_hardly_leans_is_not_worth_a_word(panda_model, leaning_by):
-    assert calibrate(panda_model, leaning_by(0.15)).findings == ()

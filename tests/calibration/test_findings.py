@@ -151,14 +151,13 @@ def test_few_saturated_samples_are_left_out_and_many_refuse(panda_model, good, p
     assert not many.accepted
 
 
-def test_swapped_units_are_both_named(panda_model, good):
+def test_of_swapped_units_each_is_told_which_link_its_data_fit(panda_model, good):
     link4, hand = calibrate(panda_model, swapped(good, LINK4, HAND)).units
-    assert [finding.kind for finding in link4.findings] == ["swapped"]
-    assert [finding.kind for finding in hand.findings] == ["swapped"]
-    assert f"Swapped with {HAND}" in link4.findings[0].sentence
-    assert f"Swapped with {LINK4}" in hand.findings[0].sentence
-    assert not link4.accepted
-    assert not hand.accepted
+    for unit, said, link in ((link4, "panda_link4", "panda_hand"), (hand, "panda_hand", "panda_link4")):
+        assert (unit.findings[0].kind, unit.findings[0].refused) == ("wrong_link", True)
+        assert f"It is said to sit on {said}, but its data fit " in unit.findings[0].sentence
+        assert link in unit.findings[0].sentence
+        assert not unit.accepted
 
 
 def test_a_unit_on_another_link_than_said_is_refused_and_its_link_named(panda_model, good):
@@ -259,7 +258,7 @@ def test_joint_states_with_nearly_the_same_stamp_are_named_and_all_but_the_last_
 ):
     found = calibrate(panda_model, fault(good))
     (finding,) = found.findings
-    assert finding.kind == "joints_bunched"
+    assert finding.kind == "joints_repeated"
     assert re.match(rf"{left_out} joint states of \d+ .* stamp", finding.sentence), finding.sentence
     assert all(unit.accepted for unit in found.units)
     assert errors(found, pair).max() < 1e-3
@@ -282,7 +281,7 @@ def held_for(data: CalibrationData, states: int) -> CalibrationData:
 def test_joint_values_given_more_than_once_are_named_and_taken_once(panda_model, good, pair, states):
     found = calibrate(panda_model, held_for(good, states))
     (finding,) = found.findings
-    assert finding.kind == "joints_held"
+    assert finding.kind == "joints_repeated"
     assert "repeat the values of the one before" in finding.sentence
     assert all(unit.accepted for unit in found.units)
     assert errors(found, pair).max() < 1e-3
@@ -317,12 +316,11 @@ def test_joint_states_at_the_least_rate_will_do_and_below_it_the_rate_is_named(p
 
 
 @pytest.mark.parametrize(("sensor", "axis"), [("acceleration", "accelerometer"), ("angular_velocity", "gyroscope")])
-def test_an_axis_that_is_cut_off_at_a_range_nobody_declared_is_told_from_a_stuck_one(panda_model, good, sensor, axis):
+def test_an_axis_that_is_cut_off_at_a_range_nobody_declared_is_refused(panda_model, good, sensor, axis):
     cut_off = getattr(unit_of(good, LINK4).imu, sensor).copy()
     cut_off[:, 1] = np.minimum(cut_off[:, 1], np.quantile(cut_off[:, 1], 0.5))
     unit = calibrate(panda_model, changed(good, LINK4, **{sensor: cut_off})).units[0]
     (finding,) = unit.findings
-    assert (finding.kind, finding.refused) == ("cut_off", True)
-    assert f"{axis} y stays at its largest value" in finding.sentence
-    assert "range" in finding.sentence
-    assert "replace" not in finding.sentence
+    assert (finding.kind, finding.refused) == ("stuck", True)
+    assert f"{axis} y stays at " in finding.sentence
+    assert "if its range ends there, set a larger one" in finding.sentence

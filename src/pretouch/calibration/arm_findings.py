@@ -3,14 +3,8 @@
 import numpy as np
 
 from pretouch.calibration.link_motion import ArmMotion
-from pretouch.calibration.locate import Located
 from pretouch.calibration.params import CalibrationParams
 from pretouch.calibration.result import Finding, UnitCalibration
-
-_LEAST_LEAN = np.deg2rad(0.3)
-"""How far an arm leans that is worth a word [rad]."""
-_SIGNIFICANT = 4.0
-"""Standard deviations from which on an arm leans."""
 
 
 def little_used(arm: ArmMotion) -> list[Finding]:
@@ -39,23 +33,3 @@ def clocks_apart(units: tuple[UnitCalibration, ...], params: CalibrationParams) 
         " stamped by different clocks: correct the stamps of all units by that."
     )
     return [Finding("clocks", sentence, False)]
-
-
-def leaning(units: list[Located]) -> list[Finding]:
-    """Say how far the base leans, from the units whose place can be trusted."""
-    if not units:
-        return []
-    gravity = np.array([unit.estimate.gravity for unit in units])
-    # the base's z leans away from up, to where up does not point
-    lean = -np.median(gravity[:, :2] / gravity[:, 2:], axis=0)
-    sigma = float(np.median([np.sqrt(np.linalg.eigvalsh(unit.gravity_covariance[:2, :2])[-1]) for unit in units]))
-    sigma /= float(np.median(gravity[:, 2]))
-    angle = float(np.arctan(np.linalg.norm(lean)))
-    if angle < _LEAST_LEAN or angle < _SIGNIFICANT * sigma:
-        return []
-    axis = int(np.argmax(np.abs(lean)))
-    sentence = (
-        f"The arm leans by {np.rad2deg(angle):.1f} degrees, mostly towards {'-' if lean[axis] < 0 else '+'}{'xy'[axis]}"
-        " of its base. The unit poses account for it, but nothing else does: level the base."
-    )
-    return [Finding("leaning", sentence, False)]

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from pretouch.calibration.arm_findings import clocks_apart, leaning, little_used
+from pretouch.calibration.arm_findings import clocks_apart, little_used
 from pretouch.calibration.data import CalibrationData, UnitData
-from pretouch.calibration.findings import end_finding, error_findings, share_findings, slip_finding, unknown_finding
+from pretouch.calibration.findings import end_finding, error_findings, share_findings, unknown_finding
 from pretouch.calibration.identify import Identified, Identifier
 from pretouch.calibration.joint_checks import check_known, checked_joints, held, moved_joints, standing_joints
 from pretouch.calibration.joint_noise import JointNoise
@@ -15,7 +15,6 @@ from pretouch.calibration.mounting import likely_member, mounting_findings, seen
 from pretouch.calibration.observability import Axis, Observability, observability
 from pretouch.calibration.params import CalibrationParams
 from pretouch.calibration.result import Calibration, Finding, Place, UnitCalibration
-from pretouch.calibration.steadiness import Course, find_slip
 from pretouch.calibration.unit_checks import checked_unit
 from pretouch.errors import CalibrationError
 from pretouch.robot.model import RobotModel
@@ -42,9 +41,7 @@ def calibrate(model: RobotModel, data: CalibrationData, params: CalibrationParam
     wrong = misplaced(model, {unit.id: unit.link for unit in data.units}, found)
     noise = JointNoise(arm, joints, params)
     units = tuple(_settled(arm, noise, unit, found[unit.id], wrong.get(unit.id), params) for unit in data.units)
-    trusted = [at for unit in units if unit.accepted and (at := found[unit.id].located) is not None]
-    notes += (*clocks_apart(units, params), *leaning(trusted))
-    return Calibration(units, notes, float(np.deg2rad(params.board_misalignment_deg)))
+    return Calibration(units, (*notes, *clocks_apart(units, params)), float(np.deg2rad(params.board_misalignment_deg)))
 
 
 def _check_ids(units: tuple[UnitData, ...]) -> None:
@@ -75,7 +72,7 @@ def _settled(
     if found.located is None:
         return UnitCalibration(unit.id, None, tuple(findings))
     located, model = found.located, arm.model
-    doubts = _doubts(arm, found, located, params)
+    doubts = _doubts(arm, located, params)
     link = located.link
     if unit.link is None or wrong:
         link = likely_member(model, found.body, link, located.pose)
@@ -88,23 +85,12 @@ def _settled(
     return UnitCalibration(unit.id, _place(arm, located, link, T, covariance), (*findings, *doubts), known)
 
 
-def _doubts(arm: ArmMotion, found: Identified, located: Located, params: CalibrationParams) -> list[Finding]:
+def _doubts(arm: ArmMotion, located: Located, params: CalibrationParams) -> list[Finding]:
     """Say why a place may not be trusted, other than where it is."""
-    shares = share_findings(arm, located, params)
-    slips = _slip(arm, found, located, params)
-    if not slips and (at_end := end_finding(arm, located)) is not None:
-        slips, shares = [at_end], [finding for finding in shares if finding.kind != "outliers"]
-    return [*slips, *shares, *error_findings(located, params)]
-
-
-def _slip(arm: ArmMotion, found: Identified, located: Located, params: CalibrationParams) -> list[Finding]:
-    if found.signal is None:
-        return []
-    known = located.known
-    measured = found.signal.at(arm.time[known] + located.assumed_late)
-    course = Course(arm.time[known], arm.link(located.link).at(known), measured, located.noise)
-    slip = find_slip(course, located.estimate, params)
-    return [] if slip is None else [slip_finding(slip, float(arm.time[0]))]
+    findings = share_findings(arm, located, params)
+    if (at_end := end_finding(arm, located)) is not None:
+        findings = [at_end, *(finding for finding in findings if finding.kind != "outliers")]
+    return [*findings, *error_findings(located, params)]
 
 
 def _observability(

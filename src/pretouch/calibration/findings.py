@@ -7,7 +7,6 @@ from pretouch.calibration.locate import Located
 from pretouch.calibration.observability import Observability
 from pretouch.calibration.params import CalibrationParams
 from pretouch.calibration.result import Finding
-from pretouch.calibration.steadiness import Slip
 from pretouch.types import FloatArray
 
 _UNUSUAL = 5.0
@@ -16,16 +15,6 @@ _MANY = 0.05
 """Share of outliers from which on they are worth a word."""
 _LONG_S = 0.5
 """Outliers that last for longer, up to an end of the run, are of a unit that is not there [s]."""
-
-
-def slip_finding(slip: Slip, begin: float) -> Finding:
-    """Say when and how far a unit slipped; `begin` of the run [s]."""
-    sentence = (
-        f"It slipped by {1000 * slip.distance:.1f} mm and {np.rad2deg(slip.angle):.1f} degrees,"
-        f" {slip.earliest - begin:.1f} s to {slip.latest - begin:.1f} s after the first joint state: fasten it and"
-        " calibrate again."
-    )
-    return Finding("slipped", sentence, True)
 
 
 def end_finding(arm: ArmMotion, located: Located) -> Finding | None:

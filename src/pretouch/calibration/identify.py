@@ -23,8 +23,6 @@ _STILL = 0.05
 """Share of the least turning of any link that a unit measures at most if it was left lying somewhere."""
 _RESTS = np.deg2rad(2.0)
 """What turns faster than this, root mean square, moved [rad/s]."""
-_COUPLED = 0.3
-"""A gyroscope that measures a smaller share of what a link turned is on something that the arm shakes."""
 _SCALE = 0.1
 """By how much a gyroscope's scale may be off at first sight."""
 _MISTAKEN = (
@@ -50,7 +48,6 @@ class Identified:
 
     body: tuple[int, ...] = ()
     """Indices of the links it may sit on, all fixed to each other; none if it fits no link."""
-    signal: ImuSignal | None = None
     located: Located | None = None
     findings: list[Finding] = field(default_factory=list)
 
@@ -119,40 +116,34 @@ class Identifier:
         close.sort(key=lambda match: -match.alignment.likeness)
         if not enough(self.arm, known_instants(self.arm, signal, close[0].alignment.late), self.params):
             return Identified(findings=[_too_little(self.params)])
-        problem = self._gyroscope(signal, close[0], given)
-        if problem is not None and problem.kind == "no_link":
-            return Identified(findings=[problem])
+        problem = self._gyroscope(signal, close[0])
         if problem is not None:
-            return Identified(close[0].body, signal, None, [*findings, problem])
+            return Identified(close[0].body, None, [*findings, problem])
         fits = [(match.body, self._fit(signal, match, given)) for match in close]
         fitted = [(body, located) for body, located in fits if located is not None]
         if not fitted:
-            return Identified(close[0].body, signal, None, [_too_little(self.params)])
+            return Identified(close[0].body, None, [_too_little(self.params)])
         scores = {body: float(located.noise[0] * located.noise[3]) for body, located in fitted}
         alike = [(body, located) for body, located in fitted if scores[body] <= _AMBIGUOUS * min(scores.values())]
         body, located = min(alike, key=lambda one: (given not in one[0], scores[one[0]]))
         if len(alike) > 1:
             others = [links for links, _ in alike if links != body]
             findings = [*findings, self._ambiguous(located.link, others, given in body)]
-        return Identified(body, signal, located, findings)
+        return Identified(body, located, findings)
 
     def _fit(self, signal: ImuSignal, match: _Match, given: int | None) -> Located | None:
         link = given if given is not None and given in match.body else match.body[0]
         return locate(self.arm, signal, link, match.alignment.late, self.params)
 
-    def _gyroscope(self, signal: ImuSignal, match: _Match, given: int | None) -> Finding | None:
+    def _gyroscope(self, signal: ImuSignal, match: _Match) -> Finding | None:
         """Find a gyroscope whose scale is wrong, or whose axes are mirrored."""
         known = known_instants(self.arm, signal, match.alignment.late)
         w = self.arm.link(match.body[0]).w[known]
         sensed = signal.at(self.arm.time[known] + match.alignment.late).values[:, :3]
         scale = _rms(sensed) / max(_rms(w), 1e-9)
         if abs(scale - 1) > _SCALE:
-            mistaken = _mistaken(scale)
-            if not mistaken and scale < _COUPLED and given not in match.body:
-                return _shaken(scale, self.arm.model.links[match.body[0]])
-            sentence = (
-                f"Its gyroscope measures {scale:.3g} times what its link turned: {mistaken or 'check its scale'}."
-            )
+            way_out = _mistaken(scale) or "check its scale, and that it sits on the arm"
+            sentence = f"Its gyroscope measures {scale:.3g} times what its link turned: {way_out}."
             return Finding("gyroscope_scale", sentence, True)
         U, size, Vt = np.linalg.svd((w - w.mean(axis=0)).T @ (sensed - sensed.mean(axis=0)))
         if size[2] > 0.01 * size[0] and np.linalg.det(U @ Vt) < 0:
@@ -222,11 +213,3 @@ def _too_little(params: CalibrationParams) -> Finding:
 def _mistaken(scale: float) -> str:
     """Say what mistake makes a gyroscope measure so many times what is right; nothing if none is known to."""
     return next((why for factor, why in _MISTAKEN if abs(scale / factor - 1) < _SCALE), "")
-
-
-def _shaken(scale: float, link: str) -> Finding:
-    sentence = (
-        f"It does not sit on the arm: it turned as {link}, but {scale:.2g} times as much, as if on something that the"
-        " arm shakes. Mount it on its link, or check its gyroscope's scale."
-    )
-    return Finding("no_link", sentence, True)

@@ -42,10 +42,11 @@ def checked_joints(
     _check_order(joints.stamp)
     _check_range(model, joints.q)
     _check_span(joints.stamp, params)
-    for kept, named in ((_own_stamp, _repeated), (_spaced, _bunched), (_renewed, _held)):
-        keep = kept(joints, params)
-        findings += [] if keep.all() else [named(keep)]
-        joints = joints.at(keep)
+    count = len(joints.stamp)
+    for choice in (_own_stamp, _spaced, _renewed):
+        joints = joints.at(choice(joints, params))
+    if len(joints.stamp) < count:
+        findings.append(_repeated(count - len(joints.stamp), count))
     _check_rate(joints, params)
     return joints, (*findings, *_missing(joints.stamp, params))
 
@@ -109,10 +110,10 @@ def _own_stamp(joints: JointTrace, params: CalibrationParams) -> BoolArray:
     return np.asarray(keep)
 
 
-def _repeated(keep: BoolArray) -> Finding:
+def _repeated(left_out: int, count: int) -> Finding:
     sentence = (
-        f"{np.sum(~keep)} joint states of {len(keep)} repeat the stamp of another one and were left out: record each"
-        " state once, with its own stamp."
+        f"{left_out} joint states of {count} repeat the values of the one before, or have the stamp of another one or"
+        " nearly so, and were left out: record each measurement once, stamped where it is measured."
     )
     return Finding("joints_repeated", sentence, False)
 
@@ -130,14 +131,6 @@ def _spaced(joints: JointTrace, params: CalibrationParams) -> BoolArray:
     return keep
 
 
-def _bunched(keep: BoolArray) -> Finding:
-    sentence = (
-        f"{np.sum(~keep)} joint states of {len(keep)} have nearly the stamp of the one after and were left out: stamp"
-        " states where they are measured, not where they arrive."
-    )
-    return Finding("joints_bunched", sentence, False)
-
-
 def _renewed(joints: JointTrace, params: CalibrationParams) -> BoolArray:
     """Tell which states (T,) are not of a value that was only held until the next one came; an arm may stand longer."""
     same = np.append(False, ~_changes(joints.q))
@@ -149,14 +142,6 @@ def _renewed(joints: JointTrace, params: CalibrationParams) -> BoolArray:
 def _changes(q: FloatArray) -> BoolArray:
     """Tell at which states but the first (T - 1,) any position differs from that before."""
     return np.asarray((np.diff(q, axis=0) != 0).any(axis=1))
-
-
-def _held(keep: BoolArray) -> Finding:
-    sentence = (
-        f"{np.sum(~keep)} joint states of {len(keep)} repeat the values of the one before and were left out: record"
-        " states at the rate at which joints are measured."
-    )
-    return Finding("joints_held", sentence, False)
 
 
 def _check_order(stamp: FloatArray) -> None:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pretouch.calibration.fit import GRAVITY, Estimate, Fit, Measured, fit, start
+from pretouch.calibration.fit import Estimate, Fit, Measured, fit, start
 from pretouch.calibration.imu_signal import ImuSignal
 from pretouch.calibration.link_motion import ArmMotion, LinkMotion
 from pretouch.calibration.params import CalibrationParams
@@ -23,8 +23,6 @@ class Located:
     estimate: Estimate
     covariance: FloatArray
     """(6, 6) of rotation vector in the sensor frame [rad] and position in the link frame [m]."""
-    gravity_covariance: FloatArray
-    """(3, 3) of what holds against gravity, base frame [m/s^2]."""
     noise: FloatArray
     """(6,) root mean square of what is not explained, each sensor's the same for its axes [rad/s, m/s^2]."""
     assumed_late: float
@@ -80,7 +78,7 @@ def locate(arm: ArmMotion, signal: ImuSignal, link: int, late: float, params: Ca
     here, measured = here.at(inliers), Measured(measured.values[inliers], measured.rates[inliers])
     found, noise = _final(found, here, measured, noise, params)
     C = 0.5 * (found.covariance + found.covariance.T)
-    return Located(link, found.estimate, C[:6, :6], C[GRAVITY, GRAVITY], noise, assumed, known, used)
+    return Located(link, found.estimate, C[:6, :6], noise, assumed, known, used)
 
 
 def explained(estimate: Estimate, motion: LinkMotion, measured: Measured, params: CalibrationParams) -> BoolArray:

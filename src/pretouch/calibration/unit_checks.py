@@ -115,30 +115,17 @@ def _stuck(unit: UnitData) -> list[Finding]:
         sentence = f"All its {len(values)} samples are the same: restart the unit, or replace it."
         return [Finding("stuck", sentence, True)]
     stuck: list[str] = []
-    cut: list[str] = []
     for axis, name in enumerate(_AXES):
         begin, end = _longest_run(values[:, axis])
         others = np.ptp(values[begin:end], axis=0) > _VARIES
         lasted = imu.stamp[end - 1] - imu.stamp[begin]
         if lasted > _STUCK_S and others.any() and not _full(unit, axis, begin):
-            where, extreme = values[begin, axis], _extreme(values[:, axis], begin, axis)
-            at = f"{f'its {extreme} value, ' if extreme else ''}{where:.4g} {'m/s^2' if axis > 2 else 'rad/s'}"
-            (cut if extreme else stuck).append(f"its {name} stays at {at} for {lasted:.1f} s")
-    findings = []
-    if stuck:
-        sentence = f"While others vary, {', '.join(stuck)}: restart the unit, or replace it."
-        findings.append(Finding("stuck", sentence, True))
-    if cut:
-        sentence = f"While others vary, {', '.join(cut)}: that ends its range; set a larger one, or declare it."
-        findings.append(Finding("cut_off", sentence, True))
-    return findings
-
-
-def _extreme(values: FloatArray, sample: int, axis: int) -> str:
-    """Say whether a value of an axis (M,) that varies is its "largest" or "smallest" one; empty for any other."""
-    if np.ptp(values) <= _VARIES[axis]:
-        return ""
-    return {values.max(): "largest", values.min(): "smallest"}.get(values[sample], "")
+            where = f"{values[begin, axis]:.4g} {'m/s^2' if axis > 2 else 'rad/s'}"
+            stuck.append(f"its {name} stays at {where} for {lasted:.1f} s")
+    if not stuck:
+        return []
+    way_out = "restart the unit, or replace it; if its range ends there, set a larger one"
+    return [Finding("stuck", f"While others vary, {', '.join(stuck)}: {way_out}.", True)]
 
 
 def _longest_run(values: FloatArray) -> tuple[int, int]:
