@@ -13,7 +13,6 @@ from pretouch.imported_data.source import Choice
 from pretouch.loop import Cycle
 from pretouch.recording.skin_recording import SkinRecording
 from pretouch.recording.writer import Recording
-from pretouch.sensing.skin import PAPER_SKIN
 from pretouch.types import Inputs
 from tests.following_arm import DT, Arm
 from tests.hardware.traffic import heard
@@ -93,7 +92,6 @@ def test_a_rate_is_that_of_the_detector(capsys, tmp_path):
         ({"out": "/dev/null/a.png"}, PretouchError, "/dev/null/a.png cannot be written"),
         ({"json_file": "/dev/null/a.json"}, PretouchError, "/dev/null/a.json cannot be written"),
         ({"place": "gone.csv"}, RecordingError, "The recording gone.csv does not exist"),
-        ({"choice": Choice(ranges=True), "skin_file": PAPER_SKIN}, RecordingError, "has no ranges"),
     ],
 )
 def test_bad_input_is_one_sentence_and_nothing_is_printed(capsys, file, given, error, words):
@@ -109,14 +107,14 @@ def test_a_recording_of_ours_gives_the_contacts_and_thresholds_it_holds(capsys, 
     steps = []
     with Recording(place, arm.controller) as recording:
         for sample in pushed(6.0, PUSHES[:1]):
-            inputs, before = Inputs(arm.time, arm.robot(tuple(sample)), arm.readings({0: 0.2})), arm.state
+            inputs, before = Inputs(arm.time, arm.robot(tuple(sample)), arm.readings()), arm.state
             step, arm.state = arm.controller.step(before, inputs)
             recording.record(Cycle(inputs, before, step, arm.state))
             arm.qd, arm.q, arm.time = step.command, arm.q + step.command * DT, arm.time + DT
             steps.append(step)
-    detect(place, Choice(ranges=True), ("paper", "blind"), PAPER_SKIN, json_file=numbers)
-    assert "The arm is assumed to be panda" in capsys.readouterr().out
-    paper, _ = json.loads(numbers.read_text())["profiles"]
+    detect(place, Choice(), ("paper",), json_file=numbers)
+    assert "Without a skin no obstacle is known" in capsys.readouterr().out
+    (paper,) = json.loads(numbers.read_text())["profiles"]
     contacts = [s for s in steps if s.contact is not None]
     assert len(contacts) == 1
     assert [c["time_s"] for c in paper["contacts"]] == pytest.approx([s.stamp + 0.005 for s in contacts])

@@ -8,12 +8,10 @@ from scipy.spatial.transform import Rotation
 from pretouch.errors import RecordingError
 from pretouch.imported_data.samples import read_imported
 from pretouch.imported_data.source import Choice
-from pretouch.types import RangeStatus
 from tests.imported_data.files import (
     START,
     STORE1,
     joints,
-    ranging,
     stamps,
     wrench,
     wrenches,
@@ -201,24 +199,6 @@ def test_headers_of_another_clock_that_keeps_pace_are_believed(tmp_path):
     found = read_imported(write_bag(tmp_path / "bag", messages), Choice())
     np.testing.assert_array_equal(found.force.time, stamps(40))
     assert found.notes == ()
-
-
-def test_ranges_are_read_as_rep_117_means_them(tmp_path):
-    messages = wrenches(FORCE) + [("/joint_states", t, joints(t, Q)) for t in stamps(40)]
-    shown = [0.5, np.inf, -np.inf, np.nan, 1.4, 0.01]
-    messages += [("/r", t, ranging(t, d, "hand")) for t, d in zip(stamps(6), shown, strict=True)]
-    (found,) = read_imported(write_bag(tmp_path / "bag", messages), Choice(ranges=True)).ranges
-    assert found.frame == "hand"
-    assert [RangeStatus(int(s)) for s in found.readings.values[:, 1]] == [
-        RangeStatus.OK, RangeStatus.SIGNAL, RangeStatus.MIN_RANGE, RangeStatus.NONE, RangeStatus.SIGNAL,
-        RangeStatus.MIN_RANGE,
-    ]  # fmt: skip
-
-
-def test_ranges_that_are_not_there_are_said(tmp_path):
-    messages = wrenches(FORCE) + [("/joint_states", t, joints(t, Q)) for t in stamps(40)]
-    with pytest.raises(RecordingError, match="no topic of sensor_msgs/Range: leave out --skin"):
-        read_imported(write_bag(tmp_path / "bag", messages), Choice(ranges=True))
 
 
 @pytest.mark.parametrize(

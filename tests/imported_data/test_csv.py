@@ -115,7 +115,6 @@ def test_what_is_wrong_is_said_in_one_sentence(tmp_path, text, words):
     ("choice", "words"),
     [
         (Choice(wrench="/w"), "has no topics"),
-        (Choice(ranges=True), "has no ranges"),
         (EE, "has no joint positions"),
     ],
 )

@@ -12,8 +12,7 @@ from pretouch.imported_data.source import Choice
 from pretouch.imported_data.summary import findings, guidance, summary
 from pretouch.profiles import PROFILES, at_rate, profile
 from tests.following_arm import Arm
-from tests.imported_data.files import PUSHES, force_columns, joints, pushed, ranging, stamps, write_bag, write_csv
-from tests.imported_data.files import wrenches as wrench_messages
+from tests.imported_data.files import PUSHES, force_columns, pushed, write_csv
 from tests.reference.contact import Touch
 
 PAPER, BLIND = PROFILES["paper"], PROFILES["blind"]
@@ -166,61 +165,3 @@ def test_the_noise_in_free_motion_is_that_of_the_data(of_force):
     assert found.duration == pytest.approx(59.0, abs=0.05)
     assert 50.0 < found.free < 53.0
     assert "if nobody touched the arm, 3 false contacts" in guidance(decisions, found, PAPER)
-
-
-def ranged(model, skin, distance, force):
-    """Messages of a resting arm, one of whose units shows something; the others see nothing."""
-    messages = wrench_messages(force)
-    for k, unit in enumerate(skin.ids):
-        for t in stamps(len(force) // 2, 50.0):
-            messages.append((f"/skin/{unit}/range", t, ranging(t, distance if k == 0 else np.inf, unit)))
-    messages += [("/joint_states", t, joints(t, model.description.q_ready)) for t in stamps(len(force))]
-    return sorted(messages, key=lambda m: m[1])
-
-
-def test_with_ranges_and_a_skin_it_is_the_controller_that_decides(tmp_path, panda_model, paper_skin):
-    force = pushed(6.0, ((3.0, 0.6, (0.0, 40.0, 0.0)),))
-    file = write_bag(tmp_path / "bag", ranged(panda_model, paper_skin, 0.2, force))
-    imported = read_imported(file, Choice(ranges=True))
-    found = detect_imported(imported, PAPER, paper_skin)
-    arm = Arm(panda_model, paper_skin, PAPER)
-    blind = detect_imported(imported, BLIND, paper_skin)
-    steps = []
-    for i, sample in enumerate(force):
-        arm.q, arm.qd, arm.time = panda_model.description.q_ready.copy(), np.zeros(7), 0.005 + i / 100
-        seen = replace(arm.readings({0: float(np.float32(0.2))}), stamp=np.full(len(paper_skin), (i // 2) * 0.02))
-        arm.readings = lambda *_, seen=seen: seen
-        steps.append(arm.step(tuple(sample)))
-        del arm.readings
-    np.testing.assert_array_equal(found.upper, [s.thresholds.upper for s in steps])
-    np.testing.assert_array_equal(found.lower, [s.thresholds.lower for s in steps])
-    assert [c.time for c in found.contacts] == pytest.approx([s.stamp for s in steps if s.contact is not None])
-    assert np.any(found.upper < blind.upper - 1.0) or np.any(found.lower > blind.lower + 1.0)
-    alone = detect_imported(imported, BLIND)
-    np.testing.assert_array_equal(blind.upper, alone.upper)
-    assert [c.time for c in blind.contacts] == [c.time for c in alone.contacts]
-
-
-def test_a_skin_whose_units_no_topic_names_is_refused(tmp_path, panda_model, paper_skin):
-    messages = [
-        (topic.replace("/skin/", "/sensor_"), t, m)
-        for topic, t, m in ranged(panda_model, paper_skin, 0.2, pushed(2.0, ()))
-    ]
-    for topic, _, message in messages:
-        if "sensor" in topic:
-            message.header.frame_id = "somewhere"
-    imported = read_imported(write_bag(tmp_path / "bag", messages), Choice(ranges=True))
-    with pytest.raises(RecordingError, match="No unit of the skin"):
-        detect_imported(imported, PAPER, paper_skin)
-
-
-def test_a_posture_that_is_missing_for_a_while_only_costs_that_while(tmp_path, panda_model, paper_skin):
-    force = pushed(9.0, ((3.0, 0.6, (0.0, 40.0, 0.0)), (7.0, 0.6, (0.0, 40.0, 0.0))))
-    messages = [
-        m for m in ranged(panda_model, paper_skin, 0.5, force)
-        if m[0] != "/joint_states" or not 2.5e9 < m[1] - stamps(1)[0] < 4.0e9
-    ]  # fmt: skip
-    imported = read_imported(write_bag(tmp_path / "bag", messages), Choice(ranges=True))
-    found = detect_imported(imported, PAPER, paper_skin)
-    assert [round(c.time, 1) for c in found.contacts] == [7.1]
-    assert np.isnan(found.force[(found.time > 2.6) & (found.time < 3.9)]).all()

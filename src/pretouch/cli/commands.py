@@ -111,8 +111,6 @@ class Detect:
     """Torque by motor current of each joint, gear included [Nm/A], separated by commas: for current1_A."""
     payload: float = 0.0
     """Load at the end-effector that the arm's model does not have [kg]: for measured torques."""
-    skin: str = ""
-    """Skin file, to use the recording's ranges; by default only the force is used."""
     rate: float = 0.0
     """Rate of the detector [Hz]; by default the profile's own, 100."""
     out: str = ""
@@ -127,12 +125,12 @@ class Detect:
         from pretouch.imported_data.source import Choice
 
         choice = Choice(
-            self.wrench, self.joints, self.sign, self.frame, self.zeros, self.arm, bool(self.skin), self.torques,
+            self.wrench, self.joints, self.sign, self.frame, self.zeros, self.arm, self.torques,
             mapping_of(self.columns), gains_of(self.gains), self.payload,
         )  # fmt: skip
-        skin, out, json = (Path(text) if text else None for text in (self.skin, self.out, self.json))
+        out, json = (Path(text) if text else None for text in (self.out, self.json))
         profiles = None if self.profiles == "auto" else words(self.profiles)
-        detect(Path(self.file), choice, profiles, skin, self.rate, out, json)
+        detect(Path(self.file), choice, profiles, self.rate, out, json)
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from pretouch.cli.writing import check_writable, numbers_to
 from pretouch.contact.moving_thresholds import thresholds_of
 from pretouch.errors import ParameterError, RecordingError
 from pretouch.extras import FIGURES
-from pretouch.imported_data.detect import detect_imported, units_topics
+from pretouch.imported_data.detect import detect_imported
 from pretouch.imported_data.held import holds_force, holds_torques
 from pretouch.imported_data.samples import ImportedData, read_imported
 from pretouch.imported_data.source import Choice
@@ -24,8 +24,6 @@ from pretouch.imported_data.torques import read_torques
 from pretouch.profiles import Profile, at_rate
 from pretouch.profiles import profile as find_profile
 from pretouch.recording.compare import Decisions, Found, matched
-from pretouch.robot.model import RobotModel
-from pretouch.sensing.skin import Skin, load_skin
 from pretouch.text_table import TextTable
 
 Column = tuple[Profile, Decisions, Summary]
@@ -35,7 +33,6 @@ def detect(
     place: Path,
     choice: Choice,
     profiles: Sequence[str] | None = None,
-    skin_file: Path | None = None,
     rate: float = 0.0,
     out: Path | None = None,
     json_file: Path | None = None,
@@ -44,10 +41,9 @@ def detect(
 
     Args:
         place: bag, MCAP or CSV file.
-        choice: what the recording does not say of itself; a skin file asks for its ranges.
+        choice: what the recording does not say of itself.
         profiles: names of the profiles to compare; None: `pretouch` and `paper` where there are joint torques, else
             `paper`.
-        skin_file: skin whose units the recording's ranges are of.
         rate: of the detector [Hz]; 0 for the profile's own.
         out: figure to write, or page.
         json_file: file for the numbers.
@@ -62,7 +58,7 @@ def detect(
         check_writable("figure", out)
     with numbers_to(json_file) as write:
         unused: tuple[str, ...] = ()
-        if skin_file is None and choice.frame == "base" and _torques_wanted(place, choice, given):
+        if choice.frame == "base" and _torques_wanted(place, choice, given):
             try:
                 recording = read_torques(place, choice)
             except RecordingError as error:
@@ -74,11 +70,8 @@ def detect(
                 return
         used = given or [_profile("paper", rate)]
         imported = read_imported(place, choice)
-        skin = load_skin(skin_file, _model(imported)) if skin_file else None
-        columns = [(p, d, summary(d, p)) for p in used for d in [detect_imported(imported, p, skin)]]
-        notes = list(
-            dict.fromkeys([*unused, *imported.notes, *_unheard(skin, imported), *_said(imported, columns, skin)])
-        )
+        columns = [(p, d, summary(d, p)) for p in used for d in [detect_imported(imported, p)]]
+        notes = list(dict.fromkeys([*unused, *imported.notes, *_said(imported, columns)]))
         if out:
             _draw(imported, columns, notes, out)
         write(_numbers(imported, columns, notes))
@@ -125,23 +118,10 @@ def _profile(name: str, rate: float) -> Profile:
     return at_rate(find_profile(name), rate) if rate else find_profile(name)
 
 
-def _model(imported: ImportedData) -> RobotModel:
-    if imported.model is None:
-        raise RecordingError(f"{imported.place} was read without ranges: a skin needs them.")
-    return imported.model
-
-
-def _unheard(skin: Skin | None, imported: ImportedData) -> list[str]:
-    if skin is None:
-        return []
-    silent = [unit for unit, topic in zip(skin.ids, units_topics(skin, imported.ranges), strict=True) if topic is None]
-    return [f"No range topic belongs to {', '.join(silent)}, which count as silent."] if silent else []
-
-
-def _said(imported: ImportedData, columns: list[Column], skin: Skin | None) -> list[str]:
+def _said(imported: ImportedData, columns: list[Column]) -> list[str]:
     said = [sentence for p, d, _ in columns for sentence in findings(imported, d, p)]
-    if skin is None and any(p.perception is not None and thresholds_of(p.detect).f_d_n for p, _, _ in columns):
-        said.append("Without ranges (--skin) no obstacle is known, so eq. 11 lowers no threshold.")
+    if any(p.perception is not None and thresholds_of(p.detect).f_d_n for p, _, _ in columns):
+        said.append("Without a skin no obstacle is known, so eq. 11 lowers no threshold.")
     return said
 
 

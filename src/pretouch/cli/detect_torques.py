@@ -12,7 +12,6 @@ from pretouch.cli.tables import show
 from pretouch.errors import RecordingError
 from pretouch.imported_data.events import ContactEvent
 from pretouch.imported_data.torque_results import ProfileResult, result_of
-from pretouch.imported_data.torque_summary import PUSH_S
 from pretouch.imported_data.torques import TorqueRecording
 from pretouch.profiles import Profile
 from pretouch.text_table import TextTable
@@ -95,21 +94,19 @@ def _profiles(labels: Sequence[str], results: Sequence[ProfileResult]) -> TextTa
     rows = []
     for name, r in zip(labels, results, strict=True):
         says = r.by_torques[1].detectable_n if r.by_torques else r.width
-        parts = [_shown(r.by_torques[1].push_quantile(q), 1) if r.by_torques else _NO for q in (0.5, 0.9)]
         largest = _shown(r.by_torques[1].evidence, 2) if r.by_torques else _NO
         rows.append((
             name, str(len(r.contacts)), f"{r.duration:.1f}", f"{r.motion:.1f}", _shown(r.per_hour, 1), largest,
-            _shown(says, 1), *parts,
+            _shown(says, 1),
         ))  # fmt: skip
     header = (
         "profile", "contacts", "armed [s]", "in motion [s]", "contacts an hour of motion", "evidence without contact",
-        "says it finds [N]", f"in {1000 * PUSH_S:.0f} ms [N]", "in 90 % [N]",
+        "says it finds [N]",
     )  # fmt: skip
     note = (
-        "A contact is evidence from 1 on. The last three are forces at the end-effector that are found: what the"
-        " detector itself says, in the direction the torques tell least of (median; of the paper's thresholds their"
-        f" distance from the mean), and pushes of {1000 * PUSH_S:.0f} ms laid on the recorded torques in"
-        " free motion along all axes: half of these are found, and 90 %."
+        "A contact is evidence from 1 on. The last is the force at the end-effector that the detector itself says it"
+        " finds, in the direction the torques tell least of (median; of the paper's thresholds their distance from the"
+        " mean)."
     )
     return TextTable("Detection", header, tuple(rows), note, 1)
 
@@ -172,7 +169,6 @@ def _of_profile(r: ProfileResult) -> dict[str, Any]:
     return numbers | {
         "residual_mean_nm": s.mean, "residual_sigma_nm": s.sigma, "external_torque_sigma_nm": s.before,
         "largest_evidence_without_contact": s.evidence, "detectable_force_n": s.detectable_n,
-        "push_s": PUSH_S, "push_force_median_n": s.push_quantile(0.5), "push_force_90_percent_n": s.push_quantile(0.9),
     }  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""A recording in a ROS bag or an MCAP file: geometry_msgs/WrenchStamped, sensor_msgs/JointState and Range."""
+"""A recording in a ROS bag or an MCAP file: geometry_msgs/WrenchStamped and sensor_msgs/JointState."""
 
 import re
 from array import array
@@ -12,11 +12,10 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
 from pretouch.errors import RecordingError
-from pretouch.imported_data.source import Choice, RangeTopic, Series, Source
+from pretouch.imported_data.source import Choice, Series, Source
 from pretouch.recording.skin_recording import READ_WITH, UNIT_SAMPLE
-from pretouch.types import RangeStatus
 
-WRENCH, JOINTS, RANGE = "geometry_msgs/msg/WrenchStamped", "sensor_msgs/msg/JointState", "sensor_msgs/msg/Range"
+WRENCH, JOINTS = "geometry_msgs/msg/WrenchStamped", "sensor_msgs/msg/JointState"
 _HELD = {WRENCH: "force", JOINTS: "joint positions"}
 _JOINT = re.compile(r"(?!.*finger).*joint_?([1-7])")
 """Names of the joints of the arms that are known: panda_joint1, fr3_joint1, joint_1."""
@@ -60,8 +59,7 @@ def read_bag(place: Path, choice: Choice) -> Source:
         wanted, picker = _wanted(place, reader, choice), JointPicker(7, _numbered)
         force = Topic(wanted[WRENCH][0].topic, 6, _wrench)
         joints = Topic(wanted[JOINTS][0].topic, 7, picker) if wanted[JOINTS] else None
-        ranges = [Topic(name, 2, _range) for name in sorted({c.topic for c in wanted[RANGE]})]
-        topics = [force, *([joints] if joints else []), *ranges]
+        topics = [force, *([joints] if joints else [])]
         fill(place, reader, [c for connections in wanted.values() for c in connections], topics)
     finally:
         reader.close()
@@ -77,7 +75,6 @@ def read_bag(place: Path, choice: Choice) -> Source:
         force.frame,
         joints.series(headers) if joints else None,
         picker.arm,
-        tuple(RangeTopic(topic.name, topic.frame, topic.series(headers)) for topic in ranges),
         notes,
     )
 
@@ -99,13 +96,10 @@ def read_errors_said(place: Path) -> Iterator[None]:
 
 
 def _wanted(place: Path, reader: AnyReader, choice: Choice) -> dict[str, list[Any]]:
-    """Connections to read, by type: one topic of forces, one of joints if needed, all ranges if wanted."""
+    """Connections to read, by type: one topic of forces, and one of joints if needed."""
     there = [c for c in reader.connections if c.msgcount]
     wanted = {WRENCH: one_topic(place, there, WRENCH, "--wrench", choice.wrench)}
     wanted[JOINTS] = one_topic(place, there, JOINTS, "--joints", choice.joints) if choice.posture else []
-    wanted[RANGE] = [c for c in there if c.msgtype == RANGE] if choice.ranges else []
-    if choice.ranges and not wanted[RANGE]:
-        raise RecordingError(f"{place} has no topic of sensor_msgs/Range: leave out --skin.")
     return wanted
 
 
@@ -154,20 +148,6 @@ def believed(topics: list[Topic]) -> tuple[bool, tuple[str, ...]]:
 def _wrench(message: Any) -> Row:
     f, t = message.wrench.force, message.wrench.torque
     return f.x, f.y, f.z, t.x, t.y, t.z
-
-
-def _range(message: Any) -> Row:
-    return float(message.range), float(_status(message))
-
-
-def _status(message: Any) -> RangeStatus:
-    """Status that says what REP 117 and the message's limits say: beyond them there is nothing near, or too near."""
-    distance = message.range
-    if np.isnan(distance):
-        return RangeStatus.NONE
-    if distance > message.max_range:
-        return RangeStatus.SIGNAL
-    return RangeStatus.MIN_RANGE if distance < message.min_range else RangeStatus.OK
 
 
 class JointPicker:

@@ -40,15 +40,13 @@ def read_csv(place: Path, choice: Choice) -> Source:
     """Read a CSV file. RecordingError for what cannot be read, with the column, the row and the way out."""
     if choice.wrench or choice.joints:
         raise RecordingError(f"{place} is a CSV file and has no topics: leave out --wrench and --joints.")
-    if choice.ranges:
-        raise RecordingError(f"{place} is a CSV file, which has no ranges: leave out --skin, or give a bag.")
     opened = open_table(place, choice.columns)
     columns, factors = _columns(place, opened.names)
     table, time, notes = opened.read({i: factors[key] for key, i in columns.items()})
     force = table[:, [k for k, key in enumerate(columns) if key.startswith(("force", "torque"))]]
     angles = [k for k, key in enumerate(columns) if key.startswith("q")]
     joints = Series(time, table[:, angles]) if angles and choice.posture else None
-    return Source("the columns force_x, force_y, force_z", Series(time, force), "", joints, "auto", (), tuple(notes))
+    return Source("the columns force_x, force_y, force_z", Series(time, force), "", joints, "auto", tuple(notes))
 
 
 class OpenTable(NamedTuple):

@@ -1,14 +1,13 @@
 """Recordings of arms that we know nothing of: read, and brought to our units, sign and frame."""
 
 import os
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from pretouch import extras
 from pretouch.errors import RecordingError
-from pretouch.imported_data.source import Choice, RangeTopic, Series, Source, check_reach, in_order, interpolated
+from pretouch.imported_data.source import Choice, Series, Source, check_reach, in_order, interpolated
 from pretouch.robot.model import RobotModel
 from pretouch.robot.named import robot_named
 from pretouch.types import BoolArray, FloatArray
@@ -24,7 +23,7 @@ _EE_FRAMES = ("_k", "_ee", "_tcp", "_hand", "link8", "tool0", "_flange")
 
 @value
 class ImportedData:
-    """Force, and perhaps postures and ranges, of an imported recording, as our controller would be given them."""
+    """Force, and perhaps postures, of an imported recording, as our controller would be given them."""
 
     place: Path
     said: str
@@ -35,7 +34,6 @@ class ImportedData:
     """(M, n) joint positions [rad]."""
     model: RobotModel | None
     """The arm, if the posture is needed."""
-    ranges: tuple[RangeTopic, ...]
     notes: tuple[str, ...]
 
     @property
@@ -53,7 +51,6 @@ def read_imported(place: Path, choice: Choice) -> ImportedData:
     if joints is not None:
         joints, more = in_order(joints, "Joints")
         notes += more
-    ranges = tuple(replace(r, readings=in_order(r.readings, r.topic)[0]) for r in source.ranges)
     if len(force) < 2:
         why = " ".join((f"{place} has {len(force)} sample{'' if len(force) == 1 else 's'} of the force.", *notes))
         raise RecordingError(f"{why} Give a longer recording, with a time of its own for each sample.")
@@ -65,7 +62,7 @@ def read_imported(place: Path, choice: Choice) -> ImportedData:
     if looks_ee:
         notes += (f"The force's frame_id is {source.frame_id!r}: if that is the end-effector's, add --frame ee.",)
     return ImportedData(
-        place, _said(source, choice, model), Series(force.time, ours), joints, model, ranges, source.notes + notes
+        place, _said(source, choice, model), Series(force.time, ours), joints, model, source.notes + notes
     )
 
 

@@ -14,7 +14,7 @@ from pretouch.values import value
 Sign = Literal["auto", "on-robot", "by-robot"]
 Frame = Literal["base", "ee"]
 Zeros = Literal["auto", "missing", "kept"]
-_OUT_OF_RANGE_RAD = 0.5
+OUT_OF_RANGE_RAD = 0.5
 """Joint positions this far beyond the arm's range [rad] are of another unit or arm."""
 
 
@@ -35,8 +35,6 @@ class Choice:
     """Whether a wrench of zeros only means that there is no estimate; auto: where the force is by the robot."""
     arm: str = "auto"
     """The arm, by its name or the folder it was imported to; auto: by the names of its joints, otherwise a Panda."""
-    ranges: bool = False
-    """Whether the range finders are wanted."""
     torques: str = ""
     """Topic of the joint torques; needed if it is not clear."""
     columns: tuple[tuple[str, str], ...] = ()
@@ -49,7 +47,7 @@ class Choice:
     @property
     def posture(self) -> bool:
         """Whether the joint positions are needed."""
-        return self.ranges or self.frame == "ee"
+        return self.frame == "ee"
 
     @property
     def zeros_missing(self) -> bool:
@@ -71,17 +69,6 @@ class Series:
 
 
 @value
-class RangeTopic:
-    """The readings of one range finder."""
-
-    topic: str
-    frame: str
-    """Its frame_id."""
-    readings: Series
-    """(N, 2) distance [m] and `RangeStatus` code."""
-
-
-@value
 class Source:
     """What stands in an imported recording, in SI units but in its own sign and frame."""
 
@@ -95,7 +82,6 @@ class Source:
     """(M, n) joint positions [rad]."""
     arm: str
     """The arm that its joints' names tell of, or auto."""
-    ranges: tuple[RangeTopic, ...]
     notes: tuple[str, ...]
     """What was found on the way and a person should know, a sentence each."""
 
@@ -147,7 +133,7 @@ def interpolated(series: Series, ticks: IntArray, longest_s: float) -> FloatArra
 
 def check_reach(place: Path, q: FloatArray, model: RobotModel) -> None:
     """Refuse positions (N, n) [rad] that an arm cannot have: their unit or the arm is another one."""
-    beyond = (q < model.q_min - _OUT_OF_RANGE_RAD) | (q > model.q_max + _OUT_OF_RANGE_RAD)
+    beyond = (q < model.q_min - OUT_OF_RANGE_RAD) | (q > model.q_max + OUT_OF_RANGE_RAD)
     if beyond.any():
         i, j = np.argwhere(beyond)[0]
         raise RecordingError(

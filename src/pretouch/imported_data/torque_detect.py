@@ -1,8 +1,7 @@
 """A profile's detector on recorded joint torques, cycle by cycle as in the controller, on an arm without a skin."""
 
-from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -13,25 +12,19 @@ from pretouch.errors import RecordingError
 from pretouch.imported_data.events import ContactEvent, Events
 from pretouch.imported_data.torques import TorqueRecording
 from pretouch.imported_data.velocities import pieces
+from pretouch.perception.closest import no_obstacles
 from pretouch.profiles import Profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.types import BoolArray, FloatArray, IntArray, Obstacles, RobotState
+from pretouch.types import BoolArray, FloatArray, IntArray, RobotState
 from pretouch.values import value
 
-_NOTHING = Obstacles(
-    unit=np.zeros(0, np.int64), point=np.zeros((0, 3)), ee_distance=np.zeros(0), body_point=np.zeros((0, 3)),
-    link=np.zeros(0, np.int64), direction=np.zeros((0, 3)), body_distance=np.zeros(0), closing_speed=np.zeros(0),
-)  # fmt: skip
+_NOTHING = no_obstacles()
 MOVING_RAD_S = 0.02
 """Speed of any joint from which the arm moves [rad/s]."""
 _DAMPING, _SINGULAR = 0.01, 0.02
 """Of the least squares by which a robot's interface makes a wrench of torques, and the smallest singular value of the
 Jacobian at which it does."""
-_KEPT = 240
-"""Instants whose state is kept, for pushes to be tried there."""
-_LEARNING_S = 20.0
-"""Time from the first sample, or half the recording, before which no push is tried [s]."""
 
 
 @value
@@ -54,8 +47,6 @@ class TorqueDecisions:
     moving: BoolArray
     """(S,) whether a joint turns."""
     contacts: tuple[ContactEvent, ...]
-    kept: tuple["Instant", ...]
-    """States on the way."""
 
     @property
     def touched(self) -> BoolArray:
@@ -64,14 +55,6 @@ class TorqueDecisions:
         for contact in self.contacts:
             found |= (self.time >= contact.time - 0.5) & (self.time <= contact.end + 0.5)
         return found
-
-
-class Instant(NamedTuple):
-    """What a detector remembered before a cycle."""
-
-    cycle: int
-    state: Any
-    window: WindowState
 
 
 class Stream:
@@ -85,13 +68,11 @@ class Stream:
         if not np.isfinite(recording.tau_ext[self.newest]).all(axis=1).any():
             raise RecordingError(f"{recording.place} has no usable torques: give a longer recording without gaps.")
 
-    def sample(self, cycle: int, window: WindowState, push: FloatArray | None = None) -> tuple[Sample, WindowState]:
-        """Return a cycle's sample, and the force window with it; `push` (3,) [N] is a force at the end-effector."""
+    def sample(self, cycle: int, window: WindowState) -> tuple[Sample, WindowState]:
+        """Return a cycle's sample, and the force window with it."""
         r, i = self.recording, self.newest[cycle]
         kin, tau = self.model.kinematics(r.q[i]), r.tau_ext[i]
         J = self.model.ee_jacobian(kin)
-        if push is not None:
-            tau = tau + J[:3].T @ push
         wrench = None if np.isnan(tau).any() else wrench_from_torques(J, tau, _DAMPING, _SINGULAR)
         robot = RobotState(self.time[cycle], r.q[i], r.qd[i], r.q[i], r.qd_commanded[i], tau, wrench)
         after = add_force(window, None if wrench is None else wrench[:3], self.profile.window)
@@ -111,7 +92,7 @@ class Stream:
 def detect_torques(recording: TorqueRecording, profile: Profile) -> TorqueDecisions:
     """Let a profile's detector run over a recording at the profile's rate, the newest sample in each cycle."""
     stream = Stream(recording, profile)
-    events, kept, wanted = Events(recording.model, recording.place), [], set(_instants(stream.time))
+    events = Events(recording.model, recording.place)
     found: list[Detection] = []
     state, window, waiting = None, window_init(profile.window.samples), True
     for cycle in range(len(stream.time)):
@@ -120,8 +101,6 @@ def detect_torques(recording: TorqueRecording, profile: Profile) -> TorqueDecisi
         waiting = waiting or bool(stream.first[cycle])
         if state is None or (waiting and not without):
             state, waiting = stream.begun(state, cycle), without
-        if cycle in wanted:
-            kept.append(Instant(cycle, state, window))
         window = after
         detection, state = stream.detector.step(state, stream.body, sample)
         events.add(float(stream.time[cycle]), detection)
@@ -132,7 +111,7 @@ def detect_torques(recording: TorqueRecording, profile: Profile) -> TorqueDecisi
         residual=np.array([d.residual for d in found]), evidence=np.array([d.evidence for d in found]),
         detectable_n=np.array([d.detectable_n for d in found]),
         armed=np.array([d.armed for d in found]), moving=np.abs(qd).max(axis=1) > MOVING_RAD_S,
-        contacts=events.all(), kept=tuple(kept),
+        contacts=events.all(),
     )  # fmt: skip
 
 
@@ -166,9 +145,3 @@ def _cycles(recording: TorqueRecording, period: float) -> tuple[FloatArray, IntA
         first.append(np.arange(count) == 0)
     ticks = np.concatenate(times)
     return ticks, np.searchsorted(time, ticks, side="right") - 1, np.concatenate(first)
-
-
-def _instants(time: FloatArray) -> Iterator[int]:
-    """Cycles whose state is kept, evenly spread over what comes after the first learning."""
-    first = int(np.searchsorted(time, min(time[0] + _LEARNING_S, 0.5 * (time[0] + time[-1]))))
-    yield from np.unique(np.linspace(first, len(time) - 1, _KEPT).astype(int)).tolist()

@@ -9,7 +9,7 @@ from pretouch.imported_data.events import ContactEvent
 from pretouch.imported_data.samples import ImportedData
 from pretouch.imported_data.source import Series
 from pretouch.imported_data.summary import summary
-from pretouch.imported_data.torque_detect import MOVING_RAD_S, Stream, TorqueDecisions, detect_torques, forces
+from pretouch.imported_data.torque_detect import MOVING_RAD_S, TorqueDecisions, detect_torques, forces
 from pretouch.imported_data.torque_summary import TorqueSummary, torque_summary
 from pretouch.imported_data.torques import TorqueRecording
 from pretouch.params import SequentialParams
@@ -58,7 +58,7 @@ def result_of(recording: TorqueRecording, profile: Profile) -> ProfileResult:
 def _by_torques(recording: TorqueRecording, profile: Profile) -> ProfileResult:
     profile, notes = for_currents(recording, profile)
     d = detect_torques(recording, profile)
-    found = torque_summary(Stream(recording, profile), d)
+    found = torque_summary(d, profile.task.control_period_s)
     if getattr(profile.detect, "learn", "") == "watched":
         notes.append(
             f"{profile.name}: no skin watches, so free motion is learnt from all that does not look like a contact"

@@ -98,7 +98,7 @@ def torque_recording(place: Path, source: JointSource, model: RobotModel, choice
     notes += check_velocities(place, stamp, q, qd) if "dq" in parts else ("Velocities are those of positions.",)
     sign = -1.0 if choice.sign == "by-robot" or (choice.sign == "auto" and source.by_robot) else 1.0
     torque = sign * parts[kind] * (np.array(choice.gains) if kind == "current" else 1.0)
-    notes += check_torques(place, q, qd, torque, model, kind != "tau_ext", choice.payload_kg)
+    check_torques(place, q, qd, torque, model, kind != "tau_ext", choice.payload_kg)
     if kind != "tau_ext":
         torque = observed(model, stamp, q, qd, torque, SequentialParams().observer_gain_1_s, choice.payload_kg)
     elif choice.payload_kg:
