@@ -13,12 +13,13 @@ from lockstep import LockstepSkin, ReadingsAt, run_in_lockstep  # beside this sc
 from pretouch.control.path import Circle
 from pretouch.controller import Controller
 from pretouch.errors import RobotError
-from pretouch.hardware.franka.client import Client, connect
+from pretouch.hardware.franka.client import connect
 from pretouch.hardware.franka.collision import collision_behavior
 from pretouch.hardware.franka.errors import MotionAborted
 from pretouch.hardware.franka.limiter import SetPointLimiter
 from pretouch.hardware.franka.limits import LimiterParams, motion_limits, planned
 from pretouch.hardware.franka.state import FrankaState, packed
+from pretouch.hardware.franka.vendor import VendorClient
 from pretouch.hardware.keys import load_keys
 from pretouch.loop import Cycle
 from pretouch.perception.scene_filter import floor_and_pedestal
@@ -71,11 +72,11 @@ class Staircase:
         return velocity, time > self._lasts and self._limiter.at_rest
 
 
-def staircase(client: Client, model: RobotModel, result: Result) -> None:
+def staircase(client: VendorClient, model: RobotModel, result: Result) -> None:
     client.control(Staircase(model, client.kind, LASTS_S, result).answer)
 
 
-def contact(client: Client, model: RobotModel, result: Result) -> None:
+def contact(client: VendorClient, model: RobotModel, result: Result) -> None:
     """Meet the contact that the server was told to make, recover, and go on."""
     client.set_collision_behavior(collision_behavior(profile("paper"), model))
     try:
@@ -92,7 +93,7 @@ def contact(client: Client, model: RobotModel, result: Result) -> None:
     client.control(Staircase(model, client.kind, 0.2, Result()).answer)
 
 
-def raises(client: Client, model: RobotModel, result: Result) -> None:
+def raises(client: VendorClient, model: RobotModel, result: Result) -> None:
     """Fail in the middle of a motion, and keep the exception, as a caller may; then move again."""
     answer = Staircase(model, client.kind, LASTS_S, result).answer
 
@@ -111,7 +112,7 @@ def raises(client: Client, model: RobotModel, result: Result) -> None:
     client.control(Staircase(model, client.kind, 0.2, Result()).answer)
 
 
-def units(client: Client, model: RobotModel, result: Result, port: str, keys: str) -> None:
+def units(client: VendorClient, model: RobotModel, result: Result, port: str, keys: str) -> None:
     """Follow the paper's circle with what the units tell in the robot's time."""
     skin = paper_skin(model)
     controller = Controller(model, skin, fixtures(SceneSpec()), Circle(), profile("paper"))
@@ -119,13 +120,13 @@ def units(client: Client, model: RobotModel, result: Result, port: str, keys: st
         follow(client, controller, result, readings_at)
 
 
-def control(client: Client, model: RobotModel, result: Result) -> None:
+def control(client: VendorClient, model: RobotModel, result: Result) -> None:
     """Follow the paper's circle without units."""
     controller = Controller(model, paper_skin(model), fixtures(SceneSpec()), Circle(), profile("blind"))
     follow(client, controller, result, lambda _: NEVER)
 
 
-def follow(client: Client, controller: Controller, result: Result, readings_at: ReadingsAt) -> None:
+def follow(client: VendorClient, controller: Controller, result: Result, readings_at: ReadingsAt) -> None:
     """Turn a controller for a second and a half after the force window is full."""
     hashed, steps = sha256(), []
 
@@ -142,7 +143,7 @@ def follow(client: Client, controller: Controller, result: Result, readings_at: 
 
 
 def experiment(
-    client: Client, model: RobotModel, result: Result, name: str, side: str, seconds: str, place: str, port: str,
+    client: VendorClient, model: RobotModel, result: Result, name: str, side: str, seconds: str, place: str, port: str,
     keys: str,
 ) -> None:  # fmt: skip
     """Follow the paper's circle with a profile and units, and record it."""

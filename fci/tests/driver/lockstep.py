@@ -6,7 +6,7 @@ from typing import Self
 import numpy as np
 
 from pretouch.controller import Controller, ControllerState
-from pretouch.hardware.franka.client import Client
+from pretouch.hardware.franka.vendor import VendorClient
 from pretouch.hardware.franka.limiter import PERIOD_S, SetPointLimiter
 from pretouch.hardware.franka.limits import LimiterParams, motion_limits
 from pretouch.hardware.franka.state import FrankaState, robot_state
@@ -63,7 +63,7 @@ class LockstepLoop:
 
 
 def run_in_lockstep(
-    client: Client, controller: Controller, readings_at: ReadingsAt, record: Record, seconds: float
+    client: VendorClient, controller: Controller, readings_at: ReadingsAt, record: Record, seconds: float
 ) -> None:
     """Let a controller move the arm. It is compiled before: the arm waits less than a second for its first command."""
     warm_up(controller, robot_state(client.read(), 0.0))

@@ -80,13 +80,6 @@ def test_a_missing_library_names_the_extra(monkeypatch: pytest.MonkeyPatch, kind
         connect("127.0.99.99", kind)
 
 
-def test_a_kernel_without_real_time_is_refused_where_it_is_demanded(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(client, "has_real_time_kernel", lambda: False)
-    monkeypatch.setitem(sys.modules, "panda_py", sys)
-    with pytest.raises(RobotError, match="boot one with PREEMPT_RT"):
-        connect("127.0.99.99", "panda", real_time=True)
-
-
 @pytest.mark.parametrize("mode", [mode for mode in MODES if mode != "idle"])
 def test_each_mode_in_which_the_arm_does_not_move_has_a_way_out(mode: str) -> None:
     with pytest.raises(RobotError, match=f'^The arm at robot is in mode "{mode}" after joint_reflex; .*\\.$'):

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pretouch.hardware.ros2.messages import TRAJECTORY, TWIST, VELOCITIES, Messages
+from pretouch.hardware.ros2.messages import TRAJECTORY, TWIST, Messages
 from pretouch.hardware.ros2.node import Ros2Node
 
 MESSAGES = Messages("jazzy")
@@ -35,11 +35,6 @@ def trajectory(names: tuple[str, ...], *points: tuple[float, Any], at: float = 0
         for after, qd in points
     ]  # fmt: skip
     return make(TRAJECTORY, MESSAGES.header(stamp(at), ""), list(names), made)
-
-
-def velocities(qd: Any) -> Any:
-    layout = MESSAGES.make("std_msgs/msg/MultiArrayLayout", [], 0)
-    return MESSAGES.make(VELOCITIES, layout, np.asarray(qd, float))
 
 
 class Publishing:

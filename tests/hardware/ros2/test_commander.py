@@ -27,7 +27,7 @@ from pretouch.profiles import profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, Mode, RangeReadings
-from tests.hardware.ros2.asking import MESSAGES, NAMES, SLOW, Publishing, trajectory, twist, velocities
+from tests.hardware.ros2.asking import MESSAGES, NAMES, SLOW, Publishing, trajectory, twist
 from tests.hardware.ros2.processes import ArmPeer, arm_peer
 from tests.hardware.ros2.test_messages import Drawn
 
@@ -116,15 +116,6 @@ def test_a_trajectory_of_other_joints_or_without_velocities_is_refused(
     assert re.search(said, Told(panda_model, "trajectory")(message).refused)
 
 
-def test_velocities_are_those_of_the_joints_in_order_and_as_many(panda_model: RobotModel) -> None:
-    told = Told(panda_model, "velocities")
-    assert told(velocities(0.01 * np.arange(7))).number.tolist() == [(0.01 * np.arange(7)).tolist()]
-    assert "6 joint velocities are asked for: give 7" in told(velocities(np.zeros(6)), 5.1).refused
-    # MoveIt Servo sends positions in such messages, unless it is told not to
-    assert "the joints' positions are sent, not velocities" in told(velocities(Q + 0.02), 5.2).refused
-    assert not told(velocities(Q + 0.2), 5.3).refused
-
-
 @pytest.mark.parametrize("off", [-30.0, 2.0])
 def test_a_clock_that_differs_is_named_unless_ros_has_its_own(panda_model: RobotModel, off: float) -> None:
     found = Told(panda_model, "twist")(twist((0.1, 0, 0), at=time() + off))
@@ -140,11 +131,12 @@ def test_a_message_that_only_comes_again_goes_stale(panda_model: RobotModel) -> 
 
 
 def test_two_that_ask_at_once_are_refused_until_one_has_been_silent(panda_model: RobotModel) -> None:
-    told = Told(panda_model, "velocities")
-    assert not told(velocities(SLOW), 5.0, writer=1).refused
-    assert told(velocities(-SLOW), 5.1, writer=2).refused == "several programs ask on /pretouch/commands: run only one"
-    assert told(velocities(-SLOW), 5.3, writer=2).refused
-    assert not told(velocities(-SLOW), 5.7, writer=2).refused
+    told, (here, there) = Told(panda_model, "trajectory"), (trajectory(NAMES, (0.0, qd)) for qd in (SLOW, -SLOW))
+    assert not told(here, 5.0, writer=1).refused
+    refusal = "several programs ask on /pretouch/joint_trajectory: run only one"
+    assert told(there, 5.1, writer=2).refused == refusal
+    assert told(there, 5.3, writer=2).refused
+    assert not told(there, 5.7, writer=2).refused
 
 
 def test_before_anything_was_asked_nothing_is(panda_model: RobotModel) -> None:
@@ -164,7 +156,7 @@ def test_what_the_arm_is_told_is_no_commander(panda_model: RobotModel) -> None:
         CommanderParams("twist", "1st")
 
 
-@pytest.mark.parametrize("asked", ["twist", "trajectory", "velocities"])
+@pytest.mark.parametrize("asked", ["twist", "trajectory"])
 def test_whatever_a_message_holds_is_taken_or_said(panda_model: RobotModel, asked: Asked) -> None:
     told, rng = Told(panda_model, asked, shared_clock=False), np.random.default_rng(0)
     odd, drawn = [math.nan, math.inf, -math.inf, 1e300, 0.0, 0.1], Drawn(MESSAGES, 1)
@@ -173,7 +165,6 @@ def test_whatever_a_message_holds_is_taken_or_said(panda_model: RobotModel, aske
         message = {
             "twist": twist(numbers[:3], numbers[3:6], str(rng.choice(["world", "panda_hand_tcp", "x"]))),
             "trajectory": trajectory(NAMES, (0.0, numbers), (float(rng.choice([0.0, 1.0])), numbers)),
-            "velocities": velocities(numbers),
         }[asked] if k % 2 else drawn.pair(told.commander.kind)[0]  # fmt: skip
         found = told(message, 5.0 + k)
         _, wrong = sound_desired(found, 7, 5.0 + k)

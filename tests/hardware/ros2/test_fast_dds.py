@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pretouch.hardware.ros2.messages import FRANKA_STATE, JOINT_STATE, RANGE, TRAJECTORY, TWIST, VELOCITIES, WRENCH
+from pretouch.hardware.ros2.messages import FRANKA_STATE, JOINT_STATE, RANGE, TRAJECTORY, TWIST, WRENCH
 from pretouch.hardware.ros2.node import Ros2Node
 from pretouch.hardware.ros2.params import ArmParams, Distribution, NodeParams
 from pretouch.hardware.ros2.stamps import Stamps
@@ -28,7 +28,6 @@ LAYOUTS = {
     RANGE: "iusbfffff",
     TRAJECTORY: "ius[s][[d][d][d][d]iu]",
     TWIST: "iusdddddd",
-    VELOCITIES: "[suu]u[d]",
 }
 JOINTS = "ius[s][d][d][d]"
 DDS_NAMES = {
@@ -37,7 +36,6 @@ DDS_NAMES = {
     RANGE: "sensor_msgs::msg::dds_::Range_",
     TRAJECTORY: "trajectory_msgs::msg::dds_::JointTrajectory_",
     TWIST: "geometry_msgs::msg::dds_::TwistStamped_",
-    VELOCITIES: "std_msgs::msg::dds_::Float64MultiArray_",
     FRANKA_STATE: "franka_msgs::msg::dds_::FrankaRobotState_",
 }
 LINES = {
@@ -53,7 +51,6 @@ LINES = {
         "0 0 :base 1 :joint 0",
     ],
     TWIST: ["1 2 :panda_link0 0.1 0 -0.25 0 nan 1"],
-    VELOCITIES: ["0 0 3 0.5 -1 1e-300", "1 :joints 2 2 0 2 0.1 0.2"],
 }
 
 

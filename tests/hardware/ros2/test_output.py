@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pretouch.hardware.ros2.messages import CLOUD, DIAGNOSTICS, MARKERS, STATUS, TEXT, TRANSFORMS, VECTOR, WRENCH
+from pretouch.hardware.ros2.messages import CLOUD, DIAGNOSTICS, MARKERS, STATUS, TEXT, TRANSFORMS, WRENCH
 from pretouch.hardware.ros2.node import Ros2Node
 from pretouch.hardware.ros2.output import Ros2Output
 from pretouch.hardware.ros2.params import OutputParams
@@ -21,9 +21,8 @@ from tests.following_arm import DT, Arm
 
 TOPICS = {
     "/pretouch/obstacles": CLOUD, "/pretouch/markers": MARKERS, "/pretouch/force": WRENCH,
-    "/pretouch/threshold_upper": VECTOR, "/pretouch/threshold_lower": VECTOR, "/pretouch/contact": WRENCH,
-    "/pretouch/mode": TEXT, "/pretouch/limited": STATUS, "/diagnostics": DIAGNOSTICS,
-    "/tf": TRANSFORMS, "/tf_static": TRANSFORMS,
+    "/pretouch/contact": WRENCH, "/pretouch/mode": TEXT, "/pretouch/limited": STATUS, "/diagnostics": DIAGNOSTICS,
+    "/tf_static": TRANSFORMS,
 }  # fmt: skip
 LATCHED = ("/pretouch/mode", "/tf_static")
 
@@ -78,7 +77,7 @@ def listener(other: Ros2Node) -> Listener:
 def trajectory(
     panda_model: RobotModel, paper_skin: Skin, node: Ros2Node, listener: Listener
 ) -> Iterator[TrajectoryRun]:
-    trajectory = TrajectoryRun(panda_model, paper_skin, node, links=True, diagnostics_hz=10.0)
+    trajectory = TrajectoryRun(panda_model, paper_skin, node, diagnostics_hz=10.0)
     assert listener.found()
     assert matched(node)
     yield trajectory
@@ -104,8 +103,6 @@ def test_a_step_is_published_by_standard_messages(
     assert rows[:, 4].view("<u4").tolist() == step.obstacles.unit.tolist()
     force = listener.last("/pretouch/force")
     assert (force.header.frame_id, force.wrench.force.z) == (panda_model.links[0], 3.0)
-    assert listener.last("/pretouch/threshold_upper").vector.x == pytest.approx(step.thresholds.upper[0])
-    assert listener.last("/pretouch/threshold_lower").vector.y == pytest.approx(step.thresholds.lower[1])
     assert listener.last("/pretouch/mode").data.startswith("HOLD: The force window is filling")
     limited = listener.last("/pretouch/limited")
     assert {pair.key: pair.value for pair in limited.values} == {
@@ -118,19 +115,14 @@ def test_a_step_is_published_by_standard_messages(
     assert words.text == "HOLD"
 
 
-def test_links_and_units_lie_where_the_model_has_them(
-    trajectory: TrajectoryRun, listener: Listener, panda_model: RobotModel, paper_skin: Skin
-) -> None:
-    cycle = trajectory.turn()
-    kin = panda_model.kinematics(cycle.step.q)
-    places = {t.child_frame_id: t for t in listener.last("/tf").transforms}
-    for name, position, rotation in zip(panda_model.links[1:], kin.position[1:], kin.rotation[1:], strict=True):
-        p, r = places[name].transform.translation, places[name].transform.rotation
-        assert [p.x, p.y, p.z] == pytest.approx(position, abs=1e-9)
-        assert Rotation.from_quat([r.x, r.y, r.z, r.w]).as_matrix() == pytest.approx(rotation, abs=1e-9)
+def test_units_lie_where_the_skin_has_them(trajectory: TrajectoryRun, listener: Listener, paper_skin: Skin) -> None:
     units = listener.last("/tf_static").transforms
     assert [t.child_frame_id for t in units] == list(paper_skin.ids)
     assert [t.header.frame_id for t in units] == [unit.link for unit in paper_skin.units]
+    for unit, T_link_sensor in zip(units, paper_skin.T_link_sensor, strict=True):
+        p, r = unit.transform.translation, unit.transform.rotation
+        assert [p.x, p.y, p.z] == pytest.approx(T_link_sensor[:3, 3], abs=1e-9)
+        assert Rotation.from_quat([r.x, r.y, r.z, r.w]).as_matrix() == pytest.approx(T_link_sensor[:3, :3], abs=1e-9)
 
 
 def test_each_contact_and_each_change_of_the_mode_is_published(trajectory: TrajectoryRun, listener: Listener) -> None:
@@ -167,7 +159,7 @@ def test_a_silent_unit_is_an_error_in_the_diagnostics(
 def test_steps_are_published_at_the_rate_that_was_asked_for(
     panda_model: RobotModel, paper_skin: Skin, node: Ros2Node, listener: Listener
 ) -> None:
-    trajectory = TrajectoryRun(panda_model, paper_skin, node, rate_hz=20.0, links=True)
+    trajectory = TrajectoryRun(panda_model, paper_skin, node, rate_hz=20.0)
     assert listener.found()
     for _ in range(50):
         trajectory.turn()
@@ -193,7 +185,7 @@ def test_recording_a_step_takes_the_loop_little_time(trajectory: TrajectoryRun) 
 def test_the_last_steps_are_published_before_the_end(
     panda_model: RobotModel, paper_skin: Skin, node: Ros2Node, listener: Listener
 ) -> None:
-    trajectory = TrajectoryRun(panda_model, paper_skin, node, links=True)
+    trajectory = TrajectoryRun(panda_model, paper_skin, node)
     assert listener.found()
     assert matched(node)
     trajectory.turn()

@@ -7,13 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pretouch.control.joint_box import joint_limits
 from pretouch.errors import RobotError
-from pretouch.hardware.ros2.messages import JOINT_STATE, TRAJECTORY, VELOCITIES, WRENCH
+from pretouch.hardware.ros2.messages import JOINT_STATE, TRAJECTORY, WRENCH
 from pretouch.hardware.ros2.node import Ros2Node
 from pretouch.hardware.ros2.params import ArmParams, NodeParams, seconds
 from pretouch.hardware.ros2.robot import Ros2Robot
-from pretouch.loop import MonotonicClock, come_to_rest
 from pretouch.robot.model import RobotModel
 
 SLOW = np.full(7, 0.05)
@@ -25,8 +23,9 @@ class Driver:
     def __init__(self, node: Ros2Node, params: ArmParams, model: RobotModel) -> None:
         self.node, self.names = node, list(params.joint_names or model.joints)
         self.commands: list[Any] = []
-        kind = TRAJECTORY if params.command == "trajectory" else VELOCITIES
-        node.subscribe(params.commands_on, kind, lambda message, *_: self.commands.append(message), reliable=True)
+        node.subscribe(
+            params.command_topic, TRAJECTORY, lambda message, *_: self.commands.append(message), reliable=True
+        )
         self._states = node.publisher(params.joint_states, JOINT_STATE)
         self._wrench = node.publisher(params.wrench, WRENCH)
         assert node.wait_for(lambda: self._states.subscribers == self._wrench.subscribers == 1, 10)
@@ -262,54 +261,6 @@ def test_a_state_is_stamped_by_when_it_came(pair: tuple[Ros2Robot, Driver], pand
     assert before - 0.1 <= robot.read().stamp <= monotonic()
 
 
-@pytest.mark.parametrize(
-    "params",
-    [
-        ArmParams(
-            "by-robot", "base", joint_names=tuple(f"arm_{i}" for i in range(7)), command="velocities",
-            controller="guarded_velocities", timeout_s=0.1,
-        )
-    ],
-)  # fmt: skip
-def test_velocities_go_to_the_named_controller_in_the_order_of_the_joints(
-    pair: tuple[Ros2Robot, Driver], params: ArmParams
-) -> None:
-    robot, driver = pair
-    assert params.commands_on == "/guarded_velocities/commands"
-    qd = 0.01 * np.arange(7)
-    robot.command(qd)
-    assert driver.command(1).data.tolist() == qd.tolist()
-    state = robot.read()
-    assert state.q_commanded.tolist() == state.q.tolist()
-    assert state.qd_commanded.tolist() == qd.tolist()
-    assert state.wrench is None  # six zeros, by the robot
-    assert "guarded_velocities stops by itself 0.1 s after the last command. This cannot be checked" in robot.notes[0]
-    # however the program is left, the last it sends is rest
-    with pytest.raises(KeyError), robot:
-        raise KeyError
-    assert not np.any(driver.command(2).data)
-
-
-@pytest.mark.parametrize(
-    "params", [ArmParams("on-robot", "base", command="velocities", controller="velocities", timeout_s=0.5)]
-)
-def test_an_arm_that_is_commanded_by_velocities_is_braked_after_what_ends_the_run(
-    pair: tuple[Ros2Robot, Driver], params: ArmParams, domain: int, panda_model: RobotModel
-) -> None:
-    robot, driver = pair
-    robot.read()
-    robot.command(SLOW)
-    with Ros2Node(NodeParams(domain=domain)) as third:
-        third.publisher(params.commands_on, VELOCITIES)  # it says nothing
-        assert robot._node.wait_for(lambda: bool(robot._conflict()), 10)
-        with pytest.raises(RobotError, match="Another program publishes"):
-            robot.read()
-        come_to_rest(joint_limits(panda_model, 0.01, 0.01), robot, MonotonicClock(0.01), robot.read().q, SLOW)
-        last = len(driver.commands)
-        assert driver.node.wait_for(lambda: not np.any(driver.commands[-1].data), 5)
-        assert last <= len(driver.commands) <= 1 + np.ceil(SLOW / (panda_model.description.qdd_max * 0.01)).max() + 1
-
-
 @pytest.mark.parametrize("params", [ArmParams("on-robot", "base", shared_clock=False, settle_s=0.2)])
 def test_without_one_clock_trajectories_begin_as_they_come(
     pair: tuple[Ros2Robot, Driver], panda_model: RobotModel
@@ -338,5 +289,5 @@ def test_a_clock_that_is_not_shared_is_refused(
 def test_everything_unusual_is_noted(pair: tuple[Ros2Robot, Driver], other: Ros2Node, params: ArmParams) -> None:
     robot, _ = pair
     assert robot.notes == ()
-    other.subscribe(params.commands_on, TRAJECTORY, lambda *_: None)
-    assert other.wait_for(lambda: robot.notes == (f"{params.commands_on} has 2 subscribers.",), 10)
+    other.subscribe(params.command_topic, TRAJECTORY, lambda *_: None)
+    assert other.wait_for(lambda: robot.notes == (f"{params.command_topic} has 2 subscribers.",), 10)

@@ -19,11 +19,6 @@ from pretouch.hardware.ros2.params import ArmParams, NodeParams, OutputParams, S
         (lambda: ArmParams("on-robot", "base", torques="tau"), "give the full name of a topic"),
         (lambda: ArmParams("on-robot", "base", command_topic="/1st"), "give the full name of a topic"),
         (lambda: ArmParams("on-robot", "base", joint_names=("a", "a")), "name each joint once"),
-        (lambda: ArmParams("on-robot", "base", command="velocities"), "a controller that stops by itself"),
-        (
-            lambda: ArmParams("on-robot", "base", command="velocities", controller="c", timeout_s=0.6),
-            "a controller that stops by itself",
-        ),
         (lambda: ArmParams("on-robot", "base", follow_most_rad=100.0), "must be at most 0.3"),
         (lambda: ArmParams("on-robot", "base", settle_s=1e-6), "must be at least 0.2"),
         (lambda: ArmParams("on-robot", "base", wrench_timeout_s=1e5), "must be at most 0.5"),
@@ -43,18 +38,6 @@ def test_a_setting_that_cannot_be_is_refused_with_the_way_out(make: Callable[[],
 def test_sign_and_frame_have_no_default() -> None:
     with pytest.raises(TypeError, match="'sign' and 'frame'"):
         ArmParams()  # type: ignore[call-arg]
-
-
-@pytest.mark.parametrize(
-    ("given", "topic"),
-    [
-        ({}, "/joint_trajectory_controller/joint_trajectory"),
-        ({"command": "velocities", "controller": "arm_velocities", "timeout_s": 0.1}, "/arm_velocities/commands"),
-        ({"command_topic": "/mine"}, "/mine"),
-    ],
-)
-def test_commands_go_where_ros2_control_takes_them(given: dict[str, object], topic: str) -> None:
-    assert ArmParams("on-robot", "base", **given).commands_on == topic  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

@@ -37,12 +37,6 @@ class RobotOptions:
     """With ros2, required: whether the wrench topic gives the force on the robot or by the robot."""
     ros_frame: Literal["", "base", "ee"] = ""
     """With ros2, required: the frame of the wrench."""
-    ros_command: Literal["trajectory", "velocities"] = "trajectory"
-    """With ros2: short trajectories that end at rest, or velocities for a controller with a time-out."""
-    ros_controller: str = ""
-    """With ros2 and velocities: name of the ros2_control controller that receives them."""
-    ros_timeout: float = 0.0
-    """With ros2 and velocities: its command time-out [s]."""
     ros_own_clock: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
     """With ros2: ROS time differs from this machine's time of day, as in a simulation or on another machine."""
     ros_joint_states: str = "/joint_states"
@@ -53,15 +47,15 @@ class RobotOptions:
     """With ros2: topic of the wrench."""
     ros_torques: str = ""
     """With ros2: topic of external joint torques, which the profile pretouch needs: joint states, or a robot_state."""
-    ros_desired: Literal["", "twist", "trajectory", "velocities"] = ""
-    """With ros2: the arm follows a commander in place of a path: a TwistStamped, the velocities of a JointTrajectory,
-    or a Float64MultiArray."""
+    ros_desired: Literal["", "twist", "trajectory"] = ""
+    """With ros2: the arm follows a commander in place of a path: a TwistStamped, or the velocities of a
+    JointTrajectory."""
     ros_desired_topic: str = ""
-    """With ros2: its topic; by default /pretouch/twist, /pretouch/joint_trajectory or /pretouch/commands."""
+    """With ros2: its topic; by default /pretouch/twist or /pretouch/joint_trajectory."""
     ros_base_frame: str = ""
     """With ros2: name of the base frame, beside the model's own."""
-    ros_commands: str = ""
-    """With ros2: topic of the commands; by default that of a joint_trajectory_controller, or of --ros-controller."""
+    ros_commands: str = "/joint_trajectory_controller/joint_trajectory"
+    """With ros2: topic of the commands."""
     ros_ranges: str = "/skin/{unit}/range"
     """With ros2: topic of the units' ranges; {unit} stands for the id of each."""
     ros_distribution: Literal["foxy", "galactic", "humble", "iron", "jazzy", "kilted", "lyrical"] = "jazzy"
@@ -188,7 +182,7 @@ def check_options(command: Run) -> None:
 _ONLY = {
     "franka": ("ip", "recover"),
     "ros2": (
-        "ros_sign", "ros_frame", "ros_command", "ros_controller", "ros_timeout", "ros_own_clock", "ros_joint_states",
+        "ros_sign", "ros_frame", "ros_own_clock", "ros_joint_states",
         "ros_joints", "ros_wrench", "ros_torques", "ros_commands", "ros_ranges", "ros_distribution", "ros_domain",
         "ros_interface", "ros_desired", "ros_desired_topic", "ros_base_frame",
     ),

@@ -64,7 +64,5 @@ def _params(robot: "RobotOptions") -> tuple[NodeParams, ArmParams]:
     node = NodeParams(robot.ros_distribution, robot.ros_domain, robot.ros_interface)
     return node, ArmParams(
         sign, frame, joint_states=robot.ros_joint_states, joint_names=robot.ros_joints, wrench=robot.ros_wrench,
-        torques=robot.ros_torques,
-        shared_clock=not robot.ros_own_clock, command=robot.ros_command, command_topic=robot.ros_commands,
-        controller=robot.ros_controller, timeout_s=robot.ros_timeout,
+        torques=robot.ros_torques, shared_clock=not robot.ros_own_clock, command_topic=robot.ros_commands,
     )  # fmt: skip

@@ -1,18 +1,19 @@
-"""A Franka arm through the vendor's own library: one port for both, and connecting with a clear sentence."""
+"""Connecting to a Franka arm through the vendor's own library, with a clear sentence where that fails."""
 
 import socket
 import time
 from collections.abc import Callable
 from importlib import import_module
-from pathlib import Path
-from typing import Literal, NamedTuple, Protocol, Self
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from pretouch.errors import RobotError
 from pretouch.extras import FRANKA
 from pretouch.hardware.franka.arm_lock import ArmLock
-from pretouch.hardware.franka.collision import CollisionBehavior
 from pretouch.hardware.franka.state import FrankaState
 from pretouch.types import FloatArray
+
+if TYPE_CHECKING:
+    from pretouch.hardware.franka.vendor import VendorClient
 
 Kind = Literal["panda", "fr3"]
 StateCallback = Callable[[FrankaState, float], tuple[FloatArray, bool]]
@@ -23,7 +24,6 @@ PORT = 1337
 """TCP port of the arm; the vendor's libraries have it built in."""
 ANSWER_S = 3.0
 """Longest wait for the arm to take a connection, or to answer on it [s]."""
-_REALTIME_KERNEL = Path("/sys/kernel/realtime")
 
 
 class Library(NamedTuple):
@@ -41,59 +41,12 @@ LIBRARIES: dict[Kind, Library] = {
 """That of each arm."""
 
 
-class Client(Protocol):
-    """One connection to an arm, for one thread; a context manager."""
-
-    kind: Kind
-
-    def read(self) -> FrankaState:
-        """Wait for the next state, while no motion runs."""
-        ...
-
-    def control(self, on_state: StateCallback) -> None:
-        """Run a joint velocity motion, asking `on_state` for a command in each millisecond, until it is finished.
-
-        The library's own rate limiter and low-pass filter are off: what `on_state` answers is what the arm gets. An
-        exception of `on_state` stops the arm at once, as hard as it can, and is raised here. Raises MotionAborted
-        (`errors`) if the arm ended the motion, and another RobotError if it is in no mode to move.
-        """
-        ...
-
-    def set_collision_behavior(self, behavior: CollisionBehavior) -> None:
-        """Tell the arm from which forces on it reports a contact, and from which it stops by itself."""
-        ...
-
-    def set_load(self, mass: float, com: FloatArray, inertia: FloatArray) -> None:
-        """Tell the arm what it carries: mass [kg], its centre (3,) [m, flange frame] and inertia (3, 3) [kg m^2]."""
-        ...
-
-    def recover(self) -> None:
-        """Leave the mode "reflex", as pressing the button in Desk does; a RobotError if no state says that it has."""
-        ...
-
-    def stop(self) -> None:
-        """End any motion that runs, at once."""
-        ...
-
-    def close(self) -> None:
-        """Let the arm be used by somebody else."""
-        ...
-
-    def __enter__(self) -> Self:
-        """Return the client itself."""
-        ...
-
-    def __exit__(self, *_: object) -> None:
-        """Close it."""
-        ...
-
-
 def need_library(kind: Kind) -> None:
     """Refuse to go on without the vendor's library for an arm, or what our own part needs: a MissingExtraError."""
     FRANKA.need("A Franka arm", LIBRARIES[kind].module, "ruckig")
 
 
-def connect(address: str, kind: Kind, real_time: bool = False) -> Client:
+def connect(address: str, kind: Kind) -> "VendorClient":
     """Connect to an arm; what stands in the way is a RobotError.
 
     A machine that takes the connection and then says nothing is waited for without end: the vendor's libraries know no
@@ -102,29 +55,15 @@ def connect(address: str, kind: Kind, real_time: bool = False) -> Client:
     Args:
         address: name or IP address of the arm.
         kind: which arm it is.
-        real_time: whether to refuse a kernel without real-time capabilities, as the vendor's libraries do.
     """
     need_library(kind)
-    if real_time and not has_real_time_kernel():
-        raise RobotError(
-            "The kernel of this machine has no real-time capabilities: boot one with PREEMPT_RT, or connect without"
-            " demand_real_time (the arm then stops when this machine is late 20 times in a row)."
-        )
     lock = ArmLock(reachable(address, kind))
     try:
-        opened: Client = import_module(f"pretouch.hardware.franka.{kind}").open_client(address, real_time, lock)
+        client: VendorClient = import_module(f"pretouch.hardware.franka.{kind}").open_client(address, lock)
     except BaseException:
         lock.release()
         raise
-    return opened
-
-
-def has_real_time_kernel() -> bool:
-    """Whether this machine runs a kernel with PREEMPT_RT, by the sign that libfranka goes by."""
-    try:
-        return _REALTIME_KERNEL.read_text().startswith("1")
-    except OSError:
-        return False
+    return client
 
 
 def attempt(kind: Kind, began: float) -> str:

@@ -11,7 +11,7 @@ from pretouch.hardware.franka.vendor import VendorClient
 
 
 class Fr3Client(VendorClient):
-    """See `client.Client`."""
+    """See `VendorClient`."""
 
     kind: Literal["panda", "fr3"] = "fr3"
     library: ClassVar[Any] = pylibfranka

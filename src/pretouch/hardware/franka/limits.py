@@ -83,5 +83,3 @@ class FrankaParams(Checked):
     end_after_s: Positive = 1.0
     """Age of the newest set-point at which the motion is ended, and has to be begun anew [s]: a program that was
     stopped for that long does not know where the arm is, nor who stands there by now."""
-    demand_real_time: bool = False
-    """Whether to refuse a kernel without real-time capabilities."""

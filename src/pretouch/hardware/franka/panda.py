@@ -11,7 +11,7 @@ _NO_LOW_PASS_HZ = 1000.0
 
 
 class PandaClient(VendorClient):
-    """See `client.Client`."""
+    """See `VendorClient`."""
 
     kind: Literal["panda", "fr3"] = "panda"
     library: ClassVar[Any] = libfranka

@@ -19,12 +19,13 @@ from multiprocessing.connection import Connection
 from types import FrameType
 
 from pretouch.errors import PretouchError, RobotError
-from pretouch.hardware.franka.client import Client, Kind, connect
+from pretouch.hardware.franka.client import Kind, connect
 from pretouch.hardware.franka.collision import CollisionBehavior
 from pretouch.hardware.franka.limits import FrankaParams, MotionLimits
 from pretouch.hardware.franka.mailboxes import Command, Feedback, Mailboxes, Request
 from pretouch.hardware.franka.motion import VelocityMotion
 from pretouch.hardware.franka.report import Communication
+from pretouch.hardware.franka.vendor import VendorClient
 from pretouch.realtime import real_time
 from pretouch.signals import OF_TERMINAL, leave_to_parent
 
@@ -50,7 +51,7 @@ def serve(settings: ProcessSettings, mailboxes: Mailboxes, started: Connection) 
     leave_to_parent(OF_TERMINAL)
     with ExitStack() as opened:
         try:
-            client = opened.enter_context(connect(settings.address, settings.kind, settings.params.demand_real_time))
+            client = opened.enter_context(connect(settings.address, settings.kind))
             if settings.behavior is not None:
                 client.set_collision_behavior(settings.behavior)
             server = ArmServer(client, settings, mailboxes)
@@ -66,7 +67,7 @@ def serve(settings: ProcessSettings, mailboxes: Mailboxes, started: Connection) 
 class ArmServer:
     """Turns commands into what the client does, one after the other."""
 
-    def __init__(self, client: Client, settings: ProcessSettings, mailboxes: Mailboxes) -> None:
+    def __init__(self, client: VendorClient, settings: ProcessSettings, mailboxes: Mailboxes) -> None:
         self._client, self._settings, self._mailboxes = client, settings, mailboxes
         self._communication = Communication()
         self._answered, self._trouble = 0, ""

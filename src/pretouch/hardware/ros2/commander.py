@@ -2,7 +2,6 @@
 
 from itertools import zip_longest
 from time import time as wall_clock
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -10,20 +9,17 @@ import numpy as np
 from pretouch import desired
 from pretouch.desired import Desired
 from pretouch.errors import RobotError
-from pretouch.hardware.ros2.messages import TRAJECTORY, TWIST, VELOCITIES
+from pretouch.hardware.ros2.messages import TRAJECTORY, TWIST
 from pretouch.hardware.ros2.node import Ros2Node
 from pretouch.hardware.ros2.params import CommanderParams, seconds
 from pretouch.hardware.ros2.robot import SHARED_S, Ros2Robot
 from pretouch.hardware.ros2.stamps import Stamps
 from pretouch.robot.model import RobotModel
 
-_KINDS = {"twist": TWIST, "trajectory": TRAJECTORY, "velocities": VELOCITIES}
-_NO_STAMP = SimpleNamespace(stamp=SimpleNamespace(sec=0, nanosec=0))
+_KINDS = {"twist": TWIST, "trajectory": TRAJECTORY}
 _POINTS_MOST = 1000
 _AHEAD_S = 1.0
 """How far ahead trajectories may begin [s]: MoveIt Servo leaves room for its latency."""
-_POSTURE_RAD, _ALIKE_RAD = 0.3, 0.05
-"""Velocities that are so near to the positions of an arm that is so far from 0 are positions [rad]."""
 _SHOWN = 80
 """Letters of a name from elsewhere that are shown."""
 
@@ -40,7 +36,7 @@ class Ros2Commander:
 
     def __init__(self, params: CommanderParams, robot: Ros2Robot, model: RobotModel, node: Ros2Node) -> None:
         """Take the settings, the arm and its model, and the node."""
-        if params.heard_on == robot.params.commands_on:
+        if params.heard_on == robot.params.command_topic:
             raise RobotError(f"{params.heard_on} is where the arm's commands go: ask on another topic.")
         self.params, self._robot, self._node = params, robot, node
         self.kind = _KINDS[params.asked]
@@ -81,8 +77,7 @@ class Ros2Commander:
         return Desired(asked.kind, asked.stamp, number)
 
     def _take(self, message: Any, received: float, writer: int) -> None:
-        header = getattr(message, "header", _NO_STAMP)
-        instant = self._stamps.instant(header, received, writer)
+        instant = self._stamps.instant(message.header, received, writer)
         if instant is None:
             return
         try:
@@ -103,16 +98,7 @@ class Ros2Commander:
         """Return what a message asks for, and whether it is a twist in the end-effector's frame."""
         if self.kind == TWIST:
             return self._twist(message, instant)
-        if self.kind == TRAJECTORY:
-            return self._trajectory(message, instant), False
-        self._check_count(len(message.data))
-        q = self._robot.measured().q
-        if np.abs(q).max() > _POSTURE_RAD and np.abs(message.data - q).max() < _ALIKE_RAD:
-            raise _UnfitError(
-                f"on {self.params.heard_on} the joints' positions are sent, not velocities: set MoveIt Servo's"
-                " publish_joint_positions to false, or ask by trajectories"
-            )
-        return desired.joint_velocities(instant, message.data), False
+        return self._trajectory(message, instant), False
 
     def _twist(self, message: Any, instant: float) -> tuple[Desired, bool]:
         frame = message.header.frame_id

@@ -19,9 +19,7 @@ JOINT_STATE = "sensor_msgs/msg/JointState"
 WRENCH = "geometry_msgs/msg/WrenchStamped"
 RANGE = "sensor_msgs/msg/Range"
 TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
-VELOCITIES = "std_msgs/msg/Float64MultiArray"
 CLOUD = "sensor_msgs/msg/PointCloud2"
-VECTOR = "geometry_msgs/msg/Vector3Stamped"
 TEXT = "std_msgs/msg/String"
 TRANSFORMS = "tf2_msgs/msg/TFMessage"
 MARKERS = "visualization_msgs/msg/MarkerArray"
@@ -30,7 +28,7 @@ STATUS = "diagnostic_msgs/msg/DiagnosticStatus"
 TWIST = "geometry_msgs/msg/TwistStamped"
 FRANKA_STATE = "franka_msgs/msg/FrankaRobotState"
 USED = (
-    JOINT_STATE, WRENCH, RANGE, TRAJECTORY, VELOCITIES, CLOUD, VECTOR, TEXT, TRANSFORMS, MARKERS, DIAGNOSTICS, STATUS,
+    JOINT_STATE, WRENCH, RANGE, TRAJECTORY, CLOUD, TEXT, TRANSFORMS, MARKERS, DIAGNOSTICS, STATUS,
     TWIST,
 )  # fmt: skip
 """All standard types on our topics."""

@@ -6,7 +6,7 @@ from time import monotonic, time_ns
 from typing import Self
 
 from pretouch.controller import Controller
-from pretouch.hardware.ros2.messages import CLOUD, DIAGNOSTICS, MARKERS, STATUS, TEXT, TRANSFORMS, VECTOR, WRENCH
+from pretouch.hardware.ros2.messages import CLOUD, DIAGNOSTICS, MARKERS, STATUS, TEXT, TRANSFORMS, WRENCH
 from pretouch.hardware.ros2.node import Ros2Node
 from pretouch.hardware.ros2.params import OutputParams
 from pretouch.hardware.ros2.step_messages import Stamp, StepMessages
@@ -40,13 +40,10 @@ class Ros2Output:
         self._cloud = node.publisher(f"{begin}/obstacles", CLOUD)
         self._markers = node.publisher(f"{begin}/markers", MARKERS)
         self._force = node.publisher(f"{begin}/force", WRENCH)
-        self._upper = node.publisher(f"{begin}/threshold_upper", VECTOR)
-        self._lower = node.publisher(f"{begin}/threshold_lower", VECTOR)
         self._contact = node.publisher(f"{begin}/contact", WRENCH)
         self._mode_text = node.publisher(f"{begin}/mode", TEXT, latched=True, depth=1)
         self._limited = node.publisher(f"{begin}/limited", STATUS)
         self._diagnostics = node.publisher("/diagnostics", DIAGNOSTICS)
-        self._links = node.publisher("/tf", TRANSFORMS) if params.links else None
         units = node.publisher("/tf_static", TRANSFORMS, latched=True, depth=1)
         units.publish(self._step_messages.units(_now()))
         self._thread = Thread(target=self._work, name="ros2-output", daemon=True)
@@ -105,14 +102,10 @@ class Ros2Output:
         if step.contact is not None:
             self._contact.publish(step_messages.wrench(step.contact.force, at))
         self._force.publish(step_messages.wrench(step.force, at))
-        self._upper.publish(step_messages.vector(step.thresholds.upper, at))
-        self._lower.publish(step_messages.vector(step.thresholds.lower, at))
         self._limited.publish(step_messages.limited(step))
         self._cloud.publish(step_messages.cloud(step, at))
         self._markers.publish(step_messages.markers(step, at))
         self._mode_text.publish(self._messages.make(TEXT, f"{step.mode.name}: {step.reason}"))
-        if self._links is not None:
-            self._links.publish(step_messages.links(step, at))
 
 
 def _now() -> Stamp:

@@ -5,15 +5,14 @@ import re
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from pretouch.checks import Check, Checked, NonNegative
+from pretouch.checks import Check, Checked
 from pretouch.errors import ParameterError
 
 Distribution = Literal["foxy", "galactic", "humble", "iron", "jazzy", "kilted", "lyrical"]
 Sign = Literal["on-robot", "by-robot"]
 Frame = Literal["base", "ee"]
 Zeros = Literal["auto", "missing", "kept"]
-Command = Literal["trajectory", "velocities"]
-Asked = Literal["twist", "trajectory", "velocities"]
+Asked = Literal["twist", "trajectory"]
 
 LOOPBACK = "127.0.0.1"
 ENVIRONMENT = "environment"
@@ -21,7 +20,6 @@ ENVIRONMENT = "environment"
 UNIT = "{unit}"
 """Stands in a topic for the id of a sensor unit."""
 _TOPIC = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
-_JOINT_TRAJECTORY = "/joint_trajectory_controller/joint_trajectory"
 
 
 @dataclass(frozen=True)
@@ -69,15 +67,8 @@ class ArmParams(Checked):
     """Whether the time of ROS is this machine's time of day, to some milliseconds: then stamps of headers count, and
     trajectories say when they begin. Otherwise what counts is when a message comes, and the arm moves smoothly by
     joint_trajectory_controller 4.17 to 4.20 alone."""
-    command: Command = "trajectory"
-    """trajectory: trajectory_msgs/JointTrajectory that ends at rest. velocities: std_msgs/Float64MultiArray, for a
-    controller that stops by itself when none comes any more."""
-    command_topic: str = ""
-    """Topic of the commands; '': that of a joint_trajectory_controller, or /CONTROLLER/commands."""
-    controller: str = ""
-    """Name of the controller that takes velocities; it must have a command time-out."""
-    timeout_s: NonNegative = 0.0
-    """That time-out [s], at most 0.5."""
+    command_topic: str = "/joint_trajectory_controller/joint_trajectory"
+    """Topic of the commands, trajectory_msgs/JointTrajectory that end at rest."""
     hold_s: Annotated[float, Check(low=0.0, high=0.5, open_low=True)] = 0.05
     """How long a trajectory goes on at the commanded velocity before it brakes, should no other one come [s]."""
     ahead_s: Annotated[float, Check(low=0.0, high=0.05)] = 0.01
@@ -94,30 +85,12 @@ class ArmParams(Checked):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name in ("joint_states", "wrench"):
+        for name in ("joint_states", "wrench", "command_topic"):
             check_topic("ArmParams", name, getattr(self, name))
-        if self.command == "velocities":
-            self._check_controller()
-        check_topic("ArmParams", "command_topic", self.commands_on)
         if self.torques:
             check_topic("ArmParams", "torques", self.torques)
         if len(set(self.joint_names)) < len(self.joint_names):
             raise ParameterError(f"ArmParams.joint_names is {', '.join(self.joint_names)}: name each joint once.")
-
-    def _check_controller(self) -> None:
-        if not self.controller or not 0 < self.timeout_s <= 0.5:
-            raise ParameterError(
-                f"ArmParams.controller is {self.controller!r} with timeout_s {self.timeout_s:g}: for velocities give"
-                " the name of a controller that stops by itself and its command time-out, at most 0.5 s, or the arm"
-                " would keep moving when this program dies; otherwise use trajectory."
-            )
-
-    @property
-    def commands_on(self) -> str:
-        """Topic of the commands."""
-        return self.command_topic or (
-            _JOINT_TRAJECTORY if self.command == "trajectory" else f"/{self.controller.strip('/')}/commands"
-        )
 
     @property
     def zeros_missing(self) -> bool:
@@ -131,9 +104,9 @@ class CommanderParams(Checked):
 
     asked: Asked
     """twist: geometry_msgs/TwistStamped. trajectory: the velocities of trajectory_msgs/JointTrajectory, as MoveIt Servo
-    sends. velocities: std_msgs/Float64MultiArray [rad/s], as for a forward_command_controller."""
+    sends."""
     topic: str = ""
-    """Its topic; '': /pretouch/twist, /pretouch/joint_trajectory or /pretouch/commands."""
+    """Its topic; '': /pretouch/twist or /pretouch/joint_trajectory."""
     shared_clock: bool = True
     """See `ArmParams`."""
     base_frame: str = ""
@@ -146,8 +119,7 @@ class CommanderParams(Checked):
     @property
     def heard_on(self) -> str:
         """Topic of what is asked."""
-        names = {"twist": "twist", "trajectory": "joint_trajectory", "velocities": "commands"}
-        return self.topic or f"/pretouch/{names[self.asked]}"
+        return self.topic or ("/pretouch/twist" if self.asked == "twist" else "/pretouch/joint_trajectory")
 
 
 @dataclass(frozen=True)
@@ -176,8 +148,6 @@ class OutputParams(Checked):
     """What our topics begin with."""
     base_frame: str = ""
     """Name of the base frame; '': the model's first link."""
-    links: bool = False
-    """Whether the links' transforms go to /tf: only where no robot_state_publisher does that."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -7,9 +7,8 @@ from typing import Self
 import numpy as np
 
 from pretouch.errors import RobotError
-from pretouch.hardware.ros2.commands import CommandSender, VelocityCommands
 from pretouch.hardware.ros2.joints import Joints, Measured
-from pretouch.hardware.ros2.messages import JOINT_STATE, TRAJECTORY, VELOCITIES, WRENCH
+from pretouch.hardware.ros2.messages import JOINT_STATE, TRAJECTORY, WRENCH
 from pretouch.hardware.ros2.node import Ros2Node
 from pretouch.hardware.ros2.params import ArmParams
 from pretouch.hardware.ros2.stamps import Stamps
@@ -28,8 +27,7 @@ class Ros2Robot:
     """An arm behind topics. `wait` for it before it is used; for one thread, as the control loop's.
 
     A state is stamped with when it was measured, by this machine's monotonic clock. The arm reports no commanded
-    positions and velocities: with trajectories they are reckoned from what it was sent, with velocities they are the
-    measured positions and the last command.
+    positions and velocities: they are reckoned from the trajectories that it was sent.
     """
 
     def __init__(self, params: ArmParams, model: RobotModel, node: Ros2Node, period: float = _PERIOD_S) -> None:
@@ -51,11 +49,7 @@ class Ros2Robot:
         self._efforts = (
             [node.subscribe(params.torques, self._torques.kind, self._torques.take)] if params.torques else []
         )
-        self._commands: CommandSender = (
-            TrajectoryCommands(params, model, self._joints.names, node, period)
-            if params.command == "trajectory"
-            else VelocityCommands(params, model, node)
-        )
+        self._commands = TrajectoryCommands(params, model, self._joints.names, node, period)
         self._tick = self._tick_before = -math.inf
         self._lost = ""
 
@@ -78,13 +72,8 @@ class Ros2Robot:
         if p.shared_clock and self._joints.newest is not None and self._joints.stamps.behind is None:
             found.append(f"{p.joint_states} has no stamps: whether its clock is this machine's cannot be checked.")
         if self._commands.publisher.subscribers > 1:
-            found.append(f"{p.commands_on} has {self._commands.publisher.subscribers} subscribers.")
-        if p.command == "velocities":
-            found.append(
-                f"The settings say that {p.controller} stops by itself {p.timeout_s:g} s after the last command. This"
-                " cannot be checked: if it does not, the arm keeps moving when this program dies."
-            )
-        elif not p.shared_clock:
+            found.append(f"{p.command_topic} has {self._commands.publisher.subscribers} subscribers.")
+        if not p.shared_clock:
             found.append("Without a shared clock only joint_trajectory_controller 4.17 to 4.20 moves smoothly.")
         return tuple(filter(None, found))
 
@@ -115,10 +104,10 @@ class Ros2Robot:
     def command(self, qd: FloatArray) -> None:
         """Take joint velocities (n,) [rad/s] as the set-point, kept for `hold_s` unless there is another one.
 
-        Before the arm has settled it stays at rest. Once something was found wrong, `read` has said so: trajectories
-        are RobotErrors, for it is at rest when the last one has ended, but velocities are sent on, or nothing brakes.
+        Before the arm has settled it stays at rest. Once `read` has said that something is wrong, commands are that
+        RobotError too: the arm is at rest when the last trajectory has ended.
         """
-        if self._lost and self.params.command == "trajectory":
+        if self._lost:
             raise RobotError(self._lost)
         if not np.isfinite(qd).all():
             raise RobotError(f"The command is {qd}: give finite joint velocities.")
@@ -129,8 +118,7 @@ class Ros2Robot:
         self._tick = -math.inf
 
     def end(self) -> None:
-        """Bring the arm to rest: zeros to a controller of velocities, and the last trajectory is waited for."""
-        self._commands.rest()
+        """Wait until the last trajectory has ended, at rest."""
         sleep(max(self._commands.ends - monotonic(), 0.0))
 
     @property
@@ -165,7 +153,7 @@ class Ros2Robot:
         p = self.params
         if self._node.others(self._commands.publisher):
             return (
-                f"Another program publishes on {p.commands_on}: only one program may command the arm, so end it, or"
+                f"Another program publishes on {p.command_topic}: only one program may command the arm, so end it, or"
                 " wait 10 s if it was killed."
             )
         sources = (self._joints, p.joint_states), (self._wrench, p.wrench), (self._torques, p.torques)
@@ -201,11 +189,10 @@ class Ros2Robot:
             return f"{p.torques} has efforts of {', '.join(self._torques.others)}, not of {', '.join(joints.names)}."
         if self._commands.publisher.subscribers:
             return ""
-        kind = TRAJECTORY if p.command == "trajectory" else VELOCITIES
-        there = self._node.topics(kind, subscribed=True)
+        there = self._node.topics(TRAJECTORY, subscribed=True)
         return (
-            f"Nothing subscribes to {p.commands_on} ({kind.replace('/msg/', '/')}): activate the controller, or set"
-            f" command_topic to one of {', '.join(there) or 'the topics that exist (none yet)'}."
+            f"Nothing subscribes to {p.command_topic} (trajectory_msgs/JointTrajectory): activate the controller, or"
+            f" set command_topic to one of {', '.join(there) or 'the topics that exist (none yet)'}."
         )
 
 

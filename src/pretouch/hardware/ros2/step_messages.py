@@ -8,10 +8,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pretouch.controller import Controller
-from pretouch.hardware.ros2.messages import CLOUD, DIAGNOSTICS, MARKERS, STATUS, TRANSFORMS, VECTOR, WRENCH, Messages
+from pretouch.hardware.ros2.messages import CLOUD, DIAGNOSTICS, MARKERS, STATUS, TRANSFORMS, WRENCH, Messages
 from pretouch.limited import Limit
 from pretouch.loop import Cycle
-from pretouch.robot.model import RobotModel
 from pretouch.types import ControlStep, FloatArray, Mode, RangeReadings, RangeStatus
 
 Stamp = tuple[int, int]
@@ -35,11 +34,9 @@ class StepMessages:
 
     def __init__(self, controller: Controller, messages: Messages, base_frame: str) -> None:
         self._m = messages
-        # memory of its own: this thread is not the controller's
-        self._model = RobotModel(controller.model.description)
         self._skin, self._sight = controller.skin, controller.profile.sight
         self.base = base_frame or controller.model.links[0]
-        self._links = (self.base, *controller.model.links[1:])
+        self._links, self._joints = (self.base, *controller.model.links[1:]), controller.model.joints
 
     def cloud(self, step: ControlStep, at: Stamp) -> Any:
         """Obstacles as a point cloud in the base frame."""
@@ -60,20 +57,11 @@ class StepMessages:
         pair = self._m.xyz("Vector3", force), self._m.xyz("Vector3", np.zeros(3))
         return self._m.make(WRENCH, self._header(at), self._m.make("geometry_msgs/msg/Wrench", *pair))
 
-    def vector(self, given: FloatArray, at: Stamp) -> Any:
-        """A vector (3,), base frame."""
-        return self._m.make(VECTOR, self._header(at), self._m.xyz("Vector3", given))
-
     def units(self, at: Stamp) -> Any:
         """Where the units sit on their links."""
         skin = self._skin
         parents = [self._links[link] for link in skin.link]
         return self._transforms(parents, skin.ids, skin.T_link_sensor[:, :3, 3], skin.T_link_sensor[:, :3, :3], at)
-
-    def links(self, step: ControlStep, at: Stamp) -> Any:
-        """Where the links are."""
-        kin, names = self._model.kinematics(step.q), self._links[1:]
-        return self._transforms([self.base] * len(names), names, kin.position[1:], kin.rotation[1:], at)
 
     def markers(self, step: ControlStep, at: Stamp) -> Any:
         """Obstacles, lines to their closest points on the body, the force, and the mode in words."""
@@ -92,7 +80,7 @@ class StepMessages:
     def limited(self, step: ControlStep) -> Any:
         """What keeps the arm from what is asked, for who asks: `ControlStep.limited` by name."""
         of = step.limited
-        names = {"unit": self._skin.ids, "link": self._links, "joint": self._model.joints}
+        names = {"unit": self._skin.ids, "link": self._links, "joint": self._joints}
         places = {"unit": of.unit, "link": of.link, "joint": of.joint}
         values = {"by": of.by.value, "share": f"{of.share:.3f}"} | {
             key: names[key][at] if 0 <= at < len(names[key]) else "" for key, at in places.items()

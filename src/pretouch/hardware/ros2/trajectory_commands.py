@@ -43,7 +43,7 @@ class TrajectoryCommands:
     ) -> None:
         """Take what to send, the arm, its joints as others call them, the node and the control period [s]."""
         self._params, self._names, self._messages = params, list(names), node.messages
-        self.publisher = node.publisher(params.commands_on, TRAJECTORY)
+        self.publisher = node.publisher(params.command_topic, TRAJECTORY)
         self._reference = Reference(model.description.qdd_max, period, params.hold_s)
         self._lag = Lag(model.description.qdd_max)
         self._ahead = params.ahead_s if params.shared_clock else 0.0
@@ -107,9 +107,6 @@ class TrajectoryCommands:
                 raise RobotError(self._elsewhere(int(np.argmax(stray)), joints, instant))
             self._anew, self._astray = now, False
             self._settle(joints.q, now)
-
-    def rest(self) -> None:
-        """The last trajectory ends at rest by itself."""
 
     def _settle(self, q: FloatArray, now: float) -> None:
         """Bring the arm gently to rest at q (n,) [rad]."""
