@@ -39,7 +39,7 @@ units: setup
 
 # DDS, which ROS 2 speaks: no ROS installation is needed
 ros2: setup
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[ros2]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e ./ros2
 
 # the vendor's surfaces of the arm, for the page: 131 MB
 meshes: setup

@@ -9,13 +9,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pretouch import cli
+from pretouch import cli, plugins
+from pretouch.arms import OpenedArm
+from pretouch.arms.simulated import Simulated
 from pretouch.cli.run.options import RobotOptions, Run, TaskOptions
-from pretouch.cli.run.setup import OpenedRobot, run_setup
+from pretouch.cli.run.setup import run_setup
 from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify
 from pretouch.recording.writer import Recording
-from pretouch.session import simulated
+from pretouch.serving.threaded_arm import ThreadedArm
 from pretouch.session.confirmations import Identity
 from pretouch.session.preflight import PreflightParams
 from pretouch.session.push import GuidedPush, PushParams
@@ -34,32 +36,25 @@ def _state_of_its_own(tmp_path, monkeypatch):
 
 def at_begin(monkeypatch, seconds, then):
     """Have something done a while after the arm was let move."""
-    begin = simulated.SimulatedSessionArm.begin
+    begin = ThreadedArm.begin
 
     def begun(arm):
         begin(arm)
         threading.Timer(seconds, then, (arm,)).start()
 
-    monkeypatch.setattr(simulated.SimulatedSessionArm, "begin", begun)
+    monkeypatch.setattr(ThreadedArm, "begin", begun)
 
 
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("--robot", "franka"), "give it with --ip"),
-        (("--ip", "127.0.0.1"), "--ip does not go with --robot simulated"),
-        (("--robot", "ros2"), "needs both --ros-sign and --ros-frame"),
-        (("--robot", "ros2", "--ros-sign", "on-robot", "--ip", "1.2.3.4"), "--ip does not go with --robot ros2"),
-        (
-            ("--robot", "ros2", "--ros-sign", "on-robot", "--ros-frame", "base", "--approach"),
-            "--approach does not go with --robot ros2",
-        ),
-        (("--robot", "ros2", "--ros-sign", "on-robot", "--ros-frame", "base"), "give their topic by --ros-torques"),
-        (
-            ("--robot", "ros2", "--ros-sign", "on-robot", "--ros-frame", "base", "--ros-desired-topic", "/joy"),
-            "--ros-desired-topic needs --ros-desired",
-        ),
-        (("--ros-desired", "twist"), "--ros-desired does not go with --robot simulated"),
+        (("franka",), "pretouch run franka lacks --ip"),
+        (("--ip", "127.0.0.1"), "--ip is unknown"),
+        (("frank",), "No arm to move is called 'frank': perhaps franka."),
+        (("--robot", "franka", "--ip", "1.2.3.4"), "`--robot franka` is `pretouch run franka` now"),
+        (("--yes", "--robot=ros2"), "`--robot ros2` is `pretouch run ros2` now"),
+        (("--ros-own-clock",), "--ros-own-clock is an option of `pretouch run ros2` now"),
+        (("franka", "--ip", "192.0.2.1"), "The arm brings no sensor units: give the file of their keys with --keys"),
         (("--no-skin",), "choose --profile blind"),
         (("--no-skin", "--skin", "a.toml"), "--no-skin does not go with --skin"),
         (("--skin", "missing.toml"), "missing.toml cannot be read"),
@@ -67,13 +62,12 @@ def at_begin(monkeypatch, seconds, then):
         (("--seconds", "-1"), "--seconds is -1"),
         (("--seconds", "inf"), "--seconds is inf"),
         (("--floor", "nan"), "--floor is nan"),
-        (("--seed", "-1"), "The seed is -1"),
+        (("--seed", "-1"), "--seed is -1"),
         (("--priority", "100"), "real-time priority is 100"),
         (("--units-host", ""), "--units-host is empty"),
         (("--path", "circle", "--radius", "3"), "cannot reach"),
         (("--no-learnt", "--learn-anew"), "--no-learnt does not go with"),
-        (("--recover",), "--recover does not go with --robot simulated"),
-        (("--robot", "franka", "--ip", "192.0.2.1", "--arm", "ur5"), "--arm ur5 does not go with --robot franka"),
+        (("--recover",), "--recover is unknown"),
         (("--arm", "ur5"), "There is no arm 'ur5'"),
     ],
 )  # fmt: skip
@@ -82,16 +76,30 @@ def test_what_does_not_fit_together_is_refused_in_a_sentence(words, said, capsys
     assert said in " ".join(capsys.readouterr().err.split())
 
 
+def test_an_arm_of_a_distribution_that_is_not_installed_is_a_sentence(monkeypatch, capsys):
+    monkeypatch.setattr(plugins, "names", lambda group: ())
+    assert cli.main(["run", "ros2", "--sign", "on-robot"]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("The arm 'ros2' is in the distribution pretouch-ros2, which is not installed: run ")
+    assert said.count("\n") == 1
+
+
+def test_a_franka_arm_is_a_panda_or_an_fr3(tmp_path, capsys):
+    folder = str(copied_panda(tmp_path))
+    assert cli.main(["run", "franka", "--ip", "192.0.2.1", "--arm", folder, *BLIND[1:]]) == 2
+    assert f"--arm {folder} is no arm of `pretouch run franka`" in " ".join(capsys.readouterr().err.split())
+
+
 def test_an_arm_that_does_not_come_with_the_package_has_its_path_placed_and_that_is_said(tmp_path):
     folder = str(copied_panda(tmp_path))
-    made = run_setup(Run(RobotOptions(arm=folder)))
+    made = run_setup(Run(Simulated(), RobotOptions(arm=folder)))
     assert made.assumed[0].startswith("The paper's paths for panda:")
     at = made.model.kinematics(made.simulated_start()).position[made.model.ee]
     assert np.linalg.norm(at - made.placement.point(0.5, 0.0, 0.25)) == pytest.approx(0.25 * made.placement.scale)
-    given = run_setup(Run(RobotOptions(arm=folder), task=TaskOptions(center=(0.45, 0.0, 0.3), radius=0.1)))
+    given = run_setup(Run(Simulated(), RobotOptions(arm=folder), task=TaskOptions(center=(0.45, 0.0, 0.3), radius=0.1)))
     assert given.floor == -0.2
     assert len(given.assumed) == 1  # of the simulated arm, not of a path that is given
-    usual = run_setup(Run())
+    usual = run_setup(Run(Simulated()))
     assert usual.assumed == ()
 
 
@@ -137,10 +145,10 @@ def test_a_damaged_note_of_confirmed_robots_is_found_before_the_checks(tmp_path,
     place.write_text("[")
     known = Identity("test", "here", "nothing")
 
-    def opened(arm, skin, _, *more, **named):
-        return OpenedRobot(arm, skin, known, *more, **named)
+    def opened(arm, **named):
+        return OpenedArm(arm, known, **named)
 
-    monkeypatch.setattr("pretouch.cli.run.robots.OpenedRobot", opened)
+    monkeypatch.setattr("pretouch.arms.simulated.OpenedArm", opened)
     assert cli.main([*BLIND, "--seconds", "0.1", "--yes"]) == 2
     shown = capsys.readouterr()
     assert "is damaged: delete it" in shown.err
@@ -221,7 +229,7 @@ def test_an_approach_that_is_broken_off_is_reported_and_no_refusal(tmp_path, cap
 
 @pytest.mark.usefixtures("_no_pushes")
 def test_an_arm_that_is_moved_while_a_person_is_asked_is_not_let_go(capsys, monkeypatch):
-    read, turned = simulated.SimulatedSessionArm.read, []
+    read, turned = ThreadedArm.read, []
 
     def asked(*_):
         turned.append(0.1)
@@ -231,22 +239,22 @@ def test_an_arm_that_is_moved_while_a_person_is_asked_is_not_let_go(capsys, monk
         return replace(state, q=state.q + sum(turned))
 
     monkeypatch.setattr("pretouch.cli.run.command.require_yes", asked)
-    monkeypatch.setattr(simulated.SimulatedSessionArm, "read", moved)
-    monkeypatch.setattr(simulated.SimulatedSessionArm, "begin", pytest.fail)
+    monkeypatch.setattr(ThreadedArm, "read", moved)
+    monkeypatch.setattr(ThreadedArm, "begin", pytest.fail)
     assert cli.main([*BLIND, "--seconds", "1"]) == 2
     assert "The arm moved after the checks" in capsys.readouterr().err
 
 
 @pytest.mark.usefixtures("_no_pushes")
 def test_ctrl_c_after_the_report_waits_until_all_is_closed(capsys, monkeypatch):
-    close, closed = simulated.SimulatedSessionArm.__exit__, []
+    close, closed = ThreadedArm.__exit__, []
 
     def interrupted(arm, *error):
         os.kill(os.getpid(), signal.SIGINT)
         close(arm, *error)
         closed.append(arm)
 
-    monkeypatch.setattr(simulated.SimulatedSessionArm, "__exit__", interrupted)
+    monkeypatch.setattr(ThreadedArm, "__exit__", interrupted)
     assert cli.main([*BLIND, "--seconds", "0.1", "--yes"]) == 130
     assert closed
     assert "The arm is at rest." in capsys.readouterr().out
@@ -264,7 +272,7 @@ def test_without_a_terminal_nobody_lets_the_arm_move(capsys, monkeypatch):
 
 @pytest.mark.slow
 def test_a_wrong_sign_is_refused_before_anything_moves(capsys, monkeypatch):
-    read, began = simulated.SimulatedSessionArm.read, []
+    read, began = ThreadedArm.read, []
 
     def opposite(arm):
         state = read(arm)
@@ -272,15 +280,15 @@ def test_a_wrong_sign_is_refused_before_anything_moves(capsys, monkeypatch):
             state.stamp, state.q, state.qd, state.q_commanded, state.qd_commanded, -state.tau_ext, -state.wrench
         )
 
-    monkeypatch.setattr(simulated.SimulatedSessionArm, "read", opposite)
-    monkeypatch.setattr(simulated.SimulatedSessionArm, "begin", began.append)
+    monkeypatch.setattr(ThreadedArm, "read", opposite)
+    monkeypatch.setattr(ThreadedArm, "begin", began.append)
     assert cli.main([*BLIND, "--seconds", "1", "--yes"]) == 2
     assert "force by the robot, not on it" in capsys.readouterr().err
     assert not began
 
 
 def test_without_a_push_nothing_moves(capsys, monkeypatch):
-    monkeypatch.setattr(simulated.SimulatedSessionArm, "push", lambda *_: None)
+    monkeypatch.setattr(ThreadedArm, "push", lambda *_: None)
     monkeypatch.setattr("pretouch.cli.run.command.PUSH", PushParams(timeout_s=0.5))
     assert cli.main([*BLIND, "--seconds", "1", "--yes"]) == 2
     assert "No clear push towards +y" in capsys.readouterr().err
@@ -311,7 +319,7 @@ def test_units_that_fall_silent_in_the_middle_are_named_and_the_arm_holds(tmp_pa
             unit.silent = True
 
     at_begin(monkeypatch, 2.5, silence)
-    words = "--yes", "--seconds", "4", "--units-port", "0", "--record", "a.mcap"
+    words = "--yes", "--seconds", "4", "--record", "a.mcap"
     assert cli.main(["run", *words]) == 0
     assert "No usable reading from hand_left" in capsys.readouterr().out
     steps = [kept.step for kept in open_recording(tmp_path / "a.mcap")]

@@ -40,7 +40,7 @@ def test_a_python_block_compiles_and_its_names_are_there(block):
     known = set(dir(builtins)) | NAMED | {"np", "pt", "Path"}
     for node in ast.walk(tree):
         if isinstance(node, ast.ImportFrom) and node.module.split(".")[0] not in FOREIGN:
-            if node.module.startswith("pretouch.hardware.ros2.node"):
+            if node.module.startswith("pretouch_ros2"):
                 skip_without(ROS2)
             module = importlib.import_module(node.module)
             assert [name.name for name in node.names if not hasattr(module, name.name)] == []

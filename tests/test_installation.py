@@ -68,7 +68,7 @@ def test_each_hint_works_in_an_installation_from_a_wheel(built: Path):
         "replay gone.mcap": "gone.mcap cannot be read",
         "report gone.mcap": "gone.mcap cannot be read",
         "detect a.bag": "a.bag",
-        "run --robot franka --ip 127.0.0.1 --no-skin --profile blind --seconds 1": "127.0.0.1",
+        "run franka --ip 127.0.0.1 --no-skin --profile blind --seconds 1": "127.0.0.1",
         "figure nothing": "nothing",
         "serve-fci --seed -1": "--seed is -1",
     }

@@ -11,16 +11,16 @@ import pytest
 from pretouch import extras
 from pretouch.cli.registry import FCI, command_names
 from pretouch.errors import MissingExtraError
-from pretouch.extras import BAGS, FIGURES, FRANKA, LIVE, MESHES, ROS2, UNITS
+from pretouch.extras import BAGS, FIGURES, FRANKA, LIVE, MESHES, UNITS
 from pretouch_lab.learning import LEARN
 from pretouch_lab.sweep.run import SWEEP
 
-EXTRAS = (BAGS, FIGURES, FRANKA, MESHES, ROS2, LIVE, UNITS)
+EXTRAS = (BAGS, FIGURES, FRANKA, MESHES, LIVE, UNITS)
 
 URDF = """<robot name="a"><link name="base"><collision><geometry><mesh filename="a.dae"/></geometry></collision></link>
 <link name="tip"/><joint name="j" type="revolute"><parent link="base"/><child link="tip"/><axis xyz="0 0 1"/>
 <limit lower="-1" upper="1" velocity="1" effort="1"/></joint></robot>"""
-ARM = ("run", "--robot", "franka", "--ip", "127.0.0.1")
+ARM = ("run", "franka", "--ip", "127.0.0.1", "--no-skin", "--profile", "blind")
 LAB = ("demo", "reproduce", "figure", "bench", "sweep", "identify", "learn", "policy")  # requires figures
 X = ("--vary", "detect.f_base_n=7:20", "--samples", "2", "--processes", "1")
 # what is asked for, and the extra it needs; the others end for another reason, beyond all imports
@@ -30,10 +30,6 @@ ASKED = [
     (("replay", "gone.mcap", "--no-page"), None),
     (ARM, FRANKA),
     ((*ARM, "--arm", "fr3"), FRANKA),
-    (
-        ("run", "--robot", "ros2", "--ros-sign", "on-robot", "--ros-frame", "base", "--no-skin", "--profile", "blind"),
-        ROS2,
-    ),
     (("run", "--skin", "gone.toml"), None),
     (("sweep", "static", *X, "--out", "sweep"), SWEEP),
     (("sweep", "nothing"), None),
@@ -137,18 +133,17 @@ def clone(monkeypatch, tmp_path):
 
 def test_the_sentence_names_make_in_a_clone_and_pip_of_the_folder_in_another_environment(clone, monkeypatch):
     with pytest.raises(MissingExtraError) as caught:
-        ROS2.need("An arm on ROS 2")
+        FRANKA.need("A Franka arm", "ruckig")
     assert str(caught.value) == (
-        "An arm on ROS 2 needs cyclonedds, rosbags of the extra 'ros2': run"
-        f" '/a b/python' -m pip install -e '{clone}[ros2]'"
+        f"A Franka arm needs ruckig of the extra 'franka': run '/a b/python' -m pip install -e '{clone}[franka]'"
     )
     assert SWEEP.command == f"'/a b/python' -m pip install -e '{clone}/lab[sweep]'"
     monkeypatch.setattr(sys, "prefix", str(clone / ".venv"))
     monkeypatch.chdir(clone)
-    assert ROS2.command == "make ros2"
+    assert FRANKA.command == "make franka"
     assert LIVE.command == "make setup"
     monkeypatch.chdir("/")
-    assert ROS2.command == f"make -C {clone} ros2"
+    assert FRANKA.command == f"make -C {clone} franka"
 
 
 INDEX, FILE = "", "file:///a%20b/pretouch-0.2.0-py3-none-any.whl"

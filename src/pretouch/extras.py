@@ -13,7 +13,7 @@ from pretouch.errors import MissingExtraError
 
 _CLONE = Path(__file__).parents[2]
 LAB, FCI = "pretouch-lab", "pretouch-fci"
-_FOLDERS = {LAB: "lab", FCI: "fci"}
+_FOLDERS = {LAB: "lab", FCI: "fci", "pretouch-ros2": "ros2"}
 """Folder in a clone of each distribution beside this one."""
 
 
@@ -22,6 +22,7 @@ class Extra:
     """An extra of a distribution."""
 
     name: str
+    """'' is the distribution itself."""
     modules: tuple[str, ...]
     """Modules that are imported where it is used."""
     target: str
@@ -52,7 +53,7 @@ FRANKA = Extra("franka", ("panda_py", "pylibfranka", "ruckig"), "franka")
 LIVE = Extra("live", ("viser",), "setup")
 MESHES = Extra("meshes", ("collada",), "meshes")
 PARQUET = Extra("parquet", ("pyarrow",), "setup")
-ROS2 = Extra("ros2", ("cyclonedds", "rosbags"), "ros2")
+ROS2 = Extra("", ("pretouch_ros2",), "ros2", "pretouch-ros2")
 UNITS = Extra("units", ("mpremote",), "units")
 
 

@@ -40,10 +40,7 @@ def test_the_overview_leaves_out_what_is_not_installed():
         ("run --radius wide", "--radius is 'wide': give a number. See pretouch run --help."),
         ("run --cpu x", "--cpu is 'x': give a whole number. See pretouch run --help."),
         ("live --prot 8080", "--prot is unknown: perhaps --port. See pretouch live --help."),
-        (
-            "run --robot kuka",
-            "--robot is 'kuka': choose from simulated, franka, ros2. See pretouch run --help.",
-        ),
+        ("run --path square", "--path is 'square': choose from circle, line, hold. See pretouch run --help."),
         ("live --seed", "--seed lacks a value: give 1. See pretouch live --help."),
         ("live here", "here is unknown. See pretouch live --help."),
         (

@@ -9,9 +9,9 @@ from pretouch.hardware.network_skin import NetworkSkin
 from pretouch.loop import MonotonicClock
 from pretouch.robot.model import RobotModel
 from pretouch.serving.simulated_arm import SimulateOptions
+from pretouch.serving.threaded_arm import ThreadedArm
 from pretouch.serving.wire_skin import made_keys
 from pretouch.session.session import NoUnits
-from pretouch.session.simulated import SimulatedSessionArm
 from pretouch.session.units import UnitCheck
 from pretouch.sim.scene import SceneSpec, fixtures
 
@@ -23,7 +23,7 @@ def checked(panda_model, paper_skin):
     model, scene = RobotModel(panda_model.description), SceneSpec()
     with NetworkSkin(paper_skin.ids, keys) as units:
         options = SimulateOptions(model, paper_skin, keys, *units.address, hand=False)
-        with SimulatedSessionArm(options, panda_model.description.q_ready, scene) as arm:
+        with ThreadedArm(options, panda_model.description.q_ready, scene) as arm:
             yield arm, units, UnitCheck(units, panda_model, paper_skin, fixtures(scene), arm)
 
 

@@ -6,10 +6,10 @@ from typing import Self
 import numpy as np
 
 from pretouch.controller import Controller, ControllerState
-from pretouch.hardware.franka.vendor import VendorClient
 from pretouch.hardware.franka.limiter import PERIOD_S, SetPointLimiter
 from pretouch.hardware.franka.limits import LimiterParams, motion_limits
 from pretouch.hardware.franka.state import FrankaState, robot_state
+from pretouch.hardware.franka.vendor import VendorClient
 from pretouch.hardware.keys import Keys
 from pretouch.hardware.receiver import SkinReceiver
 from pretouch.loop import Cycle, explained

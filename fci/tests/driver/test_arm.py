@@ -87,8 +87,8 @@ def test_the_arm_follows_commands_and_ends_at_rest_and_the_terminals_signals_are
         arm.end()
         assert np.all(arm.read().qd_commanded == 0.0)
         wait_for(lambda: arm.state().mode == "idle", "idle")
-        assert arm.report.cycles > 100
-        assert f"{arm.report.cycles} states answered" in str(arm.report)
+        assert arm.communication.cycles > 100
+        assert f"{arm.communication.cycles} states answered" in arm.report()
     assert "Motion ended" not in served.said()
 
 
@@ -119,7 +119,7 @@ def test_stale_set_points_bring_the_arm_to_rest_and_fresh_ones_move_it_again(ser
         assert arm.state().mode == "move"
         keep(arm, 0.3, served.moves)
         arm.end()
-        assert arm.report.stale >= 1
+        assert arm.communication.stale >= 1
     assert "Motion ended" not in served.said()
 
 

@@ -1,4 +1,4 @@
-"""`pretouch run --robot franka` through the vendor's own libraries, against simulated arms that speak its protocol."""
+"""`pretouch run franka` through the vendor's own libraries, against simulated arms that speak its protocol."""
 
 import os
 import re
@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pretouch.arms.franka import identity
 from pretouch.recording.reader import open_recording
 from pretouch.session.confirmations import ConfirmedRobots
-from pretouch.session.franka import identity
 
 pytestmark = [pytest.mark.slow, pytest.mark.alone]
 _number = count(1)
@@ -73,7 +73,7 @@ def served(kind, where, folder, *words):
 def running(kind, where, folder, *words):
     """Start `pretouch run` in a process of its own, with a memory of its own."""
     return subprocess.Popen(
-        [sys.executable, "-m", "pretouch.cli", "run", "--robot", "franka", "--arm", kind, "--ip", where, *words],
+        [sys.executable, "-m", "pretouch.cli", "run", "franka", "--arm", kind, "--ip", where, *words],
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, text=True, cwd=folder,
         env=os.environ | {"XDG_STATE_HOME": str(folder / "state")},
     )  # fmt: skip

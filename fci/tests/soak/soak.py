@@ -16,6 +16,7 @@ from fci.tests.soak.truth import Truth
 from fci.tests.soak.visitors import Visitors
 from tests.ports import free_port, loopback
 
+from pretouch.arms.franka import identity
 from pretouch.cli.skin_keys import with_new
 from pretouch.hardware.keys import Keys, save_keys
 from pretouch.recording.reader import open_recording
@@ -23,7 +24,6 @@ from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin
 from pretouch.session.confirmations import ConfirmedRobots
-from pretouch.session.franka import identity
 
 MEMORY_GROWS, AT_FIRST, FIRST_S = 0.05, 0.15, 1200.0
 """Largest share by which the memory of a process may grow once it has all it needs; and in a run that stays for less
@@ -127,8 +127,8 @@ class Soak:
         name = f"run-{self._runs}"
         record = self._folder / f"{name}.mcap"
         heard = "--keys", "keys.toml", "--units-port", str(self._units), "--floor", "-0.2", "--yes"
-        words = "--robot", "franka", "--ip", self._address, "--record", str(record), *heard
-        with program(self._clock, self._folder, name, "run", *words) as run:
+        words = "--ip", self._address, "--record", str(record), *heard
+        with program(self._clock, self._folder, name, "run", "franka", *words) as run:
             if run.said_within("(TRACK)"):
                 full = self._seconds / 4.0 if self._runs == 1 else np.inf
                 self._stay(run, page, until, full)

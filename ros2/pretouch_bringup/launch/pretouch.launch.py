@@ -1,4 +1,4 @@
-"""Start `pretouch run --robot ros2` with the options of a file.
+"""Start `pretouch run ros2` with the options of a file.
 
     ros2 launch pretouch_bringup pretouch.launch.py config:=/path/to/mine.yaml yes:=true
 
@@ -32,7 +32,7 @@ def start(context):
     with open(config, encoding="utf-8") as file:
         options = yaml.safe_load(file)
     sure = ["--yes"] if yes == "true" else []
-    command = [program, "run", "--robot", "ros2", *words(options), *sure]
+    command = [program, "run", "ros2", *words(options), *sure]
     # braking and closing a recording take a while after Ctrl-C
     return [ExecuteProcess(cmd=command, output="screen", sigterm_timeout="20", sigkill_timeout="40")]
 

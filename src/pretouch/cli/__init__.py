@@ -52,7 +52,10 @@ def _read(args: Sequence[str], errors: Console) -> Command:
     name = args[0] if args else ""
     wanted: Any = None if name.startswith("-") else command_class(name)
     if wanted is not None:
-        return cast(Command, _parsed(wanted, args[1:], f"pretouch {name}"))
+        words, prog = args[1:], name
+        if hasattr(wanted, "of_words"):  # its options depend on what the first words name
+            wanted, words, prog = wanted.of_words(words)
+        return cast(Command, _parsed(wanted, words, f"pretouch {prog}"))
     if name == "completion":
         _write_completion(args[1:], errors)
     if name in ("", "-h", "--help"):
@@ -96,7 +99,10 @@ def _write_completion(shells: Sequence[str], errors: Console) -> NoReturn:
     """Print what a shell needs to complete the words of all commands, and end."""
     if len(shells) != 1 or shells[0] not in SHELLS:
         raise UsageError(f"pretouch completion is for one shell: choose from {', '.join(SHELLS)}.")
-    kinds = [Annotated[kind, tyro.conf.subcommand(name)] for name, kind in _every(errors).items()]
+    kinds = [
+        Annotated[kind.of_all() if hasattr(kind, "of_all") else kind, tyro.conf.subcommand(name)]
+        for name, kind in _every(errors).items()
+    ]
     every: Any = Union[tuple(kinds)]  # noqa: UP007  # made when it is asked for
     tyro.cli(every, prog="pretouch", args=["--tyro-print-completion", *shells], config=_CONFIG)
     raise SystemExit(0)

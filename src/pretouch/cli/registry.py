@@ -1,7 +1,8 @@
 """All commands: the product's own, and those that other distributions add in the group `pretouch.commands`.
 
 A command is a dataclass whose docstrings are the help and whose `run()` does it. `run()` returns the exit code; with
-None it is 0, or that of the signal which ended the command.
+None it is 0, or that of the signal which ended the command. Where its options depend on what its first word names,
+`of_words(words)` returns the class, the words that are left, and those in front of them, and `of_all()` one for all.
 """
 
 from collections.abc import Sequence

@@ -1,6 +1,28 @@
-"""Several words in one option."""
+"""Words of a command line: several in one option, and the one that names an arm."""
+
+from collections.abc import Sequence
+
+from pretouch.arms import DEFAULT
+from pretouch.errors import UsageError
 
 
 def words(text: str) -> tuple[str, ...]:
     """Return the words between commas."""
     return tuple(part.strip() for part in text.split(",") if part.strip())
+
+
+def split_arm(words: Sequence[str]) -> tuple[str, Sequence[str]]:
+    """Return the name of the arm, the default one where none is named, and the other words.
+
+    Raises UsageError for options by which an arm was named before.
+    """
+    for word, value in zip(words, (*words[1:], "NAME"), strict=True):
+        option, given, text = word.partition("=")
+        if option == "--robot":
+            name = text if given else value
+            raise UsageError(f"`--robot {name}` is `pretouch run {name}` now, with the options of that arm alone.")
+        if option.startswith("--ros-"):
+            raise UsageError(f"{option} is an option of `pretouch run ros2` now: see pretouch run ros2 --help.")
+    if words and not words[0].startswith("-"):
+        return words[0], words[1:]
+    return DEFAULT, words

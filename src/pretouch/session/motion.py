@@ -13,8 +13,7 @@ from pretouch.calibration.motion.plan import Plan
 from pretouch.controller import Controller
 from pretouch.errors import PretouchError
 from pretouch.loop import MonotonicClock, Recorder
-from pretouch.ports import Skin
-from pretouch.session.arm import Arm
+from pretouch.ports import Arm, Skin
 from pretouch.signals import noted_in_motion
 from pretouch.types import ControlStep
 

@@ -7,8 +7,7 @@ import numpy as np
 from pretouch.controller import Controller
 from pretouch.errors import RobotError
 from pretouch.loop import MonotonicClock
-from pretouch.ports import Skin
-from pretouch.session.arm import Arm
+from pretouch.ports import Arm, Skin
 from pretouch.session.preflight import Finding, PreflightParams, check, refusals
 from pretouch.session.standstill import Standstill, watch
 from pretouch.session.start import check_start

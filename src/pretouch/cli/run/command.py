@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pretouch.arms import OpenedArm
 from pretouch.cli.run.motion import PlannedRun, execute
-from pretouch.cli.run.robots import need_extra, opened
-from pretouch.cli.run.setup import OpenedRobot, RunSetup, free_motion, run_setup
+from pretouch.cli.run.setup import RunSetup, free_motion, heard_units, run_setup
 from pretouch.cli.warm_up import prepare
 from pretouch.cli.writing import check_writable
 from pretouch.errors import RecordingError, RobotError
 from pretouch.loop import MonotonicClock
+from pretouch.ports import Skin
 from pretouch.realtime import check_wishes
 from pretouch.session.confirmations import ConfirmedRobots, state_folder
 from pretouch.session.preflight import PreflightParams, refusals
@@ -22,6 +23,7 @@ from pretouch.session.session import Session
 from pretouch.session.standstill import Standstill
 from pretouch.session.start import announcement, plan_to_start
 from pretouch.session.terminal import require_yes, say
+from pretouch.session.units import Units
 from pretouch.signals import noted_in_motion
 
 if TYPE_CHECKING:
@@ -31,31 +33,43 @@ PREFLIGHT, PUSH = PreflightParams(), PushParams()
 """What arm and pushes must be like."""
 
 
-def run(command: "Run", write: Callable[[Any], None]) -> int:
+def run(command: "Run[Any]", write: Callable[[Any], None]) -> int:
     """Move an arm, and write its numbers; return 1 if the run ended early or its recording failed, or else 0."""
     check_wishes(command.priority, command.cpu)
     if command.record:
         _check_free(Path(command.record))
     made = run_setup(command)
-    need_extra(command)
+    setup = made.of_arm(command)
+    command.connection.check(setup)
     for sentence in made.assumed:
         say(sentence)
     prepare(made.profile)
-    with ExitStack() as last, opened(command, made) as found:
+    with (
+        ExitStack() as last,
+        command.connection.open(setup) as found,
+        heard_units(command, made, found) as (skin, units),
+    ):
         try:
-            return _run(command, made, found, last, write)
+            return _run(command, made, found, (skin, units), last, write)
         finally:
             last.enter_context(noted_in_motion())  # until arm and units are closed
 
 
-def _run(command: "Run", made: RunSetup, found: OpenedRobot, last: ExitStack, write: Callable[[Any], None]) -> int:
+def _run(
+    command: "Run[Any]",
+    made: RunSetup,
+    found: OpenedArm,
+    heard: tuple[Skin, Units | None],
+    last: ExitStack,
+    write: Callable[[Any], None],
+) -> int:
     """Check, ask, and let the arm move; see `execute`."""
     remembered = ConfirmedRobots(state_folder())
     known = found.identity is not None and remembered.is_confirmed(found.identity)  # a damaged file is found out first
     controller = made.controller(np.array(found.arm.read().q))
     clock = MonotonicClock(made.profile.task.control_period_s)
-    learnt = free_motion(command.robot, controller, found.free_motion_id)
-    session = Session(found.arm, found.skin, found.units, controller, made.floor, clock)
+    learnt = free_motion(command.robot, controller, found.free_motion_id or found.arm.name)
+    session = Session(found.arm, *heard, controller, made.floor, clock)
     say(f"{found.arm.name}: checking it; let it stand still and do not touch it.")
     rest = _checked(session, command.task.approach, found.notes())
     if known and not command.robot.confirm_push:
@@ -81,17 +95,17 @@ def _checked(session: Session, approach: bool, notes: Sequence[str]) -> Standsti
     return rest
 
 
-def _confirm(session: Session, found: OpenedRobot, rest: Standstill) -> None:
+def _confirm(session: Session, found: OpenedArm, rest: Standstill) -> None:
     """Have the force sign confirmed by guided pushes."""
 
     def ask(direction: Direction) -> None:
         say(f"Push the hand gently, with about 15 N and for a second, towards {direction.words}.")
-        found.asked(direction)
+        found.push(direction)
 
     GuidedPush(session.arm, session.clock, session.controller.model, ask, say, PUSH).confirm(rest)
 
 
-def _confirm_motion(command: "Run", session: Session, made: RunSetup, rest: Standstill, asks: str) -> PlannedRun:
+def _confirm_motion(command: "Run[Any]", session: Session, made: RunSetup, rest: Standstill, asks: str) -> PlannedRun:
     """Say what the arm will do, and ask; return it if the arm may do it, and stands where it was checked."""
     approach = command.task.approach
     q = session.recheck(rest, PREFLIGHT, approach)

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pretouch.arms import OpenedArm
 from pretouch.calibration.motion.plan import Plan
-from pretouch.cli.run.setup import OpenedRobot
 from pretouch.errors import HardwareError, PretouchError
 from pretouch.loop import MonotonicClock
 from pretouch.realtime import Options
@@ -43,9 +43,14 @@ class PlannedRun:
 
 
 def execute(
-    command: "Run", session: Session, found: OpenedRobot, way: PlannedRun, learnt: FreeMotion | None, last: ExitStack,
+    command: "Run[Any]",
+    session: Session,
+    found: OpenedArm,
+    way: PlannedRun,
+    learnt: FreeMotion | None,
+    last: ExitStack,
     write: Callable[[Any], None],
-) -> int:  # fmt: skip
+) -> int:
     """Let the arm move and report, whatever ends it; return 1 if it did not end as asked, or else 0.
 
     All that the run is kept in is opened first. From the report to the end of `last`, signals are only noted.

@@ -1,13 +1,14 @@
 """Arm, units, profile and path of a run, from the command line."""
 
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING, Protocol, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
+from pretouch.arms import ArmSetup, OpenedArm
 from pretouch.cli.skin_keys import keys_file
 from pretouch.cli.writing import check_writable
 from pretouch.contact.sequential_test import SequentialTest
@@ -15,12 +16,9 @@ from pretouch.control.path import Circle, Path, WayPoints, line
 from pretouch.control.posture import brought_to
 from pretouch.controller import Controller
 from pretouch.coverage.placement import assumptions, placement_for
-from pretouch.desired import Desired
-from pretouch.errors import ParameterError
-from pretouch.hardware.franka.limits import LimiterParams, planned
-from pretouch.hardware.keys import Keys, load_keys
+from pretouch.errors import HardwareError, ParameterError
+from pretouch.hardware.keys import load_keys
 from pretouch.hardware.network_skin import NetworkSkin
-from pretouch.loop import Recorder
 from pretouch.perception.scene_filter import Fixtures, floor_and_pedestal
 from pretouch.ports import Skin as SkinPort
 from pretouch.profiles import Profile
@@ -28,10 +26,9 @@ from pretouch.profiles import profile as find_profile
 from pretouch.robot.model import RobotModel
 from pretouch.robot.named import robot_named
 from pretouch.sensing.skin import Skin, skin_for
-from pretouch.session.arm import Arm
-from pretouch.session.confirmations import Identity, state_folder
+from pretouch.session.confirmations import state_folder
 from pretouch.session.free_motion import FreeMotion, ModelFile, model_file_of
-from pretouch.session.push import Direction
+from pretouch.session.session import NoUnits
 from pretouch.session.terminal import say
 from pretouch.session.units import Units
 from pretouch.signals import children_undisturbed
@@ -40,7 +37,7 @@ from pretouch.sim.scene import SceneSpec
 from pretouch.types import FloatArray
 
 if TYPE_CHECKING:
-    from pretouch.cli.run.options import Run, TaskOptions
+    from pretouch.cli.run.options import RobotOptions, Run, TaskOptions
 
 _SHORTEST_M = 1e-5
 """A path must have a length: over so little an arm stands."""
@@ -70,6 +67,14 @@ class RunSetup:
         """Return the controller for an arm that stands at q (n,) [rad]."""
         return Controller(self.model, self.skin, self.fixtures, self._path(q), self.profile)
 
+    def of_arm(self, command: "Run[Any]") -> ArmSetup:
+        """Return what the arm is opened with."""
+        return ArmSetup(
+            name=command.robot.arm, model=self.model, skin=self.skin,
+            units=bool(len(self.skin)) and not command.units.keys, profile=self.profile, start=self.simulated_start,
+            floor=self.floor, priority=command.priority, yes=command.yes,
+        )  # fmt: skip
+
     def simulated_start(self) -> FloatArray:
         """Joint positions (n,) [rad] at which a simulated arm begins: at its path, unless it is to go there."""
         ready = self.model.description.q_ready
@@ -93,12 +98,11 @@ class RunSetup:
         return line((x, y, z), (x, y, z + _SHORTEST_M))
 
 
-def run_setup(command: "Run") -> RunSetup:
+def run_setup(command: "Run[Any]") -> RunSetup:
     """Read files and parameters; what does not fit together is an error."""
     units, task, profile = command.units, command.task, find_profile(command.task.profile)
-    model = RobotModel(robot_named(command.robot.arm))
-    if command.robot.robot == "franka":
-        model = RobotModel(planned(model.description, LimiterParams()))
+    arm = command.connection
+    model = RobotModel(arm.described(robot_named(command.robot.arm)))
     if units.no_skin:
         if profile.perception is not None:
             raise ParameterError(
@@ -108,28 +112,17 @@ def run_setup(command: "Run") -> RunSetup:
         skin = Skin((), model)
     else:
         skin = skin_for(model, units.skin)
-    by_torques = profile.detect.by_torques or profile.react.by_torques
-    if command.robot.robot == "ros2" and by_torques and not command.robot.ros_torques:
-        raise ParameterError(
-            f"The profile {profile.name} detects contacts by external joint torques: give their topic by --ros-torques,"
-            " or choose --profile paper, or pretouch:detect=thresholds:react=decay."
-        )
-    if command.robot.ros_desired:
+    if arm.commanded:
         task = replace(task, path="hold")
-    simulated = command.robot.robot == "simulated"
-    floor = (SceneSpec().floor_height if simulated else 0.0) if task.floor is None else task.floor
+    floor = (SceneSpec().floor_height if arm.simulated else 0.0) if task.floor is None else task.floor
     if not np.isfinite(floor):
         raise ParameterError(f"--floor is {floor}: give a height in metres.")
     circle = task.path == "circle" and (task.center is None or task.radius is None)
     placement = placement_for(model) if circle or task.path == "line" else Placement()
     assumed = assumptions(model, placement)
-    if not simulated:  # a real arm is what it is, wherever its path is
+    if not arm.simulated:  # a real arm is what it is, wherever its path is
         assumed = tuple(said for said in assumed if said == placement.paths_sentence(model.description.name))
     return RunSetup(model, skin, profile, floor, task, placement, assumed)
-
-
-if TYPE_CHECKING:
-    from pretouch.cli.run.options import RobotOptions
 
 
 def free_motion(options: "RobotOptions", controller: Controller, robot: str) -> FreeMotion | None:
@@ -159,64 +152,22 @@ def free_motion(options: "RobotOptions", controller: Controller, robot: str) -> 
     return found
 
 
-class Output(Recorder, Protocol):
-    """What else is told of each control step."""
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """What a person should know of that, a sentence each."""
-        ...
-
-
-class Commander(Protocol):
-    """Who asks for a motion in place of a path; see `loop.Options.desired`."""
-
-    def __call__(self) -> Desired | None:
-        """Return what is asked for now."""
-        ...
-
-    @property
-    def announced(self) -> str:
-        """Say what the arm will do, before it moves."""
-        ...
-
-
-def _no_output(_controller: Controller) -> AbstractContextManager[Output | None]:
-    return nullcontext()
-
-
-@dataclass(frozen=True)
-class OpenedRobot:
-    """An arm that can be read, and its units."""
-
-    arm: Arm
-    skin: SkinPort
-    identity: Identity | None
-    """By which its confirmed force sign is remembered; None: it is not."""
-    units: Units | None = None
-    """What hears the units, where their health can be told."""
-    asked: Callable[[Direction], None] = lambda _: None
-    """Called as a person is asked to push: a simulated one does."""
-    notes: Callable[[], tuple[str, ...]] = lambda: ()
-    """What is to be known of the connection by now, a sentence each."""
-    output: Callable[[Controller], AbstractContextManager[Output | None]] = _no_output
-    """Opens what else is told of each control step."""
-    free_motion_id: str = ""
-    """What the robot is known by as its free motion is remembered, where that may be learnt."""
-    commander: Commander | None = None
-    """Whom the arm follows, if it is not the path."""
-
-
 @contextmanager
-def network_units(command: "Run", setup: RunSetup, keys: Keys | None = None) -> Iterator[NetworkSkin | None]:
-    """Hear the units over the network, if there are any."""
+def heard_units(command: "Run[Any]", setup: RunSetup, opened: OpenedArm) -> Iterator[tuple[SkinPort, Units | None]]:
+    """Hear the units: over the network where there are keys, or else those that the arm brings."""
     if not len(setup.skin):
-        yield None
-        return
-    c = command.units
-    keys = load_keys(keys_file(c.keys)) if keys is None else keys
-    with children_undisturbed():
-        receiver = NetworkSkin(setup.skin.network, keys, c.units_host, c.units_port)
-    with receiver as units:
-        print(f"Receiving units at {units.address[0]}:{units.address[1]}.", flush=True)
-        yield units
+        yield NoUnits(), None
+    elif not command.units.keys:
+        if opened.skin is None:
+            raise HardwareError(f"{opened.arm.name} brings no sensor units: give the file of their keys with --keys.")
+        if opened.units is not None:
+            print(f"Receiving units at {opened.units.address[0]}:{opened.units.address[1]}.", flush=True)
+        yield opened.skin, opened.units
+    else:
+        c = command.units
+        keys = load_keys(keys_file(c.keys))
+        with children_undisturbed():
+            receiver = NetworkSkin(setup.skin.network, keys, c.units_host, c.units_port)
+        with receiver as units:
+            print(f"Receiving units at {units.address[0]}:{units.address[1]}.", flush=True)
+            yield units, units

@@ -1,4 +1,4 @@
-"""A Franka arm in real time: the port `Robot`, over a process that speaks with the arm each millisecond."""
+"""A Franka arm in real time: the port `Arm`, over a process that speaks with the arm each millisecond."""
 
 import os
 import time
@@ -10,6 +10,7 @@ from typing import Self
 from pretouch.errors import RobotError
 from pretouch.hardware.franka.client import Kind, attempt
 from pretouch.hardware.franka.collision import CollisionBehavior
+from pretouch.hardware.franka.errors import check_ready
 from pretouch.hardware.franka.limits import FrankaParams, motion_limits
 from pretouch.hardware.franka.mailboxes import Command, Feedback, Mailboxes, Request
 from pretouch.hardware.franka.process import ProcessSettings, serve
@@ -27,6 +28,8 @@ _ANSWER_S = 10.0
 _STATE_MOST_S = 0.5
 """Age at which a state says nothing about the arm any more [s]."""
 _LOOK_S = 0.001
+_NAMES: dict[Kind, str] = {"panda": "Panda", "fr3": "FR3"}
+_REFLEX = "reflex"
 
 
 class FrankaArm:
@@ -52,6 +55,7 @@ class FrankaArm:
         """
         check_wishes(priority, None)
         self._address, self._owner = address, os.getpid()
+        self.name = f"{_NAMES[kind]} at {address}"
         self._mailboxes, self._number, self._torques = Mailboxes(), 0, TorqueWatch()
         limits = motion_limits(model, kind)
         settings = ProcessSettings(address, kind, limits, behavior, params or FrankaParams(), priority, self._owner)
@@ -111,10 +115,28 @@ class FrankaArm:
         """Let the arm leave the mode "reflex"."""
         self._make_request(Request.RECOVER)
 
+    def unfit(self) -> tuple[str, ...]:
+        """Say why the arm is in no mode to be moved."""
+        state = self.state()
+        try:
+            check_ready(state, self._address)
+        except RobotError as error:
+            return (str(error), "Run with --recover.") if state.mode == _REFLEX else (str(error),)
+        return ()
+
     @property
-    def report(self) -> CommunicationReport:
+    def reflex(self) -> bool:
+        """Whether the arm has stopped by itself and must recover."""
+        return self.state().mode == _REFLEX
+
+    @property
+    def communication(self) -> CommunicationReport:
         """How well the process kept up, in the motions that have ended."""
         return self._mailboxes.report()
+
+    def report(self) -> str:
+        """Say that, in lines; '' if no motion has ended."""
+        return str(self.communication) if self.communication.cycles else ""
 
     def close(self) -> None:
         """Bring the arm to rest and end the process; at once where no state comes: it hangs, or the line is dead.

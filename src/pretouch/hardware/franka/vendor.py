@@ -10,7 +10,6 @@ from pretouch.hardware.franka.arm_lock import ArmLock
 from pretouch.hardware.franka.client import StateCallback
 from pretouch.hardware.franka.collision import CollisionBehavior
 from pretouch.hardware.franka.state import FrankaState, franka_state
-from pretouch.types import FloatArray
 
 _RECOVERING = ("reflex", "automatic error recovery")
 _STATES_AFTER = 500
@@ -18,7 +17,7 @@ _STATES_AFTER = 500
 
 
 class VendorClient:
-    """Base of the `client.Client`s.
+    """One connection to an arm, for one thread; a context manager. A subclass connects by one of the libraries.
 
     The libraries hold the interpreter's lock while they wait, so no other thread of the process runs during a motion.
     """
@@ -28,21 +27,26 @@ class VendorClient:
     failures: ClassVar[tuple[type[Exception], ...]] = (RuntimeError,)
     """What the library raises."""
 
-    def __init__(self, address: str, real_time: bool, lock: ArmLock) -> None:
+    def __init__(self, address: str, lock: ArmLock) -> None:
         self._address, self._lock = address, lock
-        wanted, began = self.library.RealtimeConfig, time.monotonic()
+        began = time.monotonic()
         try:
-            self._robot: Any = self.library.Robot(address, wanted.kEnforce if real_time else wanted.kIgnore)
+            self._robot: Any = self.library.Robot(address, self.library.RealtimeConfig.kIgnore)
         except Exception as error:
             errors.raise_not_connected(address, self.kind, began, error)
 
     def read(self) -> FrankaState:
-        """Wait for the next state."""
+        """Wait for the next state, while no motion runs."""
         with self._translated_errors("send its state"):
             return franka_state(self._robot.read_once())
 
     def control(self, on_state: StateCallback) -> None:
-        """Run a joint velocity motion until `on_state` says that it is finished."""
+        """Run a joint velocity motion, asking `on_state` for a command in each millisecond, until it is finished.
+
+        The library's own rate limiter and low-pass filter are off: what `on_state` answers is what the arm gets. An
+        exception of `on_state` stops the arm at once, as hard as it can, and is raised here. Raises MotionAborted
+        (`errors`) if the arm ended the motion, and another RobotError if it is in no mode to move.
+        """
         errors.check_ready(self.read(), self._address)
         raised: list[BaseException] = []
 
@@ -74,24 +78,17 @@ class VendorClient:
         with self._translated_errors("accept the collision behaviour"):
             self._robot.set_collision_behavior(*behavior.in_order())
 
-    def set_load(self, mass: float, com: FloatArray, inertia: FloatArray) -> None:
-        """Tell the arm what it carries."""
-        with self._translated_errors("accept the load"):
-            self._robot.set_load(mass, com.tolist(), inertia.T.ravel().tolist())
-
     def recover(self) -> None:
-        """Leave the mode "reflex", and wait for a state that says so: the answer may overtake states."""
+        """Leave the mode "reflex", as pressing the button in Desk does; a RobotError if no state says that it has.
+
+        The answer may overtake states.
+        """
         with self._translated_errors("recover"):
             self._robot.automatic_error_recovery()
         for _ in range(_STATES_AFTER):
             if (state := self.read()).mode not in _RECOVERING:
                 return
         errors.raise_not_recovered(state, self._address)
-
-    def stop(self) -> None:
-        """End any motion at once."""
-        with self._translated_errors("stop"):
-            self._robot.stop()
 
     def close(self) -> None:
         """Let the arm be used by somebody else."""

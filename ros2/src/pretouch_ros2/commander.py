@@ -1,0 +1,146 @@
+"""What a commander asks of the arm over a topic, as the loop takes it: who is wrong is named, and the arm holds."""
+
+from itertools import zip_longest
+from time import time as wall_clock
+from typing import Any
+
+import numpy as np
+
+from pretouch import desired
+from pretouch.desired import Desired
+from pretouch.errors import RobotError
+from pretouch.robot.model import RobotModel
+from pretouch_ros2.messages import TRAJECTORY, TWIST
+from pretouch_ros2.node import Ros2Node
+from pretouch_ros2.params import CommanderParams, seconds
+from pretouch_ros2.robot import SHARED_S, Ros2Robot
+from pretouch_ros2.stamps import Stamps
+
+_KINDS = {"twist": TWIST, "trajectory": TRAJECTORY}
+_POINTS_MOST = 1000
+_AHEAD_S = 1.0
+"""How far ahead trajectories may begin [s]: MoveIt Servo leaves room for its latency."""
+_SHOWN = 80
+"""Letters of a name from elsewhere that are shown."""
+
+
+class _UnfitError(Exception):
+    """Why a message asks for nothing, as a part of a sentence."""
+
+
+class Ros2Commander:
+    """Takes in what is asked; called in the loop, it returns the newest. For `loop.Options(desired=...)`.
+
+    Before anything was asked, and while two programs ask, it asks for nothing, which holds the arm and says why.
+    """
+
+    def __init__(self, params: CommanderParams, robot: Ros2Robot, model: RobotModel, node: Ros2Node) -> None:
+        """Take the settings, the arm and its model, and the node."""
+        if params.heard_on == robot.params.command_topic:
+            raise RobotError(f"{params.heard_on} is where the arm's commands go: ask on another topic.")
+        self.params, self._robot, self._node = params, robot, node
+        self.kind = _KINDS[params.asked]
+        self._base = (*_resting_links(model), *filter(None, [params.base_frame]))
+        self._ee = model.links[model.ee]
+        self._stamps = Stamps(params.shared_clock)
+        self._newest: tuple[Desired, bool] | None = None
+        self._heard = node.subscribe(params.heard_on, self.kind, self._take)
+
+    @property
+    def announced(self) -> str:
+        """Say what the arm will do, before it moves."""
+        return (
+            f"The arm does what is asked on {self.params.heard_on} ({self.kind.replace('/msg/', '/')}), wherever it"
+            " reaches and as fast as its joints may; it holds while nothing is asked. It keeps clear of what its units"
+            " see, but not of floor, table or itself."
+        )
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a person should know of what came, a sentence each."""
+        return (self._heard.unreadable,) if self._heard.unreadable else ()
+
+    def __call__(self) -> Desired:
+        """Return what is asked for now."""
+        topic, newest = self.params.heard_on, self._newest
+        if self._stamps.together():
+            return desired.refused(0.0, f"several programs ask on {topic}: run only one")
+        if newest is None:
+            kind = self.kind.replace("/msg/", "/")
+            return desired.refused(0.0, f"no {kind} was received on {topic} yet: start what publishes it")
+        asked, in_ee = newest
+        if not in_ee:
+            return asked
+        R = self._robot.orientation()
+        with np.errstate(invalid="ignore"):  # the step names what is no number
+            number = np.hstack([asked.number[:, :3] @ R.T, asked.number[:, 3:] @ R.T])
+        return Desired(asked.kind, asked.stamp, number)
+
+    def _take(self, message: Any, received: float, writer: int) -> None:
+        instant = self._stamps.instant(message.header, received, writer)
+        if instant is None:
+            return
+        try:
+            self._check_clock()
+            self._newest = self._read(message, instant)
+        except _UnfitError as unfit:
+            self._newest = desired.refused(received, str(unfit)), False
+
+    def _check_clock(self) -> None:
+        behind, ahead = self._stamps.behind, _AHEAD_S if self.kind == TRAJECTORY else SHARED_S
+        if self.params.shared_clock and behind is not None and not -ahead < behind < SHARED_S:
+            raise _UnfitError(
+                f"the stamps on {self.params.heard_on} are {behind:.3g} s behind this machine's time of day: set the"
+                " clocks by NTP, or say that ROS has its own clock"
+            )
+
+    def _read(self, message: Any, instant: float) -> tuple[Desired, bool]:
+        """Return what a message asks for, and whether it is a twist in the end-effector's frame."""
+        if self.kind == TWIST:
+            return self._twist(message, instant)
+        return self._trajectory(message, instant), False
+
+    def _twist(self, message: Any, instant: float) -> tuple[Desired, bool]:
+        frame = message.header.frame_id
+        if frame not in (*self._base, self._ee):
+            known = ", ".join((*self._base, self._ee))
+            raise _UnfitError(
+                f"on {self.params.heard_on} twists are in the frame {frame[:_SHOWN]!r}: give one of {known}"
+            )
+        v, w = message.twist.linear, message.twist.angular
+        return desired.twist(instant, (v.x, v.y, v.z), (w.x, w.y, w.z)), frame == self._ee
+
+    def _trajectory(self, message: Any, instant: float) -> Desired:
+        """Return the velocities of a trajectory's points, which may lie ahead."""
+        names, ours, points = tuple(message.joint_names), self._robot.joints, message.points
+        other = next((pair for pair in zip_longest(ours, names, fillvalue="") if pair[0] != pair[1]), None)
+        if other is not None:
+            raise _UnfitError(
+                f"on {self.params.heard_on} the joint {other[1][:_SHOWN]!r} is in the place of {other[0]!r}: give"
+                f" {', '.join(ours)}, in this order"
+            )
+        if not 0 < len(points) <= _POINTS_MOST:
+            raise _UnfitError(
+                f"on {self.params.heard_on} a trajectory has {len(points)} points: give 1 to {_POINTS_MOST}"
+            )
+        for point in points:
+            self._check_count(len(point.velocities))
+        stamp = seconds(message.header.stamp.sec, message.header.stamp.nanosec)
+        ahead = max(stamp - wall_clock(), 0.0) if self.params.shared_clock and stamp else 0.0
+        times = [seconds(point.time_from_start.sec, point.time_from_start.nanosec) for point in points]
+        return desired.joint_velocities(instant + ahead + np.array(times), np.array([p.velocities for p in points]))
+
+    def _check_count(self, given: int) -> None:
+        ours = self._robot.joints
+        if given != len(ours):
+            raise _UnfitError(
+                f"on {self.params.heard_on} {given} joint velocities are asked for: give {len(ours)}, of"
+                f" {', '.join(ours)}"
+            )
+
+
+def _resting_links(model: RobotModel) -> tuple[str, ...]:
+    """Names of the links that are the base frame, whatever the joints do."""
+    kin = model.kinematics(model.description.q_ready)
+    here = [not p.any() and np.array_equal(R, np.eye(3)) for p, R in zip(kin.position, kin.rotation, strict=True)]
+    return tuple(name for i, name in enumerate(model.links) if here[i] and not model.moved_by[i].any())

@@ -1,0 +1,114 @@
+"""What the controller does, published: a `Recorder` that never keeps the control loop waiting."""
+
+from queue import SimpleQueue
+from threading import Thread
+from time import monotonic, time_ns
+from typing import Self
+
+from pretouch.controller import Controller
+from pretouch.loop import Cycle
+from pretouch.types import ControlStep, Mode
+from pretouch_ros2.messages import CLOUD, DIAGNOSTICS, MARKERS, STATUS, TEXT, TRANSFORMS, WRENCH
+from pretouch_ros2.node import Ros2Node
+from pretouch_ros2.params import OutputParams
+from pretouch_ros2.step_messages import Stamp, StepMessages
+
+_WAITING_MOST = 16
+"""Steps that may wait to be published; more are left out."""
+
+
+class Ros2Output:
+    """Publishes control steps by a thread of its own; a context manager.
+
+    Contacts and changes of the mode are published each, the rest at a limited rate. Stamps are of the time of day, when
+    a step was taken.
+    """
+
+    def __init__(self, params: OutputParams, controller: Controller, node: Ros2Node) -> None:
+        self._step_messages = StepMessages(controller, node.messages, params.base_frame)
+        self._messages = node.messages
+        self._period, self._diagnostics_period = 1 / params.rate_hz, 1 / params.diagnostics_hz
+        self._next = self._next_diagnostics = 0.0
+        self._mode: Mode | None = None
+        self._published: Mode | None = None
+        self.dropped = 0
+        """Steps left out because the thread was busy."""
+        self.failure = ""
+        """Why nothing is published any more, as a sentence, or ''."""
+        self._queue: SimpleQueue[tuple[Cycle, Stamp] | None] = SimpleQueue()
+        begin = params.namespace.rstrip("/")
+        self._cloud = node.publisher(f"{begin}/obstacles", CLOUD)
+        self._markers = node.publisher(f"{begin}/markers", MARKERS)
+        self._force = node.publisher(f"{begin}/force", WRENCH)
+        self._contact = node.publisher(f"{begin}/contact", WRENCH)
+        self._mode_text = node.publisher(f"{begin}/mode", TEXT, latched=True, depth=1)
+        self._limited = node.publisher(f"{begin}/limited", STATUS)
+        self._diagnostics = node.publisher("/diagnostics", DIAGNOSTICS)
+        units = node.publisher("/tf_static", TRANSFORMS, latched=True, depth=1)
+        units.publish(self._step_messages.units(_now()))
+        self._thread = Thread(target=self._work, name="ros2-output", daemon=True)
+        self._thread.start()
+
+    def record(self, cycle: Cycle) -> None:
+        """Have a turn of the loop published, if it is time."""
+        now, step = monotonic(), cycle.step
+        if self.failure:
+            return
+        if now < self._next and step.contact is None and step.mode is self._mode:
+            return
+        if now >= self._next:
+            self._next = now + self._period
+        self._mode = step.mode
+        if self._queue.qsize() >= _WAITING_MOST:
+            self.dropped += 1
+            return
+        self._queue.put((cycle, _now()))
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a person should know of what was published, a sentence each."""
+        dropped = f"{self.dropped} control steps were not published: the machine was busy." if self.dropped else ""
+        return tuple(filter(None, (self.failure, dropped)))
+
+    def close(self) -> None:
+        """Publish what waits, and end."""
+        self._queue.put(None)
+        self._thread.join()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _work(self) -> None:
+        while (item := self._queue.get()) is not None:
+            try:
+                self._publish(*item)
+            except Exception as error:  # the arm goes on: a person is told at the end
+                self.failure = f"Publishing control steps failed: {type(error).__name__}: {error}"
+                return
+
+    def _publish(self, cycle: Cycle, at: Stamp) -> None:
+        self._publish_step(cycle.step, at)
+        now, changed = monotonic(), cycle.step.mode is not self._published
+        self._published = cycle.step.mode
+        if changed or now >= self._next_diagnostics:
+            self._next_diagnostics = now + self._diagnostics_period
+            self._diagnostics.publish(self._step_messages.diagnostics(cycle, at))
+
+    def _publish_step(self, step: ControlStep, at: Stamp) -> None:
+        step_messages = self._step_messages
+        if step.contact is not None:
+            self._contact.publish(step_messages.wrench(step.contact.force, at))
+        self._force.publish(step_messages.wrench(step.force, at))
+        self._limited.publish(step_messages.limited(step))
+        self._cloud.publish(step_messages.cloud(step, at))
+        self._markers.publish(step_messages.markers(step, at))
+        self._mode_text.publish(self._messages.make(TEXT, f"{step.mode.name}: {step.reason}"))
+
+
+def _now() -> Stamp:
+    """Return the time of day."""
+    now = time_ns()
+    return now // 10**9, now % 10**9

@@ -1,0 +1,114 @@
+"""The port `Skin` over ROS 2 topics of sensor_msgs/Range."""
+
+import math
+import re
+from functools import partial
+from typing import Any, Self
+
+import numpy as np
+
+from pretouch.errors import HardwareError
+from pretouch.sensing import skin as skins
+from pretouch.types import RangeReadings, RangeStatus
+from pretouch_ros2.messages import RANGE
+from pretouch_ros2.node import Ros2Node
+from pretouch_ros2.params import UNIT, SkinParams
+from pretouch_ros2.stamps import Stamps
+
+_NOTHING = (-math.inf, 0.0, RangeStatus.NONE)
+"""Stamp, distance and status of a unit that is not heard."""
+_UNKNOWN_MOST, _SHOWN = 64, 80
+"""Names of other units that are kept, and their letters."""
+
+
+class Ros2Skin:
+    """Sensor units behind topics; a unit that is not heard is silent, which the controller names."""
+
+    def __init__(self, params: SkinParams, skin: skins.Skin, node: Ros2Node) -> None:
+        self._ids, self._node, self.params = skin.ids, node, params
+        self._stamps = [Stamps(params.shared_clock) for _ in skin.ids]
+        self._newest: list[tuple[float, float, RangeStatus]] = [_NOTHING for _ in skin.ids]
+        self._unknown: set[str] = set()
+        if UNIT in params.topic:
+            self._subscriptions = [
+                node.subscribe(topic, RANGE, partial(self._take, i)) for i, topic in enumerate(self._topics())
+            ]
+        else:
+            self._subscriptions = [node.subscribe(params.topic, RANGE, self._take_any)]
+
+    def wait(self, timeout: float = 5.0) -> None:
+        """Wait until each unit was heard, for so long at most [s]; those that were not are a HardwareError."""
+
+        def silent() -> list[str]:
+            return [name for name, (stamp, _, _) in zip(self._ids, self._newest, strict=True) if stamp == -math.inf]
+
+        if not self._node.wait_for(lambda: not silent(), timeout):
+            there = ", ".join(self._node.topics(RANGE)) or "none"
+            beside = f", only from {', '.join(sorted(self._unknown))}" if self._unknown else ""
+            raise HardwareError(
+                f"No reading was received from {', '.join(silent())} on {self.params.topic}{beside}: set the"
+                f" topic to fit those of sensor_msgs/Range ({there}). {' '.join(self.notes)}".strip()
+            )
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a person should know of what came, a sentence each."""
+        several = [name for name, stamps in zip(self._ids, self._stamps, strict=True) if stamps.together()]
+        found = [f"Several publishers send as {name}: run only one; until then the unit is silent." for name in several]
+        return (*(s.unreadable for s in self._subscriptions if s.unreadable), *found)
+
+    def read(self) -> RangeReadings:
+        """Return the newest reading of each unit, stamped with when it was received by the monotonic clock.
+
+        A unit for which several publish is silent: nobody can say whose readings are its own.
+        """
+        newest = [_NOTHING if s.together() else one for s, one in zip(self._stamps, tuple(self._newest), strict=True)]
+        return RangeReadings(
+            np.array([stamp for stamp, _, _ in newest]),
+            np.array([distance for _, distance, _ in newest]),
+            np.array([status for _, _, status in newest], dtype=np.int64),
+        )
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Nothing is held that the node does not end."""
+
+    def _topics(self) -> list[str]:
+        topics = [self.params.topic.replace(UNIT, topic_name(name)) for name in self._ids]
+        twice = {topic for topic in topics if topics.count(topic) > 1}
+        if twice:
+            raise HardwareError(f"Several units would share {', '.join(sorted(twice))}: give them different ids.")
+        return topics
+
+    def _take_any(self, message: Any, received: float, writer: int) -> None:
+        name = message.header.frame_id
+        if name in self._ids:
+            self._take(self._ids.index(name), message, received, writer)
+        elif len(self._unknown) < _UNKNOWN_MOST:
+            self._unknown.add(name[:_SHOWN])
+
+    def _take(self, unit: int, message: Any, received: float, writer: int) -> None:
+        stamp = self._stamps[unit].instant(message.header, received, writer)
+        if stamp is not None:
+            self._newest[unit] = (stamp, float(message.range), status_of(message))
+
+
+def status_of(message: Any) -> RangeStatus:
+    """Return what a Range tells, by REP 117: beyond its limits there is nothing near, or it is too near.
+
+    A message without a span to measure in, as of a switch, tells nothing.
+    """
+    distance, least, most = message.range, message.min_range, message.max_range
+    if math.isnan(distance) or not 0 <= least < most:
+        return RangeStatus.NONE
+    if distance > most:
+        return RangeStatus.SIGNAL
+    return RangeStatus.MIN_RANGE if distance < least else RangeStatus.OK
+
+
+def topic_name(name: str) -> str:
+    """Return a unit's id as recordings have it in a topic: ASCII letters, digits and underscores, no digit first."""
+    plain = re.sub(r"\W", "_", name, flags=re.ASCII)
+    return f"_{plain}" if plain[0].isdigit() else plain

@@ -1,0 +1,144 @@
+"""A control step as standard messages, for RViz, PlotJuggler and the like."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from pretouch.controller import Controller
+from pretouch.limited import Limit
+from pretouch.loop import Cycle
+from pretouch.types import ControlStep, FloatArray, Mode, RangeReadings, RangeStatus
+from pretouch_ros2.messages import CLOUD, DIAGNOSTICS, MARKERS, STATUS, TRANSFORMS, WRENCH, Messages
+
+Stamp = tuple[int, int]
+"""Seconds and nanoseconds."""
+_POINT = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("distance", "<f4"), ("unit", "<u4")])
+"""An obstacle: position [m], distance from the body's surface [m], and index of the unit in the skin."""
+_FLOAT32, _UINT32 = 7, 6
+"""Codes of sensor_msgs/PointField."""
+_ARROW, _LINES, _SPHERES, _TEXT = 0, 5, 7, 9
+"""Codes of visualization_msgs/Marker."""
+_RED, _BLUE, _WHITE = (0.84, 0.19, 0.15, 1.0), (0.27, 0.46, 0.71, 1.0), (1.0, 1.0, 1.0, 1.0)
+_NEWTONS_A_METRE = 100.0
+_MARKER_S = 0.5
+"""Time after which RViz drops a marker that is not renewed [s]."""
+_OK, _WARN, _ERROR = 0, 1, 2
+_LEVEL = {Mode.TRACK: _OK, Mode.REACT: _OK, Mode.HOLD: _WARN}
+
+
+class StepMessages:
+    """Makes messages of the steps of one controller."""
+
+    def __init__(self, controller: Controller, messages: Messages, base_frame: str) -> None:
+        self._m = messages
+        self._skin, self._sight = controller.skin, controller.profile.sight
+        self.base = base_frame or controller.model.links[0]
+        self._links, self._joints = (self.base, *controller.model.links[1:]), controller.model.joints
+
+    def cloud(self, step: ControlStep, at: Stamp) -> Any:
+        """Obstacles as a point cloud in the base frame."""
+        seen = step.obstacles
+        points = np.zeros(len(seen.point), dtype=_POINT)
+        for i, name in enumerate("xyz"):
+            points[name] = seen.point[:, i]
+        points["distance"], points["unit"] = seen.body_distance, seen.unit
+        fields = [
+            self._m.make("sensor_msgs/msg/PointField", name, of[1], _UINT32 if name == "unit" else _FLOAT32, 1)
+            for name, of in (_POINT.fields or {}).items()
+        ]
+        data, size = np.frombuffer(points.tobytes(), dtype=np.uint8), _POINT.itemsize
+        return self._m.make(CLOUD, self._header(at), 1, len(points), fields, False, size, len(data), data, True)
+
+    def wrench(self, force: FloatArray, at: Stamp) -> Any:
+        """A force (3,) [N] on the robot, base frame; NaN where there is no estimate."""
+        pair = self._m.xyz("Vector3", force), self._m.xyz("Vector3", np.zeros(3))
+        return self._m.make(WRENCH, self._header(at), self._m.make("geometry_msgs/msg/Wrench", *pair))
+
+    def units(self, at: Stamp) -> Any:
+        """Where the units sit on their links."""
+        skin = self._skin
+        parents = [self._links[link] for link in skin.link]
+        return self._transforms(parents, skin.ids, skin.T_link_sensor[:, :3, 3], skin.T_link_sensor[:, :3, :3], at)
+
+    def markers(self, step: ControlStep, at: Stamp) -> Any:
+        """Obstacles, lines to their closest points on the body, the force, and the mode in words."""
+        ee, seen = step.ee_position, step.obstacles
+        lines = np.stack([seen.body_point, seen.point], axis=1).reshape(-1, 3)
+        force = np.nan_to_num(step.force) / _NEWTONS_A_METRE
+        above = ee + np.array([0.0, 0.0, 0.3])
+        made = [
+            self._marker(0, _SPHERES, seen.point, (0.04, 0.04, 0.04), _BLUE, at),
+            self._marker(1, _LINES, lines, (0.005, 0.0, 0.0), _BLUE, at),
+            self._marker(2, _ARROW, np.stack([ee, ee + force]), (0.01, 0.02, 0.0), _RED, at),
+            self._marker(3, _TEXT, np.zeros((0, 3)), (0.0, 0.0, 0.04), _WHITE, at, step.mode.name, above),
+        ]
+        return self._m.make(MARKERS, made)
+
+    def limited(self, step: ControlStep) -> Any:
+        """What keeps the arm from what is asked, for who asks: `ControlStep.limited` by name."""
+        of = step.limited
+        names = {"unit": self._skin.ids, "link": self._links, "joint": self._joints}
+        places = {"unit": of.unit, "link": of.link, "joint": of.joint}
+        values = {"by": of.by.value, "share": f"{of.share:.3f}"} | {
+            key: names[key][at] if 0 <= at < len(names[key]) else "" for key, at in places.items()
+        }
+        return self._status("pretouch: limited", _OK if of.by is Limit.NOTHING else _WARN, step.reason, "", values)
+
+    def diagnostics(self, cycle: Cycle, at: Stamp) -> Any:
+        """Mode and reason, and how old each unit's newest reading is."""
+        step = cycle.step
+        values = {"speed scale": f"{step.speed_scale:.3f}", "armed": str(step.armed), "QP": step.qp.status}
+        first = self._status("pretouch: controller", _LEVEL[step.mode], f"{step.mode.name}: {step.reason}", "", values)
+        return self._m.make(DIAGNOSTICS, self._header(at), [first, *self._unit_statuses(cycle.inputs.readings, step)])
+
+    def _unit_statuses(self, readings: RangeReadings, step: ControlStep) -> list[Any]:
+        if not len(readings.stamp) == len(readings.status) == len(self._skin):
+            return []
+        slow, silent = self._sight.slow_after_s, self._sight.silent_after_s
+        made = []
+        for name, stamp, code in zip(self._skin.ids, readings.stamp.tolist(), readings.status.tolist(), strict=True):
+            age = step.stamp - stamp
+            level = _OK if age < slow else _WARN if age < silent else _ERROR
+            said = "never heard" if math.isinf(age) else f"received {age:.2f} s ago"
+            status = RangeStatus(code).name if code in set(RangeStatus) else str(code)
+            made.append(self._status(f"pretouch: unit {name}", level, said, name, {"status": status}))
+        return made
+
+    def _status(self, name: str, level: int, said: str, hardware: str, values: dict[str, str]) -> Any:
+        pairs = [self._m.make("diagnostic_msgs/msg/KeyValue", *pair) for pair in values.items()]
+        return self._m.make(STATUS, level, name, said, hardware, pairs)
+
+    def _header(self, at: Stamp) -> Any:
+        return self._m.header(at, self.base)
+
+    def _transforms(
+        self, parents: Sequence[str], children: Sequence[str], positions: FloatArray, rotations: FloatArray, at: Stamp
+    ) -> Any:
+        """Where K frames are in their parents: positions (K, 3) [m] and rotations (K, 3, 3)."""
+        quaternions = Rotation.from_matrix(rotations).as_quat().tolist() if len(rotations) else []
+        make, made = self._m.make, []
+        for parent, child, p, q in zip(parents, children, positions, quaternions, strict=True):
+            turned = make("geometry_msgs/msg/Quaternion", *q)
+            placed = make("geometry_msgs/msg/Transform", self._m.xyz("Vector3", p), turned)
+            made.append(make("geometry_msgs/msg/TransformStamped", self._m.header(at, parent), child, placed))
+        return make(TRANSFORMS, made)
+
+    def _marker(
+        self, number: int, kind: int, points: FloatArray, scale: tuple[float, ...], color: tuple[float, ...],
+        at: Stamp, text: str = "", position: FloatArray | None = None,
+    ) -> Any:  # fmt: skip
+        make = self._m.make
+        marker = self._m.types["visualization_msgs/msg/Marker"]
+        upright = make("geometry_msgs/msg/Quaternion", 0.0, 0.0, 0.0, 1.0)
+        place = self._m.xyz("Point", np.zeros(3) if position is None else position)
+        given = {
+            "header": self._header(at), "ns": "pretouch", "id": number, "type": kind,
+            "pose": make("geometry_msgs/msg/Pose", place, upright), "scale": self._m.xyz("Vector3", scale),
+            "color": make("std_msgs/msg/ColorRGBA", *color),
+            "lifetime": make("builtin_interfaces/msg/Duration", 0, int(_MARKER_S * 1e9)),
+            "points": [self._m.xyz("Point", p) for p in points], "text": text,
+        }  # fmt: skip
+        return marker(**(self._m.blank("visualization_msgs/msg/Marker") | given))

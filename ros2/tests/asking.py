@@ -1,0 +1,57 @@
+"""What commanders send in the tests of ROS 2, and one that goes on sending."""
+
+import math
+from collections.abc import Callable
+from threading import Event, Thread
+from time import time
+from typing import Any
+
+import numpy as np
+
+from pretouch_ros2.messages import TRAJECTORY, TWIST, Messages
+from pretouch_ros2.node import Ros2Node
+
+MESSAGES = Messages("jazzy")
+NAMES = tuple(f"panda_joint{i}" for i in range(1, 8))
+SLOW = np.full(7, 0.05)
+
+
+def stamp(seconds: float) -> tuple[int, int]:
+    return math.floor(seconds), round(seconds % 1 * 1e9)
+
+
+def twist(linear: Any, angular: Any = (0, 0, 0), frame: str = "panda_link0", at: float | None = None) -> Any:
+    pair = MESSAGES.xyz("Vector3", linear), MESSAGES.xyz("Vector3", angular)
+    header = MESSAGES.header(stamp(time() if at is None else at), frame)
+    return MESSAGES.make(TWIST, header, MESSAGES.make("geometry_msgs/msg/Twist", *pair))
+
+
+def trajectory(names: tuple[str, ...], *points: tuple[float, Any], at: float = 0.0) -> Any:
+    """Points of a time [s] and velocities."""
+    none, make = np.zeros(0), MESSAGES.make
+    made = [
+        make("trajectory_msgs/msg/JointTrajectoryPoint", none, np.asarray(qd, float), none, none,
+             make("builtin_interfaces/msg/Duration", *stamp(after)))
+        for after, qd in points
+    ]  # fmt: skip
+    return make(TRAJECTORY, MESSAGES.header(stamp(at), ""), list(names), made)
+
+
+class Publishing:
+    """A commander's program: sends a message again and again, stamped as it goes, until it is left."""
+
+    def __init__(self, node: Ros2Node, topic: str, kind: str, made: Callable[[], Any]) -> None:
+        self._publisher, self._made, self._over = node.publisher(topic, kind), made, Event()
+        self._thread = Thread(target=self._send)
+
+    def _send(self) -> None:
+        while not self._over.wait(0.02):
+            self._publisher.publish(self._made())
+
+    def __enter__(self) -> "Publishing":
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._over.set()
+        self._thread.join()

@@ -1,0 +1,50 @@
+"""What the tests of ROS 2 share: a DDS domain that no other test process of this machine uses."""
+
+import socket
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import pytest
+from tests.needs import modules_with
+
+from pretouch.extras import ROS2
+
+if TYPE_CHECKING:
+    from pretouch_ros2.node import Ros2Node
+
+pytest_pycollect_makemodule = modules_with(ROS2)
+
+# beyond 101 its ports are those that the system gives to anybody
+_DOMAINS = range(20, 101)
+
+
+@pytest.fixture(scope="session")
+def domain() -> Iterator[int]:
+    """A domain; a name in the kernel, gone with the process, says that it is taken."""
+    for number in _DOMAINS:
+        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as taken:
+            try:
+                taken.bind(f"\0pretouch-tests-dds-{number}")
+            except OSError:
+                continue
+            yield number
+            return
+    pytest.fail("All DDS domains are taken by other tests.")
+
+
+@pytest.fixture
+def node(domain: int) -> "Iterator[Ros2Node]":
+    from pretouch_ros2.node import Ros2Node
+    from pretouch_ros2.params import NodeParams
+
+    with Ros2Node(NodeParams(domain=domain)) as made:
+        yield made
+
+
+@pytest.fixture
+def other(domain: int) -> "Iterator[Ros2Node]":
+    from pretouch_ros2.node import Ros2Node
+    from pretouch_ros2.params import NodeParams
+
+    with Ros2Node(NodeParams(domain=domain)) as made:
+        yield made

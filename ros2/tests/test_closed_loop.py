@@ -1,0 +1,185 @@
+"""The controller over ROS 2, with a simulated arm in another process that is pushed."""
+
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
+from threading import Thread
+from time import sleep
+
+import numpy as np
+import pytest
+from ros2.tests.processes import ArmPeer, arm_peer
+
+from pretouch import loop
+from pretouch.control.path import line
+from pretouch.controller import Controller
+from pretouch.errors import RobotError
+from pretouch.perception.scene_filter import no_fixtures
+from pretouch.profiles import PROFILES
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import Skin
+from pretouch.types import ControlStep, Mode
+from pretouch_ros2.node import Ros2Node
+from pretouch_ros2.params import ArmParams, Sign, SkinParams
+from pretouch_ros2.robot import Ros2Robot
+from pretouch_ros2.skin import Ros2Skin
+
+PUSH_N = 25.0
+
+
+class Run:
+    """Turns a controller over an arm in another process, and keeps its steps."""
+
+    def __init__(self, model: RobotModel, skin: Skin, robot: Ros2Robot, units: Ros2Skin) -> None:
+        x = model.kinematics(model.description.q_ready).position[model.ee]
+        path = line(tuple(x), (x[0], x[1] + 0.4, x[2]))
+        self.controller = Controller(model, skin, no_fixtures(), path, PROFILES["paper"])
+        self.robot, self.units = robot, units
+        self.steps: list[ControlStep] = []
+
+    def record(self, cycle: loop.Cycle) -> None:
+        self.steps.append(cycle.step)
+
+    def until(self, done: Callable[[ControlStep], bool], longest: float, resume: bool = False) -> list[ControlStep]:
+        """Turn until `done(step)` or for so long [s]; return the steps."""
+        self.steps, clock = [], loop.MonotonicClock(0.01)
+        loop.run(
+            self.controller, self.robot, self.units, clock, self,
+            lambda step: done(step) or len(self.steps) * 0.01 > longest, loop.Options(lambda: resume),
+        )  # fmt: skip
+        return self.steps
+
+
+@pytest.fixture
+def arm(domain: int, tmp_path: Path) -> Iterator[ArmPeer]:
+    with arm_peer(domain, tmp_path / "log.npy", "--extra") as peer:
+        yield peer
+
+
+def pushed(model: RobotModel, skin: Skin, arm: ArmPeer, node: Ros2Node, sign: Sign) -> list[ControlStep]:
+    """Follow the path, be pushed towards +z while doing so, and react for half a second."""
+    with Ros2Robot(ArmParams(sign, "base"), model, node) as robot, Ros2Skin(SkinParams(), skin, node) as units:
+        robot.wait(10)
+        units.wait(10)
+        run = Run(model, skin, robot, units)
+        tracked, reacted = [0], [0]
+
+        def done(step: ControlStep) -> bool:
+            tracked[0] += step.mode is Mode.TRACK
+            if tracked[0] == 60:
+                arm.tell(f"push 0 0 {PUSH_N}")
+                tracked[0] += 1
+            reacted[0] += step.mode is Mode.REACT
+            return reacted[0] >= 50
+
+        return run.until(done, 20, resume=True)  # a busy machine may be late
+
+
+def test_a_pushed_arm_yields_to_the_push(
+    panda_model: RobotModel, paper_skin: Skin, arm: ArmPeer, node: Ros2Node
+) -> None:
+    steps = pushed(panda_model, paper_skin, arm, node, "by-robot")
+    contact = next(step for step in steps if step.contact is not None)
+    reaction = [step for step in steps if step.mode is Mode.REACT]
+    assert contact.contact is not None
+    assert contact.contact.force[2] > 10
+    assert abs(reaction[-1].force[2]) < 2 * PUSH_N
+    assert reaction[0].reaction_velocity[2] > 0.2
+    # the arm itself moved up, and along the path before
+    assert reaction[-1].ee_position[2] - contact.ee_position[2] > 0.05
+    tracking = [step for step in steps if step.mode is Mode.TRACK]
+    assert tracking[-1].ee_position[1] - tracking[0].ee_position[1] > 0.05
+    # what it was thought to be sent to is what it followed
+    lag = np.array([step.q_commanded - step.q for step in steps])
+    assert np.percentile(np.abs(lag), 95) < 0.05
+    # left behind, the arm stands
+    sleep(0.6)
+    log = arm.stop()
+    assert np.abs(np.diff(log[-100:, 1:], axis=0)).max() < 1e-9
+
+
+@pytest.mark.slow
+def test_with_the_sign_set_wrong_the_numbers_say_so(
+    panda_model: RobotModel, paper_skin: Skin, arm: ArmPeer, node: Ros2Node
+) -> None:
+    steps = pushed(panda_model, paper_skin, arm, node, "on-robot")
+    contact = next(step for step in steps if step.contact is not None)
+    assert contact.contact is not None
+    assert contact.contact.force[2] < -10
+    reaction = next(step for step in steps if step.mode is Mode.REACT)
+    assert reaction.reaction_velocity[2] < -0.2
+
+
+@pytest.mark.parametrize("fault", ["mute", pytest.param("freeze", marks=pytest.mark.slow)])
+def test_a_state_that_does_not_come_or_only_comes_again_latches_a_hold(
+    panda_model: RobotModel, paper_skin: Skin, arm: ArmPeer, node: Ros2Node, fault: str
+) -> None:
+    with Ros2Robot(ArmParams("by-robot", "base"), panda_model, node) as robot, Ros2Skin(
+        SkinParams(), paper_skin, node
+    ) as units:  # fmt: skip
+        robot.wait(10)
+        units.wait(10)
+        run, turns = Run(panda_model, paper_skin, robot, units), [0]
+
+        def done(step: ControlStep) -> bool:
+            turns[0] += 1
+            if turns[0] == 20:
+                arm.tell(fault)
+            return "The robot's state is" in step.reason
+
+        steps = run.until(done, 3)
+    assert steps[-1].mode is Mode.HOLD
+    assert "check the connection to the arm, then resume" in steps[-1].reason
+
+
+@pytest.mark.slow
+def test_a_controller_that_gets_no_commands_any_more_ends_the_run_and_the_arm_is_at_rest(
+    panda_model: RobotModel, paper_skin: Skin, arm: ArmPeer, node: Ros2Node
+) -> None:
+    with Ros2Robot(ArmParams("by-robot", "base"), panda_model, node) as robot, Ros2Skin(
+        SkinParams(), paper_skin, node
+    ) as units:  # fmt: skip
+        robot.wait(10)
+        units.wait(10)
+        robot.begin()
+        run, turns = Run(panda_model, paper_skin, robot, units), [0]
+
+        def done(step: ControlStep) -> bool:
+            turns[0] += step.mode is Mode.TRACK and float(np.abs(step.command).max()) > 0.1
+            if turns[0] == 20:
+                arm.tell("deaf")
+            return False
+
+        with pytest.raises(RobotError, match="The arm does not follow"):
+            run.until(done, 20, resume=True)
+    log = arm.stop()
+    assert np.abs(np.diff(log[-50:, 1:], axis=0)).max() < 1e-9
+
+
+@pytest.mark.slow
+def test_an_arm_whose_machine_pauses_in_motion_ends_at_rest(
+    panda_model: RobotModel, paper_skin: Skin, arm: ArmPeer, node: Ros2Node
+) -> None:
+    with Ros2Robot(ArmParams("by-robot", "base"), panda_model, node) as robot, Ros2Skin(
+        SkinParams(), paper_skin, node
+    ) as units:  # fmt: skip
+        robot.wait(10)
+        units.wait(10)
+        robot.begin()
+        run, turns = Run(panda_model, paper_skin, robot, units), [0]
+        pause = Thread(target=arm.pause, args=(0.5,))
+
+        def done(step: ControlStep) -> bool:
+            turns[0] += step.mode is Mode.TRACK and float(np.abs(step.command).max()) > 0.1
+            if turns[0] == 20:
+                turns[0] += 1
+                pause.start()
+            return turns[0] > 20 and "The robot's state is" in step.reason  # a busy machine may be late before
+
+        with suppress(RobotError):  # that it does not follow may be seen first
+            steps = run.until(done, 20, resume=True)
+            assert steps[-1].mode is Mode.HOLD
+        pause.join()
+    sleep(0.8)
+    log = arm.stop()
+    assert np.abs(np.diff(log[-20:, 1:], axis=0)).max() < 1e-9

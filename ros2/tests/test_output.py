@@ -1,0 +1,210 @@
+"""What is published of the controller's steps, and that the control loop does not wait for it."""
+
+from collections import defaultdict
+from collections.abc import Iterator
+from time import perf_counter, sleep
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from tests.following_arm import DT, Arm
+
+from pretouch.loop import Cycle
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import Skin
+from pretouch.types import Inputs
+from pretouch_ros2.messages import CLOUD, DIAGNOSTICS, MARKERS, STATUS, TEXT, TRANSFORMS, WRENCH
+from pretouch_ros2.node import Ros2Node
+from pretouch_ros2.output import Ros2Output
+from pretouch_ros2.params import OutputParams
+
+TOPICS = {
+    "/pretouch/obstacles": CLOUD, "/pretouch/markers": MARKERS, "/pretouch/force": WRENCH,
+    "/pretouch/contact": WRENCH, "/pretouch/mode": TEXT, "/pretouch/limited": STATUS, "/diagnostics": DIAGNOSTICS,
+    "/tf_static": TRANSFORMS,
+}  # fmt: skip
+LATCHED = ("/pretouch/mode", "/tf_static")
+
+
+class Listener:
+    """Keeps what is published on each of the topics."""
+
+    def __init__(self, node: Ros2Node) -> None:
+        self.received: dict[str, list[Any]] = defaultdict(list)
+        self._node = node
+        self.subscriptions = {
+            topic: node.subscribe(topic, kind, lambda message, *_, topic=topic: self.received[topic].append(message),
+                                  reliable=True, latched=topic in LATCHED)
+            for topic, kind in TOPICS.items()
+        }  # fmt: skip
+
+    def last(self, topic: str) -> Any:
+        assert self._node.wait_for(lambda: bool(self.received[topic]), 5), topic
+        return self.received[topic][-1]
+
+    def found(self) -> bool:
+        return self._node.wait_for(lambda: all(s.publishers for s in self.subscriptions.values()), 10)
+
+
+def matched(node: Ros2Node) -> bool:
+    """Wait until all that a node publishes has its listener: what is sent before is lost."""
+    return node.wait_for(lambda: all(publisher.subscribers for publisher in node._publishers), 10)
+
+
+class TrajectoryRun:
+    """An arm that follows its commands, whose turns are recorded."""
+
+    def __init__(self, model: RobotModel, skin: Skin, node: Ros2Node, **params: Any) -> None:
+        self.arm = Arm(model, skin)
+        self.output = Ros2Output(OutputParams(**params), self.arm.controller, node)
+
+    def turn(self, force: tuple[float, float, float] = (0.0, 0.0, 0.0), seen: dict[int, float] | None = None) -> Cycle:
+        inputs = Inputs(self.arm.time, self.arm.robot(force), self.arm.readings(seen))
+        before = self.arm.state
+        step = self.arm.step(force, seen)
+        cycle = Cycle(inputs, before, step, self.arm.state)
+        self.output.record(cycle)
+        return cycle
+
+
+@pytest.fixture
+def listener(other: Ros2Node) -> Listener:
+    return Listener(other)
+
+
+@pytest.fixture
+def trajectory(
+    panda_model: RobotModel, paper_skin: Skin, node: Ros2Node, listener: Listener
+) -> Iterator[TrajectoryRun]:
+    trajectory = TrajectoryRun(panda_model, paper_skin, node, diagnostics_hz=10.0)
+    assert listener.found()
+    assert matched(node)
+    yield trajectory
+    trajectory.output.close()
+
+
+def test_a_step_is_published_by_standard_messages(
+    trajectory: TrajectoryRun, listener: Listener, panda_model: RobotModel, paper_skin: Skin
+) -> None:
+    for _ in range(3):
+        cycle = trajectory.turn((1.0, 2.0, 3.0), {0: 0.4, 2: 0.3})
+        sleep(0.05)
+    step = cycle.step
+    assert len(step.obstacles.unit) == 2
+    cloud = listener.last("/pretouch/obstacles")
+    assert [(f.name, f.offset, f.datatype) for f in cloud.fields] == [
+        ("x", 0, 7), ("y", 4, 7), ("z", 8, 7), ("distance", 12, 7), ("unit", 16, 6),
+    ]  # fmt: skip
+    rows = np.frombuffer(cloud.data.tobytes(), "<f4").reshape(cloud.width, 5)
+    assert (cloud.width, cloud.point_step, cloud.row_step) == (2, 20, 40)
+    assert rows[:, :3] == pytest.approx(step.obstacles.point, abs=1e-6)
+    assert rows[:, 3] == pytest.approx(step.obstacles.body_distance, abs=1e-6)
+    assert rows[:, 4].view("<u4").tolist() == step.obstacles.unit.tolist()
+    force = listener.last("/pretouch/force")
+    assert (force.header.frame_id, force.wrench.force.z) == (panda_model.links[0], 3.0)
+    assert listener.last("/pretouch/mode").data.startswith("HOLD: The force window is filling")
+    limited = listener.last("/pretouch/limited")
+    assert {pair.key: pair.value for pair in limited.values} == {
+        "by": "hold", "share": "0.000", "unit": "", "link": "", "joint": "",
+    }  # fmt: skip
+    assert (limited.level, limited.message) == (1, step.reason)
+    spheres, lines, _, words = listener.last("/pretouch/markers").markers
+    assert [(p.x, p.y, p.z) for p in spheres.points] == [pytest.approx(tuple(p)) for p in step.obstacles.point]
+    assert len(lines.points) == 4
+    assert words.text == "HOLD"
+
+
+def test_units_lie_where_the_skin_has_them(trajectory: TrajectoryRun, listener: Listener, paper_skin: Skin) -> None:
+    units = listener.last("/tf_static").transforms
+    assert [t.child_frame_id for t in units] == list(paper_skin.ids)
+    assert [t.header.frame_id for t in units] == [unit.link for unit in paper_skin.units]
+    for unit, T_link_sensor in zip(units, paper_skin.T_link_sensor, strict=True):
+        p, r = unit.transform.translation, unit.transform.rotation
+        assert [p.x, p.y, p.z] == pytest.approx(T_link_sensor[:3, 3], abs=1e-9)
+        assert Rotation.from_quat([r.x, r.y, r.z, r.w]).as_matrix() == pytest.approx(T_link_sensor[:3, :3], abs=1e-9)
+
+
+def test_each_contact_and_each_change_of_the_mode_is_published(trajectory: TrajectoryRun, listener: Listener) -> None:
+    for _ in range(105):
+        trajectory.turn()
+    cycle = trajectory.turn((0.0, 40.0, 0.0))
+    contacts = int(cycle.step.contact is not None)
+    for _ in range(60):
+        contacts += trajectory.turn((0.0, 40.0, 0.0)).step.contact is not None
+    assert contacts == 1
+    assert listener.last("/pretouch/contact").wrench.force.y > 10
+    modes = ["HOLD", "TRACK", "REACT"]
+    assert listener._node.wait_for(
+        lambda: [m for m in modes if any(t.data.startswith(m) for t in listener.received["/pretouch/mode"])] == modes, 5
+    )
+    sleep(0.1)
+    assert len(listener.received["/pretouch/contact"]) == 1
+
+
+def test_a_silent_unit_is_an_error_in_the_diagnostics(
+    trajectory: TrajectoryRun, listener: Listener, paper_skin: Skin
+) -> None:
+    readings = trajectory.arm.readings(silent={1: 0.5, 2: 0.2})
+    inputs, before = Inputs(trajectory.arm.time, trajectory.arm.robot(), readings), trajectory.arm.state
+    trajectory.output.record(Cycle(inputs, before, trajectory.arm.step(), trajectory.arm.state))
+    first, *units = listener.last("/diagnostics").status
+    assert first.name == "pretouch: controller"
+    assert (first.level, first.message.split(":")[0]) == (1, "HOLD")
+    assert [unit.level for unit in units][:4] == [0, 2, 1, 0]
+    assert [unit.hardware_id for unit in units] == list(paper_skin.ids)
+    assert units[1].message == "received 0.50 s ago"
+
+
+def test_steps_are_published_at_the_rate_that_was_asked_for(
+    panda_model: RobotModel, paper_skin: Skin, node: Ros2Node, listener: Listener
+) -> None:
+    trajectory = TrajectoryRun(panda_model, paper_skin, node, rate_hz=20.0)
+    assert listener.found()
+    for _ in range(50):
+        trajectory.turn()
+        sleep(DT)
+    trajectory.output.close()
+    assert 5 <= len(listener.received["/pretouch/force"]) <= 25
+    assert trajectory.output.dropped == 0
+
+
+@pytest.mark.slow
+@pytest.mark.alone
+def test_recording_a_step_takes_the_loop_little_time(trajectory: TrajectoryRun) -> None:
+    took = []
+    for _ in range(100):
+        cycle = trajectory.turn()
+        begin = perf_counter()
+        trajectory.output.record(cycle)
+        took.append(perf_counter() - begin)
+        sleep(DT)
+    assert np.median(took) < 0.3e-3
+
+
+def test_the_last_steps_are_published_before_the_end(
+    panda_model: RobotModel, paper_skin: Skin, node: Ros2Node, listener: Listener
+) -> None:
+    trajectory = TrajectoryRun(panda_model, paper_skin, node)
+    assert listener.found()
+    assert matched(node)
+    trajectory.turn()
+    trajectory.output.close()
+    assert listener.last("/pretouch/mode").data.startswith("HOLD")
+
+
+def test_a_failure_of_the_publishing_thread_is_told_and_keeps_nothing_waiting(
+    trajectory: TrajectoryRun, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise ValueError("no cloud")
+
+    monkeypatch.setattr(trajectory.output._step_messages, "cloud", fail)
+    assert trajectory.output.notes == ()
+    trajectory.turn()
+    trajectory.output._thread.join(5)
+    assert trajectory.output.notes == ("Publishing control steps failed: ValueError: no cloud",)
+    for _ in range(40):
+        trajectory.turn()
+    assert trajectory.output._queue.qsize() == 0
+    assert trajectory.output.dropped == 0

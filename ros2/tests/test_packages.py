@@ -1,0 +1,169 @@
+"""The packages for a ROS 2 workspace: messages are ours, launch files start what is there, parameters are known."""
+
+import re
+import sys
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+from rich.console import Console
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from ruamel.yaml import YAML
+
+from pretouch import __version__, cli
+from pretouch.cli.run.options import Run, check_options
+from pretouch.profiles import PROFILES
+from pretouch.recording.messages import OWN, fields_of, own_definition
+from pretouch.robot.model import RobotModel
+from pretouch.robot.named import robot_named
+from pretouch_ros2.params import CommanderParams
+
+ROOT = Path(__file__).parents[1]
+BRINGUP = ROOT / "pretouch_bringup"
+OPTIONS = sorted((BRINGUP / "config").glob("fr3_*.yaml"))
+LAUNCHES = sorted((BRINGUP / "launch").glob("*.launch.py"))
+
+
+def yaml(path: Path) -> Any:
+    return YAML(typ="safe", pure=True).load(path.read_text())
+
+
+def test_the_messages_are_those_of_recordings() -> None:
+    there = {path.stem: path.read_text() for path in (ROOT / "pretouch_msgs" / "msg").glob("*")}
+    assert there == {name: own_definition(name) for name in OWN}, "copy src/pretouch/recording/msg/*.msg"
+
+
+@pytest.mark.parametrize("name", OWN)
+def test_another_parser_reads_each_message_as_ours_does_and_rosidl_takes_its_names(name: str) -> None:
+    store, kind = get_typestore(Stores.ROS2_JAZZY), f"pretouch_msgs/msg/{name}"
+    store.register(
+        {k: v for one in OWN for k, v in get_types_from_msg(own_definition(one), f"pretouch_msgs/msg/{one}").items()}
+    )
+    fields = [field for field, _ in store.fielddefs[kind][1]]
+    assert fields == [field.name for field in fields_of(kind)]
+    assert re.fullmatch(r"[A-Z][A-Za-z0-9]*", name)
+    assert all(re.fullmatch(r"[a-z](?:[a-z0-9]|_(?!_))*(?<!_)", field) for field in fields)
+
+
+@pytest.mark.parametrize("package", ["pretouch_msgs", "pretouch_bringup"])
+def test_a_package_names_itself_alike_and_declares_what_it_uses(package: str) -> None:
+    root = ElementTree.parse(ROOT / package / "package.xml").getroot()  # noqa: S314
+    assert (root.attrib["format"], root.findtext("name"), root.findtext("version")) == ("3", package, __version__)
+    cmake = (ROOT / package / "CMakeLists.txt").read_text()
+    assert f"project({package})" in cmake
+    declared = {element.text for element in root if element.tag.endswith("_depend")}
+    assert set(re.findall(r"find_package\((\w+) REQUIRED\)", cmake)) <= declared
+    assert cmake.rstrip().endswith("ament_package()")
+    used = re.findall(r'package="(\w+)"', "".join(path.read_text() for path in (ROOT / package).glob("launch/*")))
+    assert set(used) <= declared
+
+
+class Launch:
+    """Stands in for ROS 2's launch: keeps what is made, and knows the arguments."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, **arguments: str) -> None:
+        self.made: list[tuple[str, dict[str, Any]]] = []
+        self.arguments = arguments
+        names = {
+            "launch": ["LaunchDescription"], "launch_ros": [],
+            "launch.actions": ["DeclareLaunchArgument", "ExecuteProcess", "OpaqueFunction"],
+            "launch_ros.actions": ["Node"],
+        }  # fmt: skip
+        for module, classes in names.items():
+            self._module(monkeypatch, module, **{name: self._kept(name) for name in classes})
+        share = {"get_package_share_directory": lambda name: str(ROOT / name)}
+        self._module(monkeypatch, "ament_index_python")
+        self._module(monkeypatch, "ament_index_python.packages", **share)
+        self._module(monkeypatch, "launch.substitutions", LaunchConfiguration=self._configuration)
+        self._module(monkeypatch, "yaml", safe_load=lambda file: yaml(Path(file.name)))
+
+    def _module(self, monkeypatch: pytest.MonkeyPatch, name: str, **members: Any) -> None:
+        module = ModuleType(name)
+        module.__dict__.update(members)
+        monkeypatch.setitem(sys.modules, name, module)
+
+    def _kept(self, name: str) -> Any:
+        def make(*parts: Any, **named: Any) -> Any:
+            self.made.append((name, named | {"parts": parts}))
+            return self.made[-1]
+
+        return make
+
+    def _configuration(self, name: str) -> Any:
+        return SimpleNamespace(name=name, perform=lambda _: self.arguments.get(name) or self.default(name))
+
+    def default(self, name: str) -> str:
+        return next(named["default_value"] for kind, named in self.made if kind[0] == "D" and named["parts"] == (name,))
+
+    def run(self, path: Path) -> dict[str, Any]:
+        space: dict[str, Any] = {}
+        exec(compile(path.read_text(), str(path), "exec"), space)  # noqa: S102
+        assert space["generate_launch_description"]()[0] == "LaunchDescription"
+        return space
+
+    def of(self, kind: str) -> list[dict[str, Any]]:
+        return [named for made, named in self.made if made == kind]
+
+
+@pytest.mark.parametrize("path", LAUNCHES, ids=lambda path: path.stem)
+def test_a_launch_file_describes_a_launch_whose_files_are_there(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    launch = Launch(monkeypatch)
+    launch.run(path)
+    assert Path(launch.default("config")).is_file()
+
+
+def commanded(monkeypatch: pytest.MonkeyPatch, **arguments: str) -> list[str]:
+    """Return what the launch file of the program starts."""
+    launch = Launch(monkeypatch, **arguments)
+    space = launch.run(BRINGUP / "launch" / "pretouch.launch.py")
+    space["start"](None)
+    (process,) = launch.of("ExecuteProcess")
+    return list(process["cmd"])
+
+
+@pytest.mark.parametrize("path", OPTIONS, ids=lambda path: path.stem)
+def test_the_program_is_started_with_options_that_it_takes(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    program, *words = commanded(monkeypatch, config=str(path))
+    run: Any = cli._read(words, Console(stderr=True))
+    assert program == "pretouch"
+    assert isinstance(run, Run)
+    check_options(run)
+    options = run.connection
+    assert (run.robot.arm, options.arm.sign, run.yes) == ("fr3", "by-robot", False)
+    assert (options.desired, options.arm.torques.rpartition("/")[2]) == (
+        path.stem.removeprefix("fr3_").replace("joystick", "twist").replace("moveit_servo", "trajectory"),
+        "external_joint_torques",
+    )
+
+
+def test_options_of_each_kind_become_words(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    mine = tmp_path / "mine.yaml"
+    mine.write_text("no_skin: true\nconfirm_push: false\njoint_names: [a, b]\nseconds: 5\n")
+    assert commanded(monkeypatch, config=str(mine), yes="true", program="/v/pretouch") == [
+        "/v/pretouch", "run", "ros2", "--no-skin", "--joint-names", "a", "b", "--seconds", "5", "--yes",
+    ]  # fmt: skip
+
+
+def test_a_joystick_asks_on_the_topic_in_a_known_frame_often_enough(monkeypatch: pytest.MonkeyPatch) -> None:
+    launch = Launch(monkeypatch)
+    launch.run(BRINGUP / "launch" / "joystick.launch.py")
+    joy, teleop = launch.of("Node")
+    assert teleop["remappings"] == [("cmd_vel", CommanderParams("twist").heard_on)]
+    config = yaml(BRINGUP / "config" / "joystick.yaml")
+    settings = config[teleop["name"]]["ros__parameters"]
+    assert settings["publish_stamped_twist"] is True
+    assert settings["require_enable_button"] is True
+    assert settings["frame"] in RobotModel(robot_named("fr3")).links
+    assert max(settings["scale_linear"].values()) <= PROFILES["pretouch"].task.speed_m_s
+    period = 1 / config[joy["name"]]["ros__parameters"]["autorepeat_rate"]
+    assert 3 * period < PROFILES["pretouch"].failure.desired_timeout_s
+
+
+def test_moveit_servo_sends_velocities_to_the_topic_often_enough() -> None:
+    servo = yaml(BRINGUP / "config" / "moveit_servo.yaml")["/**"]["ros__parameters"]["moveit_servo"]
+    assert servo["command_out_type"] == "trajectory_msgs/JointTrajectory"
+    assert servo["command_out_topic"] == CommanderParams("trajectory").heard_on
+    assert servo["publish_joint_velocities"] is True
+    assert 3 * servo["publish_period"] < PROFILES["pretouch"].failure.desired_timeout_s

@@ -1,0 +1,168 @@
+"""`pretouch run ros2`, as a program of its own, with a simulated arm in another process."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from time import monotonic, sleep
+
+import numpy as np
+import pytest
+from ros2.tests.asking import Publishing, twist
+from ros2.tests.processes import ArmPeer, arm_peer
+
+from pretouch.recording.reader import open_recording
+from pretouch.recording.verify import verify
+from pretouch.robot.description import panda
+from pretouch.session.confirmations import ConfirmedRobots
+from pretouch.session.push import DIRECTIONS
+from pretouch_ros2.arm import identity
+from pretouch_ros2.messages import TWIST
+from pretouch_ros2.node import Ros2Node
+from pretouch_ros2.params import ArmParams, NodeParams
+
+# two processes in real time: alone, lest another test takes the arm's time and it is rightly found not to follow
+pytestmark = [pytest.mark.slow, pytest.mark.alone]
+LIMIT_S = 90.0
+LATE_S = 0.2
+"""How late a busy machine may hand a message on [s]."""
+# a machine that CI shares stops either process for 50 ms and more, which is rightly held against a real arm
+PROFILE = "blind:failure.state_timeout_s=1"
+
+
+@contextmanager
+def running(domain: int, folder: Path, *words: str, profile: str = PROFILE) -> Iterator[subprocess.Popen[str]]:
+    command = [
+        sys.executable, "-u", "-m", "pretouch.cli", "run", "ros2", "--sign", "by-robot", "--frame",
+        "base", "--domain", str(domain), "--no-skin", "--profile", profile, "--path", "hold", "--yes",
+        "--holds", str(folder / "holds"), *words,
+    ]  # fmt: skip
+    environment = os.environ | {"XDG_STATE_HOME": str(folder / "state")}
+    with subprocess.Popen(
+        command, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    ) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
+
+
+@pytest.fixture
+def arm(domain: int, tmp_path: Path) -> Iterator[ArmPeer]:
+    with arm_peer(domain, tmp_path / "log.npy") as peer:
+        yield peer
+
+
+def confirmed(domain: int, folder: Path) -> None:
+    known = identity(NodeParams(domain=domain), ArmParams("by-robot", "base"))
+    ConfirmedRobots(folder / "state" / "pretouch").keep(known)
+
+
+def lines_until(process: subprocess.Popen[str], sign: str) -> list[str]:
+    assert process.stdout is not None
+    said = []
+    for line in process.stdout:
+        said.append(line)
+        if sign in line:
+            return said
+    raise AssertionError("".join(said))
+
+
+def speeds(log: np.ndarray) -> np.ndarray:
+    return np.abs(np.diff(log[:, 1:], axis=0) / np.diff(log[:, 0])[:, None]).max(axis=1)
+
+
+def test_a_run_checks_yields_to_a_push_and_ends_at_rest(domain: int, tmp_path: Path, arm: ArmPeer) -> None:
+    confirmed(domain, tmp_path)
+    with running(domain, tmp_path, "--seconds", "5") as run:
+        said = lines_until(run, "TRACK")
+        arm.tell("push 0 0 20")
+        said += lines_until(run, "REACT")
+        arm.tell("push 0 0 0")
+        out, _ = run.communicate(timeout=LIMIT_S)
+    out = "".join(said) + out
+    assert run.returncode == 0, out
+    for part in ("All checks passed", "was confirmed before", "The arm is at rest.", "1 contact"):
+        assert part in out
+    log = arm.stop()
+    assert speeds(log).max() > 0.1
+    assert speeds(log)[-50:].max() < 1e-9
+
+
+def test_a_run_that_is_killed_in_motion_leaves_the_arm_at_rest(domain: int, tmp_path: Path, arm: ArmPeer) -> None:
+    confirmed(domain, tmp_path)
+    with running(domain, tmp_path, "--seconds", "30") as run:
+        lines_until(run, "TRACK")
+        arm.tell("push 0 0 20")
+        lines_until(run, "REACT")
+        sleep(0.2)
+        run.kill()
+        killed = monotonic()
+        run.wait(10)
+        sleep(1.0)
+    log = arm.stop()
+    fast, time = speeds(log), log[1:, 0]
+    assert fast[time < killed][-50:].max() > 0.05  # samples, not a time: a busy machine may log none for a while
+    assert time[fast > 1e-6][-1] - killed < 0.4 + LATE_S
+    limits = panda().qdd_max
+    qd = np.diff(log[:, 1:], axis=0) / np.diff(log[:, 0])[:, None]
+    braking = slice(np.searchsorted(time, killed + 0.1), None)
+    acceleration = np.abs(np.diff(qd[braking], axis=0)) / 1e-3 / limits
+    assert np.percentile(acceleration, 99) < 1.1
+
+
+def test_guided_pushes_confirm_the_sign(domain: int, tmp_path: Path, arm: ArmPeer) -> None:
+    with running(domain, tmp_path, "--seconds", "1") as run:
+        said = []
+        for direction in DIRECTIONS:
+            said += lines_until(run, "Push the hand")
+            arm.tell("push " + " ".join(str(14.0 * part) for part in direction.axis))
+            said += lines_until(run, "Let go.")
+            arm.tell("push 0 0 0")
+        out, _ = run.communicate(timeout=LIMIT_S)
+    out = "".join(said) + out
+    assert run.returncode == 0, out
+    assert "The force sign is confirmed" in out
+    assert speeds(arm.stop())[-50:].max() < 1e-9
+
+
+def test_a_commander_drives_by_the_profile_pretouch_after_pushes_that_torques_confirm(
+    domain: int, tmp_path: Path, arm: ArmPeer
+) -> None:
+    place = tmp_path / "a.mcap"
+    words = "--torques", "/external_joint_torques", "--desired", "twist", "--record", str(place)
+    chosen = "pretouch:perception=none:failure.state_timeout_s=1"
+    with running(domain, tmp_path, *words, "--seconds", "12", profile=chosen) as run:
+        said = []
+        for direction in DIRECTIONS:
+            said += lines_until(run, "Push the hand")
+            arm.tell("push " + " ".join(str(14.0 * part) for part in direction.axis))
+            said += lines_until(run, "Let go.")
+            arm.tell("push 0 0 0")
+        said += lines_until(run, "was received on /pretouch/twist yet")
+        with (
+            Ros2Node(NodeParams(domain=domain)) as theirs,
+            Publishing(theirs, "/pretouch/twist", TWIST, lambda: twist((0.0, 0.05, 0.0))),
+        ):
+            said += lines_until(run, "TRACK")
+            sleep(1.5)
+            arm.tell("push 0 0 25")
+            said += lines_until(run, "REACT")
+            arm.tell("push 0 0 0")
+            said += lines_until(run, "TRACK")
+            sleep(0.5)
+        said += lines_until(run, "The desired motion ended")
+        out, _ = run.communicate(timeout=LIMIT_S)
+    out = "".join(said) + out
+    assert run.returncode == 0, out
+    for part in ("The force sign is confirmed", "The arm does what is asked on /pretouch/twist", "The arm is at rest."):
+        assert part in out
+    assert "keeps its end-effector" not in out
+    log = arm.stop()
+    assert speeds(log)[-50:].max() < 1e-9
+    recorded = open_recording(place)
+    y = [kept.step.ee_position[1] for kept in recorded if kept.step is not None]
+    assert max(y) - y[0] > 0.03
+    assert verify(recorded).differing == 0

@@ -1,0 +1,144 @@
+"""Short trajectories that end at rest: their limits, and what is reckoned from them."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pretouch.control.joint_box import JointLimits, box_and_brake, joint_box
+from pretouch.robot.description import panda
+from pretouch_ros2.trajectory import Reference, StoppingTrajectory, stopping_trajectory
+
+PANDA = panda()
+A, V = PANDA.qdd_max, PANDA.qd_max
+PERIOD, HOLD = 0.01, 0.05
+STILL = np.zeros(7)
+velocities = st.lists(st.floats(-1, 1), min_size=7, max_size=7).map(lambda v: np.array(v) * V)
+
+
+def sampled(trajectory: StoppingTrajectory) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    time = np.linspace(0, trajectory.time[-1] + 0.01, 301)
+    q, qd = zip(*(trajectory.at(t) for t in time), strict=True)
+    return time, np.array(q), np.array(qd)
+
+
+@given(qd=velocities, wanted=velocities)
+def test_velocities_change_within_the_limits_and_end_at_rest(qd: np.ndarray, wanted: np.ndarray) -> None:
+    trajectory = stopping_trajectory(PANDA.q_ready, qd, wanted, A, PERIOD, HOLD)
+    time, q, v = sampled(trajectory)
+    assert (np.abs(np.diff(v, axis=0)) <= A * np.diff(time)[:, None] * (1 + 1e-6) + 1e-9).all()
+    assert not v[-1].any()
+    # positions are what the velocities add up to
+    assert np.abs(np.diff(q, axis=0) - (v[1:] + v[:-1]) / 2 * np.diff(time)[:, None]).max() < 1e-4
+
+
+@given(qd=velocities, wanted=velocities)
+def test_each_joint_brakes_as_hard_as_it_may_once_the_velocity_was_held(qd: np.ndarray, wanted: np.ndarray) -> None:
+    trajectory = stopping_trajectory(PANDA.q_ready, qd, wanted, A, PERIOD, HOLD)
+    begin = max(HOLD, PERIOD, float((np.abs(wanted - qd) / A).max()))
+    for share in (0.1, 0.5, 0.9):
+        t = share * np.abs(wanted) / A
+        expected = np.sign(wanted) * (np.abs(wanted) - A * t)
+        for j in range(7):
+            assert trajectory.at(begin + t[j])[1][j] == pytest.approx(expected[j], abs=2e-5)
+
+
+@given(qd=velocities, wanted=velocities)
+def test_way_points_are_in_order_and_begin_where_the_velocity_was_held(qd: np.ndarray, wanted: np.ndarray) -> None:
+    points = list(stopping_trajectory(PANDA.q_ready, qd, wanted, A, PERIOD, HOLD).way_points())
+    times = [point.time for point in points]
+    assert times[0] >= HOLD
+    assert all(b - a > 0.9e-6 for a, b in pairwise(times))
+    assert points[0].qd == pytest.approx(wanted)
+    assert not points[-1].qd.any()
+
+
+def test_a_command_is_a_step_held_for_a_period_as_the_controller_takes_it() -> None:
+    reference, q = Reference(A, PERIOD, HOLD), PANDA.q_ready.copy()
+    reference.begin(q, 0.0, 0.5)
+    rng, qd = np.random.default_rng(1), STILL
+    for k in range(100):
+        now = 1.0 + k * PERIOD
+        given_q, given_qd = reference.at(now)
+        assert given_q == pytest.approx(q, abs=1e-12)
+        assert given_qd == pytest.approx(qd, abs=1e-12)
+        qd = np.clip(qd + rng.uniform(-1, 1, 7) * A * PERIOD, -0.5 * V, 0.5 * V)
+        reference.command(qd, now)
+        q = q + qd * PERIOD
+
+
+@given(seed=st.integers(0, 50))
+def test_braking_by_itself_ends_inside_the_joint_limits_that_the_controller_kept(seed: int) -> None:
+    limits = JointLimits(np.full(7, -0.5), np.full(7, 0.5), V, A, PERIOD)
+    reference, rng = Reference(A, PERIOD, PERIOD), np.random.default_rng(seed)
+    reference.begin(STILL, 0.0, 0.5)
+    wish = rng.choice([-1, 1], 7) * V
+    for k in range(60):
+        now = 1.0 + k * PERIOD
+        q, qd = reference.at(now)
+        lower, upper = joint_box(q, qd, limits)
+        trajectory = reference.command(np.clip(wish, lower, upper), now)
+        # should this have been the last command, the arm still stops before its limits
+        assert (np.abs(trajectory.q) <= 0.5 + 2e-5).all()
+
+
+def test_a_late_command_finds_the_arm_braking_and_goes_on_from_there() -> None:
+    reference = Reference(A, PERIOD, HOLD)
+    reference.begin(PANDA.q_ready, 0.0, 0.5)
+    fast = 0.5 * V
+    for k in range(40):
+        reference.command(np.minimum(fast, A * PERIOD * (k + 1)), 1.0 + k * PERIOD)
+    late = 1.4 + 0.1
+    _, braking = reference.at(late)
+    assert (braking < fast).all()
+    q, qd = reference.motion_at(late)
+    trajectory = reference.command(fast, late)
+    assert trajectory.at(0.0)[0] == pytest.approx(q)
+    assert trajectory.at(0.0)[1] == pytest.approx(qd)
+    _, _, v = sampled(trajectory)
+    assert (v <= fast + 1e-9).all()
+
+
+def test_what_is_asked_for_at_an_instant_before_the_last_command_is_of_the_one_before() -> None:
+    reference = Reference(A, PERIOD, HOLD)
+    reference.begin(PANDA.q_ready, 0.0, 0.5)
+    one = np.full(7, 0.05)
+    reference.command(one, 1.0)
+    reference.command(2 * one, 1.01)
+    assert reference.at(1.009)[1] == pytest.approx(one)
+    assert reference.at(1.011)[1] == pytest.approx(2 * one)
+    assert reference.at(0.5)[1] == pytest.approx(STILL)
+
+
+def test_what_has_passed_is_told_by_the_points_between_which_velocities_are_linear() -> None:
+    reference, rng = Reference(A, PERIOD, HOLD), np.random.default_rng(3)
+    reference.begin(PANDA.q_ready, 0.0, 0.5)
+    qd = STILL
+    for k in range(50):
+        now = 1.0 + k * PERIOD + rng.uniform(0, 2e-3)
+        passed = reference.passed(now, 0.025)
+        assert passed[0].time == pytest.approx(-0.025)
+        assert all(b.time - a.time > 0.9e-4 for a, b in pairwise(passed))
+        assert passed[-1].time < 0
+        for a, b in pairwise(passed):
+            # the middle of a cubic spline between them is where it was asked for
+            q = (a.q + b.q) / 2 + (a.qd - b.qd) * (b.time - a.time) / 8
+            assert q == pytest.approx(reference.motion_at(now + (a.time + b.time) / 2)[0], abs=1e-6)
+        qd = np.clip(qd + rng.uniform(-1, 1, 7) * A * PERIOD, -0.5 * V, 0.5 * V)
+        reference.command(qd, now)
+
+
+def test_the_loops_way_to_rest_is_followed_within_the_limits() -> None:
+    limits = JointLimits(np.full(7, -3.0), np.full(7, 3.0), V, A, PERIOD)
+    reference = Reference(A, PERIOD, HOLD)
+    reference.begin(STILL, 0.0, 0.5)
+    qd = STILL
+    for k in range(120):
+        q = reference.at(1.0 + k * PERIOD)[0]
+        qd = np.minimum(0.9 * V, qd + A * PERIOD) if k < 40 else box_and_brake(q, qd, limits.table)[2]
+        trajectory = reference.command(qd, 1.0 + k * PERIOD)
+        assert (np.abs(np.diff(trajectory.qd, axis=0)) <= A * np.diff(trajectory.time)[:, None] + 1e-4).all()
+    assert not qd.any()
+    assert reference.ends == pytest.approx(1.0 + 119 * PERIOD + HOLD)

@@ -1,1 +1,0 @@
-"""ROS 2 over DDS, without a ROS installation."""

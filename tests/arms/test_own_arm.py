@@ -1,0 +1,65 @@
+"""The arm of docs/how-to/your-own-arm.md, as another distribution adds it, and `pretouch run` with it."""
+
+import re
+import sys
+from pathlib import Path
+
+import pytest
+
+from pretouch import cli, plugins
+from pretouch.arms import arm_class, arm_names
+from pretouch.errors import PluginError
+from pretouch.recording.reader import open_recording
+from pretouch.session.confirmations import ConfirmedRobots
+from pretouch.session.preflight import PreflightParams
+from pretouch.session.push import GuidedPush
+
+PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "your-own-arm.md"
+POINTS = "[pretouch.arms]\nmine = my_package:Mine\nodd = my_package:Driver\n"
+
+
+@pytest.fixture(autouse=True)
+def _installed(tmp_path, monkeypatch):
+    (block,) = re.findall(r"^```python\n(.*?class Mine.*?)^```$", PAGE.read_text(), re.MULTILINE | re.DOTALL)
+    (tmp_path / "my_package.py").write_text(block)
+    about = tmp_path / "my_package-1.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: my-package\nVersion: 1\n")
+    (about / "entry_points.txt").write_text(POINTS)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    plugins._points.cache_clear()
+    yield
+    plugins._points.cache_clear()
+    sys.modules.pop("my_package", None)
+
+
+def test_it_is_run_with_options_of_its_own(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("pretouch.cli.run.command.PREFLIGHT", PreflightParams(watch_s=0.5))
+    monkeypatch.setattr(GuidedPush, "confirm", lambda *_: None)
+    words = "--device", "/dev/ttyS7", "--no-skin", "--profile", "blind", "--path", "hold", "--yes"
+    assert cli.main(["run", "mine", *words, "--seconds", "0.2", "--record", "a.mcap"]) == 0
+    said = capsys.readouterr().out
+    for part in ("arm at /dev/ttyS7: checking it", "The arm is at rest.", "The line to the driver was never late."):
+        assert part in said
+    assert len(open_recording(tmp_path / "a.mcap")) >= 10
+    assert "mine at /dev/ttyS7" in ConfirmedRobots(tmp_path / "state" / "pretouch").path.read_text()
+
+
+def test_its_options_are_in_its_help_alone(capsys):
+    for words in (["run", "mine", "--help"], ["run", "--help"]):
+        with pytest.raises(SystemExit):
+            cli.main(words)
+        assert ("Serial device of its driver." in capsys.readouterr().out) == ("mine" in words)
+
+
+def test_without_keys_an_arm_that_brings_no_units_is_refused(capsys):
+    assert cli.main(["run", "mine"]) == 2
+    assert "The arm brings no sensor units: give the file of their keys with --keys" in capsys.readouterr().err
+
+
+def test_an_entry_point_that_is_no_arm_is_refused_by_name():
+    assert {"simulated", "franka", "mine", "odd"} <= set(arm_names())
+    with pytest.raises(PluginError, match=r"of the arm 'odd' is not a subclass of pretouch\.arms\.ArmOptions"):
+        arm_class("odd")
