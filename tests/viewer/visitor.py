@@ -81,9 +81,6 @@ class Visitor:
     def say(self, message: dict[str, Any]) -> None:
         self._socket.send(msgspec.msgpack.encode(message))
 
-    def say_raw(self, message: bytes) -> None:
-        self._socket.send(message)
-
     def set(self, handle: Any, value: object) -> None:
         """Give a control a value, as the page does."""
         self.say(update(handle, value=value))
