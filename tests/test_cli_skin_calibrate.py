@@ -184,13 +184,6 @@ def test_the_motion_is_written_for_another_driver_with_what_it_is_good_for(panda
         assert row[8:] == pytest.approx(np.zeros(7), abs=1e-6)
 
 
-def test_a_rehearsal_ends_with_its_motion_and_takes_no_duration(tmp_path, capsys):
-    words = ("--keys", tmp_path / "k.toml", "--calibration-joints", tmp_path / "j.mcap", "--duration", 5)
-    assert cli.main(["skin", "simulate", *map(str, words)]) == 2
-    assert "--duration cannot be combined with --calibration-joints" in capsys.readouterr().err
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_the_study_in_simulation_has_another_name(capsys):
     assert calibrate("--simulate", "--skins", 20) == 2
     assert "is `pretouch bench calibration` now" in capsys.readouterr().err

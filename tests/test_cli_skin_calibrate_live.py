@@ -22,7 +22,6 @@ from pretouch.sensing.skin import load_skin
 from pretouch.signals import Terminated, ends_raise, exit_code, noted_in_motion
 from pretouch.types import RobotState
 from tests.calibrated_arm import swinging
-from tests.ports import free_port
 
 FILES = ("--keys", "keys.toml", "--out", "skin.toml", "--units-port", "0", "--robot", "simulated", "--yes")
 
@@ -219,21 +218,3 @@ def test_a_motion_that_is_interrupted_leaves_its_recording_and_says_how_to_go_on
     assert "pretouch skin calibrate --recording skin-calibration-1.mcap --arm panda --out skin.toml" in out
     assert not (tmp_path / "skin.toml").exists()
     assert read_measured(tmp_path / "skin-calibration-1.mcap").joints is not None
-
-
-@pytest.mark.slow
-def test_three_terminals_rehearse_a_real_arm(panda_model, paper_skin, tmp_path):
-    port = str(free_port())
-    arm = started(tmp_path, "simulate", "--keys", "keys.toml", "--port", port, "--calibration-joints", "joints.mcap")
-    assert arm.stdout
-    assert "Made keys" in arm.stdout.readline()
-    units = started(tmp_path, "monitor", "--keys", "keys.toml", "--port", port, "--record", "units.mcap")
-    out, err = arm.communicate(timeout=150)
-    assert arm.returncode == 0, out + err
-    assert "Joint states: joints.mcap." in out
-    units.send_signal(signal.SIGINT)
-    units.communicate(timeout=20)
-    words = ("--recording", "units.mcap", "--joints", "joints.mcap", "--out", "skin.toml")
-    out, err = started(tmp_path, "calibrate", *words).communicate(timeout=100)
-    assert "Skin file: skin.toml has 7 units where they were found." in out, err
-    assert_found_to_a_millimetre(load_skin(tmp_path / "skin.toml", panda_model), paper_skin)

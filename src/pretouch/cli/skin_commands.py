@@ -200,9 +200,6 @@ class Simulate:
     """Names of units whose range finder repeats its first reading, separated by commas."""
     hand: bool = True
     """Whether a person's hand comes and goes."""
-    calibration_joints: str = ""
-    """MCAP file to write the arm's joint states to: once all units are heard it makes the calibration motion instead
-    of its path, and the simulation ends. For `pretouch skin calibrate --joints`."""
     profile: str = "paper"
     """Profile of the arm's controller, or PROFILE:GROUP.FIELD=VALUE."""
     seed: int = 0

@@ -4,12 +4,9 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from pretouch.cli.skin_keys import keys_file, keys_or_none, with_new
 from pretouch.cli.words import words
 from pretouch.coverage.placement import assumptions, placement_for
-from pretouch.errors import HardwareError
 from pretouch.hardware.keys import Keys, save_keys
 from pretouch.profiles import profile as find_profile
 from pretouch.robot.model import RobotModel
@@ -17,10 +14,9 @@ from pretouch.robot.named import robot_named
 from pretouch.sensing.skin import Skin, skin_for
 from pretouch.serving.fleet import FleetParams
 from pretouch.serving.network import ChannelParams, NetworkParams
-from pretouch.serving.simulate import run, run_motion
+from pretouch.serving.simulate import run
 from pretouch.serving.simulated_arm import SimulateOptions
 from pretouch.sim.imu import ImuParams
-from pretouch.types import RobotState
 
 if TYPE_CHECKING:
     from pretouch.cli.skin_commands import Simulate
@@ -31,8 +27,6 @@ _say = partial(print, flush=True)
 def simulate_units(command: "Simulate") -> None:
     """Simulate until interrupted, or for the given time."""
     c = command
-    if c.calibration_joints and c.duration:
-        raise HardwareError("--duration cannot be combined with --calibration-joints, which ends with the motion.")
     up = ChannelParams(
         loss=c.loss, loss_run=c.loss_run, delay_s=c.delay, jitter_s=c.jitter, overtaken=c.overtaken, doubled=c.doubled
     )
@@ -51,30 +45,7 @@ def simulate_units(command: "Simulate") -> None:
         profile=profile, hand=c.hand, silenced=frozenset(words(c.silenced)),
         stuck=frozenset(words(c.stuck)), seed=c.seed, duration_s=c.duration,
     )  # fmt: skip
-    if c.calibration_joints:
-        _make_motion(options, Path(c.calibration_joints))
-    else:
-        run(options, lambda: False, _say)
-
-
-def _make_motion(options: SimulateOptions, place: Path) -> None:
-    """Let the arm make the calibration motion, and record its joint states."""
-    from pretouch.calibration.motion.planner import plan_motion
-    from pretouch.recording.skin_recording import SkinRecording
-
-    joints = options.model.joints
-    with SkinRecording(place) as recording:
-
-        def keep(state: RobotState) -> None:
-            q, qd = np.array(state.q)[None], np.array(state.qd)[None]
-            recording.joints(np.array([state.stamp]), q, qd, joints)
-
-        _say("The motion is being planned.")
-        run_motion(options, plan_motion(options.model), keep, lambda: bool(recording.trouble), _say)
-        recording.close()
-        if recording.trouble:
-            raise HardwareError(recording.trouble)
-    _say(f"Joint states: {place}.")
+    run(options, lambda: False, _say)
 
 
 def keys_for(place: Path, skin: Skin) -> Keys:

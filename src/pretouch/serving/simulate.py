@@ -5,33 +5,25 @@ its readings within the process, so that the arm moves whatever becomes of the d
 """
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 
-from pretouch.calibration.motion.perform import PerformParams, perform
-from pretouch.calibration.motion.plan import Plan
 from pretouch.control.posture import brought_to
 from pretouch.controller import Controller
-from pretouch.errors import HardwareError
 from pretouch.loop import Cycle
 from pretouch.loop import run as turn_on
 from pretouch.serving.fleet import Fleet
 from pretouch.serving.real_time import RealTime
-from pretouch.serving.simulated_arm import CATCH_UP_S, SimulatedArm, SimulateOptions
+from pretouch.serving.simulated_arm import SimulatedArm, SimulateOptions
 from pretouch.sim.hand import Hand, HandGoal
 from pretouch.sim.plant import Plant
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import HandSpec, SceneSpec, fixtures
-from pretouch.types import FloatArray, RobotState
+from pretouch.types import FloatArray
 
 _SAY_S = 1.0
 _ANSWER_S = 3.0
 """Time without any unit in session after which it is said that nobody answers [s]: a session takes 0.1 s to begin."""
-_STEADY_S = 3.0
-"""Time for which all units are in session before a motion begins [s]: the receiver knows their clocks by then."""
-_AFTER_S = 0.5
-"""Time the arm stands after a motion [s]: what was measured until then has arrived."""
 
 
 class VisitingHand:
@@ -118,59 +110,3 @@ def run(options: SimulateOptions, done: Callable[[], bool], say: Callable[[str],
         arm.begin()
         printer, end = _StatusPrinter(arm.fleet, arm.clock, say), options.duration_s or np.inf
         turn_on(controller, arm, finders, arm, printer, lambda _: done() or arm.clock.now >= end)
-
-
-def run_motion(
-    options: SimulateOptions, plan: Plan, keep: Callable[[RobotState], None], done: Callable[[], bool],
-    say: Callable[[str], None],
-) -> None:  # fmt: skip
-    """Wait until all units are heard, let the arm make a motion once, and end.
-
-    Args:
-        options: arm, units and receiver; what they say of path, controller, hand and duration does not count.
-        plan: the motion.
-        keep: is handed each state of the arm from when the units are heard, stamped by this machine's monotonic clock.
-        done: ends the waiting.
-        say: as of `run`.
-
-    Raises HardwareError for a receiver that cannot be found, and for an arm that could not follow.
-    """
-    params = PerformParams()
-    with SimulatedArm(options, plan.start, params.period_s, late=CATCH_UP_S) as arm:
-        arm.begin()
-        printer = _StatusPrinter(arm.fleet, arm.clock, say)
-        _await_units(arm, keep, done, printer)
-        if done():
-            return
-
-        def moved(_tick: float) -> None:
-            keep(_stamped(arm))
-            printer.print_status("moves")
-
-        stopped = perform(arm, arm, options.model, plan, params, moved).stopped
-        if stopped:
-            raise HardwareError(f"The simulated arm did not follow the motion to its end. {stopped}")
-        end = arm.tick() + _AFTER_S
-        while arm.tick() < end:
-            keep(_stamped(arm))
-        say(f"The motion of {plan.duration:.0f} s is over.")
-
-
-def _await_units(
-    arm: SimulatedArm, keep: Callable[[RobotState], None], done: Callable[[], bool], printer: _StatusPrinter
-) -> None:
-    """Let the arm stand until all units were heard for a while without a break."""
-    since = now = arm.tick()
-    while now - since < _STEADY_S and not done():
-        now = arm.tick()
-        if arm.in_session:
-            keep(_stamped(arm))
-        else:
-            since = now
-        printer.print_status("stands")
-
-
-def _stamped(arm: SimulatedArm) -> RobotState:
-    """Return an arm's state, stamped by this machine's monotonic clock."""
-    state = arm.read()
-    return replace(state, stamp=arm.monotonic(state.stamp))

@@ -127,11 +127,6 @@ class SimulatedArm:
         """Return an instant of the simulated time by this machine's monotonic clock [s]."""
         return self.clock.monotonic(simulated)
 
-    @property
-    def in_session(self) -> bool:
-        """Whether all its units that are not silenced are in a session with a receiver."""
-        return all(unit.in_session for unit in self.fleet.units if not unit.silent)
-
     def __enter__(self) -> Self:
         return self
 
