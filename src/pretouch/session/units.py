@@ -1,6 +1,6 @@
 """Sensor units before a run: each is heard, its clock is known, and what it shows agrees with the model."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from time import monotonic
 from typing import Protocol
@@ -50,6 +50,29 @@ class Units(Protocol):
         ...
 
 
+def wait_until_live(units: Units, clock: Clock, take: Callable[[float], None], patience: float, steady: float) -> None:
+    """Wait until all units have been heard for a while without a break; those that are not are a HardwareError.
+
+    Args:
+        units: what hears them.
+        clock: gives the ticks.
+        take: is called at each tick [s], to take in what came.
+        patience: how long to wait for one of them [s].
+        steady: for how long all must be heard [s]: their clocks are known by then.
+    """
+    begin = since = clock.tick()
+    while (now := clock.tick()) - since < steady:
+        take(now)
+        missing = [unit.id for unit in units.traffic().units if unit.state != "live"]
+        since = now if missing else since
+        if missing and now - begin > patience:
+            host, port = units.address
+            raise HardwareError(
+                f"No data from {', '.join(missing)} at {host}:{port}: check with `pretouch skin monitor`, or name the"
+                " arm's units with --skin."
+            )
+
+
 class UnitCheck:
     """Watches units for as long as their arm stands."""
 
@@ -63,20 +86,8 @@ class UnitCheck:
         self._arrivals = [-np.inf] * len(skin.mounted)
 
     def wait(self, clock: Clock, patience: float, steady: float) -> None:
-        """Wait until all units have been heard for a while without a break; those that are not are a HardwareError.
-
-        Args:
-            clock: gives the ticks.
-            patience: how long to wait for one of them [s].
-            steady: for how long all must be heard [s]: their clocks are known by then.
-        """
-        begin = since = clock.tick()
-        while (now := clock.tick()) - since < steady:
-            self.take(now)
-            missing = [unit.id for unit in self._traffic() if unit.state != "live"]
-            since = now if missing else since
-            if missing and now - begin > patience:
-                raise HardwareError(_missing(missing, self._units.address))
+        """Wait as `wait_until_live` does, and take in what comes."""
+        wait_until_live(self._units, clock, self.take, patience, steady)
 
     def take(self, now: float) -> None:
         """Take in what came until a tick [s]."""
@@ -104,11 +115,3 @@ class UnitCheck:
         """Return what was counted, older than the samples by up to 0.6 s but for the newest arrivals."""
         traffic = zip(self._units.traffic().units, self._arrivals, strict=True)
         return [replace(unit, last_arrival=max(arrival, unit.last_arrival)) for unit, arrival in traffic]
-
-
-def _missing(names: Sequence[str], address: tuple[str, int]) -> str:
-    host, port = address
-    return (
-        f"No data from {', '.join(names)} at {host}:{port}: check with `pretouch skin monitor`, or name the arm's units"
-        " with --skin."
-    )

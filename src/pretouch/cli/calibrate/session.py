@@ -13,6 +13,7 @@ from pretouch.hardware.network_skin import NetworkSkin
 from pretouch.ports import Clock, Robot
 from pretouch.recording.skin_recording import SkinRecording
 from pretouch.robot.model import RobotModel
+from pretouch.session.units import wait_until_live
 from pretouch.signals import noted_in_motion
 from pretouch.types import FloatArray
 
@@ -50,17 +51,7 @@ class Session:
     def wait_for_units(self) -> None:
         """Wait until all units are heard without a break; those that are not are a HardwareError that names them."""
         self._rig.begin()
-        begin = since = self._rig.tick()
-        while (now := self._rig.tick()) - since < _STEADY_S:
-            self._keep()
-            missing = [unit.id for unit in self._source.traffic().units if unit.state != "live"]
-            since = now if missing else since
-            if missing and now - begin > _PATIENCE_S:
-                raise HardwareError(
-                    f"No data from {', '.join(missing)} at"
-                    f" {self._source.address[0]}:{self._source.address[1]}: check with `pretouch skin monitor`, or name"
-                    " fewer units with --skin."
-                )
+        wait_until_live(self._source, self._rig, lambda _: self._keep(), _PATIENCE_S, _STEADY_S)
 
     def posture(self) -> FloatArray:
         """Return where the arm's joints are (n,) [rad]."""
