@@ -105,7 +105,7 @@ def _by_force(recording: TorqueRecording, profile: Profile) -> ProfileResult:
     period = profile.task.control_period_s
     force, time = forces(recording, period)
     series = Series(np.round(time * 1e9).astype(np.int64), force)
-    imported = ImportedData(recording.place, recording.said, series, None, None, (), ())
+    imported = ImportedData(recording.place, recording.said, series, None, None, ())
     try:
         d = detect_imported(imported, profile)
     except RecordingError as error:
