@@ -19,7 +19,8 @@ from pretouch.errors import PluginError
 from tests.ports import free_port
 
 ROOT = Path(__file__).parents[1]
-DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
+DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(ROOT.glob("[a-z]*/README.md"))]
+DOCUMENTS += sorted((ROOT / "docs").rglob("*.md"))
 OURS = r"(?:\.venv/bin/)?(?:pretouch|python|make|pip)"
 """Programs whose lines are commands wherever a line of code begins with one."""
 OTHER_PROGRAMS = {"cd", "done", "esptool", "for", "git", "mkdir", "mpremote", "mpy-cross", "rm", "source"}
@@ -93,12 +94,12 @@ def check_python(words: Sequence[str]) -> None:
 
 
 def check_pip(words: Sequence[str]) -> None:
-    """Check that what is to be installed is a clone, as no index has the package, with extras that it has."""
-    (requirement,) = (word for word in words[1:] if not word.startswith("-"))
-    extras = re.fullmatch(r"\.\[([\w,]+)\]", requirement)
-    assert extras, requirement
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    assert set(extras[1].split(",")) <= set(project["optional-dependencies"])
+    """Check that what is to be installed is in a clone, as no index has the package, with extras that it has."""
+    for requirement in words[1:]:
+        place = re.fullmatch(r"(\.(?:/\w+)?)(?:\[([\w,]+)\])?", requirement)
+        assert place, requirement
+        project = tomllib.loads((ROOT / place[1] / "pyproject.toml").read_text())["project"]
+        assert set(filter(None, (place[2] or "").split(","))) <= set(project.get("optional-dependencies", {}))
 
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
