@@ -16,6 +16,8 @@ from rich.console import Console
 
 from pretouch.cli import _read
 from pretouch.errors import PluginError
+from pretouch.extras import ROS2
+from tests.needs import skip_without
 from tests.ports import free_port
 
 ROOT = Path(__file__).parents[1]
@@ -23,7 +25,7 @@ DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(ROOT.glob("[a
 DOCUMENTS += sorted((ROOT / "docs").rglob("*.md"))
 OURS = r"(?:\.venv/bin/)?(?:pretouch|python|make|pip)"
 """Programs whose lines are commands wherever a line of code begins with one."""
-OTHER_PROGRAMS = {"cd", "done", "esptool", "for", "git", "mkdir", "mpremote", "mpy-cross", "rm", "source"}
+OTHER_PROGRAMS = {"cd", "done", "esptool", "for", "git", "mkdir", "mpremote", "mpy-cross", "rm", "ros2", "source"}
 
 
 def lines_of_code(text: str) -> list[str]:
@@ -58,7 +60,7 @@ def test_a_command_line_is_one_that_its_program_takes(words: list[str]) -> None:
     for program, *rest in single_commands(words):
         match program.removeprefix(".venv/bin/"):
             case "pretouch":
-                assert _read(rest, Console(stderr=True)).run
+                check_pretouch(rest)
             case "make":
                 dry = subprocess.run(["make", "-n", *rest], cwd=ROOT, capture_output=True, text=True, check=False)  # noqa: S607
                 assert dry.returncode == 0, dry.stderr
@@ -70,6 +72,16 @@ def test_a_command_line_is_one_that_its_program_takes(words: list[str]) -> None:
                 assert (ROOT / rest[0]).exists()
             case other:
                 assert other in OTHER_PROGRAMS
+
+
+def check_pretouch(words: Sequence[str]) -> None:
+    if words[:2] == ["run", "ros2"]:
+        skip_without(ROS2)
+    if "--help" in words:
+        with pytest.raises(SystemExit, match="0"):
+            _read(words, Console(stderr=True))
+    else:
+        assert _read(words, Console(stderr=True)).run
 
 
 def single_commands(words: Sequence[str]) -> Iterator[list[str]]:
@@ -117,6 +129,8 @@ def mentioned() -> Iterator[object]:
 @pytest.mark.parametrize("span", list(mentioned()))
 def test_a_command_that_a_sentence_names_exists_with_its_options(span, capsys):
     words = shlex.split(span.split("|")[0])[1:]
+    if words[:2] == ["run", "ros2"]:
+        skip_without(ROS2)
     path = [word for word in words if re.fullmatch(r"[a-z][a-z-]*", word)]
     options = {word.split("=")[0] for word in words if word.startswith("--")}
     for length in range(len(path), 0, -1):  # what follows a command may be a value, as an experiment's name

@@ -1,6 +1,7 @@
 """Words of a command line: several in one option, and the one that names an arm."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 from pretouch.arms import DEFAULT
 from pretouch.errors import UsageError
@@ -16,7 +17,7 @@ def split_arm(words: Sequence[str]) -> tuple[str, Sequence[str]]:
 
     Raises UsageError for options by which an arm was named before.
     """
-    for word, value in zip(words, (*words[1:], "NAME"), strict=True):
+    for word, value in pairwise((*words, "NAME")):
         option, given, text = word.partition("=")
         if option == "--robot":
             name = text if given else value
