@@ -11,9 +11,9 @@ from pretouch.calibration.data import CalibrationData
 from pretouch.errors import CalibrationError, RobotModelError
 from pretouch.sensing.skin import Skin
 from pretouch.traces import ImuTrace
-from pretouch_lab.studies.calibration.random_skin import random_skin
 from tests.calibration.faulty import joints_late, on_the_table, slipped, without_joints
 from tests.calibration.made import EXACT, MovingArm, Noise, pose_error, turned
+from tests.calibration.random_skin import random_skin
 
 
 def test_exact_data_give_the_exact_place(panda_model, moving_arm, pair):

@@ -12,9 +12,9 @@ from pretouch.calibration.params import CalibrationParams
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit
 from pretouch.traces import ImuTrace, JointTrace
-from pretouch_lab.studies.calibration.random_skin import random_skin
 from tests.calibration.faulty import unit_of
 from tests.calibration.made import MovingArm
+from tests.calibration.random_skin import random_skin
 
 
 def test_links_that_are_fixed_to_each_other_are_one_body(panda_model):

@@ -10,12 +10,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 from tests.contact.alone import begun as feel_init
 from tests.contact.alone import feel
 
-from pretouch.errors import ParameterError
 from pretouch.profiles import profile
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.types import Obstacles, RobotState
-from pretouch_lab.baselines.fixed_bounds import FixedBounds
 
 MODEL = RobotModel(panda())
 Q = MODEL.description.q_ready
@@ -178,15 +176,6 @@ def test_the_papers_rule_tells_its_evidence_and_passes_torques_on():
         found, state = feel(state, MODEL, KIN, given, NOTHING, False, p)
         assert (found.contact is not None) is (found.evidence > 1.0)
         assert_allclose(found.residual, size)
-
-
-def test_bounds_are_read_from_a_profiles_text_and_bad_ones_refused():
-    given = profile("fixed:detect.joint_torques_nm=10,9,8")
-    assert given.detect.joint_torques_nm == (10.0, 9.0, 8.0)
-    with pytest.raises(ParameterError, match="joint_torques_nm"):
-        FixedBounds(joint_torques_nm=(1.0, -1.0))
-    with pytest.raises(ParameterError, match="write a number"):
-        profile("fixed:detect.joint_torques_nm=many")
 
 
 def test_the_place_of_a_push_is_told_and_changes_nothing_else_that_is_felt():

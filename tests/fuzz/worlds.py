@@ -32,7 +32,6 @@ from pretouch.robot.body import Capsules
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, paper_skin
 from pretouch.sensing.unit import SensorUnit
-from pretouch_lab.baselines.fixed_bounds import FixedBounds
 
 # for each parameter its usual value and values far to both sides; what a check bounds, up to the bound
 CHOICES: dict[type, dict[str, tuple[object, ...]]] = {
@@ -95,7 +94,6 @@ OURS: dict[type, dict[str, tuple[object, ...]]] = {
         "learn": ("watched", "always", "never"), "memory_s": (300.0, 1.0), "tails": (30.0, 3.0), "suspect": (0.6, 1.0),
         "localise": (LocalisationParams(), None),
     },
-    FixedBounds: {},
     Admittance: {
         "speed_max_m_s": (0.3, 0.01, 2.0), "soft_hold": (True, False), "lag_s": (0.0167, 0.0, 0.2),
         "inertia_kg_m2": (1.5, 1e-3, 100.0), "damping_nm_s": (15.0, 0.1, 1e3), "dead_band_nm": (0.5, 0.0),
@@ -106,7 +104,7 @@ OURS: dict[type, dict[str, tuple[object, ...]]] = {
     PinchParams: {"gap_m": (0.2, 5.0), "force_n": (10.0, 0.01)},
     GiveUpParams: {"contacts": (3, 1), "push_j": (0.3, 1e-3, 50.0), "retry_s": (0.3, 30.0)},
 }  # fmt: skip
-DETECTORS = (SequentialTest, SequentialTest, FixedBounds, MovingThresholds)
+DETECTORS = (SequentialTest, SequentialTest, MovingThresholds)
 NAMED = ("pretouch", "pretouch", "fixed", "observer", "flacco", "ding")
 
 

@@ -1,70 +1,106 @@
-"""Inputs that the commands come back into: trials in the simulation, and arms that follow among many points.
+"""Inputs that the commands come back into: the simulated arm, and arms that follow among many points.
 
 They are the same to the bit on one machine, and nowhere else: they are compared between two checkouts and not stored.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
-from types import ModuleType
 
+import numpy as np
+
+from pretouch.control.path import Path
+from pretouch.control.posture import brought_to
 from pretouch.controller import Controller
+from pretouch.loop import Cycle, run
 from pretouch.perception.scene_filter import no_fixtures
-from pretouch.profiles import profile
-from pretouch_lab.benchmarks.workload import Workload
-from pretouch_lab.cell import Cell, Context
-from pretouch_lab.paper import dynamic, static
-from pretouch_lab.studies import clamp, pinch, vision
+from pretouch.profiles import profile, with_restriction
+from pretouch.sensing.skin import Skin
+from pretouch.sim.hand import Hand
+from pretouch.sim.paper_scenes import Placement, dynamic_pushes, person_scene, static_path, static_scene
+from pretouch.sim.plant import Plant, PlantClock
+from pretouch.sim.plant_params import PlantParams
+from pretouch.sim.pushes import Pusher
+from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
+from pretouch.sim.scene import HandSpec, SceneSpec, fixtures
+from pretouch.types import Inputs, RangeReadings, RangeStatus, RobotState
+from tests.calibration.random_skin import random_skin
 from tests.golden.fields import Values, values_of
 from tests.golden.streams import model, skin
 
+SEED = 3
+_UNIT_RATE = 50.0
+"""Readings of a unit in a second."""
 
-def trial(experiment: ModuleType, name: str, where: dict[str, str | float], world: str = "") -> dict[int, Values]:
-    """Run one trial of an experiment of the package."""
-    _, record = experiment.trial(Cell(experiment.NAME, name, where), 3, Context(model(), skin(), world=world))
-    return {i: values_of(step) for i, step in enumerate(record.steps)}
+
+class _Steps:
+    """Keeps the values of each step."""
+
+    def __init__(self) -> None:
+        self.values: list[Values] = []
+
+    def record(self, cycle: Cycle) -> None:
+        self.values.append(values_of(cycle.step))
+
+
+def simulated(
+    scene: SceneSpec, path: Path, name: str, restrictions: str, seconds: float, person: Pusher | None = None
+) -> dict[int, Values]:
+    """Run the simulated arm for a time in a scene, beside a person or alone."""
+    plant = Plant(model(), scene, PlantParams(), brought_to(model(), path.point(0.0)), SEED)
+    units, steps = RangeFinders(plant, skin(), RangeFinderParams(), SEED), _Steps()
+    if person is not None:
+        Hand(plant, person)
+    controller = Controller(model(), skin(), fixtures(scene), path, with_restriction(profile(name), restrictions))
+    clock = PlantClock(plant, controller.profile.task.control_period_s)
+    plant.advance(0.2)
+    run(controller, plant, units, clock, steps, lambda step: step.stamp >= seconds)
+    return dict(enumerate(steps.values))
+
+
+def static(name: str, restrictions: str, trajectory: str, side: str) -> dict[int, Values]:
+    """Run into the paper's static object."""
+    scene = static_scene(trajectory, side, 25_000.0, SEED)
+    return simulated(scene, static_path(trajectory, side), name, restrictions, 8.0)
+
+
+def dynamic(name: str, restrictions: str) -> dict[int, Values]:
+    """Be pushed by the paper's person."""
+    person, scene = Pusher(model(), dynamic_pushes(SEED)), person_scene(HandSpec(), Placement())
+    return simulated(scene, static_path("circle", "-y"), name, restrictions, 20.0, person)
 
 
 def crowd(units: int, name: str, cycles: int) -> dict[int, Values]:
     """Let an arm with many units follow its commands among things that all of them see."""
-    work = Workload(model(), units, profile(name), 3)
-    found = Controller(model(), work.skin, no_fixtures(), work.path, profile(name))
-    state = found.init(work.inputs().robot)
+    rng, placed, seed = np.random.default_rng(SEED), [], 0
+    while len(placed) < units:
+        placed += random_skin(model(), seed).units
+        seed += 1
+    many = Skin([replace(unit, id=f"unit_{i}") for i, unit in enumerate(placed[:units])], model())
+    found = Controller(model(), many, no_fixtures(), static_path("circle", "-y"), profile(name))
+    q, qd, still = brought_to(model(), found.path.point(0.0)), np.zeros(model().n), np.zeros(model().n)
+    state = found.init(RobotState(0.0, q, qd, q, qd, still, np.zeros(6)))
+    stamp, distance, phase = np.zeros(units), rng.uniform(0.3, 0.6, units), rng.uniform(0.0, 1.0, units)
     steps = {}
     for i in range(cycles):
-        step, state = found.step(state, work.inputs())
-        work.move(step.command)
+        now = 0.01 * i
+        due = np.floor(now * _UNIT_RATE - phase) > np.floor((now - 0.01) * _UNIT_RATE - phase)
+        stamp = np.where(due, now, stamp)
+        distance = np.where(due, np.clip(distance + rng.normal(0.0, 0.01, units), 0.1, 0.8), distance)
+        readings = RangeReadings(stamp, distance, np.full(units, int(RangeStatus.OK)))
+        wrench = np.concatenate([rng.normal(0.0, 0.3, 3), np.zeros(3)])
+        step, state = found.step(state, Inputs(now, RobotState(now, q, qd, q, qd, still, wrench), readings))
+        q, qd = q + step.command * 0.01, step.command
         steps[i] = values_of(step)
     return steps
 
 
-def _static(trajectory: str, side: str, mode: str) -> dict[str, str | float]:
-    return {"trajectory": trajectory, "side": side, "stiffness_n_per_m": 25_000.0, "restrictions": mode}
-
-
-def _clamp(held: float) -> dict[str, str | float]:
-    return {"held_s": held, "stiffness_n_per_m": 25_000.0, "restrictions": "off"}
-
-
-def _pinch(place: str) -> dict[str, str | float]:
-    return {"place": place, "speed_m_s": 0.2, "restrictions": "off"}
-
-
-_CAMERA: dict[str, str | float] = {
-    "scene": "board", "sensing": "both", "view": next(iter(vision.VIEWS)), "restrictions": "braking",
-}  # fmt: skip
-
 CLOSED: dict[str, Callable[[], dict[int, Values]]] = {
-    "static/circle/paper": partial(trial, static, "paper", _static("circle", "-y", "off")),
-    "static/line/paper-slack": partial(trial, static, "paper", _static("line", "+y", "slack")),
-    "static/line/pretouch": partial(trial, static, "pretouch", _static("line", "+y", "braking")),
-    "static/circle/flacco-stress": partial(trial, static, "flacco", _static("circle", "+y", "flacco"), "stress"),
-    "dynamic/paper": partial(trial, dynamic, "paper", {"restrictions": "slack"}),
-    "dynamic/pretouch": partial(trial, dynamic, "pretouch", {"restrictions": "braking"}),
-    "clamp/short-push": partial(trial, clamp, "pretouch", _clamp(0.2)),
-    "clamp/lasting-push": partial(trial, clamp, "pretouch", _clamp(3.0)),
-    "pinch/crook": partial(trial, pinch, "pretouch", _pinch("crook")),
-    "pinch/floor": partial(trial, pinch, "pretouch", _pinch("floor")),
-    "camera-and-skin": partial(trial, vision, "pretouch", _CAMERA),
+    "static/circle/paper": partial(static, "paper", "off", "circle", "-y"),
+    "static/line/paper-slack": partial(static, "paper", "slack", "line", "+y"),
+    "static/line/pretouch": partial(static, "pretouch", "braking", "line", "+y"),
+    "dynamic/paper": partial(dynamic, "paper", "slack"),
+    "dynamic/pretouch": partial(dynamic, "pretouch", "braking"),
     "32-units/paper": partial(crowd, 32, "paper", 400),
     "32-units/pretouch": partial(crowd, 32, "pretouch", 400),
     "1000-points/paper": partial(crowd, 1000, "paper", 200),

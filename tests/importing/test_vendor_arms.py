@@ -11,13 +11,8 @@ from tests.needs import skip_for
 
 from pretouch.importing.body import whole_arm_error
 from pretouch.importing.capsule_fit import Rods
-from pretouch.importing.folder import write_folder
 from pretouch.importing.robot_import import ImportOptions, _checked_at, import_robot
 from pretouch.robot.body import Capsules
-from pretouch.robot.model import RobotModel
-from pretouch_lab.campaign import Request
-from pretouch_lab.cell import Cell
-from pretouch_lab.paper import static
 
 
 def robot(name: str) -> Path:
@@ -67,20 +62,10 @@ def test_the_pandas_poses_are_those_of_our_model(panda_import, panda_model):
     ("file", "joints", "ee"),
     [("ur_description/urdf/ur5_robot.urdf", 6, "tool0"), ("xarm_description/urdf/xarm7.urdf", 7, "link_eef")],
 )
-def test_the_static_experiment_runs_on_other_arms(tmp_path, file, joints, ee):
+def test_other_arms_are_imported_as_well(file, joints, ee):
     found = import_robot(robot(file), ImportOptions())
     assert found.model.n == joints
     assert found.description.ee_body == ee
     assert found.error.p5 > -0.015
     assert found.error.p95 < 0.010
     assert_same_mechanics(found.model, stripped(robot(file)))
-    write_folder(found, tmp_path / "arm")
-    context = Request(("static",), 1, arm=str(tmp_path / "arm")).context()
-    assert isinstance(context.model, RobotModel)
-    where = {"trajectory": "line", "side": "-y", "stiffness_n_per_m": 25e3, "restrictions": "off"}
-    blind, paper = (static.trial(Cell("static", name, where), 0, context)[0] for name in ("blind", "paper"))
-    for row in (blind, paper):
-        assert row["contact"] is True
-        assert row["detection_delay_s"] is not None
-        assert row["held"] is False
-    assert paper["impact_speed_m_s"] < blind["impact_speed_m_s"]

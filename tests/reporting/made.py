@@ -28,7 +28,6 @@ from pretouch.types import (
     RobotState,
     Thresholds,
 )
-from pretouch_lab.trial import Record
 
 SETTLE_S = 0.2
 
@@ -84,7 +83,7 @@ class Recorder:
 
 
 def played(model, skin, profile="paper", side="-y", seed=0, seconds=6.0, until_reaction=None):
-    """One trial of the static experiment: what it recorded, and what it left behind by the experiment's own record."""
+    """The arm runs into a board: what was recorded, and the plant that knows the truth."""
     used = find_profile(profile)
     used = replace(used, approach=None)
     scene, path = static_scene("line", side, 25_000.0, seed), static_path("line", side)
@@ -102,11 +101,7 @@ def played(model, skin, profile="paper", side="-y", seed=0, seconds=6.0, until_r
         return bool(over) or step.stamp > seconds
 
     run(controller, plant, units, clock, recorder, done)
-    record = Record(
-        [kept.step for kept in recorder.kept], np.array([t for t, _ in plant.true_log]),
-        np.array([f for _, f in plant.true_log]), plant.touches, np.full((len(recorder.kept), 3), np.nan),
-    )  # fmt: skip
-    return Recorded((Run(model, skin, used, path),), recorder.kept), record
+    return Recorded((Run(model, skin, used, path),), recorder.kept), plant
 
 
 def seen(model, points):
