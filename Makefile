@@ -6,7 +6,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: setup demo live cbf franka learn ros2 units meshes browser docs micropython test test-quick test-contracts test-skipped test-slow soak golden golden-values lint house bench peers \
+.PHONY: setup demo live franka learn ros2 units meshes browser docs micropython test test-quick test-contracts test-skipped test-slow soak golden golden-values lint house bench peers \
 	format clean
 
 setup: $(STAMP)
@@ -29,7 +29,7 @@ live: setup
 franka: setup
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[franka]'
 
-# Gymnasium, and PyTorch for training: some hundred megabytes
+# Gymnasium, for the environment of the lab
 learn: setup
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e './lab[learn]'
 
@@ -48,10 +48,6 @@ meshes: setup
 # what the tests of the page need beside a Chromium of the system's; without both they are skipped
 browser: setup
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[browser]'
-
-# control barrier functions and JAX, 300 MB, which `pretouch bench shield` compares with
-cbf: setup
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e './lab[cbf]'
 
 # the documentation site, as build/site
 docs: setup
@@ -77,7 +73,7 @@ test-quick: setup
 # the files in which the last `make test` skipped something, with the real libraries, and the page in a browser
 test-contracts: setup
 	@test ! -s build/skipped || $(PYTEST) -n 2 --dist worksteal -m "not slow" \
-		--skip-only="make meshes,make cbf,make learn" $$(cat build/skipped)
+		--skip-only="make meshes,make learn" $$(cat build/skipped)
 	$(PYTEST) -n 2 --dist worksteal -m "not alone" --skip-only= tests/viewer/test_page_in_browser.py
 
 # the same files once all that they need is installed: nothing may be skipped now

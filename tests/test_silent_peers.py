@@ -11,11 +11,9 @@ from collections.abc import Iterator
 
 import pytest
 
-from pretouch.errors import ExperimentError
 from pretouch.hardware.franka import client
 from pretouch.hardware.network_skin import NetworkSkin
 from pretouch.viewer.server import ServeOptions, served
-from pretouch_lab.sweep import cluster
 from tests.hardware.fake_unit import IDS, KEYS
 from tests.ports import free_port, loopback
 
@@ -33,12 +31,6 @@ def bounded() -> Iterator[None]:
     began = time.monotonic()
     yield
     assert time.monotonic() - began < 30.0
-
-
-def test_a_scheduler(silent: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cluster, "CONNECT_S", 0.5)
-    with pytest.raises(ExperimentError, match="No scheduler answers at"):
-        cluster.run_on_cluster(f"tcp://{silent}:{client.PORT}", [], lambda *_: None, lambda *_: None)
 
 
 def test_units() -> None:

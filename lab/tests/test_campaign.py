@@ -4,23 +4,20 @@ import signal
 import subprocess
 import sys
 import time
-from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import replace
 from multiprocessing.connection import wait
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
 from pretouch.atomic_write import write_json
 from pretouch.errors import ExperimentError, ParameterError, SkinError
-from pretouch.profiles import PROFILES
 from pretouch.sensing.skin import PAPER_SKIN
-from pretouch_lab import campaign, engine
+from pretouch_lab import campaign
 from pretouch_lab.campaign import Request, play_trial, recording_file, trial_file
-from pretouch_lab.engine import missing, rows_of, run_tasks
+from pretouch_lab.engine import Task, missing, rows_of, run_tasks
 
 SMALL = Request(("static",), seeds=1, profiles=("blind",))
 
@@ -74,7 +71,7 @@ def test_tasks_take_all_cells_seed_by_seed():
 
 
 @pytest.mark.slow
-def test_a_run_goes_on_where_it_was(tmp_path, monkeypatch):
+def test_a_run_goes_on_where_it_was(tmp_path):
     one = replace(SMALL, seeds=1)
     seen = []
     one.open(tmp_path)
@@ -85,7 +82,7 @@ def test_a_run_goes_on_where_it_was(tmp_path, monkeypatch):
     assert (len(seen), missing(tasks)) == (4, [])
     rows = finished(one, tmp_path)
     assert [row["seed"] for row in rows] == [0, 0, 0, 0]
-    files = sorted((tmp_path / "trials").glob("*/*.json"))
+    files = sorted((tmp_path / "trials").glob("*.json"))
     files[2].unlink()
     kept = {file: file.stat().st_mtime_ns for file in files if file.exists()}
     seen.clear()
@@ -94,7 +91,6 @@ def test_a_run_goes_on_where_it_was(tmp_path, monkeypatch):
     assert len(seen) == 1
     assert {file: file.stat().st_mtime_ns for file in kept} == kept
     assert finished(one, tmp_path) == rows
-    monkeypatch.setattr(engine, "ProcessPoolExecutor", None)
     run_campaign(one, tmp_path, seen.append)
     assert len(seen) == 1
 
@@ -131,17 +127,6 @@ def test_a_changed_built_in_skin_is_noticed(tmp_path, monkeypatch):
         SMALL.open(tmp_path / "out")
 
 
-def test_changed_parameters_of_a_profile_are_noticed(tmp_path, monkeypatch):
-    SMALL.open(tmp_path)
-    for name in ("paper", "blind"):
-        task = replace(PROFILES[name].task, control_period_s=0.5 * PROFILES[name].task.control_period_s)
-        monkeypatch.setitem(PROFILES, name, replace(PROFILES[name], task=task))
-        if name == "paper":
-            SMALL.open(tmp_path)  # not one that it asks for
-    with pytest.raises(ExperimentError, match="but the parameters of profile blind have changed since"):
-        SMALL.open(tmp_path)
-
-
 @pytest.mark.parametrize("content", [b"{", b"[]", b"3", b"\xff", b"[" * 100_000, b"9" * 5000])
 def test_a_damaged_folder_is_named(tmp_path, content):
     (tmp_path / "run.json").write_bytes(content)
@@ -150,54 +135,17 @@ def test_a_damaged_folder_is_named(tmp_path, content):
 
 
 @pytest.mark.parametrize("content", [b"{", b"{}", b"[]", b"\xff", b"[" * 100_000, b"", None])
-def test_a_damaged_trial_is_run_again(tmp_path, monkeypatch, content):
+def test_a_damaged_trial_is_run_again(tmp_path, content):
     SMALL.open(tmp_path)
     first, *others = SMALL.tasks(tmp_path)
-    first.file.parent.mkdir(parents=True)
     for task in others:
         write_json(task.about, task.file)
-    _damage(first.file, content)
-    assert len(finished(SMALL, tmp_path)) == 3
-    again = _play_with(monkeypatch, lambda _file: Future())
-    with pytest.raises(_EnoughError):
-        run_campaign(SMALL, tmp_path, lambda *_: None)
-    assert again == [first.file]
-
-
-def _damage(file, content):
     if content is None:
-        file.mkdir()
+        first.file.mkdir()
     else:
-        file.write_bytes(content)
-
-
-class _EnoughError(Exception):
-    """Ends a run in a test."""
-
-
-def _play_with(monkeypatch, result):
-    """Let trials be played by `result`, in this process; return the list of what is asked for."""
-    asked = []
-
-    class Pool:
-        def __init__(self, *_args, **_options):
-            pass
-
-        def submit(self, _work, file):
-            asked.append(file)
-            return result(file)
-
-        def shutdown(self, **_options):
-            pass
-
-    def completed(futures, **_options):
-        if not any(f.done() for f in futures):
-            raise _EnoughError
-        return SimpleNamespace(done=list(futures))
-
-    monkeypatch.setattr(engine, "ProcessPoolExecutor", Pool)
-    monkeypatch.setattr(engine, "wait", completed)
-    return asked
+        first.file.write_bytes(content)
+    assert len(finished(SMALL, tmp_path)) == 3
+    assert [task.file for task in missing(SMALL.tasks(tmp_path))] == [first.file]
 
 
 @pytest.mark.parametrize(
@@ -210,15 +158,12 @@ def _play_with(monkeypatch, result):
         (OSError(28, "No space left on device"), r"could not be written .*\(No space left on device\).* goes on"),
     ],
 )
-def test_what_ended_a_worker_is_said(tmp_path, monkeypatch, error, words):
-    def failed(*_task):
-        future = Future()
-        future.set_exception(error)
-        return future
+def test_what_ended_a_worker_is_said(tmp_path, error, words):
+    def fail(_file):
+        raise error
 
-    _play_with(monkeypatch, failed)
     with pytest.raises(ExperimentError, match=words):
-        run_campaign(SMALL, tmp_path, lambda *_: None)
+        run_tasks([Task(tmp_path / "row.json", fail, 1.0)], tmp_path, lambda *_: None, processes=1)
 
 
 def test_a_trial_that_a_signal_ends_ends_its_worker_and_leaves_no_result(tmp_path, monkeypatch):
@@ -236,7 +181,7 @@ def test_a_trial_that_a_signal_ends_ends_its_worker_and_leaves_no_result(tmp_pat
     request = Request(("static",), seeds=1)
     with pytest.raises(Ended, match="143"):
         play_trial(request, tmp_path, *request.trials()[0], tmp_path / "trials" / "row.json")
-    assert list((tmp_path / "trials").glob("*/*")) == []
+    assert list((tmp_path / "trials").glob("*")) == []
 
 
 @pytest.mark.parametrize(("record", "kept"), [("first", [0]), ("all", [0, 1])])
@@ -299,7 +244,7 @@ def long_run(tmp_path):
     """A run of many trials, some of them finished."""
     out = tmp_path / "out"
     with started(out) as process:
-        wait_for(process, lambda: len(list((out / "trials").glob("*/[!.]*.json"))) >= 3)
+        wait_for(process, lambda: len(list((out / "trials").glob("[!.]*.json"))) >= 3)
         yield process, out
 
 
@@ -337,7 +282,7 @@ def test_a_stopped_run_leaves_whole_results(long_run, number, code):
     process.send_signal(number)
     said = process.communicate(timeout=100)[1]
     assert process.returncode == code
-    rows = [json.loads(file.read_text()) for file in (out / "trials").glob("*/[!.]*.json")]
+    rows = [json.loads(file.read_text()) for file in (out / "trials").glob("[!.]*.json")]
     assert len(rows) >= 3
     assert all(row["experiment"] == "static" for row in rows)
     if number != signal.SIGKILL:

@@ -13,7 +13,7 @@ from pretouch.cli.registry import FCI, command_names
 from pretouch.errors import MissingExtraError
 from pretouch.extras import BAGS, FIGURES, FRANKA, LIVE, MESHES, UNITS
 from pretouch_lab.learning import LEARN
-from pretouch_lab.sweep.run import SWEEP
+from pretouch_lab.sweep.play import SWEEP
 
 EXTRAS = (BAGS, FIGURES, FRANKA, MESHES, LIVE, UNITS)
 
@@ -21,7 +21,7 @@ URDF = """<robot name="a"><link name="base"><collision><geometry><mesh filename=
 <link name="tip"/><joint name="j" type="revolute"><parent link="base"/><child link="tip"/><axis xyz="0 0 1"/>
 <limit lower="-1" upper="1" velocity="1" effort="1"/></joint></robot>"""
 ARM = ("run", "franka", "--ip", "127.0.0.1", "--no-skin", "--profile", "blind")
-LAB = ("demo", "reproduce", "figure", "bench", "sweep", "identify", "learn", "policy")  # requires figures
+LAB = ("demo", "reproduce", "figure", "bench", "sweep", "identify")  # requires figures
 X = ("--vary", "detect.f_base_n=7:20", "--samples", "2", "--processes", "1")
 # what is asked for, and the extra it needs; the others end for another reason, beyond all imports
 ASKED = [
@@ -33,8 +33,6 @@ ASKED = [
     (("run", "--skin", "gone.toml"), None),
     (("sweep", "static", *X, "--out", "sweep"), SWEEP),
     (("sweep", "nothing"), None),
-    (("learn", "--quick"), LEARN),
-    (("policy", "gone.npz"), LIVE),
     (("robot", "import", "arm.urdf", "--out", "arm"), MESHES),
     (("robot", "check", "gone"), None),
     (("demo", "--seeds", "0"), None),
@@ -44,7 +42,6 @@ ASKED = [
     (("bench", "avoidance", "--docs", "gone"), None),
     (("bench", "localization", "--docs", "gone"), None),
     (("bench", "both", "--docs", "gone"), None),
-    (("bench", "free-motion", "--seeds", "0"), None),
     (("bench", "cycle", "--rate", "0"), None),
     (("bench", "calibration", "--skins", "0"), None),
     (("detect", "gone.csv"), None),
@@ -95,8 +92,8 @@ def test_without_an_extra_a_command_does_without_it_or_says_what_to_run(tmp_path
         (tmp_path / name).write_text("")
     (tmp_path / "force.csv").write_text("time_s,force_x_N,force_y_N,force_z_N\n0,0,0,0\n")
     monkeypatch.chdir(tmp_path)
-    asked = [(extra, words, needed) for extra in (*EXTRAS, LEARN, SWEEP) for words, needed in asked_without(extra)]
-    given = [[extra.modules, [words for words, _ in asked_without(extra)]] for extra in (*EXTRAS, LEARN, SWEEP)]
+    asked = [(extra, words, needed) for extra in (*EXTRAS, SWEEP) for words, needed in asked_without(extra)]
+    given = [[extra.modules, [words for words, _ in asked_without(extra)]] for extra in (*EXTRAS, SWEEP)]
     done = subprocess.run(
         [sys.executable, "-c", SCRIPT, json.dumps(given)], capture_output=True, text=True, check=False
     )

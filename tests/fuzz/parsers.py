@@ -1,6 +1,5 @@
 """Everything that reads files and messages: what it begins with, and what it may raise."""
 
-import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -28,11 +27,6 @@ from pretouch.robot.residual_file import Residual, load_residual, save_residual
 from pretouch.sensing.skin import load_skin, paper_skin, skin_file
 from pretouch.sim.randomisation import FOLDER, world_set
 from pretouch.types import RangeStatus
-from pretouch_lab.sweep.definition import load_sweeps
-from pretouch_lab.sweep.registry import measure
-from pretouch_lab.sweep.store import Store
-from pretouch_lab.sweep.work import Cell, Job
-from tests.fuzz import crashers
 from tests.hardware.fake_unit import KEYS, Bench
 from tests.imported_data.files import STORE1, pushed, wrenches, write_bag1, write_csv
 from tests.imported_data.joint_files import Moving
@@ -79,7 +73,6 @@ def parsers(folder: Path) -> Iterator[dict[str, Parser]]:
         "profile": Parser(
             [b"pretouch:detect.memory_s=100:react.reach_m=0.2"], lambda data: profile(data.decode(errors="replace"))
         ),
-        "worker": _of_workers(folder),
     }
     with Bench() as bench:
         bench.join()
@@ -144,7 +137,6 @@ def _of_tomls(folder: Path, model: RobotModel) -> dict[str, Parser]:
     save_keys(KEYS, folder / "keys.toml")
     learnt = Residual({"weights": np.zeros((7, 4))}, "panda", 0.0, 1.0)
     save_residual(folder / "learnt.toml", model, learnt)
-    sweep = b'[[sweep]]\nexperiment = "static"\nvary = { "window.samples" = "50:200" }\nsamples = 4\n'
 
     def keys(place: Path) -> object:
         place.chmod(0o600)
@@ -157,7 +149,6 @@ def _of_tomls(folder: Path, model: RobotModel) -> dict[str, Parser]:
         "skin": _of_file(folder, "s.toml", [skin_file(panda()).read_bytes()], partial(load_skin, model=model)),
         "keys": _of_file(folder, "k.toml", [(folder / "keys.toml").read_bytes()], keys),
         "world": _of_file(folder, "w.toml", [world, world.replace(b"0.06", _HUGE)], lambda p: world_set(str(p))),
-        "sweeps": _of_file(folder, "p.toml", [sweep], load_sweeps),
         "learnt": _of_file(
             folder,
             "l.toml",
@@ -169,21 +160,6 @@ def _of_tomls(folder: Path, model: RobotModel) -> dict[str, Parser]:
 
 
 # messages
-
-
-def _of_workers(folder: Path) -> Parser:
-    cell = Cell("abc", {}, 0, 1.0)
-    static = measure("static")
-    row = {"key": "abc", "metrics": dict.fromkeys(static.metrics, 1.0), "seconds": 1.0}
-    store, job = Store(folder / "store", static), Job("static", "paper", (cell,))
-
-    def read(data: bytes) -> None:
-        ((_, result),) = store.answered(job, data.decode(errors="replace"))
-        assert (result.metrics is None) == bool(result.reason)
-        assert all(v is None or np.isfinite(v) for v in (result.metrics or {}).values())
-
-    whole = json.dumps([row]).encode()
-    return Parser([whole, whole.replace(b"1.0}]", _HUGE + b"}]"), *crashers.ANSWERS], read, ())
 
 
 def _of_units(bench: Bench) -> Parser:

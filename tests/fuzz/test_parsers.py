@@ -19,7 +19,7 @@ MEMORY = 400_000_000
 """Largest memory that Python and NumPy may take for it [B]."""
 NAMES = (
     "recording", "recording of units", "CSV of forces", "CSV of torques", "ROS bag", "URDF", "skin", "keys",
-    "world", "sweeps", "learnt", "description", "profile", "worker", "wire",
+    "world", "learnt", "description", "profile", "wire",
 )  # fmt: skip
 
 

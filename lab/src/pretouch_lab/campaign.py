@@ -22,13 +22,12 @@ from pretouch_lab.domain_randomisation import digest_of
 from pretouch_lab.engine import Task, open_folder
 from pretouch_lab.registry import EXPERIMENTS
 from pretouch_lab.restrictions import modes
-from pretouch_lab.result_key import parameters_digest, result_key
 
 Recorded = Literal["first", "all"]
 """Trials to record: those of the first seed of which figures are drawn, or all."""
 
 
-_FOR_ANY_ARM = ("static", "avoidance", "dynamic", "free-motion")
+_FOR_ANY_ARM = ("static", "avoidance", "dynamic")
 
 
 @dataclass(frozen=True)
@@ -128,7 +127,7 @@ def _check_choice(what: str, choice: str, allowed: tuple[str, ...]) -> None:
 
 
 def _fingerprints(request: Request) -> dict[str, str]:
-    """Digests of what a request only names: the skin file, and the parameters of each profile."""
+    """Digests of what a request only names: the files of skin, arm and world."""
     arm = robot_named(request.arm or "panda")
     path = Path(request.skin or skin_file(arm))
     try:
@@ -138,15 +137,12 @@ def _fingerprints(request: Request) -> dict[str, str]:
     digests |= digest_of(request.world or "")
     if request.arm:
         digests["the arm's files have"] = files_digest(arm)
-    for name in dict.fromkeys(cell.profile for cell, _ in request.trials()):
-        digests[f"the parameters of profile {name} have"] = parameters_digest(profile(name))
     return digests
 
 
 def trial_file(out: Path, cell: Cell, seed: int) -> Path:
-    """Return where a trial's row of results is kept: elsewhere as soon as what plays the trial is another."""
-    key = result_key(EXPERIMENTS[cell.experiment].trial)
-    return out / "trials" / f"{cell.experiment}-{key}" / f"{cell.name}_{seed:04d}.json"
+    """Return where a trial's row of results is kept."""
+    return out / "trials" / f"{cell.name}_{seed:04d}.json"
 
 
 def recording_file(out: Path, cell: Cell, seed: int) -> Path:

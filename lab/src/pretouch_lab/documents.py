@@ -6,9 +6,7 @@ from pathlib import Path
 from pretouch.errors import ExperimentError
 from pretouch_lab.experiment import Picture
 
-BENCHMARKS, LOCALIZATION, SENSITIVITY, SHIELD = (
-    f"results/{name}.md" for name in ("benchmarks", "localization", "sensitivity", "shield")
-)
+BENCHMARKS, LOCALIZATION, SHIELD = (f"results/{name}.md" for name in ("benchmarks", "localization", "shield"))
 """Generated documents, in a folder of documents."""
 
 

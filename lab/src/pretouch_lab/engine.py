@@ -1,15 +1,14 @@
 """One engine for every campaign: tasks that leave one file each, and worker processes that make what is missing.
 
-A file is written whole or not at all, and its name holds the key of what made it (`result_key`): a run that was stopped
-goes on, and takes up nothing that another program or other parameters made.
+A file is written whole or not at all, and its name says which parameters made it; `run.json` of its folder says which
+version did. A run that was stopped goes on, and takes up nothing of another version or of other parameters.
 """
 
 import json
 import os
 import signal
-from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -28,9 +27,7 @@ Row = dict[str, Any]
 Progress = Callable[[float], None]
 """Called with the cost of each task that was done."""
 Job = TypeVar("Job")
-
-TRIES = 3
-"""Times a job is tried whose process is killed each time, where it may be tried again."""
+Answer = TypeVar("Answer")
 
 
 @dataclass(frozen=True)
@@ -77,15 +74,67 @@ def run_tasks(tasks: Iterable[Task], out: Path, progress: Progress, processes: i
     with failure_said(out):
         for folder in {task.file.parent for task in left}:
             folder.mkdir(parents=True, exist_ok=True)
-        if processes != 1:
-            run_jobs(
-                left, lambda task: (task.work, task.file), processes or os.cpu_count() or 1,
-                lambda task, _: progress(task.cost),
-            )  # fmt: skip
-            return
-        for task in left:
-            task.work(task.file)
-            progress(task.cost)
+        run_jobs(left, _do, processes, lambda task, _: progress(task.cost))
+
+
+def _do(task: Task) -> None:
+    task.work(task.file)
+
+
+def run_jobs(
+    jobs: Sequence[Job], work: Callable[[Job], Answer], processes: int | None, done: Callable[[Job, Answer], None]
+) -> None:
+    """Do jobs in worker processes, in their order; `done` is handed each with its answer, as it comes.
+
+    With one process they are done in this one; None: one for each processor. A killed process is a BrokenProcessPool.
+    """
+    if processes == 1:
+        for job in jobs:
+            done(job, work(job))
+        return
+    with _workers(max(1, min(processes or os.cpu_count() or 1, len(jobs)))) as pool:
+        with _interrupt_held_back():
+            running = {pool.submit(work, job): job for job in jobs}
+        for future in as_completed(running):
+            done(running[future], future.result())
+
+
+@contextmanager
+def _workers(count: int) -> Iterator[ProcessPoolExecutor]:
+    """Have so many worker processes; an exception ends them at once, and what they were to do."""
+    pool = ProcessPoolExecutor(count, mp_context=get_context("spawn"), initializer=_start)
+    try:
+        yield pool
+    except BaseException:
+        for process in active_children():
+            process.terminate()
+        pool.shutdown(wait=True, cancel_futures=True)
+        raise
+    pool.shutdown()
+
+
+@contextmanager
+def _interrupt_held_back() -> Iterator[None]:
+    """Hold Ctrl-C back while processes start; they inherit that, so that it finds none of them half imported.
+
+    Here it may come by another thread of a library, which this one's mask does not keep from calling the handler.
+    """
+    with noted(signal.SIGINT), kept_from_children({signal.SIGINT}):
+        yield
+
+
+def _start() -> None:
+    """Leave Ctrl-C to the parent, which ends the workers in order; and do not outlive it if it is killed."""
+    leave_to_parent({signal.SIGINT})
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 @contextmanager
@@ -110,7 +159,7 @@ def open_folder(out: Path, about: Mapping[str, Any], digests: Mapping[str, str],
     Args:
         out: the folder; `run.json` in it says what it holds.
         about: choices by their names, as JSON can hold them.
-        digests: of files and parameters that the choices only name, by a phrase such as "the skin file has".
+        digests: of files that the choices only name, by a phrase such as "the skin file has".
         parts: names of folders to make in it.
 
     Raises:
@@ -158,109 +207,3 @@ def _object(path: Path) -> Row:
     if not isinstance(value, dict):
         raise _Damaged("it holds no object")
     return value
-
-
-Call = tuple[Callable[[Any], Any], Any]
-"""A function of a module, and what it is given in a worker process."""
-
-
-def run_jobs(
-    jobs: Sequence[Job], call: Callable[[Job], Call], processes: int, done: Callable[[Job, Any], None],
-    lost: Callable[[Job, str], None] | None = None,
-) -> None:  # fmt: skip
-    """Run jobs in worker processes, in their order; `done` is handed each with its answer, as it comes.
-
-    A pool of processes does not tell which of its jobs killed one. With `lost`, those that were running are tried
-    again, each alone, and one whose process is killed each time is handed to it with the reason. Without, a killed
-    process is a BrokenProcessPool.
-    """
-    waiting, suspects = deque(jobs), deque[Job]()
-    killed: Counter[int] = Counter()
-    while waiting or suspects:
-        source, count = (suspects, 1) if suspects else (waiting, processes)
-        try:
-            with workers(min(count, len(source))) as pool:
-                _drain(pool, source, count, call, done)
-        except _Killed as end:
-            if lost is None:
-                raise BrokenProcessPool from end
-            for job in end.jobs:
-                killed[id(job)] += 1
-                if killed[id(job)] >= TRIES:
-                    lost(job, f"The process that played it was killed {TRIES} times, for want of memory perhaps.")
-                else:
-                    suspects.append(job)
-
-
-class _Killed(Exception):
-    """A process was killed while these jobs were running."""
-
-    def __init__(self, jobs: list[Any]) -> None:
-        super().__init__()
-        self.jobs = jobs
-
-
-def _drain(
-    pool: ProcessPoolExecutor, source: deque[Job], count: int, call: Callable[[Job], Call],
-    done: Callable[[Job, Any], None],
-) -> None:  # fmt: skip
-    """Run all jobs of a queue, no more at once than there are processes."""
-    running: dict[Future[Any], Job] = {}
-    while source or running:
-        with interrupt_held_back():
-            while source and len(running) < count:
-                job = source.popleft()
-                try:
-                    function, given = call(job)
-                    running[pool.submit(function, given)] = job
-                except BrokenProcessPool as error:
-                    raise _Killed([job, *running.values()]) from error
-        broken = []
-        for future in wait(running, return_when=FIRST_COMPLETED).done:
-            job = running.pop(future)
-            try:
-                answer = future.result()
-            except BrokenProcessPool:
-                broken.append(job)
-            else:
-                done(job, answer)
-        if broken:
-            raise _Killed([*broken, *running.values()])
-
-
-@contextmanager
-def workers(count: int) -> Iterator[ProcessPoolExecutor]:
-    """Have so many worker processes; an exception ends them at once, and what they were to do."""
-    pool = ProcessPoolExecutor(count, mp_context=get_context("spawn"), initializer=_start)
-    try:
-        yield pool
-    except BaseException:
-        for process in active_children():
-            process.terminate()
-        pool.shutdown(wait=True, cancel_futures=True)
-        raise
-    pool.shutdown()
-
-
-@contextmanager
-def interrupt_held_back() -> Iterator[None]:
-    """Hold Ctrl-C back while processes start; they inherit that, so that it finds none of them half imported.
-
-    Here it may come by another thread of a library, which this one's mask does not keep from calling the handler.
-    """
-    with noted(signal.SIGINT), kept_from_children({signal.SIGINT}):
-        yield
-
-
-def _start() -> None:
-    """Leave Ctrl-C to the parent, which ends the workers in order; and do not outlive it if it is killed."""
-    leave_to_parent({signal.SIGINT})
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    parent = parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)

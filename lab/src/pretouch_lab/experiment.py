@@ -39,10 +39,6 @@ def _nothing(_sources: Sources) -> list[Picture]:
     return []
 
 
-def _no_words(_summary: Row) -> str:
-    return ""
-
-
 @dataclass(frozen=True)
 class Experiment:
     """Cells to run, how to run a trial of one, and what to make of the rows that come out."""
@@ -58,8 +54,6 @@ class Experiment:
     tables: Callable[[Row], list[TextTable]]
     """Makes tables of the summary."""
     draw: Callable[[Sources], list[Picture]] = _nothing
-    """Draws what the sources allow; the first goes with the conclusion."""
-    conclude: Callable[[Row], str] = _no_words
-    """Says in a sentence or two what came out of a summary, or nothing: the page begins with it."""
+    """Draws what the sources allow."""
     recorded: bool = True
     """Whether trials of the first seed are recorded unasked: not where they are long and nothing is drawn of them."""

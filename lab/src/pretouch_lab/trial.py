@@ -1,7 +1,7 @@
 """One trial: an arm in a scene under the controller, and everything it left behind."""
 
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from itertools import takewhile
 from pathlib import Path as FilePath
@@ -14,7 +14,6 @@ from pretouch.control.posture import brought_to
 from pretouch.controller import Controller
 from pretouch.desired import Desired
 from pretouch.errors import RecordingError
-from pretouch.hardware.traffic import UnitTraffic
 from pretouch.loop import Cycle, Options, run
 from pretouch.profiles import Profile
 from pretouch.recording.reader import Recorded
@@ -22,8 +21,6 @@ from pretouch.recording.truth import Truth, truth_of
 from pretouch.recording.writer import Recording
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.serving.fleet import FleetParams
-from pretouch.serving.wire_skin import WireSkin
 from pretouch.sim.hand import Hand, HandScript, PersonArm
 from pretouch.sim.plant import TOUCH_N, Plant, PlantClock, Touch
 from pretouch.sim.plant_params import PlantParams
@@ -31,7 +28,6 @@ from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import SceneSpec, described, fixtures
 from pretouch.sim.touch_sensor import SimulatedTouchSkin, TouchSensorParams, TouchSensors
 from pretouch.types import ControlStep, FloatArray, Mode
-from pretouch_lab.depth_camera import DepthCamera, DepthCameraParams
 from pretouch_lab.domain_randomisation import Parts, randomised
 
 SETTLE_S = 0.2
@@ -57,12 +53,6 @@ class Setup:
     """What moves the hand."""
     plant: PlantParams = field(default_factory=PlantParams)
     ranging: RangeFinderParams = field(default_factory=RangeFinderParams)
-    camera: FloatArray | None = None
-    """Pose T_O_camera (4, 4) of a depth camera; none, and the controller has the skin alone."""
-    seeing: DepthCameraParams = field(default_factory=DepthCameraParams)
-    """How the camera sees."""
-    wire: FleetParams | None = None
-    """Units and network for readings that come over UDP sockets; none, and they come within the process."""
     recording: FilePath | None = None
     """File to record it in; none, and it is not recorded."""
     world: str = ""
@@ -90,8 +80,6 @@ class Record:
     reading_age: FloatArray | None = None
     """(S, K) age of each unit's newest reading at each control step [s], infinite before its first; None if it was
     read from a recording."""
-    traffic: tuple[UnitTraffic, ...] = ()
-    """What the receiver counted of each unit, if readings came over the wire."""
 
     def times(self) -> FloatArray:
         """Instants (S,) of the control steps [s]."""
@@ -188,23 +176,19 @@ def play(setup: Setup, done: Callable[[ControlStep, Plant], bool]) -> Record:
     setup = replace(setup, plant=parts.plant, ranging=parts.ranging, believed=parts.believed)
     model, scene, profile = setup.model, setup.scene, setup.profile
     plant = Plant(model, scene, setup.plant, brought_to(model, setup.path.point(0.0)), setup.seed)
-    with _mounted(setup, plant) as units:
-        finders, traffic = (units.range_finders, units.receiver.units) if isinstance(units, WireSkin) else (units, ())
-        hand = Hand(plant, setup.hand, setup.person) if setup.hand else None
-        camera = None if setup.camera is None else DepthCamera(plant, setup.camera, setup.seeing, setup.seed)
-        if setup.prepare:
-            setup.prepare(plant, finders)
-        known = setup.skin if setup.believed is None else setup.believed
-        controller = Controller(model, known, fixtures(scene), setup.path, profile)
-        clock = PlantClock(plant, profile.task.control_period_s)
-        sensed = _with_touch(setup, plant, units)
-        plant.advance(SETTLE_S)
-        with _recording(setup, controller) as recording:
-            recorder = _Recorder(plant, hand, recording)
-            options = Options(points=camera)
-            if setup.commander:
-                options = replace(options, desired=setup.commander(plant, hand))
-            run(controller, plant, sensed, clock, recorder, lambda step: done(step, plant), options)
+    units = RangeFinders(plant, setup.skin, setup.ranging, setup.seed)
+    hand = Hand(plant, setup.hand, setup.person) if setup.hand else None
+    if setup.prepare:
+        setup.prepare(plant, units)
+    known = setup.skin if setup.believed is None else setup.believed
+    controller = Controller(model, known, fixtures(scene), setup.path, profile)
+    clock = PlantClock(plant, profile.task.control_period_s)
+    sensed = _with_touch(setup, plant, units)
+    plant.advance(SETTLE_S)
+    with _recording(setup, controller) as recording:
+        recorder = _Recorder(plant, hand, recording)
+        options = Options(desired=setup.commander(plant, hand)) if setup.commander else Options()
+        run(controller, plant, sensed, clock, recorder, lambda step: done(step, plant), options)
     return Record(
         recorder.steps,
         np.array([t for t, _ in plant.true_log]),
@@ -212,19 +196,11 @@ def play(setup: Setup, done: Callable[[ControlStep, Plant], bool]) -> Record:
         plant.touches,
         np.array(recorder.hand_position),
         np.array(recorder.reading_age),
-        traffic,
     )
 
 
-def _mounted(setup: Setup, plant: Plant) -> AbstractContextManager[RangeFinders | WireSkin]:
-    """Mount the skin's units on an arm, for as long as the context lasts."""
-    if setup.wire is None:
-        return nullcontext(RangeFinders(plant, setup.skin, setup.ranging, setup.seed))
-    return WireSkin(plant, setup.skin, setup.ranging, setup.wire, setup.seed)
-
-
-def _with_touch(setup: Setup, plant: Plant, units: RangeFinders | WireSkin) -> ports.Skin:
-    """Return the units with their touch sensors, where the skin has such; over the wire they have them already."""
-    if isinstance(units, WireSkin) or not len(setup.skin.touching):
+def _with_touch(setup: Setup, plant: Plant, units: RangeFinders) -> ports.Skin:
+    """Return the units with their touch sensors, where the skin has such."""
+    if not len(setup.skin.touching):
         return units
     return SimulatedTouchSkin(units, TouchSensors(plant, setup.skin, TouchSensorParams(), setup.seed))

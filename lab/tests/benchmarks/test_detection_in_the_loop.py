@@ -14,27 +14,32 @@ from pretouch.types import Mode
 from pretouch_lab.baselines.detection import BASELINES
 from pretouch_lab.benchmarks.detection.arm import AWAY, Alone, path_of, record, sensing_of
 from pretouch_lab.benchmarks.detection.replay import replay
-from pretouch_lab.paper.claims.forces import Event, apply
 from pretouch_lab.trial import Setup, play
 
 
 @pytest.mark.slow
 def test_a_simulated_arm_is_quiet_alone_and_feels_pushes(panda_model):
-    pushes = tuple(
-        Event("push", 20.0, start, np.array([0.0, side, 0.0])) for start, side in ((70.0, 1.0), (75.0, -1.0))
-    )
+    starts, sides = (70.0, 75.0), (1.0, -1.0)
+
+    def prepare(plant, _) -> None:
+        """Push the hand with half a sine of 20 N for 0.2 s along y."""
+        push = plant.mj_data.xfrc_applied[int(plant.mj_model.body(plant.model.description.ee_body).id)]
+
+        def before_step(time: float) -> None:
+            phase = [(5.0 * np.pi * (time - start), side) for start, side in zip(starts, sides, strict=True)]
+            push[1] = sum(20.0 * side * np.sin(angle) for angle, side in phase if 0.0 < angle < np.pi)
+
+        plant.before_each_step(before_step)
+
     trial = play(
-        Setup(
-            panda_model, paper_skin(panda_model), profile("pretouch"), SceneSpec(), Circle(), 1071,
-            prepare=lambda plant, _: apply(plant, pushes),
-        ),
+        Setup(panda_model, paper_skin(panda_model), profile("pretouch"), SceneSpec(), Circle(), 1071, prepare=prepare),
         lambda step, _: step.stamp >= 80.0,
-    )  # fmt: skip
+    )
     felt = [(s.stamp, s.contact.force[1]) for s in trial.steps if s.contact is not None]
     assert len(felt) == 2
-    for (at, force), push in zip(felt, pushes, strict=True):
-        assert 0.0 < at - push.start < 0.1
-        assert force * push.direction[1] > 0
+    for (at, force), start, side in zip(felt, starts, sides, strict=True):
+        assert 0.0 < at - start < 0.1
+        assert force * side > 0
         goes_on = next(s.stamp for s in trial.steps if s.stamp > at and s.mode is Mode.TRACK)
         assert goes_on - at < 3.0, "nothing is left of the push to be found out"
 

@@ -1,4 +1,4 @@
-"""`pretouch bench real` on fabricated recordings: adapters, halves, correction, the learnt baseline, the count."""
+"""`pretouch bench real` on fabricated recordings: adapters, halves, correction, the count."""
 
 import json
 from dataclasses import replace
@@ -11,11 +11,11 @@ from tests.imported_data.joint_files import Moving
 from pretouch import cli
 from pretouch.errors import ExperimentError
 from pretouch.imported_data.events import ContactEvent
+from pretouch_lab.benchmarks.bounds import rate_bounds
 from pretouch_lab.benchmarks.real import bench
 from pretouch_lab.benchmarks.real.bench import Work, halves, parted, play
 from pretouch_lab.benchmarks.real.external import Stream, corrected, pushed, stream_of
-from pretouch_lab.benchmarks.real.judge import Said, Tally, poisson_bounds, tally
-from pretouch_lab.benchmarks.real.learnt import learnt
+from pretouch_lab.benchmarks.real.judge import Said, Tally, tally
 from pretouch_lab.benchmarks.real.sets import SETS, Run, sets_in
 
 FRANKA, UR10E, GLOVE = SETS[0], SETS[3], SETS[4]
@@ -131,8 +131,6 @@ def test_what_is_learnt_does_not_depend_on_the_runs_that_are_judged(stream):
     for left, right in ((stream, changed), (changed, stream)):
         fitted = [corrected(s, [0, 2]).only([0, 2]).recording.tau_ext for s in (left, right)]
         np.testing.assert_array_equal(*fitted)
-        bounds = [learnt(s, [0, 2])[1].detect.joint_torques_nm for s in (left, right)]
-        assert bounds[0] == bounds[1]
     own = [corrected(s, judge).only(judge).recording.tau_ext for s in (stream, changed)]
     assert not np.array_equal(own[0], own[1], equal_nan=True)
 
@@ -182,22 +180,11 @@ def test_pushes_reach_the_external_torques_as_the_observer_delays_them(motions, 
     assert made[0].joints == (7,)
 
 
-def test_the_learnt_baseline_explains_unseen_free_motion_and_leaves_a_push(motions, panda_model):
-    runs = [run_of(m) for m in motions]
-    runs[1] = pushed(runs, panda_model)[1]
-    stream = stream_of(FRANKA, runs, panda_model)
-    left, profile = learnt(stream, [0, 2])
-    bounds, tau = np.array(profile.detect.joint_torques_nm), left.recording.tau_ext
-    free, touched = left.free & np.isin(left.run, [1, 3]), (left.run == 1) & (left.label == 1)
-    assert np.abs(tau[free]).mean() < 0.2 * np.abs(stream.recording.tau_ext[free]).mean()
-    assert (np.abs(tau[free]) > 1.5 * bounds).mean() < 0.001
-    assert (np.abs(tau[touched]) > bounds).any(axis=1).mean() > 0.5
-
-
 def test_poisson_bounds_are_the_exact_ones():
-    assert poisson_bounds(0) == (0.0, pytest.approx(3.6889, abs=1e-4))  # -ln 0.025
-    assert poisson_bounds(1) == (pytest.approx(0.0253, abs=1e-4), pytest.approx(5.5716, abs=1e-4))
-    assert poisson_bounds(10) == (pytest.approx(4.7954, abs=1e-4), pytest.approx(18.3904, abs=1e-4))
+    assert rate_bounds(0, 1.0) == (0.0, pytest.approx(3.6889, abs=1e-4))  # -ln 0.025
+    assert rate_bounds(1, 1.0) == (pytest.approx(0.0253, abs=1e-4), pytest.approx(5.5716, abs=1e-4))
+    assert rate_bounds(10, 2.0) == (pytest.approx(2.3977, abs=1e-4), pytest.approx(9.1952, abs=1e-4))
+    assert rate_bounds(10, 1.0, dispersion=2.0)[1] > rate_bounds(10, 1.0)[1]
     row = Tally(motion_s=1800.0, false_alarms=1).row()
     assert row["per_hour"] == 2.0
     assert row["per_hour_high"] == pytest.approx(11.143, abs=1e-3)
@@ -245,7 +232,7 @@ def real(*words):
 def test_the_whole_command_writes_a_row_for_each_set_table_and_detector(folder, tmp_path, capsys):
     (folder / "lwr4.npz").write_bytes(b"")
     place = tmp_path / "rows.json"
-    assert real(folder, "--detectors", "pretouch,learnt", "--json", place) == 0
+    assert real(folder, "--detectors", "pretouch,fixed", "--json", place) == 0
     told = json.loads(place.read_text())
     said = capsys.readouterr()
     assert "lwr4 is left out, for" in said.err
@@ -253,12 +240,12 @@ def test_the_whole_command_writes_a_row_for_each_set_table_and_detector(folder, 
     rows = {(row["set"], row["table"], row["detector"]): row for row in told["rows"]}
     sets = [("franka_fast", "free"), ("franka_fast", "added")]
     sets += [("contactInterpretation", table) for table in ("free", "contacts", "added")]
-    assert set(rows) == {(*each, detector) for each in sets for detector in ("pretouch", "learnt")}
+    assert set(rows) == {(*each, detector) for each in sets for detector in ("pretouch", "fixed")}
     row = rows["contactInterpretation", "contacts", "pretouch"]
     assert (row["found"], row["contacts"], row["link_right"], row["false_alarms"]) == (3, 3, 3, 0)
     assert 0.0 < row["median_delay_ms"] < 100.0
     assert rows["franka_fast", "free", "pretouch"]["contacts"] == 0
-    added = rows["franka_fast", "added", "learnt"]
+    added = rows["franka_fast", "added", "fixed"]
     assert added["contacts"] + added["busy"] == 12
 
 

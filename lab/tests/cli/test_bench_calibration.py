@@ -6,7 +6,7 @@ import pytest
 
 from pretouch import cli
 from pretouch_lab.studies.calibration import study as study_module
-from pretouch_lab.studies.calibration.study import OURS, Study, Trial
+from pretouch_lab.studies.calibration.study import Study
 
 ROW = {
     "skin": 0, "unit": "on_panda_hand", "link": "panda_hand", "accepted": True, "position_error_m": 0.0002,
@@ -37,16 +37,16 @@ def test_what_makes_no_sense_is_said_in_one_sentence(capsys, words, said):
 def test_the_study_is_asked_as_said_and_its_rows_are_written(tmp_path, capsys, monkeypatch):
     asked = []
 
-    def study(model, skins, seed, compared, links_known, plan, progress):
-        asked.append((model.description.name, skins, seed, compared, links_known, plan))
+    def study(model, skins, seed, links_known, plan, progress):
+        asked.append((model.description.name, skins, seed, links_known, plan))
         progress()
-        return Study([Trial(0, OURS, OURS, [ROW], 1.5)], {OURS: 60.0})
+        return Study([ROW], 60.0, 1.5)
 
     monkeypatch.setattr(study_module, "study", study)
     place = tmp_path / "new" / "rows.json"
     for _ in range(2):
         assert calibrate("--skins", 20, "--json", place) == 0
-        assert asked.pop() == ("panda", 20, 0, False, True, None)
+        assert asked.pop() == ("panda", 20, 0, True, None)
     told = json.loads(place.read_text())
     assert told["rows"] == [ROW]
     assert (told["motion_s"], told["compute_s"]) == (60.0, 1.5)
@@ -54,8 +54,8 @@ def test_the_study_is_asked_as_said_and_its_rows_are_written(tmp_path, capsys, m
     assert "Where units sit, found in 60 s of motion" in said
     assert "panda_hand" in said
     assert f"Numbers: {place}" in said
-    assert calibrate("--compared", "--find-links", "--seed", 3, "--arm", "fr3") == 0
-    assert asked == [("fr3", 20, 3, True, False, None)]
+    assert calibrate("--find-links", "--seed", 3, "--arm", "fr3") == 0
+    assert asked == [("fr3", 20, 3, False, None)]
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""The paper's three experiments and the free motion on arms that the paper did not have."""
+"""The paper's three experiments on arms that the paper did not have."""
 
 import shutil
 from dataclasses import replace
@@ -24,7 +24,6 @@ from pretouch_lab.benchmarks.avoidance.trial import play_trial
 from pretouch_lab.campaign import Request
 from pretouch_lab.cell import Cell, Context
 from pretouch_lab.paper import avoidance, dynamic
-from pretouch_lab.paper.claims import free_motion
 
 ARMS = {
     "six": made.six_axis(changed={k: {"limit": made.STRONG} for k in range(1, 7)}),
@@ -141,11 +140,3 @@ def test_the_scenarios_of_the_avoidance_benchmark_are_set_up_for_it(folder):
     assert person.closest(around)[0].min() == pytest.approx(0.4, abs=1e-3)
     row = play_trial(scenarios()["srdo"], "pretouch", 0, arm=folder)
     assert row["duration_s"] == pytest.approx(9.0, abs=0.05)
-
-
-@pytest.mark.slow
-def test_it_is_left_alone(others):
-    cell = Cell(free_motion.NAME, "blind:detect.f_base_n=1000", {"trajectory": "line", "speed_m_s": 0.3})
-    row, _ = free_motion.trial(cell, 0, others, duration_s=5.0)
-    assert row["path_rms_m"] < 0.02  # it turns round at both ends of the line
-    assert 0.0 < row["norm_median_n"] < 20.0

@@ -1,6 +1,5 @@
 from dataclasses import replace
 from functools import cache
-from importlib import import_module
 from pathlib import Path
 from shutil import copy, copytree
 
@@ -21,7 +20,7 @@ from pretouch_lab.cell import Cell
 from pretouch_lab.cli import figure as cli_figure
 from pretouch_lab.cli.figure import draw_figure
 from pretouch_lab.paper.claims import between
-from pretouch_lab.paper.figures import framework, marks
+from pretouch_lab.paper.figures import marks
 from pretouch_lab.paper.figures.catalogue import CATALOGUE
 from pretouch_lab.paper.figures.circle import circle_figure
 from pretouch_lab.paper.figures.close_up import close_up_figure
@@ -151,26 +150,6 @@ def test_the_force_difference_counts_from_the_touch_away_from_the_object():
     assert len(alone.axes[0].get_legend_handles_labels()[1]) <= 4
 
 
-@pytest.mark.parametrize("function", [function for block in framework.BLOCKS for _, function in block.steps])
-def test_the_framework_names_functions_there_are(function):
-    module, name = function.rsplit(".", 1)
-    assert callable(getattr(import_module(f"pretouch.{module}"), name))
-
-
-def test_the_framework_names_types_there_are_and_says_each():
-    said = "\n".join(text.get_text() for text in framework.framework_figure().axes[0].texts)
-    for flow in framework.FLOWS:
-        if flow.type:
-            module, name = flow.type.rsplit(".", 1)
-            assert isinstance(getattr(import_module(f"pretouch.{module}"), name), type)
-            assert name in said
-        assert flow.words in said
-    for number in ("1", "2", "3", "4", "5-7", "8", "9-10", "11", "12"):
-        assert f"eq. {number}:" in said or f"eqs. {number}:" in said
-    for block in framework.BLOCKS:
-        assert block.name in said
-
-
 @pytest.fixture(scope="module")
 def recorded(context, tmp_path_factory):
     """A recorded trial, and its record."""
@@ -228,16 +207,16 @@ def test_each_figure_is_drawn_from_a_run(run_folder, tmp_path, name):
 
 @pytest.mark.usefixtures("nothing_played")
 @pytest.mark.parametrize(("ending", "begins"), [("png", b"\x89PNG"), ("pdf", b"%PDF"), ("svg", b"<?xml")])
-def test_the_ending_says_the_format(tmp_path, ending, begins):
-    made = draw_figure("framework", out=tmp_path / f"x.{ending}")
+def test_the_ending_says_the_format(run_folder, tmp_path, ending, begins):
+    made = draw_figure("close-up", run_folder, tmp_path / f"x.{ending}")
     assert made.read_bytes().startswith(begins)
 
 
 @pytest.mark.usefixtures("nothing_played")
-def test_a_figure_is_written_here_by_its_name(tmp_path, monkeypatch):
+def test_a_figure_is_written_here_by_its_name(run_folder, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    assert str(draw_figure("framework")) == "framework.png"
-    assert [path.name for path in tmp_path.iterdir()] == ["framework.png"]
+    assert str(draw_figure("close-up", run_folder)) == "close-up.png"
+    assert [path.name for path in tmp_path.iterdir()] == ["close-up.png"]
 
 
 @pytest.mark.usefixtures("nothing_played")

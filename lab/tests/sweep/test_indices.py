@@ -1,4 +1,3 @@
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -6,11 +5,9 @@ import pytest
 from lab.tests.sweep import made
 from lab.tests.sweep.made import A, B
 
-from pretouch_lab.sweep.design import points
+from pretouch_lab.sweep.design import points, sweep_of
 from pretouch_lab.sweep.indices import indices, sobol_indices
-from pretouch_lab.sweep.run import Run
-from pretouch_lab.sweep.store import Result
-from pretouch_lab.sweep.work import Cell
+from pretouch_lab.sweep.play import opened
 
 PI4 = np.pi**4
 V1 = 0.5 * (1 + B * PI4 / 5) ** 2
@@ -28,16 +25,6 @@ def evaluated(samples):
 
 def values_of(sweep):
     return np.array(evaluated(sweep.samples))
-
-
-def played(sweep, tmp_path):
-    """A run whose cells were all played."""
-    chosen = points(sweep)
-    cells = [Cell(str(i), point.values, point.seed, 0.0) for i, point in enumerate(chosen)]
-    run = Run(sweep, tmp_path, chosen, cells)
-    for cell in cells:
-        run.results[cell.key] = Result({"value": made.value(*cell.values.values())}, "", 0.01)
-    return run
 
 
 @pytest.mark.slow
@@ -63,7 +50,7 @@ def test_a_block_with_a_missing_value_is_left_out_whole_and_told():
     values = values_of(sweep)
     values[[3, 4, 100]] = np.nan
     found = sobol_indices(sweep, values)
-    assert (found["blocks"], found["of"]) == (510, 512)
+    assert (found["points"], found["of"]) == (510, 512)
     for row, total in zip(found["rows"], TOTAL, strict=True):
         assert abs(row["total"] - total) < 2 * row["total_95"]
 
@@ -74,30 +61,12 @@ def test_what_does_not_vary_or_is_nowhere_has_no_indices(value):
     assert sobol_indices(sweep, np.full(len(points(sweep)), value))["rows"] == []
 
 
-def test_rank_correlations_of_a_hypercube(tmp_path):
-    sweep = made.ishigami(512, design="lhs")
-    rows = indices(played(sweep, tmp_path))["value"]["rows"]
-    assert rows[0]["low"] > 0.3  # f grows with x1 from -pi/2 to pi/2, and with x3^4 times it
-    for row in rows[1:]:
-        assert row["low"] < 0.0 < row["high"]
-
-
 def test_the_course_over_a_grid(tmp_path):
-    sweep = replace(made.ishigami(design="grid"), vary=made.ishigami().vary[1:2], fixed={}, arms=3)
-    run = Run(sweep, tmp_path, points(sweep), [])
-    run.cells = [Cell(str(i), p.values, p.seed, 0.0) for i, p in enumerate(run.points)]
-    for cell in run.cells:
-        run.results[cell.key] = Result({"value": cell.values["scene.x2"] + cell.seed - 1001}, "", 0.01)
+    sweep = sweep_of("ishigami", {"scene.x2": made.PI}, {}, design="grid", arms=3)
+    run = opened(sweep, tmp_path)
+    made.play(run, tmp_path)
     rows = indices(run)["value"]["rows"]
-    assert [row["level"] for row in rows] == pytest.approx(np.linspace(-np.pi, np.pi, 5))
-    assert [row["median"] for row in rows] == pytest.approx([row["level"] for row in rows], abs=1e-4)
+    levels = np.linspace(-np.pi, np.pi, 5)
+    assert [row["level"] for row in rows] == pytest.approx(levels)
+    assert [row["median"] for row in rows] == pytest.approx([made.value(0.0, x, 0.0) for x in levels], abs=1e-4)
     assert {row["n"] for row in rows} == {3}
-
-
-def test_indices_of_ranks_are_those_of_any_rising_function_of_the_numbers():
-    """One number that is a thousand times the others would else be all of the variance."""
-    sweep, rng = made.ishigami(64), np.random.default_rng(1007)
-    values = rng.uniform(1.0, 2.0, len(points(sweep)))
-    ranked, bent = sobol_indices(sweep, values, True), sobol_indices(sweep, np.exp(values**5), True)
-    assert ranked["rows"] == bent["rows"]
-    assert sobol_indices(sweep, values)["rows"] != sobol_indices(sweep, np.exp(values**5))["rows"]

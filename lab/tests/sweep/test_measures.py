@@ -6,12 +6,12 @@ import pytest
 from pretouch.sensing.skin import paper_skin
 from pretouch_lab.benchmarks.detection.arm import model
 from pretouch_lab.cell import Cell, Context
+from pretouch_lab.engine import run_tasks
 from pretouch_lab.paper import static
-from pretouch_lab.sweep.definition import Asked, sensitivity, smaller, sweep_of
-from pretouch_lab.sweep.design import points
-from pretouch_lab.sweep.registry import MEASURES, measure
+from pretouch_lab.sweep.design import sweep_of
+from pretouch_lab.sweep.play import opened, play_cells
 from pretouch_lab.sweep.setting import built
-from pretouch_lab.sweep.work import cell_of, jobs_of, work
+from pretouch_lab.sweep.streams import MEASURES, measure
 
 DOCS = Path(__file__).parents[3] / "docs"
 
@@ -26,14 +26,20 @@ def test_a_cell_of_the_static_experiment_is_its_trial():
     assert set(found) == set(what.metrics)
 
 
-def test_detectors_of_one_stream_are_one_job_and_other_sensing_is_another():
-    sweep = sweep_of(Asked(
+def played(sweep, out):
+    """Each recorded stream's numbers, one for each detector."""
+    run = opened(sweep, out)
+    run_tasks(run.tasks, out, lambda _: None, processes=1)
+    assert run.failures() == []
+    return [task.row()["metrics"] for task in run.tasks]
+
+
+def test_detectors_of_one_stream_are_one_job_and_other_sensing_is_another(tmp_path):
+    sweep = sweep_of(
         "free-motion", {"detect.f_base_n": "4.5,20", "sensing.rate_hz": "10,50"},
-        fix={"scene.counted_s": "3", "scene.warm_up_s": "2"}, design="grid", arms=1,
-    ))  # fmt: skip
-    jobs = jobs_of(sweep, [cell_of(sweep, point) for point in points(sweep)])
-    assert [len(job.cells) for job in jobs] == [2, 2]
-    low, high = (row["metrics"] for row in json.loads(work(jobs[0].written())))
+        {"scene.counted_s": "3", "scene.warm_up_s": "2"}, design="grid", arms=1,
+    )  # fmt: skip
+    (low, high), (_, _) = played(sweep, tmp_path)
     # nothing but F_b differs, and the margin is F_b less what does not depend on it
     assert high["least_margin_n"] - low["least_margin_n"] == pytest.approx(15.5)
     assert high["alarms"] == 0.0
@@ -41,33 +47,19 @@ def test_detectors_of_one_stream_are_one_job_and_other_sensing_is_another():
     assert low["false_alarms_per_hour"] == pytest.approx(low["alarms"] * 3600 / 3.0, rel=0.01)
 
 
-def test_contacts_are_felt_sooner_with_a_lower_threshold():
-    sweep = sweep_of(Asked(
-        "contacts", {"detect.f_base_n": "6,30"}, fix={"scene.contacts": "4", "scene.warm_up_s": "2"}, design="grid",
-        arms=1,
-    ))  # fmt: skip
-    (job,) = jobs_of(sweep, [cell_of(sweep, point) for point in points(sweep)])
-    low, high = (row["metrics"] for row in json.loads(work(job.written())))
+def test_contacts_are_felt_sooner_with_a_lower_threshold(tmp_path):
+    fixed = {"scene.contacts": "4", "scene.warm_up_s": "2"}
+    ((low, high),) = played(sweep_of("contacts", {"detect.f_base_n": "6,30"}, fixed, design="grid", arms=1), tmp_path)
     assert low["missed"] <= high["missed"]
     assert low["delay_s"] > 0.0
 
 
-def test_a_stream_that_cannot_be_recorded_fails_all_of_its_cells_with_the_reason():
-    sweep = sweep_of(Asked("free-motion", {"detect.f_base_n": "8,9"}, design="grid", arms=1))
-    (job,) = jobs_of(sweep, [cell_of(sweep, point) for point in points(sweep)])
-    asked = json.loads(job.written())
-    for cell in asked["cells"]:
-        cell["values"]["skin.units"] = 999
-    rows = json.loads(work(json.dumps(asked)))
-    assert ["whole number to 64" in row["reason"] for row in rows] == [True, True]
-
-
-def test_the_published_sweeps_can_be_played_and_their_document_has_a_place_for_each():
-    text = (DOCS / "results" / "sensitivity.md").read_text(encoding="utf-8")
-    for sweep in sensitivity("published"):
-        assert f"<!-- {sweep.name}: generated, begin -->" in text
-        assert points(smaller(sweep, 2))
-        assert max(point.seed for point in points(smaller(sweep, 2))) <= 999
+def test_a_stream_that_cannot_be_recorded_fails_all_of_its_cells_with_the_reason(tmp_path):
+    cells = [({"skin.units": 999, "detect.f_base_n": force}, 0) for force in (8.0, 9.0)]
+    play_cells("free-motion", "paper", cells, tmp_path / "cells.json")
+    row = json.loads((tmp_path / "cells.json").read_text())
+    assert "whole number to 64" in row["failed"]
+    assert row["metrics"] == []
 
 
 def test_every_experiment_that_can_be_swept_is_described():

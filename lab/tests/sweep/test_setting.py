@@ -8,7 +8,7 @@ from pretouch.errors import ExperimentError, ParameterError
 from pretouch.profiles import profile
 from pretouch.sim.randomisation import drawn, world_set
 from pretouch_lab.benchmarks.dense_skin import UNITS, units_of
-from pretouch_lab.sweep.definition import Asked, sweep_of
+from pretouch_lab.sweep.design import sweep_of
 from pretouch_lab.sweep.measures import StaticScene
 from pretouch_lab.sweep.setting import built, skin_of, world_digest
 
@@ -84,24 +84,21 @@ def test_a_cell_knows_the_file_its_world_is_of(tmp_path):
 )
 def test_what_cannot_be_swept_is_said_with_the_way_out(experiment, vary, error, words):
     with pytest.raises(error, match=words):
-        sweep_of(Asked(experiment, vary))
+        sweep_of(experiment, vary, {})
 
 
 @pytest.mark.parametrize(
     ("more", "words"),
     [
-        ({"design": "cube"}, "'cube' is unknown: choose from grid, lhs, sobol"),
-        ({"samples": 100}, "samples is 100: give a power of two, 128 for one"),
+        ({"samples": 100}, "samples is 100: give a power of two, 64 for one"),
         ({"arms": 0}, "arms is 0: give 1 to 1000"),
-        ({"metrics": ("force",)}, "does not measure 'force': choose from peak_estimate_n"),
         ({"fix": {"window.alpha": "0.2"}}, "window.alpha is both varied and fixed"),
-        ({"name": "../x"}, "bad one for a folder"),
-        ({"profile": "brave"}, "'brave' is unknown"),
+        ({"profile_text": "brave"}, "'brave' is unknown"),
     ],
 )
 def test_options_that_cannot_be_are_said(more, words):
     with pytest.raises((ExperimentError, ParameterError), match=words):
-        sweep_of(Asked("static", {"window.alpha": "0:1"}, **more))
+        sweep_of("static", {"window.alpha": "0:1"}, **({"fix": {}} | more))
 
 
 def test_more_units_are_those_of_fewer_and_others():

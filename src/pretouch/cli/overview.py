@@ -7,7 +7,7 @@ SHELLS = ("bash", "zsh", "tcsh")
 GROUPS = {
     "Begin with": {
         "live": "a simulated arm in your browser: reach for it",
-        "demo": "the paper's three experiments in small, as a page",
+        "demo": "the paper's three experiments in small",
         "run": "move an arm: simulated, Franka, or over ROS 2",
     },
     "Recordings": {
@@ -26,8 +26,6 @@ GROUPS = {
         "figure": "one figure of the paper",
         "bench": "compare detectors, avoidance, forces, step times",
         "sweep": "vary parameters, and see which matter",
-        "learn": "a policy that reaches among people, shielded and not",
-        "policy": "watch one drive the arm of the live page",
     },
     "Setup": {"warm-up": "compile, once after an installation"},
 }

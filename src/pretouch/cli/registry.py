@@ -24,7 +24,7 @@ OWN = {
     "run": "pretouch.cli.run.options:Run",
 }
 """Class of each command of the product: a table, because a look at all installed distributions takes time."""
-LAB = ("demo", "reproduce", "figure", "bench", "sweep", "identify", "learn", "policy")
+LAB = ("demo", "reproduce", "figure", "bench", "sweep", "identify")
 """Commands of the distribution pretouch-lab."""
 FCI = ("serve-fci",)
 """Commands of the distribution pretouch-fci."""

@@ -1,7 +1,6 @@
 """`pretouch bench`: its docstrings are the help."""
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated
 
 import tyro
@@ -11,30 +10,6 @@ from pretouch.errors import ParameterError
 from pretouch_lab.cli.bench_calibration import Calibration
 from pretouch_lab.cli.bench_real import Real
 from pretouch_lab.cli.benchmarks import Avoidance, Both, Detection, Localization, Shield
-
-
-@dataclass(frozen=True)
-class FreeMotion:
-    """How far the force estimate of an arm left alone is off, and which detectors take that for a contact."""
-
-    seeds: int = 10
-    """Simulated arms; each is left alone for twenty minutes, a quarter of them standing."""
-    arm: str = ""
-    """Name of an arm, or the folder of an imported one; by default the Panda."""
-    out: str = ""
-    """Folder for results, figures and page; by default runs/bench-free-motion."""
-    json: str = ""
-    """File for all trials and their summary; by default results.json in the folder. -: also to standard output, and
-    text to standard error."""
-
-    def run(self) -> None:
-        """Run what is missing, with results, figures and page."""
-        from pretouch_lab.campaign import Request
-        from pretouch_lab.cli.campaigns import run_all
-
-        out = Path(self.out or "runs/bench-free-motion")
-        request = Request(("free-motion",), self.seeds, arm=self.arm or None)
-        run_all([(request, out)], out, self.json)
 
 
 @dataclass(frozen=True)
@@ -69,7 +44,7 @@ class Cycle:
 
 @dataclass(frozen=True)
 class Bench:
-    """Measure something: detectors, ways to avoid people, places of contacts, force estimates, or a step's time."""
+    """Measure something: detectors, ways to avoid people, places of contacts, or a step's time."""
 
     what: (
         Annotated[Detection, tyro.conf.subcommand("detection")]
@@ -77,7 +52,6 @@ class Bench:
         | Annotated[Localization, tyro.conf.subcommand("localization")]
         | Annotated[Shield, tyro.conf.subcommand("shield")]
         | Annotated[Both, tyro.conf.subcommand("both")]
-        | Annotated[FreeMotion, tyro.conf.subcommand("free-motion")]
         | Annotated[Cycle, tyro.conf.subcommand("cycle")]
         | Annotated[Calibration, tyro.conf.subcommand("calibration")]
         | Annotated[Real, tyro.conf.subcommand("real")]

@@ -16,8 +16,6 @@ class Calibration:
 
     skins: int = 20
     """How many; each has a unit on each link from the second on."""
-    compared: bool = False
-    """Also with the method and the motion of Watanabe et al. (arXiv 2110.14516); takes longer."""
     find_links: bool = False
     """Do not tell the calibration which links the units sit on."""
     motion: MotionOptions = field(default_factory=MotionOptions)
@@ -39,7 +37,7 @@ def bench_calibration(command: Calibration) -> None:
 
     from pretouch.cli.tables import show
     from pretouch.cli.writing import numbers_to
-    from pretouch_lab.studies.calibration.table import tables
+    from pretouch_lab.studies.calibration.table import by_link
 
     if command.skins < 1:
         raise CalibrationError(f"The number of skins is {command.skins}: give at least 1.")
@@ -47,8 +45,8 @@ def bench_calibration(command: Calibration) -> None:
         raise CalibrationError(f"The seed is {command.seed}: it must be at least 0.")
     with numbers_to(command.json) as write:
         found = study_of(command)
-        show(Console(highlight=False), tables(found))
-        write(found.as_json())
+        show(Console(highlight=False), [by_link(found)])
+        write({"rows": found.rows, "motion_s": found.motion_s, "compute_s": found.compute_s})
 
 
 def study_of(command: Calibration) -> "Study":
@@ -65,8 +63,8 @@ def study_of(command: Calibration) -> "Study":
     model = RobotModel(robot_named(command.arm))
     plan = None if command.motion == MotionOptions() else plan_motion(model, plan_params(command.motion))
     name = "simulations"
-    with bar(Console(stderr=True), name, command.skins * (1 + command.compared)) as advance:
+    with bar(Console(stderr=True), name, command.skins) as advance:
         return study(
-            model, command.skins, command.seed, command.compared, not command.find_links, plan,
+            model, command.skins, command.seed, not command.find_links, plan,
             progress=lambda: advance(1, name),
         )  # fmt: skip

@@ -1,6 +1,5 @@
 """`pretouch bench real`: the detectors on public recordings of real arms."""
 
-import os
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,8 +19,7 @@ class Real:
     folder: tyro.conf.Positional[Path]
     """Of the sets, each by its name, with `arms` as `pretouch robot import` wrote them."""
     detectors: str = ""
-    """Profiles, separated by commas, and learnt, a baseline that is trained on the half that is not judged; by default
-    fixed, observer, learnt, paper and pretouch."""
+    """Profiles, separated by commas; by default fixed, observer, paper and pretouch."""
     json: str = ""
     """File for the rows, or - for standard output: text then goes to standard error."""
 
@@ -39,15 +37,13 @@ def bench_real(command: Real) -> None:
     from pretouch.cli.writing import numbers_to
     from pretouch.profiles import profile
     from pretouch_lab.benchmarks.real.bench import DETECTORS, Work, play, tables_of
-    from pretouch_lab.benchmarks.real.learnt import LEARNT
     from pretouch_lab.benchmarks.real.sets import sets_in
     from pretouch_lab.cli.progress import bar
     from pretouch_lab.engine import run_jobs
 
     detectors = words(command.detectors) or DETECTORS
     for name in detectors:
-        if name != LEARNT:
-            profile(name)  # an hour later would be late
+        profile(name)  # an hour later would be late
     sets, missing = sets_in(command.folder)
     works = [Work(command.folder, each.name, name) for each in sets for name in detectors]
     rows: dict[Work, Any] = {}
@@ -60,7 +56,7 @@ def bench_real(command: Real) -> None:
                 rows[work] = found
                 advance(1, "recordings")
 
-            run_jobs(works, lambda work: (play, work), os.cpu_count() or 1, done)
+            run_jobs(works, play, None, done)
         found = [row for work in works for row in rows[work]]
         show(Console(highlight=False), tables_of(found))
         write({"sets": {each.name: each.source for each in sets}, "left_out": missing, "rows": found})

@@ -1,4 +1,4 @@
-"""Running campaigns from the command line: progress, results whatever happens, tables and page."""
+"""Running campaigns from the command line: progress, results whatever happens, tables and figures."""
 
 import os
 import sys
@@ -13,25 +13,20 @@ from pretouch.atomic_write import write_json
 from pretouch.cli.tables import show
 from pretouch.cli.writing import STANDARD_OUTPUT, check_writable, numbers_to, unwritable_said
 from pretouch.errors import ExperimentError, PretouchError
-from pretouch.text_table import TextTable
 from pretouch_lab.campaign import Request
 from pretouch_lab.cli.progress import bar
 from pretouch_lab.engine import missing, rows_of, run_tasks
-from pretouch_lab.registry import conclusions, summarise, tables
+from pretouch_lab.registry import summarise, tables
 from pretouch_lab.report import write_report
-from pretouch_lab.rows import Row
 
 
-def run_all(
-    parts: list[tuple[Request, Path]], folder: Path, json: str = "", what: Callable[[Row], list[TextTable]] = tables
-) -> None:
-    """Run one or more campaigns; whatever happens, summarise and keep what was finished.
+def run_all(parts: list[tuple[Request, Path]], folder: Path, json: str = "") -> None:
+    """Run one or more campaigns and show their tables; whatever happens, summarise and keep what was finished.
 
-    In the end it says what came out, after the tables that `what` makes of the summary. `json` is as `results_to`
-    takes it.
+    `json` is as `results_to` takes it.
     """
     with results_to(json, folder) as (json_file, write):
-        write(_run_all(parts, folder, json_file, what))
+        write(_run_all(parts, folder, json_file))
 
 
 @contextmanager
@@ -42,9 +37,7 @@ def results_to(json: str, folder: Path) -> Iterator[tuple[Path, Callable[[Any], 
         yield Path(json) if json and not printed else folder / "results.json", write
 
 
-def _run_all(
-    parts: list[tuple[Request, Path]], folder: Path, json_file: Path, what: Callable[[Row], list[TextTable]]
-) -> dict[str, Any]:
+def _run_all(parts: list[tuple[Request, Path]], folder: Path, json_file: Path) -> dict[str, Any]:
     for _, out in parts:
         _check_apart(json_file, out)
     for request, out in parts:
@@ -69,10 +62,8 @@ def _run_all(
     results = _keep(parts, json_file)
     summary = results["summary"]
     console = Console(highlight=False)
-    show(console, what(summary))
-    for said in conclusions(summary):
-        console.print(f"{said}\n")
-    console.print(f"Figures and page: {write_report(parts, summary, folder)}", soft_wrap=True, markup=False)
+    show(console, tables(summary))
+    console.print(f"Tables and figures: {write_report(parts, summary, folder)}", soft_wrap=True, markup=False)
     console.print(f"Numbers: {json_file}", soft_wrap=True, markup=False)
     return results
 

@@ -20,13 +20,13 @@ class Demo:
     seeds: int = 4
     """Trials of each cell of the static experiment; the other two take one."""
     out: str = ""
-    """Folder for results, figures and page; by default a new one under runs/."""
+    """Folder for results, tables and figures; by default a new one under runs/."""
     json: str = ""
     """File for all trials and their summary; by default results.json in the folder. -: also to standard output, and
     text to standard error."""
 
     def run(self) -> None:
-        """Play it, with results, figures and page."""
+        """Play it, with results, tables and figures."""
         from pretouch.cli.warm_up import prepare
         from pretouch.profiles import profile
         from pretouch_lab.campaign import Request
@@ -36,8 +36,8 @@ class Demo:
         few = Request(("avoidance", "dynamic"), seeds=1, profiles=_DEMONSTRATED)
         many = Request(("static",), seeds=self.seeds, profiles=_DEMONSTRATED)
         prepare(profile("pretouch"))  # each worker would compile the same, and the bar would stand still
-        # the long trials first, so that the bar moves on in small steps towards the end; tables are on the page
-        run_all([(few, out / "people"), (many, out / "static")], out, self.json, lambda _: [])
+        # the long trials first, so that the bar moves on in small steps towards the end
+        run_all([(few, out / "people"), (many, out / "static")], out, self.json)
 
 
 @dataclass(frozen=True)
@@ -45,15 +45,15 @@ class Reproduce:
     """Run the paper's experiments in full. A run that was stopped goes on where it was, with the same parameters."""
 
     experiment: tyro.conf.Positional[str] = "all"
-    """static (paper IV-A), avoidance (IV-B), dynamic (IV-C), one of the studies of its claims and weaknesses, or all of
-    them, which takes about an hour and a quarter on two processors."""
+    """static (paper IV-A), avoidance (IV-B), dynamic (IV-C), between (its close-up), one of the studies, or all,
+    which takes about half an hour on two processors."""
     seeds: int = 12
     """Trials of each cell; each seed is another arm with other errors, noise and geometry."""
     first_seed: int = 0
     """The first of them; only seed 0 is recorded and drawn unasked."""
     profiles: str = "blind,paper"
-    """Profiles to compare, separated by commas. PROFILE:GROUP.FIELD=VALUE is one with another parameter. With `all`,
-    and where only the force estimate is studied, the studies have their own."""
+    """Profiles to compare, separated by commas. PROFILE:GROUP.FIELD=VALUE is one with another parameter. With `all`
+    the studies have their own."""
     restrictions: str = ""
     """off, hard, slack or floor, or several of them; by default off in the static experiment and slack in others."""
     orientation: str = ""
@@ -71,13 +71,13 @@ class Reproduce:
     record: str = "first"
     """first: record the trials of the first seed of which figures are drawn; all: record every trial."""
     out: str = ""
-    """Folder for results, recordings, figures and page; by default runs/reproduce-EXPERIMENT."""
+    """Folder for results, recordings, tables and figures; by default runs/reproduce-EXPERIMENT."""
     json: str = ""
     """File for all trials and their summary; by default results.json in the folder. -: also to standard output, and
     text to standard error."""
 
     def run(self) -> None:
-        """Run the experiments, with results, recordings, figures and page."""
+        """Run the experiments, with results, recordings, tables and figures."""
         from pretouch.sim.plant_params import assumed_plant
         from pretouch_lab.campaign import Request
         from pretouch_lab.cli.campaigns import run_all
@@ -113,7 +113,7 @@ class Figure:
     """Draw one figure of the paper, from a run that is there or from trials played for it."""
 
     name: tyro.conf.Positional[str]
-    """circle (Fig. 4), interaction (Fig. 5), close-up (Fig. 6), force-difference (Fig. 7) or framework (Fig. 2)."""
+    """circle (Fig. 4), interaction (Fig. 5), close-up (Fig. 6) or force-difference (Fig. 7)."""
     run_folder: Annotated[str, tyro.conf.arg(name="run")] = ""
     """Folder of a run of `reproduce` or `demo` to draw it from; by default what is needed is played first."""
     out: str = ""

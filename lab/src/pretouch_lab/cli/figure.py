@@ -47,7 +47,7 @@ def draw_figure(
     if place.suffix not in _ENDINGS:
         raise ExperimentError(f"The figure {place} has no ending that says its format: use {', '.join(_ENDINGS)}.")
     check_writable("figure", place)
-    played, units = _recorded(cells, run, seed) if run and cells else _played(cells, seed)
+    played, units = _recorded(cells, run, seed) if run else _played(cells, seed)
     image = BytesIO()
     wanted.draw(played, units, used).savefig(image, format=place.suffix[1:], dpi=_DOTS_PER_INCH)
     with unwritable_said("figure", place):

@@ -14,7 +14,6 @@ from pretouch.sim.scene import HandSpec
 from pretouch.types import FloatArray
 from pretouch_lab.cell import Cell, Context, Grid
 from pretouch_lab.experiment import Experiment, Picture, Sources
-from pretouch_lab.paper.conclusions import avoidance_conclusion
 from pretouch_lab.rows import Row, rounded
 from pretouch_lab.summary import avoidance_summary
 from pretouch_lab.tables import avoidance_tables
@@ -103,6 +102,4 @@ def _draw(sources: Sources) -> list[Picture]:
     return made
 
 
-EXPERIMENT = Experiment(
-    NAME, cells, trial, lambda _: _DURATION_S, avoidance_summary, avoidance_tables, _draw, avoidance_conclusion
-)
+EXPERIMENT = Experiment(NAME, cells, trial, lambda _: _DURATION_S, avoidance_summary, avoidance_tables, _draw)

@@ -11,7 +11,6 @@ from pretouch.traces import mean_over
 from pretouch.types import ControlStep, FloatArray
 from pretouch_lab.cell import Cell, Context, Grid
 from pretouch_lab.experiment import Experiment, Picture, Sources
-from pretouch_lab.paper.conclusions import dynamic_conclusion
 from pretouch_lab.rows import Row, angle_deg, peak, rounded
 from pretouch_lab.summary import dynamic_summary
 from pretouch_lab.tables import dynamic_tables
@@ -142,6 +141,4 @@ def _draw(sources: Sources) -> list[Picture]:
     return made
 
 
-EXPERIMENT = Experiment(
-    NAME, cells, trial, lambda _: _DURATION_S, dynamic_summary, dynamic_tables, _draw, dynamic_conclusion
-)
+EXPERIMENT = Experiment(NAME, cells, trial, lambda _: _DURATION_S, dynamic_summary, dynamic_tables, _draw)

@@ -11,7 +11,6 @@ from pretouch.traces import mean_over
 from pretouch.types import ControlStep
 from pretouch_lab.cell import Cell, Context, Grid
 from pretouch_lab.experiment import Experiment, Picture, Sources
-from pretouch_lab.paper.conclusions import static_conclusion
 from pretouch_lab.rows import Row, peak, rounded
 from pretouch_lab.summary import static_summary
 from pretouch_lab.tables import shown_controllers, static_tables
@@ -139,4 +138,4 @@ def _draw(sources: Sources) -> list[Picture]:
     return [Picture("static", "Force and contact thresholds at the static object", figure)]
 
 
-EXPERIMENT = Experiment(NAME, cells, trial, _cost, static_summary, static_tables, _draw, static_conclusion)
+EXPERIMENT = Experiment(NAME, cells, trial, _cost, static_summary, static_tables, _draw)

@@ -4,6 +4,7 @@ from itertools import product
 
 import numpy as np
 
+from pretouch.control.path import Circle, Path, WayPoints
 from pretouch.perception.obstacles import placed_sensors
 from pretouch.perception.scene_filter import expected_range
 from pretouch.profiles import profile
@@ -18,7 +19,6 @@ from pretouch_lab.paper import static
 from pretouch_lab.rows import Row, rounded
 from pretouch_lab.studies.mounting_tables import NAME, ROOM, summarise, tables
 from pretouch_lab.trial import Record, Setup, play
-from pretouch_lab.weaknesses import views
 
 _POSITIONS_MM = (2.0, 5.0, 10.0, 20.0, 30.0, 50.0)
 _ORIENTATIONS_DEG = (1.0, 2.0, 5.0, 10.0, 20.0)
@@ -81,7 +81,7 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
     empty = side == ROOM
     scene = SceneSpec() if empty else static_scene(trajectory, side, _STIFFNESS_N_PER_M, seed)
     setup = context.setup(
-        cell, seed, scene, views.path(trajectory) if empty else static_path(trajectory, side), believed=believed
+        cell, seed, scene, _way(trajectory) if empty else static_path(trajectory, side), believed=believed
     )
     record = play(setup, (lambda step, _: step.stamp >= _ROOM_S) if empty else static.done_after_contact())
     row = {
@@ -96,6 +96,13 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
     }
     row["detected"] = row["detection_delay_s"] is not None
     return row, record
+
+
+def _way(trajectory: str) -> Path:
+    """Return the paper's circle, or its line to and fro."""
+    if trajectory == "circle":
+        return Circle()
+    return WayPoints(np.array([(0.4, 0.5, 0.5), (0.4, -0.5, 0.5)]), closed=True)
 
 
 def free_motion(record: Record) -> Row:

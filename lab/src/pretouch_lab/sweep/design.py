@@ -1,28 +1,60 @@
-"""Which cells a sweep plays.
+"""A sweep: what is varied, and which cells are played.
 
 A seed is a simulated arm in a scene: masses, friction, noise, where the board stands. A grid plays each combination
-with the same arms, so that two of its points differ by their parameters alone (common random numbers). In a Latin
-hypercube and for Sobol indices the arm is one more column of the design, `seed`: its index says how much of what is
-seen is due to which arm it was, and no parameter's index holds a part of that.
+with the same arms, so that two of its points differ by their parameters alone (common random numbers). For Sobol
+indices the arm is one more column of the design, `seed`: its index says how much of what is seen is due to which arm it
+was, and no parameter's index holds a part of that.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import product
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from pretouch.errors import ExperimentError, PretouchError
-from pretouch.types import FloatArray
-from pretouch_lab.sweep.definition import Sweep
-from pretouch_lab.sweep.setting import Values
-from pretouch_lab.sweep.space import Dimension
+from pretouch.profiles import profile
+from pretouch_lab.benchmarks.scenario_files import SeedRange
+from pretouch_lab.sweep.measures import Measure
+from pretouch_lab.sweep.setting import Setting, Values, built, current
+from pretouch_lab.sweep.space import Dimension, dimension, read_value
+from pretouch_lab.sweep.streams import measure
 
+Design = Literal["grid", "sobol"]
 SEED = "seed"
 LARGEST = 200_000
 """Cells of one sweep."""
 _DRAWN_WITH = 20_211_116
 """Seed of the designs themselves: the same sweep always has the same cells."""
+_SEED_RANGES: dict[SeedRange, tuple[int, int]] = {"published": (0, 999), "development": (1000, 1999)}
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """One sweep, checked."""
+
+    measure: Measure
+    """The experiment."""
+    profile: str
+    """As `pretouch.profiles.profile` reads it."""
+    vary: tuple[Dimension, ...]
+    fixed: Values
+    design: Design
+    samples: int
+    """Base points of the Sobol sequence; a grid has its levels."""
+    seeds: range
+    """Of the simulated arms."""
+
+    @property
+    def columns(self) -> list[Dimension]:
+        """Columns of the Sobol design: what is varied, and the arm if there are several."""
+        arm = [Dimension(SEED, choices=tuple(self.seeds))] if len(self.seeds) > 1 else []
+        return [*self.vary, *arm]
+
+    def setting(self, point: "Point") -> Setting:
+        """Make the setting of a cell."""
+        return built(self.profile, self.measure.scene, self.fixed | point.values, point.seed)
 
 
 @dataclass(frozen=True)
@@ -33,10 +65,53 @@ class Point:
     seed: int
 
 
-def columns(sweep: Sweep) -> list[Dimension]:
-    """Return the columns of a hypercube: what is varied, and the arm if there are several."""
-    arm = [Dimension(SEED, choices=tuple(sweep.arm_seeds))] if sweep.arms > 1 else []
-    return [*sweep.vary, *arm]
+def sweep_of(
+    experiment: str, vary: Mapping[str, str], fix: Mapping[str, str], profile_text: str = "", design: Design = "sobol",
+    samples: int = 64, arms: int = 16, seeds: SeedRange = "development",
+) -> Sweep:  # fmt: skip
+    """Read and check a sweep.
+
+    Args:
+        experiment: name of a `Measure`.
+        vary: range of each parameter that is varied, as `space.dimension` reads it.
+        fix: value of each one that is something else throughout.
+        profile_text: profile to start from; empty: the experiment's own.
+        design: all combinations, or Saltelli's for Sobol indices.
+        samples: base points of the latter, a power of two.
+        arms: simulated arms.
+        seeds: of which range these are.
+
+    Raises an error of this package for what cannot be swept.
+    """
+    what = measure(experiment)
+    base = profile(profile_text or what.profile)
+    if not vary:
+        raise ExperimentError("Nothing is varied: give --vary NAME=LOW:HIGH, detect.f_base_n=5:15 for one.")
+    now = {name: current(name, base, what.scene) for name in (*vary, *fix)}
+    for name in now:
+        what.check(name)
+    both = [name for name in vary if name in fix]
+    if both:
+        raise ExperimentError(f"The parameter {both[0]} is both varied and fixed: do one of them.")
+    if design == "sobol" and (samples < 2 or samples & (samples - 1)):
+        raise ExperimentError(f"The number of samples is {samples}: give a power of two, 64 for one.")
+    first, last = _SEED_RANGES[seeds]
+    if not 1 <= arms <= last - first + 1:
+        raise ExperimentError(f"The number of arms is {arms}: give 1 to {last - first + 1}.")
+    sweep = Sweep(
+        what, profile_text or what.profile, tuple(dimension(name, text, now[name]) for name, text in vary.items()),
+        {name: read_value(name, text, now[name]) for name, text in fix.items()}, design, samples,
+        range(first, first + arms),
+    )  # fmt: skip
+    for one in sweep.vary:
+        for value in one.ends:
+            try:
+                sweep.setting(Point({one.name: value}, 0))
+            except PretouchError as error:
+                raise ExperimentError(
+                    f"The range of {one.name} holds {value}, which is not allowed: {error}"
+                ) from error
+    return sweep
 
 
 def points(sweep: Sweep) -> list[Point]:
@@ -44,59 +119,43 @@ def points(sweep: Sweep) -> list[Point]:
 
     For Sobol indices these are `samples` blocks of D + 2: Saltelli's A, A with each column from B, and B.
     """
-    found = _points(sweep)
-    for point in found:
+    cells = _grid(sweep) if sweep.design == "grid" else _saltelli(sweep)
+    for point in cells:
         try:
-            sweep.setting(point.values, point.seed)
+            sweep.setting(point)
         except PretouchError as error:
             listed = ", ".join(f"{name} = {value}" for name, value in point.values.items())
             raise ExperimentError(f"Values go not together, {listed}: {error} Narrow a range.") from error
-    return found
+    return cells
 
 
-def _points(sweep: Sweep) -> list[Point]:
-    if sweep.design == "grid":
-        levels = [one.grid() for one in sweep.vary]
-        _check_count(int(np.prod([len(values) for values in levels])) * sweep.arms)
-        names = [one.name for one in sweep.vary]
-        return [
-            Point(dict(zip(names, chosen, strict=True)), seed)
-            for chosen in product(*levels)
-            for seed in sweep.arm_seeds
-        ]
-    wanted = columns(sweep)
-    blocks = len(wanted) + 2 if sweep.design == "sobol" else 1
-    _check_count(sweep.samples * blocks)
-    rows = saltelli(wanted, sweep.samples) if sweep.design == "sobol" else _hypercube(len(wanted), sweep.samples)
-    return [_point(wanted, row, sweep) for row in rows]
+def _grid(sweep: Sweep) -> list[Point]:
+    names, levels = [one.name for one in sweep.vary], [one.grid() for one in sweep.vary]
+    count = len(sweep.seeds)
+    for level in levels:
+        count *= len(level)
+    _check_count(count)
+    return [Point(dict(zip(names, values, strict=True)), seed) for values in product(*levels) for seed in sweep.seeds]
+
+
+def _saltelli(sweep: Sweep) -> list[Point]:
+    from SALib.sample import sobol
+
+    columns = sweep.columns
+    _check_count(sweep.samples * (len(columns) + 2))
+    unit = sobol.sample(
+        problem(columns), sweep.samples, calc_second_order=False, seed=np.random.default_rng(_DRAWN_WITH)
+    )
+    rows = [{one.name: one.at(float(part)) for one, part in zip(columns, row, strict=True)} for row in unit]
+    return [Point(row, int(row.pop(SEED, sweep.seeds[0]))) for row in rows]
+
+
+def problem(columns: list[Dimension]) -> dict[str, Any]:
+    """Return the columns as SALib names them: parts of their ranges, from 0 to 1."""
+    names = [one.name for one in columns]
+    return {"num_vars": len(names), "names": names, "bounds": [[0.0, 1.0]] * len(names)}
 
 
 def _check_count(count: int) -> None:
     if count > LARGEST:
-        raise ExperimentError(f"The sweep has {count} cells: take fewer samples, levels or arms, at most {LARGEST}.")
-
-
-def _point(wanted: list[Dimension], row: FloatArray, sweep: Sweep) -> Point:
-    values = {one.name: one.at(float(part)) for one, part in zip(wanted, row, strict=True)}
-    return Point(values, int(values.pop(SEED, sweep.arm_seeds[0])))
-
-
-def _hypercube(columns: int, samples: int) -> FloatArray:
-    from scipy.stats.qmc import LatinHypercube
-
-    return np.asarray(LatinHypercube(columns, rng=np.random.default_rng(_DRAWN_WITH)).random(samples))
-
-
-def problem(wanted: list[Dimension]) -> dict[str, Any]:
-    """Return the columns as SALib knows them: parts of their ranges."""
-    return {
-        "num_vars": len(wanted), "names": [one.name for one in wanted], "bounds": [[0.0, 1.0]] * len(wanted),
-    }  # fmt: skip
-
-
-def saltelli(wanted: list[Dimension], samples: int) -> FloatArray:
-    """Return parts (samples * (D + 2), D) of the ranges, for first-order and total indices."""
-    from SALib.sample import sobol
-
-    rows = sobol.sample(problem(wanted), samples, calc_second_order=False, seed=np.random.default_rng(_DRAWN_WITH))
-    return np.asarray(rows)
+        raise ExperimentError(f"The sweep has {count} cells, more than {LARGEST}: take fewer samples, levels or arms.")

@@ -7,6 +7,7 @@ import numpy as np
 
 from pretouch.checks import Check, Checked, NonNegative
 from pretouch.contact.decaying_velocity import DecayingVelocity
+from pretouch.errors import ExperimentError
 from pretouch_lab.baselines.detection import Baseline
 from pretouch_lab.benchmarks.detection.arm import Sensing, model
 from pretouch_lab.benchmarks.detection.contacts import ContactCell, contact_stream, touches_of
@@ -14,7 +15,7 @@ from pretouch_lab.benchmarks.detection.free import FreeCell, free_stream
 from pretouch_lab.benchmarks.detection.judge import BUSY, PERIOD_S, matched
 from pretouch_lab.benchmarks.detection.replay import begun, replay
 from pretouch_lab.benchmarks.detection.stream import Stream
-from pretouch_lab.sweep.measures import Measure, Numbers
+from pretouch_lab.sweep.measures import CLOSED_LOOP, Measure, Numbers
 from pretouch_lab.sweep.setting import Setting
 
 _HAND_RADIUS_M = 0.05
@@ -124,3 +125,12 @@ ON_STREAMS = (
     ),
 )  # fmt: skip
 """Experiments whose arm does nothing: only detection and what it is given matter."""
+MEASURES: dict[str, Measure] = {m.name: m for m in (*CLOSED_LOOP, *ON_STREAMS)}
+"""All experiments that can be swept, by name."""
+
+
+def measure(name: str) -> Measure:
+    """Look an experiment up. Raises ExperimentError."""
+    if name not in MEASURES:
+        raise ExperimentError(f"The experiment {name!r} cannot be swept: choose from {', '.join(MEASURES)}.")
+    return MEASURES[name]

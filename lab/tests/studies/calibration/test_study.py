@@ -1,4 +1,3 @@
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -10,8 +9,8 @@ from pretouch.calibration.result import Place
 from pretouch.errors import ExperimentError
 from pretouch_lab.studies.calibration.errors import NOT_FOUND, place_row
 from pretouch_lab.studies.calibration.random_skin import random_skin
-from pretouch_lab.studies.calibration.study import OURS, WATANABE, WATANABE_UNBIASED, Study, Trial, study
-from pretouch_lab.studies.calibration.table import tables
+from pretouch_lab.studies.calibration.study import Study, study
+from pretouch_lab.studies.calibration.table import by_link
 
 NONE = np.zeros(3)
 
@@ -70,41 +69,15 @@ def row(link: str, error: float) -> dict:
     }  # fmt: skip
 
 
-def made_study() -> Study:
-    def trial(method: str, motion: str, factor: float, took: float) -> Trial:
-        rows = [row("link2", 0.001 * factor), row("link3", 0.003 * factor)]
-        return Trial(0, method, motion, rows, took)
-
-    lost = Trial(1, OURS, OURS, [{"skin": 1, "unit": "on_link2", "link": "link2", **NOT_FOUND}, row("link3", 0.002)], 3)
-    return Study(
-        [trial(OURS, OURS, 1, 1.0), trial(WATANABE, OURS, 10, 2.0), lost, trial(WATANABE, WATANABE, 20, 5.0)],
-        {OURS: 60.0, WATANABE: 100.0},
-    )
-
-
-def test_tables_show_each_link_and_each_pair_of_method_and_motion():
-    by_link, by_method = tables(made_study())
-    assert [line[0] for line in by_link.rows] == ["link2", "link3", "all"]
-    assert by_link.rows[0][:3] == ("link2", "1/2", "1.00")
-    assert by_link.rows[2][:4] == ("all", "3/4", "2.00", "3.00")
-    assert by_link.rows[2][-1] == "1.00"
-    assert {line[:4] for line in by_method.rows} == {
-        (OURS, OURS, "60", "2.00"),
-        (WATANABE, OURS, "60", "20.00"),
-        (WATANABE, WATANABE, "100", "40.00"),
-    }
-    assert "2.0 s a skin" in by_link.note
-
-
-def test_the_file_holds_our_rows_and_what_they_are_compared_with():
-    written = json.loads(json.dumps(made_study().as_json(), allow_nan=False))
-    assert written["motion_s"] == 60.0
-    assert written["compute_s"] == 2.0
-    assert [r["position_error_m"] for r in written["rows"]] == [0.001, 0.003, None, 0.002]
-    assert [(c["method"], c["motion"], c["compute_s"]) for c in written["compared"]] == [
-        (WATANABE, OURS, 2.0),
-        (WATANABE, WATANABE, 5.0),
-    ]
+def test_the_table_shows_each_link_and_all():
+    rows = [row("link2", 0.001), row("link3", 0.003), row("link3", 0.002)]
+    rows.append({"skin": 1, "unit": "on_link2", "link": "link2", **NOT_FOUND})
+    table = by_link(Study(rows, 60.0, 2.0))
+    assert [line[0] for line in table.rows] == ["link2", "link3", "all"]
+    assert table.rows[0][:3] == ("link2", "1/2", "1.00")
+    assert table.rows[2][:4] == ("all", "3/4", "2.00", "3.00")
+    assert table.rows[2][-1] == "1.00"
+    assert "2.0 s a skin" in table.note
 
 
 def test_no_skins_are_refused(panda_model):
@@ -116,28 +89,17 @@ def test_no_skins_are_refused(panda_model):
 def test_a_study_of_one_skin_on_a_short_motion_finds_its_units(panda_model):
     said: list[str] = []
     made = study(
-        panda_model,
-        1,
-        compared=False,
-        plan=short_plan(postures=3, swing_s=6.0),
-        processes=1,
-        progress=lambda: said.append("done"),
+        panda_model, 1, plan=short_plan(postures=3, swing_s=6.0), processes=1, progress=lambda: said.append("done")
     )
     assert said == ["done"]
-    assert len(made.rows()) == 7
-    assert np.median([r["position_error_m"] for r in made.rows()]) < 0.003
-    assert len(tables(made)) == 1
+    assert len(made.rows) == 7
+    assert np.median([r["position_error_m"] for r in made.rows]) < 0.003
 
 
 @pytest.mark.slow
-def test_of_the_paper_s_skins_ours_find_units_ten_times_better_than_the_baseline(panda_model):
+def test_units_of_two_skins_are_found(panda_model):
     made = study(panda_model, skins=2, processes=2)
-
-    def median(method: str, motion: str, key: str = "position_error_m") -> float:
-        return float(np.median([r[key] for r in made.rows(method, motion)]))
-
-    assert median(OURS, OURS) < 0.003
-    assert median(OURS, OURS, "orientation_error_deg") < 0.5
-    assert made.motion_s[OURS] <= 90.0
-    assert min(median(WATANABE, OURS), median(WATANABE, WATANABE)) > 10 * median(OURS, OURS)
-    assert median(WATANABE_UNBIASED, WATANABE) < 0.005
+    assert [r["skin"] for r in made.rows] == 7 * [0] + 7 * [1]
+    assert np.median([r["position_error_m"] for r in made.rows]) < 0.003
+    assert np.median([r["orientation_error_deg"] for r in made.rows]) < 0.5
+    assert made.motion_s <= 90.0

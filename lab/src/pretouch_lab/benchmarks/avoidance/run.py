@@ -2,12 +2,11 @@
 
 import re
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import partial
 from hashlib import sha256
 from typing import ClassVar
 
 from pretouch.errors import ExperimentError
-from pretouch.profiles import profile
 from pretouch.robot.description_file import files_digest
 from pretouch.robot.named import robot_named
 from pretouch_lab.baselines.avoidance import ABLATED, ABLATED_IN, ABLATED_SEEDS, BASELINES, profile_text
@@ -16,7 +15,6 @@ from pretouch_lab.benchmarks.avoidance.setting import PANDA, place
 from pretouch_lab.benchmarks.avoidance.trial import keep_trial
 from pretouch_lab.benchmarks.bench import Bench, Found
 from pretouch_lab.engine import Task, rows_of
-from pretouch_lab.result_key import result_key
 from pretouch_lab.rows import Row
 
 
@@ -84,10 +82,9 @@ class AvoidanceBench(Bench):
 
 
 def _task(bench: AvoidanceBench, scene: Scenario, baseline: str, seed: int) -> Task:
-    text = profile_text(baseline)
     digest = sha256(f"{baseline} {scene.name}".encode()).hexdigest()[:6]
     plain = re.sub(r"[^A-Za-z0-9.-]+", "-", f"{scene.name}_{baseline}")[:60]
-    file = bench.out / "trials" / f"{plain}_{digest}_{_key(text)}_{seed:04d}.json"
+    file = bench.out / "trials" / f"{plain}_{digest}_{seed:04d}.json"
     return Task(file, partial(keep_trial, scene.name, baseline, seed, bench.world, bench.arm), _cost(scene, baseline))
 
 
@@ -100,9 +97,3 @@ def _cost(scene: Scenario, baseline: str) -> float:
 _COST = 0.15
 """Processor time of a simulated second, measuring included [s]."""
 _SOON = ("blind", "pretouch", *ABLATED)
-
-
-@cache
-def _key(text: str) -> str:
-    """Return the key of the trials of a profile."""
-    return result_key(keep_trial, profile=profile(text))

@@ -25,7 +25,6 @@ from pretouch_lab.benchmarks.detection.stream import PROFILE, Stream, StreamReco
 from pretouch_lab.benchmarks.scenario_files import scenario, scenario_path
 from pretouch_lab.domain_randomisation import Parts, randomised
 from pretouch_lab.ghost import Ghost
-from pretouch_lab.paper.claims.free_run import Standing
 from pretouch_lab.trial import SETTLE_S
 
 AWAY = np.array([0.0, 0.0, 4.0])
@@ -74,6 +73,24 @@ def path_of(name: str) -> Path:
     if name == "line":
         return WayPoints(np.array([[0.4, 0.5, 0.5], [0.4, -0.5, 0.5]]), closed=True)
     return Circle() if name == "circle" else Standing(Circle().point(0.0))
+
+
+@dataclass(frozen=True)
+class Standing:
+    """A path that is one point, so that the arm stands."""
+
+    at: FloatArray
+    """(3,) [m], base frame."""
+    length: float = 0.0
+    closed: bool = False
+
+    def point(self, _phase: float) -> FloatArray:
+        """Return the point (3,) [m]."""
+        return self.at
+
+    def tangent(self, _phase: float) -> FloatArray:
+        """Return no direction (3,)."""
+        return np.zeros(3)
 
 
 @dataclass(frozen=True)

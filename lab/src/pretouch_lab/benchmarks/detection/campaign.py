@@ -1,12 +1,10 @@
 """All work of the detection benchmark: streams to record, detectors to replay on them, boards to meet."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import ClassVar
 
-from pretouch.profiles import profile
 from pretouch_lab.baselines.detection import BASELINES, Baseline, ablated
 from pretouch_lab.benchmarks.bench import Bench, Found
 from pretouch_lab.benchmarks.detection.boards import COST_S, BoardCell, board_cells, meet_board
@@ -15,15 +13,9 @@ from pretouch_lab.benchmarks.detection.free import FreeCell, free_cells, record_
 from pretouch_lab.benchmarks.detection.hard import HardCell, hard_cells, record_hard
 from pretouch_lab.benchmarks.detection.judge import judge_contacts, judge_free
 from pretouch_lab.benchmarks.detection.results import Rows
-from pretouch_lab.benchmarks.detection.stream import PROFILE
 from pretouch_lab.benchmarks.scenario_files import scenario
 from pretouch_lab.engine import Task, rows_of
-from pretouch_lab.result_key import result_key
 
-_RECORD: dict[str, Callable[..., None]] = {
-    "free": record_free, "contacts": record_contacts, "hard": record_hard,
-}  # fmt: skip
-"""What records the streams of a family."""
 _CONTACT_S = 3.5
 """Time a contact takes with the gap after it, about [s]."""
 _RECORDING_COST = {"free": 0.085, "contacts": 0.11}
@@ -75,7 +67,7 @@ class DetectionBench(Bench):
         """Return the replays on streams of free motion."""
         return [
             Task(
-                self._row("free", cell.name, baseline, record_free, judge_free),
+                self._row("free", cell.name, baseline),
                 partial(judge_free, cell, baseline, self._stream(cell)),
                 _replay_cost(baseline) * _free_s(cell),
             )
@@ -87,7 +79,7 @@ class DetectionBench(Bench):
         """Return the replays on streams with contacts."""
         return [
             Task(
-                self._row("contacts", cell.name, baseline, record_contacts, judge_contacts),
+                self._row("contacts", cell.name, baseline),
                 partial(judge_contacts, cell, baseline, self._stream(cell)),
                 _replay_cost(baseline) * _contacts_s(cell),
             )
@@ -100,7 +92,7 @@ class DetectionBench(Bench):
         judges = {cell: judge_contacts if cell.near == "touched" else judge_free for cell in self._hard()}
         return [
             Task(
-                self._row("hard", cell.name, baseline, record_hard, judge),
+                self._row("hard", cell.name, baseline),
                 partial(judge, cell, baseline, self._stream(cell)),
                 _replay_cost(baseline) * _free_s(cell),
             )
@@ -111,7 +103,7 @@ class DetectionBench(Bench):
     def boards(self) -> list[Task]:
         """Return the trials in the closed loop."""
         return [
-            Task(self._row("boards", cell.name, baseline, meet_board), partial(meet_board, cell, baseline), COST_S)
+            Task(self._row("boards", cell.name, baseline), partial(meet_board, cell, baseline), COST_S)
             for cell in self._boards()
             for baseline in BASELINES
         ]
@@ -141,13 +133,10 @@ class DetectionBench(Bench):
 
     def _stream(self, cell: FreeCell | ContactCell | HardCell) -> Path:
         family = {FreeCell: "free", ContactCell: "contacts", HardCell: "hard"}[type(cell)]
-        made_by = result_key(_RECORD[family], profile=profile(PROFILE))
-        return self.out / f"streams-{made_by}" / f"{family}_{cell.name}.npz"
+        return self.out / "streams" / f"{family}_{cell.name}.npz"
 
-    def _row(self, family: str, cell: str, baseline: Baseline, *made_by: Callable[..., None]) -> Path:
-        """Where a row is kept: elsewhere as soon as the detector, or what it is given, is another."""
-        name = baseline.name.replace(" ", "-")
-        return self.out / family / f"{name}-{result_key(*made_by, profile=baseline.profile)}" / f"{cell}.json"
+    def _row(self, family: str, cell: str, baseline: Baseline) -> Path:
+        return self.out / family / baseline.name.replace(" ", "-") / f"{cell}.json"
 
 
 def _free_s(cell: FreeCell | HardCell) -> float:

@@ -8,10 +8,9 @@ import numpy as np
 
 from pretouch_lab.baselines.detection import BASELINES, Baseline, ablated
 from pretouch_lab.benchmarks.bench import EMPTY
-from pretouch_lab.benchmarks.bounds import median_bounds
+from pretouch_lab.benchmarks.bounds import dispersion_of, median_bounds, rate_bounds
 from pretouch_lab.benchmarks.detection.judge import BUSY, sweep_values
 from pretouch_lab.benchmarks.scenario_files import scenario
-from pretouch_lab.paper.claims.detectors import dispersion_of, rate_bounds
 from pretouch_lab.rows import Row, rounded
 
 GOAL_FREE, GOAL_CONTACTS = "free: goal", "contacts: goal"

@@ -6,13 +6,11 @@ from pathlib import Path
 from typing import ClassVar
 
 from pretouch.errors import ExperimentError
-from pretouch.profiles import profile
 from pretouch_lab.benchmarks.bench import Bench, Found, said
 from pretouch_lab.benchmarks.localization.contacts import TouchedCell, duration_s, record_touched, touched_cells
-from pretouch_lab.benchmarks.localization.judge import PROFILE, WITHOUT, judge_touched
+from pretouch_lab.benchmarks.localization.judge import WITHOUT, judge_touched
 from pretouch_lab.documents import LOCALIZATION
 from pretouch_lab.engine import Task, rows_of
-from pretouch_lab.result_key import result_key
 from pretouch_lab.rows import Row
 
 _RECORDING_COST, _REPLAY_COST = 0.075, 0.02
@@ -56,8 +54,7 @@ class LocalizationBench(Bench):
         for cell in self._cells():
             without = WITHOUT if cell.sensing == "nominal" else ()
             for skin in (SKINS[cell.sensing], *without):
-                made = result_key(record_touched, judge_touched, profile=profile(PROFILE))
-                file = self.out / f"replays-{made}" / f"{cell.name}_{skin.replace(', ', '-').replace(' ', '-')}.json"
+                file = self.out / "replays" / f"{cell.name}_{skin.replace(', ', '-').replace(' ', '-')}.json"
                 work = partial(judge_touched, cell, skin, self._stream(cell))
                 tasks.append(Task(file, work, _REPLAY_COST * duration_s(cell)))
         return tasks
@@ -66,5 +63,4 @@ class LocalizationBench(Bench):
         return touched_cells(self.seeds, self.quick)
 
     def _stream(self, cell: TouchedCell) -> Path:
-        made_by = result_key(record_touched, profile=profile("paper"))
-        return self.out / f"streams-{made_by}" / f"{cell.name}.npz"
+        return self.out / "streams" / f"{cell.name}.npz"

@@ -9,11 +9,10 @@ from pretouch.profiles import profile
 from pretouch.text_table import TextTable, tabulated
 from pretouch_lab.benchmarks.real.external import Stream, corrected, model_of, pushed, stream_of
 from pretouch_lab.benchmarks.real.judge import Tally, said_of, tally
-from pretouch_lab.benchmarks.real.learnt import LEARNT, learnt
 from pretouch_lab.benchmarks.real.sets import SETS, Run
 from pretouch_lab.rows import Row
 
-DETECTORS = ("fixed", "observer", LEARNT, "paper", "pretouch")
+DETECTORS = ("fixed", "observer", "paper", "pretouch")
 TABLES = {
     "free": "Real free motion",
     "contacts": "Real contacts",
@@ -58,11 +57,10 @@ def play(work: Work) -> list[Row]:
         for name, some in tables.items():
             if any(some.values()):
                 joints = [run.joints if name == "stream" else (len(run.q[0]),) for run in runs]
-                stream, detector = corrected(streams[name], learn), work.detector
-                stream, chosen = learnt(stream, learn) if detector == LEARNT else (stream, profile(detector))
+                stream = corrected(streams[name], learn)
                 # what is learnt in the first half by a detector that does so is kept, as from one session to the next
                 stream = stream.only((*learn, *judge))
-                said = said_of(stream, chosen)
+                said = said_of(stream, profile(work.detector))
                 for table, judged in some.items():
                     if judged:
                         counts[table] = counts.get(table, Tally()) + tally(stream, said, judged, joints)

@@ -10,6 +10,7 @@ from pretouch.imported_data.torque_detect import MOVING_RAD_S, detect_torques
 from pretouch.imported_data.torque_results import for_currents, result_of
 from pretouch.profiles import Profile
 from pretouch.types import BoolArray, FloatArray
+from pretouch_lab.benchmarks.bounds import rate_bounds
 from pretouch_lab.benchmarks.real.external import Stream
 from pretouch_lab.rows import Row
 
@@ -66,22 +67,15 @@ class Tally:
     def row(self) -> Row:
         """Return what a table shows."""
         hours = self.motion_s / 3600.0
-        low, high = poisson_bounds(self.false_alarms)
+        low, high = rate_bounds(self.false_alarms, hours) if hours else (None, None)
         return {
             "motion_s": self.motion_s, "false_alarms": self.false_alarms,
             "per_hour": self.false_alarms / hours if hours else None,
-            "per_hour_low": low / hours if hours else None, "per_hour_high": high / hours if hours else None,
+            "per_hour_low": low, "per_hour_high": high,
             "found": self.found, "busy": self.busy, "contacts": self.contacts,
             "median_delay_ms": 1000.0 * float(np.median(self.delays_s)) if self.delays_s else None,
             "link_right": self.links_right, "link_said": self.links_said,
         }  # fmt: skip
-
-
-def poisson_bounds(count: int) -> tuple[float, float]:
-    """95 % bounds on the mean of which so many were counted, exact (Garwood)."""
-    from scipy.stats import chi2
-
-    return float(chi2.ppf(0.025, 2 * count)) / 2 if count else 0.0, float(chi2.ppf(0.975, 2 * count + 2)) / 2
 
 
 def tally(stream: Stream, said: Said, judged: Sequence[int], joints: Sequence[tuple[int, ...]]) -> Tally:

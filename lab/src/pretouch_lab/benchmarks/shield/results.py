@@ -10,32 +10,25 @@ from pretouch_lab.rows import Row, grouped, rounded
 from pretouch_lab.tables import plain, share
 
 _COUNTS = ("steps", "exceptions", "non_finite", "limit_violations")
-_TIMES = ("median_us", "p999_us", "startup_s")
 
 
 def rows_of_cells(files: list[Row]) -> list[Row]:
     """Return a row for each filter and commander of what the tasks left."""
-    times = {row["filter"]: row for row in files if row["part"] == "times"}
-    played = [row for row in files if row["part"] != "times"]
     return [
-        {**key, **_counted(group), **_touched(group), **_timed(times.get(key["filter"]))}
-        for key, group in grouped(played, ("filter", "commander"))
+        {**key, **_counted(trials), **_touched(trials)}
+        for key, group in grouped(files, ("filter", "commander"))
+        if (trials := [trial for file in group for trial in file["trials"]])
     ]
 
 
-def _timed(row: Row | None) -> Row:
-    return {name: row and row[name] for name in _TIMES}
-
-
-def _counted(files: list[Row]) -> Row:
-    """Sums over wild steps and those of trials."""
-    parts = [part for file in files for part in ([file] if file["part"] == "wild" else file["trials"])]
-    raised = [part["first_exception"] for part in parts if part["exceptions"]]
+def _counted(trials: list[Row]) -> Row:
+    """Sums over trials."""
+    raised = [trial["first_exception"] for trial in trials if trial["exceptions"]]
     return {
-        **{name: sum(part[name] for part in parts) for name in _COUNTS},
+        **{name: sum(trial[name] for trial in trials) for name in _COUNTS},
         "first_exception": raised[0] if raised else "",
-        "intervention": _rms(parts, "change_m2_s2", "changes"),
-        "task_error": _rms([part for part in parts if "errors" in part], "error_m2", "errors"),
+        "intervention": _rms(trials, "change_m2_s2", "changes"),
+        "task_error": _rms(trials, "error_m2", "errors"),
     }
 
 
@@ -44,9 +37,8 @@ def _rms(parts: list[Row], squares: str, count: str) -> float | None:
     return rounded(sqrt(sum(part[squares] for part in parts) / total), 4) if total else None
 
 
-def _touched(files: list[Row]) -> Row:
+def _touched(trials: list[Row]) -> Row:
     """Touches of the trials, those that were seen in time apart from the others."""
-    trials = [trial for file in files if file["part"] == "touch" for trial in file["trials"]]
     touches = [touch for trial in trials for touch in trial["touches"]]
     seen = [touch for touch in touches if seen_in_time(touch)]
     kinds = {
@@ -68,20 +60,13 @@ def _largest(values: list[float]) -> float | None:
     return rounded(max(values), 4) if values else None
 
 
-def guarantees(rows: list[Row]) -> str:
+def guarantees() -> str:
     """Say what is counted, and how."""
-    of = {row["filter"] for row in rows}
-    cbf = (
-        " `cbf`: OSCBF's velocity formulation on cbfpy, with what `pretouch` senses as its obstacles"
-        " ([below](#oscbf))." if "cbf" in of else ""
-    )  # fmt: skip
     return (
         "Filters between the commander and the arm: `pretouch` and `paper` as they are; `none`: `pretouch` without"
-        f" restriction, the limits of the joints alone.{cbf} Commanders: `noise`, `extremes`, `nonsense` (NaN, huge,"
-        " stale, no desired motion at all); `at-person`, which knows where the person is and drives a part of the arm"
-        " at them, at up to 1.5 m/s; `learned`, which the cross-entropy method teaches to touch fast; `tracking`, an"
-        " ordinary one.\n\n"
-        "Wild steps are on an arm that does exactly as it is commanded, among moving balls; trials are those of"
+        " restriction, the limits of the joints alone. Commanders: `at-person`, which knows where the person is and"
+        " drives a part of the arm at them, at up to 1.5 m/s; `tracking`, an ordinary one.\n\n"
+        "Trials are those of"
         " `bench avoidance` in which somebody moves, with all errors and latencies. A limit is broken where a command"
         f" passes position, velocity or acceleration by more than {TOLERANCE:g}. The speed at a touch is that of the"
         " arm's touching point towards the person. A touch was seen in time if in each step of the"
@@ -100,8 +85,7 @@ def tables_of(rows: list[Row]) -> list[TextTable]:
     cost = tabulated(
         "What it costs", _COST, rows,
         "change: rms of how far the command at the end-effector is from what was asked, while that is sound. off: rms"
-        " distance of the hand from where the ordinary commander wants it. Times: processor time of a step with 32"
-        " points; start: of a new process up to its first answer, what Numba compiled earlier in place.",
+        " distance of the hand from where the ordinary commander wants it.",
     )  # fmt: skip
     return [limits, cost]
 
@@ -133,7 +117,4 @@ _COST = (
     *_NAMES,
     ("off\n[mm]", _number("task_error", 0, 1e3)),
     ("change\n[m/s]", _number("intervention", 2)),
-    ("median\n[us]", _number("median_us", 0)),
-    ("99.9 %\n[us]", _number("p999_us", 0)),
-    ("start\n[s]", _number("startup_s", 1)),
 )

@@ -17,7 +17,7 @@ from pretouch_lab.benchmarks.avoidance.scenario import scenarios
 from pretouch_lab.benchmarks.avoidance.setting import Setting, setting
 from pretouch_lab.benchmarks.avoidance.truth import truth_of
 from pretouch_lab.benchmarks.scenario_files import SeedRange, scenario, seed_of
-from pretouch_lab.benchmarks.shield.commanders import AtPerson, Attack, Commander, Learned, Situation, Tracking
+from pretouch_lab.benchmarks.shield.commanders import AtPerson, Commander, Situation, Tracking
 from pretouch_lab.benchmarks.shield.filters import FILTERS
 from pretouch_lab.benchmarks.shield.measures import asked_velocity, breaks_limits
 from pretouch_lab.rows import Row, rounded
@@ -62,13 +62,11 @@ class TouchCell:
 
     filter_name: str
     commander: str
-    """tracking, at-person or learned."""
+    """tracking or at-person."""
     scene: str
     number: int
     """Of the seed."""
     seeds: SeedRange = "published"
-    attack: Attack | None = None
-    """Of a learned one."""
 
     @property
     def seed(self) -> int:
@@ -130,7 +128,7 @@ def tried(cell: TouchCell) -> Row:
 def _commander(cell: TouchCell, made: Setting) -> Commander:
     if cell.commander == "tracking":
         return Tracking(made.setup.path, _SPEED_M_S, _GAIN_1_S, _FASTEST_M_S)
-    return Learned(cell.attack) if cell.attack else AtPerson(np.random.default_rng([cell.seed, 31]))
+    return AtPerson(np.random.default_rng([cell.seed, 31]))
 
 
 _SPEED_M_S, _GAIN_1_S, _FASTEST_M_S = 0.2, 2.0, 0.5

@@ -62,16 +62,9 @@ def _force_difference(played: Played, _units: tuple[str, ...], used: Profile) ->
     return force_difference_figure(traces, (used.name,))
 
 
-def _framework(_played: Played, _units: tuple[str, ...], _used: Profile) -> "Figure":
-    from pretouch_lab.paper.figures.framework import framework_figure
-
-    return framework_figure()
-
-
 CATALOGUE: dict[str, PaperFigure] = {
     "circle": PaperFigure(_beside, _circle),
     "interaction": PaperFigure(lambda name: dynamic.cells(Grid((name,))), _interaction),
     "close-up": PaperFigure(lambda name: between.cells(Grid((name,))), _close_up),
     "force-difference": PaperFigure(_against_blind, _force_difference),
-    "framework": PaperFigure(lambda _: [], _framework),
 }
