@@ -99,7 +99,5 @@ def test_the_side_of_the_pandas_hand_is_about_what_the_board_takes_it_for(panda_
 
 
 def test_other_experiments_are_refused_for_another_arm(tmp_path):
-    with pytest.raises(
-        ExperimentError, match="'pinch' is laid out for the Panda: with --arm, choose static, avoidance"
-    ):
-        Request(("pinch",), 1, arm=str(tmp_path))
+    with pytest.raises(ExperimentError, match="'release' is laid out for the Panda: with --arm, choose static, avoid"):
+        Request(("release",), 1, arm=str(tmp_path))
