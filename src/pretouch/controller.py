@@ -181,8 +181,7 @@ class Controller:
             state.path.phase, inputs.resume,
         )  # fmt: skip
         answers, react = p.react.sense(state.reaction, self.body, noticed)
-        noted = events_of(given.unfit, near.silent, near.lost, detection, window.count, p)
-        events = noted | given.events | answers
+        events = events_of(given.unfit, near.silent, near.lost, detection, window.count, p) | given.events | answers
         mode = next_mode(state.mode, events, inputs.resume)
         contact = detection.contact if mode.mode is Mode.REACT is not state.mode.mode else None
         mark("mode")
