@@ -76,6 +76,14 @@ def test_what_does_not_fit_together_is_refused_in_a_sentence(words, said, capsys
     assert said in " ".join(capsys.readouterr().err.split())
 
 
+@pytest.mark.parametrize("words", [(), ("simulated",), ("--seed", "0")])
+def test_without_the_name_of_an_arm_a_simulated_one_is_rehearsed(words, monkeypatch):
+    commands = []
+    monkeypatch.setattr("pretouch.cli.run.command.run", lambda command, _write: commands.append(command))
+    assert cli.main(["run", *words]) == 0
+    assert commands == [Run(Simulated())]
+
+
 def test_an_arm_of_a_distribution_that_is_not_installed_is_a_sentence(monkeypatch, capsys):
     monkeypatch.setattr(plugins, "names", lambda group: ())
     assert cli.main(["run", "ros2", "--sign", "on-robot"]) == 2
