@@ -2,15 +2,18 @@
 
 import re
 import sys
+from contextlib import contextmanager
 from types import SimpleNamespace
 
 import pytest
 
+from pretouch.cli.commands import Replay
 from pretouch.cli.replay import replay
 from pretouch.errors import MissingExtraError, ParameterError, RecordingError
 from pretouch.loop import Cycle
 from pretouch.recording.writer import Recording
 from pretouch.types import Inputs
+from pretouch.viewer import server
 from tests.following_arm import DT, Arm
 from tests.imported_data.files import pushed
 
@@ -44,13 +47,27 @@ def cut(whole, tmp_path):
 def page(monkeypatch):
     """Take the page's place, and keep what it was given."""
     given = []
-    stand_in = SimpleNamespace(serve_replay=lambda *args: given.append(args))
+    stand_in = SimpleNamespace(show_replay=lambda *args: given.append(args))
     monkeypatch.setitem(sys.modules, "pretouch.viewer.replay", stand_in)
     return given
 
 
+@pytest.fixture
+def begun(monkeypatch):
+    """Begin a page without a server, and keep what was announced."""
+    announced = []
+
+    @contextmanager
+    def begin(options, title, *_):
+        announced.append((options, title))
+        yield lambda: "server"
+
+    monkeypatch.setattr(server, "begun", begin)
+    return announced
+
+
 def test_a_line_says_what_ran_for_how_long_and_what_happened(capsys, whole):
-    assert replay(whole, page=False) == 0
+    assert replay(whole) == 0
     said = capsys.readouterr().out
     what = "pretouch test: profile paper on panda with 7 units, 5.0 s, 500 steps"
     assert said == f"{what}: 1 contact, 1 hold after the start, held for 24% of the time.\n"
@@ -64,12 +81,12 @@ def test_of_a_run_that_was_held_from_the_start_on_it_is_said_that_it_was(capsys,
             step, arm.state = arm.controller.step(before, inputs)
             recording.record(Cycle(inputs, before, step, arm.state))
             arm.qd, arm.q, arm.time = step.command, arm.q + step.command * DT, arm.time + DT
-    assert replay(tmp_path / "held.mcap", page=False) == 0
+    assert replay(tmp_path / "held.mcap") == 0
     assert "0 contacts, 0 holds after the start, held for 100% of the time." in capsys.readouterr().out
 
 
 def test_of_a_killed_run_it_is_said_what_is_missing(capsys, cut):
-    assert replay(cut, page=False) == 0
+    assert replay(cut) == 0
     said = capsys.readouterr().out.splitlines()
     assert "the end is missing" in said[0]
     assert "every whole part" in said[0]
@@ -100,36 +117,53 @@ def test_a_difference_ends_with_code_1(capsys, whole, monkeypatch):
 
 
 def test_another_profile_is_shown_beside_the_recorded_one(capsys, whole):
-    assert replay(whole, profile="paper:detect.f_base_n=35", page=False) == 0
+    assert replay(whole, profile="paper:detect.f_base_n=35") == 0
     said = capsys.readouterr().out
     assert "Contacts: paper as recorded, paper:detect.f_base_n=35 on the same data" in said
     (row,) = [line.split() for line in said.splitlines() if line.strip().startswith("2.1")]
     assert row[2:] == ["y", "-"]
-    assert re.search(r"35\.\d / 35\.\d / 35\.\d N \(paper:threshold\.f_base_n=35\)", said)
+    assert re.search(r"35\.\d / 35\.\d / 35\.\d N \(paper:detect\.f_base_n=35\)", said)
     assert "Detector only: both use the recorded motion of the arm" in said
 
 
 def test_the_same_profile_is_later_by_nothing(capsys, whole):
-    replay(whole, profile="paper", page=False)
+    replay(whole, profile="paper")
     (row,) = [line.split() for line in capsys.readouterr().out.splitlines() if line.strip().startswith("2.1")]
     assert row[0] == row[3]
     assert row[-1] == "+0.00"
 
 
-def test_the_page_is_given_recording_place_and_comparison(whole, page):
-    assert replay(whole, profile="blind", host="127.0.0.1", port=8123) == 0
-    ((recorded, options, comparison, *_),) = page
-    assert recorded.place == whole
-    assert (options.host, options.port) == ("127.0.0.1", 8123)
+def test_the_page_is_given_recording_server_and_comparison(whole, page, begun):
+    assert Replay(str(whole), profile="blind", host="127.0.0.1", port=8123).run() == 0
+    ((recorded, ours, comparison, *_),) = page
+    assert (recorded.place, ours) == (whole, "server")
+    ((options, title),) = begun
+    assert (options.host, options.port, title) == ("127.0.0.1", 8123, "run.mcap")
     assert comparison.other.name == "blind"
-    replay(whole)
+    Replay(str(whole)).run()
     assert page[1][2] is None
+
+
+def test_the_address_is_said_before_the_recording_is_read(whole, page, begun, monkeypatch):
+    def read(_place):
+        assert len(begun) == 1
+        raise RecordingError("read")
+
+    monkeypatch.setattr("pretouch.cli.replay.open_recording", read)
+    with pytest.raises(RecordingError, match="read"):
+        Replay(str(whole)).run()
+
+
+@pytest.mark.parametrize("given", [{"verify": True}, {"page": False}])
+def test_no_page_begins_where_none_is_asked_for(whole, page, begun, given):
+    assert Replay(str(whole), **given).run() == 0
+    assert begun == page == []
 
 
 def test_without_the_extra_the_page_is_one_sentence(whole, monkeypatch):
     monkeypatch.setitem(sys.modules, "viser", None)
     with pytest.raises(MissingExtraError, match="extra 'live'") as error:
-        replay(whole)
+        Replay(str(whole)).run()
     assert "\n" not in str(error.value)
 
 
@@ -138,7 +172,7 @@ def test_what_is_no_recording_is_one_sentence(capsys, tmp_path, name):
     if not name.startswith("gone"):
         (tmp_path / name).write_text("time_s\n" if name.startswith("text") else "")
     with pytest.raises(RecordingError, match=name) as error:
-        replay(tmp_path / name)
+        Replay(str(tmp_path / name), page=False).run()
     assert "\n" not in str(error.value)
     assert capsys.readouterr().out == ""
 

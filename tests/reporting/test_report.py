@@ -72,6 +72,29 @@ def test_a_killed_file_makes_a_page_that_says_so(folder, tmp_path):
     assert said.replace("&", "&amp;").split("'")[0][:40] in text
 
 
+def test_a_page_of_another_recording_is_not_overwritten(folder, tmp_path):
+    whole = (folder[0] / "trial.mcap").read_bytes()
+    a, b, out = tmp_path / "a" / "run.mcap", tmp_path / "b" / "run.mcap", tmp_path / "report.html"
+    for place in (a, b):
+        place.parent.mkdir()
+        place.write_bytes(whole)
+    first = write_page([a], out).read_bytes()
+    assert write_page([a], out).read_bytes() == first
+    for others in ([b], [a, b]):
+        with pytest.raises(RecordingError, match=r"report.html is there already and no report of .*, or --repl"):
+            write_page(others, out)
+    assert out.read_bytes() == first
+    out.write_text("notes of my own")
+    with pytest.raises(RecordingError, match="there already"):
+        write_page([a], out)
+    assert b"</html>" in write_page([b], out, replace=True).read_bytes()
+    a.write_bytes(whole + whole[:100])  # another run under the same name
+    write_page([a], tmp_path / "a.html")
+    a.write_bytes(whole)
+    with pytest.raises(RecordingError, match="there already"):
+        write_page([a], tmp_path / "a.html")
+
+
 def test_what_is_wrong_with_a_request_is_one_sentence(folder, tmp_path):
     trial = folder[0] / "trial.mcap"
     with pytest.raises(RecordingError, match="No recording is given"):

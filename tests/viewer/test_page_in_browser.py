@@ -1,5 +1,6 @@
 """The pages as a person meets them: in a headless Chromium, by mouse and controls."""
 
+from collections.abc import Callable
 from pathlib import Path
 from threading import Event, Thread
 from typing import Any
@@ -22,8 +23,9 @@ from pretouch.serving.simulate import run as simulate
 from pretouch.types import FloatArray, Mode
 from pretouch.viewer.live import LivePage, serve_live
 from pretouch.viewer.real_units import RealUnits
-from pretouch.viewer.replay import serve_replay
+from pretouch.viewer.replay import show_replay
 from pretouch.viewer.room import LiveSettings
+from pretouch.viewer.server import ServeOptions, begun
 from pretouch.viewer.simulation import LiveSimulation
 
 pytestmark = pytest.mark.slow
@@ -169,8 +171,13 @@ def test_a_recording_is_played_and_jumped_through(tmp_path: Path) -> None:
     contacts = [kept.step for kept in recorded if kept.step.contact is not None]
     assert contacts
     comparison = compare(recorded, profile("paper"))
+
+    def play(options: ServeOptions, until: Callable[[], bool], say: Callable[[str], None]) -> None:
+        with begun(options, "test", "The recording", "see it", say) as ready:
+            show_replay(recorded, ready(), comparison, until, say)
+
     with (
-        Served(lambda options, until, say: serve_replay(recorded, options, comparison, until, say)) as served,
+        Served(play) as served,
         chromium() as visitor,
     ):
         visitor.open(served)

@@ -6,13 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.ports import free_port
+from viser import ViserServer
 
 from pretouch.profiles import PROFILES
 from pretouch.recording.compare import Found, compare
 from pretouch.recording.reader import Recorded, open_recording
 from pretouch.types import Mode
-from pretouch.viewer.replay import ReplayPage, comparison_html, frame_of, serve_replay, world_of
-from pretouch.viewer.server import ServeOptions, served, url_of
+from pretouch.viewer.replay import ReplayPage, comparison_html, frame_of, show_replay, world_of
+from pretouch.viewer.server import ServeOptions, begun, served, url_of
 from pretouch.viewer.simulation import LiveSimulation
 
 
@@ -108,8 +109,16 @@ def test_of_several_runs_each_is_named_with_its_path(recorded: Recorded) -> None
 
 def test_the_address_is_said_and_the_page_ends_when_told(recorded: Recorded, capfd: pytest.CaptureFixture[str]) -> None:
     options, turns = ServeOptions(port=free_port()), iter([False, True])
-    serve_replay(recorded, options, until=lambda: next(turns))
-    assert capfd.readouterr().out == f"The recording is at {url_of(options)} (Ctrl-C ends it).\n"
+    with begun(options, "test", "The recording", "see it", print) as ready:
+        assert capfd.readouterr().out == f"The recording is at {url_of(options)} (Ctrl-C ends it).\n"
+        server = ready()
+        assert not [handle for handle in contents(server) if "is being read" in handle]
+        show_replay(recorded, server, until=lambda: next(turns))
+
+
+def contents(server: ViserServer) -> list[str]:
+    handles = server.gui._gui_input_handle_from_uuid.values()
+    return [str(getattr(handle, "content", "")) for handle in handles]
 
 
 def test_whatever_fails_in_the_page_it_plays_no_further_and_it_is_said_once(
@@ -120,5 +129,6 @@ def test_whatever_fails_in_the_page_it_plays_no_further_and_it_is_said_once(
 
     monkeypatch.setattr(ReplayPage, "turn", fail)
     turns, said = iter([False, False, True]), []
-    serve_replay(recorded, ServeOptions(port=free_port()), until=lambda: next(turns), say=said.append)
-    assert said[1:] == ["The page failed, and holds: KeyError: 'nosuch'. Please report this."]
+    with served(ServeOptions(port=free_port()), "test") as server:
+        show_replay(recorded, server, until=lambda: next(turns), say=said.append)
+    assert said == ["The page failed, and holds: KeyError: 'nosuch'. Please report this."]

@@ -1,6 +1,9 @@
 """Commands of the product that have no file of their own: their docstrings are the help."""
 
+import sys
+from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Literal
 
@@ -70,10 +73,19 @@ class Replay:
     """Port to serve the page at."""
 
     def run(self) -> int:
-        """Describe the recording, and check, compare or show it."""
-        from pretouch.cli.replay import replay
+        """Describe the recording, and check, compare or show it; where the page is, is said before anything is read."""
+        from pretouch.viewer.server import ServeOptions, begun, browser_here
 
-        return replay(Path(self.file), self.verify, self.profile, self.page, self.host, self.port, self.json)
+        place, page = Path(self.file), None
+        with ExitStack() as stack:
+            if self.page and not self.verify and place.is_file():
+                options = ServeOptions(self.host, self.port, browser_here())
+                say = partial(print, file=sys.stderr if self.json == "-" else None, flush=True)
+                named = place.name, "The recording", "see the recording, and play it"
+                page = stack.enter_context(begun(options, *named, say))
+            from pretouch.cli.replay import replay
+
+            return replay(place, self.verify, self.profile, page, self.json)
 
 
 @dataclass(frozen=True)
@@ -141,6 +153,8 @@ class Report:
     """Recordings."""
     out: str = "report.html"
     """File to write."""
+    replace: bool = False
+    """Overwrite a file that is there though it is no report of these recordings."""
     limits: str = ""
     """TOML file with force limits of body regions, in place of those of ISO/TS 15066."""
 
@@ -148,8 +162,8 @@ class Report:
         """Write the page."""
         from pretouch.cli.report import write_page
 
-        limits = Path(self.limits) if self.limits else None
-        print(f"Report: {write_page([Path(file) for file in self.files], Path(self.out), limits)}")
+        limits, files = Path(self.limits) if self.limits else None, [Path(file) for file in self.files]
+        print(f"Report: {write_page(files, Path(self.out), limits, self.replace)}")
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.console import Console
@@ -13,7 +13,6 @@ from pretouch.cli.detect import axes_shown
 from pretouch.cli.tables import Grid
 from pretouch.cli.warm_up import prepare
 from pretouch.cli.writing import numbers_to
-from pretouch.extras import LIVE
 from pretouch.profiles import profile as find_profile
 from pretouch.recording.compare import Comparison, Decisions, Found, compare
 from pretouch.recording.reader import Recorded, open_recording
@@ -22,30 +21,28 @@ from pretouch.recording.verify import verify as recompute
 from pretouch.signals import ended
 from pretouch.types import Mode
 
+if TYPE_CHECKING:
+    from viser import ViserServer
+
 
 def replay(
-    place: Path, verify: bool = False, profile: str = "", page: bool = True, host: str = "127.0.0.1", port: int = 8080,
+    place: Path,
+    verify: bool = False,
+    profile: str = "",
+    page: "Callable[[], ViserServer] | None" = None,
     json: str = "",
-) -> int:  # fmt: skip
+) -> int:
     """Tell of a recording, and check, compare or show it. Return the exit code.
 
     Args:
         place: recording, finished or cut off.
         verify: whether to recompute each step; then there is no page, and the code is 1 if anything differs.
         profile: one whose decisions on the same data are shown beside the recorded ones, or ''.
-        page: whether to serve the page.
-        host: address to serve it at.
-        port: port to serve it at.
+        page: gives the server of its page (`viewer.server.begun`); None for none.
         json: where the numbers go, see `numbers_to`.
     """
     console = Console(highlight=False, soft_wrap=True)
     other = find_profile(profile) if profile else None
-    if page and not verify:  # what keeps it from being shown is said before the work for it
-        from pretouch.viewer.server import ServeOptions, browser_here, check_port
-
-        LIVE.need("The page")
-        options = ServeOptions(host, port, browser_here())
-        check_port(options)
     with numbers_to(json) as write:
         recorded, found = open_recording(place), None
         if recorded.said:
@@ -68,9 +65,9 @@ def replay(
             _show(console, comparison)
         write(_numbers(recorded, found, verdict, comparison))
         if page and not verify:
-            from pretouch.viewer.replay import serve_replay
+            from pretouch.viewer.replay import show_replay
 
-            serve_replay(recorded, options, comparison, ended)
+            show_replay(recorded, page(), comparison, ended)
     return int(verdict is not None and not verdict.agrees)
 
 

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from hashlib import sha256
 from pathlib import Path
 
 from pretouch.cli.writing import check_writable, unwritable_said
@@ -12,13 +13,14 @@ from pretouch.reporting.measures import Measures, measure
 from pretouch.reporting.orientation import ISO_TS_15066, load_limits
 
 
-def write_page(files: Sequence[Path], out: Path, limits: Path | None = None) -> Path:
+def write_page(files: Sequence[Path], out: Path, limits: Path | None = None, replace: bool = False) -> Path:
     """Write the report of some recordings, and return the page's path.
 
     Args:
         files: recordings, each once.
         out: HTML file to write.
         limits: TOML file with force limits of body regions, in place of those of ISO/TS 15066.
+        replace: whether to overwrite a file that is no report of these recordings.
     """
     if not files:
         raise RecordingError("No recording is given: give at least one file.")
@@ -30,12 +32,33 @@ def write_page(files: Sequence[Path], out: Path, limits: Path | None = None) -> 
     regions = load_limits(limits) if limits else ISO_TS_15066
     FIGURES.need("A report")
     check_writable("report", out)
+    mark = _mark(files)
+    if out.is_file() and not replace and mark not in out.read_bytes():
+        raise RecordingError(
+            f"{out} is there already and no report of {'these recordings' if files[1:] else files[0]}: give another"
+            " --out, or --replace."
+        )
     from pretouch.reporting.page import page  # needs the extra
 
     text = page(_measured(files), regions)
     with unwritable_said("report", out):
-        out.write_bytes(text.encode("utf-8", errors="replace"))  # a file name may be no text
+        out.write_bytes(text.encode("utf-8", errors="replace") + mark)  # a file name may be no text
     return out
+
+
+def _mark(files: Sequence[Path]) -> bytes:
+    """Return a comment of HTML by which a page is known as that of some recordings as they are."""
+    known = sorted((str(place.resolve()), *_version(place)) for place in files)
+    return f"<!-- recordings {sha256(repr(known).encode(errors='surrogateescape')).hexdigest()} -->\n".encode()
+
+
+def _version(place: Path) -> tuple[int, ...]:
+    """Size and time of the last change of a file, nothing where there is none."""
+    try:
+        found = place.stat()
+    except OSError:
+        return ()
+    return found.st_size, found.st_mtime_ns
 
 
 def _measured(files: Sequence[Path]) -> Iterator[Measures]:

@@ -23,7 +23,7 @@ from pretouch.viewer.gui import PERIOD_S, add_button, add_view_boxes, put, style
 from pretouch.viewer.player import Player, Timeline, TimelineEvent
 from pretouch.viewer.plots import SPAN_S, History, Plots
 from pretouch.viewer.scene import Scene
-from pretouch.viewer.server import ServeOptions, announce, failure, served
+from pretouch.viewer.server import failure
 from pretouch.viewer.status import Status, legend
 
 if TYPE_CHECKING:
@@ -200,29 +200,24 @@ class ReplayPage:
         return f"profile {runs[run].profile.name}{part}"
 
 
-def serve_replay(
+def show_replay(
     recorded: Recorded,
-    options: ServeOptions,
+    server: "ViserServer",
     comparison: "Comparison | None" = None,
     until: Callable[[], bool] = lambda: False,
     say: Callable[[str], None] = print,
 ) -> None:
-    """Show a recording as a page until told to stop, with another profile's thresholds if they are given.
-
-    A ViewerError says that the port is taken or the extra is missing.
-    """
-    with served(options, recorded.place.name) as server:
-        page = ReplayPage(server, recorded, comparison)
-        announce(options, "The recording", "see the recording, and play it", say)
-        clock = MonotonicClock(PERIOD_S)
-        before = clock.tick()
-        while not until():
-            now = clock.tick()
-            try:
-                page.turn(now, now - before)
-            except Exception as error:  # whatever fails in the page
-                page.hold(error, say)
-            before = now
+    """Show a recording on a server's page until told to stop, with another profile's thresholds if they are given."""
+    page = ReplayPage(server, recorded, comparison)
+    clock = MonotonicClock(PERIOD_S)
+    before = clock.tick()
+    while not until():
+        now = clock.tick()
+        try:
+            page.turn(now, now - before)
+        except Exception as error:  # whatever fails in the page
+            page.hold(error, say)
+        before = now
 
 
 _NAMED = 5

@@ -11,6 +11,7 @@ import webbrowser
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from html import escape
 from typing import TYPE_CHECKING
 
 from pretouch.errors import ViewerError
@@ -101,6 +102,25 @@ def served(options: ServeOptions, title: str) -> Iterator["ViserServer"]:
             yield server
         finally:
             server.stop()
+
+
+@contextmanager
+def begun(
+    options: ServeOptions, title: str, what: str, exposed: str, say: Callable[[str], None]
+) -> Iterator[Callable[[], "ViserServer"]]:
+    """Serve a page that says it is being made, and announce it: reading and compiling may take a while.
+
+    Gives what takes the notice away and returns the server, for when there is something to see.
+    """
+    with served(options, title) as server:
+        notice = server.gui.add_html(f"<div style='padding:12px'>{escape(what)} is being read.</div>")
+        announce(options, what, exposed, say)
+
+        def ready() -> "ViserServer":
+            notice.remove()
+            return server
+
+        yield ready
 
 
 def check_port(options: ServeOptions) -> None:
