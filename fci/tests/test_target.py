@@ -9,8 +9,7 @@ import pytest
 from pretouch.robot.description import fr3
 from pretouch.robot.model import RobotModel
 from pretouch_fci.limits import motion_limits
-from pretouch_fci.motion import FIRST_WITHIN, Ending, Setpoint
-from pretouch_fci.target import TargetMotion
+from pretouch_fci.motion import FIRST_WITHIN, Ending, Setpoint, TargetMotion
 from pretouch_fci.wire import Controller
 
 _MODEL = RobotModel(fr3())

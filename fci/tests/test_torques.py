@@ -14,8 +14,8 @@ from pretouch.sim.scene import SceneSpec
 from pretouch.sim.tcp_push import TcpPush
 from pretouch_fci.arm import ArmSetup, ServedArm
 from pretouch_fci.controllers import _critical
+from pretouch_fci.frames import Inertial
 from pretouch_fci.gripper import GripperObject
-from pretouch_fci.inertia import Inertial
 from pretouch_fci.motion import Ending, Setpoint
 from pretouch_fci.wire import Controller, Generator, RobotKind, RobotMode
 

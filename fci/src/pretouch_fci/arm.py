@@ -22,13 +22,11 @@ from pretouch_fci.controllers import (
     ExternalTorques,
     guiding,
 )
-from pretouch_fci.frames import frames_of
+from pretouch_fci.frames import Inertial, announce, frames_of, inertials
 from pretouch_fci.gripper import Gripper, GripperObject
-from pretouch_fci.inertia import Inertial, announce, inertials
 from pretouch_fci.kinds import JointPosition, JointVelocity, MotionKind, NoMotion
 from pretouch_fci.limits import PERIOD_S, motion_limits
-from pretouch_fci.motion import Ending, Motion, Setpoint
-from pretouch_fci.target import TargetMotion
+from pretouch_fci.motion import Ending, Motion, Setpoint, TargetMotion
 from pretouch_fci.units import ServedUnits, UnitsSetup
 from pretouch_fci.wire import JOINTS, Controller, Generator, RobotKind, RobotMode
 

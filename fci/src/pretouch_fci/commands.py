@@ -9,8 +9,7 @@ from pretouch.types import FloatArray
 from pretouch_fci.arm import ServedArm
 from pretouch_fci.collision import CollisionBehavior
 from pretouch_fci.controllers import CARTESIAN_LEAST, CARTESIAN_STIFFNESS, JOINT_MOST_NM_RAD
-from pretouch_fci.frames import pose_of
-from pretouch_fci.inertia import Inertial
+from pretouch_fci.frames import Inertial, pose_of
 from pretouch_fci.wire import MOVE, Controller, Generator, Protocol, fastest_of
 
 _EIGENVALUE_SLACK = 1e-9

@@ -1,14 +1,26 @@
-"""Frames and loads at the flange, as the robot's interface knows and lets set them."""
+"""Frames and loads at the flange, as the robot's interface lets set them, and the masses of the arm's links."""
 
 from dataclasses import dataclass, field
 
+import mujoco
 import numpy as np
 
 from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.types import FloatArray
-from pretouch_fci.inertia import Inertial, hand_of
 
 _ROTATION_SLACK = 1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class Inertial:
+    """A rigid body's mass, in a frame that its owner names."""
+
+    mass: float
+    """[kg]"""
+    com: FloatArray
+    """(3,) centre of mass [m]."""
+    inertia: FloatArray
+    """(3, 3) about the centre of mass [kg m^2]."""
 
 
 def pose(kin: Kinematics, link: int) -> FloatArray:
@@ -61,3 +73,60 @@ def frames_of(model: RobotModel) -> Frames:
     """Return the frames of an arm as delivered: the end-effector is the model's."""
     kin, flange = model.kinematics(model.description.q_ready), flange_of(model)
     return Frames(flange, np.linalg.inv(pose(kin, flange)) @ pose(kin, model.ee), hand_of(model, flange))
+
+
+def inertials(model: RobotModel) -> list[Inertial]:
+    """Return the inertial of each link of the model, in the link's frame."""
+    mj = mujoco.MjModel.from_xml_path(str(model.description.mjcf))
+    found = []
+    for body in range(mj.nbody):
+        matrix = np.zeros(9)
+        mujoco.mju_quat2Mat(matrix, mj.body_iquat[body])
+        R = matrix.reshape(3, 3)
+        inertia = R @ np.diag(mj.body_inertia[body]) @ R.T
+        found.append(Inertial(float(mj.body_mass[body]), mj.body_ipos[body].copy(), inertia))
+    return found
+
+
+def hand_of(model: RobotModel, flange: int) -> Inertial:
+    """Return what the flange's link carries, as one body in the flange's frame."""
+    kin = model.kinematics(model.description.q_ready)
+    R, origin = kin.rotation[flange], kin.position[flange]
+    parts = [
+        moved(inertial, R.T @ kin.rotation[link], R.T @ (kin.position[link] - origin))
+        for link, inertial in enumerate(inertials(model))
+        if link > flange and inertial.mass > 0
+    ]
+    return combined(parts)
+
+
+def announce(model: RobotModel, flange: int, own: Inertial, load: Inertial) -> None:
+    """Have a model that is one arm's alone count a load at the flange, beside the flange's own mass.
+
+    Both are in the flange's frame.
+    """
+    both = combined([own, load])
+    moments, axes = np.linalg.eigh(both.inertia)
+    axes[:, 2] *= np.sign(np.linalg.det(axes))
+    mj, data = model.scratch
+    mj.body_mass[flange], mj.body_ipos[flange], mj.body_inertia[flange] = both.mass, both.com, moments
+    mujoco.mju_mat2Quat(mj.body_iquat[flange], axes.reshape(-1))
+    mujoco.mj_setConst(mj, data)
+
+
+def combined(parts: list[Inertial]) -> Inertial:
+    """Return several bodies in one frame as one."""
+    mass = sum(part.mass for part in parts)
+    if not mass:
+        return Inertial(0.0, np.zeros(3), np.zeros((3, 3)))
+    com = np.asarray(sum((part.mass * part.com for part in parts), np.zeros(3)) / mass)
+    inertia = np.zeros((3, 3))
+    for part in parts:
+        r = part.com - com
+        inertia += part.inertia + part.mass * (r @ r * np.eye(3) - np.outer(r, r))
+    return Inertial(mass, com, inertia)
+
+
+def moved(inertial: Inertial, R: FloatArray, p: FloatArray) -> Inertial:
+    """Return a body in another frame, in which its own one is turned by R (3, 3) and at p (3,) [m]."""
+    return Inertial(inertial.mass, R @ inertial.com + p, R @ inertial.inertia @ R.T)

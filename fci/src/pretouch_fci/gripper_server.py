@@ -1,14 +1,12 @@
 """Serves the gripper at a port of its own: one client, commands by TCP, states by UDP. It has no thread of its own."""
 
 import math
-import socket
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from dataclasses import replace
-from typing import Any
 
 from pretouch_fci.arm import ServedArm
-from pretouch_fci.connections import READS_BEFORE_REFUSAL, Connection, Disconnected, Listener, Request
+from pretouch_fci.connections import ClientPort, Connection, Disconnected, Request
 from pretouch_fci.gripper import HOMING, MAX_WIDTH_M, Course, Outcome, grasp_of, move_of
 from pretouch_fci.wire import GRASP, GRIPPER, GRIPPER_STATE, MOVE_FINGERS
 
@@ -18,7 +16,7 @@ _TEMPERATURE_C = 30
 """Always as warm [deg C]."""
 
 
-class GripperServer:
+class GripperServer(ClientPort):
     """Serves the gripper of one arm, within the loop of the arm's server: `sockets` and `due` say when to call `serve`.
 
     While it has a client its time is that of the machine's clock, less what the machine was late, in lockstep too: a
@@ -28,60 +26,29 @@ class GripperServer:
 
     def __init__(self, address: tuple[str, int], arm: ServedArm, lockstep: bool, say: Callable[[str], None]) -> None:
         """Listen; an address that cannot be had is a RobotError."""
-        self._arm, self._lockstep, self._say = arm, lockstep, say
-        self._listener = Listener(*address)
-        self.address: tuple[str, int] = self._listener.sock.getsockname()
-        """Where it listens."""
-        self._udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._udp.bind((address[0], 0))
-        self._udp.setblocking(False)
-        self._client: Connection | None = None
-        self._client_udp = ("", 0)
+        super().__init__(*address, GRIPPER, say, " of the gripper")
+        self._arm, self._lockstep = arm, lockstep
         self._running: Request | None = None
         self._time_ms = 0
         self.due = math.inf
         """When it is to be served, though nothing has come [s], of the machine's clock."""
 
-    @property
-    def sockets(self) -> list[socket.socket]:
-        """Where something may come."""
-        client = [] if self._client is None else [self._client.sock]
-        return [self._listener.sock, *client, *(waiting.sock for waiting in self._listener.waiting)]
-
-    def serve(self, ready: list[Any]) -> None:
+    def serve(self, ready: Container[object]) -> None:
         """Serve those sockets at which something has come, and send a state when one is due."""
-        if self._client is not None and self._client.sock in ready:
-            self._read()
-        if self._listener.sock in ready:
-            for _ in range(READS_BEFORE_REFUSAL):  # a client that has gone makes room for the next
-                self._read()
-            self._listener.admit(taken=self._client is not None)
-        for connection in [waiting for waiting in self._listener.waiting if waiting.sock in ready]:
-            self._greet(connection)
+        self._serve_ready(ready)
         now = time.monotonic()
         if now >= self.due:
             self.due = max(self.due + _PERIOD_MS / 1000, now)  # a machine that is late leaves the time out
             self._attempt(self._pass_time)
             self._send_state()
 
-    def close(self) -> None:
-        """Disconnect the client and stop listening."""
-        if self._client is not None:
-            self._client.close()
-        self._listener.close()
-        self._udp.close()
+    def _came(self, client: Connection) -> None:
+        self.due = time.monotonic()
 
-    def _greet(self, connection: Connection) -> None:
-        greeting = self._listener.greet(connection, GRIPPER, self._say)
-        if greeting is not None:
-            self._client, self._client_udp, self.due = connection, greeting.udp, time.monotonic()
-            self._say(f"Client {connection.peer} of the gripper connected.")
-            self._attempt(lambda: self._follow(greeting.requests))
-
-    def _read(self) -> None:
-        client = self._client
-        if client is not None:
-            self._attempt(lambda: self._follow(client.requests(GRIPPER)))
+    def _gone(self) -> None:
+        """Stop the fingers; they hold what they hold."""
+        self._running, self.due = None, math.inf
+        self._arm.carry(replace(self._arm.gripper, course=None))
 
     def _follow(self, requests: list[Request]) -> None:
         for request in requests:
@@ -130,24 +97,7 @@ class GripperServer:
             self._client.send(GRIPPER.reply(request.name, request.identifier, GRIPPER.status.pack(outcome)))
 
     def _send_state(self) -> None:
-        if self._client is None:
-            return
         self._time_ms += _PERIOD_MS
         gripper = self._arm.gripper
-        told = (self._time_ms % 2**32, gripper.width, MAX_WIDTH_M, gripper.grasped, _TEMPERATURE_C)
-        try:
-            self._udp.sendto(GRIPPER_STATE.pack(*told), self._client_udp)
-        except OSError:  # nobody there any more: its TCP connection tells
-            return
-
-    def _attempt(self, do: Callable[[], None]) -> None:
-        """Do something for the client; disconnect it if that fails. The fingers stop, and hold what they hold."""
-        try:
-            do()
-        except Disconnected as why:
-            if self._client is None:
-                return
-            self._say(f"Client {self._client.peer} of the gripper disconnected: {why}.")
-            self._client.close()
-            self._client, self._running, self.due = None, None, math.inf
-            self._arm.carry(replace(self._arm.gripper, course=None))
+        state = (self._time_ms % 2**32, gripper.width, MAX_WIDTH_M, gripper.grasped, _TEMPERATURE_C)
+        self._send(GRIPPER_STATE.pack(*state))

@@ -13,8 +13,7 @@ import numpy as np
 from pretouch.errors import RobotError
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray
-from pretouch_fci.frames import flange_of
-from pretouch_fci.inertia import combined, inertials, moved
+from pretouch_fci.frames import combined, flange_of, inertials, moved
 
 _FUNCTIONS = Path(__file__).with_suffix(".c")
 _SYSTEMS = ("Linux", "Windows")

@@ -1,7 +1,6 @@
 """The server: one client at a time, states by UDP each millisecond, requests by TCP. One thread."""
 
 import select
-import socket
 import time
 from collections.abc import Callable
 from typing import Self
@@ -10,7 +9,7 @@ import numpy as np
 
 from pretouch.errors import RobotError
 from pretouch_fci.arm import ServedArm
-from pretouch_fci.connections import READS_BEFORE_REFUSAL, Connection, Disconnected, Listener
+from pretouch_fci.connections import ClientPort, Connection, Request
 from pretouch_fci.gripper_server import GripperServer
 from pretouch_fci.handler import RequestHandler
 from pretouch_fci.limits import PERIOD_S
@@ -33,7 +32,7 @@ _MOTION_EVERY = 1_000_000
 """In lockstep, each motion begins at a multiple of this [ms], so that its times do not depend on the time before it."""
 
 
-class FciServer:
+class FciServer(ClientPort):
     """Serves one arm. A context manager, for the sockets."""
 
     def __init__(
@@ -48,26 +47,19 @@ class FciServer:
             watch: is called with the robot's time [s] and the arm after each millisecond of the plant.
             say: is handed a line when a client comes or goes, and when a motion ends otherwise than it should.
         """
-        self._arm, self._options, self._watch, self._say = arm, options, watch, say
+        self._arm, self._options, self._watch = arm, options, watch
         self.protocol = PROTOCOLS[arm.kind]
         urdf_of(arm.model)  # made while no clock runs yet
-        self._listener = Listener(options.host, options.port)
-        host, port = self._listener.sock.getsockname()
-        self.address: tuple[str, int] = (host, port)
-        """Where it listens."""
+        super().__init__(options.host, options.port, self.protocol, say)
+        host, port = self.address
         try:
             self._gripper = GripperServer((host, options.port and port + 1), arm, options.lockstep, say)
         except RobotError:
-            self._listener.close()
+            super().close()
             raise
         self.gripper_address = self._gripper.address
         """Where the hand does: at the next port."""
-        self._udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._udp.bind((host, 0))
-        self._udp.setblocking(False)
         self._state = StateDatagram(self.protocol, arm)
-        self._client: Connection | None = None
-        self._client_udp = ("", 0)
         self._handler: RequestHandler | None = None
         self._served = False
         self._done: Callable[[], bool] = lambda: False
@@ -85,11 +77,8 @@ class FciServer:
         self.close()
 
     def close(self) -> None:
-        """Disconnect the client and stop listening."""
-        if self._client is not None:
-            self._client.close()
-        self._listener.close()
-        self._udp.close()
+        """Disconnect the clients and stop listening."""
+        super().close()
         self._gripper.close()
 
     def serve(self, done: Callable[[], bool] = lambda: False) -> None:
@@ -106,10 +95,7 @@ class FciServer:
 
     def _send_state(self) -> None:
         if self._client is not None:
-            try:
-                self._udp.sendto(self._state.write(self._tick), self._client_udp)
-            except OSError:  # nobody there any more: its TCP connection tells
-                return
+            self._send(self._state.write(self._tick))
 
     def _wait(self) -> None:
         """Wait for the next millisecond, or in lockstep for the command."""
@@ -148,13 +134,14 @@ class FciServer:
             arm.units.offset = PERIOD_S * self._tick + self.left_out - arm.plant.time
         ending = arm.step(setpoint)
         self._tick += 1
-        if ending is not None and self._handler is not None:
-            self._attempt(lambda handler: handler.motion_ended(ending))
+        handler = self._handler
+        if ending is not None and handler is not None:
+            self._attempt(lambda: handler.motion_ended(ending))
         self._watch(PERIOD_S * self._tick, arm)
         if arm.units is not None:
             arm.units.step(self._robot_time if lockstep else self._wall_time)
         if self._handler is not None and arm.at_rest:
-            self._attempt(lambda handler: handler.at_rest())
+            self._attempt(self._handler.at_rest)
 
     def _robot_time(self) -> float:
         return PERIOD_S * self._tick
@@ -201,46 +188,32 @@ class FciServer:
         """Poll all sockets until an instant [s], or until a command has come."""
         while True:
             timeout = max(0.0, min(until, self._gripper.due) - time.monotonic())
-            client = [] if self._client is None else [self._client.sock]
-            waiting = {c.sock: c for c in self._listener.waiting}
-            own = [self._udp, self._listener.sock, *client, *waiting]
-            ready, _, _ = select.select([*own, *self._gripper.sockets], [], [], timeout)
+            ready, _, _ = select.select([self._udp, *self.sockets, *self._gripper.sockets], [], [], timeout)
             self._gripper.serve(ready)
             if self._udp in ready:
                 self._take_command()
-            if client and client[0] in ready:
-                self._serve_requests()
-            if self._listener.sock in ready:
-                for _ in range(READS_BEFORE_REFUSAL):  # a client that has gone makes room for the next
-                    self._serve_requests()
-                self._listener.admit(taken=self._client is not None)
-            for sock in ready:
-                if sock in waiting:
-                    self._check_protocol(waiting[sock])
+            self._serve_ready(ready)
             if for_command and (self._command is not None or self._arm.motion is None):
                 return
             if time.monotonic() >= until:
                 return
 
-    def _check_protocol(self, connection: Connection) -> None:
-        """Serve a connection that has the protocol version of the robot."""
-        greeting = self._listener.greet(connection, self.protocol, self._say)
-        if greeting is not None:
-            self._serve_client(connection, greeting.udp)
-            self._attempt(lambda handler: handler.serve(greeting.requests))
-
-    def _serve_requests(self) -> None:
-        """Serve the client's requests."""
-        client = self._client
-        if client is not None:
-            self._attempt(lambda handler: handler.serve(client.requests(self.protocol)))
-
-    def _serve_client(self, connection: Connection, udp: tuple[str, int]) -> None:
-        self._client, self._client_udp, self._served = connection, udp, True
+    def _came(self, client: Connection) -> None:
+        self._served = True
         self._handler = RequestHandler(
-            connection, self.protocol, self._arm, self._state, self._settle, self._begin_motion, self._say
+            client, self.protocol, self._arm, self._state, self._settle, self._begin_motion, self._say
         )
-        self._say(f"Client {connection.peer} connected.")
+
+    def _follow(self, requests: list[Request]) -> None:
+        if self._handler is not None:
+            self._handler.serve(requests)
+
+    def _gone(self) -> None:
+        self._handler = None
+        if self._arm.moving:
+            self._arm.stop()
+        self._arm.forget_settings()
+        self._state.frames_changed()
 
     def _begin_motion(self) -> None:
         """Note that a motion is about to begin."""
@@ -255,23 +228,3 @@ class FciServer:
         """In lockstep, let the arm come to rest between two states: what a client sees then differs in time alone."""
         while self._options.lockstep and not self._arm.moving and not self._arm.settled and not self._done():
             self._pass_time(None)
-
-    def _attempt(self, do: Callable[[RequestHandler], None]) -> None:
-        """Do something for the client; disconnect it if that fails."""
-        if self._handler is None:
-            return
-        try:
-            do(self._handler)
-        except Disconnected as why:
-            self._disconnect(str(why))
-
-    def _disconnect(self, why: str) -> None:
-        if self._client is None:
-            return
-        self._say(f"Client {self._client.peer} disconnected: {why}.")
-        self._client.close()
-        self._client = self._handler = None
-        if self._arm.moving:
-            self._arm.stop()
-        self._arm.forget_settings()
-        self._state.frames_changed()

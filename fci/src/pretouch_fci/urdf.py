@@ -9,8 +9,7 @@ import numpy as np
 
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray
-from pretouch_fci.frames import flange_of
-from pretouch_fci.inertia import Inertial, inertials
+from pretouch_fci.frames import Inertial, flange_of, inertials
 
 
 @cache
