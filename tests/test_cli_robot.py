@@ -41,9 +41,7 @@ def test_an_arm_is_imported_checked_and_reported(tmp_path, capsys):
     assert main(["robot", "check", str(out)]) == 0
     assert "No problem found" in capsys.readouterr().out
     assert main(told) == 2
-    assert "exists already: give another --out, or --force" in capsys.readouterr().err
-    assert main([*told, "--force"]) == 0
-    assert f"The previous contents of {out} are now in {out}.old-1." in capsys.readouterr().out
+    assert "exists already: give another --out, or remove it" in capsys.readouterr().err
 
 
 def test_a_folder_of_the_arms_own_name_is_refused_before_anything_is_fitted(tmp_path, capsys, monkeypatch):

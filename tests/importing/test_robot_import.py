@@ -1,7 +1,7 @@
 """A robot's file becomes a folder that everything else takes, and nothing is lost on the way."""
 
-import os
 import re
+from unittest.mock import Mock
 from xml.etree import ElementTree as ET
 
 import mujoco
@@ -140,37 +140,22 @@ def test_the_controller_and_the_simulated_arm_take_it(model, folder):
     assert controller.init(plant.read()) is not None
 
 
-def test_a_folder_that_is_there_is_kept(imported, tmp_path):
+def test_a_folder_that_is_there_is_refused(imported, tmp_path):
     out = tmp_path / "arm"
     out.mkdir()
-    (out / "mine.txt").write_text("precious")
-    with pytest.raises(RobotModelError, match="arm exists already: give another --out, or --force"):
+    with pytest.raises(RobotModelError, match="arm exists already: give another --out, or remove it"):
         write_folder(imported, out)
-    for k in (1, 2):
-        kept = write_folder(imported, out, force=True)
-        assert kept == tmp_path / f"arm.old-{k}"
-    assert (tmp_path / "arm.old-1" / "mine.txt").read_text() == "precious"
+    assert list(out.iterdir()) == []
+    out.rmdir()
+    write_folder(imported, out)
     assert sorted(p.name for p in out.iterdir()) == ["arm.xml", "robot.toml", "skin.toml"]
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["arm", "arm.old-1", "arm.old-2"]
 
 
-@pytest.mark.parametrize("at", ["_fill", "os.rename"])
-def test_an_import_that_is_cut_short_leaves_what_was_there(imported, tmp_path, monkeypatch, at):
-    out = tmp_path / "arm"
-    out.mkdir()
-    (out / "mine.txt").write_text("precious")
-    real = os.rename
-
-    def cut(*args):
-        if at == "_fill" or ".robot-" in str(args[0]):
-            raise KeyboardInterrupt
-        real(*args)
-
-    monkeypatch.setattr(f"pretouch.importing.folder.{at}", cut)
+def test_an_import_that_is_cut_short_leaves_nothing(imported, tmp_path, monkeypatch):
+    monkeypatch.setattr("pretouch.importing.folder.description_text", Mock(side_effect=KeyboardInterrupt))
     with pytest.raises(KeyboardInterrupt):
-        write_folder(imported, out, force=True)
-    assert [p.name for p in tmp_path.iterdir()] == ["arm"]
-    assert (out / "mine.txt").read_text() == "precious"
+        write_folder(imported, tmp_path / "arm")
+    assert list(tmp_path.iterdir()) == []
 
 
 def assert_pointing_down(model, ready):

@@ -1,52 +1,20 @@
-"""Arms by their names: of the package, of other distributions, and of folders."""
+"""Arms by their names: of the package, and of folders."""
 
 from pathlib import Path
 
 import pytest
 
 from pretouch.errors import RobotModelError, SkinError
-from pretouch.robot import named
 from pretouch.robot.description import RobotDescription, fr3, panda
 from pretouch.robot.description_file import description_text
 from pretouch.robot.model import RobotModel
-from pretouch.robot.named import GROUP, is_shipped, robot_named, robot_names
+from pretouch.robot.named import is_shipped, robot_named
 from pretouch.sensing.skin import OWN_SKIN, PAPER_SKIN, skin_for
 
 
-@pytest.fixture
-def installed(monkeypatch: pytest.MonkeyPatch) -> dict[str, object]:
-    """What another distribution names, without installing one."""
-    there: dict[str, object] = {}
-    monkeypatch.setattr(named.plugins, "names", lambda group: tuple(there) if group == GROUP else ())
-    monkeypatch.setattr(named.plugins, "load", lambda group, name: there[name])
-    return there
-
-
 def test_the_packages_arms_have_names():
-    assert robot_names()[:2] == ("panda", "fr3")
     assert robot_named("panda").mjcf == panda().mjcf
     assert robot_named("fr3").ee_body == "fr3_hand_tcp"
-
-
-def test_an_arm_of_another_distribution_has_a_name(installed: dict[str, object]):
-    installed["ours"] = fr3
-    assert robot_names() == ("panda", "fr3", "ours")
-    assert robot_named("ours").mjcf == fr3().mjcf
-
-
-def test_a_name_of_the_package_stays_what_it_is(installed: dict[str, object]):
-    installed["panda"] = fr3
-    assert robot_names() == ("panda", "fr3")
-    assert robot_named("panda").name == "panda"
-
-
-def test_what_is_no_description_is_refused(installed: dict[str, object]):
-    installed["ours"] = lambda: 7
-    with pytest.raises(
-        RobotModelError,
-        match=r"arm 'ours' of the entry points pretouch\.robots is 7: make its function return a RobotDescription",
-    ):
-        robot_named("ours")
 
 
 def test_an_unknown_name_is_refused_with_those_there_are():

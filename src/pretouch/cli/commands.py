@@ -20,7 +20,7 @@ class Live:
     profile: str = "pretouch"
     """Profile to start with, or PROFILE:GROUP.FIELD=VALUE."""
     arm: str = "panda"
-    """panda, fr3, a name that another package adds, or the folder of an imported arm, to which the room is scaled."""
+    """panda, fr3, or the folder of an imported arm, to which the room is scaled."""
     path: str = "circle"
     """circle or line."""
     seed: int = 0

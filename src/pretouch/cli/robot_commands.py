@@ -37,8 +37,6 @@ class Import:
     """Largest number of capsules per link."""
     cover: bool = False
     """Enlarge the capsules until no surface sticks out of them: the arm then keeps more distance than necessary."""
-    force: bool = False
-    """Write to an existing folder: its contents are kept under another name."""
     json: str = ""
     """File for the numbers, or - for standard output: text then goes to standard error."""
 

@@ -45,7 +45,7 @@ def import_arm(command: "Import") -> None:
         cover=command.cover,
     )
     folder = Path(command.out or _file_name(command.name or read_source(file, options.packages).name))
-    check_free(folder, command.force)
+    check_free(folder)
     with numbers_to(command.json) as write:
         write(_imported(command, file, options, folder))
 
@@ -53,14 +53,12 @@ def import_arm(command: "Import") -> None:
 def _imported(command: "Import", file: Path, options: ImportOptions, folder: Path) -> dict[str, Any]:
     """Import an arm, write its folder, and print what came of it; return the numbers."""
     found = import_robot(file, options)
-    kept = write_folder(found, folder, command.force)
+    write_folder(found, folder)
     console = Console(highlight=False)
     links = f"Links: {', '.join(found.model.links[1:])}."
     show(console, [joint_table(found.model, found.ready, links), _capsules(found)])
     for sentence in [*found.remarks, *_said(found)]:
         console.print(f"- {sentence}", markup=False, soft_wrap=True)
-    if kept:
-        console.print(f"The previous contents of {folder} are now in {kept}.", markup=False, soft_wrap=True)
     console.print(f"\nWritten: {folder}. Try it: pretouch live --arm {folder}", markup=False, soft_wrap=True)
     return _numbers_of(found)
 

@@ -16,7 +16,7 @@ class Coverage:
     skin: tyro.conf.Positional[str] = ""
     """Skin file; by default the seven units that come with the package, or the skin in the arm's folder."""
     arm: str = "panda"
-    """panda, fr3, a name that another package adds, or the folder of an imported arm."""
+    """panda, fr3, or the folder of an imported arm."""
     workspace: str = "paths"
     """Postures to average over: circle, line, paths (both of the paper's), or joints (their whole range)."""
     speed: float = 0.5
@@ -75,7 +75,7 @@ class Monitor:
     units: str = ""
     """Names of the units to watch, separated by commas."""
     arm: str = "panda"
-    """The arm of the skin file: panda, fr3, a name that another package adds, or the folder of an imported arm."""
+    """The arm of the skin file: panda, fr3, or the folder of an imported arm."""
     posture: str = ""
     """Joint positions [rad], separated by commas, of the arm that stands still: with --skin, units whose readings
     contradict the model are named. Nothing but the arm may be near."""
@@ -175,7 +175,7 @@ class Simulate:
     skin: str = ""
     """Skin file; by default the seven units that come with the package."""
     arm: str = "panda"
-    """panda, fr3, a name that another package adds, or the folder of an imported arm."""
+    """panda, fr3, or the folder of an imported arm."""
     host: str = HOST
     """Name or address of the receiver."""
     port: int = PORT

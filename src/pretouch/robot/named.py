@@ -1,25 +1,15 @@
-"""The arms that can be named: those of the package, those of other distributions, and folders."""
+"""The arms that can be named: those of the package, and folders."""
 
 import re
 from pathlib import Path
 
-from pretouch import plugins
 from pretouch.errors import RobotModelError
 from pretouch.robot.description import RobotDescription, fr3, panda
 from pretouch.robot.description_file import load_description
 
 ROBOTS = {"panda": panda, "fr3": fr3}
 """Those that come with the package."""
-GROUP = "pretouch.robots"
-"""Entry points of other distributions: functions without arguments that return a `RobotDescription`."""
-
-
 _DESCRIPTION = re.compile(r"[a-z][a-z0-9_]*_description")
-
-
-def robot_names() -> tuple[str, ...]:
-    """Return the names there are."""
-    return (*ROBOTS, *(name for name in plugins.names(GROUP) if name not in ROBOTS))
 
 
 def is_description(name: str) -> bool:
@@ -35,13 +25,10 @@ def is_shipped(arm: RobotDescription) -> bool:
 def robot_named(name: str) -> RobotDescription:
     """Return the description of an arm, by its name or by the folder or robot.toml that it was imported to.
 
-    Raises RobotModelError where there is neither, or where the file is wrong; PluginError where a name of another
-    distribution cannot be loaded.
+    Raises RobotModelError where there is neither, or where the file is wrong.
     """
     if name in ROBOTS:
         return ROBOTS[name]()
-    if name in plugins.names(GROUP):
-        return _of_plugin(name)
     if is_description(name):
         raise RobotModelError(
             f"There is no arm {name!r} yet: import it first by `pretouch robot import {name} --out"
@@ -49,17 +36,7 @@ def robot_named(name: str) -> RobotDescription:
         )
     if not Path(name).exists():
         raise RobotModelError(
-            f"There is no arm {name!r}: take one of {', '.join(robot_names())}, or a folder that"
+            f"There is no arm {name!r}: take one of {', '.join(ROBOTS)}, or a folder that"
             " `pretouch robot import` wrote."
         )
     return load_description(name)
-
-
-def _of_plugin(name: str) -> RobotDescription:
-    make = plugins.load(GROUP, name)
-    found = make() if callable(make) else make
-    if not isinstance(found, RobotDescription):
-        raise RobotModelError(
-            f"The arm {name!r} of the entry points {GROUP} is {found!r}: make its function return a RobotDescription."
-        )
-    return found

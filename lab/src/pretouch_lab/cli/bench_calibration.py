@@ -20,7 +20,7 @@ class Calibration:
     """Do not tell the calibration which links the units sit on."""
     motion: MotionOptions = field(default_factory=MotionOptions)
     arm: str = "panda"
-    """panda, fr3, a name that another package adds, or the folder of an imported arm."""
+    """panda, fr3, or the folder of an imported arm."""
     json: str = ""
     """File for the numbers, or - for standard output: text then goes to standard error."""
     seed: int = 0

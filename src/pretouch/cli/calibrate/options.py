@@ -82,7 +82,7 @@ class Calibrate:
     replace: bool = False
     """Overwrite existing files."""
     arm: str = "panda"
-    """panda, fr3, a name that another package adds, or the folder of an imported arm."""
+    """panda, fr3, or the folder of an imported arm."""
     seed: int = 0
     """Seed of everything that is random in a simulation."""
 

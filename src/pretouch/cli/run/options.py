@@ -19,7 +19,7 @@ class RobotOptions:
     """The arm's model, and what is remembered of it."""
 
     arm: str = "panda"
-    """Model of the arm: panda, fr3, a name that another package adds, or the folder of an imported arm."""
+    """Model of the arm: panda, fr3, or the folder of an imported arm."""
     confirm_push: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
     """Ask for the guided pushes even if the force sign of this robot is confirmed."""
     learnt: str = ""
