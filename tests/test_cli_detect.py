@@ -33,7 +33,7 @@ def test_what_was_read_assumed_and_found_is_printed(capsys, file):
         "assumed to be the force on the robot (otherwise --sign by-robot) in the base frame (otherwise --frame ee)"
         in said
     )
-    assert "Without ranges (--skin) no obstacle is known" in said
+    assert "Without a skin no obstacle is known" in said
     rows = [line.split() for line in said.splitlines() if line.startswith("paper ")]
     assert [row[-1] for row in rows[:3]] == ["y", "x", "z"]
     assert "paper: if nobody touched the arm, 3 false contacts in 0.2 min" in said
@@ -146,7 +146,7 @@ def test_joint_torques_are_detected_on_by_pretouch_and_paper(capsys, pushed_arm,
     assert contact["force_n"] == pytest.approx([0.0, 25.0, 0.0], abs=4.0)
     assert len(contact["point_m"]) == 3
     assert len(told["profiles"][0]["residual_sigma_nm"]) == 7
-    assert 1.0 < told["profiles"][0]["push_force_median_n"] < told["profiles"][0]["push_force_90_percent_n"] < 20.0
+    assert 1.0 < told["profiles"][0]["detectable_force_n"] < 20.0
     assert all(c["link"] is None and c["point_m"] is None for c in told["profiles"][1]["contacts"])
     text = page.read_text()
     assert text.count("<img src=") == 2
