@@ -1,7 +1,5 @@
 """Giving up at a location of the path, and trying again."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -134,9 +132,3 @@ def test_where_the_arm_comes_farther_than_an_object_would_let_it_the_location_is
     state = after(1.0, 1.0)
     assert forget_passed(state, 1.02, np.array([0.03, 0.0, 0.0])).contacts == 2
     assert forget_passed(state, 1.02, np.array([0.05, 0.0, 0.0])).contacts == 0
-
-
-def test_a_location_of_a_recording_of_before_counts_by_the_path_alone():
-    state = replace(after(1.0), q=None, lever=None)
-    assert count(state, met(1.05, np.ones(3), -AGAINST)).contacts == 2
-    assert forget_passed(state, 1.09, np.ones(3)).contacts == 1

@@ -43,12 +43,12 @@ class _Passed(NamedTuple):
     """A cycle that has passed, with its inputs as they were then: a port may use its arrays again."""
 
     cycle: Cycle
-    inputs: bytes | None
     truth: Truth | None
-    touch: bytes | None
-    points: bytes | None
-    desired: bytes | None
-    moving: bytes | None
+    inputs: bytes | None = None
+    touch: bytes | None = None
+    points: bytes | None = None
+    desired: bytes | None = None
+    moving: bytes | None = None
 
     def again(self) -> Cycle:
         if self.inputs is None:
@@ -103,7 +103,7 @@ class LastSeconds:
         if self._recorder is not None:
             self._recorder.record(cycle, truth)
         data, whole = encode_inputs(0, cycle.inputs)
-        self._ring.append(self._passed(cycle, data, truth) if whole else _Passed(cycle, None, truth, *[None] * 5))
+        self._ring.append(self._passed(cycle, data, truth) if whole else _Passed(cycle, truth))
         begin = cycle.step.stamp - self._seconds
         while self._ring[0].cycle.step.stamp < begin:
             self._ring.popleft()
@@ -117,8 +117,8 @@ class LastSeconds:
             self._points = given.points, None if given.points is None else encode_points(0, given.points, 0)
         return _Passed(
             cycle,
-            data,
             truth,
+            data,
             encode_touch(0, given),
             self._points[1],
             encode_desired(0, given),
