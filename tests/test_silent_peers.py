@@ -11,19 +11,10 @@ from collections.abc import Iterator
 
 import pytest
 
-from pretouch.hardware.franka import client
 from pretouch.hardware.network_skin import NetworkSkin
 from pretouch.viewer.server import ServeOptions, served
 from tests.hardware.fake_unit import IDS, KEYS
-from tests.ports import free_port, loopback
-
-
-@pytest.fixture
-def silent() -> Iterator[str]:
-    """Address of a machine whose port of the arm takes connections and says nothing."""
-    address = loopback()
-    with socket.create_server((address, client.PORT)):
-        yield address
+from tests.ports import free_port
 
 
 @pytest.fixture(autouse=True)

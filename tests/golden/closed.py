@@ -14,7 +14,7 @@ from pretouch.control.posture import brought_to
 from pretouch.controller import Controller
 from pretouch.loop import Cycle, run
 from pretouch.perception.scene_filter import no_fixtures
-from pretouch.profiles import profile, with_restriction
+from pretouch.profiles import profile
 from pretouch.sensing.skin import Skin
 from pretouch.sim.hand import Hand
 from pretouch.sim.paper_scenes import Placement, dynamic_pushes, person_scene, static_path, static_scene
@@ -44,30 +44,30 @@ class _Steps:
 
 
 def simulated(
-    scene: SceneSpec, path: Path, name: str, restrictions: str, seconds: float, person: Pusher | None = None
+    scene: SceneSpec, path: Path, name: str, seconds: float, person: Pusher | None = None
 ) -> dict[int, Values]:
     """Run the simulated arm for a time in a scene, beside a person or alone."""
     plant = Plant(model(), scene, PlantParams(), brought_to(model(), path.point(0.0)), SEED)
     units, steps = RangeFinders(plant, skin(), RangeFinderParams(), SEED), _Steps()
     if person is not None:
         Hand(plant, person)
-    controller = Controller(model(), skin(), fixtures(scene), path, with_restriction(profile(name), restrictions))
+    controller = Controller(model(), skin(), fixtures(scene), path, profile(name))
     clock = PlantClock(plant, controller.profile.task.control_period_s)
     plant.advance(0.2)
     run(controller, plant, units, clock, steps, lambda step: step.stamp >= seconds)
     return dict(enumerate(steps.values))
 
 
-def static(name: str, restrictions: str, trajectory: str, side: str) -> dict[int, Values]:
+def static(name: str, trajectory: str, side: str) -> dict[int, Values]:
     """Run into the paper's static object."""
     scene = static_scene(trajectory, side, 25_000.0, SEED)
-    return simulated(scene, static_path(trajectory, side), name, restrictions, 8.0)
+    return simulated(scene, static_path(trajectory, side), name, 8.0)
 
 
-def dynamic(name: str, restrictions: str) -> dict[int, Values]:
+def dynamic(name: str) -> dict[int, Values]:
     """Be pushed by the paper's person."""
     person, scene = Pusher(model(), dynamic_pushes(SEED)), person_scene(HandSpec(), Placement())
-    return simulated(scene, static_path("circle", "-y"), name, restrictions, 20.0, person)
+    return simulated(scene, static_path("circle", "-y"), name, 20.0, person)
 
 
 def crowd(units: int, name: str, cycles: int) -> dict[int, Values]:
@@ -96,11 +96,11 @@ def crowd(units: int, name: str, cycles: int) -> dict[int, Values]:
 
 
 CLOSED: dict[str, Callable[[], dict[int, Values]]] = {
-    "static/circle/paper": partial(static, "paper", "off", "circle", "-y"),
-    "static/line/paper-slack": partial(static, "paper", "slack", "line", "+y"),
-    "static/line/pretouch": partial(static, "pretouch", "braking", "line", "+y"),
-    "dynamic/paper": partial(dynamic, "paper", "slack"),
-    "dynamic/pretouch": partial(dynamic, "pretouch", "braking"),
+    "static/circle/paper": partial(static, "paper:approach=none", "circle", "-y"),
+    "static/line/paper-slack": partial(static, "paper", "line", "+y"),
+    "static/line/pretouch": partial(static, "pretouch", "line", "+y"),
+    "dynamic/paper": partial(dynamic, "paper"),
+    "dynamic/pretouch": partial(dynamic, "pretouch"),
     "32-units/paper": partial(crowd, 32, "paper", 400),
     "32-units/pretouch": partial(crowd, 32, "pretouch", 400),
     "1000-points/paper": partial(crowd, 1000, "paper", 200),
