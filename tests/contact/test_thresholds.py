@@ -6,11 +6,28 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from pretouch.contact.thresholds import crossed, noise_force, obstacle_force, side_distances, thresholds
+from pretouch.contact.thresholds import (
+    ThresholdNumbers,
+    crossed,
+    noise_force,
+    obstacle_force,
+    side_distances,
+    threshold_parts,
+)
 from pretouch.params import ThresholdParams
+from pretouch.types import Thresholds
 
 TABLE_I = ThresholdParams()  # F_b = 10, F_std = 3, sigma_max = 3, F_d = 4, d_max = 0.8, d_min = 0.05
 FAR = np.full(3, np.inf)
+
+
+def thresholds(
+    mean: np.ndarray, sigma: np.ndarray, positive: np.ndarray, negative: np.ndarray, params: ThresholdParams
+) -> Thresholds:
+    parts = np.empty((6, 3))
+    numbers = ThresholdNumbers(*(getattr(params, name) for name in ThresholdNumbers._fields))
+    threshold_parts(mean, sigma, positive, negative, numbers, parts)
+    return Thresholds(parts)
 
 
 def test_eq_10_by_numbers():

@@ -53,18 +53,18 @@ def test_viable_speed_by_numbers():
     # a = 10, dt = 0.01: a dt^2 = 0.001, so d = 0.003 is x = 3 and n = floor((5 - 1) / 2) = 2 steps of braking:
     # v = (0.003 / 0.01 + 10 * 0.01 * 2 * 3 / 2) / 3 = (0.3 + 0.3) / 3 = 0.2
     # check: 0.2, 0.1 and 0 m/s for 0.01 s each travel 0.002 + 0.001 = 0.003
-    assert viable_speed(np.array([0.003]), np.array([10.0]), 0.01)[0] == pytest.approx(0.2)
+    assert viable_speed(0.003, 10.0, 0.01) == pytest.approx(0.2)
     # the usual sqrt(2 a d) = 0.245 would go too far: 0.245 + 0.145 + 0.045 = 0.435 > 0.3
 
 
 def test_viable_speed_is_zero_at_the_limit_and_beyond():
-    np.testing.assert_array_equal(viable_speed(np.array([0.0, -0.1]), np.array([10.0, 10.0]), 0.01), 0.0)
+    assert viable_speed(0.0, 10.0, 0.01) == viable_speed(-0.1, 10.0, 0.01) == 0.0
 
 
 @given(st.floats(1e-6, 5.0), st.floats(1.0, 20.0), st.sampled_from(PERIODS))
 @settings(deadline=None, derandomize=True, max_examples=300)
 def test_viable_speed_stops_exactly_at_the_limit(distance: float, acceleration: float, period: float):
-    speed, travelled = viable_speed(np.array([distance]), np.array([acceleration]), period)[0], 0.0
+    speed, travelled = viable_speed(distance, acceleration, period), 0.0
     while speed > 0:
         travelled += speed * period
         speed -= acceleration * period

@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import linprog, minimize
 
 from pretouch.control.joint_box import JointLimits, joint_box
-from pretouch.control.qp import Cost, damping, manipulability, mid_joint_velocity, skipped, solve, task_cost
+from pretouch.control.qp import Cost, damping, manipulability, mid_joint_velocity, solve, task_cost
 from pretouch.control.restriction import ApproachRows, approach_rows
 from pretouch.params import RestrictionParams, TaskParams
 from pretouch.perception.closest import closest_points
@@ -262,11 +262,6 @@ def test_repeated_rows_change_nothing():
     once = simple(np.eye(7)[:1], 0.1).solve()
     often = simple(np.tile(np.eye(7)[:1], (20, 1)), 0.1).solve()
     np.testing.assert_allclose(often.qd, once.qd, atol=1e-12)
-
-
-def test_skipped_is_the_braking_command():
-    problem = simple(np.eye(7)[0], 0.1)
-    assert_braking(skipped(problem.stop, problem.rows), problem, QpOutcome.SKIPPED)
 
 
 def test_rows_that_were_violated_on_the_way_leave_no_rounding():

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -7,13 +9,15 @@ from scipy.spatial.transform import Rotation
 
 from pretouch.perception.closest import no_obstacles
 from pretouch.perception.obstacles import (
+    NewReadings,
+    TrackState,
     is_evidence,
-    is_fresh,
     locate,
     measured_distance,
+    newer,
     points_of_units,
     sensor_poses,
-    track,
+    take_in,
     track_init,
 )
 from pretouch.robot.description import panda
@@ -33,9 +37,18 @@ def _readings(stamp, distance=0.5, status=RangeStatus.OK) -> RangeReadings:
     return RangeReadings(stamp, np.full(len(stamp), distance), np.full(len(stamp), status, dtype=np.int64))
 
 
+def track(
+    state: TrackState, stamps: list[float], points: np.ndarray, shows: np.ndarray, tells: np.ndarray, now: float
+) -> TrackState:
+    """The state with readings of these stamps taken in; a point is given up after 0.06 s."""
+    point, times, stamp = state.point.copy(), state.times.copy(), np.array(stamps)
+    take_in(point, times, NewReadings(stamp, points, newer(state.used, stamp, now), shows, tells), now, 0.06)
+    return replace(state, point=point, times=times)
+
+
 def _take(state, stamp, now, x=1.0, shows=True, tells=True):
     """One reading of one unit that shows something at (x, 0, 0)."""
-    return track(state, _readings(stamp), np.array([[x, 0.0, 0.0]]), np.array([shows]), np.array([tells]), now, 0.06)
+    return track(state, [stamp], np.array([[x, 0.0, 0.0]]), np.array([shows]), np.array([tells]), now)
 
 
 # Eq. 1
@@ -192,7 +205,7 @@ def test_a_reading_that_comes_too_late_is_used_up_but_shows_nothing():
 def test_units_are_kept_apart():
     points = np.array([[1.0, 0, 0], [2.0, 0, 0], [3.0, 0, 0], [4.0, 0, 0]])
     shows, tells = np.array([True, False, False, True]), np.array([True, True, False, True])
-    state = track(track_init(4), _readings([1.0, 1.0, 1.0, -INF]), points, shows, tells, 1.0, 0.06)
+    state = track(track_init(4), [1.0, 1.0, 1.0, -INF], points, shows, tells, 1.0)
     np.testing.assert_array_equal(state.point, [[1, 0, 0], [NAN] * 3, [NAN] * 3, [NAN] * 3])
     np.testing.assert_array_equal(state.seen, [1, -INF, -INF, -INF])
     np.testing.assert_array_equal(state.heard, [1, 1, -INF, -INF])
@@ -233,7 +246,7 @@ def test_a_track_holds_what_was_really_shown(messages):
 
 def test_an_unheard_unit_is_not_fresh():
     state = track_init(4)
-    np.testing.assert_array_equal(is_fresh(state, _readings([-INF, NAN, INF, 0.0]), 0.0), [False, False, False, True])
+    np.testing.assert_array_equal(newer(state.used, np.array([-INF, NAN, INF, 0.0]), 0.0), [False, False, False, True])
 
 
 def test_points_of_units_leave_out_those_of_other_sources():

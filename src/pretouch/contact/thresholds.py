@@ -4,8 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import ByName, compiled, entry
-from pretouch.params import ThresholdParams
+from pretouch.compiled import compiled
 from pretouch.types import BoolArray, FloatArray, Number, Thresholds
 
 
@@ -45,26 +44,6 @@ def side_distances(
     return positive, negative
 
 
-def thresholds(
-    mean: FloatArray, sigma: FloatArray, positive: FloatArray, negative: FloatArray, params: ThresholdParams
-) -> Thresholds:
-    """Upper and lower contact thresholds of each axis [N], eq. 9 of the paper.
-
-    T_u = mu + F_b + F_sigma - F_obs-, T_l = mu - F_b - F_sigma + F_obs+: an object at greater y pushes the arm
-    towards -y, so it raises T_l.
-
-    Args:
-        mean: (3,) mean mu of the window [N].
-        sigma: (3,) standard deviation of the window [N].
-        positive: (3,) distance to the nearest object on the positive side of each axis [m].
-        negative: (3,) the same for the negative side [m].
-        params: F_b, F_std, sigma_max, F_d, d_max, d_min.
-    """
-    parts = np.empty((6, 3))
-    _parts(mean, sigma, positive, negative, params, parts)
-    return Thresholds(parts)
-
-
 class ThresholdNumbers(NamedTuple):
     """What is taken of `ThresholdParams`."""
 
@@ -76,20 +55,17 @@ class ThresholdNumbers(NamedTuple):
     d_min_m: float
 
 
-@entry
-def _parts(
-    mean: FloatArray, sigma: FloatArray, positive: FloatArray, negative: FloatArray, p: ByName[ThresholdNumbers],
-    parts: FloatArray,
-) -> None:  # fmt: skip
-    threshold_parts(mean, sigma, positive, negative, p, parts)
-
-
 @compiled
 def threshold_parts(
     mean: FloatArray, sigma: FloatArray, positive: FloatArray, negative: FloatArray, p: ThresholdNumbers,
     parts: FloatArray,
 ) -> None:  # fmt: skip
-    """Write what `thresholds` returns to `parts` (6, 3), in the order of `Thresholds`."""
+    """Write thresholds of each axis [N] and what they are made of, eq. 9 of the paper: `Thresholds.parts` (6, 3).
+
+    T_u = mu + F_b + F_sigma - F_obs-, T_l = mu - F_b - F_sigma + F_obs+: an object at greater y pushes the arm
+    towards -y, so it raises T_l. Mean mu and standard deviation of the window are (3,) [N], distances to the nearest
+    object on the positive and the negative side of each axis (3,) [m].
+    """
     for i in range(3):
         f_sigma = noise_force(sigma[i], p.f_std_n, p.sigma_max_n)
         f_positive = obstacle_force(positive[i], p.f_d_n, p.d_max_m, p.d_min_m)

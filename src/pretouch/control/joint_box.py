@@ -66,21 +66,13 @@ def joint_limits(model: RobotModel, margin: float, period: float) -> JointLimits
 
 
 @compiled
-def viable_speed(distance: FloatArray, acceleration: FloatArray, period: float) -> FloatArray:
-    """Largest speed (n,) [rad/s] towards a limit at `distance` (n,) [rad] from which braking still ends before it.
+def viable_speed(distance: float, acceleration: float, period: float) -> float:
+    """Largest speed [rad/s] towards a limit at `distance` [rad] from which braking still ends before it.
 
     Exact for velocities held over a period: with x = d / (a dt^2) and n = floor((sqrt(1 + 8 x) - 1) / 2) whole
     steps of braking, v = (d / dt + a dt n (n + 1) / 2) / (n + 1). The usual sqrt(2 a d) breaks the limit. Zero at
     the limit and beyond it.
     """
-    speed = np.empty(len(distance))
-    for i in range(len(distance)):
-        speed[i] = _before_limit(distance[i], acceleration[i], period)
-    return speed
-
-
-@compiled
-def _before_limit(distance: float, acceleration: float, period: float) -> float:
     d, a = max(distance, 0.0), acceleration
     # The most steps n whose braking distance a dt^2 n (n + 1) / 2 fits into d. Where it fits exactly, n and n - 1 give
     # the same speed: a floor that rounding puts one off costs nothing.
@@ -174,8 +166,8 @@ def box_and_brake(q: FloatArray, qd: FloatArray, table: FloatArray) -> tuple[Flo
 def _viable(q: float, table: FloatArray, i: int) -> tuple[float, float]:
     """Lowest and highest viable velocity of joint i at q."""
     speed, a, period = table[2, i], table[3, i], table[4, i]
-    up = np.minimum(speed, _before_limit(table[1, i] - q, a, period))
-    down = np.minimum(speed, _before_limit(q - table[0, i], a, period))
+    up = np.minimum(speed, viable_speed(table[1, i] - q, a, period))
+    down = np.minimum(speed, viable_speed(q - table[0, i], a, period))
     offset, slope = table[5, i], table[6, i]
     if slope > 0.0:  # 0 stands for no envelope
         up = np.minimum(up, viable_speed_in_envelope(table[7, i] - q, offset, slope, a, period))

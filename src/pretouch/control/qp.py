@@ -222,11 +222,6 @@ def _contradict(lower: FloatArray, upper: FloatArray, rows: ApproachRows, budget
     return least == SOLVED and bool(answer.slack.max() > 1e-6)
 
 
-def skipped(stop: FloatArray, rows: ApproachRows) -> QpSolution:
-    """Return the braking command (n,) [rad/s] where no problem is posed: the arm holds."""
-    return _braking(stop, rows, QpOutcome.SKIPPED, "not posed: the arm holds")
-
-
 def _braking(stop: FloatArray, rows: ApproachRows, outcome: QpOutcome, status: str) -> QpSolution:
     slack = np.maximum(rows.G @ stop - rows.h, 0.0)
     return QpSolution(stop, slack, np.zeros(len(stop) + len(rows.h)), outcome, status)

@@ -159,37 +159,8 @@ def measured(distance: FloatArray, status: IntArray, cones: Cones, shown: FloatA
             shown[k] = max(distance[k], nearest)
 
 
-def track(
-    state: TrackState,
-    readings: RangeReadings,
-    points: FloatArray,
-    shows: BoolArray,
-    tells: BoolArray,
-    now: float,
-    persistence: float,
-) -> TrackState:
-    """Take new readings in.
-
-    A reading that shows something replaces its unit's point. One that shows nothing, or comes too late, leaves the
-    point as it was, so one missed reading removes no obstacle.
-
-    Args:
-        state: points known so far.
-        readings: the newest reading of each unit.
-        points: (K, 3) where the readings are, base frame [m].
-        shows: (K,) whether the reading shows an obstacle.
-        tells: (K,) whether it tells anything at all.
-        now: instant of this step [s].
-        persistence: age at which a point is given up [s].
-    """
-    point, times = state.point.copy(), state.times.copy()
-    new = NewReadings(readings.stamp, points, is_fresh(state, readings, now), shows, tells)
-    take_in(point, times, new, now, persistence)
-    return TrackState(point, state.direction, times, state.motion)
-
-
 class NewReadings(NamedTuple):
-    """Readings of K units, as `track` takes them."""
+    """Readings of K units, as `take_in` takes them."""
 
     stamp: FloatArray
     """(K,) [s]."""
@@ -205,7 +176,11 @@ class NewReadings(NamedTuple):
 
 @compiled
 def take_in(point: FloatArray, times: FloatArray, new: NewReadings, now: float, persistence: float) -> None:
-    """Change the points (K, 3) and times (3, K) of a `TrackState` as `track` says."""
+    """Take new readings into the points (K, 3) and times (3, K) of a `TrackState`.
+
+    A reading that shows something replaces its unit's point. One that shows nothing, or comes too late, leaves the
+    point as it was, so one missed reading removes no obstacle. From the age `persistence` [s] on a point is given up.
+    """
     stamp, points, fresh, shows, tells = new
     for k in range(len(stamp)):
         if fresh[k]:
@@ -220,17 +195,12 @@ def take_in(point: FloatArray, times: FloatArray, new: NewReadings, now: float, 
                     point[k, i] = points[k, i]
 
 
-def is_fresh(state: TrackState, readings: RangeReadings, now: float) -> BoolArray:
+@compiled
+def newer(used: FloatArray, stamp: FloatArray, now: float) -> BoolArray:
     """Say which units (K,) have a reading newer than the last one used, and not from the future.
 
     A unit whose clock is ahead is so never heard: it must not pass for one that is well.
     """
-    return newer(state.used, readings.stamp, now)
-
-
-@compiled
-def newer(used: FloatArray, stamp: FloatArray, now: float) -> BoolArray:
-    """Answer of `is_fresh`."""
     fresh = np.empty(len(stamp), np.bool_)
     for k in range(len(stamp)):
         fresh[k] = used[k] < stamp[k] <= now  # false for NaN, and for -inf: never heard
