@@ -216,7 +216,7 @@ def test_messages_mirror_the_types_field_by_field():
         "payload",
         "desired",
         "moving",
-    }  # of Inputs: in messages of their own, so that older recordings open
+    }  # of Inputs: in messages of their own, of steps that have them
     for kind in mirrored:
         name = {"ControlStep": "Step"}.get(kind.__name__, kind.__name__)
         there = {field.name for field in fields_of(f"{PACKAGE}/msg/{name}")}
