@@ -165,6 +165,32 @@ def test_single_late_readings_are_no_reason_for_a_warning():
     assert found([late[i] if i % 40 == 0 else one for i, one in enumerate(heard())]) == ()
 
 
+def judged(samples, late, **standing):
+    return findings(
+        [unit_health("hand-1", samples, NOW, UnitStatus.of(traffic(**standing)), Counts(340, 160))], LIMITS, late
+    )
+
+
+def test_a_machine_that_is_late_is_named_first_and_its_units_not_blamed():
+    slow = heard(flags=lambda n: WELL * (n % 10 == 0), range_sigma=80, latency=0.07)
+    assert {f.what for f in judged(slow, 0.5)} == {"rate", "loss", "latency", "sigma"}
+    machine, sigma = judged(slow, 1.26)
+    assert (machine.unit, machine.level, machine.what) == ("this machine", "fault", "machine")
+    assert machine.sentence.startswith(
+        "This machine is late, by 1.3 s of the last 10 s (limit 0.5 s), so that hand-1 cannot be judged: close other"
+    )
+    assert sigma.what == "sigma"
+
+
+def test_a_unit_that_is_silent_is_named_behind_a_machine_that_is_late():
+    machine, silent = judged(heard(until=NOW - 2.0), 1.0, state="silent", last_arrival=NOW - 2.0)
+    assert (machine.what, silent.what) == ("machine", "silent")
+
+
+def test_a_machine_that_is_late_without_consequence_is_not_named():
+    assert findings([unit_health("hand-1", heard(), NOW, UnitStatus.of(traffic()), Counts(500))], LIMITS, 9.0) == ()
+
+
 @pytest.mark.parametrize("name", ["window_s", "rate_hz", "battery_v"])
 def test_a_limit_that_makes_no_sense_is_refused(name):
     with pytest.raises(ParameterError, match=name):

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pretouch.hardware.health import Counts, UnitStatus, UnitWindow, unit_health
+from pretouch.hardware.health import Counts, Lateness, UnitStatus, UnitWindow, unit_health
 from pretouch.hardware.traffic import UnitTraffic
 from pretouch.hardware.wire import NO_TEMPERATURE, Flag
 from tests.hardware.traffic import NOW, heard, traffic
@@ -30,6 +30,24 @@ def test_a_unit_that_is_well_has_the_numbers_it_was_given():
     assert unit.imu_loss == 0.0
     assert unit.statuses == {"OK": 500}
     assert (unit.bus_errors, unit.restarts, unit.range_late, unit.reboots, unit.clock_jumps) == (0, 0, 0, 0, 0)
+
+
+def test_late_looks_and_time_that_a_simulation_left_out_add_up_within_the_window():
+    lateness = Lateness(every=0.1, length=10.0)
+    for now in (5.0, 5.1, 5.24):  # by less than half of the time between two
+        lateness.look(now)
+    assert lateness.total == 0.0
+    lateness.look(5.64)
+    assert lateness.total == pytest.approx(0.3)
+    lateness.look(5.74, left_out=0.5)
+    lateness.look(5.84, left_out=0.5)
+    assert lateness.total == pytest.approx(0.8)
+    for k in range(1, 99):
+        lateness.look(5.84 + 0.1 * k, left_out=0.5)
+    lateness.look(15.69, left_out=0.5)
+    assert lateness.total == pytest.approx(0.5)
+    lateness.look(15.79, left_out=0.5)
+    assert lateness.total == 0.0
 
 
 def test_the_noise_is_that_of_the_readings_whatever_the_motion():

@@ -1,10 +1,12 @@
 """Units before a run, over real sockets."""
 
+import itertools
 import time
 
 import pytest
 
 from pretouch.errors import HardwareError
+from pretouch.hardware.health import HealthParams
 from pretouch.hardware.network_skin import NetworkSkin
 from pretouch.loop import MonotonicClock
 from pretouch.robot.model import RobotModel
@@ -40,6 +42,16 @@ def test_units_that_are_well_are_found_well_and_one_that_falls_silent_is_named(c
         check.take(now)
     (finding,) = [finding for finding in check.findings() if finding.refused]
     assert finding.sentence.startswith("hand_front has sent nothing for")
+
+
+def test_a_machine_too_slow_to_simulate_is_named_in_place_of_units(checked, panda_model, paper_skin, monkeypatch):
+    arm, units, _ = checked
+    limits = HealthParams(settle_s=0.2, rate_hz=1e3, rate_fault_hz=1e3)
+    monkeypatch.setattr("pretouch.session.units.HealthParams", lambda: limits)
+    left_out = itertools.count(0.0, 0.2)
+    check = UnitCheck(units, panda_model, paper_skin, fixtures(SceneSpec()), arm, lambda: next(left_out))
+    check.wait(MonotonicClock(0.01), 20.0, 0.6)
+    assert [finding.what for finding in check.findings() if finding.refused] == ["machine"]
 
 
 def test_units_that_are_not_heard_are_named(checked):

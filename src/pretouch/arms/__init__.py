@@ -111,6 +111,8 @@ class OpenedArm:
     """Opens what else is told of each control step."""
     free_motion_id: str = ""
     """What the arm is known by as its free motion is remembered; '': by its name."""
+    left_out: Callable[[], float] = lambda: 0.0
+    """Time that this machine was too slow to simulate it so far [s]."""
     commander: Commander | None = None
     """Whom the arm follows, if it is not the path."""
 

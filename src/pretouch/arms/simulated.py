@@ -47,5 +47,5 @@ class Simulated(ArmOptions):
             with ThreadedArm(options, setup.start(), SceneSpec(floor_height=setup.floor)) as arm:
                 yield OpenedArm(
                     arm, skin=units, units=units, push=lambda direction: arm.push(direction.axis),
-                    free_motion_id=f"{arm.name}, seed {self.seed}",
+                    free_motion_id=f"{arm.name}, seed {self.seed}", left_out=lambda: arm.left_out,
                 )  # fmt: skip

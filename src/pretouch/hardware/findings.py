@@ -36,9 +36,27 @@ class Finding:
     sentence: str
 
 
-def findings(units: Iterable[UnitHealth], params: HealthParams) -> tuple[Finding, ...]:
-    """Return what is wrong, unit by unit, faults first."""
-    return tuple(finding for unit in units for finding in sorted(_of(unit, params), key=lambda f: f.level))
+_OF_TIME = frozenset({"rate", "range late", "loss", "imu rate", "imu loss", "latency", "clock"})
+"""What a machine that is late makes of units that are well."""
+
+
+def findings(units: Iterable[UnitHealth], params: HealthParams, late: float = 0.0) -> tuple[Finding, ...]:
+    """Return what is wrong, unit by unit, faults first.
+
+    Where the machine itself was `late` for longer than `machine_late_s` within the window [s], it comes first: in place
+    of what may be its doing, and before units that are silent.
+    """
+    every = [finding for unit in units for finding in sorted(_of(unit, params), key=lambda f: f.level)]
+    doubted = [finding for finding in every if finding.what in {*_OF_TIME, "silent"}]
+    if late <= params.machine_late_s or not doubted:
+        return tuple(every)
+    names = ", ".join(dict.fromkeys(finding.unit for finding in doubted))
+    sentence = (
+        f"This machine is late, by {late:.1f} s of the last {params.window_s:g} s (limit {params.machine_late_s:g} s),"
+        f" so that {names} cannot be judged: close other programs, or take a faster machine."
+    )
+    machine = Finding("this machine", min(finding.level for finding in doubted), "machine", sentence)
+    return machine, *(finding for finding in every if finding.what not in _OF_TIME)
 
 
 def _of(unit: UnitHealth, params: HealthParams) -> Iterator[Finding]:

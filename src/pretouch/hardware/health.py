@@ -75,6 +75,9 @@ class HealthParams(Checked):
     milliseconds."""
     imu_loss: Fraction = 0.02
     """Largest share of IMU samples lost beyond those in lost datagrams: its FIFO ran over."""
+    machine_late_s: Positive = 0.5
+    """Time within the window by which this machine itself is late [s], from which on it is named in place of what units
+    lose and delay: a twentieth of the window, as much as makes a reading of twenty late."""
     reboots: PositiveCount = 1
     """Reboots within the window that are warned of; each is a second of silence."""
 
@@ -188,6 +191,31 @@ class UnitHealth:
     """Share of its touch readings that said it is touched; NaN of a unit that tells of no touch sensor."""
     touch_failed: float = 0.0
     """Share of its touch readings that said the sensor has failed."""
+
+
+class Lateness:
+    """By how much this machine was late within the last seconds: what it looks at then seems late too."""
+
+    def __init__(self, every: float, length: float) -> None:
+        """Take the time between two looks when it is not late, and the length of the window [s]."""
+        self._every, self._length = every, length
+        self._last, self._left_out = math.inf, 0.0
+        self._late: deque[tuple[float, float]] = deque()
+
+    def look(self, now: float, left_out: float = 0.0) -> None:
+        """Take note of a look [s], and of the time that a simulation on this machine has left out so far [s]."""
+        late = now - self._last - self._every
+        late = (late if late > 0.5 * self._every else 0.0) + left_out - self._left_out
+        self._last, self._left_out = now, left_out
+        if late > 0.0:
+            self._late.append((now, late))
+        while self._late and self._late[0][0] <= now - self._length:
+            self._late.popleft()
+
+    @property
+    def total(self) -> float:
+        """Return it [s]."""
+        return sum(late for _, late in self._late)
 
 
 class UnitWindow:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from pretouch.hardware.findings import Finding, findings
-from pretouch.hardware.health import HealthParams, UnitHealth, UnitWindow
+from pretouch.hardware.health import HealthParams, Lateness, UnitHealth, UnitWindow
 from pretouch.hardware.model_check import ModelCheck
 from pretouch.hardware.receiver import SkinReceiver
 from pretouch.hardware.traffic import Received
@@ -49,6 +49,7 @@ def watch(
 ) -> Iterator[MonitorUpdate]:
     """Yield an update every `UPDATE_PERIOD_S` for a duration [s], by the monotonic clock; the last one is marked."""
     windows = [UnitWindow(unit.id, params.window_s) for unit in receiver.units]
+    lateness = Lateness(UPDATE_PERIOD_S, params.window_s)
     begun = due = compare_due = time.monotonic()
     over = False
     while not over:
@@ -60,11 +61,12 @@ def watch(
                 posture.check.take(posture.q, receiver.readings())
         receiver.receive()
         now = time.monotonic()
+        lateness.look(now)
         over = now >= begun + duration
         heard = receiver.take_samples()
         receiver.take_imu()
         health = tuple(_taken(window, receiver, k, now, heard) for k, window in enumerate(windows))
-        found = findings(health, params)
+        found = findings(health, params, lateness.total)
         if posture is not None:
             found += posture.check.findings()
         yield MonitorUpdate(now, now - begun, heard, health, found, over)

@@ -84,8 +84,13 @@ class ThreadedArm:
 
     def report(self) -> str:
         """Say whether the machine was fast enough."""
-        late = self._arm.clock.left_out
+        late = self.left_out
         return f"This machine is too slow by {late:.1f} s for the simulation." if late else ""
+
+    @property
+    def left_out(self) -> float:
+        """Time that this machine was too slow to simulate so far [s]."""
+        return self._arm.clock.left_out
 
     def push(self, axis: tuple[float, float, float]) -> None:
         """Let a simulated person push the hand along an axis of the base, in a moment and for a while."""

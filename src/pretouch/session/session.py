@@ -1,5 +1,6 @@
 """One arm, its units and its controller: what is checked before the arm moves, in order."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,6 +42,8 @@ class Session:
     floor: float
     """Height of what is below the arm, base frame [m]."""
     clock: MonotonicClock
+    left_out: Callable[[], float] = lambda: 0.0
+    """Time that this machine was too slow to simulate so far [s], where arm and units are simulated."""
 
     def preflight(self, params: PreflightParams, approach: bool) -> tuple[Standstill, tuple[Finding, ...]]:
         """Watch arm and units for some seconds; return what was seen of the arm, and what there is to know.
@@ -53,7 +56,7 @@ class Session:
         """
         self.check_arm()
         c = self.controller
-        units = UnitCheck(self.units, c.model, c.skin, c.fixtures, self.arm) if self.units else None
+        units = UnitCheck(self.units, c.model, c.skin, c.fixtures, self.arm, self.left_out) if self.units else None
         if units:
             units.wait(self.clock, _PATIENCE_S, _STEADY_S)
         qd_max = c.limits.qd_max

@@ -9,7 +9,7 @@ import numpy as np
 
 from pretouch.errors import HardwareError
 from pretouch.hardware.findings import findings
-from pretouch.hardware.health import HealthParams, UnitWindow
+from pretouch.hardware.health import HealthParams, Lateness, UnitWindow
 from pretouch.hardware.model_check import ModelCheck, ModelCheckParams
 from pretouch.hardware.receiver_process import Traffic
 from pretouch.hardware.traffic import Received, UnitTraffic
@@ -76,12 +76,19 @@ def wait_until_live(units: Units, clock: Clock, take: Callable[[float], None], p
 class UnitCheck:
     """Watches units for as long as their arm stands."""
 
-    def __init__(self, units: Units, model: RobotModel, skin: Skin, fixtures: Fixtures, robot: Robot) -> None:
-        """Take the units of a skin on an arm, and what stands around it."""
-        self._units, self._skin, self._robot = units, skin, robot
+    def __init__(
+        self, units: Units, model: RobotModel, skin: Skin, fixtures: Fixtures, robot: Robot,
+        left_out: Callable[[], float] = lambda: 0.0,
+    ) -> None:  # fmt: skip
+        """Take the units of a skin on an arm, and what stands around it.
+
+        `left_out` tells the time that this machine was too slow to simulate so far [s], where they are simulated.
+        """
+        self._units, self._skin, self._robot, self._left_out = units, skin, robot, left_out
         self._health = HealthParams()
         self._windows = [UnitWindow(name, self._health.window_s) for name in skin.network.ids]
         self._model = ModelCheck(model, skin, fixtures, ModelCheckParams())
+        self._lateness = Lateness(_TAKE_S, self._health.window_s)
         self._taken = 0.0
         self._arrivals = [-np.inf] * len(skin.mounted)
 
@@ -96,6 +103,7 @@ class UnitCheck:
         if now - self._taken < _TAKE_S:
             return
         self._taken = now
+        self._lateness.look(now, self._left_out())
         heard = self._units.take_samples()
         for one in heard:
             self._arrivals[one.unit] = one.arrival
@@ -108,7 +116,7 @@ class UnitCheck:
         """Return what is wrong with them by now."""
         now = monotonic()
         health = [window.health(now, unit) for window, unit in zip(self._windows, self._traffic(), strict=True)]
-        found = (*findings(health, self._health), *self._model.findings())
+        found = (*findings(health, self._health, self._lateness.total), *self._model.findings())
         return tuple(Finding(f.what, f.sentence, refused=f.level == "fault") for f in found)
 
     def _traffic(self) -> Sequence[UnitTraffic]:

@@ -69,7 +69,7 @@ def _run(
     controller = made.controller(np.array(found.arm.read().q))
     clock = MonotonicClock(made.profile.task.control_period_s)
     learnt = free_motion(command.robot, controller, found.free_motion_id or found.arm.name)
-    session = Session(found.arm, *heard, controller, made.floor, clock)
+    session = Session(found.arm, *heard, controller, made.floor, clock, found.left_out)
     say(f"{found.arm.name}: checking it; let it stand still and do not touch it.")
     rest = _checked(session, command.task.approach, found.notes())
     if known and not command.robot.confirm_push:
