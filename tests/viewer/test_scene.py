@@ -154,12 +154,11 @@ def test_a_touched_place_is_an_arrow_that_ends_there(
     at, force = np.array([[0.3, 0.1, 0.6]]), np.array([[0.0, 0.0, -20.0]])
     touched = Touched(np.array([5]), at, force, np.array([0.02]), np.array([0.9]))
     scene.draw(frame(replace(some_step, touched=touched)), 0.0)
-    (begin, end) = nodes.nodes["/place/0"].points[0]
+    (begin, end) = nodes.nodes["/place"].points[0]
     np.testing.assert_allclose(end, at[0], atol=1e-6)
     np.testing.assert_allclose(end - begin, [0.0, 0.0, -0.24], atol=1e-6)
-    assert not nodes.nodes["/place/1"].visible
     scene.draw(frame(replace(some_step, touched=NOT_TOUCHED)), 0.0)
-    assert not nodes.nodes["/place/0"].visible
+    assert not nodes.nodes["/place"].visible
 
 
 @pytest.mark.parametrize("force", [np.zeros(3), np.array([0.0, 5.0, 0.0]), np.full(3, np.nan), None])
