@@ -212,6 +212,11 @@ def test_one_visitor_commands_all_see_who_and_the_others_look(
         visitor.set(speed, 0.7)
         visitor.settle()
         assert speed.value == 0.5
+        text = control(page, "Profile text")
+        visitor.set(text, "blind")
+        visitor.say({"type": "GuiFormSubmitMessage", "uuid": text._impl.parent_container_id})
+        visitor.settle()
+        assert text.value == "paper"
     until(lambda: not take.visible)
     visitor.set(speed, 0.7)
     visitor.settle()

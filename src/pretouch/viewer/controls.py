@@ -196,6 +196,8 @@ class Controls:
         text = self._text.value
         if self._actions.admits(event.client_id):
             self._actions.put(lambda: self._simulation.set_profile(profile(text.strip())), "profile text")
+        else:
+            put(self._text, self._written)
 
     def _choose_profile(self, base: str) -> None:
         self._set_speed(profile(base), base, self._profile.task.speed_m_s)
