@@ -49,9 +49,10 @@ def test_the_firmware_brings_each_zone_to_the_receiver(side: int, least: int, tm
     assert readings.distance[seen] == pytest.approx(along[seen], abs=1.6e-3)
 
 
-def test_a_skin_without_its_zones_gets_the_nearest(tmp_path: Path) -> None:
+def test_a_skin_without_its_zones_gets_no_reading_and_counts_them(tmp_path: Path) -> None:
     with SkinReceiver(["one"], KEYS) as receiver, running_unit(receiver.address[1], tmp_path, zoned(4)):
         served(receiver, 100)
-        readings = receiver.readings()
-    assert readings.status.tolist() == [RangeStatus.OK]
-    assert 0.500 <= readings.distance[0] <= 0.520
+        readings, traffic = receiver.readings(), receiver.units[0]
+    assert readings.status.tolist() == [RangeStatus.NONE]
+    assert traffic.zones_told == 4
+    assert traffic.misfits > 20

@@ -166,6 +166,10 @@ def a_call_that_never_returns_lets_the_watchdog_bite():
     assert 5 * SECOND <= chip.now.now_us < 5.3 * SECOND
 
 
+lines = []
+"""What the unit printed."""
+
+
 def _configure():
     with open("config.json", "w") as file:
         file.write(json.dumps(CONFIG))
@@ -173,6 +177,7 @@ def _configure():
 
 def _run(board):
     service.this_board = lambda: board
+    service.print = lambda *words: lines.append(" ".join(map(str, words)))
     return _reset_in(service.run)
 
 
@@ -213,7 +218,9 @@ def without_a_configuration_there_is_the_prompt_and_nothing_is_sent():
     _configure()
     os.remove("config.json")
     service.this_board = _Draw
+    service.print = lambda *words: lines.append(" ".join(map(str, words)))
     service.run()
+    assert lines[-1] == "there is no configuration"
     assert network.state.asked is None
     assert chip.receiver.hellos == []
 
