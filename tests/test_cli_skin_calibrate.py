@@ -162,23 +162,22 @@ def test_nobody_who_reads_on_ends_the_command_quietly_with_the_motion_written(tm
     )  # fmt: skip
     process.stdout.readline()
     process.stdout.close()
-    assert (process.wait(timeout=60), process.stderr.read()) == (1, "")
+    assert (process.wait(timeout=60), process.stderr.read()) == (141, "")
     process.stderr.close()
     assert (tmp_path / "m.csv").stat().st_size > 1e6
 
 
-def test_the_motion_is_written_for_another_driver_with_what_it_is_good_for(panda_model, tmp_path, capsys):
+def test_the_motion_is_written_for_another_driver_with_the_room_it_takes(panda_model, tmp_path, capsys):
     place = tmp_path / "motion.csv"
     assert calibrate("--plan", place, "--duration", 45) == 0
     said = capsys.readouterr().out
     assert said.index("45 s, ") < said.index("The arm needs the space") < said.index("Keep everybody out of")
-    assert "panda_link1       not where along the axis" in said
     with place.open() as file:
         rows = list(csv.reader(file))
     assert rows[0] == ["time_s", *(f"q{i}_rad" for i in range(1, 8)), *(f"qd{i}_rad_s" for i in range(1, 8))]
     np.testing.assert_allclose(read_joints(place, panda_model).trace.q, np.array(rows[1:], dtype=float)[:, 1:8])
     table = np.array(rows[1:], dtype=float)
-    assert table[-1, 0] == pytest.approx(45.0, abs=0.002)
+    assert table[-1, 0] == pytest.approx(45.0, abs=0.004)  # three swings of whole milliseconds
     for row in table[[0, -1]]:
         assert row[1:8] == pytest.approx(panda_model.description.q_ready, abs=1e-6)
         assert row[8:] == pytest.approx(np.zeros(7), abs=1e-6)

@@ -32,7 +32,7 @@ def planned(model: RobotModel, options: "MotionOptions") -> tuple[Plan, PlanPara
 
 
 def write_motion(command: "Calibrate") -> None:
-    """Plan the motion, write it as CSV, and print what it is good for and the room it takes."""
+    """Plan the motion, write it as CSV, and print the time and the room it takes."""
     place = Path(command.plan)
     check_free("motion", place, command.replace)
     check_writable("file", place)
