@@ -5,8 +5,6 @@ import pytest
 
 from pretouch.atomic_write import write_json
 from pretouch.errors import ExperimentError
-from pretouch.text_table import TextTable, markdown
-from pretouch_lab.documents import begin_mark, end_mark, put
 from pretouch_lab.engine import Task, missing, open_folder, rows_of, run_tasks
 
 
@@ -48,16 +46,3 @@ def test_a_folder_of_another_run_is_refused(tmp_path):
         open_folder(tmp_path, {"seeds": "development"}, {"the scenario files have": "a"})
     with pytest.raises(ExperimentError, match="holds a run, but the scenario files have changed since"):
         open_folder(tmp_path, {"seeds": "published"}, {"the scenario files have": "b"})
-
-
-def test_only_what_is_between_the_markers_of_a_document_is_replaced(tmp_path):
-    document = tmp_path / "benchmarks.md"
-    document.write_text(f"Before.\n\n{begin_mark('tables')}\nold\n{end_mark('tables')}\n\nAfter.\n")
-    put(document, "tables", markdown(TextTable("Title", ("a", "b"), (("1", "2\n3"),), "Note.")))
-    text = document.read_text()
-    assert text.startswith("Before.")
-    assert text.endswith("After.\n")
-    assert "old" not in text
-    assert "| 1 | 2<br>3 |" in text
-    with pytest.raises(ExperimentError, match="has no place for figures"):
-        put(document, "figures", "")

@@ -16,8 +16,7 @@ from pretouch_lab.cell import Cell, Grid
 from pretouch_lab.paper import dynamic, static
 from pretouch_lab.registry import summarise
 from pretouch_lab.report import write_report
-from pretouch_lab.trace import read_trace, trace_of
-from pretouch_lab.trial import record_of
+from pretouch_lab.trial import read_trace, record_of, trace_of
 
 pytestmark = pytest.mark.slow
 
@@ -47,7 +46,7 @@ def test_tables_and_figures_are_in_one_file(request_and_folder):
     text = write_report([(request, out)], summarise(rows_in(out)), out).read_text()
     assert len(re.findall("^## ", text, flags=re.MULTILINE)) == 2
     figures = re.findall(r"^!\[.+\]\((.+)\)$", text, flags=re.MULTILINE)
-    assert figures == ["static.png", "dynamic-compared.png", "dynamic.png"]
+    assert figures == ["static.png", "dynamic.png"]
     for name in figures:
         with Image.open(out / name) as picture:
             assert picture.width >= 1000

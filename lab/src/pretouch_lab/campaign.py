@@ -5,12 +5,11 @@ from dataclasses import asdict, dataclass, replace
 from functools import cache, partial
 from hashlib import sha256
 from pathlib import Path
-from typing import Literal, cast, get_args
+from typing import Literal, get_args
 
 from pretouch.atomic_write import write_json
 from pretouch.coverage.placement import placement_for
 from pretouch.errors import ExperimentError, SkinError
-from pretouch.params import Orientation
 from pretouch.profiles import profile
 from pretouch.robot.description_file import files_digest
 from pretouch.robot.model import RobotModel
@@ -39,8 +38,6 @@ class Request:
     profiles: tuple[str, ...] = ("blind", "paper")
     restrictions: tuple[str, ...] = ()
     """Restriction modes; none: each experiment's own."""
-    orientation: str | None = None
-    """Whether the hand's orientation is free or held, or None for the profile's own."""
     stiffness: tuple[float, ...] = (25_000.0,)
     """Contact stiffnesses of static objects [N/m]."""
     skin: str | None = None
@@ -74,8 +71,6 @@ class Request:
             profile(name)
         for mode in self.restrictions:
             _check_choice("restriction mode", mode, tuple(modes()))
-        if self.orientation is not None:
-            _check_choice("orientation", self.orientation, get_args(Orientation))
         _check_choice("choice of trials to record", self.record, get_args(Recorded))
         for stiffness in self.stiffness:
             if not 100.0 <= stiffness <= 1e6:
@@ -95,7 +90,7 @@ class Request:
         """Load what all trials share."""
         model = RobotModel(robot_named(self.arm or "panda"))
         skin = skin_for(model, self.skin or "")
-        return Context(model, skin, cast(Orientation | None, self.orientation), placement_for(model), self.world or "")
+        return Context(model, skin, placement_for(model), self.world or "")
 
     def trials(self) -> list[tuple[Cell, int]]:
         """Every trial once, seed by seed, so that a stopped run has some of each cell."""

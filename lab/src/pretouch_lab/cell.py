@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 from pretouch.control.path import Path as TaskPath
-from pretouch.params import Orientation
 from pretouch.profiles import Profile, profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
@@ -83,8 +82,6 @@ class Context:
 
     model: RobotModel
     skin: Skin
-    orientation: Orientation | None = None
-    """Whether the hand's orientation is free or held, or None for the profile's own."""
     placement: Placement = field(default_factory=Placement)
     """Where the paper's paths and places are for this arm."""
     world: str = ""
@@ -106,7 +103,7 @@ class Context:
         found = profile(cell.profile)
         if "restrictions" in cell.where:
             found = with_mode(found, str(cell.where["restrictions"]))
-        return replace(found, task=replace(found.task, orientation=self.orientation or found.task.orientation))
+        return found
 
     def setup(self, cell: Cell, seed: int, scene: SceneSpec, path: TaskPath, **other: Any) -> Setup:
         """Return what a trial of a cell is made of; `other` are further fields of `Setup`, or other values of them."""

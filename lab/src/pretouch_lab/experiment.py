@@ -1,7 +1,8 @@
 """What every experiment is made of."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pretouch.recording.run_record import RunRecord
@@ -21,6 +22,12 @@ class Picture:
     name: str
     text: str
     figure: "Figure"
+
+
+def draw(pictures: Iterable[Picture], folder: Path) -> None:
+    """Write figures into a folder. Raises OSError."""
+    for picture in pictures:
+        picture.figure.savefig(folder / f"{picture.name}.png", dpi=120)
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,9 @@ from pretouch.recording.run_record import RunRecord
 from pretouch.text_table import markdown
 from pretouch_lab.campaign import Request, recording_file
 from pretouch_lab.cell import Cell
-from pretouch_lab.documents import draw
-from pretouch_lab.experiment import Picture, Sources
+from pretouch_lab.experiment import Picture, Sources, draw
 from pretouch_lab.registry import EXPERIMENTS
-from pretouch_lab.trace import read_trace
+from pretouch_lab.trial import read_trace
 
 
 def write_report(parts: list[tuple[Request, Path]], summary: dict[str, Any], folder: Path) -> Path:

@@ -16,7 +16,8 @@ from pretouch.desired import Desired
 from pretouch.errors import RecordingError
 from pretouch.loop import Cycle, Options, run
 from pretouch.profiles import Profile
-from pretouch.recording.reader import Recorded
+from pretouch.recording.reader import Recorded, open_recording
+from pretouch.recording.run_record import RunRecord, TrueForces, columns_of, contacts_of
 from pretouch.recording.truth import Truth, truth_of
 from pretouch.recording.writer import Recording
 from pretouch.robot.model import RobotModel
@@ -128,6 +129,18 @@ def record_of(recorded: Recorded) -> Record:
         [Touch(*touch) for t in truths for touch in t.touches],
         np.array([np.full(3, np.nan) if cycle.truth is None else cycle.truth.hand for cycle in kept]),
     )
+
+
+def trace_of(record: Record) -> RunRecord:
+    """Return what a trial left behind as arrays."""
+    truth, contacts = TrueForces(record.true_time, record.true_force), tuple(contacts_of(record.steps))
+    return RunRecord(**columns_of(record.steps), contacts=contacts, truth=truth)
+
+
+def read_trace(place: FilePath) -> tuple[RunRecord, tuple[str, ...]]:
+    """Read a recorded trial, and the names of its units; RecordingError for what is no recording."""
+    recorded = open_recording(place)
+    return trace_of(record_of(recorded)), recorded.runs[0].skin.ids
 
 
 class _Recorder:

@@ -293,7 +293,6 @@ def test_a_run_leaves_rows_for_every_baseline_and_goes_on_after_a_kill(tmp_path,
     for module in (free, judge, campaign):
         monkeypatch.setattr(module, "warm_up_s", lambda: 1.5)
     monkeypatch.setattr(campaign, "free_cells", lambda *_: [FreeCell("nominal", "circle", 0.3, "standing", 1000, 1.0)])
-    monkeypatch.setattr(campaign, "board_cells", lambda *_: [])
     monkeypatch.setattr(campaign, "hard_cells", lambda *_: [])
     cell = ContactCell("nominal", "seven", 0.3, 1000, 1)
     monkeypatch.setattr(campaign, "contact_cells", lambda *_: [cell])
@@ -315,7 +314,7 @@ def test_a_run_leaves_rows_for_every_baseline_and_goes_on_after_a_kill(tmp_path,
     keys = {"contender", "scenario", "seen", "false_alarms_per_hour", "median_delay_s", "p95_delay_s", "missed",
             "contacts", "peak_estimate_n", "true_peak_20ms_n", "first_contact_s", "cycle_time_s"}  # fmt: skip
     assert all(keys <= set(row) for row in results["rows"])
-    assert "Contact detection: the goals" in found.section()
+    assert "Contact detection: the goals" in found.page()
     assert resolution(rows).startswith(
         "0.00028 h of free motion. No false alarm in the 0.00028 h at the goal's speed means fewer than"
     )

@@ -65,7 +65,7 @@ def test_rows_are_by_motion_and_loads_that_nobody_announced_are_apart():
     hidden = missed | {"detectable": False}
     touched = {"contender": "pretouch", "motion": "random", "near": "touched", "contacts": [touch, missed, hidden]}
     rows = [free("random", "nothing", 1), free("jogging", "standing", 2), free(UNTOLD, "nothing", 40), touched]
-    found = {row["scenario"]: row for row in hard_rows(Rows([], [], [], rows), BASELINES[-1:])}
+    found = {row["scenario"]: row for row in hard_rows(Rows([], [], rows), BASELINES[-1:])}
     assert found[HARD]["false_alarms"] == 3
     assert found["hard: all, nobody near"]["false_alarms"] == 1
     assert found["hard: untold-load"]["false_alarms_per_hour"] == 40.0

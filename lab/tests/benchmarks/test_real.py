@@ -14,7 +14,7 @@ from pretouch.imported_data.events import ContactEvent
 from pretouch_lab.benchmarks.bounds import rate_bounds
 from pretouch_lab.benchmarks.real import bench
 from pretouch_lab.benchmarks.real.bench import Work, halves, parted, play
-from pretouch_lab.benchmarks.real.external import Stream, corrected, pushed, stream_of
+from pretouch_lab.benchmarks.real.external import Stream, corrected, stream_of
 from pretouch_lab.benchmarks.real.judge import Said, Tally, tally
 from pretouch_lab.benchmarks.real.sets import SETS, Run, sets_in
 
@@ -149,7 +149,7 @@ def test_each_detector_is_shown_corrections_of_the_other_half_alone(folder, monk
     monkeypatch.setattr(bench, "corrected", fit)
     monkeypatch.setattr(bench, "tally", count)
     play(Work(folder, "franka_fast", "fixed"))
-    assert len(judged) == 4  # two halves, of free motion and of pushes added to it
+    assert len(judged) == 2
     for learn, runs, order in judged:
         assert not learn & runs
         assert set(order[:2]) == learn  # a detector that learns has heard the other half before
@@ -164,20 +164,6 @@ def test_load_and_friction_of_one_half_explain_the_other(stream):
     # what is left is mostly noise: 5 mrad/s of velocity by 60 1/s and 1.5 kg m^2 is 0.45 Nm
     assert np.sqrt((after**2).mean(axis=0)).max() < 0.6
     assert np.abs(after.mean(axis=0)).max() < 0.1
-
-
-def test_pushes_reach_the_external_torques_as_the_observer_delays_them(motions, panda_model):
-    runs = [run_of(motions[0])]
-    made = pushed(runs, panda_model)
-    (pair,) = ([stream_of(FRANKA, some, panda_model).recording.tau_ext for some in (runs, made)],)
-    first = np.searchsorted(motions[0].time, 1.5)
-    at = first + 25  # 0.1 s later at 250 Hz, where the push ends
-    J = panda_model.ee_jacobian(panda_model.kinematics(motions[0].q[at]))[:3]
-    # implicit Euler of 60 1/s over 25 samples of 4 ms: 1 - 1.24^-25
-    expected = J.T @ np.array([15.0, 0.0, 0.0]) * (1.0 - 1.24**-25)
-    np.testing.assert_allclose((pair[1] - pair[0])[at - 1], expected, atol=0.05)  # the arm turned in its 16 ms
-    assert (made[0].label == 1).sum() == 75  # three pushes of 25 samples: at 1.5, 3 and 4.5 s
-    assert made[0].joints == (7,)
 
 
 def test_poisson_bounds_are_the_exact_ones():
@@ -236,17 +222,14 @@ def test_the_whole_command_writes_a_row_for_each_set_table_and_detector(folder, 
     told = json.loads(place.read_text())
     said = capsys.readouterr()
     assert "lwr4 is left out, for" in said.err
-    assert "NOT real contacts: pushes added to real free motion" in said.out
     rows = {(row["set"], row["table"], row["detector"]): row for row in told["rows"]}
-    sets = [("franka_fast", "free"), ("franka_fast", "added")]
-    sets += [("contactInterpretation", table) for table in ("free", "contacts", "added")]
+    sets = [("franka_fast", "free")]
+    sets += [("contactInterpretation", table) for table in ("free", "contacts")]
     assert set(rows) == {(*each, detector) for each in sets for detector in ("pretouch", "fixed")}
     row = rows["contactInterpretation", "contacts", "pretouch"]
     assert (row["found"], row["contacts"], row["link_right"], row["false_alarms"]) == (3, 3, 3, 0)
     assert 0.0 < row["median_delay_ms"] < 100.0
     assert rows["franka_fast", "free", "pretouch"]["contacts"] == 0
-    added = rows["franka_fast", "added", "fixed"]
-    assert added["contacts"] + added["busy"] == 12
 
 
 def test_a_folder_without_a_set_says_what_was_looked_for_and_where_it_comes_from(tmp_path, capsys):

@@ -78,12 +78,8 @@ def test_columns_that_are_missing_are_named(tmp_path, header, said, capsys):
     assert said in capsys.readouterr().err
 
 
-def test_a_world_has_a_folder_of_its_own_and_is_kept_out_of_the_published_tables(tmp_path, capsys, monkeypatch):
+def test_a_world_has_a_folder_of_its_own(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    assert cli.main(["bench", "detection", "--world", "stress", "--docs", "docs"]) == 2
-    assert "writes the published tables" in capsys.readouterr().err
-    assert cli.main(["bench", "both", "--world", "stress", "--readme", "README.md"]) == 2
-    assert "--readme writes the published tables" in capsys.readouterr().err
     assert cli.main(["bench", "detection", "--world", "strange"]) == 2
     assert "not one of nominal, realistic, stress" in capsys.readouterr().err
     assert cli.main(["reproduce", "static", "--world", "strange"]) == 2

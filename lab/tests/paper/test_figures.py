@@ -1,34 +1,28 @@
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from shutil import copy, copytree
 
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
 from PIL import Image
-from tests.recording.runs import controller_of, recorded_run
 
-from pretouch.errors import ExperimentError, ParameterError, PretouchError, RecordingError
+from pretouch.errors import ExperimentError, ParameterError, PretouchError
 from pretouch.perception.obstacles import points_of_units
 from pretouch.profiles import profile
 from pretouch.recording.run_record import MODES, RunRecord, TrueForces
-from pretouch.sensing.skin import Skin
 from pretouch.types import Contact, Mode
-from pretouch_lab.campaign import Request, recording_file
 from pretouch_lab.cell import Cell
 from pretouch_lab.cli import figure as cli_figure
 from pretouch_lab.cli.figure import draw_figure
 from pretouch_lab.paper.claims import between
 from pretouch_lab.paper.figures import marks
-from pretouch_lab.paper.figures.catalogue import CATALOGUE
 from pretouch_lab.paper.figures.circle import circle_figure
 from pretouch_lab.paper.figures.close_up import close_up_figure
-from pretouch_lab.paper.figures.compared import compared_figure
 from pretouch_lab.paper.figures.force_difference import force_difference_figure
 from pretouch_lab.paper.figures.interaction import interaction_figure
 from pretouch_lab.registry import EXPERIMENTS
-from pretouch_lab.trace import trace_of
+from pretouch_lab.trial import trace_of
 
 S, UNITS = 400, tuple("abcdefg")
 PAPER = profile("paper")
@@ -65,7 +59,6 @@ def drawn():
         "interaction": interaction_figure(trace, UNITS, PAPER),
         "close-up": close_up_figure(trace, UNITS, PAPER),
         "force-difference": force_difference_figure(pairs, ["paper"]),
-        "compared": compared_figure({"pushed": {"blind": trace, "paper": trace}, "alone": {"blind": trace}}),
     }
 
 
@@ -73,7 +66,7 @@ def line(axes, label):
     return next(found for found in axes.lines if found.get_label() == label)
 
 
-@pytest.mark.parametrize("name", ["circle", "interaction", "close-up", "force-difference", "compared"])
+@pytest.mark.parametrize("name", ["circle", "interaction", "close-up", "force-difference"])
 def test_what_must_be_told_apart_differs_without_colour(name):
     for axes in drawn()[name].axes:
         looks = [
@@ -174,18 +167,6 @@ def test_a_record_keeps_what_each_unit_showed(step_and_trace):
             np.testing.assert_array_equal(trace.sensed_point[i, unit], step.obstacles.point[k])
 
 
-@pytest.fixture(scope="module")
-def run_folder(recorded, tmp_path_factory):
-    """A folder with two runs in it, as `pretouch demo` leaves it, all of one trial."""
-    out = tmp_path_factory.mktemp("demo")
-    for part, names in (("static", ("force-difference",)), ("people", ("circle", "interaction", "close-up"))):
-        request = Request(("static",), seeds=1)
-        request.open(out / part)
-        for cell in (cell for name in names for cell in CATALOGUE[name].cells("paper")):
-            copy(recorded[0], recording_file(out / part, cell, 0))
-    return out
-
-
 def refuse(*_args):
     raise AssertionError("a trial was played")
 
@@ -196,26 +177,31 @@ def nothing_played(monkeypatch):
     monkeypatch.setattr(cli_figure, "EXPERIMENTS", refusing)
 
 
-@pytest.mark.usefixtures("nothing_played")
-@pytest.mark.parametrize("name", CATALOGUE)
-def test_each_figure_is_drawn_from_a_run(run_folder, tmp_path, name):
-    made = draw_figure(name, run_folder, tmp_path / "new" / f"{name}.png")
-    with Image.open(made) as picture:
-        assert picture.width > 1000
-        assert np.asarray(picture.convert("L")).std() > 10
+@pytest.fixture
+def recorded_trials(step_and_trace, monkeypatch):
+    """Have all trials be one that was played before; return what is asked for."""
+    asked = []
+
+    def play(cell, seed, _context):
+        asked.append((cell.name, seed))
+        return {}, step_and_trace[0]
+
+    for name, experiment in EXPERIMENTS.items():
+        monkeypatch.setitem(EXPERIMENTS, name, replace(experiment, trial=play))
+    return asked
 
 
-@pytest.mark.usefixtures("nothing_played")
+@pytest.mark.usefixtures("recorded_trials")
 @pytest.mark.parametrize(("ending", "begins"), [("png", b"\x89PNG"), ("pdf", b"%PDF"), ("svg", b"<?xml")])
-def test_the_ending_says_the_format(run_folder, tmp_path, ending, begins):
-    made = draw_figure("close-up", run_folder, tmp_path / f"x.{ending}")
+def test_the_ending_says_the_format(tmp_path, ending, begins):
+    made = draw_figure("close-up", tmp_path / f"x.{ending}")
     assert made.read_bytes().startswith(begins)
 
 
-@pytest.mark.usefixtures("nothing_played")
-def test_a_figure_is_written_here_by_its_name(run_folder, tmp_path, monkeypatch):
+@pytest.mark.usefixtures("recorded_trials")
+def test_a_figure_is_written_here_by_its_name(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    assert str(draw_figure("close-up", run_folder)) == "close-up.png"
+    assert str(draw_figure("close-up")) == "close-up.png"
     assert [path.name for path in tmp_path.iterdir()] == ["close-up.png"]
 
 
@@ -231,58 +217,22 @@ def test_a_figure_is_written_here_by_its_name(run_folder, tmp_path, monkeypatch)
         ({"out": "/dev/null/x.png"}, "The figure /dev/null/x.png cannot be written .File exists.: give another"),
         ({"out": "FOLDER.png"}, "FOLDER.png cannot be written .Is a directory.: give another"),
         ({"out": "x" * 300 + ".png"}, "cannot be written .File name too long.: give another"),
-        ({"run": "/nowhere"}, r"The run /nowhere cannot be read \(No such file or directory\)"),
-        (
-            {"run": "EMPTY"},
-            "has no recording of avoidance_beside_slack_paper with seed 0 .*`pretouch reproduce avoidance --seeds 1",
-        ),
-        ({"run": "EMPTY", "profile": "blind"}, "avoidance_beside_off_blind .*--profiles blind`"),
-        ({"run": "RUN", "seed": 3}, "no recording of avoidance_beside_slack_paper with seed 3 .runs keep those of"),
         ({"name": "force-difference", "profile": "blind"}, "cannot show blind, which has no proximity"),
     ],
 )
-def test_what_cannot_be_drawn_is_said_in_a_sentence(run_folder, tmp_path, monkeypatch, changes, words):
+def test_what_cannot_be_drawn_is_said_in_a_sentence(tmp_path, monkeypatch, changes, words):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "FOLDER.png").mkdir()
-    (tmp_path / "EMPTY").mkdir()
-    (tmp_path / "RUN").symlink_to(run_folder)
     with pytest.raises(PretouchError, match=words) as error:
-        draw_figure(**{"name": "circle", **{k: Path(v) if k in ("out", "run") else v for k, v in changes.items()}})
+        draw_figure(**{"name": "circle", **{k: Path(v) if k == "out" else v for k, v in changes.items()}})
     assert isinstance(error.value, (ExperimentError, ParameterError))
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["EMPTY", "FOLDER.png", "RUN"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["FOLDER.png"]
 
 
-@pytest.mark.usefixtures("nothing_played")
-def test_a_damaged_run_is_named(tmp_path):
-    (cell,) = CATALOGUE["close-up"].cells("paper")
-    Request(("static",), seeds=1).open(tmp_path)
-    recording_file(tmp_path, cell, 0).write_bytes(b"no recording")
-    with pytest.raises(RecordingError, match="is not an MCAP file"):
-        draw_figure("close-up", tmp_path, tmp_path / "x.png")
-    assert not (tmp_path / "x.png").exists()
-
-
-@pytest.mark.usefixtures("nothing_played")
-def test_recordings_of_several_skins_make_no_figure(run_folder, context, tmp_path):
-    run = copytree(run_folder, tmp_path / "run")
-    other = next((run / "static" / "recordings").glob("static_circle_*blind*.mcap"))
-    other.unlink()
-    recorded_run(other, controller_of(context.model, Skin(context.skin.units[:2], context.model)), 10)
-    with pytest.raises(ExperimentError, match="are of several skins"):
-        draw_figure("force-difference", run, tmp_path / "x.png")
-
-
-def test_without_a_run_the_trials_are_played_and_told(step_and_trace, tmp_path, monkeypatch, capsys):
-    seeds = []
-
-    def play(cell, seed, _context):
-        seeds.append((cell.name, seed))
-        return {}, step_and_trace[0]
-
-    monkeypatch.setitem(EXPERIMENTS, "between", replace(EXPERIMENTS["between"], trial=play))
+def test_the_trials_are_played_and_told(recorded_trials, tmp_path, capsys):
     made = draw_figure("close-up", out=tmp_path / "x.svg", profile="paper-0.5m", seed=4)
     assert made.stat().st_size > 10_000
-    assert seeds == [("between_slack_paper-0.5m", 4)]
+    assert recorded_trials == [("between_slack_paper-0.5m", 4)]
     assert capsys.readouterr().err == ("Playing between_slack_paper-0.5m with seed 4: about 12 s of simulated time.\n")
 
 

@@ -131,14 +131,6 @@ def test_a_summary_is_made_of_whatever_rows_there_are():
     assert width(table) <= 80
 
 
-def test_the_figure_has_a_line_for_each_persistence():
-    rows = [row(0), row(3), row(3, profile="paper:perception.persistence_s=0.04", free_step=None)]
-    (picture,) = dropout.EXPERIMENT.draw(SimpleNamespace(summary=dropout.summarise(rows)))
-    first, free, _ = picture.figure.axes
-    assert [c.get_label() for c in first.containers] == ["paper, points kept 60 ms", "paper, points kept 40 ms"]
-    assert free.containers[0].lines[0].get_xdata().tolist() == [0.0, 3.0]
-
-
 def test_a_unit_that_sees_the_board_now_and_then_counts_for_no_row():
     def seeing(stamp, *units):
         found = SimpleNamespace(unit=np.array(units, dtype=np.int64))

@@ -9,7 +9,6 @@ from tests.limits import assert_within_limits
 from pretouch.types import Mode
 from pretouch_lab.cell import Cell, Grid
 from pretouch_lab.paper import static
-from pretouch_lab.trace import trace_of
 from pretouch_lab.trial import Record
 from pretouch_lab.weaknesses import endless
 
@@ -110,20 +109,3 @@ def test_a_summary_is_made_of_whatever_rows_there_are():
     (table,) = endless.tables(summary)
     assert table.rows[0] == ("line -y", "paper", "off", "25", "4", "10", "5.00", "30.0", "20.0", "2", "1/3")
     assert width(table) <= 80
-
-
-def test_the_figure_shows_the_force_of_each_profile(trial):
-    _, rec = trial
-    rows, asked = [row(0, "blind"), row(0)], []
-
-    def trace(cell):
-        asked.append(cell)
-        return trace_of(rec) if cell.profile == "paper" else None
-
-    sources = SimpleNamespace(summary=endless.summarise(rows), trace=trace)
-    (picture,) = endless.EXPERIMENT.draw(sources)
-    assert asked[-1] == Cell(endless.NAME, "paper", WHERE)
-    (axes,) = picture.figure.axes
-    assert axes.get_title() == "profile paper"
-    assert len(axes.lines[1].get_xdata()) == len(rec.reactions())
-    assert endless.EXPERIMENT.draw(SimpleNamespace(summary={"cells": []}, trace=trace)) == []

@@ -200,13 +200,3 @@ def test_pushes_of_all_trials_are_pooled_and_echoes_counted_once_a_push():
     assert table.rows[0] == ("3", "paper", "2", "2/3", "3", "2", "0", "1", "10.0", "0.10", "0.20", "0/2")
     assert table.rows[1][-2] == "-"
     assert width(table) <= 80
-
-
-def test_the_figure_shows_a_line_for_each_decay():
-    rows = [row([push_row(against_after_release=1)], held) for held in (4.0, 1.0)] + [row([], 2.0)]
-    rows.append(row([push_row()], 1.0, "paper:react.decay_cycles=25"))
-    (picture,) = release.EXPERIMENT.draw(SimpleNamespace(summary=release.summarise(rows)))
-    left = picture.figure.axes[0]
-    assert [line.get_label() for line in left.lines] == ["paper, reaction of 2 s", "paper, reaction of 0.25 s"]
-    assert left.lines[0].get_xydata().tolist() == [[1.0, 100.0], [4.0, 100.0]]
-    assert left.lines[0].get_linestyle() != left.lines[1].get_linestyle()

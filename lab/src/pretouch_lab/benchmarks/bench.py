@@ -9,10 +9,8 @@ from typing import ClassVar
 from pretouch import __version__
 from pretouch.text_table import TextTable, markdown
 from pretouch_lab.benchmarks.scenario_files import SeedRange, checksums
-from pretouch_lab.documents import BENCHMARKS, shown
 from pretouch_lab.domain_randomisation import digest_of
 from pretouch_lab.engine import Progress, Task, open_folder, run_tasks
-from pretouch_lab.experiment import Picture
 from pretouch_lab.rows import Row
 
 EMPTY: Row = dict.fromkeys(
@@ -26,22 +24,18 @@ EMPTY: Row = dict.fromkeys(
 
 @dataclass(frozen=True)
 class Found:
-    """What a run came to: for its JSON file, the terminal, and a document."""
+    """What a run came to: for its JSON file, the terminal, and `tables.md`."""
 
     json: Row
     tables: list[TextTable]
     resolution: str
     """What its numbers can tell, in a sentence."""
-    pictures: list[Picture]
     text: str
-    """What the document has above the figures."""
-    below: str = ""
-    """What it has between figures and tables."""
+    """What stands above the tables in the file."""
 
-    def section(self) -> str:
-        """Return the part of the document as Markdown."""
-        below = [self.below] if self.below else []
-        return "\n\n".join([self.text, *map(shown, self.pictures), *below, *map(markdown, self.tables)])
+    def page(self) -> str:
+        """Return text and tables as Markdown."""
+        return "\n\n".join([self.text, *map(markdown, self.tables)]) + "\n"
 
 
 @dataclass(frozen=True)
@@ -49,10 +43,6 @@ class Bench(ABC):
     """What of a benchmark is run, and where."""
 
     name: ClassVar[str]
-    document: ClassVar[str] = BENCHMARKS
-    """In a folder of documents; it has a part of the benchmark's name."""
-    shown_unfinished: ClassVar[bool] = False
-    """Whether an unfinished run has something to show."""
 
     out: Path
     """Folder for everything that is kept."""

@@ -1,4 +1,4 @@
-"""What one control step costs: processor and wall time at a rate, and the share of each stage."""
+"""What one control step costs: processor and wall time at a rate."""
 
 import os
 import platform
@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pretouch.controller import STAGES, Controller, ControllerState
+from pretouch.controller import Controller, ControllerState
 from pretouch.errors import ExperimentError
 from pretouch.loop import MonotonicClock
 from pretouch.perception.scene_filter import no_fixtures
@@ -25,8 +25,6 @@ from pretouch_lab.rows import Row
 
 _SETTLE = 500
 """Cycles after the force window is full in which the arm gets up to speed."""
-_STAGED = 2000
-"""Most cycles in which the stages are shown separately."""
 _SHORTER = 5000
 """Most cycles in which every reading is new."""
 _MOST_CYCLES = 10_000_000
@@ -73,8 +71,8 @@ def measure(points: int, request: CycleRequest, tell: Callable[[str], None] = la
     """Time the control step with a skin of that many points: a row of `pretouch bench cycle`.
 
     Three runs are timed from outside: steps back to back, the same with every reading new in every cycle, and steps at
-    the ticks of a clock, between which the processor sleeps and its caches cool. In a fourth the controller says where
-    one stage ends and the next begins. `tell` is given what real time could not be had.
+    the ticks of a clock, between which the processor sleeps and its caches cool. `tell` is given what real time
+    could not be had.
     """
     model, params = RobotModel(robot_named(request.arm)), request.at_rate()
     work, hard, paced = (Workload(model, points, params, request.seed, new) for new in (False, True, False))
@@ -86,13 +84,11 @@ def measure(points: int, request: CycleRequest, tell: Callable[[str], None] = la
         steps = _timed(controller, work, request.cycles, None)
         all_new = _timed(controller, hard, min(request.cycles, _SHORTER), None)
         at_rate = _timed(controller, paced, request.cycles, MonotonicClock(1 / request.rate))
-        shares = _stages(model, points, params, request)
     others = {"all_new": all_new.cpu, "at_rate": at_rate.cpu, "wall": at_rate.wall}
     return {
         "points": points,
         **_spread(steps.cpu),
         "overruns": int((at_rate.wall > 1e9 / request.rate).sum()),
-        "stages": shares,
         **{f"{run}_{name}": value for run, took in others.items() for name, value in _spread(took).items()},
         "cycles": request.cycles,
         "missed_ticks": at_rate.missed,
@@ -161,42 +157,6 @@ def _timed(controller: Controller, work: Workload, cycles: int, clock: Monotonic
 def _resident() -> int:
     """Memory that this process holds [B]."""
     return int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1]) * resource.getpagesize()
-
-
-def _stages(model: RobotModel, points: int, params: Profile, request: CycleRequest) -> dict[str, float]:
-    """Share of each stage in a step: medians over the cycles, of their sum."""
-    cycles = min(request.cycles, _STAGED)
-    watch = _Stopwatch(cycles)
-    work = Workload(model, points, params, request.seed)
-    controller = Controller(model, work.skin, no_fixtures(), work.path, params, mark=watch.mark)
-    state = _settled(controller, work)
-    for i in range(cycles):
-        inputs = work.inputs()
-        watch.begin(i)
-        step, state = controller.step(state, inputs)
-        work.move(step.command)
-    medians = np.median(watch.took, axis=0)
-    return {name: float(share) for name, share in zip(STAGES, medians / medians.sum(), strict=True)}
-
-
-class _Stopwatch:
-    """How long each stage of each cycle took."""
-
-    def __init__(self, cycles: int) -> None:
-        self.took = np.zeros((cycles, len(STAGES)), np.int64)
-        """[ns]"""
-        self._place = {name: i for i, name in enumerate(STAGES)}
-        self._row = self._before = 0
-
-    def begin(self, cycle: int) -> None:
-        self._row = cycle
-        self.took[cycle] = 0
-        self._before = time.perf_counter_ns()
-
-    def mark(self, stage: str) -> None:
-        now = time.perf_counter_ns()
-        self.took[self._row, self._place[stage]] += now - self._before
-        self._before = time.perf_counter_ns()
 
 
 def _spread(took: IntArray) -> dict[str, float]:

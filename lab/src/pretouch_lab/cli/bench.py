@@ -14,7 +14,7 @@ from pretouch_lab.cli.benchmarks import Avoidance, Both, Detection, Localization
 
 @dataclass(frozen=True)
 class Cycle:
-    """How long a control step takes: processor and wall time at a rate, overruns, and the share of each stage."""
+    """How long a control step takes: processor and wall time at a rate, and overruns."""
 
     points: str = "7,32,128,1000"
     """Numbers of sensed points, separated by commas, each shown by a unit 50 times a second."""

@@ -59,9 +59,6 @@ def _show(rows: list[Row], request: CycleRequest, missing: list[str]) -> None:
         " period. Restricting: points within reach of eq. 7, median.\n",
         style="dim", markup=False,
     )  # fmt: skip
-    console.print("Share of each stage [%]", style="bold", markup=False)
-    console.print(_shares(rows))
-    console.print()
     gained = ", ".join(f"{row['memory_gained_kib']} KiB with {row['points']}" for row in rows)
     console.print(f"Memory gained in the run at {request.rate:g} Hz: {gained}.", soft_wrap=True, markup=False)
     for sentence in missing:
@@ -82,8 +79,3 @@ def _times(measured: list[Row], rate: float) -> Grid:
             restricting = f"{row['restricting_median']:.0f}" if not prefix else ""
             rows.append((first, name, *took, overruns, restricting))
     return Grid(("points", "", *_SPREAD, "overruns", "restricting"), rows, 2, left=(1,))
-
-
-def _shares(rows: list[Row]) -> Grid:
-    lines = [(stage, *(f"{100 * row['stages'][stage]:.0f}" for row in rows)) for stage in rows[0]["stages"]]
-    return Grid(("points", *(str(row["points"]) for row in rows)), lines, left=())

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import tyro
 
 from pretouch.cli.words import words
-from pretouch.errors import ExperimentError, PretouchError
+from pretouch.errors import PretouchError
 
 if TYPE_CHECKING:  # the help is to need none of the heavy packages
     from pretouch_lab.benchmarks.bench import Bench
@@ -26,30 +26,13 @@ class BenchOptions:
     """Set of simulated arms, sensors and delays: nominal, realistic, stress, or a TOML file, of which each trial's seed
     draws its own; by default the arms of the published tables. Results of a world are kept in a folder of its own."""
     out: str = ""
-    """Folder for results and figures; by default runs/bench or runs/bench-NAME, with -quick if it is."""
-    docs: str = ""
-    """Folder of documents (docs) whose results/benchmarks.md and images are to be made anew; by default none."""
+    """Folder for results and tables; by default runs/bench or runs/bench-NAME, with -quick if it is."""
 
     def folder(self, name: str) -> Path:
         """Where the results go; `name` is that under runs/."""
         from pretouch_lab.domain_randomisation import folder_part
 
         return Path(self.out or f"runs/{name}{folder_part(self.world)}{'-quick' if self.quick else ''}")
-
-    @property
-    def documents(self) -> Path | None:
-        """Folder of documents to be made anew, if any."""
-        if self.docs:
-            self.check_published("--docs")
-        return Path(self.docs) if self.docs else None
-
-    def check_published(self, option: str) -> None:
-        """Refuse to write numbers of other arms where the published ones stand."""
-        if self.world:
-            raise ExperimentError(
-                f"The domain randomisation is {self.world!r}, and {option} writes the published tables, which are of"
-                f" the usual arms: leave out {option}; tables and figures are in the run's folder."
-            )
 
 
 @dataclass(frozen=True)
@@ -64,10 +47,10 @@ class Detection(BenchOptions):
     text to standard error."""
 
     def run(self) -> None:
-        """Run it, with tables, figures and numbers."""
+        """Run it, with tables and numbers."""
         from pretouch_lab.benchmarks.detection.campaign import DetectionBench
 
-        run_bench(DetectionBench(self.folder("bench-detection"), self.quick, self.seeds, self.world), self, self.json)
+        run_bench(DetectionBench(self.folder("bench-detection"), self.quick, self.seeds, self.world), self.json)
 
 
 @dataclass(frozen=True)
@@ -91,7 +74,7 @@ class Avoidance(BenchOptions):
     paths and obstacles are scaled and moved into its reach, and the skin is the arm's own."""
 
     def run(self) -> None:
-        """Run it, with tables, figures and numbers."""
+        """Run it, with tables and numbers."""
         from pretouch.sim.plant_params import assumed_plant
         from pretouch_lab.benchmarks.avoidance.run import AvoidanceBench
         from pretouch_lab.benchmarks.avoidance.setting import PANDA, arm, place
@@ -99,14 +82,9 @@ class Avoidance(BenchOptions):
         out, some = self.folder("bench-avoidance"), (words(self.baselines), words(self.scenarios))
         bench = AvoidanceBench(out, self.quick, self.seeds, self.world, *some, self.arm)
         if self.arm != PANDA:
-            if self.docs:
-                raise ExperimentError(
-                    f"The arm is {self.arm!r}, and --docs writes the published tables, which are the Panda's: leave out"
-                    " --docs; tables and figures are in the run's folder."
-                )
             described = arm(self.arm).description
             print(place(self.arm).sentence(described.name), assumed_plant(described), sep="\n")
-        run_bench(bench, self, self.json)
+        run_bench(bench, self.json)
 
 
 @dataclass(frozen=True)
@@ -116,8 +94,6 @@ class Localization(BenchOptions):
     About twenty minutes on two processors, with --quick three. A run that was stopped goes on with the same --out.
     """
 
-    docs: str = ""
-    """Folder of documents (docs) whose results/localization.md is to be made anew; by default none."""
     json: str = ""
     """File for the numbers; by default results.json in the folder. -: also to standard output, and
     text to standard error."""
@@ -127,7 +103,7 @@ class Localization(BenchOptions):
         from pretouch_lab.benchmarks.localization.campaign import LocalizationBench
 
         out = self.folder("bench-localization")
-        run_bench(LocalizationBench(out, self.quick, self.seeds, self.world), self, self.json)
+        run_bench(LocalizationBench(out, self.quick, self.seeds, self.world), self.json)
 
 
 @dataclass(frozen=True)
@@ -138,8 +114,6 @@ class Shield(BenchOptions):
     --quick two. A run that was stopped goes on with the same --out.
     """
 
-    docs: str = ""
-    """Folder of documents (docs) whose results/shield.md is to be made anew; by default none."""
     json: str = ""
     """File for the numbers, with a row for each filter and commander; by default results.json in the folder.
     -: also to standard output, and text to standard error."""
@@ -148,7 +122,7 @@ class Shield(BenchOptions):
         """Run it, with tables and numbers."""
         from pretouch_lab.benchmarks.shield.run import ShieldBench
 
-        run_bench(ShieldBench(self.folder("bench-shield"), self.quick, self.seeds, self.world), self, self.json)
+        run_bench(ShieldBench(self.folder("bench-shield"), self.quick, self.seeds, self.world), self.json)
 
 
 @dataclass(frozen=True)
@@ -159,34 +133,28 @@ class Both(BenchOptions):
     --out.
     """
 
-    readme: str = ""
-    """Document for the one table, between its marks; by default none."""
     json: str = ""
     """File for the numbers, or - for standard output: text then goes to standard error."""
 
     def run(self) -> None:
-        """Run both, with tables, figures and numbers."""
+        """Run both, with tables and numbers."""
         from pretouch.cli.writing import numbers_to
 
         with numbers_to(self.json) as write:
             write(run_both(self))
 
 
-def run_bench(bench: "Bench", options: BenchOptions, json: str) -> None:
-    """Run what is missing of a benchmark, and show, write and draw what came out."""
+def run_bench(bench: "Bench", json: str) -> None:
+    """Run what is missing of a benchmark, and show and write what came out."""
     from pretouch_lab.cli.campaigns import results_to
-    from pretouch_lab.documents import around
 
-    docs = options.documents
-    if docs:
-        around(docs / bench.document, bench.name)  # an hour later would be late
     bench.open()
     with results_to(json, bench.out) as (json_file, write):
-        _play(bench, json_file, docs)
-        write(_report(bench, json_file, docs))
+        _play(bench, json_file)
+        write(_report(bench, json_file))
 
 
-def _play(bench: "Bench", json_file: Path, docs: Path | None) -> None:
+def _play(bench: "Bench", json_file: Path) -> None:
     from pretouch.cli.writing import check_writable
     from pretouch_lab.cli.progress import worked
     from pretouch_lab.domain_randomisation import sentence
@@ -199,74 +167,59 @@ def _play(bench: "Bench", json_file: Path, docs: Path | None) -> None:
     try:
         worked(bench.name, tasks, bench.run)
     except BaseException as error:
-        if bench.shown_unfinished:
-            _report(bench, json_file, docs)
         if not isinstance(error, PretouchError):
             done = f"{len(tasks) - len(missing(tasks))} of {len(tasks)} pieces of work are there"
             print(f"Stopped: {done}; the same command with --out {bench.out} goes on.", file=sys.stderr)
         raise
 
 
-def _report(bench: "Bench", json_file: Path, docs: Path | None) -> Any:
-    """Show, write and draw what was found, and return its numbers; None where there are none yet."""
+def _report(bench: "Bench", json_file: Path) -> Any:
+    """Show and write what was found, and return its numbers; None where there are none yet."""
     from rich.console import Console
 
     from pretouch.atomic_write import write_json
     from pretouch.cli.tables import show
     from pretouch.cli.writing import unwritable_said
-    from pretouch_lab.documents import draw, put
 
-    found = bench.found()
+    found, tables_file = bench.found(), bench.out / "tables.md"
     if found is None:
         return None
     with unwritable_said("file", json_file):
         write_json(found.json, json_file)
-    console, places = Console(highlight=False), [json_file]
+    with unwritable_said("file", tables_file):
+        tables_file.write_text(found.page(), encoding="utf-8")
+    console = Console(highlight=False)
     show(console, found.tables)
-    if found.pictures:
-        places.append(docs / "images" if docs else bench.out / "figures")
-        with unwritable_said("folder", docs or bench.out):
-            draw(found.pictures, places[-1])
-    if docs:
-        put(docs / bench.document, bench.name, found.section())
-        places.append(docs / bench.document)
     if found.resolution:
         console.print(found.resolution, soft_wrap=True, markup=False)
-    for place in places:
+    for place in (json_file, tables_file):
         console.print(f"Written: {place}", soft_wrap=True, markup=False)
     return found.json
 
 
 def run_both(command: Both) -> dict[str, Any]:
-    """Run what is missing of both, show and write what came out of them together, and return the numbers."""
+    """Run what is missing of both, show what came out of them together, and return the numbers."""
     import json
 
     from rich.console import Console
 
     from pretouch.cli.tables import show
+    from pretouch.cli.writing import unwritable_said
     from pretouch.text_table import markdown
     from pretouch_lab.benchmarks.front import front_table
     from pretouch_lab.benchmarks.goals import goal_table
-    from pretouch_lab.documents import BENCHMARKS, around, put
 
-    out, docs = command.folder("bench"), command.documents
-    if command.readme:
-        command.check_published("--readme")
-    readme = Path(command.readme) if command.readme else None
-    parts = ("detection", "avoidance", "goals") if docs else ()
-    places = [(docs / BENCHMARKS, part) for part in parts if docs] + ([(readme, "front")] if readme else [])
-    for document, part in places:
-        around(document, part)  # an hour later would be late
-    given = {"quick": command.quick, "seeds": command.seeds, "docs": command.docs, "world": command.world}
+    out = command.folder("bench")
+    given = {"quick": command.quick, "seeds": command.seeds, "world": command.world}
     Detection(out=str(out / "detection"), **given).run()  # type: ignore[arg-type]  # of both the same
     Avoidance(out=str(out / "avoidance"), **given).run()  # type: ignore[arg-type]
     detection, avoidance = (
         json.loads((out / name / "results.json").read_text(encoding="utf-8")) for name in ("detection", "avoidance")
     )
-    made = {"goals": goal_table(detection, avoidance), "front": front_table(detection, avoidance)}
-    show(Console(highlight=False), made.values())
-    for document, part in places:
-        if part in made:
-            put(document, part, markdown(made[part]))
-            print(f"Written: {document}")
+    made = [goal_table(detection, avoidance), front_table(detection, avoidance)]
+    show(Console(highlight=False), made)
+    tables_file = out / "tables.md"
+    with unwritable_said("file", tables_file):
+        tables_file.write_text("\n\n".join(map(markdown, made)) + "\n", encoding="utf-8")
+    print(f"Written: {tables_file}")
     return {"detection": detection, "avoidance": avoidance}

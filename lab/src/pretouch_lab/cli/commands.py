@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
-from typing import Annotated
 
 import tyro
 
@@ -56,8 +55,6 @@ class Reproduce:
     the studies have their own."""
     restrictions: str = ""
     """off, hard, slack or floor, or several of them; by default off in the static experiment and slack in others."""
-    orientation: str = ""
-    """free or hold: whether the task keeps the hand's orientation; by default the profile's own, hold."""
     stiffness: str = "25000"
     """Contact stiffness of the static object [N/m], or several, separated by commas."""
     skin: str = ""
@@ -91,7 +88,6 @@ class Reproduce:
             seeds=self.seeds,
             profiles=words(self.profiles),
             restrictions=words(self.restrictions),
-            orientation=self.orientation or None,
             stiffness=tuple(map(_number, words(self.stiffness))),
             skin=self.skin or None,
             record=self.record,
@@ -110,26 +106,23 @@ class Reproduce:
 
 @dataclass(frozen=True)
 class Figure:
-    """Draw one figure of the paper, from a run that is there or from trials played for it."""
+    """Draw one figure of the paper, from trials that are played for it."""
 
     name: tyro.conf.Positional[str]
     """circle (Fig. 4), interaction (Fig. 5), close-up (Fig. 6) or force-difference (Fig. 7)."""
-    run_folder: Annotated[str, tyro.conf.arg(name="run")] = ""
-    """Folder of a run of `reproduce` or `demo` to draw it from; by default what is needed is played first."""
     out: str = ""
     """File to write, ending in .png, .pdf or .svg; by default NAME.png."""
     profile: str = "paper"
     """Profile that is shown."""
     seed: int = 0
-    """Seed of the trials that are played; runs keep the course of seed 0."""
+    """Seed of the trials."""
 
     def run(self) -> None:
         """Draw the figure."""
         from pretouch_lab.cli.figure import draw_figure
 
-        run = Path(self.run_folder) if self.run_folder else None
         out = Path(self.out or f"{self.name}.png")
-        print(f"Figure: {draw_figure(self.name, run, out, self.profile, self.seed)}")
+        print(f"Figure: {draw_figure(self.name, out, self.profile, self.seed)}")
 
 
 def new_folder(name: str) -> Path:

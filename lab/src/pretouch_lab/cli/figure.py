@@ -1,6 +1,5 @@
-"""What `pretouch figure` does: one of the paper's figures, from a recorded run or from trials played for it."""
+"""What `pretouch figure` does: one of the paper's figures, from trials that are played for it."""
 
-import os
 from io import BytesIO
 from pathlib import Path
 from typing import cast
@@ -13,27 +12,22 @@ from pretouch.profiles import profile as find_profile
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin
-from pretouch_lab.campaign import recording_file
 from pretouch_lab.cell import Cell, Context
 from pretouch_lab.paper.figures.catalogue import CATALOGUE, Played
 from pretouch_lab.registry import EXPERIMENTS
-from pretouch_lab.trace import read_trace, trace_of
-from pretouch_lab.trial import Record
+from pretouch_lab.trial import Record, trace_of
 
 _ENDINGS = (".png", ".pdf", ".svg")
 _DOTS_PER_INCH = 150
 
 
-def draw_figure(
-    name: str, run: Path | None = None, out: Path | None = None, profile: str = "paper", seed: int = 0
-) -> Path:
+def draw_figure(name: str, out: Path | None = None, profile: str = "paper", seed: int = 0) -> Path:
     """Draw one of the paper's figures into a file, and return the file's path.
 
     Whatever is wrong with the request is said before anything is played.
 
     Args:
         name: a figure of `CATALOGUE`.
-        run: folder of `pretouch reproduce` or `pretouch demo` with the recordings; without one the trials are played.
         out: file to write, its ending says the format; by default NAME.png here.
         profile: name of the profile to show.
         seed: seed of the trials.
@@ -47,39 +41,12 @@ def draw_figure(
     if place.suffix not in _ENDINGS:
         raise ExperimentError(f"The figure {place} has no ending that says its format: use {', '.join(_ENDINGS)}.")
     check_writable("figure", place)
-    played, units = _recorded(cells, run, seed) if run else _played(cells, seed)
+    played, units = _played(cells, seed)
     image = BytesIO()
     wanted.draw(played, units, used).savefig(image, format=place.suffix[1:], dpi=_DOTS_PER_INCH)
     with unwritable_said("figure", place):
         place.write_bytes(image.getvalue())
     return place
-
-
-def _recorded(cells: list[Cell], run: Path, seed: int) -> tuple[Played, tuple[str, ...]]:
-    """Read the recorded trials of some cells from a run's folder or the folders in it, and the names of the units."""
-    try:
-        folders = [run, *sorted(folder for folder in run.iterdir() if folder.is_dir())]
-    except OSError as error:
-        raise ExperimentError(
-            f"The run {run} cannot be read ({error.strerror}): give a folder of pretouch reproduce or pretouch demo."
-        ) from error
-    played: Played = []
-    skins: set[tuple[str, ...]] = set()
-    for cell in cells:
-        places = [recording_file(folder, cell, seed) for folder in folders]
-        place = next((p for p in places if os.path.isfile(p)), None)
-        if place is None:
-            profiles = ",".join(dict.fromkeys(cell.profile for cell in cells))
-            raise ExperimentError(
-                f"The run {run} has no recording of {cell.name} with seed {seed} (runs keep those of seed 0): `pretouch"
-                f" reproduce {cell.experiment} --seeds 1 --profiles {profiles}` makes it, or leave out --run."
-            )
-        trace, units = read_trace(place)
-        played.append((cell, trace))
-        skins.add(units)
-    if len(skins) > 1:
-        raise ExperimentError(f"The recordings of the run {run} are of several skins: leave out --run.")
-    return played, skins.pop()
 
 
 def _played(cells: list[Cell], seed: int) -> tuple[Played, tuple[str, ...]]:

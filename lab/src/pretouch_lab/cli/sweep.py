@@ -94,9 +94,8 @@ def _written(run: "Run", metrics: tuple[str, ...], out: Path) -> dict[str, Any]:
     from pretouch import __version__
     from pretouch.atomic_write import write_json
     from pretouch.cli.tables import show
-    from pretouch_lab.documents import draw
     from pretouch_lab.engine import failure_said
-    from pretouch_lab.experiment import Picture
+    from pretouch_lab.experiment import Picture, draw
     from pretouch_lab.sweep.figure import sweep_figure
     from pretouch_lab.sweep.indices import indices, tables
     from pretouch_lab.sweep.play import write_table

@@ -6,7 +6,6 @@ import numpy as np
 
 from pretouch.perception.closest import closest_points
 from pretouch.profiles import profile
-from pretouch.recording.run_record import RunRecord
 from pretouch.robot.model import RobotModel
 from pretouch.sim.paper_scenes import Placement, person_scene
 from pretouch.sim.pushes import Visit, Visitor
@@ -28,7 +27,6 @@ PLACES = ("beside", "inside")
 """Where the person's hand is: 3 cm clear of the robot's on the free circle, or half of it in its way."""
 _SPREAD_M = 0.03
 _UNMOVED = Placement()
-_COMPARED = "Speed of the end-effector and true force on the arm with a hand beside the path and inside it"
 
 
 def cells(grid: Grid) -> list[Cell]:
@@ -87,19 +85,15 @@ def gaps(record: Record, model: RobotModel, radius: float) -> FloatArray:
 
 def _draw(sources: Sources) -> list[Picture]:
     from pretouch_lab.paper.figures.circle import circle_figure
-    from pretouch_lab.paper.figures.compared import compared_figure
 
-    scenes: dict[str, dict[str, RunRecord]] = {}
     for cell in sources.summary["cells"]:
-        trace = sources.trace(Cell(NAME, cell["profile"], {key: cell[key] for key in ("place", "restrictions")}))
-        if trace is not None:
-            scenes.setdefault(f"hand {cell['place']} the path", {}).setdefault(cell["profile"], trace)
-    made = [Picture("avoidance-compared", _COMPARED, compared_figure(scenes))] if scenes else []
-    for name, trace in scenes.get("hand beside the path", {}).items():
-        if name != "blind":
-            text = "End-effector path with a hand beside it"
-            return [*made, Picture("avoidance", text, circle_figure(trace, profile(name)))]
-    return made
+        if cell["place"] == "beside" and cell["profile"] != "blind":
+            where = {key: cell[key] for key in ("place", "restrictions")}
+            trace = sources.trace(Cell(NAME, cell["profile"], where))
+            if trace is not None:
+                figure = circle_figure(trace, profile(cell["profile"]))
+                return [Picture("avoidance", "End-effector path with a hand beside it", figure)]
+    return []
 
 
 EXPERIMENT = Experiment(NAME, cells, trial, lambda _: _DURATION_S, avoidance_summary, avoidance_tables, _draw)

@@ -3,7 +3,6 @@
 import numpy as np
 
 from pretouch.profiles import profile
-from pretouch.recording.run_record import RunRecord
 from pretouch.sim.paper_scenes import dynamic_pushes, person_scene
 from pretouch.sim.pushes import Push, Pusher
 from pretouch.sim.scene import HandSpec
@@ -123,22 +122,15 @@ def _mean_force(record: Record, start: float, end: float) -> FloatArray:
 
 
 def _draw(sources: Sources) -> list[Picture]:
-    from pretouch_lab.paper.figures.compared import compared_figure
     from pretouch_lab.paper.figures.interaction import interaction_figure
 
-    courses: dict[str, RunRecord] = {}
     for cell in sources.summary["cells"]:
-        trace = sources.trace(Cell(NAME, cell["profile"], {"restrictions": cell["restrictions"]}))
-        if trace is not None:
-            courses.setdefault(cell["profile"], trace)
-    said = "Speed of the end-effector and true force on the arm over thirty seconds with three pushes"
-    compared = compared_figure({"three pushes in thirty seconds": courses})
-    made = [Picture("dynamic-compared", said, compared)] if courses else []
-    for name, trace in courses.items():
-        if name != "blind":
-            text = "Distances, force with thresholds, velocity over thirty seconds"
-            return [*made, Picture("dynamic", text, interaction_figure(trace, sources.units, profile(name)))]
-    return made
+        if cell["profile"] != "blind":
+            trace = sources.trace(Cell(NAME, cell["profile"], {"restrictions": cell["restrictions"]}))
+            if trace is not None:
+                figure = interaction_figure(trace, sources.units, profile(cell["profile"]))
+                return [Picture("dynamic", "Distances, force with thresholds, velocity over thirty seconds", figure)]
+    return []
 
 
 EXPERIMENT = Experiment(NAME, cells, trial, lambda _: _DURATION_S, dynamic_summary, dynamic_tables, _draw)

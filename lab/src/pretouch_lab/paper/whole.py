@@ -16,7 +16,7 @@ _STUDIES = {
 def whole_paper(asked: Request) -> list[tuple[str, Request]]:
     """All runs of `pretouch reproduce all`, each with the name of its folder.
 
-    `asked` gives skin, orientation and the number of seeds; a study has no more seeds than that, nor than its own
+    `asked` gives skin and the number of seeds; a study has no more seeds than that, nor than its own
     number. Profiles, restrictions and stiffnesses that it names replace those of the paper's three experiments; where
     it has the defaults of a Request, these are varied as well.
     """
@@ -29,7 +29,7 @@ def whole_paper(asked: Request) -> list[tuple[str, Request]]:
     ]
     if not asked.restrictions and "paper" in profiles:
         runs.append(("restrictions", replace(asked, experiments=("static",), profiles=("paper",), restrictions=_MODES)))
-    study = Request(("static",), asked.seeds, orientation=asked.orientation, skin=asked.skin, world=asked.world)
+    study = Request(("static",), asked.seeds, skin=asked.skin, world=asked.world)
     return runs + [
         (name, replace(study, experiments=(name,), seeds=min(asked.seeds, seeds))) for name, seeds in _STUDIES.items()
     ]

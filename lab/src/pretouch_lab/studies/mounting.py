@@ -1,5 +1,6 @@
 """The static experiment with units that sit elsewhere than the skin file says: how good is good enough."""
 
+from collections.abc import Callable
 from itertools import product
 
 import numpy as np
@@ -12,13 +13,19 @@ from pretouch.robot.model import RobotModel
 from pretouch.sim.misplacement import Misplacement, misplaced
 from pretouch.sim.paper_scenes import static_path, static_scene
 from pretouch.sim.scene import Box, SceneSpec, fixtures
+from pretouch.text_table import TextTable, tabulated
 from pretouch_lab.benchmarks.avoidance.obstacle import Cuboid, nearest
 from pretouch_lab.cell import Cell, Context, Grid
-from pretouch_lab.experiment import Experiment, Picture, Sources
+from pretouch_lab.experiment import Experiment
 from pretouch_lab.paper import static
-from pretouch_lab.rows import Row, rounded
-from pretouch_lab.studies.mounting_tables import NAME, ROOM, summarise, tables
+from pretouch_lab.rows import Row, cells_of, grouped, rounded
+from pretouch_lab.tables import hits, median, number, plain
 from pretouch_lab.trial import Record, Setup, play
+
+NAME = "mounting"
+ROOM = "room"
+"""In place of the board's side: an empty room."""
+FORCES = ("filtered_at_detection_n", "raw_at_detection_n", "peak_estimate_n", "true_peak_20ms_n")
 
 _POSITIONS_MM = (2.0, 5.0, 10.0, 20.0, 30.0, 50.0)
 _ORIENTATIONS_DEG = (1.0, 2.0, 5.0, 10.0, 20.0)
@@ -146,11 +153,106 @@ def _cost(cell: Cell) -> float:
     return 40.0 if cell.where["restrictions"] in ("hard", "slack") else 7.0
 
 
-def _draw(sources: Sources) -> list[Picture]:
-    from pretouch_lab.paper.figures.mounting import mounting_figure
+_COMPARED = ("impact_speed_m_s", *FORCES, "touch_s", "travelled_m")
+_MEASURES = (
+    *_COMPARED, *(f"{name}_ratio" for name in _COMPARED), "detection_delay_s", "missed_fraction", "least_gap_m",
+    "obstacle_fraction", "speed_scale",
+)  # fmt: skip
+_TOTALS = ("detected", "false_detections", "held", "refused", "drawn")
+_ERROR = ("position_mm", "orientation_deg", "told")
+_KEYS = ("trajectory", "side", "profile", "restrictions", *_ERROR)
 
-    figure = mounting_figure(sources.summary["cells"])
-    return [Picture("mounting", "Force and free motion against errors of the units' places", figure)] if figure else []
+
+def summarise(rows: list[Row]) -> Row:
+    """Cells of all boards together, of both empty rooms together, and of each place.
+
+    Ratios are those to the trial with the same seed at the same place whose units sit where they are believed to.
+    """
+    exact = {_twin(row): row for row in rows if (row["position_mm"], row["orientation_deg"]) == (0, 0)}
+    compared = [row | _ratios(row, exact.get(_twin(row))) for row in rows]
+    together = [row | {"trajectory": "all", "side": ROOM if row["side"] == ROOM else "boards"} for row in compared]
+    cells = []
+    for group in (together, compared):
+        found = cells_of(group, _KEYS, _MEASURES, ("contact",), _TOTALS)
+        for cell, (_, trials) in zip(found, grouped(group, _KEYS), strict=True):
+            cells.append(cell | {"largest_true_20ms_n": max((_true(row) for row in trials), default=None)})
+    return {"cells": cells}
 
 
-EXPERIMENT = Experiment(NAME, cells, trial, _cost, summarise, tables, _draw, recorded=False)
+def _true(row: Row) -> float:
+    return row["true_peak_20ms_n"] or 0.0
+
+
+def _twin(row: Row) -> tuple[object, ...]:
+    return tuple(row[name] for name in ("trajectory", "side", "profile", "restrictions", "seed"))
+
+
+def _ratios(row: Row, exact: Row | None) -> Row:
+    return {
+        f"{name}_ratio": rounded(row[name] / exact[name], 4) if exact and exact[name] and row[name] else None
+        for name in _COMPARED
+    }
+
+
+def tables(part: Row) -> list[TextTable]:
+    """What misplaced units change of the forces at the board, of how near the arm comes, and where nothing is near."""
+    pooled = [cell for cell in part["cells"] if cell["trajectory"] == "all"]
+    rooms = [cell for cell in pooled if cell["side"] == ROOM]
+    boards = [cell for cell in pooled if cell["side"] == "boards"]
+    made = (
+        tabulated("Misplaced units, static object: medians of all four places", _BOARDS, boards, _BOARDS_NOTE),
+        tabulated("Misplaced units, an empty room: medians", _ROOMS, rooms, _ROOMS_NOTE),
+    )
+    return [table for table in made if table.rows]
+
+
+def _error(cell: Row) -> str:
+    parts = [f"{cell['position_mm']:g} mm"] if cell["position_mm"] else []
+    parts += [f"{cell['orientation_deg']:g} deg"] if cell["orientation_deg"] else []
+    return "\n".join(parts) or "none"
+
+
+def _percent(name: str, digits: int) -> Callable[[Row], str]:
+    return lambda cell: number(cell[name], digits, 100.0)
+
+
+_NAMES = (
+    ("error", _error),
+    ("stated", lambda cell: "yes" if cell["told"] == "told" else ""),
+    ("profile\nmode", lambda cell: f"{cell['profile']}\n{cell['restrictions']}"),
+)
+_BOARDS = (
+    *_NAMES,
+    ("hit", hits),
+    ("least\n[m]", median("least_gap_m", 3)),
+    ("impact\n[m/s]", median("impact_speed_m_s", 3)),
+    ("filtered\n[N]", median("filtered_at_detection_n", 1)),
+    ("true\n20 ms", median("true_peak_20ms_n", 1)),
+    ("ratio", median("true_peak_20ms_n_ratio", 2)),
+    ("most\n[N]", plain("largest_true_20ms_n", ".0f")),
+    ("missed\n[%]", _percent("missed_fraction", 1)),
+    ("false", plain("false_detections")),
+)
+_BOARDS_NOTE = (
+    "Each unit sits this far from where the controller believes it to be, in a direction of its own, or is turned by"
+    " this angle about an axis of its own; stated: the skin file says so as standard deviations. Hit: trials with"
+    " contact. Least: true distance of the arm's surface from the board. Ratio: of the true force to that of the trial"
+    " with units in their place. Most: largest of the true 20 ms peaks. Missed: of the readings that show the board,"
+    " those that the controller took for the arm or the room. False: detections before the contact."
+)
+_ROOMS = (
+    *_NAMES,
+    ("obstacle\n[%]", _percent("obstacle_fraction", 1)),
+    ("speed", median("speed_scale", 2)),
+    ("way\n[%]", _percent("travelled_m_ratio", 0)),
+    ("false", plain("false_detections")),
+    ("refused\n[%]", lambda cell: f"{100 * cell['refused'] / cell['drawn']:.0f}"),
+)
+_ROOMS_NOTE = (
+    "Twenty seconds on the circle and on the line with nothing near. Obstacle: control steps in which the controller"
+    " believes that there is one: it is the arm or the floor. Speed: factor of eqs. 3 and 4. Way: travelled, of that"
+    " with units in their place. Refused: of all poses that were drawn, those that lie inside the unit's own link."
+)
+
+
+EXPERIMENT = Experiment(NAME, cells, trial, _cost, summarise, tables, recorded=False)

@@ -6,10 +6,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from pretouch_lab.benchmarks import style
 from pretouch_lab.sweep.design import Sweep
 
-_FIRST, _TOTAL = style.colour("pretouch"), style.colour("paper")
+_FIRST, _TOTAL = "#0072b2", "#d55e00"
+"""Colours that the colour-blind tell apart too (Okabe and Ito, 2008)."""
 _ROW_IN = 0.3
 """Height of a parameter's row [in]."""
 
@@ -24,11 +24,11 @@ def sweep_figure(sweep: Sweep, found: dict[str, Any], metrics: tuple[str, ...]) 
     for axes, metric in zip(panels, metrics, strict=True):
         _indices(axes, found[metric]["rows"])
         axes.set_title(metric, fontsize=10)
-        style.plain(axes)
+        _plain(axes)
     panels[0].invert_yaxis()
     filled = next((axes for axes in panels if axes.get_legend_handles_labels()[0]), None)
     if filled is not None:
-        style.legend_above(figure, filled, 2)
+        _legend_above(figure, filled, 2)
     return figure
 
 
@@ -63,7 +63,19 @@ def _courses(sweep: Sweep, found: dict[str, Any], metrics: tuple[str, ...]) -> F
             axes.plot(at, middle, color=_FIRST, marker="o", label="median")
             axes.plot(at, mean, color=_TOTAL, ls="--", marker="s", ms=4, label="mean")
             axes.set_xlabel(one.name)
-            style.plain(axes)
+            _plain(axes)
         line[0].set_ylabel(metric, fontsize=9)
-    style.legend_above(figure, panels[0, 0], 3)
+    _legend_above(figure, panels[0, 0], 3)
     return figure
+
+
+def _plain(axes: Axes) -> None:
+    """Take away what a reader does not need."""
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.grid(alpha=0.25, lw=0.6)
+
+
+def _legend_above(figure: Figure, axes: Axes, columns: int) -> None:
+    """Put the legend of some axes above all."""
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=columns, frameon=False)

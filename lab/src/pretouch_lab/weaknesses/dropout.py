@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, field
 from itertools import pairwise, product
-from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
@@ -24,14 +23,11 @@ from pretouch.sim.range_finder import RangeFinders
 from pretouch.text_table import TextTable, tabulated
 from pretouch.types import ControlStep, FloatArray, Mode, QpOutcome
 from pretouch_lab.cell import Cell, Context, Grid
-from pretouch_lab.experiment import Experiment, Picture, Sources
+from pretouch_lab.experiment import Experiment
 from pretouch_lab.paper import static
 from pretouch_lab.rows import Row, cells_of, grouped, peak, rounded, spread
 from pretouch_lab.tables import median, plain, share
 from pretouch_lab.trial import Record, play
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 NAME = "dropout"
 DEFAULT_RESTRICTIONS = "slack"
@@ -304,40 +300,4 @@ def _by_profile(found: list[Row]) -> list[list[Row]]:
     ]
 
 
-def _draw(sources: Sources) -> list[Picture]:
-    return [Picture("dropout", "What lost readings change from one step to the next", _figure(sources.summary))]
-
-
-_DRAWN = (
-    ("threshold_step_n", "threshold, change in a step [N]"),
-    ("free_step", "free QP, change in a step / allowed change"),
-    ("towards_most_m_s", "fastest towards the board [m/s]"),
-)
-
-
-def _figure(part: Row) -> "Figure":
-    """Medians and 10-90 % of three measures by the number of readings lost, for each persistence."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(11, 4), layout="constrained")
-    panels = figure.subplots(1, len(_DRAWN), sharex=True)
-    styles = (("-", "o"), ("--", "s"), (":", "^"), ("-.", "D"))
-    for axes, (measure, label) in zip(panels, _DRAWN, strict=True):
-        for i, shown in enumerate(_by_profile(part["cells"])):
-            mine = [cell for cell in shown if cell[measure] is not None]
-            at = np.array([READINGS.index(int(cell["readings"])) for cell in mine]) + 0.1 * i
-            middle, low, high = (np.array([c[measure][key] for c in mine]) for key in ("median", "p10", "p90"))
-            name, (line_style, marker) = shown[0]["profile"], styles[i % len(styles)]
-            kept = f"{_base(name)}, points kept {1000 * _kept_s(name):.0f} ms"
-            axes.errorbar(
-                at, middle, (middle - low, high - middle), ls=line_style, marker=marker, capsize=2, label=kept
-            )
-        axes.set(xlabel="readings lost in a row", ylabel=label, ylim=(0, None))
-        axes.set_xticks(range(len(READINGS)), [str(count) for count in READINGS])
-        axes.grid(alpha=0.3)
-    panels[0].legend(fontsize="small", loc="lower right")
-    figure.suptitle("Readings of a board are lost")
-    return figure
-
-
-EXPERIMENT = Experiment(NAME, cells, trial, lambda _: _BEGIN_S + WATCHED_S, summarise, tables, _draw)
+EXPERIMENT = Experiment(NAME, cells, trial, lambda _: _BEGIN_S + WATCHED_S, summarise, tables)

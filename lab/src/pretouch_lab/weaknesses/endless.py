@@ -2,25 +2,20 @@
 
 from dataclasses import replace
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pretouch.recording.run_record import RunRecord
 from pretouch.sim.paper_scenes import static_path, static_scene
 from pretouch.sim.plant import TOUCH_N
 from pretouch.text_table import TextTable, tabulated
 from pretouch.traces import mean_over
 from pretouch.types import FloatArray
 from pretouch_lab.cell import Cell, Context, Grid
-from pretouch_lab.experiment import Experiment, Picture, Sources
+from pretouch_lab.experiment import Experiment
 from pretouch_lab.paper import static
 from pretouch_lab.rows import Row, cells_of, peak, rounded
 from pretouch_lab.tables import median, plain, share
 from pretouch_lab.trial import Record, play
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 NAME = "endless"
 
@@ -117,39 +112,4 @@ def tables(part: Row) -> list[TextTable]:
     return [table]
 
 
-def _draw(sources: Sources) -> list[Picture]:
-    shown: dict[str, RunRecord] = {}
-    place = ""
-    for cell in sources.summary["cells"]:
-        where = {key: cell[key] for key in _KEYS if key != "profile"}
-        here = f"{cell['trajectory']}, object at {cell['side']}"
-        trace = sources.trace(Cell(NAME, cell["profile"], where)) if place in ("", here) else None
-        if trace is not None:
-            place = here
-            shown.setdefault(cell["profile"], trace)
-    if not shown:
-        return []
-    return [Picture("endless", "True force of an object that stays on the path", _figure(shown, place))]
-
-
-def _figure(traces: dict[str, RunRecord], place: str) -> "Figure":
-    """True force over the whole trial, with the detections, for each profile at one place."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(10, 2.4 * len(traces) + 0.6), layout="constrained")
-    panels = np.atleast_1d(figure.subplots(len(traces), 1, sharex=True, sharey=True))
-    for axes, (name, trace) in zip(panels, traces.items(), strict=True):
-        force = np.linalg.norm(trace.true_force, axis=1)
-        axes.plot(trace.time, force, color="black", lw=0.8, label="true force")
-        axes.plot(
-            trace.time[trace.detected], force[trace.detected], "v", color="tab:red", mec="black", label="detected"
-        )
-        axes.set(title=f"profile {name}", ylabel="force [N]")
-        axes.grid(alpha=0.3)
-    panels[0].legend(loc="upper right", fontsize="small")
-    panels[-1].set_xlabel("time [s]")
-    figure.suptitle(f"A static object stays on the path: {place}")
-    return figure
-
-
-EXPERIMENT = Experiment(NAME, cells, trial, lambda _: _DURATION_S, summarise, tables, _draw)
+EXPERIMENT = Experiment(NAME, cells, trial, lambda _: _DURATION_S, summarise, tables)

@@ -1,7 +1,6 @@
 """A push that is held for long: the window's mean follows it, and its release can pass for a push by the other side."""
 
 from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,13 +13,10 @@ from pretouch.sim.scene import HandSpec, SceneSpec
 from pretouch.text_table import TextTable, tabulated
 from pretouch.types import ControlStep, FloatArray, Mode
 from pretouch_lab.cell import Cell, Context, Grid
-from pretouch_lab.experiment import Experiment, Picture, Sources
+from pretouch_lab.experiment import Experiment
 from pretouch_lab.rows import Row, grouped, peak, rounded, spread
 from pretouch_lab.tables import median, plain, share
 from pretouch_lab.trial import Record, play
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 NAME = "release"
 DEFAULT_RESTRICTIONS = "slack"
@@ -211,38 +207,8 @@ def tables(part: Row) -> list[TextTable]:
     return [table]
 
 
-def _draw(sources: Sources) -> list[Picture]:
-    return [Picture("release", "Reactions towards the person who releases the arm", _figure(sources.summary["cells"]))]
-
-
-def _figure(found: list[Row]) -> "Figure":
-    """Share of pushes with a reaction against them after the release, and the window's mean, by length of the push."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(10, 4), layout="constrained")
-    left, right = figure.subplots(1, 2, sharex=True)
-    styles = (("-", "o"), ("--", "s"), (":", "^"), ("-.", "D"))
-    touched = [cell for cell in found if cell["pushes"]]
-    for i, (key, group) in enumerate(grouped(touched, ("profile", "restrictions"))):
-        mine = sorted(group, key=lambda c: float(c["held_s"]))
-        held, (line, marker) = [c["held_s"] for c in mine], styles[i % len(styles)]
-        label = f"{_base(key['profile'])}, reaction of {_decay_s(key['profile']):g} s"
-        share = [100 * c["against_after_release"] / c["pushes"] for c in mine]
-        left.plot(held, share, line, marker=marker, label=label)
-        right.plot(held, [c["mean_peak_n"]["median"] for c in mine], line, marker=marker, label=label)
-    left.set(xlabel="push held [s]", ylabel="reaction towards the person [% of pushes]", ylim=(-5, 105))
-    right.set(xlabel="push held [s]", ylabel="largest mean along the push [N]")
-    right.set_ylim(bottom=0)
-    if left.lines:
-        left.legend(fontsize="small", loc="lower right")
-    for axes in (left, right):
-        axes.grid(alpha=0.3)
-    figure.suptitle("What the arm does when a held push is released")
-    return figure
-
-
 def _cost(cell: Cell) -> float:
     return _FIRST_S + _PUSHES * float(cell.where["held_s"]) + (_PUSHES - 1) * _PAUSE_S + _REACH_S + WATCHED_S
 
 
-EXPERIMENT = Experiment(NAME, cells, trial, _cost, summarise, tables, _draw)
+EXPERIMENT = Experiment(NAME, cells, trial, _cost, summarise, tables)

@@ -7,8 +7,7 @@ from pretouch.sim.plant import Touch
 from pretouch.types import Mode, QpOutcome
 from pretouch_lab.benchmarks.avoidance import measures
 from pretouch_lab.benchmarks.avoidance.livelock import livelocks, stuck_for
-from pretouch_lab.benchmarks.avoidance.obstacle import Ball, Nearest
-from pretouch_lab.benchmarks.avoidance.truth import Truth
+from pretouch_lab.benchmarks.avoidance.obstacle import Ball, Nearest, Truth
 from pretouch_lab.trial import Record
 
 

@@ -9,11 +9,11 @@ import pytest
 from pretouch.control.posture import brought_to
 from pretouch.perception.closest import closest_points
 from pretouch.profiles import profile
+from pretouch_lab.benchmarks.avoidance.obstacle import truth_of
 from pretouch_lab.benchmarks.avoidance.run import AvoidanceBench
 from pretouch_lab.benchmarks.avoidance.scenario import FAMILIES, scenarios
 from pretouch_lab.benchmarks.avoidance.setting import setting
 from pretouch_lab.benchmarks.avoidance.trial import play_trial
-from pretouch_lab.benchmarks.avoidance.truth import truth_of
 from pretouch_lab.engine import missing
 from pretouch_lab.trial import Record
 

@@ -9,7 +9,7 @@ from pretouch.profiles import profile
 from pretouch_lab.cell import Cell, Grid
 from pretouch_lab.paper.claims import between
 from pretouch_lab.paper.figures.close_up import close_up_figure
-from pretouch_lab.trace import trace_of
+from pretouch_lab.trial import trace_of
 
 MODES = {"blind": "off", "paper": "slack"}
 

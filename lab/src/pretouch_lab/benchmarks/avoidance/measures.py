@@ -11,8 +11,8 @@ from pretouch.robot.model import RobotModel
 from pretouch.sim.plant import TOUCH_N
 from pretouch.traces import mean_over
 from pretouch.types import ControlStep, FloatArray, Mode, QpOutcome
+from pretouch_lab.benchmarks.avoidance.obstacle import Truth
 from pretouch_lab.benchmarks.avoidance.setting import Setting
-from pretouch_lab.benchmarks.avoidance.truth import Truth
 from pretouch_lab.rows import Row, peak, rounded
 from pretouch_lab.trial import Record
 

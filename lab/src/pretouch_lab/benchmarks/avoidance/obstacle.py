@@ -1,16 +1,18 @@
 """The obstacle of a scenario: how it moves, and how far from it the bodies truly are."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
 from pretouch.robot.body import Capsules
-from pretouch.robot.model import Kinematics
+from pretouch.robot.model import Kinematics, RobotModel
 from pretouch.robot.vectors import placed
 from pretouch.sim.hand import HandGoal
 from pretouch.sim.plant import Plant
 from pretouch.types import FloatArray
+from pretouch_lab.trial import Record
 
 _BRAKING_M_S2 = 4.0
 """How hard one who walks slows down at the end."""
@@ -120,3 +122,25 @@ def nearest(kin: Kinematics, body: Capsules, shape: Shape) -> Nearest:
     place, k = np.unravel_index(int(np.argmin(gap)), gap.shape)
     to = direction[place, k]
     return Nearest(float(gap[place, k]), int(body.link[k]), along[place, k] + body.radius[k] * to, to)
+
+
+@dataclass(frozen=True)
+class Truth:
+    """How near arm and obstacle truly were in the S control steps of a trial: no sensor is asked."""
+
+    nearest: list[Nearest]
+    """True closest points of arm and obstacle at each step."""
+    distance: FloatArray
+    """(S,) distance of the surfaces, negative in contact [m]."""
+    ee_distance: FloatArray
+    """(S,) distance of the obstacle's surface from the end-effector's origin [m]."""
+
+
+def truth_of(record: Record, model: RobotModel, shapes: Iterable[Shape]) -> Truth:
+    """Work out from true joint positions and the obstacle's true place at each step how near they were."""
+    found, of_ee = [], []
+    for step, shape in zip(record.steps, shapes, strict=True):
+        kin = model.kinematics(step.q)
+        found.append(nearest(kin, model.body, shape))
+        of_ee.append(float(shape.closest(kin.position[model.ee])[0]))
+    return Truth(found, np.array([n.distance for n in found]), np.array(of_ee))

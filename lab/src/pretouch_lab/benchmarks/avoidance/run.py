@@ -10,8 +10,11 @@ from pretouch.errors import ExperimentError
 from pretouch.robot.description_file import files_digest
 from pretouch.robot.named import robot_named
 from pretouch_lab.baselines.avoidance import ABLATED, ABLATED_IN, ABLATED_SEEDS, BASELINES, profile_text
+from pretouch_lab.benchmarks.ablations import BASE
 from pretouch_lab.benchmarks.avoidance.scenario import Scenario, scenarios
 from pretouch_lab.benchmarks.avoidance.setting import PANDA, place
+from pretouch_lab.benchmarks.avoidance.summary import results, summarise
+from pretouch_lab.benchmarks.avoidance.tables import tables
 from pretouch_lab.benchmarks.avoidance.trial import keep_trial
 from pretouch_lab.benchmarks.bench import Bench, Found
 from pretouch_lab.engine import Task, rows_of
@@ -23,7 +26,6 @@ class AvoidanceBench(Bench):
     """The avoidance benchmark."""
 
     name: ClassVar[str] = "avoidance"
-    shown_unfinished: ClassVar[bool] = True
 
     baselines: tuple[str, ...] = ()
     """None: all there are, and `pretouch` with each switch off alone in some scenarios."""
@@ -75,10 +77,25 @@ class AvoidanceBench(Bench):
 
     def found(self) -> Found | None:
         """See `Bench`."""
-        from pretouch_lab.benchmarks.avoidance.page import found
-
         rows = self.rows()
-        return found(self, rows) if rows else None
+        if not rows:
+            return None
+        summary = summarise(rows)
+        counts = [cell["trials"] for cell in summary["cells"]]
+        resolution = f"Resolution: {min(counts)} to {max(counts)} trials a cell, {self.seeds} seeds."
+        trials = sum(counts) + sum(cell["trials"] for cell in summary["ablations"] if cell["contender"] != BASE)
+        about = (
+            f"{trials} trials with {self.seeds} seeds. Contenders: `blind` without proximity; `flacco` and `ding` as"
+            " published, and each with another tuning ([baselines](../explanation/baselines.md)); `paper` with its"
+            " restrictions, soft; `paper-off` without them."
+        )
+        scenes = [
+            f"- **{family}**: {text}"
+            for family, text in {s.family: s.text for s in scenarios().values()}.items()
+            if any(cell["family"] == family for cell in summary["cells"])
+        ]
+        text = "\n\n".join([about, "\n".join(scenes)])
+        return Found(results(summary, self), tables(summary), resolution, text)
 
 
 def _task(bench: AvoidanceBench, scene: Scenario, baseline: str, seed: int) -> Task:

@@ -1,4 +1,4 @@
-"""What many trials come to: spreads over seeds, ratios on the same seeds, and the benchmark's JSON rows."""
+"""What many trials come to: spreads over seeds, and the benchmark's JSON rows."""
 
 from collections import Counter
 from typing import Any
@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from pretouch_lab.benchmarks.ablations import BASE, WITHOUT
-from pretouch_lab.benchmarks.avoidance.paired import REFERENCES, paired
+from pretouch_lab.benchmarks.avoidance.paired import paired
 from pretouch_lab.benchmarks.bench import EMPTY, Bench
 from pretouch_lab.rows import Row, grouped, rounded
 
@@ -20,15 +20,6 @@ SPREAD = (
 TOTALS = (
     "holds", "livelocks", "reactions", "false_reactions", "towards_person", "solver_failures", "infeasible",
 )  # fmt: skip
-RATIOS = (
-    "true_peak_20ms_n",
-    "clamping_force_n",
-    "peak_estimate_n",
-    "first_contact_s",
-    "cycle_time_s",
-    "tracking_rms_m",
-)
-"""Measures that are compared seed by seed."""
 
 
 def summarise(rows: list[Row]) -> Row:
@@ -36,14 +27,13 @@ def summarise(rows: list[Row]) -> Row:
 
     Returns:
         `cells`, one for each scenario and baseline; `families`, all scenarios of a family together; `ablations`, cells
-        of `pretouch` with each switch off alone and as it is, on the same seeds; `ratios` to each reference; `paired`.
+        of `pretouch` with each switch off alone and as it is, on the same seeds; `paired`.
     """
     whole = [row for row in rows if not row["contender"].startswith(WITHOUT)]
     return {
         "cells": _cells(whole, ("scenario", "family", "contender")),
         "families": _cells(whole, ("family", "contender")),
         "ablations": _cells(_ablated(rows), ("scenario", "family", "contender")),
-        "ratios": _ratios(whole),
         "paired": paired(whole),
     }
 
@@ -88,32 +78,13 @@ def spread(values: list[Any]) -> dict[str, float | int | None] | None:
     return {**{k: rounded(v, 4) if np.isfinite(v) else None for k, v in numbers.items()}, "n": len(known)}
 
 
-def _ratios(rows: list[Row]) -> list[Row]:
-    """Ratios reference / baseline over the seeds that both have, for every scenario, and where both are above 0."""
-    of = {(row["scenario"], row["contender"], row["seed"]): row for row in rows}
-    found = []
-    for reference in REFERENCES:
-        for key, group in grouped(rows, ("scenario", "family", "contender")):
-            pairs = [(of.get((row["scenario"], reference, row["seed"])), row) for row in group]
-            both = [(theirs, mine) for theirs, mine in pairs if theirs is not None]
-            if not both or key["contender"] == reference:
-                continue
-            ratio = {name: spread([_ratio(theirs[name], mine[name]) for theirs, mine in both]) for name in RATIOS}
-            found.append({**key, "reference": reference, **ratio})
-    return found
-
-
-def _ratio(theirs: float | None, mine: float | None) -> float | None:
-    return theirs / mine if theirs and mine else None
-
-
 _MEDIANS = ("peak_estimate_n", "true_peak_20ms_n", "first_contact_s", "cycle_time_s")
 """Keys all benchmarks share, of which the rows have the median over the seeds."""
 
 
 def results(summary: Row, bench: Bench) -> Row:
-    """Return what the JSON file holds: what was run, a row for each baseline and scenario, and ratios to some."""
-    kept = {key: summary[key] for key in ("families", "ablations", "ratios", "paired")}
+    """Return what the JSON file holds: what was run, a row for each baseline and scenario."""
+    kept = {key: summary[key] for key in ("families", "ablations", "paired")}
     return {"about": bench.about(), "rows": json_rows(summary), **kept}
 
 

@@ -15,33 +15,19 @@ _NOTE = (
     " the obstacle being within 0.8 m of the end-effector. turn: time of the second turn, > where the trial ended"
     " before."
 )
-_MOTION_NOTE = (
-    "jerk: of the commanded joint velocities, the largest of all, the median over seconds of each second's largest, and"
-    " rms. manip.: least manipulability of the hand's velocity, and median of that of the body point nearest to the"
-    " obstacle while it is within 0.6 m. mobility: speed of that point towards the obstacle per joint speed. livelock:"
-    " see the scenario files. seen: share of the time within 0.6 m in which the controller knew a point of it."
-    " false: reactions without a contact. towards person: reactions against the force they answer or echo. no solution:"
-    " control steps whose hard rows contradict the acceleration limits."
-)
 
 
 def tables(summary: Row) -> list[TextTable]:
-    """Return what is lost, each baseline in each scenario, a table a family, the motion, ablations, and ratios."""
+    """Return what is lost, each baseline in each scenario, a table a family, and ablations."""
     cells, made = summary["cells"], [losses(summary["cells"])]
     made += [_results(family["family"], group) for family, group in grouped(cells, ("family",))]
-    made += [_motion(family["family"], group) for family, group in grouped(cells, ("family",))]
     made += [_ablations(summary["ablations"])]
-    made += [_ratios(ref["reference"], part) for ref, part in grouped(summary["ratios"], ("reference",))]
     return [table for table in made if table.rows]
 
 
 def _results(family: str, cells: list[Row]) -> TextTable:
     text = next(s.text for s in scenarios().values() if s.family == family)
     return tabulated(f"{family.capitalize()}: contact and cost", _COLUMNS, cells, f"{text} {_NOTE}")
-
-
-def _motion(family: str, cells: list[Row]) -> TextTable:
-    return tabulated(f"{family.capitalize()}: motion, holds and reactions", _MOTION, cells, _MOTION_NOTE)
 
 
 def _ablations(cells: list[Row]) -> TextTable:
@@ -51,16 +37,6 @@ def _ablations(cells: list[Row]) -> TextTable:
         [cell for _, found in grouped(cells, ("scenario",)) for cell in found],
         "On fewer seeds than the tables above: pretouch here has the same. The switches of detection are in the tables"
         " of contact detection.",
-    )
-
-
-def _ratios(reference: str, ratios: list[Row]) -> TextTable:
-    return tabulated(
-        f"{reference} over each contender, on the same seeds",
-        (*_NAMES, *((label, write) for _, label, write in _RATIO)),
-        [row for row in ratios if any(row[key] for key, *_ in _RATIO)],
-        f"Above 1 the contender's is smaller than that of {reference}. Only seeds in which both have one: those without"
-        " contact are in the table above.",
     )
 
 
@@ -102,25 +78,6 @@ _COLUMNS = (
     ("along\n[m/s]", value("speed_m_s", 3)),
     _TURN,
 )
-_MOTION = (
-    *_NAMES,
-    ("off path\nmost [m]", value("off_path_max_m", 2)),
-    ("jerk most\n[rad/s^3]", value("jerk_max_rad_s3", 0)),
-    ("each\nsecond", value("jerk_max_per_second_rad_s3", 0)),
-    ("rms", value("jerk_rms_rad_s3", 0)),
-    ("manip.\nhand", value("manipulability_ee_least", 3)),
-    ("manip.\npoint", value("manipulability_point", 3)),
-    ("mobility\n[m]", value("mobility_point_m", 2)),
-    ("held\n[s]", value("held_s", 1)),
-    ("livelock\n[s]", value("livelock_s", 1)),
-    ("seen", value("seen_fraction", 2)),
-    ("holds", plain("holds")),
-    ("livelocks", plain("livelocks")),
-    ("false", plain("false_reactions")),
-    ("towards\nperson", plain("towards_person")),
-    ("solver\nfailed", plain("solver_failures")),
-    ("no\nsolution", plain("infeasible")),
-)
 _ABLATED = (
     *_NAMES,
     _HIT,
@@ -132,15 +89,4 @@ _ABLATED = (
     ("towards\nperson", plain("towards_person")),
     ("holds", plain("holds")),
     ("livelocks", plain("livelocks")),
-)
-_RATIO = tuple(
-    (key, label, value(key, 2))
-    for key, label in (
-        ("true_peak_20ms_n", "true 20 ms"),
-        ("clamping_force_n", "clamp"),
-        ("peak_estimate_n", "estimate"),
-        ("first_contact_s", "touch time"),
-        ("cycle_time_s", "turn"),
-        ("tracking_rms_m", "off path"),
-    )
 )

@@ -11,9 +11,9 @@ from pretouch.profiles import profile
 from pretouch_lab.baselines.avoidance import profile_text
 from pretouch_lab.benchmarks.avoidance import measures
 from pretouch_lab.benchmarks.avoidance.livelock import livelocks
+from pretouch_lab.benchmarks.avoidance.obstacle import Truth, truth_of
 from pretouch_lab.benchmarks.avoidance.scenario import Scenario, scenarios
 from pretouch_lab.benchmarks.avoidance.setting import PANDA, Setting, setting
-from pretouch_lab.benchmarks.avoidance.truth import Truth, truth_of
 from pretouch_lab.rows import Row
 from pretouch_lab.trial import Record, play
 

@@ -1,4 +1,4 @@
-"""All work of the detection benchmark: streams to record, detectors to replay on them, boards to meet."""
+"""All work of the detection benchmark: streams to record, detectors to replay on them."""
 
 from dataclasses import dataclass, replace
 from functools import partial
@@ -6,15 +6,24 @@ from pathlib import Path
 from typing import ClassVar
 
 from pretouch_lab.baselines.detection import BASELINES, Baseline, ablated
-from pretouch_lab.benchmarks.bench import Bench, Found
-from pretouch_lab.benchmarks.detection.boards import COST_S, BoardCell, board_cells, meet_board
+from pretouch_lab.benchmarks.bench import Bench, Found, said
 from pretouch_lab.benchmarks.detection.contacts import ContactCell, contact_cells, record_contacts
 from pretouch_lab.benchmarks.detection.free import FreeCell, free_cells, record_free, warm_up_s
 from pretouch_lab.benchmarks.detection.hard import HardCell, hard_cells, record_hard
 from pretouch_lab.benchmarks.detection.judge import judge_contacts, judge_free
-from pretouch_lab.benchmarks.detection.results import Rows
+from pretouch_lab.benchmarks.detection.results import (
+    Rows,
+    ablation_rows,
+    contact_rows,
+    curves,
+    free_rows,
+    hard_rows,
+    resolution,
+)
+from pretouch_lab.benchmarks.detection.tables import detection_tables
 from pretouch_lab.benchmarks.scenario_files import scenario
 from pretouch_lab.engine import Task, rows_of
+from pretouch_lab.rows import Row
 
 _CONTACT_S = 3.5
 """Time a contact takes with the gap after it, about [s]."""
@@ -32,18 +41,27 @@ class DetectionBench(Bench):
     name: ClassVar[str] = "detection"
 
     def stages(self) -> list[list[Task]]:
-        """Return the streams to record, then what is made of them and the trials in the closed loop."""
-        return [self.streams(), [*self.free(), *self.contacts(), *self.hard(), *self.boards()]]
+        """Return the streams to record, then what is made of them."""
+        return [self.streams(), [*self.free(), *self.contacts(), *self.hard()]]
 
     def rows(self) -> Rows:
         """Return the rows of what is done."""
-        return Rows(rows_of(self.free()), rows_of(self.contacts()), rows_of(self.boards()), rows_of(self.hard()))
+        return Rows(rows_of(self.free()), rows_of(self.contacts()), rows_of(self.hard()))
 
     def found(self) -> Found | None:
         """See `Bench`."""
-        from pretouch_lab.benchmarks.detection.published import found
-
-        return found(self, self.rows())
+        rows = self.rows()
+        results: Row = {
+            "about": self.about(),
+            "resolution": resolution(rows),
+            "rows": [
+                *free_rows(rows, BASELINES), *contact_rows(rows, BASELINES), *hard_rows(rows, BASELINES),
+                *ablation_rows(rows),
+            ],
+            "curves": curves(rows, BASELINES),
+        }  # fmt: skip
+        text = f"{said(results['about'])} {results['resolution']}"
+        return Found(results, detection_tables(results), results["resolution"], text)
 
     def streams(self) -> list[Task]:
         """Return the streams to record."""
@@ -100,14 +118,6 @@ class DetectionBench(Bench):
             for baseline in BASELINES
         ]
 
-    def boards(self) -> list[Task]:
-        """Return the trials in the closed loop."""
-        return [
-            Task(self._row("boards", cell.name, baseline), partial(meet_board, cell, baseline), COST_S)
-            for cell in self._boards()
-            for baseline in BASELINES
-        ]
-
     def _replayed(self, cell: FreeCell | ContactCell) -> tuple[Baseline, ...]:
         """Return the detectors that are given a cell's stream: ablations only what the goals are about."""
         wanted = cell.kind == "nominal" and cell.speed_m_s == scenario("contacts")["goal"]["speed_m_s"]
@@ -123,9 +133,6 @@ class DetectionBench(Bench):
 
     def _contacts(self) -> list[ContactCell]:
         return [replace(cell, world=self.world) for cell in contact_cells(self.seeds, self.quick)]
-
-    def _boards(self) -> list[BoardCell]:
-        return [replace(cell, world=self.world) for cell in board_cells(self.seeds, self.quick)]
 
     def _hard(self) -> list[HardCell]:
         # they have a world of their own: with another they are left out

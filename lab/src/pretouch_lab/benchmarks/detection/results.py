@@ -26,7 +26,6 @@ class Rows:
 
     free: list[Row]
     contacts: list[Row]
-    boards: list[Row]
     hard: list[Row]
     """Of arms as unkind as real ones, free or touched."""
 
@@ -161,7 +160,7 @@ def ablation_rows(rows: Rows) -> list[Row]:
         return [cell for cell in cells if cell["seed"] in seeds]
 
     compared = (BASELINES[-1], *ablated())
-    part = Rows(given(rows.free), given(rows.contacts), [], [])
+    part = Rows(given(rows.free), given(rows.contacts), [])
     return [
         *free_rows(part, compared, {ABLATED_FREE: lambda row: True}),
         *contact_rows(part, compared, {ABLATED_CONTACTS: wanted}),
@@ -188,36 +187,8 @@ def hard_rows(rows: Rows, baselines: Iterable[Baseline]) -> list[Row]:
         name.replace("hard", "hard, touched"): lambda cell, contact, of=of: of(cell) and contact["detectable"]  # type: ignore[misc]
         for name, of in groups.items()
     }
-    parts = Rows(free, touched, [], [])
+    parts = Rows(free, touched, [])
     return [*free_rows(parts, baselines, groups), *contact_rows(parts, baselines, of_contacts)]
-
-
-def board_rows(rows: Rows, baselines: Iterable[Baseline]) -> list[Row]:
-    """Return medians of forces and delay of each baseline at each kind of board."""
-    found = []
-    for baseline in baselines:
-        own = [row for row in rows.boards if row["contender"] == baseline.name]
-        for name, group in _boards(own).items():
-            touched = [row for row in group if row["contact"]]
-            times = [row["detection_delay_s"] for row in touched]
-            values: Row = {key: _median(touched, key) for key in ("peak_estimate_n", "true_peak_20ms_n", "clamping_n")}
-            falsely = sum(row["false_detections"] for row in group)
-            where = {"contender": baseline.name, "scenario": name, "false_alarms": falsely}
-            found.append({**EMPTY, **where, **delays(times), **values})
-    return found
-
-
-def _boards(rows: list[Row]) -> dict[str, list[Row]]:
-    groups: dict[str, list[Row]] = {}
-    for row in rows:
-        what = f"{row['stiffness_n_per_m'] / 1000:g} N/mm" if row["sensing"] == "nominal" else row["sensing"]
-        groups.setdefault(f"board: {what}", []).append(row)
-    return groups
-
-
-def _median(rows: list[Row], key: str) -> float | None:
-    values = [row[key] for row in rows if row[key] is not None]
-    return rounded(float(np.median(values))) if values else None
 
 
 def curves(rows: Rows, baselines: Iterable[Baseline]) -> list[Row]:

@@ -1,7 +1,5 @@
 """The detection benchmark as tables of finished text, for the terminal and the document."""
 
-from collections.abc import Callable
-
 from pretouch.text_table import TextTable, tabulated
 from pretouch_lab.benchmarks.ablations import BASE, WITHOUT
 from pretouch_lab.benchmarks.bounds import short
@@ -9,7 +7,6 @@ from pretouch_lab.benchmarks.detection.results import ABLATED_CONTACTS, ABLATED_
 from pretouch_lab.benchmarks.goals import find
 from pretouch_lab.benchmarks.scenario_files import scenario
 from pretouch_lab.rows import Row
-from pretouch_lab.tables import plain, share
 
 
 def detection_tables(results: Row) -> list[TextTable]:
@@ -30,11 +27,14 @@ def detection_tables(results: Row) -> list[TextTable]:
             " the goal's speed; pretouch here has the same. Nothing reacts in them, so that freeze_while_reacting"
             " changes nothing.",
         ),
-        _false_alarms(rows, whole),
-        _contacts(rows, whole),
-        _hard(rows, whole),
-        _hard_contacts(rows, whole),
-        _boards(rows),
+        _goals(
+            rows,
+            whole,
+            "Arms as unkind as real ones",
+            ("hard: all", "hard, touched: all"),
+            " The world hard: friction that remembers, gears that shake, joints that ring, drift, cables, delays;"
+            " contacts whose torques exceed three standard deviations of that arm's free motion.",
+        ),
     ]
     return [table for table in made if table.rows]
 
@@ -62,7 +62,7 @@ def _goals(
     )
     return tabulated(
         title,
-        columns,
+        columns[:-1] if where[0].startswith("hard") else columns,  # hard arms have goals of their own
         found,
         f"Goals: at most {goal['false_alarms_per_hour']:g} false alarm an hour in free motion at"
         f" {goal['speed_m_s']:g} m/s, with or without somebody near; median delay at most"
@@ -118,125 +118,6 @@ def _equal(curves: list[Row], names: list[str]) -> TextTable:
         " hour: the base force F_b, or a factor on the evidence that makes an alarm. Chosen with hindsight on the same"
         " streams, so it flatters all of them alike.",
         1,
-    )
-
-
-def _groups(rows: list[Row], family: str, without: str) -> dict[tuple[str, bool | None], None]:
-    """Scenarios of a family, each with whether the contacts were seen, in their order."""
-    return dict.fromkeys(
-        (row["scenario"], row["seen"])
-        for row in rows
-        if row["scenario"].startswith(family) and row["scenario"] != without
-    )
-
-
-def _false_alarms(rows: list[Row], names: list[str]) -> TextTable:
-    return _rates(
-        rows, names, "free: ", "False alarms per hour of free motion", "arms",
-        "Below: 95 % bounds, Poisson's, wider by how much more the counts of the arms scatter than such counts do.",
-    )  # fmt: skip
-
-
-def _hard(rows: list[Row], names: list[str]) -> TextTable:
-    goal = scenario("hard")["goal"]
-    return _rates(
-        rows, names, "hard: ", "False alarms per hour of arms as unkind as real ones", "motion",
-        f"The world hard: friction that remembers, gears that shake, joints that ring, drift, cables, delays. Goals: at"
-        f" most {goal['false_alarms_per_hour']:g} an hour of all, {goal['in_any_motion_per_hour']:g} in any motion;"
-        " untold-load is no part of all, for each load that nobody announced may give one alarm. Below: 95 % bounds.",
-    )  # fmt: skip
-
-
-def _rates(rows: list[Row], names: list[str], family: str, title: str, what: str, note: str) -> TextTable:
-    def hours(group: tuple[str, bool | None]) -> str:
-        found = (find(rows, name, group[0]) for name in names)
-        return f"{next((row['hours'] for row in found if row), 0.0):.2g}"
-
-    def of(name: str) -> Callable[[tuple[str, bool | None]], str]:
-        return lambda group: _rate(find(rows, name, group[0]))
-
-    return tabulated(
-        title,
-        (
-            (what, lambda group: group[0].removeprefix(family)),
-            ("hours", hours),
-            *((name, of(name)) for name in names),
-        ),
-        _groups(rows, family, ABLATED_FREE),
-        note,
-        1,
-    )
-
-
-def _contacts(rows: list[Row], names: list[str]) -> TextTable:
-    return _delays(
-        rows, names, "contacts: ", "Contacts: median and 95 % of the delay [ms], below what was missed", "contacts",
-        "Rows of a speed, an arm or a kind of sensing hold the contacts of the goals; tap, push, clamp and all hold"
-        " every contact. Contacts that came while a false alarm was being answered are left out of a detector's count.",
-    )  # fmt: skip
-
-
-def _hard_contacts(rows: list[Row], names: list[str]) -> TextTable:
-    goal = scenario("hard")["goal"]
-    return _delays(
-        rows, names, "hard, touched: ",
-        "Contacts on such arms: median and 95 % of the delay [ms], below what was missed", "motion",
-        "15 to 30 N for 100 to 400 ms on the links 3 to 7 and the hand whose torques exceed three standard deviations"
-        f" of that arm's free motion. Goals: {100 * goal['found']:g} % found, median {1000 * goal['seen_delay_s']:g} ms"
-        f" seen and {1000 * goal['unseen_delay_s']:g} ms unseen.",
-    )  # fmt: skip
-
-
-def _delays(rows: list[Row], names: list[str], family: str, title: str, what: str, note: str) -> TextTable:
-    def count(group: tuple[str, bool | None]) -> str:
-        found = (find(rows, name, *group) for name in names)
-        return str(next((row["contacts"] + row["busy"] for row in found if row), 0))
-
-    def of(name: str) -> Callable[[tuple[str, bool | None]], str]:
-        def write(group: tuple[str, bool | None]) -> str:
-            row = find(rows, name, *group)
-            if row is None:
-                return "-"
-            return f"{_ms(row['median_delay_s'])}, {_ms(row['p95_delay_s'])}\n{row['missed']}/{row['contacts']}"
-
-        return write
-
-    return tabulated(
-        title,
-        (
-            (what, lambda group: group[0].removeprefix(family)),
-            ("", lambda group: "seen" if group[1] else "unseen"),
-            ("number", count),
-            *((name, of(name)) for name in names),
-        ),
-        _groups(rows, family, ABLATED_CONTACTS),
-        note,
-        2,
-    )
-
-
-def _boards(rows: list[Row]) -> TextTable:
-    def newtons(key: str) -> Callable[[Row], str]:
-        return lambda row: "-" if row[key] is None else f"{row[key]:.1f}"
-
-    columns = (
-        ("board", lambda row: row["scenario"].removeprefix("board: ")),
-        ("detector", plain("contender")),
-        ("delay\n[ms]", lambda row: _ms(row["median_delay_s"])),
-        ("missed", share("missed", "contacts")),
-        ("peak\n[N]", newtons("peak_estimate_n")),
-        ("true\n20 ms [N]", newtons("true_peak_20ms_n")),
-        ("clamping\n[N]", newtons("clamping_n")),
-        ("false", plain("false_alarms")),
-    )
-    chosen = [row for row in rows if row["scenario"].startswith("board")]
-    return tabulated(
-        "Boards in the closed loop: medians",
-        columns,
-        sorted(chosen, key=lambda row: str(row["scenario"])),
-        "The arm runs into a board on circle and line, from both sides, restrictions off, and yields: paper is still"
-        " slowed by what is near, pretouch by nothing, so this is its detector and its reaction alone. Peak: of the"
-        " estimate. Clamping: mean true force half a second to a second after the touch, the board being where it was.",
     )
 
 

@@ -9,7 +9,6 @@ from pretouch.errors import ExperimentError
 from pretouch_lab.benchmarks.bench import Bench, Found, said
 from pretouch_lab.benchmarks.localization.contacts import TouchedCell, duration_s, record_touched, touched_cells
 from pretouch_lab.benchmarks.localization.judge import WITHOUT, judge_touched
-from pretouch_lab.documents import LOCALIZATION
 from pretouch_lab.engine import Task, rows_of
 from pretouch_lab.rows import Row
 
@@ -24,7 +23,6 @@ class LocalizationBench(Bench):
     """The localisation benchmark."""
 
     name: ClassVar[str] = "localization"
-    document: ClassVar[str] = LOCALIZATION
 
     def __post_init__(self) -> None:
         if self.world:
@@ -39,7 +37,7 @@ class LocalizationBench(Bench):
         from pretouch_lab.benchmarks.localization.results import rows_by_body, tables_of
 
         results: Row = {"about": self.about(), "rows": rows_by_body(rows_of(self.replays()))}
-        return Found(results, tables_of(results), "", [], said(results["about"]))
+        return Found(results, tables_of(results), "", said(results["about"]))
 
     def streams(self) -> list[Task]:
         """Return the streams to record."""

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pretouch.profiles import profile
 from pretouch.text_table import TextTable, tabulated
-from pretouch_lab.benchmarks.real.external import Stream, corrected, model_of, pushed, stream_of
+from pretouch_lab.benchmarks.real.external import Stream, corrected, model_of, stream_of
 from pretouch_lab.benchmarks.real.judge import Tally, said_of, tally
 from pretouch_lab.benchmarks.real.sets import SETS, Run
 from pretouch_lab.rows import Row
@@ -16,17 +16,12 @@ DETECTORS = ("fixed", "observer", "paper", "pretouch")
 TABLES = {
     "free": "Real free motion",
     "contacts": "Real contacts",
-    "added": "NOT real contacts: pushes added to real free motion",
 }
 _NOTES = {
     "free": "False alarms an hour of free motion, with exact 95 % bounds (Poisson).",
     "contacts": (
         "Found of the labelled contacts; busy: began during an earlier alarm, and count in neither. Link: right of"
         " those that set and detector name."
-    ),
-    "added": (
-        "15 N for 100 ms at the end-effector, laid on the measured torques before the observer; the arm does not give"
-        " way. No person made these contacts."
     ),
 }  # fmt: skip
 
@@ -48,22 +43,16 @@ def halves(count: int) -> tuple[tuple[tuple[int, ...], tuple[int, ...]], ...]:
 
 def play(work: Work) -> list[Row]:
     """Return a row for each table that a set has something for."""
-    runs, streams = _prepared(work.folder, work.set_name)
+    runs, whole = _prepared(work.folder, work.set_name)
     counts: dict[str, Tally] = {}
     for learn, judge in halves(len(runs)):
-        touched = tuple(number for number in judge if runs[number].touched)
-        free = tuple(number for number in judge if not runs[number].touched)
-        tables = {"stream": {"free": free, "contacts": touched}, "pushed": {"added": free}}
-        for name, some in tables.items():
-            if any(some.values()):
-                joints = [run.joints if name == "stream" else (len(run.q[0]),) for run in runs]
-                stream = corrected(streams[name], learn)
-                # what is learnt in the first half by a detector that does so is kept, as from one session to the next
-                stream = stream.only((*learn, *judge))
-                said = said_of(stream, profile(work.detector))
-                for table, judged in some.items():
-                    if judged:
-                        counts[table] = counts.get(table, Tally()) + tally(stream, said, judged, joints)
+        # what is learnt in the first half by a detector that does so is kept, as from one session to the next
+        stream = corrected(whole, learn).only((*learn, *judge))
+        said = said_of(stream, profile(work.detector))
+        for table in TABLES:
+            judged = tuple(number for number in judge if runs[number].touched is (table == "contacts"))
+            if judged:
+                counts[table] = counts.get(table, Tally()) + tally(stream, said, judged, [run.joints for run in runs])
     return [
         {"set": work.set_name, "table": table, "detector": work.detector, **counts[table].row()}
         for table in TABLES if table in counts
@@ -71,13 +60,10 @@ def play(work: Work) -> list[Row]:
 
 
 @lru_cache(maxsize=1)
-def _prepared(folder: Path, name: str) -> tuple[list[Run], dict[str, Stream]]:
+def _prepared(folder: Path, name: str) -> tuple[list[Run], Stream]:
     real = next(each for each in SETS if each.name == name)
     runs, model = parted(real.read(real.files(folder))), model_of(real, folder)
-    streams = {"stream": stream_of(real, runs, model)}
-    if not all(run.touched for run in runs):
-        streams["pushed"] = stream_of(real, pushed(runs, model), model)
-    return runs, streams
+    return runs, stream_of(real, runs, model)
 
 
 def parted(runs: list[Run]) -> list[Run]:

@@ -99,28 +99,3 @@ def corrected(stream: Stream, learnt: Sequence[int]) -> Stream:
     left = r.tau_ext + mass * stream.load
     told = np.stack([friction[:, j] @ (inverse[j] @ left[fitted, j]) for j in range(r.model.n)], axis=1)
     return replace(stream, recording=replace(r, tau_ext=left - told))
-
-
-_PUSH_N, _PUSH_S = 15.0, 0.1
-_EVERY_S, _TAIL_S = 1.5, 0.1
-"""Time from one push to the next, and after one until the observer has forgotten it [s]."""
-
-
-def pushed(runs: Sequence[Run], model: RobotModel) -> list[Run]:
-    """Lay pushes at the end-effector on the measured torques of free motion, along one axis after the other.
-
-    The arm does not give way to them: its motion stays as it was recorded.
-    """
-    made, count = [], 0
-    for run in runs:
-        torque, label = run.torque.copy(), run.label.copy()
-        for start in np.arange(run.time[0] + _EVERY_S, run.time[-1] - _PUSH_S - _TAIL_S, _EVERY_S):
-            first, last, after = np.searchsorted(run.time, [start, start + _PUSH_S, start + _PUSH_S + _TAIL_S])
-            if not run.label[first:after].any():
-                force = np.zeros(3)
-                force[count // 2 % 3], count = _PUSH_N * (-1.0) ** count, count + 1
-                for i in range(first, last):
-                    torque[i] -= model.ee_jacobian(model.kinematics(run.q[i]))[:3].T @ force
-                label[first:last], label[last:after] = 1, -1
-        made.append(Run(run.name, run.time, run.q, run.qd, torque, label, (model.n,)))
-    return made

@@ -9,10 +9,8 @@ from pretouch.atomic_write import write_json
 from pretouch.errors import ExperimentError
 from pretouch_lab.benchmarks.bench import Bench, Found, said
 from pretouch_lab.benchmarks.scenario_files import SeedRange
-from pretouch_lab.benchmarks.shield.filters import FILTERS
 from pretouch_lab.benchmarks.shield.results import guarantees, rows_of_cells, tables_of
-from pretouch_lab.benchmarks.shield.trial import SCENES, TouchCell, tried
-from pretouch_lab.documents import SHIELD
+from pretouch_lab.benchmarks.shield.trial import FILTERS, SCENES, TouchCell, tried
 from pretouch_lab.engine import Task, rows_of
 from pretouch_lab.rows import Row
 
@@ -30,7 +28,6 @@ class ShieldBench(Bench):
     """The shield benchmark."""
 
     name: ClassVar[str] = "shield"
-    document: ClassVar[str] = SHIELD
 
     def __post_init__(self) -> None:
         if self.world:
@@ -47,7 +44,7 @@ class ShieldBench(Bench):
             return None
         made: Row = {"about": self.about(), "rows": rows_of_cells(rows)}
         text = "\n\n".join([said(made["about"]), guarantees()])
-        return Found(made, tables_of(made["rows"]), "", [], text)
+        return Found(made, tables_of(made["rows"]), "", text)
 
     def _trials(self, name: str) -> list[Task]:
         tasks = []

@@ -9,20 +9,25 @@ from pretouch.control.braking import braking_cap
 from pretouch.control.joint_box import joint_limits
 from pretouch.desired import Desired
 from pretouch.params import BrakingParams
+from pretouch.profiles import Profile, profile
 from pretouch.sim.hand import Hand
 from pretouch.sim.plant import TOUCH_N, Plant
 from pretouch.types import FloatArray
-from pretouch_lab.benchmarks.avoidance.obstacle import Nearest, nearest
+from pretouch_lab.benchmarks.avoidance.obstacle import Nearest, nearest, truth_of
 from pretouch_lab.benchmarks.avoidance.scenario import scenarios
 from pretouch_lab.benchmarks.avoidance.setting import Setting, setting
-from pretouch_lab.benchmarks.avoidance.truth import truth_of
 from pretouch_lab.benchmarks.scenario_files import SeedRange, scenario, seed_of
 from pretouch_lab.benchmarks.shield.commanders import AtPerson, Commander, Situation, Tracking
-from pretouch_lab.benchmarks.shield.filters import FILTERS
 from pretouch_lab.benchmarks.shield.measures import asked_velocity, breaks_limits
 from pretouch_lab.rows import Row, rounded
 from pretouch_lab.trial import Record, play
 
+FILTERS: dict[str, Profile] = {
+    "pretouch": profile("pretouch"),
+    "paper": profile("paper"),
+    "none": profile("pretouch:approach=none:null_space=none"),
+}
+"""`none` sees what `pretouch` does, answers contacts as it does, and keeps the limits of the joints alone."""
 SCENES = ("walking", "srdo", "drdo", "inside")
 """Scenarios of `bench avoidance` in which somebody moves: a person walks up, an obstacle passes over a standing arm or
 into the way of a moving one, a hand is held in the way and taken away."""

@@ -10,7 +10,7 @@ from pretouch.text_table import TextTable, tabulated
 from pretouch.types import ControlStep
 from pretouch_lab.cell import Cell, Context, Grid
 from pretouch_lab.experiment import Experiment, Picture, Sources
-from pretouch_lab.rows import Row, rounded, spread
+from pretouch_lab.rows import Row, cells_of, rounded
 from pretouch_lab.tables import controller, median, plain, share
 from pretouch_lab.trial import Record, play
 
@@ -40,6 +40,7 @@ _REBOUND_S = 3.0
 """A later reaction up to this long after the release is the push's echo [s]."""
 _Y = 1
 _WIDTHS = ("upper_free_n", "upper_least_n", "lower_free_n", "lower_least_n")
+_TOTALS = ("contacts", "detected", "both_lowered", "both_lowered_at_touch", "false_detections", "held")
 _MEASURES = ("both_lowered_s", "detection_delay_s", "filtered_at_detection_n", "raw_at_detection_n")
 
 
@@ -133,26 +134,17 @@ def lowered_on_both_sides(step: ControlStep) -> bool:
 
 def summarise(rows: list[Row]) -> Row:
     """Cells: how far the band along y was narrowed before the push, and whether the push was detected."""
-    groups: dict[tuple[str, str], list[Row]] = {}
-    for row in rows:
-        groups.setdefault((row["profile"], row["restrictions"]), []).append(row)
-    return {"cells": [_cell(*key, group) for key, group in groups.items()]}
-
-
-def _cell(profile: str, restrictions: str, group: list[Row]) -> Row:
-    return {
-        "profile": profile,
-        "restrictions": restrictions,
-        "trials": len(group),
-        "contacts": sum(row["contact"] for row in group),
-        "detected": sum(row["detected"] for row in group),
-        "both_lowered": sum(row["both_lowered"] for row in group),
-        "both_lowered_at_touch": sum(bool(row["both_lowered_at_touch"]) for row in group),
-        "false_detections": sum(row["false_detections"] for row in group),
-        "held": sum(row["held"] for row in group),
-        **{f"{name}_y": spread([row[name][_Y] for row in group if row[name][_Y] is not None]) for name in _WIDTHS},
-        **{name: spread([row[name] for row in group if row[name] is not None]) for name in _MEASURES},
-    }
+    along_y = [
+        {
+            **row,
+            **{f"{name}_y": row[name][_Y] for name in _WIDTHS},
+            "contacts": row["contact"],
+            "both_lowered_at_touch": bool(row["both_lowered_at_touch"]),
+        }
+        for row in rows
+    ]
+    measures = (*(f"{name}_y" for name in _WIDTHS), *_MEASURES)
+    return {"cells": cells_of(along_y, ("profile", "restrictions"), measures, totals=_TOTALS)}
 
 
 def tables(part: Row) -> list[TextTable]:
