@@ -1,3 +1,4 @@
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -5,28 +6,34 @@ from tools.house import __main__ as house
 from tools.house.source import Function, Source, import_cycle
 
 TEXT = '''"""A module."""
-# a reason
-def wide(a, b, /, c, *, d):  # equation 1
+def wide(a, b, /, c, *, d):
     """Two lines."""
-    return a  # fmt: skip
+    found = a  # fmt: skip
+    return found
 
 
 class Kind:
     def of_object(self, a):
         async def within():
             pass
+
+
+class _Kind:
+    pass
 '''
 
 
-def test_functions_lines_and_comments_are_counted(tmp_path: Path) -> None:
+def test_lines_functions_and_names_are_counted(tmp_path: Path) -> None:
     (tmp_path / "p").mkdir()
     (tmp_path / "p" / "m.py").write_text(TEXT)
-    source = Source(tmp_path / "p")
-    assert source.files == {tmp_path / "p" / "m.py": 11}
+    source = Source((tmp_path / "p").rglob("*.py"), tmp_path)
+    assert source.files == {Path("p/m.py"): 15}
+    assert (source.lines, source.format_skips, source.participles, source.repeated_classes) == (15, 1, 1, ["Kind"])
     assert sorted(source.functions, key=lambda f: f.place) == [
-        Function("p/m.py:of_object", 3, 1), Function("p/m.py:wide", 3, 4), Function("p/m.py:within", 2, 0),
-    ]  # fmt: skip
-    assert source.comment_share == 2 / 8
+        Function("p/m.py:of_object", 3, 1),
+        Function("p/m.py:wide", 4, 4),
+        Function("p/m.py:within", 2, 0),
+    ]
 
 
 def test_a_circle_of_imports_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -42,15 +49,31 @@ def test_a_circle_of_imports_is_named(tmp_path: Path, monkeypatch: pytest.Monkey
     monkeypatch.syspath_prepend(tmp_path)
     assert import_cycle(["circled"]) == []
     (package / "c.py").write_text("import circled.a")
-    found = import_cycle(["circled"])
-    assert found[0] == found[-1]
-    assert set(found) == {"circled.a", "circled.b", "circled.c"}
+    cycle = import_cycle(["circled"])
+    assert cycle[0] == cycle[-1]
+    assert set(cycle) == {"circled.a", "circled.b", "circled.c"}
 
 
-def test_what_is_beyond_what_is_held_fails(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    kept = [house.Measure("lines", 10, 10, 5), house.Measure("comments", 5, 5, least=True)]
-    monkeypatch.setattr(house, "measures", lambda: kept)
+def test_a_measure_beyond_its_bound_fails(monkeypatch, capsys, tmp_path) -> None:
+    monkeypatch.setattr(house, "BOUNDS", tmp_path / "bounds.toml")
+    house.BOUNDS.write_text("lines = 10\nfiles = 4\n")
+    monkeypatch.setattr(house, "measures", lambda: [house.Measure("lines", 10, 5), house.Measure("files", 3, 5)])
     assert house.main() == 0
-    kept += [house.Measure("words", 11, 10), house.Measure("reasons", 4, 5, least=True)]
+    monkeypatch.setattr(house, "measures", lambda: [house.Measure("lines", 11, 5), house.Measure("words", 0, 5)])
     assert house.main() == 1
-    assert "Beyond what is held: words, reasons." in capsys.readouterr().out
+    assert "Beyond the bound: lines, words." in capsys.readouterr().out
+
+
+def _git(*words: str) -> str:
+    done = subprocess.run(("git", *words), cwd=house.ROOT, capture_output=True, text=True, check=False)  # noqa: S607
+    return done.stdout if done.returncode == 0 else ""
+
+
+def test_no_bound_is_higher_than_in_the_commits_before() -> None:
+    file = str(house.BOUNDS.relative_to(house.ROOT))
+    now = house.bounds(house.BOUNDS.read_text())
+    for commit in _git("log", "-n", "2", "--format=%H", "--", file).split():  # none without history
+        before = house.bounds(_git("show", f"{commit}:{file}"))
+        raised = {name for name in now.keys() & before.keys() if now[name] > before[name]}
+        assert not raised, f"{', '.join(sorted(raised))}: above the bound of {commit[:8]}"
+        assert before.keys() <= now.keys(), f"a bound of {commit[:8]} is gone"

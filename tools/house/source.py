@@ -1,9 +1,8 @@
-"""What the Python files of a folder are like: size, functions, comments, imports."""
+"""What the Python files of a folder are like: size, functions, names, imports."""
 
 import ast
-import re
-import tokenize
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from graphlib import CycleError, TopologicalSorter
@@ -11,7 +10,10 @@ from pathlib import Path
 
 import grimp
 
-_Function = ast.FunctionDef | ast.AsyncFunctionDef
+PARTICIPLES = frozenset({
+    "found", "said", "told", "made", "kept", "given", "asked", "wanted", "known", "shown", "taken", "held",
+})  # fmt: skip
+"""Names of variables that say what was done to a value and not what it is."""
 
 
 @dataclass(frozen=True)
@@ -23,64 +25,60 @@ class Function:
     parameters: int
 
 
-@dataclass(frozen=True)
 class Source:
-    """The Python files below a folder."""
+    """Python files, and what is counted in them. Lines are raw: comments, docstrings and blank lines count."""
 
-    folder: Path
+    def __init__(self, files: Iterable[Path], root: Path) -> None:
+        """Take the files; `root` is the folder that places are named from."""
+        self._root = root
+        self._text = {path.relative_to(root): path.read_text(encoding="utf-8") for path in sorted(files)}
 
     @cached_property
+    def _trees(self) -> dict[Path, ast.Module]:
+        return {path: ast.parse(text) for path, text in self._text.items()}
+
+    @cached_property
+    def _nodes(self) -> list[ast.AST]:
+        return [node for tree in self._trees.values() for node in ast.walk(tree)]
+
+    @property
     def files(self) -> dict[Path, int]:
         """Number of lines by file."""
-        return {path: len(path.read_bytes().splitlines()) for path in sorted(self.folder.rglob("*.py"))}
+        return {path: len(text.splitlines()) for path, text in self._text.items()}
+
+    @property
+    def lines(self) -> int:
+        """Number of lines of all files."""
+        return sum(self.files.values())
+
+    @property
+    def format_skips(self) -> int:
+        """Number of places that are kept from the formatter."""
+        return sum(text.count("# fmt: skip") for text in self._text.values())
+
+    @property
+    def repeated_classes(self) -> list[str]:
+        """Names that several classes have; a leading underscore is no difference."""
+        counts = Counter(node.name.lstrip("_") for node in self._nodes if isinstance(node, ast.ClassDef))
+        return sorted(name for name, count in counts.items() if count > 1)
+
+    @property
+    def participles(self) -> int:
+        """Number of assignments to variables named by a participle."""
+        stores = (node for node in self._nodes if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store))
+        return sum(node.id in PARTICIPLES for node in stores)
 
     @cached_property
     def functions(self) -> list[Function]:
         """All functions, nested ones too."""
-        return [found for path in self.files for found in _functions(path, self.folder)]
-
-    @cached_property
-    def _tokens(self) -> list[list[tokenize.TokenInfo]]:
-        found = []
-        for path in self.files:
-            with tokenize.open(path) as file:
-                found.append(list(tokenize.generate_tokens(file.readline)))
-        return found
-
-    @cached_property
-    def _comments(self) -> list[tokenize.TokenInfo]:
-        tokens = (token for file in self._tokens for token in file)
-        return [token for token in tokens if token.type == tokenize.COMMENT and not _TO_TOOLS.match(token.string)]
-
-    @property
-    def lines(self) -> int:
-        """Lines but those that hold a comment alone: a reason costs nothing."""
-        return sum(self.files.values()) - sum(token.line.lstrip().startswith("#") for token in self._comments)
-
-    @property
-    def comment_share(self) -> float:
-        """Lines that hold a comment, as a share of those that hold code or a docstring."""
-        code = sum(
-            len({line for token in tokens if token.type not in _BLANK for line in _lines(token)})
-            for tokens in self._tokens
-        )
-        return len(self._comments) / max(code, 1)
+        return [function for path, tree in self._trees.items() for function in _functions(path, tree)]
 
 
-_TO_TOOLS = re.compile(r"#\s*(fmt|noqa|type)\b")
-"""Comments that speak to a tool and not to a reader."""
-_BLANK = {tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER}
-
-
-def _lines(token: tokenize.TokenInfo) -> range:
-    return range(token.start[0], token.end[0] + 1)
-
-
-def _functions(path: Path, folder: Path) -> Iterator[Function]:
-    for node in ast.walk(ast.parse(path.read_bytes())):
-        if isinstance(node, _Function):
-            place = f"{path.relative_to(folder.parent)}:{node.name}"
-            yield Function(place, (node.end_lineno or node.lineno) - node.lineno + 1, _parameters(node.args))
+def _functions(path: Path, tree: ast.Module) -> Iterator[Function]:
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            lines = (node.end_lineno or node.lineno) - node.lineno + 1
+            yield Function(f"{path}:{node.name}", lines, _parameters(node.args))
 
 
 def _parameters(arguments: ast.arguments) -> int:
@@ -92,9 +90,9 @@ def _parameters(arguments: ast.arguments) -> int:
 def import_cycle(packages: list[str]) -> list[str]:
     """Return modules that import each other in a circle, the first again at the end; none where there is no circle."""
     graph = grimp.build_graph(*packages, exclude_type_checking_imports=True)
-    imported = {module: graph.find_modules_directly_imported_by(module) for module in graph.modules}
+    imports = {module: graph.find_modules_directly_imported_by(module) for module in graph.modules}
     try:
-        TopologicalSorter(imported).prepare()
+        TopologicalSorter(imports).prepare()
     except CycleError as error:
         return list(error.args[1])
     return []
