@@ -1,1 +1,1 @@
-"""Sweeps: any parameters of any experiment: a grid, a Latin hypercube, Sobol indices (docs/how-to/sweep.md)."""
+"""Sweeps: any parameters of an experiment, over a grid or for Sobol indices (docs/how-to/sweep.md)."""
