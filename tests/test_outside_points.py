@@ -12,9 +12,7 @@ from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import PROFILES
 from pretouch.realtime import warm_up
 from pretouch.recording.codec import decode_points, encode_points
-from pretouch.recording.messages import decoded, encoded
 from pretouch.recording.reader import open_recording
-from pretouch.recording.state_codec import STATE, decode_state, encode_state
 from pretouch.recording.verify import verify
 from pretouch.recording.writer import Recording
 from pretouch.sensing.skin import Skin
@@ -165,14 +163,6 @@ def test_inputs_with_points_that_fit_no_message_are_said_to_be_unreadable(panda_
     assert recorded[9].inputs is None
     assert "points are no rows" in recorded.unreadable(9)
     assert verify(recorded).agrees
-
-
-def test_a_state_recorded_before_there_were_outside_points_and_loads_still_opens(panda_model, paper_skin):
-    state = controller_of(panda_model, paper_skin).init(Run(controller_of(panda_model, paper_skin)).inputs().robot)
-    message = decoded(STATE, encode_state(3, state, True))
-    assert message.name[-2:] == ["outside", "load"]
-    message.name, message.kind, message.shape = message.name[:-2], message.kind[:-2], message.shape[:-2]
-    assert same(decode_state(encoded(STATE, message))[1], state)
 
 
 def test_another_number_of_places_begins_anew(panda_model, paper_skin):

@@ -40,8 +40,10 @@ def test_units_that_are_well_are_found_well_and_one_that_falls_silent_is_named(c
     end = time.monotonic() + 1.0
     while (now := clock.tick()) < end:
         check.take(now)
-    (finding,) = [finding for finding in check.findings() if finding.refused]
-    assert finding.sentence.startswith("hand_front has sent nothing for")
+    refused = [
+        finding for finding in check.findings() if finding.refused and finding.what != "machine"
+    ]
+    assert [finding.sentence.startswith("hand_front has sent nothing for") for finding in refused] == [True]
 
 
 def test_a_machine_too_slow_to_simulate_is_named_in_place_of_units(checked, panda_model, paper_skin, monkeypatch):
@@ -50,8 +52,13 @@ def test_a_machine_too_slow_to_simulate_is_named_in_place_of_units(checked, pand
     monkeypatch.setattr("pretouch.session.units.HealthParams", lambda: limits)
     left_out = itertools.count(0.0, 0.2)
     check = UnitCheck(units, panda_model, paper_skin, fixtures(SceneSpec()), arm, lambda: next(left_out))
-    check.wait(MonotonicClock(0.01), 20.0, 0.6)
-    assert [finding.what for finding in check.findings() if finding.refused] == ["machine"]
+    clock = MonotonicClock(0.01)
+    check.wait(clock, 20.0, 0.6)
+    end = time.monotonic() + 20.0
+    while not (refused := [finding.what for finding in check.findings() if finding.refused]):
+        assert time.monotonic() < end
+        check.take(clock.tick())
+    assert refused == ["machine"]
 
 
 def test_units_that_are_not_heard_are_named(checked):
