@@ -40,9 +40,7 @@ def test_units_that_are_well_are_found_well_and_one_that_falls_silent_is_named(c
     end = time.monotonic() + 1.0
     while (now := clock.tick()) < end:
         check.take(now)
-    refused = [
-        finding for finding in check.findings() if finding.refused and finding.what != "machine"
-    ]
+    refused = [finding for finding in check.findings() if finding.refused and finding.what != "machine"]
     assert [finding.sentence.startswith("hand_front has sent nothing for") for finding in refused] == [True]
 
 
