@@ -7,15 +7,7 @@ import pytest
 
 from pretouch.desired import Desired, DesiredKind, sound_desired, twist
 from pretouch.errors import ParameterError
-from pretouch.faults import (
-    Watch,
-    examine,
-    sound_points,
-    sound_readings,
-    sound_robot,
-    sound_touch,
-    watch_init,
-)
+from pretouch.faults import Watch, examine, sound_points, sound_readings, sound_robot, sound_touch, watch_init
 from pretouch.modes import Event
 from pretouch.moving_fixtures import MovingFixtures
 from pretouch.params import FailureParams
