@@ -3,6 +3,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from pretouch.modes import Event
 from pretouch.sim.plant import Touch
 from pretouch.types import Mode, QpOutcome
 from pretouch_lab.benchmarks.avoidance import measures
@@ -108,14 +109,14 @@ def test_jerk_by_numbers():
     assert measures.smoothness(record(steps[:2]), 0.01)["jerk_max_rad_s3"] == 0.0
 
 
-def test_holds_after_the_start_are_counted_with_their_reasons():
+def test_holds_after_the_start_are_counted_with_their_events():
     modes = [Mode.HOLD] * 10 + [Mode.TRACK] * 5 + [Mode.HOLD] * 20 + [Mode.TRACK] * 5 + [Mode.HOLD] * 3
-    steps = [step(i, mode=m, reason=f"Silent for {0.1 * i:.2f} s.") for i, m in enumerate(modes)]
+    steps = [step(i, mode=m, event=Event.SKIN_SILENT) for i, m in enumerate(modes)]
     steps[12].qp = SimpleNamespace(outcome=QpOutcome.FAILED)
     row = measures.holds(record(steps))
     assert row["holds"] == 2
     assert row["held_s"] == pytest.approx(0.23)
-    assert row["hold_reasons"] == {"Silent for # s.": 2}
+    assert row["hold_events"] == {"skin_silent": 2}
     assert (row["solver_failures"], row["infeasible"]) == (1, 0)
 
 

@@ -29,7 +29,7 @@ def row(baseline, seed, scenario="drdo", family="drdo", **measures):
     usual = {
         "contact": False, "least_distance_m": 0.1, "speed_m_s": 0.3, "way_m": 3.0, "livelock_s": 0.0, "timed": False,
         "manipulability_ee_least": 0.1, "manipulability_point": 0.05, "mobility_point_m": 0.4,
-        "hold_reasons": {}, "duration_s": 14.0,
+        "hold_events": {}, "duration_s": 14.0,
         "course": {"time_s": [0.0, 1.0], "distance_m": [0.4, 0.1], "force_n": [0.0, 0.0], "way_m": [0.0, 0.3]},
     }  # fmt: skip
     names = {"contender": baseline, "scenario": scenario, "family": family, "seed": seed}
@@ -49,9 +49,9 @@ def test_spread_of_nothing_and_of_what_never_ended():
 
 
 def test_reasons_of_holds_are_added_up():
-    rows = [row("ding", s, hold_reasons={"Braking.": 2}, holds=2) for s in (0, 1)]
+    rows = [row("ding", s, hold_events={"latched": 2}, holds=2) for s in (0, 1)]
     cell = summarise(rows)["cells"][0]
-    assert (cell["holds"], cell["hold_reasons"]) == (4, {"Braking.": 4})
+    assert (cell["holds"], cell["hold_events"]) == (4, {"latched": 4})
 
 
 def test_rows_have_the_keys_all_benchmarks_share():

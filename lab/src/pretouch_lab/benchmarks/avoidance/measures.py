@@ -1,6 +1,5 @@
 """What one trial comes to: numbers from what truly happened, and from what was commanded."""
 
-import re
 from collections import Counter
 from itertools import pairwise
 
@@ -151,7 +150,7 @@ def dexterity(record: Record, truth: Truth, model: RobotModel) -> Row:
 
 
 def holds(record: Record) -> Row:
-    """Holds after the start, with their reasons, and steps without a solution."""
+    """Holds after the start, with their events, and steps without a solution."""
     steps = record.steps[started(record.steps) :]
     held = [s for s in steps if s.mode is Mode.HOLD]
     begun = [b for a, b in pairwise(steps) if b.mode is Mode.HOLD and a.mode is not Mode.HOLD]
@@ -159,7 +158,7 @@ def holds(record: Record) -> Row:
     return {
         "holds": len(begun),
         "held_s": rounded(len(held) * period),
-        "hold_reasons": dict(Counter(re.sub(r"[\d.]*\d", "#", s.reason) for s in begun)),
+        "hold_events": dict(Counter(s.event.value for s in begun)),
         "solver_failures": sum(s.qp.outcome is QpOutcome.FAILED for s in steps),
         "infeasible": sum(s.qp.outcome is QpOutcome.INFEASIBLE for s in steps),
     }

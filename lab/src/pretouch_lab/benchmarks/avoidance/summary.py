@@ -51,9 +51,9 @@ def _ablated(rows: list[Row]) -> list[Row]:
 
 def _cell(key: Row, group: list[Row]) -> Row:
     """Summarise the trials of one baseline in one scenario."""
-    reasons: Counter[str] = Counter()
+    events: Counter[str] = Counter()
     for row in group:
-        reasons.update(row["hold_reasons"])
+        events.update(row["hold_events"])
     return {
         **key,
         "trials": len(group),
@@ -63,7 +63,7 @@ def _cell(key: Row, group: list[Row]) -> Row:
         if group[0]["timed"]
         else None,
         **{name: sum(row[name] or 0 for row in group) for name in TOTALS},
-        "hold_reasons": dict(reasons),
+        "hold_events": dict(events),
     }
 
 
