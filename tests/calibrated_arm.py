@@ -11,13 +11,13 @@ from pretouch.recording.skin_recording import SkinRecording
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.serving.fleet import FleetParams
-from pretouch.serving.wire_skin import WireSkin
 from pretouch.sim.imu import ImuParams
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.range_finder import RangeFinderParams
 from pretouch.sim.scene import SceneSpec
 from pretouch.traces import JointTrace
+from tests.wire_skin import WireSkin
 
 
 def swinging(model: RobotModel, duration: float = 17.0) -> Plan:

@@ -12,12 +12,12 @@ from pretouch.recording.calibration_data import read_measured
 from pretouch.recording.skin_recording import SkinRecording
 from pretouch.serving.fleet import FleetParams
 from pretouch.serving.network import ChannelParams, NetworkParams
-from pretouch.serving.wire_skin import WireSkin
 from pretouch.sim.imu import ImuParams, Imus
 from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.range_finder import RangeFinderParams
 from pretouch.sim.scene import SceneSpec
+from tests.wire_skin import WireSkin
 
 EVEN = ChannelParams(delay_s=0.0012, jitter_s=0.0012, jitter_shape=2.0)
 """As fast one way as the other: what remains of the clocks' offset is not the network's, which nobody could know."""

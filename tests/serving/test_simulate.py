@@ -9,11 +9,10 @@ import pytest
 from pretouch.errors import HardwareError, ParameterError
 from pretouch.hardware.receiver import SkinReceiver
 from pretouch.serving import simulate
-from pretouch.serving.fleet import FleetParams
+from pretouch.serving.fleet import FleetParams, simulated_keys
 from pretouch.serving.network import network
 from pretouch.serving.simulate import SimulateOptions, VisitingHand, run
 from pretouch.serving.unit import UnitParams
-from pretouch.serving.wire_skin import made_keys
 from pretouch.sim.imu import ImuParams
 from pretouch.types import Mode, RangeStatus
 
@@ -21,7 +20,7 @@ from pretouch.types import Mode, RangeStatus
 @pytest.fixture
 def options(panda_model, paper_skin):
     def made(address: tuple[str, int], **changes) -> SimulateOptions:
-        keys = made_keys(paper_skin.ids, 0)
+        keys = simulated_keys(paper_skin.ids, 0)
         return replace(SimulateOptions(panda_model, paper_skin, keys, *address), **changes)
 
     return made
@@ -29,7 +28,7 @@ def options(panda_model, paper_skin):
 
 @pytest.fixture
 def receiver(paper_skin):
-    with SkinReceiver(paper_skin.ids, made_keys(paper_skin.ids, 0)) as made:
+    with SkinReceiver(paper_skin.ids, simulated_keys(paper_skin.ids, 0)) as made:
         yield made
 
 

@@ -5,15 +5,15 @@ import time
 import pytest
 
 from pretouch.errors import HardwareError
+from pretouch.serving.fleet import simulated_keys
 from pretouch.serving.simulate import run
 from pretouch.serving.simulated_arm import SimulatedArm, SimulateOptions
-from pretouch.serving.wire_skin import made_keys
 
 
 @pytest.fixture
 def options(panda_model, paper_skin):
     def made(address: tuple[str, int]) -> SimulateOptions:
-        return SimulateOptions(panda_model, paper_skin, made_keys(paper_skin.ids, 0), *address)
+        return SimulateOptions(panda_model, paper_skin, simulated_keys(paper_skin.ids, 0), *address)
 
     return made
 

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.wire_skin import WireSkin
 
 from pretouch.control.path import Circle
 from pretouch.control.posture import brought_to
@@ -20,7 +21,6 @@ from pretouch.hardware.wire import (
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import TouchPatch
 from pretouch.serving.fleet import FleetParams
-from pretouch.serving.wire_skin import WireSkin
 from pretouch.sim.plant import Plant, PointForce
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.range_finder import RangeFinderParams

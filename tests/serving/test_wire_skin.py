@@ -3,6 +3,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from tests.wire_skin import WireSkin
 
 from pretouch.control.path import Circle
 from pretouch.control.posture import brought_to
@@ -10,10 +11,9 @@ from pretouch.controller import Controller
 from pretouch.errors import HardwareError
 from pretouch.loop import turn
 from pretouch.profiles import Profile
-from pretouch.serving.fleet import Fleet, FleetParams
+from pretouch.serving.fleet import Fleet, FleetParams, simulated_keys
 from pretouch.serving.network import NetworkParams, network
 from pretouch.serving.unit import UnitParams
-from pretouch.serving.wire_skin import WireSkin, made_keys
 from pretouch.sim.imu import ImuParams
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.plant_params import PlantParams
@@ -133,7 +133,7 @@ def test_a_unit_whose_finder_stops_ages_though_it_goes_on_sending(plant, paper_s
 
 
 def test_a_unit_without_a_key_and_a_receiver_that_cannot_be_found_are_refused(paper_skin):
-    keys = made_keys(paper_skin.ids, 0)
+    keys = simulated_keys(paper_skin.ids, 0)
     with pytest.raises(HardwareError, match=r"No key for unit elbow"):
         Fleet(["elbow"], keys, FleetParams(), 0, ("127.0.0.1", 9))
     with pytest.raises(HardwareError, match=r"The receiver no.such.host.invalid:9 cannot be found"):

@@ -5,6 +5,7 @@ from struct import pack
 
 import numpy as np
 import pytest
+from tests.wire_skin import WireSkin
 
 from pretouch.control.path import Circle
 from pretouch.control.posture import brought_to
@@ -26,7 +27,6 @@ from pretouch.sensing.sensor import VL53L5CX
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import TouchPatch
 from pretouch.serving.fleet import FleetParams
-from pretouch.serving.wire_skin import WireSkin
 from pretouch.sim.imu import ImuParams, Imus
 from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams

@@ -10,9 +10,9 @@ from pretouch.hardware.health import HealthParams
 from pretouch.hardware.network_skin import NetworkSkin
 from pretouch.loop import MonotonicClock
 from pretouch.robot.model import RobotModel
+from pretouch.serving.fleet import simulated_keys
 from pretouch.serving.simulated_arm import SimulateOptions
 from pretouch.serving.threaded_arm import ThreadedArm
-from pretouch.serving.wire_skin import made_keys
 from pretouch.session.session import NoUnits
 from pretouch.session.units import UnitCheck
 from pretouch.sim.scene import SceneSpec, fixtures
@@ -21,7 +21,7 @@ from pretouch.sim.scene import SceneSpec, fixtures
 @pytest.fixture
 def checked(panda_model, paper_skin):
     """A simulated arm with units, and the check of them."""
-    keys = made_keys(paper_skin.ids, 0)
+    keys = simulated_keys(paper_skin.ids, 0)
     model, scene = RobotModel(panda_model.description), SceneSpec()
     with NetworkSkin(paper_skin.ids, keys) as units:
         options = SimulateOptions(model, paper_skin, keys, *units.address, hand=False)

@@ -30,15 +30,15 @@ class Simulated(ArmOptions):
         from pretouch.hardware.network_skin import NetworkSkin
         from pretouch.robot.model import RobotModel
         from pretouch.sensing.skin import Skin
+        from pretouch.serving.fleet import simulated_keys
         from pretouch.serving.simulated_arm import SimulateOptions
         from pretouch.serving.threaded_arm import ThreadedArm
-        from pretouch.serving.wire_skin import made_keys
         from pretouch.signals import children_undisturbed
         from pretouch.sim.scene import SceneSpec
 
         model = RobotModel(setup.model.description)
         skin = setup.skin if setup.units else Skin((), setup.model)
-        keys = made_keys(skin.network.ids, self.seed)
+        keys = simulated_keys(skin.network.ids, self.seed)
         with children_undisturbed():
             receiver = NetworkSkin(skin.network, keys, HOST, 0) if len(skin) else nullcontext()
         with receiver as units:

@@ -9,7 +9,8 @@ import numpy as np
 
 from pretouch.checks import Checked, NonNegative
 from pretouch.errors import HardwareError
-from pretouch.hardware.keys import Keys
+from pretouch.hardware.keys import Keys, UnitKey
+from pretouch.hardware.wire import KEY_SIZE
 from pretouch.sensing.network import NetworkUnits
 from pretouch.serving.network import Channel, NetworkParams
 from pretouch.serving.unit import SimulatedUnit, UnitParams
@@ -119,6 +120,12 @@ class Fleet:
         """Give the sockets back."""
         for one in self._sockets:
             one.close()
+
+
+def simulated_keys(ids: tuple[str, ...], seed: int) -> Keys:
+    """Keys that are the same with the same seed: for simulated units alone."""
+    rng = np.random.default_rng([seed, 7])
+    return Keys(UnitKey(name, number, rng.bytes(KEY_SIZE)) for number, name in enumerate(ids, 1))
 
 
 def _reboots(every: float, rng: np.random.Generator) -> "count[float] | tuple[()]":

@@ -5,12 +5,10 @@ from typing import Self
 import numpy as np
 
 from pretouch.errors import HardwareError
-from pretouch.hardware.keys import Keys, UnitKey
 from pretouch.hardware.link import LinkParams
 from pretouch.hardware.receiver import SkinReceiver
-from pretouch.hardware.wire import KEY_SIZE
 from pretouch.sensing.skin import Skin
-from pretouch.serving.fleet import Fleet, FleetParams
+from pretouch.serving.fleet import Fleet, FleetParams, simulated_keys
 from pretouch.sim.imu import Imus
 from pretouch.sim.plant import Plant
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
@@ -38,7 +36,7 @@ class WireSkin:
         the arm.
         """
         self._plant = plant
-        keys, rng = made_keys(skin.network.ids, seed), np.random.default_rng([seed, 8])
+        keys, rng = simulated_keys(skin.network.ids, seed), np.random.default_rng([seed, 8])
         self.receiver = SkinReceiver(skin.network, keys, clock=lambda: plant.time, draw=rng.bytes, params=link)
         """What came of it all: traffic of each unit, what was rejected, samples."""
         try:
@@ -90,9 +88,3 @@ class WireSkin:
         """Datagrams that reached the receiver, whatever it made of them."""
         receiver = self.receiver
         return sum(unit.accepted + unit.hellos for unit in receiver.units) + sum(receiver.rejected.values())
-
-
-def made_keys(ids: tuple[str, ...], seed: int) -> Keys:
-    """Keys that are the same with the same seed: for simulated units alone."""
-    rng = np.random.default_rng([seed, 7])
-    return Keys(UnitKey(name, number, rng.bytes(KEY_SIZE)) for number, name in enumerate(ids, 1))
