@@ -6,6 +6,7 @@ import pytest
 
 from pretouch.cli import main
 from pretouch.sensing.skin import PAPER_SKIN, load_skin
+from tests.importing.made import six_axis, written
 
 
 def test_numbers_figure_and_a_skin_with_more_units(tmp_path, capsys, panda_model):
@@ -45,14 +46,19 @@ def test_a_unit_with_zones_is_suggested_and_shown_whole(tmp_path, capsys, panda_
     assert (len(made), len(made.mounted), made.mounted[-1].sensor.zones) == (23, 8, 4)
 
 
-def test_an_imported_arm_has_its_own_skin(tmp_path, capsys):
-    from tests.importing.made import six_axis, written
-
+def test_an_imported_arm_gets_its_first_units(tmp_path, capsys):
+    arm = tmp_path / "mine"
     told = ["robot", "import", str(written(tmp_path, six_axis())), "--capsules", "1", "--ready", "0,0.3,1.2,0,1.6,0"]
-    assert main([*told, "--out", str(tmp_path / "mine")]) == 0
-    capsys.readouterr()
-    assert main(["skin", "coverage", "--arm", str(tmp_path / "mine"), "--workspace", "joints", "--postures", "3"]) == 0
-    assert "Seen in time: sixer, 3 postures of joints" in capsys.readouterr().out
+    assert main([*told, "--out", str(arm)]) == 0
+    skin = f"--suggest 8 --out {arm / 'skin.toml'}"
+    assert f"pretouch skin coverage --arm {arm} {skin}" in capsys.readouterr().out
+    told = ["skin", "coverage", "--arm", str(arm), "--workspace", "joints", "--postures", "3"]
+    assert main(told) == 2
+    assert skin in capsys.readouterr().err
+    assert main([*told, *skin.split()]) == 0
+    assert "8 more units:" in capsys.readouterr().out
+    assert main(["robot", "check", str(arm)]) == 0
+    assert "suggested_8" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,14 @@
-"""Small robots to import: texts of URDF files."""
+"""Small robots to import: texts of URDF files; and units for what came of them."""
 
 from pathlib import Path
+
+from pretouch.coverage.measuring import Setting
+from pretouch.coverage.params import CoverageParams
+from pretouch.coverage.suggest import suggest
+from pretouch.perception.scene_filter import floor_and_pedestal
+from pretouch.robot.description_file import load_description
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import OWN_SKIN, Skin, save_skin
 
 BOX = '<geometry><box size="0.08 0.08 0.2"/></geometry>'
 
@@ -67,3 +75,11 @@ def written(folder: Path, text: str, name: str = "arm.urdf") -> Path:
     file = folder / name
     file.write_text(text)
     return file
+
+
+def equipped(folder: Path, units: int = 8) -> Path:
+    """Put a skin of suggested units into the folder of an imported arm."""
+    model = RobotModel(load_description(folder))
+    ways = Setting(model, floor_and_pedestal(-0.2), CoverageParams(), "joints", 4, points=400).ways()
+    save_skin(Skin(suggest((ways,), Skin([], model), units).units, model), folder / OWN_SKIN)
+    return folder

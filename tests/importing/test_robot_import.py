@@ -20,7 +20,7 @@ from pretouch.profiles import profile
 from pretouch.robot.description_file import load_description
 from pretouch.robot.model import RobotModel
 from pretouch.robot.self_distance import capsule_ends, kinematics_of, self_distances
-from pretouch.sensing.skin import load_skin
+from pretouch.sensing.skin import Skin
 from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import plant_params_of
 from pretouch.sim.scene import SceneSpec, fixtures
@@ -111,30 +111,12 @@ def test_the_ready_posture_is_a_good_one(model, imported):
     )
 
 
-def test_the_units_sit_on_the_surface_and_look_away(model, folder, imported):
-    skin = load_skin(folder / "skin.toml", model)
-    assert len(skin) >= 6
-    arm_links, above = imported.arm.source.links, []
-    for link_index, T in zip(skin.link, skin.T_link_sensor, strict=True):
-        own = model.capsules.of_links(np.array([link_index]))
-        axis = np.clip(((T[:3, 3] - own.a) * (own.b - own.a)).sum(axis=1) / ((own.b - own.a) ** 2).sum(axis=1), 0, 1)
-        away = T[:3, 3] - own.a - axis[:, None] * (own.b - own.a)
-        height = np.linalg.norm(away, axis=1) - own.radius
-        assert height.min() > 0.008 - 1e-4
-        surface = next(body.surface for body in imported.bodies if arm_links[body.link].name == model.links[link_index])
-        assert surface.outside(T[None, :3, 3]).all()
-        above.append((height.min(), float(surface(T[None, :3, 3])[0])))
-        assert away[height.argmin()] @ T[:3, 2] > 0
-    # as high as a board in its case, over whichever of the two is higher there
-    assert np.min(above, axis=1) == pytest.approx(np.full(len(skin), 0.008), abs=1e-3)
-
-
 def test_the_controller_and_the_simulated_arm_take_it(model, folder):
     description = model.description
     plant = Plant(model, SceneSpec(), plant_params_of(description), description.q_ready, 0)
     at = model.kinematics(description.q_ready).position[model.ee]
     path = line(tuple(at), (at[0], at[1] + 0.1, at[2]))
-    skin = load_skin(folder / "skin.toml", model)
+    skin = Skin([], model)
     controller = Controller(model, skin, fixtures(SceneSpec()), path, profile("blind"))
     plant.advance(0.1)
     assert controller.init(plant.read()) is not None
@@ -148,7 +130,7 @@ def test_a_folder_that_is_there_is_refused(imported, tmp_path):
     assert list(out.iterdir()) == []
     out.rmdir()
     write_folder(imported, out)
-    assert sorted(p.name for p in out.iterdir()) == ["arm.xml", "robot.toml", "skin.toml"]
+    assert sorted(p.name for p in out.iterdir()) == ["arm.xml", "robot.toml"]
 
 
 def test_an_import_that_is_cut_short_leaves_nothing(imported, tmp_path, monkeypatch):

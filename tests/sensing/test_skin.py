@@ -309,7 +309,7 @@ def test_the_fr3_has_the_same_seven_units(paper_skin):
 
 def test_another_arm_has_no_skin_yet():
     other = RobotModel(replace(panda(), name="other"))
-    with pytest.raises(SkinError, match="The arm other comes without a skin: write a file like panda"):
+    with pytest.raises(SkinError, match=r"The arm other comes without a skin: write skin.toml beside .*suggest 8"):
         sensing_skin.paper_skin(other)
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from tests.importing.made import six_axis, written
+from tests.importing.made import equipped, six_axis, written
 from tests.other_arm import copied_panda
 
 from pretouch.control.path import Circle
@@ -63,7 +63,7 @@ def test_the_opening_hand_comes_where_units_look(panda_model):
 def test_an_imported_arm_follows_its_path_and_answers_the_hand(tmp_path):
     found = import_robot(written(tmp_path, six_axis()), ImportOptions(capsules=1))
     write_folder(found, tmp_path / "six")
-    model = RobotModel(robot_named(str(tmp_path / "six")))
+    model = RobotModel(robot_named(str(equipped(tmp_path / "six"))))
     settings = settings_for(model, LiveSettings(profile=profile("pretouch")))
     simulation = LiveSimulation(settings, model, skin_for(model))
     begin = simulation.frame.step.path_position

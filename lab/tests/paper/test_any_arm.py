@@ -45,7 +45,7 @@ def stranger(tmp_path_factory) -> RobotDescription:
 def folder(request, tmp_path_factory) -> str:
     place = tmp_path_factory.mktemp(request.param)
     write_folder(import_robot(made.written(place, ARMS[request.param]), ImportOptions()), place / "arm")
-    return str(place / "arm")
+    return str(made.equipped(place / "arm"))
 
 
 @pytest.fixture(scope="module")

@@ -17,7 +17,7 @@ class Import:
     """URDF file (not a xacro template) or MJCF file, or a name of the package robot_descriptions, if it is installed,
     such as ur5e_mj_description."""
     out: str = ""
-    """Folder to write robot.toml, arm.xml and skin.toml to; by default the arm's name."""
+    """Folder to write robot.toml and arm.xml to; by default the arm's name."""
     ee: str = ""
     """Link whose origin is the end-effector; by default the most likely one."""
     name: str = ""

@@ -18,6 +18,7 @@ from pretouch.importing.folder import check_free, write_folder
 from pretouch.importing.read import read_source
 from pretouch.importing.robot_import import Imported, ImportOptions, import_robot
 from pretouch.robot.named import is_description
+from pretouch.sensing.skin import OWN_SKIN
 from pretouch.text_table import TextTable
 
 if TYPE_CHECKING:
@@ -59,7 +60,10 @@ def _imported(command: "Import", file: Path, options: ImportOptions, folder: Pat
     show(console, [joint_table(found.model, found.ready, links), _capsules(found)])
     for sentence in [*found.remarks, *_said(found)]:
         console.print(f"- {sentence}", markup=False, soft_wrap=True)
-    console.print(f"\nWritten: {folder}. Try it: pretouch live --arm {folder}", markup=False, soft_wrap=True)
+    where = "" if found.model.n >= 6 else " --workspace joints"
+    units = f"pretouch skin coverage --arm {folder}{where} --suggest 8 --out {folder / OWN_SKIN}"
+    after = f"Next, sensor units: {units}\nThen try it: pretouch live --arm {folder}"
+    console.print(f"\nWritten: {folder}. {after}", markup=False, soft_wrap=True)
     return _numbers_of(found)
 
 
@@ -98,12 +102,10 @@ def _row(error: FitError) -> tuple[str, ...]:
 
 
 def _said(found: Imported) -> list[str]:
-    units = ", ".join(f"{unit.id} ({unit.link})" for unit in found.skin.units) or "none"
     return [
         *_sticking_out(found),
         f"{ready_said(found.ready)} Use --ready to set another one.",
         *([found.ready.conflict] if found.ready.conflict else []),
-        f"Proposed units: {units}. skin.toml holds their proposed poses; replace them by yours, or calibrate.",
     ]
 
 

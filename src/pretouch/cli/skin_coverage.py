@@ -52,7 +52,7 @@ def _measured(command: "Asked", model: RobotModel, skin: Skin) -> dict[str, Any]
     found, sees = coverage_of(ways, skin)
     both = found, coverage_of(met, skin)[0]
     spots = blind_spots(ways, found)
-    show(console, [link_table(both, setting), unit_table(skin, ways, sees)])
+    show(console, [link_table(both, setting), *([unit_table(skin, ways, sees)] if len(skin) else [])])
     for line in spot_lines(spots, _SPOTS):
         console.print(line, markup=False, soft_wrap=True)
     numbers = _numbers(command, setting, both, spots)
@@ -72,10 +72,15 @@ def _measured(command: "Asked", model: RobotModel, skin: Skin) -> dict[str, Any]
     return numbers
 
 
-def _arm_and_skin(command: "Asked") -> tuple[RobotModel, Skin, Path]:
-    """Return the arm, its skin, and the skin's file."""
+def _arm_and_skin(command: "Asked") -> tuple[RobotModel, Skin, Path | None]:
+    """Return the arm, its skin, and the skin's file; no units and no file where the first units are to be suggested."""
     model = RobotModel(robot_named(command.arm))
-    source = Path(command.skin or skin_file(model.description))
+    try:
+        source = Path(command.skin or skin_file(model.description))
+    except SkinError:
+        if not command.suggest:
+            raise
+        return model, Skin([], model), None
     return model, load_skin(source, model), source
 
 
@@ -87,7 +92,7 @@ def _params(command: "Asked") -> CoverageParams:
     )  # fmt: skip
 
 
-def _check_outputs(command: "Asked", source: Path) -> None:
+def _check_outputs(command: "Asked", source: Path | None) -> None:
     """Refuse, before anything is computed, what could not be done or would be lost."""
     if command.suggest < 0:
         raise SkinError(f"--suggest is {command.suggest}: give 1 or more, or leave it out.")
@@ -106,7 +111,7 @@ def _check_outputs(command: "Asked", source: Path) -> None:
     places = [("skin file", command.out), ("figure", command.figure), ("file", command.json)]
     given = [(what, Path(text)) for what, text in places if text and text != STANDARD_OUTPUT]
     for i, (what, place) in enumerate(given):
-        others = [other for _, other in given[:i]] + [source]
+        others = [other for _, other in given[:i]] + ([source] if source else [])
         if any(same_file(other, place) or same_file(place, other) for other in others):
             raise ExperimentError(f"The {what} {place} is also another input or output file: give another name.")
     for what, place in given:

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from dataclasses import replace
+from functools import lru_cache
 from itertools import product
 
 import numpy as np
@@ -40,13 +41,14 @@ _STEP_M, _STEPS = 0.005, 400
 """How far from the plane y = 0 these places are searched for, from far to near."""
 
 
+@lru_cache(maxsize=1)
 def placement_for(model: RobotModel) -> Placement:
     """Scale the paper's paths by the arm's reach, and shrink or move them as little as lets the arm follow them.
 
     All along, hand as in the ready posture, the arm keeps away from singularities, its limits, itself and the floor,
     and its joints hold its weight. A person's hand is then held beside the circle where the whole free arm passes it
     by as much as the Panda's hand does. Raises ExperimentError where no such place is found. The Panda and the FR3 have
-    the paper's own.
+    the paper's own. The last arm's is kept: the search takes seconds.
     """
     if is_shipped(model.description):
         return Placement()

@@ -104,7 +104,7 @@ def suggest(ways: Sequence[Ways], skin: Skin, count: int, places: tuple[SensorUn
 
 def _seen(ways: Sequence[Ways], skin: Skin) -> BoolArray:
     """Whether (B, W) each mounted unit sees the ball of each way of all sets and postures."""
-    return np.hstack([seen_by(some, skin).reshape(len(skin.first), -1) for some in ways])
+    return np.hstack([seen_by(some, skin).reshape(len(skin.first), some.weight.size) for some in ways])
 
 
 def greedy(sees: BoolArray, weight: FloatArray, count: int) -> tuple[list[int], list[float], float]:

@@ -1,4 +1,4 @@
-"""The folder an arm is kept in: robot.toml, arm.xml and skin.toml."""
+"""The folder an arm is kept in: robot.toml and arm.xml."""
 
 import shutil
 from dataclasses import replace
@@ -7,7 +7,6 @@ from pathlib import Path
 from pretouch.errors import RobotModelError
 from pretouch.importing.robot_import import MJCF, Imported
 from pretouch.robot.description_file import FILE, description_text
-from pretouch.sensing.skin import OWN_SKIN, save_skin
 
 
 def write_folder(found: Imported, folder: Path) -> None:
@@ -36,5 +35,3 @@ def _fill(found: Imported, folder: Path) -> None:
     (folder / MJCF).write_text(found.mjcf_text, encoding="utf-8")
     description = replace(found.description, mjcf=folder / MJCF)
     (folder / FILE).write_text(description_text(description), encoding="utf-8")
-    if len(found.skin):
-        save_skin(found.skin, folder / OWN_SKIN)

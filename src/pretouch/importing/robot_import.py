@@ -15,11 +15,9 @@ from pretouch.importing.limits import Limits, limits_of
 from pretouch.importing.read import read_source
 from pretouch.importing.ready import Ready, check_posture, proposed, rated
 from pretouch.importing.sampling import spread
-from pretouch.importing.units import proposed_skin
 from pretouch.importing.write_mjcf import mjcf_text
 from pretouch.robot.description import RobotDescription
 from pretouch.robot.model import RobotModel
-from pretouch.sensing.skin import Skin
 from pretouch.types import FloatArray
 
 MJCF = "arm.xml"
@@ -72,7 +70,6 @@ class Imported:
     error: FitError
     """Of the whole arm's distances, over many postures."""
     ready: Ready
-    skin: Skin
     remarks: tuple[str, ...]
     """What was assumed or left out, a sentence each."""
 
@@ -100,11 +97,9 @@ def import_robot(file: Path, options: ImportOptions) -> Imported:
         ready, about_ready = (rated(model, np.array(options.ready)), ()) if options.ready else proposed(model)
         described = replace(described, q_ready=ready.q)
         model = RobotModel(described)
-    surfaces = {arm.source.links[body.link].name: body.surface for body in bodies}
-    skin, about_skin = proposed_skin(model, surfaces)
-    remarks = (*arm.remarks, *limits.remarks, *about_bodies, *about_inertials, *about_ready, *about_skin)
+    remarks = (*arm.remarks, *limits.remarks, *about_bodies, *about_inertials, *about_ready)
     error = whole_arm_error(arm, bodies, *_checked_at(arm, model))
-    return Imported(described, text, model, arm, limits, bodies, error, ready, skin, remarks)
+    return Imported(described, text, model, arm, limits, bodies, error, ready, remarks)
 
 
 def check_same(arm: Arm, model: RobotModel) -> None:

@@ -184,8 +184,8 @@ def _seven_units(arm: RobotDescription) -> Path:
     path = PAPER_SKIN.with_name(f"{arm.name}_seven_units.toml")
     if not path.is_file():
         raise SkinError(
-            f"The arm {arm.name} comes without a skin: write a file like {PAPER_SKIN.name} for it, or"
-            f" put {OWN_SKIN} beside its model."
+            f"The arm {arm.name} comes without a skin: write {OWN_SKIN} beside its model, like {PAPER_SKIN.name}, or by"
+            f" `pretouch skin coverage --arm {arm.mjcf.parent} --suggest 8 --out {arm.mjcf.with_name(OWN_SKIN)}`."
         )
     return path
 
