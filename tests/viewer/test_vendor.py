@@ -1,5 +1,3 @@
-from pathlib import Path
-
 import numpy as np
 import pytest
 import trimesh
@@ -11,23 +9,24 @@ from pretouch.viewer import vendor
 from pretouch.viewer.vendor import coarse, vendor_surfaces
 
 
-def sphere(rings: int = 60) -> tuple[np.ndarray, np.ndarray]:
+def sphere(rings: int = 60) -> trimesh.Trimesh:
     """A sphere of radius 5 cm, each triangle with vertices of its own, as the vendor's files have them."""
     ball = trimesh.creation.uv_sphere(0.05, count=(rings, rings))
-    return ball.triangles.reshape(-1, 3), np.arange(3 * len(ball.faces)).reshape(-1, 3)
+    corners = np.arange(3 * len(ball.faces)).reshape(-1, 3)
+    return trimesh.Trimesh(ball.triangles.reshape(-1, 3), corners, process=False)
 
 
 def test_a_coarse_mesh_has_few_vertices_near_the_fine_one_and_looks_outwards() -> None:
-    vertices, faces = sphere()
-    mesh = coarse(vertices, faces, 0.006)
-    assert len(mesh.vertices) < len(vertices) / 10
+    fine = sphere()
+    mesh = coarse(fine, 0.006)
+    assert len(mesh.vertices) < len(fine.vertices) / 10
     assert np.abs(np.linalg.norm(mesh.vertices, axis=1) - 0.05).max() < 0.003
-    assert np.einsum("vi,vi->v", mesh.normals, mesh.vertices).min() > 0
+    assert np.einsum("vi,vi->v", mesh.vertex_normals, mesh.vertices).min() > 0
     assert set(np.unique(mesh.faces)) == set(range(len(mesh.vertices)))
 
 
 def test_a_coarse_mesh_has_no_empty_or_double_triangle() -> None:
-    mesh = coarse(*sphere())
+    mesh = coarse(sphere())
     corners = np.sort(mesh.faces, axis=1)
     assert (np.diff(corners, axis=1) > 0).all()
     assert len(np.unique(corners, axis=0)) == len(corners)
@@ -40,28 +39,6 @@ def test_without_the_extra_the_capsules_are_drawn_and_a_sentence_says_why(
     found, said = vendor_surfaces(panda_model)
     assert found == {}
     assert said == f"The arm is drawn by its capsules; for the vendor's surfaces run {MESHES.command}"
-
-
-def test_surfaces_are_made_once_and_kept(
-    panda_model: RobotModel, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    skip_without(MESHES)
-    monkeypatch.setattr(vendor, "kept_in", lambda: str(tmp_path))
-    vendor._surfaces.cache_clear()
-    made, _ = vendor_surfaces(panda_model)
-    (place,) = (tmp_path / "__pycache__").iterdir()
-    vendor._surfaces.cache_clear()
-    with monkeypatch.context() as nothing:
-        nothing.delattr(vendor, "_surface")
-        kept, _ = vendor_surfaces(panda_model)
-    place.write_bytes(b"PK")
-    vendor._surfaces.cache_clear()
-    anew, _ = vendor_surfaces(panda_model)
-    for other in (kept, anew):
-        for link, mesh in made.items():
-            for part in ("vertices", "faces", "normals"):
-                np.testing.assert_array_equal(getattr(mesh, part), getattr(other[link], part))
-    assert place.stat().st_size > 2
 
 
 def test_with_the_extra_every_link_has_a_surface_near_its_capsules(panda_model: RobotModel) -> None:

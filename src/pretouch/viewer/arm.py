@@ -1,9 +1,10 @@
 """The arm of the page: its links, coloured where contact is expected, and the units on them."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import trimesh
 from scipy.spatial.transform import Rotation
 
 from pretouch.robot.model import Kinematics, RobotModel
@@ -11,8 +12,7 @@ from pretouch.sensing.skin import Skin
 from pretouch.types import FloatArray, IntArray
 from pretouch.viewer import palette
 from pretouch.viewer.expectation import LEVELS, on_surface, shares
-from pretouch.viewer.glb import ColouredMesh
-from pretouch.viewer.surface import Mesh, surface_of
+from pretouch.viewer.surface import surface_of
 
 if TYPE_CHECKING:
     from viser import GlbHandle, SceneApi
@@ -29,7 +29,7 @@ def quaternions(rotation: FloatArray) -> FloatArray:
     return np.asarray(Rotation.from_matrix(rotation).as_quat(scalar_first=True), dtype=np.float64)
 
 
-def capsule_surfaces(model: RobotModel) -> dict[int, Mesh]:
+def capsule_surfaces(model: RobotModel) -> dict[int, trimesh.Trimesh]:
     """The surface of each link that has a body, by its index, link frame."""
     return {int(i): surface_of(model.capsules.of_links(np.array([i]))) for i in np.unique(model.capsules.link)}
 
@@ -45,6 +45,22 @@ def seen_from(model: RobotModel, skin: Skin, link: int) -> tuple[IntArray, Float
     return units, (origin - kin.position[link]) @ back.T, beam @ back.T
 
 
+def coloured(mesh: trimesh.Trimesh, colours: FloatArray) -> bytes:
+    """Return a mesh with a colour at each vertex (V, 3), from 0 to 255 as a screen shows them, as binary glTF.
+
+    It is the one format in which the page takes them.
+    """
+    shape = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False, vertex_colors=palette.as_vertex(colours))
+    data = trimesh.exchange.gltf.export_glb(trimesh.Scene(shape), include_normals=False, tree_postprocessor=_matt)
+    return bytes(data)
+
+
+def _matt(document: dict[str, Any]) -> None:
+    """Give the one mesh of a glTF document a matt surface; without a material it would be of metal."""
+    document["materials"] = [{"pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": 0.6}}]
+    document["meshes"][0]["primitives"][0]["material"] = 0
+
+
 @dataclass
 class _Sent:
     levels: tuple[int, ...]
@@ -55,8 +71,8 @@ class _Sent:
 class PaintedLink:
     """A link whose colours change, without flicker: what is sent is hidden until the page has had time to read it."""
 
-    def __init__(self, scene: "SceneApi", name: str, mesh: Mesh, share: FloatArray) -> None:
-        self._mesh, self._share = ColouredMesh(mesh), share
+    def __init__(self, scene: "SceneApi", name: str, mesh: trimesh.Trimesh, share: FloatArray) -> None:
+        self._mesh, self._share = mesh, share
         neutral = (0,) * share.shape[1]
         plain = self._painted(neutral)
         self._front: GlbHandle = scene.add_glb(f"{name}/front", plain, cast_shadow=False, receive_shadow=False)
@@ -67,7 +83,7 @@ class PaintedLink:
 
     def _painted(self, levels: tuple[int, ...]) -> bytes:
         expected = np.array(levels, dtype=np.float64) / LEVELS
-        return self._mesh.painted(palette.expected(on_surface(self._share, expected)))
+        return coloured(self._mesh, palette.expected(on_surface(self._share, expected)))
 
     def paint(self, levels: tuple[int, ...], now: float) -> int:
         """Colour by what the units expect, in `LEVELS`, at a time [s]; returns the bytes that were sent."""
@@ -89,7 +105,7 @@ class Arm:
     """The links of an arm and the units on them, to be moved and coloured."""
 
     def __init__(
-        self, scene: "SceneApi", model: RobotModel, skin: Skin, surfaces: dict[int, Mesh], root: str = ""
+        self, scene: "SceneApi", model: RobotModel, skin: Skin, surfaces: dict[int, trimesh.Trimesh], root: str = ""
     ) -> None:
         self._frames = {}
         self._painted: list[tuple[IntArray, PaintedLink]] = []
@@ -97,11 +113,11 @@ class Arm:
             name = f"{root}/arm/{model.links[link]}"
             self._frames[link] = scene.add_frame(name, show_axes=False)
             units, origin, beam = seen_from(model, skin, link)
-            share = shares(mesh.vertices, mesh.normals, origin, beam)
+            share = shares(mesh.vertices, mesh.vertex_normals, origin, beam)
             reached = share.any(axis=0)
             under = _UNDER_M if reached.any() else 0.0
             scene.add_mesh_simple(
-                f"{name}/plain", mesh.vertices - under * mesh.normals, mesh.faces, color=palette.ARM,
+                f"{name}/plain", mesh.vertices - under * mesh.vertex_normals, mesh.faces, color=palette.ARM,
                 cast_shadow=False, receive_shadow=False,
             )  # fmt: skip
             if reached.any():

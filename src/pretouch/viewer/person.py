@@ -6,15 +6,15 @@ see. The cuff is drawn only: it is short, and always on the side away from the a
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import trimesh
 
 from pretouch.robot.body import Capsules
 from pretouch.types import FloatArray
 from pretouch.viewer import palette
-from pretouch.viewer.surface import Mesh, surface_of
+from pretouch.viewer.surface import surface_of
 
 if TYPE_CHECKING:
     from viser import SceneApi, ViserServer
@@ -29,14 +29,15 @@ GRIP = 1.7
 
 _FINGERS = ((-0.0255, 0.0115), (-0.0088, 0.0125), (0.0088, 0.0125), (0.0255, 0.0115))
 """Place across the fist, and radius of each finger [m]."""
-_CELL_M, _BLEND_M = 0.004, 0.005
+_AROUND = 14
+"""Vertices round a finger."""
 _SIDE_M = 0.08
 """Distance from the plane y = 0 from which on the forearm lies along y [m]."""
 _APART_M = 0.015
 """Distance between hand and target from which the target is shown [m]."""
 
 
-def fist(radius: float) -> Mesh:
+def fist(radius: float) -> trimesh.Trimesh:
     """A closed hand in a ball of a radius [m] round the origin: knuckles to +x, its back to +z, the thumb at +y."""
     segments = [
         ((-0.012, -0.010, 0.003), (-0.012, 0.010, 0.003), 0.034),  # palm
@@ -48,21 +49,17 @@ def fist(radius: float) -> Mesh:
         knuckle, joint, tip = (0.020 * bent, y, 0.025), (0.034 * bent, y, -0.004), (0.014, y, -0.028)
         segments += [(knuckle, joint, radius_of_it), (joint, tip, radius_of_it)]
         segments.append(((-0.024, 0.7 * y, 0.022), knuckle, radius_of_it))
-    return _scaled(surface_of(_capsules(segments), _CELL_M, _BLEND_M), radius / BALL_M)
+    return surface_of(_capsules(segments), _AROUND).apply_scale(radius / BALL_M)
 
 
-def cuff(radius: float) -> Mesh:
+def cuff(radius: float) -> trimesh.Trimesh:
     """The end of a sleeve behind the fist of a radius [m], along -x."""
-    return _scaled(surface_of(_capsules([((-0.062, 0.0, 0.0), (-0.105, 0.0, 0.0), 0.030)]), 0.008), radius / BALL_M)
+    return surface_of(_capsules([((-0.062, 0.0, 0.0), (-0.105, 0.0, 0.0), 0.030)])).apply_scale(radius / BALL_M)
 
 
 def _capsules(segments: list[tuple[tuple[float, float, float], tuple[float, float, float], float]]) -> Capsules:
     a, b, radii = zip(*segments, strict=True)
     return Capsules(np.zeros(len(radii), np.int64), np.array(a), np.array(b), np.array(radii))
-
-
-def _scaled(mesh: Mesh, factor: float) -> Mesh:
-    return replace(mesh, vertices=factor * mesh.vertices)
 
 
 class PersonHand:

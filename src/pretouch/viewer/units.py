@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import trimesh
 from numpy.typing import NDArray
 
 from pretouch.perception.obstacles import locate, points_of_units, sensor_poses
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 _IDLE_M = 0.06
 """Length at which a cone is drawn that shows nothing [m]."""
 _FAINT, _CLEAR = 0.2, 0.7
-_UNIT_HALF_M = np.array([0.010, 0.007, 0.002])
+_UNIT_M = (0.020, 0.014, 0.004)
 _POINT_M = 0.014
 _GONE = 1e-6
 """Scale of what is not to be seen: the number of instances stays, so that the page keeps its buffers."""
@@ -34,13 +35,14 @@ class Units:
         self._skin, count = skin, len(skin)
         self._plates: list[tuple[IntArray, BatchedMeshHandle]] = []
         self._cones: list[tuple[IntArray, BatchedMeshHandle]] = []
+        plate, ball = _parts(trimesh.creation.box(_UNIT_M)), _parts(trimesh.creation.icosphere(subdivisions=2))
         plain: dict[str, Any] = {"cast_shadow": False, "receive_shadow": False, "lod": "off"}
         for link in np.unique(skin.link):
             units, boards = np.flatnonzero(skin.link == link), np.flatnonzero(skin.link[skin.first] == link)
             place = _places(skin.T_link_sensor[units])
             node = f"{root}/arm/{links[link]}"
             plates = scene.add_batched_meshes_simple(
-                f"{node}/units", *_plate(), *_places(np.array([skin.mounted[b].T_link_sensor for b in boards])),
+                f"{node}/units", *plate, *_places(np.array([skin.mounted[b].T_link_sensor for b in boards])),
                 batched_colors=_all(palette.UNIT, boards), flat_shading=True, **plain,
             )  # fmt: skip
             self._plates.append((boards, plates))
@@ -53,7 +55,7 @@ class Units:
                 )  # fmt: skip
                 self._cones.append((units[alike], cones))
         self.points = scene.add_batched_meshes_simple(
-            f"{root}/points", *_ball(), np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)), np.zeros((count, 3)),
+            f"{root}/points", *ball, np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)), np.zeros((count, 3)),
             batched_scales=np.full(count, _GONE), batched_colors=_all(palette.SENSED, np.arange(count)), **plain,
         )  # fmt: skip
 
@@ -117,13 +119,6 @@ def _all(colour: palette.Colour, units: IntArray) -> NDArray[np.uint8]:
     return np.tile(palette.as_vertex(colour), (len(units), 1))
 
 
-def _plate() -> tuple[FloatArray, IntArray]:
-    """A flat box on the surface."""
-    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * _UNIT_HALF_M
-    sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    return corners, np.array([t for a, b, c, d in sides for t in ((a, b, c), (a, c, d))])
-
-
 def _cone(radius: float, around: int = 28) -> tuple[FloatArray, IntArray]:
     """A field of view out to 1 m along z, of a radius [m] there, without a lid."""
     angle = np.linspace(0, 2 * np.pi, around, endpoint=False)
@@ -133,24 +128,5 @@ def _cone(radius: float, around: int = 28) -> tuple[FloatArray, IntArray]:
     return np.vstack([np.zeros(3), rim]), faces
 
 
-def _ball(rings: int = 8, around: int = 14) -> tuple[FloatArray, IntArray]:
-    """A sphere of radius 1 m."""
-    tilt = np.linspace(0, np.pi, rings + 1)[1:-1]
-    turn = np.linspace(0, 2 * np.pi, around, endpoint=False)
-    grid = np.stack(
-        [
-            np.outer(np.sin(tilt), np.cos(turn)),
-            np.outer(np.sin(tilt), np.sin(turn)),
-            np.outer(np.cos(tilt), np.ones(around)),
-        ],
-        axis=-1,
-    )
-    vertices = np.vstack([[0, 0, 1.0], grid.reshape(-1, 3), [0, 0, -1.0]])
-    here, after = np.arange(around), np.roll(np.arange(around), -1)
-    faces = [np.stack([np.zeros(around, dtype=int), 1 + here, 1 + after], axis=1)]
-    for ring in range(rings - 2):
-        a, b = 1 + ring * around + here, 1 + ring * around + after
-        faces += [np.stack([a, a + around, b + around], axis=1), np.stack([a, b + around, b], axis=1)]
-    last = 1 + (rings - 2) * around
-    faces.append(np.stack([last + here, np.full(around, len(vertices) - 1), last + after], axis=1))
-    return vertices, np.concatenate(faces)
+def _parts(shape: trimesh.Trimesh) -> tuple[FloatArray, IntArray]:
+    return np.asarray(shape.vertices), np.asarray(shape.faces)
