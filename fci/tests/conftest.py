@@ -75,7 +75,7 @@ class Served:
             skip_for("make franka")
         command = [sys.executable, str(_VENDOR), kind or self.arm.kind, self.host, what, *map(str, values)]
         done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
-        assert done.returncode == 0, done.stderr
+        assert done.returncode == 0, (done.stderr, self.said)
         return json.loads(done.stdout)
 
 
