@@ -1,10 +1,13 @@
 """Runs to record: an arm that follows commands exactly, what its units and its force estimate say drawn from a seed."""
 
+import struct
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
+from mcap.reader import make_reader
+from mcap.writer import Writer
 
 from pretouch.control.path import Circle
 from pretouch.control.path import Path as Course
@@ -12,11 +15,12 @@ from pretouch.controller import Controller, ControllerState
 from pretouch.loop import Cycle
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import PROFILES, Profile
+from pretouch.recording.codec import decode_step, encode_step
 from pretouch.recording.writer import Recording
 from pretouch.robot.description import RobotDescription
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.types import Inputs, RangeReadings, RobotState
+from pretouch.types import ControlStep, Inputs, RangeReadings, RobotState
 
 SHORT: Profile = replace(PROFILES["paper"], window=replace(PROFILES["paper"].window, samples=5))
 """The paper's profile, with a window that is soon full."""
@@ -84,6 +88,40 @@ def recorded_run(place: Path, controller: Controller, cycles: int, seed: int = 0
         for _ in range(cycles):
             recording.record(run.turn())
     return run
+
+
+def changed(
+    source: Path,
+    place: Path,
+    change: Callable[[str, int, bytes], bytes | None] = lambda topic, number, data: data,
+    schema: Callable[[str, bytes], bytes] = lambda topic, text: text,
+) -> Path:
+    """Write a recording anew, its messages changed by topic and number (None leaves one out), or their definitions."""
+    with source.open("rb") as old, place.open("wb") as new:
+        writer = Writer(new)
+        writer.start("ros2")
+        channels: dict[str, int] = {}
+        for kind, channel, message in make_reader(old).iter_messages(log_time_order=False):
+            topic = channel.topic
+            if topic not in channels:
+                number = writer.register_schema(kind.name, "ros2msg", schema(topic, kind.data))
+                channels[topic] = writer.register_channel(topic, "cdr", number)
+            data = change(topic, struct.unpack_from("<Q", message.data, 4)[0], message.data)
+            if data is not None:
+                writer.add_message(channels[topic], message.log_time, data, message.log_time)
+        writer.finish()
+    return place
+
+
+def steps_changed(source: Path, place: Path, changes: dict[int, Callable[[ControlStep], ControlStep]]) -> Path:
+    """Write a recording anew, its steps of some numbers changed."""
+
+    def change(topic: str, number: int, data: bytes) -> bytes:
+        if topic != "/pretouch/step" or number not in changes:
+            return data
+        return encode_step(number, changes[number](decode_step(data)[1]))
+
+    return changed(source, place, change)
 
 
 class Spiral:

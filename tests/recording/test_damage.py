@@ -2,9 +2,7 @@
 
 import json
 import os
-import struct
 from dataclasses import replace
-from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -13,15 +11,15 @@ from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
 from pretouch.errors import RecordingError
-from pretouch.recording.container import Contents, begins_as_mcap, messages, scan
-from pretouch.recording.messages import TOPICS, decoded, definition, encoded
+from pretouch.recording import disk, reader
+from pretouch.recording.messages import decoded, definition, encoded
 from pretouch.recording.reader import Recorded, open_recording
 from pretouch.recording.setting import RUN
 from pretouch.recording.writer import Recording
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from tests.fuzz.invariants import same
-from tests.recording.runs import Run, controller_of, custom_arm, recorded_run
+from tests.recording.runs import Run, changed, controller_of, custom_arm, recorded_run
 
 
 @pytest.fixture(scope="module")
@@ -97,26 +95,53 @@ def test_a_file_cut_off_at_any_byte_gives_its_whole_chunks(tmp_path, stride):
     assert opened(place).complete
 
 
-def chunks_of(place: Path) -> list:
+def middle_chunk(place: Path) -> tuple[int, int]:
+    """Offset and length of the chunk in the middle of a file, by its index."""
     with place.open("rb") as file:
-        assert begins_as_mcap(file)
-        return list(scan(file, Contents()))
+        chunks = make_reader(file).get_summary().chunk_indexes
+    return chunks[len(chunks) // 2].chunk_start_offset, chunks[len(chunks) // 2].chunk_length
 
 
-@pytest.mark.parametrize("head", [False, True], ids=["content", "length"])
-def test_a_damaged_chunk_in_the_middle_is_left_out_and_said(tiny, tmp_path, head):
+@pytest.mark.parametrize("at", [4, 200], ids=["length", "content"])
+def test_a_damaged_chunk_without_an_index_ends_what_is_read(tiny, tmp_path, at):
     place, run = tiny
-    data, chunks = bytearray(place.read_bytes()), chunks_of(place)
-    bad = chunks[len(chunks) // 2]
-    data[bad.start + (4 if head else len(bad.record) // 2)] ^= 0xFF
+    data, (start, _) = bytearray(place.read_bytes()), middle_chunk(place)
+    data[start + at] ^= 0xFF
     (tmp_path / "a.mcap").write_bytes(data)
     recorded = opened(tmp_path / "a.mcap")
-    assert "1 damaged part left out" in recorded.said
-    assert not recorded.complete
+    assert "damaged; every whole part before it is read" in recorded.said
     assert 0 < len(recorded) < len(run.cycles)
-    left = {m.data for chunk in chunks if chunk is not bad for m in messages(chunk)}
-    stamps = [struct.pack("<d", cycle.step.stamp) for cycle in run.cycles]
-    assert len(recorded) == sum(stamp == data[12:20] and len(data) > 1500 for stamp in stamps for data in left)
+    assert all(same(kept.step, c.step) for kept, c in zip(recorded, run.cycles, strict=False))
+
+
+def test_a_damaged_chunk_that_the_index_lists_is_one_sentence_where_it_is_read(controller, tmp_path, monkeypatch):
+    monkeypatch.setattr(disk, "_CHUNK", 20_000)
+    place = tmp_path / "a.mcap"
+    run = recorded_run(place, controller, 40)
+    data, (start, length) = bytearray(place.read_bytes()), middle_chunk(place)
+    data[start + length // 2] ^= 0xFF
+    place.write_bytes(data)
+    recorded = open_recording(place)
+    assert len(recorded) == len(run.cycles)
+    assert same(recorded[0].step, run.cycles[0].step)
+    assert same(recorded[39].step, run.cycles[39].step)
+    with pytest.raises(RecordingError, match=rf"chunk at byte {start} of the recording is damaged"):
+        recorded.stamps()
+
+
+def test_what_is_read_first_is_the_index_and_what_describes_the_run(controller, tmp_path, monkeypatch):
+    monkeypatch.setattr(disk, "_CHUNK", 20_000)
+    place = tmp_path / "a.mcap"
+    run = recorded_run(place, controller, 200)
+    offsets: list[int] = []
+    read = reader.chunk_at
+    monkeypatch.setattr(reader, "chunk_at", lambda file, at, contents: offsets.append(at) or read(file, at, contents))
+    recorded = open_recording(place)
+    assert len(offsets) == 1
+    assert len(recorded) == len(run.cycles)
+    assert all(same(kept.step, c.step) for kept, c in zip(recorded, run.cycles, strict=True))
+    assert offsets[1:] == sorted(set(offsets[1:]))
+    assert len(offsets) > 10
 
 
 def test_a_file_with_any_byte_changed_is_no_worse_than_a_sentence(tiny, tmp_path):
@@ -127,8 +152,7 @@ def test_a_file_with_any_byte_changed_is_no_worse_than_a_sentence(tiny, tmp_path
         opened(part)
 
 
-@pytest.mark.parametrize("options", [{"use_chunking": False}, {"compression": CompressionType.LZ4},
-                                     {"compression": CompressionType.NONE}])  # fmt: skip
+@pytest.mark.parametrize("options", [{"compression": CompressionType.LZ4}, {"compression": CompressionType.NONE}])
 def test_a_file_that_another_tool_wrote_anew_opens_too(tiny, tmp_path, options):
     place, run = tiny
     rewritten(place, tmp_path / "a.mcap", 5, **options)
@@ -172,43 +196,25 @@ def test_what_is_no_recording_of_ours_is_refused_with_the_way_out(tmp_path):
         open_recording(place)
 
 
-def changed(source: Path, place: Path, topic: str, schema=lambda text: text, data=lambda data: data) -> None:
-    """The same file with the definition or the messages of one topic changed."""
-    with source.open("rb") as old, place.open("wb") as new:
-        writer = Writer(new)
-        writer.start("ros2")
-        channels = {}
-        for found, channel, message in make_reader(old).iter_messages(log_time_order=False):
-            hit = channel.topic == topic
-            if channel.topic not in channels:
-                text = schema(found.data.decode()).encode() if hit else found.data
-                number = writer.register_schema(found.name, "ros2msg", text)
-                channels[channel.topic] = writer.register_channel(channel.topic, "cdr", number)
-            writer.add_message(
-                channels[channel.topic], message.log_time, data(message.data) if hit else message.data, message.log_time
-            )
-        writer.finish()
-
-
 def test_messages_of_another_version_are_refused(tiny, tmp_path):
-    changed(tiny[0], tmp_path / "a.mcap", "/pretouch/step", schema=lambda text: text + "float64 more\n")
+    more = {"/pretouch/step": b"float64 more\n"}
+    changed(tiny[0], tmp_path / "a.mcap", schema=lambda topic, text: text + more.get(topic, b""))
     with pytest.raises(RecordingError, match=r"another version.*/pretouch/step"):
         open_recording(tmp_path / "a.mcap")
-    changed(tiny[0], tmp_path / "b.mcap", "/pretouch/step", schema=lambda text: text.replace("#", "  # of old:"))
-    assert len(open_recording(tmp_path / "b.mcap"))
 
 
 def run_with(tiny, place: Path, **fields) -> Path:
     """The same file with fields of its Run message changed."""
 
-    def data(given: bytes) -> bytes:
-        message = decoded(RUN, given)
+    def change(topic: str, number: int, data: bytes) -> bytes:
+        if topic != "/pretouch/run":
+            return data
+        message = decoded(RUN, data)
         for name, value in fields.items():
             setattr(message, name, value)
         return encoded(RUN, message)
 
-    changed(tiny[0], place, "/pretouch/run", data=data)
-    return place
+    return changed(tiny[0], place, change)
 
 
 def test_a_later_format_is_refused(tiny, tmp_path):
@@ -259,24 +265,10 @@ def test_a_run_that_makes_no_sense_is_one_sentence(tiny, tmp_path, fields):
 
 
 def test_missing_inputs_are_none_and_said(tiny, tmp_path):
-    recorded = open_recording(tiny[0])
-    recorded._raw["/pretouch/inputs"].pop(3)
+    gone = ("/pretouch/inputs", 3)
+    recorded = open_recording(
+        changed(tiny[0], tmp_path / "a.mcap", lambda topic, number, data: None if (topic, number) == gone else data)
+    )
     assert recorded[3].inputs is None
     assert recorded.unreadable(3) == "they are missing"
     assert replace(recorded[2], inputs=None).run == 0
-
-
-def test_a_message_that_is_too_short_to_be_one_is_left_out_by_every_reader(tiny, tmp_path):
-    data, chunks = tiny[0].read_bytes(), chunks_of(tiny[0])
-    place = tmp_path / "a.mcap"
-    place.write_bytes(data[: chunks[0].end] + struct.pack("<BQ", 0x05, 5) + b"abcde")
-    assert "1 damaged part left out" in open_recording(place).said
-
-
-def test_scanning_goes_on_behind_a_record_of_a_kind_that_is_not_known(tiny):
-    data, (first, *_rest) = tiny[0].read_bytes(), chunks_of(tiny[0])
-    private = struct.pack("<BQ", 0x7F, 3) + b"abc"
-    file = BytesIO(data[: first.start] + private + data[first.start :])
-    assert begins_as_mcap(file)
-    assert len(list(scan(file, Contents()))) == 1 + len(_rest)
-    assert TOPICS

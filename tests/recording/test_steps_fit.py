@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from pretouch.errors import RecordingError
-from pretouch.recording.codec import decode_step, encode_step
 from pretouch.recording.reader import open_recording
-from tests.recording.runs import controller_of, recorded_run
+from tests.recording.runs import controller_of, recorded_run, steps_changed
 
 
 @pytest.fixture(scope="module")
@@ -29,10 +28,9 @@ def whole(panda_model, paper_skin, tmp_path_factory):
         lambda step: replace(step, approach_limit=np.zeros(5)),
     ],
 )
-def test_a_step_that_is_not_of_the_recordings_arm_is_named(whole, change):
-    recorded = open_recording(whole)
-    steps = recorded._raw["/pretouch/step"]
-    steps[3] = encode_step(3, change(decode_step(steps[3])[1]))
+def test_a_step_that_is_not_of_the_recordings_arm_is_named(whole, tmp_path, change):
+    place = tmp_path / "other.mcap"
+    recorded = open_recording(steps_changed(whole, place, {3: change}))
     assert [recorded[i].step.stamp for i in range(3)] == recorded.stamps()[:3].tolist()
-    with pytest.raises(RecordingError, match=r"Step 3 of .*whole\.mcap is not of the arm and skin"):
+    with pytest.raises(RecordingError, match=r"Step 3 of .*other\.mcap is not of the arm and skin"):
         _ = recorded[3]

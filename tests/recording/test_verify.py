@@ -11,7 +11,7 @@ from pretouch.control.posture import brought_to
 from pretouch.loop import Cycle, turn
 from pretouch.profiles import PROFILES
 from pretouch.recording import verify as verifying
-from pretouch.recording.codec import STEP, decode_step, encode_step
+from pretouch.recording.codec import STEP
 from pretouch.recording.messages import decoded, encoded
 from pretouch.recording.reader import open_recording
 from pretouch.recording.state_codec import STATE
@@ -26,7 +26,7 @@ from pretouch.sim.scene import Box, SceneSpec, fixtures
 from pretouch.types import Mode
 from tests.fuzz.machine import Course, Machine
 from tests.fuzz.worlds import any_world
-from tests.recording.runs import SHORT, Run, Spiral, controller_of, custom_arm, recorded_run
+from tests.recording.runs import SHORT, Run, Spiral, changed, controller_of, custom_arm, recorded_run, steps_changed
 
 
 @pytest.fixture(scope="module")
@@ -152,20 +152,16 @@ def test_an_arm_of_ones_own_is_recomputed_bit_for_bit(tmp_path):
     assert verdict.agrees, verdict.said
 
 
-def step_changed(recorded, number, change):
-    steps = recorded._raw["/pretouch/step"]
-    _, step, _ = decode_step(steps[number])
-    steps[number] = encode_step(number, change(step))
-
-
-def test_a_bit_that_was_flipped_is_the_first_difference(made):
+def test_a_bit_that_was_flipped_is_the_first_difference(place, tmp_path):
     def flip(step):
         qd = step.qp.qd.copy()
         qd[3] = np.nextafter(qd[3], 1.0)
         return replace(step, qp=replace(step.qp, qd=qd))
 
-    step_changed(made, 123, flip)
-    step_changed(made, 200, lambda step: replace(step, ee_position=step.ee_position + np.array([0.0, 0.25, 0.0])))
+    def move(step):
+        return replace(step, ee_position=step.ee_position + np.array([0.0, 0.25, 0.0]))
+
+    made = open_recording(steps_changed(place, tmp_path / "b.mcap", {123: flip, 200: move}))
     verdict = verify(made)
     assert not verdict.agrees
     assert verdict.differing == 2
@@ -187,30 +183,44 @@ def test_a_bit_that_was_flipped_is_the_first_difference(made):
         (lambda s: replace(s, armed=not s.armed), "armed", False),
     ],
 )
-def test_a_difference_of_any_kind_is_named(made, change, field, recorded):
-    step_changed(made, 2 if field == "path_phase" else 60, change)
-    first = verify(made).first
+def test_a_difference_of_any_kind_is_named(place, tmp_path, change, field, recorded):
+    changes = {2 if field == "path_phase" else 60: change}
+    first = verify(open_recording(steps_changed(place, tmp_path / "b.mcap", changes))).first
     assert (first.field, first.recorded) == (field, recorded)
 
 
-def test_a_snapshot_that_does_not_follow_is_found(made):
-    raw = made._raw["/pretouch/state"]
-    number = sorted(raw)[1]
-    message = decoded(STATE, raw[number])
-    message.numbers[0] += 1e-9
-    raw[number] = encoded(STATE, message)
-    verdict = verify(made)
+def snapshots(recorded) -> list[int]:
+    return [i for i, kept in enumerate(recorded) if kept.snapshot is not None]
+
+
+def second_snapshot_changed(place, other):
+    """The same file, its second snapshot 1 ns later."""
+    second = snapshots(open_recording(place))[1]
+
+    def change(topic, number, data):
+        if (topic, number) != ("/pretouch/state", second):
+            return data
+        message = decoded(STATE, data)
+        message.numbers[0] += 1e-9
+        return encoded(STATE, message)
+
+    return second, open_recording(changed(place, other, change))
+
+
+def test_a_snapshot_that_does_not_follow_is_found(place, tmp_path):
+    number, recorded = second_snapshot_changed(place, tmp_path / "b.mcap")
+    verdict = verify(recorded)
     assert verdict.first.number == number
     assert verdict.first.field == "state before.watch.stamp"
 
 
-def test_steps_that_are_missing_are_passed_to_the_next_snapshot(made):
-    for number in range(50, 60):
-        for topic in ("/pretouch/step", "/pretouch/inputs"):
-            del made._raw[topic][number]
-    made._numbers = sorted(made._raw["/pretouch/step"])
+def test_steps_that_are_missing_are_passed_to_the_next_snapshot(place, tmp_path):
+    def change(topic, number, data):
+        return None if 50 <= number < 60 and topic in ("/pretouch/step", "/pretouch/inputs") else data
+
+    made = open_recording(changed(place, tmp_path / "b.mcap", change))
     verdict = verify(made)
-    second = sorted(made._raw["/pretouch/state"])[1]
+    second = made.number(snapshots(made)[1])
     assert verdict.first is None
     assert not verdict.agrees
     assert verdict.skipped == {"gone missing": 10, "no snapshot before": second - 60}
@@ -218,9 +228,13 @@ def test_steps_that_are_missing_are_passed_to_the_next_snapshot(made):
     assert verdict.checked == 390 - (second - 60)
 
 
-def test_inputs_that_are_missing_are_no_inputs_that_could_not_be_kept(made):
-    del made._raw["/pretouch/inputs"][50]
-    verdict = verify(made)
+def test_inputs_that_are_missing_are_no_inputs_that_could_not_be_kept(place, tmp_path):
+    gone = ("/pretouch/inputs", 50)
+    verdict = verify(
+        open_recording(
+            changed(place, tmp_path / "b.mcap", lambda topic, number, data: None if (topic, number) == gone else data)
+        )
+    )
     assert not verdict.agrees
     assert verdict.skipped["no inputs in the file"] == 1
 
@@ -229,27 +243,25 @@ def elsewhere(monkeypatch):
     monkeypatch.setattr(verifying, "versions", lambda: {"numpy": "9", "machine": "another"})
 
 
-def test_other_versions_are_held_against_a_tolerance_and_named(made, monkeypatch):
-    step_changed(made, 5, lambda s: replace(s, reason="Other words.", path_phase=s.path_phase + 9e-7))
+def test_other_versions_are_held_against_a_tolerance_and_named(place, tmp_path, monkeypatch):
+    def shifted(size):
+        change = {5: lambda s: replace(s, reason="Other words.", path_phase=s.path_phase + size)}
+        return verify(open_recording(steps_changed(place, tmp_path / f"{size}.mcap", change)))
+
     elsewhere(monkeypatch)
-    verdict = verify(made)
+    verdict = shifted(9e-7)
     assert verdict.agrees, verdict.said
     assert not verdict.exact
     assert "within 1e-06" in verdict.said
     assert "here 9" in verdict.said
-    step_changed(made, 5, lambda s: replace(s, path_phase=s.path_phase + 2e-6))
-    verdict = verify(made)
+    verdict = shifted(2e-6)
     assert (verdict.first.number, verdict.first.field) == (5, "path_phase")
 
 
-def test_within_a_tolerance_each_snapshot_is_a_new_start(made, monkeypatch):
-    raw = made._raw["/pretouch/state"]
-    second = sorted(raw)[1]
-    message = decoded(STATE, raw[second])
-    message.numbers[0] += 1e-9
-    raw[second] = encoded(STATE, message)
+def test_within_a_tolerance_each_snapshot_is_a_new_start(place, tmp_path, monkeypatch):
+    _, recorded = second_snapshot_changed(place, tmp_path / "b.mcap")
     elsewhere(monkeypatch)
-    assert verify(made).agrees
+    assert verify(recorded).agrees
 
 
 def test_differences_of_numbers_that_are_none():

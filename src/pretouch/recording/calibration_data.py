@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from pretouch.recording.container import Contents, begins_as_mcap, messages_of
+from pretouch.recording.mcap_file import Contents, read_messages
 from pretouch.recording.reader import Recorded, open_recording
 from pretouch.recording.skin_reader import holds_units, read_skin
 from pretouch.recording.standard import IMU
@@ -70,7 +70,7 @@ class Measured:
     skin: Skin | None
     """The skin that a run began with; None in a recording of units alone."""
     complete: bool
-    """Whether the recording was ended in order, and nothing in it is damaged."""
+    """Whether the recording was ended in order."""
 
 
 def read_measured(place: Path) -> Measured:
@@ -94,11 +94,11 @@ def _of_run(recorded: Recorded) -> Measured:
 
 
 def _imus(place: Path) -> dict[str, ImuTrace]:
-    contents, imus = Contents(), ImuRows()
+    imus = ImuRows()
     with place.open("rb") as file:
-        begins_as_mcap(file)
-        for *_, data in messages_of(file, contents, lambda _topic, kind: kind == IMU):
-            imus.add(data)
+        for message in read_messages(file, Contents()):
+            if message.kind == IMU:
+                imus.add(message.data)
     return imus.traces()
 
 

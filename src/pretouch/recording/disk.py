@@ -7,21 +7,19 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable
 from contextlib import suppress
-from itertools import chain
 from pathlib import Path
 from queue import Empty, SimpleQueue
-from typing import BinaryIO
+from typing import NamedTuple
+
+from mcap.writer import Writer
 
 from pretouch.errors import RecordingError
-from pretouch.recording.chunk_writer import ChunkWriter
-from pretouch.recording.container import Contents, begins_as_mcap, scan
-from pretouch.recording.ending import Entry, Index, ending, entry
-from pretouch.recording.messages import Item
+from pretouch.recording.messages import LIBRARY, definition
 
 _FLUSH_S = 0.5
 """Time after which what was recorded is written [s]."""
 _CHUNK = 1 << 18
-"""Bytes of messages in a chunk at most: to index more of them at once would keep a fast loop waiting."""
+"""Bytes of messages from which on a chunk is written: to index more at once would keep a fast loop waiting."""
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _LATE_S = 0.2
 """Time for which a cycle waits to be written when a run that is faster than the clock should wait too [s]."""
@@ -31,8 +29,19 @@ _MOST_WAITING = 20_000
 """Cycles that may wait to be written: a disk that is farther behind is too slow."""
 
 
-More = Callable[[], Iterable[Item]]
-"""Makes messages."""
+class Item(NamedTuple):
+    """One message to write."""
+
+    topic: str
+    kind: str
+    sequence: int
+    time: int
+    """[ns]"""
+    data: bytes
+
+
+Job = Callable[[], Iterable[Item]]
+"""Makes the messages of a cycle."""
 
 
 class _File:
@@ -55,28 +64,31 @@ class _File:
     def flush(self) -> None:
         """Nothing waits."""
 
-    def end_at(self, size: int, tail: bytes) -> None:
-        """Cut the file off at a size and end it with a tail."""
-        os.ftruncate(self._handle, size)
-        os.lseek(self._handle, size, os.SEEK_SET)
-        self._at = size
-        self.write(tail)
-
     def close(self) -> None:
         os.close(self._handle)
 
 
 class Disk:
-    """Takes messages at once, and writes them in a thread of its own."""
+    """Takes what makes messages at once, and writes these in a thread of its own.
+
+    A chunk holds whole cycles: the reader counts on it.
+    """
 
     def __init__(self, place: Path) -> None:
         self._place = place
         self._file = _opened(place)
-        self._queue: SimpleQueue[tuple[list[Item], More] | None] = SimpleQueue()
+        self._queue: SimpleQueue[Job | None] = SimpleQueue()
         self._since: deque[float] = deque()
         """When each cycle was put that is not written yet [s]."""
+        self._writer = Writer(self._file, chunk_size=1 << 62)  # type: ignore[arg-type]
+        self._schemas: dict[str, int] = {}
+        self._channels: dict[str, int] = {}
+        self._waiting = self._newest = 0
+        """Bytes of messages in the chunk that is being filled, and the latest time in it [ns]."""
+        self._written: int | None = None
+        """Latest time in the file [ns]."""
         try:
-            self._writer = ChunkWriter(self._file, _CHUNK)  # type: ignore[arg-type]
+            self._writer.start("ros2", LIBRARY)
         except OSError as error:
             self._file.close()
             place.unlink()
@@ -86,12 +98,12 @@ class Disk:
         self._thread = threading.Thread(target=self._work, name=f"recording {place.name}", daemon=True)
         self._thread.start()
 
-    def put(self, items: list[Item], more: More = tuple) -> None:
-        """Hand messages over, and what makes more of them, in the thread."""
+    def put(self, job: Job) -> None:
+        """Hand over what makes the messages of a cycle, in the thread."""
         if self._queue.qsize() > _MOST_WAITING and not self.trouble:
             self.trouble = f"The recording {self._place} ended early, because the disk is too slow: use a faster one."
         self._since.append(time.monotonic())
-        self._queue.put((items, more))
+        self._queue.put(job)
 
     def behind(self) -> bool:
         """Whether something has waited to be written for a while."""
@@ -121,12 +133,10 @@ class Disk:
     def _work(self) -> None:
         try:
             self._write_all()
+            self._flush()
             self._writer.finish()
-        except OSError as error:
-            self._rescue(error)
         except Exception as error:  # the run goes on, whatever failed here
-            self.trouble = f"The recording {self._place} ended early: {type(error).__name__}: {error}."
-            self._rescue(None)
+            self.trouble = self._sentence(error)
         with suppress(OSError):  # of what was written, the system has said by now what it has to say
             self._file.close()
 
@@ -140,57 +150,42 @@ class Disk:
             else:
                 if job is None:
                     return
-                items, more = job
-                for item in chain(items, more()):
-                    self._writer.add(item)
+                for item in job():
+                    self._add(item)
                 self._since.popleft()
                 time.sleep(0)  # lets the control loop have the interpreter, if it waits for it
-            if time.monotonic() >= due:
-                self._writer.flush()
+            if self._waiting > _CHUNK or time.monotonic() >= due:
+                self._flush()
                 due = time.monotonic() + _FLUSH_S
 
-    def _rescue(self, error: OSError | None) -> None:
-        """End the file after as many whole chunks as leave room for the index."""
-        contents = Contents()
-        self.trouble = self.trouble or f"The recording {self._place} ended early."  # nobody waits for what follows
-        try:
-            with self._place.open("rb") as file:
-                begins_as_mcap(file)
-                entries, ends = _indexed(file, contents)
-            held = _end(self._file, contents, entries, ends)
-        except (OSError, ValueError) as another:
-            held, error = "it cannot be opened", another if isinstance(another, OSError) else error
-        cause = os.strerror(error.errno) if error and error.errno else str(error or "")
-        if error is not None:
-            remedy = "free some space, then record again" if error.errno in _FULL else "check the disk"
-            self.trouble = f"The recording {self._place} ended early ({cause}) and {held}: {remedy}."
+    def _add(self, item: Item) -> None:
+        channel = self._channels.get(item.topic) or self._channel(item)
+        self._writer.add_message(channel, item.time, item.data, item.time, item.sequence % 2**32)
+        self._waiting += len(item.data)
+        self._newest = max(self._newest, item.time)
 
+    def _channel(self, item: Item) -> int:
+        """Define the channel of a topic, and the schema of its type where that is new."""
+        if item.kind not in self._schemas:
+            schema = self._writer.register_schema(item.kind, "ros2msg", definition(item.kind).encode())
+            self._schemas[item.kind] = schema
+        self._channels[item.topic] = self._writer.register_channel(item.topic, "cdr", self._schemas[item.kind])
+        return self._channels[item.topic]
 
-def _indexed(file: BinaryIO, contents: Contents) -> tuple[list[Entry], list[int]]:
-    """Index of each chunk that is followed by all of its message indexes, and where those end."""
-    entries: list[Entry] = []
-    ends: list[int] = []
-    for chunk in scan(file, contents):
-        made = entry(chunk, chunk.start)
-        if chunk.end != chunk.start + len(chunk.record) + len(made.index):
-            break
-        entries.append(made)
-        ends.append(chunk.end)
-    return entries, ends
+    def _flush(self) -> None:
+        self._writer.flush()
+        if self._waiting:
+            self._waiting, self._written = 0, self._newest
 
-
-def _end(file: _File, contents: Contents, entries: list[Entry], ends: list[int]) -> str:
-    """Write the index, of fewer chunks if it does not fit, and say what the file then holds."""
-    for count in range(len(entries), 0, -1):
-        try:
-            file.end_at(ends[count - 1], ending(contents, Index.of(entries[:count]), ends[count - 1]))
-        except OSError as error:
-            if error.errno not in _FULL:
-                raise
+    def _sentence(self, error: Exception) -> str:
+        """Say why nothing more is written, and what the file holds."""
+        held = "nothing" if self._written is None else f"the run up to {self._written / 1e9:.2f} s"
+        if not isinstance(error, OSError):
+            cause, remedy = f"{type(error).__name__}: {error}", "report this"
         else:
-            return f"it holds the run up to {entries[count - 1].last / 1e9:.2f} s"
-    file.end_at(0, b"")
-    return "it holds nothing"
+            cause = os.strerror(error.errno) if error.errno else str(error)
+            remedy = "free some space, then record again" if error.errno in _FULL else "check the disk"
+        return f"The recording {self._place} ended early ({cause}) and it holds {held}: {remedy}."
 
 
 def _opened(place: Path) -> _File:

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from functools import cache
 from importlib.resources import files
 from itertools import chain
-from typing import Any, NamedTuple
+from typing import Any
 
 import pretouch
 from pretouch.errors import RecordingError
@@ -30,17 +30,6 @@ TOPICS["/pretouch/moving"] = f"{PACKAGE}/msg/MovingFixtures"
 
 _SECTION = f"{'=' * 80}\nMSG: "
 """Stands before the name of each further type in a definition (encoding `ros2msg`)."""
-
-
-class Item(NamedTuple):
-    """One message to write."""
-
-    topic: str
-    kind: str
-    sequence: int
-    time: int
-    """[ns]"""
-    data: bytes
 
 
 @cache

@@ -1,12 +1,15 @@
 """A recording, opened: each of its control steps, and the controllers that made them."""
 
 import struct
-from bisect import bisect_right
-from collections.abc import Iterator
+from bisect import bisect_left, bisect_right
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
+from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
+from mcap.records import Channel
 
 from pretouch.controller import ControllerState
 from pretouch.errors import RecordingError
@@ -20,13 +23,13 @@ from pretouch.recording.codec import (
     decode_touch,
     decode_truth,
 )
-from pretouch.recording.container import Contents, begins_as_mcap, messages_of
+from pretouch.recording.mcap_file import Contents, Message, chunk_at, chunks, indexed_chunks, message_count, open_mcap
 from pretouch.recording.messages import LIBRARY, TOPICS, definition
 from pretouch.recording.setting import Run, Tangents, decode_run
 from pretouch.recording.skin_recording import READ_WITH, UNIT_SAMPLE
 from pretouch.recording.state_codec import decode_state
 from pretouch.recording.truth import Truth
-from pretouch.types import ControlStep, FloatArray, Inputs, RobotState
+from pretouch.types import ControlStep, FloatArray, Inputs, IntArray, RobotState
 from pretouch.values import value
 
 __all__ = ["Kept", "Recorded", "Run", "open_recording"]
@@ -56,35 +59,66 @@ class Kept:
 
 MISSING_INPUTS = "they are missing"
 
-Raw = dict[str, dict[int, bytes]]
-"""Messages of each of our topics, by the number of the step."""
+_PARTS: dict[str, Callable[[bytes], Any]] = {
+    "touch": decode_touch, "payload": decode_payload, "moving": decode_moving, "desired": decode_desired
+}  # fmt: skip
+_STEP, _RUN = "/pretouch/step", "/pretouch/run"
+_REMEDY = "for a recording of another program use `pretouch detect`"
+_CUT = "the end is missing, as after a run that was killed, or damaged; every whole part before it is read"
+_CHUNKS = 4
+"""Chunks that are held in memory: half a second and 0.3 MB each."""
+
+Raw = dict[tuple[str, int], bytes]
+"""Messages of our topics by topic and number of the step."""
+
+
+class _Span(NamedTuple):
+    """A chunk, and the numbers of the first and the last step of which it holds messages."""
+
+    offset: int
+    first: int
+    last: int
 
 
 class Recorded:
-    """A recording: a sequence of control steps, each decoded when it is asked for."""
+    """A recording: a sequence of control steps, each read when it is asked for.
 
-    def __init__(self, place: Path, raw: Raw, said: str) -> None:
+    Where the file has an index, nothing but that is read at first; without one, as after a run that was killed, the
+    file is read through once. In memory are the last chunks that were read.
+    """
+
+    def __init__(self, place: Path, contents: Contents, spans: list[_Span], numbers: IntArray, runs: Raw) -> None:
         self.place = place
-        self.said = said
+        self.complete = contents.complete
+        self.said = "" if self.complete else f"{place}: {_CUT}."
         """What is missing, as a sentence, or ''."""
-        self.complete = not said
-        self._raw = raw
-        self._numbers = sorted(raw["/pretouch/step"])
-        runs = [raw["/pretouch/run"][n] for n in sorted(raw["/pretouch/run"])]
-        self.runs: tuple[Run, ...] = tuple(decode_run(data, self._tangents) for data in runs)
+        self._contents, self._spans, self._numbers = contents, spans, numbers
+        self._firsts, self._lasts = [span.first for span in spans], [span.last for span in spans]
+        self._chunk = lru_cache(_CHUNKS)(self._read)
+        self.runs: tuple[Run, ...] = tuple(decode_run(runs[key], self._tangents) for key in sorted(runs))
         """The controllers that made steps, in order."""
         self._begins = [run.sequence for run in self.runs]
+
+    def _read(self, offset: int) -> Raw:
+        with self.place.open("rb") as file:
+            return _ours(chunk_at(file, offset, self._contents))
+
+    def _get(self, topic: str, number: int) -> bytes | None:
+        """Return a message of a step, None where there is none."""
+        for i in range(bisect_left(self._lasts, number), bisect_right(self._firsts, number)):
+            data = self._chunk(self._spans[i].offset).get((topic, number))
+            if data is not None:
+                return data
+        return None
 
     def __len__(self) -> int:
         return len(self._numbers)
 
     def __getitem__(self, i: int) -> Kept:
-        number = self._numbers[i]
-        raw = self._raw
-        truth = raw["/pretouch/truth"].get(number)
-        state = raw["/pretouch/state"].get(number)
+        number = self.number(i)
+        truth, state = (self._get(f"/pretouch/{name}", number) for name in ("truth", "state"))
         anew, snapshot = (False, None) if state is None else decode_state(state)
-        run, step = max(0, bisect_right(self._begins, number) - 1), decode_step(raw["/pretouch/step"][number])[1]
+        run, step = max(0, bisect_right(self._begins, number) - 1), self.step(i)
         if not _fits(step, *self.runs[run].sizes):
             raise RecordingError(
                 f"Step {number} of {self.place} is not of the arm and skin that the recording says made it: use one"
@@ -101,32 +135,27 @@ class Recorded:
 
     def _inputs(self, number: int) -> Inputs | None:
         """Return all that a step was given; None where a part of it is missing."""
-        raw = self._raw
-        data, touch = (raw[f"/pretouch/{part}"].get(number) for part in ("inputs", "touch"))
+        data = self._get("/pretouch/inputs", number)
         inputs = None if data is None else decode_inputs(data)[1]
-        if inputs is not None and touch is not None:
-            inputs = replace(inputs, touch=decode_touch(touch))
-        payload = raw["/pretouch/payload"].get(number)
-        if inputs is not None and payload is not None:
-            inputs = replace(inputs, payload=decode_payload(payload))
-        moving = raw["/pretouch/moving"].get(number)
-        if inputs is not None and moving is not None:
-            inputs = replace(inputs, moving=decode_moving(moving))
-        desired = raw["/pretouch/desired"].get(number)
-        if inputs is not None and desired is not None:
-            inputs = replace(inputs, desired=decode_desired(desired))
+        if inputs is None:
+            return None
+        for name, decode in _PARTS.items():
+            part = self._get(f"/pretouch/{name}", number)
+            if part is not None:
+                inputs = replace(inputs, **{name: decode(part)})
         return self._with_points(number, inputs)
 
-    def _with_points(self, number: int, inputs: Inputs | None) -> Inputs | None:
+    def _with_points(self, number: int, inputs: Inputs) -> Inputs | None:
         """Return inputs with the points of outside sources, if there were any; None where these are missing."""
-        raw = self._raw["/pretouch/seenpoints"]
-        if inputs is None or number not in raw:
+        data = self._get("/pretouch/seenpoints", number)
+        if data is None:
             return inputs
-        same_as, points = decode_points(raw[number])
+        same_as, points = decode_points(data)
         if same_as != number:
-            if same_as not in raw:
+            data = self._get("/pretouch/seenpoints", same_as)
+            if data is None:
                 return None
-            points = decode_points(raw[same_as])[1]
+            points = decode_points(data)[1]
         return replace(inputs, points=points)
 
     def __iter__(self) -> Iterator[Kept]:
@@ -134,24 +163,33 @@ class Recorded:
 
     def robot_states(self) -> Iterator[RobotState]:
         """Yield the robot's state of each step whose inputs were kept."""
-        for number in self._numbers:
-            data = self._raw["/pretouch/inputs"].get(number)
+        for number in self._numbers.tolist():
+            data = self._get("/pretouch/inputs", number)
             inputs = None if data is None else decode_inputs(data)[1]
             if inputs is not None:
                 yield inputs.robot
 
     def number(self, i: int) -> int:
         """Return the number a step had when it was recorded: where some are missing it is not `i`."""
-        return self._numbers[i]
+        return int(self._numbers[i])
 
     def unreadable(self, i: int) -> str:
         """Say what is known of inputs that could not be kept, or ''."""
-        inputs = self._raw["/pretouch/inputs"].get(self._numbers[i])
+        inputs = self._get("/pretouch/inputs", self.number(i))
         return MISSING_INPUTS if inputs is None else decode_inputs(inputs)[2]
+
+    def step(self, i: int) -> ControlStep:
+        """Return a step alone."""
+        return decode_step(self.step_data(i))[1]
 
     def step_data(self, i: int) -> bytes:
         """Return a step as it was written."""
-        return self._raw["/pretouch/step"][self._numbers[i]]
+        data = self._get(_STEP, self.number(i))
+        if data is None:
+            raise RecordingError(
+                f"Step {self.number(i)} is missing in {self.place}, whose index lists it: use a copy that is whole."
+            )
+        return data
 
     def tangent(self, i: int) -> FloatArray | None:
         """Return the path's tangent (3,) at a step, where it was kept with it."""
@@ -160,19 +198,18 @@ class Recorded:
 
     def stamps(self) -> FloatArray:
         """Stamps (S,) of the steps [s]."""
-        steps = self._raw["/pretouch/step"]
-        return np.array([_STAMP.unpack_from(steps[n], _HEAD + _NUMBER.size)[0] for n in self._numbers])
+        return np.array([_STAMP.unpack_from(self.step_data(i), _HEAD + _NUMBER.size)[0] for i in range(len(self))])
 
     def _tangents(self, number: int) -> Tangents:
         """Find where the path led in the steps of the run that begins with a number."""
         later = [begin for begin in self._begins if begin > number]
-        found: Tangents = {}
-        for n in self._numbers:
+        tangents: Tangents = {}
+        for i, n in enumerate(self._numbers.tolist()):
             if number <= n and (not later or n < later[0]):
-                _, step, tangent = decode_step(self._raw["/pretouch/step"][n])
+                _, step, tangent = decode_step(self.step_data(i))
                 if len(tangent):
-                    found[step.path_phase] = step.path_position, tangent
-        return found
+                    tangents[step.path_phase] = step.path_position, tangent
+        return tangents
 
 
 def _fits(step: ControlStep, joints: int, units: int) -> bool:
@@ -194,71 +231,88 @@ def open_recording(place: Path) -> Recorded:
     """Open a recording, finished or cut off.
 
     RecordingError for a file that is missing, is not an MCAP file, is another program's (`pretouch detect` reads those)
-    or is of a later version.
+    or is of another version.
     """
-    place = Path(place)
-    contents, raw = Contents(), {topic: dict[int, bytes]() for topic in TOPICS}
-    if place.exists() and not (place.is_file() or place.is_dir()):  # as a pipe or a device, which may have no end
-        raise RecordingError(f"{place} is no file: give a recording that is one.")
-    try:
-        with place.open("rb") as file:
-            if not begins_as_mcap(file):
-                raise RecordingError(_no_mcap(place))
-            for topic, _, _, data in messages_of(file, contents, lambda topic, kind: TOPICS.get(topic) == kind):
-                if len(data) >= _HEAD + _NUMBER.size + _STAMP.size:
-                    raw[topic].setdefault(_NUMBER.unpack_from(data, _HEAD)[0], data)
-    except OSError as error:
-        reason = "it does not exist" if isinstance(error, FileNotFoundError) else error.strerror
-        raise RecordingError(f"The recording {place} cannot be read: {reason}.") from error
-    _check(place, contents, raw)
-    return Recorded(place, raw, _missing(place, contents))
+    place, contents = Path(place), Contents()
+    with open_mcap(place, _REMEDY) as file:
+        spans, numbers, runs = _by_index(file, contents) or _by_reading(file, contents)
+    _check(place, contents, runs, numbers)
+    return Recorded(place, contents, spans, numbers, runs)
 
 
-def _check(place: Path, contents: Contents, raw: Raw) -> None:
+_Found = tuple[list[_Span], IntArray, Raw]
+"""Chunks with messages of ours, the numbers of all steps, and what describes their runs."""
+
+
+def _by_index(file: BinaryIO, contents: Contents) -> _Found | None:
+    """Use the index at the end of a file of ours: its chunks hold whole cycles, and none is missing."""
+    listed = indexed_chunks(file, contents)
+    ids = {channel.topic: channel.id for channel in contents.channels.values()}
+    if not listed or not _by_us(contents) or not ids.keys() >= {_STEP, _RUN}:
+        return None
+    spans: list[_Span] = []
+    runs: Raw = {}
+    number: int | None = None
+    for chunk in listed:
+        if number is None or ids[_RUN] in chunk.message_index_offsets:
+            ours = _ours(chunk_at(file, chunk.chunk_start_offset, contents))
+            runs |= {key: data for key, data in ours.items() if key[0] == _RUN}
+            number = min((n for _, n in ours), default=None) if number is None else number
+        count = message_count(file, chunk, ids[_STEP])
+        if number is not None and count:
+            spans.append(_Span(chunk.chunk_start_offset, number, number + count - 1))
+            number += count
+    return spans, np.arange(spans[0].first, spans[-1].last + 1), runs
+
+
+def _by_reading(file: BinaryIO, contents: Contents) -> _Found:
+    """Read a file through that has no index, or was written by another tool."""
+    spans: list[_Span] = []
+    runs: Raw = {}
+    steps: set[int] = set()
+    file.seek(0)
+    for offset, messages in chunks(file, contents):
+        ours = _ours(messages)
+        runs |= {key: data for key, data in ours.items() if key[0] == _RUN}
+        steps |= {n for topic, n in ours if topic == _STEP}
+        if ours:
+            numbers = [n for _, n in ours]
+            spans.append(_Span(offset, min(numbers), max(numbers)))
+    return spans, np.array(sorted(steps), dtype=np.int64), runs
+
+
+def _ours(messages: list[Message]) -> Raw:
+    """Return the messages on our topics, the first of two alike."""
+    raw: Raw = {}
+    for topic, kind, data in messages:
+        if TOPICS.get(topic) == kind and len(data) >= _HEAD + _NUMBER.size:
+            raw.setdefault((topic, _NUMBER.unpack_from(data, _HEAD)[0]), data)
+    return raw
+
+
+def _by_us(contents: Contents) -> bool:
+    return contents.library.partition(" ")[0] == LIBRARY.partition(" ")[0]
+
+
+def _check(place: Path, contents: Contents, runs: Raw, numbers: IntArray) -> None:
     """Refuse a file without a step of ours, or with messages that are not these."""
-    for topic, number, _ in contents.channels.values():
-        kind, schema = contents.schemas.get(number, ("", b""))
-        if TOPICS.get(topic) == kind and not is_ours(schema, kind):
+    for channel in contents.channels.values():
+        kind = contents.kind(channel)
+        if TOPICS.get(channel.topic) == kind and not is_ours(contents, channel):
             raise RecordingError(
-                f"{place} was recorded by another version of pretouch, with different messages on {topic}: open it with"
-                " that version."
+                f"{place} was recorded by another version of pretouch, with different messages on {channel.topic}: open"
+                " it with that version."
             )
-    if raw["/pretouch/step"] and raw["/pretouch/run"]:
+    if len(numbers) and runs:
         return
-    if any(contents.of(channel)[1] == UNIT_SAMPLE for channel in contents.channels):
+    if any(contents.kind(channel) == UNIT_SAMPLE for channel in contents.channels.values()):
         raise RecordingError(f"{place} holds samples of sensor units, but no control step: {READ_WITH}.")
-    if contents.library.startswith(LIBRARY.split()[0]) or any(t in TOPICS for t, _, _ in contents.channels.values()):
+    if _by_us(contents) or any(channel.topic in TOPICS for channel in contents.channels.values()):
         raise RecordingError(f"{place} holds no control step, because the run ended before the first was written.")
-    raise RecordingError(
-        f"{place} is not a recording of pretouch: for one of another program use `pretouch detect {place}`."
-    )
+    raise RecordingError(f"{place} is not a recording of pretouch: {_REMEDY}.")
 
 
-def is_ours(schema: bytes, kind: str) -> bool:
-    """Whether a schema record ends with the definition of a type of ours, comments apart."""
-    ours, at = definition(kind), len(schema)
-    text = schema[max(0, at - 4 * len(ours)) :].decode(errors="replace")
-    return _bare(text).endswith(_bare(ours))
-
-
-def _bare(text: str) -> str:
-    lines = (line.partition("#")[0].split() for line in text.splitlines())
-    return "\n".join(" ".join(words) for words in lines if words)
-
-
-def _no_mcap(place: Path) -> str:
-    if place.stat().st_size == 0:
-        return f"{place} is empty, because the run ended before anything was written."
-    return f"{place} is not an MCAP file: for a recording of another program use `pretouch detect {place}`."
-
-
-def _missing(place: Path, contents: Contents) -> str:
-    """Say what is missing of a file, or ''."""
-    said = []
-    if contents.damaged:
-        said.append(f"{contents.damaged} damaged part{'s' if contents.damaged > 1 else ''} left out")
-    if not contents.complete:
-        said.append("the end is missing, as after a run that was killed")
-    if not said:
-        return ""
-    return f"{place}: {' and '.join(said)}; every whole part of it is read."
+def is_ours(contents: Contents, channel: Channel) -> bool:
+    """Whether the messages of a channel are defined as those of a type of ours."""
+    schema = contents.schemas[channel.schema_id]
+    return schema.data == definition(schema.name).encode()

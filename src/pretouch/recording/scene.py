@@ -6,7 +6,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pretouch.controller import Controller
-from pretouch.recording.messages import Item, encoded, make
+from pretouch.recording.disk import Item
+from pretouch.recording.messages import encoded, make
 from pretouch.recording.standard import HEADER, QUATERNION, TIME, VECTOR, header, vector
 from pretouch.recording.surroundings import surroundings
 from pretouch.robot.body import Capsules

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from pretouch.errors import RecordingError
-from pretouch.recording.container import Contents, begins_as_mcap, messages, messages_of, scan
+from pretouch.recording.mcap_file import Contents, chunks, open_mcap, read_messages
 from pretouch.recording.messages import TOPICS, decoded
 from pretouch.recording.reader import is_ours
 from pretouch.recording.skin_recording import UNIT_SAMPLE
@@ -63,7 +63,7 @@ class SkinTrace:
     joint_names: tuple[str, ...]
     """Names of these joints, in the order of the columns."""
     complete: bool
-    """Whether the recording was ended in order, and nothing in it is damaged."""
+    """Whether the recording was ended in order."""
 
     @property
     def samples(self) -> int:
@@ -83,33 +83,29 @@ def read_skin(place: Path) -> SkinTrace:
     contents = Contents()
     samples: dict[str, list[Any]] = {}
     imus, joints = ImuRows(), JointRows(place)
-    try:
-        for kind, data in _messages(place, contents):
-            if kind == UNIT_SAMPLE:
-                sample = decoded(kind, data)
-                samples.setdefault(sample.id, []).append(sample)
-            elif kind == IMU:
-                imus.add(data)
-            else:
-                joints.add_message(decoded(kind, data))
-    except OSError as error:
-        reason = "it does not exist" if isinstance(error, FileNotFoundError) else error.strerror
-        raise RecordingError(f"The recording {place} cannot be read: {reason}.") from error
+    for kind, data in _messages(place, contents):
+        if kind == UNIT_SAMPLE:
+            sample = decoded(kind, data)
+            samples.setdefault(sample.id, []).append(sample)
+        elif kind == IMU:
+            imus.add(data)
+        else:
+            joints.add_message(decoded(kind, data))
     if not samples:
         raise RecordingError(
             f"{place} holds no samples of sensor units: give a recording made by `pretouch skin monitor --record`."
         )
     imu = imus.traces()
     units = {unit: UnitTrace(_ranges(rows), imu.get(unit, no_imu()), rows) for unit, rows in samples.items()}
-    return SkinTrace(units, joints.trace(), joints.names, contents.complete and not contents.damaged)
+    return SkinTrace(units, joints.trace(), joints.names, contents.complete)
 
 
 def holds_units(place: Path) -> bool:
     """Whether a file is a recording of sensor units: what its first chunks hold tells."""
     contents = Contents()
     with suppress(OSError), Path(place).open("rb") as file:  # whoever opens it next says what is wrong
-        for chunk in scan(file, contents) if begins_as_mcap(file) else ():
-            kinds = {contents.of(message.channel)[1] for message in messages(chunk)}
+        for _, messages in chunks(file, contents):
+            kinds = {message.kind for message in messages}
             if UNIT_SAMPLE in kinds or not kinds.isdisjoint(TOPICS.values()):
                 return UNIT_SAMPLE in kinds
     return False
@@ -117,18 +113,16 @@ def holds_units(place: Path) -> bool:
 
 def _messages(place: Path, contents: Contents) -> Iterator[tuple[str, bytes]]:
     """Yield type and CDR of all messages to read in the whole chunks of a file."""
-    with place.open("rb") as file:
-        if not begins_as_mcap(file):
+    with open_mcap(place, "give a recording made by `pretouch skin monitor --record`") as file:
+        for message in read_messages(file, contents):
+            if message.kind in _READ:
+                yield message.kind, message.data
+    for channel in contents.channels.values():
+        if contents.kind(channel) == UNIT_SAMPLE and not is_ours(contents, channel):
             raise RecordingError(
-                f"{place} is not an MCAP file: give a recording made by `pretouch skin monitor --record`."
+                f"{place} was recorded by another version of pretouch, with different samples of units: open it with"
+                " that version."
             )
-        for _, kind, schema, data in messages_of(file, contents, lambda _topic, kind: kind in _READ):
-            if kind == UNIT_SAMPLE and not is_ours(schema, kind):
-                raise RecordingError(
-                    f"{place} was recorded by another version of pretouch, with different samples of units: open it"
-                    " with that version."
-                )
-            yield kind, data
 
 
 def _ranges(samples: list[Any]) -> RangeTrace:

@@ -11,8 +11,8 @@ from typing import Any, Protocol, Self
 
 import numpy as np
 
-from pretouch.recording.disk import Disk
-from pretouch.recording.messages import PACKAGE, Item, encoded, fields_of, make, prepare
+from pretouch.recording.disk import Disk, Item
+from pretouch.recording.messages import PACKAGE, encoded, fields_of, make, prepare
 from pretouch.recording.standard import IMU, JOINT_STATE, RANGE, header, imu_items, nanoseconds, range_item, topic_name
 from pretouch.recording.traces import check_joints, joint_items
 from pretouch.types import FloatArray
@@ -87,12 +87,12 @@ class SkinRecording:
         """
         if self._take(heard.arrival):
             self.samples += 1
-            self._disk.put([], partial(self._sample_items, unit, self._time, heard, new))
+            self._disk.put(partial(self._sample_items, unit, self._time, heard, new))
 
     def imu(self, unit: str, stamp: FloatArray, acceleration: FloatArray, angular_velocity: FloatArray) -> None:
         """Keep what a unit's IMU measured at instants (M,) [s]: (M, 3) [m/s^2], (M, 3) [rad/s], sensor frame."""
         if not self._sentence and not self.trouble:
-            self._disk.put([], partial(imu_items, unit, self._time, stamp, acceleration, angular_velocity))
+            self._disk.put(partial(imu_items, unit, self._time, stamp, acceleration, angular_velocity))
 
     def joints(self, stamp: FloatArray, q: FloatArray, qd: FloatArray | None, names: Sequence[str]) -> None:
         """Keep where an arm's n joints were at instants (M,) [s], on the clock of the samples' arrivals.
@@ -102,12 +102,12 @@ class SkinRecording:
         """
         check_joints(stamp, q, qd, names)
         if not self._sentence and not self.trouble:
-            self._disk.put([], partial(joint_items, self._time, stamp, q, qd, names))
+            self._disk.put(partial(joint_items, self._time, stamp, q, qd, names))
 
     def health(self, stamp: float, rows: Sequence[Diagnosis]) -> None:
         """Keep how the units are at an instant [s]."""
         if self._take(stamp):
-            self._disk.put([], partial(_health_items, self._time, rows))
+            self._disk.put(partial(_health_items, self._time, rows))
 
     def _take(self, stamp: float) -> bool:
         """Go on to an instant, unless nothing more is written."""

@@ -10,7 +10,8 @@ import numpy as np
 
 from pretouch.controller import Controller
 from pretouch.recording.codec import decode_inputs
-from pretouch.recording.messages import Item, encoded, make
+from pretouch.recording.disk import Item
+from pretouch.recording.messages import encoded, make
 from pretouch.sensing.sensor import PAPER_SENSOR, Sensor
 from pretouch.types import ControlStep, FloatArray, RangeReadings, RangeStatus
 

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from pretouch.errors import RecordingError
-from pretouch.recording.messages import Item, encoded, make
+from pretouch.recording.disk import Item
+from pretouch.recording.messages import encoded, make
 from pretouch.recording.standard import JOINT_STATE, header, nanoseconds
 from pretouch.traces import ImuTrace, JointTrace
 from pretouch.types import FloatArray

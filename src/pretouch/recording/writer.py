@@ -33,8 +33,8 @@ from pretouch.recording.codec import (
     encode_touch,
     encode_truth,
 )
-from pretouch.recording.disk import Disk
-from pretouch.recording.messages import TOPICS, Item, prepare
+from pretouch.recording.disk import Disk, Item
+from pretouch.recording.messages import TOPICS, prepare
 from pretouch.recording.plain import JSON
 from pretouch.recording.scene import DRAWN, Scene
 from pretouch.recording.setting import RUN, encode_run, is_described
@@ -151,7 +151,7 @@ class Recording:
         if truth is not None:
             items.append(Item("/pretouch/truth", TRUTH, number, time, encode_truth(number, truth)))
         given = data if whole else None
-        self._disk.put(items, partial(_copies, self._standard, self._scene, given, step, number, time))
+        self._disk.put(partial(_messages, items, self._standard, self._scene, given, step, number, time))
         if not self._steps:
             self._first, self._begun_at = step.stamp, monotonic()
         elif self._disk.behind() and step.stamp - self._first > _FASTER * (monotonic() - self._begun_at):
@@ -169,7 +169,7 @@ class Recording:
     def imu(self, unit_id: str, stamp: FloatArray, acceleration: FloatArray, angular_velocity: FloatArray) -> None:
         """Keep what a unit's IMU measured at instants (M,) [s]: (M, 3) [m/s^2], (M, 3) [rad/s], sensor frame."""
         if self._closed is None and not self.trouble:
-            self._disk.put([], partial(imu_items, unit_id, self._log_time, stamp, acceleration, angular_velocity))
+            self._disk.put(partial(imu_items, unit_id, self._log_time, stamp, acceleration, angular_velocity))
 
     @property
     def trouble(self) -> str:
@@ -203,9 +203,16 @@ class Recording:
         self._as_context.close()
 
 
-def _copies(
-    standard: Standard, scene: Scene, inputs: bytes | None, step: ControlStep, number: int, time: int
+def _messages(
+    items: list[Item],
+    standard: Standard,
+    scene: Scene,
+    inputs: bytes | None,
+    step: ControlStep,
+    number: int,
+    time: int,
 ) -> Iterator[Item]:
-    """Yield what a cycle is to tools that do not know our messages."""
+    """Yield the messages of a cycle, and what it is to tools that do not know our types."""
+    yield from items
     yield from standard.items(inputs, step, number, time)
     yield from scene.drawn(step, number, time)

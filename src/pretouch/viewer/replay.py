@@ -10,7 +10,6 @@ import numpy as np
 
 from pretouch.explanation import finds
 from pretouch.loop import MonotonicClock
-from pretouch.recording.codec import decode_step
 from pretouch.recording.compare import Comparison, Found
 from pretouch.recording.reader import Kept, Recorded, Run
 from pretouch.recording.surroundings import surroundings
@@ -77,7 +76,7 @@ class ReplayPage:
         self.player = Player(stamps)
         self._actions = ActionQueue(Commander(server).admits)
         found = contacts_of_other(comparison, stamps) if comparison else {}
-        self.timeline = Timeline(lambda i: decode_step(recorded.step_data(i))[1], len(recorded), found)
+        self.timeline = Timeline(recorded.step, len(recorded), found)
         self._run, self._drawn = 0, -1
         self._world = cache(lambda run: world_of(recorded.runs[run]))
         world = self._world(0)
