@@ -4,13 +4,15 @@ from pathlib import Path
 
 import numpy as np
 
-from pretouch.calibration.motion.perform import perform
+from pretouch import loop
+from pretouch.calibration.motion.follow import PlanCommander, plan_controller
 from pretouch.calibration.motion.plan import Plan, Swing
 from pretouch.cli.skin_record import record_samples
 from pretouch.recording.skin_recording import SkinRecording
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.serving.fleet import FleetParams
+from pretouch.session.session import NoUnits
 from pretouch.sim.imu import ImuParams
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.plant_params import PlantParams
@@ -36,12 +38,19 @@ def record_motion(model: RobotModel, skin: Skin, place: Path, joints_too: bool =
     with WireSkin(plant, skin, RangeFinderParams(), fleet, 0) as wire, SkinRecording(place) as recording:
         plant.advance(2.0)  # the receiver knows the units' clocks
 
-        def keep(_tick: float) -> None:
-            state = plant.read()
-            if joints_too:
-                recording.joints(np.array([state.stamp]), state.q[None].copy(), None, model.joints)
-            record_samples(recording, wire.receiver.take_samples(), skin.ids)
+        controller, stamps, positions = plan_controller(model, plan.start), [], []
+        commander = PlanCommander(controller, plan, lambda: plant.time)
 
-        done = perform(plant, PlantClock(plant, 0.01), model, plan, on_tick=keep)
-    assert done.stopped is None
-    return done.joints
+        class Recorder:
+            def record(self, cycle: loop.Cycle) -> None:
+                state = cycle.inputs.robot
+                stamps.append(state.stamp)
+                positions.append(np.array(state.q))
+                if joints_too:
+                    recording.joints(np.array([state.stamp]), positions[-1][None], None, model.joints)
+                record_samples(recording, wire.receiver.take_samples(), skin.ids)
+
+        clock, options = PlantClock(plant, 0.01), loop.Options(desired=commander)
+        loop.run(controller, plant, NoUnits(), clock, Recorder(), commander.done, options)
+    assert commander.stopped == ""
+    return JointTrace(np.array(stamps), np.array(positions))

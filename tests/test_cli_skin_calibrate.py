@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 
 from pretouch import cli
-from pretouch.cli.calibrate import live
+from pretouch.hardware.keys import save_keys
 from pretouch.imported_data.joints import read_joints
 from pretouch.robot.self_distance import capsule_ends, kinematics_of
+from pretouch.serving import threaded_arm
+from pretouch.serving.fleet import simulated_keys
 from pretouch.serving.simulated_arm import SimulatedArm
 
 ASIDE = np.array([-1.2, 0, 0, 0, 0, 0, 0])
@@ -26,25 +28,24 @@ def calibrate(*words):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ((), "The source of the calibration is missing: give --recording FILE, --plan FILE, or --robot ARM."),
-        (("--keys", "k.toml"), "The source of the calibration is missing"),
-        (("--plan", "m.csv", "--robot", "simulated"), "--plan and --robot are given: choose one of them."),
-        (("--recording", "x.mcap", "--keys", "k"), "--keys does not go with --recording: leave it out."),
+        ((), "give --recording FILE or --plan FILE, or name an arm, as in `pretouch skin calibrate simulated`."),
+        (("--keys", "k.toml"), "--keys (applied to pretouch skin calibrate)"),
+        (("--plan", "m.csv", "--recording", "x"), "--recording and --plan are given: choose one of them."),
+        (("--robot", "simulated"), "`--robot simulated` is `pretouch skin calibrate simulated` now"),
         (("--recording", "x.mcap", "--duration", "30"), "--duration does not go with --recording"),
-        (("--recording", "x.mcap", "--seed", "1"), "--seed does not go with --recording"),
-        (("--plan", "m.csv", "--units-port", "1"), "--units-port does not go with --plan"),
-        (("--robot", "simulated", "--joints", "x"), "--joints does not go with --robot"),
         (("--recording", "/nowhere.mcap"), "The recording /nowhere.mcap cannot be read: it does not exist."),
         (("--recording", "x.mcap", "--skin", "/nowhere.toml"), "/nowhere.toml cannot be read"),
         (("--recording", "x.mcap", "--out", "/dev/null/x.toml"), "/dev/null/x.toml cannot be written"),
         (("--recording", "x.mcap", "--json", "/dev/null/x.json"), "/dev/null/x.json cannot be written"),
         (("--plan", "m.csv", "--duration", "100"), "PlanParams.duration_s is 100.0: it must be at most 90"),
         (("--plan", "/dev/null/m.csv"), "/dev/null/m.csv cannot be written"),
-        (("--robot", "fr3", "--out", "s.toml"), "--robot 'fr3' is not supported: choose simulated"),
-        (("--robot", "simulated"), "--out is missing: name the skin file to write."),
-        (("--robot", "simulated", "--out", "s.toml"), "The file of keys is missing: name one with --keys."),
-        (("--robot", "simulated", "--out", "s.toml", "--keys", "k.toml", "--units-host", ""), "--units-host is empty"),
-        (("--robot", "simulated", "--out", "s.toml", "--record", "/dev/null/x.mcap"), "x.mcap cannot be written"),
+        (("fr3", "--out", "s.toml"), "No arm to move is called 'fr3'"),
+        (("simulated",), "--out is missing: name the skin file to write."),
+        (("simulated", "--joints", "x"), "--joints is unknown"),
+        (("franka", "--ip", "1.2.3.4", "--out", "s.toml"), "give the file of their keys with --keys"),
+        (("simulated", "--out", "s.toml", "--units-host", ""), "--units-host is empty"),
+        (("simulated", "--out", "s.toml", "--seed", "-1"), "--seed is -1"),
+        (("simulated", "--out", "s.toml", "--record", "/dev/null/x.mcap"), "x.mcap cannot be written"),
     ],
 )  # fmt: skip
 def test_what_makes_no_sense_is_said_in_one_sentence(tmp_path, monkeypatch, capsys, words, said):
@@ -63,9 +64,9 @@ def test_files_that_are_there_are_not_written_over_unasked(tmp_path, capsys):
         ("--recording", "x.mcap", "--out", there),
         ("--plan", there),
         ("--recording", "x.mcap", "--json", there),
-        ("--robot", "simulated", "--keys", "k.toml", "--out", there),
-        ("--robot", "simulated", "--keys", "k.toml", "--out", tmp_path / "s.toml", "--json", there),
-        ("--robot", "simulated", "--keys", "k.toml", "--out", tmp_path / "s.toml", "--record", there),
+        ("simulated", "--out", there),
+        ("simulated", "--out", tmp_path / "s.toml", "--json", there),
+        ("simulated", "--out", tmp_path / "s.toml", "--record", there),
     ):
         assert calibrate(*words) == 2
         assert f"{there} exists already: give another name, or --replace." in capsys.readouterr().err
@@ -82,8 +83,8 @@ def test_files_that_are_there_are_not_written_over_unasked(tmp_path, capsys):
         (("--recording", "x", "--joints", "bag", "--json", "bag/mine"), "would be written over --joints bag"),
         (("--recording", "x", "--skin", "mine", "--json", "mine"), "--json mine would be written over --skin mine"),
         (("--recording", "x", "--out", "new", "--json", "new"), "--json new would be written over --out new"),
-        (("--robot", "simulated", "--out", "new", "--record", "new"), "--record new would be written over --out new"),
-        (("--robot", "simulated", "--out", "s", "--keys", "mine", "--json", "mine"), "written over --keys mine"),
+        (("simulated", "--out", "new", "--record", "new"), "--record new would be written over --out new"),
+        (("simulated", "--out", "s", "--keys", "mine", "--json", "mine"), "written over --keys mine"),
     ],
 )
 def test_no_file_is_written_over_another_one_of_the_same_command(tmp_path, monkeypatch, capsys, words, said):
@@ -102,12 +103,13 @@ def test_a_table_is_no_recording_of_units(tmp_path, capsys):
     assert "give the recording with --recording, and joint states with --joints." in capsys.readouterr().err
 
 
-def test_a_port_that_is_taken_is_said_before_anything_is_planned(tmp_path, capsys):
+def test_a_port_that_is_taken_is_said_before_anything_is_planned(paper_skin, tmp_path, capsys):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one:
         one.bind(("127.0.0.1", 0))
         port = one.getsockname()[1]
+        save_keys(simulated_keys(paper_skin.ids, 0), tmp_path / "k.toml")
         files = ("--keys", tmp_path / "k.toml", "--out", tmp_path / "s.toml")
-        assert calibrate("--robot", "simulated", *files, "--units-port", port) == 2
+        assert calibrate("simulated", *files, "--units-port", port) == 2
     told = capsys.readouterr()
     assert f"Port {port} of 127.0.0.1 is in use" in told.err
     assert "planned" not in told.out
@@ -115,10 +117,10 @@ def test_a_port_that_is_taken_is_said_before_anything_is_planned(tmp_path, capsy
 
 @pytest.mark.slow
 def test_the_arm_does_not_move_without_a_persons_word(tmp_path, capsys, monkeypatch):
-    files = ("--keys", tmp_path / "k.toml", "--out", tmp_path / "s.toml", "--units-port", 0)
+    files = ("--out", tmp_path / "s.toml")
     for answer in ("", "n", "maybe"):
         monkeypatch.setattr("builtins.input", lambda question, answer=answer: answer)
-        assert calibrate("--robot", "simulated", *files) == 2
+        assert calibrate("simulated", *files) == 2
         told = capsys.readouterr()
         assert "The arm needs the space x" in told.out
         assert "While the arm moves, nobody may be within its reach" in told.out
@@ -128,17 +130,17 @@ def test_the_arm_does_not_move_without_a_persons_word(tmp_path, capsys, monkeypa
         raise EOFError
 
     monkeypatch.setattr("builtins.input", nobody)
-    assert calibrate("--robot", "simulated", *files) == 2
+    assert calibrate("simulated", *files) == 2
     assert "There is no terminal to ask for permission to move the arm: give --yes." in capsys.readouterr().err
-    assert [place.name for place in tmp_path.iterdir()] == ["k.toml"]
+    assert not list(tmp_path.iterdir())
 
 
 def test_the_way_to_the_start_is_part_of_what_is_asked_about(panda_model, tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(live, "SimulatedArm", elsewhere)
+    monkeypatch.setattr(threaded_arm, "SimulatedArm", elsewhere)
     questions = []
     monkeypatch.setattr("builtins.input", lambda question: questions.append(question) or "n")
-    files = ("--keys", tmp_path / "k.toml", "--out", tmp_path / "s.toml", "--units-port", 0)
-    assert calibrate("--robot", "simulated", *files, "--duration", 45) == 2
+    files = ("--out", tmp_path / "s.toml")
+    assert calibrate("simulated", *files, "--duration", 45) == 2
     said = capsys.readouterr().out
     told = re.search(r"moving to its start takes (\d+) s and needs the space x (\S+) to .*, y (\S+) to", said)
     assert told

@@ -317,3 +317,19 @@ def test_a_skin_that_stamps_as_it_reads_is_heard(controller: Controller, world: 
     recorder = FakeRecorder()
     loop.run(controller, world, Ahead(world), world, recorder, lambda step: len(recorder.steps) == 60)
     assert recorder.steps[-1].mode is Mode.HOLD
+
+
+def test_a_loop_that_waits_between_its_tick_and_the_arms_state_is_late_and_goes_on(
+    controller: Controller, world: World
+):
+    read = world.read
+
+    def read_late() -> RobotState:
+        if len(recorder.steps) == 30:
+            world.now += 0.07
+        return read()
+
+    world.read, recorder = read_late, FakeRecorder()
+    turn(controller, world, recorder, lambda step: len(recorder.steps) == 60)
+    assert [step.mode for step in recorder.steps[29:32]] == [Mode.TRACK, Mode.HOLD, Mode.TRACK]
+    assert "0.080 s ago" in recorder.steps[30].reason

@@ -31,6 +31,9 @@ _ENCODER_RAD = 0.02
 """By how much a measured joint position may jump [rad]: what an encoder and a joint's elasticity can do."""
 _LAG_S = 0.025
 """By how much an arm may lag behind the last command [s]: its way there, and a pause of the process that brings it."""
+_WAIT_S = 0.5
+"""How long a busy machine may keep a loop waiting between its tick and what it reads [s]: beyond, a stamp of after the
+tick is another clock's."""
 _BINS_PER_E = 1.0 / math.log(1.01)
 _BINS = 2316
 """Bins one per cent wide from a tenth of a microsecond to a thousand seconds."""
@@ -288,12 +291,15 @@ def explained(controller: Controller, state: ControllerState, robot: RobotState,
 def instant(
     tick: float, period: float, report: RobotState, readings: RangeReadings, touch: TouchReadings | None
 ) -> float:
-    """Instant of a step [s]: a port that stamps what it reads as it reads it is a little later than the tick."""
+    """Instant of a step [s]: a port that stamps what it reads as it reads it is a little later than the tick.
+
+    The arm's report may be later than that: a busy machine may keep the loop waiting between the two.
+    """
     latest = tick
-    for stamp in (getattr(given, "stamp", tick) for given in (report, readings, touch)):
+    for port, most in ((report, _WAIT_S), (readings, period), (touch, period)):
         with suppress(TypeError, ValueError):  # the controller names what is wrong
-            stamps = real(stamp, copy=False)
-            latest = max(latest, float(stamps[(stamps > tick) & (stamps <= tick + period)].max(initial=tick)))
+            stamps = real(getattr(port, "stamp", tick), copy=False)
+            latest = float(stamps[(stamps > latest) & (stamps <= latest + most)].max(initial=latest))
     return latest
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from pretouch import loop
 from pretouch.controller import Controller
+from pretouch.desired import joint_positions
 from pretouch.errors import ParameterError
 from pretouch.ports import Robot, Skin
 from pretouch.signals import ended_in_order
@@ -196,8 +197,8 @@ def _stay(cpu: int | None, undo: ExitStack) -> str:
 def warm_up(controller: Controller, robot: RobotState, points: bool = False) -> None:
     """Run steps whose results are dropped, so that nothing is left to be compiled or loaded in the loop.
 
-    They see obstacles and none, follow the path, meet a contact and a robot that cannot be believed: TRACK, REACT and
-    HOLD. The controller and its arm are left as they are.
+    They see obstacles and none, follow the path and a commander, meet a contact and a robot that cannot be believed:
+    TRACK, REACT and HOLD. The controller and its arm are left as they are.
 
     Args:
         controller: the one that the loop will turn.
@@ -213,6 +214,8 @@ def warm_up(controller: Controller, robot: RobotState, points: bool = False) -> 
         for wrench in (robot.wrench, None, quiet, push):
             for _ in range(_WARM_UP_STEPS):
                 rehearsal.step(seen, wrench, _PUSH_NM if wrench is push else 0.0)
+        for _ in range(_WARM_UP_STEPS):
+            rehearsal.step(seen, quiet, asks=True)
         # a loss that latches, and the way out of it
         rehearsal.step(seen, quiet, q=lost)
         rehearsal.step(seen, quiet, resume=True)
@@ -227,7 +230,7 @@ class _Rehearsal:
 
     def step(
         self, seen: RangeStatus | None, wrench: FloatArray | None, torque: float = 0.0, q: FloatArray | None = None,
-        resume: bool = False,
+        resume: bool = False, asks: bool = False,
     ) -> None:  # fmt: skip
         """Turn the controller once. All units say `seen`, at distances up to 1 m; without it they say nothing.
 
@@ -246,5 +249,6 @@ class _Rehearsal:
             near = self._controller.model.kinematics(self._robot.q).position + np.array([0.0, 0.3, 0.1])
             count = len(near) if seen is RangeStatus.OK else 0
             points = SeenPoints(self._now, np.full(count, self._now), near[:count], np.full(count, 0.01))
-        inputs = Inputs(self._now, robot, readings, resume, points=points)
+        stays = joint_positions(self._now, robot.q) if asks else None
+        inputs = Inputs(self._now, robot, readings, resume, points=points, desired=stays)
         _, self._state = self._controller.step(self._state, inputs)

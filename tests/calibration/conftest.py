@@ -5,8 +5,8 @@ import pytest
 from pretouch.calibration.data import CalibrationData
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
+from pretouch.sim.random_skin import random_skin
 from tests.calibration.made import MovingArm
-from tests.calibration.random_skin import random_skin
 
 
 @pytest.fixture(scope="session")

@@ -10,10 +10,10 @@ from pretouch.calibration.calibrate import calibrate
 from pretouch.calibration.data import CalibrationData
 from pretouch.errors import CalibrationError, RobotModelError
 from pretouch.sensing.skin import Skin
+from pretouch.sim.random_skin import random_skin
 from pretouch.traces import ImuTrace
 from tests.calibration.faulty import joints_late, on_the_table, slipped, without_joints
 from tests.calibration.made import EXACT, MovingArm, Noise, pose_error, turned
-from tests.calibration.random_skin import random_skin
 
 
 def test_exact_data_give_the_exact_place(panda_model, moving_arm, pair):

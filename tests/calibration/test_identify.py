@@ -11,10 +11,10 @@ from pretouch.calibration.identify import rigid_bodies
 from pretouch.calibration.params import CalibrationParams
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit
+from pretouch.sim.random_skin import random_skin
 from pretouch.traces import ImuTrace, JointTrace
 from tests.calibration.faulty import unit_of
 from tests.calibration.made import MovingArm
-from tests.calibration.random_skin import random_skin
 
 
 def test_links_that_are_fixed_to_each_other_are_one_body(panda_model):

@@ -7,8 +7,8 @@ from pretouch.calibration.calibrate import calibrate
 from pretouch.calibration.observability import Axis, observability
 from pretouch.calibration.params import CalibrationParams
 from pretouch.sensing.skin import Skin
+from pretouch.sim.random_skin import random_skin
 from tests.calibration.made import MovingArm
-from tests.calibration.random_skin import random_skin
 
 PARAMS = CalibrationParams()
 AXIS = Axis("panda_joint3", np.array([0.0, 0.1, 0.0]), np.array([0.0, 0.0, 1.0]))

@@ -21,10 +21,10 @@ from pretouch.sim.paper_scenes import Placement, dynamic_pushes, person_scene, s
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.pushes import Pusher
+from pretouch.sim.random_skin import random_skin
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import HandSpec, SceneSpec, fixtures
 from pretouch.types import Inputs, RangeReadings, RangeStatus, RobotState
-from tests.calibration.random_skin import random_skin
 from tests.golden.fields import Values, values_of
 from tests.golden.streams import model, skin
 

@@ -1,11 +1,14 @@
 """What can be said after `pretouch skin`: one dataclass a command, its docstrings are the help."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 import tyro
 
-from pretouch.cli.calibrate.options import Calibrate
+from pretouch.arms import arm_class
+from pretouch.cli.calibrate.options import Calibrate, CalibrateArm
+from pretouch.cli.words import split_arm
 from pretouch.hardware.address import HOST, PORT
 
 
@@ -227,6 +230,16 @@ class Skin:
         | Annotated[Provision, tyro.conf.subcommand("provision")]
         | Annotated[Keys, tyro.conf.subcommand("keys")]
     )
+
+    @staticmethod
+    def of_words(words: Sequence[str]) -> tuple[Any, Sequence[str], str]:
+        """Return the command, the words that are left, and those in front of them: a calibration may name an arm."""
+        if words[:1] != ["calibrate"]:
+            return Skin, words, "skin"
+        name, others = split_arm(words[1:], "skin calibrate")
+        if len(others) == len(words) - 1:
+            return Skin, words, "skin"
+        return CalibrateArm[arm_class(name)], others, f"skin calibrate {name}"  # type: ignore[misc]
 
     def run(self) -> int:
         """Run the command."""

@@ -12,8 +12,8 @@ def words(text: str) -> tuple[str, ...]:
     return tuple(part.strip() for part in text.split(",") if part.strip())
 
 
-def split_arm(words: Sequence[str]) -> tuple[str, Sequence[str]]:
-    """Return the name of the arm, the default one where none is named, and the other words.
+def split_arm(words: Sequence[str], command: str) -> tuple[str, Sequence[str]]:
+    """Return the name of the arm that the words of a command name, the default one where there is none, and the others.
 
     Raises UsageError for options by which an arm was named before.
     """
@@ -21,7 +21,7 @@ def split_arm(words: Sequence[str]) -> tuple[str, Sequence[str]]:
         option, given, text = word.partition("=")
         if option == "--robot":
             name = text if given else value
-            raise UsageError(f"`--robot {name}` is `pretouch run {name}` now, with the options of that arm alone.")
+            raise UsageError(f"`--robot {name}` is `pretouch {command} {name}` now, with options of its own.")
         if option.startswith("--ros-"):
             raise UsageError(f"{option} is an option of `pretouch run ros2` now: see pretouch run ros2 --help.")
     if words and not words[0].startswith("-"):

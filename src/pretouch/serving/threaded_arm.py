@@ -4,7 +4,7 @@ import threading
 import time
 from dataclasses import replace
 from types import TracebackType
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -17,10 +17,23 @@ _PERIOD_S = 0.002
 """Time in which a command reaches the arm, and between two of its states [s]."""
 _STUCK_S = 1.0
 """A simulation that has not moved on for so long [s] is not a slow one."""
+_LAG_S = 0.03
+"""How much older than now a state may be stamped [s]: beyond, a slow machine slows the simulated time, not the line."""
 _START_S = 120.0
 """Longest time it may take to begin [s]: everything may have to be compiled first."""
 _PUSH_N, _PUSH_AFTER_S, _PUSH_S = 14.0, 0.5, 1.5
 """What a simulated person does when asked to push the hand."""
+
+
+class _Newest(NamedTuple):
+    """What the simulation has come to: one value, for another thread reads it."""
+
+    state: RobotState
+    """Stamped with when it was due."""
+    left_out: float
+    """Time that was left out before it [s]."""
+    instant: float
+    """When it was there [s]."""
 
 
 class ThreadedArm:
@@ -33,8 +46,7 @@ class ThreadedArm:
         self._still = np.zeros(options.model.n)
         self._set_point = self._still
         self._begun, self._over = False, threading.Event()
-        self._state: RobotState | None = None
-        self._moved_on = 0.0
+        self._newest: _Newest | None = None
         self._started, self._failure = threading.Event(), ""
         self._push, self._push_span = np.zeros(3), (np.inf, np.inf)
         plant = self._arm.plant
@@ -56,11 +68,13 @@ class ThreadedArm:
         self._arm.__exit__(kind, error, trace)
 
     def read(self) -> RobotState:
-        """Return the newest state, as of now: a machine that is too slow slows the simulated time, and not the line."""
-        if self._state is None or self._failure:
+        """Return the newest state, stamped with when it was due: at most `_LAG_S` ago, and never after now."""
+        newest = self._newest
+        if newest is None or self._failure:
             raise RobotError(f"The simulation has ended: {self._failure or 'it was closed'}.")
-        now = time.monotonic()
-        return replace(self._state, stamp=now if now < self._moved_on + _STUCK_S else self._moved_on)
+        now = time.monotonic()  # after the state: this thread may have to wait between the two
+        latest = now if now < newest.instant + _STUCK_S else newest.instant
+        return replace(newest.state, stamp=min(now, max(newest.state.stamp, latest - _LAG_S)))
 
     def command(self, qd: FloatArray) -> None:
         """Take joint velocities (n,) [rad/s] as the set-point until the next command."""
@@ -84,13 +98,14 @@ class ThreadedArm:
 
     def report(self) -> str:
         """Say whether the machine was fast enough."""
-        late = self.left_out
+        late = self._arm.clock.left_out
         return f"This machine is too slow by {late:.1f} s for the simulation." if late else ""
 
     @property
     def left_out(self) -> float:
-        """Time that this machine was too slow to simulate so far [s]."""
-        return self._arm.clock.left_out
+        """Time that this machine was too slow to simulate by now [s]; of what is not left out yet it may make up."""
+        newest = self._newest
+        return 0.0 if newest is None else newest.left_out + max(0.0, time.monotonic() - _LAG_S - newest.state.stamp)
 
     def push(self, axis: tuple[float, float, float]) -> None:
         """Let a simulated person push the hand along an axis of the base, in a moment and for a while."""
@@ -108,7 +123,9 @@ class ThreadedArm:
             while not self._over.is_set():
                 arm.command(self._set_point)
                 arm.tick()
-                self._state, self._moved_on = arm.read(), time.monotonic()
+                state = arm.read()
+                state = replace(state, stamp=arm.monotonic(state.stamp))
+                self._newest = _Newest(state, arm.clock.left_out, time.monotonic())
                 self._started.set()
         except Exception as error:
             self._failure = f"{type(error).__name__}: {error}"

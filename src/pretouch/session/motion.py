@@ -7,13 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pretouch import realtime
-from pretouch.calibration.motion.perform import PerformParams, perform
+from pretouch import loop, realtime
+from pretouch.calibration.motion.follow import PlanCommander, plan_controller
 from pretouch.calibration.motion.plan import Plan
 from pretouch.controller import Controller
 from pretouch.errors import PretouchError
 from pretouch.loop import MonotonicClock, Recorder
 from pretouch.ports import Arm, Skin
+from pretouch.session.session import NoUnits
 from pretouch.signals import noted_in_motion
 from pretouch.types import ControlStep
 
@@ -50,30 +51,54 @@ _STILL_RAD_S = 0.05
 """Six standard deviations of the joint velocity that a Panda measures at rest [rad/s]."""
 
 
-class _Interrupted(Exception):
-    """A signal came while the arm moved."""
+class NoRecorder:
+    """Keeps nothing."""
+
+    def record(self, cycle: loop.Cycle) -> None:
+        """Keep nothing."""
 
 
-def go(arm: Arm, controller: Controller, way: Plan, ending: Ending) -> None:
-    """Let an arm go a planned way. A signal stops it, and is raised after it has come to rest."""
-    period = controller.profile.task.control_period_s
+NO_RECORDER = NoRecorder()
+
+
+def go(
+    arm: Arm,
+    controller: Controller,
+    way: Plan,
+    ending: Ending,
+    recorder: Recorder = NO_RECORDER,
+    left_out: Callable[[], float] = lambda: 0.0,
+) -> None:
+    """Let an arm follow a plan, without a skin. A signal stops it, and is raised after it has come to rest.
+
+    What the arm follows, and what ends it early, is `calibration.motion.follow`'s. `controller` gives arm and rate,
+    `left_out` the time that this machine was too slow to simulate the arm so far [s].
+    """
+    blind = plan_controller(controller.model, np.array(arm.read().q), controller.profile)
+    realtime.warm_up(blind, arm.read())
+    commander = PlanCommander(blind, way, time.monotonic, left_out)
 
     def move(came: list[int]) -> str:
-        def look(_tick: float) -> None:
-            if came:
-                raise _Interrupted("a signal came")
+        def done(step: ControlStep) -> bool:
+            return bool(came) or commander.done(step)
 
-        params = PerformParams(period_s=period)
-        done = perform(arm, MonotonicClock(period), controller.model, way, params, look)
-        return done.stopped or ""
+        clock, options = MonotonicClock(blind.limits.period), loop.Options(desired=commander)
+        loop.run(blind, arm, NoUnits(), clock, recorder, done, options)
+        return "A signal came." if came else commander.stopped
 
     _run_motion(arm, move, ending)
 
 
 def follow(
-    controller: Controller, arm: Arm, skin: Skin, clock: MonotonicClock, recorder: Recorder,
-    done: Callable[[ControlStep], bool], options: realtime.Options, ending: Ending,
-) -> None:  # fmt: skip
+    controller: Controller,
+    arm: Arm,
+    skin: Skin,
+    clock: MonotonicClock,
+    recorder: Recorder,
+    done: Callable[[ControlStep], bool],
+    options: realtime.Options,
+    ending: Ending,
+) -> None:
     """Turn the controller until `done` says so, a signal comes, or something fails. The arguments are `realtime.run`'s.
 
     Everything is compiled before the arm takes commands. A signal is raised after the arm has come to rest.

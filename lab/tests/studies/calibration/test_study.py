@@ -7,8 +7,8 @@ from scipy.spatial.transform import Rotation
 
 from pretouch.calibration.result import Place
 from pretouch.errors import ExperimentError
+from pretouch.sim.random_skin import random_skin
 from pretouch_lab.studies.calibration.errors import NOT_FOUND, place_row
-from pretouch_lab.studies.calibration.random_skin import random_skin
 from pretouch_lab.studies.calibration.study import Study, study
 from pretouch_lab.studies.calibration.table import by_link
 

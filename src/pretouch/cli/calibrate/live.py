@@ -1,108 +1,111 @@
-"""What `pretouch skin calibrate --robot` does: the arm makes the motion, all is recorded, and that is calibrated."""
+"""What `pretouch skin calibrate ARM` does: the arm makes the motion, all is recorded, and that is calibrated."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
-from functools import partial
+from collections.abc import Callable
+from contextlib import suppress
 from itertools import count
 from pathlib import Path
 from shlex import join
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
-from pretouch.calibration.motion.perform import PerformParams
+from pretouch.arms import ArmSetup, OpenedArm
+from pretouch.calibration.motion.follow import START_RAD, plan_controller
 from pretouch.calibration.motion.plan import Plan
 from pretouch.calibration.motion.report import report_on
 from pretouch.calibration.motion.route import approach
 from pretouch.cli.calibrate.motion import planned
 from pretouch.cli.calibrate.outputs import Outputs, check_free, same_file
 from pretouch.cli.calibrate.recording import Sources, calibrate_recording
-from pretouch.cli.calibrate.session import Session
-from pretouch.cli.skin_keys import keys_file
-from pretouch.cli.skin_simulate import keys_for
+from pretouch.cli.run.setup import heard_units
+from pretouch.cli.skin_record import record_samples
 from pretouch.cli.writing import check_writable
-from pretouch.errors import CalibrationError, HardwareError
-from pretouch.hardware.address import EVERYWHERE, HOST
-from pretouch.hardware.network_skin import NetworkSkin
+from pretouch.errors import CalibrationError, HardwareError, RecordingError, RobotError
+from pretouch.loop import Cycle, MonotonicClock
+from pretouch.ports import Arm
+from pretouch.profiles import PROFILES
 from pretouch.recording.skin_recording import SkinRecording
 from pretouch.robot.model import RobotModel
 from pretouch.robot.named import robot_named
 from pretouch.sensing.skin import skin_for
-from pretouch.serving.simulated_arm import CATCH_UP_S, SimulatedArm, SimulateOptions
+from pretouch.session.motion import Ending, go
+from pretouch.session.units import Units, wait_until_live
 from pretouch.signals import Terminated
 
 if TYPE_CHECKING:
-    from pretouch.cli.calibrate.options import Calibrate, MotionOptions
+    from pretouch.cli.calibrate.options import CalibrateArm
 
-_ROBOTS = ("simulated",)
+_STEADY_S, _PATIENCE_S = 3.0, 20.0
+"""Units that were heard for so long have clocks that are known; for so long they are waited for [s]."""
+_AFTER_S = 0.5
+"""What was measured up to the end of a motion has arrived then [s]."""
 
 
-def calibrate_live(command: "Calibrate", outputs: Outputs) -> int:
+def calibrate_live(command: "CalibrateArm[Any]", outputs: Outputs) -> int:
     """Calibrate the units of an arm that is moved; return 1 if a unit was refused or the motion ended early, or 0."""
-    if command.live.robot not in _ROBOTS:
-        raise HardwareError(
-            f"--robot {command.live.robot!r} is not supported: choose {' or '.join(_ROBOTS)}, or run the motion of"
-            " --plan with your own driver and calibrate from its --recording."
-        )
-    if not outputs.skin:
-        raise CalibrationError("--out is missing: name the skin file to write.")
-    if not command.live.units_host:
-        raise HardwareError(f"--units-host is empty: give {HOST}, or {EVERYWHERE} for every address of this machine.")
     place = _recording_place(command)
-    model, again = RobotModel(robot_named(command.arm)), _again(command, place)
-    with _session(command, model) as session:
-        ways = _ways(session, model, command.motion)
-        if not command.live.yes:
-            _ask(sum(way.duration for way in ways))
+    model, again = RobotModel(command.connection.described(robot_named(command.arm))), _again(command, place)
+    skin = skin_for(model, command.skin)
+    setup = ArmSetup(
+        name=command.arm,
+        model=model,
+        skin=skin,
+        units=not command.units.keys,
+        profile=PROFILES["blind"],
+        start=lambda: model.description.q_ready,
+        floor=command.motion.floor,
+        priority=None,
+        yes=command.yes,
+    )
+    command.connection.check(setup)
+    with (
+        command.connection.open(setup) as opened,
+        heard_units(command.units, skin, opened) as (_, units),
+    ):
+        if units is None:
+            raise HardwareError("A calibration hears the units' IMUs over the network: give their keys with --keys.")
+        plans = _plans(opened.arm, model, command)
+        if not command.yes:
+            _ask(sum(plan.duration for plan in plans))
+        against = opened.arm.unfit()
+        if against:
+            raise RobotError(" ".join(against))
         print("Waiting for the units.", flush=True)
-        session.wait_for_units()
+        wait_until_live(units, MonotonicClock(0.01), lambda _: None, _PATIENCE_S, _STEADY_S)
         print(f"All measurements are recorded in {place}. {again}", flush=True)
-        stopped = _recorded(session, ways, place, again)
-    if stopped:
+        early = _recorded(opened, model, plans, units, skin.network.ids, place, again)
+        report = opened.arm.report()
+        if report:
+            print(report, flush=True)
+    if early:
         return 1
-    skin = Path(command.skin) if command.skin else None
     try:
-        return calibrate_recording(model, Sources(place, skin=skin), outputs)
+        return calibrate_recording(model, Sources(place, skin=Path(command.skin) if command.skin else None), outputs)
     except BaseException:
         with suppress(OSError):  # the terminal may be gone
             print(f"The calibration was not finished. The measurements are in {place}. {again}", flush=True)
         raise
 
 
-def _recording_place(command: "Calibrate") -> Path:
+def _recording_place(command: "CalibrateArm[Any]") -> Path:
     """Return the recording to write, which is not there yet."""
     out, others = Path(command.out), [Path(file) for file in (command.out, command.json) if file]
     beside = (out.with_name(f"{out.stem}-calibration-{n}.mcap") for n in count(1))
     free = (one for one in beside if not one.exists() and not any(same_file(file, one) for file in others))
-    place = Path(command.live.record or next(free))
+    place = Path(command.record or next(free))
     check_free("recording", place, replace=False)
     check_writable("recording", place)
     return place
 
 
-@contextmanager
-def _session(command: "Calibrate", model: RobotModel) -> Iterator[Session]:
-    """Hear the units of a simulated arm."""
-    skin = skin_for(model, command.skin)
-    keys = keys_for(keys_file(command.live.keys), skin)
-    host = command.live.units_host
-    with NetworkSkin(skin.network, keys, host, command.live.units_port) as source:
-        here = HOST if host == EVERYWHERE else host
-        options = SimulateOptions(model, skin, keys, here, source.address[1], hand=False, seed=command.seed)
-        with SimulatedArm(options, model.description.q_ready, PerformParams().period_s, late=CATCH_UP_S) as arm:
-            yield Session(arm, model, source, skin.network.ids)
-        if arm.clock.left_out:
-            print(f"This machine is too slow by {arm.clock.left_out:.1f} s for the simulation: its data have gaps.")
-
-
-def _ways(session: Session, model: RobotModel, options: "MotionOptions") -> list[Plan]:
+def _plans(arm: Arm, model: RobotModel, command: "CalibrateArm[Any]") -> list[Plan]:
     """Return the motion, after a motion to its start if the arm is elsewhere, and print the space for both."""
-    plan, params = planned(model, options)
+    plan, params = planned(model, command.motion)
     print(report_on(model, plan, params), flush=True)
-    q = session.posture()
-    if np.abs(q - plan.start).max() <= PerformParams().start_tolerance_rad / 2:
+    q = np.array(arm.read().q)
+    if np.abs(q - plan.start).max() <= START_RAD / 2:
         return [plan]
     way = approach(model, q, plan, params)
     room = report_on(model, way, params)
@@ -122,12 +125,44 @@ def _ask(duration: float) -> None:
         raise CalibrationError("The arm was not moved: answer y to allow it.")
 
 
-def _recorded(session: Session, ways: list[Plan], place: Path, again: str) -> str | None:
-    """Let the arm move, and record all; return why it was stopped, or None."""
+class Measurements:
+    """Records what units and joints measure while an arm moves; a `loop.Recorder`."""
+
+    def __init__(self, recording: SkinRecording, units: Units, ids: tuple[str, ...], joints: tuple[str, ...]) -> None:
+        """Take where to record, what hears the units of these ids, and the names of the joints."""
+        self._recording, self._units, self._ids, self._joints = recording, units, ids, joints
+        self._newest = -np.inf
+        self.progress: Callable[[], None] = lambda: None
+        """Called at each step."""
+        units.take_samples()  # of before
+
+    def record(self, cycle: Cycle) -> None:
+        """Record what is new; a receiver that has ended, and a disk that is full, are an error."""
+        self.take()
+        state = cycle.inputs.robot
+        if state.stamp > self._newest:
+            self._newest = state.stamp
+            q, qd = (np.array(values)[None] for values in (state.q, state.qd))
+            self._recording.joints(np.array([state.stamp]), q, qd, self._joints)
+        if self._recording.trouble:
+            raise RecordingError(self._recording.trouble)
+        self.progress()
+
+    def take(self) -> None:
+        """Record what the units have measured."""
+        if not self._units.alive:
+            raise HardwareError("The receiver of the units has ended: see what it printed.")
+        record_samples(self._recording, self._units.take_samples(), self._ids)
+
+
+def _recorded(
+    opened: OpenedArm, model: RobotModel, plans: list[Plan], units: Units, ids: tuple[str, ...], place: Path, again: str
+) -> bool:
+    """Let the arm move, and record all; return whether that ended early."""
+    ending = Ending()
     with SkinRecording(place) as recording:
-        session.record(recording)
         try:
-            stopped = _moved(session, ways)
+            _move(opened, model, plans, Measurements(recording, units, ids, model.joints), ending)
         except (KeyboardInterrupt, Terminated):
             with suppress(OSError):  # the terminal may be gone
                 print(f"The arm was stopped. {recording.close()} {again}", flush=True)
@@ -135,29 +170,42 @@ def _recorded(session: Session, ways: list[Plan], place: Path, again: str) -> st
         except BaseException:
             print(recording.close(), flush=True)
             raise
-        kept = recording.close()
-    print(f"The motion was ended early. {stopped}\n{kept} {again}" if stopped else kept, flush=True)
-    return stopped
+        sentence = recording.close()
+    if ending.early:
+        print("\n".join((*ending.sentences(), f"{sentence} {again}")), flush=True)
+    else:
+        print(sentence, flush=True)
+    return ending.early
 
 
-def _moved(session: Session, ways: list[Plan]) -> str | None:
-    """Let the arm go to the start of the motion and make it; return why it was stopped, or None."""
+def _move(opened: OpenedArm, model: RobotModel, plans: list[Plan], measurements: Measurements, ending: Ending) -> None:
+    """Let the arm go to the start of the motion and make it, and stand until all that was measured has arrived."""
+    controller = plan_controller(model, np.array(opened.arm.read().q))
     columns = TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn()
     with Progress(*columns, console=Console(stderr=True)) as bar:
-        for way in ways:
-            task = bar.add_task("motion" if way is ways[-1] else "motion to its start", total=way.duration)
-            stopped = session.follow(way, partial(_progress, bar, task))
-            if stopped:
-                return stopped
-        session.stand()
-    return None
+        for plan in plans:
+            task = bar.add_task("motion" if plan is plans[-1] else "motion to its start", total=plan.duration)
+            measurements.progress = _Advance(bar, task, controller.limits.period)
+            go(opened.arm, controller, plan, ending, measurements, opened.left_out)
+            if ending.early:
+                return
+    clock = MonotonicClock(controller.limits.period)
+    begin = clock.tick()
+    while clock.tick() - begin < _AFTER_S:
+        measurements.take()
 
 
-def _progress(bar: Progress, task: TaskID, since: float) -> None:
-    bar.update(task, completed=since)
+class _Advance:
+    """Advances a bar by a period at each step."""
+
+    def __init__(self, bar: Progress, task: TaskID, period: float) -> None:
+        self._bar, self._task, self._period = bar, task, period
+
+    def __call__(self) -> None:
+        self._bar.advance(self._task, self._period)
 
 
-def _again(command: "Calibrate", place: Path) -> str:
+def _again(command: "CalibrateArm[Any]", place: Path) -> str:
     """Say how to calibrate from the recording alone."""
     words = ["pretouch", "skin", "calibrate", "--recording", str(place), "--arm", command.arm, "--out", command.out]
     for option, value in (("--skin", command.skin), ("--json", command.json)):

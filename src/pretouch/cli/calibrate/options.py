@@ -3,10 +3,10 @@
 from collections.abc import Iterator
 from dataclasses import MISSING, Field, dataclass, field, fields, is_dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Generic, Literal
 
-from pretouch.errors import CalibrationError
-from pretouch.hardware.address import HOST, PORT
+from pretouch.cli.run.options import A, UnitOptions
+from pretouch.errors import CalibrationError, HardwareError
 
 
 @dataclass(frozen=True)
@@ -20,24 +20,6 @@ class RecordingOptions:
     clock."""
     topic: str = ""
     """Topic of the joint states in that file, if there are several."""
-
-
-@dataclass(frozen=True)
-class LiveOptions:
-    """Calibrate live: the arm runs the motion, everything is recorded, and the units are calibrated from that."""
-
-    robot: str = ""
-    """The arm to move: `simulated`, with simulated units."""
-    keys: str = ""
-    """File of the units' keys; with a simulated arm it is created if it is missing."""
-    units_host: str = HOST
-    """Address to receive units at; real ones need 0.0.0.0, which is every address of this machine."""
-    units_port: int = PORT
-    """UDP port to receive units at."""
-    record: str = ""
-    """Recording to write; by default a new one beside the skin file."""
-    yes: bool = False
-    """Do not ask before the arm moves."""
 
 
 @dataclass(frozen=True)
@@ -63,18 +45,17 @@ class MotionOptions:
 class Calibrate:
     """Find the pose of each unit, from its IMU and the joint positions of the moving arm, and write the skin file.
 
+    `pretouch skin calibrate NAME` moves an arm itself: simulated, franka, or one that another distribution adds.
     The exit code is 1 if a unit was refused.
     """
 
     recorded: RecordingOptions = field(default_factory=RecordingOptions)
-    live: LiveOptions = field(default_factory=LiveOptions)
     motion: MotionOptions = field(default_factory=MotionOptions)
     plan: str = ""
     """CSV file to write the motion to, for your own driver (time_s, q1_rad to qn_rad, qd1_rad_s to qdn_rad_s),
     instead of running it."""
     skin: str = ""
-    """Skin file with the units and their assumed links, which are checked; without it, links are identified.
-    A simulated arm carries these units, without it the seven that come with the package."""
+    """Skin file with the units and their assumed links, which are checked; without it, links are identified."""
     out: str = ""
     """Skin file to write: places and how well they are known. Refused units are as in --skin, or left out."""
     json: str = ""
@@ -83,23 +64,56 @@ class Calibrate:
     """Overwrite existing files."""
     arm: str = "panda"
     """panda, fr3, or the folder of an imported arm."""
-    seed: int = 0
-    """Seed of everything that is random in a simulation."""
 
     def run(self) -> int:
         """Calibrate, and show and write the answer."""
         return calibrate_skin(self, mode_of(self))
 
 
-Mode = Literal["recording", "plan", "robot"]
-_ANY = {"arm"}
-_MOTION = {"duration", "variant", "reach", "speed", "clearance", "floor"}
+@dataclass(frozen=True)
+class CalibrateArm(Generic[A]):
+    """Let an arm make the calibration motion, find the pose of each unit from that, and write the skin file.
+
+    Nothing sees a person meanwhile. The exit code is 1 if a unit was refused or the motion ended early.
+    """
+
+    connection: A
+    units: UnitOptions = field(default_factory=UnitOptions)
+    motion: MotionOptions = field(default_factory=MotionOptions)
+    skin: str = ""
+    """Skin file with the units and their assumed links, which are checked; without it, the seven that come with the
+    package are heard, and links are identified."""
+    out: str = ""
+    """Skin file to write: places and how well they are known. Refused units are as in --skin, or left out."""
+    record: str = ""
+    """Recording to write; by default a new one beside the skin file."""
+    json: str = ""
+    """File for the numbers, or - for standard output: text then goes to standard error."""
+    replace: bool = False
+    """Overwrite existing files."""
+    arm: str = "panda"
+    """panda, fr3, or the folder of an imported arm."""
+    yes: bool = False
+    """Do not ask before the arm moves."""
+
+    def run(self) -> int:
+        """Move the arm, calibrate, and show and write the answer."""
+        from pretouch.cli.calibrate.live import calibrate_live
+        from pretouch.cli.calibrate.outputs import outputs_of
+
+        if not self.out:
+            raise CalibrationError("--out is missing: name the skin file to write.")
+        if not (self.units.keys or self.connection.brings_units):
+            raise HardwareError("The arm brings no sensor units: give the file of their keys with --keys.")
+        self.units.check()
+        with outputs_of(self) as outputs:
+            return calibrate_live(self, outputs)
+
+
+Mode = Literal["recording", "plan"]
 _OPTIONS: dict[Mode, set[str]] = {
-    "recording": {"recording", "joints", "topic", "skin", "out", "json", "replace"} | _ANY,
-    "plan": {"plan", "replace"} | _MOTION | _ANY,
-    "robot": {"robot", "keys", "units_host", "units_port", "record", "yes", "skin", "out", "json", "replace", "seed"}
-    | _MOTION
-    | _ANY,
+    "recording": {"recording", "joints", "topic", "skin", "out", "json", "replace", "arm"},
+    "plan": {"plan", "replace", "arm", "duration", "variant", "reach", "speed", "clearance", "floor"},
 }
 
 
@@ -109,7 +123,8 @@ def mode_of(command: Calibrate) -> Mode:
     modes = [mode for mode in _OPTIONS if mode in given]
     if not modes:
         raise CalibrationError(
-            "The source of the calibration is missing: give --recording FILE, --plan FILE, or --robot ARM."
+            "The source of the calibration is missing: give --recording FILE or --plan FILE, or name an arm, as in"
+            " `pretouch skin calibrate simulated`."
         )
     if len(modes) > 1:
         raise CalibrationError(f"{' and '.join(map(_flag, modes))} are given: choose one of them.")
@@ -153,10 +168,6 @@ def calibrate_skin(command: Calibrate, mode: Mode) -> int:
         write_motion(command)
         return 0
     with outputs_of(command) as outputs:
-        if mode == "robot":
-            from pretouch.cli.calibrate.live import calibrate_live
-
-            return calibrate_live(command, outputs)
         c = command.recorded
         joints, skin = (Path(text) if text else None for text in (c.joints, command.skin))
         sources = Sources(Path(c.recording), joints, c.topic, skin)

@@ -12,7 +12,7 @@ from pretouch.cli.writing import check_writable, numbers_to
 from pretouch.errors import CalibrationError
 
 if TYPE_CHECKING:
-    from pretouch.cli.calibrate.options import Calibrate
+    from pretouch.cli.calibrate.options import Calibrate, CalibrateArm
 
 _WRITTEN = {"out", "json", "record"}
 
@@ -27,7 +27,7 @@ class Outputs:
 
 
 @contextmanager
-def outputs_of(command: "Calibrate") -> Iterator[Outputs]:
+def outputs_of(command: "Calibrate | CalibrateArm[Any]") -> Iterator[Outputs]:
     """Give what is asked for.
 
     CalibrationError or ExperimentError for what could not be written, or is also another input or output file.
@@ -56,13 +56,19 @@ def same_file(one: Path, other: Path) -> bool:
     return second.is_relative_to(first)
 
 
-def _check_apart(command: "Calibrate") -> None:
+def _check_apart(command: "Calibrate | CalibrateArm[Any]") -> None:
     """Raise CalibrationError where a file to write is one to read, or another to write; --out may be --skin."""
-    given = {
-        "recording": command.recorded.recording, "joints": command.recorded.joints, "keys": command.live.keys,
-        "skin": command.skin, "out": command.out, "json": command.json, "record": command.live.record,
-    }  # fmt: skip
-    for (one, first), (other, second) in combinations(((name, text) for name, text in given.items() if text), 2):
+    recorded, units = getattr(command, "recorded", None), getattr(command, "units", None)
+    files = {
+        "recording": getattr(recorded, "recording", ""),
+        "joints": getattr(recorded, "joints", ""),
+        "keys": getattr(units, "keys", ""),
+        "skin": command.skin,
+        "out": command.out,
+        "json": command.json,
+        "record": getattr(command, "record", ""),
+    }
+    for (one, first), (other, second) in combinations(((name, text) for name, text in files.items() if text), 2):
         if other in _WRITTEN and (one, other) != ("skin", "out") and same_file(Path(first), Path(second)):
             raise CalibrationError(
                 f"--{other} {second} would be written over --{one} {first}: give --{other} another name."

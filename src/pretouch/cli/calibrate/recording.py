@@ -75,8 +75,8 @@ def _joints(model: RobotModel, measured: Measured, sources: Sources) -> tuple[Jo
         raise CalibrationError("--topic needs --joints: it names a topic of that file.")
     if measured.joints is None:
         raise CalibrationError(
-            f"{sources.recording} has no joint states: give the file that has them with --joints, or run the motion"
-            " with --robot."
+            f"{sources.recording} has no joint states: give the file that has them with --joints, or let"
+            " `pretouch skin calibrate NAME` move the arm."
         )
     missing = [name for name in model.joints if name not in measured.joint_names]
     if missing:

@@ -47,7 +47,7 @@ def run(command: "Run[Any]", write: Callable[[Any], None]) -> int:
     with (
         ExitStack() as last,
         command.connection.open(setup) as found,
-        heard_units(command, made, found) as (skin, units),
+        heard_units(command.units, made.skin, found) as (skin, units),
     ):
         try:
             return _run(command, made, found, (skin, units), last, write)

@@ -86,7 +86,7 @@ def _go_to_start(session: Session, approach: Plan | None, tell: Callable[[str], 
     """Let the arm go to where its path begins, if it is to; return whether it is there."""
     if approach is None:
         return True
-    go(session.arm, session.controller, approach, ending)
+    go(session.arm, session.controller, approach, ending, left_out=session.left_out)
     if not ending.early:
         try:
             ending.stopped = " ".join(refusals(check_start(session.controller, np.array(session.arm.read().q))))

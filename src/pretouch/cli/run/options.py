@@ -31,19 +31,30 @@ class RobotOptions:
 
 
 @dataclass(frozen=True)
-class SkinOptions:
-    """The sensor units."""
+class UnitOptions:
+    """Where the sensor units are heard."""
 
-    skin: str = ""
-    """Skin file; by default the seven units that come with the package."""
-    no_skin: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
-    """The arm carries no units. The profile must not need any, such as blind."""
     keys: str = ""
     """File of the keys of units that are received over the network; without it, the units that the arm brings."""
     units_host: str = HOST
     """Address to receive units at; real ones need 0.0.0.0, which is every address of this machine."""
     units_port: int = PORT
     """UDP port to receive units at."""
+
+    def check(self) -> None:
+        """Refuse an address that is none: a HardwareError."""
+        if not self.units_host:
+            raise HardwareError("--units-host is empty: give 127.0.0.1, or 0.0.0.0 for every address of this machine.")
+
+
+@dataclass(frozen=True)
+class SkinOptions(UnitOptions):
+    """The sensor units."""
+
+    skin: str = ""
+    """Skin file; by default the seven units that come with the package."""
+    no_skin: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    """The arm carries no units. The profile must not need any, such as blind."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +106,7 @@ class Run(Generic[A]):
     @staticmethod
     def of_words(words: Sequence[str]) -> tuple[Any, Sequence[str], str]:
         """Return the command for the arm that the first word names, the other words, and what is in front of them."""
-        name, others = split_arm(words)
+        name, others = split_arm(words, "run")
         return Run[arm_class(name)], others, f"run {name}" if len(others) < len(words) else "run"  # type: ignore[misc]
 
     @staticmethod
@@ -123,7 +134,6 @@ def check_options(command: Run[Any]) -> None:
         raise HardwareError("The arm brings no sensor units: give the file of their keys with --keys, or --no-skin.")
     if robot.no_learnt and (robot.learnt or robot.learn_anew):
         raise RobotError("--no-learnt does not go with --learnt and --learn-anew: leave one or the other out.")
-    if not units.units_host:
-        raise HardwareError("--units-host is empty: give 127.0.0.1, or 0.0.0.0 for every address of this machine.")
+    units.check()
     if not 0.0 <= command.task.seconds < float("inf"):
         raise ParameterError(f"--seconds is {command.task.seconds:g}: give 0 or more.")

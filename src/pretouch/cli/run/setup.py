@@ -37,7 +37,7 @@ from pretouch.sim.scene import SceneSpec
 from pretouch.types import FloatArray
 
 if TYPE_CHECKING:
-    from pretouch.cli.run.options import RobotOptions, Run, TaskOptions
+    from pretouch.cli.run.options import RobotOptions, Run, TaskOptions, UnitOptions
 
 _SHORTEST_M = 1e-5
 """A path must have a length: over so little an arm stands."""
@@ -153,21 +153,20 @@ def free_motion(options: "RobotOptions", controller: Controller, robot: str) -> 
 
 
 @contextmanager
-def heard_units(command: "Run[Any]", setup: RunSetup, opened: OpenedArm) -> Iterator[tuple[SkinPort, Units | None]]:
-    """Hear the units: over the network where there are keys, or else those that the arm brings."""
-    if not len(setup.skin):
+def heard_units(where: "UnitOptions", skin: Skin, opened: OpenedArm) -> Iterator[tuple[SkinPort, Units | None]]:
+    """Hear the units of a skin: over the network where there are keys, or else those that the arm brings."""
+    if not len(skin):
         yield NoUnits(), None
-    elif not command.units.keys:
+    elif not where.keys:
         if opened.skin is None:
             raise HardwareError(f"{opened.arm.name} brings no sensor units: give the file of their keys with --keys.")
         if opened.units is not None:
             print(f"Receiving units at {opened.units.address[0]}:{opened.units.address[1]}.", flush=True)
         yield opened.skin, opened.units
     else:
-        c = command.units
-        keys = load_keys(keys_file(c.keys))
+        keys = load_keys(keys_file(where.keys))
         with children_undisturbed():
-            receiver = NetworkSkin(setup.skin.network, keys, c.units_host, c.units_port)
+            receiver = NetworkSkin(skin.network, keys, where.units_host, where.units_port)
         with receiver as units:
             print(f"Receiving units at {units.address[0]}:{units.address[1]}.", flush=True)
             yield units, units

@@ -3,11 +3,13 @@
 import numpy as np
 
 from pretouch.calibration.data import CalibrationData, UnitData
-from pretouch.calibration.motion.perform import PerformParams, perform
+from pretouch.calibration.motion.follow import PlanCommander, plan_controller
 from pretouch.calibration.motion.plan import Plan
 from pretouch.errors import ExperimentError
+from pretouch.loop import Cycle, Options, run
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
+from pretouch.session.session import NoUnits
 from pretouch.sim.imu import ImuParams, Imus, ImuSample, imu_counts
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.plant_params import PlantParams
@@ -35,16 +37,31 @@ def simulate(
     plant = Plant(model, SceneSpec(), PlantParams(), plan.start, seed)
     samples: list[ImuSample] = []
     Imus(plant, skin, imu, seed, samples.append)
-    params = PerformParams()
-    done = perform(plant, PlantClock(plant, params.period_s), model, plan, params)
-    if done.stopped:
-        raise ExperimentError(f"The simulated arm did not follow the plan to its end. {done.stopped}")
-    late = clock_errors(len(skin), seed, clock_error_s) - done.begin
+    joints, begin = followed(plant, model, plan)
+    late = clock_errors(len(skin), seed, clock_error_s) - begin
     units = tuple(
         UnitData(unit.id, trace, unit.link if links_known else None, *_full_scale(imu))
         for unit, trace in zip(skin.units, _traces(samples, imu, late), strict=True)
     )
-    return CalibrationData(JointTrace(done.joints.stamp - done.begin, done.joints.q), units)
+    return CalibrationData(JointTrace(joints.stamp - begin, joints.q), units)
+
+
+def followed(plant: Plant, model: RobotModel, plan: Plan) -> tuple[JointTrace, float]:
+    """Let an arm follow a plan; return the joint positions measured meanwhile, and when it began [s]."""
+    controller = plan_controller(model, plan.start)
+    commander = PlanCommander(controller, plan, lambda: plant.time)
+    states: list[tuple[float, FloatArray]] = []
+
+    class Recorder:
+        def record(self, cycle: Cycle) -> None:
+            if commander.begin is not None:
+                states.append((cycle.inputs.robot.stamp, np.array(cycle.inputs.robot.q)))
+
+    clock = PlantClock(plant, controller.limits.period)
+    run(controller, plant, NoUnits(), clock, Recorder(), commander.done, Options(desired=commander))
+    if commander.stopped or commander.begin is None:
+        raise ExperimentError(f"The simulated arm did not follow the plan to its end. {commander.stopped}")
+    return JointTrace(np.array([stamp for stamp, _ in states]), np.array([q for _, q in states])), commander.begin
 
 
 def clock_errors(count: int, seed: int, most: float = CLOCK_ERROR_S) -> FloatArray:

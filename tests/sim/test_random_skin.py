@@ -1,9 +1,11 @@
+"""Random skins: a unit a link, on its surface."""
+
 import numpy as np
 import pytest
 
 from pretouch.robot.description import fr3
 from pretouch.robot.model import RobotModel
-from pretouch_lab.studies.calibration.random_skin import HEIGHT, mounted_links, random_skin
+from pretouch.sim.random_skin import HEIGHT, random_skin
 
 LINKS = ("link2", "link3", "link4", "link5", "link6", "link7", "hand")
 
@@ -26,8 +28,8 @@ def test_there_is_a_unit_on_each_link_from_the_second_to_the_hand(panda_model, f
 
 
 def test_the_first_link_carries_one_on_request(panda_model):
-    assert mounted_links(panda_model, first_link=True) == ("panda_link1", *mounted_links(panda_model))
-    assert random_skin(panda_model, 0, first_link=True).units[0].link == "panda_link1"
+    links = [unit.link for unit in random_skin(panda_model, 0, first_link=True).units]
+    assert links == ["panda_link1", *(f"panda_{name}" for name in LINKS)]
 
 
 def test_units_sit_on_the_surface_and_look_away_from_it(panda_model):

@@ -1,8 +1,8 @@
-"""Skins whose units are anywhere on the arm, to try calibration on."""
+"""Skins whose units are anywhere on an arm, to try things on."""
 
 import numpy as np
 
-from pretouch.errors import ExperimentError, SkinError
+from pretouch.errors import SkinError
 from pretouch.robot.body import Capsules
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
@@ -17,32 +17,27 @@ _TRIES = 1000
 
 
 def random_skin(model: RobotModel, seed: int, first_link: bool = False) -> Skin:
-    """Put one unit on each link of `mounted_links`, anywhere on its surface, turned anyhow about its beam."""
-    rng = np.random.default_rng([seed, 11])
-    return Skin([_random_unit(model, link, rng) for link in mounted_links(model, first_link)], model)
+    """Put one unit on each link that has a surface and that two joints move, anywhere on it, turned anyhow.
 
-
-def mounted_links(model: RobotModel, first_link: bool = False) -> tuple[str, ...]:
-    """Return the links that have a surface and that two joints move at least.
-
-    What turns about one axis only cannot be found along that axis: `first_link` takes such links too.
+    What turns about one axis only cannot be found along that axis: `first_link` takes such a link too. SkinError if a
+    link has no place for a unit.
     """
-    least = 1 if first_link else 2
-    covered = set(model.capsules.link.tolist())
-    joints = model.moved_by.sum(axis=1)
-    return tuple(name for i, name in enumerate(model.links) if i in covered and joints[i] >= least)
+    rng = np.random.default_rng([seed, 11])
+    joints, least = model.moved_by.sum(axis=1), 1 if first_link else 2
+    links = [link for link in np.unique(model.capsules.link).tolist() if joints[link] >= least]
+    return Skin([_random_unit(model, link, rng) for link in links], model)
 
 
-def _random_unit(model: RobotModel, link: str, rng: np.random.Generator) -> SensorUnit:
-    surface = model.capsules.of_links(np.array([model.link_index(link)]))
+def _random_unit(model: RobotModel, link: int, rng: np.random.Generator) -> SensorUnit:
+    name, surface = model.links[link], model.capsules.of_links(np.array([link]))
     for _ in range(_TRIES):
-        unit = SensorUnit(f"on_{link}", link, _random_pose(surface, rng))
+        unit = SensorUnit(f"on_{name}", name, _random_pose(surface, rng))
         try:
             Skin([unit], model)
         except SkinError:
             continue
         return unit
-    raise ExperimentError(f"No place for a unit was found on {link}: its capsules lie inside each other, part them.")
+    raise SkinError(f"No place for a unit was found on {name}: its capsules lie inside each other, part them.")
 
 
 def _random_pose(surface: Capsules, rng: np.random.Generator) -> FloatArray:
