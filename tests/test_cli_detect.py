@@ -9,7 +9,7 @@ from matplotlib.image import imread
 
 from pretouch.cli.detect import detect, gains_of
 from pretouch.errors import ParameterError, PretouchError, RecordingError
-from pretouch.imported_data.source import Choice
+from pretouch.imported_data.log import Choice
 from pretouch.loop import Cycle
 from pretouch.recording.skin_recording import SkinRecording
 from pretouch.recording.writer import Recording
@@ -43,7 +43,9 @@ def test_of_a_recording_of_units_it_is_said_what_can_be_done_with_it(tmp_path):
     place = tmp_path / "units.mcap"
     with SkinRecording(place) as recording:
         recording.sample("wrist", heard(0.02)[0], new=True)
-    with pytest.raises(RecordingError, match="holds samples of sensor units, but no force: read it with") as caught:
+    with pytest.raises(
+        RecordingError, match="holds samples of sensor units, but none of geometry_msgs/WrenchStamped: read it with"
+    ) as caught:
         detect(place, Choice())
     assert len(str(caught.value)) < 300
 
@@ -170,15 +172,18 @@ def test_with_a_force_beside_torques_each_can_be_had(capsys, pushed_arm, tmp_pat
     columns = moving.columns(*kinds) | {f"force_{axis}_N": np.zeros(len(moving.time)) for axis in "xyz"}
     both = write_csv(tmp_path / "both.csv", columns)
     detect(both, Choice(), ("paper",))
-    assert "Force from the columns force_x, force_y, force_z" in capsys.readouterr().out
+    assert "Force from force_x_N, assumed" in capsys.readouterr().out
     detect(both, Choice())
-    assert "External torques, from the columns" in capsys.readouterr().out
+    assert (
+        "External torques, from tau_ext1_Nm, positions from q1_rad, assumed to be on the robot"
+        in capsys.readouterr().out
+    )
     del columns["q7_rad"]
     detect(write_csv(tmp_path / "six.csv", columns), Choice())
     said = capsys.readouterr().out
     assert "Joint torques are not used: " in said
-    assert "Force from the columns force_x, force_y, force_z" in said
-    with pytest.raises(RecordingError, match="positions of 6 joints"):
+    assert "Force from force_x_N, assumed" in said
+    with pytest.raises(RecordingError, match="are not the 7 joints of panda"):
         detect(tmp_path / "six.csv", Choice(), ("pretouch",))
     with pytest.raises(RecordingError, match="gives only a force: choose one with"):
         detect(write_csv(tmp_path / "force.csv", force_columns(pushed(5.0, ()))), Choice(), ("pretouch",))

@@ -11,7 +11,7 @@ import pytest
 
 from pretouch import cli
 from pretouch.hardware.keys import save_keys
-from pretouch.imported_data.joints import read_joints
+from pretouch.imported_data.reading import read_joints
 from pretouch.robot.self_distance import capsule_ends, kinematics_of
 from pretouch.serving import threaded_arm
 from pretouch.serving.fleet import simulated_keys
@@ -177,7 +177,7 @@ def test_the_motion_is_written_for_another_driver_with_the_room_it_takes(panda_m
     with place.open() as file:
         rows = list(csv.reader(file))
     assert rows[0] == ["time_s", *(f"q{i}_rad" for i in range(1, 8)), *(f"qd{i}_rad_s" for i in range(1, 8))]
-    np.testing.assert_allclose(read_joints(place, panda_model).trace.q, np.array(rows[1:], dtype=float)[:, 1:8])
+    np.testing.assert_allclose(read_joints(place, panda_model)[0].q, np.array(rows[1:], dtype=float)[:, 1:8])
     table = np.array(rows[1:], dtype=float)
     assert table[-1, 0] == pytest.approx(45.0, abs=0.004)  # three swings of whole milliseconds
     for row in table[[0, -1]]:

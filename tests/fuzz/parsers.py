@@ -11,9 +11,10 @@ import numpy as np
 from pretouch.errors import PretouchError
 from pretouch.hardware.keys import load_keys, save_keys
 from pretouch.hardware.wire import TAG_SIZE
-from pretouch.imported_data.samples import read_imported
-from pretouch.imported_data.source import Choice
-from pretouch.imported_data.torques import read_torques
+from pretouch.imported_data.forces import read_force
+from pretouch.imported_data.log import Choice
+from pretouch.imported_data.reading import open_log
+from pretouch.imported_data.torques import torque_recording
 from pretouch.importing.chain import arm_of
 from pretouch.importing.read import read_source
 from pretouch.profiles import profile
@@ -104,6 +105,10 @@ def _read_whole(place: Path) -> None:
 # tables and bags
 
 
+def _read_force(place: Path) -> object:
+    return read_force(open_log(place, Choice()), Choice())
+
+
 def _of_tables(folder: Path, model: RobotModel) -> dict[str, Parser]:
     force = pushed(2.0, ())
     columns = {"time_s": np.arange(len(force)) / 100.0} | {f"force_{a}_N": force[:, i] for i, a in enumerate("xyz")}
@@ -114,10 +119,12 @@ def _of_tables(folder: Path, model: RobotModel) -> dict[str, Parser]:
             folder,
             "a.csv",
             [write_csv(folder / "f.csv", columns).read_bytes()],
-            partial(read_imported, choice=Choice()),
+            _read_force,
         ),
-        "CSV of torques": _of_file(folder, "b.csv", [torques], partial(read_torques, choice=Choice())),
-        "ROS bag": _of_file(folder, "a.bag", [bag], partial(read_imported, choice=Choice())),
+        "CSV of torques": _of_file(
+            folder, "b.csv", [torques], lambda place: torque_recording(open_log(place, Choice()).torques(), Choice())
+        ),
+        "ROS bag": _of_file(folder, "a.bag", [bag], _read_force),
     }
 
 

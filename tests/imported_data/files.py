@@ -10,7 +10,7 @@ from rosbags.typesys import Stores, get_typestore
 STORE = get_typestore(Stores.ROS2_JAZZY)
 STORE1 = get_typestore(Stores.ROS1_NOETIC)
 START = 1_700_000_000 * 10**9
-WRENCH, JOINTS, RANGE = "geometry_msgs/msg/WrenchStamped", "sensor_msgs/msg/JointState", "sensor_msgs/msg/Range"
+WRENCH, JOINTS = "geometry_msgs/msg/WrenchStamped", "sensor_msgs/msg/JointState"
 PANDA = tuple(f"panda_joint{i}" for i in range(1, 8))
 
 
@@ -32,18 +32,11 @@ def wrench(stamp, force, torque=(0.1, 0.2, 0.3), frame="base", store=STORE):
     return made(WRENCH, store, header=header(stamp, frame, store), wrench=both)
 
 
-def joints(stamp, q, names=PANDA):
-    nothing = np.zeros(0)
+def joints(stamp, q, names=PANDA, velocity=(), effort=()):
+    rows = {"position": q, "velocity": velocity, "effort": effort}
     return made(
-        JOINTS, header=header(stamp), name=list(names), position=np.array(q, float), velocity=nothing, effort=nothing
+        JOINTS, header=header(stamp), name=list(names), **{name: np.array(row, float) for name, row in rows.items()}
     )
-
-
-def ranging(stamp, distance, frame, least=0.04, most=1.3):
-    return made(
-        RANGE, header=header(stamp, frame), radiation_type=1, field_of_view=0.47, min_range=least, max_range=most,
-        range=float(distance), variance=0.0,
-    )  # fmt: skip
 
 
 def write_bag(folder, messages, plugin=StoragePlugin.MCAP):

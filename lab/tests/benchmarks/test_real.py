@@ -10,7 +10,7 @@ from tests.imported_data.joint_files import Moving
 
 from pretouch import cli
 from pretouch.errors import ExperimentError
-from pretouch.imported_data.events import ContactEvent
+from pretouch.imported_data.detect_torque import ContactEvent
 from pretouch_lab.benchmarks.bounds import rate_bounds
 from pretouch_lab.benchmarks.real import bench
 from pretouch_lab.benchmarks.real.bench import Work, halves, parted, play
@@ -262,4 +262,4 @@ def test_currents_are_read_as_such(motions, panda_model):
     assert of_currents.arm_of(Path("x")) == "panda"
     assert UR10E.arm_of(Path("x")) == "x/arms/ur10e"
     made = stream_of(of_currents, [run_of(motions[0])], panda_model)
-    assert made.recording.of_currents
+    assert made.recording.kind == "current"

@@ -98,7 +98,7 @@ class Detect:
     profiles: str = "auto"
     """Profiles to compare, separated by commas. PROFILE:GROUP.FIELD=VALUE is one with another parameter. auto:
     pretouch,paper where there are joint torques, else paper."""
-    # the choices of pretouch.imported_data.source, spelt out: the help is to need none of the heavy packages
+    # the choices of pretouch.imported_data.log, spelt out: the help is to need none of the heavy packages
     sign: Literal["auto", "on-robot", "by-robot"] = "auto"
     """Whether force and external torques are on the robot (by its environment) or by the robot, as Franka's
     O_F_ext_hat_K; auto: on the robot, but for torques by the name tau_ext_hat_filtered."""
@@ -133,8 +133,8 @@ class Detect:
     def run(self) -> None:
         """Run the detectors, and show and write what they found."""
         from pretouch.cli.detect import detect, gains_of
+        from pretouch.imported_data.log import Choice
         from pretouch.imported_data.renaming import mapping_of
-        from pretouch.imported_data.source import Choice
 
         choice = Choice(
             self.wrench, self.joints, self.sign, self.frame, self.zeros, self.arm, self.torques,

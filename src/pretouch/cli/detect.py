@@ -9,24 +9,22 @@ from rich.console import Console
 
 from pretouch.cli.detect_drawing import ENDINGS, write_drawing
 from pretouch.cli.detect_torques import show_torques
+from pretouch.cli.detect_words import force_guidance, read_from, sentences
 from pretouch.cli.tables import Grid
 from pretouch.cli.words import words
 from pretouch.cli.writing import check_writable, numbers_to
 from pretouch.contact.moving_thresholds import thresholds_of
 from pretouch.errors import ParameterError, RecordingError
 from pretouch.extras import FIGURES
-from pretouch.imported_data.detect import detect_imported
-from pretouch.imported_data.held import holds_force, holds_torques
-from pretouch.imported_data.samples import ImportedData, read_imported
-from pretouch.imported_data.source import Choice
-from pretouch.imported_data.summary import Summary, findings, guidance, summary
-from pretouch.imported_data.torques import read_torques
+from pretouch.imported_data.detect_force import ForceResult, detect_force
+from pretouch.imported_data.forces import ForceRecording, read_force
+from pretouch.imported_data.log import TORQUES, Choice, LogFile
+from pretouch.imported_data.reading import open_log
+from pretouch.imported_data.torques import torque_recording
 from pretouch.profiles import Profile, at_rate
 from pretouch.profiles import profile as find_profile
-from pretouch.recording.compare import Decisions, Found, matched
+from pretouch.recording.compare import Found, matched
 from pretouch.text_table import TextTable
-
-Column = tuple[Profile, Decisions, Summary]
 
 
 def detect(
@@ -57,25 +55,27 @@ def detect(
         FIGURES.need("A figure")
         check_writable("figure", out)
     with numbers_to(json_file) as write:
-        unused: tuple[str, ...] = ()
-        if choice.frame == "base" and _torques_wanted(place, choice, given):
+        file, unused = open_log(place, choice), ""
+        if _by_torques(file, choice, given):
             try:
-                recording = read_torques(place, choice)
+                recording = torque_recording(file.torques(), choice)
             except RecordingError as error:
-                if given is not None or not holds_force(place, choice):
+                if given is not None or "force" not in file.kinds:
                     raise
-                unused = (f"Joint torques are not used: {error}",)
+                unused = f"Joint torques are not used: {error}"
             else:
                 show_torques(recording, given or [_profile(name, rate) for name in ("pretouch", "paper")], out, write)
                 return
-        used = given or [_profile("paper", rate)]
-        imported = read_imported(place, choice)
-        columns = [(p, d, summary(d, p)) for p in used for d in [detect_imported(imported, p)]]
-        notes = list(dict.fromkeys([*unused, *imported.notes, *_said(imported, columns)]))
+        force = read_force(file, choice)
+        results = [detect_force(force, profile) for profile in given or [_profile("paper", rate)]]
+        notes = sentences([*force.notes, *(note for r in results for note in r.notes)])
+        notes = [*([unused] if unused else []), *notes]
+        if any(r.profile.perception is not None and thresholds_of(r.profile.detect).f_d_n for r in results):
+            notes.append("Without a skin no obstacle is known, so eq. 11 lowers no threshold.")
         if out:
-            _draw(imported, columns, notes, out)
-        write(_numbers(imported, columns, notes))
-        _show(imported, columns, notes)
+            _draw(force, results, notes, out)
+        write(_numbers(force, results, notes))
+        _show(force, results, notes)
         if out:
             print(f"{'Page' if out.suffix == '.html' else 'Figure'}: {out}")
 
@@ -91,56 +91,49 @@ def gains_of(text: str) -> tuple[float, ...]:
     return gains
 
 
-def _torques_wanted(place: Path, choice: Choice, given: Sequence[Profile] | None) -> bool:
+def _by_torques(file: LogFile, choice: Choice, given: Sequence[Profile] | None) -> bool:
     """Whether the detectors run on joint torques: where there are some, unless only thresholds of a force are asked."""
-    asked = bool(choice.torques or choice.gains or choice.payload_kg)
-    if choice.wrench and not asked:
+    if choice.frame == "ee":
         return False
-    if given is not None and not asked and not any(p.detect.by_torques for p in given):
-        return not holds_force(place, choice) and holds_torques(place, choice)
-    return asked or holds_torques(place, choice)
+    if choice.torques or choice.gains or choice.payload_kg:
+        return True
+    force, torques = "force" in file.kinds, bool(set(TORQUES) & file.kinds)
+    if choice.wrench or (force and given is not None and not any(p.detect.by_torques for p in given)):
+        return False
+    return torques or ("q" in file.kinds and not force)
 
 
-def _draw(imported: ImportedData, columns: list[Column], notes: list[str], out: Path) -> None:
-    from pretouch.imported_data.figure import decisions_figure
+def _draw(force: ForceRecording, results: list[ForceResult], notes: list[str], out: Path) -> None:
+    from pretouch.imported_data.figures import decisions_figure
 
-    title, (contacts, noise) = imported.place.name, (_contacts(columns), _noise_table(columns))
+    title, (contacts, noise) = force.place.name, (_contacts(results), _noise_table(results))
     tables = [
         TextTable("Contacts, force on the robot [N]", tuple(contacts.header), tuple(map(tuple, contacts.rows)), "", 1),
         TextTable("Free motion [N]", tuple(noise.header), tuple(map(tuple, noise.rows)), "", 1),
     ]
-    said = [*(guidance(d, found, p) for p, d, found in columns), imported.said, *notes]
-    shown = "Force along each axis between its thresholds, and contacts."
-    write_drawing(title, said, tables, [(decisions_figure([d for _, d, _ in columns], title), shown)], out)
+    said = [*map(force_guidance, results), read_from(force), *notes]
+    caption = "Force along each axis between its thresholds, and contacts."
+    write_drawing(title, said, tables, [(decisions_figure([r.decisions for r in results], title), caption)], out)
 
 
 def _profile(name: str, rate: float) -> Profile:
     return at_rate(find_profile(name), rate) if rate else find_profile(name)
 
 
-def _said(imported: ImportedData, columns: list[Column]) -> list[str]:
-    said = [sentence for p, d, _ in columns for sentence in findings(imported, d, p)]
-    if any(p.perception is not None and thresholds_of(p.detect).f_d_n for p, _, _ in columns):
-        said.append("Without a skin no obstacle is known, so eq. 11 lowers no threshold.")
-    return said
-
-
-def _show(imported: ImportedData, columns: list[Column], notes: list[str]) -> None:
+def _show(force: ForceRecording, results: list[ForceResult], notes: list[str]) -> None:
     console = Console(highlight=False, soft_wrap=True)
-    time = imported.force.time
-    seconds = (time[-1] - time[0]) / 1e9
     console.print(
-        f"{imported.place}: {len(time)} samples in {seconds:.1f} s, {imported.rate:.4g} Hz, the first at"
-        f" {time[0] / 1e9:.3f} s: times below count from it.",
+        f"{force.place}: {len(force.time)} samples in {force.time[-1]:.1f} s, {force.rate:.4g} Hz, the first at"
+        f" {force.first_s:.3f} s: times below count from it.",
         markup=False,
     )
-    console.print(imported.said, markup=False)
+    console.print(read_from(force), markup=False)
     for note in notes:
         console.print(note, markup=False)
     console.print("\nContacts, force on the robot [N]", style="bold", markup=False)
-    console.print(_contacts(columns))
-    first = columns[0][1]
-    for _, d, _ in columns[1:]:
+    console.print(_contacts(results))
+    first, *others = (r.decisions for r in results)
+    for d in others:
         both, only_first, only_other = matched(first.contacts, d.contacts)
         console.print(
             f"{first.name} and {d.name}: {len(both)} contacts in both, {len(only_first)} only in {first.name},"
@@ -148,14 +141,14 @@ def _show(imported: ImportedData, columns: list[Column], notes: list[str]) -> No
             markup=False,
         )
     console.print("\nFree motion [N]", style="bold", markup=False)
-    console.print(_noise_table(columns))
+    console.print(_noise_table(results))
     console.print()
-    for p, d, found in columns:
-        console.print(guidance(d, found, p), markup=False)
+    for result in results:
+        console.print(force_guidance(result), markup=False)
 
 
-def _contacts(columns: list[Column]) -> Grid:
-    return contact_table([(d.name, found) for _, d, _ in columns for found in d.contacts])
+def _contacts(results: list[ForceResult]) -> Grid:
+    return contact_table([(r.decisions.name, contact) for r in results for contact in r.decisions.contacts])
 
 
 def contact_table(contacts: Sequence[tuple[str, Found]]) -> Grid:
@@ -172,33 +165,31 @@ def axes_shown(found: Found) -> str:
     return "".join(axis for axis, crossed in zip("xyz", found.axes, strict=True) if crossed)
 
 
-def _noise_table(columns: list[Column]) -> Grid:
+def _noise_table(results: list[ForceResult]) -> Grid:
     rows = []
-    for _, d, s in columns:
-        name = f"{d.name}, {s.free:.1f} of {s.duration:.1f} s"
+    for s in results:
+        name = f"{s.decisions.name}, {s.free:.1f} of {s.duration:.1f} s"
         for axis, *values in zip("xyz", s.mean, s.sigma, s.sigma_window, s.width, strict=True):
             rows.append((name if axis == "x" else "", axis, *(f"{value:.2f}" for value in values)))
     return Grid(("", "along", "mean", "sigma", "sigma in window", "thresholds at +-"), rows)
 
 
-def _numbers(imported: ImportedData, columns: list[Column], notes: list[str]) -> dict[str, Any]:
-    time = imported.force.time
+def _numbers(force: ForceRecording, results: list[ForceResult], notes: list[str]) -> dict[str, Any]:
     return {
-        "recording": str(imported.place), "assumed": imported.said, "notes": notes, "samples": len(time),
-        "first_sample_s": time[0] / 1e9,
-        "duration_s": (time[-1] - time[0]) / 1e9, "rate_hz": imported.rate,
+        "recording": str(force.place), "assumed": read_from(force), "notes": notes, "samples": len(force.time),
+        "first_sample_s": force.first_s, "duration_s": force.time[-1], "rate_hz": force.rate,
         "profiles": [
             {
-                "profile": d.name, "control_rate_hz": 1 / p.task.control_period_s,
+                "profile": r.decisions.name, "control_rate_hz": 1 / r.profile.task.control_period_s,
                 "contacts": [
                     {"time_s": c.time, "force_n": c.force, "norm_n": np.linalg.norm(c.force), "axes": axes_shown(c)}
-                    for c in d.contacts
+                    for c in r.decisions.contacts
                 ],
-                "armed_s": s.duration, "free_s": s.free, "free_mean_n": s.mean, "free_sigma_n": s.sigma,
-                "free_window_sigma_n": s.sigma_window,
-                "threshold_width_n": s.width, "f_base_no_contact_free_n": s.f_base_free,
-                "f_base_no_contact_n": s.f_base_all,
+                "armed_s": r.duration, "free_s": r.free, "free_mean_n": r.mean, "free_sigma_n": r.sigma,
+                "free_window_sigma_n": r.sigma_window,
+                "threshold_width_n": r.width, "f_base_no_contact_free_n": r.f_base_free,
+                "f_base_no_contact_n": r.f_base_all,
             }
-            for p, d, s in columns
+            for r in results
         ],
     }  # fmt: skip

@@ -8,10 +8,10 @@ import numpy as np
 from rich.console import Console
 
 from pretouch.cli.detect_drawing import write_drawing
+from pretouch.cli.detect_words import read_from, sentences, shown, torque_guidance
 from pretouch.cli.tables import show
 from pretouch.errors import RecordingError
-from pretouch.imported_data.events import ContactEvent
-from pretouch.imported_data.torque_results import ProfileResult, result_of
+from pretouch.imported_data.detect_torque import ContactEvent, ProfileResult, result_of
 from pretouch.imported_data.torques import TorqueRecording
 from pretouch.profiles import Profile
 from pretouch.text_table import TextTable
@@ -30,12 +30,13 @@ def show_torques(
     """Run profiles over a recording of torques, show what they found, and write figure or page and numbers."""
     results = [result_of(recording, profile) for profile in profiles]
     if not any(r.by_torques or r.by_force for r in results):
-        raise RecordingError(results[0].notes[0])
-    notes = list(dict.fromkeys([*recording.notes, *(note for r in results for note in r.notes)]))
+        raise RecordingError(sentences(results[0].notes)[0])
+    notes = sentences([*recording.notes, *(note for r in results for note in r.notes)])
     labels = _labels(results)
     pairs = list(zip(labels, results, strict=True))
     notes += [f"{label} is {r.profile.name}." for label, r in pairs if label != r.profile.name]
-    said = [*(_guidance(label, r) for label, r in pairs), recording.said, *notes]
+    source = read_from(recording)
+    said = [*(torque_guidance(label, r) for label, r in pairs), source, *notes]
     tables = [_contacts(labels, results), _profiles(labels, results), *_joints(recording, labels, results)]
     if out:
         figures = _figures(recording, labels, results)
@@ -47,11 +48,11 @@ def show_torques(
         f" first at {recording.first_s:.3f} s: times below count from it.",
         markup=False,
     )
-    for sentence in [recording.said, *notes]:
+    for sentence in [source, *notes]:
         console.print(sentence, markup=False)
     show(console, tables)
     for label, r in pairs:
-        console.print(_guidance(label, r), markup=False)
+        console.print(torque_guidance(label, r), markup=False)
     if out:
         print(f"{'Page' if out.suffix == '.html' else 'Figure'}: {out}")
 
@@ -60,17 +61,6 @@ def _labels(results: Sequence[ProfileResult]) -> list[str]:
     """Names of profiles for tables: those of long changes are numbered."""
     names = [r.profile.name for r in results]
     return [name if len(name) <= _LONGEST else f"{name.partition(':')[0]} ({k})" for k, name in enumerate(names, 1)]
-
-
-def _guidance(name: str, r: ProfileResult) -> str:
-    count = len(r.contacts)
-    contacts = f"{count or 'no'} contact{'' if count == 1 else 's'} in {r.duration / 60:.1f} min"
-    if not r.motion:
-        return f"{name}: {contacts}; the arm does not move."
-    return (
-        f"{name}: {contacts}, {r.in_motion} of them in {r.motion / 60:.1f} min of motion; if nobody touched the"
-        f" arm, these are {r.per_hour:.3g} false alarms an hour."
-    )
 
 
 def _contacts(labels: Sequence[str], results: Sequence[ProfileResult]) -> TextTable:
@@ -86,18 +76,17 @@ def _contacts(labels: Sequence[str], results: Sequence[ProfileResult]) -> TextTa
 
 
 def _contact_row(name: str, c: ContactEvent) -> tuple[str, ...]:
-    place = [_shown(value, 3) for value in c.point]
-    return name, c.link or _NO, f"{c.time:.3f}", *place, *(_shown(v, 1) for v in (*c.force, np.linalg.norm(c.force)))
+    place = [shown(value, 3) for value in c.point]
+    return name, c.link or _NO, f"{c.time:.3f}", *place, *(shown(v, 1) for v in (*c.force, np.linalg.norm(c.force)))
 
 
 def _profiles(labels: Sequence[str], results: Sequence[ProfileResult]) -> TextTable:
     rows = []
     for name, r in zip(labels, results, strict=True):
-        says = r.by_torques[1].detectable_n if r.by_torques else r.width
-        largest = _shown(r.by_torques[1].evidence, 2) if r.by_torques else _NO
+        largest = shown(r.by_torques.largest, 2) if r.by_torques else _NO
         rows.append((
-            name, str(len(r.contacts)), f"{r.duration:.1f}", f"{r.motion:.1f}", _shown(r.per_hour, 1), largest,
-            _shown(says, 1),
+            name, str(len(r.contacts)), f"{r.duration:.1f}", f"{r.motion:.1f}", shown(r.per_hour, 1), largest,
+            shown(r.detectable_n, 1),
         ))  # fmt: skip
     header = (
         "profile", "contacts", "armed [s]", "in motion [s]", "contacts an hour of motion", "evidence without contact",
@@ -112,47 +101,42 @@ def _profiles(labels: Sequence[str], results: Sequence[ProfileResult]) -> TextTa
 
 
 def _joints(recording: TorqueRecording, labels: Sequence[str], results: Sequence[ProfileResult]) -> list[TextTable]:
-    made = []
+    header = ("joint", "external torque, sigma", "residual, mean", "residual, sigma")
+    note = "Outside contacts; the residual is what learnt free motion does not explain."
+    tables = []
     for label, r in zip(labels, results, strict=True):
-        if r.by_torques:
-            s = r.by_torques[1]
-            columns = zip(recording.model.joints, s.before, s.mean, s.sigma, strict=True)
-            rows = tuple((name, *(_shown(value, 3) for value in values)) for name, *values in columns)
-            header = ("joint", "external torque, sigma", "residual, mean", "residual, sigma")
-            note = "Outside contacts; the residual is what learnt free motion does not explain."
-            made.append(TextTable(f"Torques in free motion [Nm], {label}", header, rows, note, 1))
-    return made
-
-
-def _shown(value: float, digits: int) -> str:
-    return f"{value:.{digits}f}" if np.isfinite(value) else "inf" if value > 0 else _NO
+        if d := r.by_torques:
+            columns = d.in_free(d.tau_ext)[1], *d.in_free(d.residual)
+            rows = zip(recording.model.joints, *([shown(x, 3) for x in column] for column in columns), strict=True)
+            tables.append(TextTable(f"Torques in free motion [Nm], {label}", header, tuple(rows), note, 1))
+    return tables
 
 
 def _figures(
     recording: TorqueRecording, labels: Sequence[str], results: Sequence[ProfileResult]
 ) -> list[tuple["Figure", str]]:
-    from pretouch.imported_data.figure import decisions_figure
-    from pretouch.imported_data.torque_figure import torque_figure
+    from pretouch.imported_data.figures import decisions_figure, torque_figure
 
     title = recording.place.name
-    shown = "joint torques, what free motion does not explain of them, and the evidence. Red: contacts."
+    caption = "joint torques, what free motion does not explain of them, and the evidence. Red: contacts."
     figures = [
-        (torque_figure(r.by_torques[0], recording.model.joints, f"{title}: {name}"), f"{name}: {shown}")
+        (torque_figure(r.by_torques, recording.model.joints, f"{title}: {name}"), f"{name}: {caption}")
         for name, r in zip(labels, results, strict=True) if r.by_torques
     ]  # fmt: skip
-    if forces := [r.by_force for r in results if r.by_force]:
-        shown = "Force at the end-effector by the torques, and thresholds."
-        figures.append((decisions_figure(forces, title), shown))
+    if forces := [r.by_force.decisions for r in results if r.by_force]:
+        caption = "Force at the end-effector by the torques, and thresholds."
+        figures.append((decisions_figure(forces, title), caption))
     return figures
 
 
 def _numbers(recording: TorqueRecording, results: Sequence[ProfileResult], notes: list[str]) -> dict[str, Any]:
-    found = [_of_profile(r) for r in results]
+    profiles = [_of_profile(r) for r in results]
     return {
-        "recording": str(recording.place), "assumed": recording.said, "notes": notes, "samples": len(recording.time),
+        "recording": str(recording.place), "assumed": read_from(recording), "notes": notes,
+        "samples": len(recording.time),
         "first_sample_s": recording.first_s, "duration_s": recording.time[-1], "rate_hz": recording.rate,
         "arm": recording.model.description.name, "joints": recording.model.joints,
-        "contacts": found[0]["contacts"], "profiles": found,
+        "contacts": profiles[0]["contacts"], "profiles": profiles,
     }  # fmt: skip
 
 
@@ -163,12 +147,12 @@ def _of_profile(r: ProfileResult) -> dict[str, Any]:
         "armed_s": r.duration, "motion_s": r.motion, "contacts_in_motion": r.in_motion,
         "contacts_per_hour_of_motion": r.per_hour,
     }  # fmt: skip
-    if r.by_torques is None:
-        return numbers | {"threshold_width_n": r.width}
-    s = r.by_torques[1]
+    if (d := r.by_torques) is None:
+        return numbers | {"threshold_width_n": r.detectable_n}
+    mean, sigma = d.in_free(d.residual)
     return numbers | {
-        "residual_mean_nm": s.mean, "residual_sigma_nm": s.sigma, "external_torque_sigma_nm": s.before,
-        "largest_evidence_without_contact": s.evidence, "detectable_force_n": s.detectable_n,
+        "residual_mean_nm": mean, "residual_sigma_nm": sigma, "external_torque_sigma_nm": d.in_free(d.tau_ext)[1],
+        "largest_evidence_without_contact": d.largest, "detectable_force_n": r.detectable_n,
     }  # fmt: skip
 
 

@@ -1,29 +1,27 @@
-"""Recordings of any arm's joint torques: read, checked, and brought to external torques on the robot."""
+"""Joint torques of any arm: read, checked, and brought to external torques on the robot."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
+from pretouch.contact.observer import observe, observer_init
 from pretouch.errors import RecordingError
-from pretouch.imported_data.joint_source import JointSource, read_joint_table
-from pretouch.imported_data.observed import observed
-from pretouch.imported_data.samples import check_exists, is_table
-from pretouch.imported_data.source import Choice, Series, check_reach, in_order
-from pretouch.imported_data.torque_checks import check_positions, check_torques, check_velocities
-from pretouch.imported_data.velocities import GAP_S, smoothed, velocities
+from pretouch.imported_data.checks import GRAVITY, check_torques, check_velocities
+from pretouch.imported_data.log import TORQUES, Choice, Log, Note, check_reach
 from pretouch.params import SequentialParams
 from pretouch.robot.model import RobotModel
-from pretouch.robot.named import robot_named
-from pretouch.types import FloatArray, IntArray
+from pretouch.types import FloatArray
 from pretouch.values import value
 
+GAP_S = 0.1
+"""Time without a sample after which a recording begins anew [s]."""
 _LEAST_HZ = 40.0
 """Rate below which nothing is detected [Hz]."""
-_WHAT = {
-    "tau_ext": "external torques", "tau": "measured torques, less the model's by an observer of ours",
-    "current": "motor currents times their gains, less the model's torques by an observer of ours",
-}  # fmt: skip
+_OVER_S = 0.04
+"""Time over which velocities are averaged, half of it before and half after [s]."""
+_SETTLED = 5.0
+"""Time constants after which the observer has forgotten how it began [1]."""
 
 
 @value
@@ -31,8 +29,12 @@ class TorqueRecording:
     """An arm's motion and the external torques on it. N samples of n joints, in the order of time."""
 
     place: Path
-    said: str
-    """What was read, and what was assumed of it, as a sentence."""
+    kind: str
+    """What the external torques were made of: one of `TORQUES`."""
+    sources: tuple[str, str]
+    """Topics or first columns of the torques and of the positions."""
+    by_robot: bool
+    """Whether the torques were taken to be by the robot or to brake it, and turned round."""
     model: RobotModel
     first_s: float
     """Instant of the first sample on the recording's clock [s]."""
@@ -46,10 +48,7 @@ class TorqueRecording:
     """(N, n) [rad/s]; where the recording has none, the measured ones smoothed."""
     tau_ext: FloatArray
     """(N, n) on the robot by its environment [Nm], NaN where there is none."""
-    of_currents: bool
-    """Whether motor currents were measured, with the friction of the gears in them."""
-    notes: tuple[str, ...]
-    """What was found on the way and a person should know, a sentence each."""
+    notes: tuple[Note, ...]
 
     @property
     def rate(self) -> float:
@@ -57,32 +56,36 @@ class TorqueRecording:
         return float(1.0 / np.median(np.diff(self.time)))
 
 
-def read_torques(place: Path, choice: Choice) -> TorqueRecording:
-    """Read a recording of joint positions and torques. RecordingError for what cannot be used, with the way out."""
-    check_exists(place)
-    if is_table(place):
-        source = read_joint_table(place, choice)
-    else:
-        from pretouch.imported_data.joint_bag import read_joint_bag
+def torque_recording(log: Log, choice: Choice) -> TorqueRecording:
+    """Check a log against its arm's model, and make external torques on the robot of it.
 
-        source = read_joint_bag(place, choice)
-    arm = source.arm if choice.arm == "auto" else choice.arm
-    model = RobotModel(robot_named("panda" if arm == "auto" else arm))
-    ordered = source.ordered(model.joints)
-    if ordered.names and ordered.names != model.joints:
-        note = f"The joints are named otherwise than the arm's, and taken in the order {', '.join(ordered.names)}."
-        ordered = replace(ordered, notes=(*ordered.notes, note))
-    return torque_recording(place, ordered, model, choice)
+    RecordingError for what cannot be used, with the way out.
+    """
+    model, kind = log.model, next(kind for kind in TORQUES if kind in log.arrays)
+    _check_options(log.place, kind, model.n, choice)
+    log = log.in_order(*log.arrays)
+    time = (log.time - log.time[0]) / 1e9
+    notes = [*log.notes, *_gaps(log.place, time)]
+    q = log.arrays["q"]
+    check_reach(log.place, q, model)
+    derived = velocities(time, q)
+    qd = log.arrays.get("dq", derived)
+    notes += check_velocities(log.place, derived, qd) if "dq" in log.arrays else [Note("derived_velocities", {})]
+    by_robot = choice.sign == "by-robot" or (choice.sign == "auto" and log.by_robot)
+    torque = (-1.0 if by_robot else 1.0) * log.arrays[kind] * (np.array(choice.gains) if kind == "current" else 1.0)
+    check_torques(log.place, q, qd, torque, model, kind != "tau_ext", choice.payload_kg)
+    if kind != "tau_ext":
+        torque = observed(model, time, q, qd, torque, SequentialParams().observer_gain_1_s, choice.payload_kg)
+    if "dq_d" not in log.arrays:
+        notes.append(Note("no_commands", {}))
+    commanded = log.arrays.get("dq_d", smoothed(time, qd))
+    sources, first = (log.sources[kind], log.sources["q"]), log.time[0] / 1e9
+    return TorqueRecording(
+        log.place, kind, sources, by_robot, model, first, time, q, qd, commanded, torque, tuple(notes)
+    )
 
 
-def torque_recording(place: Path, source: JointSource, model: RobotModel, choice: Choice) -> TorqueRecording:
-    """Check what was read against an arm's model, and make external torques on the robot of it."""
-    kind, n = source.torque, source.joints["q"].shape[1]
-    if n != model.n:
-        raise RecordingError(
-            f"{place} has {n} joints, and {model.description.name} has {model.n}: choose another --arm, a name or the"
-            " folder that `pretouch robot import` wrote."
-        )
+def _check_options(place: Path, kind: str, n: int, choice: Choice) -> None:
     if kind == "current" and len(choice.gains) != n:
         raise RecordingError(
             f"{place} has currents of {n} motors and {len(choice.gains)} gains: give --gains, {n} torques by current in"
@@ -90,58 +93,83 @@ def torque_recording(place: Path, source: JointSource, model: RobotModel, choice
         )
     if choice.gains and kind != "current":
         raise RecordingError(f"{place} has torques, and --gains is for motor currents (current1_A ...): leave it out.")
-    time, parts, notes = _usable(place, source)
-    q, stamp = parts["q"], (time - time[0]) / 1e9
-    check_positions(place, q, model)
-    check_reach(place, q, model)
-    qd = parts.get("dq", velocities(stamp, q))
-    notes += check_velocities(place, stamp, q, qd) if "dq" in parts else ("Velocities are those of positions.",)
-    sign = -1.0 if choice.sign == "by-robot" or (choice.sign == "auto" and source.by_robot) else 1.0
-    torque = sign * parts[kind] * (np.array(choice.gains) if kind == "current" else 1.0)
-    check_torques(place, q, qd, torque, model, kind != "tau_ext", choice.payload_kg)
-    if kind != "tau_ext":
-        torque = observed(model, stamp, q, qd, torque, SequentialParams().observer_gain_1_s, choice.payload_kg)
-    elif choice.payload_kg:
+    if choice.payload_kg and kind == "tau_ext":
         raise RecordingError(f"{place} has external torques, which --payload does not change: tell the robot its load.")
-    if "dq_d" not in parts:
-        notes += ("There are no commanded velocities (dq_d1_rad_s ...): the measured ones, smoothed, stand in.",)
-    qd_commanded = parts.get("dq_d", smoothed(stamp, qd))
-    said = (
-        f"{_WHAT[kind].capitalize()}, from {source.said}, {_whose(kind, sign)} The arm is assumed to be"
-        f" {model.description.name} (--arm)."
-    )
-    return TorqueRecording(
-        place, said, model, time[0] / 1e9, stamp, q, qd, qd_commanded, torque, kind == "current", source.notes + notes
-    )
 
 
-def _whose(kind: str, sign: float) -> str:
-    if kind != "tau_ext":
-        return f"assumed to {'drive' if sign > 0 else 'brake'} the joints (otherwise --sign)."
-    whose, other = ("on", "by-robot") if sign > 0 else ("by", "on-robot")
-    return f"assumed to be {whose} the robot (otherwise --sign {other})."
-
-
-def _usable(place: Path, source: JointSource) -> tuple[IntArray, dict[str, FloatArray], tuple[str, ...]]:
-    """Instants [ns] in order, and what was measured then; samples that are not numbers are left out."""
-    kinds = [*source.joints]
-    whole = Series(source.time, np.hstack([source.joints[kind] for kind in kinds]))
-    finite = np.isfinite(whole.values).all(axis=1)
-    without = int(np.count_nonzero(~finite))
-    said = "1 sample is" if without == 1 else f"{without} samples are"
-    notes = (f"{said} not finite numbers and left out.",) if without else ()
-    series, more = in_order(Series(whole.time[finite], whole.values[finite]), "Joints")
-    if len(series) < 2:
-        raise RecordingError(f"{place} has {len(series)} samples of all joints: give a longer recording.")
-    rate = 1e9 / float(np.median(np.diff(series.time)))
+def _gaps(place: Path, time: FloatArray) -> list[Note]:
+    """Say what gaps there are between instants (N,) [s]; RecordingError for a rate that is too low."""
+    steps = np.diff(time)
+    rate = 1.0 / float(np.median(steps))
     if rate < _LEAST_HZ:
         raise RecordingError(
             f"The samples of {place} come at {rate:.3g} Hz: record at {_LEAST_HZ:g} Hz or more, or check the unit of"
             " the time."
         )
-    long = np.diff(series.time) / 1e9
-    if (gaps := long[long > GAP_S]).size:
-        many = "A gap" if len(gaps) == 1 else f"{len(gaps)} gaps"
-        more += (f"{many} of more than {GAP_S:g} s, {gaps.sum():.2f} s in all: what comes after begins anew.",)
-    parts = np.split(series.values, len(kinds), axis=1)
-    return series.time, dict(zip(kinds, parts, strict=True)), notes + more
+    gaps = steps[steps > GAP_S]
+    return [Note("gaps", {"count": len(gaps), "longer_s": GAP_S, "seconds": float(gaps.sum())})] if len(gaps) else []
+
+
+def pieces(time: FloatArray, gap_s: float = GAP_S) -> list[slice]:
+    """Stretches without a gap of instants (N,) [s]."""
+    ends = np.flatnonzero(np.diff(time) > gap_s) + 1
+    return [slice(int(a), int(b)) for a, b in zip([0, *ends], [*ends, len(time)], strict=True)]
+
+
+def velocities(time: FloatArray, q: FloatArray) -> FloatArray:
+    """Velocities (N, n) [rad/s] of positions (N, n) [rad] at instants (N,) [s], smoothed."""
+    slopes = np.zeros_like(q)
+    for piece in pieces(time):
+        if piece.stop - piece.start > 1:
+            slopes[piece] = np.gradient(q[piece], time[piece], axis=0)
+    return smoothed(time, slopes)
+
+
+def smoothed(time: FloatArray, values: FloatArray) -> FloatArray:
+    """Means of values (N, n) over `_OVER_S` about each instant, without delay."""
+    means = values.copy()
+    for piece in pieces(time):
+        count = piece.stop - piece.start
+        samples = round(_OVER_S * (count - 1) / max(time[piece.stop - 1] - time[piece.start], 1e-9)) if count > 1 else 1
+        for _ in range(2):  # twice: a triangle, whose derivative does not jump
+            means[piece] = uniform_filter1d(means[piece], max(1, min(samples, count)), axis=0, mode="nearest")
+    return means
+
+
+def observed(
+    model: RobotModel, time: FloatArray, q: FloatArray, qd: FloatArray, tau: FloatArray, gain: float, payload: float
+) -> FloatArray:
+    """External torques (N, n) on the robot [Nm] by our momentum observer, NaN after each gap until it has settled.
+
+    Args:
+        model: the arm.
+        time: instants (N,) [s].
+        q: positions (N, n) [rad].
+        qd: velocities (N, n) [rad/s].
+        tau: torques (N, n) that drive the joints, gravity in them [Nm].
+        gain: of the observer [1/s].
+        payload: mass at the end-effector [kg].
+    """
+    external = np.full_like(tau, np.nan)
+    for piece in pieces(time):
+        mass, bias, J = _loaded(model, q[piece.start], qd[piece.start], payload, None, 1.0)
+        state = observer_init(mass, qd[piece.start])
+        for i in range(piece.start + 1, piece.stop):
+            dt = time[i] - time[i - 1]
+            mass, bias, J = _loaded(model, q[i], qd[i], payload, J, dt)
+            state = observe(state, mass, bias, qd[i], tau[i], gain, dt)
+            if time[i] - time[piece.start] > _SETTLED / gain:
+                external[i] = state.residual
+    return external
+
+
+def _loaded(
+    model: RobotModel, q: FloatArray, qd: FloatArray, payload: float, before: FloatArray | None, dt: float
+) -> tuple[FloatArray, FloatArray, FloatArray | None]:
+    """Mass matrix and bias of an arm with a load, and the Jacobian (3, n) of the load, from that `dt` earlier."""
+    mass, bias = model.mass_matrix_and_bias(q, qd, np.empty(model.n))
+    if not payload:
+        return mass, bias, None
+    J = model.ee_jacobian(model.kinematics(q))[:3]
+    turning = np.zeros(3) if before is None else (J - before) @ qd / dt
+    return mass + payload * J.T @ J, bias + payload * J.T @ (turning + GRAVITY), J

@@ -1,6 +1,5 @@
-"""Joint positions, velocities and torques of an arm in free motion, from a recording of ours or a CSV file."""
+"""Joint positions, velocities and torques of an arm in free motion, from a recording of ours or a table."""
 
-import re
 from pathlib import Path
 from typing import Literal
 
@@ -8,21 +7,15 @@ import numpy as np
 
 from pretouch.contact.observer import observe, observer_init
 from pretouch.errors import RecordingError
-from pretouch.imported_data.csv import read_header, read_table
-from pretouch.imported_data.renaming import listed
-from pretouch.imported_data.samples import TABLES
-from pretouch.imported_data.source import check_reach
+from pretouch.imported_data.log import PARQUET, TABLES, Choice, Log, check_reach
+from pretouch.imported_data.reading import open_log
 from pretouch.recording.reader import open_recording
-from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray
 from pretouch_lab.identification.samples import ArmSamples
 
 Sign = Literal["on-robot", "by-robot"]
 
-_COLUMN = re.compile(r"(q|qd|tau_ext|tau)(\d{1,2})_(rad|rad_s|deg|deg_s|nm)")
-_UNITS = {"q": {"rad": 1.0, "deg": np.pi / 180}, "qd": {"rad_s": 1.0, "deg_s": np.pi / 180}}
-_TIMES = {"time_s": 1.0, "time_ms": 1e-3, "time_us": 1e-6, "time_ns": 1e-9}
 _LEAST_OBSERVED_HZ = 400.0
 """Rate at which measured torques have to come for an observer to be run over them [Hz]."""
 
@@ -33,8 +26,8 @@ def read_free_motion(
     """Read a recording; return samples, the arm, and what was taken from where as a sentence.
 
     Args:
-        place: a recording of ours, or a CSV file with time_s, q1_rad ..., perhaps qd1_rad_s ..., and tau_ext1_Nm ...
-            (external torques) or tau1_Nm ... (measured torques, gravity in them).
+        place: a recording of ours, or a CSV or Parquet file with time_s, q1_rad ..., perhaps dq1_rad_s ..., and
+            tau_ext1_Nm ... (external torques) or tau1_Nm ... (measured torques, gravity in them).
         model: the arm; None: what the recording says, or a Panda.
         sign: whose torques those of a CSV file are.
         gain: of the observer that is run over measured torques [1/s].
@@ -42,9 +35,10 @@ def read_free_motion(
     Raises:
         RecordingError: for what cannot be read, and for what is not clear, with the way out.
     """
-    if place.suffix.lower() in TABLES:
-        arm = model or RobotModel(panda())
-        samples, said = _of_csv(place, arm, -1.0 if sign == "by-robot" else 1.0, gain)
+    if place.suffix.lower() in (*TABLES, PARQUET):
+        log = open_log(place, Choice(arm=model or "auto")).torques()
+        arm = log.model
+        samples, said = _of_table(log, -1.0 if sign == "by-robot" else 1.0, gain)
     else:
         recorded = open_recording(place)
         arm, kept = recorded.runs[0].model, list(recorded.robot_states())
@@ -63,41 +57,15 @@ def read_free_motion(
     return samples, arm, said
 
 
-def _of_csv(place: Path, model: RobotModel, sign: float, gain: float) -> tuple[ArmSamples, str]:
-    rows, names = read_header(place, "time_s,q1_rad,tau_ext1_Nm and so on")
-    lower = [name.lower() for name in names]
-    times = [i for i, name in enumerate(lower) if name in _TIMES]
-    if len(times) != 1:
-        raise RecordingError(f"{place} has {len(times)} columns of time (it has {listed(names)}): give one, as time_s.")
-    at: dict[str, dict[int, tuple[int, float]]] = {}
-    for i, name in enumerate(lower):
-        found = _COLUMN.fullmatch(name)
-        if found and found[3] in _UNITS.get(found[1], {"nm": 1.0}):
-            at.setdefault(found[1], {})[int(found[2])] = (i, _UNITS.get(found[1], {"nm": 1.0})[found[3]])
-    torque = "tau_ext" if "tau_ext" in at else "tau"
-    for what, unit in (("q", "rad"), (torque, "Nm")):
-        if set(at.get(what, {})) != set(range(1, model.n + 1)):
-            raise RecordingError(
-                f"{place} has {len(at.get(what, {}))} columns of {what} (it has {listed(names)}), and"
-                f" {model.description.name} has {model.n} joints: give {what}1_{unit} to {what}{model.n}_{unit}, or"
-                " another --arm."
-            )
-    if "qd" in at and set(at["qd"]) != set(at["q"]):
-        raise RecordingError(
-            f"{place} has velocities of {len(at['qd'])} joints only: give qd1_rad_s to qd{model.n}_rad_s."
-        )
-    places = [(times[0], _TIMES[lower[times[0]]])]
-    for what in ("q", torque, *(["qd"] if "qd" in at else [])):
-        places += [at[what][j] for j in range(1, model.n + 1)]
-    table, _, _ = read_table(place, rows, names, dict(places))
-    n = model.n
-    q, tau, qd = table[:, 1 : 1 + n], table[:, 1 + n : 1 + 2 * n], table[:, 1 + 2 * n :]
-    speeds = qd if "qd" in at else None
-    if torque == "tau":
-        tau = _observed(place, model, table[:, 0], q, speeds, tau, gain)
-        return ArmSamples(table[:, 0], q, speeds, tau), f"{place}: an observer of {gain:g} 1/s over measured torques"
-    said = f"{place}: external torques, taken as {_whose(sign)} (--sign)"
-    return ArmSamples(table[:, 0], q, speeds, sign * tau), said
+def _of_table(log: Log, sign: float, gain: float) -> tuple[ArmSamples, str]:
+    time, q, qd = log.time / 1e9, log.arrays["q"], log.arrays.get("dq")
+    if "tau_ext" in log.arrays:
+        said = f"{log.place}: external torques, taken as {_whose(sign)} (--sign)"
+        return ArmSamples(time, q, qd, sign * log.arrays["tau_ext"]), said
+    if "tau" not in log.arrays:
+        raise RecordingError(f"{log.place} has motor currents: give torques, tau1_Nm and so on, in their place.")
+    tau = _observed(log.place, log.model, time, q, qd, log.arrays["tau"], gain)
+    return ArmSamples(time, q, qd, tau), f"{log.place}: an observer of {gain:g} 1/s over measured torques"
 
 
 def _whose(sign: float) -> str:

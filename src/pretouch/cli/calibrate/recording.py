@@ -12,9 +12,10 @@ from pretouch.calibration.result import Calibration
 from pretouch.calibration.stamps import instants, retimed
 from pretouch.cli.calibrate.answer import Answer, give
 from pretouch.cli.calibrate.outputs import Outputs
+from pretouch.cli.detect_words import sentences
 from pretouch.errors import CalibrationError
-from pretouch.imported_data.joints import read_joints
-from pretouch.imported_data.samples import TABLES
+from pretouch.imported_data.log import TABLES
+from pretouch.imported_data.reading import read_joints
 from pretouch.recording.calibration_data import Measured, MeasuredUnit, read_measured
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, load_skin
@@ -69,8 +70,8 @@ def calibrate_recording(model: RobotModel, sources: Sources, outputs: Outputs) -
 def _joints(model: RobotModel, measured: Measured, sources: Sources) -> tuple[JointTrace, list[str]]:
     """Return the joint positions in the order of the model, and what is to be said of them."""
     if sources.joints:
-        read = read_joints(sources.joints, model, sources.topic)
-        return read.trace, [f"Joint states are {read.said} of {sources.joints}.", *read.notes]
+        trace, log = read_joints(sources.joints, model, sources.topic)
+        return trace, [f"Joint states are {log.sources['q']} of {sources.joints}.", *sentences(log.notes)]
     if sources.topic:
         raise CalibrationError("--topic needs --joints: it names a topic of that file.")
     if measured.joints is None:

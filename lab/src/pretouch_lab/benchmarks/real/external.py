@@ -7,10 +7,8 @@ from pathlib import Path
 import numpy as np
 from scipy.signal import lfilter
 
-from pretouch.imported_data.joint_source import JointSource
-from pretouch.imported_data.observed import observed
-from pretouch.imported_data.source import Choice
-from pretouch.imported_data.torques import TorqueRecording, torque_recording
+from pretouch.imported_data.log import Choice, Log
+from pretouch.imported_data.torques import TorqueRecording, observed, torque_recording
 from pretouch.params import SequentialParams
 from pretouch.robot.model import RobotModel
 from pretouch.robot.named import robot_named
@@ -72,9 +70,9 @@ def stream_of(real: RealSet, runs: Sequence[Run], model: RobotModel) -> Stream:
     arrays = {"q": [r.q for r in runs], "dq": [r.qd for r in runs], kind: [r.torque for r in runs]}
     joints = {name: np.concatenate(parts) for name, parts in arrays.items()}
     stamps = np.round(np.concatenate(time) * 1e9).astype(np.int64)
-    source = JointSource(real.name, stamps, joints, False, real.arm, ())
+    log = Log(Path(real.name), model, stamps, joints, dict.fromkeys(joints, real.name))
     gains = (1.0,) * model.n if real.of_currents else ()
-    r = torque_recording(Path(real.name), source, model, Choice(gains=gains))
+    r = torque_recording(log, Choice(gains=gains))
     loaded = observed(model, r.time, r.q, r.qd, joints[kind], SequentialParams().observer_gain_1_s, 1.0)
     numbers = np.repeat(np.arange(len(runs)), [len(run.time) for run in runs])
     return Stream(r, np.concatenate([run.label for run in runs]), numbers, loaded - r.tau_ext)

@@ -5,9 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pretouch.imported_data.events import ContactEvent
-from pretouch.imported_data.torque_detect import MOVING_RAD_S, detect_torques
-from pretouch.imported_data.torque_results import for_currents, result_of
+from pretouch.imported_data.detect_torque import (
+    MOVING_RAD_S,
+    ContactEvent,
+    detect_torques,
+    for_currents,
+    result_of,
+)
 from pretouch.profiles import Profile
 from pretouch.types import BoolArray, FloatArray
 from pretouch_lab.benchmarks.bounds import rate_bounds
@@ -36,12 +40,11 @@ def said_of(stream: Stream, profile: Profile) -> Said:
     r = stream.recording
     if profile.detect.by_torques:
         by_torques = detect_torques(r, for_currents(r, profile)[0])
-        known = np.isfinite(by_torques.residual).all(axis=1)
-        return Said(by_torques.contacts, by_torques.time, by_torques.armed & known)
+        return Said(by_torques.contacts, by_torques.time, by_torques.judged)
     result = result_of(r, profile)
     if result.by_force is None:
         return Said((), np.zeros(0), np.zeros(0, np.bool_))
-    d = result.by_force
+    d = result.by_force.decisions
     return Said(result.contacts, d.time + r.time[0], d.armed & np.isfinite(d.compared).all(axis=1))
 
 

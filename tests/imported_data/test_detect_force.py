@@ -1,4 +1,4 @@
-"""The detector on imported data, held against the plain one of `tests.reference` and against the controller itself."""
+"""Thresholds on a recorded force, held against the plain one of `tests.reference` and against the controller itself."""
 
 from dataclasses import replace
 
@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from pretouch.errors import RecordingError
-from pretouch.imported_data.detect import detect_imported
-from pretouch.imported_data.samples import read_imported
-from pretouch.imported_data.source import Choice
-from pretouch.imported_data.summary import findings, guidance, summary
+from pretouch.imported_data.detect_force import detect_force
+from pretouch.imported_data.forces import read_force
+from pretouch.imported_data.log import Choice
+from pretouch.imported_data.reading import open_log
 from pretouch.profiles import PROFILES, at_rate, profile
 from tests.following_arm import Arm
 from tests.imported_data.files import PUSHES, force_columns, pushed, write_csv
@@ -18,12 +18,18 @@ from tests.reference.contact import Touch
 PAPER, BLIND = PROFILES["paper"], PROFILES["blind"]
 
 
+def read(file):
+    return read_force(open_log(file, Choice()), Choice())
+
+
 @pytest.fixture
 def of_force(tmp_path):
     """Read a force (N, 3) as from a CSV file."""
-    return lambda force, rate=100.0: read_imported(
-        write_csv(tmp_path / f"{rate}.csv", force_columns(force, rate)), Choice()
-    )
+    return lambda force, rate=100.0: read(write_csv(tmp_path / f"{rate}.csv", force_columns(force, rate)))
+
+
+def decided(recording, p):
+    return detect_force(recording, p).decisions
 
 
 def expected(force, p):
@@ -43,7 +49,7 @@ def expected(force, p):
 @pytest.mark.parametrize("name", ["paper", "paper:detect.compare=raw", "blind:window.samples=150"])
 def test_contacts_and_thresholds_are_those_of_the_plain_detector(of_force, name):
     force, p = pushed(14.0, PUSHES), profile(name)
-    found = detect_imported(of_force(force), p)
+    found = decided(of_force(force), p)
     contacts, limits = expected(force, p)
     assert len(contacts) == 3
     assert [c.time for c in found.contacts] == pytest.approx([0.005 + cycle / 100 for cycle, *_ in contacts])
@@ -58,7 +64,7 @@ def test_contacts_and_thresholds_are_those_of_the_plain_detector(of_force, name)
 def test_a_push_that_lasts_is_found_again_after_each_reaction_as_by_the_plain_detector(of_force):
     p = profile("paper:react.decay_cycles=20")
     force = pushed(8.0, ((2.0, 4.0, (0.0, 60.0, 0.0)),))
-    found, (contacts, _) = detect_imported(of_force(force), p), expected(force, p)
+    found, (contacts, _) = decided(of_force(force), p), expected(force, p)
     assert len(contacts) > 2
     assert [c.time for c in found.contacts] == pytest.approx([0.005 + cycle / 100 for cycle, *_ in contacts])
 
@@ -67,7 +73,7 @@ def test_a_controller_given_the_same_forces_decides_the_same(of_force, panda_mod
     force = pushed(10.0, PUSHES)
     arm = Arm(panda_model, paper_skin, BLIND)
     steps = [arm.step(tuple(sample)) for sample in force]
-    found = detect_imported(of_force(force), BLIND)
+    found = decided(of_force(force), BLIND)
     reactions = [(i, s.contact.force) for i, s in enumerate(steps) if s.contact is not None]
     assert len(reactions) == 2
     assert [round((c.time - 0.005) * 100) for c in found.contacts] == [i for i, _ in reactions]
@@ -82,30 +88,29 @@ def test_jitter_of_a_few_milliseconds_neither_doubles_nor_drops_a_sample(tmp_pat
     force = pushed(10.0, PUSHES)
     columns = force_columns(force)
     columns["time_s"] = columns["time_s"] + np.random.default_rng(1).uniform(-2e-3, 2e-3, len(force))
-    found = detect_imported(read_imported(write_csv(tmp_path / "j.csv", columns), Choice()), PAPER)
+    found = decided(read(write_csv(tmp_path / "j.csv", columns)), PAPER)
     np.testing.assert_array_equal(found.force[:990], force[:990])
 
 
 def test_of_faster_data_the_newest_sample_of_each_cycle_is_taken(of_force):
     force = pushed(5.0, PUSHES, rate=1000.0)
-    found = detect_imported(of_force(force, 1000.0), PAPER)
+    found = decided(of_force(force, 1000.0), PAPER)
     np.testing.assert_array_equal(found.force, force[::10])
 
 
 def test_slower_data_are_held_and_the_way_out_is_named(of_force):
     force = pushed(14.0, PUSHES, rate=25.0)
     imported = of_force(force, 25.0)
-    found = detect_imported(imported, PAPER)
+    found = decided(imported, PAPER)
     np.testing.assert_array_equal(found.force[:100:4], force[:25])
     np.testing.assert_array_equal(found.force[3:100:4], force[:25])
-    (said,) = findings(imported, found, PAPER)
-    assert "at 25 Hz" in said
-    assert "--rate 25" in said
+    (note,) = detect_force(imported, PAPER).notes
+    assert (note.code, note.values["rate"], note.values["own"]) == ("slower", pytest.approx(25.0), 100.0)
     slow = at_rate(PAPER, 25.0)
-    found = detect_imported(imported, slow)
+    found = decided(imported, slow)
     contacts, _ = expected(force, slow)
     assert [c.time for c in found.contacts] == pytest.approx([0.02 + cycle / 25 for cycle, *_ in contacts])
-    assert findings(imported, found, slow) == ()
+    assert detect_force(imported, slow).notes == ()
 
 
 def test_after_a_gap_there_is_no_force_and_nothing_is_felt_until_it_comes_back(tmp_path):
@@ -113,18 +118,20 @@ def test_after_a_gap_there_is_no_force_and_nothing_is_felt_until_it_comes_back(t
     columns = force_columns(force)
     kept = (columns["time_s"] < 8.0) | (columns["time_s"] >= 15.0)
     file = write_csv(tmp_path / "gap.csv", {name: values[kept] for name, values in columns.items()})
-    imported = read_imported(file, Choice())
-    found = detect_imported(imported, PAPER)
+    imported = read(file)
+    found = decided(imported, PAPER)
     assert [round(c.time, 1) for c in found.contacts] == [3.1, 16.1]
     assert np.isnan(found.force[(found.time > 8.2) & (found.time < 15.0)]).all()
     assert np.isfinite(found.force[(found.time > 7.99) & (found.time < 8.18)]).all()
-    assert any("A gap of more than 0.2 s, 7.01 s in all" in said for said in findings(imported, found, PAPER))
+    gap, without = detect_force(imported, PAPER).notes
+    assert (gap.code, gap.values["count"], gap.values["seconds"]) == ("force_gaps", 1, pytest.approx(7.01))
+    assert without.values["count"] == np.isnan(found.force[:, 0]).sum()
 
 
 def test_a_gap_of_days_costs_no_time_and_no_memory(tmp_path):
     columns = force_columns(pushed(6.0, ()))
     columns["time_s"][300:] += 20 * 86_400.0
-    found = detect_imported(read_imported(write_csv(tmp_path / "days.csv", columns), Choice()), PAPER)
+    found = decided(read(write_csv(tmp_path / "days.csv", columns)), PAPER)
     assert len(found.time) < 1000
     assert not found.contacts
 
@@ -133,7 +140,7 @@ def test_a_gap_of_days_costs_no_time_and_no_memory(tmp_path):
 def test_samples_that_are_no_estimate_leave_the_window_as_it_is(of_force, broken):
     force = pushed(6.0, ())
     force[300:320] = broken
-    found = detect_imported(of_force(force), PAPER)
+    found = decided(of_force(force), PAPER)
     assert not found.contacts
     assert np.isnan(found.force[300:320]).all()
     np.testing.assert_array_equal(found.upper[300:320], np.tile(found.upper[299], (20, 1)))
@@ -141,27 +148,26 @@ def test_samples_that_are_no_estimate_leave_the_window_as_it_is(of_force, broken
 
 def test_data_too_short_or_too_slow_are_one_sentence(of_force):
     with pytest.raises(RecordingError, match=r"0\.90 s of usable force, but the window of paper takes 1 s to fill"):
-        detect_imported(of_force(pushed(0.9, ())), PAPER)
+        decided(of_force(pushed(0.9, ())), PAPER)
     with pytest.raises(RecordingError, match=r"comes every 1 s.*unit of the time"):
-        detect_imported(of_force(pushed(100.0, (), rate=1.0), 1.0), PAPER)
+        decided(of_force(pushed(100.0, (), rate=1.0), 1.0), PAPER)
 
 
 def test_base_forces_that_the_summary_names_are_the_borderline(of_force):
     imported = of_force(pushed(14.0, PUSHES))
-    found = summary(detect_imported(imported, PAPER), PAPER)
+    found = detect_force(imported, PAPER)
     for f_base, contacts in ((found.f_base_all - 0.01, 1), (found.f_base_all + 0.01, 0)):
         p = replace(PAPER, detect=replace(PAPER.detect, f_base_n=f_base))
-        assert len(detect_imported(imported, p).contacts) == contacts
+        assert len(decided(imported, p).contacts) == contacts
     assert found.f_base_free < 10.0 < found.f_base_all
 
 
 def test_the_noise_in_free_motion_is_that_of_the_data(of_force):
-    decisions = detect_imported(of_force(pushed(60.0, PUSHES, noise=0.4)), PAPER)
-    found = summary(decisions, PAPER)
+    found = detect_force(of_force(pushed(60.0, PUSHES, noise=0.4)), PAPER)
     np.testing.assert_allclose(found.mean, [1.0, -2.0, 0.5], atol=0.2)
     np.testing.assert_allclose(found.sigma, 0.4, rtol=0.1)
     assert np.all((found.sigma_window > 0.0) & (found.sigma_window < found.sigma))  # eq. 8 makes outliers smaller
     np.testing.assert_allclose(found.width, 10.0 + found.sigma_window, atol=0.02)
     assert found.duration == pytest.approx(59.0, abs=0.05)
     assert 50.0 < found.free < 53.0
-    assert "if nobody touched the arm, 3 false contacts" in guidance(decisions, found, PAPER)
+    assert len(found.decisions.contacts) == 3

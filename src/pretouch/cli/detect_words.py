@@ -1,0 +1,123 @@
+"""What is said of a log of another program and of what detectors made of it: a sentence for each code."""
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from pretouch.contact.moving_thresholds import thresholds_of
+from pretouch.imported_data.detect_force import ForceResult
+from pretouch.imported_data.detect_torque import ProfileResult
+from pretouch.imported_data.forces import ForceRecording
+from pretouch.imported_data.log import Note
+from pretouch.imported_data.torques import TorqueRecording
+
+_SENTENCES = {
+    "no_time": "{rows} {have} no time and {were} left out.",
+    "unused": "Columns that are not used: {names}.",
+    "no_stamps": "Some headers have no stamp, so the times of recording are used.",
+    "drift": "The headers' stamps and the times of recording drift {seconds:.3g} s apart, so the {used}, which are"
+    " steadier, are used.",
+    "not_finite": "{samples} not finite numbers and left out.",
+    "sorted": "{what}: the time went backwards {times}; the samples were sorted.",
+    "repeated": "{what}: a stamp was repeated {times}; the later sample counts.",
+    "no_estimate": "Force: {samples} not finite and count as no estimate.",
+    "zeros_missing": "Force: {samples} all zeros and count as no estimate (--zeros kept).",
+    "zeros_kept": "Force: {samples} all zeros, which on a Franka arm means no estimate (--zeros missing).",
+    "looks_ee": "The force's frame_id is {frame!r}: if that is the end-effector's, add --frame ee.",
+    "force_gaps": "{gaps} of more than {longer_s:g} s, {seconds:.2f} s in all, without force.",
+    "gaps": "{gaps} of more than {longer_s:g} s, {seconds:.2f} s in all: what comes after begins anew.",
+    "no_motion": "No joint moves: sign and unit of the velocities cannot be checked.",
+    "velocities": "The velocities are {ratio:.2g} times those of the positions, with a correlation of"
+    " {correlation:.2f} at the worst joint: check them.",
+    "derived_velocities": "Velocities are those of positions.",
+    "no_commands": "There are no commanded velocities (dq_d1_rad_s ...): the measured ones, smoothed, stand in.",
+    "slower": "The data come at {rate:.4g} Hz and the detector of {profile} runs at {own:.4g} Hz: repeated samples look"
+    " like more than they are, and lower sigma; --rate {rate:.4g} runs it at the data's own rate.",
+    "cycles_without": "{profile}: {count} of {of} cycles have no force, so nothing is detected in them.",
+    "unwatched": "{profile}: no skin watches, so free motion is learnt from all that does not look like a contact"
+    " (detect.learn=always); a touch that is there from the start is learnt too.",
+    "never_armed": "{profile} was never armed: the recording is shorter than its window, or too near a singularity.",
+    "long": "{profile}: the contact at {time:.1f} s lasts {seconds:.0f} s; if nobody leant on the arm, its model or"
+    " load is wrong (--arm, --payload, units), or more has to be allowed for (detect.friction_prior_nm,"
+    " detect.offset_prior_nm, detect.torque_prior_nm).",
+    "for_currents": "{profile}: currents have gear friction in them, so more is allowed for before it is learnt:"
+    " {allowed}.",
+    "cannot_run": "{profile} cannot run: {why}",
+}
+_TORQUES = {
+    "tau_ext": "External torques",
+    "tau": "Measured torques, less the model's by an observer of ours",
+    "current": "Motor currents times their gains, less the model's torques by an observer of ours",
+}
+
+
+def sentence(note: Note) -> str:
+    """Return the sentence of a note."""
+    count = int(note.values.get("count", 0))
+    one = count == 1
+    words = {
+        "rows": "1 row" if one else f"{count} rows", "have": "has" if one else "have", "were": "was" if one else "were",
+        "samples": "1 sample is" if one else f"{count} samples are", "times": "once" if one else f"{count} times",
+        "gaps": "A gap" if one else f"{count} gaps",
+    }  # fmt: skip
+    return _SENTENCES[note.code].format(**words | dict(note.values))
+
+
+def sentences(notes: Iterable[Note]) -> list[str]:
+    """Return the sentences of notes, each once."""
+    return list(dict.fromkeys(map(sentence, notes)))
+
+
+def read_from(r: ForceRecording | TorqueRecording) -> str:
+    """Say what was read, and what was assumed of it."""
+    if isinstance(r, ForceRecording):
+        sign, other = ("by", "on-robot") if r.by_robot else ("on", "by-robot")
+        frame, another = ("end-effector's", "base") if r.in_ee else ("base", "ee")
+        arm = f" The arm is assumed to be {r.model.description.name} (--arm)." if r.in_ee else ""
+        return (
+            f"Force from {r.source}, assumed to be the force {sign} the robot (otherwise --sign {other}) in the {frame}"
+            f" frame (otherwise --frame {another}).{arm}"
+        )
+    torques, positions = r.sources
+    sources = torques if positions == torques else f"{torques}, positions from {positions}"
+    whose = ("by" if r.by_robot else "on") if r.kind == "tau_ext" else "brake" if r.by_robot else "drive"
+    assumed = f"to be {whose} the robot" if r.kind == "tau_ext" else f"to {whose} the joints"
+    other = "on-robot" if r.by_robot else "by-robot"
+    return (
+        f"{_TORQUES[r.kind]}, from {sources}, assumed {assumed} (otherwise --sign {other}). The arm is assumed to be"
+        f" {r.model.description.name} (--arm)."
+    )
+
+
+def force_guidance(r: ForceResult) -> str:
+    """Say what contacts by a force mean for an arm that nobody touched."""
+    name, count, minutes = r.decisions.name, len(r.decisions.contacts), r.duration / 60
+    f_base = thresholds_of(r.profile.detect).f_base_n
+    if not count:
+        return (
+            f"{name}: no contact in {minutes:.1f} min; an F_b below {r.f_base_all:.1f} N would have given one (F_b is"
+            f" {f_base:g} N)."
+        )
+    contacts = "1 false contact" if count == 1 else f"{count} false contacts"
+    return (
+        f"{name}: if nobody touched the arm, {contacts} in {minutes:.1f} min; an F_b above {r.f_base_all:.1f} N would"
+        f" have given none, one above {r.f_base_free:.1f} N none but {'this' if count == 1 else 'these'} (it is"
+        f" {f_base:g} N)."
+    )
+
+
+def torque_guidance(name: str, r: ProfileResult) -> str:
+    """Say what contacts by torques mean for an arm that nobody touched."""
+    count = len(r.contacts)
+    contacts = f"{count or 'no'} contact{'' if count == 1 else 's'} in {r.duration / 60:.1f} min"
+    if not r.motion:
+        return f"{name}: {contacts}; the arm does not move."
+    return (
+        f"{name}: {contacts}, {r.in_motion} of them in {r.motion / 60:.1f} min of motion; if nobody touched the arm,"
+        f" these are {r.per_hour:.3g} false alarms an hour."
+    )
+
+
+def shown(value: float, digits: int) -> str:
+    """Write a number; inf and what is not known otherwise."""
+    return f"{value:.{digits}f}" if np.isfinite(value) else "inf" if value > 0 else "–"

@@ -1,0 +1,221 @@
+"""A log of another program: what stands in it by kind, in SI units but in its own sign and frame."""
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal, Protocol
+
+import numpy as np
+
+from pretouch.errors import RecordingError
+from pretouch.robot.model import RobotModel
+from pretouch.robot.named import robot_named
+from pretouch.types import FloatArray, IntArray
+from pretouch.values import value
+
+Sign = Literal["auto", "on-robot", "by-robot"]
+Frame = Literal["base", "ee"]
+Zeros = Literal["auto", "missing", "kept"]
+TORQUES = ("tau_ext", "tau", "current")
+"""Kinds of joint torques; of those that a log holds the first is used."""
+BAGS = (".mcap", ".db3", ".bag")
+TABLES = (".csv", ".tsv", ".txt")
+PARQUET = ".parquet"
+_LATE_S = 0.5
+"""How far a stamp may lie before an earlier one [s]: messages overtake each other by less, two recordings by more."""
+_OUT_OF_RANGE_RAD = 0.5
+"""Joint positions this far beyond the arm's range [rad] are of another unit or arm."""
+_NUMBERED = re.compile(r"(.*?)(\d{1,2})(\D*)")
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What a log does not say of itself."""
+
+    wrench: str = ""
+    """Topic of the force; needed if there are several."""
+    joints: str = ""
+    """Topic of the joint positions; needed if there are several."""
+    sign: Sign = "auto"
+    """Whether forces and external torques are on the robot by the environment, as ours, or by the robot, as the
+    vendor's O_F_ext_hat_K; auto: on the robot, but for torques by the name that Franka gives them."""
+    frame: Frame = "base"
+    """Frame the force is given in: the arm's base or its end-effector."""
+    zeros: Zeros = "auto"
+    """Whether a wrench of zeros only means that there is no estimate; auto: where the force is by the robot."""
+    arm: str | RobotModel = "auto"
+    """The arm, or its name or the folder it was imported to; auto: by the names of its joints, otherwise a Panda."""
+    torques: str = ""
+    """Topic of the joint torques; needed if it is not clear."""
+    columns: tuple[tuple[str, str], ...] = ()
+    """Columns of other names: theirs and ours. `*` stands for the number of a joint."""
+    gains: tuple[float, ...] = ()
+    """Torque of each joint by its motor's current [Nm/A]."""
+    payload_kg: float = 0.0
+    """Load at the end-effector that measured torques carry and the model does not [kg]."""
+
+
+@value
+class Note:
+    """What a person should know of a log or of a result: a code, and the numbers and names that belong to it."""
+
+    code: str
+    values: Mapping[str, float | str]
+
+
+@value
+class Log:
+    """N samples of what a log holds."""
+
+    place: Path
+    model: RobotModel
+    """The arm whose joints these are."""
+    time: IntArray
+    """(N,) [ns], of any clock."""
+    arrays: dict[str, FloatArray]
+    """By kind, NaN where there is no value: `force` (N, 3) [N], `torque` (N, 3) [Nm]; of the n joints of the model, in
+    its order, `q`, `dq`, `dq_d`, `tau_ext`, `tau` (N, n) [rad, rad/s, Nm] and `current` [A]."""
+    sources: dict[str, str]
+    """By kind, the topic or the first column it was taken from."""
+    frame_id: str = ""
+    """Frame that the log names for the force."""
+    by_robot: bool = False
+    """Whether the name of the external torques tells that they are by the robot on its environment."""
+    notes: tuple[Note, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def at(self, rows: IntArray) -> "Log":
+        """Return some of its samples."""
+        return replace(self, time=self.time[rows], arrays={kind: values[rows] for kind, values in self.arrays.items()})
+
+    def noted(self, *notes: Note) -> "Log":
+        """Return it with further notes."""
+        return replace(self, notes=(*self.notes, *notes))
+
+    def in_order(self, *finite: str) -> "Log":
+        """Return it by time without doubles, the later of two counting, and without rows that are not finite in kinds.
+
+        Raises RecordingError if fewer than two samples are left.
+        """
+        log, what = self, "Force" if "force" in self.arrays else "Joints"
+        if finite:
+            usable = np.isfinite(np.hstack([self.arrays[kind] for kind in finite])).all(axis=1)
+            if without := int(np.count_nonzero(~usable)):
+                log = log.at(np.flatnonzero(usable)).noted(Note("not_finite", {"count": without}))
+        steps = np.diff(log.time)
+        if backwards := int(np.count_nonzero(steps < 0)):
+            log = log.at(np.argsort(log.time, kind="stable")).noted(Note("sorted", {"what": what, "count": backwards}))
+        last = np.append(np.diff(log.time) > 0, True)[: len(log)]
+        if doubles := int(np.count_nonzero(~last)):
+            log = log.at(np.flatnonzero(last)).noted(Note("repeated", {"what": what, "count": doubles}))
+        if len(log) < 2:
+            raise RecordingError(
+                f"{self.place} has {len(self)} samples, and {len(log)} of them {'is' if len(log) == 1 else 'are'}"
+                " usable: give a longer recording, of finite numbers and with a time of its own for each sample."
+            )
+        return log
+
+
+class LogFile(Protocol):
+    """A log that was opened: a table, or a bag."""
+
+    kinds: frozenset[str]
+    """What it surely holds, of the kinds of `Log`."""
+
+    def force(self, posture: bool) -> Log:
+        """Read the force, and where asked for the joint positions at its instants."""
+
+    def torques(self) -> Log:
+        """Read one of `TORQUES`, with joint positions and perhaps velocities."""
+
+    def positions(self) -> Log:
+        """Read joint positions."""
+
+
+def arm_of(names: Sequence[str], arm: str | RobotModel) -> RobotModel:
+    """Return an arm by its name, or the one that the names of joints tell of, otherwise a Panda."""
+    if isinstance(arm, RobotModel):
+        return arm
+    return RobotModel(robot_named(("fr3" if "fr3" in " ".join(names) else "panda") if arm == "auto" else arm))
+
+
+def joint_places(place: Path, names: Sequence[str], model: RobotModel) -> list[int]:
+    """Where each joint of a model stands among names: by its name, as the end of a name, or by its number.
+
+    Numbers, from 0 or 1 on, count where names differ in them alone, as q1 to q7 do. RecordingError where that is not
+    clear.
+    """
+    lower = [name.lower() for name in names]
+    for alike in (str.__eq__, str.endswith):
+        by_name = [[i for i, name in enumerate(lower) if alike(name, joint.lower())] for joint in model.joints]
+        if all(len(places) == 1 for places in by_name):
+            return [places[0] for places in by_name]
+    groups: dict[tuple[str, str], dict[int, int]] = {}
+    for i, name in enumerate(lower):
+        if (parts := _NUMBERED.fullmatch(name)) and "finger" not in name:
+            groups.setdefault((parts[1], parts[3]), {})[int(parts[2])] = i
+    whole = [group for group in groups.values() if sorted(group) in (list(range(model.n)), list(range(1, model.n + 1)))]
+    if len(whole) != 1:
+        what = f"{len(whole)} arms of" if whole else "not"
+        raise RecordingError(
+            f"{place} names the joints {listed(names)}, which are {what} the {model.n} joints of"
+            f" {model.description.name} ({', '.join(model.joints)}): name them so, or q1 to q{model.n} in a table, or"
+            " choose another --arm, a name or the folder that `pretouch robot import` wrote."
+        )
+    return [place for _, place in sorted(whole[0].items())]
+
+
+def check_reach(place: Path, q: FloatArray, model: RobotModel) -> None:
+    """Refuse positions (N, n) [rad] that an arm cannot have: their unit or the arm is another one."""
+    low, high = model.q_min - _OUT_OF_RANGE_RAD, model.q_max + _OUT_OF_RANGE_RAD
+    beyond = (q < low) | (q > high)
+    if not beyond.any():
+        return
+    i, j = np.argwhere(beyond)[0]
+    turned = np.deg2rad(q[np.isfinite(q).all(axis=1)])
+    degrees = np.abs(turned).max() > np.deg2rad(7.0) and ((turned >= low) & (turned <= high)).all()
+    raise RecordingError(
+        f"{model.joints[j]} in {place} is at {q[i, j]:.4g} rad, out of its range of {model.q_min[j]:.2f} to"
+        f" {model.q_max[j]:.2f} rad: "
+        + (
+            "as degrees all are within: name the columns q1_deg and so on."
+            if degrees
+            else "check the unit and the arm."
+        )
+    )
+
+
+def check_steps_back(place: Path, time: IntArray, where: Callable[[int], str]) -> None:
+    """Refuse instants (N,) [ns] that begin anew: sorted, two motions would be one. `where` names a sample."""
+    back = (np.maximum.accumulate(time) - time) / 1e9 if len(time) else np.zeros(1)
+    if back.max() > _LATE_S:
+        first = int(np.argmax(back > _LATE_S))
+        raise RecordingError(
+            f"{place}, {where(first)}: the time goes back by {back[first]:.3g} s: give one recording, cut to a part in"
+            " which time never goes back."
+        )
+
+
+def interpolated(log: Log, kind: str, ticks: IntArray, longest_s: float) -> FloatArray:
+    """Values (S, m) at each tick [ns], linear between samples that are at most so far apart [s], or else NaN.
+
+    The log is in order. The last value is held for as long; before the first there is none.
+    """
+    time, values = log.time, log.arrays[kind]
+    at = np.full((len(ticks), values.shape[1]), np.nan)
+    left = np.searchsorted(time, ticks, side="right") - 1
+    right = np.minimum(left + 1, len(time) - 1)
+    gap = np.where(left == right, ticks - time[left], time[right] - time[left])
+    inside = (left >= 0) & (gap <= 1e9 * longest_s)
+    i, j = left[inside], right[inside]
+    share = (ticks[inside] - time[i]) / np.maximum(gap[inside], 1)
+    at[inside] = values[i] + share[:, None] * (values[j] - values[i])
+    return at
+
+
+def listed(names: Sequence[str]) -> str:
+    """Names, as a part of a sentence."""
+    return ", ".join(repr(name) for name in names[:8]) + (", ..." if len(names) > 8 else "") or "none"

@@ -1,0 +1,428 @@
+"""Bags of every kind: topics, stamps, joints by name, robot states, and what is wrong with them in one sentence."""
+
+import numpy as np
+import pytest
+from rosbags.rosbag1 import Writer as Writer1
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from scipy.spatial.transform import Rotation
+
+from pretouch.errors import RecordingError
+from pretouch.imported_data.forces import read_force
+from pretouch.imported_data.log import Choice
+from pretouch.imported_data.reading import open_log, read_joints
+from pretouch.imported_data.torques import torque_recording
+from pretouch.recording.skin_recording import SkinRecording
+from tests.imported_data.files import (
+    PANDA,
+    START,
+    STORE1,
+    header,
+    joints,
+    stamps,
+    wrench,
+    wrenches,
+    write_bag,
+    write_bag1,
+)
+from tests.imported_data.joint_files import Moving
+
+FORCE = np.random.default_rng(0).normal(size=(40, 3))
+Q = np.array([0.1, -0.7, 0.2, -2.3, 0.3, 1.6, 0.7])
+MOVING = Q + 0.01 * np.arange(50)[:, None] * np.array([1, 2, -1, 3, 1, -2, 1])
+FR3 = tuple(f"fr3_joint{i}" for i in range(1, 8))
+NOTHING = np.zeros(0)
+STATE = "franka_msgs/msg/FrankaState"
+FIELDS = "std_msgs/Header header\nfloat64[7] q\nfloat64[7] dq\nfloat64[7] dq_d\nfloat64[7] tau_ext_hat_filtered\n"
+STATE2 = "franka_msgs/msg/FrankaRobotState"
+FIELDS2 = (
+    "std_msgs/Header header\nsensor_msgs/JointState measured_joint_state\nsensor_msgs/JointState desired_joint_state\n"
+    "sensor_msgs/JointState tau_ext_hat_filtered\n"
+)
+
+
+def force_of(place, **choice):
+    return read_force(open_log(place, Choice(**choice)), Choice(**choice))
+
+
+def torques_of(place, **choice):
+    return torque_recording(open_log(place, Choice(**choice)).torques(), Choice(**choice))
+
+
+def one_file(folder):
+    return next(p for p in folder.iterdir() if p.suffix in (".mcap", ".db3"))
+
+
+def states(q=MOVING, names=PANDA, topic="/joint_states"):
+    return [(topic, t + 300_000, joints(t, row, names)) for t, row in zip(stamps(len(q)), q, strict=True)]
+
+
+def by_time(*parts):
+    return sorted((m for part in parts for m in part), key=lambda m: m[1])
+
+
+@pytest.mark.parametrize("plugin", [StoragePlugin.MCAP, StoragePlugin.SQLITE3])
+@pytest.mark.parametrize("as_file", [False, True])
+def test_bags_of_ros_2_are_read_as_folder_and_as_file(tmp_path, plugin, as_file):
+    bag = write_bag(tmp_path / "bag", wrenches(FORCE), plugin)
+    recording = force_of(one_file(bag) if as_file else bag)
+    np.testing.assert_array_equal(recording.force, FORCE)
+    np.testing.assert_allclose(recording.time, (stamps(40) - START) / 1e9)
+    assert recording.notes == ()
+    assert recording.rate == pytest.approx(100.0)
+    assert recording.source == "/wrench"
+
+
+def test_bags_of_ros_1_are_read(tmp_path):
+    messages = [("/wrench", t, wrench(t, f, store=STORE1)) for t, f in zip(stamps(40), FORCE, strict=True)]
+    np.testing.assert_array_equal(force_of(write_bag1(tmp_path / "old.bag", messages)).force, FORCE)
+
+
+def test_the_sign_is_what_was_said_and_is_kept(tmp_path):
+    bag = write_bag(tmp_path / "bag", wrenches(FORCE))
+    on, by = force_of(bag, sign="on-robot"), force_of(bag, sign="by-robot")
+    np.testing.assert_array_equal(on.force, FORCE)
+    np.testing.assert_array_equal(by.force, -FORCE)
+    assert (on.by_robot, by.by_robot) == (False, True)
+
+
+@pytest.mark.parametrize(
+    ("sign", "zeros", "code"),
+    [
+        ("on-robot", "auto", "zeros_kept"), ("by-robot", "auto", "zeros_missing"),
+        ("on-robot", "missing", "zeros_missing"), ("by-robot", "kept", "zeros_kept"),
+    ],
+)  # fmt: skip
+def test_wrenches_of_zeros_only_are_no_estimate_where_the_robot_says_so(tmp_path, sign, zeros, code):
+    messages = wrenches(FORCE)
+    stamp = messages[7][1] - 300_000
+    messages[7] = ("/wrench", stamp + 300_000, wrench(stamp, (0, 0, 0), (0, 0, 0)))
+    messages[9] = ("/wrench", messages[9][1], wrench(messages[9][1] - 300_000, (0, 0, 0), (0, 0, 1)))
+    recording = force_of(write_bag(tmp_path / "bag", messages), sign=sign, zeros=zeros)
+    gone = np.flatnonzero(np.isnan(recording.force).any(axis=1))
+    assert gone.tolist() == ([7] if code == "zeros_missing" else [])
+    assert [(note.code, note.values["count"]) for note in recording.notes] == [(code, 1)]
+
+
+def hand_rotation(q):
+    """R_O_tcp of a Panda from the vendor's table of modified Denavit-Hartenberg parameters, hand turned by -45 deg."""
+    alphas = np.array([0, -1, 1, 1, -1, 1, 1]) * np.pi / 2
+    total = Rotation.identity()
+    for alpha, theta in zip(alphas, q, strict=True):
+        total = total * Rotation.from_euler("x", alpha) * Rotation.from_euler("z", theta)
+    return (total * Rotation.from_euler("z", -np.pi / 4)).as_matrix()
+
+
+def test_a_force_in_the_end_effectors_frame_is_turned_by_the_arms_posture(tmp_path):
+    other = Q + np.linspace(0.0, 0.3, 7)
+    share = np.linspace(0, 1, 40)
+    order = [3, 0, 6, 1, 5, 2, 4]
+    names = ["fr3_finger_joint1", *(FR3[j] for j in order)]
+    messages = wrenches(FORCE, frame="fr3_K")
+    for t, s in zip(stamps(40), share, strict=True):
+        q = (1 - s) * Q + s * other
+        messages.append(("/joint_states", t, joints(t, [0.02, *q[order]], names)))
+        messages.append(("/joint_states", t, joints(t, [0.02, 0.02], ["finger_joint1", "finger_joint2"])))
+    bag = write_bag(tmp_path / "bag", by_time(messages))
+    recording = force_of(bag, frame="ee")
+    for f, s, ours in zip(FORCE, share, recording.force, strict=True):
+        # the file of the arm has six digits
+        np.testing.assert_allclose(ours, hand_rotation((1 - s) * Q + s * other) @ f, atol=1e-5)
+    assert recording.model.description.name == "fr3"
+    assert [(note.code, note.values["frame"]) for note in force_of(bag).notes] == [("looks_ee", "fr3_K")]
+
+
+def test_forces_without_a_posture_near_them_are_left_out_in_the_end_effectors_frame(tmp_path):
+    messages = wrenches(FORCE) + [("/joint_states", t, joints(t, Q)) for t in stamps(40)[:10]]
+    known = np.isfinite(force_of(write_bag(tmp_path / "bag", by_time(messages)), frame="ee").force).all(axis=1)
+    assert known[:29].all()
+    assert not known[30:].any()
+
+
+def test_of_several_topics_one_has_to_be_named(tmp_path):
+    bag = write_bag(tmp_path / "bag", wrenches(FORCE, "/base") + wrenches(2 * FORCE, "/tool"))
+    with pytest.raises(
+        RecordingError, match=r"several topics of geometry_msgs/WrenchStamped: .*--wrench, /base, /tool"
+    ):
+        force_of(bag)
+    np.testing.assert_array_equal(force_of(bag, wrench="/tool").force, 2 * FORCE)
+    with pytest.raises(RecordingError, match=r"no topic '/hand' of .*: choose --wrench from /base, /tool"):
+        force_of(bag, wrench="/hand")
+
+
+def test_the_arm_that_moved_is_chosen_by_its_topic_and_what_was_desired_is_not_taken(tmp_path, panda_model):
+    messages = states(topic="/a") + states(MOVING + 0.2, topic="/desired") + wrenches(FORCE)
+    bag = write_bag(tmp_path / "one", messages)
+    np.testing.assert_array_equal(read_joints(bag, panda_model)[0].q, MOVING)
+    bag = write_bag(tmp_path / "two", messages + states(MOVING + 0.1, topic="/b"))
+    force_of(bag)
+    np.testing.assert_array_equal(read_joints(bag, panda_model, "/b")[0].q, MOVING + 0.1)
+    words = r"several topics of sensor_msgs/JointState: choose one by --joints \(--topic of .*, /a, /b, /desired"
+    for read in (lambda: read_joints(bag, panda_model), lambda: force_of(bag, frame="ee")):
+        with pytest.raises(RecordingError, match=words):
+            read()
+    with pytest.raises(RecordingError, match="has no topic '/c'"):
+        read_joints(bag, panda_model, "/c")
+
+
+def test_joints_are_in_the_order_of_the_arm_and_a_gripper_is_passed_over(tmp_path, panda_model):
+    gripper = states(np.zeros((50, 2)), ("gripper_left", "gripper_right"))
+    arm = states(MOVING[:, ::-1], PANDA[::-1])
+    messages = [m for pair in zip(gripper, arm, strict=True) for m in pair]
+    trace, log = read_joints(write_bag(tmp_path / "bag", messages), panda_model)
+    np.testing.assert_array_equal(trace.q, MOVING)
+    np.testing.assert_allclose(trace.stamp, START / 1e9 + np.arange(50) / 100, atol=1e-6)
+    assert log.sources["q"] == "/joint_states"
+    assert log.notes == ()
+
+
+def test_states_without_names_are_those_of_the_arm_if_there_are_as_many(tmp_path, panda_model):
+    np.testing.assert_array_equal(read_joints(write_bag(tmp_path / "bag", states(names=())), panda_model)[0].q, MOVING)
+
+
+def test_a_recording_of_our_own_is_a_bag_too(tmp_path, panda_model):
+    with SkinRecording(tmp_path / "own.mcap") as recording:
+        recording.joints(np.arange(50) / 100 + 7.0, MOVING, None, PANDA)
+    trace, _ = read_joints(tmp_path / "own.mcap", panda_model)
+    np.testing.assert_array_equal(trace.q, MOVING)
+    np.testing.assert_allclose(trace.stamp, np.arange(50) / 100 + 7.0, atol=1e-9)
+
+
+def test_what_is_wrong_with_joints_is_said_in_one_sentence(tmp_path, panda_model):
+    two = tuple(f"{a}_joint{i}" for a in "ab" for i in range(1, 8))
+    for name, messages, words in (
+        ("none", wrenches(FORCE), "has no topic of sensor_msgs/JointState; it holds /wrench"),
+        ("others", states(MOVING[:, :2], ("a", "b")), "names the joints 'a', 'b', .* not the 7 joints of panda"),
+        ("twice", states(np.hstack([MOVING, MOVING]), two), "are 2 arms of the 7 joints"),
+        ("parts", states(MOVING[:, :4], PANDA[:4]) + states(MOVING[:, 4:], PANDA[4:]), "No message on /joint_states"),
+        ("nan", states(np.full((9, 7), np.nan)), "has joint states without positions"),
+        ("far", states(100 * MOVING), "out of its range of .* check the unit and the arm"),
+        ("short", states(MOVING, (*PANDA, "finger_joint1")), "names 8 joints and has 7 values: record as many"),
+    ):
+        with pytest.raises(RecordingError, match=words) as error:
+            read_joints(write_bag(tmp_path / name, messages), panda_model)
+        assert "\n" not in str(error.value)
+
+
+def test_a_message_without_positions_is_passed_over(tmp_path, panda_model):
+    empty = joints(START, NOTHING)
+    trace, _ = read_joints(write_bag(tmp_path / "bag", [("/joint_states", START, empty), *states()]), panda_model)
+    assert len(trace.stamp) == 50
+
+
+def test_disorder_and_doubles_are_put_right_and_counted(tmp_path):
+    messages = wrenches(FORCE)
+    messages[3], messages[4] = messages[4], messages[3]
+    stamp = messages[10][1] - 300_000
+    messages.insert(11, ("/wrench", messages[10][1] + 1, wrench(stamp, (9, 9, 9))))
+    late = [("/wrench", START + i * 10_000_000 + 300_000, m) for i, (_, _, m) in enumerate(messages)]
+    recording = force_of(write_bag(tmp_path / "bag", late))
+    expected = FORCE.copy()
+    expected[10] = 9
+    np.testing.assert_array_equal(recording.force, expected)
+    assert [(note.code, note.values["count"]) for note in recording.notes] == [("sorted", 1), ("repeated", 1)]
+
+
+@pytest.mark.parametrize(("shift", "code"), [(None, "no_stamps"), (3600, "drift")])
+def test_headers_that_cannot_be_believed_give_way_to_the_times_of_recording(tmp_path, shift, code):
+    messages = wrenches(FORCE)
+    for _, _, message in messages[5:7]:
+        stamp = message.header.stamp
+        stamp.sec, stamp.nanosec = (0, 0) if shift is None else (stamp.sec + shift, stamp.nanosec)
+    recording = force_of(write_bag(tmp_path / "bag", messages))
+    assert recording.first_s == pytest.approx((START + 300_000) / 1e9, abs=1e-6)
+    np.testing.assert_allclose(recording.time, (stamps(40) - START) / 1e9)
+    assert recording.notes[0].code == code
+
+
+@pytest.mark.parametrize(
+    "logged", [lambda s: 2.0 * s, lambda s: 6.0 * np.ceil(s / 6.0), lambda s: s + 9.0 * (s > 0.05)]
+)
+def test_of_two_clocks_that_drift_apart_the_steadier_is_used(tmp_path, logged):
+    seconds = np.arange(1200) / 100.0
+    times = START + np.round(logged(seconds) * 1e9).astype(np.int64)
+    force = np.tile(FORCE, (30, 1))
+    messages = [("/wrench", t, wrench(s, f)) for t, s, f in zip(times, stamps(1200), force, strict=True)]
+    recording = force_of(write_bag(tmp_path / "bag", messages))
+    np.testing.assert_allclose(recording.time, seconds)
+    assert [(note.code, note.values["used"]) for note in recording.notes] == [("drift", "stamps")]
+
+
+@pytest.mark.parametrize(("begin", "later"), [(START, 0), (0, START + 10**15)])
+def test_headers_of_another_clock_that_keeps_pace_are_believed(tmp_path, begin, later):
+    messages = [
+        ("/wrench", int(t) + later, wrench(t - START + begin, f)) for t, f in zip(stamps(40), FORCE, strict=True)
+    ]
+    recording = force_of(write_bag(tmp_path / "bag", messages))
+    assert recording.first_s == pytest.approx(begin / 1e9)
+    assert recording.notes == ()
+
+
+def test_a_clock_of_headers_that_steps_back_is_refused_and_one_of_the_recording_is_not(tmp_path):
+    messages = wrenches(np.tile(FORCE, (5, 1)))
+    back = [(topic, t - 10**9 * (i >= 120), m) for i, (topic, t, m) in enumerate(messages)]
+    recording = force_of(write_bag(tmp_path / "recording", back))
+    np.testing.assert_array_equal(recording.force, np.tile(FORCE, (5, 1)))
+    for _, _, message in messages[120:]:
+        message.header.stamp.sec -= 1
+    with pytest.raises(RecordingError, match=r"message 121 on /wrench: the time goes back by 0\.99 s"):
+        force_of(write_bag(tmp_path / "headers", messages))
+
+
+def test_a_bag_without_forces_says_what_it_holds(tmp_path):
+    bag = write_bag(tmp_path / "bag", [("/joint_states", START, joints(START, Q))])
+    with pytest.raises(
+        RecordingError, match=r"no topic of .*Wrench.*; it holds /joint_states \(sensor_msgs/JointState\)"
+    ):
+        force_of(bag)
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("junk.mcap", b"\x89MCAP0\r\n" + bytes(range(256)) * 4),
+        ("junk.db3", b"SQLite format 3\0" + bytes(200)),
+        ("junk.bag", b"#ROSBAG V2.0\n" + bytes(200)),
+    ],
+)
+def test_files_that_are_no_recording_are_one_sentence(tmp_path, name, content):
+    file = tmp_path / name
+    file.write_bytes(content)
+    with pytest.raises(RecordingError, match="cannot be read as a bag") as error:
+        open_log(file, Choice())
+    assert "\n" not in str(error.value)
+
+
+def read_or_refused(file):
+    """Return how much was read, and our error's sentence or the name; any other exception is a failure."""
+    try:
+        return len(force_of(file).force), str(file)
+    except RecordingError as error:
+        return 0, str(error)
+
+
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.9, 0.99])
+@pytest.mark.parametrize("plugin", [StoragePlugin.MCAP, StoragePlugin.SQLITE3])
+def test_a_file_cut_off_is_read_or_refused_in_one_sentence(tmp_path, share, plugin):
+    file = one_file(write_bag(tmp_path / "bag", wrenches(FORCE), plugin))
+    content = file.read_bytes()
+    file.write_bytes(content[: int(share * len(content))])
+    count, sentence = read_or_refused(file)
+    assert count <= 40
+    assert str(file) in sentence
+    assert "\n" not in sentence
+
+
+def test_a_file_with_flipped_bytes_is_read_or_refused_in_one_sentence(tmp_path):
+    file = one_file(write_bag(tmp_path / "bag", wrenches(FORCE)))
+    content, random = bytearray(file.read_bytes()), np.random.default_rng(4)
+    for _ in range(60):
+        broken = bytearray(content)
+        for place in random.integers(0, len(content), 3):
+            broken[place] = random.integers(256)
+        file.write_bytes(broken)
+        count, sentence = read_or_refused(file)
+        assert count <= 40
+        assert "\n" not in sentence
+
+
+# joint torques
+
+
+@pytest.fixture(scope="module")
+def short(panda_model):
+    return Moving(panda_model, 4.0, rate=100.0)
+
+
+def of_motion(moving):
+    return START + np.round(moving.time * 1e9).astype(np.int64)
+
+
+def measured(moving, topic="/joint_states", names=PANDA, order=range(7), effort=True):
+    rows = zip(of_motion(moving), moving.q, moving.qd, moving.driving, strict=True)
+    pick, named = list(order), [names[j] for j in order]
+    return [
+        (topic, t + 200_000, joints(t, q[pick], named, v[pick], e[pick] if effort else NOTHING)) for t, q, v, e in rows
+    ]
+
+
+def external(moving, topic="/broadcaster/external_joint_torques", names=PANDA):
+    rows = zip(of_motion(moving), -moving.tau_ext, strict=True)
+    return [(topic, t + 300_000, joints(t, NOTHING, names, effort=e)) for t, e in rows]
+
+
+def test_efforts_of_joint_states_are_measured_torques_whatever_the_order_of_names(tmp_path, short):
+    fingers = [("/joint_states", t, joints(t, [0.01], ["finger_joint1"], [0.0], [0.0])) for t in of_motion(short)]
+    bag = write_bag(tmp_path / "bag", by_time(measured(short, order=[2, 1, 0, 6, 5, 4, 3]), fingers))
+    assert open_log(bag, Choice()).kinds == {"q", "tau"}
+    recording = torques_of(bag)
+    np.testing.assert_allclose(recording.q, short.q)
+    np.testing.assert_allclose(recording.qd, short.qd)
+    assert recording.kind == "tau"
+    assert np.nanstd(recording.tau_ext - short.tau_ext, axis=0).max() < 1.0
+
+
+def test_external_torques_of_franka_ros2_are_by_the_robot_and_take_positions_from_the_joint_states(tmp_path, short):
+    desired = measured(short, "/desired_joint_states", FR3)
+    bag = write_bag(tmp_path / "bag", by_time(external(short, names=FR3), measured(short, names=FR3), desired))
+    recording = torques_of(bag)
+    np.testing.assert_allclose(recording.tau_ext, short.tau_ext)
+    np.testing.assert_allclose(recording.q, short.q, atol=1e-6)
+    assert recording.model.description.name == "fr3"
+    assert recording.by_robot
+    assert recording.sources == ("/broadcaster/external_joint_torques", "/joint_states")
+    assert torques_of(bag, torques="/joint_states").kind == "tau"
+
+
+def test_beside_a_force_only_what_is_surely_torques_counts(tmp_path, short):
+    forces = [("/wrench", t, wrench(t, (1.0, 0.0, 0.0))) for t in of_motion(short)]
+    beside = write_bag(tmp_path / "beside", by_time(forces, measured(short)))
+    assert open_log(beside, Choice()).kinds == {"force", "q"}
+    both = write_bag(tmp_path / "both", by_time(forces, measured(short), external(short)))
+    assert open_log(both, Choice()).kinds == {"force", "q", "tau_ext"}
+
+
+@pytest.mark.parametrize(
+    ("messages", "choice", "words"),
+    [
+        (lambda m: external(m), {}, "has no topic of sensor_msgs/JointState"),
+        (lambda m: by_time(measured(m), measured(m, "/other")), {}, "several topics of .*: choose one by --torques"),
+        (lambda m: measured(m), {"torques": "/gone"}, "has no topic '/gone' of sensor_msgs/JointState"),
+        (lambda m: measured(m), {"joints": "/gone"}, "has no topic '/gone' of sensor_msgs/JointState: choose --joints"),
+        (lambda m: measured(m, effort=False), {}, "has no efforts of the joints"),
+    ],
+)
+def test_topics_that_are_not_clear_are_one_sentence(tmp_path, short, messages, choice, words):
+    bag = write_bag(tmp_path / "bag", messages(short))
+    with pytest.raises(RecordingError, match=words) as caught:
+        torques_of(bag, **choice)
+    assert "\n" not in str(caught.value)
+
+
+def test_the_robot_state_of_franka_ros_is_read_from_a_bag_of_ros_1(tmp_path, short):
+    store = get_typestore(Stores.ROS1_NOETIC)
+    store.register(get_types_from_msg(FIELDS, STATE))
+    with Writer1(tmp_path / "old.bag") as writer:
+        connection = writer.add_connection("/franka_state_controller/franka_states", STATE, typestore=store)
+        for t, *arrays in zip(of_motion(short), short.q, short.qd, short.qd_d, -short.tau_ext, strict=True):
+            message = store.types[STATE](header(t, store=STORE1), *arrays)
+            writer.write(connection, int(t), store.serialize_ros1(message, STATE))
+    recording = torques_of(tmp_path / "old.bag")
+    np.testing.assert_allclose(recording.tau_ext, short.tau_ext)
+    np.testing.assert_allclose(recording.qd_commanded, short.qd_d)
+    np.testing.assert_allclose(open_log(tmp_path / "old.bag", Choice()).positions().arrays["q"], short.q)
+
+
+def test_the_robot_state_of_franka_ros2_is_read(tmp_path, short):
+    store = get_typestore(Stores.ROS2_JAZZY)
+    store.register(get_types_from_msg(FIELDS2, STATE2))
+    with Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        connection = writer.add_connection("/franka_robot_state_broadcaster/robot_state", STATE2, typestore=store)
+        for t, q, dq, dq_d, tau in zip(of_motion(short), short.q, short.qd, short.qd_d, -short.tau_ext, strict=True):
+            parts = [joints(t, q, FR3, dq), joints(t, q, FR3, dq_d), joints(t, NOTHING, FR3, effort=tau)]
+            message = store.types[STATE2](header(t), *parts)
+            writer.write(connection, int(t), store.serialize_cdr(message, STATE2))
+    assert "tau_ext" in open_log(tmp_path / "bag", Choice()).kinds
+    recording = torques_of(tmp_path / "bag")
+    np.testing.assert_allclose(recording.tau_ext, short.tau_ext)
+    np.testing.assert_allclose(recording.qd_commanded, short.qd_d)
