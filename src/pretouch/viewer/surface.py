@@ -11,7 +11,7 @@ from pretouch.types import FloatArray
 EDGE_M = 0.02
 """Distance of vertices along a capsule [m], at most: between them a colour runs evenly."""
 
-AROUND = 20
+AROUND = 18
 """Vertices round a capsule."""
 
 
