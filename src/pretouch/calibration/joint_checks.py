@@ -5,8 +5,7 @@ import numpy as np
 from pretouch.calibration.link_motion import ArmMotion
 from pretouch.calibration.params import CalibrationParams
 from pretouch.calibration.result import Finding
-from pretouch.calibration.signals import gaps
-from pretouch.calibration.stamps import median_period, of_several_clocks
+from pretouch.calibration.signals import gaps, median_period, of_several_clocks
 from pretouch.errors import CalibrationError
 from pretouch.robot.model import RobotModel
 from pretouch.traces import JointTrace

@@ -8,8 +8,7 @@ from pretouch.calibration.data import UnitData
 from pretouch.calibration.imu_signal import saturated
 from pretouch.calibration.params import CalibrationParams
 from pretouch.calibration.result import Finding
-from pretouch.calibration.signals import gaps
-from pretouch.calibration.stamps import median_period, of_several_clocks
+from pretouch.calibration.signals import gaps, median_period, of_several_clocks
 from pretouch.traces import ImuTrace
 from pretouch.types import BoolArray, FloatArray
 

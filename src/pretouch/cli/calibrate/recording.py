@@ -101,8 +101,7 @@ def _unit(name: str, measured: MeasuredUnit | None, link: str | None) -> UnitDat
         return UnitData(name, _NO_IMU, link)
     imu, c = measured.imu, measured.counters
     if c is not None:
-        found = instants(c.index, c.count, c.time_us, c.imu_age_us, c.offset, c.bound)
-        imu = retimed(imu, found.instant)
+        imu = retimed(imu, instants(c.index, c.count, c.time_us, c.imu_age_us, c.offset, c.bound))
     return UnitData(name, imu, link, measured.acceleration_max, measured.angular_velocity_max)
 
 
