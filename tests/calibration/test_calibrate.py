@@ -12,7 +12,7 @@ from pretouch.errors import CalibrationError, RobotModelError
 from pretouch.sensing.skin import Skin
 from pretouch.sim.random_skin import random_skin
 from pretouch.traces import ImuTrace
-from tests.calibration.faulty import joints_late, on_the_table, slipped, without_joints
+from tests.calibration.faulty import on_the_table, slipped
 from tests.calibration.made import EXACT, MovingArm, Noise, pose_error, turned
 
 
@@ -131,41 +131,13 @@ def test_a_unit_that_falls_off_near_the_end_is_refused_with_the_instant(panda_mo
     assert finding.kind == "slipped"
     assert hand.findings == ()
     if at > 41.0:
-        assert float(re.search(r"came off, ([0-9.]+) s after", finding.sentence)[1]) == pytest.approx(at, abs=0.3)
-
-
-def test_a_unit_that_is_put_on_after_the_begin_is_refused_with_the_instant(panda_model, good):
-    link4, _ = calibrate(panda_model, slipped(on_the_table(good, LINK4), good, LINK4, 3.0)).units
-    (finding,) = [finding for finding in link4.findings if finding.refused]
-    assert (finding.kind, link4.accepted) == ("slipped", False)
-    assert float(re.search(r"put on, ([0-9.]+) s after", finding.sentence)[1]) == pytest.approx(3.0, abs=0.3)
+        assert float(re.search(r"from ([0-9.]+) s after", finding.sentence)[1]) == pytest.approx(at, abs=0.3)
 
 
 def test_a_unit_that_turns_near_the_end_is_refused(panda_model, moving_arm, good, pair):
     skin = Skin([turned(unit, np.array([0.0, 0.0, np.deg2rad(30)]), np.zeros(3)) for unit in pair.units], panda_model)
     link4, _ = calibrate(panda_model, slipped(good, moving_arm.data(skin), LINK4, 42.0)).units
     assert ("slipped", True) in [(finding.kind, finding.refused) for finding in link4.findings]
-
-
-def test_clocks_that_are_all_off_by_the_same_are_named_once(panda_model, good):
-    (finding,) = calibrate(panda_model, joints_late(good, 12.0)).findings
-    assert (finding.kind, finding.refused) == ("clocks", False)
-    assert "early by about 12.00 s" in finding.sentence
-
-
-def test_one_clock_that_is_off_is_said_of_its_unit_alone(panda_model, good):
-    late = replace(good.units[0], imu=replace(good.units[0].imu, stamp=good.units[0].imu.stamp + 3.0))
-    found = calibrate(panda_model, replace(good, units=(late, good.units[1])))
-    assert found.findings == ()
-    assert [finding.kind for finding in found.units[0].findings] == ["clock"]
-
-
-def test_joints_with_gaps_nearly_everywhere_are_named_with_what_is_left(panda_model, good):
-    data = good
-    for begin in np.arange(0.0, 27.0, 0.3):
-        data = without_joints(data, begin, begin + 0.06)
-    kinds = {finding.kind: finding.sentence for finding in calibrate(panda_model, data).findings}
-    assert re.search(r"Of 45.0 s of joint states only 1[0-9].[0-9] s", kinds["joints_little_used"])
 
 
 def test_noise_of_the_joints_is_named_where_it_is_what_hides_a_place(panda_model, moving_arm, pair):

@@ -92,21 +92,8 @@ def test_links_fixed_to_each_other_are_told_apart_by_where_the_unit_sits_and_loo
     assert np.mean(right) > 0.8
 
 
-@pytest.fixture(scope="module")
-def seven(panda_model, moving_arm):
-    """A unit on each link; that of link7 would look inwards if it sat there on the hand."""
-    return moving_arm.data(random_skin(panda_model, 7), 7)
-
-
 def kinds(units):
     return {unit.id: [(finding.kind, finding.refused) for finding in unit.findings] for unit in units if unit.findings}
-
-
-def test_a_unit_on_the_hand_that_is_said_to_sit_on_the_link_before_is_refused(panda_model, seven):
-    unit = replace(unit_of(seven, "on_panda_hand"), link="panda_link7")
-    found = calibrate(panda_model, replace(seven, units=(unit,))).units[0]
-    assert kinds([found]) == {unit.id: [("wrong_link", True)]}
-    assert "its data fit panda_hand" in found.findings[0].sentence
 
 
 def shaken(data, unit, share, arm):
@@ -125,15 +112,6 @@ def test_a_unit_on_a_table_that_the_arm_shakes_does_not_sit_on_the_arm(panda_mod
     unit = calibrate(panda_model, shaken(good, "on_panda_link4", share, moving_arm)).units[0]
     assert ("gyroscope_scale", True) in [(finding.kind, finding.refused) for finding in unit.findings]
     assert not unit.accepted
-
-
-def test_a_unit_that_turned_fast_is_not_said_never_to_have_moved(panda_model, good):
-    stamp = np.arange(0.0, 45.0, 0.002)
-    q = panda_model.q_mid + np.sin(2 * np.pi * 10.0 * stamp)[:, None] * np.full(7, 0.9)
-    (unit,) = calibrate(panda_model, CalibrationData(JointTrace(stamp, q), good.units[:1])).units
-    (finding,) = unit.findings
-    assert (finding.kind, finding.refused) == ("no_link", True)
-    assert "no link by less than" in finding.sentence
 
 
 def test_a_clock_is_not_judged_from_what_is_too_little(panda_model, good):

@@ -87,13 +87,6 @@ def test_a_unit_deep_inside_its_capsule_is_refused(panda_model, moving_arm, pair
     assert [(finding.kind, finding.refused) for finding in unit.findings] == [("inside", True)]
 
 
-def test_a_unit_on_a_high_bracket_is_worth_a_word(panda_model, moving_arm, pair):
-    true = pair.units[0]
-    high = turned(true, np.zeros(3), 0.15 * true.T_link_sensor[:3, 2])
-    (unit,) = calibrate(panda_model, moving_arm.data(_Anywhere([high]))).units
-    assert [(finding.kind, finding.refused) for finding in unit.findings] == [("far", False)]
-
-
 def test_points_inside_a_link_are_moved_to_its_surface(panda_model):
     rng = np.random.default_rng(0)
     for link in sorted(set(panda_model.capsules.link.tolist())):

@@ -2,20 +2,17 @@
 
 import numpy as np
 
-from pretouch.calibration.arm_findings import clocks_apart, little_used
+from pretouch.calibration.checks import checked_joints, checked_unit
 from pretouch.calibration.data import CalibrationData, UnitData
-from pretouch.calibration.findings import end_finding, error_findings, share_findings, unknown_finding
+from pretouch.calibration.findings import mounting_findings, scale_findings, share_findings, unknown_finding
 from pretouch.calibration.identify import Identified, Identifier
-from pretouch.calibration.joint_checks import check_known, checked_joints, held, moved_joints, standing_joints
 from pretouch.calibration.joint_noise import JointNoise
 from pretouch.calibration.link_motion import ArmMotion
 from pretouch.calibration.locate import Located
-from pretouch.calibration.misplaced import misplaced
-from pretouch.calibration.mounting import likely_member, mounting_findings, seen_from
+from pretouch.calibration.mounting import likely_member, seen_from
 from pretouch.calibration.observability import Axis, Observability, observability
 from pretouch.calibration.params import CalibrationParams
 from pretouch.calibration.result import Calibration, Finding, Place, UnitCalibration
-from pretouch.calibration.unit_checks import checked_unit
 from pretouch.errors import CalibrationError
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray
@@ -31,17 +28,10 @@ def calibrate(model: RobotModel, data: CalibrationData, params: CalibrationParam
     params = params or CalibrationParams()
     _check_ids(data.units)
     joints, notes = checked_joints(model, data.joints, params)
-    moved = moved_joints(joints, params)
-    joints = held(joints, moved)
     arm = ArmMotion(model, joints, params)
-    check_known(arm, params)
-    notes += (*standing_joints(model, moved), *little_used(arm))
-    identifier = Identifier(arm, params)
-    found = {unit.id: _identified(identifier, unit, params) for unit in data.units}
-    wrong = misplaced(model, {unit.id: unit.link for unit in data.units}, found)
-    noise = JointNoise(arm, joints, params)
-    units = tuple(_settled(arm, noise, unit, found[unit.id], wrong.get(unit.id), params) for unit in data.units)
-    return Calibration(units, (*notes, *clocks_apart(units, params)), float(np.deg2rad(params.board_misalignment_deg)))
+    identifier, noise = Identifier(arm, params), JointNoise(arm, joints, params)
+    units = tuple(_settled(arm, noise, unit, _identified(identifier, unit, params), params) for unit in data.units)
+    return Calibration(units, notes, float(np.deg2rad(params.board_misalignment_deg)))
 
 
 def _check_ids(units: tuple[UnitData, ...]) -> None:
@@ -61,18 +51,14 @@ def _identified(identifier: Identifier, unit: UnitData, params: CalibrationParam
 
 
 def _settled(
-    arm: ArmMotion,
-    noise: JointNoise,
-    unit: UnitData,
-    found: Identified,
-    wrong: Finding | None,
-    params: CalibrationParams,
+    arm: ArmMotion, noise: JointNoise, unit: UnitData, found: Identified, params: CalibrationParams
 ) -> UnitCalibration:
-    findings = [*([wrong] if wrong else []), *found.findings]
+    wrong = _wrong_link(arm.model, unit, found)
+    findings = [*wrong, *found.findings]
     if found.located is None:
         return UnitCalibration(unit.id, None, tuple(findings))
     located, model = found.located, arm.model
-    doubts = _doubts(arm, located, params)
+    doubts = [*share_findings(arm, located, params), *scale_findings(located, params)]
     link = located.link
     if unit.link is None or wrong:
         link = likely_member(model, found.body, link, located.pose)
@@ -85,12 +71,14 @@ def _settled(
     return UnitCalibration(unit.id, _place(arm, located, link, T, covariance), (*findings, *doubts), known)
 
 
-def _doubts(arm: ArmMotion, located: Located, params: CalibrationParams) -> list[Finding]:
-    """Say why a place may not be trusted, other than where it is."""
-    findings = share_findings(arm, located, params)
-    if (at_end := end_finding(arm, located)) is not None:
-        findings = [at_end, *(finding for finding in findings if finding.kind != "outliers")]
-    return [*findings, *error_findings(located, params)]
+def _wrong_link(model: RobotModel, unit: UnitData, found: Identified) -> list[Finding]:
+    """Say which link the data of a unit fit that is said to sit on another one."""
+    if unit.link is None or not found.body or model.link_index(unit.link) in found.body:
+        return []
+    covered = [link for link in found.body if link in model.capsules.link]
+    fitting = " or ".join(model.links[link] for link in covered or found.body)
+    sentence = f"It is said to sit on {unit.link}, but its data fit {fitting}: correct its link, or move it."
+    return [Finding("wrong_link", sentence, True)]
 
 
 def _observability(

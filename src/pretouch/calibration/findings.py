@@ -4,42 +4,29 @@ import numpy as np
 
 from pretouch.calibration.link_motion import ArmMotion
 from pretouch.calibration.locate import Located
+from pretouch.calibration.mounting import DEEPEST, moved_out
 from pretouch.calibration.observability import Observability
 from pretouch.calibration.params import CalibrationParams
 from pretouch.calibration.result import Finding
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.seat import seat
 from pretouch.types import FloatArray
 
 _UNUSUAL = 5.0
-"""Standard deviations, as assumed, from which on an error of a sensor is not its own."""
+"""Standard deviations, as assumed, from which on an error of a scale is not its own."""
 _MANY = 0.05
 """Share of outliers from which on they are worth a word."""
 _LONG_S = 0.5
-"""Outliers that last for longer, up to an end of the run, are of a unit that is not there [s]."""
-
-
-def end_finding(arm: ArmMotion, located: Located) -> Finding | None:
-    """Say when a unit began, or ceased, to move as its link, near an end of the run: one pose does not hold there."""
-    known = np.flatnonzero(located.known)
-    fits = np.flatnonzero(located.used[known])
-    if not len(fits):
-        return None
-    long = _LONG_S / float(arm.time[1] - arm.time[0])
-    if len(known) - 1 - fits[-1] > long:
-        since = arm.time[known[fits[-1]]] - arm.time[0]
-        what = f"It slipped, or came off, {since:.1f} s after the first joint state: from then on"
-    elif fits[0] > long:
-        until = arm.time[known[fits[0]]] - arm.time[0]
-        what = f"It slipped, or was put on, {until:.1f} s after the first joint state: until then"
-    else:
-        return None
-    return Finding("slipped", f"{what} it did not move with its link. Fasten it and calibrate again.", True)
+"""Outliers that last for longer, up to the end of the run, are of a unit that is not there [s]."""
+_INWARDS = -0.5
+"""Cosine between beam and outward normal below which a beam points into the link."""
 
 
 def share_findings(arm: ArmMotion, located: Located, params: CalibrationParams) -> list[Finding]:
     """Say how much of the run was left out, and what of the rest is not explained."""
     whole = float(arm.usable.sum())
     missing, outliers = (1 - located.known.sum() / whole), float((located.known & ~located.used).sum()) / whole
-    findings = []
+    findings = _slipped(arm, located)
     if missing + outliers > params.unusable:
         sentence = (
             f"{missing + outliers:.0%} of the run could not be used (limit {params.unusable:.0%}): during {missing:.0%}"
@@ -47,7 +34,7 @@ def share_findings(arm: ArmMotion, located: Located, params: CalibrationParams) 
             " that and calibrate again."
         )
         findings.append(Finding("unusable", sentence, True))
-    elif outliers > _MANY:
+    elif outliers > _MANY and not findings:
         sentence = (
             f"During {outliers:.0%} of the run it did not move with its link, so that part was left out: check whether"
             " it is loose."
@@ -64,25 +51,30 @@ def share_findings(arm: ArmMotion, located: Located, params: CalibrationParams) 
     return findings
 
 
-def error_findings(located: Located, params: CalibrationParams) -> list[Finding]:
-    """Name errors of the IMU that are too large to be its own."""
-    e = located.estimate
-    findings = []
-    for name, si, bias, usual, scale in (
-        ("accelerometer", "m/s^2", e.acceleration_bias, params.acceleration_bias, e.acceleration_scale),
-        ("gyroscope", "rad/s", e.angular_velocity_bias, params.angular_velocity_bias, e.angular_velocity_scale),
-    ):
+def _slipped(arm: ArmMotion, located: Located) -> list[Finding]:
+    """Say when a unit ceased to move as its link: where it was found, it is no more."""
+    last = np.flatnonzero(located.used)[-1]
+    if located.known[last + 1 :].sum() * (arm.time[1] - arm.time[0]) <= _LONG_S:
+        return []
+    since = arm.time[last] - arm.time[0]
+    sentence = (
+        f"It slipped, or came off: from {since:.1f} s after the first joint state on, it did not move with its link."
+        " Fasten it and calibrate again."
+    )
+    return [Finding("slipped", sentence, True)]
+
+
+def scale_findings(located: Located, params: CalibrationParams) -> list[Finding]:
+    """Name errors of the IMU's scales that are too large to be its own."""
+    findings, e = [], located.estimate
+    for sensor, scale in (("accelerometer", e.acceleration_scale), ("gyroscope", e.angular_velocity_scale)):
         axis = int(np.argmax(np.abs(scale)))
         if abs(scale[axis]) > _UNUSUAL * params.scale_error:
             way_out = "correct its sign" if scale[axis] < -1 else "check its range"
             sentence = (
-                f"The scale of its {name} {'xyz'[axis]} seems to be {1 + scale[axis]:.2f} instead of 1: {way_out}."
+                f"The scale of its {sensor} {'xyz'[axis]} seems to be {1 + scale[axis]:.2f} instead of 1: {way_out}."
             )
             findings.append(Finding("scale", sentence, True))
-        axis = int(np.argmax(np.abs(bias)))
-        if abs(bias[axis]) > _UNUSUAL * usual:
-            sentence = f"Its {name} {'xyz'[axis]} is off by {bias[axis]:.3g} {si}: check the sensor."
-            findings.append(Finding("bias", sentence, False))
     return findings
 
 
@@ -116,9 +108,27 @@ def unknown_finding(
     if moving.sum() == 1:
         joint = model.joints[int(np.flatnonzero(moving)[0])]
         way_out = f"{joint} alone moves {model.links[link]}, so no motion can determine it: measure it by hand."
-    rest = f" Known: {_listed(known.known)}." if known.known else ""
-    return [Finding("unobservable", f"Not known: {_listed(known.unknown)}.{rest} {way_out}", True)]
+    rest = f" Known: {', and '.join(known.known)}." if known.known else ""
+    return [Finding("unobservable", f"Not known: {', and '.join(known.unknown)}.{rest} {way_out}", True)]
 
 
-def _listed(words: tuple[str, ...]) -> str:
-    return ", and ".join(words)
+def mounting_findings(model: RobotModel, link: int, T: FloatArray) -> list[Finding]:
+    """Say what is odd about where a unit sits and looks, T_link_sensor (4, 4)."""
+    below, name = seat(model, link, T[:3, 3]), model.links[link]
+    if below is None:
+        return []
+    findings = []
+    if below.height < 0:
+        refused = below.height < -DEEPEST or moved_out(model, link, T[:3, 3]) is None
+        way_out = "check its link and the arm's model" if refused else "in the skin file it is moved out, less certain"
+        sentence = f"It lies {-1000 * below.height:.1f} mm inside the capsules of {name}: {way_out}."
+        findings.append(Finding("inside", sentence, refused))
+    facing = float(below.normal @ T[:3, 2])
+    if facing < _INWARDS:
+        tilt = np.rad2deg(np.arccos(np.clip(facing, -1.0, 1.0)))
+        sentence = (
+            f"Its beam (z axis) points into {name}, {tilt:.0f} degrees away from outwards: turn the board over, or give"
+            " the IMU's data in the axes of the range finder."
+        )
+        findings.append(Finding("inwards", sentence, True))
+    return findings

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pretouch.calibration.alignment import Alignment, align
+from pretouch.calibration.checks import mistaken
 from pretouch.calibration.data import UnitData
 from pretouch.calibration.imu_signal import ImuSignal
 from pretouch.calibration.link_motion import ArmMotion
@@ -21,17 +22,8 @@ _AMBIGUOUS = 1.5
 """Two fits whose differences, both sensors' multiplied, are within this factor tell no link apart."""
 _STILL = 0.05
 """Share of the least turning of any link that a unit measures at most if it was left lying somewhere."""
-_RESTS = np.deg2rad(2.0)
-"""What turns faster than this, root mean square, moved [rad/s]."""
 _SCALE = 0.1
 """By how much a gyroscope's scale may be off at first sight."""
-_MISTAKEN = (
-    (np.rad2deg(1.0), "rad/s is needed and these look like degrees/s: multiply by pi / 180"),
-    (1000 * np.rad2deg(1.0), "rad/s is needed and these look like thousandths of degrees/s: multiply by pi / 180000"),
-    (np.deg2rad(1.0), "these look like rad/s taken for degrees/s: multiply by 180 / pi"),
-    (2.0, "the range it is read with is probably twice the one it was set to"),
-    (0.5, "the range it is read with is probably half the one it was set to"),
-)
 
 
 @dataclass(frozen=True)
@@ -142,8 +134,7 @@ class Identifier:
         sensed = signal.at(self.arm.time[known] + match.alignment.late).values[:, :3]
         scale = _rms(sensed) / max(_rms(w), 1e-9)
         if abs(scale - 1) > _SCALE:
-            way_out = _mistaken(scale) or "check its scale, and that it sits on the arm"
-            sentence = f"Its gyroscope measures {scale:.3g} times what its link turned: {way_out}."
+            sentence = f"Its gyroscope measures {scale:.3g} times what its link turned: {mistaken('gyroscope', scale)}."
             return Finding("gyroscope_scale", sentence, True)
         U, size, Vt = np.linalg.svd((w - w.mean(axis=0)).T @ (sensed - sensed.mean(axis=0)))
         if size[2] > 0.01 * size[0] and np.linalg.det(U @ Vt) < 0:
@@ -171,16 +162,9 @@ def _rms(values: FloatArray) -> float:
 
 def _never_moved(values: FloatArray, least: float) -> Finding:
     """Say that a unit turned much less than any link; `least` is the turning of the one that turned least [rad/s]."""
-    turned = np.rad2deg(_rms(values))
-    if turned > np.rad2deg(_RESTS):
-        sentence = (
-            f"It fits no link of this arm: it turned by {turned:.2g} degrees/s, and no link by less than"
-            f" {np.rad2deg(least):.2g} degrees/s. Check the joints' stamps and units, and those of its gyroscope."
-        )
-        return Finding("no_link", sentence, True)
     sentence = (
-        f"It never moved: its gyroscope varied by {turned:.2g} degrees/s while the arm moved. Mount it on a link that a"
-        " joint moves."
+        f"It never moved: its gyroscope varied by {np.rad2deg(_rms(values)):.2g} degrees/s while each link turned by"
+        f" {np.rad2deg(least):.2g} degrees/s or more. Mount it on a link that a joint moves, and check its units."
     )
     return Finding("never_moved", sentence, True)
 
@@ -208,8 +192,3 @@ def _too_little(params: CalibrationParams) -> Finding:
         " range: record again."
     )
     return Finding("too_little", sentence, True)
-
-
-def _mistaken(scale: float) -> str:
-    """Say what mistake makes a gyroscope measure so many times what is right; nothing if none is known to."""
-    return next((why for factor, why in _MISTAKEN if abs(scale / factor - 1) < _SCALE), "")

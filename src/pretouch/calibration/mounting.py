@@ -2,19 +2,12 @@
 
 import numpy as np
 
-from pretouch.calibration.result import Finding
 from pretouch.robot.model import RobotModel
-from pretouch.sensing.seat import Seat, seat
+from pretouch.sensing.seat import seat
 from pretouch.types import FloatArray
 
 DEEPEST = 0.02
 """A unit that is found further inside a capsule [m] cannot be there: capsules are no further off the true surface."""
-_OFF, _FARTHEST = 0.1, 0.5
-"""Height above its link at which a unit is worth a word, and beyond which it cannot sit there [m]."""
-_INWARDS = -0.5
-"""Cosine between beam and outward normal below which a beam points into the link."""
-_CLOSE, _NEAR, _OUTWARDS = 0.005, 0.05, 0.5
-"""Depth [m], height [m] and cosine between beam and outward normal within which a unit sits as one does."""
 _CLEAR = 1e-4
 """Height at which a unit that was moved out of a capsule is left [m]."""
 _TRIES = 20
@@ -48,12 +41,6 @@ def likely_member(model: RobotModel, body: tuple[int, ...], link: int, T: FloatA
     return best if np.isfinite(oddity(best)) else link
 
 
-def sits_well(model: RobotModel, link: int, T: FloatArray) -> bool:
-    """Tell whether a unit, T (4, 4) on a link, sits on its surface and looks away from it, beyond doubt."""
-    below = seat(model, link, T[:3, 3])
-    return below is not None and -_CLOSE < below.height < _NEAR and float(below.normal @ T[:3, 2]) > _OUTWARDS
-
-
 def seen_from(model: RobotModel, link: int, other: int, T: FloatArray, C: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return pose (4, 4) and covariance (6, 6) in the frame of `link`, given in that of `other`, to which it is fixed.
 
@@ -69,28 +56,6 @@ def seen_from(model: RobotModel, link: int, other: int, T: FloatArray, C: FloatA
     return T_link_other @ T, turned @ C @ turned.T
 
 
-def mounting_findings(model: RobotModel, link: int, T: FloatArray) -> list[Finding]:
-    """Say what is odd about where a unit sits and looks, T_link_sensor (4, 4)."""
-    below = seat(model, link, T[:3, 3])
-    name = model.links[link]
-    if below is None:
-        below = Seat(float(np.linalg.norm(T[:3, 3])), T[:3, 2])
-    findings = []
-    if below.height < 0:
-        findings.append(_inside(name, -below.height, moved_out(model, link, T[:3, 3]) is not None))
-    elif below.height > _OFF:
-        findings.append(_far(name, below.height))
-    facing = float(below.normal @ T[:3, 2])
-    if facing < _INWARDS:
-        tilt = np.rad2deg(np.arccos(np.clip(facing, -1.0, 1.0)))
-        sentence = (
-            f"Its beam (z axis) points into {name}, {tilt:.0f} degrees away from outwards: turn the board over, or give"
-            " the IMU's data in the axes of the range finder."
-        )
-        findings.append(Finding("inwards", sentence, True))
-    return findings
-
-
 def moved_out(model: RobotModel, link: int, p: FloatArray) -> FloatArray | None:
     """Return the point (3,) outside all capsules of a link that p (3,) is moved to; None if there is none near by."""
     at = p
@@ -100,21 +65,3 @@ def moved_out(model: RobotModel, link: int, p: FloatArray) -> FloatArray | None:
             return at if np.linalg.norm(at - p) <= 2 * DEEPEST else None
         at = at + (_CLEAR - below.height) * below.normal
     return None
-
-
-def _inside(name: str, depth: float, way_out: bool) -> Finding:
-    if depth > DEEPEST or not way_out:
-        sentence = (
-            f"It lies {1000 * depth:.0f} mm inside {name}, which is impossible: check its link and the arm's model."
-        )
-        return Finding("inside", sentence, True)
-    sentence = (
-        f"It lies {1000 * depth:.1f} mm inside the capsules of {name}: in the skin file it is moved out to their"
-        " surface, with a larger sigma."
-    )
-    return Finding("inside", sentence, False)
-
-
-def _far(name: str, height: float) -> Finding:
-    sentence = f"It lies {1000 * height:.0f} mm off {name}: check that it sits on a bracket of that height."
-    return Finding("far", sentence, height > _FARTHEST)

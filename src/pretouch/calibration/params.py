@@ -60,10 +60,6 @@ class CalibrationParams(Checked):
     """A joint that moves by less has not moved: the links on its two sides cannot be distinguished [rad]."""
     likeness: Fraction = 0.9
     """How much of a gyroscope's and a link's turning must be the same for the unit to sit on that link."""
-    slip_m: Positive = 0.004
-    """Least slip that is looked for [m]: smaller ones hide in what bends and warms up."""
-    slip_deg: Positive = 0.6
-    """The same of its orientation [degrees]."""
 
     @property
     def position_limit(self) -> float:

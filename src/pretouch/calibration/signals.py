@@ -11,8 +11,6 @@ FINE_S = 0.002
 """Spacing of the instants at which signals are filtered [s]."""
 HALF_S = 0.25
 """Half the length of the filter [s]: what is nearer to a gap than this is not used."""
-_SPARSE = 100
-"""Stamps that span more than this many times the time their samples take are not all of one clock."""
 
 
 def times(begin: float, end: float) -> FloatArray:
@@ -35,16 +33,6 @@ def rate_of_change(signal: FloatArray) -> FloatArray:
     derivative = np.zeros_like(signal)
     derivative[2:-2] = (signal[:-4] - 8 * signal[1:-3] + 8 * signal[3:-1] - signal[4:]) / (12 * FINE_S)
     return derivative
-
-
-def median_period(stamp: FloatArray) -> float:
-    """Return the median time between stamps (M,), two at least [s]."""
-    return float(np.median(np.diff(stamp)))
-
-
-def of_several_clocks(stamp: FloatArray) -> bool:
-    """Tell whether stamps (M,), two at least, are spread over far more time than so many samples take [s]."""
-    return float(np.ptp(stamp)) > _SPARSE * median_period(stamp) * len(stamp)
 
 
 def gaps(stamp: FloatArray, longest: float) -> FloatArray:

@@ -3,6 +3,7 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from pretouch.calibration.mounting import seen_from
 from pretouch.calibration.result import Place
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.unit import SensorUnit
@@ -50,7 +51,7 @@ def place_row(model: RobotModel, unit: SensorUnit, place: Place, late: float) ->
     same = bool(np.array_equal(model.moved_by[true], model.moved_by[found]))
     if not same:
         return NOT_FOUND
-    here, covariance = _seen_from(model, true, found, place)
+    here, covariance = seen_from(model, true, found, place.T_link_sensor, place.covariance)
     error = pose_error(unit.T_link_sensor, here)
     return error_row(error) | {
         "position_sigma_m": place.position_sigma,
@@ -61,17 +62,6 @@ def place_row(model: RobotModel, unit: SensorUnit, place: Place, late: float) ->
         "clock_error_s": place.clock_offset - late,
         "link_found": True,
     }  # fmt: skip
-
-
-def _seen_from(model: RobotModel, link: int, other: int, place: Place) -> tuple[FloatArray, FloatArray]:
-    """Pose (4, 4) and covariance (6, 6) of a place on `other`, as one on `link`, to which that is fixed."""
-    kin = model.kinematics(model.description.q_ready)
-    R = kin.rotation[link].T @ kin.rotation[other]
-    T = np.eye(4)
-    T[:3, :3], T[:3, 3] = R, kin.rotation[link].T @ (kin.position[other] - kin.position[link])
-    turned = np.eye(6)
-    turned[_SHIFT, _SHIFT] = R
-    return T @ place.T_link_sensor, turned @ place.covariance @ turned.T
 
 
 def _normalised(error: FloatArray, covariance: FloatArray, part: slice) -> float:
