@@ -1,14 +1,12 @@
 """The door of a page, tried from outside: by pages of others, by strangers, and by visitors who do not command."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from tests.ports import free_port
-from tests.viewer.visitor import Visitor, answered, fetched, refusal, until, update
+from tests.viewer.visitor import Visitor, answered, control, fetched, refusal, until, update
 
 from pretouch.errors import ViewerError
 from pretouch.viewer.commander import Commander
@@ -25,24 +23,19 @@ DRAG = {
 }  # fmt: skip
 
 
-@contextmanager
-def live() -> Iterator[tuple[LivePage, ServeOptions]]:
-    options = ServeOptions(port=free_port())
-    with served(options, "test") as server:
-        yield LivePage(server, LiveSimulation()), options
-
-
 @pytest.fixture(scope="module")
 def unmoved() -> Iterator[tuple[LivePage, ServeOptions]]:
     """One page for all that is refused: each test finds it as it was."""
-    with live() as found:
-        yield found
-        turns(found[0], 3)
-        assert found[0]._simulation.settings.profile.name == "paper"
+    options = ServeOptions(port=free_port())
+    with served(options, "test") as server:
+        page = LivePage(server, LiveSimulation())
+        yield page, options
+        turns(page, 3)
+        assert page._simulation.settings.profile.name == "paper"
 
 
 @pytest.fixture
-def options(unmoved: tuple[LivePage, ServeOptions]) -> ServeOptions:
+def door(unmoved: tuple[LivePage, ServeOptions]) -> ServeOptions:
     return unmoved[1]
 
 
@@ -54,28 +47,6 @@ def liar(unmoved: tuple[LivePage, ServeOptions]) -> Iterator[Visitor]:
         assert len(unmoved[0]._actions) == 0
 
 
-@pytest.fixture
-def place() -> Iterator[tuple[LivePage, ServeOptions]]:
-    with live() as found:
-        yield found
-
-
-@pytest.fixture
-def page(place: tuple[LivePage, ServeOptions]) -> LivePage:
-    return place[0]
-
-
-@pytest.fixture
-def visitor(place: tuple[LivePage, ServeOptions]) -> Iterator[Visitor]:
-    with Visitor(place[0]._server, place[1]) as somebody:
-        yield somebody
-
-
-def control(page: LivePage, label: str) -> Any:
-    handles = page._server.gui._gui_input_handle_from_uuid.values()
-    return next(found for found in handles if getattr(found, "label", None) == label)
-
-
 def turns(page: LivePage, count: int) -> None:
     for number in range(count):
         page.turn(number * PERIOD_S)
@@ -84,54 +55,54 @@ def turns(page: LivePage, count: int) -> None:
 # who comes in
 
 
-def test_the_address_with_its_token_is_answered_and_tells_it_to_nobody_else(options: ServeOptions) -> None:
-    status, text, kind = fetched(options)
+def test_the_address_with_its_token_is_answered_and_tells_it_to_nobody_else(door: ServeOptions) -> None:
+    status, text, kind = fetched(door)
     assert (status, kind) == (200, "text/html")
     assert text.startswith("<!doctype html>")
-    assert refusal(options) == (101, "")
-    assert refusal(options, origin=f"http://127.0.0.1:{options.port}") == (101, "")
+    assert refusal(door) == (101, "")
+    assert refusal(door, origin=f"http://127.0.0.1:{door.port}") == (101, "")
 
 
 @pytest.mark.parametrize("path", ["/", "/index.html", "/wrong/", "/wrong/index.html", "/?token=", "//"])
-def test_without_the_token_there_is_a_sentence(options: ServeOptions, path: str) -> None:
-    assert fetched(options, path) == (403, ADDRESS, "text/plain; charset=utf-8")
-    assert refusal(options, path) == (403, ADDRESS)
+def test_without_the_token_there_is_a_sentence(door: ServeOptions, path: str) -> None:
+    assert fetched(door, path) == (403, ADDRESS, "text/plain; charset=utf-8")
+    assert refusal(door, path) == (403, ADDRESS)
 
 
 @pytest.mark.parametrize("path", [b"/\xff", b"/\xc3\xa9/", b"/{token}\xff/", b"/\xff/{token}/", "/tokén/".encode()])
-def test_a_path_that_is_not_ascii_is_refused_like_any_other(options: ServeOptions, path: bytes) -> None:
-    status, text = answered(options, path.replace(b"{token}", options.token.encode()))
+def test_a_path_that_is_not_ascii_is_refused_like_any_other(door: ServeOptions, path: bytes) -> None:
+    status, text = answered(door, path.replace(b"{token}", door.token.encode()))
     assert (status, text) == (403, ADDRESS)
 
 
 @pytest.mark.parametrize("rest", [b"\xff", b"\xc3\xa9.js", b"%ff", b"%00", b"../%2e%2e/\xff", b"?\xff"])
-def test_behind_the_token_a_path_that_is_not_ascii_is_a_file_or_none(options: ServeOptions, rest: bytes) -> None:
-    assert answered(options, b"/" + options.token.encode() + b"/" + rest)[0] in (200, 404)
+def test_behind_the_token_a_path_that_is_not_ascii_is_a_file_or_none(door: ServeOptions, rest: bytes) -> None:
+    assert answered(door, b"/" + door.token.encode() + b"/" + rest)[0] in (200, 404)
 
 
 @pytest.mark.parametrize(
     ("header", "line"),
     [("This page is not at", b"Host: \xff"), ("Pages of", b"Host: 127.0.0.1:{port}\r\nOrigin: http://\xff")],
 )
-def test_a_header_that_is_not_ascii_is_refused_in_a_sentence(options: ServeOptions, header: str, line: bytes) -> None:
-    status, text = answered(options, b"/", line.replace(b"{port}", str(options.port).encode()))
+def test_a_header_that_is_not_ascii_is_refused_in_a_sentence(door: ServeOptions, header: str, line: bytes) -> None:
+    status, text = answered(door, b"/", line.replace(b"{port}", str(door.port).encode()))
     assert (status, text.startswith(header)) == (403, True)
 
 
-def test_a_page_of_somebody_else_does_not_get_in_though_it_knows_the_token(options: ServeOptions) -> None:
-    for origin in ("http://evil.example", "null", f"http://127.0.0.1:{options.port + 1}", "http://127.0.0.1"):
+def test_a_page_of_somebody_else_does_not_get_in_though_it_knows_the_token(door: ServeOptions) -> None:
+    for origin in ("http://evil.example", "null", f"http://127.0.0.1:{door.port + 1}", "http://127.0.0.1"):
         said = f"Pages of {origin} may not use this one. {ADDRESS}"
-        assert refusal(options, origin=origin) == (403, said)
+        assert refusal(door, origin=origin) == (403, said)
 
 
 @pytest.mark.parametrize("host", ["evil.example", "127.0.0.1.evil.example", "localhost.", "", "[", "a b"])
-def test_a_name_that_leads_here_but_is_not_ours_does_not_get_in(options: ServeOptions, host: str) -> None:
-    assert fetched(options, Host=f"{host}:{options.port}")[0] in (400, 403)
+def test_a_name_that_leads_here_but_is_not_ours_does_not_get_in(door: ServeOptions, host: str) -> None:
+    assert fetched(door, Host=f"{host}:{door.port}")[0] in (400, 403)
 
 
 @pytest.mark.parametrize("host", ["localhost", "127.0.0.1", "192.168.1.7", "[::1]"])
-def test_numbers_and_names_of_this_machine_get_in(options: ServeOptions, host: str) -> None:
-    assert fetched(options, Host=f"{host}:{options.port}")[0] == 200
+def test_numbers_and_names_of_this_machine_get_in(door: ServeOptions, host: str) -> None:
+    assert fetched(door, Host=f"{host}:{door.port}")[0] == 200
 
 
 def test_nobody_can_have_the_page_shared(
@@ -188,9 +159,8 @@ def test_sixty_clicks_on_record_begin_one_recording(
 
 
 def test_one_visitor_commands_all_see_who_and_the_others_look(
-    place: tuple[LivePage, ServeOptions], visitor: Visitor
+    page: LivePage, options: ServeOptions, visitor: Visitor
 ) -> None:
-    page, options = place
     pause, speed, take = (control(page, label) for label in ("Pause", "Clock speed", "Take command"))
     assert not take.visible
     with Visitor(page._server, options) as other:
@@ -223,8 +193,7 @@ def test_one_visitor_commands_all_see_who_and_the_others_look(
     assert speed.value == 0.7
 
 
-def test_who_comes_while_another_commands_is_told_so(place: tuple[LivePage, ServeOptions], visitor: Visitor) -> None:
-    page, options = place
+def test_who_comes_while_another_commands_is_told_so(page: LivePage, options: ServeOptions, visitor: Visitor) -> None:
     visitor.set(control(page, "Pause"), True)
     visitor.settle()
     with Visitor(page._server, options) as other:

@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.ports import free_port
-from tests.viewer.test_door import control, turns
-from tests.viewer.visitor import Visitor
+from tests.viewer.test_door import turns
+from tests.viewer.visitor import Visitor, control
 
 from pretouch.desired import DesiredKind
 from pretouch.recording.reader import open_recording
@@ -18,26 +17,12 @@ from pretouch.viewer.asked import asked_in
 from pretouch.viewer.drive import REACH_M, TASKS, Steering
 from pretouch.viewer.live import LivePage
 from pretouch.viewer.replay import frame_of, world_of
-from pretouch.viewer.server import ServeOptions, served
-from pretouch.viewer.simulation import LiveSimulation
+from pretouch.viewer.server import ServeOptions
 
 
 @pytest.fixture
-def place() -> Iterator[tuple[LivePage, ServeOptions]]:
-    options = ServeOptions(port=free_port())
-    with served(options, "test") as server:
-        yield LivePage(server, LiveSimulation()), options
-
-
-@pytest.fixture
-def page(place: tuple[LivePage, ServeOptions]) -> LivePage:
-    return place[0]
-
-
-@pytest.fixture
-def driver(place: tuple[LivePage, ServeOptions]) -> Iterator[Visitor]:
+def driver(page: LivePage, options: ServeOptions) -> Iterator[Visitor]:
     """Somebody who drives an arm that stands."""
-    page, options = place
     page._simulation.advance(1.5)
     with Visitor(page._server, options) as somebody:
         do(page, somebody, control(page, "Task"), TASKS[1])
@@ -99,9 +84,8 @@ def test_the_hand_goes_to_a_target_that_is_dragged_and_stays(page: LivePage, dri
 
 
 def test_a_driver_who_leaves_has_the_arm_come_to_rest_and_the_next_goes_on(
-    place: tuple[LivePage, ServeOptions], driver: Visitor
+    page: LivePage, options: ServeOptions, driver: Visitor
 ) -> None:
-    page, options = place
     with Visitor(page._server, options) as other:
         do(page, other, control(page, "Take command"), True)
         aim(page, other, hand(page) + np.array([0.0, 0.4, 0.0]))
@@ -119,8 +103,7 @@ def test_a_driver_who_leaves_has_the_arm_come_to_rest_and_the_next_goes_on(
     assert page._simulation.frame.step.mode is Mode.TRACK
 
 
-def test_who_takes_the_command_has_the_arm_come_to_rest(place: tuple[LivePage, ServeOptions], driver: Visitor) -> None:
-    page, options = place
+def test_who_takes_the_command_has_the_arm_come_to_rest(page: LivePage, options: ServeOptions, driver: Visitor) -> None:
     aim(page, driver, hand(page) + np.array([0.0, 0.4, 0.0]))
     turns(page, 10)
     with Visitor(page._server, options) as other:
@@ -130,9 +113,8 @@ def test_who_takes_the_command_has_the_arm_come_to_rest(place: tuple[LivePage, S
 
 
 def test_who_does_not_command_drives_nothing_and_is_shown_again_where_the_target_is(
-    place: tuple[LivePage, ServeOptions], driver: Visitor
+    page: LivePage, options: ServeOptions, driver: Visitor
 ) -> None:
-    page, options = place
     before = page.drive._target.position
     with Visitor(page._server, options) as other:
         aim(page, other, np.array([0.3, 0.3, 0.3]))

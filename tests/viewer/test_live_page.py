@@ -1,16 +1,15 @@
 """The live page without a browser: what it does between two ticks."""
 
 import asyncio
-from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
-from tests.ports import free_port
 from tests.viewer.browser import seen_at
 from tests.viewer.sessions import set_speed
+from tests.viewer.visitor import control
+from viser import ViserServer
 
 from pretouch.profiles import PROFILES, profile
 from pretouch.recording.reader import open_recording
@@ -24,7 +23,6 @@ from pretouch.viewer.gui import PANEL_PX, SETTLE_S
 from pretouch.viewer.live import PERIOD_S, LivePage
 from pretouch.viewer.room import Faults, LiveSettings
 from pretouch.viewer.scene import CAMERA_FROM
-from pretouch.viewer.server import ServeOptions, served
 from pretouch.viewer.simulation import LiveSimulation
 
 
@@ -40,23 +38,17 @@ class Clock:
             self.page.turn(self.now)
 
 
-def handle(page: LivePage, label: str) -> Any:
-    """The first control of the page with a label."""
-    handles = page._server.gui._gui_input_handle_from_uuid.values()
-    return next(found for found in handles if getattr(found, "label", None) == label)
-
-
 def give(page: LivePage, label: str, value: object) -> None:
     """Give a control a value as somebody at the page does."""
-    control = handle(page, label)
-    control._impl.value = value
-    for told in control._impl.update_cb:
-        asyncio.run(told(SimpleNamespace(client_id=0, client=None, target=control)))
+    found = control(page, label)
+    found._impl.value = value
+    for told in found._impl.update_cb:
+        asyncio.run(told(SimpleNamespace(client_id=0, client=None, target=found)))
 
 
 def submit(page: LivePage, text: str) -> None:
     """Type a profile as somebody at the page does, and press Enter."""
-    field = handle(page, "Profile text")
+    field = control(page, "Profile text")
     field._impl.value = text
     form = page._server.gui._container_handle_from_uuid[field._impl.parent_container_id]
     for told in form._submit_cb:
@@ -68,14 +60,8 @@ def click(page: LivePage, label: str) -> None:
 
 
 @pytest.fixture
-def simulation() -> LiveSimulation:
-    return LiveSimulation()
-
-
-@pytest.fixture
-def clock(simulation: LiveSimulation) -> Iterator[Clock]:
-    with served(ServeOptions(port=free_port()), "test") as server:
-        yield Clock(LivePage(server, simulation))
+def clock(page: LivePage) -> Clock:
+    return Clock(page)
 
 
 def test_a_second_of_ticks_is_a_second_of_the_simulation(clock: Clock, simulation: LiveSimulation) -> None:
@@ -114,20 +100,6 @@ def test_what_is_refused_is_said_and_changes_nothing(clock: Clock, simulation: L
     clock.turn(0.1)
     assert clock.page.notice.startswith("Not done: TaskParams.speed_m_s is -1")
     assert simulation.world.profile == before
-
-
-def test_a_reset_begins_anew(clock: Clock, simulation: LiveSimulation) -> None:
-    clock.turn(2.0)
-    clock.page.ask(simulation.reset)
-    clock.turn(0.1)
-    assert simulation.time < 1.0
-    assert simulation.frame.step.mode is Mode.HOLD
-
-
-def test_another_object_is_another_world(clock: Clock, simulation: LiveSimulation) -> None:
-    clock.page.ask(lambda: simulation.reset(object="board -y"))
-    clock.turn(0.1)
-    assert len(simulation.world.boxes) == 1
 
 
 def test_nobody_watching_costs_nothing_but_the_simulation(clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -178,16 +150,16 @@ def test_a_number_counts_when_nobody_types_any_more(clock: Clock, simulation: Li
         clock.turn(0.7)
         assert simulation.world.profile.task.speed_m_s == 0.3
     clock.turn(SETTLE_S)
-    assert simulation.world.profile.name == handle(clock.page, "Profile text").value == "paper:task.speed_m_s=0.2"
+    assert simulation.world.profile.name == control(clock.page, "Profile text").value == "paper:task.speed_m_s=0.2"
 
 
 def test_a_profile_is_typed_as_on_the_command_line(clock: Clock, simulation: LiveSimulation) -> None:
-    assert handle(clock.page, "Profile text").value == "paper"
+    assert control(clock.page, "Profile text").value == "paper"
     submit(clock.page, " pretouch:task.speed_m_s=0.2 ")
     clock.turn(0.1)
     assert simulation.world.profile == profile("pretouch:task.speed_m_s=0.2")
     shown = {"Profile": "pretouch", "Path speed [m/s]": 0.2, "Profile text": "pretouch:task.speed_m_s=0.2"}
-    assert {label: handle(clock.page, label).value for label in shown} == shown
+    assert {label: control(clock.page, label).value for label in shown} == shown
 
 
 @pytest.mark.parametrize(
@@ -202,11 +174,11 @@ def test_a_profile_that_is_refused_stays_to_be_put_right_and_changes_nothing(
     submit(clock.page, text)
     clock.turn(0.1)
     assert clock.page.notice.startswith(said)
-    assert handle(clock.page, "Profile text").value == text
+    assert control(clock.page, "Profile text").value == text
     assert simulation.world.profile == PROFILES["paper"]
     give(clock.page, "Profile", "blind")
     clock.turn(0.1)
-    assert handle(clock.page, "Profile text").value == "blind"
+    assert control(clock.page, "Profile text").value == "blind"
 
 
 def test_a_changed_profile_is_named_so_that_it_can_be_found_again() -> None:
@@ -225,7 +197,7 @@ def test_all_controls_show_what_holds(clock: Clock, simulation: LiveSimulation) 
         "Clock speed": 0.5, "Path": "line", "Object": "board -y", "hand_left": False, "Noise factor": 2.0,
         "More latency [s]": 0.1,
     }  # fmt: skip
-    assert {label: handle(clock.page, label).value for label in shown} == shown
+    assert {label: control(clock.page, label).value for label in shown} == shown
 
 
 @pytest.mark.parametrize("speed", [0.0, 7.0])
@@ -233,7 +205,7 @@ def test_a_clock_speed_out_of_range_is_the_nearest_in_it(clock: Clock, speed: fl
     give(clock.page, "Clock speed", speed)
     clock.turn(SETTLE_S + 0.1)
     assert clock.page.controls.running.speed == np.clip(speed, 0.1, 1.0)
-    assert handle(clock.page, "Clock speed").value == np.clip(speed, 0.1, 1.0)
+    assert control(clock.page, "Clock speed").value == np.clip(speed, 0.1, 1.0)
 
 
 def test_what_a_person_gives_the_hand_holds_though_the_sliders_show_another_place_before_it_is_done(
@@ -248,15 +220,16 @@ def test_what_a_person_gives_the_hand_holds_though_the_sliders_show_another_plac
     np.testing.assert_array_equal(simulation.hand_target, [1.2, y, 0.7])
 
 
-def test_what_was_said_of_the_simulation_before_is_on_the_page_at_first(simulation: LiveSimulation) -> None:
+def test_what_was_said_of_the_simulation_before_is_on_the_page_at_first(
+    server: ViserServer, simulation: LiveSimulation
+) -> None:
     simulation.notice = "The paper's paths for mine: 0.8 times as large."
-    with served(ServeOptions(port=free_port()), "test") as server:
-        clock = Clock(LivePage(server, simulation))
-        clock.turn(1.0)
-        assert clock.page.notice.endswith("for mine: 0.8 times as large.")
-        click(clock.page, "Reset")
-        clock.turn(1.0)
-        assert clock.page.notice == ""
+    clock = Clock(LivePage(server, simulation))
+    clock.turn(1.0)
+    assert clock.page.notice.endswith("for mine: 0.8 times as large.")
+    click(clock.page, "Reset")
+    clock.turn(1.0)
+    assert clock.page.notice == ""
 
 
 def test_a_hand_on_the_move_and_another_view_leave_a_notice_standing(clock: Clock, simulation: LiveSimulation) -> None:
@@ -304,7 +277,7 @@ def test_a_push_is_felt_or_the_page_says_what_it_lacked(clock: Clock, simulation
 def test_resuming_is_offered_only_where_a_hold_waits_for_it(clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(clock.page._server, "get_clients", lambda: {0: None})
     clock.turn(0.1)
-    button = handle(clock.page, "Resume: nothing waits for it")
+    button = control(clock.page, "Resume: nothing waits for it")
     assert button.disabled
     clock.page.controls.offer_resume(True)
     assert (button.label, button.disabled) == ("Resume", False)
@@ -327,34 +300,35 @@ def test_an_opening_waits_for_somebody_and_ends_with_the_first_click(
 
 
 @pytest.mark.slow
-def test_three_arms_with_one_hand_go_through_the_same_cycles(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_three_arms_with_one_hand_go_through_the_same_cycles(
+    server: ViserServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
     model = RobotModel(panda())
     simulation = LiveSimulation(LiveSettings(profile=PROFILES["pretouch"]), model, load_skin(LIVE_SKIN, model))
-    with served(ServeOptions(port=free_port()), "test") as server:
-        clock = Clock(LivePage(server, simulation))
-        monkeypatch.setattr(server, "get_clients", lambda: {0: SimpleNamespace(camera=SimpleNamespace())})
-        give(clock.page, "Arms", "three arms")
-        clock.turn(8.0)
-        beside = clock.page._companions
-        assert beside
-        assert [arm.name for arm in beside._arms] == ["blind", "paper"]
-        for arm in beside._arms:
-            assert arm.simulation.time == pytest.approx(simulation.time, abs=1e-9)
-            np.testing.assert_array_equal(arm.simulation.frame.hand_target, simulation.frame.hand_target)
-        assert beside._arms[0].most > 30.0
-        assert 0.0 < beside._most < 0.5 * beside._arms[0].most
-        assert beside._arms[0].label.text.endswith(f"touched with {beside._arms[0].most:.0f} N")
-        give(clock.page, "Task", TASKS[1])
-        clock.page.ask(lambda: simulation.set_path("line"))
-        clock.page.ask(lambda: simulation.set_faults(frozenset({"hand_left"})))
-        clock.turn(0.1)
-        assert {arm.simulation.settings.path for arm in beside._arms} == {"line"}
-        assert {arm.simulation.settings.faults for arm in beside._arms} == {simulation.settings.faults}
-        assert {arm.simulation.commander for arm in beside._arms} == {clock.page.drive.steering}
-        clock.page.ask(simulation.reset)
-        clock.turn(0.1)
-        assert max(arm.simulation.time for arm in beside._arms) < 1.0
-        give(clock.page, "Arms", "one arm")
-        clock.turn(0.1)
-        assert clock.page._companions is None
-        assert not any("blind" in name for name in server.scene._handle_from_node_name)
+    clock = Clock(LivePage(server, simulation))
+    monkeypatch.setattr(server, "get_clients", lambda: {0: SimpleNamespace(camera=SimpleNamespace())})
+    give(clock.page, "Arms", "three arms")
+    clock.turn(8.0)
+    beside = clock.page._companions
+    assert beside
+    assert [arm.name for arm in beside._arms] == ["blind", "paper"]
+    for arm in beside._arms:
+        assert arm.simulation.time == pytest.approx(simulation.time, abs=1e-9)
+        np.testing.assert_array_equal(arm.simulation.frame.hand_target, simulation.frame.hand_target)
+    assert beside._arms[0].most > 30.0
+    assert 0.0 < beside._most < 0.5 * beside._arms[0].most
+    assert beside._arms[0].label.text.endswith(f"touched with {beside._arms[0].most:.0f} N")
+    give(clock.page, "Task", TASKS[1])
+    clock.page.ask(lambda: simulation.set_path("line"))
+    clock.page.ask(lambda: simulation.set_faults(frozenset({"hand_left"})))
+    clock.turn(0.1)
+    assert {arm.simulation.settings.path for arm in beside._arms} == {"line"}
+    assert {arm.simulation.settings.faults for arm in beside._arms} == {simulation.settings.faults}
+    assert {arm.simulation.commander for arm in beside._arms} == {clock.page.drive.steering}
+    clock.page.ask(simulation.reset)
+    clock.turn(0.1)
+    assert max(arm.simulation.time for arm in beside._arms) < 1.0
+    give(clock.page, "Arms", "one arm")
+    clock.turn(0.1)
+    assert clock.page._companions is None
+    assert not any("blind" in name for name in server.scene._handle_from_node_name)

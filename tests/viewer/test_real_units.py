@@ -1,11 +1,8 @@
 """Real units on the simulated arm: readings are as old in the simulation as they are in the room."""
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-
 import numpy as np
 import pytest
-from tests.ports import free_port
+from viser import ViserServer
 
 from pretouch.errors import ParameterError
 from pretouch.recording.reader import open_recording
@@ -13,7 +10,6 @@ from pretouch.recording.verify import verify
 from pretouch.types import Mode, RangeReadings, RangeStatus
 from pretouch.viewer.live import LivePage
 from pretouch.viewer.real_units import RealUnits
-from pretouch.viewer.server import ServeOptions, served
 from pretouch.viewer.simulation import LiveSimulation
 
 UNITS = 7
@@ -123,20 +119,13 @@ def test_readings_of_real_units_are_recorded_and_verify(room: Room, real: RealUn
     assert verdict.checked >= 49
 
 
-@contextmanager
-def page_of(simulation: LiveSimulation, say: Callable[[str], None] = lambda line: None) -> Iterator[LivePage]:
-    with served(ServeOptions(port=free_port()), "test") as server:
-        yield LivePage(server, simulation, say)
-
-
-def test_a_receiver_that_has_ended_is_said_once(room: Room, real: RealUnits) -> None:
+def test_a_receiver_that_has_ended_is_said_once(server: ViserServer, room: Room, real: RealUnits) -> None:
     said: list[str] = []
-    simulation = LiveSimulation(real=real)
-    with page_of(simulation, said.append) as page:
-        page.turn(0.0)
-        assert not said
-        room.alive = False
-        for turn in range(10):
-            page.turn(turn / 30)
-        assert page.notice == "The receiver of the sensor units has ended: start the page again."
+    page = LivePage(server, LiveSimulation(real=real), said.append)
+    page.turn(0.0)
+    assert not said
+    room.alive = False
+    for turn in range(10):
+        page.turn(turn / 30)
+    assert page.notice == "The receiver of the sensor units has ended: start the page again."
     assert said == [page.notice]

@@ -13,7 +13,7 @@ from pretouch.recording.compare import Found, compare
 from pretouch.recording.reader import Recorded, open_recording
 from pretouch.types import Mode
 from pretouch.viewer.replay import ReplayPage, comparison_html, frame_of, show_replay, world_of
-from pretouch.viewer.server import ServeOptions, begun, served, url_of
+from pretouch.viewer.server import ServeOptions, begun, url_of
 from pretouch.viewer.simulation import LiveSimulation
 
 
@@ -63,48 +63,46 @@ def test_a_frame_knows_how_old_the_readings_were(recorded: Recorded) -> None:
 
 
 @pytest.mark.parametrize("other", ["", "blind"])
-def test_playing_and_jumping_show_the_steps_at_that_time(recorded: Recorded, other: str) -> None:
+def test_playing_and_jumping_show_the_steps_at_that_time(server: ViserServer, recorded: Recorded, other: str) -> None:
     comparison = compare(recorded, PROFILES[other]) if other else None
-    with served(ServeOptions(port=free_port()), "test") as server:
-        page = ReplayPage(server, recorded, comparison)
-        page.player.play()
-        for i in range(30):
-            page.turn(i / 30, 1 / 30)
-        assert page.draw(1.0).step.stamp == pytest.approx(recorded[0].step.stamp + 1.0, abs=0.02)
-        page.player.seek(2.5)
-        assert page.draw(2.0).run == 1
-        page.player.seek(0.0)
-        assert page.draw(3.0).step.mode is Mode.HOLD
+    page = ReplayPage(server, recorded, comparison)
+    page.player.play()
+    for i in range(30):
+        page.turn(i / 30, 1 / 30)
+    assert page.draw(1.0).step.stamp == pytest.approx(recorded[0].step.stamp + 1.0, abs=0.02)
+    page.player.seek(2.5)
+    assert page.draw(2.0).run == 1
+    page.player.seek(0.0)
+    assert page.draw(3.0).step.mode is Mode.HOLD
 
 
-def test_what_another_profile_finds_is_named_and_can_be_jumped_to(recorded: Recorded) -> None:
+def test_what_another_profile_finds_is_named_and_can_be_jumped_to(server: ViserServer, recorded: Recorded) -> None:
     stamps = recorded.stamps()
     found = Found(float(stamps[150]), np.array([0.0, 12.0, 9.0]), np.array([False, True, False]))
     comparison = compare(recorded, PROFILES["blind"])
     comparison = replace(comparison, other=replace(comparison.other, contacts=(found,)))
     said = comparison_html(comparison, stamps[0])
     assert "As recorded, paper: no contact. On the same data blind finds contacts of 15.0 N at 1.50 s." in said
-    with served(ServeOptions(port=free_port()), "test") as server:
-        page = ReplayPage(server, recorded, comparison)
-        while not page.timeline.done:
-            page.turn(0.0, 0.0)
-        assert (150, "Contact of 15.0 N found by blind") in [(h.index, h.what) for h in page.timeline.found]
+    page = ReplayPage(server, recorded, comparison)
+    while not page.timeline.done:
+        page.turn(0.0, 0.0)
+    assert (150, "Contact of 15.0 N found by blind") in [(h.index, h.what) for h in page.timeline.found]
 
 
-def test_after_a_jump_the_plots_begin_ten_seconds_before_or_at_the_start(recorded: Recorded) -> None:
-    with served(ServeOptions(port=free_port()), "test") as server:
-        page = ReplayPage(server, recorded, None)
-        page.player.seek(2.5)
-        page.draw(0.0)
-        time = page.history.columns()[0]
-        assert time[0] == pytest.approx(0.0, abs=0.05)
-        assert time[-1] == pytest.approx(2.5, abs=0.1)
+def test_after_a_jump_the_plots_begin_ten_seconds_before_or_at_the_start(
+    server: ViserServer, recorded: Recorded
+) -> None:
+    page = ReplayPage(server, recorded, None)
+    page.player.seek(2.5)
+    page.draw(0.0)
+    time = page.history.columns()[0]
+    assert time[0] == pytest.approx(0.0, abs=0.05)
+    assert time[-1] == pytest.approx(2.5, abs=0.1)
 
 
-def test_of_several_runs_each_is_named_with_its_path(recorded: Recorded) -> None:
-    with served(ServeOptions(port=free_port()), "test") as server:
-        page = ReplayPage(server, recorded, None)
-        assert page.run_name(1) == "profile paper, part 2 of 2, path of 2.00 m"
+def test_of_several_runs_each_is_named_with_its_path(server: ViserServer, recorded: Recorded) -> None:
+    page = ReplayPage(server, recorded, None)
+    assert page.run_name(1) == "profile paper, part 2 of 2, path of 2.00 m"
 
 
 def test_the_address_is_said_and_the_page_ends_when_told(recorded: Recorded, capfd: pytest.CaptureFixture[str]) -> None:
@@ -122,13 +120,12 @@ def contents(server: ViserServer) -> list[str]:
 
 
 def test_whatever_fails_in_the_page_it_plays_no_further_and_it_is_said_once(
-    recorded: Recorded, monkeypatch: pytest.MonkeyPatch
+    server: ViserServer, recorded: Recorded, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fail(*_: object) -> None:
         raise KeyError("nosuch")
 
     monkeypatch.setattr(ReplayPage, "turn", fail)
     turns, said = iter([False, False, True]), []
-    with served(ServeOptions(port=free_port()), "test") as server:
-        show_replay(recorded, server, until=lambda: next(turns), say=said.append)
+    show_replay(recorded, server, until=lambda: next(turns), say=said.append)
     assert said == ["The page failed, and holds: KeyError: 'nosuch'. Please report this."]

@@ -1,19 +1,20 @@
 """Serving the live page: what is said, how it ends, and what no error ends."""
 
+import signal
+import socket
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import pytest
 from tests.ports import free_port
 
+from pretouch.recording.reader import open_recording
 from pretouch.recording.writer import Recording
 from pretouch.viewer.live import LivePage, serve_live
 from pretouch.viewer.server import ServeOptions, url_of
 from pretouch.viewer.simulation import LiveSimulation
-
-
-@pytest.fixture
-def simulation() -> LiveSimulation:
-    return LiveSimulation()
 
 
 def test_the_address_is_the_one_line_that_is_said(
@@ -81,3 +82,26 @@ def test_whatever_fails_in_the_page_the_arm_holds_and_it_is_said_once(
     assert said[1:] == ["The page failed, and holds: KeyError: 'nosuch'. Please report this."]
     assert times[1] < times[2]
     assert times[-1] == times[-2] == times[-3]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_interrupted_it_closes_its_recording_and_says_where_it_is(
+    number: signal.Signals, code: int, tmp_path: Path
+) -> None:
+    place, port = tmp_path / "session.mcap", free_port()
+    command = [sys.executable, "-m", "pretouch.cli", "live", "--port", str(port), "--record", str(place)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, bufsize=1) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline().startswith(f"The arm is at http://127.0.0.1:{port}/")
+        deadline = time.monotonic() + 60
+        while place.stat().st_size < 100_000:
+            assert time.monotonic() < deadline, "nothing is being recorded"
+            time.sleep(0.05)
+        with socket.create_connection(("127.0.0.1", port)):
+            process.send_signal(number)
+        rest = process.stdout.read()
+    assert process.returncode == code
+    assert str(place) in rest
+    assert "Traceback" not in rest
+    assert open_recording(place).complete

@@ -1,7 +1,6 @@
 """A live session: time, the hand, the object, a reset."""
 
 import tracemalloc
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -26,12 +25,6 @@ from pretouch.viewer.simulation import LiveSimulation
 
 OBJECTS = ("none", "board -y", "board +y")
 PATHS = ("circle", "line")
-
-
-@pytest.fixture
-def live(panda_model, paper_skin):
-    """Begin a session."""
-    return lambda **settings: LiveSimulation(LiveSettings(**settings), panda_model, paper_skin)
 
 
 def test_a_session_runs_as_an_experiment_does(live, panda_model, paper_skin):
@@ -242,11 +235,6 @@ def test_a_long_session_does_not_fill_the_memory(live):
         assert tracemalloc.get_traced_memory()[0] - early < 30_000  # a log of the physics alone would take 500 kB
     finally:
         tracemalloc.stop()
-
-
-def test_time_never_repeats_and_never_jumps(live):
-    steps = live().advance(1.0)
-    assert all(0.0099 < b.stamp - a.stamp < 0.0101 for a, b in pairwise(steps))
 
 
 # What a frame knows

@@ -8,14 +8,13 @@ from pretouch.errors import RecordingError
 from pretouch.profiles import PROFILES, profile
 from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify
-from pretouch.viewer.room import LiveSettings
 from pretouch.viewer.simulation import LiveSimulation
 
 
 @pytest.fixture
-def session(panda_model, paper_skin):
+def session(live):
     """A session on its way."""
-    session = LiveSimulation(LiveSettings(object="board -y"), panda_model, paper_skin)
+    session = live(object="board -y")
     session.advance(ARMED_S)
     return session
 

@@ -9,14 +9,7 @@ from tests.viewer.sessions import ARMED_S, AWAY, holds, kept_within_limits, mode
 from pretouch.errors import ParameterError
 from pretouch.profiles import PROFILES, profile
 from pretouch.types import Mode
-from pretouch.viewer.room import LiveSettings
 from pretouch.viewer.simulation import LiveSimulation
-
-
-@pytest.fixture
-def live(panda_model, paper_skin):
-    """Begin a session."""
-    return lambda **settings: LiveSimulation(LiveSettings(**settings), panda_model, paper_skin)
 
 
 def beside(session: LiveSimulation, gap: float) -> None:

@@ -15,6 +15,7 @@ import zstandard
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
+from pretouch.viewer.live import LivePage
 from pretouch.viewer.server import ServeOptions, url_of
 
 PATIENCE_S = 20.0
@@ -103,6 +104,12 @@ class Visitor:
                 if message["type"] == kind and fields.items() <= message.items():
                     return message
         raise AssertionError(f"no {kind} has come")
+
+
+def control(page: LivePage, label: str) -> Any:
+    """The first control of a page with a label."""
+    handles = page._server.gui._gui_input_handle_from_uuid.values()
+    return next(handle for handle in handles if getattr(handle, "label", None) == label)
 
 
 def update(handle: Any, **updates: object) -> dict[str, Any]:
