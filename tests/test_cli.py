@@ -9,7 +9,7 @@ from importlib.metadata import EntryPoint, EntryPoints
 import pytest
 
 from pretouch import cli, extras, plugins
-from pretouch.cli.registry import FCI, GROUP, LAB, OWN
+from pretouch.cli.registry import FCI, GROUP, LAB
 
 
 def run(capsys, *args):
@@ -48,38 +48,12 @@ except SystemExit:
     subprocess.run([sys.executable, "-c", code], check=True, stdout=subprocess.DEVNULL)
 
 
-def test_ctrl_c_while_words_are_read_ends_in_order(monkeypatch):
-    def stop(*_args, **_options):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(cli.tyro, "cli", stop)
-    assert cli.main(["warm-up"]) == 130
-
-
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
-def test_signals_that_end_a_process_end_it_in_order(monkeypatch, number):
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_signals_while_words_are_read_end_it_in_order(monkeypatch, number):
     before = signal.getsignal(number)
     monkeypatch.setattr(cli.tyro, "cli", lambda *_args, **_options: signal.raise_signal(number))
     assert cli.main(["warm-up"]) == 128 + number
     assert signal.getsignal(number) is before
-
-
-@pytest.mark.parametrize("args", [(), ("dance",), ("live", "--seed", "many"), ("report", "--nothing"), ("skin",)])
-def test_words_it_does_not_know_end_with_code_2(capsys, args):
-    try:
-        code = cli.main(list(args))
-    except SystemExit as stop:
-        code = stop.code
-    assert code == 2
-
-
-def test_help_names_the_commands(capsys):
-    with pytest.raises(SystemExit) as stop:
-        cli.main(["--help"])
-    assert stop.value.code == 0
-    said = capsys.readouterr().out
-    for name in OWN:
-        assert f" {name} " in said
 
 
 def test_a_pipe_is_written_to_and_not_replaced(tmp_path):

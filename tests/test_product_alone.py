@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from pretouch.extras import BAGS, FIGURES, LIVE
 from tests.importing.made import six_axis, written
 
 pytestmark = pytest.mark.slow
@@ -27,12 +26,6 @@ if sys.argv[1:2] == ["run"]:  # pushes and checks take seconds
     command.PREFLIGHT = PreflightParams(watch_s=1.0)
 sys.exit(main(sys.argv[1:]))
 """
-
-
-@pytest.fixture(autouse=True)
-def _there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What installs an extra is said as seen from the folder that one stands in."""
-    monkeypatch.chdir(tmp_path)
 
 
 def alone(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
@@ -57,49 +50,24 @@ def test_help(tmp_path: Path):
     assert re.findall(r"usage: pretouch ([a-z-]+(?: import)?)", done.stdout) == list(_HELPED)
 
 
-def test_a_rehearsed_run_is_recorded_recomputed_and_not_reported_without_figures(tmp_path: Path):
+def test_a_rehearsed_run_is_recorded_and_recomputed(tmp_path: Path):
     words = ("--no-skin", "--profile", "blind", "--path", "hold", "--seconds", "0.1", "--yes", "--no-learnt")
     done = alone(tmp_path, "run", *words, "--record", "a.mcap")
     assert done.returncode == 0, done.stderr
     done = alone(tmp_path, "replay", "a.mcap", "--verify")
     assert done.returncode == 0, done.stderr
-    done = alone(tmp_path, "report", "a.mcap")
-    assert done.returncode == 2
-    assert done.stderr == f"A report needs matplotlib of the extra 'figures': run {FIGURES.command}\n"
-    done = alone(tmp_path, "detect", "a.mcap")
-    assert done.returncode == 2
-    assert done.stderr == f"A bag or MCAP file needs rosbags of the extra 'bags': run {BAGS.command}\n"
 
 
-def test_contacts_of_a_table_are_found_and_only_the_figure_needs_more(tmp_path: Path):
+def test_contacts_of_a_table_are_found(tmp_path: Path):
     rows = (f"{0.01 * i},0,0,{25 if 300 < i < 320 else 0.1 * (i % 2)}" for i in range(400))
     (tmp_path / "force.csv").write_text("\n".join(["time_s,force_x_N,force_y_N,force_z_N", *rows]))
     done = alone(tmp_path, "detect", "force.csv", "--json", "found.json")
     assert done.returncode == 0, done.stderr
     (profile,) = json.loads((tmp_path / "found.json").read_text())["profiles"]
     assert len(profile["contacts"]) == 1
-    done = alone(tmp_path, "detect", "force.csv", "--out", "figure.png")
-    assert done.returncode == 2
-    assert done.stderr == f"A figure needs matplotlib of the extra 'figures': run {FIGURES.command}\n"
 
 
 def test_an_arm_is_imported(tmp_path: Path):
     done = alone(tmp_path, "robot", "import", str(written(tmp_path, six_axis())), "--capsules", "1", "--out", "arm")
     assert done.returncode == 0, done.stderr
     assert alone(tmp_path, "robot", "check", "arm").returncode == 0
-
-
-@pytest.mark.parametrize(
-    ("name", "owner"), [("reproduce", "pretouch-lab"), ("demo", "pretouch-lab"), ("serve-fci", "pretouch-fci")]
-)
-def test_a_command_of_another_distribution_is_a_sentence(tmp_path: Path, name: str, owner: str):
-    done = alone(tmp_path, name)
-    assert done.returncode == 2
-    assert done.stderr.count("\n") == 1
-    assert owner in done.stderr
-
-
-def test_live_names_what_it_needs(tmp_path: Path):
-    done = alone(tmp_path, "live")
-    assert done.returncode == 2
-    assert done.stderr == f"The page needs viser of the extra 'live': run {LIVE.command}\n"

@@ -1,11 +1,16 @@
 """The lab's distribution: of the product's version, with the commands that the product says it has."""
 
+import sys
 import tomllib
 from pathlib import Path
 
+import pytest
+
 import pretouch
-from pretouch import plugins
+from pretouch import cli, plugins
 from pretouch.cli.registry import GROUP, LAB, command_class
+from pretouch_lab.learning import LEARN
+from pretouch_lab.sweep.play import SWEEP
 
 PROJECT = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text())["project"]
 
@@ -20,3 +25,15 @@ def test_its_commands_are_those_the_product_names():
     assert set(LAB) <= set(plugins.names(GROUP))
     for name in LAB:
         assert command_class(name) is not None
+
+
+@pytest.mark.parametrize("extra", [LEARN, SWEEP], ids=lambda extra: extra.name)
+def test_an_extra_is_one_that_the_distribution_has_and_make_installs(extra):
+    assert extra.name in PROJECT["optional-dependencies"]
+    assert f"\n{extra.target}: " in (Path(__file__).parents[2] / "Makefile").read_text()
+
+
+def test_a_sweep_without_its_extra_says_what_to_run(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "SALib", None)
+    assert cli.main(["sweep", "static", "--vary", "detect.f_base_n=7:20", "--samples", "2"]) == 2
+    assert capsys.readouterr().err.endswith(f"of the extra 'sweep': run {SWEEP.command}\n")

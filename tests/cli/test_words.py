@@ -44,6 +44,11 @@ def test_the_overview_leaves_out_what_is_not_installed():
         ("live --seed", "--seed lacks a value: give 1. See pretouch live --help."),
         ("live here", "here is unknown. See pretouch live --help."),
         (
+            "skin keys",
+            "pretouch skin keys lacks --keys: File of the units' keys; created if it is missing, readable only by you."
+            " See pretouch skin keys --help.",
+        ),
+        (
             "replay",
             "pretouch replay lacks an argument: Recording; that of a killed process works too."
             " See pretouch replay --help.",
@@ -101,20 +106,6 @@ def test_help_fits_a_terminal_of_80_columns_and_shows_no_empty_default(capsys, m
         assert nothing not in " ".join(said.split())
 
 
-def test_help_wraps_the_sentences_of_an_option_anew(capsys, monkeypatch):
-    monkeypatch.setenv("COLUMNS", "80")
-    with pytest.raises(SystemExit):
-        cli.main(["live", "--help"])
-    said = capsys.readouterr().out
-    begin = said.index("  --world STR")
-    assert said[begin : said.index("  --record")] == (
-        "  --world STR              Set of simulated arms, sensors and delays: nominal,\n"
-        "                           realistic, stress, or a TOML file, as `pretouch\n"
-        "                           identify` writes one, of which the seed draws its\n"
-        "                           own; by default the usual ones.\n"
-    )
-
-
 REQUIRED = {
     "skin monitor": ("--keys", "k"), "skin simulate": ("--keys", "k"), "robot import": ("a",), "replay": ("a",),
     "skin provision": ("--id", "a", "--keys", "k", "--ssid", "s", "--host", "h"), "detect": ("a",), "figure": ("a",),
@@ -136,8 +127,3 @@ def test_what_is_no_number_is_one_sentence(capsys, monkeypatch, name):
         assert said.out == ""
         assert said.err.count("\n") == 1
         assert f"{option} is 'many': give a" in said.err
-
-
-def test_an_option_that_is_missing_is_named(capsys):
-    assert cli.main(["skin", "keys"]) == 2
-    assert capsys.readouterr().err.startswith("pretouch skin keys lacks --keys: File of the units' keys")

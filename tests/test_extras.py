@@ -9,11 +9,9 @@ from pathlib import Path
 import pytest
 
 from pretouch import extras
-from pretouch.cli.registry import FCI, command_names
+from pretouch.cli.registry import OWN
 from pretouch.errors import MissingExtraError
 from pretouch.extras import BAGS, FIGURES, FRANKA, LIVE, MESHES, UNITS
-from pretouch_lab.learning import LEARN
-from pretouch_lab.sweep.play import SWEEP
 
 EXTRAS = (BAGS, FIGURES, FRANKA, MESHES, LIVE, UNITS)
 
@@ -21,8 +19,6 @@ URDF = """<robot name="a"><link name="base"><collision><geometry><mesh filename=
 <link name="tip"/><joint name="j" type="revolute"><parent link="base"/><child link="tip"/><axis xyz="0 0 1"/>
 <limit lower="-1" upper="1" velocity="1" effort="1"/></joint></robot>"""
 ARM = ("run", "franka", "--ip", "127.0.0.1", "--no-skin", "--profile", "blind")
-LAB = ("demo", "reproduce", "figure", "bench", "sweep", "identify")  # requires figures
-X = ("--vary", "detect.f_base_n=7:20", "--samples", "2", "--processes", "1")
 # what is asked for, and the extra it needs; the others end for another reason, beyond all imports
 ASKED = [
     (("live", "--path", "spiral"), LIVE),
@@ -31,23 +27,11 @@ ASKED = [
     (ARM, FRANKA),
     ((*ARM, "--arm", "fr3"), FRANKA),
     (("run", "--skin", "gone.toml"), None),
-    (("sweep", "static", *X, "--out", "sweep"), SWEEP),
-    (("sweep", "nothing"), None),
     (("robot", "import", "arm.urdf", "--out", "arm"), MESHES),
     (("robot", "check", "gone"), None),
-    (("demo", "--seeds", "0"), None),
-    (("reproduce", "nothing"), None),
-    (("figure", "nothing"), None),
-    (("bench", "detection", "--world", "gone.toml"), None),
-    (("bench", "avoidance", "--world", "gone.toml"), None),
-    (("bench", "localization", "--world", "gone.toml"), None),
-    (("bench", "both", "--world", "gone.toml"), None),
-    (("bench", "cycle", "--rate", "0"), None),
-    (("bench", "calibration", "--skins", "0"), None),
     (("detect", "gone.csv"), None),
     (("detect", "a.bag"), BAGS),
     (("detect", "force.csv", "--out", "force.png"), FIGURES),
-    (("identify", "gone.mcap"), None),
     (("report", "gone.mcap"), FIGURES),
     (("skin", "monitor", "--keys", "gone.toml"), None),
     (("skin", "calibrate", "--skin", "gone.toml", "--recording", "gone.mcap"), None),
@@ -82,7 +66,7 @@ for hidden, asked in json.loads(sys.argv[1]):
 
 
 def test_every_command_is_asked_for():
-    assert {words[0] for words, _ in ASKED} == set(command_names()) - set(FCI)
+    assert {words[0] for words, _ in ASKED} == set(OWN)
 
 
 @pytest.mark.slow
@@ -92,8 +76,8 @@ def test_without_an_extra_a_command_does_without_it_or_says_what_to_run(tmp_path
         (tmp_path / name).write_text("")
     (tmp_path / "force.csv").write_text("time_s,force_x_N,force_y_N,force_z_N\n0,0,0,0\n")
     monkeypatch.chdir(tmp_path)
-    asked = [(extra, words, needed) for extra in (*EXTRAS, SWEEP) for words, needed in asked_without(extra)]
-    given = [[extra.modules, [words for words, _ in asked_without(extra)]] for extra in (*EXTRAS, SWEEP)]
+    asked = [(extra, words, needed) for extra in EXTRAS for words, needed in ASKED if needed in (None, extra)]
+    given = [[extra.modules, [words for one, words, _ in asked if one is extra]] for extra in EXTRAS]
     done = subprocess.run(
         [sys.executable, "-c", SCRIPT, json.dumps(given)], capture_output=True, text=True, check=False
     )
@@ -109,12 +93,6 @@ def test_without_an_extra_a_command_does_without_it_or_says_what_to_run(tmp_path
         else:
             assert "extra" not in said, (extra, words, said)
             assert "usage" not in said, (extra, words, said)
-
-
-def asked_without(extra):
-    """What is asked for where an extra is hidden; the lab itself requires figures."""
-    there = ((words, needed) for words, needed in ASKED if extra != FIGURES or words[0] not in LAB)
-    return [(words, needed) for words, needed in there if needed in (None, extra)]
 
 
 @pytest.fixture
@@ -134,7 +112,7 @@ def test_the_sentence_names_make_in_a_clone_and_pip_of_the_folder_in_another_env
     assert str(caught.value) == (
         f"A Franka arm needs ruckig of the extra 'franka': run '/a b/python' -m pip install -e '{clone}[franka]'"
     )
-    assert SWEEP.command == f"'/a b/python' -m pip install -e '{clone}/lab[sweep]'"
+    assert extras.install_command(extras.LAB, "sweep") == f"'/a b/python' -m pip install -e '{clone}/lab[sweep]'"
     monkeypatch.setattr(sys, "prefix", str(clone / ".venv"))
     monkeypatch.chdir(clone)
     assert FRANKA.command == "make franka"
@@ -198,9 +176,8 @@ def test_a_hint_is_for_what_made_the_environment(monkeypatch, tmp_path, maker, o
     assert extras.install_command(extras.LAB) == lab
 
 
-@pytest.mark.parametrize("extra", [*EXTRAS, LEARN, SWEEP], ids=lambda extra: extra.name)
+@pytest.mark.parametrize("extra", EXTRAS, ids=lambda extra: extra.name)
 def test_an_extra_is_one_that_its_distribution_has_and_make_installs(extra):
-    root = Path(__file__).parents[2]
-    project = root / ("lab" if extra.distribution == "pretouch-lab" else "") / "pyproject.toml"
-    assert extra.name in tomllib.loads(project.read_text())["project"]["optional-dependencies"]
+    root = Path(__file__).parents[1]
+    assert extra.name in tomllib.loads((root / "pyproject.toml").read_text())["project"]["optional-dependencies"]
     assert f"\n{extra.target}: " in (root / "Makefile").read_text()
