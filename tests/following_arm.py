@@ -6,6 +6,7 @@ import numpy as np
 
 from pretouch.control.path import line
 from pretouch.controller import Controller
+from pretouch.loop import Cycle
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import PROFILES, Profile
 from pretouch.robot.model import RobotModel
@@ -46,18 +47,24 @@ class Arm:
             stamp[unit] = self.time - age
         return RangeReadings(stamp, distance, status)
 
-    def step(
+    def turn(
         self,
         force: tuple[float, float, float] = (0.0, 0.0, 0.0),
         seen: dict[int, float] | None = None,
         silent: dict[int, float] | None = None,
         resume: bool = False,
         change: Callable[[RobotState], RobotState] = lambda robot: robot,
-    ) -> ControlStep:
-        inputs = Inputs(self.time, change(self.robot(force)), self.readings(seen, silent), resume)
-        step, self.state = self.controller.step(self.state, inputs)
+        **more: object,
+    ) -> Cycle:
+        """Turn the controller once and follow its command; `more` are other fields of the inputs."""
+        inputs = Inputs(self.time, change(self.robot(force)), self.readings(seen, silent), resume, **more)
+        before = self.state
+        step, self.state = self.controller.step(before, inputs)
         self.qd, self.q, self.time = step.command, self.q + step.command * DT, self.time + DT
-        return step
+        return Cycle(inputs, before, step, self.state)
+
+    def step(self, *values: object, **given: object) -> ControlStep:
+        return self.turn(*values, **given).step
 
     def run(self, cycles: int, **given: object) -> list[ControlStep]:
         return [self.step(**given) for _ in range(cycles)]

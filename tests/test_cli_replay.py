@@ -9,12 +9,10 @@ import pytest
 
 from pretouch.cli.commands import Replay
 from pretouch.cli.replay import replay
-from pretouch.errors import MissingExtraError, ParameterError, RecordingError
-from pretouch.loop import Cycle
+from pretouch.errors import ParameterError, RecordingError
 from pretouch.recording.writer import Recording
-from pretouch.types import Inputs
 from pretouch.viewer import server
-from tests.following_arm import DT, Arm
+from tests.following_arm import Arm
 from tests.imported_data.files import pushed
 
 PUSHES = ((2.0, 0.6, (0.0, 40.0, 0.0)),)
@@ -27,10 +25,7 @@ def whole(panda_model, paper_skin, tmp_path_factory):
     with Recording(place, arm.controller, {"command": "pretouch test", "seed": 3}) as recording:
         for sample in pushed(5.0, PUSHES):
             silent = {0: arm.time - 4.5} if arm.time > 4.5 else None
-            inputs, before = Inputs(arm.time, arm.robot(tuple(sample)), arm.readings(silent=silent)), arm.state
-            step, arm.state = arm.controller.step(before, inputs)
-            recording.record(Cycle(inputs, before, step, arm.state))
-            arm.qd, arm.q, arm.time = step.command, arm.q + step.command * DT, arm.time + DT
+            recording.record(arm.turn(tuple(sample), silent=silent))
     return place
 
 
@@ -77,10 +72,7 @@ def test_of_a_run_that_was_held_from_the_start_on_it_is_said_that_it_was(capsys,
     arm = Arm(panda_model, paper_skin)
     with Recording(tmp_path / "held.mcap", arm.controller) as recording:
         for sample in pushed(1.0, ()):
-            inputs, before = Inputs(arm.time, arm.robot(tuple(sample)), arm.readings(silent={0: 9.0})), arm.state
-            step, arm.state = arm.controller.step(before, inputs)
-            recording.record(Cycle(inputs, before, step, arm.state))
-            arm.qd, arm.q, arm.time = step.command, arm.q + step.command * DT, arm.time + DT
+            recording.record(arm.turn(tuple(sample), silent={0: 9.0}))
     assert replay(tmp_path / "held.mcap") == 0
     assert "0 contacts, 0 holds after the start, held for 100% of the time." in capsys.readouterr().out
 
@@ -158,13 +150,6 @@ def test_the_address_is_said_before_the_recording_is_read(whole, page, begun, mo
 def test_no_page_begins_where_none_is_asked_for(whole, page, begun, given):
     assert Replay(str(whole), **given).run() == 0
     assert begun == page == []
-
-
-def test_without_the_extra_the_page_is_one_sentence(whole, monkeypatch):
-    monkeypatch.setitem(sys.modules, "viser", None)
-    with pytest.raises(MissingExtraError, match="extra 'live'") as error:
-        Replay(str(whole)).run()
-    assert "\n" not in str(error.value)
 
 
 @pytest.mark.parametrize("name", ["gone.mcap", "text.mcap", "empty.mcap"])

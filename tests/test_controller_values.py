@@ -12,6 +12,7 @@ from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import Inputs, Mode, RangeReadings
 from tests.following_arm import PAPER, Arm
+from tests.fuzz.invariants import same
 
 LEFT = 0  # unit of the paper's skin that looks along +y in the ready posture
 
@@ -32,16 +33,6 @@ def arrays_in(value: object) -> list[np.ndarray]:
     if isinstance(value, tuple):
         return [a for part in value for a in arrays_in(part)]
     return []
-
-
-def same(a: object, b: object) -> bool:
-    if is_dataclass(a):
-        return type(a) is type(b) and all(same(getattr(a, f.name), getattr(b, f.name)) for f in fields(a))
-    if isinstance(a, np.ndarray):
-        return bool(np.array_equal(a, b, equal_nan=True))
-    if isinstance(a, tuple):
-        return len(a) == len(b) and all(map(same, a, b))
-    return a == b or (a != a and b != b)
 
 
 @pytest.mark.parametrize("force", [(0.0, 0.0, 0.0), (0.0, 50.0, 0.0)])

@@ -28,19 +28,13 @@ def rod(x: float, y: float, stamp: float, speed: float = 0.0) -> MovingFixtures:
     return MovingFixtures(stamp, a, b, np.array([0.05]), v, v)
 
 
-def turn(arm: Arm, moving: MovingFixtures | None):
-    step, arm.state = arm.controller.step(arm.state, Inputs(arm.time, arm.robot(), arm.readings(), moving=moving))
-    arm.qd, arm.q, arm.time = step.command, arm.q + step.command * 0.01, arm.time + 0.01
-    return step
-
-
 @pytest.mark.parametrize("profile", [PRETOUCH, PROFILES["paper"]], ids=lambda profile: profile.name)
 def test_an_arm_keeps_off_a_rod_on_its_path_and_takes_it_for_no_person(panda_model, paper_skin, profile):
     arm = Arm(panda_model, paper_skin, profile)
     x, y, _ = arm.ee()
     least = np.inf
     for _ in range(400):
-        step = turn(arm, rod(x, y + 0.35, arm.time))
+        step = arm.step(moving=rod(x, y + 0.35, arm.time))
         least = min(least, step.obstacles.body_distance.min())
         # no unit shows it, and no person's nearness slows the arm or bends the thresholds
         assert step.obstacles.unit.min() >= len(paper_skin)
@@ -50,7 +44,7 @@ def test_an_arm_keeps_off_a_rod_on_its_path_and_takes_it_for_no_person(panda_mod
     assert "a fixture that moves is 0." in explain(step, paper_skin.ids, panda_model.links).sentence
     free = Arm(panda_model, paper_skin, profile)
     for _ in range(400):
-        last = turn(free, None)
+        last = free.step()
     assert last.ee_position[1] > y + 0.3
     assert step.ee_position[1] < y + 0.25
     assert least > 0.0
@@ -60,8 +54,8 @@ def test_a_braking_arm_gives_way_to_a_rod_that_comes(panda_model, paper_skin):
     still, coming = (Arm(panda_model, paper_skin, PRETOUCH) for _ in range(2))
     x, y, _ = still.ee()
     for i in range(130):
-        turn(still, rod(x, y + 0.45, still.time))
-        step = turn(coming, rod(x, y + 0.45 + 0.3 * (1.3 - 0.01 * i) - 0.39, coming.time, -0.3))
+        still.step(moving=rod(x, y + 0.45, still.time))
+        step = coming.step(moving=rod(x, y + 0.45 + 0.3 * (1.3 - 0.01 * i) - 0.39, coming.time, -0.3))
     assert step.command[0] < still.qd[0]
 
 
@@ -69,7 +63,7 @@ def test_a_braking_arm_gives_way_to_a_rod_that_comes(panda_model, paper_skin):
 def test_far_away_it_changes_no_command(panda_model, paper_skin, profile):
     plain, given = Arm(panda_model, paper_skin, profile), Arm(panda_model, paper_skin, profile)
     for _ in range(150):
-        one, other = turn(plain, None), turn(given, rod(5.0, 5.0, given.time))
+        one, other = plain.step(), given.step(moving=rod(5.0, 5.0, given.time))
         assert one.command.tobytes() == other.command.tobytes()
         assert one.thresholds.parts.tobytes() == other.thresholds.parts.tobytes()
 
@@ -78,30 +72,30 @@ def test_an_arm_that_sees_nothing_keeps_off_too(panda_model, paper_skin):
     profile = replace(PRETOUCH, perception=None)
     arm = Arm(panda_model, paper_skin, profile)
     x, y, _ = arm.ee()
-    least = min(turn(arm, rod(x, y + 0.35, arm.time)).obstacles.body_distance.min() for _ in range(300))
+    least = min(arm.step(moving=rod(x, y + 0.35, arm.time)).obstacles.body_distance.min() for _ in range(300))
     assert 0.0 < least < 0.03
 
 
 def test_silence_of_who_tells_holds_the_arm_until_it_is_told_again(panda_model, paper_skin):
     arm = Arm(panda_model, paper_skin, PRETOUCH)
     for _ in range(150):
-        step = turn(arm, rod(5.0, 0.0, arm.time))
+        step = arm.step(moving=rod(5.0, 0.0, arm.time))
     assert step.mode is Mode.TRACK
     told = arm.time
     for _ in range(8):
-        step = turn(arm, rod(5.0, 0.0, told))
+        step = arm.step(moving=rod(5.0, 0.0, told))
     assert step.mode is Mode.HOLD
     assert step.reason == (
         "The fixtures that move were last known 0.070 s ago: check who tells of them; the arm goes on when it is told"
         " again."
     )
-    assert turn(arm, rod(5.0, 0.0, arm.time)).mode is Mode.TRACK
+    assert arm.step(moving=rod(5.0, 0.0, arm.time)).mode is Mode.TRACK
 
 
 def test_an_arm_holds_until_it_is_told_of_the_other_for_the_first_time(panda_model, paper_skin):
     arm = Arm(panda_model, paper_skin, PRETOUCH)
-    assert {turn(arm, SOMEWHERE).mode for _ in range(8)} == {Mode.HOLD}
-    step = turn(arm, SOMEWHERE)
+    assert {arm.step(moving=SOMEWHERE).mode for _ in range(8)} == {Mode.HOLD}
+    step = arm.step(moving=SOMEWHERE)
     assert "have not been told of yet" in step.reason
     given = Inputs(arm.time, arm.robot(), arm.readings(), moving=SOMEWHERE)
     assert same(decode_moving(encode_moving(0, given)), SOMEWHERE)

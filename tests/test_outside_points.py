@@ -16,7 +16,7 @@ from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify
 from pretouch.recording.writer import Recording
 from pretouch.sensing.skin import Skin
-from pretouch.types import Inputs, Mode, SeenPoints
+from pretouch.types import Mode, SeenPoints
 from tests.following_arm import Arm
 from tests.fuzz.invariants import same
 from tests.recording.runs import Run, controller_of
@@ -29,17 +29,10 @@ def seen(now: float, *point, sigma: float = 0.005) -> SeenPoints:
     return SeenPoints(now, np.full(len(at), now), at, np.full(len(at), sigma))
 
 
-def turn(arm: Arm, points: SeenPoints | None):
-    inputs = Inputs(arm.time, arm.robot(), arm.readings(), points=points)
-    step, arm.state = arm.controller.step(arm.state, inputs)
-    arm.qd, arm.q, arm.time = step.command, arm.q + step.command * 0.01, arm.time + 0.01
-    return step
-
-
 def test_a_profile_that_takes_no_points_does_the_same_to_the_bit_with_and_without(panda_model, paper_skin):
     plain, given = Arm(panda_model, paper_skin), Arm(panda_model, paper_skin)
     for _ in range(150):
-        one, other = turn(plain, None), turn(given, seen(given.time, given.ee() + np.array([0.0, 0.2, 0.0])))
+        one, other = plain.step(), given.step(points=seen(given.time, given.ee() + np.array([0.0, 0.2, 0.0])))
         assert same(one, other)
     assert same(plain.state, given.state)
 
@@ -48,7 +41,7 @@ def test_pretouch_without_a_source_does_the_same_to_the_bit_whatever_is_kept_of_
     off = replace(PRETOUCH, perception=replace(PRETOUCH.perception, outside=None))
     arms = [Arm(panda_model, paper_skin, profile) for profile in (PRETOUCH, off)]
     for _ in range(150):
-        assert same(*(turn(arm, None) for arm in arms))
+        assert same(*(arm.step() for arm in arms))
     assert same(arms[0].state, arms[1].state)
 
 
@@ -59,7 +52,7 @@ def test_an_arm_slows_before_what_only_an_outside_source_sees(panda_model, paper
     place = arm.ee() + np.array([0.0, 0.25, 0.0])
     speeds, fastest = [], 0.0
     for _ in range(400):
-        step, ahead = turn(arm, seen(arm.time, place)), turn(free, None)
+        step, ahead = arm.step(points=seen(arm.time, place)), free.step()
         fastest = max(fastest, ahead.ee_velocity[1])
         nearest = step.obstacles
         if len(nearest.unit) and nearest.body_distance.min() < 0.02 and nearest.direction[0, 1] > 0.8:
@@ -74,15 +67,15 @@ def test_an_arm_slows_before_what_only_an_outside_source_sees(panda_model, paper
 def test_a_source_once_given_that_falls_silent_stops_the_arm_and_lets_it_go_on(panda_model, paper_skin):
     arm = Arm(panda_model, paper_skin, PRETOUCH)
     for _ in range(150):
-        turn(arm, seen(arm.time))
+        arm.step(points=seen(arm.time))
     last = seen(arm.time)
-    modes = [turn(arm, last) for _ in range(60)]
+    modes = [arm.step(points=last) for _ in range(60)]
     assert modes[15].mode is Mode.TRACK
     assert 0.0 < modes[30].speed_scale < 1.0
     assert modes[-1].mode is Mode.HOLD
     assert "outside source of points has been silent" in modes[-1].reason
-    assert turn(arm, None).mode is Mode.HOLD, "nor when there is no set at all"
-    assert turn(arm, seen(arm.time)).mode is Mode.TRACK
+    assert arm.step().mode is Mode.HOLD, "nor when there is no set at all"
+    assert arm.step(points=seen(arm.time)).mode is Mode.TRACK
 
 
 @pytest.mark.parametrize(
@@ -105,11 +98,11 @@ def test_points_that_cannot_be_used_are_named(panda_model, paper_skin, points, s
     assert said in wrong
     arm = Arm(panda_model, paper_skin, PRETOUCH)
     for _ in range(150):
-        turn(arm, seen(arm.time))
-    step = turn(arm, points)
+        arm.step(points=seen(arm.time))
+    step = arm.step(points=points)
     assert step.mode is Mode.HOLD
     assert said in step.reason
-    assert turn(arm, seen(arm.time)).mode is Mode.TRACK
+    assert arm.step(points=seen(arm.time)).mode is Mode.TRACK
 
 
 def test_room_for_more_units_leaves_the_rows_there_are():
@@ -167,12 +160,12 @@ def test_inputs_with_points_that_fit_no_message_are_said_to_be_unreadable(panda_
 
 def test_another_number_of_places_begins_anew(panda_model, paper_skin):
     arm = Arm(panda_model, paper_skin, PRETOUCH)
-    turn(arm, seen(arm.time, arm.ee() + np.array([0.0, 0.3, 0.0])))
+    arm.step(points=seen(arm.time, arm.ee() + np.array([0.0, 0.3, 0.0])))
     one = replace(PRETOUCH, perception=replace(PRETOUCH.perception, outside=OutsidePoints(per_link=1)))
     other = controller_of(panda_model, paper_skin, one)
     assert other.adopt(arm.state, arm.controller).outside is None
     arm.state, arm.controller = other.adopt(arm.state, arm.controller), other
-    step = turn(arm, seen(arm.time, arm.ee() + np.array([0.0, 0.3, 0.0])))
+    step = arm.step(points=seen(arm.time, arm.ee() + np.array([0.0, 0.3, 0.0])))
     assert (step.obstacles.unit >= 7).any()
     assert same(other.adopt(arm.state, other).outside, arm.state.outside)
 

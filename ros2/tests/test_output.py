@@ -13,7 +13,6 @@ from tests.following_arm import DT, Arm
 from pretouch.loop import Cycle
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.types import Inputs
 from pretouch_ros2.messages import CLOUD, DIAGNOSTICS, MARKERS, STATUS, TEXT, TRANSFORMS, WRENCH
 from pretouch_ros2.node import Ros2Node
 from pretouch_ros2.output import Ros2Output
@@ -60,10 +59,7 @@ class TrajectoryRun:
         self.output = Ros2Output(OutputParams(**params), self.arm.controller, node)
 
     def turn(self, force: tuple[float, float, float] = (0.0, 0.0, 0.0), seen: dict[int, float] | None = None) -> Cycle:
-        inputs = Inputs(self.arm.time, self.arm.robot(force), self.arm.readings(seen))
-        before = self.arm.state
-        step = self.arm.step(force, seen)
-        cycle = Cycle(inputs, before, step, self.arm.state)
+        cycle = self.arm.turn(force, seen)
         self.output.record(cycle)
         return cycle
 
@@ -145,9 +141,7 @@ def test_each_contact_and_each_change_of_the_mode_is_published(trajectory: Traje
 def test_a_silent_unit_is_an_error_in_the_diagnostics(
     trajectory: TrajectoryRun, listener: Listener, paper_skin: Skin
 ) -> None:
-    readings = trajectory.arm.readings(silent={1: 0.5, 2: 0.2})
-    inputs, before = Inputs(trajectory.arm.time, trajectory.arm.robot(), readings), trajectory.arm.state
-    trajectory.output.record(Cycle(inputs, before, trajectory.arm.step(), trajectory.arm.state))
+    trajectory.output.record(trajectory.arm.turn(silent={1: 0.5, 2: 0.2}))
     first, *units = listener.last("/diagnostics").status
     assert first.name == "pretouch: controller"
     assert (first.level, first.message.split(":")[0]) == (1, "HOLD")

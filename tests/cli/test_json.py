@@ -9,10 +9,8 @@ import pytest
 
 from pretouch import cli
 from pretouch.cli.writing import numbers_to, plain
-from pretouch.loop import Cycle
 from pretouch.recording.writer import Recording
 from pretouch.session.push import GuidedPush
-from pretouch.types import Inputs
 from tests.cli.commands import COMMANDS
 from tests.following_arm import DT, Arm
 from tests.imported_data.files import pushed
@@ -59,10 +57,7 @@ def files(tmp_path_factory, panda_model, paper_skin):
     arm = Arm(panda_model, paper_skin)
     with Recording(folder / "run.mcap", arm.controller) as recording:
         for sample in forces:
-            inputs, before = Inputs(arm.time, arm.robot(tuple(sample)), arm.readings()), arm.state
-            step, arm.state = arm.controller.step(before, inputs)
-            recording.record(Cycle(inputs, before, step, arm.state))
-            arm.qd, arm.q, arm.time = step.command, arm.q + step.command * DT, arm.time + DT
+            recording.record(arm.turn(tuple(sample)))
     told = ["robot", "import", str(written(folder, six_axis())), "--capsules", "1", "--ready", "0,0.3,1.2,0,1.6,0"]
     assert cli.main([*told, "--out", str(folder / "arm")]) == 0
     assert cli.main(["skin", "keys", "--keys", str(folder / "keys.toml"), "--new", "a,b"]) == 0
@@ -81,7 +76,6 @@ def files(tmp_path_factory, panda_model, paper_skin):
         ("replay run.mcap --verify", {"verified"}),
         ("replay run.mcap --no-page --profile blind", {"compared"}),
         ("run --no-skin --profile blind --path hold --seconds 0.2 --yes", {"contacts", "held_s", "timing"}),
-        ("bench cycle --points 3 --cycles 20 --rate 100", {"about", "rows"}),
     ],
 )
 def test_a_dash_is_one_document_on_standard_output_and_text_beside_it(files, capsys, monkeypatch, words, holds):

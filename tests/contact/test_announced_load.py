@@ -18,7 +18,7 @@ from pretouch.recording.codec import decode_payload, encode_inputs, encode_paylo
 from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify
 from pretouch.recording.writer import Recording
-from pretouch.types import Inputs, Mode, RobotState
+from pretouch.types import Mode, RobotState
 
 PRETOUCH = PROFILES["pretouch"]
 STILL = np.zeros(7)
@@ -178,16 +178,11 @@ def test_an_arm_holds_on_a_payload_it_cannot_carry_and_goes_on_without_it(panda_
     arm = Arm(panda_model, paper_skin, PRETOUCH)
     arm.run(150)
 
-    def turn(given):
-        step, arm.state = arm.controller.step(arm.state, Inputs(arm.time, arm.robot(), arm.readings(), payload=given))
-        arm.qd, arm.q, arm.time = step.command, arm.q + step.command * DT, arm.time + DT
-        return step
-
-    step = turn(payload)
+    step = arm.step(payload=payload)
     assert step.mode is Mode.HOLD
     assert said in step.reason
     assert arm.state.load is None
-    assert turn(None).mode is Mode.TRACK
+    assert arm.step().mode is Mode.TRACK
 
 
 def test_a_panda_holds_less_than_its_joints_torques_allow(panda_model):

@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -15,7 +14,7 @@ from pretouch.profiles import PROFILES, Profile
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin
-from pretouch.types import Inputs, RangeReadings, RangeStatus, RobotState
+from pretouch.types import Inputs, RangeReadings, RangeStatus
 from tests.fuzz.machine import Course, Machine
 from tests.fuzz.weather import STATUS
 from tests.fuzz.worlds import World
@@ -148,13 +147,3 @@ def test_any_goal_among_any_obstacles(profile, q, goal, sequence):
         for _ in range(3):
             seen = RangeReadings(np.full(K, arm.time), np.array(distance), np.zeros(K, np.int64))
             arm.step(replace(calm(arm), readings=seen), deep=False)
-
-
-@pytest.mark.parametrize("value", [np.nan, np.inf])
-@pytest.mark.parametrize("part", ["stamp", "q", "qd", "q_commanded", "qd_commanded"])
-def test_no_controller_starts_from_what_is_no_number(part: str, value: float):
-    arm = course(SHORT, READY, np.zeros(N))
-    robot: RobotState = arm.robot()
-    wrong = value if part == "stamp" else np.full(N, value)
-    with pytest.raises(ValueError, match="cannot start"):
-        arm.controller.init(replace(robot, **{part: wrong}))

@@ -12,7 +12,6 @@ from numpy.testing import assert_array_equal
 
 from pretouch.contact.residual_model import kept
 from pretouch.errors import ParameterError, RobotModelError
-from pretouch.loop import Cycle
 from pretouch.profiles import PROFILES
 from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify
@@ -22,7 +21,6 @@ from pretouch.robot.model import RobotModel
 from pretouch.robot.residual_file import Residual, save_residual
 from pretouch.sensing.skin import paper_skin as skin_of_arm
 from pretouch.session.free_motion import FreeMotion, ModelFile, model_file_of
-from pretouch.types import Inputs
 from tests.following_arm import Arm
 
 PROFILE = PROFILES["pretouch"]
@@ -44,14 +42,11 @@ def turned(arm, free, steps, recording=None, drift=0.0):
     arm.state = arm.controller.init(arm.robot(), free.begin)
     residuals, arm.evidence = [], []
     for _ in range(steps):
-        before, robot = arm.state, arm.robot()
-        inputs = Inputs(arm.time, replace(robot, tau_ext=robot.tau_ext + OFFSET + drift), arm.readings())
-        step, arm.state = arm.controller.step(before, inputs)
-        arm.qd, arm.q, arm.time = step.command, arm.q + step.command * 0.01, arm.time + 0.01
+        cycle = arm.turn(change=lambda robot: replace(robot, tau_ext=robot.tau_ext + OFFSET + drift))
         for one in (free, recording) if recording else (free,):
-            one.record(Cycle(inputs, before, step, arm.state))
-        residuals.append(np.linalg.norm(step.residual))
-        arm.evidence.append(step.evidence)
+            one.record(cycle)
+        residuals.append(np.linalg.norm(cycle.step.residual))
+        arm.evidence.append(cycle.step.evidence)
     return np.array(residuals)
 
 

@@ -5,11 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pretouch.loop import Cycle
 from pretouch.profiles import PROFILES
 from pretouch.sensing.skin import Skin
 from pretouch.session.progress import ProgressReporter, RunSummary
-from pretouch.types import Contact, Inputs, Mode
+from pretouch.types import Contact, Mode
 from tests.following_arm import Arm
 
 
@@ -29,10 +28,7 @@ def watched(panda_model, paper_skin):
 
     def turn(cycles, **given):
         for _ in range(cycles):
-            before, robot = arm.state, arm.robot()
-            step = arm.step(**given)
-            inputs = Inputs(step.stamp, robot, arm.readings())
-            reporter.record(Cycle(inputs, before, step, arm.state))
+            reporter.record(arm.turn(**given))
 
     return reporter, told, sink, turn
 
@@ -88,8 +84,7 @@ def test_where_nothing_can_see_it_is_not_said_that_nothing_is_seen(panda_model, 
     arm, sentences = Arm(panda_model, skin, PROFILES["paper" if without == "units" else "blind"]), []
     reporter = ProgressReporter(Sink(), sentences.append, "", arm.controller)
     for _ in range(120):
-        before, robot = arm.state, arm.robot()
-        reporter.record(Cycle(Inputs(arm.time, robot, arm.readings()), before, arm.step(), arm.state))
+        reporter.record(arm.turn())
     assert sentences[-1].endswith(": no sensor unit is in use.")
 
 
