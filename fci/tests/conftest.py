@@ -28,7 +28,7 @@ from pretouch.sim.scene import SceneSpec
 from pretouch_fci.arm import ArmSetup, ServedArm
 from pretouch_fci.options import ServeOptions
 from pretouch_fci.server import FciServer
-from pretouch_fci.wire import CONNECT, HEADER, PROTOCOLS, Protocol, RobotKind
+from pretouch_fci.wire import CONNECT, ERRORS, HEADER, PROTOCOLS, Protocol, RobotKind
 
 _VENDOR = Path(__file__).with_name("vendor_client.py")
 _NUMBERS = itertools.count(1)
@@ -188,6 +188,11 @@ class RawClient:
                 raise ConnectionError("closed")
             data += part
         return data
+
+
+def errors_of(state: np.void, field: str = "errors") -> list[str]:
+    """Names of the errors that a state tells."""
+    return [name for name, flag in zip(ERRORS, state[field], strict=True) if flag]
 
 
 @pytest.fixture

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from fci.tests.conftest import errors_of
 
 from pretouch.control.commander import rotation_about
 from pretouch.robot.description import fr3, panda
@@ -13,7 +14,7 @@ from pretouch_fci.frames import frames_of
 from pretouch_fci.limits import motion_limits
 from pretouch_fci.motion import Ending, Motion, Setpoint
 from pretouch_fci.options import Drop
-from pretouch_fci.wire import ERRORS, Controller, RobotKind
+from pretouch_fci.wire import Controller, RobotKind
 
 _MS = 1e-3
 _MOVE = 2
@@ -22,10 +23,6 @@ _PREFIX = "cartesian_motion_generator"
 _START = "cartesian_position_motion_generator_start_pose_invalid"
 _UP = np.eye(6)[2]
 _ZERO = np.zeros(7)
-
-
-def _errors(state: np.void) -> list[str]:
-    return [name for name, flag in zip(ERRORS, state["errors"], strict=True) if flag]
 
 
 def _begun(client: Any, generator: int) -> np.void:
@@ -51,7 +48,7 @@ def test_velocities_lead_the_end_effector_and_are_told(serve: Any, raw: Any, kin
     for k in range(1, 1001):
         velocity = 0.1 * (1 - np.cos(2 * np.pi * k / 1000)) * np.array([0, 1, 0, 2, 0, 0])
         state = client.turn(state, velocity, field="O_dP_EE_c")
-        assert state["robot_mode"] == _MOVE, _errors(state)
+        assert state["robot_mode"] == _MOVE, errors_of(state)
         np.testing.assert_allclose(state["O_dP_EE_c"], velocity, atol=1e-6)
     assert state["motion_generator_mode"] == _VELOCITY + 1
     client.turn(state, np.zeros(6), finished=True, field="O_dP_EE_c")
@@ -71,7 +68,7 @@ def test_poses_lead_the_end_effector_though_commands_are_lost(serve: Any, raw: A
         T[2, 3] += 0.1 * _share(k, 2000)
         T[:3, :3] = rotation_about(np.eye(3)[2], 0.3 * _share(k, 2000)) @ begin[:3, :3]
         state = client.turn(state, _columns(T), field="O_T_EE_c")
-        assert state["robot_mode"] == _MOVE, _errors(state)
+        assert state["robot_mode"] == _MOVE, errors_of(state)
     np.testing.assert_allclose(_pose(state), T, atol=1e-5)
     assert state["control_command_success_rate"] == pytest.approx(0.96)
     for _ in range(3):  # the first two are lost
@@ -86,12 +83,12 @@ def test_the_elbow_moves_while_the_end_effector_stays(serve: Any, raw: Any, kind
     for k in range(1, 1001):
         elbow[0] = begun["elbow_d"][0] + 0.2 * _share(k, 1000)
         state = client.turn(state, _columns(T), field="O_T_EE_c", elbow=elbow)
-        assert state["robot_mode"] == _MOVE, _errors(state)
+        assert state["robot_mode"] == _MOVE, errors_of(state)
     assert state["q_d"][2] - begun["q_d"][2] == pytest.approx(0.2, abs=1e-5)
     np.testing.assert_allclose(_pose(state), T, atol=1e-6)
     # bent to the other side
     state = client.turn(state, _columns(T), field="O_T_EE_c", elbow=elbow * [1, -1])
-    assert _errors(state) == [f"{_PREFIX}_elbow_sign_inconsistent"]
+    assert errors_of(state) == [f"{_PREFIX}_elbow_sign_inconsistent"]
 
 
 @pytest.mark.parametrize(("by", "sign"), [(0.5, 1), (0.0, -1)])
@@ -99,7 +96,7 @@ def test_the_first_elbow_must_be_the_arms(serve: Any, raw: Any, kind: RobotKind,
     client = raw(serve(kind))
     state = _begun(client, _VELOCITY)
     elbow = (state["elbow_d"] + [by, 0]) * [1, sign]
-    assert _errors(client.turn(state, np.zeros(6), field="O_dP_EE_c", elbow=elbow)) == [
+    assert errors_of(client.turn(state, np.zeros(6), field="O_dP_EE_c", elbow=elbow)) == [
         f"{_PREFIX}_start_elbow_invalid"
     ]
 
@@ -112,7 +109,7 @@ def test_an_fr3_may_begin_with_the_pose_it_measurably_has(serve: Any, raw: Any, 
     first, angle = state["O_T_EE"].astype(np.float64), state["elbow"].astype(np.float64) if elbow else None
     for _ in range(3):
         state = client.turn(state, first, field="O_T_EE_c", elbow=angle)
-        assert state["robot_mode"] == _MOVE, _errors(state)
+        assert state["robot_mode"] == _MOVE, errors_of(state)
     np.testing.assert_allclose(state["O_T_EE_c"], first, atol=1e-6)
     if elbow:
         assert state["q_d"][2] == pytest.approx(angle[0], abs=1e-6)
@@ -126,11 +123,11 @@ def test_the_first_pose_must_be_where_the_arm_is(serve: Any, raw: Any, kind: Rob
     turned = T.copy()
     turned[:3, :3] = rotation_about(np.eye(3)[0], off) @ T[:3, :3]
     T[0, 3] += off
-    assert _errors(client.turn(state, _columns(T), field="O_T_EE_c")) == [_START]
+    assert errors_of(client.turn(state, _columns(T), field="O_T_EE_c")) == [_START]
     assert client.ended() == "reflex"
     assert client.request("AutomaticErrorRecovery") == b"\0"
     state = _begun(client, _POSE)
-    assert _errors(client.turn(state, _columns(turned), field="O_T_EE_c")) == [_START]
+    assert errors_of(client.turn(state, _columns(turned), field="O_T_EE_c")) == [_START]
 
 
 def test_half_a_turn_is_a_start_elsewhere_too(serve: Any, raw: Any) -> None:
@@ -138,14 +135,14 @@ def test_half_a_turn_is_a_start_elsewhere_too(serve: Any, raw: Any) -> None:
     state = _begun(client, _POSE)
     T = _pose(state)
     T[:3, :3] = np.diag([1.0, -1.0, -1.0]) @ T[:3, :3]
-    assert _errors(client.turn(state, _columns(T), field="O_T_EE_c")) == [_START]
+    assert errors_of(client.turn(state, _columns(T), field="O_T_EE_c")) == [_START]
 
 
 @pytest.mark.parametrize("bad", [np.full(16, np.nan), np.zeros(16), 2 * np.eye(4).ravel(), np.full(16, 1e300)])
 def test_what_is_no_pose_has_its_name(serve: Any, raw: Any, bad: np.ndarray) -> None:
     client = raw(serve())
     state = client.turn(_begun(client, _POSE), bad, field="O_T_EE_c")
-    assert _errors(state) == ["cartesian_position_motion_generator_invalid_frame"]
+    assert errors_of(state) == ["cartesian_position_motion_generator_invalid_frame"]
     assert np.all(np.isfinite(state["dq_d"]))
 
 
@@ -153,7 +150,7 @@ def test_what_is_no_pose_has_its_name(serve: Any, raw: Any, bad: np.ndarray) -> 
 def test_velocities_that_are_none_end_the_motion(serve: Any, raw: Any, bad: float) -> None:
     client = raw(serve())
     state = client.turn(_begun(client, _VELOCITY), np.full(6, bad), field="O_dP_EE_c")
-    assert f"{_PREFIX}_velocity_limits_violation" in _errors(state)
+    assert f"{_PREFIX}_velocity_limits_violation" in errors_of(state)
     assert np.all(np.isfinite(state["dq_d"]))
 
 
@@ -162,10 +159,10 @@ def test_a_motion_of_the_end_effector_may_not_end_while_it_moves(serve: Any, raw
     state = _begun(client, _VELOCITY)
     for k in range(1, 101):
         state = client.turn(state, 1e-3 * k * _UP, field="O_dP_EE_c")
-        assert state["robot_mode"] == _MOVE, _errors(state)
+        assert state["robot_mode"] == _MOVE, errors_of(state)
     state = client.turn(state, 0.1 * _UP, finished=True, field="O_dP_EE_c")
     assert client.ended() == "reflex"
-    assert _errors(state) == [f"{_PREFIX}_velocity_discontinuity"]
+    assert errors_of(state) == [f"{_PREFIX}_velocity_discontinuity"]
 
 
 def test_no_motion_of_the_end_effector_begins_at_a_singularity(serve: Any, raw: Any, kind: RobotKind) -> None:

@@ -103,8 +103,12 @@ def test_what_cannot_be_served_is_said_in_a_sentence(
     assert words in capsys.readouterr().err
 
 
-def test_a_person_types_pushes() -> None:
-    arm = ServedArm(ArmSetup(RobotModel(panda()), "panda", panda().q_ready, SceneSpec()))
+@pytest.fixture
+def arm() -> ServedArm:
+    return ServedArm(ArmSetup(RobotModel(panda()), "panda", panda().q_ready, SceneSpec()))
+
+
+def test_a_person_types_pushes(arm: ServedArm) -> None:
     ours, theirs = os.openpty()
     with os.fdopen(theirs) as terminal:
         typed = TypedPushes(arm, terminal)
@@ -136,9 +140,8 @@ def test_a_program_types_in_place_of_a_person_and_ends_the_server_by_ending(tmp_
 
 
 @pytest.fixture
-def swinging() -> ServedArm:
+def swinging(arm: ServedArm) -> ServedArm:
     """An arm just after a motion."""
-    arm = ServedArm(ArmSetup(RobotModel(panda()), "panda", panda().q_ready, SceneSpec()))
     arm.begin(Generator.JOINT_VELOCITY, Controller.JOINT_IMPEDANCE)
     arm.step(Setpoint(np.zeros(7)))
     arm.step(Setpoint(np.zeros(7), finished=True))
@@ -185,8 +188,7 @@ def test_all_that_was_typed_before_the_end_of_a_pipe_is_done(
 
 
 @pytest.mark.parametrize("lockstep", [False, True])
-def test_an_arm_that_is_led_by_hand_hears_what_is_typed_but_in_lockstep(lockstep: bool) -> None:
-    arm = ServedArm(ArmSetup(RobotModel(panda()), "panda", panda().q_ready, SceneSpec()))
+def test_an_arm_that_is_led_by_hand_hears_what_is_typed_but_in_lockstep(arm: ServedArm, lockstep: bool) -> None:
     ours, theirs = os.pipe()
     with os.fdopen(ours) as read, os.fdopen(theirs, "wb", buffering=0) as written:
         typed = TypedPushes(arm, read, program=True, lockstep=lockstep)
@@ -204,8 +206,7 @@ def test_an_arm_that_is_led_by_hand_hears_what_is_typed_but_in_lockstep(lockstep
         assert arm.mode is RobotMode.IDLE
 
 
-def test_a_line_without_an_end_is_not_kept_whole(capsys: pytest.CaptureFixture[str]) -> None:
-    arm = ServedArm(ArmSetup(RobotModel(panda()), "panda", panda().q_ready, SceneSpec()))
+def test_a_line_without_an_end_is_not_kept_whole(arm: ServedArm, capsys: pytest.CaptureFixture[str]) -> None:
     ours, theirs = os.pipe()
     with os.fdopen(ours) as read, os.fdopen(theirs, "wb", buffering=0) as written:
         typed = TypedPushes(arm, read, program=True)
@@ -228,8 +229,9 @@ def test_in_lockstep_a_lasting_push_of_a_guided_arm_does_not_keep_the_server_fro
     assert done.returncode == 0
 
 
-def test_a_push_that_is_over_is_said_with_what_the_arm_measured_of_it(capsys: pytest.CaptureFixture[str]) -> None:
-    arm = ServedArm(ArmSetup(RobotModel(panda()), "panda", panda().q_ready, SceneSpec()))
+def test_a_push_that_is_over_is_said_with_what_the_arm_measured_of_it(
+    arm: ServedArm, capsys: pytest.CaptureFixture[str]
+) -> None:
     ours, theirs = os.openpty()
     with os.fdopen(theirs) as terminal:
         typed = TypedPushes(arm, terminal)
@@ -244,8 +246,7 @@ def test_a_push_that_is_over_is_said_with_what_the_arm_measured_of_it(capsys: py
     assert 15.0 < float(found[1]) < 30.0
 
 
-def test_what_is_typed_and_is_no_push_is_said(capsys: pytest.CaptureFixture[str]) -> None:
-    arm = ServedArm(ArmSetup(RobotModel(panda()), "panda", panda().q_ready, SceneSpec()))
+def test_what_is_typed_and_is_no_push_is_said(arm: ServedArm, capsys: pytest.CaptureFixture[str]) -> None:
     ours, theirs = os.openpty()
     with os.fdopen(theirs) as terminal:
         typed = TypedPushes(arm, terminal)
@@ -257,8 +258,7 @@ def test_what_is_typed_and_is_no_push_is_said(capsys: pytest.CaptureFixture[str]
     os.close(ours)
 
 
-def test_nobody_types_where_there_is_no_terminal(tmp_path: Path) -> None:
-    arm = ServedArm(ArmSetup(RobotModel(panda()), "panda", panda().q_ready, SceneSpec()))
+def test_nobody_types_where_there_is_no_terminal(arm: ServedArm, tmp_path: Path) -> None:
     (tmp_path / "typed").write_text("+y\n")
     with (tmp_path / "typed").open() as file:
         typed = TypedPushes(arm, file)

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from fci.tests.conftest import errors_of
 
 from pretouch.robot.description import fr3, panda
 from pretouch.robot.model import RobotModel
@@ -12,17 +13,13 @@ from pretouch_fci.kinds import JointPosition
 from pretouch_fci.limits import MotionLimits, motion_limits
 from pretouch_fci.motion import Ending, Motion, Setpoint
 from pretouch_fci.options import Drop
-from pretouch_fci.wire import ERRORS, Controller, RobotKind
+from pretouch_fci.wire import Controller, RobotKind
 
 _MODELS = {"panda": RobotModel(panda()), "fr3": RobotModel(fr3())}
 _READY = panda().q_ready
 _MS = 1e-3
 _REFLEX, _MOVE = 4, 2
 _START = "joint_position_motion_generator_start_pose_invalid"
-
-
-def _errors(state: np.void) -> list[str]:
-    return [name for name, flag in zip(ERRORS, state["errors"], strict=True) if flag]
 
 
 def _begun(client: Any) -> np.void:
@@ -38,7 +35,7 @@ def _moved(client: Any, by: float, milliseconds: int) -> np.void:
         share = k / milliseconds
         q = start + joints * by * (share - np.sin(2 * np.pi * share) / (2 * np.pi))
         state = client.turn(state, q, field="q_c")
-        assert state["robot_mode"] == _MOVE, _errors(state)
+        assert state["robot_mode"] == _MOVE, errors_of(state)
         np.testing.assert_allclose(state["q_d"], q, atol=1e-6)
     return client.turn(state, q, finished=True, field="q_c")
 
@@ -62,7 +59,7 @@ def test_lost_commands_are_bridged(serve: Any, raw: Any, kind: RobotKind) -> Non
         share = k / 2000
         q = start + 0.1 * (share - np.sin(2 * np.pi * share) / (2 * np.pi))
         state = client.turn(state, q, field="q_c")
-        assert state["robot_mode"] == _MOVE, _errors(state)
+        assert state["robot_mode"] == _MOVE, errors_of(state)
     np.testing.assert_allclose(state["q_d"], q, atol=1e-5)
     assert state["control_command_success_rate"] == pytest.approx(0.96)
 
@@ -73,7 +70,7 @@ def test_the_first_position_must_be_where_the_arm_is(serve: Any, raw: Any, kind:
     state = _begun(client)
     after = client.turn(state, state["q_d"] + off, field="q_c")
     assert client.ended() == "reflex"
-    assert _errors(after) == [_START]
+    assert errors_of(after) == [_START]
     np.testing.assert_array_equal(after["q_d"], state["q_d"])
 
 
@@ -83,7 +80,7 @@ def test_a_panda_begins_where_it_is_commanded_to_be_and_not_where_it_is(serve: A
     client = raw(serve("panda"))
     state = _begun(client)
     first = state["q_d"] + off if off else state["q"]
-    assert _errors(client.turn(state, first, field="q_c")) == [_START]
+    assert errors_of(client.turn(state, first, field="q_c")) == [_START]
 
 
 def test_an_fr3_may_begin_where_it_measurably_is(serve: Any, raw: Any) -> None:
@@ -97,7 +94,7 @@ def test_an_fr3_may_begin_where_it_measurably_is(serve: Any, raw: Any) -> None:
     for k in range(1, 51):
         q = q + 1e-3 * k * _MS * np.eye(7)[6]
         state = client.turn(state, q, field="q_c")
-        assert state["robot_mode"] == _MOVE, _errors(state)
+        assert state["robot_mode"] == _MOVE, errors_of(state)
 
 
 def test_a_step_of_the_positions_is_a_discontinuity(serve: Any, raw: Any, kind: RobotKind) -> None:
@@ -107,7 +104,7 @@ def test_a_step_of_the_positions_is_a_discontinuity(serve: Any, raw: Any, kind: 
     state = client.turn(state, start, field="q_c")
     state = client.turn(state, start + 0.1 * np.eye(7)[0], field="q_c")
     assert client.ended() == "reflex"
-    assert "joint_motion_generator_velocity_discontinuity" in _errors(state)
+    assert "joint_motion_generator_velocity_discontinuity" in errors_of(state)
     np.testing.assert_allclose(state["q_d"], start, atol=1e-6)
 
 
@@ -120,7 +117,7 @@ def test_a_motion_through_positions_may_not_end_while_it_moves(serve: Any, raw: 
         state = client.turn(state, q, field="q_c")
     state = client.turn(state, q, finished=True, field="q_c")
     assert client.ended() == "reflex"
-    assert _errors(state) == ["joint_motion_generator_velocity_discontinuity"]
+    assert errors_of(state) == ["joint_motion_generator_velocity_discontinuity"]
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, 1e308])
@@ -130,7 +127,7 @@ def test_positions_that_are_none_end_the_motion(serve: Any, raw: Any, bad: float
     state = client.turn(state, state["q_d"], field="q_c")
     state = client.turn(state, np.full(7, bad), field="q_c")
     assert client.ended() in ("input error", "reflex")
-    assert "joint_motion_generator_position_limits_violation" in _errors(state)
+    assert "joint_motion_generator_position_limits_violation" in errors_of(state)
     assert np.all(np.isfinite(state["q_d"]))
 
 

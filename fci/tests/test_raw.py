@@ -7,16 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from fci.tests.conftest import errors_of
 
 from pretouch_fci.options import Drop
 from pretouch_fci.wire import ERRORS, HEADER, PROTOCOLS, RobotKind
 
 _REFLEX, _IDLE, _MOVE = 4, 1, 2
 _STILL = np.zeros(7)
-
-
-def _errors(state: np.void, field: str = "errors") -> list[str]:
-    return [name for name, flag in zip(ERRORS, state[field], strict=True) if flag]
 
 
 def _sped_up(client: Any, speed: float) -> np.void:
@@ -125,7 +122,7 @@ def test_numbers_that_are_none_end_the_motion(serve: Any, raw: Any, bad: float) 
     state = _sped_up(client, 0.3)
     state = client.turn(state, np.full(7, bad))
     assert client.ended() in ("input error", "reflex")
-    assert "joint_motion_generator_velocity_limits_violation" in _errors(state)
+    assert "joint_motion_generator_velocity_limits_violation" in errors_of(state)
     assert np.all(np.isfinite(state["dq_d"]))
     still = client.state_where(lambda s: not np.any(s["dq_d"]))
     assert still["robot_mode"] == _REFLEX
@@ -139,7 +136,7 @@ def test_a_motion_may_not_end_while_it_moves(serve: Any, raw: Any) -> None:
     state = _sped_up(client, 0.3)
     state = client.turn(state, state["dq_d"], finished=True)
     assert client.ended() == "reflex"
-    assert _errors(state) == ["joint_motion_generator_velocity_discontinuity"]
+    assert errors_of(state) == ["joint_motion_generator_velocity_discontinuity"]
 
 
 def test_a_motion_may_not_begin_with_a_step(serve: Any, raw: Any) -> None:
@@ -147,7 +144,7 @@ def test_a_motion_may_not_begin_with_a_step(serve: Any, raw: Any) -> None:
     client.begin()
     state = client.turn(client.first_of_motion(), np.full(7, 0.1))
     assert client.ended() == "reflex"
-    assert "joint_motion_generator_velocity_discontinuity" in _errors(state, "reflex_reason")
+    assert "joint_motion_generator_velocity_discontinuity" in errors_of(state, "reflex_reason")
 
 
 def test_commands_of_other_states_sizes_and_senders_are_no_commands(serve: Any, raw: Any, kind: RobotKind) -> None:
@@ -179,7 +176,7 @@ def test_twenty_lost_commands_in_a_row_end_the_motion(serve: Any, raw: Any) -> N
         state = client.turn(state, _STILL)
         rates.append(float(state["control_command_success_rate"]))
     assert client.ended() == "reflex"
-    assert _errors(state) == ["communication_constraints_violation"]
+    assert errors_of(state) == ["communication_constraints_violation"]
     assert len(rates) == 80
     assert rates[0] == 1.0
     assert rates[19] == pytest.approx(1 / 20)
@@ -192,7 +189,7 @@ def test_a_motion_without_commands_ends_in_real_time(serve: Any, raw: Any) -> No
     begun = client.first_of_motion()["message_id"]
     state = client.state_where(lambda s: s["robot_mode"] != _MOVE)
     assert client.ended() == "reflex"
-    assert _errors(state) == ["communication_constraints_violation"]
+    assert errors_of(state) == ["communication_constraints_violation"]
     assert 400 < state["message_id"] - begun <= 501
 
 

@@ -79,6 +79,7 @@ class Served:
 
     def close(self) -> None:
         self.process.send_signal(signal.SIGTERM)
+        self.process.send_signal(signal.SIGCONT)  # a test may have stopped it
         try:
             self.process.wait(20.0)
         except subprocess.TimeoutExpired:
