@@ -38,6 +38,7 @@ class Served:
                 stdin=typed,
                 stdout=log,
                 stderr=subprocess.STDOUT,
+                cwd=place,
             )
         os.close(typed)
         try:
