@@ -35,3 +35,13 @@ def test_a_new_file_has_the_usual_mode_and_an_old_one_keeps_its_own(tmp_path):
         assert stat.S_IMODE((tmp_path / "a").stat().st_mode) == 0o600
     finally:
         os.umask(before)
+
+
+def test_a_file_is_written_whole_or_not_at_all_however_long_its_name(tmp_path):
+    path = tmp_path / ("x" * 255)
+    atomic_write(path, "new")
+    assert path.read_text() == "new"
+    (tmp_path / "below").mkdir()
+    with pytest.raises(IsADirectoryError):
+        atomic_write(tmp_path / "below", "new")
+    assert {p.name for p in tmp_path.iterdir()} == {path.name, "below"}

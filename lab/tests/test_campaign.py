@@ -12,19 +12,13 @@ from pathlib import Path
 
 import pytest
 
-from pretouch.atomic_write import write_json
-from pretouch.errors import ExperimentError, ParameterError, SkinError
+from pretouch.errors import ExperimentError, SkinError
 from pretouch.sensing.skin import PAPER_SKIN
 from pretouch_lab import campaign
 from pretouch_lab.campaign import Request, play_trial, recording_file, trial_file
-from pretouch_lab.engine import Task, missing, rows_of, run_tasks
+from pretouch_lab.engine import Task, rows_of, run_tasks
 
 SMALL = Request(("static",), seeds=1, profiles=("blind",))
-
-
-def run_campaign(request, out, progress):
-    request.open(out)
-    run_tasks(request.tasks(out), out, progress)
 
 
 def finished(request, out):
@@ -52,47 +46,11 @@ def test_what_cannot_be_done_is_said_in_a_sentence(change, words):
         replace(SMALL, **change)
 
 
-def test_an_unknown_profile_is_refused():
-    with pytest.raises(ParameterError, match="'brave' is unknown: choose from paper, blind"):
-        replace(SMALL, profiles=("brave",))
-
-
-def test_a_bad_skin_is_refused_before_anything_runs(tmp_path):
-    with pytest.raises(SkinError, match=r"nowhere\.toml cannot be read"):
-        run_campaign(replace(SMALL, skin=str(tmp_path / "nowhere.toml")), tmp_path / "out", lambda *_: None)
-    assert not (tmp_path / "out").exists()
-
-
 def test_tasks_take_all_cells_seed_by_seed():
     tasks = Request(("static", "dynamic"), seeds=2).trials()
     assert len(tasks) == 2 * (8 + 2)
     assert [seed for _, seed in tasks] == [0] * 10 + [1] * 10
     assert len({trial_file(Path("x"), *task) for task in tasks}) == 20
-
-
-@pytest.mark.slow
-def test_a_run_goes_on_where_it_was(tmp_path):
-    one = replace(SMALL, seeds=1)
-    seen = []
-    one.open(tmp_path)
-    tasks = one.tasks(tmp_path)
-    assert missing(tasks) == tasks
-    run_campaign(one, tmp_path, seen.append)
-    assert sum(seen) == pytest.approx(sum(task.cost for task in tasks))
-    assert (len(seen), missing(tasks)) == (4, [])
-    rows = finished(one, tmp_path)
-    assert [row["seed"] for row in rows] == [0, 0, 0, 0]
-    files = sorted((tmp_path / "trials").glob("*.json"))
-    files[2].unlink()
-    kept = {file: file.stat().st_mtime_ns for file in files if file.exists()}
-    seen.clear()
-    assert len(missing(tasks)) == 1
-    run_campaign(one, tmp_path, seen.append)
-    assert len(seen) == 1
-    assert {file: file.stat().st_mtime_ns for file in kept} == kept
-    assert finished(one, tmp_path) == rows
-    run_campaign(one, tmp_path, seen.append)
-    assert len(seen) == 1
 
 
 @pytest.mark.parametrize("change", [{"seeds": 5}, {"stiffness": (2000.0,)}, {"restrictions": ("floor",)}])
@@ -132,20 +90,6 @@ def test_a_damaged_folder_is_named(tmp_path, content):
     (tmp_path / "run.json").write_bytes(content)
     with pytest.raises(ExperimentError, match=r"run\.json is damaged"):
         SMALL.open(tmp_path)
-
-
-@pytest.mark.parametrize("content", [b"{", b"{}", b"[]", b"\xff", b"[" * 100_000, b"", None])
-def test_a_damaged_trial_is_run_again(tmp_path, content):
-    SMALL.open(tmp_path)
-    first, *others = SMALL.tasks(tmp_path)
-    for task in others:
-        write_json(task.about, task.file)
-    if content is None:
-        first.file.mkdir()
-    else:
-        first.file.write_bytes(content)
-    assert len(finished(SMALL, tmp_path)) == 3
-    assert [task.file for task in missing(SMALL.tasks(tmp_path))] == [first.file]
 
 
 @pytest.mark.parametrize(
@@ -201,16 +145,6 @@ def test_the_trials_that_are_wanted_are_recorded(tmp_path, monkeypatch, record, 
     assert [seed for seed in (0, 1) if recording_file(tmp_path, cell, seed).exists()] == kept
     assert recording_file(tmp_path, cell, 0).read_text() == "0"
     assert len(list((tmp_path / "recordings").iterdir())) == len(kept)
-
-
-def test_a_file_is_written_whole_or_not_at_all_however_long_its_name(tmp_path):
-    path = tmp_path / ("x" * 255)
-    write_json({"a": 1}, path)
-    assert json.loads(path.read_text()) == {"a": 1}
-    (tmp_path / "below").mkdir()
-    with pytest.raises(IsADirectoryError):
-        write_json({}, tmp_path / "below")
-    assert {p.name for p in tmp_path.iterdir()} == {path.name, "below"}
 
 
 def test_a_folder_that_cannot_be_made_is_named(tmp_path):

@@ -29,10 +29,11 @@ def test_after_a_kill_only_what_is_missing_is_done_again(tmp_path):
     assert kept == {file: file.stat().st_mtime_ns for file in kept}
 
 
-def test_a_damaged_row_is_made_again(tmp_path):
+@pytest.mark.parametrize("content", [b"{", b"[]", b"\xff", b"[" * 100_000, b""])
+def test_a_damaged_row_is_made_again(tmp_path, content):
     task = tasks_in(tmp_path)[1]
     task.file.parent.mkdir()
-    task.file.write_text("{")
+    task.file.write_bytes(content)
     assert missing([task]) == [task]
     run_tasks([task], tmp_path, lambda _: None, processes=1)
     assert rows_of([task]) == [{"number": 1, "square": 1}]

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from pretouch.controller import Controller
-from pretouch.errors import ExperimentError
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import PROFILES, Profile, at_rate
 from pretouch.robot.description import fr3
@@ -15,7 +14,7 @@ from pretouch.robot.model import RobotModel
 from pretouch.types import Inputs, Mode
 from pretouch_lab.benchmarks import cycle
 from pretouch_lab.benchmarks.cycle import CycleRequest, measure
-from pretouch_lab.benchmarks.workload import LARGEST_SKIN, Workload
+from pretouch_lab.benchmarks.workload import Workload
 
 # a short window, so that the arm soon moves
 SHORT = replace(PROFILES["paper"], window=replace(PROFILES["paper"].window, samples=10))
@@ -100,21 +99,6 @@ def test_any_arm_has_one():
     assert np.isfinite(work.inputs().readings.distance).all()
 
 
-@pytest.mark.parametrize("points", [0, LARGEST_SKIN + 1])
-def test_a_number_of_points_that_cannot_be_names_the_range(panda_model: RobotModel, points: int):
-    with pytest.raises(ExperimentError, match=f"The number of points is {points}: give 1 to {LARGEST_SKIN}"):
-        Workload(panda_model, points, FAST, 0)
-
-
-def test_bad_requests_are_refused_when_made():
-    with pytest.raises(ExperimentError, match="The number of cycles is 0"):
-        CycleRequest(cycles=0)
-    with pytest.raises(ExperimentError, match="The seed is -1"):
-        CycleRequest(seed=-1)
-    with pytest.raises(ExperimentError, match="The rate is 20 Hz: give more than 20 and up to 10000 Hz"):
-        CycleRequest(rate=20.0)
-
-
 @pytest.fixture
 def short(monkeypatch: pytest.MonkeyPatch) -> None:
     def found(_name: str) -> Profile:
@@ -182,11 +166,3 @@ def test_a_spread_is_numpys():
     expected = np.percentile(values, [50, 99, 99.9, 100]) / 1000  # of nanoseconds
     np.testing.assert_allclose(list(spread.values()), expected)
     assert list(spread) == ["median_us", "p99_us", "p999_us", "max_us"]
-
-
-def test_what_stands_in_the_file_says_where_it_was_measured():
-    about = cycle.about(CycleRequest(priority=80))
-    assert about["rate_hz"] == 1000.0
-    assert about["priority"] == 80
-    assert set(about["versions"]) >= {"pretouch", "numpy", "numba"}
-    assert about["processor"]

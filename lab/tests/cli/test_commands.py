@@ -16,14 +16,10 @@ def run(capsys, *args):
 @pytest.mark.parametrize(
     ("args", "words"),
     [
-        (("reproduce", "statik"), "The experiment 'statik' is unknown"),
         (("reproduce", "static", "--profiles", "paper,brave"), "The profile 'brave' is unknown"),
-        (("reproduce", "static", "--restrictions", "firm"), "The restriction mode 'firm' is unknown"),
         (("reproduce", "static", "--stiffness", "25,soft"), "The stiffness is 'soft': give numbers in N/m"),
         (("reproduce", "static", "--profiles", "paper:react.decay=3"), "The parameter 'react.decay' is unknown"),
-        (("reproduce", "static", "--seeds", "-1"), "The number of seeds is -1"),
         (("reproduce", "static", "--skin", "/nowhere.toml"), "/nowhere.toml cannot be read"),
-        (("reproduce", "static", "--out", "/dev/null/x"), "/dev/null/x cannot be used"),
         (("reproduce", "static", "--out", "OUT", "--json", "/dev/null/x.json"), "/dev/null/x.json cannot be written"),
         (("reproduce", "static", "--out", "OUT", "--json", "OUT"), "written (Is a directory): give another file"),
         (

@@ -4,7 +4,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.colors import to_rgb
 from PIL import Image
 
 from pretouch.errors import ExperimentError, ParameterError, PretouchError
@@ -64,19 +63,6 @@ def drawn():
 
 def line(axes, label):
     return next(found for found in axes.lines if found.get_label() == label)
-
-
-@pytest.mark.parametrize("name", ["circle", "interaction", "close-up", "force-difference"])
-def test_what_must_be_told_apart_differs_without_colour(name):
-    for axes in drawn()[name].axes:
-        looks = [
-            (str(found._dash_pattern), found.get_linestyle(), found.get_marker(),
-             round(np.mean(to_rgb(found.get_color())), 1), found.get_linewidth())
-            for found in axes.lines if not found.get_label().startswith("_")
-        ]  # fmt: skip
-        assert len(set(looks)) == len(looks)
-        shades = {(patch.get_label(), patch.get_hatch()) for patch in axes.patches if patch.get_label()}
-        assert len({hatch for _, hatch in shades}) >= min(2, len(shades))
 
 
 @pytest.mark.parametrize("name", ["circle", "interaction", "close-up", "force-difference"])
@@ -189,13 +175,6 @@ def recorded_trials(step_and_trace, monkeypatch):
     for name, experiment in EXPERIMENTS.items():
         monkeypatch.setitem(EXPERIMENTS, name, replace(experiment, trial=play))
     return asked
-
-
-@pytest.mark.usefixtures("recorded_trials")
-@pytest.mark.parametrize(("ending", "begins"), [("png", b"\x89PNG"), ("pdf", b"%PDF"), ("svg", b"<?xml")])
-def test_the_ending_says_the_format(tmp_path, ending, begins):
-    made = draw_figure("close-up", tmp_path / f"x.{ending}")
-    assert made.read_bytes().startswith(begins)
 
 
 @pytest.mark.usefixtures("recorded_trials")

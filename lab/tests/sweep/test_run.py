@@ -2,7 +2,6 @@ import csv
 import json
 
 import numpy as np
-import pytest
 from lab.tests.sweep.made import ISHIGAMI, ishigami, opened_ishigami, play, value
 
 from pretouch_lab.engine import missing
@@ -53,16 +52,6 @@ def test_cells_of_another_version_are_not_taken(tmp_path, monkeypatch):
     play(opened_ishigami(tmp_path, samples=2), tmp_path)
     monkeypatch.setattr("pretouch_lab.sweep.play.__version__", "9.9")
     assert len(missing(opened_ishigami(tmp_path, samples=2).tasks)) == 10
-
-
-@pytest.mark.parametrize("text", ["{", "[]", "{}"])
-def test_a_damaged_cell_is_played_again(tmp_path, text):
-    run = opened_ishigami(tmp_path, samples=2)
-    play(run, tmp_path)
-    run.tasks[3].file.write_text(text)
-    assert missing(run.tasks) == [run.tasks[3]]
-    play(run, tmp_path)
-    assert run.values()["value"].tolist() == known(run)
 
 
 def test_a_cell_that_fails_is_written_down_stops_no_other_and_is_tried_again(tmp_path):

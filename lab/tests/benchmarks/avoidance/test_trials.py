@@ -10,11 +10,9 @@ from pretouch.control.posture import brought_to
 from pretouch.perception.closest import closest_points
 from pretouch.profiles import profile
 from pretouch_lab.benchmarks.avoidance.obstacle import truth_of
-from pretouch_lab.benchmarks.avoidance.run import AvoidanceBench
 from pretouch_lab.benchmarks.avoidance.scenario import FAMILIES, scenarios
 from pretouch_lab.benchmarks.avoidance.setting import setting
 from pretouch_lab.benchmarks.avoidance.trial import play_trial
-from pretouch_lab.engine import missing
 from pretouch_lab.trial import Record
 
 QUICK = [next(s for s in scenarios().values() if s.family == f and s.quick) for f in FAMILIES]
@@ -52,20 +50,3 @@ def test_the_published_methods_move_out_of_the_way(baseline):
     row = play_trial(scenarios()["drdo"], baseline, 1000)
     assert row["off_path_max_m"] > 0.05
     assert row["solver_failures"] == row["infeasible"] == 0
-
-
-@pytest.mark.slow
-def test_a_run_that_was_stopped_goes_on(tmp_path):
-    bench = AvoidanceBench(tmp_path, True, "development", baselines=("blind",), names=("srdo", "drdo"))
-    bench.run(lambda _: None, processes=1)
-    assert not missing(bench.every())
-    lost = bench.every()[0].file
-    kept = bench.every()[1].file.stat().st_mtime_ns
-    before = json.loads(lost.read_text())
-    lost.unlink()
-    assert [row["scenario"] for row in bench.rows()] == ["drdo"]
-    costs = []
-    bench.run(costs.append, processes=1)
-    assert len(costs) == 1
-    assert json.loads(lost.read_text()) == before
-    assert bench.every()[1].file.stat().st_mtime_ns == kept

@@ -6,7 +6,7 @@ from lab.tests.width import width
 from tests.limits import assert_within_limits
 
 from pretouch.profiles import profile
-from pretouch_lab.cell import Cell, Grid
+from pretouch_lab.cell import Cell
 from pretouch_lab.paper.claims import between
 from pretouch_lab.paper.figures.close_up import close_up_figure
 from pretouch_lab.trial import trace_of
@@ -96,11 +96,6 @@ def test_summary_and_table_count_what_the_rows_say(trials):
     assert table.rows[1][5:8] == ("2/2", "2/2", "1/2")
     assert width(table) <= 80
     assert between.summarise([]) == {"cells": []}
-
-
-def test_cells_are_all_controllers():
-    cells = between.cells(Grid(("blind", "paper")))
-    assert [(c.profile, c.where["restrictions"]) for c in cells] == list(MODES.items())
 
 
 def test_the_close_up_shows_the_touch_and_both_bounds(trials, paper_skin):
