@@ -87,9 +87,10 @@ def test_joints_are_known_by_their_names_or_numbers_whatever_stands_between(pand
     assert joint_places(PLACE, mixed, panda_model) == [7, 6, 5, 4, 3, 2, 1]
 
 
-def test_of_two_arms_the_one_of_the_models_names_is_taken(panda_model):
+@pytest.mark.parametrize("names", [PANDA, tuple(f"q{j}" for j in range(1, 8))])
+def test_of_two_arms_the_one_of_the_models_names_or_of_our_own_is_taken(panda_model, names):
     other = tuple(f"left_joint{j}" for j in range(1, 8))
-    assert joint_places(PLACE, [*other, *PANDA], panda_model) == list(range(7, 14))
+    assert joint_places(PLACE, [*other, *names], panda_model) == list(range(7, 14))
 
 
 @pytest.mark.parametrize(

@@ -1,16 +1,16 @@
 """What `pretouch detect` does: the detector of some profiles on a recording of any arm, as tables, figure and file."""
 
 from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from rich.console import Console
 
-from pretouch.cli.detect_drawing import ENDINGS, write_drawing
-from pretouch.cli.detect_torques import show_torques
-from pretouch.cli.detect_words import force_guidance, read_from, sentences
-from pretouch.cli.tables import Grid
+from pretouch.cli.detect_account import ENDINGS, Account, give
+from pretouch.cli.detect_torques import torque_account
+from pretouch.cli.detect_words import force_guidance, sentences
 from pretouch.cli.words import words
 from pretouch.cli.writing import check_writable, numbers_to
 from pretouch.contact.moving_thresholds import thresholds_of
@@ -25,6 +25,9 @@ from pretouch.profiles import Profile, at_rate
 from pretouch.profiles import profile as find_profile
 from pretouch.recording.compare import Found, matched
 from pretouch.text_table import TextTable
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 def detect(
@@ -55,29 +58,22 @@ def detect(
         FIGURES.need("A figure")
         check_writable("figure", out)
     with numbers_to(json_file) as write:
-        file, unused = open_log(place, choice), ""
-        if _by_torques(file, choice, given):
-            try:
-                recording = torque_recording(file.torques(), choice)
-            except RecordingError as error:
-                if given is not None or "force" not in file.kinds:
-                    raise
-                unused = f"Joint torques are not used: {error}"
-            else:
-                show_torques(recording, given or [_profile(name, rate) for name in ("pretouch", "paper")], out, write)
-                return
-        force = read_force(file, choice)
-        results = [detect_force(force, profile) for profile in given or [_profile("paper", rate)]]
-        notes = sentences([*force.notes, *(note for r in results for note in r.notes)])
-        notes = [*([unused] if unused else []), *notes]
-        if any(r.profile.perception is not None and thresholds_of(r.profile.detect).f_d_n for r in results):
-            notes.append("Without a skin no obstacle is known, so eq. 11 lowers no threshold.")
-        if out:
-            _draw(force, results, notes, out)
-        write(_numbers(force, results, notes))
-        _show(force, results, notes)
-        if out:
-            print(f"{'Page' if out.suffix == '.html' else 'Figure'}: {out}")
+        give(_account(open_log(place, choice), choice, given, rate), out, write)
+
+
+def _account(file: LogFile, choice: Choice, given: Sequence[Profile] | None, rate: float) -> Account:
+    unused = []
+    if _by_torques(file, choice, given):
+        try:
+            recording = torque_recording(file.torques(), choice)
+        except RecordingError as error:
+            if given is not None or "force" not in file.kinds:
+                raise
+            unused = [f"Joint torques are not used: {error}"]
+        else:
+            return torque_account(recording, given or [_profile(name, rate) for name in ("pretouch", "paper")])
+    account = _force_account(read_force(file, choice), given or [_profile("paper", rate)])
+    return replace(account, notes=[*unused, *account.notes])
 
 
 def gains_of(text: str) -> tuple[float, ...]:
@@ -103,61 +99,49 @@ def _by_torques(file: LogFile, choice: Choice, given: Sequence[Profile] | None) 
     return torques or ("q" in file.kinds and not force)
 
 
-def _draw(force: ForceRecording, results: list[ForceResult], notes: list[str], out: Path) -> None:
-    from pretouch.imported_data.figures import decisions_figure
-
-    title, (contacts, noise) = force.place.name, (_contacts(results), _noise_table(results))
-    tables = [
-        TextTable("Contacts, force on the robot [N]", tuple(contacts.header), tuple(map(tuple, contacts.rows)), "", 1),
-        TextTable("Free motion [N]", tuple(noise.header), tuple(map(tuple, noise.rows)), "", 1),
-    ]
-    said = [*map(force_guidance, results), read_from(force), *notes]
-    caption = "Force along each axis between its thresholds, and contacts."
-    write_drawing(title, said, tables, [(decisions_figure([r.decisions for r in results], title), caption)], out)
-
-
 def _profile(name: str, rate: float) -> Profile:
     return at_rate(find_profile(name), rate) if rate else find_profile(name)
 
 
-def _show(force: ForceRecording, results: list[ForceResult], notes: list[str]) -> None:
-    console = Console(highlight=False, soft_wrap=True)
-    console.print(
-        f"{force.place}: {len(force.time)} samples in {force.time[-1]:.1f} s, {force.rate:.4g} Hz, the first at"
-        f" {force.first_s:.3f} s: times below count from it.",
-        markup=False,
-    )
-    console.print(read_from(force), markup=False)
-    for note in notes:
-        console.print(note, markup=False)
-    console.print("\nContacts, force on the robot [N]", style="bold", markup=False)
-    console.print(_contacts(results))
+def _force_account(force: ForceRecording, profiles: Sequence[Profile]) -> Account:
+    """Run thresholds over a force, and give an account of what they found."""
+    results = [detect_force(force, profile) for profile in profiles]
+    notes = sentences([*force.notes, *(note for r in results for note in r.notes)])
+    if any(r.profile.perception is not None and thresholds_of(r.profile.detect).f_d_n for r in results):
+        notes.append("Without a skin no obstacle is known, so eq. 11 lowers no threshold.")
     first, *others = (r.decisions for r in results)
+    guidance = []
     for d in others:
         both, only_first, only_other = matched(first.contacts, d.contacts)
-        console.print(
+        guidance.append(
             f"{first.name} and {d.name}: {len(both)} contacts in both, {len(only_first)} only in {first.name},"
-            f" {len(only_other)} only in {d.name}.",
-            markup=False,
+            f" {len(only_other)} only in {d.name}."
         )
-    console.print("\nFree motion [N]", style="bold", markup=False)
-    console.print(_noise_table(results))
-    console.print()
-    for result in results:
-        console.print(force_guidance(result), markup=False)
+    guidance += map(force_guidance, results)
+    figures = partial(_figures, results, force.place.name)
+    tables = [_contacts(results), _free_motion(results)]
+    return Account(force, notes, tables, guidance, figures, {"profiles": [_of_profile(r) for r in results]})
 
 
-def _contacts(results: list[ForceResult]) -> Grid:
-    return contact_table([(r.decisions.name, contact) for r in results for contact in r.decisions.contacts])
+def _figures(results: list[ForceResult], title: str) -> list[tuple["Figure", str]]:
+    from pretouch.imported_data.figures import decisions_figure
+
+    caption = "Force along each axis between its thresholds, and contacts."
+    return [(decisions_figure([r.decisions for r in results], title), caption)]
 
 
-def contact_table(contacts: Sequence[tuple[str, Found]]) -> Grid:
-    """Make a table of contacts, each with who found it, in time order."""
+def _contacts(results: list[ForceResult]) -> TextTable:
     rows = []
-    for name, found in sorted(contacts, key=lambda pair: pair[1].time):
-        force = [f"{value:.1f}" for value in (*found.force, np.linalg.norm(found.force))]
-        rows.append((name, f"{found.time:.3f}", *force, axes_shown(found)))
-    return Grid(("", "time [s]", "x", "y", "z", "norm", "axes"), rows or [("none", *[""] * 6)])
+    for name, c in sorted(((r.decisions.name, c) for r in results for c in r.decisions.contacts), key=_time):
+        force = [f"{value:.1f}" for value in (*c.force, np.linalg.norm(c.force))]
+        rows.append((name, f"{c.time:.3f}", *force, axes_shown(c)))
+    header = ("profile", "time [s]", "x", "y", "z", "norm", "axes")
+    note = "Force on the robot, base frame, less its mean (eq. 12); axes whose threshold it crossed."
+    return TextTable("Contacts [N]", header, tuple(rows) or (("none", *[""] * 6),), note, 1)
+
+
+def _time(pair: tuple[str, Found]) -> float:
+    return pair[1].time
 
 
 def axes_shown(found: Found) -> str:
@@ -165,31 +149,24 @@ def axes_shown(found: Found) -> str:
     return "".join(axis for axis, crossed in zip("xyz", found.axes, strict=True) if crossed)
 
 
-def _noise_table(results: list[ForceResult]) -> Grid:
+def _free_motion(results: list[ForceResult]) -> TextTable:
     rows = []
     for s in results:
         name = f"{s.decisions.name}, {s.free:.1f} of {s.duration:.1f} s"
         for axis, *values in zip("xyz", s.mean, s.sigma, s.sigma_window, s.width, strict=True):
             rows.append((name if axis == "x" else "", axis, *(f"{value:.2f}" for value in values)))
-    return Grid(("", "along", "mean", "sigma", "sigma in window", "thresholds at +-"), rows)
+    header = ("profile", "along", "mean", "sigma", "sigma in window", "thresholds at +-")
+    return TextTable("Free motion [N]", header, tuple(rows), "Outside contacts and reactions.")
 
 
-def _numbers(force: ForceRecording, results: list[ForceResult], notes: list[str]) -> dict[str, Any]:
+def _of_profile(r: ForceResult) -> dict[str, Any]:
     return {
-        "recording": str(force.place), "assumed": read_from(force), "notes": notes, "samples": len(force.time),
-        "first_sample_s": force.first_s, "duration_s": force.time[-1], "rate_hz": force.rate,
-        "profiles": [
-            {
-                "profile": r.decisions.name, "control_rate_hz": 1 / r.profile.task.control_period_s,
-                "contacts": [
-                    {"time_s": c.time, "force_n": c.force, "norm_n": np.linalg.norm(c.force), "axes": axes_shown(c)}
-                    for c in r.decisions.contacts
-                ],
-                "armed_s": r.duration, "free_s": r.free, "free_mean_n": r.mean, "free_sigma_n": r.sigma,
-                "free_window_sigma_n": r.sigma_window,
-                "threshold_width_n": r.width, "f_base_no_contact_free_n": r.f_base_free,
-                "f_base_no_contact_n": r.f_base_all,
-            }
-            for r in results
+        "profile": r.decisions.name, "control_rate_hz": 1 / r.profile.task.control_period_s,
+        "contacts": [
+            {"time_s": c.time, "force_n": c.force, "norm_n": np.linalg.norm(c.force), "axes": axes_shown(c)}
+            for c in r.decisions.contacts
         ],
+        "armed_s": r.duration, "free_s": r.free, "free_mean_n": r.mean, "free_sigma_n": r.sigma,
+        "free_window_sigma_n": r.sigma_window,
+        "threshold_width_n": r.width, "f_base_no_contact_free_n": r.f_base_free, "f_base_no_contact_n": r.f_base_all,
     }  # fmt: skip

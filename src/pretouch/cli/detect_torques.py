@@ -1,15 +1,13 @@
 """`pretouch detect` on joint torques: what the profiles find, as tables, figure or page, and numbers."""
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from rich.console import Console
 
-from pretouch.cli.detect_drawing import write_drawing
-from pretouch.cli.detect_words import read_from, sentences, shown, torque_guidance
-from pretouch.cli.tables import show
+from pretouch.cli.detect_account import Account
+from pretouch.cli.detect_words import sentences, shown, torque_guidance
 from pretouch.errors import RecordingError
 from pretouch.imported_data.detect_torque import ContactEvent, ProfileResult, result_of
 from pretouch.imported_data.torques import TorqueRecording
@@ -24,10 +22,8 @@ _LONGEST = 24
 """Characters of a profile's name that a table has room for."""
 
 
-def show_torques(
-    recording: TorqueRecording, profiles: Sequence[Profile], out: Path | None, write: Callable[[Any], None]
-) -> None:
-    """Run profiles over a recording of torques, show what they found, and write figure or page and numbers."""
+def torque_account(recording: TorqueRecording, profiles: Sequence[Profile]) -> Account:
+    """Run profiles over a recording of torques, and give an account of what they found."""
     results = [result_of(recording, profile) for profile in profiles]
     if not any(r.by_torques or r.by_force for r in results):
         raise RecordingError(sentences(results[0].notes)[0])
@@ -35,26 +31,14 @@ def show_torques(
     labels = _labels(results)
     pairs = list(zip(labels, results, strict=True))
     notes += [f"{label} is {r.profile.name}." for label, r in pairs if label != r.profile.name]
-    source = read_from(recording)
-    said = [*(torque_guidance(label, r) for label, r in pairs), source, *notes]
     tables = [_contacts(labels, results), _profiles(labels, results), *_joints(recording, labels, results)]
-    if out:
-        figures = _figures(recording, labels, results)
-        write_drawing(recording.place.name, said, tables, figures, out)
-    write(_numbers(recording, results, notes))
-    console = Console(highlight=False, soft_wrap=True)
-    console.print(
-        f"{recording.place}: {len(recording.time)} samples in {recording.time[-1]:.1f} s, {recording.rate:.4g} Hz, the"
-        f" first at {recording.first_s:.3f} s: times below count from it.",
-        markup=False,
-    )
-    for sentence in [source, *notes]:
-        console.print(sentence, markup=False)
-    show(console, tables)
-    for label, r in pairs:
-        console.print(torque_guidance(label, r), markup=False)
-    if out:
-        print(f"{'Page' if out.suffix == '.html' else 'Figure'}: {out}")
+    rows = [_of_profile(r) for r in results]
+    numbers = {
+        "arm": recording.model.description.name, "joints": recording.model.joints,
+        "contacts": rows[0]["contacts"], "profiles": rows,
+    }  # fmt: skip
+    guidance = [torque_guidance(label, r) for label, r in pairs]
+    return Account(recording, notes, tables, guidance, partial(_figures, recording, labels, results), numbers)
 
 
 def _labels(results: Sequence[ProfileResult]) -> list[str]:
@@ -127,17 +111,6 @@ def _figures(
         caption = "Force at the end-effector by the torques, and thresholds."
         figures.append((decisions_figure(forces, title), caption))
     return figures
-
-
-def _numbers(recording: TorqueRecording, results: Sequence[ProfileResult], notes: list[str]) -> dict[str, Any]:
-    profiles = [_of_profile(r) for r in results]
-    return {
-        "recording": str(recording.place), "assumed": read_from(recording), "notes": notes,
-        "samples": len(recording.time),
-        "first_sample_s": recording.first_s, "duration_s": recording.time[-1], "rate_hz": recording.rate,
-        "arm": recording.model.description.name, "joints": recording.model.joints,
-        "contacts": profiles[0]["contacts"], "profiles": profiles,
-    }  # fmt: skip
 
 
 def _of_profile(r: ProfileResult) -> dict[str, Any]:

@@ -158,6 +158,8 @@ def joint_places(place: Path, names: Sequence[str], model: RobotModel) -> list[i
         if (parts := _NUMBERED.fullmatch(name)) and "finger" not in name:
             groups.setdefault((parts[1], parts[3]), {})[int(parts[2])] = i
     whole = [group for group in groups.values() if sorted(group) in (list(range(model.n)), list(range(1, model.n + 1)))]
+    if (own := groups.get(("q", ""))) in whole:  # of a table that holds other numbered joints too
+        whole = [own]
     if len(whole) != 1:
         what = f"{len(whole)} arms of" if whole else "not"
         raise RecordingError(

@@ -87,7 +87,7 @@ class Table:
             raise RecordingError(f"{place} is a table and has no topics: leave out the option that names one.")
         self._place, self._choice = place, choice
         self._parquet = _parquet(place) if place.suffix.lower() == PARQUET else None
-        self._names = renamed(place, list(self._parquet) if self._parquet else _header(place), choice.columns)
+        self._names = renamed(place, _header(place) if self._parquet is None else list(self._parquet), choice.columns)
         self._columns = _columns([name.lower() for name in self._names])
         self.kinds = frozenset(column.kind for column in self._columns.values())
 
@@ -208,7 +208,7 @@ class Table:
                 f"The times of {self._place} go from {first:.6g} to {last:.6g} s: check their unit, or cut the file."
             )
         time = round(float(seconds[0]) * 1e9) + np.round((seconds - seconds[0]) * 1e9).astype(np.int64)
-        check_steps_back(self._place, time, lambda i: f"{'row' if self._parquet else 'line'} {rows[i]}")
+        check_steps_back(self._place, time, lambda i: f"{'line' if self._parquet is None else 'row'} {rows[i]}")
         return time
 
 
