@@ -24,10 +24,10 @@ def test_numbers_figure_and_a_skin_with_more_units(tmp_path, capsys, panda_model
     assert figure.read_bytes().startswith(b"\x89PNG")
     found = json.loads(numbers.read_text())
     assert found["parameters"]["warning_m"] == pytest.approx(0.373)
-    before, after = (found["suggested"][when][-1]["ways"]["share"] for when in ("before", "after"))
+    before, after = (found["suggested"][when][-1]["ways"] for when in ("before", "after"))
     assert after > before
     assert found["links"][-1]["link"] == "whole arm"
-    met = [found["suggested"][when][-1]["met"]["share"] for when in ("before", "after")]
+    met = [found["suggested"][when][-1]["met"] for when in ("before", "after")]
     assert met[1] > met[0] > 0
     areas = [spot["area_m2"] for spot in found["blind_spots"]]
     assert areas == sorted(areas, reverse=True)

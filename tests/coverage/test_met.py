@@ -75,7 +75,7 @@ def test_a_unit_at_the_hands_side_sees_what_that_side_meets(panda_model, surface
     skin = Skin([SensorUnit("side", "panda_hand", T, sensor=VL53L7CX())], panda_model)
     R = panda_model.kinematics(panda_model.description.q_ready).rotation[panda_model.link_index("panda_hand")]
     met = ways_met(panda_model, ROOM, PARAMS, surface, ready(panda_model), ahead * R[None, :, 1])
-    links = {one.name: one.ways.value for one in covered(met, seen_by(met, skin)).links}
+    links = {one.name: one.ways for one in covered(met, seen_by(met, skin)).links}
     assert low <= links["panda_hand"] <= high
 
 
@@ -88,4 +88,4 @@ def test_a_skin_is_measured_along_its_path_or_in_any_direction(panda_model, pape
         assert np.all(np.abs(fast[:, 0]) < 0.02) == (workspace == "circle"), "the circle lies across x"
         (one, _), (other, _) = (coverage_of(found, paper_skin) for found in (met, setting.met()))
         assert one.links == other.links
-        assert 0.0 < one.arm.ways.value < 0.6
+        assert 0.0 < one.arm.ways < 0.6

@@ -46,7 +46,7 @@ def test_gains_fall_and_add_up_to_what_the_larger_skin_sees(made, panda_model, p
     assert gains[-1] > 0
     assert sum(gains) <= found.most
     more = Skin((*paper_skin.units, *found.units), panda_model)
-    before, after = (covered(made, seen_by(made, worn)).arm.ways.value for worn in (paper_skin, more))
+    before, after = (covered(made, seen_by(made, worn)).arm.ways for worn in (paper_skin, more))
     assert after - before == pytest.approx(sum(gains), rel=1e-6)
 
 
@@ -56,7 +56,7 @@ def test_what_comes_and_what_is_met_count_the_same(made, panda_model, paper_skin
     found = suggest((made, met), paper_skin, 3)
     more = Skin((*paper_skin.units, *found.units), panda_model)
     rise = [
-        covered(some, seen_by(some, more)).arm.ways.value - covered(some, seen_by(some, paper_skin)).arm.ways.value
+        covered(some, seen_by(some, more)).arm.ways - covered(some, seen_by(some, paper_skin)).arm.ways
         for some in (made, met)
     ]
     assert sum(one.gain for one in found.chosen) == pytest.approx(sum(rise) / 2, rel=1e-6)

@@ -63,5 +63,5 @@ def test_the_same_seed_gives_the_same_numbers_and_the_figure_can_be_drawn(panda_
     fresh, _ = coverage_of(ways, paper_skin)
     assert fresh.arm.ways != one.arm.ways
     figure = coverage_figure(ways, fresh, paper_skin, frozenset({"hand_left"}))
-    assert f"{100 * fresh.arm.ways.value:.0f} % of the paths" in figure.get_suptitle()
+    assert f"{100 * fresh.arm.ways:.0f} % of the paths" in figure.get_suptitle()
     assert len(figure.axes) == 4

@@ -11,7 +11,7 @@ from pretouch.cli.skin_coverage_tables import link_table, spot_lines, suggestion
 from pretouch.cli.tables import show
 from pretouch.cli.writing import STANDARD_OUTPUT, check_writable, numbers_to, unwritable_said
 from pretouch.coverage.blind import BlindSpot, blind_spots
-from pretouch.coverage.measure import Coverage, Share, covered
+from pretouch.coverage.measure import Coverage, covered
 from pretouch.coverage.measuring import Both, Setting, coverage_of
 from pretouch.coverage.params import CoverageParams
 from pretouch.coverage.suggest import Suggestions, candidates, suggest
@@ -171,15 +171,11 @@ def _numbers(command: "Asked", setting: Setting, both: Both, spots: tuple[BlindS
 
 def _links(both: Both) -> list[dict[str, Any]]:
     found, met = both
-    meets = {one.name: _share(one.ways) for one in (*met.links, met.arm)}
+    meets = {one.name: one.ways for one in (*met.links, met.arm)}
     return [
         {
-            "link": one.name, "area_m2": one.area_m2, "ways": _share(one.ways), "surface": _share(one.surface),
+            "link": one.name, "area_m2": one.area_m2, "ways": one.ways, "surface": one.surface,
             "met": meets.get(one.name),
         }
         for one in (*found.links, found.arm)
     ]  # fmt: skip
-
-
-def _share(share: Share) -> dict[str, float]:
-    return {"share": share.value, "low": share.low, "high": share.high}

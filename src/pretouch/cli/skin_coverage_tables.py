@@ -3,7 +3,6 @@
 import numpy as np
 
 from pretouch.coverage.blind import BLIND, BlindSpot
-from pretouch.coverage.measure import Share
 from pretouch.coverage.measuring import Both, Setting
 from pretouch.coverage.suggest import Suggestions
 from pretouch.coverage.ways import Ways
@@ -19,12 +18,9 @@ def link_table(both: Both, setting: Setting) -> TextTable:
     columns = (
         ("link", lambda one: one.name),
         ("area\n[cm^2]", lambda one: f"{1e4 * one.area_m2:.0f}"),
-        ("ways\n[%]", lambda one: f"{100 * one.ways.value:.1f}"),
-        ("95 %", lambda one: _bounds(one.ways)),
-        ("surface\n[%]", lambda one: f"{100 * one.surface.value:.1f}"),
-        ("95 %", lambda one: _bounds(one.surface)),
-        ("met\n[%]", lambda one: f"{100 * meets[one.name].value:.1f}" if one.name in meets else "-"),
-        ("95 %", lambda one: _bounds(meets[one.name]) if one.name in meets else "-"),
+        ("ways\n[%]", lambda one: _percent(one.ways)),
+        ("surface\n[%]", lambda one: _percent(one.surface)),
+        ("met\n[%]", lambda one: _percent(meets[one.name]) if one.name in meets else "-"),
     )
     return tabulated(
         f"Seen in time: {setting.model.description.name}, {setting.postures} postures of {setting.workspace}",
@@ -59,7 +55,7 @@ def unit_table(skin: Skin, ways: Ways, sees: BoolArray) -> TextTable:
 
 def suggestion_table(suggested: Suggestions, before: Both, after: Both) -> TextTable:
     """Show the places of the new units, and what they change."""
-    was, now = ([_said(one.arm.ways) for one in both] for both in (before, after))
+    was, now = ([f"{_percent(one.arm.ways)} %" for one in both] for both in (before, after))
     columns = (
         ("unit", lambda one: one.unit.id),
         ("sensor", lambda one: one.unit.sensor.label),
@@ -88,12 +84,8 @@ def spot_lines(spots: tuple[BlindSpot, ...], most: int) -> list[str]:
     return said + ([f"  and {len(spots) - most} smaller ones"] if len(spots) > most else [])
 
 
-def _bounds(share: Share) -> str:
-    return f"{100 * share.low:.0f}-{100 * share.high:.0f}"
-
-
-def _said(share: Share) -> str:
-    return f"{100 * share.value:.1f} % ({100 * share.low:.1f}-{100 * share.high:.1f})"
+def _percent(share: float) -> str:
+    return f"{100 * share:.1f}"
 
 
 def _vector(values: np.ndarray, digits: int) -> str:

@@ -46,7 +46,7 @@ def coverage_figure(ways: Ways, coverage: Coverage, skin: Skin, new: frozenset[s
         axes.set_title(title, fontsize="medium")
     bar = figure.colorbar(ScalarMappable(scale, colours), ax=panels, shrink=0.8, pad=0.02)
     bar.set_label("share of the paths to it seen in time")
-    seen = 100 * coverage.arm.ways.value
+    seen = 100 * coverage.arm.ways
     figure.suptitle(
         f"{ways.model.description.name}, {len(skin.first)} units: {seen:.0f} % of the paths to its surface are seen in"
         " time (grey: the base, or no free path)",

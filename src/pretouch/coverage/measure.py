@@ -1,4 +1,4 @@
-"""Shares of ways and of surface that are seen in time, with bounds, for each link and for the arm."""
+"""Shares of ways and of surface that are seen in time, for each link and for the arm."""
 
 from dataclasses import dataclass
 
@@ -10,16 +10,6 @@ from pretouch.types import BoolArray, FloatArray
 
 COVERED = 0.5
 """Share of the ways to a surface point that has to be seen for the point to count as covered."""
-_NORMAL_95 = 1.96
-
-
-@dataclass(frozen=True)
-class Share:
-    """A share and its 95 % bounds; no numbers where nothing can come at all."""
-
-    value: float
-    low: float
-    high: float
 
 
 @dataclass(frozen=True)
@@ -29,10 +19,10 @@ class LinkShare:
     name: str
     area_m2: float
     """Outer surface that a ball can touch [m^2]."""
-    ways: Share
-    """Of the ways to it, those on which the ball is seen in time."""
-    surface: Share
-    """Of its surface, the points to which at least half of the ways are seen."""
+    ways: float
+    """Share of the ways to it on which the ball is seen in time; NaN where nothing can come at all."""
+    surface: float
+    """Share of its surface to whose points at least half of the ways are seen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,30 +64,7 @@ def _of(name: str, surface: Surface, free: FloatArray, seen: FloatArray, points:
     # each point weighs as its area: capsules' points differ a little in what they stand for
     weight = area / area.sum()
     good = s.sum(axis=0) >= COVERED * f.sum(axis=0)
-    return LinkShare(name, float(area.sum()), ratio(weight * s, weight * f), ratio((weight * good)[None], weight[None]))
-
-
-def ratio(seen: FloatArray, free: FloatArray) -> Share:
-    """Return sum(seen) / sum(free) of (S, P) with 95 % bounds, by the spread over postures and that over points, added.
-
-    The usual linearised variance of a ratio, once with postures and once with points as what was drawn: safe where
-    they vary together. Where all or none are seen nothing spreads, and the bound is that of as many trials as there are
-    points or postures, whichever are fewer (Clopper and Pearson); with one posture, of the points.
-    """
-    total = float(free.sum())
+    total = float((weight * f).sum())
     if total <= 0:
-        return Share(float("nan"), float("nan"), float("nan"))
-    value = float(seen.sum()) / total
-    rest = seen - value * free
-    variance = sum(_spread(rest.sum(axis=axis)) for axis in (0, 1)) / total**2
-    few = 1.0 - 0.025 ** (1.0 / (free.shape[1] if len(free) == 1 else min(free.shape)))
-    if value <= 0.0 or value >= 1.0 - 1e-12:
-        return Share(value, 0.0 if value <= 0.0 else 1.0 - few, few if value <= 0.0 else 1.0)
-    half = _NORMAL_95 * float(np.sqrt(variance))
-    return Share(value, max(0.0, value - half), min(1.0, value + half))
-
-
-def _spread(parts: FloatArray) -> float:
-    """Variance of a sum of independent parts (N,), by their scatter about 0."""
-    n = len(parts)
-    return float((parts**2).sum()) * (n / (n - 1) if n > 1 else 1.0)
+        return LinkShare(name, 0.0, float("nan"), float("nan"))
+    return LinkShare(name, float(area.sum()), float((weight * s).sum()) / total, float((weight * good).sum()))

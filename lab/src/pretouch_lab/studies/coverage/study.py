@@ -109,7 +109,7 @@ def _predicted(model: RobotModel, own: Skin, skin: Skin) -> float | None:
     """Share of the ways, over the whole circle, that coverage says are not seen in time."""
     ways = _prepared(model, own)[0]
     seen = seen_by(ways, skin)
-    return rounded(1.0 - covered(ways, seen).arm.ways.value)
+    return rounded(1.0 - covered(ways, seen).arm.ways)
 
 
 def results(came: list[ApproachingObstacle], record: Record, params: CoverageParams) -> Row:
