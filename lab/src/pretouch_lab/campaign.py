@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import Literal, get_args
 
 from pretouch.atomic_write import write_json
-from pretouch.coverage.placement import placement_for
 from pretouch.errors import ExperimentError, SkinError
 from pretouch.profiles import profile
 from pretouch.robot.description_file import files_digest
 from pretouch.robot.model import RobotModel
 from pretouch.robot.named import robot_named
 from pretouch.sensing.skin import skin_file, skin_for
+from pretouch.sim.placement import placement_for
 from pretouch.sim.randomisation import world_set
 from pretouch_lab.cell import Cell, Context, Grid
 from pretouch_lab.domain_randomisation import digest_of

@@ -9,13 +9,13 @@ from tests.importing import made
 from tests.limits import assert_within_limits
 
 from pretouch.control.posture import brought_to
-from pretouch.coverage.placement import placement_for
 from pretouch.errors import ExperimentError
 from pretouch.importing.folder import write_folder
 from pretouch.importing.robot_import import ImportOptions, import_robot
 from pretouch.profiles import profile
 from pretouch.robot.description import RobotDescription, panda
 from pretouch.robot.model import RobotModel
+from pretouch.sim.placement import placement_for
 from pretouch.sim.plant_params import assumed_plant
 from pretouch.sim.pushes import PALM, robot_hand
 from pretouch_lab.benchmarks.avoidance.scenario import scenarios
@@ -88,7 +88,7 @@ def test_the_rule_finds_about_the_hand_that_a_panda_has(stranger, panda_model):
     ],
 )
 def test_an_arm_that_cannot_follow_the_paths_is_refused_with_the_reason(stranger, changed, reason):
-    with pytest.raises(ExperimentError, match=r"stranger cannot follow .* of 567 sizes and places") as said:
+    with pytest.raises(ExperimentError, match=r"stranger cannot follow .* in no size from 1 to 0.4") as said:
         placement_for(RobotModel(replace(stranger, **changed)))
     assert reason in str(said.value)
     assert "Give another q_ready in robot.toml" in str(said.value)

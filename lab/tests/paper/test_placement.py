@@ -3,13 +3,13 @@ import pytest
 from tests.other_arm import copied_panda
 
 from pretouch.control.path import Circle
-from pretouch.coverage.placement import assumptions, hand_side, placement_for
 from pretouch.errors import ExperimentError
 from pretouch.robot.description import RobotDescription
 from pretouch.robot.model import RobotModel
 from pretouch.robot.named import robot_named
 from pretouch.sim.board import PANDA_SIDE, HandSide
 from pretouch.sim.paper_scenes import Placement, person_scene, static_path, static_scene
+from pretouch.sim.placement import assumptions, hand_side, placement_for
 from pretouch.sim.pushes import way_round
 from pretouch.sim.scene import HandSpec
 from pretouch_lab.campaign import Request

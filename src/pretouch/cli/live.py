@@ -33,9 +33,9 @@ def live(command: "Live") -> None:
     settings = LiveSettings(profile=profile, path=path, seed=command.seed)
 
     from pretouch.cli.warm_up import prepare
-    from pretouch.coverage.placement import assumptions
     from pretouch.robot.model import RobotModel
     from pretouch.robot.named import robot_named
+    from pretouch.sim.placement import assumptions
     from pretouch.viewer.live import serve_live
     from pretouch.viewer.simulation import LiveSimulation
 

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 from pretouch.cli.skin_keys import keys_file, keys_or_none, with_new
 from pretouch.cli.words import words
-from pretouch.coverage.placement import assumptions, placement_for
 from pretouch.hardware.keys import Keys, save_keys
 from pretouch.profiles import profile as find_profile
 from pretouch.robot.model import RobotModel
@@ -17,6 +16,7 @@ from pretouch.serving.network import ChannelParams, NetworkParams
 from pretouch.serving.simulate import run
 from pretouch.serving.simulated_arm import SimulateOptions
 from pretouch.sim.imu import ImuParams
+from pretouch.sim.placement import assumptions, placement_for
 
 if TYPE_CHECKING:
     from pretouch.cli.skin_commands import Simulate

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from pretouch.control.posture import brought_to
-from pretouch.coverage.placement import placement_for
 from pretouch.errors import ExperimentError
 from pretouch.importing.ready import ever_apart
 from pretouch.perception.scene_filter import Fixtures
@@ -13,6 +12,7 @@ from pretouch.robot.model import RobotModel
 from pretouch.robot.self_distance import capsule_ends, kinematics_of, self_distances
 from pretouch.robot.vectors import placed
 from pretouch.sim.paper_scenes import Placement
+from pretouch.sim.placement import placement_for
 from pretouch.types import FloatArray
 
 KINDS = ("circle", "line", "paths", "joints")

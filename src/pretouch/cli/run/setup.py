@@ -15,7 +15,6 @@ from pretouch.contact.sequential_test import SequentialTest
 from pretouch.control.path import Circle, Path, WayPoints, line
 from pretouch.control.posture import brought_to
 from pretouch.controller import Controller
-from pretouch.coverage.placement import assumptions, placement_for
 from pretouch.errors import HardwareError, ParameterError
 from pretouch.hardware.keys import load_keys
 from pretouch.hardware.network_skin import NetworkSkin
@@ -33,6 +32,7 @@ from pretouch.session.terminal import say
 from pretouch.session.units import Units
 from pretouch.signals import children_undisturbed
 from pretouch.sim.paper_scenes import Placement
+from pretouch.sim.placement import assumptions, placement_for
 from pretouch.sim.scene import SceneSpec
 from pretouch.types import FloatArray
 

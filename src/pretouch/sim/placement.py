@@ -1,36 +1,28 @@
 """The paper's paths and board brought into the reach of another arm than a Panda."""
 
-from collections import Counter
 from dataclasses import replace
 from functools import lru_cache
-from itertools import product
 
 import numpy as np
 
 from pretouch.control.path import Path
 from pretouch.control.posture import brought_to
-from pretouch.control.task import rotation_error
 from pretouch.errors import ExperimentError
-from pretouch.importing.reaching import Pace, reached
-from pretouch.importing.ready import ever_apart, reach_of
-from pretouch.robot.description import panda
-from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.robot.model import RobotModel
 from pretouch.robot.named import is_shipped
 from pretouch.robot.self_distance import capsule_ends, kinematics_of, pairs_apart, segment_distance, self_distances
 from pretouch.sim.board import HandSide, Side, sign_of
 from pretouch.sim.paper_scenes import Placement
 from pretouch.sim.plant_params import assumed_plant
 from pretouch.sim.scene import SceneSpec
-from pretouch.types import BoolArray, FloatArray
+from pretouch.types import FloatArray
 
 _SIDES: tuple[Side, Side] = ("+y", "-y")
-_SHRINK = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4)
-_SHIFT_M = (0.0, 0.05, -0.05, 0.1, -0.1, 0.15, -0.15, 0.2, -0.2)
-"""What is tried, the nearest to the paper first: parts of the scale by reach, shifts along x and z."""
+_SCALES = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4)
+"""What is tried, the paper's own size first."""
 _PATHS = (("circle", -1.0), ("circle", 1.0), ("line", -1.0), ("line", 1.0))
-"""What is to be followed, begun on either side: an arm may come to the other end in another posture."""
-_PLACES, _JOINTS = 48, 6
-_TO_START, _ONWARD = Pace(300, 0.1, 1e-6, 0.05), Pace(30, 0.1, 1e-6, 0.05)
+"""What is to be followed, begun on either side."""
+_PLACES, _JOINTS = 24, 6
 _SINGULAR, _LIMIT_RAD, _CLEAR_M = 0.05, 0.05, 0.01
 """What the arm has to keep all along: smallest singular value, distance from joint limits, and from itself."""
 _HELD = 0.8
@@ -43,12 +35,12 @@ _STEP_M, _STEPS = 0.005, 400
 
 @lru_cache(maxsize=1)
 def placement_for(model: RobotModel) -> Placement:
-    """Scale the paper's paths by the arm's reach, and shrink or move them as little as lets the arm follow them.
+    """Shrink the paper's paths towards the arm's base as little as lets the arm follow them.
 
     All along, hand as in the ready posture, the arm keeps away from singularities, its limits, itself and the floor,
     and its joints hold its weight. A person's hand is then held beside the circle where the whole free arm passes it
-    by as much as the Panda's hand does. Raises ExperimentError where no such place is found. The Panda and the FR3 have
-    the paper's own. The last arm's is kept: the search takes seconds.
+    by as much as the Panda's hand does. Raises ExperimentError where no such size is found. The Panda and the FR3 have
+    the paper's own. The last arm's is remembered.
     """
     if is_shipped(model.description):
         return Placement()
@@ -57,23 +49,21 @@ def placement_for(model: RobotModel) -> Placement:
             f"{model.description.name} has {model.n} joints ({', '.join(model.joints)}): to follow the paths with its"
             f" hand upright an arm needs {_JOINTS}. If its file has more, import it again with another --ee."
         )
-    by_reach = reach_of(model) / reach_of(RobotModel(panda()))
     left, right = (hand_side(model, side) for side in _SIDES)
-    shifts = sorted(product(_SHIFT_M, _SHIFT_M), key=lambda s: s[0] ** 2 + s[1] ** 2)
-    apart, refused = ever_apart(model, 2 * _CLEAR_M), Counter[str]()  # less room is the arm's make, not the posture's
-    for part, (x, z) in product(_SHRINK, shifts):
-        placement = Placement(by_reach * part, x, z, left, right)
+    reasons = dict[str, None]()
+    for scale in _SCALES:
+        placement = Placement(scale, left=left, right=right)
         try:
-            around = [_followed(model, placement.path(name, sign), apart) for name, sign in _PATHS]
+            around = [_followed(model, placement.path(name, sign)) for name, sign in _PATHS]
         except _NotFollowed as reason:
-            refused[str(reason)] += 1
+            reasons[str(reason)] = None
         else:
             return _visited(model, placement, np.concatenate(around[:2]))
-    why = ", ".join(f"{reason} ({times})" for reason, times in refused.most_common(2))
     raise ExperimentError(
-        f"{model.description.name} cannot follow the paper's paths anywhere with its hand as in q_ready: of"
-        f" {refused.total()} sizes and places, {why}. Give another q_ready in robot.toml, with the hand in front of the"
-        " base and pointing down, or correct its limits there and its capsules in arm.xml."
+        f"{model.description.name} cannot follow the paper's paths with its hand as in q_ready, in no size from"
+        f" {_SCALES[0]:g} to {_SCALES[-1]:g}: {'; '.join(reasons)}. Give another q_ready in robot.toml, with the hand"
+        " in front of the base and pointing down, correct its limits there and its capsules in arm.xml, or give a path"
+        " of your own."
     )
 
 
@@ -129,58 +119,48 @@ def hand_side(model: RobotModel, side: Side) -> HandSide:
     return HandSide(max(float(out[widest]), 0.02), float(away[widest, 2]))
 
 
+_OUT_OF_REACH = "the hand does not get everywhere without a singularity or a joint limit"
+
+
 class _NotFollowed(Exception):
     """Why an arm cannot follow a path."""
 
 
-def _followed(model: RobotModel, path: Path, apart: BoolArray) -> FloatArray:
-    """Return postures (S, n) in which an arm follows a path with its hand upright, from where experiments begin."""
-    upright = model.kinematics(model.description.q_ready).rotation[model.ee]
-    q = model.description.q_ready
-    postures: list[FloatArray] = []
-    for phase in np.linspace(0.0, path.length, _PLACES):
-        found = _at(model, q, path.point(phase), upright, _ONWARD if postures else _TO_START)
-        if found is None:
-            raise _NotFollowed("the hand does not get everywhere without a singularity or a joint limit")
-        q = found if postures else brought_to(model, path.point(phase))
-        postures.append(q)
-    _check_room(model, np.array(postures), apart)
+def _followed(model: RobotModel, path: Path) -> FloatArray:
+    """Return postures (S, n) in which an arm follows a path with its hand upright."""
+    points = [path.point(phase) for phase in np.linspace(0.0, path.length, _PLACES)]
+    try:
+        postures = np.array([brought_to(model, point) for point in points])
+    except ExperimentError as error:
+        raise _NotFollowed(_OUT_OF_REACH) from error
+    room = np.minimum(postures - model.q_min, model.q_max - postures).min()
+    singular = [np.linalg.svd(model.ee_jacobian(model.kinematics(q)), compute_uv=False)[-1] for q in postures]
+    if room <= _LIMIT_RAD or min(singular) <= _SINGULAR:
+        raise _NotFollowed(_OUT_OF_REACH)
+    _check_room(model, postures)
     _check_torques(model, postures)
-    return np.array(postures)
+    return postures
 
 
-def _check_room(model: RobotModel, postures: FloatArray, apart: BoolArray) -> None:
-    """Refuse postures (S, n) in which an arm comes near itself, of the pairs that `apart` (P,) names, or the floor."""
-    ends = capsule_ends(model, kinematics_of(model, postures))
-    between = self_distances(model, ends)[:, apart]
+def _check_room(model: RobotModel, postures: FloatArray) -> None:
+    """Refuse postures (S, n) in which an arm comes near the floor, or near itself where it does not when ready."""
+    ends = capsule_ends(model, kinematics_of(model, np.vstack([model.description.q_ready, postures])))
+    between = self_distances(model, ends)
+    between = between[1:, apart := between[0] > 2 * _CLEAR_M]
     if between.min(initial=np.inf) <= _CLEAR_M:
         nearest = pairs_apart(model)[apart][int(between.min(axis=0).argmin())]
         links = " and ".join(model.links[model.capsules.link[c]] for c in nearest)
         raise _NotFollowed(f"{links} come within {1000 * _CLEAR_M:.0f} mm of each other")
     moved = np.isin(model.capsules.link, model.body.link)
-    heights = ends[:, moved][..., 2] - model.capsules.radius[moved, None]
+    heights = ends[1:, moved][..., 2] - model.capsules.radius[moved, None]
     if heights.min(initial=np.inf) <= SceneSpec().floor_height + _CLEAR_M:
         raise _NotFollowed("the arm meets the floor")
 
 
-def _check_torques(model: RobotModel, postures: list[FloatArray]) -> None:
-    """Refuse postures that the joints can barely hold."""
+def _check_torques(model: RobotModel, postures: FloatArray) -> None:
+    """Refuse postures (S, n) that the joints can barely hold."""
     weight = [model.mass_matrix_and_bias(q, np.zeros(model.n), np.zeros(model.n))[1] for q in postures]
     part = np.abs(weight).max(axis=0) / model.description.tau_max
     weakest = int(part.argmax())
     if part[weakest] > _HELD:
         raise _NotFollowed(f"{model.joints[weakest]} needs more than {100 * _HELD:.0f} % of its torque to hold the arm")
-
-
-def _at(model: RobotModel, q: FloatArray, point: FloatArray, upright: FloatArray, pace: Pace) -> FloatArray | None:
-    """Move the hand to a point (3,), not turned; None where it does not get there or only just."""
-
-    def error(kin: Kinematics) -> FloatArray:
-        return np.concatenate([point - kin.position[model.ee], rotation_error(kin.rotation[model.ee], upright)])
-
-    found = reached(model, q, error, model.description.q_ready, pace)
-    if found is None:
-        return None
-    room = np.minimum(found - model.q_min, model.q_max - found).min()
-    singular = np.linalg.svd(model.ee_jacobian(model.kinematics(found)), compute_uv=False)[-1]
-    return found if room > _LIMIT_RAD and singular > _SINGULAR else None
