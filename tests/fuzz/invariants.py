@@ -7,7 +7,10 @@ from functools import cache
 import numpy as np
 
 from pretouch.contact.admittance import Admittance
+from pretouch.contact.moving_thresholds import MovingThresholds
+from pretouch.contact.sequential_test import SequentialTest
 from pretouch.control.approach_restriction import ApproachRestriction, notice_m
+from pretouch.control.braking_curve import BrakingCurve
 from pretouch.params import ClampParams
 from pretouch.profiles import Profile
 from pretouch.robot.description import SpeedEnvelope
@@ -81,7 +84,7 @@ def check_touched(touched: Touched) -> None:
 def check_finite(step: ControlStep, e: Expected, p: Profile) -> None:
     """Every number is finite but for what is documented to be NaN."""
     unknown = MAY_BE_NAN if e.strained else MAY_BE_NAN | {"residual", "parts"}
-    unknown = unknown | {"parts"} if p.detect.name == "fixed" else unknown
+    unknown = unknown if isinstance(p.detect, MovingThresholds | SequentialTest) else unknown | {"parts"}
     numbers = [array.ravel() for name, array in arrays_of(step) if name not in unknown]
     assert np.isfinite(np.concatenate(numbers)).all()
     assert np.isnan(step.force).all() if e.force is None else np.array_equal(step.force, e.force)
@@ -164,7 +167,7 @@ def check_braking(step: ControlStep, e: Expected, p: Profile, model: RobotModel)
 def check_rows(step: ControlStep, p: Profile, model: RobotModel) -> None:
     """Approach velocities by finite differences: no faster than eq. 7 allows and the reported slack."""
     o, which = step.obstacles, step.restricted
-    if p.approach is not None and p.approach.name in ("flacco", "ding"):
+    if p.approach is not None and not isinstance(p.approach, ApproachRestriction | BrakingCurve):
         return
     notice = o.body_distance < notice_m(p.approach)
     assert np.array_equal(which, np.flatnonzero(notice & (p.approach is not None)))

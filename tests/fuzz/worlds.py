@@ -105,7 +105,9 @@ OURS: dict[type, dict[str, tuple[object, ...]]] = {
     GiveUpParams: {"contacts": (3, 1), "push_j": (0.3, 1e-3, 50.0), "retry_s": (0.3, 30.0)},
 }  # fmt: skip
 DETECTORS = (SequentialTest, SequentialTest, MovingThresholds)
-NAMED = ("pretouch", "pretouch", "fixed", "observer", "flacco", "ding")
+NAMED = ("pretouch",)
+NAMED_SHARE = 0.15
+"""Share of profiles that are named ones as they are."""
 
 
 @dataclass(frozen=True)
@@ -138,7 +140,7 @@ def any_world(rng: np.random.Generator, model: RobotModel) -> World:
 def any_profile(rng: np.random.Generator) -> Profile:
     """Draw each parameter, mostly the usual value in a third of the profiles; a few are named ones as they are."""
     usual = 0.85 if rng.random() < 1 / 3 else 0.4
-    if rng.random() < 0.15:
+    if rng.random() < NAMED_SHARE:
         named = profile(str(rng.choice(NAMED)))
         return replace(named, window=replace(named.window, samples=5))
     ours = rng.random() < 0.6

@@ -18,10 +18,7 @@ from pretouch.types import Inputs, RangeReadings, RangeStatus
 from tests.golden.fields import Values, forgotten, values_of
 from tests.golden.script import Script
 
-PROFILES = (
-    "paper", "blind", "slowing-only", "thresholds-only", "paper-0.5m", "fixed", "observer", "pretouch", "flacco",
-    "ding",
-)  # fmt: skip
+PROFILES = ("paper", "blind", "slowing-only", "thresholds-only", "paper-0.5m", "pretouch")
 HAND, FOREARM, ELBOW = "panda_hand", "panda_link5", "panda_link4"
 START = (0.306890567, 0.0, 0.486882052)
 """Where the end-effector is in the posture READY [m]."""
@@ -261,8 +258,6 @@ _REACHED = {
     "paper": (*_SENSES, "raised thresholds", "slack"),
     "blind": ("track", "hold", "react", "contact", "reaction"),
     "pretouch": (*_OURS, "restricted"),
-    "fixed": ("track", "react"), "observer": ("track", "react"),
-    "flacco": ("track", "react"), "ding": ("track", "react", "restricted"),
 }  # fmt: skip
 
 STREAMS = {
@@ -289,6 +284,5 @@ STREAMS = {
     "touch": Stream("pretouch", touched, ("contact", "localised"), touching=True),
     "outside-points": Stream("pretouch", outside, ("restricted", "outside source")),
     **{f"fuzz/{name}": Stream(name, fuzz(7 + i), ("track", "react")) for i, name in enumerate(("paper", "pretouch"))},
-    "fuzz/ding": Stream("ding", fuzz(9), ("track",)),
 }  # fmt: skip
 """Name -> input. Names stay, and have no spaces."""

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pretouch.profiles import profile_names
+from pretouch.profiles import PROFILES
 from pretouch.types import ControlStep
 from tests.golden import streams
 from tests.golden.closed import CLOSED
@@ -34,7 +34,7 @@ def test_all_of_the_stored_values_are_compared(stored: Steps):
 
 
 def test_every_profile_has_an_input():
-    assert set(streams.PROFILES) == set(profile_names())
+    assert set(streams.PROFILES) == set(PROFILES)
     assert not any(" " in name for name in (*STREAMS, *CLOSED))
 
 
