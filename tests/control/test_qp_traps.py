@@ -1,9 +1,8 @@
-"""What the solver answers wrongly, shown on the solver itself (daqp 0.11) and shown not to get through `solve`."""
+"""What solvers answer wrongly does not get through `solve`: numbers that are none, weights, tolerance, budget."""
 
 from dataclasses import dataclass, replace
 from itertools import product
 
-import daqp
 import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
@@ -21,7 +20,6 @@ from pretouch.sensing.skin import Skin
 from pretouch.types import Inputs, Mode, QpOutcome, QpSolution, RangeReadings, RangeStatus, RobotState
 
 N = 7
-HARD, SOFT = 0, 8
 STOP = np.full(N, 0.0123)
 WEIGHT = 1000.0
 PARTS = ["H", "f", "lower", "upper", "G", "h"]
@@ -64,25 +62,6 @@ def ours(p: Problem, weight: float = WEIGHT, budget: int = 500) -> QpSolution:
     return solve(Cost(p.H, p.f), p.lower, p.upper, ApproachRows(p.G, p.h, p.soft), weight, STOP, budget)
 
 
-def raw(p: Problem, **settings: float) -> tuple[int, np.ndarray]:
-    """The solver's own answer: exit flag and x. `weight` is what soft rows weigh by `soft_weights`."""
-    weight = settings.pop("weight", None)
-    model = set_up(p)
-    model.settings = settings
-    if weight is not None:
-        model.soft_weights(*[np.full(N + len(p.h), 1.0 / weight)] * 2)
-    x, _, flag, _ = model.solve()
-    return flag, x
-
-
-def set_up(p: Problem) -> daqp.Model:
-    model = daqp.Model()
-    sense = np.r_[np.zeros(N), np.full(len(p.h), SOFT if p.soft else HARD)].astype(np.int32)
-    flag, _ = model.setup(p.H, p.f, p.G, np.r_[p.upper, p.h], np.r_[p.lower, np.full(len(p.h), -1e30)], sense)
-    assert flag > 0
-    return model
-
-
 def exact(p: Problem, weight: float) -> np.ndarray:
     """The optimum with soft rows: for each set of violated rows a bounded least-squares problem, until one agrees."""
     root = np.linalg.cholesky(p.H).T
@@ -101,31 +80,8 @@ def assert_braking(answer: QpSolution, p: Problem, outcome: QpOutcome) -> None:
     assert answer.status
     np.testing.assert_array_equal(answer.qd, STOP)
     assert len(answer.slack) == len(p.h)
-
-
-# NaN
-
-
-def test_the_solver_calls_nan_in_the_cost_a_success():
-    for part in ("H", "f"):
-        flag, x = raw(problem().spoiled(part, np.nan))
-        assert flag == 1
-        assert np.isnan(x).any()
-
-
-@pytest.mark.parametrize(("part", "at"), [("G", 0), ("h", 0)])
-def test_the_solver_drops_a_row_with_nan_in_silence(part: str, at: int):
-    flag, x = raw(problem().spoiled(part, np.nan, at))
-    assert flag == 1
-    # the row asked for x_0 <= 0.1
-    np.testing.assert_allclose(x, [0.5, 0.1, 0.5, 0.5, 0.5, 0.5, 0.5])
-
-
-def test_the_solver_drops_a_limit_that_is_nan_in_silence():
-    tight = replace(problem(), upper=np.full(N, 0.3))
-    flag, x = raw(tight.spoiled("upper", np.nan, at=4))
-    assert flag == 1
-    assert x[4] == pytest.approx(0.5)
+    assert answer.multipliers.shape == (N + len(p.h),)
+    assert np.all(np.isfinite(answer.multipliers))
 
 
 @pytest.mark.parametrize("soft", [True, False])
@@ -142,45 +98,14 @@ def test_nothing_that_is_not_finite_gets_through(part: str, value: float, soft: 
 # rows
 
 
-def test_the_solver_cannot_set_up_a_hard_row_of_zeros_that_does_not_hold():
-    p = replace(problem(), G=np.zeros((1, N)), h=np.array([-0.04]))
-    model = daqp.Model()
-    flag, _ = model.setup(p.H, p.f, p.G, np.r_[p.upper, p.h], np.r_[p.lower, -1e30], np.zeros(N + 1, np.int32))
-    assert flag == -1
-    with pytest.raises(RuntimeError):
-        model.solve()
-    assert_braking(ours(p), p, QpOutcome.INFEASIBLE)
-
-
 def test_no_rows_are_no_trouble():
     for soft in (True, False):
         p = replace(problem(soft), G=np.zeros((0, N)), h=np.zeros(0))
         np.testing.assert_allclose(ours(p).qd, 0.5, rtol=1e-12)
-
-
-def test_the_solver_leaves_garbage_where_hard_rows_contradict_the_box():
-    p = replace(problem(), h=np.array([-1.5, 0.1]))
-    flag, x = raw(p)
-    assert flag == -1
-    assert np.any(x < p.lower)
-    assert_braking(ours(p), p, QpOutcome.INFEASIBLE)
-
-
-def test_a_soft_row_that_is_violated_is_an_answer():
-    p = problem(soft=True)
-    assert raw(p, weight=WEIGHT)[0] == 2
-    assert ours(p).outcome is QpOutcome.SOLVED
+        assert ours(p).slack.shape == (0,)
 
 
 # weights
-
-
-def test_the_solver_scales_the_common_weight_of_soft_rows():
-    off = []
-    for seed in range(20):
-        p = random_problem(seed, 4)
-        off.append(np.abs(raw(p, primal_tol=1e-9, rho_soft=1.0 / WEIGHT)[1] - exact(p, WEIGHT)).max())
-    assert max(off) > 0.05
 
 
 @pytest.mark.parametrize("weight", [1.0, 1e3, 1e6])
@@ -200,17 +125,6 @@ def test_soft_rows_weigh_what_was_asked(rows: int, weight: float):
 # tolerance
 
 
-def test_the_solver_takes_a_row_that_is_nearly_met_for_met():
-    # in displacements of 0.1 ms the solver's own tolerance is 1 mm/s of a row's limit
-    H, period = np.eye(N), 1e-4
-    p = replace(problem(), H=H, f=-H @ np.full(N, 0.101))
-    moved = replace(p, f=p.f * period, lower=p.lower * period, upper=p.upper * period, h=p.h * period)
-    flag, displaced = raw(moved)
-    assert flag == 1
-    np.testing.assert_allclose(displaced[:2] / period, 0.101)
-    np.testing.assert_allclose(ours(p).qd[:2], 0.1, atol=1e-8)
-
-
 def test_hard_rows_hold_to_a_hundred_millionth():
     for seed in range(40):
         p = random_problem(seed, 6)
@@ -222,20 +136,6 @@ def test_hard_rows_hold_to_a_hundred_millionth():
 
 
 # stale data
-
-
-@pytest.mark.parametrize(
-    ("change", "flag"),
-    [({"H": -np.eye(N)}, -5), ({"bupper": np.full(N + 2, -5.0)}, -1), ({"f": np.full(N, np.nan)}, 0)],
-)
-def test_the_solver_calls_it_success_after_an_update_that_failed(change: dict[str, np.ndarray], flag: int):
-    model = set_up(problem())
-    model.solve()
-    assert model.update(**change) == flag
-    x, _, after, _ = model.solve()
-    assert after == 1
-    # none is the answer to the changed problem: either what was before, or NaN
-    assert np.isnan(x).any() or np.all(x >= -1.0)
 
 
 def bad_problems() -> list[tuple[Problem, QpOutcome]]:
@@ -273,12 +173,6 @@ def test_answers_do_not_depend_on_the_problem_before():
 
 
 # budget
-
-
-def test_the_solver_answers_something_where_its_iterations_end():
-    flag, x = raw(problem(), iter_limit=1)
-    assert flag == -4
-    assert np.all(np.isfinite(x))
 
 
 @pytest.mark.parametrize("soft", [True, False])
