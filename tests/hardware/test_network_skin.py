@@ -15,7 +15,6 @@ import pytest
 
 from pretouch.errors import HardwareError
 from pretouch.hardware.network_skin import NetworkSkin
-from pretouch.types import RangeStatus
 from tests.hardware.fake_unit import IDS, KEYS, FakeUnit
 
 SHARED = Path("/dev/shm")  # noqa: S108  where named shared memory would lie
@@ -103,15 +102,6 @@ def player(skin):
     made = Player(skin.address)
     yield made
     made.socket.close()
-
-
-def test_nothing_is_known_before_a_unit_speaks(skin):
-    readings = skin.read()
-    assert skin.alive
-    assert readings.stamp.tolist() == [-np.inf] * 2
-    assert readings.status.tolist() == [RangeStatus.NONE] * 2
-    assert [unit.id for unit in skin.traffic().units] == list(IDS)
-    assert skin.take_imu() == skin.take_samples() == []
 
 
 def test_readings_samples_and_counts_come_over(skin, player):

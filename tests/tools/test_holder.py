@@ -4,7 +4,6 @@ import sys
 
 import numpy as np
 import pytest
-import trimesh
 from tools.holder import Holder, main, solid
 
 
@@ -59,10 +58,3 @@ def test_nonsense_is_refused(monkeypatch, tmp_path):
         main()
     with pytest.raises(SystemExit, match="too small"):
         Holder(length=20.0)
-
-
-def test_files_are_written(monkeypatch, tmp_path, capsys):
-    monkeypatch.setattr(sys, "argv", ["holder", str(tmp_path / "new"), "--height", "20"])
-    main()
-    assert trimesh.load(tmp_path / "new" / "tray.stl").extents[2] == pytest.approx(22.0)
-    assert "lid.stl: 70 x 38 x 2 mm" in capsys.readouterr().out

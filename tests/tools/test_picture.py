@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image, ImageSequence
-from tools.picture import FRAMES_PER_S, FROM_S, HEIGHT_PX, TO_S, WIDTH_PX, drawn, record, write
+from tools.picture import FROM_S, HEIGHT_PX, TO_S, WIDTH_PX, drawn, record
 
 import pretouch as pt
 from pretouch.viewer import palette
@@ -22,15 +22,6 @@ def durations(place):
             frame.load()  # a frame of WebP has its duration once it is read
             shown.append(frame.info["duration"] / 1000)
         return shown
-
-
-def test_frames_become_a_picture_that_moves_for_ever_in_real_time(tmp_path):
-    write([Image.new("RGB", (64, 48), colour) for colour in ("red", "blue", "green")], tmp_path / "three.webp")
-    assert durations(tmp_path / "three.webp") == [1 / FRAMES_PER_S] * 3
-    with Image.open(tmp_path / "three.webp") as picture:
-        assert picture.info["loop"] == 0
-        picture.seek(1)
-        np.testing.assert_allclose(picture.convert("RGB").getpixel((30, 20)), (0, 0, 255), atol=12)
 
 
 def test_the_readme_begins_with_the_picture_and_says_in_words_what_happens():
