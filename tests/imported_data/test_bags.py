@@ -236,16 +236,23 @@ def test_headers_that_cannot_be_believed_give_way_to_the_times_of_recording(tmp_
 
 
 @pytest.mark.parametrize(
-    "logged", [lambda s: 2.0 * s, lambda s: 6.0 * np.ceil(s / 6.0), lambda s: s + 9.0 * (s > 0.05)]
+    ("logged", "stamped", "used"),
+    [
+        (lambda s: 2.0 * s, lambda s: s, "stamps"),
+        (lambda s: s, lambda s: 2.0 * s, "stamps"),
+        (lambda s: 6.0 * np.ceil(s / 6.0), lambda s: s, "stamps"),
+        (lambda s: s + 9.0 * (s > 0.05), lambda s: s, "stamps"),
+        (lambda s: s, lambda s: s + 9.0 * (s > 0.05), "times of recording"),
+        (lambda s: s, lambda s: 0.0 * s, "times of recording"),
+    ],
 )
-def test_of_two_clocks_that_drift_apart_the_steadier_is_used(tmp_path, logged):
+def test_of_two_clocks_that_drift_apart_the_steadier_is_used(tmp_path, logged, stamped, used):
     seconds = np.arange(1200) / 100.0
-    times = START + np.round(logged(seconds) * 1e9).astype(np.int64)
-    force = np.tile(FORCE, (30, 1))
-    messages = [("/wrench", t, wrench(s, f)) for t, s, f in zip(times, stamps(1200), force, strict=True)]
+    times, header = (START + np.round(clock(seconds) * 1e9).astype(np.int64) for clock in (logged, stamped))
+    messages = [("/wrench", t, wrench(s, FORCE[0])) for t, s in zip(times, header, strict=True)]
     recording = force_of(write_bag(tmp_path / "bag", messages))
-    np.testing.assert_allclose(recording.time, seconds)
-    assert [(note.code, note.values["used"]) for note in recording.notes] == [("drift", "stamps")]
+    np.testing.assert_allclose(recording.time, (stamped if used == "stamps" else logged)(seconds), atol=1e-6)
+    assert [(note.code, note.values["used"]) for note in recording.notes] == [("drift", used)]
 
 
 @pytest.mark.parametrize(("begin", "later"), [(START, 0), (0, START + 10**15)])

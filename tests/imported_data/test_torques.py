@@ -161,6 +161,16 @@ def test_columns_of_other_names_are_mapped_one_by_one_or_by_a_pattern_or_by_a_fi
     np.testing.assert_allclose(by_file.q, by_text.q)
 
 
+@pytest.mark.parametrize("named", ["q{}_rad", "panda_joint{}_rad"])
+def test_joints_may_be_numbered_from_zero_and_positions_named(tmp_path, short, named):
+    first = int(named[0] != "q")
+    columns = {"time_s": short.time} | {named.format(j + first): short.q[:, j] for j in range(7)}
+    columns |= {f"tau_ext{j + first}_Nm": short.tau_ext[:, j] for j in reversed(range(7))}
+    recording = read_torques(write_csv(tmp_path / "a.csv", columns), Choice())
+    np.testing.assert_array_equal(recording.q, short.q)
+    np.testing.assert_array_equal(recording.tau_ext, short.tau_ext)
+
+
 def test_numbers_of_joints_in_a_pattern_begin_at_one_or_zero():
     assert renamed(Path("a"), ["x_0", "x_1", "y"], (("x_*", "q*_rad"),)) == ["q1_rad", "q2_rad", "y"]
     assert renamed(Path("a"), ["x_1", "x_2"], (("x_*", "q*_rad"),)) == ["q1_rad", "q2_rad"]

@@ -116,10 +116,12 @@ class Table:
         for kind in sorted({*needed, *also} & self.kinds, key=list(_UNITS).index):
             parts = self._parts(kind)
             if kind == "q":
-                places[kind] = [parts[joints[i]] for i in joint_places(self._place, joints, model)]
+                joints = [joints[i] for i in joint_places(self._place, joints, model)]
+                places[kind] = [parts[joint] for joint in joints]
             else:
                 axes = kind in ("force", "torque")
-                order = ["x", "y", "z"] if axes else [f"q{j + 1}" for j in range(model.n)]
+                numbered = joints if joints and joints[0] in parts else [f"q{j + 1}" for j in range(model.n)]
+                order = ["x", "y", "z"] if axes else numbered
                 if sorted(parts) != sorted(order):
                     raise RecordingError(
                         f"{self._place} has {kind} of {', '.join(parts)}, but of {', '.join(order)} it is needed: add"
