@@ -22,7 +22,6 @@ from pretouch.perception.obstacles import (
 )
 from pretouch.robot.description import panda
 from pretouch.sensing.sensor import PAPER_SENSOR, cones_of
-from pretouch.sensing.skin import Skin
 from pretouch.types import RangeReadings, RangeStatus
 
 INF, NAN = np.inf, np.nan
@@ -73,10 +72,6 @@ def test_an_obstacle_is_at_its_reading_seen_from_the_sensor(position, turn, dist
     np.testing.assert_allclose(R.T @ (found - position), [0, 0, distance], atol=1e-12)
 
 
-def test_no_sensor_has_no_obstacle():
-    assert locate(np.zeros((0, 3)), np.zeros((0, 3, 3)), np.zeros(0)).shape == (0, 3)
-
-
 def test_sensor_poses_chain_link_and_mounting(panda_model, paper_skin):
     kin = panda_model.kinematics(np.linspace(-1.5, 1.5, 7))
     position, rotation = sensor_poses(paper_skin, kin)
@@ -94,12 +89,6 @@ def test_the_left_unit_of_the_hand_looks_left(panda_model, paper_skin):
     left = paper_skin.ids.index("hand_left")
     np.testing.assert_allclose(position[left] - kin.position[panda_model.ee], [0.0, 0.108, 0.1034 - 0.045], atol=1e-5)
     np.testing.assert_allclose(rotation[left, :, 2], [0, 1, 0], atol=1e-5)
-
-
-def test_an_empty_skin_has_no_poses(panda_model):
-    position, rotation = sensor_poses(Skin([], panda_model), panda_model.kinematics(np.zeros(7)))
-    assert position.shape == (0, 3)
-    assert rotation.shape == (0, 3, 3)
 
 
 # What a reading stands for
@@ -152,11 +141,6 @@ def test_without_a_distance_only_a_missing_or_far_target_tells(distance, status)
     assert _tells(status, distance) == (not np.isnan(shown) or far or status in NO_TARGET)
 
 
-def test_an_open_hall_is_not_a_failure():
-    assert _tells(RangeStatus.OK, 4.1)
-    assert not _tells(RangeStatus.OK, -0.1)
-
-
 # How long a point is kept
 
 
@@ -166,12 +150,6 @@ def test_a_point_outlives_missed_readings_but_not_its_persistence():
     np.testing.assert_array_equal(state.point, [[1, 0, 0]])
     assert state.seen == 10.0  # when it was shown, not when it was missed
     assert state.used == 10.02
-
-
-def test_a_newer_point_replaces_an_older_one():
-    state = _take(_take(track_init(1), 10.0, now=10.0), 10.02, now=10.03, x=2.0)
-    np.testing.assert_array_equal(state.point, [[2, 0, 0]])
-    assert state.seen == 10.02
 
 
 @pytest.mark.parametrize("late", [10.0, 9.99, -INF, NAN])
