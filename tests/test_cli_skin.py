@@ -223,7 +223,7 @@ def test_a_monitor_that_is_ended_leaves_its_recording(keys, port, tmp_path, numb
     assert "Traceback" not in err
     trace = read_skin(place)
     assert trace.complete == (number != signal.SIGKILL)
-    assert sent - trace.units["wrist"].samples[-1].sequence <= 55
+    assert sent - trace.units["wrist"].samples[-1].sample["sequence"] <= 55
     assert out.count("units.mcap holds") == (number != signal.SIGKILL)
 
 

@@ -11,9 +11,9 @@ import pytest
 from pretouch import extras
 from pretouch.cli.registry import OWN
 from pretouch.errors import MissingExtraError
-from pretouch.extras import BAGS, FIGURES, FRANKA, LIVE, MESHES, UNITS
+from pretouch.extras import FIGURES, FRANKA, LIVE, MESHES, UNITS
 
-EXTRAS = (BAGS, FIGURES, FRANKA, MESHES, LIVE, UNITS)
+EXTRAS = (FIGURES, FRANKA, MESHES, LIVE, UNITS)
 
 URDF = """<robot name="a"><link name="base"><collision><geometry><mesh filename="a.dae"/></geometry></collision></link>
 <link name="tip"/><joint name="j" type="revolute"><parent link="base"/><child link="tip"/><axis xyz="0 0 1"/>
@@ -30,7 +30,7 @@ ASKED = [
     (("robot", "import", "arm.urdf", "--out", "arm"), MESHES),
     (("robot", "check", "gone"), None),
     (("detect", "gone.csv"), None),
-    (("detect", "a.bag"), BAGS),
+    (("detect", "a.bag"), None),
     (("detect", "force.csv", "--out", "force.png"), FIGURES),
     (("report", "gone.mcap"), FIGURES),
     (("skin", "monitor", "--keys", "gone.toml"), None),

@@ -11,7 +11,7 @@ from pretouch.params import OutsidePoints
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import PROFILES
 from pretouch.realtime import warm_up
-from pretouch.recording.codec import decode_points, encode_points
+from pretouch.recording.cycles import Cycles, inputs_of
 from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify
 from pretouch.recording.writer import Recording
@@ -137,24 +137,24 @@ def test_a_run_with_points_is_recomputed_bit_for_bit(panda_model, paper_skin, tm
     assert any((kept.step.obstacles.unit >= 7).any() for kept in recorded)
 
 
-def test_points_are_written_once(panda_model):
-    points = seen(1.0, [0.1, 0.2, 0.3])
-    number, back = decode_points(encode_points(7, points, 7))
-    assert number == 7
-    assert same(back, points)
-    number, back = decode_points(encode_points(8, points, 7))
-    assert (number, len(back.stamp)) == (7, 0)
+def test_points_are_written_once_and_with_each_snapshot(panda_model, paper_skin):
+    run, points = Run(controller_of(panda_model, paper_skin, PRETOUCH)), seen(1.0, [0.1, 0.2, 0.3])
+    cycles = Cycles(run.controller, {})
+    kept = [cycles.keep(run.turn(lambda inputs: replace(inputs, points=points))) for _ in range(400)]
+    whole = [i for i, each in enumerate(kept) if inputs_of(each.inputs)[0].points is not None]
+    assert whole == [i for i, each in enumerate(kept) if each.state is not None]
+    assert len(whole) == 2
+    assert [inputs_of(each.inputs)[1] for each in kept] == [whole[0]] * whole[1] + [whole[1]] * (400 - whole[1])
 
 
-def test_inputs_with_points_that_fit_no_message_are_said_to_be_unreadable(panda_model, paper_skin, tmp_path):
+def test_points_of_any_shape_are_kept_and_replayed(panda_model, paper_skin, tmp_path):
     controller = controller_of(panda_model, paper_skin, PRETOUCH)
     run, odd = Run(controller), SeenPoints(0.0, np.zeros(2), np.zeros(5), np.zeros(2))
     with Recording(tmp_path / "a.mcap", controller) as recording:
         for k in range(20):
             recording.record(run.turn(lambda inputs, k=k: replace(inputs, points=odd if k == 9 else None)))
     recorded = open_recording(tmp_path / "a.mcap")
-    assert recorded[9].inputs is None
-    assert "points are no rows" in recorded.unreadable(9)
+    assert same(recorded[9].inputs, run.cycles[9].inputs)
     assert verify(recorded).agrees
 
 

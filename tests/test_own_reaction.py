@@ -8,7 +8,7 @@ import pytest
 from pretouch.contact.reaction import Reaction, ReactionMotion, contact_event
 from pretouch.modes import Event
 from pretouch.profiles import profile
-from pretouch.recording.state_codec import decode_state, encode_state
+from pretouch.recording.cycles import packed_state, state_of
 from pretouch.types import Mode
 from tests.following_arm import PAPER, Arm
 
@@ -54,7 +54,7 @@ def test_a_reaction_of_somebody_else_moves_the_arm_as_long_as_it_says(arm: Arm):
 
 def test_its_state_is_recorded_and_another_profile_goes_on_without_it(arm: Arm, panda_model, paper_skin):
     arm.run(6, force=(0.0, 40.0, 0.0))
-    _, back = decode_state(encode_state(0, arm.state, False))
+    _, back = state_of(packed_state(arm.state, False))
     assert back.reaction == arm.state.reaction > 0
     paper = Arm(panda_model, paper_skin)
     arm.state, arm.controller = paper.controller.adopt(arm.state, arm.controller), paper.controller

@@ -1,4 +1,4 @@
-"""The product goes its ways without our other distributions, and without what only figures, bags and sweeps need."""
+"""The product goes its ways without our other distributions, and without what only figures and sweeps need."""
 
 import json
 import re
@@ -13,7 +13,7 @@ from tests.importing.made import six_axis, written
 pytestmark = pytest.mark.slow
 
 HIDDEN = (
-    "pretouch_fci", "pretouch_lab", "matplotlib", "mpl_toolkits", "rosbags", "SALib", "pyarrow", "distributed", "viser",
+    "pretouch_fci", "pretouch_lab", "matplotlib", "mpl_toolkits", "SALib", "pyarrow", "distributed", "viser",
 )  # fmt: skip
 _ALONE = f"""
 import sys

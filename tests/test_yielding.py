@@ -11,7 +11,7 @@ from pretouch.contact.reach import axis_ends
 from pretouch.modes import ModeState
 from pretouch.params import ClampParams, GiveUpParams
 from pretouch.profiles import PROFILES, Profile, profile
-from pretouch.recording.state_codec import decode_state, encode_state
+from pretouch.recording.cycles import packed_state, state_of
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, Mode, RobotState
@@ -321,7 +321,7 @@ def test_the_reaction_is_a_part_chosen_by_its_name():
 def test_the_state_of_a_clamp_is_recorded_to_the_bit(arm: Pushed):
     caught(arm)
     arm.run(3)
-    _, back = decode_state(encode_state(0, arm.state, False))
+    _, back = state_of(packed_state(arm.state, False))
     assert same(back, arm.state)
     assert back.reaction.clamp.torque > 0
 

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from pretouch.errors import RobotError
-from pretouch.recording import standard
+from pretouch.recording import viewer_topics
 from pretouch.types import RangeStatus
 from pretouch_ros2.joints import Joints
 from pretouch_ros2.messages import FRANKA_STATE, JOINT_STATE, RANGE, WRENCH, Messages
@@ -263,4 +263,4 @@ def test_a_range_says_what_rep_117_says(distance: float, least: float, most: flo
 
 @pytest.mark.parametrize("name", ["forearm_1", "1st", "links/rechts", "größe", "a b", "_", "9"])
 def test_a_unit_has_the_same_topic_as_in_recordings(name: str) -> None:
-    assert topic_name(name) == standard.topic_name(name)
+    assert topic_name(name) == viewer_topics.topic_name(name)

@@ -28,7 +28,7 @@ class Drawn:
         self.messages, self.rng = messages, np.random.default_rng(seed)
 
     def pair(self, kind: str) -> tuple[Any, Any]:
-        fields = {name: self.field(*of) for name, of in self.messages._store.fielddefs[kind][1]}
+        fields = {name: self.field(*of) for name, of in self.messages.store.fielddefs[kind][1]}
         ours = self.messages.types[kind](**{name: a for name, (a, _) in fields.items()})
         return ours, self.messages.idl_type(kind)(**{name: b for name, (_, b) in fields.items()})
 

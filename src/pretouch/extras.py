@@ -47,7 +47,6 @@ class Extra:
             raise MissingExtraError(f"{what} needs {', '.join(absent)} of the extra '{self.name}': run {self.command}")
 
 
-BAGS = Extra("bags", ("rosbags",), "setup")
 FIGURES = Extra("figures", ("matplotlib",), "setup")
 FRANKA = Extra("franka", ("panda_py", "pylibfranka", "ruckig"), "franka")
 LIVE = Extra("live", ("viser",), "setup")

@@ -14,7 +14,6 @@ from pretouch.errors import ParameterError
 from pretouch.params import SequentialParams
 from pretouch.payload import Payload
 from pretouch.profiles import PROFILES
-from pretouch.recording.codec import decode_payload, encode_inputs, encode_payload
 from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify
 from pretouch.recording.writer import Recording
@@ -213,11 +212,3 @@ def test_a_run_with_a_payload_is_recorded_and_recomputed_bit_for_bit(panda_model
     verdict = verify(recorded)
     assert verdict.exact
     assert verdict.agrees
-
-
-def test_a_payload_comes_back_and_what_is_none_is_unreadable(panda_model, paper_skin):
-    inputs = Run(controller_of(panda_model, paper_skin)).inputs()
-    payload = Payload(0.7, (0.1, 0.0, -0.2), 0.3)
-    assert decode_payload(encode_payload(3, replace(inputs, payload=payload))) == payload
-    assert encode_payload(3, inputs) is None
-    assert not encode_inputs(3, replace(inputs, payload=0.7))[1]

@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from pretouch.errors import RecordingError
-from pretouch.recording import disk
+from pretouch.recording import disk, writer
 from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify
 from pretouch.recording.writer import Recording
@@ -118,7 +118,7 @@ def test_a_message_that_cannot_be_made_ends_the_recording_and_not_the_run(contro
     def fail(*given):
         raise ValueError("no")
 
-    monkeypatch.setattr(recording._standard, "items", fail)
+    monkeypatch.setattr(writer.ViewerTopics, "items", fail)
     recording.record(run.turn())
     assert "ValueError: no" in recording.close().sentence
 

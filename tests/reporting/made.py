@@ -10,7 +10,7 @@ from pretouch.controller import Controller
 from pretouch.loop import run
 from pretouch.modes import Event
 from pretouch.profiles import profile as find_profile
-from pretouch.recording.truth import Truth
+from pretouch.recording.simulation import Truth
 from pretouch.sim.paper_scenes import static_path, static_scene
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.plant_params import PlantParams

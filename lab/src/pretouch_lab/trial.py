@@ -18,7 +18,7 @@ from pretouch.loop import Cycle, Options, run
 from pretouch.profiles import Profile
 from pretouch.recording.reader import Recorded, open_recording
 from pretouch.recording.run_record import RunRecord, TrueForces, columns_of, contacts_of
-from pretouch.recording.truth import Truth, truth_of
+from pretouch.recording.simulation import Truth, truth_of
 from pretouch.recording.writer import Recording
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin

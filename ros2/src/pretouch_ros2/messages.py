@@ -1,29 +1,30 @@
-"""The messages of a ROS 2 distribution, all from one source: the definitions that rosbags brings along.
+"""The messages of a ROS 2 distribution on DDS, all from one source: the definitions that rosbags brings along.
 
-rosbags makes values and bytes of them. DDS is told the same definitions as IDL types, under the names rmw gives them.
+`pretouch.recording.ros` makes values and bytes of them. DDS is told the same definitions as IDL types, under the names
+that rmw gives them.
 """
 
 from functools import cache
 from typing import Any
 
-import numpy as np
 from cyclonedds.idl import IdlStruct, make_idl_struct
 from cyclonedds.idl import types as idl
 from rosbags.interfaces import Nodetype
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.typesys import get_types_from_msg
 
 from pretouch.errors import RobotError
+from pretouch.recording import ros
+from pretouch.recording.ros import DIAGNOSTICS as DIAGNOSTICS
+from pretouch.recording.ros import JOINT_STATE as JOINT_STATE
+from pretouch.recording.ros import MARKERS as MARKERS
+from pretouch.recording.ros import RANGE as RANGE
+from pretouch.recording.ros import TRANSFORMS as TRANSFORMS
+from pretouch.recording.ros import WRENCH as WRENCH
 from pretouch_ros2.params import Distribution
 
-JOINT_STATE = "sensor_msgs/msg/JointState"
-WRENCH = "geometry_msgs/msg/WrenchStamped"
-RANGE = "sensor_msgs/msg/Range"
 TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
 CLOUD = "sensor_msgs/msg/PointCloud2"
 TEXT = "std_msgs/msg/String"
-TRANSFORMS = "tf2_msgs/msg/TFMessage"
-MARKERS = "visualization_msgs/msg/MarkerArray"
-DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
 STATUS = "diagnostic_msgs/msg/DiagnosticStatus"
 TWIST = "geometry_msgs/msg/TwistStamped"
 FRANKA_STATE = "franka_msgs/msg/FrankaRobotState"
@@ -46,7 +47,6 @@ _BASE: dict[str, Any] = {
 }  # fmt: skip
 _ARRAY: Any = idl.array
 _SEQUENCE: Any = idl.sequence
-_NUMPY = {"byte": "uint8", "octet": "uint8", "char": "uint8"}
 
 
 def _as_it_is(message: Any, *_: Any, **__: Any) -> bytes:
@@ -61,46 +61,25 @@ def _held(cls: type[Any], data: bytes, *_: Any, **__: Any) -> Any:
     return message
 
 
-class Messages:
+class Messages(ros.Messages):
     """Makes, encodes and decodes the messages of one distribution."""
 
     def __init__(self, distribution: Distribution) -> None:
+        super().__init__(distribution)
         self.distribution = distribution
-        self._store = get_typestore(Stores(f"ros2_{distribution}"))
-        self._store.register(get_types_from_msg(_FRANKA, FRANKA_STATE))
-        self.types = self._store.types
-        """Classes by type name, as sensor_msgs/msg/JointState."""
+        self.store.register(get_types_from_msg(_FRANKA, FRANKA_STATE))
         self.idl_type = cache(self._idl_type)
         self.wire_type = cache(self._wire_type)
-        self.blank = cache(self._blank)
-        for kind in (*USED, FRANKA_STATE):
-            self._store.get_msgdef(kind)  # makes the code that encodes: the first message would wait for it
-
-    def make(self, kind: str, *fields: Any) -> Any:
-        """Make a message from its fields, in order."""
-        return self.types[kind](*fields)
-
-    def header(self, stamp: tuple[int, int], frame: str) -> Any:
-        """Return a header for a stamp, in seconds and nanoseconds, and a frame."""
-        return self.make("std_msgs/msg/Header", self.make("builtin_interfaces/msg/Time", *stamp), frame)
-
-    def xyz(self, kind: str, given: Any) -> Any:
-        """Return three numbers as one of geometry_msgs' types, such as Point."""
-        x, y, z = (float(v) for v in given)
-        return self.make(f"geometry_msgs/msg/{kind}", x, y, z)
-
-    def encoded(self, kind: str, message: Any) -> bytes:
-        """Return a message as CDR."""
-        return bytes(self._store.serialize_cdr(message, kind, little_endian=True))
+        self.prepare(*USED, FRANKA_STATE)
 
     def decoded(self, kind: str, data: bytes) -> Any:
         """Return the message that bytes hold; those of another type or distribution are a RobotError."""
         try:
             if kind == FRANKA_STATE:  # more follows than is read
-                definition = self._store.get_msgdef(kind)
+                definition = self.store.get_msgdef(kind)
                 read = definition.deserialize_cdr_le if data[1] else definition.deserialize_cdr_be
-                return read(data[4:], 0, definition.cls, self._store)[0]
-            return self._store.deserialize_cdr(data, kind)
+                return read(data[4:], 0, definition.cls, self.store)[0]
+            return self.store.deserialize_cdr(data, kind)
         except Exception as error:  # any bytes may come from a network
             raise RobotError(
                 f"A message of {len(data)} bytes is not a {kind} of {self.distribution}: choose the sender's"
@@ -109,7 +88,7 @@ class Messages:
 
     def type_hash(self, kind: str) -> str:
         """Return the hash of a type that rmw sends along since Iron; '' of one that is only known in part."""
-        return "" if kind == FRANKA_STATE else self._store.hash_rihs01(kind)
+        return "" if kind == FRANKA_STATE else self.store.hash_rihs01(kind)
 
     def _wire_type(self, kind: str) -> Any:
         """Class of a type's messages for DDS, which know their type and hold `cdr`: rosbags takes half the time."""
@@ -123,7 +102,7 @@ class Messages:
         return make_idl_struct(kind.rpartition("/")[2], _dds_name(kind), self._fields(kind))
 
     def _fields(self, kind: str) -> dict[str, Any]:
-        return {name: self._field(*described) for name, described in self._store.fielddefs[kind][1]}
+        return {name: self._field(*described) for name, described in self.store.fielddefs[kind][1]}
 
     def _field(self, node: Nodetype, of: Any) -> Any:
         if node == Nodetype.BASE:
@@ -134,20 +113,6 @@ class Messages:
         if node == Nodetype.ARRAY:
             return _ARRAY[element, length]
         return _SEQUENCE[element, length] if length else _SEQUENCE[element]
-
-    def _blank(self, kind: str) -> dict[str, Any]:
-        """Return the fields of a type by name, all of them zero or empty."""
-        return {name: self._nothing(*described) for name, described in self._store.fielddefs[kind][1]}
-
-    def _nothing(self, node: Nodetype, of: Any) -> Any:
-        if node == Nodetype.BASE:
-            return {"string": "", "bool": False, "float32": 0.0, "float64": 0.0}.get(of[0], 0)
-        if node == Nodetype.NAME:
-            return self.types[of](**self.blank(of))
-        (element, name), length = of
-        if element == Nodetype.BASE and name[0] != "string":
-            return np.zeros(length if node == Nodetype.ARRAY else 0, dtype=_NUMPY.get(name[0], name[0]))
-        return [self._nothing(element, name) for _ in range(length)] if node == Nodetype.ARRAY else []
 
 
 def _dds_name(kind: str) -> str:

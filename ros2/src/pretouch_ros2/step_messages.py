@@ -1,15 +1,14 @@
 """A control step as standard messages, for RViz, PlotJuggler and the like."""
 
 import math
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from pretouch.controller import Controller
 from pretouch.limited import Limit
 from pretouch.loop import Cycle
+from pretouch.recording.ros import Look
 from pretouch.types import ControlStep, FloatArray, Mode, RangeReadings, RangeStatus
 from pretouch_ros2.messages import CLOUD, DIAGNOSTICS, MARKERS, STATUS, TRANSFORMS, WRENCH, Messages
 
@@ -60,8 +59,9 @@ class StepMessages:
     def units(self, at: Stamp) -> Any:
         """Where the units sit on their links."""
         skin = self._skin
-        parents = [self._links[link] for link in skin.link]
-        return self._transforms(parents, skin.ids, skin.T_link_sensor[:, :3, 3], skin.T_link_sensor[:, :3, :3], at)
+        places = zip(skin.link, skin.ids, skin.T_link_sensor, strict=True)
+        frames = [self._m.transform(at, self._links[link], name, T[:3, 3], T[:3, :3]) for link, name, T in places]
+        return self._m.make(TRANSFORMS, frames)
 
     def markers(self, step: ControlStep, at: Stamp) -> Any:
         """Obstacles, lines to their closest points on the body, the force, and the mode in words."""
@@ -70,10 +70,10 @@ class StepMessages:
         force = np.nan_to_num(step.force) / _NEWTONS_A_METRE
         above = ee + np.array([0.0, 0.0, 0.3])
         made = [
-            self._marker(0, _SPHERES, seen.point, (0.04, 0.04, 0.04), _BLUE, at),
-            self._marker(1, _LINES, lines, (0.005, 0.0, 0.0), _BLUE, at),
-            self._marker(2, _ARROW, np.stack([ee, ee + force]), (0.01, 0.02, 0.0), _RED, at),
-            self._marker(3, _TEXT, np.zeros((0, 3)), (0.0, 0.0, 0.04), _WHITE, at, step.mode.name, above),
+            self._marker(0, (_SPHERES, (0.04, 0.04, 0.04), _BLUE), at, points=seen.point),
+            self._marker(1, (_LINES, (0.005, 0.0, 0.0), _BLUE), at, points=lines),
+            self._marker(2, (_ARROW, (0.01, 0.02, 0.0), _RED), at, points=np.stack([ee, ee + force])),
+            self._marker(3, (_TEXT, (0.0, 0.0, 0.04), _WHITE), at, position=above, text=step.mode.name),
         ]
         return self._m.make(MARKERS, made)
 
@@ -114,31 +114,6 @@ class StepMessages:
     def _header(self, at: Stamp) -> Any:
         return self._m.header(at, self.base)
 
-    def _transforms(
-        self, parents: Sequence[str], children: Sequence[str], positions: FloatArray, rotations: FloatArray, at: Stamp
-    ) -> Any:
-        """Where K frames are in their parents: positions (K, 3) [m] and rotations (K, 3, 3)."""
-        quaternions = Rotation.from_matrix(rotations).as_quat().tolist() if len(rotations) else []
-        make, made = self._m.make, []
-        for parent, child, p, q in zip(parents, children, positions, quaternions, strict=True):
-            turned = make("geometry_msgs/msg/Quaternion", *q)
-            placed = make("geometry_msgs/msg/Transform", self._m.xyz("Vector3", p), turned)
-            made.append(make("geometry_msgs/msg/TransformStamped", self._m.header(at, parent), child, placed))
-        return make(TRANSFORMS, made)
-
-    def _marker(
-        self, number: int, kind: int, points: FloatArray, scale: tuple[float, ...], color: tuple[float, ...],
-        at: Stamp, text: str = "", position: FloatArray | None = None,
-    ) -> Any:  # fmt: skip
-        make = self._m.make
-        marker = self._m.types["visualization_msgs/msg/Marker"]
-        upright = make("geometry_msgs/msg/Quaternion", 0.0, 0.0, 0.0, 1.0)
-        place = self._m.xyz("Point", np.zeros(3) if position is None else position)
-        given = {
-            "header": self._header(at), "ns": "pretouch", "id": number, "type": kind,
-            "pose": make("geometry_msgs/msg/Pose", place, upright), "scale": self._m.xyz("Vector3", scale),
-            "color": make("std_msgs/msg/ColorRGBA", *color),
-            "lifetime": make("builtin_interfaces/msg/Duration", 0, int(_MARKER_S * 1e9)),
-            "points": [self._m.xyz("Point", p) for p in points], "text": text,
-        }  # fmt: skip
-        return marker(**(self._m.blank("visualization_msgs/msg/Marker") | given))
+    def _marker(self, number: int, look: Look, at: Stamp, **more: Any) -> Any:
+        lifetime = self._m.make("builtin_interfaces/msg/Duration", 0, int(_MARKER_S * 1e9))
+        return self._m.marker(self._header(at), look, ns="pretouch", id=number, lifetime=lifetime, **more)

@@ -24,7 +24,6 @@ def open_log(place: Path, choice: Choice) -> LogFile:
         raise RecordingError(f"The folder {place} has no metadata.yaml: give the folder of a ROS 2 bag, or a file.")
     ending = place.suffix.lower()
     if folder or ending in BAGS:
-        extras.BAGS.need("A bag or MCAP file")
         from pretouch.imported_data.bags import Bag
 
         return Bag(place, choice)

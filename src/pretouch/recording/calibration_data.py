@@ -2,15 +2,14 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from pretouch.recording.mcap_file import Contents, read_messages
 from pretouch.recording.reader import Recorded, open_recording
-from pretouch.recording.skin_reader import holds_units, read_skin
-from pretouch.recording.standard import IMU
-from pretouch.recording.traces import ImuRows, JointRows
+from pretouch.recording.ros import IMU, decoded
+from pretouch.recording.skin_reader import ImuRows, JointRows, holds_units, read_skin
+from pretouch.recording.skin_recording import KeptSample
 from pretouch.sensing.imu_scale import ACCELERATION_LSB, ANGULAR_RATE_LSB, LARGEST_COUNT
 from pretouch.sensing.skin import Skin
 from pretouch.traces import ImuTrace, JointTrace
@@ -20,8 +19,6 @@ from pretouch.values import value
 _ACCELERATION_LSB = np.array(list(ACCELERATION_LSB.values()))
 _ANGULAR_VELOCITY_LSB = np.array(list(ANGULAR_RATE_LSB.values()))
 """One count by the codes of scales in datagrams [m/s^2], [rad/s]."""
-_IMU_BYTES = 12
-"""Size of an IMU sample in a datagram: six counts."""
 
 
 @value
@@ -98,31 +95,32 @@ def _imus(place: Path) -> dict[str, ImuTrace]:
     with place.open("rb") as file:
         for message in read_messages(file, Contents()):
             if message.kind == IMU:
-                imus.add(message.data)
+                imus.add(decoded(IMU, message.data))
     return imus.traces()
 
 
-def _of_samples(samples: list[Any]) -> MeasuredUnit | None:
+def _of_samples(samples: list[KeptSample]) -> MeasuredUnit | None:
     """Return what a unit's datagrams tell of its IMU; None if they hold nothing of one, or a scale it cannot have."""
-    used = [s for s in samples if s.imu_count and s.imu_scale >> 4 & 7 < len(_ANGULAR_VELOCITY_LSB)]
+    used = [s for s in samples if s.sample["imu_count"] and s.sample["imu_scale"] >> 4 & 7 < len(_ANGULAR_VELOCITY_LSB)]
     if not used:
         return None
+
+    def column(name: str) -> IntArray:
+        return np.array([s.sample[name] for s in used], dtype=np.uint64).astype(np.int64)
+
     counters = ImuCounters(
-        index=np.array([s.imu_index for s in used], dtype=np.int64),
-        count=np.array([s.imu_count for s in used], dtype=np.int64),
-        time_us=np.array([s.time_us for s in used], dtype=np.uint64).astype(np.int64),
-        imu_age_us=np.array([s.imu_age_us for s in used], dtype=np.int64),
+        index=column("imu_index"),
+        count=column("imu_count"),
+        time_us=column("time_us"),
+        imu_age_us=column("imu_age_us"),
         offset=np.array([s.offset for s in used], dtype=np.float64),
         bound=np.array([s.bound for s in used], dtype=np.float64),
     )
-    scale = np.array([s.imu_scale for s in used], dtype=np.int64)
+    scale = column("imu_scale")
     acceleration_lsb, angular_velocity_lsb = _ACCELERATION_LSB[scale & 3], _ANGULAR_VELOCITY_LSB[scale >> 4 & 7]
-    # behind the IMU samples there may be a touch reading
-    raw = (
-        np.concatenate([s.imu[: _IMU_BYTES * s.imu_count] for s in used]).view("<i2").reshape(-1, 6).astype(np.float64)
-    )
+    raw = np.frombuffer(b"".join(s.sample["imu"] for s in used), "<i2").reshape(-1, 6).astype(np.float64)
     imu = ImuTrace(
-        _nominal(counters, np.array([s.imu_rate_hz for s in used], dtype=np.float64)),
+        _nominal(counters, column("imu_rate_hz").astype(np.float64)),
         raw[:, 3:] * np.repeat(acceleration_lsb, counters.count)[:, None],
         raw[:, :3] * np.repeat(angular_velocity_lsb, counters.count)[:, None],
     )

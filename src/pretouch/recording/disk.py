@@ -14,7 +14,7 @@ from typing import NamedTuple
 from mcap.writer import Writer
 
 from pretouch.errors import RecordingError
-from pretouch.recording.messages import LIBRARY, definition
+from pretouch.recording.ros import LIBRARY, definition
 
 _FLUSH_S = 0.5
 """Time after which what was recorded is written [s]."""

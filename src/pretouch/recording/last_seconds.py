@@ -3,78 +3,27 @@
 import threading
 from collections import deque
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple, Protocol, Self
+from typing import Self
 
 from pretouch.controller import Controller
+from pretouch.errors import RecordingError
 from pretouch.loop import Cycle
-from pretouch.recording.codec import (
-    decode_desired,
-    decode_inputs,
-    decode_moving,
-    decode_points,
-    decode_touch,
-    encode_desired,
-    encode_inputs,
-    encode_moving,
-    encode_points,
-    encode_touch,
-)
-from pretouch.recording.plain import JSON
-from pretouch.recording.truth import Truth
-from pretouch.recording.writer import Recording
-from pretouch.types import SeenPoints
-
-
-class Further(Protocol):
-    """Another recorder, as `Recording`."""
-
-    def record(self, cycle: Cycle, truth: Truth | None = None) -> None:
-        """Keep one turn of the loop."""
-        ...
-
-    def change(self, controller: Controller) -> None:
-        """Go on with another controller."""
-        ...
-
-
-class _Passed(NamedTuple):
-    """A cycle that has passed, with its inputs as they were then: a port may use its arrays again."""
-
-    cycle: Cycle
-    truth: Truth | None
-    inputs: bytes | None = None
-    touch: bytes | None = None
-    points: bytes | None = None
-    desired: bytes | None = None
-    moving: bytes | None = None
-
-    def again(self) -> Cycle:
-        if self.inputs is None:
-            return self.cycle
-        inputs = decode_inputs(self.inputs)[1]
-        if inputs is None:
-            return self.cycle
-        whole = replace(
-            inputs,
-            touch=None if self.touch is None else decode_touch(self.touch),
-            points=None if self.points is None else decode_points(self.points)[1],
-            payload=self.cycle.inputs.payload,  # nobody can change it
-            desired=None if self.desired is None else decode_desired(self.desired),
-            moving=None if self.moving is None else decode_moving(self.moving),
-        )
-        return replace(self.cycle, inputs=whole)
+from pretouch.recording.cycles import SNAPSHOT_S, Cycles, KeptCycle
+from pretouch.recording.run import JSON
+from pretouch.recording.simulation import Truth
+from pretouch.recording.writer import CycleFile, Recording
 
 
 class LastSeconds:
     """A recorder that writes `hold-1.mcap`, `hold-2.mcap`, ... to a folder as HOLDs latch, and raises nothing.
 
-    Each file ends with the step that latched. What is recorded is handed on to another recorder, if there is one.
+    Each file ends with the step that latched, and begins with a snapshot of the controller's state: up to 3 s before
+    the last seconds. What is recorded goes into a recording too, if there is one.
     """
 
     def __init__(
-        self, controller: Controller, folder: Path, recorder: Further | None = None, seconds: float = 5.0,
+        self, controller: Controller, folder: Path, recording: Recording | None = None, seconds: float = 5.0,
         most: int = 5, about: Mapping[str, JSON] | None = None,
     ) -> None:  # fmt: skip
         """Keep the cycles of a controller.
@@ -82,8 +31,8 @@ class LastSeconds:
         Args:
             controller: whose cycles will be recorded.
             folder: for the files; it is made when the first is written.
-            recorder: what else records.
-            seconds: how far back each file begins [s].
+            recording: where all cycles go.
+            seconds: how far back each file begins at least [s].
             most: files written at most.
             about: as for `Recording`.
         """
@@ -91,46 +40,54 @@ class LastSeconds:
         """The files so far; each is finished once `close` has returned."""
         self.trouble = ""
         """Why a file could not be written, as a sentence, or ''."""
-        self._controller, self._folder, self._recorder = controller, Path(folder), recorder
+        self._controller, self._folder, self._recording = controller, Path(folder), recording
         self._seconds, self._most, self._about = seconds, most, dict(about or {})
-        self._ring: deque[_Passed] = deque(maxlen=max(1, round(2 * seconds / controller.limits.period)))
+        self._cycles = Cycles(controller, self._about) if recording is None else None
+        self._run = b""
+        self._ring: deque[KeptCycle] = deque()
+        self._begins: deque[KeptCycle] = deque()
+        """Those in the ring that begin with a snapshot."""
+        self._longest = round(2 * (seconds + SNAPSHOT_S) / controller.limits.period)
         self._writing: list[threading.Thread] = []
-        self._points: tuple[SeenPoints | None, bytes | None] = None, None
-        """Those that came last, and what is kept of them."""
 
     def record(self, cycle: Cycle, truth: Truth | None = None) -> None:
         """Keep one turn of the loop for a while."""
-        if self._recorder is not None:
-            self._recorder.record(cycle, truth)
-        data, whole = encode_inputs(0, cycle.inputs)
-        self._ring.append(self._passed(cycle, data, truth) if whole else _Passed(cycle, truth))
-        begin = cycle.step.stamp - self._seconds
-        while self._ring[0].cycle.step.stamp < begin:
-            self._ring.popleft()
+        kept = self._keep(cycle, truth)
+        if kept is None:
+            return
+        self._run = kept.run or self._run
+        self._ring.append(kept)
+        if kept.state is not None:
+            self._begins.append(kept)
+        self._forget(cycle.step.stamp - self._seconds)
         if cycle.after.mode.latched and not cycle.before.mode.latched:
             self._write()
 
-    def _passed(self, cycle: Cycle, data: bytes, truth: Truth | None) -> _Passed:
-        """Return a cycle whose inputs are those of now; a set of points that stays the same is written down once."""
-        given = cycle.inputs
-        if given.points is not self._points[0]:
-            self._points = given.points, None if given.points is None else encode_points(0, given.points, 0)
-        return _Passed(
-            cycle,
-            truth,
-            data,
-            encode_touch(0, given),
-            self._points[1],
-            encode_desired(0, given),
-            encode_moving(0, given),
-        )
+    def _keep(self, cycle: Cycle, truth: Truth | None) -> KeptCycle | None:
+        if self._recording is not None:
+            return self._recording.keep(cycle, truth)
+        try:
+            return self._cycles.keep(cycle, truth) if self._cycles else None
+        except RecordingError as error:  # a part of the profile remembers what no recording can hold
+            self.trouble, self._cycles = f"The last seconds before a HOLD are not kept: {error}", None
+            return None
+
+    def _forget(self, begin: float) -> None:
+        """Drop what lies before the last snapshot that is older than an instant [s]."""
+        while len(self._begins) > 1 and (self._begins[1].step.stamp <= begin or len(self._ring) > self._longest):
+            self._begins.popleft()
+            while self._ring[0] is not self._begins[0]:
+                self._ring.popleft()
 
     def change(self, controller: Controller) -> None:
         """Let the cycles from the next one on be those of another controller of the same arm."""
-        if self._recorder is not None:
-            self._recorder.change(controller)
+        if self._recording is not None:
+            self._recording.change(controller)
+        if self._cycles is not None:
+            self._cycles.begin(controller)
         self._controller = controller
         self._ring.clear()
+        self._begins.clear()
 
     def close(self) -> None:
         """Wait for what is being written."""
@@ -145,23 +102,24 @@ class LastSeconds:
 
     def _write(self) -> None:
         """Have what is kept written, by a thread: the arm is braking, and its loop must not wait."""
-        if not self._ring or len(self.written) + bool(self.trouble) >= self._most:
+        if len(self.written) + bool(self.trouble) >= self._most:
             return
-        thread = threading.Thread(target=self._write_all, args=(self._controller, tuple(self._ring)))
+        first = self._ring[0]._replace(run=self._run)
+        thread = threading.Thread(target=self._write_all, args=(self._controller, [first, *list(self._ring)[1:]]))
         self._writing.append(thread)
         thread.start()
 
-    def _write_all(self, controller: Controller, cycles: tuple[_Passed, ...]) -> None:
+    def _write_all(self, controller: Controller, cycles: list[KeptCycle]) -> None:
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
             number = 1
             while (place := self._folder / f"hold-{number}.mcap").exists():
                 number += 1
-            recording = Recording(place, controller, self._about)
-            for passed in cycles:
-                recording.record(passed.again(), passed.truth)
-            recording.close()
+            file = CycleFile(place, controller, self._about)
+            for kept in cycles:
+                file.put(kept)
+            file.disk.close()
             self.written.append(place)
-            self.trouble = recording.trouble or self.trouble
+            self.trouble = file.disk.trouble or self.trouble
         except Exception as error:  # the arm is stopping, and nothing may come between
             self.trouble = f"The last seconds before a HOLD were not saved: {error}"

@@ -2,33 +2,34 @@
 
 import struct
 from bisect import bisect_left, bisect_right
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple
+from typing import BinaryIO, NamedTuple
 
 import numpy as np
 from mcap.records import Channel
 
 from pretouch.controller import ControllerState
 from pretouch.errors import RecordingError
-from pretouch.recording.codec import (
-    decode_desired,
-    decode_inputs,
-    decode_moving,
-    decode_payload,
-    decode_points,
-    decode_step,
-    decode_touch,
-    decode_truth,
+from pretouch.recording.cycles import (
+    INPUTS,
+    RUN,
+    STATE,
+    STEP,
+    TOPICS,
+    TRUTH,
+    inputs_of,
+    state_of,
+    step_of,
+    truth_of_message,
 )
 from pretouch.recording.mcap_file import Contents, Message, chunk_at, chunks, indexed_chunks, message_count, open_mcap
-from pretouch.recording.messages import LIBRARY, TOPICS, definition
-from pretouch.recording.setting import Run, Tangents, decode_run
-from pretouch.recording.skin_recording import READ_WITH, UNIT_SAMPLE
-from pretouch.recording.state_codec import decode_state
-from pretouch.recording.truth import Truth
+from pretouch.recording.ros import LIBRARY, UNIT_SAMPLE, definition, packed_data
+from pretouch.recording.run import Run
+from pretouch.recording.simulation import Truth
+from pretouch.recording.skin_recording import READ_WITH
 from pretouch.types import ControlStep, FloatArray, Inputs, IntArray, RobotState
 from pretouch.values import value
 
@@ -59,10 +60,6 @@ class Kept:
 
 MISSING_INPUTS = "they are missing"
 
-_PARTS: dict[str, Callable[[bytes], Any]] = {
-    "touch": decode_touch, "payload": decode_payload, "moving": decode_moving, "desired": decode_desired
-}  # fmt: skip
-_STEP, _RUN = "/pretouch/step", "/pretouch/run"
 _REMEDY = "for a recording of another program use `pretouch detect`"
 _CUT = "the end is missing, as after a run that was killed, or damaged; every whole part before it is read"
 _CHUNKS = 4
@@ -95,7 +92,7 @@ class Recorded:
         self._contents, self._spans, self._numbers = contents, spans, numbers
         self._firsts, self._lasts = [span.first for span in spans], [span.last for span in spans]
         self._chunk = lru_cache(_CHUNKS)(self._read)
-        self.runs: tuple[Run, ...] = tuple(decode_run(runs[key], self._tangents) for key in sorted(runs))
+        self.runs = tuple(Run(number, packed_data(runs[RUN, number])) for _, number in sorted(runs))
         """The controllers that made steps, in order."""
         self._begins = [run.sequence for run in self.runs]
 
@@ -116,47 +113,26 @@ class Recorded:
 
     def __getitem__(self, i: int) -> Kept:
         number = self.number(i)
-        truth, state = (self._get(f"/pretouch/{name}", number) for name in ("truth", "state"))
-        anew, snapshot = (False, None) if state is None else decode_state(state)
-        run, step = max(0, bisect_right(self._begins, number) - 1), self.step(i)
-        if not _fits(step, *self.runs[run].sizes):
-            raise RecordingError(
-                f"Step {number} of {self.place} is not of the arm and skin that the recording says made it: use one"
-                " that is whole."
-            )
+        truth, state = self._get(TRUTH, number), self._get(STATE, number)
+        anew, snapshot = (False, None) if state is None else state_of(packed_data(state))
         return Kept(
-            run=run,
+            run=max(0, bisect_right(self._begins, number) - 1),
             inputs=self._inputs(number),
-            step=step,
-            truth=None if truth is None else decode_truth(truth)[1],
+            step=self.step(i),
+            truth=None if truth is None else truth_of_message(truth),
             snapshot=snapshot,
             anew=anew,
         )
 
-    def _inputs(self, number: int) -> Inputs | None:
-        """Return all that a step was given; None where a part of it is missing."""
-        data = self._get("/pretouch/inputs", number)
-        inputs = None if data is None else decode_inputs(data)[1]
-        if inputs is None:
-            return None
-        for name, decode in _PARTS.items():
-            part = self._get(f"/pretouch/{name}", number)
-            if part is not None:
-                inputs = replace(inputs, **{name: decode(part)})
-        return self._with_points(number, inputs)
-
-    def _with_points(self, number: int, inputs: Inputs) -> Inputs | None:
-        """Return inputs with the points of outside sources, if there were any; None where these are missing."""
-        data = self._get("/pretouch/seenpoints", number)
-        if data is None:
+    def _inputs(self, number: int, points: bool = True) -> Inputs | None:
+        """Return all that a step was given, the points of outside sources with it; None where a part is missing."""
+        data = self._get(INPUTS, number)
+        inputs, points_at, _ = (None, -1, "") if data is None else inputs_of(packed_data(data))
+        if inputs is None or not points or points_at in (-1, number):
             return inputs
-        same_as, points = decode_points(data)
-        if same_as != number:
-            data = self._get("/pretouch/seenpoints", same_as)
-            if data is None:
-                return None
-            points = decode_points(data)[1]
-        return replace(inputs, points=points)
+        data = self._get(INPUTS, points_at)
+        others = None if data is None else inputs_of(packed_data(data))[0]
+        return None if others is None else replace(inputs, points=others.points)
 
     def __iter__(self) -> Iterator[Kept]:
         return (self[i] for i in range(len(self)))
@@ -164,8 +140,7 @@ class Recorded:
     def robot_states(self) -> Iterator[RobotState]:
         """Yield the robot's state of each step whose inputs were kept."""
         for number in self._numbers.tolist():
-            data = self._get("/pretouch/inputs", number)
-            inputs = None if data is None else decode_inputs(data)[1]
+            inputs = self._inputs(number, points=False)
             if inputs is not None:
                 yield inputs.robot
 
@@ -175,56 +150,25 @@ class Recorded:
 
     def unreadable(self, i: int) -> str:
         """Say what is known of inputs that could not be kept, or ''."""
-        inputs = self._get("/pretouch/inputs", self.number(i))
-        return MISSING_INPUTS if inputs is None else decode_inputs(inputs)[2]
+        data = self._get(INPUTS, self.number(i))
+        return MISSING_INPUTS if data is None else inputs_of(packed_data(data))[2]
 
     def step(self, i: int) -> ControlStep:
         """Return a step alone."""
-        return decode_step(self.step_data(i))[1]
+        return step_of(self.step_data(i))
 
     def step_data(self, i: int) -> bytes:
         """Return a step as it was written."""
-        data = self._get(_STEP, self.number(i))
+        data = self._get(STEP, self.number(i))
         if data is None:
             raise RecordingError(
                 f"Step {self.number(i)} is missing in {self.place}, whose index lists it: use a copy that is whole."
             )
         return data
 
-    def tangent(self, i: int) -> FloatArray | None:
-        """Return the path's tangent (3,) at a step, where it was kept with it."""
-        tangent = decode_step(self.step_data(i))[2]
-        return tangent if len(tangent) else None
-
     def stamps(self) -> FloatArray:
         """Stamps (S,) of the steps [s]."""
         return np.array([_STAMP.unpack_from(self.step_data(i), _HEAD + _NUMBER.size)[0] for i in range(len(self))])
-
-    def _tangents(self, number: int) -> Tangents:
-        """Find where the path led in the steps of the run that begins with a number."""
-        later = [begin for begin in self._begins if begin > number]
-        tangents: Tangents = {}
-        for i, n in enumerate(self._numbers.tolist()):
-            if number <= n and (not later or n < later[0]):
-                _, step, tangent = decode_step(self.step_data(i))
-                if len(tangent):
-                    tangents[step.path_phase] = step.path_position, tangent
-        return tangents
-
-
-def _fits(step: ControlStep, joints: int, units: int) -> bool:
-    """Whether the arrays of a step are as long as those of an arm with so many joints and units."""
-    near, touched = step.obstacles, step.touched
-    of_joints = (step.q, step.q_commanded, step.command, step.residual, step.qp.qd)
-    of_obstacles = (near.point, near.ee_distance, near.body_point, near.link, near.direction, near.body_distance)
-    of_touches = (touched.point, touched.force, touched.sigma, touched.probability)
-    return (
-        all(len(array) == joints for array in of_joints)
-        and len(step.range_distance) == units
-        and all(len(array) == len(near.unit) for array in (*of_obstacles, near.closing_speed))
-        and all(len(array) == len(touched.link) for array in of_touches)
-        and len(step.restricted) == len(step.approach_limit)
-    )
 
 
 def open_recording(place: Path) -> Recorded:
@@ -248,17 +192,17 @@ def _by_index(file: BinaryIO, contents: Contents) -> _Found | None:
     """Use the index at the end of a file of ours: its chunks hold whole cycles, and none is missing."""
     listed = indexed_chunks(file, contents)
     ids = {channel.topic: channel.id for channel in contents.channels.values()}
-    if not listed or not _by_us(contents) or not ids.keys() >= {_STEP, _RUN}:
+    if not listed or not _by_us(contents) or not ids.keys() >= {STEP, RUN}:
         return None
     spans: list[_Span] = []
     runs: Raw = {}
     number: int | None = None
     for chunk in listed:
-        if number is None or ids[_RUN] in chunk.message_index_offsets:
+        if number is None or ids[RUN] in chunk.message_index_offsets:
             ours = _ours(chunk_at(file, chunk.chunk_start_offset, contents))
-            runs |= {key: data for key, data in ours.items() if key[0] == _RUN}
+            runs |= {key: data for key, data in ours.items() if key[0] == RUN}
             number = min((n for _, n in ours), default=None) if number is None else number
-        count = message_count(file, chunk, ids[_STEP])
+        count = message_count(file, chunk, ids[STEP])
         if number is not None and count:
             spans.append(_Span(chunk.chunk_start_offset, number, number + count - 1))
             number += count
@@ -273,8 +217,8 @@ def _by_reading(file: BinaryIO, contents: Contents) -> _Found:
     file.seek(0)
     for offset, messages in chunks(file, contents):
         ours = _ours(messages)
-        runs |= {key: data for key, data in ours.items() if key[0] == _RUN}
-        steps |= {n for topic, n in ours if topic == _STEP}
+        runs |= {key: data for key, data in ours.items() if key[0] == RUN}
+        steps |= {n for topic, n in ours if topic == STEP}
         if ours:
             numbers = [n for _, n in ours]
             spans.append(_Span(offset, min(numbers), max(numbers)))

@@ -11,31 +11,45 @@ from typing import Any, Protocol, Self
 
 import numpy as np
 
+from pretouch.errors import RecordingError
 from pretouch.recording.disk import Disk, Item
-from pretouch.recording.messages import PACKAGE, encoded, fields_of, make, prepare
-from pretouch.recording.standard import IMU, JOINT_STATE, RANGE, header, imu_items, nanoseconds, range_item, topic_name
-from pretouch.recording.traces import check_joints, joint_items
+from pretouch.recording.packing import packed
+from pretouch.recording.ros import DIAGNOSTICS, IMU, JOINT_STATE, RANGE, messages, packed_message
+from pretouch.recording.ros import UNIT_SAMPLE as UNIT_SAMPLE
+from pretouch.recording.viewer_topics import header, imu_items, nanoseconds, range_item, topic_name
 from pretouch.types import FloatArray
+from pretouch.values import value
 
-UNIT_SAMPLE = f"{PACKAGE}/msg/UnitSample"
-"""Type of the messages that hold a datagram as it came."""
 READ_WITH = "read it with pretouch.recording.skin_reader.read_skin, or open it in Foxglove"
 """What can be done with such a recording, as the end of a sentence."""
-DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
-_STATUS, _KEY_VALUE = "diagnostic_msgs/msg/DiagnosticStatus", "diagnostic_msgs/msg/KeyValue"
-_OURS = 5
-"""Fields of a `UnitSample` that are the receiver's; the unit's follow, and its IMU data is the last."""
 
 
 class Arrived(Protocol):
-    """A datagram as it came: `UnitSample.msg` says what these are."""
+    """A datagram as it came: `KeptSample` says what these are."""
 
     arrival: float
     stamp: float
     offset: float
     bound: float
     sample: Any
-    """All of its own fields by their names there, from `unit` on."""
+
+
+@value
+class KeptSample:
+    """One datagram of a unit, as it came, and when. Times in seconds of the receiver's clock."""
+
+    unit: str
+    """The unit's name."""
+    arrival: float
+    """When the datagram came [s]."""
+    stamp: float
+    """Earliest instant its range can have been measured [s]; NaN if not known."""
+    offset: float
+    """The receiver's time minus the unit's [s]; NaN while that is not known."""
+    bound: float
+    """Most the true offset differs from it [s]."""
+    sample: Mapping[str, Any]
+    """All fields of the datagram by their names in `pretouch.hardware.wire.Sample`, integers and bytes as sent."""
 
 
 class Level(IntEnum):
@@ -69,8 +83,7 @@ class SkinRecording:
         self.samples = 0
         """Datagrams that were kept."""
         self._time = 0
-        prepare((UNIT_SAMPLE, RANGE, IMU, JOINT_STATE, DIAGNOSTICS))
-        self._fields = [field.name for field in fields_of(UNIT_SAMPLE)[_OURS:-1]]
+        messages().prepare(UNIT_SAMPLE, RANGE, IMU, JOINT_STATE, DIAGNOSTICS)
         self._sentence = ""
         self._disk = Disk(self.place)
         atexit.register(self.close)
@@ -87,7 +100,7 @@ class SkinRecording:
         """
         if self._take(heard.arrival):
             self.samples += 1
-            self._disk.put(partial(self._sample_items, unit, self._time, heard, new))
+            self._disk.put(partial(_sample_items, unit, self._time, heard, new))
 
     def imu(self, unit: str, stamp: FloatArray, acceleration: FloatArray, angular_velocity: FloatArray) -> None:
         """Keep what a unit's IMU measured at instants (M,) [s]: (M, 3) [m/s^2], (M, 3) [rad/s], sensor frame."""
@@ -100,9 +113,15 @@ class SkinRecording:
         Positions q (M, n) [rad], velocities qd (M, n) [rad/s] if they are known, by the joints' names. Nobody may
         change these arrays from here on. RecordingError for other shapes.
         """
-        check_joints(stamp, q, qd, names)
+        shape = len(stamp), len(names)
+        for what, rows in (("positions", q), ("velocities", q if qd is None else qd)):
+            if rows.shape != shape:
+                raise RecordingError(
+                    f"The joint {what} have the shape {rows.shape}: give {shape}, a row for each instant and a column"
+                    " for each joint's name."
+                )
         if not self._sentence and not self.trouble:
-            self._disk.put(partial(joint_items, self._time, stamp, q, qd, names))
+            self._disk.put(partial(_joint_items, self._time, stamp, q, qd, names))
 
     def health(self, stamp: float, rows: Sequence[Diagnosis]) -> None:
         """Keep how the units are at an instant [s]."""
@@ -115,19 +134,6 @@ class SkinRecording:
             return False
         self._time = nanoseconds(stamp, self._time)
         return True
-
-    def _sample_items(self, unit: str, time: int, heard: Arrived, new: bool) -> Iterator[Item]:
-        sample = heard.sample
-        ours = unit, heard.arrival, heard.stamp, heard.offset, heard.bound
-        given = (getattr(sample, name) for name in self._fields)
-        message = make(
-            UNIT_SAMPLE, *ours, *given, np.frombuffer(sample.imu + sample.touch + sample.zones, dtype=np.uint8)
-        )
-        name = f"/skin/{topic_name(unit)}/sample"
-        yield Item(name, UNIT_SAMPLE, sample.sequence, time, encoded(UNIT_SAMPLE, message))
-        if new and heard.stamp == heard.stamp:
-            distance = sample.range_mm / 1000
-            yield range_item(unit, sample.sequence, time, heard.stamp, distance, sample.range_status)
 
     def close(self) -> str:
         """End the file, and say what it holds; a second time says the same again."""
@@ -147,13 +153,37 @@ class SkinRecording:
         self.close()
 
 
+def _sample_items(unit: str, time: int, heard: Arrived, new: bool) -> Iterator[Item]:
+    sample = heard.sample
+    data = packed(KeptSample(unit, heard.arrival, heard.stamp, heard.offset, heard.bound, sample))
+    message = packed_message(sample.sequence, data, UNIT_SAMPLE)
+    yield Item(f"/skin/{topic_name(unit)}/sample", UNIT_SAMPLE, sample.sequence, time, message)
+    if new and heard.stamp == heard.stamp:
+        distance = sample.range_mm / 1000
+        yield range_item(unit, sample.sequence, time, heard.stamp, distance, sample.range_status)
+
+
+def _joint_items(
+    instead: int, stamp: FloatArray, q: FloatArray, qd: FloatArray | None, names: Sequence[str]
+) -> Iterator[Item]:
+    """Yield states of joints at instants (M,) [s]: (M, n) [rad], [rad/s]; what is no time stands at `instead` [ns]."""
+    nothing, texts = np.zeros(0), list(names)
+    for i, t in enumerate(stamp.tolist()):
+        time = nanoseconds(t, instead)
+        velocity = nothing if qd is None else np.array(qd[i], dtype=np.float64)
+        row = np.array(q[i], dtype=np.float64)
+        state = messages().make(JOINT_STATE, header(time, ""), texts, row, velocity, nothing)
+        yield Item("/joint_states", JOINT_STATE, 0, time, messages().encoded(JOINT_STATE, state))
+
+
 def _health_items(time: int, rows: Sequence[Diagnosis]) -> Iterator[Item]:
+    make = messages().make
     statuses = [
         make(
-            _STATUS, int(row.level), row.unit, row.message, row.unit,
-            [make(_KEY_VALUE, key, value) for key, value in row.values.items()],
+            "diagnostic_msgs/msg/DiagnosticStatus", int(row.level), row.unit, row.message, row.unit,
+            [make("diagnostic_msgs/msg/KeyValue", key, value) for key, value in row.values.items()],
         )
         for row in rows
     ]  # fmt: skip
     message = make(DIAGNOSTICS, header(time, ""), statuses)
-    yield Item("/diagnostics", DIAGNOSTICS, 0, time, encoded(DIAGNOSTICS, message))
+    yield Item("/diagnostics", DIAGNOSTICS, 0, time, messages().encoded(DIAGNOSTICS, message))

@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from pretouch.control.path import Path
 from pretouch.controller import Controller, ControllerState
-from pretouch.recording.codec import encode_step
+from pretouch.recording.cycles import encoded_step
 from pretouch.recording.reader import MISSING_INPUTS, Kept, Recorded
-from pretouch.recording.setting import Run
+from pretouch.recording.run import Run
 from pretouch.recording.versions import versions
 
 TOLERANCE = 1e-6
@@ -149,12 +150,14 @@ class _Count:
             self.first = Difference(number, stamp, part.field, part.recorded, part.recomputed)
 
 
-def verify(recorded: Recorded, progress: Callable[[int], None] = lambda done: None) -> Verdict:
+def verify(
+    recorded: Recorded, progress: Callable[[int], None] = lambda done: None, path: Path | None = None
+) -> Verdict:
     """Recompute each step from the snapshots and inputs, and compare all of it with what was recorded.
 
     With the versions and on the kind of machine that made it, bit for bit, and the state is carried from snapshot to
     snapshot, where it is compared too. Otherwise within `TOLERANCE`, beginning anew at each snapshot, and
-    without the sentences. `progress` gets how many steps are done.
+    without the sentences. `progress` gets how many steps are done; `path` stands for one of your own class.
     """
     count = _Count()
     exact = [run.versions == versions() for run in recorded.runs]
@@ -169,7 +172,7 @@ def verify(recorded: Recorded, progress: Callable[[int], None] = lambda done: No
             state = None
         before = kept.run, number
         if kept.run not in controllers:
-            controllers = {kept.run: recorded.runs[kept.run].controller()}
+            controllers = {kept.run: recorded.runs[kept.run].controller(path)}
         parts: list[Part] = []
         if kept.snapshot is not None:
             if state is not None and exact[kept.run] and not kept.anew:
@@ -180,7 +183,7 @@ def verify(recorded: Recorded, progress: Callable[[int], None] = lambda done: No
             state = None
         else:
             step, state = controllers[kept.run].step(state, kept.inputs)
-            if not exact[kept.run] or encode_step(number, step, recorded.tangent(i)) != recorded.step_data(i):
+            if not exact[kept.run] or encoded_step(number, step) != recorded.step_data(i):
                 parts += differing(kept.step, step, exact[kept.run])
             count.checked += 1
         count.note(number, kept.step.stamp, parts)

@@ -5,15 +5,11 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from pretouch.controller import Controller
 from pretouch.loop import Cycle, Recorder
-from pretouch.recording.codec import encode_inputs
 from pretouch.recording.last_seconds import LastSeconds
 from pretouch.recording.writer import Recording
 from pretouch.session.free_motion import FreeMotion
-from pretouch.types import Inputs, RangeReadings, RobotState
 
 
 @dataclass(frozen=True)
@@ -61,7 +57,6 @@ def open_run_files(
         learnt: what keeps free motion, if anything does.
         further: what else is given each cycle, if anything.
     """
-    _warm_up(controller)
     with ExitStack() as stack:
         recording = stack.enter_context(Recording(place, controller, {"robot": robot})) if place else None
         last = stack.enter_context(LastSeconds(controller, folder, recording, about={"robot": robot}))
@@ -69,14 +64,6 @@ def open_run_files(
         yield RunFiles(
             _RecorderGroup([one for one in (last, learnt, further, supervisor) if one]), recording, last, learnt
         )
-
-
-def _warm_up(controller: Controller) -> None:
-    """Encode once what is encoded in the loop: the first time takes a tenth of a second."""
-    n, units = controller.model.n, len(controller.skin)
-    zero = np.zeros(n)
-    readings = RangeReadings(np.zeros(units), np.zeros(units), np.zeros(units, np.int64))
-    encode_inputs(0, Inputs(0.0, RobotState(0.0, zero, zero, zero, zero, zero, np.zeros(6)), readings))
 
 
 class _RecorderGroup:

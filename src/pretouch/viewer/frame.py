@@ -6,7 +6,7 @@ import numpy as np
 
 from pretouch.control.path import Path
 from pretouch.profiles import Profile
-from pretouch.recording.surroundings import KnownBox
+from pretouch.recording.simulation import KnownBox
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import BoolArray, ControlStep, FloatArray, Inputs

@@ -12,7 +12,7 @@ from pretouch.explanation import finds
 from pretouch.loop import MonotonicClock
 from pretouch.recording.compare import Comparison, Found
 from pretouch.recording.reader import Kept, Recorded, Run
-from pretouch.recording.surroundings import surroundings
+from pretouch.recording.simulation import surroundings
 from pretouch.types import FloatArray
 from pretouch.viewer.action_queue import ActionQueue
 from pretouch.viewer.asked import Asked, told

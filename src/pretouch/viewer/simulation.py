@@ -16,8 +16,7 @@ from pretouch.desired import Desired
 from pretouch.errors import ParameterError
 from pretouch.loop import Cycle, Options, turn
 from pretouch.profiles import Profile
-from pretouch.recording.surroundings import surroundings
-from pretouch.recording.truth import truth_of
+from pretouch.recording.simulation import surroundings, truth_of
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, paper_skin

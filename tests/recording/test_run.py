@@ -6,15 +6,17 @@ import numpy as np
 import pytest
 
 from pretouch.control.path import Circle, WayPoints, line
+from pretouch.errors import RecordingError
 from pretouch.perception.scene_filter import Fixtures
 from pretouch.recording.reader import open_recording
+from pretouch.recording.verify import verify
 from pretouch.recording.writer import Recording
 from pretouch.robot.body import Capsules
 from pretouch.robot.description import fr3
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.sensor import VL53L5CX
 from pretouch.sensing.skin import Skin, paper_skin
-from pretouch.sensing.unit import SensorUnit
+from pretouch.sensing.unit import SensorUnit, TouchPatch
 from tests.fuzz.invariants import same
 from tests.recording.runs import SHORT, Run, Spiral, controller_of, custom_arm, recorded_run
 
@@ -57,20 +59,21 @@ def test_paths_of_ours_are_made_again_to_the_bit(controller, tmp_path, path):
         assert same(made.tangent(phase), path.tangent(phase))
 
 
-def test_a_path_of_another_class_is_known_where_it_led(controller, tmp_path):
+def test_a_path_of_another_class_is_drawn_and_has_to_be_given_to_go_on(controller, tmp_path):
     model = controller.model
     path = Spiral(model.kinematics(model.description.q_ready).position[model.ee])
-    run = recorded_run(tmp_path / "a.mcap", controller_of(controller.model, controller.skin, path=path), 40)
-    made = open_recording(tmp_path / "a.mcap").runs[0].path
-    assert (made.length, made.closed) == (1.0, False)
-    phases = [cycle.step.path_phase for cycle in run.cycles]
-    assert len(set(phases)) > 10
-    for phase in phases:
-        assert same(made.point(phase), path.point(phase))
-        assert same(made.tangent(phase), path.tangent(phase))
-    for phase in (0.2, 0.55, 1.0):
-        assert np.allclose(made.point(phase), path.point(phase), atol=1e-3)
-        assert np.linalg.norm(made.tangent(phase)) == pytest.approx(1.0)
+    recorded_run(tmp_path / "a.mcap", controller_of(controller.model, controller.skin, path=path), 40)
+    recorded = open_recording(tmp_path / "a.mcap")
+    near = recorded.runs[0].path
+    assert (near.length, near.closed) == (1.0, False)
+    for phase in (0.0, 0.2, 0.55, 1.0):
+        assert np.allclose(near.point(phase), path.point(phase), atol=1e-3)
+    assert np.linalg.norm(near.tangent(0.2)) == pytest.approx(1.0)
+    with pytest.raises(RecordingError, match=r"class Spiral.*run\.controller\(path=\.\.\.\)"):
+        verify(recorded)
+    verdict = verify(recorded, path=path)
+    assert verdict.agrees, verdict.said
+    assert verdict.exact
 
 
 def test_arm_skin_and_fixtures_are_made_again_to_the_bit(tmp_path):
@@ -113,3 +116,26 @@ def test_the_envelope_of_an_arm_is_made_again(tmp_path):
     made = open_recording(tmp_path / "a.mcap").runs[0].model.description
     assert same(made.envelope, model.description.envelope)
     assert made.mjcf == model.description.mjcf
+
+
+def test_uncertain_places_and_touch_sensors_are_made_again(panda_model, paper_skin, tmp_path):
+    rng = np.random.default_rng(0)
+    units = [
+        replace(unit, position_sigma=rng.uniform(0.0, 0.03), orientation_sigma=rng.uniform(0.0, 0.2), touch=patch)
+        for unit, patch in zip(paper_skin.units, [None, TouchPatch(0.01), *[None] * 5], strict=True)
+    ]
+    skin = Skin(units, panda_model)
+    recorded_run(tmp_path / "a.mcap", controller_of(panda_model, skin), 60)
+    recorded = open_recording(tmp_path / "a.mcap")
+    made = recorded.runs[0].skin
+    assert same(made.position_sigma, skin.position_sigma)
+    assert same(made.orientation_sigma, skin.orientation_sigma)
+    assert [unit.touch for unit in made.units] == [unit.touch for unit in units]
+    assert verify(recorded).agrees
+
+
+@pytest.mark.parametrize("source", ["", "two\nlines"])
+def test_a_source_of_any_text_is_kept(tmp_path, source):
+    model = RobotModel(replace(custom_arm(tmp_path), source=source))
+    recorded_run(tmp_path / "a.mcap", controller_of(model, Skin([], model)), 2)
+    assert open_recording(tmp_path / "a.mcap").runs[0].model.description.source == source

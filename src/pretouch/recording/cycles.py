@@ -1,0 +1,209 @@
+"""What a file keeps of a control cycle, to bytes and back, to the bit."""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import msgspec
+import numpy as np
+
+from pretouch.controller import Controller, ControllerState
+from pretouch.desired import Desired
+from pretouch.errors import RecordingError
+from pretouch.loop import Cycle
+from pretouch.moving_fixtures import MovingFixtures
+from pretouch.payload import Payload
+from pretouch.recording.disk import Item
+from pretouch.recording.packing import marked, packed, unmarked, unpacked
+from pretouch.recording.ros import PACKED, decoded, encode, own, packed_message, value_of
+from pretouch.recording.run import packed_run
+from pretouch.recording.simulation import Truth
+from pretouch.recording.viewer_topics import nanoseconds
+from pretouch.types import ControlStep, FloatArray, Inputs, RangeReadings, RobotState, SeenPoints, TouchReadings
+from pretouch.values import value
+
+SNAPSHOT_S = 3.0
+"""Time between two snapshots of the controller's state [s]."""
+RUN, INPUTS, STATE, STEP, TRUTH = (f"/pretouch/{name}" for name in ("run", "inputs", "state", "step", "truth"))
+TOPICS = {RUN: PACKED, INPUTS: PACKED, STATE: PACKED, STEP: own("Step"), TRUTH: own("Truth")}
+"""Type of the messages on each of our topics."""
+_PARTS = (("touch", TouchReadings), ("points", SeenPoints), ("payload", Payload), ("desired", Desired),
+          ("moving", MovingFixtures))  # fmt: skip
+"""What inputs may have beside the arm's state and the readings."""
+_SHOWN = 500
+"""Characters of what cannot be kept that are."""
+
+
+@value
+class _KeptInputs:
+    """Inputs of a step as they are packed."""
+
+    inputs: Inputs | None
+    """None where they cannot be kept."""
+    points_at: int = -1
+    """Number of the step with which the points of outside sources stand: a set is kept once; -1 without any."""
+    unreadable: str = ""
+    """What was given where it cannot be kept."""
+
+
+class KeptCycle(NamedTuple):
+    """What is kept of a cycle: bytes of what others may write to again, and values that nobody changes."""
+
+    number: int
+    """Of the step."""
+    time: int
+    """[ns]"""
+    run: bytes | None
+    """What describes the run that begins here."""
+    state: bytes | None
+    """The state the step began with: from here on a file can begin."""
+    inputs: bytes
+    step: ControlStep
+    truth: Truth | None
+
+
+class Cycles:
+    """Makes what is kept of each cycle of one controller after the other."""
+
+    def __init__(self, controller: Controller, about: Mapping[str, Any]) -> None:
+        self._about = dict(about)
+        self._number = self._time = 0
+        self._last = math.nan
+        self._points: SeenPoints | None = None
+        self._points_at = -1
+        self.begin(controller)
+
+    def begin(self, controller: Controller) -> None:
+        """Let the cycles from the next one on be those of a controller."""
+        self._run: bytes | None = packed_run(controller, self._about)
+        self._snapshot_due = -math.inf
+        self._command: FloatArray | None = None
+        """Of the last step; None where the next one cannot be recomputed from it."""
+
+    def keep(self, cycle: Cycle, truth: Truth | None = None) -> KeptCycle:
+        """Return what is kept of the next cycle, and of what only a simulation knows."""
+        number, step, run = self._number, cycle.step, self._run
+        self._time = nanoseconds(step.stamp, self._time)
+        anew = not self._goes_on(cycle)
+        state = None
+        if anew or not self._last <= step.stamp < self._snapshot_due:
+            state = packed_state(cycle.before, anew)
+            self._snapshot_due = step.stamp + SNAPSHOT_S
+            self._points = None
+        inputs, whole = self._inputs(cycle.inputs)
+        self._command = step.command if whole else None
+        self._number, self._last, self._run = number + 1, step.stamp, None
+        return KeptCycle(number, self._time, run, state, inputs, step, truth)
+
+    def _goes_on(self, cycle: Cycle) -> bool:
+        """Whether a cycle began with what the one before left, and that can be recomputed."""
+        before, command = cycle.before, self._command
+        return command is not None and before.watch.stamp == self._last and bool((before.command == command).all())
+
+    def _inputs(self, inputs: Inputs) -> tuple[bytes, bool]:
+        """Return inputs as they are kept, and whether that is all a step goes by."""
+        try:
+            points = inputs.points
+            if points is not None and points is not self._points:
+                self._points, self._points_at = points, self._number
+            elif points is not None:
+                inputs = replace(inputs, points=None)
+            return packed_inputs(inputs, self._points_at if points is not None else -1), True
+        except Exception as error:  # inputs may be anything, with any behaviour
+            self._points = None
+            return packed(_KeptInputs(None, -1, _described(inputs, error))), False
+
+
+def packed_inputs(inputs: Inputs, points_at: int = -1) -> bytes:
+    """Return inputs as they are kept; raises for what cannot be. `points_at` is the step that has their points."""
+    robot = inputs.robot
+    if type(robot) is not RobotState or type(inputs.readings) is not RangeReadings:
+        raise TypeError("the arm's state or the readings are none")
+    for name, kind in _PARTS:
+        part = getattr(inputs, name)
+        if part is not None and type(part) is not kind:
+            raise TypeError(f"{name} is a {type(part).__name__}")
+    if not isinstance(robot.tau_ext, np.ndarray):  # such are no torques to a step either
+        inputs = replace(inputs, robot=replace(robot, tau_ext=np.zeros(0)))
+    return packed(_KeptInputs(inputs, points_at))
+
+
+def _described(inputs: object, error: Exception) -> str:
+    """Describe inputs that cannot be kept, in one line of limited length."""
+    try:
+        text = f"{error}: {inputs!r}"
+    except Exception:  # a repr may do anything
+        text = f"{error}: a {type(inputs).__name__}"
+    return text[:_SHOWN].encode("utf-8", "backslashreplace").decode()
+
+
+def inputs_of(data: bytes) -> tuple[Inputs | None, int, str]:
+    """Return what a step was given, the step that has the points (-1: none), and what is known of what was not kept."""
+    try:
+        kept = unpacked(_KeptInputs, data)
+    except RecordingError as error:
+        return None, -1, str(error)
+    return kept.inputs, kept.points_at, kept.unreadable
+
+
+def packed_state(state: ControllerState, anew: bool) -> bytes:
+    """Return the state a step begins with; `anew` if it does not follow from the step before."""
+    try:
+        return packed({"anew": anew, "state": marked(ControllerState, state)})
+    except TypeError as error:
+        raise RecordingError(
+            f"The controller's state cannot be kept, because a part of the profile remembers what a recording cannot"
+            f" hold ({error}): let it remember numbers, arrays of numbers, or classes of such fields."
+        ) from error
+
+
+def state_of(data: bytes) -> tuple[bool, ControllerState]:
+    """Return whether a state does not follow from the step before, and the state."""
+    try:
+        table = msgspec.msgpack.decode(data)
+        return table["anew"], unmarked(ControllerState, table["state"])
+    except (msgspec.MsgspecError, LookupError, TypeError, RecursionError) as error:
+        raise RecordingError(f"A state of the controller in the recording cannot be read: {error}") from error
+
+
+def encoded_step(number: int, step: ControlStep) -> bytes:
+    """Return a step as CDR."""
+    return encode("Step", step, sequence=number)
+
+
+def step_of(data: bytes) -> ControlStep:
+    """Return the step that CDR holds."""
+    return value_of(ControlStep, decoded(own("Step"), data))
+
+
+def encoded_truth(number: int, truth: Truth) -> bytes:
+    """Return what a simulation knows as CDR."""
+    times, links, velocities = zip(*truth.touches, strict=True) if truth.touches else ((), (), ())
+    return encode(
+        "Truth",
+        truth,
+        sequence=number,
+        touch_time=np.array(times, dtype=np.float64),
+        touch_link=np.array(links, dtype=np.int64),
+        touch_velocity=np.array(velocities, dtype=np.float64).reshape(-1),
+    )
+
+
+def truth_of_message(data: bytes) -> Truth:
+    """Return what a simulation knew."""
+    m = decoded(own("Truth"), data)
+    velocities = m.touch_velocity.reshape(-1, 3)
+    touches = tuple(zip(m.touch_time.tolist(), m.touch_link.tolist(), velocities, strict=True))
+    return Truth(m.time, m.force.reshape(-1, 3), m.hand, touches)
+
+
+def items(kept: KeptCycle) -> Iterator[Item]:
+    """Yield the messages of a cycle."""
+    number, time = kept.number, kept.time
+    for topic, data in ((RUN, kept.run), (STATE, kept.state), (INPUTS, kept.inputs)):
+        if data is not None:
+            yield Item(topic, PACKED, number, time, packed_message(number, data))
+    yield Item(STEP, TOPICS[STEP], number, time, encoded_step(number, kept.step))
+    if kept.truth is not None:
+        yield Item(TRUTH, TOPICS[TRUTH], number, time, encoded_truth(number, kept.truth))

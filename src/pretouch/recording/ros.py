@@ -1,0 +1,238 @@
+"""ROS 2 messages by rosbags: the standard ones, and ours of `msg/`, made of our classes and back to the bit."""
+
+from collections.abc import Callable
+from enum import Enum
+from functools import cache
+from importlib.resources import files
+from operator import attrgetter
+from typing import Any
+
+import numpy as np
+from rosbags.interfaces import Nodetype
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+import pretouch
+from pretouch.errors import RecordingError
+from pretouch.recording.fields import hints_of, is_record, optional
+from pretouch.types import FloatArray, Thresholds
+
+LIBRARY = f"pretouch {pretouch.__version__}"
+"""What a file says it was written by."""
+PACKAGE = "pretouch_msgs"
+OWN = ("Contact", "Obstacles", "QpSolution", "Thresholds", "Touched", "Step", "Truth", "Packed", "UnitSample")
+"""Our types, each after those that it holds; each has a file in `msg/`."""
+PACKED, UNIT_SAMPLE = f"{PACKAGE}/msg/Packed", f"{PACKAGE}/msg/UnitSample"
+"""Types of what is MessagePack."""
+JOINT_STATE, WRENCH = "sensor_msgs/msg/JointState", "geometry_msgs/msg/WrenchStamped"
+RANGE, IMU = "sensor_msgs/msg/Range", "sensor_msgs/msg/Imu"
+TRANSFORMS, MARKERS = "tf2_msgs/msg/TFMessage", "visualization_msgs/msg/MarkerArray"
+DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
+
+Look = tuple[int, tuple[float, ...], tuple[float, ...]]
+"""Kind of a marker, its size (3,) [m] and its colour: red, green, blue, opacity."""
+_DTYPES = {"byte": "uint8", "octet": "uint8", "char": "uint8"}
+_ROWS = ("point", "body_point", "direction", "force")
+"""Fields of ours that are rows of three numbers, where a message has any number of them: there they lie one by one."""
+_NAMED = {"ControlStep": "Step"}
+"""Message of a class that is not named as it."""
+
+
+class Messages:
+    """Makes, encodes and decodes the messages of one ROS 2 distribution."""
+
+    def __init__(self, distribution: str) -> None:
+        self.store = get_typestore(Stores(f"ros2_{distribution}"))
+        self.types = self.store.types
+        """Classes by type name, as sensor_msgs/msg/JointState."""
+        self.blank = cache(self._blank)
+
+    def prepare(self, *kinds: str) -> None:
+        """Make the code that encodes types: the first message would wait for it."""
+        for kind in kinds:
+            self.store.get_msgdef(kind)
+
+    def make(self, kind: str, *fields: Any, **named: Any) -> Any:
+        """Make a message from its fields in order, or from some by name: the others are zero or empty."""
+        return self.types[kind](*fields) if fields else self.types[kind](**(self.blank(kind) | named))
+
+    def header(self, stamp: tuple[int, int], frame: str) -> Any:
+        """Return a header for a stamp, in seconds and nanoseconds, and a frame."""
+        return self.make("std_msgs/msg/Header", self.make("builtin_interfaces/msg/Time", *stamp), frame)
+
+    def xyz(self, kind: str, numbers: Any) -> Any:
+        """Return three numbers as one of geometry_msgs' types, such as Point."""
+        x, y, z = (float(v) for v in numbers)
+        return self.make(f"geometry_msgs/msg/{kind}", x, y, z)
+
+    def transform(self, stamp: tuple[int, int], parent: str, child: str, p: FloatArray, rotation: FloatArray) -> Any:
+        """Return where a frame is in its parent: position (3,) [m] and rotation (3, 3)."""
+        from scipy.spatial.transform import Rotation
+
+        turn = self.make("geometry_msgs/msg/Quaternion", *Rotation.from_matrix(rotation).as_quat().tolist())
+        pose = self.make("geometry_msgs/msg/Transform", self.xyz("Vector3", p), turn)
+        return self.make("geometry_msgs/msg/TransformStamped", self.header(stamp, parent), child, pose)
+
+    def marker(
+        self,
+        header: Any,
+        look: Look,
+        position: Any = (0.0, 0.0, 0.0),
+        turn: Any = (0.0, 0.0, 0.0, 1.0),
+        points: Any = (),
+        **more: Any,
+    ) -> Any:
+        """Make a marker of a look: where it is, its turn (x, y, z, w), corners (M, 3) [m], and other fields by name."""
+        kind, size, color = look
+        place = self.xyz("Point", position), self.make("geometry_msgs/msg/Quaternion", *(float(v) for v in turn))
+        return self.make(
+            "visualization_msgs/msg/Marker",
+            header=header,
+            type=kind,
+            pose=self.make("geometry_msgs/msg/Pose", *place),
+            scale=self.xyz("Vector3", size),
+            color=self.make("std_msgs/msg/ColorRGBA", *color),
+            points=[self.xyz("Point", p) for p in points],
+            **more,
+        )
+
+    def encoded(self, kind: str, message: Any) -> bytes:
+        """Return a message as CDR."""
+        return bytes(self.store.serialize_cdr(message, kind, little_endian=True))
+
+    def _blank(self, kind: str) -> dict[str, Any]:
+        """Return the fields of a type by name, all of them zero or empty."""
+        return {name: self._nothing(*described) for name, described in self.store.fielddefs[kind][1]}
+
+    def _nothing(self, node: Nodetype, of: Any) -> Any:
+        if node == Nodetype.BASE:
+            return {"string": "", "bool": False, "float32": 0.0, "float64": 0.0}.get(of[0], 0)
+        if node == Nodetype.NAME:
+            return self.types[of](**self.blank(of))
+        (element, name), length = of
+        if element == Nodetype.BASE and name[0] != "string":
+            return np.zeros(length if node == Nodetype.ARRAY else 0, dtype=_DTYPES.get(name[0], name[0]))
+        return [self._nothing(element, name) for _ in range(length)] if node == Nodetype.ARRAY else []
+
+
+@cache
+def messages() -> Messages:
+    """Return the messages of ROS 2 Jazzy, and ours."""
+    jazzy = Messages("jazzy")
+    for name in OWN:
+        jazzy.store.register(get_types_from_msg(own_definition(name), own(name)))
+    return jazzy
+
+
+def own(name: str) -> str:
+    """Return the full name of a type of ours."""
+    return f"{PACKAGE}/msg/{name}"
+
+
+def own_definition(name: str) -> str:
+    """Return the text of one of our message files, comments and all."""
+    return (files("pretouch.recording") / "msg" / f"{name}.msg").read_text(encoding="utf-8")
+
+
+@cache
+def definition(kind: str) -> str:
+    """Return the full definition of a type as MCAP embeds it (encoding `ros2msg`): its own, and that of its parts."""
+    return messages().store.generate_msgdef(kind, ros_version=2)[0]
+
+
+def decoded(kind: str, data: bytes) -> Any:
+    """Return the message that CDR bytes hold; its arrays are aligned and writable. RecordingError if they hold none."""
+    try:
+        return messages().store.deserialize_cdr(bytearray(data), kind)  # type: ignore[arg-type]
+    except Exception as error:  # rosbags meets damaged bytes with exceptions of any kind
+        raise RecordingError(f"A message of the type {kind} in the recording cannot be read: {error}") from error
+
+
+def encode(kind: str, value: Any, **more: Any) -> bytes:
+    """Return a value of one of our classes as CDR; `more` are fields that it does not have.
+
+    Raises ValueError for an array of another type than its field.
+    """
+    return messages().encoded(own(kind), _message(own(kind), value, more))
+
+
+def packed_message(number: int, data: bytes, kind: str = PACKED) -> bytes:
+    """Return packed data as CDR."""
+    return messages().encoded(kind, messages().types[kind](number, np.frombuffer(data, np.uint8)))
+
+
+def packed_data(message: bytes, kind: str = PACKED) -> bytes:
+    """Return the packed data that CDR holds."""
+    return decoded(kind, message).data.tobytes()
+
+
+def value_of(kind: type, message: Any) -> Any:
+    """Return a value of one of our classes from a message; one that cannot be is a RecordingError."""
+    try:
+        return _maker(kind)(message)
+    except ValueError as error:
+        raise RecordingError(f"A {kind.__name__} in the recording cannot be read: {error}") from error
+
+
+def _message(kind: str, value: Any, more: dict[str, Any]) -> Any:
+    return messages().types[kind](*[more[name] if name in more else get(value) for name, get in _getters(kind)])
+
+
+@cache
+def _getters(kind: str) -> tuple[tuple[str, Callable[[Any], Any]], ...]:
+    """Return names of the fields of a message, and what takes each from a value."""
+    return tuple((name, _getter(name, *described)) for name, described in messages().store.fielddefs[kind][1])
+
+
+def _getter(name: str, node: Nodetype, of: Any) -> Callable[[Any], Any]:
+    get = attrgetter(name)
+    if name.startswith("has_"):
+        part = attrgetter(name.removeprefix("has_"))
+        return lambda value: part(value) is not None
+    if node == Nodetype.NAME:
+
+        def inner(value: Any) -> Any:
+            part = get(value)
+            return messages().types[of](**messages().blank(of)) if part is None else _message(of, part, {})
+
+        return inner
+    if node == Nodetype.BASE:
+        return get if of[0] != "string" else lambda value: _text(get(value))
+    dtype = np.dtype(of[0][1][0])
+
+    def row(value: Any) -> Any:
+        array = get(value)
+        if array.dtype != dtype:
+            raise ValueError(f"{name} is an array of {array.dtype}, not {dtype}")
+        return array.reshape(-1)
+
+    return row
+
+
+def _text(text: str | Enum) -> str:
+    return text.value if isinstance(text, Enum) else text
+
+
+@cache
+def _maker(kind: type) -> Callable[[Any], Any]:
+    """Return what makes a value of a class from a message."""
+    if kind is Thresholds:
+        names = [name for name, _ in _getters(own("Thresholds"))]
+        return lambda message: Thresholds(np.array([getattr(message, name) for name in names]))
+    described = dict(messages().store.fielddefs[own(_NAMED.get(kind.__name__, kind.__name__))][1])
+    rows = {name for name in _ROWS if name in described and described[name][0] == Nodetype.SEQUENCE}
+    ways = tuple(_way(name, hint, name in rows) for name, hint in hints_of(kind))
+    return lambda message: kind(*[way(message) for way in ways])
+
+
+def _way(name: str, hint: Any, rows: bool) -> Callable[[Any], Any]:
+    """Return what makes a field of a class from a message."""
+    get, left = attrgetter(name), optional(hint)
+    if left is not None:
+        there, made = attrgetter(f"has_{name}"), _way(name, left, rows)
+        return lambda message: made(message) if there(message) else None
+    if isinstance(hint, type) and issubclass(hint, Enum):
+        return lambda message: hint(get(message))
+    if is_record(hint):
+        inner = _maker(hint)
+        return lambda message: inner(get(message))
+    return (lambda message: get(message).reshape(-1, 3)) if rows else get

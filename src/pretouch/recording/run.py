@@ -1,0 +1,249 @@
+"""What made the steps of a recording: arm, skin, surroundings, path, parameters and versions, to bytes and back."""
+
+import json
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path as FilePath
+from shutil import rmtree
+from tempfile import mkdtemp
+from typing import Any, TypeVar
+from weakref import finalize
+
+import numpy as np
+
+from pretouch.composition import as_table, from_table
+from pretouch.control.path import Circle, Path, WayPoints
+from pretouch.controller import Controller
+from pretouch.errors import PretouchError, RecordingError
+from pretouch.perception.scene_filter import Fixtures
+from pretouch.profiles import Profile
+from pretouch.recording.packing import packed, unpacked
+from pretouch.recording.versions import versions
+from pretouch.robot.body import Capsules
+from pretouch.robot.description import RobotDescription, fr3, panda
+from pretouch.robot.description_file import FILE, description_text, load_description
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.sensor import Sensor
+from pretouch.sensing.skin import Skin
+from pretouch.sensing.unit import SensorUnit, TouchPatch
+from pretouch.types import FloatArray
+
+JSON = Any
+"""What JSON can hold: None, bool, numbers, text, and lists and dicts with text keys of these."""
+
+_MJCF = "arm.xml"
+_SAMPLES = 400
+"""Points kept of a path whose class is not ours, to draw it by."""
+Result = TypeVar("Result")
+
+
+@dataclass(frozen=True)
+class _KeptUnit:
+    """A sensor unit as it is packed."""
+
+    id: str
+    link: str
+    T_link_sensor: FloatArray
+    position_sigma: float
+    orientation_sigma: float
+    touch: TouchPatch | None
+    sensor: dict[str, Any]
+    zone: int | None
+
+
+@dataclass(frozen=True)
+class _KeptPath:
+    """A path as it is packed."""
+
+    kind: str
+    """Name of its class."""
+    numbers: FloatArray
+    """Circle: centre [m], radius [m], start angle [rad]; otherwise points (W, 3) [m]."""
+    length: float
+    closed: bool
+
+
+@dataclass(frozen=True)
+class _KeptRun:
+    """A run as it is packed."""
+
+    started: float
+    versions: dict[str, str]
+    about: dict[str, Any]
+    profile: dict[str, Any]
+    robot: str
+    """robot.toml."""
+    arm: str
+    """The MJCF file that it names."""
+    units: tuple[_KeptUnit, ...]
+    planes: FloatArray
+    capsules: Capsules
+    path: _KeptPath
+
+
+class SampledPath:
+    """A path of a class that is not ours, drawn through points of it: near it, not the path that was followed."""
+
+    def __init__(self, samples: FloatArray, length: float, closed: bool) -> None:
+        """Take samples (S, 3) [m] at equal arc lengths."""
+        self.length, self.closed, self._samples = length, closed, samples
+
+    def point(self, phase: float) -> FloatArray:
+        """Return the position (3,) [m] at an arc length [m]."""
+        s = phase % self.length if self.closed else min(max(phase, 0.0), self.length)
+        places = np.linspace(0.0, self.length, len(self._samples))
+        return np.array([np.interp(s, places, self._samples[:, i]) for i in range(3)])
+
+    def tangent(self, phase: float) -> FloatArray:
+        """Return the unit tangent (3,) at an arc length [m]; zero where samples on either side coincide."""
+        step = self.length / (len(self._samples) - 1)
+        along = self.point(phase + step / 2) - self.point(phase - step / 2)
+        size = float(np.linalg.norm(along))
+        return along / size if size else along
+
+
+class Run:
+    """One controller that made steps of a recording."""
+
+    def __init__(self, sequence: int, data: bytes) -> None:
+        """Take the number of the first step it made, and what `packed_run` returned."""
+        kept = unpacked(_KeptRun, data)
+        self._kept, self.sequence = kept, sequence
+        self.versions = kept.versions
+        """Program, libraries and machine it ran on."""
+        self.started = kept.started
+        """When it began [s since 1970, UTC]."""
+        self.about: dict[str, JSON] = kept.about
+        """Whatever the caller said of the run."""
+        self.profile: Profile = _sound(lambda: from_table(Profile, kept.profile))
+
+    @cached_property
+    def model(self) -> RobotModel:
+        """The arm."""
+        return _sound(lambda: _model(self._kept))
+
+    @cached_property
+    def skin(self) -> Skin:
+        """The sensor units on it."""
+        return _sound(lambda: Skin([_unit(unit) for unit in self._kept.units], self.model))
+
+    @cached_property
+    def fixtures(self) -> Fixtures:
+        """What stood around it."""
+        return _sound(lambda: Fixtures(self._kept.planes, self._kept.capsules))
+
+    @cached_property
+    def path(self) -> Path:
+        """The path it followed; one of another class than ours is near it, for drawings."""
+        return _sound(lambda: _path(self._kept.path))
+
+    def controller(self, path: Path | None = None) -> Controller:
+        """Make the controller again, on the model, skin and fixtures of this run.
+
+        A path of another class than ours is not in the recording: give it, or it is a RecordingError.
+        """
+        if path is None and isinstance(self.path, SampledPath):
+            raise RecordingError(
+                f"The path of the run is of the class {self._kept.path.kind}, which a recording cannot hold: give it,"
+                " as run.controller(path=...) or verify(recorded, path=...)."
+            )
+        return _sound(lambda: Controller(self.model, self.skin, self.fixtures, path or self.path, self.profile))
+
+
+def packed_run(controller: Controller, about: Mapping[str, JSON]) -> bytes:
+    """Return what describes a controller. Facts that JSON cannot hold are a RecordingError."""
+    model, fixtures = controller.model, controller.fixtures
+    units = [
+        _KeptUnit(u.id, u.link, u.T_link_sensor, u.position_sigma, u.orientation_sigma, u.touch, as_table(u.sensor),
+                  u.zone)
+        for u in controller.skin.units
+    ]  # fmt: skip
+    return packed(_KeptRun(
+        time.time(), versions(), _as_json(about), _as_json(as_table(controller.profile)),
+        description_text(model.description, _MJCF), _mjcf(model.description), tuple(units), fixtures.planes,
+        fixtures.capsules, _kept_path(controller.path),
+    ))  # fmt: skip
+
+
+def _as_json(table: Mapping[str, JSON]) -> dict[str, JSON]:
+    """Return facts as JSON has them; others are a RecordingError."""
+    try:
+        return json.loads(json.dumps(dict(table), default=_plain))
+    except (TypeError, ValueError, RecursionError) as error:
+        raise RecordingError(
+            f"The description of the run cannot be written as JSON ({error}): give plain values."
+        ) from error
+
+
+def _plain(value: Any) -> Any:
+    """Return a number or array of NumPy, or a path, as JSON has it."""
+    if isinstance(value, np.generic | np.ndarray):
+        return value.tolist()
+    if isinstance(value, FilePath):
+        return str(value)
+    raise TypeError(f"{value!r} is no plain value")
+
+
+def _sound(make: Callable[[], Result]) -> Result:
+    """Return what is made; what cannot be made from a recording is a RecordingError."""
+    try:
+        return make()
+    except RecordingError:
+        raise
+    except (PretouchError, ValueError, TypeError, LookupError, AttributeError, OverflowError, OSError) as error:
+        why = " ".join(str(error).split())
+        raise RecordingError(f"The recording does not describe a controller that can be made again: {why}") from error
+
+
+def _mjcf(arm: RobotDescription) -> str:
+    try:
+        return arm.mjcf.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise RecordingError(f"The MJCF file {arm.mjcf} cannot be copied into the recording: {error}") from error
+
+
+def _model(kept: _KeptRun) -> RobotModel:
+    """Make the arm: on the MJCF file of this installation if that says the same, otherwise on the recorded one."""
+    folder = FilePath(mkdtemp(prefix="pretouch-"))
+    try:
+        (folder / FILE).write_text(kept.robot, encoding="utf-8")
+        (folder / _MJCF).write_text(kept.arm, encoding="utf-8")
+        arm = load_description(folder)
+        for installed in (panda().mjcf, fr3().mjcf):
+            if installed.read_text(encoding="utf-8") == kept.arm:
+                arm = replace(arm, mjcf=installed)
+        model = RobotModel(arm)
+    except BaseException:
+        rmtree(folder)
+        raise
+    finalize(model, rmtree, folder, ignore_errors=True)  # whoever has the model may read its file
+    return model
+
+
+def _unit(kept: _KeptUnit) -> SensorUnit:
+    return SensorUnit(
+        kept.id, kept.link, kept.T_link_sensor, kept.position_sigma, kept.orientation_sigma, kept.touch,
+        from_table(Sensor, kept.sensor, "sensor"), kept.zone,
+    )  # fmt: skip
+
+
+def _kept_path(path: Path) -> _KeptPath:
+    if type(path) is Circle:
+        numbers = np.array([*path.center, path.radius, path.start_angle], dtype=np.float64)
+    elif type(path) is WayPoints:
+        numbers = path.points
+    else:
+        phases = np.linspace(0.0, path.length, _SAMPLES)
+        numbers = np.array([path.point(phase) for phase in phases.tolist()], dtype=np.float64)
+    return _KeptPath(type(path).__name__, numbers, float(path.length), bool(path.closed))
+
+
+def _path(kept: _KeptPath) -> Path:
+    if kept.kind == "Circle":
+        x, y, z, radius, start_angle = kept.numbers.tolist()
+        return Circle((x, y, z), radius, start_angle)
+    if kept.kind == "WayPoints":
+        return WayPoints(kept.numbers, kept.closed)
+    return SampledPath(kept.numbers, kept.length, kept.closed)

@@ -1,0 +1,312 @@
+"""What a file keeps of control cycles: to bytes and back, to the bit."""
+
+import struct
+from dataclasses import fields, replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as npst
+from rosbags.typesys import get_types_from_msg
+
+from pretouch.contact.window import window_init
+from pretouch.errors import RecordingError
+from pretouch.loop import Cycle
+from pretouch.modes import Event, ModeState
+from pretouch.recording.cycles import (
+    Cycles,
+    encoded_step,
+    encoded_truth,
+    inputs_of,
+    packed_inputs,
+    packed_state,
+    state_of,
+    step_of,
+    truth_of_message,
+)
+from pretouch.recording.ros import OWN, decoded, definition, messages, own, own_definition
+from pretouch.recording.simulation import Truth, truth_of
+from pretouch.types import (
+    Contact,
+    ControlStep,
+    Inputs,
+    Mode,
+    Obstacles,
+    QpOutcome,
+    QpSolution,
+    RangeReadings,
+    RobotState,
+    Thresholds,
+    Touched,
+)
+from tests.fuzz.invariants import same
+from tests.recording.runs import Run, controller_of
+
+NUMBER = st.floats(allow_nan=False)  # NaN with a payload is compared as NaN elsewhere
+NAN_TOO = st.one_of(NUMBER, st.just(float("nan")))
+TEXT = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0"), max_size=20)
+
+
+def rows(*shape: int) -> st.SearchStrategy[np.ndarray]:
+    return npst.arrays(np.float64, shape, elements=NAN_TOO)
+
+
+def wholes(count: int) -> st.SearchStrategy[np.ndarray]:
+    return npst.arrays(np.int64, count)
+
+
+@st.composite
+def robots(draw: st.DrawFn) -> RobotState:
+    lengths = st.integers(0, 8)
+    parts = [draw(rows(draw(lengths))) for _ in range(5)]
+    return RobotState(draw(NAN_TOO), *parts, draw(st.none() | rows(6) | rows(0) | rows(7)))
+
+
+@st.composite
+def all_inputs(draw: st.DrawFn) -> Inputs:
+    lengths = st.integers(0, 8)
+    readings = RangeReadings(draw(rows(draw(lengths))), draw(rows(draw(lengths))), draw(wholes(draw(lengths))))
+    return Inputs(draw(NAN_TOO), draw(robots()), readings, draw(st.booleans()))
+
+
+@st.composite
+def steps(draw: st.DrawFn) -> ControlStep:
+    n, k, m, units = (draw(st.integers(0, 8)) for _ in range(4))
+    row = rows(3)
+    obstacles = Obstacles(
+        draw(wholes(k)), draw(rows(k, 3)), draw(rows(k)), draw(rows(k, 3)), draw(wholes(k)), draw(rows(k, 3)),
+        draw(rows(k)), draw(rows(k)),
+    )  # fmt: skip
+    contact = st.builds(Contact, row, npst.arrays(np.bool_, 3))
+    qp = QpSolution(
+        draw(rows(n)),
+        draw(rows(m)),
+        draw(rows(n + m)),
+        draw(st.sampled_from(QpOutcome)),
+        draw(TEXT),
+        draw(st.booleans()),
+    )
+    return ControlStep(
+        stamp=draw(NAN_TOO), mode=draw(st.sampled_from(Mode)), event=draw(st.sampled_from(Event)), detail=draw(TEXT),
+        reason=draw(TEXT), latched=draw(st.booleans()), q=draw(rows(n)),
+        q_commanded=draw(rows(n)), ee_position=draw(row), ee_velocity=draw(row), path_position=draw(row),
+        path_phase=draw(NAN_TOO), desired_velocity=draw(row), speed_scale=draw(NAN_TOO),
+        range_distance=draw(rows(units)), obstacles=obstacles, force=draw(row), filtered_force=draw(row),
+        thresholds=Thresholds(draw(rows(6, 3))), armed=draw(st.booleans()), contact=draw(st.none() | contact),
+        reaction_velocity=draw(row), restricted=draw(wholes(m)), approach_limit=draw(rows(m)), qp=qp,
+        command=draw(rows(n)), residual=draw(rows(n)), evidence=draw(NAN_TOO), touched=draw(places()),
+        detectable_n=draw(NAN_TOO),
+    )  # fmt: skip
+
+
+@st.composite
+def places(draw: st.DrawFn) -> Touched:
+    c = draw(st.integers(0, 2))
+    return Touched(draw(wholes(c)), draw(rows(c, 3)), draw(rows(c, 3)), draw(rows(c)), draw(rows(c)))
+
+
+@given(all_inputs(), st.integers(-1, 2**62))
+def test_inputs_come_back_to_the_bit_whatever_their_lengths(inputs, points_at):
+    back, at, unreadable = inputs_of(packed_inputs(inputs, points_at))
+    assert (at, unreadable) == (points_at, "")
+    assert same(back, inputs)
+
+
+@given(steps())
+def test_a_step_comes_back_to_the_bit_in_arrays_as_fresh_ones(step):
+    data = encoded_step(7, step)
+    back = step_of(data)
+    assert struct.unpack_from("<Q", data, 4)[0] == decoded(own("Step"), data).sequence == 7
+    assert same(back, step)
+    assert encoded_step(7, back) == data
+    for array in (back.q, back.obstacles.point, back.obstacles.unit, back.thresholds.parts, back.command):
+        assert array.flags.aligned
+        assert array.flags.writeable
+        assert array.flags.c_contiguous
+
+
+@given(rows(4), rows(4, 3), rows(3), st.lists(st.tuples(NAN_TOO, st.integers(-5, 99), rows(3)), max_size=3))
+def test_truth_comes_back_to_the_bit(time, force, hand, touches):
+    truth = Truth(time, force, hand, tuple(touches))
+    assert same(truth_of_message(encoded_truth(3, truth)), truth)
+
+
+def test_what_a_simulation_logged_is_gathered_as_it_is():
+    log = [(0.5, np.array([1.0, 2.0, 3.0])), (0.501, np.zeros(3))]
+    touch = SimpleNamespace(time=0.501, link=4, velocity=np.array([0.0, 0.1, 0.0]))
+    truth = truth_of(log, [touch], np.array([0.7, 0.0, 0.4]))
+    assert truth.time.tolist() == [0.5, 0.501]
+    assert truth.force.tolist() == [[1.0, 2.0, 3.0], [0.0, 0.0, 0.0]]
+    assert truth.hand.tolist() == [0.7, 0.0, 0.4]
+    assert truth.touches == ((0.501, 4, touch.velocity),)
+    nothing = truth_of_message(encoded_truth(3, truth_of([], [], None)))
+    assert (nothing.force.shape, len(nothing.touches), np.isnan(nothing.hand).all()) == ((0, 3), 0, True)
+
+
+def usual() -> Inputs:
+    readings = RangeReadings(np.zeros(7), np.full(7, 0.5), np.zeros(7, np.int64))
+    return Inputs(1.0, RobotState(1.0, *(np.zeros(7) for _ in range(5)), np.zeros(6)), readings)
+
+
+class Hostile:
+    """Something that fails however it is looked at."""
+
+    def __repr__(self) -> str:
+        raise RuntimeError("no")
+
+
+@pytest.fixture(scope="module")
+def run(panda_model, paper_skin):
+    run = Run(controller_of(panda_model, paper_skin), seed=3)
+    for _ in range(60):
+        run.turn()
+    return run
+
+
+SPOILED = [
+    lambda i: replace(i, robot=None),
+    lambda i: replace(i, robot="broken"),
+    lambda i: replace(i, readings=None),
+    lambda i: replace(i, robot=replace(i.robot, q="seven numbers")),
+    lambda i: replace(i, robot=replace(i.robot, q=[1.0, None])),
+    lambda i: replace(i, robot=replace(i.robot, qd=np.zeros(7, complex))),
+    lambda i: replace(i, readings=replace(i.readings, status=["OK"] * 7)),
+    lambda i: replace(i, stamp=None),
+    lambda i: replace(i, stamp=10**400),
+    lambda i: replace(i, payload=0.7),
+    lambda i: replace(i, robot=Hostile()),
+    lambda i: None,
+    lambda i: Hostile(),
+    lambda i: replace(i, robot=SimpleNamespace(q="\ud800\0" * 1000)),
+]
+
+
+@pytest.mark.parametrize("spoil", SPOILED)
+def test_inputs_that_cannot_be_kept_are_none_and_said(run, spoil):
+    cycle = run.cycles[3]
+    kept = Cycles(run.controller, {}).keep(Cycle(spoil(cycle.inputs), cycle.before, cycle.step, cycle.after))
+    back, _, unreadable = inputs_of(kept.inputs)
+    assert back is None
+    assert 0 < len(unreadable) < 5000
+
+
+@pytest.mark.parametrize("spoil", SPOILED[:3])
+def test_what_follows_inputs_that_cannot_be_kept_begins_anew(run, spoil):
+    cycles, (first, second, third) = Cycles(run.controller, {}), run.cycles[:3]
+    cycles.keep(Cycle(spoil(first.inputs), first.before, first.step, first.after))
+    assert cycles.keep(second).state is not None
+    assert cycles.keep(third).state is None
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda i: replace(i, robot=replace(i.robot, q=np.zeros((7, 1)))),
+        lambda i: replace(i, robot=replace(i.robot, tau_ext=np.zeros((2, 3), np.float32))),
+        lambda i: replace(i, readings=replace(i.readings, status=np.zeros(7, np.uint8))),
+        lambda i: replace(i, readings=replace(i.readings, status=np.zeros(7))),
+    ],
+)
+def test_arrays_of_other_types_and_shapes_are_kept_as_they_are(change):
+    inputs = change(usual())
+    assert same(inputs_of(packed_inputs(inputs))[0], inputs)
+
+
+@pytest.mark.parametrize(
+    ("change", "same_as"),
+    [
+        (lambda i: replace(i, stamp=1), lambda i: i),
+        (lambda i: replace(i, stamp=np.float32(1.0)), lambda i: i),
+        (lambda i: replace(i, robot=replace(i.robot, q=[0.0] * 7)), lambda i: i),
+        (lambda i: replace(i, robot=replace(i.robot, q=np.zeros(14)[::2])), lambda i: i),
+        (lambda i: replace(i, robot=replace(i.robot, tau_ext="none")),
+         lambda i: replace(i, robot=replace(i.robot, tau_ext=np.zeros(0)))),
+    ],
+)  # fmt: skip
+def test_numbers_of_other_types_are_kept_as_the_controller_takes_them(change, same_as):
+    assert same(inputs_of(packed_inputs(change(usual())))[0], same_as(usual()))
+
+
+def test_each_state_of_a_run_comes_back_to_the_bit(run):
+    for cycle in run.cycles:
+        anew, back = state_of(packed_state(cycle.before, True))
+        assert anew
+        assert same(back, cycle.before)
+
+
+ANY = st.floats() | st.sampled_from([-0.0, np.inf, -np.inf, 5e-324])
+
+
+@given(ANY, st.integers(0, 300), st.booleans(), st.integers(0, 2**53), st.sampled_from(Mode), st.integers(0, 5),
+       st.sampled_from(Event))  # fmt: skip
+def test_any_numbers_counts_and_lengths_come_back(run, number, samples, latched, count, mode, sent, event):
+    state = run.cycles[-1].before
+    watch = replace(state.watch, stamp=number, sent=tuple((number, np.full(7, number)) for _ in range(sent)))
+    window = replace(window_init(max(1, samples)), count=count)
+    odd = replace(
+        state, watch=watch, window=window, mode=ModeState(mode, event, "Für", "Für ä: 'x'.", latched),
+        tracks=replace(state.tracks, point=np.full((0, 3), number)), command=np.full(7, number),
+    )  # fmt: skip
+    anew, back = state_of(packed_state(odd, False))
+    assert not anew
+    assert same(back, odd)
+
+
+def test_a_state_of_another_version_is_refused_with_what_differs(run):
+    data = packed_state(run.cycles[-1].before, False)
+    with pytest.raises(RecordingError, match=r"reduction.*from another version"):
+        state_of(data.replace(b"reduction", b"reductive"))
+    with pytest.raises(RecordingError, match="cannot be read"):
+        state_of(data[:-9])
+
+
+MIRRORED = {Obstacles: "Obstacles", Contact: "Contact", QpSolution: "QpSolution", Touched: "Touched",
+            ControlStep: "Step", Truth: "Truth"}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", MIRRORED)
+def test_messages_mirror_the_types_field_by_field(kind):
+    there = {name for name, _ in messages().store.fielddefs[own(MIRRORED[kind])][1]}
+    beside = {"sequence", "has_contact", "touch_time", "touch_link", "touch_velocity", "touches"}
+    assert there - beside == {f.name for f in fields(kind)} - beside
+
+
+def test_the_rows_of_the_thresholds_have_their_names(run):
+    step = replace(run.cycles[0].step, thresholds=Thresholds(np.arange(18.0).reshape(6, 3)))
+    message = decoded(own("Step"), encoded_step(0, step)).thresholds
+    for name, _ in messages().store.fielddefs[own("Thresholds")][1]:
+        assert getattr(message, name).tobytes() == getattr(step.thresholds, name).tobytes()
+
+
+def test_an_array_of_another_type_than_its_field_is_refused(run):
+    with pytest.raises(ValueError, match="q is an array of float32, not float64"):
+        encoded_step(0, replace(run.cycles[0].step, q=np.zeros(7, np.float32)))
+
+
+@pytest.mark.parametrize("name", OWN)
+def test_each_field_of_a_message_file_is_explained(name):
+    lines = [line for line in own_definition(name).splitlines() if line]
+    assert lines[0].startswith("#")
+    assert all("#" in line for line in lines if line.split()[0] not in OWN)
+    assert all(len(line) <= 120 for line in lines)
+
+
+@pytest.mark.parametrize("name", OWN)
+def test_the_definition_that_is_embedded_can_be_parsed_alone(name):
+    for kind, defined in get_types_from_msg(definition(own(name)), own(name)).items():
+        assert defined == messages().store.fielddefs[kind]
+
+
+@given(steps(), st.data())
+def test_a_step_that_is_cut_or_changed_is_no_worse_than_a_recording_error(step, data):
+    whole = bytearray(encoded_step(0, step))
+    cut = data.draw(st.integers(0, len(whole)))
+    at = data.draw(st.integers(0, len(whole) - 1))
+    whole[at] = data.draw(st.integers(0, 255))
+    for spoiled in (bytes(whole[:cut]), bytes(whole)):
+        try:
+            step_of(spoiled)
+        except RecordingError:
+            continue
