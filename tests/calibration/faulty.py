@@ -72,16 +72,6 @@ def joints_late(data: CalibrationData, late: float) -> CalibrationData:
     return replace(data, joints=JointTrace(data.joints.stamp + late, data.joints.q))
 
 
-def with_losses(
-    data: CalibrationData, unit: str, bursts: int = 20, length: float = 0.3, seed: int = 0
-) -> CalibrationData:
-    """A unit's samples are lost in bursts of so many seconds each, anywhere."""
-    imu = unit_of(data, unit).imu
-    begins = np.random.default_rng(seed).uniform(imu.stamp[0], imu.stamp[-1] - length, bursts)
-    lost = np.any((imu.stamp[:, None] >= begins) & (imu.stamp[:, None] < begins + length), axis=1)
-    return _with_trace(data, unit, _kept(imu, ~lost))
-
-
 def silent(data: CalibrationData, unit: str, begin: float, end: float) -> CalibrationData:
     """A unit sends nothing in an interval of its clock [s]."""
     imu = unit_of(data, unit).imu

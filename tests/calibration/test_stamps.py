@@ -92,15 +92,6 @@ def test_instants_are_true_to_a_tenth_of_a_period_whatever_is_lost(seed, rate, d
     assert error.std() < 1.2e-4
 
 
-def test_stamps_at_the_nominal_rate_are_far_worse():
-    heard = unit(np.random.default_rng(0))
-    b = heard.batches
-    newest = 1e-6 * (b["time_us"] - b["imu_age_us"]) + b["offset"]
-    place = np.concatenate([np.arange(1 - n, 1) for n in b["count"]])
-    wire = newest[heard.batch] + place / NOMINAL
-    assert np.abs(heard.error()).std() < 0.1 * (wire - heard.true).std()
-
-
 def test_an_index_that_wraps_is_as_good_as_one_that_does_not():
     low, high = (unit(np.random.default_rng(3), first=first) for first in (0, 2**32 - 5000))
     assert high.batches["index"].min() < 5000 < 2**31 < high.batches["index"].max()
@@ -117,12 +108,6 @@ def test_a_unit_that_boots_half_way_has_two_clocks():
 def test_a_clock_that_jumps_is_another_clock():
     rng = np.random.default_rng(5)
     heard = joined(unit(rng, 15.0), unit(rng, 15.0, begin=1015.5, booted=-415.52, first=9000))
-    assert np.abs(heard.error()).max() < 3e-4
-
-
-def test_an_index_that_begins_anew_by_itself_is_another_count():
-    rng = np.random.default_rng(16)
-    heard = joined(unit(rng, 15.0), unit(rng, 15.0, begin=1015.5, booted=-415.5))
     assert np.abs(heard.error()).max() < 3e-4
 
 
@@ -186,15 +171,6 @@ def test_a_clock_heard_for_seconds_is_as_good_as_its_best_bounds():
     heard.batches["offset"][:120] += np.linspace(0.004, 0.001, 120)
     heard.batches["bound"][:120] += np.linspace(0.004, 0.001, 120)
     assert np.abs(heard.error()).max() < 4e-4
-
-
-def test_bounds_that_are_loose_for_a_while_count_little():
-    rng = np.random.default_rng(11)
-    heard = unit(rng)
-    bad = slice(0, 700)
-    heard.batches["offset"][bad] += 0.005
-    heard.batches["bound"][bad] = 0.025
-    assert np.abs(heard.error()).max() < 1e-3
 
 
 def test_what_is_not_known_is_nan_and_left_out_when_retimed():

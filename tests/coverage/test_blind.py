@@ -25,11 +25,9 @@ def test_the_back_of_a_capsule_with_a_unit_in_front(tmp_path):
     assert back.area_m2 == pytest.approx(np.pi / 2 * 0.05 * 0.4 + 0.003, abs=0.0025)
     assert back.side == "back"
     assert back.center == pytest.approx([-0.045, 0.0, 0.2], abs=0.01)
-    assert (back.joint, back.share) == ("turn", 0.0)
-    assert back.from_joint_m == pytest.approx(0.205, abs=0.01)
-    assert back.sentence == (
-        f"one, its back, {back.from_joint_m:.2f} m from turn, facing -x of the link: {1e4 * back.area_m2:.0f} cm^2"
-    )
+    assert back.share == 0.0
+    place = ", ".join(f"{x:.2f}" for x in back.center)
+    assert back.sentence == (f"one, its back, facing -x at ({place}) m of the link: {1e4 * back.area_m2:.0f} cm^2")
 
 
 def test_a_side_that_changes_with_the_posture_has_no_name(tmp_path):

@@ -8,7 +8,6 @@ from scipy.spatial import cKDTree
 
 from pretouch.coverage.measure import Coverage
 from pretouch.coverage.ways import Ways
-from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray, IntArray
 
 BLIND = 0.1
@@ -31,10 +30,6 @@ class BlindSpot:
     """Axis of the link's frame that it faces."""
     side: str
     """Side of the arm in the base frame, or '' where that changes with the posture."""
-    joint: str
-    """Joint that the link is moved by."""
-    from_joint_m: float
-    """Distance of its middle from that joint's axis, at the joint [m]."""
     area_m2: float
     center: FloatArray
     """(3,) its middle, link frame [m]."""
@@ -44,11 +39,8 @@ class BlindSpot:
     @property
     def sentence(self) -> str:
         """Where it is, in plain words."""
-        its = f"its {self.side}, " if self.side else ""
-        return (
-            f"{self.link}, {its}{self.from_joint_m:.2f} m from {self.joint}, facing {self.facing} of the link:"
-            f" {1e4 * self.area_m2:.0f} cm^2"
-        )
+        its, place = f"its {self.side}, " if self.side else "", ", ".join(f"{x:.2f}" for x in self.center)
+        return f"{self.link}, {its}facing {self.facing} at ({place}) m of the link: {1e4 * self.area_m2:.0f} cm^2"
 
 
 def blind_spots(ways: Ways, coverage: Coverage) -> tuple[BlindSpot, ...]:
@@ -87,21 +79,12 @@ def _spot(ways: Ways, coverage: Coverage, points: IntArray) -> BlindSpot:
     normal = np.average(surface.normal[points], axis=0, weights=area)
     in_base = np.mean([kin.rotation[link] @ normal for kin in ways.postures], axis=0)
     steady = np.linalg.norm(in_base) > _STEADY
-    joint = int(np.flatnonzero(model.moved_by[link])[-1])
     free = float(coverage.free[:, points].sum())
     return BlindSpot(
         model.links[link],
         _AXES[int(_axis(normal[None])[0])],
         _SIDES[int(_axis(in_base[None])[0])] if steady else "",
-        model.joints[joint],
-        _from_joint(model, ways, link, joint, center),
         float(area.sum()),
         center,
         float(coverage.seen[:, points].sum()) / free,
     )
-
-
-def _from_joint(model: RobotModel, ways: Ways, link: int, joint: int, center: FloatArray) -> float:
-    """Distance [m] of a point (3,) of a link from where its joint is anchored: the same in all postures."""
-    kin = ways.postures[0]
-    return float(np.linalg.norm(kin.position[link] + kin.rotation[link] @ center - kin.anchor[joint]))

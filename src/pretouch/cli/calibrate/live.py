@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from itertools import count
 from pathlib import Path
 from shlex import join
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from pretouch.arms import ArmSetup, OpenedArm
 from pretouch.calibration.motion.follow import START_RAD, plan_controller
@@ -185,7 +186,7 @@ def _move(opened: OpenedArm, model: RobotModel, plans: list[Plan], measurements:
     with Progress(*columns, console=Console(stderr=True)) as bar:
         for plan in plans:
             task = bar.add_task("motion" if plan is plans[-1] else "motion to its start", total=plan.duration)
-            measurements.progress = _Advance(bar, task, controller.limits.period)
+            measurements.progress = partial(bar.advance, task, controller.limits.period)
             go(opened.arm, controller, plan, ending, measurements, opened.left_out)
             if ending.early:
                 return
@@ -193,16 +194,6 @@ def _move(opened: OpenedArm, model: RobotModel, plans: list[Plan], measurements:
     begin = clock.tick()
     while clock.tick() - begin < _AFTER_S:
         measurements.take()
-
-
-class _Advance:
-    """Advances a bar by a period at each step."""
-
-    def __init__(self, bar: Progress, task: TaskID, period: float) -> None:
-        self._bar, self._task, self._period = bar, task, period
-
-    def __call__(self) -> None:
-        self._bar.advance(self._task, self._period)
 
 
 def _again(command: "CalibrateArm[Any]", place: Path) -> str:
