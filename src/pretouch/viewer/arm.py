@@ -50,8 +50,10 @@ def coloured(mesh: trimesh.Trimesh, colours: FloatArray) -> bytes:
 
     It is the one format in which the page takes them.
     """
-    shape = trimesh.Trimesh(mesh.vertices, mesh.faces, vertex_normals=mesh.vertex_normals, process=False)
-    shape.visual.vertex_colors = palette.as_vertex(colours)
+    painted = trimesh.visual.ColorVisuals(vertex_colors=palette.as_vertex(colours))
+    shape = trimesh.Trimesh(
+        mesh.vertices, mesh.faces, vertex_normals=mesh.vertex_normals, visual=painted, process=False
+    )
     # without normals the page would draw each triangle flat
     data = trimesh.exchange.gltf.export_glb(trimesh.Scene(shape), include_normals=True, tree_postprocessor=_matt)
     return bytes(data)

@@ -1,6 +1,7 @@
 """The surface of a body made of capsules, with vertices dense enough to be coloured."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import trimesh
@@ -18,7 +19,14 @@ AROUND = 18
 def surface_of(capsules: Capsules, around: int = AROUND) -> trimesh.Trimesh:
     """Join the surfaces of capsules, at least one. Parts inside other capsules stay: they are not seen."""
     parts = zip(capsules.a, capsules.b, capsules.radius, strict=True)
-    return trimesh.util.concatenate([_surface(a, b, float(radius), around) for a, b, radius in parts])
+    return joined([_surface(a, b, float(radius), around) for a, b, radius in parts])
+
+
+def joined(meshes: Sequence[trimesh.Trimesh]) -> trimesh.Trimesh:
+    """Put meshes into one."""
+    mesh = trimesh.util.concatenate(meshes)
+    assert isinstance(mesh, trimesh.Trimesh)  # noqa: S101  of meshes it is one
+    return mesh
 
 
 def _surface(a: FloatArray, b: FloatArray, radius: float, around: int) -> trimesh.Trimesh:

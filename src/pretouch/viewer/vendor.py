@@ -9,6 +9,7 @@ from trimesh import Trimesh
 
 from pretouch.extras import MESHES
 from pretouch.robot.model import RobotModel
+from pretouch.viewer.surface import joined
 
 _PACKAGE = "example-robot-data"
 
@@ -41,7 +42,7 @@ def _surface(folder: Path, link: str) -> Trimesh:
     fingers = [_read(folder / "finger.dae") for _ in range(2)]
     fingers[1].apply_transform(np.diag([-1.0, -1.0, 1.0, 1.0]))
     raised = [finger.apply_translation((0, 0, _FINGER_HEIGHT_M)) for finger in fingers]
-    return trimesh.util.concatenate([mesh, *map(coarse, raised)])
+    return joined([mesh, *map(coarse, raised)])
 
 
 def _read(file: Path) -> Trimesh:
