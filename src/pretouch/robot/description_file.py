@@ -32,7 +32,7 @@ def load_description(path: Path | str) -> RobotDescription:
         path = path / FILE
     data = _read(path)
     _check_keys(path, data, (*_WORDS, *_LISTS, "envelope"))
-    words = {key: _word(path, data, key) for key in _WORDS if key != "source"}
+    words = {key: _word(path, data, key) for key in _WORDS}
     n = len(_numbers(path, data, "q_ready", "rad", None))
     lists = {key: _numbers(path, data, key, unit, n) for key, unit in _LISTS.items()}
     try:
@@ -44,7 +44,7 @@ def load_description(path: Path | str) -> RobotDescription:
             qdd_max=lists["qdd_max"],
             tau_max=lists["tau_max"],
             q_ready=lists["q_ready"],
-            source=_text(path, data, "source"),
+            source=words["source"],
             envelope=_envelope(path, data["envelope"], n) if "envelope" in data else None,
         )
     except (RobotModelError, OSError) as error:  # a file's name may be too long to look for
@@ -53,10 +53,7 @@ def load_description(path: Path | str) -> RobotDescription:
 
 
 def description_text(arm: RobotDescription, mjcf: str = "") -> str:
-    """Return the robot.toml that `load_description` reads back to the same arm, beside its MJCF file.
-
-    `mjcf` is what that file is called there, if not by its own name.
-    """
+    """Return the robot.toml that `load_description` reads back to the same arm, beside its MJCF file of this name."""
     given = {"name": arm.name, "mjcf": mjcf or arm.mjcf.name, "ee_body": arm.ee_body, "source": arm.source}
     lists = {key: [float(v) for v in getattr(arm, key)] for key in _LISTS}
     return tomli_w.dumps(given | lists | ({} if arm.envelope is None else {"envelope": _envelope_table(arm.envelope)}))
@@ -71,7 +68,7 @@ def _envelope(path: Path, table: Any, n: int) -> SpeedEnvelope:
         raise RobotModelError(f"{path}: envelope is {_shown(table)}: give a table [envelope].")
     _check_keys(path, table, (*_ENVELOPE, "source"))
     numbers = {key: _numbers(path, table, key, unit, n) for key, unit in _ENVELOPE.items()}
-    return SpeedEnvelope(**numbers, source=_text(path, table, "source"))
+    return SpeedEnvelope(**numbers, source=_word(path, table, "source"))
 
 
 def _check_keys(path: Path, table: dict[str, Any], keys: tuple[str, ...]) -> None:
@@ -102,15 +99,8 @@ def _read(path: Path) -> dict[str, Any]:
 
 def _word(path: Path, data: dict[str, Any], key: str) -> str:
     value = data.get(key)
-    if not isinstance(value, str) or not value.isprintable() or not value:
+    if not isinstance(value, str) or (key != "source" and not (value.isprintable() and value)):
         raise RobotModelError(f"{path}: {key} is {_shown(value)}: give printable text in quotes.")
-    return value
-
-
-def _text(path: Path, data: dict[str, Any], key: str) -> str:
-    value = data.get(key)
-    if not isinstance(value, str):
-        raise RobotModelError(f"{path}: {key} is {_shown(value)}: give text in quotes.")
     return value
 
 
