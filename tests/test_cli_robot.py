@@ -33,11 +33,11 @@ def test_an_arm_is_imported_checked_and_reported(tmp_path, capsys):
     told += ["--capsules", "1"]
     assert main(told) == 0
     printed = capsys.readouterr().out
-    for part in ("sixer: 6 joints, end-effector tool0", "whole arm", "sticks out", "manipulability", "Written: "):
+    for part in ("sixer: 6 joints, end-effector tool0", "stand over", "sticks out", "manipulability", "Written: "):
         assert part in printed
     assert "of its capsules most, by" in printed
     assert "raise approach.d_repulse_m by as much, or import with --cover" in printed
-    assert json.loads(numbers.read_text())["whole_arm"]["points"] > 500
+    assert json.loads(numbers.read_text())["links"]["link1"]["sticks_out_m"] > 1e-3
     assert main(["robot", "check", str(out)]) == 0
     assert "No problem found" in capsys.readouterr().out
     assert main(told) == 2
@@ -73,7 +73,7 @@ def test_misuse_is_one_sentence(tmp_path, capsys, more, sentence):
 @pytest.mark.parametrize(
     ("name", "old", "new", "sentence"),
     [
-        ("arm.xml", 'name="base_0" type="capsule" size="', 'name="base_0" type="capsule" size="0.7 0.1" friction="',
+        ("arm.xml", 'name="base_0" size="', 'name="base_0" size="0.7 0.1" friction="',
          "overlap by"),
         ("robot.toml", '"tool0"', '"hand"', "ee_body: The link 'hand' is unknown: choose from base"),
         ("robot.toml", "1.2", "9.2", "q_ready is [0.0, 0.3, 9.2, 0.0, 1.6, 0.0]: give 6 joint positions"),

@@ -9,10 +9,9 @@ from pretouch.calibration.calibrate import calibrate
 from pretouch.calibration.mounting import moved_out
 from pretouch.calibration.skin_of import skin_of
 from pretouch.errors import CalibrationError
-from pretouch.sensing.seat import seat
 from pretouch.sensing.sensor import VL53L5CX
 from pretouch.sensing.skin import Skin, load_skin, save_skin
-from pretouch.sensing.unit import TouchPatch
+from pretouch.sensing.unit import TouchPatch, seat
 from tests.calibration.faulty import on_the_table
 from tests.calibration.made import turned
 

@@ -13,8 +13,8 @@ from pretouch.coverage.suggest import HEIGHT_M, candidates, greedy, suggest
 from pretouch.coverage.surface import surface_of
 from pretouch.coverage.ways import seen_by, ways_met, ways_to
 from pretouch.errors import SkinError
-from pretouch.sensing.seat import seat
 from pretouch.sensing.skin import Skin, load_skin, save_skin
+from pretouch.sensing.unit import seat
 from pretouch.sim.scene import SceneSpec, fixtures
 
 

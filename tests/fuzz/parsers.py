@@ -16,7 +16,7 @@ from pretouch.imported_data.log import Choice
 from pretouch.imported_data.reading import open_log
 from pretouch.imported_data.torques import torque_recording
 from pretouch.importing.chain import arm_of
-from pretouch.importing.read import read_source
+from pretouch.importing.read import read_robot
 from pretouch.profiles import profile
 from pretouch.recording.reader import open_recording
 from pretouch.recording.skin_reader import read_skin
@@ -24,8 +24,8 @@ from pretouch.recording.skin_recording import SkinRecording
 from pretouch.robot.description import panda
 from pretouch.robot.description_file import description_text, load_description
 from pretouch.robot.model import RobotModel
-from pretouch.robot.residual_file import Residual, load_residual, save_residual
 from pretouch.sensing.skin import load_skin, paper_skin, skin_file
+from pretouch.session.residual_file import Residual, load_residual, save_residual
 from pretouch.sim.randomisation import FOLDER, world_set
 from pretouch.types import RangeStatus
 from tests.hardware.fake_unit import KEYS, Bench
@@ -133,7 +133,7 @@ def _of_tables(folder: Path, model: RobotModel) -> dict[str, Parser]:
 
 def _of_robots(folder: Path) -> dict[str, Parser]:
     tags = tuple(f"<{tag}>".encode() for tag in ("link", "joint", "geometry", "mesh", "/a"))
-    read = _file(folder, "arm.urdf", lambda place: arm_of(read_source(place)))
+    read = _file(folder, "arm.urdf", lambda place: arm_of(read_robot(place)))
     return {"URDF": Parser([six_axis().encode()], read, words=tags)}
 
 

@@ -8,8 +8,8 @@ from tests.importing.made import six_axis, written
 
 from pretouch.cli import main
 from pretouch.errors import RobotModelError
-from pretouch.importing.described import described
-from pretouch.robot.named import is_description, robot_named
+from pretouch.importing.described import described, is_description
+from pretouch.robot.named import robot_named
 
 
 @pytest.fixture
@@ -71,7 +71,7 @@ def test_without_the_package_it_is_said_how_to_get_it(monkeypatch):
 
 
 def test_an_arm_of_such_a_name_has_to_be_imported_first(tmp_path, monkeypatch):
-    with pytest.raises(RobotModelError, match="`pretouch robot import ur5e_mj_description --out ur5e`"):
+    with pytest.raises(RobotModelError, match=r"no arm 'ur5e_mj_description': .*`pretouch robot import FILE"):
         robot_named("ur5e_mj_description")
     monkeypatch.chdir(tmp_path)
     (tmp_path / "my_description").mkdir()

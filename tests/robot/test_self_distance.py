@@ -8,7 +8,7 @@ from scipy.stats import qmc
 
 from pretouch.robot.description import RobotDescription, fr3, panda
 from pretouch.robot.model import RobotModel
-from pretouch.robot.self_distance import capsule_ends, kinematics_of, pairs_apart, segment_distance, self_distances
+from pretouch.robot.self_distance import capsule_ends, kinematics_of, segment_distance, self_distances
 
 ARMS = [panda(), fr3()]
 
@@ -31,7 +31,7 @@ def test_distances_are_those_mujoco_finds_between_its_geoms(arm: RobotDescriptio
     for s, row in enumerate(q):
         data.qpos[:] = row
         mujoco.mj_kinematics(physics, data)
-        expected = [mujoco.mj_geomDistance(physics, data, int(i), int(j), 5.0, ends) for i, j in pairs_apart(model)]
+        expected = [mujoco.mj_geomDistance(physics, data, int(i), int(j), 5.0, ends) for i, j in model.apart]
         np.testing.assert_allclose(found[s], expected, atol=1e-6)
 
 
@@ -39,7 +39,7 @@ def test_distances_are_those_mujoco_finds_between_its_geoms(arm: RobotDescriptio
 def test_every_pair_comes_apart_somewhere_and_neighbours_are_no_pair(arm: RobotDescription):
     model = RobotModel(arm)
     assert np.all(distances(model, postures(model, 256)).max(axis=0) > 0.05)
-    links = {tuple(sorted(pair)) for pair in model.capsules.link[pairs_apart(model)].tolist()}
+    links = {tuple(sorted(pair)) for pair in model.capsules.link[model.apart].tolist()}
     number = model.link_index
     name = arm.name
     assert (number(f"{name}_link5"), number(f"{name}_hand")) in links
@@ -59,7 +59,7 @@ def test_turning_the_base_changes_no_distance_between_the_links_it_turns(panda_m
     q = np.repeat(panda_model.description.q_ready[None], 2, axis=0)
     q[1, 0] = 1.3
     base = panda_model.link_index("panda_link0")
-    moved = panda_model.capsules.link[pairs_apart(panda_model)].min(axis=1) > base
+    moved = panda_model.capsules.link[panda_model.apart].min(axis=1) > base
     found = distances(panda_model, q)[:, moved]
     np.testing.assert_allclose(found[0], found[1], atol=1e-12)
 

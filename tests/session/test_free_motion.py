@@ -18,9 +18,9 @@ from pretouch.recording.verify import verify
 from pretouch.recording.writer import Recording
 from pretouch.robot.description import fr3
 from pretouch.robot.model import RobotModel
-from pretouch.robot.residual_file import Residual, save_residual
 from pretouch.sensing.skin import paper_skin as skin_of_arm
 from pretouch.session.free_motion import FreeMotion, ModelFile, model_file_of
+from pretouch.session.residual_file import Residual, save_residual
 from tests.following_arm import Arm
 
 PROFILE = PROFILES["pretouch"]

@@ -9,7 +9,7 @@ from pretouch.calibration.observability import Observability
 from pretouch.calibration.params import CalibrationParams
 from pretouch.calibration.result import Finding
 from pretouch.robot.model import RobotModel
-from pretouch.sensing.seat import seat
+from pretouch.sensing.unit import seat
 from pretouch.types import FloatArray
 
 _UNUSUAL = 5.0

@@ -3,7 +3,7 @@
 import numpy as np
 
 from pretouch.robot.model import RobotModel
-from pretouch.sensing.seat import seat
+from pretouch.sensing.unit import seat
 from pretouch.types import FloatArray
 
 DEEPEST = 0.02

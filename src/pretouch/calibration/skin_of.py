@@ -8,9 +8,8 @@ from pretouch.calibration.mounting import moved_out
 from pretouch.calibration.result import Calibration, UnitCalibration
 from pretouch.errors import CalibrationError
 from pretouch.robot.model import RobotModel
-from pretouch.sensing.seat import seat
 from pretouch.sensing.skin import Skin
-from pretouch.sensing.unit import LARGEST_ORIENTATION_SIGMA, LARGEST_POSITION_SIGMA, SensorUnit
+from pretouch.sensing.unit import LARGEST_ORIENTATION_SIGMA, LARGEST_POSITION_SIGMA, SensorUnit, seat
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,7 +1,6 @@
 """Importing an arm on the command line: the report of what was read, fitted and assumed."""
 
 import re
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,14 +11,12 @@ from pretouch.cli.tables import show
 from pretouch.cli.words import words
 from pretouch.cli.writing import numbers_to
 from pretouch.errors import ParameterError
-from pretouch.importing.body import FARTHEST, FitError
-from pretouch.importing.described import described
+from pretouch.importing.described import described, is_description
 from pretouch.importing.folder import check_free, write_folder
-from pretouch.importing.read import read_source
+from pretouch.importing.read import read_robot
 from pretouch.importing.robot_import import Imported, ImportOptions, import_robot
-from pretouch.robot.named import is_description
 from pretouch.sensing.skin import OWN_SKIN
-from pretouch.text_table import TextTable
+from pretouch.text_table import TextTable, tabulated
 
 if TYPE_CHECKING:
     from pretouch.cli.robot_commands import Import
@@ -45,7 +42,7 @@ def import_arm(command: "Import") -> None:
         capsules=command.capsules,
         cover=command.cover,
     )
-    folder = Path(command.out or _file_name(command.name or read_source(file, options.packages).name))
+    folder = Path(command.out or _file_name(command.name or read_robot(file, options.packages).name))
     check_free(folder)
     with numbers_to(command.json) as write:
         write(_imported(command, file, options, folder))
@@ -80,25 +77,17 @@ def _file_name(name: str) -> str:
 
 
 def _capsules(found: Imported) -> TextTable:
-    rows = []
-    for body in found.bodies:
-        name = found.arm.source.links[body.link].name
-        rows.append((name, str(len(body.rods)), *_row(body.error), f"{1000 * body.sticks_out:.1f}"))
-    out = max((body.sticks_out for body in found.bodies), default=0.0)
-    rows.append(("whole arm", str(sum(len(b.rods) for b in found.bodies)), *_row(found.error), f"{1000 * out:.1f}"))
-    note = (
-        f"Distance to the capsules minus distance to the surfaces, of points outside within {FARTHEST:g} m; of the"
-        f" whole arm in {found.error.points} places in many postures. Negative: the capsules extend beyond the surface."
-        " Last: the largest distance by which the surface sticks out of the capsules; a person may be closer by that"
-        " much."
+    columns = (
+        ("link", lambda body: body.name),
+        ("capsules", lambda body: str(len(body.rods))),
+        ("stand over\n[mm]", lambda body: f"{1000 * body.stands_over:.1f}"),
+        ("sticks out\n[mm]", lambda body: f"{1000 * body.sticks_out:.1f}"),
     )
-    header = ("link", "capsules", "p5\n[mm]", "p95\n[mm]", "largest\n[mm]", "rms\n[mm]", "sticks out\n[mm]")
-    return TextTable("Capsules for the links", header, tuple(rows), note, 1)
-
-
-def _row(error: FitError) -> tuple[str, ...]:
-    values = (error.p5, error.p95, error.largest, error.rms)
-    return tuple(f"{1000 * value:.1f}" if error.points else "-" for value in values)
+    note = (
+        "By how much the capsules stand over the surface at most, and it sticks out of them: a person may be that much"
+        " closer."
+    )
+    return tabulated("Capsules for the links", columns, found.bodies, note, 1)
 
 
 def _said(found: Imported) -> list[str]:
@@ -111,28 +100,23 @@ def _said(found: Imported) -> list[str]:
 
 def _sticking_out(found: Imported) -> list[str]:
     """Name the moving link that sticks out most, and say what to do about it."""
-    links, model = found.arm.source.links, found.model
-    moving = [body for body in found.bodies if model.moved_by[model.link_index(links[body.link].name)].any()]
+    model = found.model
+    moving = [body for body in found.bodies if model.moved_by[model.link_index(body.name)].any()]
     worst = max(moving, key=lambda body: body.sticks_out)
     if worst.sticks_out < _NEGLIGIBLE:
         return []
     return [
-        f"Of the moving links {links[worst.link].name} sticks out of its capsules most, by"
-        f" {1000 * worst.sticks_out:.1f} mm: raise approach.d_repulse_m by as much, or import with --cover."
+        f"Of the moving links {worst.name} sticks out of its capsules most, by {1000 * worst.sticks_out:.1f} mm: raise"
+        " approach.d_repulse_m by as much, or import with --cover."
     ]
 
 
 def _numbers_of(found: Imported) -> dict[str, Any]:
     links = {
-        found.arm.source.links[body.link].name: {
+        body.name: {
             "capsules": len(body.rods), "fitted": body.fitted, "sticks_out_m": body.sticks_out,
-            **_fit_numbers(body.error),
+            "stands_over_m": body.stands_over,
         }
         for body in found.bodies
     }  # fmt: skip
-    fit = {"whole_arm": _fit_numbers(found.error), "links": links, "remarks": found.remarks}
-    return arm_numbers(found.model, found.ready) | fit
-
-
-def _fit_numbers(error: FitError) -> dict[str, float]:
-    return {key if key == "points" else f"{key}_m": value for key, value in asdict(error).items()}
+    return arm_numbers(found.model, found.ready) | {"links": links, "remarks": found.remarks}

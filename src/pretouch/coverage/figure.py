@@ -13,6 +13,7 @@ from pretouch.coverage.measure import Coverage
 from pretouch.coverage.surface import on_capsule
 from pretouch.coverage.ways import Ways
 from pretouch.perception.obstacles import sensor_poses
+from pretouch.robot.body import from_axes
 from pretouch.robot.model import Kinematics
 from pretouch.robot.vectors import placed
 from pretouch.sensing.skin import Skin
@@ -93,9 +94,7 @@ def _surface(ways: Ways, coverage: Coverage, kin: Kinematics) -> list[tuple[Floa
 def _inside(point: FloatArray, a: FloatArray, b: FloatArray, radius: FloatArray, own: int) -> BoolArray:
     """Whether points (N, 3) lie well inside a capsule that is not their own."""
     others = np.arange(len(radius)) != own
-    axis, rel = (b - a)[others], point[:, None] - a[others]
-    part = np.clip((rel * axis).sum(axis=2) / np.maximum((axis**2).sum(axis=1), 1e-12), 0.0, 1.0)
-    depth = radius[others] - np.linalg.norm(rel - part[..., None] * axis, axis=2)
+    depth = radius[others] - np.linalg.norm(from_axes(point, a[others], b[others])[1], axis=2)
     return np.asarray(depth.max(axis=1) > 0.003)
 
 

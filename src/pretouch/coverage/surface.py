@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pretouch.control.braking import tangents_of
-from pretouch.perception.closest import to_axis
-from pretouch.robot.body import Capsules
+from pretouch.robot.body import Capsules, from_axes
 from pretouch.robot.model import RobotModel
 from pretouch.types import BoolArray, FloatArray, IntArray
 
@@ -78,8 +77,6 @@ def on_capsule(
 
 def _inside(arm: Capsules, c: int, point: FloatArray) -> BoolArray:
     """Whether points (N, 3) of capsule c lie inside another one of its link."""
-    others = [int(i) for i in np.flatnonzero(arm.link == arm.link[c]) if i != c]
-    return np.array(
-        [any(to_axis(point, n, arm.a, arm.b, i)[1] < arm.radius[i] for i in others) for n in range(len(point))],
-        dtype=np.bool_,
-    )
+    others = (arm.link == arm.link[c]) & (np.arange(len(arm)) != c)
+    away = np.linalg.norm(from_axes(point, arm.a[others], arm.b[others])[1], axis=2)
+    return np.asarray((away < arm.radius[others]).any(axis=1))

@@ -1,5 +1,6 @@
 """Robots by the names that the package robot_descriptions of PyPI gives them: it fetches their files by git."""
 
+import re
 from difflib import get_close_matches
 from importlib import import_module
 from importlib.util import find_spec
@@ -8,6 +9,12 @@ from pathlib import Path
 from pretouch.errors import RobotModelError
 
 _PACKAGE = "robot_descriptions"
+_NAME = re.compile(r"[a-z][a-z0-9_]*_description")
+
+
+def is_description(name: str) -> bool:
+    """Whether a name is no file's or folder's, but like those of the package robot_descriptions, as ur5_description."""
+    return _NAME.fullmatch(name) is not None and not Path(name).exists()
 
 
 def described(name: str) -> tuple[Path, Path]:

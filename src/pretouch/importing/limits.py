@@ -11,7 +11,7 @@ from pretouch.types import FloatArray
 _ENDLESS = 2 * np.pi
 _SPEED, _ACCELERATION, _TORQUE = 1.0, 5.0, 50.0
 """Where nothing is known: slow, gentle and middling [rad/s, rad/s^2, Nm]."""
-_LARGEST_POSITION, _LARGEST_SPEED, _LARGEST_TORQUE = 100.0, 50.0, 5000.0
+_LARGEST_POSITION, _LARGEST_SPEED, _LARGEST_TORQUE = 4 * np.pi, 50.0, 5000.0
 """What no joint of an arm has [rad, rad/s, Nm]."""
 
 
@@ -58,7 +58,10 @@ def limits_of(
     ):
         beyond = [f"{joint.name} ({v:g} {unit})" for joint, v in zip(arm.joints, values, strict=True) if v > largest]
         if beyond:
-            remarks.append(f"Implausible {what} limits, correct them in the file or robot.toml: {', '.join(beyond)}.")
+            degrees = ", perhaps degrees in place of radians" if len(beyond) > 1 and what != "torque" else ""
+            remarks.append(
+                f"Implausible {what} limits{degrees}, correct them in the file or robot.toml: {', '.join(beyond)}."
+            )
     return Limits(ranges[:, 0], ranges[:, 1], speeds, accelerations, torques, tuple(remarks))
 
 

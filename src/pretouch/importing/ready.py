@@ -6,21 +6,21 @@ from functools import partial
 import numpy as np
 
 from pretouch.errors import RobotModelError
-from pretouch.importing.reaching import Pace, reached
 from pretouch.importing.sampling import spread
+from pretouch.robot.ik import Pace, posture_at
 from pretouch.robot.model import Kinematics, RobotModel
-from pretouch.robot.self_distance import capsule_ends, kinematics_of, pairs_apart, self_distances
+from pretouch.robot.self_distance import capsule_ends, kinematics_of, self_distances
 from pretouch.types import BoolArray, FloatArray
 
 _STARTS = 96
-_DRAWN, _FREE = Pace(80, 0.2, 1e-3, 0.02), Pace(80, 0.2, 1e-6, 0.0)
+_DRAWN, _FREE = Pace(80, 0.2, 1e-3, 0.02), Pace(80, 0.2, 1e-6)
 """First drawn to the middle of the joints' ranges; arms with small singular values get there only undrawn."""
 _TRIED = 100
 _ANYWHERE = 1000
 """Postures that are looked at where no hand in front of the base points down."""
 _IN_FRONT, _HEIGHT = 0.55, 0.4
 """Where the hand is to be, in front of the base and above it, as parts of the arm's reach."""
-_CLEAR = 0.02
+_CLEAR = 0.01
 """Least distance of the arm from itself and of its moving parts from the base's plane [m]."""
 _MARGIN = 0.1
 """Least distance of each joint from its limits, of its range or of two turns."""
@@ -78,7 +78,7 @@ def rated(model: RobotModel, q: FloatArray, apart: BoolArray | None = None) -> R
     if apart.any():
         between = self_distances(model, capsule_ends(model, kinematics_of(model, q[None])))[0, apart]
         at = int(between.argmin())
-        first, second = (model.links[model.capsules.link[c]] for c in pairs_apart(model)[apart][at])
+        first, second = (model.links[model.capsules.link[c]] for c in model.apart[apart][at])
         clear, nearest = float(between[at]), (first, second)
     return Ready(q, float(np.prod(values)) if model.n >= 6 else 0.0, float(values[-1]), clear, nearest)
 
@@ -106,7 +106,7 @@ def _hand_at(model: RobotModel, hand: FloatArray, pace: Pace) -> list[FloatArray
     """Return postures with the end-effector at a place (3,), pointing down, away from joint limits."""
     low, high = _near_middle(model, 0.8)
     starts = low + spread(_STARTS, model.n) * (high - low)
-    found = [reached(model, q, partial(_to_hand, model, hand), model.q_mid, pace) for q in starts]
+    found = [posture_at(model, q, partial(_to_hand, model, hand), model.q_mid, pace) for q in starts]
     return [q for q in found if q is not None and _room(model, q) > _MARGIN]
 
 
@@ -149,7 +149,7 @@ def pointing(model: RobotModel, kin: Kinematics) -> FloatArray:
 
 
 def ever_apart(model: RobotModel, by: float = 0.0) -> BoolArray:
-    """Whether the pairs (P,) of `pairs_apart` come apart, by more than `by` [m], in some of many postures.
+    """Whether the pairs (P,) of `RobotModel.apart` come apart, by more than `by` [m], in some of many postures.
 
     In a short wrist not all do; nor does an upper arm that turns close above its base, whatever the posture.
     """
@@ -160,7 +160,7 @@ def ever_apart(model: RobotModel, by: float = 0.0) -> BoolArray:
 
 def never_apart(model: RobotModel) -> tuple[tuple[str, str], ...]:
     """Pairs of links that `ever_apart` leaves out altogether: no capsules of theirs come apart."""
-    pairs = model.capsules.link[pairs_apart(model)]
+    pairs = model.capsules.link[model.apart]
     apart = {(int(a), int(b)) for a, b in pairs[ever_apart(model)]}
     rest = sorted({(int(a), int(b)) for a, b in pairs} - apart)
     return tuple((model.links[a], model.links[b]) for a, b in rest)

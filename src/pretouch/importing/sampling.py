@@ -6,14 +6,12 @@ from pretouch.types import FloatArray
 
 
 def spread(count: int, dimensions: int, skip: int = 20) -> FloatArray:
-    """Points (count, dimensions) of the unit cube: Halton's sequence after its first `skip` points, and each shifted.
-
-    The shift differs between dimensions: the sequence's columns of large primes begin alike.
-    """
-    from scipy.stats.qmc import Halton  # takes a third of a second, and all that imports this module may never need it
-
-    sequence = Halton(dimensions, scramble=False).fast_forward(1 + skip)
-    return (sequence.random(count) + 0.618034 * np.arange(dimensions)) % 1.0
+    """Points (count, dimensions) of the unit cube: multiples of an irrational vector after the first (Roberts 2018)."""
+    step = 2.0
+    for _ in range(40):  # the root of x^(d + 1) = x + 1
+        step = (1 + step) ** (1 / (dimensions + 1))
+    multiple = np.arange(1 + skip, 1 + skip + count)[:, None]
+    return np.asarray(multiple / step ** np.arange(1, dimensions + 1) % 1.0)
 
 
 def directions(u: FloatArray) -> FloatArray:

@@ -1,6 +1,5 @@
 """The arms that can be named: those of the package, and folders."""
 
-import re
 from pathlib import Path
 
 from pretouch.errors import RobotModelError
@@ -9,12 +8,6 @@ from pretouch.robot.description_file import load_description
 
 ROBOTS = {"panda": panda, "fr3": fr3}
 """Those that come with the package."""
-_DESCRIPTION = re.compile(r"[a-z][a-z0-9_]*_description")
-
-
-def is_description(name: str) -> bool:
-    """Whether a name is no file's or folder's, but like those of the package robot_descriptions, as ur5_description."""
-    return _DESCRIPTION.fullmatch(name) is not None and not Path(name).exists()
 
 
 def is_shipped(arm: RobotDescription) -> bool:
@@ -29,14 +22,9 @@ def robot_named(name: str) -> RobotDescription:
     """
     if name in ROBOTS:
         return ROBOTS[name]()
-    if is_description(name):
-        raise RobotModelError(
-            f"There is no arm {name!r} yet: import it first by `pretouch robot import {name} --out"
-            f" {name.split('_')[0]}`, and name that folder."
-        )
     if not Path(name).exists():
         raise RobotModelError(
             f"There is no arm {name!r}: take one of {', '.join(ROBOTS)}, or a folder that"
-            " `pretouch robot import` wrote."
+            " `pretouch robot import FILE --out FOLDER` wrote."
         )
     return load_description(name)

@@ -9,7 +9,7 @@ hand and the last link with the forearm, the forearm with the upper arm.
 import numpy as np
 
 from pretouch.robot.model import Kinematics, RobotModel
-from pretouch.types import FloatArray, IntArray
+from pretouch.types import FloatArray
 
 
 def kinematics_of(model: RobotModel, q: FloatArray) -> Kinematics:
@@ -30,19 +30,14 @@ def capsule_ends(model: RobotModel, kin: Kinematics) -> FloatArray:
     return kin.position[:, body.link, None] + ends @ kin.rotation[:, body.link].swapaxes(-1, -2)
 
 
-def pairs_apart(model: RobotModel) -> IntArray:
-    """Pairs of capsules (P, 2) that two joints or more part, by their index."""
-    return model.apart
-
-
 def self_distances(model: RobotModel, ends: FloatArray) -> FloatArray:
-    """Distances (S, P) [m] between the surfaces of the pairs of `pairs_apart`, negative in penetration.
+    """Distances (S, P) [m] between the surfaces of the pairs of `RobotModel.apart`, negative in penetration.
 
     Args:
         model: the arm.
         ends: (S, C, 2, 3) of `capsule_ends`.
     """
-    first, second = pairs_apart(model).T
+    first, second = model.apart.T
     a, b, radius = ends[:, first], ends[:, second], model.capsules.radius
     return segment_distance(a[..., 0, :], a[..., 1, :], b[..., 0, :], b[..., 1, :]) - radius[first] - radius[second]
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from pretouch.errors import RobotModelError
 from pretouch.groups import SurfaceArrays
-from pretouch.robot.body import Capsules
+from pretouch.robot.body import Capsules, from_axes
 from pretouch.types import BoolArray, FloatArray, IntArray
 
 SPACING_M = 0.025
@@ -79,7 +79,8 @@ def surface_of(
     for c in np.argsort(rigid[body.link], kind="stable"):
         point, normal, area = _on_capsule(a[c], b[c], float(body.radius[c]), spacing)
         others = (rigid[body.link] == rigid[body.link[c]]) & (np.arange(len(body)) != c)
-        free = _outside(point, a[others], b[others], body.radius[others])
+        away = np.linalg.norm(from_axes(point, a[others], b[others])[1], axis=2)
+        free = (away > body.radius[others]).all(axis=1)
         link = int(body.link[c])
         R = rotation[link]
         parts.append((
@@ -117,11 +118,3 @@ def _on_capsule(
         points.append(a + at * along + radius * normal)
         areas.append(np.full(count, 2 * np.pi * radius * width / count))
     return np.concatenate(points), np.concatenate(normals), np.concatenate(areas)
-
-
-def _outside(point: FloatArray, a: FloatArray, b: FloatArray, radius: FloatArray) -> BoolArray:
-    """Whether points (P, 3) lie outside all capsules given, (C, 3), (C, 3), (C,)."""
-    axis, rel = b - a, point[:, None] - a
-    part = np.clip((rel * axis).sum(axis=2) / np.maximum((axis**2).sum(axis=1), 1e-12), 0.0, 1.0)
-    far = np.linalg.norm(rel - part[:, :, None] * axis, axis=2)
-    return np.asarray((far > radius).all(axis=1))

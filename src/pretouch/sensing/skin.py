@@ -16,7 +16,6 @@ from pretouch.groups import Cones, SkinArrays
 from pretouch.robot.description import RobotDescription
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.network import NetworkUnits
-from pretouch.sensing.seat import seat
 from pretouch.sensing.sensor import PAPER_SENSOR, Sensor, cones_of
 from pretouch.sensing.sensor_types import own_type, sensor_called, sensor_tables, tables_of
 from pretouch.sensing.unit import (
@@ -26,6 +25,7 @@ from pretouch.sensing.unit import (
     SensorUnit,
     TouchPatch,
     mounted,
+    seat,
     zones_of,
 )
 from pretouch.toml_files import read_toml

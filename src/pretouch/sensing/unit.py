@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pretouch.errors import SkinError
+from pretouch.robot.body import from_axes
+from pretouch.robot.model import RobotModel
 from pretouch.sensing.sensor import PAPER_SENSOR, Sensor
 from pretouch.types import FloatArray
 
@@ -143,3 +145,24 @@ def mounted(units: Iterable[SensorUnit]) -> tuple[SensorUnit, ...]:
             T[:3, :3] = T[:3, :3] @ unit.sensor.looks()[0].T
             whole.append(replace(unit, id=unit.board, T_link_sensor=T, zone=None))
     return tuple(whole)
+
+
+@dataclass(frozen=True, eq=False)
+class Seat:
+    """A point of the surface of a link, below a unit."""
+
+    height: float
+    """Of the unit above it [m]; negative inside."""
+    normal: FloatArray
+    """(3,) unit vector outwards, link frame."""
+
+
+def seat(model: RobotModel, link: int, p: FloatArray) -> Seat | None:
+    """Return where the surface of a link is nearest to a point p (3,) in its frame [m]; None if it has no capsule."""
+    own = model.capsules.of_links(np.array([link]))
+    if not len(own):
+        return None
+    away = from_axes(p[None], own.a, own.b)[1][0]
+    distance = np.linalg.norm(away, axis=1)
+    c = int((distance - own.radius).argmin())
+    return Seat(float(distance[c] - own.radius[c]), away[c] / max(float(distance[c]), 1e-9))

@@ -18,7 +18,7 @@ from pretouch.contact.sequential_test import SequentialTest
 from pretouch.controller import Controller
 from pretouch.errors import ParameterError, RobotModelError
 from pretouch.loop import Cycle
-from pretouch.robot.residual_file import Residual, load_residual, save_residual
+from pretouch.session.residual_file import Residual, load_residual, save_residual
 
 _FOLDER = "free-motion"
 _UNUSABLE = ".unusable"

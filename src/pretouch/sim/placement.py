@@ -10,7 +10,7 @@ from pretouch.control.posture import brought_to
 from pretouch.errors import ExperimentError
 from pretouch.robot.model import RobotModel
 from pretouch.robot.named import is_shipped
-from pretouch.robot.self_distance import capsule_ends, kinematics_of, pairs_apart, segment_distance, self_distances
+from pretouch.robot.self_distance import capsule_ends, kinematics_of, segment_distance, self_distances
 from pretouch.sim.board import HandSide, Side, sign_of
 from pretouch.sim.paper_scenes import Placement
 from pretouch.sim.plant_params import assumed_plant
@@ -148,7 +148,7 @@ def _check_room(model: RobotModel, postures: FloatArray) -> None:
     between = self_distances(model, ends)
     between = between[1:, apart := between[0] > 2 * _CLEAR_M]
     if between.min(initial=np.inf) <= _CLEAR_M:
-        nearest = pairs_apart(model)[apart][int(between.min(axis=0).argmin())]
+        nearest = model.apart[apart][int(between.min(axis=0).argmin())]
         links = " and ".join(model.links[model.capsules.link[c]] for c in nearest)
         raise _NotFollowed(f"{links} come within {1000 * _CLEAR_M:.0f} mm of each other")
     moved = np.isin(model.capsules.link, model.body.link)

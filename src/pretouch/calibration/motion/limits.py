@@ -7,7 +7,7 @@ from pretouch.calibration.motion.plan import Plan, PlanSamples
 from pretouch.errors import CalibrationError
 from pretouch.robot.description import SpeedEnvelope
 from pretouch.robot.model import RobotModel
-from pretouch.robot.self_distance import capsule_ends, kinematics_of, pairs_apart, self_distances
+from pretouch.robot.self_distance import capsule_ends, kinematics_of, self_distances
 from pretouch.types import BoolArray, FloatArray
 
 RATE_HZ = 50.0
@@ -38,11 +38,11 @@ class MotionLimits:
         self.qd_max: FloatArray = params.speed_share * arm.qd_max
         self.qdd_max: FloatArray = params.acceleration_share * arm.qdd_max
         self._moving: BoolArray = np.isin(model.capsules.link, model.body.link)
-        pairs = model.capsules.link[pairs_apart(model)]
+        pairs = model.capsules.link[model.apart]
         self._pair_names = [f"{model.links[a]} and {model.links[b]}" for a, b in pairs]
 
     def distances(self, ends: FloatArray) -> FloatArray:
-        """Distances (S, P + 1) [m] of the pairs of `pairs_apart`, then of the lowest moving part from the floor."""
+        """Distances (S, P + 1) [m] of the pairs of `RobotModel.apart`, then of the lowest moving part and the floor."""
         lowest = ends[..., 2][:, self._moving].min(axis=2) - self.model.capsules.radius[self._moving]
         height = lowest.min(axis=1, keepdims=True) - self.params.floor_m
         return np.hstack([self_distances(self.model, ends), height])

@@ -1,6 +1,6 @@
 """What was learnt of an arm's free motion, in a TOML file beside what else is known of the arm.
 
-The numbers are plain tables here: this layer knows no detector. `pretouch.session` brings them together.
+The numbers are plain tables here; `free_motion` brings them and the detector together.
 """
 
 from dataclasses import dataclass

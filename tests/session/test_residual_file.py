@@ -7,7 +7,7 @@ from numpy.testing import assert_array_equal
 from pretouch.contact.residual_model import kept, residual_init, resumed
 from pretouch.errors import RobotModelError
 from pretouch.params import SequentialParams
-from pretouch.robot.residual_file import Residual, load_residual, save_residual
+from pretouch.session.residual_file import Residual, load_residual, save_residual
 
 P = SequentialParams()
 
