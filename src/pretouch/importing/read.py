@@ -60,7 +60,7 @@ def _root(file: Path) -> ET.Element:
         data = file.read_bytes()
     except OSError as error:
         raise RobotModelError(f"The file {file} cannot be read: {error.strerror}: give a URDF or MJCF file.") from error
-    template = f"Xacro is left in the file {file}: make a URDF of it by `xacro {file.name} > arm.urdf` first."
+    template = f"Xacro is left in the file {file}: make a URDF of it by `xacro {file.name} -o expanded.urdf` first."
     try:
         root = ET.fromstring(data)  # noqa: S314  the user's own file
     except (ET.ParseError, ValueError, LookupError) as error:
