@@ -51,7 +51,7 @@ def test_an_imported_arm_gets_its_first_units(tmp_path, capsys):
     told = ["robot", "import", str(written(tmp_path, six_axis())), "--capsules", "1", "--ready", "0,0.3,1.2,0,1.6,0"]
     assert main([*told, "--out", str(arm)]) == 0
     skin = f"--suggest 8 --out {arm / 'skin.toml'}"
-    assert f"pretouch skin coverage --arm {arm} {skin}" in capsys.readouterr().out
+    assert f"pretouch skin coverage --arm {arm} --workspace joints {skin}" in capsys.readouterr().out
     told = ["skin", "coverage", "--arm", str(arm), "--workspace", "joints", "--postures", "3"]
     assert main(told) == 2
     assert skin in capsys.readouterr().err

@@ -57,8 +57,7 @@ def _imported(command: "Import", file: Path, options: ImportOptions, folder: Pat
     show(console, [joint_table(found.model, found.ready, links), _capsules(found)])
     for sentence in [*found.remarks, *_said(found)]:
         console.print(f"- {sentence}", markup=False, soft_wrap=True)
-    where = "" if found.model.n >= 6 else " --workspace joints"
-    units = f"pretouch skin coverage --arm {folder}{where} --suggest 8 --out {folder / OWN_SKIN}"
+    units = f"pretouch skin coverage --arm {folder} --workspace joints --suggest 8 --out {folder / OWN_SKIN}"
     after = f"Next, sensor units: {units}\nThen try it: pretouch live --arm {folder}"
     console.print(f"\nWritten: {folder}. {after}", markup=False, soft_wrap=True)
     return _numbers_of(found)

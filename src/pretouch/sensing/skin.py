@@ -185,7 +185,8 @@ def _seven_units(arm: RobotDescription) -> Path:
     if not path.is_file():
         raise SkinError(
             f"The arm {arm.name} comes without a skin: write {OWN_SKIN} beside its model, like {PAPER_SKIN.name}, or by"
-            f" `pretouch skin coverage --arm {arm.mjcf.parent} --suggest 8 --out {arm.mjcf.with_name(OWN_SKIN)}`."
+            f" `pretouch skin coverage --arm {arm.mjcf.parent} --workspace joints --suggest 8 --out"
+            f" {arm.mjcf.with_name(OWN_SKIN)}`."
         )
     return path
 
