@@ -14,12 +14,13 @@ from pretouch.errors import RecordingError
 from pretouch.loop import Cycle
 from pretouch.moving_fixtures import MovingFixtures
 from pretouch.payload import Payload
+from pretouch.recording import packing, ros
 from pretouch.recording.disk import Item
 from pretouch.recording.packing import marked, packed, unmarked, unpacked
 from pretouch.recording.ros import PACKED, decoded, encode, own, packed_message, value_of
 from pretouch.recording.run import packed_run
 from pretouch.recording.simulation import Truth
-from pretouch.recording.viewer_topics import nanoseconds
+from pretouch.recording.viewer_topics import KINDS, nanoseconds
 from pretouch.types import ControlStep, FloatArray, Inputs, RangeReadings, RobotState, SeenPoints, TouchReadings
 from pretouch.values import value
 
@@ -63,10 +64,20 @@ class KeptCycle(NamedTuple):
     truth: Truth | None
 
 
+def prepare() -> None:
+    """Make the code that packs and encodes cycles: at the first one, a control loop would wait for it."""
+    ros.prepare(*TOPICS.values(), *KINDS)
+    packing.prepare(_KeptInputs, ControllerState)
+    zero = np.zeros(1)
+    robot = RobotState(0.0, zero, zero, zero, zero, zero, None)
+    inputs_of(packed_inputs(Inputs(0.0, robot, RangeReadings(zero, zero, np.zeros(1, np.int64)))))
+
+
 class Cycles:
     """Makes what is kept of each cycle of one controller after the other."""
 
     def __init__(self, controller: Controller, about: Mapping[str, Any]) -> None:
+        prepare()
         self._about = dict(about)
         self._number = self._time = 0
         self._last = math.nan

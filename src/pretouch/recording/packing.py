@@ -66,6 +66,12 @@ def unpacked(kind: type[Value], data: bytes) -> Value:
         raise RecordingError(_unreadable(kind, error)) from error
 
 
+def prepare(kind: type, state: type) -> None:
+    """Make ready to unpack a class, and to pack one with parts: the first time takes some milliseconds."""
+    _decoder(kind)
+    _holds_parts(state)
+
+
 @cache
 def _decoder(kind: Any) -> Any:
     return msgspec.msgpack.Decoder(kind, dec_hook=_array)

@@ -123,6 +123,13 @@ def messages() -> Messages:
     return jazzy
 
 
+def prepare(*kinds: str) -> None:
+    """Make the code that encodes types, and all of ours: the first message would wait for it."""
+    messages().prepare(*kinds)
+    for name in OWN:
+        _getters(own(name))
+
+
 def own(name: str) -> str:
     """Return the full name of a type of ours."""
     return f"{PACKAGE}/msg/{name}"

@@ -13,12 +13,11 @@ from typing import Self
 
 from pretouch.controller import Controller
 from pretouch.loop import Cycle
-from pretouch.recording.cycles import TOPICS, Cycles, KeptCycle, inputs_of, items
+from pretouch.recording.cycles import Cycles, KeptCycle, inputs_of, items
 from pretouch.recording.disk import Disk, Item
-from pretouch.recording.ros import messages
 from pretouch.recording.run import JSON
 from pretouch.recording.simulation import Truth
-from pretouch.recording.viewer_topics import KINDS, ViewerTopics, imu_items
+from pretouch.recording.viewer_topics import ViewerTopics, imu_items
 from pretouch.robot.model import RobotModel
 from pretouch.signals import ended_in_order
 from pretouch.types import FloatArray
@@ -45,7 +44,6 @@ class CycleFile:
     def __init__(self, place: Path, controller: Controller, about: Mapping[str, JSON]) -> None:
         self._about = about
         self._model: RobotModel | None = None
-        messages().prepare(*TOPICS.values(), *KINDS)
         self.begin(controller)
         self.disk = Disk(place)
 
