@@ -17,11 +17,6 @@ def _model(kind: RobotKind) -> RobotModel:
     return RobotModel(panda() if kind == "panda" else fr3())
 
 
-def _model_beside(served: Any) -> RobotModel:
-    """A model of the served arm for this thread; the server goes on computing with its own."""
-    return RobotModel(served.arm.model.description)
-
-
 def test_a_motion_ends_where_its_velocities_lead(serve: Any, kind: RobotKind) -> None:
     done = serve(kind).ask("move", 1.0)
     assert done["error"] is None
@@ -107,7 +102,7 @@ def test_a_push_is_told_with_the_vendors_sign(serve: Any, kind: RobotKind) -> No
     np.testing.assert_allclose(came[:3], np.negative(force), atol=1.5)
     np.testing.assert_allclose(np.linalg.norm(K[:, :3], axis=1), np.linalg.norm(felt[:, :3], axis=1), rtol=1e-5)
     torques = np.array([one["tau_ext_hat_filtered"] for one in told])
-    model, q = _model_beside(served), np.array(told[0]["q"])
+    model, q = _model(kind), np.array(told[0]["q"])
     explained = model.ee_jacobian(model.kinematics(q))[:3].T @ np.negative(force)
     np.testing.assert_allclose(torques[during].mean(axis=0) - torques[before].mean(axis=0), explained, atol=0.6)
 
@@ -168,7 +163,7 @@ def test_the_vendors_library_computes_with_our_model(serve: Any, client: str, ro
     served = serve("fr3" if client == "fr3" else "panda")
     if client != "fr3" and shutil.which("cc") is None:
         skip_for("apt install gcc libc6-dev")
-    told, model = served.ask("model", kind=client), _model_beside(served)
+    told, model = served.ask("model", kind=client), _model("fr3" if client == "fr3" else "panda")
     q = np.array(told["q"])
     dynamics = model.dynamics(q, np.zeros(7))
     np.testing.assert_allclose(np.reshape(told["gravity"], 7), dynamics.gravity, atol=2e-2 * rough)

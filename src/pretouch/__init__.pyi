@@ -34,6 +34,7 @@ from pretouch.desired import Desired as Desired
 from pretouch.errors import PretouchError as PretouchError
 from pretouch.errors import RecordingError as RecordingError
 from pretouch.explanation import explain as explain
+from pretouch.groups import Kinematics as Kinematics
 from pretouch.limited import Limit as Limit
 from pretouch.limited import Limited as Limited
 from pretouch.loop import Cycle as Cycle
@@ -58,7 +59,6 @@ from pretouch.reporting.measures import measure as measure
 from pretouch.robot.description import RobotDescription as RobotDescription
 from pretouch.robot.description import fr3 as fr3
 from pretouch.robot.description import panda as panda
-from pretouch.robot.model import Kinematics as Kinematics
 from pretouch.robot.model import RobotModel as RobotModel
 from pretouch.robot.other_arm import OtherArm as OtherArm
 from pretouch.sensing.skin import Skin as Skin

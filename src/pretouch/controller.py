@@ -18,11 +18,11 @@ from pretouch.control import path as paths
 from pretouch.control.commander import Asked, asked_by, commanded
 from pretouch.control.interface import MotionBody, MotionRequest
 from pretouch.control.joint_box import joint_limits
-from pretouch.control.motion import Motion, MotionState, joint_motion, restriction_on
+from pretouch.control.motion import Motion, MotionState, joint_motion, motion_setup, restriction_on
 from pretouch.control.reduction import ReductionState, reduce_speed, speed_scale
-from pretouch.control.setup import motion_setup
 from pretouch.errors import RobotStateError, SkinError
 from pretouch.events import events_of
+from pretouch.groups import Kinematics
 from pretouch.modes import Event, ModeState, mode_init, next_mode
 from pretouch.payload import sound_payload
 from pretouch.perception.moving import beside, near_moving, sound_moving
@@ -31,7 +31,7 @@ from pretouch.perception.outside import OutsideState, outside_silence, see_outsi
 from pretouch.perception.perceive import nothing_seen, perceive, perception_setup, silent_units
 from pretouch.perception.scene_filter import Fixtures
 from pretouch.profiles import Profile
-from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.step_parts import Given, Near
 from pretouch.types import (

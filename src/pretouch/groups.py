@@ -19,6 +19,19 @@ class Arm(NamedTuple):
     """Index of the end-effector's link."""
 
 
+class Kinematics(NamedTuple):
+    """Where everything is in one posture, base frame. L links (bodies of the MJCF, world first), n joints."""
+
+    position: FloatArray
+    """(L, 3) link origins [m]."""
+    rotation: FloatArray
+    """(L, 3, 3) link orientations R_O_link."""
+    anchor: FloatArray
+    """(n, 3) a point on each joint's axis [m]."""
+    axis: FloatArray
+    """(n, 3) unit vectors of the joint axes."""
+
+
 class Chain(NamedTuple):
     """The moving joints (n,) in one posture: what a point's Jacobian and its speed are made of."""
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pretouch.contact.proximity_prior import nearest_of, nearness
+from pretouch.contact.hypotheses import nearest_of, nearness
 
 
 def test_nearness_by_numbers():

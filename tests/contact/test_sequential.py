@@ -7,9 +7,8 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.stats import multivariate_normal, multivariate_t
 
-from pretouch.contact.residual_windows import LENGTHS, LONGEST, window_means
 from pretouch.contact.sequential import Hypotheses, alarm_bound, explained_by_force, judge, log_ratio
-from pretouch.contact.window_scatter import white_means
+from pretouch.contact.window_scatter import LENGTHS, LONGEST, white_means, window_means
 from pretouch.params import SequentialParams
 from pretouch.types import FloatArray
 

@@ -4,10 +4,10 @@ from typing import Any
 
 from pretouch.control.interface import MotionBody, MotionRequest
 from pretouch.control.joint_box import JointLimits
-from pretouch.control.motion import Motion, MotionState, joint_motion, restriction_on
-from pretouch.control.setup import motion_setup
+from pretouch.control.motion import Motion, MotionState, joint_motion, motion_setup, restriction_on
+from pretouch.groups import Kinematics
 from pretouch.profiles import Profile
-from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.robot.model import RobotModel
 from pretouch.types import Obstacles, RobotState
 
 

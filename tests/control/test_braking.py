@@ -7,9 +7,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pretouch.control.braking import BrakingLimits, Mass, braking_cap, braking_rows, slots_init, tangents_of
+from pretouch.control.braking import (
+    BrakingLimits,
+    Mass,
+    TouchLimits,
+    braking_cap,
+    braking_rows,
+    slots_init,
+    tangents_of,
+)
 from pretouch.control.restriction import Rows
-from pretouch.control.touch_speed import TouchLimits
 from pretouch.groups import Chain, ObstacleArrays
 from pretouch.types import FloatArray
 

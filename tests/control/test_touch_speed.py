@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pretouch.cholesky import factor
-from pretouch.control.touch_speed import mass_along, touch_limits, touch_speed
+from pretouch.control.braking import mass_along, touch_limits, touch_speed
 from pretouch.params.anticipation import REGIONS, BrakingParams, EffectiveMass
 from pretouch.robot.model import RobotModel
 

@@ -6,13 +6,12 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
-from pretouch.groups import Sensors
+from pretouch.groups import Kinematics, Sensors
 from pretouch.perception.closest import closest_points
 from pretouch.perception.obstacles import placed_sensors, sensor_poses
 from pretouch.perception.scene_filter import Fixtures, expected_range, no_fixtures, ray_capsule
 from pretouch.robot.body import Capsules
 from pretouch.robot.description import panda
-from pretouch.robot.model import Kinematics
 from pretouch.sensing.sensor import PAPER_SENSOR, cone_rays, cones_of
 
 INF = np.inf

@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 
+from pretouch.groups import Kinematics
 from pretouch.params import PerceptionParams
 from pretouch.perception.obstacles import placed_sensors, track_init
 from pretouch.perception.perceive import perceive, perception_setup
 from pretouch.perception.scene_filter import Fixtures, expected_range, no_fixtures
 from pretouch.robot.body import Capsules
 from pretouch.robot.description import panda
-from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.robot.model import RobotModel
 from pretouch.sensing.sensor import PAPER_SENSOR
 from pretouch.sensing.skin import LIVE_SKIN, Skin, load_skin, paper_skin
 from pretouch.sim.misplacement import Misplacement, misplaced

@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from pretouch.robot.link_motion import chain_motion, lever_acceleration
+from pretouch.robot.kinematics import chain_motion, lever_acceleration
 from pretouch.robot.model import RobotModel
 
 

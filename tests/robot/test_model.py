@@ -1,5 +1,8 @@
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from threading import Barrier
 
 import mujoco
 import numpy as np
@@ -62,6 +65,63 @@ def test_turning_the_base_joint_turns_the_arm_to_the_left(panda_model):
     x, y, _ = kin.position[panda_model.ee]
     assert y > 0.3
     assert abs(x) < 1e-5
+
+
+TREE = """
+<mujoco><compiler angle="radian"/><default><joint range="-3 3" limited="true"/><geom type="capsule" size=".02 .1"/>
+</default><worldbody><body name="stand" pos=".1 -.2 .3" euler=".3 .2 -.5"><geom/>
+  <body name="shoulder" pos="0 .1 .2" quat=".5 .1 -.7 .4">
+    <joint name="a" axis="1 2 -1" pos=".03 .02 -.1"/><joint name="b" axis="0 1 0" pos="-.2 0 .1"/>
+    <joint name="c" axis="0 -.6 .8" ref=".4"/><geom/>
+    <body name="plate" pos=".3 0 .1" euler="1 0 .4"><geom/>
+      <body name="tip" pos="0 0 .2" euler="0 -.7 .2"><joint name="d" pos="0 .05 0" ref="-1.1"/><geom/></body></body>
+    <body name="other" pos="-.3 .1 0"><joint name="e" axis="1 0 0"/><geom/></body></body>
+  <body name="lamp" pos="0 .4 0" euler="0 1 2"><joint name="f" axis="1 1 1" pos=".1 .1 .1"/><geom/></body></body>
+</worldbody></mujoco>"""
+"""Branches, a link without a joint, three joints on one link, axes off the origin, and zeros that are none."""
+
+
+def tree(folder: Path) -> RobotDescription:
+    (folder / "tree.xml").write_text(TREE)
+    six = np.ones(6)
+    return RobotDescription("tree", folder / "tree.xml", "tip", six, six, six, 0.0 * six, "made")
+
+
+@pytest.mark.parametrize("arm", ["panda", "fr3", "tree"])
+def test_kinematics_are_those_of_mujoco(arm: str, tmp_path: Path):
+    description = {"panda": panda, "fr3": fr3, "tree": partial(tree, tmp_path)}[arm]()
+    model, mj = RobotModel(description), mujoco.MjModel.from_xml_path(str(description.mjcf))
+    data, rng = mujoco.MjData(mj), np.random.default_rng(5)
+    for _ in range(200):
+        data.qpos[:] = rng.uniform(-4.0, 4.0, model.n)
+        mujoco.mj_kinematics(mj, data)
+        kin = model.kinematics(data.qpos)
+        for ours, theirs in zip(kin, (data.xpos, data.xmat, data.xanchor, data.xaxis), strict=True):
+            np.testing.assert_allclose(ours, theirs.reshape(ours.shape), rtol=0, atol=1e-12)
+
+
+def test_two_threads_may_ask_one_model_at_once(panda_model: RobotModel):
+    postures = np.random.default_rng(8).uniform(panda_model.q_min, panda_model.q_max, (2000, 7))
+    together = Barrier(2, timeout=60)
+
+    def answers(order: slice) -> list[np.ndarray]:
+        together.wait()
+        rows = []
+        for q in postures[order]:
+            rows.append(np.vstack([panda_model.ee_jacobian(panda_model.kinematics(q)), panda_model.mass_matrix(q)]))
+        return rows
+
+    with ThreadPoolExecutor(2) as threads:
+        forwards, backwards = threads.map(answers, (slice(None), slice(None, None, -1)))
+    np.testing.assert_array_equal(forwards, backwards[::-1])
+    for q, row in zip(postures, forwards, strict=True):
+        np.testing.assert_array_equal(row[:6], panda_model.ee_jacobian(panda_model.kinematics(q)))
+
+
+@pytest.mark.parametrize("q", [np.zeros(6), np.zeros(8), np.zeros((7, 1)), 0.0])
+def test_joint_positions_of_another_number_are_refused(panda_model: RobotModel, q: np.ndarray):
+    with pytest.raises(ValueError, match="give 7 of them"):
+        panda_model.kinematics(q)
 
 
 @given(fraction=postures, link=moving_links, p_link=points)

@@ -5,7 +5,8 @@ from dataclasses import dataclass, field
 import mujoco
 import numpy as np
 
-from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.groups import Kinematics
+from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray
 
 _ROTATION_SLACK = 1e-3
@@ -80,9 +81,8 @@ def inertials(model: RobotModel) -> list[Inertial]:
     mj = mujoco.MjModel.from_xml_path(str(model.description.mjcf))
     found = []
     for body in range(mj.nbody):
-        matrix = np.zeros(9)
-        mujoco.mju_quat2Mat(matrix, mj.body_iquat[body])
-        R = matrix.reshape(3, 3)
+        R = np.zeros((3, 3))
+        mujoco.mju_quat2Mat(R.reshape(-1), mj.body_iquat[body])
         inertia = R @ np.diag(mj.body_inertia[body]) @ R.T
         found.append(Inertial(float(mj.body_mass[body]), mj.body_ipos[body].copy(), inertia))
     return found

@@ -2,8 +2,9 @@
 
 from pretouch.contact.detector import Body, Detection, Sample
 from pretouch.contact.window import add_force, window_init
+from pretouch.groups import Kinematics
 from pretouch.profiles import Profile
-from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import Obstacles, RobotState, TouchReadings
 

@@ -40,7 +40,7 @@ class Ros2Robot:
         if params.hold_s < period:
             raise RobotError(f"hold_s is {params.hold_s:g} s: give at least the control period, {period:g} s.")
         self.params, self._node = params, node
-        self._model = RobotModel(model.description)  # memory of its own
+        self._model = model
         self._joints = Joints(params.joint_names or model.joints, Stamps(params.shared_clock))
         self._wrench = Wrench(params, Stamps(params.shared_clock))
         self._states = node.subscribe(params.joint_states, JOINT_STATE, self._joints.take)

@@ -8,7 +8,7 @@ import numpy as np
 
 from pretouch.calibration.params import CalibrationParams
 from pretouch.calibration.signals import HALF_S, gaps, outside, rate_of_change, smooth, times
-from pretouch.robot.link_motion import chain_motion, lever_acceleration
+from pretouch.robot.kinematics import chain_motion, lever_acceleration
 from pretouch.robot.model import RobotModel
 from pretouch.traces import JointTrace
 from pretouch.types import BoolArray, FloatArray

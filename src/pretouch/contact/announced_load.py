@@ -10,9 +10,10 @@ from dataclasses import replace
 import numpy as np
 
 from pretouch.contact.residual_model import ResidualModel
+from pretouch.groups import Kinematics
 from pretouch.params import SequentialParams
 from pretouch.payload import Payload
-from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray, RobotState
 from pretouch.values import value
 

@@ -11,8 +11,7 @@ import numpy as np
 
 from pretouch.cholesky import factor, forward
 from pretouch.compiled import compiled
-from pretouch.contact.residual_windows import LENGTHS
-from pretouch.contact.window_scatter import FreeMeans, covariance_of_mean, spread_out
+from pretouch.contact.window_scatter import LENGTHS, FreeMeans, covariance_of_mean, spread_out
 from pretouch.types import FloatArray
 
 HELD_S = 0.1

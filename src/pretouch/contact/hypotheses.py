@@ -1,4 +1,9 @@
-"""The hypotheses of the sequential test in one posture, which `sequential.judge` weighs: contacts and their priors."""
+"""The hypotheses of the sequential test in one posture, which `sequential.judge` weighs: contacts and their priors.
+
+An object adds hypotheses, it takes none away: a force on the body's point nearest to it, away from it. How much they
+weigh depends on how soon it may touch. What no unit sees, or a unit whose reading is too old to be an obstacle, adds
+nothing, and all other contacts keep the weight they have without a skin.
+"""
 
 import math
 from typing import NamedTuple
@@ -6,12 +11,14 @@ from typing import NamedTuple
 import numpy as np
 
 from pretouch.compiled import compiled
-from pretouch.contact.proximity_prior import nearest_of, nearness
-from pretouch.contact.residual_windows import LENGTHS
 from pretouch.contact.sequential import Hypotheses
-from pretouch.groups import Mechanism, ObstacleArrays
-from pretouch.robot.model import Kinematics, jacobian_into
-from pretouch.types import FloatArray
+from pretouch.contact.window_scatter import LENGTHS
+from pretouch.groups import Kinematics, Mechanism, ObstacleArrays
+from pretouch.robot.kinematics import jacobian_into
+from pretouch.types import FloatArray, IntArray
+
+MOST = 4
+"""Objects that are taken into account, the nearest ones."""
 
 
 class NearPrior(NamedTuple):
@@ -74,3 +81,20 @@ def write_hypotheses(
                 for j in range(n):
                     speed += direction[k, a] * J[h, a, j] * qd[j]
             weight[n + h] = p.near_gain * nearness(distance[k], speed, p.near_m, p.near_horizon_s) * touch_gain[link]
+
+
+@compiled
+def nearness(distance: float, closing: float, near: float, horizon: float) -> float:
+    """How soon an object may touch, from 0 (not near) to 1 (touches within `horizon` [s]).
+
+    `distance` [m] is from the body's surface, `closing` [m/s] the speed at which it becomes less; a growing one counts
+    as it is.
+    """
+    ahead = distance - max(closing, 0.0) * horizon
+    return min(max(1.0 - ahead / near, 0.0), 1.0)
+
+
+@compiled
+def nearest_of(distance: FloatArray, most: int) -> IntArray:
+    """Indices of the smallest distances (K,), at most so many, the nearest first."""
+    return np.argsort(distance)[:most]

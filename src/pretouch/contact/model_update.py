@@ -15,9 +15,8 @@ from pretouch.contact.lasting_load import (
     weight_part,
 )
 from pretouch.contact.residual_model import BLOCK, QUEUE, CalmSample, Learnt, Pace, add_sample, learn_block
-from pretouch.contact.residual_windows import LENGTHS, LONGEST
 from pretouch.contact.turning import learn_turning
-from pretouch.contact.window_scatter import FreeMeans, learn_scatter
+from pretouch.contact.window_scatter import LENGTHS, LONGEST, FreeMeans, learn_scatter
 from pretouch.types import FloatArray
 
 CALM = BLOCK * QUEUE

@@ -3,9 +3,8 @@
 import numpy as np
 
 from pretouch.compiled import compiled, entry
-from pretouch.groups import CapsuleArrays
+from pretouch.groups import CapsuleArrays, Kinematics
 from pretouch.robot.body import Capsules
-from pretouch.robot.model import Kinematics
 from pretouch.types import BoolArray, FloatArray
 
 BRAKES_S = 0.2

@@ -21,9 +21,10 @@ import numpy as np
 from pretouch.cholesky import backward, factor, forward
 from pretouch.compiled import compiled, entry
 from pretouch.errors import ParameterError
-from pretouch.groups import Mechanism
+from pretouch.groups import Kinematics, Mechanism
 from pretouch.params import SequentialParams
-from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.robot.kinematics import column
+from pretouch.robot.model import RobotModel
 from pretouch.types import BoolArray, FloatArray
 from pretouch.values import value
 
@@ -149,10 +150,7 @@ def _carried(
     for j in range(len(growth)):
         V[j] = 0.0
         if moved[j]:
-            x, y, z = point[0] - anchor[j, 0], point[1] - anchor[j, 1], point[2] - anchor[j, 2]
-            V[j, 0] = axis[j, 1] * z - axis[j, 2] * y
-            V[j, 1] = axis[j, 2] * x - axis[j, 0] * z
-            V[j, 2] = axis[j, 0] * y - axis[j, 1] * x
+            V[j, 0], V[j, 1], V[j, 2] = column(anchor, axis, j, point[0], point[1], point[2])
             # J qdd only: what the velocities add to the acceleration is left out
             ax, ay, az = ax + V[j, 0] * growth[j], ay + V[j, 1] * growth[j], az + V[j, 2] * growth[j]
     for j in range(len(growth)):

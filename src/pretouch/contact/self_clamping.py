@@ -8,9 +8,10 @@ gap. See docs/explanation/reaction.md.
 
 import numpy as np
 
+from pretouch.groups import Kinematics
 from pretouch.params.reaction import PinchParams
 from pretouch.robot.body import Capsules
-from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.robot.model import RobotModel
 from pretouch.robot.self_distance import nearest_points
 from pretouch.types import FloatArray, IntArray, Touched
 from pretouch.values import value

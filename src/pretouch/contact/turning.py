@@ -9,7 +9,7 @@ an alarm because it turned round would do so for ever.
 import numpy as np
 
 from pretouch.compiled import compiled
-from pretouch.contact.residual_windows import LENGTHS
+from pretouch.contact.window_scatter import LENGTHS
 from pretouch.types import FloatArray
 
 _PRIOR = 0.3

@@ -11,9 +11,10 @@ from typing import NamedTuple
 import numpy as np
 
 from pretouch.compiled import ByName, compiled, entry
-from pretouch.groups import CapsuleArrays
+from pretouch.groups import CapsuleArrays, Chain, Kinematics
 from pretouch.params.reaction import AdmittanceParams
-from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.robot.kinematics import point_velocity
+from pretouch.robot.model import RobotModel
 from pretouch.types import BoolArray, FloatArray
 from pretouch.values import value
 
@@ -286,20 +287,13 @@ def fastest_point(kin: Kinematics, moved_by: BoolArray, capsules: CapsuleArrays,
 
     The speed along an axis is convex, so no point of it is faster than both its ends.
     """
-    position, rotation, anchor, axis = kin
-    link, a, b = capsules.link, capsules.a, capsules.b
+    position, rotation = kin.position, kin.rotation
+    link, a, b, chain = capsules.link, capsules.a, capsules.b, Chain(kin.anchor, kin.axis, moved_by, qd)
     fastest = 0.0
     for c in range(len(link)):
         k = link[c]
         for end in (a[c], b[c]):
             point = rotation[k] @ end + position[k]
-            # v = sum of qd_j a_j x (p - p_j) over the joints that move the link
-            vx, vy, vz = 0.0, 0.0, 0.0
-            for j in range(len(qd)):
-                if moved_by[k, j]:
-                    x, y, z = point[0] - anchor[j, 0], point[1] - anchor[j, 1], point[2] - anchor[j, 2]
-                    vx += (axis[j, 1] * z - axis[j, 2] * y) * qd[j]
-                    vy += (axis[j, 2] * x - axis[j, 0] * z) * qd[j]
-                    vz += (axis[j, 0] * y - axis[j, 1] * x) * qd[j]
-            fastest = max(fastest, np.sqrt(vx * vx + vy * vy + vz * vz))
+            x, y, z = point_velocity(chain, k, point[0], point[1], point[2])
+            fastest = max(fastest, np.sqrt(x * x + y * y + z * z))
     return fastest

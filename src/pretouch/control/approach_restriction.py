@@ -9,8 +9,8 @@ from pretouch.compiled import entry, flattened
 from pretouch.control.interface import CompiledRows, MotionBody, MotionRequest, Restricted, Restriction
 from pretouch.control.motion_entry import Allowed, Ended, Fixed, Step, motion_within
 from pretouch.control.restriction import ApproachParams, Rows, approach_params, approach_rows, rows_into
+from pretouch.groups import Kinematics
 from pretouch.params import RestrictionParams
-from pretouch.robot.model import Kinematics
 from pretouch.types import WHOLE, Obstacles, RobotState
 
 

@@ -13,18 +13,18 @@ from pretouch.control.braking import (
     BrakingLimits,
     Mass,
     Slots,
+    TouchLimits,
     braking_rows,
     slots_init,
+    touch_limits,
     widened,
 )
 from pretouch.control.interface import CompiledRows, MotionBody, MotionRequest, Restriction
 from pretouch.control.motion_entry import Allowed, Ended, Fixed, Step, motion_within
 from pretouch.control.restriction import Rows
-from pretouch.control.touch_speed import TouchLimits, touch_limits
-from pretouch.groups import Chain, Links, Mechanism, ObstacleArrays
+from pretouch.groups import Chain, Kinematics, Links, Mechanism, ObstacleArrays
 from pretouch.params import BrakingParams
-from pretouch.robot.mass_matrix import mass_matrix_into
-from pretouch.robot.model import Kinematics
+from pretouch.robot.kinematics import mass_matrix_into
 from pretouch.types import WHOLE, FloatArray, IntArray, Obstacles, RobotState
 
 

@@ -6,9 +6,10 @@ import numpy as np
 
 from pretouch.control.path import Following
 from pretouch.desired import Desired, DesiredKind, sound_desired
+from pretouch.groups import Kinematics
 from pretouch.modes import Event
 from pretouch.params import FailureParams, TaskParams
-from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray, RobotState
 from pretouch.values import value
 

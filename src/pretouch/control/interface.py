@@ -6,8 +6,9 @@ from pretouch.compiled import Entry
 from pretouch.composition import Part
 from pretouch.control.joint_box import JointLimits
 from pretouch.control.motion_entry import Ended
+from pretouch.groups import Kinematics
 from pretouch.params import TaskParams
-from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray, IntArray, Obstacles, RobotState
 from pretouch.values import value
 

@@ -1,18 +1,21 @@
 """From what is asked and what is allowed to joint velocities, in one compiled call."""
 
+import math
 from typing import Any
 
 import numpy as np
 
+from pretouch.compiled import flattened
 from pretouch.control.interface import CompiledRows, MotionBody, MotionRequest, Restricted, Restriction
 from pretouch.control.joint_box import box_and_brake
-from pretouch.control.motion_entry import given_motion
+from pretouch.control.motion_entry import Fixed, MotionNumbers, given_motion
+from pretouch.control.null_space import NullSpaceLimits
 from pretouch.control.penalty import SOLVED
-from pretouch.control.qp import ENDING, Cost, solve_hard
+from pretouch.control.qp import ENDING, Cost, cost_params, solve_hard
 from pretouch.control.restriction import ApproachRows
-from pretouch.control.setup import MotionSetup
 from pretouch.errors import ParameterError
-from pretouch.robot.model import Kinematics
+from pretouch.groups import Kinematics
+from pretouch.params import NullSpaceMotion
 from pretouch.types import WHOLE, FloatArray, IntArray, Obstacles, QpOutcome, QpSolution, RobotState
 from pretouch.values import value
 
@@ -38,6 +41,29 @@ class Motion:
     """(3,) measured velocity of the end-effector origin [m/s]."""
     ee_velocity_commanded: FloatArray
     """(3,) velocity of the end-effector origin with the joint velocities of the answer [m/s]."""
+
+
+@value
+class MotionSetup:
+    """A body, and how it moves."""
+
+    body: MotionBody
+    numbers: MotionNumbers
+    moves_away: bool
+    """Whether links before the hand move away in the null space."""
+    fields: tuple[Any, ...]
+    """Of `Fixed`, for compiled code."""
+
+
+def motion_setup(body: MotionBody, null_space: NullSpaceMotion | None, budget: int) -> MotionSetup:
+    """Return what `joint_motion` is made with; `budget` counts the factorisations after which it gives up."""
+    model, t, p, moves_away = body.model, body.task, null_space or NullSpaceMotion(), null_space is not None
+    within = p.distance_m if moves_away else -math.inf  # nothing is nearer than that, so nothing moves away
+    numbers = MotionNumbers(
+        cost_params(t), t.orientation_gain_1_s, t.orientation == "hold", budget, body.limits.table, model.q_mid,
+        t.mid_joint_projected, NullSpaceLimits(within, p.speed_m_s, p.joint_rad_s, p.rate_rad_s2 * t.control_period_s),
+    )  # fmt: skip
+    return MotionSetup(body, numbers, moves_away, flattened(Fixed(model.arm, numbers)))
 
 
 _NONE = np.zeros(0)

@@ -15,8 +15,8 @@ from pretouch.control.penalty import SOLVED, Minimum, Problem, excesses, minimis
 from pretouch.control.qp import CostParams, cost_into
 from pretouch.control.restriction import Rows
 from pretouch.control.task import twist
-from pretouch.groups import Arm, JointArrays, NearArrays
-from pretouch.robot.model import Kinematics, jacobian_into
+from pretouch.groups import Arm, JointArrays, Kinematics, NearArrays
+from pretouch.robot.kinematics import jacobian_into
 from pretouch.types import FloatArray, IntArray
 
 Ended = tuple[int, int, int, bool]

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pretouch.cholesky import backward, factor, forward
 from pretouch.compiled import compiled, inlined
 from pretouch.types import BoolArray, FloatArray, IntArray
 
@@ -306,27 +307,17 @@ def _box_minimum(
 def _newton_step(H: FloatArray, gradient: FloatArray, free: IntArray, L: FloatArray, step: FloatArray) -> bool:
     """Solve H step = -gradient for the free joints by a Cholesky factor L; False if H is not positive definite."""
     m = len(free)
+    part, pull = np.empty((m, m)), np.empty(m)
     for a in range(m):
+        pull[a] = -gradient[free[a]]
         for b in range(a + 1):
-            total = H[free[a], free[b]]
-            for c in range(b):
-                total -= L[a, c] * L[b, c]
-            if a == b:
-                if not total > 0:  # or NaN
-                    return False
-                L[a, a] = np.sqrt(total)
-            else:
-                L[a, b] = total / L[b, b]
+            part[a, b] = H[free[a], free[b]]
+    if not factor(part, L):
+        return False
+    forward(L, pull, pull)
+    backward(L, pull, pull)
     for a in range(m):
-        total = -gradient[free[a]]
-        for c in range(a):
-            total -= L[a, c] * step[free[c]]
-        step[free[a]] = total / L[a, a]
-    for a in range(m - 1, -1, -1):
-        total = step[free[a]]
-        for c in range(a + 1, m):
-            total -= L[c, a] * step[free[c]]
-        step[free[a]] = total / L[a, a]
+        step[free[a]] = pull[a]
     return True
 
 

@@ -4,8 +4,9 @@ import numpy as np
 
 from pretouch.control.task import rotation_error
 from pretouch.errors import ExperimentError
+from pretouch.groups import Kinematics
 from pretouch.robot.ik import Pace, posture_at
-from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray
 
 

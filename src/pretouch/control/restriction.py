@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 
 from pretouch.compiled import ByName, compiled, entry, inlined
-from pretouch.groups import NearArrays
+from pretouch.groups import Kinematics, NearArrays
 from pretouch.params import RestrictionParams
-from pretouch.robot.model import Kinematics
+from pretouch.robot.kinematics import column
 from pretouch.types import BoolArray, FloatArray, IntArray, Number, Obstacles
 from pretouch.values import value
 
@@ -137,12 +137,8 @@ def rows_into(kin: Kinematics, moved_by: BoolArray, near: NearArrays, p: Approac
         for j in range(len(anchor)):
             G[found, j] = 0.0
             if moved_by[link[k], j]:
-                x, y, z = point[k, 0] - anchor[j, 0], point[k, 1] - anchor[j, 1], point[k, 2] - anchor[j, 2]
                 # d . (a x (p - p_j)), column j of d^T J_c: all joints are hinges
-                G[found, j] = (
-                    dx * (axis[j, 1] * z - axis[j, 2] * y)
-                    + dy * (axis[j, 2] * x - axis[j, 0] * z)
-                    + dz * (axis[j, 0] * y - axis[j, 1] * x)
-                )
+                x, y, z = column(anchor, axis, j, point[k, 0], point[k, 1], point[k, 2])
+                G[found, j] = dx * x + dy * y + dz * z
         found += 1
     return found

@@ -12,9 +12,9 @@ from scipy.spatial import cKDTree
 from pretouch.coverage.measure import Coverage
 from pretouch.coverage.surface import on_capsule
 from pretouch.coverage.ways import Ways
+from pretouch.groups import Kinematics
 from pretouch.perception.obstacles import sensor_poses
 from pretouch.robot.body import from_axes
-from pretouch.robot.model import Kinematics
 from pretouch.robot.vectors import placed
 from pretouch.sensing.skin import Skin
 from pretouch.types import BoolArray, FloatArray

@@ -7,11 +7,11 @@ import numpy as np
 from pretouch.control.braking import tangents_of
 from pretouch.coverage.params import CoverageParams
 from pretouch.coverage.surface import Surface
-from pretouch.groups import CapsuleArrays, Sensors
+from pretouch.groups import CapsuleArrays, Kinematics, Sensors
 from pretouch.perception.obstacles import sensor_poses
 from pretouch.perception.scene_filter import Fixtures, expected_range
 from pretouch.perception.sighting import BallWays, Stretch, View, ways_free, ways_seen
-from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.robot.model import RobotModel
 from pretouch.robot.vectors import placed
 from pretouch.sensing.skin import Skin
 from pretouch.types import WHOLE, BoolArray, FloatArray, IntArray

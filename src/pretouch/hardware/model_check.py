@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from pretouch.checks import Checked, Fraction, Positive, PositiveCount
-from pretouch.groups import CapsuleArrays, Cones, Sensors
+from pretouch.groups import CapsuleArrays, Cones, Kinematics, Sensors
 from pretouch.hardware.findings import Finding
 from pretouch.perception.closest import bounds
 from pretouch.perception.obstacles import is_evidence, measured_distance, placed_sensors
 from pretouch.perception.scene_filter import Fixtures, expected_range, nearest_capsule, plane_return
 from pretouch.robot.body import Capsules
-from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.robot.model import RobotModel
 from pretouch.robot.vectors import placed
 from pretouch.sensing.skin import Skin
 from pretouch.types import BoolArray, FloatArray, RangeReadings

@@ -6,9 +6,10 @@ from functools import partial
 import numpy as np
 
 from pretouch.errors import RobotModelError
+from pretouch.groups import Kinematics
 from pretouch.importing.sampling import spread
 from pretouch.robot.ik import Pace, posture_at
-from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.robot.model import RobotModel
 from pretouch.robot.self_distance import capsule_ends, kinematics_of, self_distances
 from pretouch.types import BoolArray, FloatArray
 

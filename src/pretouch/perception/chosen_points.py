@@ -9,6 +9,7 @@ from pretouch.groups import CapsuleArrays, Chain
 from pretouch.perception.closest import ClosestArrays, closest, to_axis
 from pretouch.perception.closing import follow_points
 from pretouch.perception.obstacles import HEARD, SEEN, USED
+from pretouch.robot.kinematics import point_velocity
 from pretouch.robot.vectors import dot
 from pretouch.types import FloatArray, IntArray
 
@@ -251,18 +252,9 @@ def _gap(points: FloatArray, m: int, ends: FloatArray, radius: FloatArray) -> fl
 @compiled
 def move_ends(ends: FloatArray, link: IntArray, chain: Chain, age: float, out: FloatArray) -> None:
     """Write to `out` where the ends (2, C, 3) [m] of capsules on links (C,) were `age` [s] before, to first order."""
-    anchor, axis, moved_by, qd = chain
     for end in range(2):
         for c in range(len(link)):
-            x, y, z = 0.0, 0.0, 0.0
-            for j in range(len(qd)):
-                if moved_by[link[c], j]:
-                    u, v, w = (
-                        ends[end, c, 0] - anchor[j, 0], ends[end, c, 1] - anchor[j, 1], ends[end, c, 2] - anchor[j, 2],
-                    )  # fmt: skip
-                    x += (axis[j, 1] * w - axis[j, 2] * v) * qd[j]
-                    y += (axis[j, 2] * u - axis[j, 0] * w) * qd[j]
-                    z += (axis[j, 0] * v - axis[j, 1] * u) * qd[j]
+            x, y, z = point_velocity(chain, link[c], ends[end, c, 0], ends[end, c, 1], ends[end, c, 2])
             out[end, c, 0] = ends[end, c, 0] - age * x
             out[end, c, 1] = ends[end, c, 1] - age * y
             out[end, c, 2] = ends[end, c, 2] - age * z

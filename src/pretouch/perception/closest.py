@@ -5,9 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from pretouch.compiled import compiled, entry
-from pretouch.groups import CapsuleArrays
+from pretouch.groups import CapsuleArrays, Kinematics
 from pretouch.robot.body import Capsules
-from pretouch.robot.model import Kinematics
 from pretouch.robot.vectors import placed_capsules
 from pretouch.types import FloatArray, IntArray, Obstacles
 

@@ -7,11 +7,11 @@ import numpy as np
 
 from pretouch.arrays import real, real_number
 from pretouch.compiled import compiled, entry
-from pretouch.groups import CapsuleArrays
+from pretouch.groups import CapsuleArrays, Kinematics
 from pretouch.moving_fixtures import MovingFixtures
 from pretouch.perception.perceive import PerceptionSetup, perception_setup
 from pretouch.robot.body import Capsules
-from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.robot.model import RobotModel
 from pretouch.robot.vectors import dot, placed_capsules
 from pretouch.types import WHOLE, FloatArray, IntArray, Obstacles, RangeReadings
 

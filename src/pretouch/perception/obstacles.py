@@ -5,9 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from pretouch.compiled import compiled
-from pretouch.groups import Cones, Sensors
+from pretouch.groups import Cones, Kinematics, Sensors
 from pretouch.perception.closing import motion_init
-from pretouch.robot.model import Kinematics
 from pretouch.sensing.skin import Skin
 from pretouch.types import BoolArray, FloatArray, IntArray, Obstacles, RangeReadings, RangeStatus
 from pretouch.values import value

@@ -5,9 +5,8 @@ import math
 import numpy as np
 
 from pretouch.compiled import compiled
-from pretouch.groups import Sensors, SkinArrays
+from pretouch.groups import Kinematics, Sensors, SkinArrays
 from pretouch.perception.obstacles import pose_into
-from pretouch.robot.model import Kinematics
 from pretouch.types import BoolArray, FloatArray
 
 _ON_AXIS = math.cos(math.radians(0.5))

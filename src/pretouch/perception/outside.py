@@ -12,14 +12,14 @@ from typing import NamedTuple
 import numpy as np
 
 from pretouch.compiled import entry
-from pretouch.groups import CapsuleArrays, Chain
+from pretouch.groups import CapsuleArrays, Chain, Kinematics
 from pretouch.params import OutsidePoints
 from pretouch.perception.chosen_points import KeptPoints, Placed, PointNumbers, take_points
 from pretouch.perception.closest import ClosestArrays, closest, distances, joined
 from pretouch.perception.closing import closing_speeds
 from pretouch.perception.obstacles import HEARD, SEEN, TrackState, track_init
 from pretouch.perception.perceive import Perception, PerceptionSetup
-from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.robot.model import RobotModel
 from pretouch.robot.vectors import placed_ends
 from pretouch.types import WHOLE, FloatArray, IntArray, Obstacles, RobotState, SeenPoints
 from pretouch.values import value

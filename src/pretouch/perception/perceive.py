@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pretouch.compiled import entry, flattened, inlined
-from pretouch.groups import CapsuleArrays, Chain, Sensors, SkinArrays
+from pretouch.groups import CapsuleArrays, Chain, Kinematics, Sensors, SkinArrays
 from pretouch.params import PerceptionParams
 from pretouch.perception.chosen_points import PointNumbers
 from pretouch.perception.closest import ClosestArrays, closest, distances, no_obstacles
@@ -29,7 +29,7 @@ from pretouch.perception.out_of_view import give_up, looks_at
 from pretouch.perception.scene_filter import Fixtures, leave_out, leave_out_planes
 from pretouch.perception.spread import bring_nearer, widen
 from pretouch.perception.stamped import move_back
-from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.robot.model import RobotModel
 from pretouch.robot.vectors import placed_capsules, rotate
 from pretouch.sensing.skin import Skin
 from pretouch.types import WHOLE, BoolArray, FloatArray, IntArray, Obstacles, RangeReadings, RangeStatus, RobotState

@@ -7,10 +7,9 @@ import numpy as np
 
 from pretouch.compiled import compiled, entry, inlined
 from pretouch.errors import FixtureError
-from pretouch.groups import CapsuleArrays, Cones, Sensors
+from pretouch.groups import CapsuleArrays, Cones, Kinematics, Sensors
 from pretouch.perception.closest import bounds, to_axis, to_spheres
 from pretouch.robot.body import Capsules, no_capsules
-from pretouch.robot.model import Kinematics
 from pretouch.robot.vectors import dot, placed, rotate
 from pretouch.types import BoolArray, FloatArray
 

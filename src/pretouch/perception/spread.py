@@ -3,8 +3,7 @@
 import numpy as np
 
 from pretouch.compiled import compiled
-from pretouch.groups import SkinArrays
-from pretouch.robot.model import Kinematics
+from pretouch.groups import Kinematics, SkinArrays
 from pretouch.types import FloatArray, IntArray, Number
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from pretouch.compiled import compiled
 from pretouch.groups import Chain, Sensors
+from pretouch.robot.kinematics import point_velocity
 from pretouch.types import BoolArray, FloatArray
 
 
@@ -27,21 +28,17 @@ def move_back(
         longest: see above.
     """
     position, rotation, unit_link = sensors
-    anchor, axis, moved_by, qd = chain
-    v, w, turned = np.empty(3), np.empty(3), np.empty(3)
+    axis, moved_by, qd = chain.axis, chain.moved_by, chain.qd
+    w, turned = np.empty(3), np.empty(3)
     for k in range(len(unit_link)):
         age = min(posed - stamp[k], longest)
         # measured after the posture: how the arm goes on is not known
         if not moved[k] or not age > 0.0:
             continue
-        v[:], w[:] = 0.0, 0.0
-        # v = sum of qd_j a_j x (p - p_j) and w = sum of qd_j a_j, over the joints that move the link
+        v = point_velocity(chain, unit_link[k], position[k, 0], position[k, 1], position[k, 2])
+        w[:] = 0.0  # the sum of qd_j a_j, over the joints that move the link
         for j in range(len(qd)):
             if moved_by[unit_link[k], j]:
-                x, y, z = position[k, 0] - anchor[j, 0], position[k, 1] - anchor[j, 1], position[k, 2] - anchor[j, 2]
-                v[0] += (axis[j, 1] * z - axis[j, 2] * y) * qd[j]
-                v[1] += (axis[j, 2] * x - axis[j, 0] * z) * qd[j]
-                v[2] += (axis[j, 0] * y - axis[j, 1] * x) * qd[j]
                 for i in range(3):
                     w[i] += axis[j, i] * qd[j]
         speed = math.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])

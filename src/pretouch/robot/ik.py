@@ -5,7 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.groups import Kinematics
+from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray
 
 

@@ -1,31 +1,19 @@
-"""Kinematics and dynamics of an arm, over MuJoCo."""
+"""Kinematics and dynamics of an arm that MuJoCo reads."""
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from functools import partial
 
 import mujoco
 import numpy as np
 
-from pretouch.compiled import compiled, flattened
+from pretouch.compiled import entry, flattened
 from pretouch.errors import RobotModelError
-from pretouch.groups import Arm, Links, Mechanism
+from pretouch.groups import Arm, Kinematics, Links, Mechanism
 from pretouch.robot.body import Capsules, capsules_of
 from pretouch.robot.description import RobotDescription
+from pretouch.robot.kinematics import Hinges, jacobian_into, mass_matrix_into, place
 from pretouch.robot.surface import Surface, bodies_of, surface_of
 from pretouch.types import BoolArray, FloatArray, IntArray
-
-
-class Kinematics(NamedTuple):
-    """Where everything is in one posture, base frame. L links (bodies of the MJCF, world first), n joints."""
-
-    position: FloatArray
-    """(L, 3) link origins [m]."""
-    rotation: FloatArray
-    """(L, 3, 3) link orientations R_O_link."""
-    anchor: FloatArray
-    """(n, 3) a point on each joint's axis [m]."""
-    axis: FloatArray
-    """(n, 3) unit vectors of the joint axes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,8 +31,10 @@ class Dynamics:
 class RobotModel:
     """Poses, Jacobians of any body point, mass matrix, Coriolis and gravity torques of an arm.
 
-    Rotor inertia and damping of the MJCF are left out: the joint torque sensors sit on the link side. The calls
-    depend on their arguments alone; the MuJoCo data is scratch memory, so one model serves one thread.
+    Rotor inertia and damping of the MJCF are left out: the joint torque sensors sit on the link side. All answers
+    depend on the arguments alone. `kinematics`, Jacobians and `mass_matrix`, all that a controller asks for, may be
+    asked for from any thread. `mass_matrix_and_bias` and `dynamics` work in MuJoCo's memory, the `scratch`: they serve
+    one thread at a time.
     """
 
     def __init__(self, description: RobotDescription) -> None:
@@ -64,7 +54,6 @@ class RobotModel:
         # views into MuJoCo's memory, taken once: looking an attribute up costs as much as the arithmetic
         data = self._data
         self._qpos, self._qvel = data.qpos, data.qvel
-        self._frames = data.xpos, data.xmat.reshape(-1, 3, 3), data.xanchor, data.xaxis
         self._check()
         self.links: tuple[str, ...] = tuple(self._model.body(i).name for i in range(self._model.nbody))
         """Names of the links; a link's index is its place here, 0 is the world."""
@@ -74,6 +63,8 @@ class RobotModel:
         """Index of the end-effector's link."""
         self.capsules: Capsules = capsules_of(self._model)
         """The body, base included."""
+        self._place = partial(place.flat, *_hinges(self._model))
+        self._shapes = (len(self.links), 3), (len(self.links), 3, 3), (self.n, 3)
         self.moved_by: BoolArray = self._moved_by()
         """(L, n) whether a joint moves a link."""
         self.body: Capsules = self.capsules.of_links(np.flatnonzero(self.moved_by.any(axis=1)))
@@ -155,10 +146,13 @@ class RobotModel:
 
     def kinematics(self, q: FloatArray) -> Kinematics:
         """Compute poses and joint axes at joint positions q (n,) [rad]."""
-        self._qpos[:] = q
-        mujoco.mj_kinematics(self._model, self._data)
-        position, rotation, anchor, axis = self._frames
-        return Kinematics(position.copy(), rotation.copy(), anchor.copy(), axis.copy())
+        angles = np.ascontiguousarray(q, np.float64)
+        origins, orientations, axes = self._shapes
+        if angles.shape != axes[:1]:  # compiled code reads on behind the end
+            raise ValueError(f"Joint positions have the shape {angles.shape}: give {self.n} of them.")
+        kin = np.empty(origins), np.empty(orientations), np.empty(axes), np.empty(axes)
+        self._place(angles, *kin)
+        return Kinematics._make(kin)
 
     def jacobian(self, kin: Kinematics, link: int, point: FloatArray) -> FloatArray:
         """Jacobian (6, n) of a point (3,) [m, base frame] fixed to a link: velocity first, then angular velocity."""
@@ -179,13 +173,8 @@ class RobotModel:
 
     def mass_matrix(self, q: FloatArray) -> FloatArray:
         """Compute the mass matrix (n, n) [kg m^2] at q (n,) [rad]."""
-        model, data = self._model, self._data
-        self._qpos[:] = q
-        mujoco.mj_kinematics(model, data)
-        mujoco.mj_comPos(model, data)
-        mujoco.mj_crb(model, data)
-        mass_matrix = np.zeros((self.n, self.n))
-        mujoco.mj_fullM(model, data, mass_matrix)
+        mass_matrix = np.empty((self.n, self.n))
+        _mass_matrix.flat(*self.kinematics(q), *self.mechanism_fields, mass_matrix)
         return mass_matrix
 
     def mass_matrix_and_bias(self, q: FloatArray, qd: FloatArray, bias: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -203,19 +192,17 @@ class RobotModel:
         return mass_matrix, bias
 
 
-@compiled
-def jacobian_into(
-    anchor: FloatArray, axis: FloatArray, moved: BoolArray, point: FloatArray, jacobian: FloatArray
-) -> None:
-    """Write the Jacobian (6, n) of `RobotModel.jacobian`; `moved` (n,) says which joints move the link."""
-    for j in range(len(anchor)):
-        for i in range(6):
-            jacobian[i, j] = 0.0
-        if moved[j]:
-            x, y, z = point[0] - anchor[j, 0], point[1] - anchor[j, 1], point[2] - anchor[j, 2]
-            jacobian[0, j] = axis[j, 1] * z - axis[j, 2] * y
-            jacobian[1, j] = axis[j, 2] * x - axis[j, 0] * z
-            jacobian[2, j] = axis[j, 0] * y - axis[j, 1] * x
-            jacobian[3, j] = axis[j, 0]
-            jacobian[4, j] = axis[j, 1]
-            jacobian[5, j] = axis[j, 2]
+@entry
+def _mass_matrix(kin: Kinematics, mechanism: Mechanism, M: FloatArray) -> None:
+    mass_matrix_into(kin, mechanism, M)
+
+
+def _hinges(model: mujoco.MjModel) -> Hinges:
+    """Return how the links of a model of hinges alone hang on each other."""
+    T, R = np.empty((model.nbody, 3, 4)), np.empty(9)
+    for link in range(model.nbody):
+        mujoco.mju_quat2Mat(R, model.body_quat[link])
+        T[link, :, :3], T[link, :, 3] = R.reshape(3, 3), model.body_pos[link]
+    first = np.append(0, np.cumsum(model.body_jntnum))  # joints are in the order of their links
+    joint = np.column_stack([model.jnt_pos, model.jnt_axis, model.qpos0])
+    return Hinges(model.body_parentid.astype(np.int64), first.astype(np.int64), T, joint)

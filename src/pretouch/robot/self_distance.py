@@ -8,7 +8,8 @@ hand and the last link with the forearm, the forearm with the upper arm.
 
 import numpy as np
 
-from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.groups import Kinematics
+from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray
 
 

@@ -11,9 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from pretouch.contact.learnt_bounds import check_learnt
+from pretouch.contact.learnt_bounds import check_learnt, rested
 from pretouch.contact.residual_model import ResidualModel, kept, residual_init, resumed
-from pretouch.contact.rested import rested
 from pretouch.contact.sequential_test import SequentialTest
 from pretouch.controller import Controller
 from pretouch.errors import ParameterError, RobotModelError

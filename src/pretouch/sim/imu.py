@@ -9,7 +9,7 @@ import numpy as np
 
 from pretouch.checks import Check, Checked, Fraction, NonNegative, Positive
 from pretouch.compiled import compiled, entry, flattened
-from pretouch.robot.link_motion import cross
+from pretouch.robot.kinematics import cross
 from pretouch.sensing.imu_scale import ACCELERATION_LSB, ANGULAR_RATE_LSB, STANDARD_GRAVITY
 from pretouch.sensing.skin import Skin
 from pretouch.sim.plant import Plant

@@ -7,7 +7,8 @@ import numpy as np
 import trimesh
 from scipy.spatial.transform import Rotation
 
-from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.groups import Kinematics
+from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import FloatArray, IntArray
 from pretouch.viewer import palette

@@ -7,8 +7,8 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
+from pretouch.groups import Kinematics
 from pretouch.perception.obstacles import locate, points_of_units, sensor_poses
-from pretouch.robot.model import Kinematics
 from pretouch.sensing.skin import Skin
 from pretouch.types import BoolArray, ControlStep, FloatArray, IntArray
 from pretouch.viewer import palette

@@ -5,12 +5,13 @@ import numpy as np
 from pretouch.contact.cues import Cues, no_cues
 from pretouch.contact.localisation.localise import LocalisationState, localisation_init, localise
 from pretouch.contact.localisation.prior import candidate_poses, hidden_candidates
-from pretouch.contact.residual_windows import LENGTHS
 from pretouch.contact.sequential_detector import Observation, ResidualWindows
+from pretouch.contact.window_scatter import LENGTHS
+from pretouch.groups import Kinematics
 from pretouch.params import LocalisationParams
 from pretouch.perception.closest import no_obstacles
 from pretouch.robot.description import panda
-from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.robot.model import RobotModel
 from pretouch.robot.vectors import placed_capsules
 from pretouch.types import FloatArray, Obstacles, RobotState, Touched
 

@@ -27,8 +27,8 @@ from pretouch.contact.cues import Cues, no_cues
 from pretouch.contact.localisation.prior import LocalisationNumbers, SeenNear, UnitCues, log_prior
 from pretouch.contact.localisation.single_contact import Candidates, log_posterior
 from pretouch.contact.tactile import gain_of, surface_area
+from pretouch.groups import Kinematics
 from pretouch.params import TouchSensorParams
-from pretouch.robot.model import Kinematics
 from pretouch.sensing.unit import TouchPatch
 from pretouch.types import FloatArray, Obstacles
 

@@ -24,9 +24,9 @@ from pretouch.contact.localisation.prior import (
 from pretouch.contact.localisation.significance import independent_part, most_significant
 from pretouch.contact.localisation.single_contact import Candidates, log_posterior
 from pretouch.contact.sequential_detector import Observation, ResidualWindows
-from pretouch.groups import CapsuleArrays, SurfaceArrays
+from pretouch.groups import CapsuleArrays, Kinematics, SurfaceArrays
 from pretouch.params import LocalisationParams
-from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.robot.model import RobotModel
 from pretouch.robot.vectors import placed_capsules
 from pretouch.types import NOT_TOUCHED, BoolArray, FloatArray, IntArray, Touched
 from pretouch.values import value

@@ -6,8 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pretouch.compiled import compiled
-from pretouch.groups import CapsuleArrays, SurfaceArrays
-from pretouch.robot.model import Kinematics
+from pretouch.groups import CapsuleArrays, Kinematics, SurfaceArrays
 from pretouch.types import BoolArray, FloatArray, IntArray
 
 _NEVER = 1e-12

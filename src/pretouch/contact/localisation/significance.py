@@ -4,8 +4,8 @@ import numpy as np
 
 from pretouch.cholesky import factor, forward
 from pretouch.compiled import compiled
-from pretouch.contact.residual_windows import LENGTHS
 from pretouch.contact.sequential_detector import ResidualWindows
+from pretouch.contact.window_scatter import LENGTHS
 from pretouch.params import LocalisationParams
 from pretouch.types import FloatArray
 

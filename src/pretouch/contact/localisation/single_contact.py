@@ -18,8 +18,8 @@ import numpy as np
 from pretouch.cholesky import factor, forward
 from pretouch.compiled import compiled
 from pretouch.contact.localisation.prior import LocalisationNumbers
-from pretouch.groups import SurfaceArrays
-from pretouch.robot.model import Kinematics, jacobian_into
+from pretouch.groups import Kinematics, SurfaceArrays
+from pretouch.robot.kinematics import jacobian_into
 from pretouch.types import BoolArray, FloatArray
 
 _LEAST_N = 1.0

@@ -6,8 +6,9 @@ from typing import Protocol
 
 import numpy as np
 
+from pretouch.groups import Kinematics
 from pretouch.robot.body import Capsules
-from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.robot.model import RobotModel
 from pretouch.robot.vectors import placed
 from pretouch.sim.hand import HandGoal
 from pretouch.sim.plant import Plant

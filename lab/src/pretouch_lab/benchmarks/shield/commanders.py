@@ -7,8 +7,9 @@ import numpy as np
 
 from pretouch.control.path import Path
 from pretouch.desired import Desired, joint_velocities, twist
+from pretouch.groups import Kinematics
 from pretouch.robot.body import Capsules
-from pretouch.robot.model import Kinematics, RobotModel
+from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray
 from pretouch_lab.benchmarks.avoidance.obstacle import Shape, nearest
 

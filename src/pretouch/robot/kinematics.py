@@ -1,0 +1,165 @@
+"""Chains of hinges, which may branch: where links and joints are, Jacobians, the mass matrix, and how links move."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from pretouch.compiled import compiled, entry
+from pretouch.groups import Chain, Kinematics, Mechanism
+from pretouch.types import BoolArray, FloatArray, IntArray
+
+
+class Hinges(NamedTuple):
+    """How links hang on each other: a link's joints turn it in the order of q, on its own place on its parent."""
+
+    parent: IntArray
+    """(L,) link that each hangs on, of a smaller index; the world's own is 0."""
+    first: IntArray
+    """(L + 1,) index of the first joint of each link, and n."""
+    T_parent_link: FloatArray
+    """(L, 3, 4) rotation and origin [m] of each link in its parent's frame, with its joints at rest."""
+    joint: FloatArray
+    """(n, 7) of each joint a point on its axis [m] and the axis, frame of its link, and q at rest [rad]."""
+
+
+@entry
+def place(hinges: Hinges, q: FloatArray, kin: Kinematics) -> None:
+    """Write poses and joint axes at joint positions q (n,) [rad] to `kin`."""
+    parent, first, T, joint = hinges.parent, hinges.first, hinges.T_parent_link, hinges.joint
+    position, rotation, anchor, axis = kin.position, kin.rotation, kin.anchor, kin.axis
+    for i in range(3):
+        position[0, i] = 0.0
+        for k in range(3):
+            rotation[0, i, k] = 1.0 if i == k else 0.0
+    for m in range(1, len(parent)):
+        p = parent[m]
+        for i in range(3):  # T_O_link = T_O_parent T_parent_link, row by row
+            a, b, c = rotation[p, i, 0], rotation[p, i, 1], rotation[p, i, 2]
+            for k in range(3):
+                rotation[m, i, k] = a * T[m, 0, k] + b * T[m, 1, k] + c * T[m, 2, k]
+            position[m, i] = position[p, i] + a * T[m, 0, 3] + b * T[m, 1, 3] + c * T[m, 2, 3]
+        for j in range(first[m], first[m + 1]):
+            x, y, z = joint[j, 0], joint[j, 1], joint[j, 2]
+            u, v, w = joint[j, 3], joint[j, 4], joint[j, 5]
+            angle = q[j] - joint[j, 6]
+            sine, cosine = math.sin(angle), math.cos(angle)
+            for i in range(3):
+                a, b, c = rotation[m, i, 0], rotation[m, i, 1], rotation[m, i, 2]
+                along = a * u + b * v + c * w
+                axis[j, i] = along
+                anchor[j, i] = position[m, i] + a * x + b * y + c * z
+                # Rodrigues: a row r of R becomes cos r + (1 - cos) (r u) u^T + sin r x u
+                along *= 1.0 - cosine
+                rotation[m, i, 0] = cosine * a + along * u + sine * (b * w - c * v)
+                rotation[m, i, 1] = cosine * b + along * v + sine * (c * u - a * w)
+                rotation[m, i, 2] = cosine * c + along * w + sine * (a * v - b * u)
+                # the axis stays where it is
+                a, b, c = rotation[m, i, 0], rotation[m, i, 1], rotation[m, i, 2]
+                position[m, i] = anchor[j, i] - a * x - b * y - c * z
+
+
+@compiled
+def column(anchor: FloatArray, axis: FloatArray, j: int, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """Velocity a_j x (p - p_j) [m/s] of a point p = (x, y, z) [m] that hinge j moves at 1 rad/s."""
+    x, y, z = x - anchor[j, 0], y - anchor[j, 1], z - anchor[j, 2]
+    return axis[j, 1] * z - axis[j, 2] * y, axis[j, 2] * x - axis[j, 0] * z, axis[j, 0] * y - axis[j, 1] * x
+
+
+@compiled
+def point_velocity(chain: Chain, link: int, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """Velocity [m/s] of a point (x, y, z) [m] of a link, base frame."""
+    u, v, w = 0.0, 0.0, 0.0
+    for j in range(len(chain.qd)):
+        if chain.moved_by[link, j]:
+            a, b, c = column(chain.anchor, chain.axis, j, x, y, z)
+            u, v, w = u + a * chain.qd[j], v + b * chain.qd[j], w + c * chain.qd[j]
+    return u, v, w
+
+
+@compiled
+def jacobian_into(
+    anchor: FloatArray, axis: FloatArray, moved: BoolArray, point: FloatArray, jacobian: FloatArray
+) -> None:
+    """Write the Jacobian (6, n) of `RobotModel.jacobian`; `moved` (n,) says which joints move the link."""
+    for j in range(len(anchor)):
+        for i in range(6):
+            jacobian[i, j] = 0.0
+        if moved[j]:
+            jacobian[0, j], jacobian[1, j], jacobian[2, j] = column(anchor, axis, j, point[0], point[1], point[2])
+            jacobian[3, j], jacobian[4, j], jacobian[5, j] = axis[j, 0], axis[j, 1], axis[j, 2]
+
+
+@compiled
+def mass_matrix_into(kin: Kinematics, mechanism: Mechanism, M: FloatArray) -> None:
+    """Write M = sum of m Jv^T Jv + Jw^T I Jw over the links (n, n) [kg m^2].
+
+    Jv (3, n) is the Jacobian of a link's centre of mass and Jw that of its angular velocity.
+    """
+    position, rotation, anchor, axis = kin
+    moved_by = mechanism.arm.moved_by
+    mass, com, inertia = mechanism.links.mass, mechanism.links.com, mechanism.links.inertia
+    n = len(anchor)
+    V, H, turned = np.empty((n, 3)), np.empty((n, 3)), np.empty((3, 3))
+    c, RI = np.empty(3), np.empty((3, 3))
+    M[:] = 0.0
+    for m in range(len(mass)):
+        if mass[m] <= 0.0 or not moved_by[m].any():
+            continue
+        R = rotation[m]
+        for i in range(3):
+            c[i] = position[m, i]
+            for j in range(3):
+                c[i] += R[i, j] * com[m, j]
+                RI[i, j] = R[i, 0] * inertia[m, 0, j] + R[i, 1] * inertia[m, 1, j] + R[i, 2] * inertia[m, 2, j]
+        for i in range(3):
+            for j in range(3):
+                turned[i, j] = RI[i, 0] * R[j, 0] + RI[i, 1] * R[j, 1] + RI[i, 2] * R[j, 2]
+        for j in range(n):
+            if not moved_by[m, j]:
+                continue
+            V[j, 0], V[j, 1], V[j, 2] = column(anchor, axis, j, c[0], c[1], c[2])
+            for i in range(3):
+                H[j, i] = turned[i, 0] * axis[j, 0] + turned[i, 1] * axis[j, 1] + turned[i, 2] * axis[j, 2]
+            for k in range(j + 1):
+                if moved_by[m, k]:
+                    M[j, k] += mass[m] * (V[j, 0] * V[k, 0] + V[j, 1] * V[k, 1] + V[j, 2] * V[k, 2])
+                    M[j, k] += H[j, 0] * axis[k, 0] + H[j, 1] * axis[k, 1] + H[j, 2] * axis[k, 2]
+    for j in range(n):
+        for k in range(j):
+            M[k, j] = M[j, k]
+
+
+@compiled
+def chain_motion(
+    anchor: FloatArray, axis: FloatArray, qd: FloatArray, qdd: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Motion, base frame, of what moves with the first 0, 1, ... n joints: (n + 1, 3) each.
+
+    Angular velocity [rad/s], angular acceleration [rad/s^2], acceleration of a point [m/s^2], and that point [m]. The
+    first two arguments are those of `Kinematics`; joint velocities [rad/s] and accelerations [rad/s^2] are (n,).
+    """
+    n = len(qd)
+    w, alpha, a, point = np.zeros((n + 1, 3)), np.zeros((n + 1, 3)), np.zeros((n + 1, 3)), np.zeros((n + 1, 3))
+    for j in range(n):
+        a[j + 1] = a[j] + lever_acceleration(w[j], alpha[j], anchor[j] - point[j])
+        point[j + 1] = anchor[j]
+        turn = axis[j] * qd[j]
+        alpha[j + 1] = alpha[j] + cross(w[j], turn) + axis[j] * qdd[j]
+        w[j + 1] = w[j] + turn
+    return w, alpha, a, point
+
+
+@compiled
+def lever_acceleration(w: FloatArray, alpha: FloatArray, r: FloatArray) -> FloatArray:
+    """Acceleration (3,) [m/s^2] of one point of a body relative to another that is r (3,) [m] before it.
+
+    `w` (3,) is the body's angular velocity [rad/s], `alpha` (3,) its angular acceleration [rad/s^2].
+    """
+    return cross(alpha, r) + cross(w, cross(w, r))
+
+
+@compiled
+def cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Cross product (3,)."""
+    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
