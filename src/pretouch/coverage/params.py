@@ -4,8 +4,8 @@ import math
 from dataclasses import dataclass, replace
 
 from pretouch.checks import Checked, Fraction, NonNegative, Positive
+from pretouch.coverage.sighting import GRID_M
 from pretouch.errors import ParameterError
-from pretouch.perception.sighting import GRID_M
 from pretouch.sensing.sensor import PAPER_SENSOR, Sensor
 
 

@@ -6,11 +6,11 @@ import numpy as np
 
 from pretouch.control.braking import tangents_of
 from pretouch.coverage.params import CoverageParams
+from pretouch.coverage.sighting import BallWays, Stretch, View, ways_free, ways_seen
 from pretouch.coverage.surface import Surface
 from pretouch.groups import CapsuleArrays, Kinematics, Sensors
 from pretouch.perception.obstacles import sensor_poses
 from pretouch.perception.scene_filter import Fixtures, expected_range
-from pretouch.perception.sighting import BallWays, Stretch, View, ways_free, ways_seen
 from pretouch.robot.model import RobotModel
 from pretouch.robot.vectors import placed
 from pretouch.sensing.skin import Skin

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pretouch.coverage.sighting import GRID_M, BallWays, Stretch, View, common_area, in_view, ways_free, ways_seen
 from pretouch.groups import CapsuleArrays, Sensors
-from pretouch.perception.sighting import GRID_M, BallWays, Stretch, View, common_area, in_view, ways_free, ways_seen
 from pretouch.sensing.sensor import PAPER_SENSOR, cones_of
 
 HALF = np.deg2rad(13.5)
