@@ -2,11 +2,11 @@
 
     python examples/02_rows_for_your_own_qp.py
 
-Here the program is solved by DAQP; the rows and the joint box are plain arrays for any solver.
+Here the program is solved by SciPy; the rows and the joint box are plain arrays for any solver.
 """
 
-import daqp
 import numpy as np
+from scipy.optimize import Bounds, LinearConstraint, minimize
 
 import pretouch as pt
 
@@ -23,10 +23,10 @@ lower, upper = pt.joint_box(q, qd, pt.joint_limits(arm, margin=0.01, period=0.01
 
 wanted = np.array([0.1, 0.0, 0.0])  # towards the nearer point [m/s]
 H, f = J.T @ J + 1e-3 * np.eye(7), -J.T @ wanted
-lowest = np.concatenate([lower, np.full(len(rows.h), -1e30)])
-for name, G, h in (("free", np.zeros((1, 7)), np.ones(1)), ("restricted", rows.G, rows.h)):
-    x, _, flag, _ = daqp.solve(
-        H, f, np.ascontiguousarray(G), np.concatenate([upper, h]), lowest[: 7 + len(h)], np.zeros(7 + len(h), np.int32)
-    )  # fmt: skip
+for name, limits in (("free", []), ("restricted", [LinearConstraint(rows.G, ub=rows.h)])):
+    x = minimize(
+        lambda x: 0.5 * x @ H @ x + f @ x, qd, jac=lambda x: H @ x + f, method="SLSQP", bounds=Bounds(lower, upper),
+        constraints=limits, options={"ftol": 1e-12},
+    ).x  # fmt: skip
     approach = rows.G @ x
     print(f"{name}: hand {(J @ x).round(3)} m/s, approach to the points {approach.round(3)} of {rows.h.round(3)} m/s")

@@ -72,7 +72,7 @@ def in_python(code: str, **environment: str) -> str:
 
 def test_the_import_loads_nothing():
     loaded = in_python("import sys, pretouch; print(*(n for n in sys.modules if '.' not in n))").split()
-    assert not {"numpy", "numba", "scipy", "mujoco", "daqp", "matplotlib", "tyro", "rich"} & set(loaded)
+    assert not {"numpy", "numba", "scipy", "mujoco", "matplotlib", "tyro", "rich"} & set(loaded)
 
 
 def test_public_names_are_there():

@@ -12,7 +12,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 _FOLDER = ROOT / ".venv" / "peers"
 _SHARED = ("daqp", "numpy")
-"""Requirements of Pretouch that every peer's environment gets too: the same solver and arrays for all."""
+"""Requirements of Pretouch and its tests that every peer's environment gets too: the same solver and arrays for all."""
 
 
 @dataclass(frozen=True)
@@ -61,9 +61,9 @@ def _own(peer: Peer) -> Path:
 def _requirements(peer: Peer) -> list[str]:
     """Read the peer's extra, and the ranges of what is shared, from pyproject.toml."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    shared = [r for r in project["dependencies"] if re.split(r"[^\w-]", r, maxsplit=1)[0] in _SHARED]
-    extra: list[str] = project["optional-dependencies"][peer.extra]
-    return shared + extra
+    extras = project["optional-dependencies"]
+    shared = [r for r in project["dependencies"] + extras["dev"] if re.split(r"[^\w-]", r, maxsplit=1)[0] in _SHARED]
+    return [*shared, *extras[peer.extra]]
 
 
 def single_threaded() -> dict[str, str]:

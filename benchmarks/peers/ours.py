@@ -24,7 +24,7 @@ from pretouch.types import Inputs, RangeReadings, RangeStatus, RobotState
 
 _AT_ONCE = 1000
 """Units that a skin wears, of more than it may have."""
-VERSIONS = {name: version(name) for name in ("pretouch", "mujoco-core", "numba", "daqp", "numpy")}
+VERSIONS = {name: version(name) for name in ("pretouch", "mujoco-core", "numba", "numpy")}
 
 
 def panda_arm() -> tuple[Arm, Array]:

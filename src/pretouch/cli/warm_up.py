@@ -23,7 +23,7 @@ from pretouch.sensing.skin import paper_skin
 from pretouch.signals import OF_TERMINAL, kept_from_children
 from pretouch.types import RobotState
 
-_PROFILES = ("pretouch", "paper", "paper:approach.rows=hard", "paper:approach=none")
+_PROFILES = ("pretouch", "paper", "paper:approach=none")
 _RATE_HZ = 1000.0
 
 

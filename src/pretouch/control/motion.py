@@ -7,12 +7,10 @@ import numpy as np
 
 from pretouch.compiled import flattened
 from pretouch.control.interface import CompiledRows, MotionBody, MotionRequest, Restricted, Restriction
-from pretouch.control.joint_box import box_and_brake
 from pretouch.control.motion_entry import Fixed, MotionNumbers, given_motion
 from pretouch.control.null_space import NullSpaceLimits
-from pretouch.control.penalty import SOLVED
-from pretouch.control.qp import ENDING, Cost, cost_params, solve_hard
-from pretouch.control.restriction import ApproachRows
+from pretouch.control.penalty import INFEASIBLE, SOLVED
+from pretouch.control.qp import ENDING, cost_params
 from pretouch.errors import ParameterError
 from pretouch.groups import Kinematics
 from pretouch.params import NullSpaceMotion
@@ -69,7 +67,6 @@ def motion_setup(body: MotionBody, null_space: NullSpaceMotion | None, budget: i
 _NONE = np.zeros(0)
 """What stands for joint velocities that are not given."""
 _ANY = _NONE, _NONE
-_NO_COST = np.zeros((0, 0))
 
 
 def joint_motion(
@@ -89,60 +86,39 @@ def joint_motion(
     """
     n, o, velocity = len(robot.q), obstacles, request.velocity
     if isinstance(allowed, CompiledRows):
-        rows, speeds = allowed, None
+        rows = allowed
     else:
-        rows, speeds = _given(allowed, n), allowed.speeds
+        rows = _given(allowed, n)
         velocity = velocity if allowed.velocity is None else velocity + allowed.velocity
     G, h, which = rows.room
     # compiled code writes to it, and a step leaves the state it was given as it is
     null_velocity = state.null_velocity.copy() if setup.moves_away else state.null_velocity
-    # Hard rows have no price: the first answer is that without them, and final where it keeps them. Where it does not,
-    # another solver takes over, which needs H and f.
-    hard = rows.weight == 0.0
-    cost, qd, velocities = np.empty((n + 1, n)) if hard else _NO_COST, np.empty(n), np.empty((2, 3))
+    qd, velocities = np.empty(n), np.empty((2, 3))
     slack, multipliers = np.empty(len(h)), np.empty(n + len(h))
     # Field by field in the order of `Step`, `Rows` and `Fixed`, 1 us faster than by groups. No type checker finds two
     # fields of one type that have changed places.
-    seen, found, ending, violated = rows.motion.flat(
+    seen, ending, violated = rows.motion.flat(
         robot.q, robot.qd, robot.q_commanded, robot.qd_commanded,
         o.link, o.body_point, o.direction, o.body_distance,
         velocity, request.rotation_goal, request.hold, _NONE if request.qd is None else request.qd,
-        null_velocity, cost, qd, slack, multipliers, velocities, *kin,
+        null_velocity, qd, slack, multipliers, velocities, *kin,
         G, h, which, *setup.fields, *rows.numbers,
     )  # fmt: skip
     # what remembers nothing hands its state on, and makes no new one in each step
     after = MotionState(null_velocity) if setup.moves_away else state
     which, limit = which[:seen], h[:seen]
-    if violated and hard and not request.hold and ending == SOLVED:
-        qp = _with_hard_rows(setup, robot, ApproachRows(G[:found], h[:found], soft=False), speeds, cost)
-        J = setup.body.model.ee_jacobian(kin)[:3]
-        # a step reports the rows of obstacles; those that a restriction adds behind them belong to none
-        of_obstacles = QpSolution(qp.qd, qp.slack[:seen], qp.multipliers[: n + seen], qp.outcome, qp.status)
-        return Motion(of_obstacles, which, limit, J @ robot.qd, J @ qp.qd), after
+    # a step reports the rows of obstacles; those that a restriction adds behind them belong to none
     qp = QpSolution(qd, slack[:seen], multipliers[: n + seen], *_how_it_ended(request.hold, ending, violated))
     return Motion(qp, which, limit, velocities[0], velocities[1]), after
 
 
 def _how_it_ended(hold: bool, ending: int, violated: bool) -> tuple[QpOutcome, str, bool]:
-    """Return outcome and sentence for how `minimise` ended, and whether its solution violates a row."""
+    """Return outcome and sentence for how a minimisation ended, and whether its solution violates a row."""
     if hold:
         return QpOutcome.SKIPPED, "not posed: the arm holds", False
     if ending != SOLVED:
-        return QpOutcome.FAILED, ENDING[ending], False
+        return QpOutcome.INFEASIBLE if ending == INFEASIBLE else QpOutcome.FAILED, ENDING[ending], False
     return QpOutcome.SOLVED, "solved, an approach row is violated" if violated else "solved", violated
-
-
-def _with_hard_rows(
-    setup: MotionSetup, robot: RobotState, rows: ApproachRows, speeds: tuple[FloatArray, FloatArray] | None,
-    cost: FloatArray,
-) -> QpSolution:  # fmt: skip
-    """Answer of `joint_motion` where a hard row is in the way, which takes another solver."""
-    # the box of `motion_entry._box` once more: rare enough not to be handed out by each step
-    lower, upper, stop = box_and_brake(robot.q_commanded, robot.qd_commanded, setup.numbers.limits)
-    if speeds is not None:
-        slowest, fastest = speeds
-        lower, upper = np.clip(slowest, lower, upper), np.clip(fastest, lower, upper)
-    return solve_hard(Cost(cost[:-1], cost[-1]), lower, upper, rows, stop, setup.numbers.budget)
 
 
 def _given(a: Restricted, n: int) -> CompiledRows:

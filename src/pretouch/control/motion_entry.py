@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pretouch.compiled import compiled, entry, inlined
+from pretouch.control.active_set import minimise_within
 from pretouch.control.joint_box import box_and_brake
 from pretouch.control.null_space import NullSpaceLimits, away, cost_with_null_space
 from pretouch.control.penalty import SOLVED, Minimum, Problem, excesses, minimise
@@ -19,8 +20,8 @@ from pretouch.groups import Arm, JointArrays, Kinematics, NearArrays
 from pretouch.robot.kinematics import jacobian_into
 from pretouch.types import FloatArray, IntArray
 
-Ended = tuple[int, int, int, bool]
-"""How many rows are of obstacles and how many there are, how the solver ended, and whether any row is violated."""
+Ended = tuple[int, int, bool]
+"""How many rows are of obstacles, how the solver ended, and whether a soft row is violated."""
 
 
 class MotionNumbers(NamedTuple):
@@ -62,8 +63,6 @@ class Asked(NamedTuple):
 class Answer(NamedTuple):
     """Room for the answer."""
 
-    cost: FloatArray
-    """(n + 1, n) H and f of `Cost`, or none for what nobody asks for."""
     qd: FloatArray
     """(n,) joint velocities [rad/s]."""
     slack: FloatArray
@@ -133,12 +132,14 @@ def motion_within(step: Step, allowed: Allowed, fixed: Fixed) -> Ended:
     lower, upper, stop = _box(robot, allowed, p)
     ending = SOLVED
     if not asked.hold:
-        # H and f are kept for the solver of hard rows alone
-        cost = answer.cost if len(answer.cost) > 0 else np.empty((n + 1, n))
-        H, f = cost[:n], cost[n]
-        _pose(J, robot.q, asked, kin.rotation[arm.ee], null_velocity, p, cost)
+        H, f = np.empty((n, n)), np.empty(n)
+        _pose(J, robot.q, asked, kin.rotation[arm.ee], null_velocity, p, H, f)
+        problem = Problem(H, f, lower, upper, G, h, allowed.weight)
         minimum = Minimum(qd, slack, answer.multipliers[: n + found])
-        ending = minimise(Problem(H, f, lower, upper, G, h, allowed.weight), p.budget, minimum)
+        if allowed.weight == 0.0:  # hard rows have no price
+            ending = minimise_within(problem, p.budget, minimum)
+        else:
+            ending = minimise(problem, p.budget, minimum)
     if asked.hold or ending != SOLVED:
         # no answer is sent but one that is a minimum; by how much braking violates the rows is reported all the same
         qd[:], answer.multipliers[:] = stop, 0.0
@@ -147,8 +148,8 @@ def motion_within(step: Step, allowed: Allowed, fixed: Fixed) -> Ended:
     _hand_velocities(J, robot.qd, qd, by_product, answer.velocities)
     violated = False
     for k in range(found):
-        violated = violated or slack[k] > 0.0
-    return seen, found, ending, violated
+        violated = violated or (slack[k] > 0.0 and allowed.weight > 0.0)
+    return seen, ending, violated
 
 
 @inlined
@@ -166,14 +167,12 @@ def _box(robot: JointArrays, allowed: Allowed, p: MotionNumbers) -> tuple[FloatA
 @inlined
 def _pose(
     J: FloatArray, q: FloatArray, asked: Asked, rotation: FloatArray, null_velocity: FloatArray, p: MotionNumbers,
-    cost: FloatArray,
+    H: FloatArray, f: FloatArray,
 ) -> None:  # fmt: skip
     """Write the cost of eq. 2, or of how far the joint velocities are from those asked for."""
-    n = len(q)
-    H, f = cost[:n], cost[n]
     if len(asked.joints) > 0:
         # 1/2 |qd_asked - qd|^2, a reaction in joint space: H = I is regular in any posture and needs no damping
-        H[:], f[:] = np.eye(n), -asked.joints
+        H[:], f[:] = np.eye(len(q)), -asked.joints
         return
     m = 6 if p.holds_orientation else 3
     # 3 rows for the velocity alone: the rotation stays in the null space, and may drift

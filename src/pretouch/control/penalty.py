@@ -16,8 +16,8 @@ from pretouch.cholesky import backward, factor, forward
 from pretouch.compiled import compiled, inlined
 from pretouch.types import BoolArray, FloatArray, IntArray
 
-SOLVED, NOT_FINITE, NOT_CONVEX, BUDGET = range(4)
-"""How `minimise` ended."""
+SOLVED, NOT_FINITE, NOT_CONVEX, BUDGET, INFEASIBLE = range(5)
+"""How a minimisation ended."""
 
 _ROUNDING = 1e-13
 """Relative size below which a difference is rounding."""
@@ -72,7 +72,7 @@ def minimise(problem: Problem, budget: int, answer: Minimum) -> int:
     """Write the minimum, and say how that ended; `budget` counts the factorisations after which to give up."""
     H, f, lower, upper, G, h = problem.H, problem.f, problem.lower, problem.upper, problem.G, problem.h
     x = answer.x
-    if not _finite(problem):
+    if not finite(problem):
         return NOT_FINITE
     n = len(x)
     for i in range(n):
@@ -124,7 +124,8 @@ def possible_rows(G: FloatArray, h: FloatArray, lower: FloatArray, upper: FloatA
 
 
 @inlined
-def _finite(problem: Problem) -> bool:
+def finite(problem: Problem) -> bool:
+    """Whether all numbers of a problem are finite."""
     H, f, lower, upper, G, h = problem.H, problem.f, problem.lower, problem.upper, problem.G, problem.h
     # A number that is not finite spoils any sum of products with zero. This comes first: what is NaN would compare as a
     # row that holds.

@@ -2,20 +2,19 @@
 
 from typing import NamedTuple
 
-import daqp
 import numpy as np
 
 from pretouch.compiled import compiled, entry
+from pretouch.control.active_set import minimise_within
 from pretouch.control.penalty import (
     BUDGET,
+    INFEASIBLE,
     NOT_CONVEX,
     NOT_FINITE,
     SOLVED,
     Minimum,
     Problem,
-    excesses,
     minimise,
-    possible_rows,
 )
 from pretouch.control.restriction import ApproachRows
 from pretouch.params import TaskParams
@@ -26,16 +25,9 @@ ENDING = {
     NOT_FINITE: "the problem holds numbers that are not finite",
     NOT_CONVEX: "the Hessian is not convex",
     BUDGET: "the iteration limit was reached",
+    INFEASIBLE: "the approach rows cannot be met within the acceleration limits",
 }
-_OPTIMAL, _INFEASIBLE, _CYCLED = 1, -1, -2  # exit flags of DAQP
-_EXIT = {
-    _INFEASIBLE: "the approach rows cannot be met within the acceleration limits",
-    _CYCLED: "the solver cycled",
-    -3: "the problem is unbounded",
-    -4: "the iteration limit was reached",
-    -5: "the Hessian is not convex",
-    -6: "the problem is overdetermined at the start",
-}
+"""What happened, by how a minimisation ended, but for `SOLVED`."""
 
 
 @value
@@ -151,8 +143,9 @@ def solve(
 ) -> QpSolution:
     """Minimise the cost over joint velocities within the box and the approach rows.
 
-    A soft row may be violated by s at a cost of slack_weight / 2 s^2. Where hard rows contradict the box, and where
-    the solver gives no usable answer, the answer is `stop`, and the outcome says so.
+    A soft row may be violated by s at a cost of slack_weight / 2 s^2. Where hard rows contradict the box or each other,
+    and where numbers are no usable problem, the answer is `stop`, and the outcome says so. The multipliers are then
+    weights of what contradicts, so added up it reads 0 <= something negative; or 0.
 
     Args:
         cost: H (n, n), f (n,).
@@ -163,65 +156,19 @@ def solve(
         stop: (n,) braking command inside the box [rad/s].
         budget: iterations after which to brake. A limit in time would give another answer each time.
     """
-    x, slack, multipliers = answer = _room(len(lower), len(rows.h))
-    # hard rows have no price: what is best without them is best with them if it keeps them
-    weight = slack_weight if rows.soft else 0.0
-    # Before DAQP in any case: that one takes NaN in the cost for a success and drops a row of NaN in silence
-    # (tests/control/test_qp_traps.py).
+    n, count, weight = len(lower), len(rows.h), slack_weight if rows.soft else 0.0
+    x, slack, multipliers = answer = Minimum(np.empty(n), np.empty(count), np.empty(n + count))
     ending = _minimise(Problem(cost.H, cost.f, lower, upper, rows.G, rows.h, weight), budget, answer)
     if ending != SOLVED:
-        return _braking(stop, rows, QpOutcome.FAILED, ENDING[ending])
-    if len(slack) and not rows.soft and slack.max() > 0:
-        return solve_hard(cost, lower, upper, rows, stop, budget)
-    violated = len(slack) > 0 and bool(slack.max() > 0)
+        outcome = QpOutcome.INFEASIBLE if ending == INFEASIBLE else QpOutcome.FAILED
+        weights = multipliers if ending == INFEASIBLE else np.zeros(n + count)
+        return QpSolution(stop, np.maximum(rows.G @ stop - rows.h, 0.0), weights, outcome, ENDING[ending])
+    violated = rows.soft and bool(slack.max(initial=0.0) > 0)
     status = "solved, an approach row is violated" if violated else "solved"
     return QpSolution(x, slack, multipliers, QpOutcome.SOLVED, status, violated)
 
 
-def _room(n: int, count: int) -> Minimum:
-    """Return room for the minimum of a problem with n joints and so many rows."""
-    return Minimum(np.empty(n), np.empty(count), np.empty(n + count))
-
-
 @entry
 def _minimise(problem: Problem, budget: int, answer: Minimum) -> int:
-    return minimise(problem, budget, answer)
-
-
-def solve_hard(
-    cost: Cost, lower: FloatArray, upper: FloatArray, rows: ApproachRows, stop: FloatArray, budget: int
-) -> QpSolution:
-    """Answer of `solve` where hard rows are in the way of a minimum that it found, so that all numbers are finite."""
-    which = possible_rows(rows.G, rows.h, lower, upper)
-    # The first n bounds are those of x itself. -1e30 is the least bound that DAQP takes for none; a sense of 0 is a
-    # hard inequality. With its own tolerance, 1e-6, a row that is violated by as much would count as met.
-    lowest = np.full(len(which), -1e30)
-    x, _, flag, info = daqp.solve(
-        cost.H, cost.f, rows.G[which], np.concatenate((upper, rows.h[which])), np.concatenate((lower, lowest)),
-        np.zeros(len(lower) + len(which), np.int32), primal_tol=1e-12, iter_limit=budget,
-    )  # fmt: skip
-    if flag != _OPTIMAL or not np.isfinite(x).all():
-        # of rows that contradict each other by little DAQP may say that it cycled
-        contradict = flag == _INFEASIBLE or (flag == _CYCLED and _contradict(lower, upper, rows, budget))
-        outcome, flag = (QpOutcome.INFEASIBLE, _INFEASIBLE) if contradict else (QpOutcome.FAILED, flag)
-        return _braking(stop, rows, outcome, _EXIT.get(flag, f"the solver failed with exit code {flag}"))
-    # the box holds to the solver's tolerance only; the clip makes it exact
-    x, n = np.minimum(np.maximum(x, lower), upper), len(x)
-    slack, multipliers = np.empty(len(rows.h)), np.zeros(n + len(rows.h))
-    excesses(rows.G, rows.h, x, slack)
-    multipliers[:n], multipliers[n + which] = info["lam"][:n], info["lam"][n:]
-    return QpSolution(x, slack, multipliers, QpOutcome.SOLVED, "solved")
-
-
-def _contradict(lower: FloatArray, upper: FloatArray, rows: ApproachRows, budget: int) -> bool:
-    """Whether no joint velocities in the box meet all rows: those that violate them least still do."""
-    n = len(lower)
-    answer = _room(n, len(rows.h))
-    # only violations cost; the small Hessian is there to make the problem strictly convex
-    least = _minimise(Problem(1e-6 * np.eye(n), np.zeros(n), lower, upper, rows.G, rows.h, 1e3), budget, answer)
-    return least == SOLVED and bool(answer.slack.max() > 1e-6)
-
-
-def _braking(stop: FloatArray, rows: ApproachRows, outcome: QpOutcome, status: str) -> QpSolution:
-    slack = np.maximum(rows.G @ stop - rows.h, 0.0)
-    return QpSolution(stop, slack, np.zeros(len(stop) + len(rows.h)), outcome, status)
+    # hard rows have no price
+    return minimise_within(problem, budget, answer) if problem.weight == 0.0 else minimise(problem, budget, answer)

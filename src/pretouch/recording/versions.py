@@ -9,7 +9,7 @@ from pretouch import __version__
 from pretouch.controller import Controller
 from pretouch.source_digest import source_digest
 
-_LIBRARIES = ("numpy", "numba", "mujoco-core", "daqp", "scipy")
+_LIBRARIES = ("numpy", "numba", "mujoco-core", "scipy")
 
 
 @cache

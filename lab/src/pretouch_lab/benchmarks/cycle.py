@@ -30,7 +30,7 @@ _SHORTER = 5000
 _MOST_CYCLES = 10_000_000
 _SLOWEST, _FASTEST = 20.0, 10_000.0
 """[Hz]: slower, each step would be late; faster than the shortest control period there may be."""
-_PACKAGES = ("pretouch", "numpy", "numba", "mujoco-core", "daqp")
+_PACKAGES = ("pretouch", "numpy", "numba", "mujoco-core")
 
 
 @dataclass(frozen=True)
