@@ -164,7 +164,7 @@ def test_one_visitor_commands_all_see_who_and_the_others_look(
     pause, speed, take = (control(page, label) for label in ("Pause", "Clock speed", "Take command"))
     assert not take.visible
     with Visitor(page._server, options) as other:
-        assert take.visible
+        until(lambda: take.visible)
         assert shown(page) == "Nobody commands: the first to act does."
         visitor.set(pause, True)
         visitor.settle()
