@@ -9,6 +9,7 @@ from tests.importing.test_robot_import import assert_same_mechanics, stripped
 from tests.needs import skip_for
 
 from pretouch.importing.robot_import import ImportOptions, import_robot
+from pretouch.sim.placement import placement_for
 
 pytestmark = pytest.mark.slow
 
@@ -31,17 +32,18 @@ def test_a_panda_is_imported_as_ours_is(panda_model):
 
 
 @pytest.mark.parametrize(
-    ("file", "joints", "ee"),
+    ("file", "joints", "ee", "scale"),
     [
-        ("ur_description/urdf/ur5_robot.urdf", 6, "tool0"),
-        ("xarm_description/urdf/xarm7.urdf", 7, "link_eef"),
-        ("kinova_description/robots/kinova.urdf", 6, "j2s6s200_end_effector"),  # in COLLADA
+        ("ur_description/urdf/ur5_robot.urdf", 6, "tool0", 1.0),
+        ("xarm_description/urdf/xarm7.urdf", 7, "link_eef", 0.9),
+        ("kinova_description/robots/kinova.urdf", 6, "j2s6s200_end_effector", 0.8),  # in COLLADA
     ],
 )
-def test_other_arms_are_imported_as_well(file, joints, ee):
+def test_other_arms_are_imported_as_well_and_follow_the_papers_paths(file, joints, ee, scale):
     found = import_robot(robot(file), ImportOptions())
     assert found.model.n == joints
     assert found.description.ee_body == ee
     assert max(body.sticks_out for body in found.bodies) < 0.03
     assert not any("No posture was found" in remark for remark in found.remarks)
     assert_same_mechanics(found.model, stripped(robot(file)))
+    assert placement_for(found.model).scale >= scale

@@ -124,8 +124,12 @@ def _is_clear(model: RobotModel, found: Ready) -> bool:
     return bool(found.clear >= _CLEAR and lowest >= _CLEAR)
 
 
-def _worth(model: RobotModel, found: Ready) -> float:
-    return found.singular_value + 0.2 * _room(model, found.q)
+def _worth(model: RobotModel, found: Ready) -> tuple[bool, float]:
+    """Rate a posture: first one whose body, but for what the first joint alone moves, stays above the base's plane."""
+    ends = capsule_ends(model, kinematics_of(model, found.q[None]))[0]
+    lifted = model.moved_by[model.capsules.link].sum(axis=1) > 1
+    lowest = (ends[lifted][..., 2] - model.capsules.radius[lifted, None]).min(initial=np.inf)
+    return bool(lowest >= _CLEAR), found.singular_value + 0.2 * _room(model, found.q)
 
 
 def _near_middle(model: RobotModel, part: float) -> tuple[FloatArray, FloatArray]:
