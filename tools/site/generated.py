@@ -16,7 +16,7 @@ from pretouch.cli.registry import command_names
 from pretouch.composition import field_docs
 
 API = {
-    "arm-and-skin": ("Arm and skin", ("robot", "sensing")),
+    "arm-and-skin": ("Arm and skin", ("groups", "robot", "sensing")),
     "controller": ("Controller and profiles", ("controller", "profiles", "composition", "params", "explanation")),
     "parts": ("Parts of a controller", ("contact", "control", "perception")),
     "loop": ("Loop and recordings", ("loop", "shielding", "realtime", "recording", "reporting")),
