@@ -147,9 +147,14 @@ class Visitor:
         field.blur()
 
     def enter(self, label: str, text: str) -> None:
-        """Type over what a field holds, key by key as a person does, and press Enter."""
+        """Type over what a field holds, key by key as a person does, and press Enter.
+
+        A page sends a change 50 ms after the one before, and in its place whatever comes next, Enter too. So Enter
+        waits for that long by the page's own clock.
+        """
         self.field(label).select_text()
         self.field(label).press_sequentially(text, delay=20)
+        self.page.evaluate("new Promise(done => setTimeout(() => setTimeout(done, 60), 60))")
         self.field(label).press("Enter")
 
     def value(self, label: str) -> str:

@@ -65,6 +65,8 @@ class Controls:
         self._shown: list[tuple[Any, str, Callable[[], object]]] = []
         self.on_view: Callable[[str, bool], None] = lambda name, visible: None
         """Told which part of the scene to show or hide."""
+        self._text: Any = None
+        """The field for a profile's text, once it is there."""
         self._written = ""
         """The profile that the field shows, or showed before somebody typed."""
         self._first()
@@ -131,7 +133,6 @@ class Controls:
         form = gui.add_form(None)
         with form:
             self._text = gui.add_text("Profile text", "", hint=_TEXT_HINT)
-        self._shown.append((self._text, "profile text", self._profile_text))
         form.on_submit(self._submit)
 
     def _world_folder(self) -> None:
@@ -179,12 +180,16 @@ class Controls:
     def _profile(self) -> Profile:
         return self._simulation.settings.profile
 
-    def _profile_text(self) -> str:
-        """What the field is to show: another profile, else what somebody typed, to be put right."""
-        if self._profile.name == self._written:
-            return str(self._text.value)
-        self._written = self._profile.name
-        return self._written
+    def _show_text(self) -> None:
+        """Show another profile in the field; else it keeps what somebody types, to be put right.
+
+        What is typed is never written back: letters that come meanwhile would be lost.
+        """
+        name = self._profile.name
+        if self._text is None or name == self._written or self._actions.is_waiting("profile text"):
+            return
+        self._written = name
+        put(self._text, name)
 
     @property
     def _base(self) -> str:
@@ -250,6 +255,7 @@ class Controls:
         for handle, kind, current in self._shown:
             if not self._actions.is_waiting(kind):
                 put(handle, current())
+        self._show_text()
         self._pause.label = "Go on" if self.running.paused else "Pause"
         self._record.label = "Stop recording" if self._simulation.recording else "Record"
 
