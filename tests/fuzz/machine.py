@@ -62,8 +62,9 @@ class Course:
         self.state = self.controller.init(robot)
         self.oracle = Oracle(world.profile, world.skin.ids, robot, world.model.description.qd_max)
         p = world.profile
+        approach = "none" if p.approach is None else f"{p.approach.name} {getattr(p.approach, 'rows', '')}".strip()
         self.setting = (
-            "step", f"arm {world.model.description.name}", f"restriction {getattr(p.approach, 'name', 'none')}",
+            "step", f"arm {world.model.description.name}", f"restriction {approach}",
             f"detection {p.detect.name}", f"reaction {p.react.name}", f"period {p.task.control_period_s}",
             f"units {len(world.skin)}",
         )  # fmt: skip

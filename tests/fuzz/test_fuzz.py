@@ -23,7 +23,7 @@ EXPECTED = [
     *(f"force {force}" for force in weather.FORCES),
     *(f"fault {fault}" for fault in weather.FAULTS),
     *(f"fault lie about {part}" for part in ("q", "qd", "q_commanded", "qd_commanded")),
-    *(f"restriction {mode}" for mode in ("off", "hard", "slack", "floor")),
+    *(f"restriction {mode}" for mode in ("none", "paper hard", "paper slack", "paper floor", "braking")),
     *(f"units {units}" for units in (0, 1, 7, 32)),
     *(f"{what} {yes}" for what in ("slack", "slowed", "on the axis") for yes in (True, False)),
     "period 0.01", "period 0.001", "arm panda", "arm fr3",
