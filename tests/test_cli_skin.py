@@ -17,8 +17,8 @@ import pytest
 
 from pretouch import cli
 from pretouch.cli.skin_monitor import only_here
-from pretouch.hardware.address import EVERYWHERE
 from pretouch.hardware.keys import Keys, UnitKey, load_keys, new_key, save_keys
+from pretouch.hardware.udp import EVERYWHERE
 from pretouch.recording.skin_reader import read_skin
 from pretouch.sensing.skin import PAPER_SKIN
 from pretouch.types import RangeStatus

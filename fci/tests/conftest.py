@@ -6,7 +6,6 @@ said in one way), `tests.ports` and `tests.fuzz.mutations`.
 
 import itertools
 import json
-import os
 import socket
 import struct
 import subprocess
@@ -21,6 +20,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.needs import skip_for
+from tests.ports import loopback
 
 from pretouch.robot.description import fr3, panda
 from pretouch.robot.model import RobotModel
@@ -31,15 +31,13 @@ from pretouch_fci.server import FciServer
 from pretouch_fci.wire import CONNECT, ERRORS, HEADER, PROTOCOLS, Protocol, RobotKind
 
 _VENDOR = Path(__file__).with_name("vendor_client.py")
-_NUMBERS = itertools.count(1)
 _PATIENCE_S = 10.0
 
 
 @pytest.fixture
 def host() -> str:
     """An address of this machine that no other test has: the vendor's clients know one port only."""
-    number = next(_NUMBERS)
-    return f"127.{1 + os.getpid() // 250 % 250}.{1 + os.getpid() % 250}.{number % 250 + 1}"
+    return loopback()
 
 
 @dataclass

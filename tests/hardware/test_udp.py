@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from pretouch.hardware import udp
-from pretouch.hardware.address import PORT
+from pretouch.hardware.udp import PORT
 from tests.ports import PORTS, free_port
 
 linux = pytest.mark.skipif(sys.platform != "linux", reason="the options are Linux's")

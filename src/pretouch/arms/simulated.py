@@ -26,8 +26,8 @@ class Simulated(ArmOptions):
     @contextmanager
     def open(self, setup: ArmSetup) -> Iterator[OpenedArm]:
         """Let the arm live in a thread, and its units send to a receiver of this machine."""
-        from pretouch.hardware.address import HOST
         from pretouch.hardware.network_skin import NetworkSkin
+        from pretouch.hardware.udp import HOST
         from pretouch.robot.model import RobotModel
         from pretouch.sensing.skin import Skin
         from pretouch.serving.fleet import simulated_keys

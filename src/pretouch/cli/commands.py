@@ -10,7 +10,7 @@ from typing import Literal
 import tyro
 
 from pretouch.cli.words import words
-from pretouch.hardware.address import HOST, PORT
+from pretouch.hardware.udp import HOST, PORT
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, cast
 
 from pretouch.errors import HardwareError, ParameterError
 from pretouch.extras import LIVE
-from pretouch.hardware.address import EVERYWHERE, HOST
+from pretouch.hardware.udp import EVERYWHERE, HOST
 from pretouch.profiles import profile as find_profile
 from pretouch.signals import ended
 from pretouch.viewer.room import LiveSettings, PathName, Room, live_path, settings_for

@@ -20,12 +20,12 @@ from pretouch.cli.skin_table import line, thrown_away, view
 from pretouch.cli.words import words
 from pretouch.cli.writing import numbers_to
 from pretouch.errors import HardwareError
-from pretouch.hardware.address import EVERYWHERE, HOST
 from pretouch.hardware.health import HealthParams
 from pretouch.hardware.keys import load_keys
 from pretouch.hardware.model_check import ModelCheck, ModelCheckParams
 from pretouch.hardware.monitor import MonitorUpdate, Posture, watch
 from pretouch.hardware.receiver import SkinReceiver
+from pretouch.hardware.udp import EVERYWHERE, HOST
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.recording.skin_recording import SkinRecording
 from pretouch.robot.model import RobotModel

@@ -22,8 +22,6 @@ from pretouch.types import FloatArray, RobotState
 
 SETTLE_S = 0.2
 """Time the arm stands before its time begins [s]: the observer's transient is over."""
-CATCH_UP_S = 5.0
-"""How late a machine may be that makes up for it [s]: for motions in which no time may be left out."""
 
 
 def _fleet() -> FleetParams:

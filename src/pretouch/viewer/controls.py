@@ -185,11 +185,10 @@ class Controls:
 
         What is typed is never written back: letters that come meanwhile would be lost.
         """
-        name = self._profile.name
-        if self._text is None or name == self._written or self._actions.is_waiting("profile text"):
-            return
-        self._written = name
-        put(self._text, name)
+        changed = self._profile.name != self._written
+        if self._text is not None and changed and not self._actions.is_waiting("profile text"):
+            self._written = self._profile.name
+            put(self._text, self._written)
 
     @property
     def _base(self) -> str:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from typing import cast
 
 import numpy as np
 import trimesh
@@ -24,9 +25,7 @@ def surface_of(capsules: Capsules, around: int = AROUND) -> trimesh.Trimesh:
 
 def joined(meshes: Sequence[trimesh.Trimesh]) -> trimesh.Trimesh:
     """Put meshes into one."""
-    mesh = trimesh.util.concatenate(meshes)
-    assert isinstance(mesh, trimesh.Trimesh)  # noqa: S101  of meshes it is one
-    return mesh
+    return cast("trimesh.Trimesh", trimesh.util.concatenate(meshes))
 
 
 def _surface(a: FloatArray, b: FloatArray, radius: float, around: int) -> trimesh.Trimesh:

@@ -119,13 +119,9 @@ def _all(colour: palette.Colour, units: IntArray) -> NDArray[np.uint8]:
     return np.tile(palette.as_vertex(colour), (len(units), 1))
 
 
-def _cone(radius: float, around: int = 28) -> tuple[FloatArray, IntArray]:
+def _cone(radius: float) -> tuple[FloatArray, IntArray]:
     """A field of view out to 1 m along z, of a radius [m] there, without a lid."""
-    angle = np.linspace(0, 2 * np.pi, around, endpoint=False)
-    rim = np.stack([radius * np.cos(angle), radius * np.sin(angle), np.ones(around)], axis=1)
-    after = np.roll(np.arange(around), -1)
-    faces = np.stack([np.zeros(around, dtype=int), after + 1, np.arange(around) + 1], axis=1)
-    return np.vstack([np.zeros(3), rim]), faces
+    return _parts(trimesh.creation.revolve(np.array([[0.0, 0.0], [radius, 1.0]]), sections=28))
 
 
 def _parts(shape: trimesh.Trimesh) -> tuple[FloatArray, IntArray]:

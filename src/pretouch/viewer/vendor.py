@@ -39,10 +39,9 @@ def _surface(folder: Path, link: str) -> Trimesh:
     mesh = coarse(_read(folder / f"{link.removeprefix('panda_')}.dae"))
     if link != "panda_hand":
         return mesh
-    fingers = [_read(folder / "finger.dae") for _ in range(2)]
-    fingers[1].apply_transform(np.diag([-1.0, -1.0, 1.0, 1.0]))
-    raised = [finger.apply_translation((0, 0, _FINGER_HEIGHT_M)) for finger in fingers]
-    return joined([mesh, *map(coarse, raised)])
+    finger = _read(folder / "finger.dae").apply_translation((0, 0, _FINGER_HEIGHT_M))
+    other = finger.copy().apply_transform(np.diag([-1.0, -1.0, 1.0, 1.0]))
+    return joined([mesh, coarse(finger), coarse(other)])
 
 
 def _read(file: Path) -> Trimesh:
