@@ -13,7 +13,7 @@ from tests.fuzz.machine import Machine
 from tests.fuzz.oracle import WORDS
 
 MODES = ("HOLD", "TRACK", "REACT")
-RARE = ("failed", "given up", "pressed")
+RARE = ("failed", "given up", "pressed", "blocked reaction")
 """Causes that take a bug, or a course of events that not every seed has."""
 EXPECTED = [
     *(f"mode {mode}" for mode in MODES),
