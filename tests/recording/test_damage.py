@@ -13,6 +13,7 @@ from mcap.writer import CompressionType, Writer
 
 from pretouch.errors import RecordingError
 from pretouch.recording import disk, reader
+from pretouch.recording.mcap_file import Contents, chunk_at, indexed_chunks, message_count
 from pretouch.recording.reader import Recorded, open_recording
 from pretouch.recording.ros import definition, packed_data, packed_message
 from pretouch.recording.writer import Recording
@@ -127,6 +128,18 @@ def test_a_damaged_chunk_that_the_index_lists_is_one_sentence_where_it_is_read(c
     assert same(recorded[39].step, run.cycles[39].step)
     with pytest.raises(RecordingError, match=rf"chunk at byte {start} of the recording is damaged"):
         recorded.stamps()
+
+
+@pytest.mark.parametrize("offset", [1 << 40, (1 << 63) - 1, (1 << 64) - 1])
+def test_an_index_that_points_nowhere_is_one_sentence(tiny, offset):
+    with tiny[0].open("rb") as file:
+        (chunk, *_) = indexed_chunks(file, Contents())
+        channel = next(iter(chunk.message_index_offsets))
+        with pytest.raises(RecordingError, match="is damaged"):
+            chunk_at(file, offset, Contents())
+        chunk.message_index_offsets[channel] = offset
+        with pytest.raises(RecordingError, match="is damaged"):
+            message_count(file, chunk, channel)
 
 
 def test_what_is_read_first_is_the_index_and_what_describes_the_run(controller, tmp_path, monkeypatch):

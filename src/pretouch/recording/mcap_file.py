@@ -1,20 +1,26 @@
 """An MCAP file, whole or cut off, read chunk by chunk (https://mcap.dev/spec)."""
 
+import struct
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
+from mcap.exceptions import McapError
 from mcap.reader import SeekingReader
 from mcap.records import Channel, Chunk, ChunkIndex, Header, MessageIndex, Schema
 from mcap.records import Message as Record
 from mcap.stream_reader import StreamReader, breakup_chunk
+from zstandard import ZstdError
 
 from pretouch.errors import RecordingError
 
 _MAGIC = b"\x89MCAP0\r\n"
 _LARGEST = 1 << 26
 """A record of more bytes is damage: our chunks have 0.3 MB, those of other tools some 10 MB."""
+_DAMAGE = (McapError, ZstdError, struct.error, ValueError, KeyError, OverflowError, RuntimeError, MemoryError, OSError)
+"""What the library and its decompressors raise for bytes that are cut off or damaged: RuntimeError is lz4's, OSError a
+file shorter than its last record, or a disk that cannot read on."""
 
 
 class Message(NamedTuple):
@@ -91,7 +97,7 @@ def chunks(file: BinaryIO, contents: Contents) -> Iterator[tuple[int, list[Messa
             else:
                 contents.add(record)
             at = file.tell()
-    except Exception:  # the library meets a file that is cut off or damaged with exceptions of any kind
+    except _DAMAGE:
         contents.complete = False
     else:
         contents.complete = True
@@ -105,13 +111,13 @@ def read_messages(file: BinaryIO, contents: Contents) -> Iterator[Message]:
 
 def chunk_at(file: BinaryIO, offset: int, contents: Contents) -> list[Message]:
     """Return the messages of the chunk at an offset; a damaged one is a RecordingError."""
-    file.seek(offset)
     try:
+        file.seek(offset)
         record = next(StreamReader(file, skip_magic=True, emit_chunks=True, record_size_limit=_LARGEST).records)
         if not isinstance(record, Chunk):
             raise ValueError("it is none")
         return contents.messages(record)
-    except Exception as error:  # as above
+    except _DAMAGE as error:
         raise RecordingError(
             f"The chunk at byte {offset} of the recording is damaged ({error}): use a copy that is whole."
         ) from error
@@ -123,7 +129,7 @@ def indexed_chunks(file: BinaryIO, contents: Contents) -> list[ChunkIndex]:
         reader = SeekingReader(file, record_size_limit=_LARGEST)
         contents.add(reader.get_header())
         summary = reader.get_summary()
-    except Exception:  # as above
+    except _DAMAGE:
         summary = None
     if summary is None:
         return []
@@ -138,12 +144,12 @@ def message_count(file: BinaryIO, chunk: ChunkIndex, channel: int) -> int:
     offset = chunk.message_index_offsets.get(channel)
     if offset is None:
         return 0
-    file.seek(offset)
     try:
+        file.seek(offset)
         record = next(StreamReader(file, skip_magic=True, record_size_limit=_LARGEST).records)
         if not isinstance(record, MessageIndex):
             raise ValueError("it is none")
-    except Exception as error:  # as above
+    except _DAMAGE as error:
         raise RecordingError(
             f"The index at byte {offset} of the recording is damaged ({error}): use a copy that is whole."
         ) from error
