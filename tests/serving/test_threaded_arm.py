@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from pretouch.errors import RobotError
 from pretouch.serving import threaded_arm
 from pretouch.serving.fleet import simulated_keys
 from pretouch.serving.simulated_arm import SimulateOptions
@@ -24,6 +25,7 @@ class ScriptedArm:
         self.plant.before_each_step = lambda call: None
         self.goes_on, self.stands = threading.Event(), threading.Event()
         self.goes_on.set()
+        self.fails = False
 
     def begin(self):
         pass
@@ -34,7 +36,9 @@ class ScriptedArm:
     def tick(self):
         if not self.goes_on.is_set():
             self.stands.set()
-        self.goes_on.wait()
+            self.goes_on.wait()
+        if self.fails:
+            raise ValueError("It broke.")
         self.now = time.monotonic()
 
     def read(self):
@@ -74,11 +78,32 @@ def test_a_simulation_that_stands_still_falls_behind_until_it_goes_on(arm, simul
     simulation.goes_on.clear()
     assert simulation.stands.wait(10.0)
     stood = arm.read()
-    while arm.left_out < 0.1:
-        assert time.monotonic() < stood.stamp + 10.0
-    assert stood.stamp < arm.read().stamp < time.monotonic() - 0.02
+    while time.monotonic() < stood.stamp + 0.1:
+        pass
+    assert arm.read().stamp == stood.stamp < time.monotonic() - 1.0  # it was waited for, and is what it is
+    assert arm.left_out > 0.5
     simulation.clock.left_out = 0.3
     simulation.goes_on.set()
-    while arm.left_out < 0.3:
-        assert time.monotonic() < stood.stamp + 10.0
+    assert arm.read().stamp > stood.stamp + 1.0
+    assert arm.left_out == pytest.approx(0.3)
     assert arm.report() == "This machine is too slow by 0.3 s for the simulation."
+
+
+def test_a_late_simulation_is_waited_for(arm, simulation):
+    simulation.goes_on.clear()
+    assert simulation.stands.wait(10.0)
+    threading.Timer(0.1, simulation.goes_on.set).start()
+    while time.monotonic() - arm.read().stamp > 0.02:
+        assert simulation.goes_on.is_set()
+
+
+def test_a_simulation_that_fails_is_not_waited_for(arm, simulation):
+    simulation.goes_on.clear()
+    assert simulation.stands.wait(10.0)
+    simulation.fails = True
+    threading.Timer(0.1, simulation.goes_on.set).start()
+    begin = arm.read().stamp
+    while time.monotonic() < begin + 0.05:
+        pass
+    with pytest.raises(RobotError, match="The simulation has ended: ValueError: It broke"):
+        arm.read()

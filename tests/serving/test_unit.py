@@ -339,3 +339,15 @@ def test_what_was_measured_out_of_session_is_not_told_in_it(desk):
     on.unit.take_imu(ImuSample(0, on.now, np.full(6, 100)))
     first = samples(on.pass_time(0.05), session)[0]
     assert (first.imu_index, first.imu_count) == (100, 1)
+
+
+def test_samples_that_its_imu_did_not_take_count_as_lost_and_parts_of_one_add_up(desk):
+    on = desk(imu=ImuParams())
+    session, told = on.open(), []
+    for step in [0.002] * 9 + [0.101] + [0.002] * 9 + [0.101]:  # a simulation that leaves time out: 49.5 samples, twice
+        told += samples(on.pass_time(step), session)
+        on.unit.take_imu(ImuSample(0, on.now, np.zeros(6, np.int64)))
+    told += samples(on.pass_time(0.05), session)
+    first, last = (sample for sample in told if sample.flags & Flag.IMU_LOST)
+    assert first.imu_index in (9 + 49, 9 + 50)
+    assert (last.imu_index, last.imu_count) == (18 + 99 + 1, 1)

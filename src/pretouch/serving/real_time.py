@@ -12,7 +12,7 @@ from pretouch.sim.touch_sensor import TouchSample
 _SLICE_S = 0.002
 """The simulation moves on by so much at once [s]: how late a datagram may leave."""
 LATE_S = 0.1
-"""A machine that is later than this leaves the time out [s], unless told otherwise."""
+"""How late the simulation may be [s]: what a machine is later than that is left out."""
 
 Measured = TypeVar("Measured", RangeSample, ImuSample, TouchSample)
 
@@ -20,12 +20,8 @@ Measured = TypeVar("Measured", RangeSample, ImuSample, TouchSample)
 class RealTime:
     """The port `Clock`: moves arm and units on as real time passes. Its ticks are of the simulated time."""
 
-    def __init__(self, plant: Plant, period: float, late: float = LATE_S) -> None:
-        """Take the arm, the control period [s], and how late it may be before time is left out [s].
-
-        Time that is left out is missing in what IMUs measured, so that calibration needs more patience.
-        """
-        self._late = late
+    def __init__(self, plant: Plant, period: float) -> None:
+        """Take the arm, and the control period [s]."""
         self._plant, self._slices = plant, max(1, round(period / _SLICE_S))
         self._slice = period / self._slices
         self._fleet: Fleet | None = None
@@ -48,9 +44,9 @@ class RealTime:
             wait = self._next - time.monotonic()
             if wait > 0:
                 time.sleep(wait)
-            elif wait < -self._late:
-                self._next -= wait
-                self.left_out -= wait
+            elif wait < -LATE_S:
+                self._next -= wait + LATE_S
+                self.left_out -= wait + LATE_S
             self._look()
             self._plant.advance(self._slice)
             if self._fleet:

@@ -11,7 +11,7 @@ from pretouch.profiles import Profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.serving.fleet import Fleet, FleetParams
-from pretouch.serving.real_time import LATE_S, RealTime
+from pretouch.serving.real_time import RealTime
 from pretouch.sim.imu import ImuParams, Imus
 from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import plant_params_of
@@ -74,11 +74,8 @@ class SimulatedArm:
     All happens while somebody waits for a tick: one thread.
     """
 
-    def __init__(
-        self, options: SimulateOptions, q: FloatArray, period: float, scene: SceneSpec | None = None,
-        late: float = LATE_S,
-    ) -> None:  # fmt: skip
-        """Let an arm stand at q (n,) [rad] and switch its units on. Control period and `late` are as of `RealTime`.
+    def __init__(self, options: SimulateOptions, q: FloatArray, period: float, scene: SceneSpec | None = None) -> None:
+        """Let an arm stand at q (n,) [rad] and switch its units on; the control period is in s.
 
         A receiver that cannot be found, and a unit without a key, are a HardwareError.
         """
@@ -89,7 +86,7 @@ class SimulatedArm:
             for name, unit in zip(self.fleet.ids, self.fleet.units, strict=True):
                 unit.silent, unit.stuck = name in options.silenced, name in options.stuck
             self.plant = Plant(options.model, scene or SceneSpec(), plant_params_of(options.model.description), q, seed)
-            self.clock = RealTime(self.plant, period, late)
+            self.clock = RealTime(self.plant, period)
             real, fleet = self.clock.real, self.fleet
             RangeFinders(self.plant, skin, RangeFinderParams(), seed, lambda sample: fleet.take_range(real(sample)))
             if len(skin.touching):

@@ -3,6 +3,7 @@
 from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from math import isclose
 
 import numpy as np
 
@@ -108,6 +109,7 @@ class SimulatedUnit:
         self._touch_new = False
         self._fifo: deque[ImuSample] = deque()
         self._fifo_first, self._fifo_lost = 0, False
+        self._imu_time, self._imu_step, self._imu_period, self._imu_phase = np.nan, np.nan, np.nan, 0.0
         self._next_hello = self._up + self._params.hello_s * float(self._rng.uniform())
         self._sampled = self._up - self._params.longest_s * float(self._rng.uniform())
         self._leave()
@@ -172,9 +174,24 @@ class SimulatedUnit:
                 self._range, self._stream = ready, self._stream + 1 if self._stream < 255 else 128
 
     def take_imu(self, sample: ImuSample) -> None:
-        """Let its IMU's FIFO take a sample in; full, it loses the oldest."""
+        """Let its IMU's FIFO take a sample in; full, it loses the oldest.
+
+        Samples that were due since the one before, and never came, count as lost, and what waits with them.
+        """
         if sample.time < self._up:
             return
+        before, step = self._imu_step, sample.time - self._imu_time
+        self._imu_time, self._imu_step = sample.time, step
+        if step > 0.0 and isclose(step, before, rel_tol=1e-6):  # twice the same: nothing is missing
+            self._imu_period = step
+        elif step > self._imu_period:
+            self._imu_phase += step / self._imu_period - 1.0  # what is no whole sample counts at the next gap
+            missing = round(self._imu_phase)
+            if missing > 0:
+                self._imu_phase -= missing
+                self._fifo_first += len(self._fifo) + missing
+                self._fifo.clear()
+                self._fifo_lost = True
         self._fifo.append(sample)
         if len(self._fifo) > FIFO_MOST:
             self._fifo.popleft()

@@ -83,7 +83,8 @@ def go(
             return bool(came) or commander.done(step)
 
         clock, options = MonotonicClock(blind.limits.period), loop.Options(desired=commander)
-        loop.run(blind, arm, NoUnits(), clock, recorder, done, options)
+        with realtime.real_time():
+            loop.run(blind, arm, NoUnits(), clock, recorder, done, options)
         return "A signal came." if came else commander.stopped
 
     _run_motion(arm, move, ending)
