@@ -1,7 +1,7 @@
 """The controller over ROS 2, with a simulated arm in another process that is pushed."""
 
 from collections.abc import Callable, Iterator
-from contextlib import suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from threading import Thread
 from time import sleep
@@ -25,6 +25,7 @@ from pretouch_ros2.robot import Ros2Robot
 from pretouch_ros2.skin import Ros2Skin
 
 PUSH_N = 25.0
+Connected = Callable[..., AbstractContextManager["Run"]]
 
 
 class Run:
@@ -56,12 +57,24 @@ def arm(domain: int, tmp_path: Path) -> Iterator[ArmPeer]:
         yield peer
 
 
-def pushed(model: RobotModel, skin: Skin, arm: ArmPeer, node: Ros2Node, sign: Sign) -> list[ControlStep]:
+@pytest.fixture
+def connected(panda_model: RobotModel, paper_skin: Skin, node: Ros2Node, arm: ArmPeer) -> Connected:
+    """What connects to the arm, whose forces have a sign, and to its units."""
+
+    @contextmanager
+    def made(sign: Sign = "by-robot") -> Iterator[Run]:
+        params = ArmParams(sign, "base")
+        with Ros2Robot(params, panda_model, node) as robot, Ros2Skin(SkinParams(), paper_skin, node) as units:
+            robot.wait(10)
+            units.wait(10)
+            yield Run(panda_model, paper_skin, robot, units)
+
+    return made
+
+
+def pushed(connected: Connected, arm: ArmPeer, sign: Sign) -> list[ControlStep]:
     """Follow the path, be pushed towards +z while doing so, and react for half a second."""
-    with Ros2Robot(ArmParams(sign, "base"), model, node) as robot, Ros2Skin(SkinParams(), skin, node) as units:
-        robot.wait(10)
-        units.wait(10)
-        run = Run(model, skin, robot, units)
+    with connected(sign) as run:
         tracked, reacted = [0], [0]
 
         def done(step: ControlStep) -> bool:
@@ -75,10 +88,8 @@ def pushed(model: RobotModel, skin: Skin, arm: ArmPeer, node: Ros2Node, sign: Si
         return run.until(done, 20, resume=True)  # a busy machine may be late
 
 
-def test_a_pushed_arm_yields_to_the_push(
-    panda_model: RobotModel, paper_skin: Skin, arm: ArmPeer, node: Ros2Node
-) -> None:
-    steps = pushed(panda_model, paper_skin, arm, node, "by-robot")
+def test_a_pushed_arm_yields_to_the_push(connected: Connected, arm: ArmPeer) -> None:
+    steps = pushed(connected, arm, "by-robot")
     contact = next(step for step in steps if step.contact is not None)
     reaction = [step for step in steps if step.mode is Mode.REACT]
     assert contact.contact is not None
@@ -99,10 +110,8 @@ def test_a_pushed_arm_yields_to_the_push(
 
 
 @pytest.mark.slow
-def test_with_the_sign_set_wrong_the_numbers_say_so(
-    panda_model: RobotModel, paper_skin: Skin, arm: ArmPeer, node: Ros2Node
-) -> None:
-    steps = pushed(panda_model, paper_skin, arm, node, "on-robot")
+def test_with_the_sign_set_wrong_the_numbers_say_so(connected: Connected, arm: ArmPeer) -> None:
+    steps = pushed(connected, arm, "on-robot")
     contact = next(step for step in steps if step.contact is not None)
     assert contact.contact is not None
     assert contact.contact.force[2] < -10
@@ -112,14 +121,10 @@ def test_with_the_sign_set_wrong_the_numbers_say_so(
 
 @pytest.mark.parametrize("fault", ["mute", pytest.param("freeze", marks=pytest.mark.slow)])
 def test_a_state_that_does_not_come_or_only_comes_again_latches_a_hold(
-    panda_model: RobotModel, paper_skin: Skin, arm: ArmPeer, node: Ros2Node, fault: str
+    connected: Connected, arm: ArmPeer, fault: str
 ) -> None:
-    with Ros2Robot(ArmParams("by-robot", "base"), panda_model, node) as robot, Ros2Skin(
-        SkinParams(), paper_skin, node
-    ) as units:  # fmt: skip
-        robot.wait(10)
-        units.wait(10)
-        run, turns = Run(panda_model, paper_skin, robot, units), [0]
+    with connected() as run:
+        turns = [0]
 
         def done(step: ControlStep) -> bool:
             turns[0] += 1
@@ -134,15 +139,11 @@ def test_a_state_that_does_not_come_or_only_comes_again_latches_a_hold(
 
 @pytest.mark.slow
 def test_a_controller_that_gets_no_commands_any_more_ends_the_run_and_the_arm_is_at_rest(
-    panda_model: RobotModel, paper_skin: Skin, arm: ArmPeer, node: Ros2Node
+    connected: Connected, arm: ArmPeer
 ) -> None:
-    with Ros2Robot(ArmParams("by-robot", "base"), panda_model, node) as robot, Ros2Skin(
-        SkinParams(), paper_skin, node
-    ) as units:  # fmt: skip
-        robot.wait(10)
-        units.wait(10)
-        robot.begin()
-        run, turns = Run(panda_model, paper_skin, robot, units), [0]
+    with connected() as run:
+        run.robot.begin()
+        turns = [0]
 
         def done(step: ControlStep) -> bool:
             turns[0] += step.mode is Mode.TRACK and float(np.abs(step.command).max()) > 0.1
@@ -157,16 +158,10 @@ def test_a_controller_that_gets_no_commands_any_more_ends_the_run_and_the_arm_is
 
 
 @pytest.mark.slow
-def test_an_arm_whose_machine_pauses_in_motion_ends_at_rest(
-    panda_model: RobotModel, paper_skin: Skin, arm: ArmPeer, node: Ros2Node
-) -> None:
-    with Ros2Robot(ArmParams("by-robot", "base"), panda_model, node) as robot, Ros2Skin(
-        SkinParams(), paper_skin, node
-    ) as units:  # fmt: skip
-        robot.wait(10)
-        units.wait(10)
-        robot.begin()
-        run, turns = Run(panda_model, paper_skin, robot, units), [0]
+def test_an_arm_whose_machine_pauses_in_motion_ends_at_rest(connected: Connected, arm: ArmPeer) -> None:
+    with connected() as run:
+        run.robot.begin()
+        turns = [0]
         pause = Thread(target=arm.pause, args=(0.5,))
 
         def done(step: ControlStep) -> bool:

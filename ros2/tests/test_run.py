@@ -113,14 +113,20 @@ def test_a_run_that_is_killed_in_motion_leaves_the_arm_at_rest(domain: int, tmp_
     assert np.percentile(acceleration, 99) < 1.1
 
 
+def guided(run: subprocess.Popen[str], arm: ArmPeer) -> list[str]:
+    """Push the hand as the command asks for; return what it said."""
+    said = []
+    for direction in DIRECTIONS:
+        said += lines_until(run, "Push the hand")
+        arm.tell("push " + " ".join(str(14.0 * part) for part in direction.axis))
+        said += lines_until(run, "Let go.")
+        arm.tell("push 0 0 0")
+    return said
+
+
 def test_guided_pushes_confirm_the_sign(domain: int, tmp_path: Path, arm: ArmPeer) -> None:
     with running(domain, tmp_path, "--seconds", "1") as run:
-        said = []
-        for direction in DIRECTIONS:
-            said += lines_until(run, "Push the hand")
-            arm.tell("push " + " ".join(str(14.0 * part) for part in direction.axis))
-            said += lines_until(run, "Let go.")
-            arm.tell("push 0 0 0")
+        said = guided(run, arm)
         out, _ = run.communicate(timeout=LIMIT_S)
     out = "".join(said) + out
     assert run.returncode == 0, out
@@ -135,12 +141,7 @@ def test_a_commander_drives_by_the_profile_pretouch_after_pushes_that_torques_co
     words = "--torques", "/external_joint_torques", "--desired", "twist", "--record", str(place)
     chosen = "pretouch:perception=none:failure.state_timeout_s=1"
     with running(domain, tmp_path, *words, "--seconds", "12", profile=chosen) as run:
-        said = []
-        for direction in DIRECTIONS:
-            said += lines_until(run, "Push the hand")
-            arm.tell("push " + " ".join(str(14.0 * part) for part in direction.axis))
-            said += lines_until(run, "Let go.")
-            arm.tell("push 0 0 0")
+        said = guided(run, arm)
         said += lines_until(run, "was received on /pretouch/twist yet")
         with (
             Ros2Node(NodeParams(domain=domain)) as theirs,

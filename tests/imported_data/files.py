@@ -93,3 +93,8 @@ def write_csv(file: Path, columns, separator=",", ending="\n"):
 
 def force_columns(force, rate=100.0):
     return {"time_s": np.arange(len(force)) / rate} | {f"force_{a}_N": force[:, i] for i, a in enumerate("xyz")}
+
+
+def by_time(*parts):
+    """Messages of several topics in the order of their times."""
+    return sorted((m for part in parts for m in part), key=lambda m: m[1])
