@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from pretouch.contact.thresholds import (
+from pretouch.contact.moving_thresholds import (
     ThresholdNumbers,
     crossed,
     noise_force,

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from pretouch.cholesky import factor
 from pretouch.control.braking import mass_along, touch_limits, touch_speed
-from pretouch.params.anticipation import REGIONS, BrakingParams, EffectiveMass
+from pretouch.params.pretouch import REGIONS, BrakingParams, EffectiveMass
 from pretouch.robot.model import RobotModel
 
 UNCAPPED = 100.0

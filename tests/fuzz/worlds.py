@@ -25,7 +25,7 @@ from pretouch.params import (
     TaskParams,
     WindowParams,
 )
-from pretouch.params.anticipation import EffectiveMass, NullSpaceMotion, Tangential
+from pretouch.params.pretouch import EffectiveMass, NullSpaceMotion, Tangential
 from pretouch.perception.scene_filter import Fixtures, no_fixtures
 from pretouch.profiles import Profile, profile
 from pretouch.robot.body import Capsules

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pretouch.groups import Sensors
-from pretouch.perception.closing import LastSeen, closing_speeds, follow_points, motion_init, reckon
+from pretouch.perception.motion_compensation import LastSeen, closing_speeds, follow_points, motion_init, reckon
 from pretouch.sensing.sensor import PAPER_SENSOR, cones_of
 
 MEMORY, PERIOD = 0.09, 0.02

@@ -7,10 +7,10 @@ import pytest
 
 from pretouch.groups import Chain, Sensors
 from pretouch.params import PerceptionParams
+from pretouch.perception.motion_compensation import move_back
 from pretouch.perception.obstacles import poses, track_init
 from pretouch.perception.perceive import perceive, perception_setup
 from pretouch.perception.scene_filter import no_fixtures
-from pretouch.perception.stamped import move_back
 from pretouch.profiles import PROFILES
 from pretouch.types import RangeReadings, RangeStatus, RobotState
 

@@ -24,7 +24,7 @@ from pretouch.contact.self_clamping import find_self_clamp, presses_on_fixture
 from pretouch.contact.virtual_mass import VirtualMass, begun, dead_band, fastest_point, learnt, mass_init, yielded
 from pretouch.groups import Kinematics
 from pretouch.modes import Event, ModeState
-from pretouch.params.reaction import AdmittanceParams, ClampParams
+from pretouch.params.paper import AdmittanceParams, ClampParams
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray, Mode
 from pretouch.values import value

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from pretouch.compiled import compiled
-from pretouch.params.reaction import ClampParams
+from pretouch.params.paper import ClampParams
 from pretouch.types import FloatArray
 from pretouch.values import value
 

@@ -9,7 +9,7 @@ gap. See docs/explanation/reaction.md.
 import numpy as np
 
 from pretouch.groups import Kinematics
-from pretouch.params.reaction import PinchParams
+from pretouch.params.paper import PinchParams
 from pretouch.robot.body import Capsules
 from pretouch.robot.model import RobotModel
 from pretouch.robot.self_distance import nearest_points

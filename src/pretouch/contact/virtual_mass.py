@@ -12,7 +12,7 @@ import numpy as np
 
 from pretouch.compiled import ByName, compiled, entry
 from pretouch.groups import CapsuleArrays, Chain, Kinematics
-from pretouch.params.reaction import AdmittanceParams
+from pretouch.params.paper import AdmittanceParams
 from pretouch.robot.kinematics import point_velocity
 from pretouch.robot.model import RobotModel
 from pretouch.types import BoolArray, FloatArray

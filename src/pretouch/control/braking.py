@@ -15,7 +15,7 @@ from pretouch.cholesky import forward
 from pretouch.compiled import compiled, inlined
 from pretouch.control.restriction import Rows
 from pretouch.groups import Chain, ObstacleArrays
-from pretouch.params.anticipation import REGIONS, BrakingParams, EffectiveMass
+from pretouch.params.pretouch import REGIONS, BrakingParams, EffectiveMass
 from pretouch.robot.kinematics import column
 from pretouch.types import BoolArray, FloatArray, IntArray
 

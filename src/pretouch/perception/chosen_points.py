@@ -7,7 +7,7 @@ import numpy as np
 from pretouch.compiled import ByName, compiled, entry, inlined
 from pretouch.groups import CapsuleArrays, Chain
 from pretouch.perception.closest import ClosestArrays, closest, to_axis
-from pretouch.perception.closing import follow_points
+from pretouch.perception.motion_compensation import follow_points
 from pretouch.perception.obstacles import HEARD, SEEN, USED
 from pretouch.robot.kinematics import point_velocity
 from pretouch.robot.vectors import dot

@@ -6,7 +6,7 @@ import numpy as np
 
 from pretouch.compiled import compiled
 from pretouch.groups import Cones, Kinematics, Sensors
-from pretouch.perception.closing import motion_init
+from pretouch.perception.motion_compensation import motion_init
 from pretouch.sensing.skin import Skin
 from pretouch.types import BoolArray, FloatArray, IntArray, Obstacles, RangeReadings, RangeStatus
 from pretouch.values import value

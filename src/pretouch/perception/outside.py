@@ -16,7 +16,7 @@ from pretouch.groups import CapsuleArrays, Chain, Kinematics
 from pretouch.params import OutsidePoints
 from pretouch.perception.chosen_points import KeptPoints, Placed, PointNumbers, take_points
 from pretouch.perception.closest import ClosestArrays, closest, distances, joined
-from pretouch.perception.closing import closing_speeds
+from pretouch.perception.motion_compensation import closing_speeds
 from pretouch.perception.obstacles import HEARD, SEEN, TrackState, track_init
 from pretouch.perception.perceive import Perception, PerceptionSetup
 from pretouch.robot.model import RobotModel

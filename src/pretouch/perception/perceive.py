@@ -10,7 +10,7 @@ from pretouch.groups import CapsuleArrays, Chain, Kinematics, Sensors, SkinArray
 from pretouch.params import PerceptionParams
 from pretouch.perception.chosen_points import PointNumbers
 from pretouch.perception.closest import ClosestArrays, closest, distances, no_obstacles
-from pretouch.perception.closing import LastSeen, closing_speeds, follow_points, reckon
+from pretouch.perception.motion_compensation import LastSeen, closing_speeds, follow_points, move_back, reckon
 from pretouch.perception.obstacles import (
     HEARD,
     SEEN,
@@ -28,7 +28,6 @@ from pretouch.perception.obstacles import (
 from pretouch.perception.out_of_view import give_up, looks_at
 from pretouch.perception.scene_filter import Fixtures, leave_out, leave_out_planes
 from pretouch.perception.spread import bring_nearer, widen
-from pretouch.perception.stamped import move_back
 from pretouch.robot.model import RobotModel
 from pretouch.robot.vectors import placed_capsules, rotate
 from pretouch.sensing.skin import Skin
