@@ -233,19 +233,6 @@ def test_robot_and_loop(panda_model, paper_skin):
     assert loop.period.max == pytest.approx(0.03)
 
 
-def test_units_of_several_skins_are_told_apart_by_name(panda_model, paper_skin):
-    other = Skin(paper_skin.units[5:0:-1], panda_model)
-    runs = tuple(made.Run(panda_model, skin, profile("paper")) for skin in (paper_skin, other))
-    near = [(0, "panda_hand", 0.5, 0.7)]
-    kept = [
-        made.Kept(0, None, made.step(panda_model, stamp=0.0, near=near)),
-        made.Kept(1, None, made.step(panda_model, units=5, stamp=0.01, near=near)),
-    ]
-    course = gather(made.Recorded(runs, kept))
-    assert course.units == paper_skin.ids
-    assert np.argwhere(np.isfinite(course.body_distance)).tolist() == [[0, 0], [1, 5]]
-
-
 def test_each_step_has_the_parameters_of_its_run(panda_model, paper_skin):
     runs = tuple(made.Run(panda_model, paper_skin, profile(name)) for name in ("paper", "paper-0.5m"))
     near = [(0, "panda_hand", 0.55, 0.7)]

@@ -10,7 +10,6 @@ from pretouch.modes import Event
 from pretouch.profiles import PROFILES, profile
 from pretouch.reporting.html import bad, number, percent, table
 from pretouch.reporting.measures import measure
-from pretouch.reporting.orientation import ISO_TS_15066
 from pretouch.reporting.page import page
 from pretouch.reporting.sections.contact import contact_section, heading, orientation_section
 from pretouch.reporting.sections.motion import limit_section, mode_section
@@ -52,7 +51,7 @@ class Reader(HTMLParser):
 
 def read(*recordings):
     measured = [measure(recorded, f"number-{i}.mcap") for i, recorded in enumerate(recordings)]
-    reader = Reader(page(measured, ISO_TS_15066))
+    reader = Reader(page(measured))
     reader.said = re.sub(r"\s+", " ", " ".join(reader.text))
     return reader
 
@@ -196,7 +195,7 @@ def test_a_file_that_is_cut_off_is_said_to_be(panda_model, paper_skin):
 def test_truth_that_is_not_known_is_said_to_be_not_known(panda_model, paper_skin):
     one = one_step(panda_model, paper_skin)
     assert "True touches are not known" in section(contact_section, one)
-    assert "understates the peaks of impacts" in section(orientation_section, one, ISO_TS_15066)
+    assert "understates the peaks of impacts" in section(orientation_section, one)
 
 
 def test_an_exceeded_limit_is_marked(panda_model, paper_skin):
@@ -210,7 +209,7 @@ def test_text_of_a_file_stays_text(panda_model, paper_skin):
     steps = [made.step(panda_model, stamp=0.01 * i, mode=Mode.HOLD, reason=f"{evil} {i}") for i in range(3)]
     run = made.Run(panda_model, skin, replace(profile("paper"), name=evil), versions={evil: evil}, about={evil: [evil]})
     hostile = made.Recorded((run,), [made.Kept(0, None, s) for s in steps], False, evil)
-    reader = Reader(page([measure(hostile, evil)], ISO_TS_15066))
+    reader = Reader(page([measure(hostile, evil)]))
     assert "script" not in reader.tags
     assert reader.tags.count("img") == 4
     assert any(evil in text for text in reader.text)
@@ -234,7 +233,7 @@ def test_an_hour_stays_small(panda_model, paper_skin):
         mode = Mode.REACT if i % 50 < 5 else Mode.TRACK
         step = replace(steps[i % 100], stamp=0.6 * i, force=noise[i], filtered_force=noise[i], mode=mode)
         many.kept.append(made.Kept(0, None, replace(step, obstacles=made.seen(panda_model, near))))
-    assert len(page([measure(many, "hour")], ISO_TS_15066)) < 3e6
+    assert len(page([measure(many, "hour")])) < 3e6
 
 
 def test_numbers_as_they_are_written():

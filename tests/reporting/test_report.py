@@ -7,7 +7,7 @@ import pytest
 from pretouch import cli
 from pretouch.cli.report import titles, write_page
 from pretouch.controller import Controller
-from pretouch.errors import ExperimentError, ParameterError, RecordingError
+from pretouch.errors import ExperimentError, RecordingError
 from pretouch.loop import Cycle
 from pretouch.profiles import profile
 from pretouch.recording.reader import open_recording
@@ -107,17 +107,6 @@ def test_what_is_wrong_with_a_request_is_one_sentence(folder, tmp_path):
         write_page([tmp_path / "nowhere.mcap"], tmp_path / "page.html")
     with pytest.raises(ExperimentError, match="cannot be written"):
         write_page([trial], tmp_path)
-    with pytest.raises(ParameterError, match=r"limits\.toml cannot be read"):
-        write_page([trial], tmp_path / "page.html", tmp_path / "limits.toml")
-
-
-def test_limits_of_ones_own_stand_in_the_page(folder, tmp_path):
-    limits = tmp_path / "limits.toml"
-    limits.write_text('source = "our table"\n[[region]]\nname = "Thumb"\nquasi_static_n = 40\ntransient_n = 50\n')
-    text = write_page([folder[0] / "trial.mcap"], tmp_path / "page.html", limits).read_text()
-    assert "our table" in text
-    assert "Thumb" in text
-    assert "Hands and fingers" not in text
 
 
 def test_a_name_that_is_no_text_can_be_reported(folder, tmp_path):

@@ -155,15 +155,12 @@ class Report:
     """File to write."""
     replace: bool = False
     """Overwrite a file that is there though it is no report of these recordings."""
-    limits: str = ""
-    """TOML file with force limits of body regions, in place of those of ISO/TS 15066."""
 
     def run(self) -> None:
         """Write the page."""
         from pretouch.cli.report import write_page
 
-        limits, files = Path(self.limits) if self.limits else None, [Path(file) for file in self.files]
-        print(f"Report: {write_page(files, Path(self.out), limits, self.replace)}")
+        print(f"Report: {write_page([Path(file) for file in self.files], Path(self.out), self.replace)}")
 
 
 @dataclass(frozen=True)

@@ -10,16 +10,14 @@ from pretouch.errors import RecordingError
 from pretouch.extras import FIGURES
 from pretouch.recording.reader import open_recording
 from pretouch.reporting.measures import Measures, measure
-from pretouch.reporting.orientation import ISO_TS_15066, load_limits
 
 
-def write_page(files: Sequence[Path], out: Path, limits: Path | None = None, replace: bool = False) -> Path:
+def write_page(files: Sequence[Path], out: Path, replace: bool = False) -> Path:
     """Write the report of some recordings, and return the page's path.
 
     Args:
         files: recordings, each once.
         out: HTML file to write.
-        limits: TOML file with force limits of body regions, in place of those of ISO/TS 15066.
         replace: whether to overwrite a file that is no report of these recordings.
     """
     if not files:
@@ -29,7 +27,6 @@ def write_page(files: Sequence[Path], out: Path, limits: Path | None = None, rep
         raise RecordingError(f"The recording {twice[0]} is given more than once: give each once.")
     if out.resolve() in [place.resolve() for place in files]:
         raise RecordingError(f"The report {out} would be written over the recording: give another --out.")
-    regions = load_limits(limits) if limits else ISO_TS_15066
     FIGURES.need("A report")
     check_writable("report", out)
     mark = _mark(files)
@@ -40,7 +37,7 @@ def write_page(files: Sequence[Path], out: Path, limits: Path | None = None, rep
         )
     from pretouch.reporting.page import page  # needs the extra
 
-    text = page(_measured(files), regions)
+    text = page(_measured(files))
     with unwritable_said("report", out):
         out.write_bytes(text.encode("utf-8", errors="replace") + mark)  # a file name may be no text
     return out

@@ -3,7 +3,7 @@
 import math
 from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass
 from enum import Enum
 from typing import Any
 
@@ -101,41 +101,24 @@ class Difference:
     recomputed: object
 
 
-@dataclass(frozen=True)
+@dataclass
 class Verdict:
     """What recomputing a recording showed."""
 
     steps: int
     """In the recording."""
-    checked: int
+    elsewhere: str
+    """Where it was made, as a sentence, if not by these versions on a machine like this: then not every bit counts."""
+    checked: int = 0
     """Recomputed and compared."""
-    skipped: dict[str, int]
+    skipped: Counter[str] = field(default_factory=Counter)
     """Steps that could not be recomputed, by the reason."""
-    exact: bool
-    """Whether every bit was compared: all was recorded by these versions on a machine like this."""
-    differing: int
+    differing: int = 0
     """Steps that differ."""
-    first: Difference | None
-    largest: float
+    first: Difference | None = None
+    largest: float = 0.0
     """Largest difference of a number, in its field's SI unit; infinite if a mode, a text or a shape differs."""
-    largest_field: str
-    said: str
-    """All this as a sentence or two."""
-
-    @property
-    def agrees(self) -> bool:
-        """Whether there was something to compare, nothing differs, and nothing has gone missing from the file."""
-        return self.checked > 0 and self.first is None and not {_MISSING, _GONE} & set(self.skipped)
-
-
-class _Count:
-    """What was found so far."""
-
-    def __init__(self) -> None:
-        self.checked = self.differing = 0
-        self.skipped: Counter[str] = Counter()
-        self.first: Difference | None = None
-        self.largest, self.largest_field = 0.0, ""
+    largest_field: str = ""
 
     def note(self, number: int, stamp: float, parts: list[Part]) -> None:
         """Take in what differs in one step."""
@@ -149,6 +132,37 @@ class _Count:
             part = parts[0]
             self.first = Difference(number, stamp, part.field, part.recorded, part.recomputed)
 
+    @property
+    def exact(self) -> bool:
+        """Whether every bit was compared."""
+        return not self.elsewhere
+
+    @property
+    def agrees(self) -> bool:
+        """Whether there was something to compare, nothing differs, and nothing has gone missing from the file."""
+        return self.checked > 0 and self.first is None and not {_MISSING, _GONE} & set(self.skipped)
+
+    @property
+    def said(self) -> str:
+        """All this as a sentence or two."""
+        if self.first is not None:
+            size = "one of kind" if math.isinf(self.largest) else f"{self.largest:.3g}"
+            said = (
+                f"{self.differing} of {self.checked} steps differ when they are recomputed; the first is step"
+                f" {self.first.number} at {self.first.stamp:.3f} s: {self.first.field} was {self.first.recorded},"
+                f" recomputed {self.first.recomputed}. The largest difference is {size}, of"
+                f" {self.largest_field}."
+            )
+        elif self.checked:
+            how = "bit for bit" if self.exact else f"within {TOLERANCE:g} of their SI units"
+            all_of_them = "The only step was" if self.checked == 1 else f"All {self.checked} steps were"
+            are = "is" if self.checked == 1 else "are"
+            said = f"{all_of_them} recomputed and {are} the same {how}."
+        else:
+            said = "No step could be recomputed."
+        skipped = "; ".join(f"{n} {'step has' if n == 1 else 'steps have'} {why}" for why, n in self.skipped.items())
+        return " ".join(filter(None, (said, f"{skipped}." if skipped else "", self.elsewhere)))
+
 
 def verify(
     recorded: Recorded, progress: Callable[[int], None] = lambda done: None, path: Path | None = None
@@ -159,7 +173,7 @@ def verify(
     snapshot, where it is compared too. Otherwise within `TOLERANCE`, beginning anew at each snapshot, and
     without the sentences. `progress` gets how many steps are done; `path` stands for one of your own class.
     """
-    count = _Count()
+    verdict = Verdict(len(recorded), _elsewhere(recorded.runs))
     exact = [run.versions == versions() for run in recorded.runs]
     controllers: dict[int, Controller] = {}
     state: ControllerState | None = None
@@ -167,7 +181,7 @@ def verify(
     for i in range(len(recorded)):
         kept, number = recorded[i], recorded.number(i)
         if before is not None and number > before[1] + 1:
-            count.skipped[_GONE] += number - before[1] - 1
+            verdict.skipped[_GONE] += number - before[1] - 1
         if before != (kept.run, number - 1):
             state = None
         before = kept.run, number
@@ -179,16 +193,16 @@ def verify(
                 parts += differing(kept.snapshot, state, True, "state before")
             state = kept.snapshot
         if state is None or kept.inputs is None:
-            count.skipped[_unchecked(recorded, i, kept)] += 1
+            verdict.skipped[_unchecked(recorded, i, kept)] += 1
             state = None
         else:
             step, state = controllers[kept.run].step(state, kept.inputs)
             if not exact[kept.run] or encoded_step(number, step) != recorded.step_data(i):
                 parts += differing(kept.step, step, exact[kept.run])
-            count.checked += 1
-        count.note(number, kept.step.stamp, parts)
+            verdict.checked += 1
+        verdict.note(number, kept.step.stamp, parts)
         progress(i + 1)
-    return _verdict(recorded, count, all(exact))
+    return verdict
 
 
 def _unchecked(recorded: Recorded, i: int, kept: Kept) -> str:
@@ -198,42 +212,8 @@ def _unchecked(recorded: Recorded, i: int, kept: Kept) -> str:
     return _NO_INPUTS if recorded.unreadable(i) != MISSING_INPUTS else _MISSING
 
 
-def _verdict(recorded: Recorded, count: _Count, exact: bool) -> Verdict:
-    first, skipped = count.first, dict(count.skipped)
-    how = "bit for bit" if exact else f"within {TOLERANCE:g} of their SI units"
-    if first is not None:
-        said = (
-            f"{count.differing} of {count.checked} steps differ when they are recomputed; the first is step"
-            f" {first.number} at {first.stamp:.3f} s: {first.field} was {first.recorded}, recomputed"
-            f" {first.recomputed}. {_largest(count)}"
-        )
-    elif count.checked:
-        said = f"{_all(count.checked)} recomputed and {'is' if count.checked == 1 else 'are'} the same {how}."
-    else:
-        said = "No step could be recomputed."
-    if skipped:
-        said += (
-            " " + "; ".join(f"{n} {'step has' if n == 1 else 'steps have'} {why}" for why, n in skipped.items()) + "."
-        )
-    if not exact:
-        said += f" {_otherwise(recorded.runs)}"
-    return Verdict(
-        len(recorded), count.checked, skipped, exact, count.differing, first, count.largest, count.largest_field, said
-    )
-
-
-def _all(checked: int) -> str:
-    return "The only step was" if checked == 1 else f"All {checked} steps were"
-
-
-def _largest(count: _Count) -> str:
-    if math.isinf(count.largest):
-        return f"The largest difference is one of kind, of {count.largest_field}."
-    return f"The largest difference is {count.largest:.3g}, of {count.largest_field}."
-
-
-def _otherwise(runs: tuple[Run, ...]) -> str:
-    """Say what differs between where a recording was made and here."""
+def _elsewhere(runs: tuple[Run, ...]) -> str:
+    """Say what differs between where a recording was made and here, or ''."""
     here = versions()
     differ = {
         name: (run.versions.get(name, "unknown"), here.get(name, "unknown"))
@@ -242,4 +222,4 @@ def _otherwise(runs: tuple[Run, ...]) -> str:
         if run.versions.get(name) != here.get(name)
     }
     shown = ", ".join(f"{name} {there}, here {now}" for name, (there, now) in differ.items())
-    return f"It was made with {shown}: sums may round otherwise."
+    return f"It was made with {shown}: sums may round otherwise." if differ else ""

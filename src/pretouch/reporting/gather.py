@@ -1,18 +1,16 @@
 """One pass over a recording, in batches so that an hour of it fits into memory as arrays."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import groupby, islice
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from pretouch.explanation import answers
 from pretouch.recording.run_record import Columns, TrueForces, columns_of, contacts_of
 from pretouch.reporting.course import NO_READING, OUTCOMES, Course
 from pretouch.robot.model import RobotModel
-from pretouch.types import FloatArray, Inputs, IntArray, RangeReadings
+from pretouch.types import FloatArray, Inputs, RangeReadings
 
 if TYPE_CHECKING:
     from pretouch.recording.reader import Kept, Recorded, Run
@@ -21,31 +19,13 @@ _BATCH = 4096
 """Cycles that are held as objects at a time."""
 
 
-@dataclass(frozen=True)
-class _Layout:
-    """Columns of the arrays: all units and links of all runs, by name."""
-
-    units: tuple[str, ...]
-    links: tuple[str, ...]
-    joints: int
-
-    @classmethod
-    def of(cls, runs: Sequence["Run"]) -> "_Layout":
-        return cls(
-            tuple(dict.fromkeys(unit for run in runs for unit in run.skin.ids)),
-            tuple(dict.fromkeys(link for run in runs for link in run.model.links)),
-            max((run.model.n for run in runs), default=0),
-        )
-
-
 def gather(recorded: "Recorded") -> Course:
-    """Read all cycles of a recording."""
-    layout = _Layout.of(recorded.runs)
+    """Read all cycles of a recording: of one arm and one skin, which runs do not change."""
     blocks, events, reasons, contacts, truths = [], [], [], [], []
     done = 0
     for batch in _batches(recorded):
         run = recorded.runs[batch[0].run]
-        blocks.append(_block(batch, run, layout))
+        blocks.append(_block(batch, run))
         events += [kept.step.event for kept in batch]
         reasons += [kept.step.reason for kept in batch]
         contacts += contacts_of([kept.step for kept in batch], done)
@@ -53,7 +33,8 @@ def gather(recorded: "Recorded") -> Course:
         done += len(batch)
     joined = {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
     return Course(
-        runs=tuple(recorded.runs), units=layout.units, links=layout.links, event=tuple(events),
+        runs=tuple(recorded.runs), units=recorded.runs[0].skin.ids, links=recorded.runs[0].model.links,
+        event=tuple(events),
         reason=tuple(reasons), contacts=tuple(contacts), truth=_joined(truths), **joined,
     )  # fmt: skip
 
@@ -65,36 +46,29 @@ def _batches(recorded: "Recorded") -> Iterator[list["Kept"]]:
             yield batch
 
 
-def _block(batch: list["Kept"], run: "Run", layout: _Layout) -> Columns:
+def _block(batch: list["Kept"], run: "Run") -> Columns:
     """Arrays of a batch of one run."""
     steps = [kept.step for kept in batch]
-    place = np.array([layout.units.index(unit) for unit in run.skin.ids], dtype=np.int64)
     q, q_commanded = np.array([s.q for s in steps]), np.array([s.q_commanded for s in steps])
     command = np.array([s.command for s in steps])
-    joints = {
-        "q_margin": _margin(q_commanded, run.model),
-        "q_margin_measured": _margin(q, run.model),
-        "command": command,
-        "speed_limit": _speed_limit(q_commanded, command, run.model),
-    }
-    found = columns_of(steps)
-    spread = {name: _spread(found[name], place, len(layout.units)) for name in ("range_distance", "sensed_point")}
     return {
-        **found,
-        **spread,
+        **columns_of(steps),
         "run": np.full(len(batch), batch[0].run),
         "answering": np.array([answers(s) for s in steps]),
         "detectable_n": np.array([s.detectable_n for s in steps]),
         "restricted": np.array([len(s.restricted) for s in steps]),
         "outcome": np.array([OUTCOMES.index(s.qp.outcome) for s in steps]),
         "slack": np.array([np.max(s.qp.slack, initial=0.0) for s in steps]),
-        **{name: _padded(values, layout.joints) for name, values in joints.items()},
-        **_near(batch, run, layout, place),
-        **_given([kept.inputs for kept in batch], place, len(layout.units)),
+        "q_margin": _margin(q_commanded, run.model),
+        "q_margin_measured": _margin(q, run.model),
+        "command": command,
+        "speed_limit": _speed_limit(q_commanded, command, run.model),
+        **_near(batch, run),
+        **_given([kept.inputs for kept in batch], len(run.skin)),
     }
 
 
-def _near(batch: list["Kept"], run: "Run", layout: _Layout, place: IntArray) -> Columns:
+def _near(batch: list["Kept"], run: "Run") -> Columns:
     """What was sensed, as the least distance of each step by unit and by link, and the nearest point."""
     seen = [kept.step.obstacles for kept in batch]
     row = np.repeat(np.arange(len(seen)), [len(o.unit) for o in seen])
@@ -103,12 +77,11 @@ def _near(batch: list["Kept"], run: "Run", layout: _Layout, place: IntArray) -> 
     body = np.concatenate([o.body_distance for o in seen])
     ee = np.concatenate([o.ee_distance for o in seen])
     point = np.concatenate([o.point for o in seen]).reshape(-1, 3)
-    names = np.array([layout.links.index(name) for name in run.model.links], dtype=np.int64)
-    by_unit = np.full((len(seen), len(layout.units)), np.nan)
-    by_link = np.full((len(seen), len(layout.links)), np.nan)
-    own = unit < len(place)  # what outside sources see is of no unit
-    np.fmin.at(by_unit, (row[own], place[unit[own]]), body[own])
-    np.fmin.at(by_link, (row, names[link]), body)
+    by_unit = np.full((len(seen), len(run.skin)), np.nan)
+    by_link = np.full((len(seen), len(run.model.links)), np.nan)
+    own = unit < len(run.skin)  # what outside sources see is of no unit
+    np.fmin.at(by_unit, (row[own], unit[own]), body[own])
+    np.fmin.at(by_link, (row, link), body)
     nearest, where = np.full(len(seen), np.nan), np.full((len(seen), 3), np.nan)
     farthest_first = np.argsort(-ee, kind="stable")  # of several entries for a row the last one stays
     farthest_first = farthest_first[np.isfinite(ee[farthest_first])]
@@ -116,18 +89,17 @@ def _near(batch: list["Kept"], run: "Run", layout: _Layout, place: IntArray) -> 
     return {"body_distance": by_unit, "link_distance": by_link, "ee_distance": nearest, "nearest_point": where}
 
 
-def _given(inputs: Sequence[Inputs | None], place: IntArray, units: int) -> Columns:
+def _given(inputs: Sequence[Inputs | None], units: int) -> Columns:
     """What the steps were given; inputs that a controller could not use may hold anything."""
-    nothing = np.full(len(place), np.nan)
-    none = np.full(len(place), NO_READING)
-    readings = [_readings(i, len(place)) for i in inputs]
+    nothing, none = np.full(units, np.nan), np.full(units, NO_READING)
+    readings = [_readings(i, units) for i in inputs]
     return {
         "given": np.array([i is not None for i in inputs]),
         "robot_stamp": np.array([np.nan if i is None else float(i.robot.stamp) for i in inputs]),
         "force_missing": np.array([i is not None and i.robot.wrench is None for i in inputs]),
-        "reading_stamp": _spread([r.stamp if r else nothing for r in readings], place, units),
-        "reading_distance": _spread([r.distance if r else nothing for r in readings], place, units),
-        "reading_status": _spread([r.status if r else none for r in readings], place, units, NO_READING),
+        "reading_stamp": np.array([r.stamp if r else nothing for r in readings]),
+        "reading_distance": np.array([r.distance if r else nothing for r in readings]),
+        "reading_status": np.array([r.status if r else none for r in readings]),
     }
 
 
@@ -138,19 +110,6 @@ def _readings(inputs: Inputs | None, count: int) -> RangeReadings | None:
     fit = all(np.shape(part) == (count,) for part in (inputs.readings.stamp, inputs.readings.distance,
                                                       inputs.readings.status))  # fmt: skip
     return inputs.readings if fit else None
-
-
-def _spread(rows: ArrayLike, place: IntArray, width: int, nothing: Any = np.nan) -> NDArray[Any]:
-    """Rows (S, K, ...) of a skin's units, each unit in the column of its name."""
-    given = np.asarray(rows)
-    spread = np.full((len(given), width, *given.shape[2:]), nothing)
-    spread[:, place] = given
-    return spread
-
-
-def _padded(values: FloatArray, width: int) -> FloatArray:
-    """Columns of NaN added on the right, up to a width."""
-    return np.pad(values, ((0, 0), (0, width - values.shape[1])), constant_values=np.nan)
 
 
 def _margin(q: FloatArray, model: RobotModel) -> FloatArray:

@@ -11,19 +11,18 @@ from pretouch.reporting.figures.motion import joint_figure, motion_figure, path_
 from pretouch.reporting.html import Html, Text, document, element, joined
 from pretouch.reporting.limits import acceleration_fraction, speed_fraction
 from pretouch.reporting.measures import Measures
-from pretouch.reporting.orientation import BodyLimits
 from pretouch.reporting.sections.contact import contact_section, orientation_section
 from pretouch.reporting.sections.motion import distance_section, limit_section, mode_section, speed_section
 from pretouch.reporting.sections.setting import health_section, parameter_section, setting_section
 from pretouch.reporting.summary import compared, comparison, summary
 
 
-def page(recordings: Iterable[Measures], limits: BodyLimits) -> str:
+def page(recordings: Iterable[Measures]) -> str:
     """Make the page of one recording or several; of each no more than its text is kept."""
     title, rows, sections = "", [], []
     for order, m in enumerate(recordings, 1):
         rows.append(compared(order, m))
-        sections.append(_recording(order, m, limits))
+        sections.append(_recording(order, m))
         title = m.title
     head = [element("h1", "Pretouch report")]
     if len(rows) > 1:
@@ -33,15 +32,15 @@ def page(recordings: Iterable[Measures], limits: BodyLimits) -> str:
     return document(f"Pretouch report: {title}", joined([*head, *sections]), note)
 
 
-def _recording(order: int, m: Measures, limits: BodyLimits) -> Html:
+def _recording(order: int, m: Measures) -> Html:
     parts: list[Text] = [element("h2", m.title), summary(m), element("h3", "What ran"), setting_section(m)]
     if len(m.course):
         with style():
-            parts += _body(m, limits)
+            parts += _body(m)
     return element("section", joined(parts), anchor=f"recording-{order}")
 
 
-def _body(m: Measures, limits: BodyLimits) -> list[Text]:
+def _body(m: Measures) -> list[Text]:
     """All that takes at least one control step."""
     course = m.course
     joints = joint_figure(course, speed_fraction(course), acceleration_fraction(course))
@@ -66,7 +65,7 @@ def _body(m: Measures, limits: BodyLimits) -> list[Text]:
         element("h3", "Units, robot and loop"),
         health_section(m),
         element("h3", "Forces beside limits of body regions: for orientation, not conformity"),
-        orientation_section(m, limits),
+        orientation_section(m),
         element("h3", "Parameters"),
         parameter_section(m),
     ]

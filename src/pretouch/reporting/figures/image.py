@@ -25,7 +25,9 @@ def style() -> AbstractContextManager[None]:
 def picture(figure: Figure, text: str) -> Html:
     """Draw a figure as SVG into the page, with a caption."""
     image = BytesIO()
-    figure.savefig(image, format="svg", bbox_inches="tight", pad_inches=0.05, metadata={"Date": None, "Creator": None})
+    figure.savefig(
+        image, format="svg", dpi=160, bbox_inches="tight", pad_inches=0.05, metadata={"Date": None, "Creator": None}
+    )
     data = b64encode(image.getvalue()).decode("ascii")
     shown = Html(f'<img src="data:image/svg+xml;base64,{data}" alt="{escape(text)}">')
     return element("figure", Html(shown + element("figcaption", html(text))))

@@ -8,53 +8,10 @@ from matplotlib.figure import Figure
 
 from pretouch.recording.run_record import MODES
 from pretouch.reporting.course import Course
-from pretouch.traces import spans
-from pretouch.types import BoolArray, FloatArray, IntArray, Mode
+from pretouch.types import FloatArray, Mode
 
-BINS = 700
-"""Stretches of time that a line is drawn in: more than a printed page shows."""
-
-
-def envelope(time: FloatArray, values: FloatArray, bins: int = BINS) -> tuple[FloatArray, FloatArray]:
-    """Least and greatest of each of so many stretches of a course (S,), in the order they came; a short one as it is.
-
-    A stretch without any number is NaN, so that a line is broken there.
-    """
-    if len(values) <= 2 * bins:
-        return time, values
-    edges = np.linspace(0, len(values), bins + 1).astype(np.int64)[:-1]
-    length = np.diff(np.append(edges, len(values)))
-    bin_of = np.repeat(np.arange(bins), length)
-    nan = np.isnan(values)
-    low = _first_where(values, np.minimum.reduceat(np.where(nan, np.inf, values), edges), bin_of, edges)
-    high = _first_where(values, np.maximum.reduceat(np.where(nan, -np.inf, values), edges), bin_of, edges)
-    places = np.sort(np.stack([low, high], axis=1), axis=1).ravel()
-    return time[places], values[places]
-
-
-def _first_where(values: FloatArray, wanted: FloatArray, bin_of: IntArray, edges: IntArray) -> IntArray:
-    """Index in each bin (B,) of the first value equal to the one wanted; the first of the bin if there is none."""
-    hits = np.flatnonzero(values == wanted[bin_of])
-    places = edges.copy()
-    bins, first = np.unique(bin_of[hits], return_index=True)
-    places[bins] = hits[first]
-    return places
-
-
-def stretches(time: FloatArray, flags: BoolArray, bins: int = BINS) -> list[tuple[float, float]]:
-    """Spans of time [s] in which flags (S,) hold, those joined that would touch on paper."""
-    if not len(time):
-        return []
-    close = (time[-1] - time[0]) / bins
-    joined: list[tuple[float, float]] = []
-    for first, past in spans(flags):
-        start, end = float(time[first]), float(time[min(past, len(time) - 1)])
-        if joined and start - joined[-1][1] < close:
-            joined[-1] = (joined[-1][0], end)
-        else:
-            joined.append((start, end))
-    return joined
-
+_MOST_DRAWN = 3000
+"""Points of a course beyond which it is drawn as pixels: an hour of lines would be a page of 100 MB."""
 
 INK, BLUE, RED, GREEN, AMBER, GREY = "#1f2933", "#2b6cb0", "#c53030", "#2f855a", "#b7791f", "#a0aab4"
 _SHADES = {Mode.REACT: (RED, 0.16), Mode.HOLD: (GREY, 0.28)}
@@ -83,10 +40,14 @@ def panels(count: int, course: Course, heights: Sequence[float], height: float) 
 def shade_modes(axes: Axes, course: Course) -> None:
     """Shade the time the arm reacts or holds, and mark where another profile or path began."""
     for mode, (colour, alpha) in _SHADES.items():
-        spans = stretches(course.time, course.mode == MODES.index(mode))
-        for i, (start, end) in enumerate(spans):
-            name = mode.name if i == 0 else None
-            axes.axvspan(start, end, facecolor=(colour, alpha), lw=0, zorder=0, label=name)
+        flags = course.mode == MODES.index(mode)
+        if flags.any():
+            until = flags | np.append(False, flags[:-1])  # a mode lasts until the next step
+            whole, long = axes.get_xaxis_transform(), len(flags) > _MOST_DRAWN
+            axes.fill_between(
+                course.time, 0.0, 1.0, where=until, transform=whole, facecolor=(colour, alpha), lw=0, zorder=0,
+                label=mode.name, rasterized=long,
+            )  # fmt: skip
     switches = course.time[1:][np.diff(course.run) != 0]
     for time in switches if len(switches) <= _SWITCHES else ():
         axes.axvline(time, color=INK, lw=0.8, ls=(0, (1, 2)))
@@ -94,7 +55,7 @@ def shade_modes(axes: Axes, course: Course) -> None:
 
 def draw(axes: Axes, time: FloatArray, values: FloatArray, **style: object) -> None:
     """Draw a course (S,) with all its peaks."""
-    axes.plot(*envelope(time, values), **style)  # type: ignore[arg-type]
+    axes.plot(time, values, rasterized=len(time) > _MOST_DRAWN, **style)  # type: ignore[arg-type]
 
 
 def legend(axes: Axes, columns: int = 6) -> None:

@@ -5,7 +5,7 @@ import numpy as np
 from pretouch.reporting.contacts import GRACE_S, Detection
 from pretouch.reporting.html import NOTHING, Html, Text, bad, element, joined, note, number, percent, table, vector
 from pretouch.reporting.measures import Measures
-from pretouch.reporting.orientation import BodyLimits, Region
+from pretouch.reporting.orientation import REGIONS, SOURCE, Region
 from pretouch.reporting.touches import BOUNCE_S, TRANSIENT_S
 from pretouch.types import FloatArray, Mode
 
@@ -128,12 +128,12 @@ def heading(force: FloatArray) -> str:
     return ("+" if force[axis] > 0 else "−") + _AXES[axis]
 
 
-def orientation_section(m: Measures, limits: BodyLimits) -> Html:
+def orientation_section(m: Measures) -> Html:
     """The largest forces beside what regions of the body are said to bear."""
     source = "true force, as the simulation knows it" if m.truth_known else "force estimate during detected contacts"
     said = f"Largest {source}: {number(m.peak, 1)} N; later than {TRANSIENT_S:g} s into a contact: {_held(m)}."
     head = ("body region", "transient [N]", "of it", "quasi-static [N]", "of it", "")
-    rows = [_region(region, m) for region in limits.regions]
+    rows = [_region(region, m) for region in REGIONS]
     unsure = "" if m.truth_known else (
         " The estimate has a bandwidth of about 10 Hz and understates the peaks of impacts, and contacts that were not"
         " detected are not in it."
@@ -142,8 +142,8 @@ def orientation_section(m: Measures, limits: BodyLimits) -> Html:
         element("p", said),
         table(head, rows),
         note(
-            f"For orientation, not conformity. Figures: {limits.source}. Public copies of such tables disagree; give"
-            " your own with --limits. The transient figure is held against the largest force, the quasi-static one"
+            f"For orientation, not conformity. Figures: {SOURCE}. Public copies of such tables disagree."
+            " The transient figure is held against the largest force, the quasi-static one"
             f" against the largest 20 ms mean later than {TRANSIENT_S:g} s into a contact"
             f"{'' if m.truth_known else ' (here of the estimate as it is)'}. Which region would be hit, and over what"
             f" area, is not known here; pressures are not looked at.{unsure}"
