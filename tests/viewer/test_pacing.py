@@ -73,6 +73,5 @@ def test_a_pause_is_no_slowness_and_forgets_it() -> None:
     assert pace.slow
     pace.tick(now + PERIOD, 0.0, 0.0)
     assert not pace.slow
-    assert pace.share is None
-    run(pace, now + 60.0, 1.0, PERIOD)
+    run(pace, now + 60.0, 1.2, PERIOD)
     assert pace.factor == pytest.approx(1.0, rel=0.01)

@@ -82,16 +82,3 @@ def test_a_contact_that_did_not_move_the_arm_is_told_as_it_ends(some_step: Contr
     assert [h.what for h in timeline.found] == [
         "Contact of 6.0 N", "REACT to TRACK, after a contact that did not move the arm"
     ]  # fmt: skip
-
-
-def test_what_is_known_of_a_step_comes_in_its_turn(some_step: ControlStep) -> None:
-    contact = Contact(np.array([12.0, 0.0, 0.0]), np.array([True, False, False]))
-    steps = [replace(some_step, mode=Mode.TRACK, contact=contact if i == 40 else None) for i in range(100)]
-    timeline = Timeline(steps.__getitem__, len(steps), {40: "Contact with another", 70: "Contact with a third"})
-    timeline.search(60)
-    assert timeline.after(40) is None
-    timeline.search(100)
-    assert [(h.index, h.what) for h in timeline.found] == [
-        (40, "Contact of 12.0 N; Contact with another"),
-        (70, "Contact with a third"),
-    ]

@@ -37,9 +37,9 @@ def test_a_short_peak_of_evidence_is_not_lost(some_step: ControlStep) -> None:
 
 
 def test_columns_are_what_their_names_say(some_step: ControlStep) -> None:
-    history = History(np.arange(K), more=1)
+    history = History(np.arange(K))
     for i in range(50):
-        history.add(replace(some_step, stamp=i / 100), (5.0,))
+        history.add(replace(some_step, stamp=i / 100))
     last = history.columns()[:, -1]
     np.testing.assert_array_equal(last[1 + K : 4 + K], some_step.force)
     np.testing.assert_array_equal(last[4 + K : 7 + K], some_step.thresholds.upper)
@@ -48,7 +48,6 @@ def test_columns_are_what_their_names_say(some_step: ControlStep) -> None:
     np.testing.assert_array_equal(last[10 + K : 12 + K], speeds)
     assert last[12 + K] == some_step.evidence
     assert last[13 + K] == min(some_step.obstacles.body_distance, default=9.0)
-    assert last[-1] == 5.0
 
 
 def test_time_going_back_begins_anew(some_step: ControlStep) -> None:
@@ -126,12 +125,6 @@ def test_what_is_folded_is_sent_only_while_it_is_shown(some_step: ControlStep) -
     gui.more.value = True
     plots.draw(1.0)
     assert all(plot.data is not data for plot, data in zip(gui.plots, before, strict=True))
-
-
-def test_a_second_profile_has_its_plots_shown(some_step: ControlStep) -> None:
-    gui = FakeGui()
-    Plots(gui, History(np.arange(K), 6), ["unit"] * K, "blind")  # type: ignore[arg-type]
-    assert all(plot.visible for plot in gui.plots[3:])
 
 
 class FakeGui:

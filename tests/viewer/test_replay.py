@@ -9,10 +9,9 @@ from tests.ports import free_port
 from viser import ViserServer
 
 from pretouch.profiles import PROFILES
-from pretouch.recording.compare import Found, compare
 from pretouch.recording.reader import Recorded, open_recording
 from pretouch.types import Mode
-from pretouch.viewer.replay import ReplayPage, comparison_html, frame_of, show_replay, world_of
+from pretouch.viewer.replay import ReplayPage, frame_of, show_replay, world_of
 from pretouch.viewer.server import ServeOptions, begun, url_of
 from pretouch.viewer.simulation import LiveSimulation
 
@@ -62,10 +61,8 @@ def test_a_frame_knows_how_old_the_readings_were(recorded: Recorded) -> None:
     assert not frame_of(replace(kept, inputs=None)).late(0.0).any()
 
 
-@pytest.mark.parametrize("other", ["", "blind"])
-def test_playing_and_jumping_show_the_steps_at_that_time(server: ViserServer, recorded: Recorded, other: str) -> None:
-    comparison = compare(recorded, PROFILES[other]) if other else None
-    page = ReplayPage(server, recorded, comparison)
+def test_playing_and_jumping_show_the_steps_at_that_time(server: ViserServer, recorded: Recorded) -> None:
+    page = ReplayPage(server, recorded)
     page.player.play()
     for i in range(30):
         page.turn(i / 30, 1 / 30)
@@ -76,23 +73,10 @@ def test_playing_and_jumping_show_the_steps_at_that_time(server: ViserServer, re
     assert page.draw(3.0).step.mode is Mode.HOLD
 
 
-def test_what_another_profile_finds_is_named_and_can_be_jumped_to(server: ViserServer, recorded: Recorded) -> None:
-    stamps = recorded.stamps()
-    found = Found(float(stamps[150]), np.array([0.0, 12.0, 9.0]), np.array([False, True, False]))
-    comparison = compare(recorded, PROFILES["blind"])
-    comparison = replace(comparison, other=replace(comparison.other, contacts=(found,)))
-    said = comparison_html(comparison, stamps[0])
-    assert "As recorded, paper: no contact. On the same data blind finds contacts of 15.0 N at 1.50 s." in said
-    page = ReplayPage(server, recorded, comparison)
-    while not page.timeline.done:
-        page.turn(0.0, 0.0)
-    assert (150, "Contact of 15.0 N found by blind") in [(h.index, h.what) for h in page.timeline.found]
-
-
 def test_after_a_jump_the_plots_begin_ten_seconds_before_or_at_the_start(
     server: ViserServer, recorded: Recorded
 ) -> None:
-    page = ReplayPage(server, recorded, None)
+    page = ReplayPage(server, recorded)
     page.player.seek(2.5)
     page.draw(0.0)
     time = page.history.columns()[0]
@@ -101,7 +85,7 @@ def test_after_a_jump_the_plots_begin_ten_seconds_before_or_at_the_start(
 
 
 def test_of_several_runs_each_is_named_with_its_path(server: ViserServer, recorded: Recorded) -> None:
-    page = ReplayPage(server, recorded, None)
+    page = ReplayPage(server, recorded)
     assert page.run_name(1) == "profile paper, part 2 of 2, path of 2.00 m"
 
 

@@ -109,7 +109,7 @@ def test_a_reading_that_no_obstacle_is_made_of_is_a_point_only_where_perception_
     assert np.all(points.batched_scales < 1e-3)
 
 
-@pytest.mark.parametrize(("multiplier", "colour"), [(0.0, palette.PAIR), (0.5, palette.PAIR_BINDING)])
+@pytest.mark.parametrize(("multiplier", "colour"), [(0.0, palette.PAIR), (0.5, palette.LIMITING)])
 def test_each_point_is_joined_to_the_body_and_the_line_says_whether_it_binds(
     scene: Scene, nodes: FakeScene, some_step: ControlStep, multiplier: float, colour: palette.Colour
 ) -> None:

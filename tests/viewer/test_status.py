@@ -76,7 +76,7 @@ def test_words_are_not_taken_for_markup(status: Status, html: Html) -> None:
 
 def test_the_legend_names_every_colour_of_the_trail() -> None:
     shown = legend()
-    for colour in (palette.FOLLOWING, palette.AVOIDING, palette.RECOVERING, palette.REACTING, palette.HOLDING):
+    for colour in (palette.FOLLOWING, palette.LIMITING, palette.RECOVERING, palette.REACTING, palette.HOLDING):
         assert palette.css(colour) in shown
 
 

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.progress import Progress
 
 from pretouch.cli.detect import axes_shown
-from pretouch.cli.tables import Grid
+from pretouch.cli.tables import PlainTable
 from pretouch.cli.warm_up import prepare
 from pretouch.cli.writing import numbers_to
 from pretouch.profiles import profile as find_profile
@@ -67,7 +67,7 @@ def replay(
         if page and not verify:
             from pretouch.viewer.replay import show_replay
 
-            show_replay(recorded, page(), comparison, ended)
+            show_replay(recorded, page(), ended)
     return int(verdict is not None and not verdict.agrees)
 
 
@@ -135,7 +135,7 @@ class _Progress:
 def _show(console: Console, comparison: Comparison) -> None:
     mine, other = comparison.recorded, comparison.other
     console.print(f"\nContacts: {mine.name} as recorded, {other.name} on the same data", style="bold", markup=False)
-    console.print(_table(comparison))
+    console.print(_table(comparison), crop=False)
     console.print(
         "Thresholds from their middle, median along x / y / z:"
         f" {_width(mine)} N ({mine.name}), {_width(other)} N ({other.name}).",
@@ -159,14 +159,9 @@ def _numbers(
         "recording": str(recorded.place), "complete": recorded.complete, "arm": run.model.description.name,
         "profiles": [run.profile.name for run in recorded.runs], "units": [unit.id for unit in run.skin.mounted],
         "steps": len(recorded), "duration_s": stamps[-1] - stamps[0], **(asdict(found) if found else {}),
-        **({"verified": _verdict_numbers(verdict)} if verdict else {}),
+        **({"verified": verdict} if verdict else {}),
         **({"compared": _comparison_numbers(comparison)} if comparison else {}),
     }  # fmt: skip
-
-
-def _verdict_numbers(verdict: Verdict) -> dict[str, Any]:
-    kept = ("checked", "skipped", "exact", "differing", "largest", "largest_field", "agrees", "said")
-    return {name: getattr(verdict, name) for name in kept}
 
 
 def _comparison_numbers(comparison: Comparison) -> dict[str, Any]:
@@ -186,13 +181,13 @@ def _pairs(comparison: Comparison) -> list[tuple[Found | None, Found | None]]:
     return sorted(pairs, key=lambda pair: min(found.time for found in pair if found))
 
 
-def _table(comparison: Comparison) -> Grid:
+def _table(comparison: Comparison) -> PlainTable:
     rows = [
         (*_cells(mine), *_cells(other), f"{other.time - mine.time:+.2f}" if mine and other else "")
         for mine, other in _pairs(comparison)
     ]
     header = "recorded at [s]", "force [N]", "axes", "other at [s]", "force [N]", "axes", "later by [s]"
-    return Grid(header, rows or [("none", "", "", "none", "", "", "")], names=0, left=())
+    return PlainTable(header, rows or [("none", "", "", "none", "", "", "")], left=())
 
 
 def _cells(found: Found | None) -> tuple[str, str, str]:

@@ -8,7 +8,7 @@ r = L on, and what several units expect adds up as 1 - prod(1 - e w).
 
 import numpy as np
 
-from pretouch.contact.thresholds import obstacle_force
+from pretouch.contact.moving_thresholds import obstacle_force
 from pretouch.params import ThresholdParams
 from pretouch.types import FloatArray, Obstacles
 

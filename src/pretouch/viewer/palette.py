@@ -15,21 +15,17 @@ CONE: Colour = (84, 150, 214)
 SEEING: Colour = (242, 150, 40)
 """Of a unit, and of its cone, that sees an obstacle."""
 LIMITING: Colour = (214, 40, 57)
-"""Of one whose obstacle keeps the arm from what it would do."""
+"""Of one whose obstacle, and of a pair whose nearness, keeps the arm from what it would do."""
 SENSED: Colour = (38, 166, 91)
 PATH: Colour = (49, 104, 196)
-AVOIDING: Colour = (214, 40, 57)
 RECOVERING: Colour = (38, 166, 91)
 REACTING: Colour = (138, 79, 190)
 HOLDING: Colour = (226, 155, 28)
 FOLLOWING: Colour = (110, 121, 136)
 PAIR: Colour = (132, 168, 142)
-PAIR_BINDING: Colour = (214, 40, 57)
-"""Of a pair that keeps the arm from what it would do."""
 FORCE: Colour = (232, 119, 34)
 ASKED: Colour = (49, 104, 196)
-ALLOWED: Colour = (38, 166, 91)
-"""Of the velocities that a commander asked for and was allowed."""
+"""Of the velocity that a commander asked for."""
 TRUE_FORCE: Colour = (38, 44, 54)
 PLACE: Colour = (190, 24, 120)
 """Of the forces at the places where the arm is said to be touched."""

@@ -1,7 +1,7 @@
 """Where in a recording a page is: a position in time that moves on, jumps, and stops at the ends."""
 
 from bisect import bisect_left, bisect_right
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -68,7 +68,7 @@ class Player:
 
 @dataclass(frozen=True)
 class TimelineEvent:
-    """A contact, or a change of mode, of the recording or of what it is compared with."""
+    """A contact, or a change of mode, of the recording."""
 
     index: int
     """The step."""
@@ -78,9 +78,9 @@ class TimelineEvent:
 class Timeline:
     """Events of a recording, found a few steps at a time: searching a long one takes a while."""
 
-    def __init__(self, step: Callable[[int], ControlStep], count: int, known: Mapping[int, str] | None = None) -> None:
-        """Take what returns a step, how many there are, and events `known` otherwise, by step."""
-        self._step, self._count, self._known = step, count, known or {}
+    def __init__(self, step: Callable[[int], ControlStep], count: int) -> None:
+        """Take what returns a step, and how many there are."""
+        self._step, self._count = step, count
         self._looked = 0
         self._mode: Mode | None = None
         self._answered = True
@@ -100,16 +100,16 @@ class Timeline:
         """Search some more steps."""
         for i in range(self._looked, min(self._looked + steps, self._count)):
             step = self._step(i)
-            what = [self._known[i]] if i in self._known else []
+            what = ""
             if step.contact is not None:
-                what.insert(0, f"Contact of {np.linalg.norm(step.contact.force):.1f} N")
+                what = f"Contact of {np.linalg.norm(step.contact.force):.1f} N"
                 self._answered = False
             elif self._mode is not None and step.mode is not self._mode:
                 held = self._mode is Mode.REACT and not self._answered
-                what.insert(0, f"{self._mode.name} to {step.mode.name}" + (_UNMOVED if held else ""))
+                what = f"{self._mode.name} to {step.mode.name}{_UNMOVED if held else ''}"
             self._answered = self._answered or answers(step)
             if what:
-                self.found.append(TimelineEvent(i, "; ".join(what)))
+                self.found.append(TimelineEvent(i, what))
             self._mode, self._looked = step.mode, i + 1
 
     def after(self, index: int) -> TimelineEvent | None:

@@ -35,14 +35,14 @@ SAMPLES = int(SPAN_S / SAMPLE_S)
 class History:
     """Samples of the last `SPAN_S`: time, distance of each mounted unit (B), then what the steps say.
 
-    That is force, upper and lower threshold (3 each), two speeds, the evidence of a contact, the distance of what is
-    nearest to the body, and what else is given.
+    That is force, upper and lower threshold (3 each), two speeds, the evidence of a contact, and the distance of what
+    is nearest to the body.
     """
 
-    def __init__(self, first: IntArray, more: int = 0, start: float = 0.0) -> None:
-        """Take `Skin.first`, the number of further columns that `add` is given, and the stamp of time 0 [s]."""
+    def __init__(self, first: IntArray, start: float = 0.0) -> None:
+        """Take `Skin.first`, and the stamp of time 0 [s]."""
         self._first, self._units, self._start = first, len(first), start
-        self._width = 1 + self._units + 9 + 2 + 2 + more
+        self._width = 1 + self._units + 9 + 2 + 2
         self._rows: deque[FloatArray] = deque(maxlen=SAMPLES)
         self._open: FloatArray | None = None
 
@@ -54,7 +54,7 @@ class History:
         self._rows.clear()
         self._open = None
 
-    def add(self, step: ControlStep, more: Sequence[float] = (), late: BoolArray | None = None) -> None:
+    def add(self, step: ControlStep, late: BoolArray | None = None) -> None:
         """Take a step in; one from before the last begins anew. A `late` unit (K,) shows nothing."""
         time = step.stamp - self._start
         if self._open is not None and time < self._open[0]:
@@ -68,7 +68,6 @@ class History:
             [
                 [time], distance, step.force, thresholds.upper, thresholds.lower,
                 [np.linalg.norm(step.ee_velocity), np.linalg.norm(step.desired_velocity), step.evidence, nearest],
-                more,
             ]
         )  # fmt: skip
         if self._open is None:
@@ -97,11 +96,10 @@ class History:
 class Plots:
     """Three plots of a history, one below the other; with a box for those of each axis and unit."""
 
-    def __init__(self, gui: "GuiApi", history: History, ids: Sequence[str], other: str = "") -> None:
-        """`other` names a second profile, whose thresholds (upper 3, lower 3) are the history's further columns."""
-        self._history, self._units, self._other = history, len(ids), bool(other)
+    def __init__(self, gui: "GuiApi", history: History, ids: Sequence[str]) -> None:
+        self._history, self._units = history, len(ids)
         self._sent = -np.inf
-        grey, force, second = (palette.css(c) for c in (palette.FOLLOWING, palette.FORCE, palette.REACTING))
+        grey, force = palette.css(palette.FOLLOWING), palette.css(palette.FORCE)
         blue, green = palette.css(palette.PATH), palette.css(palette.SENSED)
         gui.add_html(_caption("Touch", [("a contact from 1 on", force)]))
         self._evidence = _plot(gui, [force, grey], _SMALL_PX, (0.0, 1.5), dashed=1)
@@ -110,15 +108,14 @@ class Plots:
         gui.add_html(_caption("Speed [m/s]", [("of the hand", blue), ("asked for", grey)]))
         self._speed = _plot(gui, [blue, grey], _SMALL_PX, (0.0, 0.4), dashed=1)
 
-        self._more = gui.add_checkbox("More plots", bool(other), hint="Force of each axis, distance of each unit.")
+        self._more = gui.add_checkbox("More plots", False, hint="Force of each axis, distance of each unit.")
         colours = [palette.css(palette.UNITS[i % len(palette.UNITS)]) for i in range(len(ids))]
-        marks = [("force", force), ("thresholds or bands", grey)] + ([(f"of {other}", second)] if other else [])
-        lines = [force, grey, grey] + ([second] * 2 if other else [])
+        marks = [("force", force), ("thresholds or bands", grey)]
         self._force, captions = [], []
         for axis in "xyz":
             captions.append(gui.add_html(_caption(f"Force {axis} [N]", marks if axis == "x" else ())))
             # a page whose scale is changed no longer follows the time: unseen lines hold it open
-            self._force.append(_plot(gui, [*lines, _UNSEEN, _UNSEEN], 96, None, dashed=3))
+            self._force.append(_plot(gui, [force, grey, grey, _UNSEEN, _UNSEEN], 96, None, dashed=3))
         captions.append(gui.add_html(_caption("Distance [m]", zip(ids, colours, strict=True))))
         self._distance = _plot(gui, colours, 112, (0.0, 1.0))
         self._folded: list[Any] = [*captions, *self._force, self._distance]
@@ -148,7 +145,6 @@ class Plots:
         self._distance.data = (time, *rows[1 : 1 + k])
         for axis, plot in enumerate(self._force):
             at = [1 + k + axis, 4 + k + axis, 7 + k + axis]
-            at += [14 + k + axis, 17 + k + axis] if self._other else []
             reach = np.full(len(time), _reach(rows[at]))
             plot.data = (time, *rows[at], -reach, reach)
 
@@ -168,13 +164,10 @@ def _plot(
     axes: Any = (small, {**small, "size": 34, "space": 15})
     return gui.add_uplot(
         tuple(np.full(2, np.nan) if i else np.arange(2.0) for i in range(len(colours) + 1)), tuple(lines),
-        height=height, scales=_scales(values), legend={"show": False}, cursor={"show": False},
+        height=height, scales={"x": {"time": False}, "y": {"range": values} if values else {}},
+        legend={"show": False}, cursor={"show": False},
         axes=axes, padding=(6, 8, 0, 0),
     )  # fmt: skip
-
-
-def _scales(values: tuple[float, float] | None) -> dict[str, Any]:
-    return {"x": {"time": False}, "y": {} if values is None else {"range": values}}
 
 
 def _reach(forces: FloatArray) -> float:

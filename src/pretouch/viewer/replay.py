@@ -1,16 +1,14 @@
 """The page of a recording: the live view with a slider over time."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import cache
-from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pretouch.explanation import finds
 from pretouch.loop import MonotonicClock
-from pretouch.recording.compare import Comparison, Found
 from pretouch.recording.reader import Kept, Recorded, Run
 from pretouch.recording.simulation import surroundings
 from pretouch.types import FloatArray
@@ -27,8 +25,6 @@ from pretouch.viewer.status import Status, legend
 
 if TYPE_CHECKING:
     from viser import ViserServer
-
-    from pretouch.recording.compare import Comparison
 
 _SEARCH_S, _SEARCH_PLAYING_S = 0.015, 0.005
 """Time spent on searching for events between two updates, at rest and while it plays [s]."""
@@ -70,26 +66,22 @@ def _age(kept: Kept) -> FloatArray | None:
 class ReplayPage:
     """A page over a recording, turned by `turn`."""
 
-    def __init__(self, server: "ViserServer", recorded: Recorded, comparison: "Comparison | None") -> None:
-        self._server, self._recorded, self._comparison = server, recorded, comparison
+    def __init__(self, server: "ViserServer", recorded: Recorded) -> None:
+        self._server, self._recorded = server, recorded
         stamps = recorded.stamps()
         self.player = Player(stamps)
         self._actions = ActionQueue(Commander(server).admits)
-        found = contacts_of_other(comparison, stamps) if comparison else {}
-        self.timeline = Timeline(recorded.step, len(recorded), found)
+        self.timeline = Timeline(recorded.step, len(recorded))
         self._run, self._drawn = 0, -1
         self._world = cache(lambda run: world_of(recorded.runs[run]))
         world = self._world(0)
         style_page(server)
         self._status = Status(server.gui)
         self._status.notice = recorded.said
-        if comparison:
-            server.gui.add_html(comparison_html(comparison, stamps[0]))
         self._controls(server)
         self._scene = Scene(server, world)
-        other = comparison.other.name if comparison else ""
-        self.history = History(world.skin.first, 6 if other else 0, stamps[0])
-        self._plots = Plots(server.gui, self.history, [unit.id for unit in world.skin.mounted], other)
+        self.history = History(world.skin.first, stamps[0])
+        self._plots = Plots(server.gui, self.history, [unit.id for unit in world.skin.mounted])
         with server.gui.add_folder("View", expand_by_default=False):
             add_view_boxes(server.gui, self._actions, self._scene.show)
             server.gui.add_html(legend())
@@ -165,7 +157,7 @@ class ReplayPage:
         for i in range(index, start - 1, -stride)[::-1]:
             kept = recorded[i]
             step, slow = kept.step, self._world(kept.run).profile.sight.slow_after_s
-            self.history.add(step, self._other(step.stamp), frame_of(kept).late(slow))
+            self.history.add(step, frame_of(kept).late(slow))
             self._scene.trail.add(step)
         self._drawn = index
         kept = recorded[index]
@@ -173,14 +165,6 @@ class ReplayPage:
             self._run = kept.run
             self._scene.show_world(self._world(kept.run))
         return kept
-
-    def _other(self, stamp: float) -> tuple[float, ...]:
-        """Thresholds of the other profile at an instant [s]: upper and lower."""
-        if self._comparison is None:
-            return ()
-        other = self._comparison.other
-        at = max(0, int(np.searchsorted(other.time, stamp + 1e-9)) - 1)
-        return *other.upper[at].tolist(), *other.lower[at].tolist()
 
     def _show(self, kept: Kept, asked: Asked | None, now: float) -> None:
         player, step = self.player, kept.step
@@ -202,12 +186,11 @@ class ReplayPage:
 def show_replay(
     recorded: Recorded,
     server: "ViserServer",
-    comparison: "Comparison | None" = None,
     until: Callable[[], bool] = lambda: False,
     say: Callable[[str], None] = print,
 ) -> None:
-    """Show a recording on a server's page until told to stop, with another profile's thresholds if they are given."""
-    page = ReplayPage(server, recorded, comparison)
+    """Show a recording on a server's page until told to stop."""
+    page = ReplayPage(server, recorded)
     clock = MonotonicClock(PERIOD_S)
     before = clock.tick()
     while not until():
@@ -217,34 +200,3 @@ def show_replay(
         except Exception as error:  # whatever fails in the page
             page.hold(error, say)
         before = now
-
-
-_NAMED = 5
-"""Contacts named in a sentence."""
-
-
-def comparison_html(comparison: Comparison, start: float) -> str:
-    """Say which contacts were recorded, and which another profile finds on the same data."""
-    mine, other = comparison.recorded, comparison.other
-    said = (
-        f"As recorded, {mine.name}: {_named(mine.contacts, start)}. On the same data {other.name} finds"
-        f" {_named(other.contacts, start)}."
-    )
-    return f"<div id='compared' style='padding:0 12px 10px;font-size:12px;line-height:1.4'>{escape(said)}</div>"
-
-
-def contacts_of_other(comparison: Comparison, stamps: FloatArray) -> dict[int, str]:
-    """Say at which steps another profile finds contacts."""
-    other = comparison.other
-    at = np.searchsorted(stamps, [found.time - 1e-9 for found in other.contacts]).tolist()
-    sizes = [np.linalg.norm(found.force) for found in other.contacts]
-    return {i: f"Contact of {size:.1f} N found by {other.name}" for i, size in zip(at, sizes, strict=True)}
-
-
-def _named(contacts: Sequence[Found], start: float) -> str:
-    """Name contacts, in time since the start [s]."""
-    if not contacts:
-        return "no contact"
-    shown = ", ".join(f"{np.linalg.norm(c.force):.1f} N at {c.time - start:.2f} s" for c in contacts[:_NAMED])
-    more = len(contacts) - _NAMED
-    return f"contacts of {shown}" + (f" and {more} more" if more > 0 else "")

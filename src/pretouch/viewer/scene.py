@@ -71,7 +71,7 @@ class Scene:
         self._ee = scene.add_frame(f"{root}/ee", show_axes=False)
         self._force = self._arrow(f"{root}/ee/force", palette.FORCE)
         self._asked = self._arrow(f"{root}/ee/asked", palette.ASKED, 0.004)
-        self._allowed = self._arrow(f"{root}/ee/allowed", palette.ALLOWED, 0.008)
+        self._allowed = self._arrow(f"{root}/ee/allowed", palette.RECOVERING, 0.008)
         self._goal = scene.add_frame(
             f"{root}/goal", axes_length=0.1, axes_radius=0.004, origin_radius=0.012, origin_color=palette.ASKED,
             visible=False,
@@ -168,7 +168,7 @@ class Scene:
         self.pairs.visible = self._shows_pairs and len(near.unit) > 0
         if len(near.unit):
             colours = np.tile(palette.as_vertex(palette.PAIR), (len(near.unit), 2, 1))
-            colours[step.restricted[binding(step)]] = palette.as_vertex(palette.PAIR_BINDING)
+            colours[step.restricted[binding(step)]] = palette.as_vertex(palette.LIMITING)
             self.pairs.points = np.stack([near.body_point, near.point], axis=1).astype(np.float32)
             self.pairs.colors = colours
 

@@ -35,10 +35,10 @@ _STYLE = (
 """Keeps the lines above the controls that scroll beneath them; on a phone, the sheet beneath the scene."""
 
 _COLOURS = {
-    Doing.MOVING: palette.RECOVERING, Doing.SLOWED: palette.FORCE, Doing.AVOIDING: palette.AVOIDING,
-    Doing.RETURNING: palette.RECOVERING, Doing.BLOCKED: palette.AVOIDING, Doing.YIELDING: palette.REACTING,
-    Doing.TOUCHED: palette.REACTING, Doing.CAUGHT: palette.AVOIDING, Doing.WAITING: palette.HOLDING,
-    Doing.STOPPED: palette.AVOIDING,
+    Doing.MOVING: palette.RECOVERING, Doing.SLOWED: palette.FORCE, Doing.AVOIDING: palette.LIMITING,
+    Doing.RETURNING: palette.RECOVERING, Doing.BLOCKED: palette.LIMITING, Doing.YIELDING: palette.REACTING,
+    Doing.TOUCHED: palette.REACTING, Doing.CAUGHT: palette.LIMITING, Doing.WAITING: palette.HOLDING,
+    Doing.STOPPED: palette.LIMITING,
 }  # fmt: skip
 
 
@@ -94,10 +94,10 @@ def _banner(name: str, said: str, tint: palette.Colour) -> str:
 def legend() -> str:
     """What the colours in space mean."""
     paths = [
-        ("path", palette.PATH), ("followed", palette.FOLLOWING), ("avoiding", palette.AVOIDING),
+        ("path", palette.PATH), ("followed", palette.FOLLOWING), ("avoiding", palette.LIMITING),
         ("recovering", palette.RECOVERING), ("reacting", palette.REACTING), ("holding", palette.HOLDING),
         ("force estimate", palette.FORCE), ("true force", palette.TRUE_FORCE),
-        ("asked", palette.ASKED), ("allowed", palette.ALLOWED),
+        ("asked", palette.ASKED), ("allowed", palette.RECOVERING),
     ]  # fmt: skip
     marks = "".join(_mark(name, colour, 14, 4, 2) for name, colour in paths)
     marks += _mark("sensed", palette.SENSED, 9, 9, 5) + _mark("closest pair", palette.PAIR, 14, 2, 0)

@@ -27,7 +27,7 @@ class Activity(Enum):
     """How the arm goes along its path."""
 
     FOLLOWING = palette.FOLLOWING
-    AVOIDING = palette.AVOIDING
+    AVOIDING = palette.LIMITING
     """Off the path, and kept from it by an obstacle."""
     RECOVERING = palette.RECOVERING
     """Off the path, on the way back."""
