@@ -65,7 +65,7 @@ def main() -> None:
         rng = np.random.default_rng([seed, 56])
         drawn = rng.choice(len(places), rng.integers(LEAST, MOST + 1), replace=False)
         skin = Skin([places[i] for i in drawn], model)
-        foreseen = [covered(some, seen_by(some, skin)).arm.ways.value for some in (ways, met)]
+        foreseen = [covered(some, seen_by(some, skin)).arm.ways for some in (ways, met)]
         rows.append([*foreseen, blind_share(model, skin, seed)])
         by_ways, by_met, blind = (100 * share for share in rows[-1])
         print(f"{seed:5} {len(drawn):5} {by_ways:8.0f} {by_met:8.0f} {blind:18.0f}", flush=True)

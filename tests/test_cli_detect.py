@@ -199,5 +199,5 @@ def test_a_page_of_forces_has_tables_and_figure(capsys, file, tmp_path):
 
 @pytest.mark.parametrize("text", ["a,b", "1,0", "1,inf", "1,-2"])
 def test_gains_that_are_none_are_refused(text):
-    with pytest.raises(ParameterError, match="--gains is "):
+    with pytest.raises(PretouchError, match="--gains is "):
         gains_of(text)

@@ -48,8 +48,6 @@ def at_begin(monkeypatch, seconds, then):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("franka",), "pretouch run franka lacks --ip"),
-        (("--ip", "127.0.0.1"), "--ip is unknown"),
         (("frank",), "No arm to move is called 'frank': perhaps franka."),
         (("--robot", "franka", "--ip", "1.2.3.4"), "`--robot franka` is `pretouch run franka` now"),
         (("--yes", "--robot=ros2"), "`--robot ros2` is `pretouch run ros2` now"),
@@ -67,7 +65,6 @@ def at_begin(monkeypatch, seconds, then):
         (("--units-host", ""), "--units-host is empty"),
         (("--path", "circle", "--radius", "3"), "cannot reach"),
         (("--no-learnt", "--learn-anew"), "--no-learnt does not go with"),
-        (("--recover",), "--recover is unknown"),
         (("--arm", "ur5"), "There is no arm 'ur5'"),
     ],
 )  # fmt: skip
@@ -130,7 +127,8 @@ def test_a_rehearsal_checks_confirms_announces_moves_and_reports(tmp_path, capsy
     places = [said.find(part) for part in order]
     assert -1 not in places
     assert places == sorted(places)
-    assert len(open_recording(tmp_path / "a.mcap")) >= 30
+    stamps = [kept.step.stamp for kept in open_recording(tmp_path / "a.mcap")]
+    assert stamps[-1] - stamps[0] >= 0.28  # a busy machine leaves out some cycles
     assert not (tmp_path / "state").exists()
 
 

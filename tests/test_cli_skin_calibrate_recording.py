@@ -65,14 +65,14 @@ def test_a_recording_of_units_and_joints_becomes_a_skin_file(panda_model, skin, 
     told = json.loads(numbers.read_text())
     assert told["clock_ahead_s"] == 0.0
     for unit in told["units"]:
-        place, written = unit["place"], made.units[made.ids.index(unit["unit"])]
+        place, written = unit["place"], made.units[made.ids.index(unit["id"])]
         assert unit["accepted"]
-        assert place["position_m"] == pytest.approx(written.T_link_sensor[:3, 3], abs=1e-9)
-        assert place["position_sigma_m"] == pytest.approx(written.position_sigma)
-        floor = told["board_misalignment_sigma_rad"]
-        assert written.orientation_sigma == pytest.approx(np.hypot(place["orientation_sigma_rad"], floor))
+        np.testing.assert_allclose(place["T_link_sensor"], written.T_link_sensor, atol=1e-9)
+        assert place["position_sigma"] == pytest.approx(written.position_sigma)
+        floor = told["orientation_floor"]
+        assert written.orientation_sigma == pytest.approx(np.hypot(place["orientation_sigma"], floor))
         assert np.array(place["covariance"]).shape == (6, 6)
-        assert unit["unit"] in said
+        assert unit["id"] in said
         assert unit["observability"]["unknown"] == []
 
 
@@ -87,7 +87,7 @@ def test_joint_states_of_another_clock_are_aligned(panda_model, skin, recorded, 
     assert_same_places(load_skin(out, panda_model), skin)
     told = json.loads(numbers.read_text())
     assert told["clock_ahead_s"] == pytest.approx(-LATE, abs=0.05)
-    assert all(abs(unit["place"]["clock_offset_s"]) < 0.01 for unit in told["units"])
+    assert all(abs(unit["place"]["clock_offset"]) < 0.01 for unit in told["units"])
 
 
 def test_an_offset_of_clocks_that_one_unit_alone_tells_is_said_to_be_so(recorded, capsys, monkeypatch):

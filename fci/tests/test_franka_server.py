@@ -179,7 +179,7 @@ def test_each_option_of_the_command_is_one_of_the_fixture(franka_server: Any) ->
 
 
 def test_what_cannot_be_served_is_an_error_that_says_why(franka_server: Any) -> None:
-    with pytest.raises(RobotError, match=r"The simulated robot has ended: .*perhaps --scene"):
+    with pytest.raises(RobotError, match=r"(?s)The simulated robot has ended: .*--scenes.*--scene "):
         franka_server(scenes="static")
 
 

@@ -59,36 +59,22 @@ UNITS = Extra("units", ("mpremote",), "units")
 def install_command(owner: str, extra: str = "", target: str = "setup") -> str:
     """Return the command that installs a distribution, or an extra of it, where this Python is.
 
-    In a clone that is a target of make, or pip of the folder in an environment other than the clone's own. Elsewhere
-    it is what made the environment: pip and pipx add to a distribution that is there, wherever it came from; uvx makes
-    another environment, so it is given the origin. A distribution beside this one that is missing is looked for beside
-    the wheel of Pretouch too.
+    In a clone that is a target of make, or pip of the folder in an environment other than the clone's own. A
+    distribution beside this one that is missing is looked for beside the wheel of Pretouch too.
     """
+    python = shlex.quote(sys.executable)
+    pip = f"{python} -m pip install" if find_spec("pip") else f"uv pip install --python {python}"
     if (_CLONE / "lab" / "pyproject.toml").is_file():
         if Path(sys.prefix) == _CLONE / ".venv":
             there = "" if Path.cwd() == _CLONE else f"-C {shlex.quote(str(_CLONE))} "
             return f"make {there}{target}"
-        folder = _CLONE / _FOLDERS.get(owner, "")
-        return f"{_pip()} -e {_quoted(folder, extra)}"
-    origin, beside, wanted = _origin(), "", _quoted(owner, extra)
-    if owner in _FOLDERS and not _installed(owner):
-        wanted = _quoted(owner, extra, f"=={version('pretouch')}")
-        if origin.startswith("file:"):
-            beside = f"--find-links {shlex.quote(str(Path(unquote(urlsplit(origin).path)).parent))} "
-    if not {"archive-v0", "environments-v2"} & set(Path(sys.prefix).parts):  # of uv's cache
-        return f"{_pip()} {beside}{wanted}"
-    source = f" @ {origin}" if origin else ""
-    if owner in _FOLDERS:
-        return f"uvx {beside}--with {wanted} --from {_quoted('pretouch', '', source)} pretouch"
-    return f"uvx --from {_quoted(owner, extra, source)} pretouch"
-
-
-def _pip() -> str:
-    """Return what installs into the environment that runs: pipx, pip, or uv, which makes environments without pip."""
-    python = shlex.quote(sys.executable)
-    if (Path(sys.prefix) / "pipx_metadata.json").is_file():
-        return "pipx runpip pretouch install"
-    return f"{python} -m pip install" if find_spec("pip") else f"uv pip install --python {python}"
+        return f"{pip} -e {_quoted(_CLONE / _FOLDERS.get(owner, ''), extra)}"
+    if owner not in _FOLDERS or _installed(owner):
+        return f"{pip} {_quoted(owner, extra)}"
+    origin = Path(unquote(urlsplit(_origin()).path)).parent if _origin().startswith("file:") else None
+    beside = f"--find-links {shlex.quote(str(origin))} " if origin else ""
+    ours = version("pretouch")
+    return f"{pip} {beside}{_quoted(owner, extra, f'=={ours}')}"
 
 
 def _installed(owner: str) -> bool:

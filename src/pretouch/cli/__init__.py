@@ -3,10 +3,7 @@
 import os
 import sys
 from collections.abc import Sequence
-from contextlib import redirect_stderr, redirect_stdout
 from difflib import get_close_matches
-from io import StringIO
-from shutil import get_terminal_size
 from typing import Annotated, Any, NoReturn, Union, cast
 
 import tyro
@@ -14,7 +11,6 @@ from rich.console import Console
 
 from pretouch.cli.overview import SHELLS, overview
 from pretouch.cli.registry import Command, check_moved, command_class, command_names
-from pretouch.cli.usage_error import tidied, usage_error
 from pretouch.errors import PluginError, PretouchError, UsageError
 from pretouch.signals import Terminated, ends_raise, exit_code
 
@@ -55,7 +51,7 @@ def _read(args: Sequence[str], errors: Console) -> Command:
         words, prog = args[1:], name
         if hasattr(wanted, "of_words"):  # its options depend on what the first words name
             wanted, words, prog = wanted.of_words(words)
-        return cast(Command, _parsed(wanted, words, f"pretouch {prog}"))
+        return cast(Command, tyro.cli(wanted, prog=f"pretouch {prog}", args=words, config=_CONFIG))
     if name == "completion":
         _write_completion(args[1:], errors)
     if name in ("", "-h", "--help"):
@@ -65,19 +61,6 @@ def _read(args: Sequence[str], errors: Console) -> Command:
     raise PluginError(
         f"{name} is no command of pretouch: {f'perhaps {near[0]}' if near else 'pretouch --help lists them'}."
     )
-
-
-def _parsed(wanted: Any, args: Sequence[str], prog: str) -> Any:
-    """Return what tyro makes of words; what is wrong with them is a UsageError."""
-    said, shown = StringIO(), StringIO()
-    try:
-        with redirect_stderr(said), redirect_stdout(shown):
-            return tyro.cli(wanted, prog=prog, args=args, config=_CONFIG)
-    except SystemExit as end:
-        if end.code != _USAGE:
-            print(tidied(shown.getvalue(), get_terminal_size().columns), end="")
-            raise
-        raise UsageError(usage_error(said.getvalue(), args, prog)) from None
 
 
 def _every(errors: Console) -> dict[str, Any]:

@@ -11,7 +11,7 @@ import numpy as np
 from pretouch.cli.detect_account import ENDINGS, Account, give
 from pretouch.cli.detect_torques import torque_account
 from pretouch.cli.detect_words import force_guidance, sentences
-from pretouch.cli.words import words
+from pretouch.cli.words import numbers
 from pretouch.cli.writing import check_writable, numbers_to
 from pretouch.contact.moving_thresholds import thresholds_of
 from pretouch.errors import ParameterError, RecordingError
@@ -77,11 +77,8 @@ def _account(file: LogFile, choice: Choice, given: Sequence[Profile] | None, rat
 
 
 def gains_of(text: str) -> tuple[float, ...]:
-    """Read the gains of motors [Nm/A]; ParameterError for what is no list of numbers above zero."""
-    try:
-        gains = tuple(float(word) for word in words(text))
-    except ValueError:
-        gains = (0.0,)
+    """Read the gains of motors [Nm/A]; ParameterError for what is not above zero."""
+    gains = numbers("--gains", text)
     if not all(np.isfinite(gain) and gain > 0.0 for gain in gains):
         raise ParameterError(f"--gains is {text!r}: give torques by current [Nm/A], one a joint, separated by commas.")
     return gains

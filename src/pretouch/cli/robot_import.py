@@ -8,9 +8,8 @@ from rich.console import Console
 
 from pretouch.cli.robot_check import arm_numbers, joint_table, ready_said
 from pretouch.cli.tables import show
-from pretouch.cli.words import words
+from pretouch.cli.words import numbers, words
 from pretouch.cli.writing import numbers_to
-from pretouch.errors import ParameterError
 from pretouch.importing.described import described, is_description
 from pretouch.importing.folder import check_free, write_folder
 from pretouch.importing.read import read_robot
@@ -35,10 +34,10 @@ def import_arm(command: "Import") -> None:
         ee=command.ee,
         name=command.name,
         packages=packages,
-        qd_max=_numbers("--qd-max", command.qd_max),
-        qdd_max=_numbers("--qdd-max", command.qdd_max),
-        tau_max=_numbers("--tau-max", command.tau_max),
-        ready=_numbers("--ready", command.ready),
+        qd_max=numbers("--qd-max", command.qd_max),
+        qdd_max=numbers("--qdd-max", command.qdd_max),
+        tau_max=numbers("--tau-max", command.tau_max),
+        ready=numbers("--ready", command.ready),
         capsules=command.capsules,
         cover=command.cover,
     )
@@ -61,13 +60,6 @@ def _imported(command: "Import", file: Path, options: ImportOptions, folder: Pat
     after = f"Next, sensor units: {units}\nThen try it: pretouch live --arm {folder}"
     console.print(f"\nWritten: {folder}. {after}", markup=False, soft_wrap=True)
     return _numbers_of(found)
-
-
-def _numbers(option: str, text: str) -> tuple[float, ...]:
-    try:
-        return tuple(float(word) for word in words(text))
-    except ValueError:
-        raise ParameterError(f"{option} is {text!r}: give numbers, separated by commas.") from None
 
 
 def _file_name(name: str) -> str:

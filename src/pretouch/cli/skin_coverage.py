@@ -6,10 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
-from pretouch.cli.calibrate.outputs import check_free, same_file
 from pretouch.cli.skin_coverage_tables import link_table, spot_lines, suggestion_table, unit_table
 from pretouch.cli.tables import show
-from pretouch.cli.writing import STANDARD_OUTPUT, check_writable, numbers_to, unwritable_said
+from pretouch.cli.writing import check_outputs, numbers_to, unwritable_said
 from pretouch.coverage.blind import BlindSpot, blind_spots
 from pretouch.coverage.measure import Coverage, covered
 from pretouch.coverage.measuring import Both, Setting, coverage_of
@@ -67,7 +66,11 @@ def _measured(command: "Asked", model: RobotModel, skin: Skin) -> dict[str, Any]
             save_skin(shown, Path(command.out))
             console.print(f"Skin: {command.out}", markup=False, soft_wrap=True)
     if command.figure:
-        _draw(command.figure, ways if not new else setting.ways(1), found, shown, new)
+        from pretouch.coverage.figure import coverage_figure  # needs the extra
+
+        with unwritable_said("figure", Path(command.figure)):
+            figure = coverage_figure(setting.ways(1) if new else ways, found, shown, new)
+            figure.savefig(command.figure, dpi=110)
         console.print(f"Figure: {command.figure}", markup=False, soft_wrap=True)
     return numbers
 
@@ -108,15 +111,8 @@ def _check_outputs(command: "Asked", source: Path | None) -> None:
         )
     if command.figure:
         FIGURES.need("A figure")
-    places = [("skin file", command.out), ("figure", command.figure), ("file", command.json)]
-    given = [(what, Path(text)) for what, text in places if text and text != STANDARD_OUTPUT]
-    for i, (what, place) in enumerate(given):
-        others = [other for _, other in given[:i]] + ([source] if source else [])
-        if any(same_file(other, place) or same_file(place, other) for other in others):
-            raise ExperimentError(f"The {what} {place} is also another input or output file: give another name.")
-    for what, place in given:
-        check_free(what, place, command.replace)
-        check_writable(what, place)
+    outputs = ("skin file", command.out), ("figure", command.figure), ("file", command.json)
+    check_outputs(outputs, [str(source)] if source else [], command.replace)
 
 
 def _suggested(
@@ -147,26 +143,13 @@ def _both(ways: tuple[Ways, Ways], seen: list[BoolArray]) -> Both:
     return covered(ways[0], seen[0]), covered(ways[1], seen[1])
 
 
-def _draw(file: str, ways: Ways, found: Coverage, skin: Skin, new: frozenset[str]) -> None:
-    from pretouch.coverage.figure import coverage_figure
-
-    with unwritable_said("figure", Path(file)):
-        coverage_figure(ways, found, skin, new).savefig(file, dpi=110)
-
-
 def _numbers(command: "Asked", setting: Setting, both: Both, spots: tuple[BlindSpot, ...]) -> dict[str, Any]:
     return {
         "asked": asdict(command),
         "parameters": asdict(setting.params) | {"warning_m": setting.params.warning_m},
         "links": _links(both),
-        "blind_spots": [
-            {
-                "name": s.sentence, "link": s.link, "facing": s.facing, "side": s.side, "area_m2": s.area_m2,
-                "center_m": s.center.tolist(), "share": s.share,
-            }
-            for s in spots
-        ],
-    }  # fmt: skip
+        "blind_spots": spots,
+    }
 
 
 def _links(both: Both) -> list[dict[str, Any]]:

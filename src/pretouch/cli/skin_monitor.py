@@ -17,7 +17,7 @@ from rich.live import Live
 from pretouch.cli.skin_keys import keys_file
 from pretouch.cli.skin_record import record
 from pretouch.cli.skin_table import line, thrown_away, view
-from pretouch.cli.words import words
+from pretouch.cli.words import numbers, words
 from pretouch.cli.writing import numbers_to
 from pretouch.errors import HardwareError
 from pretouch.hardware.health import HealthParams
@@ -113,10 +113,7 @@ def _watched(command: "Monitor", all_ids: tuple[str, ...]) -> tuple[NetworkUnits
 
 
 def _posture(text: str, model: RobotModel) -> FloatArray:
-    try:
-        q = np.array([float(word) for word in words(text)])
-    except ValueError:
-        q = np.zeros(0)
+    q = np.array(numbers("--posture", text))
     if q.shape != (model.n,) or not np.isfinite(q).all():
         raise HardwareError(f"The posture is {text!r}: give {model.n} joint positions [rad], separated by commas.")
     beyond = np.flatnonzero((q < model.q_min) | (q > model.q_max))

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from pretouch.cli.tables import Grid
+from pretouch.cli.tables import PlainTable
 from pretouch.hardware.findings import Finding
 from pretouch.hardware.health import UnitHealth, status_name
 from pretouch.hardware.monitor import MonitorUpdate
@@ -39,12 +39,11 @@ def view(update: MonitorUpdate, rejected: Mapping[str, int], notes: Sequence[str
     return Group(table(update.units, update.findings), *(lines or [Text("Nothing is wrong.", style="green")]), *below)
 
 
-def table(units: Sequence[UnitHealth], found: Sequence[Finding]) -> Grid:
+def table(units: Sequence[UnitHealth], found: Sequence[Finding]) -> PlainTable:
     """Return one row per unit, coloured by the worst that was found of it."""
     worst = {f.unit: f.level for f in sorted(found, key=lambda f: f.level, reverse=True)}
     styles = [_STYLES.get(worst.get(unit.unit, ""), "") for unit in units]
-    # a long name is broken: 80 columns hold all else
-    return Grid(_COLUMNS, [_cells(unit) for unit in units], left=(0, 1), broken=1, styles=styles)
+    return PlainTable(_COLUMNS, [_cells(unit) for unit in units], left=(0, 1), styles=styles)
 
 
 def _cells(unit: UnitHealth) -> tuple[str, ...]:

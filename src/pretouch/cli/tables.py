@@ -8,7 +8,10 @@ from rich.console import Console, ConsoleOptions, RenderResult
 from rich.markup import escape
 from rich.table import Table
 
-from pretouch.text_table import TextTable, blocks
+from pretouch.text_table import TextTable
+
+_BROKEN = 8
+"""Characters that the first column keeps at least, where those beside it need the room."""
 
 
 def show(console: Console, tables: Iterable[TextTable]) -> None:
@@ -16,37 +19,40 @@ def show(console: Console, tables: Iterable[TextTable]) -> None:
     for table in tables:
         console.print()
         console.print(table.title, style="bold", markup=False)
-        console.print(Grid(table.header, table.rows, table.names, range(table.names)))
+        console.print(PlainTable(table.header, table.rows, range(table.names)), crop=False)
         console.print(table.note, style="dim", markup=False)
     console.print()
 
 
 @dataclass(frozen=True)
-class Grid:
-    """A table without lines; what does not fit beside its first columns stands below, beside these columns again."""
+class PlainTable:
+    """A table without lines. Where the terminal is narrow, headings are wrapped and names in the first column broken.
+
+    All else stays whole: print it with `crop=False`.
+    """
 
     header: Sequence[str]
     rows: Sequence[Sequence[str]]
-    names: int = 1
-    """How many columns at the left stand in each part."""
     left: Collection[int] = (0,)
     """Columns that are aligned left, as words are."""
-    broken: int = 0
-    """How many columns at the left may be broken into lines, for the others to stand side by side."""
     styles: Iterable[str] = ()
     """Of each row; those without are plain."""
 
     def __rich_console__(self, _console: Console, options: ConsoleOptions) -> RenderResult:
         """Draw it as wide as the terminal is."""
-        columns = [[self.header[i], *(row[i] for row in self.rows)] for i in range(len(self.header))]
-        for n, block in enumerate(blocks(columns, options.max_width, self.names, self.broken)):
-            if n:
-                yield ""
-            drawn = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
-            for i, width in block:
-                drawn.add_column(
-                    escape(self.header[i]), justify="left" if i in self.left else "right", width=width, overflow="fold"
-                )
-            for row, style in zip_longest(self.rows, self.styles, fillvalue=""):
-                drawn.add_row(*(escape(row[i]) for i, _ in block), style=style)
-            yield drawn
+        cells = [[line for row in self.rows for line in row[i].split("\n")] for i in range(len(self.header))]
+        columns = list(zip(self.header, cells, strict=True))
+        widths = [max(map(len, [*heading.split("\n"), *lines])) for heading, lines in columns]
+        room = options.max_width - len(widths) + 1
+        if sum(widths) > room:
+            first, *others = (max(map(len, [*heading.split(), *lines]), default=0) for heading, lines in columns)
+            least = _BROKEN if 0 in self.left else first
+            widths = [min(first, max(least, room - sum(others))), *others]
+        drawn = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False, width=sum(widths) + len(widths) - 1)
+        for i, (heading, width) in enumerate(zip(self.header, widths, strict=True)):
+            drawn.add_column(
+                escape(heading), justify="left" if i in self.left else "right", width=width, overflow="fold"
+            )
+        for row, style in zip_longest(self.rows, self.styles, fillvalue=""):
+            drawn.add_row(*map(escape, row), style=style)
+        yield drawn

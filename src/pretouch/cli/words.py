@@ -12,6 +12,14 @@ def words(text: str) -> tuple[str, ...]:
     return tuple(part.strip() for part in text.split(",") if part.strip())
 
 
+def numbers(option: str, text: str) -> tuple[float, ...]:
+    """Return the numbers between commas; what is none is a UsageError."""
+    try:
+        return tuple(float(word) for word in words(text))
+    except ValueError:
+        raise UsageError(f"{option} is {text!r}: give numbers, separated by commas.") from None
+
+
 def split_arm(words: Sequence[str], command: str) -> tuple[str, Sequence[str]]:
     """Return the name of the arm that the words of a command name, the default one where there is none, and the others.
 

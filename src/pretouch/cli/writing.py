@@ -3,8 +3,9 @@
 import os
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, redirect_stdout, suppress
+from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
@@ -42,6 +43,36 @@ def check_writable(what: str, place: Path) -> None:
             raise IsADirectoryError(21, "Is a directory")
 
 
+def check_outputs(outputs: Iterable[tuple[str, str]], inputs: Iterable[str], replace: bool) -> None:
+    """Raise ExperimentError for a file to write that is read too, is there already, or cannot be written.
+
+    Outputs are files with what they are; '' and the standard output are none.
+    """
+    taken = [Path(text) for text in inputs if text]
+    for what, text in outputs:
+        if text and text != STANDARD_OUTPUT:
+            place = Path(text)
+            if any(same_file(other, place) or same_file(place, other) for other in taken):
+                raise ExperimentError(f"The {what} {place} is also another input or output file: give another name.")
+            check_free(what, place, replace)
+            check_writable(what, place)
+            taken.append(place)
+
+
+def check_free(what: str, place: Path, replace: bool) -> None:
+    """Raise ExperimentError for a file that is there and not to be replaced."""
+    if place.is_file() and not replace:
+        raise ExperimentError(f"The {what} {place} exists already: give another name, or --replace.")
+
+
+def same_file(one: Path, other: Path) -> bool:
+    """Whether `other` is the file `one` by another name, be it there or not, or lies in the folder `one`."""
+    if one.exists() and other.exists() and one.samefile(other):
+        return True
+    first, second = Path(os.path.realpath(one)), Path(os.path.realpath(other))
+    return second.is_relative_to(first)
+
+
 @contextmanager
 def numbers_to(place: str | Path | None) -> Iterator[Callable[[Any], None]]:
     """Give what writes a command's numbers as JSON, where --json says: a file, '-', or nowhere for '' and None.
@@ -68,7 +99,13 @@ def numbers_to(place: str | Path | None) -> Iterator[Callable[[Any], None]]:
 
 
 def plain(value: Any) -> Any:
-    """Return what JSON can hold: arrays and tuples become lists, numbers that are not finite None."""
+    """Return what JSON can hold: arrays and tuples become lists, numbers that are not finite None.
+
+    A dataclass becomes a dictionary of its fields and properties.
+    """
+    if is_dataclass(value) and not isinstance(value, type):
+        told = [name for name, member in vars(type(value)).items() if isinstance(member, property)]
+        return {name: plain(getattr(value, name)) for name in (*(field.name for field in fields(value)), *told)}
     if isinstance(value, dict):
         return {name: plain(part) for name, part in value.items()}
     if isinstance(value, np.ndarray | np.generic):

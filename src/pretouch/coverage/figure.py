@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
+from matplotlib.colors import Normalize, to_rgba
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d import Axes3D
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
@@ -105,13 +105,8 @@ def _skin_faces(kin: Kinematics, skin: Skin, new: frozenset[str]) -> Faces:
     ring = np.column_stack([np.cos(turn), np.sin(turn), np.zeros(len(turn))])
     faces: Faces = []
     for unit, p, R in zip(skin.units, position, rotation, strict=True):
-        name, half = unit.board, unit.sensor.angle / 2
-        colour = _NEW if name in new else _OLD
+        half, colour = unit.sensor.angle / 2, _NEW if unit.board in new else _OLD
         faces.append((p + 0.014 * ring @ R.T, colour, colour))
         rim = p + (_BEAM_M * np.array([0, 0, 1]) + _BEAM_M * np.tan(half) * ring) @ R.T
-        faces += [(np.array([p, *rim[i : i + 2]]), (0, 0, 0, 0.08), (*_rgb(new, name), 0.35)) for i in range(12)]
+        faces += [(np.array([p, *rim[i : i + 2]]), (0, 0, 0, 0.08), to_rgba(colour, 0.35)) for i in range(12)]
     return faces
-
-
-def _rgb(new: frozenset[str], name: str) -> tuple[float, float, float]:
-    return (0.84, 0.15, 0.16) if name in new else (0.0, 0.0, 0.0)

@@ -6,7 +6,7 @@ from typing import Any
 
 from rich.console import Console
 
-from pretouch.cli.tables import Grid
+from pretouch.cli.tables import PlainTable
 from pretouch.cli.writing import numbers_to
 from pretouch.errors import ExperimentError
 from pretouch.realtime import check_wishes
@@ -52,7 +52,7 @@ def _show(rows: list[Row], request: CycleRequest, missing: list[str]) -> None:
     console = Console(highlight=False)
     title = f"\nTime of a control step, {request.cycles} cycles [us]"
     console.print(title, style="bold", markup=False)
-    console.print(_times(rows, request.rate))
+    console.print(_times(rows, request.rate), crop=False)
     console.print(
         "CPU: steps back to back, a reading of each unit 50 times a second; all new: every reading in every step; at a"
         " rate: the processor sleeps between steps, and its caches cool. Overruns: steps that took longer than the"
@@ -68,7 +68,7 @@ def _show(rows: list[Row], request: CycleRequest, missing: list[str]) -> None:
         console.print(f"With {', '.join(idle)} points the arm did not follow its path in every cycle.", markup=False)
 
 
-def _times(measured: list[Row], rate: float) -> Grid:
+def _times(measured: list[Row], rate: float) -> PlainTable:
     rows = []
     runs = {"CPU": "", "CPU, all new": "all_new_", f"CPU at {rate:g} Hz": "at_rate_", f"wall at {rate:g} Hz": "wall_"}
     for row in measured:
@@ -78,4 +78,4 @@ def _times(measured: list[Row], rate: float) -> Grid:
             overruns = str(row["overruns"]) if prefix == "wall_" else ""
             restricting = f"{row['restricting_median']:.0f}" if not prefix else ""
             rows.append((first, name, *took, overruns, restricting))
-    return Grid(("points", "", *_SPREAD, "overruns", "restricting"), rows, 2, left=(1,))
+    return PlainTable(("points", "", *_SPREAD, "overruns", "restricting"), rows, left=(1,))

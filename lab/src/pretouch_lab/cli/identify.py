@@ -92,7 +92,7 @@ def _model(arm: str) -> "RobotModel | None":
 def _show(found: "Identified", model: "RobotModel", said: str) -> None:
     from rich.console import Console
 
-    from pretouch.cli.tables import Grid
+    from pretouch.cli.tables import PlainTable
 
     console = Console(highlight=False, soft_wrap=True)
     console.print(f"{said}. {found.seconds:.0f} s of free motion are used.", markup=False)
@@ -103,7 +103,7 @@ def _show(found: "Identified", model: "RobotModel", said: str) -> None:
         for name, values, errors, identifiable in joint_rows(found, model)
     ]
     heading, *rows = zip(("joint", *model.joints), *columns, strict=True)
-    console.print(Grid(heading, rows))
+    console.print(PlainTable(heading, rows), crop=False)
     payload, error = float(found.fit.numbers[-2]), float(found.fit.errors[-2])
     console.print(f"Payload {payload:.3f} +- {error:.3f} kg.", markup=False)
     noise = found.noise

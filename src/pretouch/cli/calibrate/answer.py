@@ -1,18 +1,16 @@
 """The answer of `pretouch skin calibrate`: a table, sentences, the skin file, and all numbers."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from rich.console import Console
-from scipy.spatial.transform import Rotation
 
-from pretouch.calibration.observability import Observability
-from pretouch.calibration.result import Calibration, Finding, Place, UnitCalibration
+from pretouch.calibration.result import Calibration, UnitCalibration
 from pretouch.calibration.skin_of import skin_of
 from pretouch.cli.calibrate.outputs import Outputs
-from pretouch.cli.tables import Grid
+from pretouch.cli.tables import PlainTable
+from pretouch.cli.writing import plain
 from pretouch.errors import CalibrationError
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, save_skin
@@ -41,20 +39,21 @@ class Answer:
 def give(answer: Answer, outputs: Outputs) -> int:
     """Show and write an answer; return 1 if a unit was refused, or else 0."""
     console = Console(highlight=False)
-    console.print(_table(answer))
+    console.print(_table(answer), crop=False)
     notes = [*answer.notes, *(finding.sentence for finding in answer.calibration.findings)]
     for sentence in (*notes, *_sentences(answer)):
         console.print(sentence, soft_wrap=True, markup=False)
-    outputs.write(numbers(answer.model, answer.calibration, answer.clock_ahead, notes))
+    about = {"arm": answer.model.description.name, "clock_ahead_s": answer.clock_ahead, "notes": notes}
+    outputs.write(about | plain(answer.calibration))
     if outputs.skin:
         console.print(_written(answer, outputs), soft_wrap=True, markup=False)
     return int(not all(unit.accepted for unit in answer.calibration.units))
 
 
-def _table(answer: Answer) -> Grid:
+def _table(answer: Answer) -> PlainTable:
     units = answer.calibration.units
     styles = ["bold red" if not unit.accepted else "yellow" if unit.findings else "" for unit in units]
-    return Grid(_COLUMNS, [_cells(unit) for unit in units], 2, _TEXT, broken=2, styles=styles)
+    return PlainTable(_COLUMNS, [_cells(unit) for unit in units], _TEXT, styles)
 
 
 def _cells(unit: UnitCalibration) -> tuple[str, ...]:
@@ -97,59 +96,3 @@ def _written(answer: Answer, outputs: Outputs) -> str:
     if made.left_out:
         said.append(f"Left out: {', '.join(made.left_out)}.")
     return " ".join(said)
-
-
-def numbers(model: RobotModel, calibration: Calibration, clock_ahead: float, notes: Sequence[str]) -> dict[str, Any]:
-    """Return all numbers of a calibration."""
-    return {
-        "arm": model.description.name,
-        "clock_ahead_s": clock_ahead,
-        "board_misalignment_sigma_rad": calibration.orientation_floor,
-        "notes": list(notes),
-        "units": [_unit(unit) for unit in calibration.units],
-        "findings": [_finding(finding) for finding in calibration.findings],
-    }
-
-
-def _unit(unit: UnitCalibration) -> dict[str, Any]:
-    return {
-        "unit": unit.id,
-        "accepted": unit.accepted,
-        "place": None if unit.place is None else _place(unit.place),
-        "observability": None if unit.observability is None else _observability(unit.observability),
-        "findings": [_finding(finding) for finding in unit.findings],
-    }
-
-
-def _place(place: Place) -> dict[str, Any]:
-    return {
-        "link": place.link,
-        "position_m": place.T_link_sensor[:3, 3],
-        "quaternion_wxyz": Rotation.from_matrix(place.T_link_sensor[:3, :3]).as_quat(canonical=True, scalar_first=True),
-        "covariance": place.covariance,
-        "position_sigma_m": place.position_sigma,
-        "orientation_sigma_rad": place.orientation_sigma,
-        "acceleration_bias_m_s2": place.acceleration_bias,
-        "angular_velocity_bias_rad_s": place.angular_velocity_bias,
-        "acceleration_scale_error": place.acceleration_scale,
-        "angular_velocity_scale_error": place.angular_velocity_scale,
-        "clock_offset_s": place.clock_offset,
-        "acceleration_residual_m_s2": place.acceleration_residual,
-        "angular_velocity_residual_rad_s": place.angular_velocity_residual,
-        "used": place.used,
-    }
-
-
-def _observability(seen: Observability) -> dict[str, Any]:
-    return {
-        "position_directions": seen.position_directions,
-        "position_sigma_m": seen.position_sigma,
-        "orientation_axes": seen.orientation_axes,
-        "orientation_sigma_rad": seen.orientation_sigma,
-        "unknown": seen.unknown,
-        "known": seen.known,
-    }
-
-
-def _finding(finding: Finding) -> dict[str, Any]:
-    return {"kind": finding.kind, "sentence": finding.sentence, "refused": finding.refused}

@@ -18,11 +18,11 @@ from pretouch.calibration.motion.plan import Plan
 from pretouch.calibration.motion.report import report_on
 from pretouch.calibration.motion.route import approach
 from pretouch.cli.calibrate.motion import planned
-from pretouch.cli.calibrate.outputs import Outputs, check_free, same_file
+from pretouch.cli.calibrate.outputs import Outputs
 from pretouch.cli.calibrate.recording import Sources, calibrate_recording
 from pretouch.cli.run.setup import heard_units
 from pretouch.cli.skin_record import record_samples
-from pretouch.cli.writing import check_writable
+from pretouch.cli.writing import check_free, check_writable, same_file
 from pretouch.errors import CalibrationError, HardwareError, RecordingError, RobotError
 from pretouch.loop import Cycle, MonotonicClock
 from pretouch.ports import Arm

@@ -7,8 +7,7 @@ from pretouch.calibration.motion.params import PlanParams
 from pretouch.calibration.motion.plan import Plan
 from pretouch.calibration.motion.planner import plan_motion
 from pretouch.calibration.motion.report import report_on
-from pretouch.cli.calibrate.outputs import check_free
-from pretouch.cli.writing import check_writable, unwritable_said
+from pretouch.cli.writing import check_free, check_writable, unwritable_said
 from pretouch.robot.model import RobotModel
 from pretouch.robot.named import robot_named
 
