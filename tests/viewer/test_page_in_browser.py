@@ -13,7 +13,6 @@ from pretouch.explanation import explain
 from pretouch.hardware.keys import Keys, UnitKey
 from pretouch.hardware.network_skin import NetworkSkin
 from pretouch.profiles import profile
-from pretouch.recording.compare import compare
 from pretouch.recording.reader import open_recording
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
@@ -170,11 +169,10 @@ def test_a_recording_is_played_and_jumped_through(tmp_path: Path) -> None:
     recorded = open_recording(tmp_path / "session.mcap")
     contacts = [kept.step for kept in recorded if kept.step.contact is not None]
     assert contacts
-    comparison = compare(recorded, profile("paper"))
 
     def play(options: ServeOptions, until: Callable[[], bool], say: Callable[[str], None]) -> None:
         with begun(options, "test", "The recording", "see it", say) as ready:
-            show_replay(recorded, ready(), comparison, until, say)
+            show_replay(recorded, ready(), until, say)
 
     with (
         Served(play) as served,
@@ -184,10 +182,6 @@ def test_a_recording_is_played_and_jumped_through(tmp_path: Path) -> None:
         visitor.wait_for("mode", Mode.HOLD.name)
         visitor.press("Next event")
         visitor.wait_for("notice", "HOLD to TRACK")
-        for found in comparison.other.contacts:
-            if found.time < contacts[0].stamp:
-                visitor.press("Next event")
-                visitor.wait_for("notice", f"found by paper at {found.time - recorded.stamps()[0]:.2f} s.")
         visitor.press("Next event")
         visitor.wait_for("notice", f"Contact of {np.linalg.norm(contacts[0].contact.force):.1f} N")
         visitor.wait_for("mode", Mode.REACT.name)
