@@ -98,14 +98,12 @@ def test_out_of_session_a_unit_greets_ten_times_a_second_with_one_challenge(desk
     assert gaps.min() >= 0.074
     assert gaps.max() <= 0.127
     assert np.ptp(gaps) > 0.03
-    uptime = np.diff([hello.uptime_us for _, hello in hellos])
-    assert uptime == pytest.approx(1e6 * gaps, rel=1e-4)
+    assert np.diff([hello.uptime_us for _, hello in hellos]) == pytest.approx(1e6 * gaps, rel=1e-4)
 
 
 def test_in_session_it_sends_fifty_samples_a_second_in_sequence(desk):
     on = desk()
-    session = on.open()
-    told = []
+    session, told = on.open(), []
     for _ in range(4):
         told += samples(on.pass_time(0.5), session)
         on.beacon()
@@ -148,8 +146,7 @@ def test_ranges_that_come_too_fast_wait_for_10_ms_to_pass_and_tell_their_age(des
     assert np.diff(times).min() >= 0.01
     assert len(said) >= 45
     measured = 0.009 * np.floor(np.round((times - 0.01) / 0.009, 6))
-    ages = 1e6 * (times - measured)
-    assert [sample.range_age_us for sample in told] == pytest.approx(ages, abs=3)
+    assert [sample.range_age_us for sample in told] == pytest.approx(1e6 * (times - measured), abs=3)
 
 
 def test_between_ranges_that_come_too_slowly_there_are_samples_without_one(desk):
