@@ -10,7 +10,7 @@ from pretouch.robot.vectors import dot
 from pretouch.source_digest import source_digest
 
 TREE = {
-    "__init__": "",
+    "__init__": "Lazy = 1",
     "bottom": "NEAREST = 0.04",
     "arm.__init__": "from .joints import seven",
     "arm.joints": "from ..bottom import NEAREST\nseven = 7",
@@ -30,6 +30,8 @@ USERS = {
     "import house.arm.joints as j": True,
     "from house import alone": False,
     "import numpy": False,
+    "from house import Lazy": True,
+    "import house as h": True,
 }
 
 

@@ -29,7 +29,7 @@ def source_digest(function: Callable[..., object]) -> str:
     file = getattr(sys.modules.get(own), "__file__", None)
     if file is None or not Path(file).is_file():
         raise SourceError(f"The source text of {function.__qualname__} cannot be found: put it in a file.")
-    package = getattr(sys.modules.get(_root(own)), "__path__", [])
+    package = getattr(sys.modules.get(own.partition(".")[0]), "__path__", [])
     above = {__name__.partition(".")[0]: Path(__file__).parents[1]} | {Path(at).name: Path(at).parent for at in package}
     found: dict[str, str] = {}
     todo = [(own, Path(file))]
@@ -44,10 +44,16 @@ def source_digest(function: Callable[..., object]) -> str:
 @cache
 def _read(name: str, place: Path, above: tuple[tuple[str, Path], ...]) -> tuple[str, list[tuple[str, Path]]]:
     """Return the digest of a module, and what it imports of packages, which are given with the folders above them."""
-    text, folders = place.read_text(encoding="utf-8"), dict(above)
-    needed = [(module, folders[_root(module)]) for module in _imported(text, name, place) if _root(module) in folders]
-    found = [(module, _place(module, folder)) for module, folder in needed]
-    return sha256(text.encode()).hexdigest(), [(module, file) for module, file in found if file]
+    text, folders, needed = place.read_text(encoding="utf-8"), dict(above), list[tuple[str, Path]]()
+    for module in _imported(text, name, place):
+        root, _, rest = module.partition(".")
+        if root in folders:
+            file = _place(module, folders[root]) if rest else None
+            if file:
+                needed.append((module, file))
+            elif "." not in rest:  # a package may load what it gives itself from any of its modules
+                needed += _modules(root, folders[root])
+    return sha256(text.encode()).hexdigest(), needed
 
 
 def _imported(text: str, name: str, place: Path) -> Iterator[str]:
@@ -57,13 +63,10 @@ def _imported(text: str, name: str, place: Path) -> Iterator[str]:
         level = len(base) - len(base.lstrip("."))
         if level:
             base = ".".join([*parts[: len(parts) - level + 1], *filter(None, [base[level:]])])
-        yield base
+        if "." in base:
+            yield base
         for imported in re.findall(r"[\w.]+", names):
             yield f"{base}.{imported}" if base else imported
-
-
-def _root(module: str) -> str:
-    return module.partition(".")[0]
 
 
 @cache
@@ -71,3 +74,10 @@ def _place(module: str, above: Path) -> Path | None:
     """Return the file of a module whose package lies in a folder, or None if there is none."""
     place = above.joinpath(*module.split("."))
     return next((file for file in (place / "__init__.py", place.with_suffix(".py")) if file.is_file()), None)
+
+
+@cache
+def _modules(package: str, above: Path) -> list[tuple[str, Path]]:
+    """Return all modules of a package that lies in a folder."""
+    files = [(file.relative_to(above).with_suffix("").parts, file) for file in (above / package).rglob("*.py")]
+    return [(".".join(parts).removesuffix(".__init__"), file) for parts, file in files]

@@ -1,6 +1,5 @@
 """The simulated units of a skin, each behind its own UDP socket and its own stretch of a simulated network."""
 
-import selectors
 import socket
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
@@ -72,10 +71,8 @@ class Fleet:
         self._up = [Channel[bytes](params.network.up, rng) for _, rng, _ in rngs]
         self._down = [Channel[bytes](params.network.down, rng) for _, _, rng in rngs]
         self._sockets = [socket.socket(family, socket.SOCK_DGRAM) for _ in ids]
-        self._selector = selectors.DefaultSelector()
-        for one, down in zip(self._sockets, self._down, strict=True):
+        for one in self._sockets:
             one.setblocking(False)
-            self._selector.register(one, selectors.EVENT_READ, (one, down))
         self.sent = 0
         """Datagrams that reached the socket."""
         self.lost = 0
@@ -99,14 +96,11 @@ class Fleet:
 
         `clock` gives the time [s]. It is asked once, after the sockets: no beacon is heard before it was sent.
         """
-        # One call for all sockets: each one lets other threads go on, and the simulation may have to wait for them.
-        before = self.sent
-        arrived = [(down, _heard(one)) for one, down in (key.data for key, _ in self._selector.select(0))]
+        before, arrived = self.sent, [_heard(one) for one in self._sockets]
         now = clock()
-        for down, datagrams in arrived:
-            for datagram in datagrams:
+        for unit, came, down, up, one in zip(self.units, arrived, self._down, self._up, self._sockets, strict=True):
+            for datagram in came:
                 down.put(datagram, now)
-        for unit, down, up, one in zip(self.units, self._down, self._up, self._sockets, strict=True):
             for datagram in down.take(now):
                 unit.receive_beacon(datagram, now)
             for datagram in unit.tick(now):
@@ -124,7 +118,6 @@ class Fleet:
 
     def close(self) -> None:
         """Give the sockets back."""
-        self._selector.close()
         for one in self._sockets:
             one.close()
 
