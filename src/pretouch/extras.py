@@ -73,8 +73,7 @@ def install_command(owner: str, extra: str = "", target: str = "setup") -> str:
         return f"{pip} {_quoted(owner, extra)}"
     origin = Path(unquote(urlsplit(_origin()).path)).parent if _origin().startswith("file:") else None
     beside = f"--find-links {shlex.quote(str(origin))} " if origin else ""
-    ours = version("pretouch")
-    return f"{pip} {beside}{_quoted(owner, extra, f'=={ours}')}"
+    return f"{pip} {beside}{_quoted(owner, extra, '==' + version('pretouch'))}"
 
 
 def _installed(owner: str) -> bool:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from pretouch.session.confirmations import Identity
     from pretouch.session.push import Direction
     from pretouch.session.units import Units
-    from pretouch.types import FloatArray
+    from pretouch.types import FloatArray, RobotState
 
 # options and their help are shown without what takes a second to import
 
@@ -113,6 +113,8 @@ class OpenedArm:
     """What the arm is known by as its free motion is remembered; '': by its name."""
     left_out: Callable[[], float] = lambda: 0.0
     """Time that this machine was too slow to simulate it so far [s]."""
+    measured: "Callable[[], RobotState] | None" = None
+    """Its newest state by the clock of its units, where that of `arm` may be stamped otherwise."""
     commander: Commander | None = None
     """Whom the arm follows, if it is not the path."""
 

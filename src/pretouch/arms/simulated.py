@@ -48,4 +48,5 @@ class Simulated(ArmOptions):
                 yield OpenedArm(
                     arm, skin=units, units=units, push=lambda direction: arm.push(direction.axis),
                     free_motion_id=f"{arm.name}, seed {self.seed}", left_out=lambda: arm.left_out,
+                    measured=arm.measured,
                 )  # fmt: skip

@@ -155,9 +155,8 @@ class Verdict:
             )
         elif self.checked:
             how = "bit for bit" if self.exact else f"within {TOLERANCE:g} of their SI units"
-            all_of_them = "The only step was" if self.checked == 1 else f"All {self.checked} steps were"
-            are = "is" if self.checked == 1 else "are"
-            said = f"{all_of_them} recomputed and {are} the same {how}."
+            one, more = "The only step was recomputed and is", f"All {self.checked} steps were recomputed and are"
+            said = f"{one if self.checked == 1 else more} the same {how}."
         else:
             said = "No step could be recomputed."
         skipped = "; ".join(f"{n} {'step has' if n == 1 else 'steps have'} {why}" for why, n in self.skipped.items())

@@ -12,7 +12,7 @@ from pretouch.sim.touch_sensor import TouchSample
 _SLICE_S = 0.002
 """The simulation moves on by so much at once [s]: how late a datagram may leave."""
 LATE_S = 0.1
-"""How late the simulation may be [s]: what a machine is later than that is left out."""
+"""A machine that is later than this leaves the time out [s]: until then it makes up for it."""
 
 Measured = TypeVar("Measured", RangeSample, ImuSample, TouchSample)
 
@@ -45,8 +45,8 @@ class RealTime:
             if wait > 0:
                 time.sleep(wait)
             elif wait < -LATE_S:
-                self._next -= wait + LATE_S
-                self.left_out -= wait + LATE_S
+                self._next -= wait
+                self.left_out -= wait
             self._look()
             self._plant.advance(self._slice)
             if self._fleet:

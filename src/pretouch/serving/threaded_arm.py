@@ -9,17 +9,16 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from pretouch.errors import RobotError
-from pretouch.serving.real_time import LATE_S
 from pretouch.serving.simulated_arm import SimulatedArm, SimulateOptions
 from pretouch.sim.scene import SceneSpec
 from pretouch.types import FloatArray, RobotState
 
 _PERIOD_S = 0.002
 """Time in which a command reaches the arm, and between two of its states [s]."""
-_FRESH_S = 0.03
-"""How old a state may be that is handed out at once [s]: a simulation that is later catches up first."""
 _STUCK_S = 1.0
-"""A simulation that has not moved on for so long [s] is not a slow one: its newest state is handed out as it is."""
+"""A simulation that has not moved on for so long [s] is not a slow one."""
+_LAG_S = 0.03
+"""How much older than now a state is for a controller [s]: a machine that is late for a moment makes up for it."""
 _START_S = 120.0
 """Longest time it may take to begin [s]: everything may have to be compiled first."""
 _PUSH_N, _PUSH_AFTER_S, _PUSH_S = 14.0, 0.5, 1.5
@@ -33,6 +32,8 @@ class _Newest(NamedTuple):
     """Stamped with when it was due."""
     left_out: float
     """Time that was left out before it [s]."""
+    instant: float
+    """When it was there [s]."""
 
 
 class ThreadedArm:
@@ -46,7 +47,6 @@ class ThreadedArm:
         self._set_point = self._still
         self._begun, self._over = False, threading.Event()
         self._newest: _Newest | None = None
-        self._moved = threading.Condition()
         self._started, self._failure = threading.Event(), ""
         self._push, self._push_span = np.zeros(3), (np.inf, np.inf)
         plant = self._arm.plant
@@ -68,17 +68,21 @@ class ThreadedArm:
         self._arm.__exit__(kind, error, trace)
 
     def read(self) -> RobotState:
-        """Return the newest state, stamped with when it was due, and never after now; wait while it is not fresh."""
-        with self._moved:
-            self._moved.wait_for(self._is_fresh, _STUCK_S)
+        """Return the newest state, stamped with when it was due: at most `_LAG_S` ago, and never after now."""
+        newest = self._state()
+        now = time.monotonic()  # after the state: this thread may have to wait between the two
+        latest = now if now < newest.instant + _STUCK_S else newest.instant
+        return replace(newest.state, stamp=min(now, max(newest.state.stamp, latest - _LAG_S)))
+
+    def measured(self) -> RobotState:
+        """Return the newest state, stamped with when it was due, however late: by the clock of its units."""
+        return self._state().state
+
+    def _state(self) -> _Newest:
         newest = self._newest
         if newest is None or self._failure:
             raise RobotError(f"The simulation has ended: {self._failure or 'it was closed'}.")
-        return replace(newest.state, stamp=min(time.monotonic(), newest.state.stamp))
-
-    def _is_fresh(self) -> bool:
-        newest = self._newest
-        return newest is None or bool(self._failure) or time.monotonic() - newest.state.stamp <= _FRESH_S
+        return newest
 
     def command(self, qd: FloatArray) -> None:
         """Take joint velocities (n,) [rad/s] as the set-point until the next command."""
@@ -109,7 +113,7 @@ class ThreadedArm:
     def left_out(self) -> float:
         """Time that this machine was too slow to simulate by now [s]; of what is not left out yet it may make up."""
         newest = self._newest
-        return 0.0 if newest is None else newest.left_out + max(0.0, time.monotonic() - LATE_S - newest.state.stamp)
+        return 0.0 if newest is None else newest.left_out + max(0.0, time.monotonic() - _LAG_S - newest.state.stamp)
 
     def push(self, axis: tuple[float, float, float]) -> None:
         """Let a simulated person push the hand along an axis of the base, in a moment and for a while."""
@@ -129,12 +133,8 @@ class ThreadedArm:
                 arm.tick()
                 state = arm.read()
                 state = replace(state, stamp=arm.monotonic(state.stamp))
-                with self._moved:
-                    self._newest = _Newest(state, arm.clock.left_out)
-                    self._moved.notify_all()
+                self._newest = _Newest(state, arm.clock.left_out, time.monotonic())
                 self._started.set()
         except Exception as error:
-            with self._moved:
-                self._failure = f"{type(error).__name__}: {error}"
-                self._moved.notify_all()
+            self._failure = f"{type(error).__name__}: {error}"
             self._started.set()

@@ -14,6 +14,7 @@ from pretouch.controller import Controller
 from pretouch.errors import PretouchError
 from pretouch.loop import MonotonicClock, Recorder
 from pretouch.ports import Arm, Skin
+from pretouch.session.run_files import RecorderGroup
 from pretouch.session.session import NoUnits
 from pretouch.signals import noted_in_motion
 from pretouch.types import ControlStep
@@ -49,16 +50,7 @@ _STAND_S, _LOOK_S = 1.0, 0.01
 """How long an arm is looked at, and between two looks [s]."""
 _STILL_RAD_S = 0.05
 """Six standard deviations of the joint velocity that a Panda measures at rest [rad/s]."""
-
-
-class NoRecorder:
-    """Keeps nothing."""
-
-    def record(self, cycle: loop.Cycle) -> None:
-        """Keep nothing."""
-
-
-NO_RECORDER = NoRecorder()
+NO_RECORDER = RecorderGroup(())
 
 
 def go(

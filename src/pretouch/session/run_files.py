@@ -62,12 +62,12 @@ def open_run_files(
         last = stack.enter_context(LastSeconds(controller, folder, recording, about={"robot": robot}))
         supervisor = _RecordingSupervisor(recording, tell) if recording else None
         yield RunFiles(
-            _RecorderGroup([one for one in (last, learnt, further, supervisor) if one]), recording, last, learnt
+            RecorderGroup([one for one in (last, learnt, further, supervisor) if one]), recording, last, learnt
         )
 
 
-class _RecorderGroup:
-    """Several recorders as one."""
+class RecorderGroup:
+    """Several recorders as one, or none."""
 
     def __init__(self, recorders: Sequence[Recorder]) -> None:
         self._recorders = recorders

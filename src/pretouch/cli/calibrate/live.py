@@ -34,6 +34,7 @@ from pretouch.sensing.skin import skin_for
 from pretouch.session.motion import Ending, go
 from pretouch.session.units import Units, wait_until_live
 from pretouch.signals import Terminated
+from pretouch.types import RobotState
 
 if TYPE_CHECKING:
     from pretouch.cli.calibrate.options import CalibrateArm
@@ -135,12 +136,14 @@ class Measurements:
         self._newest = -np.inf
         self.progress: Callable[[], None] = lambda: None
         """Called at each step."""
+        self.measured: Callable[[], RobotState] | None = None
+        """`OpenedArm.measured`."""
         units.take_samples()  # of before
 
     def record(self, cycle: Cycle) -> None:
         """Record what is new; a receiver that has ended, and a disk that is full, are an error."""
         self.take()
-        state = cycle.inputs.robot
+        state = self.measured() if self.measured else cycle.inputs.robot
         if state.stamp > self._newest:
             self._newest = state.stamp
             q, qd = (np.array(values)[None] for values in (state.q, state.qd))
@@ -181,7 +184,7 @@ def _recorded(
 
 def _move(opened: OpenedArm, model: RobotModel, plans: list[Plan], measurements: Measurements, ending: Ending) -> None:
     """Let the arm go to the start of the motion and make it, and stand until all that was measured has arrived."""
-    controller = plan_controller(model, np.array(opened.arm.read().q))
+    controller, measurements.measured = plan_controller(model, np.array(opened.arm.read().q)), opened.measured
     columns = TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn()
     with Progress(*columns, console=Console(stderr=True)) as bar:
         for plan in plans:
