@@ -62,7 +62,7 @@ def drawn(recorded: Recorded, times: Sequence[float]) -> Iterator[Image.Image]:
     """Draw a recording at some times on its steps' clock [s], which grow."""
     options = ServeOptions(port=free_port())
     with served(options, "Pretouch") as server, chromium(WIDTH_PX + PANEL_PX + _EDGE_PX, HEIGHT_PX) as visitor:
-        page = ReplayPage(server, recorded, None)
+        page = ReplayPage(server, recorded)
         server.initial_camera.fov, server.initial_camera.look_at = _FOV, _LOOK_AT
         page.draw(-1.0)
         visitor.open(SimpleNamespace(options=options))
