@@ -1,37 +1,15 @@
-"""What a step should say, reckoned from its inputs alone: the cause that counts, its words, and how fast at most."""
+"""What is to be believed of a step's inputs, reckoned from them alone, and how fast the arm may go at most."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from pretouch.contact.admittance import Admittance
-from pretouch.contact.decaying_velocity import DecayingVelocity
+from pretouch.modes import Event
 from pretouch.profiles import Profile
-from pretouch.types import ControlStep, Inputs, Mode, QpOutcome, RobotState
+from pretouch.types import ControlStep, Inputs, Mode, RobotState
 
 SHOWN, NEAR, NO_TARGET = {0, 6, 11}, {3, 13}, {1, 2, 4, 7}
-
-WORDS = {
-    "unusable": "The robot's state cannot be used", "backwards": "Time went backwards (from",
-    "stale": "The robot's state is",
-    "failed": "gave no answer", "blocked": "The approach limits cannot be met",
-    "blocked reaction": "allow no motion within", "contact": "A contact of", "reacting": "Moving with a contact",
-    "silent": "No usable reading from", "no force": "no force estimate", "overrun": "The step before this one was",
-    "filling": "The force window is filling", "clear": "Moving as asked.", "opening": "Clamped between two objects",
-    "caught": "The arm was clamped between two objects", "yielding": "Yielding to a contact",
-    "given up": "Given up after", "pressed": "A force that does not move the arm",
-}  # fmt: skip
-"""Cause -> words its sentence holds."""
-
-MODES = {
-    "contact": Mode.REACT,
-    "reacting": Mode.REACT,
-    "blocked reaction": Mode.REACT,
-    "clear": Mode.TRACK,
-    "opening": Mode.REACT,
-    "yielding": Mode.REACT,
-}
-"""Cause -> mode; what is not here is a HOLD."""
 
 LARGEST = 1e3
 """Joint position or velocity from which on a robot's state is not believed [rad, rad/s]."""
@@ -42,15 +20,13 @@ STRONGEST = 1e4
 LATEST = 1e12
 """Time stamp from which on it is none [s]."""
 
-LATCHING = {"unusable", "backwards", "stale", "failed", "latched", "caught"}
-
 
 @dataclass
 class Expected:
     """What is to be believed of one step's inputs, and what follows."""
 
-    believed: bool
-    fault: str
+    fault: Event | None
+    """Why the robot's state is not believed."""
     q: np.ndarray
     """(n,) commanded joint positions to go by [rad]."""
     qd: np.ndarray
@@ -78,8 +54,6 @@ class Oracle:
         self.q, self.qd = robot.q_commanded.copy(), robot.qd_commanded.copy()
         self.mode, self.latched, self.reason = Mode.HOLD, False, ""
         self.samples = 0
-        self.decay_cycles = DecayingVelocity.of(profile.react, profile.task.control_period_s).decay_cycles
-        self.reacted = self.decay_cycles
 
     def expect(self, inputs: Inputs) -> Expected:
         """Judge the inputs of the next step."""
@@ -100,7 +74,7 @@ class Oracle:
         age = now - self.heard if p.perception is not None and len(self.ids) else np.zeros(0)
         slow, stop = p.sight.slow_after_s, p.sight.silent_after_s
         return Expected(
-            not fault, fault, self.q, self.qd, now, w[:3].copy() if felt else None, strained,
+            fault, self.q, self.qd, now, w[:3].copy() if felt else None, strained,
             overrun=not fault and now - last > p.failure.overrun_s,
             no_force=not fault and now - self.force_stamp > p.failure.force_timeout_s,
             silent=[name for name, a in zip(self.ids, age, strict=False) if a >= stop],
@@ -118,19 +92,19 @@ class Oracle:
                 q, at = q + command * (end - at), end
         self.q = q
 
-    def _fault(self, inputs: Inputs) -> str:
+    def _fault(self, inputs: Inputs) -> Event | None:
         r = inputs.robot
         numbers = np.concatenate((r.q, r.qd, r.q_commanded, r.qd_commanded))
         if not (np.abs(numbers) < LARGEST).all():  # what is no number is not below
-            return "unusable"
+            return Event.UNUSABLE
         if (
             not (abs(inputs.stamp) < LATEST and abs(r.stamp) < LATEST)
             or (np.abs(r.qd_commanded) >= 2 * self.qd_max).any()
         ):
-            return "unusable"
+            return Event.UNUSABLE
         if inputs.stamp < self.stamp:
-            return "backwards"
-        return "stale" if abs(inputs.stamp - r.stamp) > self.p.failure.state_timeout_s else ""
+            return Event.TIME_BACKWARDS
+        return Event.STATE_STALE if abs(inputs.stamp - r.stamp) > self.p.failure.state_timeout_s else None
 
     def _hear(self, inputs: Inputs, now: float, forget: bool) -> None:
         if self.p.perception is None:
@@ -145,63 +119,23 @@ class Oracle:
                 if status in NEAR or status in NO_TARGET or (status in SHOWN and 0 <= distance < np.inf):
                     self.heard[k] = stamp
 
-    def cause(self, e: Expected, step: ControlStep, resume: bool) -> str:
-        """Name the cause that should have decided the step's mode, and remember it."""
-        cause = self._cause(e, step, resume)
-        if MODES.get(cause) is Mode.REACT:
-            self.reacted = 1 if cause == "contact" or self.mode is not Mode.REACT else self.reacted + 1
-        else:
-            self.reacted = self.decay_cycles
+    def remember(self, e: Expected, step: ControlStep) -> None:
+        """Go on from what a step decided."""
         self.samples = min(self.samples + (e.force is not None), self.p.window.samples)
-        self.mode, self.latched, self.reason = step.mode, cause in LATCHING, step.reason
+        self.mode, self.latched, self.reason = step.mode, step.latched, step.reason
         self.q, self.qd = self.q + step.command * self.p.task.control_period_s, step.command.copy()
-        return cause
 
-    def _cause(self, e: Expected, step: ControlStep, resume: bool) -> str:
-        first = e.fault or self._first(e, step, resume)
-        moves = MODES.get(first)
-        if moves is None or step.qp.outcome is QpOutcome.SOLVED:
-            return first
-        if step.qp.outcome is QpOutcome.FAILED:
-            return "failed"
-        return "blocked" if moves is Mode.TRACK else "blocked reaction"
-
-    def _first(self, e: Expected, step: ControlStep, resume: bool) -> str:
-        """What decides the mode of a step whose inputs can be believed, before the quadratic program."""
-        if self.latched and not resume:
-            return "latched"
-        decays = isinstance(self.p.react, DecayingVelocity)
-        if decays and self.mode is Mode.REACT and self.reacted < self.decay_cycles:
-            return "reacting"
-        if self.mode is not Mode.REACT and self.feels_contact(e, step):
-            return "contact"
-        if self.p.detect.by_torques or not decays:
-            return self._told(e, step)
-        filling = self.samples < self.p.window.samples
-        seen = {"silent": bool(e.silent), "no force": e.no_force, "overrun": e.overrun, "filling": filling}
-        return next((cause for cause, here in seen.items() if here), "clear")
-
-    def _told(self, e: Expected, step: ControlStep) -> str:
-        """Take the step's word for what has a memory of its own, where nothing it was given speaks against it."""
-        told = next(cause for cause, words in WORDS.items() if words in step.reason)
-        waiting = told in ("yielding", "opening", "caught")
-        assert not waiting or self.mode is Mode.REACT
-        if waiting or told in ("blocked", "blocked reaction", "failed"):
-            return told if waiting else "yielding" if told == "blocked reaction" else "clear"
-        seen = {
-            "silent": bool(e.silent),
-            "no force": e.no_force or (self.p.detect.by_torques and not e.strained),
-            "overrun": e.overrun,
-        }
-        first = next((cause for cause, here in seen.items() if here), "")
-        free = ("given up", "pressed", "filling", "clear")
-        assert first or told in free, (told, step.reason)
-        if not first and told == "clear":
-            assert self.samples >= self.p.window.samples
-        return first or told
+    def speaks_against(self, e: Expected) -> dict[Event, bool]:
+        """What forbids to follow the path, and whether it is so."""
+        no_torques = self.p.detect.by_torques and not e.strained
+        return {
+            Event.SKIN_SILENT: bool(e.silent), Event.NO_FORCE: e.no_force or no_torques, Event.OVERRUN: e.overrun,
+        }  # fmt: skip
 
     def feels_contact(self, e: Expected, step: ControlStep) -> bool:
-        """Whether the force crosses the thresholds the step gives."""
+        """Whether a contact is due: the force crosses the thresholds the step gives, where nothing is under way."""
+        if self.mode is Mode.REACT:
+            return False
         r = self.p.react
         sticks = self.mode is Mode.HOLD and isinstance(r, Admittance) and r.soft_hold and r.static_friction_nm > 0
         if self.p.detect.by_torques or sticks:
