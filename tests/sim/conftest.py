@@ -1,4 +1,4 @@
-"""Postures for the simulated arm, and units on its hand."""
+"""Units on the hand of the simulated arm."""
 
 from collections.abc import Callable
 
@@ -13,26 +13,6 @@ from pretouch.sensing.unit import SensorUnit
 from pretouch.sim.plant import Plant
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
-from pretouch.types import FloatArray
-
-Reach = Callable[[tuple[float, float, float]], FloatArray]
-
-
-@pytest.fixture(scope="session")
-def reach(panda_model: RobotModel) -> Reach:
-    """Joint positions (7,) that bring the end-effector to a point [m], from the ready posture."""
-
-    def to(goal: tuple[float, float, float]) -> FloatArray:
-        q = panda_model.description.q_ready.copy()
-        for _ in range(500):
-            kin = panda_model.kinematics(q)
-            error = np.array(goal) - kin.position[panda_model.ee]
-            if np.linalg.norm(error) < 1e-6:
-                return q
-            q = q + np.clip(np.linalg.pinv(panda_model.ee_jacobian(kin)[:3]) @ error, -0.05, 0.05)
-        raise AssertionError(f"{goal} is out of reach")
-
-    return to
 
 
 @pytest.fixture

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from pretouch.contact.observer import wrench_from_torques
+from pretouch.control.posture import brought_to
 from pretouch.errors import ParameterError
 from pretouch.robot.model import RobotModel
 from pretouch.sim.plant import Plant, PlantClock
@@ -19,6 +20,12 @@ PERFECT = PlantParams(
 """An arm that is its model, with sensors that do not err."""
 LEFT = (0.5, 0.25, 0.25)
 """Start of the paper's circle [m]."""
+
+
+def arm(model: RobotModel, params: PlantParams | None = None, seed: int = 0, at: object = None) -> Plant:
+    """An arm alone with its end-effector at a point [m], or ready."""
+    q = model.description.q_ready if at is None else brought_to(model, np.array(at))
+    return Plant(model, SceneSpec(), params or PlantParams(), q, seed)
 
 
 def record(plant: Plant, duration: float) -> list[RobotState]:
@@ -56,9 +63,9 @@ def circle(plant: Plant, duration: float) -> list[RobotState]:
 
 
 @pytest.fixture(scope="module")
-def moving(panda_model, reach) -> list[list[RobotState]]:
+def moving(panda_model) -> list[list[RobotState]]:
     """Ten seconds on the circle by each of four arms."""
-    return [circle(Plant(panda_model, SceneSpec(), PlantParams(), reach(LEFT), seed), 10.0) for seed in range(4)]
+    return [circle(arm(panda_model, seed=seed, at=LEFT), 10.0) for seed in range(4)]
 
 
 def test_in_free_motion_the_force_errs_as_on_a_real_arm_and_not_less(panda_model, moving):
@@ -74,8 +81,8 @@ def test_in_free_motion_the_force_errs_as_on_a_real_arm_and_not_less(panda_model
         assert np.linalg.norm([1.8, 1.6, 1.6]) < np.linalg.norm(force.std(axis=0)) < np.linalg.norm([2.5, 2.2, 2.3])
 
 
-def test_at_rest_each_arm_has_its_own_constant_force_error(panda_model, reach):
-    arms = [Plant(panda_model, SceneSpec(), PlantParams(), reach(LEFT), seed) for seed in range(16)]
+def test_at_rest_each_arm_has_its_own_constant_force_error(panda_model):
+    arms = [arm(panda_model, seed=seed, at=LEFT) for seed in range(16)]
     offset = np.array([mean_wrench(plant)[:3] for plant in arms])
     assert 0.4 < np.median(np.abs(offset)) < 1.7  # reported of real Pandas: 0.4 to 1.7 N per axis
     assert np.abs(offset).max() < 4.1  # the offset of a stress case, too large to be real
@@ -85,8 +92,8 @@ def test_at_rest_each_arm_has_its_own_constant_force_error(panda_model, reach):
 
 @pytest.mark.parametrize("point", [LEFT, (0.5, 0.0, 0.0), (0.4, -0.3, 0.5)])
 @pytest.mark.parametrize("force", [(10, 0, 0), (0, -20, 0), (0, 0, 30), (15, 15, -15), (-30, 0, 0)])
-def test_a_push_at_the_hand_is_the_force_in_the_estimate(panda_model, reach, point, force):
-    pushed, free = (Plant(panda_model, SceneSpec(), PlantParams(), reach(point), seed=5) for _ in range(2))
+def test_a_push_at_the_hand_is_the_force_in_the_estimate(panda_model, point, force):
+    pushed, free = (arm(panda_model, seed=5, at=point) for _ in range(2))
     push(pushed, panda_model.ee, np.array(point), np.array(force))
     for plant in (pushed, free):
         plant.advance(0.4)
@@ -96,8 +103,8 @@ def test_a_push_at_the_hand_is_the_force_in_the_estimate(panda_model, reach, poi
     assert (estimate - error)[3:] == pytest.approx(np.zeros(3), abs=0.5)
 
 
-def test_a_perfect_arm_estimates_a_wrench_exactly(panda_model, reach):
-    plant = Plant(panda_model, SceneSpec(), PERFECT, reach(LEFT), seed=0)
+def test_a_perfect_arm_estimates_a_wrench_exactly(panda_model):
+    plant = arm(panda_model, PERFECT, at=LEFT)
     assert mean_wrench(plant) == pytest.approx(np.zeros(6), abs=1e-6)
     force, lever = np.array([12.0, -20.0, 7.0]), np.array([0.02, 0.05, -0.03])
     push(plant, panda_model.ee, np.array(LEFT) + lever, force)
@@ -110,10 +117,9 @@ def test_a_perfect_arm_estimates_a_wrench_exactly(panda_model, reach):
     ("link", "offset"), [("panda_link3", (0, 0, -0.1)), ("panda_link4", (0, 0.06, 0)), ("panda_link5", (0, 0.1, -0.1))]
 )
 def test_a_push_on_any_link_is_in_the_external_torques(panda_model, link, offset, force):
-    q, index = panda_model.description.q_ready, panda_model.link_index(link)
-    kin = panda_model.kinematics(q)
+    kin, index = panda_model.kinematics(panda_model.description.q_ready), panda_model.link_index(link)
     point = kin.position[index] + kin.rotation[index] @ offset
-    pushed, free = (Plant(panda_model, SceneSpec(), PlantParams(), q, seed=5) for _ in range(2))
+    pushed, free = (arm(panda_model, seed=5) for _ in range(2))
     push(pushed, index, point, np.array(force))
     for plant in (pushed, free):
         plant.advance(0.4)
@@ -123,8 +129,8 @@ def test_a_push_on_any_link_is_in_the_external_torques(panda_model, link, offset
     assert tau_ext - error == pytest.approx(expected, abs=0.42)  # twice the largest ripple
 
 
-def test_the_estimate_follows_a_push_within_a_tenth_of_a_second(panda_model, reach):
-    plant = Plant(panda_model, SceneSpec(), PERFECT, reach(LEFT), seed=0)
+def test_the_estimate_follows_a_push_within_a_tenth_of_a_second(panda_model):
+    plant = arm(panda_model, PERFECT, at=LEFT)
     push(plant, panda_model.ee, np.array(LEFT), np.array([0.0, 20.0, 0.0]))
     force = np.array([(plant.advance(0.001), plant.read().wrench[1])[1] for _ in range(100)])
     assert force[2] < 5.0, "no observer is that fast"
@@ -134,7 +140,7 @@ def test_the_estimate_follows_a_push_within_a_tenth_of_a_second(panda_model, rea
 
 def turning(model: RobotModel, params: PlantParams, speed: float, duration: float) -> FloatArray:
     """External torque (N,) [Nm] on joint 1 while it turns at a constant speed [rad/s], every millisecond."""
-    plant = Plant(model, SceneSpec(), params, model.description.q_ready, seed=0)
+    plant = arm(model, params)
     plant.command(np.array([speed, 0, 0, 0, 0, 0, 0]))
     plant.advance(0.5)
     return np.array([(plant.advance(0.001), plant.read().tau_ext[0])[1] for _ in range(round(duration / 0.001))])
@@ -156,7 +162,7 @@ def test_ripple_comes_back_241_times_a_turn(panda_model):
 
 def test_torque_noise_reaches_the_estimate_through_the_observer(panda_model):
     params = replace(PERFECT, torque_noise_nm=PlantParams().torque_noise_nm)
-    plant = Plant(panda_model, SceneSpec(), params, panda_model.description.q_ready, seed=0)
+    plant = arm(panda_model, params)
     tau_ext = np.array([state.tau_ext for state in record(plant, 6.0)])[10:]
     # noise with a corner of 80 Hz behind a low-pass of 60 1/s keeps K / (K + omega) of its variance
     expected = np.array([0.26, 0.36, 0.23, 0.35, 0.05, 0.06, 0.01]) * np.sqrt(60.0 / (60.0 + 2 * np.pi * 80.0))
@@ -165,7 +171,7 @@ def test_torque_noise_reaches_the_estimate_through_the_observer(panda_model):
 
 
 def test_a_perfect_arm_feels_nothing_while_it_accelerates(panda_model):
-    plant = Plant(panda_model, SceneSpec(), PERFECT, panda_model.description.q_ready, seed=0)
+    plant = arm(panda_model, PERFECT)
     largest = fastest = np.zeros(7)
     for step in range(500):
         plant.command(0.5 * np.sin(2 * np.pi * step / 500) * np.ones(7))
@@ -185,8 +191,7 @@ def test_commanded_joint_velocities_are_followed(panda_model, moving):
 
 
 def test_torques_stay_within_the_limits_whatever_is_commanded(panda_model):
-    no_friction = replace(PlantParams(), friction_f1_nm=NONE)
-    plant = Plant(panda_model, SceneSpec(), no_friction, panda_model.description.q_ready, seed=0)
+    plant = arm(panda_model, replace(PlantParams(), friction_f1_nm=NONE))
     limit, largest = panda_model.description.tau_max, np.zeros(7)
     for step in range(300):
         if step % 50 == 0:
@@ -197,11 +202,9 @@ def test_torques_stay_within_the_limits_whatever_is_commanded(panda_model):
     assert np.all(largest[4:] == limit[4:]), "the command was too gentle to reach the limits"
 
 
-def test_an_arm_is_decided_by_its_seed(panda_model, reach):
-    q = reach(LEFT)
-    first, again, other = (Plant(panda_model, SceneSpec(), PlantParams(), q, seed) for seed in (3, 3, 4))
+def test_an_arm_is_decided_by_its_seed(panda_model):
     runs = []
-    for plant in (first, again, other):
+    for plant in (arm(panda_model, seed=seed, at=LEFT) for seed in (3, 3, 4)):
         plant.command(np.linspace(-0.2, 0.2, 7))
         runs.append(record(plant, 0.2))
     for name in ("q", "qd", "q_commanded", "tau_ext", "wrench"):
@@ -210,19 +213,8 @@ def test_an_arm_is_decided_by_its_seed(panda_model, reach):
         assert not np.array_equal(one, else_)
 
 
-def test_time_split_differently_is_the_same_time(panda_model):
-    q = panda_model.description.q_ready
-    whole, pieces = (Plant(panda_model, SceneSpec(), PlantParams(), q, seed=0) for _ in range(2))
-    whole.advance(0.1)
-    for _ in range(20):
-        pieces.advance(0.005)
-    assert whole.time == pytest.approx(0.1)
-    assert pieces.time == pytest.approx(0.1)
-    assert np.array_equal(whole.read().tau_ext, pieces.read().tau_ext)
-
-
-def test_a_state_is_consistent_and_stays_as_it_was_read(panda_model, reach):
-    plant = Plant(panda_model, SceneSpec(), PlantParams(), reach(LEFT), seed=0)
+def test_a_state_is_consistent_and_stays_as_it_was_read(panda_model):
+    plant = arm(panda_model, at=LEFT)
     plant.command(np.full(7, 0.1))
     plant.advance(0.3)
     state, again = plant.read(), plant.read()
@@ -254,25 +246,19 @@ def test_near_a_singularity_there_is_no_wrench(panda_model: RobotModel, q, singu
     assert np.all(np.isfinite(plant.read().tau_ext))
 
 
-def test_without_contact_the_true_force_is_zero_and_logged(panda_model):
-    plant = Plant(panda_model, SceneSpec(), PlantParams(), panda_model.description.q_ready, seed=0)
-    plant.advance(0.05)
-    assert [time for time, _ in plant.true_log] == pytest.approx(np.arange(1, 51) * 0.001)
-    assert not np.any([force for _, force in plant.true_log])
-
-
-def test_a_log_that_is_taken_begins_anew(panda_model):
-    plant = Plant(panda_model, SceneSpec(), PlantParams(), panda_model.description.q_ready, seed=0)
+def test_the_true_force_is_logged_zero_without_contact_and_a_log_that_is_taken_begins_anew(panda_model):
+    plant = arm(panda_model)
     plant.advance(0.003)
     log, touches = plant.take_log()
     plant.advance(0.002)
     assert [time for time, _ in log] == pytest.approx([0.001, 0.002, 0.003])
+    assert not np.any([force for _, force in log])
     assert [time for time, _ in plant.take_log()[0]] == pytest.approx([0.004, 0.005])
     assert plant.true_log == plant.touches == touches == []
 
 
 def test_the_clock_lets_one_period_pass(panda_model):
-    plant = Plant(panda_model, SceneSpec(), PlantParams(), panda_model.description.q_ready, seed=0)
+    plant = arm(panda_model)
     clock, called = PlantClock(plant, 0.01), []
     plant.before_each_step(called.append)
     assert [clock.tick() for _ in range(3)] == pytest.approx([0.01, 0.02, 0.03])
@@ -281,13 +267,13 @@ def test_the_clock_lets_one_period_pass(panda_model):
 
 @pytest.mark.parametrize("period", [0.0004, 0.0015, -0.01])
 def test_a_clock_that_the_physics_cannot_keep_is_refused(panda_model, period):
-    plant = Plant(panda_model, SceneSpec(), PlantParams(), panda_model.description.q_ready, seed=0)
+    plant = arm(panda_model)
     with pytest.raises(ParameterError, match=rf"control period is {period:g} s: give a multiple of .* 0.001 s"):
         PlantClock(plant, period)
 
 
 def test_who_says_until_when_it_has_nothing_to_do_is_not_called_before(panda_model):
-    plant, called = Plant(panda_model, SceneSpec(), PlantParams(), panda_model.description.q_ready, seed=0), []
+    plant, called = arm(panda_model), []
 
     def call(time: float) -> float:
         called.append(time)

@@ -32,15 +32,6 @@ def test_what_is_sent_is_what_would_have_been_read(panda_model, paper_skin, rig)
     assert set(seen) <= set(told)
 
 
-def test_a_silenced_sensor_sends_nothing(panda_model, paper_skin):
-    samples: list[RangeSample] = []
-    plant = Plant(panda_model, SceneSpec(), NO_ERROR, panda_model.description.q_ready, 0)
-    finders = RangeFinders(plant, paper_skin, RangeFinderParams(), 0, samples.append)
-    finders.silenced = {2}
-    plant.advance(0.2)
-    assert {s.unit for s in samples} == {0, 1, 3, 4, 5, 6}
-
-
 def test_light_falls_off_with_the_distance_and_never_repeats_itself(panda_model):
     skin = Skin([SensorUnit("front", "panda_hand", FORWARD)], panda_model)
     by_distance = {d: sent(panda_model, skin, 2.0, wall(d)) for d in (0.2, 0.6, 1.2)}

@@ -88,10 +88,3 @@ def test_both_feel_the_same_touch(panda_model):
     first.advance(0.05)
     assert first.read().wrench[0] < -2.0
     assert second.read().wrench[0] < -2.0
-
-
-def test_a_second_arm_reads_what_it_measured_last(panda_model):
-    first, second = facing(panda_model, APART_M)
-    first.advance(0.01)
-    assert second.read().stamp == pytest.approx(0.01)
-    assert second.read().stamp == second.time

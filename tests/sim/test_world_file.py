@@ -12,6 +12,7 @@ from tests.sim.ranging import EXACT, FORWARD, NO_ERROR, ORIGIN
 
 from pretouch.errors import ParameterError
 from pretouch.robot.model import RobotModel
+from pretouch.sensing.sensor import PAPER_SENSOR, cone_rays
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit
 from pretouch.sim.plant import Plant
@@ -119,30 +120,46 @@ _ROOM = (
 <geom type="hfield" hfield="hills" pos="-.5 .5 -.3"/>
 <geom type="cylinder" size=".1 .2" pos="-.5 -.5 .3"/>
 <geom type="ellipsoid" size=".1 .2 .3" pos=".5 -.5 .3"/>
+<geom type="sphere" size=".05" pos=".4 .3 .4"/>
 <body mocap="true" pos="0 -.7 .5"><geom type="box" size=".1 .1 .1"/></body>
 """
 )
 
 
-def test_rays_meet_what_mujoco_finds_in_it(world: World) -> None:
+@pytest.mark.parametrize("farthest", [0.3, 1.3, 4.0])
+def test_rays_meet_what_mujoco_finds_to_the_bit_anywhere_in_it(world: World, farthest: float) -> None:
     plant = world(_ROOM, _SHAPES)
-    built, data, rng = plant.mj_model, plant.mj_data, np.random.default_rng(0)
-    geoms, found, met = geoms_of(built, data), np.zeros(1, np.int32), set()
-    for _ in range(3000):
+    built, data, rng, cone = plant.mj_model, plant.mj_data, np.random.default_rng(0), cone_rays(2, PAPER_SENSOR.angle)
+    geoms, met = geoms_of(built, data), set()
+    hit, normal, geom = np.zeros(len(cone)), np.zeros((len(cone), 3)), np.zeros(len(cone), np.int32)
+    for _ in range(1000):
+        data.qpos[:7] = rng.uniform(plant.model.q_min, plant.model.q_max)
         data.qpos[10:14] = Rotation.random(rng=rng).as_quat()
         mujoco.mj_kinematics(built, data)
-        origin, ray = rng.uniform(-1.0, 1.0, 3), rng.normal(size=3)
-        ray /= np.linalg.norm(ray)
-        normal = np.zeros(3)
-        expected = mujoco.mj_ray(built, data, origin, ray, None, True, -1, found, normal)
-        distance, outwards, which = cast(origin, ray[None], geoms, -1, 100.0)
-        assert distance[0] == expected
-        if expected >= 0.0:
-            assert which[0] == found[0]
-            assert np.array_equal(outwards[0], normal)
-            met.add(int(built.geom_type[which[0]]))
-    kinds = ("PLANE", "HFIELD", "CAPSULE", "ELLIPSOID", "CYLINDER", "BOX", "MESH")
+        # on a link's surface, inside it, a little away, or anywhere
+        link = int(rng.integers(-1, len(plant.model.links)))
+        origin = data.xpos[link] + rng.normal(0.0, 0.07, 3) if link >= 0 else rng.uniform(-1.0, 1.0, 3)
+        rays = np.ascontiguousarray(cone @ Rotation.random(rng=rng).as_matrix().T)
+        mujoco.mj_multiRay(
+            built, data, origin, rays.reshape(-1), None, True, link, geom, hit, normal.reshape(-1), len(rays), farthest
+        )
+        distance, outwards, which = cast(origin, rays, geoms, link, farthest)
+        within = (hit >= 0.0) & (hit <= farthest)
+        assert np.array_equal(within, (distance >= 0.0) & (distance <= farthest))
+        assert np.array_equal(distance[within], hit[within])
+        assert np.array_equal(outwards[within], normal[within])
+        assert np.array_equal(which[within], geom[within])
+        met |= set(built.geom_type[which[within]].tolist())
+    kinds = ("PLANE", "HFIELD", "CAPSULE", "SPHERE", "ELLIPSOID", "CYLINDER", "BOX", "MESH")
     assert met == {int(getattr(mujoco.mjtGeom, f"mjGEOM_{kind}")) for kind in kinds}
+
+
+def test_what_is_transparent_is_not_met(world: World) -> None:
+    plant = world(_FLOOR)
+    origin, down = np.array([1.5, 0.0, 0.3]), np.array([[0.0, 0.0, -1.0]])
+    assert cast(origin, down, geoms_of(plant.mj_model, plant.mj_data), -1, 4.0)[0] == pytest.approx([1.05])
+    plant.mj_model.geom("world/floor").rgba[3] = 0.0
+    assert cast(origin, down, geoms_of(plant.mj_model, plant.mj_data), -1, 4.0)[0] == [-1.0]
 
 
 def test_units_see_a_mesh_at_its_distance(world: World, panda_model: RobotModel) -> None:
