@@ -93,6 +93,12 @@ def few(panda_model):
     return surface_of(panda_model, 400), q
 
 
+@pytest.fixture(scope="module")
+def usual(panda_model, paper_skin, few):
+    """Ways, and which unit of the paper's skin sees which of them."""
+    return found_by(panda_model, paper_skin, few, CoverageParams())
+
+
 def found_by(model, worn, few, params):
     made = ways_to(model, fixtures(SceneSpec()), params, few[0], q=few[1], each=2, rng=np.random.default_rng(4))
     return made, seen_by(made, worn)
@@ -119,8 +125,8 @@ def test_what_is_seen_at_worse_is_seen_at_better(
 
 
 @given(st.sets(st.integers(0, 6), max_size=7), st.integers(0, 6))
-def test_one_more_unit_never_lowers_a_share(panda_model, paper_skin, few, some, one):
-    made, seen = found_by(panda_model, paper_skin, few, CoverageParams())
+def test_one_more_unit_never_lowers_a_share(usual, some, one):
+    made, seen = usual
     less, more = (covered(made, seen[sorted(units)]) for units in (some, some | {one}))
     assert less.arm.ways <= more.arm.ways
     assert less.arm.surface <= more.arm.surface
@@ -128,8 +134,8 @@ def test_one_more_unit_never_lowers_a_share(panda_model, paper_skin, few, some, 
         assert a.ways <= b.ways
 
 
-def test_what_is_not_free_counts_nowhere(panda_model, paper_skin, few):
-    made, seen = found_by(panda_model, paper_skin, few, CoverageParams())
+def test_what_is_not_free_counts_nowhere(usual):
+    made, seen = usual
     assert 0.1 < made.free.mean() < 0.9
     assert not np.any(seen & ~made.free)
     found = covered(made, seen)
@@ -137,8 +143,8 @@ def test_what_is_not_free_counts_nowhere(panda_model, paper_skin, few):
     assert np.nansum(found.point_share * found.free.sum(axis=0)) == pytest.approx(seen.any(axis=0).sum())
 
 
-def test_where_nothing_can_come_there_is_no_share(panda_model, paper_skin, few):
-    made, seen = found_by(panda_model, paper_skin, few, CoverageParams())
+def test_where_nothing_can_come_there_is_no_share(usual):
+    made, seen = usual
     nothing = covered(replace(made, weight=np.zeros_like(made.weight)), np.zeros_like(seen))
     assert nothing.links == ()
     assert np.isnan(nothing.arm.ways)

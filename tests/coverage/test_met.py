@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from pretouch.control.posture import brought_to
 from pretouch.coverage.measure import covered
 from pretouch.coverage.measuring import Setting, coverage_of
 from pretouch.coverage.params import CoverageParams
@@ -51,8 +52,6 @@ def test_the_hand_meets_what_lies_ahead_as_often_as_its_surface_faces_it(panda_m
 
 def test_points_move_as_the_arm_turns(panda_model, surface):
     """Against a difference of two postures: the hand goes 1 mm down, and its pose is found again."""
-    from pretouch.control.posture import brought_to
-
     q, down, step = panda_model.description.q_ready, np.array([0.0, 0.0, -1.0]), 1e-3
     at = panda_model.kinematics(q)
     later = panda_model.kinematics(brought_to(panda_model, at.position[panda_model.ee] + step * down))

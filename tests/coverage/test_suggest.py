@@ -12,7 +12,6 @@ from pretouch.coverage.params import CoverageParams
 from pretouch.coverage.suggest import HEIGHT_M, candidates, greedy, suggest
 from pretouch.coverage.surface import surface_of
 from pretouch.coverage.ways import seen_by, ways_met, ways_to
-from pretouch.errors import SkinError
 from pretouch.sensing.skin import Skin, load_skin, save_skin
 from pretouch.sensing.unit import seat
 from pretouch.sim.scene import SceneSpec, fixtures
@@ -84,8 +83,3 @@ def test_the_file_with_new_units_keeps_the_old_ones(made, panda_model, paper_ski
     again = suggest((made,), read, 1)
     assert again.chosen[0].unit.id == "suggested_3"
     assert again.chosen[0].gain <= found.chosen[1].gain + 1e-12
-
-
-def test_more_units_than_there_are_places(made, paper_skin):
-    with pytest.raises(SkinError, match=r"5 more units were requested, but 3 positions were found: request 1 to 3"):
-        suggest((made,), paper_skin, 5, candidates(made, paper_skin)[:3])
