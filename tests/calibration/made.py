@@ -32,13 +32,18 @@ class Noise:
 EXACT = Noise(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-class MovingArm:
-    """An arm all of whose joints swing, each by two sines; `stand` names joints, by index, that do not."""
+SWINGS = (0.5, 0.35, 0.5, 0.4, 0.7, 0.6, 0.9)
 
-    def __init__(self, model: RobotModel, duration: float = 45.0, stand: tuple[int, ...] = ()) -> None:
+
+class MovingArm:
+    """An arm whose joints swing, each by two sines of its amplitude [rad]; `stand`: those that do not."""
+
+    def __init__(
+        self, model: RobotModel, duration: float = 45.0, stand: tuple[int, ...] = (), swings: tuple[float, ...] = SWINGS
+    ) -> None:
         self.model = model
         self.time = np.arange(0.0, duration, 1 / RATE_HZ)
-        self._amplitude = np.array([0.5, 0.35, 0.5, 0.4, 0.7, 0.6, 0.9])
+        self._amplitude = np.array(swings)
         self._amplitude[list(stand)] = 0.0
         instants = self.time[:, None] + np.array([-H, 0.0, H])
         self.q = self._at(self.time)

@@ -12,7 +12,7 @@ from pretouch.errors import CalibrationError, RobotModelError
 from pretouch.sensing.skin import Skin
 from pretouch.sim.random_skin import random_skin
 from pretouch.traces import ImuTrace
-from tests.calibration.faulty import on_the_table, slipped
+from tests.calibration.faulty import joined, on_the_table, slipped
 from tests.calibration.made import EXACT, MovingArm, Noise, pose_error, turned
 
 
@@ -110,13 +110,8 @@ def with_a_long_wait(data: CalibrationData, wait: float) -> CalibrationData:
         imu = unit.imu
         gravity = 9.81 * imu.acceleration[0] / np.linalg.norm(imu.acceleration[0])
         felt = gravity + 0.015 * rng.standard_normal((len(before), 3))
-        turned = 0.002 * rng.standard_normal((len(before), 3))
-        trace = ImuTrace(
-            np.concatenate([before, imu.stamp]),
-            np.vstack([felt, imu.acceleration]),
-            np.vstack([turned, imu.angular_velocity]),
-        )
-        units.append(replace(unit, imu=trace))
+        lying = ImuTrace(before, felt, 0.002 * rng.standard_normal((len(before), 3)))
+        units.append(replace(unit, imu=joined(lying, imu)))
     return CalibrationData(data.joints, tuple(units))
 
 

@@ -6,14 +6,12 @@ import numpy as np
 import pytest
 
 from pretouch.calibration.calibrate import calibrate
-from pretouch.calibration.data import CalibrationData
 from pretouch.calibration.identify import rigid_bodies
 from pretouch.calibration.params import CalibrationParams
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit
 from pretouch.sim.random_skin import random_skin
-from pretouch.traces import ImuTrace, JointTrace
-from tests.calibration.faulty import unit_of
+from tests.calibration.faulty import changed, cut, joints, kept, traced, unit_of
 from tests.calibration.made import MovingArm
 
 
@@ -23,11 +21,6 @@ def test_links_that_are_fixed_to_each_other_are_one_body(panda_model):
         ("panda_link1",), ("panda_link2",), ("panda_link3",), ("panda_link4",), ("panda_link5",), ("panda_link6",),
         ("panda_link7", "panda_link8", "panda_hand", "panda_hand_tcp"),
     ]  # fmt: skip
-
-
-def test_links_of_the_paper_s_skin_are_found(panda_model, moving_arm, paper_skin):
-    found = calibrate(panda_model, moving_arm.data(paper_skin, links_known=False))
-    assert [unit.place.link for unit in found.units] == [unit.link for unit in paper_skin.units]
 
 
 def test_the_user_s_choice_among_links_fixed_to_each_other_stays(panda_model, moving_arm, paper_skin):
@@ -75,9 +68,7 @@ def test_a_unit_on_a_link_that_did_not_move_never_moved(panda_model, whole_skin)
 
 
 def test_data_of_another_motion_fit_no_link(panda_model, moving_arm, good):
-    q = good.joints.q[::-1]
-    other = CalibrationData(type(good.joints)(good.joints.stamp, q), good.units)
-    for unit in calibrate(panda_model, other).units:
+    for unit in calibrate(panda_model, joints(good, q=good.joints.q[::-1])).units:
         assert [(finding.kind, finding.refused) for finding in unit.findings] == [("no_link", True)]
         assert unit.place is None
 
@@ -92,10 +83,6 @@ def test_links_fixed_to_each_other_are_told_apart_by_where_the_unit_sits_and_loo
     assert np.mean(right) > 0.8
 
 
-def kinds(units):
-    return {unit.id: [(finding.kind, finding.refused) for finding in unit.findings] for unit in units if unit.findings}
-
-
 def shaken(data, unit, share, arm):
     """A unit on the table, which turns by a share of what the first link does."""
     imu = unit_of(data, unit).imu
@@ -103,8 +90,7 @@ def shaken(data, unit, share, arm):
     turning = share * np.interp(imu.stamp, arm.time, np.gradient(arm.q[:, 0], arm.time))[:, None] * [0.0, 0.0, 1.0]
     w = turning + 0.002 * rng.standard_normal((len(imu.stamp), 3))
     felt = [0.1, -0.2, 9.8] + 0.015 * rng.standard_normal((len(imu.stamp), 3))
-    other = replace(unit_of(data, unit), imu=ImuTrace(imu.stamp, felt, w))
-    return replace(data, units=tuple(other if one.id == unit else one for one in data.units))
+    return changed(data, unit, acceleration=felt, angular_velocity=w)
 
 
 @pytest.mark.parametrize("share", [0.06, 0.2])
@@ -116,10 +102,7 @@ def test_a_unit_on_a_table_that_the_arm_shakes_does_not_sit_on_the_arm(panda_mod
 
 def test_a_clock_is_not_judged_from_what_is_too_little(panda_model, good):
     imu = good.units[0].imu
-    late = imu.stamp > 8.0
-    trace = ImuTrace(imu.stamp[late] + 100.0, imu.acceleration[late], imu.angular_velocity[late])
-    early = good.joints.stamp < 20.0
-    joints = JointTrace(good.joints.stamp[early], good.joints.q[early])
-    data = CalibrationData(joints, (replace(good.units[0], imu=trace),))
+    late = kept(replace(imu, stamp=imu.stamp + 100.0), imu.stamp > 8.0)
+    data = cut(traced(good, "on_panda_link4", late), good.joints.stamp < 20.0)
     unit = calibrate(panda_model, data, CalibrationParams(shortest_s=15.0)).units[0]
-    assert kinds([unit]) == {unit.id: [("too_little", True)]}
+    assert [(finding.kind, finding.refused) for finding in unit.findings] == [("too_little", True)]

@@ -28,16 +28,8 @@ def test_the_accelerations_noise_is_told_from_the_positions(panda_model, rate):
     assert found == pytest.approx(acceleration.std(axis=0), rel=0.3)
 
 
-class _Timid(MovingArm):
-    """An arm that moves by 3 degrees."""
-
-    def _at(self, time):
-        self._amplitude = np.full(7, 0.05)
-        return super()._at(time)
-
-
 def test_a_weak_motion_and_noisy_joints_give_no_place_that_is_said_to_be_sure(panda_model, whole_skin):
-    arm = _Timid(panda_model, 40.0)
+    arm = MovingArm(panda_model, 40.0, swings=(0.05,) * 7)  # 3 degrees
     found = calibrate(panda_model, arm.data(whole_skin, noise=Noise(joints=1e-4)))
     errors = [
         np.linalg.norm(pose_error(true.T_link_sensor, unit.place.T_link_sensor)[3:])

@@ -1,10 +1,9 @@
-"""Link motions against finite differences of where points are, and against MuJoCo."""
+"""Link motions against finite differences of where points are."""
 
-import mujoco
 import numpy as np
 import pytest
 
-from pretouch.calibration.link_motion import ArmMotion, skew
+from pretouch.calibration.link_motion import ArmMotion
 from pretouch.calibration.params import CalibrationParams
 from pretouch.traces import JointTrace
 
@@ -60,23 +59,6 @@ def test_a_point_of_a_link_moves_as_its_motion_says(arm, panda_model, link):
         assert motion.R_link_base[i] == pytest.approx(R.T, abs=1e-4)
 
 
-def test_angular_accelerations_are_those_of_mujoco(arm, panda_model):
-    model = mujoco.MjModel.from_xml_path(str(panda_model.description.mjcf))
-    data = mujoco.MjData(model)
-    for i in np.flatnonzero(arm.usable)[::25]:
-        q, qd, qdd = (x[0] for x in swing(panda_model, arm.time[i : i + 1]))
-        data.qpos[:7], data.qvel[:7], data.qacc[:7] = q, qd, qdd
-        mujoco.mj_inverse(model, data)
-        mujoco.mj_rnePostConstraint(model, data)
-        for link in ("panda_link3", "panda_hand"):
-            index = panda_model.link_index(link)
-            six = np.zeros(6)
-            mujoco.mj_objectAcceleration(model, data, mujoco.mjtObj.mjOBJ_XBODY, index, six, 1)
-            motion = arm.link(index)
-            assert motion.alpha[i] == pytest.approx(six[:3], abs=2e-2)
-            assert motion.a[i] + 9.81 * motion.R_link_base[i, :, 2] == pytest.approx(six[3:], abs=1e-2)
-
-
 def test_gaps_in_joint_positions_are_not_used(panda_model):
     time = np.arange(0, 8.0, 0.001)
     time = time[(time < 3.0) | (time > 3.4)]
@@ -94,9 +76,3 @@ def test_a_hundred_positions_a_second_are_enough(panda_model, arm):
     hand = panda_model.link_index("panda_hand")
     difference = slow.link(hand).a[both] - arm.link(hand).a[: len(slow.time)][both]
     assert np.abs(difference).max() < 1e-3
-
-
-def test_skew_is_the_cross_product():
-    rng = np.random.default_rng(0)
-    a, b = rng.normal(size=(2, 5, 3))
-    assert np.einsum("nij,nj->ni", skew(a), b) == pytest.approx(np.cross(a, b))

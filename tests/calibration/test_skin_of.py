@@ -1,6 +1,7 @@
 """From a calibration to a skin file."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -62,15 +63,10 @@ def test_without_any_unit_there_is_no_skin(panda_model, good):
         skin_of(found, panda_model)
 
 
-class _Anywhere(Skin):
-    def __init__(self, units):
-        self.units = tuple(units)
-
-
 def test_a_unit_a_little_inside_its_capsule_is_moved_out_and_less_certain(panda_model, moving_arm, pair):
     true = pair.units[0]
     deep = turned(true, np.zeros(3), -0.011 * true.T_link_sensor[:3, 2])
-    found = calibrate(panda_model, moving_arm.data(_Anywhere([deep])))
+    found = calibrate(panda_model, moving_arm.data(SimpleNamespace(units=(deep,))))
     (finding,) = found.units[0].findings
     assert (finding.kind, finding.refused) == ("inside", False)
     assert "3.0 mm inside the capsules" in finding.sentence
@@ -82,7 +78,7 @@ def test_a_unit_a_little_inside_its_capsule_is_moved_out_and_less_certain(panda_
 def test_a_unit_deep_inside_its_capsule_is_refused(panda_model, moving_arm, pair):
     true = pair.units[0]
     deep = turned(true, np.zeros(3), -0.04 * true.T_link_sensor[:3, 2])
-    (unit,) = calibrate(panda_model, moving_arm.data(_Anywhere([deep]))).units
+    (unit,) = calibrate(panda_model, moving_arm.data(SimpleNamespace(units=(deep,)))).units
     assert [(finding.kind, finding.refused) for finding in unit.findings] == [("inside", True)]
 
 
