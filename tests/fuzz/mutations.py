@@ -29,34 +29,18 @@ class Change:
     def of(self, data: bytes, words: Sequence[bytes]) -> bytes:
         """Return changed bytes."""
         a, b = sorted((int(self.begin * len(data)), int(self.end * len(data))))
-        match self.kind:
-            case "flip" if data:
-                at = min(a, len(data) - 1)
-                return data[:at] + bytes([data[at] ^ 1 << self.number % 8]) + data[at + 1 :]
-            case "set":
-                value = _BYTES[self.number % len(_BYTES)]
-                return data[:a] + value + data[a + len(value) :]
-            case "cut":
-                return data[:a] + data[b:]
-            case "end":
-                return data[:a]
-            case "repeat":
-                return data[:b] + data[a:b] * (1 + self.number % 40) + data[b:]
-            case "word":
-                return data[:a] + words[self.number % len(words)] + data[a:]
-            case "number":
-                return self._number(data)
-            case "swap":
-                middle = (a + b) // 2
-                return data[:a] + data[middle:b] + data[a:middle] + data[b:]
-        return data
-
-    def _number(self, data: bytes) -> bytes:
-        there = list(_NUMBER.finditer(data))
-        if not there:
-            return data
-        found = there[int(self.begin * (len(there) - 1))]
-        return data[: found.start()] + _NUMBERS[self.number % len(_NUMBERS)] + data[found.end() :]
+        there = list(_NUMBER.finditer(data)) if self.kind == "number" else []
+        if there:
+            a, b = there[int(self.begin * (len(there) - 1))].span()
+        else:
+            b = {"word": a, "end": len(data), "flip": a + 1}.get(self.kind, b)
+        pieces = {
+            "flip": [bytes([byte ^ 1 << self.number % 8 for byte in data[a:b]])], "set": _BYTES, "word": words,
+            "number": _NUMBERS, "repeat": [data[a:b] * (2 + self.number % 40)],
+            "swap": [data[(a + b) // 2 : b] + data[a : (a + b) // 2]],
+        }.get(self.kind, [b""])  # fmt: skip
+        piece = pieces[self.number % len(pieces)]
+        return data[:a] + piece + data[a + len(piece) if self.kind == "set" else b :]
 
 
 _KINDS = ("flip", "set", "cut", "end", "repeat", "word", "number", "swap")

@@ -66,8 +66,8 @@ def parsers(folder: Path) -> Iterator[dict[str, Parser]]:
     model = RobotModel(panda())
     recorded_run(folder / "whole.mcap", controller_of(model, paper_skin(model)), 8)
     found = {
-        "recording": _of_file(folder, "a.mcap", [(folder / "whole.mcap").read_bytes()], _read_whole),
-        "recording of units": _of_file(folder, "b.mcap", [_units_recorded(folder / "units.mcap")], read_skin),
+        "recording": _of_file(folder, "a.mcap", _read_whole, (folder / "whole.mcap").read_bytes()),
+        "recording of units": _of_file(folder, "b.mcap", read_skin, _units_recorded(folder / "units.mcap")),
         **_of_tables(folder, model),
         **_of_robots(folder),
         **_of_tomls(folder, model),
@@ -84,8 +84,8 @@ _HUGE = b"1" + 400 * b"0"
 """A whole number that no float holds."""
 
 
-def _of_file(folder: Path, name: str, corpus: list[bytes], read: Callable[[Path], object]) -> Parser:
-    return Parser(corpus, _file(folder, name, read))
+def _of_file(folder: Path, name: str, read: Callable[[Path], object], *corpus: bytes) -> Parser:
+    return Parser(list(corpus), _file(folder, name, read))
 
 
 def _units_recorded(place: Path) -> bytes:
@@ -114,17 +114,14 @@ def _of_tables(folder: Path, model: RobotModel) -> dict[str, Parser]:
     columns = {"time_s": np.arange(len(force)) / 100.0} | {f"force_{a}_N": force[:, i] for i, a in enumerate("xyz")}
     torques = Moving(model, 0.3).external_csv(folder / "torques.csv").read_bytes()
     bag = write_bag1(folder / "whole.bag", wrenches(force[:20], store=STORE1)).read_bytes()
+
+    def read_torques(place: Path) -> object:
+        return torque_recording(open_log(place, Choice()).torques(), Choice())
+
     return {
-        "CSV of forces": _of_file(
-            folder,
-            "a.csv",
-            [write_csv(folder / "f.csv", columns).read_bytes()],
-            _read_force,
-        ),
-        "CSV of torques": _of_file(
-            folder, "b.csv", [torques], lambda place: torque_recording(open_log(place, Choice()).torques(), Choice())
-        ),
-        "ROS bag": _of_file(folder, "a.bag", [bag], _read_force),
+        "CSV of forces": _of_file(folder, "a.csv", _read_force, write_csv(folder / "f.csv", columns).read_bytes()),
+        "CSV of torques": _of_file(folder, "b.csv", read_torques, torques),
+        "ROS bag": _of_file(folder, "a.bag", _read_force, bag),
     }
 
 
@@ -142,8 +139,8 @@ def _of_robots(folder: Path) -> dict[str, Parser]:
 
 def _of_tomls(folder: Path, model: RobotModel) -> dict[str, Parser]:
     save_keys(KEYS, folder / "keys.toml")
-    learnt = Residual({"weights": np.zeros((7, 4))}, "panda", 0.0, 1.0)
-    save_residual(folder / "learnt.toml", model, learnt)
+    save_residual(folder / "learnt.toml", model, Residual({"weights": np.zeros((7, 4))}, "panda", 0.0, 1.0))
+    load_learnt = partial(load_residual, model=model, shapes={"weights": (7, 4)})
 
     def keys(place: Path) -> object:
         place.chmod(0o600)
@@ -153,16 +150,11 @@ def _of_tomls(folder: Path, model: RobotModel) -> dict[str, Parser]:
     (folder / "described" / panda().mjcf.name).write_bytes(panda().mjcf.read_bytes())
     described, world = description_text(panda()).encode(), (FOLDER / "realistic.toml").read_bytes()
     return {
-        "skin": _of_file(folder, "s.toml", [skin_file(panda()).read_bytes()], partial(load_skin, model=model)),
-        "keys": _of_file(folder, "k.toml", [(folder / "keys.toml").read_bytes()], keys),
-        "world": _of_file(folder, "w.toml", [world, world.replace(b"0.06", _HUGE)], lambda p: world_set(str(p))),
-        "learnt": _of_file(
-            folder,
-            "l.toml",
-            [(folder / "learnt.toml").read_bytes()],
-            partial(load_residual, model=model, shapes={"weights": (7, 4)}),
-        ),
-        "description": _of_file(folder / "described", "robot.toml", [described], load_description),
+        "skin": _of_file(folder, "s.toml", partial(load_skin, model=model), skin_file(panda()).read_bytes()),
+        "keys": _of_file(folder, "k.toml", keys, (folder / "keys.toml").read_bytes()),
+        "world": _of_file(folder, "w.toml", lambda p: world_set(str(p)), world, world.replace(b"0.06", _HUGE)),
+        "learnt": _of_file(folder, "l.toml", load_learnt, (folder / "learnt.toml").read_bytes()),
+        "description": _of_file(folder / "described", "robot.toml", load_description, described),
     }
 
 

@@ -9,14 +9,13 @@ import numpy as np
 import pytest
 from numba.core.registry import CPUDispatcher
 
-from pretouch.control.path import Circle
-from pretouch.controller import Controller, ControllerState
+from pretouch.controller import ControllerState
 from pretouch.errors import PretouchError
-from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import PROFILES
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, Inputs, Mode, RangeReadings, RangeStatus, RobotState
+from tests.following_arm import Arm
 from tests.fuzz.invariants import arrays_of, same
 
 PAPER = PROFILES["paper"]
@@ -24,25 +23,16 @@ SHORT = replace(PAPER, window=replace(PAPER.window, samples=5))
 NUMBERS = ["q", "qd", "q_commanded", "qd_commanded", "wrench", "stamp", "distance"]
 
 
-class Moving:
+class Moving(Arm):
     """An arm on its way, and the inputs of its next step."""
 
     def __init__(self, model: RobotModel, skin: Skin) -> None:
-        self.controller = Controller(model, skin, no_fixtures(), Circle(), SHORT)
-        q, qd = model.description.q_ready.copy(), np.zeros(7)
-        self.state = self.controller.init(self.inputs(0.0, q, qd).robot)
-        for i in range(30):
-            step, self.state = self.controller.step(self.state, self.inputs(i * 0.01, q, qd))
-            qd, q = step.command, q + step.command * 0.01
-        self.last = step
-        self.next = self.inputs(0.3, q, qd)
+        super().__init__(model, skin, SHORT)
+        felt, seen = (0.5, 0.5, 0.5), dict.fromkeys(range(7), 0.5)
+        self.last = self.run(30, force=felt, seen=seen)[-1]
+        self.next = Inputs(self.time, self.robot(felt), self.readings(seen))
 
-    @staticmethod
-    def inputs(time: float, q: np.ndarray, qd: np.ndarray) -> Inputs:
-        readings = RangeReadings(np.full(7, time), np.full(7, 0.5), np.zeros(7, np.int64))
-        return Inputs(time, RobotState(time, q, qd, q.copy(), qd.copy(), np.zeros(7), np.full(6, 0.5)), readings)
-
-    def step(self, inputs: Inputs) -> tuple[ControlStep, ControllerState]:
+    def given(self, inputs: Inputs) -> tuple[ControlStep, ControllerState]:
         return self.controller.step(self.state, inputs)
 
 
@@ -93,9 +83,9 @@ def compiled_versions() -> int:
     ],
 )
 def test_another_type_or_layout_gives_the_same_and_compiles_nothing(moving: Moving, change, names):
-    expected = moving.step(moving.next)
+    expected = moving.given(moving.next)
     before = compiled_versions()
-    answer = moving.step(changed(moving.next, change, names))
+    answer = moving.given(changed(moving.next, change, names))
     # the numbers are the same, and what is published is in float64 of its own
     assert same(answer[0], expected[0])
     assert compiled_versions() == before >= 3  # perception, thresholds, motion
@@ -104,7 +94,7 @@ def test_another_type_or_layout_gives_the_same_and_compiles_nothing(moving: Movi
 def test_whole_and_short_numbers_are_numbers(moving: Moving):
     before = compiled_versions()
     for kind in (np.float32, np.float16, np.int64, bool):
-        step, _ = moving.step(changed(moving.next, lambda a, kind=kind: a.astype(kind), NUMBERS))
+        step, _ = moving.given(changed(moving.next, lambda a, kind=kind: a.astype(kind), NUMBERS))
         assert np.isfinite(step.command).all()
         assert {a.dtype for _, a in arrays_of(step)} <= {np.dtype(t) for t in (np.float64, np.int64, np.bool_)}
     assert compiled_versions() == before
@@ -112,7 +102,7 @@ def test_whole_and_short_numbers_are_numbers(moving: Moving):
 
 def test_a_driver_may_use_its_buffers_again(moving: Moving):
     inputs = deepcopy(moving.next)
-    step, state = moving.step(inputs)
+    step, state = moving.given(inputs)
     kept = deepcopy((step, state))
     for name, array in arrays_of(inputs.robot) + arrays_of(inputs.readings):
         if name != "tau_ext":
@@ -122,7 +112,7 @@ def test_a_driver_may_use_its_buffers_again(moving: Moving):
         if name != "watch":
             assert same(getattr(state, name), getattr(kept[1], name)), name
     assert same(replace(state.watch.robot, tau_ext=np.zeros(7)), replace(kept[1].watch.robot, tau_ext=np.zeros(7)))
-    assert same(moving.step(moving.next)[0], kept[0])
+    assert same(moving.given(moving.next)[0], kept[0])
 
 
 def test_a_window_that_fills_keeps_no_buffer(panda_model, paper_skin):
@@ -155,7 +145,7 @@ def assert_held(moving: Moving, step: ControlStep) -> None:
 @pytest.mark.parametrize("part", ["q", "qd", "q_commanded", "qd_commanded", "wrench"])
 def test_a_robot_state_of_the_wrong_shape_is_refused(moving: Moving, part: str, change):
     inputs = changed(moving.next, change, [part])
-    step, state = moving.step(inputs)
+    step, state = moving.given(inputs)
     assert_held(moving, step)
     assert state.mode.latched
     assert str(np.shape(getattr(inputs.robot, part))) in step.reason
@@ -167,7 +157,7 @@ def test_a_robot_state_of_the_wrong_shape_is_refused(moving: Moving, part: str, 
 @pytest.mark.parametrize("parts", [["stamp"], ["distance"], ["status"], ["stamp", "distance", "status"]])
 def test_readings_that_do_not_fit_the_skin_are_refused(moving: Moving, parts: list[str], change):
     inputs = changed(moving.next, change, parts)
-    step, _ = moving.step(inputs)
+    step, _ = moving.given(inputs)
     assert_held(moving, step)
     assert str(np.shape(getattr(inputs.readings, parts[0]))) in step.reason
     assert step.range_distance.shape == (7,)
@@ -176,12 +166,12 @@ def test_readings_that_do_not_fit_the_skin_are_refused(moving: Moving, parts: li
 @pytest.mark.parametrize("wrong", [None, "far", ["far"] * 7, [[1.0], [2.0, 3.0]], [10**400] * 7, [1j] * 7])
 @pytest.mark.parametrize("part", ["q", "qd_commanded", "stamp", "distance", "status"])
 def test_what_is_no_array_of_numbers_is_refused(moving: Moving, part: str, wrong: object):
-    step, _ = moving.step(changed(moving.next, lambda a: wrong, [part]))
+    step, _ = moving.given(changed(moving.next, lambda a: wrong, [part]))
     assert_held(moving, step)
 
 
 @pytest.mark.parametrize("status", [np.full(7, 0.5), np.full(7, np.nan), np.array([RangeStatus.OK] * 7, dtype=object)])
 def test_statuses_that_are_no_whole_numbers_are_refused(moving: Moving, status: np.ndarray):
-    step, _ = moving.step(changed(moving.next, lambda a: status, ["status"]))
+    step, _ = moving.given(changed(moving.next, lambda a: status, ["status"]))
     assert_held(moving, step)
     assert "status" in step.reason

@@ -16,6 +16,7 @@ from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin
 from pretouch.types import Inputs, RangeReadings, RangeStatus
 from tests.fuzz.machine import Course, Machine
+from tests.fuzz.oracle import Oracle
 from tests.fuzz.weather import STATUS
 from tests.fuzz.worlds import World
 
@@ -60,16 +61,6 @@ readings = st.tuples(
 wrenches = st.none() | st.lists(st.one_of(st.floats(-80, 80), st.floats()), min_size=6, max_size=6).map(np.array)
 
 
-def course(profile: Profile, q: np.ndarray, qd: np.ndarray) -> Course:
-    """A controller of an arm in that state."""
-    course = Course(
-        Machine(0), World(MODEL, profile, SKIN, no_fixtures(), Circle(), q, qd, lying=True, measured_off=0.0)
-    )
-    course.time = 100.0
-    course.weather.feel = "calm"
-    return course
-
-
 def calm(course: Course) -> Inputs:
     """No target in view, and nothing felt."""
     robot = replace(course.robot(), wrench=np.zeros(6))
@@ -78,10 +69,12 @@ def calm(course: Course) -> Inputs:
 
 
 def begun(profile: Profile, q: np.ndarray, qd: np.ndarray) -> Course:
-    """The same after some calm steps: past the filling of its window, and on the move if it may."""
-    a = course(profile, q, qd)
-    a.state = a.controller.init(calm(a).robot)
-    a.oracle = type(a.oracle)(profile, SKIN.ids, calm(a).robot, a.oracle.qd_max)
+    """An arm that was in that state, after some calm steps: past the filling of its window, on the move if it may."""
+    world = World(MODEL, profile, SKIN, no_fixtures(), Circle(), q, qd, lying=True, measured_off=0.0)
+    a = Course(Machine(0), world)
+    a.time, a.weather.feel = 100.0, "calm"
+    robot = calm(a).robot
+    a.state, a.oracle = a.controller.init(robot), Oracle(profile, SKIN.ids, robot, MODEL.description.qd_max)
     for _ in range(6):
         a.step(calm(a), deep=False)
     return a

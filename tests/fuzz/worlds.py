@@ -3,6 +3,7 @@
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from pretouch.contact.admittance import Admittance
 from pretouch.contact.decaying_velocity import DecayingVelocity
@@ -31,7 +32,7 @@ from pretouch.profiles import Profile, profile
 from pretouch.robot.body import Capsules
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, paper_skin
-from pretouch.sensing.unit import SensorUnit
+from tests.reference.skins import spread
 
 # for each parameter its usual value and values far to both sides; what a check bounds, up to the bound
 CHOICES: dict[type, dict[str, tuple[object, ...]]] = {
@@ -189,40 +190,13 @@ def any_skin(rng: np.random.Generator, model: RobotModel) -> Skin:
         return paper_skin(model)
     count = int(rng.choice([0, 1, 7, 7, 32]))
     worst = np.array([(0.0, 0.0), (0.0, 0.0), (0.01, 0.05), (0.5, 1.5)])[rng.integers(4)]
-    units = [_unit(rng, model, f"u{i}") for i in range(count)]
-    sigmas = worst * rng.random((count, 2))
-    unsure = [replace(u, position_sigma=p, orientation_sigma=o) for u, (p, o) in zip(units, sigmas, strict=True)]
-    return Skin(unsure, model)
-
-
-def _unit(rng: np.random.Generator, model: RobotModel, name: str) -> SensorUnit:
-    while True:
-        c = int(rng.integers(len(model.capsules)))
-        link = int(model.capsules.link[c])
-        a, b, radius = model.capsules.a[c], model.capsules.b[c], model.capsules.radius[c]
-        out = np.cross(b - a if np.any(b != a) else rng.normal(size=3), rng.normal(size=3))
-        out /= np.linalg.norm(out)
-        place = a + rng.random() * (b - a) + (radius + 0.005) * out
-        own = model.capsules.of_links(np.array([link]))
-        if link and all(_height(place, own, i) > 0 for i in range(len(own))):
-            break
-    looks = {0: out, 1: rng.normal(size=3), 2: -out}[int(rng.choice([0, 0, 1, 2]))]
-    T = np.eye(4)
-    T[:3, :3], T[:3, 3] = _frame(looks / np.linalg.norm(looks)), place
-    return SensorUnit(name, model.links[link], T)
-
-
-def _height(p: np.ndarray, capsules: Capsules, i: int) -> float:
-    a, b = capsules.a[i], capsules.b[i]
-    along = np.clip((p - a) @ (b - a) / max((b - a) @ (b - a), 1e-12), 0.0, 1.0)
-    return float(np.linalg.norm(p - a - along * (b - a)) - capsules.radius[i])
-
-
-def _frame(z: np.ndarray) -> np.ndarray:
-    """Some rotation whose third column is z."""
-    x = np.cross(z, np.eye(3)[int(np.argmin(np.abs(z)))])
-    x /= np.linalg.norm(x)
-    return np.column_stack([x, np.cross(z, x), z])
+    units = []
+    for unit in spread(model, count, int(rng.integers(1 << 31))).units:
+        T, (p, o) = unit.T_link_sensor.copy(), worst * rng.random(2)
+        looks = {0: np.eye(3), 1: Rotation.random(rng=rng).as_matrix(), 2: np.diag([1.0, -1.0, -1.0])}
+        T[:3, :3] = T[:3, :3] @ looks[int(rng.choice([0, 0, 1, 2]))]
+        units.append(replace(unit, T_link_sensor=T, position_sigma=p, orientation_sigma=o))
+    return Skin(units, model)
 
 
 def any_fixtures(rng: np.random.Generator) -> Fixtures:
