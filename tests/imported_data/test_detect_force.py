@@ -1,4 +1,4 @@
-"""Thresholds on a recorded force, held against the plain one of `tests.reference` and against the controller itself."""
+"""Thresholds on a recorded force, held against the controller itself."""
 
 from dataclasses import replace
 
@@ -13,9 +13,8 @@ from pretouch.imported_data.reading import open_log
 from pretouch.profiles import PROFILES, at_rate, profile
 from tests.following_arm import Arm
 from tests.imported_data.files import PUSHES, force_columns, pushed, write_csv
-from tests.reference.contact import Touch
 
-PAPER, BLIND = PROFILES["paper"], PROFILES["blind"]
+PAPER = PROFILES["paper"]
 
 
 def read(file):
@@ -32,54 +31,40 @@ def decided(recording, p):
     return detect_force(recording, p).decisions
 
 
-def expected(force, p):
-    """What the plain detector finds in samples, one a cycle: (cycle, force) of each contact, and all thresholds."""
-    touch, nothing = Touch(p.detect, p.window), type("Nothing", (), {"point": ()})()
-    contacts, limits, busy_until = [], [], -1
-    for cycle, sample in enumerate(force):
-        there = sample if np.isfinite(sample).all() else None
-        thresholds, contact, _ = touch.feel(there, np.zeros(3), nothing)
-        limits.append(thresholds)
-        if contact is not None and cycle > busy_until:
-            contacts.append((cycle, contact.force, contact.axes))
-            busy_until = cycle + p.react.decay_cycles
-    return contacts, limits
+@pytest.fixture
+def controlled(panda_model, paper_skin):
+    """Give forces to a controller, one a cycle; return its steps, and the cycles in which a contact is found."""
+
+    def run(force, p):
+        arm = Arm(panda_model, paper_skin, p)
+        steps = [arm.step(tuple(sample)) for sample in force]
+        return steps, [i for i, step in enumerate(steps) if step.contact is not None]
+
+    return run
 
 
-@pytest.mark.parametrize("name", ["paper", "paper:detect.compare=raw", "blind:window.samples=150"])
-def test_contacts_and_thresholds_are_those_of_the_plain_detector(of_force, name):
-    force, p = pushed(14.0, PUSHES), profile(name)
-    found = decided(of_force(force), p)
-    contacts, limits = expected(force, p)
-    assert len(contacts) == 3
-    assert [c.time for c in found.contacts] == pytest.approx([0.005 + cycle / 100 for cycle, *_ in contacts])
-    for contact, (_, there, axes) in zip(found.contacts, contacts, strict=True):
-        np.testing.assert_allclose(contact.force, there, atol=1e-9)
-        np.testing.assert_array_equal(contact.axes, axes)
-    np.testing.assert_allclose(found.upper, [t.upper for t in limits], atol=1e-9)
-    np.testing.assert_allclose(found.lower, [t.lower for t in limits], atol=1e-9)
+LASTS = ((2.0, 4.0, (0.0, 60.0, 0.0)),)
+"""A push that is found again after each reaction."""
+
+
+@pytest.mark.parametrize(
+    ("name", "pushes"),
+    [
+        ("paper", PUSHES), ("blind", PUSHES), ("paper:detect.compare=raw", PUSHES),
+        ("blind:window.samples=150", PUSHES), ("paper:react.decay_cycles=20", LASTS),
+    ],
+)  # fmt: skip
+def test_a_controller_given_the_same_forces_decides_the_same(of_force, controlled, name, pushes):
+    force, p = pushed(14.0, pushes), profile(name)
+    found, (steps, cycles) = decided(of_force(force), p), controlled(force, p)
+    assert len(cycles) >= 3
+    assert [round((c.time - 0.005) * 100) for c in found.contacts] == cycles
+    for contact, cycle in zip(found.contacts, cycles, strict=True):
+        np.testing.assert_array_equal(contact.force, steps[cycle].contact.force)
+        np.testing.assert_array_equal(contact.axes, steps[cycle].contact.axes)
     np.testing.assert_array_equal(found.force, force)
-
-
-def test_a_push_that_lasts_is_found_again_after_each_reaction_as_by_the_plain_detector(of_force):
-    p = profile("paper:react.decay_cycles=20")
-    force = pushed(8.0, ((2.0, 4.0, (0.0, 60.0, 0.0)),))
-    found, (contacts, _) = decided(of_force(force), p), expected(force, p)
-    assert len(contacts) > 2
-    assert [c.time for c in found.contacts] == pytest.approx([0.005 + cycle / 100 for cycle, *_ in contacts])
-
-
-def test_a_controller_given_the_same_forces_decides_the_same(of_force, panda_model, paper_skin):
-    force = pushed(10.0, PUSHES)
-    arm = Arm(panda_model, paper_skin, BLIND)
-    steps = [arm.step(tuple(sample)) for sample in force]
-    found = decided(of_force(force), BLIND)
-    reactions = [(i, s.contact.force) for i, s in enumerate(steps) if s.contact is not None]
-    assert len(reactions) == 2
-    assert [round((c.time - 0.005) * 100) for c in found.contacts] == [i for i, _ in reactions]
-    for contact, (_, there) in zip(found.contacts, reactions, strict=True):
-        np.testing.assert_array_equal(contact.force, there)
     np.testing.assert_array_equal(found.upper, [s.thresholds.upper for s in steps])
+    np.testing.assert_array_equal(found.lower, [s.thresholds.lower for s in steps])
     np.testing.assert_array_equal(found.reacting, [s.mode.value == "react" for s in steps])
     np.testing.assert_array_equal(found.armed, [s.armed for s in steps])
 
@@ -98,7 +83,7 @@ def test_of_faster_data_the_newest_sample_of_each_cycle_is_taken(of_force):
     np.testing.assert_array_equal(found.force, force[::10])
 
 
-def test_slower_data_are_held_and_the_way_out_is_named(of_force):
+def test_slower_data_are_held_and_the_way_out_is_named(of_force, controlled):
     force = pushed(14.0, PUSHES, rate=25.0)
     imported = of_force(force, 25.0)
     found = decided(imported, PAPER)
@@ -108,8 +93,7 @@ def test_slower_data_are_held_and_the_way_out_is_named(of_force):
     assert (note.code, note.values["rate"], note.values["own"]) == ("slower", pytest.approx(25.0), 100.0)
     slow = at_rate(PAPER, 25.0)
     found = decided(imported, slow)
-    contacts, _ = expected(force, slow)
-    assert [c.time for c in found.contacts] == pytest.approx([0.02 + cycle / 25 for cycle, *_ in contacts])
+    assert [c.time for c in found.contacts] == pytest.approx([0.02 + i / 25 for i in controlled(force, slow)[1]])
     assert detect_force(imported, slow).notes == ()
 
 

@@ -146,50 +146,6 @@ def test_what_is_wrong_is_said_in_one_sentence(tmp_path, text, words):
     assert "a.csv" in str(error.value)
 
 
-def changed(**names):
-    """The columns of a table of joints with some of them renamed or (None) left out."""
-    columns = table()
-    for name, given_as in names.items():
-        column = columns.pop(name)
-        if given_as is not None:
-            columns |= {given_as: column} if isinstance(given_as, str) else {name: given_as}
-    return columns
-
-
-@pytest.mark.parametrize(
-    ("columns", "words"),
-    [
-        (changed(time_s=None), "but not time_s: name them so"),
-        (changed(time_s="time"), "'time' of .* has no unit: write time_s or time_ms"),
-        (changed() | {"time_ms": np.zeros(50)}, "has two columns of one thing, 'time_s' and 'time_ms'"),
-        (changed(q4_rad=None), "names the joints 'q1', 'q2', 'q3', 'q5'.* not the 7 joints of panda"),
-        (changed(q4_rad="q4"), "'q4' of .* has no unit: write q4_rad or q4_deg"),
-        (changed(q4_rad="q4_ms"), "'q4_ms' of .* has the unit 'ms': write q4_rad or q4_deg"),
-        (changed() | {"q4_deg": np.zeros(50)}, "has two columns of one thing, 'q4_rad' and 'q4_deg'"),
-        (changed(q4_rad=np.degrees(MOVING[:, 3])), r"panda_joint4 in .* is at -131.8 rad, out of its range"),
-        (changed(q4_rad=np.full(50, np.nan)), "has 50 samples, and 0 of them are usable"),
-        (changed(time_s=np.full(50, 3.0)), "has 50 samples, and 1 of them is usable"),
-        (changed(time_s=np.tile(np.arange(25) / 10, 2)), "line 27: the time goes back by 2.4 s: give one recording"),
-        ({"time_s": np.arange(50.0), "x": np.zeros(50)}, r"has the columns 'time_s', 'x', but not q1_rad \.\.\.: name"),
-    ],
-)
-def test_what_is_wrong_with_joints_is_said_in_one_sentence(tmp_path, panda_model, columns, words):
-    with pytest.raises(RecordingError, match=words) as error:
-        read_joints(write_csv(tmp_path / "a.csv", columns), panda_model)
-    assert "\n" not in str(error.value)
-    assert "a.csv" in str(error.value)
-
-
-def test_a_parquet_file_gives_the_joints_that_a_csv_file_does(tmp_path, panda_model):
-    time = np.arange(50) / 100.0
-    columns = {"time_s": time} | {f"q{j + 1}_deg": np.rad2deg(Q[j] + 0.1 * time) for j in range(7)}
-    parquet.write_table(pa.table(columns), tmp_path / "a.parquet")
-    files = write_csv(tmp_path / "a.csv", columns), tmp_path / "a.parquet"
-    one, other = (read_joints(file, panda_model)[0] for file in files)
-    np.testing.assert_allclose(other.stamp, one.stamp, atol=1e-9)
-    np.testing.assert_allclose(other.q, one.q, atol=1e-9)
-
-
 def test_of_a_column_of_long_lists_only_the_first_places_are_columns(tmp_path, panda_model):
     columns = {"time_s": [0.0, 0.01], "q": [np.append(Q, np.zeros(100_000))] * 2}
     parquet.write_table(pa.table(columns), tmp_path / "a.parquet")

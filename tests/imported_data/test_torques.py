@@ -198,6 +198,8 @@ def test_a_mapping_that_is_wrong_is_one_sentence(tmp_path, short, columns, error
         (lambda c: c.pop("tau_ext3_Nm"), {}, "has tau_ext of q1, q2, q4, q5, q6, q7, but of q1, q2, q3"),
         (lambda c: [c.pop(name) for name in list(c) if "7_" in name], {}, "which are not the 7 joints of panda"),
         (lambda c: c.update(tau_ext1=c.pop("tau_ext1_Nm")), {}, "'tau_ext1' .* has no unit: write tau_ext1_Nm or"),
+        (lambda c: [c.pop(name) for name in list(c) if name[0] == "q"], {}, r"but not q1_rad \.\.\.: name"),
+        (lambda c: c.update(q4_ms=c.pop("q4_rad")), {}, "'q4_ms' of .* has the unit 'ms': write q4_rad or q4_deg"),
         (lambda c: c.pop("time_s"), {}, "but not time_s: name them so"),
         (lambda c: c.update(time_s=50 * c["time_s"]), {}, "come at 10 Hz: record at 40 Hz or more"),
         (lambda c: c.update(time_s=np.zeros_like(c["time_s"])), {}, "and 1 of them is usable"),
