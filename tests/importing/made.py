@@ -29,10 +29,6 @@ def joint(name, parent, child, kind="revolute", axis="0 0 1", xyz="0 0 0.2", rpy
     )
 
 
-STRONG = '<limit lower="-2.8" upper="2.8" velocity="2" effort="120"/>'
-"""Limits of joints that hold such an arm outstretched."""
-
-
 _AXES = ("0 0 1", "0 1 0", "0 1 0", "0 0 1", "0 1 0", "0 0 1")
 _LENGTHS = (0.0, 0.2, 0.25, 0.35, 0.25, 0.25, 0.25)
 
@@ -49,25 +45,12 @@ def six_axis(tail="", changed=None):
     return f'<robot name="sixer">{"".join(parts)}{tail}</robot>'
 
 
-def seven_axis():
-    """An arm of seven joints: the six of `six_axis`, and one along the upper arm."""
-    axes = ("0 0 1", "0 1 0", "0 0 1", "0 1 0", "0 0 1", "0 1 0", "0 0 1")
-    lengths = (0.3, 0.05, 0.35, 0.05, 0.3, 0.1, 0.1)
-    can = '<geometry><cylinder radius="0.05" length="0.08"/></geometry>'
-    parts = [link("base", BOX)]
-    for k, (axis, length) in enumerate(zip(axes, lengths, strict=True), 1):
-        parts.append(link(f"link{k}", can))
-        parts.append(joint(f"joint{k}", f"link{k - 1}" if k > 1 else "base", f"link{k}", axis=axis, xyz=f"0 0 {length}",
-                           limit=STRONG))  # fmt: skip
-    return f'<robot name="sevener">{"".join(parts)}</robot>'
-
-
-def small(what="collision"):
+def small():
     """An arm of six joints whose links are 0.2 m long: all of its singular values are small."""
     can = '<geometry><cylinder radius="0.04" length="0.2"/></geometry>'
-    parts = [link("base", can, what=what)]
+    parts = [link("base", can)]
     for k, axis in enumerate(("0 0 1", "0 1 0", "0 1 0", "1 0 0", "0 1 0", "0 0 1"), 1):
-        parts += [link(f"l{k}", can, what=what), joint(f"j{k}", f"l{k - 1}" if k > 1 else "base", f"l{k}", axis=axis)]
+        parts += [link(f"l{k}", can), joint(f"j{k}", f"l{k - 1}" if k > 1 else "base", f"l{k}", axis=axis)]
     return f'<robot name="small">{"".join(parts)}</robot>'
 
 

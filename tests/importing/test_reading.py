@@ -24,7 +24,6 @@ def arm(folder, text, ee=""):
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ("", "is not valid XML"),
         ("<robot", "is not valid XML"),
         ("<sdf/>", "starts with <sdf>: give a URDF"),
         (
@@ -48,7 +47,6 @@ def arm(folder, text, ee=""):
         ),
         (six_axis(changed={2: {"kind": "screw"}}), "joint2 is of the type 'screw': choose from revolute"),
         (six_axis(changed={2: {"axis": "0 0 0"}}), "axis too small in joint Element name 'joint2'"),
-        (six_axis(changed={2: {"axis": "0 1"}}), "joint2: xyz of <axis> is '0 1': give 3 finite numbers"),
         (six_axis(changed={2: {"xyz": "0 nan 0"}}), "joint2: xyz of <origin> is '0 nan 0': give 3 finite numbers"),
         (six_axis(changed={2: {"limit": '<limit velocity="1"/>'}}), "joint2 has the range 0 to 0: give it lower"),
         (six_axis(changed={4: {"kind": "prismatic"}}), "joint4 is prismatic, but only hinge .* --ee, such as link3"),
@@ -73,11 +71,6 @@ def test_a_broken_urdf_is_refused_in_one_sentence(tmp_path, text, sentence):
 def test_a_file_that_is_not_there_is_said(tmp_path):
     with pytest.raises(RobotModelError, match=r"nowhere.urdf cannot be read: No such file"):
         read_robot(tmp_path / "nowhere.urdf")
-
-
-def test_an_unknown_end_effector_lists_the_links(tmp_path):
-    with pytest.raises(RobotModelError, match=r"The link 'hand' is unknown: choose from base, link1, .*tool0"):
-        arm(tmp_path, six_axis(), "hand")
 
 
 def test_an_end_effector_that_nothing_moves_is_refused(tmp_path):
@@ -243,8 +236,6 @@ def test_a_package_is_found_in_the_path_given(tmp_path):
 @pytest.mark.parametrize(
     ("name", "content", "sentence"),
     [
-        ("a.stl", b"", "holds no triangle, or is truncated"),
-        ("a.stl", b"\0" * 100, "holds no triangle, or is truncated"),
         ("a.stl", b"\0" * 80 + (2**32 - 1).to_bytes(4, "little") + b"\0" * 50, "holds no triangle, or is truncated"),
         ("a.stl", b"version https://git-lfs.github.com/spec/v1\n", "holds no triangle, or is truncated"),
         ("a.stl", ASCII_STL[:-12].encode(), "holds no triangle, or is truncated"),
