@@ -64,11 +64,3 @@ def test_what_is_not_known_does_not_count():
 def test_nothing_known_is_like_nothing():
     assert align(turning(TIME), ALL, turning(TIME), ~ALL, STEP, 0.5).likeness == 0.0
     assert align(np.zeros((1000, 3)), ALL, turning(TIME), ALL, STEP, 0.5).likeness == 0.0
-
-
-@pytest.mark.parametrize(("length", "late"), [(25.0, -8.0), (200.0, 150.0)])
-def test_two_recordings_of_different_length_are_aligned(length, late):
-    later = np.arange(0, length, STEP)
-    found = align(turning(TIME), ALL, turning(later - late), np.ones(len(later), bool), STEP, np.inf)
-    assert found.late == pytest.approx(late, abs=0.01)
-    assert found.likeness > 0.97

@@ -1,9 +1,7 @@
-"""The least squares: its derivatives, what it finds in exact data, and whether its covariance is honest."""
+"""The least squares: its derivatives, and whether its covariance is honest."""
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from pretouch.calibration.fit import Estimate, Fit, Measured, Problem, fit, start
@@ -15,18 +13,14 @@ NOISE = np.repeat((0.003, 0.02), 3)
 TIME = np.arange(0, 60, 1 / PARAMS.rate_hz)
 
 
-def motion(axes=3, seed=0):
-    """A link that turns about the first so many of its axes, all derivatives exact; up turns with it."""
+def motion(seed=0):
+    """A link that turns, all derivatives exact; up turns with it."""
     rng = np.random.default_rng(seed)
     frequency, phase = rng.uniform(0.2, 0.9, 3), rng.uniform(0, 6, 3)
     angle = 2 * np.pi * frequency * TIME[:, None] + phase
-    on = np.arange(3) < axes
-    w = np.where(on, np.sin(angle), 0.0)
-    alpha = np.where(on, 2 * np.pi * frequency * np.cos(angle), 0.0)
-    a = 0.8 * np.sin(angle[:, ::-1] + 1.0) if axes > 1 else np.zeros_like(w)
-    turned = Rotation.from_rotvec(np.where(on, -np.cos(angle), 0.0)).as_matrix().swapaxes(1, 2)
-    upright = np.eye(3) if axes > 1 else np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-    return LinkMotion(w, a, turned @ upright, alpha)
+    turned = Rotation.from_rotvec(-np.cos(angle)).as_matrix().swapaxes(1, 2)
+    alpha = 2 * np.pi * frequency * np.cos(angle)
+    return LinkMotion(np.sin(angle), 0.8 * np.sin(angle[:, ::-1] + 1.0), turned, alpha)
 
 
 def truth(seed=0, gravity=(0.0, 0.0, 9.81)):
@@ -58,28 +52,6 @@ def test_the_jacobian_is_that_of_finite_differences():
         step = h * (np.arange(23) == k)
         expected = (problem.residuals(x + step) - problem.residuals(x - step)) / (2 * h)
         assert J[:, k] == pytest.approx(expected, rel=1e-5, abs=1e-4)
-
-
-@settings(max_examples=20, deadline=None)
-@given(st.integers(0, 10_000))
-def test_exact_data_give_the_exact_pose(seed):
-    link, true = motion(seed=seed), truth(seed)
-    data = measured(link, true)
-    found = fit(link, data, start(link, data, PARAMS.gravity), NOISE, PARAMS).estimate
-    # the priors on bias, scale and gravity pull by what little they weigh
-    assert found.p == pytest.approx(true.p, abs=2e-4)
-    assert Rotation.from_matrix(found.R.T @ true.R).magnitude() < 2e-4
-    assert found.late == pytest.approx(true.late, abs=2e-4)
-    assert found.angular_velocity_bias == pytest.approx(true.angular_velocity_bias, abs=5e-4)
-
-
-def test_the_closed_form_is_near_enough_to_start_from():
-    for seed in range(20):
-        link, true = motion(seed=seed), truth(seed)
-        found = start(link, measured(link, true, NOISE, seed), PARAMS.gravity)
-        assert np.linalg.norm(found.p - true.p) < 0.02
-        assert Rotation.from_matrix(found.R.T @ true.R).magnitude() < 0.05
-        assert np.linalg.det(found.R) == pytest.approx(1.0)
 
 
 def nees(found: Fit, true: Estimate) -> float:
@@ -120,32 +92,6 @@ def test_the_covariance_counts_errors_that_last():
     fast = measured(link, true, NOISE)
     sigma = [np.trace(fit(link, d, true, NOISE, PARAMS).covariance[3:6, 3:6]) ** 0.5 for d in (fast, lasting)]
     assert sigma[1] > 2.5 * sigma[0]
-
-
-def test_large_differences_count_less_when_robust():
-    link, true = motion(), truth()
-    data = measured(link, true, NOISE)
-    data.values[200:260] += 5.0
-    plain = fit(link, data, true, NOISE, PARAMS).estimate
-    robust = fit(link, data, true, NOISE, PARAMS, robust=True).estimate
-    assert np.linalg.norm(robust.p - true.p) < 0.25 * np.linalg.norm(plain.p - true.p)
-
-
-def test_what_one_upright_axis_does_not_tell_stays_unknown_and_the_rest_is_found():
-    # turns about x, which is also up, as the first link of an arm on a table does
-    link, true = motion(axes=1), truth(2)
-    data = measured(link, true, NOISE)
-    found = fit(link, data, start(link, data, PARAMS.gravity), NOISE, PARAMS)
-    pose = found.covariance[:6, :6]
-    assert np.all(np.isfinite(pose))
-    sigma = np.sqrt(np.linalg.eigvalsh(pose[3:, 3:]))
-    assert sigma[-1] > 0.3, "the height along the axis cannot be known"
-    axis = found.estimate.R.T @ [1.0, 0.0, 0.0]
-    assert np.sqrt(axis @ pose[:3, :3] @ axis) > 0.5, "nor the heading about it"
-    distance = [np.linalg.norm(e.p[1:]) for e in (found.estimate, true)]
-    assert distance[0] == pytest.approx(distance[1], abs=3e-3)
-    tilt = [e.R.T @ [1.0, 0.0, 0.0] for e in (found.estimate, true)]
-    assert tilt[0] == pytest.approx(tilt[1], abs=2e-2)
 
 
 @pytest.mark.parametrize("gravity", [(0.0, 0.0, 9.78), (0.0, 0.0, 9.832), (0.12, -0.08, 9.809)])

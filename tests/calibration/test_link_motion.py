@@ -26,14 +26,6 @@ def arm(panda_model):
     return ArmMotion(panda_model, JointTrace(time, swing(panda_model, time)[0]), PARAMS)
 
 
-def test_joints_come_out_as_they_went_in(arm, panda_model):
-    q, qd, _ = swing(panda_model, arm.time)
-    assert arm.usable.sum() > 100
-    assert arm.q[arm.usable] == pytest.approx(q[arm.usable], abs=1e-4)
-    assert arm.qd[arm.usable] == pytest.approx(qd[arm.usable], abs=5e-4)
-    assert np.diff(arm.time) == pytest.approx(1 / PARAMS.rate_hz)
-
-
 def test_near_the_ends_nothing_is_usable(arm):
     assert not arm.usable[arm.time < 100.25].any()
     assert not arm.usable[arm.time > 105.74].any()
@@ -67,12 +59,3 @@ def test_gaps_in_joint_positions_are_not_used(panda_model):
     assert arm.usable[(arm.time > 2.0) & (arm.time < 2.7)].all()
     q = swing(panda_model, arm.time)[0]
     assert arm.q[arm.usable] == pytest.approx(q[arm.usable], abs=1e-3)
-
-
-def test_a_hundred_positions_a_second_are_enough(panda_model, arm):
-    time = 100.0 + np.arange(0, 6.0, 0.01)
-    slow = ArmMotion(panda_model, JointTrace(time, swing(panda_model, time)[0]), PARAMS)
-    both = arm.usable[: len(slow.time)] & slow.usable
-    hand = panda_model.link_index("panda_hand")
-    difference = slow.link(hand).a[both] - arm.link(hand).a[: len(slow.time)][both]
-    assert np.abs(difference).max() < 1e-3

@@ -31,21 +31,6 @@ def covariance(*free: tuple[np.ndarray, float]) -> np.ndarray:
     return back @ C @ back.T
 
 
-def test_a_pose_that_is_known_leaves_nothing_to_say():
-    known = observability(covariance(), pose(0.1, 0.0, 0.2), AXIS, PARAMS)
-    assert known.unknown == ()
-    assert known.known == ()
-    assert known.position_sigma == pytest.approx([1e-4] * 3)
-    assert known.orientation_sigma == pytest.approx([1e-4] * 3)
-
-
-def test_a_place_along_the_joint_s_axis_is_named_after_the_joint():
-    known = observability(covariance((np.eye(6)[5], 0.3)), pose(0.1, 0.0, 0.2), AXIS, PARAMS)
-    assert known.unknown == ("where it sits along the axis of panda_joint3",)
-    assert known.position_sigma[2] == pytest.approx(0.3, rel=1e-3)
-    assert np.abs(known.position_directions[2]) == pytest.approx([0, 0, 1], abs=1e-6)
-
-
 def test_a_turn_about_the_joint_s_axis_is_seen_through_the_place_that_it_moves():
     T = pose(0.1, 0.0, 0.2)
     about = np.concatenate([AXIS.direction, np.cross(AXIS.direction, T[:3, 3] - AXIS.point)])

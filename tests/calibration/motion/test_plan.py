@@ -1,6 +1,3 @@
-import csv
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -70,14 +67,3 @@ def test_sampling_includes_both_ends_at_no_less_than_the_rate():
     assert (samples.time[0], samples.time[-1]) == (0.0, 12.0)
     assert np.diff(samples.time).max() <= 1 / 7.3
     np.testing.assert_allclose(samples.q[33], plan().at(samples.time[33])[0])
-
-
-def test_the_file_holds_what_another_program_needs_to_play_it(tmp_path: Path):
-    plan().save(tmp_path / "plan.csv", rate=50.0)
-    with (tmp_path / "plan.csv").open(newline="") as file:
-        header, *rows = csv.reader(file)
-    assert header == ["time_s", "q1_rad", "q2_rad", "qd1_rad_s", "qd2_rad_s"]
-    table = np.array(rows, dtype=np.float64)
-    np.testing.assert_allclose(np.diff(table[:, 0]), 0.02, atol=1e-8)
-    q, qd = plan().at(table[321, 0])
-    np.testing.assert_allclose(table[321, 1:], [*q, *qd], atol=1e-8)
