@@ -46,14 +46,25 @@ class Presser:
         return [PointForce(link, at + self.beside * R[:, 0], self.newtons * self.sign * R[:, 2])]
 
 
+@pytest.fixture
+def pressed(panda_model, paper_skin):
+    """Make sensors on an arm of its own, and a force beside the unit."""
+
+    def make(params=EXACT, seed=0, patch=None, **force):
+        plant, skin = plant_of(panda_model), skin_of(paper_skin, panda_model, patch)
+        press = Presser(plant, skin, **{"beside": 0.0, "newtons": 0.0} | force)
+        return plant, TouchSensors(plant, skin, params, seed, press), press
+
+    return make
+
+
 @pytest.mark.parametrize(
     ("beside", "newtons", "sign", "felt"),
     [(0.0, 5.0, -1.0, 5.0), (0.019, 5.0, -1.0, 5.0), (0.021, 5.0, -1.0, 0.0), (0.0, 0.4, -1.0, 0.4),
      (0.0, 5.0, 1.0, 0.0), (0.0, 50.0, -1.0, 10.0)],
 )  # fmt: skip
-def test_a_force_that_is_laid_on_the_patch_is_felt(panda_model, paper_skin, beside, newtons, sign, felt):
-    plant, skin = plant_of(panda_model), skin_of(paper_skin, panda_model)
-    sensors = TouchSensors(plant, skin, EXACT, 0, Presser(plant, skin, beside, newtons, sign))
+def test_a_force_that_is_laid_on_the_patch_is_felt(pressed, beside, newtons, sign, felt):
+    plant, sensors, _ = pressed(beside=beside, newtons=newtons, sign=sign)
     before = sensors.touch()
     assert before.stamp[UNIT] == -np.inf
     assert before.status.tolist() == [TouchStatus.NONE] * 7
@@ -65,10 +76,8 @@ def test_a_force_that_is_laid_on_the_patch_is_felt(panda_model, paper_skin, besi
     assert plant.time - now.stamp[UNIT] <= 0.021
 
 
-def test_a_sensor_of_contact_only_tells_no_force(panda_model, paper_skin):
-    plant = plant_of(panda_model)
-    skin = skin_of(paper_skin, panda_model, TouchPatch(0.02, 0.5, measures_force=False))
-    sensors = TouchSensors(plant, skin, EXACT, 0, Presser(plant, skin, 0.0, 5.0))
+def test_a_sensor_of_contact_only_tells_no_force(pressed):
+    plant, sensors, _ = pressed(patch=TouchPatch(0.02, 0.5, measures_force=False), newtons=5.0)
     plant.advance(0.1)
     assert sensors.touch().contact[UNIT]
     assert np.isnan(sensors.touch().force[UNIT])
@@ -108,11 +117,8 @@ def test_a_hand_that_pushes_on_the_unit_is_felt_with_the_force_of_the_contact(pa
     assert sensors.touch().force[UNIT] == pytest.approx(6.0, abs=1.0)
 
 
-def test_hysteresis_keeps_a_touch_until_well_below_the_smallest_force(panda_model, paper_skin):
-    plant, skin = plant_of(panda_model), skin_of(paper_skin, panda_model)
-    press = Presser(plant, skin, 0.0, 0.45)
-    sensors = TouchSensors(plant, skin, EXACT, 0, press)
-    course = []
+def test_hysteresis_keeps_a_touch_until_well_below_the_smallest_force(pressed):
+    (plant, sensors, press), course = pressed(), []
     for newtons in (0.45, 0.55, 0.45, 0.3, 0.45):
         press.newtons = newtons
         plant.advance(0.06)
@@ -120,10 +126,9 @@ def test_hysteresis_keeps_a_touch_until_well_below_the_smallest_force(panda_mode
     assert course == [False, True, True, False, False]
 
 
-def test_false_touches_come_at_the_rate_asked_for(panda_model, paper_skin):
-    plant, skin = plant_of(panda_model), skin_of(paper_skin, panda_model)
-    often = replace(EXACT, false_per_hour=3600.0, false_s=0.2)
-    sensors, begun, on = TouchSensors(plant, skin, often, 3), 0, False
+def test_false_touches_come_at_the_rate_asked_for(pressed):
+    plant, sensors, _ = pressed(replace(EXACT, false_per_hour=3600.0, false_s=0.2), seed=3)
+    begun, on = 0, False
     for _ in range(1500):
         plant.advance(0.02)
         contact = bool(sensors.touch().contact[UNIT])
@@ -132,9 +137,8 @@ def test_false_touches_come_at_the_rate_asked_for(panda_model, paper_skin):
     assert 12 <= begun <= 38
 
 
-def test_a_stuck_sensor_says_so_and_a_silenced_one_says_nothing(panda_model, paper_skin):
-    plant, skin = plant_of(panda_model), skin_of(paper_skin, panda_model)
-    sensors = TouchSensors(plant, skin, EXACT, 0)
+def test_a_stuck_sensor_says_so_and_a_silenced_one_says_nothing(pressed):
+    plant, sensors, _ = pressed()
     sensors.stuck.add(UNIT)
     plant.advance(0.1)
     assert sensors.touch().contact[UNIT]
@@ -144,10 +148,9 @@ def test_a_stuck_sensor_says_so_and_a_silenced_one_says_nothing(panda_model, pap
     assert sensors.touch().stamp[UNIT] == last
 
 
-def test_the_same_seed_gives_the_same_readings(panda_model, paper_skin):
+def test_the_same_seed_gives_the_same_readings(pressed):
     def readings(seed: int) -> list[float]:
-        plant, skin = plant_of(panda_model), skin_of(paper_skin, panda_model)
-        sensors, found = TouchSensors(plant, skin, TouchSensorParams(), seed, Presser(plant, skin, 0.0, 3.0)), []
+        (plant, sensors, _), found = pressed(TouchSensorParams(), seed, newtons=3.0), []
         for _ in range(20):
             plant.advance(0.01)
             found.append(float(sensors.touch().force[UNIT]))
@@ -157,9 +160,8 @@ def test_the_same_seed_gives_the_same_readings(panda_model, paper_skin):
     assert readings(4) != readings(5)
 
 
-def test_beside_range_finders_they_are_one_skin(panda_model, paper_skin):
-    plant, skin = plant_of(panda_model), skin_of(paper_skin, panda_model)
-    sensors = TouchSensors(plant, skin, EXACT, 0)
+def test_beside_range_finders_they_are_one_skin(pressed):
+    _, sensors, _ = pressed()
     readings = object()
     both = SimulatedTouchSkin(SimpleNamespace(read=lambda: readings), sensors)
     assert both.read() is readings
