@@ -19,6 +19,7 @@ from pretouch.robot.description import SpeedEnvelope
 from pretouch.robot.model import RobotModel
 from pretouch.types import ControlStep, Mode, QpOutcome, Touched
 from tests.fuzz.oracle import Expected, Oracle
+from tests.reference.motion import limit as eq_7
 
 LATCHING = {Event.UNUSABLE, Event.TIME_BACKWARDS, Event.STATE_STALE, Event.SOLVER_FAILED, Event.CLAMPED}
 SOFT = {Event.SKIN_SILENT, Event.NO_FORCE, Event.GIVEN_UP, Event.PRESSED, Event.CLAMPED}
@@ -177,7 +178,7 @@ def check_rows(step: ControlStep, p: Profile, model: RobotModel) -> None:
     if not len(which) or np.abs(step.q).max() > 100.0 or np.abs(step.command).max() > 1e3:
         return  # answers to lies, beyond what differences resolve
     if isinstance(p.approach, ApproachRestriction):
-        limit = [approach_limit(d, p.approach) for d in o.body_distance[which].tolist()]
+        limit = [eq_7(d, p.approach) for d in o.body_distance[which].tolist()]
         assert (np.abs(step.approach_limit - limit) <= 1e-9 * p.approach.v_max_m_s).all()
     excess = approach_velocity(step, model) - step.approach_limit
     size = 1e-7 * (1.0 + np.abs(step.command).max())
@@ -189,14 +190,6 @@ def check_rows(step: ControlStep, p: Profile, model: RobotModel) -> None:
         and step.qp.outcome is QpOutcome.SOLVED
     ):
         assert step.qp.slack.max() <= 1e-7
-
-
-def approach_limit(d: float, r: ApproachRestriction) -> float:
-    """Eq. 7 of the paper at a body distance within d_notice [m]."""
-    near, far = 2.0 * d / r.d_crit_m - 1.0, 2.0 * (d - r.d_crit_m) / (r.d_notice_m - r.d_crit_m) - 1.0
-    slope = min(max(r.beta * (near if d < r.d_repulse_m else far), -700.0), 700.0)
-    limit = r.v_max_m_s / (1.0 + math.exp(slope)) - (r.v_max_m_s if d < r.d_repulse_m else 0.0)
-    return max(limit, r.floor_m_s) if r.rows == "floor" else limit
 
 
 def approach_velocity(step: ControlStep, model: RobotModel) -> np.ndarray:

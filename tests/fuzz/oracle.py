@@ -1,4 +1,4 @@
-"""What is to be believed of a step's inputs, reckoned from them alone, and how fast the arm may go at most."""
+"""What is to be believed of a step's inputs, by the plain controller of `tests.reference`, and how fast at most."""
 
 from dataclasses import dataclass
 
@@ -8,17 +8,14 @@ from pretouch.contact.admittance import Admittance
 from pretouch.modes import Event
 from pretouch.profiles import Profile
 from pretouch.types import ControlStep, Inputs, Mode, RobotState
-
-SHOWN, NEAR, NO_TARGET = {0, 6, 11}, {3, 13}, {1, 2, 4, 7}
-
-LARGEST = 1e3
-"""Joint position or velocity from which on a robot's state is not believed [rad, rad/s]."""
+from tests.reference import modes
+from tests.reference.perception import tells
 
 STRONGEST = 1e4
 """External joint torque from which on it is none [Nm]."""
-
-LATEST = 1e12
-"""Time stamp from which on it is none [s]."""
+FAULTS = {
+    modes.UNUSABLE: Event.UNUSABLE, modes.BACKWARDS: Event.TIME_BACKWARDS, modes.STALE: Event.STATE_STALE,
+}  # fmt: skip
 
 
 @dataclass
@@ -46,69 +43,36 @@ class Oracle:
     """Remembers what has to be remembered, apart from the controller's own state."""
 
     def __init__(self, profile: Profile, ids: tuple[str, ...], robot: RobotState, qd_max: np.ndarray) -> None:
-        self.p, self.ids, self.qd_max = profile, ids, qd_max
-        self.sent: list[tuple[float, np.ndarray]] = []
-        self.stamp = self.force_stamp = robot.stamp
+        self.p, self.ids = profile, ids
+        self.trust, self.command = modes.Trust(robot, profile.failure, qd_max), robot.qd_commanded
+        self.strained = robot.stamp
         self.used = np.full(len(ids), -np.inf)
         self.heard = np.full(len(ids), -np.inf)
-        self.q, self.qd = robot.q_commanded.copy(), robot.qd_commanded.copy()
         self.mode, self.latched, self.reason = Mode.HOLD, False, ""
         self.samples = 0
 
     def expect(self, inputs: Inputs) -> Expected:
         """Judge the inputs of the next step."""
-        p, robot = self.p, inputs.robot
-        fault = self._fault(inputs)
-        last = self.stamp
-        now = self.stamp = inputs.stamp if abs(inputs.stamp) < LATEST else self.stamp
-        kept = int(p.failure.state_timeout_s / p.task.control_period_s) + 1
-        self.sent = [] if now < last else [*self.sent[-kept:], (last, self.qd)]
-        if not fault:
-            self._believe(robot, last, now)
-        w = None if fault else robot.wrench
-        tau = np.array(np.nan if fault or robot.tau_ext is None else robot.tau_ext, dtype=np.float64)
-        strained = tau.shape == self.qd_max.shape and bool((np.abs(tau) < STRONGEST).all())
-        felt = w is not None and bool(np.isfinite(w).all() and np.abs(w).max() < p.failure.force_max_n)
-        self.force_stamp = now if (felt if not p.detect.by_torques else strained) else min(self.force_stamp, now)
-        self._hear(inputs, now, now < last)
+        p, last = self.p, self.trust.now
+        robot, wrong = self.trust.judge(inputs, self.command, p.task.control_period_s)
+        now = self.trust.now
+        fault = next((event for sentence, event in FAULTS.items() if sentence in wrong), None)
+        tau = np.array(np.nan if fault or inputs.robot.tau_ext is None else inputs.robot.tau_ext, dtype=np.float64)
+        strained = tau.shape == self.command.shape and bool((np.abs(tau) < STRONGEST).all())
+        self.strained = now if strained else min(self.strained, now)
+        no_force = now - self.strained > p.failure.force_timeout_s if p.detect.by_torques else modes.NO_FORCE in wrong
+        if p.perception is not None:
+            self._hear(inputs, now, now < last)
         age = now - self.heard if p.perception is not None and len(self.ids) else np.zeros(0)
         slow, stop = p.sight.slow_after_s, p.sight.silent_after_s
         return Expected(
-            fault, self.q, self.qd, now, w[:3].copy() if felt else None, strained,
-            overrun=not fault and now - last > p.failure.overrun_s,
-            no_force=not fault and now - self.force_stamp > p.failure.force_timeout_s,
+            fault, robot.q_commanded, robot.qd_commanded, now, None if robot.wrench is None else robot.wrench[:3],
+            strained, overrun=modes.OVERRUN in wrong, no_force=not fault and no_force,
             silent=[name for name, a in zip(self.ids, age, strict=False) if a >= stop],
             scale=min(max(float(stop - age.max(initial=0.0)) / (stop - slow), 0.0), 1.0),
         )  # fmt: skip
 
-    def _believe(self, robot: RobotState, last: float, now: float) -> None:
-        """Go by a report, and by the commands it cannot know of."""
-        if robot.stamp > last or now == last:
-            self.q, self.qd = robot.q_commanded.copy(), robot.qd_commanded.copy()
-            return
-        q, at = robot.q_commanded.copy(), robot.stamp
-        for (_, command), end in zip(self.sent, [*(t for t, _ in self.sent[1:]), now], strict=True):
-            if end > at:
-                q, at = q + command * (end - at), end
-        self.q = q
-
-    def _fault(self, inputs: Inputs) -> Event | None:
-        r = inputs.robot
-        numbers = np.concatenate((r.q, r.qd, r.q_commanded, r.qd_commanded))
-        if not (np.abs(numbers) < LARGEST).all():  # what is no number is not below
-            return Event.UNUSABLE
-        if (
-            not (abs(inputs.stamp) < LATEST and abs(r.stamp) < LATEST)
-            or (np.abs(r.qd_commanded) >= 2 * self.qd_max).any()
-        ):
-            return Event.UNUSABLE
-        if inputs.stamp < self.stamp:
-            return Event.TIME_BACKWARDS
-        return Event.STATE_STALE if abs(inputs.stamp - r.stamp) > self.p.failure.state_timeout_s else None
-
     def _hear(self, inputs: Inputs, now: float, forget: bool) -> None:
-        if self.p.perception is None:
-            return
         if forget:
             self.used[:], self.heard[:] = -np.inf, -np.inf
         readings = inputs.readings
@@ -116,14 +80,13 @@ class Oracle:
         for k, (stamp, distance, status) in enumerate(rows):
             if self.used[k] < stamp <= now:
                 self.used[k] = stamp
-                if status in NEAR or status in NO_TARGET or (status in SHOWN and 0 <= distance < np.inf):
-                    self.heard[k] = stamp
+                self.heard[k] = stamp if tells(distance, status) else self.heard[k]
 
     def remember(self, e: Expected, step: ControlStep) -> None:
         """Go on from what a step decided."""
         self.samples = min(self.samples + (e.force is not None), self.p.window.samples)
         self.mode, self.latched, self.reason = step.mode, step.latched, step.reason
-        self.q, self.qd = self.q + step.command * self.p.task.control_period_s, step.command.copy()
+        self.command = step.command.copy()
 
     def speaks_against(self, e: Expected) -> dict[Event, bool]:
         """What forbids to follow the path, and whether it is so."""

@@ -38,6 +38,8 @@ TRACKING = "Moving as asked."
 
 LARGEST = 1e3
 """What no joint position or velocity reaches [rad, rad/s]."""
+LATEST = 1e12
+"""Time stamp from which on it is none [s]."""
 
 
 class Behaviour:
@@ -89,7 +91,7 @@ class Trust:
         """Return the state to go by and what is wrong; a state that is not believed goes on by the last command."""
         robot, last, wrong, before = inputs.robot, self.robot, {}, self.now
         odd = unusable(inputs, self.qd_max)
-        self.now = inputs.stamp if np.isfinite(inputs.stamp) else before
+        self.now = inputs.stamp if abs(inputs.stamp) < LATEST else before
         if odd:
             wrong[UNUSABLE] = odd
         else:
@@ -131,7 +133,7 @@ class Trust:
 def unusable(inputs: Inputs, qd_max: np.ndarray) -> str:
     """Say the first thing that is no number, or no number a joint can have; '' if there is none."""
     robot = inputs.robot
-    if not np.isfinite(robot.stamp):
+    if not abs(robot.stamp) < LATEST:
         return f"its time stamp is {robot.stamp}"
     parts = {
         "joint positions": robot.q,
@@ -143,4 +145,4 @@ def unusable(inputs: Inputs, qd_max: np.ndarray) -> str:
         for value, fastest in zip(values, qd_max, strict=True):
             if np.isnan(value) or abs(value) >= (2 * fastest if values is robot.qd_commanded else LARGEST):
                 return f"{name} hold {value:g}"
-    return "" if np.isfinite(inputs.stamp) else f"the step's time stamp is {inputs.stamp}"
+    return "" if abs(inputs.stamp) < LATEST else f"the step's time stamp is {inputs.stamp}"

@@ -76,7 +76,7 @@ def limit(d: float, p: RestrictionParams) -> float:
     """Eqs. 5-7: the largest approach velocity [m/s] at a distance from the body [m], infinite from d_notice on."""
 
     def logistic(x: float) -> float:
-        return p.v_max_m_s / (1.0 + np.exp(p.beta * (2.0 * x - 1.0)))
+        return p.v_max_m_s / (1.0 + np.exp(min(p.beta * (2.0 * x - 1.0), 700.0)))
 
     if d >= p.d_notice_m:
         return np.inf
