@@ -12,7 +12,7 @@ from pretouch.errors import PretouchError
 from pretouch.hardware.keys import load_keys, save_keys
 from pretouch.hardware.wire import TAG_SIZE
 from pretouch.imported_data.forces import read_force
-from pretouch.imported_data.log import Choice
+from pretouch.imported_data.log import Choice, Log
 from pretouch.imported_data.reading import open_log
 from pretouch.imported_data.torques import torque_recording
 from pretouch.importing.chain import arm_of
@@ -105,22 +105,33 @@ def _read_whole(place: Path) -> None:
 # tables and bags
 
 
-def _read_force(place: Path) -> object:
-    return read_force(open_log(place, Choice()), Choice())
+def _read_force(place: Path) -> None:
+    log = open_log(place, Choice())
+    assert_sound(log.force(posture=False).in_order("force"), "force")
+    read_force(log, Choice())
+
+
+def assert_sound(log: Log, what: str) -> None:
+    """What was read is numbers at instants that increase."""
+    assert np.isfinite(log.arrays[what]).all()
+    assert np.all(np.diff(log.time) > 0)
 
 
 def _of_tables(folder: Path, model: RobotModel) -> dict[str, Parser]:
     force = pushed(2.0, ())
     columns = {"time_s": np.arange(len(force)) / 100.0} | {f"force_{a}_N": force[:, i] for i, a in enumerate("xyz")}
     torques = Moving(model, 0.3).external_csv(folder / "torques.csv").read_bytes()
+    late = torques.split(b"\n")[0] + b"\n"  # and a time that no 64 bits hold in nanoseconds
     bag = write_bag1(folder / "whole.bag", wrenches(force[:20], store=STORE1)).read_bytes()
 
-    def read_torques(place: Path) -> object:
-        return torque_recording(open_log(place, Choice()).torques(), Choice())
+    def read_torques(place: Path) -> None:
+        log = open_log(place, Choice())
+        assert_sound(log.positions().in_order("q"), "q")
+        torque_recording(log.torques(), Choice())
 
     return {
         "CSV of forces": _of_file(folder, "a.csv", _read_force, write_csv(folder / "f.csv", columns).read_bytes()),
-        "CSV of torques": _of_file(folder, "b.csv", read_torques, torques),
+        "CSV of torques": _of_file(folder, "b.csv", read_torques, torques, late + b"9223372037.0" + 28 * b",0"),
         "ROS bag": _of_file(folder, "a.bag", _read_force, bag),
     }
 

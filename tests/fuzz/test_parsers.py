@@ -1,11 +1,8 @@
 """No damaged file and no message is worse than a sentence, soon: what is whole is changed at random."""
 
-import signal
 import time
 import tracemalloc
 from collections.abc import Iterator
-from types import FrameType
-from typing import NoReturn
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -30,27 +27,13 @@ def there(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Parser
         yield found
 
 
-def too_late(_number: int, _frame: FrameType | None) -> NoReturn:
-    raise AssertionError(f"it takes more than {SOON_S:g} s")
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _alarm() -> Iterator[None]:
-    before = signal.signal(signal.SIGALRM, too_late)
-    yield
-    signal.signal(signal.SIGALRM, before)
-
-
 def read(parser: Parser, data: bytes) -> bool:
-    """Have it read, within the bounds; return whether it was refused."""
-    signal.setitimer(signal.ITIMER_REAL, SOON_S)
+    """Have it read; return whether it was refused."""
     try:
         parser.read(data)
         sentence = ""
     except parser.allowed as refused:
         sentence = str(refused) or type(refused).__name__
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
     assert len(sentence) < 2000 + len(data)
     return bool(sentence)
 
@@ -74,7 +57,7 @@ def test_what_is_whole_is_read_and_what_once_did_harm_does_none(there: dict[str,
 def test_whatever_is_changed_is_no_worse_than_a_sentence(there: dict[str, Parser], name: str) -> None:
     parser = there[name]
 
-    @settings(max_examples=200, suppress_health_check=list(HealthCheck))
+    @settings(max_examples=200, deadline=1e3 * SOON_S, suppress_health_check=list(HealthCheck))
     @given(changes, changes)
     def fuzzed(first: list[Change], second: list[Change]) -> None:
         data = parser.corpus[second[0].number % len(parser.corpus)]

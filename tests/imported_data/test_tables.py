@@ -3,8 +3,6 @@
 import numpy as np
 import pyarrow as pa
 import pytest
-from hypothesis import example, given
-from hypothesis import strategies as st
 from pyarrow import parquet
 
 from pretouch.errors import RecordingError
@@ -166,45 +164,3 @@ def test_text_in_a_column_of_a_parquet_file_is_no_number(tmp_path):
     parquet.write_table(pa.table(columns), tmp_path / "a.parquet")
     with pytest.raises(RecordingError, match=r"'time_s' of .* holds string: give numbers"):
         forces_of(tmp_path / "a.parquet")
-
-
-NAMES = st.sampled_from([
-    "time_s", "time_ms", "time", "force_x_N", "force_y_N", "force_z_N", "torque_x_Nm", *NAMED, "q1_deg", "q99_rad",
-    "_rad", "joint_1_rad", "force_x", "q_rad", "",
-])  # fmt: skip
-CELLS = st.one_of(
-    st.floats().map(repr),
-    st.integers().map(str),
-    st.text(max_size=5),
-    st.sampled_from(["", "nan", '"', "1,5", "1e999", "0", "3"]),
-)
-TABLES = st.builds(
-    lambda names, rows, separator: "\n".join(separator.join(row) for row in [names, *rows]),
-    st.one_of(
-        st.lists(NAMES, max_size=8), st.just(GOOD.split("\n")[0].split(",")), st.just(["time_s", *NAMED]),
-        st.lists(st.text()),
-    ),
-    st.lists(st.lists(CELLS, max_size=8), max_size=6),
-    st.sampled_from(",;\t"),
-)  # fmt: skip
-
-
-@example(",".join(["time_s", *NAMED]).encode() + b"\n9223372037.0,0,0,0,0,0,0,0")
-@given(st.one_of(TABLES.map(lambda text: text.encode("utf-8", "surrogatepass")), st.binary(max_size=200)))
-def test_junk_gives_a_log_or_our_error_and_nothing_else(tmp_path_factory, panda_model, junk):
-    file = tmp_path_factory.getbasetemp() / "junk.csv"
-    file.write_bytes(junk)
-    opened = {
-        "force": lambda: open_log(file, Choice()).force(posture=False),
-        "q": lambda: open_log(file, Choice(arm=panda_model)).positions(),
-    }
-    for kind, read in opened.items():
-        sentence = ""
-        try:
-            log = read().in_order(kind)
-        except RecordingError as error:
-            sentence = str(error)
-        else:
-            assert np.isfinite(log.arrays[kind]).all()
-            assert np.all(np.diff(log.time) > 0)
-        assert "\n" not in sentence

@@ -1,6 +1,7 @@
 """An arm follows a plan under its controller, and what is not as planned ends the motion, at rest."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,26 +20,18 @@ from tests.calibrated_arm import swinging
 DURATION_S = 8.0
 
 
-class Kept:
-    def __init__(self) -> None:
-        self.cycles: list[loop.Cycle] = []
-
-    def record(self, cycle: loop.Cycle) -> None:
-        self.cycles.append(cycle)
-
-
 def arm_at(model: RobotModel, q: np.ndarray, seed: int = 0) -> Plant:
     plant = Plant(model, SceneSpec(), PlantParams(), q, seed)
     plant.advance(0.2)
     return plant
 
 
-def followed(plant: Plant, model: RobotModel, plan: Plan) -> tuple[PlanCommander, Kept]:
-    controller, kept = plan_controller(model, plan.start), Kept()
+def followed(plant: Plant, model: RobotModel, plan: Plan) -> tuple[PlanCommander, list[loop.Cycle]]:
+    controller, cycles = plan_controller(model, plan.start), []
     commander = PlanCommander(controller, plan, lambda: plant.time)
-    options = loop.Options(desired=commander)
-    loop.run(controller, plant, NoUnits(), PlantClock(plant, 0.01), kept, commander.done, options)
-    return commander, kept
+    record, options = SimpleNamespace(record=cycles.append), loop.Options(desired=commander)
+    loop.run(controller, plant, NoUnits(), PlantClock(plant, 0.01), record, commander.done, options)
+    return commander, cycles
 
 
 @pytest.mark.parametrize("seed", [0, 1])
@@ -48,14 +41,14 @@ def test_the_simulated_arm_follows_within_two_milliradians_and_ends_at_rest(pand
     commander, kept = followed(plant, panda_model, plan)
     assert commander.stopped == ""
     assert commander.begin is not None
-    states = [cycle.inputs.robot for cycle in kept.cycles]
+    states = [cycle.inputs.robot for cycle in kept]
     off = [s.q - plan.at(s.stamp - commander.begin)[0] for s in states if s.stamp >= commander.begin]
     assert len(off) == pytest.approx(DURATION_S / 0.01, abs=3)
     assert np.abs(off).max() < 2e-3
     assert np.ptp([s.q for s in states], axis=0).min() > 0.1
     plant.advance(0.3)
     np.testing.assert_allclose(plant.read().q, plan.end, atol=2e-3)
-    steps = np.diff([cycle.step.command for cycle in kept.cycles], axis=0) / 0.01
+    steps = np.diff([cycle.step.command for cycle in kept], axis=0) / 0.01
     assert np.all(np.abs(steps) <= 1.001 * panda_model.description.qdd_max)
 
 
@@ -87,12 +80,13 @@ def test_time_that_a_simulation_leaves_out_is_none_of_the_plans(panda_model: Rob
 
     machine, controller = SlowMachine(), plan_controller(panda_model, plan.start)
     commander = PlanCommander(controller, plan, lambda: machine.now, lambda: machine.left_out)
-    kept, options = Kept(), loop.Options(desired=commander)
-    loop.run(controller, machine, NoUnits(), machine, kept, commander.done, options)
+    kept: list[loop.Cycle] = []
+    record, options = SimpleNamespace(record=kept.append), loop.Options(desired=commander)
+    loop.run(controller, machine, NoUnits(), machine, record, commander.done, options)
     assert commander.stopped == ""
-    speeds = [np.abs(cycle.step.command).max() for cycle in kept.cycles if 4.9 < cycle.inputs.robot.stamp < 5.2]
+    speeds = [np.abs(cycle.step.command).max() for cycle in kept if 4.9 < cycle.inputs.robot.stamp < 5.2]
     assert max(speeds) > 0.5
-    assert kept.cycles[-1].step.q == pytest.approx(plan.end, abs=5e-3)
+    assert kept[-1].step.q == pytest.approx(plan.end, abs=5e-3)
 
 
 def test_a_push_ends_the_motion_at_rest(panda_model: RobotModel):
@@ -104,8 +98,8 @@ def test_a_push_ends_the_motion_at_rest(panda_model: RobotModel):
 
     plant.before_each_step(push)
     commander, kept = followed(plant, panda_model, plan)
-    assert commander.stopped == kept.cycles[-1].step.reason
-    assert kept.cycles[-1].step.contact is not None
+    assert commander.stopped == kept[-1].step.reason
+    assert kept[-1].step.contact is not None
     assert 3.5 < plant.time < 5.0
     plant.mj_data.xfrc_applied[:] = 0.0
     plant.advance(0.5)
@@ -117,7 +111,7 @@ def test_an_arm_that_is_elsewhere_does_not_begin(panda_model: RobotModel):
     plant = arm_at(panda_model, plan.start + 0.05)
     commander, kept = followed(plant, panda_model, plan)
     assert commander.stopped.startswith("The arm is not where the plan begins: panda_joint")
-    assert not any(cycle.step.command.any() for cycle in kept.cycles[:-1])
+    assert not any(cycle.step.command.any() for cycle in kept[:-1])
 
 
 def test_an_arm_that_does_not_follow_ends_the_motion_by_the_name_of_the_joint(panda_model: RobotModel):
@@ -133,12 +127,8 @@ def test_an_arm_whose_force_is_not_known_does_not_begin(panda_model: RobotModel,
     plant = arm_at(panda_model, plan.start)
     read = plant.read
 
-    def without_force():
-        state = read()
-        return type(state)(state.stamp, state.q, state.qd, state.q_commanded, state.qd_commanded, state.tau_ext, None)
-
-    monkeypatch.setattr(plant, "read", without_force)
+    monkeypatch.setattr(plant, "read", lambda: replace(read(), wrench=None))
     commander, kept = followed(plant, panda_model, plan)
     assert commander.begin is None
     assert "force" in commander.stopped
-    assert kept.cycles[-1].step.stamp - kept.cycles[0].step.stamp == pytest.approx(5.0, abs=0.05)
+    assert kept[-1].step.stamp - kept[0].step.stamp == pytest.approx(5.0, abs=0.05)
