@@ -6,21 +6,12 @@ import numpy as np
 import pytest
 
 from pretouch.calibration.calibrate import calibrate
-from pretouch.calibration.identify import rigid_bodies
 from pretouch.calibration.params import CalibrationParams
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit
 from pretouch.sim.random_skin import random_skin
 from tests.calibration.faulty import changed, cut, joints, kept, traced, unit_of
 from tests.calibration.made import MovingArm
-
-
-def test_links_that_are_fixed_to_each_other_are_one_body(panda_model):
-    named = [tuple(panda_model.links[i] for i in body) for body in rigid_bodies(panda_model)]
-    assert named == [
-        ("panda_link1",), ("panda_link2",), ("panda_link3",), ("panda_link4",), ("panda_link5",), ("panda_link6",),
-        ("panda_link7", "panda_link8", "panda_hand", "panda_hand_tcp"),
-    ]  # fmt: skip
 
 
 def test_the_user_s_choice_among_links_fixed_to_each_other_stays(panda_model, moving_arm, paper_skin):

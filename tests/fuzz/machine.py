@@ -72,7 +72,8 @@ class Course:
     def robot(self) -> RobotState:
         """Return what the arm's interface reports: the truth, but for the measured joint positions."""
         measured = self.q + self.rng.normal(scale=self.world.measured_off, size=len(self.q))
-        return weather.report(self.time, self.q, self.qd, measured, self.weather.wrench(), self.weather.torques())
+        q, qd, wrench = self.q.copy(), self.qd.copy(), self.weather.wrench()
+        return RobotState(self.time, measured, qd, q, self.qd.copy(), self.weather.torques(), wrench)
 
     def run(self, steps: int) -> None:
         """Let the arm be driven for so many steps."""

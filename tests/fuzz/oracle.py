@@ -8,14 +8,11 @@ from pretouch.contact.admittance import Admittance
 from pretouch.modes import Event
 from pretouch.profiles import Profile
 from pretouch.types import ControlStep, Inputs, Mode, RobotState
-from tests.reference import modes
+from tests.reference.modes import FAULTS, Trust
 from tests.reference.perception import tells
 
 STRONGEST = 1e4
 """External joint torque from which on it is none [Nm]."""
-FAULTS = {
-    modes.UNUSABLE: Event.UNUSABLE, modes.BACKWARDS: Event.TIME_BACKWARDS, modes.STALE: Event.STATE_STALE,
-}  # fmt: skip
 
 
 @dataclass
@@ -44,7 +41,7 @@ class Oracle:
 
     def __init__(self, profile: Profile, ids: tuple[str, ...], robot: RobotState, qd_max: np.ndarray) -> None:
         self.p, self.ids = profile, ids
-        self.trust, self.command = modes.Trust(robot, profile.failure, qd_max), robot.qd_commanded
+        self.trust, self.command = Trust(robot, profile.failure, qd_max), robot.qd_commanded
         self.strained = robot.stamp
         self.used = np.full(len(ids), -np.inf)
         self.heard = np.full(len(ids), -np.inf)
@@ -56,18 +53,18 @@ class Oracle:
         p, last = self.p, self.trust.now
         robot, wrong = self.trust.judge(inputs, self.command, p.task.control_period_s)
         now = self.trust.now
-        fault = next((event for sentence, event in FAULTS.items() if sentence in wrong), None)
+        fault = next((event for event in FAULTS if event in wrong), None)
         tau = np.array(np.nan if fault or inputs.robot.tau_ext is None else inputs.robot.tau_ext, dtype=np.float64)
         strained = tau.shape == self.command.shape and bool((np.abs(tau) < STRONGEST).all())
         self.strained = now if strained else min(self.strained, now)
-        no_force = now - self.strained > p.failure.force_timeout_s if p.detect.by_torques else modes.NO_FORCE in wrong
+        no_force = now - self.strained > p.failure.force_timeout_s if p.detect.by_torques else Event.NO_FORCE in wrong
         if p.perception is not None:
             self._hear(inputs, now, now < last)
         age = now - self.heard if p.perception is not None and len(self.ids) else np.zeros(0)
         slow, stop = p.sight.slow_after_s, p.sight.silent_after_s
         return Expected(
             fault, robot.q_commanded, robot.qd_commanded, now, None if robot.wrench is None else robot.wrench[:3],
-            strained, overrun=modes.OVERRUN in wrong, no_force=not fault and no_force,
+            strained, overrun=Event.OVERRUN in wrong, no_force=not fault and no_force,
             silent=[name for name, a in zip(self.ids, age, strict=False) if a >= stop],
             scale=min(max(float(stop - age.max(initial=0.0)) / (stop - slow), 0.0), 1.0),
         )  # fmt: skip

@@ -3,7 +3,6 @@
 import os
 import subprocess
 import sys
-from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -40,10 +39,8 @@ def test_some_thousand_steps(seed: int):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(10))
-def test_half_a_million_steps(seed: int, capsys: pytest.CaptureFixture[str]):
+def test_half_a_million_steps(seed: int):
     reached = Machine(seed).run(50_000)
-    with capsys.disabled():
-        print(f"\n{summary(reached)}")
     missing = [name for name in EXPECTED if not reached[name]]
     assert not missing
     assert reached["step"] == 50_000
@@ -60,8 +57,3 @@ def test_no_compiled_loop_leaves_its_arrays(tmp_path: Path):
         [sys.executable, "-W", "error", "-c", run], cwd=root, env=checked, capture_output=True, text=True
     )
     assert done.returncode == 0, done.stderr
-
-
-def summary(reached: Counter[str]) -> str:
-    """What was reached, in one paragraph."""
-    return ", ".join(f"{name}: {count}" for name, count in sorted(reached.items()))

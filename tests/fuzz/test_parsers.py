@@ -1,14 +1,46 @@
 """No damaged file and no message is worse than a sentence, soon: what is whole is changed at random."""
 
+import re
 import time
 import tracemalloc
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
-from tests.fuzz.mutations import Change, changed, changes
-from tests.fuzz.parsers import Parser, parsers
+from pretouch.errors import PretouchError
+from pretouch.hardware.keys import load_keys, save_keys
+from pretouch.hardware.wire import TAG_SIZE
+from pretouch.imported_data.forces import read_force
+from pretouch.imported_data.log import Choice, Log
+from pretouch.imported_data.reading import open_log
+from pretouch.imported_data.torques import torque_recording
+from pretouch.importing.chain import arm_of
+from pretouch.importing.read import read_robot
+from pretouch.profiles import profile
+from pretouch.recording.reader import open_recording
+from pretouch.recording.skin_reader import read_skin
+from pretouch.recording.skin_recording import SkinRecording
+from pretouch.robot.description import panda
+from pretouch.robot.description_file import description_text, load_description
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import load_skin, paper_skin, skin_file
+from pretouch.session.residual_file import Residual, load_residual, save_residual
+from pretouch.sim.randomisation import FOLDER, world_set
+from pretouch.types import RangeStatus
+from tests.hardware.fake_unit import KEYS, Bench
+from tests.imported_data.files import STORE1, pushed, wrenches, write_bag1, write_csv
+from tests.imported_data.joint_files import Moving
+from tests.importing.made import six_axis
+from tests.recording.runs import controller_of, recorded_run
+from tests.recording.test_skin_recording import record
 
 SOON_S = 10.0
 """Longest time for anything that is read [s]."""
@@ -18,6 +50,217 @@ NAMES = (
     "recording", "recording of units", "CSV of forces", "CSV of torques", "ROS bag", "URDF", "skin", "keys",
     "world", "learnt", "description", "profile", "wire",
 )  # fmt: skip
+
+
+# What is changed: it is drawn by Hypothesis, which finds the fewest changes that do harm
+
+LONGEST = 1 << 17
+"""Bytes of anything that is tried."""
+_NUMBER = re.compile(rb"[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?")
+_NUMBERS = [
+    b"nan", b"-inf", b"1e400", b"-1", b"0", b"1e308", b"5e-324", b"9" * 400, b"1_0", b"0x7f", b"true", b"''",
+    b"9223372036854775808", b"-9223372036854775809", b"4294967296", b"1e-9",
+]  # fmt: skip
+_BYTES = [b"\0" * 4, b"\xff" * 4, b"\xff" * 8, b"\0\0\0\x80", b"\xff\xff\xff\x7f", b"\n", b"\xc3", b"\xf0\x9f\xa4\x96"]
+
+
+@dataclass(frozen=True)
+class Change:
+    """One change; where it happens is a share of the length."""
+
+    kind: str
+    begin: float
+    end: float
+    number: int
+
+    def of(self, data: bytes, words: Sequence[bytes]) -> bytes:
+        """Return changed bytes."""
+        a, b = sorted((int(self.begin * len(data)), int(self.end * len(data))))
+        there = list(_NUMBER.finditer(data)) if self.kind == "number" else []
+        if there:
+            a, b = there[int(self.begin * (len(there) - 1))].span()
+        else:
+            b = {"word": a, "end": len(data), "flip": a + 1}.get(self.kind, b)
+        pieces = {
+            "flip": [bytes([byte ^ 1 << self.number % 8 for byte in data[a:b]])], "set": _BYTES, "word": words,
+            "number": _NUMBERS, "repeat": [data[a:b] * (2 + self.number % 40)],
+            "swap": [data[(a + b) // 2 : b] + data[a : (a + b) // 2]],
+        }.get(self.kind, [b""])  # fmt: skip
+        piece = pieces[self.number % len(pieces)]
+        return data[:a] + piece + data[a + len(piece) if self.kind == "set" else b :]
+
+
+_KINDS = ("flip", "set", "cut", "end", "repeat", "word", "number", "swap")
+_share = st.floats(0.0, 1.0)
+changes: st.SearchStrategy[Any] = st.lists(
+    st.builds(Change, st.sampled_from(_KINDS), _share, _share, st.integers(0, 1 << 16)), min_size=1, max_size=6
+)
+"""Some changes, one after the other."""
+
+
+def changed(data: bytes, made: list[Change], words: Sequence[bytes]) -> bytes:
+    """Return bytes with changes made."""
+    for change in made:
+        data = change.of(data, words)[:LONGEST]
+    return data
+
+
+# Everything that reads files and messages
+
+Read = Callable[[bytes], object]
+
+
+@dataclass(frozen=True)
+class Parser:
+    """One that reads."""
+
+    corpus: list[bytes]
+    """What is changed: something whole first; of messages, then what once did harm."""
+    read: Read
+    words: tuple[bytes, ...] = (b"\n", b"[[", b"]]", b"=", b"'", b'"""', b"{", b"}", b",", b";", b"inf", b"nan", b"a.b")
+
+
+def _file(folder: Path, name: str, read: Callable[[Path], object]) -> Read:
+    """Return what writes bytes to a file and has it read."""
+
+    def written(data: bytes) -> object:
+        (folder / name).write_bytes(data)
+        return read(folder / name)
+
+    return written
+
+
+@contextmanager
+def parsers(folder: Path) -> Iterator[dict[str, Parser]]:
+    """Have all of them, with their files in a folder."""
+    model = RobotModel(panda())
+    recorded_run(folder / "whole.mcap", controller_of(model, paper_skin(model)), 8)
+    found = {
+        "recording": _of_file(folder, "a.mcap", _read_whole, (folder / "whole.mcap").read_bytes()),
+        "recording of units": _of_file(folder, "b.mcap", read_skin, _units_recorded(folder / "units.mcap")),
+        **_of_tables(folder, model),
+        **_of_robots(folder),
+        **_of_tomls(folder, model),
+        "profile": Parser(
+            [b"pretouch:detect.memory_s=100:react.reach_m=0.2"], lambda data: profile(data.decode(errors="replace"))
+        ),
+    }
+    with Bench() as bench:
+        bench.join()
+        yield found | {"wire": _of_units(bench)}
+
+
+_HUGE = b"1" + 400 * b"0"
+"""A whole number that no float holds."""
+
+
+def _of_file(folder: Path, name: str, read: Callable[[Path], object], *corpus: bytes) -> Parser:
+    return Parser(list(corpus), _file(folder, name, read))
+
+
+def _units_recorded(place: Path) -> bytes:
+    with SkinRecording(place) as recording:
+        for number in range(10):
+            record(recording, number)
+    return place.read_bytes()
+
+
+def _read_whole(place: Path) -> None:
+    recorded = open_recording(place)
+    for _ in recorded:
+        pass
+    _ = recorded.runs[0].profile, recorded.stamps()
+
+
+# tables and bags
+
+
+def _read_force(place: Path) -> None:
+    log = open_log(place, Choice())
+    assert_sound(log.force(posture=False).in_order("force"), "force")
+    read_force(log, Choice())
+
+
+def assert_sound(log: Log, what: str) -> None:
+    """What was read is numbers at instants that increase."""
+    assert np.isfinite(log.arrays[what]).all()
+    assert np.all(np.diff(log.time) > 0)
+
+
+def _of_tables(folder: Path, model: RobotModel) -> dict[str, Parser]:
+    force = pushed(2.0, ())
+    columns = {"time_s": np.arange(len(force)) / 100.0} | {f"force_{a}_N": force[:, i] for i, a in enumerate("xyz")}
+    torques = Moving(model, 0.3).external_csv(folder / "torques.csv").read_bytes()
+    late = torques.split(b"\n")[0] + b"\n"  # and a time that no 64 bits hold in nanoseconds
+    bag = write_bag1(folder / "whole.bag", wrenches(force[:20], store=STORE1)).read_bytes()
+
+    def read_torques(place: Path) -> None:
+        log = open_log(place, Choice())
+        assert_sound(log.positions().in_order("q"), "q")
+        torque_recording(log.torques(), Choice())
+
+    return {
+        "CSV of forces": _of_file(folder, "a.csv", _read_force, write_csv(folder / "f.csv", columns).read_bytes()),
+        "CSV of torques": _of_file(folder, "b.csv", read_torques, torques, late + b"9223372037.0" + 28 * b",0"),
+        "ROS bag": _of_file(folder, "a.bag", _read_force, bag),
+    }
+
+
+# robots
+
+
+def _of_robots(folder: Path) -> dict[str, Parser]:
+    tags = tuple(f"<{tag}>".encode() for tag in ("link", "joint", "geometry", "mesh", "/a"))
+    read = _file(folder, "arm.urdf", lambda place: arm_of(read_robot(place)))
+    return {"URDF": Parser([six_axis().encode()], read, words=tags)}
+
+
+# TOML
+
+
+def _of_tomls(folder: Path, model: RobotModel) -> dict[str, Parser]:
+    save_keys(KEYS, folder / "keys.toml")
+    save_residual(folder / "learnt.toml", model, Residual({"weights": np.zeros((7, 4))}, "panda", 0.0, 1.0))
+    load_learnt = partial(load_residual, model=model, shapes={"weights": (7, 4)})
+
+    def keys(place: Path) -> object:
+        place.chmod(0o600)
+        return load_keys(place)
+
+    (folder / "described").mkdir()
+    (folder / "described" / panda().mjcf.name).write_bytes(panda().mjcf.read_bytes())
+    described, world = description_text(panda()).encode(), (FOLDER / "realistic.toml").read_bytes()
+    return {
+        "skin": _of_file(folder, "s.toml", partial(load_skin, model=model), skin_file(panda()).read_bytes()),
+        "keys": _of_file(folder, "k.toml", keys, (folder / "keys.toml").read_bytes()),
+        "world": _of_file(folder, "w.toml", lambda p: world_set(str(p)), world, world.replace(b"0.06", _HUGE)),
+        "learnt": _of_file(folder, "l.toml", load_learnt, (folder / "learnt.toml").read_bytes()),
+        "description": _of_file(folder / "described", "robot.toml", load_description, described),
+    }
+
+
+# messages
+
+
+def _of_units(bench: Bench) -> Parser:
+    """A stolen unit: what it says is signed with its key."""
+    unit = bench.units[0]
+    sample, hello = unit.sample(bench.now), unit.hello(bench.now)
+
+    def read(data: bytes) -> None:
+        bench.now, data = bench.now + 0.001, data[:2000]
+        bench.send(data + unit.mac.tag(data), data + unit.session.tag(data))
+        readings = bench.receiver.readings()
+        valid = readings.status == RangeStatus.OK
+        assert np.all(np.isfinite(readings.distance[valid]))
+        assert np.all(readings.distance[valid] >= 0.0)
+        assert np.all(readings.stamp <= bench.now)
+        bench.answers()
+
+    return Parser([sample[:-TAG_SIZE], hello[:-TAG_SIZE]], read)
+
+
+# The tests
 
 
 @pytest.fixture(scope="module")
@@ -32,7 +275,7 @@ def read(parser: Parser, data: bytes) -> bool:
     try:
         parser.read(data)
         sentence = ""
-    except parser.allowed as refused:
+    except PretouchError as refused:
         sentence = str(refused) or type(refused).__name__
     assert len(sentence) < 2000 + len(data)
     return bool(sentence)

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pretouch.control.approach_restriction import ApproachRestriction
-from pretouch.control.path import Circle, line
+from pretouch.control.path import Circle
 from pretouch.params import RowKind
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import PROFILES, Profile
@@ -124,19 +124,3 @@ def test_any_robot_state(profile, sequence):
         wrong = getattr(inputs.robot, part).copy()
         wrong[joint] = value
         arm.step(replace(inputs, robot=replace(inputs.robot, **{part: wrong}), resume=resume), deep=True)
-
-
-@given(
-    profiles, postures, st.tuples(*[st.floats(-3.0, 3.0)] * 3),
-    st.lists(st.tuples(*[st.floats(0.0, 0.6)] * K), min_size=1, max_size=6),
-)  # fmt: skip
-@settings(deadline=None, derandomize=True, max_examples=60)
-def test_any_goal_among_any_obstacles(profile, q, goal, sequence):
-    arm = begun(profile, q, np.zeros(N))
-    start = tuple(MODEL.kinematics(arm.q).position[MODEL.ee])
-    if np.linalg.norm(np.subtract(goal, start)) > 1e-3:
-        arm.controller.path = line(start, goal)
-    for distance in sequence:
-        for _ in range(3):
-            seen = RangeReadings(np.full(K, arm.time), np.array(distance), np.zeros(K, np.int64))
-            arm.step(replace(calm(arm), readings=seen), deep=False)

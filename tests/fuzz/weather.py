@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pretouch.types import Inputs, RangeReadings, RangeStatus, RobotState
+from pretouch.types import Inputs, RangeReadings, RangeStatus
 
 STATUS = [*map(int, RangeStatus), 42, -1, 1 << 40]
 SIGHTS = [
@@ -132,10 +132,3 @@ def spoiled(inputs: Inputs, fault: str, value: float, joint: int = 3) -> Inputs:
         return replace(inputs, stamp=stamps[fault])
     stamps = {"robot stamp": value, "stale": now - 1.5, "future": now + 1.5}
     return replace(inputs, robot=replace(robot, stamp=stamps[fault]))
-
-
-def report(
-    time: float, q: np.ndarray, qd: np.ndarray, measured: np.ndarray, wrench: np.ndarray | None, torques: object
-) -> RobotState:
-    """Return a robot state in arrays of its own."""
-    return RobotState(time, measured, qd.copy(), q.copy(), qd.copy(), torques, wrench)

@@ -106,9 +106,8 @@ OURS: dict[type, dict[str, tuple[object, ...]]] = {
     GiveUpParams: {"contacts": (3, 1), "push_j": (0.3, 1e-3, 50.0), "retry_s": (0.3, 30.0)},
 }  # fmt: skip
 DETECTORS = (SequentialTest, SequentialTest, MovingThresholds)
-NAMED = ("pretouch",)
 NAMED_SHARE = 0.15
-"""Share of profiles that are named ones as they are."""
+"""Share of profiles that are the named one as it is."""
 
 
 @dataclass(frozen=True)
@@ -142,7 +141,7 @@ def any_profile(rng: np.random.Generator) -> Profile:
     """Draw each parameter, mostly the usual value in a third of the profiles; a few are named ones as they are."""
     usual = 0.85 if rng.random() < 1 / 3 else 0.4
     if rng.random() < NAMED_SHARE:
-        named = profile(str(rng.choice(NAMED)))
+        named = profile("pretouch")
         return replace(named, window=replace(named.window, samples=5))
     ours = rng.random() < 0.6
     groups = {f.name: f.type for f in fields(Profile) if f.type in CHOICES or (ours and f.type in OURS)}

@@ -85,20 +85,6 @@ def test_the_tool_frame_is_taken_for_the_end_effector(tmp_path):
     assert "choose another one with --ee: camera" in found.remarks[0]
 
 
-def fingers():
-    slide = '<limit lower="0.01" upper="0.04" velocity="1" effort="1"/>'
-    return (
-        link("left", BOX) + link("right", BOX) + joint("f1", "link6", "left", "prismatic", "0 1 0", limit=slide)
-        + joint("f2", "link6", "right", "prismatic", "0 -1 0", limit=slide, more='<mimic joint="f1"/>')
-    )  # fmt: skip
-
-
-def test_fingers_are_fixed_and_named(tmp_path):
-    found = arm(tmp_path, six_axis(fingers()))
-    assert len(found.joints) == 6
-    assert any("2 joints off the arm are fixed at 0, or at the nearest limit: f1, f2" in r for r in found.remarks)
-
-
 @pytest.mark.parametrize(("joint_name", "link_name"), [("jointGripper", "mover"), ("j7", "upper_jaw")])
 def test_a_single_finger_is_fixed_unless_asked_for(tmp_path, joint_name, link_name):
     more = link(link_name, BOX) + joint(joint_name, "link6", link_name, axis="0 1 0")

@@ -221,10 +221,15 @@ def test_links_without_mass_or_inertia_are_estimated_from_their_capsules(tmp_pat
     assert found.model.inertia[at] == pytest.approx(0.4 * kg * 0.1**2 * np.eye(3), rel=0.01)
 
 
-def test_fingers_are_fixed_where_they_are_nearest_to_zero(tmp_path):
+def test_fingers_are_fixed_where_they_are_nearest_to_zero_and_named(tmp_path):
     slide = '<limit lower="0.01" upper="0.04" velocity="1" effort="1"/>'
-    finger = link("left", BOX) + joint("f1", "link6", "left", "prismatic", "0 1 0", limit=slide)
-    model = quickly(tmp_path, six_axis(finger).replace(BOX, "<geometry/>", 5), ee="tool0").model
+    fingers = link("left", BOX) + joint("f1", "link6", "left", "prismatic", "0 1 0", limit=slide)
+    fingers += link("right") + joint(
+        "f2", "link6", "right", "prismatic", "0 -1 0", limit=slide, more='<mimic joint="f1"/>'
+    )
+    found = quickly(tmp_path, six_axis(fingers).replace(BOX, "<geometry/>", 5))
+    assert any("2 joints off the arm are fixed at 0, or at the nearest limit: f1, f2" in r for r in found.remarks)
+    model = found.model
     kin, hand, left = model.kinematics(np.zeros(6)), model.link_index("link6"), model.link_index("left")
     offset = kin.rotation[hand].T @ (kin.position[left] - kin.position[hand])
     assert offset == pytest.approx([0.0, 0.01, 0.2], abs=1e-5)

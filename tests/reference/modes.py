@@ -5,37 +5,17 @@ from dataclasses import replace
 
 import numpy as np
 
+from pretouch.modes import TABLE, Event
 from pretouch.params import FailureParams
 from pretouch.types import Inputs, Mode, RobotState
 
-UNUSABLE = "The robot's state cannot be used ({}): check the connection to the arm, then resume."
-BACKWARDS = "Time went backwards ({}): let one monotonic clock stamp everything, then resume."
-STALE = "The robot's state is {}, then resume."
 OLD = (
     "{:.3f} s old, for this machine is busy, perhaps without a real-time kernel, or the connection is slow: close other"
     " programs and check the connection to the arm"
 )
 AHEAD = "{:.3f} s in the future: let one clock stamp states and steps"
-BLOCKED = "The approach limits cannot be met within the acceleration limits: braking and trying again."
-BLOCKED_REACT = (
-    "Moving with a contact, but the approach limits allow no motion within the acceleration limits: braking."
-)
-CONTACT = "A contact of {}: yielding to what moves the arm."
-REACTING = "Moving with a contact: {} left."
-SILENT = "No usable reading from {}: check the unit's power, radio and sensor; the arm goes on when it is heard again."
-NO_FORCE = (
-    "The robot has given no force estimate for {}, as near a singularity, and contacts could not be detected: guide the"
-    " arm to another posture."
-)
-OVERRUN = (
-    "The step before this one was {} ago, for this machine is busy, perhaps without a real-time kernel: braking, then"
-    " going on. Close other programs, and give the controller a process of its own."
-)
-FILLING = (
-    "The force window is filling ({}): contacts cannot be distinguished from noise yet. The arm moves once it is full."
-)
-TRACKING = "Moving as asked."
-
+FAULTS = Event.UNUSABLE, Event.TIME_BACKWARDS, Event.STATE_STALE
+PASSING = Event.SKIN_SILENT, Event.NO_FORCE, Event.OVERRUN, Event.WINDOW_FILLING
 LARGEST = 1e3
 """What no joint position or velocity reaches [rad, rad/s]."""
 LATEST = 1e12
@@ -48,35 +28,30 @@ class Behaviour:
     def __init__(self) -> None:
         self.mode, self.reason, self.latched = Mode.HOLD, "The controller has not run yet.", False
 
-    def decide(self, seen: dict[str, str], resume: bool) -> None:
-        """Go on to the next mode; `seen` maps a sentence to the detail it needs."""
-        for sentence in (UNUSABLE, BACKWARDS, STALE):
-            if sentence in seen:
-                self._be(Mode.HOLD, sentence.format(seen[sentence]), latched=True)
-                return
+    def decide(self, seen: dict[Event, str], resume: bool) -> None:
+        """Go on to the next mode; `seen` maps an event to the detail its sentence needs."""
+        fault = next((event for event in FAULTS if event in seen), None)
+        if fault:
+            self._be(Mode.HOLD, fault, seen, latched=True)
+            return
         if self.latched and not resume:
             return
-        if self.mode is not Mode.REACT and CONTACT in seen:
-            self._be(Mode.REACT, CONTACT.format(seen[CONTACT]))
+        if self.mode is not Mode.REACT and Event.CONTACT in seen:
+            self._be(Mode.REACT, Event.CONTACT, seen)
             return
-        if self.mode is Mode.REACT and REACTING in seen:
-            self._be(Mode.REACT, REACTING.format(seen[REACTING]))
+        if self.mode is Mode.REACT and Event.REACTING in seen:
+            self._be(Mode.REACT, Event.REACTING, seen)
             return
-        for sentence in (SILENT, NO_FORCE, OVERRUN, FILLING):
-            if sentence in seen:
-                self._be(Mode.HOLD, sentence.format(seen[sentence]))
-                return
-        self._be(Mode.TRACK, TRACKING)
+        cause = next((event for event in PASSING if event in seen), Event.CLEAR)
+        self._be(Mode.TRACK if cause is Event.CLEAR else Mode.HOLD, cause, seen)
 
     def blocked(self) -> None:
         """No joint velocities meet hard rows: hold, or stay with a contact, braking."""
-        if self.mode is Mode.TRACK:
-            self._be(Mode.HOLD, BLOCKED)
-        else:
-            self._be(Mode.REACT, BLOCKED_REACT)
+        self._be(Mode.HOLD if self.mode is Mode.TRACK else Mode.REACT, Event.BLOCKED, {})
 
-    def _be(self, mode: Mode, reason: str, latched: bool = False) -> None:
-        self.mode, self.reason, self.latched = mode, reason, latched
+    def _be(self, mode: Mode, event: Event, seen: dict[Event, str], latched: bool = False) -> None:
+        sentence = next(row.sentence for row in TABLE if row.event is event and row.target is mode)
+        self.mode, self.reason, self.latched = mode, sentence.format(seen.get(event, "")), latched
 
 
 class Trust:
@@ -87,21 +62,21 @@ class Trust:
         self.qd_max = qd_max
         self.sent: list[tuple[float, np.ndarray]] = []
 
-    def judge(self, inputs: Inputs, command: np.ndarray, period: float) -> tuple[RobotState, dict[str, str]]:
+    def judge(self, inputs: Inputs, command: np.ndarray, period: float) -> tuple[RobotState, dict[Event, str]]:
         """Return the state to go by and what is wrong; a state that is not believed goes on by the last command."""
         robot, last, wrong, before = inputs.robot, self.robot, {}, self.now
         odd = unusable(inputs, self.qd_max)
         self.now = inputs.stamp if abs(inputs.stamp) < LATEST else before
         if odd:
-            wrong[UNUSABLE] = odd
+            wrong[Event.UNUSABLE] = odd
         else:
             age = inputs.stamp - robot.stamp
             if abs(age) > self.params.state_timeout_s:
-                wrong[STALE] = OLD.format(age) if age > 0 else AHEAD.format(-age)
+                wrong[Event.STATE_STALE] = OLD.format(age) if age > 0 else AHEAD.format(-age)
         kept = int(self.params.state_timeout_s / period) + 1
         self.sent = [*self.sent[-kept:], (before, command)]
         if self.now < before:
-            wrong[BACKWARDS] = f"from {before:.3f} s to {self.now:.3f} s"
+            wrong[Event.TIME_BACKWARDS] = f"from {before:.3f} s to {self.now:.3f} s"
             self.sent = []
         # a force cannot have been felt later than now
         self.felt = min(self.felt, self.now)
@@ -123,9 +98,9 @@ class Trust:
         if robot.wrench is not None:
             self.felt = self.now
         if self.now - before > self.params.overrun_s:
-            wrong[OVERRUN] = f"{self.now - before:.3f} s"
+            wrong[Event.OVERRUN] = f"{self.now - before:.3f} s"
         if self.now - self.felt > self.params.force_timeout_s:
-            wrong[NO_FORCE] = f"{self.now - self.felt:.2f} s"
+            wrong[Event.NO_FORCE] = f"{self.now - self.felt:.2f} s"
         self.robot = robot
         return robot, wrong
 

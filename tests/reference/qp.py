@@ -73,20 +73,30 @@ def solve(p: Problem) -> Answer:
 
 def _polished(p: Problem, A: np.ndarray, b: np.ndarray, C: np.ndarray, force: list[int]) -> Answer:
     """Solve with the rows in force; one that holds nothing is let go, one that is missed by rounding is taken in."""
-    n = len(p.f)
     for _ in range(10 * len(b)):
-        z = _refined(np.block([[p.H, A[force].T], [A[force], -np.diag(C[force])]]), np.concatenate([-p.f, b[force]]))
-        lam = np.zeros(len(b))
-        lam[force] = z[n:]
-        missed = A @ z[:n] - b - C * lam
+        x, lam = _held(p, A, b, C, force)
+        missed = A @ x - b - C * lam
         missed[force] = -np.inf
+        row = int(np.argmax(missed))
         if np.any(lam < 0):
-            force.remove(int(np.argmin(lam)))
-        elif missed.max() > _MET:
-            force.append(int(np.argmax(missed)))
+            force = [i for i in force if i != np.argmin(lam)]
+        elif missed[row] > _MET and np.linalg.matrix_rank(np.hstack([A, np.diag(C)])[[*force, row]]) > len(force):
+            force = [*force, row]
+        elif missed[row] > _MET:  # as many rows as joints meet in it: it takes the place of one of them
+            others = ([i for i in force if i != out] + [row] for out in force)
+            force = next(other for other in others if np.all(_held(p, A, b, C, other)[1] >= 0))
         else:
-            return Answer(np.clip(z[:n], p.lower, p.upper), np.concatenate([lam[:n] - lam[n : 2 * n], lam[2 * n :]]))
+            n = len(x)
+            return Answer(np.clip(x, p.lower, p.upper), np.concatenate([lam[:n] - lam[n : 2 * n], lam[2 * n :]]))
     raise ArithmeticError("the reference solver does not end")
+
+
+def _held(p: Problem, A: np.ndarray, b: np.ndarray, C: np.ndarray, force: list[int]) -> tuple[np.ndarray, np.ndarray]:
+    """Minimum and multipliers where these rows are met to the point, and no others looked at."""
+    K = np.block([[p.H, A[force].T], [A[force], -np.diag(C[force])]])
+    z, lam = _refined(K, np.concatenate([-p.f, b[force]])), np.zeros(len(b))
+    lam[force] = z[len(p.f) :]
+    return z[: len(p.f)], lam
 
 
 def _refined(K: np.ndarray, right: np.ndarray) -> np.ndarray:

@@ -55,7 +55,7 @@ class ReferenceController:
         posture = Posture(self.tree, robot.q)
         x, R = posture.T[model.ee, :3, 3], posture.T[model.ee, :3, :3]
         J = posture.jacobian(model.ee, x)
-        if modes.BACKWARDS in seen:
+        if Event.TIME_BACKWARDS in seen:
             self.eyes.forget()
         obstacles = self.eyes.look(posture, x, inputs.readings, now)
         force = None if robot.wrench is None else robot.wrench[:3]
@@ -88,19 +88,19 @@ class ReferenceController:
         return Reference(step, problem)
 
     def _decide(
-        self, seen: dict[str, str], silent: str, touched: Contact | None, armed: bool, resume: bool
+        self, seen: dict[Event, str], silent: str, touched: Contact | None, armed: bool, resume: bool
     ) -> Contact | None:
         """Go on to the next mode; return the contact a reaction begins with, or None."""
         p, before = self.profile, self.behaviour.mode
         if touched is not None:
-            seen[modes.CONTACT] = f"{np.linalg.norm(touched.force):.1f} N"
+            seen[Event.CONTACT] = f"{np.linalg.norm(touched.force):.1f} N"
         left = p.react.decay_cycles - self.pushed_for
         if left > 0:
-            seen[modes.REACTING] = f"{left * p.task.control_period_s:.2f} s"
+            seen[Event.REACTING] = f"{left * p.task.control_period_s:.2f} s"
         if silent:
-            seen[modes.SILENT] = silent
+            seen[Event.SKIN_SILENT] = silent
         if not armed:
-            seen[modes.FILLING] = f"{len(self.touch.samples)} of {p.window.samples} samples"
+            seen[Event.WINDOW_FILLING] = f"{len(self.touch.samples)} of {p.window.samples} samples"
         self.behaviour.decide(seen, resume)
         begins = self.behaviour.mode is Mode.REACT and before is not Mode.REACT
         if begins:

@@ -27,11 +27,6 @@ def test_there_is_a_unit_on_each_link_from_the_second_to_the_hand(panda_model, f
         assert [unit.link for unit in random_skin(model, 0).units] == [prefix + name for name in LINKS]
 
 
-def test_the_first_link_carries_one_on_request(panda_model):
-    links = [unit.link for unit in random_skin(panda_model, 0, first_link=True).units]
-    assert links == ["panda_link1", *(f"panda_{name}" for name in LINKS)]
-
-
 def test_units_sit_on_the_surface_and_look_away_from_it(panda_model):
     for seed in range(20):
         skin = random_skin(panda_model, seed)

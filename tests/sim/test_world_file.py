@@ -8,19 +8,15 @@ import mujoco
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from tests.sim.ranging import EXACT, FORWARD, NO_ERROR, ORIGIN
+from tests.sim.ranging import NO_ERROR
 
 from pretouch.errors import ParameterError
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.sensor import PAPER_SENSOR, cone_rays
-from pretouch.sensing.skin import Skin
-from pretouch.sensing.unit import SensorUnit
 from pretouch.sim.plant import Plant
-from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.rays import cast, geoms_of
 from pretouch.sim.scene import BasePose, SceneSpec
 from pretouch.sim.second_arm import SecondArm
-from pretouch.types import RangeStatus
 
 World = Callable[..., Plant]
 _FLOOR = '<geom name="floor" type="plane" size="0 0 1" pos="0 0 -0.75"/>'
@@ -76,14 +72,9 @@ def test_a_weight_on_the_wrist_is_felt_with_its_weight(world: World, panda_model
     kin = panda_model.kinematics(plant.mj_data.qpos[:7])
     for one in plant.contact_forces():
         expected += panda_model.jacobian(kin, one.link, one.point)[:3].T @ one.force
-    told = np.mean([_advanced(plant, 0.01).read().tau_ext for _ in range(30)], axis=0)
+    told = np.mean([(plant.advance(0.01), plant.read().tau_ext)[1] for _ in range(30)], axis=0)
     assert np.abs(expected).max() > 2.0
     np.testing.assert_allclose(told, expected, atol=1.0)
-
-
-def _advanced(plant: Plant, duration: float) -> Plant:
-    plant.advance(duration)
-    return plant
 
 
 def test_the_arm_stands_where_the_file_has_its_base(world: World) -> None:
@@ -160,18 +151,6 @@ def test_what_is_transparent_is_not_met(world: World) -> None:
     assert cast(origin, down, geoms_of(plant.mj_model, plant.mj_data), -1, 4.0)[0] == pytest.approx([1.05])
     plant.mj_model.geom("world/floor").rgba[3] = 0.0
     assert cast(origin, down, geoms_of(plant.mj_model, plant.mj_data), -1, 4.0)[0] == [-1.0]
-
-
-def test_units_see_a_mesh_at_its_distance(world: World, panda_model: RobotModel) -> None:
-    x, half = ORIGIN[0] + 0.4, 1.0
-    corners = " ".join(f"{i} {j * half} {k * half}" for i in (0, 0.1) for j in (-1, 1) for k in (-1, 1))
-    mesh = f'<asset><mesh name="wall" vertex="{corners}"/></asset>'
-    plant = world(f'<geom type="mesh" mesh="wall" pos="{x} 0 {ORIGIN[2]}"/>', mesh)
-    skin = Skin([SensorUnit("unit", "panda_hand", FORWARD)], panda_model)
-    finders = RangeFinders(plant, skin, RangeFinderParams(rings=0, **EXACT), 0)
-    told = _advanced(plant, 0.1) and finders.read()
-    assert told.status[0] == RangeStatus.OK
-    assert told.distance[0] == pytest.approx(0.4, abs=1e-3)
 
 
 _HINGE = '<body name="door"><joint name="hinge"/><geom size=".1" mass="1"/>{}</body>'
