@@ -74,11 +74,9 @@ def test_two_units_of_one_name_are_refused(panda_model, good):
         calibrate(panda_model, CalibrationData(good.joints, (good.units[1], good.units[1])))
 
 
-def test_a_link_that_the_arm_does_not_have_is_refused(panda_model, moving_arm, pair):
-    data = moving_arm.data(pair)
-    object.__setattr__(data.units[0], "link", "panda_elbow")
+def test_a_link_that_the_arm_does_not_have_is_refused(panda_model, good):
     with pytest.raises(RobotModelError, match="panda_elbow"):
-        calibrate(panda_model, data)
+        calibrate(panda_model, replace(good, units=(replace(good.units[0], link="panda_elbow"),)))
 
 
 def test_no_units_make_an_empty_calibration(panda_model, good):

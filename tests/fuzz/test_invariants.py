@@ -10,7 +10,6 @@ from pretouch.control.path import Circle
 from pretouch.modes import Event
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import PROFILES
-from pretouch.robot.description import fr3
 from pretouch.types import Inputs, Mode, QpOutcome, RangeReadings
 from tests.fuzz import invariants
 from tests.fuzz.machine import Course, Machine
@@ -85,26 +84,6 @@ def test_what_breaks_an_invariant_is_noticed(arm, check):
     told(*arm)
     with pytest.raises(AssertionError):
         check(*arm)
-
-
-def test_a_speed_beyond_an_envelope_is_noticed():
-    description = fr3()
-    reach, e = description.qdd_max * 0.01, description.envelope
-    # 0.3 rad before the end of the upper side and of the lower one
-    place = np.stack((e.q_upper, -e.q_lower)) - 0.3
-    most = np.sqrt(e.slope * 0.3) - e.offset
-    assert invariants.below_envelope(np.stack((0.5 * most, 0.5 * most)), place, reach, 0.01, e).all()
-    for side in range(2):
-        speed = np.zeros((2, 7))
-        speed[side] = most + 1e-3
-        below = invariants.below_envelope(speed, place, reach, 0.01, e)
-        assert not below[side].any()
-        assert below[1 - side].all()
-    # where braking is weaker than the envelope is steep, what is below it now may not stay there
-    steep = e.slope / 2 > description.qdd_max
-    assert steep.any()
-    speed = np.stack((most - 1e-3, np.zeros(7)))
-    assert not invariants.below_envelope(speed, place, reach, 0.01, e)[0, steep].any()
 
 
 def test_a_difference_in_the_last_bit_is_noticed(arm):

@@ -120,14 +120,14 @@ class Parser:
     words: tuple[bytes, ...] = (b"\n", b"[[", b"]]", b"=", b"'", b'"""', b"{", b"}", b",", b";", b"inf", b"nan", b"a.b")
 
 
-def _file(folder: Path, name: str, read: Callable[[Path], object]) -> Read:
-    """Return what writes bytes to a file and has it read."""
+def _of_file(folder: Path, name: str, read: Callable[[Path], object], *corpus: bytes, **more: Any) -> Parser:
+    """Write bytes to a file and have it read."""
 
     def written(data: bytes) -> object:
         (folder / name).write_bytes(data)
         return read(folder / name)
 
-    return written
+    return Parser(list(corpus), written, **more)
 
 
 @contextmanager
@@ -139,7 +139,7 @@ def parsers(folder: Path) -> Iterator[dict[str, Parser]]:
         "recording": _of_file(folder, "a.mcap", _read_whole, (folder / "whole.mcap").read_bytes()),
         "recording of units": _of_file(folder, "b.mcap", read_skin, _units_recorded(folder / "units.mcap")),
         **_of_tables(folder, model),
-        **_of_robots(folder),
+        "URDF": _of_file(folder, "arm.urdf", lambda p: arm_of(read_robot(p)), six_axis().encode(), words=TAGS),
         **_of_tomls(folder, model),
         "profile": Parser(
             [b"pretouch:detect.memory_s=100:react.reach_m=0.2"], lambda data: profile(data.decode(errors="replace"))
@@ -150,12 +150,9 @@ def parsers(folder: Path) -> Iterator[dict[str, Parser]]:
         yield found | {"wire": _of_units(bench)}
 
 
+TAGS = tuple(f"<{tag}>".encode() for tag in ("link", "joint", "geometry", "mesh", "/a"))
 _HUGE = b"1" + 400 * b"0"
 """A whole number that no float holds."""
-
-
-def _of_file(folder: Path, name: str, read: Callable[[Path], object], *corpus: bytes) -> Parser:
-    return Parser(list(corpus), _file(folder, name, read))
 
 
 def _units_recorded(place: Path) -> bytes:
@@ -204,15 +201,6 @@ def _of_tables(folder: Path, model: RobotModel) -> dict[str, Parser]:
         "CSV of torques": _of_file(folder, "b.csv", read_torques, torques, late + b"9223372037.0" + 28 * b",0"),
         "ROS bag": _of_file(folder, "a.bag", _read_force, bag),
     }
-
-
-# robots
-
-
-def _of_robots(folder: Path) -> dict[str, Parser]:
-    tags = tuple(f"<{tag}>".encode() for tag in ("link", "joint", "geometry", "mesh", "/a"))
-    read = _file(folder, "arm.urdf", lambda place: arm_of(read_robot(place)))
-    return {"URDF": Parser([six_axis().encode()], read, words=tags)}
 
 
 # TOML

@@ -1,7 +1,6 @@
 """Samples in time, joints by their names, and what cannot be opened."""
 
 import os
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -143,10 +142,3 @@ def test_what_cannot_be_opened_is_one_sentence_for_all_that_read(tmp_path, panda
     if not choice:
         with pytest.raises(RecordingError, match=words):
             read_joints(tmp_path / name, panda_model)
-
-
-def test_a_log_of_joints_keeps_them_in_order_with_their_time(log):
-    both = replace(log([3, 1, 2]), arrays={"q": np.array([[3.0], [1.0], [2.0]])})
-    ordered = both.in_order("q")
-    assert ordered.arrays["q"][:, 0].tolist() == [1.0, 2.0, 3.0]
-    assert ordered.notes[0].values["what"] == "Joints"

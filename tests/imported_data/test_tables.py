@@ -9,7 +9,7 @@ from pretouch.errors import RecordingError
 from pretouch.imported_data.forces import read_force
 from pretouch.imported_data.log import Choice
 from pretouch.imported_data.reading import open_log, read_joints
-from tests.imported_data.files import PANDA, force_columns, write_csv
+from tests.imported_data.files import force_columns, write_csv
 
 FORCE = np.random.default_rng(0).normal(size=(50, 3))
 Q = np.array([0.1, -0.7, 0.2, -2.3, 0.3, 1.6, 0.7])
@@ -66,19 +66,6 @@ def test_units_of_time_are_converted(tmp_path, unit, per_second):
     np.testing.assert_allclose(log.time, 1.7e18 + np.arange(50) * 1e7, rtol=0, atol=1e3)
 
 
-@pytest.mark.parametrize(
-    "names",
-    [NAMED, tuple(f"Q{i}_RAD" for i in range(1, 8)), tuple(f"{n}_rad" for n in PANDA),
-     tuple(f"fr3_joint{i}_rad" for i in range(1, 8))],
-)  # fmt: skip
-def test_joints_are_named_by_number_or_by_name(tmp_path, panda_model, names):
-    trace, log = read_joints(write_csv(tmp_path / "a.csv", table(names)), panda_model)
-    np.testing.assert_array_equal(trace.q, MOVING)
-    np.testing.assert_allclose(trace.stamp, 5.0 + np.arange(50) / 100, atol=1e-9)
-    assert log.notes == ()
-    assert log.sources["q"] == names[0]
-
-
 def test_columns_may_stand_in_any_order_among_others_and_in_degrees(tmp_path, panda_model):
     columns = table()
     shuffled = {name.replace("rad", "deg"): np.degrees(columns[name]) for name in reversed(NAMED)}
@@ -93,19 +80,6 @@ def test_empty_cells_are_no_estimate_and_rows_without_time_are_left_out(tmp_path
     recording = read_force(open_log(written(tmp_path, text), Choice()), Choice())
     np.testing.assert_array_equal(np.isnan(recording.force[:, 0]), [False, False, True, True, True, False])
     assert [(note.code, note.values["count"]) for note in recording.notes] == [("no_time", 1), ("no_estimate", 3)]
-
-
-def test_what_is_no_number_or_comes_twice_is_left_out_and_counted(tmp_path, panda_model):
-    columns = table()
-    columns["q3_rad"] = np.where(np.arange(50) == 7, np.nan, columns["q3_rad"])
-    columns["time_s"][[20, 21]] = columns["time_s"][[21, 20]]
-    columns["time_s"][31] = columns["time_s"][30]
-    columns["time_s"][40] = np.nan
-    trace, log = read_joints(write_csv(tmp_path / "a.csv", columns), panda_model)
-    np.testing.assert_array_equal(trace.q, np.delete(MOVING[[*range(20), 21, 20, *range(22, 50)]], [7, 30, 40], axis=0))
-    assert [(note.code, note.values["count"]) for note in log.notes] == [
-        ("no_time", 1), ("not_finite", 1), ("sorted", 1), ("repeated", 1),
-    ]  # fmt: skip
 
 
 @pytest.mark.parametrize(

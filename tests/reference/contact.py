@@ -54,14 +54,6 @@ class Touch:
         axes = (reading > upper) | (reading < lower)
         return limits, Contact(reading - mean, axes) if axes.any() else None, armed
 
-    def evidence(self, force: np.ndarray | None, limits: Thresholds) -> float:
-        """Largest distance from the mean as a part of the band on that side."""
-        if force is None:
-            return 0.0
-        x = self.newest if self.params.compare == "filtered" else force
-        up, down = (x - limits.mean) / (limits.upper - limits.mean), (limits.mean - x) / (limits.mean - limits.lower)
-        return float(np.max(np.maximum(up, down)))
-
     def _add(self, force: np.ndarray, full: bool) -> None:
         value = np.array(force)
         if full:

@@ -4,7 +4,7 @@ import numpy as np
 
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.sensing.unit import SensorUnit
+from pretouch.sensing.unit import SensorUnit, seat
 
 HEIGHT = 0.008
 """Height of a unit above the surface it is on [m]."""
@@ -39,7 +39,7 @@ def spread(model: RobotModel, count: int, seed: int) -> Skin:
         out /= np.linalg.norm(out)
         foot = body.a[c] + np.clip(along, 0.0, length[c]) * axis
         place = foot + (body.radius[c] + HEIGHT) * out
-        if _covered(model, int(body.link[c]), place):
+        if seat(model, int(body.link[c]), place).height < HEIGHT / 2:
             continue
         side = np.cross(out, rng.normal(size=3))
         side /= np.linalg.norm(side)
@@ -48,12 +48,3 @@ def spread(model: RobotModel, count: int, seed: int) -> Skin:
         sigmas = doubt.uniform(0.0, MOST_UNSURE) * UNSURE[len(units) % len(UNSURE)]
         units.append(SensorUnit(f"unit_{len(units)}", model.links[body.link[c]], T, *sigmas))
     return Skin(units, model)
-
-
-def _covered(model: RobotModel, link: int, place: np.ndarray) -> bool:
-    own = model.capsules.of_links(np.array([link]))
-    for a, b, radius in zip(own.a, own.b, own.radius, strict=True):
-        along = np.clip((place - a) @ (b - a) / ((b - a) @ (b - a)), 0.0, 1.0)
-        if np.linalg.norm(place - a - along * (b - a)) < radius + HEIGHT / 2:
-            return True
-    return False

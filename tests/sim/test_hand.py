@@ -65,15 +65,10 @@ def test_a_disturbed_hand_comes_to_rest(plant_with_hand):
     assert np.abs(away[200:]).max() < 1e-4
 
 
-def push_up(hand_plant: Callable[..., Plant], force_max: float) -> tuple[Plant, Hand]:
-    """A hand 2 cm below the fingertip that wants to go 10 cm up."""
-    plant = hand_plant((0.3069, 0.0, 0.4082))
-    return plant, Hand(plant, Script(stay((0.3069, 0.0, 0.5)), force_max), PersonArm(speed_max=0.1))
-
-
 @pytest.mark.parametrize("force_max", [5.0, 20.0, 40.0])
 def test_a_hand_pushes_with_no_more_than_its_force(plant_with_hand, force_max):
-    plant, hand = push_up(plant_with_hand, force_max)
+    plant = plant_with_hand((0.3069, 0.0, 0.4082))  # 2 cm below the fingertip
+    hand = Hand(plant, Script(stay((0.3069, 0.0, 0.5)), force_max), PersonArm(speed_max=0.1))
     applied = each_step(plant, 1.5, lambda: plant.mj_data.qfrc_applied[-3:])
     assert np.linalg.norm(applied, axis=1).max() <= force_max + 1e-9
     assert np.linalg.norm(plant.true_force) == pytest.approx(force_max, rel=0.02)

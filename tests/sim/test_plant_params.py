@@ -29,12 +29,6 @@ def test_torques_of_another_arm_are_scaled_by_its_limits():
     assert found.stiffness_nm_rad == tuple(own.stiffness_nm_rad[k] for k in (0, 1, 2, 4, 5, 6))
 
 
-def test_figures_for_another_number_of_joints_are_refused(panda_model):
-    params = dataclasses.replace(PlantParams(), stiffness_nm_rad=(1000.0,) * 6)
-    with pytest.raises(ParameterError, match="stiffness_nm_rad has 6 values, the arm 7 joints"):
-        Plant(panda_model, SceneSpec(), params, panda_model.description.q_ready, 0)
-
-
 MODEL = RobotModel(panda())
 
 
@@ -99,6 +93,8 @@ def test_what_is_known_changes_no_other_draw():
 
 
 def test_what_is_known_of_another_arm_is_refused():
+    with pytest.raises(ParameterError, match="stiffness_nm_rad has 6 values, the arm 7 joints"):
+        plant(stiffness_nm_rad=(1000.0,) * 6)
     with pytest.raises(ParameterError, match="mass_factors has 3 values"):
         plant(mass_factors=(1.0, 1.0, 1.0))
     with pytest.raises(ParameterError, match="offsets_nm has 6 values"):

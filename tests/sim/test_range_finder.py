@@ -6,7 +6,7 @@ from tests.sim.ranging import CONE_MEAN, EXACT, FORWARD, NO_ERROR, Rig, ball, wa
 
 from pretouch.errors import ParameterError
 from pretouch.perception.scene_filter import ray_capsule
-from pretouch.sensing.sensor import PAPER_SENSOR, Sensor
+from pretouch.sensing.sensor import Sensor
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit
 from pretouch.sim.plant import Plant
@@ -36,9 +36,11 @@ def test_each_unit_has_its_own_constant_offset(rig):
     assert np.std(means[0]) == pytest.approx(0.01 / np.sqrt(3.0), rel=0.25)  # uniform
 
 
-@pytest.mark.parametrize(("mode", "rate"), [("short", 50.0), ("long", 7.14)])
-def test_units_measure_at_the_rate_of_their_mode_each_at_its_own_phase(rig, mode, rate):
-    readings = rig(wall(0.5), units=10, mode=mode, dropout=0.0, jitter_s=0.0).collect(3.0)
+@pytest.mark.parametrize(
+    ("told", "rate"), [({"mode": "short"}, 50.0), ({"mode": "long"}, 7.14), ({"rate_hz": 10.0}, 10.0)]
+)
+def test_units_measure_at_the_rate_of_their_mode_or_as_told_each_at_its_own_phase(rig, told, rate):
+    readings = rig(wall(0.5), units=10, **told, dropout=0.0, jitter_s=0.0).collect(3.0)
     phases = []
     for unit in range(10):
         stamps = readings["stamp"][readings["unit"] == unit]
@@ -237,12 +239,6 @@ def test_a_skin_without_units_reads_nothing(panda_model):
     finders = RangeFinders(plant, Skin([], panda_model), RangeFinderParams(), seed=0)
     plant.advance(0.05)
     assert len(finders.read().stamp) == 0
-
-
-def test_units_measure_as_often_as_they_are_told():
-    assert RangeFinderParams().period_s == PAPER_SENSOR.ranging("short").period_s
-    assert RangeFinderParams(mode="long").period_s == PAPER_SENSOR.ranging("long").period_s
-    assert RangeFinderParams(rate_hz=10.0).period_s == 0.1
 
 
 # All that a sensor says, for whoever brings it somewhere
