@@ -8,12 +8,6 @@ import pytest
 from tests.firmware import harness
 
 
-@pytest.fixture
-def micropython() -> harness.Run:
-    """The real MicroPython; the test is skipped where it is missing."""
-    return harness.micropython
-
-
 @pytest.fixture(params=["cpython", "micropython"])
 def unit_python(request: pytest.FixtureRequest, tmp_path: Path) -> harness.Run:
     """Both interpreters, one after the other."""

@@ -4,19 +4,18 @@ Both interpreters find every file of `firmware/` and `tests/firmware/fakes/` und
 the files they are given besides; a file given hides one of the same name. Each run is a process of its own.
 
 - `MicroPython` is the WebAssembly build in Node, put into `build/micropython` by `make micropython`. It has `struct`,
-  `hashlib`, `micropython`, `array`, `gc`, `json`, `os`, `select`, `time.ticks_us`; it has no `machine`, `network`,
-  `socket`: give fakes of them as files.
-- `CPython` has stand-ins (`tests/firmware/shims`) for the module `micropython` and for what MicroPython's `time`, `gc`
-  and `sys` have besides.
+  `hashlib`, `micropython`, `array`, `gc`, `json`, `os`, `select`, `time.ticks_us`. Of `machine`, `network`, `socket`
+  and `esp` there are fakes.
+- `CPython` has stand-ins (`tests/firmware/shims`) for the module `micropython` and for what MicroPython's `time` and
+  `sys` have besides.
 
-In tests, use the fixtures of conftest.py: `micropython(files, script)` and `unit_python(files, script)`, which runs a
+In tests, use `micropython(files, script)`, or the fixture of conftest.py `unit_python(files, script)`, which runs a
 test once in each. Both return the lines that the script printed, and fail the test if the script raises.
 
 Tests that are all unit-side are functions without arguments in a module of `tests/firmware/cases/`, in plain asserts,
-which together.py runs in one process.
+which test_cases.py runs in one process.
 """
 
-import ast
 import base64
 import json
 import shutil
@@ -56,15 +55,24 @@ def _lines(command: list[str | Path], stdin: str) -> list[str]:
     return lines if lines[-1] else lines[:-1]
 
 
-def micropython(files: Files, script: str) -> list[str]:
-    """Return the lines a script prints in MicroPython. Skip the test where Node or the package is missing."""
-    node = shutil.which("node")
-    if node is None:
+def node(program: str) -> list[str | Path]:
+    """Return the command that runs a program of ours with MicroPython. Skip the test where Node or that is missing."""
+    found = shutil.which("node")
+    if found is None:
         skip_for("apt-get install nodejs npm")
     if not PACKAGE.exists():
         skip_for("make micropython")
-    packed = {name: base64.b64encode(content).decode() for name, content in _tree(files).items()}
-    return _lines([node, HERE / "run.mjs", PACKAGE], json.dumps({"files": packed, "script": script}))
+    return [found, HERE / program, PACKAGE]
+
+
+def packed(files: Mapping[str, bytes]) -> dict[str, str]:
+    """Return files as our programs for Node take them."""
+    return {name: base64.b64encode(content).decode() for name, content in files.items()}
+
+
+def micropython(files: Files, script: str) -> list[str]:
+    """Return the lines a script prints in MicroPython. Skip the test where Node or the package is missing."""
+    return _lines(node("run.mjs"), json.dumps({"files": packed(_tree(files)), "script": script}))
 
 
 def cpython(files: Files, script: str, folder: Path) -> list[str]:
@@ -74,9 +82,3 @@ def cpython(files: Files, script: str, folder: Path) -> list[str]:
     start = f"import sys; sys.path[:0] = [{str(folder)!r}, {str(HERE / 'shims')!r}]; import as_on_unit; "
     start += "exec(compile(sys.stdin.read(), '<stdin>', 'exec'))"
     return _lines([sys.executable, "-I", "-S", "-B", "-c", start], script)
-
-
-def cases(module: str) -> list[str]:
-    """Names of the functions of a module of `tests/firmware/cases/`; those that begin with _ are helpers."""
-    tree = ast.parse((HERE / "cases" / f"{module}.py").read_text())
-    return [item.name for item in tree.body if isinstance(item, ast.FunctionDef) and not item.name.startswith("_")]

@@ -1,9 +1,8 @@
-"""In both interpreters: tests/firmware/cases/config.py, and what the host writes."""
+"""A unit reads what the host writes."""
 
 from pretouch.hardware.keys import UnitKey
 from pretouch.hardware.provision import Network, configuration
 from tests.firmware.harness import Run
-from tests.firmware.together import run_all
 
 SHOW = """
 import os, sys
@@ -13,10 +12,6 @@ read = config.load()
 for text in (read.ssid, read.password, read.host): print(text.encode())
 print(read.unit, read.port, read.key == bytes(range(32)), read.zones, read.sensor)
 """
-
-
-def test_config(unit_python: Run) -> None:
-    run_all(unit_python, "config")
 
 
 def test_a_unit_reads_what_the_host_writes_with_characters_beyond_16_bits(unit_python: Run) -> None:

@@ -1,4 +1,4 @@
-"""The unit's datagrams against the receiver's own code."""
+"""The unit's datagrams, and what its drivers put into them, against the receiver's own code."""
 
 import dataclasses
 import json
@@ -6,6 +6,8 @@ import json
 import numpy as np
 
 from pretouch.hardware import wire
+from pretouch.sensing.imu_scale import ACCELERATION_LSB, ANGULAR_RATE_LSB, STANDARD_GRAVITY
+from pretouch.types import RangeStatus
 from tests.firmware.harness import Run
 
 KEY, CHALLENGE, NONCE = bytes(range(32)), b"challeng", b"nonce678"
@@ -110,3 +112,37 @@ def test_bytes_of_version_1_stay_as_they_are(unit_python: Run) -> None:
         + "ffffffff"
         + "4275fe96ca4f2d30cf0af69bdf050af6"
     )
+
+
+def test_the_wire_reads_the_samples_of_the_imu_and_their_scales(unit_python: Run) -> None:
+    """The sensor at rest, z up, turning at 100 degrees a second about x; counts by the data sheet's sensitivities."""
+    script = """
+from fake_bus import Bus, Clock
+from fake_lsm6ds3 import FakeLsm6ds3
+from lsm6ds3 import LSM6DS3
+
+SCALES = (2, 125, 16393, 22857), (4, 500, 8197, 5714), (8, 245, 4098, 11429), (16, 2000, 2049, 1429)
+for g, dps, one_g, turn in SCALES:
+    clock = Clock()
+    bus = Bus(clock)
+    device = FakeLsm6ds3(clock)
+    device.sample = lambda k: (turn, 0, 0, 0, 0, one_g)
+    bus.add(device)
+    sensor = LSM6DS3(bus, sleep_ms=clock.sleep_ms, ticks_us=clock.ticks_us, ticks_diff=clock.ticks_diff)
+    sensor.begin(416, g, dps)
+    clock.advance(20_000)
+    buffer = memoryview(bytearray(120))
+    count = sensor.drain(buffer, 10)
+    print(sensor.scale_code, bytes(buffer[: 12 * count]).hex())
+"""
+    for line in unit_python({}, script):
+        code, data = line.split()
+        acceleration, turn = wire.imu_values(bytes.fromhex(data), int(code))
+        assert len(turn) == 8
+        np.testing.assert_allclose(acceleration, [[0, 0, STANDARD_GRAVITY]] * 8, atol=max(ACCELERATION_LSB.values()))
+        np.testing.assert_allclose(turn, [[np.deg2rad(100), 0, 0]] * 8, atol=max(ANGULAR_RATE_LSB.values()))
+
+
+def test_each_status_a_driver_gives_is_one_the_controller_knows(unit_python: Run) -> None:
+    printed = unit_python({}, "import vl53l1x, vl53l5cx\nprint(*vl53l1x._STATUS + vl53l5cx._STATUS_OF)")
+    assert {int(code) for code in printed[0].split()} | {2, 14} <= set(RangeStatus)

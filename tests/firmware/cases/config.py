@@ -5,6 +5,7 @@ import os
 import sys
 
 from config import PATH, ConfigError, load
+from fake_bus import error_of
 
 os.chdir(sys.path[0])
 VALUES = {
@@ -17,15 +18,7 @@ VALUES = {
 def _fault(text):
     with open(PATH, "w") as file:
         file.write(text)
-    return _fault_of_file()
-
-
-def _fault_of_file():
-    try:
-        load()
-    except ConfigError as error:
-        return str(error)
-    raise AssertionError("there was a configuration")
+    return error_of(load, kind=ConfigError)
 
 
 def is_read_as_it_was_written():
@@ -62,4 +55,4 @@ def none_is_told_apart_from_a_torn_one():
     with open(PATH, "w") as file:
         file.write("")
     os.remove(PATH)
-    assert _fault_of_file() == "there is no configuration"
+    assert error_of(load, kind=ConfigError) == "there is no configuration"

@@ -122,10 +122,3 @@ def a_broken_sensor_is_told_as_such():
     pin.broken = True
     contact, status, raw, force, _ = unit.run(SECOND)[-1]["touch"]
     assert (contact, status, raw, force) == (0, 1, 2, 0xFFFFFFFF)
-
-
-def a_unit_without_a_sensor_says_nothing_of_touch():
-    unit = FakeUnit()
-    samples = unit.run(2 * SECOND)
-    assert len(samples) > 50
-    assert not any(s["flags"] & TOUCH for s in samples)

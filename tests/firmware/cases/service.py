@@ -14,8 +14,9 @@ from clock import Clock
 from config import Config
 from fake_bus import Bus as FakeBus
 from fake_bus import Clock as FakeClock
+from fake_bus import error_of
 from fake_lsm6ds3 import FakeLsm6ds3
-from fake_receiver import FakeReceiver, FakeTime
+from fake_receiver import Draw, FakeReceiver
 from fake_vl53l1x import FakeVl53l1x
 from lsm6ds3 import LSM6DS3
 from vl53l1x import VL53L1X
@@ -23,7 +24,7 @@ from vl53l1x import VL53L1X
 os.chdir(sys.path[0])
 KEY = "00112233445566778899aabbccddeeff" * 2
 CONFIG = {
-    "unit": 7, "key": KEY, "ssid": "net", "password": "password", "host": "10.0.0.1", "port": 4950,
+    "unit": 7, "key": KEY, "ssid": "net", "password": "correct horse", "host": "10.0.0.1", "port": 4950,
     "battery_full_mv": 0, "sensor": "vl53l1x", "zones": 1, "touch_ohm": 0, "touch_least_mn": 500, "touch_mn_per_us": 10,
 }  # fmt: skip
 SECOND = 1_000_000
@@ -36,25 +37,20 @@ class _Enough(BaseException):
 class _Draw(Esp8266):
     """An ESP8266; not every interpreter that tests run in has `os.urandom`."""
 
-    drawn = 0
-
-    def draw(self, size):
-        _Draw.drawn += 1
-        return bytes([_Draw.drawn & 0xFF] * size)
+    draw = Draw()
 
 
-class _Time(FakeTime):
+class _Time(FakeClock):
     """The module `time` of a chip: sleeping lets time pass, `events` happen, and the watchdog look."""
 
-    def __init__(self, clock):
-        super().__init__(clock)
-        self.clock = clock
+    def __init__(self):
+        super().__init__()
         self.events = []
 
     def sleep_ms(self, ms):
-        self.clock.sleep_ms(ms)
+        super().sleep_ms(ms)
         machine.state.check_watchdog()
-        while self.events and self.events[0][0] <= self.clock.now_us:
+        while self.events and self.events[0][0] <= self.now_us:
             self.events.pop(0)[1]()
 
 
@@ -64,16 +60,19 @@ class _Chip:
     def __init__(self):
         machine.state.__init__()
         network.state.__init__()
-        self.now = machine.state.clock = FakeClock()
-        self.bus = machine.state.bus = FakeBus(self.now)
-        self.vl53l1x, self.lsm6ds3 = FakeVl53l1x(self.now), FakeLsm6ds3(self.now)
+        self.time = service.time = machine.state.clock = _Time()
+        self.bus = machine.state.bus = FakeBus(self.time)
+        self.vl53l1x, self.lsm6ds3 = FakeVl53l1x(self.time), FakeLsm6ds3(self.time)
         self.bus.add(self.vl53l1x)
         self.bus.add(self.lsm6ds3)
         self.receiver = socket.state.receiver = FakeReceiver(7, bytes(Config(CONFIG).key))
-        self.time = service.time = _Time(self.now)
-        sleep, ticks = self.now.sleep_ms, self.now.ticks_us
-        service.VL53L1X = lambda i2c: VL53L1X(i2c, 0x29, sleep)
-        service.LSM6DS3 = lambda i2c: LSM6DS3(i2c, None, sleep, ticks, FakeTime.ticks_diff)
+        time = self.time
+
+        def sleep_ms(ms):
+            time.advance(1000 * ms)
+
+        service.VL53L1X = lambda i2c: VL53L1X(i2c, 0x29, sleep_ms)
+        service.LSM6DS3 = lambda i2c: LSM6DS3(i2c, None, sleep_ms, time.ticks_us, time.ticks_diff)
         self._beacon(SECOND // 2)
 
     def _beacon(self, at):
@@ -91,28 +90,18 @@ class _Chip:
 
     def serve(self, until_us):
         self.at(until_us, _enough)
-        try:
-            service.serve(_Draw(), Clock(self.time), Config(CONFIG))
-        except _Enough:
-            return self.receiver.samples
-        raise AssertionError("it ended by itself")
+        error_of(service.serve, _Draw(), Clock(self.time), Config(CONFIG), kind=_Enough)
+        return self.receiver.samples
 
 
 def _enough():
-    raise _Enough
-
-
-def _set_there(there):
-    def change():
-        network.state.there = there
-
-    return change
+    raise _Enough("seen")
 
 
 def a_touch_sensor_is_looked_at_on_a_board_that_has_a_pin_for_it():
     told = dict(CONFIG, touch_ohm=3300, touch_least_mn=500, touch_mn_per_us=10)
     machine.state.__init__()
-    clock = Clock(FakeTime(FakeClock()))
+    clock = Clock(FakeClock())
     touch = service.touch_of(Esp32C3(), clock, Config(told))
     touch.step(clock.ticks())
     assert touch.new, "1250 mV at the pin"
@@ -122,20 +111,10 @@ def a_touch_sensor_is_looked_at_on_a_board_that_has_a_pin_for_it():
     assert board.noted() == "this board has no pin for a touch sensor"
 
 
-def it_joins_and_says_50_samples_a_second():
-    chip = _Chip()
-    samples = chip.serve(5 * SECOND)
-    assert network.state.asked == ("net", "password")
-    assert socket.state.sent_to == {("10.0.0.1", 4950)}
-    assert 200 <= len(samples) <= 250
-    assert sum(s["flags"] & 1 for s in samples) > 190
-    assert machine.state.hz == 160_000_000
-
-
 def a_network_lost_and_back_is_no_end():
     chip = _Chip()
-    chip.at(3 * SECOND, _set_there(False))
-    chip.at(9 * SECOND, _set_there(True))
+    chip.at(3 * SECOND, lambda: setattr(network.state, "there", False))
+    chip.at(9 * SECOND, lambda: setattr(network.state, "there", True))
     samples = chip.serve(14 * SECOND)
     assert 300 < len(samples) < 500
     assert samples[-1]["time_us"] > 13.9 * SECOND
@@ -158,12 +137,9 @@ def a_call_that_never_returns_lets_the_watchdog_bite():
         while True:
             chip.time.sleep_ms(100)
 
-    def break_bus():
-        chip.bus.readfrom_mem_into = hang
-
-    chip.at(2 * SECOND, break_bus)
-    assert _reset_in(lambda: chip.serve(10 * SECOND)) == "watchdog"
-    assert 5 * SECOND <= chip.now.now_us < 5.3 * SECOND
+    chip.at(2 * SECOND, lambda: setattr(chip.bus, "readfrom_mem_into", hang))
+    assert error_of(chip.serve, 10 * SECOND, kind=machine.Reset) == "watchdog"
+    assert 5 * SECOND <= chip.time.now_us < 5.3 * SECOND
 
 
 lines = []
@@ -178,15 +154,7 @@ def _configure():
 def _run(board):
     service.this_board = lambda: board
     service.print = lambda *words: lines.append(" ".join(map(str, words)))
-    return _reset_in(service.run)
-
-
-def _reset_in(run):
-    try:
-        run()
-    except machine.Reset as error:
-        return str(error)
-    raise AssertionError("it went on")
+    return error_of(service.run, kind=machine.Reset)
 
 
 def an_error_nobody_expected_is_noted_and_the_unit_begins_anew():
@@ -202,7 +170,7 @@ def an_error_nobody_expected_is_noted_and_the_unit_begins_anew():
     assert "MemoryError" in board.noted()
     assert "of no use" in board.noted()
     assert KEY not in board.noted()
-    assert "password" not in board.noted()
+    assert "correct horse" not in board.noted()
 
 
 def a_note_may_be_any_bytes():
@@ -225,19 +193,20 @@ def without_a_configuration_there_is_the_prompt_and_nothing_is_sent():
     assert chip.receiver.hellos == []
 
 
-def for_3_s_after_a_reset_there_is_no_watchdog_and_then_it_serves():
+def for_3_s_after_a_reset_there_is_no_watchdog_and_then_it_joins_and_says_50_samples_a_second():
     chip = _Chip()
     _configure()
     chip.at(3 * SECOND - 1000, lambda: _none_yet(chip))
-    chip.at(11 * SECOND, _enough)
-    try:
-        _run(_Draw())
-    except _Enough:
-        times = [s["time_us"] for s in chip.receiver.samples]
-        assert 0 <= chip.receiver.hellos[0][2] <= times[0] <= times[-1] <= 8 * SECOND, times[-1]
-        assert len(times) > 150
-        return
-    raise AssertionError("it ended")
+    chip.at(8 * SECOND, _enough)
+    error_of(_run, _Draw(), kind=_Enough)
+    samples = chip.receiver.samples
+    times = [s["time_us"] for s in samples]
+    assert 0 <= chip.receiver.hellos[0][2] <= times[0] <= times[-1] <= 5 * SECOND, times[-1]
+    assert network.state.asked == ("net", "correct horse")
+    assert socket.state.sent_to == (("10.0.0.1", 4950),)
+    assert 200 <= len(samples) <= 250
+    assert sum(s["flags"] & 1 for s in samples) > 190
+    assert machine.state.hz == 160_000_000
 
 
 def _none_yet(chip):

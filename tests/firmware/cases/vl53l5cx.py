@@ -26,6 +26,16 @@ def _file(content):
         file.write(content)
 
 
+def _read(target):
+    """Let 4 x 4 zones see this, and read them."""
+    clock, _, device, sensor = _made(4)
+    device.target = lambda us: target
+    sensor.begin()
+    clock.advance(17_000)
+    sensor.read()
+    return sensor
+
+
 def _zones(sensor):
     return [struct.unpack_from("<HHB", sensor.zones, 2 + 5 * k) for k in range(sensor.zones[0] ** 2)]
 
@@ -74,11 +84,7 @@ def grids_of_4_x_4_are_means():
 
 
 def a_reading_has_each_zones_own_distance_along_its_beam():
-    clock, _, device, sensor = _made(4)
-    device.target = lambda us: [(5, 1, 4 * 1000 + k, 128 * 3, 16 * 20) for k in range(16)]
-    sensor.begin()
-    clock.advance(20_000)
-    sensor.read()
+    sensor = _read([(5, 1, 4 * 1000 + k, 128 * 3, 16 * 20) for k in range(16)])
     # beams of 4 x 4 zones lie at 5.625 and 16.875 degrees: 1 / cos is 1.0097, 1.0497 and 1.0882 of two of them
     mm = [zone[0] for zone in _zones(sensor)]
     assert abs(mm[5] - 1.0097 * 1001.25) <= 1, mm
@@ -102,23 +108,12 @@ def every_status_is_translated_and_no_target_is_nothing_near():
 
 
 def the_nearest_target_is_told_and_not_a_nearer_doubt():
-    clock, _, device, sensor = _made(4)
-    device.target = lambda us: (
-        [(4, 1, 40, 128, 0), (9, 1, 8000, 256, 0), (5, 1, 4000, 128, 16)] + [(255, 0, 0, 0, 0)] * 13
-    )
-    sensor.begin()
-    clock.advance(17_000)
-    sensor.read()
+    sensor = _read([(4, 1, 40, 128, 0), (9, 1, 8000, 256, 0), (5, 1, 4000, 128, 16)] + [(255, 0, 0, 0, 0)] * 13)
     assert (sensor.status, sensor.mm, sensor.sigma, sensor.ambient) == (0, _zones(sensor)[2][0], 4, 1)
 
 
 def a_negative_distance_is_none():
-    clock, _, device, sensor = _made(4)
-    device.target = lambda us: [(5, 1, -8, 128, 0)] * 16
-    sensor.begin()
-    clock.advance(17_000)
-    sensor.read()
-    assert [zone[0] for zone in _zones(sensor)] == [0] * 16
+    assert [zone[0] for zone in _zones(_read([(5, 1, -8, 128, 0)] * 16))] == [0] * 16
 
 
 def a_torn_frame_is_an_error_and_no_reading():

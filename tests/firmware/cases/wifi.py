@@ -2,7 +2,7 @@
 
 from clock import Clock
 from fake_bus import Clock as FakeClock
-from fake_receiver import FakeTime, steps
+from fake_receiver import steps
 from wifi import Datagrams, Station
 
 
@@ -34,7 +34,7 @@ class _Wlan:
 
 def _station():
     fake = FakeClock()
-    clock = Clock(FakeTime(fake))
+    clock = Clock(fake)
     wlan = _Wlan(fake)
     return fake, clock, wlan, Station(wlan, "net", "password", clock)
 
@@ -45,20 +45,14 @@ def _pass(fake, clock, station, seconds):
         station.step(clock.ticks())
 
 
-def joins():
+def joins_asks_again_at_once_when_the_network_is_lost_and_is_back_when_it_is():
     fake, clock, wlan, station = _station()
     _pass(fake, clock, station, 3)
     assert station.connected
-    assert [each[1:] for each in wlan.asked] == [("net", "password")]
-
-
-def asks_again_at_once_when_the_network_is_lost_and_is_back_when_it_is():
-    fake, clock, wlan, station = _station()
-    _pass(fake, clock, station, 3)
     wlan.there = False
     _pass(fake, clock, station, 1)
     assert not station.connected
-    assert len(wlan.asked) == 2
+    assert [each[1:] for each in wlan.asked] == [("net", "password")] * 2
     wlan.there = True
     _pass(fake, clock, station, 20)
     assert station.connected
@@ -108,11 +102,12 @@ class _Socket:
         self.closed = True
 
 
-def errors_of_the_network_are_counted_and_no_end():
+def datagrams_come_and_go_and_errors_of_the_network_are_counted_and_no_end():
     socket = _Socket()
     port = Datagrams(lambda: socket, ("host", 1))
     buffer = bytearray(10)
     assert port.receive(buffer) == 0
+    socket.inbox.append(b"abc")
     for errno in (11, 12, 101, 113, 118):
         socket.errno = errno
         port.send(b"lost")
@@ -121,32 +116,19 @@ def errors_of_the_network_are_counted_and_no_end():
     socket.errno = None
     port.send(b"sent")
     assert socket.sent == [(b"sent", ("host", 1))]
-
-
-def datagrams_are_read_when_there_are_some():
-    socket = _Socket()
-    port = Datagrams(lambda: socket, ("host", 1))
-    port.send(b"hello")
-    buffer = bytearray(10)
-    socket.inbox.append(b"abc")
     assert port.receive(buffer) == 3
     assert bytes(buffer[:3]) == b"abc"
     assert port.receive(buffer) == 0
 
 
 def a_socket_that_refuses_for_long_is_replaced():
-    sockets = [_Socket(9), _Socket()]
-    made = []
-
-    def make():
-        made.append(sockets[len(made)])
-        return made[-1]
-
-    port = Datagrams(make, ("host", 1))
+    bad, good = _Socket(9), _Socket()
+    left = [bad, good]
+    port = Datagrams(lambda: left.pop(0), ("host", 1))
     for _ in range(101):
         port.send(b"x")
-    assert sockets[0].closed
-    assert sockets[1].sent == [(b"x", ("host", 1))]
+    assert bad.closed
+    assert good.sent == [(b"x", ("host", 1))]
 
 
 def no_memory_for_a_socket_is_no_end():

@@ -21,7 +21,7 @@ class Refused(Exception):
 
 
 class Clock:
-    """Time since the start of the test."""
+    """Time since the start of the test; stands for the module `time`, too."""
 
     PERIOD = 1 << 30
 
@@ -32,18 +32,16 @@ class Clock:
         self.now_us += us
 
     def sleep_ms(self, ms):
-        """In place of `time.sleep_ms`."""
         self.now_us += 1000 * ms
 
     def ticks_us(self):
-        """In place of `time.ticks_us`; wraps as on the ESP8266."""
+        """Ticks that wrap as on the ESP8266."""
         return self.now_us % self.PERIOD
 
     def ticks_add(self, ticks, delta):
         return (ticks + delta) % self.PERIOD
 
     def ticks_diff(self, end, start):
-        """In place of `time.ticks_diff`."""
         return (end - start + self.PERIOD // 2) % self.PERIOD - self.PERIOD // 2
 
 
@@ -54,33 +52,27 @@ class Bus:
         """A byte takes 9 bits: 22.5 us at 400 kHz."""
         self.clock = clock
         self.us_per_byte = us_per_byte
-        self.transfers = self.bytes = self.failed = 0
+        self.transfers = 0
+        self.fail_at = 0
+        """Number of the transfer that fails, from 1 on; 0: none."""
         self.stuck = False
         """The clock line is held down: no transfer ends."""
         self.held = None
         """The data line is not the device's own: this tells each byte that is read, what is written vanishes, and no
         transfer fails. So it is where that line is held down, as its level counts as the acknowledgement."""
         self._devices = []
-        self._fail_next, self._fail_until, self._errno = 0, -1, NO_ANSWER
-        self._break_next = 0
+        self._fail_next = self._break_next = 0
 
     def add(self, device):
         self._devices.append(device)
 
-    def fail_next(self, count, errno=NO_ANSWER):
+    def fail_next(self, count):
         """Let so many transfers fail."""
-        self._fail_next, self._errno = count, errno
-
-    def fail_for(self, us, errno=NO_ANSWER):
-        """Let all transfers fail for a time."""
-        self._fail_until, self._errno = self.clock.now_us + us, errno
+        self._fail_next = count
 
     def break_next(self, count):
         """Let so many transfers fail at their end: the device has done its part, the driver gets nothing."""
         self._break_next = count
-
-    def scan(self):
-        return sorted(a for device in self._devices if device.answers() for a in device.addresses)
 
     def readfrom_mem(self, address, register, count, *, addrsize=8):
         buffer = bytearray(count)
@@ -103,33 +95,28 @@ class Bus:
     def _break_off(self):
         if self._break_next:
             self._break_next -= 1
-            raise self._failure(TIMED_OUT)
+            raise OSError(TIMED_OUT)
 
     def _transfer(self, address, register, count, addrsize):
         self.transfers += 1
         if self.stuck:
-            raise self._failure(TIMED_OUT)
+            raise OSError(TIMED_OUT)
         self.clock.advance(self.us_per_byte)
         if self.held:
             self.clock.advance(self.us_per_byte * (count + 2))
             return None
-        if self._fail_next or self.clock.now_us < self._fail_until:
+        if self._fail_next or self.transfers == self.fail_at:
             self._fail_next = max(self._fail_next - 1, 0)
-            raise self._failure(self._errno)
+            raise OSError(NO_ANSWER)
         for device in self._devices:
             if address in device.addresses and device.answers():
                 if addrsize != device.address_bits:
                     raise Refused(f"registers of 0x{address:02x} have {device.address_bits} bits")
                 if count == 0 or not 0 <= register < 1 << addrsize:
                     raise Refused(f"register 0x{register:x}, {count} bytes")
-                self.bytes += count
                 self.clock.advance(self.us_per_byte * (count + 2))
                 return device
-        raise self._failure(NO_ANSWER)
-
-    def _failure(self, errno):
-        self.failed += 1
-        return OSError(errno)
+        raise OSError(NO_ANSWER)
 
 
 def error_of(action, *arguments, kind=OSError):

@@ -1,31 +1,15 @@
-"""Time for `clock.Clock`, and a receiver at the other end of a unit's port that has a network of any mood between."""
+"""A receiver at the other end of a unit's port that has a network of any mood between."""
 
 import struct
 
 from wire import BEACON_SIZE, Mac, session_mac
 
-PERIOD = 1 << 30
 SAMPLE = "<2sBBHHIQIIHhHBBHIHHHHBBHII"
 FIELDS = (
     "magic", "version", "kind", "unit", "flags", "sequence", "time_us", "beacon", "hold", "battery", "temperature",
     "bus_errors", "stream", "status", "mm", "age", "sigma", "signal", "ambient", "spads", "count", "scale", "rate",
     "index", "imu_age",
 )  # fmt: skip
-
-
-class FakeTime:
-    """In place of the module `time`, by a clock of fake_bus."""
-
-    def __init__(self, clock):
-        self.ticks_us = clock.ticks_us
-
-    @staticmethod
-    def ticks_add(ticks, delta):
-        return (ticks + delta) % PERIOD
-
-    @staticmethod
-    def ticks_diff(end, start):
-        return (end - start + PERIOD // 2) % PERIOD - PERIOD // 2
 
 
 def steps(values):

@@ -4,7 +4,7 @@ from clock import Clock
 from fake_bus import Bus as FakeBus
 from fake_bus import Clock as FakeClock
 from fake_lsm6ds3 import FakeLsm6ds3
-from fake_receiver import Draw, FakeReceiver, FakeTime
+from fake_receiver import Draw, FakeReceiver
 from fake_vl53l1x import FakeVl53l1x
 from fake_vl53l5cx import FakeVl53l5cx
 from link import Link
@@ -18,24 +18,26 @@ KEY = bytes(range(32))
 
 
 class FakeUnit:
-    def __init__(self, start_us=0, touch=None, zones=1):
-        """`touch` is the device of its touch sensor, if it has one; `zones` are along a side of its range finder."""
-        self.now = FakeClock(start_us)
-        time = FakeTime(self.now)
+    def __init__(self, start_us=0, touch=None, zones=1, now=None, receiver=None):
+        """`touch` is the device of its touch sensor, if it has one; `zones` are along a side of its range finder.
+
+        `now` and `receiver` are a clock and a port in place of the fakes.
+        """
+        self.now = now or FakeClock(start_us)
         self.bus = FakeBus(self.now)
         self.vl53l1x, self.lsm6ds3 = FakeVl53l1x(self.now), FakeLsm6ds3(self.now)
         self.vl53l5cx = FakeVl53l5cx(self.now)
         self.bus.add(self.vl53l1x if zones == 1 else self.vl53l5cx)
         self.bus.add(self.lsm6ds3)
-        self.receiver = FakeReceiver(7, KEY)
+        self.receiver = receiver or FakeReceiver(7, KEY)
         self.battery_mv = 3900
         self.errors = Bus()
-        clock = Clock(time)
+        clock = Clock(self.now)
         sleep_ms = self.now.sleep_ms
         device = VL53L1X(self.bus, 0x29, sleep_ms)
         if zones > 1:
             device = VL53L5CX(self.bus, zones, sleep_ms=sleep_ms)
-        imu = LSM6DS3(self.bus, None, sleep_ms, self.now.ticks_us, time.ticks_diff)
+        imu = LSM6DS3(self.bus, None, sleep_ms, self.now.ticks_us, self.now.ticks_diff)
         self.unit = Unit(
             7,
             Link(7, KEY, self.receiver, clock, Draw(), 1, 1),

@@ -1,6 +1,5 @@
-"""Adds to CPython's `time`, `gc` and `sys` what MicroPython's have besides."""
+"""Adds to CPython's `time` and `sys` what MicroPython's have besides."""
 
-import gc
 import sys
 import time
 import traceback
@@ -8,13 +7,9 @@ import traceback
 TICKS_PERIOD = 1 << 30
 
 time.ticks_us = lambda: time.monotonic_ns() // 1000 % TICKS_PERIOD
-time.ticks_ms = lambda: time.monotonic_ns() // 1_000_000 % TICKS_PERIOD
 time.ticks_add = lambda ticks, delta: (ticks + delta) % TICKS_PERIOD
 time.ticks_diff = lambda end, start: (end - start + TICKS_PERIOD // 2) % TICKS_PERIOD - TICKS_PERIOD // 2
 time.sleep_ms = lambda ms: time.sleep(ms / 1e3)
 time.sleep_us = lambda us: time.sleep(us / 1e6)
-
-gc.mem_alloc = lambda: 0
-gc.mem_free = lambda: 0
 
 sys.print_exception = lambda error, file=None: traceback.print_exception(error, file=file or sys.stdout)

@@ -3,10 +3,3 @@
 
 def const(value):
     return value
-
-
-def native(function):
-    return function
-
-
-viper = native

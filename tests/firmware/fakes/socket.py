@@ -1,17 +1,13 @@
-"""UDP as MicroPython's `socket` shows it, to the receiver in `State`; error 118 without the network."""
+"""UDP as MicroPython's `socket` shows it, to the receiver in `state`; error 118 without the network."""
 
 import network
 
 AF_INET, SOCK_DGRAM = 2, 2
 
 
-class State:
-    def __init__(self):
-        self.receiver = None
-        self.sent_to = set()
-
-
-state = State()
+class state:
+    receiver = None
+    sent_to = ()
 
 
 def getaddrinfo(host, port):
@@ -31,7 +27,8 @@ class socket:
     def sendto(self, datagram, address):
         if not network.state.joined:
             raise OSError(118)
-        state.sent_to.add(address)
+        if address not in state.sent_to:
+            state.sent_to += (address,)
         state.receiver.send(datagram)
 
     def readinto(self, buffer):

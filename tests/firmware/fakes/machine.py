@@ -63,17 +63,13 @@ class Pin:
         return None
 
 
-def _bus(scl, sda, freq):
+def SoftI2C(scl, sda, freq):
     state.pins = (scl.number, sda.number)
     return state.bus
 
 
-def SoftI2C(scl, sda, freq):
-    return _bus(scl, sda, freq)
-
-
 def I2C(_, scl, sda, freq):
-    return _bus(scl, sda, freq)
+    return SoftI2C(scl, sda, freq)
 
 
 class ADC:

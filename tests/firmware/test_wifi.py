@@ -1,8 +1,0 @@
-"""In both interpreters: tests/firmware/cases/wifi.py."""
-
-from tests.firmware.harness import Run
-from tests.firmware.together import run_all
-
-
-def test_wifi(unit_python: Run) -> None:
-    run_all(unit_python, "wifi")
