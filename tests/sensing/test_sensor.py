@@ -7,7 +7,7 @@ import pytest
 
 from pretouch.errors import ParameterError, SkinError
 from pretouch.perception.obstacles import measured_distance, placed_sensors
-from pretouch.perception.scene_filter import Fixtures, expected_range, no_fixtures
+from pretouch.perception.scene_filter import Fixtures, expected_range
 from pretouch.robot.body import no_capsules
 from pretouch.sensing.sensor import PAPER_SENSOR, VL53L5CX, VL53L7CX, Sensor, cones_of
 from pretouch.sensing.skin import Skin, load_skin, save_skin, sensor_unit
@@ -110,12 +110,6 @@ def test_types_of_programs_are_checked_too():
     ).sensor == Whistle()  # fmt: skip
 
 
-def test_no_wall_is_no_return(panda_model, paper_skin):
-    kin = panda_model.kinematics(panda_model.description.q_ready)
-    seen = expected_range(kin, placed_sensors(paper_skin, kin), paper_skin.cones, no_capsules(), no_fixtures())
-    assert np.isinf(seen).all()
-
-
 ZONES = 'sensor = "vl53l5cx"\ntouch = true\n'
 
 
@@ -158,16 +152,6 @@ def test_an_error_in_a_unit_names_the_file_and_the_unit(panda_model, tmp_path):
     text = UNIT.format(id="a", z=0.045) + UNIT.format(id="b", z=0.02) + 'sensor = "sonar"\n'
     with pytest.raises(SkinError, match=r"Unit b has the sensor 'sonar': .* \(in .*skin.toml, unit 2 of 2\)"):
         skin_of(tmp_path, panda_model, text)
-    with pytest.raises(SkinError, match=r"A unit has the id None: .* \(in .*skin.toml, unit 1 of 1\)"):
-        skin_of(tmp_path, panda_model, '[[unit]]\nlink = "panda_hand"\n')
-
-
-@pytest.mark.parametrize("text", ["a = [", "a = " + "[" * 50_000, "\xff", "a = 1\na = 2"])
-def test_a_file_that_is_not_toml_is_named(panda_model, tmp_path, text):
-    file = tmp_path / "skin.toml"
-    file.write_bytes(text.encode("latin-1"))
-    with pytest.raises(SkinError, match=r"The skin file .*skin\.toml is not (valid TOML|UTF-8 text): ."):
-        load_skin(file, panda_model)
 
 
 def test_zones_of_more_units_than_a_step_can_take_are_refused(panda_model, paper_skin):
