@@ -8,7 +8,6 @@ import pytest
 from pretouch.errors import RobotError
 from pretouch.hardware.franka.limiter import SetPointLimiter, refusal
 from pretouch.hardware.franka.limits import LimiterParams, MotionLimits, motion_limits, planned
-from pretouch.hardware.franka.state import FrankaState
 from pretouch.robot.model import RobotModel
 from tests.hardware.franka.made import CheckingArm, middle
 
@@ -86,10 +85,7 @@ def test_without_a_loss_nothing_is_begun_anew(limits: MotionLimits) -> None:
     arm, limiter = CheckingArm(limits, middle(limits)), SetPointLimiter(limits, LimiterParams())
     for _ in range(500):
         state = arm.state()
-        rounded = FrankaState(*(
-            np.float32(getattr(state, name)).astype(float) if name == "dq_d" else getattr(state, name)
-            for name in FrankaState.__slots__
-        ))  # fmt: skip
+        rounded = replace(state, dq_d=np.float32(state.dq_d).astype(float))
         arm.take(limiter.step(rounded, (0.5 * limits.qd_max).tolist()))
         assert not limiter.lost
 

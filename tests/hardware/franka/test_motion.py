@@ -74,9 +74,7 @@ def test_commands_of_another_request_end_it(bench: Bench) -> None:
     bench.mailboxes.send_command(Command(2, Request.MOVE, time.monotonic() + 1000.0, [0.2] * 7))
     bench.run(1000)
     assert bench.finished
-    feedback = bench.mailboxes.newest_feedback()
-    assert feedback is not None
-    assert feedback.answered == 1
+    assert bench.mailboxes.newest_feedback().answered == 1
 
 
 def test_a_set_point_that_is_old_but_not_stale_still_counts(bench: Bench) -> None:
@@ -95,9 +93,7 @@ def test_a_set_point_that_is_none_ends_the_motion_at_rest_and_later_ones_do_not_
     bench.run(1000)
     assert bench.finished
     assert bench.motion.trouble.startswith("The arm was brought to rest, because joint 1 was to move at ")
-    feedback = bench.mailboxes.newest_feedback()
-    assert feedback is not None
-    assert feedback.trouble == bench.motion.trouble
+    assert bench.mailboxes.newest_feedback().trouble == bench.motion.trouble
 
 
 @pytest.mark.parametrize("asked_for", [Request.WAIT, Request.END, Request.QUIT])

@@ -34,14 +34,9 @@ def test_one_that_repeats_for_long_takes_torques_and_force_away_until_it_wavers_
     assert [watch.believed(report).wrench is not None for report in later] == [True] * 10
 
 
-def test_the_same_state_read_again_and_again_is_not_stuck() -> None:
+def test_the_same_state_read_again_and_again_is_not_stuck_and_with_a_new_stamp_the_old_one() -> None:
     watch, (report,) = TorqueWatch(), reports(0.01, ())
     for _ in range(100):
         assert watch.believed(report).stamp == report.stamp
         assert watch.believed(report).wrench is not None
-
-
-def test_a_state_told_again_with_a_new_stamp_is_the_old_one() -> None:
-    watch, (report,) = TorqueWatch(), reports(0.01, ())
-    watch.believed(report)
     assert watch.believed(replace(report, stamp=report.stamp + 3.0)).stamp == report.stamp

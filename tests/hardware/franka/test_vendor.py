@@ -8,22 +8,15 @@ from pretouch.hardware.franka.vendor import VendorClient
 from tests.hardware.franka.made import state
 
 
-class Library:
-    """As the vendor's `Robot`: takes the order to recover."""
+class GivenStates(VendorClient):
+    """Reads these modes one after the other, and the last one from then on; takes the order to recover."""
 
-    def __init__(self) -> None:
-        self.asked = 0
+    def __init__(self, *modes: str) -> None:
+        self._address, self._robot, self._modes = "arm", self, list(modes)
+        self.states = self.asked = 0
 
     def automatic_error_recovery(self) -> None:
         self.asked += 1
-
-
-class GivenStates(VendorClient):
-    """Reads these modes one after the other, and the last one from then on."""
-
-    def __init__(self, *modes: str) -> None:
-        self._address, self._robot, self._modes = "arm", Library(), list(modes)
-        self.states = 0
 
     def read(self) -> FrankaState:
         self.states += 1
@@ -36,7 +29,7 @@ class GivenStates(VendorClient):
 def test_recovery_lasts_until_a_state_tells_of_it(before: tuple[str, ...], after: str) -> None:
     client = GivenStates(*before, after)
     client.recover()
-    assert client._robot.asked == 1
+    assert client.asked == 1
     assert client.states == len(before) + 1
 
 
