@@ -116,11 +116,14 @@ class Bench:
                 unit.hear(datagram, self.now)
         return came
 
+    def greet(self, *units: FakeUnit) -> None:
+        """Let units ask for a session, and hear what came back."""
+        self.send(*[unit.hello(self.now) for unit in units])
+        self.deliver()
+
     def join(self) -> None:
         """Bring all units into session."""
-        for unit in self.units:
-            self.send(unit.hello(self.now))
-        self.deliver()
+        self.greet(*self.units)
         for unit in self.units:
             assert self.send(unit.sample(self.now)) == 1
 

@@ -43,8 +43,7 @@ def test_a_reboot_is_told_from_a_session_that_was_lost(bench):
             bench.now += 1.0
         else:
             unit.leave()
-        bench.send(unit.hello(bench.now))
-        bench.deliver()
+        bench.greet(unit)
         assert bench.send(unit.sample(bench.now)) == 1
         assert traffic.reboots == int(reboot)
     assert traffic.sessions == 3
@@ -116,8 +115,7 @@ def test_each_beacon_is_taken_as_echoed_once(bench):
 
 def test_the_first_beacon_of_a_session_is_due_a_period_after_its_answer(bench):
     unit = bench.units[0]
-    bench.send(unit.hello(bench.now))
-    bench.deliver()
+    bench.greet(unit)
     sent = bench.now
     bench.now += 0.1
     bench.send(unit.sample(bench.now))

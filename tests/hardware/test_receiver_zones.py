@@ -1,6 +1,7 @@
 """Zones at the receiver: those of the skin are rows of readings, others are none and are named."""
 
 import math
+from dataclasses import asdict
 from struct import pack
 
 import numpy as np
@@ -27,9 +28,7 @@ def zones(side: int, *mm: int, status: int = 0) -> bytes:
 @pytest.fixture
 def bench():
     with Bench(units=UNITS) as made:
-        for unit in made.units:
-            made.send(unit.hello(made.now))
-        made.deliver()
+        made.greet(*made.units)
         yield made
 
 
@@ -102,28 +101,25 @@ def test_zones_that_repeat_are_stuck_and_one_that_changes_is_not(bench):
         assert bench.receiver.readings().status[:4].tolist() == [wanted] * 4
 
 
-def test_garbled_and_cut_datagrams_with_zones_change_nothing(bench):
+def test_cut_datagrams_with_zones_change_nothing(bench):
     whole = bench.units[0].sample(bench.now, flags=ZONED, zones=zones(2, 100, 200, 300, 400))
-    rng, sent = np.random.default_rng(0), 0
-    for cut in range(len(whole)):
-        sent += bench.send(whole[:cut])
-    for _ in range(500):
-        bad = bytearray(whole)
-        bad[int(rng.integers(len(bad)))] ^= 1 << int(rng.integers(8))
-        sent += bench.send(bytes(bad))
-    assert sent == 0
+    assert not any(bench.send(whole[:cut]) for cut in range(len(whole)))
     assert set(bench.receiver.readings().status) == {RangeStatus.NONE}
     assert bench.send(whole) == 1
 
 
-def test_zones_come_through_shared_memory(bench):
+def test_samples_with_zones_come_through_shared_memory_however_large(bench):
     outputs = SharedOutputs(UNITS, LinkParams().samples_most)
-    part = zones(2, 100, 200, 300, 400)
-    datagram = bench.units[0].sample(bench.now, flags=ZONED, zones=part)
-    bench.send(datagram)
-    (received,) = bench.receiver.take_samples()
-    outputs.put_samples([packed(received, memoryview(datagram))])
+    zoned, plain = bench.units
+    eight = b"\x08\x00" + bytes(5 * 64)
+    for datagram in (
+        zoned.sample(bench.now, flags=ZONED, zones=zones(2, 100, 200, 300, 400), imu=b"0123456789ab" * 2),
+        plain.sample(bench.now, flags=ZONED, zones=eight, imu_count=32, imu=bytes(384)),
+    ):
+        bench.send(datagram)
+        (received,) = bench.receiver.take_samples()
+        outputs.put_samples([packed(received, memoryview(datagram))])
+        (back,) = outputs.take_samples()
+        np.testing.assert_equal(asdict(back), asdict(received))  # of zones that do not fit the stamp is NaN
     outputs.put_readings(bench.receiver.table.tobytes())
-    (back,) = outputs.take_samples()
-    assert back == received
     assert np.frombuffer(outputs.readings()).reshape(3, 5)[1, :4] == pytest.approx([0.1, 0.2, 0.3, 0.4])

@@ -2,12 +2,12 @@
 
 import socket
 import sys
+from types import SimpleNamespace
 
 import pytest
 
 from pretouch.hardware import udp
 from pretouch.hardware.udp import PORT
-from tests.ports import PORTS, free_port
 
 linux = pytest.mark.skipif(sys.platform != "linux", reason="the options are Linux's")
 
@@ -15,28 +15,18 @@ LOWEST_GIVEN = 32768
 """The first port that Linux gives to a socket which asks for none, unless told otherwise (ip_local_port_range)."""
 
 
-def test_no_port_that_is_named_beforehand_is_one_that_any_socket_may_be_given():
+def test_the_port_of_units_is_none_that_any_socket_may_be_given():
     assert PORT < LOWEST_GIVEN
-    assert PORTS[-1] < LOWEST_GIVEN
-    one, another = free_port(), free_port()
-    assert {one, another} < set(PORTS)
-    assert one != another
-
-
-class Options:
-    """Stands for a socket of a process that may not go past the system's limit."""
-
-    def __init__(self):
-        self.asked = []
-
-    def setsockopt(self, _level, option, value):
-        self.asked.append((option, value))
-        if option != socket.SO_RCVBUF:
-            raise PermissionError
 
 
 @linux
 def test_without_the_right_to_more_the_queue_is_as_long_as_the_system_allows():
-    options = Options()
-    udp._widen(options, 12345)
-    assert options.asked[-1] == (socket.SO_RCVBUF, 12345)
+    asked = []
+
+    def set_option(_level, option, value):
+        asked.append((option, value))
+        if option != socket.SO_RCVBUF:
+            raise PermissionError
+
+    udp._widen(SimpleNamespace(setsockopt=set_option), 12345)
+    assert asked[-1] == (socket.SO_RCVBUF, 12345)

@@ -43,11 +43,15 @@ def with_losses(values, losses):
 @given(
     st.floats(-1000.0, 1000.0), st.floats(-0.99 * DRIFT, 0.99 * DRIFT),
     st.lists(st.tuples(delays, st.booleans()), min_size=1, max_size=60),
-    st.lists(st.tuples(delays, st.booleans()), min_size=1, max_size=200),
+    st.lists(st.tuples(delays, st.booleans(), st.floats(0.0, 0.05)), min_size=1, max_size=200),
+    st.sampled_from([0.5, 10.0]),
 )  # fmt: skip
-def test_the_true_offset_is_within_the_bounds(offset, drift, down, up):
-    down, up = (with_losses(*zip(*pairs, strict=True)) for pairs in (down, up))
-    wire, clock = Wire(offset, 1.0 + drift, down, up), UnitClock(DRIFT, 10.0)
+def test_the_truth_is_within_the_bounds_and_no_stamp_is_later_and_newer_readings_have_later_stamps(
+    offset, drift, down, up, window
+):
+    ages = [age for _, _, age in up]
+    down, up = (with_losses(*list(zip(*pairs, strict=True))[:2]) for pairs in (down, up))
+    wire, clock = Wire(offset, 1.0 + drift, down, up), UnitClock(DRIFT, window)
     newest = -math.inf
     for made, arrival in wire.order:
         sent, hold = wire.echo(made)
@@ -59,6 +63,15 @@ def test_the_true_offset_is_within_the_bounds(offset, drift, down, up):
             assert abs(clock.offset - true) <= clock.bound + 1e-9
             for age in (0.0, 0.02, 5.0):
                 assert clock.earliest(wire.unit(made) - age) <= made - age * (1 - DRIFT) + 1e-9
+        measured = made - ages[round((made - 0.3) / 0.02)]
+        instant, last, before = wire.unit(measured), clock.last_reading, clock._last_stamp
+        at_least = clock.earliest(instant)
+        stamp = clock.stamp(instant)
+        assert at_least <= stamp <= measured + 1e-9
+        if instant > last:
+            assert stamp > before or stamp == -math.inf
+        else:
+            assert (clock.last_reading, clock._last_stamp) == (last, before)
     assert clock.jumps == 0
 
 
@@ -100,30 +113,6 @@ def test_a_round_trip_gives_its_half_as_bound():
     assert clock.earliest(4.9) == pytest.approx(99.91 - 1.0e-6 - TICK - DRIFT * 0.12, abs=1e-6)
 
 
-@given(
-    st.floats(-1000.0, 1000.0), st.floats(-0.99 * DRIFT, 0.99 * DRIFT),
-    st.lists(st.tuples(delays, st.booleans()), min_size=1, max_size=60),
-    st.lists(st.tuples(delays, st.booleans(), st.floats(0.0, 0.05)), min_size=1, max_size=200),
-    st.sampled_from([0.5, 10.0]),
-)  # fmt: skip
-def test_no_stamp_is_later_than_the_truth_and_newer_readings_have_later_stamps(offset, drift, down, up, window):
-    ages = [age for _, _, age in up]
-    down, up = (with_losses(*list(zip(*pairs, strict=True))[:2]) for pairs in (down, up))
-    wire, clock = Wire(offset, 1.0 + drift, down, up), UnitClock(DRIFT, window)
-    for made, arrival in wire.order:
-        sent, hold = wire.echo(made)
-        assert clock.update(wire.unit(made), arrival, sent, hold)
-        true = made - ages[round((made - 0.3) / 0.02)]
-        instant, newest, before = wire.unit(true), clock.last_reading, clock._last_stamp
-        at_least = clock.earliest(instant)
-        stamp = clock.stamp(instant)
-        assert at_least <= stamp <= true + 1e-9
-        if instant > newest:
-            assert stamp > before or stamp == -math.inf
-        else:
-            assert (clock.last_reading, clock._last_stamp) == (newest, before)
-
-
 def test_jumps_too_small_to_be_seen_make_no_stamp_later_than_it_can_be():
     clock = UnitClock(DRIFT, 10.0)
     for k in range(6000):
@@ -141,21 +130,20 @@ def test_what_a_beacon_told_allows_for_the_resolution_of_the_units_clock():
     assert clock.known
 
 
-def test_its_memory_is_bounded_however_the_units_clock_goes():
-    clock = UnitClock(DRIFT, 10.0)
-    for k in range(5000):
-        clock.update(5.0, 100.0 + 1e-6 * k, 90.0 - 1e-6 * k, 1e-6 * k)
-    assert len(clock._lows) <= 1024
-    assert len(clock._highs) <= 1024
-
-
-def test_its_memory_is_bounded():
-    clock = UnitClock(DRIFT, 10.0)
-    for k in range(5000):
+@pytest.mark.parametrize(
+    ("times", "most"),
+    [
+        (lambda k: (5.0, 100.0 + 1e-6 * k, 90.0 - 1e-6 * k, 1e-6 * k), 1024),
         # each sample a little later than the one before: every bound is worse than the last, so that all are kept
-        clock.update(0.02 * k, 0.02 * k + 1e-3 + 1e-5 * k, 0.02 * k - 0.01 - 1e-5 * k, 0.005)
-    assert len(clock._lows) <= 502
-    assert len(clock._highs) <= 502
+        (lambda k: (0.02 * k, 0.02 * k + 1e-3 + 1e-5 * k, 0.02 * k - 0.01 - 1e-5 * k, 0.005), 502),
+    ],
+)
+def test_its_memory_is_bounded_however_the_units_clock_goes(times, most):
+    clock = UnitClock(DRIFT, 10.0)
+    for k in range(5000):
+        clock.update(*times(k))
+    assert len(clock._lows) <= most
+    assert len(clock._highs) <= most
 
 
 def wifi(rng, count, busy):

@@ -76,8 +76,7 @@ def test_a_stuck_unit_is_stuck_in_its_next_session_too(stuck_bench, reboot):
         stuck_bench.now += 0.5
     else:
         unit.leave()
-    stuck_bench.send(unit.hello(stuck_bench.now))
-    stuck_bench.deliver()
+    stuck_bench.greet(unit)
     assert say(stuck_bench, 80) == 0
     assert stuck_bench.receiver.units[0].reboots == reboot
 
@@ -86,8 +85,7 @@ def test_a_stream_that_begins_anew_with_a_reboot_is_not_stuck(stuck_bench):
     unit = stuck_bench.units[0]
     unit.reboot(stuck_bench.now)
     stuck_bench.now += 0.5
-    stuck_bench.send(unit.hello(stuck_bench.now))
-    stuck_bench.deliver()
+    stuck_bench.greet(unit)
     assert say(stuck_bench, 1, range_mm=700) == 1
 
 
