@@ -1,9 +1,33 @@
 """What a run is made of: cells, grids, and all of the paper."""
 
+import re
+from itertools import product
+
+import pytest
+
 from pretouch_lab.campaign import Request
 from pretouch_lab.cell import Cell, Grid
 from pretouch_lab.paper.whole import whole_paper
 from pretouch_lab.registry import EXPERIMENTS
+
+SENSING = [("paper", "slack"), ("pretouch", "braking")]
+DECAYING = [("paper:react.decay_cycles=50", "slack"), ("paper:react.decay_cycles=25", "slack")]
+KEPT = ("", ":perception.persistence_s=0.04", ":perception.persistence_s=0.021")
+CELLS = {
+    "avoidance": ([("blind", "off"), *SENSING], ["beside", "inside"]),
+    "release": ([*SENSING, *DECAYING], [0.3, 1.0, 2.0, 3.0, 4.0]),
+    "dropout": ([(name + kept, mode) for name, mode in SENSING for kept in KEPT], [0, 1, 2, 3, 5, 10, 20]),
+    "coverage": (list(product(("paper", "pretouch"), ("own", "suggested", "random"))), ["moving", "standing"]),
+    "two-arms": (SENSING, ["blind", "seen", "told"]),
+}
+"""Of some experiments: profiles with restriction modes, or with skins, and what is varied for each of them."""
+
+
+@pytest.mark.parametrize("name", CELLS)
+def test_cells_are_all_values_for_each_controller_that_the_experiment_is_about(name):
+    cells = EXPERIMENTS[name].cells(Grid(("blind", "paper", "pretouch")))
+    expected = [(profile, value, mode) for (profile, mode), value in product(*CELLS[name])]
+    assert sorted((cell.profile, *cell.where.values()) for cell in cells) == sorted(expected)
 
 
 def test_files_of_different_cells_differ():
@@ -12,9 +36,7 @@ def test_files_of_different_cells_differ():
     grid = Grid(names[:3] + names[4:], modes, (2e3, 25e3))
     cells = [cell for experiment in EXPERIMENTS.values() for cell in experiment.cells(grid)]
     assert len({cell.name for cell in cells}) == len(cells)
-    assert all(
-        set(cell.name) <= set("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789.-_") for cell in cells
-    )
+    assert all(re.fullmatch(r"[A-Za-z0-9._-]+", cell.name) for cell in cells)
     assert Cell("static", names[2]).name != Cell("static", names[3]).name
     odd = ("paper:approach.slack_weight=1e-3", "paper:approach.slack_weight=1e+3")
     assert Cell("static", odd[0]).name != Cell("static", odd[1]).name
@@ -45,6 +67,5 @@ def test_the_whole_paper_runs_every_experiment_and_no_trial_twice():
 def test_the_whole_paper_with_less_is_less():
     asked = Request(tuple(EXPERIMENTS), 1, profiles=("paper",), restrictions=("slack",), stiffness=(2e3,))
     cells = [c for _, request in whole_paper(asked) for c, _ in request.trials() if c.experiment == "static"]
-    assert [(c.profile, c.where["restrictions"], c.where["stiffness_n_per_m"]) for c in cells] == [
-        ("paper", "slack", 2e3)
-    ] * 4
+    found = [(c.profile, c.where["restrictions"], c.where["stiffness_n_per_m"]) for c in cells]
+    assert found == [("paper", "slack", 2e3)] * 4

@@ -5,13 +5,11 @@ from pretouch.traces import mean_over
 from pretouch_lab.rows import angle_deg, peak, spread
 
 
-def test_moving_mean_by_numbers():
-    np.testing.assert_allclose(mean_over(np.array([1.0, 2.0, 6.0, 4.0]), 2), [1.5, 4.0, 5.0])
-
-
-def test_moving_mean_of_less_than_a_window_is_the_mean():
-    np.testing.assert_allclose(mean_over(np.array([1.0, 3.0]), 20), [2.0])
-    assert mean_over(np.zeros(0), 20).shape == (0,)
+@pytest.mark.parametrize(
+    ("values", "count", "means"), [([1.0, 2.0, 6.0, 4.0], 2, [1.5, 4.0, 5.0]), ([1.0, 3.0], 20, [2.0]), ([], 20, [])]
+)
+def test_a_moving_mean_by_numbers_is_the_mean_of_less_than_a_window(values, count, means):
+    np.testing.assert_allclose(mean_over(np.array(values), count), means)
 
 
 def test_the_peak_of_nothing_is_nothing():
@@ -19,13 +17,11 @@ def test_the_peak_of_nothing_is_nothing():
     assert peak(np.array([1.0, 7.0, 2.0])) == 7.0
 
 
-@pytest.mark.parametrize(("b", "angle"), [((2, 0, 0), 0), ((0, 5, 0), 90), ((-1, 0, 0), 180), ((1, 1, 0), 45)])
-def test_angles_by_numbers(b, angle):
+@pytest.mark.parametrize(
+    ("b", "angle"), [((2, 0, 0), 0), ((0, 5, 0), 90), ((-1, 0, 0), 180), ((1, 1, 0), 45), ((0, 0, 0), None)]
+)
+def test_angles_by_numbers_and_none_to_nothing(b, angle):
     assert angle_deg(np.array([1.0, 0.0, 0.0]), np.array(b, float)) == pytest.approx(angle)
-
-
-def test_there_is_no_angle_to_nothing():
-    assert angle_deg(np.zeros(3), np.ones(3)) is None
 
 
 def test_spread_by_numbers():

@@ -19,21 +19,6 @@ def calibrate(*words):
     return cli.main(["bench", "calibration", *map(str, words)])
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (("--skins", "0"), "The number of skins is 0"),
-        (("--seed", "-1"), "The seed is -1: it must be at least 0."),
-        (("--json", "/dev/null/x.json"), "/dev/null/x.json cannot be written"),
-    ],
-)
-def test_what_makes_no_sense_is_said_in_one_sentence(capsys, words, said):
-    assert calibrate(*words) == 2
-    told = capsys.readouterr().err
-    assert said in told
-    assert told.count("\n") == 1
-
-
 def test_the_study_is_asked_as_said_and_its_rows_are_written(tmp_path, capsys, monkeypatch):
     asked = []
 

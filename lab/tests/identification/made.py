@@ -8,12 +8,15 @@ from pretouch.contact.observer import observe, observer_init
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sim.plant_params import PlantParams
+from pretouch_lab.identification.identify import Identified
 from pretouch_lab.identification.params import usual_of
 from pretouch_lab.identification.samples import ArmSamples
 
 MODEL = RobotModel(panda())
 PLANT = PlantParams()
 USUAL = usual_of(PLANT)
+FRICTION = 0.8 * np.array(PLANT.friction_f1_nm)
+"""What is not compensated of it in an arm as made below [Nm]."""
 
 
 @dataclass(frozen=True)
@@ -64,8 +67,7 @@ def free_motion(made: Made = Made(), seconds: float = 60.0, seed: int = 5, every
     return ArmSamples(*(np.array(column) for column in zip(*rows, strict=True)))
 
 
-def with_hole(samples: ArmSamples, begin: int, end: int) -> ArmSamples:
-    """The samples without some."""
-    which = np.ones(len(samples.stamp), bool)
-    which[begin:end] = False
-    return samples.at(which)
+def sigmas_off(found: Identified, column: int, truth: np.ndarray) -> float:
+    """By how many of its standard errors that joint is off which is worst in a column of the joints' numbers."""
+    own, errors = (found.fit.of_joints(part)[:, column] for part in (found.fit.numbers, found.fit.errors))
+    return float((np.abs(own - truth) / errors).max())

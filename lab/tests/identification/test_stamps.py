@@ -34,10 +34,11 @@ def test_stamps_off_by_milliseconds_are_put_right():
     assert motions[0].half_s == 0.06
 
 
-@pytest.mark.parametrize("noise", [0.0, 2e-5, 1e-4, 5e-4])
-def test_noise_of_encoders_moves_no_stamp(noise):
-    found, _ = moved(usable(at(TIME, noise)))
+@pytest.mark.parametrize(("noise", "told"), [(0.0, False), (2e-5, False), (1e-4, True), (5e-4, True)])
+def test_noise_of_encoders_moves_no_stamp_and_a_wide_fit_is_told(noise, told):
+    found, motions = moved(usable(at(TIME, noise)))
     assert np.array_equal(found.samples.stamp, TIME)
+    assert (f"fits over {2 * motions[0].half_s:.2g} s" in " ".join(found.notes)) is told
 
 
 def test_time_that_goes_slow_for_a_while_shows_in_measured_velocities():
@@ -53,15 +54,10 @@ def test_time_that_goes_slow_for_a_while_shows_in_measured_velocities():
     assert worse[inner].std() > 0.009
 
 
-def test_the_wide_fit_is_told():
-    found, motions = moved(usable(at(TIME, 5e-4)))
-    assert f"fits over {2 * motions[0].half_s:.2g} s" in " ".join(found.notes)
-
-
 def test_states_that_are_told_again_count_once():
     given = at(TIME)
     again = np.sort(np.append(np.arange(len(TIME)), np.arange(0, len(TIME), 10)))
-    twice = ArmSamples(*(column[again] for column in (given.stamp, given.q, given.qd, given.tau)))
+    twice = given.at(again)
     twice = replace(twice, stamp=twice.stamp + 0.004 * np.append(0.0, np.diff(again) == 0))
     found = usable(twice)
     assert found.samples.stamp == pytest.approx(TIME)
@@ -72,7 +68,7 @@ def test_states_that_are_told_again_count_once():
 def test_a_short_gap_is_bridged_and_a_long_one_parts(missing, segments):
     given = at(TIME)
     left = np.delete(np.arange(len(TIME)), np.arange(2000, 2000 + missing))
-    found = usable(ArmSamples(*(column[left] for column in (given.stamp, given.q, given.qd, given.tau))))
+    found = usable(given.at(left))
     assert len(found.segments) == segments
     (motion, *_), path = moved(found)[1], 0.5 * RATES * np.cos(RATES * 20.04)
     assert segments == 2 or motion.between()(20.04, 1) == pytest.approx(path, abs=1e-4)

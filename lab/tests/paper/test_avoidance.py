@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from tests.limits import assert_within_limits
 
-from pretouch_lab.cell import Cell, Grid
+from pretouch_lab.cell import Cell
 from pretouch_lab.paper import avoidance
 
 MODES = {"blind": "off", "paper": "slack"}
@@ -49,13 +49,3 @@ def test_a_hand_comes_once_on_each_side_beside_the_path_or_into_it():
             assert abs(visit.place[1]) - 0.05 - 0.352 > clear - 0.03
     gaps = [abs(v.place[1]) for seed in range(20) for v in avoidance.visits("beside", seed)]
     assert min(gaps) > 0.352 + 0.05 - 0.003
-
-
-def test_cells_are_both_places_and_all_profiles():
-    cells = avoidance.cells(Grid(("blind", "paper")))
-    assert [(c.where["place"], c.profile, c.where["restrictions"]) for c in cells] == [
-        ("beside", "blind", "off"),
-        ("beside", "paper", "slack"),
-        ("inside", "blind", "off"),
-        ("inside", "paper", "slack"),
-    ]

@@ -6,20 +6,9 @@ import numpy as np
 import pytest
 
 from pretouch.coverage.params import CoverageParams
-from pretouch.sim.scene import SceneSpec, fixtures
-from pretouch_lab.cell import Cell, Context, Grid
+from pretouch_lab.cell import Cell
 from pretouch_lab.studies.coverage import study
 from pretouch_lab.studies.coverage.approaching import ApproachingObstacle
-
-ROOM = fixtures(SceneSpec())
-
-
-def test_cells_are_those_of_profiles_that_sense():
-    cells = study.cells(Grid(("blind", "pretouch")))
-    assert {cell.profile for cell in cells} == {"pretouch"}
-    assert [(c.where["arm"], c.where["skin"]) for c in cells][:3] == [
-        ("moving", "own"), ("moving", "suggested"), ("moving", "random")
-    ]  # fmt: skip
 
 
 def test_a_ball_is_seen_in_time_by_a_point_near_it_while_there_is_way_to_brake():
@@ -55,11 +44,11 @@ def test_numbers_and_table_of_the_study():
 
 
 @pytest.mark.slow
-def test_a_short_trial_agrees_with_what_was_foreseen(panda_model, paper_skin, monkeypatch):
+def test_a_short_trial_agrees_with_what_was_foreseen(context, monkeypatch):
     """The simulated range finders cast rays in MuJoCo; coverage knows nothing of them."""
     monkeypatch.setattr(study, "COUNT", 3)
     cell = Cell("coverage", "pretouch", {"arm": "standing", "skin": "suggested"})
-    row, _ = study.trial(cell, 1000, Context(panda_model, paper_skin))
+    row, _ = study.trial(cell, 1000, context)
     assert row["came"] == 3
     assert row["agree"] == 3
     assert 0.6 < row["predicted"] < 0.8

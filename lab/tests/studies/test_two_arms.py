@@ -8,16 +8,8 @@ import pytest
 from pretouch.moving_fixtures import MovingFixtures
 from pretouch.perception.closest import no_obstacles
 from pretouch.profiles import profile
-from pretouch_lab.cell import Context, Grid
 from pretouch_lab.studies import two_arms
 from pretouch_lab.studies.two_arms_trial import BACK, Visits, play, visits, way
-
-
-def test_each_profile_knows_the_other_arm_in_three_ways():
-    cells = two_arms.cells(Grid(("blind", "paper", "pretouch")))
-    assert [(c.profile, c.where["knows"]) for c in cells] == [
-        (name, knows) for name in ("paper", "pretouch") for knows in ("blind", "seen", "told")
-    ]
 
 
 def test_touches_are_counted_once_while_they_chatter():
@@ -70,8 +62,8 @@ def test_a_person_reaches_stays_and_withdraws():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("knows", ["blind", "seen", "told"])
-def test_a_short_trial(panda_model, paper_skin, knows):
-    played = play(Context(panda_model, paper_skin), profile("pretouch"), knows, 1, 9.0)
+def test_a_short_trial(context, knows):
+    played = play(context, profile("pretouch"), knows, 1, 9.0)
     row = two_arms.results(played, 0.3 * 9.0)
     assert len(played.felt.time) == 9000
     assert row["done"] > 0.0

@@ -12,7 +12,7 @@ from pretouch.sim.paper_scenes import static_scene
 from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams
 from pretouch.types import Mode
-from pretouch_lab.cell import Cell, Grid
+from pretouch_lab.cell import Cell
 from pretouch_lab.weaknesses import dropout
 
 
@@ -31,15 +31,6 @@ def test_the_units_that_see_a_board_are_those_on_its_side(panda_model, paper_ski
         names = {paper_skin.ids[unit] for unit in dropout.facing(plant, paper_skin, "object")}
         assert expected in names
         assert not names & {"hand_left", "hand_right"} - {expected}
-
-
-def test_cells_are_all_numbers_of_readings_and_three_persistences_of_each_profile_that_senses():
-    cells = dropout.cells(Grid(("blind", "paper")))
-    assert len({cell.name for cell in cells}) == len(cells) == 21
-    assert [cell.where["readings"] for cell in cells[:7]] == [0.0, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0]
-    assert {cell.profile for cell in cells} == {
-        "paper", "paper:perception.persistence_s=0.04", "paper:perception.persistence_s=0.021",
-    }  # fmt: skip
 
 
 def cell(readings, profile="paper"):

@@ -7,8 +7,7 @@ from lab.tests.width import width
 from tests.limits import assert_within_limits
 
 from pretouch.types import Mode
-from pretouch_lab.cell import Cell, Grid
-from pretouch_lab.paper import static
+from pretouch_lab.cell import Cell
 from pretouch_lab.trial import Record
 from pretouch_lab.weaknesses import endless
 
@@ -58,14 +57,6 @@ def test_without_a_contact_there_is_nothing_to_measure():
     row = endless.results(record([]))
     assert (row["contacts"], row["detections"], row["ended"]) == (0, 0, False)
     assert row["interval_s"] is row["first_peak_n"] is row["last_peak_n"] is row["highest_peak_n"] is None
-
-
-def test_cells_are_those_of_the_static_experiment():
-    grid = Grid(("blind", "paper"))
-    cells = endless.cells(grid)
-    assert [(c.profile, c.where) for c in cells] == [(c.profile, c.where) for c in static.cells(grid)]
-    assert {c.experiment for c in cells} == {"endless"}
-    assert len(cells) == 8
 
 
 @pytest.fixture(scope="module")

@@ -9,16 +9,12 @@ from tests.limits import assert_within_limits
 
 from pretouch.sim.pushes import Push
 from pretouch.types import Mode
-from pretouch_lab.cell import Cell, Grid
+from pretouch_lab.cell import Cell
 from pretouch_lab.trial import Record
 from pretouch_lab.weaknesses import release
 
 pytestmark = pytest.mark.slow
 
-PUSH = {
-    "push_n", "watched", "touching_fraction", "estimated_fraction", "detected", "reactions", "against_while_held",
-    "against_after_release", "mean_peak_n", "speed_towards_m_s", "reaction_speed_towards_m_s",
-}  # fmt: skip
 Y = np.array([0.0, 1.0, 0.0])
 
 
@@ -121,15 +117,6 @@ def test_pushes_are_against_one_face_and_leave_time_to_watch_each():
     assert fronts == {(1, -1.0), (1, 1.0), (0, -1.0)}
 
 
-def test_cells_are_five_lengths_and_three_decays_of_each_profile_that_senses():
-    cells = release.cells(Grid(("blind", "paper")))
-    assert [cell.where["held_s"] for cell in cells[::3]] == [0.3, 1.0, 2.0, 3.0, 4.0]
-    assert [cell.profile for cell in cells[:3]] == [
-        "paper", "paper:react.decay_cycles=50", "paper:react.decay_cycles=25",
-    ]  # fmt: skip
-    assert len({cell.name for cell in cells}) == 15
-
-
 def cell(held, profile="paper"):
     return Cell(release.NAME, profile, {"held_s": held, "restrictions": "slack"})
 
@@ -151,7 +138,7 @@ def test_a_row_can_be_written_and_agrees_with_the_record(trials):
     for row, rec in trials.values():
         json.dumps(row, allow_nan=False)
         assert len(row["pushes"]) == 3 or row["stuck"]
-        assert all(set(push) == PUSH and push["touching_fraction"] > 0.9 for push in row["pushes"])
+        assert all(push["touching_fraction"] > 0.9 for push in row["pushes"])
         assert sum(push["reactions"] for push in row["pushes"]) <= len(rec.reactions())
         fastest = max(np.linalg.norm(s.ee_velocity) for s in rec.steps)
         assert all(push["speed_towards_m_s"] < fastest for push in row["pushes"])

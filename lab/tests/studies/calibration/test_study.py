@@ -86,20 +86,11 @@ def test_no_skins_are_refused(panda_model):
 
 
 @pytest.mark.slow
-def test_a_study_of_one_skin_on_a_short_motion_finds_its_units(panda_model):
+def test_units_of_two_skins_are_found_by_a_short_motion(panda_model):
     said: list[str] = []
-    made = study(
-        panda_model, 1, plan=short_plan(postures=3, swing_s=6.0), processes=1, progress=lambda: said.append("done")
-    )
-    assert said == ["done"]
-    assert len(made.rows) == 7
-    assert np.median([r["position_error_m"] for r in made.rows]) < 0.003
-
-
-@pytest.mark.slow
-def test_units_of_two_skins_are_found(panda_model):
-    made = study(panda_model, skins=2, processes=2)
+    plan = short_plan(postures=3, swing_s=6.0)
+    made = study(panda_model, skins=2, plan=plan, processes=2, progress=lambda: said.append("done"))
+    assert said == ["done", "done"]
+    assert made.motion_s == plan.duration
     assert [r["skin"] for r in made.rows] == 7 * [0] + 7 * [1]
     assert np.median([r["position_error_m"] for r in made.rows]) < 0.003
-    assert np.median([r["orientation_error_deg"] for r in made.rows]) < 0.5
-    assert made.motion_s <= 90.0
