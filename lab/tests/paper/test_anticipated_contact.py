@@ -7,7 +7,7 @@ from pretouch.control.path import Circle
 from pretouch.profiles import PROFILES
 from pretouch.sim.scene import Box, SceneSpec
 from pretouch.types import Mode
-from pretouch_lab.cell import Cell, Context
+from pretouch_lab.cell import Cell
 from pretouch_lab.paper import static
 from pretouch_lab.trial import Setup, play
 
@@ -16,8 +16,8 @@ A = PROFILES["pretouch"].approach
 
 
 @pytest.mark.slow
-def test_the_arm_touches_a_board_it_sees_at_about_the_touch_speed_and_sooner_than_the_papers(panda_model, paper_skin):
-    context, rows = Context(panda_model, paper_skin), {}
+def test_the_arm_touches_a_board_it_sees_at_about_the_touch_speed_and_sooner_than_the_papers(context):
+    rows = {}
     for profile, mode in (("blind", "off"), ("paper", "off"), ("pretouch", "braking")):
         where = {"trajectory": "line", "side": "-y", "stiffness_n_per_m": 25_000.0, "restrictions": mode}
         row, record = static.trial(Cell("static", profile, where), SEED, context)
@@ -35,16 +35,10 @@ def test_beside_a_person_who_stands_still_the_arm_keeps_its_speed(panda_model, p
     person = Box("person", (0.5, 0.77, 0.3), (0.2, 0.12, 0.5), 25_000.0)  # 0.4 m beside the circle
     path, laps = Circle(start_angle=np.pi), {}
     for name in ("paper", "pretouch"):
-        tracking: list[float] = []
-
-        def done(step, _plant, tracking=tracking):
-            if step.mode is Mode.TRACK:
-                tracking.append(step.stamp)
-            return step.path_phase >= path.length or step.stamp >= 20.0
-
         setup = Setup(panda_model, paper_skin, PROFILES[name], SceneSpec(boxes=(person,)), path, SEED)
-        record = play(setup, done)
+        record = play(setup, lambda step, _: step.path_phase >= path.length or step.stamp >= 20.0)
         assert record.first_contact() is None
+        tracking = [step.stamp for step in record.steps if step.mode is Mode.TRACK]
         laps[name] = tracking[-1] - tracking[0]
     # 5.24 s at 0.3 m/s, and the start
     assert laps["pretouch"] < 5.7

@@ -1,12 +1,12 @@
 """The paper's three experiments on arms that the paper did not have."""
 
-import shutil
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from tests.importing import made
 from tests.limits import assert_within_limits
+from tests.other_arm import copied_panda
 
 from pretouch.control.posture import brought_to
 from pretouch.errors import ExperimentError
@@ -15,6 +15,7 @@ from pretouch.importing.robot_import import ImportOptions, import_robot
 from pretouch.profiles import profile
 from pretouch.robot.description import RobotDescription, panda
 from pretouch.robot.model import RobotModel
+from pretouch.robot.named import robot_named
 from pretouch.sim.placement import placement_for
 from pretouch.sim.plant_params import assumed_plant
 from pretouch.sim.pushes import PALM, robot_hand
@@ -36,9 +37,7 @@ SHORT_S, FIRST_OVER_S = 10.0, 14.0
 @pytest.fixture(scope="module")
 def stranger(tmp_path_factory) -> RobotDescription:
     """A Panda that nobody knows for one: its places are found by rule."""
-    mjcf = tmp_path_factory.mktemp("stranger") / "arm.xml"
-    shutil.copy(panda().mjcf, mjcf)
-    return replace(panda(), name="stranger", mjcf=mjcf)
+    return robot_named(str(copied_panda(tmp_path_factory.mktemp("stranger"))))
 
 
 @pytest.fixture(scope="module", params=tuple(ARMS))
@@ -88,7 +87,7 @@ def test_the_rule_finds_about_the_hand_that_a_panda_has(stranger, panda_model):
     ],
 )
 def test_an_arm_that_cannot_follow_the_paths_is_refused_with_the_reason(stranger, changed, reason):
-    with pytest.raises(ExperimentError, match=r"stranger cannot follow .* in no size from 1 to 0.4") as said:
+    with pytest.raises(ExperimentError, match=r"panda cannot follow .* in no size from 1 to 0.4") as said:
         placement_for(RobotModel(replace(stranger, **changed)))
     assert reason in str(said.value)
     assert "Give another q_ready in robot.toml" in str(said.value)

@@ -29,13 +29,10 @@ def test_the_arm_slows_for_the_hand_gives_way_and_recovers(trials):
     assert np.linalg.norm(last.ee_position - last.path_position) < 0.02
 
 
-def test_blind_passes_by_without_slowing(trials):
+def test_blind_passes_by_without_slowing(trials, panda_model):
     row, _ = trials["blind"]
     assert row["least_speed_scale"] == 1.0
     assert row["deviation_m"] < 0.01
-
-
-def test_no_command_exceeds_a_limit(trials, panda_model):
     for _, record in trials.values():
         assert_within_limits(record, panda_model)
 

@@ -6,22 +6,19 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from pretouch.errors import ExperimentError, ParameterError, PretouchError
-from pretouch.perception.obstacles import points_of_units
+from pretouch import cli
+from pretouch.errors import ExperimentError, ParameterError
 from pretouch.profiles import profile
 from pretouch.recording.run_record import MODES, RunRecord, TrueForces
 from pretouch.types import Contact, Mode
-from pretouch_lab.cell import Cell
 from pretouch_lab.cli import figure as cli_figure
 from pretouch_lab.cli.figure import draw_figure
-from pretouch_lab.paper.claims import between
 from pretouch_lab.paper.figures import marks
 from pretouch_lab.paper.figures.circle import circle_figure
 from pretouch_lab.paper.figures.close_up import close_up_figure
 from pretouch_lab.paper.figures.force_difference import force_difference_figure
 from pretouch_lab.paper.figures.interaction import interaction_figure
 from pretouch_lab.registry import EXPERIMENTS
-from pretouch_lab.trial import trace_of
 
 S, UNITS = 400, tuple("abcdefg")
 PAPER = profile("paper")
@@ -129,90 +126,47 @@ def test_the_force_difference_counts_from_the_touch_away_from_the_object():
     assert len(alone.axes[0].get_legend_handles_labels()[1]) <= 4
 
 
-@pytest.fixture(scope="module")
-def recorded(context, tmp_path_factory):
-    """A recorded trial, and its record."""
-    cell, place = Cell(between.NAME, "paper", {"restrictions": "slack"}), tmp_path_factory.mktemp("trial") / "x.mcap"
-    _, record = between.trial(cell, 101, replace(context, recording=place))
-    return place, record
-
-
-@pytest.fixture(scope="module")
-def step_and_trace(recorded):
-    return recorded[1], trace_of(recorded[1])
-
-
-def test_a_record_keeps_what_each_unit_showed(step_and_trace):
-    record, trace = step_and_trace
-    for i in range(0, len(record.steps), 20):
-        step = record.steps[i]
-        np.testing.assert_array_equal(points_of_units(step.obstacles, 7), trace.sensed_point[i])
-        shown = np.flatnonzero(np.isfinite(trace.sensed_point[i, :, 0]))
-        assert shown.tolist() == sorted(step.obstacles.unit)
-        for k, unit in enumerate(step.obstacles.unit):
-            np.testing.assert_array_equal(trace.sensed_point[i, unit], step.obstacles.point[k])
-
-
-def refuse(*_args):
-    raise AssertionError("a trial was played")
-
-
 @pytest.fixture
-def nothing_played(monkeypatch):
-    refusing = {name: replace(experiment, trial=refuse) for name, experiment in EXPERIMENTS.items()}
-    monkeypatch.setattr(cli_figure, "EXPERIMENTS", refusing)
-
-
-@pytest.fixture
-def recorded_trials(step_and_trace, monkeypatch):
-    """Have all trials be one that was played before; return what is asked for."""
+def played(tmp_path, monkeypatch):
+    """Have the made-up trace be that of each trial, in an empty folder; return what is asked for."""
     asked = []
 
     def play(cell, seed, _context):
         asked.append((cell.name, seed))
-        return {}, step_and_trace[0]
+        return {}, None
 
     for name, experiment in EXPERIMENTS.items():
         monkeypatch.setitem(EXPERIMENTS, name, replace(experiment, trial=play))
+    monkeypatch.setattr(cli_figure, "trace_of", lambda _record: made_trace())
+    monkeypatch.chdir(tmp_path)
     return asked
 
 
-@pytest.mark.usefixtures("recorded_trials")
-def test_a_figure_is_written_here_by_its_name(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    assert str(draw_figure("close-up")) == "close-up.png"
+def test_a_figure_is_written_here_by_its_name_of_trials_that_are_played_and_told(played, tmp_path, capsys):
+    assert cli.main(["figure", "close-up", "--profile", "paper-0.5m", "--seed", "4"]) == 0
+    said = capsys.readouterr()
+    assert said.err == "Playing between_slack_paper-0.5m with seed 4: about 12 s of simulated time.\n"
+    assert said.out == "Figure: close-up.png\n"
     assert [path.name for path in tmp_path.iterdir()] == ["close-up.png"]
+    assert played == [("between_slack_paper-0.5m", 4)]
+    assert "<svg" in draw_figure("close-up", out=tmp_path / "x.svg").read_text()
 
 
-@pytest.mark.usefixtures("nothing_played")
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
         ({"name": "square"}, "The figure 'square' is unknown: choose from circle, interaction"),
         ({"seed": -1}, "The seed is -1"),
         ({"profile": "brave"}, "The profile 'brave' is unknown"),
-        ({"out": "figure.jpg"}, "no ending that says its format: use .png, .pdf, .svg"),
-        ({"out": "figure"}, "no ending that says its format"),
-        ({"out": "/dev/null/x.png"}, "The figure /dev/null/x.png cannot be written .File exists.: give another"),
-        ({"out": "FOLDER.png"}, "FOLDER.png cannot be written .Is a directory.: give another"),
-        ({"out": "x" * 300 + ".png"}, "cannot be written .File name too long.: give another"),
+        ({"out": Path("figure.jpg")}, "no ending that says its format: use .png, .pdf, .svg"),
+        ({"out": Path("/dev/null/x.png")}, "The figure /dev/null/x.png cannot be written .File exists.: give another"),
         ({"name": "force-difference", "profile": "blind"}, "cannot show blind, which has no proximity"),
     ],
 )
-def test_what_cannot_be_drawn_is_said_in_a_sentence(tmp_path, monkeypatch, changes, words):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "FOLDER.png").mkdir()
-    with pytest.raises(PretouchError, match=words) as error:
-        draw_figure(**{"name": "circle", **{k: Path(v) if k == "out" else v for k, v in changes.items()}})
-    assert isinstance(error.value, (ExperimentError, ParameterError))
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["FOLDER.png"]
-
-
-def test_the_trials_are_played_and_told(recorded_trials, tmp_path, capsys):
-    made = draw_figure("close-up", out=tmp_path / "x.svg", profile="paper-0.5m", seed=4)
-    assert made.stat().st_size > 10_000
-    assert recorded_trials == [("between_slack_paper-0.5m", 4)]
-    assert capsys.readouterr().err == ("Playing between_slack_paper-0.5m with seed 4: about 12 s of simulated time.\n")
+def test_what_cannot_be_drawn_is_said_in_a_sentence(played, tmp_path, changes, words):
+    with pytest.raises((ExperimentError, ParameterError), match=words):
+        draw_figure(**{"name": "circle", **changes})
+    assert played == list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.slow

@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 from tests.other_arm import copied_panda
+from tests.recording.runs import custom_arm
 
 from pretouch.control.path import Circle
 from pretouch.errors import ExperimentError
-from pretouch.robot.description import RobotDescription
 from pretouch.robot.model import RobotModel
 from pretouch.robot.named import robot_named
 from pretouch.sim.board import PANDA_SIDE, HandSide
@@ -14,21 +14,6 @@ from pretouch.sim.pushes import way_round
 from pretouch.sim.scene import HandSpec
 from pretouch_lab.campaign import Request
 
-FIVE = "<mujoco><worldbody>{}</worldbody></mujoco>"
-
-
-@pytest.fixture
-def five_axis(tmp_path):
-    """An arm of five joints."""
-    body = "".join(
-        f'<body name="l{k}" pos="0 0 .1"><joint name="j{k}" axis="0 {k % 2} 1" range="-1 1"/>'
-        '<geom type="capsule" size=".03 .03" pos="0 0 .05" mass="1"/>'
-        for k in range(1, 6)
-    )  # fmt: skip
-    (tmp_path / "five.xml").write_text(FIVE.format(body + "</body>" * 5))
-    ones = np.ones(5)
-    return RobotModel(RobotDescription("five", tmp_path / "five.xml", "l5", ones, ones, ones, 0 * ones, "made"))
-
 
 def test_the_panda_has_the_papers_paths(panda_model):
     placement = placement_for(panda_model)
@@ -37,9 +22,9 @@ def test_the_panda_has_the_papers_paths(panda_model):
     assert placement.face(0.2371, "+y") == 0.2371
 
 
-def test_an_arm_of_five_joints_is_refused_with_its_joints(five_axis):
-    with pytest.raises(ExperimentError, match=r"five has 5 joints \(j1, j2, j3, j4, j5\): .* needs 6. .*another --ee"):
-        placement_for(five_axis)
+def test_an_arm_of_too_few_joints_is_refused_with_its_joints(tmp_path):
+    with pytest.raises(ExperimentError, match=r"two has 2 joints \(j1, j2\): .* needs 6. .*another --ee"):
+        placement_for(RobotModel(custom_arm(tmp_path)))
 
 
 def test_of_a_simulated_arm_it_is_said_what_is_assumed(panda_model, tmp_path):

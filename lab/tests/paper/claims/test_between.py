@@ -42,17 +42,14 @@ def test_the_push_is_felt_and_goes_away_from_the_hand(trials):
     assert hardest[1] > 0.8 * np.linalg.norm(hardest)
 
 
-def test_blind_narrows_nothing(trials):
+def test_blind_narrows_nothing(trials, panda_model):
     row, record = trials["blind"]
     assert row["contact"]
     assert not row["both_lowered"]
     assert min(*row["upper_least_n"], *row["lower_least_n"]) >= 10.0
     assert all(np.all(s.thresholds.obstacle_positive == 0) for s in record.steps)
-
-
-def test_no_command_exceeds_a_limit(trials, panda_model):
-    for _, record in trials.values():
-        assert_within_limits(record, panda_model)
+    for _, each in trials.values():
+        assert_within_limits(each, panda_model)
 
 
 def test_widths_are_those_of_the_steps(trials):
@@ -98,9 +95,13 @@ def test_summary_and_table_count_what_the_rows_say(trials):
     assert between.summarise([]) == {"cells": []}
 
 
-def test_the_close_up_shows_the_touch_and_both_bounds(trials, paper_skin):
+def test_a_trace_has_what_each_unit_showed_and_the_close_up_the_touch_and_both_bounds(trials, paper_skin):
     row, record = trials["paper"]
     trace = trace_of(record)
+    for step, points in zip(record.steps[::20], trace.sensed_point[::20], strict=True):
+        shown = np.full((7, 3), np.nan)
+        shown[step.obstacles.unit] = step.obstacles.point
+        np.testing.assert_array_equal(points, shown)
     top, bottom = close_up_figure(trace, paper_skin.ids, profile("paper")).axes
     low, high = bottom.get_xlim()
     touch = next(s.stamp for s in record.reactions()) - row["detection_delay_s"]
