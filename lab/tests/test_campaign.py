@@ -27,6 +27,7 @@ SMALL = Request(("static",), seeds=1, profiles=("blind",))
         ({"profiles": ()}, "profiles are none"),
         ({"profiles": ("paper", "paper")}, "name each wanted one once"),
         ({"restrictions": ("off", "firm")}, "'firm' is unknown: choose from off, hard, slack, floor"),
+        ({"stiffness": (0.0,)}, "stiffness is 0 N/m"),
         ({"stiffness": (25e3, float("nan"))}, "stiffness is nan N/m"),
         ({"stiffness": ()}, "stiffnesses are none N/m: name each"),
         ({"stiffness": (25e3, 25000.0)}, "name each wanted one once"),

@@ -9,7 +9,7 @@ from tests.control.motions import Mover
 from pretouch.control.interface import MotionRequest
 from pretouch.control.joint_box import joint_limits
 from pretouch.errors import ParameterError
-from pretouch.perception.closest import closest_points, no_obstacles
+from pretouch.perception.closest import closest_points
 from pretouch.profiles import profile
 from pretouch.types import Obstacles, QpOutcome, RobotState
 from pretouch_lab.baselines.ding import Ding, ding_limit, ding_rows
@@ -26,34 +26,26 @@ def obstacles_at(points, ee=(0.0, 0.0, 0.0)):
     return Obstacles(np.arange(k), points, far, points * 0, np.ones(k, np.int64), away / far[:, None], far, np.zeros(k))
 
 
-def test_repulsion_by_numbers():
+def test_repulsion_by_numbers_is_finite_anywhere():
     # at half of rho the exponent is 0; at 0 it is -6, and 1 / (1 + e^-6) = 0.99752738; at rho it is 6
-    found = repulsion(np.array([0.0, 0.2, 0.4]), 0.4, 6.0, 0.4)
-    np.testing.assert_allclose(found, [0.4 * 0.99752738, 0.2, 0.4 * 0.00247262], rtol=1e-5)
+    found = repulsion(np.array([0.0, 0.2, 0.4, 1e6, -1e6]), 0.4, 6.0, 0.4)
+    np.testing.assert_allclose(found, [0.4 * 0.99752738, 0.2, 0.4 * 0.00247262, 0.0, 0.4], rtol=1e-5, atol=1e-12)
 
 
-def test_repulsion_of_the_farthest_and_of_deep_penetration_is_finite():
-    np.testing.assert_allclose(repulsion(np.array([1e6, -1e6]), 0.4, 6.0, 0.4), [0.0, 0.4], atol=1e-12)
-
-
-def test_the_hand_is_moved_away_from_a_single_point():
-    found = repulsive_velocity(np.zeros(3), obstacles_at([[0.0, 0.2, 0.0]]), FLACCO)
-    np.testing.assert_allclose(found, [0.0, -0.2, 0.0], atol=1e-12)
-
-
-def test_of_two_points_the_nearest_gives_the_size_and_both_the_direction():
-    found = repulsive_velocity(np.zeros(3), obstacles_at([[0.2, 0.0, 0.0], [0.0, 0.2, 0.0]]), FLACCO)
-    np.testing.assert_allclose(found, -0.2 / np.sqrt(2) * np.array([1.0, 1.0, 0.0]), atol=1e-12)
-
-
-def test_the_size_of_the_hand_is_taken_off_the_distance():
-    found = repulsive_velocity(np.zeros(3), obstacles_at([[0.3, 0.0, 0.0]]), replace(FLACCO, size_m=0.1))
-    np.testing.assert_allclose(found, [-0.2, 0.0, 0.0], atol=1e-12)
-
-
-@pytest.mark.parametrize("points", [[], [[0.2, 0.0, 0.0], [-0.2, 0.0, 0.0]]])
-def test_nothing_or_what_is_on_both_sides_gives_no_repulsion(points):
-    np.testing.assert_allclose(repulsive_velocity(np.zeros(3), obstacles_at(points), FLACCO), np.zeros(3), atol=1e-12)
+@pytest.mark.parametrize(
+    ("points", "size", "expected"),
+    [
+        ([], 0.0, [0.0, 0.0, 0.0]),
+        ([[0.0, 0.2, 0.0]], 0.0, [0.0, -0.2, 0.0]),
+        ([[0.3, 0.0, 0.0]], 0.1, [-0.2, 0.0, 0.0]),
+        ([[0.2, 0.0, 0.0], [0.0, 0.2, 0.0]], 0.0, [-0.2 / np.sqrt(2), -0.2 / np.sqrt(2), 0.0]),
+        ([[0.2, 0.0, 0.0], [-0.2, 0.0, 0.0]], 0.0, [0.0, 0.0, 0.0]),
+    ],
+    ids=["nothing", "one point", "the hand's size is taken off", "size of the nearest, way of both", "both sides"],
+)
+def test_the_hand_is_moved_away_from_points(points, size, expected):
+    found = repulsive_velocity(np.zeros(3), obstacles_at(points), replace(FLACCO, size_m=size))
+    np.testing.assert_allclose(found, expected, atol=1e-12)
 
 
 def test_joints_are_slowed_towards_the_obstacle_only():
@@ -84,11 +76,8 @@ def test_ding_rows_by_numbers():
     np.testing.assert_allclose(rows.G, [[1.0, 0.0], [5.0 / 7.0, 2.0 / 7.0]])
     np.testing.assert_allclose(rows.h, [-0.08, 0.0])
     assert rows.weight > 0
-
-
-def test_far_obstacles_can_be_kept_out_of_the_weighted_sum():
-    rows = ding_rows(np.eye(2), np.array([0.2, 0.5]), replace(DING, weighted_m=0.3))
-    np.testing.assert_allclose(rows.G[-1], [1.0, 0.0])
+    near = ding_rows(approach, np.array([0.2, 0.5]), replace(DING, weighted_m=0.3))
+    np.testing.assert_allclose(near.G[-1], [1.0, 0.0])
 
 
 @given(st.lists(st.floats(0.02, 1.0), min_size=1, max_size=5), st.integers(0, 10_000))
@@ -102,80 +91,73 @@ def test_no_motion_that_ding_allows_lowers_the_weighted_sum_of_the_distances(dis
     assert C @ allowed >= -1e-9
 
 
-@pytest.mark.parametrize("places", [(0.2, 0.1, 0.25, 0.3), (0.1, 0.2, 0.3, 0.3)])
-def test_distances_of_ding_have_to_grow(places):
-    names = ("repulse_m", "zero_low_m", "zero_high_m", "notice_m")
+@pytest.mark.parametrize("wrong", [{"repulse_m": 0.3}, {"notice_m": 0.25}])
+def test_distances_of_ding_have_to_grow(wrong):
     with pytest.raises(ParameterError, match="they must grow"):
-        Ding(**dict(zip(names, places, strict=True)))
+        Ding(**wrong)
 
 
 class Arm:
     """A Panda at rest in its ready posture, with a point beside its hand."""
 
-    def __init__(self, model, text, offset):
-        self.model, self.profile = model, profile(text)
-        q = model.description.q_ready
-        self.kin = model.kinematics(q)
-        self.ee = self.kin.position[model.ee]
-        self.robot = RobotState(0.0, q, np.zeros(7), q, np.zeros(7), np.zeros(7), None)
+    def __init__(self, model, text, *offset):
+        self.model, q, still = model, model.description.q_ready, np.zeros(7)
+        self.kin, self.robot = model.kinematics(q), RobotState(0.0, q, still, q, still, still, None)
         self.limits = joint_limits(model, 0.01, 0.01)
-        self.mover = Mover(model, self.limits, self.profile, 1)
-        aside = np.array([[0.0, 1.0, 0.0]])
-        points = (self.ee + np.array(offset))[None] if offset is not None else None
-        self.obstacles = (
-            no_obstacles()
-            if points is None
-            else closest_points(self.kin, model.body, self.ee, np.zeros(1, np.int64), points, aside)
-        )
+        self.mover = Mover(model, self.limits, profile(text), 1)
+        hand, k = self.kin.position[model.ee], len(offset)
+        points, aside = hand + np.reshape(offset, (k, 3)), np.tile([0.0, 1.0, 0.0], (k, 1))
+        self.obstacles = closest_points(self.kin, model.body, hand, np.zeros(k, np.int64), points, aside)
+
+    def step(self, velocity, hold=False):
+        request = MotionRequest(np.array(velocity), self.kin.rotation[self.model.ee], hold)
+        return self.mover.step(self.kin, self.robot, self.obstacles, request)
 
     def move(self, velocity, hold=False):
         """Answer to a velocity once the acceleration box has let the arm get there."""
-        robot = self.robot
-        request = MotionRequest(np.array(velocity), self.kin.rotation[self.model.ee], hold)
         for _ in range(60):
-            motion = self.mover.step(self.kin, robot, self.obstacles, request)
-            robot = replace(robot, qd=motion.qp.qd, qd_commanded=motion.qp.qd)
-        return motion.qp, motion.restricted, motion.approach_limit, motion.ee_velocity_commanded
+            motion = self.step(velocity, hold)
+            self.robot = replace(self.robot, qd=motion.qp.qd, qd_commanded=motion.qp.qd)
+        return motion
+
+    def approach(self, qd):
+        """Speed of the nearest point of the arm towards the one beside it."""
+        near = self.obstacles
+        return near.direction[0] @ self.model.jacobian(self.kin, int(near.link[0]), near.body_point[0])[:3] @ qd
 
 
 @pytest.mark.parametrize("mode", ["flacco", "ding"])
 def test_with_nothing_near_the_task_is_followed(panda_model, mode):
-    qp, which, _, velocity = Arm(panda_model, mode, None).move([0.0, 0.1, 0.0])
-    assert qp.outcome is QpOutcome.SOLVED
-    assert len(which) == len(qp.slack) == 0
-    np.testing.assert_allclose(velocity, [0.0, 0.1, 0.0], atol=2e-3)
+    motion = Arm(panda_model, mode).move([0.0, 0.1, 0.0])
+    assert motion.qp.outcome is QpOutcome.SOLVED
+    assert len(motion.restricted) == len(motion.qp.slack) == 0
+    np.testing.assert_allclose(motion.ee_velocity_commanded, [0.0, 0.1, 0.0], atol=2e-3)
 
 
 def test_flacco_moves_the_hand_away(panda_model):
-    arm = Arm(panda_model, "flacco", [0.0, 0.2, 0.0])
-    qp, *_, velocity = arm.move([0.0, 0.0, 0.0])
-    assert qp.outcome is QpOutcome.SOLVED
-    np.testing.assert_allclose(velocity, [0.0, -0.2, 0.0], atol=5e-3)
+    motion = Arm(panda_model, "flacco", [0.0, 0.2, 0.0]).move([0.0, 0.0, 0.0])
+    assert motion.qp.outcome is QpOutcome.SOLVED
+    np.testing.assert_allclose(motion.ee_velocity_commanded, [0.0, -0.2, 0.0], atol=5e-3)
 
 
 def test_ding_retreats_as_fast_as_its_limit_says(panda_model):
     arm = Arm(panda_model, "ding", [0.0, 0.25, 0.0])
-    d = float(arm.obstacles.body_distance[0])
-    qp, which, limit, _ = arm.move([0.0, 0.3, 0.0])
-    assert qp.outcome is QpOutcome.SOLVED
-    assert which.tolist() == [0]
-    np.testing.assert_allclose(limit, ding_limit(np.array([d]), DING))
-    J = panda_model.jacobian(arm.kin, int(arm.obstacles.link[0]), arm.obstacles.body_point[0])[:3]
-    assert arm.obstacles.direction[0] @ J @ qp.qd == pytest.approx(limit[0], abs=5e-3)
+    motion, limit = arm.move([0.0, 0.3, 0.0]), ding_limit(arm.obstacles.body_distance, DING)
+    assert motion.qp.outcome is QpOutcome.SOLVED
+    assert motion.restricted.tolist() == [0]
+    np.testing.assert_allclose(motion.approach_limit, limit)
+    assert arm.approach(motion.qp.qd) == pytest.approx(limit[0], abs=5e-3)
 
 
 @pytest.mark.parametrize("mode", ["flacco", "ding"])
 def test_a_held_arm_brakes_whatever_is_near(panda_model, mode):
-    qp, *_ = Arm(panda_model, mode, [0.0, 0.15, 0.0]).move([0.0, 0.3, 0.0], hold=True)
+    qp = Arm(panda_model, mode, [0.0, 0.15, 0.0]).move([0.0, 0.3, 0.0], hold=True).qp
     assert qp.outcome is QpOutcome.SKIPPED
     np.testing.assert_allclose(qp.qd, np.zeros(7))
 
 
 def test_an_arm_at_rest_begins_its_retreat_as_fast_as_its_joints_allow(panda_model):
     arm = Arm(panda_model, "ding", [0.0, 0.15, 0.0])
-    request = MotionRequest(np.array([0.0, 0.3, 0.0]), arm.kin.rotation[panda_model.ee])
-    qp = arm.mover.step(arm.kin, arm.robot, arm.obstacles, request).qp
-    J = panda_model.jacobian(arm.kin, int(arm.obstacles.link[0]), arm.obstacles.body_point[0])[:3]
-    assert arm.obstacles.direction[0] @ J @ qp.qd < -0.02
-    fastest = np.abs(qp.qd) / (0.01 * arm.limits.qdd_max)
-    assert fastest.max() == pytest.approx(1.0)
+    qd = arm.step([0.0, 0.3, 0.0]).qp.qd
+    assert arm.approach(qd) < -0.02
+    assert (np.abs(qd) / (0.01 * arm.limits.qdd_max)).max() == pytest.approx(1.0)

@@ -2,6 +2,7 @@
 
 import time
 from dataclasses import replace
+from itertools import count
 from mmap import mmap
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 
 from pretouch.controller import Controller
 from pretouch.perception.scene_filter import no_fixtures
-from pretouch.profiles import PROFILES, Profile, at_rate
+from pretouch.profiles import PROFILES, at_rate
 from pretouch.robot.description import fr3
 from pretouch.robot.model import RobotModel
 from pretouch.types import Inputs, Mode
@@ -102,10 +103,7 @@ def test_any_arm_has_one():
 
 @pytest.fixture
 def short(monkeypatch: pytest.MonkeyPatch) -> None:
-    def found(_name: str) -> Profile:
-        return SHORT
-
-    monkeypatch.setattr(cycle, "profile", found)
+    monkeypatch.setattr(cycle, "profile", lambda _name: SHORT)
     monkeypatch.setattr(cycle, "_SETTLE", 20)
 
 
@@ -124,18 +122,15 @@ def test_a_row_says_what_was_asked():
 
 @pytest.mark.usefixtures("short")
 def test_slow_steps_are_overruns_in_wall_time_alone(monkeypatch: pytest.MonkeyPatch):
-    class Slow(Controller):
+    turns, step = count(1), Controller.step
+
+    def slow(controller: Controller, state: object, inputs: Inputs) -> object:
         """One step in five waits, and so takes no processor time."""
+        if next(turns) % 5 == 0:
+            time.sleep(0.1)
+        return step(controller, state, inputs)
 
-        turns = 0
-
-        def step(self, state: object, inputs: Inputs) -> object:
-            Slow.turns += 1
-            if Slow.turns % 5 == 0:
-                time.sleep(0.1)
-            return super().step(state, inputs)
-
-    monkeypatch.setattr(cycle, "Controller", Slow)
+    monkeypatch.setattr(Controller, "step", slow)
     monkeypatch.setattr(cycle, "_SETTLE", 0)
     monkeypatch.setattr(cycle, "warm_up", lambda *_given: None)
     row = measure(2, CycleRequest(rate=25.0, cycles=10))
@@ -147,18 +142,16 @@ def test_slow_steps_are_overruns_in_wall_time_alone(monkeypatch: pytest.MonkeyPa
 
 @pytest.mark.usefixtures("short")
 def test_memory_that_steps_keep_is_told(monkeypatch: pytest.MonkeyPatch):
-    kept = []
+    kept, step = [], Controller.step
 
-    class Hoarder(Controller):
+    def hoarding(controller: Controller, state: object, inputs: Inputs) -> object:
         """Each step keeps a megabyte, of the system's: the process may have as much free of its own."""
-
-        def step(self, state: object, inputs: Inputs) -> object:
-            kept.append(mmap(-1, 2**20))
-            kept[-1].write(bytes(2**20))
-            return super().step(state, inputs)
+        kept.append(mmap(-1, 2**20))
+        kept[-1].write(bytes(2**20))
+        return step(controller, state, inputs)
 
     assert measure(2, CycleRequest(cycles=30))["memory_gained_kib"] < 5_000
-    monkeypatch.setattr(cycle, "Controller", Hoarder)
+    monkeypatch.setattr(Controller, "step", hoarding)
     assert measure(2, CycleRequest(cycles=30))["memory_gained_kib"] >= 28 * 1024
 
 

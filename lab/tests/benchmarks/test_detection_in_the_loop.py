@@ -6,19 +6,20 @@ import numpy as np
 import pytest
 
 from pretouch.control.path import Circle
-from pretouch.profiles import profile
-from pretouch.sensing.skin import paper_skin
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.scene import SceneSpec
 from pretouch.types import Mode
 from pretouch_lab.baselines.detection import BASELINES
 from pretouch_lab.benchmarks.detection.arm import AWAY, Alone, path_of, record, sensing_of
 from pretouch_lab.benchmarks.detection.replay import replay
-from pretouch_lab.trial import Setup, play
+from pretouch_lab.cell import Cell
+from pretouch_lab.trial import play
+
+pytestmark = pytest.mark.slow
+PRETOUCH = Cell("", "pretouch")
 
 
-@pytest.mark.slow
-def test_a_simulated_arm_is_quiet_alone_and_feels_pushes(panda_model):
+def test_a_simulated_arm_is_quiet_alone_and_feels_pushes(context):
     starts, sides = (70.0, 75.0), (1.0, -1.0)
 
     def prepare(plant, _) -> None:
@@ -31,10 +32,8 @@ def test_a_simulated_arm_is_quiet_alone_and_feels_pushes(panda_model):
 
         plant.before_each_step(before_step)
 
-    trial = play(
-        Setup(panda_model, paper_skin(panda_model), profile("pretouch"), SceneSpec(), Circle(), 1071, prepare=prepare),
-        lambda step, _: step.stamp >= 80.0,
-    )
+    setup = context.setup(PRETOUCH, 1071, SceneSpec(), Circle(), prepare=prepare)
+    trial = play(setup, lambda step, _: step.stamp >= 80.0)
     felt = [(s.stamp, s.contact.force[1]) for s in trial.steps if s.contact is not None]
     assert len(felt) == 2
     for (at, force), start, side in zip(felt, starts, sides, strict=True):
@@ -72,7 +71,6 @@ def biased(joint: int, torque: float, since: float):
     return prepare
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("seed", "prepare"),
     [
@@ -83,18 +81,13 @@ def biased(joint: int, torque: float, since: float):
     ],
     ids=["gripped", "put down", "a step of the estimate", "one hardly felt"],
 )
-def test_what_stays_is_felt_once_and_the_task_goes_on(panda_model, seed, prepare):
-    trial = play(
-        Setup(
-            panda_model, paper_skin(panda_model), profile("pretouch"), SceneSpec(), Circle(), seed, prepare=prepare
-        ),
-        lambda step, _: step.stamp >= 60.0,
-    )  # fmt: skip
+def test_what_stays_is_felt_once_and_the_task_goes_on(context, seed, prepare):
+    setup = context.setup(PRETOUCH, seed, SceneSpec(), Circle(), prepare=prepare)
+    trial = play(setup, lambda step, _: step.stamp >= 60.0)
     assert sum(s.contact is not None for s in trial.steps) == 1
     assert all(s.mode is Mode.TRACK for s in trial.steps if s.stamp > 40.0)
 
 
-@pytest.mark.slow
 def test_an_arm_that_turns_round_hard_with_an_unknown_load_gives_no_alarm(panda_model):
     plant = replace(PlantParams(), payload_max_kg=0.5, friction_compensated=0.0)
     alone = Alone(path_of("line"), 0.3, plant, sensing_of("seven", 1112), 0.15, 1112, 120.0)

@@ -24,6 +24,10 @@ def touching(link: str, start: float = 1.0, force: float = 20.0) -> Touching:
     return Touching(index, 0, force, 0.02, 0.4, start, point, normal, -normal)
 
 
+def said_at(link: int, place: np.ndarray) -> Touched:
+    return Touched(np.array([link]), place[None], np.ones((1, 3)), np.ones(1), np.ones(1))
+
+
 def said_of(*touched: Touched) -> Said:
     count = len(touched)
     q = np.tile(model().description.q_ready, (count, 1))
@@ -73,10 +77,7 @@ def test_links_that_the_same_joints_move_are_one_body():
 def test_a_contact_is_judged_by_its_body_and_its_place():
     touch = touching("link6")
     at = true_place(touch)
-    right = Touched(
-        np.array([touch.link]), (at + np.array([0.0, 0.03, 0.0]))[None], np.ones((1, 3)), np.ones(1), np.ones(1)
-    )
-    wrong = Touched(np.array([model().ee]), at[None], np.ones((1, 3)), np.ones(1), np.ones(1))
+    right, wrong = said_at(touch.link, at + np.array([0.0, 0.03, 0.0])), said_at(model().ee, at)
     row = _one(touch, said_of(NOT_TOUCHED, right, NOT_TOUCHED, NOT_TOUCHED, wrong))
     assert row["right"]
     assert row["error_m"] == pytest.approx(0.03)
@@ -88,23 +89,22 @@ def test_a_contact_is_judged_by_its_body_and_its_place():
 
 
 def test_torques_tell_most_of_the_hand_and_hardly_anything_of_the_first_links():
-    limits = []
-    for link in ("link1", "link2", "link4", "link6", "hand"):
-        touch = touching(link, force=30.0)
-        q = model().description.q_ready
-        limits.append(position_limit(touch, model().kinematics(q), q, LEARNT))
+    q = model().description.q_ready
+    kin = model().kinematics(q)
+
+    def limit(link: str, force: float = 30.0) -> float:
+        return position_limit(touching(link, force=force), kin, q, LEARNT)
+
+    limits = [limit(link) for link in ("link1", "link2", "link4", "link6", "hand")]
     assert limits[0] > limits[2] > limits[4]
     assert limits[-1] < 0.03
     assert max(limits) <= np.sqrt(2.0) * LINK_M
-    # a harder push tells more
-    q, soft, hard = model().description.q_ready, touching("link6", force=15.0), touching("link6", force=60.0)
-    kin = model().kinematics(q)
-    assert position_limit(hard, kin, q, LEARNT) < position_limit(soft, kin, q, LEARNT)
+    assert limit("link6", 60.0) < limit("link6", 15.0), "a harder push tells more"
 
 
 def test_rows_say_what_was_found():
     touch = touching("hand")
-    at = Touched(np.array([touch.link]), true_place(touch)[None] + 0.01, np.ones((1, 3)), np.ones(1), np.ones(1))
+    at = said_at(touch.link, true_place(touch) + 0.01)
     found = [_one(touch, said_of(NOT_TOUCHED, at, at, at, at)), _one(touch, said_of(NOT_TOUCHED))]
     rows = rows_by_body([{"skin": "none", "found": found, "median_s": 0.0004, "p99_s": 0.002}])
     (first,) = rows

@@ -28,6 +28,7 @@ def run(capsys, *args):
         (("bench", "cycle", "--points", "7,x"), "The numbers of points are '7,x': give whole numbers"),
         (("bench", "cycle", "--points", ""), "The numbers of points are '': give whole numbers"),
         (("bench", "cycle", "--points", "7,0"), "The number of points is 0: give 1 to 10000"),
+        (("bench", "cycle", "--rate", "10"), "The rate is 10 Hz"),
         (("bench", "cycle", "--rate", "nan"), "The rate is nan Hz: give more than 20 and up to 10000 Hz"),
         (("bench", "cycle", "--cycles", "0"), "The number of cycles is 0"),
         (("bench", "cycle", "--profile", "brave"), "The profile 'brave' is unknown"),

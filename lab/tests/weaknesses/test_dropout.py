@@ -42,8 +42,10 @@ def trials(context):
     return {n: dropout.trial(cell(n), 101, context) for n in (0, 3, 20)}
 
 
-def test_as_many_readings_are_lost_as_were_silenced(trials):
-    for n, (row, _) in trials.items():
+def test_as_many_readings_are_lost_as_were_silenced_and_no_command_exceeds_a_limit(trials, panda_model):
+    for n, (row, record) in trials.items():
+        assert row["command_step"] <= 1.0
+        assert_within_limits(record, panda_model)
         assert row["units"]
         assert all(abs(lost - n) <= 1 for lost in row["lost"])
         json.dumps(row, allow_nan=False)
@@ -90,12 +92,6 @@ def test_the_largest_steps_are_those_of_the_record(trials):
     assert row["threshold_step_n"] == pytest.approx(max(upper, lower), abs=1e-3)
     assert row["scale_rise"] == pytest.approx(max(np.diff([s.speed_scale for s in watched])), abs=1e-4)
     assert row["towards_most_m_s"] > row["towards_before_m_s"]
-
-
-def test_no_command_exceeds_a_limit(trials, panda_model):
-    for row, rec in trials.values():
-        assert row["command_step"] <= 1.0
-        assert_within_limits(rec, panda_model)
 
 
 def row(readings, seed=0, profile="paper", **changes):

@@ -36,7 +36,7 @@ def test_touches_less_than_a_fifth_of_a_second_apart_are_one_contact():
     assert endless.contacts(time, np.zeros(len(time))) == []
 
 
-def test_results_count_contacts_detections_and_peaks():
+def test_results_count_contacts_detections_and_peaks_and_without_a_contact_there_are_none():
     touches = (2.0, 2.1, 40.0), (6.0, 6.1, 60.0), (11.0, 11.1, 30.0)
     row = endless.results(record([2.05, 6.05, 11.05], *touches))
     assert row == {
@@ -51,33 +51,22 @@ def test_results_count_contacts_detections_and_peaks():
         "held": False,
     }
     assert endless.results(record([2.05], *touches, (25.0, 25.1, 30.0)))["ended"] is False
-
-
-def test_without_a_contact_there_is_nothing_to_measure():
     row = endless.results(record([]))
     assert (row["contacts"], row["detections"], row["ended"]) == (0, 0, False)
     assert row["interval_s"] is row["first_peak_n"] is row["last_peak_n"] is row["highest_peak_n"] is None
 
 
-@pytest.fixture(scope="module")
-def trial(context):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(endless, "_DURATION_S", 30.0)
-        return endless.trial(Cell(endless.NAME, "paper", WHERE), 100, context)
-
-
-def test_the_first_detection_does_not_end_the_trial(trial, panda_model):
-    row, rec = trial
+def test_the_first_detection_does_not_end_a_trial_and_reactions_are_as_far_apart_as_they_last(
+    context, panda_model, monkeypatch
+):
+    monkeypatch.setattr(endless, "_DURATION_S", 30.0)
+    row, rec = endless.trial(Cell(endless.NAME, "paper", WHERE), 100, context)
     assert rec.steps[-1].stamp == pytest.approx(30.0, abs=0.02)
     assert row["detections"] == len(rec.reactions())
     assert row["contacts"] > 1
     assert row["ended"] is False
     json.dumps(row, allow_nan=False)
     assert_within_limits(rec, panda_model)
-
-
-def test_reactions_are_at_least_their_own_length_apart(trial):
-    row, rec = trial
     assert np.diff([s.stamp for s in rec.reactions()]).min() >= 2.0
     assert row["interval_s"] >= 2.0
 
