@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
-from lab.tests.studies.calibration.ideal import ideal_data
-from lab.tests.studies.calibration.motions import START, short_plan
+from tests.calibrated_arm import swinging
+from tests.calibration.made import MovingArm
 
 from pretouch.calibration.motion.plan import Plan
 from pretouch.errors import ExperimentError
@@ -9,7 +9,7 @@ from pretouch.sim.imu import ImuParams
 from pretouch.sim.random_skin import random_skin
 from pretouch_lab.studies.calibration.simulated import clock_errors, simulate
 
-PLAN = short_plan(postures=1, swing_s=3.0)
+START = np.array([0.0, -0.4, 0.0, -2.0, 0.0, 1.8, 0.6])
 STILL = Plan(np.array([0.0, 1.0]), np.array([START, START]))
 EXACT = ImuParams(
     rate_error=0.0, scale_error=0.0, misalignment_deg=0.0, acceleration_bias_mg=0.0, angular_rate_bias_dps=0.0,
@@ -22,17 +22,24 @@ def skin(panda_model):
     return random_skin(panda_model, 0)
 
 
+class Planned(MovingArm):
+    """An arm that follows a plan exactly."""
+
+    def _at(self, time):
+        return np.array([swinging(self.model, 5.0).at(t)[0] for t in time])
+
+
 def test_units_measure_what_the_plan_does_at_the_same_instants(panda_model, skin):
-    data = simulate(panda_model, skin, PLAN, 0, EXACT, clock_error_s=0.0)
-    ideal = ideal_data(panda_model, skin, PLAN, rate=100.0)
-    for unit, expected in zip(data.units, ideal.units, strict=True):
-        swinging = (expected.imu.stamp > 1.5) & (expected.imu.stamp < 3.5)
-        at = expected.imu.stamp[swinging]
-        for name, tolerance in (("acceleration", 0.3), ("angular_velocity", 0.03)):
-            sensed = [np.interp(at, unit.imu.stamp, axis) for axis in getattr(unit.imu, name).T]
-            off = np.array(sensed).T - getattr(expected.imu, name)[swinging]
+    plan, ideal = swinging(panda_model, 5.0), Planned(panda_model, 5.0)
+    data = simulate(panda_model, skin, plan, 0, EXACT, clock_error_s=0.0)
+    swings = (ideal.time > 1.5) & (ideal.time < 3.5)
+    for unit, sensed in zip(skin.units, data.units, strict=True):
+        expected, at = ideal.imu(unit), ideal.time[swings]
+        for name, tolerance in (("acceleration", 0.3), ("angular_velocity", 0.015)):
+            found = [np.interp(at, sensed.imu.stamp, axis) for axis in getattr(sensed.imu, name).T]
+            off = np.array(found).T - getattr(expected, name)[swings]
             assert np.sqrt(np.mean(off**2)) < tolerance  # the arm follows the plan to some milliseconds
-    planned = np.array([PLAN.at(time)[0] for time in data.joints.stamp])
+    planned = np.array([plan.at(time)[0] for time in data.joints.stamp])
     assert np.abs(planned - data.joints.q).max() < 0.02
 
 
