@@ -2,12 +2,13 @@ import re
 from pathlib import Path
 
 from pretouch_lab.registry import EXPERIMENTS
+from pretouch_lab.sweep.streams import MEASURES
 
-ROOT = Path(__file__).parents[2]
+DOCS = Path(__file__).parents[2] / "docs"
 
 
 def test_the_paper_page_names_experiments_there_are():
-    text = (ROOT / "docs" / "explanation" / "paper.md").read_text()
+    text = (DOCS / "explanation" / "paper.md").read_text()
     claims, weaknesses = (part.split("\n## ")[0] for part in text.split("\n## ")[1:3])
     named = [row.rstrip(" |").split(" | ")[-1] for row in claims.splitlines() if row.startswith("| ")]
     named += [row.split(" | ")[1] for row in weaknesses.splitlines() if row.startswith("| ")]
@@ -16,6 +17,8 @@ def test_the_paper_page_names_experiments_there_are():
     assert found <= set(EXPERIMENTS)
 
 
-def test_every_experiment_is_described():
-    text = (ROOT / "docs" / "reference" / "experiments.md").read_text()
+def test_every_experiment_and_every_one_that_can_be_swept_is_described():
+    text = (DOCS / "reference" / "experiments.md").read_text()
     assert [name for name in EXPERIMENTS if f"**{name}**" not in text] == []
+    text = (DOCS / "how-to" / "sweep.md").read_text()
+    assert [name for name in MEASURES if f"`{name}`" not in text] == []

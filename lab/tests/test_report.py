@@ -1,54 +1,41 @@
-import json
 import re
 from dataclasses import replace
-from shutil import copytree
 
 import numpy as np
 import pytest
+from lab.tests.paper.test_figures import UNITS, made_trace
+from lab.tests.test_summary import contact, dynamic_row, static_row
 from PIL import Image
 
-from pretouch.atomic_write import write_json
-from pretouch.errors import ExperimentError
+from pretouch.errors import ExperimentError, RecordingError
 from pretouch.recording.reader import open_recording
 from pretouch.recording.run_record import columns_of
-from pretouch_lab.campaign import Request, recording_file, trial_file
-from pretouch_lab.cell import Cell, Grid
-from pretouch_lab.paper import dynamic, static
+from pretouch_lab import report
+from pretouch_lab.campaign import Request
+from pretouch_lab.cell import Cell
+from pretouch_lab.paper import static
 from pretouch_lab.registry import summarise
 from pretouch_lab.report import write_report
 from pretouch_lab.trial import read_trace, record_of, trace_of
 
-pytestmark = pytest.mark.slow
-
-LINE = ("line", "-y")
+ROWS = [static_row("blind", 0, 80.0), static_row("paper", 0, 20.0), dynamic_row([contact()])]
 
 
-@pytest.fixture(scope="module")
-def request_and_folder(context, tmp_path_factory):
-    request, out = Request(("static", "dynamic"), seeds=1), tmp_path_factory.mktemp("run")
-    request.open(out)
-    for task in request.tasks(out):
-        task.file.parent.mkdir(exist_ok=True)
-    cells = [c for c in static.cells(Grid(("blind", "paper"))) if (c.where["trajectory"], c.where["side"]) == LINE]
-    for cell in [*cells, Cell(dynamic.NAME, "paper", {"restrictions": "slack"})]:
-        recorded = replace(context, recording=recording_file(out, cell, 0))
-        row, _ = (static if cell.experiment == "static" else dynamic).trial(cell, 0, recorded)
-        write_json(row, trial_file(out, cell, 0))
-    return request, out
+@pytest.mark.parametrize(("damaged", "drawn"), [("none", ["static.png", "dynamic.png"]), ("dynamic", ["static.png"])])
+def test_tables_and_figures_are_in_one_file_but_those_of_recordings_that_cannot_be_read(
+    tmp_path, monkeypatch, damaged, drawn
+):
+    def read(file):
+        if file.name.startswith(damaged):
+            raise RecordingError("It is damaged.")
+        return made_trace(), UNITS
 
-
-def rows_in(out):
-    return [json.loads(file.read_text()) for file in sorted((out / "trials").glob("*.json"))]
-
-
-def test_tables_and_figures_are_in_one_file(request_and_folder):
-    request, out = request_and_folder
-    text = write_report([(request, out)], summarise(rows_in(out)), out).read_text()
+    monkeypatch.setattr(report, "read_trace", read)
+    text = write_report([(Request(("static", "dynamic"), seeds=1), tmp_path)], summarise(ROWS), tmp_path).read_text()
     assert len(re.findall("^## ", text, flags=re.MULTILINE)) == 2
-    figures = re.findall(r"^!\[.+\]\((.+)\)$", text, flags=re.MULTILINE)
-    assert figures == ["static.png", "dynamic.png"]
-    for name in figures:
-        with Image.open(out / name) as picture:
+    assert re.findall(r"^!\[.+\]\((.+)\)$", text, flags=re.MULTILINE) == drawn
+    for name in drawn:
+        with Image.open(tmp_path / name) as picture:
             assert picture.width >= 1000
             assert np.asarray(picture.convert("L")).std() > 10
 
@@ -60,15 +47,7 @@ def test_a_run_without_trials_still_has_a_file_and_one_that_cannot_be_written_is
         write_report([(request, tmp_path)], {}, tmp_path / "none")
 
 
-def test_a_recording_that_cannot_be_read_leaves_its_picture_out(request_and_folder, tmp_path):
-    request, whole = request_and_folder
-    out = copytree(whole, tmp_path / "out")
-    (file,) = (out / "recordings").glob("dynamic*.mcap")
-    file.write_bytes(file.read_bytes()[:100])
-    text = write_report([(request, out)], summarise(rows_in(out)), out).read_text()
-    assert re.findall(r"\]\((.+)\)$", text, flags=re.MULTILINE) == ["static.png"]
-
-
+@pytest.mark.slow
 def test_a_recorded_trial_is_as_without_and_its_trace_has_the_course_and_each_steps_mean_true_force(context, tmp_path):
     where = {"trajectory": "line", "side": "+y", "stiffness_n_per_m": 25e3, "restrictions": "off"}
     cell, place = Cell(static.NAME, "paper", where), tmp_path / "x.mcap"

@@ -102,6 +102,7 @@ def test_a_run_writes_what_it_says(capsys, tmp_path):
     assert code == 0
     for words in ("Static object", "circle", "line", "ratio", str(out / "tables.md"), str(numbers)):
         assert words in said.out
+    assert (out / "static.png").exists()
     results = json.loads(numbers.read_text())
     assert len(results["trials"]) == 8
     assert len(results["summary"]["static"]["cells"]) == 8

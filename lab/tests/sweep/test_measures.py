@@ -1,5 +1,4 @@
 import json
-from pathlib import Path
 
 import pytest
 
@@ -11,9 +10,7 @@ from pretouch_lab.paper import static
 from pretouch_lab.sweep.design import sweep_of
 from pretouch_lab.sweep.play import opened, play_cells
 from pretouch_lab.sweep.setting import built
-from pretouch_lab.sweep.streams import MEASURES, measure
-
-DOCS = Path(__file__).parents[3] / "docs"
+from pretouch_lab.sweep.streams import measure
 
 
 def test_a_cell_of_the_static_experiment_is_its_trial():
@@ -60,8 +57,3 @@ def test_a_stream_that_cannot_be_recorded_fails_all_of_its_cells_with_the_reason
     row = json.loads((tmp_path / "cells.json").read_text())
     assert "whole number to 64" in row["failed"]
     assert row["metrics"] == []
-
-
-def test_every_experiment_that_can_be_swept_is_described():
-    text = (DOCS / "how-to" / "sweep.md").read_text(encoding="utf-8")
-    assert all(f"`{name}`" in text for name in MEASURES if name != "ishigami")  # which is these tests' own

@@ -2,8 +2,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 from tests.calibrated_arm import swinging
+from tests.calibration.made import turned
 
 from pretouch.calibration.result import Place
 from pretouch.errors import ExperimentError
@@ -17,9 +17,7 @@ NONE = np.zeros(3)
 
 def place(unit, shift: list[float], turn: list[float], covariance: np.ndarray) -> Place:
     """An answer that is off the truth by a shift in the link frame [m] and a turn in the sensor frame [rad]."""
-    T = unit.T_link_sensor.copy()
-    T[:3, :3] = T[:3, :3] @ Rotation.from_rotvec(turn).as_matrix()
-    T[:3, 3] += shift
+    T = turned(unit, np.array(turn), np.array(shift)).T_link_sensor
     return Place(unit.link, T, covariance, NONE, NONE, NONE, NONE, 0.012, 0.1, 0.01, 1.0)
 
 
@@ -48,9 +46,9 @@ def test_a_place_on_a_link_fixed_to_the_true_one_is_as_good(panda_model):
     T[:3, :3], T[:3, 3] = R, kin.rotation[last].T @ (kin.position[hand] - kin.position[last])
     covariance = np.diag([0.01, 0.01, 0.01, 0.002, 0.001, 0.001]) ** 2
     here = place(unit, [0.004, 0.0, 0.0], [0.0, 0.03, 0.0], covariance)
-    turned = np.kron(np.diag([1.0, 0.0]), np.eye(3)) + np.kron(np.diag([0.0, 1.0]), R)
+    rotated = np.kron(np.diag([1.0, 0.0]), np.eye(3)) + np.kron(np.diag([0.0, 1.0]), R)
     there = replace(
-        here, link="panda_link7", T_link_sensor=T @ here.T_link_sensor, covariance=turned @ covariance @ turned.T
+        here, link="panda_link7", T_link_sensor=T @ here.T_link_sensor, covariance=rotated @ covariance @ rotated.T
     )
     assert place_row(panda_model, unit, there, 0.01) == pytest.approx(place_row(panda_model, unit, here, 0.01))
 
