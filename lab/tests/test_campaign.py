@@ -119,15 +119,6 @@ def wait_for(process, happened):
         wait([process.stderr], 0.02)
 
 
-@pytest.fixture
-def long_run(tmp_path):
-    """A run of many trials, some of them finished."""
-    out = tmp_path / "out"
-    with started(out) as process:
-        wait_for(process, lambda: len(list((out / "trials").glob("[!.]*.json"))) >= 3)
-        yield process, out
-
-
 @pytest.mark.parametrize("delay", [0.1, *(pytest.param(s, marks=pytest.mark.slow) for s in (0.0, 0.4, 0.8))])
 def test_ctrl_c_while_workers_start_leaves_no_traceback(tmp_path, delay):
     with started(tmp_path) as process:
@@ -139,31 +130,32 @@ def test_ctrl_c_while_workers_start_leaves_no_traceback(tmp_path, delay):
     assert "Traceback" not in said
 
 
-@pytest.mark.slow
-def test_a_killed_worker_is_said_in_a_sentence(long_run):
-    process, out = long_run
+def worker_of(process):
+    """The process of one of a run's workers."""
     children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
-    workers = [pid for pid in children if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()]
-    os.kill(int(workers[-1]), signal.SIGKILL)
-    said = process.communicate(timeout=100)[1]
-    assert process.returncode == 2
-    assert "A worker process was killed" in said
-    assert "Traceback" not in said
-    assert len(json.loads((out / "results.json").read_text())["trials"]) >= 3
+    return int([pid for pid in children if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()][-1])
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGKILL, -9)])
-def test_a_stopped_run_leaves_whole_results(long_run, number, code):
-    process, out = long_run
-    process.send_signal(number)
-    said = process.communicate(timeout=100)[1]
+@pytest.mark.parametrize(
+    ("of_worker", "number", "code", "words"),
+    [
+        (False, signal.SIGINT, 130, "finished trials are in"),
+        (False, signal.SIGTERM, 143, "finished trials are in"),
+        (False, signal.SIGKILL, -9, ""),
+        (True, signal.SIGKILL, 2, "A worker process was killed"),
+    ],
+)
+def test_a_stopped_run_and_one_whose_worker_is_killed_leave_whole_results(tmp_path, of_worker, number, code, words):
+    with started(tmp_path) as process:
+        wait_for(process, lambda: len(list((tmp_path / "trials").glob("[!.]*.json"))) >= 3)
+        os.kill(worker_of(process) if of_worker else process.pid, number)
+        said = process.communicate(timeout=100)[1]
     assert process.returncode == code
-    rows = [json.loads(file.read_text()) for file in (out / "trials").glob("[!.]*.json")]
+    assert words in said
+    rows = [json.loads(file.read_text()) for file in (tmp_path / "trials").glob("[!.]*.json")]
     assert len(rows) >= 3
     assert all(row["experiment"] == "static" for row in rows)
-    if number != signal.SIGKILL:
-        assert "finished trials are in" in said
-        results = json.loads((out / "results.json").read_text())
-        assert len(results["trials"]) == len(rows)
+    if code > 0:
         assert "Traceback" not in said
+        assert len(json.loads((tmp_path / "results.json").read_text())["trials"]) == len(rows)

@@ -45,16 +45,13 @@ def test_trials_without_contact_are_counted_but_not_averaged():
 
 def test_pushes_of_all_trials_are_pooled():
     missed = contact(detected=False, delay_s=None, direction_error_deg=None, reaction_towards_person=True)
-    (cell,) = summarise([dynamic_row([contact(), missed]), dynamic_row([contact(delay_s=0.08)])])["dynamic"]["cells"]
+    summary = summarise([dynamic_row([contact(), missed]), dynamic_row([contact(delay_s=0.08)])])
+    assert set(summary) == {"dynamic"}, "only experiments that ran are summarised"
+    (cell,) = summary["dynamic"]["cells"]
     assert (cell["detected"], cell["pushes"]) == (2, 3)
     assert cell["delay_s"]["median"] == 0.07
     assert cell["reactions_towards_person"] == 1
     assert cell["false_detections"] == 2
-
-
-def test_only_experiments_that_ran_are_summarised():
-    assert set(summarise([dynamic_row([contact()])])) == {"dynamic"}
-    assert summarise([]) == {}
 
 
 def test_tables_show_medians_and_ratios():
@@ -99,7 +96,7 @@ def test_more_of_a_grid_is_shown_in_more_tables():
         assert all(len(row) == len(table.header) for row in table.rows)
 
 
-def test_what_is_shown_in_detail_is_blind_one_other_with_restrictions_off_and_pretouch():
+def test_blind_one_other_with_restrictions_off_and_pretouch_are_shown_in_detail_and_several_modes_are_named():
     def cell(profile, restrictions, stiffness=25e3):
         return {"profile": profile, "restrictions": restrictions, "stiffness_n_per_m": stiffness}
 
@@ -110,13 +107,9 @@ def test_what_is_shown_in_detail_is_blind_one_other_with_restrictions_off_and_pr
     three = shown_controllers([*many, cell("pretouch", "braking"), cell("other", "off")])
     assert three[2] == ["blind", "paper", "pretouch"]
     assert shown_controllers([cell("blind", "off", 2e3)])[::2] == (2e3, ["blind"])
-    assert shown_controllers([cell("paper", "slack"), cell("paper", "hard")])[1:] == ({"paper": "slack"}, ["paper"])
-
-
-def test_the_mode_is_named_where_a_profile_has_several():
-    cells = [{"profile": "paper", "restrictions": mode} for mode in ("hard", "slack")]
-    cells.append({"profile": "blind", "restrictions": "off"})
-    assert [controller(cell, cells) for cell in cells] == ["paper\nhard", "paper\nslack", "blind"]
+    cells = [cell("paper", "hard"), cell("paper", "slack"), cell("blind", "off")]
+    assert shown_controllers(cells[1::-1])[1:] == ({"paper": "slack"}, ["paper"])
+    assert [controller(each, cells) for each in cells] == ["paper\nhard", "paper\nslack", "blind"]
 
 
 def test_a_table_without_the_default_mode_says_so():

@@ -55,14 +55,8 @@ def test_bounds_of_a_median_are_ranks_and_of_a_share_clopper_and_pearsons():
 def measured(**changes):
     """What both JSON files hold of a `pretouch` that reaches every goal."""
     told = {"quick": True, "seeds": "development"}
-    felt = {
-        "median_delay_s": 0.03,
-        "contacts": 90,
-        "missed": 0,
-        "median_bounds_s": [0.01, 0.03],
-        "p95_delay_s": 0.05,
-        "towards": 0,
-    }
+    felt = {"median_delay_s": 0.03, "contacts": 90, "missed": 0, "p95_delay_s": 0.05, "towards": 0}
+    felt["median_bounds_s"] = [0.01, 0.03]
     rows = [
         {**EMPTY, "contender": "pretouch", "scenario": f"free: {name}", "false_alarms_per_hour": 0.4, "hours": 5.0,
          "low_per_hour": 0.05, "high_per_hour": 1.4, "false_alarms": 2}

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.imported_data.files import write_csv
 from tests.imported_data.joint_files import Moving
 
 from pretouch import cli
@@ -30,15 +31,13 @@ def motions(panda_model):
 
 def arrays(motions, **more):
     """What a file of arrays holds of motions."""
-    joined = {name: np.concatenate([getattr(m, name) for m in motions]) for name in ("time", "q", "qd", "driving")}
-    names = {"time": "t", "q": "q", "qd": "dq", "driving": "tau"}
-    run = np.repeat(np.arange(len(motions)), [len(m.time) for m in motions])
-    return {names[name]: values for name, values in joined.items()} | {"run": run} | more
+    kinds = {"t": "time", "q": "q", "dq": "qd", "tau": "driving"}
+    joined = {name: np.concatenate([getattr(m, kind) for m in motions]) for name, kind in kinds.items()}
+    return joined | {"run": np.repeat(np.arange(len(motions)), [len(m.time) for m in motions])} | more
 
 
-def run_of(motion, label=None, joints=()):
-    label = np.zeros(len(motion.time), np.int64) if label is None else label
-    return Run("made", motion.time, motion.q, motion.qd, motion.driving, label, joints)
+def run_of(motion):
+    return Run("made", motion.time, motion.q, motion.qd, motion.driving, np.zeros(len(motion.time), np.int64), ())
 
 
 @pytest.fixture(scope="module")
@@ -74,8 +73,7 @@ def glove_csv(file, motion, label):
     columns |= {f"{kind}{j}": values[:, j] for kind, values in kinds for j in range(7)}
     columns["label"] = label
     file.parent.mkdir(parents=True, exist_ok=True)
-    table = np.column_stack(list(columns.values()))
-    np.savetxt(file, table, delimiter=",", header=",".join(columns), comments="")
+    write_csv(file, columns)
 
 
 def touching(motion):
@@ -89,9 +87,8 @@ def folder(tmp_path_factory, panda_model, motions):
     np.savez(made / "franka_fast.npz", **arrays(motions))
     for name, pushes in (("e1", (PUSH,)), ("e2", (PUSH,)), ("e3", (PUSH,)), ("e4", ())):
         motion = Moving(panda_model, 6.0, pushes, rate=200.0, seed=int(name[1]))
-        glove_csv(
-            made / "contactInterpretation" / "link5" / f"{name}.csv", motion, touching(motion) * (len(pushes) > 0)
-        )
+        touched = touching(motion) * (len(pushes) > 0)
+        glove_csv(made / "contactInterpretation" / "link5" / f"{name}.csv", motion, touched)
     return made
 
 
@@ -223,8 +220,7 @@ def test_the_whole_command_writes_a_row_for_each_set_table_and_detector(folder, 
     said = capsys.readouterr()
     assert "lwr4 is left out, for" in said.err
     rows = {(row["set"], row["table"], row["detector"]): row for row in told["rows"]}
-    sets = [("franka_fast", "free")]
-    sets += [("contactInterpretation", table) for table in ("free", "contacts")]
+    sets = [("franka_fast", "free"), ("contactInterpretation", "free"), ("contactInterpretation", "contacts")]
     assert set(rows) == {(*each, detector) for each in sets for detector in ("pretouch", "fixed")}
     row = rows["contactInterpretation", "contacts", "pretouch"]
     assert (row["found"], row["contacts"], row["link_right"], row["false_alarms"]) == (3, 3, 3, 0)

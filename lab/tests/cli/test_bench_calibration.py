@@ -44,12 +44,12 @@ def test_the_study_is_asked_as_said_and_its_rows_are_written(tmp_path, capsys, m
 
 
 @pytest.mark.slow
-def test_a_study_of_one_skin_finds_all_units_to_a_millimetre(tmp_path):
+def test_a_study_of_two_skins_finds_all_units_to_a_millimetre(tmp_path):
     place = tmp_path / "rows.json"
-    assert calibrate("--skins", 1, "--find-links", "--json", place) == 0
+    assert calibrate("--skins", 2, "--find-links", "--duration", 50, "--json", place) == 0
     told = json.loads(place.read_text())
-    assert len(told["rows"]) == 7
-    assert told["motion_s"] <= 90.0
+    assert [row["skin"] for row in told["rows"]] == 7 * [0] + 7 * [1]
+    assert told["motion_s"] <= 50.0
     for row in told["rows"]:
         assert row["position_error_m"] < 0.001
         assert row["orientation_error_deg"] < 0.1

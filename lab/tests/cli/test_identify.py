@@ -1,8 +1,8 @@
 import json
 
-import numpy as np
 import pytest
 from lab.tests.identification.made import Made, free_motion
+from tests.imported_data.files import write_csv
 
 from pretouch import cli
 from pretouch.sim.randomisation import drawn, world_set
@@ -11,12 +11,10 @@ from pretouch.sim.randomisation import drawn, world_set
 @pytest.fixture(scope="module")
 def table(tmp_path_factory):
     samples = free_motion(Made(), seconds=40.0)
-    names = ["time_s"] + [f"{what}{j}_{unit}" for what, unit in (("q", "rad"), ("qd", "rad_s"), ("tau_ext", "Nm"))
-                          for j in range(1, 8)]  # fmt: skip
+    kinds = {"q{}_rad": samples.q, "qd{}_rad_s": samples.qd, "tau_ext{}_Nm": samples.tau}
+    columns = {name.format(j + 1): values[:, j] for name, values in kinds.items() for j in range(7)}
     place = tmp_path_factory.mktemp("free") / "free.csv"
-    columns = np.column_stack([samples.stamp, samples.q, samples.qd, samples.tau])
-    np.savetxt(place, columns, delimiter=",", header=",".join(names), comments="")
-    return place
+    return write_csv(place, {"time_s": samples.stamp} | columns)
 
 
 @pytest.mark.slow

@@ -33,8 +33,6 @@ class Made:
     torque_noise: float = 0.2
     push: tuple[float, float] = (0.0, 0.0)
     """From when to when 8 Nm push joint 2 [s]."""
-    moved: float = 0.5
-    """Amplitude of each joint [rad]."""
 
 
 def free_motion(made: Made = Made(), seconds: float = 60.0, seed: int = 5, every: int = 10) -> ArmSamples:
@@ -43,8 +41,8 @@ def free_motion(made: Made = Made(), seconds: float = 60.0, seed: int = 5, every
     rate = 2 * np.pi * np.array([0.11, 0.13, 0.17, 0.19, 0.23, 0.29, 0.31])
     t = dt * np.arange(round(seconds / dt))[:, None]
     middle = np.array([0.0, 0.2, 0.0, -1.8, 0.0, 2.0, 0.5])
-    q = middle + made.moved * np.sin(rate * t)
-    qd, qdd = made.moved * rate * np.cos(rate * t), -made.moved * rate**2 * np.sin(rate * t)
+    q = middle + 0.5 * np.sin(rate * t)
+    qd, qdd = 0.5 * rate * np.cos(rate * t), -0.5 * rate**2 * np.sin(rate * t)
     measured = qd + made.velocity_noise * rng.standard_normal(q.shape)
     f1, f2, f3 = (np.array(x) for x in (PLANT.friction_f1_nm, PLANT.friction_f2_s_rad, PLANT.friction_f3_rad_s))
     lost = made.friction * f1 * (1 / (1 + np.exp(-f2 * (qd + f3))) - 1 / (1 + np.exp(-f2 * f3)))

@@ -52,16 +52,13 @@ def others(folder) -> Context:
     return Request(("avoidance", "dynamic"), 1, arm=folder).context()
 
 
-def test_the_rule_finds_the_papers_places_for_a_panda_that_it_does_not_know(stranger):
-    found = placement_for(RobotModel(stranger))
-    assert (found.scale, found.shift_x, found.shift_z) == (1.0, 0.0, 0.0)
-    assert found.beside == pytest.approx((0.43, 0.43), abs=0.03)
-    assert found.inside == pytest.approx((0.35, 0.35), abs=0.03)
-    assert found.ahead == 0.0
-
-
-def test_the_rule_finds_about_the_hand_that_a_panda_has(stranger, panda_model):
+def test_the_rule_finds_the_papers_places_and_about_the_hand_of_a_panda_that_it_does_not_know(stranger, panda_model):
     model = RobotModel(stranger)
+    places = placement_for(model)
+    assert (places.scale, places.shift_x, places.shift_z) == (1.0, 0.0, 0.0)
+    assert places.beside == pytest.approx((0.43, 0.43), abs=0.03)
+    assert places.inside == pytest.approx((0.35, 0.35), abs=0.03)
+    assert places.ahead == 0.0
     own, found = robot_hand(panda_model), robot_hand(model)
     assert (own.link, own.palm.tolist(), own.turn.tolist()) == (
         panda_model.link_index("panda_hand"), PALM.tolist(), np.eye(3).tolist(),

@@ -14,22 +14,12 @@ from pretouch_lab.trial import Record
 
 def step(i, **changed):
     """A control step at 100 Hz, in which nothing happens."""
-    usual = {
-        "stamp": 0.01 * i,
-        "mode": Mode.TRACK,
-        "reason": "Moving as asked.",
-        "q": np.zeros(7),
-        "ee_position": np.zeros(3),
-        "path_position": np.zeros(3),
-        "path_phase": 0.0,
-        "force": np.zeros(3),
-        "contact": None,
-        "reaction_velocity": np.zeros(3),
-        "command": np.zeros(7),
-        "qp": SimpleNamespace(outcome=QpOutcome.SOLVED),
-        "obstacles": SimpleNamespace(point=np.zeros((0, 3))),
-    }
-    return SimpleNamespace(**{**usual, **changed})
+    usual = dict.fromkeys(("ee_position", "path_position", "force", "reaction_velocity"), np.zeros(3))
+    usual |= dict.fromkeys(("q", "command"), np.zeros(7))
+    usual |= {"stamp": 0.01 * i, "mode": Mode.TRACK, "reason": "Moving as asked.", "path_phase": 0.0, "contact": None}
+    usual["qp"] = SimpleNamespace(outcome=QpOutcome.SOLVED)
+    usual["obstacles"] = SimpleNamespace(point=np.zeros((0, 3)))
+    return SimpleNamespace(**usual | changed)
 
 
 def record(steps, force=(), touches=(), hand=None):

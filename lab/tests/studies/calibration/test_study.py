@@ -2,7 +2,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.calibrated_arm import swinging
 from tests.calibration.made import turned
 
 from pretouch.calibration.result import Place
@@ -81,14 +80,3 @@ def test_the_table_shows_each_link_and_all():
 def test_no_skins_are_refused(panda_model):
     with pytest.raises(ExperimentError, match="number of skins is 0"):
         study(panda_model, skins=0)
-
-
-@pytest.mark.slow
-def test_units_of_two_skins_are_found_by_a_short_motion(panda_model):
-    said: list[str] = []
-    plan = swinging(panda_model)
-    made = study(panda_model, skins=2, plan=plan, processes=2, progress=lambda: said.append("done"))
-    assert said == ["done", "done"]
-    assert made.motion_s == plan.duration
-    assert [r["skin"] for r in made.rows] == 7 * [0] + 7 * [1]
-    assert np.median([r["position_error_m"] for r in made.rows]) < 0.001
