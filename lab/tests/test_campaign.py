@@ -19,26 +19,6 @@ from pretouch_lab.campaign import Request, play_trial, recording_file, trial_fil
 SMALL = Request(("static",), seeds=1, profiles=("blind",))
 
 
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        ({"experiments": ("statik",)}, "'statik' is unknown: choose from static, avoidance, dynamic,"),
-        ({"seeds": 0}, "number of seeds is 0: give at least 1"),
-        ({"profiles": ()}, "profiles are none"),
-        ({"profiles": ("paper", "paper")}, "name each wanted one once"),
-        ({"restrictions": ("off", "firm")}, "'firm' is unknown: choose from off, hard, slack, floor"),
-        ({"stiffness": (0.0,)}, "stiffness is 0 N/m"),
-        ({"stiffness": (25e3, float("nan"))}, "stiffness is nan N/m"),
-        ({"stiffness": ()}, "stiffnesses are none N/m: name each"),
-        ({"stiffness": (25e3, 25000.0)}, "name each wanted one once"),
-        ({"experiments": ("release",)}, "nothing to run: release is about proximity"),
-    ],
-)
-def test_what_cannot_be_done_is_said_in_a_sentence(change, words):
-    with pytest.raises(ExperimentError, match=words):
-        replace(SMALL, **change)
-
-
 def test_tasks_take_all_cells_seed_by_seed():
     tasks = Request(("static", "dynamic"), seeds=2).trials()
     assert len(tasks) == 2 * (8 + 2)

@@ -1,5 +1,3 @@
-from pathlib import Path
-
 import pytest
 
 from pretouch.composition import differences
@@ -7,7 +5,6 @@ from pretouch.errors import ParameterError
 from pretouch.profiles import profile
 from pretouch_lab.baselines.detection import Baseline, ablated
 from pretouch_lab.benchmarks.ablations import OFF, Ablation, ablations
-from pretouch_lab.benchmarks.avoidance.run import AvoidanceBench
 
 
 def differing(a, b):
@@ -38,5 +35,3 @@ def test_only_the_thresholds_are_swept_by_their_base_force():
 def test_an_unknown_switch_is_an_error_and_not_left_out():
     with pytest.raises(ParameterError, match=r"'detect\.lern' is unknown"):
         Baseline("own", "pretouch:detect.lern=no", "scale").profile  # noqa: B018  # it reads the text
-    with pytest.raises(ParameterError, match=r"'react\.clam' is unknown.* Baselines are blind"):
-        AvoidanceBench(Path(), baselines=("pretouch:react.clam=no",))

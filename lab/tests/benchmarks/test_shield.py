@@ -11,7 +11,6 @@ from pretouch import desired
 from pretouch.control.joint_box import JointLimits
 from pretouch.controller import Controller
 from pretouch.desired import DesiredKind
-from pretouch.errors import ExperimentError
 from pretouch.sim.plant import Touch
 from pretouch.types import Mode
 from pretouch_lab.benchmarks.avoidance.obstacle import Ball, nearest
@@ -170,8 +169,6 @@ def test_the_work_of_the_shield_is_six_hundred_trials(tmp_path):
     assert len(set(names)) == len(names)
     assert sum(task.cost for task in bench.every() if "pretouch" in task.file.name) == pytest.approx(0.8 * 600)
     assert bench.found() is None
-    with pytest.raises(ExperimentError, match="leave out --world stress"):
-        ShieldBench(tmp_path, world="stress")
 
 
 def test_a_trial_is_played_and_measured():

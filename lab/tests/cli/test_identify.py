@@ -48,18 +48,6 @@ def test_without_velocities_no_torque_noise_is_told_and_the_other_sign_turns_off
 
 
 @pytest.mark.parametrize(
-    ("given", "said"),
-    [
-        (["--arm", "nowhere"], "nowhere"),
-        (["--figure", "x.gif"], "no ending that says its format"),
-    ],
-)
-def test_what_cannot_be_is_refused(table, given, said, capsys):
-    assert cli.main(["identify", str(table), *given]) == 2
-    assert said in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
     ("header", "said"),
     [
         ("q1_rad", "but not time_s and not tau_ext1_Nm"),

@@ -12,7 +12,6 @@ from pretouch.sim.paper_scenes import Placement, person_scene, static_path, stat
 from pretouch.sim.placement import assumptions, hand_side, placement_for
 from pretouch.sim.pushes import way_round
 from pretouch.sim.scene import HandSpec
-from pretouch_lab.campaign import Request
 
 
 def test_the_panda_has_the_papers_paths(panda_model):
@@ -81,8 +80,3 @@ def test_the_side_of_the_pandas_hand_is_about_what_the_board_takes_it_for(panda_
         found = hand_side(panda_model, side)
         assert found.aside == pytest.approx(PANDA_SIDE.aside, abs=0.03)
         assert found.above == pytest.approx(PANDA_SIDE.above, abs=0.03)
-
-
-def test_other_experiments_are_refused_for_another_arm(tmp_path):
-    with pytest.raises(ExperimentError, match="'release' is laid out for the Panda: with --arm, choose static, avoid"):
-        Request(("release",), 1, arm=str(tmp_path))

@@ -2,13 +2,9 @@ from dataclasses import replace
 from hashlib import sha256
 from itertools import pairwise
 
-import pytest
-
-from pretouch.errors import ExperimentError, ParameterError
 from pretouch.profiles import profile
 from pretouch.sim.randomisation import drawn, world_set
 from pretouch_lab.benchmarks.dense_skin import UNITS, units_of
-from pretouch_lab.sweep.design import sweep_of
 from pretouch_lab.sweep.measures import StaticScene
 from pretouch_lab.sweep.setting import built, skin_of, world_digest
 
@@ -52,40 +48,6 @@ def test_a_cell_knows_the_file_its_world_is_of(tmp_path):
     assert built("paper", StaticScene(), values, 0).plant.payload_max_kg == 0.25
     assert world_digest(values) == sha256(place.read_bytes()).hexdigest()
     assert world_digest({"plant.world": "none"}) is None
-
-
-@pytest.mark.parametrize(
-    ("experiment", "vary", "words"),
-    [
-        ("static", {"f_base_n": "1:2"}, "The parameter 'f_base_n' is unknown: there is name"),
-        ("static", {"slow": "1:2"}, "is not one of numbers: slow is 'on'"),
-        ("static", {"scene.place": "1:2"}, "scene has trajectory, side, stiffness_n_m"),
-        ("static", {"plant.ripple_nm": "1:2"}, "one value a joint"),
-        ("static", {"detect.f_base_n": "3:9"}, "holds 3.0, which is not allowed.*than f_d_n"),
-        ("static", {"skin.units": "0:4"}, "skin.units is 0: give 1 or more"),
-        ("static", {"skin.units": "1:65"}, "holds 65, which is not allowed.*whole number to 64"),
-        ("static", {"plant.kind": "nominal,rusty"}, "plant.kind=rusty is unknown"),
-        ("static", {"plant.world": "none,mars"}, "'mars' is not one of nominal, realistic, stress"),
-        ("contacts", {"slow.d_max_m": "0.5:1"}, "nothing in contacts: take one of window, detect"),
-    ],
-)
-def test_what_cannot_be_swept_is_said_with_the_way_out(experiment, vary, words):
-    with pytest.raises(ExperimentError, match=words):
-        sweep_of(experiment, vary, {})
-
-
-@pytest.mark.parametrize(
-    ("more", "words"),
-    [
-        ({"samples": 100}, "samples is 100: give a power of two, 64 for one"),
-        ({"arms": 0}, "arms is 0: give 1 to 1000"),
-        ({"fix": {"window.alpha": "0.2"}}, "window.alpha is both varied and fixed"),
-        ({"profile_text": "brave"}, "'brave' is unknown"),
-    ],
-)
-def test_options_that_cannot_be_are_said(more, words):
-    with pytest.raises((ExperimentError, ParameterError), match=words):
-        sweep_of("static", {"window.alpha": "0:1"}, **({"fix": {}} | more))
 
 
 def test_more_units_are_those_of_fewer_and_others():

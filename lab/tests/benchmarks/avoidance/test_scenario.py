@@ -1,9 +1,6 @@
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-from pretouch.errors import ExperimentError, ParameterError
 from pretouch.profiles import profile
 from pretouch.sim.plant_params import PlantParams
 from pretouch_lab.baselines.avoidance import ABLATED, BASELINES, TUNINGS, profile_text
@@ -64,15 +61,6 @@ def test_baselines_and_their_other_tunings_are_profiles():
     for name in (*BASELINES, *ABLATED, *TUNINGS):
         assert profile(profile_text(name))
     assert profile(profile_text("paper-off")).approach is None
-
-
-def test_an_unknown_baseline_or_scenario_is_refused_with_those_there_are():
-    with pytest.raises(ParameterError, match="Baselines are blind, flacco"):
-        AvoidanceBench(Path(), baselines=("nobody",))
-    with pytest.raises(ExperimentError, match="choose from srdo, drdo"):
-        AvoidanceBench(Path(), names=("nothing",))
-    with pytest.raises(ExperimentError, match="name each once"):
-        AvoidanceBench(Path(), baselines=("blind", "blind"))
 
 
 def test_each_trial_has_its_own_file(tmp_path):
