@@ -29,10 +29,9 @@ PLACES = {
 }
 """The path to and fro at each place [m]: at its end forearm and upper arm are 0.08 m apart, fingers are 0.05 m above
 the floor."""
-_RADIUS_M = (0.045, 0.055)
-"""Of the limb: 9 to 11 cm thick, as a forearm."""
-_ASIDE_M = 0.02
-"""How far it lies from the middle of the gap, along the axis about which the arm folds, or of the fingers [m]."""
+_ASIDE_M, _RADIUS_M = 0.004179898822221975, 0.05120731203806578
+"""How far the limb, as thick as a forearm, lies from the middle of the gap along the axis about which the arm folds, or
+of the fingers, and its radius [m]."""
 _RESTS_N = 15.0
 """Largest force with which the person keeps it there [N]."""
 _END_S = 9.0
@@ -44,18 +43,14 @@ class _Limb:
 
     place: str
     model: RobotModel
-    aside: float
-    """Where it lies along the y axis [m]."""
-    radius: float
-    """[m]"""
     force: list[float] = field(default_factory=list)
     """The smaller of the forces from both sides at each physics step [N]."""
 
     def middle(self, position: FloatArray, rotation: FloatArray) -> FloatArray:
         """Where it lies (3,) [m], given all links' origins and orientations."""
-        aside = np.array([0.0, self.aside, 0.0])
+        aside = np.array([0.0, _ASIDE_M, 0.0])
         if self.place == "floor":
-            return aside + np.array([*PLACES["floor"][0, :2], SceneSpec().floor_height + self.radius])
+            return aside + np.array([*PLACES["floor"][0, :2], SceneSpec().floor_height + _RADIUS_M])
         name, body = self.model.description.name, self.model.capsules
         first, second = (np.flatnonzero(body.link == self.model.link_index(f"{name}_{link}")) for link in _CROOK)
         a, b = (
@@ -97,11 +92,10 @@ _CROOK = ("link2", "link5")
 
 def pinched(model: RobotModel, skin: Skin, place: str, name: str):
     """Return the force (T,) [N] with which the limb is squeezed at each millisecond, and the trial's record."""
-    rng, used = np.random.default_rng([SEED, 43]), profile(name)
-    limb = _Limb(place, model, _ASIDE_M * rng.uniform(-1, 1), rng.uniform(*_RADIUS_M))
+    limb, used = _Limb(place, model), profile(name)
     kin = model.kinematics(brought_to(model, PLACES[place][0]))
     x, y, z = limb.middle(kin.position, kin.rotation).tolist()
-    scene = SceneSpec(hand=HandSpec(radius=limb.radius, stiffness=40_000.0, mass=2.0, start=(x, y, z)))
+    scene = SceneSpec(hand=HandSpec(radius=_RADIUS_M, stiffness=40_000.0, mass=2.0, start=(x, y, z)))
     used = replace(used, task=replace(used.task, speed_m_s=SPEED_M_S))
     path = WayPoints(PLACES[place], closed=True)
     record = play(

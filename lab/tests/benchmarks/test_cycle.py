@@ -1,7 +1,6 @@
 """The benchmark of the control step: that its work is what it says, and that its numbers are those measured."""
 
 import time
-from dataclasses import replace
 from itertools import count
 from mmap import mmap
 
@@ -10,7 +9,7 @@ import pytest
 
 from pretouch.controller import Controller
 from pretouch.perception.scene_filter import no_fixtures
-from pretouch.profiles import PROFILES, at_rate
+from pretouch.profiles import at_rate, profile
 from pretouch.robot.description import fr3
 from pretouch.robot.model import RobotModel
 from pretouch.types import Inputs, Mode
@@ -19,7 +18,7 @@ from pretouch_lab.benchmarks.cycle import CycleRequest, measure
 from pretouch_lab.benchmarks.workload import Workload
 
 # a short window, so that the arm soon moves
-SHORT = replace(PROFILES["paper"], window=replace(PROFILES["paper"].window, samples=10))
+SHORT = profile("paper:window.samples=10")
 FAST = at_rate(SHORT, 1000.0)
 
 

@@ -29,6 +29,7 @@ from pretouch_lab.benchmarks.detection.campaign import DetectionBench
 from pretouch_lab.benchmarks.detection.contacts import ContactCell, Toucher, Touching, contact_cells, plan
 from pretouch_lab.benchmarks.detection.first_motion import FirstMotion
 from pretouch_lab.benchmarks.detection.free import FreeCell, free_cells
+from pretouch_lab.benchmarks.detection.hard import hard_cells
 from pretouch_lab.benchmarks.detection.judge import BUSY, matched
 from pretouch_lab.benchmarks.detection.replay import REST, begun, replay
 from pretouch_lab.benchmarks.detection.results import delays, rate, resolution
@@ -222,7 +223,7 @@ def test_planned_contacts_leave_time_for_a_reaction_and_lie_on_the_surface():
 
 
 def test_a_quick_run_is_a_part_of_the_full_one():
-    for cells in (free_cells, contact_cells):
+    for cells in (free_cells, contact_cells, hard_cells):
         full = {(cell.name, cell.seed) for cell in cells("development", False)}
         assert len({seed for _, seed in full}) == len(full)
         assert {(cell.name, cell.seed) for cell in cells("development", True)} < full

@@ -105,13 +105,6 @@ def test_a_goal_that_is_missed_says_so_with_its_number():
     assert table.rows[5][1:] == ("not reached", "1 of 90", "at most 6.0 %")
 
 
-def test_what_was_not_measured_is_not_reached():
-    detection, avoidance = measured()
-    empty = {"rows": [], "about": detection["about"]}
-    nothing = {**avoidance, "rows": [], "paired": [], "families": []}
-    assert {goal.reached for goal in goals(empty, nothing)} == {None}
-
-
 def test_the_table_of_the_first_page_has_who_it_is_about():
     table = front_table(*measured())
     assert [row[0] for row in table.rows] == ["blind", "paper", "pretouch"]

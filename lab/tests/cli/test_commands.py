@@ -95,6 +95,7 @@ def test_bad_input_ends_with_one_sentence_and_code_2(capsys, tmp_path, monkeypat
     assert re.search(words, said.err)
     assert said.err.count("\n") == 1
     assert said.out == ""
+    assert {file.name for file in tmp_path.rglob("*.*")} <= {"run.json"}
 
 
 @pytest.mark.parametrize("name", ["run.json", "trials/x.json", "recordings/a/b.json", "trials", "../link/run.json"])

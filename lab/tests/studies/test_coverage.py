@@ -11,13 +11,15 @@ from pretouch_lab.studies.coverage import study
 from pretouch_lab.studies.coverage.approaching import ApproachingObstacle
 
 
+def coming(near, *towards):
+    return ApproachingObstacle(1, *np.zeros((3, 3)), True, near, *towards)
+
+
 def test_a_ball_is_seen_in_time_by_a_point_near_it_while_there_is_way_to_brake():
     params = CoverageParams()
     needed = params.braking_m + 0.016 * 0.8
     ball = np.array([1.0, 0.0, 0.5])
-    obstacle = ApproachingObstacle(
-        1, np.zeros(3), np.zeros(3), np.zeros(3), True, {10: (needed + 0.01, ball), 20: (needed - 0.01, ball)}
-    )
+    obstacle = coming({10: (needed + 0.01, ball), 20: (needed - 0.01, ball)})
     beside, off = ball + np.array([0.149, 0.0, 0.0]), ball + np.array([0.151, 0.0, 0.0])
     assert study.seen_in_time(obstacle, {10: np.array([off, beside])}, params)
     assert not study.seen_in_time(obstacle, {10: off[None]}, params), "more than 0.1 m from its surface"
@@ -28,8 +30,7 @@ def test_a_ball_is_seen_in_time_by_a_point_near_it_while_there_is_way_to_brake()
 def test_numbers_and_table_of_the_study():
     params = CoverageParams()
     step = SimpleNamespace(stamp=0.01, obstacles=SimpleNamespace(point=np.zeros((1, 3))))
-    seen = ApproachingObstacle(1, np.zeros(3), np.zeros(3), np.zeros(3), True, {10: (0.5, np.zeros(3))}, 0.2)
-    blind = ApproachingObstacle(1, np.zeros(3), np.zeros(3), np.zeros(3), True, {10: (0.5, np.ones(3))}, -0.1)
+    seen, blind = coming({10: (0.5, np.zeros(3))}, 0.2), coming({10: (0.5, np.ones(3))}, -0.1)
     row = study.results([seen, blind], SimpleNamespace(steps=[step]), params)
     assert row == {"came": 2, "blind": 1, "foreseen_blind": 0, "agree": 1, "fast": 1, "towards_m_s": 0.1}
     where = {"experiment": "coverage", "arm": "moving", "skin": "own", "profile": "pretouch", "predicted": 0.6}
