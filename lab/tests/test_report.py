@@ -4,6 +4,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from lab.tests.paper.test_figures import UNITS, made_trace
+from lab.tests.paper.test_static import cell
 from lab.tests.test_summary import contact, dynamic_row, static_row
 from PIL import Image
 
@@ -12,7 +13,6 @@ from pretouch.recording.reader import open_recording
 from pretouch.recording.run_record import columns_of
 from pretouch_lab import report
 from pretouch_lab.campaign import Request
-from pretouch_lab.cell import Cell
 from pretouch_lab.paper import static
 from pretouch_lab.registry import summarise
 from pretouch_lab.report import write_report
@@ -49,10 +49,9 @@ def test_a_run_without_trials_still_has_a_file_and_one_that_cannot_be_written_is
 
 @pytest.mark.slow
 def test_a_recorded_trial_is_as_without_and_its_trace_has_the_course_and_each_steps_mean_true_force(context, tmp_path):
-    where = {"trajectory": "line", "side": "+y", "stiffness_n_per_m": 25e3, "restrictions": "off"}
-    cell, place = Cell(static.NAME, "paper", where), tmp_path / "x.mcap"
-    row, record = static.trial(cell, 101, replace(context, recording=place))
-    assert static.trial(cell, 101, context)[0] == row
+    place = tmp_path / "x.mcap"
+    row, record = static.trial(cell("paper", side="+y"), 101, replace(context, recording=place))
+    assert static.trial(cell("paper", side="+y"), 101, context)[0] == row
     trace, again = trace_of(record), read_trace(place)
     assert again[1] == context.skin.ids
     for name in columns_of(record.steps):

@@ -3,16 +3,13 @@
 import json
 
 import pytest
+from lab.tests.studies.calibration.test_study import row
 
 from pretouch import cli
 from pretouch_lab.studies.calibration import study as study_module
 from pretouch_lab.studies.calibration.study import Study
 
-ROW = {
-    "skin": 0, "unit": "on_panda_hand", "link": "panda_hand", "accepted": True, "position_error_m": 0.0002,
-    "orientation_error_deg": 0.004, "position_sigma_m": 0.0001, "orientation_sigma_deg": 0.003, "nees_position": 3.0,
-    "nees_orientation": 3.0, "nees_pose": 6.0, "clock_error_s": 0.0007, "link_found": True,
-}  # fmt: skip
+ROW = row("panda_hand", 0.0002)
 
 
 def calibrate(*words):
@@ -48,8 +45,8 @@ def test_a_study_of_two_skins_finds_all_units_to_a_millimetre(tmp_path):
     place = tmp_path / "rows.json"
     assert calibrate("--skins", 2, "--find-links", "--duration", 50, "--json", place) == 0
     told = json.loads(place.read_text())
-    assert [row["skin"] for row in told["rows"]] == 7 * [0] + 7 * [1]
+    assert [unit["skin"] for unit in told["rows"]] == 7 * [0] + 7 * [1]
     assert told["motion_s"] <= 50.0
-    for row in told["rows"]:
-        assert row["position_error_m"] < 0.001
-        assert row["orientation_error_deg"] < 0.1
+    for unit in told["rows"]:
+        assert unit["position_error_m"] < 0.001
+        assert unit["orientation_error_deg"] < 0.1

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from lab.tests.paper.test_static import cell
 
 from pretouch.control.path import Circle
 from pretouch.profiles import PROFILES
 from pretouch.sim.scene import Box, SceneSpec
 from pretouch.types import Mode
-from pretouch_lab.cell import Cell
 from pretouch_lab.paper import static
 from pretouch_lab.trial import Setup, play
 
@@ -19,8 +19,7 @@ A = PROFILES["pretouch"].approach
 def test_the_arm_touches_a_board_it_sees_at_about_the_touch_speed_and_sooner_than_the_papers(context):
     rows = {}
     for profile, mode in (("blind", "off"), ("paper", "off"), ("pretouch", "braking")):
-        where = {"trajectory": "line", "side": "-y", "stiffness_n_per_m": 25_000.0, "restrictions": mode}
-        row, record = static.trial(Cell("static", profile, where), SEED, context)
+        row, record = static.trial(cell(profile, restrictions=mode), SEED, context)
         rows[profile] = row | {"touch_s": record.first_contact()}
     pretouch, paper = rows["pretouch"], rows["paper"]
     assert pretouch["impact_speed_m_s"] == pytest.approx(A.touch_speed_max_m_s, abs=0.01)

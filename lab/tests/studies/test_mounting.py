@@ -9,7 +9,6 @@ from lab.tests.width import width
 from scipy.spatial.transform import Rotation
 
 from pretouch.perception.closest import no_obstacles
-from pretouch.profiles import profile
 from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify
 from pretouch.robot.description import panda
@@ -96,21 +95,19 @@ def one_step(setup: Setup, steps: int = 3):
     return play(setup, lambda step, _: step.stamp >= 0.2 + 0.01 * steps)
 
 
-def test_units_measure_where_they_are_and_an_arm_works_and_replays_by_what_it_is_told(
-    panda_model, paper_skin, tmp_path
-):
-    believed, _ = misplaced(paper_skin, panda_model, Misplacement(50.0, 20.0), seed=1)
+def test_units_measure_where_they_are_and_an_arm_works_and_replays_by_what_it_is_told(context, tmp_path):
+    believed, _ = misplaced(context.skin, context.model, Misplacement(50.0, 20.0), seed=1)
     path = mounting.static_path("line", "+y")
     scene = mounting.static_scene("line", "+y", 25e3, 1)
-    setup, place = Setup(panda_model, paper_skin, profile("paper"), scene, path, 1), tmp_path / "told-wrong.mcap"
+    setup, place = context.setup(cell(), 1, scene, path), tmp_path / "told-wrong.mcap"
     right, wrong = one_step(setup), one_step(replace(setup, believed=believed, recording=place))
     assert wrong.steps[0].range_distance.tolist() == pytest.approx(right.steps[0].range_distance.tolist(), nan_ok=True)
     unit = int(right.steps[0].obstacles.unit[0])
     truly, taken = (
         record.steps[0].obstacles.point[record.steps[0].obstacles.unit == unit] for record in (right, wrong)
     )
-    kin = panda_model.kinematics(wrong.steps[0].q)
-    link = paper_skin.link[unit]
+    kin = context.model.kinematics(wrong.steps[0].q)
+    link = context.skin.link[unit]
     beam = believed.T_link_sensor[unit] @ [0.0, 0.0, wrong.steps[0].range_distance[unit], 1.0]
     assert taken[0] == pytest.approx(kin.position[link] + kin.rotation[link] @ beam[:3], abs=1e-9)
     assert np.linalg.norm(taken - truly) > 0.01
@@ -121,9 +118,9 @@ def test_units_measure_where_they_are_and_an_arm_works_and_replays_by_what_it_is
     assert verdict.agrees
 
 
-def test_an_arm_that_believes_the_truth_does_as_if_it_were_told_nothing(panda_model, paper_skin):
-    setup = Setup(panda_model, paper_skin, profile("paper"), SceneSpec(), mounting.static_path("line", "+y"), 2)
-    same = replace(setup, believed=misplaced(paper_skin, panda_model, EXACT, 2)[0])
+def test_an_arm_that_believes_the_truth_does_as_if_it_were_told_nothing(context):
+    setup = context.setup(cell(), 2, SceneSpec(), mounting.static_path("line", "+y"))
+    same = replace(setup, believed=misplaced(context.skin, context.model, EXACT, 2)[0])
     commands = [[s.command.tobytes() for s in one_step(s, 30).steps] for s in (setup, same)]
     assert commands[0] == commands[1]
 
@@ -166,10 +163,8 @@ def test_units_in_their_place_miss_nothing(exact):
 
 def test_readings_that_are_taken_for_nothing_are_missed(exact, context):
     _, record = exact
-    setup = Setup(
-        context.model, context.skin, profile("paper"), mounting.static_scene("line", "+y", 25e3, 1),
-        mounting.static_path("line", "+y"), 1,
-    )  # fmt: skip
+    scene = mounting.static_scene("line", "+y", 25e3, 1)
+    setup = context.setup(cell(), 1, scene, mounting.static_path("line", "+y"))
     seen = [s for s in record.steps if len(s.obstacles.unit)]
     cut = replace(record, steps=[copy(step) for step in seen])
     for step in cut.steps[1::2]:

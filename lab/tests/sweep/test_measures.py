@@ -2,9 +2,7 @@ import json
 
 import pytest
 
-from pretouch.sensing.skin import paper_skin
-from pretouch_lab.benchmarks.detection.arm import model
-from pretouch_lab.cell import Cell, Context
+from pretouch_lab.cell import Cell
 from pretouch_lab.engine import run_tasks
 from pretouch_lab.paper import static
 from pretouch_lab.sweep.design import sweep_of
@@ -13,11 +11,11 @@ from pretouch_lab.sweep.setting import built
 from pretouch_lab.sweep.streams import measure
 
 
-def test_a_cell_of_the_static_experiment_is_its_trial():
+def test_a_cell_of_the_static_experiment_is_its_trial(context):
     what = measure("static")
     found = what.run(built(what.profile, what.scene, {}, 1000), None)
     where = {"trajectory": "circle", "side": "-y", "stiffness_n_per_m": 25_000.0, "restrictions": "off"}
-    row, _ = static.trial(Cell("static", "paper", where), 1000, Context(model(), paper_skin(model())))
+    row, _ = static.trial(Cell("static", "paper", where), 1000, context)
     assert found["true_peak_n"] == row["true_peak_n"] > 5.0
     assert found["delay_s"] == row["detection_delay_s"] > 0.0
     assert set(found) == set(what.metrics)

@@ -15,8 +15,8 @@ from pretouch_lab.benchmarks.avoidance.setting import setting
 from pretouch_lab.benchmarks.avoidance.trial import play_trial
 from pretouch_lab.trial import Record
 
-DRDO = scenarios()["drdo"]
 QUICK = [next(s for s in scenarios().values() if s.family == f and s.quick) for f in FAMILIES]
+PLAYED = [*((scene, "paper") for scene in QUICK), *((scenarios()["drdo"], method) for method in ("flacco", "ding"))]
 
 
 def test_an_arm_that_does_not_move_in_srdo_has_the_distance_of_its_geometry():
@@ -37,11 +37,7 @@ def test_an_arm_that_does_not_move_in_srdo_has_the_distance_of_its_geometry():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("scene", "baseline"),
-    [*((scene, "paper") for scene in QUICK), (DRDO, "flacco"), (DRDO, "ding")],
-    ids=lambda given: getattr(given, "name", given),
-)
+@pytest.mark.parametrize(("scene", "baseline"), PLAYED, ids=lambda given: getattr(given, "name", given))
 def test_a_trial_of_every_family_can_be_played_and_the_published_methods_move_out_of_the_way(scene, baseline):
     row = play_trial(scene, baseline, 1000)
     json.dumps(row, allow_nan=False)
