@@ -19,11 +19,13 @@ from pretouch_lab.campaign import Request, play_trial, recording_file, trial_fil
 SMALL = Request(("static",), seeds=1, profiles=("blind",))
 
 
-def test_tasks_take_all_cells_seed_by_seed():
+def test_tasks_take_all_cells_once_seed_by_seed():
     tasks = Request(("static", "dynamic"), seeds=2).trials()
     assert len(tasks) == 2 * (8 + 2)
     assert [seed for _, seed in tasks] == [0] * 10 + [1] * 10
     assert len({trial_file(Path("x"), *task) for task in tasks}) == 20
+    named_twice = Request(("release",), 1, profiles=("paper", "paper:react.decay_cycles=50")).trials()
+    assert len({cell.name for cell, _ in named_twice}) == len(named_twice)
 
 
 @pytest.mark.parametrize("own", [True, False])

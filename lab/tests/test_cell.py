@@ -42,12 +42,6 @@ def test_files_of_different_cells_differ():
     assert Cell("static", odd[0]).name != Cell("static", odd[1]).name
 
 
-def test_a_cell_that_is_named_twice_runs_once():
-    tasks = Request(("release",), 1, profiles=("paper", "paper:react.decay_cycles=50")).trials()
-    names = [cell.name for cell, _ in tasks]
-    assert len(names) == len(set(names))
-
-
 def test_a_grid_gives_each_profile_its_modes():
     grid = Grid(("blind", "paper", "paper:approach.rows=floor"), ("slack", "hard"))
     assert grid.controllers("off") == [

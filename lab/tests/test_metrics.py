@@ -12,11 +12,6 @@ def test_a_moving_mean_by_numbers_is_the_mean_of_less_than_a_window(values, coun
     np.testing.assert_allclose(mean_over(np.array(values), count), means)
 
 
-def test_the_peak_of_nothing_is_nothing():
-    assert peak(np.zeros(0)) == 0.0
-    assert peak(np.array([1.0, 7.0, 2.0])) == 7.0
-
-
 @pytest.mark.parametrize(
     ("b", "angle"), [((2, 0, 0), 0), ((0, 5, 0), 90), ((-1, 0, 0), 180), ((1, 1, 0), 45), ((0, 0, 0), None)]
 )
@@ -24,6 +19,7 @@ def test_angles_by_numbers_and_none_to_nothing(b, angle):
     assert angle_deg(np.array([1.0, 0.0, 0.0]), np.array(b, float)) == pytest.approx(angle)
 
 
-def test_spread_by_numbers():
+def test_peak_and_spread_by_numbers_and_of_nothing():
+    assert (peak(np.zeros(0)), peak(np.array([1.0, 7.0, 2.0]))) == (0.0, 7.0)
     assert spread([float(v) for v in range(11)]) == {"median": 5.0, "p10": 1.0, "p90": 9.0, "n": 11}
     assert spread([]) is None

@@ -22,13 +22,10 @@ def test_an_ablation_changes_its_switch_and_nothing_else(switch):
     assert differing(profile(Ablation(switch).profile_text), profile("pretouch")) == {switch}
 
 
-def test_no_switch_is_in_both_benchmarks():
+def test_no_switch_is_in_both_benchmarks_and_only_the_thresholds_are_swept_by_their_base_force():
     of_detection, others = (ablations(of_detection=of) for of in (True, False))
     assert {a.switch for a in of_detection} == {s for s in OFF if s.startswith(("detect", "window."))}
     assert not {a.name for a in of_detection} & {a.name for a in others}
-
-
-def test_only_the_thresholds_are_swept_by_their_base_force():
     assert [baseline.name for baseline in ablated() if baseline.sweep == "f_base_n"] == ["without detect"]
 
 

@@ -5,12 +5,11 @@ from lab.tests.sweep.made import register, value
 
 from pretouch import cli
 
-X = ("--vary", "scene.x1=-3:3", "--vary", "scene.x2=-3:3")
-
 
 def test_a_sweep_shows_and_writes_what_it_says_and_is_not_played_twice(capsys, tmp_path, monkeypatch):
     register(monkeypatch)
-    args = ("ishigami", *X, "--samples", "4", "--processes", "1", "--arms", "1", "--out", str(tmp_path))
+    vary, out = ("--vary", "scene.x1=-3:3", "--vary", "scene.x2=-3:3"), ("--processes", "1", "--out", str(tmp_path))
+    args = ("ishigami", *vary, "--samples", "4", "--arms", "1", *out)
     assert cli.main(["sweep", *args]) == 0
     said = capsys.readouterr()
     assert "Sweep: 16 pieces of work" in said.err

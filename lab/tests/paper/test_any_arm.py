@@ -60,9 +60,8 @@ def test_the_rule_finds_the_papers_places_and_about_the_hand_of_a_panda_that_it_
     assert places.inside == pytest.approx((0.35, 0.35), abs=0.03)
     assert places.ahead == 0.0
     own, found = robot_hand(panda_model), robot_hand(model)
-    assert (own.link, own.palm.tolist(), own.turn.tolist()) == (
-        panda_model.link_index("panda_hand"), PALM.tolist(), np.eye(3).tolist(),
-    )  # fmt: skip
+    assert own.link == panda_model.link_index("panda_hand")
+    assert (own.palm.tolist(), own.turn.tolist()) == (PALM.tolist(), np.eye(3).tolist())
     kin = model.kinematics(model.description.q_ready)
 
     def at(hand, away):

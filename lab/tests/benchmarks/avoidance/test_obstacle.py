@@ -5,14 +5,11 @@ from pretouch.perception.closest import closest_points
 from pretouch_lab.benchmarks.avoidance.obstacle import Ball, Cuboid, Walker, nearest, travelled
 
 
-def test_a_walker_brakes_to_rest_at_the_end():
+def test_a_walker_brakes_to_rest_at_the_end_and_goes_slower_with_no_room_to_brake():
     # 0.8 m/s and 4 m/s^2: 0.2 s and 0.08 m to brake, so 0.92 m in 1.15 s before
     times = [-1.0, 0.0, 0.5, 1.15, 1.25, 1.35, 9.0]
     expected = [0.0, 0.0, 0.4, 0.92, 0.92 + 0.08 - 0.02, 1.0, 1.0]
     np.testing.assert_allclose([travelled(t, 1.0, 0.8) for t in times], expected, atol=1e-12)
-
-
-def test_a_walker_with_no_room_to_brake_goes_slower():
     # sqrt(2 * 4 * 0.02) = 0.4 m/s, which is 0.1 s to brake
     assert travelled(0.1, 0.02, 2.0) == pytest.approx(0.02)
 

@@ -9,12 +9,9 @@ from pretouch_lab.benchmarks.avoidance.scenario import FAMILIES, scenarios
 from pretouch_lab.benchmarks.avoidance.setting import plant_of, setting
 
 
-def test_every_family_has_scenarios_under_their_own_names():
+def test_every_family_has_scenarios_under_their_own_names_and_a_variant_changes_what_it_says_alone():
     assert list(dict.fromkeys(s.family for s in scenarios().values())) == list(FAMILIES)
     assert all(name == scene.name for name, scene in scenarios().items())
-
-
-def test_a_variant_changes_what_it_says_and_keeps_the_rest():
     small = scenarios()["small"].params["obstacle"]
     assert (small["radius_m"], small["mass_kg"]) == (0.02, 0.6)
     assert scenarios()["dark"].params["ranging"] == {"reflectance": 0.05}
