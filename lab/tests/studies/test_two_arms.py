@@ -76,6 +76,5 @@ def test_a_short_trial(context, knows):
         assert row["arms_peak_n"] > 20.0
     if knows == "told":
         assert row["arms"] == 0
-    table = two_arms.tables(two_arms.summarise([{"profile": "pretouch", "restrictions": "braking", "knows": knows}
-                                                | row]))  # fmt: skip
-    assert "Two arms" in str(table[0])
+    told = {"profile": "pretouch", "restrictions": "braking", "knows": knows}
+    assert "Two arms" in str(two_arms.tables(two_arms.summarise([told | row]))[0])
