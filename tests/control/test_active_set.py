@@ -1,38 +1,17 @@
 """Hard rows: the answer is DAQP's, which is another solver's, and a contradiction is one by its own weights."""
 
-from dataclasses import dataclass
-
 import daqp
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.control.programs import answered
+from tests.reference.qp import Problem
 
-from pretouch.control.qp import Cost, solve
-from pretouch.control.restriction import ApproachRows
-from pretouch.types import QpOutcome, QpSolution
-
-
-@dataclass(frozen=True)
-class Hard:
-    """Minimise 1/2 x^T H x + f^T x within lower <= x <= upper and G x <= h."""
-
-    H: np.ndarray
-    f: np.ndarray
-    lower: np.ndarray
-    upper: np.ndarray
-    G: np.ndarray
-    h: np.ndarray
-
-    def solve(self) -> QpSolution:
-        rows = ApproachRows(self.G, self.h, soft=False)
-        return solve(Cost(self.H, self.f), self.lower, self.upper, rows, 1.0, (self.lower + self.upper) / 2)
-
-    def value(self, x: np.ndarray) -> float:
-        return float(0.5 * x @ self.H @ x + self.f @ x)
+from pretouch.types import QpOutcome
 
 
-def daqps(p: Hard) -> tuple[int, np.ndarray]:
+def daqps(p: Problem) -> tuple[int, np.ndarray]:
     """DAQP's exit flag, 1 for solved and -1 for infeasible, and x."""
     count = len(p.h)
     x, _, flag, _ = daqp.solve(
@@ -45,7 +24,7 @@ def daqps(p: Hard) -> tuple[int, np.ndarray]:
 KINDS = ("random", "coarse", "equal", "opposite", "zeros", "narrow", "through a point", "scaled")
 
 
-def problem(kind: str, seed: int) -> Hard:
+def problem(kind: str, seed: int) -> Problem:
     """Up to ten joints and forty rows; most kinds are feasible in some draws and infeasible in others."""
     rng = np.random.default_rng(seed)
     n, count = int(rng.integers(1, 11)), int(rng.integers(0, 41) if rng.random() < 0.3 else rng.integers(0, 9))
@@ -73,10 +52,10 @@ def problem(kind: str, seed: int) -> Hard:
         h = G @ at
     if kind == "scaled":
         G[half : 2 * half], h[half : 2 * half] = 7.0 * G[:half], 7.0 * h[:half] - rng.choice([0.0, 1e-3, -1e-3])
-    return Hard(H, f, lower, upper, G, h)
+    return Problem(H, f, lower, upper, G, h, None)
 
 
-def assert_contradiction(p: Hard, multipliers: np.ndarray) -> None:
+def assert_contradiction(p: Problem, multipliers: np.ndarray) -> None:
     """Farkas: bounds and rows, added up with weights >= 0, read 0 <= something negative."""
     n = len(p.f)
     box, rows = multipliers[:n], multipliers[n:]
@@ -91,7 +70,7 @@ def assert_contradiction(p: Hard, multipliers: np.ndarray) -> None:
 @given(seed=st.integers(0, 2**32 - 1))
 def test_it_answers_as_daqp_does(kind: str, seed: int):
     p = problem(kind, seed)
-    answer, (flag, x) = p.solve(), daqps(p)
+    answer, (flag, x) = answered(p), daqps(p)
     if answer.outcome is QpOutcome.INFEASIBLE:
         assert flag != 1
         assert_contradiction(p, answer.multipliers)
@@ -103,30 +82,31 @@ def test_it_answers_as_daqp_does(kind: str, seed: int):
     pull = p.H @ answer.qd + p.f + answer.multipliers[: len(p.f)] + p.G.T @ answer.multipliers[len(p.f) :]
     np.testing.assert_allclose(pull, 0.0, rtol=0, atol=1e-9 * (1.0 + np.abs(answer.multipliers).max()))
     if flag == 1:
-        assert p.value(answer.qd) == pytest.approx(p.value(x), rel=0, abs=1e-9)
+        ours, theirs = (0.5 * x @ p.H @ x + p.f @ x for x in (answer.qd, x))
+        assert ours == pytest.approx(theirs, rel=0, abs=1e-9)
 
 
 def test_every_kind_has_problems_with_and_without_an_answer():
-    outcomes = {kind: {problem(kind, seed).solve().outcome for seed in range(60)} for kind in KINDS}
+    outcomes = {kind: {answered(problem(kind, seed)).outcome for seed in range(60)} for kind in KINDS}
     both = {QpOutcome.SOLVED, QpOutcome.INFEASIBLE}
     assert outcomes == {kind: {QpOutcome.SOLVED} if kind == "through a point" else both for kind in KINDS}
 
 
 def test_a_contradiction_names_its_rows():
     G, h = np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, 0.0]]), np.array([-0.2, 0.3, 0.1, 0.0])
-    p = Hard(np.eye(2), np.zeros(2), -np.ones(2), np.ones(2), G, h)
-    answer = p.solve()
+    p = Problem(np.eye(2), np.zeros(2), -np.ones(2), np.ones(2), G, h, None)
+    answer = answered(p)
     assert answer.outcome is QpOutcome.INFEASIBLE
     np.testing.assert_allclose(answer.multipliers, [0, 0, 1, 0, 1, 0])
     # x_0 <= -1.5 contradicts the lower bound of x_0
-    answer = Hard(p.H, p.f, p.lower, p.upper, G[:1], np.array([-1.5])).solve()
+    answer = answered(Problem(p.H, p.f, p.lower, p.upper, G[:1], np.array([-1.5]), None))
     np.testing.assert_allclose(answer.multipliers, [-1, 0, 1])
 
 
 def test_rows_that_miss_each_other_by_rounding_alone_do_not_contradict():
     G = np.array([[1.0, 1.0], [-1.0, -1.0], [3.0, 3.0]])
     for gap in (0.0, 1e-16, 1e-13, 1e-11):
-        p = Hard(np.eye(2), np.ones(2), -np.ones(2), np.ones(2), G, np.array([0.1, -0.1 - gap, 0.3 - gap]))
-        answer = p.solve()
+        h = np.array([0.1, -0.1 - gap, 0.3 - gap])
+        answer = answered(Problem(np.eye(2), np.ones(2), -np.ones(2), np.ones(2), G, h, None))
         assert answer.outcome is QpOutcome.SOLVED
         np.testing.assert_allclose(answer.qd, 0.05, atol=1e-10)

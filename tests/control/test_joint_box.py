@@ -1,7 +1,5 @@
 """The joint box keeps position, velocity and acceleration limits at once, whatever is commanded inside it."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -20,33 +18,6 @@ def limits_of(period: float, n: int = N) -> JointLimits:
     return JointLimits(
         -rng.uniform(0.05, 0.6, n), rng.uniform(0.05, 0.6, n), rng.uniform(1, 2.6, n), rng.uniform(5, 20, n), period
     )
-
-
-@dataclass
-class Joints:
-    """Joints that follow their commands exactly, and the limits they must keep."""
-
-    limits: JointLimits
-    q: np.ndarray
-    qd: np.ndarray
-
-    def box(self) -> tuple[np.ndarray, np.ndarray]:
-        return joint_box(self.q, self.qd, self.limits)
-
-    def move(self, command: np.ndarray) -> None:
-        acceleration = (command - self.qd) / self.limits.period
-        assert np.all(np.abs(acceleration) <= self.limits.qdd_max + 1e-8)
-        self.q, self.qd = self.q + command * self.limits.period, command
-
-    def check_position_and_velocity(self) -> None:
-        assert np.all(self.q >= self.limits.q_min - 1e-9)
-        assert np.all(self.q <= self.limits.q_max + 1e-9)
-        assert np.all(np.abs(self.qd) <= self.limits.qd_max + 1e-9)
-
-
-def at_rest(period: float) -> Joints:
-    limits = limits_of(period)
-    return Joints(limits, np.random.default_rng(4).uniform(limits.q_min, limits.q_max), np.zeros(N))
 
 
 def test_viable_speed_by_numbers():
@@ -73,46 +44,40 @@ def test_viable_speed_stops_exactly_at_the_limit(distance: float, acceleration: 
 
 
 @pytest.mark.parametrize("period", PERIODS)
-def test_random_commands_never_break_a_limit(period: float):
-    rng = np.random.default_rng(5)
-    joints = at_rest(period)
-    for _ in range(500):  # 200 000 joint steps
-        lower, upper = joints.box()
-        assert np.all(lower <= upper)
-        joints.move(rng.uniform(lower, upper))
-        joints.check_position_and_velocity()
-
-
-@pytest.mark.parametrize("period", PERIODS)
-def test_extreme_commands_never_break_a_limit(period: float):
-    rng = np.random.default_rng(6)
-    joints = at_rest(period)
+@pytest.mark.parametrize("extreme", [False, True])
+def test_random_commands_never_break_a_limit(period: float, extreme: bool):
+    limits, rng = limits_of(period), np.random.default_rng(5 + extreme)
+    q, qd = np.random.default_rng(4).uniform(limits.q_min, limits.q_max), np.zeros(N)
     upwards, used = rng.random(N) < 0.5, np.zeros(N, dtype=bool)
-    for i in range(2000):  # 800 000 joint steps
-        lower, upper = joints.box()
+    for i in range(2000 if extreme else 500):  # 800 000 or 200 000 joint steps
+        lower, upper = joint_box(q, qd, limits)
         assert np.all(lower <= upper)
-        joints.move(np.where(upwards, upper, lower))
-        joints.check_position_and_velocity()
-        used |= np.minimum(joints.q - joints.limits.q_min, joints.limits.q_max - joints.q) < 1e-6
+        command = np.where(upwards, upper, lower) if extreme else rng.uniform(lower, upper)
+        assert np.all(np.abs(command - qd) <= limits.qdd_max * period + 1e-8 * period)
+        q, qd = q + command * period, command
+        left = np.minimum(q - limits.q_min, limits.q_max - q)
+        assert np.all(left >= -1e-9)
+        assert np.all(np.abs(qd) <= limits.qd_max + 1e-9)
+        used |= left < 1e-6
         if i % 50 == 0:
             upwards ^= rng.random(N) < 0.3
     # nor is the box timid: the ends of the range are reached
-    assert used.mean() > 0.9
+    assert used.mean() > 0.9 or not extreme
 
 
 @pytest.mark.parametrize("period", PERIODS)
 def test_a_joint_too_fast_to_stop_in_time_brakes_at_its_acceleration_limit(period: float):
     limits = limits_of(period)
-    joints = Joints(limits, limits.q_max - 1e-3, 0.9 * limits.qd_max)
-    needed = np.ceil(joints.qd / (limits.qdd_max * period))
+    q, qd, reach = limits.q_max - 1e-3, 0.9 * limits.qd_max, limits.qdd_max * period
+    needed = np.ceil(qd / reach)
     for i in range(int(needed.max())):
-        before = joints.qd
-        _, upper = joints.box()
-        hard = before > limits.qdd_max * period
+        _, upper = joint_box(q, qd, limits)
+        hard = qd > reach
         # beyond the limit nothing but full braking is left
-        np.testing.assert_allclose(upper[hard], (before - limits.qdd_max * period)[hard], rtol=1e-12)
-        joints.move(upper)
-        assert np.all(joints.qd[needed <= i + 1] <= 1e-12)
+        np.testing.assert_allclose(upper[hard], (qd - reach)[hard], rtol=1e-12)
+        assert np.all(np.abs(upper - qd) <= reach + 1e-8 * period)
+        q, qd = q + upper * period, upper
+        assert np.all(qd[needed <= i + 1] <= 1e-12)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -127,19 +92,6 @@ def test_a_joint_beyond_its_limit_may_only_return():
     limits = JointLimits(np.array([-1.0]), np.array([1.0]), np.array([2.0]), np.array([10.0]), 0.01)
     lower, upper = joint_box(np.array([1.2]), np.zeros(1), limits)
     np.testing.assert_allclose([lower[0], upper[0]], [-0.1, 0.0])
-
-
-wild = arrays(np.float64, 7, elements=st.floats(-1e3, 1e3))
-
-
-@given(wild, wild)
-@settings(deadline=None, derandomize=True, max_examples=300)
-def test_the_box_is_never_empty_nor_beyond_the_acceleration(q: np.ndarray, qd: np.ndarray):
-    limits = limits_of(0.01, 7)
-    lower, upper = joint_box(q, qd, limits)
-    assert np.all(lower <= upper)
-    assert np.all(upper <= qd + limits.qdd_max * 0.01)
-    assert np.all(lower >= qd - limits.qdd_max * 0.01)
 
 
 @given(arrays(np.float64, 7, elements=st.floats(-1, 1)), arrays(np.float64, 7, elements=st.floats(-1, 1)))

@@ -1,35 +1,23 @@
 """Eq. 2 by numbers, and the solver's answers against the conditions of optimality."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.optimize import linprog, minimize
+from tests.control.programs import answered
+from tests.reference.qp import Problem, kkt_residual
+from tests.reference.qp import solve as solve_exactly
 
 from pretouch.control.joint_box import JointLimits, joint_box
-from pretouch.control.qp import Cost, damping, manipulability, mid_joint_velocity, solve, task_cost
-from pretouch.control.restriction import ApproachRows, approach_rows
+from pretouch.control.qp import damping, manipulability, mid_joint_velocity, task_cost
+from pretouch.control.restriction import approach_rows
 from pretouch.params import RestrictionParams, TaskParams
 from pretouch.perception.closest import closest_points
 from pretouch.robot.model import RobotModel
-from pretouch.types import QpOutcome, QpSolution
+from pretouch.types import QpOutcome
 
 TASK = TaskParams()
 WEIGHT = RestrictionParams().slack_weight
-
-
-@dataclass(frozen=True)
-class Problem:
-    """What is handed to the solver, and the braking command it falls back on."""
-
-    cost: Cost
-    lower: np.ndarray
-    upper: np.ndarray
-    rows: ApproachRows
-    stop: np.ndarray
-
-    def solve(self) -> QpSolution:
-        return solve(self.cost, self.lower, self.upper, self.rows, WEIGHT, self.stop)
 
 
 def panda_problem(model: RobotModel, seed: int, soft: bool, count: int | None = None, still: bool = False) -> Problem:
@@ -49,39 +37,7 @@ def panda_problem(model: RobotModel, seed: int, soft: bool, count: int | None = 
     h = rows.h if soft else rows.h + rng.uniform(0, 0.5)
     velocity = rng.uniform(-0.5, 0.5, len(jacobian))
     cost = task_cost(jacobian, velocity, q, model.q_mid, TASK)
-    return Problem(cost, lower, upper, replace(rows, h=h), np.clip(qd, lower, upper))
-
-
-def kkt_residual(p: Problem, x: np.ndarray, multipliers: np.ndarray) -> float:
-    """Largest violation of the conditions of Karush, Kuhn and Tucker, each scaled by the size of its terms."""
-    on_box, on_rows = multipliers[: len(x)], multipliers[len(x) :]
-    parts = np.array([p.cost.H @ x, p.cost.f, on_box, p.rows.G.T @ on_rows])
-    stationarity = np.abs(parts.sum(axis=0)).max() / (1 + np.abs(parts).max())
-    above, below = x - p.upper, p.lower - x
-    residuals = [stationarity, above.max(), below.max()]
-    # a multiplier is positive at an upper bound, negative at a lower one, zero between
-    scale = 1 + np.abs(multipliers).max()
-    residuals += [(np.maximum(on_box, 0) * -above).max() / scale, (np.maximum(-on_box, 0) * -below).max() / scale]
-    if len(on_rows):
-        excess = p.rows.G @ x - p.rows.h
-        residuals.append((-on_rows).max() / scale)
-        if p.rows.soft:
-            # the penalty WEIGHT / 2 s^2 of s = max(0, excess) pushes back with WEIGHT s
-            residuals.append(np.abs(on_rows - WEIGHT * np.maximum(excess, 0)).max() / (scale + WEIGHT))
-        else:
-            residuals += [excess.max(), np.abs(on_rows * excess).max() / scale]
-    return float(max(residuals))
-
-
-def feasible(p: Problem) -> bool:
-    """Whether box and rows can be met together, by linear programming."""
-    bounds = list(zip(p.lower, p.upper, strict=True))
-    return linprog(np.zeros(7), A_ub=p.rows.G, b_ub=p.rows.h, bounds=bounds).status == 0
-
-
-def objective(p: Problem, x: np.ndarray) -> float:
-    slack = np.maximum(p.rows.G @ x - p.rows.h, 0) if p.rows.soft else np.zeros(1)
-    return float(0.5 * x @ p.cost.H @ x + p.cost.f @ x + WEIGHT / 2 * slack @ slack)
+    return Problem(cost.H, cost.f, lower, upper, rows.G, h, WEIGHT if soft else None)
 
 
 # eq. 2
@@ -138,107 +94,33 @@ def test_answers_are_optimal(panda_model: RobotModel, soft: bool, block: int):
     solved = 0
     for seed in range(50 * block, 50 * block + 50):
         problem = panda_problem(panda_model, seed, soft)
-        answer = problem.solve()
+        answer = answered(problem)
         if answer.outcome is QpOutcome.SOLVED:
             solved += 1
             assert kkt_residual(problem, answer.qd, answer.multipliers) <= 1e-8
-            excess = problem.rows.G @ answer.qd - problem.rows.h
+            excess = problem.G @ answer.qd - problem.h
             np.testing.assert_allclose(answer.slack, np.maximum(excess, 0), atol=1e-12)
             assert np.all((problem.lower <= answer.qd) & (answer.qd <= problem.upper))
         else:
             assert answer.outcome is QpOutcome.INFEASIBLE
-            assert not problem.rows.soft
-            assert not feasible(problem)
+            assert not soft
+            assert solve_exactly(problem).x is None
     assert solved >= (50 if soft else 15)
 
 
 @pytest.mark.parametrize("seed", range(40))
 def test_from_rest_hard_rows_ahead_of_d_repulse_are_always_solved(panda_model: RobotModel, seed: int):
     problem = panda_problem(panda_model, seed, soft=False, count=10, still=True)
-    ahead = replace(problem, rows=replace(problem.rows, h=np.maximum(problem.rows.h, 0.0)))
-    answer = ahead.solve()
+    ahead = replace(problem, h=np.maximum(problem.h, 0.0))
+    answer = answered(ahead)
     assert answer.outcome is QpOutcome.SOLVED
     assert kkt_residual(ahead, answer.qd, answer.multipliers) <= 1e-8
 
 
-@pytest.mark.parametrize("soft", [True, False])
-@pytest.mark.parametrize("seed", range(5))
-def test_an_independent_solver_finds_the_same(panda_model: RobotModel, seed: int, soft: bool):
-    problem = panda_problem(panda_model, seed, soft, count=6, still=True)
-    if not soft:
-        problem = replace(problem, rows=replace(problem.rows, h=np.abs(problem.rows.h)))
-    constraints = [] if soft else [{"type": "ineq", "fun": lambda x: problem.rows.h - problem.rows.G @ x}]
-    other = minimize(
-        lambda x: objective(problem, x), problem.stop, method="SLSQP", constraints=constraints,
-        bounds=list(zip(problem.lower, problem.upper, strict=True)), options={"ftol": 1e-14, "maxiter": 500},
-    )  # fmt: skip
-    answer = problem.solve()
-    assert objective(problem, answer.qd) <= other.fun + 1e-9
-    np.testing.assert_allclose(answer.qd, other.x, atol=2e-4)
-
-
-# what solvers get wrong
-
-
-def simple(G: np.ndarray | None = None, h: float = 0.0, soft: bool = False) -> Problem:
-    """Minimise |qd - 0.5|^2 / 2 over seven joints in [-1, 1]."""
-    rows = np.zeros((0, 7)) if G is None else np.atleast_2d(G)
-    return Problem(
-        Cost(np.eye(7), np.full(7, -0.5)), np.full(7, -1.0), np.full(7, 1.0),
-        ApproachRows(rows, np.full(len(rows), h), soft), np.full(7, 0.123),
-    )  # fmt: skip
-
-
-def assert_braking(answer: QpSolution, problem: Problem, outcome: QpOutcome) -> None:
-    assert answer.outcome is outcome
-    np.testing.assert_array_equal(answer.qd, problem.stop)
-    assert answer.multipliers.shape == (7 + len(problem.rows.h),)
-    assert np.all(np.isfinite(answer.multipliers))
-
-
-def test_hard_rows_against_the_box_brake():
-    problem = simple(np.eye(7)[0], -1.5)
-    answer = problem.solve()
-    assert_braking(answer, problem, QpOutcome.INFEASIBLE)
-    # the braking command misses the row by 0.123 + 1.5
-    np.testing.assert_allclose(answer.slack, [1.623])
-
-
-def test_a_row_no_joint_can_move_is_not_dropped_in_silence():
-    hard, soft = simple(np.zeros(7), -0.04), simple(np.zeros(7), -0.04, soft=True)
-    assert_braking(hard.solve(), hard, QpOutcome.INFEASIBLE)
-    answer = soft.solve()
-    np.testing.assert_allclose(answer.qd, 0.5)
-    np.testing.assert_allclose(answer.slack, [0.04])
-
-
-def test_a_box_without_width_is_answered():
-    problem = replace(simple(np.ones(7), 0.0, soft=True), lower=np.full(7, 0.3), upper=np.full(7, 0.3))
-    answer = problem.solve()
-    np.testing.assert_allclose(answer.qd, 0.3)
-    np.testing.assert_allclose(answer.slack, [2.1])
-
-
-def test_soft_rows_trade_against_the_task_by_numbers():
-    # one joint: 1/2 (x - 0.5)^2 + 1000 / 2 (x - 0.1)^2 is least at x = (0.5 + 1000 * 0.1) / 1001 = 0.1003996
-    answer = simple(np.eye(7)[0], 0.1, soft=True).solve()
-    assert answer.outcome is QpOutcome.SOLVED
-    np.testing.assert_allclose(answer.qd[0], 100.5 / 1001, rtol=1e-9)
-    np.testing.assert_allclose(answer.slack[0], 100.5 / 1001 - 0.1, rtol=1e-6)
-
-
-def test_repeated_rows_change_nothing():
-    once = simple(np.eye(7)[:1], 0.1).solve()
-    often = simple(np.tile(np.eye(7)[:1], (20, 1)), 0.1).solve()
-    np.testing.assert_allclose(often.qd, once.qd, atol=1e-12)
-
-
 def test_rows_that_were_violated_on_the_way_leave_no_rounding():
     # 300 heavy rows ask for the box's corner where the search begins, and none binds at the answer
-    rng = np.random.default_rng(1)
-    G, cost = rng.uniform(0.1, 1.0, (300, 7)), Cost(1e-3 * np.eye(7), np.full(7, 1e-3))
-    rows = ApproachRows(G, -0.05 * G.sum(axis=1), soft=True)
-    answer = solve(cost, np.full(7, -1.0), np.full(7, 1.0), rows, 8e5, np.zeros(7))
+    G, one = np.random.default_rng(1).uniform(0.1, 1.0, (300, 7)), np.ones(7)
+    answer = answered(Problem(1e-3 * np.eye(7), 1e-3 * one, -one, one, G, -0.05 * G.sum(axis=1), 8e5))
     np.testing.assert_allclose(answer.qd, -1.0, atol=1e-12)
     assert not answer.slack.any()
 
@@ -249,8 +131,8 @@ def test_an_answer_of_zero_on_bounds_and_rows_is_found(seed: int):
     rng = np.random.default_rng(seed)
     count = 4 if seed == 9219 else 2
     lower, upper = -rng.uniform(0, 0.3, 7) * (rng.random(7) < 0.6), rng.uniform(0.01, 0.3, 7) * (rng.random(7) < 0.7)
-    rows = ApproachRows(rng.uniform(-0.1, 0.5, (count, 7)), np.zeros(count), soft=True)
-    answer = solve(Cost(np.eye(7), np.zeros(7)), lower, upper + 1e-3, rows, 1e6, np.full(7, 1e-4))
+    G = rng.uniform(-0.1, 0.5, (count, 7))
+    answer = answered(Problem(np.eye(7), np.zeros(7), lower, upper + 1e-3, G, np.zeros(count), 1e6))
     assert answer.outcome is QpOutcome.SOLVED
     np.testing.assert_allclose(answer.qd, 0.0, atol=1e-12)
 
@@ -263,8 +145,8 @@ def test_rows_that_meet_in_the_answer_do_not_hold_it_up(seed: int):
     at = rng.integers(-2, 3, n) * 0.25
     G = rng.integers(-1, 2, (count, n)) * 0.5
     J = rng.integers(-1, 2, (3, n)).astype(float)
-    cost = Cost(J.T @ J + 1e-3 * np.eye(n), -J.T @ rng.integers(-1, 2, 3).astype(float))
-    problem = Problem(cost, np.full(n, -0.5), np.full(n, 0.5), ApproachRows(G, G @ at, soft=True), np.zeros(n))
-    answer = problem.solve()
+    H, f = J.T @ J + 1e-3 * np.eye(n), -J.T @ rng.integers(-1, 2, 3).astype(float)
+    problem = Problem(H, f, np.full(n, -0.5), np.full(n, 0.5), G, G @ at, WEIGHT)
+    answer = answered(problem)
     assert answer.outcome is QpOutcome.SOLVED
     assert kkt_residual(problem, answer.qd, answer.multipliers) <= 1e-8

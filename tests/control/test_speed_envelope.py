@@ -230,7 +230,8 @@ def test_the_box_is_sound_from_any_state(at: np.ndarray, fast: np.ndarray, perio
     # beyond what the envelope allows at once, only full braking is left, and it takes nothing the brakes cannot
     assert np.all(upper <= np.maximum(with_margin[0], qd - reach) + 1e-9)
     assert np.all(-lower <= np.maximum(with_margin[1], -qd - reach) + 1e-9)
-    assert np.all((without[0] <= lower) & (upper <= without[1]))
+    assert np.all((qd - reach <= without[0]) & (without[0] <= lower))
+    assert np.all((upper <= without[1]) & (without[1] <= qd + reach))
 
 
 # The limits of an arm
