@@ -8,7 +8,6 @@ import pytest
 from tests.control.motions import Mover
 from tests.following_arm import DT, Arm
 
-from pretouch.control.approach_restriction import ApproachRestriction
 from pretouch.control.braking import braking_cap
 from pretouch.control.interface import MotionRequest, Restricted
 from pretouch.control.joint_box import joint_limits
@@ -58,24 +57,12 @@ def run_into_a_wall(arm: Arm, cycles: int, ahead: float = 0.25) -> list[ControlS
     return steps
 
 
-def approach(arm: Arm, step: ControlStep, row: int = 0) -> float:
-    """Velocity [m/s] of the closest body point of a row towards its obstacle."""
-    o, m = step.obstacles, step.restricted[row]
+def approach(arm: Arm, step: ControlStep) -> float:
+    """Velocity [m/s] of the closest body point of the first row towards its obstacle."""
+    o, m = step.obstacles, step.restricted[0]
     kin = arm.model.kinematics(step.q)
     J = arm.model.jacobian(kin, int(o.link[m]), o.body_point[m])[:3]
     return float(o.direction[m] @ J @ step.command)
-
-
-def test_the_papers_profile_anticipates_nothing(panda_model: RobotModel, paper_skin: Skin):
-    paper = PROFILES["paper"]
-    assert paper.null_space is None
-    assert not paper.task.mid_joint_projected
-    arm = on_its_way(panda_model, paper_skin, paper)
-    mover = Mover(panda_model, arm.controller.limits, paper)
-    before = mover.state
-    request = MotionRequest(np.array([0.0, 0.3, 0.0]), np.eye(3))
-    mover.step(panda_model.kinematics(arm.q), arm.robot(), no_obstacles(), request)
-    assert mover.state is before
 
 
 def test_every_part_of_ours_can_be_left_out_alone():
@@ -125,16 +112,6 @@ def test_towards_a_wall_the_arm_keeps_the_braking_curve_and_comes_to_touch(panda
     assert len(steps) * DT < 0.9 + 1.6
 
 
-def test_the_command_keeps_the_acceleration_limits_whatever_a_unit_sees(panda_model: RobotModel, paper_skin: Skin):
-    arm, rng = on_its_way(panda_model, paper_skin), np.random.default_rng(1000)
-    last, most = arm.qd.copy(), panda_model.description.qdd_max * DT
-    for _ in range(200):
-        seen = {int(u): float(rng.uniform(0, 0.6)) for u in rng.permutation(7)[: rng.integers(0, 5)]}
-        step = arm.step(seen=seen)
-        assert np.all(np.abs(step.command - last) <= most + 1e-9)
-        last = step.command
-
-
 def test_when_sight_is_lost_the_arm_speeds_up_no_faster_than_rows_loosen(panda_model: RobotModel, paper_skin: Skin):
     arm = on_its_way(panda_model, paper_skin)
     steps = run_into_a_wall(arm, 100)
@@ -145,14 +122,6 @@ def test_when_sight_is_lost_the_arm_speeds_up_no_faster_than_rows_loosen(panda_m
         assert after - before < A.loosen_m_s2 * DT + 0.002
         before = after
     assert before > 0.25
-
-
-def test_a_missed_reading_changes_nothing_but_a_little(panda_model: RobotModel, paper_skin: Skin):
-    arm = on_its_way(panda_model, paper_skin)
-    steps = run_into_a_wall(arm, 70)
-    before = hand_speed(arm, steps[-1])[1]
-    lost = [hand_speed(arm, s)[1] for s in arm.run(10, silent={LEFT: 0.07})]
-    assert max(lost) - before < 10 * A.loosen_m_s2 * DT + 0.002
 
 
 def test_a_push_away_from_an_obstacle_is_followed_at_once(panda_model: RobotModel, paper_skin: Skin):
@@ -225,11 +194,3 @@ def test_joint_velocities_asked_for_are_the_answer_within_the_limits(panda_model
             MotionRequest(np.array([0.0, 0.3, 0.0]), np.eye(3), qd=wanted),
         )  # fmt: skip
         np.testing.assert_allclose(motion.qp.qd, wanted, atol=1e-12)
-
-
-def test_other_modes_rows_go_with_the_null_space_too(panda_model: RobotModel, paper_skin: Skin):
-    for other in (None, ApproachRestriction(rows="slack"), ApproachRestriction(rows="hard")):
-        arm = on_its_way(panda_model, paper_skin, replace(PRETOUCH, approach=other))
-        step = arm.run(5, seen={LEFT: 0.3})[-1]
-        assert len(step.restricted) == (other is not None)
-        assert np.isfinite(step.command).all()

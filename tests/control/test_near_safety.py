@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.control.motions import Mover
-from tests.control.test_near import LEFT, PRETOUCH, A, approach, hand_speed, on_its_way, to_wall
+from tests.control.test_near import LEFT, PRETOUCH, A, hand_speed, on_its_way, to_wall
 from tests.following_arm import DT, Arm
 
 from pretouch.control.braking import braking_cap
@@ -133,11 +133,3 @@ def test_in_any_posture_nothing_that_stands_is_met_faster_than_the_curve_allows(
             speed, before = near.direction[m] @ J @ command, near.direction[m] @ J @ qd
             assert speed <= max(cap, before) + TOLERANCE
         q, qd = np.clip(q + command * DT, limits.q_min, limits.q_max), command
-
-
-def test_what_the_row_of_the_wall_asks_for_is_what_the_hand_does(panda_model, paper_skin):
-    arm = on_its_way(panda_model, paper_skin)
-    y = wall_ahead(arm, 0.15)
-    for _ in range(60):
-        step = arm.step(seen={LEFT: to_wall(arm, y)})
-    assert approach(arm, step) <= step.approach_limit[0] + 0.003

@@ -76,27 +76,24 @@ def test_unusable_circles_are_refused(bad: dict):
         Circle(**bad)
 
 
-def test_on_the_path_the_task_runs_along_it():
-    velocity = follow(LINE, PathState(0.25, 0.2), np.array([0.4, 0.25, 0.5]), PARAMS).velocity
-    np.testing.assert_allclose(velocity, [0, -0.2, 0], atol=1e-12)
+SLOWED = 0.02 / np.hypot(0.01, 0.1)
 
 
-def test_beside_the_path_the_task_returns_by_numbers():
-    # 0.05 m off in z: forward 0.2 * (1 - 0.05 / 0.1) = 0.1, back 2 * 0.05 = 0.1
-    velocity = follow(LINE, PathState(0.25, 0.2), np.array([0.4, 0.25, 0.45]), PARAMS).velocity
-    np.testing.assert_allclose(velocity, [0, -0.1, 0.1], atol=1e-12)
-
-
-def test_the_way_back_is_no_faster_than_the_speed_allowed_by_now():
-    # the same with 0.02 m/s allowed: forward 0.02 * (1 - 0.05 / 0.1) = 0.01, back 0.1; clipped from 0.1005 to 0.02
-    velocity = follow(LINE, PathState(0.25, 0.02), np.array([0.4, 0.25, 0.45]), PARAMS).velocity
-    np.testing.assert_allclose(velocity, np.array([0, -0.01, 0.1]) * 0.02 / np.hypot(0.01, 0.1), atol=1e-12)
-    np.testing.assert_array_equal(follow(LINE, PathState(0.25, 0.0), np.array([0.4, 0.25, 0.45]), PARAMS).velocity, 0.0)
-
-
-def test_far_off_the_path_the_arm_only_returns_at_the_task_speed():
-    velocity = follow(LINE, PathState(0.25, 0.3), np.array([0.9, 0.25, 0.5]), PARAMS).velocity
-    np.testing.assert_allclose(velocity, [-0.3, 0, 0], atol=1e-12)
+@pytest.mark.parametrize(
+    ("speed", "position", "velocity"),
+    [
+        (0.2, (0.4, 0.25, 0.5), (0, -0.2, 0)),  # on the path
+        # 0.05 m beside it: forward 0.2 * (1 - 0.05 / 0.1) = 0.1, back 2 * 0.05 = 0.1
+        (0.2, (0.4, 0.25, 0.45), (0, -0.1, 0.1)),
+        # with 0.02 m/s allowed by now: forward 0.02 * (1 - 0.05 / 0.1) = 0.01, back 0.1; clipped from 0.1005 to 0.02
+        (0.02, (0.4, 0.25, 0.45), (0, -0.01 * SLOWED, 0.1 * SLOWED)),
+        (0.0, (0.4, 0.25, 0.45), (0, 0, 0)),
+        (0.3, (0.9, 0.25, 0.5), (-0.3, 0, 0)),  # far off it only returns, at the task's speed
+    ],
+)
+def test_along_and_back_to_the_path_by_numbers(speed: float, position: tuple, velocity: tuple):
+    found = follow(LINE, PathState(0.25, speed), np.array(position), PARAMS).velocity
+    np.testing.assert_allclose(found, velocity, atol=1e-12)
 
 
 @given(arrays(np.float64, 3, elements=st.floats(-2, 2)), st.floats(0, 10), st.floats(0, 0.3))
@@ -106,21 +103,20 @@ def test_the_task_is_never_faster_than_allowed_by_now(position: np.ndarray, phas
     assert np.linalg.norm(velocity) <= speed * (1 + 1e-12)
 
 
-def test_the_phase_moves_by_what_was_achieved_along_the_path():
-    # asked for 0.3 m/s along -y, the arm does 0.2 m/s for 0.01 s; the 0.5 m/s across do not count
-    after = advance(LINE, PathState(0.25, 0.3), LINE.point(0.25), np.array([0.5, -0.2, 0]))
-    np.testing.assert_allclose(after.phase, 0.252)
-
-
-def test_the_speed_grows_by_the_task_acceleration():
-    # 1 m/s^2 for 0.01 s
-    after = advance(LINE, PathState(0.25, 0.1), LINE.point(0.25), np.zeros(3))
-    np.testing.assert_allclose(after.speed, 0.11)
-
-
-def test_a_blocked_arm_stops_the_phase_and_never_turns_it_back():
-    for velocity in (np.zeros(3), np.array([0, 0.2, 0])):
-        assert advance(LINE, PathState(0.25, 0.1), LINE.point(0.25), velocity).phase == 0.25
+@pytest.mark.parametrize(
+    ("path", "phase", "velocity", "after"),
+    [
+        # asked for 0.3 m/s along -y, the arm does 0.2 m/s for 0.01 s; the 0.5 m/s across do not count
+        (LINE, 0.25, (0.5, -0.2, 0), 0.252),
+        (LINE, 0.25, (0, 0, 0), 0.25),  # blocked
+        (LINE, 0.25, (0, 0.2, 0), 0.25),  # and never back
+        (LINE, 0.9999, (0, -0.3, 0), 1.0),  # the end
+        (CIRCLE, CIRCLE.length, (0, 0, 0.3), CIRCLE.length + 0.003),  # has none
+    ],
+)
+def test_the_phase_moves_by_what_was_achieved_along_the_path(path: Path, phase: float, velocity: tuple, after: float):
+    found = advance(path, PathState(phase, 0.3), path.point(phase), np.array(velocity)).phase
+    assert found == pytest.approx(after, rel=1e-7, abs=0.0)
 
 
 def test_the_way_back_to_the_path_is_no_way_along_it_by_numbers():
@@ -130,17 +126,6 @@ def test_the_way_back_to_the_path_is_no_way_along_it_by_numbers():
     np.testing.assert_allclose(advance(LINE, state, behind, np.array([0, -0.2, 0])).phase, 0.251)
     # slowed to a half it does 0.1 m/s, 0.1 less than asked: all of that is catching up
     np.testing.assert_allclose(advance(LINE, state, behind, np.array([0, -0.1, 0])).phase, 0.25)
-
-
-def test_the_phase_of_an_open_path_stops_at_its_end():
-    after = advance(LINE, PathState(0.9999, 0.3), LINE.point(0.9999), np.array([0, -0.3, 0]))
-    assert after.phase == 1.0
-
-
-def test_the_phase_of_a_closed_path_goes_on():
-    start = CIRCLE.point(0.0)
-    after = advance(CIRCLE, PathState(CIRCLE.length, 0.3), start, np.array([0, 0, 0.3]))
-    np.testing.assert_allclose(after.phase, CIRCLE.length + 0.003)
 
 
 @pytest.mark.parametrize("path", [CIRCLE, line((0.0, 0.0, 0.0), (0.0, 9.0, 0.0))])

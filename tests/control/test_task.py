@@ -35,18 +35,3 @@ def test_rotation_error_is_axis_times_sine_in_the_base_frame(seed: int):
     angle = np.linalg.norm(turn)
     expected = turn / angle * np.sin(angle)
     np.testing.assert_allclose(rotation_error(rotation.as_matrix(), goal.as_matrix()), expected, atol=1e-12)
-
-
-@pytest.mark.parametrize("seed", range(20))
-def test_rotation_error_is_half_the_sum_of_the_cross_products_of_the_axes(seed: int):
-    rotation, goal = Rotation.random(2, np.random.default_rng(seed)).as_matrix()
-    expected = 0.5 * np.cross(rotation.T, goal.T).sum(axis=0)
-    np.testing.assert_allclose(rotation_error(rotation, goal), expected, atol=1e-12)
-
-
-def test_turning_with_the_error_reaches_the_goal():
-    rotation, goal = Rotation.from_euler("xyz", [0.5, -0.8, 0.3]), Rotation.from_euler("xyz", [-0.2, 0.4, 0.1])
-    for _ in range(1000):
-        error = rotation_error(rotation.as_matrix(), goal.as_matrix())
-        rotation = Rotation.from_rotvec(0.01 * error) * rotation
-    assert (goal * rotation.inv()).magnitude() < 1e-3

@@ -77,9 +77,3 @@ def test_a_point_that_cannot_move_has_infinite_mass(panda_model: RobotModel):
     L = np.empty((7, 7))
     assert factor(panda_model.mass_matrix(panda_model.description.q_ready), L)
     assert mass_along(L, np.zeros(7)) == np.inf
-
-
-def test_the_mass_matrix_is_that_of_the_whole_dynamics(panda_model: RobotModel):
-    q = panda_model.description.q_ready
-    whole = panda_model.dynamics(q, np.zeros(7)).mass_matrix  # MuJoCo's
-    np.testing.assert_allclose(panda_model.mass_matrix(q), whole, rtol=0, atol=1e-12)
