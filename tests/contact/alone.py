@@ -13,7 +13,7 @@ from pretouch.groups import Kinematics
 from pretouch.profiles import Profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.types import Obstacles, RobotState, TouchReadings
+from pretouch.types import FloatArray, Obstacles, RobotState, TouchReadings
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,19 @@ def sample(
     return Sample(now, kin, robot, window_init(2), True, near, touches=touches)
 
 
-def standing(model: RobotModel, stamp: float = 0.0) -> RobotState:
-    """The arm at rest in its ready posture, with nothing felt."""
+def standing(
+    model: RobotModel, tau_ext: FloatArray | None = None, wrench: FloatArray | None = None, stamp: float = 0.0
+) -> RobotState:
+    """The arm at rest in its ready posture, with these torques [Nm] and wrench [N, Nm], else with nothing felt."""
     q, still = model.description.q_ready, np.zeros(model.n)
-    return RobotState(stamp, q, still, q, still, still, np.zeros(6))
+    return RobotState(
+        stamp, q, still, q, still, still if tau_ext is None else tau_ext, np.zeros(6) if wrench is None else wrench
+    )
+
+
+def something(link: int, at: FloatArray, away: FloatArray, distance: float, ee_distance: float) -> Obstacles:
+    """One object so far from a place (3,) of a link's surface [m], in a direction (3,) away from it."""
+    return Obstacles(
+        np.zeros(1, np.int64), (at + distance * away)[None], np.array([ee_distance]), at[None], np.array([link]),
+        away[None], np.array([distance]), np.zeros(1),
+    )  # fmt: skip

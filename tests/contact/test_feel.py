@@ -1,6 +1,7 @@
 """Detection by each method through its one entry: what is felt, what is learnt and when, and which way the force is."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -8,38 +9,26 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from tests.contact.alone import begun as feel_init
-from tests.contact.alone import feel
+from tests.contact.alone import feel, something, standing
 
+from pretouch.perception.closest import no_obstacles
 from pretouch.profiles import profile
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
-from pretouch.types import Obstacles, RobotState
+from pretouch.types import Obstacles
 
 MODEL = RobotModel(panda())
-Q = MODEL.description.q_ready
-KIN = MODEL.kinematics(Q)
+KIN = MODEL.kinematics(MODEL.description.q_ready)
 PRETOUCH = profile("pretouch:window.samples=10")
 UNPLACED = replace(PRETOUCH, detect=replace(PRETOUCH.detect, localise=None))
 STILL = np.zeros(7)
-
-
-def robot(tau_ext: np.ndarray, wrench: np.ndarray | None = None) -> RobotState:
-    return RobotState(0.0, Q, STILL, Q, STILL, tau_ext, np.zeros(6) if wrench is None else wrench)
+NOTHING = no_obstacles()
+robot = partial(standing, MODEL)
 
 
 def object_at(distance: float, direction: np.ndarray) -> Obstacles:
     """One object near the hand's origin, in a direction from it."""
-    at = KIN.position[MODEL.ee]
-    return Obstacles(
-        np.zeros(1, np.int64), (at + distance * direction)[None], np.array([distance]), at[None],
-        np.array([MODEL.ee]), direction[None], np.array([distance]), np.zeros(1),
-    )  # fmt: skip
-
-
-NOTHING = Obstacles(
-    np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros((0, 3)),
-    np.zeros(0), np.zeros(0),
-)  # fmt: skip
+    return something(MODEL.ee, KIN.position[MODEL.ee], direction, distance, distance)
 
 
 def noise(samples: int, seed: int = 1) -> np.ndarray:
@@ -181,12 +170,3 @@ def test_the_place_of_a_push_is_told_and_changes_nothing_else_that_is_felt():
     found, one = feel(one, MODEL, KIN, robot(np.full(7, np.nan)), NOTHING, False, PRETOUCH)
     assert not len(found.touched.link)
     assert one.state.localisation.steps == 0
-
-
-@pytest.mark.parametrize("name", ["paper", "blind"])
-def test_profiles_that_do_not_localise_say_nothing_of_places(name):
-    found, state = feel(
-        feel_init(MODEL, profile(name)), MODEL, KIN, robot(np.full(7, 30.0)), NOTHING, False, profile(name)
-    )
-    assert not len(found.touched.link)
-    assert state.state is None
