@@ -1,5 +1,7 @@
 """From a force sample to a contact: arming, filtered against raw, the help of proximity, and a missing estimate."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ from pretouch.contact.detector import Detection
 from pretouch.contact.moving_thresholds import MovingThresholds
 from pretouch.contact.window import WindowState, add_force, window_init
 from pretouch.params import WindowParams
+from pretouch.perception.closest import no_obstacles
 from pretouch.types import Obstacles
 
 EE = np.array([0.5, 0.0, 0.3])
@@ -15,11 +18,8 @@ PUSH = np.array([0.0, -50.0, 0.0])
 
 def points(*at: tuple[float, float, float]) -> Obstacles:
     """Sensed points; what belongs to the body plays no part in detection."""
-    p, k = np.array(at).reshape(-1, 3), len(at)
-    zero = np.zeros((k, 3))
-    return Obstacles(
-        np.arange(k), p, np.linalg.norm(p - EE, axis=1), zero, np.zeros(k, np.int64), zero, np.zeros(k), np.zeros(k)
-    )  # fmt: skip
+    p = np.array(at).reshape(-1, 3)
+    return replace(no_obstacles(), point=p, ee_distance=np.linalg.norm(p - EE, axis=1))
 
 
 def detect(
@@ -91,8 +91,3 @@ def test_without_an_estimate_the_window_waits():
     assert after is state
     assert detection.contact is None
     assert detection.armed
-
-
-def test_every_crossed_axis_is_named():
-    found = push(MovingThresholds(compare="raw"), points(), 1, np.array([30.0, -30.0, 2.0]))
-    assert found[0].contact.axes.tolist() == [True, True, False]

@@ -39,20 +39,13 @@ def residuals(model: RobotModel, tau_ext: np.ndarray, duration: float, gain: flo
     return np.array(seen)
 
 
-def test_residual_becomes_the_external_torque(panda_model: RobotModel):
-    # after 8 time constants exp(-8) = 0.03 % is missing; what the moving arm adds is the error of one step
-    np.testing.assert_allclose(residuals(panda_model, TAU_EXT, 8 / GAIN)[-1], TAU_EXT, rtol=0.02, atol=0.02)
-
-
 def test_residual_rises_with_time_constant_one_over_gain(panda_model: RobotModel):
-    seen = residuals(panda_model, TAU_EXT, 2 / GAIN)
+    seen = residuals(panda_model, TAU_EXT, 8 / GAIN)
     for constants in (1, 2):
         share = seen[round(constants / GAIN / DT) - 1] / TAU_EXT
         np.testing.assert_allclose(share, 1 - np.exp(-constants), atol=0.03)
-
-
-def test_without_contact_a_moving_arm_shows_nothing(panda_model: RobotModel):
-    assert np.abs(residuals(panda_model, np.zeros(7), 0.2)).max() < 0.02
+    # after 8 time constants exp(-8) = 0.03 % is missing; what the moving arm adds is the error of one step
+    np.testing.assert_allclose(seen[-1], TAU_EXT, rtol=0.02, atol=0.02)
 
 
 def test_any_gain_is_stable(panda_model: RobotModel):
@@ -71,26 +64,6 @@ def test_a_known_wrench_is_recovered_with_its_sign(panda_model: RobotModel, axis
     wrench = wrench_from_torques(jacobian, jacobian.T @ force, damping=1e-3, smallest_singular_value=0.01)
     assert wrench is not None
     np.testing.assert_allclose(wrench, force, atol=0.01)
-
-
-def test_a_push_by_the_environment_reads_as_a_force_along_its_motion(panda_model: RobotModel):
-    # the torques that do work while the hand yields towards +y are those of a force towards +y: power = F . v
-    q = panda_model.description.q_ready
-    jacobian = panda_model.ee_jacobian(panda_model.kinematics(q))
-    yielding = np.linalg.pinv(jacobian) @ np.array([0.0, 0.1, 0.0, 0.0, 0.0, 0.0])
-    wrench = wrench_from_torques(jacobian, 40.0 * yielding, damping=1e-3, smallest_singular_value=0.01)
-    assert wrench is not None
-    assert wrench[1] > 0
-
-
-def test_damping_shrinks_the_wrench(panda_model: RobotModel):
-    jacobian = panda_model.ee_jacobian(panda_model.kinematics(panda_model.description.q_ready))
-    tau = jacobian.T @ np.array([10.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-    damped = wrench_from_torques(jacobian, tau, 0.5, 0.01)
-    exact = wrench_from_torques(jacobian, tau, 0.0, 0.01)
-    assert damped is not None
-    assert exact is not None
-    assert np.linalg.norm(damped) < np.linalg.norm(exact)
 
 
 def test_there_is_no_estimate_near_a_singularity(panda_model: RobotModel):

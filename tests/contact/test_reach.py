@@ -22,14 +22,6 @@ def ends(model: RobotModel, q):
     return axis_ends(model.body, model.kinematics(q))
 
 
-def test_the_ends_are_those_of_the_capsules(panda_model: RobotModel):
-    q, body = panda_model.description.q_ready, panda_model.body
-    kin, found = panda_model.kinematics(q), ends(panda_model, q)
-    for c, link in enumerate(body.link):
-        for i, end in enumerate((body.a[c], body.b[c])):
-            np.testing.assert_allclose(found[c, i], kin.rotation[link] @ end + kin.position[link])
-
-
 def test_where_the_contact_began_nothing_is_slower(panda_model: RobotModel):
     q = panda_model.description.q_ready
     velocity, moved = slowed(panda_model, q, TURN, ends(panda_model, q))

@@ -1,6 +1,7 @@
 """Eq. 12 by numbers: the arm moves the way it was pushed, not too fast, and for a while."""
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -9,20 +10,18 @@ from pretouch.contact.admittance import Admittance
 from pretouch.contact.decaying_velocity import DecayingVelocity, advanced, decayed, reaction_velocity
 
 
-def test_eq_12_by_numbers():
-    force = np.array([1.5, -10.0, 0.0])
-    # C = 0.02: 0.02 * 1.5 = 0.03, 0.02 * -10 = -0.2
-    np.testing.assert_allclose(reaction_velocity(force, 0.02, 0.3), [0.03, -0.2, 0.0])
-
-
-def test_the_norm_is_clipped_not_the_axes():
-    # 0.03 * (30, 40, 0) = (0.9, 1.2, 0), norm 1.5; scaled by 0.3 / 1.5 = 0.2
-    velocity = reaction_velocity(np.array([30.0, 40.0, 0.0]), 0.03, 0.3)
-    np.testing.assert_allclose(velocity, [0.18, 0.24, 0.0])
-
-
-def test_no_force_moves_nothing():
-    np.testing.assert_array_equal(reaction_velocity(np.zeros(3), 0.03, 0.3), 0.0)
+@pytest.mark.parametrize(
+    ("force", "compliance", "velocity"),
+    [
+        # C = 0.02: 0.02 * 1.5 = 0.03, 0.02 * -10 = -0.2
+        ((1.5, -10.0, 0.0), 0.02, (0.03, -0.2, 0.0)),
+        # not the axes are clipped, but the norm: 0.03 * (30, 40, 0) = (0.9, 1.2, 0), norm 1.5; scaled by 0.3 / 1.5
+        ((30.0, 40.0, 0.0), 0.03, (0.18, 0.24, 0.0)),
+        ((0.0, 0.0, 0.0), 0.03, (0.0, 0.0, 0.0)),
+    ],
+)
+def test_eq_12_by_numbers(force: tuple, compliance: float, velocity: tuple):
+    np.testing.assert_allclose(reaction_velocity(np.array(force), compliance, 0.3), velocity)
 
 
 def test_decay_is_linear_and_ends():
@@ -36,12 +35,6 @@ def test_decay_is_linear_and_ends():
     # 0.02 * 10 = 0.2 m/s, then a quarter less each cycle
     np.testing.assert_allclose(speeds, [0.2, 0.15, 0.1, 0.05, 0.0, 0.0])
     assert active == [True, True, True, True, False, False]
-
-
-def test_before_any_contact_there_is_no_reaction():
-    part = DecayingVelocity()
-    assert not part.active(part.rest())
-    np.testing.assert_array_equal(decayed(part.rest(), part.decay_cycles), 0.0)
 
 
 def test_without_an_arm_an_answer_lasts_as_long_as_the_reaction_or_that_of_the_paper():

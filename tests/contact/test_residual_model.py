@@ -62,20 +62,14 @@ def test_the_covariance_stays_between_nothing_and_the_prior_whatever_is_excited(
     assert np.linalg.eigvalsh(np.diag(prior) - C).min() > -1e-9
 
 
-def test_features_of_gravity_are_the_gravity_torques_of_the_model(panda_model):
-    q = panda_model.description.q_ready + 0.1
-    x = features(panda_model, panda_model.kinematics(q), np.zeros(7), np.zeros(7))
+def test_features_of_gravity_are_the_gravity_torques_of_the_model_and_that_of_a_load_has_its_inertia(panda_model):
+    q, growth = panda_model.description.q_ready + 0.1, np.linspace(-3.0, 4.0, 7)
+    kin = panda_model.kinematics(q)
+    x = features(panda_model, kin, np.zeros(7), np.zeros(7))
     gravity = panda_model.dynamics(q, np.zeros(7)).gravity
     # the torque that holds the arm is the opposite of what gravity does, summed over all links
     assert_allclose(x[:, PLAIN : PLAIN + 7].sum(axis=1), -gravity, atol=1e-9)
-    J = panda_model.ee_jacobian(panda_model.kinematics(q))
-    assert_allclose(x[:, -1], J[:3].T @ np.array([0.0, 0.0, -9.81]), atol=1e-12)
-
-
-def test_the_feature_of_a_load_has_its_inertia(panda_model):
-    q, growth = panda_model.description.q_ready + 0.1, np.linspace(-3.0, 4.0, 7)
-    x = features(panda_model, panda_model.kinematics(q), np.zeros(7), growth)
-    J = panda_model.ee_jacobian(panda_model.kinematics(q))[:3]
+    J, x = panda_model.ee_jacobian(kin)[:3], features(panda_model, kin, np.zeros(7), growth)
     assert_allclose(x[:, -1], J.T @ (np.array([0.0, 0.0, -9.81]) - J @ growth), atol=1e-12)
 
 

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from tests.contact.alone import begun as feel_init
-from tests.contact.alone import feel, sample, standing
+from tests.contact.alone import feel, sample, something, standing
 
 from pretouch.contact.alarm_level import earned_level, level_init
-from pretouch.contact.cues import Cues, no_cues
+from pretouch.contact.cues import Cues, no_cues, together
 from pretouch.contact.detector import Body
 from pretouch.contact.sequential import alarm_bound
 from pretouch.contact.tactile import TouchSensors, gain_of, surface_area
@@ -20,7 +20,7 @@ from pretouch.robot.body import Capsules
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import TouchPatch
-from pretouch.types import Obstacles, RobotState, TouchReadings, TouchStatus
+from pretouch.types import TouchReadings, TouchStatus
 
 (P,) = profile("pretouch").detect.cues
 PERIOD = 0.01
@@ -152,25 +152,34 @@ def test_a_sensor_that_is_stuck_is_believed_for_ten_seconds_and_comes_back_slowl
     assert len(cues.link) == 1
 
 
-def test_a_touch_counts_for_an_object_that_is_seen_at_its_link_as_well(panda_model, paper_skin):
-    q, still = panda_model.description.q_ready, np.zeros(panda_model.n)
-    kin, link = panda_model.kinematics(q), panda_model.link_index("panda_link5")
+def test_a_cue_counts_for_an_object_that_is_seen_at_its_link_as_well_and_no_cue_changes_no_bit(panda_model):
+    kin, link = panda_model.kinematics(panda_model.description.q_ready), panda_model.link_index("panda_link5")
     at, away = kin.position[link], np.array([0.0, 1.0, 0.0])
-    seen = Obstacles(
-        np.array([0]), (at + 0.01 * away)[None], np.array([0.5]), at[None], np.array([link]), away[None],
-        np.array([0.01]), np.zeros(1),
-    )  # fmt: skip
     torque = np.asarray(panda_model.jacobian(kin, link, at)[:3].T @ (-9.0 * away))
-    gain = np.ones(len(panda_model.links))
+    quiet = no_cues(len(panda_model.links))
+    gain = quiet.gain.copy()
     gain[link] = 50.0
     ours, evidence = profile("pretouch"), []
-    for cues in (None, replace(no_cues(len(gain)), gain=gain)):
+    for cues in (None, quiet, replace(quiet, gain=gain)):
         state = feel_init(panda_model, ours)
         for k in range(5):
-            robot = RobotState(0.02 * k, q, still, q, still, torque, np.zeros(6))
+            robot, seen = standing(panda_model, torque, stamp=0.02 * k), something(link, at, away, 0.01, 0.5)
             felt, state = feel(state, panda_model, kin, robot, seen, False, ours, True, cues)
         evidence.append(felt.evidence)
+    assert evidence[0] == evidence[1]
     # fifty times the prior of what says most: ln 50 in units of ln A, but for what the other hypotheses add
     bound = alarm_bound(ours.detect, ours.task.control_period_s)
     gained = np.log(50.0) / earned_level(level_init()[1], bound, ours.detect.slack_nats, np.exp(-bound))
-    assert 0.8 * gained < evidence[1] - evidence[0] <= gained * (1 + 1e-9)
+    assert 0.8 * gained < evidence[2] - evidence[1] <= gained * (1 + 1e-9)
+
+
+def test_gains_multiply_and_places_add_up():
+    one = Cues(np.array([1.0, 2.0, 3.0]), np.array([1]), np.array([[0.1, 0.2, 0.3]]), np.array([0.01]), np.array([4.0]))
+    two = Cues(np.array([1.0, 5.0, 0.5]), np.array([2]), np.array([[0.4, 0.5, 0.6]]), np.array([0.02]), np.array([7.0]))
+    both = together(one, no_cues(3), two)
+    assert both.gain == pytest.approx([1.0, 10.0, 1.5])
+    assert both.link.tolist() == [1, 2]
+    assert both.point.tolist() == [[0.1, 0.2, 0.3], [0.4, 0.5, 0.6]]
+    assert both.sigma.tolist() == [0.01, 0.02]
+    assert both.force.tolist() == [4.0, 7.0]
+    assert together(one) is one
