@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pretouch.contact.clamp import clamp_init, clamped, opened
+from pretouch.contact.clamp import caught_between, clamp_begun, clamp_init, clamped, gone, opened
 from pretouch.params import ClampParams
 
 P = ClampParams()
@@ -94,3 +94,34 @@ def test_it_does_not_open_into_what_pushes_it():
         assert not state.open, i
         _, state = opened(state, 12.0 * WAY, q, DT, P)
     assert state.open
+
+
+# the way out of what is caught between two links
+
+
+def come(cycles: int = 60):
+    """The state of an arm that has turned a joint by 0.01 rad in each cycle, and where it is."""
+    state = clamp_init(Q)
+    for k in range(cycles):
+        state = gone(state, 0.01 * (k + 1) * WAY, DT)
+    return state, 0.01 * cycles * WAY
+
+
+def test_the_arm_opens_the_way_it_came_and_does_not_close_again_what_has_been_opened_already():
+    before, q = come()
+    begun = caught_between(clamp_begun(before, q, 1.0 * WAY), "one and other", 50.0, 6.0 * WAY)
+    # where it was caught, and four places of the way farther back
+    for at in (q, q - 0.22 * WAY):
+        way, state = opened(begun, -6.0 * WAY, at, DT, P)
+        assert way @ WAY < 0.0
+        assert way - (way @ WAY) * WAY == pytest.approx(np.zeros(N))
+        assert not state.open
+    beyond, state = opened(state, -6.0 * WAY, -1.0 * WAY, DT, P)
+    assert beyond == pytest.approx(np.zeros(N))
+    assert state.open
+
+
+def test_the_way_begins_anew_where_the_arm_has_been_moved():
+    before, q = come()
+    moved = gone(before, q + 0.5 * ASIDE, DT)
+    assert np.all(moved.path == q + 0.5 * ASIDE)

@@ -4,9 +4,12 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.stats import multivariate_normal, multivariate_t
 
+from pretouch.contact.hypotheses import nearest_of, nearness
 from pretouch.contact.sequential import Hypotheses, alarm_bound, explained_by_force, judge, log_ratio
 from pretouch.contact.window_scatter import LENGTHS, LONGEST, white_means, window_means
 from pretouch.params import SequentialParams
@@ -128,3 +131,24 @@ def test_an_outlier_of_one_sample_is_less_to_a_test_with_heavy_tails():
         for tails in (5.0, 1e3)
     )
     assert heavy < 0.3 * light
+
+
+# How much nearness raises the prior
+
+
+def test_nearness_by_numbers():
+    assert nearness(0.25, 0.0, 0.25, 0.2) == 0.0
+    assert nearness(0.125, 0.0, 0.25, 0.2) == pytest.approx(0.5)
+    # at 0.5 m/s it is 0.1 m nearer in 0.2 s
+    assert nearness(0.225, 0.5, 0.25, 0.2) == pytest.approx(0.5)
+    assert nearness(-0.02, 0.0, 0.25, 0.2) == 1.0
+
+
+@given(st.floats(-0.1, 5.0), st.floats(-3.0, 3.0))
+def test_nearness_is_bounded_and_going_away_never_lowers_it_below_standing(distance, closing):
+    found = nearness(distance, closing, 0.25, 0.2)
+    assert nearness(distance, 0.0, 0.25, 0.2) <= found <= 1.0
+
+
+def test_the_nearest_objects_count():
+    assert nearest_of(np.array([0.3, 0.1, 0.2]), 2).tolist() == [1, 2]

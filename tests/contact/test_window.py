@@ -1,31 +1,29 @@
 """Eq. 8, and running statistics against NumPy's on the same values."""
 
 from collections import deque
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from hypothesis.extra.numpy import arrays
 
 from pretouch.contact.window import WindowState, add_force, weighted_value, window_init
 from pretouch.params import WindowParams
 
-ALPHA, LAMBDA = 0.1, 0.75  # Table I
+P = WindowParams()  # Table I: alpha 0.1, lambda 0.75
 
 
-def filled(values: list[float], alpha: float = ALPHA) -> WindowState:
+def filled(values: list[float]) -> WindowState:
     """A window as large as the values, the same on all three axes."""
     state = window_init(len(values))
     for value in values:
-        state = add_force(state, np.full(3, value), WindowParams(alpha=alpha, lambda_=LAMBDA))
+        state = add_force(state, np.full(3, value), P)
     return state
 
 
 def test_eq_8_by_numbers():
     # mu = 0, sigma = 4, so |x| > 0.75 * 4 = 3 is an outlier; x_{t-1} = 2
     reading, last = np.array([10.0, 1.0, -10.0]), np.full(3, 2.0)
-    value = weighted_value(reading, last, np.zeros(3), np.full(3, 4.0), ALPHA, LAMBDA)
+    value = weighted_value(reading, last, np.zeros(3), np.full(3, 4.0), P.alpha, P.lambda_)
     # 0.1 * 10 + 0.9 * 2 = 2.8;   1 as it is;   0.1 * -10 + 0.9 * 2 = 0.8
     np.testing.assert_allclose(value, [2.8, 1.0, 0.8], rtol=1e-15)
 
@@ -33,7 +31,7 @@ def test_eq_8_by_numbers():
 def test_a_reading_on_the_bound_is_no_outlier():
     # lambda sigma = 0.75 * 4 = 3 exactly: eq. 8 has ">", not ">="; 3.001 counts with its tenth
     reading = np.array([3.0, -3.0, 3.001])
-    value = weighted_value(reading, np.zeros(3), np.zeros(3), np.full(3, 4.0), ALPHA, LAMBDA)
+    value = weighted_value(reading, np.zeros(3), np.zeros(3), np.full(3, 4.0), P.alpha, P.lambda_)
     np.testing.assert_allclose(value, [3.0, -3.0, 0.3001], rtol=1e-12)
 
 
@@ -45,21 +43,14 @@ def test_raw_samples_fill_the_window_however_wild():
 
 def test_a_full_window_filters_with_its_last_statistics_and_its_last_value():
     state = filled([0.0, 0.0, 0.0, 0.0])
-    state = add_force(state, np.full(3, 5.0), WindowParams(alpha=ALPHA, lambda_=LAMBDA))
+    state = add_force(state, np.full(3, 5.0), P)
     # sigma = 0, so 5 is an outlier: 0.1 * 5 + 0.9 * 0 = 0.5
     np.testing.assert_allclose(state.newest, 0.5)
-    state = add_force(state, np.full(3, 5.0), WindowParams(alpha=ALPHA, lambda_=LAMBDA))
+    state = add_force(state, np.full(3, 5.0), P)
     # window 0, 0, 0, 0.5: mu = 0.125, sigma = 0.25, |5 - 0.125| > 0.1875; x_{t-1} is the 0.5 that was added, not 5:
     # 0.1 * 5 + 0.9 * 0.5 = 0.95
     np.testing.assert_allclose(state.newest, 0.95)
     np.testing.assert_allclose(np.sort(state.ring[:, 1]), [0.0, 0.0, 0.5, 0.95])
-
-
-def test_the_oldest_value_leaves():
-    state = filled([1.0, 2.0, 3.0], alpha=1.0)
-    state = add_force(state, np.full(3, 4.0), WindowParams(alpha=1.0, lambda_=LAMBDA))
-    np.testing.assert_array_equal(np.sort(state.ring[:, 0]), [2.0, 3.0, 4.0])
-    np.testing.assert_allclose(state.mean(), 3.0)
 
 
 @pytest.mark.parametrize("samples", [2, 7, 100])
@@ -70,7 +61,7 @@ def test_statistics_equal_numpy_over_thousands_of_samples(samples: int, offset: 
     for i in range(3000):
         # phases of noise, of none, and single wild values
         scale = (3.0, 0.0, 50.0 if i % 17 == 0 else 0.01)[i // 500 % 3]
-        state = add_force(state, offset + scale * rng.standard_normal(3), WindowParams(alpha=ALPHA, lambda_=LAMBDA))
+        state = add_force(state, offset + scale * rng.standard_normal(3), P)
         ring.append(state.newest)
         np.testing.assert_allclose(state.mean(), np.mean(ring, axis=0), atol=1e-10)
         if len(ring) > 1:
@@ -80,32 +71,11 @@ def test_statistics_equal_numpy_over_thousands_of_samples(samples: int, offset: 
 def test_a_step_of_the_signal_leaves_no_lasting_error():
     state = window_init(50)
     for i in range(500):
-        state = add_force(state, np.full(3, 0.1 if i < 130 else 12345.678), WindowParams(alpha=1.0, lambda_=LAMBDA))
+        state = add_force(state, np.full(3, 0.1 if i < 130 else 12345.678), replace(P, alpha=1.0))
         values = state.ring[: state.count]
         np.testing.assert_allclose(state.mean(), values.mean(axis=0), atol=1e-9)
     # the window holds equal values only: its deviation is exactly zero, so eq. 10 adds nothing
     np.testing.assert_array_equal(state.std(), 0.0)
-
-
-@given(arrays(np.float64, st.tuples(st.integers(1, 40), st.just(3)), elements=st.floats(-1e3, 1e3)))
-@settings(deadline=None, derandomize=True, max_examples=150)
-def test_statistics_equal_numpy_for_any_values(values: np.ndarray):
-    state = window_init(8)
-    for value in values:
-        state = add_force(state, value, WindowParams(alpha=ALPHA, lambda_=LAMBDA))
-    held = state.ring[: state.count]
-    np.testing.assert_allclose(state.mean(), held.mean(axis=0), atol=1e-9)
-    expected = held.std(axis=0, ddof=1) if len(held) > 1 else np.zeros(3)
-    # rounding of sums of squares up to 8 * (2e3)^2 = 3e7 leaves 1e-8 in the variance, 1e-4 in its root
-    np.testing.assert_allclose(state.std(), expected, atol=1e-4)
-
-
-def test_constant_force_has_no_deviation_and_every_change_is_an_outlier():
-    state = filled([-7.3] * 20)
-    np.testing.assert_array_equal(state.std(), 0.0)
-    np.testing.assert_array_equal(state.mean(), -7.3)
-    changed = add_force(state, np.full(3, -7.2), WindowParams(alpha=ALPHA, lambda_=LAMBDA)).newest
-    np.testing.assert_allclose(changed, 0.1 * -7.2 + 0.9 * -7.3)
 
 
 def test_empty_and_single():
@@ -113,14 +83,6 @@ def test_empty_and_single():
     np.testing.assert_array_equal(empty.mean(), 0.0)
     np.testing.assert_array_equal(empty.std(), 0.0)
     assert not empty.full
-    one = add_force(empty, np.array([1.0, 2.0, 3.0]), WindowParams(alpha=ALPHA, lambda_=LAMBDA))
+    one = add_force(empty, np.array([1.0, 2.0, 3.0]), P)
     np.testing.assert_array_equal(one.mean(), [1.0, 2.0, 3.0])
     np.testing.assert_array_equal(one.std(), 0.0)
-
-
-def test_adding_leaves_the_old_state_alone():
-    state = filled([1.0, 2.0, 3.0])
-    before = state.ring.copy()
-    add_force(state, np.full(3, 9.0), WindowParams(alpha=ALPHA, lambda_=LAMBDA))
-    np.testing.assert_array_equal(state.ring, before)
-    np.testing.assert_array_equal(state.newest, 3.0)
