@@ -22,8 +22,8 @@ import pytest
 from tests.needs import skip_for
 from tests.ports import loopback
 
-from pretouch.robot.description import fr3, panda
 from pretouch.robot.model import RobotModel
+from pretouch.robot.named import robot_named
 from pretouch.sim.scene import SceneSpec
 from pretouch_fci.arm import ArmSetup, ServedArm
 from pretouch_fci.options import ServeOptions
@@ -32,6 +32,20 @@ from pretouch_fci.wire import CONNECT, ERRORS, HEADER, PROTOCOLS, Protocol, Robo
 
 _VENDOR = Path(__file__).with_name("vendor_client.py")
 _PATIENCE_S = 10.0
+_FIELDS = {0: "q_c", 1: "dq_c", 2: "O_T_EE_c", 3: "O_dP_EE_c"}
+"""What is commanded, by motion generator."""
+
+
+def smooth(k: int, of: int) -> float:
+    """Share of its way of a motion from rest to rest after so many of its milliseconds."""
+    return k / of - np.sin(2 * np.pi * k / of) / (2 * np.pi)
+
+
+def arm_of(kind: RobotKind = "panda", **setup: Any) -> ServedArm:
+    """An arm that stands at its usual posture, in an empty scene."""
+    model = RobotModel(robot_named(kind))
+    usual = {"model": model, "kind": kind, "q": model.description.q_ready.copy(), "scene": SceneSpec()}
+    return ServedArm(ArmSetup(**usual | setup))
 
 
 @pytest.fixture
@@ -66,6 +80,10 @@ class Served:
     def protocol(self) -> Protocol:
         return self.server.protocol
 
+    @property
+    def address(self) -> tuple[str, int]:
+        return self.server.address
+
     def ask(self, what: str, *values: float, kind: str = "") -> dict[str, Any]:
         """Have a vendor's client do something (see `vendor_client.py`)."""
         name = "pylibfranka" if (kind or self.arm.kind) == "fr3" else "panda_py"
@@ -86,9 +104,7 @@ def serve(host: str) -> Iterator[Serve]:
     running: list[Served] = []
 
     def start(kind: RobotKind = "panda", setup: dict[str, Any] | None = None, **options: Any) -> Served:
-        model = RobotModel(panda() if kind == "panda" else fr3())
-        arm = ServedArm(ArmSetup(**{"model": model, "kind": kind, "q": model.description.q_ready.copy(),
-                                    "scene": SceneSpec(), **(setup or {})}))  # fmt: skip
+        arm = arm_of(kind, **(setup or {}))
         given = ServeOptions(**{"host": host, "lockstep": True, "patience_s": 5.0, **options})
         served = Served(arm, None, host)  # type: ignore[arg-type]
 
@@ -109,12 +125,12 @@ def serve(host: str) -> Iterator[Serve]:
 class RawClient:
     """A client that speaks bytes."""
 
-    def __init__(self, served: Served) -> None:
-        self.served, self.protocol = served, served.protocol
+    def __init__(self, protocol: Protocol, address: tuple[str, int]) -> None:
+        self.protocol, self.field = protocol, "q_c"
         self.udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.udp.bind(("127.0.0.1", 0))
         self.udp.settimeout(_PATIENCE_S)
-        self.tcp = socket.create_connection(served.server.address, timeout=_PATIENCE_S)
+        self.tcp = socket.create_connection(address, timeout=_PATIENCE_S)
         self._identifiers = itertools.count(1)
         self.robot_udp: Any = None
         self.connected = b""
@@ -140,7 +156,13 @@ class RawClient:
     def begin(self, controller: int = 0, generator: int = 1) -> str:
         body = struct.pack("<II", controller, generator)
         status = self.request("Move", body + bytes(self.protocol.sizes["Move"] - len(body)))
+        self.field = _FIELDS.get(generator, self.field)
         return self.protocol.move[status[0]]
+
+    def begun(self, generator: int = 1, controller: int = 0) -> np.void:
+        """Begin a motion and return its first state."""
+        assert self.begin(controller, generator) == "started"
+        return self.first_of_motion()
 
     def ended(self) -> str:
         name, _, body = self.answer()
@@ -158,21 +180,24 @@ class RawClient:
     def first_of_motion(self) -> np.void:
         return self.state_where(lambda state: state["robot_mode"] == 2)
 
-    def command(
-        self, message_id: int, values: Any, finished: bool = False, field: str = "dq_c", elbow: Any = None
-    ) -> None:
+    def command(self, message_id: int, values: Any, finished: bool = False, **fields: Any) -> None:
+        """Command values of the motion's generator, and other fields."""
         command = np.zeros((), self.protocol.command)
-        command["message_id"], command[field], command["motion_generation_finished"] = message_id, values, finished
-        if elbow is not None:
-            command["valid_elbow"], command["elbow_c"] = 1, elbow
+        fields |= {"message_id": message_id, self.field: values, "motion_generation_finished": finished}
+        for name, value in fields.items():
+            command[name] = value
         self.udp.sendto(command.tobytes(), self.robot_udp)
 
-    def turn(
-        self, state: np.void, values: Any, finished: bool = False, field: str = "dq_c", elbow: Any = None
-    ) -> np.void:
+    def turn(self, state: np.void, values: Any, finished: bool = False, **fields: Any) -> np.void:
         """Answer a state and return the next."""
-        self.command(int(state["message_id"]), values, finished, field, elbow)
+        self.command(int(state["message_id"]), values, finished, **fields)
         return self.state_where(lambda new: new["message_id"] > state["message_id"])
+
+    def moved(self, state: np.void, values: Any, **fields: Any) -> np.void:
+        """Answer a state and return the next, of the motion that goes on."""
+        state = self.turn(state, values, **fields)
+        assert state["robot_mode"] == 2, errors_of(state)
+        return state
 
     def close(self) -> None:
         self.tcp.close()
@@ -199,7 +224,7 @@ def raw() -> Iterator[Callable[..., RawClient]]:
     made: list[RawClient] = []
 
     def make(served: Served, version: int | None = None) -> RawClient:
-        client = RawClient(served)
+        client = RawClient(served.protocol, served.address)
         made.append(client)
         client.connect(version or served.protocol.version)
         return client

@@ -4,11 +4,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fci.tests.conftest import errors_of
+from fci.tests.conftest import errors_of, smooth
 
 from pretouch.control.commander import rotation_about
-from pretouch.robot.description import fr3, panda
 from pretouch.robot.model import RobotModel
+from pretouch.robot.named import robot_named
 from pretouch_fci.cartesian import CARTESIAN_LIMITS, Body, CartesianVelocity
 from pretouch_fci.frames import frames_of
 from pretouch_fci.limits import motion_limits
@@ -17,7 +17,6 @@ from pretouch_fci.options import Drop
 from pretouch_fci.wire import Controller, RobotKind
 
 _MS = 1e-3
-_MOVE = 2
 _POSE, _VELOCITY = 2, 3
 _PREFIX = "cartesian_motion_generator"
 _START = "cartesian_position_motion_generator_start_pose_invalid"
@@ -25,13 +24,8 @@ _UP = np.eye(6)[2]
 _ZERO = np.zeros(7)
 
 
-def _begun(client: Any, generator: int) -> np.void:
-    assert client.begin(generator=generator) == "started"
-    return client.first_of_motion()
-
-
-def _share(k: int, of: int) -> float:
-    return k / of - np.sin(2 * np.pi * k / of) / (2 * np.pi)
+def _elbow(angle_and_sign: np.ndarray) -> dict[str, Any]:
+    return {"valid_elbow": 1, "elbow_c": angle_and_sign}
 
 
 def _pose(state: np.void) -> np.ndarray:
@@ -44,14 +38,13 @@ def _columns(T: np.ndarray) -> np.ndarray:
 
 def test_velocities_lead_the_end_effector_and_are_told(serve: Any, raw: Any, kind: RobotKind) -> None:
     client = raw(serve(kind))
-    state = begun = _begun(client, _VELOCITY)
+    state = begun = client.begun(_VELOCITY)
     for k in range(1, 1001):
         velocity = 0.1 * (1 - np.cos(2 * np.pi * k / 1000)) * np.array([0, 1, 0, 2, 0, 0])
-        state = client.turn(state, velocity, field="O_dP_EE_c")
-        assert state["robot_mode"] == _MOVE, errors_of(state)
+        state = client.moved(state, velocity)
         np.testing.assert_allclose(state["O_dP_EE_c"], velocity, atol=1e-6)
     assert state["motion_generator_mode"] == _VELOCITY + 1
-    client.turn(state, np.zeros(6), finished=True, field="O_dP_EE_c")
+    client.turn(state, np.zeros(6), finished=True)
     assert client.ended() == "success"
     begin, end = _pose(begun), _pose(state)
     np.testing.assert_allclose(end[:3, 3] - begin[:3, 3], [0, 0.1, 0], atol=1e-5)
@@ -61,106 +54,74 @@ def test_velocities_lead_the_end_effector_and_are_told(serve: Any, raw: Any, kin
 @pytest.mark.slow
 def test_poses_lead_the_end_effector_though_commands_are_lost(serve: Any, raw: Any, kind: RobotKind) -> None:
     client = raw(serve(kind, drop=Drop(2, 50)))
-    state = _begun(client, _POSE)
+    state = client.begun(_POSE)
     T = begin = _pose(state)
     for k in range(1, 2001):
         T = begin.copy()
-        T[2, 3] += 0.1 * _share(k, 2000)
-        T[:3, :3] = rotation_about(np.eye(3)[2], 0.3 * _share(k, 2000)) @ begin[:3, :3]
-        state = client.turn(state, _columns(T), field="O_T_EE_c")
-        assert state["robot_mode"] == _MOVE, errors_of(state)
+        T[2, 3] += 0.1 * smooth(k, 2000)
+        T[:3, :3] = rotation_about(np.eye(3)[2], 0.3 * smooth(k, 2000)) @ begin[:3, :3]
+        state = client.moved(state, _columns(T))
     np.testing.assert_allclose(_pose(state), T, atol=1e-5)
     assert state["control_command_success_rate"] == pytest.approx(0.96)
     for _ in range(3):  # the first two are lost
-        state = client.turn(state, _columns(T), finished=True, field="O_T_EE_c")
+        state = client.turn(state, _columns(T), finished=True)
     assert client.ended() == "success"
 
 
 def test_the_elbow_moves_while_the_end_effector_stays(serve: Any, raw: Any, kind: RobotKind) -> None:
     client = raw(serve(kind))
-    state = begun = _begun(client, _POSE)
+    state = begun = client.begun(_POSE)
     T, elbow = _pose(begun), begun["elbow_d"].astype(np.float64)
     for k in range(1, 1001):
-        elbow[0] = begun["elbow_d"][0] + 0.2 * _share(k, 1000)
-        state = client.turn(state, _columns(T), field="O_T_EE_c", elbow=elbow)
-        assert state["robot_mode"] == _MOVE, errors_of(state)
+        elbow[0] = begun["elbow_d"][0] + 0.2 * smooth(k, 1000)
+        state = client.moved(state, _columns(T), **_elbow(elbow))
     assert state["q_d"][2] - begun["q_d"][2] == pytest.approx(0.2, abs=1e-5)
     np.testing.assert_allclose(_pose(state), T, atol=1e-6)
     # bent to the other side
-    state = client.turn(state, _columns(T), field="O_T_EE_c", elbow=elbow * [1, -1])
+    state = client.turn(state, _columns(T), **_elbow(elbow * [1, -1]))
     assert errors_of(state) == [f"{_PREFIX}_elbow_sign_inconsistent"]
 
 
 @pytest.mark.parametrize(("by", "sign"), [(0.5, 1), (0.0, -1)])
 def test_the_first_elbow_must_be_the_arms(serve: Any, raw: Any, kind: RobotKind, by: float, sign: float) -> None:
     client = raw(serve(kind))
-    state = _begun(client, _VELOCITY)
-    elbow = (state["elbow_d"] + [by, 0]) * [1, sign]
-    assert errors_of(client.turn(state, np.zeros(6), field="O_dP_EE_c", elbow=elbow)) == [
-        f"{_PREFIX}_start_elbow_invalid"
-    ]
+    state = client.begun(_VELOCITY)
+    elbow = _elbow((state["elbow_d"] + [by, 0]) * [1, sign])
+    assert errors_of(client.turn(state, np.zeros(6), **elbow)) == [f"{_PREFIX}_start_elbow_invalid"]
 
 
-@pytest.mark.parametrize("elbow", [True, False])
-def test_an_fr3_may_begin_with_the_pose_it_measurably_has(serve: Any, raw: Any, elbow: bool) -> None:
+@pytest.mark.parametrize("with_elbow", [True, False])
+def test_an_fr3_may_begin_with_the_pose_it_measurably_has(serve: Any, raw: Any, with_elbow: bool) -> None:
     client = raw(serve("fr3"))
-    state = _begun(client, _POSE)
+    state = client.begun(_POSE)
     assert np.linalg.norm(state["O_T_EE"][12:15] - state["O_T_EE_c"][12:15]) > 2e-5
-    first, angle = state["O_T_EE"].astype(np.float64), state["elbow"].astype(np.float64) if elbow else None
+    first, angle = state["O_T_EE"].astype(np.float64), state["elbow"].astype(np.float64)
     for _ in range(3):
-        state = client.turn(state, first, field="O_T_EE_c", elbow=angle)
-        assert state["robot_mode"] == _MOVE, errors_of(state)
+        state = client.moved(state, first, **(_elbow(angle) if with_elbow else {}))
     np.testing.assert_allclose(state["O_T_EE_c"], first, atol=1e-6)
-    if elbow:
+    if with_elbow:
         assert state["q_d"][2] == pytest.approx(angle[0], abs=1e-6)
 
 
 @pytest.mark.parametrize(("kind", "off"), [("panda", 0.1), ("panda", 1e-4), ("fr3", 0.1), ("fr3", 2e-3)])
 def test_the_first_pose_must_be_where_the_arm_is(serve: Any, raw: Any, kind: RobotKind, off: float) -> None:
     client = raw(serve(kind))
-    state = _begun(client, _POSE)
-    T = _pose(state)
-    turned = T.copy()
-    turned[:3, :3] = rotation_about(np.eye(3)[0], off) @ T[:3, :3]
-    T[0, 3] += off
-    assert errors_of(client.turn(state, _columns(T), field="O_T_EE_c")) == [_START]
-    assert client.ended() == "reflex"
-    assert client.request("AutomaticErrorRecovery") == b"\0"
-    state = _begun(client, _POSE)
-    assert errors_of(client.turn(state, _columns(turned), field="O_T_EE_c")) == [_START]
-
-
-def test_half_a_turn_is_a_start_elsewhere_too(serve: Any, raw: Any) -> None:
-    client = raw(serve())
-    state = _begun(client, _POSE)
-    T = _pose(state)
-    T[:3, :3] = np.diag([1.0, -1.0, -1.0]) @ T[:3, :3]
-    assert errors_of(client.turn(state, _columns(T), field="O_T_EE_c")) == [_START]
-
-
-@pytest.mark.parametrize("bad", [np.full(16, np.nan), np.zeros(16), 2 * np.eye(4).ravel(), np.full(16, 1e300)])
-def test_what_is_no_pose_has_its_name(serve: Any, raw: Any, bad: np.ndarray) -> None:
-    client = raw(serve())
-    state = client.turn(_begun(client, _POSE), bad, field="O_T_EE_c")
-    assert errors_of(state) == ["cartesian_position_motion_generator_invalid_frame"]
-    assert np.all(np.isfinite(state["dq_d"]))
-
-
-@pytest.mark.parametrize("bad", [np.nan, np.inf, 1e308])
-def test_velocities_that_are_none_end_the_motion(serve: Any, raw: Any, bad: float) -> None:
-    client = raw(serve())
-    state = client.turn(_begun(client, _VELOCITY), np.full(6, bad), field="O_dP_EE_c")
-    assert f"{_PREFIX}_velocity_limits_violation" in errors_of(state)
-    assert np.all(np.isfinite(state["dq_d"]))
+    elsewhere, turned, half_turned = (_pose(client.state()) for _ in range(3))
+    elsewhere[0, 3] += off
+    turned[:3, :3] = rotation_about(np.eye(3)[0], off) @ turned[:3, :3]
+    half_turned[:3, :3] = np.diag([1.0, -1.0, -1.0]) @ half_turned[:3, :3]
+    for first in (elsewhere, turned, half_turned):
+        assert errors_of(client.turn(client.begun(_POSE), _columns(first))) == [_START]
+        assert client.ended() == "reflex"
+        assert client.request("AutomaticErrorRecovery") == b"\0"
 
 
 def test_a_motion_of_the_end_effector_may_not_end_while_it_moves(serve: Any, raw: Any) -> None:
     client = raw(serve())
-    state = _begun(client, _VELOCITY)
+    state = client.begun(_VELOCITY)
     for k in range(1, 101):
-        state = client.turn(state, 1e-3 * k * _UP, field="O_dP_EE_c")
-        assert state["robot_mode"] == _MOVE, errors_of(state)
-    state = client.turn(state, 0.1 * _UP, finished=True, field="O_dP_EE_c")
+        state = client.moved(state, 1e-3 * k * _UP)
+    state = client.turn(state, 0.1 * _UP, finished=True)
     assert client.ended() == "reflex"
     assert errors_of(state) == [f"{_PREFIX}_velocity_discontinuity"]
 
@@ -192,7 +153,7 @@ class Follower:
     """A motion of the end-effector that is always where it is commanded."""
 
     def __init__(self, kind: RobotKind) -> None:
-        model = RobotModel(panda() if kind == "panda" else fr3())
+        model = RobotModel(robot_named(kind))
         body = Body(model, frames_of(model), CARTESIAN_LIMITS[kind])
         self.motion = Motion(motion_limits(model, kind), Controller.JOINT_IMPEDANCE, CartesianVelocity(body))
         self.q = model.description.q_ready.copy()

@@ -4,26 +4,27 @@ import csv
 import os
 import re
 import signal
-import socket
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 import pytest
+from fci.tests.conftest import RawClient, arm_of
 
 from pretouch.cli import main
 from pretouch.cli.skin_keys import with_new
 from pretouch.hardware.keys import Keys, save_keys
 from pretouch.hardware.receiver import SkinReceiver
-from pretouch.robot.description import fr3, panda
+from pretouch.robot.description import fr3
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin
-from pretouch.sim.scene import SceneSpec
-from pretouch_fci.arm import ArmSetup, ServedArm
+from pretouch_fci.arm import ServedArm
 from pretouch_fci.motion import Setpoint
 from pretouch_fci.serve import TypedPushes
-from pretouch_fci.wire import CONNECT, HEADER, PANDA, Controller, Generator, RobotMode
+from pretouch_fci.wire import PANDA, Controller, Generator, RobotMode
 
 
 def _served(*arguments: str) -> subprocess.Popen[str]:
@@ -41,13 +42,12 @@ def _address(server: subprocess.Popen[str]) -> tuple[str, int]:
 def test_it_says_where_it_listens_and_ends_in_order_on_sigterm(tmp_path: Path) -> None:
     truth = tmp_path / "truth.csv"
     with _served("--truth", str(truth), "--scene", "static", "--start", "path", "--push", "0:0,10,0:60") as server:
-        with socket.create_connection(_address(server)) as tcp, socket.socket(type=socket.SOCK_DGRAM) as udp:
-            udp.bind(("127.0.0.1", 0))
-            tcp.sendall(PANDA.reply("Connect", 1, CONNECT.pack(5, udp.getsockname()[1])))
-            assert tcp.recv(64)[HEADER.size :] == b"\0\5\0"
-            udp.settimeout(5.0)
-            for _ in range(50):
-                assert len(udp.recv(4096)) == PANDA.state.itemsize
+        client = RawClient(PANDA, _address(server))
+        client.connect(5)
+        assert client.connected == b"\0\5\0"
+        for _ in range(50):
+            client.state()
+        client.close()
         server.send_signal(signal.SIGTERM)
         assert server.wait(10.0) == 128 + signal.SIGTERM
     rows = list(csv.DictReader(truth.read_text().splitlines()))
@@ -105,7 +105,15 @@ def test_what_cannot_be_served_is_said_in_a_sentence(
 
 @pytest.fixture
 def arm() -> ServedArm:
-    return ServedArm(ArmSetup(RobotModel(panda()), "panda", panda().q_ready, SceneSpec()))
+    return arm_of()
+
+
+@pytest.fixture
+def pipe() -> Iterator[tuple[IO[str], IO[bytes]]]:
+    """Where what a program types is read, and where it is written."""
+    ours, theirs = os.pipe()
+    with os.fdopen(ours) as read, os.fdopen(theirs, "wb", buffering=0) as written:
+        yield read, written
 
 
 def test_a_person_types_pushes(arm: ServedArm) -> None:
@@ -129,9 +137,10 @@ def test_a_person_types_pushes(arm: ServedArm) -> None:
     os.close(ours)
 
 
-def test_a_program_types_in_place_of_a_person_and_ends_the_server_by_ending(tmp_path: Path) -> None:
+def test_a_program_types_in_place_of_a_person_and_ends_the_server_by_ending_whatever_lasts(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "pretouch.cli", "serve-fci", "--port", "0", "--lockstep", "--stdin"]
-    done = subprocess.run(command, input="time\nharder\n", capture_output=True, text=True, timeout=60.0, cwd=tmp_path)
+    typed = "time\nharder\nguide\n0,1,0:1e6\n"
+    done = subprocess.run(command, input=typed, capture_output=True, text=True, timeout=60.0, cwd=tmp_path)
     assert done.returncode == 0
     listening, time, refused = done.stdout.splitlines()
     assert listening.startswith("Listening at")
@@ -139,83 +148,58 @@ def test_a_program_types_in_place_of_a_person_and_ends_the_server_by_ending(tmp_
     assert refused.startswith("'harder' is not a push")
 
 
-@pytest.fixture
-def swinging(arm: ServedArm) -> ServedArm:
-    """An arm just after a motion."""
+def test_all_that_was_typed_before_the_end_of_a_pipe_is_done_once_the_arm_has_come_to_rest(
+    arm: ServedArm, pipe: tuple[IO[str], IO[bytes]], capsys: pytest.CaptureFixture[str]
+) -> None:
     arm.begin(Generator.JOINT_VELOCITY, Controller.JOINT_IMPEDANCE)
     arm.step(Setpoint(np.zeros(7)))
     arm.step(Setpoint(np.zeros(7), finished=True))
-    return arm
-
-
-def test_what_is_typed_while_the_arm_comes_to_rest_waits_until_it_has(swinging: ServedArm) -> None:
-    arm = swinging
-    ours, theirs = os.pipe()
-    with os.fdopen(ours) as read, os.fdopen(theirs, "w") as written:
-        typed = TypedPushes(arm, read, program=True)
-        written.write("0,15,0\n")
-        written.flush()
-        while not arm.settled:
-            assert not typed.take()
-            arm.step(None)
-            assert not arm.true_force.any()
+    typed = TypedPushes(arm, pipe[0], program=True)
+    pipe[1].write(b"time\nharder\n\n0,15,0")  # the last without an end
+    pipe[1].close()
+    while not arm.settled:
         assert not typed.take()
         arm.step(None)
-        np.testing.assert_array_equal(arm.true_force, [0.0, 15.0, 0.0])
-        written.close()
-        assert typed.take()
-
-
-def test_all_that_was_typed_before_the_end_of_a_pipe_is_done(
-    swinging: ServedArm, capsys: pytest.CaptureFixture[str]
-) -> None:
-    ours, theirs = os.pipe()
-    with os.fdopen(ours) as read:
-        typed = TypedPushes(swinging, read, program=True)
-        os.write(theirs, b"time\nharder\n\n0,15,0")  # the last without an end
-        os.close(theirs)
-        while not swinging.settled:
-            assert not typed.take()
-            swinging.step(None)
-        while not typed.take():
-            swinging.step(None)
-        assert typed.take()
+        assert not arm.true_force.any()
+    while not typed.take():
+        arm.step(None)
+    assert typed.take()
     time, refused = capsys.readouterr().out.splitlines()
     assert time.startswith("The arm's time is")
     assert refused.startswith("'harder' is not a push")
-    swinging.step(None)
-    np.testing.assert_array_equal(swinging.true_force, [0.0, 15.0, 0.0])
+    arm.step(None)
+    np.testing.assert_array_equal(arm.true_force, [0.0, 15.0, 0.0])
 
 
 @pytest.mark.parametrize("lockstep", [False, True])
-def test_an_arm_that_is_led_by_hand_hears_what_is_typed_but_in_lockstep(arm: ServedArm, lockstep: bool) -> None:
-    ours, theirs = os.pipe()
-    with os.fdopen(ours) as read, os.fdopen(theirs, "wb", buffering=0) as written:
-        typed = TypedPushes(arm, read, program=True, lockstep=lockstep)
-        written.write(b"guide\n0,5,0:0.3\n")
-        typed.take()
+def test_an_arm_that_is_led_by_hand_hears_what_is_typed_but_in_lockstep(
+    arm: ServedArm, pipe: tuple[IO[str], IO[bytes]], lockstep: bool
+) -> None:
+    typed = TypedPushes(arm, pipe[0], program=True, lockstep=lockstep)
+    pipe[1].write(b"guide\n0,5,0:0.3\n")
+    typed.take()
+    arm.step(None)
+    pipe[1].write(b"let go\n")
+    for _ in range(100):
+        assert not typed.take()
         arm.step(None)
-        written.write(b"let go\n")
-        for _ in range(100):
-            assert not typed.take()
-            arm.step(None)
-        assert (arm.mode is RobotMode.GUIDING) is lockstep
-        while not arm.settled:
-            arm.step(None)
-        typed.take()
-        assert arm.mode is RobotMode.IDLE
+    assert (arm.mode is RobotMode.GUIDING) is lockstep
+    while not arm.settled:
+        arm.step(None)
+    typed.take()
+    assert arm.mode is RobotMode.IDLE
 
 
-def test_a_line_without_an_end_is_not_kept_whole(arm: ServedArm, capsys: pytest.CaptureFixture[str]) -> None:
-    ours, theirs = os.pipe()
-    with os.fdopen(ours) as read, os.fdopen(theirs, "wb", buffering=0) as written:
-        typed = TypedPushes(arm, read, program=True)
-        for _ in range(50):
-            written.write(b"0,15,0" + 4000 * b" ")
-            typed.take()
-        assert capsys.readouterr().out == ""
-        written.write(b"\n" + b"time\n")
+def test_a_line_without_an_end_is_not_kept_whole(
+    arm: ServedArm, pipe: tuple[IO[str], IO[bytes]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    typed = TypedPushes(arm, pipe[0], program=True)
+    for _ in range(50):
+        pipe[1].write(b"0,15,0" + 4000 * b" ")
         typed.take()
+    assert capsys.readouterr().out == ""
+    pipe[1].write(b"\n" + b"time\n")
+    typed.take()
     refused, time = capsys.readouterr().out.splitlines()
     assert refused == "A line of more than 256 characters is left out."
     assert time.startswith("The arm's time is")
@@ -223,39 +207,18 @@ def test_a_line_without_an_end_is_not_kept_whole(arm: ServedArm, capsys: pytest.
     assert not arm.true_force.any()
 
 
-def test_in_lockstep_a_lasting_push_of_a_guided_arm_does_not_keep_the_server_from_ending() -> None:
-    command = [sys.executable, "-m", "pretouch.cli", "serve-fci", "--port", "0", "--lockstep", "--stdin"]
-    done = subprocess.run(command, input="guide\n0,1,0:1e6\n", capture_output=True, text=True, timeout=60.0)
-    assert done.returncode == 0
-
-
 def test_a_push_that_is_over_is_said_with_what_the_arm_measured_of_it(
-    arm: ServedArm, capsys: pytest.CaptureFixture[str]
+    arm: ServedArm, pipe: tuple[IO[str], IO[bytes]], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    ours, theirs = os.openpty()
-    with os.fdopen(theirs) as terminal:
-        typed = TypedPushes(arm, terminal)
-        os.write(ours, b"0,20,0:0.4\n")
-        for _ in range(650):
-            typed.take()
-            arm.step(None)
-    os.close(ours)
+    typed = TypedPushes(arm, pipe[0], program=True)
+    pipe[1].write(b"0,20,0:0.4\n")
+    for _ in range(650):
+        typed.take()
+        arm.step(None)
     (said,) = capsys.readouterr().out.splitlines()
     found = re.fullmatch(r"The push of 20 N is over. The arm's estimate of it came to ([\d.]+) N; .*", said)
     assert found is not None
     assert 15.0 < float(found[1]) < 30.0
-
-
-def test_what_is_typed_and_is_no_push_is_said(arm: ServedArm, capsys: pytest.CaptureFixture[str]) -> None:
-    ours, theirs = os.openpty()
-    with os.fdopen(theirs) as terminal:
-        typed = TypedPushes(arm, terminal)
-        os.write(ours, b"harder\n")
-        typed.take()
-        assert "'harder'" in capsys.readouterr().out
-        arm.step(None)
-        assert not arm.true_force.any()
-    os.close(ours)
 
 
 def test_nobody_types_where_there_is_no_terminal(arm: ServedArm, tmp_path: Path) -> None:

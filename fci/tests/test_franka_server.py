@@ -5,7 +5,7 @@ import socket
 import subprocess
 import sys
 import tomllib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
@@ -31,26 +31,14 @@ _STILL = np.zeros(7)
 
 
 @pytest.fixture
-def connected() -> Iterator[Callable[[FrankaServer, RobotKind], RawClient]]:
+def connected(raw: Callable[..., RawClient]) -> Callable[[FrankaServer, RobotKind], RawClient]:
     """Connect clients that speak bytes."""
-    made: list[RawClient] = []
-
-    def connect(server: FrankaServer, kind: RobotKind) -> RawClient:
-        protocol = PROTOCOLS[kind]
-        place = SimpleNamespace(protocol=protocol, server=SimpleNamespace(address=(server.host, PORT)))
-        made.append(RawClient(place))  # type: ignore[arg-type]
-        made[-1].connect(protocol.version)
-        return made[-1]
-
-    yield connect
-    for client in made:
-        client.close()
+    return lambda server, kind: raw(SimpleNamespace(protocol=PROTOCOLS[kind], address=(server.host, PORT)))
 
 
 def _motion(client: RawClient, seconds: float, qd: Any = _STILL) -> np.void:
     """Speed up to velocities (7,) [rad/s] within a second, keep them, and stop; return the last state of the motion."""
-    assert client.begin() == "started"
-    state, milliseconds = client.first_of_motion(), round(1000 * seconds)
+    state, milliseconds = client.begun(), round(1000 * seconds)
     for k in range(milliseconds):
         share = min(1.0, k / 1000, (milliseconds - k) / 1000)
         state = client.turn(state, share * np.asarray(qd))
@@ -87,9 +75,19 @@ def test_pushes_come_when_they_are_wanted_and_the_truth_is_the_same_each_time(
         np.testing.assert_array_equal(getattr(truths[0], name), getattr(truths[1], name))
 
 
+_IN_A_ROOM = """<mujoco><worldbody><site name="base" pos="1 2 .7"/>
+<geom type="box" size=".3 .05 .3" pos="1.35 2.3 1.2"/></worldbody></mujoco>"""
+"""The box below, seen from a corner of the room."""
+
+
 @pytest.mark.slow
-def test_a_box_is_run_into_and_the_server_says_why_the_motion_ended(franka_server: Any, connected: Any) -> None:
-    server = franka_server(robot="fr3", box=("0.35,0.3,0.5:0.6,0.1,0.6",))
+@pytest.mark.parametrize("given", ["box", "scene"])
+def test_a_box_is_run_into_and_the_server_says_why_the_motion_ended(
+    franka_server: Any, connected: Any, tmp_path: Path, given: str
+) -> None:
+    (tmp_path / "world.xml").write_text(_IN_A_ROOM)
+    options = {"box": ("0.35,0.3,0.5:0.6,0.1,0.6",), "scene": tmp_path / "world.xml"}
+    server = franka_server(robot="fr3", **{given: options[given]})
     state = _motion(connected(server, "fr3"), 4.0, [0.4, 0, 0, 0, 0, 0, 0])
     assert state["robot_mode"] == _REFLEX
     assert state["reflex_reason"][ERRORS.index("cartesian_reflex")]
@@ -97,19 +95,6 @@ def test_a_box_is_run_into_and_the_server_says_why_the_motion_ended(franka_serve
     assert np.linalg.norm(truth.force, axis=1).max() > 20.0
     assert truth.q[-1, 0] > 0.05
     assert any("cartesian_reflex" in line for line in server.said)
-
-
-@pytest.mark.slow
-def test_what_stands_in_a_file_is_run_into(franka_server: Any, connected: Any, tmp_path: Path) -> None:
-    world = tmp_path / "world.xml"
-    # the box of the test before, seen from a corner of the room
-    board = '<geom type="box" size=".3 .05 .3" pos="1.35 2.3 1.2"/>'
-    world.write_text(f'<mujoco><worldbody><site name="base" pos="1 2 .7"/>{board}</worldbody></mujoco>')
-    server = franka_server(robot="fr3", scene=world)
-    state = _motion(connected(server, "fr3"), 4.0, [0.4, 0, 0, 0, 0, 0, 0])
-    assert state["robot_mode"] == _REFLEX
-    assert np.linalg.norm(server.truth.force, axis=1).max() > 20.0
-    assert server.truth.q[-1, 0] > 0.05
 
 
 @pytest.mark.slow
@@ -151,8 +136,7 @@ def test_it_stands_where_the_test_wants_it_to(franka_server: Any, connected: Any
 def test_the_user_stop_ends_a_motion(franka_server: Any, connected: Any) -> None:
     server = franka_server()
     client = connected(server, "panda")
-    assert client.begin() == "started"
-    state = client.turn(client.first_of_motion(), _STILL)
+    state = client.turn(client.begun(), _STILL)
     server.press_stop()
     state = client.turn(state, _STILL)  # the command that was due is followed
     assert client.turn(state, _STILL)["robot_mode"] == 5
@@ -166,8 +150,7 @@ def test_in_a_motion_the_truth_is_not_told_and_that_is_said(
 ) -> None:
     server = franka_server()
     client = connected(server, "panda")
-    assert client.begin() == "started"
-    client.turn(client.first_of_motion(), _STILL)
+    client.turn(client.begun(), _STILL)
     monkeypatch.setattr(testing, "_ANSWERS_S", 0.2)
     with pytest.raises(RobotError, match=r"does not answer within 0\.2 s: is it in a motion\?"):
         _ = server.truth

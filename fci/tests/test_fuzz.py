@@ -7,13 +7,11 @@ from contextlib import suppress
 
 import numpy as np
 import pytest
+from fci.tests.conftest import arm_of
 from hypothesis import HealthCheck, given, settings
 from tests.fuzz.mutations import Change, changed, changes
 
-from pretouch.robot.description import panda
-from pretouch.robot.model import RobotModel
-from pretouch.sim.scene import SceneSpec
-from pretouch_fci.arm import ArmSetup, ServedArm
+from pretouch_fci.arm import ServedArm
 from pretouch_fci.commands import set_or_get, wanted_motion
 from pretouch_fci.connections import Connection, Disconnected
 from pretouch_fci.wire import PROTOCOLS, Protocol
@@ -38,8 +36,7 @@ WHOLE = b"".join(REQUESTS)
 @pytest.fixture(scope="module")
 def read() -> Iterator[Callable[[bytes], None]]:
     """Have an arm take in what a client sends."""
-    model = RobotModel(panda())
-    with ServedArm(ArmSetup(model, "panda", model.description.q_ready, SceneSpec())) as arm:
+    with arm_of() as arm:
 
         def taken_in(data: bytes) -> None:
             began = time.monotonic()

@@ -1,22 +1,23 @@
 """Limits, motions, collisions, pushes and the URDF, without a server."""
 
+from types import SimpleNamespace
+
 import mujoco
 import numpy as np
 import pytest
+from fci.tests.conftest import arm_of
 from hypothesis import given
 from hypothesis import strategies as st
 
 from pretouch.errors import ParameterError, RobotModelError
 from pretouch.robot.description import fr3, panda
 from pretouch.robot.model import RobotModel
-from pretouch.sim.scene import SceneSpec
 from pretouch.sim.tcp_push import TcpPush
-from pretouch_fci.arm import ArmSetup, ServedArm
 from pretouch_fci.collision import CollisionBehavior, Contacts
 from pretouch_fci.frames import flange_of
 from pretouch_fci.kinds import JointVelocity
 from pretouch_fci.limits import MotionLimits, motion_limits
-from pretouch_fci.motion import FIRST_WITHIN, Ending, Motion, Setpoint
+from pretouch_fci.motion import Ending, Motion, Setpoint
 from pretouch_fci.options import drop_of
 from pretouch_fci.pushes import push_of
 from pretouch_fci.state import StateDatagram, by_robot_at
@@ -30,23 +31,6 @@ _ZERO = np.zeros(7)
 
 def _limits(kind: str) -> MotionLimits:
     return motion_limits(_MODELS[kind], kind)  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize("kind", ["panda", "fr3"])
-def test_each_limit_has_its_own_name(kind: str) -> None:
-    limits = _limits(kind)
-    one, step = np.eye(7)[6], 1e-3
-    most_a, most_j = limits.qdd[6], limits.qddd[6]
-    name = "joint_motion_generator_{}".format
-    assert limits.violated(_READY, _ZERO, _ZERO, 0.99 * most_j * step**2 * one) == ()
-    assert limits.violated(_READY, _ZERO, _ZERO, 1.01 * most_j * step**2 * one) == (name("acceleration_discontinuity"),)
-    assert limits.violated(_READY, _ZERO, most_a * one, 1.01 * most_a * step * one) == (name("velocity_discontinuity"),)
-    fast = 1.002 * limits.qd * one
-    assert limits.violated(_READY, fast, _ZERO, fast) == (name("velocity_limits_violation"),)
-    end = _READY.copy()
-    end[1] = limits.q_max[1] - 1e-5
-    assert name("position_limits_violation") in limits.violated(end, np.full(7, 0.05), _ZERO, np.full(7, 0.05))
-    assert len(limits.violated(_READY, _ZERO, _ZERO, np.full(7, np.nan))) == 4
 
 
 def test_the_fr3s_speed_limits_are_those_the_vendor_publishes() -> None:
@@ -73,7 +57,7 @@ def test_braking_keeps_the_acceleration_limit_and_ends_at_rest(speeds: list[floa
 
 
 def test_a_motion_that_breaks_off_ends_in_braking_at_the_acceleration_limit() -> None:
-    arm = ServedArm(ArmSetup(RobotModel(panda()), "panda", _READY.copy(), SceneSpec()))
+    arm = arm_of()
     arm.begin(Generator.JOINT_VELOCITY, Controller.JOINT_IMPEDANCE)
     for k in range(1, 501):
         assert arm.step(Setpoint(2e-3 * k * np.eye(7)[6])) is None
@@ -99,13 +83,6 @@ def test_nineteen_lost_commands_are_bridged_at_the_same_acceleration() -> None:
     assert motion.follow(_READY, None) == Ending("reflex", ("communication_constraints_violation",))
 
 
-def test_the_first_command_has_to_come_in_half_a_second() -> None:
-    motion = Motion(_limits("panda"), Controller.JOINT_IMPEDANCE, JointVelocity())
-    endings = [motion.follow(_READY, None) for _ in range(FIRST_WITHIN)]
-    assert endings[:-1] == [None] * (FIRST_WITHIN - 1)
-    assert endings[-1] == Ending("reflex", ("communication_constraints_violation",))
-
-
 def test_thresholds_are_those_of_what_the_arm_does() -> None:
     # lower and upper torque, accelerating then steady; then forces alike
     body = np.concatenate([np.repeat([10.0, 20.0, 1.0, 2.0], 7), np.repeat([30.0, 60.0, 3.0, 6.0], 6)])
@@ -124,11 +101,6 @@ def test_thresholds_are_those_of_what_the_arm_does() -> None:
     assert not contacts.joint_collision.any()
 
 
-@pytest.mark.parametrize("bad", [-1.0, np.nan, np.inf])
-def test_what_is_no_threshold_is_refused(bad: float) -> None:
-    assert CollisionBehavior.of(np.full(52, bad)) is None
-
-
 def test_pushes_and_drops_are_read() -> None:
     assert push_of("2.5:0,15,-3") == TcpPush(2.5, (0.0, 15.0, -3.0), 0.5)
     assert push_of("0:1,2,3:0.25") == TcpPush(0.0, (1.0, 2.0, 3.0), 0.25)
@@ -137,20 +109,7 @@ def test_pushes_and_drops_are_read() -> None:
 
 
 @pytest.mark.parametrize(
-    "text",
-    [
-        "1:0,1e9,0",
-        "1:0,0,-1001",
-        "",
-        "1",
-        "1:2",
-        "1:2,3",
-        "a:1,2,3",
-        "1:1,2,3:0",
-        "-1:1,2,3",
-        "1:nan,0,0",
-        "1:1,2,3:1:1",
-    ],
+    "text", ["1:0,1e9,0", "1:0,0,-1001", "1", "1:2,3", "a:1,2,3", "1:1,2,3:0", "-1:1,2,3", "1:nan,0,0", "1:1,2,3:1:1"]
 )
 def test_what_is_no_push_is_refused(text: str) -> None:
     with pytest.raises(ParameterError, match=r"as 2\.0:0,15,0:0\.5|give at most 1000 N along each axis"):
@@ -192,7 +151,7 @@ def test_the_wrench_is_by_the_robot_and_about_the_stiffness_frame() -> None:
 
 def test_near_a_singularity_the_wrench_is_exactly_zero() -> None:
     q = np.array([0.0, 0.0, np.pi / 2, -0.07, 0.0, 3.2126, 0.0])
-    arm = ServedArm(ArmSetup(RobotModel(panda()), "panda", q, SceneSpec()))
+    arm = arm_of(q=q)
     assert arm.report.wrench is None
     state = np.frombuffer(StateDatagram(PANDA, arm).write(1), PANDA.state)[0]
     assert state["O_F_ext_hat_K"].tolist() == state["K_F_ext_hat_K"].tolist() == [0.0] * 6
@@ -200,7 +159,7 @@ def test_near_a_singularity_the_wrench_is_exactly_zero() -> None:
 
 
 def test_at_rest_the_torques_hold_the_arm() -> None:
-    arm = ServedArm(ArmSetup(RobotModel(panda()), "panda", _READY.copy(), SceneSpec()))
+    arm = arm_of()
     gravity = arm.model.dynamics(arm.report.q, _ZERO).gravity
     # but for what the model does not know of masses and payload
     np.testing.assert_allclose(arm.torques.measured, gravity, atol=3.0)
@@ -208,9 +167,6 @@ def test_at_rest_the_torques_hold_the_arm() -> None:
 
 
 def test_an_arm_with_other_joints_does_not_speak_it() -> None:
-    class Six:
-        n = 6
-        description = panda()
-
+    six = SimpleNamespace(n=6, description=panda())
     with pytest.raises(RobotModelError, match="only arms with 7"):
-        ServedArm(ArmSetup(Six(), "panda", _ZERO, SceneSpec()))  # type: ignore[arg-type]
+        arm_of(model=six, q=_ZERO)

@@ -18,8 +18,7 @@ _STILL = np.zeros(7)
 
 def _sped_up(client: Any, speed: float) -> np.void:
     """Begin a motion and bring joint 7 to a speed [rad/s] within all limits; return the newest state."""
-    assert client.begin() == "started"
-    state, qd = client.first_of_motion(), _STILL.copy()
+    state, qd = client.begun(), _STILL.copy()
     while qd[6] < speed:
         qd[6] += 2e-3
         state = client.turn(state, qd)
@@ -71,8 +70,7 @@ def test_what_a_client_sets_does_not_outlive_it(serve: Any, raw: Any) -> None:
 
 def _modes(client: Any) -> list[int]:
     """Modes of the robot while a client stands still in a motion for twenty states, or until they end."""
-    assert client.begin() == "started"
-    states = [client.first_of_motion()]
+    states = [client.begun()]
     while len(states) < 20 and states[-1]["robot_mode"] == _MOVE:
         states.append(client.turn(states[-1], _STILL))
     return [int(state["robot_mode"]) for state in states]
@@ -116,19 +114,29 @@ def test_stop_preempts_the_motion_and_is_answered_at_rest(serve: Any, raw: Any, 
     assert client.begin() == "started"
 
 
-@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e308])
-def test_numbers_that_are_none_end_the_motion(serve: Any, raw: Any, bad: float) -> None:
+@pytest.mark.parametrize(
+    ("generator", "error", "bad"),
+    [
+        (0, "joint_motion_generator_position_limits_violation", (np.nan, np.inf, 1e308)),
+        (1, "joint_motion_generator_velocity_limits_violation", (np.nan, np.inf, -np.inf, 1e308)),
+        (2, "cartesian_position_motion_generator_invalid_frame", (np.nan, 0.0, 2 * np.eye(4).ravel(), 1e300)),
+        (3, "cartesian_motion_generator_velocity_limits_violation", (np.nan, np.inf, 1e308)),
+    ],
+)
+def test_numbers_that_are_none_end_the_motion(
+    serve: Any, raw: Any, generator: int, error: str, bad: tuple[Any, ...]
+) -> None:
     client = raw(serve())
-    state = _sped_up(client, 0.3)
-    state = client.turn(state, np.full(7, bad))
-    assert client.ended() in ("input error", "reflex")
-    assert "joint_motion_generator_velocity_limits_violation" in errors_of(state)
-    assert np.all(np.isfinite(state["dq_d"]))
-    still = client.state_where(lambda s: not np.any(s["dq_d"]))
-    assert still["robot_mode"] == _REFLEX
-    assert client.begin() == "not possible"
-    assert client.request("AutomaticErrorRecovery") == b"\0"
-    assert client.begin() == "started"
+    for values in bad:
+        state = client.begun(generator)
+        state = client.moved(state, state["q_d"]) if generator == 0 else state
+        state = client.turn(state, values)
+        assert client.ended() in ("input error", "reflex")
+        assert error in errors_of(state)
+        assert np.all(np.isfinite(state["q_d"]))
+        assert np.all(np.isfinite(state["dq_d"]))
+        assert client.begin() == "not possible"
+        assert client.request("AutomaticErrorRecovery") == b"\0"
 
 
 def test_a_motion_may_not_end_while_it_moves(serve: Any, raw: Any) -> None:
@@ -141,16 +149,14 @@ def test_a_motion_may_not_end_while_it_moves(serve: Any, raw: Any) -> None:
 
 def test_a_motion_may_not_begin_with_a_step(serve: Any, raw: Any) -> None:
     client = raw(serve())
-    client.begin()
-    state = client.turn(client.first_of_motion(), np.full(7, 0.1))
+    state = client.turn(client.begun(), np.full(7, 0.1))
     assert client.ended() == "reflex"
     assert "joint_motion_generator_velocity_discontinuity" in errors_of(state, "reflex_reason")
 
 
 def test_commands_of_other_states_sizes_and_senders_are_no_commands(serve: Any, raw: Any, kind: RobotKind) -> None:
     client = raw(serve(kind))
-    client.begin()
-    state = client.turn(client.first_of_motion(), _STILL)
+    state = client.turn(client.begun(), _STILL)
     number, wrong = int(state["message_id"]), np.full(7, 2.0)
     for other in (0, number - 1, number + 1, 2**64 - 1):
         client.command(other, wrong)
@@ -169,9 +175,7 @@ def test_commands_of_other_states_sizes_and_senders_are_no_commands(serve: Any, 
 def test_twenty_lost_commands_in_a_row_end_the_motion(serve: Any, raw: Any) -> None:
     # the very first command is never lost: so nineteen, and from the sixtieth millisecond on twenty
     client = raw(serve(drop=Drop(20, 60)))
-    client.begin()
-    state = client.first_of_motion()
-    rates = []
+    state, rates = client.begun(), []
     while state["robot_mode"] == _MOVE:
         state = client.turn(state, _STILL)
         rates.append(float(state["control_command_success_rate"]))
@@ -185,8 +189,7 @@ def test_twenty_lost_commands_in_a_row_end_the_motion(serve: Any, raw: Any) -> N
 
 def test_a_motion_without_commands_ends_in_real_time(serve: Any, raw: Any) -> None:
     client = raw(serve(lockstep=False))
-    client.begin()
-    begun = client.first_of_motion()["message_id"]
+    begun = client.begun()["message_id"]
     state = client.state_where(lambda s: s["robot_mode"] != _MOVE)
     assert client.ended() == "reflex"
     assert errors_of(state) == ["communication_constraints_violation"]
@@ -199,8 +202,7 @@ def test_each_motion_in_lockstep_begins_at_the_next_thousand_seconds(serve: Any,
     assert idle[0]["message_id"] < idle[1]["message_id"] < 1_000_000
     np.testing.assert_array_equal(idle[0]["tau_J"], idle[1]["tau_J"])
     for number in (1, 2):
-        client.begin()
-        state = client.first_of_motion()
+        state = client.begun()
         assert state["message_id"] == number * 1_000_000
         state = client.turn(client.turn(state, _STILL), _STILL, finished=True)
         assert client.ended() == "success"
@@ -225,8 +227,7 @@ def test_unknown_motions_are_not_possible_and_all_known_ones_are(serve: Any, raw
     for controller, generator in ((3, 1), (7, 1), (0, 4), (1, 4), (0, 2**32 - 1)):
         assert client.begin(controller, generator) == "not possible"
     for controller, generator in itertools.product((0, 1, 2), (0, 1, 2, 3)):
-        assert client.begin(controller, generator) == "started"
-        state = client.first_of_motion()
+        state = client.begun(generator, controller)
         assert (state["controller_mode"], state["motion_generator_mode"]) == (controller, generator + 1)
         client.send_request("StopMove")
         assert client.ended() == "preempted"
@@ -250,6 +251,7 @@ def test_all_other_requests_of_protocol_5_are_answered(serve: Any, raw: Any) -> 
     assert client.request("LoadModelLibrary", bytes([0, 1])) == b"\1"  # for Windows
     assert client.request("SetEEToK", np.full(16, 2.0).tobytes()) == b"\2"
     assert client.request("SetLoad", np.full(13, np.nan).tobytes()) == b"\2"
+    assert client.request("SetCollisionBehavior", np.full(52, -1.0).tobytes()) == b"\2"
 
 
 _MALFORMED = [

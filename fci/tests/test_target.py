@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pretouch.robot.description import fr3
 from pretouch.robot.model import RobotModel
+from pretouch.robot.named import robot_named
 from pretouch_fci.limits import motion_limits
 from pretouch_fci.motion import FIRST_WITHIN, Ending, Setpoint, TargetMotion
 from pretouch_fci.wire import Controller
 
-_MODEL = RobotModel(fr3())
+_MODEL = RobotModel(robot_named("fr3"))
 _LIMITS = motion_limits(_MODEL, "fr3")
 _READY = _MODEL.description.q_ready
 _MS = 1e-3
@@ -86,14 +86,14 @@ def test_a_client_sends_targets_when_it_likes(serve: Any, raw: Any) -> None:
     state = client.first_of_motion()
     q = state["q_d"].astype(np.float64)
     for k in range(1, 6):  # every 40 ms, and each answers a state that is 3 ms old
-        client.command(int(state["message_id"]), q + 0.02 * k, field="q_c")
+        client.command(int(state["message_id"]), q + 0.02 * k)
         until = int(state["message_id"]) + 40
         state = client.state_where(lambda new, until=until: new["message_id"] >= until - 3)
         client.state_where(lambda new, until=until: new["message_id"] >= until)
     state = client.state_where(lambda new: abs(new["q_d"][0] - q[0] - 0.1) < 1e-4)
     np.testing.assert_allclose(state["q_d"], q + 0.1, atol=1e-3)
     assert state["control_command_success_rate"] == 1.0
-    client.command(int(state["message_id"]), np.zeros(7), finished=True, field="q_c")
+    client.command(int(state["message_id"]), np.zeros(7), finished=True)
     assert client.ended() == "success"
 
 

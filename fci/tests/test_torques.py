@@ -5,14 +5,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from fci.tests.conftest import arm_of, smooth
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pretouch.robot.description import panda
-from pretouch.robot.model import RobotModel
-from pretouch.sim.scene import SceneSpec
 from pretouch.sim.tcp_push import TcpPush
-from pretouch_fci.arm import ArmSetup, ServedArm
+from pretouch_fci.arm import ServedArm
 from pretouch_fci.controllers import _critical
 from pretouch_fci.frames import Inertial
 from pretouch_fci.gripper import GripperObject
@@ -24,12 +22,9 @@ _JOINT_7 = np.eye(7)[6]
 _TORQUE_ONLY = {"panda": Generator.JOINT_VELOCITY, "fr3": Generator.NONE}
 
 
-def _arm(*pushes: TcpPush, **setup: Any) -> ServedArm:
-    model = RobotModel(panda())
-    return ServedArm(ArmSetup(model, "panda", model.description.q_ready.copy(), SceneSpec(), pushes=pushes, **setup))
-
-
-def _tried(arm: ServedArm) -> ServedArm:
+def _tried(arm: ServedArm | None = None) -> ServedArm:
+    """An arm that torques act on."""
+    arm = arm or arm_of()
     arm.begin(Generator.JOINT_VELOCITY, Controller.EXTERNAL)
     return arm
 
@@ -51,7 +46,7 @@ def _settled(arm: ServedArm) -> None:
 
 
 def test_a_torque_accelerates_a_joint_as_its_inertia_says() -> None:
-    arm = _tried(_arm())
+    arm = _tried()
     _commanded(arm, _ZERO)
     before = arm.plant.mj_data.qvel[:7].copy()
     assert _commanded(arm, *[0.9 * _JOINT_7] * 20) is None
@@ -63,18 +58,13 @@ def test_a_torque_accelerates_a_joint_as_its_inertia_says() -> None:
     np.testing.assert_array_equal(arm.torques.desired, 0.9 * _JOINT_7)
 
 
-def test_the_joints_are_asked_for_nothing_while_torques_act() -> None:
-    arm = _tried(_arm())
+def test_torques_alone_move_the_joints_and_after_them_the_arm_brakes_and_stays() -> None:
+    arm = _tried()
     asked = arm.report.q_commanded.copy()
     _commanded(arm, *[0.9 * _JOINT_7] * 200)
-    np.testing.assert_array_equal(arm.report.q_commanded, asked)
-    assert arm.report.q[6] > asked[6] + 0.05
-
-
-def test_after_torques_the_arm_brakes_and_stays_where_it_is() -> None:
-    arm = _tried(_arm())
-    _commanded(arm, *[0.9 * _JOINT_7] * 200)
     speed, there = arm.report.qd[6], arm.report.q[6]
+    np.testing.assert_array_equal(arm.report.q_commanded, asked)
+    assert there > asked[6] + 0.05
     assert arm.step(Setpoint(_ZERO, finished=True)) == Ending("success")
     _settled(arm)
     # half a v^2 / a at 20 rad/s^2, and what the impedance swings
@@ -85,23 +75,23 @@ def test_after_torques_the_arm_brakes_and_stays_where_it_is() -> None:
 
 def test_torques_that_jump_or_are_too_large_are_refused() -> None:
     ramp = [k * _JOINT_7 for k in range(1, 12)]
-    assert _commanded(_tried(_arm()), *ramp, 13.2 * _JOINT_7) == Ending("reflex", (
+    assert _commanded(_tried(), *ramp, 13.2 * _JOINT_7) == Ending("reflex", (
         "controller_torque_discontinuity", "tau_j_range_violation",
     ))  # fmt: skip
-    assert _commanded(_tried(_arm()), 2.0 * _JOINT_7) == Ending("reflex", ("controller_torque_discontinuity",))
-    assert _commanded(_tried(_arm()), *ramp, 12.001 * _JOINT_7) == Ending("reflex", ("tau_j_range_violation",))
-    assert _commanded(_tried(_arm()), np.full(7, np.nan)) == Ending("input error", ("controller_torque_discontinuity",))
-    assert _commanded(_tried(_arm()), np.full(7, 1e308)).errors[0] == "controller_torque_discontinuity"
+    assert _commanded(_tried(), 2.0 * _JOINT_7) == Ending("reflex", ("controller_torque_discontinuity",))
+    assert _commanded(_tried(), *ramp, 12.001 * _JOINT_7) == Ending("reflex", ("tau_j_range_violation",))
+    assert _commanded(_tried(), np.full(7, np.nan)) == Ending("input error", ("controller_torque_discontinuity",))
+    assert _commanded(_tried(), np.full(7, 1e308)).errors[0] == "controller_torque_discontinuity"
 
 
 def test_torques_that_drive_a_joint_too_fast_or_too_far_end_in_a_reflex() -> None:
-    assert _commanded(_tried(_arm()), *[k * _JOINT_7 for k in range(1, 6)], *[6.0 * _JOINT_7] * 400) == Ending(
+    assert _commanded(_tried(), *[k * _JOINT_7 for k in range(1, 6)], *[6.0 * _JOINT_7] * 400) == Ending(
         "reflex", ("joint_velocity_violation",)
     )
-    arm = _arm()
-    ready = arm.model.description.q_ready.copy()
-    ready[6] = arm.model.q_max[6] - 0.02
-    arm = _tried(ServedArm(ArmSetup(arm.model, "panda", ready, SceneSpec())))
+    model = arm_of().model
+    ready = model.description.q_ready.copy()
+    ready[6] = model.q_max[6] - 0.02
+    arm = _tried(arm_of(q=ready))
     ending = _commanded(arm, *[0.9 * _JOINT_7] * 2000)
     assert ending == Ending("reflex", ("joint_position_limits_violation",))
     arm.recover()
@@ -111,7 +101,7 @@ def test_torques_that_drive_a_joint_too_fast_or_too_far_end_in_a_reflex() -> Non
 
 
 def test_a_lost_command_leaves_the_torques_as_they_are() -> None:
-    arm = _tried(_arm())
+    arm = _tried()
     _commanded(arm, 0.9 * _JOINT_7)
     for _ in range(19):
         assert arm.step(None) is None
@@ -122,30 +112,19 @@ def test_a_lost_command_leaves_the_torques_as_they_are() -> None:
 def test_each_protocol_serves_torques_alone_and_beside_a_motion(serve: Any, raw: Any, kind: RobotKind) -> None:
     client = raw(serve(kind))
     for generator in (_TORQUE_ONLY[kind], Generator.JOINT_POSITION):
-        assert client.begin(Controller.EXTERNAL, generator) == "started"
-        state = client.first_of_motion()
+        state = client.begun(generator, Controller.EXTERNAL)
         assert (state["controller_mode"], state["motion_generator_mode"]) == (Controller.EXTERNAL, generator + 1)
+        still = state["q_d"] if generator == Generator.JOINT_POSITION else 0.0
         for k in range(1, 50):
-            command = np.zeros((), client.protocol.command)
-            command["message_id"], command["q_c"] = state["message_id"], state["q_d"]
-            command["tau_J_d"] = 0.01 * k * _JOINT_7
-            client.udp.sendto(command.tobytes(), client.robot_udp)
-            state = client.state_where(lambda new, old=state: new["message_id"] > old["message_id"])
+            state = client.turn(state, still, tau_J_d=0.01 * k * _JOINT_7)
         np.testing.assert_allclose(state["tau_J_d"], 0.49 * _JOINT_7, atol=1e-7)
-        client.turn(state, state["q_d"], finished=True, field="q_c")
+        client.turn(state, still, finished=True)
         assert client.ended() == "success"
-
-
-def test_a_motion_that_the_robot_would_interpolate_is_not_possible(serve: Any, raw: Any) -> None:
-    client = raw(serve("fr3"))
-    body = np.zeros(client.protocol.sizes["Move"], np.uint8)
-    body[4 + 4 + 6 * 8] = 1
-    assert client.protocol.move[client.request("Move", body.tobytes())[0]] == "not possible"
 
 
 @pytest.mark.parametrize("frame", ["base", "turned"])
 def test_a_push_moves_the_end_effector_as_the_cartesian_stiffness_says(frame: str) -> None:
-    arm = _arm(TcpPush(0.5, (0.0, 12.0, 0.0), 2.0))
+    arm = arm_of(pushes=(TcpPush(0.5, (0.0, 12.0, 0.0), 2.0),))
     soft = np.array([1000.0, 300.0, 1000.0, 100.0, 100.0, 100.0])
     if frame == "turned":  # a quarter about the end-effector's own z: its x lies along the base's y
         R = arm.body.end_effector(arm.report.q)[0][:3, :3]
@@ -162,7 +141,7 @@ def test_a_push_moves_the_end_effector_as_the_cartesian_stiffness_says(frame: st
 
 
 def test_a_push_moves_the_joints_as_their_stiffness_says() -> None:
-    arm = _arm(TcpPush(0.5, (0.0, 12.0, 0.0), 2.0))
+    arm = arm_of(pushes=(TcpPush(0.5, (0.0, 12.0, 0.0), 2.0),))
     arm.plant.set_stiffness(np.full(7, 200.0))
     arm.begin(Generator.JOINT_VELOCITY, Controller.JOINT_IMPEDANCE)
     _still(arm, 450)
@@ -194,7 +173,7 @@ def test_each_mode_of_any_arm_is_damped_critically(seed: int) -> None:
 def test_a_load_that_is_announced_is_no_external_force() -> None:
     found = {}
     for announced in (0.0, 2.0):
-        arm = _arm(object=GripperObject(0.04, 2.0))
+        arm = arm_of(object=GripperObject(0.04, 2.0))
         if announced:
             arm.announce(Inertial(announced, np.array([0.0, 0.0, 0.1034]), 1e-5 * np.eye(3)))
         arm.carry(replace(arm.gripper, width=0.04, grasped=True))
@@ -210,17 +189,8 @@ def _raised(arm: ServedArm) -> Any:
     return replace(steady, upper_force=5.0 * steady.upper_force, upper_torque=5.0 * steady.upper_torque)
 
 
-def test_an_announced_load_is_forgotten_with_its_client() -> None:
-    arm = _arm()
-    before = arm.model.dynamics(arm.report.q, _ZERO).mass_matrix
-    arm.announce(Inertial(1.5, np.array([0.0, 0.02, 0.1]), np.diag([1e-3, 2e-3, 3e-3])))
-    assert arm.model.dynamics(arm.report.q, _ZERO).mass_matrix[0, 0] > before[0, 0] + 0.1
-    arm.forget_settings()
-    np.testing.assert_allclose(arm.model.dynamics(arm.report.q, _ZERO).mass_matrix, before, atol=1e-12)
-
-
-def test_the_load_is_where_the_client_says() -> None:
-    arm, load = _arm(), Inertial(1.5, np.array([0.03, 0.02, 0.1]), np.diag([1e-3, 2e-3, 4e-3]))
+def test_the_load_is_where_the_client_says_until_it_has_gone() -> None:
+    arm, load = arm_of(), Inertial(1.5, np.array([0.03, 0.02, 0.1]), np.diag([1e-3, 2e-3, 4e-3]))
     q, flange = arm.report.q, arm.frames.flange
     before = arm.model.dynamics(q, _ZERO)
     arm.announce(load)
@@ -230,10 +200,12 @@ def test_the_load_is_where_the_client_says() -> None:
     added = 1.5 * J[:3].T @ J[:3] + J[3:].T @ R @ load.inertia @ R.T @ J[3:]
     np.testing.assert_allclose(after.mass_matrix - before.mass_matrix, added, atol=1e-9)
     np.testing.assert_allclose(after.gravity - before.gravity, 1.5 * 9.81 * J[2], atol=1e-9)
+    arm.forget_settings()
+    np.testing.assert_allclose(arm.model.dynamics(q, _ZERO).mass_matrix, before.mass_matrix, atol=1e-12)
 
 
 def test_guided_by_hand_the_arm_gives_way_along_the_free_axes_alone() -> None:
-    arm = _arm(TcpPush(0.1, (0.0, 15.0, 15.0), 0.5))
+    arm = arm_of(pushes=(TcpPush(0.1, (0.0, 15.0, 15.0), 0.5),))
     arm.guiding_axes = np.array([False, True, False, False, False, False, True])
     arm.press_guiding()
     assert arm.mode is RobotMode.GUIDING
@@ -252,10 +224,10 @@ def test_guided_by_hand_the_arm_gives_way_along_the_free_axes_alone() -> None:
 
 
 def test_the_buttons_do_nothing_in_a_motion_and_the_user_stop_ends_guiding() -> None:
-    arm = _tried(_arm())
+    arm = _tried()
     arm.press_guiding()
     assert arm.mode is RobotMode.MOVE
-    arm = _arm()
+    arm = arm_of()
     arm.press_guiding()
     arm.press_stop()
     assert arm.mode is RobotMode.USER_STOPPED
@@ -297,14 +269,13 @@ def test_impedances_within_the_vendors_limits_act(
 
 
 def test_an_arm_that_comes_into_itself_stops() -> None:
-    arm = _arm()
+    arm = arm_of()
     arm.begin(Generator.JOINT_POSITION, Controller.JOINT_IMPEDANCE)
     begun, folded = arm.report.q_commanded.copy(), np.array([0.0, 1.2, 0.0, -3.0, 0.0, 0.1, 0.785])
     k, ending = 0, None
     while ending is None:
         k += 1
-        share = k / 2000 - np.sin(2 * np.pi * k / 2000) / (2 * np.pi)
-        ending = arm.step(Setpoint(begun + share * (folded - begun)))
+        ending = arm.step(Setpoint(begun + smooth(k, 2000) * (folded - begun)))
     assert ending == Ending("reflex", ("self_collision_avoidance_violation",))
     assert k < 2000
     _settled(arm)
@@ -313,5 +284,4 @@ def test_an_arm_that_comes_into_itself_stops() -> None:
     arm.begin(Generator.JOINT_POSITION, Controller.JOINT_IMPEDANCE)
     stopped = arm.report.q_commanded.copy()
     for k in range(2000):
-        share = k / 2000 - np.sin(2 * np.pi * k / 2000) / (2 * np.pi)
-        assert arm.step(Setpoint(stopped + share * (begun - stopped))) is None, arm.errors
+        assert arm.step(Setpoint(stopped + smooth(k, 2000) * (begun - stopped))) is None, arm.errors

@@ -33,8 +33,7 @@ def _readings(serve: Any, raw: Any, skin: Any) -> Any:
     with SkinReceiver(skin.ids, keys, clock=lambda: now[0], draw=rng.bytes) as receiver:
         served = serve(setup={"units": UnitsSetup(skin, keys, receiver.address)})
         client = raw(served)
-        client.begin()
-        state, tables = client.first_of_motion(), []
+        state, tables = client.begun(), []
         for _ in range(_LASTING):
             now[0] = 1e-3 * float(state["message_id"])
             receiver.receive()

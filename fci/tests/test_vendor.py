@@ -7,57 +7,49 @@ import numpy as np
 import pytest
 from tests.needs import skip_for
 
-from pretouch.robot.description import fr3, panda
 from pretouch.robot.model import RobotModel
+from pretouch.robot.named import robot_named
 from pretouch.sim.tcp_push import TcpPush
 from pretouch_fci.wire import RobotKind
-
-
-def _model(kind: RobotKind) -> RobotModel:
-    return RobotModel(panda() if kind == "panda" else fr3())
 
 
 def test_a_motion_ends_where_its_velocities_lead(serve: Any, kind: RobotKind) -> None:
     done = serve(kind).ask("move", 1.0)
     assert done["error"] is None
     assert done["after"]["mode"] == "idle"
-    assert done["last"]["control_command_success_rate"] == 1.0
+    assert done["told"][-1]["control_command_success_rate"] == 1.0
     # the integral of 0.2 sin^2 over a second is 0.1
-    moved = np.subtract(done["after"]["q_d"], done["first"]["q_d"])
+    moved = np.subtract(done["after"]["q_d"], done["told"][0]["q_d"])
     np.testing.assert_allclose(moved, [0.1, -0.05, 0.1, 0.0, 0.0, 0.1, -0.1], atol=3e-4)
     np.testing.assert_allclose(done["after"]["q"], done["after"]["q_d"], atol=5e-3)
 
 
-def test_a_motion_through_positions_ends_where_they_lead(serve: Any, kind: RobotKind) -> None:
-    done = serve(kind).ask("positions", 1.0)
+def test_positions_lead_the_joints_and_those_begun_elsewhere_are_refused_by_the_vendors_name(
+    serve: Any, kind: RobotKind
+) -> None:
+    done, refused = serve(kind).ask("positions", 1.0)
     assert done["error"] is None
     assert done["after"]["mode"] == "idle"
-    np.testing.assert_allclose(np.subtract(done["after"]["q_d"], done["first"]["q_d"]), 0.1, atol=1e-5)
+    np.testing.assert_allclose(np.subtract(done["after"]["q_d"], done["told"][0]["q_d"]), 0.1, atol=1e-5)
     np.testing.assert_allclose(done["after"]["q"], done["after"]["q_d"], atol=5e-3)
+    assert "joint_position_motion_generator_start_pose_invalid" in refused["error"]
+    assert refused["after"]["last_motion_errors"] == ["joint_position_motion_generator_start_pose_invalid"]
+    np.testing.assert_array_equal(refused["after"]["q_d"], done["after"]["q_d"])
+    assert refused["recovered"]["mode"] == "idle"
 
 
-def test_positions_begun_elsewhere_are_refused_by_the_vendors_name(serve: Any, kind: RobotKind) -> None:
-    done = serve(kind).ask("positions", 1.0, 0.2)
-    assert "joint_position_motion_generator_start_pose_invalid" in done["error"]
-    assert done["after"]["last_motion_errors"] == ["joint_position_motion_generator_start_pose_invalid"]
-    np.testing.assert_array_equal(done["after"]["q_d"], done["first"]["q_d"])
-    assert done["recovered"]["mode"] == "idle"
-
-
-def test_the_end_effector_goes_where_its_velocities_and_poses_lead(serve: Any, kind: RobotKind) -> None:
-    done = serve(kind).ask("cartesian", 1.0)
-    assert done["errors"] == [None, None]
-    first, there, after = (np.array(done[name]["O_T_EE_d"]) for name in ("first", "there", "after"))
+def test_velocities_and_poses_lead_the_end_effector_and_poses_begun_elsewhere_are_refused(
+    serve: Any, kind: RobotKind
+) -> None:
+    by_velocities, by_poses, refused = serve(kind).ask("cartesian", 1.0)
+    assert by_velocities["error"] is by_poses["error"] is None
+    first = np.array(by_velocities["told"][0]["O_T_EE_d"])
+    there, back, stayed = (np.array(one["after"]["O_T_EE_d"]) for one in (by_velocities, by_poses, refused))
     np.testing.assert_allclose(there - first, 0.1 * np.eye(16)[13], atol=3e-4)
-    np.testing.assert_allclose(after - there, -0.1 * np.eye(16)[13], atol=1e-5)
-
-
-def test_a_pose_begun_elsewhere_is_refused_by_the_vendors_name(serve: Any, kind: RobotKind) -> None:
-    done = serve(kind).ask("cartesian", 1.0, 0.01)
-    assert done["errors"][0] is None
-    assert "cartesian_position_motion_generator_start_pose_invalid" in done["errors"][1]
-    np.testing.assert_allclose(done["after"]["O_T_EE_d"], done["there"]["O_T_EE_d"], atol=1e-6)
-    assert done["recovered"]["mode"] == "idle"
+    np.testing.assert_allclose(back - there, -0.1 * np.eye(16)[13], atol=1e-5)
+    assert "cartesian_position_motion_generator_start_pose_invalid" in refused["error"]
+    np.testing.assert_allclose(stayed, back, atol=1e-6)
+    assert refused["recovered"]["mode"] == "idle"
 
 
 @pytest.mark.slow
@@ -68,14 +60,14 @@ def test_two_runs_are_the_same_to_the_last_bit(serve: Any, kind: RobotKind) -> N
         runs.append(served.ask("move", 0.8))
         served.stop()
         truths.append(served.truth)
-    assert runs[0]["first"]["time"] == 1000.001
-    assert runs[0]["digest"] == runs[1]["digest"]
+    assert runs[0]["told"][0]["time"] == 1000.001
+    assert runs[0]["told"] == runs[1]["told"]
     assert len(truths[0]) > 1000
     assert truths[0] == truths[1]
 
 
 def test_states_tell_poses_and_what_the_flange_carries(serve: Any, kind: RobotKind) -> None:
-    told, model = serve(kind).ask("state"), _model(kind)
+    told, model = serve(kind).ask("state"), RobotModel(robot_named(kind))
     kin = model.kinematics(np.array(told["q"]))
     T = np.array(told["O_T_EE"]).reshape(4, 4).T
     np.testing.assert_allclose(T[:3, 3], kin.position[model.ee], atol=1e-6)
@@ -102,7 +94,7 @@ def test_a_push_is_told_with_the_vendors_sign(serve: Any, kind: RobotKind) -> No
     np.testing.assert_allclose(came[:3], np.negative(force), atol=1.5)
     np.testing.assert_allclose(np.linalg.norm(K[:, :3], axis=1), np.linalg.norm(felt[:, :3], axis=1), rtol=1e-5)
     torques = np.array([one["tau_ext_hat_filtered"] for one in told])
-    model, q = _model(kind), np.array(told[0]["q"])
+    model, q = RobotModel(robot_named(kind)), np.array(told[0]["q"])
     explained = model.ee_jacobian(model.kinematics(q))[:3].T @ np.negative(force)
     np.testing.assert_allclose(torques[during].mean(axis=0) - torques[before].mean(axis=0), explained, atol=0.6)
 
@@ -151,19 +143,21 @@ def test_torques_hold_the_arm_as_their_springs_say(serve: Any, kind: RobotKind) 
     pushes = (TcpPush(0.5, (0.0, 12.0, 0.0), 2.0),)
     done = serve(kind, {"pushes": pushes}).ask("torques", 2.0)
     assert done["error"] is None
-    moved = np.subtract(done["last"]["q"], done["begun"])
+    last = done["told"][-1]
+    moved = np.subtract(last["q"], done["begun"])
     # 12 N at 0.307 m from joint 1's axis, on 600 Nm/rad
     assert moved[0] == pytest.approx(12.0 * 0.307 / 600.0, abs=1e-3)
-    np.testing.assert_allclose(done["last"]["tau_J_d"], -600.0 * moved, atol=1.5)
+    np.testing.assert_allclose(last["tau_J_d"], -600.0 * moved, atol=1.5)
     assert done["after"]["mode"] == "idle"
 
 
 @pytest.mark.parametrize(("client", "rough"), [("fr3", 1.0), ("panda", 1e-9), ("panda-python", 1e-9)])
 def test_the_vendors_library_computes_with_our_model(serve: Any, client: str, rough: float) -> None:
-    served = serve("fr3" if client == "fr3" else "panda")
-    if client != "fr3" and shutil.which("cc") is None:
+    kind = client.partition("-")[0]
+    served = serve(kind)
+    if kind == "panda" and shutil.which("cc") is None:
         skip_for("apt install gcc libc6-dev")
-    told, model = served.ask("model", kind=client), _model("fr3" if client == "fr3" else "panda")
+    told, model = served.ask("model", kind=client), RobotModel(robot_named(kind))
     q = np.array(told["q"])
     dynamics = model.dynamics(q, np.zeros(7))
     np.testing.assert_allclose(np.reshape(told["gravity"], 7), dynamics.gravity, atol=2e-2 * rough)

@@ -3,7 +3,6 @@
 Prints what came of it as JSON. A process of its own: the libraries hold the interpreter, and cannot share a process.
 """
 
-import hashlib
 import json
 import math
 import os
@@ -67,37 +66,6 @@ _COMMANDS = {
 }  # fmt: skip
 
 
-def _control(lib, robot, on_state, what="joint_velocity", limited=False):
-    """Call `on_state(state, time) -> (values, finished)` for each state of a motion; return the error, or None."""
-    time, made = 0.0, getattr(lib, _COMMANDS[what])
-    try:
-        mode, alone = lib.ControllerMode, what == "torque"
-        if hasattr(robot, "control"):
-
-            def called(state, duration):
-                nonlocal time
-                time += duration.to_sec()
-                values, finished = on_state(state, time)
-                command = made(values)
-                command.motion_finished = finished
-                return command
-
-            begin = robot.control if alone else getattr(robot, f"control_{what}")
-            begin(called, *(() if alone else (mode.kJointImpedance,)), limited, 1000.0)
-            return None
-        control = getattr(robot, f"start_{what}_control")(*(() if alone else (mode.JointImpedance,)))
-        finished = False
-        while not finished:
-            state, duration = control.readOnce()
-            time += duration.to_sec()
-            values, finished = on_state(state, time)
-            command = made(values)
-            command.motion_finished = finished
-            control.writeOnce(command)
-    except Exception as error:
-        return str(error)
-
-
 def _behavior(robot, kind, torque, force):
     """Set the upper thresholds, and half of them as the lower ones."""
     torques, forces = ([0.5 * torque] * 7, [torque] * 7), ([0.5 * force] * 6, [force] * 6)
@@ -107,84 +75,102 @@ def _behavior(robot, kind, torque, force):
         robot.set_collision_behavior(*torques, *forces)
 
 
+def _ran(lib, robot, kind, seconds, command, what="joint_velocity", force=90.0, limited=False):
+    """Run a motion by `command(state, time)`, with a collision threshold [N], recover, and tell all that was told."""
+    _behavior(robot, kind, 90.0, force)
+    told, time, error, alone = [], 0.0, None, what == "torque"
+
+    def answer(state, duration):
+        nonlocal time
+        told.append(_told(state))
+        time += duration.to_sec()
+        answered = getattr(lib, _COMMANDS[what])(command(state, time))
+        answered.motion_finished = time >= seconds
+        return answered
+
+    try:
+        if hasattr(robot, "control"):
+            begin = robot.control if alone else getattr(robot, f"control_{what}")
+            begin(answer, *(() if alone else (lib.ControllerMode.kJointImpedance,)), limited, 1000.0)
+        else:
+            mode = () if alone else (lib.ControllerMode.JointImpedance,)
+            control = getattr(robot, f"start_{what}_control")(*mode)
+            while time < seconds:
+                control.writeOnce(answer(*control.readOnce()))
+    except Exception as why:
+        error = str(why)
+    after = _fresh(robot)
+    robot.automatic_error_recovery()
+    return {"error": error, "told": told, "after": after, "recovered": _fresh(robot)}
+
+
 def state(lib, robot, kind):
     return _told(robot.read_once())
 
 
+def _share(time, seconds):
+    """Share of its way of a motion from rest to rest."""
+    share = min(time / seconds, 1.0)
+    return share - math.sin(2 * math.pi * share) / (2 * math.pi)
+
+
 def move(lib, robot, kind, seconds, jump=0.0):
     """Move there and back to rest; with a jump of the velocity [rad/s] in the middle."""
-    _behavior(robot, kind, 90.0, 90.0)
-    digest, told = hashlib.sha256(), []
 
-    def on_state(state, time):
-        told.append(_told(state))
-        digest.update(json.dumps(told[-1]).encode())
+    def command(state, time):
         speed = 0.2 * math.sin(math.pi * min(time / seconds, 1.0)) ** 2 + (jump if time > seconds / 2 else 0.0)
-        return [speed, -speed / 2, speed, 0.0, 0.0, speed, -speed], time >= seconds
+        return [speed, -speed / 2, speed, 0.0, 0.0, speed, -speed]
 
-    error = _control(lib, robot, on_state)
-    after = _told(robot.read_once())
-    robot.automatic_error_recovery()
-    return {
-        "error": error, "digest": digest.hexdigest(), "first": told[0], "last": told[-1], "count": len(told),
-        "after": after, "recovered": _fresh(robot),
-    }  # fmt: skip
+    return _ran(lib, robot, kind, seconds, command)
 
 
-def positions(lib, robot, kind, seconds, off=0.0):
-    """Move each joint by 0.1 rad through its positions, begun off by so much [rad]."""
-    _behavior(robot, kind, 90.0, 90.0)
-    told = []
+def positions(lib, robot, kind, seconds):
+    """Move each joint by 0.1 rad through its positions; then once more, begun off by 0.2 rad."""
 
-    def on_state(state, time):
-        told.append(_told(state))
-        share = min(time / seconds, 1.0)
-        moved = off + 0.1 * (share - math.sin(2 * math.pi * share) / (2 * math.pi))
-        return [q + moved for q in told[0]["q_d"]], time >= seconds
+    def moved(off):
+        begun = _fresh(robot)["q_d"]
 
-    error = _control(lib, robot, on_state, "joint_position")
-    after = _told(robot.read_once())
-    robot.automatic_error_recovery()
-    return {"error": error, "first": told[0], "last": told[-1], "after": after, "recovered": _fresh(robot)}
+        def command(state, time):
+            return [q + off + 0.1 * _share(time, seconds) for q in begun]
+
+        return _ran(lib, robot, kind, seconds, command, "joint_position")
+
+    return [moved(0.0), moved(0.2)]
 
 
-def cartesian(lib, robot, kind, seconds, off=0.0):
-    """Move the end-effector by 0.1 m along y by velocities, then back by poses, begun off by so much [m]."""
-    _behavior(robot, kind, 90.0, 90.0)
-    told = []
+def cartesian(lib, robot, kind, seconds):
+    """Move the end-effector by 0.1 m along y by velocities and back by poses; then once more, begun off by 0.01 m."""
 
     def by_velocity(state, time):
-        told.append(_told(state))
         share = min(time / seconds, 1.0)
-        return [0.0, 0.1 / seconds * (1 - math.cos(2 * math.pi * share)), 0.0, 0.0, 0.0, 0.0], time >= seconds
+        return [0.0, 0.1 / seconds * (1 - math.cos(2 * math.pi * share)), 0.0, 0.0, 0.0, 0.0]
 
-    def by_pose(state, time):
-        told.append(_told(state))
-        share, pose = min(time / seconds, 1.0), list(there["O_T_EE_d"])
-        pose[13] += off - 0.1 * (share - math.sin(2 * math.pi * share) / (2 * math.pi))
-        return pose, time >= seconds
+    def by_poses(off):
+        there = _fresh(robot)["O_T_EE_d"]
 
-    errors = [_control(lib, robot, by_velocity, "cartesian_velocity", limited=True)]
-    there = _fresh(robot)
-    errors.append(_control(lib, robot, by_pose, "cartesian_pose"))
-    after = _fresh(robot)
-    robot.automatic_error_recovery()
-    return {"errors": errors, "first": told[0], "there": there, "after": after, "recovered": _fresh(robot)}
+        def command(state, time):
+            return [*there[:13], there[13] + off - 0.1 * _share(time, seconds), *there[14:]]
+
+        return _ran(lib, robot, kind, seconds, command, "cartesian_pose")
+
+    by_velocities = _ran(lib, robot, kind, seconds, by_velocity, "cartesian_velocity", limited=True)
+    return [by_velocities, by_poses(0.0), by_poses(0.01)]
 
 
 def hold(lib, robot, kind, seconds, force):
-    """Stand still in a motion, with a collision threshold [N], and tell all states."""
-    _behavior(robot, kind, 90.0, force)
-    told = []
+    """Stand still in a motion, with a collision threshold [N]."""
+    return _ran(lib, robot, kind, seconds, lambda state, time: [0.0] * 7, force=force)
 
-    def on_state(state, time):
-        told.append(_told(state))
-        return [0.0] * 7, time >= seconds
 
-    error = _control(lib, robot, on_state)
-    after = _told(robot.read_once())
-    robot.automatic_error_recovery()
-    return {"error": error, "told": told, "after": after, "recovered": _fresh(robot)}
+def torques(lib, robot, kind, seconds):
+    """Hold the arm by springs and dampers of one's own, within the limit of the torque's rate."""
+    begun = list(robot.read_once().q)
+
+    def command(state, time):
+        wanted = [600.0 * (q0 - q) - 40.0 * dq for q0, q, dq in zip(begun, state.q, state.dq, strict=True)]
+        return [max(-1.0, min(1.0, w - last)) + last for w, last in zip(wanted, state.tau_J_d, strict=True)]
+
+    return {"begun": begun, **_ran(lib, robot, kind, seconds, command, "torque")}
 
 
 def settings(lib, robot, kind):
@@ -204,21 +190,6 @@ def settings(lib, robot, kind):
     }.items():
         refused[name] = _error(do)
     return {"state": _fresh(robot), "refused": refused, "turned": turned}
-
-
-def torques(lib, robot, kind, seconds):
-    """Hold the arm by springs and dampers of one's own, with the library's limit of the torque's rate."""
-    _behavior(robot, kind, 90.0, 90.0)
-    begun, told = list(robot.read_once().q), []
-
-    def on_state(state, time):
-        told.append(_told(state))
-        wanted = [600.0 * (q0 - q) - 40.0 * dq for q0, q, dq in zip(begun, state.q, state.dq, strict=True)]
-        held = [max(-1.0, min(1.0, w - last)) + last for w, last in zip(wanted, state.tau_J_d, strict=True)]
-        return held, time >= seconds
-
-    error = _control(lib, robot, on_state, "torque")
-    return {"error": error, "last": told[-1], "begun": begun, "after": _told(robot.read_once())}
 
 
 def _error(do):
