@@ -11,7 +11,7 @@ import struct
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
@@ -49,7 +49,7 @@ def arm_of(kind: RobotKind = "panda", **setup: Any) -> ServedArm:
 
 
 @pytest.fixture
-def host() -> str:
+def host():
     """An address of this machine that no other test has: the vendor's clients know one port only."""
     return loopback()
 
@@ -99,7 +99,7 @@ Serve = Callable[..., Served]
 
 
 @pytest.fixture
-def serve(host: str) -> Iterator[Serve]:
+def serve(host):
     """Serve an arm until the test ends."""
     running: list[Served] = []
 
@@ -219,7 +219,7 @@ def errors_of(state: np.void, field: str = "errors") -> list[str]:
 
 
 @pytest.fixture
-def raw() -> Iterator[Callable[..., RawClient]]:
+def raw():
     """Make clients that speak bytes."""
     made: list[RawClient] = []
 
@@ -235,5 +235,5 @@ def raw() -> Iterator[Callable[..., RawClient]]:
 
 
 @pytest.fixture(params=sorted(PROTOCOLS))
-def kind(request: pytest.FixtureRequest) -> RobotKind:
+def kind(request):
     return request.param

@@ -36,7 +36,7 @@ def _columns(T: np.ndarray) -> np.ndarray:
     return T.T.ravel()
 
 
-def test_velocities_lead_the_end_effector_and_are_told(serve: Any, raw: Any, kind: RobotKind) -> None:
+def test_velocities_lead_the_end_effector_and_are_told(serve, raw, kind):
     client = raw(serve(kind))
     state = begun = client.begun(_VELOCITY)
     for k in range(1, 1001):
@@ -52,7 +52,7 @@ def test_velocities_lead_the_end_effector_and_are_told(serve: Any, raw: Any, kin
 
 
 @pytest.mark.slow
-def test_poses_lead_the_end_effector_though_commands_are_lost(serve: Any, raw: Any, kind: RobotKind) -> None:
+def test_poses_lead_the_end_effector_though_commands_are_lost(serve, raw, kind):
     client = raw(serve(kind, drop=Drop(2, 50)))
     state = client.begun(_POSE)
     T = begin = _pose(state)
@@ -68,7 +68,7 @@ def test_poses_lead_the_end_effector_though_commands_are_lost(serve: Any, raw: A
     assert client.ended() == "success"
 
 
-def test_the_elbow_moves_while_the_end_effector_stays(serve: Any, raw: Any, kind: RobotKind) -> None:
+def test_the_elbow_moves_while_the_end_effector_stays(serve, raw, kind):
     client = raw(serve(kind))
     state = begun = client.begun(_POSE)
     T, elbow = _pose(begun), begun["elbow_d"].astype(np.float64)
@@ -83,7 +83,7 @@ def test_the_elbow_moves_while_the_end_effector_stays(serve: Any, raw: Any, kind
 
 
 @pytest.mark.parametrize(("by", "sign"), [(0.5, 1), (0.0, -1)])
-def test_the_first_elbow_must_be_the_arms(serve: Any, raw: Any, kind: RobotKind, by: float, sign: float) -> None:
+def test_the_first_elbow_must_be_the_arms(serve, raw, kind, by, sign):
     client = raw(serve(kind))
     state = client.begun(_VELOCITY)
     elbow = _elbow((state["elbow_d"] + [by, 0]) * [1, sign])
@@ -91,7 +91,7 @@ def test_the_first_elbow_must_be_the_arms(serve: Any, raw: Any, kind: RobotKind,
 
 
 @pytest.mark.parametrize("with_elbow", [True, False])
-def test_an_fr3_may_begin_with_the_pose_it_measurably_has(serve: Any, raw: Any, with_elbow: bool) -> None:
+def test_an_fr3_may_begin_with_the_pose_it_measurably_has(serve, raw, with_elbow):
     client = raw(serve("fr3"))
     state = client.begun(_POSE)
     assert np.linalg.norm(state["O_T_EE"][12:15] - state["O_T_EE_c"][12:15]) > 2e-5
@@ -104,7 +104,7 @@ def test_an_fr3_may_begin_with_the_pose_it_measurably_has(serve: Any, raw: Any, 
 
 
 @pytest.mark.parametrize(("kind", "off"), [("panda", 0.1), ("panda", 1e-4), ("fr3", 0.1), ("fr3", 2e-3)])
-def test_the_first_pose_must_be_where_the_arm_is(serve: Any, raw: Any, kind: RobotKind, off: float) -> None:
+def test_the_first_pose_must_be_where_the_arm_is(serve, raw, kind, off):
     client = raw(serve(kind))
     elsewhere, turned, half_turned = (_pose(client.state()) for _ in range(3))
     elsewhere[0, 3] += off
@@ -116,7 +116,7 @@ def test_the_first_pose_must_be_where_the_arm_is(serve: Any, raw: Any, kind: Rob
         assert client.request("AutomaticErrorRecovery") == b"\0"
 
 
-def test_a_motion_of_the_end_effector_may_not_end_while_it_moves(serve: Any, raw: Any) -> None:
+def test_a_motion_of_the_end_effector_may_not_end_while_it_moves(serve, raw):
     client = raw(serve())
     state = client.begun(_VELOCITY)
     for k in range(1, 101):
@@ -126,7 +126,7 @@ def test_a_motion_of_the_end_effector_may_not_end_while_it_moves(serve: Any, raw
     assert errors_of(state) == [f"{_PREFIX}_velocity_discontinuity"]
 
 
-def test_no_motion_of_the_end_effector_begins_at_a_singularity(serve: Any, raw: Any, kind: RobotKind) -> None:
+def test_no_motion_of_the_end_effector_begins_at_a_singularity(serve, raw, kind):
     q = np.array([0.0, 0.0, np.pi / 2, -0.15 if kind == "fr3" else -0.07, 0.0, 3.2126, 0.0])
     client = raw(serve(kind, setup={"q": q}))
     assert [client.begin(generator=generator) for generator in (_POSE, _VELOCITY)] == ["singular", "singular"]
@@ -135,7 +135,7 @@ def test_no_motion_of_the_end_effector_begins_at_a_singularity(serve: Any, raw: 
 
 @pytest.mark.parametrize("kind", ["panda", "fr3"])
 @pytest.mark.parametrize(("part", "axis"), [(0, 1), (1, 3), (2, 6)])
-def test_each_limit_has_its_own_name(kind: RobotKind, part: int, axis: int) -> None:
+def test_each_limit_has_its_own_name(kind, part, axis):
     limits, one = CARTESIAN_LIMITS[kind], np.eye(7)[axis]
     fast, hard, jerked = (most[part] for most in (limits.velocity, limits.acceleration, limits.jerk))
     for factor, over in ((0.99, False), (1.01, True)):
@@ -173,7 +173,7 @@ class Follower:
 
 
 @pytest.mark.parametrize("kind", ["panda", "fr3"])
-def test_limits_of_joints_that_follow_have_names_of_their_own(kind: RobotKind) -> None:
+def test_limits_of_joints_that_follow_have_names_of_their_own(kind):
     outwards = Follower(kind).led(0, 0.4, 2.0)  # until the arm is stretched
     assert outwards is not None
     assert outwards.status == "reflex"
@@ -181,6 +181,6 @@ def test_limits_of_joints_that_follow_have_names_of_their_own(kind: RobotKind) -
 
 
 @pytest.mark.slow
-def test_a_joint_that_follows_to_its_end_has_a_name_of_its_own() -> None:
+def test_a_joint_that_follows_to_its_end_has_a_name_of_its_own():
     turned = Follower("panda").led(5, 0.8, 1.0)
     assert turned == Ending("reflex", (f"{_PREFIX}_joint_position_limits_violation",))

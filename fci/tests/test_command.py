@@ -6,9 +6,6 @@ import re
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
-from pathlib import Path
-from typing import IO
 
 import numpy as np
 import pytest
@@ -21,7 +18,6 @@ from pretouch.hardware.receiver import SkinReceiver
 from pretouch.robot.description import fr3
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin
-from pretouch_fci.arm import ServedArm
 from pretouch_fci.motion import Setpoint
 from pretouch_fci.serve import TypedPushes
 from pretouch_fci.wire import PANDA, Controller, Generator, RobotMode
@@ -39,7 +35,7 @@ def _address(server: subprocess.Popen[str]) -> tuple[str, int]:
     return "127.0.0.1", int(line.split(":")[1].split()[0])
 
 
-def test_it_says_where_it_listens_and_ends_in_order_on_sigterm(tmp_path: Path) -> None:
+def test_it_says_where_it_listens_and_ends_in_order_on_sigterm(tmp_path):
     truth = tmp_path / "truth.csv"
     with _served("--truth", str(truth), "--scene", "static", "--start", "path", "--push", "0:0,10,0:60") as server:
         client = RawClient(PANDA, _address(server))
@@ -55,7 +51,7 @@ def test_it_says_where_it_listens_and_ends_in_order_on_sigterm(tmp_path: Path) -
     assert float(rows[40]["force_y_N"]) == 10.0
 
 
-def test_its_units_are_heard_in_real_time(tmp_path: Path) -> None:
+def test_its_units_are_heard_in_real_time(tmp_path):
     skin = paper_skin(RobotModel(fr3()))
     keys = with_new(Keys(), skin.ids)
     save_keys(keys, tmp_path / "keys.toml")
@@ -96,27 +92,25 @@ def test_its_units_are_heard_in_real_time(tmp_path: Path) -> None:
         (["--truth", "/nowhere/truth.csv"], "The truth cannot be written"),
     ],
 )
-def test_what_cannot_be_served_is_said_in_a_sentence(
-    arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_cannot_be_served_is_said_in_a_sentence(arguments, words, capsys):
     assert main(["serve-fci", *arguments]) == 2
     assert words in capsys.readouterr().err
 
 
 @pytest.fixture
-def arm() -> ServedArm:
+def arm():
     return arm_of()
 
 
 @pytest.fixture
-def pipe() -> Iterator[tuple[IO[str], IO[bytes]]]:
+def pipe():
     """Where what a program types is read, and where it is written."""
     ours, theirs = os.pipe()
     with os.fdopen(ours) as read, os.fdopen(theirs, "wb", buffering=0) as written:
         yield read, written
 
 
-def test_a_person_types_pushes(arm: ServedArm) -> None:
+def test_a_person_types_pushes(arm):
     ours, theirs = os.openpty()
     with os.fdopen(theirs) as terminal:
         typed = TypedPushes(arm, terminal)
@@ -137,7 +131,7 @@ def test_a_person_types_pushes(arm: ServedArm) -> None:
     os.close(ours)
 
 
-def test_a_program_types_in_place_of_a_person_and_ends_the_server_by_ending_whatever_lasts(tmp_path: Path) -> None:
+def test_a_program_types_in_place_of_a_person_and_ends_the_server_by_ending_whatever_lasts(tmp_path):
     command = [sys.executable, "-m", "pretouch.cli", "serve-fci", "--port", "0", "--lockstep", "--stdin"]
     typed = "time\nharder\nguide\n0,1,0:1e6\n"
     done = subprocess.run(command, input=typed, capture_output=True, text=True, timeout=60.0, cwd=tmp_path)
@@ -148,9 +142,7 @@ def test_a_program_types_in_place_of_a_person_and_ends_the_server_by_ending_what
     assert refused.startswith("'harder' is not a push")
 
 
-def test_all_that_was_typed_before_the_end_of_a_pipe_is_done_once_the_arm_has_come_to_rest(
-    arm: ServedArm, pipe: tuple[IO[str], IO[bytes]], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_all_that_was_typed_before_the_end_of_a_pipe_is_done_once_the_arm_has_come_to_rest(arm, pipe, capsys):
     arm.begin(Generator.JOINT_VELOCITY, Controller.JOINT_IMPEDANCE)
     arm.step(Setpoint(np.zeros(7)))
     arm.step(Setpoint(np.zeros(7), finished=True))
@@ -172,9 +164,7 @@ def test_all_that_was_typed_before_the_end_of_a_pipe_is_done_once_the_arm_has_co
 
 
 @pytest.mark.parametrize("lockstep", [False, True])
-def test_an_arm_that_is_led_by_hand_hears_what_is_typed_but_in_lockstep(
-    arm: ServedArm, pipe: tuple[IO[str], IO[bytes]], lockstep: bool
-) -> None:
+def test_an_arm_that_is_led_by_hand_hears_what_is_typed_but_in_lockstep(arm, pipe, lockstep):
     typed = TypedPushes(arm, pipe[0], program=True, lockstep=lockstep)
     pipe[1].write(b"guide\n0,5,0:0.3\n")
     typed.take()
@@ -190,9 +180,7 @@ def test_an_arm_that_is_led_by_hand_hears_what_is_typed_but_in_lockstep(
     assert arm.mode is RobotMode.IDLE
 
 
-def test_a_line_without_an_end_is_not_kept_whole(
-    arm: ServedArm, pipe: tuple[IO[str], IO[bytes]], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_line_without_an_end_is_not_kept_whole(arm, pipe, capsys):
     typed = TypedPushes(arm, pipe[0], program=True)
     for _ in range(50):
         pipe[1].write(b"0,15,0" + 4000 * b" ")
@@ -207,9 +195,7 @@ def test_a_line_without_an_end_is_not_kept_whole(
     assert not arm.true_force.any()
 
 
-def test_a_push_that_is_over_is_said_with_what_the_arm_measured_of_it(
-    arm: ServedArm, pipe: tuple[IO[str], IO[bytes]], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_push_that_is_over_is_said_with_what_the_arm_measured_of_it(arm, pipe, capsys):
     typed = TypedPushes(arm, pipe[0], program=True)
     pipe[1].write(b"0,20,0:0.4\n")
     for _ in range(650):
@@ -221,7 +207,7 @@ def test_a_push_that_is_over_is_said_with_what_the_arm_measured_of_it(
     assert 15.0 < float(found[1]) < 30.0
 
 
-def test_nobody_types_where_there_is_no_terminal(arm: ServedArm, tmp_path: Path) -> None:
+def test_nobody_types_where_there_is_no_terminal(arm, tmp_path):
     (tmp_path / "typed").write_text("+y\n")
     with (tmp_path / "typed").open() as file:
         typed = TypedPushes(arm, file)

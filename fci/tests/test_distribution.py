@@ -20,18 +20,18 @@ sys.exit(main(sys.argv[1:]))
 """
 
 
-def test_it_is_of_the_products_version_and_needs_that() -> None:
+def test_it_is_of_the_products_version_and_needs_that():
     assert PROJECT["version"] == pretouch.__version__
     assert PROJECT["dependencies"] == [f"pretouch=={pretouch.__version__}"]
 
 
-def test_its_commands_are_those_the_product_names() -> None:
+def test_its_commands_are_those_the_product_names():
     assert tuple(PROJECT["entry-points"][GROUP]) == FCI
     assert set(FCI) <= set(plugins.names(GROUP))
     assert all(command_class(name) for name in FCI)
 
 
-def test_it_serves_without_the_lab_and_without_any_extra(tmp_path: Path) -> None:
+def test_it_serves_without_the_lab_and_without_any_extra(tmp_path):
     command = [sys.executable, "-u", "-c", _ALONE, "serve-fci", "--port", "0", "--scene", "static"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=tmp_path) as server:
         assert server.stdout is not None

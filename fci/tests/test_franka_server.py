@@ -5,7 +5,6 @@ import socket
 import subprocess
 import sys
 import tomllib
-from collections.abc import Callable
 from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
@@ -20,8 +19,7 @@ from tests.needs import skip_for
 
 from pretouch.errors import ParameterError, RobotError
 from pretouch_fci import testing
-from pretouch_fci.testing import FrankaServer
-from pretouch_fci.wire import ERRORS, GRIPPER_PORT, PORT, PROTOCOLS, RobotKind
+from pretouch_fci.wire import ERRORS, GRIPPER_PORT, PORT, PROTOCOLS
 
 pytest_plugins = ["pytester", "pretouch_fci.pytest_plugin"]
 
@@ -31,7 +29,7 @@ _STILL = np.zeros(7)
 
 
 @pytest.fixture
-def connected(raw: Callable[..., RawClient]) -> Callable[[FrankaServer, RobotKind], RawClient]:
+def connected(raw):
     """Connect clients that speak bytes."""
     return lambda server, kind: raw(SimpleNamespace(protocol=PROTOCOLS[kind], address=(server.host, PORT)))
 
@@ -51,9 +49,7 @@ def _motion(client: RawClient, seconds: float, qd: Any = _STILL) -> np.void:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", sorted(PROTOCOLS))
-def test_pushes_come_when_they_are_wanted_and_the_truth_is_the_same_each_time(
-    franka_server: Any, connected: Any, kind: RobotKind
-) -> None:
+def test_pushes_come_when_they_are_wanted_and_the_truth_is_the_same_each_time(franka_server, connected, kind):
     truths = []
     for _ in range(2):
         server = franka_server(robot=kind)
@@ -82,9 +78,7 @@ _IN_A_ROOM = """<mujoco><worldbody><site name="base" pos="1 2 .7"/>
 
 @pytest.mark.slow
 @pytest.mark.parametrize("given", ["box", "scene"])
-def test_a_box_is_run_into_and_the_server_says_why_the_motion_ended(
-    franka_server: Any, connected: Any, tmp_path: Path, given: str
-) -> None:
+def test_a_box_is_run_into_and_the_server_says_why_the_motion_ended(franka_server, connected, tmp_path, given):
     (tmp_path / "world.xml").write_text(_IN_A_ROOM)
     options = {"box": ("0.35,0.3,0.5:0.6,0.1,0.6",), "scene": tmp_path / "world.xml"}
     server = franka_server(robot="fr3", **{given: options[given]})
@@ -98,7 +92,7 @@ def test_a_box_is_run_into_and_the_server_says_why_the_motion_ended(
 
 
 @pytest.mark.slow
-def test_a_person_comes_and_pushes(franka_server: Any, connected: Any) -> None:
+def test_a_person_comes_and_pushes(franka_server, connected):
     server = franka_server(scene="dynamic", seed=1)
     client = connected(server, "panda")
     assert client.request("SetCollisionBehavior", np.full(52, 90.0).tobytes()) == b"\0"
@@ -109,7 +103,7 @@ def test_a_person_comes_and_pushes(franka_server: Any, connected: Any) -> None:
 
 
 @pytest.mark.slow
-def test_an_object_is_grasped_and_loads_the_arm_the_same_each_time(franka_server: Any, connected: Any) -> None:
+def test_an_object_is_grasped_and_loads_the_arm_the_same_each_time(franka_server, connected):
     truths = []
     for _ in range(2):
         server = franka_server(object="0.04:0.8")
@@ -127,13 +121,13 @@ def test_an_object_is_grasped_and_loads_the_arm_the_same_each_time(franka_server
     np.testing.assert_array_equal(truths[0].q, truths[1].q)
 
 
-def test_it_stands_where_the_test_wants_it_to(franka_server: Any, connected: Any) -> None:
+def test_it_stands_where_the_test_wants_it_to(franka_server, connected):
     wanted = [-0.1, -0.5, 0.1, -2.0, 0.0, 1.6, 0.7]
     server = franka_server(start=",".join(map(str, wanted)))
     np.testing.assert_allclose(connected(server, "panda").state()["q"], wanted, atol=2e-2)
 
 
-def test_the_user_stop_ends_a_motion(franka_server: Any, connected: Any) -> None:
+def test_the_user_stop_ends_a_motion(franka_server, connected):
     server = franka_server()
     client = connected(server, "panda")
     state = client.turn(client.begun(), _STILL)
@@ -145,9 +139,7 @@ def test_the_user_stop_ends_a_motion(franka_server: Any, connected: Any) -> None
     client.state_where(lambda s: s["robot_mode"] == 1)
 
 
-def test_in_a_motion_the_truth_is_not_told_and_that_is_said(
-    franka_server: Any, connected: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_in_a_motion_the_truth_is_not_told_and_that_is_said(franka_server, connected, monkeypatch):
     server = franka_server()
     client = connected(server, "panda")
     client.turn(client.begun(), _STILL)
@@ -156,17 +148,17 @@ def test_in_a_motion_the_truth_is_not_told_and_that_is_said(
         _ = server.truth
 
 
-def test_each_option_of_the_command_is_one_of_the_fixture(franka_server: Any) -> None:
+def test_each_option_of_the_command_is_one_of_the_fixture(franka_server):
     server = franka_server(lockstep=False, push=["0:0,5,0", "1:0,5,0"], start="path", patience=3)
     assert server.said == (f"Listening at {server.host}:{PORT} (FCI 5, real time), gripper at port 1338.",)
 
 
-def test_what_cannot_be_served_is_an_error_that_says_why(franka_server: Any) -> None:
+def test_what_cannot_be_served_is_an_error_that_says_why(franka_server):
     with pytest.raises(RobotError, match=r"(?s)The simulated robot has ended: .*--scenes.*--scene "):
         franka_server(scenes="static")
 
 
-def test_what_is_no_push_and_a_server_that_has_gone_are_said(franka_server: Any) -> None:
+def test_what_is_no_push_and_a_server_that_has_gone_are_said(franka_server):
     server = franka_server()
     for wrong in ((0, np.nan, 0), (0, 2000, 0), (0, 1)):
         with pytest.raises(ParameterError, match="The push is "):
@@ -202,7 +194,7 @@ def test_of_something_else():
 """
 
 
-def test_whatever_a_test_does_its_server_ends_and_what_it_said_is_reported(pytester: pytest.Pytester) -> None:
+def test_whatever_a_test_does_its_server_ends_and_what_it_said_is_reported(pytester):
     pytester.makepyfile(_INNER)
     done = pytester.runpytest_subprocess("-p", "pretouch_fci.pytest_plugin", "-W", "error")
     done.assert_outcomes(failed=1, passed=1)
@@ -212,7 +204,7 @@ def test_whatever_a_test_does_its_server_ends_and_what_it_said_is_reported(pytes
         nobody.connect((host, PORT))
 
 
-def test_a_killed_test_run_leaves_no_server_behind(tmp_path: Path) -> None:
+def test_a_killed_test_run_leaves_no_server_behind(tmp_path):
     program = (
         "import os, sys\nfrom pretouch_fci.testing import FrankaServer\nserver = FrankaServer()\n"
         "print(server.host, flush=True)\nsys.stdin.read()"
@@ -227,7 +219,7 @@ def test_a_killed_test_run_leaves_no_server_behind(tmp_path: Path) -> None:
                 assert tcp.recv(1) == b""
 
 
-def test_a_run_that_does_not_use_it_loads_nothing_and_warns_of_nothing(pytester: pytest.Pytester) -> None:
+def test_a_run_that_does_not_use_it_loads_nothing_and_warns_of_nothing(pytester):
     pytester.makepyfile(
         "import sys\ndef test_nothing():\n"
         "    assert not {'numpy', 'mujoco', 'numba', 'pretouch_fci.testing', 'pretouch.errors'} & set(sys.modules)"
@@ -236,7 +228,7 @@ def test_a_run_that_does_not_use_it_loads_nothing_and_warns_of_nothing(pytester:
     done.assert_outcomes(passed=1, warnings=0)
 
 
-def test_pytest_finds_it_and_nothing_else_of_the_distribution_needs_pytest() -> None:
+def test_pytest_finds_it_and_nothing_else_of_the_distribution_needs_pytest():
     points = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["entry-points"]["pytest11"]
     assert points == {"pretouch_fci.pytest_plugin": "pretouch_fci.pytest_plugin"}
     source = ROOT / "src"
@@ -247,7 +239,7 @@ def test_pytest_finds_it_and_nothing_else_of_the_distribution_needs_pytest() -> 
 
 
 @pytest.mark.slow
-def test_the_example_of_the_readme_passes_and_finds_a_program_that_goes_on(pytester: pytest.Pytester) -> None:
+def test_the_example_of_the_readme_passes_and_finds_a_program_that_goes_on(pytester):
     """In one process with the vendor's library, which holds the interpreter while it waits for a state."""
     if find_spec("pylibfranka") is None:
         skip_for("make franka")
@@ -259,7 +251,7 @@ def test_the_example_of_the_readme_passes_and_finds_a_program_that_goes_on(pytes
     pytester.runpytest_subprocess("-p", "pretouch_fci.pytest_plugin", "-W", "error").assert_outcomes(failed=1)
 
 
-def test_guided_by_hand_the_arm_goes_where_it_is_pushed(franka_server: Any) -> None:
+def test_guided_by_hand_the_arm_goes_where_it_is_pushed(franka_server):
     server = franka_server()
     server.guide()
     server.push((0, 15, 0), seconds=0.3)

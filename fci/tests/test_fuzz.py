@@ -2,7 +2,6 @@
 
 import socket
 import time
-from collections.abc import Callable, Iterator
 from contextlib import suppress
 
 import numpy as np
@@ -34,7 +33,7 @@ WHOLE = b"".join(REQUESTS)
 
 
 @pytest.fixture(scope="module")
-def read() -> Iterator[Callable[[bytes], None]]:
+def read():
     """Have an arm take in what a client sends."""
     with arm_of() as arm:
 
@@ -68,14 +67,14 @@ def _connected() -> tuple[socket.socket, socket.socket]:
         return server.accept()[0], theirs
 
 
-def test_whole_requests_are_taken_in(read: Callable[[bytes], None]) -> None:
+def test_whole_requests_are_taken_in(read):
     read(WHOLE)
     for request in REQUESTS:
         read(request)
 
 
 @pytest.mark.slow
-def test_whatever_is_changed_is_no_worse_than_the_end_of_the_connection(read: Callable[[bytes], None]) -> None:
+def test_whatever_is_changed_is_no_worse_than_the_end_of_the_connection(read):
     @settings(max_examples=200, suppress_health_check=list(HealthCheck))
     @given(changes, changes)
     def fuzzed(first: list[Change], second: list[Change]) -> None:

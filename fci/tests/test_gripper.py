@@ -3,7 +3,7 @@
 import math
 import socket
 import struct
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -15,7 +15,6 @@ from pretouch.errors import ParameterError, RobotError
 from pretouch_fci.gripper import HOMING, Course, Gripper, GripperObject, Outcome, grasp_of, move_of, object_of
 from pretouch_fci.options import ServeOptions
 from pretouch_fci.server import FciServer
-from pretouch_fci.wire import RobotKind
 
 _CUBE = GripperObject(0.04, 0.5)
 _CONNECT, _HOMING, _GRASP, _MOVE, _STOP = range(5)
@@ -77,7 +76,7 @@ class GripperClient:
 
 
 @pytest.fixture
-def client() -> Iterator[Callable[..., GripperClient]]:
+def client():
     """Make clients of the gripper of a server, connected unless it is said otherwise."""
     made: list[GripperClient] = []
 
@@ -106,7 +105,7 @@ def _done(gripper: Gripper, course: Course | None) -> tuple[Gripper, Outcome, fl
 # the fingers
 
 
-def test_fingers_move_at_the_speed_that_is_asked_for_and_at_most_as_fast_as_the_vendor_says() -> None:
+def test_fingers_move_at_the_speed_that_is_asked_for_and_at_most_as_fast_as_the_vendor_says():
     moved, outcome, seconds = _done(Gripper(), move_of(0.03, 0.05))
     assert (moved.width, outcome) == (0.03, Outcome.SUCCESS)
     assert seconds == pytest.approx(1.0, abs=2e-3)
@@ -123,9 +122,7 @@ def test_fingers_move_at_the_speed_that_is_asked_for_and_at_most_as_fast_as_the_
         (0.044, 0.005, 0.005, True), (0.046, 0.005, 0.005, False), (0.0, 0.0, 0.08, True), (0.04, 0.0, 0.0, False),
     ],
 )  # fmt: skip
-def test_an_object_is_grasped_if_its_width_is_within_the_tolerances(
-    width: float, inner: float, outer: float, grasped: bool
-) -> None:
+def test_an_object_is_grasped_if_its_width_is_within_the_tolerances(width, inner, outer, grasped):
     gripper, outcome, _ = _done(Gripper(_CUBE), grasp_of(width, inner, outer, 0.1, 20.0))
     assert gripper.width == _CUBE.width
     assert gripper.grasped is grasped
@@ -133,7 +130,7 @@ def test_an_object_is_grasped_if_its_width_is_within_the_tolerances(
     assert gripper.load_kg == (_CUBE.mass if grasped else 0.0)
 
 
-def test_a_grasp_of_nothing_is_unsuccessful_and_carries_nothing() -> None:
+def test_a_grasp_of_nothing_is_unsuccessful_and_carries_nothing():
     gripper, outcome, _ = _done(Gripper(), grasp_of(0.04, 0.005, 0.005, 0.1, 20.0))
     assert (gripper.width, gripper.grasped, outcome) == (0.0, False, Outcome.UNSUCCESSFUL)
     # by the vendor's words the distance decides: closed fingers are within these tolerances
@@ -141,7 +138,7 @@ def test_a_grasp_of_nothing_is_unsuccessful_and_carries_nothing() -> None:
     assert (gripper.grasped, gripper.load_kg, outcome) == (True, 0.0, Outcome.SUCCESS)
 
 
-def test_an_object_is_held_until_the_fingers_open() -> None:
+def test_an_object_is_held_until_the_fingers_open():
     held = _done(Gripper(_CUBE), grasp_of(0.04, 0.005, 0.005, 0.1, 20.0))[0]
     closer, outcome, _ = _done(held, move_of(0.01, 0.1))
     assert (closer.width, closer.grasped, outcome) == (0.04, True, Outcome.UNSUCCESSFUL)
@@ -152,7 +149,7 @@ def test_an_object_is_held_until_the_fingers_open() -> None:
 
 @pytest.mark.parametrize("bad", [-1.0, math.nan, math.inf])
 @pytest.mark.parametrize("which", range(5))
-def test_widths_tolerances_speeds_and_forces_that_it_does_not_have_are_no_command(which: int, bad: float) -> None:
+def test_widths_tolerances_speeds_and_forces_that_it_does_not_have_are_no_command(which, bad):
     values = [0.04, 0.01, 0.01, 0.1, 20.0]
     assert grasp_of(*values) is not None
     values[which] = bad
@@ -160,7 +157,7 @@ def test_widths_tolerances_speeds_and_forces_that_it_does_not_have_are_no_comman
     assert move_of(values[0], values[3]) is None or which in (1, 2, 4)
 
 
-def test_an_object_is_written_with_width_and_mass() -> None:
+def test_an_object_is_written_with_width_and_mass():
     assert object_of("0.04:0.5") == _CUBE
     for text in ("0.04", "0.08:1", "0:1", "0.04:0", "0.04:4", "nan:1", "0.04:1:2", "wide:1"):
         with pytest.raises(ParameterError, match=r"give width and mass, such as 0\.04:0\.5"):
@@ -170,14 +167,14 @@ def test_an_object_is_written_with_width_and_mass() -> None:
 # its port
 
 
-def test_states_say_width_grasp_and_a_time_that_rises(serve: Any, client: Any) -> None:
+def test_states_say_width_grasp_and_a_time_that_rises(serve, client):
     gripper = client(serve(lockstep=False))
     first, second = gripper.state(), gripper.state()
     assert first[1:] == second[1:] == (0.08, 0.08, False, 30)
     assert second.message_id - first.message_id == 10
 
 
-def test_a_move_takes_its_time_in_real_time(serve: Any, client: Any) -> None:
+def test_a_move_takes_its_time_in_real_time(serve, client):
     gripper = client(serve(lockstep=False))
     before = gripper.state()
     gripper.send(_MOVE, 1, struct.pack("<dd", 0.06, 0.1))
@@ -191,7 +188,7 @@ def test_a_move_takes_its_time_in_real_time(serve: Any, client: Any) -> None:
 
 
 @pytest.mark.parametrize(("command", "body"), [(_STOP, b""), (_MOVE, struct.pack("<dd", 0.08, 0.1)), (_HOMING, b"")])
-def test_a_command_ends_the_one_before_which_is_aborted(serve: Any, client: Any, command: int, body: bytes) -> None:
+def test_a_command_ends_the_one_before_which_is_aborted(serve, client, command, body):
     served = serve(lockstep=False)
     gripper = client(served)
     gripper.send(_MOVE, 1, struct.pack("<dd", 0.0, 0.01))
@@ -205,7 +202,7 @@ def test_a_command_ends_the_one_before_which_is_aborted(serve: Any, client: Any,
         assert gripper.state().width == stopped > 0.0
 
 
-def test_in_lockstep_a_command_takes_its_way_at_once(serve: Any, client: Any) -> None:
+def test_in_lockstep_a_command_takes_its_way_at_once(serve, client):
     gripper = client(serve(setup={"object": _CUBE}))
     assert gripper.request(_HOMING) == _SUCCESS
     assert gripper.request(_GRASP, 0.04, 0.005, 0.005, 5e-324, 20.0) == _SUCCESS
@@ -216,9 +213,7 @@ def test_in_lockstep_a_command_takes_its_way_at_once(serve: Any, client: Any) ->
     assert gripper.request(_STOP) == _SUCCESS
 
 
-def test_the_arm_carries_what_is_grasped_until_the_fingers_open(
-    serve: Any, raw: Any, client: Any, kind: RobotKind
-) -> None:
+def test_the_arm_carries_what_is_grasped_until_the_fingers_open(serve, raw, client, kind):
     served = serve(kind, setup={"object": _CUBE})
     arm, gripper = raw(served), client(served)
     payload = served.arm.plant.mj_model.body("payload").mass
@@ -232,9 +227,7 @@ def test_the_arm_carries_what_is_grasped_until_the_fingers_open(
     assert not any("ended" in line for line in served.said)
 
 
-def test_in_a_motion_in_lockstep_it_is_served_while_the_arm_waits_for_its_command(
-    serve: Any, raw: Any, client: Any
-) -> None:
+def test_in_a_motion_in_lockstep_it_is_served_while_the_arm_waits_for_its_command(serve, raw, client):
     served = serve(setup={"object": _CUBE})
     arm, gripper = raw(served), client(served)
     state = arm.turn(arm.begun(), np.zeros(7))
@@ -244,7 +237,7 @@ def test_in_a_motion_in_lockstep_it_is_served_while_the_arm_waits_for_its_comman
     assert arm.turn(state, np.zeros(7))["message_id"] == state["message_id"] + 1
 
 
-def test_a_second_client_is_turned_away_and_the_next_finds_what_the_first_left(serve: Any, client: Any) -> None:
+def test_a_second_client_is_turned_away_and_the_next_finds_what_the_first_left(serve, client):
     served = serve(setup={"object": _CUBE})
     first = client(served)
     assert first.request(_GRASP, 0.04, 0.005, 0.005, 0.1, 20.0) == _SUCCESS
@@ -254,7 +247,7 @@ def test_a_second_client_is_turned_away_and_the_next_finds_what_the_first_left(s
     assert client(served).state().is_grasped
 
 
-def test_without_its_port_the_arm_is_not_served_either(host: str) -> None:
+def test_without_its_port_the_arm_is_not_served_either(host):
     arm = arm_of()
     with socket.create_server((host, 1338)), pytest.raises(RobotError, match=f"Listening on {host}:1338 failed"):
         FciServer(arm, ServeOptions(host))
@@ -262,9 +255,7 @@ def test_without_its_port_the_arm_is_not_served_either(host: str) -> None:
 
 
 @pytest.mark.parametrize("message", [struct.pack("<HIIHH", _CONNECT, 1, 14, 3, 9), b"GET / HTTP/1.1\r\n\r\n"])
-def test_a_client_that_sends_what_is_no_request_is_let_go_and_the_fingers_stop(
-    serve: Any, client: Any, message: bytes
-) -> None:
+def test_a_client_that_sends_what_is_no_request_is_let_go_and_the_fingers_stop(serve, client, message):
     served = serve(lockstep=False)
     first = client(served)
     first.send(_MOVE, 1, struct.pack("<dd", 0.0, 0.01))
@@ -276,7 +267,7 @@ def test_a_client_that_sends_what_is_no_request_is_let_go_and_the_fingers_stop(
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_nothing_that_is_sent_kills_the_server(serve: Any, client: Any, seed: int) -> None:
+def test_nothing_that_is_sent_kills_the_server(serve, client, seed):
     served, rng = serve(), np.random.default_rng([seed, 9])
     for _ in range(30):
         one = client(served)
@@ -295,7 +286,7 @@ def test_nothing_that_is_sent_kills_the_server(serve: Any, client: Any, seed: in
 # the vendor's clients
 
 
-def test_the_vendors_client_grasps_and_lets_go(serve: Any, kind: RobotKind) -> None:
+def test_the_vendors_client_grasps_and_lets_go(serve, kind):
     done = serve(kind, setup={"object": _CUBE}).ask("gripper")
     assert done["first"] == [0.08, 0.08, False, 30]
     assert done["results"] == [True, True, False, True, False, True]

@@ -33,7 +33,7 @@ def _limits(kind: str) -> MotionLimits:
     return motion_limits(_MODELS[kind], kind)  # type: ignore[arg-type]
 
 
-def test_the_fr3s_speed_limits_are_those_the_vendor_publishes() -> None:
+def test_the_fr3s_speed_limits_are_those_the_vendor_publishes():
     limits = _limits("fr3")
     q = _READY.copy()
     q[0] = 2.7
@@ -46,7 +46,7 @@ def test_the_fr3s_speed_limits_are_those_the_vendor_publishes() -> None:
 
 
 @given(st.lists(st.floats(-2.0, 2.0), min_size=7, max_size=7))
-def test_braking_keeps_the_acceleration_limit_and_ends_at_rest(speeds: list[float]) -> None:
+def test_braking_keeps_the_acceleration_limit_and_ends_at_rest(speeds):
     limits, qd = _limits("panda"), np.array(speeds)
     for _ in range(270):
         slower = limits.braked(qd)
@@ -56,7 +56,7 @@ def test_braking_keeps_the_acceleration_limit_and_ends_at_rest(speeds: list[floa
     assert not qd.any()
 
 
-def test_a_motion_that_breaks_off_ends_in_braking_at_the_acceleration_limit() -> None:
+def test_a_motion_that_breaks_off_ends_in_braking_at_the_acceleration_limit():
     arm = arm_of()
     arm.begin(Generator.JOINT_VELOCITY, Controller.JOINT_IMPEDANCE)
     for k in range(1, 501):
@@ -72,7 +72,7 @@ def test_a_motion_that_breaks_off_ends_in_braking_at_the_acceleration_limit() ->
     assert arm.mode is RobotMode.REFLEX
 
 
-def test_nineteen_lost_commands_are_bridged_at_the_same_acceleration() -> None:
+def test_nineteen_lost_commands_are_bridged_at_the_same_acceleration():
     motion = Motion(_limits("panda"), Controller.JOINT_IMPEDANCE, JointVelocity())
     for k in range(1, 4):
         assert motion.follow(_READY, Setpoint(np.full(7, 1e-3 * k))) is None
@@ -83,7 +83,7 @@ def test_nineteen_lost_commands_are_bridged_at_the_same_acceleration() -> None:
     assert motion.follow(_READY, None) == Ending("reflex", ("communication_constraints_violation",))
 
 
-def test_thresholds_are_those_of_what_the_arm_does() -> None:
+def test_thresholds_are_those_of_what_the_arm_does():
     # lower and upper torque, accelerating then steady; then forces alike
     body = np.concatenate([np.repeat([10.0, 20.0, 1.0, 2.0], 7), np.repeat([30.0, 60.0, 3.0, 6.0], 6)])
     contacts, behavior = Contacts(), CollisionBehavior.of(body)
@@ -101,7 +101,7 @@ def test_thresholds_are_those_of_what_the_arm_does() -> None:
     assert not contacts.joint_collision.any()
 
 
-def test_pushes_and_drops_are_read() -> None:
+def test_pushes_and_drops_are_read():
     assert push_of("2.5:0,15,-3") == TcpPush(2.5, (0.0, 15.0, -3.0), 0.5)
     assert push_of("0:1,2,3:0.25") == TcpPush(0.0, (1.0, 2.0, 3.0), 0.25)
     drop = drop_of("3/50")
@@ -111,19 +111,19 @@ def test_pushes_and_drops_are_read() -> None:
 @pytest.mark.parametrize(
     "text", ["1:0,1e9,0", "1:0,0,-1001", "1", "1:2,3", "a:1,2,3", "1:1,2,3:0", "-1:1,2,3", "1:nan,0,0", "1:1,2,3:1:1"]
 )
-def test_what_is_no_push_is_refused(text: str) -> None:
+def test_what_is_no_push_is_refused(text):
     with pytest.raises(ParameterError, match=r"as 2\.0:0,15,0:0\.5|give at most 1000 N along each axis"):
         push_of(text)
 
 
 @pytest.mark.parametrize("text", ["", "3", "3/", "0/50", "50/50", "-1/3", "a/b"])
-def test_what_is_no_share_to_drop_is_refused(text: str) -> None:
+def test_what_is_no_share_to_drop_is_refused(text):
     with pytest.raises(ParameterError, match="as 3/50"):
         drop_of(text)
 
 
 @pytest.mark.parametrize("kind", ["panda", "fr3"])
-def test_the_urdf_is_the_arm_up_to_its_flange(kind: str) -> None:
+def test_the_urdf_is_the_arm_up_to_its_flange(kind):
     model = _MODELS[kind]
     mj = mujoco.MjModel.from_xml_string(
         urdf_of(model).replace("<link", '<mujoco><compiler fusestatic="false"/></mujoco><link', 1)
@@ -142,14 +142,14 @@ def test_the_urdf_is_the_arm_up_to_its_flange(kind: str) -> None:
     np.testing.assert_allclose(ranges[:, 1], model.q_max if envelope is None else envelope.q_upper)
 
 
-def test_the_wrench_is_by_the_robot_and_about_the_stiffness_frame() -> None:
+def test_the_wrench_is_by_the_robot_and_about_the_stiffness_frame():
     # 10 N along y at a point 0.1 m in x from the frame: a moment of 1 Nm about z
     told = by_robot_at(np.array([0.0, 10.0, 0.0, 0.0, 0.0, 0.0]), np.array([0.1, 0.0, 0.0]), np.zeros(3))
     np.testing.assert_allclose(told, [0.0, -10.0, 0.0, 0.0, 0.0, -1.0])
     assert not np.signbit(by_robot_at(np.zeros(6), np.ones(3), np.zeros(3))).any()
 
 
-def test_near_a_singularity_the_wrench_is_exactly_zero() -> None:
+def test_near_a_singularity_the_wrench_is_exactly_zero():
     q = np.array([0.0, 0.0, np.pi / 2, -0.07, 0.0, 3.2126, 0.0])
     arm = arm_of(q=q)
     assert arm.report.wrench is None
@@ -158,7 +158,7 @@ def test_near_a_singularity_the_wrench_is_exactly_zero() -> None:
     assert np.any(state["tau_ext_hat_filtered"])
 
 
-def test_at_rest_the_torques_hold_the_arm() -> None:
+def test_at_rest_the_torques_hold_the_arm():
     arm = arm_of()
     gravity = arm.model.dynamics(arm.report.q, _ZERO).gravity
     # but for what the model does not know of masses and payload
@@ -166,7 +166,7 @@ def test_at_rest_the_torques_hold_the_arm() -> None:
     np.testing.assert_allclose(arm.torques.desired, arm.torques.measured - gravity, atol=0.3)
 
 
-def test_an_arm_with_other_joints_does_not_speak_it() -> None:
+def test_an_arm_with_other_joints_does_not_speak_it():
     six = SimpleNamespace(n=6, description=panda())
     with pytest.raises(RobotModelError, match="only arms with 7"):
         arm_of(model=six, q=_ZERO)

@@ -4,7 +4,6 @@ import ctypes
 import platform
 import shutil
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -23,7 +22,7 @@ _GRAVITY = np.array([0.3, -0.2, -9.7])
 
 
 @pytest.fixture(scope="module", params=[panda, fr3])
-def model(request: pytest.FixtureRequest) -> RobotModel:
+def model(request):
     return RobotModel(request.param())
 
 
@@ -38,7 +37,7 @@ Call = Callable[..., FloatArray]
 
 
 @pytest.fixture(scope="module")
-def call(model: RobotModel, tmp_path_factory: pytest.TempPathFactory) -> Call:
+def call(model, tmp_path_factory):
     """Call a function of the library with its arguments, which are followed by where it writes."""
     answer = library_answer(model, _request(), print)
     assert answer[0] == 0
@@ -64,7 +63,7 @@ def _turned(rng: np.random.Generator) -> FloatArray:
     return matrix.reshape(3, 3)
 
 
-def test_poses_and_jacobians_of_all_frames(model: RobotModel, call: Call) -> None:
+def test_poses_and_jacobians_of_all_frames(model, call):
     rng, flange = np.random.default_rng(0), flange_of(model)
     frames = [*range(2, 9), flange]
     for q in rng.uniform(model.q_min, model.q_max, (20, 7)):
@@ -98,7 +97,7 @@ def _loaded(model: RobotModel, mass: float, com: FloatArray, inertia: FloatArray
     return built, mujoco.MjData(built)
 
 
-def test_mass_matrix_coriolis_and_gravity_with_loads(model: RobotModel, call: Call) -> None:
+def test_mass_matrix_coriolis_and_gravity_with_loads(model, call):
     rng = np.random.default_rng(1)
     for _ in range(20):
         mass, com, R = float(rng.uniform(0.1, 3.0)), rng.uniform(-0.2, 0.2, 3), _turned(rng)
@@ -122,7 +121,7 @@ def test_mass_matrix_coriolis_and_gravity_with_loads(model: RobotModel, call: Ca
     ("machine", "system", "words"),
     [(0, 1, "Windows on x86_64"), (1, 0, "Linux on i686"), (7, 9, "number 9 on number 7")],
 )
-def test_another_machine_than_the_servers_gets_none(model: RobotModel, machine: int, system: int, words: str) -> None:
+def test_another_machine_than_the_servers_gets_none(model, machine, system, words):
     said: list[str] = []
     assert library_answer(model, bytes([machine, system]), said.append) == b"\1"
     here = f"{platform.system()} on {platform.machine()}"
@@ -130,14 +129,14 @@ def test_another_machine_than_the_servers_gets_none(model: RobotModel, machine: 
     assert said == [f"The client has no model library: {expected}"]
 
 
-def test_without_a_compiler_there_is_none(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_without_a_compiler_there_is_none(monkeypatch, tmp_path):
     request, said = _request(), []
     monkeypatch.setenv("PATH", str(tmp_path))
     assert library_answer(RobotModel(panda()), request, said.append) == b"\1"
     assert said == ["The client has no model library: there is no C compiler: install one that is found as cc."]
 
 
-def test_what_the_compiler_says_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_what_the_compiler_says_is_told(monkeypatch, tmp_path):
     request, said = _request(), []
     compiler = tmp_path / "cc"
     compiler.write_text("#!/bin/sh\necho cannot find math.h >&2\nexit 1\n")

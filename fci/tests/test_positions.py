@@ -1,7 +1,6 @@
 """Motions through joint positions: by raw bytes, and each limit by itself without a server."""
 
 import time
-from typing import Any
 
 import numpy as np
 import pytest
@@ -20,9 +19,7 @@ _JOINT_7 = np.eye(7)[6]
 
 
 @pytest.mark.parametrize(("drop", "rate", "off"), [(None, 1.0, 1e-6), (Drop(2, 50), 0.96, 1e-5)])
-def test_the_arm_is_where_commands_say_though_some_are_lost(
-    serve: Any, raw: Any, kind: RobotKind, drop: Drop | None, rate: float, off: float
-) -> None:
+def test_the_arm_is_where_commands_say_though_some_are_lost(serve, raw, kind, drop, rate, off):
     client = raw(serve(kind, drop=drop))
     state = client.begun(0)
     start = state["q_d"].astype(np.float64)
@@ -43,7 +40,7 @@ def test_the_arm_is_where_commands_say_though_some_are_lost(
 @pytest.mark.parametrize(
     ("kind", "off"), [("panda", 0.2), ("panda", 1e-3), ("panda", -2e-5), ("panda", None), ("fr3", 0.2), ("fr3", 2e-3)]
 )
-def test_the_first_position_must_be_where_the_arm_is(serve: Any, raw: Any, kind: RobotKind, off: float | None) -> None:
+def test_the_first_position_must_be_where_the_arm_is(serve, raw, kind, off):
     """Without an offset it is the common mistake: a Panda begins at q_d, and not at q."""
     client = raw(serve(kind))
     state = client.begun(0)
@@ -53,7 +50,7 @@ def test_the_first_position_must_be_where_the_arm_is(serve: Any, raw: Any, kind:
     np.testing.assert_array_equal(after["q_d"], state["q_d"])
 
 
-def test_an_fr3_may_begin_where_it_measurably_is(serve: Any, raw: Any) -> None:
+def test_an_fr3_may_begin_where_it_measurably_is(serve, raw):
     client = raw(serve("fr3"))
     state = client.begun(0)
     q = state["q"].astype(np.float64)
@@ -66,7 +63,7 @@ def test_an_fr3_may_begin_where_it_measurably_is(serve: Any, raw: Any) -> None:
         state = client.moved(state, q)
 
 
-def test_in_real_time_the_first_states_of_a_motion_wait_for_their_answer_too(serve: Any, raw: Any) -> None:
+def test_in_real_time_the_first_states_of_a_motion_wait_for_their_answer_too(serve, raw):
     """libfranka filters the second command with what the robot took of the first, which must not be lost."""
     client = raw(serve("fr3", lockstep=False, grace_s=0.1))
     client.begun(0)
@@ -114,7 +111,7 @@ def _reflex(name: str) -> Ending:
 
 
 @pytest.mark.parametrize("kind", ["panda", "fr3"])
-def test_each_limit_has_its_own_name(kind: RobotKind) -> None:
+def test_each_limit_has_its_own_name(kind):
     most, q = Follower(kind).limits, Follower(kind).q
     fast, hard, jerked = most.qd[6], most.qdd[6], most.qddd[6]
     # a little below each limit, then above it, with the others kept
@@ -130,9 +127,7 @@ def test_each_limit_has_its_own_name(kind: RobotKind) -> None:
 @pytest.mark.parametrize(
     ("kind", "way", "name"), [("panda", 0.02, "position_limits_violation"), ("fr3", 0.2, "velocity_limits_violation")]
 )
-def test_towards_the_end_of_a_joint_the_panda_goes_and_the_fr3_must_be_slower(
-    kind: RobotKind, way: float, name: str
-) -> None:
+def test_towards_the_end_of_a_joint_the_panda_goes_and_the_fr3_must_be_slower(kind, way, name):
     follower, speed = Follower(kind, way), {"panda": 0.1, "fr3": 0.3}[kind]
     assert follower.speed_up(speed, 1.0) is None
     while (ending := follower.go(speed)) is None:

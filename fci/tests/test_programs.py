@@ -34,7 +34,7 @@ def test_one_that_says_what_it_should_and_complains_of_nothing_runs():
         ("raise ConnectionRefusedError('Connection refused')", "refused", "ConnectionRefusedError: Connection refused"),
     ],
 )
-def test_any_other_does_not_and_its_first_complaint_says_why(code: str, verdict: str, why: str):
+def test_any_other_does_not_and_its_first_complaint_says_why(code, verdict, why):
     one = played(code, says="done")
     assert (one.verdict, one.why) == (verdict, why)
 
@@ -59,7 +59,7 @@ def test_the_list_names_each_program_once_and_for_a_robot_that_a_server_has():
         assert any(one["robot"] in server["robots"] for server in KNOWN["server"].values())
 
 
-def test_the_table_has_a_column_for_each_server_that_was_tried(tmp_path: Path):
+def test_the_table_has_a_column_for_each_server_that_was_tried(tmp_path):
     title = KNOWN["set"][0]["title"]
     ran, failed = {"verdict": "runs", "why": ""}, {"verdict": "fails", "why": "x"}
     found = {title: {"echo": {"pretouch": ran, "franka-sim": failed}}}

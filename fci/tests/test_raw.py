@@ -10,7 +10,7 @@ import pytest
 from fci.tests.conftest import errors_of
 
 from pretouch_fci.options import Drop
-from pretouch_fci.wire import ERRORS, HEADER, PROTOCOLS, RobotKind
+from pretouch_fci.wire import ERRORS, HEADER, PROTOCOLS
 
 _REFLEX, _IDLE, _MOVE = 4, 1, 2
 _STILL = np.zeros(7)
@@ -25,13 +25,13 @@ def _sped_up(client: Any, speed: float) -> np.void:
     return state
 
 
-def test_the_layouts_have_the_sizes_the_vendors_have() -> None:
+def test_the_layouts_have_the_sizes_the_vendors_have():
     sizes = {kind: (p.version, p.state.itemsize, p.command.itemsize, p.sizes["Move"]) for kind, p in PROTOCOLS.items()}
     assert sizes == {"panda": (5, 2373, 370, 56), "fr3": (10, 1377, 371, 113)}
     assert len(ERRORS) == 41
 
 
-def test_another_version_is_told_ours_and_let_go(serve: Any, raw: Any, kind: RobotKind) -> None:
+def test_another_version_is_told_ours_and_let_go(serve, raw, kind):
     served = serve(kind)
     client = raw(served, version=77)
     assert client.connected == b"\1" + struct.pack("<H", served.protocol.version)
@@ -39,7 +39,7 @@ def test_another_version_is_told_ours_and_let_go(serve: Any, raw: Any, kind: Rob
     assert raw(served).connected == b"\0" + struct.pack("<H", served.protocol.version)
 
 
-def test_a_bare_connection_does_no_harm(serve: Any, raw: Any) -> None:
+def test_a_bare_connection_does_no_harm(serve, raw):
     served = serve()
     for _ in range(40):
         socket.create_connection(served.server.address).close()
@@ -49,7 +49,7 @@ def test_a_bare_connection_does_no_harm(serve: Any, raw: Any) -> None:
         one.close()
 
 
-def test_what_a_client_sets_does_not_outlive_it(serve: Any, raw: Any) -> None:
+def test_what_a_client_sets_does_not_outlive_it(serve, raw):
     served = serve("fr3")
     first = raw(served)
     delivered = first.state()
@@ -76,7 +76,7 @@ def _modes(client: Any) -> list[int]:
     return [int(state["robot_mode"]) for state in states]
 
 
-def test_a_second_client_is_turned_away_while_the_first_is_served(serve: Any, raw: Any) -> None:
+def test_a_second_client_is_turned_away_while_the_first_is_served(serve, raw):
     served = serve()
     first = raw(served)
     second = socket.create_connection(served.server.address, timeout=5.0)
@@ -85,13 +85,13 @@ def test_a_second_client_is_turned_away_while_the_first_is_served(serve: Any, ra
     assert first.begin() == "started"
 
 
-def test_states_flow_at_a_thousand_a_second_with_rising_numbers(serve: Any, raw: Any, kind: RobotKind) -> None:
+def test_states_flow_at_a_thousand_a_second_with_rising_numbers(serve, raw, kind):
     client = raw(serve(kind, lockstep=False))
     numbers = [int(client.state()["message_id"]) for _ in range(200)]
     assert np.all(np.diff(numbers) == 1)
 
 
-def test_a_client_killed_in_a_motion_leaves_an_arm_that_brakes(serve: Any, raw: Any, kind: RobotKind) -> None:
+def test_a_client_killed_in_a_motion_leaves_an_arm_that_brakes(serve, raw, kind):
     served = serve(kind)
     client = raw(served)
     _sped_up(client, 0.5)
@@ -104,7 +104,7 @@ def test_a_client_killed_in_a_motion_leaves_an_arm_that_brakes(serve: Any, raw: 
     assert after.begin() == "started"
 
 
-def test_stop_preempts_the_motion_and_is_answered_at_rest(serve: Any, raw: Any, kind: RobotKind) -> None:
+def test_stop_preempts_the_motion_and_is_answered_at_rest(serve, raw, kind):
     client = raw(serve(kind))
     _sped_up(client, 0.3)
     client.send_request("StopMove")
@@ -123,9 +123,7 @@ def test_stop_preempts_the_motion_and_is_answered_at_rest(serve: Any, raw: Any, 
         (3, "cartesian_motion_generator_velocity_limits_violation", (np.nan, np.inf, 1e308)),
     ],
 )
-def test_numbers_that_are_none_end_the_motion(
-    serve: Any, raw: Any, generator: int, error: str, bad: tuple[Any, ...]
-) -> None:
+def test_numbers_that_are_none_end_the_motion(serve, raw, generator, error, bad):
     client = raw(serve())
     for values in bad:
         state = client.begun(generator)
@@ -139,7 +137,7 @@ def test_numbers_that_are_none_end_the_motion(
         assert client.request("AutomaticErrorRecovery") == b"\0"
 
 
-def test_a_motion_may_not_end_while_it_moves(serve: Any, raw: Any) -> None:
+def test_a_motion_may_not_end_while_it_moves(serve, raw):
     client = raw(serve())
     state = _sped_up(client, 0.3)
     state = client.turn(state, state["dq_d"], finished=True)
@@ -147,14 +145,14 @@ def test_a_motion_may_not_end_while_it_moves(serve: Any, raw: Any) -> None:
     assert errors_of(state) == ["joint_motion_generator_velocity_discontinuity"]
 
 
-def test_a_motion_may_not_begin_with_a_step(serve: Any, raw: Any) -> None:
+def test_a_motion_may_not_begin_with_a_step(serve, raw):
     client = raw(serve())
     state = client.turn(client.begun(), np.full(7, 0.1))
     assert client.ended() == "reflex"
     assert "joint_motion_generator_velocity_discontinuity" in errors_of(state, "reflex_reason")
 
 
-def test_commands_of_other_states_sizes_and_senders_are_no_commands(serve: Any, raw: Any, kind: RobotKind) -> None:
+def test_commands_of_other_states_sizes_and_senders_are_no_commands(serve, raw, kind):
     client = raw(serve(kind))
     state = client.turn(client.begun(), _STILL)
     number, wrong = int(state["message_id"]), np.full(7, 2.0)
@@ -172,7 +170,7 @@ def test_commands_of_other_states_sizes_and_senders_are_no_commands(serve: Any, 
     assert not np.any(after["dq_d"])
 
 
-def test_twenty_lost_commands_in_a_row_end_the_motion(serve: Any, raw: Any) -> None:
+def test_twenty_lost_commands_in_a_row_end_the_motion(serve, raw):
     # the very first command is never lost: so nineteen, and from the sixtieth millisecond on twenty
     client = raw(serve(drop=Drop(20, 60)))
     state, rates = client.begun(), []
@@ -187,7 +185,7 @@ def test_twenty_lost_commands_in_a_row_end_the_motion(serve: Any, raw: Any) -> N
     assert rates[59] == pytest.approx(41 / 60)
 
 
-def test_a_motion_without_commands_ends_in_real_time(serve: Any, raw: Any) -> None:
+def test_a_motion_without_commands_ends_in_real_time(serve, raw):
     client = raw(serve(lockstep=False))
     begun = client.begun()["message_id"]
     state = client.state_where(lambda s: s["robot_mode"] != _MOVE)
@@ -196,7 +194,7 @@ def test_a_motion_without_commands_ends_in_real_time(serve: Any, raw: Any) -> No
     assert 400 < state["message_id"] - begun <= 501
 
 
-def test_each_motion_in_lockstep_begins_at_the_next_thousand_seconds(serve: Any, raw: Any) -> None:
+def test_each_motion_in_lockstep_begins_at_the_next_thousand_seconds(serve, raw):
     client = raw(serve())
     idle = client.state(), client.state()
     assert idle[0]["message_id"] < idle[1]["message_id"] < 1_000_000
@@ -211,7 +209,7 @@ def test_each_motion_in_lockstep_begins_at_the_next_thousand_seconds(serve: Any,
 
 
 @pytest.mark.parametrize("wrong", [0.3, np.nan])
-def test_in_lockstep_states_after_a_motion_differ_in_time_alone(serve: Any, raw: Any, wrong: float) -> None:
+def test_in_lockstep_states_after_a_motion_differ_in_time_alone(serve, raw, wrong):
     client = raw(serve())
     state = _sped_up(client, 0.3)
     state = client.turn(state, np.full(7, wrong))
@@ -222,7 +220,7 @@ def test_in_lockstep_states_after_a_motion_differ_in_time_alone(serve: Any, raw:
     assert len({one.tobytes()[time:] for one in told}) == 1
 
 
-def test_unknown_motions_are_not_possible_and_all_known_ones_are(serve: Any, raw: Any, kind: RobotKind) -> None:
+def test_unknown_motions_are_not_possible_and_all_known_ones_are(serve, raw, kind):
     client = raw(serve(kind))
     for controller, generator in ((3, 1), (7, 1), (0, 4), (1, 4), (0, 2**32 - 1)):
         assert client.begin(controller, generator) == "not possible"
@@ -234,7 +232,7 @@ def test_unknown_motions_are_not_possible_and_all_known_ones_are(serve: Any, raw
         client.answer()
 
 
-def test_while_it_moves_only_the_collision_behaviour_is_set(serve: Any, raw: Any, kind: RobotKind) -> None:
+def test_while_it_moves_only_the_collision_behaviour_is_set(serve, raw, kind):
     client = raw(serve(kind))
     client.begin()
     assert client.request("SetJointImpedance", np.full(7, 100.0).tobytes()) == b"\1"
@@ -243,7 +241,7 @@ def test_while_it_moves_only_the_collision_behaviour_is_set(serve: Any, raw: Any
     assert client.request("SetCollisionBehavior", np.full(52, 50.0).tobytes()) == b"\0"
 
 
-def test_all_other_requests_of_protocol_5_are_answered(serve: Any, raw: Any) -> None:
+def test_all_other_requests_of_protocol_5_are_answered(serve, raw):
     client = raw(serve())
     assert len(client.request("GetCartesianLimit", struct.pack("<I", 3))) == 1 + 8 * 19 + 1
     assert client.request("SetFilters", np.full(5, 100.0).tobytes()) == b"\0"
@@ -265,7 +263,7 @@ _MALFORMED = [
 
 
 @pytest.mark.parametrize("message", _MALFORMED)
-def test_a_client_that_sends_what_is_no_request_is_let_go(serve: Any, raw: Any, message: bytes) -> None:
+def test_a_client_that_sends_what_is_no_request_is_let_go(serve, raw, message):
     served = serve()
     client = raw(served)
     client.begin()
@@ -275,7 +273,7 @@ def test_a_client_that_sends_what_is_no_request_is_let_go(serve: Any, raw: Any, 
     assert raw(served).connected[0] == 0
 
 
-def test_requests_in_pieces_and_in_one_go_are_understood(serve: Any, raw: Any) -> None:
+def test_requests_in_pieces_and_in_one_go_are_understood(serve, raw):
     client = raw(serve())
     one = client.protocol.reply("SetJointImpedance", 5, np.full(7, 100.0).tobytes())
     for byte in one:
@@ -286,7 +284,7 @@ def test_requests_in_pieces_and_in_one_go_are_understood(serve: Any, raw: Any) -
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
-def test_nothing_that_is_sent_kills_the_server(serve: Any, raw: Any, kind: RobotKind, seed: int) -> None:
+def test_nothing_that_is_sent_kills_the_server(serve, raw, kind, seed):
     served, rng = serve(kind, patience_s=0.02), np.random.default_rng([seed, 8])
     for _ in range(12):
         client = raw(served)
@@ -317,7 +315,7 @@ def _some_request(protocol: Any, rng: np.random.Generator) -> bytes:
     return protocol.reply(name, int(rng.integers(2**32)), values.tobytes()[: protocol.sizes[name]])
 
 
-def test_a_client_that_does_not_read_its_answers_is_let_go(serve: Any, raw: Any) -> None:
+def test_a_client_that_does_not_read_its_answers_is_let_go(serve, raw):
     served = serve("fr3")
     client = raw(served)
     client.tcp.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)

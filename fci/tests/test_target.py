@@ -35,7 +35,7 @@ class Going:
 
 
 @pytest.mark.parametrize(("fastest", "by"), [(0.2, 0.05), (0.655, 0.5), (100.0, 0.5), (100.0, 1e-3)])
-def test_the_joints_arrive_within_all_limits_and_stay(fastest: float, by: float):
+def test_the_joints_arrive_within_all_limits_and_stay(fastest, by):
     """That no limit is broken, the motion itself sees; that the way is short, we do."""
     going = Going(fastest)
     target = _READY + by * np.array([1, -1, 1, -1, 1, -1, 1])
@@ -80,7 +80,7 @@ def _asked(client: Any, generator: int, fastest: float) -> str:
     return client.protocol.move[client.request("Move", body)[0]]
 
 
-def test_a_client_sends_targets_when_it_likes(serve: Any, raw: Any) -> None:
+def test_a_client_sends_targets_when_it_likes(serve, raw):
     client = raw(serve("fr3"))
     assert _asked(client, 0, 0.5) == "started"
     state = client.first_of_motion()
@@ -98,7 +98,5 @@ def test_a_client_sends_targets_when_it_likes(serve: Any, raw: Any) -> None:
 
 
 @pytest.mark.parametrize(("generator", "fastest"), [(1, 0.5), (2, 0.5), (0, 0.0), (0, -1.0), (0, np.nan), (0, np.inf)])
-def test_only_positions_of_joints_at_some_speed_can_be_targets(
-    serve: Any, raw: Any, generator: int, fastest: float
-) -> None:
+def test_only_positions_of_joints_at_some_speed_can_be_targets(serve, raw, generator, fastest):
     assert _asked(raw(serve("fr3")), generator, fastest) == "not possible"

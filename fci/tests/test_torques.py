@@ -15,7 +15,7 @@ from pretouch_fci.controllers import _critical
 from pretouch_fci.frames import Inertial
 from pretouch_fci.gripper import GripperObject
 from pretouch_fci.motion import Ending, Setpoint
-from pretouch_fci.wire import Controller, Generator, RobotKind, RobotMode
+from pretouch_fci.wire import Controller, Generator, RobotMode
 
 _ZERO = np.zeros(7)
 _JOINT_7 = np.eye(7)[6]
@@ -45,7 +45,7 @@ def _settled(arm: ServedArm) -> None:
         arm.step(None)
 
 
-def test_a_torque_accelerates_a_joint_as_its_inertia_says() -> None:
+def test_a_torque_accelerates_a_joint_as_its_inertia_says():
     arm = _tried()
     _commanded(arm, _ZERO)
     before = arm.plant.mj_data.qvel[:7].copy()
@@ -58,7 +58,7 @@ def test_a_torque_accelerates_a_joint_as_its_inertia_says() -> None:
     np.testing.assert_array_equal(arm.torques.desired, 0.9 * _JOINT_7)
 
 
-def test_torques_alone_move_the_joints_and_after_them_the_arm_brakes_and_stays() -> None:
+def test_torques_alone_move_the_joints_and_after_them_the_arm_brakes_and_stays():
     arm = _tried()
     asked = arm.report.q_commanded.copy()
     _commanded(arm, *[0.9 * _JOINT_7] * 200)
@@ -73,7 +73,7 @@ def test_torques_alone_move_the_joints_and_after_them_the_arm_brakes_and_stays()
     assert arm.mode is RobotMode.IDLE
 
 
-def test_torques_that_jump_or_are_too_large_are_refused() -> None:
+def test_torques_that_jump_or_are_too_large_are_refused():
     ramp = [k * _JOINT_7 for k in range(1, 12)]
     assert _commanded(_tried(), *ramp, 13.2 * _JOINT_7) == Ending("reflex", (
         "controller_torque_discontinuity", "tau_j_range_violation",
@@ -84,7 +84,7 @@ def test_torques_that_jump_or_are_too_large_are_refused() -> None:
     assert _commanded(_tried(), np.full(7, 1e308)).errors[0] == "controller_torque_discontinuity"
 
 
-def test_torques_that_drive_a_joint_too_fast_or_too_far_end_in_a_reflex() -> None:
+def test_torques_that_drive_a_joint_too_fast_or_too_far_end_in_a_reflex():
     assert _commanded(_tried(), *[k * _JOINT_7 for k in range(1, 6)], *[6.0 * _JOINT_7] * 400) == Ending(
         "reflex", ("joint_velocity_violation",)
     )
@@ -100,7 +100,7 @@ def test_torques_that_drive_a_joint_too_fast_or_too_far_end_in_a_reflex() -> Non
     assert arm.report.q[6] < arm.model.q_max[6] - 0.02
 
 
-def test_a_lost_command_leaves_the_torques_as_they_are() -> None:
+def test_a_lost_command_leaves_the_torques_as_they_are():
     arm = _tried()
     _commanded(arm, 0.9 * _JOINT_7)
     for _ in range(19):
@@ -109,7 +109,7 @@ def test_a_lost_command_leaves_the_torques_as_they_are() -> None:
     assert arm.step(None) == Ending("reflex", ("communication_constraints_violation",))
 
 
-def test_each_protocol_serves_torques_alone_and_beside_a_motion(serve: Any, raw: Any, kind: RobotKind) -> None:
+def test_each_protocol_serves_torques_alone_and_beside_a_motion(serve, raw, kind):
     client = raw(serve(kind))
     for generator in (_TORQUE_ONLY[kind], Generator.JOINT_POSITION):
         state = client.begun(generator, Controller.EXTERNAL)
@@ -123,7 +123,7 @@ def test_each_protocol_serves_torques_alone_and_beside_a_motion(serve: Any, raw:
 
 
 @pytest.mark.parametrize("frame", ["base", "turned"])
-def test_a_push_moves_the_end_effector_as_the_cartesian_stiffness_says(frame: str) -> None:
+def test_a_push_moves_the_end_effector_as_the_cartesian_stiffness_says(frame):
     arm = arm_of(pushes=(TcpPush(0.5, (0.0, 12.0, 0.0), 2.0),))
     soft = np.array([1000.0, 300.0, 1000.0, 100.0, 100.0, 100.0])
     if frame == "turned":  # a quarter about the end-effector's own z: its x lies along the base's y
@@ -140,7 +140,7 @@ def test_a_push_moves_the_end_effector_as_the_cartesian_stiffness_says(frame: st
     assert np.abs(moved[[0, 2]]).max() < 0.006
 
 
-def test_a_push_moves_the_joints_as_their_stiffness_says() -> None:
+def test_a_push_moves_the_joints_as_their_stiffness_says():
     arm = arm_of(pushes=(TcpPush(0.5, (0.0, 12.0, 0.0), 2.0),))
     arm.plant.set_stiffness(np.full(7, 200.0))
     arm.begin(Generator.JOINT_VELOCITY, Controller.JOINT_IMPEDANCE)
@@ -152,13 +152,13 @@ def test_a_push_moves_the_joints_as_their_stiffness_says() -> None:
 
 
 @given(st.floats(0.1, 10.0), st.floats(0.0, 5000.0))
-def test_a_mass_on_a_spring_is_damped_critically(mass: float, spring: float) -> None:
+def test_a_mass_on_a_spring_is_damped_critically(mass, spring):
     found = _critical(np.diag([mass, 1.0]), np.diag([spring, 0.0]))
     np.testing.assert_allclose(found, np.diag([2.0 * np.sqrt(mass * spring), 0.0]), atol=1e-9 * max(1.0, spring))
 
 
 @given(st.integers(0, 2**32 - 1))
-def test_each_mode_of_any_arm_is_damped_critically(seed: int) -> None:
+def test_each_mode_of_any_arm_is_damped_critically(seed):
     rng = np.random.default_rng(seed)
     A, B = rng.normal(size=(2, 7, 7))
     M, K = A @ A.T + np.eye(7), B @ B.T
@@ -170,7 +170,7 @@ def test_each_mode_of_any_arm_is_damped_critically(seed: int) -> None:
     assert roots.real.max() < 1e-6
 
 
-def test_a_load_that_is_announced_is_no_external_force() -> None:
+def test_a_load_that_is_announced_is_no_external_force():
     found = {}
     for announced in (0.0, 2.0):
         arm = arm_of(object=GripperObject(0.04, 2.0))
@@ -189,7 +189,7 @@ def _raised(arm: ServedArm) -> Any:
     return replace(steady, upper_force=5.0 * steady.upper_force, upper_torque=5.0 * steady.upper_torque)
 
 
-def test_the_load_is_where_the_client_says_until_it_has_gone() -> None:
+def test_the_load_is_where_the_client_says_until_it_has_gone():
     arm, load = arm_of(), Inertial(1.5, np.array([0.03, 0.02, 0.1]), np.diag([1e-3, 2e-3, 4e-3]))
     q, flange = arm.report.q, arm.frames.flange
     before = arm.model.dynamics(q, _ZERO)
@@ -204,7 +204,7 @@ def test_the_load_is_where_the_client_says_until_it_has_gone() -> None:
     np.testing.assert_allclose(arm.model.dynamics(q, _ZERO).mass_matrix, before.mass_matrix, atol=1e-12)
 
 
-def test_guided_by_hand_the_arm_gives_way_along_the_free_axes_alone() -> None:
+def test_guided_by_hand_the_arm_gives_way_along_the_free_axes_alone():
     arm = arm_of(pushes=(TcpPush(0.1, (0.0, 15.0, 15.0), 0.5),))
     arm.guiding_axes = np.array([False, True, False, False, False, False, True])
     arm.press_guiding()
@@ -223,7 +223,7 @@ def test_guided_by_hand_the_arm_gives_way_along_the_free_axes_alone() -> None:
     np.testing.assert_allclose(arm.report.q, there, atol=1e-4)
 
 
-def test_the_buttons_do_nothing_in_a_motion_and_the_user_stop_ends_guiding() -> None:
+def test_the_buttons_do_nothing_in_a_motion_and_the_user_stop_ends_guiding():
     arm = _tried()
     arm.press_guiding()
     assert arm.mode is RobotMode.MOVE
@@ -237,7 +237,7 @@ def test_the_buttons_do_nothing_in_a_motion_and_the_user_stop_ends_guiding() -> 
     assert arm.mode is RobotMode.IDLE
 
 
-def test_while_it_is_guided_no_motion_begins(serve: Any, raw: Any, kind: RobotKind) -> None:
+def test_while_it_is_guided_no_motion_begins(serve, raw, kind):
     served = serve(kind)
     served.arm.press_guiding()
     client = raw(served)
@@ -255,9 +255,7 @@ def test_while_it_is_guided_no_motion_begins(serve: Any, raw: Any, kind: RobotKi
     ("SetCartesianImpedance", np.array([10.0, 10, 9, 1, 1, 1]), False),
     ("SetCartesianImpedance", np.array([10.0, 10, 10, 1, 1, 301]), False),
 ])  # fmt: skip
-def test_impedances_within_the_vendors_limits_act(
-    serve: Any, raw: Any, name: str, values: np.ndarray, possible: bool
-) -> None:
+def test_impedances_within_the_vendors_limits_act(serve, raw, name, values, possible):
     served = serve("panda")
     before = served.arm.plant.stiffness.copy(), served.arm.cartesian_stiffness
     assert raw(served).request(name, values.tobytes()) == (b"\0" if possible else b"\2")
@@ -268,7 +266,7 @@ def test_impedances_within_the_vendors_limits_act(
     np.testing.assert_array_equal(served.arm.plant.stiffness, before[0])
 
 
-def test_an_arm_that_comes_into_itself_stops() -> None:
+def test_an_arm_that_comes_into_itself_stops():
     arm = arm_of()
     arm.begin(Generator.JOINT_POSITION, Controller.JOINT_IMPEDANCE)
     begun, folded = arm.report.q_commanded.copy(), np.array([0.0, 1.2, 0.0, -3.0, 0.0, 0.1, 0.785])

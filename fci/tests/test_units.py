@@ -17,7 +17,7 @@ _LASTING = 600
 
 
 @pytest.mark.slow
-def test_in_lockstep_readings_are_the_same_to_the_last_bit(serve: Any, raw: Any) -> None:
+def test_in_lockstep_readings_are_the_same_to_the_last_bit(serve, raw):
     skin = paper_skin(RobotModel(panda()))
     runs = [_readings(serve, raw, skin) for _ in range(2)]
     np.testing.assert_array_equal(runs[0], runs[1])

@@ -1,7 +1,6 @@
 """The vendor's own, unmodified clients against the server, in lockstep."""
 
 import shutil
-from typing import Any
 
 import numpy as np
 import pytest
@@ -10,10 +9,9 @@ from tests.needs import skip_for
 from pretouch.robot.model import RobotModel
 from pretouch.robot.named import robot_named
 from pretouch.sim.tcp_push import TcpPush
-from pretouch_fci.wire import RobotKind
 
 
-def test_a_motion_ends_where_its_velocities_lead(serve: Any, kind: RobotKind) -> None:
+def test_a_motion_ends_where_its_velocities_lead(serve, kind):
     done = serve(kind).ask("move", 1.0)
     assert done["error"] is None
     assert done["after"]["mode"] == "idle"
@@ -24,9 +22,7 @@ def test_a_motion_ends_where_its_velocities_lead(serve: Any, kind: RobotKind) ->
     np.testing.assert_allclose(done["after"]["q"], done["after"]["q_d"], atol=5e-3)
 
 
-def test_positions_lead_the_joints_and_those_begun_elsewhere_are_refused_by_the_vendors_name(
-    serve: Any, kind: RobotKind
-) -> None:
+def test_positions_lead_the_joints_and_those_begun_elsewhere_are_refused_by_the_vendors_name(serve, kind):
     done, refused = serve(kind).ask("positions", 1.0)
     assert done["error"] is None
     assert done["after"]["mode"] == "idle"
@@ -38,9 +34,7 @@ def test_positions_lead_the_joints_and_those_begun_elsewhere_are_refused_by_the_
     assert refused["recovered"]["mode"] == "idle"
 
 
-def test_velocities_and_poses_lead_the_end_effector_and_poses_begun_elsewhere_are_refused(
-    serve: Any, kind: RobotKind
-) -> None:
+def test_velocities_and_poses_lead_the_end_effector_and_poses_begun_elsewhere_are_refused(serve, kind):
     by_velocities, by_poses, refused = serve(kind).ask("cartesian", 1.0)
     assert by_velocities["error"] is by_poses["error"] is None
     first = np.array(by_velocities["told"][0]["O_T_EE_d"])
@@ -53,7 +47,7 @@ def test_velocities_and_poses_lead_the_end_effector_and_poses_begun_elsewhere_ar
 
 
 @pytest.mark.slow
-def test_two_runs_are_the_same_to_the_last_bit(serve: Any, kind: RobotKind) -> None:
+def test_two_runs_are_the_same_to_the_last_bit(serve, kind):
     runs, truths = [], []
     for _ in range(2):
         served = serve(kind, setup={"pushes": (TcpPush(0.3, (0.0, 15.0, 0.0), 0.5),)})
@@ -66,7 +60,7 @@ def test_two_runs_are_the_same_to_the_last_bit(serve: Any, kind: RobotKind) -> N
     assert truths[0] == truths[1]
 
 
-def test_states_tell_poses_and_what_the_flange_carries(serve: Any, kind: RobotKind) -> None:
+def test_states_tell_poses_and_what_the_flange_carries(serve, kind):
     told, model = serve(kind).ask("state"), RobotModel(robot_named(kind))
     kin = model.kinematics(np.array(told["q"]))
     T = np.array(told["O_T_EE"]).reshape(4, 4).T
@@ -81,7 +75,7 @@ def test_states_tell_poses_and_what_the_flange_carries(serve: Any, kind: RobotKi
     assert told["mode"] == "idle"
 
 
-def test_a_push_is_told_with_the_vendors_sign(serve: Any, kind: RobotKind) -> None:
+def test_a_push_is_told_with_the_vendors_sign(serve, kind):
     force = (0.0, 15.0, -10.0)
     served = serve(kind, setup={"pushes": (TcpPush(0.3, force, 0.4),)})
     told = served.ask("hold", 1.0, 60.0)["told"]
@@ -99,7 +93,7 @@ def test_a_push_is_told_with_the_vendors_sign(serve: Any, kind: RobotKind) -> No
     np.testing.assert_allclose(torques[during].mean(axis=0) - torques[before].mean(axis=0), explained, atol=0.6)
 
 
-def test_a_contact_above_the_upper_threshold_is_a_reflex_and_recovery_works(serve: Any, kind: RobotKind) -> None:
+def test_a_contact_above_the_upper_threshold_is_a_reflex_and_recovery_works(serve, kind):
     served = serve(kind, setup={"pushes": (TcpPush(0.3, (0.0, 40.0, 0.0), 0.2),)})
     done = served.ask("hold", 1.0, 30.0)
     assert "cartesian_reflex" in done["error"]
@@ -115,7 +109,7 @@ def test_a_contact_above_the_upper_threshold_is_a_reflex_and_recovery_works(serv
     assert done["recovered"]["cartesian_collision"] == [0.0] * 6
 
 
-def test_a_jump_of_the_velocity_is_refused_by_the_vendors_names(serve: Any, kind: RobotKind) -> None:
+def test_a_jump_of_the_velocity_is_refused_by_the_vendors_names(serve, kind):
     done = serve(kind).ask("move", 0.6, 0.3)
     names = [f"joint_motion_generator_{what}_discontinuity" for what in ("acceleration", "velocity")]
     assert all(name in done["error"] for name in names)
@@ -124,7 +118,7 @@ def test_a_jump_of_the_velocity_is_refused_by_the_vendors_names(serve: Any, kind
     assert done["recovered"]["mode"] == "idle"
 
 
-def test_what_is_set_is_told(serve: Any, kind: RobotKind) -> None:
+def test_what_is_set_is_told(serve, kind):
     done = serve(kind).ask("settings")
     told = done["state"]
     assert told["m_load"] == 0.5
@@ -139,7 +133,7 @@ def test_what_is_set_is_told(serve: Any, kind: RobotKind) -> None:
     assert "invalid argument" in done["refused"]["collision"]
 
 
-def test_torques_hold_the_arm_as_their_springs_say(serve: Any, kind: RobotKind) -> None:
+def test_torques_hold_the_arm_as_their_springs_say(serve, kind):
     pushes = (TcpPush(0.5, (0.0, 12.0, 0.0), 2.0),)
     done = serve(kind, {"pushes": pushes}).ask("torques", 2.0)
     assert done["error"] is None
@@ -152,7 +146,7 @@ def test_torques_hold_the_arm_as_their_springs_say(serve: Any, kind: RobotKind) 
 
 
 @pytest.mark.parametrize(("client", "rough"), [("fr3", 1.0), ("panda", 1e-9), ("panda-python", 1e-9)])
-def test_the_vendors_library_computes_with_our_model(serve: Any, client: str, rough: float) -> None:
+def test_the_vendors_library_computes_with_our_model(serve, client, rough):
     kind = client.partition("-")[0]
     served = serve(kind)
     if kind == "panda" and shutil.which("cc") is None:
@@ -167,7 +161,7 @@ def test_the_vendors_library_computes_with_our_model(serve: Any, client: str, ro
 
 
 @pytest.mark.slow
-def test_panda_pythons_own_motions_end_where_it_plans(serve: Any) -> None:
+def test_panda_pythons_own_motions_end_where_it_plans(serve):
     if shutil.which("cc") is None:
         skip_for("apt install gcc libc6-dev")
     told = serve("panda").ask("panda_python", kind="panda-python")
@@ -177,7 +171,7 @@ def test_panda_pythons_own_motions_end_where_it_plans(serve: Any) -> None:
 
 
 @pytest.mark.parametrize(("client", "kind"), [("panda", "fr3"), ("fr3", "panda")])
-def test_a_library_for_another_robot_is_told_so(serve: Any, client: str, kind: RobotKind) -> None:
+def test_a_library_for_another_robot_is_told_so(serve, client, kind):
     error = serve(kind).ask("state", kind=client)["error"]
     assert "version" in error
     assert {"panda": "10", "fr3": "5"}[client] in error

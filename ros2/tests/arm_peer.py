@@ -31,7 +31,7 @@ DT = 0.001
 class Peer:
     """The arm and its controller behind topics."""
 
-    def __init__(self, node: Ros2Node, rate: float, ideal: bool, extra: bool, release: Release) -> None:
+    def __init__(self, node: Ros2Node, rate: float, ideal: bool, release: Release) -> None:
         self.node, self.rate, self.ideal = node, rate, ideal
         model = RobotModel(panda())
         skin, q = paper_skin(model), model.description.q_ready
@@ -41,8 +41,7 @@ class Peer:
         self.spline, self.told = Spline(release, DT, list(model.joints), q), SimpleQueue()
         # another order than the model's, and joints that are none of its
         self.shuffled = [6, 0, 3, 1, 5, 2, 4]
-        more = ["finger_1", "finger_2"] if extra else []
-        self.names, self.more = [model.joints[j] for j in self.shuffled] + more, np.full(len(more), 0.02)
+        self.names, self.more = [model.joints[j] for j in self.shuffled] + ["finger_1", "finger_2"], np.full(2, 0.02)
         self.rows, self.sent, self.muted, self.deaf, self.frozen = [], 0, False, False, None
         node.subscribe("/joint_trajectory_controller/joint_trajectory", TRAJECTORY,
                        lambda message, received, writer: self.told.put(message), reliable=True)  # fmt: skip
@@ -100,11 +99,11 @@ class Peer:
                 publisher.publish(make(RANGE, header(stamp, name), 1, 0.47, 0.04, 4.0, np.inf, 0.0))
 
 
-def main(domain: int, log: str, rate: float, ideal: bool, extra: bool, release: Release) -> None:
+def main(domain: int, log: str, rate: float, ideal: bool, release: Release) -> None:
     orders = SimpleQueue()
     Thread(target=lambda: [orders.put(line.split()) for line in sys.stdin], daemon=True).start()
     with Ros2Node(NodeParams(domain=domain)) as node:
-        peer = Peer(node, rate, ideal, extra, release)
+        peer = Peer(node, rate, ideal, release)
         print("ready", flush=True)
         begin, tick, each = monotonic(), 0, round(1 / rate / DT)
         while True:
@@ -130,6 +129,5 @@ if __name__ == "__main__":
     parser.add_argument("--log")
     parser.add_argument("--rate", type=float, default=250.0)
     parser.add_argument("--ideal", action="store_true")
-    parser.add_argument("--extra", action="store_true")
     parser.add_argument("--release", default="4.21")
     main(**vars(parser.parse_args()))

@@ -1,16 +1,12 @@
 """What the tests of ROS 2 share: a DDS domain that no other test process of this machine uses."""
 
 import socket
-from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import pytest
+from ros2.tests.processes import arm_peer
 from tests.needs import modules_with
 
 from pretouch.extras import ROS2
-
-if TYPE_CHECKING:
-    from pretouch_ros2.node import Ros2Node
 
 pytest_pycollect_makemodule = modules_with(ROS2)
 
@@ -19,7 +15,7 @@ _DOMAINS = range(20, 101)
 
 
 @pytest.fixture(scope="session")
-def domain() -> Iterator[int]:
+def domain():
     """A domain; a name in the kernel, gone with the process, says that it is taken."""
     for number in _DOMAINS:
         with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as taken:
@@ -33,18 +29,18 @@ def domain() -> Iterator[int]:
 
 
 @pytest.fixture
-def node(domain: int) -> "Iterator[Ros2Node]":
+def node(domain):
     from pretouch_ros2.node import Ros2Node
     from pretouch_ros2.params import NodeParams
 
     with Ros2Node(NodeParams(domain=domain)) as made:
         yield made
+
+
+other = third = node
 
 
 @pytest.fixture
-def other(domain: int) -> "Iterator[Ros2Node]":
-    from pretouch_ros2.node import Ros2Node
-    from pretouch_ros2.params import NodeParams
-
-    with Ros2Node(NodeParams(domain=domain)) as made:
-        yield made
+def arm(domain, tmp_path):
+    with arm_peer(domain, tmp_path / "log.npy") as peer:
+        yield peer

@@ -39,16 +39,7 @@ class ArmPeer:
 
 @contextmanager
 def arm_peer(domain: int, log: Path, *options: str) -> Iterator[ArmPeer]:
-    command = [
-        sys.executable,
-        "-m",
-        "ros2.tests.arm_peer",
-        "--domain",
-        str(domain),
-        "--log",
-        str(log),
-        *options,
-    ]
+    command = [sys.executable, "-m", "ros2.tests.arm_peer", "--domain", str(domain), "--log", str(log), *options]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=ROOT) as process:
         try:
             assert process.stdout is not None
@@ -56,3 +47,13 @@ def arm_peer(domain: int, log: Path, *options: str) -> Iterator[ArmPeer]:
             yield ArmPeer(process, log)
         finally:
             process.kill()
+
+
+def velocities(log: np.ndarray) -> np.ndarray:
+    """Joint velocities (T, 7) between the rows of what was commanded [rad/s]."""
+    return np.diff(log[:, 1:], axis=0) / np.diff(log[:, 0])[:, None]
+
+
+def speeds(log: np.ndarray) -> np.ndarray:
+    """Largest joint speeds (T,), likewise."""
+    return np.abs(velocities(log)).max(axis=1)

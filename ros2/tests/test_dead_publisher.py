@@ -3,12 +3,11 @@
 import signal
 import subprocess
 import sys
-from pathlib import Path
 from time import monotonic, sleep
 
 import numpy as np
 import pytest
-from ros2.tests.processes import HERE, arm_peer
+from ros2.tests.processes import HERE, arm_peer, speeds, velocities
 
 from pretouch.robot.description import panda
 from pretouch_ros2.params import ArmParams
@@ -23,9 +22,7 @@ LATE_S = 0.2
 @pytest.mark.parametrize(
     "ending", [pytest.param(signal.SIGKILL, id="killed"), pytest.param(signal.SIGSTOP, id="frozen")]
 )
-def test_an_arm_whose_commands_end_comes_to_rest_within_its_limits(
-    domain: int, tmp_path: Path, ending: signal.Signals
-) -> None:
+def test_an_arm_whose_commands_end_comes_to_rest_within_its_limits(domain, tmp_path, ending):
     with arm_peer(domain, tmp_path / "log.npy", "--ideal") as arm:
         command = [sys.executable, str(HERE / "commander.py"), str(domain)]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as commander:
@@ -41,9 +38,7 @@ def test_an_arm_whose_commands_end_comes_to_rest_within_its_limits(
             finally:
                 commander.kill()
         log = arm.stop()
-    time, q = log[:, 0], log[:, 1:]
-    qd = np.diff(q, axis=0) / np.diff(time)[:, None]
-    moving = np.abs(qd).max(axis=1) > 1e-6
+    time, qd, moving = log[:, 0], velocities(log), speeds(log) > 1e-6
     at_end = int(np.searchsorted(time, ended))
     assert np.abs(qd[at_end - 20 : at_end]).max() > 0.5
     braking = float((np.abs(qd[at_end - 20 : at_end + 20]).max(axis=0) / PANDA.qdd_max).max())

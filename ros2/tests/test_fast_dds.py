@@ -17,7 +17,7 @@ from tests.needs import skip_for
 
 from pretouch_ros2.messages import FRANKA_STATE, JOINT_STATE, RANGE, TRAJECTORY, TWIST, WRENCH
 from pretouch_ros2.node import Ros2Node
-from pretouch_ros2.params import ArmParams, Distribution, NodeParams
+from pretouch_ros2.params import ArmParams, NodeParams
 from pretouch_ros2.stamps import Stamps
 from pretouch_ros2.torques import JointTorques
 
@@ -55,7 +55,7 @@ LINES = {
 
 
 @pytest.fixture(scope="session")
-def fast_peer(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def fast_peer(tmp_path_factory):
     """The peer, compiled once for all processes of a test run."""
     compiler = shutil.which("g++")
     if compiler is None or not Path("/usr/include/fastdds/dds/domain/DomainParticipant.hpp").exists():
@@ -105,7 +105,7 @@ OTHERS = [pytest.param(kind, "reliable", marks=pytest.mark.slow) for kind in LIN
 
 
 @pytest.mark.parametrize(("kind", "how"), [(JOINT_STATE, "reliable"), (JOINT_STATE, "best"), *OTHERS])
-def test_what_fast_dds_publishes_is_read(fast_peer: Path, node: Ros2Node, domain: int, kind: str, how: str) -> None:
+def test_what_fast_dds_publishes_is_read(fast_peer, node, domain, kind, how):
     got: list[str] = []
     subscription = node.subscribe("/topic", kind, lambda message, *_: got.append(" ".join(words_of(message))))
     with peer(fast_peer, domain, kind, "pub", how) as process:
@@ -119,9 +119,7 @@ def test_what_fast_dds_publishes_is_read(fast_peer: Path, node: Ros2Node, domain
 @pytest.mark.parametrize(
     "kind", [pytest.param(kind, marks=pytest.mark.slow) if kind != TRAJECTORY else kind for kind in LINES]
 )
-def test_fast_dds_reads_what_is_published(
-    fast_peer: Path, node: Ros2Node, other: Ros2Node, domain: int, kind: str
-) -> None:
+def test_fast_dds_reads_what_is_published(fast_peer, node, other, domain, kind):
     # what is to be published is made from bytes of Fast CDR, read once
     messages: list[Any] = []
     subscription = other.subscribe("/topic", kind, lambda message, *_: messages.append(message), reliable=True)
@@ -141,9 +139,7 @@ def test_fast_dds_reads_what_is_published(
     assert all(same(a, b) for a, b in zip(lines, LINES[kind], strict=True)), lines
 
 
-def test_the_torques_in_a_state_of_franka_are_read_and_what_follows_them_is_not(
-    fast_peer: Path, node: Ros2Node, domain: int
-) -> None:
+def test_the_torques_in_a_state_of_franka_are_read_and_what_follows_them_is_not(fast_peer, node, domain):
     efforts = [0.5, -1.25, 3.0]
     layout = f"ius{'d' * 26}{JOINTS * 3}{'d' * 14}{JOINTS}[d]dsb"
     words = ["7 8 :fr3_link0", *["1"] * 26, *["0 0 :l 1 :j 1 0.5 0 0"] * 3, *["2"] * 14,
@@ -165,9 +161,7 @@ def test_the_torques_in_a_state_of_franka_are_read_and_what_follows_them_is_not(
 
 
 @pytest.mark.parametrize("distribution", ["humble", "jazzy"])
-def test_a_range_of_the_other_layout_is_not_taken_for_ours(
-    fast_peer: Path, domain: int, distribution: Distribution
-) -> None:
+def test_a_range_of_the_other_layout_is_not_taken_for_ours(fast_peer, domain, distribution):
     theirs = {"humble": "iusbfffff", "jazzy": "iusbffff"}[distribution]
     line = "7 8 :forearm_1 1 0.5 0.0625 4 1.5" + (" 0.25" if distribution == "humble" else "")
     got: list[Any] = []

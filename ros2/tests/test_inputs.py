@@ -13,7 +13,7 @@ from pretouch.recording import viewer_topics
 from pretouch.types import RangeStatus
 from pretouch_ros2.joints import Joints
 from pretouch_ros2.messages import FRANKA_STATE, JOINT_STATE, RANGE, WRENCH, Messages
-from pretouch_ros2.params import ArmParams, Frame, Sign, Zeros
+from pretouch_ros2.params import ArmParams
 from pretouch_ros2.skin import status_of, topic_name
 from pretouch_ros2.stamps import Stamps
 from pretouch_ros2.torques import JointTorques
@@ -37,7 +37,7 @@ def wrench(stamp: float, *numbers: float) -> Any:
     return MESSAGES.make(WRENCH, header(stamp), MESSAGES.make("geometry_msgs/msg/Wrench", *pair))
 
 
-def test_joints_are_found_by_name_in_any_order_and_beside_others() -> None:
+def test_joints_are_found_by_name_in_any_order_and_beside_others():
     joints = Joints(NAMES, Stamps())
     joints.take(joint_state(1, "xcbya", [9, 3, 2, 8, 1], [90, 30, 20, 80, 10]), 5.0, 1)
     assert joints.newest is not None
@@ -46,7 +46,7 @@ def test_joints_are_found_by_name_in_any_order_and_beside_others() -> None:
     assert joints.newest.stamp == 5.0
 
 
-def test_a_message_without_all_of_our_joints_is_another_devices() -> None:
+def test_a_message_without_all_of_our_joints_is_another_devices():
     joints = Joints(NAMES, Stamps())
     joints.take(joint_state(1, "ab", [1, 2]), 5.0, 1)
     assert joints.newest is None
@@ -59,14 +59,14 @@ def test_a_message_without_all_of_our_joints_is_another_devices() -> None:
 
 
 @pytest.mark.parametrize("positions", [[1.0, 2.0], [1.0, 2.0, 3.0, 4.0], []])
-def test_positions_that_are_not_one_for_each_name_are_not_taken(positions: list[float]) -> None:
+def test_positions_that_are_not_one_for_each_name_are_not_taken(positions):
     joints = Joints(NAMES, Stamps())
     joints.take(joint_state(1, "abc", positions), 5.0, 1)
     assert joints.newest is None
 
 
 @pytest.mark.parametrize("given", [None, [math.nan] * 3])
-def test_missing_velocities_are_taken_from_the_positions(given: list[float] | None) -> None:
+def test_missing_velocities_are_taken_from_the_positions(given):
     joints = Joints(NAMES, Stamps())
     joints.take(joint_state(1, "abc", [1, 2, 3], given), 5.0, 1)
     assert joints.newest is not None
@@ -76,7 +76,7 @@ def test_missing_velocities_are_taken_from_the_positions(given: list[float] | No
     assert joints.differentiated
 
 
-def test_a_position_that_is_no_number_is_handed_on_for_the_controller_to_name() -> None:
+def test_a_position_that_is_no_number_is_handed_on_for_the_controller_to_name():
     joints = Joints(NAMES, Stamps())
     joints.take(joint_state(1, "abc", [1, math.nan, 3], [0, 0, 0]), 5.0, 1)
     assert joints.newest is not None
@@ -87,7 +87,7 @@ def at(stamp: float) -> Any:
     return SimpleNamespace(stamp=SimpleNamespace(sec=math.floor(stamp), nanosec=round(stamp % 1 * 1e9)))
 
 
-def test_what_comes_again_or_late_is_not_new() -> None:
+def test_what_comes_again_or_late_is_not_new():
     stamps = Stamps()
     assert stamps.instant(at(10.0), 1.0, 7) == 1.0
     assert stamps.instant(at(10.0), 1.1, 7) is None
@@ -95,7 +95,7 @@ def test_what_comes_again_or_late_is_not_new() -> None:
     assert stamps.instant(at(10.01), 1.3, 7) == 1.3
 
 
-def test_another_publisher_begins_anew_and_so_does_a_clock_set_back_once_it_goes_on() -> None:
+def test_another_publisher_begins_anew_and_so_does_a_clock_set_back_once_it_goes_on():
     stamps = Stamps()
     assert stamps.instant(at(10.0), 1.0, 7) == 1.0
     assert stamps.instant(at(9.9), 1.1, 8) == 1.1
@@ -103,7 +103,7 @@ def test_another_publisher_begins_anew_and_so_does_a_clock_set_back_once_it_goes
     assert stamps.instant(at(5.03), 1.3, 8) is None
 
 
-def test_two_frozen_writers_and_alternating_stamps_are_not_new() -> None:
+def test_two_frozen_writers_and_alternating_stamps_are_not_new():
     stamps = Stamps()
     assert [stamps.instant(at(10), t, w) for t, w in ((1.0, 1), (1.01, 2), (1.02, 1), (1.03, 2))] == [
         1.0, 1.01, None, None,
@@ -112,7 +112,7 @@ def test_two_frozen_writers_and_alternating_stamps_are_not_new() -> None:
     assert [stamps.instant(at(10 - 2 * (k % 2)), 1.0 + k, 1) for k in range(9)] == [1.0, *[None] * 8]
 
 
-def test_writers_that_publish_at_once_are_noticed_and_one_that_follows_another_is_not() -> None:
+def test_writers_that_publish_at_once_are_noticed_and_one_that_follows_another_is_not():
     stamps = Stamps()
     for k in range(3):
         stamps.instant(at(10 + k), 1.0 + k, 1)
@@ -123,7 +123,7 @@ def test_writers_that_publish_at_once_are_noticed_and_one_that_follows_another_i
     assert stamps.together()
 
 
-def test_what_strangers_publish_takes_bounded_memory() -> None:
+def test_what_strangers_publish_takes_bounded_memory():
     joints, stamps = Joints(("a",), Stamps()), Stamps()
     for k in range(1000):
         joints.take(SimpleNamespace(name=[f"x{k}"], position=[0.0], velocity=[], header=at(0)), 0.0, 1)
@@ -137,17 +137,17 @@ def test_what_strangers_publish_takes_bounded_memory() -> None:
     assert joints.newest is not None
 
 
-def test_messages_without_a_stamp_are_all_new() -> None:
+def test_messages_without_a_stamp_are_all_new():
     stamps = Stamps()
     assert [stamps.instant(at(0), t, 7) for t in (1.0, 1.1)] == [1.0, 1.1]
 
 
 @pytest.mark.parametrize(("clock", "expected"), [(100.2, 4.8), (100.0, 5.0), (99.0, 5.0)])
-def test_with_one_clock_the_headers_age_counts(clock: float, expected: float) -> None:
+def test_with_one_clock_the_headers_age_counts(clock, expected):
     assert Stamps(True, lambda: clock).instant(at(100.0), 5.0, 7) == pytest.approx(expected)
 
 
-def test_how_far_a_clock_is_behind_is_what_the_promptest_message_shows() -> None:
+def test_how_far_a_clock_is_behind_is_what_the_promptest_message_shows():
     stamps = Stamps(now=lambda: 100.0)
     stamps.instant(at(0), 5.0, 7)
     assert stamps.behind is None
@@ -158,7 +158,7 @@ def test_how_far_a_clock_is_behind_is_what_the_promptest_message_shows() -> None
 
 @pytest.mark.parametrize(("sign", "factor"), [("on-robot", 1), ("by-robot", -1)])
 @pytest.mark.parametrize("frame", ["base", "ee"])
-def test_the_wrench_is_brought_to_our_sign_and_frame(sign: Sign, factor: int, frame: Frame) -> None:
+def test_the_wrench_is_brought_to_our_sign_and_frame(sign, factor, frame):
     R = Rotation.from_euler("z", 90, degrees=True).as_matrix()
     taken = Wrench(ArmParams(sign, frame), Stamps())
     taken.take(wrench(1, 10, 2, 3, 0.1, 0.2, 0.3), 5.0, 1)
@@ -173,14 +173,14 @@ def test_the_wrench_is_brought_to_our_sign_and_frame(sign: Sign, factor: int, fr
         ("by-robot", "kept", False),
     ],
 )  # fmt: skip
-def test_six_zeros_are_no_estimate_where_that_is_set(sign: Sign, zeros: Zeros, none: bool) -> None:
+def test_six_zeros_are_no_estimate_where_that_is_set(sign, zeros, none):
     taken = Wrench(ArmParams(sign, "base", zeros), Stamps())
     taken.take(wrench(1, *[0.0] * 6), 5.0, 1)
     assert taken.received_any
     assert (taken.read(5.0, np.eye(3)) is None) == none
 
 
-def test_a_wrench_that_is_old_or_no_number_is_no_estimate() -> None:
+def test_a_wrench_that_is_old_or_no_number_is_no_estimate():
     taken = Wrench(ArmParams("on-robot", "base"), Stamps())
     assert taken.read(5.0, np.eye(3)) is None
     taken.take(wrench(1, 1, 2, 3, 4, 5, 6), 5.0, 1)
@@ -195,7 +195,7 @@ def efforts(stamp: float, names: str, tau: list[float]) -> Any:
 
 
 @pytest.mark.parametrize(("sign", "factor"), [("on-robot", 1), ("by-robot", -1)])
-def test_torques_are_those_of_our_joints_in_our_order_and_sign_while_they_are_new(sign: Sign, factor: int) -> None:
+def test_torques_are_those_of_our_joints_in_our_order_and_sign_while_they_are_new(sign, factor):
     torques = JointTorques(ArmParams(sign, "base", torques="/tau"), NAMES, Stamps())
     assert np.isnan(torques.read(5.0)).all()
     torques.take(efforts(1, "xcab", [9, 3, 1, 2]), 5.0, 1)
@@ -205,7 +205,7 @@ def test_torques_are_those_of_our_joints_in_our_order_and_sign_while_they_are_ne
     assert np.isnan(torques.read(5.1)[1])
 
 
-def test_torques_of_others_or_too_few_are_none_and_zeros_neither_where_they_mean_that() -> None:
+def test_torques_of_others_or_too_few_are_none_and_zeros_neither_where_they_mean_that():
     torques = JointTorques(ArmParams("by-robot", "base", torques="/tau"), NAMES, Stamps())
     torques.take(efforts(1, "abd", [1, 2, 3]), 5.0, 1)
     torques.take(efforts(2, "abc", []), 5.1, 1)
@@ -218,7 +218,7 @@ def test_torques_of_others_or_too_few_are_none_and_zeros_neither_where_they_mean
     assert not kept.read(5.2).any()
 
 
-def test_only_the_beginning_of_a_state_of_franka_is_read_and_half_of_it_is_refused() -> None:
+def test_only_the_beginning_of_a_state_of_franka_is_read_and_half_of_it_is_refused():
     data = MESSAGES.encoded(FRANKA_STATE, MESSAGES.types[FRANKA_STATE](**MESSAGES.blank(FRANKA_STATE)))
     assert MESSAGES.decoded(FRANKA_STATE, data + b"more").tau_ext_hat_filtered.name == []
     for cut in (0, 1, 4, len(data) // 2):
@@ -230,7 +230,7 @@ def test_only_the_beginning_of_a_state_of_franka_is_read_and_half_of_it_is_refus
     ("frame_id", "frame", "doubted"),
     [("fr3_hand_tcp", "base", True), ("fr3_hand_tcp", "ee", False), ("base", "ee", True), ("", "ee", False)],
 )
-def test_a_frame_id_that_does_not_fit_the_setting_is_named(frame_id: str, frame: Frame, doubted: bool) -> None:
+def test_a_frame_id_that_does_not_fit_the_setting_is_named(frame_id, frame, doubted):
     taken = Wrench(ArmParams("on-robot", frame), Stamps())
     message = wrench(1, *[1.0] * 6)
     message.header.frame_id = frame_id
@@ -256,11 +256,11 @@ def test_a_frame_id_that_does_not_fit_the_setting_is_named(frame_id: str, frame:
         (1.0, 0.0, math.inf, RangeStatus.OK),
     ],
 )
-def test_a_range_says_what_rep_117_says(distance: float, least: float, most: float, status: RangeStatus) -> None:
+def test_a_range_says_what_rep_117_says(distance, least, most, status):
     message = MESSAGES.make(RANGE, header(1), 1, 0.5, least, most, distance, 0.0)
     assert status_of(message) is status
 
 
 @pytest.mark.parametrize("name", ["forearm_1", "1st", "links/rechts", "größe", "a b", "_", "9"])
-def test_a_unit_has_the_same_topic_as_in_recordings(name: str) -> None:
+def test_a_unit_has_the_same_topic_as_in_recordings(name):
     assert topic_name(name) == viewer_topics.topic_name(name)

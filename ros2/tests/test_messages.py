@@ -67,7 +67,7 @@ def own_encoding(message: Any) -> bytes:
 
 @pytest.mark.parametrize("distribution", DISTRIBUTIONS)
 @pytest.mark.parametrize("kind", USED)
-def test_both_encoders_make_the_same_bytes(kind: str, distribution: Distribution) -> None:
+def test_both_encoders_make_the_same_bytes(kind, distribution):
     messages = messages_of(distribution)
     for seed in range(15):
         ours, theirs = Drawn(messages, seed).pair(kind)
@@ -76,7 +76,7 @@ def test_both_encoders_make_the_same_bytes(kind: str, distribution: Distribution
 
 @pytest.mark.parametrize("distribution", DISTRIBUTIONS)
 @pytest.mark.parametrize("kind", USED)
-def test_what_one_encodes_the_other_decodes(kind: str, distribution: Distribution) -> None:
+def test_what_one_encodes_the_other_decodes(kind, distribution):
     messages = messages_of(distribution)
     for seed in range(15):
         ours, theirs = Drawn(messages, seed).pair(kind)
@@ -88,7 +88,7 @@ def test_what_one_encodes_the_other_decodes(kind: str, distribution: Distributio
 
 
 @pytest.mark.parametrize("kind", USED)
-def test_a_blank_message_can_be_encoded_and_read_back(kind: str) -> None:
+def test_a_blank_message_can_be_encoded_and_read_back(kind):
     messages = messages_of("jazzy")
     blank = messages.types[kind](**messages.blank(kind))
     assert messages.encoded(kind, messages.decoded(kind, messages.encoded(kind, blank))) == messages.encoded(
@@ -96,7 +96,7 @@ def test_a_blank_message_can_be_encoded_and_read_back(kind: str) -> None:
     )
 
 
-def test_names_are_those_of_rmw() -> None:
+def test_names_are_those_of_rmw():
     names = [messages_of("humble").wire_type(kind).__idl_typename__ for kind in (JOINT_STATE, TRAJECTORY)]
     assert names == [
         "sensor_msgs::msg::dds_::JointState_",
@@ -105,29 +105,27 @@ def test_names_are_those_of_rmw() -> None:
 
 
 @pytest.mark.parametrize(("sender", "receiver"), [("humble", "jazzy"), ("jazzy", "humble"), ("foxy", "iron")])
-def test_a_range_of_another_layout_is_refused_and_names_the_way_out(
-    sender: Distribution, receiver: Distribution
-) -> None:
+def test_a_range_of_another_layout_is_refused_and_names_the_way_out(sender, receiver):
     theirs, ours = messages_of(sender), messages_of(receiver)
     sent = theirs.encoded(RANGE, theirs.types[RANGE](**theirs.blank(RANGE)))
     with pytest.raises(RobotError, match=r"is not a sensor_msgs/msg/Range of .*: choose the sender's distribution"):
         ours.decoded(RANGE, sent)
 
 
-def test_since_iron_a_range_has_a_variance() -> None:
+def test_since_iron_a_range_has_a_variance():
     sizes = {d: len(messages_of(d).blank(RANGE)) for d in DISTRIBUTIONS}
     assert sizes == {d: 6 if d in ("foxy", "galactic", "humble") else 7 for d in DISTRIBUTIONS}
 
 
 @pytest.mark.parametrize("cut", [0, 3, 4, 11, 40])
-def test_a_message_cut_off_is_refused(cut: int) -> None:
+def test_a_message_cut_off_is_refused(cut):
     messages = messages_of("jazzy")
     ours, _ = Drawn(messages, 3).pair(MARKERS)
     with pytest.raises(RobotError, match="is not a visualization_msgs/msg/MarkerArray of jazzy"):
         messages.decoded(MARKERS, messages.encoded(MARKERS, ours)[:cut])
 
 
-def test_the_hash_of_a_type_is_that_of_ros() -> None:
+def test_the_hash_of_a_type_is_that_of_ros():
     # as `ros2 topic info --verbose` prints it
     assert messages_of("jazzy").type_hash("std_msgs/msg/String") == (
         "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"

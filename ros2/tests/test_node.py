@@ -10,8 +10,6 @@ import numpy as np
 import pytest
 
 from pretouch.errors import HardwareError, RobotError
-from pretouch.robot.model import RobotModel
-from pretouch.sensing.skin import Skin
 from pretouch_ros2.messages import JOINT_STATE, RANGE, TEXT, WRENCH
 from pretouch_ros2.node import Ros2Node
 from pretouch_ros2.params import ArmParams, NodeParams, SkinParams
@@ -28,7 +26,7 @@ def joint_state(node: Ros2Node, names: list[str], stamp: int = 1) -> Any:
     return node.messages.make(JOINT_STATE, node.messages.header((stamp, 0), ""), names, zeros, zeros, np.zeros(0))
 
 
-def test_who_comes_late_is_told_what_was_latched_and_nothing_else(node: Ros2Node, other: Ros2Node) -> None:
+def test_who_comes_late_is_told_what_was_latched_and_nothing_else(node, other):
     node.publisher("/latched", TEXT, latched=True, depth=1).publish(text(node, "first"))
     node.publisher("/passing", TEXT).publish(text(node, "gone"))
     received, came = [], Event()
@@ -44,7 +42,7 @@ def test_who_comes_late_is_told_what_was_latched_and_nothing_else(node: Ros2Node
     assert received == ["first"]
 
 
-def test_a_publisher_that_comes_again_is_heard_again(node: Ros2Node, domain: int) -> None:
+def test_a_publisher_that_comes_again_is_heard_again(node, domain):
     received: list[tuple[str, int]] = []
     node.subscribe("/again", TEXT, lambda message, _, writer: received.append((message.data, writer)))
     for said in ("one", "two"):
@@ -57,7 +55,7 @@ def test_a_publisher_that_comes_again_is_heard_again(node: Ros2Node, domain: int
     assert received[0][1] != received[1][1]
 
 
-def test_a_node_that_is_closed_is_gone_for_others(node: Ros2Node, domain: int) -> None:
+def test_a_node_that_is_closed_is_gone_for_others(node, domain):
     subscription = node.subscribe("/gone", TEXT, lambda *_: None)
     with Ros2Node(NodeParams(domain=domain)) as passing:
         publisher = passing.publisher("/gone", TEXT)
@@ -66,7 +64,7 @@ def test_a_node_that_is_closed_is_gone_for_others(node: Ros2Node, domain: int) -
     assert node.wait_for(lambda: subscription.publishers == 0, 10)
 
 
-def test_topics_of_others_are_listed_by_type(node: Ros2Node, other: Ros2Node) -> None:
+def test_topics_of_others_are_listed_by_type(node, other):
     other.publisher("/arm/joint_states", JOINT_STATE)
     other.publisher("/arm/wrench", WRENCH)
     other.subscribe("/arm/commands", TEXT, lambda *_: None)
@@ -75,9 +73,7 @@ def test_topics_of_others_are_listed_by_type(node: Ros2Node, other: Ros2Node) ->
     assert other.topics(JOINT_STATE) == ()
 
 
-def test_an_arm_that_is_not_there_is_named_with_what_there_is(
-    node: Ros2Node, other: Ros2Node, panda_model: RobotModel
-) -> None:
+def test_an_arm_that_is_not_there_is_named_with_what_there_is(node, other, panda_model):
     with Ros2Robot(ArmParams("on-robot", "base"), panda_model, node) as robot:
         states = other.publisher("/elsewhere", JOINT_STATE)
         assert node.wait_for(lambda: node.topics(JOINT_STATE) == ("/elsewhere",), 10)
@@ -101,7 +97,7 @@ def test_an_arm_that_is_not_there_is_named_with_what_there_is(
             Ros2Robot(ArmParams("on-robot", "base"), panda_model, node, 0.1)
 
 
-def test_units_that_are_not_there_are_named(node: Ros2Node, other: Ros2Node, paper_skin: Skin) -> None:
+def test_units_that_are_not_there_are_named(node, other, paper_skin):
     with Ros2Skin(SkinParams("/ranges"), paper_skin, node) as units:
         publisher = other.publisher("/ranges", RANGE)
         assert other.wait_for(lambda: publisher.subscribers == 1, 10)
@@ -120,8 +116,8 @@ def test_units_that_are_not_there_are_named(node: Ros2Node, other: Ros2Node, pap
 
 
 def test_a_unit_for_which_several_publish_is_silent_and_named_and_strangers_take_little_memory(
-    node: Ros2Node, other: Ros2Node, paper_skin: Skin, domain: int
-) -> None:
+    node, other, paper_skin, domain
+):
     def say(by: Ros2Node, name: str, number: int, distance: float) -> None:
         given = {
             "header": by.messages.header((number, 0), name),
@@ -174,7 +170,7 @@ with Ros2Node(NodeParams(domain=int(sys.argv[1]))) as node:
 
 @pytest.mark.slow
 @pytest.mark.alone
-def test_joint_states_at_1_khz_come_in_time(domain: int, node: Ros2Node) -> None:
+def test_joint_states_at_1_khz_come_in_time(domain, node):
     seconds = 5.0
     late: list[float] = []
 

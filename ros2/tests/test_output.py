@@ -1,7 +1,6 @@
 """What is published of the controller's steps, and that the control loop does not wait for it."""
 
 from collections import defaultdict
-from collections.abc import Iterator
 from time import perf_counter, sleep
 from typing import Any
 
@@ -65,14 +64,12 @@ class TrajectoryRun:
 
 
 @pytest.fixture
-def listener(other: Ros2Node) -> Listener:
+def listener(other):
     return Listener(other)
 
 
 @pytest.fixture
-def trajectory(
-    panda_model: RobotModel, paper_skin: Skin, node: Ros2Node, listener: Listener
-) -> Iterator[TrajectoryRun]:
+def trajectory(panda_model, paper_skin, node, listener):
     trajectory = TrajectoryRun(panda_model, paper_skin, node, diagnostics_hz=10.0)
     assert listener.found()
     assert matched(node)
@@ -80,9 +77,7 @@ def trajectory(
     trajectory.output.close()
 
 
-def test_a_step_is_published_by_standard_messages(
-    trajectory: TrajectoryRun, listener: Listener, panda_model: RobotModel, paper_skin: Skin
-) -> None:
+def test_a_step_is_published_by_standard_messages(trajectory, listener, panda_model, paper_skin):
     for _ in range(3):
         cycle = trajectory.turn((1.0, 2.0, 3.0), {0: 0.4, 2: 0.3})
         sleep(0.05)
@@ -111,7 +106,7 @@ def test_a_step_is_published_by_standard_messages(
     assert words.text == "HOLD"
 
 
-def test_units_lie_where_the_skin_has_them(trajectory: TrajectoryRun, listener: Listener, paper_skin: Skin) -> None:
+def test_units_lie_where_the_skin_has_them(trajectory, listener, paper_skin):
     units = listener.last("/tf_static").transforms
     assert [t.child_frame_id for t in units] == list(paper_skin.ids)
     assert [t.header.frame_id for t in units] == [unit.link for unit in paper_skin.units]
@@ -121,7 +116,7 @@ def test_units_lie_where_the_skin_has_them(trajectory: TrajectoryRun, listener: 
         assert Rotation.from_quat([r.x, r.y, r.z, r.w]).as_matrix() == pytest.approx(T_link_sensor[:3, :3], abs=1e-9)
 
 
-def test_each_contact_and_each_change_of_the_mode_is_published(trajectory: TrajectoryRun, listener: Listener) -> None:
+def test_each_contact_and_each_change_of_the_mode_is_published(trajectory, listener):
     for _ in range(105):
         trajectory.turn()
     cycle = trajectory.turn((0.0, 40.0, 0.0))
@@ -138,9 +133,7 @@ def test_each_contact_and_each_change_of_the_mode_is_published(trajectory: Traje
     assert len(listener.received["/pretouch/contact"]) == 1
 
 
-def test_a_silent_unit_is_an_error_in_the_diagnostics(
-    trajectory: TrajectoryRun, listener: Listener, paper_skin: Skin
-) -> None:
+def test_a_silent_unit_is_an_error_in_the_diagnostics(trajectory, listener, paper_skin):
     trajectory.output.record(trajectory.arm.turn(silent={1: 0.5, 2: 0.2}))
     first, *units = listener.last("/diagnostics").status
     assert first.name == "pretouch: controller"
@@ -150,9 +143,7 @@ def test_a_silent_unit_is_an_error_in_the_diagnostics(
     assert units[1].message == "received 0.50 s ago"
 
 
-def test_steps_are_published_at_the_rate_that_was_asked_for(
-    panda_model: RobotModel, paper_skin: Skin, node: Ros2Node, listener: Listener
-) -> None:
+def test_steps_are_published_at_the_rate_that_was_asked_for(panda_model, paper_skin, node, listener):
     trajectory = TrajectoryRun(panda_model, paper_skin, node, rate_hz=20.0)
     assert listener.found()
     for _ in range(50):
@@ -165,7 +156,7 @@ def test_steps_are_published_at_the_rate_that_was_asked_for(
 
 @pytest.mark.slow
 @pytest.mark.alone
-def test_recording_a_step_takes_the_loop_little_time(trajectory: TrajectoryRun) -> None:
+def test_recording_a_step_takes_the_loop_little_time(trajectory):
     took = []
     for _ in range(100):
         cycle = trajectory.turn()
@@ -176,9 +167,7 @@ def test_recording_a_step_takes_the_loop_little_time(trajectory: TrajectoryRun) 
     assert np.median(took) < 0.3e-3
 
 
-def test_the_last_steps_are_published_before_the_end(
-    panda_model: RobotModel, paper_skin: Skin, node: Ros2Node, listener: Listener
-) -> None:
+def test_the_last_steps_are_published_before_the_end(panda_model, paper_skin, node, listener):
     trajectory = TrajectoryRun(panda_model, paper_skin, node)
     assert listener.found()
     assert matched(node)
@@ -187,9 +176,7 @@ def test_the_last_steps_are_published_before_the_end(
     assert listener.last("/pretouch/mode").data.startswith("HOLD")
 
 
-def test_a_failure_of_the_publishing_thread_is_told_and_keeps_nothing_waiting(
-    trajectory: TrajectoryRun, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_failure_of_the_publishing_thread_is_told_and_keeps_nothing_waiting(trajectory, monkeypatch):
     def fail(*_: object) -> None:
         raise ValueError("no cloud")
 

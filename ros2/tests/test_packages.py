@@ -29,13 +29,13 @@ def yaml(path: Path) -> Any:
     return YAML(typ="safe", pure=True).load(path.read_text())
 
 
-def test_the_messages_are_those_of_recordings() -> None:
+def test_the_messages_are_those_of_recordings():
     there = {path.stem: path.read_text() for path in (ROOT / "pretouch_msgs" / "msg").glob("*")}
     assert there == {name: own_definition(name) for name in OWN}, "copy src/pretouch/recording/msg/*.msg"
 
 
 @pytest.mark.parametrize("name", OWN)
-def test_rosidl_takes_the_names_of_each_message(name: str) -> None:
+def test_rosidl_takes_the_names_of_each_message(name):
     fields = re.findall(r"^[\w\[\]/]+ +(\w+)", own_definition(name), re.MULTILINE)
     assert fields
     assert re.fullmatch(r"[A-Z][A-Za-z0-9]*", name)
@@ -43,7 +43,7 @@ def test_rosidl_takes_the_names_of_each_message(name: str) -> None:
 
 
 @pytest.mark.parametrize("package", ["pretouch_msgs", "pretouch_bringup"])
-def test_a_package_names_itself_alike_and_declares_what_it_uses(package: str) -> None:
+def test_a_package_names_itself_alike_and_declares_what_it_uses(package):
     root = ElementTree.parse(ROOT / package / "package.xml").getroot()  # noqa: S314
     assert (root.attrib["format"], root.findtext("name"), root.findtext("version")) == ("3", package, __version__)
     cmake = (ROOT / package / "CMakeLists.txt").read_text()
@@ -103,7 +103,7 @@ class Launch:
 
 
 @pytest.mark.parametrize("path", LAUNCHES, ids=lambda path: path.stem)
-def test_a_launch_file_describes_a_launch_whose_files_are_there(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_launch_file_describes_a_launch_whose_files_are_there(path, monkeypatch):
     launch = Launch(monkeypatch)
     launch.run(path)
     assert Path(launch.default("config")).is_file()
@@ -119,7 +119,7 @@ def commanded(monkeypatch: pytest.MonkeyPatch, **arguments: str) -> list[str]:
 
 
 @pytest.mark.parametrize("path", OPTIONS, ids=lambda path: path.stem)
-def test_the_program_is_started_with_options_that_it_takes(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_program_is_started_with_options_that_it_takes(path, monkeypatch):
     program, *words = commanded(monkeypatch, config=str(path))
     run: Any = cli._read(words, Console(stderr=True))
     assert program == "pretouch"
@@ -133,7 +133,7 @@ def test_the_program_is_started_with_options_that_it_takes(path: Path, monkeypat
     )
 
 
-def test_options_of_each_kind_become_words(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_options_of_each_kind_become_words(monkeypatch, tmp_path):
     mine = tmp_path / "mine.yaml"
     mine.write_text("no_skin: true\nconfirm_push: false\njoint_names: [a, b]\nseconds: 5\n")
     assert commanded(monkeypatch, config=str(mine), yes="true", program="/v/pretouch") == [
@@ -141,7 +141,7 @@ def test_options_of_each_kind_become_words(monkeypatch: pytest.MonkeyPatch, tmp_
     ]  # fmt: skip
 
 
-def test_a_joystick_asks_on_the_topic_in_a_known_frame_often_enough(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_joystick_asks_on_the_topic_in_a_known_frame_often_enough(monkeypatch):
     launch = Launch(monkeypatch)
     launch.run(BRINGUP / "launch" / "joystick.launch.py")
     joy, teleop = launch.of("Node")
@@ -156,7 +156,7 @@ def test_a_joystick_asks_on_the_topic_in_a_known_frame_often_enough(monkeypatch:
     assert 3 * period < PROFILES["pretouch"].failure.desired_timeout_s
 
 
-def test_moveit_servo_sends_velocities_to_the_topic_often_enough() -> None:
+def test_moveit_servo_sends_velocities_to_the_topic_often_enough():
     servo = yaml(BRINGUP / "config" / "moveit_servo.yaml")["/**"]["ros__parameters"]["moveit_servo"]
     assert servo["command_out_type"] == "trajectory_msgs/JointTrajectory"
     assert servo["command_out_topic"] == CommanderParams("trajectory").heard_on

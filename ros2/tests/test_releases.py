@@ -6,7 +6,6 @@ Velocities of up to 0.8 rad/s that turn around within 1.6 rad/s^2 use 0.213 of t
 import numpy as np
 import pytest
 from ros2.tests.simulated import MODEL, SETTLED, TrajectoryRun, V, swing
-from ros2.tests.spline import Release
 
 from pretouch_ros2.params import ArmParams
 
@@ -27,7 +26,7 @@ def late(turn: int) -> float:
 
 @pytest.mark.parametrize("release", RELEASES)
 @pytest.mark.parametrize(("rate", "most"), [(1000, OWN), (250, OWN), (100, OWN)])
-def test_with_one_clock_messages_leave_no_trace_in_the_motion(release: Release, rate: float, most: float) -> None:
+def test_with_one_clock_messages_leave_no_trace_in_the_motion(release, rate, most):
     trajectory = TrajectoryRun(release, rate).run(swing, 3.0, late)
     assert not trajectory.tripped
     assert trajectory.acceleration(MOVES) < most
@@ -35,18 +34,18 @@ def test_with_one_clock_messages_leave_no_trace_in_the_motion(release: Release, 
 
 
 @pytest.mark.parametrize("skew", [-0.01, -0.005, 0.003, 0.005])
-def test_clocks_may_differ_by_milliseconds(skew: float) -> None:
+def test_clocks_may_differ_by_milliseconds(skew):
     assert TrajectoryRun("4.21", 1000).run(swing, 3.0, late, skew=skew).acceleration(MOVES) < OWN
 
 
 @pytest.mark.parametrize(("release", "low", "high"), [("4.17", 0.0, 1.0), ("humble", 50, 200), ("4.21", 50, 200)])
-def test_without_one_clock_some_releases_jerk_at_each_message(release: Release, low: float, high: float) -> None:
+def test_without_one_clock_some_releases_jerk_at_each_message(release, low, high):
     trajectory = TrajectoryRun(release, 1000, ArmParams("on-robot", "base", shared_clock=False)).run(swing, 3.0, late)
     assert low < trajectory.acceleration(MOVES) < high
 
 
 @pytest.mark.parametrize("lag", [0.01, 0.03])
-def test_an_arm_that_is_behind_its_commands_moves_as_well(lag: float) -> None:
+def test_an_arm_that_is_behind_its_commands_moves_as_well(lag):
     trajectory = TrajectoryRun("4.21", 1000, lag=lag).run(swing, 3.0, late)
     assert not trajectory.tripped
     assert trajectory.acceleration(MOVES) < OWN
@@ -54,7 +53,7 @@ def test_an_arm_that_is_behind_its_commands_moves_as_well(lag: float) -> None:
 
 @pytest.mark.parametrize("release", RELEASES)
 @pytest.mark.parametrize("length", [0.1, 0.15, 0.22, 0.5])
-def test_after_lost_commands_the_arm_comes_to_rest_within_its_limits(release: Release, length: float) -> None:
+def test_after_lost_commands_the_arm_comes_to_rest_within_its_limits(release, length):
     trajectory = TrajectoryRun(release, 1000).run(swing, 4.0, late, lost=lambda t: 2.1 <= t < 2.1 + length)
     assert trajectory.tripped.startswith("The arm does not follow")
     assert trajectory.acceleration() < 1.01
@@ -62,7 +61,7 @@ def test_after_lost_commands_the_arm_comes_to_rest_within_its_limits(release: Re
 
 
 @pytest.mark.parametrize(("length", "acceleration"), [(0.02, 25), (0.05, 250)])
-def test_a_few_lost_commands_are_a_step_within_the_velocity_limits(length: float, acceleration: float) -> None:
+def test_a_few_lost_commands_are_a_step_within_the_velocity_limits(length, acceleration):
     trajectory = TrajectoryRun("4.21", 1000).run(swing, 4.0, late, lost=lambda t: 2.1 <= t < 2.1 + length)
     assert not trajectory.tripped
     assert 1 < trajectory.acceleration(MOVES) < acceleration
@@ -71,7 +70,7 @@ def test_a_few_lost_commands_are_a_step_within_the_velocity_limits(length: float
 
 @pytest.mark.parametrize("release", RELEASES)
 @pytest.mark.parametrize("away", [0.01, 0.03, 0.045])
-def test_an_arm_moved_by_hand_while_its_controller_was_off_stays_there(release: Release, away: float) -> None:
+def test_an_arm_moved_by_hand_while_its_controller_was_off_stays_there(release, away):
     trajectory = TrajectoryRun(release, 1000).run(still, 5.0, late, off=(2.0, 2.5, Q + away))
     assert not trajectory.tripped
     after = np.array(trajectory.times)[1:] > 2.502
@@ -85,20 +84,20 @@ def test_an_arm_moved_by_hand_while_its_controller_was_off_stays_there(release: 
     assert np.abs(begins.speed()[after.size :]).max() > 0.5
 
 
-def test_an_arm_moved_by_hand_too_far_is_told_of() -> None:
+def test_an_arm_moved_by_hand_too_far_is_told_of():
     trajectory = TrajectoryRun("4.21", 1000).run(still, 3.0, late, off=(2.0, 2.5, Q + 0.06))
     assert "but was commanded to" in trajectory.tripped
     after = np.array(trajectory.times)[1:] > 2.502
     assert np.abs(trajectory.speed()[after]).max() < 1e-9
 
 
-def test_a_controller_switched_off_in_motion_does_not_jump_when_it_is_back() -> None:
+def test_a_controller_switched_off_in_motion_does_not_jump_when_it_is_back():
     trajectory = TrajectoryRun("4.21", 1000).run(swing, 4.0, late, off=(2.0, 2.04, None))
     assert trajectory.tripped
     assert trajectory.acceleration(2.043) < 1.0
 
 
-def test_at_rest_nothing_is_sent_and_no_motion_before_the_arm_has_settled() -> None:
+def test_at_rest_nothing_is_sent_and_no_motion_before_the_arm_has_settled():
     trajectory = TrajectoryRun("4.21", 1000).run(still, 3.0, late)
     assert trajectory.messages == 1
     early = TrajectoryRun("4.21", 1000)

@@ -1,6 +1,5 @@
 """The port `Robot` over ROS 2: what is sent, and what is given as commanded."""
 
-from collections.abc import Iterator
 from time import monotonic, sleep, time, time_ns
 from typing import Any
 
@@ -46,14 +45,12 @@ class Driver:
 
 
 @pytest.fixture
-def params() -> ArmParams:
+def params():
     return ArmParams("on-robot", "base", settle_s=0.3, hold_s=0.4)
 
 
 @pytest.fixture
-def pair(
-    params: ArmParams, panda_model: RobotModel, node: Ros2Node, other: Ros2Node
-) -> Iterator[tuple[Ros2Robot, Driver]]:
+def pair(params, panda_model, node, other):
     with Ros2Robot(params, panda_model, node) as robot:
         driver = Driver(other, params, panda_model)
         for _ in range(3):  # one may be late on a busy machine
@@ -62,7 +59,7 @@ def pair(
         yield robot, driver
 
 
-def test_the_first_trajectory_goes_to_where_the_arm_was_measured(pair: tuple[Ros2Robot, Driver]) -> None:
+def test_the_first_trajectory_goes_to_where_the_arm_was_measured(pair):
     robot, driver = pair
     q = robot.read().q
     before = monotonic()
@@ -81,7 +78,7 @@ def test_the_first_trajectory_goes_to_where_the_arm_was_measured(pair: tuple[Ros
     assert len(driver.commands) == 1  # none at rest
 
 
-def test_until_the_arm_has_settled_it_is_not_moved(pair: tuple[Ros2Robot, Driver]) -> None:
+def test_until_the_arm_has_settled_it_is_not_moved(pair):
     robot, driver = pair
     robot.read()
     robot.command(SLOW)
@@ -93,9 +90,7 @@ def test_until_the_arm_has_settled_it_is_not_moved(pair: tuple[Ros2Robot, Driver
 
 
 @pytest.mark.parametrize(("old", "q3", "said"), [(0.0, np.nan, "not all finite"), (1.5, 0.0, r"1\.[5-9]. s")])
-def test_from_a_state_that_tells_nothing_no_arm_begins(
-    pair: tuple[Ros2Robot, Driver], panda_model: RobotModel, old: float, q3: float, said: str
-) -> None:
+def test_from_a_state_that_tells_nothing_no_arm_begins(pair, panda_model, old, q3, said):
     robot, driver = pair
     q = panda_model.description.q_ready.copy()
     q[3] += q3
@@ -111,9 +106,7 @@ def test_from_a_state_that_tells_nothing_no_arm_begins(
     assert not driver.commands
 
 
-def test_before_any_command_an_arm_moved_by_hand_is_where_it_is_measured(
-    pair: tuple[Ros2Robot, Driver], panda_model: RobotModel
-) -> None:
+def test_before_any_command_an_arm_moved_by_hand_is_where_it_is_measured(pair, panda_model):
     robot, driver = pair
     moved = panda_model.description.q_ready + 0.3
     driver.tell(moved, robot)
@@ -122,9 +115,7 @@ def test_before_any_command_an_arm_moved_by_hand_is_where_it_is_measured(
     assert not state.qd_commanded.any()
 
 
-def test_a_moving_command_brings_its_past_is_kept_and_then_brakes_to_rest(
-    pair: tuple[Ros2Robot, Driver], panda_model: RobotModel
-) -> None:
+def test_a_moving_command_brings_its_past_is_kept_and_then_brakes_to_rest(pair, panda_model):
     robot, driver = pair
     robot.begin()
     driver.tell(panda_model.description.q_ready, robot)
@@ -150,9 +141,7 @@ def test_a_moving_command_brings_its_past_is_kept_and_then_brakes_to_rest(
     assert state.q_commanded == pytest.approx(state.q, abs=1e-3)
 
 
-def test_an_arm_that_does_not_follow_is_an_error_that_names_the_joint_and_is_sent_nothing_more(
-    pair: tuple[Ros2Robot, Driver], panda_model: RobotModel
-) -> None:
+def test_an_arm_that_does_not_follow_is_an_error_that_names_the_joint_and_is_sent_nothing_more(pair, panda_model):
     robot, driver = pair
     robot.begin()
     away = panda_model.description.q_ready.copy()
@@ -168,9 +157,7 @@ def test_an_arm_that_does_not_follow_is_an_error_that_names_the_joint_and_is_sen
     assert len(driver.commands) == 1
 
 
-def test_a_state_without_numbers_does_not_end_the_watch_over_the_arm(
-    pair: tuple[Ros2Robot, Driver], panda_model: RobotModel
-) -> None:
+def test_a_state_without_numbers_does_not_end_the_watch_over_the_arm(pair, panda_model):
     robot, driver = pair
     robot.begin()
     driver.tell(np.full(7, np.nan), robot)
@@ -180,9 +167,7 @@ def test_a_state_without_numbers_does_not_end_the_watch_over_the_arm(
         robot.read()
 
 
-def test_a_second_program_that_commands_the_arm_is_refused_and_ends_a_run(
-    pair: tuple[Ros2Robot, Driver], panda_model: RobotModel, other: Ros2Node, params: ArmParams, domain: int
-) -> None:
+def test_a_second_program_that_commands_the_arm_is_refused_and_ends_a_run(pair, panda_model, other, params, domain):
     robot, _ = pair
     robot.read()
     with Ros2Node(NodeParams(domain=domain)) as third, Ros2Robot(params, panda_model, third) as second:
@@ -194,9 +179,7 @@ def test_a_second_program_that_commands_the_arm_is_refused_and_ends_a_run(
             robot.read()
 
 
-def test_a_second_driver_of_the_arm_is_refused(
-    pair: tuple[Ros2Robot, Driver], panda_model: RobotModel, params: ArmParams, domain: int
-) -> None:
+def test_a_second_driver_of_the_arm_is_refused(pair, panda_model, params, domain):
     robot, driver = pair
     with Ros2Node(NodeParams(domain=domain)) as third:
         again = Driver(third, params, panda_model)
@@ -207,9 +190,7 @@ def test_a_second_driver_of_the_arm_is_refused(
 
 
 @pytest.mark.parametrize("params", [ArmParams("by-robot", "base", torques="/tau")])
-def test_torques_that_were_asked_for_are_waited_for_and_read(
-    params: ArmParams, panda_model: RobotModel, node: Ros2Node, other: Ros2Node
-) -> None:
+def test_torques_that_were_asked_for_are_waited_for_and_read(params, panda_model, node, other):
     with Ros2Robot(params, panda_model, node) as robot:
         driver = Driver(other, params, panda_model)
         driver.tell(panda_model.description.q_ready, robot)
@@ -235,7 +216,7 @@ def test_torques_that_were_asked_for_are_waited_for_and_read(
         robot.wait(10)
 
 
-def test_a_failure_of_the_receiving_thread_stops_the_arm(pair: tuple[Ros2Robot, Driver], node: Ros2Node) -> None:
+def test_a_failure_of_the_receiving_thread_stops_the_arm(pair, node):
     robot, driver = pair
 
     def fail(*_: object) -> None:
@@ -248,13 +229,13 @@ def test_a_failure_of_the_receiving_thread_stops_the_arm(pair: tuple[Ros2Robot, 
         robot.read()
 
 
-def test_a_command_that_is_no_number_is_refused(pair: tuple[Ros2Robot, Driver]) -> None:
+def test_a_command_that_is_no_number_is_refused(pair):
     robot, _ = pair
     with pytest.raises(RobotError, match="give finite joint velocities"):
         robot.command(np.full(7, np.nan))
 
 
-def test_a_state_is_stamped_by_when_it_came(pair: tuple[Ros2Robot, Driver], panda_model: RobotModel) -> None:
+def test_a_state_is_stamped_by_when_it_came(pair, panda_model):
     robot, driver = pair
     before = monotonic()
     driver.tell(panda_model.description.q_ready, robot)
@@ -262,9 +243,7 @@ def test_a_state_is_stamped_by_when_it_came(pair: tuple[Ros2Robot, Driver], pand
 
 
 @pytest.mark.parametrize("params", [ArmParams("on-robot", "base", shared_clock=False, settle_s=0.2)])
-def test_without_one_clock_trajectories_begin_as_they_come(
-    pair: tuple[Ros2Robot, Driver], panda_model: RobotModel
-) -> None:
+def test_without_one_clock_trajectories_begin_as_they_come(pair, panda_model):
     robot, driver = pair
     assert "only joint_trajectory_controller 4.17 to 4.20 moves smoothly" in robot.notes[0]
     robot.begin()
@@ -277,16 +256,14 @@ def test_without_one_clock_trajectories_begin_as_they_come(
     assert robot.read().stamp > monotonic() - 5
 
 
-def test_a_clock_that_is_not_shared_is_refused(
-    node: Ros2Node, other: Ros2Node, panda_model: RobotModel, params: ArmParams
-) -> None:
+def test_a_clock_that_is_not_shared_is_refused(node, other, panda_model, params):
     with Ros2Robot(params, panda_model, node) as robot:
         Driver(other, params, panda_model).tell(panda_model.description.q_ready, robot, 100.0)
         with pytest.raises(RobotError, match=r"stamps of /joint_states are 100 s behind .* NTP"):
             robot.wait(10)
 
 
-def test_everything_unusual_is_noted(pair: tuple[Ros2Robot, Driver], other: Ros2Node, params: ArmParams) -> None:
+def test_everything_unusual_is_noted(pair, other, params):
     robot, _ = pair
     assert robot.notes == ()
     other.subscribe(params.command_topic, TRAJECTORY, lambda *_: None)

@@ -11,7 +11,7 @@ from time import monotonic, sleep
 import numpy as np
 import pytest
 from ros2.tests.asking import Publishing, twist
-from ros2.tests.processes import ArmPeer, arm_peer
+from ros2.tests.processes import speeds, velocities
 
 from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify
@@ -20,7 +20,6 @@ from pretouch.session.confirmations import ConfirmedRobots
 from pretouch.session.push import DIRECTIONS
 from pretouch_ros2.arm import identity
 from pretouch_ros2.messages import TWIST
-from pretouch_ros2.node import Ros2Node
 from pretouch_ros2.params import ArmParams, NodeParams
 
 # two processes in real time: alone, lest another test takes the arm's time and it is rightly found not to follow
@@ -49,12 +48,6 @@ def running(domain: int, folder: Path, *words: str, profile: str = PROFILE) -> I
             process.kill()
 
 
-@pytest.fixture
-def arm(domain: int, tmp_path: Path) -> Iterator[ArmPeer]:
-    with arm_peer(domain, tmp_path / "log.npy") as peer:
-        yield peer
-
-
 def confirmed(domain: int, folder: Path) -> None:
     known = identity(NodeParams(domain=domain), ArmParams("by-robot", "base"))
     ConfirmedRobots(folder / "state" / "pretouch").keep(known)
@@ -70,11 +63,7 @@ def lines_until(process: subprocess.Popen[str], sign: str) -> list[str]:
     raise AssertionError("".join(said))
 
 
-def speeds(log: np.ndarray) -> np.ndarray:
-    return np.abs(np.diff(log[:, 1:], axis=0) / np.diff(log[:, 0])[:, None]).max(axis=1)
-
-
-def test_a_run_checks_yields_to_a_push_and_ends_at_rest(domain: int, tmp_path: Path, arm: ArmPeer) -> None:
+def test_a_run_checks_yields_to_a_push_and_ends_at_rest(domain, tmp_path, arm):
     confirmed(domain, tmp_path)
     with running(domain, tmp_path, "--seconds", "5") as run:
         said = lines_until(run, "TRACK")
@@ -91,7 +80,7 @@ def test_a_run_checks_yields_to_a_push_and_ends_at_rest(domain: int, tmp_path: P
     assert speeds(log)[-50:].max() < 1e-9
 
 
-def test_a_run_that_is_killed_in_motion_leaves_the_arm_at_rest(domain: int, tmp_path: Path, arm: ArmPeer) -> None:
+def test_a_run_that_is_killed_in_motion_leaves_the_arm_at_rest(domain, tmp_path, arm):
     confirmed(domain, tmp_path)
     with running(domain, tmp_path, "--seconds", "30") as run:
         lines_until(run, "TRACK")
@@ -107,46 +96,24 @@ def test_a_run_that_is_killed_in_motion_leaves_the_arm_at_rest(domain: int, tmp_
     assert fast[time < killed][-50:].max() > 0.05  # samples, not a time: a busy machine may log none for a while
     assert time[fast > 1e-6][-1] - killed < 0.4 + LATE_S
     limits = panda().qdd_max
-    qd = np.diff(log[:, 1:], axis=0) / np.diff(log[:, 0])[:, None]
     braking = slice(np.searchsorted(time, killed + 0.1), None)
-    acceleration = np.abs(np.diff(qd[braking], axis=0)) / 1e-3 / limits
+    acceleration = np.abs(np.diff(velocities(log)[braking], axis=0)) / 1e-3 / limits
     assert np.percentile(acceleration, 99) < 1.1
 
 
-def guided(run: subprocess.Popen[str], arm: ArmPeer) -> list[str]:
-    """Push the hand as the command asks for; return what it said."""
-    said = []
-    for direction in DIRECTIONS:
-        said += lines_until(run, "Push the hand")
-        arm.tell("push " + " ".join(str(14.0 * part) for part in direction.axis))
-        said += lines_until(run, "Let go.")
-        arm.tell("push 0 0 0")
-    return said
-
-
-def test_guided_pushes_confirm_the_sign(domain: int, tmp_path: Path, arm: ArmPeer) -> None:
-    with running(domain, tmp_path, "--seconds", "1") as run:
-        said = guided(run, arm)
-        out, _ = run.communicate(timeout=LIMIT_S)
-    out = "".join(said) + out
-    assert run.returncode == 0, out
-    assert "The force sign is confirmed" in out
-    assert speeds(arm.stop())[-50:].max() < 1e-9
-
-
-def test_a_commander_drives_by_the_profile_pretouch_after_pushes_that_torques_confirm(
-    domain: int, tmp_path: Path, arm: ArmPeer
-) -> None:
+def test_a_commander_drives_by_the_profile_pretouch_after_pushes_that_torques_confirm(domain, tmp_path, arm, other):
     place = tmp_path / "a.mcap"
     words = "--torques", "/external_joint_torques", "--desired", "twist", "--record", str(place)
     chosen = "pretouch:perception=none:failure.state_timeout_s=1"
     with running(domain, tmp_path, *words, "--seconds", "12", profile=chosen) as run:
-        said = guided(run, arm)
+        said = []
+        for direction in DIRECTIONS:
+            said += lines_until(run, "Push the hand")
+            arm.tell("push " + " ".join(str(14.0 * part) for part in direction.axis))
+            said += lines_until(run, "Let go.")
+            arm.tell("push 0 0 0")
         said += lines_until(run, "was received on /pretouch/twist yet")
-        with (
-            Ros2Node(NodeParams(domain=domain)) as theirs,
-            Publishing(theirs, "/pretouch/twist", TWIST, lambda: twist((0.0, 0.05, 0.0))),
-        ):
+        with Publishing(other, "/pretouch/twist", TWIST, lambda: twist((0.0, 0.05, 0.0))):
             said += lines_until(run, "TRACK")
             sleep(1.5)
             arm.tell("push 0 0 25")

@@ -1,7 +1,5 @@
 """Settings, and what of the environment counts."""
 
-from collections.abc import Callable
-
 import pytest
 
 from pretouch.errors import ParameterError, RobotError
@@ -30,12 +28,12 @@ from pretouch_ros2.params import ArmParams, NodeParams, OutputParams, SkinParams
         (lambda: NodeParams("lunar"), "choose one of foxy"),  # type: ignore[arg-type]
     ],
 )
-def test_a_setting_that_cannot_be_is_refused_with_the_way_out(make: Callable[[], object], said: str) -> None:
+def test_a_setting_that_cannot_be_is_refused_with_the_way_out(make, said):
     with pytest.raises(ParameterError, match=said):
         make()
 
 
-def test_sign_and_frame_have_no_default() -> None:
+def test_sign_and_frame_have_no_default():
     with pytest.raises(TypeError, match="'sign' and 'frame'"):
         ArmParams()  # type: ignore[call-arg]
 
@@ -44,14 +42,12 @@ def test_sign_and_frame_have_no_default() -> None:
     ("domain", "environment", "expected"),
     [(-1, {}, 0), (-1, {"ROS_DOMAIN_ID": "42"}, 42), (7, {"ROS_DOMAIN_ID": "42"}, 7)],
 )
-def test_the_domain_is_the_set_one_or_that_of_the_environment(
-    domain: int, environment: dict[str, str], expected: int
-) -> None:
+def test_the_domain_is_the_set_one_or_that_of_the_environment(domain, environment, expected):
     assert domain_of(NodeParams(domain=domain), environment) == expected
 
 
 @pytest.mark.parametrize("text", ["-1", "x", "233", "1.5"])
-def test_a_domain_of_the_environment_that_is_none_is_refused(text: str) -> None:
+def test_a_domain_of_the_environment_that_is_none_is_refused(text):
     with pytest.raises(RobotError, match=r"ROS_DOMAIN_ID is .*: set it to a whole number from 0 to 232"):
         domain_of(NodeParams(), {"ROS_DOMAIN_ID": text})
 
@@ -68,9 +64,7 @@ def test_a_domain_of_the_environment_that_is_none_is_refused(text: str) -> None:
         ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}, "127.0.0.1", True),
     ],
 )
-def test_a_network_that_the_environment_forbids_is_refused(
-    environment: dict[str, str], interface: str, refused: bool
-) -> None:
+def test_a_network_that_the_environment_forbids_is_refused(environment, interface, refused):
     params = NodeParams(interface=interface)
     if refused:
         with pytest.raises(RobotError, match="ROS_"):
@@ -79,12 +73,12 @@ def test_a_network_that_the_environment_forbids_is_refused(
         check_range(params, environment)
 
 
-def test_an_interface_that_is_not_there_is_refused(domain: int) -> None:
+def test_an_interface_that_is_not_there_is_refused(domain):
     with pytest.raises(RobotError, match="cannot be joined through the interface 'nowhere0': give the address or name"):
         Ros2Node(NodeParams(domain=domain, interface="nowhere0"))
 
 
-def test_two_nodes_of_a_program_share_a_domain_and_so_its_network(domain: int) -> None:
+def test_two_nodes_of_a_program_share_a_domain_and_so_its_network(domain):
     with Ros2Node(NodeParams(domain=domain)):
         with pytest.raises(RobotError, match="in use by this program with another interface"):
             Ros2Node(NodeParams(domain=domain, interface="eth0"))

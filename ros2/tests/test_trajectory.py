@@ -25,7 +25,7 @@ def sampled(trajectory: StoppingTrajectory) -> tuple[np.ndarray, np.ndarray, np.
 
 
 @given(qd=velocities, wanted=velocities)
-def test_velocities_change_within_the_limits_and_end_at_rest(qd: np.ndarray, wanted: np.ndarray) -> None:
+def test_velocities_change_within_the_limits_and_end_at_rest(qd, wanted):
     trajectory = stopping_trajectory(PANDA.q_ready, qd, wanted, A, PERIOD, HOLD)
     time, q, v = sampled(trajectory)
     assert (np.abs(np.diff(v, axis=0)) <= A * np.diff(time)[:, None] * (1 + 1e-6) + 1e-9).all()
@@ -35,7 +35,7 @@ def test_velocities_change_within_the_limits_and_end_at_rest(qd: np.ndarray, wan
 
 
 @given(qd=velocities, wanted=velocities)
-def test_each_joint_brakes_as_hard_as_it_may_once_the_velocity_was_held(qd: np.ndarray, wanted: np.ndarray) -> None:
+def test_each_joint_brakes_as_hard_as_it_may_once_the_velocity_was_held(qd, wanted):
     trajectory = stopping_trajectory(PANDA.q_ready, qd, wanted, A, PERIOD, HOLD)
     begin = max(HOLD, PERIOD, float((np.abs(wanted - qd) / A).max()))
     for share in (0.1, 0.5, 0.9):
@@ -46,7 +46,7 @@ def test_each_joint_brakes_as_hard_as_it_may_once_the_velocity_was_held(qd: np.n
 
 
 @given(qd=velocities, wanted=velocities)
-def test_way_points_are_in_order_and_begin_where_the_velocity_was_held(qd: np.ndarray, wanted: np.ndarray) -> None:
+def test_way_points_are_in_order_and_begin_where_the_velocity_was_held(qd, wanted):
     points = list(stopping_trajectory(PANDA.q_ready, qd, wanted, A, PERIOD, HOLD).way_points())
     times = [point.time for point in points]
     assert times[0] >= HOLD
@@ -55,7 +55,7 @@ def test_way_points_are_in_order_and_begin_where_the_velocity_was_held(qd: np.nd
     assert not points[-1].qd.any()
 
 
-def test_a_command_is_a_step_held_for_a_period_as_the_controller_takes_it() -> None:
+def test_a_command_is_a_step_held_for_a_period_as_the_controller_takes_it():
     reference, q = Reference(A, PERIOD, HOLD), PANDA.q_ready.copy()
     reference.begin(q, 0.0, 0.5)
     rng, qd = np.random.default_rng(1), STILL
@@ -70,7 +70,7 @@ def test_a_command_is_a_step_held_for_a_period_as_the_controller_takes_it() -> N
 
 
 @given(seed=st.integers(0, 50))
-def test_braking_by_itself_ends_inside_the_joint_limits_that_the_controller_kept(seed: int) -> None:
+def test_braking_by_itself_ends_inside_the_joint_limits_that_the_controller_kept(seed):
     limits = JointLimits(np.full(7, -0.5), np.full(7, 0.5), V, A, PERIOD)
     reference, rng = Reference(A, PERIOD, PERIOD), np.random.default_rng(seed)
     reference.begin(STILL, 0.0, 0.5)
@@ -84,7 +84,7 @@ def test_braking_by_itself_ends_inside_the_joint_limits_that_the_controller_kept
         assert (np.abs(trajectory.q) <= 0.5 + 2e-5).all()
 
 
-def test_a_late_command_finds_the_arm_braking_and_goes_on_from_there() -> None:
+def test_a_late_command_finds_the_arm_braking_and_goes_on_from_there():
     reference = Reference(A, PERIOD, HOLD)
     reference.begin(PANDA.q_ready, 0.0, 0.5)
     fast = 0.5 * V
@@ -101,7 +101,7 @@ def test_a_late_command_finds_the_arm_braking_and_goes_on_from_there() -> None:
     assert (v <= fast + 1e-9).all()
 
 
-def test_what_is_asked_for_at_an_instant_before_the_last_command_is_of_the_one_before() -> None:
+def test_what_is_asked_for_at_an_instant_before_the_last_command_is_of_the_one_before():
     reference = Reference(A, PERIOD, HOLD)
     reference.begin(PANDA.q_ready, 0.0, 0.5)
     one = np.full(7, 0.05)
@@ -112,7 +112,7 @@ def test_what_is_asked_for_at_an_instant_before_the_last_command_is_of_the_one_b
     assert reference.at(0.5)[1] == pytest.approx(STILL)
 
 
-def test_what_has_passed_is_told_by_the_points_between_which_velocities_are_linear() -> None:
+def test_what_has_passed_is_told_by_the_points_between_which_velocities_are_linear():
     reference, rng = Reference(A, PERIOD, HOLD), np.random.default_rng(3)
     reference.begin(PANDA.q_ready, 0.0, 0.5)
     qd = STILL
@@ -130,7 +130,7 @@ def test_what_has_passed_is_told_by_the_points_between_which_velocities_are_line
         reference.command(qd, now)
 
 
-def test_the_loops_way_to_rest_is_followed_within_the_limits() -> None:
+def test_the_loops_way_to_rest_is_followed_within_the_limits():
     limits = JointLimits(np.full(7, -3.0), np.full(7, 3.0), V, A, PERIOD)
     reference = Reference(A, PERIOD, HOLD)
     reference.begin(STILL, 0.0, 0.5)

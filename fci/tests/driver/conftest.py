@@ -1,8 +1,5 @@
 """Tests of the product's Franka arm against the served one, through the vendor's libraries."""
 
-from collections.abc import Callable, Iterator
-from pathlib import Path
-
 import pytest
 from fci.tests.driver.served import Served
 from tests.needs import modules_with
@@ -15,12 +12,12 @@ pytest_pycollect_makemodule = modules_with(FRANKA)
 
 
 @pytest.fixture(scope="session")
-def fr3_model() -> RobotModel:
+def fr3_model():
     return RobotModel(fr3())
 
 
 @pytest.fixture
-def serve(tmp_path: Path) -> Iterator[Callable[..., Served]]:
+def serve(tmp_path):
     """Starts simulated arms: of a kind, with more options of `pretouch serve-fci`."""
     opened: list[Served] = []
 

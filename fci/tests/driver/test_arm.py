@@ -19,7 +19,6 @@ from pretouch.hardware.franka.arm import FrankaArm
 from pretouch.hardware.franka.collision import collision_behavior
 from pretouch.hardware.franka.limits import FrankaParams
 from pretouch.profiles import profile
-from pretouch.robot.model import RobotModel
 from pretouch.signals import OF_TERMINAL
 
 pytestmark = [pytest.mark.slow, pytest.mark.alone]
@@ -30,14 +29,14 @@ FROZEN_S = 1.3
 
 
 @pytest.fixture(scope="module", params=["panda", "fr3"])
-def served(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+def served(request, tmp_path_factory):
     arm = Served(tmp_path_factory.mktemp("served"), request.param)
     yield arm
     arm.close()
 
 
 @pytest.fixture
-def model(served: Served, panda_model: RobotModel, fr3_model: RobotModel) -> RobotModel:
+def model(served, panda_model, fr3_model):
     return panda_model if served.kind == "panda" else fr3_model
 
 
@@ -67,9 +66,7 @@ def keep(arm: FrankaArm, speed: float, until: Callable[[], bool], most: float = 
         time.sleep(0.01)
 
 
-def test_the_arm_follows_commands_and_ends_at_rest_and_the_terminals_signals_are_left_to_the_program(
-    served: Served, model: RobotModel
-) -> None:
+def test_the_arm_follows_commands_and_ends_at_rest_and_the_terminals_signals_are_left_to_the_program(served, model):
     with FrankaArm(served.address, served.kind, model, behavior=collision_behavior(profile("paper"), model)) as arm:
         idle = arm.read()
         assert abs(time.monotonic() - idle.stamp) < 1.0
@@ -94,9 +91,7 @@ def test_the_arm_follows_commands_and_ends_at_rest_and_the_terminals_signals_are
 
 @one_kind
 @pytest.mark.parametrize(("speed", "words"), [(np.nan, "not finite"), (3.0 * np.pi, "limit ")])
-def test_a_set_point_that_is_none_brings_the_arm_to_rest(
-    served: Served, model: RobotModel, speed: float, words: str
-) -> None:
+def test_a_set_point_that_is_none_brings_the_arm_to_rest(served, model, speed, words):
     with FrankaArm(served.address, served.kind, model) as arm:
         arm.begin()
         keep(arm, 0.3, served.moves)
@@ -111,7 +106,7 @@ def test_a_set_point_that_is_none_brings_the_arm_to_rest(
 
 
 @one_kind
-def test_stale_set_points_bring_the_arm_to_rest_and_fresh_ones_move_it_again(served: Served, model: RobotModel) -> None:
+def test_stale_set_points_bring_the_arm_to_rest_and_fresh_ones_move_it_again(served, model):
     with FrankaArm(served.address, served.kind, model, FrankaParams(end_after_s=30.0)) as arm:
         arm.begin()
         keep(arm, -0.3, served.moves)
@@ -124,7 +119,7 @@ def test_stale_set_points_bring_the_arm_to_rest_and_fresh_ones_move_it_again(ser
 
 
 @one_kind
-def test_a_second_process_is_refused_with_the_number_of_the_first(served: Served, model: RobotModel) -> None:
+def test_a_second_process_is_refused_with_the_number_of_the_first(served, model):
     with (
         FrankaArm(served.address, served.kind, model) as arm,
         pytest.raises(RobotError, match=f"in use by process {arm.pid} on this machine"),
@@ -132,7 +127,7 @@ def test_a_second_process_is_refused_with_the_number_of_the_first(served: Served
         FrankaArm(served.address, served.kind, model)
 
 
-def test_sigterm_to_the_process_brings_the_arm_to_rest_first(served: Served, model: RobotModel) -> None:
+def test_sigterm_to_the_process_brings_the_arm_to_rest_first(served, model):
     with FrankaArm(served.address, served.kind, model) as arm:
         arm.begin()
         keep(arm, 0.3, served.moves)
@@ -144,7 +139,7 @@ def test_sigterm_to_the_process_brings_the_arm_to_rest_first(served: Served, mod
 
 
 @one_kind
-def test_a_program_that_was_frozen_for_long_does_not_move_the_arm_again(served: Served) -> None:
+def test_a_program_that_was_frozen_for_long_does_not_move_the_arm_again(served):
     with commander(served) as process:
         process.send_signal(signal.SIGSTOP)
         wait_for(served.rests, "rest")
@@ -158,7 +153,7 @@ def test_a_program_that_was_frozen_for_long_does_not_move_the_arm_again(served: 
 
 
 @one_kind
-def test_a_program_that_is_killed_leaves_the_arm_at_rest(served: Served) -> None:
+def test_a_program_that_is_killed_leaves_the_arm_at_rest(served):
     gone = served.clients_gone()
     with commander(served) as process:
         process.kill()
@@ -167,16 +162,14 @@ def test_a_program_that_is_killed_leaves_the_arm_at_rest(served: Served) -> None
     assert "Motion ended" not in served.said()
 
 
-def test_another_arm_than_was_said_is_refused_in_one_sentence(served: Served, model: RobotModel) -> None:
+def test_another_arm_than_was_said_is_refused_in_one_sentence(served, model):
     other, speaks = {"panda": ("fr3", 5), "fr3": ("panda", 10)}[served.kind]
     with pytest.raises(RobotError, match=f"^The arm at {served.address} speaks version {speaks} of .*: choose .*$"):
         FrankaArm(served.address, other, model)
 
 
 @one_kind
-def test_when_the_process_is_killed_the_arm_stops_by_itself_and_nobody_says_that_it_rests(
-    served: Served, model: RobotModel
-) -> None:
+def test_when_the_process_is_killed_the_arm_stops_by_itself_and_nobody_says_that_it_rests(served, model):
     with FrankaArm(served.address, served.kind, model) as arm:
         arm.begin()
         keep(arm, 0.3, served.moves)
@@ -192,9 +185,7 @@ def test_when_the_process_is_killed_the_arm_stops_by_itself_and_nobody_says_that
 
 
 @one_kind
-def test_when_the_process_is_stopped_the_arm_stops_by_itself_and_the_caller_is_told(
-    served: Served, model: RobotModel
-) -> None:
+def test_when_the_process_is_stopped_the_arm_stops_by_itself_and_the_caller_is_told(served, model):
     with FrankaArm(served.address, served.kind, model) as arm:
         arm.begin()
         keep(arm, 0.3, served.moves)

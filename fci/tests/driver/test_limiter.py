@@ -11,12 +11,12 @@ from pretouch.robot.named import robot_named
 from pretouch_fci.kinds import JointVelocity
 from pretouch_fci.limits import motion_limits as served_limits
 from pretouch_fci.motion import Motion, Setpoint
-from pretouch_fci.wire import Controller, RobotKind
+from pretouch_fci.wire import Controller
 
 
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("kind", ["panda", "fr3"])
-def test_bursts_of_lost_commands_at_any_time_break_no_limit_of_the_served_arm(kind: RobotKind, seed: int) -> None:
+def test_bursts_of_lost_commands_at_any_time_break_no_limit_of_the_served_arm(kind, seed):
     model, draw = RobotModel(robot_named(kind)), np.random.default_rng([seed, 15])
     limits = motion_limits(model, kind)
     q, limiter = (limits.q_min + limits.q_max) / 2, SetPointLimiter(limits, LimiterParams())

@@ -15,7 +15,7 @@ def drive(served: Served, task: str) -> dict:
 
 
 @pytest.mark.parametrize("kind", [pytest.param("panda", marks=pytest.mark.slow), "fr3"])
-def test_an_exception_in_a_motion_stops_the_arm_before_it_is_raised(serve: Serve, kind: str) -> None:
+def test_an_exception_in_a_motion_stops_the_arm_before_it_is_raised(serve, kind):
     result = drive(serve(kind, "--lockstep"), "raises")
     assert result["states"] == 300
     assert result["trouble"] == "the disk is full"
@@ -24,7 +24,7 @@ def test_an_exception_in_a_motion_stops_the_arm_before_it_is_raised(serve: Serve
 
 @pytest.mark.parametrize("drop", [pytest.param("3/50", marks=pytest.mark.slow), "15/200"])
 @pytest.mark.parametrize("kind", ["panda", pytest.param("fr3", marks=pytest.mark.slow)])
-def test_bursts_of_lost_commands_are_survived(serve: Serve, kind: str, drop: str) -> None:
+def test_bursts_of_lost_commands_are_survived(serve, kind, drop):
     served = serve(kind, "--lockstep", "--drop", drop)
     result = drive(served, "staircase")
     assert result["mode"] == "idle"
@@ -33,7 +33,7 @@ def test_bursts_of_lost_commands_are_survived(serve: Serve, kind: str, drop: str
 
 
 @pytest.mark.parametrize("kind", ["panda", pytest.param("fr3", marks=pytest.mark.slow)])
-def test_a_contact_above_the_arms_own_threshold_is_its_reflex_and_it_recovers(serve: Serve, kind: str) -> None:
+def test_a_contact_above_the_arms_own_threshold_is_its_reflex_and_it_recovers(serve, kind):
     result = drive(serve(kind, "--lockstep", "--push", "0.5:0,80,0:0.5"), "contact")
     assert "cartesian_reflex" in result["errors"]
     assert "cartesian_reflex" in result["trouble"]

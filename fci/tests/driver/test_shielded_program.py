@@ -3,15 +3,12 @@
 import re
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
-
-from fci.tests.driver.served import Served
 
 EXAMPLE = Path(__file__).parents[3] / "examples" / "09_libfranka_program.py"
 
 
-def test_a_program_of_the_vendors_library_yields_to_a_push_and_goes_on(serve: Callable[..., Served]) -> None:
+def test_a_program_of_the_vendors_library_yields_to_a_push_and_goes_on(serve):
     served = serve("fr3", "--lockstep", "--push", "3:0,30,0:0.3")
     ended = subprocess.run(
         [sys.executable, EXAMPLE, served.address], capture_output=True, text=True, timeout=240, check=False
