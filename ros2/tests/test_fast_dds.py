@@ -101,32 +101,20 @@ def same(one: str, another: str) -> bool:
     return all(a == b if a[:1] == ":" else repr(float(a)) == repr(float(b)) for a, b in pairs)
 
 
-OTHERS = [pytest.param(kind, "reliable", marks=pytest.mark.slow) for kind in LINES if kind != JOINT_STATE]
+OTHERS = [pytest.param(kind, "reliable", marks=pytest.mark.slow) for kind in LINES if kind != TRAJECTORY]
 
 
-@pytest.mark.parametrize(("kind", "how"), [(JOINT_STATE, "reliable"), (JOINT_STATE, "best"), *OTHERS])
-def test_what_fast_dds_publishes_is_read(fast_peer, node, domain, kind, how):
-    got: list[str] = []
-    subscription = node.subscribe("/topic", kind, lambda message, *_: got.append(" ".join(words_of(message))))
-    with peer(fast_peer, domain, kind, "pub", how) as process:
-        assert node.wait_for(lambda: subscription.publishers == 1, 20)
-        process.communicate("".join(f"{line}\n" for line in LINES[kind]), timeout=30)
-    assert process.returncode == 0
-    assert node.wait_for(lambda: len(got) == len(LINES[kind]), 5)
-    assert all(same(a, b) for a, b in zip(got, LINES[kind], strict=True)), got
-
-
-@pytest.mark.parametrize(
-    "kind", [pytest.param(kind, marks=pytest.mark.slow) if kind != TRAJECTORY else kind for kind in LINES]
-)
-def test_fast_dds_reads_what_is_published(fast_peer, node, other, domain, kind):
-    # what is to be published is made from bytes of Fast CDR, read once
+@pytest.mark.parametrize(("kind", "how"), [(TRAJECTORY, "reliable"), (JOINT_STATE, "best"), *OTHERS])
+def test_what_fast_dds_publishes_is_read_and_it_reads_what_is_published(fast_peer, node, other, domain, kind, how):
     messages: list[Any] = []
-    subscription = other.subscribe("/topic", kind, lambda message, *_: messages.append(message), reliable=True)
-    with peer(fast_peer, domain, kind, "pub", "reliable") as process:
+    subscription = other.subscribe("/topic", kind, lambda message, *_: messages.append(message))
+    with peer(fast_peer, domain, kind, "pub", how) as process:
         assert other.wait_for(lambda: subscription.publishers == 1, 20)
         process.communicate("".join(f"{line}\n" for line in LINES[kind]), timeout=30)
+    assert process.returncode == 0
     assert other.wait_for(lambda: len(messages) == len(LINES[kind]), 5)
+    got = [" ".join(words_of(message)) for message in messages]
+    assert all(same(a, b) for a, b in zip(got, LINES[kind], strict=True)), got
     publisher = node.publisher("/topic", kind)
     with peer(fast_peer, domain, kind, "sub", str(len(messages))) as process:
         assert node.wait_for(lambda: publisher.subscribers == 2, 20)

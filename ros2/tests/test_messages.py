@@ -67,33 +67,16 @@ def own_encoding(message: Any) -> bytes:
 
 @pytest.mark.parametrize("distribution", DISTRIBUTIONS)
 @pytest.mark.parametrize("kind", USED)
-def test_both_encoders_make_the_same_bytes(kind, distribution):
+def test_both_encoders_make_the_same_bytes_and_one_decodes_what_the_other_makes(kind, distribution):
     messages = messages_of(distribution)
     for seed in range(15):
         ours, theirs = Drawn(messages, seed).pair(kind)
-        assert messages.encoded(kind, ours) == own_encoding(theirs)
-
-
-@pytest.mark.parametrize("distribution", DISTRIBUTIONS)
-@pytest.mark.parametrize("kind", USED)
-def test_what_one_encodes_the_other_decodes(kind, distribution):
-    messages = messages_of(distribution)
-    for seed in range(15):
-        ours, theirs = Drawn(messages, seed).pair(kind)
-        back = messages.idl_type(kind).deserialize(messages.encoded(kind, ours))
-        assert repr(back) == repr(theirs)  # NaN is equal to itself there
+        encoded = messages.encoded(kind, ours)
+        assert encoded == own_encoding(theirs)
+        assert repr(messages.idl_type(kind).deserialize(encoded)) == repr(theirs)  # NaN is equal to itself there
         # with the padding that cyclonedds puts on the wire
-        again = messages.decoded(kind, own_encoding(theirs).ljust(4, b"\0") + b"\0" * (-len(own_encoding(theirs)) % 4))
-        assert messages.encoded(kind, again) == messages.encoded(kind, ours)
-
-
-@pytest.mark.parametrize("kind", USED)
-def test_a_blank_message_can_be_encoded_and_read_back(kind):
-    messages = messages_of("jazzy")
-    blank = messages.types[kind](**messages.blank(kind))
-    assert messages.encoded(kind, messages.decoded(kind, messages.encoded(kind, blank))) == messages.encoded(
-        kind, blank
-    )
+        again = messages.decoded(kind, encoded.ljust(4, b"\0") + b"\0" * (-len(encoded) % 4))
+        assert messages.encoded(kind, again) == encoded
 
 
 def test_names_are_those_of_rmw():

@@ -26,6 +26,10 @@ def joint_state(node: Ros2Node, names: list[str], stamp: int = 1) -> Any:
     return node.messages.make(JOINT_STATE, node.messages.header((stamp, 0), ""), names, zeros, zeros, np.zeros(0))
 
 
+def measured_range(node: Ros2Node, name: str, stamp: int, distance: float) -> Any:
+    return node.messages.make(RANGE, node.messages.header((stamp, 0), name), 1, 0.47, 0.04, 4.0, distance, 0.0)
+
+
 def test_who_comes_late_is_told_what_was_latched_and_nothing_else(node, other):
     node.publisher("/latched", TEXT, latched=True, depth=1).publish(text(node, "first"))
     node.publisher("/passing", TEXT).publish(text(node, "gone"))
@@ -101,10 +105,8 @@ def test_units_that_are_not_there_are_named(node, other, paper_skin):
     with Ros2Skin(SkinParams("/ranges"), paper_skin, node) as units:
         publisher = other.publisher("/ranges", RANGE)
         assert other.wait_for(lambda: publisher.subscribers == 1, 10)
-        blank = other.messages.blank(RANGE)
         for name in [*paper_skin.ids[1:], "stranger"]:
-            given = {"header": other.messages.header((1, 0), name), "min_range": 0.04, "max_range": 4.0, "range": 0.5}
-            publisher.publish(other.messages.types[RANGE](**(blank | given)))
+            publisher.publish(measured_range(other, name, 1, 0.5))
         with pytest.raises(
             HardwareError, match=rf"No reading was received from {paper_skin.ids[0]} on /ranges, only from stranger"
         ):
@@ -116,19 +118,13 @@ def test_units_that_are_not_there_are_named(node, other, paper_skin):
 
 
 def test_a_unit_for_which_several_publish_is_silent_and_named_and_strangers_take_little_memory(
-    node, other, paper_skin, domain
+    node, other, third, paper_skin
 ):
     def say(by: Ros2Node, name: str, number: int, distance: float) -> None:
-        given = {
-            "header": by.messages.header((number, 0), name),
-            "min_range": 0.04,
-            "max_range": 4.0,
-            "range": distance,
-        }
-        publishers[by].publish(by.messages.types[RANGE](**(by.messages.blank(RANGE) | given)))
+        publishers[by].publish(measured_range(by, name, number, distance))
 
     ours = paper_skin.ids[0]
-    with Ros2Skin(SkinParams("/ranges"), paper_skin, node) as units, Ros2Node(NodeParams(domain=domain)) as third:
+    with Ros2Skin(SkinParams("/ranges"), paper_skin, node) as units:
         publishers = {by: by.publisher("/ranges", RANGE) for by in (other, third)}
         assert all(by.wait_for(lambda one=one: one.subscribers == 1, 10) for by, one in publishers.items())
         say(other, ours, 1, 0.25)

@@ -50,15 +50,15 @@ def matched(node: Ros2Node) -> bool:
     return node.wait_for(lambda: all(publisher.subscribers for publisher in node._publishers), 10)
 
 
-class TrajectoryRun:
-    """An arm that follows its commands, whose turns are recorded."""
+class Published(Arm):
+    """An arm that follows its commands, whose turns are published."""
 
     def __init__(self, model: RobotModel, skin: Skin, node: Ros2Node, **params: Any) -> None:
-        self.arm = Arm(model, skin)
-        self.output = Ros2Output(OutputParams(**params), self.arm.controller, node)
+        super().__init__(model, skin)
+        self.output = Ros2Output(OutputParams(**params), self.controller, node)
 
-    def turn(self, force: tuple[float, float, float] = (0.0, 0.0, 0.0), seen: dict[int, float] | None = None) -> Cycle:
-        cycle = self.arm.turn(force, seen)
+    def turn(self, *given: Any, **more: Any) -> Cycle:
+        cycle = super().turn(*given, **more)
         self.output.record(cycle)
         return cycle
 
@@ -69,17 +69,17 @@ def listener(other):
 
 
 @pytest.fixture
-def trajectory(panda_model, paper_skin, node, listener):
-    trajectory = TrajectoryRun(panda_model, paper_skin, node, diagnostics_hz=10.0)
+def published(panda_model, paper_skin, node, listener):
+    published = Published(panda_model, paper_skin, node, diagnostics_hz=10.0)
     assert listener.found()
     assert matched(node)
-    yield trajectory
-    trajectory.output.close()
+    yield published
+    published.output.close()
 
 
-def test_a_step_is_published_by_standard_messages(trajectory, listener, panda_model, paper_skin):
+def test_a_step_is_published_by_standard_messages(published, listener, panda_model, paper_skin):
     for _ in range(3):
-        cycle = trajectory.turn((1.0, 2.0, 3.0), {0: 0.4, 2: 0.3})
+        cycle = published.turn((1.0, 2.0, 3.0), {0: 0.4, 2: 0.3})
         sleep(0.05)
     step = cycle.step
     assert len(step.obstacles.unit) == 2
@@ -106,7 +106,7 @@ def test_a_step_is_published_by_standard_messages(trajectory, listener, panda_mo
     assert words.text == "HOLD"
 
 
-def test_units_lie_where_the_skin_has_them(trajectory, listener, paper_skin):
+def test_units_lie_where_the_skin_has_them(published, listener, paper_skin):
     units = listener.last("/tf_static").transforms
     assert [t.child_frame_id for t in units] == list(paper_skin.ids)
     assert [t.header.frame_id for t in units] == [unit.link for unit in paper_skin.units]
@@ -116,13 +116,13 @@ def test_units_lie_where_the_skin_has_them(trajectory, listener, paper_skin):
         assert Rotation.from_quat([r.x, r.y, r.z, r.w]).as_matrix() == pytest.approx(T_link_sensor[:3, :3], abs=1e-9)
 
 
-def test_each_contact_and_each_change_of_the_mode_is_published(trajectory, listener):
+def test_each_contact_and_each_change_of_the_mode_is_published(published, listener):
     for _ in range(105):
-        trajectory.turn()
-    cycle = trajectory.turn((0.0, 40.0, 0.0))
+        published.turn()
+    cycle = published.turn((0.0, 40.0, 0.0))
     contacts = int(cycle.step.contact is not None)
     for _ in range(60):
-        contacts += trajectory.turn((0.0, 40.0, 0.0)).step.contact is not None
+        contacts += published.turn((0.0, 40.0, 0.0)).step.contact is not None
     assert contacts == 1
     assert listener.last("/pretouch/contact").wrench.force.y > 10
     modes = ["HOLD", "TRACK", "REACT"]
@@ -133,8 +133,8 @@ def test_each_contact_and_each_change_of_the_mode_is_published(trajectory, liste
     assert len(listener.received["/pretouch/contact"]) == 1
 
 
-def test_a_silent_unit_is_an_error_in_the_diagnostics(trajectory, listener, paper_skin):
-    trajectory.output.record(trajectory.arm.turn(silent={1: 0.5, 2: 0.2}))
+def test_a_silent_unit_is_an_error_in_the_diagnostics(published, listener, paper_skin):
+    published.turn(silent={1: 0.5, 2: 0.2})
     first, *units = listener.last("/diagnostics").status
     assert first.name == "pretouch: controller"
     assert (first.level, first.message.split(":")[0]) == (1, "HOLD")
@@ -144,48 +144,45 @@ def test_a_silent_unit_is_an_error_in_the_diagnostics(trajectory, listener, pape
 
 
 def test_steps_are_published_at_the_rate_that_was_asked_for(panda_model, paper_skin, node, listener):
-    trajectory = TrajectoryRun(panda_model, paper_skin, node, rate_hz=20.0)
+    published = Published(panda_model, paper_skin, node, rate_hz=20.0)
     assert listener.found()
     for _ in range(50):
-        trajectory.turn()
+        published.turn()
         sleep(DT)
-    trajectory.output.close()
+    published.output.close()
     assert 5 <= len(listener.received["/pretouch/force"]) <= 25
-    assert trajectory.output.dropped == 0
+    assert published.output.dropped == 0
 
 
 @pytest.mark.slow
 @pytest.mark.alone
-def test_recording_a_step_takes_the_loop_little_time(trajectory):
+def test_recording_a_step_takes_the_loop_little_time(published):
     took = []
     for _ in range(100):
-        cycle = trajectory.turn()
+        cycle = published.turn()
         begin = perf_counter()
-        trajectory.output.record(cycle)
+        published.output.record(cycle)
         took.append(perf_counter() - begin)
         sleep(DT)
     assert np.median(took) < 0.3e-3
 
 
-def test_the_last_steps_are_published_before_the_end(panda_model, paper_skin, node, listener):
-    trajectory = TrajectoryRun(panda_model, paper_skin, node)
-    assert listener.found()
-    assert matched(node)
-    trajectory.turn()
-    trajectory.output.close()
+def test_the_last_steps_are_published_before_the_end(published, listener):
+    published.turn()
+    published.output.close()
     assert listener.last("/pretouch/mode").data.startswith("HOLD")
 
 
-def test_a_failure_of_the_publishing_thread_is_told_and_keeps_nothing_waiting(trajectory, monkeypatch):
+def test_a_failure_of_the_publishing_thread_is_told_and_keeps_nothing_waiting(published, monkeypatch):
     def fail(*_: object) -> None:
         raise ValueError("no cloud")
 
-    monkeypatch.setattr(trajectory.output._step_messages, "cloud", fail)
-    assert trajectory.output.notes == ()
-    trajectory.turn()
-    trajectory.output._thread.join(5)
-    assert trajectory.output.notes == ("Publishing control steps failed: ValueError: no cloud",)
+    monkeypatch.setattr(published.output._step_messages, "cloud", fail)
+    assert published.output.notes == ()
+    published.turn()
+    published.output._thread.join(5)
+    assert published.output.notes == ("Publishing control steps failed: ValueError: no cloud",)
     for _ in range(40):
-        trajectory.turn()
-    assert trajectory.output._queue.qsize() == 0
-    assert trajectory.output.dropped == 0
+        published.turn()
+    assert published.output._queue.qsize() == 0
+    assert published.output.dropped == 0

@@ -1,9 +1,12 @@
 """The packages for a ROS 2 workspace: messages are ours, launch files start what is there, parameters are known."""
 
 import re
+import runpy
 import sys
+from collections import defaultdict
+from functools import partial
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
+from types import SimpleNamespace
 from typing import Any
 from xml.etree import ElementTree
 
@@ -59,47 +62,35 @@ class Launch:
     """Stands in for ROS 2's launch: keeps what is made, and knows the arguments."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, **arguments: str) -> None:
-        self.made: list[tuple[str, dict[str, Any]]] = []
+        self.made: dict[str, list[dict[str, Any]]] = defaultdict(list)
         self.arguments = arguments
-        names = {
-            "launch": ["LaunchDescription"], "launch_ros": [],
+        modules = {
+            "launch": ["LaunchDescription"], "launch_ros": [], "launch_ros.actions": ["Node"],
             "launch.actions": ["DeclareLaunchArgument", "ExecuteProcess", "OpaqueFunction"],
-            "launch_ros.actions": ["Node"],
         }  # fmt: skip
-        for module, classes in names.items():
-            self._module(monkeypatch, module, **{name: self._kept(name) for name in classes})
-        share = {"get_package_share_directory": lambda name: str(ROOT / name)}
-        self._module(monkeypatch, "ament_index_python")
-        self._module(monkeypatch, "ament_index_python.packages", **share)
-        self._module(monkeypatch, "launch.substitutions", LaunchConfiguration=self._configuration)
-        self._module(monkeypatch, "yaml", safe_load=lambda file: yaml(Path(file.name)))
+        given = {module: {name: partial(self._keep, name) for name in names} for module, names in modules.items()} | {
+            "launch.substitutions": {"LaunchConfiguration": self._configuration},
+            "ament_index_python": {},
+            "ament_index_python.packages": {"get_package_share_directory": lambda name: str(ROOT / name)},
+            "yaml": {"safe_load": lambda file: yaml(Path(file.name))},
+        }
+        for module, members in given.items():
+            monkeypatch.setitem(sys.modules, module, SimpleNamespace(**members))
 
-    def _module(self, monkeypatch: pytest.MonkeyPatch, name: str, **members: Any) -> None:
-        module = ModuleType(name)
-        module.__dict__.update(members)
-        monkeypatch.setitem(sys.modules, name, module)
-
-    def _kept(self, name: str) -> Any:
-        def make(*parts: Any, **named: Any) -> Any:
-            self.made.append((name, named | {"parts": parts}))
-            return self.made[-1]
-
-        return make
+    def _keep(self, kind: str, *parts: Any, **named: Any) -> str:
+        self.made[kind].append(named | {"parts": parts})
+        return kind
 
     def _configuration(self, name: str) -> Any:
-        return SimpleNamespace(name=name, perform=lambda _: self.arguments.get(name) or self.default(name))
+        return SimpleNamespace(perform=lambda _: self.arguments.get(name) or self.default(name))
 
     def default(self, name: str) -> str:
-        return next(named["default_value"] for kind, named in self.made if kind[0] == "D" and named["parts"] == (name,))
+        return next(one["default_value"] for one in self.made["DeclareLaunchArgument"] if one["parts"] == (name,))
 
     def run(self, path: Path) -> dict[str, Any]:
-        space: dict[str, Any] = {}
-        exec(compile(path.read_text(), str(path), "exec"), space)  # noqa: S102
-        assert space["generate_launch_description"]()[0] == "LaunchDescription"
+        space = runpy.run_path(str(path))
+        assert space["generate_launch_description"]() == "LaunchDescription"
         return space
-
-    def of(self, kind: str) -> list[dict[str, Any]]:
-        return [named for made, named in self.made if made == kind]
 
 
 @pytest.mark.parametrize("path", LAUNCHES, ids=lambda path: path.stem)
@@ -114,7 +105,7 @@ def commanded(monkeypatch: pytest.MonkeyPatch, **arguments: str) -> list[str]:
     launch = Launch(monkeypatch, **arguments)
     space = launch.run(BRINGUP / "launch" / "pretouch.launch.py")
     space["start"](None)
-    (process,) = launch.of("ExecuteProcess")
+    (process,) = launch.made["ExecuteProcess"]
     return list(process["cmd"])
 
 
@@ -144,7 +135,7 @@ def test_options_of_each_kind_become_words(monkeypatch, tmp_path):
 def test_a_joystick_asks_on_the_topic_in_a_known_frame_often_enough(monkeypatch):
     launch = Launch(monkeypatch)
     launch.run(BRINGUP / "launch" / "joystick.launch.py")
-    joy, teleop = launch.of("Node")
+    joy, teleop = launch.made["Node"]
     assert teleop["remappings"] == [("cmd_vel", CommanderParams("twist").heard_on)]
     config = yaml(BRINGUP / "config" / "joystick.yaml")
     settings = config[teleop["name"]]["ros__parameters"]

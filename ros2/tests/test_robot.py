@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 
 from pretouch.errors import RobotError
+from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch_ros2.messages import JOINT_STATE, TRAJECTORY, WRENCH
 from pretouch_ros2.node import Ros2Node
-from pretouch_ros2.params import ArmParams, NodeParams, seconds
+from pretouch_ros2.params import ArmParams, seconds
 from pretouch_ros2.robot import Ros2Robot
 
+READY = panda().q_ready
 SLOW = np.full(7, 0.05)
 
 
@@ -50,17 +52,21 @@ def params():
 
 
 @pytest.fixture
-def pair(params, panda_model, node, other):
+def robot(params, panda_model, node):
     with Ros2Robot(params, panda_model, node) as robot:
-        driver = Driver(other, params, panda_model)
-        for _ in range(3):  # one may be late on a busy machine
-            driver.tell(panda_model.description.q_ready, robot)
-        robot.wait(10)
-        yield robot, driver
+        yield robot
 
 
-def test_the_first_trajectory_goes_to_where_the_arm_was_measured(pair):
-    robot, driver = pair
+@pytest.fixture
+def driver(params, panda_model, robot, other):
+    driver = Driver(other, params, panda_model)
+    for _ in range(3):  # one may be late on a busy machine
+        driver.tell(READY, robot)
+    robot.wait(10)
+    return driver
+
+
+def test_the_first_trajectory_goes_to_where_the_arm_was_measured(robot, driver):
     q = robot.read().q
     before = monotonic()
     robot.begin()
@@ -78,8 +84,7 @@ def test_the_first_trajectory_goes_to_where_the_arm_was_measured(pair):
     assert len(driver.commands) == 1  # none at rest
 
 
-def test_until_the_arm_has_settled_it_is_not_moved(pair):
-    robot, driver = pair
+def test_until_the_arm_has_settled_it_is_not_moved(robot, driver):
     robot.read()
     robot.command(SLOW)
     driver.command(1)
@@ -90,9 +95,8 @@ def test_until_the_arm_has_settled_it_is_not_moved(pair):
 
 
 @pytest.mark.parametrize(("old", "q3", "said"), [(0.0, np.nan, "not all finite"), (1.5, 0.0, r"1\.[5-9]. s")])
-def test_from_a_state_that_tells_nothing_no_arm_begins(pair, panda_model, old, q3, said):
-    robot, driver = pair
-    q = panda_model.description.q_ready.copy()
+def test_from_a_state_that_tells_nothing_no_arm_begins(robot, driver, old, q3, said):
+    q = READY.copy()
     q[3] += q3
     sleep(0.15 if old else 0.0)
     if old:
@@ -106,19 +110,17 @@ def test_from_a_state_that_tells_nothing_no_arm_begins(pair, panda_model, old, q
     assert not driver.commands
 
 
-def test_before_any_command_an_arm_moved_by_hand_is_where_it_is_measured(pair, panda_model):
-    robot, driver = pair
-    moved = panda_model.description.q_ready + 0.3
+def test_before_any_command_an_arm_moved_by_hand_is_where_it_is_measured(robot, driver):
+    moved = READY + 0.3
     driver.tell(moved, robot)
     state = robot.read()
     assert state.q_commanded.tolist() == state.q.tolist() == moved.tolist()
     assert not state.qd_commanded.any()
 
 
-def test_a_moving_command_brings_its_past_is_kept_and_then_brakes_to_rest(pair, panda_model):
-    robot, driver = pair
+def test_a_moving_command_brings_its_past_is_kept_and_then_brakes_to_rest(robot, driver):
     robot.begin()
-    driver.tell(panda_model.description.q_ready, robot)
+    driver.tell(READY, robot)
     robot.read()
     robot.command(SLOW)
     sent = driver.command(2)
@@ -130,21 +132,20 @@ def test_a_moving_command_brings_its_past_is_kept_and_then_brakes_to_rest(pair, 
     assert kept[-1] - kept[0] == pytest.approx(0.39)
     assert not sent.points[-1].velocities.any()
     sleep(0.02)
-    driver.tell(panda_model.description.q_ready, robot)
+    driver.tell(READY, robot)
     state = robot.read()
     assert state.qd_commanded == pytest.approx(SLOW)
     assert (state.q_commanded > state.q).all()
     sleep(0.5)
-    driver.tell(panda_model.description.q_ready + 0.02, robot)
+    driver.tell(READY + 0.02, robot)
     state = robot.read()
     assert not state.qd_commanded.any()
     assert state.q_commanded == pytest.approx(state.q, abs=1e-3)
 
 
-def test_an_arm_that_does_not_follow_is_an_error_that_names_the_joint_and_is_sent_nothing_more(pair, panda_model):
-    robot, driver = pair
+def test_an_arm_that_does_not_follow_is_an_error_that_names_the_joint_and_is_sent_nothing_more(robot, driver):
     robot.begin()
-    away = panda_model.description.q_ready.copy()
+    away = READY.copy()
     away[3] += 0.2
     driver.tell(away, robot)
     said = r"does not follow: panda_joint4 is at -2.156 rad, but was commanded to -2.356 rad"
@@ -157,68 +158,61 @@ def test_an_arm_that_does_not_follow_is_an_error_that_names_the_joint_and_is_sen
     assert len(driver.commands) == 1
 
 
-def test_a_state_without_numbers_does_not_end_the_watch_over_the_arm(pair, panda_model):
-    robot, driver = pair
+def test_a_state_without_numbers_does_not_end_the_watch_over_the_arm(robot, driver):
     robot.begin()
     driver.tell(np.full(7, np.nan), robot)
     assert np.isnan(robot.read().q).all()  # for the controller to name
-    driver.tell(panda_model.description.q_ready + 1.0, robot)
+    driver.tell(READY + 1.0, robot)
     with pytest.raises(RobotError, match="does not follow"):
         robot.read()
 
 
-def test_a_second_program_that_commands_the_arm_is_refused_and_ends_a_run(pair, panda_model, other, params, domain):
-    robot, _ = pair
+def test_a_second_program_that_commands_the_arm_is_refused_and_ends_a_run(
+    robot, driver, params, panda_model, node, third
+):
     robot.read()
-    with Ros2Node(NodeParams(domain=domain)) as third, Ros2Robot(params, panda_model, third) as second:
+    with Ros2Robot(params, panda_model, third) as second:
         assert third.wait_for(lambda: bool(second._conflict()), 10)
         with pytest.raises(RobotError, match="Another program publishes on /joint_trajectory_controller"):
             second.wait(0.1)
-        assert robot._node.wait_for(lambda: bool(robot._conflict()), 10)
+        assert node.wait_for(lambda: bool(robot._conflict()), 10)
         with pytest.raises(RobotError, match="Another program publishes"):
             robot.read()
 
 
-def test_a_second_driver_of_the_arm_is_refused(pair, panda_model, params, domain):
-    robot, driver = pair
-    with Ros2Node(NodeParams(domain=domain)) as third:
-        again = Driver(third, params, panda_model)
-        for each in (driver, again, driver):
-            each.tell(panda_model.description.q_ready, robot)
-        with pytest.raises(RobotError, match="Several publishers send on /joint_states"):
-            robot.read()
+def test_a_second_driver_of_the_arm_is_refused(robot, driver, params, panda_model, third):
+    again = Driver(third, params, panda_model)
+    for each in (driver, again, driver):
+        each.tell(READY, robot)
+    with pytest.raises(RobotError, match="Several publishers send on /joint_states"):
+        robot.read()
 
 
 @pytest.mark.parametrize("params", [ArmParams("by-robot", "base", torques="/tau")])
-def test_torques_that_were_asked_for_are_waited_for_and_read(params, panda_model, node, other):
-    with Ros2Robot(params, panda_model, node) as robot:
-        driver = Driver(other, params, panda_model)
-        driver.tell(panda_model.description.q_ready, robot)
-        with pytest.raises(
-            RobotError, match=r"Nothing was received on /tau: start its publisher, .* set torques to one"
-        ):
-            robot.wait(0.1)
-        make, header = other.messages.make, other.messages.header
-        publisher, none = other.publisher("/tau", JOINT_STATE), np.zeros(0)
-        assert other.wait_for(lambda: publisher.subscribers == 1, 10)
+def test_torques_that_were_asked_for_are_waited_for_and_read(robot, params, panda_model, node, other):
+    driver = Driver(other, params, panda_model)
+    driver.tell(READY, robot)
+    with pytest.raises(RobotError, match=r"Nothing was received on /tau: start its publisher, .* set torques to one"):
+        robot.wait(0.1)
+    make, header = other.messages.make, other.messages.header
+    publisher, none = other.publisher("/tau", JOINT_STATE), np.zeros(0)
+    assert other.wait_for(lambda: publisher.subscribers == 1, 10)
 
-        def send(names: list[str]) -> None:
-            stamp = header(divmod(time_ns(), 10**9), "")
-            publisher.publish(make(JOINT_STATE, stamp, names, none, none, np.arange(len(names), dtype=float)))
+    def send(names: list[str]) -> None:
+        stamp = header(divmod(time_ns(), 10**9), "")
+        publisher.publish(make(JOINT_STATE, stamp, names, none, none, np.arange(len(names), dtype=float)))
 
-        send(["finger"])
-        assert node.wait_for(lambda: bool(robot._torques.others), 5)
-        with pytest.raises(RobotError, match=r"/tau has efforts of finger, not of panda_joint1, "):
-            robot.wait(0.1)
-        send(driver.names)
-        assert node.wait_for(lambda: robot._torques.received_any, 5)
-        assert robot.read().tau_ext.tolist() == [0, -1, -2, -3, -4, -5, -6]
-        robot.wait(10)
+    send(["finger"])
+    assert node.wait_for(lambda: bool(robot._torques.others), 5)
+    with pytest.raises(RobotError, match=r"/tau has efforts of finger, not of panda_joint1, "):
+        robot.wait(0.1)
+    send(driver.names)
+    assert node.wait_for(lambda: robot._torques.received_any, 5)
+    assert robot.read().tau_ext.tolist() == [0, -1, -2, -3, -4, -5, -6]
+    robot.wait(10)
 
 
-def test_a_failure_of_the_receiving_thread_stops_the_arm(pair, node):
-    robot, driver = pair
-
+def test_a_failure_of_the_receiving_thread_stops_the_arm(robot, driver, node):
     def fail(*_: object) -> None:
         raise ValueError("no such joint")
 
@@ -229,25 +223,16 @@ def test_a_failure_of_the_receiving_thread_stops_the_arm(pair, node):
         robot.read()
 
 
-def test_a_command_that_is_no_number_is_refused(pair):
-    robot, _ = pair
+def test_a_command_that_is_no_number_is_refused(robot, driver):
     with pytest.raises(RobotError, match="give finite joint velocities"):
         robot.command(np.full(7, np.nan))
 
 
-def test_a_state_is_stamped_by_when_it_came(pair, panda_model):
-    robot, driver = pair
-    before = monotonic()
-    driver.tell(panda_model.description.q_ready, robot)
-    assert before - 0.1 <= robot.read().stamp <= monotonic()
-
-
 @pytest.mark.parametrize("params", [ArmParams("on-robot", "base", shared_clock=False, settle_s=0.2)])
-def test_without_one_clock_trajectories_begin_as_they_come(pair, panda_model):
-    robot, driver = pair
+def test_without_one_clock_trajectories_begin_as_they_come(robot, driver):
     assert "only joint_trajectory_controller 4.17 to 4.20 moves smoothly" in robot.notes[0]
     robot.begin()
-    driver.tell(panda_model.description.q_ready, robot)
+    driver.tell(READY, robot)
     robot.command(SLOW)
     sent = driver.command(2)
     assert sent.header.stamp.sec == sent.header.stamp.nanosec == 0
@@ -256,15 +241,13 @@ def test_without_one_clock_trajectories_begin_as_they_come(pair, panda_model):
     assert robot.read().stamp > monotonic() - 5
 
 
-def test_a_clock_that_is_not_shared_is_refused(node, other, panda_model, params):
-    with Ros2Robot(params, panda_model, node) as robot:
-        Driver(other, params, panda_model).tell(panda_model.description.q_ready, robot, 100.0)
-        with pytest.raises(RobotError, match=r"stamps of /joint_states are 100 s behind .* NTP"):
-            robot.wait(10)
+def test_a_clock_that_is_not_shared_is_refused(robot, params, panda_model, other):
+    Driver(other, params, panda_model).tell(READY, robot, 100.0)
+    with pytest.raises(RobotError, match=r"stamps of /joint_states are 100 s behind .* NTP"):
+        robot.wait(10)
 
 
-def test_everything_unusual_is_noted(pair, other, params):
-    robot, _ = pair
+def test_everything_unusual_is_noted(robot, driver, other, params):
     assert robot.notes == ()
     other.subscribe(params.command_topic, TRAJECTORY, lambda *_: None)
     assert other.wait_for(lambda: robot.notes == (f"{params.command_topic} has 2 subscribers.",), 10)
