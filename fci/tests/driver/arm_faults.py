@@ -83,14 +83,6 @@ class Fault:
     lasts_s: float = LASTS_S
 
 
-def _press(served: Served) -> None:
-    served.type("stop")
-
-
-def _release(served: Served) -> None:
-    served.type("release")
-
-
 def _refused(_: Served) -> None:
     """The second program has been refused."""
     said, _ = _seconds.pop().communicate(timeout=60.0)
@@ -98,7 +90,10 @@ def _refused(_: Served) -> None:
 
 
 _seconds: list[Popen[str]] = []
-_STOPPED = "User Stop|user stop|emergency|Emergency"
+_STOP = Fault(
+    "User Stop|user stop|emergency|Emergency",
+    do=lambda served: served.type("stop"), undo=lambda served: served.type("release"), ends=True,
+)  # fmt: skip
 FAULTS = {
     "states 0.2 s late": Fault("s old", _late, resumes=True),
     "the same state again and again": Fault("s old", lambda _, last: last, ends=True),
@@ -126,9 +121,9 @@ FAULTS = {
     "a second commander": Fault(
         "", do=lambda served: _seconds.append(child("commander.py", "panda", served.address)), undo=_refused
     ),
-    "emergency stop in TRACK": Fault(_STOPPED, do=_press, undo=_release, ends=True),
-    "emergency stop in REACT": Fault(_STOPPED, do=_press, undo=_release, at=Mode.REACT, ends=True),
-    "emergency stop in HOLD": Fault(_STOPPED, do=_press, undo=_release, at=Mode.HOLD, ends=True),
+    "emergency stop in TRACK": _STOP,
+    "emergency stop in REACT": replace(_STOP, at=Mode.REACT),
+    "emergency stop in HOLD": replace(_STOP, at=Mode.HOLD),
 }  # fmt: skip
 
 

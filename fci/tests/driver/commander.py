@@ -6,12 +6,12 @@ import time
 import numpy as np
 
 from pretouch.hardware.franka.arm import FrankaArm
-from pretouch.robot.description import fr3, panda
 from pretouch.robot.model import RobotModel
+from pretouch.robot.named import robot_named
 
 
 def main(kind: str, address: str) -> None:
-    model = RobotModel(panda() if kind == "panda" else fr3())
+    model = RobotModel(robot_named(kind))
     with FrankaArm(address, kind, model) as arm:  # type: ignore[arg-type]
         arm.begin()
         print(arm.pid, flush=True)

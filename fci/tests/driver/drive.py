@@ -3,7 +3,6 @@
 import gc
 import json
 import sys
-from dataclasses import asdict, dataclass, field
 
 import numpy as np
 
@@ -16,73 +15,64 @@ from pretouch.hardware.franka.limits import LimiterParams, motion_limits
 from pretouch.hardware.franka.state import FrankaState
 from pretouch.hardware.franka.vendor import VendorClient
 from pretouch.profiles import profile
-from pretouch.robot.description import fr3, panda
 from pretouch.robot.model import RobotModel
+from pretouch.robot.named import robot_named
 from pretouch.types import FloatArray
-
-LASTS_S = 1.5
-
-
-@dataclass
-class Result:
-    states: int = 0
-    lost: int = 0
-    errors: list[str] = field(default_factory=list)
-    trouble: str = ""
-    refused: str = ""
-    mode: str = ""
-    last_errors: list[str] = field(default_factory=list)
-    forces: list[list[float]] = field(default_factory=list)
 
 
 class Staircase:
     """Velocities that change every 10 ms, with the steps of a reaction to a contact, for so long [s]."""
 
-    def __init__(self, model: RobotModel, kind: str, lasts: float, result: Result) -> None:
-        self._limiter = SetPointLimiter(motion_limits(model, kind), LimiterParams())
-        self._lasts, self._result = lasts, result
+    def __init__(self, client: VendorClient, model: RobotModel, lasts: float = 1.5) -> None:
+        self._limiter, self._lasts = SetPointLimiter(motion_limits(model, client.kind), LimiterParams()), lasts
+        self.states = self.lost = 0
+        self.force: list[float] = []
 
-    def answer(self, state: FrankaState, since: float) -> tuple[FloatArray, bool]:
-        result = self._result
-        result.states += 1
-        time = result.states // 10 * 0.01
+    def __call__(self, state: FrankaState, since: float) -> tuple[FloatArray, bool]:
+        self.states += 1
+        time = self.states // 10 * 0.01
         wave = 0.25 * np.sin(6.0 * time) + (0.4 if 0.5 < time < 0.8 or 1.2 < time < 1.3 else 0.0)
-        wanted = [0.0] * 7 if time > self._lasts else (wave * np.array([1.0, -0.5, 0.5, 0.3, 0.2, -1.0, 1.0])).tolist()
+        over = time > self._lasts
+        wanted = [0.0] * 7 if over else (wave * np.array([1.0, -0.5, 0.5, 0.3, 0.2, -1.0, 1.0])).tolist()
         velocity = np.array(self._limiter.step(state, wanted))
-        result.lost += self._limiter.lost
-        result.forces.append(state.wrench[:3].tolist())
-        return velocity, time > self._lasts and self._limiter.at_rest
+        self.lost += self._limiter.lost
+        self.force = state.wrench[:3].tolist()
+        return velocity, over and self._limiter.at_rest
 
 
-def staircase(client: VendorClient, model: RobotModel, result: Result) -> None:
-    client.control(Staircase(model, client.kind, LASTS_S, result).answer)
+def staircase(client: VendorClient, model: RobotModel) -> dict:
+    stairs = Staircase(client, model)
+    client.control(stairs)
+    return {"lost": stairs.lost, "mode": client.read().mode}
 
 
-def contact(client: VendorClient, model: RobotModel, result: Result) -> None:
+def contact(client: VendorClient, model: RobotModel) -> dict:
     """Meet the contact that the server was told to make, recover, and go on."""
     client.set_collision_behavior(collision_behavior(profile("paper"), model))
+    stairs, found = Staircase(client, model), {}
     try:
-        client.control(Staircase(model, client.kind, LASTS_S, result).answer)
+        client.control(stairs)
     except MotionAborted as error:
-        result.errors, result.trouble = list(error.errors), str(error)
+        found |= {"errors": list(error.errors), "trouble": str(error), "force": stairs.force}
     after = client.read()
-    result.mode, result.last_errors = after.mode, list(after.last_motion_errors)
+    found |= {"mode": after.mode, "last_errors": list(after.last_motion_errors)}
     try:
-        client.control(Staircase(model, client.kind, LASTS_S, Result()).answer)
+        client.control(Staircase(client, model))
     except RobotError as error:
-        result.refused = str(error)
+        found["refused"] = str(error)
     client.recover()
-    client.control(Staircase(model, client.kind, 0.2, Result()).answer)
+    client.control(Staircase(client, model, 0.2))
+    return found
 
 
-def raises(client: VendorClient, model: RobotModel, result: Result) -> None:
+def raises(client: VendorClient, model: RobotModel) -> dict:
     """Fail in the middle of a motion, and keep the exception, as a caller may; then move again."""
-    answer = Staircase(model, client.kind, LASTS_S, result).answer
+    stairs = Staircase(client, model)
 
     def failing(state: FrankaState, since: float) -> tuple[FloatArray, bool]:
-        if result.states == 300:
+        if stairs.states == 300:
             raise RuntimeError("the disk is full")
-        return answer(state, since)
+        return stairs(state, since)
 
     kept: list[Exception] = []
     gc.disable()
@@ -90,18 +80,15 @@ def raises(client: VendorClient, model: RobotModel, result: Result) -> None:
         client.control(failing)
     except RuntimeError as error:
         kept.append(error)
-    result.trouble, result.mode = str(kept[0]), client.read().mode
-    client.control(Staircase(model, client.kind, 0.2, Result()).answer)
+    mode = client.read().mode
+    client.control(Staircase(client, model, 0.2))
+    return {"states": stairs.states, "trouble": str(kept[0]), "mode": mode}
 
 
 def main(kind: str, address: str, task: str) -> None:
-    model, result = RobotModel(panda() if kind == "panda" else fr3()), Result()
+    tasks = {one.__name__: one for one in (staircase, contact, raises)}
     with connect(address, kind) as client:  # type: ignore[arg-type]
-        tasks = {one.__name__: one for one in (staircase, contact, raises)}
-        tasks[task](client, model, result)
-        if not result.mode:
-            result.mode = client.read().mode
-    print(json.dumps(asdict(result)))
+        print(json.dumps(tasks[task](client, RobotModel(robot_named(kind)))))
 
 
 if __name__ == "__main__":

@@ -9,9 +9,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from fci.tests.soak.programs import Program
 from tests.ports import loopback
 
-STARTS_S = 60.0
 _TAIL = 65536
 HERE = Path(__file__).parent
 
@@ -23,39 +23,25 @@ def wait_for(happened: Callable[[], bool], what: str, most: float = 20.0) -> Non
         time.sleep(0.01)
 
 
-class Served:
-    """`pretouch serve-fci` in a process of its own, with a keyboard."""
+class Served(Program):
+    """`pretouch serve-fci`, with a keyboard."""
 
     def __init__(self, place: Path, kind: str, *more: str) -> None:
         self.kind, self.address = kind, loopback()
         name = self.address.replace(".", "-")
-        self.truth, self._said = place / f"{name}.csv", place / f"{name}.log"
-        at = ["--robot", kind, "--host", self.address, "--truth", str(self.truth)]
+        self.truth = place / f"{name}.csv"
         self._keyboard, typed = os.openpty()
-        with self._said.open("w") as log:
-            self.process = subprocess.Popen(
-                [sys.executable, "-m", "pretouch.cli", "serve-fci", *at, *more],
-                stdin=typed,
-                stdout=log,
-                stderr=subprocess.STDOUT,
-                cwd=place,
-            )
+        at = "--robot", kind, "--host", self.address, "--truth", str(self.truth)
+        super().__init__(place, name, "serve-fci", *at, *more, stdin=typed)
         os.close(typed)
         try:
-            wait_for(self._listens, f"listening at {self.address}", STARTS_S)
+            assert self.said_within("(Listening) at", 60.0), self.said()
         except BaseException:
             self.close()
             raise
 
     def type(self, line: str) -> None:
         os.write(self._keyboard, f"{line}\n".encode())
-
-    def _listens(self) -> bool:
-        assert self.process.poll() is None, self.said()
-        return "Listening at" in self.said()
-
-    def said(self) -> str:
-        return self._said.read_text()
 
     def q(self) -> np.ndarray:
         """(T, 7) where the arm truly was in the last milliseconds, as far as it has been written [rad]."""

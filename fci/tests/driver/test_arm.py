@@ -19,6 +19,8 @@ from pretouch.hardware.franka.arm import FrankaArm
 from pretouch.hardware.franka.collision import collision_behavior
 from pretouch.hardware.franka.limits import FrankaParams
 from pretouch.profiles import profile
+from pretouch.robot.model import RobotModel
+from pretouch.robot.named import robot_named
 from pretouch.signals import OF_TERMINAL
 
 pytestmark = [pytest.mark.slow, pytest.mark.alone]
@@ -36,8 +38,8 @@ def served(request, tmp_path_factory):
 
 
 @pytest.fixture
-def model(served, panda_model, fr3_model):
-    return panda_model if served.kind == "panda" else fr3_model
+def model(served):
+    return RobotModel(robot_named(served.kind))
 
 
 @contextmanager
@@ -116,15 +118,6 @@ def test_stale_set_points_bring_the_arm_to_rest_and_fresh_ones_move_it_again(ser
         arm.end()
         assert arm.communication.stale >= 1
     assert "Motion ended" not in served.said()
-
-
-@one_kind
-def test_a_second_process_is_refused_with_the_number_of_the_first(served, model):
-    with (
-        FrankaArm(served.address, served.kind, model) as arm,
-        pytest.raises(RobotError, match=f"in use by process {arm.pid} on this machine"),
-    ):
-        FrankaArm(served.address, served.kind, model)
 
 
 def test_sigterm_to_the_process_brings_the_arm_to_rest_first(served, model):

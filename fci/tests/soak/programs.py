@@ -1,4 +1,4 @@
-"""The programs of a soak, each in a process of its own, with a wall clock of ours and a file of what it says."""
+"""Programs, each in a process of its own, with a file of what it says, and a wall clock of ours if we like."""
 
 import os
 import re
@@ -35,17 +35,20 @@ class WallClock:
 class Program:
     """`pretouch ...`, with its children."""
 
-    def __init__(self, clock: WallClock, folder: Path, name: str, *words: str) -> None:
+    def __init__(
+        self, folder: Path, name: str, *words: str, clock: WallClock | None = None, stdin: int = subprocess.DEVNULL
+    ) -> None:
+        """Start it in a folder, with a memory of its own there."""
         self._log = folder / f"{name}.log"
-        more = {
-            "PYTHONPATH": os.pathsep.join((str(CLOCK), str(_ROOT))),
-            "PRETOUCH_SOAK_CLOCK": str(clock.place),
-            "XDG_STATE_HOME": str(folder / "state"),
-        }
+        more = {"XDG_STATE_HOME": str(folder / "state")}
+        if clock is not None:
+            more |= {
+                "PYTHONPATH": os.pathsep.join((str(CLOCK), str(_ROOT))), "PRETOUCH_SOAK_CLOCK": str(clock.place),
+            }  # fmt: skip
         with self._log.open("w") as log:
             self.process = subprocess.Popen(
                 [sys.executable, "-m", "pretouch.cli", *words],
-                cwd=folder, env=os.environ | more, stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT,
+                cwd=folder, env=os.environ | more, stdin=stdin, stdout=log, stderr=subprocess.STDOUT,
             )  # fmt: skip
 
     def said(self) -> str:
@@ -79,6 +82,10 @@ class Program:
         for number in self.family():
             resource.prlimit(number, resource.RLIMIT_FSIZE, (most, resource.RLIM_INFINITY))
 
+    def left(self, most: float = 60.0) -> tuple[int, str]:
+        """Wait until it ends by itself; return its exit code and all that it has said."""
+        return self.process.wait(most), self.said()
+
     def end(self, sign: int, most: float = 30.0) -> int:
         """Send it a signal and wait; return its exit code."""
         self.process.send_signal(sign)
@@ -91,9 +98,9 @@ class Program:
 
 
 @contextmanager
-def program(clock: WallClock, folder: Path, name: str, *words: str) -> Iterator[Program]:
+def program(folder: Path, name: str, *words: str, clock: WallClock | None = None) -> Iterator[Program]:
     """Have a program for as long as the context lasts."""
-    made = Program(clock, folder, name, *words)
+    made = Program(folder, name, *words, clock=clock)
     try:
         yield made
     finally:

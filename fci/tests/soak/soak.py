@@ -89,7 +89,7 @@ class Soak:
         end = begun + self._seconds
         with self._stack as opened:
             relay = opened.enter_context(Relay(self._units, int(self._rng.integers(2**32))))
-            page = opened.enter_context(program(self._clock, self._folder, "page", *self._page_words()))
+            page = opened.enter_context(program(self._folder, "page", *self._page_words(), clock=self._clock))
             visitors = opened.enter_context(Visitors(page.said_within(r"(http://\S+)"), int(self._rng.integers(2**32))))
             with ExitStack() as serving:
                 self._serve(serving, relay)
@@ -116,7 +116,7 @@ class Soak:
         place = self._folder / "truth.csv"
         units = "--units", f"127.0.0.1:{relay.port}", "--keys", "keys.toml", "--start", "path"
         words = "serve-fci", "--host", self._address, "--truth", str(place), *units
-        self._server = opened.enter_context(program(self._clock, self._folder, "server", *words))
+        self._server = opened.enter_context(program(self._folder, "server", *words, clock=self._clock))
         self._server.said_within(r"(Listening) at")
         self._truth = Truth(place, self._qd_max)
         opened.callback(self._judge_server, self._server, self._truth)
@@ -128,7 +128,7 @@ class Soak:
         record = self._folder / f"{name}.mcap"
         heard = "--keys", "keys.toml", "--units-port", str(self._units), "--floor", "-0.2", "--yes"
         words = "--ip", self._address, "--record", str(record), *heard
-        with program(self._clock, self._folder, name, "run", "franka", *words) as run:
+        with program(self._folder, name, "run", "franka", *words, clock=self._clock) as run:
             if run.said_within("(TRACK)"):
                 full = self._seconds / 4.0 if self._runs == 1 else np.inf
                 self._stay(run, page, until, full)
