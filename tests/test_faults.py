@@ -7,7 +7,7 @@ import pytest
 
 from pretouch.desired import Desired, DesiredKind, sound_desired, twist
 from pretouch.errors import ParameterError
-from pretouch.faults import Watch, examine, sound_points, sound_readings, sound_robot, sound_touch, watch_init
+from pretouch.faults import Watch, examine, sound_points, sound_readings, sound_touch, watch_init
 from pretouch.modes import Event
 from pretouch.moving_fixtures import MovingFixtures
 from pretouch.params import FailureParams
@@ -20,6 +20,7 @@ PARAMS = FailureParams()  # state older than 0.05 s, step more than 0.05 s after
 PERIOD = 0.01
 QD_MAX = np.array([2.0, 2.0])
 COMMAND = np.array([0.5, -0.2])
+COMPLEX = np.full(2, 0.1 + 0.0j)
 READINGS = RangeReadings(np.zeros(1), np.full(1, PAPER_SENSOR.nearest_m), np.zeros(1, np.int64))
 PARTS = [
     ("q", "joint positions"),
@@ -81,15 +82,6 @@ def test_a_state_from_before_the_last_command_is_moved_on_by_it():
     np.testing.assert_array_equal(believed.qd_commanded, robot().qd_commanded)
 
 
-def test_what_is_believed_does_not_change_with_the_callers_arrays():
-    given = inputs()
-    believed, _, watch = judge(given)
-    for name in ("q", "qd", "q_commanded", "qd_commanded", "wrench"):
-        getattr(given.robot, name)[:] = 99.0
-        assert not np.any(getattr(believed, name) == 99.0)
-        assert not np.any(getattr(watch.robot, name) == 99.0)
-
-
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e3, -1e3, 1e300])
 @pytest.mark.parametrize(("name", "called"), PARTS)
 def test_a_number_no_joint_can_have_is_named_and_not_believed(name: str, called: str, value: float):
@@ -108,6 +100,11 @@ def test_a_number_no_joint_can_have_is_named_and_not_believed(name: str, called:
         (["a", "b"], "are not arrays of numbers"),
         ([[1.0], [1.0, 2.0]], "are not arrays of numbers"),
         (None, "have the shape (), not (2,)"),
+        (np.full(2, np.longdouble("1e4000")), "hold inf"),
+        (COMPLEX, "are not arrays of numbers"),
+        (list(COMPLEX), "are not arrays of numbers"),
+        (COMPLEX.tolist(), "are not arrays of numbers"),
+        (COMPLEX.astype(object), "are not arrays of numbers"),
     ],
 )
 @pytest.mark.parametrize(("name", "called"), PARTS)
@@ -117,25 +114,15 @@ def test_a_part_that_does_not_fit_the_arm_is_named_and_not_believed(name: str, c
     assert_last_state_moved_on(believed)
 
 
-@pytest.mark.parametrize("wrench", [np.zeros(3), np.zeros((6, 1)), "none", [1.0, "x"]])
+@pytest.mark.parametrize("wrench", [np.zeros(3), np.zeros((6, 1)), "none", [1.0, "x"], np.zeros(6, complex)])
 def test_a_force_estimate_that_is_none_is_named(wrench: object):
     believed, faults, _ = judge(inputs(wrench=wrench))
     assert "its force estimate" in faults[Event.UNUSABLE]
     assert_last_state_moved_on(believed)
 
 
-@pytest.mark.parametrize("kind", [np.float32, np.int64, list])
-def test_numbers_of_another_kind_are_taken_as_they_are(kind: type):
-    given = [1, 2]
-    part = given if kind is list else np.array(given, dtype=kind)
-    believed, faults, _ = judge(inputs(q=part, wrench=[0, 0, 0, 0, 0, 0]))
-    assert faults == {}
-    assert believed.q.dtype == believed.wrench.dtype == np.float64
-    np.testing.assert_array_equal(believed.q, given)
-
-
-@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
-def test_a_time_stamp_that_is_not_finite_is_named(value: float):
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e308, np.complex128(1.01), np.array(1.01 + 0j), 1.01 + 0j])
+def test_a_time_stamp_that_is_none_is_named(value: object):
     for wrong in (replace(inputs(), stamp=value), inputs(stamp=value), replace(inputs(), robot=robot(value))):
         believed, faults, watch = judge(wrong)
         assert list(faults) == [Event.UNUSABLE]
@@ -187,16 +174,6 @@ def test_a_step_too_long_after_the_last_is_an_overrun(gap: float, overrun: bool)
     assert judge(inputs(1.01 + gap), watch)[1] == {}
 
 
-def test_the_first_part_that_cannot_be_used_is_named():
-    wrong = np.array([np.nan, 0.0])
-    assert sound_robot(robot(), QD_MAX)[1] == ""
-    assert sound_robot(robot(np.inf), QD_MAX) == (None, "its time stamp is inf")
-    found, said = sound_robot(replace(robot(), qd=wrong, q_commanded=wrong), QD_MAX)
-    assert (found, said) == (None, "joint velocities hold nan")
-    # a force is judged apart
-    assert sound_robot(replace(robot(), wrench=np.full(6, np.nan), tau_ext=wrong), QD_MAX)[1] == ""
-
-
 def test_a_clock_set_back_is_seen_with_a_state_that_cannot_be_used_too():
     _, _, watch = judge(inputs(5.0))
     _, faults, watch = judge(inputs(4.0, q=np.full(2, np.nan)), watch)
@@ -243,32 +220,11 @@ def test_a_clock_set_back_does_not_hide_a_missing_wrench():
     assert Event.NO_FORCE in faults
 
 
-COMPLEX = np.full(2, 0.1 + 0.0j)
-
-
-@pytest.mark.parametrize("part", [COMPLEX, list(COMPLEX), COMPLEX.tolist(), COMPLEX.astype(object)])
-@pytest.mark.parametrize(("name", "called"), PARTS)
-def test_complex_numbers_are_none_of_a_joint(name: str, called: str, part: object):
-    believed, faults, _ = judge(inputs(**{name: part}))
-    assert faults == {Event.UNUSABLE: f"{called} are not arrays of numbers"}
-    assert_last_state_moved_on(believed)
-
-
-def test_complex_numbers_are_no_force_torque_or_time():
-    _, faults, _ = judge(inputs(wrench=np.zeros(6, complex)))
-    assert faults == {Event.UNUSABLE: "its force estimate is not an array of numbers"}
-    believed, faults, _ = judge(inputs(tau_ext=COMPLEX))
+def test_complex_numbers_are_no_torque_touch_points_motion_fixtures_or_load():
+    z = COMPLEX
+    believed, faults, _ = judge(inputs(tau_ext=z))
     assert faults == {}
     assert np.isnan(believed.tau_ext).all()
-    for stamp in (np.complex128(1.01), np.array(1.01 + 0j), 1.01 + 0j):
-        _, faults, _ = judge(replace(inputs(), robot=robot(stamp)))
-        assert faults == {Event.UNUSABLE: f"its time stamp is {stamp}"}
-        _, faults, _ = judge(replace(inputs(), stamp=stamp))
-        assert faults == {Event.UNUSABLE: f"the step's time stamp is {stamp}"}
-
-
-def test_complex_numbers_are_no_touch_points_motion_fixtures_or_load():
-    z = COMPLEX
     touch = TouchReadings(np.zeros(2), np.zeros(2, bool), np.zeros(2), np.zeros(2, np.int64))
     points = SeenPoints(0.0, np.zeros(2), np.zeros((2, 3)), np.zeros(2))
     moving = MovingFixtures(1.0, *np.zeros((2, 1, 3)), np.zeros(1), *np.zeros((2, 1, 3)))
@@ -287,17 +243,10 @@ def test_complex_numbers_are_no_touch_points_motion_fixtures_or_load():
         twist(1.0, np.zeros(3, complex))
 
 
-def test_stamps_as_large_as_a_float_can_be_are_refused_in_a_sentence():
+def test_stamps_of_a_motion_as_large_as_a_float_can_be_are_refused_in_a_sentence():
     for stamps in ((-1e308, 1e308), (1e308, 1.1e308), (0.0, np.nan), (-np.inf, 0.0)):
         wanted = Desired(DesiredKind.JOINT_VELOCITIES, np.array(stamps), np.zeros((2, 2)))
         assert sound_desired(wanted, 2, 1.0)[1].startswith("its time stamp is ")
-    _, faults, _ = judge(replace(inputs(), stamp=1e308))
-    assert faults == {Event.UNUSABLE: "the step's time stamp is 1e+308"}
-
-
-def test_numbers_too_large_for_a_float_are_none_of_a_joint():
-    _, faults, _ = judge(inputs(q=np.full(2, np.longdouble("1e4000"))))
-    assert faults == {Event.UNUSABLE: "joint positions hold inf"}
 
 
 # readings
@@ -307,33 +256,14 @@ def readings(stamp: object = (1.0, 2.0), distance: object = (0.5, 0.6), status: 
     return RangeReadings(*(np.array(part) if isinstance(part, tuple) else part for part in (stamp, distance, status)))
 
 
-@pytest.mark.parametrize("kind", [np.int64, np.int32, np.uint8, np.int16])
-def test_readings_that_fit_are_copied(kind: type):
-    given = RangeReadings(np.array([1.0, 2.0]), np.array([0.5, 0.6], np.float32), np.array([0, 7], kind))
-    sound, unfit = sound_readings(given, 2)
-    assert unfit == ""
-    assert sound.distance.dtype == np.float64
-    assert sound.status.dtype == np.int64
-    np.testing.assert_array_equal(sound.status, [0, 7])
-    given.stamp[:] = 99.0
-    given.status[:] = 9
-    np.testing.assert_array_equal(sound.stamp, [1.0, 2.0])
-    np.testing.assert_array_equal(sound.status, [0, 7])
-
-
 @pytest.mark.parametrize(
     ("given", "said"),
     [
         (readings(stamp=(1.0,)), "have the shapes (1,), (2,) and (2,), not (2,)"),
-        (readings(distance=(0.5, 0.6, 0.7)), "have the shapes (2,), (3,) and (2,), not (2,)"),
-        (readings(status=()), "have the shapes (2,), (2,) and (0,), not (2,)"),
-        (readings(distance=np.zeros((2, 1))), "have the shapes (2,), (2, 1) and (2,), not (2,)"),
         (readings(status=(0.0, np.nan)), "statuses are of type float64"),
         (readings(status=("ok", "ok")), "statuses are of type <U2"),
         (readings(stamp=("a", "b")), "not arrays of numbers"),
         (readings(stamp=COMPLEX), "not arrays of numbers"),
-        (readings(distance=COMPLEX), "not arrays of numbers"),
-        (readings(distance=[[1.0], [1.0, 2.0]]), "not arrays of numbers"),
     ],
 )
 def test_of_readings_that_do_not_fit_none_is_taken(given: RangeReadings, said: str):
