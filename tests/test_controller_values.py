@@ -7,10 +7,9 @@ import pytest
 
 from pretouch.controller import Controller
 from pretouch.errors import RobotStateError
-from pretouch.profiles import PROFILES
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.types import Inputs, Mode, RangeReadings
+from pretouch.types import Inputs, Mode
 from tests.following_arm import PAPER, Arm
 from tests.fuzz.invariants import same
 
@@ -47,22 +46,6 @@ def test_a_step_is_pure(arm: Arm, force: tuple[float, float, float]):
     assert same(first[0], second[0])
     assert same(first[1], second[1])
     assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(given, before, strict=True))
-
-
-def test_readings_that_do_not_fit_hold_until_they_do(arm: Arm):
-    state, robot = arm.state, arm.robot()
-    few = RangeReadings(np.zeros(3), np.zeros(3), np.zeros(3, np.int64))
-    held, after = arm.controller.step(state, Inputs(arm.time, robot, few))
-    assert held.mode is Mode.HOLD
-    assert "the shapes (3,), (3,) and (3,), not (7,)" in held.reason
-    assert arm.controller.step(after, Inputs(arm.time + 0.01, arm.robot(), arm.readings()))[0].mode is Mode.TRACK
-
-
-def test_a_blind_arm_does_not_look_at_readings(panda_model: RobotModel, paper_skin: Skin):
-    arm = Arm(panda_model, paper_skin, PROFILES["blind"])
-    arm.run(150)
-    step, _ = arm.controller.step(arm.state, Inputs(arm.time, arm.robot(), None))
-    assert step.mode is Mode.TRACK
 
 
 def test_a_state_of_another_controller_is_refused(arm: Arm, panda_model: RobotModel):
