@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pretouch.control.path import line
+from pretouch.control.path import Path, line
 from pretouch.controller import Controller
 from pretouch.loop import Cycle
 from pretouch.perception.scene_filter import no_fixtures
@@ -20,11 +20,11 @@ PAPER = PROFILES["paper"]
 class Arm:
     """An arm that does exactly what it is told, its controller, and what both are given."""
 
-    def __init__(self, model: RobotModel, skin: Skin, profile: Profile = PAPER) -> None:
+    def __init__(self, model: RobotModel, skin: Skin, profile: Profile = PAPER, path: Path | None = None) -> None:
         self.model, self.skin = model, skin
         self.q, self.qd, self.time = model.description.q_ready.copy(), np.zeros(7), 0.0
         x = self.ee()
-        path = line(tuple(x), (x[0], x[1] + 0.4, x[2]))
+        path = path or line(tuple(x), (x[0], x[1] + 0.4, x[2]))
         self.controller = Controller(model, skin, no_fixtures(), path, profile)
         self.state = self.controller.init(self.robot())
 
@@ -57,7 +57,10 @@ class Arm:
         **more: object,
     ) -> Cycle:
         """Turn the controller once and follow its command; `more` are other fields of the inputs."""
-        inputs = Inputs(self.time, change(self.robot(force)), self.readings(seen, silent), resume, **more)
+        return self.give(Inputs(self.time, change(self.robot(force)), self.readings(seen, silent), resume, **more))
+
+    def give(self, inputs: Inputs) -> Cycle:
+        """Turn the controller once with these inputs, and follow its command."""
         before = self.state
         step, self.state = self.controller.step(before, inputs)
         self.qd, self.q, self.time = step.command, self.q + step.command * DT, self.time + DT
