@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from pretouch import loop
+from pretouch.control.joint_box import JointLimits
 from pretouch.control.path import Circle
 from pretouch.controller import Controller
 from pretouch.perception.scene_filter import no_fixtures
@@ -11,51 +12,19 @@ from pretouch.profiles import PROFILES, at_rate
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 
-DT = 0.01
-PAPER = PROFILES["paper"]
-
 
 @pytest.fixture
 def controller(panda_model: RobotModel, paper_skin: Skin) -> Controller:
-    return Controller(panda_model, paper_skin, no_fixtures(), Circle(), PAPER)
+    return Controller(panda_model, paper_skin, no_fixtures(), Circle(), PROFILES["paper"])
 
 
-class Ticks:
-    """A clock and a robot that only count and keep."""
+class Arm:
+    """A robot and its clock, which keep what they are told and fail at some ticks and commands, by number."""
 
-    def __init__(self) -> None:
-        self.sent: list[np.ndarray] = []
-
-    def tick(self) -> float:
-        return 0.0
-
-    def command(self, qd: np.ndarray) -> None:
-        self.sent.append(qd)
-
-
-@pytest.mark.parametrize("rate", [30.0, 100.0, 1000.0, 4000.0])
-def test_an_arm_at_full_speed_comes_to_rest_at_any_rate(panda_model: RobotModel, paper_skin: Skin, rate: float):
-    controller = Controller(panda_model, paper_skin, no_fixtures(), Circle(), at_rate(PAPER, rate))
-    arm, fastest = Ticks(), panda_model.description.qd_max
-    loop.come_to_rest(controller.limits, arm, arm, panda_model.q_mid, fastest)
-    np.testing.assert_array_equal(arm.sent[-1], 0.0)
-    change = np.abs(np.diff([fastest, *arm.sent], axis=0)).max(axis=0) * rate
-    assert np.all(change <= panda_model.description.qdd_max * (1 + 1e-9))
-
-
-def test_a_speed_that_is_no_number_is_not_braked_for_ever(controller: Controller):
-    arm = Ticks()
-    loop.come_to_rest(controller.limits, arm, arm, controller.model.q_mid, np.full(7, np.nan))
-    assert len(arm.sent) < 100
-
-
-class Stubborn(Ticks):
-    """Fails at some of its ticks, and at some commands, by number."""
-
-    def __init__(self, ticks: range, commands: range) -> None:
-        super().__init__()
-        self.bad_ticks, self.bad_commands = ticks, commands
+    def __init__(self, bad_ticks: range = range(0), bad_commands: range = range(0)) -> None:
+        self.bad_ticks, self.bad_commands = bad_ticks, bad_commands
         self.ticks = self.asked = 0
+        self.sent: list[np.ndarray] = []
 
     def tick(self) -> float:
         self.ticks += 1
@@ -67,7 +36,27 @@ class Stubborn(Ticks):
         self.asked += 1
         if self.asked in self.bad_commands:
             raise OSError(f"command {self.asked}")
-        super().command(qd)
+        self.sent.append(qd)
+
+    def assert_braked(self, limits: JointLimits) -> None:
+        """From full speed, to rest."""
+        np.testing.assert_array_equal(self.sent[-1], 0.0)
+        change = np.abs(np.diff([limits.qd_max, *self.sent], axis=0)).max(axis=0) / limits.period
+        assert np.all(change <= limits.qdd_max * (1 + 1e-9))
+
+
+@pytest.mark.parametrize("rate", [30.0, 100.0, 1000.0, 4000.0])
+def test_an_arm_at_full_speed_comes_to_rest_at_any_rate(panda_model: RobotModel, paper_skin: Skin, rate: float):
+    limits = Controller(panda_model, paper_skin, no_fixtures(), Circle(), at_rate(PROFILES["paper"], rate)).limits
+    arm = Arm()
+    loop.come_to_rest(limits, arm, arm, panda_model.q_mid, limits.qd_max)
+    arm.assert_braked(limits)
+
+
+def test_a_speed_that_is_no_number_is_not_braked_for_ever(controller: Controller):
+    arm = Arm()
+    loop.come_to_rest(controller.limits, arm, arm, controller.model.q_mid, np.full(7, np.nan))
+    assert len(arm.sent) < 100
 
 
 @pytest.mark.parametrize(
@@ -82,17 +71,14 @@ class Stubborn(Ticks):
 def test_braking_goes_on_through_ticks_and_commands_that_fail(
     controller: Controller, ticks: range, commands: range, first: str
 ):
-    arm, model = Stubborn(ticks, commands), controller.model
-    fastest = model.description.qd_max
+    arm, limits = Arm(ticks, commands), controller.limits
     with pytest.raises(OSError, match=f"^{first}$"):
-        loop.come_to_rest(controller.limits, arm, arm, model.q_mid, fastest)
-    np.testing.assert_array_equal(arm.sent[-1], 0.0)
-    change = np.abs(np.diff([fastest, *arm.sent], axis=0)).max(axis=0) / DT
-    assert np.all(change <= model.description.qdd_max * (1 + 1e-9))
+        loop.come_to_rest(limits, arm, arm, controller.model.q_mid, limits.qd_max)
+    arm.assert_braked(limits)
 
 
 def test_a_robot_that_takes_no_command_is_given_up(controller: Controller):
-    arm = Stubborn(range(0), range(1, 999))
+    arm = Arm(bad_commands=range(1, 999))
     with pytest.raises(OSError, match=r"^command 1$"):
         loop.come_to_rest(controller.limits, arm, arm, controller.model.q_mid, controller.limits.qd_max)
     assert arm.asked < 100
