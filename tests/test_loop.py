@@ -25,6 +25,8 @@ PROFILE = replace(PAPER, window=replace(PAPER.window, samples=2))
 class World:
     """An arm that holds its last command until the next tick, a skin that sees nothing, and their clock."""
 
+    period = DT
+
     def __init__(self, model: RobotModel, units: int) -> None:
         self.model, self.units = model, units
         self.now, self.q, self.qd = 0.0, model.description.q_ready.copy(), np.zeros(7)
@@ -33,8 +35,8 @@ class World:
         """Velocity of each period so far."""
 
     def tick(self) -> float:
-        self.now += DT
-        self.q = self.q + self.qd * DT
+        self.now += self.period
+        self.q = self.q + self.qd * self.period
         self.held.append(self.qd)
         return self.now
 

@@ -14,7 +14,8 @@ from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import PROFILES, at_rate
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.types import ControlStep, Inputs, Mode, RangeReadings, RangeStatus, RobotState
+from pretouch.types import ControlStep, Inputs, Mode, RangeReadings, RobotState
+from tests import test_loop
 
 DT = 0.001
 PAPER = PROFILES["paper"]
@@ -26,48 +27,40 @@ BRISK = replace(
 )
 
 
-class World:
+class World(test_loop.World):
     """An arm that does as it is told, whose state is read with a delay and sometimes not anew, its skin and clock."""
 
+    period = DT
+
     def __init__(self, model: RobotModel, units: int, lost: float = 0.0, delay: int = 0) -> None:
-        self.units, self.lost, self.rng = units, lost, np.random.default_rng(0)
-        self.now, self.q, self.qd = 0.0, model.description.q_ready.copy(), np.zeros(7)
+        super().__init__(model, units)
+        self.lost, self.rng = lost, np.random.default_rng(0)
         self.states: deque[RobotState] = deque(maxlen=delay + 1)
-        self.sent: list[np.ndarray] = [self.qd]
         self.been: list[np.ndarray] = []
         self.steps: list[ControlStep] = []
-        self.silent_from, self.silent_until = np.inf, np.inf
+        self.silent = np.inf, np.inf
 
     def tick(self) -> float:
-        self.now += DT
-        self.q = self.q + self.qd * DT
+        super().tick()
         self.been.append(self.q)
         return self.now
 
     def read(self) -> RobotState:
         if not self.states or self.rng.uniform() >= self.lost:
             wrench = np.concatenate([self.rng.normal(0.0, 0.3, 3), np.zeros(3)])
-            self.states.append(RobotState(self.now, self.q, self.qd, self.q, self.qd, np.zeros(7), wrench))
+            self.states.append(replace(super().read(), wrench=wrench))
         return self.states[0]
-
-    def command(self, qd: np.ndarray) -> None:
-        self.qd = qd
-        self.sent.append(qd)
 
     def record(self, cycle: Cycle) -> None:
         self.steps.append(cycle.step)
 
 
-class SilentFor:
+class SilentFor(test_loop.FakeSkin):
     """A skin that sees nothing, and stops in the times of its world."""
 
-    def __init__(self, world: World) -> None:
-        self.world = world
-
     def read(self) -> RangeReadings:
-        w, k = self.world, self.world.units
-        stamp = w.silent_from if w.silent_from <= w.now < w.silent_until else w.now
-        return RangeReadings(np.full(k, stamp), np.zeros(k), np.full(k, int(RangeStatus.SIGNAL)))
+        readings, (begin, end) = super().read(), self.world.silent
+        return replace(readings, stamp=np.minimum(readings.stamp, begin)) if self.world.now < end else readings
 
 
 def turn(model: RobotModel, skin: Skin, world: World, seconds: float) -> list[Mode]:
@@ -77,7 +70,8 @@ def turn(model: RobotModel, skin: Skin, world: World, seconds: float) -> list[Mo
 
 
 def assert_within_limits(model: RobotModel, world: World) -> None:
-    arm, sent = model.description, np.array(world.sent)
+    world.tick()
+    arm, sent = model.description, np.array(world.held)
     assert np.all(np.isfinite(sent))
     assert np.all(np.abs(sent) <= arm.qd_max + 1e-9)
     assert np.all(np.abs(np.diff(sent, axis=0)) <= arm.qdd_max * DT * (1 + 1e-9))
@@ -85,28 +79,19 @@ def assert_within_limits(model: RobotModel, world: World) -> None:
     np.testing.assert_array_equal(sent[-1], 0.0)
 
 
-@pytest.mark.parametrize("lost", [0.01, 0.3])
-def test_lost_samples_keep_the_arm_going_within_its_limits(panda_model: RobotModel, paper_skin: Skin, lost: float):
-    world = World(panda_model, len(paper_skin), lost=lost)
+@pytest.mark.parametrize(("lost", "delay"), [(0.01, 0), (0.3, 0), (0.0, 1), (0.0, 20)])
+def test_lost_and_late_states_keep_the_arm_going_within_its_limits(panda_model, paper_skin, lost: float, delay: int):
+    world = World(panda_model, len(paper_skin), lost, delay)
     modes = turn(panda_model, paper_skin, world, 2.0)
     assert set(modes[300:]) == {Mode.TRACK}
-    assert np.abs(world.sent).max() > 0.5
-    assert_within_limits(panda_model, world)
-
-
-@pytest.mark.parametrize("delay", [1, 20])
-def test_a_late_state_keeps_the_arm_going_within_its_limits(panda_model: RobotModel, paper_skin: Skin, delay: int):
-    world = World(panda_model, len(paper_skin), delay=delay)
-    modes = turn(panda_model, paper_skin, world, 2.0)
-    assert set(modes[300:]) == {Mode.TRACK}
-    assert np.abs(world.sent).max() > 0.5
+    assert np.abs(world.held).max() > 0.5
     assert_within_limits(panda_model, world)
 
 
 @pytest.mark.parametrize("delay", [0, 20])
 def test_a_skin_that_stops_stops_the_arm_until_it_is_heard_again(panda_model: RobotModel, paper_skin: Skin, delay: int):
     world = World(panda_model, len(paper_skin), lost=0.01, delay=delay)
-    world.silent_from, world.silent_until = 0.6, 1.5
+    world.silent = 0.6, 1.5
     modes = turn(panda_model, paper_skin, world, 2.0)
     at = np.array([step.stamp for step in world.steps])
     # held 0.3 s after the last reading, and at rest no later than from full speed
