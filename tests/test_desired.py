@@ -178,38 +178,22 @@ def test_a_far_orientation_is_approached_the_short_way(seed):
     assert left == pytest.approx(max(0.0, angle - 1.0) if angle > 1.0 else 0.0, abs=1e-5)
 
 
-def test_a_recording_holds_what_was_asked_and_replays_to_the_bit(panda_model, tmp_path):
-    place = tmp_path / "a.mcap"
-    q = panda_model.description.q_ready
+def test_a_recording_holds_what_was_asked_nonsense_too_and_replays_to_the_bit(panda_model, tmp_path):
+    place, count, q = tmp_path / "a.mcap", iter(range(10_000)), panda_model.description.q_ready
     plan = desired.joint_positions((0.5, 2.0), (q, q + 0.1))
-
-    def asks(now, _):
-        return None if now < 1.2 else plan if now < 2.0 else desired.twist(now, (0.0, 0.05, 0.0))
-
-    control = Controller(panda_model, Skin([], panda_model), no_fixtures(), Circle(), profile("paper"))
-    with Recording(place, control) as recording:
-        Commanded(panda_model, asks=asks, recorder=recording, seconds=3.0)
-    recorded = open_recording(place)
-    kinds = [kept.inputs.desired and kept.inputs.desired.kind for kept in recorded]
-    assert set(kinds) == {None, DesiredKind.JOINT_POSITIONS, DesiredKind.TWIST}
-    assert verify(recorded).said.startswith("All")
-    found = recorded[150].inputs.desired
-    np.testing.assert_array_equal(found.number, plan.number)
-
-
-def test_nonsense_that_was_asked_replays_too(panda_model, tmp_path):
-    place, count = tmp_path / "a.mcap", iter(range(10_000))
 
     def asks(now, _):
         two = np.array([now, now + 0.1])
         return (
+            None,
+            plan,
             desired.twist(now, np.full(3, np.nan)),
             desired.refused(now, "two programs ask"),
             Desired(DesiredKind.TWIST, two, np.zeros((1, 5))),
             Desired(DesiredKind.TWIST, np.zeros(0), np.zeros((0, 6))),
             "left",
-            desired.joint_velocities(now, np.full(7, 0.05)),
-        )[next(count) // 40 % 6]
+            desired.twist(now, (0.0, 0.05, 0.0)),
+        )[next(count) // 40 % 8]
 
     control = Controller(panda_model, Skin([], panda_model), no_fixtures(), Circle(), profile("paper"))
     with Recording(place, control) as recording:
@@ -217,8 +201,13 @@ def test_nonsense_that_was_asked_replays_too(panda_model, tmp_path):
     recorded = open_recording(place)
     assert len(recorded) == len(run.steps)
     unread = [kept.inputs is None for kept in recorded]
-    assert [all(unread[k + 1 : k + 39]) for k in range(0, 240, 40)] == [False, False, False, False, True, False]
-    assert verify(recorded).differing == 0
+    assert [all(unread[k + 1 : k + 39]) for k in range(0, 320, 40)] == [False] * 6 + [True, False]
+    assert recorded[20].inputs.desired is None
+    np.testing.assert_array_equal(recorded[60].inputs.desired.number, plan.number)
+    assert recorded[300].inputs.desired.kind == DesiredKind.TWIST
+    verdict = verify(recorded)
+    assert verdict.differing == 0
+    assert verdict.checked == unread.count(False)
 
 
 def test_while_the_arm_yields_its_orientation_is_held_and_not_turned_to_what_is_asked(panda_model):
@@ -244,4 +233,3 @@ def test_what_is_sound_is_copied():
     assert found is not None
     assert not np.shares_memory(found.number, asked.number)
     assert sound_desired(None, 7, 1.0) == (None, "")
-    assert replace(asked, kind=0).kind == DesiredKind.TWIST
