@@ -10,11 +10,9 @@ from matplotlib.image import imread
 from pretouch.cli.detect import detect, gains_of
 from pretouch.errors import ParameterError, PretouchError, RecordingError
 from pretouch.imported_data.log import Choice
-from pretouch.loop import Cycle
 from pretouch.recording.skin_recording import SkinRecording
 from pretouch.recording.writer import Recording
-from pretouch.types import Inputs
-from tests.following_arm import DT, Arm
+from tests.following_arm import Arm
 from tests.hardware.traffic import heard
 from tests.imported_data.files import PUSHES, force_columns, pushed, wrenches, write_bag, write_csv
 from tests.imported_data.joint_files import Moving
@@ -25,8 +23,9 @@ def file(tmp_path):
     return write_csv(tmp_path / "mine.csv", force_columns(pushed(14.0, PUSHES)))
 
 
-def test_what_was_read_assumed_and_found_is_printed(capsys, file):
-    detect(file, Choice())
+def test_what_was_read_assumed_and_found_is_printed_and_on_a_page(capsys, file, tmp_path):
+    page = tmp_path / "a.html"
+    detect(file, Choice(), out=page)
     said = capsys.readouterr().out
     assert "mine.csv: 1400 samples in 14.0 s, 100 Hz, the first at" in said
     assert (
@@ -37,6 +36,9 @@ def test_what_was_read_assumed_and_found_is_printed(capsys, file):
     rows = [line.split() for line in said.splitlines() if line.startswith("paper ")]
     assert [row[-1] for row in rows[:3]] == ["y", "x", "z"]
     assert "paper: if nobody touched the arm, 3 false contacts in 0.2 min" in said
+    assert f"Page: {page}" in said
+    assert "3 false contacts" in page.read_text()
+    assert page.read_text().count("<img src=") == 1
 
 
 def test_of_a_recording_of_units_it_is_said_what_can_be_done_with_it(tmp_path):
@@ -106,18 +108,14 @@ def test_bad_input_is_one_sentence_and_nothing_is_printed(capsys, file, given, e
 
 def test_a_recording_of_ours_gives_the_contacts_and_thresholds_it_holds(capsys, tmp_path, panda_model, paper_skin):
     arm, place, numbers = Arm(panda_model, paper_skin), tmp_path / "ours.mcap", tmp_path / "a.json"
-    steps = []
     with Recording(place, arm.controller) as recording:
-        for sample in pushed(6.0, PUSHES[:1]):
-            inputs, before = Inputs(arm.time, arm.robot(tuple(sample)), arm.readings()), arm.state
-            step, arm.state = arm.controller.step(before, inputs)
-            recording.record(Cycle(inputs, before, step, arm.state))
-            arm.qd, arm.q, arm.time = step.command, arm.q + step.command * DT, arm.time + DT
-            steps.append(step)
+        cycles = [arm.turn(tuple(sample)) for sample in pushed(6.0, PUSHES[:1])]
+        for cycle in cycles:
+            recording.record(cycle)
     detect(place, Choice(), ("paper",), json_file=numbers)
     assert "Without a skin no obstacle is known" in capsys.readouterr().out
     (paper,) = json.loads(numbers.read_text())["profiles"]
-    contacts = [s for s in steps if s.contact is not None]
+    contacts = [cycle.step for cycle in cycles if cycle.step.contact is not None]
     assert len(contacts) == 1
     assert [c["time_s"] for c in paper["contacts"]] == pytest.approx([s.stamp + 0.005 for s in contacts])
     assert paper["contacts"][0]["force_n"] == pytest.approx(list(contacts[0].contact.force), abs=0.05)
@@ -187,14 +185,6 @@ def test_with_a_force_beside_torques_each_can_be_had(capsys, pushed_arm, tmp_pat
         detect(tmp_path / "six.csv", Choice(), ("pretouch",))
     with pytest.raises(RecordingError, match="gives only a force: choose one with"):
         detect(write_csv(tmp_path / "force.csv", force_columns(pushed(5.0, ()))), Choice(), ("pretouch",))
-
-
-def test_a_page_of_forces_has_tables_and_figure(capsys, file, tmp_path):
-    detect(file, Choice(), out=tmp_path / "a.html")
-    assert "Page: " in capsys.readouterr().out
-    text = (tmp_path / "a.html").read_text()
-    assert "3 false contacts" in text
-    assert text.count("<img src=") == 1
 
 
 @pytest.mark.parametrize("text", ["a,b", "1,0", "1,inf", "1,-2"])

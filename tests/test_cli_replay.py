@@ -9,6 +9,7 @@ import pytest
 
 from pretouch.cli.commands import Replay
 from pretouch.cli.replay import replay
+from pretouch.controller import Controller
 from pretouch.errors import ParameterError, RecordingError
 from pretouch.recording.writer import Recording
 from pretouch.viewer import server
@@ -61,8 +62,9 @@ def begun(monkeypatch):
     return announced
 
 
-def test_a_line_says_what_ran_for_how_long_and_what_happened(capsys, whole):
-    assert replay(whole) == 0
+def test_a_line_says_what_ran_for_how_long_and_what_happened(capsys, whole, page, begun):
+    assert Replay(str(whole), page=False).run() == 0
+    assert begun == page == []
     said = capsys.readouterr().out
     what = "pretouch test: profile paper on panda with 7 units, 5.0 s, 500 steps"
     assert said == f"{what}: 1 contact, 1 hold after the start, held for 24% of the time.\n"
@@ -85,15 +87,13 @@ def test_of_a_killed_run_it_is_said_what_is_missing(capsys, cut):
     assert said[1].startswith("pretouch test: profile paper")
 
 
-def test_a_recording_that_can_be_recomputed_ends_with_code_0_and_no_page(capsys, whole, page):
-    assert replay(whole, verify=True) == 0
+def test_a_recording_that_can_be_recomputed_ends_with_code_0_and_no_page(capsys, whole, page, begun):
+    assert Replay(str(whole), verify=True).run() == 0
     assert "All 500 steps were recomputed and are the same bit for bit." in capsys.readouterr().out
-    assert page == []
+    assert begun == page == []
 
 
 def test_a_difference_ends_with_code_1(capsys, whole, monkeypatch):
-    from pretouch.controller import Controller
-
     step = Controller.step
 
     def otherwise(self, state, inputs):
@@ -141,12 +141,6 @@ def test_the_address_is_said_before_the_recording_is_read(whole, page, begun, mo
     monkeypatch.setattr("pretouch.cli.replay.open_recording", read)
     with pytest.raises(RecordingError, match="read"):
         Replay(str(whole)).run()
-
-
-@pytest.mark.parametrize("given", [{"verify": True}, {"page": False}])
-def test_no_page_begins_where_none_is_asked_for(whole, page, begun, given):
-    assert Replay(str(whole), **given).run() == 0
-    assert begun == page == []
 
 
 @pytest.mark.parametrize("name", ["gone.mcap", "text.mcap", "empty.mcap"])
