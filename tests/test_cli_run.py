@@ -5,6 +5,7 @@ import os
 import signal
 import threading
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -149,11 +150,7 @@ def test_a_damaged_note_of_confirmed_robots_is_found_before_the_checks(tmp_path,
     place = tmp_path / "state" / "pretouch" / "force-sign.json"
     place.parent.mkdir(parents=True)
     place.write_text("[")
-    known = Identity("test", "here", "nothing")
-
-    def opened(arm, **named):
-        return OpenedArm(arm, known, **named)
-
+    opened = partial(OpenedArm, identity=Identity("test", "here", "nothing"))
     monkeypatch.setattr("pretouch.arms.simulated.OpenedArm", opened)
     assert cli.main([*BLIND, "--seconds", "0.1", "--yes"]) == 2
     shown = capsys.readouterr()
@@ -282,9 +279,7 @@ def test_a_wrong_sign_is_refused_before_anything_moves(capsys, monkeypatch):
 
     def opposite(arm):
         state = read(arm)
-        return type(state)(
-            state.stamp, state.q, state.qd, state.q_commanded, state.qd_commanded, -state.tau_ext, -state.wrench
-        )
+        return replace(state, tau_ext=-state.tau_ext, wrench=-state.wrench)
 
     monkeypatch.setattr(ThreadedArm, "read", opposite)
     monkeypatch.setattr(ThreadedArm, "begin", began.append)

@@ -32,6 +32,8 @@ def calibrate(*words):
         (("--plan", "m.csv", "--recording", "x"), "--recording and --plan are given: choose one of them."),
         (("--robot", "simulated"), "`--robot simulated` is `pretouch skin calibrate simulated` now"),
         (("--recording", "x.mcap", "--duration", "30"), "--duration does not go with --recording"),
+        (("--simulate", "--skins", "20"), "is `pretouch bench calibration` now"),
+        (("--recording", "joints.csv"), "give the recording with --recording, and joint states with --joints."),
         (("--recording", "/nowhere.mcap"), "The recording /nowhere.mcap cannot be read: it does not exist."),
         (("--recording", "x.mcap", "--skin", "/nowhere.toml"), "/nowhere.toml cannot be read"),
         (("--recording", "x.mcap", "--out", "/dev/null/x.toml"), "/dev/null/x.toml cannot be written"),
@@ -91,11 +93,6 @@ def test_no_file_is_written_over_another_one_of_the_same_command(tmp_path, monke
     assert calibrate(*words, "--replace") == 2
     assert "is also another input or output file: give another name." in capsys.readouterr().err
     assert (tmp_path / "mine").read_text() == (tmp_path / "bag" / "mine").read_text() == "mine"
-
-
-def test_a_table_is_no_recording_of_units(tmp_path, capsys):
-    assert calibrate("--recording", tmp_path / "joints.csv") == 2
-    assert "give the recording with --recording, and joint states with --joints." in capsys.readouterr().err
 
 
 def test_a_port_that_is_taken_is_said_before_anything_is_planned(paper_skin, tmp_path, capsys):
@@ -178,8 +175,3 @@ def test_the_motion_is_written_for_another_driver_with_the_room_it_takes(panda_m
     for row in table[[0, -1]]:
         assert row[1:8] == pytest.approx(panda_model.description.q_ready, abs=1e-6)
         assert row[8:] == pytest.approx(np.zeros(7), abs=1e-6)
-
-
-def test_the_study_in_simulation_has_another_name(capsys):
-    assert calibrate("--simulate", "--skins", 20) == 2
-    assert "is `pretouch bench calibration` now" in capsys.readouterr().err
