@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from pretouch import loop
 from pretouch.calibration.motion.follow import PlanCommander, plan_controller
@@ -54,3 +55,13 @@ def record_motion(model: RobotModel, skin: Skin, place: Path, joints_too: bool =
         loop.run(controller, plant, NoUnits(), clock, Recorder(), commander.done, options)
     assert commander.stopped == ""
     return JointTrace(np.array(stamps), np.array(positions))
+
+
+def assert_same_places(found: Skin, true: Skin, within_deg: float = 0.1) -> None:
+    """Each unit that was found sits where it does in truth."""
+    for unit in found.units:
+        there = true.units[true.ids.index(unit.id)]
+        assert unit.link == there.link
+        T, wanted = unit.T_link_sensor, there.T_link_sensor
+        assert np.linalg.norm(T[:3, 3] - wanted[:3, 3]) < 0.001
+        assert np.rad2deg(Rotation.from_matrix(T[:3, :3].T @ wanted[:3, :3]).magnitude()) < within_deg

@@ -6,14 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from pretouch import cli
 from pretouch.cli.calibrate import recording as recording_way
 from pretouch.recording.calibration_data import read_measured
 from pretouch.sensing.skin import Skin, load_skin, save_skin
 from pretouch.traces import JointTrace
-from tests.calibrated_arm import record_motion
+from tests.calibrated_arm import assert_same_places, record_motion
 
 pytestmark = pytest.mark.slow
 
@@ -39,19 +38,19 @@ def recorded(panda_model, skin, tmp_path_factory):
     return folder
 
 
+@pytest.fixture
+def read_as(recorded, monkeypatch):
+    """Have the recording read as if some of it were otherwise; `whole` is all of it."""
+
+    def changed(**changes):
+        monkeypatch.setattr(recording_way, "read_measured", lambda place: replace(changed.whole, **changes))
+
+    changed.whole = read_measured(recorded / "units.mcap")
+    return changed
+
+
 def calibrate(*words):
     return cli.main(["skin", "calibrate", *map(str, words)])
-
-
-def assert_same_places(found, true, ids=None):
-    for unit in found.units:
-        if ids and unit.id not in ids:
-            continue
-        there = true.units[true.ids.index(unit.id)]
-        assert unit.link == there.link
-        T, wanted = unit.T_link_sensor, there.T_link_sensor
-        assert np.linalg.norm(T[:3, 3] - wanted[:3, 3]) < 0.001
-        assert np.rad2deg(Rotation.from_matrix(T[:3, :3].T @ wanted[:3, :3]).magnitude()) < 0.1
 
 
 def test_a_recording_of_units_and_joints_becomes_a_skin_file(panda_model, skin, recorded, tmp_path, capsys):
@@ -90,10 +89,8 @@ def test_joint_states_of_another_clock_are_aligned(panda_model, skin, recorded, 
     assert all(abs(unit["place"]["clock_offset"]) < 0.01 for unit in told["units"])
 
 
-def test_an_offset_of_clocks_that_one_unit_alone_tells_is_said_to_be_so(recorded, capsys, monkeypatch):
-    whole = read_measured(recorded / "units.mcap")
-    alone = {"hand_left": whole.units["hand_left"]}
-    monkeypatch.setattr(recording_way, "read_measured", lambda place: replace(whole, units=alone, complete=False))
+def test_an_offset_of_clocks_that_one_unit_alone_tells_is_said_to_be_so(recorded, capsys, read_as):
+    read_as(units={"hand_left": read_as.whole.units["hand_left"]}, complete=False)
     assert calibrate("--recording", "units.mcap", "--joints", recorded / "joints.csv") == 0
     said = capsys.readouterr().out
     assert "Only hand_left shows this: no other unit agrees with it" in said
@@ -115,7 +112,7 @@ def test_a_skin_that_is_wrong_about_a_link_keeps_that_unit_as_it_was(panda_model
     made = load_skin(out, panda_model)
     assert made.ids == ("lost", "hand_left", "hand_front", "forearm_left")
     np.testing.assert_allclose(made.T_link_sensor[:2], believed.T_link_sensor[:2], atol=1e-9)
-    assert_same_places(made, skin, ("hand_front", "forearm_left"))
+    assert_same_places(Skin(made.units[2:], panda_model), skin)
 
 
 def test_a_skin_file_is_replaced_only_if_that_is_said(panda_model, skin, recorded, tmp_path, capsys):
@@ -128,42 +125,31 @@ def test_a_skin_file_is_replaced_only_if_that_is_said(panda_model, skin, recorde
     assert load_skin(place, panda_model).position_sigma.all()
 
 
-def test_joint_states_that_are_missing_are_asked_for(panda_model, skin, recorded, tmp_path, capsys, monkeypatch):
-    whole = read_measured(recorded / "units.mcap")
-    monkeypatch.setattr(recording_way, "read_measured", lambda place: replace(whole, joints=None))
-    assert calibrate("--recording", "units.mcap") == 2
-    assert "units.mcap has no joint states: give the file that has them with --joints" in capsys.readouterr().err
+@pytest.mark.parametrize(
+    ("words", "changes", "said"),
+    [
+        ((), {"joints": None}, "units.mcap has no joint states: give the file that has them with --joints"),
+        ((), {"units": {}}, "units.mcap holds no IMU data"),
+        (("--topic", "/joint_states"), {}, "--topic needs --joints"),
+        (("--arm", "fr3"), {}, "has no states of fr3_joint1"),
+    ],
+)
+def test_what_is_missing_is_said(recorded, capsys, read_as, words, changes, said):
+    read_as(**changes)
+    assert calibrate("--recording", recorded / "units.mcap", *words) == 2
+    assert said in capsys.readouterr().err
 
 
-def test_units_without_an_imu_are_named(recorded, capsys, monkeypatch):
-    whole = read_measured(recorded / "units.mcap")
-    monkeypatch.setattr(recording_way, "read_measured", lambda place: replace(whole, units={}))
-    assert calibrate("--recording", "units.mcap") == 2
-    assert "units.mcap holds no IMU data" in capsys.readouterr().err
-
-
-def test_joint_states_in_another_order_are_put_in_that_of_the_arm(panda_model, skin, recorded, tmp_path, monkeypatch):
-    whole = read_measured(recorded / "units.mcap")
-    turned = JointTrace(whole.joints.stamp, whole.joints.q[:, ::-1])
-    monkeypatch.setattr(
-        recording_way, "read_measured",
-        lambda place: replace(whole, joints=turned, joint_names=whole.joint_names[::-1]),
-    )  # fmt: skip
+def test_joint_states_in_another_order_are_put_in_that_of_the_arm(panda_model, skin, tmp_path, read_as):
+    whole = read_as.whole
+    read_as(joints=JointTrace(whole.joints.stamp, whole.joints.q[:, ::-1]), joint_names=whole.joint_names[::-1])
     assert calibrate("--recording", "units.mcap", "--out", tmp_path / "skin.toml") == 0
     assert_same_places(load_skin(tmp_path / "skin.toml", panda_model), skin)
 
 
-def test_nothing_is_written_where_no_unit_is_good(recorded, tmp_path, capsys, monkeypatch):
-    whole = read_measured(recorded / "units.mcap")
-    held = JointTrace(whole.joints.stamp, np.flip(whole.joints.q, axis=0))
-    monkeypatch.setattr(recording_way, "read_measured", lambda place: replace(whole, joints=held))
+def test_nothing_is_written_where_no_unit_is_good(tmp_path, capsys, read_as):
+    joints = read_as.whole.joints
+    read_as(joints=JointTrace(joints.stamp, np.flip(joints.q, axis=0)))
     assert calibrate("--recording", "units.mcap", "--out", tmp_path / "skin.toml") == 1
     assert f"{tmp_path / 'skin.toml'} is not written." in capsys.readouterr().out
     assert not (tmp_path / "skin.toml").exists()
-
-
-def test_joint_states_of_another_arm_are_refused(recorded, capsys):
-    assert calibrate("--recording", recorded / "units.mcap", "--topic", "/joint_states") == 2
-    assert "--topic needs --joints" in capsys.readouterr().err
-    assert calibrate("--recording", recorded / "units.mcap", "--arm", "fr3") == 2
-    assert "has no states of fr3_joint1" in capsys.readouterr().err
