@@ -20,17 +20,19 @@ def ran(*words: str, folder: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run(words, cwd=folder, env=CLEAN, capture_output=True, text=True, check=False)
 
 
+def succeeds(*words: str, folder: Path) -> None:
+    done = ran(*words, folder=folder)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
 @pytest.fixture(scope="module")
 def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("built")
-    done = ran(sys.executable, "-m", "venv", "builder", folder=folder)
-    assert done.returncode == 0, done.stderr
+    succeeds(sys.executable, "-m", "venv", "builder", folder=folder)
     python = str(folder / "builder/bin/python")
-    done = ran(python, "-m", "pip", "install", "-q", "build", "twine", folder=folder)
-    assert done.returncode == 0, done.stderr
+    succeeds(python, "-m", "pip", "install", "-q", "build", "twine", folder=folder)
     for project in (ROOT, ROOT / "fci", ROOT / "lab"):
-        done = ran(python, "-m", "build", "-q", "-o", str(folder / "dist"), str(project), folder=folder)
-        assert done.returncode == 0, done.stderr
+        succeeds(python, "-m", "build", "-q", "-o", str(folder / "dist"), str(project), folder=folder)
     return folder
 
 
@@ -38,8 +40,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_what_an_index_is_given_is_whole_and_holds_no_more(built: Path):
     files = sorted(map(str, (built / "dist").iterdir()))
     assert len(files) == 6
-    done = ran(str(built / "builder/bin/python"), "-m", "twine", "check", "--strict", *files, folder=built)
-    assert done.returncode == 0, done.stdout
+    succeeds(str(built / "builder/bin/python"), "-m", "twine", "check", "--strict", *files, folder=built)
     with zipfile.ZipFile(built / f"dist/pretouch-{VERSION}-py3-none-any.whl") as wheel:
         text = message_from_bytes(wheel.read(f"pretouch-{VERSION}.dist-info/METADATA")).get_payload()
     assert "](docs/" not in text
@@ -58,11 +59,9 @@ def test_what_an_index_is_given_is_whole_and_holds_no_more(built: Path):
 @pytest.mark.slow
 def test_each_hint_works_in_an_installation_from_a_wheel(built: Path):
     """Follow what each command says is missing, in the words it says it in, until nothing is."""
-    done = ran(sys.executable, "-m", "venv", "user", folder=built)
-    assert done.returncode == 0, done.stderr
+    succeeds(sys.executable, "-m", "venv", "user", folder=built)
     wheel = f"dist/pretouch-{VERSION}-py3-none-any.whl"
-    done = ran(str(built / "user/bin/python"), "-m", "pip", "install", "-q", wheel, folder=built)
-    assert done.returncode == 0, done.stderr
+    succeeds(str(built / "user/bin/python"), "-m", "pip", "install", "-q", wheel, folder=built)
     (built / "cut.mcap").touch()
     asked = {
         "replay cut.mcap": "cut.mcap",
@@ -87,11 +86,9 @@ def test_each_hint_works_in_an_installation_from_a_wheel(built: Path):
 
 @pytest.mark.slow
 def test_pytest_finds_the_fixture_of_a_wheel_and_warns_of_nothing(built: Path):
-    done = ran(sys.executable, "-m", "venv", "tester", folder=built)
-    assert done.returncode == 0, done.stderr
+    succeeds(sys.executable, "-m", "venv", "tester", folder=built)
     python = str(built / "tester/bin/python")
-    done = ran(python, "-m", "pip", "install", "-q", "--find-links", "dist", "pretouch-fci", "pytest", folder=built)
-    assert done.returncode == 0, done.stderr
+    succeeds(python, "-m", "pip", "install", "-q", "--find-links", "dist", "pretouch-fci", "pytest", folder=built)
     # begun by a program that has imported the package before
     program = "import sys, pretouch, pytest; sys.exit(pytest.main(['-W', 'error', '--fixtures', 'dist']))"
     done = ran(python, "-c", program, folder=built)

@@ -1,7 +1,6 @@
 """The product goes its ways without our other distributions, and without what only figures and sweeps need."""
 
 import json
-import re
 import subprocess
 import sys
 from pathlib import Path
@@ -33,21 +32,11 @@ def alone(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([sys.executable, "-c", _ALONE, *words], cwd=folder, capture_output=True, text=True)
 
 
-_HELPED = "live", "skin", "run", "replay", "detect", "robot import"
-_EACH_HELP = f"""
-for name in {_HELPED}:
-    try:
-        main([*name.split(), "--help"])
-    except SystemExit as end:
-        assert end.code == 0, name
-"""
-
-
-def test_help(tmp_path: Path):
-    text = _ALONE.replace("sys.exit(main(sys.argv[1:]))", _EACH_HELP)
-    done = subprocess.run([sys.executable, "-c", text], cwd=tmp_path, capture_output=True, text=True)
+@pytest.mark.parametrize("name", ["live", "skin", "run", "replay", "detect", "robot import"])
+def test_help(tmp_path: Path, name: str):
+    done = alone(tmp_path, *name.split(), "--help")
     assert (done.returncode, done.stderr) == (0, "")
-    assert re.findall(r"usage: pretouch ([a-z-]+(?: import)?)", done.stdout) == list(_HELPED)
+    assert f"usage: pretouch {name} " in done.stdout
 
 
 def test_a_rehearsed_run_is_recorded_and_recomputed(tmp_path: Path):

@@ -2,47 +2,50 @@
 
 import json
 import math
+from collections.abc import Iterator
 from dataclasses import fields
+from typing import Any, get_args, get_type_hints
 
 import numpy as np
 import pytest
 
 from pretouch import cli
-from pretouch.cli.writing import numbers_to, plain
+from pretouch.cli.registry import command_class, command_names
+from pretouch.cli.writing import numbers_to
 from pretouch.recording.writer import Recording
 from pretouch.session.push import GuidedPush
-from tests.cli.commands import COMMANDS
 from tests.following_arm import DT, Arm
 from tests.imported_data.files import pushed
 from tests.importing.made import six_axis, written
 
-WITHOUT = {
-    "live": "serves a page",
-    "report": "writes a page",
-    "skin simulate": "sends what units send",
-    "skin provision": "sets a unit up, and says so",
-    "warm-up": "compiles",
-    "serve-fci": "serves an arm",
-    "figure": "writes a picture",
-    "policy": "serves a page",
-}
-"""Commands that conclude with no numbers."""
+
+def single(name: str, kind: Any) -> Iterator[tuple[str, Any]]:
+    """Yield name and class of a command, or of each one that stands below it, as below `skin`, `robot` and `bench`."""
+    what = get_type_hints(kind, include_extras=True).get("what")
+    below = [each for each in get_args(what) if hasattr(each, "__metadata__")]
+    if not below:
+        yield name, kind
+    for each in below:
+        called, *_ = (one.name for one in each.__metadata__)
+        yield from single(f"{name} {called}", each.__origin__)
+
+
+COMMANDS: dict[str, Any] = dict(pair for name in command_names() for pair in single(name, command_class(name)))
+"""Class of each command, by its words."""
+WITHOUT = {"live", "report", "skin simulate", "skin provision", "warm-up", "serve-fci", "figure", "policy"}
+"""Commands that conclude with no numbers: they serve a page or an arm, write a page or a picture, or set up."""
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_a_command_has_json_or_a_reason_to_have_none(name):
-    kept = {one.name: one for one in fields(COMMANDS[name])}
-    assert ("json" in kept) != (name in WITHOUT)
-    if "json" in kept:
-        assert kept["json"].default == ""
-
-
-@pytest.mark.parametrize("name", [name for name in COMMANDS if name not in WITHOUT])
-def test_help_says_what_a_dash_does(capsys, name):
-    with pytest.raises(SystemExit):
+def test_every_command_has_help_which_says_what_a_dash_does_if_it_concludes_with_numbers(capsys, name):
+    with pytest.raises(SystemExit) as stop:
         cli.main([*name.split(), "--help"])
-    said = " ".join(capsys.readouterr().out.replace("│", " ").split()).partition("--json STR ")[2]
-    assert "standard output" in said.partition("--")[0]
+    assert stop.value.code == 0
+    said = " ".join(capsys.readouterr().out.replace("│", " ").split())
+    assert f"usage: pretouch {name} " in said
+    kept = {one.name: one.default for one in fields(COMMANDS[name]) if one.name == "json"}
+    assert kept == ({} if name in WITHOUT else {"json": ""})
+    assert ("standard output" in said.partition("--json STR ")[2].partition("--")[0]) == (name not in WITHOUT)
 
 
 @pytest.fixture(scope="module")
@@ -96,19 +99,15 @@ def test_what_ends_a_command_leaves_standard_output_empty(capsys, tmp_path):
     assert capsys.readouterr().out == ""
 
 
-def test_a_file_of_numbers_is_named(capsys, tmp_path):
+def test_a_file_of_numbers_is_named_and_holds_null_for_what_is_not_finite(capsys, tmp_path):
+    odd = [-math.inf, {"c": np.float32("nan")}, True]
     with numbers_to(tmp_path / "new" / "a.json") as write:
         print("text")
-        write({"force_n": np.array([1.0, math.nan]), "count": np.int64(3), "pair": (1, None)})
+        write({"force_n": np.array([1.0, math.nan]), "count": np.int64(3), "pair": (1, None), "odd": odd})
     assert capsys.readouterr().out == f"text\nNumbers: {tmp_path / 'new' / 'a.json'}\n"
     assert json.loads((tmp_path / "new" / "a.json").read_text()) == {
         "force_n": [1, None],
         "count": 3,
         "pair": [1, None],
+        "odd": [None, {"c": None}, True],
     }
-
-
-def test_what_is_not_finite_is_null():
-    assert plain({"a": math.inf, "b": [-math.inf, {"c": np.float32("nan")}], "d": True}) == {
-        "a": None, "b": [None, {"c": None}], "d": True,
-    }  # fmt: skip

@@ -11,7 +11,6 @@ from pretouch import cli
 from pretouch.cli.overview import GROUPS, SHELLS, overview
 from pretouch.cli.registry import FCI, LAB, OWN
 from pretouch.profiles import profile
-from tests.cli.commands import COMMANDS
 
 
 def test_the_overview_fits_a_screen_and_has_each_command_once():
@@ -85,11 +84,3 @@ def test_a_reader_that_has_seen_enough_is_no_error(unbuffered):
         assert done.stderr is not None
         done.stdout.close()
         assert (done.stderr.read(), done.wait()) == (b"", 141)
-
-
-@pytest.mark.parametrize("name", COMMANDS)
-def test_every_command_has_help(capsys, name):
-    with pytest.raises(SystemExit) as stop:
-        cli.main([*name.split(), "--help"])
-    assert stop.value.code == 0
-    assert f"usage: pretouch {name} " in capsys.readouterr().out
