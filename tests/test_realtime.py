@@ -3,11 +3,13 @@
 import ctypes
 import gc
 import os
+import re
 import signal
 import sys
 import threading
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from types import SimpleNamespace
 from typing import Self
 
@@ -49,25 +51,15 @@ def controller(panda_model: RobotModel, paper_skin: Skin) -> Controller:
     return Controller(panda_model, paper_skin, no_fixtures(), Circle(), FAST)
 
 
-def at_rest(model: RobotModel, stamp: float = 0.0) -> RobotState:
-    q, zero = model.description.q_ready, np.zeros(7)
-    return RobotState(stamp, q, zero, q, zero, zero, np.zeros(6))
-
-
 @pytest.mark.usefixtures("nothing_frozen")
-def test_nothing_is_collected_meanwhile():
-    with realtime.real_time() as missing:
+@pytest.mark.parametrize("ends", [None, RuntimeError("lost")])
+def test_nothing_is_collected_meanwhile_however_it_ends(ends: Exception | None):
+    with suppress(RuntimeError), realtime.real_time() as missing:
+        assert missing == () or sys.platform != "linux"
         assert not gc.isenabled()
         assert gc.get_freeze_count() > 1000
-    assert gc.isenabled()
-    assert gc.get_freeze_count() == 0
-    assert missing == () or sys.platform != "linux"
-
-
-@pytest.mark.usefixtures("nothing_frozen")
-def test_the_collector_comes_back_after_an_error():
-    with pytest.raises(RuntimeError, match="lost"), realtime.real_time():
-        raise RuntimeError("lost")
+        if ends:
+            raise ends
     assert gc.isenabled()
     assert gc.get_freeze_count() == 0
 
@@ -85,30 +77,32 @@ def test_a_collector_somebody_switched_off_and_froze_stays_so():
         gc.enable()
 
 
-@linux
-def test_a_refused_priority_is_one_sentence_and_the_run_goes_on(monkeypatch: pytest.MonkeyPatch):
-    def refuse(*_args: object) -> None:
-        raise PermissionError(1, "Operation not permitted")
+NOT_ALLOWED, INVALID = PermissionError(1, "Operation not permitted"), OSError(22, "Invalid argument")
+CPU = 0 if sys.platform != "linux" else min(os.sched_getaffinity(0))
 
-    monkeypatch.setattr(os, "sched_setscheduler", refuse)
-    with realtime.real_time(priority=80) as missing:
+
+def fails(monkeypatch: pytest.MonkeyPatch, function: str, error: OSError) -> None:
+    def refuse(*_args: object) -> None:
+        raise error
+
+    monkeypatch.setattr(os, function, refuse)
+
+
+@linux
+@pytest.mark.parametrize(
+    ("function", "error", "wish", "words"),
+    [
+        ("scheduler", NOT_ALLOWED, {"priority": 80}, "Real-time priority 80 was refused.*rtprio 99.*limits.conf.*CAP_"),
+        ("scheduler", INVALID, {"priority": 1}, r"Real-time priority 1 is not to be had here \(Invalid argument\)"),
+        ("affinity", INVALID, {"cpu": CPU}, rf"Staying on processor {CPU} was refused \(Invalid argument\)"),
+    ],
+)
+def test_what_is_refused_is_one_sentence_and_the_run_goes_on(monkeypatch, function, error, wish, words):
+    fails(monkeypatch, f"sched_set{function}", error)
+    with realtime.real_time(**wish) as missing:
         assert not gc.isenabled()
     (said,) = missing
-    assert said.startswith("Real-time priority 80 was refused")
-    assert "rtprio 99" in said
-    assert "/etc/security/limits.conf" in said
-    assert "CAP_SYS_NICE" in said
-
-
-@linux
-def test_a_priority_there_is_not_here_is_one_sentence(monkeypatch: pytest.MonkeyPatch):
-    def fail(*_args: object) -> None:
-        raise OSError(22, "Invalid argument")
-
-    monkeypatch.setattr(os, "sched_setscheduler", fail)
-    with realtime.real_time(priority=1) as missing:
-        pass
-    assert missing == ("Real-time priority 1 is not to be had here (Invalid argument): the loop runs without it.",)
+    assert re.match(words, said)
 
 
 @linux
@@ -117,14 +111,11 @@ def test_a_priority_is_set_and_taken_back(monkeypatch: pytest.MonkeyPatch, ends:
     calls = []
     monkeypatch.setattr(os, "sched_setscheduler", lambda *call: calls.append(call))
     before = os.sched_getscheduler(0)
-    try:
-        with realtime.real_time(priority=80) as missing:
-            assert missing == ()
-            assert [(who, policy, param.sched_priority) for who, policy, param in calls] == [(0, os.SCHED_FIFO, 80)]
-            if ends:
-                raise ends
-    except RuntimeError:
-        pass
+    with suppress(RuntimeError), realtime.real_time(priority=80) as missing:
+        assert missing == ()
+        assert [(who, policy, param.sched_priority) for who, policy, param in calls] == [(0, os.SCHED_FIFO, 80)]
+        if ends:
+            raise ends
     assert [(who, policy) for who, policy, _ in calls[1:]] == [(0, before)]
 
 
@@ -135,19 +126,6 @@ def test_the_process_stays_on_a_processor_meanwhile():
         assert os.sched_getaffinity(0) == {max(before)}
     assert missing == ()
     assert os.sched_getaffinity(0) == before
-
-
-@linux
-def test_a_refused_processor_is_one_sentence(monkeypatch: pytest.MonkeyPatch):
-    def refuse(*_args: object) -> None:
-        raise OSError(22, "Invalid argument")
-
-    monkeypatch.setattr(os, "sched_setaffinity", refuse)
-    cpu = min(os.sched_getaffinity(0))
-    with realtime.real_time(cpu=cpu) as missing:
-        pass
-    (said,) = missing
-    assert said.startswith(f"Staying on processor {cpu} was refused (Invalid argument)")
 
 
 @linux
@@ -186,15 +164,18 @@ def test_elsewhere_than_on_linux_one_sentence_says_so(monkeypatch: pytest.Monkey
 
 
 class Arm:
-    """A robot and a recorder."""
+    """A robot at rest and a recorder, beside a skin that was never heard."""
 
     def __init__(self, controller: Controller) -> None:
-        self.model, self.units = controller.model, len(controller.skin)
+        self.q, k = controller.model.description.q_ready, len(controller.skin)
+        unheard = RangeReadings(np.full(k, -np.inf), np.zeros(k), np.full(k, 255))
+        self.skin = SimpleNamespace(read=lambda: unheard)
         self.steps: list[ControlStep] = []
         self.collecting: list[bool] = []
 
-    def read(self) -> RobotState:
-        return at_rest(self.model)
+    def read(self, stamp: float = 0.0) -> RobotState:
+        zero = np.zeros(7)
+        return RobotState(stamp, self.q, zero, self.q, zero, zero, np.zeros(6))
 
     def command(self, qd: np.ndarray) -> None:
         assert np.all(np.isfinite(qd))
@@ -204,25 +185,12 @@ class Arm:
         self.collecting.append(gc.isenabled())
 
 
-class NoReadings:
-    def __init__(self, units: int) -> None:
-        self.units = units
-
-    def read(self) -> RangeReadings:
-        return RangeReadings(np.full(self.units, -np.inf), np.zeros(self.units), np.full(self.units, 255))
-
-
 def test_the_runner_prepares_tells_and_reports(controller: Controller, monkeypatch: pytest.MonkeyPatch):
-    def refuse(*_args: object) -> None:
-        raise OSError(22, "Invalid argument")
-
     if sys.platform == "linux":
-        monkeypatch.setattr(os, "sched_setaffinity", refuse)
-    clock, told = MonotonicClock(0.001), []
-    arm = Arm(controller)
-    cpu = 0 if sys.platform != "linux" else min(os.sched_getaffinity(0))
-    options = realtime.Options(cpu=cpu, tell=told.append)
-    realtime.run(controller, arm, NoReadings(arm.units), clock, arm, lambda step: len(arm.steps) == 20, options)
+        fails(monkeypatch, "sched_setaffinity", INVALID)
+    clock, told, arm = MonotonicClock(0.001), [], Arm(controller)
+    options = realtime.Options(cpu=CPU, tell=told.append)
+    realtime.run(controller, arm, arm.skin, clock, arm, lambda step: len(arm.steps) == 20, options)
     assert len(told) == 1
     assert arm.collecting == [False] * 20
     assert clock.timing().cycles == 20
@@ -242,7 +210,7 @@ class HeardArm(Arm):
             self._stamp = time.monotonic()
 
     def read(self) -> RobotState:
-        return at_rest(self.model, self._stamp)
+        return super().read(self._stamp)
 
     def record(self, cycle: Cycle) -> None:
         super().record(cycle)
@@ -268,7 +236,7 @@ def test_the_loop_begins_with_a_state_that_is_newer_than_the_preparations(
 
     monkeypatch.setattr(gc, "collect", collect)
     with HeardArm(controller) as arm:
-        realtime.run(controller, arm, NoReadings(arm.units), MonotonicClock(0.001), arm, lambda step: True)
+        realtime.run(controller, arm, arm.skin, MonotonicClock(0.001), arm, lambda step: True)
     assert arm.first is not None
     assert arm.first.stamp >= collected[-1]
 
@@ -285,7 +253,7 @@ def test_a_signal_that_ends_processes_ends_the_loop_in_order(controller: Control
 
     try:
         with pytest.raises(SystemExit) as ended:
-            realtime.run(controller, arm, NoReadings(arm.units), clock, arm, done)
+            realtime.run(controller, arm, arm.skin, clock, arm, done)
         assert signal.getsignal(number) is signal.SIG_DFL
     finally:
         signal.signal(number, before)
@@ -298,5 +266,5 @@ def test_a_clock_of_another_period_is_refused(controller: Controller):
     clock = MonotonicClock(0.01)
     arm = Arm(controller)
     with pytest.raises(ParameterError, match=r"period of 0\.01 s, the controller 0\.001 s: make them the same"):
-        realtime.run(controller, arm, NoReadings(arm.units), clock, arm, lambda step: True)
+        realtime.run(controller, arm, arm.skin, clock, arm, lambda step: True)
     assert arm.steps == []

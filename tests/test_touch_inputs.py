@@ -1,6 +1,7 @@
 """Touch readings given to control steps: which are believed, what they change, and what they must not."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,8 +13,10 @@ from pretouch.ports import touch_of
 from pretouch.profiles import PROFILES, profile
 from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify
+from pretouch.recording.writer import Recording
+from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.sensing.unit import TouchPatch
+from pretouch.sensing.unit import SensorUnit, TouchPatch
 from pretouch.types import Inputs, Mode, TouchReadings, TouchStatus
 from tests.fuzz.invariants import same
 from tests.recording.runs import Run, controller_of, custom_arm
@@ -54,10 +57,13 @@ def test_readings_that_fit_are_copied():
         ("nothing", "touch readings are 'nothing'"),
     ],
 )
-def test_readings_that_do_not_fit_are_said_and_not_believed(given, said):
+def test_readings_that_do_not_fit_are_said_and_hold_the_arm(panda_model, feeling, given, said):
     sound, wrong = sound_touch(given, 7)
     assert sound is None
     assert said in wrong
+    step = Run(controller_of(panda_model, feeling, OURS)).turn(lambda inputs: replace(inputs, touch=given)).step
+    assert step.mode is Mode.HOLD
+    assert said in step.reason
 
 
 def test_numbers_that_are_none_are_taken_for_nothing_known():
@@ -126,69 +132,36 @@ def test_without_sensors_in_the_skin_or_without_the_switch_no_bit_changes(panda_
     assert not PROFILES["paper"].detect.reads_touch
 
 
-def test_touch_readings_that_do_not_fit_hold_the_arm_and_say_so(panda_model, feeling):
-    controller = controller_of(panda_model, feeling, OURS)
-    run = Run(controller)
-    cycle = run.turn(lambda given: replace(given, touch=readings(6)))
-    assert cycle.step.mode is Mode.HOLD
-    assert (
-        "do not fit the skin (stamps, contacts, forces and statuses of touch have the shapes (6,)" in cycle.step.reason
-    )
-
-
 def test_the_loop_hands_on_what_a_skin_feels(panda_model, feeling):
-    class Port:
-        def __init__(self, run: Run) -> None:
-            self.run = run
-
-        def read(self):
-            return self.run.inputs().readings
-
-    class FeelingPort(Port):
-        def touch(self):
-            return readings(7, self.run.time, (3,))
-
-    class Follower:
-        def __init__(self, run: Run) -> None:
-            self.run = run
-
-        def read(self):
-            return self.run.inputs().robot
-
-        def command(self, qd):
-            self.run.qd = qd
-
     run = Run(controller_of(panda_model, feeling, OURS))
-    assert touch_of(Port(run)) is None
-    cycle = turn(run.controller, run.state, Follower(run), FeelingPort(run), 0.0)
+    deaf = SimpleNamespace(read=lambda: run.inputs().readings)
+    touched = SimpleNamespace(read=deaf.read, touch=lambda: readings(7, run.time, (3,)))
+    arm = SimpleNamespace(read=lambda: run.inputs().robot, command=lambda qd: None)
+    assert touch_of(deaf) is None
+    cycle = turn(run.controller, run.state, arm, touched, 0.0)
     assert cycle.inputs.touch is not None
     assert cycle.inputs.touch.contact.tolist() == [k == 3 for k in range(7)]
-    assert turn(run.controller, run.state, Follower(run), Port(run), 0.0).inputs.touch is None
+    assert turn(run.controller, run.state, arm, deaf, 0.0).inputs.touch is None
 
 
-def recorded(place, controller: Controller, touch):
-    from pretouch.recording.writer import Recording
-
-    run = Run(controller)
-    with Recording(place, controller) as recording:
-        for k in range(60):
-            recording.record(run.turn(lambda given, k=k: replace(given, touch=touch(k, given.stamp))))
-    return run
-
-
-def test_a_recording_with_touch_is_recomputed_to_the_bit(panda_model, feeling, tmp_path):
-    rng = np.random.default_rng(0)
+def test_a_recording_with_touch_is_recomputed_to_the_bit_and_lacks_what_fits_no_message(panda_model, feeling, tmp_path):
+    rng, run = np.random.default_rng(0), Run(controller_of(panda_model, feeling, OURS))
 
     def touch(k: int, stamp: float) -> TouchReadings | None:
         if k % 10 == 9:
             return None
         force = np.where(rng.random(7) < 0.3, np.nan, rng.uniform(0.0, 5.0, 7))
         status = np.where(rng.random(7) < 0.2, int(TouchStatus.FAILED), int(TouchStatus.OK))
-        return TouchReadings(stamp - rng.uniform(0.0, 0.08, 7), rng.random(7) < 0.3, force, status)
+        contact = ["yes"] * 7 if k == 30 else rng.random(7) < 0.3
+        return TouchReadings(stamp - rng.uniform(0.0, 0.08, 7), contact, force, status)
 
-    run = recorded(tmp_path / "a.mcap", controller_of(panda_model, feeling, OURS), touch)
+    with Recording(tmp_path / "a.mcap", run.controller) as recording:
+        for k in range(60):
+            recording.record(run.turn(lambda given, k=k: replace(given, touch=touch(k, given.stamp))))
     kept = open_recording(tmp_path / "a.mcap")
-    assert all(same(kept[k].inputs, cycle.inputs) for k, cycle in enumerate(run.cycles))
+    assert all(same(kept[k].inputs, cycle.inputs) for k, cycle in enumerate(run.cycles) if k != 30)
+    assert kept[30].inputs is None
+    assert "numbers are none" in kept.unreadable(30)
     assert [u.touch for u in kept.runs[0].skin.units] == [u.touch for u in feeling.units]
     found = verify(kept)
     assert found.exact
@@ -196,23 +169,8 @@ def test_a_recording_with_touch_is_recomputed_to_the_bit(panda_model, feeling, t
     assert run.cycles[-1].after.detector.cues[0].account.any()
 
 
-def test_touch_that_fits_no_message_is_said_to_be_missing(panda_model, feeling, tmp_path):
-    recorded(
-        tmp_path / "a.mcap", controller_of(panda_model, feeling, OURS),
-        lambda k, stamp: replace(readings(7, stamp), contact=["yes"] * 7) if k == 30 else readings(7, stamp),
-    )  # fmt: skip
-    kept = open_recording(tmp_path / "a.mcap")
-    assert kept[30].inputs is None
-    assert "numbers are none" in kept.unreadable(30)
-    assert verify(kept).agrees
-
-
 def test_another_arm_feels_as_well(tmp_path):
-    from pretouch.robot.model import RobotModel
-    from pretouch.sensing.unit import SensorUnit
-
-    model = RobotModel(custom_arm(tmp_path))
-    T = np.eye(4)
+    model, T = RobotModel(custom_arm(tmp_path)), np.eye(4)
     T[:3, 3] = [0.05, 0.0, 0.0]
     skin = Skin([SensorUnit("u", "b", T, touch=TouchPatch())], model)
     assert len(Run(controller_of(model, skin, OURS)).state.detector.cues[0].account) == 1
