@@ -30,25 +30,20 @@ def test_a_function_without_text_works_all_the_same():
     assert names["double"](1.5) == 3.0
 
 
-def test_where_nothing_can_be_kept_functions_work_all_the_same(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("numba.core.caching.CompileResultCacheImpl._locator_classes", [])
+def full(*_given: object) -> None:
+    raise OSError(28, "No space left on device")
+
+
+@pytest.mark.parametrize(
+    ("place", "how"), [("CompileResultCacheImpl._locator_classes", []), ("IndexDataCacheFile.save", full)]
+)
+def test_where_nothing_can_be_kept_and_on_a_full_disk_functions_work_all_the_same(monkeypatch, place, how):
+    monkeypatch.setattr(f"numba.core.caching.{place}", how)
 
     def half(x: float) -> float:
         return x / 2
 
     assert compiled.compiled(half)(3.0) == 1.5
-
-
-def test_a_full_disk_is_no_reason_to_stop(monkeypatch: pytest.MonkeyPatch):
-    def full(*_given: object) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr("numba.core.caching.IndexDataCacheFile.save", full)
-
-    def third(x: float) -> float:
-        return x / 3
-
-    assert compiled.compiled(third)(3.0) == 1.0
 
 
 def test_a_division_by_zero_is_a_number():

@@ -69,16 +69,6 @@ def test_a_reading_becomes_a_slower_command(arm: Arm):
     assert approach == pytest.approx(steps[-1].approach_limit[0] + steps[-1].qp.slack[0], abs=1e-9)
 
 
-def test_after_the_reading_is_gone_the_speed_comes_back_slowly(arm: Arm):
-    arm.run(30, seen={LEFT: 0.25})
-    # the point is kept for 0.06 s, then fades
-    scales = [s.speed_scale for s in arm.run(220)][7:]
-    assert scales[0] < 0.6
-    assert np.all(np.diff(scales) >= 0)
-    assert np.diff(scales).max() <= 1 / 200 + 1e-12
-    assert scales[-1] == 1.0
-
-
 @pytest.mark.parametrize("axis", range(3))
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_the_arm_moves_the_way_it_is_pushed(arm: Arm, axis: int, sign: float):
@@ -153,20 +143,6 @@ def test_a_silent_unit_first_slows_the_arm_then_stops_it_by_name(arm: Arm):
     # gently: the speed along the path grows from nothing, and the factor as after any obstacle
     assert np.linalg.norm(again.desired_velocity) < 0.05
     np.testing.assert_allclose([s.speed_scale for s in [again, *arm.run(3)]], np.arange(1, 5) / 200)
-
-
-def test_a_unit_heard_again_before_it_was_silent_gives_the_speed_back_slowly(arm: Arm):
-    low = arm.run(20, silent={RIGHT: np.inf})[-1].speed_scale
-    scales = [low, *(s.speed_scale for s in arm.run(210))]
-    # 0.5, then 0.5 / 200 each cycle
-    np.testing.assert_allclose(np.diff(scales)[:200], 0.5 / 200, atol=1e-9)
-    assert scales[-1] == 1.0
-
-
-def test_the_slower_of_silence_and_nearness_counts_not_their_product(arm: Arm):
-    steps = arm.run(20, seen={LEFT: 0.25}, silent={RIGHT: np.inf})
-    near = np.linalg.norm(steps[-1].obstacles.point[0] - steps[-1].ee_position) / 0.8
-    assert steps[-1].speed_scale == pytest.approx(min(near, 0.5))
 
 
 @pytest.mark.parametrize(("name", "tracks"), [("paper", 18), ("pretouch", 0)])

@@ -125,32 +125,22 @@ INDEX, FILE = "", "file:///a%20b/pretouch-0.2.0-py3-none-any.whl"
 
 
 @pytest.mark.parametrize(
-    ("maker", "origin", "extra", "lab"),
+    ("maker", "origin", "pip", "beside"),
     [
-        ("pip", INDEX, "/v/python -m pip install 'pretouch[live]'", "/v/python -m pip install 'pretouch-lab==0.2.0'"),
-        (
-            "pip",
-            FILE,
-            "/v/python -m pip install 'pretouch[live]'",
-            "/v/python -m pip install --find-links '/a b' 'pretouch-lab==0.2.0'",
-        ),
-        (
-            "uv",
-            INDEX,
-            "uv pip install --python /v/python 'pretouch[live]'",
-            "uv pip install --python /v/python 'pretouch-lab==0.2.0'",
-        ),
+        ("pip", INDEX, "/v/python -m pip install", ""),
+        ("pip", FILE, "/v/python -m pip install", "--find-links '/a b' "),
+        ("uv", INDEX, "uv pip install --python /v/python", ""),
     ],
 )
-def test_a_hint_is_for_what_made_the_environment(monkeypatch, tmp_path, maker, origin, extra, lab):
+def test_a_hint_is_for_what_made_the_environment(monkeypatch, tmp_path, maker, origin, pip, beside):
     monkeypatch.setattr(extras, "find_spec", lambda name: object() if maker == "pip" else None)
     monkeypatch.setattr(extras, "_CLONE", tmp_path)
     monkeypatch.setattr(extras, "_origin", lambda: origin)
     monkeypatch.setattr(extras, "_installed", lambda owner: owner != extras.LAB)
     monkeypatch.setattr(extras, "version", lambda owner: "0.2.0")
     monkeypatch.setattr(sys, "executable", "/v/python")
-    assert LIVE.command == extra
-    assert extras.install_command(extras.LAB) == lab
+    assert LIVE.command == f"{pip} 'pretouch[live]'"
+    assert extras.install_command(extras.LAB) == f"{pip} {beside}'pretouch-lab==0.2.0'"
 
 
 @pytest.mark.parametrize("extra", EXTRAS, ids=lambda extra: extra.name)

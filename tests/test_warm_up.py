@@ -37,14 +37,7 @@ def recorded(controller: Controller, monkeypatch: pytest.MonkeyPatch) -> list[Co
 
 @pytest.mark.parametrize("name", ["paper", "blind", "paper:approach.rows=hard", "paper:detect.compare=raw", "pretouch"])
 @pytest.mark.parametrize("rate", [100.0, 1000.0])
-def test_a_warm_up_sees_every_mode(
-    panda_model: RobotModel,
-    paper_skin: Skin,
-    robot: RobotState,
-    monkeypatch: pytest.MonkeyPatch,
-    name: str,
-    rate: float,
-):
+def test_a_warm_up_sees_every_mode(panda_model, paper_skin, robot: RobotState, monkeypatch, name: str, rate: float):
     controller = Controller(panda_model, paper_skin, no_fixtures(), Circle(), at_rate(profile(name), rate))
     steps = recorded(controller, monkeypatch)
     realtime.warm_up(controller, robot)

@@ -303,15 +303,6 @@ def test_the_paper_does_not_look_at_joint_torques(panda_model, paper_skin, name:
         assert (one.mode, one.reason) == (two.mode, two.reason)
 
 
-@pytest.mark.parametrize(
-    "change", ["clamp=none", "pinch=none", "give_up=none", "soft_hold=no", "lag_s=0", "static_friction_nm=0"]
-)
-def test_each_of_its_parts_can_be_left_out_alone(change: str):
-    name, _, text = change.partition("=")
-    ours, varied = PROFILES["pretouch"].react, profile(f"pretouch:react.{change}").react
-    assert varied == replace(ours, **{name: {"none": None, "no": False, "0": 0.0}[text]}) != ours
-
-
 def test_the_reaction_is_a_part_chosen_by_its_name():
     assert profile("pretouch:react=decay").react == PROFILES["paper"].react == DecayingVelocity()
     chosen = profile("paper:react=admittance:react.clamp=on:react.clamp.torque_nm=5")
