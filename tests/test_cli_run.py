@@ -117,19 +117,22 @@ def test_a_recording_that_is_there_is_not_written_over(tmp_path, capsys):
 
 
 @pytest.mark.slow
-def test_a_rehearsal_checks_confirms_announces_moves_and_reports(tmp_path, capsys):
-    assert cli.main([*BLIND, "--seconds", "0.3", "--yes", "--record", "a.mcap"]) == 0
+@pytest.mark.alone
+def test_a_rehearsal_checks_confirms_announces_goes_to_its_path_moves_and_reports(tmp_path, capsys):
+    words = "--no-skin", "--profile", "blind", "--path", "line", "--approach", "--seconds", "0.3", "--yes"
+    assert cli.main(["run", *words, "--record", "a.mcap"]) == 0
     said = capsys.readouterr().out
     order = [
         "All checks passed", "Push the hand gently", "towards +y", "towards +x", "towards +z",
-        "The force sign is confirmed", "keeps its end-effector at", "To stop it", "HOLD", "The arm is at rest.",
+        "The force sign is confirmed", "First the arm moves slowly", "To stop it", "HOLD", "The arm is at rest.",
         "a.mcap holds",
     ]  # fmt: skip
     places = [said.find(part) for part in order]
     assert -1 not in places
     assert places == sorted(places)
-    stamps = [kept.step.stamp for kept in open_recording(tmp_path / "a.mcap")]
-    assert stamps[-1] - stamps[0] >= 0.28  # a busy machine leaves out some cycles
+    steps = [kept.step for kept in open_recording(tmp_path / "a.mcap")]
+    assert np.linalg.norm(steps[0].ee_position - steps[0].path_position) < 0.02
+    assert steps[-1].stamp - steps[0].stamp >= 0.28  # a busy machine leaves out some cycles
     assert not (tmp_path / "state").exists()
 
 
@@ -137,13 +140,6 @@ def test_a_rehearsal_checks_confirms_announces_moves_and_reports(tmp_path, capsy
 def _no_pushes(monkeypatch):
     """The force sign counts as confirmed: pushes take seconds."""
     monkeypatch.setattr(GuidedPush, "confirm", lambda *_: None)
-
-
-@pytest.mark.usefixtures("_no_pushes")
-def test_a_folder_that_is_made_for_a_recording_is_said(tmp_path, capsys):
-    assert cli.main([*BLIND, "--seconds", "0.1", "--yes", "--record", "deep/er/a.mcap"]) == 0
-    assert "The folder deep/er was created for the recording." in capsys.readouterr().out
-    assert len(open_recording(tmp_path / "deep" / "er" / "a.mcap"))
 
 
 def test_a_damaged_note_of_confirmed_robots_is_found_before_the_checks(tmp_path, capsys, monkeypatch):
@@ -249,7 +245,7 @@ def test_an_arm_that_is_moved_while_a_person_is_asked_is_not_let_go(capsys, monk
 
 
 @pytest.mark.usefixtures("_no_pushes")
-def test_ctrl_c_after_the_report_waits_until_all_is_closed(capsys, monkeypatch):
+def test_ctrl_c_after_the_report_waits_until_all_is_closed(tmp_path, capsys, monkeypatch):
     close, closed = ThreadedArm.__exit__, []
 
     def interrupted(arm, *error):
@@ -258,9 +254,12 @@ def test_ctrl_c_after_the_report_waits_until_all_is_closed(capsys, monkeypatch):
         closed.append(arm)
 
     monkeypatch.setattr(ThreadedArm, "__exit__", interrupted)
-    assert cli.main([*BLIND, "--seconds", "0.1", "--yes"]) == 130
+    assert cli.main([*BLIND, "--seconds", "0.1", "--yes", "--record", "deep/er/a.mcap"]) == 130
     assert closed
-    assert "The arm is at rest." in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "The folder deep/er was created for the recording." in said
+    assert "The arm is at rest." in said
+    assert len(open_recording(tmp_path / "deep" / "er" / "a.mcap"))
     assert cli.main([*BLIND, "--seconds", "-1"]) == 2
 
 
@@ -327,15 +326,3 @@ def test_units_that_fall_silent_in_the_middle_are_named_and_the_arm_holds(tmp_pa
     assert any(step.mode is Mode.TRACK for step in steps)
     assert steps[-1].mode is Mode.HOLD
     assert not steps[-1].command.any()
-
-
-@pytest.mark.usefixtures("_no_pushes")
-@pytest.mark.slow
-@pytest.mark.alone
-def test_an_approach_leads_to_where_the_path_begins(tmp_path, capsys):
-    words = "--no-skin", "--profile", "blind", "--path", "line", "--approach", "--seconds", "0.5", "--yes"
-    assert cli.main(["run", *words, "--record", "a.mcap"]) == 0
-    said = capsys.readouterr().out
-    assert "First the arm moves slowly" in said
-    step = open_recording(tmp_path / "a.mcap")[0].step
-    assert np.linalg.norm(step.ee_position - step.path_position) < 0.02
