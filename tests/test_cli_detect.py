@@ -52,23 +52,18 @@ def test_of_a_recording_of_units_it_is_said_what_can_be_done_with_it(tmp_path):
     assert len(str(caught.value)) < 300
 
 
-def test_profiles_stand_side_by_side(capsys, file):
-    detect(file, Choice(), ("paper", "paper:detect.f_base_n=31"))
+def test_profiles_stand_side_by_side_and_their_figure_and_numbers_are_written(capsys, file, tmp_path):
+    figure, numbers, names = tmp_path / "new" / "a.png", tmp_path / "a.json", ("paper", "paper:detect.f_base_n=31")
+    detect(file, Choice(), names, out=figure, json_file=numbers)
     said = capsys.readouterr().out
     assert "paper and paper:detect.f_base_n=31: 0 contacts in both, 3 only in paper, 0 only in" in said
     assert "paper:detect.f_base_n=31: no contact in 0.2 min" in said
     assert "time [s]" in said
-
-
-def test_the_figure_and_the_numbers_are_written(capsys, file, tmp_path):
-    figure, numbers = tmp_path / "new" / "a.png", tmp_path / "a.json"
-    detect(file, Choice(), ("paper", "blind"), out=figure, json_file=numbers)
-    said = capsys.readouterr().out
     assert f"Figure: {figure}" in said
     assert f"Numbers: {numbers}" in said
     assert imread(figure).std() > 0.05
     told = json.loads(numbers.read_text())
-    assert [p["profile"] for p in told["profiles"]] == ["paper", "blind"]
+    assert [p["profile"] for p in told["profiles"]] == list(names)
     assert [c["axes"] for c in told["profiles"][0]["contacts"]] == ["y", "x", "z"]
     assert told["rate_hz"] == pytest.approx(100.0)
     push = told["profiles"][0]["contacts"][0]

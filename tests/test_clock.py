@@ -37,29 +37,23 @@ def fake_time(monkeypatch: pytest.MonkeyPatch) -> FakeTime:
     return fake
 
 
-def test_a_late_caller_gets_one_tick_at_once_and_the_rest_are_counted(fake_time: FakeTime):
+@pytest.mark.parametrize(
+    ("now", "ticks", "missed"),
+    [
+        (100.035, [100.035, 100.04, 100.05], 2),  # 100.01 and 100.02 went by unused, 100.03 is taken now
+        (100.019, [100.019, 100.02], 0),
+    ],
+)
+def test_a_late_caller_gets_one_tick_at_once_and_the_rest_are_counted(fake_time, now, ticks, missed):
     clock = MonotonicClock(0.01)
     clock.tick()  # at 100.00; the next ticks are 100.01, 100.02, ...
-    fake_time.now = 100.035
-    fake_time.slept = 0.0
-    # 100.01 and 100.02 went by unused, 100.03 is taken now
-    assert clock.tick() == pytest.approx(100.035)
+    fake_time.now = now
+    assert clock.tick() == pytest.approx(ticks[0])
     assert fake_time.slept == 0.0
-    assert clock.missed == 2
+    assert (clock.missed, clock.overruns) == (missed, 1)
     # then in step again, without a burst
-    assert clock.tick() == pytest.approx(100.04)
-    assert clock.tick() == pytest.approx(100.05)
-    assert clock.missed == 2
-
-
-def test_a_little_late_is_not_missed(fake_time: FakeTime):
-    clock = MonotonicClock(0.01)
-    clock.tick()
-    fake_time.now = 100.019
-    assert clock.tick() == pytest.approx(100.019)
-    assert clock.tick() == pytest.approx(100.02)
-    assert clock.missed == 0
-    assert clock.overruns == 1
+    assert [clock.tick() for _ in ticks[1:]] == pytest.approx(ticks[1:])
+    assert (clock.missed, clock.overruns) == (missed, 1)
 
 
 def test_time_between_making_a_clock_and_its_first_tick_is_not_missed(fake_time: FakeTime):

@@ -19,7 +19,7 @@ def controller(panda_model: RobotModel, paper_skin: Skin) -> Controller:
 
 
 class Arm:
-    """A robot and its clock, which keep what they are told and fail at some ticks and commands, by number."""
+    """A robot that cannot be read and its clock; they keep what they are told, and fail at some numbers of calls."""
 
     def __init__(self, bad_ticks: range = range(0), bad_commands: range = range(0)) -> None:
         self.bad_ticks, self.bad_commands = bad_ticks, bad_commands
@@ -39,10 +39,11 @@ class Arm:
         self.sent.append(qd)
 
     def assert_braked(self, limits: JointLimits) -> None:
-        """From full speed, to rest."""
+        """From full speed, to rest; every command is slower than the one before, none more is sent to who stands."""
         np.testing.assert_array_equal(self.sent[-1], 0.0)
-        change = np.abs(np.diff([limits.qd_max, *self.sent], axis=0)).max(axis=0) / limits.period
-        assert np.all(change <= limits.qdd_max * (1 + 1e-9))
+        sent = np.array([limits.qd_max, *self.sent])
+        assert np.all(np.abs(np.diff(sent, axis=0)).max(axis=0) <= limits.qdd_max * limits.period * (1 + 1e-9))
+        assert np.all(np.diff(np.linalg.norm(sent, axis=1)) < 0)
 
 
 @pytest.mark.parametrize("rate", [30.0, 100.0, 1000.0, 4000.0])
@@ -51,6 +52,8 @@ def test_an_arm_at_full_speed_comes_to_rest_at_any_rate(panda_model: RobotModel,
     arm = Arm()
     loop.come_to_rest(limits, arm, arm, panda_model.q_mid, limits.qd_max)
     arm.assert_braked(limits)
+    loop.come_to_rest(limits, arm, arm, panda_model.q_mid, np.zeros(7))
+    assert arm.ticks == len(arm.sent), "at rest it is told nothing"
 
 
 def test_a_speed_that_is_no_number_is_not_braked_for_ever(controller: Controller):

@@ -27,16 +27,6 @@ def speed(arm: Arm, step: ControlStep) -> np.ndarray:
     return (arm.model.ee_jacobian(arm.model.kinematics(step.q)) @ step.command)[:3]
 
 
-def test_the_arm_holds_until_the_window_is_full(panda_model: RobotModel, paper_skin: Skin):
-    arm = Arm(panda_model, paper_skin)
-    steps = arm.run(101)
-    assert {s.mode for s in steps[:100]} == {Mode.HOLD}
-    assert "99 of 100 samples" not in steps[100].reason
-    assert steps[100].mode is Mode.TRACK
-    assert not np.any(steps[99].command)
-    assert [s.armed for s in steps[99:]] == [False, True]
-
-
 def test_the_arm_follows_its_path_at_the_speed_asked(arm: Arm):
     steps = arm.run(60)
     assert {s.mode for s in steps} == {Mode.TRACK}
@@ -113,18 +103,6 @@ def test_after_a_reaction_the_arm_returns_gently(arm: Arm):
     speeds = [0.0, *(np.linalg.norm(s.desired_velocity) for s in back)]
     assert np.diff(speeds).max() <= 0.01 + 1e-12
     assert max(speeds) == pytest.approx(0.3)
-
-
-def test_a_latched_arm_goes_on_only_when_a_person_resumes(arm: Arm):
-    held = arm.step(change=lambda robot: replace(robot, q=robot.q * np.nan))
-    assert held.mode is Mode.HOLD
-    assert "joint positions" in held.reason
-    later = arm.run(100)
-    assert {(s.mode, s.reason) for s in later} == {(Mode.HOLD, held.reason)}
-    assert not np.any(later[-1].command)
-    # not even a push moves it
-    assert arm.step(force=(0.0, 50.0, 0.0)).mode is Mode.HOLD
-    assert arm.step(resume=True).mode is not Mode.HOLD
 
 
 def test_a_silent_unit_first_slows_the_arm_then_stops_it_by_name(arm: Arm):

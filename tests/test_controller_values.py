@@ -57,16 +57,10 @@ def test_a_path_that_hands_out_its_own_memory_changes_no_step(panda_model: Robot
 
 @pytest.mark.parametrize("seen", [True, False])
 def test_after_a_clock_set_back_with_a_broken_state_the_arm_sees_again(arm: Arm, seen: bool):
-    broken = replace(arm.robot(), qd=np.full(7, np.nan))
     arm.time = 0.5
-    held, arm.state = arm.controller.step(arm.state, Inputs(0.5, replace(broken, stamp=0.5), arm.readings()))
-    assert held.mode is Mode.HOLD
-    for i in range(40):
-        arm.time = 0.51 + 0.01 * i
-        readings = (
-            arm.readings(dict.fromkeys(range(7), 0.05)) if seen else arm.readings(silent=dict.fromkeys(range(7), 1.0))
-        )
-        step, arm.state = arm.controller.step(arm.state, Inputs(arm.time, arm.robot(), readings, resume=True))
+    assert arm.step(change=lambda robot: replace(robot, qd=np.full(7, np.nan))).mode is Mode.HOLD
+    units = dict.fromkeys(range(7), 0.05 if seen else 1.0)
+    step = arm.run(40, resume=True, **{"seen" if seen else "silent": units})[-1]
     if seen:
         assert step.speed_scale < 0.3
     else:

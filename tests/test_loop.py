@@ -15,7 +15,7 @@ from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import PROFILES
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.types import ControlStep, Inputs, Mode, RangeReadings, RangeStatus, RobotState
+from pretouch.types import ControlStep, Mode, RangeReadings, RangeStatus, RobotState
 
 DT = 0.01
 PAPER = PROFILES["paper"]
@@ -111,12 +111,6 @@ def test_the_loop_commands_each_step_and_ends_when_done_says_so(controller: Cont
     assert_brought_to_rest(world)
 
 
-def test_an_arm_at_rest_needs_no_braking(controller: Controller, world: World):
-    turn(controller, world, FakeRecorder(), lambda step: True)
-    np.testing.assert_array_equal(world.qd, 0.0)
-    assert len(world.held) <= 3
-
-
 @pytest.mark.parametrize("error", [KeyboardInterrupt(), RuntimeError("the disk is full")])
 @pytest.mark.parametrize("where", ["record", "read", "command"])
 def test_an_interrupt_or_error_brings_the_arm_to_rest_and_is_passed_on(
@@ -176,28 +170,6 @@ def test_no_start_from_a_state_that_is_not_finite(
     monkeypatch.setattr(world, "command", lambda qd: pytest.fail("no command is due"))
     with pytest.raises(RobotStateError, match=f"cannot start: .*{called} .*{value}.*: check the connection"):
         turn(controller, world, FakeRecorder(), never)
-
-
-def test_the_arm_is_brought_to_rest_without_asking_where_it_is(
-    controller: Controller, world: World, monkeypatch: pytest.MonkeyPatch
-):
-    state = controller.init(world.read())
-    for _ in range(50):
-        now = world.tick()
-        step, state = controller.step(state, Inputs(now, world.read(), world.skin().read()))
-        world.command(step.command)
-    last, sent = world.read(), [step.command]
-    monkeypatch.setattr(world, "read", lambda: pytest.fail("it is asked"))
-    monkeypatch.setattr(world, "command", lambda qd: (sent.append(qd), World.command(world, qd)))
-    loop.come_to_rest(controller.limits, world, world, last.q_commanded, step.command)
-    assert_brought_to_rest(world)
-    # every command slower than the one before, and none more once the arm stands
-    assert np.all(np.diff(np.linalg.norm(sent, axis=1)) < 0)
-    assert np.any(sent[-2])
-    # again, from rest: nothing to send
-    count = len(sent)
-    loop.come_to_rest(controller.limits, world, world, last.q_commanded, np.zeros(7))
-    assert len(sent) == count
 
 
 @pytest.mark.parametrize("asked", [True, False])

@@ -14,7 +14,7 @@ from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import PROFILES, at_rate
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.types import ControlStep, Inputs, Mode, RangeReadings, RobotState
+from pretouch.types import ControlStep, Mode, RangeReadings, RobotState
 from tests import test_loop
 
 DT = 0.001
@@ -109,19 +109,3 @@ def test_a_state_too_old_latches(panda_model: RobotModel, paper_skin: Skin):
     assert modes[-1] is Mode.HOLD
     assert "0.060 s old, for this machine is busy" in world.steps[-1].reason
     assert_within_limits(panda_model, world)
-
-
-def test_readings_older_than_the_last_ones_are_no_news(panda_model: RobotModel, paper_skin: Skin):
-    """A radio that delivers a reading twice, or two in the wrong order, moves no obstacle back."""
-    controller = Controller(panda_model, paper_skin, no_fixtures(), Circle(), at_rate(BRISK, 1 / DT))
-    world = World(panda_model, len(paper_skin))
-    state, k = controller.init(world.read()), len(paper_skin)
-    seen = []
-    for stamp, distance in ((0.001, 0.3), (0.003, 0.2), (0.002, 0.4), (0.003, 0.5)):
-        world.tick()
-        readings = RangeReadings(np.full(k, stamp), np.full(k, distance), np.zeros(k, np.int64))
-        step, state = controller.step(state, Inputs(max(world.now, stamp), world.read(), readings))
-        seen.append(step.obstacles.point)
-    assert len(seen[1]) > 0
-    np.testing.assert_allclose(seen[2], seen[1])
-    np.testing.assert_allclose(seen[3], seen[1])

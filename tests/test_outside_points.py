@@ -17,11 +17,12 @@ from pretouch.recording.verify import verify
 from pretouch.recording.writer import Recording
 from pretouch.sensing.skin import Skin
 from pretouch.types import Mode, SeenPoints
-from tests.following_arm import Arm
+from tests.following_arm import PAPER, Arm
 from tests.fuzz.invariants import same
 from tests.recording.runs import Run, controller_of
 
 PRETOUCH = PROFILES["pretouch"]
+DEAF = replace(PRETOUCH, perception=replace(PRETOUCH.perception, outside=None))
 
 
 def seen(now: float, *point, sigma: float = 0.005) -> SeenPoints:
@@ -29,20 +30,15 @@ def seen(now: float, *point, sigma: float = 0.005) -> SeenPoints:
     return SeenPoints(now, np.full(len(at), now), at, np.full(len(at), sigma))
 
 
-def test_a_profile_that_takes_no_points_does_the_same_to_the_bit_with_and_without(panda_model, paper_skin):
-    plain, given = Arm(panda_model, paper_skin), Arm(panda_model, paper_skin)
+@pytest.mark.parametrize(("one", "other", "given"), [(PAPER, PAPER, True), (PRETOUCH, DEAF, False)])
+def test_a_profile_that_takes_no_points_and_one_without_a_source_do_the_same_to_the_bit(
+    panda_model, paper_skin, one, other, given
+):
+    plain, beside = Arm(panda_model, paper_skin, one), Arm(panda_model, paper_skin, other)
     for _ in range(150):
-        one, other = plain.step(), given.step(points=seen(given.time, given.ee() + np.array([0.0, 0.2, 0.0])))
-        assert same(one, other)
-    assert same(plain.state, given.state)
-
-
-def test_pretouch_without_a_source_does_the_same_to_the_bit_whatever_is_kept_of_points(panda_model, paper_skin):
-    off = replace(PRETOUCH, perception=replace(PRETOUCH.perception, outside=None))
-    arms = [Arm(panda_model, paper_skin, profile) for profile in (PRETOUCH, off)]
-    for _ in range(150):
-        assert same(*(arm.step() for arm in arms))
-    assert same(arms[0].state, arms[1].state)
+        points = seen(beside.time, beside.ee() + np.array([0.0, 0.2, 0.0])) if given else None
+        assert same(plain.step(), beside.step(points=points))
+    assert same(plain.state, beside.state)
 
 
 @pytest.mark.parametrize("units", [7, 0])

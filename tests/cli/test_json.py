@@ -14,8 +14,8 @@ from pretouch.cli.registry import command_class, command_names
 from pretouch.cli.writing import numbers_to
 from pretouch.recording.writer import Recording
 from pretouch.session.push import GuidedPush
-from tests.following_arm import DT, Arm
-from tests.imported_data.files import pushed
+from tests.following_arm import Arm
+from tests.imported_data.files import force_columns, pushed, write_csv
 from tests.importing.made import six_axis, written
 
 
@@ -53,10 +53,7 @@ def files(tmp_path_factory, panda_model, paper_skin):
     """A folder with a force, an arm, keys, and a recording with a push."""
     folder = tmp_path_factory.mktemp("files")
     forces = pushed(5.0, ((2.0, 0.6, (0.0, 40.0, 0.0)),))
-    np.savetxt(
-        folder / "force.csv", np.column_stack([DT * np.arange(len(forces)), np.array(forces)[:, :3]]), delimiter=",",
-        header="time_s,force_x_N,force_y_N,force_z_N", comments="",
-    )  # fmt: skip
+    write_csv(folder / "force.csv", force_columns(forces))
     arm = Arm(panda_model, paper_skin)
     with Recording(folder / "run.mcap", arm.controller) as recording:
         for sample in forces:
