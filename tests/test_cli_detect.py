@@ -89,7 +89,6 @@ def test_a_rate_is_that_of_the_detector(capsys, tmp_path):
         ({"rate": 10.0}, ParameterError, "The rate is 10 Hz"),
         ({"out": "a.gif"}, RecordingError, "a.gif has an unknown format"),
         ({"out": "/dev/null/a.png"}, PretouchError, "/dev/null/a.png cannot be written"),
-        ({"json_file": "/dev/null/a.json"}, PretouchError, "/dev/null/a.json cannot be written"),
         ({"place": "gone.csv"}, RecordingError, "The recording gone.csv does not exist"),
     ],
 )

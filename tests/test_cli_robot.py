@@ -8,12 +8,17 @@ from tests.importing.made import six_axis, written
 READY = "0,0.3,1.2,0,1.6,0"
 
 
+def imported(folder, *more):
+    """Import an arm of six axes to a folder's `out`, by the options of somebody in a hurry and more."""
+    told = ["robot", "import", str(written(folder, six_axis())), "--out", str(folder / "out"), "--capsules", "1"]
+    return main([*told, *more])
+
+
 @pytest.fixture(scope="module")
 def arm(tmp_path_factory):
     """An imported arm's folder; tests change copies of it."""
     folder = tmp_path_factory.mktemp("arm")
-    told = ["robot", "import", str(written(folder, six_axis())), "--capsules", "1", "--ready", READY]
-    assert main([*told, "--out", str(folder / "out")]) == 0
+    assert imported(folder, "--ready", READY) == 0
     return folder / "out"
 
 
@@ -27,20 +32,18 @@ def changed(arm, folder, name, old, new):
 
 
 def test_an_arm_is_imported_checked_and_reported(tmp_path, capsys):
-    file = written(tmp_path, six_axis())
-    out, numbers = tmp_path / "mine", tmp_path / "fit.json"
-    told = ["robot", "import", str(file), "--out", str(out), "--ready", READY, "--json", str(numbers)]
-    told += ["--capsules", "1"]
-    assert main(told) == 0
+    numbers = tmp_path / "fit.json"
+    told = tmp_path, "--ready", READY, "--json", str(numbers)
+    assert imported(*told) == 0
     printed = capsys.readouterr().out
     for part in ("sixer: 6 joints, end-effector tool0", "stand over", "sticks out", "manipulability", "Written: "):
         assert part in printed
     assert "of its capsules most, by" in printed
     assert "raise approach.d_repulse_m by as much, or import with --cover" in printed
     assert json.loads(numbers.read_text())["links"]["link1"]["sticks_out_m"] > 1e-3
-    assert main(["robot", "check", str(out)]) == 0
+    assert main(["robot", "check", str(tmp_path / "out")]) == 0
     assert "No problem found" in capsys.readouterr().out
-    assert main(told) == 2
+    assert imported(*told) == 2
     assert "exists already: give another --out, or remove it" in capsys.readouterr().err
 
 
@@ -64,7 +67,7 @@ def test_a_folder_of_the_arms_own_name_is_refused_before_anything_is_fitted(tmp_
     ],
 )
 def test_misuse_is_one_sentence(tmp_path, capsys, more, sentence):
-    assert main(["robot", "import", str(written(tmp_path, six_axis())), "--out", str(tmp_path / "o"), *more]) == 2
+    assert imported(tmp_path, *more) == 2
     error = capsys.readouterr().err
     assert sentence in error
     assert len(error.strip().splitlines()) == 1
@@ -90,10 +93,9 @@ def test_an_arm_that_is_not_in_order_is_refused_with_the_file_and_the_key(
 
 
 def test_a_ready_posture_that_is_not_clear_is_said_and_the_import_is_kept(tmp_path, capsys):
-    told = ["robot", "import", str(written(tmp_path, six_axis())), "--capsules", "1", "--out", str(tmp_path / "o")]
-    assert main([*told, "--ready", "0,0,2.7,0,2.7,0"]) == 0
+    assert imported(tmp_path, "--ready", "0,0,2.7,0,2.7,0") == 0
     assert "mm: choose another posture" in capsys.readouterr().out
-    assert main(["robot", "check", str(tmp_path / "o")]) == 2
+    assert main(["robot", "check", str(tmp_path / "out")]) == 2
 
 
 def test_a_folder_that_is_no_arm_is_said(tmp_path, capsys):

@@ -25,14 +25,23 @@ from pretouch.session.push import GuidedPush, PushParams
 from pretouch.types import Mode
 from tests.other_arm import copied_panda
 
+CONFIRM = GuidedPush.confirm
 BLIND = ("run", "--no-skin", "--profile", "blind", "--path", "hold")
 
 
 @pytest.fixture(autouse=True)
 def _state_of_its_own(tmp_path, monkeypatch):
+    """A folder of its own, in which the force sign counts as confirmed: pushes take seconds."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     monkeypatch.setattr("pretouch.cli.run.command.PREFLIGHT", PreflightParams(watch_s=1.0))
+    monkeypatch.setattr(GuidedPush, "confirm", lambda *_: None)
     monkeypatch.chdir(tmp_path)
+
+
+@pytest.fixture
+def _pushes(monkeypatch):
+    """The force sign has to be confirmed."""
+    monkeypatch.setattr(GuidedPush, "confirm", CONFIRM)
 
 
 def at_begin(monkeypatch, seconds, then):
@@ -118,6 +127,7 @@ def test_a_recording_that_is_there_is_not_written_over(tmp_path, capsys):
 
 @pytest.mark.slow
 @pytest.mark.alone
+@pytest.mark.usefixtures("_pushes")
 def test_a_rehearsal_checks_confirms_announces_goes_to_its_path_moves_and_reports(tmp_path, capsys):
     words = "--no-skin", "--profile", "blind", "--path", "line", "--approach", "--seconds", "0.3", "--yes"
     assert cli.main(["run", *words, "--record", "a.mcap"]) == 0
@@ -136,12 +146,6 @@ def test_a_rehearsal_checks_confirms_announces_goes_to_its_path_moves_and_report
     assert not (tmp_path / "state").exists()
 
 
-@pytest.fixture
-def _no_pushes(monkeypatch):
-    """The force sign counts as confirmed: pushes take seconds."""
-    monkeypatch.setattr(GuidedPush, "confirm", lambda *_: None)
-
-
 def test_a_damaged_note_of_confirmed_robots_is_found_before_the_checks(tmp_path, capsys, monkeypatch):
     place = tmp_path / "state" / "pretouch" / "force-sign.json"
     place.parent.mkdir(parents=True)
@@ -154,7 +158,6 @@ def test_a_damaged_note_of_confirmed_robots_is_found_before_the_checks(tmp_path,
     assert "checks" not in shown.out
 
 
-@pytest.mark.usefixtures("_no_pushes")
 def test_a_recording_that_fails_in_the_middle_is_told_at_once_and_by_the_exit_code(capsys, monkeypatch):
     at_begin(monkeypatch, 0.2, lambda _: monkeypatch.setattr(Recording, "trouble", "The disk is full."))
     assert cli.main([*BLIND, "--seconds", "1", "--yes", "--record", "a.mcap"]) == 1
@@ -171,7 +174,6 @@ LEARNING = (
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("_no_pushes")
 def test_a_second_run_begins_with_what_the_first_learnt_and_can_be_recomputed(tmp_path, capsys):
     place = tmp_path / "state" / "pretouch" / "free-motion" / "simulated-panda-seed-0.toml"
     for name in ("a", "b"):
@@ -192,7 +194,6 @@ def test_a_second_run_begins_with_what_the_first_learnt_and_can_be_recomputed(tm
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("_no_pushes")
 def test_what_was_learnt_is_kept_after_ctrl_c_in_the_file_that_was_named(tmp_path, capsys, monkeypatch):
     at_begin(monkeypatch, 3.0, lambda _: os.kill(os.getpid(), signal.SIGINT))
     assert cli.main([*LEARNING, "--learnt", "arms/mine.toml"]) == 130
@@ -211,7 +212,6 @@ def test_a_named_file_of_free_motion_must_be_one_and_the_profile_must_learn(tmp_
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("_no_pushes")
 def test_an_approach_that_is_broken_off_is_reported_and_no_refusal(tmp_path, capsys, monkeypatch):
     def fail(arm):
         arm._failure = "its power failed"
@@ -226,7 +226,6 @@ def test_an_approach_that_is_broken_off_is_reported_and_no_refusal(tmp_path, cap
     assert not list((tmp_path / "runs").glob("**/*"))
 
 
-@pytest.mark.usefixtures("_no_pushes")
 def test_an_arm_that_is_moved_while_a_person_is_asked_is_not_let_go(capsys, monkeypatch):
     read, turned = ThreadedArm.read, []
 
@@ -244,7 +243,6 @@ def test_an_arm_that_is_moved_while_a_person_is_asked_is_not_let_go(capsys, monk
     assert "The arm moved after the checks" in capsys.readouterr().err
 
 
-@pytest.mark.usefixtures("_no_pushes")
 def test_ctrl_c_after_the_report_waits_until_all_is_closed(tmp_path, capsys, monkeypatch):
     close, closed = ThreadedArm.__exit__, []
 
@@ -263,7 +261,6 @@ def test_ctrl_c_after_the_report_waits_until_all_is_closed(tmp_path, capsys, mon
     assert cli.main([*BLIND, "--seconds", "-1"]) == 2
 
 
-@pytest.mark.usefixtures("_no_pushes")
 def test_without_a_terminal_nobody_lets_the_arm_move(capsys, monkeypatch):
     monkeypatch.setattr("sys.stdin", io.StringIO("y\n"))
     assert cli.main([*BLIND, "--seconds", "1"]) == 2
@@ -273,6 +270,7 @@ def test_without_a_terminal_nobody_lets_the_arm_move(capsys, monkeypatch):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("_pushes")
 def test_a_wrong_sign_is_refused_before_anything_moves(capsys, monkeypatch):
     read, began = ThreadedArm.read, []
 
@@ -287,6 +285,7 @@ def test_a_wrong_sign_is_refused_before_anything_moves(capsys, monkeypatch):
     assert not began
 
 
+@pytest.mark.usefixtures("_pushes")
 def test_without_a_push_nothing_moves(capsys, monkeypatch):
     monkeypatch.setattr(ThreadedArm, "push", lambda *_: None)
     monkeypatch.setattr("pretouch.cli.run.command.PUSH", PushParams(timeout_s=0.5))
@@ -294,7 +293,6 @@ def test_without_a_push_nothing_moves(capsys, monkeypatch):
     assert "No clear push towards +y" in capsys.readouterr().err
 
 
-@pytest.mark.usefixtures("_no_pushes")
 @pytest.mark.slow
 @pytest.mark.alone
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGHUP, 129)])
@@ -310,7 +308,6 @@ def test_a_signal_in_the_middle_brings_the_arm_to_rest_and_files_are_whole(tmp_p
     assert np.linalg.norm(recorded[len(recorded) - 1].step.ee_velocity) > 0.1
 
 
-@pytest.mark.usefixtures("_no_pushes")
 @pytest.mark.slow
 @pytest.mark.alone
 def test_units_that_fall_silent_in_the_middle_are_named_and_the_arm_holds(tmp_path, capsys, monkeypatch):

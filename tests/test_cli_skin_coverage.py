@@ -72,7 +72,6 @@ def test_an_imported_arm_gets_its_first_units(tmp_path, capsys):
         (["--workspace", "moon"], "The workspace is 'moon': give circle"),
         (["--suggest", "400", "--postures", "2"], "400 more units were requested, but"),
         (["--suggest", "1", "--sensor", "sonar"], "--sensor has the sensor 'sonar': choose from"),
-        (["no-such.toml"], "The skin file no-such.toml cannot be read"),
         (["--arm", "no-such-arm"], "no-such-arm"),
         (["--json", "a.json", "--figure", "a.json/b.png"], "is also another input or output file"),
     ],
