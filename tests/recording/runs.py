@@ -1,9 +1,9 @@
 """Runs to record: an arm that follows commands exactly, what its units and its force estimate say drawn from a seed."""
 
-import struct
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from mcap.reader import make_reader
@@ -95,20 +95,30 @@ def changed(
     place: Path,
     change: Callable[[str, int, bytes], bytes | None] = lambda topic, number, data: data,
     schema: Callable[[str, bytes], bytes] = lambda topic, text: text,
+    per_chunk: int = 1_000_000,
+    **options: Any,
 ) -> Path:
-    """Write a recording anew, its messages changed by topic and number (None leaves one out), or their definitions."""
+    """Write a recording anew as another tool does, so many messages to a chunk; `options` go to its writer.
+
+    Messages are changed by topic and number (None leaves one out), definitions by topic.
+    """
     with source.open("rb") as old, place.open("wb") as new:
-        writer = Writer(new)
-        writer.start("ros2")
+        writer = Writer(new, **options)
+        writer.start("ros2", "another tool")
         channels: dict[str, int] = {}
-        for kind, channel, message in make_reader(old).iter_messages(log_time_order=False):
+        schemas: dict[int, int] = {}
+        for i, (kind, channel, message) in enumerate(make_reader(old).iter_messages(log_time_order=False)):
             topic = channel.topic
+            data = change(topic, int.from_bytes(message.data[4:12], "little"), message.data)
+            if data is None:
+                continue
+            if kind.id not in schemas:
+                schemas[kind.id] = writer.register_schema(kind.name, "ros2msg", schema(topic, kind.data))
             if topic not in channels:
-                number = writer.register_schema(kind.name, "ros2msg", schema(topic, kind.data))
-                channels[topic] = writer.register_channel(topic, "cdr", number)
-            data = change(topic, struct.unpack_from("<Q", message.data, 4)[0], message.data)
-            if data is not None:
-                writer.add_message(channels[topic], message.log_time, data, message.log_time)
+                channels[topic] = writer.register_channel(topic, "cdr", schemas[kind.id])
+            writer.add_message(channels[topic], message.log_time, data, message.publish_time)
+            if i % per_chunk == per_chunk - 1:
+                writer.flush()
         writer.finish()
     return place
 
@@ -122,18 +132,3 @@ def steps_changed(source: Path, place: Path, changes: dict[int, Callable[[Contro
         return encoded_step(number, changes[number](step_of(data)))
 
     return changed(source, place, change)
-
-
-class Spiral:
-    """A path of a class that no recording knows."""
-
-    length, closed = 1.0, False
-
-    def __init__(self, start):
-        self.start = start
-
-    def point(self, phase):
-        return self.start + np.array([0.0, 0.5 * phase * np.cos(phase), 0.1 * phase])
-
-    def tangent(self, phase):
-        return np.array([0.0, np.cos(phase), np.sin(phase)])

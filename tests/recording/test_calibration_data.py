@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pretouch.errors import RecordingError
 from pretouch.hardware.traffic import Received, imu_batch
 from pretouch.hardware.wire import IMU_SAMPLE, imu_values
 from pretouch.loop import Cycle
@@ -13,7 +12,7 @@ from pretouch.recording.calibration_data import read_measured
 from pretouch.recording.skin_recording import SkinRecording
 from pretouch.recording.writer import Recording
 from pretouch.sensing.imu_scale import ACCELERATION_LSB, ANGULAR_RATE_LSB
-from tests.recording.runs import Run, controller_of
+from tests.recording.runs import Run
 from tests.recording.test_skin_recording import BATCH, arrival, sample
 
 NAMES = tuple(f"panda_joint{i}" for i in range(1, 8))
@@ -72,10 +71,8 @@ def test_full_scales_are_the_largest_values_a_sensor_can_tell(tmp_path, accelera
 
 
 def test_of_two_scales_the_smaller_is_the_full_scale_and_one_there_is_not_is_left_out(tmp_path):
-    found = recorded(
-        tmp_path / "a.mcap", [heard(1, imu_scale=0x21), heard(2, imu_scale=0x42), heard(3, imu_scale=0x51)]
-    )
-    unit = found.units["hand/1"]
+    received = [heard(number, imu_scale=scale) for number, scale in ((1, 0x21), (2, 0x42), (3, 0x51))]
+    unit = recorded(tmp_path / "a.mcap", received).units["hand/1"]
     assert unit.acceleration_max == pytest.approx(4 * 9.80665, rel=1e-3)
     assert unit.angular_velocity_max == pytest.approx(np.deg2rad(573.4), rel=1e-3)
     assert unit.counters.index.tolist() == [BATCH, 2 * BATCH]
@@ -95,8 +92,8 @@ def test_a_unit_without_an_imu_is_left_out(tmp_path):
     assert found.joints is None
 
 
-def test_a_run_gives_the_joints_of_its_inputs_its_skin_and_what_imus_it_kept(tmp_path, panda_model, paper_skin):
-    run, rng = Run(controller_of(panda_model, paper_skin)), np.random.default_rng(1)
+def test_a_run_gives_the_joints_of_its_inputs_its_skin_and_what_imus_it_kept(tmp_path, controller, paper_skin):
+    run, rng = Run(controller), np.random.default_rng(1)
     at, a, w = 0.01 * np.arange(20), rng.normal(size=(20, 3)), rng.normal(size=(20, 3))
     with Recording(tmp_path / "run.mcap", run.controller) as recording:
         for _ in range(30):
@@ -117,9 +114,9 @@ def test_a_run_gives_the_joints_of_its_inputs_its_skin_and_what_imus_it_kept(tmp
     assert (unit.counters, unit.acceleration_max, unit.angular_velocity_max) == (None, np.inf, np.inf)
 
 
-def test_inputs_of_a_run_that_are_no_posture_are_left_out(tmp_path, panda_model, paper_skin):
-    run = Run(controller_of(panda_model, paper_skin))
-    with Recording(tmp_path / "run.mcap", run.controller) as recording:
+def test_inputs_of_a_run_that_are_no_posture_are_left_out(tmp_path, controller):
+    run = Run(controller)
+    with Recording(tmp_path / "run.mcap", controller) as recording:
         for number in range(8):
             cycle = run.turn()
             robot = cycle.inputs.robot
@@ -129,11 +126,3 @@ def test_inputs_of_a_run_that_are_no_posture_are_left_out(tmp_path, panda_model,
     found = read_measured(tmp_path / "run.mcap")
     kept = [run.cycles[i].inputs.robot.q for i in (0, 1, 3, 5, 7)]
     np.testing.assert_array_equal(found.joints.q, kept)
-
-
-def test_what_is_no_recording_of_ours_is_refused(tmp_path):
-    (tmp_path / "empty.mcap").touch()
-    (tmp_path / "text.mcap").write_text("text")
-    for name, words in (("none", "it does not exist"), ("empty", "is empty"), ("text", "is not an MCAP file")):
-        with pytest.raises(RecordingError, match=words):
-            read_measured(tmp_path / f"{name}.mcap")

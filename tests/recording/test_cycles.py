@@ -42,7 +42,7 @@ from pretouch.types import (
     Touched,
 )
 from tests.fuzz.invariants import same
-from tests.recording.runs import Run, controller_of
+from tests.recording.runs import Run
 
 NUMBER = st.floats(allow_nan=False)  # NaN with a payload is compared as NaN elsewhere
 NAN_TOO = st.one_of(NUMBER, st.just(float("nan")))
@@ -80,14 +80,8 @@ def steps(draw: st.DrawFn) -> ControlStep:
         draw(rows(k)), draw(rows(k)),
     )  # fmt: skip
     contact = st.builds(Contact, row, npst.arrays(np.bool_, 3))
-    qp = QpSolution(
-        draw(rows(n)),
-        draw(rows(m)),
-        draw(rows(n + m)),
-        draw(st.sampled_from(QpOutcome)),
-        draw(TEXT),
-        draw(st.booleans()),
-    )
+    outcome = draw(st.sampled_from(QpOutcome))
+    qp = QpSolution(draw(rows(n)), draw(rows(m)), draw(rows(n + m)), outcome, draw(TEXT), draw(st.booleans()))
     return ControlStep(
         stamp=draw(NAN_TOO), mode=draw(st.sampled_from(Mode)), event=draw(st.sampled_from(Event)), detail=draw(TEXT),
         reason=draw(TEXT), latched=draw(st.booleans()), q=draw(rows(n)),
@@ -158,8 +152,8 @@ class Hostile:
 
 
 @pytest.fixture(scope="module")
-def run(panda_model, paper_skin):
-    run = Run(controller_of(panda_model, paper_skin), seed=3)
+def run(controller):
+    run = Run(controller, seed=3)
     for _ in range(60):
         run.turn()
     return run
@@ -192,31 +186,15 @@ def test_inputs_that_cannot_be_kept_are_none_and_said(run, spoil):
     assert 0 < len(unreadable) < 5000
 
 
-@pytest.mark.parametrize("spoil", SPOILED[:3])
-def test_what_follows_inputs_that_cannot_be_kept_begins_anew(run, spoil):
-    cycles, (first, second, third) = Cycles(run.controller, {}), run.cycles[:3]
-    cycles.keep(Cycle(spoil(first.inputs), first.before, first.step, first.after))
-    assert cycles.keep(second).state is not None
-    assert cycles.keep(third).state is None
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        lambda i: replace(i, robot=replace(i.robot, q=np.zeros((7, 1)))),
-        lambda i: replace(i, robot=replace(i.robot, tau_ext=np.zeros((2, 3), np.float32))),
-        lambda i: replace(i, readings=replace(i.readings, status=np.zeros(7, np.uint8))),
-        lambda i: replace(i, readings=replace(i.readings, status=np.zeros(7))),
-    ],
-)
-def test_arrays_of_other_types_and_shapes_are_kept_as_they_are(change):
-    inputs = change(usual())
-    assert same(inputs_of(packed_inputs(inputs))[0], inputs)
-
-
 @pytest.mark.parametrize(
     ("change", "same_as"),
     [
+        *((change, change) for change in (
+            lambda i: replace(i, robot=replace(i.robot, q=np.zeros((7, 1)))),
+            lambda i: replace(i, robot=replace(i.robot, tau_ext=np.zeros((2, 3), np.float32))),
+            lambda i: replace(i, readings=replace(i.readings, status=np.zeros(7, np.uint8))),
+            lambda i: replace(i, readings=replace(i.readings, status=np.zeros(7))),
+        )),
         (lambda i: replace(i, stamp=1), lambda i: i),
         (lambda i: replace(i, stamp=np.float32(1.0)), lambda i: i),
         (lambda i: replace(i, robot=replace(i.robot, q=[0.0] * 7)), lambda i: i),
@@ -225,7 +203,9 @@ def test_arrays_of_other_types_and_shapes_are_kept_as_they_are(change):
          lambda i: replace(i, robot=replace(i.robot, tau_ext=np.zeros(0)))),
     ],
 )  # fmt: skip
-def test_numbers_of_other_types_are_kept_as_the_controller_takes_them(change, same_as):
+def test_arrays_of_other_types_and_shapes_are_kept_as_they_are_and_numbers_as_the_controller_takes_them(
+    change, same_as
+):
     assert same(inputs_of(packed_inputs(change(usual())))[0], same_as(usual()))
 
 
@@ -286,15 +266,11 @@ def test_an_array_of_another_type_than_its_field_is_refused(run):
 
 
 @pytest.mark.parametrize("name", OWN)
-def test_each_field_of_a_message_file_is_explained(name):
+def test_each_field_of_a_message_file_is_explained_and_the_definition_that_is_embedded_can_be_parsed_alone(name):
     lines = [line for line in own_definition(name).splitlines() if line]
     assert lines[0].startswith("#")
     assert all("#" in line for line in lines if line.split()[0] not in OWN)
     assert all(len(line) <= 120 for line in lines)
-
-
-@pytest.mark.parametrize("name", OWN)
-def test_the_definition_that_is_embedded_can_be_parsed_alone(name):
     for kind, defined in get_types_from_msg(definition(own(name)), own(name)).items():
         assert defined == messages().store.fielddefs[kind]
 

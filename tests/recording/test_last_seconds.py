@@ -17,11 +17,6 @@ from tests.fuzz.invariants import same
 from tests.recording.runs import SHORT, Run, controller_of
 
 
-@pytest.fixture(scope="module")
-def controller(panda_model, paper_skin):
-    return controller_of(panda_model, paper_skin)
-
-
 def broken(inputs):
     return replace(inputs, robot=replace(inputs.robot, q=np.full(7, np.nan)), resume=False)
 
@@ -34,11 +29,17 @@ def resumed(inputs):
     return replace(inputs, resume=True)
 
 
+def held(controller, folder, cycles, at, **more):
+    """A run that latches at one of its cycles, and what is kept of it."""
+    run = Run(controller)
+    with LastSeconds(controller, folder, **more) as kept:
+        for i in range(cycles):
+            kept.record(run.turn(broken if i == at else going_on))
+    return run, kept
+
+
 def test_a_latched_hold_leaves_its_last_seconds(controller, tmp_path):
-    run, kept = Run(controller), LastSeconds(controller, tmp_path / "holds", seconds=2.0)
-    for i in range(660):
-        kept.record(run.turn(broken if i == 650 else going_on))
-    kept.close()
+    run, kept = held(controller, tmp_path / "holds", 660, 650, seconds=2.0)
     assert kept.written == [tmp_path / "holds" / "hold-1.mcap"]
     assert kept.trouble == ""
     recorded = open_recording(kept.written[0])
@@ -79,11 +80,9 @@ def test_what_is_felt_and_seen_from_outside_is_kept_too(panda_model, paper_skin,
 
 def test_a_hold_that_clears_by_itself_leaves_nothing(controller, tmp_path):
     run, kept = Run(controller), LastSeconds(controller, tmp_path)
+    silent = lambda inputs: replace(inputs, readings=replace(inputs.readings, stamp=np.full(7, -1.0)))  # noqa: E731
     for i in range(60):
-        stamp = -1.0 if 20 <= i < 60 else None
-        silent = lambda inputs, stamp=stamp: inputs if stamp is None else replace(  # noqa: E731
-            inputs, readings=replace(inputs.readings, stamp=np.full(7, stamp)))  # fmt: skip
-        kept.record(run.turn(silent))
+        kept.record(run.turn(silent if i >= 20 else lambda inputs: inputs))
     kept.close()
     assert run.cycles[-1].step.mode is Mode.HOLD
     assert kept.written == []
@@ -91,10 +90,7 @@ def test_a_hold_that_clears_by_itself_leaves_nothing(controller, tmp_path):
 
 
 def test_a_run_that_ends_with_the_very_step_that_latches_is_kept(controller, tmp_path):
-    run = Run(controller)
-    with LastSeconds(controller, tmp_path) as kept:
-        for i in range(30):
-            kept.record(run.turn(broken if i == 29 else going_on))
+    held(controller, tmp_path, 30, 29)
     assert len(open_recording(tmp_path / "hold-1.mcap")) == 30
 
 
@@ -122,10 +118,10 @@ def test_what_is_recorded_is_handed_on(controller, tmp_path):
             kept.record(run.turn(broken if i == 30 else going_on))
         kept.close()
     assert len(open_recording(tmp_path / "all.mcap")) == 40
-    held = open_recording(tmp_path / "hold-1.mcap")
-    assert [each.profile.name for each in held.runs] == ["other"]
-    assert len(held) == 11
-    assert verify(held).agrees
+    found = open_recording(tmp_path / "hold-1.mcap")
+    assert [each.profile.name for each in found.runs] == ["other"]
+    assert len(found) == 11
+    assert verify(found).agrees
 
 
 def test_inputs_that_fit_no_message_and_arrays_used_again_are_no_trouble(controller, tmp_path):
@@ -134,19 +130,16 @@ def test_inputs_that_fit_no_message_and_arrays_used_again_are_no_trouble(control
         cycle = run.turn(lambda inputs, i=i: replace(inputs, robot=None) if i == 20 else going_on(inputs))
         kept.record(cycle)
         if i != 20:
-            cycle.inputs.robot.q[:] = 9.0
+            cycle.inputs.robot.q[:] = cycle.inputs.readings.distance[:] = 9.0
     kept.close()
-    held = open_recording(tmp_path / "hold-1.mcap")
-    assert held[20].inputs is None
-    assert "robot=None" in held.unreadable(20)
-    assert verify(held).agrees
+    found = open_recording(tmp_path / "hold-1.mcap")
+    assert found[20].inputs is None
+    assert "robot=None" in found.unreadable(20)
+    assert verify(found).agrees
 
 
 def test_a_folder_that_cannot_be_made_is_one_sentence_and_raises_nothing(controller, tmp_path):
     (tmp_path / "file").touch()
-    run, kept = Run(controller), LastSeconds(controller, tmp_path / "file" / "folder")
-    for i in range(12):
-        kept.record(run.turn(broken if i == 10 else going_on))
-    kept.close()
+    _, kept = held(controller, tmp_path / "file" / "folder", 12, 10)
     assert kept.written == []
     assert "were not saved" in kept.trouble

@@ -1,6 +1,7 @@
 """What made the steps: each controller is made again as it was."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +11,6 @@ from pretouch.errors import RecordingError
 from pretouch.perception.scene_filter import Fixtures
 from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify
-from pretouch.recording.writer import Recording
 from pretouch.robot.body import Capsules
 from pretouch.robot.description import fr3
 from pretouch.robot.model import RobotModel
@@ -18,30 +18,7 @@ from pretouch.sensing.sensor import VL53L5CX
 from pretouch.sensing.skin import Skin, paper_skin
 from pretouch.sensing.unit import SensorUnit, TouchPatch
 from tests.fuzz.invariants import same
-from tests.recording.runs import SHORT, Run, Spiral, controller_of, custom_arm, recorded_run
-
-
-@pytest.fixture(scope="module")
-def controller(panda_model, paper_skin):
-    return controller_of(panda_model, paper_skin)
-
-
-def test_another_profile_begins_another_run(controller, tmp_path):
-    run = Run(controller)
-    path = line((0.4, 0.0, 0.5), (0.5, 0.0, 0.5))
-    other = controller_of(controller.model, controller.skin, replace(SHORT, name="other"), path)
-    with Recording(tmp_path / "a.mcap", controller, {"command": "test"}) as recording:
-        recording.record(run.turn())
-        recording.change(other)
-        run.state, run.controller = other.adopt(run.state, controller), other
-        recording.record(run.turn())
-        recording.record(run.turn())
-    recorded = open_recording(tmp_path / "a.mcap")
-    assert [kept.run for kept in recorded] == [0, 1, 1]
-    assert [each.profile.name for each in recorded.runs] == [SHORT.name, "other"]
-    assert [each.sequence for each in recorded.runs] == [0, 1]
-    assert recorded.runs[0].about == {"command": "test"}
-
+from tests.recording.runs import controller_of, custom_arm, recorded_run
 
 PATHS = [Circle((0.4, 0.1, 0.3), 0.17, 0.3), WayPoints(np.random.default_rng(0).normal(size=(5, 3)), closed=True),
          line((0.1, 0.2, 0.3), (0.7, 0.1, 0.2))]  # fmt: skip
@@ -61,7 +38,11 @@ def test_paths_of_ours_are_made_again_to_the_bit(controller, tmp_path, path):
 
 def test_a_path_of_another_class_is_drawn_and_has_to_be_given_to_go_on(controller, tmp_path):
     model = controller.model
-    path = Spiral(model.kinematics(model.description.q_ready).position[model.ee])
+    start = model.kinematics(model.description.q_ready).position[model.ee]
+    path = SimpleNamespace(
+        length=1.0, closed=False, tangent=lambda phase: np.array([0.0, np.cos(phase), np.sin(phase)]),
+        point=lambda phase: start + np.array([0.0, 0.5 * phase * np.cos(phase), 0.1 * phase]),
+    )  # fmt: skip
     recorded_run(tmp_path / "a.mcap", controller_of(controller.model, controller.skin, path=path), 40)
     recorded = open_recording(tmp_path / "a.mcap")
     near = recorded.runs[0].path
@@ -69,7 +50,7 @@ def test_a_path_of_another_class_is_drawn_and_has_to_be_given_to_go_on(controlle
     for phase in (0.0, 0.2, 0.55, 1.0):
         assert np.allclose(near.point(phase), path.point(phase), atol=1e-3)
     assert np.linalg.norm(near.tangent(0.2)) == pytest.approx(1.0)
-    with pytest.raises(RecordingError, match=r"class Spiral.*run\.controller\(path=\.\.\.\)"):
+    with pytest.raises(RecordingError, match=r"class SimpleNamespace.*run\.controller\(path=\.\.\.\)"):
         verify(recorded)
     verdict = verify(recorded, path=path)
     assert verdict.agrees, verdict.said
@@ -84,10 +65,11 @@ def test_arm_skin_and_fixtures_are_made_again_to_the_bit(tmp_path):
     capsules = Capsules(np.zeros(1, np.int64), np.array([[0.1, 0.2, 1 / 3]]), np.ones((1, 3)), np.array([0.1]))
     own = controller_of(model, skin)
     own.fixtures = Fixtures(np.array([[0.0, 0.0, 1.0, -1 / 3]]), capsules)
-    recorded_run(tmp_path / "a.mcap", own, 2)
+    recorded_run(tmp_path / "a.mcap", own, 60)
     (tmp_path / "two.xml").unlink()
-    run = open_recording(tmp_path / "a.mcap").runs[0]
-    made = run.controller()
+    recorded = open_recording(tmp_path / "a.mcap")
+    assert verify(recorded).agrees
+    made = recorded.runs[0].controller()
     assert made.model.links == model.links
     for name in ("q_ready", "qd_max", "qdd_max", "tau_max", "name", "source", "ee_body", "envelope"):
         assert same(getattr(made.model.description, name), getattr(model.description, name))
@@ -100,14 +82,21 @@ def test_arm_skin_and_fixtures_are_made_again_to_the_bit(tmp_path):
     recorded_run(tmp_path / "b.mcap", made, 2)  # whoever has it may record with it again
 
 
-def test_zones_are_made_again_to_the_bit(tmp_path, panda_model, paper_skin):
-    skin = Skin([*paper_skin.units[:2], replace(paper_skin.units[2], sensor=VL53L5CX())], panda_model)
-    recorded_run(tmp_path / "a.mcap", controller_of(panda_model, skin), 2)
-    made = open_recording(tmp_path / "a.mcap").runs[0].controller().skin
+def test_zones_uncertain_places_and_touch_sensors_are_made_again_to_the_bit(tmp_path, panda_model, paper_skin):
+    rng = np.random.default_rng(0)
+    units = [
+        replace(unit, position_sigma=rng.uniform(0.0, 0.03), orientation_sigma=rng.uniform(0.0, 0.2), **more)
+        for unit, more in zip(paper_skin.units, [{}, {"touch": TouchPatch(0.01)}, {"sensor": VL53L5CX()}], strict=False)
+    ]
+    skin = Skin(units, panda_model)
+    recorded_run(tmp_path / "a.mcap", controller_of(panda_model, skin), 60)
+    recorded = open_recording(tmp_path / "a.mcap")
+    made = recorded.runs[0].controller().skin
     assert (made.ids, made.boards) == (skin.ids, skin.boards)
-    assert same(made.T_link_sensor, skin.T_link_sensor)
-    assert same(made.first, skin.first)
-    assert [unit.id for unit in made.mounted] == [unit.id for unit in skin.mounted]
+    for name in ("T_link_sensor", "first", "position_sigma", "orientation_sigma"):
+        assert same(getattr(made, name), getattr(skin, name))
+    assert [(unit.id, unit.touch) for unit in made.mounted] == [(unit.id, unit.touch) for unit in units]
+    assert verify(recorded).agrees
 
 
 def test_the_envelope_of_an_arm_is_made_again(tmp_path):
@@ -116,22 +105,6 @@ def test_the_envelope_of_an_arm_is_made_again(tmp_path):
     made = open_recording(tmp_path / "a.mcap").runs[0].model.description
     assert same(made.envelope, model.description.envelope)
     assert made.mjcf == model.description.mjcf
-
-
-def test_uncertain_places_and_touch_sensors_are_made_again(panda_model, paper_skin, tmp_path):
-    rng = np.random.default_rng(0)
-    units = [
-        replace(unit, position_sigma=rng.uniform(0.0, 0.03), orientation_sigma=rng.uniform(0.0, 0.2), touch=patch)
-        for unit, patch in zip(paper_skin.units, [None, TouchPatch(0.01), *[None] * 5], strict=True)
-    ]
-    skin = Skin(units, panda_model)
-    recorded_run(tmp_path / "a.mcap", controller_of(panda_model, skin), 60)
-    recorded = open_recording(tmp_path / "a.mcap")
-    made = recorded.runs[0].skin
-    assert same(made.position_sigma, skin.position_sigma)
-    assert same(made.orientation_sigma, skin.orientation_sigma)
-    assert [unit.touch for unit in made.units] == [unit.touch for unit in units]
-    assert verify(recorded).agrees
 
 
 @pytest.mark.parametrize("source", ["", "two\nlines"])

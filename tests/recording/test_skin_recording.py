@@ -1,19 +1,11 @@
 """What sensor units sent, recorded without a controller."""
 
 import math
-import os
-import resource
-import signal
-import subprocess
-import sys
-import time
 from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 import pytest
-from mcap.reader import make_reader
-from mcap.writer import Writer
 from rosbags.highlevel import AnyReader
 
 from pretouch import cli
@@ -23,6 +15,7 @@ from pretouch.hardware.wire import Flag, Sample, TouchPart, imu_values
 from pretouch.recording.reader import open_recording
 from pretouch.recording.skin_reader import read_skin
 from pretouch.recording.skin_recording import Diagnosis, Level, SkinRecording
+from tests.recording.runs import changed, recorded_run
 
 BATCH = 8
 
@@ -72,6 +65,7 @@ def test_every_field_of_every_sample_comes_back(place):
     trace = read_skin(place)
     assert trace.complete
     assert list(trace.units) == ["hand/1", "wrist"]
+    assert (trace.joints, trace.joint_names) == (None, ())
     for unit in trace.units.values():
         assert len(unit.samples) == 100
         for number, kept in enumerate(unit.samples, 1):
@@ -135,92 +129,68 @@ def test_a_file_that_is_cut_off_gives_its_whole_part(place, tmp_path):
     assert trace.samples == 200
 
 
-@pytest.mark.parametrize(
-    ("content", "words"),
-    [(b"", "is empty"), (b"time", "is not an MCAP file"), (b"\x89MCAP0\r\n", "holds no samples of sensor units")],
-)
-def test_a_file_of_something_else_is_refused(tmp_path, content, words):
-    other = tmp_path / "other.mcap"
-    other.write_bytes(content)
-    with pytest.raises(RecordingError, match=words):
-        read_skin(other)
-    with pytest.raises(RecordingError, match="it does not exist"):
-        read_skin(tmp_path / "none.mcap")
-
-
-def test_a_recording_of_control_steps_is_no_recording_of_units(panda_model, paper_skin, tmp_path):
-    from tests.recording.runs import controller_of, recorded_run
-
-    recorded_run(tmp_path / "run.mcap", controller_of(panda_model, paper_skin), 3)
+def test_a_recording_of_control_steps_is_no_recording_of_units(controller, tmp_path):
+    recorded_run(tmp_path / "run.mcap", controller, 3)
     with pytest.raises(RecordingError, match="holds no samples of sensor units"):
         read_skin(tmp_path / "run.mcap")
     assert len(open_recording(tmp_path / "run.mcap")) == 3
 
 
 def test_samples_of_another_version_are_refused(place, tmp_path):
-    with place.open("rb") as old, (tmp_path / "other.mcap").open("wb") as new:
-        writer = Writer(new)
-        writer.start("ros2", "pretouch 9")
-        for schema, channel, message in make_reader(old).iter_messages(topics=["/skin/wrist/sample"]):
-            number = writer.register_schema(schema.name, schema.encoding, schema.data.replace(b"uint8", b"int8"))
-            topic = writer.register_channel(channel.topic, "cdr", number)
-            writer.add_message(topic, message.log_time, message.data, message.publish_time)
-        writer.finish()
     with pytest.raises(RecordingError, match="another version of pretouch"):
-        read_skin(tmp_path / "other.mcap")
+        read_skin(changed(place, tmp_path / "b.mcap", schema=lambda topic, text: text.replace(b"uint8", b"int8")))
 
 
-def test_nothing_is_written_over(place):
-    with pytest.raises(RecordingError, match="exists already"):
-        SkinRecording(place)
+NAMES = ("panda_joint1", "panda_joint2")
+STAMP = 100.0 + np.arange(200) / 1000
+Q = np.random.default_rng(0).normal(size=(200, 2))
 
 
-_ENDLESS = """
-import sys, time
-from pathlib import Path
-from tests.recording.test_skin_recording import record
-from pretouch.recording.skin_recording import SkinRecording
-recording = SkinRecording(Path(sys.argv[1]))
-began, number = time.monotonic(), 0
-while True:
-    number += 1
-    record(recording, number)
-    print(number, flush=True)
-    time.sleep(max(0.0, began + 0.02 * number - time.monotonic()))
-"""
-
-
-@pytest.mark.slow
-def test_a_killed_process_loses_at_most_the_last_second(tmp_path):
-    place = tmp_path / "killed.mcap"
-    root = Path(__file__).parents[2]
-    command = [sys.executable, "-c", _ENDLESS, str(place)]
-    environment = {**os.environ, "PYTHONPATH": str(root)}
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=root, env=environment) as process:
-        assert process.stdout
-        until, last = None, 0
-        for line in process.stdout:
-            last, until = int(line), until or time.monotonic() + 2.5
-            if time.monotonic() > until:
-                process.kill()  # what is left in the pipe is read to its end
-    trace = read_skin(place)
-    assert not trace.complete
-    assert last - trace.samples <= 50
-
-
-def test_a_full_disk_is_said_in_a_sentence(tmp_path):
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    recording = SkinRecording(tmp_path / "full.mcap")
-    try:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, before[1]))
-        for number in range(1, 4000):
+def recorded(place, *parts):
+    """Record units, and states of joints in parts: (stamp, q, qd, names)."""
+    with SkinRecording(place) as recording:
+        for number in range(1, 6):
             record(recording, number)
-        said = recording.close()
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
-        signal.signal(signal.SIGXFSZ, handler)
-    assert said == recording.trouble
-    assert "ended early" in said
-    assert "free some space, then record again" in said
-    assert 0 < read_skin(tmp_path / "full.mcap").samples < 4000
+        for part in parts:
+            recording.joints(*part)
+    return read_skin(place)
+
+
+def test_the_usual_tools_read_states_of_joints(tmp_path):
+    recorded(tmp_path / "a.mcap", (STAMP, Q, 0.1 * Q, NAMES))
+    with AnyReader([tmp_path / "a.mcap"]) as reader:
+        (connection,) = (c for c in reader.connections if c.topic == "/joint_states")
+        assert (connection.msgtype, connection.msgcount) == ("sensor_msgs/msg/JointState", 200)
+        for (_, time, raw), t, q in zip(reader.messages([connection]), STAMP, Q, strict=True):
+            state = reader.deserialize(raw, connection.msgtype)
+            assert state.name == list(NAMES)
+            assert state.position.tolist() == q.tolist()
+            assert state.velocity.tolist() == (0.1 * q).tolist()
+            assert not len(state.effort)
+            assert time == round(t * 1e9) == state.header.stamp.sec * 10**9 + state.header.stamp.nanosec
+
+
+def test_states_of_joints_are_sorted_and_what_is_no_number_or_came_twice_is_left_out(tmp_path):
+    q = Q.copy()
+    q[5] = np.nan
+    trace = recorded(
+        tmp_path / "a.mcap", (STAMP[100:], q[100:], None, NAMES), (STAMP[:101], q[:101] + 1.0, None, NAMES)
+    )
+    np.testing.assert_array_equal(trace.joints.q, np.delete(np.vstack([q[:101] + 1.0, q[101:]]), 5, axis=0))
+    np.testing.assert_allclose(trace.joints.stamp, np.delete(STAMP, 5), atol=1e-9)
+
+
+def test_joints_of_another_arm_in_the_same_file_are_refused(tmp_path):
+    with pytest.raises(RecordingError, match="states of the joints a, b and of panda_joint1, panda_joint2"):
+        recorded(tmp_path / "a.mcap", (STAMP, Q, None, NAMES), (STAMP, Q, None, ("a", "b")))
+
+
+@pytest.mark.parametrize(
+    ("q", "qd", "names"),
+    [(Q[:, :1], None, NAMES), (Q[1:], None, NAMES), (Q[:, 0], None, NAMES), (Q, Q[:, :1], NAMES), (Q, None, NAMES[:1])],
+)
+def test_other_shapes_of_joint_states_are_refused_before_anything_is_written(tmp_path, q, qd, names):
+    with SkinRecording(tmp_path / "a.mcap") as recording:
+        with pytest.raises(RecordingError, match=r"give \(200, [12]\), a row for each instant"):
+            recording.joints(STAMP, q, qd, names)
+        assert not recording.trouble
