@@ -10,7 +10,7 @@ from pretouch.controller import Controller
 from pretouch.loop import run
 from pretouch.modes import Event
 from pretouch.profiles import profile as find_profile
-from pretouch.recording.simulation import Truth
+from pretouch.recording.simulation import Truth, truth_of
 from pretouch.sim.paper_scenes import static_path, static_scene
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.plant_params import PlantParams
@@ -28,8 +28,6 @@ from pretouch.types import (
     RobotState,
     Thresholds,
 )
-
-SETTLE_S = 0.2
 
 
 @dataclass
@@ -73,25 +71,19 @@ class Recorder:
         self.plant, self.kept, self.forces, self.touches = plant, [], 0, 0
 
     def record(self, cycle):
-        forces, touches = self.plant.true_log[self.forces :], self.plant.touches[self.touches :]
+        truth = truth_of(self.plant.true_log[self.forces :], self.plant.touches[self.touches :], None)
         self.forces, self.touches = len(self.plant.true_log), len(self.plant.touches)
-        truth = Truth(
-            np.array([t for t, _ in forces]), np.array([f for _, f in forces]), np.full(3, np.nan),
-            tuple((t.time, t.link, t.velocity) for t in touches),
-        )  # fmt: skip
         self.kept.append(Kept(0, cycle.inputs, cycle.step, truth))
 
 
 def played(model, skin, profile="paper", side="-y", seed=0, seconds=6.0, until_reaction=None):
     """The arm runs into a board: what was recorded, and the plant that knows the truth."""
-    used = find_profile(profile)
-    used = replace(used, approach=None)
+    used = replace(find_profile(profile), approach=None)
     scene, path = static_scene("line", side, 25_000.0, seed), static_path("line", side)
     plant = Plant(model, scene, PlantParams(), brought_to(model, path.point(0.0)), seed)
     units = RangeFinders(plant, skin, RangeFinderParams(), seed)
     recorder = Recorder(plant)
-    clock = PlantClock(plant, 0.01)
-    plant.advance(SETTLE_S)
+    plant.advance(0.2)
     controller = Controller(model, skin, fixtures(scene), path, used)
     felt = []
 
@@ -100,7 +92,7 @@ def played(model, skin, profile="paper", side="-y", seed=0, seconds=6.0, until_r
         over = until_reaction is not None and felt and step.stamp >= felt[0] + until_reaction
         return bool(over) or step.stamp > seconds
 
-    run(controller, plant, units, clock, recorder, done)
+    run(controller, plant, units, PlantClock(plant, 0.01), recorder, done)
     return Recorded((Run(model, skin, used, path),), recorder.kept), plant
 
 

@@ -1,5 +1,6 @@
 import re
 from dataclasses import replace
+from functools import reduce
 from html.parser import HTMLParser
 
 import numpy as np
@@ -10,6 +11,7 @@ from pretouch.modes import Event
 from pretouch.profiles import PROFILES, profile
 from pretouch.reporting.html import bad, number, percent, table
 from pretouch.reporting.measures import measure
+from pretouch.reporting.orientation import REGIONS
 from pretouch.reporting.page import page
 from pretouch.reporting.sections.contact import contact_section, heading, orientation_section
 from pretouch.reporting.sections.motion import limit_section, mode_section
@@ -131,11 +133,6 @@ def backwards(model, skin):
     return made.recorded(model, skin, steps, truths=truths)
 
 
-def infinite(model, skin):
-    steps = [made.step(model, stamp=0.01 * i, force=np.full(3, np.inf), command=np.full(7, np.inf)) for i in range(5)]
-    return made.recorded(model, skin, steps)
-
-
 ODD = {
     "one step": one_step,
     "no unit": lambda model, skin: one_step(model, Skin((), model)),
@@ -143,7 +140,11 @@ ODD = {
     "holds": holds_only,
     "no wrench": without_wrench,
     "backwards": backwards,
-    "infinite": infinite,
+    "infinite": lambda model, skin: made.recorded(
+        model,
+        skin,
+        [made.step(model, stamp=0.01 * i, force=np.full(3, np.inf), command=np.full(7, np.inf)) for i in range(5)],
+    ),
 }
 
 
@@ -176,31 +177,27 @@ def test_very_many_changes_of_the_profile_are_summed_up(panda_model, paper_skin)
     assert "34 more profiles are left out" in section(parameter_section, changed)
 
 
-def test_facts_nested_without_end_are_cut(panda_model, paper_skin):
-    deep = one_step(panda_model, paper_skin)
-    nested = []
-    for _ in range(900):
-        nested = [nested]
-    deep.runs[0].about = {"nested": nested}
-    assert "((((((...))))))" in section(setting_section, deep)
+CUT = "The file ends in the middle of a chunk."
+NESTED = reduce(lambda inner, _: [inner], range(900), [])
 
 
-def test_a_file_that_is_cut_off_is_said_to_be(panda_model, paper_skin):
-    cut = one_step(panda_model, paper_skin)
-    cut.complete, cut.said = False, "The file ends in the middle of a chunk."
-    for made_by in (summary, setting_section):
-        assert '<span class="bad">The file ends in the middle of a chunk.</span>' in section(made_by, cut)
-
-
-def test_truth_that_is_not_known_is_said_to_be_not_known(panda_model, paper_skin):
-    one = one_step(panda_model, paper_skin)
-    assert "True touches are not known" in section(contact_section, one)
-    assert "understates the peaks of impacts" in section(orientation_section, one)
-
-
-def test_an_exceeded_limit_is_marked(panda_model, paper_skin):
-    fast = section(limit_section, one_step(panda_model, paper_skin, command=np.full(7, 9.0)))
-    assert '<span class="bad">Exceeded: velocity of joint 1' in fast
+@pytest.mark.parametrize(
+    ("made_by", "run", "file", "said"),
+    [
+        (summary, {}, {"complete": False, "said": CUT}, bad(CUT)),
+        (setting_section, {}, {"complete": False, "said": CUT}, bad(CUT)),
+        (setting_section, {"about": {"nested": NESTED}}, {}, "((((((...))))))"),
+        (contact_section, {}, {}, "True touches are not known"),
+        (orientation_section, {}, {}, "understates the peaks of impacts"),
+        (limit_section, {}, {}, '<span class="bad">Exceeded: velocity of joint 1'),
+    ],
+)
+def test_what_is_cut_off_not_known_nested_without_end_or_exceeded_is_said(
+    panda_model, paper_skin, made_by, run, file, said
+):
+    one = replace(one_step(panda_model, paper_skin, command=np.full(7, 9.0)), **file)
+    one.runs = (replace(one.runs[0], **run),)
+    assert said in section(made_by, one)
 
 
 def test_text_of_a_file_stays_text(panda_model, paper_skin):
@@ -252,6 +249,11 @@ def test_directions_and_units_are_named():
     assert [unit_of(name) for name in ("speed_m_s", "compliance_m_s_n", "f_base_n", "alpha", "d_max_m")] == [
         "m/s", "(m/s)/N", "N", "", "m"
     ]  # fmt: skip
+
+
+def test_transient_figures_of_body_regions_are_twice_the_others_where_there_are_any():
+    assert all(region.transient in (None, 2 * region.quasi_static) for region in REGIONS)
+    assert [r.name for r in REGIONS if r.transient is None] == ["Skull and forehead", "Face"]
 
 
 def test_units_of_all_parameters_are_those_that_their_documentation_gives():

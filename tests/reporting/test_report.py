@@ -103,8 +103,6 @@ def test_what_is_wrong_with_a_request_is_one_sentence(folder, tmp_path):
         write_page([trial, trial.parent / "." / "trial.mcap"], tmp_path / "page.html")
     with pytest.raises(RecordingError, match="would be written over the recording"):
         write_page([trial], trial)
-    with pytest.raises(RecordingError, match=r"nowhere\.mcap cannot be read"):
-        write_page([tmp_path / "nowhere.mcap"], tmp_path / "page.html")
     with pytest.raises(ExperimentError, match="cannot be written"):
         write_page([trial], tmp_path)
 

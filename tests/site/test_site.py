@@ -16,43 +16,34 @@ ROOT = Path(__file__).parents[2]
 
 
 class Page(HTMLParser):
-    """What a page of the site refers to, and what it can be referred to by."""
+    """What a page of the site refers to and can be referred to by, and the numbers that its lists show in order."""
 
     def __init__(self, path: Path) -> None:
         super().__init__()
         self.anchors: set[str] = set()
         self.loaded: list[str] = []
         self.pictures: list[tuple[str, str]] = []
+        self.numbers: list[int] = []
+        self._lists: list[int | None] = []
+        self._article = False
         self.feed(path.read_text(encoding="utf-8"))
 
     def handle_starttag(self, tag, attrs):
         given = dict(attrs)
         self.anchors.add(given.get("id") or "")
-        if tag in ("script", "img", "iframe", "source") and given.get("src"):
-            self.loaded.append(given["src"])
-        if tag == "link" and given.get("href"):
-            self.loaded.append(given["href"])
+        self._article = self._article or tag == "article"
+        source = given.get({"script": "src", "img": "src", "iframe": "src", "source": "src", "link": "href"}.get(tag))
+        self.loaded += [source] if source else []
         if tag == "img":
             self.pictures.append((given.get("src", ""), given.get("alt") or ""))
-
-
-class Numbers(HTMLParser):
-    """The numbers that a page's numbered lists show, in order."""
-
-    def __init__(self, path: Path) -> None:
-        super().__init__()
-        self.shown: list[int] = []
-        self._lists: list[int | None] = []
-        self.feed(path.read_text(encoding="utf-8").partition("<article")[2].partition("</article")[0])
-
-    def handle_starttag(self, tag, attrs):
         if tag in ("ol", "ul"):
-            self._lists.append(int(dict(attrs).get("start") or 1) if tag == "ol" else None)
-        if tag == "li" and self._lists[-1] is not None:
-            self.shown.append(self._lists[-1])
+            self._lists.append(int(given.get("start") or 1) if tag == "ol" else None)
+        if tag == "li" and self._article and self._lists[-1] is not None:
+            self.numbers.append(self._lists[-1])
             self._lists[-1] += 1
 
     def handle_endtag(self, tag):
+        self._article = self._article and tag != "article"
         if tag in ("ol", "ul"):
             self._lists.pop()
 
@@ -102,14 +93,14 @@ def test_command_lines_are_code(pages):
     assert [path.name for path in pages if re.search(r"<p>\s*(pretouch|make|python) ", _prose(path))] == []
 
 
-def test_numbered_lists_keep_their_numbers(site):
+def test_numbered_lists_keep_their_numbers(site, pages):
     """A block that is indented by less than four blanks would end its list, and the next would begin at one."""
     numbered = {}
     for document in sorted((ROOT / "docs").rglob("*.md")):
         text = re.sub(r"^ *```.*?^ *```$", "", document.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
         if numbers := re.findall(r"^ *(\d+)\. ", text, flags=re.MULTILINE):
             page = (site / document.relative_to(ROOT / "docs")).with_suffix(".html")
-            numbered[document.name] = [int(number) for number in numbers], Numbers(page).shown
+            numbered[document.name] = [int(number) for number in numbers], pages[page].numbers
     assert len(numbered) > 5
     assert {name: both for name, both in numbered.items() if both[0] != both[1]} == {}
 
