@@ -39,20 +39,17 @@ def test_the_way_down_is_shorter_and_its_jitter_narrower():
     assert np.percentile(delay, 99) < 0.007
 
 
-@pytest.mark.parametrize("loss", [0.1, 0.3])
-def test_losses_are_of_the_size_asked_for_and_independent(loss):
-    _, numbers = course(ChannelParams(loss=loss))
-    assert 1 - len(numbers) / 20_000 == pytest.approx(loss, abs=0.01)
-    assert np.mean(runs(numbers, 20_000)) == pytest.approx(1 / (1 - loss), rel=0.05)
+@pytest.mark.parametrize(
+    ("loss", "loss_run", "count", "mean"),
+    [(0.1, 0.0, 20_000, 1 / 0.9), (0.3, 0.0, 20_000, 1 / 0.7), (0.1, 5.0, 40_000, 5.0)],
+)
+def test_losses_are_of_the_size_asked_for_and_independent_or_in_runs_of_the_mean_asked_for(loss, loss_run, count, mean):
+    _, numbers = course(ChannelParams(loss=loss, loss_run=loss_run), count=count)
+    assert 1 - len(numbers) / count == pytest.approx(loss, abs=0.015 if loss_run else 0.01)
+    assert np.mean(runs(numbers, count)) == pytest.approx(mean, rel=0.1 if loss_run else 0.05)
 
 
-def test_losses_in_runs_have_the_same_size_and_the_mean_run_asked_for():
-    _, numbers = course(ChannelParams(loss=0.1, loss_run=5.0), count=40_000)
-    assert 1 - len(numbers) / 40_000 == pytest.approx(0.1, abs=0.015)
-    assert np.mean(runs(numbers, 40_000)) == pytest.approx(5.0, rel=0.1)
-
-
-def test_a_datagram_held_up_is_overtaken():
+def test_a_datagram_held_up_is_overtaken_and_one_is_doubled_as_often_as_asked_for():
     _, in_order = course(ChannelParams(jitter_s=0.0), count=2000)
     assert in_order == sorted(in_order)
     _, numbers = course(ChannelParams(jitter_s=0.0, overtaken=0.1), count=2000)
@@ -61,9 +58,6 @@ def test_a_datagram_held_up_is_overtaken():
     )
     assert overtaken == pytest.approx(200, abs=40)
     assert sorted(numbers) == in_order
-
-
-def test_a_datagram_is_doubled_as_often_as_asked_for():
     _, numbers = course(ChannelParams(doubled=0.2), count=5000)
     assert len(numbers) - len(set(numbers)) == pytest.approx(1000, abs=100)
 

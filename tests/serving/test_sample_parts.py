@@ -1,6 +1,7 @@
 """Zones and touch from simulated sensors over units, sockets and receiver to what a skin reads."""
 
 from dataclasses import replace
+from functools import partial
 from struct import pack
 
 import numpy as np
@@ -23,7 +24,6 @@ from pretouch.hardware.wire import (
     touch_part,
     zones_size,
 )
-from pretouch.sensing.network import NetworkUnits
 from pretouch.sensing.sensor import VL53L5CX
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import TouchPatch
@@ -43,24 +43,19 @@ PART = TouchPart(1, 0, 400, 2500, 1200)
 
 
 @pytest.mark.parametrize("part", [PART, TouchPart(0, 1, 2, NO_FORCE, 0)])
-def test_a_touch_reading_goes_behind_the_imu_samples(part):
+def test_a_touch_reading_goes_behind_the_imu_samples_and_a_sample_without_is_as_before(part):
+    datagram = PLAIN.encode(SESSION)
+    assert len(datagram) == SAMPLE_LEAST + 24
+    back = decode_sample(datagram, SESSION)
+    assert back == PLAIN
+    assert touch_part(back) is None
     whole = replace(PLAIN, flags=int(Flag.TOUCH), touch=part.encode())
     datagram = whole.encode(SESSION)
     assert len(datagram) == SAMPLE_LEAST + 24 + 12
     assert datagram[62 + 24 : -16] == part.encode()
     back = decode_sample(datagram, SESSION)
     assert back == whole
-    assert back is not None
     assert touch_part(back) == part
-
-
-def test_a_sample_without_touch_is_as_before_and_has_no_part():
-    datagram = PLAIN.encode(SESSION)
-    assert len(datagram) == SAMPLE_LEAST + 24
-    back = decode_sample(datagram, SESSION)
-    assert back == PLAIN
-    assert back is not None
-    assert touch_part(back) is None
 
 
 def test_zones_go_behind_the_imu_samples_and_touch():
@@ -115,13 +110,6 @@ def test_what_is_cut_off_or_garbled_before_its_tag_raises_nothing():
             bad[place] = int(rng.integers(256))
         back = decode_sample(bytes(bad) + SESSION.tag(bad), SESSION)
         assert back is None or len(back.zones) == (zones_size(back.zones[0]) if back.flags & Flag.ZONES else 0)
-
-
-def test_rows_of_units_with_zones():
-    units = NetworkUnits(("a", "b", "c"), (1, 4, 2))
-    assert (units.first, units.rows) == ((0, 1, 17), 21)
-    assert NetworkUnits.of(["a", "b"]) == NetworkUnits(("a", "b"), (1, 1))
-    assert NetworkUnits.of([]).first == ()
 
 
 @pytest.fixture
@@ -184,24 +172,16 @@ def feeling(skin: Skin, model, *units: int) -> Skin:
     return Skin([replace(u, touch=TouchPatch()) if k in units else u for k, u in enumerate(skin.units)], model)
 
 
-class Presser:
-    """Presses on the first unit with 3 N from 1.5 s to 2.5 s."""
-
-    def __init__(self, plant: Plant, skin: Skin) -> None:
-        self.plant, self.link, self.T = plant, int(skin.link[0]), skin.T_link_sensor[0]
-
-    def __call__(self, time: float) -> list[PointForce]:
-        if not 1.5 <= time < 2.5:
-            return []
-        R = self.plant.link_rotation[self.link]
-        return [
-            PointForce(self.link, self.plant.link_position[self.link] + R @ self.T[:3, 3], -3.0 * R @ self.T[:3, 2])
-        ]
+def pressed(plant: Plant, skin: Skin, time: float) -> list[PointForce]:
+    """The first unit is pressed on with 3 N from 1.5 s to 2.5 s."""
+    link, T = int(skin.link[0]), skin.T_link_sensor[0]
+    R, at = plant.link_rotation[link], plant.link_position[link]
+    return [PointForce(link, at + R @ T[:3, 3], -3.0 * R @ T[:3, 2])] if 1.5 <= time < 2.5 else []
 
 
 def test_a_touch_comes_over_the_wire_with_its_force_and_never_fresher_than_it_is(arm, panda_model, paper_skin):
     skin = feeling(paper_skin, panda_model, 0, 2)
-    with WireSkin(arm, skin, RangeFinderParams(), FleetParams(), 0, laid=Presser(arm, skin)) as wire:
+    with WireSkin(arm, skin, RangeFinderParams(), FleetParams(), 0, laid=partial(pressed, arm, skin)) as wire:
         assert wire.touch() is None
         rows = []
         for _ in range(320):
@@ -222,12 +202,3 @@ def test_a_touch_comes_over_the_wire_with_its_force_and_never_fresher_than_it_is
         taken = wire.receiver.take_samples()
         assert {received.unit for received in taken if received.sample.touch} == {0, 2}
         assert sum(wire.receiver.rejected.values()) == 0
-
-
-def test_a_skin_without_touch_sensors_sends_the_samples_it_always_did(arm, paper_skin):
-    with WireSkin(arm, paper_skin, RangeFinderParams(), FleetParams(), 0) as wire:
-        arm.advance(2.0)
-        assert wire.touch() is None
-        samples = [received.sample for received in wire.receiver.take_samples()]
-    assert samples
-    assert not any(sample.flags & Flag.TOUCH or sample.touch for sample in samples)

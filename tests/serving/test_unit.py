@@ -64,10 +64,14 @@ class Desk:
     def session(self, nonce: bytes = NONCE) -> Mac:
         return session_mac(MAC, self.hellos(self.said)[-1][1].challenge, nonce)
 
-    def open(self) -> Mac:
+    def open(self) -> "Desk":
         self.pass_time(0.2)
         self.beacon()
-        return self.session()
+        return self
+
+    def samples(self, said, session: Mac | None = None) -> list[Sample]:
+        """Samples among what was said, of the newest session by default."""
+        return [decode_sample(d, session or self.session()) for _, d in said if d[3] == Kind.SAMPLE]
 
 
 def ranged(time: float, distance: float = 0.5) -> RangeSample:
@@ -80,10 +84,6 @@ def desk():
         return Desk(SimulatedUnit(KEY, UnitParams(**params), np.random.default_rng(seed), imu, reboots))
 
     return made
-
-
-def samples(said, session: Mac) -> list[Sample]:
-    return [decode_sample(d, session) for _, d in said if d[3] == Kind.SAMPLE]
 
 
 def test_out_of_session_a_unit_greets_ten_times_a_second_with_one_challenge(desk):
@@ -102,14 +102,16 @@ def test_out_of_session_a_unit_greets_ten_times_a_second_with_one_challenge(desk
 
 
 def test_in_session_it_sends_fifty_samples_a_second_in_sequence(desk):
-    on = desk()
-    session, told = on.open(), []
+    on, told = desk().open(), []
     for _ in range(4):
-        told += samples(on.pass_time(0.5), session)
+        said = on.pass_time(0.5)
+        told += on.samples(said)
         on.beacon()
     assert len(told) == pytest.approx(100, abs=2)
     assert [sample.sequence for sample in told] == list(range(1, len(told) + 1))
     assert all(sample.flags == Flag.RANGE_NEW for sample in told)
+    assert [at for at, _ in said] == pytest.approx(np.arange(1.71, 2.20, 0.02)), "as soon as the unit has a range"
+    assert [sample.range_age_us for sample in told] == pytest.approx([10_000] * len(told), abs=3)
     sample = told[-1]
     assert (sample.range_mm, sample.range_status, sample.range_sigma) == (500, 0, 24)
     assert (sample.range_signal, sample.range_ambient, sample.range_spads) == (1600, 38, 32768)
@@ -117,32 +119,20 @@ def test_in_session_it_sends_fifty_samples_a_second_in_sequence(desk):
 
 
 def test_a_sample_echoes_the_newest_beacon_and_for_how_long_it_was_held(desk):
-    on = desk()
-    session = on.open()
+    on = desk().open()
     on.pass_time(0.3)
     on.beacon()
-    sample = samples(on.pass_time(0.1), session)[-1]
+    sample = on.samples(on.pass_time(0.1))[-1]
     assert sample.beacon == 2
     assert sample.beacon_hold_us == pytest.approx(1e6 * (on.said[-1][0] - 0.5), abs=5)
 
 
-def test_a_range_is_sent_as_soon_as_the_unit_has_it(desk):
-    on = desk()
-    session = on.open()
-    said = on.pass_time(0.2)
-    assert [at for at, _ in said] == pytest.approx(np.arange(0.21, 0.40, 0.02))
-    told = samples(said, session)
-    assert all(s.flags == Flag.RANGE_NEW for s in told)
-    assert [s.range_age_us for s in told] == pytest.approx([10_000] * 10, abs=3)
-
-
 def test_ranges_that_come_too_fast_wait_for_10_ms_to_pass_and_tell_their_age(desk):
-    on = desk()
-    session = on.open()
+    on = desk().open()
     on.every = 0.009
     on.pass_time(0.03)
     said = on.pass_time(0.5)
-    told, times = samples(said, session), np.array([at for at, _ in said])
+    told, times = on.samples(said), np.array([at for at, _ in said])
     assert np.diff(times).min() >= 0.01
     assert len(said) >= 45
     measured = 0.009 * np.floor(np.round((times - 0.01) / 0.009, 6))
@@ -150,11 +140,10 @@ def test_ranges_that_come_too_fast_wait_for_10_ms_to_pass_and_tell_their_age(des
 
 
 def test_between_ranges_that_come_too_slowly_there_are_samples_without_one(desk):
-    on = desk()
-    session = on.open()
+    on = desk().open()
     on.every = 0.06
     on.pass_time(0.06)
-    told = samples(on.pass_time(1.2), session)
+    told = on.samples(on.pass_time(1.2))
     new = [sample for sample in told if sample.flags & Flag.RANGE_NEW]
     assert len(new) == 20
     assert all(sample.range_age_us < 20_000 for sample in new)
@@ -162,8 +151,7 @@ def test_between_ranges_that_come_too_slowly_there_are_samples_without_one(desk)
 
 
 def test_without_beacons_it_leaves_after_two_seconds_and_greets_with_a_new_challenge(desk):
-    on = desk()
-    on.open()
+    on = desk().open()
     before = on.hellos(on.said)[-1][1].challenge
     said = on.pass_time(3.0)
     hellos = on.hellos(said)
@@ -193,18 +181,17 @@ def test_only_a_fresh_beacon_of_its_own_opens_and_keeps_a_session(desk):
 
 
 def test_after_the_last_sequence_number_it_leaves_its_session(desk):
-    on = desk()
-    session = on.open()
+    on = desk().open()
+    session = on.session()
     on.pass_time(0.1)
     on.unit._sequence = 2**32 - 3
     said = on.pass_time(0.5)
-    assert [sample.sequence for sample in samples(said, session)] == [2**32 - 2, 2**32 - 1]
+    assert [sample.sequence for sample in on.samples(said, session)] == [2**32 - 2, 2**32 - 1]
     assert on.hellos(said)[0][1].challenge != on.hellos(on.said)[0][1].challenge
 
 
 def test_a_reboot_begins_its_clock_at_nothing_and_takes_its_time(desk):
-    on = desk(reboots=[1.0], boot_s=0.5)
-    on.open()
+    on = desk(reboots=[1.0], boot_s=0.5).open()
     said = on.pass_time(1.8)
     hellos = on.hellos(said)
     assert max(at for at, d in said if d[3] == Kind.SAMPLE) < 1.0
@@ -213,7 +200,7 @@ def test_a_reboot_begins_its_clock_at_nothing_and_takes_its_time(desk):
     assert hellos[0][1].uptime_us == pytest.approx(1e6 * (hellos[0][0] - 1.0), abs=50)
     assert hellos[0][1].challenge != on.hellos(on.said)[0][1].challenge
     on.beacon()
-    assert samples(on.pass_time(0.1), on.session())[0].sequence == 1
+    assert on.samples(on.pass_time(0.1))[0].sequence == 1
 
 
 def test_reboots_may_go_on_for_ever(desk):
@@ -223,8 +210,7 @@ def test_reboots_may_go_on_for_ever(desk):
 
 
 def test_a_silent_unit_neither_sends_nor_hears(desk):
-    on = desk()
-    on.open()
+    on = desk().open()
     on.unit.silent = True
     assert on.pass_time(1.0) == []
     on.beacon()
@@ -236,24 +222,22 @@ def test_a_silent_unit_neither_sends_nor_hears(desk):
 
 
 def test_a_stuck_unit_repeats_itself_as_if_it_were_new(desk):
-    on = desk()
-    session = on.open()
+    on = desk().open()
     on.pass_time(0.1)
     on.unit.stuck = True
-    told = samples(on.pass_time(1.0), session)
+    told = on.samples(on.pass_time(1.0))
     assert all(sample.flags & Flag.RANGE_NEW for sample in told)
     assert len({(s.range_stream, s.range_mm, s.range_signal, s.range_ambient) for s in told}) == 1
     assert max(sample.range_age_us for sample in told) < 25_000, "it says that it is fresh"
     on.unit.stuck = False
-    assert len({s.range_stream for s in samples(on.pass_time(0.2), session)}) > 5
+    assert len({s.range_stream for s in on.samples(on.pass_time(0.2))}) > 5
 
 
 def test_a_range_finder_that_says_nothing_is_late(desk):
-    on = desk()
-    session = on.open()
+    on = desk().open()
     on.every = np.inf
     on.pass_time(0.05)
-    told = samples(on.pass_time(1.0), session)
+    told = on.samples(on.pass_time(1.0))
     assert len(told) in (39, 40)
     assert all(sample.flags == Flag.RANGE_LATE for sample in told)
     assert told[-1].range_age_us == pytest.approx(1.05e6, abs=25_000)
@@ -262,8 +246,8 @@ def test_a_range_finder_that_says_nothing_is_late(desk):
 def test_before_the_first_range_there_is_none(desk):
     on = desk()
     on.every = np.inf
-    session = on.open()
-    assert all(s.range_status == RangeStatus.NONE and not s.flags for s in samples(on.pass_time(0.2), session))
+    on.open()
+    assert all(s.range_status == RangeStatus.NONE and not s.flags for s in on.samples(on.pass_time(0.2)))
 
 
 MG = {2: 0.061, 4: 0.122, 8: 0.244, 16: 0.488}
@@ -274,10 +258,9 @@ MDPS = {125: 4.375, 245: 8.75, 500: 17.5, 1000: 35.0, 2000: 70.0}
 @pytest.mark.parametrize("acceleration_range", MG)
 @pytest.mark.parametrize("rate_range", MDPS)
 def test_counts_of_the_simulated_imu_mean_on_the_wire_what_they_meant(desk, acceleration_range, rate_range):
-    on = desk(imu=ImuParams(acceleration_range_g=acceleration_range, angular_rate_range_dps=rate_range))
-    session = on.open()
+    on = desk(imu=ImuParams(acceleration_range_g=acceleration_range, angular_rate_range_dps=rate_range)).open()
     on.unit.take_imu(ImuSample(0, on.now, np.array([100, -200, 300, 32767, -32768, 1])))
-    sample = samples(on.pass_time(0.05), session)[0]
+    sample = on.samples(on.pass_time(0.05))[0]
     acceleration, rate = imu_values(sample.imu, sample.imu_scale)
     mg, mdps = MG[acceleration_range], MDPS[rate_range]
     assert acceleration[0] == pytest.approx(np.array([32767, -32768, 1]) * mg * 9.80665e-3)
@@ -286,11 +269,10 @@ def test_counts_of_the_simulated_imu_mean_on_the_wire_what_they_meant(desk, acce
 
 
 def test_imu_samples_come_in_batches_without_a_gap(desk):
-    on = desk(imu=ImuParams())
-    session, told = on.open(), []
+    on, told = desk(imu=ImuParams()).open(), []
     for count in range(1000):
         on.unit.take_imu(ImuSample(0, on.now, np.full(6, count)))
-        told += samples(on.pass_time(0.002), session)
+        told += on.samples(on.pass_time(0.002))
         if count % 200 == 0:
             on.beacon()
     index = told[0].imu_index
@@ -304,11 +286,10 @@ def test_imu_samples_come_in_batches_without_a_gap(desk):
 
 
 def test_a_fifo_that_runs_over_says_so_and_counts_what_is_lost(desk):
-    on = desk(imu=ImuParams())
-    session = on.open()
+    on = desk(imu=ImuParams()).open()
     for count in range(FIFO_MOST + 50):
         on.unit.take_imu(ImuSample(0, on.now, np.full(6, count)))
-    first, second = samples(on.pass_time(0.05), session)[:2]
+    first, second = on.samples(on.pass_time(0.05))[:2]
     assert first.flags & Flag.IMU_LOST
     assert not second.flags & Flag.IMU_LOST
     assert (first.imu_index, first.imu_count, second.imu_index) == (50, 32, 82)
@@ -332,19 +313,18 @@ def test_what_was_measured_out_of_session_is_not_told_in_it(desk):
     on.pass_time(0.1)
     for count in range(100):
         on.unit.take_imu(ImuSample(0, on.now, np.full(6, count)))
-    session = on.open()
+    on.open()
     on.unit.take_imu(ImuSample(0, on.now, np.full(6, 100)))
-    first = samples(on.pass_time(0.05), session)[0]
+    first = on.samples(on.pass_time(0.05))[0]
     assert (first.imu_index, first.imu_count) == (100, 1)
 
 
 def test_samples_that_its_imu_did_not_take_count_as_lost_and_parts_of_one_add_up(desk):
-    on = desk(imu=ImuParams())
-    session, told = on.open(), []
+    on, told = desk(imu=ImuParams()).open(), []
     for step in [0.002] * 9 + [0.101] + [0.002] * 9 + [0.101]:  # a simulation that leaves time out: 49.5 samples, twice
-        told += samples(on.pass_time(step), session)
+        told += on.samples(on.pass_time(step))
         on.unit.take_imu(ImuSample(0, on.now, np.zeros(6, np.int64)))
-    told += samples(on.pass_time(0.05), session)
+    told += on.samples(on.pass_time(0.05))
     first, last = (sample for sample in told if sample.flags & Flag.IMU_LOST)
     assert first.imu_index in (9 + 49, 9 + 50)
     assert (last.imu_index, last.imu_count) == (18 + 99 + 1, 1)

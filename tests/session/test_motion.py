@@ -22,6 +22,11 @@ from pretouch.types import Mode
 from tests.session.arms import FollowingArm
 
 
+@pytest.fixture
+def arm(panda_model):
+    return FollowingArm(panda_model.description.q_ready)
+
+
 @pytest.fixture(scope="module")
 def controller(panda_model):
     x, y, z = panda_model.kinematics(panda_model.description.q_ready).position[panda_model.ee]
@@ -55,8 +60,8 @@ def fast(arm):
     return np.abs(np.array(arm.commands)).max()
 
 
-def test_a_run_begins_and_ends_at_rest(controller, panda_model):
-    arm, keeper = FollowingArm(panda_model.description.q_ready), Keeper()
+def test_a_run_begins_and_ends_at_rest(controller, arm, panda_model):
+    keeper = Keeper()
     assert followed(controller, arm, keeper) == Ending()
     assert keeper.steps[-1].mode is Mode.TRACK
     assert fast(arm) > 0.05
@@ -66,11 +71,10 @@ def test_a_run_begins_and_ends_at_rest(controller, panda_model):
     assert np.all(np.abs(steps) <= 1.001 * panda_model.description.qdd_max)
 
 
-def test_an_exception_in_the_recorder_brings_the_arm_to_rest_and_is_said(controller, panda_model):
+def test_an_exception_in_the_recorder_brings_the_arm_to_rest_and_is_said(controller, arm):
     def fail():
         raise ZeroDivisionError("by a recorder")
 
-    arm = FollowingArm(panda_model.description.q_ready)
     ending = followed(controller, arm, Keeper(60, fail))
     assert ending == Ending(stopped="ZeroDivisionError: by a recorder")
     assert fast(arm) > 0.05
@@ -82,8 +86,7 @@ def test_an_exception_in_the_recorder_brings_the_arm_to_rest_and_is_said(control
     ("number", "raised"),
     [(signal.SIGINT, KeyboardInterrupt), (signal.SIGTERM, Terminated), (signal.SIGHUP, Terminated)],
 )
-def test_a_signal_is_raised_after_the_arm_has_come_to_rest(controller, panda_model, number, raised):
-    arm = FollowingArm(panda_model.description.q_ready)
+def test_a_signal_is_raised_after_the_arm_has_come_to_rest(controller, arm, number, raised):
     before = signal.getsignal(signal.SIGTSTP)
     with ends_raise(), pytest.raises(raised):
         followed(controller, arm, Keeper(60, lambda: os.kill(os.getpid(), number)))
@@ -93,13 +96,11 @@ def test_a_signal_is_raised_after_the_arm_has_come_to_rest(controller, panda_mod
     assert signal.getsignal(signal.SIGTSTP) is before
 
 
-def test_ctrl_z_does_not_stop_a_program_whose_arm_moves(controller, panda_model):
-    arm = FollowingArm(panda_model.description.q_ready)
+def test_ctrl_z_does_not_stop_a_program_whose_arm_moves(controller, arm):
     assert followed(controller, arm, Keeper(20, lambda: os.kill(os.getpid(), signal.SIGTSTP)), 40) == Ending()
 
 
-def test_an_arm_that_takes_no_more_commands_is_said_and_its_motion_ended(controller, panda_model):
-    arm = FollowingArm(panda_model.description.q_ready)
+def test_an_arm_that_takes_no_more_commands_is_said_and_its_motion_ended(controller, arm):
     arm.dies_after = 60
     ending = followed(controller, arm, Keeper())
     assert ending.stopped == "The process that speaks with the arm has ended."
@@ -107,8 +108,7 @@ def test_an_arm_that_takes_no_more_commands_is_said_and_its_motion_ended(control
 
 
 @pytest.mark.parametrize(("stands", "rest_unknown"), [(True, ""), (False, "The arm does not answer.")])
-def test_an_arm_whose_motion_cannot_be_ended_is_looked_at(controller, panda_model, stands, rest_unknown):
-    arm = FollowingArm(panda_model.description.q_ready)
+def test_an_arm_whose_motion_cannot_be_ended_is_looked_at(controller, arm, stands, rest_unknown):
     arm.end_fails, arm.gone = True, not stands
     assert followed(controller, arm, Keeper(), 20) == Ending(
         stopped="The arm does not answer.", rest_unknown=rest_unknown

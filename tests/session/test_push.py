@@ -27,98 +27,68 @@ class Person:
         return self.wanted if self.begin <= time < self.begin + 1.0 else np.zeros(3)
 
 
-def confirmed(model, push=lambda axis: 14.0 * axis, **about_arm):
-    """Have a person push, and return what was said; RobotErrors come through."""
-    person, said = Person(push), []
-    arm = PushedArm(model, person.force, **about_arm)
+def confirmed(model, push=lambda axis: 14.0 * axis, said=None, felt=lambda person, time: person.force(time), **about):
+    """Have a person push an arm that feels what it does of that, and return what was said; RobotErrors come through."""
+    person, said = Person(push), [] if said is None else said
+    arm = PushedArm(model, lambda time: felt(person, time), **about)
     rest = watch(arm, arm, model.description.qd_max, 2.0)
     GuidedPush(arm, arm, model, person.ask(arm), said.append, PARAMS).confirm(rest)
     assert person.asked == len(DIRECTIONS)
     return said
 
 
-@pytest.mark.parametrize("noise", [0.0, 1.8])
-def test_a_force_on_the_robot_in_the_base_frame_is_confirmed(panda_model, noise):
-    said = confirmed(panda_model, noise=noise)
+@pytest.mark.parametrize(
+    "about",
+    [
+        {"noise": 0.0},
+        {"noise": 1.8},
+        {"push": lambda axis: 14.0 * axis + 6.0 * np.roll(axis, 1)},  # somewhat askew
+        {"tau_sign": np.nan},  # without joint torques
+        {"felt": lambda person, time: person.force(time) + np.array([2.0, -9.0, 3.0])},  # a constant bias
+    ],
+)
+def test_a_force_on_the_robot_in_the_base_frame_is_confirmed(panda_model, about):
+    said = confirmed(panda_model, **about)
     assert sum("Let go" in sentence for sentence in said) == 3
 
 
-def test_a_push_somewhat_askew_still_tells(panda_model):
-    confirmed(panda_model, lambda axis: 14.0 * axis + 6.0 * np.roll(axis, 1))
-
-
-def test_the_force_by_the_robot_is_refused(panda_model):
-    with pytest.raises(RobotError, match="force by the robot, not on it"):
-        confirmed(panda_model, wrench_sign=-1.0, tau_sign=-1.0)
-
-
-def test_a_force_in_the_frame_of_a_hand_that_points_down_is_refused(panda_model):
-    with pytest.raises(RobotError, match="not given in the base frame"):
-        confirmed(panda_model, R=np.diag([1.0, -1.0, -1.0]))
-
-
-@pytest.mark.parametrize("tau_sign", [1.0, -1.0])
-def test_the_force_by_the_robot_in_a_frame_turned_about_z_is_refused_by_the_push_upwards(panda_model, tau_sign):
-    with pytest.raises(RobotError, match="not given in the base frame"):
-        confirmed(panda_model, R=np.diag([-1.0, -1.0, 1.0]), wrench_sign=-1.0, tau_sign=tau_sign)
-
-
-def test_a_force_against_the_joint_torques_is_refused(panda_model):
-    with pytest.raises(RobotError, match="contradict each other"):
-        confirmed(panda_model, wrench_sign=-1.0)
+TURNED = np.diag([-1.0, -1.0, 1.0])
+"""Of a frame half a turn about z away: along x and y a force by the robot reads as one on it."""
 
 
 @pytest.mark.parametrize(
-    ("push", "said"),
+    ("about", "said"),
     [
-        (lambda axis: 14.0 * np.array([0.0, 0.0, 1.0]), "not along the requested axis"),
-        (lambda axis: 5.0 * axis, ""),
-        (lambda axis: 0.0 * axis, ""),
+        ({"wrench_sign": -1.0, "tau_sign": -1.0}, "force by the robot, not on it"),
+        ({"R": np.diag([1.0, -1.0, -1.0])}, "not given in the base frame"),  # but in that of a hand that points down
+        ({"R": TURNED, "wrench_sign": -1.0, "tau_sign": 1.0}, "not given in the base frame"),
+        ({"R": TURNED, "wrench_sign": -1.0, "tau_sign": -1.0}, "not given in the base frame"),
+        ({"wrench_sign": -1.0}, "contradict each other"),
+        ({"wrench_sign": -1.0, "tau_sign": np.nan}, "opposite to the pushes"),
     ],
 )
-def test_what_is_no_clear_push_decides_nothing(panda_model, push, said):
-    person, heard = Person(push), []
-    arm = PushedArm(panda_model, person.force)
-    rest = watch(arm, arm, panda_model.description.qd_max, 1.0)
+def test_a_force_that_is_not_the_one_on_the_robot_in_the_base_frame_is_refused(panda_model, about, said):
+    with pytest.raises(RobotError, match=said):
+        confirmed(panda_model, **about)
+
+
+@pytest.mark.parametrize(
+    ("about", "said"),
+    [
+        ({"push": lambda axis: 14.0 * np.array([0.0, 0.0, 1.0])}, "not along the requested axis"),
+        ({"push": lambda axis: 5.0 * axis}, ""),
+        ({"push": lambda axis: 0.0 * axis}, ""),
+        ({"tau_sign": 0.0}, "do not match"),
+        ({"felt": lambda person, time: person.force(time) * (time < person.begin + 0.3)}, ""),  # shorter than asked
+    ],
+)
+def test_what_is_no_clear_push_or_does_not_fit_the_torques_decides_nothing(panda_model, about, said):
+    heard = []
     with pytest.raises(RobotError, match=r"No clear push .* within 8 s"):
-        GuidedPush(arm, arm, panda_model, person.ask(arm), heard.append, PARAMS).confirm(rest)
+        confirmed(panda_model, said=heard, **about)
     assert (said in heard[0]) if said else not heard
 
 
-def test_an_arm_that_tells_no_joint_torques_is_confirmed_by_its_force_alone(panda_model):
-    confirmed(panda_model, tau_sign=np.nan)
-    with pytest.raises(RobotError, match="opposite to the pushes"):
-        confirmed(panda_model, wrench_sign=-1.0, tau_sign=np.nan)
-
-
-def test_torques_that_do_not_fit_the_force_are_said_and_decide_nothing(panda_model):
-    person, heard = Person(lambda axis: 14.0 * axis), []
-    arm = PushedArm(panda_model, person.force, tau_sign=0.0)
-    rest = watch(arm, arm, panda_model.description.qd_max, 1.0)
-    with pytest.raises(RobotError, match="No clear push"):
-        GuidedPush(arm, arm, panda_model, person.ask(arm), heard.append, PARAMS).confirm(rest)
-    assert "do not match" in heard[0]
-
-
-def test_a_push_shorter_than_asked_decides_nothing(panda_model):
-    person = Person(lambda axis: 14.0 * axis)
-    arm = PushedArm(panda_model, lambda time: person.force(time) if time < person.begin + 0.3 else np.zeros(3))
-    rest = watch(arm, arm, panda_model.description.qd_max, 1.0)
-    with pytest.raises(RobotError, match="No clear push"):
-        GuidedPush(arm, arm, panda_model, person.ask(arm), lambda _: None, PARAMS).confirm(rest)
-
-
 def test_a_push_that_never_ends_is_an_error(panda_model):
-    arm = PushedArm(panda_model)
-    rest = watch(arm, arm, panda_model.description.qd_max, 1.0)
-    arm.force = lambda time: np.array([0.0, 14.0, 0.0])
     with pytest.raises(RobotError, match="did not end"):
-        GuidedPush(arm, arm, panda_model, lambda _: None, lambda _: None, PARAMS).confirm(rest)
-
-
-def test_a_constant_bias_is_no_push(panda_model):
-    person = Person(lambda axis: 14.0 * axis)
-    bias = np.array([2.0, -9.0, 3.0])
-    arm = PushedArm(panda_model, lambda time: person.force(time) + bias)
-    rest = watch(arm, arm, panda_model.description.qd_max, 1.0)
-    GuidedPush(arm, arm, panda_model, person.ask(arm), lambda _: None, PARAMS).confirm(rest)
+        confirmed(panda_model, felt=lambda person, time: np.array([0.0, 14.0 * (person.asked > 0), 0.0]))

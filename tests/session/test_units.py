@@ -13,7 +13,6 @@ from pretouch.robot.model import RobotModel
 from pretouch.serving.fleet import simulated_keys
 from pretouch.serving.simulated_arm import SimulateOptions
 from pretouch.serving.threaded_arm import ThreadedArm
-from pretouch.session.session import NoUnits
 from pretouch.session.units import UnitCheck
 from pretouch.sim.scene import SceneSpec, fixtures
 
@@ -71,7 +70,3 @@ def test_a_receiver_that_has_ended_is_said(checked):
     units.close()
     with pytest.raises(HardwareError, match="receiver of the units has ended"):
         check.wait(MonotonicClock(0.01), 1.5, 1.0)
-
-
-def test_an_arm_without_units_has_none():
-    assert len(NoUnits().read().stamp) == 0
