@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from importlib.util import find_spec
 from io import BytesIO
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 from matplotlib.image import imread
@@ -23,41 +24,36 @@ PATIENCE_S = 120
 SCREENSHOTS = Path("build/screenshots")
 
 
-class Served:
-    """A page served in a thread until the context ends, and what was printed meanwhile."""
+Serve = Callable[[ServeOptions, Callable[[], bool], Callable[[str], None]], None]
+"""Serves a page until it is told to stop, and says where it is."""
 
-    def __init__(self, serve: Callable[[ServeOptions, Callable[[], bool], Callable[[str], None]], None]) -> None:
-        self.options = ServeOptions(port=free_port())
-        self.said: list[str] = []
-        self._ready, self._end = threading.Event(), threading.Event()
-        self._error: BaseException | None = None
-        self._thread = threading.Thread(target=self._run, args=(serve,), daemon=True)
 
-    def _run(self, serve: Callable[..., None]) -> None:
+@contextmanager
+def serving(serve: Serve) -> Iterator[SimpleNamespace]:
+    """A page served in a thread until the context ends, and its `options`."""
+    options, errors = ServeOptions(port=free_port()), list[BaseException]()
+    ready, end = threading.Event(), threading.Event()
+
+    def run() -> None:
         try:
-            serve(self.options, self._end.is_set, self._say)
+            serve(options, end.is_set, lambda line: ready.set())
         except BaseException as error:  # told to the test that waits
-            self._error = error
+            errors.append(error)
         finally:
-            self._ready.set()
+            ready.set()
 
-    def _say(self, line: str) -> None:
-        self.said.append(line)
-        self._ready.set()
-
-    def __enter__(self) -> "Served":
-        self._thread.start()
-        assert self._ready.wait(PATIENCE_S)
-        if self._error:
-            raise self._error
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._end.set()
-        self._thread.join(PATIENCE_S)
-        assert not self._thread.is_alive()
-        if self._error:
-            raise self._error
+    thread = threading.Thread(target=run, daemon=True)
+    thread.start()
+    assert ready.wait(PATIENCE_S)
+    try:
+        if not errors:
+            yield SimpleNamespace(options=options)
+    finally:
+        end.set()
+        thread.join(PATIENCE_S)
+        assert not thread.is_alive()
+        if errors:
+            raise errors[0]
 
 
 @contextmanager
@@ -92,7 +88,7 @@ class Visitor:
     def _count(self, data: str | bytes) -> None:
         self.received += len(data)
 
-    def open(self, served: Served) -> None:
+    def open(self, served: SimpleNamespace) -> None:
         """Wait until the page shows the arm's mode and its scene, and close viser's warning."""
         self.page.goto(url_of(served.options))
         self.page.wait_for_selector("#mode")
@@ -167,16 +163,23 @@ class Visitor:
     def tick(self, label: str) -> None:
         self.page.get_by_label(label, exact=True).click()
 
-    def drag(self, start: FloatArray, end: FloatArray) -> None:
-        """Drag with the mouse from where a point (3,) [m] is seen to where another one is."""
+    def drag(self, start: FloatArray, end: FloatArray, finger: bool = False) -> None:
+        """Drag with the mouse, or a finger, from where a point (3,) [m] is seen to where another one is."""
         box = self.page.locator("canvas").first.bounding_box()
-        (x, y), (to_x, to_y) = (seen_at(point, box) for point in (start, end))
+        seen = np.array([seen_at(point, box) for point in (start, end)])
+        way = [tuple(seen[0] + share * (seen[1] - seen[0])) for share in np.linspace(0.0, 1.0, 11)]
+        if finger:
+            session = self.page.context.new_cdp_session(self.page)
+            for kind, at in (("touchStart", way[0]), *(("touchMove", at) for at in way[1:]), ("touchEnd", ())):
+                points = [{"x": at[0], "y": at[1]}] if at else []
+                session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+            return
         mouse = self.page.mouse
-        mouse.move(x, y)
-        mouse.move(x + 1, y)
+        mouse.move(*way[0])
+        mouse.move(way[0][0] + 1, way[0][1])
         mouse.down()
-        for share in np.linspace(0.1, 1.0, 10):
-            mouse.move(x + share * (to_x - x), y + share * (to_y - y))
+        for at in way[1:]:
+            mouse.move(*at)
         mouse.up()
 
     def colour_at(self, point: FloatArray) -> FloatArray:
@@ -193,21 +196,6 @@ class Visitor:
             return bool(red > blue + 20.0)
 
         self.wait_until(there)
-
-    def drag_by_finger(self, start: FloatArray, end: FloatArray) -> None:
-        """Drag as `drag` does, on a touch screen."""
-        box = self.page.locator("canvas").first.bounding_box()
-        (x, y), (to_x, to_y) = (seen_at(point, box) for point in (start, end))
-        session = self.page.context.new_cdp_session(self.page)
-
-        def finger(kind: str, *at: float) -> None:
-            points = [{"x": at[0], "y": at[1]}] if at else []
-            session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
-
-        finger("touchStart", x, y)
-        for share in np.linspace(0.1, 1.0, 10):
-            finger("touchMove", x + share * (to_x - x), y + share * (to_y - y))
-        finger("touchEnd")
 
     def keep(self, name: str, folder: Path) -> Path:
         """Keep a picture for a person to look at, in a folder of the test's and where they are gathered."""

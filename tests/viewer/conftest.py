@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator
 
 import pytest
 from tests.ports import free_port
+from tests.viewer.fake_scene import FakeScene
 from tests.viewer.visitor import Visitor
 from viser import ViserServer
 
@@ -56,3 +57,8 @@ def visitor(page: LivePage, server: ViserServer, options: ServeOptions) -> Itera
     """Somebody at the page."""
     with Visitor(server, options) as somebody:
         yield somebody
+
+
+@pytest.fixture
+def fake() -> FakeScene:
+    return FakeScene()

@@ -1,10 +1,8 @@
 """What the tests of a live session do with it."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
-from tests.limits import assert_within_limits
 
 from pretouch.types import ControlStep, Mode
 from pretouch.viewer.simulation import LiveSimulation
@@ -12,11 +10,6 @@ from pretouch.viewer.simulation import LiveSimulation
 AWAY = np.array([1.2, 0.0, 0.8])
 ARMED_S = 1.2
 """By then the force window is full."""
-
-
-def kept_within_limits(steps: list[ControlStep], session: LiveSimulation) -> None:
-    """Check every command from the first on."""
-    assert_within_limits(SimpleNamespace(steps=steps), session.model)
 
 
 def poke(session: LiveSimulation, patience: float = 8.0) -> list[ControlStep]:
@@ -35,11 +28,6 @@ def poke(session: LiveSimulation, patience: float = 8.0) -> list[ControlStep]:
 def modes(steps: list[ControlStep]) -> list[Mode]:
     """Modes in turn."""
     return [s.mode for i, s in enumerate(steps) if i == 0 or s.mode is not steps[i - 1].mode]
-
-
-def holds(steps: list[ControlStep]) -> set[str]:
-    """Reasons of the HOLDs among some steps, up to the first bracket."""
-    return {s.reason.split(" (")[0] for s in steps if s.mode is Mode.HOLD}
 
 
 def set_speed(session: LiveSimulation, speed: float) -> None:

@@ -3,16 +3,6 @@ import threading
 from pretouch.viewer.action_queue import ActionQueue
 
 
-def test_actions_come_in_the_order_in_which_they_were_asked_for() -> None:
-    commands, done = ActionQueue(), []
-    for i in range(5):
-        commands.put(lambda i=i: done.append(i))
-    for action in commands.take():
-        action()
-    assert done == [0, 1, 2, 3, 4]
-    assert commands.take() == []
-
-
 def test_of_one_kind_only_the_newest_waits_and_in_its_own_place() -> None:
     commands, done = ActionQueue(), []
     for i in range(1000):
@@ -23,6 +13,7 @@ def test_of_one_kind_only_the_newest_waits_and_in_its_own_place() -> None:
     for action in commands.take():
         action()
     assert done == [-1, 999]
+    assert commands.take() == []
 
 
 def test_what_has_to_settle_waits_until_nothing_newer_came_for_so_long() -> None:

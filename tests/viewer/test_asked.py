@@ -58,14 +58,8 @@ def test_nothing_is_drawn_of_what_nobody_asked_or_nobody_can_use(simulation: Liv
     now = simulation.frame.step.stamp
     for wanted in (None, desired.twist(now, (np.nan, 0.0, 0.0)), desired.joint_velocities(now, np.zeros(3))):
         assert shown(simulation, wanted) is None
-    assert (
-        asked_in(
-            replace(simulation.frame, inputs=None),
-            simulation.world,
-            simulation.model.kinematics(simulation.frame.step.q),
-        )
-        is None
-    )
+    kin = simulation.model.kinematics(simulation.frame.step.q)
+    assert asked_in(replace(simulation.frame, inputs=None), simulation.world, kin) is None
 
 
 def approaching(place: FloatArray, wanted: FloatArray) -> tuple[LiveSimulation, str]:
@@ -92,17 +86,14 @@ def test_the_sentence_names_unit_and_link_that_limit_what_is_asked() -> None:
     assert said.endswith(" what hand_left sees near panda_hand.")
 
 
-def test_an_arm_at_the_end_of_its_reach_says_so(simulation: LiveSimulation) -> None:
+def test_an_arm_at_the_end_of_its_reach_and_one_without_units_say_what_limits_them(simulation: LiveSimulation) -> None:
     step, way = simulation.frame.step, np.array([0.0, 0.2, 0.0])
     assert step.limited.by is Limit.NOTHING
-    found = told(Asked(way, 0.5 * way, None), step, simulation.skin.ids, simulation.model.links)
-    assert found.sentence.endswith(" Asked 0.20 m/s, allowed 0.10 m/s: this posture allows no more.")
-
-
-def test_an_arm_without_units_says_what_limits_it(simulation: LiveSimulation) -> None:
-    step, way = simulation.frame.step, np.array([0.0, 0.2, 0.0])
-    found = told(Asked(way, 0.5 * way, None), replace(step, speed_scale=0.5), (), simulation.model.links)
-    assert found.sentence.endswith(" Asked 0.20 m/s, allowed 0.10 m/s: slowed.")
+    asked, links = Asked(way, 0.5 * way, None), simulation.model.links
+    said = told(asked, step, simulation.skin.ids, links).sentence
+    assert said.endswith(" Asked 0.20 m/s, allowed 0.10 m/s: this posture allows no more.")
+    said = told(asked, replace(step, speed_scale=0.5), (), links).sentence
+    assert said.endswith(" Asked 0.20 m/s, allowed 0.10 m/s: slowed.")
 
 
 def test_the_page_of_a_blind_arm_knows_no_unit_in_use() -> None:

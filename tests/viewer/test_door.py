@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.ports import free_port
-from tests.viewer.visitor import Visitor, answered, control, fetched, refusal, until, update
+from tests.viewer.visitor import Visitor, answered, control, refusal, until, update
+from viser import ViserServer
 
 from pretouch.errors import ViewerError
 from pretouch.viewer.commander import Commander
 from pretouch.viewer.door import Door
 from pretouch.viewer.live import PERIOD_S, LivePage
 from pretouch.viewer.server import ServeOptions, served
-from pretouch.viewer.simulation import LiveSimulation
 
 ADDRESS = "Open the page at the address that the program printed: each start has its own.\n"
 DRAG = {
@@ -24,27 +24,11 @@ DRAG = {
 
 
 @pytest.fixture(scope="module")
-def unmoved() -> Iterator[tuple[LivePage, ServeOptions]]:
-    """One page for all that is refused: each test finds it as it was."""
+def door() -> Iterator[ServeOptions]:
+    """One page for all that is refused."""
     options = ServeOptions(port=free_port())
-    with served(options, "test") as server:
-        page = LivePage(server, LiveSimulation())
-        yield page, options
-        turns(page, 3)
-        assert page._simulation.settings.profile.name == "paper"
-
-
-@pytest.fixture
-def door(unmoved: tuple[LivePage, ServeOptions]) -> ServeOptions:
-    return unmoved[1]
-
-
-@pytest.fixture
-def liar(unmoved: tuple[LivePage, ServeOptions]) -> Iterator[Visitor]:
-    with Visitor(unmoved[0]._server, unmoved[1]) as somebody:
-        yield somebody
-        somebody.settle()
-        assert len(unmoved[0]._actions) == 0
+    with served(options, "test"):
+        yield options
 
 
 def turns(page: LivePage, count: int) -> None:
@@ -56,23 +40,23 @@ def turns(page: LivePage, count: int) -> None:
 
 
 def test_the_address_with_its_token_is_answered_and_tells_it_to_nobody_else(door: ServeOptions) -> None:
-    status, text, kind = fetched(door)
+    status, text, kind = answered(door)
     assert (status, kind) == (200, "text/html")
     assert text.startswith("<!doctype html>")
     assert refusal(door) == (101, "")
     assert refusal(door, origin=f"http://127.0.0.1:{door.port}") == (101, "")
 
 
-@pytest.mark.parametrize("path", ["/", "/index.html", "/wrong/", "/wrong/index.html", "/?token=", "//"])
-def test_without_the_token_there_is_a_sentence(door: ServeOptions, path: str) -> None:
-    assert fetched(door, path) == (403, ADDRESS, "text/plain; charset=utf-8")
-    assert refusal(door, path) == (403, ADDRESS)
+PLAIN = [b"/", b"/index.html", b"/wrong/", b"/wrong/index.html", b"/?token=", b"//"]
+NOT_ASCII = [b"/\xff", b"/\xc3\xa9/", b"/{token}\xff/", b"/\xff/{token}/", "/tokén/".encode()]
 
 
-@pytest.mark.parametrize("path", [b"/\xff", b"/\xc3\xa9/", b"/{token}\xff/", b"/\xff/{token}/", "/tokén/".encode()])
-def test_a_path_that_is_not_ascii_is_refused_like_any_other(door: ServeOptions, path: bytes) -> None:
-    status, text = answered(door, path.replace(b"{token}", door.token.encode()))
-    assert (status, text) == (403, ADDRESS)
+@pytest.mark.parametrize("path", PLAIN + NOT_ASCII)
+def test_without_the_token_there_is_a_sentence(door: ServeOptions, path: bytes) -> None:
+    asked = path.replace(b"{token}", door.token.encode())
+    assert answered(door, asked) == (403, ADDRESS, "text/plain; charset=utf-8")
+    if path in PLAIN:
+        assert refusal(door, path.decode()) == (403, ADDRESS)
 
 
 @pytest.mark.parametrize("rest", [b"\xff", b"\xc3\xa9.js", b"%ff", b"%00", b"../%2e%2e/\xff", b"?\xff"])
@@ -85,7 +69,7 @@ def test_behind_the_token_a_path_that_is_not_ascii_is_a_file_or_none(door: Serve
     [("This page is not at", b"Host: \xff"), ("Pages of", b"Host: 127.0.0.1:{port}\r\nOrigin: http://\xff")],
 )
 def test_a_header_that_is_not_ascii_is_refused_in_a_sentence(door: ServeOptions, header: str, line: bytes) -> None:
-    status, text = answered(door, b"/", line.replace(b"{port}", str(door.port).encode()))
+    status, text, _ = answered(door, b"/", line.replace(b"{port}", str(door.port).encode()))
     assert (status, text.startswith(header)) == (403, True)
 
 
@@ -97,22 +81,21 @@ def test_a_page_of_somebody_else_does_not_get_in_though_it_knows_the_token(door:
 
 @pytest.mark.parametrize("host", ["evil.example", "127.0.0.1.evil.example", "localhost.", "", "[", "a b"])
 def test_a_name_that_leads_here_but_is_not_ours_does_not_get_in(door: ServeOptions, host: str) -> None:
-    assert fetched(door, Host=f"{host}:{door.port}")[0] in (400, 403)
+    assert answered(door, headers=f"Host: {host}:{door.port}".encode())[0] in (400, 403)
 
 
 @pytest.mark.parametrize("host", ["localhost", "127.0.0.1", "192.168.1.7", "[::1]"])
 def test_numbers_and_names_of_this_machine_get_in(door: ServeOptions, host: str) -> None:
-    assert fetched(door, Host=f"{host}:{door.port}")[0] == 200
+    assert answered(door, headers=f"Host: {host}:{door.port}".encode())[0] == 200
 
 
 def test_nobody_can_have_the_page_shared(
-    unmoved: tuple[LivePage, ServeOptions], liar: Visitor, monkeypatch: pytest.MonkeyPatch
+    server: ViserServer, visitor: Visitor, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked: list[object] = []
-    server = unmoved[0]._server
     monkeypatch.setattr(server, "request_share_url", lambda: asked.append(0))
-    liar.say({"type": "ShareUrlRequest"})
-    liar.settle()
+    visitor.say({"type": "ShareUrlRequest"})
+    visitor.settle()
     assert not [kind for kind in server._websock_server._incoming_handlers if "Share" in kind.__name__]
     server._thread_executor.submit(int).result()
     assert asked == []

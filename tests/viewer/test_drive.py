@@ -83,12 +83,16 @@ def test_the_hand_goes_to_a_target_that_is_dragged_and_stays(page: LivePage, dri
     np.testing.assert_allclose(hand(page), goal, atol=0.005)
 
 
-def test_a_driver_who_leaves_has_the_arm_come_to_rest_and_the_next_goes_on(
+def test_a_driver_from_whom_the_command_is_taken_or_who_leaves_has_the_arm_come_to_rest_and_the_next_goes_on(
     page: LivePage, options: ServeOptions, driver: Visitor
 ) -> None:
+    aim(page, driver, hand(page) + np.array([0.0, 0.4, 0.0]))
+    turns(page, 10)
     with Visitor(page._server, options) as other:
         do(page, other, control(page, "Take command"), True)
-        aim(page, other, hand(page) + np.array([0.0, 0.4, 0.0]))
+        turns(page, 15)
+        assert page._simulation.frame.step.mode is Mode.HOLD
+        aim(page, other, hand(page) - np.array([0.0, 0.4, 0.0]))
         turns(page, 10)
         assert speed(page) > 0.1
     turns(page, 15)
@@ -101,15 +105,6 @@ def test_a_driver_who_leaves_has_the_arm_come_to_rest_and_the_next_goes_on(
     aim(page, driver, rest)
     turns(page, 3)
     assert page._simulation.frame.step.mode is Mode.TRACK
-
-
-def test_who_takes_the_command_has_the_arm_come_to_rest(page: LivePage, options: ServeOptions, driver: Visitor) -> None:
-    aim(page, driver, hand(page) + np.array([0.0, 0.4, 0.0]))
-    turns(page, 10)
-    with Visitor(page._server, options) as other:
-        do(page, other, control(page, "Take command"), True)
-        turns(page, 15)
-        assert page._simulation.frame.step.mode is Mode.HOLD
 
 
 def test_who_does_not_command_drives_nothing_and_is_shown_again_where_the_target_is(

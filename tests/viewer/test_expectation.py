@@ -20,24 +20,20 @@ def obstacles(units: list[int], distances: list[float]) -> Obstacles:
     )  # fmt: skip
 
 
-def test_contact_is_expected_fully_at_d_min_not_at_all_at_d_max_and_by_half_between() -> None:
-    params = ThresholdParams(d_min_m=0.05, d_max_m=0.85)
-    found = expectation(obstacles([0, 1, 2, 3, 4], [0.05, 0.45, 0.85, 2.0, -0.01]), 7, params)
-    np.testing.assert_allclose(found, [1.0, 0.5, 0.0, 0.0, 1.0, 0.0, 0.0], atol=1e-12)
-
-
-def test_the_nearest_of_two_points_of_a_unit_counts() -> None:
-    found = expectation(obstacles([1, 1], [0.6, 0.2]), 2, ThresholdParams())
-    assert found[1] == pytest.approx((0.8 - 0.2) / 0.75)
-
-
-def test_what_outside_sources_see_is_expected_at_no_unit() -> None:
-    found = expectation(obstacles([1, 7, 12], [0.45, 0.05, 0.05]), 7, ThresholdParams(d_min_m=0.05, d_max_m=0.85))
-    np.testing.assert_allclose(found, [0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0], atol=1e-12)
-
-
-def test_without_obstacles_nothing_is_expected() -> None:
-    assert not expectation(obstacles([], []), 7, ThresholdParams()).any()
+@pytest.mark.parametrize(
+    ("units", "distances", "expected"),
+    [
+        ([0, 1, 2, 3, 4], [0.05, 0.45, 0.85, 2.0, -0.01], [1.0, 0.5, 0.0, 0.0, 1.0, 0.0, 0.0]),
+        ([1, 1], [0.65, 0.25], [0.0, 0.75, 0.0, 0.0, 0.0, 0.0, 0.0]),  # the nearest of two points counts
+        ([1, 7, 12], [0.45, 0.05, 0.05], [0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0]),  # two seen by outside sources
+        ([], [], [0.0] * 7),
+    ],
+)
+def test_contact_is_expected_fully_at_d_min_not_at_all_at_d_max_and_by_half_between(
+    units: list[int], distances: list[float], expected: list[float]
+) -> None:
+    found = expectation(obstacles(units, distances), 7, ThresholdParams(d_min_m=0.05, d_max_m=0.85))
+    np.testing.assert_allclose(found, expected, atol=1e-12)
 
 
 def test_a_unit_colours_the_surface_under_it_fully_and_nothing_from_the_spread_on() -> None:

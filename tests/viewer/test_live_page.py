@@ -46,15 +46,6 @@ def give(page: LivePage, label: str, value: object) -> None:
         asyncio.run(told(SimpleNamespace(client_id=0, client=None, target=found)))
 
 
-def submit(page: LivePage, text: str) -> None:
-    """Type a profile as somebody at the page does, and press Enter."""
-    field = control(page, "Profile text")
-    field._impl.value = text
-    form = page._server.gui._container_handle_from_uuid[field._impl.parent_container_id]
-    for told in form._submit_cb:
-        asyncio.run(told(SimpleNamespace(client_id=0)))
-
-
 def click(page: LivePage, label: str) -> None:
     give(page, label, True)
 
@@ -64,13 +55,12 @@ def clock(page: LivePage) -> Clock:
     return Clock(page)
 
 
-def test_a_second_of_ticks_is_a_second_of_the_simulation(clock: Clock, simulation: LiveSimulation) -> None:
+def test_a_second_of_ticks_is_a_second_of_the_simulation_but_in_slow_motion_and_while_paused(
+    clock: Clock, simulation: LiveSimulation
+) -> None:
     before = simulation.time
     clock.turn(1.0)
     assert simulation.time - before == pytest.approx(1.0, abs=0.011)
-
-
-def test_slow_motion_and_pause(clock: Clock, simulation: LiveSimulation) -> None:
     before = simulation.time
     clock.page.controls.running.speed = 0.1
     clock.turn(2.0)
@@ -92,14 +82,6 @@ def test_what_people_ask_for_waits_for_the_loop(clock: Clock, simulation: LiveSi
     assert not np.allclose(simulation.frame.hand_target, [0.9, 0.3, 0.6])
     clock.turn(0.1)
     np.testing.assert_allclose(simulation.frame.hand_target, [0.9, 0.3, 0.6])
-
-
-def test_what_is_refused_is_said_and_changes_nothing(clock: Clock, simulation: LiveSimulation) -> None:
-    before = simulation.world.profile
-    clock.page.ask(lambda: set_speed(simulation, -1.0))
-    clock.turn(0.1)
-    assert clock.page.notice.startswith("Not done: TaskParams.speed_m_s is -1")
-    assert simulation.world.profile == before
 
 
 def test_nobody_watching_costs_nothing_but_the_simulation(clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -153,34 +135,6 @@ def test_a_number_counts_when_nobody_types_any_more(clock: Clock, simulation: Li
     assert simulation.world.profile.name == control(clock.page, "Profile text").value == "paper:task.speed_m_s=0.2"
 
 
-def test_a_profile_is_typed_as_on_the_command_line(clock: Clock, simulation: LiveSimulation) -> None:
-    assert control(clock.page, "Profile text").value == "paper"
-    submit(clock.page, " pretouch:task.speed_m_s=0.2 ")
-    clock.turn(0.1)
-    assert simulation.world.profile == profile("pretouch:task.speed_m_s=0.2")
-    shown = {"Profile": "pretouch", "Path speed [m/s]": 0.2, "Profile text": "pretouch:task.speed_m_s=0.2"}
-    assert {label: control(clock.page, label).value for label in shown} == shown
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [("nosuch", "Not done: The profile 'nosuch' is unknown: choose from paper, "),
-     ("paper:approach.d_crit_m=0.9", "Not done: ApproachRestriction.d_notice_m is 0.6: it must be greater"),
-     ("paper:task.control_period_s=0.002", "Not done: The control period is 0.002 s, but can change only by a reset")],
-)  # fmt: skip
-def test_a_profile_that_is_refused_stays_to_be_put_right_and_changes_nothing(
-    clock: Clock, simulation: LiveSimulation, text: str, said: str
-) -> None:
-    submit(clock.page, text)
-    clock.turn(0.1)
-    assert clock.page.notice.startswith(said)
-    assert control(clock.page, "Profile text").value == text
-    assert simulation.world.profile == PROFILES["paper"]
-    give(clock.page, "Profile", "blind")
-    clock.turn(0.1)
-    assert control(clock.page, "Profile text").value == "blind"
-
-
 def test_a_changed_profile_is_named_so_that_it_can_be_found_again() -> None:
     changed = with_name(profile("paper:detect.f_base_n=8.12345678:task.restore_cycles=150"), "paper")
     assert changed.name == "paper:task.restore_cycles=150:detect.f_base_n=8.12345678"
@@ -189,13 +143,16 @@ def test_a_changed_profile_is_named_so_that_it_can_be_found_again() -> None:
 
 
 def test_all_controls_show_what_holds(clock: Clock, simulation: LiveSimulation) -> None:
+    assert control(clock.page, "Profile text").value == "paper"
     clock.page.controls.running.speed = 0.5
+    clock.page.ask(lambda: simulation.set_profile(profile("pretouch:task.speed_m_s=0.2")))
     clock.page.ask(lambda: simulation.set_path("line"))
     clock.page.ask(lambda: simulation.reset(object="board -y", faults=Faults(frozenset({"hand_left"}), 2.0, 0.1)))
     clock.turn(0.1)
     shown = {
         "Clock speed": 0.5, "Path": "line", "Object": "board -y", "hand_left": False, "Noise factor": 2.0,
-        "More latency [s]": 0.1,
+        "More latency [s]": 0.1, "Profile": "pretouch", "Path speed [m/s]": 0.2,
+        "Profile text": "pretouch:task.speed_m_s=0.2",
     }  # fmt: skip
     assert {label: control(clock.page, label).value for label in shown} == shown
 
@@ -232,14 +189,18 @@ def test_what_was_said_of_the_simulation_before_is_on_the_page_at_first(
     assert clock.page.notice == ""
 
 
-def test_a_hand_on_the_move_and_another_view_leave_a_notice_standing(clock: Clock, simulation: LiveSimulation) -> None:
+def test_what_is_refused_is_said_until_the_next_click_though_the_hand_moves_and_changes_nothing(
+    clock: Clock, simulation: LiveSimulation
+) -> None:
+    before = simulation.world.profile
     clock.page.ask(lambda: set_speed(simulation, -1.0))
     clock.turn(0.1)
+    assert simulation.world.profile == before
     give(clock.page, "x [m]", 0.9)
     give(clock.page, "Cones", False)
     clock.page._drag(0, np.array(CAMERA_FROM), np.array([1.0, 0.4, 0.3]))
     clock.turn(0.1)
-    assert clock.page.notice.startswith("Not done: ")
+    assert clock.page.notice.startswith("Not done: TaskParams.speed_m_s is -1")
     click(clock.page, "Pause")
     clock.turn(0.1)
     assert clock.page.notice == ""

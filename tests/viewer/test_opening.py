@@ -80,12 +80,6 @@ def test_a_blind_arm_runs_into_the_same_hand_unslowed_and_with_more_force(protec
     assert max(blind.force) > 30.0
 
 
-def test_the_same_opening_is_the_same_run(panda_model: RobotModel, protected: Played) -> None:
-    again = Played(panda_model, "pretouch")
-    assert again.force == protected.force
-    np.testing.assert_array_equal(again.steps[-1].command, protected.steps[-1].command)
-
-
 @pytest.mark.parametrize("how", ["move", "point"])
 def test_a_person_who_moves_the_hand_ends_it_at_once(panda_model: RobotModel, how: str) -> None:
     simulation = LiveSimulation(model=panda_model)

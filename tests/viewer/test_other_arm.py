@@ -17,7 +17,6 @@ from pretouch.sim.plant_params import plant_params_of
 from pretouch.sim.scene import HandSpec, SceneSpec
 from pretouch.types import Mode
 from pretouch.viewer.mouse import Mouse
-from pretouch.viewer.opening import _units_above
 from pretouch.viewer.room import LiveSettings, live_path, settings_for
 from pretouch.viewer.simulation import LiveSimulation
 
@@ -53,10 +52,6 @@ def test_round_a_larger_arm_the_hand_has_more_space():
     np.testing.assert_allclose(larger.highest, [2.1, 1.8, 2.1])
     np.testing.assert_allclose(larger.lowest, [-1.5, -1.8, -0.45])
     np.testing.assert_allclose(smaller.highest, usual.highest)
-
-
-def test_the_opening_hand_comes_where_units_look(panda_model):
-    assert _units_above(panda_model, load_skin(LIVE_SKIN, panda_model)) == pytest.approx(0.058, abs=1e-3)
 
 
 @pytest.mark.slow

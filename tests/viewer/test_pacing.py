@@ -15,20 +15,14 @@ def run(pace: Pace, start: float, seconds: float, period: float, speed: float = 
     return start
 
 
-def test_a_machine_that_keeps_up_runs_at_real_time_and_says_nothing() -> None:
+@pytest.mark.parametrize("speed", [1.0, 0.1])
+def test_a_machine_that_keeps_up_runs_at_real_time_and_says_nothing_in_slow_motion_too(speed: float) -> None:
     pace = Pace()
-    run(pace, 0.0, 10.0, PERIOD)
-    assert pace.factor == pytest.approx(1.0, rel=1e-6)
+    run(pace, 0.0, 10.0, PERIOD, speed=speed)
+    assert pace.factor == pytest.approx(speed, rel=1e-6)
     assert pace.updates == pytest.approx(30.0, rel=1e-6)
     assert not pace.slow
     assert pace.sentence() == ""
-
-
-def test_slow_motion_is_not_slowness() -> None:
-    pace = Pace()
-    run(pace, 0.0, 10.0, PERIOD, speed=0.1)
-    assert pace.factor == pytest.approx(0.1, rel=1e-6)
-    assert not pace.slow
 
 
 def test_a_slow_machine_is_named_after_a_while_and_the_share_is_right() -> None:

@@ -1,13 +1,15 @@
 """The pages as a person meets them: in a headless Chromium, by mouse and controls."""
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from pathlib import Path
 from threading import Event, Thread
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
-from tests.viewer.browser import Served, Visitor, chromium
+from tests.viewer.browser import chromium, serving
 
 from pretouch.explanation import explain
 from pretouch.hardware.keys import Keys, UnitKey
@@ -30,8 +32,8 @@ from pretouch.viewer.simulation import LiveSimulation
 pytestmark = pytest.mark.slow
 
 
-def live(simulation: LiveSimulation) -> Served:
-    return Served(lambda options, until, say: serve_live(simulation, options, until, say))
+def live(simulation: LiveSimulation) -> AbstractContextManager[SimpleNamespace]:
+    return serving(lambda options, until, say: serve_live(simulation, options, until, say))
 
 
 @pytest.fixture
@@ -65,12 +67,11 @@ def test_a_hand_dragged_into_the_arm_leads_to_a_reaction_and_back_and_the_camera
         visitor.wait_for("mode", Mode.TRACK.name)
         visitor.wait_for_skin(start)
         before = camera(pages[0])
-        drag = visitor.drag_by_finger if touch else visitor.drag
-        drag(start, np.array([0.5, 0.25, 0.25]))
-        # the hand is drawn onto the circle in the picture, at the arm's depth where that is near
         at = np.array([0.5, 0.25, 0.25])
-        visitor.wait_until(lambda: off_line(target(simulation), before, at) < 0.03)
-        visitor.wait_until(lambda: off_line(hand(simulation), before, at) < 0.05)
+        visitor.drag(start, at, touch)
+        # the hand is drawn onto the circle in the picture, at the arm's depth where that is near
+        visitor.wait_until(lambda: off_line(simulation.hand_target, before, at) < 0.03)
+        visitor.wait_until(lambda: off_line(simulation.frame.hand, before, at) < 0.05)
         np.testing.assert_allclose(camera(pages[0]), before, atol=1e-9)
         visitor.press("Reset")  # the hand may have pushed the arm anywhere by now
         visitor.wait_until(lambda: simulation.time < 2.0)
@@ -81,27 +82,17 @@ def test_a_hand_dragged_into_the_arm_leads_to_a_reaction_and_back_and_the_camera
         visitor.type("x [m]", 1.2)
         visitor.wait_until(lambda: simulation.hand_target[0] == 1.2)
         visitor.wait_for("mode", Mode.TRACK.name)
-        drag(np.array([0.3, -0.6, 0.1]), np.array([0.3, -0.4, 0.3]))  # beside hand and arm: turns the camera
+        visitor.drag(
+            np.array([0.3, -0.6, 0.1]), np.array([0.3, -0.4, 0.3]), touch
+        )  # beside hand and arm: turns the camera
         visitor.wait_until(lambda: np.linalg.norm(camera(pages[0]) - before) > 0.1)
-        assert target(simulation)[0] == 1.2
+        assert simulation.hand_target[0] == 1.2
 
 
 def off_line(point: FloatArray, eye: FloatArray, through: FloatArray) -> float:
     """Distance of a point (3,) from the line of sight through another [m]."""
     along = (through - eye) / np.linalg.norm(through - eye)
     return float(np.linalg.norm(np.cross(point - eye, along)))
-
-
-def hand(simulation: LiveSimulation) -> FloatArray:
-    """Where the hand is (3,) [m]."""
-    assert simulation.frame.hand is not None
-    return simulation.frame.hand
-
-
-def target(simulation: LiveSimulation) -> FloatArray:
-    """Where the hand is to be (3,) [m]."""
-    assert simulation.frame.hand_target is not None
-    return simulation.frame.hand_target
 
 
 def test_the_page_changes_profile_refuses_what_is_not_allowed_and_drops_a_unit(tmp_path: Path) -> None:
@@ -114,9 +105,12 @@ def test_the_page_changes_profile_refuses_what_is_not_allowed_and_drops_a_unit(t
         visitor.wait_until(lambda: visitor.value("Profile text") == "blind")
 
         visitor.enter("Profile text", "paper:approach.d_crit_m=0.9")
-        visitor.wait_for("notice", "Not done: ApproachRestriction.d_notice_m")
+        visitor.wait_for("notice", "Not done: ApproachRestriction.d_notice_m is 0.6: it must be greater")
         assert simulation.world.profile.name == visitor.value("Profile") == "blind"
-        visitor.enter("Profile text", "paper:detect.f_base_n=8")
+        assert visitor.value("Profile text") == "paper:approach.d_crit_m=0.9"  # stays to be put right
+        visitor.choose("Profile", "paper")
+        visitor.wait_until(lambda: visitor.value("Profile text") == "paper")
+        visitor.enter("Profile text", " paper:detect.f_base_n=8 ")
         visitor.wait_until(lambda: simulation.world.profile.name == "paper:detect.f_base_n=8")
         visitor.wait_until(lambda: visitor.value("Profile") == "paper")
         visitor.tab("World")
@@ -174,10 +168,7 @@ def test_a_recording_is_played_and_jumped_through(tmp_path: Path) -> None:
         with begun(options, "test", "The recording", "see it", say) as ready:
             show_replay(recorded, ready(), until, say)
 
-    with (
-        Served(play) as served,
-        chromium() as visitor,
-    ):
+    with serving(play) as served, chromium() as visitor:
         visitor.open(served)
         visitor.wait_for("mode", Mode.HOLD.name)
         visitor.press("Next event")
@@ -204,7 +195,8 @@ def test_a_person_drives_the_arm_at_another_by_target(tmp_path: Path, pages: lis
         visitor.choose("Task", "drive yourself")
         visitor.press("Pause")
         visitor.wait_for("reason", "No motion is asked.")
-        start = rest(visitor, simulation)
+        visitor.wait_until(lambda: float(np.abs(simulation.frame.step.command).max()) < 0.03)
+        start = simulation.frame.step.ee_position
         simulation.move_hand(start + np.array([0.0, 0.45, 0.05]))
         # the head of an arrow of the target, with the fingers down: its rings are nearer to the middle
         handle = start - np.array([0.0, 0.195, 0.0])
@@ -215,18 +207,6 @@ def test_a_person_drives_the_arm_at_another_by_target(tmp_path: Path, pages: lis
         assert goal is not None
         assert goal[1, 3] > start[1] + 0.2
         assert np.linalg.norm(goal[[0, 2], 3] - start[[0, 2]]) < 0.05
-
-
-def hand_of_arm(simulation: LiveSimulation) -> FloatArray:
-    """Where the arm's hand is (3,) [m]."""
-    return simulation.frame.step.ee_position
-
-
-def rest(visitor: Visitor, simulation: LiveSimulation) -> FloatArray:
-    """Wait until nothing is asked and the arm stands, and return where its hand is (3,) [m]."""
-    visitor.wait_for("reason", "No motion is asked.")
-    visitor.wait_until(lambda: float(np.abs(simulation.frame.step.command).max()) < 0.03)
-    return hand_of_arm(simulation)
 
 
 def test_real_units_on_a_simulated_arm_are_shown_and_missed(tmp_path: Path) -> None:

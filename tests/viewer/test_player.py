@@ -9,8 +9,10 @@ from pretouch.viewer.player import Player, Timeline
 STAMPS = 100.0 + np.arange(101) / 100
 
 
-def test_playing_takes_as_long_as_it_took() -> None:
+def test_playing_takes_as_long_as_it_took_and_a_paused_player_stands() -> None:
     player = Player(STAMPS)
+    player.advance(1.0)
+    assert player.index == 0
     player.play()
     for _ in range(15):
         player.advance(1 / 30)
@@ -22,12 +24,6 @@ def test_playing_takes_as_long_as_it_took() -> None:
     assert player.ended
     assert not player.playing
     assert player.index == 100
-
-
-def test_a_paused_player_stands() -> None:
-    player = Player(STAMPS)
-    player.advance(1.0)
-    assert player.index == 0
 
 
 def test_from_the_end_it_plays_from_the_start() -> None:

@@ -21,18 +21,12 @@ def test_a_history_holds_the_last_seconds_and_no_more(some_step: ControlStep) ->
     assert np.all(np.diff(time) > 0)
 
 
-def test_a_short_peak_of_force_is_not_lost(some_step: ControlStep) -> None:
+def test_a_short_peak_of_force_or_evidence_is_not_lost(some_step: ControlStep) -> None:
     history = History(np.arange(K))
     for i in range(500):
-        force = np.array([0.0, -40.0 if i == 251 else 0.0, 0.0])
-        history.add(replace(some_step, stamp=i / 100, force=force))
+        peak = float(i == 251)
+        history.add(replace(some_step, stamp=i / 100, force=np.array([0.0, -40.0 * peak, 0.0]), evidence=1.2 * peak))
     assert history.columns()[1 + K + 1].min() == -40.0
-
-
-def test_a_short_peak_of_evidence_is_not_lost(some_step: ControlStep) -> None:
-    history = History(np.arange(K))
-    for i in range(500):
-        history.add(replace(some_step, stamp=i / 100, evidence=1.2 if i == 251 else 0.0))
     assert history.columns()[12 + K].max() == 1.2
 
 
@@ -50,10 +44,10 @@ def test_columns_are_what_their_names_say(some_step: ControlStep) -> None:
     assert last[13 + K] == min(some_step.obstacles.body_distance, default=9.0)
 
 
-def test_time_going_back_begins_anew(some_step: ControlStep) -> None:
-    history = History(np.arange(K))
+def test_time_counts_from_the_start_and_going_back_begins_anew(some_step: ControlStep) -> None:
+    history = History(np.arange(K), start=100.0)
     for stamp in (*np.arange(0, 5, 0.01), *np.arange(0, 1, 0.01)):
-        history.add(replace(some_step, stamp=float(stamp)))
+        history.add(replace(some_step, stamp=100.0 + float(stamp)))
     time = history.columns()[0]
     assert time[0] == 0.0
     assert time[-1] < 1.0
@@ -70,15 +64,6 @@ def test_a_history_of_little_can_be_drawn(some_step: ControlStep, samples: int) 
     assert np.all(np.isfinite(columns[0]))
 
 
-def test_time_counts_from_the_start(some_step: ControlStep) -> None:
-    history = History(np.arange(K), start=100.0)
-    for i in range(100):
-        history.add(replace(some_step, stamp=100.0 + i / 100))
-    time = history.columns()[0]
-    assert time[0] == 0.0
-    assert time[-1] < 1.0
-
-
 def test_a_unit_whose_reading_is_late_shows_nothing(some_step: ControlStep) -> None:
     history, step = History(np.arange(K)), replace(some_step, range_distance=np.full(K, 0.5))
     history.add(step, late=np.arange(K) == 3)
@@ -86,12 +71,13 @@ def test_a_unit_whose_reading_is_late_shows_nothing(some_step: ControlStep) -> N
     assert np.flatnonzero(distances > 1.0).tolist() == [3]  # the axis ends at 1 m
 
 
-def test_axes_of_force_are_symmetric_and_grow_with_the_force(some_step: ControlStep) -> None:
+def test_axes_of_force_are_symmetric_and_grow_with_the_force_and_no_scale_changes(some_step: ControlStep) -> None:
+    """A page whose scale is changed no longer follows the time."""
     history, gui = History(np.arange(K)), FakeGui()
     plots = Plots(gui, history, [f"unit {i}" for i in range(K)])  # type: ignore[arg-type]
     gui.more.value = True
     limits = replace(some_step.thresholds, parts=np.zeros((6, 3)))
-    seen = []
+    seen, before = [], [plot.scales for plot in gui.plots]
     for i, force in enumerate((3.0, -20.0, 65.0, np.nan)):
         history.add(replace(some_step, stamp=float(i), force=np.array([0.0, force, 0.0]), thresholds=limits))
         plots.draw(float(i))
@@ -100,15 +86,6 @@ def test_axes_of_force_are_symmetric_and_grow_with_the_force(some_step: ControlS
     at_rest = (-FORCE_N, FORCE_N)
     assert [forces[1] for forces in seen] == [at_rest, (-30.0, 30.0), (-120.0, 120.0), (-120.0, 120.0)]
     assert all(forces[0] == forces[2] == at_rest for forces in seen)
-
-
-def test_no_scale_changes_for_a_page_would_no_longer_follow_the_time(some_step: ControlStep) -> None:
-    history, gui = History(np.arange(K)), FakeGui()
-    plots = Plots(gui, history, [f"unit {i}" for i in range(K)])  # type: ignore[arg-type]
-    before = [plot.scales for plot in gui.plots]
-    for i, force in enumerate((3.0, -20.0, 65.0, 0.0)):
-        history.add(replace(some_step, stamp=float(i), force=np.full(3, force)))
-        plots.draw(float(i))
     assert all(plot.scales is scales for plot, scales in zip(gui.plots, before, strict=True))
     assert all(len({len(line) for line in plot.data}) == 1 for plot in gui.plots)
 

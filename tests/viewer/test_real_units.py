@@ -1,5 +1,7 @@
 """Real units on the simulated arm: readings are as old in the simulation as they are in the room."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from viser import ViserServer
@@ -43,17 +45,15 @@ def real(room: Room) -> RealUnits:
     return RealUnits(room, clock=lambda: room.now)
 
 
-def test_a_reading_is_as_old_in_the_simulation_as_in_the_room(room: Room, real: RealUnits) -> None:
-    real.begin(lambda: 5.0)
-    room.hear(age=0.012)
-    np.testing.assert_allclose(real.read().stamp, 5.0 - 0.012, atol=1e-9)
-
-
-def test_a_reading_keeps_the_stamp_it_was_given_however_fast_the_clocks_go(room: Room, real: RealUnits) -> None:
+def test_a_reading_is_as_old_in_the_simulation_as_in_the_room_and_keeps_its_stamp_however_fast_the_clocks_go(
+    room: Room, real: RealUnits
+) -> None:
     time = [5.0]
     real.begin(lambda: time[0])
-    room.hear()
+    assert np.all(np.isneginf(real.read().stamp)), "what was never heard stays unheard"
+    room.hear(age=0.012)
     first = real.read().stamp
+    np.testing.assert_allclose(first, 5.0 - 0.012, atol=1e-9)
     room.now, time[0] = room.now + 1.0, 5.5  # at half speed
     np.testing.assert_array_equal(real.read().stamp, first)
 
@@ -67,15 +67,11 @@ def test_no_stamp_goes_back_while_the_simulation_stands(room: Room, real: RealUn
     np.testing.assert_array_equal(real.read().stamp, first)
 
 
-def test_what_was_never_heard_stays_unheard(room: Room, real: RealUnits) -> None:
-    real.begin(lambda: 5.0)
-    assert np.all(np.isneginf(real.read().stamp))
-
-
-def test_an_arm_with_real_units_goes_while_they_are_heard_and_holds_when_they_are_not(
-    room: Room, real: RealUnits
+def test_an_arm_with_real_units_goes_while_they_are_heard_and_holds_when_they_are_not_and_all_is_recorded(
+    room: Room, real: RealUnits, tmp_path: Path
 ) -> None:
     simulation = LiveSimulation(real=real)
+    simulation.start_recording(tmp_path / "desk.mcap")
     for _ in range(200):
         room.now += 0.01
         room.hear()
@@ -92,6 +88,12 @@ def test_an_arm_with_real_units_goes_while_they_are_heard_and_holds_when_they_ar
         room.hear()
         step = simulation.single_step()
     assert step.mode is Mode.TRACK
+    simulation.stop_recording()
+    recorded = open_recording(tmp_path / "desk.mcap")
+    assert recorded.runs[0].about["units"] == "real"
+    verdict = verify(recorded)
+    assert verdict.agrees
+    assert verdict.checked == 280
 
 
 def test_real_units_cannot_be_made_to_fail_but_can_be_reset(room: Room, real: RealUnits) -> None:
@@ -102,21 +104,6 @@ def test_real_units_cannot_be_made_to_fail_but_can_be_reset(room: Room, real: Re
     room.hear()
     simulation.reset()
     np.testing.assert_allclose(simulation.frame.age, 0.012, atol=1e-9)
-
-
-def test_readings_of_real_units_are_recorded_and_verify(room: Room, real: RealUnits, tmp_path) -> None:
-    simulation = LiveSimulation(real=real)
-    simulation.start_recording(tmp_path / "desk.mcap")
-    for _ in range(50):
-        room.now += 0.01
-        room.hear()
-        simulation.single_step()
-    simulation.stop_recording()
-    recorded = open_recording(tmp_path / "desk.mcap")
-    assert recorded.runs[0].about["units"] == "real"
-    verdict = verify(recorded)
-    assert verdict.agrees
-    assert verdict.checked >= 49
 
 
 def test_a_receiver_that_has_ended_is_said_once(server: ViserServer, room: Room, real: RealUnits) -> None:

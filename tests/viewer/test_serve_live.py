@@ -1,4 +1,4 @@
-"""Serving the live page: what is said, how it ends, and what no error ends."""
+"""Serving the live page: what is said, how it ends, what no error ends; and where a page is served."""
 
 import signal
 import socket
@@ -10,10 +10,12 @@ from pathlib import Path
 import pytest
 from tests.ports import free_port
 
+from pretouch.errors import ViewerError
 from pretouch.recording.reader import open_recording
 from pretouch.recording.writer import Recording
-from pretouch.viewer.live import LivePage, serve_live
-from pretouch.viewer.server import ServeOptions, url_of
+from pretouch.viewer.live import serve_live
+from pretouch.viewer.scene import Scene
+from pretouch.viewer.server import ServeOptions, check_port, served, url_of
 from pretouch.viewer.simulation import LiveSimulation
 
 
@@ -23,18 +25,6 @@ def test_the_address_is_the_one_line_that_is_said(
     options, turns = ServeOptions(port=free_port()), iter([False, False, True])
     serve_live(simulation, options, until=lambda: next(turns))
     assert capfd.readouterr().out == f"The arm is at {url_of(options)} (Ctrl-C ends it).\n"
-
-
-def test_however_it_ends_a_recording_is_closed_and_named(simulation: LiveSimulation, tmp_path: Path) -> None:
-    def interrupted() -> bool:
-        raise KeyboardInterrupt
-
-    simulation.start_recording(tmp_path / "session.mcap")
-    said: list[str] = []
-    with pytest.raises(KeyboardInterrupt):
-        serve_live(simulation, ServeOptions(port=free_port()), interrupted, said.append)
-    assert simulation.recording is None
-    assert str(tmp_path / "session.mcap") in said[-1]
 
 
 def test_a_recording_in_trouble_is_said_once_on_the_page_and_in_the_terminal(
@@ -62,9 +52,8 @@ def test_beyond_this_machine_it_is_said_what_is_exposed_and_the_page_is_opened_w
     assert opened == [f"http://localhost:{options.port}/{options.token}/"]
 
 
-@pytest.mark.parametrize("part", ["_run_actions", "_draw"])
 def test_whatever_fails_in_the_page_the_arm_holds_and_it_is_said_once(
-    simulation: LiveSimulation, monkeypatch: pytest.MonkeyPatch, part: str
+    simulation: LiveSimulation, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fail(*_: object) -> None:
         raise KeyError("nosuch")
@@ -75,7 +64,7 @@ def test_whatever_fails_in_the_page_the_arm_holds_and_it_is_said_once(
     def until() -> bool:
         times.append(simulation.time)
         if len(times) == 3:
-            monkeypatch.setattr(LivePage, part, fail)
+            monkeypatch.setattr(Scene, "draw", fail)
         return next(turns)
 
     serve_live(simulation, ServeOptions(port=free_port()), until, said.append)
@@ -105,3 +94,49 @@ def test_interrupted_it_closes_its_recording_and_says_where_it_is(
     assert str(place) in rest
     assert "Traceback" not in rest
     assert open_recording(place).complete
+
+
+# the server of any page
+
+
+def test_a_second_page_on_the_same_port_is_refused_in_a_sentence_with_the_next_free_one_and_the_first_goes_on(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    options = ServeOptions(port=free_port())
+    with served(options, "first") as server:
+        with pytest.raises(ViewerError) as caught, served(options, "second"):
+            pass
+        assert server.get_port() == options.port
+    said = str(caught.value)
+    assert said.startswith(f"Port {options.port} on 127.0.0.1 is in use")
+    assert "\n" not in said
+    free = int(said.split("--port ")[1].split()[0])
+    assert free > options.port
+    for port in (free, options.port):
+        check_port(ServeOptions(port=port))
+    assert capfd.readouterr().out == ""
+
+
+def test_a_page_is_for_this_machine_alone_unless_asked() -> None:
+    assert ServeOptions().host == "127.0.0.1"
+    for host, shown in (("127.0.0.1", "127.0.0.1"), ("0.0.0.0", "localhost"), ("::", "localhost"), ("::1", "[::1]")):  # noqa: S104
+        options = ServeOptions(host, 1234)
+        assert url_of(options) == f"http://{shown}:1234/{options.token}/"
+
+
+def test_each_start_has_an_address_that_nobody_can_guess_or_read_in_an_error() -> None:
+    one, other = ServeOptions(), ServeOptions()
+    assert one.token != other.token
+    assert len(one.token) >= 43  # 256 bits, six to a character
+    assert one.token not in repr(one)
+
+
+@pytest.mark.parametrize("port", [0, -1, 65536])
+def test_what_is_no_port_is_refused(port: int) -> None:
+    with pytest.raises(ViewerError, match="from 1 to 65535"):
+        check_port(ServeOptions(port=port))
+
+
+def test_a_host_that_is_not_this_machine_is_refused() -> None:
+    with pytest.raises(ViewerError, match=r"192\.0\.2\.1"):
+        check_port(ServeOptions("192.0.2.1", free_port()))

@@ -8,6 +8,8 @@ from pretouch.errors import RecordingError
 from pretouch.profiles import PROFILES, profile
 from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify
+from pretouch.recording.writer import Recording
+from pretouch.types import Mode
 from pretouch.viewer.simulation import LiveSimulation
 
 
@@ -34,11 +36,17 @@ def switched(session: LiveSimulation) -> list:
     return steps + session.advance(0.7)
 
 
-def test_each_step_is_kept_with_what_only_the_simulation_knows(session, tmp_path):
+def test_each_step_is_kept_with_what_only_the_simulation_knows_and_is_recomputed_and_the_run_stays_as_it_is(
+    session, panda_model, paper_skin, tmp_path
+):
+    other = LiveSimulation(session.settings, panda_model, paper_skin)
+    other.advance(ARMED_S)
     place = tmp_path / "live.mcap"
     session.start_recording(place)
     steps = switched(session)
     closed = session.stop_recording()
+    for mine, theirs in zip(steps, switched(other), strict=True):
+        np.testing.assert_array_equal(mine.command, theirs.command)
     assert session.recording is None
     assert closed.steps == len(steps)
     recorded = open_recording(place)
@@ -59,25 +67,11 @@ def test_each_step_is_kept_with_what_only_the_simulation_knows(session, tmp_path
     scene = recorded.runs[0].about["scene"]
     assert [box["name"] for box in scene["boxes"]] == ["object"]
     assert scene["hand_radius_m"] == 0.05
-
-
-def test_a_recording_with_switches_verifies_bit_for_bit(session, tmp_path):
-    session.start_recording(tmp_path / "live.mcap")
-    steps = switched(session)
-    session.stop_recording()
-    verdict = verify(open_recording(tmp_path / "live.mcap"))
+    verdict = verify(recorded)
     assert verdict.agrees, verdict.said
     assert verdict.exact
     assert (verdict.checked, verdict.skipped) == (len(steps), {})
-
-
-def test_a_recording_does_not_change_the_run(session, panda_model, paper_skin, tmp_path):
-    other = LiveSimulation(session.settings, panda_model, paper_skin)
-    other.advance(ARMED_S)
-    session.start_recording(tmp_path / "live.mcap")
-    for mine, theirs in zip(switched(session), switched(other), strict=True):
-        np.testing.assert_array_equal(mine.command, theirs.command)
-    session.stop_recording()
+    assert any(kept.step.mode is Mode.REACT for kept in recorded)
 
 
 def test_a_reset_ends_the_recording_and_says_so(session, tmp_path):
@@ -105,23 +99,12 @@ def test_a_place_that_cannot_be_written_is_refused_and_the_session_goes_on(sessi
     assert session.advance(0.1)
 
 
-def test_a_recording_in_trouble_ends_with_its_sentence_and_the_session_goes_on(session, tmp_path):
+def test_a_recording_in_trouble_ends_with_its_sentence_and_the_session_goes_on(session, tmp_path, monkeypatch):
     session.start_recording(tmp_path / "live.mcap")
     session.advance(0.1)
-
-    class Full:
-        trouble = "The disk is full."
-        closed = False
-
-        def record(self, cycle, truth) -> None:
-            pass
-
-        def close(self) -> None:
-            self.closed = True
-
-    session.stop_recording()
-    session.recording = full = Full()
+    monkeypatch.setattr(Recording, "trouble", "The disk is full.")
     assert len(session.advance(0.1)) == 10
     assert session.notice == "The disk is full."
     assert session.recording is None
-    assert full.closed
+    recorded = open_recording(tmp_path / "live.mcap")
+    assert (len(recorded), recorded.complete) == (10, True)

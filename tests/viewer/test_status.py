@@ -7,6 +7,7 @@ from pretouch.explanation import Doing, Explanation
 from pretouch.types import Mode
 from pretouch.viewer import palette
 from pretouch.viewer.status import PERIOD_S, Status, legend
+from pretouch.viewer.trail import Activity
 
 
 class Html:
@@ -48,13 +49,9 @@ def test_it_is_sent_five_times_a_second_and_at_once_when_there_is_news(status: S
     assert len(html.sent) <= 10 / PERIOD_S + 1
     sent = len(html.sent)
     status.draw(Mode.TRACK, Explanation(Doing.SLOWED, "Slowed to 17 %."), "", "", 300 / 30)
+    for i in range(30):  # what is the same is not sent again
+        status.draw(Mode.TRACK, Explanation(Doing.SLOWED, "Slowed to 17 %."), "", "", 10 + i / 3)
     assert len(html.sent) == sent + 1
-
-
-def test_what_is_the_same_is_not_sent_again(status: Status, html: Html) -> None:
-    for i in range(30):
-        status.draw(Mode.TRACK, FREE, "paused", "", i / 3)
-    assert len(html.sent) == 1
 
 
 def test_what_a_person_is_told_and_the_warning_are_both_shown(status: Status, html: Html) -> None:
@@ -74,14 +71,10 @@ def test_words_are_not_taken_for_markup(status: Status, html: Html) -> None:
     assert "<i>" not in html.sent[-1]
 
 
-def test_the_legend_names_every_colour_of_the_trail() -> None:
+def test_the_legend_names_every_colour_of_the_trail_and_the_marks_of_sensing() -> None:
     shown = legend()
-    for colour in (palette.FOLLOWING, palette.LIMITING, palette.RECOVERING, palette.REACTING, palette.HOLDING):
-        assert palette.css(colour) in shown
-
-
-def test_the_legend_names_the_marks_of_sensing() -> None:
-    shown = legend()
+    for activity in Activity:
+        assert palette.css(activity.value) in shown
     for name, colour in (("sensed", palette.SENSED), ("closest pair", palette.PAIR), ("silent", palette.UNIT_SILENT)):
         assert name in shown
         assert palette.css(colour) in shown

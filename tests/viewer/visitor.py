@@ -13,11 +13,13 @@ import msgspec
 import viser
 import zstandard
 from websockets.exceptions import InvalidStatus
-from websockets.sync.client import ClientConnection, connect
+from websockets.sync.client import connect
+from websockets.typing import Subprotocol
 
 from pretouch.viewer.live import LivePage
 from pretouch.viewer.server import ServeOptions, url_of
 
+PROTOCOL = Subprotocol(f"viser-v{viser.__version__}")
 PATIENCE_S = 20.0
 """Time a page on a busy machine is given [s]."""
 CAMERA = {
@@ -34,24 +36,15 @@ def until(true: Callable[[], bool]) -> None:
         time.sleep(0.01)
 
 
-def fetched(options: ServeOptions, path: str = "", **headers: str) -> tuple[int, str, str]:
-    """Status, text and kind of what is answered at a path, by default that of the page's own address."""
-    connection = http.client.HTTPConnection(options.host, options.port, timeout=PATIENCE_S)
-    connection.request("GET", path or f"/{options.token}/", headers=headers)
-    answer = connection.getresponse()
-    text = answer.read().decode()
-    connection.close()
-    return answer.status, text, answer.headers["Content-Type"]
-
-
-def answered(options: ServeOptions, path: bytes, headers: bytes = b"") -> tuple[int, str]:
-    """Status and text of what is answered at a path, and with headers, of any bytes."""
+def answered(options: ServeOptions, path: bytes = b"", headers: bytes = b"") -> tuple[int, str, str]:
+    """Status, text and kind of what is answered at a path and with headers, of any bytes; by default the page's own."""
+    path = path or f"/{options.token}/".encode()
     headers = headers or f"Host: {options.host}:{options.port}".encode()
     with socket.create_connection((options.host, options.port), PATIENCE_S) as sock:
         sock.sendall(b"GET " + path + b" HTTP/1.1\r\n" + headers + b"\r\n\r\n")
         answer = http.client.HTTPResponse(sock)
         answer.begin()
-        return answer.status, answer.read().decode(errors="replace")
+        return answer.status, answer.read().decode(errors="replace"), answer.headers["Content-Type"]
 
 
 class Visitor:
@@ -60,17 +53,14 @@ class Visitor:
     def __init__(self, server: viser.ViserServer, options: ServeOptions) -> None:
         self._server, self._stack = server, ExitStack()
         before = set(server.get_clients())
-        self._socket = self._stack.enter_context(self.unseen(options))
-        self.say(CAMERA)
+        address = url_of(options).replace("http", "ws", 1).rstrip("/")
+        self._socket = self._stack.enter_context(
+            connect(address, subprotocols=[PROTOCOL], max_size=None, max_queue=None)
+        )
+        self.say(CAMERA)  # viser knows a visitor only once he has said where he looks from
         until(lambda: set(server.get_clients()) > before)
         (self.number,) = set(server.get_clients()) - before
         self._marks = itertools.count(1)
-
-    @staticmethod
-    def unseen(options: ServeOptions) -> ClientConnection:
-        """A bare connection: viser knows a visitor only once he has said where he looks from."""
-        address = url_of(options).replace("http", "ws", 1).rstrip("/")
-        return connect(address, subprotocols=[f"viser-v{viser.__version__}"], max_size=None, max_queue=None)  # type: ignore[list-item]
 
     def __enter__(self) -> "Visitor":
         return self
@@ -117,11 +107,11 @@ def update(handle: Any, **updates: object) -> dict[str, Any]:
     return {"type": "GuiUpdateMessage", "uuid": handle._impl.uuid, "updates": updates}
 
 
-def refusal(options: ServeOptions, path: str = "", origin: str | None = None, **headers: str) -> tuple[int, str]:
+def refusal(options: ServeOptions, path: str = "", origin: str | None = None) -> tuple[int, str]:
     """Status and sentence with which a connection is refused."""
     address = f"ws://{options.host}:{options.port}{path or '/' + options.token}"
     try:
-        with connect(address, origin=origin, additional_headers=headers, subprotocols=[f"viser-v{viser.__version__}"]):  # type: ignore[arg-type]
+        with connect(address, origin=origin, subprotocols=[PROTOCOL]):  # type: ignore[arg-type]
             return 101, ""
     except InvalidStatus as error:
         return error.response.status_code, error.response.body.decode()
