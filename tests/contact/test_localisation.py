@@ -7,32 +7,117 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from tests.contact.localisation.arm import (
-    MODEL,
-    MODEL_VARIANCE,
-    NOISE,
-    SURFACE,
-    N,
-    P,
-    exposed,
-    of,
-    pose_of,
-    poses,
-    posture,
-    said,
-    torques,
-)
+from tests.contact.alone import something, standing
 
 from pretouch.contact.cues import Cues, no_cues
-from pretouch.contact.localisation.prior import LocalisationNumbers, SeenNear, UnitCues, log_prior
+from pretouch.contact.localisation.localise import LocalisationState, localisation_init, localise
+from pretouch.contact.localisation.prior import (
+    LocalisationNumbers,
+    SeenNear,
+    UnitCues,
+    candidate_poses,
+    hidden_candidates,
+    log_prior,
+)
 from pretouch.contact.localisation.single_contact import Candidates, log_posterior
+from pretouch.contact.sequential_detector import Observation, ResidualWindows
 from pretouch.contact.tactile import gain_of, surface_area
+from pretouch.contact.window_scatter import LENGTHS
 from pretouch.groups import Kinematics
-from pretouch.params import TouchSensorParams
+from pretouch.params import LocalisationParams, TouchSensorParams
+from pretouch.perception.closest import no_obstacles
+from pretouch.robot.description import panda
+from pretouch.robot.model import RobotModel
+from pretouch.robot.vectors import placed_capsules
 from pretouch.sensing.unit import TouchPatch
-from pretouch.types import FloatArray, Obstacles
+from pretouch.types import FloatArray, Obstacles, Touched
 
+MODEL = RobotModel(panda())
+SURFACE = MODEL.surface
+N = MODEL.n
+PERIOD = 0.01
+NOISE = np.diag([0.09, 0.12, 0.09, 0.12, 0.01, 0.01, 0.002])
+MODEL_VARIANCE = np.full(N, 1e-4)
+P = LocalisationParams()
 NUMBERS = LocalisationNumbers(*(getattr(P, name) for name in LocalisationNumbers._fields))
+
+
+def posture(seed: int = 0) -> Kinematics:
+    q = MODEL.description.q_ready + np.random.default_rng(seed).uniform(-0.3, 0.3, N)
+    return MODEL.kinematics(q)
+
+
+def pose_of(kin: Kinematics, c: int) -> tuple[FloatArray, FloatArray]:
+    """Return a candidate's point and normal in the base frame."""
+    link = SURFACE.link[c]
+    return kin.position[link] + kin.rotation[link] @ SURFACE.point[c], kin.rotation[link] @ SURFACE.normal[c]
+
+
+def poses(kin: Kinematics) -> tuple[FloatArray, FloatArray]:
+    """Return points and normals (N, 3) of all candidates in the base frame."""
+    point, normal = np.empty((len(SURFACE), 3)), np.empty((len(SURFACE), 3))
+    candidate_poses(kin, SURFACE.arrays, point, normal)
+    return point, normal
+
+
+def exposed(kin: Kinematics) -> FloatArray:
+    """Which candidates (N,) nothing hides."""
+    capsules, hidden = placed_capsules(MODEL.capsules.arrays, kin), np.empty(len(SURFACE), np.bool_)
+    hidden_candidates(poses(kin)[0], SURFACE.body, capsules, MODEL.rigid[capsules.link], hidden)
+    return ~hidden
+
+
+def torques(kin: Kinematics, *contacts: tuple[int, float]) -> FloatArray:
+    total = np.zeros(N)
+    for c, size in contacts:
+        point, normal = pose_of(kin, c)
+        total += MODEL.jacobian(kin, int(SURFACE.link[c]), point)[:3].T @ (-size * normal)
+    return total
+
+
+def said(
+    kin: Kinematics, torque: FloatArray, obstacles: Obstacles | None = None, cues: Cues | None = None, steps: int = 1,
+    ratio: float = 5.0, p: LocalisationParams = P, state: LocalisationState | None = None,
+) -> tuple[Touched, LocalisationState]:  # fmt: skip
+    windows = ResidualWindows(np.tile(torque, (len(LENGTHS), 1)), 32, NOISE + np.diag(MODEL_VARIANCE), MODEL_VARIANCE)
+    seen = Observation(kin, standing(MODEL, torque), obstacles or no_obstacles(), cues or no_cues(len(MODEL.links)))
+    state, found = localisation_init() if state is None else state, None
+    for _ in range(steps):
+        found, state = localise(state, MODEL, seen, windows, ratio, PERIOD, p)
+    assert found is not None
+    return found, state
+
+
+def of(name: str, kin: Kinematics) -> int:
+    """Return a candidate in the middle of a link that nothing hides."""
+    own = np.flatnonzero((SURFACE.link == MODEL.link_index(name)) & exposed(kin))
+    return int(own[len(own) // 2])
+
+
+PATCH = TouchPatch()
+
+
+def touched(kin: Kinematics, c: int) -> Cues:
+    """What a unit at a candidate says while it is touched, as `TouchSensors` has it."""
+    link, gain = SURFACE.link[c], np.ones(len(MODEL.links))
+    share = np.array([np.pi * PATCH.radius**2 / surface_area(MODEL.capsules, int(link))])
+    gain[link] = gain_of(share, TouchSensorParams())[0]
+    return Cues(gain, np.array([link]), pose_of(kin, c)[0][None], np.array([PATCH.radius / 2]), np.array([5.0]))
+
+
+NOTHING_NEAR = SeenNear(np.zeros((0, 3)), np.zeros(0))
+
+
+def prior(kin: Kinematics, cues: Cues, hidden: FloatArray, near: SeenNear = NOTHING_NEAR) -> FloatArray:
+    """Probability (N,) of each candidate before torques are looked at."""
+    ln, units = np.empty(len(SURFACE)), UnitCues(cues.gain, cues.link, cues.point, cues.sigma)
+    log_prior(poses(kin)[0], SURFACE.arrays, hidden, near, units, NUMBERS, ln)
+    return np.exp(ln)
+
+
+def candidates(torque: FloatArray, kin: Kinematics, numbers: LocalisationNumbers = NUMBERS) -> Candidates:
+    none = np.zeros(len(SURFACE))
+    return Candidates(torque, kin, MODEL.moved_by, SURFACE.arrays, *poses(kin), none, numbers)
 
 
 def test_candidates_lie_on_the_capsules_and_stand_for_their_area():
@@ -59,10 +144,7 @@ def test_the_likelihood_is_that_of_a_normal_distribution_with_the_force_integrat
     torque = torques(kin, (c, 30.0))
     ln, force = np.empty(len(SURFACE)), np.empty((len(SURFACE), 3))
     known = NUMBERS._replace(friction=0.25, force_n=1000.0, tails=1e9)
-    candidates = Candidates(
-        torque, kin, MODEL.moved_by, SURFACE.arrays, *poses(kin), np.zeros(len(SURFACE)), known
-    )  # fmt: skip
-    assert log_posterior(NOISE, candidates, ln, force)
+    assert log_posterior(NOISE, candidates(torque, kin, known), ln, force)
     assert_allclose(force[c], -30.0 * normal, atol=0.5)
     size = -force[c] @ normal
     J = MODEL.jacobian(kin, int(SURFACE.link[c]), point)[:3]
@@ -76,10 +158,7 @@ def test_the_likelihood_is_that_of_a_normal_distribution_with_the_force_integrat
 
 def test_torques_whose_covariance_is_none_say_nothing():
     kin, ln = posture(), np.zeros(len(SURFACE))
-    candidates = Candidates(
-        np.zeros(N), kin, MODEL.moved_by, SURFACE.arrays, *poses(kin), np.zeros(len(SURFACE)), NUMBERS
-    )  # fmt: skip
-    assert not log_posterior(-NOISE, candidates, ln, np.zeros((len(SURFACE), 3)))
+    assert not log_posterior(-NOISE, candidates(np.zeros(N), kin), ln, np.zeros((len(SURFACE), 3)))
     assert not ln.any()
 
 
@@ -91,7 +170,7 @@ def test_a_contact_on_an_outer_link_is_found_where_it_is(link, seed):
     found, _ = said(kin, torques(kin, (c, 40.0)), steps=4)
     point, normal = pose_of(kin, c)
     assert len(found.link) == 1
-    assert MODEL.rigid[found.link[0]] == MODEL.rigid[SURFACE.link[c]]
+    assert MODEL.rigid[found.link[0]] == SURFACE.body[c]
     assert np.linalg.norm(found.point[0] - point) < 0.03
     assert found.force[0] @ -normal > 30.0
     assert found.probability[0] > 0.9
@@ -127,15 +206,9 @@ def test_a_touched_unit_and_a_seen_hand_say_where_when_the_torques_do_not():
     point, normal = pose_of(kin, c)
     torque = torques(kin, (c, 60.0))
     alone, _ = said(kin, torque)
-    cue = Cues(np.ones(len(MODEL.links)), SURFACE.link[c : c + 1], point[None], np.array([0.01]), np.array([np.nan]))
-    told, _ = said(kin, torque, cues=cue)
-    ball = (point + 0.05 * normal)[None]
-    near = Obstacles(
-        np.zeros(1, np.int64), ball, np.array([1.0]), point[None], SURFACE.link[c : c + 1], normal[None],
-        np.array([0.05]), np.zeros(1),
-    )  # fmt: skip
-    seen, _ = said(kin, torque, obstacles=near)
-    assert MODEL.rigid[told.link[0]] == MODEL.rigid[SURFACE.link[c]]
+    told, _ = said(kin, torque, cues=replace(touched(kin, c), gain=np.ones(len(MODEL.links))))
+    seen, _ = said(kin, torque, obstacles=something(int(SURFACE.link[c]), point, normal, 0.05, 1.0))
+    assert MODEL.rigid[told.link[0]] == SURFACE.body[c]
     assert np.linalg.norm(told.point[0] - point) < 0.02
     assert np.linalg.norm(seen.point[0] - point) < 0.06
     assert told.sigma[0] < alone.sigma[0]
@@ -143,21 +216,18 @@ def test_a_touched_unit_and_a_seen_hand_say_where_when_the_torques_do_not():
     gain = np.ones(len(MODEL.links))
     gain[SURFACE.link[c]] = 100.0
     likely, _ = said(kin, torque, cues=replace(no_cues(len(MODEL.links)), gain=gain))
-    assert MODEL.rigid[likely.link[0]] == MODEL.rigid[SURFACE.link[c]]
+    assert MODEL.rigid[likely.link[0]] == SURFACE.body[c]
 
 
 def test_the_prior_is_one_in_all_and_hides_what_cannot_be_touched():
     kin = posture()
     point, _ = poses(kin)
-    hidden, ln = ~exposed(kin), np.empty(len(SURFACE))
+    hidden = ~exposed(kin)
     assert 0 < hidden.sum() < len(SURFACE) / 2
-    log_prior(
-        point, SURFACE.arrays, hidden, SeenNear(point[:2] + 0.03, np.array([0.03, 0.2])),
-        UnitCues(np.ones(len(MODEL.links)), np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros(0)),
-        NUMBERS, ln,
-    )  # fmt: skip
-    assert np.exp(ln).sum() == pytest.approx(1.0, abs=1e-6)
-    assert np.exp(ln[hidden]).max() < 1e-11
+    near = SeenNear(point[:2] + 0.03, np.array([0.03, 0.2]))
+    made = prior(kin, no_cues(len(MODEL.links)), hidden, near)
+    assert made.sum() == pytest.approx(1.0, abs=1e-6)
+    assert made[hidden].max() < 1e-11
 
 
 def test_between_two_inferences_the_last_one_holds():
@@ -187,22 +257,6 @@ def test_whatever_is_felt_what_is_said_is_sound(torque, q, steps):
     assert (found.sigma >= 0).all()
 
 
-PATCH = TouchPatch()
-SIGMA_M = PATCH.radius / 2
-
-
-def touched(kin: Kinematics, c: int) -> Cues:
-    """What a unit at a candidate says while it is touched, as `TouchSensors` has it."""
-    link, gain = SURFACE.link[c], np.ones(len(MODEL.links))
-    share = np.array([np.pi * PATCH.radius**2 / surface_area(MODEL.capsules, int(link))])
-    gain[link] = gain_of(share, TouchSensorParams())[0]
-    return Cues(gain, np.array([link]), pose_of(kin, c)[0][None], np.array([SIGMA_M]), np.array([5.0]))
-
-
-def body(link: int) -> int:
-    return int(MODEL.rigid[link])
-
-
 def noisy(torque: FloatArray, seed: int) -> FloatArray:
     noise = np.random.default_rng(seed).standard_normal(N)
     return np.asarray(torque + np.linalg.cholesky(NOISE / 16 + np.diag(MODEL_VARIANCE)) @ noise)
@@ -217,8 +271,8 @@ def test_a_touch_tells_the_place_on_links_of_which_torques_tell_little(link, mos
         torque = noisy(torques(kin, (int(c), 30.0)), seed)
         alone, _ = said(kin, torque)
         told, _ = said(kin, torque, cues=touched(kin, int(c)))
-        assert body(told.link[0]) == SURFACE.body[c]
-        right += body(alone.link[0]) == SURFACE.body[c]
+        assert MODEL.rigid[told.link[0]] == SURFACE.body[c]
+        right += MODEL.rigid[alone.link[0]] == SURFACE.body[c]
         told_off.append(np.linalg.norm(told.point[0] - point))
         alone_off.append(np.linalg.norm(alone.point[0] - point))
     assert right <= most * 12
@@ -242,25 +296,12 @@ def test_torques_that_contradict_a_false_touch_win(seed, where, one, other, newt
     torque = noisy(torques(kin, (c, newtons)), seed)
     alone, _ = said(kin, torque, steps=3)
     # what contradicts the touch: the torques alone are sure of the right body, and of where on it
-    assume(len(alone.link) == 1 and body(alone.link[0]) == where and alone.probability[0] > 0.99)
+    assume(len(alone.link) == 1 and MODEL.rigid[alone.link[0]] == where and alone.probability[0] > 0.99)
     assume(np.linalg.norm(alone.point[0] - point) < 0.03 and alone.sigma[0] < 0.02)
     told, _ = said(kin, torque, cues=touched(kin, false), steps=3)
     assert len(told.link) == 1
-    assert body(told.link[0]) == where
+    assert MODEL.rigid[told.link[0]] == where
     assert np.linalg.norm(told.point[0] - point) < 0.04
-
-
-def prior(kin: Kinematics, cues: Cues, hidden: FloatArray) -> FloatArray:
-    """Probability (N,) of each candidate before torques are looked at, nothing being seen."""
-    ln, numbers = (
-        np.empty(len(SURFACE)),
-        LocalisationNumbers(*(getattr(P, name) for name in LocalisationNumbers._fields)),
-    )
-    log_prior(
-        poses(kin)[0], SURFACE.arrays, hidden, SeenNear(np.zeros((0, 3)), np.zeros(0)),
-        UnitCues(cues.gain, cues.link, cues.point, cues.sigma), numbers, ln,
-    )  # fmt: skip
-    return np.exp(ln)
 
 
 def test_a_touch_is_counted_once_by_its_place_and_not_by_its_link_again():
@@ -283,10 +324,9 @@ def test_a_touch_whose_place_is_hidden_still_counts_by_its_link():
     c = of("panda_link4", kin)
     link = SURFACE.link[c]
     cues = touched(kin, c)
-    far = Cues(cues.gain, cues.link, cues.point + 5.0, cues.sigma, cues.force)
+    far = replace(cues, point=cues.point + 5.0)
     made = prior(kin, far, ~exposed(kin))
-    evenly = prior(kin, Cues(np.ones(len(cues.gain)), *(getattr(far, n) for n in ("link", "point", "sigma", "force"))),
-                   ~exposed(kin))  # fmt: skip
+    evenly = prior(kin, replace(far, gain=np.ones(len(cues.gain))), ~exposed(kin))
     on = SURFACE.link == link
     odds = made[on].sum() / made[~on].sum() / (evenly[on].sum() / evenly[~on].sum())
     assert odds == pytest.approx(cues.gain[link], rel=1e-3)
@@ -303,8 +343,8 @@ def test_a_false_touch_takes_few_pushes_on_link_2_that_the_torques_put_there():
         false = int(rng.choice(free[SURFACE.link[free] != SURFACE.link[c]]))
         torque = noisy(torques(kin, (c, 40.0)), seed)
         alone, _ = said(kin, torque)
-        if body(alone.link[0]) == SURFACE.body[c]:
+        if MODEL.rigid[alone.link[0]] == SURFACE.body[c]:
             told, _ = said(kin, torque, cues=touched(kin, false))
-            right, lost = right + 1, lost + (body(told.link[0]) != SURFACE.body[c])
+            right, lost = right + 1, lost + (MODEL.rigid[told.link[0]] != SURFACE.body[c])
     assert right >= 60
     assert lost <= right / 8
