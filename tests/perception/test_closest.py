@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from pretouch.groups import Kinematics
-from pretouch.perception.closest import closest_points, no_obstacles
+from pretouch.perception.closest import closest_points
 from pretouch.robot.body import Capsules
 from pretouch.robot.description import panda
 from pretouch.types import Obstacles
@@ -78,39 +78,12 @@ def test_the_least_signed_distance_wins():
     assert _closest(_body(second, first), (0.15, 0, 0)).body_distance == pytest.approx(-0.1)
 
 
-def test_each_obstacle_has_its_own_answer():
-    body = Capsules(np.array([2, 1]), np.array([[0.0, 0, 0], [0, 0, 0]]), np.zeros((2, 3)), np.array([0.1, 0.1]))
-    kin = _still(3)
-    kin.position[1:] = [[1.0, 0, 0], [-1.0, 0, 0]]
-    points = np.array([[0.5, 0, 0], [-0.5, 0, 0], [0.0, 3.0, 4.0]])
-    last = np.tile(UP, (3, 1))
-    found = closest_points(kin, body, np.array([0.0, 0.0, 0.0]), np.array([4, 0, 6]), points, last)
-    np.testing.assert_array_equal(found.unit, [4, 0, 6])
-    np.testing.assert_array_equal(found.link[:2], [1, 2])
-    np.testing.assert_allclose(found.body_distance[:2], [0.4, 0.4])
-    np.testing.assert_allclose(found.ee_distance, [0.5, 0.5, 5.0])
-
-
 def test_a_point_that_is_none_still_names_a_link():
     body = Capsules(np.array([3]), np.zeros((1, 3)), np.ones((1, 3)), np.ones(1))
     found = _closest(body, (np.nan, 0, 0), kin=_still(4))
     np.testing.assert_array_equal(found.link, [3])
     np.testing.assert_array_equal(found.direction, [UP])
     assert np.isnan(found.body_distance)
-
-
-def test_a_capsule_turns_with_its_link():
-    kin = _still()
-    kin.rotation[0] = [[0, 0, 1], [1, 0, 0], [0, 1, 0]]  # z of the link is x of the base
-    kin.position[0] = [0, 0, 2]
-    found = _closest(_body(ROD), (0.7, 0.5, 2), kin=kin)
-    np.testing.assert_allclose(found.body_point, [[0.7, 0.1, 2]], atol=1e-12)
-
-
-def test_no_obstacle_has_no_answer():
-    for none in (no_obstacles(), _closest(_body(ROD))):
-        assert none.point.shape == none.body_point.shape == none.direction.shape == (0, 3)
-        assert none.unit.shape == none.link.shape == none.body_distance.shape == none.ee_distance.shape == (0,)
 
 
 @given(a=vectors, b=vectors, radius=radii, share=st.floats(0, 1), last=vectors)

@@ -92,22 +92,21 @@ def reckoned(distance: float, last: float | None, sensor: float = 0.0, velocity:
     return float(points[0, 2] - sensor)
 
 
-def test_a_reading_the_sensor_can_measure_stands():
-    assert reckoned(0.3, last=0.1) == pytest.approx(0.3)
-
-
-def test_nearer_than_that_a_point_stays_where_it_was_last_seen():
-    # the arm has come to 25 mm of where it was
-    assert reckoned(0.04, last=0.055, sensor=0.03) == pytest.approx(0.025)
-    assert reckoned(0.04, last=0.2) == pytest.approx(0.04)
-    assert reckoned(0.04, last=0.01, sensor=0.02) == 0.0
-
-
-def test_one_that_comes_by_itself_is_moved_on_and_a_slow_one_is_not():
-    assert reckoned(0.04, last=0.04, velocity=-0.5) == pytest.approx(0.03)
-    assert reckoned(0.04, last=0.04, velocity=-0.05) == pytest.approx(0.04)
-
-
-def test_what_was_never_seen_farther_off_is_taken_to_touch():
-    assert reckoned(0.04, last=None) == 0.0
-    assert reckoned(0.04, last=0.04, age=1.0) == 0.0
+@pytest.mark.parametrize(
+    ("given", "height"),
+    [
+        ({"distance": 0.3, "last": 0.1}, 0.3),  # what the sensor can measure stands
+        # nearer than that a point stays where it was last seen: the arm has come to 25 mm of where it was
+        ({"distance": 0.04, "last": 0.055, "sensor": 0.03}, 0.025),
+        ({"distance": 0.04, "last": 0.2}, 0.04),
+        ({"distance": 0.04, "last": 0.01, "sensor": 0.02}, 0.0),
+        # one that comes by itself is moved on, and a slow one is not
+        ({"distance": 0.04, "last": 0.04, "velocity": -0.5}, 0.03),
+        ({"distance": 0.04, "last": 0.04, "velocity": -0.05}, 0.04),
+        # what was never seen farther off is taken to touch
+        ({"distance": 0.04, "last": None}, 0.0),
+        ({"distance": 0.04, "last": 0.04, "age": 1.0}, 0.0),
+    ],
+)
+def test_where_a_point_is_that_is_nearer_than_the_sensor_measures(given: dict, height: float):
+    assert reckoned(**given) == pytest.approx(height)

@@ -38,32 +38,26 @@ def seen(model, moving: MovingFixtures | None, distance: float, now: float = 0.0
     return len(found.obstacles.unit)
 
 
-def test_what_a_unit_sees_of_it_is_left_out_within_the_margin(panda_model):
-    # the ball's surface is 0.4 m before the unit; its beam is along x
-    other = ball(ORIGIN + np.array([0.45, 0.0, 0.0]))
-    assert seen(panda_model, None, 0.4) == 1
-    assert seen(panda_model, other, 0.4) == 0
-    assert seen(panda_model, other, 0.4 - 0.9 * MARGIN_M) == 0
-    # what is behind cannot be seen through it
-    assert seen(panda_model, other, 0.5) == 0
-
-
-def test_a_hand_in_front_of_it_is_still_a_person(panda_model):
-    other = ball(ORIGIN + np.array([0.45, 0.0, 0.0]))
-    assert seen(panda_model, other, 0.4 - 1.2 * MARGIN_M) == 1
-    assert seen(panda_model, other, 0.15) == 1
-
-
-def test_beside_the_beam_it_explains_nothing(panda_model):
-    # half the cone's angle is 13.5 degrees: at 0.4 m it is 0.1 m wide
-    assert seen(panda_model, ball(ORIGIN + np.array([0.4, 0.3, 0.0])), 0.4) == 1
-
-
-def test_it_is_where_it_was_when_the_unit_measured(panda_model):
-    # at 2 m/s it is now 0.2 m farther away than 0.1 s ago, and was at 0.4 m at the reading's stamp of 0.09 s
-    away = ball(ORIGIN + np.array([0.45 - 2.0 * 0.09, 0.0, 0.0]), velocity=(2.0, 0.0, 0.0))
-    assert seen(panda_model, away, 0.4, now=0.1) == 0
-    assert seen(panda_model, away, 0.4 - 1.2 * MARGIN_M, now=0.1) == 1
+@pytest.mark.parametrize(
+    ("aside", "speed", "now", "distance", "count"),
+    [
+        # the ball's surface is 0.4 m before the unit; its beam is along x
+        ((0.45, 0.0, 0.0), 0.0, 0.0, 0.4, 0),
+        ((0.45, 0.0, 0.0), 0.0, 0.0, 0.4 - 0.9 * MARGIN_M, 0),
+        ((0.45, 0.0, 0.0), 0.0, 0.0, 0.5, 0),  # what is behind cannot be seen through it
+        ((0.45, 0.0, 0.0), 0.0, 0.0, 0.4 - 1.2 * MARGIN_M, 1),  # a hand in front of it is still a person
+        ((0.45, 0.0, 0.0), 0.0, 0.0, 0.15, 1),
+        # beside the beam it explains nothing: half the cone's angle is 13.5 degrees, at 0.4 m it is 0.1 m wide
+        ((0.4, 0.3, 0.0), 0.0, 0.0, 0.4, 1),
+        # at 2 m/s it is now 0.2 m farther away than 0.1 s ago, and was at 0.4 m at the reading's stamp of 0.09 s
+        ((0.45 - 2.0 * 0.09, 0.0, 0.0), 2.0, 0.1, 0.4, 0),
+        ((0.45 - 2.0 * 0.09, 0.0, 0.0), 2.0, 0.1, 0.4 - 1.2 * MARGIN_M, 1),
+    ],
+)
+def test_what_a_unit_sees_of_it_is_left_out_within_the_margin(panda_model, aside, speed, now, distance, count):
+    assert seen(panda_model, None, distance, now) == 1
+    other = ball(ORIGIN + np.array(aside), velocity=(speed, 0.0, 0.0))
+    assert seen(panda_model, other, distance, now) == count
 
 
 def test_of_each_link_the_nearest_place_is_an_obstacle(panda_model):

@@ -4,46 +4,35 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.perception.watcher import Watcher
 
-from pretouch.perception.obstacles import track_init
-from pretouch.perception.perceive import perceive, perception_setup
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import PROFILES
-from pretouch.types import RangeReadings, RangeStatus
+from pretouch.types import RangeStatus
 
 KEPT_S = 1.0
-NOTHING = (np.nan, int(RangeStatus.SIGNAL))
+NOTHING = (np.nan, RangeStatus.SIGNAL)
 """Too little light: nothing is near."""
 
 
-class Watcher:
-    """Perception of the hand's left unit alone, on an arm that is put where a test wants it."""
+class TurnedWatcher(Watcher):
+    """Perception of the hand's left unit alone."""
 
     def __init__(self, model, skin, kept=KEPT_S):
-        self.model, self.count, self.unit = model, len(skin), skin.ids.index("hand_left")
-        params = replace(PROFILES["paper"].perception, out_of_view_s=kept)
-        self.setup = perception_setup(model, skin, no_fixtures(), params)
-        self.state = track_init(self.count)
+        super().__init__(model, skin, no_fixtures(), replace(PROFILES["paper"].perception, out_of_view_s=kept))
 
     def at(self, now, turned, reading):
         """Points at an instant [s] with joint 1 turned by an angle [deg], a new reading of the unit."""
-        q = self.model.description.q_ready.copy()
-        q[0] += np.deg2rad(turned)
-        heard = np.arange(self.count) == self.unit
-        readings = RangeReadings(
-            np.where(heard, now, -np.inf), np.where(heard, reading[0], np.nan),
-            np.where(heard, reading[1], int(RangeStatus.NONE)),
-        )  # fmt: skip
-        seen, self.state = perceive(self.state, self.setup, self.model.kinematics(q), readings, now)
-        return seen.obstacles.point
+        self.kin = self.model.kinematics(self.model.description.q_ready + np.deg2rad(turned) * np.eye(7)[0])
+        return self.see(now, reading[1], hand_left=reading[0]).point
 
 
-OBJECT = (0.3, int(RangeStatus.OK))
+OBJECT = (0.3, RangeStatus.OK)
 
 
 @pytest.fixture
 def watcher(panda_model, paper_skin):
-    return Watcher(panda_model, paper_skin)
+    return TurnedWatcher(panda_model, paper_skin)
 
 
 def test_a_point_is_kept_for_its_time_while_the_beam_goes_on(watcher):
@@ -55,7 +44,7 @@ def test_a_point_is_kept_for_its_time_while_the_beam_goes_on(watcher):
 
 
 def test_without_it_the_point_goes(panda_model, paper_skin):
-    watcher = Watcher(panda_model, paper_skin, kept=0.0)
+    watcher = TurnedWatcher(panda_model, paper_skin, kept=0.0)
     watcher.at(0.0, 0.0, OBJECT)
     assert len(watcher.at(0.1, 4.0, NOTHING)) == 0
 
@@ -75,7 +64,7 @@ def test_a_place_seen_empty_is_empty_when_the_beam_leaves_it_again(watcher):
 
 @pytest.mark.parametrize(
     ("reading", "kept"),
-    [((np.nan, int(RangeStatus.HARDWARE)), True), ((1.2, int(RangeStatus.OK)), False)],
+    [((np.nan, RangeStatus.HARDWARE), True), ((1.2, RangeStatus.OK), False)],
     ids=["a failure tells nothing", "what lies behind it is seen"],
 )
 def test_only_a_look_through_its_place_says_that_it_is_empty(watcher, reading, kept):
@@ -88,6 +77,6 @@ def test_only_a_look_through_its_place_says_that_it_is_empty(watcher, reading, k
 
 def test_what_is_seen_next_takes_its_place(watcher):
     watcher.at(0.0, 0.0, OBJECT)
-    points = watcher.at(0.1, 4.0, (0.2, int(RangeStatus.OK)))
+    points = watcher.at(0.1, 4.0, (0.2, RangeStatus.OK))
     assert len(points) == 1
     np.testing.assert_array_equal(watcher.at(0.2, 8.0, NOTHING), points)

@@ -6,19 +6,18 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.perception.watcher import FLOOR, TCP
 
 from pretouch.params import ClosingSpeed, OutsidePoints, PerceptionParams
 from pretouch.perception.closest import closest_points, no_obstacles
 from pretouch.perception.outside import moving_links, outside_silence, see_outside
 from pretouch.perception.perceive import Perception, perception_setup
-from pretouch.perception.scene_filter import Fixtures, no_fixtures
+from pretouch.perception.scene_filter import no_fixtures
 from pretouch.robot.description import panda
 from pretouch.robot.vectors import placed
 from pretouch.sensing.skin import paper_skin
 from pretouch.types import RobotState, SeenPoints
 
-TCP = np.array([0.30689, 0.0, 0.48688])
-"""End-effector origin in the ready posture, see `test_model.py` [m]."""
 UNITS = 7
 PARAMS = PerceptionParams(outside=OutsidePoints())
 POINTS = OutsidePoints()
@@ -60,17 +59,6 @@ def watcher(panda_model):
 
 
 BESIDE = TCP + np.array([0.0, 0.4, 0.0])
-
-
-def test_without_a_source_or_a_place_for_it_nothing_is_touched(panda_model):
-    robot = RobotState(0.0, *(np.zeros(7) for _ in range(5)), None)
-    for params, points in (
-        (PARAMS, None), (PerceptionParams(), points_at(0.0, BESIDE)),
-    ):  # fmt: skip
-        setup = setup_of(panda_model, params, no_fixtures())
-        seen, state = see_outside(None, False, NOTHING, points, setup, panda_model.kinematics(np.zeros(7)), robot, 0.0)
-        assert seen is NOTHING
-        assert state is None
 
 
 def test_a_point_is_an_obstacle_at_its_distance_less_two_sigmas(watcher):
@@ -117,9 +105,8 @@ def test_the_arm_is_left_out_where_it_was_when_the_points_were_measured(panda_mo
 
 
 def test_fixtures_are_left_out_up_to_the_margin_and_the_uncertainty(panda_model):
-    floor = Fixtures(np.array([[0.0, 0.0, 1.0, -0.2]]), no_fixtures().capsules)
     for height, sigma, seen in ((0.04, 0.0, 0), (0.06, 0.0, 1), (0.06, 0.01, 0), (-0.3, 0.0, 0)):
-        watcher = Watcher(panda_model, fixtures=floor)
+        watcher = Watcher(panda_model, fixtures=FLOOR)
         assert len(watcher.see(1.0, points_at(1.0, [0.7, 0.3, height - 0.2], sigma=sigma)).unit) == seen
 
 

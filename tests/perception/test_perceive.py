@@ -4,11 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.perception.watcher import FLOOR, HAND_LEFT, PARAMS, TCP, Watcher, readings_of
 
-from pretouch.params import PerceptionParams
-from pretouch.perception.obstacles import track_init
-from pretouch.perception.perceive import perceive, perception_setup, silent_units
-from pretouch.perception.scene_filter import Fixtures, no_fixtures
+from pretouch.perception.perceive import silent_units
 from pretouch.robot.body import Capsules
 from pretouch.robot.description import panda
 from pretouch.robot.vectors import placed
@@ -16,45 +14,15 @@ from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit
 from pretouch.types import RangeReadings, RangeStatus
 
-FLOOR = Fixtures(np.array([[0.0, 0.0, 1.0, -0.2]]), no_fixtures().capsules)
-TCP = np.array([0.30689, 0.0, 0.48688])
-"""End-effector origin in the ready posture, see `test_model.py` [m]."""
-PARAMS = PerceptionParams()
-
 
 def _left_of_hand(distance: float) -> np.ndarray:
-    """Where the unit hand_left, which looks along +y in the ready posture, sees something (1, 3) [m]."""
-    return TCP[None] + np.array([0.0, 0.108 + distance, 0.1034 - 0.045])
-
-
-class _Watcher:
-    """Perception in a chosen posture, its state carried along."""
-
-    def __init__(self, model, skin, fixtures=FLOOR, params=PARAMS):
-        self.model, self.skin, self.fixtures, self.params = model, skin, fixtures, params
-        self.kin = model.kinematics(panda().q_ready)
-        self.state = track_init(len(skin))
-
-    def readings(self, stamp: float, status=RangeStatus.OK, **distance: float) -> RangeReadings:
-        heard = [unit in distance for unit in self.skin.ids]
-        return RangeReadings(
-            np.where(heard, stamp, -np.inf),
-            np.array([distance.get(unit, np.nan) for unit in self.skin.ids]),
-            np.where(heard, int(status), int(RangeStatus.NONE)),
-        )
-
-    def take(self, readings: RangeReadings, now: float):
-        setup = perception_setup(self.model, self.skin, self.fixtures, self.params)
-        self.seen, self.state = perceive(self.state, setup, self.kin, readings, now)
-        return self.seen.obstacles
-
-    def see(self, now: float, status=RangeStatus.OK, **distance: float):
-        return self.take(self.readings(now, status, **distance), now)
+    """Where the unit hand_left sees something in the ready posture (1, 3) [m]."""
+    return HAND_LEFT[None] + np.array([0.0, distance, 0.0])
 
 
 @pytest.fixture
 def watcher(panda_model, paper_skin):
-    return _Watcher(panda_model, paper_skin)
+    return Watcher(panda_model, paper_skin)
 
 
 @pytest.fixture
@@ -62,7 +30,7 @@ def looking_down(panda_model):
     """A unit 20 mm below the fingertips of the ready posture, on the beam's way to the floor."""
     T = np.eye(4)
     T[2, 3] = 0.1034 + 0.03
-    return _Watcher(panda_model, Skin([SensorUnit("down", "panda_hand", T)], panda_model))
+    return Watcher(panda_model, Skin([SensorUnit("down", "panda_hand", T)], panda_model))
 
 
 # One obstacle
@@ -84,53 +52,21 @@ def test_units_are_told_apart(watcher):
     np.testing.assert_allclose(found.point[:, 1], [0.108 + 0.3, -0.107 - 0.5, -0.05 - 0.2], atol=1e-4)
 
 
-def test_nothing_is_seen_before_the_first_reading(watcher):
-    assert len(watcher.see(1.0).unit) == 0
-
-
-def test_a_target_too_near_to_measure_stays_at_40_mm(watcher):
-    watcher.see(1.0, hand_left=0.05)
-    found = watcher.see(1.02, status=RangeStatus.MIN_RANGE, hand_left=0.0)
-    np.testing.assert_allclose(found.point, _left_of_hand(0.04), atol=1e-4)
-
-
-def test_a_bare_arm_sees_nothing(panda_model):
-    assert len(_Watcher(panda_model, Skin([], panda_model)).see(1.0).unit) == 0
-
-
 # How long
-
-
-@pytest.mark.parametrize("status", [RangeStatus.SIGNAL, RangeStatus.WRAPPED, RangeStatus.NONE])
-def test_one_missed_reading_takes_no_obstacle_away(watcher, status):
-    shown = watcher.see(1.0, hand_left=0.3)
-    kept = watcher.see(1.02, status=status, hand_left=np.nan)
-    np.testing.assert_array_equal(kept.point, shown.point)
 
 
 def test_an_obstacle_is_given_up_after_its_persistence(watcher):
     watcher.see(1.0, hand_left=0.3)
-    old = watcher.readings(1.0, hand_left=0.3)
+    old = readings_of(watcher.skin, 1.0, hand_left=0.3)
     assert len(watcher.take(old, 1.059).unit) == 1
     assert len(watcher.take(old, 1.061).unit) == 0
     assert len(watcher.take(old, 1.02).unit) == 1  # by the time it was seen, not by how often it was asked
 
 
-@pytest.mark.parametrize(("stamp", "now"), [(1.0, 1.1), (1.001, 1.0), (np.nan, 1.0), (np.inf, 1.0)])
-def test_a_reading_too_old_or_ahead_of_its_time_shows_nothing(watcher, stamp, now):
-    assert len(watcher.take(watcher.readings(stamp, hand_left=0.3), now).unit) == 0
-
-
-def test_a_late_message_does_not_bring_an_older_obstacle_back(watcher):
-    watcher.see(1.02, hand_left=0.5)
-    found = watcher.take(watcher.readings(1.0, hand_left=0.3), 1.03)
-    np.testing.assert_allclose(found.point, _left_of_hand(0.5), atol=1e-4)
-
-
 def test_an_obstacle_stays_where_it_was_while_the_arm_moves(watcher):
     shown = watcher.see(1.0, hand_left=0.3)
     watcher.kin = watcher.model.kinematics(panda().q_ready + 0.3 * np.eye(7)[0])  # turn towards it
-    kept = watcher.take(watcher.readings(1.0, hand_left=0.3), 1.03)
+    kept = watcher.take(readings_of(watcher.skin, 1.0, hand_left=0.3), 1.03)
     np.testing.assert_array_equal(kept.point, shown.point)
     assert kept.body_distance[0] < shown.body_distance[0] - 0.05
 
@@ -152,24 +88,16 @@ def test_the_forearm_is_no_obstacle_but_what_is_before_it_is(watcher, distance, 
     assert len(watcher.see(1.0, hand_back=distance).unit) == shown
 
 
-def test_unfiltered_the_floor_is_an_obstacle(looking_down, panda_model):
-    distance = 0.48688 - 0.03 + 0.2
-    assert len(looking_down.see(1.0, down=distance).unit) == 0
-    seeing_all = _Watcher(panda_model, looking_down.skin, params=replace(PARAMS, self_margin_m=None))
-    (height,) = seeing_all.see(1.0, down=distance).point[:, 2]
-    assert height == pytest.approx(-0.2, abs=1e-4)
-
-
 def test_only_the_unit_that_sees_the_arm_is_silenced(watcher):
     watcher.see(1.0, hand_left=0.35)
-    found = watcher.take(watcher.readings(1.02, hand_back=0.35, wrist_front=0.35), 1.02)
+    found = watcher.take(readings_of(watcher.skin, 1.02, hand_back=0.35, wrist_front=0.35), 1.02)
     assert [watcher.skin.ids[k] for k in found.unit] == ["hand_left", "wrist_front"]
 
 
 def test_a_declared_post_is_no_obstacle(panda_model, paper_skin):
     ends = np.array([[0.307, 0.6, -0.2], [0.307, 0.6, 1.0]])
     post = Capsules(np.zeros(1, np.int64), ends[:1], ends[1:], np.array([0.1]))
-    watcher = _Watcher(panda_model, paper_skin, replace(FLOOR, capsules=post))
+    watcher = Watcher(panda_model, paper_skin, replace(FLOOR, capsules=post))
     assert len(watcher.see(1.0, hand_left=0.39).unit) == 0  # its surface is at 0.6 - 0.1 - 0.108 = 0.392 m
     assert len(watcher.see(1.02, hand_left=0.3).unit) == 1
 
@@ -194,7 +122,7 @@ def test_on_the_axis_the_last_direction_holds_or_else_the_beam(watcher, last):
     watcher.state.point[unit], watcher.state.seen[unit] = (a[finger] + b[finger]) / 2, 1.0
     if last:
         watcher.state.direction[unit] = last
-    found = watcher.take(watcher.readings(-np.inf), 1.01)
+    found = watcher.take(readings_of(watcher.skin, -np.inf), 1.01)
     np.testing.assert_allclose(found.direction, [last or (0, 1, 0)], atol=1e-5)
     np.testing.assert_array_equal(watcher.state.direction[unit], found.direction[0])
 
@@ -209,7 +137,7 @@ messages = st.lists(st.tuples(stamps, distances, statuses), min_size=7, max_size
 
 @given(steps=st.lists(messages, min_size=1, max_size=4))
 def test_whatever_arrives_obstacles_are_whole(panda_model, paper_skin, steps):
-    watcher = _Watcher(panda_model, paper_skin)
+    watcher = Watcher(panda_model, paper_skin)
     for tick, step in enumerate(steps):
         now = 1.0 + 0.05 * tick
         stamp, distance, status = (np.array(part) for part in zip(*step, strict=True))
@@ -227,27 +155,21 @@ def test_whatever_arrives_obstacles_are_whole(panda_model, paper_skin, steps):
 
 # Silent units
 
-FAILURES = [
-    RangeStatus.HARDWARE, RangeStatus.CROSSTALK, RangeStatus.SYNC, RangeStatus.INVALID, RangeStatus.STUCK,
-    RangeStatus.NONE,
-]  # fmt: skip
-NO_TARGET = [RangeStatus.SIGNAL, RangeStatus.SIGMA, RangeStatus.OUT_OF_BOUNDS, RangeStatus.WRAPPED]
-
 
 def _silent(watcher, now: float, status: RangeStatus = RangeStatus.OK) -> tuple[float, str]:
     reported = np.full(len(watcher.skin), int(status))
     return silent_units(watcher.skin, watcher.state, reported, watcher.seen.longest_silence, now, PARAMS)
 
 
-def _go_on(watcher, start, duration=0.4, status=RangeStatus.OK, distance=0.5, ahead=0.0) -> tuple[float, str]:
+def _go_on(watcher, start, duration=0.4, status=RangeStatus.OK, ahead=0.0) -> tuple[float, str]:
     """All units report at 50 Hz after `start`, wrist_front in its own way, its clock ahead by a time [s]."""
     unit = watcher.skin.ids.index("wrist_front")
     now = start
     for tick in range(round(duration / 0.02)):
         now = start + 0.02 * (tick + 1)
-        readings = watcher.readings(now, **dict.fromkeys(watcher.skin.ids, 0.5))
+        readings = readings_of(watcher.skin, now, **dict.fromkeys(watcher.skin.ids, 0.5))
         readings.stamp[unit] += ahead
-        readings.distance[unit], readings.status[unit] = distance, status
+        readings.status[unit] = status
         watcher.take(readings, now)
     return _silent(watcher, now)
 
@@ -258,7 +180,7 @@ def _go_on(watcher, start, duration=0.4, status=RangeStatus.OK, distance=0.5, ah
     + [(age, 0.0, "wrist_front") for age in (np.inf, -0.01, np.nan)],
 )
 def test_a_unit_that_falls_silent_slows_the_arm_and_is_named(watcher, age, factor, names):
-    heard = watcher.readings(10.0, **dict.fromkeys(watcher.skin.ids, 0.5))
+    heard = readings_of(watcher.skin, 10.0, **dict.fromkeys(watcher.skin.ids, 0.5))
     heard.stamp[watcher.skin.ids.index("wrist_front")] = 10.0 - age
     watcher.take(heard, 10.0)
     left, silent = _silent(watcher, 10.0)
@@ -266,53 +188,10 @@ def test_a_unit_that_falls_silent_slows_the_arm_and_is_named(watcher, age, facto
     assert silent == names
 
 
-@pytest.mark.parametrize(
-    ("status", "why"),
-    [(RangeStatus.STUCK, " (it repeats the same reading)"), (RangeStatus.HARDWARE, " (it reports a hardware failure)")],
-)
-def test_a_unit_that_reports_a_failure_of_its_own_is_named_with_it(watcher, status, why):
-    watcher.take(watcher.readings(10.0, **dict.fromkeys(watcher.skin.ids, 0.5)), 10.0)
-    _go_on(watcher, 10.0, status=status)
-    assert _silent(watcher, 10.4, status) == (0.0, f"wrist_front{why}")
-
-
-def test_all_units_never_heard_are_named(watcher):
-    watcher.take(watcher.readings(0.0), 10.0)
-    left, silent = _silent(watcher, 10.0)
-    assert left == 0.0
-    assert silent == ", ".join(watcher.skin.ids)
-
-
-@pytest.mark.parametrize(("status", "distance"), [(s, 0.5) for s in [*FAILURES, 8, 300]] + [(RangeStatus.OK, np.nan)])
-def test_a_unit_that_only_fails_slows_the_arm_and_is_named(watcher, status, distance):
-    assert _go_on(watcher, 9.0) == (1.0, "")
-    left, silent = _go_on(watcher, 9.4, 0.2, status, distance)
-    assert left == pytest.approx(0.5)
-    assert silent == ""
-    assert _go_on(watcher, 9.6, 0.2, status, distance) == (0.0, "wrist_front")
-
-
-@pytest.mark.parametrize("status", [s for s in RangeStatus if s not in FAILURES])
-def test_a_unit_that_sees_something_or_nothing_is_well(watcher, status):
-    assert _go_on(watcher, 9.0, status=status, distance=0.5) == (1.0, "")
-
-
-@pytest.mark.parametrize("status", NO_TARGET)
-def test_a_unit_without_target_is_well_whatever_the_distance(watcher, status):
-    assert _go_on(watcher, 9.0, status=status, distance=np.nan) == (1.0, "")
-
-
 @pytest.mark.parametrize("ahead", [0.001, 1.0, np.inf, np.nan])
 def test_a_unit_whose_clock_is_ahead_is_named(watcher, ahead):
     _go_on(watcher, 9.0)
     assert _go_on(watcher, 9.4, ahead=ahead) == (0.0, "wrist_front")
-
-
-@pytest.mark.parametrize("status", [RangeStatus.OK, RangeStatus.MIN_RANGE, *NO_TARGET])
-def test_a_unit_recovers_when_it_tells_again(watcher, status):
-    assert _go_on(watcher, 9.0, status=RangeStatus.HARDWARE) == (0.0, "wrist_front")
-    assert _go_on(watcher, 9.4, ahead=0.5) == (0.0, "wrist_front")
-    assert _go_on(watcher, 9.8, 0.02, status) == (1.0, "")
 
 
 def test_a_failure_now_and_then_is_no_silence(watcher):
@@ -323,15 +202,9 @@ def test_a_failure_now_and_then_is_no_silence(watcher):
 
 @given(ages=st.lists(st.floats(-0.1, 0.5), min_size=7, max_size=7))
 def test_the_arm_stands_exactly_when_a_unit_is_named(panda_model, paper_skin, ages):
-    watcher = _Watcher(panda_model, paper_skin)
+    watcher = Watcher(panda_model, paper_skin)
     watcher.take(RangeReadings(10.0 - np.array(ages), np.ones(7), np.zeros(7, np.int64)), 10.0)
     left, silent = _silent(watcher, 10.0)
     assert 0.0 <= left <= 1.0
     assert (left == 0.0) == bool(silent)
     assert left == 1.0 or max(ages) > 0.0999 or min(ages) < 0.0
-
-
-def test_without_units_none_is_missed(panda_model):
-    bare = _Watcher(panda_model, Skin([], panda_model))
-    bare.take(RangeReadings(np.zeros(0), np.zeros(0), np.zeros(0, np.int64)), 10.0)
-    assert _silent(bare, 10.0) == (1.0, "")

@@ -2,34 +2,24 @@
 
 import numpy as np
 import pytest
+from tests.perception.watcher import HAND_LEFT, Watcher
 
 from pretouch.groups import Kinematics
 from pretouch.params import PerceptionParams
-from pretouch.perception.obstacles import placed_sensors, track_init
-from pretouch.perception.perceive import perceive, perception_setup
+from pretouch.perception.obstacles import placed_sensors
 from pretouch.perception.scene_filter import Fixtures, expected_range, no_fixtures
 from pretouch.robot.body import Capsules
-from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.sensor import PAPER_SENSOR
-from pretouch.sensing.skin import LIVE_SKIN, Skin, load_skin, paper_skin
+from pretouch.sensing.skin import LIVE_SKIN, Skin, load_skin
 from pretouch.sim.misplacement import Misplacement, misplaced
-from pretouch.types import RangeReadings, RangeStatus
-
-ASIDE = PerceptionParams(self_aside_m=0.005)
-TCP = np.array([0.30689, 0.0, 0.48688])
-"""End-effector origin in the ready posture, see `test_model.py` [m]."""
 
 
-def shown_by(
-    model: RobotModel, skin: Skin, kin: Kinematics, distance: np.ndarray, fixtures: Fixtures | None = None
-) -> int:
-    """How many obstacles readings (K,) [m] show, NaN of a unit that is not heard."""
-    heard = ~np.isnan(distance)
-    status = np.where(heard, int(RangeStatus.OK), int(RangeStatus.NONE))
-    readings = RangeReadings(np.where(heard, 1.0, -np.inf), distance, status)
-    setup = perception_setup(model, skin, fixtures or no_fixtures(), ASIDE)
-    return len(perceive(track_init(len(skin)), setup, kin, readings, 1.0)[0].obstacles.unit)
+def shown_by(model: RobotModel, skin: Skin, kin: Kinematics, fixtures: Fixtures, distance: dict[str, float]) -> int:
+    """How many obstacles units show that read a distance [m]."""
+    watcher = Watcher(model, skin, fixtures, PerceptionParams(self_aside_m=0.005))
+    watcher.kin = kin
+    return len(watcher.see(1.0, **distance).unit)
 
 
 def test_units_a_little_elsewhere_do_not_take_their_own_arm_for_an_obstacle(panda_model):
@@ -41,23 +31,19 @@ def test_units_a_little_elsewhere_do_not_take_their_own_arm_for_an_obstacle(pand
         for _ in range(50):
             kin = panda_model.kinematics(rng.uniform(panda_model.q_min, panda_model.q_max))
             at = expected_range(kin, placed_sensors(truly, kin), truly.cones, panda_model.capsules, no_fixtures())
-            near = at < 0.3
-            readings += int(near.sum())
-            shown += shown_by(
-                panda_model, believed, kin, np.where(near, np.maximum(at, PAPER_SENSOR.nearest_m), np.nan)
-            )
+            near = {u: max(d, PAPER_SENSOR.nearest_m) for u, d in zip(truly.ids, at, strict=True) if d < 0.3}
+            readings += len(near)
+            shown += shown_by(panda_model, believed, kin, no_fixtures(), near)
     assert readings > 1000
     assert shown < 10  # 46 without the allowance
 
 
 @pytest.mark.parametrize(("distance", "shown"), [(0.05, 1), (0.13, 1), (0.15, 0), (0.25, 0), (0.27, 1), (0.5, 1)])
-def test_what_is_barely_missed_explains_what_is_about_there_and_hides_nothing(panda_model, distance, shown):
+def test_what_is_barely_missed_explains_what_is_about_there_and_hides_nothing(panda_model, paper_skin, distance, shown):
     # a post whose surface lies 3 mm outside of the cone, 0.2 m before the unit of the hand that looks along +y
-    unit = TCP + np.array([0.0, 0.108, 0.1034 - 0.045])
     edge = 0.2 * np.tan(PAPER_SENSOR.angle / 2) + 0.003 / np.cos(PAPER_SENSOR.angle / 2)
-    post = unit + np.array([0.0, 0.2, edge + 0.01 / np.cos(PAPER_SENSOR.angle / 2)])
+    post = HAND_LEFT + np.array([0.0, 0.2, edge + 0.01 / np.cos(PAPER_SENSOR.angle / 2)])
     ends = post[None] - np.array([0.3, 0, 0]), post[None] + np.array([0.3, 0, 0])
     beside = Fixtures(np.zeros((0, 4)), Capsules(np.zeros(1, np.int64), *ends, np.full(1, 0.01)))
-    skin, kin = paper_skin(panda_model), panda_model.kinematics(panda().q_ready)
-    seen = np.where([unit == "hand_left" for unit in skin.ids], distance, np.nan)
-    assert shown_by(panda_model, skin, kin, seen, beside) == shown
+    kin = panda_model.kinematics(panda_model.description.q_ready)
+    assert shown_by(panda_model, paper_skin, kin, beside, {"hand_left": distance}) == shown

@@ -7,18 +7,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from tests.fuzz.invariants import same
+from tests.perception.watcher import FLOOR, PARAMS
 
-from pretouch.params import PerceptionParams
 from pretouch.perception.obstacles import track_init
 from pretouch.perception.perceive import perceive, perception_setup
-from pretouch.perception.scene_filter import Fixtures, no_fixtures
 from pretouch.perception.spread import spread
 from pretouch.robot.description import panda
 from pretouch.sensing.skin import Skin
 from pretouch.types import RangeReadings, RangeStatus
 
-FLOOR = Fixtures(np.array([[0.0, 0.0, 1.0, -0.2]]), no_fixtures().capsules)
-PARAMS = PerceptionParams()
 READY = panda().q_ready
 
 

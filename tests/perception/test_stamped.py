@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.perception.watcher import readings_of
 
 from pretouch.groups import Chain, Sensors
 from pretouch.params import PerceptionParams
@@ -12,7 +13,7 @@ from pretouch.perception.obstacles import poses, track_init
 from pretouch.perception.perceive import perceive, perception_setup
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import PROFILES
-from pretouch.types import RangeReadings, RangeStatus, RobotState
+from pretouch.types import RobotState
 
 LATE_S = 0.05
 QD = np.array([0.8, -0.2, 0.1, 0.3, 0.0, 0.4, 0.6])
@@ -30,11 +31,7 @@ def errors(model, skin, params: PerceptionParams, noise: float = 0.0) -> list[fl
         at, turned, _ = placed(model, skin, q0 + QD * then)
         beam = turned[unit, :, 2]
         distance = float((on - at[unit]) @ normal / (beam @ normal)) + noise * rng.standard_normal()
-        heard = np.arange(len(skin)) == unit
-        readings = RangeReadings(
-            np.where(heard, then, -np.inf), np.where(heard, distance, np.nan),
-            np.where(heard, int(RangeStatus.OK), int(RangeStatus.NONE)),
-        )  # fmt: skip
+        readings = readings_of(skin, then, hand_left=distance)
         q = q0 + QD * now
         robot = RobotState(now, q, QD, q, QD, np.zeros(7), None)
         setup = perception_setup(model, skin, no_fixtures(), params)
