@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from pretouch.errors import RobotModelError
-from pretouch.robot.body import Capsules, capsules_of
+from pretouch.robot.body import capsules_of
 
 
 def _model(geoms: str) -> mujoco.MjModel:
@@ -11,11 +11,6 @@ def _model(geoms: str) -> mujoco.MjModel:
         f'<mujoco><worldbody><body name="one">{geoms}</body><body name="two">'
         '<geom name="two_0" type="capsule" fromto="0 1 0 0 1 2" size="0.2"/></body></worldbody></mujoco>'
     )
-
-
-def _three() -> Capsules:
-    ends = np.arange(9.0).reshape(3, 3)
-    return Capsules(np.array([1, 2, 1]), ends, ends + 1, np.array([0.1, 0.2, 0.3]))
 
 
 def test_capsules_have_the_ends_and_radius_of_the_file():
@@ -27,24 +22,9 @@ def test_capsules_have_the_ends_and_radius_of_the_file():
         np.testing.assert_allclose(sorted([a.tolist(), b.tolist()]), sorted(ends), atol=1e-12)
 
 
-def test_an_axis_turned_by_a_quaternion_is_turned():
-    body = capsules_of(_model('<geom type="capsule" pos="0 0 1" size="0.05 0.2" euler="0 90 0"/>'))
-    np.testing.assert_allclose(np.abs(body.b[0] - body.a[0]), [0.4, 0, 0], atol=1e-12)
-    np.testing.assert_allclose((body.a[0] + body.b[0]) / 2, [0, 0, 1], atol=1e-12)
-
-
 def test_geoms_that_are_no_capsules_are_refused_by_name():
     with pytest.raises(RobotModelError, match=r"The geoms plate, ball are not capsules.*capsules only"):
         capsules_of(_model('<geom name="plate" type="box" size="1 1 1"/><geom name="ball" size="1"/>'))
-
-
-def test_of_links_keeps_order_and_pairs_up_fields():
-    kept = _three().of_links(np.array([1]))
-    np.testing.assert_array_equal(kept.link, [1, 1])
-    np.testing.assert_array_equal(kept.a[:, 0], [0, 6])
-    np.testing.assert_array_equal(kept.b[:, 0], [1, 7])
-    np.testing.assert_array_equal(kept.radius, [0.1, 0.3])
-    assert len(_three().of_links(np.array([7]))) == 0
 
 
 def test_the_pandas_fingertips_reach_beyond_the_tcp(panda_model):

@@ -39,10 +39,6 @@ def test_the_envelope_of_the_fr3_is_the_one_its_vendor_publishes():
         assert np.all((beyond > -8e-3) & (beyond < 4e-4))
 
 
-def test_a_panda_has_no_envelope():
-    assert panda().envelope is None
-
-
 @pytest.mark.parametrize("name", ["qd_max", "qdd_max", "tau_max"])
 @pytest.mark.parametrize("bad", [0.0, -1.0, np.nan, np.inf])
 def test_a_limit_that_is_no_positive_number_is_refused(name, bad):

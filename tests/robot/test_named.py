@@ -3,10 +3,10 @@
 from pathlib import Path
 
 import pytest
+from tests.other_arm import copied_panda
 
 from pretouch.errors import RobotModelError, SkinError
-from pretouch.robot.description import RobotDescription, fr3, panda
-from pretouch.robot.description_file import description_text
+from pretouch.robot.description import fr3, panda
 from pretouch.robot.model import RobotModel
 from pretouch.robot.named import is_shipped, robot_named
 from pretouch.sensing.skin import OWN_SKIN, PAPER_SKIN, skin_for
@@ -25,17 +25,12 @@ def test_an_unknown_name_is_refused_with_those_there_are():
 def test_only_the_packages_arms_are_shipped(tmp_path: Path):
     assert is_shipped(panda())
     assert is_shipped(fr3())
-    assert not is_shipped(_folder(tmp_path))
-
-
-def _folder(folder: Path) -> RobotDescription:
-    (folder / "robot.toml").write_text(description_text(panda()))
-    (folder / panda().mjcf.name).write_bytes(panda().mjcf.read_bytes())
-    return robot_named(str(folder))
+    assert not is_shipped(robot_named(str(copied_panda(tmp_path))))
 
 
 def test_a_folder_is_an_arm_and_the_skin_beside_it_is_its_skin(tmp_path: Path):
-    model = RobotModel(_folder(tmp_path))
+    model = RobotModel(robot_named(str(copied_panda(tmp_path))))
+    (tmp_path / OWN_SKIN).unlink()
     assert model.description.mjcf.parent == tmp_path
     assert len(skin_for(model)) == 7  # it is called panda
     text = PAPER_SKIN.read_text()

@@ -55,15 +55,6 @@ def test_a_hand_folded_onto_the_forearm_is_in_penetration(panda_model: RobotMode
     assert distances(panda_model, panda_model.description.q_ready[None]).min() > 0.03
 
 
-def test_turning_the_base_changes_no_distance_between_the_links_it_turns(panda_model: RobotModel):
-    q = np.repeat(panda_model.description.q_ready[None], 2, axis=0)
-    q[1, 0] = 1.3
-    base = panda_model.link_index("panda_link0")
-    moved = panda_model.capsules.link[panda_model.apart].min(axis=1) > base
-    found = distances(panda_model, q)[:, moved]
-    np.testing.assert_allclose(found[0], found[1], atol=1e-12)
-
-
 coordinate = st.one_of(st.floats(-1.0, 1.0), st.sampled_from([0.0, 1.0, 1e-9, 1e-5, -0.5]))
 point = st.tuples(coordinate, coordinate, coordinate).map(np.array)
 
@@ -93,10 +84,3 @@ def test_parallel_segments_too(a, b, begin, end, offset):
 def test_points_are_segments_of_no_length(a, b, c):
     assert segment_distance(a, a, b, b) == pytest.approx(float(np.linalg.norm(a - b)), abs=1e-12)
     assert segment_distance(a, a, b, c) == pytest.approx(float(segment_distance(b, c, a, a)), abs=1e-9)
-
-
-def test_many_segments_at_once_give_what_each_gives():
-    a, b, c, d = np.random.default_rng(3).normal(size=(4, 5, 6, 3))
-    together = segment_distance(a, b, c, d)
-    assert together.shape == (5, 6)
-    assert together[2, 4] == pytest.approx(float(segment_distance(a[2, 4], b[2, 4], c[2, 4], d[2, 4])))
