@@ -31,15 +31,6 @@ def whole(panda_model, paper_skin, tmp_path_factory):
 
 
 @pytest.fixture
-def cut(whole, tmp_path):
-    """The same, of a process that was killed."""
-    place = tmp_path / "cut.mcap"
-    content = whole.read_bytes()
-    place.write_bytes(content[: 2 * len(content) // 3])
-    return place
-
-
-@pytest.fixture
 def page(monkeypatch):
     """Take the page's place, and keep what it was given."""
     given = []
@@ -79,7 +70,9 @@ def test_of_a_run_that_was_held_from_the_start_on_it_is_said_that_it_was(capsys,
     assert "0 contacts, 0 holds after the start, held for 100% of the time." in capsys.readouterr().out
 
 
-def test_of_a_killed_run_it_is_said_what_is_missing(capsys, cut):
+def test_of_a_killed_run_it_is_said_what_is_missing(capsys, whole, tmp_path):
+    cut, content = tmp_path / "cut.mcap", whole.read_bytes()
+    cut.write_bytes(content[: 2 * len(content) // 3])
     assert replay(cut) == 0
     said = capsys.readouterr().out.splitlines()
     assert "the end is missing" in said[0]

@@ -65,9 +65,13 @@ def in_python(code: str, **environment: str) -> str:
     return done.stdout
 
 
-def test_the_import_loads_nothing():
-    loaded = in_python("import sys, pretouch; print(*(n for n in sys.modules if '.' not in n))").split()
-    assert not {"numpy", "numba", "scipy", "mujoco", "matplotlib", "tyro", "rich"} & set(loaded)
+HELP = "import contextlib, pretouch.cli as cli\nwith contextlib.suppress(SystemExit): cli.main(['--help'])"
+
+
+@pytest.mark.parametrize(("code", "loads"), [("import pretouch", set()), (HELP, {"tyro", "rich"})])
+def test_neither_import_nor_help_loads_heavy_packages(code: str, loads: set[str]):
+    loaded = in_python(f"{code}\nimport sys; print(*(n for n in sys.modules if '.' not in n))").split()
+    assert {"numpy", "numba", "scipy", "mujoco", "matplotlib", "tyro", "rich"} & set(loaded) == loads
 
 
 def test_public_names_are_there():

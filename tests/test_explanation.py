@@ -47,15 +47,16 @@ def said(step: ControlStep, **changes: object) -> Explanation:
     return explain(replace(step, **changes), UNITS, LINKS)  # type: ignore[arg-type]
 
 
-def test_an_arm_that_nothing_limits_follows_its_path(step: ControlStep) -> None:
+def test_an_arm_that_nothing_limits_says_its_speed_or_place_and_what_it_sees(step: ControlStep) -> None:
     assert said(step) == Explanation(Doing.MOVING, "Moving at 0.30 m/s: nothing near is seen.")
     far = said(step, obstacles=seen((0, 0.9, 0.75, 2), (1, 0.6, 0.45, 2)))
     assert far == Explanation(Doing.MOVING, "Moving at 0.30 m/s: hand_left sees something at 0.45 m.")
-
-
-def test_where_no_unit_is_in_use_nothing_is_said_of_what_is_near(step: ControlStep) -> None:
+    seen_too = {"obstacles": seen((1, 0.5, 0.15, 1)), "restricted": np.array([0]), "approach_limit": np.array([0.4])}
+    loose = said(step, **seen_too, qp=limited(multiplier=0.0))
+    assert loose.sentence == "Moving at 0.30 m/s: hand_left sees something at 0.15 m."
+    rest = replace(step, desired_velocity=np.zeros(3), ee_velocity=np.zeros(3))
+    assert said(rest) == Explanation(Doing.MOVING, "In its place: nothing near is seen.")
     assert explain(step, (), LINKS).sentence == "Moving at 0.30 m/s: no sensor unit is in use."
-    rest = replace(step, desired_velocity=np.zeros(3))
     assert explain(rest, (), LINKS).sentence == "In its place: no sensor unit is in use."
 
 
@@ -66,11 +67,6 @@ def test_an_arm_too_loud_for_a_light_push_says_what_it_finds(step: ControlStep) 
     assert finds(replace(step, detectable_n=np.inf)) == "here, at this speed, no push is found"
 
 
-def test_an_arm_without_a_way_to_go_is_in_its_place(step: ControlStep) -> None:
-    found = said(step, desired_velocity=np.zeros(3), ee_velocity=np.zeros(3))
-    assert found == Explanation(Doing.MOVING, "In its place: nothing near is seen.")
-
-
 def test_eq_3_is_said_with_its_factor_and_the_unit_nearest_to_the_end_effector(step: ControlStep) -> None:
     # 0.136 m of 0.8 m are 17 %; what hand_left sees is nearer to the body, but not to the end-effector
     slowed = {"speed_scale": 0.17, "desired_velocity": 0.17 * AHEAD, "ee_velocity": 0.17 * AHEAD}
@@ -79,11 +75,8 @@ def test_eq_3_is_said_with_its_factor_and_the_unit_nearest_to_the_end_effector(s
     gone = said(step, **slowed)
     why = "what was seen has gone from view, a unit is late, or none looks where it goes"
     assert gone == Explanation(Doing.SLOWED, f"Slowed to 17 %: {why}.")
-
-
-def test_what_an_outside_source_sees_is_of_no_unit(step: ControlStep) -> None:
-    found = said(step, obstacles=seen((2, 0.4, 0.3, 2)), speed_scale=0.5)
-    assert found.sentence == "Slowed to 50 %: an outside source sees something at 0.30 m."
+    outside = said(step, obstacles=seen((2, 0.4, 0.3, 2)), speed_scale=0.5)
+    assert outside.sentence == "Slowed to 50 %: an outside source sees something at 0.30 m."
 
 
 def test_a_row_slows_to_the_share_of_the_speed_that_it_leaves(step: ControlStep) -> None:
@@ -117,14 +110,6 @@ def test_a_row_that_limits_the_direction_alone_names_unit_and_link(step: Control
         qp=limited(),
     )  # fmt: skip
     assert found == Explanation(Doing.MOVING, f"Moving, but hand_left sees something at 0.15 m, and {words}.")
-
-
-def test_a_row_that_does_not_bind_limits_nothing(step: ControlStep) -> None:
-    found = said(
-        step, obstacles=seen((1, 0.5, 0.15, 1)), restricted=np.array([0]), approach_limit=np.array([0.4]),
-        qp=limited(multiplier=0.0),
-    )  # fmt: skip
-    assert found.sentence == "Moving at 0.30 m/s: hand_left sees something at 0.15 m."
 
 
 def test_an_arm_kept_off_its_path_says_by_what_and_how_far_and_never_that_it_follows(step: ControlStep) -> None:

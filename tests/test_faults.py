@@ -7,14 +7,14 @@ import pytest
 
 from pretouch.desired import Desired, DesiredKind, sound_desired, twist
 from pretouch.errors import ParameterError
-from pretouch.faults import Watch, examine, sound_points, sound_readings, sound_touch, watch_init
+from pretouch.faults import Watch, examine, sound_points, sound_touch, watch_init
 from pretouch.modes import Event
 from pretouch.moving_fixtures import MovingFixtures
 from pretouch.params import FailureParams
 from pretouch.payload import Payload
 from pretouch.perception.moving import sound_moving
 from pretouch.sensing.sensor import PAPER_SENSOR
-from pretouch.types import Inputs, RangeReadings, RangeStatus, RobotState, SeenPoints, TouchReadings
+from pretouch.types import Inputs, RangeReadings, RobotState, SeenPoints, TouchReadings
 
 PARAMS = FailureParams()  # state older than 0.05 s, step more than 0.05 s after the last, no force for 0.2 s
 PERIOD = 0.01
@@ -240,27 +240,3 @@ def test_stamps_of_a_motion_as_large_as_a_float_can_be_are_refused_in_a_sentence
     for stamps in ((-1e308, 1e308), (1e308, 1.1e308), (0.0, np.nan), (-np.inf, 0.0)):
         wanted = Desired(DesiredKind.JOINT_VELOCITIES, np.array(stamps), np.zeros((2, 2)))
         assert sound_desired(wanted, 2, 1.0)[1].startswith("its time stamp is ")
-
-
-# readings
-
-
-def readings(stamp: object = (1.0, 2.0), distance: object = (0.5, 0.6), status: object = (0, 7)) -> RangeReadings:
-    return RangeReadings(*(np.array(part) if isinstance(part, tuple) else part for part in (stamp, distance, status)))
-
-
-@pytest.mark.parametrize(
-    ("given", "said"),
-    [
-        (readings(stamp=(1.0,)), "have the shapes (1,), (2,) and (2,), not (2,)"),
-        (readings(status=(0.0, np.nan)), "statuses are of type float64"),
-        (readings(status=("ok", "ok")), "statuses are of type <U2"),
-        (readings(stamp=("a", "b")), "not arrays of numbers"),
-        (readings(stamp=COMPLEX), "not arrays of numbers"),
-    ],
-)
-def test_of_readings_that_do_not_fit_none_is_taken(given: RangeReadings, said: str):
-    sound, unfit = sound_readings(given, 2)
-    assert said in unfit
-    np.testing.assert_array_equal(sound.stamp, [-np.inf, -np.inf])
-    np.testing.assert_array_equal(sound.status, int(RangeStatus.NONE))

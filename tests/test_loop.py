@@ -219,24 +219,17 @@ def test_signals_that_come_while_the_arm_brakes_wait(controller: Controller, wor
     assert np.abs(world.held[59]).max() > 0.05
 
 
-def test_a_skin_that_stamps_as_it_reads_is_heard(controller: Controller, world: World):
-    class Stamping(FakeSkin):
-        def read(self) -> RangeReadings:
-            readings = super().read()
-            return replace(readings, stamp=readings.stamp + 2e-4)
-
-    recorder = FakeRecorder()
-    loop.run(controller, world, Stamping(world), world, recorder, lambda step: len(recorder.steps) == 60)
-    assert recorder.steps[-1].mode is Mode.TRACK
-
-    # but a clock that is ahead is no clock
+@pytest.mark.parametrize(("ahead", "mode"), [(2e-4, Mode.TRACK), (2 * DT, Mode.HOLD)])
+def test_a_skin_that_stamps_as_it_reads_is_heard_but_a_clock_that_is_ahead_is_none(
+    controller: Controller, world: World, ahead: float, mode: Mode
+):
     class Ahead(FakeSkin):
         def read(self) -> RangeReadings:
-            return replace(super().read(), stamp=np.full(self.world.units, self.world.now + 2 * DT))
+            return replace(super().read(), stamp=np.full(self.world.units, self.world.now + ahead))
 
     recorder = FakeRecorder()
     loop.run(controller, world, Ahead(world), world, recorder, lambda step: len(recorder.steps) == 60)
-    assert recorder.steps[-1].mode is Mode.HOLD
+    assert recorder.steps[-1].mode is mode
 
 
 def test_a_loop_that_waits_between_its_tick_and_the_arms_state_is_late_and_goes_on(

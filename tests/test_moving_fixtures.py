@@ -27,7 +27,9 @@ def rod(x: float, y: float, stamp: float, speed: float = 0.0) -> MovingFixtures:
     return MovingFixtures(stamp, a, b, np.array([0.05]), v, v)
 
 
-@pytest.mark.parametrize("profile", [PRETOUCH, PROFILES["paper"]], ids=lambda profile: profile.name)
+@pytest.mark.parametrize(
+    "profile", [PRETOUCH, PROFILES["paper"], replace(PRETOUCH, perception=None)], ids=["pretouch", "paper", "unseeing"]
+)
 def test_an_arm_keeps_off_a_rod_on_its_path_and_takes_it_for_no_person(panda_model, paper_skin, profile):
     arm = Arm(panda_model, paper_skin, profile)
     x, y, _ = arm.ee()
@@ -46,7 +48,7 @@ def test_an_arm_keeps_off_a_rod_on_its_path_and_takes_it_for_no_person(panda_mod
         last = free.step()
     assert last.ee_position[1] > y + 0.3
     assert step.ee_position[1] < y + 0.25
-    assert least > 0.0
+    assert 0.0 < least < (0.2 if profile.name == "paper" else 0.03)
 
 
 def test_a_braking_arm_gives_way_to_a_rod_that_comes(panda_model, paper_skin):
@@ -67,16 +69,11 @@ def test_far_away_it_changes_no_command(panda_model, paper_skin, profile):
         assert one.thresholds.parts.tobytes() == other.thresholds.parts.tobytes()
 
 
-def test_an_arm_that_sees_nothing_keeps_off_too(panda_model, paper_skin):
-    profile = replace(PRETOUCH, perception=None)
-    arm = Arm(panda_model, paper_skin, profile)
-    x, y, _ = arm.ee()
-    least = min(arm.step(moving=rod(x, y + 0.35, arm.time)).obstacles.body_distance.min() for _ in range(300))
-    assert 0.0 < least < 0.03
-
-
-def test_silence_of_who_tells_holds_the_arm_until_it_is_told_again(panda_model, paper_skin):
+def test_silence_of_who_tells_holds_the_arm_until_it_is_told_for_the_first_time_and_again(panda_model, paper_skin):
     arm = Arm(panda_model, paper_skin, PRETOUCH)
+    steps = [arm.step(moving=SOMEWHERE) for _ in range(9)]
+    assert {step.mode for step in steps} == {Mode.HOLD}
+    assert "have not been told of yet" in steps[-1].reason
     for _ in range(150):
         step = arm.step(moving=rod(5.0, 0.0, arm.time))
     assert step.mode is Mode.TRACK
@@ -89,13 +86,6 @@ def test_silence_of_who_tells_holds_the_arm_until_it_is_told_again(panda_model, 
         " again."
     )
     assert arm.step(moving=rod(5.0, 0.0, arm.time)).mode is Mode.TRACK
-
-
-def test_an_arm_holds_until_it_is_told_of_the_other_for_the_first_time(panda_model, paper_skin):
-    arm = Arm(panda_model, paper_skin, PRETOUCH)
-    assert {arm.step(moving=SOMEWHERE).mode for _ in range(8)} == {Mode.HOLD}
-    step = arm.step(moving=SOMEWHERE)
-    assert "have not been told of yet" in step.reason
 
 
 def test_a_recording_holds_them_to_the_bit_and_replays(panda_model, paper_skin, tmp_path):

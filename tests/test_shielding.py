@@ -17,6 +17,11 @@ def plant(panda_model: pt.RobotModel) -> pt.Plant:
     return pt.Plant(panda_model, pt.SceneSpec(), pt.PlantParams(), pt.brought_to(panda_model, START), seed=1)
 
 
+@pytest.fixture
+def shield(panda_model: pt.RobotModel, plant: pt.Plant) -> pt.Shield:
+    return pt.shield(panda_model, pt.Skin([], panda_model), plant.read(), "blind")
+
+
 def turned(shield: pt.Shield, plant: pt.Plant, until: float, ask: object) -> list[pt.ControlStep]:
     """Steps of a loop in which `ask(now)` says what is wanted."""
     clock, steps = pt.PlantClock(plant, shield.controller.limits.period), []
@@ -27,8 +32,7 @@ def turned(shield: pt.Shield, plant: pt.Plant, until: float, ask: object) -> lis
     return steps
 
 
-def test_what_is_asked_is_done_and_where_nothing_is_asked_the_hand_stays(panda_model, plant):
-    shield = pt.shield(panda_model, pt.Skin([], panda_model), plant.read(), "blind")
+def test_what_is_asked_is_done_and_where_nothing_is_asked_the_hand_stays(shield, plant):
     steps = turned(shield, plant, 4.0, lambda now: twist(now, (0.0, 0.1, 0.0)) if 2.0 <= now < 3.0 else None)
     y = np.array([step.ee_position[1] for step in steps])
     at = [step.stamp for step in steps]
@@ -39,8 +43,7 @@ def test_what_is_asked_is_done_and_where_nothing_is_asked_the_hand_stays(panda_m
     assert {step.mode for step in steps[asked[0] :]} == {pt.Mode.TRACK}
 
 
-def test_a_turn_recomputes_and_a_false_report_is_not_believed(panda_model, plant):
-    shield = pt.shield(panda_model, pt.Skin([], panda_model), plant.read(), "blind")
+def test_a_turn_recomputes_and_a_false_report_is_not_believed(shield, plant):
     turned(shield, plant, 1.5, lambda now: joint_velocities(now, np.zeros(7)))
     cycle = shield.cycle
     step, _ = shield.controller.step(cycle.before, cycle.inputs)
@@ -57,8 +60,7 @@ def test_a_shield_begins_with_a_state_that_can_be_used(panda_model, plant):
         pt.shield(panda_model, pt.Skin([], panda_model), broken, "blind")
 
 
-def test_a_program_may_read_the_arm_after_the_clock(panda_model, plant):
-    shield = pt.shield(panda_model, pt.Skin([], panda_model), plant.read(), "blind")
+def test_a_program_may_read_the_arm_after_the_clock(shield, plant):
     turned(shield, plant, 1.5, lambda now: None)
     last = shield.cycle.inputs
     robot = replace(plant.read(), stamp=last.stamp + 0.012)
