@@ -101,11 +101,3 @@ def test_a_skin_that_stops_stops_the_arm_until_it_is_heard_again(panda_model: Ro
     assert modes[-1] is Mode.TRACK
     assert speeds[-1] > 0
     assert_within_limits(panda_model, world)
-
-
-def test_a_state_too_old_latches(panda_model: RobotModel, paper_skin: Skin):
-    world = World(panda_model, len(paper_skin), delay=60)
-    modes = turn(panda_model, paper_skin, world, 0.5)
-    assert modes[-1] is Mode.HOLD
-    assert "0.060 s old, for this machine is busy" in world.steps[-1].reason
-    assert_within_limits(panda_model, world)

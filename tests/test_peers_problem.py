@@ -97,7 +97,10 @@ def travelled(speed: float, acceleration: float, period: float) -> float:
 
 @pytest.mark.parametrize("points", [0, 7])
 def test_the_whole_step_sees_as_many_points_in_every_snapshot(points: int):
-    whole = Step(generate(*panda_arm(), SNAPSHOTS, points, seed=3))
+    problem = generate(*panda_arm(), SNAPSHOTS, points, seed=3)
+    assert problem.points.shape == (SNAPSHOTS, points, 3)
+    assert np.all(np.isfinite(Rows(problem).solve(0)))
+    whole = Step(problem)
     for s in range(SNAPSHOTS):
         step, _ = whole.controller.step(whole.state, whole._inputs(whole.time, s))
         assert len(step.obstacles.unit) == points
@@ -109,12 +112,6 @@ def test_it_is_drawn_from_its_seed_alone(problem: Problem):
     np.testing.assert_array_equal(again.points, problem.points)
     np.testing.assert_array_equal(again.velocity, problem.velocity)
     assert not np.any(other.points == problem.points)
-
-
-def test_no_points_are_a_problem_too():
-    problem = generate(*panda_arm(), 2, 0, seed=0)
-    assert problem.points.shape == (2, 0, 3)
-    assert np.all(np.isfinite(Rows(problem).solve(0)))
 
 
 def test_a_file_holds_all_of_it(problem: Problem, tmp_path: Path):

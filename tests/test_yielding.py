@@ -14,7 +14,7 @@ from pretouch.profiles import PROFILES, Profile, profile
 from pretouch.recording.cycles import packed_state, state_of
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.types import ControlStep, Mode, RobotState
+from pretouch.types import ControlStep, Mode
 from tests.following_arm import DT, Arm
 from tests.fuzz.invariants import same
 from tests.golden.script import Script
@@ -28,13 +28,16 @@ NO_LAG = replace(OURS, react=replace(OURS.react, lag_s=0.0))
 class Pushed(Arm):
     """An arm whose joints feel forces on its body, with no noise and no lag."""
 
+    def feel(self, torque: np.ndarray, **more: object) -> ControlStep:
+        return self.step(change=lambda robot: replace(robot, tau_ext=torque), **more)
+
     def push(self, force: tuple[float, float, float], link: str = "", cycles: int = 1, **more: object):
         k = self.model.link_index(link) if link else self.model.ee
         steps = []
         for _ in range(cycles):
             kin = self.model.kinematics(self.q)
             torque = self.model.jacobian(kin, k, kin.position[k])[:3].T @ np.array(force)
-            steps.append(self.step(force=force, change=with_torque(torque), **more))
+            steps.append(self.feel(torque, force=force, **more))
         return steps
 
     def meet(self, face: float, cycles: int) -> list[ControlStep]:
@@ -51,13 +54,6 @@ class Pushed(Arm):
 
     def point(self, link: str) -> np.ndarray:
         return self.model.kinematics(self.q).position[self.model.link_index(link)]
-
-
-def with_torque(torque: np.ndarray):
-    def change(robot: RobotState) -> RobotState:
-        return replace(robot, tau_ext=torque)
-
-    return change
 
 
 def arm_of(model: RobotModel, skin: Skin, params: Profile = NO_LAG) -> Pushed:
@@ -298,7 +294,7 @@ def test_the_paper_does_not_look_at_joint_torques(panda_model, paper_skin, name:
     for i in range(400):
         force = (0.0, -25.0 * (150 < i < 180), 0.0)
         one = plain.step(force)
-        two = other.step(force, change=with_torque(rng.normal(0, 20, 7)))
+        two = other.feel(rng.normal(0, 20, 7), force=force)
         np.testing.assert_array_equal(one.command, two.command)
         assert (one.mode, one.reason) == (two.mode, two.reason)
 

@@ -1,4 +1,4 @@
-"""Outside points through the whole controller, the loop and a recording."""
+"""What others tell of the surroundings, points and fixtures that move, through controller, loop and recording."""
 
 from dataclasses import replace
 
@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 
 from pretouch.control.braking import slots_init, widened
+from pretouch.explanation import explain
 from pretouch.faults import MOST_POINTS, sound_points
+from pretouch.limited import Limit
+from pretouch.moving_fixtures import SOMEWHERE, MovingFixtures
 from pretouch.params import OutsidePoints
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import PROFILES
@@ -165,3 +168,87 @@ def test_warming_up_knows_of_points_and_leaves_the_arm_as_it_is(panda_model, pap
     arm.controller.step = lambda state, inputs: calls.append(inputs.points) or step(state, inputs)
     warm_up(arm.controller, robot, points=True)
     assert {len(points.stamp) > 0 for points in calls} == {True, False}
+
+
+# fixtures that move
+
+
+def rod(x: float, y: float, stamp: float, speed: float = 0.0) -> MovingFixtures:
+    """An upright rod of 5 cm radius that moves along y."""
+    a, b = np.array([[x, y, 0.0]]), np.array([[x, y, 1.0]])
+    v = np.array([[0.0, speed, 0.0]])
+    return MovingFixtures(stamp, a, b, np.array([0.05]), v, v)
+
+
+@pytest.mark.parametrize(
+    "profile", [PRETOUCH, PAPER, replace(PRETOUCH, perception=None)], ids=["pretouch", "paper", "unseeing"]
+)
+def test_an_arm_keeps_off_a_rod_on_its_path_and_takes_it_for_no_person(panda_model, paper_skin, profile):
+    arm = Arm(panda_model, paper_skin, profile)
+    x, y, _ = arm.ee()
+    least = np.inf
+    for _ in range(400):
+        step = arm.step(moving=rod(x, y + 0.35, arm.time))
+        least = min(least, step.obstacles.body_distance.min())
+        # no unit shows it, and no person's nearness slows the arm or bends the thresholds
+        assert step.obstacles.unit.min() >= len(paper_skin)
+        assert step.speed_scale == 1.0
+    assert step.limited.by is Limit.APPROACH
+    assert step.limited.unit >= len(paper_skin)
+    assert "a fixture that moves is 0." in explain(step, paper_skin.ids, panda_model.links).sentence
+    free = Arm(panda_model, paper_skin, profile)
+    for _ in range(400):
+        last = free.step()
+    assert last.ee_position[1] > y + 0.3
+    assert step.ee_position[1] < y + 0.25
+    assert 0.0 < least < (0.2 if profile.name == "paper" else 0.03)
+
+
+def test_a_braking_arm_gives_way_to_a_rod_that_comes(panda_model, paper_skin):
+    still, coming = (Arm(panda_model, paper_skin, PRETOUCH) for _ in range(2))
+    x, y, _ = still.ee()
+    for i in range(130):
+        still.step(moving=rod(x, y + 0.45, still.time))
+        step = coming.step(moving=rod(x, y + 0.45 + 0.3 * (1.3 - 0.01 * i) - 0.39, coming.time, -0.3))
+    assert step.command[0] < still.qd[0]
+
+
+@pytest.mark.parametrize("profile", [PRETOUCH, PAPER], ids=lambda profile: profile.name)
+def test_far_away_it_changes_no_command(panda_model, paper_skin, profile):
+    plain, given = Arm(panda_model, paper_skin, profile), Arm(panda_model, paper_skin, profile)
+    for _ in range(150):
+        one, other = plain.step(), given.step(moving=rod(5.0, 5.0, given.time))
+        assert one.command.tobytes() == other.command.tobytes()
+        assert one.thresholds.parts.tobytes() == other.thresholds.parts.tobytes()
+
+
+def test_silence_of_who_tells_holds_the_arm_until_it_is_told_for_the_first_time_and_again(panda_model, paper_skin):
+    arm = Arm(panda_model, paper_skin, PRETOUCH)
+    steps = [arm.step(moving=SOMEWHERE) for _ in range(9)]
+    assert {step.mode for step in steps} == {Mode.HOLD}
+    assert "have not been told of yet" in steps[-1].reason
+    for _ in range(150):
+        step = arm.step(moving=rod(5.0, 0.0, arm.time))
+    assert step.mode is Mode.TRACK
+    told = arm.time
+    for _ in range(8):
+        step = arm.step(moving=rod(5.0, 0.0, told))
+    assert step.mode is Mode.HOLD
+    assert step.reason == (
+        "The fixtures that move were last known 0.070 s ago: check who tells of them; the arm goes on when it is told"
+        " again."
+    )
+    assert arm.step(moving=rod(5.0, 0.0, arm.time)).mode is Mode.TRACK
+
+
+def test_a_recording_holds_them_to_the_bit_and_replays(panda_model, paper_skin, tmp_path):
+    run = Run(controller_of(panda_model, paper_skin))
+    for i in range(60):
+        run.turn(lambda inputs, i=i: replace(inputs, moving=rod(0.6, 0.3 + 0.001 * i, inputs.stamp, 0.1)))
+    place = tmp_path / "beside.mcap"
+    with Recording(place, run.controller) as recording:
+        for cycle in run.cycles:
+            recording.record(cycle)
+    found = open_recording(place)
+    assert [same(kept.inputs, cycle.inputs) for kept, cycle in zip(found, run.cycles, strict=True)] == 60 * [True]
+    assert verify(found).agrees
