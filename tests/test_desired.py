@@ -28,9 +28,9 @@ from tests.test_loop import DT, World
 class Commanded:
     """An arm that follows its commands, driven by a commander: asks(time, arm) for each step."""
 
-    def __init__(self, model: RobotModel, name="paper", asks=None, seconds=4.0, recorder=None, arm=World):
+    def __init__(self, model: RobotModel, asks, seconds=4.0, recorder=None, arm=World):
         self.model = model
-        self.control = Controller(model, Skin([], model), no_fixtures(), Circle(), profile(name))
+        self.control = Controller(model, Skin([], model), no_fixtures(), Circle(), profile("paper"))
         self.arm = arm(model, 0)
         self.begin = model.kinematics(self.arm.read().q)
         self.steps: list[ControlStep] = []
@@ -51,10 +51,6 @@ class Commanded:
     @property
     def end(self):
         return self.model.kinematics(self.arm.read().q)
-
-    def moved(self) -> np.ndarray:
-        ee = self.model.ee
-        return self.end.position[ee] - self.begin.position[ee]
 
 
 class Pushed(World):
@@ -106,8 +102,9 @@ def test_a_pose_and_joint_positions_are_reached_and_kept(panda_model):
         return desired.pose(now, T)
 
     run = Commanded(panda_model, asks=to_pose, seconds=9.0)
-    np.testing.assert_allclose(run.moved(), (0.05, 0.1, -0.05), atol=2e-3)
-    np.testing.assert_allclose(run.end.rotation[panda_model.ee], TURN @ run.begin.rotation[panda_model.ee], atol=0.02)
+    begin, end, ee = run.begin, run.end, panda_model.ee
+    np.testing.assert_allclose(end.position[ee] - begin.position[ee], (0.05, 0.1, -0.05), atol=2e-3)
+    np.testing.assert_allclose(end.rotation[ee], TURN @ begin.rotation[ee], atol=0.02)
     assert max(np.linalg.norm(step.ee_velocity) for step in run.steps) < 0.31
 
     q = panda_model.description.q_ready + 0.1

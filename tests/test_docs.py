@@ -121,13 +121,13 @@ FOREIGN = {"franky", "panda_py", "pylibfranka", "rosbags"}
 """Modules that need an extra, or another program."""
 
 
-def blocks(kind):
+def blocks():
     for document in DOCUMENTS:
-        for found in re.findall(rf"^```{kind}\n(.*?)^```$", document.read_text(), re.MULTILINE | re.DOTALL):
+        for found in re.findall(r"^```python\n(.*?)^```$", document.read_text(), re.MULTILINE | re.DOTALL):
             yield pytest.param(found, id=f"{document.relative_to(ROOT)}:{found.strip().splitlines()[0][:40]}")
 
 
-@pytest.mark.parametrize("block", list(blocks("python")))
+@pytest.mark.parametrize("block", list(blocks()))
 def test_a_python_block_compiles_and_its_names_are_there(block):
     tree = ast.parse(block)
     compile(tree, "block", "exec")
