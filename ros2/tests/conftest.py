@@ -3,7 +3,6 @@
 import socket
 
 import pytest
-from ros2.tests.processes import arm_peer
 from tests.needs import modules_with
 
 from pretouch.extras import ROS2
@@ -42,5 +41,7 @@ other = third = node
 
 @pytest.fixture
 def arm(domain, tmp_path):
+    from ros2.tests.arm_peer import arm_peer
+
     with arm_peer(domain, tmp_path / "log.npy") as peer:
         yield peer

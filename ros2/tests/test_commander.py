@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from ros2.tests.arm_peer import speeds
 from ros2.tests.asking import MESSAGES, NAMES, SLOW, Publishing, trajectory, twist
-from ros2.tests.processes import speeds
 from ros2.tests.test_messages import Drawn
 
 from pretouch import loop

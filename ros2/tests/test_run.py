@@ -10,8 +10,8 @@ from time import monotonic, sleep
 
 import numpy as np
 import pytest
+from ros2.tests.arm_peer import speeds, velocities
 from ros2.tests.asking import Publishing, twist
-from ros2.tests.processes import speeds, velocities
 
 from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify
