@@ -12,7 +12,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from contextlib import ExitStack, closing
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -54,35 +54,28 @@ def host():
     return loopback()
 
 
-@dataclass
 class Served:
     """A server in a thread."""
 
-    arm: ServedArm
-    server: FciServer
-    host: str
-    said: list[str] = field(default_factory=list)
-    truth: list[list[float]] = field(default_factory=list)
-    """Time [s], true force [N] and joint positions [rad] of each millisecond of the plant."""
-    thread: threading.Thread | None = None
-    ending: threading.Event = field(default_factory=threading.Event)
+    def __init__(self, arm: ServedArm, options: ServeOptions) -> None:
+        self.arm, self.host, self.said, self._ending = arm, options.host, list[str](), threading.Event()
+        self.truth: list[list[float]] = []
+        """Time [s], true force [N] and joint positions [rad] of each millisecond of the plant."""
+        self.server = FciServer(arm, options, self._watch, self.said.append)
+        self.protocol, self.address = self.server.protocol, self.server.address
+        self._thread = threading.Thread(target=self.server.serve, args=(self._ending.is_set,))
+        self._thread.start()
+
+    def _watch(self, time: float, arm: ServedArm) -> None:
+        self.truth.append([time, *arm.true_force.tolist(), *arm.plant.mj_data.qpos[:7].tolist()])
 
     def stop(self) -> None:
         """End it, and give its address back."""
-        self.ending.set()
-        if self.thread is not None:
-            self.thread.join(_PATIENCE_S)
-            assert not self.thread.is_alive()
+        self._ending.set()
+        self._thread.join(_PATIENCE_S)
+        assert not self._thread.is_alive()
         self.server.close()
         self.arm.__exit__()
-
-    @property
-    def protocol(self) -> Protocol:
-        return self.server.protocol
-
-    @property
-    def address(self) -> tuple[str, int]:
-        return self.server.address
 
     def ask(self, what: str, *values: float, kind: str = "") -> dict[str, Any]:
         """Have a vendor's client do something (see `vendor_client.py`)."""
@@ -95,42 +88,46 @@ class Served:
         return json.loads(done.stdout)
 
 
-Serve = Callable[..., Served]
-
-
 @pytest.fixture
 def serve(host):
     """Serve an arm until the test ends."""
-    running: list[Served] = []
+    with ExitStack() as running:
 
-    def start(kind: RobotKind = "panda", setup: dict[str, Any] | None = None, **options: Any) -> Served:
-        arm = arm_of(kind, **(setup or {}))
-        given = ServeOptions(**{"host": host, "lockstep": True, "patience_s": 5.0, **options})
-        served = Served(arm, None, host)  # type: ignore[arg-type]
+        def start(kind: RobotKind = "panda", setup: dict[str, Any] | None = None, **options: Any) -> Served:
+            given = ServeOptions(**{"host": host, "lockstep": True, "patience_s": 5.0, **options})
+            served = Served(arm_of(kind, **(setup or {})), given)
+            running.callback(served.stop)
+            return served
 
-        def watch(time: float, arm: ServedArm) -> None:
-            served.truth.append([time, *arm.true_force.tolist(), *arm.plant.mj_data.qpos[:7].tolist()])
-
-        served.server = FciServer(arm, given, watch, served.said.append)
-        served.thread = threading.Thread(target=served.server.serve, args=(served.ending.is_set,))
-        served.thread.start()
-        running.append(served)
-        return served
-
-    yield start
-    for served in running:
-        served.stop()
+        yield start
 
 
-class RawClient:
-    """A client that speaks bytes."""
+class Client:
+    """Sockets of a client that speaks bytes."""
 
-    def __init__(self, protocol: Protocol, address: tuple[str, int]) -> None:
-        self.protocol, self.field = protocol, "q_c"
+    def __init__(self, address: tuple[str, int]) -> None:
         self.udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.udp.bind(("127.0.0.1", 0))
         self.udp.settimeout(_PATIENCE_S)
         self.tcp = socket.create_connection(address, timeout=_PATIENCE_S)
+
+    def state(self) -> Any:
+        raise NotImplementedError
+
+    def state_where(self, holds: Callable[[Any], bool]) -> Any:
+        return next(state for state in iter(self.state, None) if holds(state))
+
+    def close(self) -> None:
+        self.tcp.close()
+        self.udp.close()
+
+
+class RawClient(Client):
+    """A client of the arm."""
+
+    def __init__(self, protocol: Protocol, address: tuple[str, int]) -> None:
+        super().__init__(address)
+        self.protocol, self.field = protocol, "q_c"
         self._identifiers = itertools.count(1)
         self.robot_udp: Any = None
         self.connected = b""
@@ -174,9 +171,6 @@ class RawClient:
         assert len(data) == self.protocol.state.itemsize
         return np.frombuffer(data, self.protocol.state)[0]
 
-    def state_where(self, holds: Callable[[np.void], bool]) -> np.void:
-        return next(state for state in iter(self.state, None) if holds(state))
-
     def first_of_motion(self) -> np.void:
         return self.state_where(lambda state: state["robot_mode"] == 2)
 
@@ -199,10 +193,6 @@ class RawClient:
         assert state["robot_mode"] == 2, errors_of(state)
         return state
 
-    def close(self) -> None:
-        self.tcp.close()
-        self.udp.close()
-
     def _read(self, size: int) -> bytes:
         data = b""
         while len(data) < size:
@@ -221,17 +211,14 @@ def errors_of(state: np.void, field: str = "errors") -> list[str]:
 @pytest.fixture
 def raw():
     """Make clients that speak bytes."""
-    made: list[RawClient] = []
+    with ExitStack() as made:
 
-    def make(served: Served, version: int | None = None) -> RawClient:
-        client = RawClient(served.protocol, served.address)
-        made.append(client)
-        client.connect(version or served.protocol.version)
-        return client
+        def make(served: Served, version: int | None = None) -> RawClient:
+            client = made.enter_context(closing(RawClient(served.protocol, served.address)))
+            client.connect(version or served.protocol.version)
+            return client
 
-    yield make
-    for client in made:
-        client.close()
+        yield make
 
 
 @pytest.fixture(params=sorted(PROTOCOLS))

@@ -3,13 +3,13 @@
 import math
 import socket
 import struct
-from collections.abc import Callable
+from contextlib import ExitStack, closing
 from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from fci.tests.conftest import arm_of
+from fci.tests.conftest import Client, arm_of
 
 from pretouch.errors import ParameterError, RobotError
 from pretouch_fci.gripper import HOMING, Course, Gripper, GripperObject, Outcome, grasp_of, move_of, object_of
@@ -19,7 +19,6 @@ from pretouch_fci.server import FciServer
 _CUBE = GripperObject(0.04, 0.5)
 _CONNECT, _HOMING, _GRASP, _MOVE, _STOP = range(5)
 _SUCCESS, _FAIL, _UNSUCCESSFUL, _ABORTED = range(4)
-_PATIENCE_S = 10.0
 
 
 class State(NamedTuple):
@@ -32,14 +31,8 @@ class State(NamedTuple):
     temperature: int
 
 
-class GripperClient:
+class GripperClient(Client):
     """A client that speaks bytes; the layouts are written down once more, as the vendor publishes them."""
-
-    def __init__(self, address: tuple[str, int]) -> None:
-        self.udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self.udp.bind(("127.0.0.1", 0))
-        self.udp.settimeout(_PATIENCE_S)
-        self.tcp = socket.create_connection(address, timeout=_PATIENCE_S)
 
     def send(self, command: int, identifier: int, body: bytes = b"") -> None:
         self.tcp.sendall(struct.pack("<HII", command, identifier, 10 + len(body)) + body)
@@ -67,28 +60,18 @@ class GripperClient:
         assert len(data) == 23
         return State(*struct.unpack("<IddBH", data))
 
-    def state_where(self, holds: Callable[[State], bool]) -> State:
-        return next(state for state in iter(self.state, None) if holds(state))
-
-    def close(self) -> None:
-        self.tcp.close()
-        self.udp.close()
-
 
 @pytest.fixture
 def client():
     """Make clients of the gripper of a server, connected unless it is said otherwise."""
-    made: list[GripperClient] = []
+    with ExitStack() as made:
 
-    def make(served: Any, connected: bool = True) -> GripperClient:
-        made.append(GripperClient(served.server.gripper_address))
-        if connected:
-            assert made[-1].connect() == (_CONNECT, 5, 14, _SUCCESS, 3)
-        return made[-1]
+        def make(served: Any, connected: bool = True) -> GripperClient:
+            one = made.enter_context(closing(GripperClient(served.server.gripper_address)))
+            assert not connected or one.connect() == (_CONNECT, 5, 14, _SUCCESS, 3)
+            return one
 
-    yield make
-    for one in made:
-        one.close()
+        yield make
 
 
 def _done(gripper: Gripper, course: Course | None) -> tuple[Gripper, Outcome, float]:

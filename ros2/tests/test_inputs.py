@@ -27,9 +27,8 @@ def header(stamp: float) -> Any:
     return MESSAGES.header((math.floor(stamp), round(stamp % 1 * 1e9)), "f")
 
 
-def joint_state(stamp: float, names: str, q: list[float], qd: list[float] | None = None) -> Any:
-    nothing = np.zeros(0)
-    return MESSAGES.make(JOINT_STATE, header(stamp), list(names), np.array(q), np.array(qd or []), nothing)
+def joint_state(stamp: float, names: str, q: Any = (), qd: Any = (), tau: Any = ()) -> Any:
+    return MESSAGES.make(JOINT_STATE, header(stamp), list(names), *(np.array(one, float) for one in (q, qd, tau)))
 
 
 def wrench(stamp: float, *numbers: float) -> Any:
@@ -37,98 +36,84 @@ def wrench(stamp: float, *numbers: float) -> Any:
     return MESSAGES.make(WRENCH, header(stamp), MESSAGES.make("geometry_msgs/msg/Wrench", *pair))
 
 
-def test_joints_are_found_by_name_in_any_order_and_beside_others():
-    joints = Joints(NAMES, Stamps())
+@pytest.fixture
+def joints():
+    return Joints(NAMES, Stamps())
+
+
+def test_joints_are_found_by_name_in_any_order_and_beside_others(joints):
     joints.take(joint_state(1, "xcbya", [9, 3, 2, 8, 1], [90, 30, 20, 80, 10]), 5.0, 1)
-    assert joints.newest is not None
     assert joints.newest.q.tolist() == [1, 2, 3]
     assert joints.newest.qd.tolist() == [10, 20, 30]
     assert joints.newest.stamp == 5.0
 
 
-def test_a_message_without_all_of_our_joints_is_another_devices():
-    joints = Joints(NAMES, Stamps())
+def test_a_message_without_all_of_our_joints_is_another_devices(joints):
     joints.take(joint_state(1, "ab", [1, 2]), 5.0, 1)
     assert joints.newest is None
     assert joints.missing == ("c",)
     joints.take(joint_state(2, "abc", [1, 2, 3]), 6.0, 1)
     joints.take(joint_state(3, "ab", [7, 8]), 7.0, 1)
-    assert joints.newest is not None
     assert joints.newest.q.tolist() == [1, 2, 3]
     assert joints.newest.stamp == 6.0
 
 
 @pytest.mark.parametrize("positions", [[1.0, 2.0], [1.0, 2.0, 3.0, 4.0], []])
-def test_positions_that_are_not_one_for_each_name_are_not_taken(positions):
-    joints = Joints(NAMES, Stamps())
+def test_positions_that_are_not_one_for_each_name_are_not_taken(joints, positions):
     joints.take(joint_state(1, "abc", positions), 5.0, 1)
     assert joints.newest is None
 
 
-@pytest.mark.parametrize("given", [None, [math.nan] * 3])
-def test_missing_velocities_are_taken_from_the_positions(given):
-    joints = Joints(NAMES, Stamps())
+@pytest.mark.parametrize("given", [(), [math.nan] * 3])
+def test_missing_velocities_are_taken_from_the_positions(joints, given):
     joints.take(joint_state(1, "abc", [1, 2, 3], given), 5.0, 1)
-    assert joints.newest is not None
     assert joints.newest.qd.tolist() == [0, 0, 0]
     joints.take(joint_state(2, "abc", [1.1, 2, 2.9], given), 5.1, 1)
     assert joints.newest.qd == pytest.approx([1, 0, -1])
     assert joints.differentiated
 
 
-def test_a_position_that_is_no_number_is_handed_on_for_the_controller_to_name():
-    joints = Joints(NAMES, Stamps())
+def test_a_position_that_is_no_number_is_handed_on_for_the_controller_to_name(joints):
     joints.take(joint_state(1, "abc", [1, math.nan, 3], [0, 0, 0]), 5.0, 1)
-    assert joints.newest is not None
     assert np.isnan(joints.newest.q[1])
 
 
-def at(stamp: float) -> Any:
-    return SimpleNamespace(stamp=SimpleNamespace(sec=math.floor(stamp), nanosec=round(stamp % 1 * 1e9)))
+_BACK = [(5 + k / 100, 1.2 + k / 100, 8) for k in range(4)]
 
 
-def test_what_comes_again_or_late_is_not_new():
+@pytest.mark.parametrize(
+    ("told", "expected"),
+    [
+        pytest.param([(10, 1.0, 7), (10, 1.1, 7), (9.5, 1.2, 7), (10.01, 1.3, 7)], [1.0, None, None, 1.3], id="late"),
+        pytest.param([(10, 1.0, 7), (9.9, 1.1, 8)], [1.0, 1.1], id="another publisher"),
+        pytest.param([(9.9, 1.1, 8), *_BACK, _BACK[-1]], [1.1, None, None, 1.22, 1.23, None], id="clock set back"),
+        pytest.param([(10, 1.0, 1), (10, 1.1, 2), (10, 1.2, 1), (10, 1.3, 2)], [1.0, 1.1, None, None], id="frozen"),
+        pytest.param([(10 - 2 * (k % 2), 1.0 + k, 1) for k in range(9)], [1.0, *[None] * 8], id="alternating"),
+        pytest.param([(0, 1.0, 7), (0, 1.1, 7)], [1.0, 1.1], id="no stamps"),
+    ],
+)
+def test_only_what_is_newer_than_what_its_writer_said_before_is_new(told, expected):
     stamps = Stamps()
-    assert stamps.instant(at(10.0), 1.0, 7) == 1.0
-    assert stamps.instant(at(10.0), 1.1, 7) is None
-    assert stamps.instant(at(9.5), 1.2, 7) is None
-    assert stamps.instant(at(10.01), 1.3, 7) == 1.3
-
-
-def test_another_publisher_begins_anew_and_so_does_a_clock_set_back_once_it_goes_on():
-    stamps = Stamps()
-    assert stamps.instant(at(10.0), 1.0, 7) == 1.0
-    assert stamps.instant(at(9.9), 1.1, 8) == 1.1
-    assert [stamps.instant(at(5 + k / 100), 1.2 + k / 100, 8) for k in range(4)] == [None, None, 1.22, 1.23]
-    assert stamps.instant(at(5.03), 1.3, 8) is None
-
-
-def test_two_frozen_writers_and_alternating_stamps_are_not_new():
-    stamps = Stamps()
-    assert [stamps.instant(at(10), t, w) for t, w in ((1.0, 1), (1.01, 2), (1.02, 1), (1.03, 2))] == [
-        1.0, 1.01, None, None,
-    ]  # fmt: skip
-    stamps = Stamps()
-    assert [stamps.instant(at(10 - 2 * (k % 2)), 1.0 + k, 1) for k in range(9)] == [1.0, *[None] * 8]
+    assert [stamps.instant(header(stamp), received, writer) for stamp, received, writer in told] == expected
 
 
 def test_writers_that_publish_at_once_are_noticed_and_one_that_follows_another_is_not():
     stamps = Stamps()
     for k in range(3):
-        stamps.instant(at(10 + k), 1.0 + k, 1)
+        stamps.instant(header(10 + k), 1.0 + k, 1)
     assert not stamps.together()
-    stamps.instant(at(13), 4.0, 2)
+    stamps.instant(header(13), 4.0, 2)
     assert not stamps.together()
-    stamps.instant(at(13.1), 4.1, 1)
+    stamps.instant(header(13.1), 4.1, 1)
     assert stamps.together()
 
 
 def test_what_strangers_publish_takes_bounded_memory():
     joints, stamps = Joints(("a",), Stamps()), Stamps()
     for k in range(1000):
-        joints.take(SimpleNamespace(name=[f"x{k}"], position=[0.0], velocity=[], header=at(0)), 0.0, 1)
-        stamps.instant(at(10), float(k), k)
-    joints.take(SimpleNamespace(name=["a"] * 2000, position=[0.0] * 2000, velocity=[], header=at(0)), 0.0, 1)
+        joints.take(SimpleNamespace(name=[f"x{k}"], position=[0.0], velocity=[], header=header(0)), 0.0, 1)
+        stamps.instant(header(10), float(k), k)
+    joints.take(SimpleNamespace(name=["a"] * 2000, position=[0.0] * 2000, velocity=[], header=header(0)), 0.0, 1)
     assert len(joints._places) <= 64
     assert max(map(len, joints._places)) == 1
     assert len(joints.others) <= 65
@@ -137,22 +122,17 @@ def test_what_strangers_publish_takes_bounded_memory():
     assert joints.newest is not None
 
 
-def test_messages_without_a_stamp_are_all_new():
-    stamps = Stamps()
-    assert [stamps.instant(at(0), t, 7) for t in (1.0, 1.1)] == [1.0, 1.1]
-
-
 @pytest.mark.parametrize(("clock", "expected"), [(100.2, 4.8), (100.0, 5.0), (99.0, 5.0)])
 def test_with_one_clock_the_headers_age_counts(clock, expected):
-    assert Stamps(True, lambda: clock).instant(at(100.0), 5.0, 7) == pytest.approx(expected)
+    assert Stamps(True, lambda: clock).instant(header(100.0), 5.0, 7) == pytest.approx(expected)
 
 
 def test_how_far_a_clock_is_behind_is_what_the_promptest_message_shows():
     stamps = Stamps(now=lambda: 100.0)
-    stamps.instant(at(0), 5.0, 7)
+    stamps.instant(header(0), 5.0, 7)
     assert stamps.behind is None
     for stamp in (99.5, 99.99, 99.995 - 0.1, 99.996):
-        stamps.instant(at(stamp), 5.0, 7)
+        stamps.instant(header(stamp), 5.0, 7)
     assert stamps.behind == pytest.approx(0.004)
 
 
@@ -190,31 +170,27 @@ def test_a_wrench_that_is_old_or_no_number_is_no_estimate():
     assert taken.read(5.1, np.eye(3)) is None
 
 
-def efforts(stamp: float, names: str, tau: list[float]) -> Any:
-    return MESSAGES.make(JOINT_STATE, header(stamp), list(names), np.zeros(3), np.zeros(3), np.array(tau))
-
-
 @pytest.mark.parametrize(("sign", "factor"), [("on-robot", 1), ("by-robot", -1)])
 def test_torques_are_those_of_our_joints_in_our_order_and_sign_while_they_are_new(sign, factor):
     torques = JointTorques(ArmParams(sign, "base", torques="/tau"), NAMES, Stamps())
     assert np.isnan(torques.read(5.0)).all()
-    torques.take(efforts(1, "xcab", [9, 3, 1, 2]), 5.0, 1)
+    torques.take(joint_state(1, "xcab", tau=[9, 3, 1, 2]), 5.0, 1)
     assert torques.read(5.04).tolist() == [factor, factor * 2, factor * 3]
     assert np.isnan(torques.read(5.06)).all()
-    torques.take(efforts(2, "abc", [1, math.nan, 3]), 5.1, 1)
+    torques.take(joint_state(2, "abc", tau=[1, math.nan, 3]), 5.1, 1)
     assert np.isnan(torques.read(5.1)[1])
 
 
 def test_torques_of_others_or_too_few_are_none_and_zeros_neither_where_they_mean_that():
     torques = JointTorques(ArmParams("by-robot", "base", torques="/tau"), NAMES, Stamps())
-    torques.take(efforts(1, "abd", [1, 2, 3]), 5.0, 1)
-    torques.take(efforts(2, "abc", []), 5.1, 1)
+    torques.take(joint_state(1, "abd", tau=[1, 2, 3]), 5.0, 1)
+    torques.take(joint_state(2, "abc", tau=[]), 5.1, 1)
     assert (torques.received_any, torques.others) == (False, ("a", "b", "c"))
-    torques.take(efforts(3, "abc", [0, 0, 0]), 5.2, 1)
+    torques.take(joint_state(3, "abc", tau=[0, 0, 0]), 5.2, 1)
     assert torques.received_any
     assert np.isnan(torques.read(5.2)).all()
     kept = JointTorques(ArmParams("on-robot", "base", torques="/tau"), NAMES, Stamps())
-    kept.take(efforts(3, "abc", [0, 0, 0]), 5.2, 1)
+    kept.take(joint_state(3, "abc", tau=[0, 0, 0]), 5.2, 1)
     assert not kept.read(5.2).any()
 
 
