@@ -49,15 +49,15 @@ def _motion(client: RawClient, seconds: float, qd: Any = _STILL) -> np.void:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", sorted(PROTOCOLS))
-def test_pushes_come_when_they_are_wanted_and_the_truth_is_the_same_each_time(franka_server, connected, kind):
-    truths = []
+def test_pushes_come_when_they_are_wanted_and_all_is_the_same_each_time(franka_server, connected, kind):
+    truths, states = [], []
     for _ in range(2):
         server = franka_server(robot=kind)
         server.push((0, 15, -4), seconds=0.2, at=0.3)
         client = connected(server, kind)
-        _motion(client, 0.7)
+        states += [_motion(client, 0.7)]
         server.push((5, 0, 0), seconds=0.1)
-        _motion(client, 0.3)
+        states += [_motion(client, 0.3)]
         truths.append(server.truth)
     truth = truths[0]
     # each motion is followed by the half second in which the arm comes to rest
@@ -69,6 +69,7 @@ def test_pushes_come_when_they_are_wanted_and_the_truth_is_the_same_each_time(fr
     assert truth.time[truth.force[:, 0] == 5.0][0] == 2000.001
     for name in ("time", "force", "q"):
         np.testing.assert_array_equal(getattr(truths[0], name), getattr(truths[1], name))
+    assert [state.tobytes() for state in states[:2]] == [state.tobytes() for state in states[2:]]
 
 
 _IN_A_ROOM = """<mujoco><worldbody><site name="base" pos="1 2 .7"/>

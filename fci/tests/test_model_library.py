@@ -129,18 +129,17 @@ def test_another_machine_than_the_servers_gets_none(model, machine, system, word
     assert said == [f"The client has no model library: {expected}"]
 
 
-def test_without_a_compiler_there_is_none(monkeypatch, tmp_path):
-    request, said = _request(), []
+@pytest.mark.parametrize(
+    ("compiler", "words"),
+    [
+        ("", "there is no C compiler: install one that is found as cc."),
+        ("#!/bin/sh\necho cannot find math.h >&2\nexit 1\n", "{} failed (cannot find math.h): install another."),
+    ],
+)
+def test_without_a_compiler_that_works_there_is_none(monkeypatch, tmp_path, compiler, words):
+    request, said, place = _request(), [], tmp_path / "cc"
+    place.write_text(compiler)
+    place.chmod(0o755 if compiler else 0o644)
     monkeypatch.setenv("PATH", str(tmp_path))
     assert library_answer(RobotModel(panda()), request, said.append) == b"\1"
-    assert said == ["The client has no model library: there is no C compiler: install one that is found as cc."]
-
-
-def test_what_the_compiler_says_is_told(monkeypatch, tmp_path):
-    request, said = _request(), []
-    compiler = tmp_path / "cc"
-    compiler.write_text("#!/bin/sh\necho cannot find math.h >&2\nexit 1\n")
-    compiler.chmod(0o755)
-    monkeypatch.setenv("PATH", str(tmp_path))
-    assert library_answer(RobotModel(panda()), request, said.append) == b"\1"
-    assert said == [f"The client has no model library: {compiler} failed (cannot find math.h): install another."]
+    assert said == [f"The client has no model library: {words.format(place)}"]

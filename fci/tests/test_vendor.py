@@ -46,20 +46,6 @@ def test_velocities_and_poses_lead_the_end_effector_and_poses_begun_elsewhere_ar
     assert refused["recovered"]["mode"] == "idle"
 
 
-@pytest.mark.slow
-def test_two_runs_are_the_same_to_the_last_bit(serve, kind):
-    runs, truths = [], []
-    for _ in range(2):
-        served = serve(kind, setup={"pushes": (TcpPush(0.3, (0.0, 15.0, 0.0), 0.5),)})
-        runs.append(served.ask("move", 0.8))
-        served.stop()
-        truths.append(served.truth)
-    assert runs[0]["told"][0]["time"] == 1000.001
-    assert runs[0]["told"] == runs[1]["told"]
-    assert len(truths[0]) > 1000
-    assert truths[0] == truths[1]
-
-
 def test_states_tell_poses_and_what_the_flange_carries(serve, kind):
     told, model = serve(kind).ask("state"), RobotModel(robot_named(kind))
     kin = model.kinematics(np.array(told["q"]))

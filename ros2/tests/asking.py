@@ -1,13 +1,17 @@
-"""What commanders send in the tests of ROS 2, and one that goes on sending."""
+"""What commanders send in the tests of ROS 2, one that goes on sending, and a controller that is turned."""
 
 import math
 from collections.abc import Callable
 from threading import Event, Thread
 from time import time
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
+from pretouch import loop
+from pretouch.controller import Controller
+from pretouch.types import ControlStep
 from pretouch_ros2.messages import TRAJECTORY, TWIST, Messages
 from pretouch_ros2.node import Ros2Node
 
@@ -55,3 +59,17 @@ class Publishing:
     def __exit__(self, *_: object) -> None:
         self._over.set()
         self._thread.join()
+
+
+def turned(
+    controller: Controller, robot: Any, units: Any, done: Callable[[ControlStep], bool], **options: Any
+) -> list[ControlStep]:
+    """Turn a controller over an arm until `done(step)`, or for 30 s; return the steps."""
+    steps: list[ControlStep] = []
+    kept = SimpleNamespace(record=lambda cycle: steps.append(cycle.step))
+
+    def over(step: ControlStep) -> bool:
+        return done(step) or len(steps) > 3000
+
+    loop.run(controller, robot, units, loop.MonotonicClock(0.01), kept, over, loop.Options(**options))
+    return steps

@@ -1,21 +1,20 @@
 """The controller over ROS 2, with a simulated arm in another process that is pushed."""
 
-from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from threading import Thread
 from time import sleep
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from ros2.tests.asking import turned
 
-from pretouch import loop
 from pretouch.control.path import line
 from pretouch.controller import Controller
 from pretouch.errors import RobotError
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import PROFILES
-from pretouch.robot.model import RobotModel
-from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, Mode
 from pretouch_ros2.params import ArmParams, SkinParams
 from pretouch_ros2.robot import Ros2Robot
@@ -24,38 +23,19 @@ from pretouch_ros2.skin import Ros2Skin
 PUSH_N = 25.0
 
 
-class Run:
-    """Turns a controller over an arm in another process, and keeps its steps."""
-
-    def __init__(self, model: RobotModel, skin: Skin, robot: Ros2Robot, units: Ros2Skin) -> None:
-        x = model.kinematics(model.description.q_ready).position[model.ee]
-        path = line(tuple(x), (x[0], x[1] + 0.4, x[2]))
-        self.controller = Controller(model, skin, no_fixtures(), path, PROFILES["paper"])
-        self.robot, self.units = robot, units
-        self.steps: list[ControlStep] = []
-
-    def record(self, cycle: loop.Cycle) -> None:
-        self.steps.append(cycle.step)
-
-    def until(self, done: Callable[[ControlStep], bool], longest: float, resume: bool = False) -> list[ControlStep]:
-        """Turn until `done(step)` or for so long [s]; return the steps."""
-        self.steps, clock = [], loop.MonotonicClock(0.01)
-        loop.run(
-            self.controller, self.robot, self.units, clock, self,
-            lambda step: done(step) or len(self.steps) * 0.01 > longest, loop.Options(lambda: resume),
-        )  # fmt: skip
-        return self.steps
-
-
 @pytest.fixture
 def run(panda_model, paper_skin, node, arm):
+    """An arm and its units, over which a controller is turned until something has happened."""
+    x, y, z = panda_model.kinematics(panda_model.description.q_ready).position[panda_model.ee]
+    path = line((x, y, z), (x, y + 0.4, z))
+    controller = Controller(panda_model, paper_skin, no_fixtures(), path, PROFILES["paper"])
     with (
         Ros2Robot(ArmParams("by-robot", "base"), panda_model, node) as robot,
         Ros2Skin(SkinParams(), paper_skin, node) as units,
     ):
         robot.wait(10)
         units.wait(10)
-        yield Run(panda_model, paper_skin, robot, units)
+        yield SimpleNamespace(robot=robot, until=partial(turned, controller, robot, units))
 
 
 def test_a_pushed_arm_yields_to_the_push(run, arm):
@@ -69,7 +49,7 @@ def test_a_pushed_arm_yields_to_the_push(run, arm):
         reacted[0] += step.mode is Mode.REACT
         return reacted[0] >= 50
 
-    steps = run.until(done, 20, resume=True)  # a busy machine may be late
+    steps = run.until(done, resume=lambda: True)  # a busy machine may be late
     contact = next(step for step in steps if step.contact is not None)
     reaction = [step for step in steps if step.mode is Mode.REACT]
     assert contact.contact is not None
@@ -99,7 +79,7 @@ def test_a_state_that_does_not_come_or_only_comes_again_latches_a_hold(run, arm,
             arm.tell(fault)
         return "The robot's state is" in step.reason
 
-    steps = run.until(done, 3)
+    steps = run.until(done)
     assert steps[-1].mode is Mode.HOLD
     assert "check the connection to the arm, then resume" in steps[-1].reason
 
@@ -116,7 +96,7 @@ def test_a_controller_that_gets_no_commands_any_more_ends_the_run_and_the_arm_is
         return False
 
     with pytest.raises(RobotError, match="The arm does not follow"):
-        run.until(done, 20, resume=True)
+        run.until(done, resume=lambda: True)
     sleep(0.6)
     log = arm.stop()
     assert np.abs(np.diff(log[-50:, 1:], axis=0)).max() < 1e-9
@@ -136,7 +116,7 @@ def test_an_arm_whose_machine_pauses_in_motion_ends_at_rest(run, arm):
         return turns[0] > 20 and "The robot's state is" in step.reason  # a busy machine may be late before
 
     with suppress(RobotError):  # that it does not follow may be seen first
-        steps = run.until(done, 20, resume=True)
+        steps = run.until(done, resume=lambda: True)
         assert steps[-1].mode is Mode.HOLD
     pause.join()
     sleep(0.8)

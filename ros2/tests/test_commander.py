@@ -11,10 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 from ros2.tests.arm_peer import speeds
-from ros2.tests.asking import MESSAGES, NAMES, SLOW, Publishing, trajectory, twist
+from ros2.tests.asking import MESSAGES, NAMES, SLOW, Publishing, trajectory, turned, twist
 from ros2.tests.test_messages import Drawn
 
-from pretouch import loop
 from pretouch.control.path import line
 from pretouch.controller import Controller
 from pretouch.desired import Desired, DesiredKind, sound_desired
@@ -167,7 +166,6 @@ def driven(
 ) -> list[ControlStep]:
     """Let a commander drive an arm whose torques are heard too; `done` is given each step."""
     arm = ArmParams("by-robot", "base", torques="/external_joint_torques")
-    steps: list[ControlStep] = []
     with Ros2Robot(arm, model, node) as robot:
         robot.wait(10)
         commander = Ros2Commander(params, robot, model, node)
@@ -175,12 +173,7 @@ def driven(
         chosen = profile("pretouch:perception=none:failure.state_timeout_s=1")
         controller = Controller(model, Skin((), model), no_fixtures(), line((x, y, z), (x, y + 0.4, z)), chosen)
         robot.begin()
-        loop.run(
-            controller, robot, NoUnits(), loop.MonotonicClock(0.01),
-            SimpleNamespace(record=lambda cycle: steps.append(cycle.step)),
-            lambda step: done(step) or len(steps) > 3000, loop.Options(desired=commander),
-        )  # fmt: skip
-    return steps
+        return turned(controller, robot, NoUnits(), done, desired=commander)
 
 
 def test_a_twist_drives_the_arm_by_its_torques_and_what_goes_wrong_holds_it_and_says_so(

@@ -29,15 +29,6 @@ LAYOUTS = {
     TRAJECTORY: "ius[s][[d][d][d][d]iu]",
     TWIST: "iusdddddd",
 }
-JOINTS = "ius[s][d][d][d]"
-DDS_NAMES = {
-    JOINT_STATE: "sensor_msgs::msg::dds_::JointState_",
-    WRENCH: "geometry_msgs::msg::dds_::WrenchStamped_",
-    RANGE: "sensor_msgs::msg::dds_::Range_",
-    TRAJECTORY: "trajectory_msgs::msg::dds_::JointTrajectory_",
-    TWIST: "geometry_msgs::msg::dds_::TwistStamped_",
-    FRANKA_STATE: "franka_msgs::msg::dds_::FrankaRobotState_",
-}
 LINES = {
     JOINT_STATE: [
         "12 34 :panda_link0 3 :a :bcd :panda_joint3 3 0.1 nan -inf 0 1 1e-300",
@@ -75,7 +66,7 @@ def fast_peer(tmp_path_factory):
 
 
 def peer(fast_peer: Path, domain: int, kind: str, *how: str, layout: str = "") -> subprocess.Popen[str]:
-    given = [str(domain), "rt/topic", DDS_NAMES[kind], layout or LAYOUTS[kind], *how]
+    given = [str(domain), "rt/topic", kind.replace("/msg/", "::msg::dds_::") + "_", layout or LAYOUTS[kind], *how]
     return subprocess.Popen([fast_peer, *given], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
 
 
@@ -129,7 +120,8 @@ def test_what_fast_dds_publishes_is_read_and_it_reads_what_is_published(fast_pee
 
 def test_the_torques_in_a_state_of_franka_are_read_and_what_follows_them_is_not(fast_peer, node, domain):
     efforts = [0.5, -1.25, 3.0]
-    layout = f"ius{'d' * 26}{JOINTS * 3}{'d' * 14}{JOINTS}[d]dsb"
+    joints = LAYOUTS[JOINT_STATE]
+    layout = f"ius{'d' * 26}{joints * 3}{'d' * 14}{joints}[d]dsb"
     words = ["7 8 :fr3_link0", *["1"] * 26, *["0 0 :l 1 :j 1 0.5 0 0"] * 3, *["2"] * 14,
              "7 8 :fr3_link0 3 :a :b :c 3 0 0 0 3 0 0 0 3", *map(str, efforts), "2 0.1 0.2 9.5 :more 1"]  # fmt: skip
     torques = JointTorques(ArmParams("by-robot", "base", torques="/arm/robot_state"), ("c", "a", "b"), Stamps())

@@ -46,26 +46,19 @@ def test_who_comes_late_is_told_what_was_latched_and_nothing_else(node, other):
     assert received == ["first"]
 
 
-def test_a_publisher_that_comes_again_is_heard_again(node, domain):
+def test_a_publisher_that_is_closed_is_gone_and_is_heard_again_when_it_comes_again(node, domain):
     received: list[tuple[str, int]] = []
-    node.subscribe("/again", TEXT, lambda message, _, writer: received.append((message.data, writer)))
+    subscription = node.subscribe("/again", TEXT, lambda message, _, writer: received.append((message.data, writer)))
     for said in ("one", "two"):
         with Ros2Node(NodeParams(domain=domain)) as passing:
             publisher = passing.publisher("/again", TEXT)
             assert passing.wait_for(lambda publisher=publisher: publisher.subscribers == 1, 10)
             publisher.publish(text(passing, said))
             assert node.wait_for(lambda said=said: received[-1:] != [] and received[-1][0] == said, 5)
+        assert publisher.topic == "/again"  # kept, but of no use
+        assert node.wait_for(lambda: subscription.publishers == 0, 10)
     assert [said for said, _ in received] == ["one", "two"]
     assert received[0][1] != received[1][1]
-
-
-def test_a_node_that_is_closed_is_gone_for_others(node, domain):
-    subscription = node.subscribe("/gone", TEXT, lambda *_: None)
-    with Ros2Node(NodeParams(domain=domain)) as passing:
-        publisher = passing.publisher("/gone", TEXT)
-        assert node.wait_for(lambda: subscription.publishers == 1, 10)
-    assert publisher.topic == "/gone"  # kept, but of no use
-    assert node.wait_for(lambda: subscription.publishers == 0, 10)
 
 
 def test_topics_of_others_are_listed_by_type(node, other):

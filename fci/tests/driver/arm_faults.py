@@ -6,7 +6,7 @@ import re
 import tempfile
 import time
 from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from subprocess import Popen
@@ -127,10 +127,6 @@ FAULTS = {
 }  # fmt: skip
 
 
-def _model() -> RobotModel:
-    return RobotModel(planned(panda(), LimiterParams()))
-
-
 @dataclass
 class Seen:
     """What came of a fault."""
@@ -161,7 +157,7 @@ class Rehearsal:
 
     def play(self) -> Seen:
         """Play it."""
-        model, seen = _model(), self.seen
+        model, seen = RobotModel(planned(panda(), LimiterParams())), self.seen
         control = Controller(model, Skin([], model), no_fixtures(), Circle(), profile("paper"))
         with FrankaArm(
             self._served.address, "panda", model, behavior=collision_behavior(control.profile, model)
@@ -180,12 +176,11 @@ class Rehearsal:
                 if not np.isfinite(seen.held_s):
                     seen.reason, seen.held_s = str(error), self._newest_step - self._instant + PERIOD_S
             assert not np.isnan(self._instant), f"the run ended before its fault: {seen.reason}"
-            self._measure_rest()
+            if self._fault.said and not np.isfinite(seen.rested_s):
+                time.sleep(1.0)
+                self._read_rest()
         self._fault.undo(self._served)
-        if self._fault.ends:
-            seen.goes_on = self._runs_again(model)
-        else:
-            seen.goes_on = seen.modes[-1] is Mode.TRACK
+        seen.goes_on = self._runs_again(model) if self._fault.ends else seen.modes[-1] is Mode.TRACK
         self._truth.close()
         return seen
 
@@ -233,11 +228,6 @@ class Rehearsal:
         self._truth.read()
         self.seen.rested_s = self._truth.rested_after(self._robot_instant) if self._moved else 0.0
 
-    def _measure_rest(self) -> None:
-        if self._fault.said and not np.isfinite(self.seen.rested_s):
-            time.sleep(1.0)
-            self._read_rest()
-
     def _runs_again(self, model: RobotModel) -> bool:
         """Whether the arm moves in a new run, recovered if need be."""
         time.sleep(0.5)
@@ -256,9 +246,7 @@ class Rehearsal:
 
 def play(folder: Path, name: str) -> Seen:
     """Play one fault with an arm of its own."""
-    with ExitStack() as opened:
-        served = Served(folder, "panda", "--start", "path")
-        opened.callback(served.close)
+    with closing(Served(folder, "panda", "--start", "path")) as served:
         return Rehearsal(served, FAULTS[name]).play()
 
 
