@@ -29,7 +29,6 @@ def _served(*arguments: str) -> subprocess.Popen[str]:
 
 
 def _address(server: subprocess.Popen[str]) -> tuple[str, int]:
-    assert server.stdout is not None
     line = server.stdout.readline()
     assert line.startswith("Listening at 127.0.0.1:")
     return "127.0.0.1", int(line.split(":")[1].split()[0])

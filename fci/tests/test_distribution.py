@@ -34,6 +34,5 @@ def test_its_commands_are_those_the_product_names():
 def test_it_serves_without_the_lab_and_without_any_extra(tmp_path):
     command = [sys.executable, "-u", "-c", _ALONE, "serve-fci", "--port", "0", "--scene", "static"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=tmp_path) as server:
-        assert server.stdout is not None
         assert re.match(r"Listening at 127\.0\.0\.1:", server.stdout.readline())
         server.terminate()

@@ -210,14 +210,15 @@ def test_a_killed_test_run_leaves_no_server_behind(tmp_path):
         "import os, sys\nfrom pretouch_fci.testing import FrankaServer\nserver = FrankaServer()\n"
         "print(server.host, flush=True)\nsys.stdin.read()"
     )
-    with subprocess.Popen(
-        [sys.executable, "-c", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=tmp_path
-    ) as run:
-        assert run.stdout is not None
-        with socket.create_connection((run.stdout.readline().strip(), PORT), timeout=20.0) as tcp:
-            run.kill()
-            with suppress(ConnectionResetError):  # closed or reset, as it happens
-                assert tcp.recv(1) == b""
+    with (
+        subprocess.Popen(
+            [sys.executable, "-c", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=tmp_path
+        ) as run,
+        socket.create_connection((run.stdout.readline().strip(), PORT), timeout=20.0) as tcp,
+    ):
+        run.kill()
+        with suppress(ConnectionResetError):  # closed or reset, as it happens
+            assert tcp.recv(1) == b""
 
 
 def test_a_run_that_does_not_use_it_loads_nothing_and_warns_of_nothing(pytester):

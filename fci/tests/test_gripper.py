@@ -74,9 +74,8 @@ def client():
         yield make
 
 
-def _done(gripper: Gripper, course: Course | None) -> tuple[Gripper, Outcome, float]:
+def _done(gripper: Gripper, course: Course) -> tuple[Gripper, Outcome, float]:
     """The gripper when a command has ended, what became of it, and how long it took [s]."""
-    assert course is not None
     gripper, outcome, steps = replace(gripper, course=course), None, 0
     while outcome is None:
         gripper, outcome = gripper.step(0.001)

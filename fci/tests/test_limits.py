@@ -10,13 +10,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pretouch.errors import ParameterError, RobotModelError
-from pretouch.robot.description import fr3, panda
+from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
+from pretouch.robot.named import robot_named
 from pretouch.sim.tcp_push import TcpPush
 from pretouch_fci.collision import CollisionBehavior, Contacts
 from pretouch_fci.frames import flange_of
 from pretouch_fci.kinds import JointVelocity
-from pretouch_fci.limits import MotionLimits, motion_limits
+from pretouch_fci.limits import motion_limits
 from pretouch_fci.motion import Ending, Motion, Setpoint
 from pretouch_fci.options import drop_of
 from pretouch_fci.pushes import push_of
@@ -24,17 +25,14 @@ from pretouch_fci.state import StateDatagram, by_robot_at
 from pretouch_fci.urdf import urdf_of
 from pretouch_fci.wire import PANDA, Controller, Generator, RobotMode
 
-_MODELS = {"panda": RobotModel(panda()), "fr3": RobotModel(fr3())}
+_MODELS = {kind: RobotModel(robot_named(kind)) for kind in ("panda", "fr3")}
+_LIMITS = {kind: motion_limits(model, kind) for kind, model in _MODELS.items()}
 _READY = panda().q_ready
 _ZERO = np.zeros(7)
 
 
-def _limits(kind: str) -> MotionLimits:
-    return motion_limits(_MODELS[kind], kind)  # type: ignore[arg-type]
-
-
 def test_the_fr3s_speed_limits_are_those_the_vendor_publishes():
-    limits = _limits("fr3")
+    limits = _LIMITS["fr3"]
     q = _READY.copy()
     q[0] = 2.7
     # libfranka, rate_limiting.h: joint 1 towards its upper end
@@ -47,7 +45,7 @@ def test_the_fr3s_speed_limits_are_those_the_vendor_publishes():
 
 @given(st.lists(st.floats(-2.0, 2.0), min_size=7, max_size=7))
 def test_braking_keeps_the_acceleration_limit_and_ends_at_rest(speeds):
-    limits, qd = _limits("panda"), np.array(speeds)
+    limits, qd = _LIMITS["panda"], np.array(speeds)
     for _ in range(270):
         slower = limits.braked(qd)
         assert np.all(np.abs(slower - qd) <= limits.qdd * 1e-3 + 1e-12)
@@ -73,7 +71,7 @@ def test_a_motion_that_breaks_off_ends_in_braking_at_the_acceleration_limit():
 
 
 def test_nineteen_lost_commands_are_bridged_at_the_same_acceleration():
-    motion = Motion(_limits("panda"), Controller.JOINT_IMPEDANCE, JointVelocity())
+    motion = Motion(_LIMITS["panda"], Controller.JOINT_IMPEDANCE, JointVelocity())
     for k in range(1, 4):
         assert motion.follow(_READY, Setpoint(np.full(7, 1e-3 * k))) is None
     for _ in range(19):
@@ -86,9 +84,8 @@ def test_nineteen_lost_commands_are_bridged_at_the_same_acceleration():
 def test_thresholds_are_those_of_what_the_arm_does():
     # lower and upper torque, accelerating then steady; then forces alike
     body = np.concatenate([np.repeat([10.0, 20.0, 1.0, 2.0], 7), np.repeat([30.0, 60.0, 3.0, 6.0], 6)])
-    contacts, behavior = Contacts(), CollisionBehavior.of(body)
-    assert behavior is not None
-    contacts.behavior = behavior
+    contacts = Contacts()
+    contacts.behavior = CollisionBehavior.of(body)
     torque, force = 1.5 * np.eye(7)[2], -4.0 * np.eye(6)[0]
     assert contacts.update(torque, force, _ZERO) == ()
     assert contacts.joint_contact.tolist() == [False, False, True, False, False, False, False]

@@ -9,25 +9,20 @@ import os
 import sys
 
 
-def _panda(host):
-    from panda_py import libfranka as lib
+def _connected(kind, host):
+    """The library, and the robot by it."""
+    global kept
+    if kind == "fr3":
+        import pylibfranka as lib
 
-    return lib, lib.Robot(host)
-
-
-def _panda_python(host):
+        return lib, lib.Robot(host, lib.RealtimeConfig.kIgnore)
     import panda_py
     from panda_py import libfranka as lib
 
-    global kept
+    if kind == "panda":
+        return lib, lib.Robot(host)
     kept = panda_py.Panda(host)
     return lib, kept.get_robot()
-
-
-def _fr3(host):
-    import pylibfranka as lib
-
-    return lib, lib.Robot(host, lib.RealtimeConfig.kIgnore)
 
 
 _FIELDS = (
@@ -183,12 +178,10 @@ def settings(lib, robot, kind):
     (robot.set_k if kind == "panda" else robot.set_K)(turned)
     if kind == "panda":
         robot.set_guiding_mode([True] * 6, False)
-    refused = {}
-    for name, do in {
-        "load": lambda: robot.set_load(-1.0, [0.0] * 3, [0.0] * 9),
-        "collision": lambda: _behavior(robot, kind, -1.0, 1.0),
-    }.items():
-        refused[name] = _error(do)
+    refused = {
+        "load": _error(lambda: robot.set_load(-1.0, [0.0] * 3, [0.0] * 9)),
+        "collision": _error(lambda: _behavior(robot, kind, -1.0, 1.0)),
+    }
     return {"state": _fresh(robot), "refused": refused, "turned": turned}
 
 
@@ -248,7 +241,7 @@ def gripper(lib, robot, kind):
 def main():
     kind, host, what, *values = sys.argv[1:]
     try:
-        lib, robot = {"panda": _panda, "panda-python": _panda_python, "fr3": _fr3}[kind](host)
+        lib, robot = _connected(kind, host)
     except Exception as error:
         print(json.dumps({"error": str(error)}), flush=True)
     else:

@@ -137,7 +137,6 @@ class ArmPeer:
         self._process, self._log = process, log
 
     def tell(self, order: str) -> None:
-        assert self._process.stdin is not None
         print(order, file=self._process.stdin, flush=True)
 
     def pause(self, seconds: float) -> None:
@@ -158,7 +157,6 @@ def arm_peer(domain: int, log: Path, *options: str) -> Iterator[ArmPeer]:
     command = [sys.executable, "-m", "ros2.tests.arm_peer", str(domain), str(log), *options]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=ROOT) as process:
         try:
-            assert process.stdout is not None
             assert process.stdout.readline() == "ready\n"
             yield ArmPeer(process, log)
         finally:

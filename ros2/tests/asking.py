@@ -1,7 +1,8 @@
 """What commanders send in the tests of ROS 2, one that goes on sending, and a controller that is turned."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from threading import Event, Thread
 from time import time
 from types import SimpleNamespace
@@ -41,24 +42,22 @@ def trajectory(names: tuple[str, ...], *points: tuple[float, Any], at: float = 0
     return make(TRAJECTORY, MESSAGES.header(stamp(at), ""), list(names), made)
 
 
-class Publishing:
-    """A commander's program: sends a message again and again, stamped as it goes, until it is left."""
+@contextmanager
+def publishing(node: Ros2Node, topic: str, kind: str, made: Callable[[], Any]) -> Iterator[None]:
+    """Be a commander's program: send a message again and again, stamped as it goes."""
+    publisher, over = node.publisher(topic, kind), Event()
 
-    def __init__(self, node: Ros2Node, topic: str, kind: str, made: Callable[[], Any]) -> None:
-        self._publisher, self._made, self._over = node.publisher(topic, kind), made, Event()
-        self._thread = Thread(target=self._send)
+    def send() -> None:
+        while not over.wait(0.02):
+            publisher.publish(made())
 
-    def _send(self) -> None:
-        while not self._over.wait(0.02):
-            self._publisher.publish(self._made())
-
-    def __enter__(self) -> "Publishing":
-        self._thread.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._over.set()
-        self._thread.join()
+    thread = Thread(target=send)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
 
 
 def turned(

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from ros2.tests.arm_peer import speeds
-from ros2.tests.asking import MESSAGES, NAMES, SLOW, Publishing, trajectory, turned, twist
+from ros2.tests.asking import MESSAGES, NAMES, SLOW, publishing, trajectory, turned, twist
 from ros2.tests.test_messages import Drawn
 
 from pretouch.control.path import line
@@ -186,11 +186,11 @@ def test_a_twist_drives_the_arm_by_its_torques_and_what_goes_wrong_holds_it_and_
         return twist((0.0, 0.1, 0.0), frame=asked["frame"], at=time() + asked["at"])
 
     with ExitStack() as opened:
-        opened.enter_context(Publishing(other, topic, TWIST, made))
+        opened.enter_context(publishing(other, topic, TWIST, made))
         stages = iter([
             (lambda: asked.update(frame="camera"), "in the frame 'camera'"),
             (lambda: asked.update(at=-30.0), "The desired motion ended 30"),
-            (lambda: opened.enter_context(Publishing(third, topic, TWIST, made)), "several programs ask on"),
+            (lambda: opened.enter_context(publishing(third, topic, TWIST, made)), "several programs ask on"),
         ])  # fmt: skip
 
         def done(step: ControlStep) -> bool:

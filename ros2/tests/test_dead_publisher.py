@@ -32,7 +32,6 @@ def test_an_arm_whose_commands_end_comes_to_rest_within_its_limits(domain, tmp_p
         command = [sys.executable, "-m", "ros2.tests.test_dead_publisher", str(domain)]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=ROOT) as commander:
             try:
-                assert commander.stdout is not None
                 for line in commander.stdout:
                     last = np.array(line.split(), dtype=float)
                     if np.abs(last).max() > 0.75:

@@ -148,7 +148,6 @@ def test_a_range_of_the_other_layout_is_not_taken_for_ours(fast_peer, domain, di
     with Ros2Node(NodeParams(distribution, domain)) as node:
         subscription = node.subscribe("/topic", RANGE, lambda message, *_: got.append(message))
         with peer(fast_peer, domain, RANGE, "pub", "reliable", layout=theirs) as process:
-            assert process.stdin is not None
             print(line, file=process.stdin, flush=True)
             assert node.wait_for(lambda: bool(subscription.unreadable), 20)
             said = subscription.unreadable

@@ -95,11 +95,6 @@ def test_a_range_of_another_layout_is_refused_and_names_the_way_out(sender, rece
         ours.decoded(RANGE, sent)
 
 
-def test_since_iron_a_range_has_a_variance():
-    sizes = {d: len(messages_of(d).blank(RANGE)) for d in DISTRIBUTIONS}
-    assert sizes == {d: 6 if d in ("foxy", "galactic", "humble") else 7 for d in DISTRIBUTIONS}
-
-
 @pytest.mark.parametrize("cut", [0, 3, 4, 11, 40])
 def test_a_message_cut_off_is_refused(cut):
     messages = messages_of("jazzy")

@@ -30,7 +30,7 @@ class Listener:
 
     def __init__(self, node: Ros2Node) -> None:
         self.received: dict[str, list[Any]] = defaultdict(list)
-        self._node = node
+        self.node = node
         self.subscriptions = {
             topic: node.subscribe(topic, kind, lambda message, *_, topic=topic: self.received[topic].append(message),
                                   reliable=True, latched=topic in LATCHED)
@@ -38,16 +38,8 @@ class Listener:
         }  # fmt: skip
 
     def last(self, topic: str) -> Any:
-        assert self._node.wait_for(lambda: bool(self.received[topic]), 5), topic
+        assert self.node.wait_for(lambda: bool(self.received[topic]), 5), topic
         return self.received[topic][-1]
-
-    def found(self) -> bool:
-        return self._node.wait_for(lambda: all(s.publishers for s in self.subscriptions.values()), 10)
-
-
-def matched(node: Ros2Node) -> bool:
-    """Wait until all that a node publishes has its listener: what is sent before is lost."""
-    return node.wait_for(lambda: all(publisher.subscribers for publisher in node._publishers), 10)
 
 
 class Published(Arm):
@@ -68,11 +60,12 @@ def listener(other):
     return Listener(other)
 
 
-@pytest.fixture
-def published(panda_model, paper_skin, node, listener):
-    published = Published(panda_model, paper_skin, node, diagnostics_hz=10.0)
-    assert listener.found()
-    assert matched(node)
+@pytest.fixture(params=[{"diagnostics_hz": 10.0}], ids=[""])
+def published(request, panda_model, paper_skin, node, listener):
+    published = Published(panda_model, paper_skin, node, **request.param)
+    # what is sent before both sides have found each other is lost
+    assert listener.node.wait_for(lambda: all(one.publishers for one in listener.subscriptions.values()), 10)
+    assert node.wait_for(lambda: all(publisher.subscribers for publisher in node._publishers), 10)
     yield published
     published.output.close()
 
@@ -126,7 +119,7 @@ def test_each_contact_and_each_change_of_the_mode_is_published(published, listen
     assert contacts == 1
     assert listener.last("/pretouch/contact").wrench.force.y > 10
     modes = ["HOLD", "TRACK", "REACT"]
-    assert listener._node.wait_for(
+    assert listener.node.wait_for(
         lambda: [m for m in modes if any(t.data.startswith(m) for t in listener.received["/pretouch/mode"])] == modes, 5
     )
     sleep(0.1)
@@ -143,9 +136,8 @@ def test_a_silent_unit_is_an_error_in_the_diagnostics(published, listener, paper
     assert units[1].message == "received 0.50 s ago"
 
 
-def test_steps_are_published_at_the_rate_that_was_asked_for(panda_model, paper_skin, node, listener):
-    published = Published(panda_model, paper_skin, node, rate_hz=20.0)
-    assert listener.found()
+@pytest.mark.parametrize("published", [{"rate_hz": 20.0}], indirect=True)
+def test_steps_are_published_at_the_rate_that_was_asked_for(published, listener):
     for _ in range(50):
         published.turn()
         sleep(DT)

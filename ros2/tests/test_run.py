@@ -11,7 +11,7 @@ from time import monotonic, sleep
 import numpy as np
 import pytest
 from ros2.tests.arm_peer import speeds, velocities
-from ros2.tests.asking import Publishing, twist
+from ros2.tests.asking import publishing, twist
 
 from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify
@@ -54,7 +54,6 @@ def confirmed(domain: int, folder: Path) -> None:
 
 
 def lines_until(process: subprocess.Popen[str], sign: str) -> list[str]:
-    assert process.stdout is not None
     said = []
     for line in process.stdout:
         said.append(line)
@@ -113,7 +112,7 @@ def test_a_commander_drives_by_the_profile_pretouch_after_pushes_that_torques_co
             said += lines_until(run, "Let go.")
             arm.tell("push 0 0 0")
         said += lines_until(run, "was received on /pretouch/twist yet")
-        with Publishing(other, "/pretouch/twist", TWIST, lambda: twist((0.0, 0.05, 0.0))):
+        with publishing(other, "/pretouch/twist", TWIST, lambda: twist((0.0, 0.05, 0.0))):
             said += lines_until(run, "TRACK")
             sleep(1.5)
             arm.tell("push 0 0 25")

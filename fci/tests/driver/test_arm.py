@@ -47,7 +47,6 @@ def commander(served: Served) -> Iterator[Popen[str]]:
     """A process that moves the arm; once it does."""
     process = child("commander.py", served.kind, served.address)
     try:
-        assert process.stdout
         pid = process.stdout.readline().strip()
         assert pid.isdecimal(), pid + process.stdout.read()
         wait_for(served.moves, "a motion")
@@ -55,7 +54,6 @@ def commander(served: Served) -> Iterator[Popen[str]]:
     finally:
         process.kill()
         process.wait()
-        assert process.stdout
         process.stdout.close()
 
 
@@ -139,7 +137,6 @@ def test_a_program_that_was_frozen_for_long_does_not_move_the_arm_again(served):
         time.sleep(FROZEN_S)
         process.send_signal(signal.SIGCONT)
         assert process.wait(20.0) == 1
-        assert process.stdout
         assert "its motion ended, because no set-point came for 1 s" in process.stdout.read()
         assert served.rests()
     assert "Motion ended" not in served.said()

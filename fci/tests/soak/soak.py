@@ -144,10 +144,11 @@ class Soak:
     def run(self) -> Found:
         """Play it: half of the time one run that stays, then runs that are killed; return what was found."""
         begun, found = time.monotonic(), self.found
+        words = "live", "--port", str(free_port()), "--record", str(self._folder / "page.mcap")
         end = begun + self._seconds
         with self._stack as opened:
             relay = opened.enter_context(Relay(self._units, int(self._rng.integers(2**32))))
-            page = opened.enter_context(program(self._folder, "page", *self._page_words(), clock=self._clock))
+            page = opened.enter_context(program(self._folder, "page", *words, clock=self._clock))
             visitors = opened.enter_context(Visitors(page.said_within(r"(http://\S+)"), int(self._rng.integers(2**32))))
             with ExitStack() as serving:
                 self._serve(serving, relay)
@@ -166,9 +167,6 @@ class Soak:
         self._judge_memory()
         found.seconds = time.monotonic() - begun
         return found
-
-    def _page_words(self) -> tuple[str, ...]:
-        return "live", "--port", str(free_port()), "--record", str(self._folder / "page.mcap")
 
     def _serve(self, opened: ExitStack, relay: Relay) -> None:
         place = self._folder / "truth.csv"
