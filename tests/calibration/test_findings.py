@@ -140,6 +140,7 @@ def test_of_swapped_units_each_is_told_which_link_its_data_fit(panda_model, good
         assert f"It is said to sit on {said}, but its data fit " in unit.findings[0].sentence
         assert link in unit.findings[0].sentence
         assert not unit.accepted
+    assert hand.place.link == "panda_link4"
 
 
 def test_a_clock_that_is_off_by_more_than_expected_is_measured(panda_model, good):

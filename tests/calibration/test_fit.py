@@ -54,6 +54,15 @@ def test_the_jacobian_is_that_of_finite_differences():
         assert J[:, k] == pytest.approx(expected, rel=1e-5, abs=1e-4)
 
 
+def test_the_closed_form_is_near_enough_to_start_from():
+    for seed in range(20):
+        link, true = motion(seed=seed), truth(seed)
+        found = start(link, measured(link, true, NOISE, seed), PARAMS.gravity)
+        assert np.linalg.norm(found.p - true.p) < 0.02
+        assert Rotation.from_matrix(found.R.T @ true.R).magnitude() < 0.05
+        assert np.linalg.det(found.R) == pytest.approx(1.0)
+
+
 def nees(found: Fit, true: Estimate) -> float:
     e = np.concatenate([Rotation.from_matrix(found.estimate.R.T @ true.R).as_rotvec(), true.p - found.estimate.p])
     return float(e @ np.linalg.solve(found.covariance[:6, :6], e))
@@ -92,6 +101,15 @@ def test_the_covariance_counts_errors_that_last():
     fast = measured(link, true, NOISE)
     sigma = [np.trace(fit(link, d, true, NOISE, PARAMS).covariance[3:6, 3:6]) ** 0.5 for d in (fast, lasting)]
     assert sigma[1] > 2.5 * sigma[0]
+
+
+def test_large_differences_count_less_when_robust():
+    link, true = motion(), truth()
+    data = measured(link, true, NOISE)
+    data.values[200:260] += 5.0
+    plain = fit(link, data, true, NOISE, PARAMS).estimate
+    robust = fit(link, data, true, NOISE, PARAMS, robust=True).estimate
+    assert np.linalg.norm(robust.p - true.p) < 0.25 * np.linalg.norm(plain.p - true.p)
 
 
 @pytest.mark.parametrize("gravity", [(0.0, 0.0, 9.78), (0.0, 0.0, 9.832), (0.12, -0.08, 9.809)])

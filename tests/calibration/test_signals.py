@@ -8,7 +8,7 @@ from pretouch.calibration.alignment import align
 from pretouch.calibration.data import UnitData
 from pretouch.calibration.imu_signal import ImuSignal, saturated
 from pretouch.calibration.params import CalibrationParams
-from pretouch.calibration.signals import FINE_S, gaps, outside, smooth, times
+from pretouch.calibration.signals import FINE_S, gaps, outside, rate_of_change, smooth, times
 from pretouch.traces import ImuTrace, on_grid
 
 PARAMS = CalibrationParams()
@@ -72,12 +72,27 @@ def test_nothing_known_is_like_nothing():
     assert align(np.zeros((1000, 3)), ALL, turning(TIME), ALL, STEP, 0.5).likeness == 0.0
 
 
+@pytest.mark.parametrize(("length", "late"), [(25.0, -8.0), (200.0, 150.0)])
+def test_two_recordings_of_different_length_are_aligned(length, late):
+    later = np.arange(0, length, STEP)
+    found = align(turning(TIME), ALL, turning(later - late), np.ones(len(later), bool), STEP, np.inf)
+    assert found.late == pytest.approx(late, abs=0.01)
+    assert found.likeness > 0.97
+
+
 def test_fast_signals_do_not_pass():
     stamp = np.arange(0, 10, 1 / 416)
     at = times(0.5, 9.5)
     for frequency in (20.0, 50.0, 90.0, 170.0):
         passed = smooth(stamp, np.cos(2 * np.pi * frequency * stamp)[:, None], at, PARAMS)[200:-200]
         assert np.abs(passed).max() < 1e-3
+
+
+def test_the_rate_of_change_is_exact_for_slow_signals():
+    at = times(0.0, 4.0)
+    wave = np.column_stack([np.sin(6 * at), at**3])
+    expected = np.column_stack([6 * np.cos(6 * at), 3 * at**2])
+    assert rate_of_change(wave)[2:-2] == pytest.approx(expected[2:-2], abs=1e-6)
 
 
 def test_between_instants_it_is_linear_and_at_the_ends_it_stays():
@@ -115,3 +130,15 @@ def test_where_a_value_is_cut_off_nothing_is_used():
     expected = (at > 0.26) & (at < stamp[-1] - 0.26) & (np.abs(at - stamp[1000]) > 0.26)
     assert np.array_equal(signal.usable(at), expected)
     assert not saturated(unit(stamp, acceleration, rate)).any(), "without a full scale there is nothing to be cut off"
+
+
+def test_an_imu_signal_tells_values_and_rates_at_any_instant():
+    stamp = 1000 + np.arange(0, 6, 1 / 416)
+    phase = 2 * np.pi * (stamp - 1000)[:, None] * [0.5, 0.7, 0.9]
+    signal = ImuSignal(unit(stamp, np.sin(phase), np.cos(phase)), PARAMS)
+    at = np.array([1001.234, 1003.3, 1004.9])
+    turn = 2 * np.pi * np.array([0.5, 0.7, 0.9])
+    phase = turn * (at - 1000)[:, None]
+    measured = signal.at(at)
+    assert measured.values == pytest.approx(np.hstack([np.cos(phase), np.sin(phase)]), abs=1e-4)
+    assert measured.rates == pytest.approx(np.hstack([-turn * np.sin(phase), turn * np.cos(phase)]), abs=1e-3)

@@ -34,3 +34,9 @@ def test_all_points_are_on_the_outside_of_their_link(panda_model):
         closest(own.arrays, here.point, found)
         assert np.abs(distance).max() < 1e-9
         np.testing.assert_allclose(direction, here.normal, atol=1e-6)
+
+
+def test_another_shift_gives_other_points_of_the_same_areas(panda_model):
+    one, other = surface_of(panda_model, 500), surface_of(panda_model, 500, 0.37)
+    assert not np.allclose(one.point[:20], other.point[:20])
+    assert one.area.sum() == pytest.approx(other.area.sum(), rel=0.05)

@@ -1,6 +1,7 @@
 """Samples in time, joints by their names, and what cannot be opened."""
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -64,6 +65,13 @@ def test_between_samples_that_are_near_values_are_linear_and_elsewhere_unknown(l
                 np.testing.assert_allclose(value, np.interp(tick, known, values), atol=1e-12)
 
     holds()
+
+
+def test_a_log_of_joints_keeps_them_in_order_with_their_time(log):
+    both = replace(log([3, 1, 2]), arrays={"q": np.array([[3.0], [1.0], [2.0]])})
+    ordered = both.in_order("q")
+    assert ordered.arrays["q"][:, 0].tolist() == [1.0, 2.0, 3.0]
+    assert ordered.notes[0].values["what"] == "Joints"
 
 
 NUMBERED = tuple(f"joint_{j}" for j in range(1, 8))

@@ -82,6 +82,19 @@ def test_empty_cells_are_no_estimate_and_rows_without_time_are_left_out(tmp_path
     assert [(note.code, note.values["count"]) for note in recording.notes] == [("no_time", 1), ("no_estimate", 3)]
 
 
+def test_what_is_no_number_or_comes_twice_is_left_out_and_counted(tmp_path, panda_model):
+    columns = table()
+    columns["q3_rad"] = np.where(np.arange(50) == 7, np.nan, columns["q3_rad"])
+    columns["time_s"][[20, 21]] = columns["time_s"][[21, 20]]
+    columns["time_s"][31] = columns["time_s"][30]
+    columns["time_s"][40] = np.nan
+    trace, log = read_joints(write_csv(tmp_path / "a.csv", columns), panda_model)
+    np.testing.assert_array_equal(trace.q, np.delete(MOVING[[*range(20), 21, 20, *range(22, 50)]], [7, 30, 40], axis=0))
+    assert [(note.code, note.values["count"]) for note in log.notes] == [
+        ("no_time", 1), ("not_finite", 1), ("sorted", 1), ("repeated", 1),
+    ]  # fmt: skip
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [

@@ -222,6 +222,8 @@ def test_a_package_is_found_in_the_path_given(tmp_path):
 @pytest.mark.parametrize(
     ("name", "content", "sentence"),
     [
+        ("a.stl", b"", "holds no triangle, or is truncated"),
+        ("a.stl", b"\0" * 100, "holds no triangle, or is truncated"),
         ("a.stl", b"\0" * 80 + (2**32 - 1).to_bytes(4, "little") + b"\0" * 50, "holds no triangle, or is truncated"),
         ("a.stl", b"version https://git-lfs.github.com/spec/v1\n", "holds no triangle, or is truncated"),
         ("a.stl", ASCII_STL[:-12].encode(), "holds no triangle, or is truncated"),

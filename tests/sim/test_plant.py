@@ -213,6 +213,15 @@ def test_an_arm_is_decided_by_its_seed(panda_model):
         assert not np.array_equal(one, else_)
 
 
+def test_time_split_differently_is_the_same_time(panda_model):
+    whole, pieces = arm(panda_model), arm(panda_model)
+    whole.advance(0.1)
+    for _ in range(20):
+        pieces.advance(0.005)
+    assert whole.time == pieces.time == pytest.approx(0.1)
+    assert np.array_equal(whole.read().tau_ext, pieces.read().tau_ext)
+
+
 def test_a_state_is_consistent_and_stays_as_it_was_read(panda_model):
     plant = arm(panda_model, at=LEFT)
     plant.command(np.full(7, 0.1))
