@@ -112,6 +112,7 @@ def test_readings_samples_and_counts_come_over(skin, player):
     assert np.all((readings.distance >= 0.5) & (readings.distance < 0.507))
     samples, imu = skin.take_samples(), skin.take_imu()
     sequences = [one.sample.sequence for one in samples if one.unit == 0]
+    assert len(sequences) > 10
     assert sequences == list(range(1, len(sequences) + 1))
     assert all(abs(one.offset - player.units[one.unit].offset) <= one.bound + 1e-5 for one in samples)
     assert all(one.sample.unit == KEYS[IDS[one.unit]].number for one in samples)

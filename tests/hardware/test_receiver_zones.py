@@ -114,7 +114,7 @@ def test_samples_with_zones_come_through_shared_memory_however_large(bench):
     eight = b"\x08\x00" + bytes(5 * 64)
     for datagram in (
         zoned.sample(bench.now, flags=ZONED, zones=zones(2, 100, 200, 300, 400), imu=b"0123456789ab" * 2),
-        plain.sample(bench.now, flags=ZONED, zones=eight, imu_count=32, imu=bytes(384)),
+        plain.sample(bench.now, flags=ZONED | Flag.TOUCH, zones=eight, touch=bytes(12), imu_count=32, imu=bytes(384)),
     ):
         bench.send(datagram)
         (received,) = bench.receiver.take_samples()
