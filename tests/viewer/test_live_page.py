@@ -75,15 +75,6 @@ def test_a_second_of_ticks_is_a_second_of_the_simulation_but_in_slow_motion_and_
     assert simulation.time - before == pytest.approx(0.1)
 
 
-def test_what_people_ask_for_waits_for_the_loop(clock: Clock, simulation: LiveSimulation) -> None:
-    page = clock.page
-    page.ask(lambda: simulation.move_hand(np.array([0.9, 0.3, 0.6])), "hand")
-    assert simulation.frame.hand_target is not None
-    assert not np.allclose(simulation.frame.hand_target, [0.9, 0.3, 0.6])
-    clock.turn(0.1)
-    np.testing.assert_allclose(simulation.frame.hand_target, [0.9, 0.3, 0.6])
-
-
 def test_nobody_watching_costs_nothing_but_the_simulation(clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None:
     drawn: list[float] = []
     monkeypatch.setattr(LivePage, "_draw", lambda self, now: drawn.append(now))

@@ -82,9 +82,8 @@ def test_a_hand_dragged_into_the_arm_leads_to_a_reaction_and_back_and_the_camera
         visitor.type("x [m]", 1.2)
         visitor.wait_until(lambda: simulation.hand_target[0] == 1.2)
         visitor.wait_for("mode", Mode.TRACK.name)
-        visitor.drag(
-            np.array([0.3, -0.6, 0.1]), np.array([0.3, -0.4, 0.3]), touch
-        )  # beside hand and arm: turns the camera
+        # beside hand and arm, which turns the camera
+        visitor.drag(np.array([0.3, -0.6, 0.1]), np.array([0.3, -0.4, 0.3]), touch)
         visitor.wait_until(lambda: np.linalg.norm(camera(pages[0]) - before) > 0.1)
         assert simulation.hand_target[0] == 1.2
 
