@@ -61,7 +61,7 @@ def test_a_disk_without_room_for_anything_is_one_sentence(controller, tmp_path):
 
 @pytest.mark.parametrize(
     ("number", "remedy"),
-    [(errno.EIO, "check the disk"), (errno.ENOSPC, "free some space"), (errno.EDQUOT, "free some space")],
+    [(errno.EIO, "check the disk"), *((full, "free some space") for full in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG))],
 )
 def test_a_disk_that_fails_is_one_sentence(controller, tmp_path, monkeypatch, number, remedy):
     def fail(handle, data):

@@ -1,6 +1,7 @@
 """What sensor units sent, recorded without a controller."""
 
 import math
+import time
 from dataclasses import asdict
 from pathlib import Path
 
@@ -127,6 +128,16 @@ def test_a_file_that_is_cut_off_gives_its_whole_part(place, tmp_path):
     trace = read_skin(cut)
     assert not trace.complete
     assert trace.samples == 200
+
+
+def test_what_came_is_in_the_file_within_a_second_though_nobody_closes_it(tmp_path):
+    recording = SkinRecording(tmp_path / "a.mcap")
+    for number in range(1, 6):
+        record(recording, number)
+    time.sleep(1.0)
+    trace = read_skin(tmp_path / "a.mcap")
+    recording.close()
+    assert (trace.complete, trace.samples) == (False, 5)
 
 
 def test_a_recording_of_control_steps_is_no_recording_of_units(controller, tmp_path):
