@@ -16,6 +16,7 @@ from pretouch.robot.description import panda
 from pretouch.sensing.sensor import PAPER_SENSOR, cone_rays, cones_of
 
 INF = np.inf
+NOTHING = no_fixtures()
 LOW, HIGH = np.zeros(3), np.array([0.0, 0.0, 1.0])
 vectors = arrays(np.float64, 3, elements=st.floats(-2, 2))
 
@@ -30,13 +31,18 @@ def _gap(p: np.ndarray, a: np.ndarray, b: np.ndarray, radius: float) -> float:
     return np.linalg.norm(a + np.linspace(0, 1, 4001)[:, None] * (b - a) - p, axis=1).min() - radius
 
 
-def _looking(p, along, fixtures: Fixtures) -> float:
-    """What one sensor at p that looks along a direction is expected to see."""
+def _rod(x: float, y: float, radius: float) -> Capsules:
+    """An upright rod of the first link beside the base."""
+    return Capsules(np.ones(1, np.int64), np.array([[x, y, -1.0]]), np.array([[x, y, 1.0]]), np.array([radius]))
+
+
+def _looking(p, along, fixtures: Fixtures, body: Capsules = NOTHING.capsules, own: int = 0) -> float:
+    """What one sensor at p that looks along a direction is expected to see; it sits on the link `own`."""
     still = Kinematics(np.zeros((2, 3)), np.tile(np.eye(3), (2, 1, 1)), np.zeros((0, 3)), np.zeros((0, 3)))
     along = np.array(along, dtype=np.float64) / np.linalg.norm(along)
     R = Rotation.align_vectors([along], [[0, 0, 1]])[0].as_matrix()
-    sensors = Sensors(np.array(p, dtype=np.float64)[None], R[None], np.array([1]))
-    return float(expected_range(still, sensors, cones_of([PAPER_SENSOR]), no_fixtures().capsules, fixtures)[0])
+    sensors = Sensors(np.array(p, dtype=np.float64)[None], R[None], np.array([own]))
+    return float(expected_range(still, sensors, cones_of([PAPER_SENSOR]), body, fixtures)[0])
 
 
 # One ray, one capsule
@@ -119,7 +125,7 @@ CORNER = Fixtures(np.array([[0.0, 0, 1, 0], [-1.0, 0, 0, -3]]), no_fixtures().ca
         ((0, 0, -0.2), (0, 0, -1), FLOOR, 0.0),  # on it
         ((2.5, 0, 1), (1, 0, 0), CORNER, 0.5),  # the nearest counts
         ((0.5, 0, 0.25), (0, 0, -1), CORNER, 0.25),
-        ((0, 0, 0), (1, 0, 0), no_fixtures(), INF),
+        ((0, 0, 0), (1, 0, 0), NOTHING, INF),
     ],
 )
 def test_a_plane_is_seen_from_its_front_at_its_distance(p, along, fixtures, seen):
@@ -137,9 +143,13 @@ def test_the_floor_is_seen_by_the_lowest_ray_of_the_cone(height, tilt, turn):
 def test_a_post_is_seen_off_the_beam_but_within_the_cone():
     for degrees, visible in ((0, True), (13, True), (20, False)):
         y = np.tan(np.deg2rad(degrees))
-        ends = np.array([[1.0, y, -1.0]]), np.array([[1.0, y, 1.0]])
-        post = Fixtures(np.zeros((0, 4)), Capsules(np.zeros(1, np.int64), *ends, np.array([0.02])))
+        post = Fixtures(np.zeros((0, 4)), _rod(1.0, y, 0.02))
         assert np.isfinite(_looking((0, 0, 0), (1, 0, 0), post)) == visible
+
+
+def test_a_unit_sees_other_links_but_not_its_own():
+    for own, seen in ((0, 0.9), (1, INF)):
+        assert _looking((0, 0, 0), (1, 0, 0), NOTHING, _rod(1.0, 0.0, 0.1), own) == pytest.approx(seen)
 
 
 @pytest.fixture(scope="module")
@@ -155,9 +165,7 @@ def test_the_arm_is_seen_where_mujocos_rays_meet_it(panda_model, paper_skin, muj
         q = panda_model.q_min + fraction * (panda_model.q_max - panda_model.q_min)
         kin = panda_model.kinematics(q)
         position, rotation = sensor_poses(paper_skin, kin)
-        expected = expected_range(
-            kin, placed_sensors(paper_skin, kin), paper_skin.cones, panda_model.capsules, no_fixtures()
-        )
+        expected = expected_range(kin, placed_sensors(paper_skin, kin), paper_skin.cones, panda_model.capsules, NOTHING)
         data.qpos[:] = q
         mujoco.mj_kinematics(model, data)
         for k, own in enumerate(paper_skin.link):
