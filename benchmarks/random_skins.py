@@ -14,15 +14,14 @@ import numpy as np
 from scipy.stats import spearmanr
 
 from pretouch.control.path import Circle
-from pretouch.coverage.measure import covered
-from pretouch.coverage.measuring import POINTS, Setting
+from pretouch.coverage.measure import POINTS, Setting, covered
 from pretouch.coverage.params import CoverageParams
 from pretouch.coverage.suggest import candidates
 from pretouch.coverage.surface import surface_of
 from pretouch.coverage.ways import seen_by
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
-from pretouch.sensing.sensor_types import sensor_called
+from pretouch.sensing.sensor import sensor_called
 from pretouch.sensing.skin import Skin
 from pretouch.sim.scene import GhostSpec, SceneSpec, fixtures
 from pretouch_lab.cell import Cell, Context

@@ -9,12 +9,12 @@ with `dataclasses.replace`.
 from dataclasses import replace
 
 from pretouch.control.path import Circle
-from pretouch.control.posture import brought_to
 from pretouch.controller import Controller
 from pretouch.explanation import explain
 from pretouch.loop import Cycle, run
 from pretouch.profiles import profile
 from pretouch.robot.description import panda
+from pretouch.robot.ik import brought_to
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin
 from pretouch.sim.plant import Plant, PlantClock

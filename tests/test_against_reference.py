@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from pretouch.control.qp import Cost, solve
-from pretouch.control.restriction import ApproachRows
+from pretouch.control.qp import ApproachRows, Cost, solve
 from pretouch.controller import Controller
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin

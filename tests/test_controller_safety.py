@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pretouch.control.approach_restriction import ApproachRestriction
+from pretouch.control.approach import ApproachRestriction
 from pretouch.control.path import Circle, Path, line
 from pretouch.loop import Cycle
 from pretouch.profiles import PROFILES, Profile

@@ -97,7 +97,7 @@ def test_names_in_the_notation_exist():
         if owner[0].isupper() and owner != "RobotModel":
             modules = (
                 "pretouch.types", "pretouch.params", "pretouch.control.reduction",
-                "pretouch.control.approach_restriction", "pretouch.contact.window",
+                "pretouch.control.approach", "pretouch.contact.window",
                 "pretouch.contact.residual_model", "pretouch.contact.moving_thresholds",
                 "pretouch.contact.sequential_test", "pretouch.contact.decaying_velocity",
             )  # fmt: skip

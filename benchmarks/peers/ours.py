@@ -7,10 +7,10 @@ import numpy as np
 from benchmarks.peers.geometry import Arm, Array
 from benchmarks.peers.problem import TERMS, Problem
 
+from pretouch.control.approach import approach_rows
 from pretouch.control.joint_box import JointLimits, brake, joint_box
 from pretouch.control.path import line
 from pretouch.control.qp import solve, task_cost
-from pretouch.control.restriction import approach_rows
 from pretouch.controller import Controller, ControllerState
 from pretouch.params import RestrictionParams, TaskParams
 from pretouch.perception.closest import closest_points

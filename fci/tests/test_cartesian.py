@@ -7,8 +7,8 @@ import pytest
 from fci.tests.conftest import errors_of, smooth
 
 from pretouch.control.commander import rotation_about
+from pretouch.robot.description_file import robot_named
 from pretouch.robot.model import RobotModel
-from pretouch.robot.named import robot_named
 from pretouch_fci.cartesian import CARTESIAN_LIMITS, Body, CartesianVelocity
 from pretouch_fci.frames import frames_of
 from pretouch_fci.limits import motion_limits

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from pretouch.errors import ParameterError, RobotModelError
 from pretouch.robot.description import panda
+from pretouch.robot.description_file import robot_named
 from pretouch.robot.model import RobotModel
-from pretouch.robot.named import robot_named
 from pretouch.sim.tcp_push import TcpPush
 from pretouch_fci.collision import CollisionBehavior, Contacts
 from pretouch_fci.frames import flange_of
@@ -96,6 +96,11 @@ def test_thresholds_are_those_of_what_the_arm_does():
     assert contacts.joint_collision[2]
     contacts.forget()
     assert not contacts.joint_collision.any()
+
+
+@pytest.mark.parametrize("bad", [-1.0, np.nan, np.inf])
+def test_what_is_no_threshold_is_refused(bad: float) -> None:
+    assert CollisionBehavior.of(np.full(52, bad)) is None
 
 
 def test_pushes_and_drops_are_read():

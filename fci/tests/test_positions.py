@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from fci.tests.conftest import errors_of, smooth
 
+from pretouch.robot.description_file import robot_named
 from pretouch.robot.model import RobotModel
-from pretouch.robot.named import robot_named
 from pretouch_fci.kinds import JointPosition
 from pretouch_fci.limits import MotionLimits, motion_limits
 from pretouch_fci.motion import Ending, Motion, Setpoint

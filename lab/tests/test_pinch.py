@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from pretouch.control.path import WayPoints
-from pretouch.control.posture import brought_to
 from pretouch.explanation import resumable
 from pretouch.modes import Event
 from pretouch.profiles import profile
+from pretouch.robot.ik import brought_to
 from pretouch.robot.model import RobotModel
 from pretouch.robot.self_distance import nearest_points
 from pretouch.sensing.skin import Skin

@@ -15,7 +15,8 @@ from pretouch.contact.reaction import Reaction as Reaction
 from pretouch.contact.sequential_test import SequentialTest as SequentialTest
 from pretouch.contact.window import add_force as add_force
 from pretouch.contact.window import window_init as window_init
-from pretouch.control.approach_restriction import ApproachRestriction as ApproachRestriction
+from pretouch.control.approach import ApproachRestriction as ApproachRestriction
+from pretouch.control.approach import approach_rows as approach_rows
 from pretouch.control.interface import MotionBody as MotionBody
 from pretouch.control.interface import MotionRequest as MotionRequest
 from pretouch.control.interface import Restricted as Restricted
@@ -26,8 +27,6 @@ from pretouch.control.path import Circle as Circle
 from pretouch.control.path import Path as Path
 from pretouch.control.path import WayPoints as WayPoints
 from pretouch.control.path import line as line
-from pretouch.control.posture import brought_to as brought_to
-from pretouch.control.restriction import approach_rows as approach_rows
 from pretouch.controller import Controller as Controller
 from pretouch.controller import ControllerState as ControllerState
 from pretouch.desired import Desired as Desired
@@ -59,6 +58,7 @@ from pretouch.reporting.measures import measure as measure
 from pretouch.robot.description import RobotDescription as RobotDescription
 from pretouch.robot.description import fr3 as fr3
 from pretouch.robot.description import panda as panda
+from pretouch.robot.ik import brought_to as brought_to
 from pretouch.robot.model import RobotModel as RobotModel
 from pretouch.robot.other_arm import OtherArm as OtherArm
 from pretouch.sensing.skin import Skin as Skin

@@ -21,19 +21,18 @@ from pretouch.control.joint_box import joint_limits
 from pretouch.control.motion import Motion, MotionState, joint_motion, motion_setup, restriction_on
 from pretouch.control.reduction import ReductionState, reduce_speed, speed_scale
 from pretouch.errors import RobotStateError, SkinError
-from pretouch.events import events_of
 from pretouch.groups import Kinematics
 from pretouch.modes import Event, ModeState, mode_init, next_mode
 from pretouch.payload import sound_payload
 from pretouch.perception.moving import beside, near_moving, sound_moving
-from pretouch.perception.obstacles import TrackState, track_init
+from pretouch.perception.obstacles import TrackState, silent_units, track_init
 from pretouch.perception.outside import OutsideState, outside_silence, see_outside
-from pretouch.perception.perceive import nothing_seen, perceive, perception_setup, silent_units
+from pretouch.perception.perceive import nothing_seen, perceive, perception_setup
 from pretouch.perception.scene_filter import Fixtures
 from pretouch.profiles import Profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.step_parts import Given, Near
+from pretouch.step_parts import Given, Near, events_of
 from pretouch.types import (
     ControlStep,
     FloatArray,

@@ -5,9 +5,8 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pretouch.arrays import FloatArray, real
 from pretouch.errors import ParameterError
-from pretouch.values import value
+from pretouch.values import FloatArray, real, value
 
 
 class DesiredKind(IntEnum):

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from pretouch.arrays import real, real_number
 from pretouch.compiled import compiled
 from pretouch.modes import Event
 from pretouch.params import FailureParams
@@ -19,7 +18,7 @@ from pretouch.types import (
     SeenPoints,
     TouchReadings,
 )
-from pretouch.values import value
+from pretouch.values import real, real_number, value
 
 _LARGEST = 1e3
 """A joint position or velocity [rad, rad/s] from here on is none: another unit, or a broken message."""

@@ -5,9 +5,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pretouch.arrays import BoolArray
 from pretouch.modes import Mode
-from pretouch.values import value
+from pretouch.values import BoolArray, value
 
 if TYPE_CHECKING:
     from pretouch.types import ControlStep

@@ -9,7 +9,6 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from pretouch.arrays import real
 from pretouch.contact.residual_model import ResidualModel
 from pretouch.control.joint_box import JointLimits, box_and_brake
 from pretouch.controller import Controller, ControllerState
@@ -21,7 +20,7 @@ from pretouch.payload import Payload
 from pretouch.ports import Clock, Points, Robot, Skin, touch_of
 from pretouch.signals import noted
 from pretouch.types import ControlStep, FloatArray, Inputs, RangeReadings, RobotState, TouchReadings
-from pretouch.values import value
+from pretouch.values import real, value
 
 _FINEST = 1e-7
 """Shortest time `Durations` tells apart [s]."""

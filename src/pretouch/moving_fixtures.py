@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from pretouch.arrays import FloatArray
-from pretouch.values import value
+from pretouch.values import FloatArray, value
 
 
 @value

@@ -3,8 +3,8 @@
 import math
 from dataclasses import dataclass
 
-from pretouch.arrays import real_number
 from pretouch.errors import ParameterError
+from pretouch.values import real_number
 
 _MOST_KG, _FARTHEST_M, _LONGEST_S = 100.0, 2.0, 10.0
 """From here on a mass, a distance or a time is given in another unit."""

@@ -14,8 +14,8 @@ from pretouch.contact.detector import Detector
 from pretouch.contact.moving_thresholds import MovingThresholds
 from pretouch.contact.reaction import Reaction
 from pretouch.contact.sequential_test import SequentialTest
-from pretouch.contact.tactile import TouchSensors
-from pretouch.control.approach_restriction import ApproachRestriction
+from pretouch.contact.touch_cue import TouchSensors
+from pretouch.control.approach import ApproachRestriction
 from pretouch.control.braking_curve import BrakingCurve
 from pretouch.control.interface import Restriction
 from pretouch.errors import ParameterError

@@ -1,9 +1,12 @@
-"""What the parts of one control step hand on to each other."""
+"""What the parts of one control step hand on to each other, and what of it may change the mode."""
 
 from typing import NamedTuple
 
+import numpy as np
+
 from pretouch import faults
 from pretouch.contact.announced_load import LoadState
+from pretouch.contact.detector import Detection
 from pretouch.desired import Desired
 from pretouch.modes import Event
 from pretouch.moving_fixtures import MovingFixtures
@@ -11,6 +14,7 @@ from pretouch.perception.closest import joined
 from pretouch.perception.obstacles import TrackState
 from pretouch.perception.outside import OutsideState
 from pretouch.perception.perceive import Perception
+from pretouch.profiles import Profile
 from pretouch.types import Obstacles, RangeReadings, RobotState, SeenPoints, TouchReadings
 
 
@@ -53,3 +57,19 @@ class Near(NamedTuple):
     def obstacles(self) -> Obstacles:
         """All that the arm is to keep off: what is seen, then what is known to move there."""
         return self.seen.obstacles if self.kept_off is None else joined(self.seen.obstacles, self.kept_off)
+
+
+def events_of(unfit: str, silent: str, lost: str, detection: Detection, samples: int, p: Profile) -> dict[Event, str]:
+    """Name what was seen, received and detected in one step, beside what the reaction says."""
+    events: dict[Event, str] = {}
+    if unfit and p.perception is not None:
+        events[Event.SKIN_UNFIT] = unfit
+    if silent:
+        events[Event.SKIN_SILENT] = silent
+    if lost:
+        events[Event.POINTS_LOST] = lost
+    if not detection.armed and p.detect.by_torques and bool(np.isnan(detection.residual).any()):
+        events[Event.NO_FORCE] = f"up to {p.failure.force_timeout_s:g} s"
+    elif not detection.armed:
+        events[Event.WINDOW_FILLING] = f"{samples} of {p.window.samples} samples"
+    return events

@@ -8,17 +8,17 @@ from enum import Enum, IntEnum
 
 import numpy as np
 
-from pretouch.arrays import WHOLE as WHOLE
-from pretouch.arrays import BoolArray as BoolArray
-from pretouch.arrays import FloatArray as FloatArray
-from pretouch.arrays import IntArray as IntArray
-from pretouch.arrays import Number as Number
 from pretouch.desired import Desired
 from pretouch.limited import Limited, limited_by
 from pretouch.modes import Event
 from pretouch.modes import Mode as Mode
 from pretouch.moving_fixtures import MovingFixtures
 from pretouch.payload import Payload
+from pretouch.values import WHOLE as WHOLE
+from pretouch.values import BoolArray as BoolArray
+from pretouch.values import FloatArray as FloatArray
+from pretouch.values import IntArray as IntArray
+from pretouch.values import Number as Number
 from pretouch.values import value
 
 

@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from pretouch.contact.cues import Cue, Cues
 from pretouch.contact.detector import Body, Detection, Sample
 from pretouch.contact.sequential_test import SequentialTest
+from pretouch.contact.touch_cue import Cue, Cues
 from pretouch.contact.window import WindowState, add_force, window_init
 from pretouch.groups import Kinematics
 from pretouch.profiles import Profile

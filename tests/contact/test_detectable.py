@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from tests.contact.standing_arm import PERIOD, StandingArm
 
-from pretouch.contact.detectable import detectable_force
+from pretouch.contact.alarm_level import detectable_force
+from pretouch.contact.scatter import scatter_init, scattered_means, white_means
 from pretouch.contact.sequential import log_ratio
-from pretouch.contact.window_scatter import scatter_init, scattered_means, white_means
 from pretouch.params import MisfitParams
 
 GAIN, TAILS, NEEDED = 15.0, 30.0, 10.0

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pretouch.contact.learnt_bounds import check_learnt
 from pretouch.contact.residual_model import residual_init
 from pretouch.errors import ParameterError
 from pretouch.params import SequentialParams
+from pretouch.session.free_motion import check_learnt
 
 FRESH = residual_init(7, SequentialParams())
 

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from tests.contact.alone import something, standing
 
-from pretouch.contact.cues import Cues, no_cues
 from pretouch.contact.localisation.localise import LocalisationState, localisation_init, localise
+from pretouch.contact.localisation.posterior import Candidates, log_posterior
 from pretouch.contact.localisation.prior import (
     LocalisationNumbers,
     SeenNear,
@@ -19,10 +19,9 @@ from pretouch.contact.localisation.prior import (
     hidden_candidates,
     log_prior,
 )
-from pretouch.contact.localisation.single_contact import Candidates, log_posterior
+from pretouch.contact.scatter import LENGTHS
 from pretouch.contact.sequential_detector import Observation, ResidualWindows
-from pretouch.contact.tactile import gain_of, surface_area
-from pretouch.contact.window_scatter import LENGTHS
+from pretouch.contact.touch_cue import Cues, gain_of, no_cues, surface_area
 from pretouch.groups import Kinematics
 from pretouch.params import LocalisationParams, TouchSensorParams
 from pretouch.perception.closest import no_obstacles

@@ -12,9 +12,9 @@ from tests.contact.standing_arm import PERIOD, StandingArm
 
 from pretouch.contact.alarm_level import BLOCK, earned_level, learn_level, level_init
 from pretouch.contact.detector import Body, Sample
+from pretouch.contact.scatter import LENGTHS, learn_scatter, scatter_init, scattered_means, spread_out
 from pretouch.contact.sequential_test import SequentialTest
 from pretouch.contact.window import window_init
-from pretouch.contact.window_scatter import LENGTHS, learn_scatter, scatter_init, scattered_means, spread_out
 from pretouch.params import MisfitParams
 from pretouch.perception.closest import no_obstacles
 from pretouch.profiles import profile

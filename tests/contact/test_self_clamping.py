@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pretouch.contact.self_clamping import find_self_clamp, presses_on_fixture
+from pretouch.contact.clamp import find_self_clamp, presses_on_fixture
 from pretouch.params import PinchParams
 from pretouch.robot.body import Capsules, no_capsules
 from pretouch.robot.description import RobotDescription

@@ -9,9 +9,16 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.stats import multivariate_normal, multivariate_t
 
-from pretouch.contact.hypotheses import nearest_of, nearness
-from pretouch.contact.sequential import Hypotheses, alarm_bound, explained_by_force, judge, log_ratio
-from pretouch.contact.window_scatter import LENGTHS, LONGEST, white_means, window_means
+from pretouch.contact.scatter import LENGTHS, LONGEST, white_means, window_means
+from pretouch.contact.sequential import (
+    Hypotheses,
+    alarm_bound,
+    explained_by_force,
+    judge,
+    log_ratio,
+    nearest_of,
+    nearness,
+)
 from pretouch.params import SequentialParams
 from pretouch.types import FloatArray
 

@@ -10,10 +10,9 @@ from tests.contact.alone import begun as feel_init
 from tests.contact.alone import feel, sample, something, standing
 
 from pretouch.contact.alarm_level import earned_level, level_init
-from pretouch.contact.cues import Cues, no_cues, together
 from pretouch.contact.detector import Body
 from pretouch.contact.sequential import alarm_bound
-from pretouch.contact.tactile import TouchSensors, gain_of, surface_area
+from pretouch.contact.touch_cue import Cues, TouchSensors, gain_of, no_cues, surface_area, together
 from pretouch.perception.closest import no_obstacles
 from pretouch.profiles import profile
 from pretouch.robot.body import Capsules

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from pretouch.contact.turning import add_reversal_variance, learn_turning, turning_init
-from pretouch.contact.window_scatter import LENGTHS
+from pretouch.contact.scatter import LENGTHS, add_reversal_variance, learn_turning, turning_init
 
 M, S = np.diag([2.0, 1.0]), 0.04 * np.eye(2)
 HARD = np.array([0.0, 10.0])

@@ -3,8 +3,7 @@
 import numpy as np
 from tests.reference.qp import Problem
 
-from pretouch.control.qp import Cost, solve
-from pretouch.control.restriction import ApproachRows
+from pretouch.control.qp import ApproachRows, Cost, solve
 from pretouch.types import QpOutcome, QpSolution
 
 STOP = 0.0123

@@ -16,7 +16,7 @@ from pretouch.control.braking import (
     slots_init,
     tangents_of,
 )
-from pretouch.control.restriction import Rows
+from pretouch.control.qp import Rows
 from pretouch.groups import Chain, ObstacleArrays
 from pretouch.types import FloatArray
 

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from pretouch.control.posture import brought_to
 from pretouch.errors import ExperimentError
+from pretouch.robot.ik import brought_to
 
 
 def test_the_hand_is_at_the_point_and_as_upright_as_before(panda_model):

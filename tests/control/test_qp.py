@@ -8,9 +8,9 @@ from tests.control.programs import answered
 from tests.reference.qp import Problem, kkt_residual
 from tests.reference.qp import solve as solve_exactly
 
+from pretouch.control.approach import approach_rows
 from pretouch.control.joint_box import JointLimits, joint_box
 from pretouch.control.qp import damping, manipulability, mid_joint_velocity, task_cost
-from pretouch.control.restriction import approach_rows
 from pretouch.params import RestrictionParams, TaskParams
 from pretouch.perception.closest import closest_points
 from pretouch.robot.model import RobotModel

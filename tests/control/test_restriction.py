@@ -5,10 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pretouch.control.approach_restriction import ApproachRestriction
+from pretouch.control.approach import ApproachRestriction, approach_limit, approach_rows, velocity_a, velocity_b
 from pretouch.control.interface import MotionBody, MotionRequest
 from pretouch.control.joint_box import joint_limits
-from pretouch.control.restriction import approach_limit, approach_rows, velocity_a, velocity_b
 from pretouch.params import RestrictionParams, TaskParams
 from pretouch.perception.closest import closest_points
 from pretouch.robot.model import RobotModel

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pretouch.control.task import rotation_error, task
+from pretouch.control.qp import task
 from pretouch.params import TaskParams
+from pretouch.robot.vectors import rotation_error
 
 J = np.arange(42.0).reshape(6, 7)
 V = np.array([0.1, 0.2, 0.3])

@@ -3,13 +3,12 @@
 import numpy as np
 import pytest
 
-from pretouch.control.posture import brought_to
-from pretouch.coverage.measure import covered
-from pretouch.coverage.measuring import Setting, coverage_of
+from pretouch.coverage.measure import Setting, coverage_of, covered
 from pretouch.coverage.params import CoverageParams
 from pretouch.coverage.surface import surface_of
 from pretouch.coverage.ways import seen_by, ways_met
 from pretouch.perception.scene_filter import no_fixtures
+from pretouch.robot.ik import brought_to
 from pretouch.sensing.sensor import VL53L7CX
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pretouch.coverage.figure import coverage_figure
-from pretouch.coverage.measuring import Setting, coverage_of
+from pretouch.coverage.measure import Setting, coverage_of
 from pretouch.coverage.params import CoverageParams
 from pretouch.coverage.workspace import postures
 from pretouch.errors import ExperimentError

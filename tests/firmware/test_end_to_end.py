@@ -15,8 +15,8 @@ import pytest
 from pretouch.hardware import wire
 from pretouch.hardware.keys import Keys, UnitKey
 from pretouch.hardware.receiver import SkinReceiver
-from pretouch.sensing.network import NetworkUnits
 from pretouch.sensing.sensor import VL53L5CX
+from pretouch.sensing.unit import NetworkUnits
 from pretouch.types import RangeStatus
 from tests.firmware import harness
 

@@ -10,7 +10,7 @@ from pretouch.contact.admittance import Admittance
 from pretouch.contact.moving_thresholds import MovingThresholds
 from pretouch.contact.reaction import Reaction
 from pretouch.contact.sequential_test import SequentialTest
-from pretouch.control.approach_restriction import ApproachRestriction, notice_m
+from pretouch.control.approach import ApproachRestriction, notice_m
 from pretouch.control.braking_curve import BrakingCurve
 from pretouch.modes import Event
 from pretouch.params import ClampParams

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pretouch.control.approach_restriction import ApproachRestriction
+from pretouch.control.approach import ApproachRestriction
 from pretouch.control.path import Circle
 from pretouch.params import RowKind
 from pretouch.perception.scene_filter import no_fixtures

@@ -10,7 +10,7 @@ from pretouch.contact.decaying_velocity import DecayingVelocity
 from pretouch.contact.moving_thresholds import MovingThresholds
 from pretouch.contact.reaction import Reaction
 from pretouch.contact.sequential_test import SequentialTest
-from pretouch.control.approach_restriction import ApproachRestriction
+from pretouch.control.approach import ApproachRestriction
 from pretouch.control.braking_curve import BrakingCurve
 from pretouch.control.path import Circle, Path, WayPoints, line
 from pretouch.params import (
@@ -106,6 +106,7 @@ OURS: dict[type, dict[str, tuple[object, ...]]] = {
     GiveUpParams: {"contacts": (3, 1), "push_j": (0.3, 1e-3, 50.0), "retry_s": (0.3, 30.0)},
 }  # fmt: skip
 DETECTORS = (SequentialTest, SequentialTest, MovingThresholds)
+NAMED = ("pretouch",)
 NAMED_SHARE = 0.15
 """Share of profiles that are the named one as it is."""
 
@@ -141,7 +142,7 @@ def any_profile(rng: np.random.Generator) -> Profile:
     """Draw each parameter, mostly the usual value in a third of the profiles; a few are named ones as they are."""
     usual = 0.85 if rng.random() < 1 / 3 else 0.4
     if rng.random() < NAMED_SHARE:
-        named = profile("pretouch")
+        named = profile(str(rng.choice(NAMED)))
         return replace(named, window=replace(named.window, samples=5))
     ours = rng.random() < 0.6
     groups = {f.name: f.type for f in fields(Profile) if f.type in CHOICES or (ours and f.type in OURS)}

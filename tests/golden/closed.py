@@ -10,11 +10,11 @@ from functools import partial
 import numpy as np
 
 from pretouch.control.path import Path
-from pretouch.control.posture import brought_to
 from pretouch.controller import Controller
 from pretouch.loop import Cycle, run
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import profile
+from pretouch.robot.ik import brought_to
 from pretouch.sensing.skin import Skin
 from pretouch.sim.hand import Hand
 from pretouch.sim.paper_scenes import Placement, dynamic_pushes, person_scene, static_path, static_scene

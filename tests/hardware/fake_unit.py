@@ -6,7 +6,7 @@ from dataclasses import replace
 from pretouch.hardware.keys import Keys, UnitKey
 from pretouch.hardware.receiver import SkinReceiver
 from pretouch.hardware.wire import Beacon, Flag, Hello, Mac, Sample, decode_beacon, session_mac
-from pretouch.sensing.network import NetworkUnits
+from pretouch.sensing.unit import NetworkUnits
 
 KEYS = Keys(UnitKey(f"unit {n}", n, bytes([n]) * 32) for n in (3, 4, 5))
 IDS = ("unit 3", "unit 4")

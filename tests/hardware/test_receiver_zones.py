@@ -12,7 +12,7 @@ from pretouch.hardware.health import HealthParams, UnitWindow
 from pretouch.hardware.link import LinkParams
 from pretouch.hardware.receiver_process import SharedOutputs, packed
 from pretouch.hardware.wire import Flag, TouchPart
-from pretouch.sensing.network import NetworkUnits
+from pretouch.sensing.unit import NetworkUnits
 from pretouch.types import RangeStatus
 from tests.hardware.fake_unit import IDS, Bench
 

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from pretouch.coverage.measuring import Setting
+from pretouch.coverage.measure import Setting
 from pretouch.coverage.params import CoverageParams
 from pretouch.coverage.suggest import suggest
 from pretouch.perception.scene_filter import floor_and_pedestal

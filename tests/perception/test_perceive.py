@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.perception.watcher import FLOOR, HAND_LEFT, PARAMS, TCP, Watcher, readings_of
 
-from pretouch.perception.perceive import silent_units
+from pretouch.perception.obstacles import silent_units
 from pretouch.robot.body import Capsules
 from pretouch.robot.description import panda
 from pretouch.robot.vectors import placed

@@ -31,12 +31,12 @@ def _gap(p: np.ndarray, a: np.ndarray, b: np.ndarray, radius: float) -> float:
     return np.linalg.norm(a + np.linspace(0, 1, 4001)[:, None] * (b - a) - p, axis=1).min() - radius
 
 
-def _rod(x: float, y: float, radius: float) -> Capsules:
-    """An upright rod of the first link beside the base."""
-    return Capsules(np.ones(1, np.int64), np.array([[x, y, -1.0]]), np.array([[x, y, 1.0]]), np.array([radius]))
+def _rod(x: float, y: float, radius: float, link: int = 0) -> Capsules:
+    """An upright rod of a link."""
+    return Capsules(np.array([link]), np.array([[x, y, -1.0]]), np.array([[x, y, 1.0]]), np.array([radius]))
 
 
-def _looking(p, along, fixtures: Fixtures, body: Capsules = NOTHING.capsules, own: int = 0) -> float:
+def _looking(p, along, fixtures: Fixtures, body: Capsules = NOTHING.capsules, own: int = 1) -> float:
     """What one sensor at p that looks along a direction is expected to see; it sits on the link `own`."""
     still = Kinematics(np.zeros((2, 3)), np.tile(np.eye(3), (2, 1, 1)), np.zeros((0, 3)), np.zeros((0, 3)))
     along = np.array(along, dtype=np.float64) / np.linalg.norm(along)
@@ -149,7 +149,7 @@ def test_a_post_is_seen_off_the_beam_but_within_the_cone():
 
 def test_a_unit_sees_other_links_but_not_its_own():
     for own, seen in ((0, 0.9), (1, INF)):
-        assert _looking((0, 0, 0), (1, 0, 0), NOTHING, _rod(1.0, 0.0, 0.1), own) == pytest.approx(seen)
+        assert _looking((0, 0, 0), (1, 0, 0), NOTHING, _rod(1.0, 0.0, 0.1, link=1), own) == pytest.approx(seen)
 
 
 @pytest.fixture(scope="module")

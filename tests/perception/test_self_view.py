@@ -12,7 +12,7 @@ from pretouch.robot.body import Capsules
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.sensor import PAPER_SENSOR
 from pretouch.sensing.skin import LIVE_SKIN, Skin, load_skin
-from pretouch.sim.misplacement import Misplacement, misplaced
+from pretouch.sim.random_skin import Misplacement, misplaced
 
 
 def shown_by(model: RobotModel, skin: Skin, kin: Kinematics, fixtures: Fixtures, distance: dict[str, float]) -> int:

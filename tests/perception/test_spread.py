@@ -9,9 +9,8 @@ from hypothesis import strategies as st
 from tests.fuzz.invariants import same
 from tests.perception.watcher import FLOOR, PARAMS
 
-from pretouch.perception.obstacles import track_init
+from pretouch.perception.obstacles import spread, track_init
 from pretouch.perception.perceive import perceive, perception_setup
-from pretouch.perception.spread import spread
 from pretouch.robot.description import panda
 from pretouch.sensing.skin import Skin
 from pretouch.types import RangeReadings, RangeStatus

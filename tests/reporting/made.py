@@ -5,12 +5,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from pretouch.control.path import Circle
-from pretouch.control.posture import brought_to
 from pretouch.controller import Controller
 from pretouch.loop import run
 from pretouch.modes import Event
 from pretouch.profiles import profile as find_profile
 from pretouch.recording.simulation import Truth, truth_of
+from pretouch.robot.ik import brought_to
 from pretouch.sim.paper_scenes import static_path, static_scene
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.plant_params import PlantParams

@@ -9,7 +9,6 @@ import pytest
 from tests.wire_skin import WireSkin
 
 from pretouch.control.path import Circle
-from pretouch.control.posture import brought_to
 from pretouch.hardware.wire import (
     IMU_MOST,
     NO_FORCE,
@@ -24,6 +23,7 @@ from pretouch.hardware.wire import (
     touch_part,
     zones_size,
 )
+from pretouch.robot.ik import brought_to
 from pretouch.sensing.sensor import VL53L5CX
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import TouchPatch

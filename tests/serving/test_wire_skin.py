@@ -6,12 +6,12 @@ import pytest
 from tests.wire_skin import WireSkin
 
 from pretouch.control.path import Circle
-from pretouch.control.posture import brought_to
 from pretouch.controller import Controller
 from pretouch.errors import HardwareError
 from pretouch.hardware.wire import Flag
 from pretouch.loop import turn
 from pretouch.profiles import Profile
+from pretouch.robot.ik import brought_to
 from pretouch.serving.fleet import Fleet, FleetParams, simulated_keys
 from pretouch.serving.network import NetworkParams, network
 from pretouch.serving.unit import UnitParams

@@ -10,7 +10,7 @@ from pretouch.profiles import PROFILES
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.session.progress import ProgressReporter, RunSummary
-from pretouch.session.push_outcome import PushOutcome
+from pretouch.session.push import PushOutcome
 from pretouch.types import Contact, ControlStep, Mode, Thresholds
 from tests.following_arm import Arm
 from tests.reporting import made

@@ -3,7 +3,7 @@ import pytest
 
 from pretouch.control.path import Circle, line
 from pretouch.errors import PathError
-from pretouch.sim.board import board_beside
+from pretouch.sim.paper_scenes import board_beside
 from pretouch.sim.pushes import way_round
 
 PATHS = {"circle": Circle(), "line": line((0.4, -0.5, 0.5), (0.4, 0.5, 0.5))}

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from tests.sim.ranging import EXACT, ORIGIN, wall
 
-from pretouch.perception.obstacles import track_init
-from pretouch.perception.perceive import perceive, perception_setup, silent_units
+from pretouch.perception.obstacles import silent_units, track_init
+from pretouch.perception.perceive import perceive, perception_setup
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import profile
 from pretouch.sensing.sensor import VL53L5CX

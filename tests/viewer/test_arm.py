@@ -13,8 +13,7 @@ from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.viewer import vendor
 from pretouch.viewer.arm import SETTLE_S, Arm, capsule_surfaces, coloured, seen_from
-from pretouch.viewer.expectation import LEVELS
-from pretouch.viewer.surface import EDGE_M, surface_of
+from pretouch.viewer.expectation import EDGE_M, LEVELS, surface_of
 from pretouch.viewer.vendor import coarse, vendor_surfaces
 
 PERIOD = 1 / 30

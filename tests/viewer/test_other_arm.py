@@ -10,8 +10,8 @@ from pretouch.importing.folder import write_folder
 from pretouch.importing.robot_import import ImportOptions, import_robot
 from pretouch.profiles import profile
 from pretouch.robot.description import fr3
+from pretouch.robot.description_file import robot_named
 from pretouch.robot.model import RobotModel
-from pretouch.robot.named import robot_named
 from pretouch.sensing.skin import LIVE_SKIN, load_skin, skin_for
 from pretouch.sim.plant_params import plant_params_of
 from pretouch.sim.scene import HandSpec, SceneSpec

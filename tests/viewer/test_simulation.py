@@ -8,15 +8,15 @@ import pytest
 from tests.viewer.sessions import ARMED_S, modes, poke, set_speed
 
 from pretouch.control.path import Circle
-from pretouch.control.posture import brought_to
 from pretouch.controller import Controller
 from pretouch.errors import ParameterError
 from pretouch.loop import run
 from pretouch.profiles import at_rate, profile
+from pretouch.robot.ik import brought_to
 from pretouch.sim.hand import Hand, PersonArm
-from pretouch.sim.misplacement import Misplacement, misplaced
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.plant_params import PlantParams
+from pretouch.sim.random_skin import Misplacement, misplaced
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import HandSpec, SceneSpec, fixtures
 from pretouch.types import ControlStep, Mode

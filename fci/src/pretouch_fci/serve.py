@@ -14,11 +14,11 @@ import numpy as np
 
 from pretouch.control.path import Circle
 from pretouch.control.path import Path as ArmPath
-from pretouch.control.posture import brought_to
 from pretouch.errors import HardwareError, ParameterError
 from pretouch.hardware.keys import load_keys
+from pretouch.robot.description_file import robot_named
+from pretouch.robot.ik import brought_to
 from pretouch.robot.model import RobotModel
-from pretouch.robot.named import robot_named
 from pretouch.sensing.skin import skin_for
 from pretouch.serving.simulate import VisitingHand
 from pretouch.signals import ended

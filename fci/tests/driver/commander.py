@@ -6,8 +6,8 @@ import time
 import numpy as np
 
 from pretouch.hardware.franka.arm import FrankaArm
+from pretouch.robot.description_file import robot_named
 from pretouch.robot.model import RobotModel
-from pretouch.robot.named import robot_named
 
 
 def main(kind: str, address: str) -> None:

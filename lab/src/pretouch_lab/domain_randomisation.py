@@ -7,8 +7,8 @@ from hashlib import sha256
 
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.sim.misplacement import Misplacement, misplaced
 from pretouch.sim.plant_params import PlantParams, plant_params_of
+from pretouch.sim.random_skin import Misplacement, misplaced
 from pretouch.sim.randomisation import SETS, WorldSet, drawn, world_set
 from pretouch.sim.range_finder import RangeFinderParams
 

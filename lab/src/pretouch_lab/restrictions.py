@@ -3,7 +3,7 @@
 from typing import get_args
 
 from pretouch.composition import changed
-from pretouch.control.approach_restriction import ApproachRestriction
+from pretouch.control.approach import ApproachRestriction
 from pretouch.control.interface import Restriction
 from pretouch.errors import ParameterError
 from pretouch.params import RowKind

@@ -10,7 +10,6 @@ import numpy as np
 
 from pretouch import ports
 from pretouch.control.path import Path
-from pretouch.control.posture import brought_to
 from pretouch.controller import Controller
 from pretouch.desired import Desired
 from pretouch.errors import RecordingError
@@ -20,6 +19,7 @@ from pretouch.recording.reader import Recorded, open_recording
 from pretouch.recording.run_record import RunRecord, TrueForces, columns_of, contacts_of
 from pretouch.recording.simulation import Truth, truth_of
 from pretouch.recording.writer import Recording
+from pretouch.robot.ik import brought_to
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.sim.hand import Hand, HandScript, PersonArm

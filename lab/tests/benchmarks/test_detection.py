@@ -10,11 +10,11 @@ import pytest
 from pretouch.contact.decaying_velocity import reaction_velocity
 from pretouch.contact.detector import Detection
 from pretouch.control.path import Circle
-from pretouch.control.posture import brought_to
 from pretouch.controller import Controller
 from pretouch.loop import run
 from pretouch.perception.closest import no_obstacles
 from pretouch.profiles import profile
+from pretouch.robot.ik import brought_to
 from pretouch.sensing.skin import paper_skin
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.plant_params import PlantParams

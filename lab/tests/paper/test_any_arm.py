@@ -8,14 +8,14 @@ from tests.importing import made
 from tests.limits import assert_within_limits
 from tests.other_arm import copied_panda
 
-from pretouch.control.posture import brought_to
 from pretouch.errors import ExperimentError
 from pretouch.importing.folder import write_folder
 from pretouch.importing.robot_import import ImportOptions, import_robot
 from pretouch.profiles import profile
 from pretouch.robot.description import RobotDescription, panda
+from pretouch.robot.description_file import robot_named
+from pretouch.robot.ik import brought_to
 from pretouch.robot.model import RobotModel
-from pretouch.robot.named import robot_named
 from pretouch.sim.placement import placement_for
 from pretouch.sim.plant_params import assumed_plant
 from pretouch.sim.pushes import PALM, robot_hand
@@ -26,9 +26,26 @@ from pretouch_lab.campaign import Request
 from pretouch_lab.cell import Cell, Context
 from pretouch_lab.paper import avoidance, dynamic
 
+STRONG = '<limit lower="-2.8" upper="2.8" velocity="2" effort="120"/>'
+"""Limits of joints that hold such an arm outstretched."""
+
+
+def seven_axis():
+    """An arm of seven joints: the six of `six_axis`, and one along the upper arm."""
+    axes = ("0 0 1", "0 1 0", "0 0 1", "0 1 0", "0 0 1", "0 1 0", "0 0 1")
+    lengths = (0.3, 0.05, 0.35, 0.05, 0.3, 0.1, 0.1)
+    can = '<geometry><cylinder radius="0.05" length="0.08"/></geometry>'
+    parts = [made.link("base", made.BOX)]
+    for k, (axis, length) in enumerate(zip(axes, lengths, strict=True), 1):
+        parts.append(made.link(f"link{k}", can))
+        before = f"link{k - 1}" if k > 1 else "base"
+        parts.append(made.joint(f"joint{k}", before, f"link{k}", axis=axis, xyz=f"0 0 {length}", limit=STRONG))
+    return f'<robot name="sevener">{"".join(parts)}</robot>'
+
+
 ARMS = {
-    "six": made.six_axis(changed={k: {"limit": made.STRONG} for k in range(1, 7)}),
-    "seven": made.seven_axis(),
+    "six": made.six_axis(changed={k: {"limit": STRONG} for k in range(1, 7)}),
+    "seven": seven_axis(),
 }
 SHORT_S, FIRST_OVER_S = 10.0, 14.0
 """The first push, and the first visit, are over [s]."""

@@ -5,10 +5,9 @@ from tests.recording.runs import custom_arm
 
 from pretouch.control.path import Circle
 from pretouch.errors import ExperimentError
+from pretouch.robot.description_file import robot_named
 from pretouch.robot.model import RobotModel
-from pretouch.robot.named import robot_named
-from pretouch.sim.board import PANDA_SIDE, HandSide
-from pretouch.sim.paper_scenes import Placement, person_scene, static_path, static_scene
+from pretouch.sim.paper_scenes import PANDA_SIDE, HandSide, Placement, person_scene, static_path, static_scene
 from pretouch.sim.placement import assumptions, hand_side, placement_for
 from pretouch.sim.pushes import way_round
 from pretouch.sim.scene import HandSpec

@@ -12,7 +12,7 @@ from pretouch.perception.closest import no_obstacles
 from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify
 from pretouch.robot.description import panda
-from pretouch.sim.misplacement import Misplacement, misplaced
+from pretouch.sim.random_skin import Misplacement, misplaced
 from pretouch.sim.scene import Box, SceneSpec
 from pretouch_lab.cell import Cell, Grid
 from pretouch_lab.studies import mounting

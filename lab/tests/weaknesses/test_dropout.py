@@ -7,7 +7,7 @@ import pytest
 from lab.tests.width import width
 from tests.limits import assert_within_limits
 
-from pretouch.control.posture import brought_to
+from pretouch.robot.ik import brought_to
 from pretouch.sim.paper_scenes import static_scene
 from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams

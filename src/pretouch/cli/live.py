@@ -33,8 +33,8 @@ def live(command: "Live") -> None:
     settings = LiveSettings(profile=profile, path=path, seed=command.seed)
 
     from pretouch.cli.warm_up import prepare
+    from pretouch.robot.description_file import robot_named
     from pretouch.robot.model import RobotModel
-    from pretouch.robot.named import robot_named
     from pretouch.sim.placement import assumptions
     from pretouch.viewer.live import serve_live
     from pretouch.viewer.simulation import LiveSimulation
@@ -43,7 +43,7 @@ def live(command: "Live") -> None:
     settings = settings_for(model, settings)
     believed = skin = _skin(command, model)
     if command.world:
-        from pretouch.sim.misplacement import Misplacement, misplaced
+        from pretouch.sim.random_skin import Misplacement, misplaced
         from pretouch.sim.randomisation import drawn, world_set
 
         world = drawn(world_set(command.world), command.seed, settings.plant)
@@ -65,7 +65,7 @@ def live(command: "Live") -> None:
 
 def _skin(command: "Live", model: "RobotModel") -> "Skin":
     """Return the skin that was asked for, or else the live page's for a Panda or FR3, or the one the arm has."""
-    from pretouch.robot.named import is_shipped
+    from pretouch.robot.description_file import is_shipped
     from pretouch.sensing.skin import LIVE_SKIN, skin_for
 
     arm = model.description

@@ -10,17 +10,16 @@ from pretouch.cli.skin_coverage_tables import link_table, spot_lines, suggestion
 from pretouch.cli.tables import show
 from pretouch.cli.writing import check_outputs, numbers_to, unwritable_said
 from pretouch.coverage.blind import BlindSpot, blind_spots
-from pretouch.coverage.measure import Coverage, covered
-from pretouch.coverage.measuring import Both, Setting, coverage_of
+from pretouch.coverage.measure import Both, Coverage, Setting, coverage_of, covered
 from pretouch.coverage.params import CoverageParams
 from pretouch.coverage.suggest import Suggestions, candidates, suggest
 from pretouch.coverage.ways import Ways, seen_by
 from pretouch.errors import ExperimentError, ParameterError, SkinError
 from pretouch.extras import FIGURES
 from pretouch.perception.scene_filter import floor_and_pedestal
+from pretouch.robot.description_file import robot_named
 from pretouch.robot.model import RobotModel
-from pretouch.robot.named import robot_named
-from pretouch.sensing.sensor_types import sensor_called
+from pretouch.sensing.sensor import sensor_called
 from pretouch.sensing.skin import Skin, load_skin, save_skin, skin_file
 from pretouch.types import BoolArray
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from pretouch.coverage.blind import BLIND, BlindSpot
-from pretouch.coverage.measuring import Both, Setting
+from pretouch.coverage.measure import Both, Setting
 from pretouch.coverage.suggest import Suggestions
 from pretouch.coverage.ways import Ways
 from pretouch.sensing.skin import Skin

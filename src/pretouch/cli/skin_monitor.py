@@ -28,10 +28,10 @@ from pretouch.hardware.receiver import SkinReceiver
 from pretouch.hardware.udp import EVERYWHERE, HOST
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.recording.skin_recording import SkinRecording
+from pretouch.robot.description_file import robot_named
 from pretouch.robot.model import RobotModel
-from pretouch.robot.named import robot_named
-from pretouch.sensing.network import NetworkUnits
 from pretouch.sensing.skin import load_skin
+from pretouch.sensing.unit import NetworkUnits
 from pretouch.signals import Terminated
 from pretouch.types import FloatArray
 

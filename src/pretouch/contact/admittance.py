@@ -6,7 +6,17 @@ from typing import Literal
 import numpy as np
 
 from pretouch.compiled import compiled
-from pretouch.contact.clamp import ClampState, caught_between, clamp_begun, clamp_init, clamped, gone, opened
+from pretouch.contact.clamp import (
+    ClampState,
+    caught_between,
+    clamp_begun,
+    clamp_init,
+    clamped,
+    find_self_clamp,
+    gone,
+    opened,
+    presses_on_fixture,
+)
 from pretouch.contact.detector import Body, is_known
 from pretouch.contact.reach import axis_ends, within_reach
 from pretouch.contact.reaction import Reaction, ReactionInputs, ReactionMotion, contact_event, new_contact
@@ -20,7 +30,6 @@ from pretouch.contact.repeated_contact import (
     repeated_contact_init,
     wait_to_retry,
 )
-from pretouch.contact.self_clamping import find_self_clamp, presses_on_fixture
 from pretouch.contact.virtual_mass import VirtualMass, begun, dead_band, fastest_point, learnt, mass_init, yielded
 from pretouch.groups import Kinematics
 from pretouch.modes import Event, ModeState

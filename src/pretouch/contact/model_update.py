@@ -15,8 +15,7 @@ from pretouch.contact.lasting_load import (
     weight_part,
 )
 from pretouch.contact.residual_model import BLOCK, QUEUE, CalmSample, Learnt, Pace, add_sample, learn_block
-from pretouch.contact.turning import learn_turning
-from pretouch.contact.window_scatter import LENGTHS, LONGEST, FreeMeans, learn_scatter
+from pretouch.contact.scatter import LENGTHS, LONGEST, FreeMeans, learn_scatter, learn_turning
 from pretouch.types import FloatArray
 
 CALM = BLOCK * QUEUE

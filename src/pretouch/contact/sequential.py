@@ -6,6 +6,11 @@ its expectation is the sum of the weights, so that it passes A with a probabilit
 The force of a contact is unknown, and integrated out in closed form with a Gaussian prior whose spread is g times that
 of free motion (Zellner 1986): so wide a prior as that of the forces that can be would cost a contact that only some
 joints measure what the others do not.
+
+**Hypotheses** are contacts in one posture, and their priors. An object adds hypotheses, it takes none away: a force on
+the body's point nearest to it, away from it. How much they weigh depends on how soon it may touch. What no unit sees,
+or a unit whose reading is too old to be an obstacle, adds nothing, and all other contacts keep the weight they have
+without a skin.
 """
 
 import math
@@ -13,10 +18,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.cholesky import factor, forward
+from pretouch.cholesky import backward, factor, forward
 from pretouch.compiled import compiled
-from pretouch.contact.window_scatter import LENGTHS, FreeMeans, covariance_of_mean, spread_out
+from pretouch.contact.scatter import LENGTHS, FreeMeans, covariance_of_mean, spread_out
+from pretouch.groups import Kinematics, Mechanism, ObstacleArrays
 from pretouch.params import SequentialParams
+from pretouch.robot.kinematics import jacobian_into
 from pretouch.types import FloatArray, IntArray
 
 _LENGTHS = np.array(LENGTHS)
@@ -167,3 +174,124 @@ def explained_by_force(
     along, deviation = u0 * v0 + u1 * v1 + u2 * v2, np.sqrt(v0 * v0 + v1 * v1 + v2 * v2)
     # 2 Phi(along / deviation): a prior on one side only is twice as dense there
     return explained, 1.0 + math.erf(along / deviation / math.sqrt(2.0))
+
+
+MOST = 4
+"""Objects that are taken into account, the nearest ones."""
+
+
+class NearPrior(NamedTuple):
+    """How much likelier a contact is where something is near."""
+
+    near_gain: float
+    near_m: float
+    near_horizon_s: float
+
+
+@compiled
+def link_prior(mechanism: Mechanism) -> float:
+    """Return ln of the prior weight of a force on one link in one window, of which nothing near or touched is known."""
+    return -math.log(2.0 * len(mechanism.links.parts) * len(LENGTHS))
+
+
+@compiled
+def write_hypotheses(
+    kin: Kinematics, mechanism: Mechanism, qd: FloatArray, obstacles: ObstacleArrays, touch_gain: FloatArray,
+    p: NearPrior, contacts: Hypotheses,
+) -> None:  # fmt: skip
+    """Write the hypotheses: any wrench beyond each joint, a force on each link, one by each of the nearest objects.
+
+    Joints move at `qd` (n,) [rad/s]. All weights are times `touch_gain` (L,) of the link; of several links behind one
+    joint the largest counts.
+    """
+    position, rotation, anchor, axis = kin
+    moved_by, parts, middle = mechanism.arm.moved_by, mechanism.links.parts, mechanism.links.middle
+    distance, direction = obstacles.body_distance, obstacles.direction
+    J, joints, weight, away = contacts
+    n, count, full, point = len(anchor), len(parts), np.empty((6, len(anchor))), np.empty(3)
+    order, k = nearest_of(distance, len(J) - count), 0
+    # joints and links without what is seen share a weight of 1: half for any wrench on a link, which moves the joints
+    # before it, half for a force at the middle of a link
+    weight[:n] = 0.0
+    for body in range(len(moved_by)):
+        # in a serial chain the joints that move a link are the first so many, so their number says which
+        before = moved_by[body].sum()
+        if before:
+            weight[before - 1] = max(weight[before - 1], 0.5 / n * touch_gain[body])
+    for h in range(len(J)):
+        if h < count:
+            link = parts[h]
+            weight[n + h] = (0.5 / count) * touch_gain[link]
+            for a in range(3):
+                point[a] = position[link, a]
+                for b in range(3):
+                    point[a] += rotation[link, a, b] * middle[h, b]
+        else:
+            k = order[h - count]
+            link, point[:] = obstacles.link[k], obstacles.body_point[k]
+        jacobian_into(anchor, axis, moved_by[link], point, full)
+        J[h], joints[h] = full[:3], moved_by[link].sum()
+        if h >= count:
+            # closing speed: that of the object towards the body, and u^T J qd of the body towards the object; a force
+            # away from the object has the direction -u
+            speed = obstacles.closing_speed[k]
+            for a in range(3):
+                away[h, a] = -direction[k, a]
+                for j in range(n):
+                    speed += direction[k, a] * J[h, a, j] * qd[j]
+            weight[n + h] = p.near_gain * nearness(distance[k], speed, p.near_m, p.near_horizon_s) * touch_gain[link]
+
+
+@compiled
+def nearness(distance: float, closing: float, near: float, horizon: float) -> float:
+    """How soon an object may touch, from 0 (not near) to 1 (touches within `horizon` [s]).
+
+    `distance` [m] is from the body's surface, `closing` [m/s] the speed at which it becomes less; a growing one counts
+    as it is.
+    """
+    ahead = distance - max(closing, 0.0) * horizon
+    return min(max(1.0 - ahead / near, 0.0), 1.0)
+
+
+@compiled
+def nearest_of(distance: FloatArray, most: int) -> IntArray:
+    """Indices of the smallest distances (K,), at most so many, the nearest first."""
+    return np.argsort(distance)[:most]
+
+
+def force_map(jacobian: FloatArray) -> FloatArray:
+    """Map (3, n) from joint torques [Nm] to the force at the end-effector that explains them best [N].
+
+    Damped least squares: the first three rows of (J J^T + d^2 I)^-1 J of the Jacobian (6, n). A force so found does
+    work on the arm's end in the direction in which the torques do work on the joints, wherever the contact is.
+    """
+    W = np.empty((3, jacobian.shape[1]))
+    force_map_into(jacobian, W)
+    return W
+
+
+_DAMPING = 0.02
+"""Damping d: below it a direction is singular, and the force in it is taken to be smaller than it may be."""
+
+
+@compiled
+def force_map_into(J: FloatArray, W: FloatArray) -> None:
+    """Write what `force_map` returns, of the Jacobian (6, n)."""
+    A, L, unit, y, x = np.empty((6, 6)), np.zeros((6, 6)), np.zeros(6), np.empty(6), np.empty(6)
+    for i in range(6):
+        for k in range(i + 1):
+            # J J^T + d^2 I, of which `factor` reads the lower triangle only
+            A[i, k] = _DAMPING**2 if i == k else 0.0
+            for j in range(J.shape[1]):
+                A[i, k] += J[i, j] * J[k, j]
+    factor(A, L)
+    for i in range(3):
+        # x = A^-1 e_i, a row of A^-1 too, for A is symmetric
+        unit[i] = 1.0
+        forward(L, unit, y)
+        backward(L, y, x)
+        unit[i] = 0.0
+        for j in range(J.shape[1]):
+            W[i, j] = 0.0
+            for k in range(6):
+                W[i, j] += x[k] * J[k, j]

@@ -6,13 +6,12 @@ from typing import NamedTuple
 import numpy as np
 
 from pretouch.contact.alarm_level import level_init
-from pretouch.contact.cues import Cues
 from pretouch.contact.model_update import CALM
 from pretouch.contact.residual_model import BLOCK, QUEUE, ResidualModel, prior_of, residual_init
+from pretouch.contact.scatter import LENGTHS, LONGEST, learns_scatter, scatter_init, turning_init
 from pretouch.contact.sequential import alarm_bound
 from pretouch.contact.sequential_step import detect_contact
-from pretouch.contact.turning import turning_init
-from pretouch.contact.window_scatter import LENGTHS, LONGEST, learns_scatter, scatter_init
+from pretouch.contact.touch_cue import Cues
 from pretouch.groups import Kinematics, ObstacleArrays
 from pretouch.params import MisfitParams, ProximityPriorParams, SequentialParams
 from pretouch.robot.model import RobotModel

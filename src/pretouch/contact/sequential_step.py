@@ -11,15 +11,11 @@ from typing import NamedTuple
 import numpy as np
 
 from pretouch.compiled import compiled, entry, inlined
-from pretouch.contact.alarm_level import earned_level
-from pretouch.contact.detectable import detectable_force
-from pretouch.contact.force_map import force_map_into
-from pretouch.contact.hypotheses import MOST, NearPrior, link_prior, write_hypotheses
+from pretouch.contact.alarm_level import detectable_force, earned_level
 from pretouch.contact.model_update import DetectionNumbers, Memory, Situation, Tested, update_model
 from pretouch.contact.residual_model import CalmSample, features_into, mean_and_variance, spread_of_sample
-from pretouch.contact.sequential import Hypotheses, judge
-from pretouch.contact.turning import add_reversal_variance
-from pretouch.contact.window_scatter import LONGEST, scattered_means, white_means, window_means
+from pretouch.contact.scatter import LONGEST, add_reversal_variance, scattered_means, white_means, window_means
+from pretouch.contact.sequential import MOST, Hypotheses, NearPrior, force_map_into, judge, link_prior, write_hypotheses
 from pretouch.groups import Kinematics, Mechanism, ObstacleArrays
 from pretouch.robot.kinematics import jacobian_into, mass_matrix_into
 from pretouch.types import FloatArray

@@ -6,12 +6,11 @@ from typing import Any
 import numpy as np
 
 from pretouch.contact.announced_load import doubted
-from pretouch.contact.cues import Cue, Cues, no_cues, together
 from pretouch.contact.detector import Body, Detection, Detector, Sample, no_torques, strongest
-from pretouch.contact.localisation.localise import LocalisationState, localisation_init, localise
-from pretouch.contact.localisation.significance import most_significant_mean
+from pretouch.contact.localisation.localise import LocalisationState, localisation_init, localise, most_significant_mean
 from pretouch.contact.residual_model import ResidualModel
 from pretouch.contact.sequential_detector import Observation, SequentialState, sequential_init, sequential_step
+from pretouch.contact.touch_cue import Cue, Cues, no_cues, together
 from pretouch.groups import NOTHING_NEAR
 from pretouch.params import LocalisationParams, SequentialParams
 from pretouch.types import NOT_TOUCHED, FloatArray, RobotState, Thresholds

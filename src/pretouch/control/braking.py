@@ -13,7 +13,7 @@ import numpy as np
 
 from pretouch.cholesky import forward
 from pretouch.compiled import compiled, inlined
-from pretouch.control.restriction import Rows
+from pretouch.control.qp import Rows
 from pretouch.groups import Chain, ObstacleArrays
 from pretouch.params.pretouch import REGIONS, BrakingParams, EffectiveMass
 from pretouch.robot.kinematics import column

@@ -21,7 +21,7 @@ from pretouch.control.braking import (
 )
 from pretouch.control.interface import CompiledRows, MotionBody, MotionRequest, Restriction
 from pretouch.control.motion_entry import Allowed, Ended, Fixed, Step, motion_within
-from pretouch.control.restriction import Rows
+from pretouch.control.qp import Rows
 from pretouch.groups import Chain, Kinematics, Links, Mechanism, ObstacleArrays
 from pretouch.params import BrakingParams
 from pretouch.robot.kinematics import mass_matrix_into

@@ -13,9 +13,7 @@ from pretouch.control.active_set import minimise_within
 from pretouch.control.joint_box import box_and_brake
 from pretouch.control.null_space import NullSpaceLimits, away, cost_with_null_space
 from pretouch.control.penalty import SOLVED, Minimum, Problem, excesses, minimise
-from pretouch.control.qp import CostParams, cost_into
-from pretouch.control.restriction import Rows
-from pretouch.control.task import twist
+from pretouch.control.qp import CostParams, Rows, cost_into, twist
 from pretouch.groups import Arm, JointArrays, Kinematics, NearArrays
 from pretouch.robot.kinematics import jacobian_into
 from pretouch.types import FloatArray, IntArray

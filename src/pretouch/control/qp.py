@@ -1,4 +1,4 @@
-"""The quadratic program for joint velocities: eq. 2 within joint box and approach rows. Never without an answer."""
+"""The quadratic program for joint velocities: task, joint box and rows of eq. 2. Never without an answer."""
 
 from typing import NamedTuple
 
@@ -6,20 +6,65 @@ import numpy as np
 
 from pretouch.compiled import compiled, entry
 from pretouch.control.active_set import minimise_within
-from pretouch.control.penalty import (
-    BUDGET,
-    INFEASIBLE,
-    NOT_CONVEX,
-    NOT_FINITE,
-    SOLVED,
-    Minimum,
-    Problem,
-    minimise,
-)
-from pretouch.control.restriction import ApproachRows
+from pretouch.control.penalty import BUDGET, INFEASIBLE, NOT_CONVEX, NOT_FINITE, SOLVED, Minimum, Problem, minimise
 from pretouch.params import TaskParams
-from pretouch.types import FloatArray, Number, QpOutcome, QpSolution
+from pretouch.robot.vectors import rotation_error
+from pretouch.types import FloatArray, IntArray, Number, QpOutcome, QpSolution
 from pretouch.values import value
+
+
+def task(
+    ee_jacobian: FloatArray,
+    velocity: FloatArray,
+    rotation: FloatArray,
+    rotation_goal: FloatArray,
+    params: TaskParams,
+) -> tuple[FloatArray, FloatArray]:
+    """Jacobian (m, n) and desired velocity (m,) of the task: m = 3, or 6 when the orientation is held.
+
+    Args:
+        ee_jacobian: (6, n) of the end-effector origin.
+        velocity: (3,) desired velocity [m/s].
+        rotation: (3, 3) R_O_ee now.
+        rotation_goal: (3, 3) R_O_ee to hold.
+        params: orientation and its gain.
+    """
+    if params.orientation == "free":
+        return ee_jacobian[:3], velocity
+    return ee_jacobian, twist(velocity, rotation, rotation_goal, params.orientation_gain_1_s)
+
+
+@compiled
+def twist(velocity: FloatArray, rotation: FloatArray, goal: FloatArray, gain: float) -> FloatArray:
+    """Task velocity (6,) of `task` when the orientation is held [m/s, then rad/s]."""
+    error, both = rotation_error(rotation, goal), np.empty(6)
+    for i in range(3):
+        both[i], both[3 + i] = velocity[i], gain * error[i]
+    return both
+
+
+@value
+class ApproachRows:
+    """K rows of the QP: G @ qd <= h, softly or not."""
+
+    G: FloatArray
+    """(K, n) approach velocity of the closest body point per joint velocity [m]."""
+    h: FloatArray
+    """(K,) largest approach velocity [m/s]; negative asks for a retreat."""
+    soft: bool
+    """Whether a row may be violated at a cost."""
+
+
+class Rows(NamedTuple):
+    """Room for rows of the QP, as many as there may be."""
+
+    G: FloatArray
+    """(R, n) as in `ApproachRows`."""
+    h: FloatArray
+    """(R,) likewise."""
+    which: IntArray
+    """(K,) the obstacle that each of the first belongs to."""
+
 
 ENDING = {
     NOT_FINITE: "the problem holds numbers that are not finite",

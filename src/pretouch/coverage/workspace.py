@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pretouch.control.posture import brought_to
 from pretouch.errors import ExperimentError
 from pretouch.importing.ready import ever_apart
 from pretouch.perception.scene_filter import Fixtures
+from pretouch.robot.ik import brought_to
 from pretouch.robot.model import RobotModel
 from pretouch.robot.self_distance import capsule_ends, kinematics_of, self_distances
 from pretouch.robot.vectors import placed

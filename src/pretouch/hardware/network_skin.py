@@ -21,7 +21,7 @@ from pretouch.hardware.receiver import keys_of, touch_readings
 from pretouch.hardware.receiver_process import SharedOutputs, Traffic, serve
 from pretouch.hardware.traffic import ImuBatch, Received, UnitTraffic, imu_batch
 from pretouch.hardware.udp import demand_port
-from pretouch.sensing.network import NetworkUnits
+from pretouch.sensing.unit import NetworkUnits
 from pretouch.signals import kept_from_children
 from pretouch.types import RangeReadings, RangeStatus, TouchReadings
 

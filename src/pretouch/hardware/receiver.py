@@ -26,7 +26,7 @@ from pretouch.hardware.wire import (
     Kind,
     sample_size,
 )
-from pretouch.sensing.network import NetworkUnits
+from pretouch.sensing.unit import NetworkUnits
 from pretouch.types import FloatArray, RangeReadings, TouchReadings
 
 _HEAD = struct.Struct("<4sHHI")

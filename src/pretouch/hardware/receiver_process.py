@@ -17,7 +17,7 @@ from pretouch.hardware.mailbox import Mailbox, Ring
 from pretouch.hardware.receiver import SkinReceiver
 from pretouch.hardware.traffic import Received, UnitTraffic
 from pretouch.hardware.wire import SAMPLE_MOST, TAG_SIZE, sample_of
-from pretouch.sensing.network import NetworkUnits
+from pretouch.sensing.unit import NetworkUnits
 from pretouch.signals import leave_to_parent
 
 _PAUSE_S = 0.008

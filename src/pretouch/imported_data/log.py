@@ -9,8 +9,8 @@ from typing import Literal, Protocol
 import numpy as np
 
 from pretouch.errors import RecordingError
+from pretouch.robot.description_file import robot_named
 from pretouch.robot.model import RobotModel
-from pretouch.robot.named import robot_named
 from pretouch.types import FloatArray, IntArray
 from pretouch.values import value
 

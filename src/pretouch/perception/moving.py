@@ -5,7 +5,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.arrays import real, real_number
 from pretouch.compiled import compiled, entry
 from pretouch.groups import CapsuleArrays, Kinematics
 from pretouch.moving_fixtures import MovingFixtures
@@ -14,6 +13,7 @@ from pretouch.robot.body import Capsules
 from pretouch.robot.model import RobotModel
 from pretouch.robot.vectors import dot, placed_capsules
 from pretouch.types import WHOLE, FloatArray, IntArray, Obstacles, RangeReadings
+from pretouch.values import real, real_number
 
 _FARTHEST = 100.0
 """A coordinate [m] or a speed [m/s] from here on is implausible."""

@@ -1,14 +1,16 @@
-"""Where the sensed obstacles are: eq. 1, which readings count, and how long a point is kept."""
+"""Where the sensed obstacles are: eq. 1, which readings count, and how long a point lasts, its spread, and silence."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
 from pretouch.compiled import compiled
-from pretouch.groups import Cones, Kinematics, Sensors
+from pretouch.groups import Cones, Kinematics, Sensors, SkinArrays
+from pretouch.params import PerceptionParams
 from pretouch.perception.motion_compensation import motion_init
 from pretouch.sensing.skin import Skin
-from pretouch.types import BoolArray, FloatArray, IntArray, Obstacles, RangeReadings, RangeStatus
+from pretouch.types import BoolArray, FloatArray, IntArray, Number, Obstacles, RangeReadings, RangeStatus
 from pretouch.values import value
 
 
@@ -204,3 +206,118 @@ def newer(used: FloatArray, stamp: FloatArray, now: float) -> BoolArray:
     for k in range(len(stamp)):
         fresh[k] = used[k] < stamp[k] <= now  # false for NaN, and for -inf: never heard
     return fresh
+
+
+_FAILURES = {
+    int(RangeStatus.HARDWARE): " (it reports a hardware failure)",
+    int(RangeStatus.STUCK): " (it repeats the same reading)",
+}
+
+
+def silent_units(
+    skin: Skin, state: TrackState, status: IntArray, silence: float, now: float, params: PerceptionParams
+) -> tuple[float, str]:
+    """Factor in [0, 1] on the speed for units that fall silent, and the names of those that are.
+
+    Silence is never free space, and neither is a failure: from `slow_after_s` without a reading that tells anything the
+    arm slows, at `silent_after_s` it stands. `silence` [s] is the longest of any unit, `status` (K,) what the units
+    reported last.
+    """
+    if silence <= params.slow_after_s:
+        return 1.0, ""
+    silent = np.flatnonzero(now - state.heard >= params.silent_after_s).tolist()
+    # of a unit with zones the unit is named, once
+    names = ", ".join(dict.fromkeys(skin.boards[k] + _FAILURES.get(int(status[k]), "") for k in silent))
+    # from 1 at `slow_after_s` to 0 at `silent_after_s`; the silence of a unit never heard is infinite
+    return max(0.0, (params.silent_after_s - silence) / (params.silent_after_s - params.slow_after_s)), names
+
+
+_ON_AXIS = math.cos(math.radians(0.5))
+"""A target may be anywhere in its cone, though eq. 1 puts it on the axis: it may leave the cone as soon as that is
+carried on. Half a degree is more than an arm at rest turns."""
+
+
+@compiled
+def looks_at(kin: Kinematics, skin: SkinArrays, k: int, point: FloatArray) -> bool:
+    """Whether the beam of unit k still goes to a point (3,)."""
+    position, rotation, link = np.empty(3), np.empty((3, 3)), skin.link[k]
+    pose_into(kin.position[link], kin.rotation[link], skin.T_link_sensor[k], position, rotation)
+    return _on_axis(position, rotation, point) >= 0
+
+
+@compiled
+def give_up(
+    point: FloatArray, seen: FloatArray, sensors: Sensors, told: BoolArray, distance: FloatArray, until: float
+) -> None:  # fmt: skip
+    """Give up each point (K, 3) last `seen` (K,) before `until` [s] through whose place its unit now looks.
+
+    `told` (K,) are units with a new reading that tells something, `distance` (K,) [m] what they show, NaN for nothing.
+    """
+    for k in range(len(seen)):
+        if told[k] and seen[k] < until:
+            away = _on_axis(sensors.position[k], sensors.rotation[k], point[k])
+            # what is nearer may hide the point: such a reading says nothing about it
+            if away >= 0 and not distance[k] < away:
+                seen[k] = -np.inf
+
+
+@compiled
+def _on_axis(position: FloatArray, rotation: FloatArray, point: FloatArray) -> float:
+    """Distance [m] of a point (3,) from a sensor on whose axis it lies, -1 if it does not, or is NaN."""
+    along, away2 = 0.0, 0.0
+    for i in range(3):
+        to = point[i] - position[i]
+        along += to * rotation[i, 2]
+        away2 += to * to
+    away = np.sqrt(away2)
+    return away if along >= _ON_AXIS * away else -1.0
+
+
+@compiled
+def spread(sigmas: float, position_sigma: Number, orientation_sigma: Number, distance: Number) -> Number:
+    """Spread u = n sqrt(sigma_p^2 + (d sigma_r)^2) [m]: how far a point may lie from where eq. 1 puts it.
+
+    `sigmas` n counts standard deviations, those of the unit's position [m] and orientation [rad] in the worst
+    direction; `distance` d [m] is from the unit to the point.
+    """
+    turned = distance * orientation_sigma  # to first order: lever times angle
+    return sigmas * np.sqrt(position_sigma * position_sigma + turned * turned)
+
+
+@compiled
+def widen(
+    ends: FloatArray, sigmas: float, position_sigma: FloatArray, orientation_sigma: FloatArray, distance: FloatArray,
+    most: float,
+) -> None:  # fmt: skip
+    """Add to `ends` (K,) [m], up to which the arm and fixtures explain a reading, its spread, but no more than `most`.
+
+    `distance` (K,) [m] is what each reading stands for.
+    """
+    for k in range(len(ends)):
+        # an obstacle so close before the arm is not seen: `most` bounds how much a badly placed unit may hide
+        ends[k] += min(spread(sigmas, position_sigma[k], orientation_sigma[k], distance[k]), most)
+
+
+@compiled
+def bring_nearer(
+    body_distance: FloatArray, ee_distance: FloatArray, point: FloatArray, unit: IntArray, sigmas: float,
+    skin: SkinArrays, kin: Kinematics,
+) -> None:  # fmt: skip
+    """Take its spread off the distances (M,) [m] of each point (M, 3), as far as the unit (M,) now is from it.
+
+    The distance from the body may become negative, that from the end-effector is at least 0: eq. 3 makes a factor on
+    the speed of it.
+    """
+    for m in range(len(point)):
+        k = unit[m]
+        # from the unit as it is now, not as it measured: at 5 degrees u is off by 3 mm at most, without a memory of it
+        origin, R, away2 = kin.position[skin.link[k]], kin.rotation[skin.link[k]], 0.0
+        for i in range(3):
+            at = origin[i]
+            for j in range(3):
+                at += R[i, j] * skin.T_link_sensor[k, j, 3]
+            away2 += (point[m, i] - at) ** 2
+        turned = np.sqrt(skin.orientation_sigma[k] ** 2 + skin.cones.spread[skin.cones.kind[k]] ** 2)
+        u = spread(sigmas, skin.position_sigma[k], turned, np.sqrt(away2))
+        body_distance[m] -= u
+        ee_distance[m] = max(0.0, ee_distance[m] - u)

@@ -17,21 +17,23 @@ from pretouch.perception.obstacles import (
     USED,
     NewReadings,
     TrackState,
+    bring_nearer,
+    give_up,
     locate,
+    looks_at,
     measured,
     measured_distance,
     newer,
     pose_into,
     take_in,
     tells_anything,
+    widen,
 )
-from pretouch.perception.out_of_view import give_up, looks_at
 from pretouch.perception.scene_filter import Fixtures, leave_out, leave_out_planes
-from pretouch.perception.spread import bring_nearer, widen
 from pretouch.robot.model import RobotModel
 from pretouch.robot.vectors import placed_capsules, rotate
 from pretouch.sensing.skin import Skin
-from pretouch.types import WHOLE, BoolArray, FloatArray, IntArray, Obstacles, RangeReadings, RangeStatus, RobotState
+from pretouch.types import WHOLE, BoolArray, FloatArray, IntArray, Obstacles, RangeReadings, RobotState
 from pretouch.values import value
 
 
@@ -323,27 +325,3 @@ def _take_readings(
         give_up(tracks.point, times[SEEN], sensors, fresh & tells, distance, now - p.persistence_s)
     new = NewReadings(readings.stamp, points, fresh, shows, tells)
     take_in(tracks.point, times, new, now, p.persistence_s)
-
-
-_FAILURES = {
-    int(RangeStatus.HARDWARE): " (it reports a hardware failure)",
-    int(RangeStatus.STUCK): " (it repeats the same reading)",
-}
-
-
-def silent_units(
-    skin: Skin, state: TrackState, status: IntArray, silence: float, now: float, params: PerceptionParams
-) -> tuple[float, str]:
-    """Factor in [0, 1] on the speed for units that fall silent, and the names of those that are.
-
-    Silence is never free space, and neither is a failure: from `slow_after_s` without a reading that tells anything the
-    arm slows, at `silent_after_s` it stands. `silence` [s] is the longest of any unit, `status` (K,) what the units
-    reported last.
-    """
-    if silence <= params.slow_after_s:
-        return 1.0, ""
-    silent = np.flatnonzero(now - state.heard >= params.silent_after_s).tolist()
-    # of a unit with zones the unit is named, once
-    names = ", ".join(dict.fromkeys(skin.boards[k] + _FAILURES.get(int(status[k]), "") for k in silent))
-    # from 1 at `slow_after_s` to 0 at `silent_after_s`; the silence of a unit never heard is infinite
-    return max(0.0, (params.silent_after_s - silence) / (params.silent_after_s - params.slow_after_s)), names

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from matplotlib.figure import Figure
 
-from pretouch.reporting.figures.image import picture, style
+from pretouch.reporting.figures.marks import picture, style
 from pretouch.reporting.html import Html, Text, document, element, joined, titled_table
 from pretouch.text_table import TextTable
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from pretouch.control.approach_restriction import notice_m, of_table_i
+from pretouch.control.approach import notice_m, of_table_i
 from pretouch.reporting.course import Course
 from pretouch.reporting.numbers import durations, least, least_of_each
 

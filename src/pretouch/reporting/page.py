@@ -6,7 +6,7 @@ import numpy as np
 
 from pretouch.reporting.course import Course
 from pretouch.reporting.figures.force import close_up_figure, force_figure
-from pretouch.reporting.figures.image import picture, style
+from pretouch.reporting.figures.marks import picture, style
 from pretouch.reporting.figures.motion import joint_figure, motion_figure, path_figure
 from pretouch.reporting.html import Html, Text, document, element, joined
 from pretouch.reporting.limits import acceleration_fraction, speed_fraction

@@ -1,4 +1,4 @@
-"""The body of an arm as capsules fixed to its links."""
+"""The body of an arm as capsules fixed to its links, and places spread over its surface, where it may be touched."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -7,8 +7,8 @@ import mujoco
 import numpy as np
 
 from pretouch.errors import RobotModelError
-from pretouch.groups import CapsuleArrays
-from pretouch.types import FloatArray, IntArray
+from pretouch.groups import CapsuleArrays, SurfaceArrays
+from pretouch.types import BoolArray, FloatArray, IntArray
 
 
 @dataclass(frozen=True)
@@ -69,3 +69,113 @@ def from_axes(points: FloatArray, a: FloatArray, b: FloatArray) -> tuple[FloatAr
     axis, rel = b - a, points[:, None] - a
     part = np.clip((rel * axis).sum(axis=2) / np.maximum((axis**2).sum(axis=1), 1e-12), 0.0, 1.0)
     return part, rel - part[:, :, None] * axis
+
+
+SPACING_M = 0.025
+"""About the distance between neighbouring places [m]: places are interpolated between them."""
+_MOST_CAPSULES, _MOST_AREA = 200, 50.0
+"""Capsules that joints move, and their area [m^2]: a Panda has 18 and 0.9 m^2. Time grows with the product of both."""
+
+
+@dataclass(frozen=True)
+class Surface:
+    """N places on the outside of the capsules that joints move, those of a rigid body one after the other."""
+
+    link: IntArray
+    """(N,) index of the link each is fixed to."""
+    point: FloatArray
+    """(N, 3) link frame [m]."""
+    normal: FloatArray
+    """(N, 3) outward unit normals, link frame."""
+    area: FloatArray
+    """(N,) surface each stands for [m^2]."""
+    body: IntArray
+    """(N,) the rigid body each belongs to, from 0 at the base: links that the same joints move are one."""
+    first: IntArray
+    """(B + 1,) where the places of each rigid body begin, and N."""
+
+    def __len__(self) -> int:
+        return len(self.link)
+
+    @cached_property
+    def arrays(self) -> SurfaceArrays:
+        """The same for compiled code."""
+        return SurfaceArrays(self.link, self.point, self.normal, self.area, self.body, self.first)
+
+
+def bodies_of(moved_by: BoolArray) -> IntArray:
+    """Return the rigid body (L,) of each link, given the joints (L, n) that move it; -1 of links that none moves."""
+    patterns = [tuple(row) for row in moved_by.tolist()]
+    found: dict[tuple[bool, ...], int] = {}
+    for pattern in patterns:
+        if any(pattern):
+            found.setdefault(pattern, len(found))
+    return np.array([found.get(pattern, -1) for pattern in patterns], dtype=np.int64)
+
+
+def surface_of(
+    body: Capsules, moved_by: BoolArray, position: FloatArray, rotation: FloatArray, spacing: float = SPACING_M
+) -> Surface:
+    """Spread places over C capsules, but for those inside another capsule of the same rigid body.
+
+    Args:
+        body: the capsules.
+        moved_by: (L, n) whether a joint moves a link.
+        position: (L, 3) of the links in any one posture [m].
+        rotation: (L, 3, 3) of the links in it.
+        spacing: about the distance of neighbours [m].
+
+    Raises RobotModelError for a body far larger than any arm's.
+    """
+    size = 2 * np.pi * float((body.radius * (np.linalg.norm(body.b - body.a, axis=1) + 2 * body.radius)).sum())
+    if len(body) > _MOST_CAPSULES or not size <= _MOST_AREA:
+        raise RobotModelError(
+            f"The joints move {len(body)} capsules of {size:.3g} m^2: describe the body by at most {_MOST_CAPSULES} of"
+            f" {_MOST_AREA:g} m^2 in metres."
+        )
+    rigid = bodies_of(moved_by)
+    a = position[body.link] + np.einsum("cij,cj->ci", rotation[body.link], body.a)
+    b = position[body.link] + np.einsum("cij,cj->ci", rotation[body.link], body.b)
+    parts: list[tuple[IntArray, FloatArray, FloatArray, FloatArray]] = []
+    for c in np.argsort(rigid[body.link], kind="stable"):
+        point, normal, area = _on_capsule(a[c], b[c], float(body.radius[c]), spacing)
+        others = (rigid[body.link] == rigid[body.link[c]]) & (np.arange(len(body)) != c)
+        away = np.linalg.norm(from_axes(point, a[others], b[others])[1], axis=2)
+        free = (away > body.radius[others]).all(axis=1)
+        link = int(body.link[c])
+        R = rotation[link]
+        parts.append((
+            np.full(int(free.sum()), link), (point[free] - position[link]) @ R, normal[free] @ R, area[free]
+        ))  # fmt: skip
+    links, points, normals, areas = (np.concatenate(group) for group in zip(*parts, strict=True))
+    count = rigid[links]
+    first = np.searchsorted(count, np.arange(int(rigid.max()) + 2))
+    return Surface(links.astype(np.int64), points, normals, areas, count, first.astype(np.int64))
+
+
+def _on_capsule(
+    a: FloatArray, b: FloatArray, radius: float, spacing: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return points (P, 3), normals (P, 3) and areas (P,) on the capsule from a to b (3,): rings, and its two poles."""
+    length = float(np.linalg.norm(b - a))
+    along = (b - a) / length if length > 0 else np.array([0.0, 0.0, 1.0])
+    aside = np.cross(along, np.eye(3)[int(np.argmin(np.abs(along)))])
+    aside /= np.linalg.norm(aside)
+    other = np.cross(along, aside)
+    # rings: the cylinder's, then those of the caps by their angle from the equator
+    rings = max(1, round(length / spacing))
+    places = [((k + 0.5) / rings * length, 0.0, length / rings) for k in range(rings)]
+    steps = max(1, round(radius * np.pi / 2 / spacing))
+    for k in range(steps):
+        low, high = k / steps * np.pi / 2, (k + 1) / steps * np.pi / 2
+        width = radius * (np.sin(high) - np.sin(low))
+        places += [(length, (low + high) / 2, width), (0.0, -(low + high) / 2, width)]
+    points, normals, areas = [], [], []
+    for number, (at, tilt, width) in enumerate(places):
+        count = max(3, round(2 * np.pi * radius * np.cos(tilt) / spacing))
+        turn = 2 * np.pi * (np.arange(count) + 0.5 * (number % 2)) / count
+        normal = np.cos(tilt) * (np.outer(np.cos(turn), aside) + np.outer(np.sin(turn), other)) + np.sin(tilt) * along
+        normals.append(normal)
+        points.append(a + at * along + radius * normal)
+        areas.append(np.full(count, 2 * np.pi * radius * width / count))
+    return np.concatenate(points), np.concatenate(normals), np.concatenate(areas)

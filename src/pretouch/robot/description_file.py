@@ -1,4 +1,4 @@
-"""Description of an arm in a file: robot.toml, beside the MJCF that it names."""
+"""Description of an arm in a file: robot.toml, beside the MJCF that it names; and the arms that can be named."""
 
 import os
 from hashlib import sha256
@@ -9,7 +9,7 @@ import numpy as np
 import tomli_w
 
 from pretouch.errors import RobotModelError
-from pretouch.robot.description import RobotDescription, SpeedEnvelope
+from pretouch.robot.description import RobotDescription, SpeedEnvelope, fr3, panda
 from pretouch.toml_files import read_toml
 from pretouch.types import FloatArray
 
@@ -122,3 +122,27 @@ def _shown(value: Any) -> str:
     except ValueError:
         return "too long to show"
     return text if len(text) <= 200 else f"{text[:200]} ..."
+
+
+ROBOTS = {"panda": panda, "fr3": fr3}
+"""Those that come with the package."""
+
+
+def is_shipped(arm: RobotDescription) -> bool:
+    """Whether an arm's model is one that comes with the package: a Panda or an FR3."""
+    return arm.mjcf in (panda().mjcf, fr3().mjcf)
+
+
+def robot_named(name: str) -> RobotDescription:
+    """Return the description of an arm, by its name or by the folder or robot.toml that it was imported to.
+
+    Raises RobotModelError where there is neither, or where the file is wrong.
+    """
+    if name in ROBOTS:
+        return ROBOTS[name]()
+    if not Path(name).exists():
+        raise RobotModelError(
+            f"There is no arm {name!r}: take one of {', '.join(ROBOTS)}, or a folder that"
+            " `pretouch robot import FILE --out FOLDER` wrote."
+        )
+    return load_description(name)

@@ -5,8 +5,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pretouch.errors import ExperimentError
 from pretouch.groups import Kinematics
 from pretouch.robot.model import RobotModel
+from pretouch.robot.vectors import rotation_error
 from pretouch.types import FloatArray
 
 
@@ -43,3 +45,23 @@ def posture_at(
         step = drawn + J.T @ np.linalg.solve(J @ J.T + pace.damping * np.eye(6), error - J @ drawn)
         q = np.clip(q + step * min(1.0, pace.step_max / max(np.abs(step).max(), 1e-12)), model.q_min, model.q_max)
     return None
+
+
+def brought_to(model: RobotModel, point: FloatArray) -> FloatArray:
+    """Joint positions (n,) [rad] of the ready posture, its hand moved to a point (3,) [m] without being turned.
+
+    Raises ExperimentError where the arm cannot reach it within its joint limits.
+    """
+    ready = model.description.q_ready
+    upright = model.kinematics(ready).rotation[model.ee]
+
+    def error(kin: Kinematics) -> FloatArray:
+        # metres and radians side by side; the sine of the angle will do, for the hand is never turned far
+        return np.concatenate([point - kin.position[model.ee], rotation_error(kin.rotation[model.ee], upright)])
+
+    q = posture_at(model, ready.copy(), error, ready, Pace(2000, 0.02, 1e-4, close=1e-6))
+    if q is None:
+        raise ExperimentError(
+            f"The arm cannot reach {np.round(point, 3).tolist()} with its hand upright: choose another."
+        )
+    return q

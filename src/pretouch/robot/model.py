@@ -9,10 +9,9 @@ import numpy as np
 from pretouch.compiled import entry, flattened
 from pretouch.errors import RobotModelError
 from pretouch.groups import Arm, Kinematics, Links, Mechanism
-from pretouch.robot.body import Capsules, capsules_of
+from pretouch.robot.body import Capsules, Surface, bodies_of, capsules_of, surface_of
 from pretouch.robot.description import RobotDescription
 from pretouch.robot.kinematics import Hinges, jacobian_into, mass_matrix_into, place
-from pretouch.robot.surface import Surface, bodies_of, surface_of
 from pretouch.types import BoolArray, FloatArray, IntArray
 
 

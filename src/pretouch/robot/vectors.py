@@ -21,6 +21,20 @@ def rotate(R: FloatArray, v: FloatArray, out: FloatArray) -> None:
         out[i] = R[i, 0] * v[0] + R[i, 1] * v[1] + R[i, 2] * v[2]
 
 
+@compiled
+def rotation_error(rotation: FloatArray, goal: FloatArray) -> FloatArray:
+    """Rotation from one orientation to the other (3,): the unit axis times the sine of the angle, base frame."""
+    error = np.zeros(3)
+    # Half the sum of the cross products of each axis of the one with its like of the other. The sine falls again beyond
+    # a right angle and is 0 for a half turn: good for holding an orientation, not for turning to a far one.
+    for i in range(3):
+        x, y, z = rotation[0, i], rotation[1, i], rotation[2, i]
+        error[0] += 0.5 * (y * goal[2, i] - z * goal[1, i])
+        error[1] += 0.5 * (z * goal[0, i] - x * goal[2, i])
+        error[2] += 0.5 * (x * goal[1, i] - y * goal[0, i])
+    return error
+
+
 def placed(capsules: Capsules, kin: Kinematics) -> tuple[FloatArray, FloatArray]:
     """Both ends (C, 3) of each capsule's axis in the base frame [m]."""
     ends = placed_ends(capsules.link, capsules.a, capsules.b, kin.position, kin.rotation)

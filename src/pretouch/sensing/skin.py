@@ -15,13 +15,12 @@ from pretouch.errors import SkinError
 from pretouch.groups import Cones, SkinArrays
 from pretouch.robot.description import RobotDescription
 from pretouch.robot.model import RobotModel
-from pretouch.sensing.network import NetworkUnits
-from pretouch.sensing.sensor import PAPER_SENSOR, Sensor, cones_of
-from pretouch.sensing.sensor_types import own_type, sensor_called, sensor_tables, tables_of
+from pretouch.sensing.sensor import PAPER_SENSOR, Sensor, cones_of, own_type, sensor_called, sensor_tables, tables_of
 from pretouch.sensing.unit import (
     LARGEST_NUMBER,
     LARGEST_ORIENTATION_SIGMA,
     LARGEST_POSITION_SIGMA,
+    NetworkUnits,
     SensorUnit,
     TouchPatch,
     mounted,

@@ -1,7 +1,8 @@
-"""One sensor unit: a range finder at a known place on a link, of one beam or of zones."""
+"""One sensor unit: a range finder at a known place on a link, of one beam or of zones; and units on the network."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from itertools import accumulate
 
 import numpy as np
 
@@ -166,3 +167,31 @@ def seat(model: RobotModel, link: int, p: FloatArray) -> Seat | None:
     distance = np.linalg.norm(away, axis=1)
     c = int((distance - own.radius).argmin())
     return Seat(float(distance[c] - own.radius[c]), away[c] / max(float(distance[c]), 1e-9))
+
+
+@dataclass(frozen=True)
+class NetworkUnits:
+    """B units in the order of the skin. What units measure has K rows, one for each zone (`Skin`)."""
+
+    ids: tuple[str, ...]
+    """Their names: those of keys and traffic."""
+    zones: tuple[int, ...]
+    """Zones along each side of each one's sensor; 1: a single range."""
+
+    @classmethod
+    def of(cls, units: "NetworkUnits | Iterable[str]") -> "NetworkUnits":
+        """Return units as they are, or those of these names, none of which has zones."""
+        if isinstance(units, NetworkUnits):
+            return units
+        ids = tuple(units)
+        return cls(ids, (1,) * len(ids))
+
+    @property
+    def first(self) -> tuple[int, ...]:
+        """Row of each one's range, or of its first zone's; touch and IMU are told there too."""
+        return tuple(accumulate((side**2 for side in self.zones[:-1]), initial=0))[: len(self.ids)]
+
+    @property
+    def rows(self) -> int:
+        """K."""
+        return sum(side**2 for side in self.zones)

@@ -11,7 +11,7 @@ from pretouch.checks import Checked, NonNegative
 from pretouch.errors import HardwareError
 from pretouch.hardware.keys import Keys, UnitKey
 from pretouch.hardware.wire import KEY_SIZE
-from pretouch.sensing.network import NetworkUnits
+from pretouch.sensing.unit import NetworkUnits
 from pretouch.serving.network import Channel, NetworkParams
 from pretouch.serving.unit import SimulatedUnit, UnitParams
 from pretouch.sim.imu import ImuParams, ImuSample

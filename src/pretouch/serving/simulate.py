@@ -8,10 +8,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pretouch.control.posture import brought_to
 from pretouch.controller import Controller
 from pretouch.loop import Cycle
 from pretouch.loop import run as turn_on
+from pretouch.robot.ik import brought_to
 from pretouch.serving.fleet import Fleet
 from pretouch.serving.real_time import RealTime
 from pretouch.serving.simulated_arm import SimulatedArm, SimulateOptions

@@ -10,7 +10,7 @@ from pretouch.controller import Controller
 from pretouch.explanation import Doing, answers, explain, resumable
 from pretouch.loop import Cycle, Recorder
 from pretouch.modes import Event
-from pretouch.session.push_outcome import lacked
+from pretouch.session.push import lacked
 from pretouch.types import ControlStep, Mode
 
 _LINE_S = 5.0

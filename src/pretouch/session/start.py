@@ -6,9 +6,9 @@ from pretouch.calibration.motion.params import PlanParams
 from pretouch.calibration.motion.plan import Plan
 from pretouch.calibration.motion.route import approach
 from pretouch.control.path import Path
-from pretouch.control.posture import brought_to
 from pretouch.controller import Controller
 from pretouch.errors import CalibrationError, ExperimentError, RobotError
+from pretouch.robot.ik import brought_to
 from pretouch.robot.model import RobotModel
 from pretouch.session.preflight import Finding
 from pretouch.types import FloatArray

@@ -6,13 +6,12 @@ from functools import lru_cache
 import numpy as np
 
 from pretouch.control.path import Path
-from pretouch.control.posture import brought_to
 from pretouch.errors import ExperimentError
+from pretouch.robot.description_file import is_shipped
+from pretouch.robot.ik import brought_to
 from pretouch.robot.model import RobotModel
-from pretouch.robot.named import is_shipped
 from pretouch.robot.self_distance import capsule_ends, kinematics_of, segment_distance, self_distances
-from pretouch.sim.board import HandSide, Side, sign_of
-from pretouch.sim.paper_scenes import Placement
+from pretouch.sim.paper_scenes import HandSide, Placement, Side, sign_of
 from pretouch.sim.plant_params import assumed_plant
 from pretouch.sim.scene import SceneSpec
 from pretouch.types import FloatArray

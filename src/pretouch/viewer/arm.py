@@ -12,8 +12,7 @@ from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import FloatArray, IntArray
 from pretouch.viewer import palette
-from pretouch.viewer.expectation import LEVELS, on_surface, shares
-from pretouch.viewer.surface import surface_of
+from pretouch.viewer.expectation import LEVELS, on_surface, shares, surface_of
 
 if TYPE_CHECKING:
     from viser import GlbHandle, SceneApi

@@ -14,7 +14,7 @@ import trimesh
 from pretouch.robot.body import Capsules
 from pretouch.types import FloatArray
 from pretouch.viewer import palette
-from pretouch.viewer.surface import surface_of
+from pretouch.viewer.expectation import surface_of
 
 if TYPE_CHECKING:
     from viser import SceneApi, ViserServer

@@ -7,15 +7,14 @@ import numpy as np
 
 from pretouch.checks import Check, Checked
 from pretouch.control.path import Path, WayPoints
-from pretouch.control.posture import brought_to
 from pretouch.errors import ParameterError
 from pretouch.ports import Skin as UnitPort
 from pretouch.profiles import PROFILES, Profile
+from pretouch.robot.ik import brought_to
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.sim.board import FACE_M, Side, board_beside
 from pretouch.sim.hand import Hand, PersonArm
-from pretouch.sim.paper_scenes import Placement
+from pretouch.sim.paper_scenes import FACE_M, Placement, Side, board_beside
 from pretouch.sim.placement import placement_for
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.plant_params import PlantParams, plant_params_of

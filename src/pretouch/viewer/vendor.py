@@ -9,7 +9,7 @@ from trimesh import Trimesh
 
 from pretouch.extras import MESHES
 from pretouch.robot.model import RobotModel
-from pretouch.viewer.surface import joined
+from pretouch.viewer.expectation import joined
 
 _PACKAGE = "example-robot-data"
 

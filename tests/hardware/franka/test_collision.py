@@ -3,9 +3,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pretouch.contact.cues import no_cues
 from pretouch.contact.detector import Body
 from pretouch.contact.sequential_detector import Observation, sequential_init, sequential_step
+from pretouch.contact.touch_cue import no_cues
 from pretouch.errors import ParameterError
 from pretouch.hardware.franka.collision import (
     CollisionParams,

@@ -6,7 +6,7 @@ import numpy as np
 
 from pretouch.checks import Positive
 from pretouch.contact.detector import Body, Detection, Detector, Sample, no_torques, strongest
-from pretouch.contact.force_map import force_map
+from pretouch.contact.sequential import force_map
 from pretouch.errors import ParameterError
 from pretouch.profiles import PROFILES
 from pretouch.types import FloatArray, Thresholds

@@ -83,8 +83,8 @@ def _identified(command: Identify, out: Path | None, figure: Path | None) -> dic
 
 
 def _model(arm: str) -> "RobotModel | None":
+    from pretouch.robot.description_file import robot_named
     from pretouch.robot.model import RobotModel
-    from pretouch.robot.named import robot_named
 
     return RobotModel(robot_named(arm)) if arm else None
 

@@ -10,8 +10,8 @@ from pretouch.perception.obstacles import placed_sensors
 from pretouch.perception.scene_filter import expected_range
 from pretouch.profiles import profile
 from pretouch.robot.model import RobotModel
-from pretouch.sim.misplacement import Misplacement, misplaced
 from pretouch.sim.paper_scenes import static_path, static_scene
+from pretouch.sim.random_skin import Misplacement, misplaced
 from pretouch.sim.scene import Box, SceneSpec, fixtures
 from pretouch.text_table import TextTable, tabulated
 from pretouch_lab.benchmarks.avoidance.obstacle import Cuboid, nearest

@@ -7,11 +7,11 @@ import mujoco
 import numpy as np
 
 from pretouch.control.path import WayPoints
-from pretouch.control.posture import brought_to
 from pretouch.controller import Controller
 from pretouch.loop import Options, turn
 from pretouch.moving_fixtures import MovingFixtures
 from pretouch.profiles import Profile
+from pretouch.robot.ik import brought_to
 from pretouch.robot.other_arm import OtherArm
 from pretouch.sim.arm_in_world import ArmInWorld
 from pretouch.sim.hand import Hand, HandGoal, PersonArm

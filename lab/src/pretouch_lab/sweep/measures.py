@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Literal, cast
 
 from pretouch.checks import Checked, Positive
-from pretouch.control.approach_restriction import ApproachRestriction
+from pretouch.control.approach import ApproachRestriction
 from pretouch.errors import ExperimentError
 from pretouch.profiles import Profile
 from pretouch_lab.benchmarks.detection.arm import model

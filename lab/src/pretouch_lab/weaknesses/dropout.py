@@ -6,11 +6,9 @@ from itertools import pairwise, product
 import mujoco
 import numpy as np
 
-from pretouch.control.approach_restriction import ApproachRestriction
+from pretouch.control.approach import ApproachRestriction, approach_rows
 from pretouch.control.path import line
-from pretouch.control.qp import solve, task_cost
-from pretouch.control.restriction import approach_rows
-from pretouch.control.task import task
+from pretouch.control.qp import solve, task, task_cost
 from pretouch.perception.closest import no_obstacles
 from pretouch.perception.obstacles import sensor_poses
 from pretouch.profiles import Profile, profile

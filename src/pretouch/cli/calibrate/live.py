@@ -28,8 +28,8 @@ from pretouch.loop import Cycle, MonotonicClock
 from pretouch.ports import Arm
 from pretouch.profiles import PROFILES
 from pretouch.recording.skin_recording import SkinRecording
+from pretouch.robot.description_file import robot_named
 from pretouch.robot.model import RobotModel
-from pretouch.robot.named import robot_named
 from pretouch.sensing.skin import skin_for
 from pretouch.session.motion import Ending, go
 from pretouch.session.units import Units, wait_until_live

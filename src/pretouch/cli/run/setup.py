@@ -13,7 +13,6 @@ from pretouch.cli.skin_keys import keys_file
 from pretouch.cli.writing import check_writable
 from pretouch.contact.sequential_test import SequentialTest
 from pretouch.control.path import Circle, Path, WayPoints, line
-from pretouch.control.posture import brought_to
 from pretouch.controller import Controller
 from pretouch.errors import HardwareError, ParameterError
 from pretouch.hardware.keys import load_keys
@@ -22,8 +21,9 @@ from pretouch.perception.scene_filter import Fixtures, floor_and_pedestal
 from pretouch.ports import Skin as SkinPort
 from pretouch.profiles import Profile
 from pretouch.profiles import profile as find_profile
+from pretouch.robot.description_file import robot_named
+from pretouch.robot.ik import brought_to
 from pretouch.robot.model import RobotModel
-from pretouch.robot.named import robot_named
 from pretouch.sensing.skin import Skin, skin_for
 from pretouch.session.confirmations import state_folder
 from pretouch.session.free_motion import FreeMotion, ModelFile, model_file_of

@@ -1,8 +1,8 @@
 """Contact localisation from the torques that free motion does not explain, with what the skin sees as a prior.
 
 Candidate points on the arm's surface (`robot.surface`) are weighed by how well a force there that pushes inwards
-explains the torques (`single_contact`), times how likely a contact is there beforehand (`prior`). The state is the
-contact so far: what earlier steps said of each candidate. In free motion nothing runs.
+explains the torques (`posterior`), times how likely a contact is there beforehand (`prior`). The state is the contact
+so far: what earlier steps said of each candidate. In free motion nothing runs.
 """
 
 import math
@@ -11,8 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import ByName, entry
-from pretouch.contact.localisation.posterior import ContactArrays, summarise
+from pretouch.cholesky import factor, forward
+from pretouch.compiled import ByName, compiled, entry
+from pretouch.contact.localisation.posterior import Candidates, ContactArrays, log_posterior, summarise
 from pretouch.contact.localisation.prior import (
     LocalisationNumbers,
     SeenNear,
@@ -21,8 +22,7 @@ from pretouch.contact.localisation.prior import (
     hidden_candidates,
     log_prior,
 )
-from pretouch.contact.localisation.significance import independent_part, most_significant
-from pretouch.contact.localisation.single_contact import Candidates, log_posterior
+from pretouch.contact.scatter import LENGTHS
 from pretouch.contact.sequential_detector import Observation, ResidualWindows
 from pretouch.groups import CapsuleArrays, Kinematics, SurfaceArrays
 from pretouch.params import LocalisationParams
@@ -30,6 +30,65 @@ from pretouch.robot.model import RobotModel
 from pretouch.robot.vectors import placed_capsules
 from pretouch.types import NOT_TOUCHED, BoolArray, FloatArray, IntArray, Touched
 from pretouch.values import value
+
+_LENGTHS = np.array(LENGTHS)
+
+
+def independent_part(period: float, p: LocalisationParams) -> float:
+    """Part of a sample, one a period [s], whose noise is not that of the samples before."""
+    return min(1.0, period / p.independent_s)
+
+
+def most_significant_mean(
+    windows: ResidualWindows, period: float, p: LocalisationParams
+) -> tuple[FloatArray, FloatArray] | None:
+    """Return the mean (n,) that stands out most [Nm], and its covariance (n, n) in free motion [Nm^2].
+
+    None where the covariance is not positive definite, or there are no samples.
+    """
+    covariance = np.empty_like(windows.covariance)
+    window, _ = most_significant(windows, independent_part(period, p), 0.0, covariance)
+    return None if window < 0 else (windows.means[window], covariance)
+
+
+@compiled
+def most_significant(windows: ResidualWindows, independent: float, relative: float, S: FloatArray) -> tuple[int, float]:
+    """Return the window with the largest z^T S^-1 z of its mean z, and that value; -1 where there is none.
+
+    `independent` is the part of a sample that says something new. `S` (n, n) is written: the covariance of that mean,
+    with an error of the part `relative` of each joint's torque.
+    """
+    # z^T S^-1 z grows with the window while the torques last, and falls once it holds samples from before the contact
+    n = len(windows.model_variance)
+    L, y, best, window = np.zeros((n, n)), np.empty(n), 0.0, -1
+    for k in range(len(_LENGTHS)):
+        if _LENGTHS[k] > windows.samples:
+            break
+        # without the relative error, which would make every large mean stand out alike
+        _covariance_of_mean(windows, k, independent, 0.0, S)
+        if factor(S, L):
+            square = forward(L, windows.means[k], y)
+            if square > best:
+                best, window = square, k
+    if window >= 0:
+        _covariance_of_mean(windows, window, independent, relative, S)
+    return window, best
+
+
+@compiled
+def _covariance_of_mean(windows: ResidualWindows, k: int, independent: float, relative: float, S: FloatArray) -> None:
+    """Write S = (C + U) / N + (1 - 1 / N) U + diag(relative z)^2 (n, n) of the mean z of window k.
+
+    The noise C averages out over N independent samples, the model's variance U does not; windows hold C + U.
+    """
+    # samples that follow each other closely have the same noise in part: so many of them say something new
+    samples = max(1.0, independent * _LENGTHS[k])
+    mean, variance = windows.means[k], windows.model_variance
+    for i in range(len(mean)):
+        for j in range(len(mean)):
+            S[i, j] = windows.covariance[i, j] / samples
+        S[i, i] += variance[i] * (1.0 - 1.0 / samples) + (relative * mean[i]) ** 2
+
 
 _OVER = 0.5
 """Normalised log-likelihood ratio below which a contact is over: a gap to 1, at which it begins, so that noise does not

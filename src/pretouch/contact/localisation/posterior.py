@@ -1,14 +1,187 @@
-"""What a posterior over candidates comes to: the likeliest body, the point on it, how certain both are."""
+"""How likely a single contact is at each candidate point, and what that comes to: body, point, and their certainty.
+
+With L the Cholesky factor of the torques' covariance S, a force f at the point p of a rigid body makes the torques J^T
+f, which are linear in the wrench w = [f; m] at the body's origin o, m = (p - o) x f: tau = A w with A (n, 6) the same
+for all points of the body. All that a candidate needs is A^T S^-1 A and A^T S^-1 tau of its body, so that thousands of
+candidates cost little.
+
+The force pushes inwards. Across the normal it is Gaussian, mu times as large as along it in each direction; along it,
+its size has a wide prior. It is integrated out in closed form (Laplace), so that candidates are compared by marginal
+likelihood, not by the best fit: a point where any force explains nearly anything pays for it.
+"""
 
 import math
 from typing import NamedTuple
 
 import numpy as np
 
+from pretouch.cholesky import factor, forward
 from pretouch.compiled import compiled
-from pretouch.contact.localisation.single_contact import Candidates
-from pretouch.robot.surface import SPACING_M
-from pretouch.types import FloatArray, IntArray
+from pretouch.contact.localisation.prior import LocalisationNumbers
+from pretouch.groups import Kinematics, SurfaceArrays
+from pretouch.robot.body import SPACING_M
+from pretouch.robot.kinematics import jacobian_into
+from pretouch.types import BoolArray, FloatArray, IntArray
+
+_LEAST_N = 1.0
+"""Force along the normal below which the one across it is no longer made smaller [N]."""
+
+
+class Candidates(NamedTuple):
+    """N points where a contact may be, and the torques it is to explain."""
+
+    torque: FloatArray
+    """(n,) external torques less those of free motion [Nm]."""
+    kin: Kinematics
+    moved_by: BoolArray
+    """(L, n) whether a joint moves a link."""
+    surface: SurfaceArrays
+    point: FloatArray
+    """(N, 3) in the base frame [m]."""
+    normal: FloatArray
+    """(N, 3) outwards there."""
+    log_prior: FloatArray
+    """(N,) of a contact."""
+    p: LocalisationNumbers
+
+
+@compiled
+def log_posterior(S: FloatArray, candidates: Candidates, ln: FloatArray, force: FloatArray) -> bool:
+    """Write ln of prior times marginal likelihood (N,) of a contact at each candidate, and its likeliest force (N, 3).
+
+    Forces are in the base frame [N]. The values compare between covariances S (n, n) of the torques [Nm^2]. With
+    z^T S^-1 z = |L^-1 z|^2 and X what the force explains of it, Student's tails of nu degrees of freedom give
+
+        ln = ln prior - ln det L + ln of the force's freedom - (nu + n) / 2 ln(1 + (z^T S^-1 z - X) / nu).
+
+    Returns whether S is positive definite; else nothing is written.
+    """
+    surface, p, kin, normal = candidates.surface, candidates.p, candidates.kin, candidates.normal
+    position, rotation, link, first = kin.position, kin.rotation, surface.link, surface.first
+    n = len(S)
+    L, y, G, h, u = np.zeros((n, n)), np.empty(n), np.empty((6, 6)), np.empty(6), np.empty((3, 6))
+    if not factor(S, L):
+        return False
+    square, log_det = forward(L, candidates.torque, y), 0.0
+    for j in range(n):
+        log_det += math.log(L[j, j])
+    a, lever = np.empty(3), np.empty(3)
+    for body in range(len(first) - 1):
+        if first[body] == first[body + 1]:
+            continue
+        # links that no joint separates are one body: any of them gives the origin
+        base = link[first[body]]
+        _wrench_information(kin, candidates.moved_by[base], position[base], L, y, G, h)
+        for c in range(first[body], first[body + 1]):
+            k = link[c]
+            for i in range(3):
+                lever[i] = position[k, i] - position[base, i]
+                for j in range(3):
+                    lever[i] += rotation[k, i, j] * surface.point[c, j]
+            # the directions of the force at this candidate, and what the best one along them explains
+            _unit_wrenches(normal[c], lever, u)
+            explained, freedom = _likeliest_force(G, h, u, p.friction, p.force_n, a)
+            rest = max(square - explained, 0.0)  # rounding may take it below 0
+            ln[c] = freedom - 0.5 * (p.tails + n) * math.log1p(rest / p.tails) + (candidates.log_prior[c] - log_det)
+            for i in range(3):
+                force[c, i] = a[0] * u[0, i] + a[1] * u[1, i] + a[2] * u[2, i]
+    return True
+
+
+@compiled
+def _wrench_information(
+    kin: Kinematics, moved: BoolArray, origin: FloatArray, L: FloatArray, y: FloatArray, G: FloatArray, h: FloatArray
+) -> None:
+    """Write G = A^T S^-1 A (6, 6) and h = A^T S^-1 tau (6,) of a body, from W = L^-1 A and y = L^-1 tau.
+
+    A (n, 6) is the transposed Jacobian of the body's origin (3,), moved by the joints `moved` (n,).
+    """
+    n = len(y)
+    J, W = np.empty((6, n)), np.empty((6, n))
+    jacobian_into(kin.anchor, kin.axis, moved, origin, J)
+    for i in range(6):
+        forward(L, J[i], W[i])
+        h[i] = 0.0
+        for j in range(n):
+            h[i] += W[i, j] * y[j]
+        for k in range(i + 1):
+            total = 0.0
+            for j in range(n):
+                total += W[i, j] * W[k, j]
+            G[i, k] = total
+            G[k, i] = total
+
+
+@compiled
+def _unit_wrenches(normal: FloatArray, lever: FloatArray, u: FloatArray) -> None:
+    """Write the wrenches (3, 6) of unit forces inwards and in two directions across, `lever` (3,) from the origin."""
+    x, y, z = normal[0], normal[1], normal[2]
+    u[0, 0], u[0, 1], u[0, 2] = -x, -y, -z
+    # two directions across a unit vector, without a case that is singular (Duff et al. 2017)
+    sign = 1.0 if z >= 0.0 else -1.0
+    a = -1.0 / (sign + z)
+    b = x * y * a
+    u[1, 0], u[1, 1], u[1, 2] = 1.0 + sign * x * x * a, sign * b, -sign * x
+    u[2, 0], u[2, 1], u[2, 2] = b, sign + y * y * a, -y
+    # moments m = lever x f
+    for k in range(3):
+        u[k, 3] = lever[1] * u[k, 2] - lever[2] * u[k, 1]
+        u[k, 4] = lever[2] * u[k, 0] - lever[0] * u[k, 2]
+        u[k, 5] = lever[0] * u[k, 1] - lever[1] * u[k, 0]
+
+
+@compiled
+def _likeliest_force(
+    G: FloatArray, h: FloatArray, u: FloatArray, mu: float, largest: float, a: FloatArray
+) -> tuple[float, float]:
+    """Write the parts (3,) along `u` of the likeliest force [N]; return what it explains and ln of its freedom.
+
+    With g = u G u^T, b = u h, F = `largest` and the prior's precision P = diag(1/F^2, 1/(mu a_0)^2, 1/(mu a_0)^2):
+
+        a = (g + P)^-1 b,    X = b^T a,    freedom = ln[2 Phi(a_0 / sigma_0)] + ln|P| / 2 - ln|g + P| / 2.
+    """
+    g, b = np.empty((3, 3)), np.empty(3)
+    for i in range(3):
+        b[i] = 0.0
+        for k in range(6):
+            b[i] += u[i, k] * h[k]
+        for j in range(i + 1):
+            total = 0.0
+            for k in range(6):
+                part = 0.0
+                for m in range(6):
+                    part += G[k, m] * u[j, m]
+                total += u[i, k] * part
+            g[i, j] = total
+            g[j, i] = total
+    # to begin with, the force that explains most if there is none across
+    size = b[0] / (g[0, 0] + 1.0 / largest**2)
+    normal, across = 1.0 / largest**2, 0.0
+    c00 = c10 = c11 = c20 = c21 = c22 = v0 = v1 = v2 = 0.0
+    # The prior across depends on the size of the force along the normal, which follows from the prior: three rounds
+    # of this fixed point are enough.
+    for _ in range(3):
+        across = 1.0 / (mu * max(size, _LEAST_N)) ** 2
+        # Cholesky factor c of g + P, the tangents first, so that the last pivot is the information on a_0 alone
+        c00 = math.sqrt(g[1, 1] + across)
+        c10 = g[2, 1] / c00
+        c11 = math.sqrt(g[2, 2] + across - c10 * c10)
+        c20 = g[0, 1] / c00
+        c21 = (g[0, 2] - c20 * c10) / c11
+        c22 = math.sqrt(max(g[0, 0] + normal - c20 * c20 - c21 * c21, normal))
+        v0 = b[1] / c00
+        v1 = (b[2] - c10 * v0) / c11
+        v2 = (b[0] - c20 * v0 - c21 * v1) / c22
+        size = v2 / c22
+    # back substitution, the last pivot first
+    a[0] = size
+    a[2] = (v1 - c21 * size) / c11
+    a[1] = (v0 - c10 * a[2] - c20 * size) / c00
+    # v2 = a_0 / sigma_0: 2 Phi of it is the part of the distribution that pushes
+    pushes = math.log(max(1.0 + math.erf(v2 / math.sqrt(2.0)), 1e-30))
+    explained = v0 * v0 + v1 * v1 + v2 * v2
+    return explained, pushes + 0.5 * math.log(normal) + math.log(across) - math.log(c00 * c11 * c22)
+
 
 _NEGLIGIBLE = 12.0
 """Nats below the most likely candidate from which on a candidate is left out."""

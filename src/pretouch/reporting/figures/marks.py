@@ -1,13 +1,20 @@
-"""What the figures of a report draw alike."""
+"""What the figures of a report draw alike, and a figure as part of a page: no file beside it, nothing to fetch."""
 
+from base64 import b64encode
 from collections.abc import Sequence
+from contextlib import AbstractContextManager
+from html import escape
+from io import BytesIO
+from typing import Any
 
+import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pretouch.recording.run_record import MODES
 from pretouch.reporting.course import Course
+from pretouch.reporting.html import Html, element, html
 from pretouch.types import FloatArray, Mode
 
 _MOST_DRAWN = 3000
@@ -71,3 +78,25 @@ def plain(name: str) -> str:
     """Write a name from a file so that Matplotlib shows it as it is: no formula, and not hidden."""
     shown = name.replace("\\", "\\\\").replace("$", r"\$") if "$" in name else name
     return f" {shown}" if shown.startswith("_") else shown
+
+
+_STYLE: Any = {
+    "font.size": 9.0, "axes.labelsize": 9.0, "axes.edgecolor": "#616e7c", "svg.hashsalt": "pretouch",
+    "svg.fonttype": "path", "path.simplify_threshold": 0.3, "axes.formatter.useoffset": False,
+}  # fmt: skip
+
+
+def style() -> AbstractContextManager[None]:
+    """Context in which the figures of a report are made and drawn."""
+    return matplotlib.rc_context(_STYLE)
+
+
+def picture(figure: Figure, text: str) -> Html:
+    """Draw a figure as SVG into the page, with a caption."""
+    image = BytesIO()
+    figure.savefig(
+        image, format="svg", dpi=160, bbox_inches="tight", pad_inches=0.05, metadata={"Date": None, "Creator": None}
+    )
+    data = b64encode(image.getvalue()).decode("ascii")
+    shown = Html(f'<img src="data:image/svg+xml;base64,{data}" alt="{escape(text)}">')
+    return element("figure", Html(shown + element("figcaption", html(text))))

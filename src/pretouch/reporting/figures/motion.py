@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from pretouch.control.approach_restriction import notice_m, of_table_i
+from pretouch.control.approach import notice_m, of_table_i
 from pretouch.recording.run_record import MODES
 from pretouch.reporting.course import Course
 from pretouch.reporting.figures.marks import BLUE, GREEN, GREY, INK, LINES, RED, draw, legend, panels, plain

@@ -8,16 +8,16 @@ import numpy as np
 
 from pretouch.control.path import Path, line
 from pretouch.profiles import Profile
+from pretouch.robot.description_file import robot_named
 from pretouch.robot.model import RobotModel
-from pretouch.robot.named import robot_named
 from pretouch.sensing.skin import Skin, load_skin, paper_skin, skin_for
 from pretouch.sim.hand import HandScript, PersonArm
-from pretouch.sim.misplacement import Misplacement, misplaced
 from pretouch.sim.paper_scenes import Placement, person_scene, static_path, static_scene
 from pretouch.sim.placement import placement_for
 from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams, plant_params_of
 from pretouch.sim.pushes import Visit, Visitor
+from pretouch.sim.random_skin import Misplacement, misplaced
 from pretouch.sim.range_finder import RangeFinderParams
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
 from pretouch.types import ControlStep, FloatArray

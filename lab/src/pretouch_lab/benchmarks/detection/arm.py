@@ -8,16 +8,16 @@ from typing import Any
 import numpy as np
 
 from pretouch.control.path import Circle, Path, WayPoints
-from pretouch.control.posture import brought_to
 from pretouch.controller import Controller
 from pretouch.loop import Cycle, run
 from pretouch.profiles import profile
 from pretouch.robot.description import panda
+from pretouch.robot.ik import brought_to
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, load_skin, paper_skin
-from pretouch.sim.misplacement import Misplacement, misplaced
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.plant_params import PlantParams
+from pretouch.sim.random_skin import Misplacement, misplaced
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import GhostSpec, SceneSpec, fixtures
 from pretouch.types import FloatArray

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from pretouch.control.posture import brought_to
+from pretouch.robot.ik import brought_to
 from pretouch.robot.vectors import placed
 from pretouch.sim.plant import Plant, PointForce
 from pretouch.sim.plant_params import PlantParams

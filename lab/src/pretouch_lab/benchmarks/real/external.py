@@ -10,8 +10,8 @@ from scipy.signal import lfilter
 from pretouch.imported_data.log import Choice, Log
 from pretouch.imported_data.torques import TorqueRecording, observed, torque_recording
 from pretouch.params import SequentialParams
+from pretouch.robot.description_file import robot_named
 from pretouch.robot.model import RobotModel
-from pretouch.robot.named import robot_named
 from pretouch.types import BoolArray, FloatArray, IntArray
 from pretouch.values import value
 from pretouch_lab.benchmarks.real.sets import RealSet, Run

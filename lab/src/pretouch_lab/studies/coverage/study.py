@@ -8,8 +8,7 @@ from itertools import product
 import numpy as np
 
 from pretouch.control.path import Circle
-from pretouch.coverage.measure import covered
-from pretouch.coverage.measuring import POINTS, Setting
+from pretouch.coverage.measure import POINTS, Setting, covered
 from pretouch.coverage.params import CoverageParams
 from pretouch.coverage.suggest import candidates, suggest
 from pretouch.coverage.surface import surface_of
