@@ -1,6 +1,6 @@
 """Contact localisation from the torques that free motion does not explain, with what the skin sees as a prior.
 
-Candidate points on the arm's surface (`robot.surface`) are weighed by how well a force there that pushes inwards
+Candidate points on the arm's surface (`robot.body`) are weighed by how well a force there that pushes inwards
 explains the torques (`posterior`), times how likely a contact is there beforehand (`prior`). The state is the contact
 so far: what earlier steps said of each candidate. In free motion nothing runs.
 """
