@@ -24,8 +24,6 @@ def test_tasks_take_all_cells_once_seed_by_seed():
     assert len(tasks) == 2 * (8 + 2)
     assert [seed for _, seed in tasks] == [0] * 10 + [1] * 10
     assert len({trial_file(Path("x"), *task) for task in tasks}) == 20
-    named_twice = Request(("release",), 1, profiles=("paper", "paper:react.decay_cycles=50")).trials()
-    assert len({cell.name for cell, _ in named_twice}) == len(named_twice)
 
 
 @pytest.mark.parametrize("own", [True, False])

@@ -11,12 +11,8 @@ from pretouch_lab.paper.whole import whole_paper
 from pretouch_lab.registry import EXPERIMENTS
 
 SENSING = [("paper", "slack"), ("pretouch", "braking")]
-DECAYING = [("paper:react.decay_cycles=50", "slack"), ("paper:react.decay_cycles=25", "slack")]
-KEPT = ("", ":perception.persistence_s=0.04", ":perception.persistence_s=0.021")
 CELLS = {
     "avoidance": ([("blind", "off"), *SENSING], ["beside", "inside"]),
-    "release": ([*SENSING, *DECAYING], [0.3, 1.0, 2.0, 3.0, 4.0]),
-    "dropout": ([(name + kept, mode) for name, mode in SENSING for kept in KEPT], [0, 1, 2, 3, 5, 10, 20]),
     "coverage": (list(product(("paper", "pretouch"), ("own", "suggested", "random"))), ["moving", "standing"]),
     "two-arms": (SENSING, ["blind", "seen", "told"]),
 }

@@ -1,1 +1,1 @@
-"""What proves Pretouch: the paper's experiments, weaknesses, benchmarks, sweeps and studies."""
+"""What proves Pretouch: the paper's experiments, benchmarks, sweeps and studies."""

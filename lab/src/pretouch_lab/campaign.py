@@ -95,8 +95,7 @@ class Request:
         """Every trial once, seed by seed, so that a stopped run has some of each cell."""
         grid = Grid(self.profiles, self.restrictions, self.stiffness)
         cells = [cell for name in self.experiments for cell in EXPERIMENTS[name].cells(grid)]
-        once = list({cell.name: cell for cell in cells}.values())
-        return [(cell, seed) for seed in range(self.first_seed, self.first_seed + self.seeds) for cell in once]
+        return [(cell, seed) for seed in range(self.first_seed, self.first_seed + self.seeds) for cell in cells]
 
     def tasks(self, out: Path) -> list[Task]:
         """Return the trials as tasks that keep their rows in a folder; their cost is simulated time [s]."""

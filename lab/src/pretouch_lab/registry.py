@@ -9,7 +9,6 @@ from pretouch_lab.paper.claims import between
 from pretouch_lab.rows import Row
 from pretouch_lab.studies import mounting, two_arms
 from pretouch_lab.studies.coverage import study as coverage
-from pretouch_lab.weaknesses import dropout, endless, release
 
 EXPERIMENTS: dict[str, Experiment] = {
     experiment.name: experiment
@@ -18,9 +17,6 @@ EXPERIMENTS: dict[str, Experiment] = {
         avoidance.EXPERIMENT,
         dynamic.EXPERIMENT,
         between.EXPERIMENT,
-        release.EXPERIMENT,
-        endless.EXPERIMENT,
-        dropout.EXPERIMENT,
         mounting.EXPERIMENT,
         coverage.EXPERIMENT,
         two_arms.EXPERIMENT,

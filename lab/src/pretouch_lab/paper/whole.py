@@ -7,9 +7,7 @@ from pretouch_lab.campaign import Request
 _PROFILES = ("blind", "paper", "slowing-only", "thresholds-only", "paper-0.5m")
 _STIFFNESS = (2_000.0, 25_000.0, 75_000.0, 300_000.0)
 _MODES = ("hard", "slack", "floor")
-_STUDIES = {
-    "between": 12, "release": 10, "endless": 4, "dropout": 12, "mounting": 6, "coverage": 4, "two-arms": 3,
-}  # fmt: skip
+_STUDIES = {"between": 12, "mounting": 6, "coverage": 4, "two-arms": 3}
 """Studies beside the paper's experiments, each with its number of seeds: together half an hour."""
 
 

@@ -1,1 +1,0 @@
-"""The paper's weaknesses, each with its run and its number."""
