@@ -38,7 +38,7 @@ class Cusum(pt.Detector, name="cusum"):
 
 arm = pt.RobotModel(pt.panda())
 profile = replace(pt.profile("blind"), name="blind with a cumulative sum", detect=Cusum())
-control = pt.Controller(arm, pt.Skin((), arm), pt.no_fixtures(), pt.line((0.3, 0.0, 0.5), (0.3, 0.2, 0.5)), profile)
+control = pt.Controller(arm, pt.Skin((), arm), pt.no_fixtures(), pt.segment((0.3, 0.0, 0.5), (0.3, 0.2, 0.5)), profile)
 rng, q, rest, state, said = np.random.default_rng(0), arm.description.q_ready, np.zeros(7), None, ""
 for i in range(300):
     push = np.array([0.0, -8.0, 0.0]) if i >= 200 else np.zeros(3)

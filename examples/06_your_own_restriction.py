@@ -59,7 +59,7 @@ def main() -> None:
     """Follow a line into a board for six seconds, with the profile's own restriction left out and with this one."""
     model = pt.RobotModel(pt.panda())
     ready = model.kinematics(model.description.q_ready).position[model.ee]
-    path = pt.line(tuple(ready), tuple(ready + np.array([0.0, 0.4, 0.0])))
+    path = pt.segment(tuple(ready), tuple(ready + np.array([0.0, 0.4, 0.0])))
     board = Box("board", center=(ready[0], ready[1] + 0.45, ready[2]), half_size=(0.2, 0.02, 0.2), stiffness=25_000.0)
     skin = pt.paper_skin(model)
     for part in (None, Separation()):

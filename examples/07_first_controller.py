@@ -27,7 +27,7 @@ room = pt.SceneSpec(boxes=(board,))
 # the simulated arm and its sensors; the controller knows the room's floor, and nothing of the board
 plant = pt.Plant(arm, room, pt.PlantParams(), pt.brought_to(arm, np.array(start)), seed=1)
 sensors = pt.RangeFinders(plant, skin, pt.RangeFinderParams(), seed=1)
-controller = pt.Controller(arm, skin, pt.fixtures(room), pt.line(start, end), pt.profile("pretouch"))
+controller = pt.Controller(arm, skin, pt.fixtures(room), pt.segment(start, end), pt.profile("pretouch"))
 
 
 class Narrator:

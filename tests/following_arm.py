@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pretouch.control.path import Path, line
+from pretouch.control.path import Path, segment
 from pretouch.controller import Controller
 from pretouch.loop import Cycle
 from pretouch.perception.scene_filter import no_fixtures
@@ -24,7 +24,7 @@ class Arm:
         self.model, self.skin = model, skin
         self.q, self.qd, self.time = model.description.q_ready.copy(), np.zeros(7), 0.0
         x = self.ee()
-        path = path or line(tuple(x), (x[0], x[1] + 0.4, x[2]))
+        path = path or segment(tuple(x), (x[0], x[1] + 0.4, x[2]))
         self.controller = Controller(model, skin, no_fixtures(), path, profile)
         self.state = self.controller.init(self.robot())
 

@@ -1,13 +1,10 @@
 """Compiled functions are kept under a name that tells all of them, and work where nothing can be kept."""
 
-import inspect
 import os
 import shutil
 import subprocess
 import sys
-from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -113,89 +110,22 @@ def test_an_installation_nobody_can_write_to_works(tmp_path: Path):
     assert str(home) in said
 
 
-class Pose(NamedTuple):
-    """A group."""
-
-    place: np.ndarray
-    turned: float
-
-
-class Both(NamedTuple):
-    """A group that holds one, and more."""
-
-    pose: Pose
-    size: int
-
-
-@dataclass
-class Described:
-    """What has the fields of `Pose`, and others."""
-
-    name: str
-    turned: float
-    place: np.ndarray
-
-
-def weighed(both: Both, pose: compiled.ByName[Pose], factor: float) -> float:
-    """Make a number of all that is given."""
-    return (both.pose.place[0] + both.pose.turned) * both.size + factor * pose.place[1] * pose.turned
-
-
-GIVEN = Both(Pose(np.array([1.0, 2.0]), 0.5), 3), Described("other", 0.25, np.array([4.0, 8.0])), 10.0
-
-
-def test_an_entry_takes_groups_and_whatever_has_their_fields():
-    entry = compiled.entry(weighed)
-    assert entry(*GIVEN) == weighed(*GIVEN) == 24.5
-    assert entry(GIVEN[0], factor=10.0, pose=GIVEN[0].pose) == 4.5 + 10.0
-    assert entry.__doc__ == weighed.__doc__
-
-
-def test_generated_functions_stand_where_the_true_one_does():
-    # from Python 3.13 on Numba reads the text from a function's first line, and whatever stands there must be one
-    entry = compiled.entry(weighed)
-    assert inspect.getsource(entry.flat.py_func) == inspect.getsource(weighed)  # type: ignore[attr-defined]
-
-
-def test_what_an_entry_lacks_is_named():
-    entry = compiled.entry(weighed)
-    with pytest.raises(TypeError, match=r"weighed\(\) missing 1 required positional argument: 'factor'"):
-        entry(*GIVEN[:2])
-    with pytest.raises(AttributeError, match="no attribute 'place'"):
-        entry(GIVEN[0], np.zeros(2), 1.0)
-    with pytest.raises(TypeError, match="not enough arguments: expected 6, got 5"):
-        entry(Both(Pose(np.zeros(2), 0.5)[:1], 3), GIVEN[1], 1.0)  # type: ignore[arg-type]
-
-    def bare(x):
-        return x
-
-    with pytest.raises(TypeError, match=r"bare\(\) has no type for x"):
-        compiled.entry(bare)
-
-
 MODULE = """
-from typing import NamedTuple
-import numpy as np
 from pretouch.callee import multiplied
-from pretouch.compiled import entry
+from pretouch.compiled import compiled
 
-class Group(NamedTuple):
-    x: np.ndarray
-
-@entry
-def body(group: Group, y: float) -> float:
-    return multiplied(group.x[0]) + y
+@compiled
+def body(x: float, y: float) -> float:
+    return multiplied(x) + y
 """
 CALLEE = "from pretouch.compiled import compiled\n\n@compiled\ndef multiplied(x: float) -> float:\n    return 2.0 * x\n"
 CALL = """
-import numpy as np
-from pretouch.module import Group, body
-found = body(Group(np.ones(2)), 1.0)
-print(found, sum(body.__globals__["_flat"].stats.cache_hits.values()))
+from pretouch.module import body
+print(body(1.0, 1.0), sum(body.stats.cache_hits.values()))
 """
 
 
-def test_an_entry_is_kept_between_processes_until_what_it_calls_changes(tmp_path: Path):
+def test_a_function_is_kept_between_processes_until_what_it_calls_changes(tmp_path: Path):
     package = tmp_path / "pretouch"
     package.mkdir()
     (package / "__init__.py").touch()

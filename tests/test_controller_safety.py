@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pretouch.control.approach import ApproachRestriction
-from pretouch.control.path import Circle, Path, line
+from pretouch.control.path import Circle, Path, segment
 from pretouch.loop import Cycle
 from pretouch.profiles import PROFILES, Profile
 from pretouch.robot.model import RobotModel
@@ -121,7 +121,7 @@ def test_no_reported_velocity_makes_a_command_no_arm_can_follow(arm: Arm, value:
 @pytest.mark.parametrize("cycles", [1, 2, 4])
 def test_reports_that_come_late_cost_no_limit(panda_model: RobotModel, cycles: int, goal: tuple[float, float, float]):
     # a report that is 40 ms old is still believed; braking only for where the arm was by then is too late
-    arm = Arm(panda_model, Skin([], panda_model), path=line(hand(panda_model), goal))
+    arm = Arm(panda_model, Skin([], panda_model), path=segment(hand(panda_model), goal))
     reports = [arm.robot()] * (cycles + 1)
     for _ in range(800):
         reports.append(arm.robot())
@@ -226,7 +226,7 @@ def test_a_path_out_of_reach_ends_within_the_limits(
     panda_model: RobotModel, paper_skin: Skin, goal: tuple[float, float, float]
 ):
     # a stretched arm is singular, and one folded into itself meets its joint limits
-    arm = Arm(panda_model, paper_skin, path=line(hand(panda_model), goal))
+    arm = Arm(panda_model, paper_skin, path=segment(hand(panda_model), goal))
     for _ in range(800):
         step = arm.step()
         arm.check_position_and_velocity()

@@ -219,7 +219,7 @@ def test_while_the_arm_yields_its_orientation_is_held_and_not_turned_to_what_is_
     run = Commanded(panda_model, asks=asks, seconds=4.0, arm=Pushed)
     yielding = [k for k, step in enumerate(run.steps) if step.mode is Mode.REACT]
     assert len(yielding) > 20
-    goals = {run.cycles[k].after.rotation_goal.tobytes() for k in yielding}
+    goals = {run.cycles[k].after.memory.get("rotation_goal").tobytes() for k in yielding}
     assert len(goals) == 1
 
 

@@ -96,7 +96,7 @@ def test_names_in_the_notation_exist():
     for owner, name in re.findall(r"`(\w+)\.(\w+)(?:\.min\(\))?`", text):
         if owner[0].isupper() and owner != "RobotModel":
             modules = (
-                "pretouch.types", "pretouch.params", "pretouch.control.reduction",
+                "pretouch.types", "pretouch.params", "pretouch.control.path",
                 "pretouch.control.approach", "pretouch.contact.window",
                 "pretouch.contact.residual_model", "pretouch.contact.moving_thresholds",
                 "pretouch.contact.sequential_test", "pretouch.contact.decaying_velocity",

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from pretouch import loop
 from pretouch.control.path import Circle
 from pretouch.controller import Controller
+from pretouch.faults import keep_watch
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import profile
 from pretouch.robot.model import RobotModel
@@ -219,8 +220,9 @@ def drawn(rng: np.random.Generator, step_size: np.ndarray, late: float) -> Lie:
 def test_what_the_commands_of_late_explain_is_believed_as_it_is(panda_model, arm):
     control = controller(panda_model, "paper")
     robot, state = arm.read(), control.init(arm.read())
-    state.watch.sent, state.watch.stamp = tuple((0.01 * k, np.full(7, 0.1 * k)) for k in range(4)), 0.03
-    state.command = np.full(7, 0.4)
+    sent = tuple((0.01 * k, np.full(7, 0.1 * k)) for k in range(4))
+    keep_watch(state.memory, replace(state.watch, sent=sent, stamp=0.03))
+    state.memory.put("command", np.full(7, 0.4))
 
     def believed(qd: np.ndarray, now: float = 0.04) -> np.ndarray:
         return loop.explained(control, state, replace(robot, qd_commanded=qd), now).qd_commanded
@@ -230,8 +232,9 @@ def test_what_the_commands_of_late_explain_is_believed_as_it_is(panda_model, arm
         np.testing.assert_array_equal(believed(honest), honest)
     np.testing.assert_array_equal(np.isnan(believed(0.4 + 1.1 * step * np.eye(7)[2])), np.eye(7)[2] == 1)
     # a loop that was late finds an arm that has braked in the meantime, but none that has sped up or turned round
-    fast = state.command = np.full(7, 1.5)
-    state.watch.sent = ((0.03, fast),)
+    fast = np.full(7, 1.5)
+    state.memory.put("command", fast)
+    keep_watch(state.memory, replace(state.watch, sent=((0.03, fast),)))
     for braked in (fast - 4.9 * step, fast + step):
         np.testing.assert_array_equal(believed(braked, now=0.08), braked)
     for other in (fast - 1.1 * step, fast + 1.1 * step):

@@ -7,14 +7,13 @@ import pytest
 
 from pretouch.desired import Desired, DesiredKind, sound_desired, twist
 from pretouch.errors import ParameterError
-from pretouch.faults import Watch, examine, sound_points, sound_touch, watch_init
+from pretouch.faults import Watch, examine, watch_init
 from pretouch.modes import Event
-from pretouch.moving_fixtures import MovingFixtures
 from pretouch.params import FailureParams
-from pretouch.payload import Payload
 from pretouch.perception.moving import sound_moving
 from pretouch.sensing.sensor import PAPER_SENSOR
-from pretouch.types import Inputs, RangeReadings, RobotState, SeenPoints, TouchReadings
+from pretouch.sound import sound_points, sound_touch
+from pretouch.types import Inputs, MovingFixtures, Payload, RangeReadings, RobotState, SeenPoints, TouchReadings
 
 PARAMS = FailureParams()  # state older than 0.05 s, step more than 0.05 s after the last, no force for 0.2 s
 PERIOD = 0.01
@@ -225,9 +224,9 @@ def test_complex_numbers_are_no_torque_touch_points_motion_fixtures_or_load():
     for name in ("stamp", "force"):
         assert sound_touch(replace(touch, **{name: z}), 2) == (None, "touch readings are not arrays of numbers")
     for name, part in {"heard": z[0], "stamp": z, "point": np.zeros((2, 3), complex), "sigma": z}.items():
-        assert sound_points(replace(points, **{name: part})) == (None, "gives something other than arrays of numbers")
+        assert sound_points(points._replace(**{name: part})) == (None, "gives something other than arrays of numbers")
     for name, part in {"stamp": z[0], "radius": z[:1], "a": np.zeros((1, 3), complex)}.items():
-        assert sound_moving(replace(moving, **{name: part}), 1.0, 1.0) == (None, "are not arrays of numbers")
+        assert sound_moving(moving._replace(**{name: part}), 1.0, 1.0) == (None, "are not arrays of numbers")
     for name, part in {"stamp": z[:1], "number": z[None]}.items():
         assert "holds no kind, stamps and numbers" in sound_desired(replace(wanted, **{name: part}), 2, 1.0)[1]
     with pytest.raises(ParameterError, match="is no payload: give numbers"):

@@ -8,8 +8,7 @@ import pytest
 from pretouch.contact.admittance import Admittance
 from pretouch.contact.decaying_velocity import DecayingVelocity
 from pretouch.contact.moving_thresholds import MovingThresholds
-from pretouch.control.approach import ApproachRestriction
-from pretouch.control.braking_curve import BrakingCurve
+from pretouch.control.approach import ApproachRestriction, BrakingCurve
 from pretouch.errors import ParameterError, PretouchError
 from pretouch.params import (
     ClampParams,

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pretouch.contact.window import WindowState, add_force, window_init
+from pretouch.contact.window import Window, add_force, window_init
 from pretouch.errors import ParameterError
 from pretouch.profiles import PROFILES, Profile, at_rate
 
@@ -37,7 +37,7 @@ def test_all_else_stays():
 def pushed(profile: Profile, seconds: float, force: float = 100.0) -> float:
     """The newest value in a window that was filled with no force, after a push of `seconds` [N]."""
     p = profile.window
-    window: WindowState = window_init(p.samples)
+    window: Window = window_init(p.samples)
     for _ in range(p.samples):
         window = add_force(window, np.zeros(3), p)
     for _ in range(round(seconds / profile.task.control_period_s)):

@@ -5,11 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pretouch.control.braking import slots_init, widened
+from pretouch.control.braking import Slots, slots_init, widened
 from pretouch.explanation import explain
-from pretouch.faults import MOST_POINTS, sound_points
 from pretouch.limited import Limit
-from pretouch.moving_fixtures import SOMEWHERE, MovingFixtures
 from pretouch.params import OutsidePoints
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import PROFILES
@@ -19,7 +17,8 @@ from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify
 from pretouch.recording.writer import Recording
 from pretouch.sensing.skin import Skin
-from pretouch.types import Mode, SeenPoints
+from pretouch.sound import MOST_POINTS, sound_points
+from pretouch.types import SOMEWHERE, Mode, MovingFixtures, SeenPoints
 from tests.following_arm import PAPER, Arm
 from tests.fuzz.invariants import same
 from tests.recording.runs import Run, controller_of
@@ -33,6 +32,11 @@ def seen(now: float, *point, sigma: float = 0.005) -> SeenPoints:
     return SeenPoints(now, np.full(len(at), now), at, np.full(len(at), sigma))
 
 
+def of_units(part: np.ndarray) -> np.ndarray:
+    """What slots hold of the skin's units, be there room for points from outside or not."""
+    return part.reshape(2, -1, *part.shape[1:])[:, :7]
+
+
 @pytest.mark.parametrize(("one", "other", "given"), [(PAPER, PAPER, True), (PRETOUCH, DEAF, False)])
 def test_a_profile_that_takes_no_points_and_one_without_a_source_do_the_same_to_the_bit(
     panda_model, paper_skin, one, other, given
@@ -41,7 +45,10 @@ def test_a_profile_that_takes_no_points_and_one_without_a_source_do_the_same_to_
     for _ in range(150):
         points = seen(beside.time, beside.ee() + np.array([0.0, 0.2, 0.0])) if given else None
         assert same(plain.step(), beside.step(points=points))
-    assert same(plain.state, beside.state)
+    mine, other = plain.state.memory, beside.state.memory
+    assert same(replace(plain.state, memory=other, quick=beside.state.quick), beside.state)
+    assert same(*(tuple(map(of_units, memory.part("slots", Slots))) for memory in (mine, other)))
+    assert all(same(mine.get(path), other.get(path)) for path in mine.places if not path.startswith("slots."))
 
 
 @pytest.mark.parametrize("units", [7, 0])

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from pretouch.controller import Controller
-from pretouch.faults import sound_touch
 from pretouch.loop import turn
 from pretouch.ports import touch_of
 from pretouch.profiles import PROFILES, profile
@@ -17,6 +16,7 @@ from pretouch.recording.writer import Recording
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit, TouchPatch
+from pretouch.sound import sound_touch
 from pretouch.types import Inputs, Mode, TouchReadings, TouchStatus
 from tests.fuzz.invariants import same
 from tests.recording.runs import Run, controller_of, custom_arm

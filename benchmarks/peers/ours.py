@@ -9,7 +9,7 @@ from benchmarks.peers.problem import TERMS, Problem
 
 from pretouch.control.approach import approach_rows
 from pretouch.control.joint_box import JointLimits, brake, joint_box
-from pretouch.control.path import line
+from pretouch.control.path import segment
 from pretouch.control.qp import solve, task_cost
 from pretouch.controller import Controller, ControllerState
 from pretouch.params import RestrictionParams, TaskParams
@@ -123,7 +123,9 @@ class Step:
         """Put a skin on the arm with what its units read [m], NaN for no target, and run until the arm tracks."""
         paper = profile(f"paper:task.orientation=free:{rows}")
         x = self.model.kinematics(self.problem.q[0]).position[self.model.ee]
-        self.controller = Controller(self.model, skin, no_fixtures(), line(tuple(x), (x[0], x[1] + 0.4, x[2])), paper)
+        self.controller = Controller(
+            self.model, skin, no_fixtures(), segment(tuple(x), (x[0], x[1] + 0.4, x[2])), paper
+        )
         self.distance = distance
         self.status = np.where(np.isnan(distance), int(RangeStatus.SIGNAL), int(RangeStatus.OK))
         self.state = self._armed()

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from ros2.tests.asking import turned
 
-from pretouch.control.path import line
+from pretouch.control.path import segment
 from pretouch.controller import Controller
 from pretouch.errors import RobotError
 from pretouch.perception.scene_filter import no_fixtures
@@ -27,7 +27,7 @@ PUSH_N = 25.0
 def run(panda_model, paper_skin, node, arm):
     """An arm and its units, over which a controller is turned until something has happened."""
     x, y, z = panda_model.kinematics(panda_model.description.q_ready).position[panda_model.ee]
-    path = line((x, y, z), (x, y + 0.4, z))
+    path = segment((x, y, z), (x, y + 0.4, z))
     controller = Controller(panda_model, paper_skin, no_fixtures(), path, PROFILES["paper"])
     with (
         Ros2Robot(ArmParams("by-robot", "base"), panda_model, node) as robot,

@@ -14,7 +14,7 @@ from ros2.tests.arm_peer import speeds
 from ros2.tests.asking import MESSAGES, NAMES, SLOW, publishing, trajectory, turned, twist
 from ros2.tests.test_messages import Drawn
 
-from pretouch.control.path import line
+from pretouch.control.path import segment
 from pretouch.controller import Controller
 from pretouch.desired import Desired, DesiredKind, sound_desired
 from pretouch.errors import ParameterError, RobotError
@@ -171,7 +171,7 @@ def driven(
         commander = Ros2Commander(params, robot, model, node)
         x, y, z = model.kinematics(robot.read().q).position[model.ee].tolist()
         chosen = profile("pretouch:perception=none:failure.state_timeout_s=1")
-        controller = Controller(model, Skin((), model), no_fixtures(), line((x, y, z), (x, y + 0.4, z)), chosen)
+        controller = Controller(model, Skin((), model), no_fixtures(), segment((x, y, z), (x, y + 0.4, z)), chosen)
         robot.begin()
         return turned(controller, robot, NoUnits(), done, desired=commander)
 

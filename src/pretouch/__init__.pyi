@@ -3,6 +3,7 @@
 from pretouch import desired as desired
 from pretouch import loop as loop
 from pretouch import realtime as realtime
+from pretouch.arms.other_arm import OtherArm as OtherArm
 from pretouch.composition import describe as describe
 from pretouch.contact.admittance import Admittance as Admittance
 from pretouch.contact.decaying_velocity import DecayingVelocity as DecayingVelocity
@@ -26,7 +27,7 @@ from pretouch.control.joint_box import joint_limits as joint_limits
 from pretouch.control.path import Circle as Circle
 from pretouch.control.path import Path as Path
 from pretouch.control.path import WayPoints as WayPoints
-from pretouch.control.path import line as line
+from pretouch.control.path import segment as segment
 from pretouch.controller import Controller as Controller
 from pretouch.controller import ControllerState as ControllerState
 from pretouch.desired import Desired as Desired
@@ -34,16 +35,14 @@ from pretouch.errors import PretouchError as PretouchError
 from pretouch.errors import RecordingError as RecordingError
 from pretouch.explanation import explain as explain
 from pretouch.groups import Kinematics as Kinematics
+from pretouch.groups import no_obstacles as no_obstacles
 from pretouch.limited import Limit as Limit
 from pretouch.limited import Limited as Limited
 from pretouch.loop import Cycle as Cycle
 from pretouch.loop import MonotonicClock as MonotonicClock
 from pretouch.loop import Recorder as Recorder
-from pretouch.moving_fixtures import MovingFixtures as MovingFixtures
 from pretouch.params import WindowParams as WindowParams
-from pretouch.payload import Payload as Payload
 from pretouch.perception.closest import closest_points as closest_points
-from pretouch.perception.closest import no_obstacles as no_obstacles
 from pretouch.perception.scene_filter import Fixtures as Fixtures
 from pretouch.perception.scene_filter import no_fixtures as no_fixtures
 from pretouch.profiles import PROFILES as PROFILES
@@ -60,7 +59,6 @@ from pretouch.robot.description import fr3 as fr3
 from pretouch.robot.description import panda as panda
 from pretouch.robot.ik import brought_to as brought_to
 from pretouch.robot.model import RobotModel as RobotModel
-from pretouch.robot.other_arm import OtherArm as OtherArm
 from pretouch.sensing.skin import Skin as Skin
 from pretouch.sensing.skin import load_skin as load_skin
 from pretouch.sensing.skin import paper_skin as paper_skin
@@ -86,7 +84,9 @@ from pretouch.types import Contact as Contact
 from pretouch.types import ControlStep as ControlStep
 from pretouch.types import Inputs as Inputs
 from pretouch.types import Mode as Mode
+from pretouch.types import MovingFixtures as MovingFixtures
 from pretouch.types import Obstacles as Obstacles
+from pretouch.types import Payload as Payload
 from pretouch.types import RangeReadings as RangeReadings
 from pretouch.types import RangeStatus as RangeStatus
 from pretouch.types import RobotState as RobotState

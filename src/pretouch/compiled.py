@@ -4,10 +4,8 @@ import logging
 import sys
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
-from inspect import signature
 from pathlib import Path
-from typing import Annotated, Any, Protocol, TypeVar, cast
+from typing import Any, TypeVar, cast
 
 from numba import njit
 from numba.core import event
@@ -18,8 +16,6 @@ from pretouch.errors import SourceError
 from pretouch.source_digest import source_digest
 
 Function = TypeVar("Function", bound=Callable[..., object])
-Result = TypeVar("Result")
-Group = TypeVar("Group")
 
 
 def compiled(function: Function) -> Function:
@@ -64,103 +60,9 @@ class _Cache(FunctionCache):
             super().save_overload(sig, data)  # type: ignore[no-untyped-call]
 
 
-class Entry(Protocol[Result]):
-    """What `entry` makes: called with groups, or by `flat` with each of their fields, in order."""
-
-    flat: Callable[..., Result]
-
-    def __call__(self, *groups: Any, **named: Any) -> Result:
-        """Call with groups."""
-
-
-def entry(function: Callable[..., Result]) -> Entry[Result]:
-    """Compile a function that Python calls, whose parameters may be groups: classes made with `NamedTuple`.
-
-    In the function a group is that named tuple, and may be handed on to other compiled functions. The caller gives one
-    too, or a plain tuple of the same fields, which is made in a tenth of the time; or, for a parameter annotated with
-    `ByName[Group]`, any object that has its fields, such as a dataclass. Groups may hold groups.
-
-    Numba takes 4 to 6 us to read forty arrays out of named tuples, and 1.5 us if each is an argument of its own. So two
-    functions are generated: one in Python that takes the groups apart, which costs 1 us of forty arrays, and a compiled
-    one that puts them together. Calls that each step makes hand the fields to that one, `flat`, themselves; groups that
-    stay the same come last, `flattened` once.
-    """
-    name, scope = function.__name__, dict[str, Any](__name__=function.__module__)
-    parameters = signature(function).parameters
-    taken = []
-    for parameter in parameters:
-        if parameter not in function.__annotations__:
-            raise TypeError(f"{name}() has no type for {parameter}: annotate it, so that its group is known.")
-        taken.append(_Taken.of(parameter, function.__annotations__[parameter], scope))
-    called_by_python = (
-        f"def {name}({', '.join(parameters)}):\n"
-        f"{''.join(line for t in taken for line in t.before)}"
-        f"    return _flat(*({' + '.join(t.apart for t in taken)}))\n"
-    )
-    flat = (
-        f"def {name}_flat({', '.join(argument for t in taken for argument in t.arguments)}):\n"
-        f"    return _body({', '.join(t.together for t in taken)})\n"
-    )
-    # Numba keeps what it compiles beside the file that a function's code names, and reads the text there that begins at
-    # the code's first line: both generated functions stand where the true one does.
-    above = "\n" * (function.__code__.co_firstlineno - 1)
-    for text in (called_by_python, flat):
-        exec(compile(above + text, function.__code__.co_filename, "exec"), scope)  # noqa: S102  of names of parameters
-    called = scope[name]
-    called.__doc__, called.__wrapped__ = function.__doc__, function
-    scope["_body"] = inlined(function)
-    scope["_flat"] = called.flat = compiled(scope[f"{name}_flat"])
-    return cast(Entry[Result], called)
-
-
-def flattened(*groups: Any) -> tuple[Any, ...]:
-    """Return the fields of groups, those of groups in groups too, for `Entry.flat`."""
-    fields: list[Any] = []
-    for group in groups:
-        fields += flattened(*group) if isinstance(group, tuple) else (group,)
-    return tuple(fields)
-
-
-ByName = Annotated[Group, "given as any object that has the fields of the group"]
-"""Annotates a parameter of an `entry`."""
-
-
-@dataclass(frozen=True)
-class _Taken:
-    """How a parameter, or a field of a group, is handed over."""
-
-    before: list[str]
-    """Lines of Python that unpack groups of groups."""
-    apart: str
-    """Tuple that Python hands over."""
-    arguments: list[str]
-    """Names under which that arrives."""
-    together: str
-    """What the compiled function is given, made of these."""
-
-    @classmethod
-    def of(cls, name: str, kind: Any, scope: dict[str, Any]) -> "_Taken":
-        """Take what has a name and a type; the classes of groups are noted in `scope`."""
-        by_name, kind = hasattr(kind, "__metadata__"), getattr(kind, "__origin__", kind)
-        if not hasattr(kind, "_fields"):
-            return cls([], f"({name},)", [name], name)
-        group, names = f"{kind.__name__}_{len(scope)}", [f"{name}__{field}" for field in kind._fields]
-        scope[group] = kind
-        parts = [cls.of(n, kind.__annotations__[f], scope) for n, f in zip(names, kind._fields, strict=True)]
-        if all(part.together == n for part, n in zip(parts, names, strict=True)):
-            before, apart = [], name
-            if by_name:
-                apart = f"({''.join(f'{name}.{field}, ' for field in kind._fields)})"
-        else:
-            before = [f"    {', '.join(names)} = {name}\n", *(line for part in parts for line in part.before)]
-            apart = " + ".join(part.apart for part in parts)
-        arguments = [argument for part in parts for argument in part.arguments]
-        return cls(before, apart, arguments, f"{group}({', '.join(part.together for part in parts)})")
-
-
 def is_large(told: event.Event) -> bool:
-    """Return whether an event "numba:compile" of Numba is about an `entry`, which may take a minute."""
-    return bool(told.data["dispatcher"].py_func.__name__.endswith("_flat"))
+    """Return whether an event "numba:compile" of Numba is about a part of a control step, which may take a minute."""
+    return told.data["dispatcher"].py_func.__name__ in ("line", "perceive", "assess_sample", "move_within")
 
 
 class FirstStart(event.Listener):

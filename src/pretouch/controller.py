@@ -1,47 +1,39 @@
-"""From a reading to a joint velocity: the paper on one page.
+"""From a reading to a joint velocity.
 
-`Controller.step(state, inputs) -> (ControlStep, state)` is pure: no clock, no file, no memory beside the state.
+`Controller.step(state, inputs) -> (ControlStep, state)` is pure: no clock, no file, no memory beside the state. Nearly
+every step is one call of `line`. Where something happened, a part is in plain Python, or inputs are out of the usual,
+`decision` takes the same stages one by one.
 """
 
-from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from pretouch import faults
-from pretouch.contact.announced_load import LoadState, announced, kept_free, most_kg, without_load
-from pretouch.contact.detector import Body, Detection, Sample
-from pretouch.contact.reaction import ReactionInputs, ReactionMotion
+from pretouch.contact.announced_load import LoadState, most_kg
+from pretouch.contact.detector import Body
+from pretouch.contact.model_update import SequentialState
 from pretouch.contact.residual_model import ResidualModel
-from pretouch.contact.window import WindowState, add_force, window_init
-from pretouch.control import path as paths
-from pretouch.control.commander import Asked, asked_by, commanded
-from pretouch.control.interface import MotionBody, MotionRequest
+from pretouch.control.interface import MotionBody, MotionRequest, Restriction, rows_of
 from pretouch.control.joint_box import joint_limits
-from pretouch.control.motion import Motion, MotionState, joint_motion, motion_setup, restriction_on
-from pretouch.control.reduction import ReductionState, reduce_speed, speed_scale
+from pretouch.control.path import Path, nearest_phase
+from pretouch.decision import Decision
 from pretouch.errors import RobotStateError, SkinError
-from pretouch.groups import Kinematics
-from pretouch.modes import Event, ModeState, mode_init, next_mode
-from pretouch.payload import sound_payload
-from pretouch.perception.moving import beside, near_moving, sound_moving
-from pretouch.perception.obstacles import TrackState, silent_units, track_init
-from pretouch.perception.outside import OutsideState, outside_silence, see_outside
-from pretouch.perception.perceive import nothing_seen, perceive, perception_setup
+from pretouch.groups import Kinematics, Obstacles
+from pretouch.line import CHECK, MOVE, Beside, line, line_within
+from pretouch.line_records import PYTHON, SEQUENTIAL
+from pretouch.line_setup import fixed_of, kinds_of, now_init, remembered_init
+from pretouch.modes import CLEAR, SOLVED, ModeState, mode_init
+from pretouch.perception.obstacles import TrackState
+from pretouch.perception.outside import OutsideState, outside_setup
 from pretouch.perception.scene_filter import Fixtures
 from pretouch.profiles import Profile
+from pretouch.records import Flat
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.step_parts import Given, Near, events_of
-from pretouch.types import (
-    ControlStep,
-    FloatArray,
-    Inputs,
-    Mode,
-    Obstacles,
-    QpOutcome,
-    RobotState,
-)
+from pretouch.sound import sound_robot
+from pretouch.types import WHOLE, ControlStep, FloatArray, Inputs, RobotState
 from pretouch.values import value
 
 
@@ -49,31 +41,47 @@ from pretouch.values import value
 class ControllerState:
     """All the controller remembers from one step to the next."""
 
-    watch: faults.Watch
-    tracks: TrackState
-    window: WindowState
-    """Of the external force, eq. 8."""
-    detector: object
-    """What the profile's detector remembers."""
-    reduction: ReductionState
-    reaction: object
-    path: paths.PathState
-    approach: object
-    """What the profile's restriction remembers."""
-    motion: MotionState
+    memory: Flat
+    """What compiled code remembers, see `line_records.Remembered`."""
     mode: ModeState
-    command: FloatArray
-    """(n,) last joint velocity command [rad/s]."""
-    rotation_goal: FloatArray
-    """(3, 3) R_O_ee at the start, held if the task asks for it."""
-    outside: OutsideState | None = None
+    detector: object
+    """What the profile's detector remembers beside that."""
+    reaction: object
+    approach: object
+    """What the profile's restriction remembers beside that."""
+    outside: OutsideState | None
     """What outside sources showed; None before there is one."""
-    load: LoadState | None = None
+    load: LoadState | None
     """What was announced of a load; None before anything was."""
+    calm: bool
+    """Whether the next step may be one call."""
+    quick: bool
+    """Whether the step before was."""
 
+    @property
+    def command(self) -> FloatArray:
+        """(n,) last joint velocity command [rad/s]."""
+        return self.memory.get("command")
 
-STAGES = ("state", "kinematics", "perception", "contact", "mode", "path", "motion", "record")
-"""What a step is made of, in order."""
+    @property
+    def phase(self) -> float:
+        """Arc length travelled along the path [m]."""
+        return self.memory.get("pace.phase")
+
+    @property
+    def watch(self) -> faults.Watch:
+        """What the next inputs are judged by."""
+        return faults.watch_of(self.memory)
+
+    @property
+    def heard(self) -> FloatArray:
+        """(K,) stamp of each unit's newest reading that reported anything [s]."""
+        return self.memory.part("tracks", TrackState).heard
+
+    @property
+    def learnt(self) -> ResidualModel:
+        """What the sequential detector has learnt of free motion."""
+        return self.memory.part("test.model", ResidualModel)
 
 
 class Controller:
@@ -81,51 +89,49 @@ class Controller:
 
     `step` believes any finite report of the arm, and a false one can move it against its acceleration limits: a loop of
     your own calls `loop.turn` in its place, or `loop.explained` before it.
-
-    `mark` gets the name of each of `STAGES` as it ends, so that a caller with a clock can see where the time goes.
     """
 
-    def __init__(
-        self, model: RobotModel, skin: Skin, fixtures: Fixtures, path: paths.Path, profile: Profile,
-        mark: Callable[[str], None] = lambda stage: None,
-    ) -> None:  # fmt: skip
+    def __init__(self, model: RobotModel, skin: Skin, fixtures: Fixtures, path: Path, profile: Profile) -> None:
         self.model, self.skin, self.fixtures, self.path, self.profile = model, skin, fixtures, path, profile
         for unit, link in zip(skin.units, skin.link, strict=True):
             if model.link_index(unit.link) != link:
                 raise SkinError(f"The skin was made for another arm than {model.description.name}: make one for it.")
         self.limits = joint_limits(model, profile.task.position_margin_rad, profile.task.control_period_s)
-        see = profile.perception
-        self._sight = None if see is None else perception_setup(model, skin, fixtures, see)
-        self._motion_body = MotionBody(model, len(skin), self.limits, profile.task)
-        self._approach = restriction_on(profile.approach, self._motion_body)
-        self._setup = motion_setup(self._motion_body, profile.null_space, profile.failure.solver_iterations)
         self.body = Body(model, skin, self.limits.period, fixtures.planes, fixtures.capsules)
-        self._detector = profile.detect.on(self.body)
-        self._units, self._most_kg = len(skin), most_kg(model)
-        self._touching, self._mark = profile.detect.reads_touch and len(skin.touching) > 0, mark
+        self.detector = profile.detect.on(self.body)
+        self.kinds, self.most_kg = kinds_of(profile), most_kg(model)
+        self._motion_body = MotionBody(model, len(skin), self.limits, profile.task)
+        python = self.kinds.approach == PYTHON and profile.approach is not None
+        self.approach = profile.approach.on(self._motion_body) if python and profile.approach is not None else None
+        """A restriction in plain Python; None of one that is compiled."""
+        self.touching = profile.detect.reads_touch and len(skin.touching) > 0
+        self.outside = outside_setup(model, skin, fixtures, profile.perception)
+        self.beside: Beside = (fixtures.capsules.a, fixtures.capsules.b, fixtures.capsules.radius)
+        self.fixed, self._begin = Flat.of(fixed_of(self)), Flat.of(remembered_init(self))
+        self.blank = now = Flat.of(now_init(self))
+        """What a step begins with: not written to."""
+        self._joints = slice(now.places["robot.q"].at.start, now.places["robot.wrench"].at.stop)
+        self._heard = slice(now.places["readings.stamp"].at.start, now.places["readings.distance"].at.stop)
+        self._status, self._ending = now.places["readings.status"].at, now.places["answer.ending"].at.start
+        self._stamps = [now.places["stamp"].at.start, now.places["robot.stamp"].at.start]
+        self._on_path = slice(now.places["path.point"].at.start, now.places["path.tangent"].at.stop)
+        self._shapes = [(model.n,)] * 5 + [(6,), (len(skin),), (len(skin),), (len(skin),)]
 
     def init(self, robot: RobotState, learnt: ResidualModel | None = None) -> ControllerState:
         """Return the state before the first step; a robot state that cannot be used is a RobotStateError.
 
         `learnt` is the arm's free motion as an earlier session left it, for a detector that learns it.
         """
-        sound, wrong = faults.sound_robot(robot, self.limits.qd_max)
+        sound, wrong = sound_robot(robot, self.limits.qd_max)
         if sound is None:
             raise RobotStateError(f"The controller cannot start: {wrong}: check the connection to the arm.")
-        return ControllerState(
-            watch=faults.watch_init(sound),
-            tracks=track_init(len(self.skin)),
-            window=window_init(self.profile.window.samples),
-            detector=self._detector.init(self.body, learnt),
-            reduction=ReductionState(),
-            reaction=self.profile.react.init(self.body, sound.q_commanded),
-            path=paths.PathState(),
-            approach=self._approach_init(),
-            motion=MotionState(np.zeros(self.model.n)),
-            mode=mode_init(),
-            command=sound.qd_commanded,
-            rotation_goal=self.model.kinematics(sound.q).rotation[self.model.ee],
-        )
+        memory = self._begin.copy()
+        faults.keep_watch(memory, faults.watch_init(sound))
+        memory.put("command", sound.qd_commanded)
+        memory.put("rotation_goal", self.model.kinematics(sound.q).rotation[self.model.ee])
+        detector = self.kept_detector(memory, self.detector.init(self.body, learnt))
+        reaction = self.profile.react.init(self.body, sound.q_commanded)
+        return ControllerState(memory, mode_init(), detector, reaction, self._approach_init(), None, None, False, False)
 
     def adopt(self, state: ControllerState, before: "Controller") -> ControllerState:
         """Go on from a state of another controller of the same arm and skin, with this one's profile and path.
@@ -133,197 +139,130 @@ class Controller:
         A force window of another length, and another method of detection, begin anew; another path is joined where it
         is nearest, and the speed along it grows from 0. A reaction that is over stays so.
         """
-        mine, theirs, robot = self.profile, before.profile, state.watch.robot
-        if len(state.command) != self.model.n or len(state.tracks.point) != len(self.skin):
+        mine, theirs, memory = self.profile, before.profile, self._begin.copy()
+        remembered = before.with_places(state.memory)
+        same_units = remembered.places["tracks.point"].shape == memory.places["tracks.point"].shape
+        if not same_units or remembered.places["command"].shape != memory.places["command"].shape:
             raise RobotStateError("The state is that of a controller for another arm or skin: begin with init().")
         same_window = mine.window.samples == theirs.window.samples and type(mine.detect) is type(theirs.detect)
         same_points = _points_per_link(mine) == _points_per_link(theirs)
-        path = state.path
+        parts = ["tracks", "pace", "command", "rotation_goal", "mass"]
+        parts += ["window"] * same_window + ["null_velocity"] * (mine.null_space == theirs.null_space)
+        memory.take(remembered, parts + ["slots"] * (mine.approach == theirs.approach and same_points))
+        watch = faults.watch_of(remembered)  # at another rate more or fewer commands are kept
+        faults.keep_watch(memory, watch)
         if self.path is not before.path:
-            path = paths.joined(self.path, self.model.kinematics(robot.q).position[self.model.ee])
+            here = self.model.kinematics(watch.robot.q).position[self.model.ee]
+            memory.put("pace.phase", nearest_phase(self.path, here))
+            memory.put("pace.speed", 0.0)
+        detector = self.detector.init(self.body)
+        if same_window:
+            detector = self.detector.adopted(before.whole_detector(state), self.body, before.detector)
+        reaction = mine.react.adopted(before.whole_reaction(state), self.body, theirs.react, watch.robot.q_commanded)
         return replace(
-            state,
-            window=state.window if same_window else window_init(mine.window.samples),
-            detector=self._detector.adopted(state.detector, self.body, before._detector)
-            if same_window
-            else self._detector.init(self.body),
-            reaction=mine.react.adopted(state.reaction, self.body, theirs.react, robot.q_commanded),
-            path=path,
+            state, memory=memory, detector=self.kept_detector(memory, detector), reaction=reaction,
             approach=state.approach if mine.approach == theirs.approach else self._approach_init(),
-            motion=state.motion if mine.null_space == theirs.null_space else MotionState(np.zeros(self.model.n)),
-            outside=state.outside if same_points else None,
-        )
-
-    def _approach_init(self) -> object:
-        """Return what the restriction remembers at first; a part says so itself, whatever works in its place."""
-        return None if self.profile.approach is None else self.profile.approach.init(self._motion_body)
+            outside=state.outside if same_points else None, calm=False, quick=False,
+        )  # fmt: skip
 
     def step(self, state: ControllerState, inputs: Inputs) -> tuple[ControlStep, ControllerState]:
         """Run one control cycle, once a period, with the state of the step before; it believes any finite report."""
-        p, model, mark = self.profile, self.model, self._mark
-        if len(state.command) != model.n or len(state.tracks.point) != self._units:
+        remembered = self.with_places(state.memory)
+        memory = remembered.copy()
+        if state.calm:
+            now = self.blank.copy()
+            if self._taken(now, inputs):
+                self.put_path(now, remembered.get("pace.phase"))
+                if self.take(memory, now, self.beside, CHECK, MOVE) and now.blocks[1][self._ending] == SOLVED:
+                    return ControlStep.of(now, CLEAR), ControllerState(
+                        memory, CLEAR, state.detector, state.reaction, state.approach, None, None, True, True
+                    )
+                memory = remembered.copy()
+        step, after = Decision(self, state, memory).taken(inputs)
+        return step, ControllerState(memory, **after)
+
+    def take(self, memory: Flat, now: Flat, beside: Beside, first: int, last: int) -> bool:
+        """Take stages of a step; see `line`."""
+        return line(self.fixed.blocks, memory.blocks, now.blocks, beside, first, last)
+
+    def _taken(self, now: Flat, inputs: Inputs) -> bool:
+        """Copy inputs that are as usual; else say so."""
+        robot, readings = inputs.robot, inputs.readings
+        others = inputs.points, inputs.payload, inputs.desired, inputs.moving
+        if inputs.resume or others != (None, None, None, None):
+            return False
+        try:
+            parts: Any = (robot.q, robot.qd, robot.q_commanded, robot.qd_commanded, robot.tau_ext, robot.wrench)
+            given, stamps = (readings.stamp, readings.distance, readings.status), (inputs.stamp, robot.stamp)
+            if [part.shape for part in (*parts, *given)] != self._shapes or readings.status.dtype is not WHOLE:
+                return False
+            numbers, whole = now.blocks[0], now.blocks[1]
+            np.concatenate(parts, out=numbers[self._joints])
+            np.concatenate(given[:2], out=numbers[self._heard])
+            whole[self._status] = readings.status
+            for at, stamp in zip(self._stamps, stamps, strict=True):
+                if not isinstance(stamp, float):
+                    return False
+                numbers[at] = stamp
+        except (AttributeError, TypeError, ValueError, OverflowError):
+            return False
+        return True
+
+    def put_path(self, now: Flat, phase: float) -> None:
+        """Write where the path is at an arc length [m]."""
+        at = now.blocks[0][self._on_path]
+        at[:3], at[3:] = self.path.point(phase), self.path.tangent(phase)
+        now.put("path.phase", phase)
+
+    def restricted(
+        self, part: Restriction, state: object, memory: Flat, now: Flat, robot: RobotState, request: MotionRequest
+    ) -> object:
+        """Move within what a restriction in plain Python allows; return what it remembers."""
+        count = now.get("seen.all")
+        obstacles = Obstacles._make(near[:count] for near in now.part("seen.near", Obstacles))
+        kin = now.part("kin", Kinematics)
+        allowed, state = part.step(state, self._motion_body, kin, robot, obstacles, request)
+        if allowed.velocity is not None:
+            now.put("request.velocity", request.velocity + allowed.velocity)
+        line_within(self.fixed.blocks, memory.blocks, now.blocks, *rows_of(allowed, self.model.n))
+        return state
+
+    def whole_detector(self, state: ControllerState) -> Any:
+        """Return all that the detector remembers."""
+        kept: Any = state.detector
+        if self.kinds.detect != SEQUENTIAL:
+            return kept
+        return replace(kept, test=self.with_places(state.memory).part("test", SequentialState))
+
+    def kept_detector(self, memory: Flat, state: Any) -> Any:
+        """Keep what compiled code remembers of a detector; return the rest."""
+        if self.kinds.detect != SEQUENTIAL:
+            return state
+        memory.fill("test", state.test)
+        return replace(state, test=None)
+
+    def may_be_one_call(self, detector: Any) -> bool:
+        """Whether all parts are compiled, and a detector remembers nothing of a contact."""
+        located = self.kinds.detect == SEQUENTIAL and detector.localisation is not None
+        return PYTHON not in self.kinds and not self.touching and not (located and detector.localisation.steps)
+
+    def whole_reaction(self, state: ControllerState) -> Any:
+        """Return all that the reaction remembers."""
+        memory = self.with_places(state.memory)
+        return self.profile.react.caught_up(state.reaction, memory) if state.quick else state.reaction
+
+    def with_places(self, memory: Flat) -> Flat:
+        """Return what is remembered with the places of its fields, which a recording does not have."""
+        if memory.places is self._begin.places:
+            return memory
+        if [len(block) for block in memory.blocks] != [len(block) for block in self._begin.blocks]:
             raise RobotStateError("The state is that of a controller for another arm or skin: begin with init().")
-        given = self._checked(state, inputs)
-        mark("state")
-        kin = model.kinematics(given.robot.q)
-        mark("kinematics")
-        given = self._unloaded(given, kin)
-        robot, now = given.robot, given.watch.stamp
-        near = self._perceived(state, given, kin)
-        mark("perception")
-        detection, window, detector = self._detected(state, inputs, given, near, kin)
-        mark("contact")
+        return memory if memory.places else Flat(memory.blocks, self._begin.places)
 
-        # what to do
-        noticed = ReactionInputs(
-            state.mode, kin, robot, detection, near.seen.obstacles, bool(near.silent or near.lost), state.command,
-            state.path.phase, inputs.resume,
-        )  # fmt: skip
-        answers, react = p.react.sense(state.reaction, self.body, noticed)
-        events = events_of(given.unfit, near.silent, near.lost, detection, window.count, p) | given.events | answers
-        mode = next_mode(state.mode, events, inputs.resume)
-        contact = detection.contact if mode.mode is Mode.REACT is not state.mode.mode else None
-        mark("mode")
-
-        # along the path, or as a commander asks, as fast as eqs. 3-4 leave it, or as the reaction says
-        slowed = 1.0 if p.slow is None else speed_scale(near.seen.nearest, p.slow.d_max_m)
-        scale, reduction = reduce_speed(state.reduction, min(near.scale, slowed), p.task.restore_cycles)
-        asked = self._asked(state, given, kin, scale)
-        answer, react = p.react.move(react, self.body, noticed, mode)
-        desired = asked.velocity if answer is None else answer.velocity
-        mark("path")
-        motion, mode, approach, moving = self._moved(state, noticed, near, mode, asked, desired, answer)
-        mark("motion")
-
-        step = ControlStep(
-            stamp=now, mode=mode.mode, event=mode.event, detail=mode.detail, reason=mode.reason, latched=mode.latched,
-            q=robot.q, q_commanded=robot.q_commanded,
-            ee_position=kin.position[model.ee], ee_velocity=motion.ee_velocity, path_position=asked.point,
-            path_phase=state.path.phase, desired_velocity=np.zeros(3) if mode.mode is Mode.HOLD else desired,
-            speed_scale=scale, range_distance=near.seen.distance, obstacles=near.obstacles,
-            force=np.full(3, np.nan) if robot.wrench is None else robot.wrench[:3],
-            filtered_force=window.newest, thresholds=detection.thresholds, armed=detection.armed, contact=contact,
-            reaction_velocity=desired if mode.mode is Mode.REACT else _STILL, restricted=motion.restricted,
-            approach_limit=motion.approach_limit, qp=motion.qp, command=motion.qp.qd,
-            residual=detection.residual, evidence=detection.evidence, touched=detection.touched,
-            detectable_n=detection.detectable_n,
-        )  # fmt: skip
-        after = ControllerState(
-            watch=given.watch, tracks=near.tracks, window=window, detector=detector, reduction=reduction,
-            reaction=react, path=paths.advance(self.path, state.path, asked.path, motion.ee_velocity_commanded, p.task)
-            if mode.mode is Mode.TRACK and asked.path is not None else paths.pause(state.path),
-            approach=approach, motion=moving, mode=mode, command=motion.qp.qd.copy(),
-            rotation_goal=asked.rotation_kept if mode.mode is Mode.TRACK else state.rotation_goal, outside=near.outside,
-            load=given.load and kept_free(given.load, robot.tau_ext, detection.residual),
-        )  # fmt: skip
-        mark("record")
-        return step, after
-
-    def _checked(self, state: ControllerState, inputs: Inputs) -> Given:
-        """Return what of the inputs can be used, and what is wrong with the rest."""
-        p, units = self.profile, self._units
-        robot, events, watch = faults.examine(
-            state.watch, inputs, state.command, self.limits.period, self.limits.qd_max, p.failure, p.detect.by_torques
-        )
-        readings, unfit = faults.sound_readings(inputs.readings, units)
-        touches, wrong = faults.sound_touch(inputs.touch, units) if self._touching else (None, "")
-        points, lost = faults.sound_points(inputs.points)
-        payload, heavy = sound_payload(inputs.payload, self._most_kg)
-        if heavy:
-            events[Event.LOAD_UNFIT] = heavy
-        load = announced(state.load, payload, robot)
-        moving, astray = sound_moving(inputs.moving, watch.stamp, p.failure.state_timeout_s)
-        if astray:
-            events[Event.MOVING_LOST] = astray
-        desired, ended = commanded(inputs.desired, self.model.n, watch.stamp, p.failure)
-        events |= ended
-        return Given(robot, events, watch, readings, touches, points, load, desired, moving, unfit or wrong, lost)
-
-    def _unloaded(self, given: Given, kin: Kinematics) -> Given:
-        """Take an announced load out of torques and force."""
-        if given.load is None:
-            return given
-        robot, load = without_load(given.load, self.model, kin, given.robot, self.limits.period)
-        return given._replace(robot=robot, load=load)
-
-    def _perceived(self, state: ControllerState, given: Given, kin: Kinematics) -> Near:
-        """Return what is near: eq. 1 and the closest points of the body."""
-        sight, robot, now, moving = self._sight, given.robot, given.watch.stamp, given.moving
-        if sight is None:
-            kept_off = self._kept_off(given, kin, state.outside)
-            return Near(nothing_seen(given.readings, self.skin), state.tracks, state.outside, kept_off=kept_off)
-        if moving is not None:
-            sight = beside(sight, moving, given.readings, now)
-        anew = Event.TIME_BACKWARDS in given.events
-        known = track_init(self._units) if anew else state.tracks
-        seen, tracks = perceive(known, sight, kin, given.readings, now, robot)
-        seen, outside = see_outside(state.outside, anew, seen, given.points, sight, kin, robot, now)
-        heard, silent = silent_units(self.skin, tracks, given.readings.status, seen.longest_silence, now, sight.params)
-        outside_scale, lost = outside_silence(outside, given.lost, now, sight.params.outside)
-        watched = self._units > 0 and heard >= 1.0 and not silent
-        kept_off, scale = self._kept_off(given, kin, outside), min(heard, outside_scale)
-        return Near(seen, tracks, outside, scale, watched, silent, lost, kept_off)
-
-    def _kept_off(self, given: Given, kin: Kinematics, outside: OutsideState | None) -> Obstacles | None:
-        """Return what is nearest of that which is known to move beside the arm."""
-        if given.moving is None:
-            return None
-        return near_moving(given.moving, self.model, kin, given.watch.stamp, self._places(outside))
-
-    def _places(self, outside: OutsideState | None) -> int:
-        """How many units and places of outside points there are."""
-        return self._units + (0 if outside is None else len(outside.sigma))
-
-    def _detected(
-        self, state: ControllerState, inputs: Inputs, given: Given, near: Near, kin: Kinematics
-    ) -> tuple[Detection, WindowState, object]:
-        """Tell a contact from free motion: eqs. 8-11."""
-        robot, before, p = given.robot, state.window, self.profile.window
-        reacting = state.mode.mode is Mode.REACT
-        window = add_force(before, None if robot.wrench is None else robot.wrench[:3], p)
-        sample = Sample(
-            given.watch.stamp, kin, robot, window, before.full, near.seen.obstacles, reacting, near.watched,
-            given.touches, given.load.doubted_kg if given.load else 0.0,
-        )  # fmt: skip
-        detection, detector = self._detector.step(state.detector, self.body, sample)
-        return detection, before if reacting and p.freeze_while_reacting else window, detector
-
-    def _asked(self, state: ControllerState, given: Given, kin: Kinematics, scale: float) -> Asked:
-        """Return what follows the path, or what a commander wants."""
-        task, goal = self.profile.task, state.rotation_goal
-        if given.desired is None:
-            following = paths.follow(self.path, state.path, kin.position[self.model.ee], task)
-            return Asked(following.scaled(scale), following.point, goal, goal, None, following)
-        return asked_by(given.desired, given.watch.stamp, kin, given.robot, self.model, goal, task, scale)
-
-    def _moved(
-        self, state: ControllerState, noticed: ReactionInputs, near: Near, mode: ModeState, asked: Asked,
-        desired: FloatArray, answer: ReactionMotion | None,
-    ) -> tuple[Motion, ModeState, object, MotionState]:  # fmt: skip
-        """Return the joint velocities that come nearest to what is asked: eqs. 5-7 and eq. 2."""
-        goal, qd, touch = state.rotation_goal, None, None
-        if answer is not None:
-            qd, touch = answer.qd, answer.touch_speed
-        elif mode.mode is Mode.TRACK:
-            goal, qd = asked.rotation_goal, asked.qd
-        places, told = self._places(near.outside), near.kept_off
-        request = MotionRequest(
-            desired, goal, mode.mode is Mode.HOLD and qd is None, qd, touch,
-            places + (0 if told is None else len(told.unit)), None if told is None else places,
-        )  # fmt: skip
-        kin, robot, obstacles = noticed.kin, noticed.robot, near.obstacles
-        allowed, approach = self._approach.step(state.approach, self._motion_body, kin, robot, obstacles, request)
-        motion, moving = joint_motion(state.motion, self._setup, kin, robot, obstacles, request, allowed)
-        qp = motion.qp
-        if qp.outcome in _TROUBLE and (qp.outcome is QpOutcome.FAILED or mode.mode is not Mode.HOLD):
-            mode = next_mode(mode, {_TROUBLE[qp.outcome]: qp.status}, resume=False)
-        return motion, mode, approach, moving
+    def _approach_init(self) -> object:
+        """Return what a restriction in plain Python remembers at first."""
+        return None if self.approach is None else self.approach.init(self._motion_body)
 
 
 def _points_per_link(profile: Profile) -> int:
     return 0 if profile.sight.outside is None else profile.sight.outside.per_link
-
-
-_STILL = np.zeros(3)
-"""One for all steps: its numbers are not written to."""
-_TROUBLE = {QpOutcome.FAILED: Event.SOLVER_FAILED, QpOutcome.INFEASIBLE: Event.BLOCKED}

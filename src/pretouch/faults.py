@@ -1,41 +1,17 @@
 """Which inputs to believe: faults of the inputs, distinguished before anything is computed from them."""
 
 from dataclasses import replace
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from pretouch.compiled import compiled
 from pretouch.modes import Event
 from pretouch.params import FailureParams
-from pretouch.perception.chosen_points import FARTHEST, LARGEST_SIGMA, usable
-from pretouch.types import (
-    WHOLE,
-    FloatArray,
-    Inputs,
-    RangeReadings,
-    RangeStatus,
-    RobotState,
-    SeenPoints,
-    TouchReadings,
-)
-from pretouch.values import real, real_number, value
-
-_LARGEST = 1e3
-"""A joint position or velocity [rad, rad/s] from here on is none: another unit, or a broken message."""
-
-_FASTEST = 2.0
-"""Times the arm's limit: a commanded joint velocity from here on is none that any arm was ever given."""
-
-_STRONGEST = 1e4
-"""An external torque [Nm] from here on is none."""
-
-_LATEST = 1e12
-"""A time stamp [s] from here on is none, whatever the clock began with."""
-
-MOST_POINTS = 20_000
-"""Points of outside sources that are taken in one step: what they cost stays bounded."""
-
-_PARTS = ("joint positions", "joint velocities", "commanded joint positions", "commanded joint velocities")
+from pretouch.records import Cell, Flat, IntCell
+from pretouch.sound import FASTEST, LARGEST, LATEST, STRONGEST, below, sound_robot, time_of
+from pretouch.types import FloatArray, Inputs, RobotState
+from pretouch.values import value
 
 
 @value
@@ -50,6 +26,42 @@ class Watch:
     """When the robot last gave a force estimate [s]."""
     sent: tuple[tuple[float, FloatArray], ...] = ()
     """Instants [s] and joint velocities (n,) [rad/s] of the commands that the last state may not know yet."""
+
+
+class Belief(NamedTuple):
+    """Which reports of an arm are believed."""
+
+    qd_max: Annotated[FloatArray, "n"]
+    """(n,) joint velocity limits [rad/s]."""
+    state_timeout_s: float
+    overrun_s: float
+    force_max_n: float
+
+
+class Report(NamedTuple):
+    """As `RobotState`; a wrench of NaN is none."""
+
+    stamp: Cell
+    q: Annotated[FloatArray, "n"]
+    qd: Annotated[FloatArray, "n"]
+    q_commanded: Annotated[FloatArray, "n"]
+    qd_commanded: Annotated[FloatArray, "n"]
+    tau_ext: Annotated[FloatArray, "n"]
+    wrench: Annotated[FloatArray, 6]
+
+
+class Watched(NamedTuple):
+    """What is remembered to judge the next inputs, see `faults.Watch`."""
+
+    stamp: Cell
+    force_stamp: Cell
+    robot: Report
+    sent: IntCell
+    """How many commands the last state may not know yet."""
+    sent_stamp: Annotated[FloatArray, "S"]
+    """(S,) when they were sent, oldest first [s]."""
+    sent_command: Annotated[FloatArray, "S", "n"]
+    """(S, n) [rad/s]."""
 
 
 def watch_init(robot: RobotState) -> Watch:
@@ -106,7 +118,7 @@ def examine(
         robot = replace(robot, q_commanded=_moved_on(robot, now, sent), qd_commanded=command)
     if robot.wrench is not None and not below(robot.wrench, params.force_max_n):
         robot = replace(robot, wrench=None)
-    missing = not below(robot.tau_ext, _STRONGEST) if torques else robot.wrench is None
+    missing = not below(robot.tau_ext, STRONGEST) if torques else robot.wrench is None
     force_stamp = min(watch.force_stamp, now) if missing else now
     if now - watch.stamp > params.overrun_s:
         faults[Event.OVERRUN] = f"{now - watch.stamp:.3f} s"
@@ -136,168 +148,69 @@ def _moved_on(robot: RobotState, now: float, sent: tuple[tuple[float, FloatArray
     return q
 
 
-def time_of(stamp: float) -> float | None:
-    """Return a time stamp, or None if it is none."""
-    try:
-        time = real_number(stamp)
-    except (TypeError, ValueError, OverflowError):
-        return None
-    return time if abs(time) < _LATEST else None
+def watch_of(memory: Flat) -> Watch:
+    """Return what a controller remembers to judge the next inputs."""
+    count, stamps, commands = (memory.get(f"watch.{name}") for name in ("sent", "sent_stamp", "sent_command"))
+    sent = zip(stamps[:count].tolist(), commands[:count], strict=True)
+    return Watch(
+        memory.get("watch.stamp"), robot_of(memory, "watch.robot"), memory.get("watch.force_stamp"), tuple(sent)
+    )
 
 
-def sound_robot(robot: RobotState, qd_max: FloatArray) -> tuple[RobotState | None, str]:
-    """Copy a robot's state as arrays of float64, or say what keeps it from being that of an arm with these limits.
-
-    External torques that an arm cannot have are NaN.
-    """
-    n = len(qd_max)
-    try:
-        stamp, given = time_of(robot.stamp), (robot.q, robot.qd, robot.q_commanded, robot.qd_commanded)
-        tau_ext, wrench = robot.tau_ext, None if robot.wrench is None else real(robot.wrench)
-    except AttributeError:
-        return None, f"it is {robot!r}"
-    except (TypeError, ValueError, OverflowError):
-        return None, "its force estimate is not an array of numbers"
-    if stamp is None:
-        return None, f"its time stamp is {robot.stamp}"
-    numbers = _numbers((*given, tau_ext), n)
-    if numbers is None:  # the torques may be missing, the others not
-        numbers = _numbers((*given, np.full(n, np.nan)), n)
-    if numbers is None:
-        return None, _misfit(given, n)
-    if wrench is not None and wrench.shape != (6,):
-        return None, f"its force estimate has the shape {wrench.shape}, not (6,)"
-    if not _plausible(numbers, qd_max):
-        bounds = np.vstack([np.full((3, n), _LARGEST), _FASTEST * qd_max])
-        i, j = np.argwhere(~(np.abs(numbers[:4]) < bounds))[0]
-        return None, f"{_PARTS[i]} hold {numbers[i, j]:g}"
-    return RobotState(stamp, numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], wrench), ""
+def keep_watch(memory: Flat, watch: Watch) -> None:
+    """Let a controller remember it: of the commands the newest."""
+    most = len(memory.get("watch.sent_stamp"))
+    sent = watch.sent[-most:]
+    memory.put("watch.stamp", watch.stamp)
+    memory.put("watch.force_stamp", watch.force_stamp)
+    memory.put("watch.sent", len(sent))
+    stamps, commands = memory.get("watch.sent_stamp"), memory.get("watch.sent_command")
+    for k, (stamp, command) in enumerate(sent):
+        stamps[k], commands[k] = stamp, command
+    put_robot(memory, "watch.robot", watch.robot)
 
 
-def _numbers(given: tuple[object, ...], joints: int) -> FloatArray | None:
-    """Copy what is a number a joint to one array (5, n) of float64; None if a part is something else."""
-    try:
-        numbers = real(given)
-    except (TypeError, ValueError, OverflowError):
-        return None
-    return numbers if numbers.shape == (len(given), joints) else None
+def robot_of(record: Flat, path: str) -> RobotState:
+    """Return the arm's state that a `Report` in a record holds."""
+    known = {name: record.get(f"{path}.{name}") for name in Report._fields}
+    return RobotState(**known | ({"wrench": None} if np.isnan(known["wrench"][0]) else {}))
+
+
+def put_robot(record: Flat, path: str, robot: RobotState) -> None:
+    """Write an arm's state to a `Report` in a record."""
+    for name in Report._fields:
+        number = getattr(robot, name)
+        record.put(f"{path}.{name}", np.nan if number is None else number)
 
 
 @compiled
-def _plausible(numbers: FloatArray, qd_max: FloatArray) -> bool:
-    """Whether an arm can have these (5, n) positions, velocities, and commanded ones; not if one is NaN.
+def believable(now: float, robot: Report, watch: Watched, command: FloatArray, p: Belief) -> bool:
+    """Whether `examine` finds no fault and changes nothing but torques to NaN; then do what it does to the memory.
 
-    The last row are external torques: all of them are made NaN where an arm cannot have one.
+    `now` [s] is the instant of the step, `command` (n,) the last joint velocity command [rad/s].
     """
-    for j in range(len(qd_max)):
-        for i in range(3):
-            if not abs(numbers[i, j]) < _LARGEST:
+    stamp = robot.stamp[0]
+    for j in range(len(p.qd_max)):
+        for number in (robot.q[j], robot.qd[j], robot.q_commanded[j]):
+            if not abs(number) < LARGEST:
                 return False
-        if not abs(numbers[3, j]) < _FASTEST * qd_max[j]:
+        if not abs(robot.qd_commanded[j]) < FASTEST * p.qd_max[j]:
             return False
-    if not below(numbers[4], _STRONGEST):
-        numbers[4] = np.nan
-    return True
-
-
-def _misfit(given: tuple[FloatArray, ...], joints: int) -> str:
-    """Name the first part of a robot's state that is no array of a number a joint, or ''."""
-    for name, part in zip(_PARTS, given, strict=True):
-        try:
-            shape = np.shape(part)
-            if shape == (joints,):
-                real(part)
-        except (TypeError, ValueError, OverflowError):
-            return f"{name} are not arrays of numbers"
-        if shape != (joints,):
-            return f"{name} have the shape {shape}, not ({joints},)"
-    return ""
-
-
-def sound_readings(readings: RangeReadings, units: int) -> tuple[RangeReadings, str]:
-    """Copy readings as arrays of float64 and int64; of those that do not fit so many units, take none and say why."""
-    try:
-        stamp = real(readings.stamp)
-        distance = real(readings.distance)
-        status = np.array(readings.status)
-    except AttributeError:
-        return _nothing(units), f"they are {readings!r}"
-    except (TypeError, ValueError, OverflowError):
-        return _nothing(units), "they are not arrays of numbers"
-    if not stamp.shape == distance.shape == status.shape == (units,):
-        shapes = f"{stamp.shape}, {distance.shape} and {status.shape}"
-        return _nothing(units), f"stamps, distances and statuses have the shapes {shapes}, not ({units},)"
-    if status.dtype is not WHOLE:
-        if status.dtype.kind not in "iu":
-            return _nothing(units), f"statuses are of type {status.dtype}, not whole numbers"
-        status = status.astype(np.int64)
-    return RangeReadings(stamp, distance, status), ""
-
-
-def _nothing(units: int) -> RangeReadings:
-    """Return what units report that were never heard."""
-    return RangeReadings(np.full(units, -np.inf), np.zeros(units), np.full(units, int(RangeStatus.NONE)))
-
-
-def sound_touch(touch: TouchReadings | None, units: int) -> tuple[TouchReadings | None, str]:
-    """Copy touch readings as arrays of known types; of those that do not fit so many units, take none and say why.
-
-    A stamp that is no number is that of a unit that was never heard; a force that is no number, or below 0, is not
-    measured. None stays None: a skin without touch sensors.
-    """
-    if touch is None:
-        return None, ""
-    try:
-        stamp, force = real(touch.stamp), real(touch.force)
-        contact, status = np.array(touch.contact), np.array(touch.status)
-    except AttributeError:
-        return None, f"touch readings are {touch!r}"
-    except (TypeError, ValueError, OverflowError):
-        return None, "touch readings are not arrays of numbers"
-    if not stamp.shape == force.shape == contact.shape == status.shape == (units,):
-        shapes = f"{stamp.shape}, {contact.shape}, {force.shape} and {status.shape}"
-        return None, f"stamps, contacts, forces and statuses of touch have the shapes {shapes}, not ({units},)"
-    if contact.dtype.kind not in "biu" or status.dtype.kind not in "iu":
-        return None, f"contacts and statuses of touch are of types {contact.dtype} and {status.dtype}"
-    stamp[np.isnan(stamp)] = -np.inf
-    force[~((force >= 0.0) & (force < _STRONGEST))] = np.nan
-    return TouchReadings(stamp, contact != 0, force, status.astype(np.int64)), ""
-
-
-def sound_points(points: SeenPoints | None) -> tuple[SeenPoints | None, str]:
-    """Give points of outside sources as arrays of float64; of those that cannot be used, take none and say why.
-
-    A set of which more than half the points are implausible cannot be used; single ones are left out later. No copy
-    is made, for nothing of the arrays is kept beyond the step.
-    """
-    if points is None:
-        return None, ""
-    try:
-        heard = real_number(points.heard)
-        given = points.stamp, points.point, points.sigma
-        stamp, point, sigma = (np.ascontiguousarray(real(part, copy=False)) for part in given)
-    except AttributeError:
-        return None, f"gives {points!r}"
-    except (TypeError, ValueError, OverflowError):
-        return None, "gives something other than arrays of numbers"
-    if stamp.shape != sigma.shape or point.shape != (*stamp.shape, 3) or stamp.ndim != 1:
-        return None, f"gives stamps, points and sigmas of the shapes {stamp.shape}, {point.shape} and {sigma.shape}"
-    if len(stamp) > MOST_POINTS:
-        return None, f"gives {len(stamp)} points, more than {MOST_POINTS}"
-    good, none = usable(stamp, point, sigma)
-    if 2 * good < len(stamp) - none:
-        shown = len(stamp) - none
-        return None, (
-            f"gives {shown - good} implausible points of {shown}: a coordinate of {FARTHEST:g} m or more, or a sigma"
-            f" outside 0 to {LARGEST_SIGMA:g} m"
-        )
-    return SeenPoints(heard, stamp, point, sigma), ""
-
-
-@compiled
-def below(numbers: FloatArray, bound: float) -> bool:
-    """Whether all numbers (k,) are smaller than a bound in size; one that is NaN is not."""
-    for number in numbers:  # noqa: SIM110  compiled code knows no generators
-        if not abs(number) < bound:
+    for number in robot.wrench:
+        if not abs(number) < p.force_max_n:
             return False
+    on_time = abs(now - stamp) <= p.state_timeout_s and 0.0 <= now - watch.stamp[0] <= p.overrun_s
+    # a state from before the last command, or one without torques, is for `examine`
+    newer = stamp > watch.stamp[0] or now == watch.stamp[0]
+    if not (abs(now) < LATEST and abs(stamp) < LATEST and on_time and newer and below(robot.tau_ext, STRONGEST)):
+        return False
+    count = watch.sent[0]
+    if count == len(watch.sent_stamp):
+        watch.sent_stamp[:-1], watch.sent_command[:-1] = watch.sent_stamp[1:].copy(), watch.sent_command[1:].copy()
+        count -= 1
+    watch.sent_stamp[count], watch.sent_command[count], watch.sent[0] = watch.stamp[0], command, count + 1
+    watch.stamp[0] = watch.force_stamp[0] = now
+    last = watch.robot
+    last.stamp[0], last.q[:], last.qd[:], last.q_commanded[:] = stamp, robot.q, robot.qd, robot.q_commanded
+    last.qd_commanded[:], last.tau_ext[:], last.wrench[:] = robot.qd_commanded, robot.tau_ext, robot.wrench
     return True

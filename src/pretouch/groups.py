@@ -1,19 +1,17 @@
-"""Groups of arguments that many compiled functions take; see `compiled.entry`.
+"""Records that many compiled functions take, see `records`."""
 
-Each holds fields of a class of the same purpose, under the same names, so that an object of that class can be given.
-"""
-
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from pretouch.types import BoolArray, FloatArray, IntArray
+from pretouch.compiled import compiled
+from pretouch.values import BoolArray, FloatArray, IntArray
 
 
 class Arm(NamedTuple):
     """What moves what, of `RobotModel`. L links, n joints."""
 
-    moved_by: BoolArray
+    moved_by: Annotated[BoolArray, "L", "n"]
     """(L, n) whether a joint moves a link."""
     ee: int
     """Index of the end-effector's link."""
@@ -22,13 +20,13 @@ class Arm(NamedTuple):
 class Kinematics(NamedTuple):
     """Where everything is in one posture, base frame. L links (bodies of the MJCF, world first), n joints."""
 
-    position: FloatArray
+    position: Annotated[FloatArray, "L", 3]
     """(L, 3) link origins [m]."""
-    rotation: FloatArray
+    rotation: Annotated[FloatArray, "L", 3, 3]
     """(L, 3, 3) link orientations R_O_link."""
-    anchor: FloatArray
+    anchor: Annotated[FloatArray, "n", 3]
     """(n, 3) a point on each joint's axis [m]."""
-    axis: FloatArray
+    axis: Annotated[FloatArray, "n", 3]
     """(n, 3) unit vectors of the joint axes."""
 
 
@@ -48,15 +46,15 @@ class Chain(NamedTuple):
 class Links(NamedTuple):
     """Masses and places of the links, of `RobotModel`."""
 
-    mass: FloatArray
+    mass: Annotated[FloatArray, "L"]
     """(L,) [kg]."""
-    com: FloatArray
+    com: Annotated[FloatArray, "L", 3]
     """(L, 3) centre of mass, link frame [m]."""
-    inertia: FloatArray
+    inertia: Annotated[FloatArray, "L", 3, 3]
     """(L, 3, 3) about it, axes of the link frame [kg m^2]."""
-    parts: IntArray
+    parts: Annotated[IntArray, "P"]
     """(P,) links of the body that joints move."""
-    middle: FloatArray
+    middle: Annotated[FloatArray, "P", 3]
     """(P, 3) the middle of each one's capsules, link frame [m]."""
 
 
@@ -65,19 +63,6 @@ class Mechanism(NamedTuple):
 
     arm: Arm
     links: Links
-
-
-class JointArrays(NamedTuple):
-    """The joints (n,), of `RobotState`."""
-
-    q: FloatArray
-    """Measured positions [rad]."""
-    qd: FloatArray
-    """Measured velocities [rad/s]."""
-    q_commanded: FloatArray
-    """Positions the motion generator is at [rad]."""
-    qd_commanded: FloatArray
-    """Velocities the motion generator is at [rad/s]."""
 
 
 class SurfaceArrays(NamedTuple):
@@ -100,13 +85,13 @@ class SurfaceArrays(NamedTuple):
 class CapsuleArrays(NamedTuple):
     """C capsules on links, of `Capsules`; or placed in the base frame."""
 
-    link: IntArray
+    link: Annotated[IntArray, "C"]
     """(C,) link of each."""
-    a: FloatArray
+    a: Annotated[FloatArray, "C", 3]
     """(C, 3) one end of the axis [m]."""
-    b: FloatArray
+    b: Annotated[FloatArray, "C", 3]
     """(C, 3) other end of the axis [m]."""
-    radius: FloatArray
+    radius: Annotated[FloatArray, "C"]
     """(C,) [m]."""
 
 
@@ -124,63 +109,68 @@ class Sensors(NamedTuple):
 class Cones(NamedTuple):
     """What K sensors of T kinds see: a cone about the axis of each."""
 
-    kind: IntArray
+    kind: Annotated[IntArray, "K"]
     """(K,) which kind each is of."""
-    edge: FloatArray
+    edge: Annotated[FloatArray, "T", 3]
     """(T, 3) cosine, sine and tangent of half the angle."""
-    range: FloatArray
+    range: Annotated[FloatArray, "T", 2]
     """(T, 2) nearest and farthest distance that is measured [m]."""
-    rays: FloatArray
+    rays: Annotated[FloatArray, "T", "R", 3]
     """(T, R, 3) unit vectors that fill the cone, sensor frame, the axis first."""
-    spread: FloatArray
+    spread: Annotated[FloatArray, "T"]
     """(T,) standard deviation of the direction a target lies in, beside what is not known of the unit's own [rad]."""
 
 
 class SkinArrays(NamedTuple):
     """The K units of a `Skin`."""
 
-    link: IntArray
+    link: Annotated[IntArray, "K"]
     """(K,) link each sits on."""
-    T_link_sensor: FloatArray
+    T_link_sensor: Annotated[FloatArray, "K", 4, 4]
     """(K, 4, 4)."""
-    position_sigma: FloatArray
+    position_sigma: Annotated[FloatArray, "K"]
     """(K,) standard deviation of its position [m]."""
-    orientation_sigma: FloatArray
+    orientation_sigma: Annotated[FloatArray, "K"]
     """(K,) standard deviation of its orientation [rad]."""
     cones: Cones
     """What each sees."""
 
 
-class NearArrays(NamedTuple):
-    """Where the body has something near, of `Obstacles`."""
+class Obstacles(NamedTuple):
+    """K sensed points, each with its closest point on the robot's body. Base frame."""
 
-    link: IntArray
-    """(K,) link that is closest."""
-    body_point: FloatArray
-    """(K, 3) closest point on it [m]."""
-    direction: FloatArray
-    """(K, 3) unit vectors from there to the obstacle."""
-    body_distance: FloatArray
-    """(K,) between them [m]."""
-
-
-class ObstacleArrays(NamedTuple):
-    """What the body has near, of `Obstacles`."""
-
-    unit: IntArray
-    """(K,) index of the unit that shows each."""
-    link: IntArray
-    """(K,) link that is closest."""
-    body_point: FloatArray
-    """(K, 3) closest point on it [m]."""
-    direction: FloatArray
-    """(K, 3) unit vectors from there to the obstacle."""
-    body_distance: FloatArray
-    """(K,) between them [m]."""
-    closing_speed: FloatArray
-    """(K,) speed of the object itself towards the body [m/s]."""
+    unit: Annotated[IntArray, "K"]
+    """(K,) index of the sensing unit in the skin; from their number on, of an outside point, then a moving fixture."""
+    point: Annotated[FloatArray, "K", 3]
+    """(K, 3) obstacle positions, eq. 1 [m]."""
+    ee_distance: Annotated[FloatArray, "K"]
+    """(K,) distance from the end-effector origin, less the spread, at least 0 [m] (eqs. 3, 11); inf: moving fixture."""
+    body_point: Annotated[FloatArray, "K", 3]
+    """(K, 3) closest points on the surface of the body [m]."""
+    link: Annotated[IntArray, "K"]
+    """(K,) index of the link that carries the closest point."""
+    direction: Annotated[FloatArray, "K", 3]
+    """(K, 3) unit vectors from body to obstacle, defined in penetration too."""
+    body_distance: Annotated[FloatArray, "K"]
+    """(K,) signed distance from the body's surface, less the point's spread [m] (eqs. 5-7)."""
+    closing_speed: Annotated[FloatArray, "K"]
+    """(K,) estimated speed of the object itself towards the closest body point [m/s]; 0 where it is not estimated."""
 
 
-NOTHING_NEAR = ObstacleArrays(
-    np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0)
-)
+def no_obstacles(count: int = 0) -> Obstacles:
+    """Return no obstacles, with room for so many."""
+    of_each, points = np.zeros(count), np.zeros((count, 3))
+    return Obstacles(
+        np.zeros(count, np.int64), points, of_each, points.copy(), np.zeros(count, np.int64), points.copy(),
+        of_each.copy(), of_each.copy(),
+    )  # fmt: skip
+
+
+@compiled
+def first_of(obstacles: Obstacles, count: int) -> Obstacles:
+    """Return the first of the obstacles, as views."""
+    o = obstacles
+    return Obstacles(
+        o.unit[:count], o.point[:count], o.ee_distance[:count], o.body_point[:count], o.link[:count],
+        o.direction[:count], o.body_distance[:count], o.closing_speed[:count],
+    )  # fmt: skip

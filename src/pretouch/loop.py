@@ -14,12 +14,19 @@ from pretouch.control.joint_box import JointLimits, box_and_brake
 from pretouch.controller import Controller, ControllerState
 from pretouch.desired import Desired
 from pretouch.errors import ParameterError
-from pretouch.faults import time_of
-from pretouch.moving_fixtures import MovingFixtures
-from pretouch.payload import Payload
 from pretouch.ports import Clock, Points, Robot, Skin, touch_of
 from pretouch.signals import noted
-from pretouch.types import ControlStep, FloatArray, Inputs, RangeReadings, RobotState, TouchReadings
+from pretouch.sound import time_of
+from pretouch.types import (
+    ControlStep,
+    FloatArray,
+    Inputs,
+    MovingFixtures,
+    Payload,
+    RangeReadings,
+    RobotState,
+    TouchReadings,
+)
 from pretouch.values import real, value
 
 _FINEST = 1e-7

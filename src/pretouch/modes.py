@@ -1,4 +1,4 @@
-"""What the arm is doing and why: one transition table, with a sentence for each reason."""
+"""What the arm is doing and why: one transition table, with a sentence for each reason; how a program ends."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -179,7 +179,7 @@ class ModeState:
     """Whether the arm may yield to a push while it holds."""
 
 
-_CLEAR = ModeState(Mode.TRACK, Event.CLEAR, reason=TABLE[-1].sentence)
+CLEAR = ModeState(Mode.TRACK, Event.CLEAR, reason=TABLE[-1].sentence)
 
 
 def mode_init() -> ModeState:
@@ -196,7 +196,7 @@ def next_mode(state: ModeState, events: Mapping[Event, str], resume: bool) -> Mo
         resume: whether a person asks to leave a latched HOLD; a cause that is still there latches again.
     """
     if not events and not state.latched:
-        return _CLEAR
+        return CLEAR
     seen = {**events, Event.CLEAR: ""}
     if state.latched and not resume:
         seen[Event.LATCHED] = ""
@@ -205,3 +205,37 @@ def next_mode(state: ModeState, events: Mapping[Event, str], resume: bool) -> Mo
         return state
     detail = seen[row.event]
     return ModeState(row.target, row.event, detail, row.sentence.format(detail), row.latches, row.soft)
+
+
+SOLVED, NOT_FINITE, NOT_CONVEX, BUDGET, INFEASIBLE = range(5)
+"""How a minimisation ended."""
+
+
+class QpOutcome(Enum):
+    """How a quadratic program ended."""
+
+    SOLVED = "solved"
+    INFEASIBLE = "infeasible"
+    """Hard rows contradict the joint box: the answer is the braking command."""
+    FAILED = "failed"
+    """The solver gave no usable answer: the answer is the braking command."""
+    SKIPPED = "skipped"
+    """No problem was posed, because the arm holds: the answer is the braking command."""
+
+
+ENDING = {
+    NOT_FINITE: "the problem holds numbers that are not finite",
+    NOT_CONVEX: "the Hessian is not convex",
+    BUDGET: "the iteration limit was reached",
+    INFEASIBLE: "the approach rows cannot be met within the acceleration limits",
+}
+"""What happened, by how a minimisation ended, but for `SOLVED`."""
+
+
+def outcome_of(hold: bool, ending: int, violated: bool) -> tuple[QpOutcome, str, bool]:
+    """Return outcome and sentence for how a minimisation ended, and whether its solution violates a soft row."""
+    if hold:
+        return QpOutcome.SKIPPED, "not posed: the arm holds", False
+    if ending != SOLVED:
+        return QpOutcome.INFEASIBLE if ending == INFEASIBLE else QpOutcome.FAILED, ENDING[ending], False
+    return QpOutcome.SOLVED, "solved, an approach row is violated" if violated else "solved", violated

@@ -15,8 +15,7 @@ from pretouch.contact.moving_thresholds import MovingThresholds
 from pretouch.contact.reaction import Reaction
 from pretouch.contact.sequential_test import SequentialTest
 from pretouch.contact.touch_cue import TouchSensors
-from pretouch.control.approach import ApproachRestriction
-from pretouch.control.braking_curve import BrakingCurve
+from pretouch.control.approach import ApproachRestriction, BrakingCurve
 from pretouch.control.interface import Restriction
 from pretouch.errors import ParameterError
 from pretouch.params import (

@@ -17,15 +17,7 @@ from pretouch.desired import joint_positions
 from pretouch.errors import ParameterError
 from pretouch.ports import Robot, Skin
 from pretouch.signals import ended_in_order
-from pretouch.types import (
-    ControlStep,
-    FloatArray,
-    Inputs,
-    RangeReadings,
-    RangeStatus,
-    RobotState,
-    SeenPoints,
-)
+from pretouch.types import ControlStep, FloatArray, Inputs, RangeReadings, RangeStatus, RobotState, SeenPoints
 
 _PR_SET_TIMERSLACK, _PR_GET_TIMERSLACK = 29, 30
 """Of Linux' `prctl`."""

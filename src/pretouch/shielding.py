@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from pretouch.contact.residual_model import ResidualModel
-from pretouch.control.path import line
+from pretouch.control.path import segment
 from pretouch.controller import Controller
 from pretouch.desired import twist
 from pretouch.loop import Cycle, explained, instant
@@ -57,7 +57,7 @@ def shield(
         learnt: free motion as an earlier session left it.
     """
     x, y, z = model.kinematics(robot.q).position[model.ee].tolist()
-    nowhere = line((x, y, z), (x, y, z + 0.001))  # a controller has a path; this one is never followed
+    nowhere = segment((x, y, z), (x, y, z + 0.001))  # a controller has a path; this one is never followed
     chosen = named(profile) if isinstance(profile, str) else profile
     around = no_fixtures() if fixtures is None else fixtures
     return Shield(Controller(model, skin, around, nowhere, chosen), robot, learnt)

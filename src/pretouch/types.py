@@ -3,168 +3,34 @@
 All are set once, when they are made; arrays are read and not written to (`docs/reference/conventions.md`).
 """
 
+from collections.abc import Callable
 from dataclasses import field
-from enum import Enum, IntEnum
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from pretouch.desired import Desired
+from pretouch.groups import Obstacles as Obstacles
+from pretouch.inputs import SOMEWHERE as SOMEWHERE
+from pretouch.inputs import Inputs as Inputs
+from pretouch.inputs import MovingFixtures as MovingFixtures
+from pretouch.inputs import Payload as Payload
+from pretouch.inputs import RangeReadings as RangeReadings
+from pretouch.inputs import RangeStatus as RangeStatus
+from pretouch.inputs import RobotState as RobotState
+from pretouch.inputs import SeenPoints as SeenPoints
+from pretouch.inputs import TouchReadings as TouchReadings
+from pretouch.inputs import TouchStatus as TouchStatus
 from pretouch.limited import Limited, limited_by
-from pretouch.modes import Event
+from pretouch.modes import Event, ModeState, outcome_of
 from pretouch.modes import Mode as Mode
-from pretouch.moving_fixtures import MovingFixtures
-from pretouch.payload import Payload
+from pretouch.modes import QpOutcome as QpOutcome
+from pretouch.records import Flat
 from pretouch.values import WHOLE as WHOLE
 from pretouch.values import BoolArray as BoolArray
 from pretouch.values import FloatArray as FloatArray
 from pretouch.values import IntArray as IntArray
 from pretouch.values import Number as Number
 from pretouch.values import value
-
-
-class RangeStatus(IntEnum):
-    """Range status codes of the VL53L1X (ST, UM2356), and one of ours."""
-
-    OK = 0
-    SIGMA = 1
-    SIGNAL = 2
-    MIN_CLIPPED = 3
-    OUT_OF_BOUNDS = 4
-    HARDWARE = 5
-    NO_WRAP_CHECK = 6
-    WRAPPED = 7
-    CROSSTALK = 9
-    SYNC = 10
-    MERGED = 11
-    MIN_RANGE = 13
-    INVALID = 14
-    STUCK = 254
-    """Set by whoever receives readings that repeat to the last digit."""
-    NONE = 255
-    """Set by the driver before the first measurement."""
-
-
-@value
-class RangeReadings:
-    """The newest reading of each of K units, in the order of the skin; of one never heard -inf, and status NONE."""
-
-    stamp: FloatArray
-    """(K,) instant of each measurement [s]."""
-    distance: FloatArray
-    """(K,) distance along the beam from the sensor origin [m]; meaningless unless the status says so."""
-    status: IntArray
-    """(K,) `RangeStatus` codes."""
-
-
-class TouchStatus(IntEnum):
-    """What a unit says of its touch sensor."""
-
-    OK = 0
-    FAILED = 1
-    """It measures, and what it measures can be no reading: a broken lead."""
-    NONE = 255
-    """It has none, or none was heard of."""
-
-
-@value
-class TouchReadings:
-    """The newest touch reading of each of K sensor units, in the order of the skin.
-
-    A unit without a touch sensor, and one that has never been heard, has stamp -inf and status NONE.
-    """
-
-    stamp: FloatArray
-    """(K,) instant of each measurement [s]."""
-    contact: BoolArray
-    """(K,) whether the unit is touched; meaningless unless the status is OK."""
-    force: FloatArray
-    """(K,) size of the force on it [N], NaN where it is not measured."""
-    status: IntArray
-    """(K,) `TouchStatus` codes."""
-
-
-@value
-class RobotState:
-    """What the robot's own interface reports at one instant, n joints."""
-
-    stamp: float
-    """Instant of the measurement [s]."""
-    q: FloatArray
-    """(n,) measured joint positions [rad]."""
-    qd: FloatArray
-    """(n,) measured joint velocities [rad/s]."""
-    q_commanded: FloatArray
-    """(n,) joint positions the robot's motion generator is at [rad] (the vendor's q_d)."""
-    qd_commanded: FloatArray
-    """(n,) joint velocities the robot's motion generator is at [rad/s] (the vendor's dq_d)."""
-    tau_ext: FloatArray
-    """(n,) estimated torques by the environment on the joints [Nm]; within a step NaN where the robot gave none."""
-    wrench: FloatArray | None
-    """(6,) estimated force [N] and torque about the TCP [Nm] **on the robot by the environment**, base frame.
-
-    None where the robot has no estimate, as near a singularity.
-    """
-
-
-@value
-class SeenPoints:
-    """The newest M points of what outside sources see, such as cameras, in the base frame.
-
-    What a source shows of the arm itself or of fixtures may be in it. A row with a NaN shows nothing.
-    """
-
-    heard: float
-    """Newest measurement of the source silent for longest [s], -inf before the first; no points: nothing is seen."""
-    stamp: FloatArray
-    """(M,) instant at which each point was measured [s]."""
-    point: FloatArray
-    """(M, 3) [m]."""
-    sigma: FloatArray
-    """(M,) standard deviation of each point in the worst direction, that of the sensor's own pose included [m]."""
-
-
-@value
-class Inputs:
-    """All that one control step is given."""
-
-    stamp: float
-    """Instant of this step [s]."""
-    robot: RobotState
-    readings: RangeReadings
-    resume: bool = False
-    """A person asks to leave a latched HOLD."""
-    touch: TouchReadings | None = None
-    """What units say of being touched; None of a skin that has no touch sensors."""
-    points: SeenPoints | None = None
-    """What outside sources see; None without one. Once given, silence of theirs stops the arm."""
-    payload: Payload | None = None
-    """What the arm carries; None: nothing is said, and what was said last stays."""
-    desired: Desired | None = None
-    """What a commander asks for, in place of the path; None: the path is followed."""
-    moving: MovingFixtures | None = None
-    """What is known to move beside the arm; None: nothing is said of any."""
-
-
-@value
-class Obstacles:
-    """K sensed points, each with its closest point on the robot's body. Base frame."""
-
-    unit: IntArray
-    """(K,) index of the sensing unit in the skin; from their number on, of an outside point, then a moving fixture."""
-    point: FloatArray
-    """(K, 3) obstacle positions, eq. 1 [m]."""
-    ee_distance: FloatArray
-    """(K,) distance from the end-effector origin, less the spread, at least 0 [m] (eqs. 3, 11); inf: moving fixture."""
-    body_point: FloatArray
-    """(K, 3) closest points on the surface of the body [m]."""
-    link: IntArray
-    """(K,) index of the link that carries the closest point."""
-    direction: FloatArray
-    """(K, 3) unit vectors from body to obstacle, defined in penetration too."""
-    body_distance: FloatArray
-    """(K,) signed distance from the body's surface, less the point's spread [m] (eqs. 5-7)."""
-    closing_speed: FloatArray
-    """(K,) estimated speed of the object itself towards the closest body point [m/s]; 0 where it is not estimated."""
 
 
 @value
@@ -215,8 +81,7 @@ class Contact:
     """(3,) axes whose threshold was crossed."""
 
 
-@value
-class Touched:
+class Touched(NamedTuple):
     """Where the arm is touched: C = 1 contact; none where no contact is detected. Base frame."""
 
     link: IntArray
@@ -233,18 +98,6 @@ class Touched:
 
 NOT_TOUCHED = Touched(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0))
 """No contact is detected. One of these for all steps: its arrays are not written to either."""
-
-
-class QpOutcome(Enum):
-    """How a quadratic program ended."""
-
-    SOLVED = "solved"
-    INFEASIBLE = "infeasible"
-    """Hard rows contradict the joint box: the answer is the braking command."""
-    FAILED = "failed"
-    """The solver gave no usable answer: the answer is the braking command."""
-    SKIPPED = "skipped"
-    """No problem was posed, because the arm holds: the answer is the braking command."""
 
 
 @value
@@ -264,8 +117,28 @@ class QpSolution:
     """Whether a solution violates a soft row, also one that belongs to no obstacle."""
 
 
+class _LookedUp:
+    """A value whose fields are looked up in the numbers of a step when they are first asked for."""
+
+    __slots__ = ("_mode", "_now")
+
+    _now: Flat
+    _mode: ModeState
+
+    def __getattr__(self, name: str) -> Any:
+        """Look a field up that nobody has set."""
+        if name in _PLACES:
+            number = _PLACES[name](self._now)
+        elif name in ModeState.__slots__:
+            number = getattr(self._mode, name)
+        else:
+            raise AttributeError(f"{type(self).__name__} has no {name}")
+        setattr(self, name, number)
+        return number
+
+
 @value
-class ControlStep:
+class ControlStep(_LookedUp):
     """All that one step of the controller saw and decided: what figures and reports read, of any arm."""
 
     stamp: float
@@ -324,7 +197,49 @@ class ControlStep:
     detectable_n: float = np.nan
     """Force at the end-effector that is found, see `Detection.detectable_n` [N]."""
 
+    @classmethod
+    def of(cls, now: Flat, mode: ModeState, **known: Any) -> "ControlStep":
+        """Return the step of such numbers, see `line_records.Now`, and a mode; `known` are fields of other values."""
+        step = object.__new__(cls)
+        step._now, step._mode = now, mode
+        for name, number in known.items():
+            setattr(step, name, number)
+        return step
+
     @property
     def limited(self) -> Limited:
         """What keeps the arm from what is asked, and what is left of it."""
         return limited_by(self)
+
+
+def _obstacles(now: Flat) -> Obstacles:
+    count = now.get("seen.all")
+    return Obstacles(*(now.get(f"seen.near.{name}")[:count] for name in Obstacles._fields))
+
+
+def _solution(now: Flat) -> QpSolution:
+    seen, qd = now.get("answer.seen"), now.get("answer.command")
+    slack, multipliers = now.get("answer.slack")[:seen], now.get("answer.multipliers")[: len(qd) + seen]
+    how = outcome_of(bool(now.get("request.hold")), now.get("answer.ending"), bool(now.get("answer.violated")))
+    return QpSolution(qd, slack, multipliers, *how)
+
+
+_PLACES: dict[str, Callable[[Flat], Any]] = {
+    name: lambda now, path=path: now.get(path)
+    for name, path in {
+        "stamp": "stamp", "q": "robot.q", "q_commanded": "robot.q_commanded", "ee_position": "ee",
+        "path_position": "path.point", "path_phase": "path.phase", "desired_velocity": "request.velocity",
+        "speed_scale": "path.scale", "range_distance": "seen.distance", "filtered_force": "force.filtered",
+        "command": "answer.command",
+        "residual": "detection.residual", "evidence": "detection.log_likelihood_ratio",
+        "detectable_n": "detection.detectable_n",
+    }.items()
+} | {
+    "ee_velocity": lambda now: now.get("answer.velocities")[0], "obstacles": _obstacles,
+    "force": lambda now: now.get("robot.wrench")[:3], "thresholds": lambda now: Thresholds(now.get("detection.bands")),
+    "armed": lambda now: True, "contact": lambda now: None, "reaction_velocity": lambda now: np.zeros(3),
+    "restricted": lambda now: now.get("answer.which")[: now.get("answer.seen")],
+    "approach_limit": lambda now: now.get("answer.limit")[: now.get("answer.seen")], "qp": _solution,
+    "touched": lambda now: NOT_TOUCHED,
+}  # fmt: skip
+"""Where each field is found that a step in one call leaves to be looked up."""

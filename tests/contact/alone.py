@@ -1,6 +1,6 @@
 """A profile's detector given one sample after the other, with nothing around it."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -8,7 +8,7 @@ import numpy as np
 from pretouch.contact.detector import Body, Detection, Sample
 from pretouch.contact.sequential_test import SequentialTest
 from pretouch.contact.touch_cue import Cue, Cues
-from pretouch.contact.window import WindowState, add_force, window_init
+from pretouch.contact.window import Window, add_force, window_init
 from pretouch.groups import Kinematics
 from pretouch.profiles import Profile
 from pretouch.robot.model import RobotModel
@@ -20,7 +20,7 @@ from pretouch.types import FloatArray, Obstacles, RobotState, TouchReadings
 class Given(Cue):
     """Says what it is given."""
 
-    said: Cues | None = None
+    said: Cues | None = field(default=None, compare=False)
 
     def step(self, state: None, body: Body, sample: Sample) -> tuple[Cues | None, None]:
         return self.said, None
@@ -30,7 +30,7 @@ class Given(Cue):
 class Alone:
     """What is remembered."""
 
-    window: WindowState
+    window: Window
     state: Any
 
 

@@ -7,8 +7,8 @@ import numpy as np
 from pretouch.contact.detector import Body, Sample
 from pretouch.contact.sequential_test import SequentialTest, SequentialTestState
 from pretouch.contact.window import window_init
+from pretouch.groups import no_obstacles
 from pretouch.params import MisfitParams
-from pretouch.perception.closest import no_obstacles
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import RobotState

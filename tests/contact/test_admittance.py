@@ -87,21 +87,21 @@ def test_a_contact_begins_at_the_damper_s_speed_as_far_as_the_start_energy_goes(
 
 def test_the_lag_of_the_estimate_drives_nothing_once_the_force_has_ended(arm):
     keep = math.exp(-DT / P.lag_s)
-    state = replace(mass_init(N, P), torque=only(0, 8.0), velocity=only(0, 0.1))
+    state = mass_init(N, P)._replace(torque=only(0, 8.0), velocity=only(0, 0.1))
     state = after(state, arm, only(0, 8.0 * keep), params=P)
     # nothing but the damper acts
     np.testing.assert_allclose(state.velocity, only(0, 2.0 * 0.1 / 2.2))
 
 
 def test_a_torque_against_the_last_push_needs_a_wider_band(arm):
-    state = replace(mass_init(N, NO_LAG), side=only(0, 1.0))
+    state = mass_init(N, NO_LAG)._replace(side=only(0, 1.0))
     assert not after(state, arm, only(0, -1.9)).velocity.any()
     assert after(state, arm, only(0, -2.1)).velocity[0] < 0
     assert after(state, arm, only(0, 1.9)).velocity[0] > 0
 
 
 def test_a_joint_that_nothing_drives_is_asked_for_no_more_than_it_does(arm):
-    state = replace(mass_init(N, NO_LAG), velocity=np.full(N, 0.3))
+    state = mass_init(N, NO_LAG)._replace(velocity=np.full(N, 0.3))
     command = np.array([0.1, -0.1, 0.0, 0.5, 0.2, 0.05, 0.3])
     slower = 2.0 * 0.3 / 2.2
     np.testing.assert_allclose(
@@ -110,7 +110,7 @@ def test_a_joint_that_nothing_drives_is_asked_for_no_more_than_it_does(arm):
 
 
 def test_without_energy_in_the_tank_only_what_takes_energy_moves(arm):
-    state = replace(mass_init(N, NO_LAG), velocity=np.array([0.3, 0.3, 0, 0, 0, 0, 0]), tank=-0.1)
+    state = mass_init(N, NO_LAG)._replace(velocity=np.array([0.3, 0.3, 0, 0, 0, 0, 0]), tank=-0.1)
     moved = after(state, arm, [5.0, 0, 0, 0, 0, 0, 0]).velocity
     assert moved[0] > 0
     assert not moved[1:].any()

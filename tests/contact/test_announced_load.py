@@ -12,12 +12,11 @@ from pretouch.contact.announced_load import announced, doubted, kept_free, most_
 from pretouch.contact.residual_model import residual_init
 from pretouch.errors import ParameterError
 from pretouch.params import SequentialParams
-from pretouch.payload import Payload
 from pretouch.profiles import PROFILES
 from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify
 from pretouch.recording.writer import Recording
-from pretouch.types import Mode, RobotState
+from pretouch.types import Mode, Payload, RobotState
 
 PRETOUCH = PROFILES["pretouch"]
 STILL = np.zeros(7)

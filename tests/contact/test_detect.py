@@ -1,15 +1,13 @@
 """From a force sample to a contact: arming, filtered against raw, the help of proximity, and a missing estimate."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from pretouch.contact.detector import Detection
 from pretouch.contact.moving_thresholds import MovingThresholds
-from pretouch.contact.window import WindowState, add_force, window_init
+from pretouch.contact.window import Window, add_force, window_init
+from pretouch.groups import no_obstacles
 from pretouch.params import WindowParams
-from pretouch.perception.closest import no_obstacles
 from pretouch.types import Obstacles
 
 EE = np.array([0.5, 0.0, 0.3])
@@ -19,17 +17,17 @@ PUSH = np.array([0.0, -50.0, 0.0])
 def points(*at: tuple[float, float, float]) -> Obstacles:
     """Sensed points; what belongs to the body plays no part in detection."""
     p = np.array(at).reshape(-1, 3)
-    return replace(no_obstacles(), point=p, ee_distance=np.linalg.norm(p - EE, axis=1))
+    return no_obstacles()._replace(point=p, ee_distance=np.linalg.norm(p - EE, axis=1))
 
 
 def detect(
-    state: WindowState, force: np.ndarray | None, obstacles: Obstacles, params: MovingThresholds
-) -> tuple[Detection, WindowState]:
+    state: Window, force: np.ndarray | None, obstacles: Obstacles, params: MovingThresholds
+) -> tuple[Detection, Window]:
     window = add_force(state, force, WindowParams())
     return params.judged(window, force, state.full, EE, obstacles), window
 
 
-def quiet(samples: int = 100) -> WindowState:
+def quiet(samples: int = 100) -> Window:
     """A full window of zeros."""
     state = window_init(samples)
     for _ in range(samples):

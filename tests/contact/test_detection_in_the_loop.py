@@ -23,8 +23,8 @@ def test_an_arm_without_torques_holds_if_its_detector_needs_them(panda_model, pa
 def test_another_method_begins_anew_and_what_was_learnt_can_be_given(panda_model, paper_skin):
     paper, ours = (Arm(panda_model, paper_skin, profile(name)) for name in ("paper", "pretouch"))
     assert paper.step().evidence == 0.0
-    model = ours.controller.adopt(paper.state, paper.controller).detector.test.model
+    model = ours.controller.adopt(paper.state, paper.controller).learnt
     assert not model.weights.any()
-    known = replace(model, weights=model.weights + 0.5)
-    again = ours.controller.init(ours.robot(), known).detector.test.model
+    known = model._replace(weights=model.weights + 0.5)
+    again = ours.controller.init(ours.robot(), known).learnt
     np.testing.assert_array_equal(again.weights, 0.5)

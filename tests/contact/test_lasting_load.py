@@ -9,7 +9,7 @@ from tests.contact.alone import feel, something, standing
 
 from pretouch.contact.detector import Detection
 from pretouch.contact.lasting_load import is_load
-from pretouch.perception.closest import no_obstacles
+from pretouch.groups import no_obstacles
 from pretouch.profiles import Profile, profile
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel

@@ -9,22 +9,14 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from tests.contact.alone import something, standing
 
-from pretouch.contact.localisation.localise import LocalisationState, localisation_init, localise
+from pretouch.contact.localisation.localise import LocalisationState, ResidualWindows, localisation_init, localise
 from pretouch.contact.localisation.posterior import Candidates, log_posterior
-from pretouch.contact.localisation.prior import (
-    LocalisationNumbers,
-    SeenNear,
-    UnitCues,
-    candidate_poses,
-    hidden_candidates,
-    log_prior,
-)
+from pretouch.contact.localisation.prior import LocalisationNumbers, candidate_poses, hidden_candidates, log_prior
 from pretouch.contact.scatter import LENGTHS
-from pretouch.contact.sequential_detector import Observation, ResidualWindows
+from pretouch.contact.sequential_detector import Observation
 from pretouch.contact.touch_cue import Cues, gain_of, no_cues, surface_area
-from pretouch.groups import Kinematics
+from pretouch.groups import Kinematics, no_obstacles
 from pretouch.params import LocalisationParams, TouchSensorParams
-from pretouch.perception.closest import no_obstacles
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.robot.vectors import placed_capsules
@@ -104,13 +96,10 @@ def touched(kin: Kinematics, c: int) -> Cues:
     return Cues(gain, np.array([link]), pose_of(kin, c)[0][None], np.array([PATCH.radius / 2]), np.array([5.0]))
 
 
-NOTHING_NEAR = SeenNear(np.zeros((0, 3)), np.zeros(0))
-
-
-def prior(kin: Kinematics, cues: Cues, hidden: FloatArray, near: SeenNear = NOTHING_NEAR) -> FloatArray:
+def prior(kin: Kinematics, cues: Cues, hidden: FloatArray, near: Obstacles | None = None) -> FloatArray:
     """Probability (N,) of each candidate before torques are looked at."""
-    ln, units = np.empty(len(SURFACE)), UnitCues(cues.gain, cues.link, cues.point, cues.sigma)
-    log_prior(poses(kin)[0], SURFACE.arrays, hidden, near, units, NUMBERS, ln)
+    ln = np.empty(len(SURFACE))
+    log_prior(poses(kin)[0], SURFACE.arrays, hidden, near or no_obstacles(), cues, NUMBERS, ln)
     return np.exp(ln)
 
 
@@ -205,7 +194,7 @@ def test_a_touched_unit_and_a_seen_hand_say_where_when_the_torques_do_not():
     point, normal = pose_of(kin, c)
     torque = torques(kin, (c, 60.0))
     alone, _ = said(kin, torque)
-    told, _ = said(kin, torque, cues=replace(touched(kin, c), gain=np.ones(len(MODEL.links))))
+    told, _ = said(kin, torque, cues=touched(kin, c)._replace(gain=np.ones(len(MODEL.links))))
     seen, _ = said(kin, torque, obstacles=something(int(SURFACE.link[c]), point, normal, 0.05, 1.0))
     assert MODEL.rigid[told.link[0]] == SURFACE.body[c]
     assert np.linalg.norm(told.point[0] - point) < 0.02
@@ -214,7 +203,7 @@ def test_a_touched_unit_and_a_seen_hand_say_where_when_the_torques_do_not():
     # and a link that units call likely more is believed
     gain = np.ones(len(MODEL.links))
     gain[SURFACE.link[c]] = 100.0
-    likely, _ = said(kin, torque, cues=replace(no_cues(len(MODEL.links)), gain=gain))
+    likely, _ = said(kin, torque, cues=no_cues(len(MODEL.links))._replace(gain=gain))
     assert MODEL.rigid[likely.link[0]] == SURFACE.body[c]
 
 
@@ -223,7 +212,7 @@ def test_the_prior_is_one_in_all_and_hides_what_cannot_be_touched():
     point, _ = poses(kin)
     hidden = ~exposed(kin)
     assert 0 < hidden.sum() < len(SURFACE) / 2
-    near = SeenNear(point[:2] + 0.03, np.array([0.03, 0.2]))
+    near = no_obstacles(2)._replace(point=point[:2] + 0.03, body_distance=np.array([0.03, 0.2]))
     made = prior(kin, no_cues(len(MODEL.links)), hidden, near)
     assert made.sum() == pytest.approx(1.0, abs=1e-6)
     assert made[hidden].max() < 1e-11
@@ -323,9 +312,9 @@ def test_a_touch_whose_place_is_hidden_still_counts_by_its_link():
     c = of("panda_link4", kin)
     link = SURFACE.link[c]
     cues = touched(kin, c)
-    far = replace(cues, point=cues.point + 5.0)
+    far = cues._replace(point=cues.point + 5.0)
     made = prior(kin, far, ~exposed(kin))
-    evenly = prior(kin, replace(far, gain=np.ones(len(cues.gain))), ~exposed(kin))
+    evenly = prior(kin, far._replace(gain=np.ones(len(cues.gain))), ~exposed(kin))
     on = SURFACE.link == link
     odds = made[on].sum() / made[~on].sum() / (evenly[on].sum() / evenly[~on].sum())
     assert odds == pytest.approx(cues.gain[link], rel=1e-3)

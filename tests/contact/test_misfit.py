@@ -15,8 +15,8 @@ from pretouch.contact.detector import Body, Sample
 from pretouch.contact.scatter import LENGTHS, learn_scatter, scatter_init, scattered_means, spread_out
 from pretouch.contact.sequential_test import SequentialTest
 from pretouch.contact.window import window_init
+from pretouch.groups import no_obstacles
 from pretouch.params import MisfitParams
-from pretouch.perception.closest import no_obstacles
 from pretouch.profiles import profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin

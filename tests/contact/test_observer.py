@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from pretouch.contact.observer import observe, observer_init, wrench_from_torques
 from pretouch.robot.model import RobotModel
+from pretouch.sim.observer import observe, observer_init, wrench_from_torques
 
 GAIN, DT = 50.0, 5e-4
 TAU_EXT = np.array([3.0, -8.0, 2.0, 5.0, -1.0, 0.5, -0.2])

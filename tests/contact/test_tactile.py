@@ -13,7 +13,7 @@ from pretouch.contact.alarm_level import earned_level, level_init
 from pretouch.contact.detector import Body
 from pretouch.contact.sequential import alarm_bound
 from pretouch.contact.touch_cue import Cues, TouchSensors, gain_of, no_cues, surface_area, together
-from pretouch.perception.closest import no_obstacles
+from pretouch.groups import no_obstacles
 from pretouch.profiles import profile
 from pretouch.robot.body import Capsules
 from pretouch.robot.model import RobotModel
@@ -159,7 +159,7 @@ def test_a_cue_counts_for_an_object_that_is_seen_at_its_link_as_well_and_no_cue_
     gain = quiet.gain.copy()
     gain[link] = 50.0
     ours, evidence = profile("pretouch"), []
-    for cues in (None, quiet, replace(quiet, gain=gain)):
+    for cues in (None, quiet, quiet._replace(gain=gain)):
         state = feel_init(panda_model, ours)
         for k in range(5):
             robot, seen = standing(panda_model, torque, stamp=0.02 * k), something(link, at, away, 0.01, 0.5)

@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pretouch.contact.window import WindowState, add_force, weighted_value, window_init
+from pretouch.contact.window import Window, add_force, weighted_value, window_init
 from pretouch.params import WindowParams
 
 P = WindowParams()  # Table I: alpha 0.1, lambda 0.75
 
 
-def filled(values: list[float]) -> WindowState:
+def filled(values: list[float]) -> Window:
     """A window as large as the values, the same on all three axes."""
     state = window_init(len(values))
     for value in values:
@@ -72,7 +72,7 @@ def test_a_step_of_the_signal_leaves_no_lasting_error():
     state = window_init(50)
     for i in range(500):
         state = add_force(state, np.full(3, 0.1 if i < 130 else 12345.678), replace(P, alpha=1.0))
-        values = state.ring[: state.count]
+        values = state.ring[: state.samples[0]]
         np.testing.assert_allclose(state.mean(), values.mean(axis=0), atol=1e-9)
     # the window holds equal values only: its deviation is exactly zero, so eq. 10 adds nothing
     np.testing.assert_array_equal(state.std(), 0.0)

@@ -1,28 +1,47 @@
-"""One step of the motion, made of its parts as the controller makes it."""
+"""One step of the motion, with obstacles that a test chooses."""
 
-from typing import Any
+import numpy as np
 
-from pretouch.control.interface import MotionBody, MotionRequest
-from pretouch.control.joint_box import JointLimits
-from pretouch.control.motion import Motion, MotionState, joint_motion, motion_setup, restriction_on
-from pretouch.groups import Kinematics
+from pretouch.control.interface import MotionRequest
+from pretouch.control.path import Circle
+from pretouch.controller import Controller
+from pretouch.faults import put_robot
+from pretouch.groups import Kinematics, Obstacles
+from pretouch.line import MOVE
+from pretouch.modes import CLEAR
+from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import Profile
 from pretouch.robot.model import RobotModel
-from pretouch.types import Obstacles, RobotState
+from pretouch.sensing.skin import paper_skin
+from pretouch.types import ControlStep, RobotState
 
 
 class Mover:
     """An arm's motion with a profile, and what it remembers."""
 
-    def __init__(self, model: RobotModel, limits: JointLimits, profile: Profile, units: int = 7) -> None:
-        self.body = MotionBody(model, units, limits, profile.task)
-        self.setup = motion_setup(self.body, profile.null_space, profile.failure.solver_iterations)
-        self.part = restriction_on(profile.approach, self.body)
-        self.remembered: Any = None if profile.approach is None else profile.approach.init(self.body)
-        self.state = MotionState(0.0 * limits.qd_max)
+    def __init__(self, model: RobotModel, profile: Profile) -> None:
+        self.controller = Controller(model, paper_skin(model), no_fixtures(), Circle(), profile)
+        q, still = model.description.q_ready, np.zeros(model.n)
+        state = self.controller.init(RobotState(0.0, q, still, q, still, still, None))
+        self.memory, self.approach = state.memory, state.approach
 
-    def step(self, kin: Kinematics, robot: RobotState, obstacles: Obstacles, request: MotionRequest) -> Motion:
+    def step(self, kin: Kinematics, robot: RobotState, obstacles: Obstacles, request: MotionRequest) -> ControlStep:
         """Return the motion of one step."""
-        allowed, self.remembered = self.part.step(self.remembered, self.body, kin, robot, obstacles, request)
-        motion, self.state = joint_motion(self.state, self.setup, kin, robot, obstacles, request, allowed)
-        return motion
+        controller, now = self.controller, self.controller.blank.copy()
+        put_robot(now, "robot", robot)
+        now.fill("kin", kin)
+        now.put("ee", kin.position[controller.model.ee])
+        for room, part in zip(now.part("seen.near", Obstacles), obstacles, strict=True):
+            room[: len(part)] = part
+        now.put("seen.all", len(obstacles.unit))
+        for name, asked in (("velocity", request.velocity), ("goal", request.rotation_goal), ("hold", request.hold)):
+            now.put(f"request.{name}", asked)
+        if request.qd is not None:
+            now.put("request.qd", request.qd)
+            now.put("request.by_joints", 1)
+        if controller.approach is None:
+            controller.take(self.memory, now, controller.beside, MOVE, MOVE)
+        else:
+            part = controller.approach
+            self.approach = controller.restricted(part, self.approach, self.memory, now, robot, request)
+        return ControlStep.of(now, CLEAR)

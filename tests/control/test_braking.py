@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from pretouch.control.braking import (
     BrakingLimits,
     Mass,
+    Touch,
     TouchLimits,
     braking_cap,
     braking_rows,
@@ -17,7 +18,7 @@ from pretouch.control.braking import (
     tangents_of,
 )
 from pretouch.control.qp import Rows
-from pretouch.groups import Chain, ObstacleArrays
+from pretouch.groups import Chain, no_obstacles
 from pretouch.types import FloatArray
 
 DT, A, TOUCH, TASK, NOTICE = 0.01, 0.3, 0.03, 0.3, 0.6
@@ -35,9 +36,8 @@ class Sled:
     def __init__(self, across: bool = False, units: int = 1) -> None:
         self.slots, self.units = slots_init(units), units
         near = NEAR if across else -np.inf
-        self.limits = BrakingLimits(
-            NOTICE, A, 0.0, 0.0, RETREAT, 0.0, near, SLOWEST, TASK, TIGHTEN, LOOSEN, DT, sys.maxsize
-        )
+        self.limits = BrakingLimits(NOTICE, A, 0.0, 0.0, RETREAT, near, SLOWEST, TASK, TIGHTEN, LOOSEN, DT)
+        self.touch = Touch(TouchLimits(100.0, 1e5, 1.0, TOUCH), 0.0, sys.maxsize)
 
     def rows(
         self, speed: float, seen: dict[int, tuple[int, float]], closing: float = 0.0, normal: FloatArray = UP
@@ -45,13 +45,14 @@ class Sled:
         """Rows of units that see {unit: (link, distance)}: how many are of what is seen, G in m/s, h."""
         k = len(seen)
         G, h = np.empty((10 * self.units, 1)), np.empty(10 * self.units)
-        obstacles = ObstacleArrays(
-            np.array(list(seen), np.int64), np.array([link for link, _ in seen.values()], np.int64), np.zeros((k, 3)),
-            np.tile(normal, (k, 1)), np.array([d for _, d in seen.values()]), np.full(k, closing),
+        obstacles = no_obstacles(k)._replace(
+            unit=np.array(list(seen), np.int64), link=np.array([link for link, _ in seen.values()], np.int64),
+            direction=np.tile(normal, (k, 1)), body_distance=np.array([d for _, d in seen.values()]),
+            closing_speed=np.full(k, closing),
         )  # fmt: skip
         chain = Chain(self.anchor, self.axis, self.moved_by, np.array([speed / 1000.0]))
         found, rows = braking_rows(
-            self.slots, obstacles, chain, Mass(False, np.eye(1)), TouchLimits(100.0, 1e5, 1.0, TOUCH), self.limits,
+            self.slots, obstacles, chain, Mass(False, np.eye(1)), self.touch, self.limits,
             Rows(G, h, np.empty(k, np.int64)),
         )  # fmt: skip
         return found, G[:rows, 0] / 1000.0, h[:rows]
@@ -59,7 +60,7 @@ class Sled:
 
 def test_what_is_not_to_be_touched_is_not_approached_at_its_surface():
     seen, kept_off = Sled(), Sled()
-    kept_off.limits = kept_off.limits._replace(untouched=0)
+    kept_off.touch = kept_off.touch._replace(untouched=0)
     for sled, least in ((seen, TOUCH), (kept_off, 0.0)):
         for _ in range(2000):
             _, _, h = sled.rows(0.0, {0: (1, 0.0)})

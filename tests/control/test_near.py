@@ -9,12 +9,11 @@ from tests.control.motions import Mover
 from tests.following_arm import DT, Arm
 
 from pretouch.control.braking import braking_cap
-from pretouch.control.interface import MotionRequest, Restricted
-from pretouch.control.joint_box import joint_limits
-from pretouch.control.motion import joint_motion
+from pretouch.control.interface import MotionRequest, Restricted, rows_of
 from pretouch.errors import ParameterError
+from pretouch.groups import no_obstacles
 from pretouch.params import NullSpaceMotion
-from pretouch.perception.closest import closest_points, no_obstacles
+from pretouch.perception.closest import closest_points
 from pretouch.profiles import PROFILES, Profile, profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
@@ -82,15 +81,10 @@ def test_every_part_of_ours_can_be_left_out_alone():
 
 
 @pytest.mark.parametrize("shape", [(2, 6), (1, 7)])
-def test_rows_of_a_wrong_shape_are_refused(panda_model: RobotModel, paper_skin: Skin, shape: tuple[int, int]):
-    arm = Arm(panda_model, paper_skin)
-    mover = Mover(panda_model, arm.controller.limits, PROFILES["paper"])
-    request = MotionRequest(np.zeros(3), np.eye(3))
+def test_rows_of_a_wrong_shape_are_refused(shape: tuple[int, int]):
     allowed = Restricted(np.zeros(shape), np.zeros(2), np.zeros(2, np.int64), 1.0)
     with pytest.raises(ParameterError, match=r"rows are G .*: G is \(R, 7\), h is \(R,\)"):
-        joint_motion(
-            mover.state, mover.setup, panda_model.kinematics(arm.q), arm.robot(), no_obstacles(), request, allowed
-        )
+        rows_of(allowed, 7)
 
 
 def test_towards_a_wall_the_arm_keeps_the_braking_curve_and_comes_to_touch(panda_model: RobotModel, paper_skin: Skin):
@@ -155,7 +149,7 @@ def test_near_a_thing_beside_it_the_arm_does_not_slide_past_at_full_speed(panda_
 def test_on_a_blocked_path_the_phase_waits(panda_model: RobotModel, paper_skin: Skin):
     arm = on_its_way(panda_model, paper_skin)
     arm.run(60, seen={LEFT: 0.0})
-    begun = arm.state.path.phase
+    begun = arm.state.phase
     step = arm.run(200, seen={LEFT: 0.0})[-1]
     assert step.mode is Mode.TRACK
     assert step.path_phase - begun < 0.15
@@ -165,10 +159,9 @@ def test_on_a_blocked_path_the_phase_waits(panda_model: RobotModel, paper_skin: 
 
 def test_the_null_space_moves_the_elbow_away_and_the_hand_stays(panda_model: RobotModel):
     elbow, gaps = panda_model.link_index("panda_link4"), {}
-    limits = joint_limits(panda_model, 0.01, DT)
     for name in ("pretouch", "pretouch:null_space=none"):
         params = replace(profile(name), task=replace(profile(name).task, mid_joint_gain=1e-3, mid_joint_time_s=1e5))
-        q, qd, mover = panda_model.description.q_ready.copy(), np.zeros(7), Mover(panda_model, limits, params, 1)
+        q, qd, mover = panda_model.description.q_ready.copy(), np.zeros(7), Mover(panda_model, params)
         start = panda_model.kinematics(q)
         thing = start.position[elbow] + np.array([0.0, 0.2, 0.0])
         for _ in range(100):
@@ -189,7 +182,7 @@ def test_joint_velocities_asked_for_are_the_answer_within_the_limits(panda_model
     arm = Arm(panda_model, paper_skin)
     wanted = np.array([0.02, -0.01, 0.03, 0.0, 0.01, -0.02, 0.01])
     for params in (PROFILES["paper"], PRETOUCH):
-        motion = Mover(panda_model, arm.controller.limits, params).step(
+        motion = Mover(panda_model, params).step(
             panda_model.kinematics(arm.q), arm.robot(), no_obstacles(),
             MotionRequest(np.array([0.0, 0.3, 0.0]), np.eye(3), qd=wanted),
         )  # fmt: skip

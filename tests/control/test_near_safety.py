@@ -106,8 +106,7 @@ def test_with_things_on_all_sides_the_arm_creeps_and_the_problem_is_solved(panda
 @given(st.integers(0, 10_000))
 def test_in_any_posture_nothing_that_stands_is_met_faster_than_the_curve_allows(panda_model: RobotModel, seed: int):
     rng, model = np.random.default_rng([1000, seed]), panda_model
-    limits = joint_limits(model, 0.01, DT)
-    mover = Mover(model, limits, PRETOUCH, 3)
+    limits, mover = joint_limits(model, 0.01, DT), Mover(model, PRETOUCH)
     span = limits.q_max - limits.q_min
     # near a limit or a stretched arm as often as not
     q = np.clip(limits.q_min + span * rng.uniform(-0.1, 1.1, 7), limits.q_min, limits.q_max)

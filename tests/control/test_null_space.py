@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from pretouch.control.null_space import NullSpaceLimits, away, cost_with_null_space, projector
 from pretouch.control.qp import cost_params, task_cost
-from pretouch.groups import ObstacleArrays
+from pretouch.groups import Obstacles, no_obstacles
 from pretouch.params import TaskParams
 from pretouch.robot.model import RobotModel
 
@@ -88,10 +88,9 @@ def test_without_the_switch_the_mid_joint_term_is_the_papers(panda_model: RobotM
     np.testing.assert_allclose(f, paper.f, atol=1e-12)
 
 
-def at(distance: float) -> ObstacleArrays:
+def at(distance: float) -> Obstacles:
     """One obstacle near link 1."""
-    none = np.zeros((1, 3))
-    return ObstacleArrays(np.zeros(1, np.int64), np.ones(1, np.int64), none, none, np.array([distance]), np.zeros(1))
+    return no_obstacles(1)._replace(link=np.ones(1, np.int64), body_distance=np.array([distance]))
 
 
 def asked(distance: float, row: np.ndarray, hand: bool = False, last: np.ndarray | None = None) -> np.ndarray:

@@ -1,24 +1,35 @@
 """The paths of the paper by numbers, and how the phase moves along them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from tests.following_arm import DT, Arm
 
-from pretouch.control import path as paths
-from pretouch.control.path import Circle, Path, PathState, WayPoints, follow, line, pause
+from pretouch.control.path import Circle, Path, WayPoints, advance, follow, segment
 from pretouch.errors import PathError
 from pretouch.params import TaskParams
 
 CIRCLE = Circle()  # paper, IV-A: radius 0.25 m round (0.5, 0, 0.25)
-LINE = line((0.4, 0.5, 0.5), (0.4, -0.5, 0.5))  # paper, IV-A
+LINE = segment((0.4, 0.5, 0.5), (0.4, -0.5, 0.5))  # paper, IV-A
 SQUARE = WayPoints(np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]), closed=True)
 PARAMS = TaskParams()
 
 
-def advance(path: Path, state: PathState, position: np.ndarray, velocity: np.ndarray) -> PathState:
-    return paths.advance(path, state, follow(path, state, position, PARAMS), velocity, PARAMS)
+def followed(path: Path, phase: float, speed: float, position: np.ndarray) -> tuple[np.ndarray, float]:
+    """Task velocity, and its speed along the path before it is limited."""
+    p, velocity = PARAMS, np.empty(3)
+    point, tangent = path.point(phase), path.tangent(phase)
+    forward = follow(point, tangent, speed, position, p.off_path_m, p.position_gain_1_s, velocity)
+    return velocity, forward
+
+
+def moved(path: Path, phase: float, speed: float, position: np.ndarray, velocity: np.ndarray) -> float:
+    """The phase after a cycle with a commanded velocity."""
+    return advance(phase, path.tangent(phase), *followed(path, phase, speed, position), velocity, DT)
 
 
 def test_circle_starts_at_its_left_and_rises():
@@ -92,14 +103,14 @@ SLOWED = 0.02 / np.hypot(0.01, 0.1)
     ],
 )
 def test_along_and_back_to_the_path_by_numbers(speed: float, position: tuple, velocity: tuple):
-    found = follow(LINE, PathState(0.25, speed), np.array(position), PARAMS).velocity
-    np.testing.assert_allclose(found, velocity, atol=1e-12)
+    np.testing.assert_allclose(followed(LINE, 0.25, speed, np.array(position))[0], velocity, atol=1e-12)
 
 
 @given(arrays(np.float64, 3, elements=st.floats(-2, 2)), st.floats(0, 10), st.floats(0, 0.3))
 @settings(deadline=None, derandomize=True, max_examples=200)
 def test_the_task_is_never_faster_than_allowed_by_now(position: np.ndarray, phase: float, speed: float):
-    velocity = follow(CIRCLE, PathState(phase, speed), position, PARAMS).velocity
+    velocity, forward = followed(CIRCLE, phase, speed, position)
+    assert 0 <= forward <= speed
     assert np.linalg.norm(velocity) <= speed * (1 + 1e-12)
 
 
@@ -110,44 +121,54 @@ def test_the_task_is_never_faster_than_allowed_by_now(position: np.ndarray, phas
         (LINE, 0.25, (0.5, -0.2, 0), 0.252),
         (LINE, 0.25, (0, 0, 0), 0.25),  # blocked
         (LINE, 0.25, (0, 0.2, 0), 0.25),  # and never back
-        (LINE, 0.9999, (0, -0.3, 0), 1.0),  # the end
-        (CIRCLE, CIRCLE.length, (0, 0, 0.3), CIRCLE.length + 0.003),  # has none
+        (CIRCLE, CIRCLE.length, (0, 0, 0.3), CIRCLE.length + 0.003),  # it has no end
     ],
 )
 def test_the_phase_moves_by_what_was_achieved_along_the_path(path: Path, phase: float, velocity: tuple, after: float):
-    found = advance(path, PathState(phase, 0.3), path.point(phase), np.array(velocity)).phase
+    found = moved(path, phase, 0.3, path.point(phase), np.array(velocity, float))
     assert found == pytest.approx(after, rel=1e-7, abs=0.0)
 
 
 def test_the_way_back_to_the_path_is_no_way_along_it_by_numbers():
     # 0.05 m behind: asked for 0.2 * 0.5 + 2 * 0.05 = 0.2 m/s, and does it; 0.1 of it is progress, 0.1 catches up
-    state, behind = PathState(0.25, 0.2), LINE.point(0.2)
-    np.testing.assert_allclose(follow(LINE, state, behind, PARAMS).velocity, [0, -0.2, 0], atol=1e-12)
-    np.testing.assert_allclose(advance(LINE, state, behind, np.array([0, -0.2, 0])).phase, 0.251)
+    behind = LINE.point(0.2)
+    np.testing.assert_allclose(followed(LINE, 0.25, 0.2, behind)[0], [0, -0.2, 0], atol=1e-12)
+    np.testing.assert_allclose(moved(LINE, 0.25, 0.2, behind, np.array([0, -0.2, 0])), 0.251)
     # slowed to a half it does 0.1 m/s, 0.1 less than asked: all of that is catching up
-    np.testing.assert_allclose(advance(LINE, state, behind, np.array([0, -0.1, 0])).phase, 0.25)
+    np.testing.assert_allclose(moved(LINE, 0.25, 0.2, behind, np.array([0, -0.1, 0])), 0.25)
 
 
-@pytest.mark.parametrize("path", [CIRCLE, line((0.0, 0.0, 0.0), (0.0, 9.0, 0.0))])
+@pytest.mark.parametrize("path", [CIRCLE, segment((0.0, 0.0, 0.0), (0.0, 9.0, 0.0))])
 @given(away=arrays(np.float64, 3, elements=st.floats(-0.3, 0.3)), slowed=st.floats(0.2, 1.0))
 @settings(deadline=None, derandomize=True, max_examples=30)
 def test_wherever_it_was_pushed_the_arm_comes_back_and_goes_on(path: Path, away: np.ndarray, slowed: float):
-    state, position = PathState(), path.point(0.0) + away
+    phase, speed, position = 0.0, 0.0, path.point(0.0) + away
     for _ in range(2500):  # 0.5 m at a fifth of 0.3 m/s is 8 s, and then as long again
-        velocity = follow(path, state, position, PARAMS).scaled(slowed)
-        state = advance(path, state, position, velocity)
-        position = position + 0.01 * velocity
-    assert np.linalg.norm(path.point(state.phase) - position) < 0.005
+        velocity = slowed * followed(path, phase, speed, position)[0]
+        phase = moved(path, phase, speed, position, velocity)
+        speed = min(PARAMS.speed_m_s, speed + PARAMS.acceleration_m_s2 * DT)
+        position = position + DT * velocity
+    assert np.linalg.norm(path.point(phase) - position) < 0.005
     assert np.linalg.norm(velocity) > 0.95 * slowed * PARAMS.speed_m_s
-    assert state.phase > 0.2
+    assert phase > 0.2
 
 
-def test_the_speed_grows_to_the_task_speed_and_starts_again_after_a_pause():
-    state = PathState()
-    for _ in range(29):
-        state = advance(LINE, state, LINE.point(0), np.zeros(3))
-    np.testing.assert_allclose(state.speed, 0.29)
-    for _ in range(5):
-        state = advance(LINE, state, LINE.point(0), np.zeros(3))
-    assert state.speed == 0.3
-    assert pause(PathState(0.7, 0.3)) == PathState(0.7, 0.0)
+def test_the_speed_grows_to_the_task_speed_and_starts_again_after_a_pause(panda_model, paper_skin):
+    arm, speeds = Arm(panda_model, paper_skin), [0.0]
+    arm.run(arm.controller.profile.window.samples)  # it stands until the window is full
+    for _ in range(35):
+        arm.step()
+        speeds.append(arm.state.memory.get("pace.speed"))
+    assert [speeds[1], speeds[29]] == pytest.approx([0.01, 0.29])
+    assert speeds[35] == 0.3
+    before = arm.state.phase
+    arm.step(change=lambda robot: replace(robot, stamp=robot.stamp - 1.0))  # stale: it holds
+    assert (arm.state.phase, arm.state.memory.get("pace.speed")) == (before, 0.0)
+
+
+def test_an_open_path_ends_where_it_ends(panda_model, paper_skin):
+    x = panda_model.kinematics(panda_model.description.q_ready).position[panda_model.ee]
+    arm = Arm(panda_model, paper_skin, path=segment(tuple(x), (x[0], x[1] + 0.1, x[2])))
+    phases = [step.path_phase for step in arm.run(200)]
+    assert max(phases) == phases[-1] == arm.controller.path.length
+    assert phases == sorted(phases)

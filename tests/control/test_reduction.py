@@ -7,17 +7,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pretouch.control.reduction import ReductionState, faded_scale, reduce_speed, speed_scale
+from pretouch.control.path import faded_scale, reduce_speed, speed_scale
 
 D_MAX = 0.8
 
 
 def faded(fresh: list[float]) -> list[float]:
     """Factor on the speed for a sequence of fresh factors, with l_max = 4."""
-    state, out = ReductionState(), []
+    scale, cycles, out = 1.0, 0, []
     for factor in fresh:
-        scale, state = reduce_speed(state, factor, 4)
-        out.append(scale)
+        slowed, scale, cycles = reduce_speed(scale, cycles, factor, 4)
+        out.append(slowed)
     return out
 
 
@@ -101,7 +101,5 @@ def test_the_factor_is_never_above_what_the_nearest_seen_obstacle_allows(distanc
 
 
 def test_a_factor_that_is_no_number_leaves_a_usable_factor():
-    scale, state = reduce_speed(ReductionState(0.5, 2), np.nan, 4)
     # 0.5 + 0.5 * 3 / 4: as if nothing were seen
-    assert scale == 0.875
-    assert np.isfinite(state.scale)
+    assert reduce_speed(0.5, 2, np.nan, 4) == (0.875, 0.5, 3)

@@ -10,11 +10,11 @@ from pretouch.contact.admittance import Admittance
 from pretouch.contact.moving_thresholds import MovingThresholds
 from pretouch.contact.reaction import Reaction
 from pretouch.contact.sequential_test import SequentialTest
-from pretouch.control.approach import ApproachRestriction, notice_m
-from pretouch.control.braking_curve import BrakingCurve
+from pretouch.control.approach import ApproachRestriction, BrakingCurve, notice_m
 from pretouch.modes import Event
 from pretouch.params import ClampParams
 from pretouch.profiles import Profile
+from pretouch.records import Flat
 from pretouch.robot.description import SpeedEnvelope
 from pretouch.robot.model import RobotModel
 from pretouch.types import ControlStep, Mode, QpOutcome, Touched
@@ -28,7 +28,9 @@ MAY_BE_NAN = {"range_distance", "force"}
 
 @cache
 def _names(kind: type) -> tuple[str, ...]:
-    return tuple(f.name for f in fields(kind)) if is_dataclass(kind) else ()
+    if kind is Flat:
+        return ("blocks",)
+    return tuple(f.name for f in fields(kind)) if is_dataclass(kind) else getattr(kind, "_fields", ())
 
 
 def arrays_of(value: object) -> list[tuple[str, np.ndarray]]:

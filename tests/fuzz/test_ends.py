@@ -5,7 +5,7 @@ from dataclasses import fields, is_dataclass, replace
 import numpy as np
 import pytest
 
-from pretouch.control.path import Circle, Path, WayPoints, line
+from pretouch.control.path import Circle, Path, WayPoints, segment
 from pretouch.controller import Controller
 from pretouch.errors import PretouchError
 from pretouch.perception.scene_filter import Fixtures, no_fixtures
@@ -76,7 +76,7 @@ def test_a_margin_that_leaves_a_joint_no_range_is_refused(panda_model: RobotMode
     [
         lambda: Circle(radius=5e-324), lambda: Circle(radius=1e300), lambda: Circle(start_angle=1e300),
         lambda: Circle(center=(1e308, 0.0, 0.0)), lambda: WayPoints(np.array([[0.0, 0.0, 0.0], [1e200, 0.0, 0.0]])),
-        lambda: line((0.0, 0.0, 0.0), (1e308, -1e308, 0.0)), lambda: line((0.0, 0.0, 0.3), (1e150, 0.0, 0.0)),
+        lambda: segment((0.0, 0.0, 0.0), (1e308, -1e308, 0.0)), lambda: segment((0.0, 0.0, 0.3), (1e150, 0.0, 0.0)),
         lambda: WayPoints(np.array([[0.0, 0.0, 0.0], [1e-5, 0.0, 0.0]]), closed=True),
     ],
 )  # fmt: skip

@@ -10,9 +10,8 @@ from pretouch.contact.decaying_velocity import DecayingVelocity
 from pretouch.contact.moving_thresholds import MovingThresholds
 from pretouch.contact.reaction import Reaction
 from pretouch.contact.sequential_test import SequentialTest
-from pretouch.control.approach import ApproachRestriction
-from pretouch.control.braking_curve import BrakingCurve
-from pretouch.control.path import Circle, Path, WayPoints, line
+from pretouch.control.approach import ApproachRestriction, BrakingCurve
+from pretouch.control.path import Circle, Path, WayPoints, segment
 from pretouch.params import (
     ClampParams,
     ClosingSpeed,
@@ -246,4 +245,4 @@ def any_path(rng: np.random.Generator, model: RobotModel, q: np.ndarray) -> Path
     if kind == 4:
         return WayPoints(x + np.array([[0, 0, 0], [2e-6, 0, 0], [0, 2e-6, 0]]), closed=bool(rng.random() < 0.5))
     ends = rng.uniform(-1.0, 1.0, 3) * rng.choice([1.0, 3.0, 900.0])
-    return line(tuple(x), tuple(ends)) if kind == 5 else line((0.0, 0.0, 0.3), tuple(ends + 2.0))
+    return segment(tuple(x), tuple(ends)) if kind == 5 else segment((0.0, 0.0, 0.3), tuple(ends + 2.0))

@@ -5,13 +5,12 @@ error, so that none is forgotten.
 """
 
 from collections.abc import Iterator
-from dataclasses import fields, is_dataclass
 from enum import Enum
-from types import NoneType
-from typing import get_args, get_type_hints
+from typing import get_args
 
 import numpy as np
 
+from pretouch.recording.fields import hints_of, is_record
 from pretouch.types import ControlStep
 
 FIELDS = {
@@ -101,11 +100,9 @@ def forgotten(step: ControlStep, table: dict[str, str] = FIELDS) -> list[str]:
 
 def leaves(kind: type, before: str = "") -> Iterator[str]:
     """All places in a dataclass and the dataclasses within it, those of optional ones included."""
-    hints = get_type_hints(kind)
-    for field in fields(kind):
-        choices = [hint for hint in get_args(hints[field.name]) or (hints[field.name],) if hint is not NoneType]
-        inner = [hint for hint in choices if is_dataclass(hint)]
-        place = f"{before}{field.name}"
+    for name, kinds in hints_of(kind):
+        inner = [hint for hint in get_args(kinds) or (kinds,) if is_record(hint)]
+        place = f"{before}{name}"
         if inner:
             for hint in inner:
                 yield from leaves(hint, f"{place}.")

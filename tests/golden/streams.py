@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 
-from pretouch.control.path import line
+from pretouch.control.path import segment
 from pretouch.controller import Controller
 from pretouch.perception.scene_filter import Fixtures, no_fixtures
 from pretouch.profiles import profile
@@ -62,7 +62,7 @@ def controller(stream: Stream) -> Controller:
     fixtures = no_fixtures()
     if stream.floor is not None:
         fixtures = Fixtures(np.array([[0.0, 0.0, 1.0, stream.floor]]), fixtures.capsules)
-    return Controller(model(), skin(stream.touching), fixtures, line(*stream.path), profile(stream.profile))
+    return Controller(model(), skin(stream.touching), fixtures, segment(*stream.path), profile(stream.profile))
 
 
 def run(stream: Stream) -> dict[int, Values]:

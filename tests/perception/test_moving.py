@@ -1,22 +1,17 @@
 """Fixtures that move: what a unit sees of them is no obstacle, and what is nearest of them is one to keep off."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
+from tests.perception.watcher import PARAMS, Watcher
 from tests.sim.ranging import FORWARD, ORIGIN
 
-from pretouch.moving_fixtures import MovingFixtures
-from pretouch.params import PerceptionParams
 from pretouch.perception.moving import beside, near_moving, sound_moving
-from pretouch.perception.obstacles import track_init
-from pretouch.perception.perceive import perceive, perception_setup
 from pretouch.perception.scene_filter import floor_and_pedestal
 from pretouch.robot.self_distance import segment_distance
 from pretouch.robot.vectors import placed
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit
-from pretouch.types import RangeReadings
+from pretouch.types import MovingFixtures, RangeReadings
 
 MARGIN_M = 0.06
 """Before a fixture, within which a reading is taken for it (`PerceptionParams.self_margin_m`)."""
@@ -29,13 +24,11 @@ def ball(center, radius=0.05, velocity=(0.0, 0.0, 0.0), stamp=0.0) -> MovingFixt
 
 def seen(model, moving: MovingFixtures | None, distance: float, now: float = 0.0) -> int:
     """How many obstacles a unit on the hand's front shows that reads a distance [m] 10 ms before."""
-    skin = Skin([SensorUnit("ahead", "panda_hand", FORWARD)], model)
-    setup = perception_setup(model, skin, floor_and_pedestal(-0.2), PerceptionParams())
+    watcher = Watcher(model, Skin([SensorUnit("ahead", "panda_hand", FORWARD)], model), floor_and_pedestal(-0.2))
     readings = RangeReadings(np.array([now - 0.01]), np.array([distance]), np.zeros(1, np.int64))
-    if moving is not None:
-        setup = beside(setup, moving, readings, now)
-    found, _ = perceive(track_init(1), setup, model.kinematics(model.description.q_ready), readings, now)
-    return len(found.obstacles.unit)
+    still = watcher.controller.fixtures.capsules
+    others = None if moving is None else beside(still, moving, readings, now, PARAMS.persistence_s)
+    return len(watcher.take(readings, now, others).unit)
 
 
 @pytest.mark.parametrize(
@@ -123,7 +116,7 @@ def test_a_moving_axis_comes_nearer_as_fast_as_its_nearest_point(panda_model):
 def test_what_cannot_be_used_is_said(change, said):
     good = ball((1.0, 0.0, 0.5))
     assert sound_moving(good, 0.02, 0.05)[1] == ""
-    found, wrong = sound_moving(replace(good, **change), 0.0, 0.05)
+    found, wrong = sound_moving(good._replace(**change), 0.0, 0.05)
     assert found is None
     assert said in wrong
 

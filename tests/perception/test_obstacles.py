@@ -1,13 +1,10 @@
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pretouch.perception.closest import no_obstacles
+from pretouch.groups import no_obstacles
 from pretouch.perception.obstacles import (
-    NewReadings,
     TrackState,
     is_evidence,
     locate,
@@ -36,9 +33,9 @@ def track(
     state: TrackState, stamps: list[float], points: np.ndarray, shows: np.ndarray, tells: np.ndarray, now: float
 ) -> TrackState:
     """The state with readings of these stamps taken in; a point is given up after 0.06 s."""
-    point, times, stamp = state.point.copy(), state.times.copy(), np.array(stamps)
-    take_in(point, times, NewReadings(stamp, points, newer(state.used, stamp, now), shows, tells), now, 0.06)
-    return replace(state, point=point, times=times)
+    after, stamp = state._replace(point=state.point.copy(), times=state.times.copy()), np.array(stamps)
+    take_in(after, stamp, points, newer(state.used, stamp, now), shows, tells, now, 0.06)
+    return after
 
 
 def _take(state, stamp, now, x, shows, tells):
@@ -175,8 +172,7 @@ def test_an_unheard_unit_is_not_fresh():
 
 
 def test_points_of_units_leave_out_those_of_other_sources():
-    seen = no_obstacles()
-    seen.unit, seen.point = np.array([2, 0, 3, 9]), np.arange(12.0).reshape(4, 3)
+    seen = no_obstacles(4)._replace(unit=np.array([2, 0, 3, 9]), point=np.arange(12.0).reshape(4, 3))
     found = points_of_units(seen, 3)
     assert found[[2, 0]].tolist() == [[0.0, 1.0, 2.0], [3.0, 4.0, 5.0]]
     assert np.isnan(found[1]).all()

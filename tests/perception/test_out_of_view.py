@@ -23,7 +23,7 @@ class TurnedWatcher(Watcher):
 
     def at(self, now, turned, reading):
         """Points at an instant [s] with joint 1 turned by an angle [deg], a new reading of the unit."""
-        self.kin = self.model.kinematics(self.model.description.q_ready + np.deg2rad(turned) * np.eye(7)[0])
+        self.q = self.model.description.q_ready + np.deg2rad(turned) * np.eye(7)[0]
         return self.see(now, reading[1], hand_left=reading[0]).point
 
 

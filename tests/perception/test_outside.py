@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.perception.watcher import FLOOR, TCP
 
+from pretouch.groups import no_obstacles
 from pretouch.params import ClosingSpeed, OutsidePoints, PerceptionParams
-from pretouch.perception.closest import closest_points, no_obstacles
-from pretouch.perception.outside import moving_links, outside_silence, see_outside
-from pretouch.perception.perceive import Perception, perception_setup
+from pretouch.perception.closest import closest_points
+from pretouch.perception.outside import moving_links, outside_setup, outside_silence, see_outside
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.robot.description import panda
 from pretouch.robot.vectors import placed
@@ -21,7 +21,6 @@ from pretouch.types import RobotState, SeenPoints
 UNITS = 7
 PARAMS = PerceptionParams(outside=OutsidePoints())
 POINTS = OutsidePoints()
-NOTHING = Perception(no_obstacles(), np.full(UNITS, np.nan), np.inf, 0.0)
 
 
 def points_at(stamp: float, *point, sigma: float = 0.0) -> SeenPoints:
@@ -29,15 +28,11 @@ def points_at(stamp: float, *point, sigma: float = 0.0) -> SeenPoints:
     return SeenPoints(stamp, np.full(len(at), stamp), at, np.full(len(at), sigma))
 
 
-def setup_of(model, params, fixtures):
-    return perception_setup(model, paper_skin(model), fixtures, params)
-
-
 class Watcher:
     """Perception of outside points alone, its state carried along."""
 
     def __init__(self, model, params=PARAMS, fixtures=None):
-        self.model, self.params, self.fixtures = model, params, fixtures or no_fixtures()
+        self.model, self.setup = model, outside_setup(model, paper_skin(model), fixtures or no_fixtures(), params)
         self.state, self.qd = None, np.zeros(7)
         self.pose(panda().q_ready)
 
@@ -46,11 +41,8 @@ class Watcher:
 
     def see(self, now: float, points: SeenPoints | None, anew: bool = False):
         robot = RobotState(now, self.q, self.qd, self.q, self.qd, np.zeros(7), None)
-        seen, self.state = see_outside(
-            self.state, anew, NOTHING, points, setup_of(self.model, self.params, self.fixtures), self.kin, robot, now
-        )
-        self.nearest = seen.nearest
-        return seen.obstacles
+        seen, self.state = see_outside(self.state, anew, points, self.setup, self.kin, robot, now)
+        return seen or no_obstacles()
 
 
 @pytest.fixture
@@ -71,7 +63,6 @@ def test_a_point_is_an_obstacle_at_its_distance_less_two_sigmas(watcher):
     assert near.ee_distance == pytest.approx([0.4 - 0.02], abs=1e-5)
     assert near.direction == pytest.approx(exact.direction)
     assert near.link.tolist() == exact.link.tolist()
-    assert watcher.nearest == near.ee_distance[0]
 
 
 def test_the_places_follow_the_units_of_the_skin(watcher):
@@ -113,15 +104,15 @@ def test_fixtures_are_left_out_up_to_the_margin_and_the_uncertainty(panda_model)
 @pytest.mark.parametrize(
     "spoil",
     [
-        lambda s: replace(s, point=s.point * np.nan),
-        lambda s: replace(s, point=s.point * np.inf),
-        lambda s: replace(s, point=s.point * 1000),
-        lambda s: replace(s, sigma=-s.sigma - 0.01),
-        lambda s: replace(s, sigma=s.sigma * np.nan),
-        lambda s: replace(s, sigma=s.sigma + 2.0),
-        lambda s: replace(s, stamp=s.stamp + 0.2),
-        lambda s: replace(s, stamp=s.stamp - 0.2),
-        lambda s: replace(s, stamp=s.stamp * np.nan),
+        lambda s: s._replace(point=s.point * np.nan),
+        lambda s: s._replace(point=s.point * np.inf),
+        lambda s: s._replace(point=s.point * 1000),
+        lambda s: s._replace(sigma=-s.sigma - 0.01),
+        lambda s: s._replace(sigma=s.sigma * np.nan),
+        lambda s: s._replace(sigma=s.sigma + 2.0),
+        lambda s: s._replace(stamp=s.stamp + 0.2),
+        lambda s: s._replace(stamp=s.stamp - 0.2),
+        lambda s: s._replace(stamp=s.stamp * np.nan),
     ],
 )
 def test_a_point_that_is_none_is_left_out_and_the_others_stay(watcher, spoil):

@@ -65,7 +65,7 @@ def test_an_obstacle_is_given_up_after_its_persistence(watcher):
 
 def test_an_obstacle_stays_where_it_was_while_the_arm_moves(watcher):
     shown = watcher.see(1.0, hand_left=0.3)
-    watcher.kin = watcher.model.kinematics(panda().q_ready + 0.3 * np.eye(7)[0])  # turn towards it
+    watcher.q = panda().q_ready + 0.3 * np.eye(7)[0]  # turn towards it
     kept = watcher.take(readings_of(watcher.skin, 1.0, hand_left=0.3), 1.03)
     np.testing.assert_array_equal(kept.point, shown.point)
     assert kept.body_distance[0] < shown.body_distance[0] - 0.05
@@ -105,7 +105,7 @@ def test_a_declared_post_is_no_obstacle(panda_model, paper_skin):
 @pytest.mark.parametrize(("distance", "shown"), [(0.42, 0), (0.37, 0), (0.34, 1)])
 def test_the_base_is_seen_but_never_the_part_to_move_away(watcher, distance, shown):
     # hand low before the base, its back 0.416 m from it; the first link lies 35 mm behind the base's front
-    watcher.kin = watcher.model.kinematics(np.deg2rad([0, 35, 0, -130, 0, 165, 45]))
+    watcher.q = np.deg2rad([0, 35, 0, -130, 0, 165, 45])
     found = watcher.see(1.0, hand_back=distance)
     assert len(found.unit) == shown
     assert "panda_link0" not in [watcher.model.links[link] for link in found.link]
@@ -115,15 +115,15 @@ def test_the_base_is_seen_but_never_the_part_to_move_away(watcher, distance, sho
 
 
 @pytest.mark.parametrize("last", [None, (0.6, 0.0, 0.8)])
-def test_on_the_axis_the_last_direction_holds_or_else_the_beam(watcher, last):
-    a, b = placed(watcher.model.body, watcher.kin)
+def test_on_the_axis_the_last_direction_holds_or_else_that_upwards(watcher, last):
+    a, b = placed(watcher.model.body, watcher.model.kinematics(watcher.q))
     finger = watcher.model.body.radius.argmin()
     unit = watcher.skin.ids.index("hand_left")
     watcher.state.point[unit], watcher.state.seen[unit] = (a[finger] + b[finger]) / 2, 1.0
     if last:
         watcher.state.direction[unit] = last
     found = watcher.take(readings_of(watcher.skin, -np.inf), 1.01)
-    np.testing.assert_allclose(found.direction, [last or (0, 1, 0)], atol=1e-5)
+    np.testing.assert_allclose(found.direction, [last or (0, 0, 1)], atol=1e-5)
     np.testing.assert_array_equal(watcher.state.direction[unit], found.direction[0])
 
 
@@ -158,7 +158,7 @@ def test_whatever_arrives_obstacles_are_whole(panda_model, paper_skin, steps):
 
 def _silent(watcher, now: float, status: RangeStatus = RangeStatus.OK) -> tuple[float, str]:
     reported = np.full(len(watcher.skin), int(status))
-    return silent_units(watcher.skin, watcher.state, reported, watcher.seen.longest_silence, now, PARAMS)
+    return silent_units(watcher.skin, watcher.state, reported, watcher.now.get("seen.silence"), now, PARAMS)
 
 
 def _go_on(watcher, start, duration=0.4, status=RangeStatus.OK, ahead=0.0) -> tuple[float, str]:

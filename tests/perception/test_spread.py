@@ -7,15 +7,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from tests.fuzz.invariants import same
-from tests.perception.watcher import FLOOR, PARAMS
+from tests.perception.watcher import FLOOR, PARAMS, Watcher
 
-from pretouch.perception.obstacles import spread, track_init
-from pretouch.perception.perceive import perceive, perception_setup
+from pretouch.groups import Obstacles
+from pretouch.perception.obstacles import spread
 from pretouch.robot.description import panda
 from pretouch.sensing.skin import Skin
 from pretouch.types import RangeReadings, RangeStatus
 
-READY = panda().q_ready
+BARE = replace(PARAMS, self_margin_m=None)
 
 
 def unsure(skin: Skin, model, position: float = 0.0, orientation: float = 0.0) -> Skin:
@@ -23,13 +23,16 @@ def unsure(skin: Skin, model, position: float = 0.0, orientation: float = 0.0) -
     return Skin([replace(u, position_sigma=position, orientation_sigma=orientation) for u in skin.units], model)
 
 
-def seen(model, skin: Skin, distances, params=PARAMS, q=READY, state=None, now=1.0, stamp=1.0):
+def seen(model, skin: Skin, distances, params=PARAMS) -> Obstacles:
     """What perception makes of one reading of each unit."""
-    count = len(skin)
+    return look(Watcher(model, skin, FLOOR, params), distances)
+
+
+def look(watcher: Watcher, distances, now=1.0) -> Obstacles:
+    """What a watcher makes of one reading of each unit at 1 s."""
+    count = len(watcher.skin)
     distance = np.broadcast_to(np.asarray(distances, dtype=np.float64), count).copy()
-    readings = RangeReadings(np.full(count, stamp), distance, np.full(count, int(RangeStatus.OK)))
-    state = track_init(count) if state is None else state
-    return perceive(state, perception_setup(model, skin, FLOOR, params), model.kinematics(q), readings, now)
+    return watcher.take(RangeReadings(np.ones(count), distance, np.full(count, int(RangeStatus.OK))), now)
 
 
 def test_the_spread_grows_with_the_distance_and_both_uncertainties():
@@ -44,61 +47,62 @@ def test_the_spread_grows_with_the_distance_and_both_uncertainties():
 def test_what_is_seen_counts_as_nearer_by_its_spread(panda_model, paper_skin, filtered, distances):
     skin, params = (
         unsure(paper_skin, panda_model, 0.01, 0.05),
-        PARAMS if filtered else replace(PARAMS, self_margin_m=None),
+        PARAMS if filtered else BARE,
     )
-    near, _ = seen(panda_model, skin, distances, params)
-    exact, _ = seen(panda_model, paper_skin, distances, params)
-    both = np.isin(exact.obstacles.unit, near.obstacles.unit)
-    assert set(near.obstacles.unit) <= set(exact.obstacles.unit)
+    watcher = Watcher(panda_model, skin, FLOOR, params)
+    near = look(watcher, distances)
+    exact = seen(panda_model, paper_skin, distances, params)
+    both = np.isin(exact.unit, near.unit)
+    assert set(near.unit) <= set(exact.unit)
     assert filtered or both.all()
-    u = 2.0 * np.hypot(0.01, 0.05 * np.array(distances)[near.obstacles.unit])
+    u = 2.0 * np.hypot(0.01, 0.05 * np.array(distances)[near.unit])
     for name in ("point", "body_point", "direction", "link"):
-        np.testing.assert_array_equal(getattr(near.obstacles, name), getattr(exact.obstacles, name)[both])
-    np.testing.assert_allclose(near.obstacles.body_distance, exact.obstacles.body_distance[both] - u, atol=1e-12)
-    ee_distance = np.maximum(exact.obstacles.ee_distance[both] - u, 0.0)
-    np.testing.assert_allclose(near.obstacles.ee_distance, ee_distance, atol=1e-12)
-    assert near.nearest == near.obstacles.ee_distance.min(initial=np.inf)
+        np.testing.assert_array_equal(getattr(near, name), getattr(exact, name)[both])
+    np.testing.assert_allclose(near.body_distance, exact.body_distance[both] - u, atol=1e-12)
+    ee_distance = np.maximum(exact.ee_distance[both] - u, 0.0)
+    np.testing.assert_allclose(near.ee_distance, ee_distance, atol=1e-12)
+    assert watcher.now.get("seen.nearest") == near.ee_distance.min(initial=np.inf)
 
 
 @given(distances=st.lists(st.floats(0.0, 5.0) | st.just(np.nan), min_size=7, max_size=7))
 def test_no_bit_changes_where_nothing_is_uncertain(panda_model, paper_skin, distances):
-    usual = seen(panda_model, paper_skin, distances)
     mixed = Skin([replace(paper_skin.units[0], position_sigma=0.02), *paper_skin.units[1:]], panda_model)
-    for other in (
-        seen(panda_model, paper_skin, distances, replace(PARAMS, spread_sigmas=9.0)),
-        seen(panda_model, unsure(paper_skin, panda_model, 0.5, 1.5), distances, replace(PARAMS, spread_sigmas=0.0)),
-    ):
-        assert same(usual, other)
-    rest, all_of = (s.obstacles.unit > 0 for s in (seen(panda_model, mixed, distances)[0], usual[0]))
+    watchers = [
+        Watcher(panda_model, paper_skin),
+        Watcher(panda_model, paper_skin, FLOOR, replace(PARAMS, spread_sigmas=9.0)),
+        Watcher(panda_model, unsure(paper_skin, panda_model, 0.5, 1.5), FLOOR, replace(PARAMS, spread_sigmas=0.0)),
+    ]
+    usual, *_ = (look(watcher, distances) for watcher in watchers)
+    for other in watchers[1:]:
+        assert same(watchers[0].now.blocks, other.now.blocks)
+        assert same(watchers[0].memory.blocks, other.memory.blocks)
+    rest, all_of = (s.unit > 0 for s in (seen(panda_model, mixed, distances), usual))
     for name in ("unit", "point", "direction", "body_distance", "ee_distance"):
-        of_mixed = getattr(seen(panda_model, mixed, distances)[0].obstacles, name)
-        np.testing.assert_array_equal(of_mixed[rest], getattr(usual[0].obstacles, name)[all_of])
+        of_mixed = getattr(seen(panda_model, mixed, distances), name)
+        np.testing.assert_array_equal(of_mixed[rest], getattr(usual, name)[all_of])
 
 
 def test_a_distance_from_the_body_may_be_negative_that_from_the_hand_may_not(panda_model, paper_skin):
-    found, _ = seen(panda_model, unsure(paper_skin, panda_model, 0.5), 0.1, replace(PARAMS, self_margin_m=None))
-    assert (found.obstacles.body_distance < 0).all()
-    np.testing.assert_array_equal(found.obstacles.ee_distance, 0.0)
-    assert found.nearest == 0.0
-    np.testing.assert_allclose(np.linalg.norm(found.obstacles.direction, axis=1), 1.0, atol=1e-12)
+    watcher = Watcher(panda_model, unsure(paper_skin, panda_model, 0.5), FLOOR, BARE)
+    found = look(watcher, 0.1)
+    assert (found.body_distance < 0).all()
+    np.testing.assert_array_equal(found.ee_distance, 0.0)
+    assert watcher.now.get("seen.nearest") == 0.0
+    np.testing.assert_allclose(np.linalg.norm(found.direction, axis=1), 1.0, atol=1e-12)
 
 
 def test_a_kept_point_is_as_uncertain_as_it_is_now_far_from_its_unit(panda_model, paper_skin):
     skin = unsure(paper_skin, panda_model, orientation=0.1)
-    first, state = seen(panda_model, skin, 0.3, replace(PARAMS, self_margin_m=None))
-    _, exact = seen(panda_model, paper_skin, 0.3, replace(PARAMS, self_margin_m=None))
-    q = READY + 0.3 * np.eye(7)[0]
-    late = {"params": replace(PARAMS, self_margin_m=None), "q": q, "now": 1.03}
-    kept, _ = seen(panda_model, skin, 0.3, state=state, **late)
-    plain, _ = seen(panda_model, paper_skin, 0.3, state=exact, **late)
-    kin = panda_model.kinematics(q)
+    watcher, exact = (Watcher(panda_model, of, FLOOR, BARE) for of in (skin, paper_skin))
+    first, _ = look(watcher, 0.3), look(exact, 0.3)
+    watcher.q = exact.q = panda().q_ready + 0.3 * np.eye(7)[0]
+    kept, plain = look(watcher, 0.3, 1.03), look(exact, 0.3, 1.03)
+    kin = panda_model.kinematics(watcher.q)
     place = [kin.position[m] + kin.rotation[m] @ T[:3, 3] for m, T in zip(skin.link, skin.T_link_sensor, strict=True)]
-    away = np.linalg.norm(kept.obstacles.point - place, axis=1)
+    away = np.linalg.norm(kept.point - place, axis=1)
     assert np.ptp(away) > 0.1
-    np.testing.assert_array_equal(kept.obstacles.point, first.obstacles.point)
-    np.testing.assert_allclose(
-        kept.obstacles.body_distance, plain.obstacles.body_distance - 2.0 * 0.1 * away, atol=1e-12
-    )
+    np.testing.assert_array_equal(kept.point, first.point)
+    np.testing.assert_allclose(kept.body_distance, plain.body_distance - 2.0 * 0.1 * away, atol=1e-12)
 
 
 # The arm in view
@@ -107,7 +111,7 @@ def test_a_kept_point_is_as_uncertain_as_it_is_now_far_from_its_unit(panda_model
 def first_shown(model, skin: Skin, params=PARAMS) -> float:
     """From which distance on, coming from far, the hand's unit that sees the forearm shows something [m]."""
     unit, distances = skin.ids.index("hand_back"), np.arange(0.36, 0.04, -0.0005)
-    return float(next(d for d in distances if unit in seen(model, skin, d, params)[0].obstacles.unit))
+    return float(next(d for d in distances if unit in seen(model, skin, d, params).unit))
 
 
 def test_an_uncertain_unit_does_not_take_its_own_arm_for_an_obstacle(panda_model, paper_skin):

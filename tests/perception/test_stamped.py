@@ -4,16 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.perception.watcher import readings_of
+from tests.perception.watcher import Watcher, readings_of
 
 from pretouch.groups import Chain, Sensors
 from pretouch.params import PerceptionParams
 from pretouch.perception.motion_compensation import move_back
-from pretouch.perception.obstacles import poses, track_init
-from pretouch.perception.perceive import perceive, perception_setup
+from pretouch.perception.obstacles import poses
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import PROFILES
-from pretouch.types import RobotState
 
 LATE_S = 0.05
 QD = np.array([0.8, -0.2, 0.1, 0.3, 0.0, 0.4, 0.6])
@@ -24,7 +22,7 @@ def errors(model, skin, params: PerceptionParams, noise: float = 0.0) -> list[fl
     unit, rng, q0 = skin.ids.index("hand_left"), np.random.default_rng(1000), model.description.q_ready
     position, rotation, _ = placed(model, skin, q0)
     normal, on = rotation[unit, :, 2].copy(), position[unit] + 0.5 * rotation[unit, :, 2]
-    state, found = track_init(len(skin)), []
+    watcher, found = Watcher(model, skin, no_fixtures(), params), []
     for i in range(6, 60):
         now = 0.01 * i
         then = now - LATE_S
@@ -32,11 +30,8 @@ def errors(model, skin, params: PerceptionParams, noise: float = 0.0) -> list[fl
         beam = turned[unit, :, 2]
         distance = float((on - at[unit]) @ normal / (beam @ normal)) + noise * rng.standard_normal()
         readings = readings_of(skin, then, hand_left=distance)
-        q = q0 + QD * now
-        robot = RobotState(now, q, QD, q, QD, np.zeros(7), None)
-        setup = perception_setup(model, skin, no_fixtures(), params)
-        seen, state = perceive(state, setup, model.kinematics(q), readings, now, robot)
-        found.append(float((seen.obstacles.point[0] - on) @ normal))
+        watcher.q, watcher.qd = q0 + QD * now, QD
+        found.append(float((watcher.take(readings, now).point[0] - on) @ normal))
     return found
 
 

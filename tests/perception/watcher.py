@@ -1,14 +1,21 @@
 """Perception alone, of an arm that is put where a test wants it."""
 
+from dataclasses import replace
+
 import numpy as np
 
+from pretouch.control.path import Circle
+from pretouch.controller import Controller
+from pretouch.faults import put_robot
+from pretouch.groups import Obstacles
+from pretouch.line import SEE, Beside
 from pretouch.params import PerceptionParams
-from pretouch.perception.obstacles import track_init
-from pretouch.perception.perceive import perceive, perception_setup
+from pretouch.perception.obstacles import TrackState
 from pretouch.perception.scene_filter import Fixtures, no_fixtures
+from pretouch.profiles import PROFILES
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.types import Obstacles, RangeReadings, RangeStatus
+from pretouch.types import RangeReadings, RangeStatus, RobotState
 
 FLOOR = Fixtures(np.array([[0.0, 0.0, 1.0, -0.2]]), no_fixtures().capsules)
 TCP = np.array([0.30689, 0.0, 0.48688])
@@ -34,15 +41,23 @@ class Watcher:
     def __init__(
         self, model: RobotModel, skin: Skin, fixtures: Fixtures = FLOOR, params: PerceptionParams = PARAMS
     ) -> None:
-        self.model, self.skin = model, skin
-        self.setup = perception_setup(model, skin, fixtures, params)
-        self.kin = model.kinematics(model.description.q_ready)
-        self.state = track_init(len(skin))
+        self.model, self.skin, self.q, self.qd = model, skin, model.description.q_ready, np.zeros(model.n)
+        self.controller = Controller(model, skin, fixtures, Circle(), replace(PROFILES["paper"], perception=params))
+        self.memory = self.controller.init(self.robot(0.0)).memory
+        self.state = self.memory.part("tracks", TrackState)
 
-    def take(self, readings: RangeReadings, now: float) -> Obstacles:
+    def robot(self, now: float) -> RobotState:
+        """State of the arm."""
+        return RobotState(now, self.q, self.qd, self.q, self.qd, np.zeros(self.model.n), None)
+
+    def take(self, readings: RangeReadings, now: float, beside: Beside | None = None) -> Obstacles:
         """Take readings in at an instant [s]."""
-        self.seen, self.state = perceive(self.state, self.setup, self.kin, readings, now)
-        return self.seen.obstacles
+        self.now = self.controller.blank.copy()
+        self.now.put("stamp", now)
+        put_robot(self.now, "robot", self.robot(now))
+        self.now.fill("readings", readings)
+        self.controller.take(self.memory, self.now, beside or self.controller.beside, SEE, SEE)
+        return Obstacles._make(part[: self.now.get("seen.found")] for part in self.now.part("seen.near", Obstacles))
 
     def see(self, now: float, status: RangeStatus = RangeStatus.OK, **distance: float) -> Obstacles:
         """Take new readings of the units that are named."""

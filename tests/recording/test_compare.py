@@ -7,7 +7,7 @@ import pytest
 
 from pretouch.controller import Controller
 from pretouch.errors import RecordingError
-from pretouch.perception.closest import no_obstacles
+from pretouch.groups import no_obstacles
 from pretouch.profiles import PROFILES, at_rate, profile
 from pretouch.recording.compare import Found, compare, matched
 from pretouch.recording.reader import open_recording

@@ -6,7 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pretouch.control.path import Circle, WayPoints, line
+from pretouch.control.path import Circle, WayPoints, segment
+from pretouch.controller import Controller
 from pretouch.errors import RecordingError
 from pretouch.perception.scene_filter import Fixtures
 from pretouch.recording.reader import open_recording
@@ -18,10 +19,10 @@ from pretouch.sensing.sensor import VL53L5CX
 from pretouch.sensing.skin import Skin, paper_skin
 from pretouch.sensing.unit import SensorUnit, TouchPatch
 from tests.fuzz.invariants import same
-from tests.recording.runs import controller_of, custom_arm, recorded_run
+from tests.recording.runs import SHORT, controller_of, custom_arm, recorded_run
 
 PATHS = [Circle((0.4, 0.1, 0.3), 0.17, 0.3), WayPoints(np.random.default_rng(0).normal(size=(5, 3)), closed=True),
-         line((0.1, 0.2, 0.3), (0.7, 0.1, 0.2))]  # fmt: skip
+         segment((0.1, 0.2, 0.3), (0.7, 0.1, 0.2))]  # fmt: skip
 
 
 @pytest.mark.parametrize("path", PATHS)
@@ -63,8 +64,7 @@ def test_arm_skin_and_fixtures_are_made_again_to_the_bit(tmp_path):
     T[:3, 3] = 0.06, 1e-17, 1 / 3 * 0.1
     skin = Skin([SensorUnit("unit 1/ä", "b", T)], model)
     capsules = Capsules(np.zeros(1, np.int64), np.array([[0.1, 0.2, 1 / 3]]), np.ones((1, 3)), np.array([0.1]))
-    own = controller_of(model, skin)
-    own.fixtures = Fixtures(np.array([[0.0, 0.0, 1.0, -1 / 3]]), capsules)
+    own = Controller(model, skin, Fixtures(np.array([[0.0, 0.0, 1.0, -1 / 3]]), capsules), Circle(), SHORT)
     recorded_run(tmp_path / "a.mcap", own, 60)
     (tmp_path / "two.xml").unlink()
     recorded = open_recording(tmp_path / "a.mcap")

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from pretouch.control.path import Circle, Path, line
+from pretouch.control.path import Circle, Path, segment
 from pretouch.params import WindowParams
 from pretouch.perception.scene_filter import Fixtures, no_fixtures
 from pretouch.profiles import PROFILES, Profile
@@ -87,7 +87,7 @@ def path_of(scene: Scene, x: np.ndarray) -> Path:
     """The scene's path, from the hand's place x (3,) [m]."""
     if scene.circle:
         return Circle((x[0], x[1] - 0.05, x[2]), 0.05)
-    return line(tuple(x), (x[0], x[1] + 0.25, x[2] - 0.1))
+    return segment(tuple(x), (x[0], x[1] + 0.25, x[2] - 0.1))
 
 
 class World:

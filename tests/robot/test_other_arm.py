@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from pretouch.arms.other_arm import OtherArm
 from pretouch.perception.moving import sound_moving
 from pretouch.perception.scene_filter import floor_and_pedestal
-from pretouch.robot.other_arm import OtherArm
 from pretouch.robot.vectors import placed
 from pretouch.types import RobotState
 

@@ -77,7 +77,7 @@ def test_a_second_run_begins_with_what_the_first_has_learnt(file, arm, another):
     assert str(file.path) in said
     second = begun(file, another, now=1e9 + DAY_S)
     assert "this robot is known since 2001-09-09 01:46 UTC (3 s" in second.found[0]
-    assert_array_equal(second.begin.weights, arm.state.detector.test.model.weights)
+    assert_array_equal(second.begin.weights, arm.state.learnt.weights)
     again = turned(another, second, 100)
     assert residuals[0] > 1.0
     assert again[:50].max() < 0.3 * residuals[:50].max()
@@ -92,14 +92,15 @@ def test_a_recording_of_a_run_that_began_with_something_is_recomputed_bit_for_bi
     assert verdict.agrees
     assert verdict.exact
     assert verdict.checked == 50
-    assert np.abs(recorded[0].snapshot.detector.test.model.weights).max() > 0.1
+    begin = another.controller.with_places(recorded[0].snapshot.memory)
+    assert np.abs(begin.get("test.model.weights")).max() > 0.1
 
 
 def test_the_doubt_of_offset_and_friction_grows_in_a_pause_and_that_of_masses_does_not(file, arm):
     learnt(file, arm, 400)
     at_once, later = (begun(file, arm, now=1e9 + pause).begin.covariance for pause in (0.0, DAY_S))
     prior = PROFILE.detect
-    assert_array_equal(at_once, arm.state.detector.test.model.covariance)
+    assert_array_equal(at_once, arm.state.learnt.covariance)
     grown = (later - at_once)[:, range(12), range(12)]
     assert np.all(grown[:, 0] > 0.4 * (0.25 * prior.offset_prior_nm) ** 2)
     assert np.all(grown[:, 4:11] == 0.0)
@@ -130,7 +131,7 @@ def test_it_adds_up_over_runs_and_keeps_since_when(file, arm, another):
     learnt(file, arm)
     learnt(file, another, now=1e9 + DAY_S)
     third = begun(file, another, now=1e9 + 2 * DAY_S)
-    assert third.begin.seen.sum() > 1.5 * arm.state.detector.test.model.seen.sum()
+    assert third.begin.seen.sum() > 1.5 * arm.state.learnt.seen.sum()
     assert "since 2001-09-09 01:46 UTC" in third.found[0]
     assert "last saved 2001-09-10 01:46 UTC" in third.found[0]
 
@@ -205,7 +206,7 @@ def test_a_named_file_may_be_of_another_robot_of_the_kind_but_not_of_another_kin
     ],
 )
 def test_numbers_that_no_arm_can_have_are_not_taken(file, arm, name, change):
-    numbers = kept(arm.state.detector.test.model)
+    numbers = kept(arm.state.learnt)
     numbers[name] = change(numbers[name])
     file.path.parent.mkdir(parents=True)
     save_residual(file.path, arm.model, Residual(numbers, file.robot, 1e9, 1e9))

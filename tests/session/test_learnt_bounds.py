@@ -1,7 +1,5 @@
 """Bounds by physics on what a file says was learnt."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -16,7 +14,7 @@ FRESH = residual_init(7, SequentialParams())
 def changed(name, at, value):
     array = getattr(FRESH, name).copy()
     array[at] = value
-    return replace(FRESH, **{name: array})
+    return FRESH._replace(**{name: array})
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import pytest
 
 from pretouch import realtime
 from pretouch.calibration.motion.plan import Plan
-from pretouch.control.path import line
+from pretouch.control.path import segment
 from pretouch.controller import Controller
 from pretouch.loop import MonotonicClock
 from pretouch.perception.scene_filter import no_fixtures
@@ -32,7 +32,7 @@ def controller(panda_model):
     x, y, z = panda_model.kinematics(panda_model.description.q_ready).position[panda_model.ee]
     blind = PROFILES["blind"]
     profile = replace(blind, window=replace(blind.window, samples=10))  # moves after a tenth of a second
-    path = line((x, y, z), (x, y + 0.4, z))
+    path = segment((x, y, z), (x, y + 0.4, z))
     return Controller(panda_model, Skin((), panda_model), no_fixtures(), path, profile)
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pretouch.control.path import Circle, line
+from pretouch.control.path import Circle, segment
 from pretouch.controller import Controller
 from pretouch.errors import RobotError
 from pretouch.hardware.franka.limits import LimiterParams
@@ -113,7 +113,7 @@ def test_the_way_to_the_start_ends_there_and_is_slow(controller, panda_model):
 
 def test_a_way_through_the_floor_is_an_error(panda_model):
     with pytest.raises(RobotError, match="No motion to the start"):
-        plan_to_start(panda_model, panda_model.description.q_ready, line((0.5, 0.0, -0.1), (0.5, 0.1, -0.1)), 0.0)
+        plan_to_start(panda_model, panda_model.description.q_ready, segment((0.5, 0.0, -0.1), (0.5, 0.1, -0.1)), 0.0)
 
 
 # what is seen
@@ -169,7 +169,7 @@ def checked(model, path=None):
     arm = PushedArm(model)
     arm.unfit = lambda: ()
     here = model.kinematics(arm.q).position[model.ee]
-    path = path or line(tuple(here), tuple(here + np.array([0.0, 0.4, 0.0])))
+    path = path or segment(tuple(here), tuple(here + np.array([0.0, 0.4, 0.0])))
     controller = Controller(model, Skin((), model), no_fixtures(), path, PROFILES["blind"])
     session = Session(arm, NoUnits(), None, controller, 0.0, MonotonicClock(0.01))
     return session, seen(arm)

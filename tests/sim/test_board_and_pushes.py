@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
 
-from pretouch.control.path import Circle, line
+from pretouch.control.path import Circle, segment
 from pretouch.errors import PathError
 from pretouch.sim.paper_scenes import board_beside
 from pretouch.sim.pushes import way_round
 
-PATHS = {"circle": Circle(), "line": line((0.4, -0.5, 0.5), (0.4, 0.5, 0.5))}
+PATHS = {"circle": Circle(), "line": segment((0.4, -0.5, 0.5), (0.4, 0.5, 0.5))}
 
 
 @pytest.mark.parametrize(("side", "sign"), [("-y", -1.0), ("+y", 1.0)])

@@ -3,10 +3,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pretouch.contact.observer import wrench_from_torques
 from pretouch.errors import ParameterError
 from pretouch.robot.ik import brought_to
 from pretouch.robot.model import RobotModel
+from pretouch.sim.observer import wrench_from_torques
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.scene import Box, SceneSpec

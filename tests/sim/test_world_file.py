@@ -15,8 +15,7 @@ from pretouch.robot.model import RobotModel
 from pretouch.sensing.sensor import PAPER_SENSOR, cone_rays
 from pretouch.sim.plant import Plant
 from pretouch.sim.rays import cast, geoms_of
-from pretouch.sim.scene import BasePose, SceneSpec
-from pretouch.sim.second_arm import SecondArm
+from pretouch.sim.scene import SceneSpec
 
 World = Callable[..., Plant]
 _FLOOR = '<geom name="floor" type="plane" size="0 0 1" pos="0 0 -0.75"/>'
@@ -47,17 +46,6 @@ def test_a_free_body_falls_and_rests(world: World) -> None:
     assert plant.mj_data.qvel[7:] == pytest.approx(np.zeros(6), abs=1e-3)
     assert plant.touching
     assert not plant.true_force.any()
-
-
-def test_a_second_arm_is_found_beside_a_free_body(panda_model: RobotModel, tmp_path: Path) -> None:
-    file, q = tmp_path / "world.xml", panda_model.description.q_ready
-    file.write_text('<mujoco><worldbody><body pos="0 2 0"><freejoint/><geom size=".1"/></body></worldbody></mujoco>')
-    second = SecondArm(panda_model, BasePose((1.0, 0.0, 0.0), np.pi), NO_ERROR, seed=1)
-    plant = Plant(panda_model, SceneSpec(second=second.spec, world=file), NO_ERROR, q, seed=0)
-    second.join(plant, q)
-    plant.advance(0.2)
-    assert second.read().q == pytest.approx(q, abs=1e-2)
-    assert plant.mj_data.qpos[-5] == pytest.approx(-9.81e-6 * 200 * 201 / 2, abs=1e-6)
 
 
 def test_a_weight_on_the_wrist_is_felt_with_its_weight(world: World, panda_model: RobotModel) -> None:

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.perception.watcher import Watcher
 from tests.sim.ranging import EXACT, ORIGIN, wall
 
 from pretouch.perception.obstacles import silent_units, track_init
-from pretouch.perception.perceive import perceive, perception_setup
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import profile
 from pretouch.sensing.sensor import VL53L5CX
@@ -48,16 +48,14 @@ def test_what_is_beside_the_axis_is_seen_where_it_is(rig, panda_model):
         seen_by = rig(hand=hand, sensor=sensor, **EXACT)
         seen_by.collect(0.2)
         skin = seen_by.finders._skin
-        setup = perception_setup(panda_model, skin, no_fixtures(), profile("pretouch").perception)
-        kin = panda_model.kinematics(panda_model.description.q_ready)
-        readings = seen_by.finders.read()
-        seen, _ = perceive(track_init(len(skin)), setup, kin, readings, seen_by.plant.time)
-        off = np.linalg.norm(seen.obstacles.point - hand.start, axis=1) - 0.05
+        watcher = Watcher(panda_model, skin, no_fixtures(), profile("pretouch").perception)
+        seen = watcher.take(seen_by.finders.read(), seen_by.plant.time)
+        off = np.linalg.norm(seen.point - hand.start, axis=1) - 0.05
         assert len(off) >= 1
         assert off.max() < 0.3 * 2 * np.tan(skin.units[0].sensor.angle / 2)
         # the nearest of what is seen is no farther than it truly is: the zone's width is taken off
-        truly = np.linalg.norm(seen.obstacles.body_point - hand.start, axis=1) - 0.05
-        assert truly.min() - 0.04 < seen.obstacles.body_distance.min() <= truly.min()
+        truly = np.linalg.norm(seen.body_point - hand.start, axis=1) - 0.05
+        assert truly.min() - 0.04 < seen.body_distance.min() <= truly.min()
 
 
 def test_a_single_cone_does_not_see_it(rig):

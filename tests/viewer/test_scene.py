@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from tests.viewer.fake_scene import FakeScene, Node
 
-from pretouch.perception.closest import no_obstacles
+from pretouch.groups import no_obstacles
 from pretouch.profiles import PROFILES
 from pretouch.types import NOT_TOUCHED, ControlStep, Mode, Obstacles, Touched
 from pretouch.viewer import palette

@@ -16,12 +16,12 @@ from pretouch.cli.registry import command_names
 from pretouch.composition import field_docs
 
 API = {
-    "arm-and-skin": ("Arm and skin", ("groups", "robot", "sensing")),
+    "arm-and-skin": ("Arm and skin", ("arms", "groups", "robot", "sensing")),
     "controller": ("Controller and profiles", ("controller", "profiles", "composition", "params", "explanation")),
     "parts": ("Parts of a controller", ("contact", "control", "perception")),
     "loop": ("Loop and recordings", ("loop", "shielding", "realtime", "recording", "reporting")),
     "simulation": ("Simulation", ("sim",)),
-    "values": ("Values and errors", ("types", "moving_fixtures", "payload", "desired", "limited", "errors")),
+    "values": ("Values and errors", ("types", "desired", "limited", "errors")),
 }
 """Pages of public names: title and the modules whose names stand there."""
 PAGES = {

@@ -8,12 +8,11 @@ import pytest
 
 from pretouch.control.path import Circle
 from pretouch.controller import Controller
-from pretouch.payload import Payload
 from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.range_finder import RangeFinders
 from pretouch.sim.scene import SceneSpec
-from pretouch.types import ControlStep, Mode
+from pretouch.types import ControlStep, Mode, Payload
 from pretouch_lab import trial
 from pretouch_lab.benchmarks.detection.arm import AWAY, Alone, path_of, record, sensing_of
 from pretouch_lab.benchmarks.detection.motions import motion_of

@@ -11,8 +11,8 @@ from pretouch.contact.decaying_velocity import reaction_velocity
 from pretouch.contact.detector import Detection
 from pretouch.control.path import Circle
 from pretouch.controller import Controller
+from pretouch.groups import no_obstacles
 from pretouch.loop import run
-from pretouch.perception.closest import no_obstacles
 from pretouch.profiles import profile
 from pretouch.robot.ik import brought_to
 from pretouch.sensing.skin import paper_skin

@@ -4,9 +4,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pretouch.contact.observer import observe, observer_init
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
+from pretouch.sim.observer import observe, observer_init
 from pretouch.sim.plant_params import PlantParams
 from pretouch_lab.identification.identify import Identified
 from pretouch_lab.identification.params import usual_of

@@ -10,14 +10,30 @@ from pretouch.params import GiveUpParams
 from pretouch.profiles import Profile, profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
+from pretouch.sim.hand import USUAL_ARM, HandGoal, point_on_arm
 from pretouch.sim.paper_scenes import static_path, static_scene
-from pretouch.sim.pushes import Holder, Push
+from pretouch.sim.plant import Plant
+from pretouch.sim.pushes import FREE_N, Push, Pusher
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
-from pretouch.types import Mode
+from pretouch.types import FloatArray, Mode
 from pretouch_lab.trial import Record, Setup, play
 
 SEED = 1007
 SLOW = "pretouch:approach=none:task.speed_m_s=0.02"
+
+
+class Holder(Pusher):
+    """A person who keeps pushing at one place, with one force: a hand that only pushes on slides past the arm's."""
+
+    def goal(self, time: float, hand: FloatArray, plant: Plant) -> HandGoal:
+        """Reach, push and withdraw as planned, but from the touch on stay on the line of the push through the palm."""
+        planned = super().goal(time, hand, plant)
+        if self._touch is None:
+            return planned
+        palm = point_on_arm(plant, self._robot.link, self._robot.palm)
+        # ahead by what stretches the person's arm to the planned force; what it takes to stay on the line comes on top
+        ahead = (hand - palm) @ self._direction + planned.force_max / USUAL_ARM.stiffness
+        return HandGoal(palm + ahead * self._direction, FREE_N)
 
 
 def pushed(model: RobotModel, skin: Skin, params: Profile, held_s: float, until: float, boxes=()) -> tuple:

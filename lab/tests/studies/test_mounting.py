@@ -8,7 +8,7 @@ import pytest
 from lab.tests.width import width
 from scipy.spatial.transform import Rotation
 
-from pretouch.perception.closest import no_obstacles
+from pretouch.groups import no_obstacles
 from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify
 from pretouch.robot.description import panda

@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pretouch.moving_fixtures import MovingFixtures
-from pretouch.perception.closest import no_obstacles
+from pretouch.groups import no_obstacles
 from pretouch.profiles import profile
+from pretouch.types import MovingFixtures
 from pretouch_lab.studies import two_arms
 from pretouch_lab.studies.two_arms_trial import BACK, Visits, play, visits, way
 
@@ -29,9 +29,7 @@ def test_a_point_shows_the_other_arm_if_no_person_is_nearer():
     )  # fmt: skip
 
     def step(unit: int, *point: float) -> SimpleNamespace:
-        near = no_obstacles()
-        near.unit, near.point = np.array([unit]), np.array([point])
-        return SimpleNamespace(obstacles=near)
+        return SimpleNamespace(obstacles=no_obstacles()._replace(unit=np.array([unit]), point=np.array([point])))
 
     # on its surface, 0.2 m away from it, told by no unit, on it but nearer to the person, and none
     steps = [step(0, 0.45, 0.0, 0.5), step(0, 0.25, 0.0, 0.5), step(1, 0.45, 0.0, 0.5), step(0, 0.45, 0.0, 0.2)]

@@ -2,7 +2,6 @@
 
 import os
 from collections.abc import Callable
-from dataclasses import replace
 from multiprocessing import get_context
 from multiprocessing.context import SpawnProcess
 
@@ -11,9 +10,9 @@ from numba.core import event
 from rich.console import Console
 
 from pretouch.compiled import FIRST_START, is_large, kept_in
-from pretouch.contact.moving_thresholds import MovingThresholds
 from pretouch.control.path import Circle
 from pretouch.controller import Controller
+from pretouch.line import move
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import Profile, at_rate, profile
 from pretouch.realtime import warm_up
@@ -53,7 +52,7 @@ def prepare(
     """
     start = _FirstStart(wanted, console or Console(stderr=True, highlight=False))
     with event.install_listener("numba:compile", start):
-        _stop_after_contact(wanted)
+        warm_up(*_at_rest(wanted))
         meanwhile()
     if start.begun and start.other and first_contact:
         _begun(compile_contact, wanted)
@@ -97,8 +96,9 @@ def _begun(work: Callable[[Profile], None], wanted: Profile) -> SpawnProcess:
 
 
 def compile_motion(wanted: Profile) -> None:
-    """Compile what of a step of a profile comes after contact detection, and the reaction."""
-    warm_up(*_at_rest(replace(wanted, perception=None, detect=MovingThresholds())))
+    """Compile what of a step comes after contact detection."""
+    controller, robot = _at_rest(wanted)
+    move(controller.fixed.blocks, controller.init(robot).memory.blocks, controller.blank.copy().blocks)
 
 
 def compile_contact(wanted: Profile) -> None:
@@ -106,26 +106,9 @@ def compile_contact(wanted: Profile) -> None:
     warm_up(*_at_rest(wanted))
 
 
-def _stop_after_contact(wanted: Profile) -> None:
-    """Compile what of a step of a profile comes up to contact detection."""
-
-    def stop(stage: str) -> None:
-        if stage == "contact":
-            raise _Enough
-
-    try:
-        warm_up(*_at_rest(wanted, stop))
-    except _Enough:
-        return
-
-
-class _Enough(Exception):
-    """A step has come as far as it is to."""
-
-
-def _at_rest(wanted: Profile, mark: Callable[[str], None] = lambda stage: None) -> tuple[Controller, RobotState]:
+def _at_rest(wanted: Profile) -> tuple[Controller, RobotState]:
     """Return a controller of a Panda with the paper's skin, and the state of an arm at rest."""
     model = RobotModel(panda())
     q, rest = model.description.q_ready, np.zeros(model.n)
     robot = RobotState(0.0, q, rest, q, rest, rest, np.zeros(6))
-    return Controller(model, paper_skin(model), no_fixtures(), Circle(), wanted, mark), robot
+    return Controller(model, paper_skin(model), no_fixtures(), Circle(), wanted), robot

@@ -30,10 +30,21 @@ from pretouch.contact.repeated_contact import (
     repeated_contact_init,
     wait_to_retry,
 )
-from pretouch.contact.virtual_mass import VirtualMass, begun, dead_band, fastest_point, learnt, mass_init, yielded
+from pretouch.contact.virtual_mass import (
+    FreeMass,
+    VirtualMass,
+    begun,
+    dead_band,
+    fastest_point,
+    learnt,
+    learnt_mass,
+    mass_init,
+    yielded,
+)
 from pretouch.groups import Kinematics
 from pretouch.modes import Event, ModeState
 from pretouch.params.paper import AdmittanceParams, ClampParams
+from pretouch.records import Flat
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray, Mode
 from pretouch.values import value
@@ -102,12 +113,27 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
             back, clamp = opened(state.clamp, state.mass.torque, inputs.robot.q_commanded, body.period, p)
             fastest = fastest_point(kin, model.moved_by, model.body.arrays, back)
             qd = back * min(1.0, p.open_m_s / fastest) if fastest > 0 else back  # never beyond the place in one period
-            state = replace(state, clamp=clamp, mass=replace(state.mass, velocity=np.zeros(len(qd))))
+            state = replace(state, clamp=clamp, mass=state.mass._replace(velocity=np.zeros(len(qd))))
         if doing == "soft" and not qd.any():
             return None, state
         # a pushed arm touches nothing that it sees; one that is caught is between two objects, and must get out
         touch_speed = self._way_out.open_m_s if opens else 0.0
         return ReactionMotion(model.ee_jacobian(kin)[:3] @ qd, qd, touch_speed), state
+
+    def caught_up(self, state: AdmittanceState, memory: Flat) -> AdmittanceState:
+        """Return the state with the mean torque of free motion and the places that the task went through."""
+        mean, samples, torque, path, marked = (memory.get(f"mass.{name}") for name in FreeMass._fields)
+        clamp = replace(state.clamp, path=path, marked=marked) if self.pinch is not None else state.clamp
+        return replace(state, mass=learnt_mass(mean, samples, torque, self), clamp=clamp, moved=0.0)
+
+    def keep_free(self, state: AdmittanceState, memory: Flat) -> bool:
+        """Leave the same in the memory; return whether there is neither a clamp nor a place given up."""
+        mass, clamp = state.mass, state.clamp
+        for name, number in zip(
+            FreeMass._fields, (mass.mean, mass.samples, mass.torque, clamp.path, clamp.marked), strict=True
+        ):
+            memory.put(f"mass.{name}", number)
+        return not clamp.torque and not state.place.contacts
 
     def announced(self, period: float) -> str:
         """Say how fast the arm goes with a push, and when it goes on."""
@@ -146,7 +172,7 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
         mass = yielded(mass, (model, inputs.kin), residual, inputs.command, band, dt, self, contact)
         if doing == "soft" and clamp.torque:
             # out of the clamp it may be moved, not back into it
-            mass = replace(mass, velocity=np.where(mass.velocity * clamp.course > 0, 0.0, mass.velocity))
+            mass = mass._replace(velocity=np.where(mass.velocity * clamp.course > 0, 0.0, mass.velocity))
         return mass
 
     def _kept_near(
@@ -160,7 +186,7 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
             return mass, 0.0
         moved_by, capsules = body.model.moved_by, body.model.body.arrays
         velocity, moved = within_reach(mass.velocity, kin, moved_by, capsules, origin, self.reach_m)
-        return replace(mass, velocity=velocity), moved
+        return mass._replace(velocity=velocity), moved
 
     def _placed(
         self, place: RepeatedContactState, doing: Doing, energy: float, near: bool, dt: float, inputs: ReactionInputs

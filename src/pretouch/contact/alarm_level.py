@@ -17,7 +17,7 @@ import math
 
 import numpy as np
 
-from pretouch.cholesky import factor, forward
+from pretouch.cholesky import factor, forward, largest_eigenvalue
 from pretouch.compiled import compiled
 from pretouch.contact.scatter import LENGTHS, REGIMES, FreeMeans, covariance_of_mean, spread_out
 from pretouch.types import FloatArray
@@ -109,7 +109,7 @@ def detectable_force(J: FloatArray, period: float, free: FreeMeans, needed: floa
         spread_out(free.scatter[k], L, np.empty((n, n)))
     for a in range(3):
         forward(L, J[a, ::-1].copy(), A[a])  # the last joint first
-    least, squares = _least_eigenvalue(A @ A.T), _squares(needed, n, gain, tails)
+    least, squares = -largest_eigenvalue(-A @ A.T), _squares(needed, n, gain, tails)
     return (math.sqrt(squares) + _SURE) / math.sqrt(least) if least > 0.0 else np.inf
 
 
@@ -124,16 +124,3 @@ def _squares(needed: float, n: int, gain: float, tails: float) -> float:
     # with few degrees of freedom no residual is so large that it could not be an outlier
     slope = 1.0 - E * (1.0 - c)
     return max(0.0, (E * (tails + n - 3.0 * c) - tails - n) / slope) if slope > 0.0 else np.inf
-
-
-@compiled
-def _least_eigenvalue(G: FloatArray) -> float:
-    """Return the least eigenvalue of a symmetric matrix (3, 3), in closed form."""
-    mean = (G[0, 0] + G[1, 1] + G[2, 2]) / 3.0
-    a, b, c, d, e, f = G[0, 0] - mean, G[1, 1] - mean, G[2, 2] - mean, G[0, 1], G[0, 2], G[1, 2]
-    size = math.sqrt((a * a + b * b + c * c + 2.0 * (d * d + e * e + f * f)) / 6.0)
-    if size == 0.0:
-        return mean
-    # of G less its mean, over `size`, half the determinant is the cosine of three times the angle of each root
-    half = 0.5 * (a * (b * c - f * f) - d * (d * c - f * e) + e * (d * f - b * e)) / size**3
-    return mean + 2.0 * size * math.cos((math.acos(max(-1.0, min(half, 1.0))) + 2.0 * math.pi) / 3.0)

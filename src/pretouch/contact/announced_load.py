@@ -12,9 +12,8 @@ import numpy as np
 from pretouch.contact.residual_model import ResidualModel
 from pretouch.groups import Kinematics
 from pretouch.params import SequentialParams
-from pretouch.payload import Payload
 from pretouch.robot.model import RobotModel
-from pretouch.types import FloatArray, RobotState
+from pretouch.types import FloatArray, Payload, RobotState
 from pretouch.values import value
 
 _NOTHING = Payload(0.0)
@@ -106,7 +105,7 @@ def doubted(model: ResidualModel, kg: float) -> ResidualModel:
     covariance = model.covariance.copy()
     covariance[:, 0, 0] += (kg * _GRAVITY[2] * _OFF_M) ** 2
     covariance[:, -1, -1] += (kg * _MASS_PART) ** 2
-    return replace(model, covariance=covariance)
+    return model._replace(covariance=covariance)
 
 
 def most_kg(model: RobotModel) -> float:

@@ -77,17 +77,21 @@ def gone(state: ClampState, q: FloatArray, dt: float) -> ClampState:
 
     Where it has been moved meanwhile, by a reaction or by hand, the path begins anew.
     """
-    marked, path = state.marked + dt, state.path
+    path, marked = state.path.copy(), np.array([state.marked])
+    note_place(path, marked, q, dt)
+    return replace(state, path=path, marked=float(marked[0]))
+
+
+@compiled
+def note_place(path: FloatArray, marked: FloatArray, q: FloatArray, dt: float) -> None:
+    """Do what `gone` says to a path (M, n) [rad] and the time (1,) since its newest place was noted [s]."""
+    marked[0] += dt
     # farther from one mark than the task goes until the next: something else has moved the arm
     if _farther(q, path, _MOVED_RAD):
-        marked, path = 0.0, np.tile(q, (_MARKS, 1))
-    elif marked >= _APART_S:
-        marked, path = 0.0, np.vstack((q[None], path[:-1]))
-    # each step of the task does this, and `replace` takes several times as long
-    return ClampState(
-        state.course, state.pushed, state.opposed, state.turns, state.turned, state.trail, marked, state.torque,
-        state.opening, state.open, path, state.came, state.between, state.force,
-    )  # fmt: skip
+        marked[0], path[:] = 0.0, q
+    elif marked[0] >= _APART_S:
+        marked[0], path[1:] = 0.0, path[:-1].copy()
+        path[0] = q
 
 
 @compiled

@@ -10,6 +10,7 @@ from pretouch.contact.detector import Body
 from pretouch.contact.reaction import Reaction, ReactionInputs, ReactionMotion, contact_event, new_contact
 from pretouch.modes import Event, ModeState
 from pretouch.params import TaskParams
+from pretouch.records import Flat
 from pretouch.types import FloatArray, Mode
 from pretouch.values import value
 
@@ -98,6 +99,10 @@ class DecayingVelocity(Reaction, name="decay"):
         if contact is not None:
             state = self.begun(contact.force)
         return ReactionMotion(decayed(state, self.decay_cycles)), advanced(state)
+
+    def keep_free(self, state: DecayState, memory: Flat) -> bool:
+        """Return whether no reaction is under way: nothing else is remembered."""
+        return not self.active(state)
 
     def adopted(self, state: DecayState, body: Body, before: Reaction, q: FloatArray) -> DecayState:
         """Go on with the reaction under way; one that is over stays so, however long this one lasts."""

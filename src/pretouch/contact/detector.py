@@ -9,7 +9,7 @@ import numpy as np
 from pretouch.compiled import compiled
 from pretouch.composition import Part
 from pretouch.contact.residual_model import ResidualModel
-from pretouch.contact.window import WindowState
+from pretouch.contact.window import Window
 from pretouch.groups import Kinematics
 from pretouch.robot.body import Capsules, no_capsules
 from pretouch.robot.model import RobotModel
@@ -51,7 +51,7 @@ class Sample:
     """Posture of the arm."""
     robot: RobotState
     """State of the arm, with the estimates of external torques and force; NaN and None where there is none."""
-    window: WindowState
+    window: Window
     """Force window with the force of this step in it (eq. 8)."""
     armed: bool
     """Whether the window was full before this step: a contact before is none."""

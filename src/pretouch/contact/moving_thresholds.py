@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import compiled, entry
+from pretouch.compiled import compiled
 from pretouch.contact.detector import Body, Detection, Detector, Sample
-from pretouch.contact.window import WindowState, window_mean, window_std
+from pretouch.contact.window import Window, window_mean, window_std
 from pretouch.params import ThresholdParams
 from pretouch.types import BoolArray, Contact, FloatArray, Number, Obstacles, Thresholds
 
@@ -59,6 +59,11 @@ class ThresholdNumbers(NamedTuple):
     d_min_m: float
 
 
+def threshold_numbers(p: ThresholdParams) -> ThresholdNumbers:
+    """Return what is taken of the parameters."""
+    return ThresholdNumbers(p.f_base_n, p.f_std_n, p.sigma_max_n, p.f_d_n, p.d_max_m, p.d_min_m)
+
+
 @compiled
 def threshold_parts(
     mean: FloatArray, sigma: FloatArray, positive: FloatArray, negative: FloatArray, p: ThresholdNumbers,
@@ -100,7 +105,7 @@ class MovingThresholds(ThresholdParams, Detector, name="thresholds"):
         return Detection(found.thresholds, found.contact, found.armed, robot.tau_ext, found.evidence), None
 
     def judged(
-        self, window: WindowState, force: FloatArray | None, armed: bool, ee_position: FloatArray, obstacles: Obstacles
+        self, window: Window, force: FloatArray | None, armed: bool, ee_position: FloatArray, obstacles: Obstacles
     ) -> Detection:
         """Hold a force (3,) [N] against the thresholds by its window and by what is near; the residual is NaN.
 
@@ -116,10 +121,10 @@ class MovingThresholds(ThresholdParams, Detector, name="thresholds"):
         parts, o = np.empty((6, 3)), obstacles
         # NaN crosses no threshold: without an estimate nothing is a contact
         compared = _NONE if force is None else window.newest if self.compare == "filtered" else force
-        found, share = _compare.flat(
-            window.sums, window.count, compared, ee_position, o.point, o.ee_distance,
-            self.f_base_n, self.f_std_n, self.sigma_max_n, self.f_d_n, self.d_max_m, self.d_min_m, parts,
-        )  # fmt: skip
+        count = int(window.samples[0])
+        found, share = compare(
+            window.sums, count, compared, ee_position, o.point, o.ee_distance, threshold_numbers(self), parts
+        )
         limits, contact = Thresholds(parts), None
         if found and armed:
             contact = Contact(compared - limits.mean, crossed(compared, limits))  # F_ext = F_reading - mu, eq. 12
@@ -138,20 +143,13 @@ def thresholds_of(detector: Detector) -> MovingThresholds:
 _NONE = np.full(3, np.nan)
 
 
-class _Near(NamedTuple):
-    """As of `Obstacles`."""
-
-    point: FloatArray
-    ee_distance: FloatArray
-
-
-@entry
-def _compare(
-    sums: FloatArray, count: int, compared: FloatArray, ee_position: FloatArray, obstacles: _Near,
-    p: ThresholdNumbers, parts: FloatArray,
+@compiled
+def compare(
+    sums: FloatArray, count: int, compared: FloatArray, ee_position: FloatArray, points: FloatArray,
+    ee_distance: FloatArray, p: ThresholdNumbers, parts: FloatArray,
 ) -> tuple[bool, float]:  # fmt: skip
     """Write the thresholds (6, 3); say whether a force (3,), NaN for none, crosses one, and its part of a band."""
-    positive, negative = side_distances(ee_position, obstacles.point, obstacles.ee_distance)
+    positive, negative = side_distances(ee_position, points, ee_distance)
     threshold_parts(window_mean(sums, count), window_std(sums, count), positive, negative, p, parts)
     found, largest = False, 0.0
     for i in range(3):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pretouch.compiled import compiled, entry
+from pretouch.compiled import compiled
 from pretouch.groups import CapsuleArrays, Kinematics
 from pretouch.robot.body import Capsules
 from pretouch.types import BoolArray, FloatArray
@@ -41,7 +41,7 @@ def within_reach(
     return velocity if share >= 1.0 else velocity * share, farthest
 
 
-@entry
+@compiled
 def _share(
     kin: Kinematics, moved_by: BoolArray, capsules: CapsuleArrays, qd: FloatArray, origin: FloatArray, reach: float
 ) -> tuple[float, float]:

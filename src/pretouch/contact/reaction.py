@@ -8,6 +8,7 @@ from pretouch.composition import Part
 from pretouch.contact.detector import Body, Detection
 from pretouch.groups import Kinematics
 from pretouch.modes import Event, ModeState
+from pretouch.records import Flat
 from pretouch.types import Contact, FloatArray, Mode, Obstacles, RobotState
 from pretouch.values import value
 
@@ -73,6 +74,14 @@ class Reaction(Part, group="pretouch.reactions"):
         The reaction begins where `mode` is REACT and `inputs.mode` is not: with `inputs.detection.contact`.
         """
         raise NotImplementedError
+
+    def caught_up(self, state: Any, memory: Flat) -> Any:
+        """Return the state after steps that were one compiled call each, by what these left in the memory."""
+        return state
+
+    def keep_free(self, state: Any, memory: Flat) -> bool:
+        """Leave in the memory what compiled steps go on from; return whether they may, for there is no contact."""
+        return False
 
     def adopted(self, state: Any, body: Body, before: "Reaction", q: FloatArray) -> Any:
         """Return the state to go on with from that of another profile's reaction, at joint positions (n,) [rad]."""

@@ -13,20 +13,19 @@ What is learnt waits in a queue of blocks for `QUEUE` of them, and the queue is 
 beginning of a contact is never learnt.
 """
 
-from dataclasses import replace
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from pretouch.cholesky import backward, factor, forward
-from pretouch.compiled import compiled, entry
+from pretouch.compiled import compiled
 from pretouch.errors import ParameterError
 from pretouch.groups import Kinematics, Mechanism
 from pretouch.params import SequentialParams
+from pretouch.records import IntCell
 from pretouch.robot.kinematics import column
 from pretouch.robot.model import RobotModel
 from pretouch.types import BoolArray, FloatArray
-from pretouch.values import value
 
 BLOCK = 4
 """Samples that are learnt as one: their sums."""
@@ -39,28 +38,27 @@ _SLOW, _FAST = 0.1, 0.3
 _GRAVITY = 9.81
 
 
-@value
-class ResidualModel:
+class ResidualModel(NamedTuple):
     """What was learnt, and the samples that wait to be. n joints, f features."""
 
-    weights: FloatArray
+    weights: Annotated[FloatArray, "n", "f"]
     """(n, f) of the mean [Nm]."""
-    covariance: FloatArray
+    covariance: Annotated[FloatArray, "n", "f", "f"]
     """(n, f, f) of the weights."""
-    spread: FloatArray
+    spread: Annotated[FloatArray, 2, 2, "n"]
     """(2, 2, n) standing and moving, each A [(rad/s^2)^2] and D [Nm^2]."""
-    seen: FloatArray
+    seen: Annotated[FloatArray, 2]
     """(2,) samples each of both was learnt from."""
-    speed: FloatArray
+    speed: Annotated[FloatArray, "n"]
     """(n,) commanded joint velocities as late as the torques [rad/s]."""
-    queue: FloatArray
+    queue: Annotated[FloatArray, "Q", "b"]
     """(QUEUE, b) blocks that wait: sums of torques, features, both variances and their weight, and the joints' spread,
     the last one whether the arm moved."""
-    block: FloatArray
+    block: Annotated[FloatArray, "b"]
     """(b,) the block being filled."""
-    filled: int
+    filled: IntCell
     """Samples in it."""
-    waiting: int
+    waiting: IntCell
     """Blocks in the queue, the oldest first."""
 
 
@@ -82,7 +80,8 @@ def residual_init(n: int, p: SequentialParams) -> ResidualModel:
     return ResidualModel(
         weights=np.zeros((n, f)), covariance=np.tile(np.diag(prior_of(n, p)), (n, 1, 1)),
         spread=np.stack([spread, spread]), seen=np.zeros(2), speed=np.zeros(n),
-        queue=np.zeros((QUEUE, size)), block=np.zeros(size), filled=0, waiting=0,
+        queue=np.zeros((QUEUE, size)), block=np.zeros(size),
+        filled=np.zeros(1, np.int64), waiting=np.zeros(1, np.int64),
     )  # fmt: skip
 
 
@@ -98,13 +97,8 @@ def features(model: RobotModel, kin: Kinematics, speed: FloatArray, growth: Floa
     the links behind each joint, as point masses [Nm], and that of 1 kg at the end-effector.
     """
     x = np.empty((model.n, features_of(model.n)))
-    _features(kin, model.mechanism, speed, growth, x)
+    features_into(kin, model.mechanism, speed, growth, x)
     return x
-
-
-@entry
-def _features(kin: Kinematics, mechanism: Mechanism, speed: FloatArray, growth: FloatArray, x: FloatArray) -> None:
-    features_into(kin, mechanism, speed, growth, x)
 
 
 @compiled
@@ -344,4 +338,4 @@ def resumed(numbers: dict[str, FloatArray], p: SequentialParams) -> ResidualMode
     if numbers["spread"].min() < 0.0 or numbers["seen"].min() < 0.0:
         raise ParameterError("What was learnt has a variance or a count below zero: learn it anew.")
     weights, covariance, spread, seen = (numbers[name].copy() for name in KEPT)
-    return replace(fresh, weights=weights, covariance=covariance, spread=spread, seen=seen)
+    return fresh._replace(weights=weights, covariance=covariance, spread=spread, seen=seen)

@@ -66,12 +66,6 @@ def scatter_init(n: int) -> FloatArray:
     return scatter
 
 
-def learns_scatter(at: int) -> bool:
-    """Whether `learn_scatter` may change a scatter at this count of samples."""
-    # the scatter is the largest part of the detector's state: it is copied only to be written
-    return at % _LEAST_STRIDE == 0
-
-
 @compiled
 def white_means(S: FloatArray, model_variance: FloatArray) -> FreeMeans:
     """Return means without a scatter: of noise (n, n) that is white, about a mean with variances (n,) [Nm^2]."""

@@ -14,17 +14,20 @@ without a skin.
 """
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from pretouch.cholesky import backward, factor, forward
 from pretouch.compiled import compiled
 from pretouch.contact.scatter import LENGTHS, FreeMeans, covariance_of_mean, spread_out
-from pretouch.groups import Kinematics, Mechanism, ObstacleArrays
+from pretouch.groups import Kinematics, Mechanism, Obstacles
 from pretouch.params import SequentialParams
 from pretouch.robot.kinematics import jacobian_into
 from pretouch.types import FloatArray, IntArray
+
+if TYPE_CHECKING:
+    from pretouch.contact.model_update import SequentialNumbers
 
 _LENGTHS = np.array(LENGTHS)
 _LARGEST = 300.0
@@ -180,14 +183,6 @@ MOST = 4
 """Objects that are taken into account, the nearest ones."""
 
 
-class NearPrior(NamedTuple):
-    """How much likelier a contact is where something is near."""
-
-    near_gain: float
-    near_m: float
-    near_horizon_s: float
-
-
 @compiled
 def link_prior(mechanism: Mechanism) -> float:
     """Return ln of the prior weight of a force on one link in one window, of which nothing near or touched is known."""
@@ -195,11 +190,11 @@ def link_prior(mechanism: Mechanism) -> float:
 
 
 @compiled
-def write_hypotheses(
-    kin: Kinematics, mechanism: Mechanism, qd: FloatArray, obstacles: ObstacleArrays, touch_gain: FloatArray,
-    p: NearPrior, contacts: Hypotheses,
-) -> None:  # fmt: skip
-    """Write the hypotheses: any wrench beyond each joint, a force on each link, one by each of the nearest objects.
+def hypotheses(
+    kin: Kinematics, mechanism: Mechanism, qd: FloatArray, obstacles: Obstacles, touch_gain: FloatArray,
+    p: "SequentialNumbers",
+) -> Hypotheses:  # fmt: skip
+    """Return the hypotheses: any wrench beyond each joint, a force on each link, one by each of the nearest objects.
 
     Joints move at `qd` (n,) [rad/s]. All weights are times `touch_gain` (L,) of the link; of several links behind one
     joint the largest counts.
@@ -207,8 +202,9 @@ def write_hypotheses(
     position, rotation, anchor, axis = kin
     moved_by, parts, middle = mechanism.arm.moved_by, mechanism.links.parts, mechanism.links.middle
     distance, direction = obstacles.body_distance, obstacles.direction
-    J, joints, weight, away = contacts
     n, count, full, point = len(anchor), len(parts), np.empty((6, len(anchor))), np.empty(3)
+    most = count + (min(MOST, len(distance)) if p.use_proximity else 0)
+    J, joints, weight, away = np.empty((most, 3, n)), np.empty(most, np.int64), np.empty(n + most), np.zeros((most, 3))
     order, k = nearest_of(distance, len(J) - count), 0
     # joints and links without what is seen share a weight of 1: half for any wrench on a link, which moves the joints
     # before it, half for a force at the middle of a link
@@ -240,6 +236,7 @@ def write_hypotheses(
                 for j in range(n):
                     speed += direction[k, a] * J[h, a, j] * qd[j]
             weight[n + h] = p.near_gain * nearness(distance[k], speed, p.near_m, p.near_horizon_s) * touch_gain[link]
+    return Hypotheses(J, joints, weight, away)
 
 
 @compiled

@@ -6,17 +6,18 @@ the noise covariance C = M A M^T + D and the model's variance u = x^T P x, which
 """
 
 import math
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import compiled, entry, inlined
+from pretouch.compiled import compiled, inlined
 from pretouch.contact.alarm_level import detectable_force, earned_level
-from pretouch.contact.model_update import DetectionNumbers, Memory, Situation, Tested, update_model
+from pretouch.contact.model_update import CALM, SequentialNumbers, SequentialState, Situation, Tested, update_model
 from pretouch.contact.residual_model import CalmSample, features_into, mean_and_variance, spread_of_sample
-from pretouch.contact.scatter import LONGEST, add_reversal_variance, scattered_means, white_means, window_means
-from pretouch.contact.sequential import MOST, Hypotheses, NearPrior, force_map_into, judge, link_prior, write_hypotheses
-from pretouch.groups import Kinematics, Mechanism, ObstacleArrays
+from pretouch.contact.scatter import LENGTHS, LONGEST, add_reversal_variance, scattered_means, white_means, window_means
+from pretouch.contact.sequential import force_map_into, hypotheses, judge, link_prior
+from pretouch.groups import Kinematics, Mechanism, Obstacles
+from pretouch.records import Cell, IntCell
 from pretouch.robot.kinematics import jacobian_into, mass_matrix_into
 from pretouch.types import FloatArray
 
@@ -34,67 +35,92 @@ class Joints(NamedTuple):
     tau_ext: FloatArray
 
 
-class Results(NamedTuple):
-    """Room for what a sample says, as of `SequentialDetection`, and for the velocities as late as the torques."""
+class SampleTest(NamedTuple):
+    """What one sample says."""
 
-    residual: FloatArray
-    speed: FloatArray
-    force: FloatArray
-    bands: FloatArray
-    means: FloatArray
-    covariance: FloatArray
-    model_variance: FloatArray
+    residual: Annotated[FloatArray, "n"]
+    """(n,) torques less their mean [Nm]."""
+    log_likelihood_ratio: Cell
+    """ln R / ln A: a contact from 1 on."""
+    detectable_n: Cell
+    """Force at the end-effector that is found, see `detectable_force` [N]."""
+    force: Annotated[FloatArray, 3]
+    """(3,) at the end-effector that explains the window that says most best [N]; none of it moves the arm towards a
+    seen object if what says most is that this object touches."""
+    bands: Annotated[FloatArray, 6, 3]
+    """(6, 3) bands of the force that say the same of one sample, the parts of `Thresholds` [N]."""
+    means: Annotated[FloatArray, "W", "n"]
+    """(6, n) of windows of each of `LENGTHS` [Nm]."""
+    samples: IntCell
+    """How many samples there are."""
+    covariance: Annotated[FloatArray, "n", "n"]
+    """(n, n) of one sample: its noise, and `model_variance` on the diagonal [Nm^2]."""
+    model_variance: Annotated[FloatArray, "n"]
+    """(n,) of the error of the mean of free motion, which does not average out [Nm^2]."""
+    learning: IntCell
+    """Whether the sample is to be learnt as free motion."""
+    lasting: IntCell
+    """Whether it is being found out if the residual is a load or a step of an estimate."""
 
 
-@entry
-def detect_contact(
-    robot: Joints, obstacles: ObstacleArrays, memory: Memory, now: Situation, p: DetectionNumbers, results: Results,
-    kin: Kinematics, mechanism: Mechanism,
-) -> tuple[float, float, int, int, int, int, int]:  # fmt: skip
-    """Write what a sample says and what is learnt.
+def sample_test(n: int) -> SampleTest:
+    """Return room for what a sample of n joints says."""
+    return SampleTest(
+        np.zeros(n), np.zeros(1), np.full(1, np.nan), np.zeros(3), np.zeros((6, 3)), np.zeros((len(LENGTHS), n)),
+        np.zeros(1, np.int64), np.zeros((n, n)), np.zeros(n), np.zeros(1, np.int64), np.zeros(1, np.int64),
+    )  # fmt: skip
 
-    Returns the log-likelihood ratio, the force that is found [N], what `update_model` does, and samples at rest.
+
+@compiled
+def assess_sample(
+    state: SequentialState, robot: Joints, obstacles: Obstacles, now: Situation, p: SequentialNumbers,
+    kin: Kinematics, mechanism: Mechanism, results: SampleTest,
+) -> None:  # fmt: skip
+    """Test one sample of the external torques for a contact, and learn from it if nothing can be one.
+
+    Changes the state, and writes what the sample says. The torques must be numbers.
     """
-    arm, recent, n = mechanism.arm, memory.recent, len(robot.qd)
+    arm, n, at = mechanism.arm, len(robot.qd), state.at[0]
+    count = min(state.samples[0] + 1, LONGEST)
     covariance, means, distance = results.covariance, results.means, obstacles.body_distance
-    x, M = np.empty((n, memory.learnt.weights.shape[1])), np.empty((n, n))
-    free = _FreeMotion(results.speed, x, M, np.empty(n), covariance, results.model_variance)
-    moving = _free_motion(robot.qd_commanded, memory, now, p, kin, mechanism, free)
+    means[:] = 0.0  # of windows that are not whole yet
+    x, M = np.empty((n, state.model.weights.shape[1])), np.empty((n, n))
+    free = _FreeMotion(np.empty(n), x, M, np.empty(n), covariance, results.model_variance)
+    moving = _free_motion(robot.qd_commanded, state, p, kin, mechanism, free)
     for j in range(n):
         results.residual[j] = robot.tau_ext[j] - free.mean[j]
-        recent.ring[recent.at, j] = results.residual[j]
+        state.ring[at, j] = results.residual[j]
 
     # The test against contacts of each joint, of each link and of the nearest objects: R is the sum of prior weights
     # times likelihood ratios, A the level that it passes at the chosen rate of false alarms.
-    whole = window_means(recent.ring, (recent.at + 1) % LONGEST, recent.held, means)
-    most = len(mechanism.links.parts) + (min(MOST, len(distance)) if p.use_proximity else 0)
-    contacts = Hypotheses(np.empty((most, 3, n)), np.empty(most, np.int64), np.empty(n + most), np.zeros((most, 3)))
-    near = NearPrior(p.near_gain, p.near_m, p.near_horizon_s)
-    write_hypotheses(kin, mechanism, robot.qd, obstacles, now.touch_gain, near, contacts)
-    settled = 0 if np.abs(free.speed).max() > _STIRS_RAD_S else recent.settled
+    whole = window_means(state.ring, (at + 1) % LONGEST, count, means)
+    contacts = hypotheses(kin, mechanism, robot.qd, obstacles, now.touch_gain, p)
+    settled = 0 if np.abs(free.speed).max() > _STIRS_RAD_S else state.settled[0]
     # At rest the offsets of a posture are learnt in seconds; until then the arm errs as in motion. Time in which
     # nothing may be learnt, with somebody near, does not count.
-    regime = 0 if settled * now.period >= _SETTLED_S else 1
+    regime = 0 if settled * p.period >= _SETTLED_S else 1
     expected, ratio = white_means(covariance, results.model_variance), np.zeros(0)
     if p.learn_misfit:
-        expected = scattered_means(covariance, results.model_variance, recent.scatter[regime])
+        expected = scattered_means(covariance, results.model_variance, state.scatter[regime])
         ratio = expected.scatter[-1, n + 1]
     log_r, window, which = judge(means, whole, expected, contacts, p.contact_gain, p.tails)
-    level = max(1.0, now.bound - p.slack_nats)
+    level = max(1.0, p.bound - p.slack_nats)
     if p.learn_misfit:
-        level = earned_level(recent.level[regime], now.bound, p.slack_nats, math.exp(-now.bound))
+        level = earned_level(state.level[regime], p.bound, p.slack_nats, math.exp(-p.bound))
     log_likelihood_ratio = max(0.0, log_r / level)
 
     J_ee = np.empty((6, n))
     jacobian_into(kin.anchor, kin.axis, arm.moved_by[arm.ee], kin.position[arm.ee], J_ee)
-    found = detectable_force(J_ee, now.period, expected, level - link_prior(mechanism), p.contact_gain, p.tails)
+    results.detectable_n[0] = detectable_force(
+        J_ee, p.period, expected, level - link_prior(mechanism), p.contact_gain, p.tails
+    )
     # nothing is learnt while anything that is seen could be what is measured
-    alone = now.may_learn and distance.min() >= p.clear_m if len(distance) else now.may_learn
+    alone = (p.learns == 2 or (p.learns == 1 and now.watched)) and (len(distance) == 0 or distance.min() >= p.clear_m)
     sample = CalmSample(robot.tau_ext, x, results.residual, M, results.model_variance, moving, ratio)
     tested = Tested(
-        sample, means, whole, expected, J_ee, alone, log_likelihood_ratio >= p.suspect, log_r, recent.level[regime]
+        sample, means, whole, expected, J_ee, alone, log_likelihood_ratio >= p.suspect, log_r, state.level[regime]
     )  # fmt: skip
-    calm, filled, waiting, steady = update_model(memory, now, p, tested)
+    update_model(state, now, p, tested)
 
     for j in range(n):  # only now: what is learnt is learnt of the noise alone
         covariance[j, j] += results.model_variance[j]
@@ -103,9 +129,22 @@ def detect_contact(
     _force_and_bands(
         J_ee, means[window], free.mean, covariance, away, math.sqrt(2.0 * level), results.force, results.bands
     )  # fmt: skip
-    if alone and not now.reacting:
-        settled += 1
-    return log_likelihood_ratio, found, calm, filled, waiting, steady, settled
+    state.model.speed[:], state.at[0] = free.speed, (at + 1) % LONGEST
+    state.settled[0] = settled + 1 if alone and not now.reacting else settled
+    _conclude(state, results, log_likelihood_ratio, count)
+
+
+@inlined
+def _conclude(state: SequentialState, results: SampleTest, ratio: float, count: int) -> None:
+    """Write the ratio and what is learnt, and forget a contact that was a load."""
+    if state.steady[0] < 0:  # the load that lasted is free motion now, and no contact
+        ratio, results.force[:], count = 0.0, 0.0, 0
+        state.steady[0] = state.calm[0] = state.model.filled[0] = state.model.waiting[0] = 0
+        results.learning[0] = 1
+    else:
+        results.learning[0] = 1 if state.calm[0] == CALM else 0
+    state.samples[0] = results.samples[0] = count
+    results.log_likelihood_ratio[0], results.lasting[0] = ratio, 1 if state.steady[0] > 0 else 0
 
 
 class _FreeMotion(NamedTuple):
@@ -127,19 +166,19 @@ class _FreeMotion(NamedTuple):
 
 @inlined
 def _free_motion(
-    commanded: FloatArray, memory: Memory, now: Situation, p: DetectionNumbers, kin: Kinematics, mechanism: Mechanism,
+    commanded: FloatArray, state: SequentialState, p: SequentialNumbers, kin: Kinematics, mechanism: Mechanism,
     free: _FreeMotion,
 ) -> int:  # fmt: skip
     """Write mean, noise and uncertainty of the torques without a contact; return 1 if the arm moves, or 0.
 
     `commanded` (n,) are the joint velocities [rad/s].
     """
-    learnt, before, moving, n = memory.learnt, memory.recent.speed, 0, len(commanded)
+    learnt, before, moving, n = state.model, state.model.speed, 0, len(commanded)
     acceleration = np.empty(n)
     # the observer that gives the torques is a low pass of the first order: the velocities go through the same
     for j in range(n):
-        free.speed[j] = now.delay * before[j] + (1.0 - now.delay) * commanded[j]
-        acceleration[j] = (free.speed[j] - before[j]) / now.period
+        free.speed[j] = p.delay * before[j] + (1.0 - p.delay) * commanded[j]
+        acceleration[j] = (free.speed[j] - before[j]) / p.period
         if abs(free.speed[j]) > p.still_rad_s:
             moving = 1
     features_into(kin, mechanism, free.speed, acceleration, free.x)
@@ -149,7 +188,7 @@ def _free_motion(
     for j in range(n):
         free.model_variance[j] += p.bias_floor_nm**2
     if p.widen_at_turns:
-        add_reversal_variance(free.M, acceleration, memory.recent.turning, free.model_variance)
+        add_reversal_variance(free.M, acceleration, state.turning, free.model_variance)
     return moving
 
 
@@ -158,7 +197,7 @@ def _force_and_bands(
     J: FloatArray, torque: FloatArray, mean: FloatArray, covariance: FloatArray, away: FloatArray, wide: float,
     force: FloatArray, bands: FloatArray,
 ) -> None:  # fmt: skip
-    """Write force (3,) and bands (6, 3) of `SequentialDetection`, of torques (n,) and of the mean in free motion.
+    """Write force (3,) and bands (6, 3) of `SampleTest`, of torques (n,) and of the mean in free motion.
 
     With the damped inverse W of J^T the force is W tau, and its variance diag(W C W^T). The bands are `wide` deviations
     about the mean: sqrt(2 ln A), where a single Gaussian's likelihood ratio, exp(z^2 / 2), is A.

@@ -7,11 +7,19 @@ import numpy as np
 
 from pretouch.contact.announced_load import doubted
 from pretouch.contact.detector import Body, Detection, Detector, Sample, no_torques, strongest
-from pretouch.contact.localisation.localise import LocalisationState, localisation_init, localise, most_significant_mean
+from pretouch.contact.localisation.localise import (
+    LocalisationState,
+    ResidualWindows,
+    localisation_init,
+    localise,
+    most_significant_mean,
+)
+from pretouch.contact.model_update import SequentialNumbers, SequentialState
 from pretouch.contact.residual_model import ResidualModel
-from pretouch.contact.sequential_detector import Observation, SequentialState, sequential_init, sequential_step
+from pretouch.contact.sequential_detector import Observation, sequential_init, sequential_numbers, sequential_step
 from pretouch.contact.touch_cue import Cue, Cues, no_cues, together
-from pretouch.groups import NOTHING_NEAR
+from pretouch.errors import ParameterError
+from pretouch.groups import no_obstacles
 from pretouch.params import LocalisationParams, SequentialParams
 from pretouch.types import NOT_TOUCHED, FloatArray, RobotState, Thresholds
 from pretouch.values import value
@@ -21,7 +29,8 @@ from pretouch.values import value
 class SequentialTestState:
     """All that the sequential test remembers."""
 
-    test: SequentialState
+    test: SequentialState | None
+    """None where the controller keeps it."""
     localisation: LocalisationState | None
     """None where no contact is localised."""
     cues: tuple[object, ...]
@@ -50,8 +59,12 @@ class SequentialTest(SequentialParams, Detector, name="sequential"):
 
     def init(self, body: Body, learnt: ResidualModel | None = None) -> SequentialTestState:
         """Return what is remembered before the first step."""
-        test = sequential_init(body.model, self, learnt)
+        test = sequential_init(body.model.n, self, learnt)
         return SequentialTestState(test, localisation_init() if self.localise else None, self._cues_init(body))
+
+    def numbers(self, body: Body) -> SequentialNumbers:
+        """Return what compiled code takes of the parameters."""
+        return sequential_numbers(body.model.n, body.period, self)
 
     def _cues_init(self, body: Body) -> tuple[object, ...]:
         return tuple(cue.init(body) for cue in self.cues)
@@ -68,22 +81,23 @@ class SequentialTest(SequentialParams, Detector, name="sequential"):
         # while a unit is touched free motion is not learnt, whatever the test says
         alone = sample.watched and not len(said.link)
         seen = Observation(sample.kin, sample.robot, sample.obstacles, said)
-        before = state.test
+        before = _test_of(state)
         if sample.doubted_kg:
-            before = replace(before, model=doubted(before.model, sample.doubted_kg))
-        tested, test = sequential_step(before, model, seen, sample.reacting, alone, period, self)
+            before = before._replace(model=doubted(before.model, sample.doubted_kg))
+        tested, test = sequential_step(before, model, seen, sample.reacting, alone, self.numbers(body))
         bands, touched, significant = Thresholds(tested.bands), NOT_TOUCHED, None
-        contact = strongest(tested.force, bands) if tested.log_likelihood_ratio >= 1.0 and sample.armed else None
+        ratio = float(tested.log_likelihood_ratio[0])
+        windows = ResidualWindows(tested.means, int(tested.samples[0]), tested.covariance, tested.model_variance)
+        contact = strongest(tested.force, bands) if ratio >= 1.0 and sample.armed else None
         if self.localise:
             touched, location = localise(
-                location or localisation_init(), model, seen, tested.windows, tested.log_likelihood_ratio, period,
-                self.localise,
-            )  # fmt: skip
-        if tested.log_likelihood_ratio >= 1.0:
-            significant = most_significant_mean(tested.windows, period, self.localise or _USUAL)
+                location or localisation_init(), model, seen, windows, ratio, period, self.localise
+            )
+        if ratio >= 1.0:
+            significant = most_significant_mean(windows, period, self.localise or _USUAL)
         made = Detection(
-            bands, contact, sample.armed, tested.residual, tested.log_likelihood_ratio, tested.learning, tested.lasting,
-            touched, significant, tested.detectable_n,
+            bands, contact, sample.armed, tested.residual, ratio, bool(tested.learning[0]), bool(tested.lasting[0]),
+            touched, significant, float(tested.detectable_n[0]),
         )  # fmt: skip
         return made, SequentialTestState(test, location if self.localise else None, remembered)
 
@@ -103,7 +117,7 @@ class SequentialTest(SequentialParams, Detector, name="sequential"):
 
     def learnt(self, state: SequentialTestState) -> ResidualModel:
         """Return what was learnt of free motion."""
-        return state.test.model
+        return _test_of(state).model
 
     def largest_missed_n(self, body: Body, speed: float) -> float:
         """Force from which one sample is a contact to an arm at its ready posture that has learnt nothing.
@@ -111,15 +125,15 @@ class SequentialTest(SequentialParams, Detector, name="sequential"):
         By bisection; infinite where it would miss any force up to `_LARGEST_N`.
         """
         model, q, qd = body.model, body.model.description.q_ready, np.full(body.model.n, speed)
-        kin, fresh, said = model.kinematics(q), sequential_init(model, self), no_cues(len(model.links))
+        kin, fresh, said = model.kinematics(q), sequential_init(model.n, self), no_cues(len(model.links))
         # with the delayed velocities at the present ones nothing accelerates
-        state, J = replace(fresh, model=replace(fresh.model, speed=qd)), model.ee_jacobian(kin)[:3]
+        state, J = fresh._replace(model=fresh.model._replace(speed=qd)), model.ee_jacobian(kin)[:3]
 
         def is_detected(force: FloatArray) -> bool:
             robot = RobotState(0.0, q, qd, q, qd, J.T @ force, None)
-            seen = Observation(kin, robot, NOTHING_NEAR, said)
-            tested, _ = sequential_step(state, model, seen, False, False, body.period, self)
-            return tested.log_likelihood_ratio >= 1.0
+            seen = Observation(kin, robot, no_obstacles(), said)
+            tested, _ = sequential_step(state, model, seen, False, False, self.numbers(body))
+            return bool(tested.log_likelihood_ratio[0] >= 1.0)
 
         largest = 0.0
         for axis in np.eye(3):
@@ -131,6 +145,12 @@ class SequentialTest(SequentialParams, Detector, name="sequential"):
                 low, high = (low, middle) if is_detected(middle * axis) else (middle, high)
             largest = max(largest, high)
         return largest
+
+
+def _test_of(state: SequentialTestState) -> SequentialState:
+    if state.test is None:
+        raise ParameterError("This state lacks what the controller keeps of it: begin with init().")
+    return state.test
 
 
 _LARGEST_N, _TO_N = 1000.0, 0.1

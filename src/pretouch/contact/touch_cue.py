@@ -18,7 +18,7 @@ neither raises a prior nor keeps free motion from being learnt, and contacts are
 
 from dataclasses import dataclass, field
 from functools import cache
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -32,8 +32,7 @@ from pretouch.types import FloatArray, IntArray, TouchStatus
 from pretouch.values import value
 
 
-@value
-class Cues:
+class Cues(NamedTuple):
     """Evidence of the units of one step, for detection and localisation. L links of the arm, C touched places."""
 
     gain: FloatArray
@@ -177,7 +176,7 @@ def said_by(
 ) -> tuple[Cues | None, TouchState]:
     """Return what units say of a touch in one step, None where none is believed to be touched.
 
-    The touch readings of the sample are of all K units, of known shapes (`faults.sound_touch`); None of a skin that
+    The touch readings of the sample are of all K units, of known shapes (`sound.sound_touch`); None of a skin that
     gave none. `period` [s] is that of control.
     """
     account, readings, kin = state.account, sample.touches, sample.kin

@@ -6,21 +6,20 @@ Ferraguti et al. 2015; both bound it with what they call passivity observer and 
 """
 
 import math
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import ByName, compiled, entry
+from pretouch.compiled import compiled
 from pretouch.groups import CapsuleArrays, Chain, Kinematics
 from pretouch.params.paper import AdmittanceParams
+from pretouch.records import Cell, IntCell
 from pretouch.robot.kinematics import point_velocity
 from pretouch.robot.model import RobotModel
-from pretouch.types import BoolArray, FloatArray
-from pretouch.values import value
+from pretouch.types import BoolArray, FloatArray, IntArray
 
 
-@value
-class VirtualMass:
+class VirtualMass(NamedTuple):
     """The virtual mass of n joints, and what is remembered of the torque that moves it."""
 
     mean: FloatArray
@@ -47,10 +46,19 @@ class VirtualMass:
     """Time since the contact that began a reaction [s], infinite without one."""
 
 
+class FreeMass(NamedTuple):
+    """What the virtual mass learns in free motion, and the places that the task went through."""
+
+    mean: Annotated[FloatArray, 2, "n"]
+    samples: IntCell
+    torque: Annotated[FloatArray, "n"]
+    path: Annotated[FloatArray, "M", "n"]
+    marked: Cell
+
+
 def mass_init(n: int, params: AdmittanceParams) -> VirtualMass:
     """Return the state of n joints at rest, before the first sample."""
-    none, twice = np.zeros(n), np.zeros((2, n))
-    return VirtualMass(twice, 0, none, none, none, params.start_energy_j, twice, none, 0.0, 0.0, math.inf)
+    return learnt_mass(np.zeros((2, n)), 0, np.zeros(n), params)
 
 
 def dead_band(torque_limit: FloatArray, params: AdmittanceParams) -> FloatArray:
@@ -64,22 +72,26 @@ def learnt(state: VirtualMass, residual: FloatArray, dt: float, params: Admittan
     Of two filters in a row the second takes in little of what has only begun: of a torque that has lasted for 60 ms
     less than one part in a hundred.
     """
-    # the mean of all samples at first, an exponential one from T / dt samples on
-    weight = max(1.0 - math.exp(-dt / _MEAN_S), 1.0 / (state.samples + 1))
-    none, mean, torque = np.zeros(len(residual)), np.empty((2, len(residual))), np.empty(len(residual))
-    _learn(state.mean, residual, weight, mean, torque)
-    return VirtualMass(
-        mean, min(state.samples + 1, 1_000_000), torque, none, none, params.start_energy_j, np.zeros(mean.shape), none,
-        0.0, 0.0, math.inf,
-    )  # fmt: skip
+    mean, samples, torque = state.mean.copy(), np.array([state.samples]), np.empty(len(residual))
+    learn_mean(mean, samples, residual, dt, torque)
+    return learnt_mass(mean, int(samples[0]), torque, params)
+
+
+def learnt_mass(mean: FloatArray, samples: int, torque: FloatArray, params: AdmittanceParams) -> VirtualMass:
+    """Return the state in free motion, with its mean, samples in it, and last torque beyond it."""
+    none, twice = np.zeros(len(torque)), np.zeros(mean.shape)
+    return VirtualMass(mean, samples, torque, none, none, params.start_energy_j, twice, none, 0.0, 0.0, math.inf)
 
 
 @compiled
-def _learn(before: FloatArray, residual: FloatArray, weight: float, mean: FloatArray, torque: FloatArray) -> None:
-    """Write the mean (2, n) after a sample, and what of the sample (n,) it leaves."""
+def learn_mean(mean: FloatArray, samples: IntArray, residual: FloatArray, dt: float, torque: FloatArray) -> None:
+    """Let a sample into the mean (2, n) of so many samples (1,), and write what of the sample (n,) it leaves."""
+    # the mean of all samples at first, an exponential one from T / dt samples on
+    weight = max(1.0 - math.exp(-dt / _MEAN_S), 1.0 / (samples[0] + 1))
+    samples[0] = min(samples[0] + 1, 1_000_000)
     for j in range(len(residual)):
-        mean[0, j] = before[0, j] + weight * (residual[j] - before[0, j])
-        mean[1, j] = before[1, j] + weight * (mean[0, j] - before[1, j])
+        mean[0, j] += weight * (residual[j] - mean[0, j])
+        mean[1, j] += weight * (mean[0, j] - mean[1, j])
         torque[j] = residual[j] - mean[1, j]
 
 
@@ -131,8 +143,11 @@ def yielded(
     # just after a contact the filters still lag, and the detector has found a push already
     at_once = _KEEPS if state.since < _FIRST_S else _AT_ONCE
     tank, pushed = _yield(
-        torque, command, band, state, p, (keep, at_once, 1.0 - math.exp(-dt / _STEADY_S), dt),
-        (velocity, side, sliding, steady),
+        torque, command, band, state,
+        _Period(
+            p.inertia_kg_m2, p.damping_nm_s, p.static_friction_nm, keep, at_once, 1.0 - math.exp(-dt / _STEADY_S), dt
+        ),
+        _After(velocity, side, sliding, steady),
     )  # fmt: skip
     velocity = _no_faster(velocity, *arm, p.speed_max_m_s)
     quiet, no_contact = 0.0 if pushed else state.quiet + dt, 0.0 if contact else state.no_contact + dt
@@ -169,27 +184,15 @@ _REST_RAD_S = 1e-3
 """Speed at which a joint that nothing drives sticks [rad/s]: none that can be seen."""
 
 
-class _Before(NamedTuple):
-    """As of `VirtualMass`."""
-
-    torque: FloatArray
-    velocity: FloatArray
-    side: FloatArray
-    sliding: FloatArray
-    tank: float
-
-
-class _Params(NamedTuple):
-    """Of `AdmittanceParams`."""
-
-    inertia_kg_m2: float
-    damping_nm_s: float
-    static_friction_nm: float
-
-
-class _Step(NamedTuple):
+class _Period(NamedTuple):
     """What a period comes to."""
 
+    inertia: float
+    """[kg m^2]"""
+    damping: float
+    """[Nm s/rad]"""
+    friction: float
+    """Static [Nm]."""
     keep: float
     """Part of the torque before that the estimate still shows."""
     at_once: float
@@ -209,15 +212,13 @@ class _After(NamedTuple):
     steady: FloatArray
 
 
-@entry
+@compiled
 def _yield(
-    torque: FloatArray, command: FloatArray, band: FloatArray, state: ByName[_Before], p: ByName[_Params], step: _Step,
-    after: _After,
-) -> tuple[float, bool]:  # fmt: skip
+    torque: FloatArray, command: FloatArray, band: FloatArray, state: VirtualMass, period: _Period, after: _After
+) -> tuple[float, bool]:
     """Write what follows; return the energy in the tank [J], and whether a push goes on."""
-    before, v, side, loose, tank = state
-    inertia, damping, friction = p
-    keep, at_once, weight, dt = step
+    before, v, side, loose, tank = state.torque, state.velocity, state.side, state.sliding, state.tank
+    inertia, damping, friction, keep, at_once, weight, dt = period
     velocity, sides, sliding, steady = after
     n, power, pushed = len(v), 0.0, False
     for i in range(n):
@@ -281,7 +282,7 @@ def _shrunk(torque: FloatArray, band: FloatArray) -> FloatArray:
     return np.sign(torque) * np.maximum(0.0, np.abs(torque) - band)
 
 
-@entry
+@compiled
 def fastest_point(kin: Kinematics, moved_by: BoolArray, capsules: CapsuleArrays, qd: FloatArray) -> float:
     """Speed [m/s] of the fastest end of any capsule's axis at joint velocities `qd` (n,) [rad/s].
 

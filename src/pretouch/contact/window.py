@@ -1,43 +1,34 @@
 """The sliding window of the external force: eq. 8, its mean and standard deviation by running sums, in O(1)."""
 
+from typing import Annotated, NamedTuple
+
 import numpy as np
 
 from pretouch.compiled import compiled
 from pretouch.params import WindowParams
+from pretouch.records import IntCell
 from pretouch.types import FloatArray
-from pretouch.values import value
 
 _NEWEST, _ORIGIN, _TOTAL, _SQUARES = range(4)
 
-_CHUNK = 64
-"""Values that are copied for one more: a window at 1 kHz holds a thousand."""
 
-
-@value
-class WindowState:
+class Window(NamedTuple):
     """A ring of the last N force samples and their running sums. All forces in N, per axis."""
 
-    chunks: tuple[FloatArray, ...]
-    """(up to 64, 3) each, together the N values of the ring, oldest at `next` once full."""
-    next: int
+    ring: Annotated[FloatArray, "N", 3]
+    """(N, 3), oldest at `next` once full."""
+    next: IntCell
     """Where the next value goes."""
-    count: int
+    samples: IntCell
     """Values held so far, at most N."""
-    size: int
-    """N."""
-    sums: FloatArray
+    sums: Annotated[FloatArray, 4, 3]
     """(4, 3) the value added last, the origin o the sums are taken about, so that a large mean costs no digits, the sum
     of (value - o), and that of its square."""
 
     @property
-    def ring(self) -> FloatArray:
-        """The values (N, 3), in the order of their places."""
-        return np.concatenate(self.chunks)
-
-    @property
     def full(self) -> bool:
         """Whether the window holds N values, so that its statistics mean something."""
-        return self.count == self.size
+        return bool(self.samples[0] == len(self.ring))
 
     @property
     def newest(self) -> FloatArray:
@@ -46,22 +37,21 @@ class WindowState:
 
     def mean(self) -> FloatArray:
         """Mean mu (3,), zero of an empty window."""
-        return window_mean(self.sums, self.count)
+        return window_mean(self.sums, int(self.samples[0]))
 
     def std(self) -> FloatArray:
         """Sample standard deviation sigma (3,), zero of fewer than two values."""
-        return window_std(self.sums, self.count)
+        return window_std(self.sums, int(self.samples[0]))
 
 
-def window_init(samples: int) -> WindowState:
+def window_init(samples: int) -> Window:
     """Return an empty window for N samples."""
-    chunks = tuple(np.zeros((min(_CHUNK, samples - start), 3)) for start in range(0, samples, _CHUNK))
-    return WindowState(chunks, 0, 0, samples, np.zeros((4, 3)))
+    return Window(np.zeros((samples, 3)), np.zeros(1, np.int64), np.zeros(1, np.int64), np.zeros((4, 3)))
 
 
 @compiled
 def window_mean(sums: FloatArray, count: int) -> FloatArray:
-    """Mean (3,) of a window with these sums (4, 3) and so many values; see `WindowState`."""
+    """Mean (3,) of a window with these sums (4, 3) and so many values; see `Window`."""
     mean = np.empty(3)
     for i in range(3):
         mean[i] = sums[_ORIGIN, i] + sums[_TOTAL, i] / max(count, 1)
@@ -70,7 +60,7 @@ def window_mean(sums: FloatArray, count: int) -> FloatArray:
 
 @compiled
 def window_std(sums: FloatArray, count: int) -> FloatArray:
-    """Sample standard deviation (3,) of a window with these sums (4, 3) and so many values; see `WindowState`."""
+    """Sample standard deviation (3,) of a window with these sums (4, 3) and so many values; see `Window`."""
     std = np.zeros(3)
     if count > 1:
         for i in range(3):
@@ -95,40 +85,35 @@ def weighted_value(
     return value
 
 
-def add_force(state: WindowState, reading: FloatArray | None, p: WindowParams) -> WindowState:
+def add_force(window: Window, reading: FloatArray | None, p: WindowParams) -> Window:
     """Add a force reading (3,) [N]: as it is until the window is full, through eq. 8 from then on; None: nothing."""
     if reading is None:
-        return state
-    k, at = divmod(state.next, _CHUNK)
-    # the step is pure, and copies of the ring only what it writes to
-    chunk, size = state.chunks[k].copy(), state.size
-    # Once a turn the sums are taken afresh, so that rounding errors never add up: O(1) on average. That is before the
-    # next value and not after the last one, for what a step says of its window is of the running sums.
-    sums = _afresh(state) if state.count == 1 or (state.count and state.next == 0) else state.sums.copy()
-    add_to(chunk, at, sums, state.count, state.full, reading, p.alpha, p.lambda_)
-    chunks = (*state.chunks[:k], chunk, *state.chunks[k + 1 :])
-    return WindowState(chunks, (state.next + 1) % size, min(state.count + 1, size), size, sums)
-
-
-def _afresh(state: WindowState) -> FloatArray:
-    """Sums (4, 3) of the values of a window, about the newest of them."""
-    origin = state.newest.copy()
-    values = state.ring[: state.count] - origin
-    return np.array([origin, origin, values.sum(axis=0), (values**2).sum(axis=0)])
+        return window
+    after = Window._make(part.copy() for part in window)
+    add_sample(after, reading, p.alpha, p.lambda_)
+    return after
 
 
 @compiled
-def add_to(
-    chunk: FloatArray, at: int, sums: FloatArray, count: int, full: bool, reading: FloatArray, alpha: float,
-    lambda_: float,
-) -> None:  # fmt: skip
-    """Change the chunk, at an index, and the sums (4, 3) as `add_force` says, for a window of `count` values so far."""
-    x = reading
+def add_sample(window: Window, reading: FloatArray, alpha: float, lambda_: float) -> None:
+    """Do what `add_force` says to the window itself."""
+    ring, sums, at, count = window.ring, window.sums, window.next[0], window.samples[0]
+    # Once a turn the sums are taken afresh, so that rounding errors never add up: O(1) on average. That is before the
+    # next value and not after the last one, for what a step says of its window is of the running sums.
+    if count == 1 or (count > 0 and at == 0):
+        for i in range(3):
+            sums[_ORIGIN, i], sums[_TOTAL, i], sums[_SQUARES, i] = sums[_NEWEST, i], 0.0, 0.0
+            for k in range(count):
+                off = ring[k, i] - sums[_ORIGIN, i]
+                sums[_TOTAL, i] += off
+                sums[_SQUARES, i] += off**2
+    x, full = reading, count == len(ring)
     # not before: the sigma of few values is near 0, and eq. 8 would take most readings for outliers
     if full:
         x = weighted_value(reading, sums[_NEWEST], window_mean(sums, count), window_std(sums, count), alpha, lambda_)
     for i in range(3):
-        gone, chunk[at, i], sums[_NEWEST, i] = chunk[at, i], x[i], x[i]
+        gone, ring[at, i], sums[_NEWEST, i] = ring[at, i], x[i], x[i]
         new, old = x[i] - sums[_ORIGIN, i], gone - sums[_ORIGIN, i] if full else 0.0
         sums[_TOTAL, i] += new - old
         sums[_SQUARES, i] += new**2 - old**2
+    window.next[0], window.samples[0] = (at + 1) % len(ring), min(count + 1, len(ring))

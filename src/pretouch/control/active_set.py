@@ -16,18 +16,8 @@ import numpy as np
 
 from pretouch.cholesky import backward, factor, forward
 from pretouch.compiled import compiled
-from pretouch.control.penalty import (
-    BUDGET,
-    INFEASIBLE,
-    NOT_CONVEX,
-    NOT_FINITE,
-    SOLVED,
-    Minimum,
-    Problem,
-    excesses,
-    finite,
-    possible_rows,
-)
+from pretouch.control.penalty import Minimum, Problem, excesses, finite, possible_rows
+from pretouch.modes import BUDGET, INFEASIBLE, NOT_CONVEX, NOT_FINITE, SOLVED
 from pretouch.types import FloatArray, IntArray
 
 _MET = 1e-12

@@ -1,18 +1,18 @@
-"""Restricting the body's approach to obstacles: eqs. 5-7, rows G qd <= h of the QP, the part `paper` of a profile."""
+"""Restricting the body's approach to obstacles: eqs. 5-7 as rows G qd <= h of the QP, or the braking curve."""
 
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import ByName, compiled, entry, flattened, inlined
-from pretouch.control.interface import CompiledRows, MotionBody, MotionRequest, Restricted, Restriction
-from pretouch.control.motion_entry import Allowed, Ended, Fixed, Step, motion_within
+from pretouch.compiled import compiled
+from pretouch.control.braking import BrakingLimits
+from pretouch.control.interface import MotionBody, MotionRequest, Restricted, Restriction
 from pretouch.control.qp import ApproachRows, Rows
-from pretouch.groups import Kinematics, NearArrays
-from pretouch.params import RestrictionParams
+from pretouch.groups import Kinematics, Obstacles
+from pretouch.params import BrakingParams, RestrictionParams
 from pretouch.robot.kinematics import column
-from pretouch.types import WHOLE, BoolArray, FloatArray, IntArray, Number, Obstacles, RobotState
+from pretouch.types import BoolArray, FloatArray, IntArray, Number, RobotState
 
 
 @compiled
@@ -39,7 +39,8 @@ def approach_limit(d: FloatArray, params: RestrictionParams) -> FloatArray:
     V_a - V_max below d_repulse, V_b from there to d_notice. `d` (K,) [m] is from the body's surface and may be
     negative. With rows=floor the limit never lies below `floor_m_s`.
     """
-    return _limits(d, approach_params(params))
+    p = approach_params(params)
+    return np.array([_limit(one, p) for one in d], dtype=np.float64)
 
 
 class ApproachParams(NamedTuple):
@@ -59,14 +60,6 @@ def approach_params(params: RestrictionParams) -> ApproachParams:
     p = params
     least = p.floor_m_s if p.rows == "floor" else -np.inf
     return ApproachParams(p.v_max_m_s, p.beta, p.d_crit_m, p.d_repulse_m, p.d_notice_m, least)
-
-
-@entry
-def _limits(d: FloatArray, p: ApproachParams) -> FloatArray:
-    limits = np.empty(len(d))
-    for k in range(len(d)):
-        limits[k] = _limit(d[k], p)
-    return limits
 
 
 @compiled
@@ -92,17 +85,12 @@ def approach_rows(
     if count == 0:
         return ApproachRows(np.zeros((0, n)), np.zeros(0), soft=False), np.zeros(0, np.int64)
     G, h, which = np.empty((count, n)), np.empty(count), np.empty(count, np.int64)
-    found = _rows(kin, moved_by, obstacles, Rows(G, h, which), approach_params(p))
+    found = rows_into(kin, moved_by, obstacles, approach_params(p), Rows(G, h, which))
     return ApproachRows(G[:found], h[:found], p.rows != "hard"), which[:found]
 
 
-@entry
-def _rows(kin: Kinematics, moved_by: BoolArray, near: ByName[NearArrays], rows: Rows, p: ApproachParams) -> int:
-    return rows_into(kin, moved_by, near, p, rows)
-
-
-@inlined
-def rows_into(kin: Kinematics, moved_by: BoolArray, near: NearArrays, p: ApproachParams, rows: Rows) -> int:
+@compiled
+def rows_into(kin: Kinematics, moved_by: BoolArray, near: Obstacles, p: ApproachParams, rows: Rows) -> int:
     """Write the rows of `approach_rows` and the indices of their obstacles; return how many."""
     anchor, axis = kin.anchor, kin.axis
     link, point, direction = near.link, near.body_point, near.direction
@@ -128,10 +116,6 @@ def rows_into(kin: Kinematics, moved_by: BoolArray, near: NearArrays, p: Approac
 class ApproachRestriction(RestrictionParams, Restriction, name="paper"):
     """Restricting the body's approach to obstacles, as in the paper (eqs. 5-7)."""
 
-    def on(self, body: MotionBody) -> Restriction:
-        """Return the same for compiled code, which writes the rows where it solves."""
-        return _OnBody(self)
-
     def step(
         self, state: Any, body: MotionBody, kin: Kinematics, robot: RobotState, obstacles: Obstacles,
         request: MotionRequest,
@@ -139,33 +123,6 @@ class ApproachRestriction(RestrictionParams, Restriction, name="paper"):
         """Return the rows of `approach_rows`; nothing is remembered."""
         rows, which = approach_rows(kin, body.model.moved_by, obstacles, self)
         return Restricted(rows.G, rows.h, which, self.slack_weight if rows.soft else 0.0), state
-
-
-class _OnBody(Restriction):
-    """An `ApproachRestriction` that works."""
-
-    def __init__(self, params: RestrictionParams) -> None:
-        self._weight = 0.0 if params.rows == "hard" else params.slack_weight  # 0 marks hard rows, see `Restricted`
-        self._numbers = flattened(approach_params(params), self._weight)
-
-    def step(
-        self, state: Any, body: MotionBody, kin: Kinematics, robot: RobotState, obstacles: Obstacles,
-        request: MotionRequest,
-    ) -> tuple[CompiledRows, Any]:  # fmt: skip
-        count = len(obstacles.unit)
-        # a row for each obstacle at most: which of them are within d_notice is found out while the rows are written
-        room = np.empty((count, len(robot.q))), np.empty(count), np.empty(count, WHOLE)
-        return CompiledRows(_motion, room, self._weight, self._numbers), state
-
-
-@entry
-def _motion(step: Step, rows: Rows, fixed: Fixed, params: ApproachParams, weight: float) -> Ended:
-    """Write the rows of eqs. 5-7 and the answer within them."""
-    found = rows_into(step.kin, fixed.arm.moved_by, step.near, params, rows)
-    # eqs. 5-7 bound no joint speed; an empty array says so, for None would be another type to compile for
-    none = np.empty(0)
-    allowed = Allowed(rows.G[:found], rows.h[:found], rows.which[:found], weight, none, none, False)
-    return motion_within(step, allowed, fixed)
 
 
 def of_table_i(part: Restriction | None) -> ApproachRestriction:
@@ -176,3 +133,19 @@ def of_table_i(part: Restriction | None) -> ApproachRestriction:
 def notice_m(part: Restriction | None) -> float:
     """Return from which body distance on a restriction allows everything [m]: its own, or Table I's."""
     return float(getattr(part, "d_notice_m", ApproachRestriction.d_notice_m))
+
+
+@dataclass(frozen=True)
+class BrakingCurve(BrakingParams, Restriction, name="braking"):
+    """How fast the body may come near, so that it could stop, or touch gently; compiled in `line`."""
+
+
+def braking_limits(p: BrakingParams, speed: float, period: float) -> BrakingLimits:
+    """Return what compiled code takes of the parameters, the task's speed [m/s], and the control period [s]."""
+    across = p.tangential
+    return BrakingLimits(
+        p.d_notice_m, p.deceleration_m_s2, p.latency_s, p.margin_m, p.retreat_max_m_s,
+        # what is switched off never binds: no distance is below -inf
+        -np.inf if across is None else across.distance_m, 0.0 if across is None else across.speed_m_s, speed,
+        p.tighten_m_s2, p.loosen_m_s2, period,
+    )  # fmt: skip

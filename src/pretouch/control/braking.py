@@ -7,14 +7,14 @@ one rate and gives way at another, also when its object is no longer seen; so no
 for what is so near that the arm could not slow at that rate before it: there it brakes as hard as its joints may.
 """
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from pretouch.cholesky import forward
 from pretouch.compiled import compiled, inlined
 from pretouch.control.qp import Rows
-from pretouch.groups import Chain, ObstacleArrays
+from pretouch.groups import Chain, Obstacles
 from pretouch.params.pretouch import REGIONS, BrakingParams, EffectiveMass
 from pretouch.robot.kinematics import column
 from pretouch.types import BoolArray, FloatArray, IntArray
@@ -47,15 +47,15 @@ def touch_limits(params: BrakingParams) -> TouchLimits:
 class Slots(NamedTuple):
     """What is remembered of the rows of K units: first one slot a unit, then one for the row it had before."""
 
-    link: IntArray
+    link: Annotated[IntArray, "2 K"]
     """(2 K,) link of the row, -1 for none."""
-    limit: FloatArray
+    limit: Annotated[FloatArray, "2 K"]
     """(2 K,) largest closing speed along the normal [m/s]."""
-    across: FloatArray
+    across: Annotated[FloatArray, "2 K"]
     """(2 K,) largest speed across it [m/s]."""
-    normal: FloatArray
+    normal: Annotated[FloatArray, "2 K", 3]
     """(2 K, 3) from the body to the obstacle."""
-    point: FloatArray
+    point: Annotated[FloatArray, "2 K", 3]
     """(2 K, 3) on the body [m]."""
 
 
@@ -91,8 +91,6 @@ class BrakingLimits(NamedTuple):
     margin_m: float
     retreat_m_s: float
     """Fastest retreat that is asked for [m/s]."""
-    deadband_m_s: float
-    """Closing speed of an object below which it counts as still [m/s]."""
     across_m: float
     """Body distance below which motion across the normal is restricted too [m], -inf for none."""
     across_slowest_m_s: float
@@ -102,8 +100,16 @@ class BrakingLimits(NamedTuple):
     tighten_m_s2: float
     loosen_m_s2: float
     period_s: float
+
+
+class Touch(NamedTuple):
+    """What may be touched in a step, and how."""
+
+    limits: TouchLimits
+    deadband_m_s: float
+    """Closing speed of an object below which it counts as still [m/s]."""
     untouched: int
-    """`ObstacleArrays.unit` from which on an obstacle is not to be touched at any speed."""
+    """`Obstacles.unit` from which on an obstacle is not to be touched at any speed."""
 
 
 class Mass(NamedTuple):
@@ -129,8 +135,7 @@ def braking_cap(distance: float, touch: float, deceleration: float, latency: flo
 
 @inlined
 def braking_rows(
-    slots: Slots, obstacles: ObstacleArrays, chain: Chain, mass: Mass, touching: TouchLimits, limits: BrakingLimits,
-    rows: Rows,
+    slots: Slots, obstacles: Obstacles, chain: Chain, mass: Mass, touch: Touch, limits: BrakingLimits, rows: Rows
 ) -> tuple[int, int]:  # fmt: skip
     """Change `slots` by one period and write rows; return how many are of what is seen, and how many there are.
 
@@ -141,11 +146,11 @@ def braking_rows(
         obstacles: M that are near.
         chain: what moves the points.
         mass: of the arm.
-        touching: what a touch may be.
+        touch: what may be touched.
         limits: of the braking curve.
         rows: room for all rows, and for M indices.
     """
-    half, s, distance = len(slots.link) // 2, limits, obstacles.body_distance
+    half, s, distance, touching = len(slots.link) // 2, limits, obstacles.body_distance, touch.limits
     seen, found = np.zeros(half, np.bool_), 0
     for m in range(len(obstacles.unit)):
         k = obstacles.unit[m]
@@ -158,15 +163,15 @@ def braking_rows(
         row = rows.G[found]
         approach = _row(slots.link[k], slots.point[k], obstacles.direction[m], chain, row)
         # the row is n^T J, so the effective mass along the normal comes of it too
-        touch = touch_speed(mass_along(mass.factor, row), touching) if mass.counts else touching.speed_max_m_s
-        if k >= s.untouched:
-            touch = 0.0
+        speed = touch_speed(mass_along(mass.factor, row), touching) if mass.counts else touching.speed_max_m_s
+        if k >= touch.untouched:
+            speed = 0.0
         # an object that goes away allows no more; an infinite deadband leaves its speed out
-        own = max(0.0, obstacles.closing_speed[m] - s.deadband_m_s)
-        cap = braking_cap(distance[m], touch, s.deceleration_m_s2, s.latency_s, s.margin_m)
+        own = max(0.0, obstacles.closing_speed[m] - touch.deadband_m_s)
+        cap = braking_cap(distance[m], speed, s.deceleration_m_s2, s.latency_s, s.margin_m)
         target = max(cap - own, -s.retreat_m_s)
         # the same curve at the rate of tightening: the arm can still come down to it at that rate
-        last = braking_cap(distance[m], touch, s.tighten_m_s2, s.latency_s, s.margin_m) - own
+        last = braking_cap(distance[m], speed, s.tighten_m_s2, s.latency_s, s.margin_m) - own
         # Faster than that, smoothness comes second: the limit falls at once. With 0.0 it falls as far as a stop, while
         # a retreat (target < 0) is still approached at the rate of tightening.
         slots.limit[k] = min(_eased(target, slots.limit[k], approach, s), max(target, last, 0.0))

@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 
-from pretouch.control.path import Following
 from pretouch.desired import Desired, DesiredKind, sound_desired
 from pretouch.groups import Kinematics
 from pretouch.modes import Event
@@ -31,8 +30,6 @@ class Asked:
     """(3, 3) R_O_ee to hold from here on where nobody asks for another."""
     qd: FloatArray | None = None
     """(n,) joint velocities asked for in place of all that [rad/s]."""
-    path: Following | None = None
-    """How the path is followed; None where a commander asks."""
 
 
 def commanded(

@@ -2,14 +2,15 @@
 
 from typing import Any
 
-from pretouch.compiled import Entry
+import numpy as np
+
 from pretouch.composition import Part
 from pretouch.control.joint_box import JointLimits
-from pretouch.control.motion_entry import Ended
+from pretouch.errors import ParameterError
 from pretouch.groups import Kinematics
 from pretouch.params import TaskParams
 from pretouch.robot.model import RobotModel
-from pretouch.types import FloatArray, IntArray, Obstacles, RobotState
+from pretouch.types import WHOLE, FloatArray, IntArray, Obstacles, RobotState
 from pretouch.values import value
 
 
@@ -39,10 +40,6 @@ class MotionRequest:
     touch: float | None = None
     """Speed at which an arm that a contact moves may touch what it sees, and then nothing drives it away from what
     comes nearer [m/s]; None for what the profile says."""
-    units: int = 0
-    """How many units, outside points and links beside moving fixtures obstacles may be of, if more than the units."""
-    untouched: int | None = None
-    """`Obstacles.unit` from which on obstacles are moving fixtures, not to be touched; None without."""
 
 
 @value
@@ -64,18 +61,25 @@ class Restricted:
     """(n,) least and (n,) largest joint velocities [rad/s]; what the acceleration does not allow comes later."""
 
 
-@value
-class CompiledRows:
-    """Rows that compiled code writes right before it solves: one call a step in place of two."""
+GivenRows = tuple[FloatArray, FloatArray, IntArray]
+"""G, h and which of `Restricted`."""
 
-    motion: Entry[Ended]
-    """Takes `Step`, `Rows`, `Fixed`, and what belongs to it: writes the rows and ends with `motion_within`."""
-    room: tuple[FloatArray, FloatArray, IntArray]
-    """Fields of `Rows`."""
-    weight: float
-    """As in `Restricted`."""
-    numbers: tuple[Any, ...]
-    """What belongs to it, flattened."""
+
+def rows_of(allowed: Restricted, n: int) -> tuple[GivenRows, float, tuple[FloatArray, FloatArray]]:
+    """Return rows, weight and joint speeds for compiled code; a ParameterError for wrong shapes."""
+    count, seen = len(allowed.h), len(allowed.which)
+    if allowed.G.shape != (count, n) or seen > count:
+        shapes = f"G {allowed.G.shape}, h {allowed.h.shape}, which {allowed.which.shape}"
+        raise ParameterError(f"A restriction's rows are {shapes}: G is (R, {n}), h is (R,), which is at most (R,).")
+    # other types or orders in memory would be compiled for anew, while the arm waits
+    G, h, slowest, fastest = (
+        np.ascontiguousarray(part, float) for part in (allowed.G, allowed.h, *(allowed.speeds or (_NONE, _NONE)))
+    )
+    return (G, h, np.ascontiguousarray(allowed.which, WHOLE)), float(allowed.weight), (slowest, fastest)
+
+
+_NONE = np.zeros(0)
+"""What stands for joint speeds that are not restricted."""
 
 
 class Restriction(Part, group="pretouch.restrictions"):
@@ -92,7 +96,7 @@ class Restriction(Part, group="pretouch.restrictions"):
     def step(
         self, state: Any, body: MotionBody, kin: Kinematics, robot: RobotState, obstacles: Obstacles,
         request: MotionRequest,
-    ) -> tuple[Restricted | CompiledRows, Any]:  # fmt: skip
+    ) -> tuple[Restricted, Any]:  # fmt: skip
         """Return what is allowed in one step, and what to remember.
 
         Args:

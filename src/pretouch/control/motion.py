@@ -1,152 +1,132 @@
-"""From what is asked and what is allowed to joint velocities, in one compiled call."""
+"""Joint velocities: the joint limits, and eq. 2 within rows that a restriction wrote."""
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import flattened
-from pretouch.control.interface import CompiledRows, MotionBody, MotionRequest, Restricted, Restriction
-from pretouch.control.motion_entry import Fixed, MotionNumbers, given_motion
-from pretouch.control.null_space import NullSpaceLimits
-from pretouch.control.penalty import INFEASIBLE, SOLVED
-from pretouch.control.qp import ENDING, cost_params
-from pretouch.errors import ParameterError
-from pretouch.groups import Kinematics
-from pretouch.params import NullSpaceMotion
-from pretouch.types import WHOLE, FloatArray, IntArray, Obstacles, QpOutcome, QpSolution, RobotState
-from pretouch.values import value
+from pretouch.compiled import compiled, inlined
+from pretouch.control.active_set import minimise_within
+from pretouch.control.joint_box import JointLimits, box_and_brake
+from pretouch.control.null_space import NullSpaceLimits, away, cost_with_null_space
+from pretouch.control.penalty import Minimum, Problem, excesses, minimise
+from pretouch.control.qp import CostParams, cost_into, cost_params, twist
+from pretouch.groups import Arm, Kinematics, Obstacles
+from pretouch.modes import SOLVED
+from pretouch.params import NullSpaceMotion, TaskParams
+from pretouch.robot.kinematics import jacobian_into
+from pretouch.robot.model import RobotModel
+from pretouch.types import FloatArray, IntArray
+
+if TYPE_CHECKING:
+    from pretouch.faults import Report
+    from pretouch.line_records import Answer, Request
 
 
-@value
-class MotionState:
-    """What the motion remembers from one step to the next."""
+class MotionNumbers(NamedTuple):
+    """What compiled code takes of limits and parameters."""
 
-    null_velocity: FloatArray
-    """(n,) joint velocity asked for in the null space [rad/s]."""
-
-
-@value
-class Motion:
-    """What the arm is to do, and what kept it from doing more."""
-
-    qp: QpSolution
-    restricted: IntArray
-    """(K',) which of the obstacles restrict the arm."""
-    approach_limit: FloatArray
-    """(K',) approach limit for each of them [m/s]."""
-    ee_velocity: FloatArray
-    """(3,) measured velocity of the end-effector origin [m/s]."""
-    ee_velocity_commanded: FloatArray
-    """(3,) velocity of the end-effector origin with the joint velocities of the answer [m/s]."""
+    arm: Arm
+    cost: CostParams
+    orientation_gain_1_s: float
+    holds_orientation: bool
+    """Whether the end-effector keeps its orientation."""
+    budget: int
+    """Factorisations after which to give up."""
+    limits: Annotated[FloatArray, 9, "n"]
+    """`JointLimits.table`."""
+    q_mid: Annotated[FloatArray, "n"]
+    """(n,) middle of the joint ranges [rad]."""
+    projected: bool
+    """Whether the mid-joint term is in the null space of the task."""
+    away: NullSpaceLimits
+    """How links before the hand move away in it; within no distance: they do not."""
 
 
-@value
-class MotionSetup:
-    """A body, and how it moves."""
-
-    body: MotionBody
-    numbers: MotionNumbers
-    moves_away: bool
-    """Whether links before the hand move away in the null space."""
-    fields: tuple[Any, ...]
-    """Of `Fixed`, for compiled code."""
-
-
-def motion_setup(body: MotionBody, null_space: NullSpaceMotion | None, budget: int) -> MotionSetup:
-    """Return what `joint_motion` is made with; `budget` counts the factorisations after which it gives up."""
-    model, t, p, moves_away = body.model, body.task, null_space or NullSpaceMotion(), null_space is not None
-    within = p.distance_m if moves_away else -math.inf  # nothing is nearer than that, so nothing moves away
-    numbers = MotionNumbers(
-        cost_params(t), t.orientation_gain_1_s, t.orientation == "hold", budget, body.limits.table, model.q_mid,
+def motion_numbers(
+    model: RobotModel, limits: JointLimits, task: TaskParams, null_space: NullSpaceMotion | None, budget: int
+) -> MotionNumbers:
+    """Return what compiled code takes; `budget` counts the factorisations after which the solver gives up."""
+    p, t = null_space or NullSpaceMotion(), task
+    within = -math.inf if null_space is None else p.distance_m  # nothing is nearer than that, so nothing moves away
+    return MotionNumbers(
+        model.arm, cost_params(t), t.orientation_gain_1_s, t.orientation == "hold", budget, limits.table, model.q_mid,
         t.mid_joint_projected, NullSpaceLimits(within, p.speed_m_s, p.joint_rad_s, p.rate_rad_s2 * t.control_period_s),
     )  # fmt: skip
-    return MotionSetup(body, numbers, moves_away, flattened(Fixed(model.arm, numbers)))
 
 
-_NONE = np.zeros(0)
-"""What stands for joint velocities that are not given."""
-_ANY = _NONE, _NONE
+class Allowed(NamedTuple):
+    """What compiled code takes of `Restricted`."""
+
+    G: FloatArray
+    h: FloatArray
+    which: IntArray
+    weight: float
+    slowest: FloatArray
+    """(n,) or none."""
+    fastest: FloatArray
+    """(n,) or none."""
 
 
-def joint_motion(
-    state: MotionState, setup: MotionSetup, kin: Kinematics, robot: RobotState, obstacles: Obstacles,
-    request: MotionRequest, allowed: Restricted | CompiledRows,
-) -> tuple[Motion, MotionState]:  # fmt: skip
-    """Joint velocities that track the task (eq. 2) within the joint limits and what is allowed, and what to remember.
+@compiled
+def move_within(
+    p: MotionNumbers, robot: "Report", posture: tuple[Kinematics, FloatArray], near: Obstacles,
+    request: "Request", allowed: Allowed, null_velocity: FloatArray, answer: "Answer",
+) -> None:  # fmt: skip
+    """Write the joint velocities of eq. 2 within the joint limits and rows; change the motion in the null space."""
+    arm = p.arm
+    n, seen, found, (kin, ee) = len(robot.q), len(allowed.which), len(allowed.h), posture
+    G, h, qd = allowed.G, allowed.h, answer.command
+    slack, multipliers = np.empty(found), np.empty(n + found)
+    # of the rows only the first, those of obstacles, are n^T J of something to move away from
+    if p.away.distance_m > 0.0:
+        null_velocity[:] = away(null_velocity, G[:seen], allowed.which, near, arm.moved_by, p.away)
+    J = np.empty((6, n))
+    jacobian_into(kin.anchor, kin.axis, arm.moved_by[arm.ee], ee, J)
+    # the box starts from commanded positions and speeds, where it is exact; Jacobian and cost from measured ones
+    lower, upper, stop = box_and_brake(robot.q_commanded, robot.qd_commanded, p.limits)
+    # what the acceleration does not allow comes later: the box is never empty
+    for i in range(len(allowed.slowest)):
+        least, most = lower[i], upper[i]
+        lower[i] = min(max(allowed.slowest[i], least), most)
+        upper[i] = min(max(allowed.fastest[i], least), most)
+    ending = SOLVED
+    if request.hold[0] == 0:
+        H, f = np.empty((n, n)), np.empty(n)
+        _pose(J, robot.q, request, kin.rotation[arm.ee], null_velocity, p, H, f)
+        problem, minimum = Problem(H, f, lower, upper, G, h, allowed.weight), Minimum(qd, slack, multipliers)
+        if allowed.weight == 0.0:  # hard rows have no price
+            ending = minimise_within(problem, p.budget, minimum)
+        else:
+            ending = minimise(problem, p.budget, minimum)
+    if request.hold[0] == 1 or ending != SOLVED:
+        # no answer is sent but one that is a minimum; by how much braking violates the rows is reported all the same
+        qd[:], multipliers[:] = stop, 0.0
+        excesses(G, h, qd, slack)
+    answer.seen[0], answer.ending[0], answer.violated[0] = seen, ending, 0
+    answer.velocities[0], answer.velocities[1] = J[:3] @ robot.qd, J[:3] @ qd
+    for k in range(found):
+        if slack[k] > 0.0 and allowed.weight > 0.0:
+            answer.violated[0] = 1
+    answer.which[:seen], answer.limit[:seen], answer.slack[:seen] = allowed.which, h[:seen], slack[:seen]
+    answer.multipliers[: n + seen] = multipliers[: n + seen]
 
-    Args:
-        state: what is remembered.
-        setup: body and parameters.
-        kin: posture.
-        robot: state of the arm.
-        obstacles: what is near.
-        request: what is asked.
-        allowed: what a restriction allows.
-    """
-    n, o, velocity = len(robot.q), obstacles, request.velocity
-    if isinstance(allowed, CompiledRows):
-        rows = allowed
+
+@inlined
+def _pose(
+    J: FloatArray, q: FloatArray, request: "Request", rotation: FloatArray, null_velocity: FloatArray, p: MotionNumbers,
+    H: FloatArray, f: FloatArray,
+) -> None:  # fmt: skip
+    """Write the cost of eq. 2, or of how far the joint velocities are from those asked for."""
+    if request.by_joints[0] == 1:
+        # 1/2 |qd_asked - qd|^2, a reaction in joint space: H = I is regular in any posture and needs no damping
+        H[:], f[:] = np.eye(len(q)), -request.qd
+        return
+    m = 6 if p.holds_orientation else 3
+    # 3 rows for the velocity alone: the rotation stays in the null space, and may drift
+    x_d = twist(request.velocity, rotation, request.goal, p.orientation_gain_1_s)
+    # eq. 2 as the paper has it needs no projector
+    if p.projected or p.away.distance_m > 0.0:
+        H[:], f[:] = cost_with_null_space(J[:m], x_d[:m], q, p.q_mid, p.cost, p.projected, null_velocity)
     else:
-        rows = _given(allowed, n)
-        velocity = velocity if allowed.velocity is None else velocity + allowed.velocity
-    G, h, which = rows.room
-    # compiled code writes to it, and a step leaves the state it was given as it is
-    null_velocity = state.null_velocity.copy() if setup.moves_away else state.null_velocity
-    qd, velocities = np.empty(n), np.empty((2, 3))
-    slack, multipliers = np.empty(len(h)), np.empty(n + len(h))
-    # Field by field in the order of `Step`, `Rows` and `Fixed`, 1 us faster than by groups. No type checker finds two
-    # fields of one type that have changed places.
-    seen, ending, violated = rows.motion.flat(
-        robot.q, robot.qd, robot.q_commanded, robot.qd_commanded,
-        o.link, o.body_point, o.direction, o.body_distance,
-        velocity, request.rotation_goal, request.hold, _NONE if request.qd is None else request.qd,
-        null_velocity, qd, slack, multipliers, velocities, *kin,
-        G, h, which, *setup.fields, *rows.numbers,
-    )  # fmt: skip
-    # what remembers nothing hands its state on, and makes no new one in each step
-    after = MotionState(null_velocity) if setup.moves_away else state
-    which, limit = which[:seen], h[:seen]
-    # a step reports the rows of obstacles; those that a restriction adds behind them belong to none
-    qp = QpSolution(qd, slack[:seen], multipliers[: n + seen], *_how_it_ended(request.hold, ending, violated))
-    return Motion(qp, which, limit, velocities[0], velocities[1]), after
-
-
-def _how_it_ended(hold: bool, ending: int, violated: bool) -> tuple[QpOutcome, str, bool]:
-    """Return outcome and sentence for how a minimisation ended, and whether its solution violates a row."""
-    if hold:
-        return QpOutcome.SKIPPED, "not posed: the arm holds", False
-    if ending != SOLVED:
-        return QpOutcome.INFEASIBLE if ending == INFEASIBLE else QpOutcome.FAILED, ENDING[ending], False
-    return QpOutcome.SOLVED, "solved, an approach row is violated" if violated else "solved", violated
-
-
-def _given(a: Restricted, n: int) -> CompiledRows:
-    """Return what compiled code takes of rows that a part made itself."""
-    count, seen = len(a.h), len(a.which)
-    if a.G.shape != (count, n) or seen > count:
-        shapes = f"G {a.G.shape}, h {a.h.shape}, which {a.which.shape}"
-        raise ParameterError(f"A restriction's rows are {shapes}: G is (R, {n}), h is (R,), which is at most (R,).")
-    # other types or orders in memory would be compiled for anew, while the arm waits
-    rows = np.ascontiguousarray(a.G, float), np.ascontiguousarray(a.h, float), np.ascontiguousarray(a.which, WHOLE)
-    slowest, fastest = (np.ascontiguousarray(speed, float) for speed in a.speeds or _ANY)
-    return CompiledRows(given_motion, rows, a.weight, (float(a.weight), slowest, fastest, True))
-
-
-class _Unrestricted(Restriction):
-    """Allows everything."""
-
-    def __init__(self, n: int) -> None:
-        nothing = np.zeros((0, n)), np.zeros(0), np.zeros(0, WHOLE)
-        self._all = CompiledRows(given_motion, nothing, 1.0, (1.0, *_ANY, False))  # any weight but 0, which is hard
-
-    def step(
-        self, state: Any, body: MotionBody, kin: Kinematics, robot: RobotState, obstacles: Obstacles,
-        request: MotionRequest,
-    ) -> tuple[CompiledRows, Any]:  # fmt: skip
-        return self._all, state
-
-
-def restriction_on(part: Restriction | None, body: MotionBody) -> Restriction:
-    """Return a restriction that works for a body; for None one that allows everything."""
-    return _Unrestricted(body.model.n) if part is None else part.on(body)
+        cost_into(J[:m], x_d[:m], q, p.q_mid, p.cost, H, f)

@@ -6,7 +6,7 @@ import numpy as np
 
 from pretouch.compiled import compiled
 from pretouch.control.qp import CostParams, damping, manipulability, mid_joint_velocity
-from pretouch.groups import NearArrays
+from pretouch.groups import Obstacles
 from pretouch.types import BoolArray, FloatArray, IntArray
 
 _DAMPING = 1e-6
@@ -92,7 +92,7 @@ class NullSpaceLimits(NamedTuple):
 
 @compiled
 def away(
-    last: FloatArray, G: FloatArray, which: IntArray, obstacles: NearArrays, moved_by: BoolArray,
+    last: FloatArray, G: FloatArray, which: IntArray, obstacles: Obstacles, moved_by: BoolArray,
     limits: NullSpaceLimits,
 ) -> FloatArray:  # fmt: skip
     """Joint velocities (n,) [rad/s] that take body points before the hand away from what is near.

@@ -1,4 +1,4 @@
-"""Paths for the end-effector, driven by a phase: the arc length travelled, never the time."""
+"""Paths for the end-effector, driven by a phase, the arc length travelled and never the time; and eqs. 3 and 4."""
 
 import math
 from bisect import bisect_right
@@ -7,10 +7,9 @@ from typing import Protocol
 
 import numpy as np
 
+from pretouch.compiled import compiled
 from pretouch.errors import PathError
-from pretouch.params import TaskParams
 from pretouch.types import FloatArray
-from pretouch.values import value
 
 
 class Path(Protocol):
@@ -136,94 +135,102 @@ class WayPoints:
         return np.array(self._directions[self._locate(phase)[0]])
 
 
-def line(start: tuple[float, float, float], end: tuple[float, float, float]) -> WayPoints:
+def segment(start: tuple[float, float, float], end: tuple[float, float, float]) -> WayPoints:
     """Return the straight line between two points [m]."""
     return WayPoints(np.array([start, end]))
 
 
-@value
-class PathState:
-    """How far along the path the task is."""
-
-    phase: float = 0.0
-    """Arc length travelled [m]."""
-    speed: float = 0.0
-    """Speed allowed by now [m/s]; grows with limited acceleration from 0 at the start and after each pause."""
-
-
-Vector = tuple[float, float, float]
-
-
-def joined(path: Path, position: FloatArray) -> PathState:
-    """Begin where the path comes nearest to a position (3,) [m], to within a two-hundredth of its length."""
+def nearest_phase(path: Path, position: FloatArray) -> float:
+    """Return where the path comes nearest to a position (3,) [m], to within a two-hundredth of its length."""
     phases = np.linspace(0.0, path.length, _PLACES, endpoint=not path.closed)
     away = [float(((path.point(phase) - position) ** 2).sum()) for phase in phases]
-    return PathState(float(phases[int(np.argmin(away))]))
+    return float(phases[int(np.argmin(away))])
 
 
-@value
-class Following:
-    """The path at one phase, and how to follow it from where the end-effector is."""
+@compiled
+def follow(
+    point: FloatArray, tangent: FloatArray, speed: float, here: FloatArray, off_path: float, gain: float,
+    velocity: FloatArray,
+) -> float:  # fmt: skip
+    """Write the task velocity x_d (3,) [m/s]: along the path, and towards it, no faster than the speed allowed by now.
 
-    point: FloatArray
-    """(3,) where on the path the end-effector should be [m]."""
-    tangent: Vector
-    """Unit tangent there."""
-    velocity: Vector
-    """Task velocity x_d [m/s]."""
-    forward: float
-    """Its speed along the path, before it is limited [m/s]."""
-
-    def scaled(self, scale: float) -> FloatArray:
-        """Task velocity (3,) [m/s] times a factor."""
-        x, y, z = self.velocity
-        return np.array((scale * x, scale * y, scale * z))
-
-
-def follow(path: Path, state: PathState, position: FloatArray, params: TaskParams) -> Following:
-    """Task velocity x_d: along the path, and towards it, no faster than the speed allowed by now.
-
-    Off the path the forward part shrinks, to nothing at `off_path_m`: the arm first returns to where it left.
-    `position` (3,) [m] is the end-effector origin.
-    """
-    # for three numbers, floats are faster than arrays
-    point = np.array(path.point(state.phase), dtype=np.float64)  # a copy: a path may hand out the same array again
-    tx, ty, tz = np.asarray(path.tangent(state.phase), dtype=np.float64).tolist()
-    (px, py, pz), (x, y, z) = point.tolist(), position.tolist()
-    ex, ey, ez = px - x, py - y, pz - z
-    # feedforward along the path, feedback towards it
-    forward = state.speed * max(0.0, 1.0 - math.hypot(ex, ey, ez) / params.off_path_m)
-    gain = params.position_gain_1_s
-    vx, vy, vz = forward * tx + gain * ex, forward * ty + gain * ey, forward * tz + gain * ez
-    speed = math.hypot(vx, vy, vz)
-    if speed > state.speed:
-        limit = state.speed / speed  # as a whole: the direction stays
-        vx, vy, vz = limit * vx, limit * vy, limit * vz
-    return Following(point, (tx, ty, tz), (vx, vy, vz), forward)
-
-
-def advance(path: Path, state: PathState, following: Following, velocity: FloatArray, params: TaskParams) -> PathState:
-    """Move the phase on by one period of the task's forward speed, less what the arm falls short of it, never back.
-
-    Slowing or blocking the arm so slows the phase. Motion back to the path is no progress along it, so an arm pushed
-    ahead or back meets the path where it left. The speed allowed next grows by the task's acceleration.
+    Off the path the forward part shrinks, to nothing at `off_path` [m]: the arm first returns to where it left. Returns
+    that part, before it is limited [m/s].
 
     Args:
-        path: the path.
-        state: phase and speed so far.
-        following: how it is followed from there.
-        velocity: (3,) velocity commanded at the end-effector origin [m/s].
-        params: speed, gains and period.
+        point: (3,) of the path, where the end-effector should be [m].
+        tangent: (3,) unit tangent there.
+        speed: allowed by now [m/s].
+        here: (3,) end-effector origin [m].
+        off_path: see above.
+        gain: of the way back to the path [1/s].
+        velocity: written to.
     """
-    (tx, ty, tz), (ax, ay, az), (vx, vy, vz) = following.tangent, following.velocity, velocity.tolist()
-    missing = (ax - vx) * tx + (ay - vy) * ty + (az - vz) * tz
-    # `following.velocity` is that before eqs. 3-4: missing is what they, the rows and the joint box took from it
-    phase = state.phase + max(0.0, following.forward - max(0.0, missing)) * params.control_period_s
-    if not path.closed:
-        phase = min(phase, path.length)
-    return PathState(phase, min(params.speed_m_s, state.speed + params.acceleration_m_s2 * params.control_period_s))
+    x, y, z = point[0] - here[0], point[1] - here[1], point[2] - here[2]
+    forward = speed * max(0.0, 1.0 - math.sqrt(x * x + y * y + z * z) / off_path)
+    for i in range(3):  # feedforward along the path, feedback towards it
+        velocity[i] = forward * tangent[i] + gain * (point[i] - here[i])
+    size = math.sqrt(velocity[0] ** 2 + velocity[1] ** 2 + velocity[2] ** 2)
+    if size > speed:
+        for i in range(3):
+            velocity[i] *= speed / size  # as a whole: the direction stays
+    return forward
 
 
-def pause(state: PathState) -> PathState:
-    """Stay at this phase, and start gently from it later."""
-    return PathState(state.phase, 0.0)
+@compiled
+def advance(
+    phase: float, tangent: FloatArray, asked: FloatArray, forward: float, commanded: FloatArray, period: float
+) -> float:
+    """Move the phase [m] on by one period of the forward speed, less what the arm falls short of it, never back.
+
+    Slowing or blocking the arm so slows the phase. Motion back to the path is no progress along it, so an arm pushed
+    ahead or back meets the path where it left.
+
+    Args:
+        phase: arc length so far [m].
+        tangent: (3,) unit tangent there.
+        asked: (3,) task velocity x_d, before eqs. 3-4 [m/s].
+        forward: its speed along the path, before it is limited [m/s].
+        commanded: (3,) velocity commanded at the end-effector origin [m/s].
+        period: of control [s].
+    """
+    missing = 0.0  # what eqs. 3-4, the rows and the joint box took from it
+    for i in range(3):
+        missing += (asked[i] - commanded[i]) * tangent[i]
+    return phase + max(0.0, forward - max(0.0, missing)) * period
+
+
+@compiled
+def speed_scale(distance: float, d_max: float) -> float:
+    """Factor d_lowest / d_max on the end-effector velocity, eq. 3 of the paper; 1 beyond d_max.
+
+    `distance` [m] is from the end-effector origin to the nearest obstacle, infinite if there is none.
+    """
+    # whichever way the arm moves: eq. 3 slows a retreat as well (docs/explanation/paper.md, slow-down while retreating)
+    return min(1.0, distance / d_max)
+
+
+@compiled
+def faded_scale(scale: float, l_obs: int, l_max: int) -> float:
+    """Factor s + (1 - s) l_obs / l_max of eq. 4 of the paper: back to full speed in l_max cycles after a loss."""
+    return scale + (1.0 - scale) * min(1.0, l_obs / l_max)
+
+
+@compiled
+def reduce_speed(scale: float, cycles: int, fresh: float, l_max: int) -> tuple[float, float, int]:
+    """One cycle of eqs. 3 and 4: the factor on the end-effector velocity, and the scale and cycles to remember.
+
+    The fresh factor holds at once where it is the smaller one, and rises no faster than eq. 4 lets it: whether the
+    nearest obstacle vanished, was seen again farther away, or left another one in view, the speed never jumps up.
+
+    Args:
+        scale: factor when it last fell or kept pace.
+        cycles: l_obs since then.
+        fresh: factor of eq. 3 for what is seen now, or less where a unit is silent; 1 for nothing.
+        l_max: cycles until full speed is restored.
+    """
+    faded = faded_scale(scale, cycles + 1, l_max)
+    if fresh <= faded:
+        return fresh, fresh, 0
+    # the factor at the loss stays, and the cycles count on: eq. 4 is linear in them and ends at 1 after l_max
+    return faded, scale, cycles + 1

@@ -14,10 +14,8 @@ import numpy as np
 
 from pretouch.cholesky import backward, factor, forward
 from pretouch.compiled import compiled, inlined
+from pretouch.modes import BUDGET, NOT_CONVEX, NOT_FINITE, SOLVED
 from pretouch.types import BoolArray, FloatArray, IntArray
-
-SOLVED, NOT_FINITE, NOT_CONVEX, BUDGET, INFEASIBLE = range(5)
-"""How a minimisation ended."""
 
 _ROUNDING = 1e-13
 """Relative size below which a difference is rounding."""

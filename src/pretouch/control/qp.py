@@ -4,12 +4,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import compiled, entry
+from pretouch.compiled import compiled
 from pretouch.control.active_set import minimise_within
-from pretouch.control.penalty import BUDGET, INFEASIBLE, NOT_CONVEX, NOT_FINITE, SOLVED, Minimum, Problem, minimise
+from pretouch.control.penalty import Minimum, Problem, minimise
+from pretouch.modes import INFEASIBLE, SOLVED, outcome_of
 from pretouch.params import TaskParams
 from pretouch.robot.vectors import rotation_error
-from pretouch.types import FloatArray, IntArray, Number, QpOutcome, QpSolution
+from pretouch.types import FloatArray, IntArray, Number, QpSolution
 from pretouch.values import value
 
 
@@ -64,15 +65,6 @@ class Rows(NamedTuple):
     """(R,) likewise."""
     which: IntArray
     """(K,) the obstacle that each of the first belongs to."""
-
-
-ENDING = {
-    NOT_FINITE: "the problem holds numbers that are not finite",
-    NOT_CONVEX: "the Hessian is not convex",
-    BUDGET: "the iteration limit was reached",
-    INFEASIBLE: "the approach rows cannot be met within the acceleration limits",
-}
-"""What happened, by how a minimisation ended, but for `SOLVED`."""
 
 
 @value
@@ -147,15 +139,8 @@ def task_cost(jacobian: FloatArray, velocity: FloatArray, q: FloatArray, q_mid: 
     """
     n = len(q)
     H, f = np.empty((n, n)), np.empty(n)
-    _cost(jacobian, velocity, q, q_mid, cost_params(params), H, f)
+    cost_into(jacobian, velocity, q, q_mid, cost_params(params), H, f)
     return Cost(H, f)
-
-
-@entry
-def _cost(
-    J: FloatArray, x_d: FloatArray, q: FloatArray, q_mid: FloatArray, p: CostParams, H: FloatArray, f: FloatArray
-) -> None:
-    cost_into(J, x_d, q, q_mid, p, H, f)
 
 
 @compiled
@@ -205,15 +190,13 @@ def solve(
     x, slack, multipliers = answer = Minimum(np.empty(n), np.empty(count), np.empty(n + count))
     ending = _minimise(Problem(cost.H, cost.f, lower, upper, rows.G, rows.h, weight), budget, answer)
     if ending != SOLVED:
-        outcome = QpOutcome.INFEASIBLE if ending == INFEASIBLE else QpOutcome.FAILED
         weights = multipliers if ending == INFEASIBLE else np.zeros(n + count)
-        return QpSolution(stop, np.maximum(rows.G @ stop - rows.h, 0.0), weights, outcome, ENDING[ending])
+        return QpSolution(stop, np.maximum(rows.G @ stop - rows.h, 0.0), weights, *outcome_of(False, ending, False))
     violated = rows.soft and bool(slack.max(initial=0.0) > 0)
-    status = "solved, an approach row is violated" if violated else "solved"
-    return QpSolution(x, slack, multipliers, QpOutcome.SOLVED, status, violated)
+    return QpSolution(x, slack, multipliers, *outcome_of(False, ending, violated))
 
 
-@entry
+@compiled
 def _minimise(problem: Problem, budget: int, answer: Minimum) -> int:
     # hard rows have no price
     return minimise_within(problem, budget, answer) if problem.weight == 0.0 else minimise(problem, budget, answer)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import compiled, entry
+from pretouch.compiled import compiled
 from pretouch.groups import CapsuleArrays, Cones, Sensors
 from pretouch.perception.scene_filter import ray_capsule
 from pretouch.types import BoolArray, FloatArray, IntArray
@@ -41,7 +41,7 @@ class Stretch(NamedTuple):
     """Number of the farthest."""
 
 
-@entry
+@compiled
 def ways_free(
     ways: BallWays, length: float, own: IntArray, capsules: CapsuleArrays, planes: FloatArray, free: BoolArray
 ) -> None:
@@ -84,7 +84,7 @@ class View(NamedTuple):
     """(K,) steps of the grid for which the ball has to be in view."""
 
 
-@entry
+@compiled
 def ways_seen(
     ways: BallWays, free: BoolArray, stretch: Stretch, sensors: Sensors, cones: Cones, view: View,
     seen: BoolArray,

@@ -7,18 +7,18 @@ import numpy as np
 
 from pretouch.composition import changed
 from pretouch.contact.detector import Body, Detection, Detector, Sample
-from pretouch.contact.observer import wrench_from_torques
-from pretouch.contact.window import WindowState, add_force, window_init
+from pretouch.contact.window import Window, add_force, window_init
 from pretouch.errors import RecordingError
+from pretouch.groups import no_obstacles
 from pretouch.imported_data.detect_force import ForceResult, cycles, detect_force, slow
 from pretouch.imported_data.forces import ForceRecording
 from pretouch.imported_data.log import Note
 from pretouch.imported_data.torques import GAP_S, TorqueRecording
 from pretouch.params import SequentialParams
-from pretouch.perception.closest import no_obstacles
 from pretouch.profiles import Profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
+from pretouch.sim.observer import wrench_from_torques
 from pretouch.types import BoolArray, FloatArray, RobotState
 from pretouch.values import value
 
@@ -228,7 +228,7 @@ def detect_torques(recording: TorqueRecording, profile: Profile) -> TorqueDecisi
     )  # fmt: skip
 
 
-def _sample(recording: TorqueRecording, i: int, time: float, window: WindowState, profile: Profile) -> Sample:
+def _sample(recording: TorqueRecording, i: int, time: float, window: Window, profile: Profile) -> Sample:
     """Return a cycle's sample, with the force window after it."""
     r = recording
     kin, wrench = r.model.kinematics(r.q[i]), _wrench(r.model, r.q[i], r.tau_ext[i])
@@ -241,7 +241,8 @@ def _sample(recording: TorqueRecording, i: int, time: float, window: WindowState
 def _begun(detector: Detector, body: Body, before: Any, speed: FloatArray) -> Any:
     """Return a detector's state at the first cycle with torques after a gap: what was learnt stays."""
     learnt = detector.learnt(detector.init(body) if before is None else before)
-    return detector.init(body, learnt and replace(learnt, speed=speed, filled=0, waiting=0))
+    none = np.zeros(1, np.int64)
+    return detector.init(body, learnt and learnt._replace(speed=speed, filled=none, waiting=none))
 
 
 class _Contacts:

@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from pretouch.contact.observer import observe, observer_init
 from pretouch.errors import RecordingError
 from pretouch.imported_data.checks import GRAVITY, check_torques, check_velocities
 from pretouch.imported_data.log import TORQUES, Choice, Log, Note, check_reach
 from pretouch.params import SequentialParams
 from pretouch.robot.model import RobotModel
+from pretouch.sim.observer import observe, observer_init
 from pretouch.types import FloatArray
 from pretouch.values import value
 

@@ -4,14 +4,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import ByName, compiled, entry, inlined
+from pretouch.compiled import compiled, inlined
 from pretouch.groups import CapsuleArrays, Chain
 from pretouch.perception.closest import ClosestArrays, closest, to_axis
 from pretouch.perception.motion_compensation import follow_points
 from pretouch.perception.obstacles import HEARD, SEEN, USED
 from pretouch.robot.kinematics import point_velocity
 from pretouch.robot.vectors import dot
-from pretouch.types import FloatArray, IntArray
+from pretouch.types import FloatArray, IntArray, SeenPoints
 
 FARTHEST = 100.0
 """A coordinate [m] from here on is implausible: another unit, or a broken message."""
@@ -55,15 +55,6 @@ class KeptPoints(NamedTuple):
     """(2, P, 3) smoothed place [m] and velocity [m/s]."""
     sigma: FloatArray
     """(P,) standard deviation of each [m]."""
-
-
-class PointSet(NamedTuple):
-    """As `SeenPoints`."""
-
-    heard: float
-    stamp: FloatArray
-    point: FloatArray
-    sigma: FloatArray
 
 
 class Placed(NamedTuple):
@@ -120,9 +111,9 @@ class _Candidates(NamedTuple):
     """(M,) distance from it, less the point's spread [m]."""
 
 
-@entry
+@compiled
 def take_points(
-    old: KeptPoints, new: ByName[PointSet], now: float, place: IntArray, there: Placed, chain: Chain, posed: float,
+    old: KeptPoints, new: SeenPoints, now: float, place: IntArray, there: Placed, chain: Chain, posed: float,
     p: PointNumbers,
 ) -> None:  # fmt: skip
     """Choose the points of each link's places, and change those that are kept.
@@ -166,7 +157,7 @@ def take_points(
 
 @inlined
 def _candidates(
-    old: KeptPoints, new: PointSet, now: float, place: IntArray, there: Placed, ends: FloatArray, p: PointNumbers
+    old: KeptPoints, new: SeenPoints, now: float, place: IntArray, there: Placed, ends: FloatArray, p: PointNumbers
 ) -> _Candidates:
     """The kept points that the arm hides and the new ones that are young enough, each with its nearest link."""
     persistence, sigmas = p.persistence_s, p.spread_sigmas
@@ -222,8 +213,8 @@ def _elect(
                 within = p.margin_m + p.spread_sigmas * found.sigma[m]
                 found.known[m] = _OBSTACLE
                 if (
-                    _on_capsules(found.point, m, ends, there.arm_radius, within)
-                    or _on_capsules(found.point, m, there.other_ends, there.other_radius, within)
+                    _gap(found.point, m, ends, there.arm_radius) <= within
+                    or _gap(found.point, m, there.other_ends, there.other_radius) <= within
                     or _on_planes(found.point, m, there.planes, within)
                 ):
                     found.known[m] = _EXPLAINED
@@ -258,15 +249,6 @@ def move_ends(ends: FloatArray, link: IntArray, chain: Chain, age: float, out: F
             out[end, c, 0] = ends[end, c, 0] - age * x
             out[end, c, 1] = ends[end, c, 1] - age * y
             out[end, c, 2] = ends[end, c, 2] - age * z
-
-
-@compiled
-def _on_capsules(points: FloatArray, m: int, ends: FloatArray, radius: FloatArray, within: float) -> bool:
-    """Whether point m is within a distance [m] of a placed capsule, or inside one."""
-    for c in range(len(radius)):  # noqa: SIM110  compiled code knows no generators
-        if to_axis(points, m, ends[0], ends[1], c)[1] - radius[c] <= within:
-            return True
-    return False
 
 
 @compiled

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import compiled, entry
+from pretouch.compiled import compiled
 from pretouch.groups import CapsuleArrays, Kinematics
 from pretouch.robot.body import Capsules
 from pretouch.robot.vectors import placed_capsules
@@ -40,26 +40,9 @@ def closest_points(
     # a copy: where `closest` finds no direction the last one stays in it
     direction, ee_distance = last_direction.astype(np.float64), np.empty(count)
     found = ClosestArrays(body_point, link, direction, distance)
-    _closest_points(kin, body.arrays, ee_position, point, found, ee_distance)
+    closest(placed_capsules(body.arrays, kin), point, found)
+    distances(point, ee_position, ee_distance)
     return Obstacles(unit, point, ee_distance, body_point, link, direction, distance, np.zeros(count))
-
-
-def no_obstacles() -> Obstacles:
-    """Return the empty set."""
-    none, vectors = np.zeros(0), np.zeros((0, 3))
-    return Obstacles(np.zeros(0, np.int64), vectors, none, vectors, np.zeros(0, np.int64), vectors, none, none)
-
-
-def joined(one: Obstacles, other: Obstacles) -> Obstacles:
-    """Return both sets, the one first."""
-    return Obstacles(
-        unit=np.concatenate((one.unit, other.unit)), point=np.concatenate((one.point, other.point)),
-        ee_distance=np.concatenate((one.ee_distance, other.ee_distance)),
-        body_point=np.concatenate((one.body_point, other.body_point)), link=np.concatenate((one.link, other.link)),
-        direction=np.concatenate((one.direction, other.direction)),
-        body_distance=np.concatenate((one.body_distance, other.body_distance)),
-        closing_speed=np.concatenate((one.closing_speed, other.closing_speed)),
-    )  # fmt: skip
 
 
 @compiled
@@ -81,15 +64,6 @@ class ClosestArrays(NamedTuple):
     """(K, 3) from there; before, what to fall back on."""
     distance: FloatArray
     """(K,) [m]."""
-
-
-@entry
-def _closest_points(
-    kin: Kinematics, body: CapsuleArrays, ee_position: FloatArray, point: FloatArray, found: ClosestArrays,
-    ee_distance: FloatArray,
-) -> None:  # fmt: skip
-    closest(placed_capsules(body, kin), point, found)
-    distances(point, ee_position, ee_distance)
 
 
 @compiled

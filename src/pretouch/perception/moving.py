@@ -1,18 +1,13 @@
 """Fixtures that move: what units see of them is left out, and where the arm is nearest to them it keeps off."""
 
-from dataclasses import replace
-from typing import NamedTuple
-
 import numpy as np
 
-from pretouch.compiled import compiled, entry
-from pretouch.groups import CapsuleArrays, Kinematics
-from pretouch.moving_fixtures import MovingFixtures
-from pretouch.perception.perceive import PerceptionSetup, perception_setup
+from pretouch.groups import Kinematics
 from pretouch.robot.body import Capsules
 from pretouch.robot.model import RobotModel
-from pretouch.robot.vectors import dot, placed_capsules
-from pretouch.types import WHOLE, FloatArray, IntArray, Obstacles, RangeReadings
+from pretouch.robot.self_distance import nearest_points
+from pretouch.robot.vectors import placed
+from pretouch.types import FloatArray, MovingFixtures, Obstacles, RangeReadings
 from pretouch.values import real, real_number
 
 _FARTHEST = 100.0
@@ -52,16 +47,16 @@ def sound_moving(
     return MovingFixtures(stamp, a, b, radius, a_velocity, b_velocity), ""
 
 
-def beside(setup: PerceptionSetup, moving: MovingFixtures, readings: RangeReadings, now: float) -> PerceptionSetup:
-    """Return what is perceived with where these are fixtures too, at the newest of the readings' stamps."""
-    stamps = readings.stamp[(readings.stamp <= now) & (readings.stamp >= now - setup.params.persistence_s)]
+def beside(
+    still: Capsules, moving: MovingFixtures, readings: RangeReadings, now: float, persistence: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return ends (C, 3), (C, 3) [m] and radii (C,) [m] of what stands and what moves, at the newest reading's stamp.
+
+    No reading counts that is older than `persistence` [s] by `now` [s].
+    """
+    stamps = readings.stamp[(readings.stamp <= now) & (readings.stamp >= now - persistence)]
     a, b = moving.at(float(stamps.max(initial=-np.inf)) if len(stamps) else moving.stamp)
-    still = setup.fixtures.capsules
-    both = Capsules(
-        np.concatenate([still.link, np.zeros(len(a), np.int64)]), np.concatenate([still.a, a]),
-        np.concatenate([still.b, b]), np.concatenate([still.radius, moving.radius]),
-    )  # fmt: skip
-    return perception_setup(setup.model, setup.skin, replace(setup.fixtures, capsules=both), setup.params)
+    return np.concatenate([still.a, a]), np.concatenate([still.b, b]), np.concatenate([still.radius, moving.radius])
 
 
 def near_moving(moving: MovingFixtures, model: RobotModel, kin: Kinematics, now: float, first: int) -> Obstacles:
@@ -74,87 +69,21 @@ def near_moving(moving: MovingFixtures, model: RobotModel, kin: Kinematics, now:
         now: instant of the step [s].
         first: index that stands for the first link in `Obstacles.unit`; those of the others follow.
     """
-    (a, b), count = moving.at(now), len(model.parts)
-    link, vectors, scalars = np.empty(count, WHOLE), np.empty((3, count, 3)), np.empty((2, count))
-    _nearest.flat(
-        *kin, *model.body.arrays, model.parts, a, b, moving.radius, moving.a_velocity, moving.b_velocity,
-        link, vectors, scalars,
-    )  # fmt: skip
-    point, body_point, direction = vectors
+    (a, b), body, parts = moving.at(now), model.body, model.parts
+    own_a, own_b = placed(body, kin)
+    on_body, on_other = nearest_points(own_a[:, None], own_b[:, None], a, b)  # (C, M, 3)
+    between, length = on_other - on_body, np.linalg.norm(b - a, axis=1)
+    apart, along = np.linalg.norm(between, axis=2), np.linalg.norm(on_other - a, axis=2)
+    gap = apart - body.radius[:, None] - moving.radius
+    of_part = np.where((body.link == parts[:, None])[..., None], gap, np.inf).reshape(len(parts), -1)
+    c, m = np.divmod(of_part.argmin(axis=1), len(moving.radius))
+    # any direction will do where the axes meet
+    meets = (apart[c, m] <= _ON_AXIS)[:, None]
+    n = np.where(meets, (0.0, 0.0, 1.0), between[c, m] / np.where(meets, 1.0, apart[c, m][:, None]))
+    share = (along[c, m] / np.where(length[m] > 0.0, length[m], 1.0))[:, None]
+    velocity = moving.a_velocity[m] + share * (moving.b_velocity[m] - moving.a_velocity[m])
     return Obstacles(
-        unit=first + np.arange(count), point=point, ee_distance=np.full(count, np.inf), body_point=body_point,
-        link=link, direction=direction, body_distance=scalars[0], closing_speed=scalars[1],
+        unit=first + np.arange(len(parts)), point=on_other[c, m] - moving.radius[m, None] * n,
+        ee_distance=np.full(len(parts), np.inf), body_point=on_body[c, m] + body.radius[c, None] * n,
+        link=parts.copy(), direction=n, body_distance=gap[c, m], closing_speed=-(n * velocity).sum(axis=1),
     )  # fmt: skip
-
-
-class _Moving(NamedTuple):
-    """As `MovingFixtures`, at one instant."""
-
-    a: FloatArray
-    b: FloatArray
-    radius: FloatArray
-    a_velocity: FloatArray
-    b_velocity: FloatArray
-
-
-class _Room(NamedTuple):
-    """Room for what is nearest to each of P links."""
-
-    link: IntArray
-    """(P,)"""
-    vectors: FloatArray
-    """(3, P, 3) point, body point and direction."""
-    scalars: FloatArray
-    """(2, P) distance and closing speed."""
-
-
-@entry
-def _nearest(kin: Kinematics, body: CapsuleArrays, parts: IntArray, moving: _Moving, room: _Room) -> None:
-    """Write where each link of `parts` (P,) is nearest to what moves."""
-    link, own_a, own_b, own_radius = placed_capsules(body, kin)
-    between, u, v = np.empty(3), np.empty(3), np.empty(3)
-    for row in range(len(parts)):
-        room.link[row], least = parts[row], np.inf
-        for c in range(len(link)):
-            if link[c] != parts[row]:
-                continue
-            for i in range(3):
-                u[i] = own_b[c, i] - own_a[c, i]
-            for m in range(len(moving.radius)):
-                for i in range(3):
-                    v[i], between[i] = moving.b[m, i] - moving.a[m, i], own_a[c, i] - moving.a[m, i]
-                s, t = _closest(u, v, between)
-                for i in range(3):
-                    between[i] = t * v[i] - s * u[i] - between[i]  # from one axis to the other
-                apart = np.sqrt(dot(between, between))
-                gap = apart - own_radius[c] - moving.radius[m]
-                if gap >= least:
-                    continue
-                least, speed = gap, 0.0
-                for i in range(3):
-                    # any direction will do where the axes meet
-                    n = between[i] / apart if apart > _ON_AXIS else (1.0 if i == 2 else 0.0)
-                    room.vectors[0, row, i] = moving.a[m, i] + t * v[i] - moving.radius[m] * n
-                    room.vectors[1, row, i] = own_a[c, i] + s * u[i] + own_radius[c] * n
-                    room.vectors[2, row, i] = n
-                    speed -= n * (moving.a_velocity[m, i] + t * (moving.b_velocity[m, i] - moving.a_velocity[m, i]))
-                room.scalars[0, row], room.scalars[1, row] = gap, speed
-
-
-@compiled
-def _closest(u: FloatArray, v: FloatArray, w: FloatArray) -> tuple[float, float]:
-    """Where two segments of directions u and v (3,), w (3,) from the second's start to the first's, are nearest.
-
-    Each from 0 to 1, as `robot.self_distance.nearest_points` has it.
-    """
-    uu, uv, vv, uw, vw = dot(u, u), dot(u, v), dot(v, v), dot(u, w), dot(v, w)
-    area = uu * vv - uv * uv
-    s = _share(uv * vw - uw * vv, area if area > 1e-12 * uu * vv else 0.0)
-    t = _share(uv * s + vw, vv)
-    return _share(uv * t - uw, uu), t
-
-
-@compiled
-def _share(part: float, whole: float) -> float:
-    """Quotient brought into 0 to 1; 0 where there is no whole."""
-    return 0.0 if whole <= 0.0 else min(1.0, max(0.0, part / whole))

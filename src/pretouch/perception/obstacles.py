@@ -1,7 +1,7 @@
 """Where the sensed obstacles are: eq. 1, which readings count, and how long a point lasts, its spread, and silence."""
 
 import math
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -11,20 +11,18 @@ from pretouch.params import PerceptionParams
 from pretouch.perception.motion_compensation import motion_init
 from pretouch.sensing.skin import Skin
 from pretouch.types import BoolArray, FloatArray, IntArray, Number, Obstacles, RangeReadings, RangeStatus
-from pretouch.values import value
 
 
-@value
-class TrackState:
+class TrackState(NamedTuple):
     """The last point each of K units showed. NaN and -inf where there is none."""
 
-    point: FloatArray
+    point: Annotated[FloatArray, "K", 3]
     """(K, 3) obstacle position, base frame [m]."""
-    direction: FloatArray
+    direction: Annotated[FloatArray, "K", 3]
     """(K, 3) last direction from the body to the point."""
-    times: FloatArray
+    times: Annotated[FloatArray, 3, "K"]
     """(3, K) instants `seen`, `used` and `heard` [s]."""
-    motion: FloatArray
+    motion: Annotated[FloatArray, 2, "K", 3]
     """(2, K, 3) smoothed place [m] and velocity [m/s] of each unit's point, where closing speeds are estimated."""
 
     @property
@@ -160,29 +158,18 @@ def measured(distance: FloatArray, status: IntArray, cones: Cones, shown: FloatA
             shown[k] = max(distance[k], nearest)
 
 
-class NewReadings(NamedTuple):
-    """Readings of K units, as `take_in` takes them."""
-
-    stamp: FloatArray
-    """(K,) [s]."""
-    points: FloatArray
-    """(K, 3) where they are [m]."""
-    fresh: BoolArray
-    """(K,) whether each is new."""
-    shows: BoolArray
-    """(K,) whether it shows an obstacle."""
-    tells: BoolArray
-    """(K,) whether it tells anything."""
-
-
 @compiled
-def take_in(point: FloatArray, times: FloatArray, new: NewReadings, now: float, persistence: float) -> None:
-    """Take new readings into the points (K, 3) and times (3, K) of a `TrackState`.
+def take_in(
+    tracks: TrackState, stamp: FloatArray, points: FloatArray, fresh: BoolArray, shows: BoolArray, tells: BoolArray,
+    now: float, persistence: float,
+) -> None:  # fmt: skip
+    """Take readings (K,) of `stamp` [s] and points (K, 3) [m], those that are `fresh`, into the tracks.
 
-    A reading that shows something replaces its unit's point. One that shows nothing, or comes too late, leaves the
+    A reading that `shows` something replaces its unit's point. One that shows nothing, or comes too late, leaves the
     point as it was, so one missed reading removes no obstacle. From the age `persistence` [s] on a point is given up.
+    One that `tells` anything is heard.
     """
-    stamp, points, fresh, shows, tells = new
+    point, times = tracks.point, tracks.times
     for k in range(len(stamp)):
         if fresh[k]:
             # a failure is used up but not heard, so it ages the unit as silence does

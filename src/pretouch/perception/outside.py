@@ -7,21 +7,19 @@ is left out, the arm being where it was when the points were measured.
 """
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import entry
-from pretouch.groups import CapsuleArrays, Chain, Kinematics
-from pretouch.params import OutsidePoints
+from pretouch.groups import CapsuleArrays, Chain, Kinematics, first_of, no_obstacles
+from pretouch.params import OutsidePoints, PerceptionParams
 from pretouch.perception.chosen_points import KeptPoints, Placed, PointNumbers, take_points
-from pretouch.perception.closest import ClosestArrays, closest, distances, joined
-from pretouch.perception.motion_compensation import closing_speeds
-from pretouch.perception.obstacles import HEARD, SEEN, TrackState, track_init
-from pretouch.perception.perceive import Perception, PerceptionSetup
+from pretouch.perception.obstacles import TrackState, track_init
+from pretouch.perception.perceive import lasting, show
+from pretouch.perception.scene_filter import Fixtures
 from pretouch.robot.model import RobotModel
 from pretouch.robot.vectors import placed_ends
-from pretouch.types import WHOLE, FloatArray, IntArray, Obstacles, RobotState, SeenPoints
+from pretouch.sensing.skin import Skin
+from pretouch.types import FloatArray, IntArray, Obstacles, RobotState, SeenPoints
 from pretouch.values import value
 
 
@@ -42,59 +40,77 @@ def moving_links(model: RobotModel) -> IntArray:
     return np.unique(model.body.link)
 
 
-def outside_init(model: RobotModel, kept: int) -> OutsideState:
-    """Return the state before any point, with so many places for each link that moves."""
-    places = kept * len(moving_links(model))
-    return OutsideState(track_init(places), np.zeros(places), -math.inf)
+@value
+class OutsideSetup:
+    """What points are chosen with."""
+
+    model: RobotModel
+    fixtures: Fixtures
+    units: int
+    """How many units the skin has: the places' indices follow theirs."""
+    numbers: PointNumbers
+
+
+def outside_setup(
+    model: RobotModel, skin: Skin, fixtures: Fixtures, params: PerceptionParams | None
+) -> OutsideSetup | None:
+    """Return what points are chosen with; None where no outside source is looked at."""
+    if params is None or params.outside is None:
+        return None
+    o, closing = params.outside, params.closing
+    numbers = PointNumbers(
+        o.persistence_s, o.hidden_s, o.margin_m, o.per_link, params.spread_sigmas, closing is not None,
+        math.inf if closing is None else closing.memory_s, o.silent_after_s if params.keep_while_silent else 0.0,
+    )  # fmt: skip
+    return OutsideSetup(model, fixtures, len(skin), numbers)
+
+
+def places_of(model: RobotModel, kept: int) -> int:
+    """Count the places, so many for each link that moves."""
+    return kept * len(moving_links(model))
 
 
 def see_outside(
-    state: OutsideState | None, anew: bool, seen: Perception, points: SeenPoints | None, setup: PerceptionSetup,
-    kin: Kinematics, robot: RobotState, now: float,
-) -> tuple[Perception, OutsideState | None]:  # fmt: skip
-    """Add what outside sources see to what the skin does, and return what to remember.
+    state: OutsideState | None, anew: bool, points: SeenPoints | None, setup: OutsideSetup | None, kin: Kinematics,
+    robot: RobotState, now: float,
+) -> tuple[Obstacles | None, OutsideState | None]:  # fmt: skip
+    """Return what outside sources see, None for nothing, and what to remember.
 
-    Without a source so far, or where none is to be used, both are as given. Distances are less by `spread_sigmas`
+    Without a source so far, or where none is to be used, that is nothing. Distances are less by `spread_sigmas`
     standard deviations of each point. Points that are newer than the step tell nothing, as with units.
 
     Args:
         state: memory; None before there was a source.
         anew: whether what was seen is to be forgotten, for time went backwards.
-        seen: by the skin.
         points: newest set; None for none.
-        setup: arm, skin, surroundings and parameters; the places follow the indices of the skin's units.
+        setup: arm, surroundings and parameters.
         kin: posture of the arm.
         robot: the state that `kin` is of.
         now: instant of this step [s].
     """
-    numbers, model = setup.outside, setup.model
-    if numbers is None or (state is None and points is None):
-        return seen, state
+    if setup is None or (state is None and points is None):
+        return None, state
+    numbers, model = setup.numbers, setup.model
     if state is None or anew:
-        state = outside_init(model, numbers.per_link)
+        places = places_of(model, numbers.per_link)
+        state = OutsideState(track_init(places), np.zeros(places), -math.inf)
     ends = placed_ends(model.body.link, model.body.a, model.body.b, kin.position, kin.rotation)
     body = CapsuleArrays(model.body.link, ends[0], ends[1], model.body.radius)
     # a source gives the same set until it has a newer one: each is taken in once
     if points is not None and state.heard < points.heard <= now:
         state = _taken(state, points, numbers, body, setup, kin, robot, now)
-    before = state.tracks
-    # of the tracks `_shown` changes the directions alone
-    count, direction = len(state.sigma), before.direction.copy()
-    indices, vectors, scalars = np.empty((2, count), WHOLE), np.empty((3, count, 3)), np.zeros((3, count))
-    found, nearest = _shown(
-        _Places(before.point, direction, before.times, before.motion, state.sigma), now, numbers, body,
-        kin.position[model.ee], len(setup.skin), _Room(indices, vectors, scalars),
-    )  # fmt: skip
-    after = OutsideState(TrackState(before.point, direction, before.times, before.motion), state.sigma, state.heard)
+    # of the tracks `show` changes the directions alone
+    tracks, room = state.tracks._replace(direction=state.tracks.direction.copy()), no_obstacles(len(state.sigma))
+    keeps = lasting(tracks.times, numbers.persistence_s, numbers.silence_s)
+    found = show(tracks, keeps, now, body, kin.position[model.ee], numbers.estimates, room)
+    after = OutsideState(tracks, state.sigma, state.heard)
     if found == 0:
-        return seen, after
-    shown = Obstacles(
-        unit=indices[0, :found], link=indices[1, :found], point=vectors[0, :found], body_point=vectors[1, :found],
-        direction=vectors[2, :found], ee_distance=scalars[0, :found], body_distance=scalars[1, :found],
-        closing_speed=scalars[2, :found],
-    )  # fmt: skip
-    both = joined(seen.obstacles, shown)
-    return Perception(both, seen.distance, min(seen.nearest, nearest), seen.longest_silence), after
+        return None, after
+    o = first_of(room, found)
+    spread = numbers.spread_sigmas * state.sigma[o.unit]
+    # eqs. 5-7 know penetration; eq. 3 makes a speed factor of the other distance, so that one ends at 0
+    ee_distance, body_distance = np.maximum(o.ee_distance - spread, 0.0), o.body_distance - spread
+    return o._replace(unit=o.unit + setup.units, ee_distance=ee_distance, body_distance=body_distance), after
 
 
 def outside_silence(
@@ -121,7 +137,7 @@ def outside_silence(
 
 
 def _taken(
-    state: OutsideState, points: SeenPoints, numbers: PointNumbers, body: CapsuleArrays, setup: PerceptionSetup,
+    state: OutsideState, points: SeenPoints, numbers: PointNumbers, body: CapsuleArrays, setup: OutsideSetup,
     kin: Kinematics, robot: RobotState, now: float,
 ) -> OutsideState:  # fmt: skip
     """Return the state with a newer set of points taken in; `body` is the arm's, placed."""
@@ -140,67 +156,3 @@ def _taken(
         Chain(kin.anchor, kin.axis, model.moved_by, robot.qd), robot.stamp, numbers,
     )  # fmt: skip
     return OutsideState(tracks, sigma, points.heard)
-
-
-class _Places(NamedTuple):
-    """What P places show."""
-
-    point: FloatArray
-    """(P, 3) [m]."""
-    direction: FloatArray
-    """(P, 3) last direction from the body, changed."""
-    times: FloatArray
-    """(3, P) as of `TrackState` [s]."""
-    motion: FloatArray
-    """(2, P, 3) likewise."""
-    sigma: FloatArray
-    """(P,) standard deviation of each point [m]."""
-
-
-class _Room(NamedTuple):
-    """Room for P obstacles, as that of `perceive`."""
-
-    indices: IntArray
-    vectors: FloatArray
-    scalars: FloatArray
-
-
-@entry
-def _shown(
-    places: _Places, now: float, p: PointNumbers, body: CapsuleArrays, ee: FloatArray, units: int, room: _Room
-) -> tuple[int, float]:  # fmt: skip
-    """Write the obstacles of the places whose points last, as `perceive` does of units.
-
-    Returns how many obstacles there are, and the distance of the nearest from the end-effector's origin [m].
-    """
-    point, last_direction, times, motion, sigma = places
-    indices, vectors, scalars = room.indices, room.vectors, room.scalars
-    place, link, near, body_point, direction = indices[0], indices[1], vectors[0], vectors[1], vectors[2]
-    ee_distance, body_distance = scalars[0], scalars[1]
-    found = 0
-    for k in range(len(sigma)):
-        # nothing was heard since the point was seen, and silence is no free space
-        unanswered = times[HEARD, k] <= times[SEEN, k]
-        if now - times[SEEN, k] <= (max(p.persistence_s, p.silence_s) if unanswered else p.persistence_s):
-            place[found] = k
-            near[found], direction[found] = point[k], last_direction[k]
-            if np.isnan(direction[found, 0]):
-                # any unit vector will do: it stays only for a point on a capsule's axis, see `closest`
-                direction[found, 0], direction[found, 1], direction[found, 2] = 0.0, 0.0, 1.0
-            found += 1
-    near, direction = near[:found], direction[:found]
-    closest(body, near, ClosestArrays(body_point, link, direction, body_distance))
-    distances(near, ee, ee_distance)
-    if p.estimates:
-        # by place: afterwards `place` becomes the index behind those of the skin's units
-        closing_speeds(motion, place[:found], direction, scalars[2])
-    nearest = np.inf
-    for m in range(found):
-        k = place[m]
-        last_direction[k] = direction[m]
-        # eqs. 5-7 know penetration; eq. 3 makes a speed factor of the other distance, so that one ends at 0
-        body_distance[m] -= p.spread_sigmas * sigma[k]
-        ee_distance[m] = max(0.0, ee_distance[m] - p.spread_sigmas * sigma[k])
-        nearest = min(nearest, ee_distance[m])
-        place[m] = k + units
-    return found, nearest

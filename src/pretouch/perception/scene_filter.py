@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import compiled, entry, inlined
+from pretouch.compiled import compiled, inlined
 from pretouch.errors import FixtureError
 from pretouch.groups import CapsuleArrays, Cones, Kinematics, Sensors
 from pretouch.perception.closest import bounds, to_axis, to_spheres
@@ -128,7 +128,7 @@ def leave_out_planes(
             shows[k] = plane_return(sensors, k, planes, cones, ends[k]) > ends[k]
 
 
-@entry
+@compiled
 def nearest_capsule(sensors: Sensors, k: int, capsules: CapsuleArrays, spheres: FloatArray, cones: Cones) -> float:
     """Least distance [m] at which sensor k sees a placed capsule; `spheres` are those of `bounds`."""
     return capsule_return(sensors, k, capsules, spheres, cones, Wanted(0.0, -np.inf, np.inf, -np.inf))

@@ -12,8 +12,6 @@ from pretouch.controller import Controller, ControllerState
 from pretouch.desired import Desired
 from pretouch.errors import RecordingError
 from pretouch.loop import Cycle
-from pretouch.moving_fixtures import MovingFixtures
-from pretouch.payload import Payload
 from pretouch.recording import packing, ros
 from pretouch.recording.disk import Item
 from pretouch.recording.packing import marked, packed, unmarked, unpacked
@@ -21,7 +19,17 @@ from pretouch.recording.ros import PACKED, decoded, encode, own, packed_message,
 from pretouch.recording.run import packed_run
 from pretouch.recording.simulation import Truth
 from pretouch.recording.viewer_topics import KINDS, nanoseconds
-from pretouch.types import ControlStep, FloatArray, Inputs, RangeReadings, RobotState, SeenPoints, TouchReadings
+from pretouch.types import (
+    ControlStep,
+    FloatArray,
+    Inputs,
+    MovingFixtures,
+    Payload,
+    RangeReadings,
+    RobotState,
+    SeenPoints,
+    TouchReadings,
+)
 from pretouch.values import value
 
 SNAPSHOT_S = 3.0

@@ -15,10 +15,12 @@ import numpy as np
 from pretouch.composition import Part
 from pretouch.errors import PretouchError, RecordingError
 from pretouch.recording.fields import hints_of, is_record, optional
+from pretouch.records import BLOCK_TYPES, Flat
 
 Value = TypeVar("Value")
 
 _FLOAT = np.dtype(np.float64)
+_BLOCKS: tuple[Any, ...] = (*BLOCK_TYPES, np.int64)
 _NUMBERS = (bool, int, float, str)
 
 
@@ -28,6 +30,8 @@ def _plain(value: Any) -> Any:
             return value.tobytes()
         if value.dtype.kind in "biuf":
             return value.dtype.str, value.shape, value.tobytes()
+    if isinstance(value, Flat):
+        return [block.tobytes() for block in value.blocks]
     if isinstance(value, np.generic):
         return value.item()
     if isinstance(value, Path):
@@ -36,7 +40,10 @@ def _plain(value: Any) -> Any:
 
 
 def _array(hint: Any, plain: Any) -> Any:
-    """Return what `_plain` made of an array; numbers in a list come as an array too."""
+    """Return what `_plain` made of an array or a record; numbers in a list come as an array too."""
+    if hint is Flat:
+        f, i, b, table = (np.frombuffer(bytearray(data), kind) for data, kind in zip(plain, _BLOCKS, strict=True))
+        return Flat((f, i, b, table))
     if np.ndarray not in (hint, get_origin(hint)):
         raise TypeError(f"there is no {hint} in a recording")
     if isinstance(plain, bytes):

@@ -3,7 +3,7 @@
 import math
 from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, fields, is_dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
@@ -12,9 +12,11 @@ import numpy as np
 from pretouch.control.path import Path
 from pretouch.controller import Controller, ControllerState
 from pretouch.recording.cycles import encoded_step
+from pretouch.recording.fields import hints_of, is_record
 from pretouch.recording.reader import MISSING_INPUTS, Kept, Recorded
 from pretouch.recording.run import Run
 from pretouch.recording.versions import versions
+from pretouch.records import Flat
 
 TOLERANCE = 1e-6
 """Largest difference of a number, in its SI unit, that other versions or another machine may make. Of numbers beyond 1
@@ -44,11 +46,15 @@ def differing(recorded: Any, recomputed: Any, exact: bool, field: str = "") -> I
     a, b = recorded, recomputed
     if type(a) is not type(b) and not (isinstance(a, float | int) and isinstance(b, float | int)):
         yield Part(field, a, b, math.inf)
-    elif is_dataclass(a):
-        for f in fields(a):
-            if exact or f.name not in _SENTENCES:
-                name = f"{field}.{f.name}" if field else f.name
-                yield from differing(getattr(a, f.name), getattr(b, f.name), exact, name)
+    elif is_record(type(a)):
+        kind: type = type(a)
+        for name, _ in hints_of(kind):
+            if exact or name not in _SENTENCES:
+                where = f"{field}.{name}" if field else name
+                yield from differing(getattr(a, name), getattr(b, name), exact, where)
+    elif isinstance(a, Flat):
+        for path in b.places:
+            yield from differing(Flat(a.blocks, b.places).get(path), b.get(path), exact, f"{field}.{path}")
     elif isinstance(a, tuple) and len(a) == len(b):
         for i, (one, other) in enumerate(zip(a, b, strict=True)):
             yield from differing(one, other, exact, f"{field}[{i}]")

@@ -1,11 +1,11 @@
 """Chains of hinges, which may branch: where links and joints are, Jacobians, the mass matrix, and how links move."""
 
 import math
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import compiled, entry
+from pretouch.compiled import compiled
 from pretouch.groups import Chain, Kinematics, Mechanism
 from pretouch.types import BoolArray, FloatArray, IntArray
 
@@ -13,17 +13,17 @@ from pretouch.types import BoolArray, FloatArray, IntArray
 class Hinges(NamedTuple):
     """How links hang on each other: a link's joints turn it in the order of q, on its own place on its parent."""
 
-    parent: IntArray
+    parent: Annotated[IntArray, "L"]
     """(L,) link that each hangs on, of a smaller index; the world's own is 0."""
-    first: IntArray
+    first: Annotated[IntArray, "L + 1"]
     """(L + 1,) index of the first joint of each link, and n."""
-    T_parent_link: FloatArray
+    T_parent_link: Annotated[FloatArray, "L", 3, 4]
     """(L, 3, 4) rotation and origin [m] of each link in its parent's frame, with its joints at rest."""
-    joint: FloatArray
+    joint: Annotated[FloatArray, "n", 7]
     """(n, 7) of each joint a point on its axis [m] and the axis, frame of its link, and q at rest [rad]."""
 
 
-@entry
+@compiled
 def place(hinges: Hinges, q: FloatArray, kin: Kinematics) -> None:
     """Write poses and joint axes at joint positions q (n,) [rad] to `kin`."""
     parent, first, T, joint = hinges.parent, hinges.first, hinges.T_parent_link, hinges.joint

@@ -1,12 +1,10 @@
 """Kinematics and dynamics of an arm that MuJoCo reads."""
 
 from dataclasses import dataclass
-from functools import partial
 
 import mujoco
 import numpy as np
 
-from pretouch.compiled import entry, flattened
 from pretouch.errors import RobotModelError
 from pretouch.groups import Arm, Kinematics, Links, Mechanism
 from pretouch.robot.body import Capsules, Surface, bodies_of, capsules_of, surface_of
@@ -62,7 +60,8 @@ class RobotModel:
         """Index of the end-effector's link."""
         self.capsules: Capsules = capsules_of(self._model)
         """The body, base included."""
-        self._place = partial(place.flat, *_hinges(self._model))
+        self.hinges = _hinges(self._model)
+        """How the links hang on each other, for compiled code."""
         self._shapes = (len(self.links), 3), (len(self.links), 3, 3), (self.n, 3)
         self.moved_by: BoolArray = self._moved_by()
         """(L, n) whether a joint moves a link."""
@@ -91,7 +90,6 @@ class RobotModel:
         self.arm = Arm(self.moved_by, self.ee)
         self.mechanism = Mechanism(self.arm, Links(self.mass, self.com, self.inertia, self.parts, self.middle))
         """Both for compiled code."""
-        self.mechanism_fields = flattened(self.mechanism)
         self.q_min: FloatArray = self._model.jnt_range[:, 0].copy()
         self.q_max: FloatArray = self._model.jnt_range[:, 1].copy()
         self.q_mid: FloatArray = (self.q_min + self.q_max) / 2
@@ -149,9 +147,9 @@ class RobotModel:
         origins, orientations, axes = self._shapes
         if angles.shape != axes[:1]:  # compiled code reads on behind the end
             raise ValueError(f"Joint positions have the shape {angles.shape}: give {self.n} of them.")
-        kin = np.empty(origins), np.empty(orientations), np.empty(axes), np.empty(axes)
-        self._place(angles, *kin)
-        return Kinematics._make(kin)
+        kin = Kinematics(np.empty(origins), np.empty(orientations), np.empty(axes), np.empty(axes))
+        place(self.hinges, angles, kin)
+        return kin
 
     def jacobian(self, kin: Kinematics, link: int, point: FloatArray) -> FloatArray:
         """Jacobian (6, n) of a point (3,) [m, base frame] fixed to a link: velocity first, then angular velocity."""
@@ -173,7 +171,7 @@ class RobotModel:
     def mass_matrix(self, q: FloatArray) -> FloatArray:
         """Compute the mass matrix (n, n) [kg m^2] at q (n,) [rad]."""
         mass_matrix = np.empty((self.n, self.n))
-        _mass_matrix.flat(*self.kinematics(q), *self.mechanism_fields, mass_matrix)
+        mass_matrix_into(self.kinematics(q), self.mechanism, mass_matrix)
         return mass_matrix
 
     def mass_matrix_and_bias(self, q: FloatArray, qd: FloatArray, bias: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -189,11 +187,6 @@ class RobotModel:
         mass_matrix = np.zeros((self.n, self.n))
         mujoco.mj_fullM(model, data, mass_matrix)
         return mass_matrix, bias
-
-
-@entry
-def _mass_matrix(kin: Kinematics, mechanism: Mechanism, M: FloatArray) -> None:
-    mass_matrix_into(kin, mechanism, M)
 
 
 def _hinges(model: mujoco.MjModel) -> Hinges:

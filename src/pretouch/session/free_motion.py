@@ -8,10 +8,9 @@ import os
 import re
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -68,7 +67,7 @@ def rested(model: ResidualModel, pause_s: float, p: SequentialParams) -> Residua
     left = np.sqrt(1.0 - share)
     # scaled from both sides, by which it stays positive definite: of each variance a share is replaced by the prior's
     covariance = model.covariance * (left[:, None] * left) + np.diag(share * prior)
-    return replace(model, covariance=covariance)
+    return model._replace(covariance=covariance)
 
 
 _FOLDER = "free-motion"
@@ -128,8 +127,7 @@ class FreeMotion:
 
     def record(self, cycle: Cycle) -> None:
         """Remember what is known after one turn of the loop."""
-        state: Any = cycle.after.detector  # of this detector
-        self._newest = self._params.learnt(state)
+        self._newest = cycle.after.learnt
 
     def keep(self) -> tuple[str, ...]:
         """Write what is known by now, if anything was learnt; return a sentence on it. Nothing is raised."""

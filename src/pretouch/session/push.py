@@ -16,10 +16,10 @@ import numpy as np
 from pretouch.checks import Checked, Fraction, Positive
 from pretouch.errors import RobotError
 from pretouch.explanation import answers
-from pretouch.faults import sound_robot
 from pretouch.ports import Clock, Robot
 from pretouch.robot.model import RobotModel
 from pretouch.session.standstill import MEAN_S, Standstill
+from pretouch.sound import sound_robot
 from pretouch.types import ControlStep, FloatArray, Mode, RobotState
 
 _GRACE_S = 0.3

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pretouch.errors import RobotError
-from pretouch.faults import sound_robot
 from pretouch.ports import Clock, Robot
+from pretouch.sound import sound_robot
 from pretouch.types import FloatArray, RobotState
 
 MEAN_S = 0.1

@@ -9,10 +9,9 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 
-from pretouch.compiled import flattened
-from pretouch.contact.observer import observer_init, wrench_from_torques
 from pretouch.robot.model import RobotModel
 from pretouch.sim.drive import Cogging, Friction, Impedance, Joints, MotionGenerator, TorqueSensors
+from pretouch.sim.observer import observer_init, wrench_from_torques
 from pretouch.sim.physics import Computer, Nominal, SimulatedArm, World
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.scene import CONTACTS, ArmError, CableSpec
@@ -169,11 +168,9 @@ class ArmInWorld:
         world = World(self.mj_model._address, data._address, qdd, data.sensordata[counted : counted + 1])
         nominal = Nominal(known._address, scratch._address, scratch.qpos, scratch.qvel)
         self._qd_before = np.zeros(n)
-        self._arm = flattened(
-            SimulatedArm(
-                world, joints, generator, self._impedance, friction, cogging, sensors, nominal, self._computer,
-                self._qd_before,
-            )
+        self._arm = SimulatedArm(
+            world, joints, generator, self._impedance, friction, cogging, sensors, nominal, self._computer,
+            self._qd_before,
         )  # fmt: skip
         # what is added to coloured noise at each step, so that its variance stays that of the sensor
         self._torque_noise = np.array(p.torque_noise_nm) * np.sqrt(1 - keep**2)

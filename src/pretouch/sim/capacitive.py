@@ -5,7 +5,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from pretouch.compiled import entry
+from pretouch.compiled import compiled
 from pretouch.sensing.sensor import Capacitive, cone_rays
 from pretouch.sensing.skin import Skin
 from pretouch.sim.rays import Geoms, cast, placed_rays
@@ -45,7 +45,7 @@ def electrode_on(sensor: Capacitive, body: int, T_body: FloatArray) -> Electrode
     return Electrode(body, T_body, cone_rays(_RINGS, sensor.angle))
 
 
-@entry
+@compiled
 def field(electrode: Electrode, position: FloatArray, rotation: FloatArray, geoms: Geoms, farthest: float) -> float:
     """Signal of an electrode without noise, 1 at the touch of a grounded wall.
 

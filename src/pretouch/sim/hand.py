@@ -5,7 +5,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from pretouch.compiled import compiled, entry
+from pretouch.compiled import compiled
 from pretouch.sim.plant import Plant
 from pretouch.types import FloatArray
 
@@ -50,7 +50,7 @@ class Hand:
     def __init__(self, plant: Plant, script: HandScript, arm: PersonArm = USUAL_ARM) -> None:
         """Attach to a plant whose scene has a hand; `arm` is what moves it."""
         self._plant, self._script = plant, script
-        self._moved_by = plant.params.period_s, arm.speed_max, arm.stiffness, arm.damping
+        self._moved_by = plant.params.period_s, _Arm(arm.speed_max, arm.stiffness, arm.damping)
         body = plant.mj_model.body("hand")
         dof, data = int(plant.mj_model.body_dofadr[body.id]), plant.mj_data
         # views into the simulation's memory, taken once
@@ -73,8 +73,8 @@ class Hand:
     def _drive(self, time: float) -> None:
         position = self.position
         goal = self._script.goal(time, position, self._plant)
-        self._goal, self._force[:] = _spring.flat(
-            self._goal, goal.position, goal.force_max, position, self._velocity, *self._moved_by
+        self._goal, self._force[:] = _spring(
+            self._goal, _Goal(goal.position, goal.force_max), position, self._velocity, *self._moved_by
         )
 
 
@@ -93,7 +93,7 @@ class _Arm(NamedTuple):
     damping: float
 
 
-@entry
+@compiled
 def _spring(
     last: FloatArray, goal: _Goal, x: FloatArray, v: FloatArray, dt: float, arm: _Arm
 ) -> tuple[FloatArray, FloatArray]:

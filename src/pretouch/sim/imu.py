@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from pretouch.checks import Check, Checked, Fraction, NonNegative, Positive
-from pretouch.compiled import compiled, entry, flattened
+from pretouch.compiled import compiled
 from pretouch.robot.kinematics import cross
 from pretouch.sensing.imu_scale import ACCELERATION_LSB, ANGULAR_RATE_LSB, STANDARD_GRAVITY
 from pretouch.sensing.skin import Skin
@@ -146,7 +146,7 @@ class Imus:
         root = plant.mj_model.body_rootid[link].astype(np.int64)
         data = plant.mj_data
         # views into the simulation's memory, taken once
-        self._given = flattened(
+        self._given = (
             _Bodies(data.xpos, data.xmat, data.subtree_com, data.cvel, data.cacc),
             _Mounting(link, root, skin.T_link_board[skin.first]),
             _Sensors(self.rate, mix, bias, noise, imu_counts(params), follow, dt),
@@ -170,7 +170,7 @@ class Imus:
         mujoco.mj_comVel(plant.mj_model, plant.mj_data)
         mujoco.mj_rnePostConstraint(plant.mj_model, plant.mj_data)
         self._qvel[:] = self._last_qvel = qvel
-        taken = _take.flat(time - dt, self._shaken(), self._draws[self._drawn :], *self._given)
+        taken = _take(time - dt, self._shaken(), self._draws[self._drawn :], *self._given)
         self._drawn += taken
         for i in range(taken):
             self._send(ImuSample(int(self._first[room.unit[i]]), float(room.time[i]), room.counts[i].copy()))
@@ -212,7 +212,7 @@ def _resonance(params: ImuParams, dt: float) -> tuple[float, float, float]:
     return float(keep), float(back), float(params.vibration_m_s2 / np.sqrt(variance))
 
 
-@entry
+@compiled
 def _take(
     now: float, shaken: FloatArray, draws: FloatArray, bodies: _Bodies, mounting: _Mounting, sensors: _Sensors,
     memory: _Memory, taken: _Taken,

@@ -5,7 +5,7 @@ from typing import Literal, cast
 
 import numpy as np
 
-from pretouch.control.path import Circle, Path, line
+from pretouch.control.path import Circle, Path, segment
 from pretouch.errors import PathError
 from pretouch.sim.pushes import FACES, Push, against
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
@@ -108,7 +108,9 @@ class Placement:
         """Return the paper's circle or line, begun on the side away from a board on the side `sign` (1: +y)."""
         if trajectory == "circle":
             return Circle(self.point(*_CENTER), _RADIUS_M * self.scale, np.pi if sign > 0 else 0.0)
-        return line(self.point(_LINE_X, -_LINE_END_Y * sign, _LINE_Z), self.point(_LINE_X, _LINE_END_Y * sign, _LINE_Z))
+        return segment(
+            self.point(_LINE_X, -_LINE_END_Y * sign, _LINE_Z), self.point(_LINE_X, _LINE_END_Y * sign, _LINE_Z)
+        )
 
     def hand(self, side: Side) -> HandSide:
         """Return where the hand is met on a side."""

@@ -7,13 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import compiled, entry
-from pretouch.contact.observer import _observe
+from pretouch.compiled import compiled
 from pretouch.sim.drive import Cogging, Friction, Impedance, Joints, MotionGenerator, TorqueSensors, drive, sensed
 from pretouch.sim.mujoco_calls import mj_comPos, mj_comVel, mj_crb, mj_fullM, mj_kinematics, mj_rne, mj_step
+from pretouch.sim.observer import ObserverState, observe
 from pretouch.types import FloatArray
-
-_follow = _observe.flat
 
 
 class World(NamedTuple):
@@ -62,7 +60,7 @@ class SimulatedArm(NamedTuple):
     qd_before: FloatArray  # (n,) joint velocities before the last step [rad/s]
 
 
-@entry
+@compiled
 def take_steps(
     qd_set: FloatArray, velocity_noise: FloatArray, torque_noise: FloatArray, past: FloatArray, arm: SimulatedArm
 ) -> int:
@@ -87,14 +85,14 @@ def take_steps(
     return len(velocity_noise)
 
 
-@entry
+@compiled
 def begin_step(qd_set: FloatArray, arm: SimulatedArm) -> tuple[FloatArray, FloatArray]:
     """Drive an arm in a step that another takes; return what `end_step` is to be given of it."""
     arm.qd_before[:] = arm.joints.qd
     return drive(qd_set, arm.computer.bias, arm.joints, arm.generator, arm.impedance, arm.friction, arm.cogging)
 
 
-@entry
+@compiled
 def end_step(
     qd_set: FloatArray, tau: FloatArray, lost: FloatArray, velocity_noise: FloatArray, torque_noise: FloatArray,
     past: FloatArray, arm: SimulatedArm,
@@ -116,10 +114,9 @@ def _conclude(
     computer.qd[:] = arm.joints.qd + velocity_noise
     measured = sensed(tau, lost, torque_noise, computer.q, arm.world.qdd, arm.sensors)
     _dynamics(arm.nominal, computer.q, computer.qd, mass_matrix, computer.bias)
-    computer.residual[:], computer.integral[:] = _follow(
-        computer.integral, computer.mass_matrix, mass_matrix, computer.bias, computer.qd, measured, computer.gain,
-        computer.dt,
-    )  # fmt: skip
+    before = ObserverState(computer.residual, computer.integral, computer.mass_matrix)
+    after = observe(before, mass_matrix, computer.bias, computer.qd, measured, computer.gain, computer.dt)
+    computer.residual[:], computer.integral[:] = after.residual, after.integral
     computer.mass_matrix[:] = mass_matrix
 
 

@@ -59,8 +59,8 @@ class Plant(ArmInWorld):
         while taken < steps:
             first, until = taken, self._prepare_step()
             last = bisect_left(times, until, first + 1, steps)
-            taken += take_steps.flat(
-                self._qd_set, velocity_noise[first:last], torque_noise[first:last], past[first:last], *self._arm
+            taken += take_steps(
+                self._qd_set, velocity_noise[first:last], torque_noise[first:last], past[first:last], self._arm
             )
             self.time = times[taken]
             if p.state_delay_s:

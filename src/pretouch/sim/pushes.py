@@ -1,31 +1,29 @@
-"""What the simulated person does: pushes of the hand, and a hand held up beside the path."""
+"""How the simulated person pushes the robot's hand."""
 
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from pretouch.robot.model import RobotModel
-from pretouch.sim.hand import USUAL_ARM, HandGoal, point_on_arm
+from pretouch.sim.hand import HandGoal, point_on_arm
 from pretouch.sim.plant import TOUCH_N, Plant
 from pretouch.types import FloatArray
 
-_HOME, _OUTWARDS = np.array([1.2, 0.0, 0.8]), np.array([1.0, 0.0, 0.0])
+HOME, OUTWARDS = np.array([1.2, 0.0, 0.8]), np.array([1.0, 0.0, 0.0])
+"""Where the person's hand rests [m], and the direction away from the base."""
 _AISLE_X_M = 1.15
 """Plane in front of the Panda's reach in which a hand changes sides, so that it meets the arm only on purpose [m]."""
 _STAND_OFF_M = 0.5
 _SPEED_M_S = 0.35
 """Speed of a reaching hand relative to the arm [m/s]."""
-_FREE_N = 60.0
+FREE_N = 60.0
 """Force a person moves the free hand with [N]."""
 PALM = np.array([0.0, 0.0, 0.045])
 """Point of the robot's hand the person aims at, in its frame [m]."""
-_LEAD_S = 4.0
+LEAD_S = 4.0
 """Time before a push or visit in which the person brings the hand to the side it will come from [s]."""
 _PATIENCE_S = 5.0
 """Time after which a person who has not touched the arm gives up [s]."""
-
-_CLEAR_M = 0.4
-"""Distance of the robot's hand at which a person dares to come in [m]."""
 
 
 def way_round(hand: FloatArray, goal: FloatArray, ahead: float = 0.0) -> FloatArray:
@@ -126,17 +124,17 @@ class Pusher:
         """
         number, withdrawing = len(self.contacts), time < self._release + 1.0
         over = number == len(self.pushes)
-        if not withdrawing and (over or time < self.pushes[number].start - _LEAD_S):
-            return HandGoal(way_round(hand, _HOME + self.ahead * _OUTWARDS, self.ahead), _FREE_N)
+        if not withdrawing and (over or time < self.pushes[number].start - LEAD_S):
+            return HandGoal(way_round(hand, HOME + self.ahead * OUTWARDS, self.ahead), FREE_N)
         robot = self._robot
         palm = point_on_arm(plant, robot.link, robot.palm)
         if withdrawing:
-            return HandGoal(palm - _STAND_OFF_M * self._direction, _FREE_N)
+            return HandGoal(palm - _STAND_OFF_M * self._direction, FREE_N)
         push = self.pushes[number]
         if self._touch is None:
             self._direction = point_on_arm(plant, robot.link, robot.beside(push.inwards)) - palm
         if time < push.start:
-            return HandGoal(way_round(hand, palm - _STAND_OFF_M * self._direction, self.ahead), _FREE_N)
+            return HandGoal(way_round(hand, palm - _STAND_OFF_M * self._direction, self.ahead), FREE_N)
         self._watch(time, push, plant)
         ahead = _SPEED_M_S * (time - push.start) - _STAND_OFF_M
         return HandGoal(palm + min(ahead, _STAND_OFF_M) * self._direction, push.force)
@@ -151,55 +149,3 @@ class Pusher:
         elif self._touch is None and time > push.start + _PATIENCE_S:
             self.contacts.append(None)
             self._release = time
-
-
-class Holder(Pusher):
-    """A person who keeps pushing at one place, with one force: a hand that only pushes on slides past the arm's."""
-
-    def goal(self, time: float, hand: FloatArray, plant: Plant) -> HandGoal:
-        """Reach, push and withdraw as planned, but from the touch on stay on the line of the push through the palm."""
-        planned = super().goal(time, hand, plant)
-        if self._touch is None:
-            return planned
-        palm = point_on_arm(plant, self._robot.link, self._robot.palm)
-        # ahead by what stretches the person's arm to the planned force; what it takes to stay on the line comes on top
-        ahead = (hand - palm) @ self._direction + planned.force_max / USUAL_ARM.stiffness
-        return HandGoal(palm + ahead * self._direction, _FREE_N)
-
-
-@dataclass(frozen=True)
-class Visit:
-    """A hand held at a place for a while."""
-
-    arrive: float
-    """[s]"""
-    leave: float
-    """[s]"""
-    place: FloatArray
-    """(3,) [m]"""
-
-
-@dataclass
-class Visitor:
-    """Holds a hand up beside the path, then takes it away. Comes in while the robot's hand is elsewhere."""
-
-    model: RobotModel
-    visits: tuple[Visit, ...]
-    ahead: float = 0.0
-    """How much farther from the base than from a Panda's the person stays [m]."""
-
-    def __post_init__(self) -> None:
-        self._robot = robot_hand(self.model)
-        self._inside = False
-
-    def goal(self, time: float, hand: FloatArray, plant: Plant) -> HandGoal:
-        """Be at the place of the visit under way, or at home; come and go from the far side of the place."""
-        for visit in self.visits:
-            if visit.arrive - _LEAD_S <= time < visit.leave + 1.0:
-                outside = visit.place + np.array([0.0, np.sign(visit.place[1]) * 0.4, 0.0])
-                palm = point_on_arm(plant, self._robot.link, self._robot.palm)
-                clear = np.linalg.norm(palm - visit.place) > _CLEAR_M
-                wanted = visit.arrive <= time < visit.leave
-                self._inside = wanted and (self._inside or bool(clear))
-                return HandGoal(visit.place if self._inside else way_round(hand, outside, self.ahead), _FREE_N)
-        return HandGoal(way_round(hand, _HOME + self.ahead * _OUTWARDS, self.ahead), _FREE_N)

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, NamedTuple
 import numpy as np
 
 from pretouch.checks import Check, Checked, Fraction, NonNegative, Positive
-from pretouch.compiled import compiled, entry, flattened
+from pretouch.compiled import compiled
 from pretouch.errors import ParameterError
 from pretouch.sensing.sensor import PAPER_SENSOR, Sensor, cone_rays
 from pretouch.sensing.skin import Skin
@@ -114,7 +114,7 @@ class RangeFinders:
         bodies = plant.first_body + skin.link
         mounting = _Mounting(data.xpos, data.xmat, bodies, skin.T_link_sensor, cone, offset)
         geoms = geoms_of(plant.mj_model, data)
-        self._mounted, self._errors = flattened(mounting, geoms), _errors(params)
+        self._mounted, self._errors = (mounting, geoms), _errors(params)
         self._electrodes = Electrodes(skin, bodies, data, geoms, seed)
         boards: dict[str, list[int]] = {}
         for unit, board in enumerate(skin.boards):
@@ -175,7 +175,7 @@ class RangeFinders:
         """Return distance [m], status, standard deviation [m], and strength of a measurement; `draw` is normal."""
         if unit in self._electrodes:
             return self._electrodes.measure(unit, time, draw)
-        return _measure.flat(unit, draw, *self._kinds[unit], *self._errors, *self._mounted)
+        return _measure(unit, draw, self._kinds[unit], self._errors, *self._mounted)
 
 
 _SIGNAL_LIMIT_MCPS = 1.024
@@ -260,7 +260,7 @@ class _Mounting(NamedTuple):
     offset: FloatArray  # (K,) constant errors [m]
 
 
-@entry
+@compiled
 def _measure(
     unit: int, draw: float, kind: _Kind, errors: _Errors, mounting: _Mounting, geoms: Geoms
 ) -> tuple[float, int, float, float]:

@@ -75,7 +75,7 @@ class BasePose:
 
 @dataclass(frozen=True)
 class SecondArmSpec:
-    """Another arm in the scene, on a pedestal of the same kind: moved by `pretouch.sim.second_arm`."""
+    """Another arm in the scene, on a pedestal of the same kind, which a simulation of its own moves."""
 
     model: RobotModel
     base: BasePose
@@ -236,11 +236,6 @@ _SECOND = "second_"
 def body_before_second(built: mujoco.MjModel) -> int:
     """Return the index of the body before the second arm's first: its links follow, as those of an arm the world."""
     return next(i for i in range(built.nbody) if built.body(i).name.startswith(_SECOND)) - 1
-
-
-def joint_of_second(built: mujoco.MjModel) -> int:
-    """Return the index of the second arm's first joint."""
-    return next(j for j in range(built.njnt) if built.joint(j).name.startswith(_SECOND))
 
 
 def _add_pedestal(mj: mujoco.MjSpec, name: str, spec: SceneSpec, at: tuple[float, float, float]) -> None:

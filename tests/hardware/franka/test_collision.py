@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from pretouch.contact.detector import Body
-from pretouch.contact.sequential_detector import Observation, sequential_init, sequential_step
+from pretouch.contact.sequential_detector import Observation, sequential_init, sequential_numbers, sequential_step
 from pretouch.contact.touch_cue import no_cues
 from pretouch.errors import ParameterError
+from pretouch.groups import no_obstacles
 from pretouch.hardware.franka.collision import (
     CollisionParams,
     check,
@@ -17,7 +18,7 @@ from pretouch.hardware.franka.collision import (
 from pretouch.profiles import PROFILES, profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.types import Obstacles, RobotState
+from pretouch.types import RobotState
 
 
 @pytest.mark.parametrize("name", PROFILES)
@@ -73,13 +74,12 @@ def test_thresholds_in_the_wrong_order_are_refused(panda_model: RobotModel) -> N
 def evidence(model: RobotModel, force: np.ndarray) -> float:
     """Evidence of one sample with a force (3,) [N] on the end-effector of an arm that has learnt nothing, and moves."""
     q, speed, p = model.description.q_ready, np.full(7, 0.3), PROFILES["pretouch"].detect
-    kin, none, rows, whole = model.kinematics(q), np.zeros(0), np.zeros((0, 3)), np.zeros(0, np.int64)
-    state = sequential_init(model, p)
-    state = replace(state, model=replace(state.model, speed=speed))
+    kin, state = model.kinematics(q), sequential_init(model.n, p)
+    state = state._replace(model=state.model._replace(speed=speed))
     robot = RobotState(0.0, q, speed, q, speed, model.ee_jacobian(kin)[:3].T @ force, None)
-    free = Obstacles(whole, rows, none, rows, whole, rows, none, none)
-    seen = Observation(kin, robot, free, no_cues(len(model.links)))
-    return sequential_step(state, model, seen, False, False, 0.01, p)[0].log_likelihood_ratio
+    seen = Observation(kin, robot, no_obstacles(), no_cues(len(model.links)))
+    numbers = sequential_numbers(model.n, 0.01, p)
+    return float(sequential_step(state, model, seen, False, False, numbers)[0].log_likelihood_ratio[0])
 
 
 def missed(model: RobotModel) -> float:

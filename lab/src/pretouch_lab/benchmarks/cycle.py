@@ -136,7 +136,7 @@ def _timed(controller: Controller, work: Workload, cycles: int, clock: Monotonic
     cpu, wall, restricting, tracking = np.full((4, cycles), 0)
     state = _settled(controller, work)
     held = _resident()
-    begin = state.path.phase
+    begin = state.phase
     for i in range(cycles):
         if clock:
             clock.tick()
@@ -151,7 +151,7 @@ def _timed(controller: Controller, work: Workload, cycles: int, clock: Monotonic
     late = clock.timing().wake_up if clock else None
     wake_up_us = 1e6 * late.median if late and late.max > 0 else None
     missed = clock.missed if clock else 0
-    return _Timed(cpu, wall, restricting, tracking, state.path.phase - begin, missed, wake_up_us, gained)
+    return _Timed(cpu, wall, restricting, tracking, state.phase - begin, missed, wake_up_us, gained)
 
 
 def _resident() -> int:

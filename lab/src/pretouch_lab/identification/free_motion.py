@@ -5,12 +5,12 @@ from typing import Literal
 
 import numpy as np
 
-from pretouch.contact.observer import observe, observer_init
 from pretouch.errors import RecordingError
 from pretouch.imported_data.log import PARQUET, TABLES, Choice, Log, check_reach
 from pretouch.imported_data.reading import open_log
 from pretouch.recording.reader import open_recording
 from pretouch.robot.model import RobotModel
+from pretouch.sim.observer import observe, observer_init
 from pretouch.types import FloatArray
 from pretouch_lab.identification.samples import ArmSamples
 

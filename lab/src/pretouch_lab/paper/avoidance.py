@@ -8,7 +8,6 @@ from pretouch.perception.closest import closest_points
 from pretouch.profiles import profile
 from pretouch.robot.model import RobotModel
 from pretouch.sim.paper_scenes import Placement, person_scene
-from pretouch.sim.pushes import Visit, Visitor
 from pretouch.sim.scene import HandSpec
 from pretouch.types import FloatArray
 from pretouch_lab.cell import Cell, Context, Grid
@@ -17,6 +16,7 @@ from pretouch_lab.rows import Row, rounded
 from pretouch_lab.summary import avoidance_summary
 from pretouch_lab.tables import avoidance_tables
 from pretouch_lab.trial import Record, play
+from pretouch_lab.visits import Visit, Visitor
 
 NAME = "avoidance"
 DEFAULT_RESTRICTIONS = "slack"

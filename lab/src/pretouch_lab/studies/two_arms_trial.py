@@ -6,21 +6,20 @@ from dataclasses import dataclass, field
 import mujoco
 import numpy as np
 
+from pretouch.arms.other_arm import OtherArm
 from pretouch.control.path import WayPoints
 from pretouch.controller import Controller
 from pretouch.loop import Options, turn
-from pretouch.moving_fixtures import MovingFixtures
 from pretouch.profiles import Profile
 from pretouch.robot.ik import brought_to
-from pretouch.robot.other_arm import OtherArm
 from pretouch.sim.arm_in_world import ArmInWorld
 from pretouch.sim.hand import Hand, HandGoal, PersonArm
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.range_finder import RangeFinders
 from pretouch.sim.scene import BasePose, HandSpec, SceneSpec, fixtures
-from pretouch.sim.second_arm import SecondArm
-from pretouch.types import ControlStep, FloatArray, RobotState
+from pretouch.types import ControlStep, FloatArray, MovingFixtures, RobotState
 from pretouch_lab.cell import Context
+from pretouch_lab.studies.second_arm import SecondArm
 from pretouch_lab.trial import SETTLE_S
 
 APART = BasePose((1.1, 0.0, 0.0), np.pi)

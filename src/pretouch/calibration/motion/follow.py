@@ -7,7 +7,7 @@ import numpy as np
 
 from pretouch import desired
 from pretouch.calibration.motion.plan import Plan
-from pretouch.control.path import line
+from pretouch.control.path import segment
 from pretouch.controller import Controller
 from pretouch.desired import Desired
 from pretouch.perception.scene_filter import Fixtures, no_fixtures
@@ -52,7 +52,7 @@ def plan_controller(
     if like is not None:
         profile = replace(at_rate(profile, 1.0 / like.task.control_period_s), failure=like.failure)
     x, y, z = model.kinematics(q).position[model.ee].tolist()
-    stands = line((x, y, z), (x, y, z + _SHORTEST_M))
+    stands = segment((x, y, z), (x, y, z + _SHORTEST_M))
     return Controller(model, Skin((), model), no_fixtures() if fixtures is None else fixtures, stands, profile)
 
 

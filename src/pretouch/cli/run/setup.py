@@ -12,7 +12,7 @@ from pretouch.arms import ArmSetup, OpenedArm
 from pretouch.cli.skin_keys import keys_file
 from pretouch.cli.writing import check_writable
 from pretouch.contact.sequential_test import SequentialTest
-from pretouch.control.path import Circle, Path, WayPoints, line
+from pretouch.control.path import Circle, Path, WayPoints, segment
 from pretouch.controller import Controller
 from pretouch.errors import HardwareError, ParameterError
 from pretouch.hardware.keys import load_keys
@@ -95,7 +95,7 @@ class RunSetup:
             ends = cast(WayPoints, self.placement.path("line", 1.0)).points
             return WayPoints(ends[np.argsort(np.linalg.norm(ends - here, axis=1), kind="stable")])
         x, y, z = here.tolist()
-        return line((x, y, z), (x, y, z + _SHORTEST_M))
+        return segment((x, y, z), (x, y, z + _SHORTEST_M))
 
 
 def run_setup(command: "Run[Any]") -> RunSetup:

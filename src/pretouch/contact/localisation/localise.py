@@ -12,19 +12,18 @@ from typing import NamedTuple
 import numpy as np
 
 from pretouch.cholesky import factor, forward
-from pretouch.compiled import ByName, compiled, entry
-from pretouch.contact.localisation.posterior import Candidates, ContactArrays, log_posterior, summarise
+from pretouch.compiled import compiled
+from pretouch.contact.localisation.posterior import Candidates, log_posterior, summarise
 from pretouch.contact.localisation.prior import (
     LocalisationNumbers,
-    SeenNear,
-    UnitCues,
     candidate_poses,
     hidden_candidates,
     log_prior,
 )
 from pretouch.contact.scatter import LENGTHS
-from pretouch.contact.sequential_detector import Observation, ResidualWindows
-from pretouch.groups import CapsuleArrays, Kinematics, SurfaceArrays
+from pretouch.contact.sequential_detector import Observation
+from pretouch.contact.touch_cue import Cues
+from pretouch.groups import CapsuleArrays, Kinematics, Obstacles, SurfaceArrays
 from pretouch.params import LocalisationParams
 from pretouch.robot.model import RobotModel
 from pretouch.robot.vectors import placed_capsules
@@ -32,6 +31,15 @@ from pretouch.types import NOT_TOUCHED, BoolArray, FloatArray, IntArray, Touched
 from pretouch.values import value
 
 _LENGTHS = np.array(LENGTHS)
+
+
+class ResidualWindows(NamedTuple):
+    """Means of the newest residuals, and what they are in free motion; see `SampleTest`."""
+
+    means: FloatArray
+    samples: int
+    covariance: FloatArray
+    model_variance: FloatArray
 
 
 def independent_part(period: float, p: LocalisationParams) -> float:
@@ -146,12 +154,12 @@ def localise(
     weight = _infer(
         seen.kin, _Body(model.moved_by, model.rigid, s.arrays, model.capsules.arrays),
         windows._replace(samples=_steady_samples(windows.samples, seen.robot.qd_commanded, period, p)),
-        seen.obstacles, seen.cues, p,
+        seen.obstacles, seen.cues, LocalisationNumbers(*(getattr(p, name) for name in LocalisationNumbers._fields)),
         _SoFar(
             ln, state.weight, math.exp(-max(since, period) / p.memory_s) if p.memory_s > 0.0 else 0.0,
             independent_part(period, p),
         ),
-        ContactArrays(touched.link, touched.point, touched.force, touched.sigma, touched.probability),
+        touched,
     )  # fmt: skip
     if weight < 0.0:
         return NOT_TOUCHED, _NOTHING
@@ -190,10 +198,10 @@ class _SoFar(NamedTuple):
     """Part of a sample that says something new."""
 
 
-@entry
+@compiled
 def _infer(
-    kin: Kinematics, body: _Body, windows: ResidualWindows, seen: ByName[SeenNear], cues: ByName[UnitCues],
-    p: ByName[LocalisationNumbers], so_far: _SoFar, contact: ContactArrays,
+    kin: Kinematics, body: _Body, windows: ResidualWindows, seen: Obstacles, cues: Cues,
+    p: LocalisationNumbers, so_far: _SoFar, contact: Touched,
 ) -> float:  # fmt: skip
     """Write average and contact; return the weight of the average, -1 where nothing stands out."""
     surface, capsules, rigid, average = body.surface, body.capsules, body.rigid, so_far.average

@@ -15,13 +15,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.cholesky import factor, forward
+from pretouch.cholesky import factor, forward, largest_eigenvalue
 from pretouch.compiled import compiled
 from pretouch.contact.localisation.prior import LocalisationNumbers
 from pretouch.groups import Kinematics, SurfaceArrays
 from pretouch.robot.body import SPACING_M
 from pretouch.robot.kinematics import jacobian_into
-from pretouch.types import BoolArray, FloatArray, IntArray
+from pretouch.types import BoolArray, FloatArray, Touched
 
 _LEAST_N = 1.0
 """Force along the normal below which the one across it is no longer made smaller [N]."""
@@ -187,18 +187,8 @@ _NEGLIGIBLE = 12.0
 """Nats below the most likely candidate from which on a candidate is left out."""
 
 
-class ContactArrays(NamedTuple):
-    """Room for a contact, as of `Touched` with one row."""
-
-    link: IntArray
-    point: FloatArray
-    force: FloatArray
-    sigma: FloatArray
-    probability: FloatArray
-
-
 @compiled
-def summarise(ln: FloatArray, candidates: Candidates, there: FloatArray, contact: ContactArrays) -> None:
+def summarise(ln: FloatArray, candidates: Candidates, there: FloatArray, contact: Touched) -> None:
     """Write the contact of a posterior exp(ln) (N,), not normalised, and the forces (N, 3) of the candidates [N].
 
     The body is the likeliest rigid one. The point is the mean on it, brought to the surface along the normal of the
@@ -241,23 +231,4 @@ def summarise(ln: FloatArray, candidates: Candidates, there: FloatArray, contact
                 V[i, j] += part * (at[c, i] - contact.point[0, i]) * (at[c, j] - contact.point[0, j])
     contact.link[0], contact.probability[0] = candidates.surface.link[nearest], best / total
     # a point anywhere between candidates, SPACING_M apart: the variance of a uniform distribution is d^2 / 12
-    contact.sigma[0] = math.sqrt(_largest_eigenvalue(V) + SPACING_M**2 / 12.0)
-
-
-@compiled
-def _largest_eigenvalue(V: FloatArray) -> float:
-    """Largest eigenvalue of a covariance (3, 3): the root of its characteristic polynomial in closed form.
-
-    With q = tr V / 3 and B = (V - q 1) / r, r^2 = tr (V - q 1)^2 / 6, it is q + 2 r cos(arccos(det B / 2) / 3).
-    """
-    q = (V[0, 0] + V[1, 1] + V[2, 2]) / 3.0
-    off = V[0, 1] ** 2 + V[0, 2] ** 2 + V[1, 2] ** 2
-    spread = (V[0, 0] - q) ** 2 + (V[1, 1] - q) ** 2 + (V[2, 2] - q) ** 2 + 2.0 * off
-    if not spread > 0.0:
-        return q
-    r = math.sqrt(spread / 6.0)
-    x, y, z = (V[0, 0] - q) / r, (V[1, 1] - q) / r, (V[2, 2] - q) / r
-    u, v, w = V[0, 1] / r, V[0, 2] / r, V[1, 2] / r
-    half = 0.5 * (x * (y * z - w * w) - u * (u * z - w * v) + v * (u * w - y * v))
-    # rounding may take it beyond 1
-    return q + 2.0 * r * math.cos(math.acos(min(1.0, max(-1.0, half))) / 3.0)
+    contact.sigma[0] = math.sqrt(largest_eigenvalue(V) + SPACING_M**2 / 12.0)

@@ -6,7 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from pretouch.compiled import compiled
-from pretouch.groups import CapsuleArrays, Kinematics, SurfaceArrays
+from pretouch.contact.touch_cue import Cues
+from pretouch.groups import CapsuleArrays, Kinematics, Obstacles, SurfaceArrays
 from pretouch.types import BoolArray, FloatArray, IntArray
 
 _NEVER = 1e-12
@@ -51,28 +52,6 @@ def hidden_candidates(
                 break
 
 
-class SeenNear(NamedTuple):
-    """What is seen, as of `Obstacles`."""
-
-    point: FloatArray
-    """(K, 3) [m]."""
-    body_distance: FloatArray
-    """(K,) from the body [m]."""
-
-
-class UnitCues(NamedTuple):
-    """What units say of a touch, as of `Cues`."""
-
-    gain: FloatArray
-    """(L,) factor on the prior of a contact on each link."""
-    link: IntArray
-    """(T,) link of each touched point."""
-    point: FloatArray
-    """(T, 3) these points [m]."""
-    sigma: FloatArray
-    """(T,) standard deviation of each [m]."""
-
-
 class LocalisationNumbers(NamedTuple):
     """What compiled code takes of `LocalisationParams`."""
 
@@ -89,7 +68,7 @@ class LocalisationNumbers(NamedTuple):
 
 @compiled
 def log_prior(
-    point: FloatArray, surface: SurfaceArrays, hidden: BoolArray, seen: SeenNear, cues: UnitCues,
+    point: FloatArray, surface: SurfaceArrays, hidden: BoolArray, seen: Obstacles, cues: Cues,
     p: LocalisationNumbers, ln: FloatArray,
 ) -> None:  # fmt: skip
     """Write ln of the prior (N,) of a contact at each candidate; all candidates together have probability 1.

@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 
-from pretouch.control.path import Path, line
+from pretouch.control.path import Path, segment
 from pretouch.profiles import Profile
 from pretouch.robot.description_file import robot_named
 from pretouch.robot.model import RobotModel
@@ -16,7 +16,6 @@ from pretouch.sim.paper_scenes import Placement, person_scene, static_path, stat
 from pretouch.sim.placement import placement_for
 from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams, plant_params_of
-from pretouch.sim.pushes import Visit, Visitor
 from pretouch.sim.random_skin import Misplacement, misplaced
 from pretouch.sim.range_finder import RangeFinderParams
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
@@ -25,6 +24,7 @@ from pretouch_lab.benchmarks.avoidance.obstacle import Ball, Cuboid, Shape, Walk
 from pretouch_lab.benchmarks.avoidance.scenario import Scenario, Table
 from pretouch_lab.benchmarks.scenario_files import scenario_path
 from pretouch_lab.trial import Setup
+from pretouch_lab.visits import Visit, Visitor
 
 PANDA = "panda"
 """The arm that the scenarios are laid out for."""
@@ -91,7 +91,7 @@ def path_of(given: Table, where: Placement = _UNMOVED) -> Path:
     """Return the path a scenario tells of, where it is for an arm."""
     if given["kind"] == "held":
         x, y, z = where.point(*given["point"])
-        return line((x, y, z), (x, y, z + _HELD_M))
+        return segment((x, y, z), (x, y, z + _HELD_M))
     if "side" in given:
         return static_path(given["kind"], given["side"], where)
     return where.path("circle", -1.0)

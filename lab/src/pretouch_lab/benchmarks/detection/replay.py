@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pretouch.contact.decaying_velocity import DecayingVelocity
-from pretouch.perception.closest import no_obstacles
+from pretouch.groups import no_obstacles
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import NOT_TOUCHED, BoolArray, FloatArray, Touched, TouchReadings

@@ -19,7 +19,7 @@ PROFILE = "paper:detect.f_base_n=1000:slow=none:approach=none:perception.closing
 Closing speeds are there for the detectors that use them, and the arm is left out as `pretouch` does, for all."""
 
 _ROBOT = tuple(f.name for f in fields(RobotState))
-_OBSTACLES = tuple(f.name for f in fields(Obstacles))
+_OBSTACLES = Obstacles._fields
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ class StreamRecorder:
         self._robot.append(cycle.after.watch.robot)
         self._obstacles.append(cycle.step.obstacles)
         self._reacting.append(cycle.before.mode.mode is Mode.REACT)
-        heard = cycle.after.tracks.heard
+        heard = cycle.after.heard
         self._watched.append(len(heard) > 0 and cycle.step.stamp - float(heard.min()) <= self._patience)
         self._look(cycle)
 

@@ -97,4 +97,6 @@ class WanderingController(Controller):
         step, after = super().step(state, inputs)
         q, qd = self.course.at(inputs.stamp)
         command = qd + _PULL_1_S * (q - after.watch.robot.q_commanded)
-        return replace(step, command=command), replace(after, command=command)
+        memory = after.memory.copy()
+        memory.put("command", command)
+        return replace(step, command=command), replace(after, memory=memory)

@@ -5,11 +5,10 @@ from collections.abc import Callable
 import numpy as np
 
 from pretouch.groups import Kinematics
-from pretouch.moving_fixtures import SOMEWHERE, MovingFixtures
 from pretouch.robot.body import Capsules, no_capsules
 from pretouch.robot.model import RobotModel
 from pretouch.robot.vectors import placed
-from pretouch.types import FloatArray, IntArray, RobotState
+from pretouch.types import SOMEWHERE, FloatArray, IntArray, MovingFixtures, RobotState
 
 
 class OtherArm:

@@ -1,5 +1,7 @@
 """Two arms in one world: each as if it were alone while they are apart, and both feel the same touch."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from tests.sim.ranging import EXACT, FORWARD, NO_ERROR, ORIGIN
@@ -11,7 +13,7 @@ from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import BasePose, HandSpec, SceneSpec
-from pretouch.sim.second_arm import SecondArm
+from pretouch_lab.studies.second_arm import SecondArm
 
 APART_M = 1.0
 
@@ -88,3 +90,14 @@ def test_both_feel_the_same_touch(panda_model):
     first.advance(0.05)
     assert first.read().wrench[0] < -2.0
     assert second.read().wrench[0] < -2.0
+
+
+def test_a_second_arm_is_found_beside_a_free_body(panda_model: RobotModel, tmp_path: Path):
+    file, q = tmp_path / "world.xml", panda_model.description.q_ready
+    file.write_text('<mujoco><worldbody><body pos="0 2 0"><freejoint/><geom size=".1"/></body></worldbody></mujoco>')
+    second = SecondArm(panda_model, BasePose((1.0, 0.0, 0.0), np.pi), NO_ERROR, seed=1)
+    plant = Plant(panda_model, SceneSpec(second=second.spec, world=file), NO_ERROR, q, seed=0)
+    second.join(plant, q)
+    plant.advance(0.2)
+    assert second.read().q == pytest.approx(q, abs=1e-2)
+    assert plant.mj_data.qpos[-5] == pytest.approx(-9.81e-6 * 200 * 201 / 2, abs=1e-6)

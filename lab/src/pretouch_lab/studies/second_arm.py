@@ -9,7 +9,7 @@ from pretouch.sim.arm_in_world import ArmInWorld
 from pretouch.sim.physics import begin_step, end_step
 from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams
-from pretouch.sim.scene import BasePose, SecondArmSpec, body_before_second, joint_of_second
+from pretouch.sim.scene import BasePose, SecondArmSpec, body_before_second
 from pretouch.sim.under_way import ROUNDING_S
 from pretouch.types import FloatArray, RobotState
 
@@ -34,7 +34,9 @@ class SecondArm(ArmInWorld):
         """Begin at rest at q (n,) [rad], in the world of an arm whose scene has the `spec`."""
         self._first, self.time = first, first.time
         built = first.mj_model
-        self._enter(built, first.mj_data, joint_of_second(built), body_before_second(built), q)
+        before = body_before_second(built)
+        joint = next(j for j in range(built.njnt) if built.jnt_bodyid[j] > before)
+        self._enter(built, first.mj_data, joint, before, q)
         first.before_each_step(self._begin)
 
     def before_each_step(self, call: Callable[[float], float | None]) -> None:
@@ -54,9 +56,9 @@ class SecondArm(ArmInWorld):
         draws, past = self._rng.standard_normal((2, n)), np.empty((5, n))
         self._age(p.period_s)
         self.time = self._first.time
-        end_step.flat(
+        end_step(
             self._qd_set, *self._torques, p.velocity_noise_rad_s * draws[0], self._torque_noise * draws[1], past,
-            *self._arm,
+            self._arm,
         )  # fmt: skip
         self._torques = None
         if p.state_delay_s:
@@ -68,7 +70,7 @@ class SecondArm(ArmInWorld):
         self.catch_up()
         while self._late_commands and self._late_commands[0][0] <= time + ROUNDING_S:
             self._qd_set = self._late_commands.popleft()[1]
-        self._torques = begin_step.flat(self._qd_set, *self._arm)
+        self._torques = begin_step(self._qd_set, self._arm)
 
     def _in_base(self, point: FloatArray) -> FloatArray:
         T = self._base.T

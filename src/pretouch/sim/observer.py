@@ -4,17 +4,15 @@ This is the chain an arm with joint torque sensors runs itself at 1 kHz (De Luca
 2017); the simulation uses it in the robot's place.
 """
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import ByName, entry
+from pretouch.compiled import compiled
 from pretouch.types import FloatArray
 
 
-@dataclass(frozen=True, slots=True)
-class ObserverState:
+class ObserverState(NamedTuple):
     """Memory of the observer, n joints."""
 
     residual: FloatArray
@@ -30,6 +28,7 @@ def observer_init(mass_matrix: FloatArray, qd: FloatArray) -> ObserverState:
     return ObserverState(np.zeros(len(qd)), mass_matrix @ qd, mass_matrix)  # p in the integral, so that r begins at 0
 
 
+@compiled
 def observe(
     state: ObserverState,
     mass_matrix: FloatArray,
@@ -56,31 +55,16 @@ def observe(
     Returns:
         The new memory, its `residual` positive for torques **by** the environment **on** the robot.
     """
-    residual, integral = _observe(state, mass_matrix, bias, qd, tau, gain, dt)
-    return ObserverState(residual, integral, mass_matrix)
-
-
-class _Before(NamedTuple):
-    """As of `ObserverState`."""
-
-    integral: FloatArray
-    mass_matrix: FloatArray
-
-
-@entry
-def _observe(
-    before: ByName[_Before], M: FloatArray, bias: FloatArray, qd: FloatArray, tau: FloatArray, gain: float, dt: float
-) -> tuple[FloatArray, FloatArray]:
     n = len(qd)
     momentum, rate = np.zeros(n), np.zeros(n)
     for i in range(n):
         for j in range(n):
-            momentum[i] += M[i, j] * qd[j]
-            rate[i] += (M[i, j] - before.mass_matrix[i, j]) * qd[j]  # dM/dt qd dt
+            momentum[i] += mass_matrix[i, j] * qd[j]
+            rate[i] += (mass_matrix[i, j] - state.mass_matrix[i, j]) * qd[j]  # dM/dt qd dt
     # r = K (p - integral of tau - bias + dM/dt qd + r), implicit in r: the discrete low-pass is stable for any gain
-    grown = before.integral + (tau - bias) * dt + rate
+    grown = state.integral + (tau - bias) * dt + rate
     residual = gain * (momentum - grown) / (1.0 + gain * dt)
-    return residual, grown + residual * dt
+    return ObserverState(residual, grown + residual * dt, mass_matrix)
 
 
 def wrench_from_torques(

@@ -1,0 +1,219 @@
+"""A control step that Python decides: the stages of `line` one by one, and what happened between them."""
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pretouch import faults
+from pretouch.contact.announced_load import announced, kept_free, without_load
+from pretouch.contact.detector import Detection, Sample
+from pretouch.contact.reaction import ReactionInputs
+from pretouch.contact.window import Window, add_force
+from pretouch.control.commander import Asked, asked_by, commanded
+from pretouch.control.interface import MotionRequest
+from pretouch.groups import Kinematics, Obstacles
+from pretouch.line import ASK, MOVE, SEE
+from pretouch.modes import CLEAR, Event, QpOutcome, next_mode, outcome_of
+from pretouch.perception.moving import beside, near_moving, sound_moving
+from pretouch.perception.obstacles import TrackState, silent_units, track_init
+from pretouch.perception.outside import outside_silence, see_outside
+from pretouch.records import Flat
+from pretouch.sound import sound_payload, sound_points, sound_readings, sound_touch
+from pretouch.types import ControlStep, Inputs, Mode
+
+if TYPE_CHECKING:
+    from pretouch.controller import Controller, ControllerState
+
+
+class Decision:
+    """One control step in the making."""
+
+    def __init__(self, controller: "Controller", state: "ControllerState", memory: Flat) -> None:
+        """Take a state, and a copy of what it remembers, which is written to."""
+        self.controller, self.state, self.memory, self.now = controller, state, memory, controller.blank.copy()
+        self.profile, self.model, self.mode = controller.profile, controller.model, state.mode
+        self.beside, self.outside, self.silent, self.watched = controller.beside, state.outside, "", False
+
+    def taken(self, inputs: Inputs) -> tuple[ControlStep, dict[str, Any]]:
+        """Take the step; return it, and the fields of the state after it."""
+        self._judge(inputs)
+        self._see()
+        detection, detector = self._detect()
+        contact, desired, reaction = self._answer(detection, inputs.resume)
+        approach = self._move(desired)
+        mode, still = self.mode, np.zeros(3)
+        if mode.mode is Mode.TRACK:
+            self.memory.put("rotation_goal", desired.rotation_kept)
+        step = ControlStep.of(
+            self.now, mode, path_position=desired.point, contact=contact, thresholds=detection.thresholds,
+            desired_velocity=still if mode.mode is Mode.HOLD else desired.velocity,
+            reaction_velocity=desired.velocity if mode.mode is Mode.REACT else still, armed=detection.armed,
+            residual=detection.residual, evidence=detection.evidence, touched=detection.touched,
+            detectable_n=detection.detectable_n,
+        )  # fmt: skip
+        load = self.load and kept_free(self.load, self.robot.tau_ext, detection.residual)
+        detector = self.controller.kept_detector(self.memory, detector)
+        rests = self.profile.react.keep_free(reaction, self.memory)
+        calm = rests and mode == CLEAR and detection.contact is None and self.outside is None and load is None
+        return step, {
+            "mode": mode, "detector": detector, "reaction": reaction, "approach": approach, "outside": self.outside,
+            "load": load, "calm": calm and self.controller.may_be_one_call(detector), "quick": False,
+        }  # fmt: skip
+
+    def _judge(self, inputs: Inputs) -> None:
+        """Find what of the inputs can be used, and what is wrong with the rest."""
+        p, controller, memory, units = self.profile, self.controller, self.memory, len(self.controller.skin)
+        self.robot, events, watch = faults.examine(
+            faults.watch_of(memory), inputs, memory.get("command"), controller.limits.period, controller.limits.qd_max,
+            p.failure, p.detect.by_torques,
+        )  # fmt: skip
+        self.stamp, seeing = watch.stamp, p.perception is not None
+        self.readings, unfit = sound_readings(inputs.readings, units)
+        self.touches, wrong = sound_touch(inputs.touch, units) if controller.touching else (None, "")
+        self.points, self.lost = sound_points(inputs.points)
+        payload, heavy = sound_payload(inputs.payload, controller.most_kg)
+        self.load = announced(self.state.load, payload, self.robot)
+        self.moving, astray = sound_moving(inputs.moving, self.stamp, p.failure.state_timeout_s)
+        self.desired, ended = commanded(inputs.desired, self.model.n, self.stamp, p.failure)
+        self.events = events | ended
+        self._note({Event.LOAD_UNFIT: heavy, Event.MOVING_LOST: astray})
+        self._note({Event.SKIN_UNFIT: (unfit or wrong) if seeing else ""})
+        faults.keep_watch(memory, watch)
+        self.now.put("stamp", self.stamp)
+        self.now.fill("readings", self.readings)
+        if Event.TIME_BACKWARDS in events:
+            memory.fill("tracks", track_init(units))
+        if self.moving is not None and p.perception is not None:
+            fixtures, persistence = controller.fixtures.capsules, p.perception.persistence_s
+            self.beside = beside(fixtures, self.moving, self.readings, self.stamp, persistence)
+
+    def _note(self, events: dict[Event, str]) -> None:
+        """Take in the events that have something to say."""
+        self.events |= {event: detail for event, detail in events.items() if detail}
+
+    def _see(self) -> None:
+        """Find where the arm is, and what is near (eq. 1)."""
+        now, see, stamp, robot = self.now, self.profile.perception, self.stamp, self.robot
+        faults.put_robot(now, "robot", robot)
+        self._line(SEE)
+        self.kin = kin = now.part("kin", Kinematics)
+        if self.load is not None:
+            self.robot, self.load = without_load(self.load, self.model, kin, robot, self.controller.limits.period)
+            faults.put_robot(now, "robot", self.robot)
+        if see is not None:
+            tracks, skin = self.memory.part("tracks", TrackState), self.controller.skin
+            heard, self.silent = silent_units(skin, tracks, self.readings.status, now.get("seen.silence"), stamp, see)
+            self.watched = len(skin) > 0 and heard >= 1.0 and not self.silent
+            anew = Event.TIME_BACKWARDS in self.events
+            shown, self.outside = see_outside(
+                self.outside, anew, self.points, self.controller.outside, kin, robot, stamp
+            )  # fmt: skip
+            if shown is not None:
+                now.put("seen.nearest", min(now.get("seen.nearest"), float(shown.ee_distance.min())))
+                self._add(shown, "seen.found")
+            slower, self.lost = outside_silence(self.outside, self.lost, stamp, see.outside)
+            now.put("seen.heard", min(heard, slower))
+            self._note({Event.SKIN_SILENT: self.silent, Event.POINTS_LOST: self.lost})
+        else:
+            self.lost = ""
+        self.seen = self._obstacles("seen.found")
+        now.put("seen.all", now.get("seen.found"))
+        if self.moving is not None:
+            places = len(self.controller.skin) + (0 if self.outside is None else len(self.outside.sigma))
+            self._add(near_moving(self.moving, self.model, kin, stamp, places), "seen.all")
+            now.put("request.untouched", places)
+
+    def _obstacles(self, count: str) -> Obstacles:
+        """Return as many obstacles as a field counts."""
+        found = self.now.get(count)
+        return Obstacles._make(part[:found] for part in self.now.part("seen.near", Obstacles))
+
+    def _add(self, obstacles: Obstacles, count: str) -> None:
+        """Add obstacles to those that a field counts."""
+        found = self.now.get(count)
+        for room, part in zip(self.now.part("seen.near", Obstacles), obstacles, strict=True):
+            room[found : found + len(part)] = part
+        self.now.put(count, found + len(obstacles.unit))
+
+    def _detect(self) -> tuple[Detection, Any]:
+        """Tell a contact from free motion (eqs. 8-11); return that, and what the detector remembers."""
+        p, memory, robot, state = self.profile, self.memory, self.robot, self.state
+        reacting, before = self.mode.mode is Mode.REACT, memory.part("window", Window)
+        window = add_force(before, None if robot.wrench is None else robot.wrench[:3], p.window)
+        sample = Sample(
+            self.stamp, self.kin, robot, window, before.full, self.seen, reacting, self.watched, self.touches,
+            self.load.doubted_kg if self.load else 0.0,
+        )  # fmt: skip
+        detector = self.controller.detector
+        detection, remembered = detector.step(self.controller.whole_detector(state), self.controller.body, sample)
+        if reacting and p.window.freeze_while_reacting:
+            window = before
+        memory.fill("window", window)
+        self.now.put("force.filtered", window.newest)
+        if not detection.armed and p.detect.by_torques and bool(np.isnan(detection.residual).any()):
+            self.events.setdefault(Event.NO_FORCE, f"up to {p.failure.force_timeout_s:g} s")
+        elif not detection.armed:
+            self.events[Event.WINDOW_FILLING] = f"{window.samples[0]} of {p.window.samples} samples"
+        return detection, remembered
+
+    def _answer(self, detection: Detection, resume: bool) -> tuple[Any, Asked, Any]:
+        """Decide what to do; return the contact that begins, what is asked, and what the reaction remembers."""
+        p, now, memory, controller, mode = self.profile, self.now, self.memory, self.controller, self.mode
+        missed = bool(self.silent or self.lost)
+        phase, goal = memory.get("pace.phase"), memory.get("rotation_goal").copy()
+        noticed = ReactionInputs(
+            mode, self.kin, self.robot, detection, self._obstacles("seen.all"), missed, memory.get("command").copy(),
+            phase, resume,
+        )  # fmt: skip
+        answers, reaction = p.react.sense(controller.whole_reaction(self.state), controller.body, noticed)
+        self.mode = next_mode(mode, self.events | answers, resume)
+        contact = detection.contact if self.mode.mode is Mode.REACT is not mode.mode else None
+
+        # along the path, or as a commander asks, as fast as eqs. 3-4 leave it, or as the reaction says
+        controller.put_path(now, phase)
+        self._line(ASK)
+        scale = now.get("path.scale")
+        if self.desired is None:
+            asked = Asked(scale * now.get("path.velocity"), now.get("path.point"), goal, goal)
+        else:
+            asked = asked_by(self.desired, self.stamp, self.kin, self.robot, self.model, goal, p.task, scale)
+        answer, reaction = p.react.move(reaction, controller.body, noticed, self.mode)
+        if answer is not None:
+            asked = replace(asked, velocity=answer.velocity, qd=answer.qd, rotation_goal=goal)
+            now.put("request.touch_m_s", np.nan if answer.touch_speed is None else answer.touch_speed)
+        elif self.mode.mode is not Mode.TRACK:
+            asked = replace(asked, qd=None, rotation_goal=goal)
+        return contact, asked, reaction
+
+    def _move(self, asked: Asked) -> Any:
+        """Write the joint velocities nearest to what is asked, eqs. 5-7 and 2; return what a restriction remembers."""
+        now, mode, controller = self.now, self.mode, self.controller
+        hold = mode.mode is Mode.HOLD and asked.qd is None
+        now.put("request.velocity", asked.velocity)
+        now.put("request.goal", asked.rotation_goal)
+        now.put("request.hold", hold)
+        now.put("request.advances", mode.mode is Mode.TRACK and self.desired is None)
+        if asked.qd is not None:
+            now.put("request.qd", asked.qd)
+            now.put("request.by_joints", 1)
+        approach, part = self.state.approach, controller.approach
+        if part is None:
+            self._line(MOVE)
+        else:
+            touch = now.get("request.touch_m_s")
+            request = MotionRequest(
+                asked.velocity, asked.rotation_goal, hold, asked.qd, None if np.isnan(touch) else touch
+            )
+            approach = controller.restricted(part, approach, self.memory, now, self.robot, request)
+        outcome, status, _ = outcome_of(hold, now.get("answer.ending"), bool(now.get("answer.violated")))
+        if outcome in _TROUBLE and (outcome is QpOutcome.FAILED or mode.mode is not Mode.HOLD):
+            self.mode = next_mode(mode, {_TROUBLE[outcome]: status}, resume=False)
+            self.memory.put("pace.speed", 0.0)
+        return approach
+
+    def _line(self, stage: int) -> None:
+        self.controller.take(self.memory, self.now, self.beside, stage, stage)
+
+
+_TROUBLE = {QpOutcome.FAILED: Event.SOLVER_FAILED, QpOutcome.INFEASIBLE: Event.BLOCKED}

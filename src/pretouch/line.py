@@ -1,0 +1,235 @@
+"""From readings to a joint velocity: the paper on one page, as compiled code.
+
+A control step has five stages. Nearly every step is one call of all of them; where something happened, Python takes
+them one by one and decides between them (`decision`). With `NUMBA_DISABLE_JIT=1` a debugger steps through.
+
+Each stage takes the blocks of three records: of `Fixed`, of `Remembered`, changed, and of `Now`, changed. It opens what
+it needs of them.
+"""
+
+import numpy as np
+
+from pretouch.cholesky import factor
+from pretouch.compiled import compiled
+from pretouch.contact.clamp import note_place
+from pretouch.contact.model_update import Situation
+from pretouch.contact.moving_thresholds import compare
+from pretouch.contact.sequential_step import Joints, assess_sample
+from pretouch.contact.virtual_mass import learn_mean
+from pretouch.contact.window import add_sample
+from pretouch.control.approach import rows_into
+from pretouch.control.braking import MOST_ROWS, Mass, Touch, TouchLimits, braking_rows
+from pretouch.control.interface import GivenRows
+from pretouch.control.motion import Allowed, move_within
+from pretouch.control.path import advance, follow, reduce_speed, speed_scale
+from pretouch.control.qp import Rows
+from pretouch.faults import believable
+from pretouch.groups import CapsuleArrays, Chain, first_of
+from pretouch.line_records import ADMITTANCE, BRAKING, PAPER, THRESHOLDS, Fixed, Now, Remembered
+from pretouch.modes import SOLVED
+from pretouch.perception.obstacles import measured
+from pretouch.perception.perceive import perceive
+from pretouch.records import Blocks, opener
+from pretouch.robot.kinematics import mass_matrix_into, place
+from pretouch.types import FloatArray
+
+CHECK, SEE, DETECT, ASK, MOVE = range(5)
+"""Stages of a step."""
+
+Beside = tuple[FloatArray, FloatArray, FloatArray]
+"""Both ends (C, 3) [m] and radii (C,) [m] of capsules that stand or move beside the arm, base frame."""
+
+
+@compiled
+def line(fixed: Blocks, remembered: Blocks, now: Blocks, beside: Beside, first: int, last: int) -> bool:
+    """Take the stages from the first to the last; from `CHECK` on, return False where something is to be decided."""
+    alone = first == CHECK
+    if alone and not believe(fixed, remembered, now):
+        return False
+    if first <= SEE <= last and see(fixed, remembered, now, beside) < 1.0 and alone:
+        return False
+    if first <= DETECT <= last and detect(fixed, remembered, now) and alone:
+        return False
+    if first <= ASK <= last:
+        ask(fixed, remembered, now, alone)
+    if first <= MOVE <= last:
+        move(fixed, remembered, now)
+    return True
+
+
+_belief, _watch, _report = (
+    opener(Fixed, "belief"),
+    opener(Remembered, "watch", "command"),
+    opener(Now, "stamp", "robot"),
+)
+
+
+@compiled
+def believe(fixed: Blocks, remembered: Blocks, now: Blocks) -> bool:
+    """Say whether the arm's report is as usual."""
+    (belief,), (watch, command), (stamp, robot) = _belief(fixed), _watch(remembered), _report(now)
+    return believable(stamp[0], robot, watch, command, belief)
+
+
+_sight, _tracks = opener(Fixed, "hinges", "mechanism.arm", "sight"), opener(Remembered, "tracks")
+_scene = opener(Now, "stamp", "robot", "readings", "kin", "ee", "seen")
+
+
+@compiled
+def see(fixed: Blocks, remembered: Blocks, now: Blocks, beside: Beside) -> float:
+    """Place the arm, and find the obstacles (eq. 1); return the factor on the speed for units that fall silent."""
+    (hinges, arm, sight), (tracks,), (stamp, robot, readings, kin, ee, seen) = (
+        _sight(fixed), _tracks(remembered), _scene(now),
+    )  # fmt: skip
+    place(hinges, robot.q, kin)
+    ee[:] = kin.position[arm.ee]
+    seen.found[0], seen.nearest[0], seen.silence[0], seen.heard[0] = 0, np.inf, 0.0, 1.0
+    if sight.sees:
+        a, b, radius = beside
+        found, nearest, oldest = perceive(
+            sight, tracks, readings, seen, (kin, Chain(kin.anchor, kin.axis, arm.moved_by, robot.qd), ee),
+            (stamp[0], robot.stamp[0]), CapsuleArrays(np.zeros(len(radius), np.int64), a, b, radius),
+        )  # fmt: skip
+        silence = stamp[0] - oldest
+        seen.found[0], seen.nearest[0], seen.silence[0] = found, nearest, silence
+        if silence > sight.slow_after_s:
+            seen.heard[0] = max(0.0, (sight.silent_after_s - silence) / (sight.silent_after_s - sight.slow_after_s))
+    else:
+        measured(readings.distance, readings.status, sight.skin.cones, seen.distance)
+    seen.all[0] = seen.found[0]
+    return seen.heard[0]
+
+
+_test = opener(Fixed, "kinds", "force", "test", "no_gain", "mechanism", "notes_path", "sight.sees")
+_memory, _sample = (
+    opener(Remembered, "window", "test", "mass"),
+    opener(Now, "robot", "kin", "ee", "seen", "force", "detection"),
+)
+
+
+@compiled
+def detect(fixed: Blocks, remembered: Blocks, now: Blocks) -> bool:
+    """Take the force into its window (eq. 8), and tell a contact from free motion (eqs. 9-11, or by the torques).
+
+    Return whether that is to be decided on; else the arm's own motion is learnt.
+    """
+    kinds, p, test, no_gain, mechanism, notes_path, sees = _test(fixed)
+    (window, state, mass), (robot, kin, ee, seen, force, d) = _memory(remembered), _sample(now)
+    armed, near = window.samples[0] == len(window.ring), first_of(seen.near, seen.found[0])
+    add_sample(window, robot.wrench[:3], p.alpha, p.lambda_)
+    for i in range(3):
+        force.filtered[i] = window.sums[0, i]
+        force.compared[i] = window.sums[0, i] if p.filtered else robot.wrench[i]
+    if kinds.detect == THRESHOLDS:
+        contact, d.log_likelihood_ratio[0] = compare(
+            window.sums, window.samples[0], force.compared, ee, near.point, near.ee_distance, p.thresholds, d.bands
+        )
+        d.residual[:] = robot.tau_ext
+    else:
+        assess_sample(
+            state, Joints(robot.qd, robot.qd_commanded, robot.tau_ext), near, Situation(sees, False, no_gain), test,
+            kin, mechanism, d,
+        )  # fmt: skip
+        contact = d.log_likelihood_ratio[0] >= 1.0
+    if contact or not armed:
+        return True
+    if kinds.react == ADMITTANCE:
+        learn_mean(mass.mean, mass.samples, d.residual, test.period, mass.torque)
+        if notes_path:
+            note_place(mass.path, mass.marked, robot.q_commanded, test.period)
+    return False
+
+
+_task, _pace = opener(Fixed, "path"), opener(Remembered, "pace", "rotation_goal")
+_way = opener(Now, "ee", "seen.nearest", "seen.heard", "path", "request")
+
+
+@compiled
+def ask(fixed: Blocks, remembered: Blocks, now: Blocks, alone: bool) -> None:
+    """Follow the path, and slow down near obstacles (eqs. 3-4); ask for just that if nothing else is asked."""
+    (p,), (pace, rotation_goal), (ee, nearest, heard, path, request) = _task(fixed), _pace(remembered), _way(now)
+    slowed = speed_scale(nearest[0], p.d_max_m) if p.d_max_m > 0.0 else 1.0
+    path.scale[0], pace.scale[0], pace.cycles[0] = reduce_speed(
+        pace.scale[0], pace.cycles[0], min(heard[0], slowed), p.restore_cycles
+    )
+    path.forward[0] = follow(
+        path.point, path.tangent, pace.speed[0], ee, p.off_path_m, p.position_gain_1_s, path.velocity
+    )
+    if alone:
+        request.goal[:], request.advances[0] = rotation_goal, 1
+        for i in range(3):
+            request.velocity[i] = path.scale[0] * path.velocity[i]
+
+
+_body, _slots = opener(Fixed, "kinds.approach", "mechanism", "rows", "motion"), opener(Remembered, "slots")
+_moving = opener(Remembered, "null_velocity", "command")
+_motion = opener(Now, "robot", "kin", "ee", "seen.near", "seen.all", "request", "answer")
+
+
+@compiled
+def move(fixed: Blocks, remembered: Blocks, now: Blocks) -> None:
+    """Write the rows of what restricts the body (eqs. 5-7), and the joint velocities within them (eq. 2)."""
+    (approach, mechanism, p, motion), (slots,), (null_velocity, command) = (
+        _body(fixed), _slots(remembered), _moving(remembered),
+    )  # fmt: skip
+    robot, kin, ee, room, count, request, answer = _motion(now)
+    near, n, none = first_of(room, count[0]), len(robot.q), np.empty(0)
+    G, h, which, found, seen = np.empty((0, n)), np.empty(0), np.empty(0, np.int64), 0, 0
+    if approach == PAPER:
+        G, h, which = np.empty((count[0], n)), np.empty(count[0]), np.empty(count[0], np.int64)
+        found = rows_into(kin, mechanism.arm.moved_by, near, p.paper, Rows(G, h, which))
+        seen = found
+    elif approach == BRAKING:
+        most = MOST_ROWS * len(room.unit)
+        G, h, which = np.empty((most, n)), np.empty(most), np.empty(count[0], np.int64)
+        # posture as measured, speeds as commanded: a row tightens from what the arm was sent last
+        chain = Chain(kin.anchor, kin.axis, mechanism.arm.moved_by, robot.qd_commanded)
+        M, L, counts = np.empty((n, n)), np.eye(n), p.weighs and count[0] > 0
+        if counts:
+            mass_matrix_into(kin, mechanism, M)
+            for j in range(n):
+                M[j, j] += p.rotor_inertia_kg_m2
+            counts = factor(M, L)  # a mass matrix that cannot be factored leaves the largest touch speed
+        touch = Touch(p.touch, p.deadband_m_s, request.untouched[0])
+        if not np.isnan(request.touch_m_s[0]):
+            # a touch speed whatever the mass, and no heed of what moves by itself
+            touch = Touch(TouchLimits(np.inf, 1.0, 1.0, request.touch_m_s[0]), np.inf, request.untouched[0])
+        seen, found = braking_rows(slots, near, chain, Mass(counts, L), touch, p.braking, Rows(G, h, which))
+    allowed = Allowed(G[:found], h[:found], which[:seen], p.weight, none, none)
+    move_within(motion, robot, (kin, ee), near, request, allowed, null_velocity, answer)
+    command[:] = answer.command
+    go_on(fixed, remembered, now)
+
+
+_going, _gone = opener(Remembered, "pace"), opener(Now, "path", "request", "answer")
+
+
+@compiled
+def go_on(fixed: Blocks, remembered: Blocks, now: Blocks) -> None:
+    """Go on along the path with the motion, or stay at its phase and start gently from it later."""
+    (p,), (pace,), (path, request, answer) = _task(fixed), _going(remembered), _gone(now)
+    if request.advances[0] == 1 and (request.hold[0] == 1 or answer.ending[0] == SOLVED):
+        velocity = answer.velocities[1]
+        phase = advance(pace.phase[0], path.tangent, path.velocity, path.forward[0], velocity, p.period_s)
+        pace.phase[0] = min(phase, p.end_m)
+        pace.speed[0] = min(p.speed_m_s, pace.speed[0] + p.acceleration_m_s2 * p.period_s)
+    else:
+        pace.speed[0] = 0.0
+
+
+_limits = opener(Fixed, "motion")
+
+
+@compiled
+def line_within(
+    fixed: Blocks, remembered: Blocks, now: Blocks, rows: GivenRows, weight: float,
+    speeds: tuple[FloatArray, FloatArray],
+) -> None:  # fmt: skip
+    """Take the stage `MOVE` within rows G, h, which, and joint speeds, of a part in plain Python; see `Restricted`."""
+    (motion,), (null_velocity, command) = _limits(fixed), _moving(remembered)
+    robot, kin, ee, room, count, request, answer = _motion(now)
+    (G, h, which), (slowest, fastest) = rows, speeds
+    allowed = Allowed(G, h, which, weight, slowest, fastest)
+    move_within(motion, robot, (kin, ee), first_of(room, count[0]), request, allowed, null_velocity, answer)
+    command[:] = answer.command
+    go_on(fixed, remembered, now)

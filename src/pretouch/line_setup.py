@@ -1,0 +1,153 @@
+"""What the compiled line is made with: the records of an arm, a skin, its surroundings, a path and a profile."""
+
+import math
+import sys
+from typing import Any
+
+import numpy as np
+
+from pretouch.contact.admittance import Admittance
+from pretouch.contact.clamp import clamp_init
+from pretouch.contact.decaying_velocity import DecayingVelocity
+from pretouch.contact.moving_thresholds import MovingThresholds, threshold_numbers, thresholds_of
+from pretouch.contact.sequential_detector import sequential_init, sequential_numbers
+from pretouch.contact.sequential_step import sample_test
+from pretouch.contact.sequential_test import SequentialTest
+from pretouch.contact.touch_cue import TouchSensors
+from pretouch.contact.virtual_mass import FreeMass
+from pretouch.contact.window import window_init
+from pretouch.control.approach import ApproachRestriction, BrakingCurve, approach_params, braking_limits, of_table_i
+from pretouch.control.braking import slots_init, touch_limits
+from pretouch.control.motion import motion_numbers
+from pretouch.faults import Belief, Report, Watched
+from pretouch.groups import Kinematics, no_obstacles
+from pretouch.line_records import (
+    ADMITTANCE,
+    BRAKING,
+    DECAY,
+    NO_ROWS,
+    PAPER,
+    PYTHON,
+    SEQUENTIAL,
+    THRESHOLDS,
+    Answer,
+    Compared,
+    Fixed,
+    ForceNumbers,
+    Kinds,
+    Now,
+    OnPath,
+    Pace,
+    PathNumbers,
+    Remembered,
+    Request,
+    RowNumbers,
+    Seen,
+    Sight,
+)
+from pretouch.params import PerceptionParams, SequentialParams
+from pretouch.perception.obstacles import track_init
+from pretouch.perception.outside import places_of
+from pretouch.perception.perceive import Readings, sight_numbers
+
+
+def kinds_of(profile: Any) -> Kinds:
+    """Return which parts of a profile are compiled; a part of one's own is not, also where it extends one that is."""
+    detect, approach, react = type(profile.detect), type(profile.approach), type(profile.react)
+    tests = detect is SequentialTest and all(type(cue) is TouchSensors for cue in profile.detect.cues)
+    return Kinds(
+        THRESHOLDS if detect is MovingThresholds else SEQUENTIAL if tests else PYTHON,
+        {type(None): NO_ROWS, ApproachRestriction: PAPER, BrakingCurve: BRAKING}.get(approach, PYTHON),
+        {DecayingVelocity: DECAY, Admittance: ADMITTANCE}.get(react, PYTHON),
+    )
+
+
+def fixed_of(controller: Any) -> Fixed:
+    """Return what does not change from step to step."""
+    model, skin, profile, limits = controller.model, controller.skin, controller.profile, controller.limits
+    kinds, n, t, see, failure = controller.kinds, model.n, profile.task, profile.perception, profile.failure
+    seen, thresholds, paper = see or PerceptionParams(), thresholds_of(profile.detect), of_table_i(profile.approach)
+    braking = profile.approach if kinds.approach == BRAKING else BrakingCurve()
+    # hard rows have no price; without rows any but that will do
+    weight = {PAPER: 0.0 if paper.rows == "hard" else paper.slack_weight, BRAKING: braking.slack_weight}
+    mass, deadband = braking.effective_mass, braking.closing_deadband_m_s
+    test = profile.detect if kinds.detect == SEQUENTIAL else SequentialParams()
+    return Fixed(
+        kinds, model.hinges, model.mechanism,
+        Belief(limits.qd_max, failure.state_timeout_s, failure.overrun_s, failure.force_max_n),
+        Sight(
+            see is not None and len(skin) > 0, seen.place_at_stamp, seen.slow_after_s, seen.silent_after_s,
+            model.capsules.arrays, model.body.arrays, controller.fixtures.planes, skin.arrays,
+            sight_numbers(seen, skin),
+        ),
+        ForceNumbers(
+            profile.window.alpha, profile.window.lambda_, thresholds.compare == "filtered",
+            threshold_numbers(thresholds),
+        ),
+        sequential_numbers(n, limits.period, test), np.ones(len(model.links)),
+        kinds.react == ADMITTANCE and profile.react.pinch is not None,
+        PathNumbers(
+            t.speed_m_s, t.acceleration_m_s2, t.position_gain_1_s, t.off_path_m, limits.period,
+            math.inf if controller.path.closed else controller.path.length,
+            0.0 if profile.slow is None else profile.slow.d_max_m, t.restore_cycles,
+        ),
+        RowNumbers(
+            weight.get(kinds.approach, 1.0), approach_params(paper),
+            braking_limits(braking, t.speed_m_s, limits.period), touch_limits(braking),
+            np.inf if deadband is None else deadband, mass is not None, mass.rotor_inertia_kg_m2 if mass else 0.0,
+        ),
+        motion_numbers(model, limits, t, profile.null_space, failure.solver_iterations),
+    )  # fmt: skip
+
+
+def _places(controller: Any) -> int:
+    """Count the obstacles there may be: of units, outside points, and links beside moving fixtures."""
+    model, see = controller.model, controller.profile.perception
+    outside = 0 if see is None or see.outside is None else places_of(model, see.outside.per_link)
+    return len(controller.skin) + outside + len(model.parts)
+
+
+def _report(n: int) -> Report:
+    none = np.zeros(n)
+    return Report(np.zeros(1), none, none, none, none, none, np.zeros(6))
+
+
+def remembered_init(controller: Any) -> Remembered:
+    """Return what is remembered before the first step, but for what the arm reports and a detector knows already."""
+    n, profile, period, kinds = controller.model.n, controller.profile, controller.limits.period, controller.kinds
+    sent, none, zero, cycles = (
+        int(profile.failure.state_timeout_s / period) + 2,
+        np.zeros(n),
+        np.zeros(1),
+        np.zeros(1, np.int64),
+    )
+    return Remembered(
+        Watched(zero, zero, _report(n), cycles, np.zeros(sent), np.zeros((sent, n))),
+        track_init(len(controller.skin)), window_init(profile.window.samples),
+        sequential_init(n if kinds.detect == SEQUENTIAL else 0, SequentialParams()),
+        FreeMass(np.zeros((2, n)), cycles, none, clamp_init(none).path, zero), Pace(np.ones(1), cycles, zero, zero),
+        slots_init(_places(controller) if kinds.approach == BRAKING else 0), none, none, np.eye(3),
+    )  # fmt: skip
+
+
+def now_init(controller: Any) -> Now:
+    """Return what a step begins with."""
+    n, links, units, places = controller.model.n, len(controller.model.links), len(controller.skin), _places(controller)
+    zero, count, three, of_units, rows = (
+        np.zeros(1),
+        np.zeros(1, np.int64),
+        np.zeros(3),
+        np.zeros(units),
+        np.zeros(places),
+    )
+    return Now(
+        zero, _report(n), Readings(of_units, of_units, np.zeros(units, np.int64)),
+        Kinematics(np.zeros((links, 3)), np.zeros((links, 3, 3)), np.zeros((n, 3)), np.zeros((n, 3))), three,
+        Seen(of_units, no_obstacles(places), count, count, zero, zero, np.ones(1)), Compared(three, three),
+        sample_test(n), OnPath(zero, three, three, three, zero, zero),
+        Request(three, np.eye(3), np.zeros(n), count, count, count, np.full(1, np.nan), np.full(1, sys.maxsize)),
+        Answer(
+            np.zeros(n), np.zeros((2, 3)), np.zeros(places, np.int64), rows, rows, np.zeros(n + places), count, count,
+            count,
+        ),
+    )  # fmt: skip
