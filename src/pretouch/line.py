@@ -57,11 +57,8 @@ def line(fixed: Blocks, remembered: Blocks, now: Blocks, beside: Beside, first: 
     return True
 
 
-_belief, _watch, _report = (
-    opener(Fixed, "belief"),
-    opener(Remembered, "watch", "command"),
-    opener(Now, "stamp", "robot"),
-)
+_belief, _watch = opener(Fixed, "belief"), opener(Remembered, "watch", "command")
+_report = opener(Now, "stamp", "robot")
 
 
 @compiled
@@ -101,10 +98,8 @@ def see(fixed: Blocks, remembered: Blocks, now: Blocks, beside: Beside) -> float
 
 
 _test = opener(Fixed, "kinds", "force", "test", "no_gain", "mechanism", "notes_path", "sight.sees")
-_memory, _sample = (
-    opener(Remembered, "window", "test", "mass"),
-    opener(Now, "robot", "kin", "ee", "seen", "force", "detection"),
-)
+_memory = opener(Remembered, "window", "test", "mass")
+_sample = opener(Now, "robot", "kin", "ee", "seen", "force", "detection")
 
 
 @compiled

@@ -115,12 +115,8 @@ def _report(n: int) -> Report:
 def remembered_init(controller: Any) -> Remembered:
     """Return what is remembered before the first step, but for what the arm reports and a detector knows already."""
     n, profile, period, kinds = controller.model.n, controller.profile, controller.limits.period, controller.kinds
-    sent, none, zero, cycles = (
-        int(profile.failure.state_timeout_s / period) + 2,
-        np.zeros(n),
-        np.zeros(1),
-        np.zeros(1, np.int64),
-    )
+    sent, none = int(profile.failure.state_timeout_s / period) + 2, np.zeros(n)
+    zero, cycles = np.zeros(1), np.zeros(1, np.int64)
     return Remembered(
         Watched(zero, zero, _report(n), cycles, np.zeros(sent), np.zeros((sent, n))),
         track_init(len(controller.skin)), window_init(profile.window.samples),
@@ -133,13 +129,8 @@ def remembered_init(controller: Any) -> Remembered:
 def now_init(controller: Any) -> Now:
     """Return what a step begins with."""
     n, links, units, places = controller.model.n, len(controller.model.links), len(controller.skin), _places(controller)
-    zero, count, three, of_units, rows = (
-        np.zeros(1),
-        np.zeros(1, np.int64),
-        np.zeros(3),
-        np.zeros(units),
-        np.zeros(places),
-    )
+    zero, count, three = np.zeros(1), np.zeros(1, np.int64), np.zeros(3)
+    of_units, rows = np.zeros(units), np.zeros(places)
     return Now(
         zero, _report(n), Readings(of_units, of_units, np.zeros(units, np.int64)),
         Kinematics(np.zeros((links, 3)), np.zeros((links, 3, 3)), np.zeros((n, 3)), np.zeros((n, 3))), three,
