@@ -53,7 +53,7 @@ class Kept:
     truth: Truth | None
     """None if there was no simulation."""
     snapshot: ControllerState | None
-    """The state the step began with, at some steps."""
+    """The state the step began with, at some steps; `Controller.with_places` tells where fields of its memory lie."""
     anew: bool = False
     """Whether that state does not follow from the step before."""
 
