@@ -15,7 +15,7 @@ $(STAMP): pyproject.toml fci/pyproject.toml lab/pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 		{ echo "Python 3.11 or newer is needed: say make PYTHON=/path/to/python3.11"; exit 1; }
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev,figures,live,parquet]' -e ./fci -e './lab[sweep]'
+	$(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check -c constraints.txt -e '.[dev,figures,live,parquet]' -e ./fci -e './lab[sweep]'
 	$(BIN)/pretouch warm-up
 	@touch $@
 

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from pretouch.control.qp import ApproachRows, Cost, solve
 from pretouch.controller import Controller
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.types import ControlStep, QpOutcome, QpSolution
-from tests.reference.problems import TOUCH, WEIGHT, facing_rows, grazed, problem, stiff_row
+from pretouch.types import ControlStep, QpOutcome
+from tests.control.programs import answered
+from tests.reference.problems import TOUCH, facing_rows, grazed, problem, stiff_row
 from tests.reference.qp import Problem, kkt_residual
 from tests.reference.qp import solve as solve_exactly
 from tests.reference.scenes import SCENES, Scene, World, looking_inwards, path_of, singular
@@ -132,12 +132,6 @@ def assert_all_same(scene: Scene, steps: list[tuple[ControlStep, Reference]]) ->
 
 
 # the quadratic program by itself
-
-
-def answered(p: Problem) -> QpSolution:
-    """The real solver's answer."""
-    rows = ApproachRows(p.G, p.h, p.weight is not None)
-    return solve(Cost(p.H, p.f), p.lower, p.upper, rows, p.weight or WEIGHT, (p.lower + p.upper) / 2)
 
 
 def assert_exact(p: Problem) -> bool:

@@ -11,14 +11,15 @@ import pytest
 
 import pretouch
 from pretouch import compiled
-from pretouch.robot.vectors import dot
+from pretouch.robot.vectors import below
 from pretouch.source_digest import source_digest
 
 PACKAGE = Path(pretouch.__file__).parent
 
 
 def test_what_is_kept_carries_the_digest_of_all_that_may_get_into_it():
-    assert dot.__qualname__ == f"dot-{source_digest(dot)[:12]}"
+    assert below(np.ones(3), 2.0)
+    assert list(Path(below.stats.cache_path).glob(f"vectors.below-{source_digest(below)[:12]}*"))
 
 
 def test_a_function_without_text_works_all_the_same():
@@ -81,7 +82,7 @@ def test_public_names_are_there():
 
 STEP = """
 import numpy as np, pretouch as pt
-from pretouch.compiled import kept_in
+from pretouch.cli.warm_up import kept_in
 arm = pt.RobotModel(pt.panda())
 control = pt.Controller(arm, pt.paper_skin(arm), pt.no_fixtures(), pt.Circle(), pt.profile("paper"))
 q, rest = arm.description.q_ready, np.zeros(7)
@@ -112,28 +113,43 @@ def test_an_installation_nobody_can_write_to_works(tmp_path: Path):
 
 MODULE = """
 from pretouch.callee import multiplied
-from pretouch.compiled import compiled
+from pretouch.compiled import {kind}
 
-@compiled
+@{kind}
 def body(x: float, y: float) -> float:
     return multiplied(x) + y
 """
-CALLEE = "from pretouch.compiled import compiled\n\n@compiled\ndef multiplied(x: float) -> float:\n    return 2.0 * x\n"
+CALLEE = "from pretouch.compiled import {kind}\n\n@{kind}\ndef multiplied(x: float) -> float:\n    return 2.0 * x\n"
 CALL = """
 from pretouch.module import body
 print(body(1.0, 1.0), sum(body.stats.cache_hits.values()))
 """
 
 
-def test_a_function_is_kept_between_processes_until_what_it_calls_changes(tmp_path: Path):
+@pytest.mark.parametrize(("kind", "called"), [("compiled", "compiled"), ("entry", "kernel")])
+def test_a_function_is_kept_between_processes_until_what_it_calls_changes(tmp_path: Path, kind: str, called: str):
     package = tmp_path / "pretouch"
     package.mkdir()
     (package / "__init__.py").touch()
     for needed in ("compiled.py", "errors.py", "source_digest.py"):
         shutil.copy(PACKAGE / needed, package)
-    (package / "module.py").write_text(MODULE)
-    (package / "callee.py").write_text(CALLEE)
+    (package / "module.py").write_text(MODULE.format(kind=kind))
+    (package / "callee.py").write_text(callee := CALLEE.format(kind=called))
     assert in_python(CALL, PYTHONPATH=str(tmp_path)).split() == ["3.0", "0"]
     assert in_python(CALL, PYTHONPATH=str(tmp_path)).split() == ["3.0", "1"]
-    (package / "callee.py").write_text(CALLEE.replace("2.0", "5.0"))
+    (package / "callee.py").write_text(callee.replace("2.0", "5.0"))
     assert in_python(CALL, PYTHONPATH=str(tmp_path)).split() == ["6.0", "0"]
+
+
+@compiled.kernel
+def half(x: float) -> float:
+    return x / 2
+
+
+@compiled.entry
+def quarter(x: float) -> float:
+    return half(half(x))
+
+
+def test_a_part_of_compiled_functions_may_be_called_from_python_too():
+    assert quarter(6.0) == half(3.0) == 1.5

@@ -7,11 +7,15 @@ import numpy as np
 from benchmarks.peers.geometry import Arm, Array
 from benchmarks.peers.problem import TERMS, Problem
 
+from pretouch.control.active_set import minimise_within
 from pretouch.control.approach import approach_rows
-from pretouch.control.joint_box import JointLimits, brake, joint_box
+from pretouch.control.joint_box import JointLimits, joint_box
 from pretouch.control.path import segment
-from pretouch.control.qp import solve, task_cost
+from pretouch.control.penalty import Minimum
+from pretouch.control.penalty import Problem as Program
+from pretouch.control.qp import cost_into, cost_params
 from pretouch.controller import Controller, ControllerState
+from pretouch.modes import SOLVED
 from pretouch.params import RestrictionParams, TaskParams
 from pretouch.perception.closest import closest_points
 from pretouch.perception.scene_filter import no_fixtures
@@ -83,13 +87,14 @@ class Rows:
         obstacles = closest_points(
             kin, model.body, kin.position[model.ee], self.unit, p.points[s], self.direction
         )  # fmt: skip
-        rows, _ = approach_rows(kin, model.moved_by, obstacles, self.restriction)
+        rows = approach_rows(kin, model.moved_by, obstacles, self.restriction)
         lower, upper = joint_box(q, qd, self.limits)
-        cost = task_cost(model.ee_jacobian(kin)[:3], p.velocity[s], q, model.q_mid, self.task)
-        solution = solve(cost, lower, upper, rows, self.restriction.slack_weight, brake(qd, lower, upper, self.limits))
-        if solution.outcome.value != "solved":
-            raise RuntimeError(solution.status)
-        return solution.qd
+        n, count = len(q), len(rows.h)
+        H, f, least = np.empty((n, n)), np.empty(n), Minimum(np.empty(n), np.empty(count), np.empty(n + count))
+        cost_into(model.ee_jacobian(kin)[:3], p.velocity[s], q, model.q_mid, cost_params(self.task), H, f)
+        if minimise_within(Program(H, f, lower, upper, rows.G, rows.h, 0.0), 500, least) != SOLVED:
+            raise RuntimeError(f"The program of snapshot {s} has no answer.")
+        return least.x
 
 
 class Step:

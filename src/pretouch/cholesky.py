@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 
-from pretouch.compiled import compiled
+from pretouch.compiled import kernel
 from pretouch.types import FloatArray
 
 
-@compiled
+@kernel
 def factor(S: FloatArray, L: FloatArray) -> bool:
     """Write the lower Cholesky factor of S (n, n) to L, and return whether S is positive definite."""
     n = len(S)
@@ -28,7 +28,7 @@ def factor(S: FloatArray, L: FloatArray) -> bool:
     return True
 
 
-@compiled
+@kernel
 def forward(L: FloatArray, b: FloatArray, y: FloatArray) -> float:
     """Write y = L^-1 b (n,) and return y . y."""
     square = 0.0
@@ -41,7 +41,7 @@ def forward(L: FloatArray, b: FloatArray, y: FloatArray) -> float:
     return square
 
 
-@compiled
+@kernel
 def backward(L: FloatArray, y: FloatArray, x: FloatArray) -> None:
     """Write x = L^-T y (n,)."""
     for i in range(len(y) - 1, -1, -1):
@@ -51,7 +51,7 @@ def backward(L: FloatArray, y: FloatArray, x: FloatArray) -> None:
         x[i] = rest / L[i, i]
 
 
-@compiled
+@kernel
 def largest_eigenvalue(V: FloatArray) -> float:
     """Largest eigenvalue of a symmetric matrix (3, 3): the root of its characteristic polynomial in closed form.
 

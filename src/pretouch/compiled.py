@@ -4,11 +4,12 @@ import logging
 import sys
 from collections.abc import Callable
 from contextlib import suppress
-from pathlib import Path
+from functools import cached_property, wraps
 from typing import Any, TypeVar, cast
 
+from llvmlite.binding import parse_assembly
 from numba import njit
-from numba.core import event
+from numba.core import event, types
 from numba.core.caching import FunctionCache
 from numba.core.runtime.nrt import rtsys
 
@@ -25,15 +26,58 @@ def compiled(function: Function) -> Function:
     kept beside the module, or in the user's cache where an installation is read-only. Where neither can be written it
     is compiled anew in each process: that takes seconds, and works.
     """
+    return cast(Function, _dispatcher(function))
+
+
+def entry(function: Function) -> Function:
+    """Compile a function that Python calls and compiled ones do not: what is kept of it loads in half of the time."""
+    return cast(Function, _dispatcher(function, "-entry"))
+
+
+def kernel(function: Function) -> Function:
+    """Make a function part of compiled ones: without what a call from Python needs, a third of the time to compile.
+
+    A call from Python, as a test makes, compiles it once more.
+    """
+    return cast(Function, wraps(function)(_Kernel(function)))
+
+
+class _Kernel:
+    """Compiles a function for compiled ones, and anew for Python, when they first call it."""
+
+    def __init__(self, function: Callable[..., object]) -> None:
+        self._function = function
+
+    def __call__(self, *arguments: object) -> object:
+        """Call it from Python."""
+        return self._alone(*arguments)
+
+    @cached_property
+    def _alone(self) -> Any:
+        return _dispatcher(self._function)
+
+    @cached_property
+    def _within(self) -> Any:
+        return _dispatcher(self._function, "-within", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+
+    @property
+    def _numba_type_(self) -> types.Dispatcher:
+        """What compiled code takes the function for."""
+        return types.Dispatcher(self._within)
+
+
+def _dispatcher(function: Callable[..., object], kind: str = "", **options: bool) -> Any:
+    """Return what compiles a function when it is called, or takes what was kept of that."""
+    kept: Any = cast(Any, njit)(error_model="numpy", **options)(function)
     # Numba looks at the function's own file only to tell whether what it kept is out of date. What got into a function
     # from another file, a constant or a call, it would go on using as it was: so the name it keeps it under tells all.
+    name = function.__qualname__
     with suppress(RuntimeError, SourceError):  # nowhere to keep it, or no text to tell whether it is out of date
-        function.__qualname__ += f"-{source_digest(function)[:12]}"
-        cache = _Cache(function)  # type: ignore[no-untyped-call]
-        kept: Any = njit(error_model="numpy")(function)
-        kept._cache = cache
-        return cast(Function, kept)
-    return cast(Function, njit(error_model="numpy")(function))
+        function.__qualname__ = f"{name}-{source_digest(function)[:12]}{kind}"
+        kept._cache = _Cache(function)  # type: ignore[no-untyped-call]
+        kept._cache.linked = kind != "-entry"
+    function.__qualname__ = name
+    return kept
 
 
 def inlined(function: Function) -> Function:
@@ -48,6 +92,9 @@ def inlined(function: Function) -> Function:
 class _Cache(FunctionCache):
     """Numba's cache, with less to do where all is kept."""
 
+    linked = True
+    """Whether compiled functions call it; else only the names of what it defines are kept beside the machine code."""
+
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Load machine code: what Numba's own registers before, all that can be compiled, takes a tenth of a second."""
         rtsys.initialize(target_context)
@@ -56,6 +103,10 @@ class _Cache(FunctionCache):
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Let a full disk be no reason to stop: Numba raises where it cannot write what it just compiled."""
+        if not self.linked:
+            module = data.library._get_module_for_linking()
+            names = [part.name for part in (*module.functions, *module.global_variables) if not part.is_declaration]
+            data.library._shared_module = parse_assembly("".join(f'@"{name}" = global i8 0\n' for name in names))
         with suppress(OSError):
             super().save_overload(sig, data)  # type: ignore[no-untyped-call]
 
@@ -75,26 +126,16 @@ class FirstStart(event.Listener):
         """Say it, where nobody has."""
         if not self.said and is_large(event):
             self.said = True
-            level = logging.WARNING if sys.stderr and sys.stderr.isatty() else logging.INFO
-            logging.getLogger("pretouch").log(
-                level, "Compiling for this processor, once after an installation: up to two minutes ..."
-            )
+            self.say("Compiling for this processor, once after an installation: about a minute ...")
 
     def on_end(self, event: event.Event) -> None:
         """Nothing: others may follow."""
 
+    def say(self, sentence: str) -> None:
+        """Log a sentence; a command puts something else in its place."""
+        level = logging.WARNING if sys.stderr and sys.stderr.isatty() else logging.INFO
+        logging.getLogger("pretouch").log(level, sentence)
+
 
 FIRST_START = FirstStart()
 event.register("numba:compile", FIRST_START)
-
-
-@compiled
-def _nothing() -> None:
-    """Compile to almost nothing."""
-
-
-def kept_in() -> str:
-    """Return the folder that compiled functions are kept in, or '' where there is none."""
-    _nothing()
-    stats = getattr(_nothing, "stats", None)
-    return str(Path(stats.cache_path).parent) if stats and stats.cache_path else ""

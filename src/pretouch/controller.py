@@ -20,8 +20,8 @@ from pretouch.control.joint_box import joint_limits
 from pretouch.control.path import Path, nearest_phase
 from pretouch.decision import Decision
 from pretouch.errors import RobotStateError, SkinError
-from pretouch.groups import Kinematics, Obstacles
-from pretouch.line import CHECK, MOVE, Beside, line, line_within
+from pretouch.groups import CapsuleArrays, Kinematics, Obstacles
+from pretouch.line import CHECK, MOVE, line, line_within
 from pretouch.line_records import PYTHON, SEQUENTIAL
 from pretouch.line_setup import fixed_of, kinds_of, now_init, remembered_init
 from pretouch.modes import CLEAR, SOLVED, ModeState, mode_init
@@ -106,7 +106,7 @@ class Controller:
         """A restriction in plain Python; None of one that is compiled."""
         self.touching = profile.detect.reads_touch and len(skin.touching) > 0
         self.outside = outside_setup(model, skin, fixtures, profile.perception)
-        self.beside: Beside = (fixtures.capsules.a, fixtures.capsules.b, fixtures.capsules.radius)
+        self.beside = fixtures.capsules.arrays
         self.fixed, self._begin = Flat.of(fixed_of(self)), Flat.of(remembered_init(self))
         self.blank = now = Flat.of(now_init(self))
         """What a step begins with: not written to."""
@@ -181,7 +181,7 @@ class Controller:
         step, after = Decision(self, state, memory).taken(inputs)
         return step, ControllerState(memory, **after)
 
-    def take(self, memory: Flat, now: Flat, beside: Beside, first: int, last: int) -> bool:
+    def take(self, memory: Flat, now: Flat, beside: CapsuleArrays, first: int, last: int) -> bool:
         """Take stages of a step; see `line`."""
         return line(self.fixed.blocks, memory.blocks, now.blocks, beside, first, last)
 

@@ -5,11 +5,12 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import compiled
+from pretouch.compiled import kernel
 from pretouch.modes import Event
 from pretouch.params import FailureParams
 from pretouch.records import Cell, Flat, IntCell
-from pretouch.sound import FASTEST, LARGEST, LATEST, STRONGEST, below, sound_robot, time_of
+from pretouch.robot.vectors import below
+from pretouch.sound import FASTEST, LARGEST, LATEST, STRONGEST, sound_robot, time_of
 from pretouch.types import FloatArray, Inputs, RobotState
 from pretouch.values import value
 
@@ -183,7 +184,7 @@ def put_robot(record: Flat, path: str, robot: RobotState) -> None:
         record.put(f"{path}.{name}", np.nan if number is None else number)
 
 
-@compiled
+@kernel
 def believable(now: float, robot: Report, watch: Watched, command: FloatArray, p: Belief) -> bool:
     """Whether `examine` finds no fault and changes nothing but torques to NaN; then do what it does to the memory.
 

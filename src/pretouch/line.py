@@ -10,7 +10,7 @@ it needs of them.
 import numpy as np
 
 from pretouch.cholesky import factor
-from pretouch.compiled import compiled
+from pretouch.compiled import entry, inlined, kernel
 from pretouch.contact.clamp import note_place
 from pretouch.contact.model_update import Situation
 from pretouch.contact.moving_thresholds import compare
@@ -36,12 +36,9 @@ from pretouch.types import FloatArray
 CHECK, SEE, DETECT, ASK, MOVE = range(5)
 """Stages of a step."""
 
-Beside = tuple[FloatArray, FloatArray, FloatArray]
-"""Both ends (C, 3) [m] and radii (C,) [m] of capsules that stand or move beside the arm, base frame."""
 
-
-@compiled
-def line(fixed: Blocks, remembered: Blocks, now: Blocks, beside: Beside, first: int, last: int) -> bool:
+@entry
+def line(fixed: Blocks, remembered: Blocks, now: Blocks, beside: CapsuleArrays, first: int, last: int) -> bool:
     """Take the stages from the first to the last; from `CHECK` on, return False where something is to be decided."""
     alone = first == CHECK
     if alone and not believe(fixed, remembered, now):
@@ -61,7 +58,7 @@ _belief, _watch = opener(Fixed, "belief"), opener(Remembered, "watch", "command"
 _report = opener(Now, "stamp", "robot")
 
 
-@compiled
+@inlined
 def believe(fixed: Blocks, remembered: Blocks, now: Blocks) -> bool:
     """Say whether the arm's report is as usual."""
     (belief,), (watch, command), (stamp, robot) = _belief(fixed), _watch(remembered), _report(now)
@@ -72,8 +69,8 @@ _sight, _tracks = opener(Fixed, "hinges", "mechanism.arm", "sight"), opener(Reme
 _scene = opener(Now, "stamp", "robot", "readings", "kin", "ee", "seen")
 
 
-@compiled
-def see(fixed: Blocks, remembered: Blocks, now: Blocks, beside: Beside) -> float:
+@inlined
+def see(fixed: Blocks, remembered: Blocks, now: Blocks, beside: CapsuleArrays) -> float:
     """Place the arm, and find the obstacles (eq. 1); return the factor on the speed for units that fall silent."""
     (hinges, arm, sight), (tracks,), (stamp, robot, readings, kin, ee, seen) = (
         _sight(fixed), _tracks(remembered), _scene(now),
@@ -82,10 +79,9 @@ def see(fixed: Blocks, remembered: Blocks, now: Blocks, beside: Beside) -> float
     ee[:] = kin.position[arm.ee]
     seen.found[0], seen.nearest[0], seen.silence[0], seen.heard[0] = 0, np.inf, 0.0, 1.0
     if sight.sees:
-        a, b, radius = beside
         found, nearest, oldest = perceive(
             sight, tracks, readings, seen, (kin, Chain(kin.anchor, kin.axis, arm.moved_by, robot.qd), ee),
-            (stamp[0], robot.stamp[0]), CapsuleArrays(np.zeros(len(radius), np.int64), a, b, radius),
+            (stamp[0], robot.stamp[0]), beside,
         )  # fmt: skip
         silence = stamp[0] - oldest
         seen.found[0], seen.nearest[0], seen.silence[0] = found, nearest, silence
@@ -102,7 +98,7 @@ _memory = opener(Remembered, "window", "test", "mass")
 _sample = opener(Now, "robot", "kin", "ee", "seen", "force", "detection")
 
 
-@compiled
+@inlined
 def detect(fixed: Blocks, remembered: Blocks, now: Blocks) -> bool:
     """Take the force into its window (eq. 8), and tell a contact from free motion (eqs. 9-11, or by the torques).
 
@@ -139,7 +135,7 @@ _task, _pace = opener(Fixed, "path"), opener(Remembered, "pace", "rotation_goal"
 _way = opener(Now, "ee", "seen.nearest", "seen.heard", "path", "request")
 
 
-@compiled
+@inlined
 def ask(fixed: Blocks, remembered: Blocks, now: Blocks, alone: bool) -> None:
     """Follow the path, and slow down near obstacles (eqs. 3-4); ask for just that if nothing else is asked."""
     (p,), (pace, rotation_goal), (ee, nearest, heard, path, request) = _task(fixed), _pace(remembered), _way(now)
@@ -161,7 +157,7 @@ _moving = opener(Remembered, "null_velocity", "command")
 _motion = opener(Now, "robot", "kin", "ee", "seen.near", "seen.all", "request", "answer")
 
 
-@compiled
+@inlined
 def move(fixed: Blocks, remembered: Blocks, now: Blocks) -> None:
     """Write the rows of what restricts the body (eqs. 5-7), and the joint velocities within them (eq. 2)."""
     (approach, mechanism, p, motion), (slots,), (null_velocity, command) = (
@@ -199,7 +195,7 @@ def move(fixed: Blocks, remembered: Blocks, now: Blocks) -> None:
 _going, _gone = opener(Remembered, "pace"), opener(Now, "path", "request", "answer")
 
 
-@compiled
+@kernel
 def go_on(fixed: Blocks, remembered: Blocks, now: Blocks) -> None:
     """Go on along the path with the motion, or stay at its phase and start gently from it later."""
     (p,), (pace,), (path, request, answer) = _task(fixed), _going(remembered), _gone(now)
@@ -215,7 +211,7 @@ def go_on(fixed: Blocks, remembered: Blocks, now: Blocks) -> None:
 _limits = opener(Fixed, "motion")
 
 
-@compiled
+@entry
 def line_within(
     fixed: Blocks, remembered: Blocks, now: Blocks, rows: GivenRows, weight: float,
     speeds: tuple[FloatArray, FloatArray],

@@ -50,16 +50,8 @@ class Skin(Protocol):
         ...
 
 
-class TouchSkin(Skin, Protocol):
-    """Sensor units of which some have a touch sensor. A `Skin` without the method has none."""
-
-    def touch(self) -> TouchReadings | None:
-        """Return the newest touch reading of each unit; None while none is known."""
-        ...
-
-
 def touch_of(skin: object) -> TouchReadings | None:
-    """Return what units say of being touched, None of a skin that has no touch sensors."""
+    """Return the newest touch reading of each unit by the method `touch`; None while none is known."""
     touch = getattr(skin, "touch", None)
     return None if touch is None else touch()
 

@@ -6,12 +6,14 @@ for all arms, skins and profiles. Compiled code opens the blocks as the named tu
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import cache
+from functools import cache, partial, reduce
 from typing import Annotated, Any, NamedTuple, get_args, get_origin, get_type_hints
 
 import numpy as np
+from numba.core import cgutils, types
+from numba.extending import lower_builtin, type_callable
+from numba.np.arrayobj import populate_array
 
-from pretouch.compiled import inlined
 from pretouch.values import BoolArray, FloatArray, IntArray
 
 Cell = Annotated[FloatArray, 1]
@@ -25,7 +27,7 @@ _KINDS = {FloatArray: 0, IntArray: 1, BoolArray: 2, float: 0, int: 1, bool: 2}
 
 
 Blocks = tuple[FloatArray, IntArray, BoolArray, IntArray]
-"""The numbers of a record, of float64, int64 and bool, and where each field starts, ends, and its shape."""
+"""The numbers of a record, of float64, int64 and bool, and where each field starts, and its shape."""
 
 
 class Place(NamedTuple):
@@ -83,7 +85,7 @@ class Flat:
             start = sizes[kind]
             sizes[kind] += int(np.prod(shape, dtype=int))
             places[path] = Place(kind, slice(start, sizes[kind]), shape, dimensions in ((), (1,)))
-            table += [start, sizes[kind], *shape] if shape else [start]
+            table += [start, *shape]
         blocks: Any = (*map(np.empty, sizes, BLOCK_TYPES), np.array(table, np.int64))
         flat = cls(blocks, places)
         for path in places:
@@ -130,33 +132,85 @@ class Flat:
         return self.blocks[kind][at].reshape(shape)
 
 
+class _Part(NamedTuple):
+    """A record with its fields, or a field, and where the table says where it lies."""
+
+    kind: type
+    fields: "Mapping[str, _Part]"
+    block: int = 0
+    entry: int = 0
+    dimensions: int = 0
+
+
+def _tree(kind: Any, entries: list[int]) -> _Part:
+    """Return a record or field with all in it; `entries` holds how many of the table's numbers are of those before."""
+    if hasattr(kind, "_fields"):
+        return _Part(kind, {name: _tree(hint, entries) for name, hint in _hints(kind).items()})
+    array, *dimensions = get_args(kind) if get_origin(kind) is Annotated else (kind,)
+    entry = entries[0]
+    entries[0] += 1 + len(dimensions)
+    return _Part(array, {}, _KINDS[array], entry, len(dimensions))
+
+
 def opener(record: type, *paths: str) -> Callable[[Blocks], Any]:
-    """Return compiled code that makes views of fields of a record, or of records in it, from its blocks; it is inlined.
+    """Return what makes views of fields of a record, or of records in it, from its blocks, in Python and compiled.
 
-    It is a tuple of them. What is not opened costs nothing: open no more than a function needs.
+    It is a tuple of them. What is not opened costs nothing: open no more than a function needs. A compiled view does
+    not keep its block: it must not outlive the call that the block was given to.
     """
-    scope, index, entries = dict[str, Any](__name__=record.__module__), dict[str, int](), 0
-    for path, _, dimensions in _leaves(record):
-        index[path], entries = entries, entries + (2 + len(dimensions) if dimensions else 1)
+    whole = _tree(record, [0])
+    parts = [reduce(lambda part, name: part.fields[name], path.split("."), whole) for path in paths]
 
-    def made(hint: Any, path: str) -> str:
-        if hasattr(hint, "_fields"):
-            scope[f"record_{len(scope)}"], name = hint, f"record_{len(scope)}"
-            return f"{name}({', '.join(made(inner, f'{path}.{field}') for field, inner in _hints(hint).items())})"
-        kind, *dimensions = get_args(hint) if get_origin(hint) is Annotated else (hint,)
-        block, at = "fib"[_KINDS[kind]], index[path]
-        if not dimensions:
-            return f"{block}[at[{at}]]"
-        shape = ", ".join(f"at[{at + 2 + d}]" for d in range(len(dimensions)))
-        return f"{block}[at[{at}] : at[{at + 1}]]" + (f".reshape(({shape}))" if len(dimensions) > 1 else "")
+    def open_parts(blocks: Blocks) -> Any:
+        return tuple(_view(part, blocks) for part in parts)
 
-    def hint_of(path: str) -> Any:
-        hint: Any = record
-        for name in path.split("."):
-            hint = _hints(hint)[name]
-        return hint
+    def type_parts(blocks: Any) -> Any:
+        return types.BaseTuple.from_types([_type_of(part, blocks) for part in parts])
 
-    views = "".join(made(hint_of(path), path) + ", " for path in paths)
-    text = f"def opened(blocks):\n    f, i, b, at = blocks\n    return {views}\n"
-    exec(compile(text, f"<views of {record.__name__}>", "exec"), scope)  # noqa: S102  of names of fields
-    return inlined(scope["opened"])
+    type_callable(open_parts)(lambda context: type_parts)
+    lower_builtin(open_parts, types.BaseTuple)(partial(_write_views, parts))
+    return open_parts
+
+
+def _view(part: _Part, blocks: Blocks) -> Any:
+    if part.fields:
+        return part.kind(*(_view(field, blocks) for field in part.fields.values()))
+    start, *shape = blocks[3][part.entry : part.entry + 1 + part.dimensions]
+    row = blocks[part.block][start : start + int(np.prod(shape, dtype=int))]
+    return row.reshape(shape) if shape else row[0]
+
+
+def _type_of(part: _Part, blocks: Any) -> Any:
+    """Return Numba's type of a field or a record."""
+    if part.fields:
+        return types.BaseTuple.from_types([_type_of(field, blocks) for field in part.fields.values()], part.kind)
+    block = blocks[part.block]
+    return block.copy(ndim=part.dimensions) if part.dimensions else block.dtype
+
+
+def _write_views(parts: Sequence[_Part], context: Any, builder: Any, signature: Any, given: Any) -> Any:
+    """Write the machine's code that makes views: each needs its start and its sizes, and counts no references."""
+    blocks = [
+        context.make_array(kind)(context, builder, value)
+        for kind, value in zip(signature.args[0], cgutils.unpack_tuple(builder, given[0]), strict=True)
+    ]
+
+    def at(entry: int) -> Any:
+        return builder.load(cgutils.gep_inbounds(builder, blocks[3].data, entry))
+
+    def write(part: _Part, kind: Any) -> Any:
+        if part.fields:
+            fields = map(write, part.fields.values(), kind.types)
+            return context.make_tuple(builder, kind, list(fields))
+        data = cgutils.gep_inbounds(builder, blocks[part.block].data, at(part.entry))
+        if not part.dimensions:
+            return context.unpack_value(builder, kind, data)
+        view, size = context.make_array(kind)(context, builder), blocks[part.block].itemsize
+        shape = [at(part.entry + 1 + d) for d in range(part.dimensions)]
+        strides = [size]
+        for length in shape[:0:-1]:
+            strides.insert(0, builder.mul(length, strides[0]))
+        populate_array(view, data, shape, strides, size, None)
+        return view._getvalue()
+
+    return context.make_tuple(builder, signature.return_type, list(map(write, parts, signature.return_type.types)))

@@ -4,6 +4,7 @@ import numpy as np
 
 from pretouch.compiled import compiled
 from pretouch.perception.chosen_points import FARTHEST, LARGEST_SIGMA, usable
+from pretouch.robot.vectors import below
 from pretouch.types import WHOLE, FloatArray, Payload, RangeReadings, RangeStatus, RobotState, SeenPoints, TouchReadings
 from pretouch.values import real, real_number
 
@@ -181,15 +182,6 @@ def sound_points(points: SeenPoints | None) -> tuple[SeenPoints | None, str]:
             f" outside 0 to {LARGEST_SIGMA:g} m"
         )
     return SeenPoints(heard, stamp, point, sigma), ""
-
-
-@compiled
-def below(numbers: FloatArray, bound: float) -> bool:
-    """Whether all numbers (k,) are smaller than a bound in size; one that is NaN is not."""
-    for number in numbers:  # noqa: SIM110  compiled code knows no generators
-        if not abs(number) < bound:
-            return False
-    return True
 
 
 def sound_payload(payload: Payload | None, most_kg: float) -> tuple[Payload | None, str]:

@@ -158,4 +158,6 @@ def test_nearness_is_bounded_and_going_away_never_lowers_it_below_standing(dista
 
 
 def test_the_nearest_objects_count():
-    assert nearest_of(np.array([0.3, 0.1, 0.2]), 2).tolist() == [1, 2]
+    nearest = [1, 3, 0, 4, 2]
+    for most in range(7):
+        assert nearest_of(np.array([0.3, 0.1, 0.5, 0.2, 0.4]), most).tolist() == nearest[:most]

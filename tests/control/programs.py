@@ -1,28 +1,37 @@
-"""Quadratic programs of the reference given to the product's solver, and its answer where there is none."""
+"""Quadratic programs of the reference given to the product's solvers."""
 
 import numpy as np
 from tests.reference.qp import Problem
 
-from pretouch.control.qp import ApproachRows, Cost, solve
-from pretouch.types import QpOutcome, QpSolution
-
-STOP = 0.0123
-"""Braking command of each joint."""
+from pretouch.control.active_set import minimise_within
+from pretouch.control.penalty import Minimum, minimise
+from pretouch.control.penalty import Problem as Program
+from pretouch.control.qp import cost_into, cost_params
+from pretouch.modes import outcome_of
+from pretouch.params import TaskParams
+from pretouch.types import FloatArray, QpOutcome, QpSolution
 
 
 def answered(p: Problem, budget: int = 500) -> QpSolution:
-    """The answer of the product's solver."""
-    rows = ApproachRows(p.G, p.h, p.weight is not None)
-    return solve(Cost(p.H, p.f), p.lower, p.upper, rows, p.weight or 1.0, np.full(len(p.f), STOP), budget)
+    """The answer of the product's solver: of soft rows, which have a price, or of hard ones."""
+    n, count, weight = len(p.f), len(p.h), p.weight or 0.0
+    least = Minimum(np.zeros(n), np.zeros(count), np.zeros(n + count))
+    solver = minimise if weight else minimise_within
+    ending = solver(Program(p.H, p.f, p.lower, p.upper, p.G, p.h, weight), budget, least)
+    return QpSolution(*least, *outcome_of(False, ending, weight > 0.0 and bool(least.slack.max(initial=0.0) > 0.0)))
 
 
-def assert_braking(answer: QpSolution, p: Problem, outcome: QpOutcome) -> None:
-    """There is no answer for this reason, and the command is that of braking."""
+def assert_none(answer: QpSolution, outcome: QpOutcome) -> None:
+    """There is no answer, for this reason; weights of what contradicts are numbers all the same."""
     assert answer.outcome is outcome
     assert answer.status
-    np.testing.assert_array_equal(answer.qd, STOP)
-    assert answer.slack.shape == p.h.shape
-    if outcome is QpOutcome.INFEASIBLE:
-        np.testing.assert_allclose(answer.slack, np.maximum(p.G @ answer.qd - p.h, 0.0), atol=1e-12)
-    assert answer.multipliers.shape == (len(p.f) + len(p.h),)
     assert np.all(np.isfinite(answer.multipliers))
+
+
+def task_cost(
+    J: FloatArray, x_d: FloatArray, q: FloatArray, q_mid: FloatArray, params: TaskParams
+) -> tuple[FloatArray, FloatArray]:
+    """H (n, n) and f (n,) of the cost of eq. 2."""
+    H, f = np.empty((len(q), len(q))), np.empty(len(q))
+    cost_into(J, x_d, q, q_mid, cost_params(params), H, f)
+    return H, f

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.control.programs import task_cost
 
 from pretouch.control.null_space import NullSpaceLimits, away, cost_with_null_space, projector
-from pretouch.control.qp import cost_params, task_cost
+from pretouch.control.qp import cost_params
 from pretouch.groups import Obstacles, no_obstacles
 from pretouch.params import TaskParams
 from pretouch.robot.model import RobotModel
@@ -64,9 +65,9 @@ def test_a_motion_in_the_null_space_leaves_the_end_effectors_velocity_unchanged(
 def test_the_papers_term_drags_what_the_projected_one_does_not(panda_model: RobotModel):
     q = panda_model.description.q_ready
     J, x_d = panda_model.ee_jacobian(panda_model.kinematics(q)), np.array([0.0, 0.3, 0.0, 0.0, 0.0, 0.0])
-    paper = task_cost(J, x_d, q, panda_model.q_mid, TASK)
+    paper_H, paper_f = task_cost(J, x_d, q, panda_model.q_mid, TASK)
     H, f = cost(J, x_d, q, panda_model.q_mid)
-    dragged = np.linalg.norm(J @ np.linalg.solve(paper.H, -paper.f) - x_d)
+    dragged = np.linalg.norm(J @ np.linalg.solve(paper_H, -paper_f) - x_d)
     assert dragged > 1e-3
     assert np.linalg.norm(J @ np.linalg.solve(H, -f) - x_d) < 0.01 * dragged
 
@@ -82,10 +83,10 @@ def test_the_hessian_is_positive_definite_where_the_arm_is_singular(panda_model:
 def test_without_the_switch_the_mid_joint_term_is_the_papers(panda_model: RobotModel):
     q = panda_model.description.q_ready + 0.1
     J, x_d = panda_model.ee_jacobian(panda_model.kinematics(q)), np.array([0.0, 0.3, 0.0, 0.0, 0.0, 0.0])
-    paper = task_cost(J, x_d, q, panda_model.q_mid, TASK)
+    paper_H, paper_f = task_cost(J, x_d, q, panda_model.q_mid, TASK)
     H, f = cost(J, x_d, q, panda_model.q_mid, projected=False)
-    np.testing.assert_allclose(H, paper.H + 0.001 * projector(J), atol=1e-12)
-    np.testing.assert_allclose(f, paper.f, atol=1e-12)
+    np.testing.assert_allclose(H, paper_H + 0.001 * projector(J), atol=1e-12)
+    np.testing.assert_allclose(f, paper_f, atol=1e-12)
 
 
 def at(distance: float) -> Obstacles:

@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.control.programs import answered
+from tests.control.programs import answered, task_cost
 from tests.reference.qp import Problem, kkt_residual
 from tests.reference.qp import solve as solve_exactly
 
 from pretouch.control.approach import approach_rows
 from pretouch.control.joint_box import JointLimits, joint_box
-from pretouch.control.qp import damping, manipulability, mid_joint_velocity, task_cost
+from pretouch.control.qp import damping, manipulability, mid_joint_velocity
 from pretouch.params import RestrictionParams, TaskParams
 from pretouch.perception.closest import closest_points
 from pretouch.robot.model import RobotModel
@@ -32,12 +32,12 @@ def panda_problem(model: RobotModel, seed: int, soft: bool, count: int | None = 
     points = kin.position[rng.integers(2, model.ee + 1, k)] + rng.uniform(-0.6, 0.6, (k, 3))
     obstacles = closest_points(kin, model.body, kin.position[model.ee], np.arange(k), points, np.ones((k, 3)))
     restriction = RestrictionParams(rows="slack" if soft else "hard")
-    rows, _ = approach_rows(kin, model.moved_by, obstacles, restriction)
+    rows = approach_rows(kin, model.moved_by, obstacles, restriction)
     # moving fast, most scenes leave hard rows no way out: give them more room
     h = rows.h if soft else rows.h + rng.uniform(0, 0.5)
     velocity = rng.uniform(-0.5, 0.5, len(jacobian))
-    cost = task_cost(jacobian, velocity, q, model.q_mid, TASK)
-    return Problem(cost.H, cost.f, lower, upper, rows.G, h, WEIGHT if soft else None)
+    H, f = task_cost(jacobian, velocity, q, model.q_mid, TASK)
+    return Problem(H, f, lower, upper, rows.G, h, WEIGHT if soft else None)
 
 
 # eq. 2
@@ -61,9 +61,9 @@ def test_manipulability_by_numbers():
 def test_cost_by_numbers():
     # J = (1, 2), x_d = 3; w = sqrt(5) is far from singular, so mu = 0; k = 0.1; qd_mid = (0.4 - 0.4, 1.4 - 0.4) / 5
     params = TaskParams(mid_joint_gain=0.1)
-    cost = task_cost(np.array([[1.0, 2.0]]), np.array([3.0]), np.full(2, 0.4), np.array([0.4, 1.4]), params)
-    np.testing.assert_allclose(cost.H, [[1.1, 2.0], [2.0, 4.1]])
-    np.testing.assert_allclose(cost.f, [-3.0, -6.0 - 0.1 * 0.2])
+    H, f = task_cost(np.array([[1.0, 2.0]]), np.array([3.0]), np.full(2, 0.4), np.array([0.4, 1.4]), params)
+    np.testing.assert_allclose(H, [[1.1, 2.0], [2.0, 4.1]])
+    np.testing.assert_allclose(f, [-3.0, -6.0 - 0.1 * 0.2])
 
 
 @pytest.mark.parametrize("scale", [1.0, 1e-2])
@@ -80,9 +80,9 @@ def test_gradient_is_that_of_eq_2_written_out(seed: int, scale: float):
         error, to_middle = x_d - J @ qd, (q_mid - q) / 5.0 - qd
         return 0.5 * error @ error + mu / 2 * qd @ qd + 0.001 / 2 * to_middle @ to_middle
 
-    cost = task_cost(J, x_d, q, q_mid, TASK)
+    H, f = task_cost(J, x_d, q, q_mid, TASK)
     differences = [(g(at + 1e-4 * e) - g(at - 1e-4 * e)) / 2e-4 for e in np.eye(7)]
-    np.testing.assert_allclose(cost.H @ at + cost.f, differences, rtol=1e-8, atol=1e-8)
+    np.testing.assert_allclose(H @ at + f, differences, rtol=1e-8, atol=1e-8)
 
 
 # answers

@@ -7,8 +7,8 @@ import numpy as np
 from pretouch.control.path import Circle
 from pretouch.controller import Controller
 from pretouch.faults import put_robot
-from pretouch.groups import Obstacles
-from pretouch.line import SEE, Beside
+from pretouch.groups import CapsuleArrays, Obstacles
+from pretouch.line import SEE
 from pretouch.params import PerceptionParams
 from pretouch.perception.obstacles import TrackState
 from pretouch.perception.scene_filter import Fixtures, no_fixtures
@@ -50,7 +50,7 @@ class Watcher:
         """State of the arm."""
         return RobotState(now, self.q, self.qd, self.q, self.qd, np.zeros(self.model.n), None)
 
-    def take(self, readings: RangeReadings, now: float, beside: Beside | None = None) -> Obstacles:
+    def take(self, readings: RangeReadings, now: float, beside: CapsuleArrays | None = None) -> Obstacles:
         """Take readings in at an instant [s]."""
         self.now = self.controller.blank.copy()
         self.now.put("stamp", now)

@@ -171,7 +171,7 @@ class WarmUp:
         """Compile, and print where it is cached."""
         from pretouch.cli.warm_up import compile_step
 
-        print("Compiling what all profiles need: two to four minutes the first time ...", flush=True)
+        print("Compiling what all profiles need: about a minute the first time ...", flush=True)
         kept = compile_step()
         nowhere = "Compiled, but not cached: HOME is not writable."
         print(f"Compiled, and cached in {kept}." if kept else nowhere)

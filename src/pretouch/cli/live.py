@@ -50,7 +50,7 @@ def live(command: "Live") -> None:
         settings = replace(settings, plant=world.plant, ranging=world.ranging)
         if not command.keys:
             believed, _ = misplaced(skin, model, Misplacement(world.position_mm, world.orientation_deg), command.seed)
-    prepare(profile, lambda: Room(settings, live_path(settings), model, skin).tick(), first_contact=True)
+    prepare(profile, lambda: Room(settings, live_path(settings), model, skin).tick())
     with _units(command, skin) as real:
         simulation = LiveSimulation(settings, model, believed, real, skin)
         for sentence in assumptions(model, settings.placement):

@@ -1,20 +1,26 @@
 """What `pretouch warm-up` does, and other commands at their first start: compile a control step, and keep it."""
 
+import gc
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
 from multiprocessing import get_context
 from multiprocessing.context import SpawnProcess
+from pathlib import Path
 
 import numpy as np
-from numba.core import event
 from rich.console import Console
 
-from pretouch.compiled import FIRST_START, is_large, kept_in
+from pretouch.compiled import FIRST_START
+from pretouch.contact.detector import Sample
+from pretouch.contact.window import Window
 from pretouch.control.path import Circle
 from pretouch.controller import Controller
-from pretouch.line import move
+from pretouch.groups import Obstacles
+from pretouch.line import line, move, see
 from pretouch.perception.scene_filter import no_fixtures
-from pretouch.profiles import Profile, at_rate, profile
+from pretouch.profiles import Profile, profile
 from pretouch.realtime import warm_up
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
@@ -22,88 +28,84 @@ from pretouch.sensing.skin import paper_skin
 from pretouch.signals import OF_TERMINAL, kept_from_children
 from pretouch.types import RobotState
 
-_PROFILES = ("pretouch", "paper", "paper:approach=none")
-_RATE_HZ = 1000.0
+_PUSH_NM = 30.0
+"""At each joint: a contact for any detector that goes by torques."""
 
 
 def compile_step() -> str:
-    """Compile a control step of each kind, with points from outside too, and say where that is kept; '' for nowhere."""
-    for name in _PROFILES:
-        wanted = profile(name)
-        prepare(wanted, console=Console(quiet=True))
-        warm_up(*_at_rest(at_rate(wanted, _RATE_HZ)), points=True)
+    """Compile a control step, and say where that is kept; '' for nowhere. All profiles have the same."""
+    prepare(profile("pretouch"), console=Console(quiet=True))
     return kept_in()
 
 
-def prepare(
-    wanted: Profile, meanwhile: Callable[[], object] = lambda: None, first_contact: bool = False,
-    console: Console | None = None,
-) -> None:  # fmt: skip
+def kept_in() -> str:
+    """Return the folder that compiled functions are kept in, or '' where there is none."""
+    stats = getattr(line, "stats", None)
+    return str(Path(stats.cache_path).parent) if stats and stats.cache_path else ""
+
+
+def prepare(wanted: Profile, meanwhile: Callable[[], object] = lambda: None, console: Console | None = None) -> None:
     """Compile a step of a profile where that is not kept yet, in two processes, and say so on the standard error.
 
-    Motion takes half of the time and is compiled by another process. What it does not come to, or what cannot be kept,
-    is compiled where it is first needed.
+    What the other process does not come to, or what cannot be kept, is compiled where it is first needed.
 
     Args:
         wanted: the profile.
         meanwhile: what else the command compiles at its start.
-        first_contact: whether another process goes on, beyond the return, with what a first contact comes to.
         console: where it is said, in place of the standard error.
     """
-    start = _FirstStart(wanted, console or Console(stderr=True, highlight=False))
-    with event.install_listener("numba:compile", start):
-        warm_up(*_at_rest(wanted))
-        meanwhile()
-    if start.begun and start.other and first_contact:
-        _begun(compile_contact, wanted)
-    start.wait()
+    output, since, others = console or Console(stderr=True, highlight=False), list[float](), list[SpawnProcess]()
+
+    def begin(sentence: str) -> None:
+        output.print(sentence)
+        since.append(output.get_time())
+        if len(os.sched_getaffinity(0)) > 1 and kept_in():
+            others.append(get_context("spawn").Process(target=compile_stages, daemon=True))  # ends with this one
+            with kept_from_children(OF_TERMINAL):
+                others[0].start()
+
+    FIRST_START.say = begin  # type: ignore[method-assign]
+    try:
+        with _uncollected():
+            controller, robot = _at_rest(wanted)
+            _detect(controller, robot)
+            for other in others:  # its part is then taken from where it is kept
+                other.join()
+            warm_up(controller, robot, points=True)
+            meanwhile()
+    finally:
+        del FIRST_START.say
+    if since:
+        output.print(f"Compiled in {output.get_time() - since[0]:.0f} s.")
 
 
-class _FirstStart(event.Listener):
-    """Says that it is a first start, and lets another process compile motion, when a large function is compiled."""
-
-    def __init__(self, wanted: Profile, console: Console) -> None:
-        self._wanted, self._console, self.begun = wanted, console, 0.0
-        self.other: SpawnProcess | None = None
-
-    def on_start(self, event: event.Event) -> None:
-        """Begin, once."""
-        if self.begun or not is_large(event):
-            return
-        self.begun, FIRST_START.said = self._console.get_time(), True
-        both = len(os.sched_getaffinity(0)) > 1 and bool(kept_in())
-        self._console.print("Compiling for this processor, once after an installation: one to two minutes ...")
-        if both:
-            self.other = _begun(compile_motion, self._wanted)
-
-    def on_end(self, event: event.Event) -> None:
-        """Nothing: others may follow."""
-
-    def wait(self) -> None:
-        """Wait for the other process, and say how long all of it took."""
-        if self.other:
-            self.other.join()
-        if self.begun:
-            self._console.print(f"Compiled in {self._console.get_time() - self.begun:.0f} s.")
+def _detect(controller: Controller, robot: RobotState) -> None:
+    """Tell free motion and a contact, and where it is."""
+    state, near = controller.init(robot), controller.blank.part("seen.near", Obstacles)
+    kin, memory = controller.model.kinematics(robot.q), controller.whole_detector(state)
+    for push in (0.0, _PUSH_NM):
+        report = replace(robot, tau_ext=np.full(len(robot.q), push))
+        sample = Sample(0.0, kin, report, state.memory.part("window", Window), True, near)
+        _, memory = controller.detector.step(memory, controller.body, sample)
 
 
-def _begun(work: Callable[[Profile], None], wanted: Profile) -> SpawnProcess:
-    """Begin work in a process that ends with this one, and that a terminal's Ctrl-C does not reach."""
-    process = get_context("spawn").Process(target=work, args=(wanted,), daemon=True)
-    with kept_from_children(OF_TERMINAL):
-        process.start()
-    return process
+def compile_stages() -> None:
+    """Compile what is seen and how the arm moves: as much as the detector is."""
+    controller, robot = _at_rest(profile("pretouch"))
+    blocks = controller.fixed.blocks, controller.init(robot).memory.blocks, controller.blank.copy().blocks
+    with _uncollected():
+        see(*blocks, controller.beside)
+        move(*blocks)
 
 
-def compile_motion(wanted: Profile) -> None:
-    """Compile what of a step comes after contact detection."""
-    controller, robot = _at_rest(wanted)
-    move(controller.fixed.blocks, controller.init(robot).memory.blocks, controller.blank.copy().blocks)
-
-
-def compile_contact(wanted: Profile) -> None:
-    """Compile what a first contact of a profile comes to."""
-    warm_up(*_at_rest(wanted))
+@contextmanager
+def _uncollected() -> Iterator[None]:
+    """Let the garbage collector rest: it looks through all that a compiler makes, for an eighth of the time."""
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.enable()
 
 
 def _at_rest(wanted: Profile) -> tuple[Controller, RobotState]:

@@ -18,7 +18,7 @@ import math
 import numpy as np
 
 from pretouch.cholesky import factor, forward, largest_eigenvalue
-from pretouch.compiled import compiled
+from pretouch.compiled import kernel
 from pretouch.contact.scatter import LENGTHS, REGIMES, FreeMeans, covariance_of_mean, spread_out
 from pretouch.types import FloatArray
 
@@ -50,7 +50,7 @@ def level_init() -> FloatArray:
     return np.tile([*_FIRST, -np.inf, 0.0, 0.0], (REGIMES, 1))
 
 
-@compiled
+@kernel
 def earned_level(seen: FloatArray, bound: float, slack: float, rate: float) -> float:
     """Return the level for one alarm in 1 / `rate` samples, from `bound` - `slack` to `bound` (both at least 1)."""
     # both quantiles of Gumbel's distribution give its scale and its location
@@ -61,7 +61,7 @@ def earned_level(seen: FloatArray, bound: float, slack: float, rate: float) -> f
     return max(1.0, min(max(level, bound - slack), bound))
 
 
-@compiled
+@kernel
 def learn_level(log_r: float, seen: FloatArray) -> None:
     """Take in one sample of free motion of a regime (5,)."""
     seen[2], seen[3] = max(seen[2], log_r), seen[3] + 1.0
@@ -82,7 +82,7 @@ _SURE = 1.645
 _LENGTHS = np.array(LENGTHS)
 
 
-@compiled
+@kernel
 def detectable_force(J: FloatArray, period: float, free: FreeMeans, needed: float, gain: float, tails: float) -> float:
     """Return the force at the end-effector that the test finds in 95 of 100 cases if it is held for `HELD_S` [N].
 
@@ -100,7 +100,7 @@ def detectable_force(J: FloatArray, period: float, free: FreeMeans, needed: floa
     k, n = 0, J.shape[1]
     while k + 1 < len(_LENGTHS) and _LENGTHS[k + 1] * period <= HELD_S:
         k += 1
-    S, L, A = np.empty((n, n)), np.zeros((n, n)), np.empty((3, n))
+    S, L, A, V = np.empty((n, n)), np.zeros((n, n)), np.empty((3, n)), np.zeros((3, 3))
     # a mean over less time has more noise, and one over more is not whole while the force lasts
     covariance_of_mean(free, k, S)
     if not factor(S, L):
@@ -109,11 +109,15 @@ def detectable_force(J: FloatArray, period: float, free: FreeMeans, needed: floa
         spread_out(free.scatter[k], L, np.empty((n, n)))
     for a in range(3):
         forward(L, J[a, ::-1].copy(), A[a])  # the last joint first
-    least, squares = -largest_eigenvalue(-A @ A.T), _squares(needed, n, gain, tails)
+    for a in range(3):
+        for b in range(3):
+            for j in range(n):
+                V[a, b] -= A[a, j] * A[b, j]
+    least, squares = -largest_eigenvalue(V), _squares(needed, n, gain, tails)
     return (math.sqrt(squares) + _SURE) / math.sqrt(least) if least > 0.0 else np.inf
 
 
-@compiled
+@kernel
 def _squares(needed: float, n: int, gain: float, tails: float) -> float:
     """Return the f^T G f from which on the mean's likelihood ratio passes exp(`needed`).
 

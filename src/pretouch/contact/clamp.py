@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pretouch.compiled import compiled
+from pretouch.compiled import compiled, kernel
 from pretouch.groups import Kinematics
 from pretouch.params.paper import ClampParams, PinchParams
 from pretouch.robot.body import Capsules
@@ -94,7 +94,7 @@ def note_place(path: FloatArray, marked: FloatArray, q: FloatArray, dt: float) -
         path[0] = q
 
 
-@compiled
+@kernel
 def _farther(q: FloatArray, path: FloatArray, bound: float) -> bool:
     """Whether a joint is farther than a bound from the newest place (M, n) of a path [rad]."""
     for j in range(len(q)):  # noqa: SIM110  compiled code knows no generators

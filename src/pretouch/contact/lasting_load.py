@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pretouch.cholesky import backward, factor, forward
-from pretouch.compiled import compiled
+from pretouch.compiled import kernel
 from pretouch.contact.residual_model import PLAIN, Learnt, least_squares_step
 from pretouch.types import FloatArray
 
@@ -39,7 +39,7 @@ _ALONE_DEVIATIONS = 2.5
 _GRAVITY = 9.81
 
 
-@compiled
+@kernel
 def stands_out(residual: FloatArray, S: FloatArray, samples: int) -> bool:
     """Whether the mean (n,) of so many samples [Nm] is more than noise and friction leave of nothing."""
     n = len(residual)
@@ -49,7 +49,7 @@ def stands_out(residual: FloatArray, S: FloatArray, samples: int) -> bool:
     return bool(factor(C, L) and forward(L, residual, np.empty(n)) > n + _ALONE_DEVIATIONS * np.sqrt(2.0 * n))
 
 
-@compiled
+@kernel
 def still_explains(
     lasting: FloatArray, residual: FloatArray, unit: FloatArray, J: FloatArray, S: FloatArray, samples: int,
     moving: int,
@@ -73,7 +73,7 @@ def still_explains(
     return left < 0.5 * whole
 
 
-@compiled
+@kernel
 def _torque_of(lasting: FloatArray, unit: FloatArray, J: FloatArray, j: int) -> float:
     """Torque on a joint of what has lasted, in this posture [Nm]."""
     # rows 3 and 4 of J turn about x and y: a weight has no moment about z, the vertical
@@ -92,7 +92,7 @@ class WeightPart(NamedTuple):
     """(n,) torques of 1 kg at the end-effector [Nm]."""
 
 
-@compiled
+@kernel
 def find_lasting(
     residual: FloatArray, weight: WeightPart, J: FloatArray, S: FloatArray, samples: int, offset_prior: float,
     lasting: FloatArray,
@@ -124,7 +124,7 @@ def find_lasting(
     return False
 
 
-@compiled
+@kernel
 def _one_joint(residual: FloatArray, S: FloatArray, samples: int) -> tuple[int, float, float]:
     """Return the joint whose torque alone explains a residual, that torque and the misfit; joint -1 if none does."""
     n, joint, step, best = len(residual), -1, 0.0, np.inf
@@ -145,7 +145,7 @@ def _one_joint(residual: FloatArray, S: FloatArray, samples: int) -> tuple[int, 
     return (joint, step, best) if best < n + _ALONE_DEVIATIONS * np.sqrt(2.0 * n) else (-1, 0.0, np.inf)
 
 
-@compiled
+@kernel
 def is_load(
     residual: FloatArray, learnt: FloatArray, unit: FloatArray, J: FloatArray, S: FloatArray, samples: int
 ) -> bool:
@@ -161,7 +161,7 @@ def is_load(
     return bool(few and abs(change[0]) < MOST_KG - _LEAST_KG and _LEAST_KG < whole[0] < MOST_KG - _LEAST_KG)
 
 
-@compiled
+@kernel
 def fit_load(
     residual: FloatArray, unit: FloatArray, J: FloatArray, S: FloatArray, samples: int, load: FloatArray
 ) -> float:
@@ -192,7 +192,7 @@ def fit_load(
     return float(square - explained)
 
 
-@compiled
+@kernel
 def _spread_of_mean(S: FloatArray, samples: int, unknown: float, C: FloatArray) -> None:
     """Write the spread C (n, n) of a mean of so many samples, each joint's `unknown` [Nm] with it."""
     for i in range(len(S)):
@@ -201,7 +201,7 @@ def _spread_of_mean(S: FloatArray, samples: int, unknown: float, C: FloatArray) 
         C[i, i] += unknown**2  # an error of the mean does not average out
 
 
-@compiled
+@kernel
 def learn_lasting(
     lasting: FloatArray, residual: FloatArray, x: FloatArray, S: FloatArray, samples: int, widen: float, known: Learnt
 ) -> None:
@@ -232,7 +232,7 @@ _LOAD_KG, _LOAD_PART = 0.1, 0.05
 """Deviation of a load that has just been learnt, and what part of it is added [kg]."""
 
 
-@compiled
+@kernel
 def weight_part(weights: FloatArray, x: FloatArray, part: WeightPart) -> None:
     """Write what of the mean may be weight, its constant part, and the torques of 1 kg."""
     learnt, offset, unit = part

@@ -4,7 +4,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import compiled, inlined
+from pretouch.compiled import inlined, kernel
 from pretouch.contact.alarm_level import learn_level
 from pretouch.contact.lasting_load import (
     WeightPart,
@@ -168,7 +168,7 @@ def update_model(state: SequentialState, now: Situation, p: SequentialNumbers, t
         state.steady[0] = 0
 
 
-@compiled
+@kernel
 def _queue_block(model: ResidualModel, learnt: Learnt, pace: Pace) -> None:
     """Count a sample of the block; let a block that is full wait, and learn the one that has waited longest."""
     # A contact that begins slowly is suspected late. By then its first samples are in the queue, which is thrown away.
@@ -186,7 +186,7 @@ def _queue_block(model: ResidualModel, learnt: Learnt, pace: Pace) -> None:
     queue[-1] = model.block
 
 
-@compiled
+@kernel
 def _lasting_samples(
     state: SequentialState, now: Situation, p: SequentialNumbers, tested: Tested, known: Learnt
 ) -> int:  # fmt: skip

@@ -5,14 +5,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import compiled
+from pretouch.compiled import compiled, kernel
 from pretouch.contact.detector import Body, Detection, Detector, Sample
 from pretouch.contact.window import Window, window_mean, window_std
 from pretouch.params import ThresholdParams
 from pretouch.types import BoolArray, Contact, FloatArray, Number, Obstacles, Thresholds
 
 
-@compiled
+@kernel
 def noise_force(sigma: Number, f_std: float, sigma_max: float) -> Number:
     """F_sigma = min(sigma / sigma_max F_std, F_std) per axis [N], eq. 10 of the paper."""
     return np.minimum(sigma / sigma_max * f_std, f_std)
@@ -27,7 +27,7 @@ def obstacle_force(distance: Number, f_d: float, d_max: float, d_min: float) -> 
     return np.minimum(np.maximum((d_max - distance) / (d_max - d_min), 0.0), 1.0) * f_d
 
 
-@compiled
+@kernel
 def side_distances(
     ee_position: FloatArray, points: FloatArray, ee_distance: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
@@ -64,7 +64,7 @@ def threshold_numbers(p: ThresholdParams) -> ThresholdNumbers:
     return ThresholdNumbers(p.f_base_n, p.f_std_n, p.sigma_max_n, p.f_d_n, p.d_max_m, p.d_min_m)
 
 
-@compiled
+@kernel
 def threshold_parts(
     mean: FloatArray, sigma: FloatArray, positive: FloatArray, negative: FloatArray, p: ThresholdNumbers,
     parts: FloatArray,

@@ -2,9 +2,10 @@
 
 import numpy as np
 
-from pretouch.compiled import compiled
+from pretouch.compiled import compiled, kernel
 from pretouch.groups import CapsuleArrays, Kinematics
 from pretouch.robot.body import Capsules
+from pretouch.robot.vectors import dot, placed_ends
 from pretouch.types import BoolArray, FloatArray
 
 BRAKES_S = 0.2
@@ -47,21 +48,21 @@ def _share(
 ) -> tuple[float, float]:
     """Share of the joint velocities (n,) [rad/s] that is allowed, and how far the farthest end has come [m]."""
     position, rotation, anchor, axis = kin
-    link, a, b = capsules.link, capsules.a, capsules.b
+    link, ends = capsules.link, placed_ends(capsules.link, capsules.a, capsules.b, position, rotation)
     share, farthest = 1.0, 0.0
     for e in range(2 * len(link)):
         c, end = divmod(e, 2)
         k = link[c]
-        point = rotation[k] @ (b[c] if end else a[c]) + position[k]
+        point = ends[end, c]
         away = point - origin[c, end]
-        far = np.sqrt(away @ away)
+        far = np.sqrt(dot(away, away))
         farthest = max(farthest, far)
         if far <= _LEAST_M:
             continue
         speed = 0.0
         for j in range(len(qd)):
             if moved_by[k, j]:
-                speed += qd[j] * (_turned(axis[j], point - anchor[j]) @ away)
+                speed += qd[j] * dot(_turned(axis[j], point - anchor[j]), away)
         speed /= far
         allowed = max(0.0, reach - far) / BRAKES_S
         if speed > allowed:
@@ -69,7 +70,7 @@ def _share(
     return share, farthest
 
 
-@compiled
+@kernel
 def _turned(axis: FloatArray, arm: FloatArray) -> FloatArray:
     """Velocity (3,) [m] per joint velocity of a point at `arm` (3,) [m] from a joint's axis."""
     return np.array([

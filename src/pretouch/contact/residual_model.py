@@ -18,7 +18,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from pretouch.cholesky import backward, factor, forward
-from pretouch.compiled import compiled
+from pretouch.compiled import compiled, kernel
 from pretouch.errors import ParameterError
 from pretouch.groups import Kinematics, Mechanism
 from pretouch.params import SequentialParams
@@ -134,7 +134,7 @@ def features_into(kin: Kinematics, mechanism: Mechanism, speed: FloatArray, grow
             x[j, last] += (1.0 if m < 0 else mass[m]) * torque[j]
 
 
-@compiled
+@kernel
 def _carried(
     anchor: FloatArray, axis: FloatArray, moved: BoolArray, point: FloatArray, growth: FloatArray, V: FloatArray,
     torque: FloatArray,
@@ -151,7 +151,7 @@ def _carried(
         torque[j] = -(V[j, 0] * ax + V[j, 1] * ay + V[j, 2] * az)  # by the load on the joints: -J^T (g + a)
 
 
-@compiled
+@kernel
 def mean_and_variance(
     weights: FloatArray, covariance: FloatArray, x: FloatArray, mean: FloatArray, model_variance: FloatArray
 ) -> None:
@@ -168,7 +168,7 @@ def mean_and_variance(
                 model_variance[j] += x[j, a] * part
 
 
-@compiled
+@kernel
 def least_squares_step(
     w: FloatArray, P: FloatArray, x: FloatArray, y: float, noise: float, prior: FloatArray, forget: float
 ) -> None:
@@ -211,7 +211,7 @@ class CalmSample(NamedTuple):
     """(n,) how many samples in a row say as much of the mean as one would of white noise; (0,): noise is white."""
 
 
-@compiled
+@kernel
 def add_sample(
     block: FloatArray, first: bool, sample: CalmSample, spread: FloatArray, tails: float, floor: float
 ) -> None:
@@ -252,7 +252,7 @@ def add_sample(
     block[-1] = moving  # a block is of the kind of its last sample
 
 
-@compiled
+@kernel
 def spread_of_sample(M: FloatArray, spread: FloatArray, floor: float, S: FloatArray) -> None:
     """Write S = M A M^T + D (n, n) [Nm^2], D not below the square of a floor [Nm]."""
     n = len(M)
@@ -291,7 +291,7 @@ class Pace(NamedTuple):
     """Largest variance D [Nm^2]."""
 
 
-@compiled
+@kernel
 def learn_block(block: FloatArray, learnt: Learnt, pace: Pace) -> None:
     """Learn a block of samples: weights by their mean torques and features, and one step of both variances."""
     weights, covariance, spread, seen, prior = learnt

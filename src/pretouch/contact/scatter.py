@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pretouch.cholesky import factor
-from pretouch.compiled import compiled
+from pretouch.compiled import kernel
 from pretouch.types import FloatArray
 
 LENGTHS = (1, 2, 4, 8, 16, 32)
@@ -66,21 +66,21 @@ def scatter_init(n: int) -> FloatArray:
     return scatter
 
 
-@compiled
+@kernel
 def white_means(S: FloatArray, model_variance: FloatArray) -> FreeMeans:
     """Return means without a scatter: of noise (n, n) that is white, about a mean with variances (n,) [Nm^2]."""
     n = len(S)
     return FreeMeans(S, model_variance, np.zeros((0, n + 2, n)), np.zeros((0, n)), np.zeros(0), np.zeros((0, n)))
 
 
-@compiled
+@kernel
 def scattered_means(S: FloatArray, model_variance: FloatArray, scatter: FloatArray) -> FreeMeans:
     """Return means with a scatter (6, n + 2, n), and room for how those of a sample compare."""
     n, size = len(S), len(scatter)
     return FreeMeans(S, model_variance, scatter, np.zeros((size, n)), np.zeros(size), np.zeros((size, n)))
 
 
-@compiled
+@kernel
 def covariance_of_mean(free: FreeMeans, k: int, S0: FloatArray) -> None:
     """Write the lower triangle of the covariance (n, n) of window k's mean, the last joint first, but for its scatter.
 
@@ -94,7 +94,7 @@ def covariance_of_mean(free: FreeMeans, k: int, S0: FloatArray) -> None:
         S0[i, i] += free.model_variance[n - 1 - i]
 
 
-@compiled
+@kernel
 def learn_scatter(at: int, whole: int, free: FreeMeans, tails: float, forget: float) -> None:
     """Learn from the means of the first `whole` windows; `at` counts samples.
 
@@ -117,7 +117,7 @@ def learn_scatter(at: int, whole: int, free: FreeMeans, tails: float, forget: fl
                 scatter[k, i, j] += gain * (trust * whitened[k, i] * whitened[k, j] - scatter[k, i, j])
 
 
-@compiled
+@kernel
 def spread_out(scatter: FloatArray, L: FloatArray, K: FloatArray) -> None:
     """Turn L (n, n), the factor of what white noise would be, into that with the scatter (n + 2, n), in place.
 
@@ -142,7 +142,7 @@ def spread_out(scatter: FloatArray, L: FloatArray, K: FloatArray) -> None:
             L[i, j] = total
 
 
-@compiled
+@kernel
 def window_means(ring: FloatArray, at: int, count: int, means: FloatArray) -> int:
     """Write the means (6, n) of the newest 1, 2, ... 32 samples of a ring, and return how many of them are whole.
 
@@ -196,7 +196,7 @@ def turning_init(n: int) -> FloatArray:
     return np.array([np.zeros(n), np.zeros(n), np.full(n, _DEVIATION**2)])
 
 
-@compiled
+@kernel
 def add_reversal_variance(M: FloatArray, growth: FloatArray, turning: FloatArray, model_variance: FloatArray) -> None:
     """Take in how joint velocities grow (n,) [rad/s^2], and add to the variance (n,) [Nm^2] of the mean."""
     n = len(growth)
@@ -209,7 +209,7 @@ def add_reversal_variance(M: FloatArray, growth: FloatArray, turning: FloatArray
         model_variance[j] += min(turning[1, j] * turning[0, j], _MOST_NM2)
 
 
-@compiled
+@kernel
 def learn_turning(
     at: int, means: FloatArray, S: FloatArray, model_variance: FloatArray, forget: float, turning: FloatArray
 ) -> None:

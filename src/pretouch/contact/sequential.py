@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from pretouch.cholesky import backward, factor, forward
-from pretouch.compiled import compiled
+from pretouch.compiled import compiled, kernel
 from pretouch.contact.scatter import LENGTHS, FreeMeans, covariance_of_mean, spread_out
 from pretouch.groups import Kinematics, Mechanism, Obstacles
 from pretouch.params import SequentialParams
@@ -59,7 +59,7 @@ class Hypotheses(NamedTuple):
     """(H, 3) direction of the force where one is expected, zero where it may be any."""
 
 
-@compiled
+@kernel
 def judge(
     means: FloatArray, whole: int, free: FreeMeans, contacts: Hypotheses, gain: float, tails: float
 ) -> tuple[float, int, int]:
@@ -115,7 +115,7 @@ def judge(
     return np.log(max(total, _SMALLEST)), window, which
 
 
-@compiled
+@kernel
 def log_ratio(
     alone: float, square: float, explained: float, size: int, n: int, gain: float, widened: float, tails: float
 ) -> float:
@@ -131,7 +131,7 @@ def log_ratio(
     return 0.5 * (tails + n) * (alone - np.log1p(rest / tails)) - 0.5 * size * widened
 
 
-@compiled
+@kernel
 def explained_by_force(
     L: FloatArray, pivot: FloatArray, y: FloatArray, J: FloatArray, joints: int, away: FloatArray, a: FloatArray
 ) -> tuple[float, float]:
@@ -183,13 +183,13 @@ MOST = 4
 """Objects that are taken into account, the nearest ones."""
 
 
-@compiled
+@kernel
 def link_prior(mechanism: Mechanism) -> float:
     """Return ln of the prior weight of a force on one link in one window, of which nothing near or touched is known."""
     return -math.log(2.0 * len(mechanism.links.parts) * len(LENGTHS))
 
 
-@compiled
+@kernel
 def hypotheses(
     kin: Kinematics, mechanism: Mechanism, qd: FloatArray, obstacles: Obstacles, touch_gain: FloatArray,
     p: "SequentialNumbers",
@@ -211,7 +211,7 @@ def hypotheses(
     weight[:n] = 0.0
     for body in range(len(moved_by)):
         # in a serial chain the joints that move a link are the first so many, so their number says which
-        before = moved_by[body].sum()
+        before = sum(moved_by[body])
         if before:
             weight[before - 1] = max(weight[before - 1], 0.5 / n * touch_gain[body])
     for h in range(len(J)):
@@ -226,7 +226,7 @@ def hypotheses(
             k = order[h - count]
             link, point[:] = obstacles.link[k], obstacles.body_point[k]
         jacobian_into(anchor, axis, moved_by[link], point, full)
-        J[h], joints[h] = full[:3], moved_by[link].sum()
+        J[h], joints[h] = full[:3], sum(moved_by[link])
         if h >= count:
             # closing speed: that of the object towards the body, and u^T J qd of the body towards the object; a force
             # away from the object has the direction -u
@@ -239,7 +239,7 @@ def hypotheses(
     return Hypotheses(J, joints, weight, away)
 
 
-@compiled
+@kernel
 def nearness(distance: float, closing: float, near: float, horizon: float) -> float:
     """How soon an object may touch, from 0 (not near) to 1 (touches within `horizon` [s]).
 
@@ -250,21 +250,20 @@ def nearness(distance: float, closing: float, near: float, horizon: float) -> fl
     return min(max(1.0 - ahead / near, 0.0), 1.0)
 
 
-@compiled
+@kernel
 def nearest_of(distance: FloatArray, most: int) -> IntArray:
     """Indices of the smallest distances (K,), at most so many, the nearest first."""
-    return np.argsort(distance)[:most]
-
-
-def force_map(jacobian: FloatArray) -> FloatArray:
-    """Map (3, n) from joint torques [Nm] to the force at the end-effector that explains them best [N].
-
-    Damped least squares: the first three rows of (J J^T + d^2 I)^-1 J of the Jacobian (6, n). A force so found does
-    work on the arm's end in the direction in which the torques do work on the joints, wherever the contact is.
-    """
-    W = np.empty((3, jacobian.shape[1]))
-    force_map_into(jacobian, W)
-    return W
+    nearest, count = np.empty(min(most, len(distance)), np.int64), 0
+    for k in range(len(distance) if len(nearest) else 0):
+        i = min(count, len(nearest) - 1)
+        if count == len(nearest) and not distance[k] < distance[nearest[i]]:
+            continue
+        while i > 0 and distance[k] < distance[nearest[i - 1]]:
+            nearest[i] = nearest[i - 1]
+            i -= 1
+        nearest[i] = k
+        count = min(count + 1, len(nearest))
+    return nearest
 
 
 _DAMPING = 0.02
@@ -273,7 +272,11 @@ _DAMPING = 0.02
 
 @compiled
 def force_map_into(J: FloatArray, W: FloatArray) -> None:
-    """Write what `force_map` returns, of the Jacobian (6, n)."""
+    """Write the map (3, n) from joint torques [Nm] to the force at the end-effector that explains them best [N].
+
+    Damped least squares: the first three rows of (J J^T + d^2 I)^-1 J of the Jacobian (6, n). A force so found does
+    work on the arm's end in the direction in which the torques do work on the joints, wherever the contact is.
+    """
     A, L, unit, y, x = np.empty((6, 6)), np.zeros((6, 6)), np.zeros(6), np.empty(6), np.empty(6)
     for i in range(6):
         for k in range(i + 1):

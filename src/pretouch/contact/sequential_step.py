@@ -10,15 +10,16 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import compiled, inlined
+from pretouch.compiled import compiled, inlined, kernel
 from pretouch.contact.alarm_level import detectable_force, earned_level
 from pretouch.contact.model_update import CALM, SequentialNumbers, SequentialState, Situation, Tested, update_model
 from pretouch.contact.residual_model import CalmSample, features_into, mean_and_variance, spread_of_sample
 from pretouch.contact.scatter import LENGTHS, LONGEST, add_reversal_variance, scattered_means, white_means, window_means
-from pretouch.contact.sequential import force_map_into, hypotheses, judge, link_prior
+from pretouch.contact.sequential import force_map_into, hypotheses, judge, link_prior, nearest_of
 from pretouch.groups import Kinematics, Mechanism, Obstacles
 from pretouch.records import Cell, IntCell
 from pretouch.robot.kinematics import jacobian_into, mass_matrix_into
+from pretouch.robot.vectors import below
 from pretouch.types import FloatArray
 
 _SETTLED_S = 10.0
@@ -95,18 +96,17 @@ def assess_sample(
     # times likelihood ratios, A the level that it passes at the chosen rate of false alarms.
     whole = window_means(state.ring, (at + 1) % LONGEST, count, means)
     contacts = hypotheses(kin, mechanism, robot.qd, obstacles, now.touch_gain, p)
-    settled = 0 if np.abs(free.speed).max() > _STIRS_RAD_S else state.settled[0]
+    settled = state.settled[0] if below(free.speed, _STIRS_RAD_S) else 0
     # At rest the offsets of a posture are learnt in seconds; until then the arm errs as in motion. Time in which
     # nothing may be learnt, with somebody near, does not count.
     regime = 0 if settled * p.period >= _SETTLED_S else 1
     expected, ratio = white_means(covariance, results.model_variance), np.zeros(0)
+    level = max(1.0, p.bound - p.slack_nats)
     if p.learn_misfit:
         expected = scattered_means(covariance, results.model_variance, state.scatter[regime])
         ratio = expected.scatter[-1, n + 1]
-    log_r, window, which = judge(means, whole, expected, contacts, p.contact_gain, p.tails)
-    level = max(1.0, p.bound - p.slack_nats)
-    if p.learn_misfit:
         level = earned_level(state.level[regime], p.bound, p.slack_nats, math.exp(-p.bound))
+    log_r, window, which = judge(means, whole, expected, contacts, p.contact_gain, p.tails)
     log_likelihood_ratio = max(0.0, log_r / level)
 
     J_ee = np.empty((6, n))
@@ -115,7 +115,8 @@ def assess_sample(
         J_ee, p.period, expected, level - link_prior(mechanism), p.contact_gain, p.tails
     )
     # nothing is learnt while anything that is seen could be what is measured
-    alone = (p.learns == 2 or (p.learns == 1 and now.watched)) and (len(distance) == 0 or distance.min() >= p.clear_m)
+    clear = len(distance) == 0 or distance[nearest_of(distance, 1)[0]] >= p.clear_m
+    alone = clear and (p.learns == 2 or (p.learns == 1 and now.watched))
     sample = CalmSample(robot.tau_ext, x, results.residual, M, results.model_variance, moving, ratio)
     tested = Tested(
         sample, means, whole, expected, J_ee, alone, log_likelihood_ratio >= p.suspect, log_r, state.level[regime]
@@ -192,7 +193,7 @@ def _free_motion(
     return moving
 
 
-@compiled
+@kernel
 def _force_and_bands(
     J: FloatArray, torque: FloatArray, mean: FloatArray, covariance: FloatArray, away: FloatArray, wide: float,
     force: FloatArray, bands: FloatArray,

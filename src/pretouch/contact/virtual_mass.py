@@ -10,12 +10,13 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import compiled
+from pretouch.compiled import compiled, kernel
 from pretouch.groups import CapsuleArrays, Chain, Kinematics
 from pretouch.params.paper import AdmittanceParams
 from pretouch.records import Cell, IntCell
 from pretouch.robot.kinematics import point_velocity
 from pretouch.robot.model import RobotModel
+from pretouch.robot.vectors import placed_ends
 from pretouch.types import BoolArray, FloatArray, IntArray
 
 
@@ -266,13 +267,13 @@ def _yield(
     return tank, pushed
 
 
-@compiled
+@kernel
 def _both(one: float, other: float, level: float) -> bool:
     """Whether both are beyond a level, on the same side."""
     return one * other > 0.0 and min(abs(one), abs(other)) > level
 
 
-@compiled
+@kernel
 def _beyond(torque: float, band: float) -> float:
     """How far a torque lies beyond the dead band, with its sign: never more than it is without a bias that small."""
     return np.sign(torque) * max(0.0, abs(torque) - band)
@@ -288,13 +289,11 @@ def fastest_point(kin: Kinematics, moved_by: BoolArray, capsules: CapsuleArrays,
 
     The speed along an axis is convex, so no point of it is faster than both its ends.
     """
-    position, rotation = kin.position, kin.rotation
-    link, a, b, chain = capsules.link, capsules.a, capsules.b, Chain(kin.anchor, kin.axis, moved_by, qd)
-    fastest = 0.0
+    link, chain = capsules.link, Chain(kin.anchor, kin.axis, moved_by, qd)
+    ends, fastest = placed_ends(link, capsules.a, capsules.b, kin.position, kin.rotation), 0.0
     for c in range(len(link)):
-        k = link[c]
-        for end in (a[c], b[c]):
-            point = rotation[k] @ end + position[k]
-            x, y, z = point_velocity(chain, k, point[0], point[1], point[2])
+        for end in range(2):
+            point = ends[end, c]
+            x, y, z = point_velocity(chain, link[c], point[0], point[1], point[2])
             fastest = max(fastest, np.sqrt(x * x + y * y + z * z))
     return fastest

@@ -4,7 +4,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import compiled
+from pretouch.compiled import compiled, kernel
 from pretouch.params import WindowParams
 from pretouch.records import IntCell
 from pretouch.types import FloatArray
@@ -69,7 +69,7 @@ def window_std(sums: FloatArray, count: int) -> FloatArray:
     return std
 
 
-@compiled
+@kernel
 def weighted_value(
     reading: FloatArray, last: FloatArray, mean: FloatArray, std: FloatArray, alpha: float, lambda_: float
 ) -> FloatArray:

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pretouch.cholesky import backward, factor, forward
-from pretouch.compiled import compiled
+from pretouch.compiled import kernel
 from pretouch.control.penalty import Minimum, Problem, excesses, finite, possible_rows
 from pretouch.modes import BUDGET, INFEASIBLE, NOT_CONVEX, NOT_FINITE, SOLVED
 from pretouch.types import FloatArray, IntArray
@@ -53,7 +53,7 @@ class _Force(NamedTuple):
     """(2 n + R,) from which excess on a bound counts as violated [rad/s]: none while it is in force."""
 
 
-@compiled
+@kernel
 def minimise_within(problem: Problem, budget: int, answer: Minimum) -> int:
     """Write the minimum, and say how that ended; `budget` counts bounds that are taken in or let go.
 
@@ -73,7 +73,7 @@ def minimise_within(problem: Problem, budget: int, answer: Minimum) -> int:
         A[i, i], A[n + i, i], b[i], b[n + i] = 1.0, -1.0, problem.upper[i], -problem.lower[i]
         source[i], source[n + i], size[n + i] = i, i, -1.0  # a multiplier at a lower bound is negative
     for k in which:
-        length = np.sqrt(np.sum(problem.G[k] ** 2))
+        length = np.sqrt(sum(problem.G[k] ** 2))
         if length > _SHORT:
             A[count], b[count] = problem.G[k] / length, problem.h[k] / length
             source[count], size[count] = n + k, length
@@ -95,7 +95,7 @@ def minimise_within(problem: Problem, budget: int, answer: Minimum) -> int:
     return ending
 
 
-@compiled
+@kernel
 def _search(
     L: FloatArray, f: FloatArray, A: FloatArray, b: FloatArray, force: _Force, budget: int, x: FloatArray
 ) -> tuple[int, int]:  # fmt: skip
@@ -143,7 +143,7 @@ def _search(
             m -= 1
 
 
-@compiled
+@kernel
 def _most_violated(A: FloatArray, b: FloatArray, x: FloatArray, from_excess: FloatArray) -> tuple[int, float]:
     """Return which bound is violated most, -1 for none, and by how much [rad/s]."""
     worst, most = -1, 0.0
@@ -156,7 +156,7 @@ def _most_violated(A: FloatArray, b: FloatArray, x: FloatArray, from_excess: Flo
     return worst, most
 
 
-@compiled
+@kernel
 def _split(force: _Force, m: int, r: FloatArray, rest: FloatArray) -> float:
     """Write the normal of bound m as sum of r_j times those before it and `rest`, and column m of Q and R.
 
@@ -165,7 +165,7 @@ def _split(force: _Force, m: int, r: FloatArray, rest: FloatArray) -> float:
     normal, Q, R, n = force.normal, force.Q, force.R, len(rest)
     for i in range(n):
         rest[i] = normal[m, i]
-    size = np.sqrt(np.sum(rest * rest))
+    size = np.sqrt(sum(rest * rest))
     r[:m] = 0.0
     for _ in range(2):  # twice is enough (Giraud et al. 2005)
         for j in range(m):
@@ -175,7 +175,7 @@ def _split(force: _Force, m: int, r: FloatArray, rest: FloatArray) -> float:
             for i in range(n):
                 rest[i] -= along * Q[j, i]
             r[j] += along
-    height = np.sqrt(np.sum(rest * rest))
+    height = np.sqrt(sum(rest * rest))
     if m < n and height > 0.0:
         for j in range(m):
             R[j, m] = r[j]
@@ -189,7 +189,7 @@ def _split(force: _Force, m: int, r: FloatArray, rest: FloatArray) -> float:
     return height if m < n and height > _DEPENDENT * size else 0.0
 
 
-@compiled
+@kernel
 def _settle(b: FloatArray, force: _Force, m: int, least: FloatArray, y: FloatArray) -> None:
     """Write y and the multipliers where the m bounds in force are met, afresh: so rounding does not add up."""
     n, Q, R, weight, reach = len(y), force.Q, force.R, force.multiplier, np.empty(m)
@@ -212,7 +212,7 @@ def _settle(b: FloatArray, force: _Force, m: int, least: FloatArray, y: FloatArr
         weight[j] = max(0.0, weight[j])
 
 
-@compiled
+@kernel
 def _let_go(force: _Force, m: int, first: int, r: FloatArray, rest: FloatArray) -> None:
     """Take bound `first` out of those m in force."""
     _bar(force, force.bound[first], len(rest), _MET)
@@ -224,7 +224,7 @@ def _let_go(force: _Force, m: int, first: int, r: FloatArray, rest: FloatArray) 
         _split(force, j, r, rest)
 
 
-@compiled
+@kernel
 def _bar(force: _Force, bound: int, n: int, excess: float) -> None:
     """Count a bound, and the one opposite to one of the box, as violated from an excess on."""
     force.from_excess[bound] = excess

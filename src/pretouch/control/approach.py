@@ -1,33 +1,33 @@
 """Restricting the body's approach to obstacles: eqs. 5-7 as rows G qd <= h of the QP, or the braking curve."""
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import compiled
+from pretouch.compiled import compiled, kernel
 from pretouch.control.braking import BrakingLimits
-from pretouch.control.interface import MotionBody, MotionRequest, Restricted, Restriction
-from pretouch.control.qp import ApproachRows, Rows
+from pretouch.control.interface import Restriction
+from pretouch.control.qp import Rows
 from pretouch.groups import Kinematics, Obstacles
 from pretouch.params import BrakingParams, RestrictionParams
 from pretouch.robot.kinematics import column
-from pretouch.types import BoolArray, FloatArray, IntArray, Number, RobotState
+from pretouch.types import BoolArray, FloatArray, Number
 
 
-@compiled
+@kernel
 def _sigmoid(v_max: float, exponent: Number) -> Number:
     # beyond +-500 the result is 0 or v_max to the last digit, and exp does not overflow
     return v_max / (1.0 + np.exp(np.minimum(np.maximum(exponent, -500.0), 500.0)))
 
 
-@compiled
+@kernel
 def velocity_a(d: Number, v_max: float, beta: float, d_crit: float) -> Number:
     """V_a = V_max / (1 + exp(beta (2 d / d_crit - 1))) [m/s], eq. 5 of the paper. `d` [m] is from the surface."""
     return _sigmoid(v_max, beta * (2.0 * d / d_crit - 1.0))  # beta < 0: from about 0 at the surface to V_max at d_crit
 
 
-@compiled
+@kernel
 def velocity_b(d: Number, v_max: float, beta: float, d_crit: float, d_notice: float) -> Number:
     """V_b = V_max / (1 + exp(beta (2 (d - d_crit) / (d_notice - d_crit) - 1))) [m/s], eq. 6 of the paper."""
     return _sigmoid(v_max, beta * (2.0 * (d - d_crit) / (d_notice - d_crit) - 1.0))
@@ -73,20 +73,16 @@ def _limit(d: float, p: ApproachParams) -> float:
     return max(velocity_b(d, p.v_max_m_s, p.beta, p.d_crit_m, p.d_notice_m), p.least_m_s)
 
 
-def approach_rows(
-    kin: Kinematics, moved_by: BoolArray, obstacles: Obstacles, params: RestrictionParams
-) -> tuple[ApproachRows, IntArray]:
-    """Rows d^T J_c qd <= x_a for all obstacles within d_notice, and which obstacles (K',) they belong to.
+def approach_rows(kin: Kinematics, moved_by: BoolArray, obstacles: Obstacles, params: RestrictionParams) -> Rows:
+    """Rows d^T J_c qd <= x_a for all obstacles within d_notice.
 
     J_c is the Jacobian of the closest body point, d the direction from it to the obstacle; `moved_by` (L, n) says
     which joint moves which link.
     """
-    p, n, count = params, len(kin.anchor), len(obstacles.unit)
-    if count == 0:
-        return ApproachRows(np.zeros((0, n)), np.zeros(0), soft=False), np.zeros(0, np.int64)
-    G, h, which = np.empty((count, n)), np.empty(count), np.empty(count, np.int64)
-    found = rows_into(kin, moved_by, obstacles, approach_params(p), Rows(G, h, which))
-    return ApproachRows(G[:found], h[:found], p.rows != "hard"), which[:found]
+    n, count = len(kin.anchor), len(obstacles.unit)
+    rows = Rows(np.empty((count, n)), np.empty(count), np.empty(count, np.int64))
+    found = rows_into(kin, moved_by, obstacles, approach_params(params), rows)
+    return Rows._make(part[:found] for part in rows)
 
 
 @compiled
@@ -114,15 +110,7 @@ def rows_into(kin: Kinematics, moved_by: BoolArray, near: Obstacles, p: Approach
 
 @dataclass(frozen=True)
 class ApproachRestriction(RestrictionParams, Restriction, name="paper"):
-    """Restricting the body's approach to obstacles, as in the paper (eqs. 5-7)."""
-
-    def step(
-        self, state: Any, body: MotionBody, kin: Kinematics, robot: RobotState, obstacles: Obstacles,
-        request: MotionRequest,
-    ) -> tuple[Restricted, Any]:  # fmt: skip
-        """Return the rows of `approach_rows`; nothing is remembered."""
-        rows, which = approach_rows(kin, body.model.moved_by, obstacles, self)
-        return Restricted(rows.G, rows.h, which, self.slack_weight if rows.soft else 0.0), state
+    """Restricting the body's approach to obstacles, as in the paper (eqs. 5-7); compiled in `line`."""
 
 
 def of_table_i(part: Restriction | None) -> ApproachRestriction:

@@ -12,7 +12,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from pretouch.cholesky import forward
-from pretouch.compiled import compiled, inlined
+from pretouch.compiled import compiled, inlined, kernel
 from pretouch.control.qp import Rows
 from pretouch.groups import Chain, Obstacles
 from pretouch.params.pretouch import REGIONS, BrakingParams, EffectiveMass
@@ -188,7 +188,7 @@ def braking_rows(
     return found, _rows_across(slots, chain, s, rows, with_fading)
 
 
-@compiled
+@kernel
 def _take_slot(slots: Slots, k: int, half: int, link: int) -> None:
     """Make slot k that of a unit's row on a link: as it is, as it was before another link was nearer, or empty."""
     if slots.link[k] == link:
@@ -208,7 +208,7 @@ def _take_slot(slots: Slots, k: int, half: int, link: int) -> None:
     slots.link[k], slots.limit[k], slots.across[k] = link, np.inf, np.inf
 
 
-@compiled
+@kernel
 def _leave(slots: Slots, k: int, last: int) -> None:
     """Let the row in slot k fade in slot `last`, unless a row that fades there is the tighter one."""
     if slots.link[k] >= 0 and (slots.link[last] < 0 or slots.limit[k] <= slots.limit[last]):
@@ -218,7 +218,7 @@ def _leave(slots: Slots, k: int, last: int) -> None:
     slots.link[k] = -1
 
 
-@compiled
+@kernel
 def _fading_rows(
     slots: Slots, seen: BoolArray, chain: Chain, s: BrakingLimits, rows: Rows, found: int
 ) -> int:  # fmt: skip
@@ -246,7 +246,7 @@ def _fading_rows(
     return found
 
 
-@compiled
+@kernel
 def _rows_across(slots: Slots, chain: Chain, s: BrakingLimits, rows: Rows, found: int) -> int:
     """Add (t + n) . v <= cap for four tangents t of each near point, n its normal: what retreats may slide as fast."""
     tangents, along = np.empty((2, 3)), np.empty(3)
@@ -283,14 +283,14 @@ def tangents_of(normal: FloatArray, tangents: FloatArray) -> None:
     tangents[1, 0], tangents[1, 1], tangents[1, 2] = y * w - z * v, z * u - x * w, x * v - y * u
 
 
-@compiled
+@kernel
 def _eased(target: float, last: float, approach: float, s: BrakingLimits) -> float:
     """Limit between what is wanted, how far it may loosen from the last, and how hard it may slow the arm."""
     eased = min(target, last + s.loosen_m_s2 * s.period_s)
     return max(eased, approach - s.tighten_m_s2 * s.period_s)  # comes last: it outweighs the target
 
 
-@compiled
+@kernel
 def _row(link: int, point: FloatArray, along: FloatArray, chain: Chain, row: FloatArray) -> float:
     """Write the row along^T J (n,) of a point (3,) of a link, and return the speed along it [m/s]."""
     # a hinge moves the point with a x (p - p_j): each entry of the row is the part of that along the direction
@@ -304,7 +304,7 @@ def _row(link: int, point: FloatArray, along: FloatArray, chain: Chain, row: Flo
     return speed
 
 
-@compiled
+@kernel
 def touch_speed(mass: float, limits: TouchLimits) -> float:
     """Speed v_c = F / sqrt(mu k) [m/s], 1/mu = 1/m_H + 1/m_R, at which two masses meet over a spring with force F.
 
@@ -316,7 +316,7 @@ def touch_speed(mass: float, limits: TouchLimits) -> float:
     return min(limits.speed_max_m_s, limits.force_n * np.sqrt(inverse / limits.stiffness_n_m))
 
 
-@compiled
+@kernel
 def mass_along(L: FloatArray, row: FloatArray) -> float:
     """Effective mass 1 / (g M^-1 g^T) [kg] along a row g = n^T J (n,), of a mass matrix M = L L^T; infinite for g = 0.
 

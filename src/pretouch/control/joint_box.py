@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pretouch.compiled import compiled
+from pretouch.compiled import compiled, kernel
 from pretouch.errors import ParameterError
 from pretouch.robot.description import SpeedEnvelope
 from pretouch.robot.model import RobotModel
@@ -65,7 +65,7 @@ def joint_limits(model: RobotModel, margin: float, period: float) -> JointLimits
     return JointLimits(model.q_min + margin, model.q_max - margin, arm.qd_max, arm.qdd_max, period, envelope)
 
 
-@compiled
+@kernel
 def viable_speed(distance: float, acceleration: float, period: float) -> float:
     """Largest speed [rad/s] towards a limit at `distance` [rad] from which braking still ends before it.
 
@@ -81,7 +81,7 @@ def viable_speed(distance: float, acceleration: float, period: float) -> float:
     return (d / period + a * period * steps * (steps + 1.0) / 2.0) / (steps + 1.0)
 
 
-@compiled
+@kernel
 def viable_speed_in_envelope(distance: float, offset: float, slope: float, acceleration: float, period: float) -> float:
     """Largest speed [rad/s] at `distance` [rad] from an envelope's reference from which braking stays below it.
 
@@ -109,7 +109,7 @@ def viable_speed_in_envelope(distance: float, offset: float, slope: float, accel
     return speed * unit
 
 
-@compiled
+@kernel
 def _before_period(k: float, x: float, o: float, b: float) -> float:
     """F(k) of `viable_speed_in_envelope`; a command that full braking has brought to rest by then keeps any limit."""
     p, z = o + b * (k + 1.0), max(b * (2.0 * x - k * (k + 1.0)), 0.0)
@@ -162,7 +162,7 @@ def box_and_brake(q: FloatArray, qd: FloatArray, table: FloatArray) -> tuple[Flo
     return lower, upper, _brake(qd, lower, upper, table)
 
 
-@compiled
+@kernel
 def _viable(q: float, table: FloatArray, i: int) -> tuple[float, float]:
     """Lowest and highest viable velocity of joint i at q."""
     speed, a, period = table[2, i], table[3, i], table[4, i]

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import compiled, inlined
+from pretouch.compiled import inlined, kernel
 from pretouch.control.active_set import minimise_within
 from pretouch.control.joint_box import JointLimits, box_and_brake
 from pretouch.control.null_space import NullSpaceLimits, away, cost_with_null_space
@@ -68,7 +68,7 @@ class Allowed(NamedTuple):
     """(n,) or none."""
 
 
-@compiled
+@kernel
 def move_within(
     p: MotionNumbers, robot: "Report", posture: tuple[Kinematics, FloatArray], near: Obstacles,
     request: "Request", allowed: Allowed, null_velocity: FloatArray, answer: "Answer",
@@ -104,7 +104,11 @@ def move_within(
         qd[:], multipliers[:] = stop, 0.0
         excesses(G, h, qd, slack)
     answer.seen[0], answer.ending[0], answer.violated[0] = seen, ending, 0
-    answer.velocities[0], answer.velocities[1] = J[:3] @ robot.qd, J[:3] @ qd
+    answer.velocities[:] = 0.0
+    for i in range(3):
+        for j in range(n):
+            answer.velocities[0, i] += J[i, j] * robot.qd[j]
+            answer.velocities[1, i] += J[i, j] * qd[j]
     for k in range(found):
         if slack[k] > 0.0 and allowed.weight > 0.0:
             answer.violated[0] = 1

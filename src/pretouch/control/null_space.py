@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import compiled
+from pretouch.compiled import compiled, kernel
 from pretouch.control.qp import CostParams, damping, manipulability, mid_joint_velocity
 from pretouch.groups import Obstacles
 from pretouch.types import BoolArray, FloatArray, IntArray
@@ -13,7 +13,7 @@ _DAMPING = 1e-6
 """Added to J J^T, so that the projector is defined at singularities too [m^2]."""
 
 
-@compiled
+@kernel
 def projector(J: FloatArray) -> FloatArray:
     """N = I - J^T (J J^T + c I)^-1 J (n, n), symmetric: onto joint velocities that leave the task of J (m, n) alone.
 
@@ -44,7 +44,7 @@ def projector(J: FloatArray) -> FloatArray:
     return N
 
 
-@compiled
+@kernel
 def cost_with_null_space(
     J: FloatArray, x_d: FloatArray, q: FloatArray, q_mid: FloatArray, p: CostParams, projected: bool,
     null_velocity: FloatArray,
@@ -105,7 +105,7 @@ def away(
     z = np.zeros(n)
     for r in range(len(which)):
         m = which[r]
-        if distance[m] >= within or moved_by[link[m]].all():
+        if distance[m] >= within or sum(moved_by[link[m]]) == n:
             continue  # far, or of the hand, whose place is the task's
         size2 = 0.0
         for j in range(n):
@@ -122,8 +122,8 @@ def away(
     return last + step
 
 
-@compiled
+@kernel
 def _shorten(v: FloatArray, length: float) -> None:
-    size = np.sqrt((v * v).sum())
+    size = np.sqrt(sum(v * v))
     if size > length:
         v *= length / size

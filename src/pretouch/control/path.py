@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from pretouch.compiled import compiled
+from pretouch.compiled import kernel
 from pretouch.errors import PathError
 from pretouch.types import FloatArray
 
@@ -147,7 +147,7 @@ def nearest_phase(path: Path, position: FloatArray) -> float:
     return float(phases[int(np.argmin(away))])
 
 
-@compiled
+@kernel
 def follow(
     point: FloatArray, tangent: FloatArray, speed: float, here: FloatArray, off_path: float, gain: float,
     velocity: FloatArray,
@@ -177,7 +177,7 @@ def follow(
     return forward
 
 
-@compiled
+@kernel
 def advance(
     phase: float, tangent: FloatArray, asked: FloatArray, forward: float, commanded: FloatArray, period: float
 ) -> float:
@@ -200,7 +200,7 @@ def advance(
     return phase + max(0.0, forward - max(0.0, missing)) * period
 
 
-@compiled
+@kernel
 def speed_scale(distance: float, d_max: float) -> float:
     """Factor d_lowest / d_max on the end-effector velocity, eq. 3 of the paper; 1 beyond d_max.
 
@@ -210,13 +210,13 @@ def speed_scale(distance: float, d_max: float) -> float:
     return min(1.0, distance / d_max)
 
 
-@compiled
+@kernel
 def faded_scale(scale: float, l_obs: int, l_max: int) -> float:
     """Factor s + (1 - s) l_obs / l_max of eq. 4 of the paper: back to full speed in l_max cycles after a loss."""
     return scale + (1.0 - scale) * min(1.0, l_obs / l_max)
 
 
-@compiled
+@kernel
 def reduce_speed(scale: float, cycles: int, fresh: float, l_max: int) -> tuple[float, float, int]:
     """One cycle of eqs. 3 and 4: the factor on the end-effector velocity, and the scale and cycles to remember.
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pretouch.cholesky import backward, factor, forward
-from pretouch.compiled import compiled, inlined
+from pretouch.compiled import inlined, kernel
 from pretouch.modes import BUDGET, NOT_CONVEX, NOT_FINITE, SOLVED
 from pretouch.types import BoolArray, FloatArray, IntArray
 
@@ -107,7 +107,7 @@ def minimise(problem: Problem, budget: int, answer: Minimum) -> int:
     return SOLVED if sound else NOT_FINITE
 
 
-@compiled
+@kernel
 def possible_rows(G: FloatArray, h: FloatArray, lower: FloatArray, upper: FloatArray) -> IntArray:
     """Indices of the rows G x <= h that some x of the box violates; all others can be left out of any problem in it."""
     which, found = np.empty(len(h), np.int64), 0
@@ -140,7 +140,7 @@ def finite(problem: Problem) -> bool:
     return bool(spoilt == 0.0)
 
 
-@compiled
+@kernel
 def _excess(G: FloatArray, h: FloatArray, k: int, x: FloatArray) -> float:
     """By how much row k is violated at x; negative where it holds."""
     total = -h[k]
@@ -149,14 +149,14 @@ def _excess(G: FloatArray, h: FloatArray, k: int, x: FloatArray) -> float:
     return total
 
 
-@compiled
+@kernel
 def excesses(G: FloatArray, h: FloatArray, x: FloatArray, slack: FloatArray) -> None:
     """Write by how much each row is violated at x, zero where it holds."""
     for k in range(len(h)):
         slack[k] = max(0.0, _excess(G, h, k, x))
 
 
-@compiled
+@kernel
 def _take_violated(problem: Problem, which: IntArray, x: FloatArray, piece: _Piece) -> None:
     """Make the piece of the cost the one that x is on; only the rows `which` are looked at."""
     H, f, G, h, weight = problem.H, problem.f, problem.G, problem.h, problem.weight
@@ -183,7 +183,7 @@ def _take_violated(problem: Problem, which: IntArray, x: FloatArray, piece: _Pie
             hessian[j, i] = hessian[i, j]
 
 
-@compiled
+@kernel
 def _differs(G: FloatArray, h: FloatArray, which: IntArray, x: FloatArray, violated: BoolArray) -> bool:
     """Whether another piece of the cost rules at x, but for rows that x meets to rounding."""
     for k in which:
@@ -234,7 +234,7 @@ def _shorten(problem: Problem, which: IntArray, x: FloatArray, y: FloatArray) ->
         y[i] = x[i] + t * d[i]
 
 
-@compiled
+@kernel
 def _slope(
     start: float, bend: float, excess: FloatArray, rate: FloatArray, weight: float, t: float
 ) -> tuple[float, float]:
@@ -248,7 +248,7 @@ def _slope(
     return start + t * bend + weight * slope, bend + weight * rise
 
 
-@compiled
+@kernel
 def _box_minimum(
     H: FloatArray, f: FloatArray, lower: FloatArray, upper: FloatArray, x: FloatArray, at_bound: IntArray, left: int
 ) -> tuple[int, int]:  # fmt: skip
@@ -302,7 +302,7 @@ def _box_minimum(
     return BUDGET, left
 
 
-@compiled
+@kernel
 def _newton_step(H: FloatArray, gradient: FloatArray, free: IntArray, L: FloatArray, step: FloatArray) -> bool:
     """Solve H step = -gradient for the free joints by a Cholesky factor L; False if H is not positive definite."""
     m = len(free)

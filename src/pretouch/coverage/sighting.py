@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import compiled
+from pretouch.compiled import compiled, kernel
 from pretouch.groups import CapsuleArrays, Cones, Sensors
 from pretouch.perception.scene_filter import ray_capsule
 from pretouch.types import BoolArray, FloatArray, IntArray
@@ -136,7 +136,7 @@ def ways_seen(
                         break
 
 
-@compiled
+@kernel
 def in_view(
     depth: float, distance2: float, radius: float, widening: float, limit: float, light: float
 ) -> bool:  # fmt: skip
@@ -167,7 +167,7 @@ def in_view(
     return bool(light * common_area(radius, cone, aside) >= np.pi * cone * cone * read * read)
 
 
-@compiled
+@kernel
 def common_area(r: float, R: float, apart: float) -> float:
     """Area [m^2] that two circles of radii r and R [m] share, whose centres are `apart` [m]."""
     if apart >= r + R:

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import compiled, inlined
+from pretouch.compiled import compiled, inlined, kernel
 from pretouch.groups import CapsuleArrays, Chain
 from pretouch.perception.closest import ClosestArrays, closest, to_axis
 from pretouch.perception.motion_compensation import follow_points
@@ -36,7 +36,7 @@ def usable(stamp: FloatArray, point: FloatArray, sigma: FloatArray) -> tuple[int
     return good, nothing
 
 
-@compiled
+@kernel
 def _is_point(stamp: float, point: FloatArray, m: int, sigma: float) -> bool:
     for i in range(3):
         if not abs(point[m, i]) < FARTHEST:
@@ -222,7 +222,7 @@ def _elect(
             chosen[first + rank] = m
 
 
-@compiled
+@kernel
 def _is_apart(direction: FloatArray, m: int, chosen: IntArray) -> bool:
     """Whether point m lies in another direction from its link than all those chosen of it; not if one is missing."""
     for c in chosen:  # noqa: SIM110  compiled code knows no generators
@@ -231,7 +231,7 @@ def _is_apart(direction: FloatArray, m: int, chosen: IntArray) -> bool:
     return True
 
 
-@compiled
+@kernel
 def _gap(points: FloatArray, m: int, ends: FloatArray, radius: FloatArray) -> float:
     """Distance [m] of point m from the nearest of some placed capsules, negative inside."""
     least = np.inf
@@ -240,7 +240,7 @@ def _gap(points: FloatArray, m: int, ends: FloatArray, radius: FloatArray) -> fl
     return least
 
 
-@compiled
+@kernel
 def move_ends(ends: FloatArray, link: IntArray, chain: Chain, age: float, out: FloatArray) -> None:
     """Write to `out` where the ends (2, C, 3) [m] of capsules on links (C,) were `age` [s] before, to first order."""
     for end in range(2):
@@ -251,7 +251,7 @@ def move_ends(ends: FloatArray, link: IntArray, chain: Chain, age: float, out: F
             out[end, c, 2] = ends[end, c, 2] - age * z
 
 
-@compiled
+@kernel
 def _on_planes(points: FloatArray, m: int, planes: FloatArray, within: float) -> bool:
     """Whether point m is within a distance [m] of a plane, or behind it."""
     for p in range(len(planes)):  # noqa: SIM110  compiled code knows no generators

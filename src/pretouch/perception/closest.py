@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import compiled
+from pretouch.compiled import compiled, kernel
 from pretouch.groups import CapsuleArrays, Kinematics
 from pretouch.robot.body import Capsules
 from pretouch.robot.vectors import placed_capsules
@@ -83,7 +83,7 @@ def closest(capsules: CapsuleArrays, point: FloatArray, found: ClosestArrays) ->
             body_point[k, i] = foot + radius[c] * direction[k, i]
 
 
-@compiled
+@kernel
 def nearest_capsules(capsules: CapsuleArrays, point: FloatArray, distance: FloatArray) -> IntArray:
     """Write how far points (K, 3) are from the nearest of C placed capsules, as `to_axis` has it; return which it is.
 
@@ -127,7 +127,7 @@ def bounds(a: FloatArray, b: FloatArray, radius: FloatArray) -> FloatArray:
     return spheres
 
 
-@compiled
+@kernel
 def to_spheres(point: FloatArray, k: int, spheres: FloatArray, gap2: FloatArray) -> None:
     """Write the squared distance (C,) of point[k] from the middle of each sphere [m^2]."""
     x, y, z = point[k, 0], point[k, 1], point[k, 2]
@@ -136,7 +136,7 @@ def to_spheres(point: FloatArray, k: int, spheres: FloatArray, gap2: FloatArray)
         gap2[c] = u * u + v * v + w * w
 
 
-@compiled
+@kernel
 def to_axis(point: FloatArray, k: int, a: FloatArray, b: FloatArray, c: int) -> tuple[float, float]:
     """Where on the segment from a[c] to b[c] point[k] is closest, from 0 to 1, and how far from it [m]."""
     ux, uy, uz = b[c, 0] - a[c, 0], b[c, 1] - a[c, 1], b[c, 2] - a[c, 2]

@@ -5,13 +5,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import compiled
+from pretouch.compiled import kernel
 from pretouch.groups import Chain, Cones, Sensors
 from pretouch.robot.kinematics import point_velocity
 from pretouch.types import BoolArray, FloatArray, IntArray
 
 
-@compiled
+@kernel
 def move_back(
     sensors: Sensors, moved: BoolArray, stamp: FloatArray, chain: Chain, posed: float, longest: float
 ) -> None:  # fmt: skip
@@ -74,7 +74,7 @@ def motion_init(units: int) -> FloatArray:
     return np.full((2, units, 3), np.nan)
 
 
-@compiled
+@kernel
 def follow_points(
     motion: FloatArray, last: FloatArray, last_stamp: FloatArray, points: FloatArray, stamp: FloatArray,
     taken: BoolArray, memory: float,
@@ -118,7 +118,7 @@ class LastSeen(NamedTuple):
     """(2, K, 3) smoothed place [m] and velocity [m/s]."""
 
 
-@compiled
+@kernel
 def reckon(
     points: FloatArray, distance: FloatArray, stamp: FloatArray, before: LastSeen, sensors: Sensors, cones: Cones,
     within: float,
@@ -154,7 +154,7 @@ def reckon(
             points[k, i] = position[k, i] + rotation[k, i, 2] * ahead
 
 
-@compiled
+@kernel
 def closing_speeds(motion: FloatArray, unit: IntArray, direction: FloatArray, out: FloatArray) -> None:
     """Write the speed (M,) [m/s] at which each obstacle comes nearer: its velocity against the direction (M, 3) to it.
 

@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from pretouch.groups import Kinematics
+from pretouch.groups import CapsuleArrays, Kinematics
 from pretouch.robot.body import Capsules
 from pretouch.robot.model import RobotModel
 from pretouch.robot.self_distance import nearest_points
 from pretouch.robot.vectors import placed
-from pretouch.types import FloatArray, MovingFixtures, Obstacles, RangeReadings
+from pretouch.types import MovingFixtures, Obstacles, RangeReadings
 from pretouch.values import real, real_number
 
 _FARTHEST = 100.0
@@ -49,14 +49,19 @@ def sound_moving(
 
 def beside(
     still: Capsules, moving: MovingFixtures, readings: RangeReadings, now: float, persistence: float
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return ends (C, 3), (C, 3) [m] and radii (C,) [m] of what stands and what moves, at the newest reading's stamp.
+) -> CapsuleArrays:
+    """Return what stands and what moves, at the newest reading's stamp.
 
     No reading counts that is older than `persistence` [s] by `now` [s].
     """
     stamps = readings.stamp[(readings.stamp <= now) & (readings.stamp >= now - persistence)]
     a, b = moving.at(float(stamps.max(initial=-np.inf)) if len(stamps) else moving.stamp)
-    return np.concatenate([still.a, a]), np.concatenate([still.b, b]), np.concatenate([still.radius, moving.radius])
+    return CapsuleArrays(
+        np.concatenate([still.link, np.zeros(len(a), np.int64)]),
+        np.concatenate([still.a, a]),
+        np.concatenate([still.b, b]),
+        np.concatenate([still.radius, moving.radius]),
+    )
 
 
 def near_moving(moving: MovingFixtures, model: RobotModel, kin: Kinematics, now: float, first: int) -> Obstacles:

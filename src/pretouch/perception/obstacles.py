@@ -5,7 +5,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import compiled
+from pretouch.compiled import compiled, kernel
 from pretouch.groups import Cones, Kinematics, Sensors, SkinArrays
 from pretouch.params import PerceptionParams
 from pretouch.perception.motion_compensation import motion_init
@@ -79,7 +79,7 @@ def poses(
     return position, rotation
 
 
-@compiled
+@kernel
 def pose_into(p: FloatArray, R: FloatArray, T: FloatArray, position: FloatArray, rotation: FloatArray) -> None:
     """Write the pose, (3,) and (3, 3), of a sensor at T_link_sensor (4, 4) on a link with position and rotation."""
     for i in range(3):
@@ -158,7 +158,7 @@ def measured(distance: FloatArray, status: IntArray, cones: Cones, shown: FloatA
             shown[k] = max(distance[k], nearest)
 
 
-@compiled
+@kernel
 def take_in(
     tracks: TrackState, stamp: FloatArray, points: FloatArray, fresh: BoolArray, shows: BoolArray, tells: BoolArray,
     now: float, persistence: float,
@@ -183,7 +183,7 @@ def take_in(
                     point[k, i] = points[k, i]
 
 
-@compiled
+@kernel
 def newer(used: FloatArray, stamp: FloatArray, now: float) -> BoolArray:
     """Say which units (K,) have a reading newer than the last one used, and not from the future.
 
@@ -224,7 +224,7 @@ _ON_AXIS = math.cos(math.radians(0.5))
 carried on. Half a degree is more than an arm at rest turns."""
 
 
-@compiled
+@kernel
 def looks_at(kin: Kinematics, skin: SkinArrays, k: int, point: FloatArray) -> bool:
     """Whether the beam of unit k still goes to a point (3,)."""
     position, rotation, link = np.empty(3), np.empty((3, 3)), skin.link[k]
@@ -232,7 +232,7 @@ def looks_at(kin: Kinematics, skin: SkinArrays, k: int, point: FloatArray) -> bo
     return _on_axis(position, rotation, point) >= 0
 
 
-@compiled
+@kernel
 def give_up(
     point: FloatArray, seen: FloatArray, sensors: Sensors, told: BoolArray, distance: FloatArray, until: float
 ) -> None:  # fmt: skip
@@ -248,7 +248,7 @@ def give_up(
                 seen[k] = -np.inf
 
 
-@compiled
+@kernel
 def _on_axis(position: FloatArray, rotation: FloatArray, point: FloatArray) -> float:
     """Distance [m] of a point (3,) from a sensor on whose axis it lies, -1 if it does not, or is NaN."""
     along, away2 = 0.0, 0.0
@@ -260,7 +260,7 @@ def _on_axis(position: FloatArray, rotation: FloatArray, point: FloatArray) -> f
     return away if along >= _ON_AXIS * away else -1.0
 
 
-@compiled
+@kernel
 def spread(sigmas: float, position_sigma: Number, orientation_sigma: Number, distance: Number) -> Number:
     """Spread u = n sqrt(sigma_p^2 + (d sigma_r)^2) [m]: how far a point may lie from where eq. 1 puts it.
 
@@ -271,7 +271,7 @@ def spread(sigmas: float, position_sigma: Number, orientation_sigma: Number, dis
     return sigmas * np.sqrt(position_sigma * position_sigma + turned * turned)
 
 
-@compiled
+@kernel
 def widen(
     ends: FloatArray, sigmas: float, position_sigma: FloatArray, orientation_sigma: FloatArray, distance: FloatArray,
     most: float,
@@ -285,7 +285,7 @@ def widen(
         ends[k] += min(spread(sigmas, position_sigma[k], orientation_sigma[k], distance[k]), most)
 
 
-@compiled
+@kernel
 def bring_nearer(
     body_distance: FloatArray, ee_distance: FloatArray, point: FloatArray, unit: IntArray, sigmas: float,
     skin: SkinArrays, kin: Kinematics,

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import compiled, inlined
+from pretouch.compiled import compiled, inlined, kernel
 from pretouch.groups import CapsuleArrays, Chain, Kinematics, Obstacles, Sensors, first_of
 from pretouch.params import PerceptionParams
 from pretouch.perception.closest import ClosestArrays, closest, distances
@@ -76,7 +76,7 @@ class Readings(NamedTuple):
     status: Annotated[IntArray, "K"]
 
 
-@compiled
+@kernel
 def perceive(
     sight: "Sight", tracks: TrackState, readings: Readings, seen: "Seen", posture: tuple[Kinematics, Chain, FloatArray],
     instants: tuple[float, float], beside: CapsuleArrays,

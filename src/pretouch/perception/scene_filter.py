@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import compiled, inlined
+from pretouch.compiled import compiled, inlined, kernel
 from pretouch.errors import FixtureError
 from pretouch.groups import CapsuleArrays, Cones, Kinematics, Sensors
 from pretouch.perception.closest import bounds, to_axis, to_spheres
@@ -96,7 +96,7 @@ class Wanted(NamedTuple):
     """The search ends with the first distance that counts and is no more [m], which then need not be the least."""
 
 
-@compiled
+@kernel
 def leave_out(
     shows: BoolArray, fresh: BoolArray, distance: FloatArray, ends: FloatArray, aside: float, sensors: Sensors,
     capsules: CapsuleArrays, cones: Cones,
@@ -118,7 +118,7 @@ def leave_out(
             shows[k] = capsule_return(sensors, k, capsules, spheres, cones, wanted) > end
 
 
-@compiled
+@kernel
 def leave_out_planes(
     shows: BoolArray, fresh: BoolArray, ends: FloatArray, sensors: Sensors, planes: FloatArray, cones: Cones
 ) -> None:  # fmt: skip
@@ -134,7 +134,7 @@ def nearest_capsule(sensors: Sensors, k: int, capsules: CapsuleArrays, spheres: 
     return capsule_return(sensors, k, capsules, spheres, cones, Wanted(0.0, -np.inf, np.inf, -np.inf))
 
 
-@compiled
+@kernel
 def capsule_return(
     sensors: Sensors, k: int, capsules: CapsuleArrays, spheres: FloatArray, cones: Cones, wanted: Wanted
 ) -> float:
@@ -260,7 +260,7 @@ def _cast(sensors: Sensors, k: int, capsules: CapsuleArrays, c: int, rays: Float
     return least
 
 
-@compiled
+@kernel
 def ray_capsule(p: FloatArray, ray: FloatArray, a: FloatArray, b: FloatArray, radius: float) -> float:
     """Distance [m] along a unit ray (3,) from p (3,) to a capsule, 0 from inside, infinite for a miss."""
     axis, offset = b - a, p - a
@@ -270,14 +270,14 @@ def ray_capsule(p: FloatArray, ray: FloatArray, a: FloatArray, b: FloatArray, ra
     return _from_outside(aa, ao, oo, dot(axis, ray), dot(ray, offset), radius)
 
 
-@compiled
+@kernel
 def _inside(aa: float, ao: float, oo: float, radius: float) -> bool:
     """Whether a point lies in a capsule; aa, ao and oo are products of its axis a and the point's offset o from it."""
     along = 0.0 if aa == 0 else min(1.0, max(0.0, ao / aa))
     return bool(oo - along * (2 * ao - along * aa) <= radius * radius)  # |o - s a|^2 <= r^2
 
 
-@compiled
+@kernel
 def _from_outside(aa: float, ao: float, oo: float, ar: float, rest: float, radius: float) -> float:
     """Answer of `ray_capsule` outside of it; as for `_inside`, and with the ray r, ar = a . r and rest = o . r."""
     best = np.inf

@@ -5,7 +5,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import compiled
+from pretouch.compiled import compiled, kernel
 from pretouch.groups import Chain, Kinematics, Mechanism
 from pretouch.types import BoolArray, FloatArray, IntArray
 
@@ -59,14 +59,14 @@ def place(hinges: Hinges, q: FloatArray, kin: Kinematics) -> None:
                 position[m, i] = anchor[j, i] - a * x - b * y - c * z
 
 
-@compiled
+@kernel
 def column(anchor: FloatArray, axis: FloatArray, j: int, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Velocity a_j x (p - p_j) [m/s] of a point p = (x, y, z) [m] that hinge j moves at 1 rad/s."""
     x, y, z = x - anchor[j, 0], y - anchor[j, 1], z - anchor[j, 2]
     return axis[j, 1] * z - axis[j, 2] * y, axis[j, 2] * x - axis[j, 0] * z, axis[j, 0] * y - axis[j, 1] * x
 
 
-@compiled
+@kernel
 def point_velocity(chain: Chain, link: int, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Velocity [m/s] of a point (x, y, z) [m] of a link, base frame."""
     u, v, w = 0.0, 0.0, 0.0
@@ -104,7 +104,7 @@ def mass_matrix_into(kin: Kinematics, mechanism: Mechanism, M: FloatArray) -> No
     c, RI = np.empty(3), np.empty((3, 3))
     M[:] = 0.0
     for m in range(len(mass)):
-        if mass[m] <= 0.0 or not moved_by[m].any():
+        if mass[m] <= 0.0 or sum(moved_by[m]) == 0:
             continue
         R = rotation[m]
         for i in range(3):
@@ -159,7 +159,7 @@ def lever_acceleration(w: FloatArray, alpha: FloatArray, r: FloatArray) -> Float
     return cross(alpha, r) + cross(w, cross(w, r))
 
 
-@compiled
+@kernel
 def cross(a: FloatArray, b: FloatArray) -> FloatArray:
     """Cross product (3,)."""
     return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])

@@ -2,23 +2,32 @@
 
 import numpy as np
 
-from pretouch.compiled import compiled
+from pretouch.compiled import compiled, kernel
 from pretouch.groups import CapsuleArrays, Kinematics
 from pretouch.robot.body import Capsules
 from pretouch.types import FloatArray, IntArray
 
 
-@compiled
+@kernel
 def dot(a: FloatArray, b: FloatArray) -> float:
     """Scalar product of two vectors (3,)."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@compiled
+@kernel
 def rotate(R: FloatArray, v: FloatArray, out: FloatArray) -> None:
     """Write R @ v of a matrix (3, 3) and a vector (3,) to `out` (3,), which is another array."""
     for i in range(3):
         out[i] = R[i, 0] * v[0] + R[i, 1] * v[1] + R[i, 2] * v[2]
+
+
+@compiled
+def below(numbers: FloatArray, bound: float) -> bool:
+    """Whether all numbers (k,) are smaller than a bound in size; one that is NaN is not."""
+    for number in numbers:  # noqa: SIM110  compiled code knows no generators
+        if not abs(number) < bound:
+            return False
+    return True
 
 
 @compiled

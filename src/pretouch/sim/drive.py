@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import compiled
+from pretouch.compiled import kernel
 from pretouch.types import FloatArray
 
 
@@ -73,7 +73,7 @@ class TorqueSensors(NamedTuple):
     damping: float  # as a fraction of critical
 
 
-@compiled
+@kernel
 def drive(
     qd_set: FloatArray, bias: FloatArray, joints: Joints, generator: MotionGenerator, impedance: Impedance,
     friction: Friction, cogging: Cogging,
@@ -105,7 +105,7 @@ def drive(
     return tau, lost
 
 
-@compiled
+@kernel
 def _bent(qd: float, i: int, friction: Friction, dt: float) -> float:
     """Bend a joint's bristles on, and return the torque they take [Nm].
 
@@ -119,7 +119,7 @@ def _bent(qd: float, i: int, friction: Friction, dt: float) -> float:
     return float(friction.bristle_nm * friction.bristle[i] / z_c)
 
 
-@compiled
+@kernel
 def sensed(
     tau: FloatArray, lost: FloatArray, drawn: FloatArray, q: FloatArray, qdd: FloatArray, sensors: TorqueSensors
 ) -> FloatArray:

@@ -5,7 +5,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from pretouch.compiled import compiled
+from pretouch.compiled import compiled, kernel
 from pretouch.sim.plant import Plant
 from pretouch.types import FloatArray
 
@@ -108,7 +108,7 @@ def _spring(
     return at, _shortened(force, goal.force_max)
 
 
-@compiled
+@kernel
 def _shortened(vector: FloatArray, length: float) -> FloatArray:
     size = np.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
     return vector if size <= length else vector * (length / size)

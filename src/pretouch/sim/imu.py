@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from pretouch.checks import Check, Checked, Fraction, NonNegative, Positive
-from pretouch.compiled import compiled
+from pretouch.compiled import compiled, kernel
 from pretouch.robot.kinematics import cross
 from pretouch.sensing.imu_scale import ACCELERATION_LSB, ANGULAR_RATE_LSB, STANDARD_GRAVITY
 from pretouch.sensing.skin import Skin
@@ -254,7 +254,7 @@ def _take(
     return count
 
 
-@compiled
+@kernel
 def _true(
     xpos: FloatArray, xmat: FloatArray, center: FloatArray, cvel: FloatArray, cacc: FloatArray,
     T_link_sensor: FloatArray,

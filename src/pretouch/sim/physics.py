@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import compiled
+from pretouch.compiled import compiled, entry, kernel
 from pretouch.sim.drive import Cogging, Friction, Impedance, Joints, MotionGenerator, TorqueSensors, drive, sensed
 from pretouch.sim.mujoco_calls import mj_comPos, mj_comVel, mj_crb, mj_fullM, mj_kinematics, mj_rne, mj_step
 from pretouch.sim.observer import ObserverState, observe
@@ -60,7 +60,7 @@ class SimulatedArm(NamedTuple):
     qd_before: FloatArray  # (n,) joint velocities before the last step [rad/s]
 
 
-@compiled
+@entry
 def take_steps(
     qd_set: FloatArray, velocity_noise: FloatArray, torque_noise: FloatArray, past: FloatArray, arm: SimulatedArm
 ) -> int:
@@ -102,7 +102,7 @@ def end_step(
     _report(arm, qd_set, past)
 
 
-@compiled
+@kernel
 def _conclude(
     arm: SimulatedArm, tau: FloatArray, lost: FloatArray, velocity_noise: FloatArray, torque_noise: FloatArray,
     mass_matrix: FloatArray,
@@ -120,14 +120,14 @@ def _conclude(
     computer.mass_matrix[:] = mass_matrix
 
 
-@compiled
+@kernel
 def _report(arm: SimulatedArm, qd_set: FloatArray, past: FloatArray) -> None:
     """Write (5, n) what the arm's interface knows after a step."""
     computer = arm.computer
     past[0], past[1], past[2], past[3], past[4] = computer.q, computer.qd, arm.generator.q_d, qd_set, computer.residual
 
 
-@compiled
+@kernel
 def _dynamics(nominal: Nominal, q: FloatArray, qd: FloatArray, mass_matrix: FloatArray, bias: FloatArray) -> None:
     """Do what `RobotModel.mass_matrix_and_bias` does."""
     nominal.qpos[:], nominal.qvel[:] = q, qd

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, NamedTuple
 import numpy as np
 
 from pretouch.checks import Check, Checked, Fraction, NonNegative, Positive
-from pretouch.compiled import compiled
+from pretouch.compiled import compiled, kernel
 from pretouch.errors import ParameterError
 from pretouch.sensing.sensor import PAPER_SENSOR, Sensor, cone_rays
 from pretouch.sensing.skin import Skin
@@ -273,7 +273,7 @@ def _measure(
     return _reading(_Returns(distance, rays, normal), kind, mounting.offset[unit], draw, errors)
 
 
-@compiled
+@kernel
 def _reading(
     returns: _Returns, kind: _Kind, offset: float, draw: float, errors: _Errors
 ) -> tuple[float, int, float, float]:
@@ -307,7 +307,7 @@ def _reading(
             if strength[i] > 0 and start <= distance[i] < nearest:
                 nearest = distance[i]
         if nearest == np.inf:
-            return 0.0, _SIGNAL, 0.0, strength.sum()
+            return 0.0, _SIGNAL, 0.0, sum(strength)
         total, mean = 0.0, 0.0
         for i in range(count):
             if nearest <= distance[i] <= nearest + errors.merge_m:

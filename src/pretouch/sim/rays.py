@@ -9,7 +9,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from pretouch.compiled import compiled
+from pretouch.compiled import kernel
 from pretouch.sim.mujoco_calls import mj_rayHfield, mj_rayMesh, mju_rayGeom
 from pretouch.types import FloatArray, IntArray
 
@@ -44,7 +44,7 @@ def geoms_of(model: mujoco.MjModel, data: mujoco.MjData) -> Geoms:
     )  # fmt: skip
 
 
-@compiled
+@kernel
 def placed_rays(
     xpos: FloatArray, xmat: FloatArray, T_link_sensor: FloatArray, cone: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
@@ -71,7 +71,7 @@ def placed_rays(
     return origin, rays
 
 
-@compiled
+@kernel
 def _along(geoms: Geoms, geom: int, origin: FloatArray, ray: FloatArray, normal: FloatArray) -> float:
     """Return the distance [m] at which a ray meets a geom, -1 if it does not; into `normal` (3,) comes that there."""
     kind = geoms.kind[geom]
@@ -86,7 +86,7 @@ def _along(geoms: Geoms, geom: int, origin: FloatArray, ray: FloatArray, normal:
     )  # fmt: skip
 
 
-@compiled
+@kernel
 def cast(
     origin: FloatArray, rays: FloatArray, geoms: Geoms, without: int, farthest: float
 ) -> tuple[FloatArray, FloatArray, IntArray]:

@@ -185,7 +185,7 @@ class TouchSensors:
 
 
 class SimulatedTouchSkin:
-    """The port `TouchSkin` of a simulated arm: range finders, or any other skin, and touch sensors beside them."""
+    """The port `Skin` of a simulated arm, with `touch`: range finders, or another skin, and touch sensors."""
 
     def __init__(self, ranges: SkinPort, sensors: TouchSensors) -> None:
         self._ranges, self._sensors = ranges, sensors

@@ -6,7 +6,7 @@ import numpy as np
 
 from pretouch.checks import Positive
 from pretouch.contact.detector import Body, Detection, Detector, Sample, no_torques, strongest
-from pretouch.contact.sequential import force_map
+from pretouch.contact.sequential import force_map_into
 from pretouch.errors import ParameterError
 from pretouch.profiles import PROFILES
 from pretouch.types import FloatArray, Thresholds
@@ -37,10 +37,10 @@ class FixedBounds(Detector, name="fixed"):
         robot, nothing = sample.robot, no_torques(body, sample)
         if nothing is not None:
             return nothing, None
-        measured = None if robot.wrench is None else robot.wrench[:3]
-        force = force_map(body.model.ee_jacobian(sample.kin)) @ robot.tau_ext if measured is None else measured
-        share = self.share(robot.tau_ext, measured)
-        bands = bands_of(np.full(3, self.force_n))
+        measured, W = None if robot.wrench is None else robot.wrench[:3], np.empty((3, body.model.n))
+        force_map_into(body.model.ee_jacobian(sample.kin), W)
+        force = W @ robot.tau_ext if measured is None else measured
+        share, bands = self.share(robot.tau_ext, measured), bands_of(np.full(3, self.force_n))
         contact = strongest(force, bands) if share >= 1.0 and sample.armed else None
         return Detection(bands, contact, sample.armed, robot.tau_ext, share), None
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pretouch.cholesky import factor, forward
-from pretouch.compiled import compiled
+from pretouch.compiled import compiled, entry, kernel
 from pretouch.contact.localisation.posterior import Candidates, log_posterior, summarise
 from pretouch.contact.localisation.prior import (
     LocalisationNumbers,
@@ -83,7 +83,7 @@ def most_significant(windows: ResidualWindows, independent: float, relative: flo
     return window, best
 
 
-@compiled
+@kernel
 def _covariance_of_mean(windows: ResidualWindows, k: int, independent: float, relative: float, S: FloatArray) -> None:
     """Write S = (C + U) / N + (1 - 1 / N) U + diag(relative z)^2 (n, n) of the mean z of window k.
 
@@ -198,7 +198,7 @@ class _SoFar(NamedTuple):
     """Part of a sample that says something new."""
 
 
-@compiled
+@entry
 def _infer(
     kin: Kinematics, body: _Body, windows: ResidualWindows, seen: Obstacles, cues: Cues,
     p: LocalisationNumbers, so_far: _SoFar, contact: Touched,

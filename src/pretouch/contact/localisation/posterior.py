@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pretouch.cholesky import factor, forward, largest_eigenvalue
-from pretouch.compiled import compiled
+from pretouch.compiled import kernel
 from pretouch.contact.localisation.prior import LocalisationNumbers
 from pretouch.groups import Kinematics, SurfaceArrays
 from pretouch.robot.body import SPACING_M
@@ -45,7 +45,7 @@ class Candidates(NamedTuple):
     p: LocalisationNumbers
 
 
-@compiled
+@kernel
 def log_posterior(S: FloatArray, candidates: Candidates, ln: FloatArray, force: FloatArray) -> bool:
     """Write ln of prior times marginal likelihood (N,) of a contact at each candidate, and its likeliest force (N, 3).
 
@@ -88,7 +88,7 @@ def log_posterior(S: FloatArray, candidates: Candidates, ln: FloatArray, force: 
     return True
 
 
-@compiled
+@kernel
 def _wrench_information(
     kin: Kinematics, moved: BoolArray, origin: FloatArray, L: FloatArray, y: FloatArray, G: FloatArray, h: FloatArray
 ) -> None:
@@ -112,7 +112,7 @@ def _wrench_information(
             G[k, i] = total
 
 
-@compiled
+@kernel
 def _unit_wrenches(normal: FloatArray, lever: FloatArray, u: FloatArray) -> None:
     """Write the wrenches (3, 6) of unit forces inwards and in two directions across, `lever` (3,) from the origin."""
     x, y, z = normal[0], normal[1], normal[2]
@@ -130,7 +130,7 @@ def _unit_wrenches(normal: FloatArray, lever: FloatArray, u: FloatArray) -> None
         u[k, 5] = lever[0] * u[k, 1] - lever[1] * u[k, 0]
 
 
-@compiled
+@kernel
 def _likeliest_force(
     G: FloatArray, h: FloatArray, u: FloatArray, mu: float, largest: float, a: FloatArray
 ) -> tuple[float, float]:
@@ -187,7 +187,7 @@ _NEGLIGIBLE = 12.0
 """Nats below the most likely candidate from which on a candidate is left out."""
 
 
-@compiled
+@kernel
 def summarise(ln: FloatArray, candidates: Candidates, there: FloatArray, contact: Touched) -> None:
     """Write the contact of a posterior exp(ln) (N,), not normalised, and the forces (N, 3) of the candidates [N].
 
@@ -196,7 +196,9 @@ def summarise(ln: FloatArray, candidates: Candidates, there: FloatArray, contact
     """
     at, normal, first = candidates.point, candidates.normal, candidates.surface.first
     # exp(ln - max) cannot overflow; the sum over a body is its probability, up to the sum over all
-    most, total, best, body = ln.max(), 0.0, -1.0, 0
+    most, total, best, body = -np.inf, 0.0, -1.0, 0
+    for value in ln:
+        most = max(most, value)
     for d in range(len(first) - 1):
         here = 0.0
         for c in range(first[d], first[d + 1]):

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import compiled
+from pretouch.compiled import kernel
 from pretouch.contact.touch_cue import Cues
 from pretouch.groups import CapsuleArrays, Kinematics, Obstacles, SurfaceArrays
 from pretouch.types import BoolArray, FloatArray, IntArray
@@ -14,7 +14,7 @@ _NEVER = 1e-12
 """Prior of what cannot be: its logarithm stays finite."""
 
 
-@compiled
+@kernel
 def candidate_poses(kin: Kinematics, surface: SurfaceArrays, point: FloatArray, normal: FloatArray) -> None:
     """Write points [m] and outward normals (N, 3) of the surface in the base frame."""
     position, rotation, link = kin.position, kin.rotation, surface.link
@@ -27,7 +27,7 @@ def candidate_poses(kin: Kinematics, surface: SurfaceArrays, point: FloatArray, 
                 normal[c, i] += rotation[k, i, j] * surface.normal[c, j]
 
 
-@compiled
+@kernel
 def hidden_candidates(
     point: FloatArray, body: IntArray, capsules: CapsuleArrays, capsule_body: IntArray, hidden: BoolArray
 ) -> None:
@@ -66,7 +66,7 @@ class LocalisationNumbers(NamedTuple):
     unit_m: float
 
 
-@compiled
+@kernel
 def log_prior(
     point: FloatArray, surface: SurfaceArrays, hidden: BoolArray, seen: Obstacles, cues: Cues,
     p: LocalisationNumbers, ln: FloatArray,
@@ -112,7 +112,7 @@ def log_prior(
         ln[c] = math.log(max(weight[c], _NEVER))
 
 
-@compiled
+@kernel
 def _normal_kernel(
     point: FloatArray, link: IntArray, area: FloatArray, hidden: BoolArray, only: int, mean: FloatArray, sigma: float,
     out: FloatArray,
@@ -136,10 +136,10 @@ def _normal_kernel(
     return True
 
 
-@compiled
+@kernel
 def _mix(weight: FloatArray, kernels: FloatArray, share: float) -> None:
     """Mix a share of other distributions (N,), added up, into weights (N,) whose sum is 1."""
-    total = kernels.sum()
+    total = sum(kernels)
     if total > 0.0:
         for c in range(len(weight)):
             weight[c] = (1.0 - share) * weight[c] + share * kernels[c] / total
