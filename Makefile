@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
 .PHONY: setup demo live franka learn ros2 units meshes browser docs micropython test test-quick test-contracts test-skipped test-slow soak golden golden-values lint house bench peers \
-	format clean
+	format wheel clean
 
 setup: $(STAMP)
 
@@ -114,6 +114,10 @@ bench: setup
 # about a quarter of an hour: sets up an environment for each peer, measures, and writes the tables of docs/results/peers.md
 peers: setup
 	$(BIN)/python -m benchmarks.peers --set-up --runs 2 --docs
+
+# a wheel with machine code for this Python: an installation of it compiles nothing
+wheel: setup
+	$(BIN)/python -m tools.wheel
 
 format: setup
 	$(BIN)/ruff format .

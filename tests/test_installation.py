@@ -10,6 +10,7 @@ from email import message_from_bytes
 from pathlib import Path
 
 import pytest
+from tools.wheel import build
 
 ROOT = Path(__file__).parents[1]
 CLEAN = {name: text for name, text in os.environ.items() if name not in ("PYTHONPATH", "VIRTUAL_ENV")}
@@ -82,6 +83,17 @@ def test_each_hint_works_in_an_installation_from_a_wheel(built: Path):
         assert "Traceback" not in done.stderr
         assert ": run " not in done.stderr
         assert otherwise in done.stderr
+
+
+@pytest.mark.slow
+def test_a_wheel_with_machine_code_compiles_nothing(tmp_path: Path):
+    wheel = build(tmp_path / "wheel")
+    succeeds(sys.executable, "-m", "venv", "user", folder=tmp_path)
+    python = str(tmp_path / "user/bin/python")
+    succeeds(python, "-m", "pip", "install", "-q", "-c", str(ROOT / "constraints.txt"), str(wheel), folder=tmp_path)
+    done = ran("env", "NUMBA_DEBUG_CACHE=1", python, str(ROOT / "examples/00_one_step.py"), folder=tmp_path)
+    assert "data loaded" in done.stdout
+    assert "data saved" not in done.stdout
 
 
 @pytest.mark.slow

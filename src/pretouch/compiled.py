@@ -7,7 +7,7 @@ from contextlib import suppress
 from functools import cached_property, wraps
 from typing import Any, TypeVar, cast
 
-from llvmlite.binding import parse_assembly
+from llvmlite.binding import get_host_cpu_features, parse_assembly
 from numba import njit
 from numba.core import event, types
 from numba.core.caching import FunctionCache
@@ -57,12 +57,9 @@ class _Kernel:
         return _dispatcher(self._function)
 
     @cached_property
-    def _within(self) -> Any:
-        return _dispatcher(self._function, "-within", no_cpython_wrapper=True, no_cfunc_wrapper=True)
-
-    @property
     def _numba_type_(self) -> types.Dispatcher:
-        """What compiled code takes the function for."""
+        """What compiled code takes the function for; the type does not hold what it is of."""
+        self._within = _dispatcher(self._function, "-within", no_cpython_wrapper=True, no_cfunc_wrapper=True)
         return types.Dispatcher(self._within)
 
 
@@ -89,17 +86,33 @@ def inlined(function: Function) -> Function:
     return cast(Function, njit(error_model="numpy", inline="always")(function))
 
 
+LEVEL, _LEVEL_HAS = "x86-64-v3", {"avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe"}
+"""Processors that a wheel's machine code is for, of 2013 and later, and what they can do."""
+
+
 class _Cache(FunctionCache):
     """Numba's cache, with less to do where all is kept."""
 
     linked = True
     """Whether compiled functions call it; else only the names of what it defines are kept beside the machine code."""
 
+    _shipped = False
+    """Whether a wheel's machine code is looked for."""
+
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Load machine code: what Numba's own registers before, all that can be compiled, takes a tenth of a second."""
         rtsys.initialize(target_context)
         with self._guard_against_spurious_io_errors():
-            return self._load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+            overload = self._load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+            if overload is None and {name for name, has in get_host_cpu_features().items() if has} >= _LEVEL_HAS:
+                self._shipped = True
+                overload = self._load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+                self._shipped = False
+            return overload
+
+    def _index_key(self, sig: Any, codegen: Any) -> Any:
+        sig, (triple, *host), code = super()._index_key(sig, codegen)  # type: ignore[no-untyped-call]
+        return sig, (triple, LEVEL, "") if self._shipped else (triple, *host), code
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Let a full disk be no reason to stop: Numba raises where it cannot write what it just compiled."""
@@ -111,9 +124,8 @@ class _Cache(FunctionCache):
             super().save_overload(sig, data)  # type: ignore[no-untyped-call]
 
 
-def is_large(told: event.Event) -> bool:
-    """Return whether an event "numba:compile" of Numba is about a part of a control step, which may take a minute."""
-    return told.data["dispatcher"].py_func.__name__ in ("line", "perceive", "assess_sample", "move_within")
+_LARGE = ("line", "perceive", "assess_sample", "move_within")
+"""Functions that take seconds."""
 
 
 class FirstStart(event.Listener):
@@ -124,7 +136,7 @@ class FirstStart(event.Listener):
 
     def on_start(self, event: event.Event) -> None:
         """Say it, where nobody has."""
-        if not self.said and is_large(event):
+        if not self.said and event.data["dispatcher"].py_func.__name__ in _LARGE:
             self.said = True
             self.say("Compiling for this processor, once after an installation: about a minute ...")
 

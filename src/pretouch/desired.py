@@ -41,12 +41,12 @@ class Desired:
 
 _MOST = 1000
 """Instants of a horizon."""
-_LARGEST = 1e3
-"""A desired number [rad, rad/s, m, m/s] from here on is none."""
+LARGEST = 1e3
+"""A desired number, a joint position or velocity [rad, rad/s, m, m/s] from here on is none: another unit, or broken."""
 _ROUNDING = 1e-6
 """By how much the columns of a rotation may miss unit length and right angles."""
-_LATEST = 1e12
-"""A time stamp [s] from here on is none."""
+LATEST = 1e12
+"""A time stamp [s] from here on is none, whatever the clock began with."""
 _AHEAD_S = 60.0
 """A horizon that begins so far in the future is stamped by another clock."""
 _WIDTH = {DesiredKind.TWIST: 6, DesiredKind.POSE: 12}
@@ -104,10 +104,10 @@ def sound_desired(desired: Desired | None, joints: int, now: float) -> tuple[Des
     wanted = _WIDTH.get(kind, joints)
     if stamp.ndim != 1 or not 1 <= len(stamp) <= _MOST or number.shape != (len(stamp), wanted):
         return None, f"stamps {stamp.shape} and numbers {number.shape}, not (M,) and (M, {wanted}) with M up to {_MOST}"
-    wrong = ~(np.abs(number) < _LARGEST)
+    wrong = ~(np.abs(number) < LARGEST)
     if wrong.any():
         return None, f"it asks for {number[wrong][0]:g}"
-    wrong = ~(np.abs(stamp) < _LATEST)
+    wrong = ~(np.abs(stamp) < LATEST)
     if wrong.any():
         return None, f"its time stamp is {stamp[wrong][0]:g}"
     if (np.diff(stamp) <= 0.0).any():

@@ -6,11 +6,12 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from pretouch.compiled import kernel
+from pretouch.desired import LARGEST, LATEST
 from pretouch.modes import Event
 from pretouch.params import FailureParams
 from pretouch.records import Cell, Flat, IntCell
 from pretouch.robot.vectors import below
-from pretouch.sound import FASTEST, LARGEST, LATEST, STRONGEST, sound_robot, time_of
+from pretouch.sound import FASTEST, STRONGEST, sound_robot, time_of
 from pretouch.types import FloatArray, Inputs, RobotState
 from pretouch.values import value
 

@@ -3,22 +3,17 @@
 import numpy as np
 
 from pretouch.compiled import compiled
+from pretouch.desired import LARGEST, LATEST
 from pretouch.perception.chosen_points import FARTHEST, LARGEST_SIGMA, usable
 from pretouch.robot.vectors import below
 from pretouch.types import WHOLE, FloatArray, Payload, RangeReadings, RangeStatus, RobotState, SeenPoints, TouchReadings
 from pretouch.values import real, real_number
-
-LARGEST = 1e3
-"""A joint position or velocity [rad, rad/s] from here on is none: another unit, or a broken message."""
 
 FASTEST = 2.0
 """Times the arm's limit: a commanded joint velocity from here on is none that any arm was ever given."""
 
 STRONGEST = 1e4
 """An external torque [Nm] from here on is none."""
-
-LATEST = 1e12
-"""A time stamp [s] from here on is none, whatever the clock began with."""
 
 MOST_POINTS = 20_000
 """Points of outside sources that are taken in one step: what they cost stays bounded."""
@@ -106,27 +101,21 @@ def _misfit(given: tuple[FloatArray, ...], joints: int) -> str:
 
 def sound_readings(readings: RangeReadings, units: int) -> tuple[RangeReadings, str]:
     """Copy readings as arrays of float64 and int64; of those that do not fit so many units, take none and say why."""
+    nothing = RangeReadings(np.full(units, -np.inf), np.zeros(units), np.full(units, int(RangeStatus.NONE)))
     try:
-        stamp = real(readings.stamp)
-        distance = real(readings.distance)
-        status = np.array(readings.status)
+        stamp, distance, status = real(readings.stamp), real(readings.distance), np.array(readings.status)
     except AttributeError:
-        return _nothing(units), f"they are {readings!r}"
+        return nothing, f"they are {readings!r}"
     except (TypeError, ValueError, OverflowError):
-        return _nothing(units), "they are not arrays of numbers"
+        return nothing, "they are not arrays of numbers"
     if not stamp.shape == distance.shape == status.shape == (units,):
         shapes = f"{stamp.shape}, {distance.shape} and {status.shape}"
-        return _nothing(units), f"stamps, distances and statuses have the shapes {shapes}, not ({units},)"
+        return nothing, f"stamps, distances and statuses have the shapes {shapes}, not ({units},)"
     if status.dtype is not WHOLE:
         if status.dtype.kind not in "iu":
-            return _nothing(units), f"statuses are of type {status.dtype}, not whole numbers"
+            return nothing, f"statuses are of type {status.dtype}, not whole numbers"
         status = status.astype(np.int64)
     return RangeReadings(stamp, distance, status), ""
-
-
-def _nothing(units: int) -> RangeReadings:
-    """Return what units report that were never heard."""
-    return RangeReadings(np.full(units, -np.inf), np.zeros(units), np.full(units, int(RangeStatus.NONE)))
 
 
 def sound_touch(touch: TouchReadings | None, units: int) -> tuple[TouchReadings | None, str]:

@@ -85,40 +85,27 @@ def test_a_soft_row_gives_way_by_numbers(row: np.ndarray, h: float, width: float
     np.testing.assert_allclose(answer.slack, [slack], rtol=1e-6)
 
 
-# stale data
+# no answer
 
 
-def bad_problems() -> list[tuple[Problem, QpOutcome]]:
-    good = problem()
-    return [
-        *[(spoiled(good, part, np.nan), QpOutcome.FAILED) for part in PARTS],
-        (replace(good, H=-np.eye(N)), QpOutcome.FAILED),
-        (replace(good, h=np.array([-1.5, 0.1])), QpOutcome.INFEASIBLE),
-        (replace(good, G=np.zeros((1, N)), h=np.array([-0.04])), QpOutcome.INFEASIBLE),
-        (replace(good, G=np.vstack([np.eye(N)[0], -np.eye(N)[0]]), h=np.full(2, -0.1)), QpOutcome.INFEASIBLE),
-    ]  # fmt: skip
-
-
-@pytest.mark.parametrize("soft", [True, False])
-@pytest.mark.parametrize("rows", [0, 1, 4])
-def test_a_bad_problem_leaves_nothing_behind(rows: int, soft: bool):
-    good = random_problem(3, rows, soft)
-    before = answered(good)
-    assert before.outcome is QpOutcome.SOLVED
-    for bad, outcome in bad_problems():
-        assert_none(answered(bad), outcome)
-        after = answered(good)
-        assert after.outcome is before.outcome
-        np.testing.assert_array_equal(after.qd, before.qd)
-        np.testing.assert_array_equal(after.slack, before.slack)
-        np.testing.assert_array_equal(after.multipliers, before.multipliers)
+@pytest.mark.parametrize(
+    ("bad", "outcome"),
+    [
+        ({"H": -np.eye(N)}, QpOutcome.FAILED),
+        ({"h": np.array([-1.5, 0.1])}, QpOutcome.INFEASIBLE),
+        ({"G": np.zeros((1, N)), "h": np.array([-0.04])}, QpOutcome.INFEASIBLE),
+        ({"G": np.vstack([np.eye(N)[0], -np.eye(N)[0]]), "h": np.full(2, -0.1)}, QpOutcome.INFEASIBLE),
+    ],
+)
+def test_a_problem_without_an_answer_has_none(bad: dict[str, np.ndarray], outcome: QpOutcome):
+    assert_none(answered(replace(problem(), **bad)), outcome)
 
 
 # budget
 
 
 @pytest.mark.parametrize("soft", [True, False])
-def test_a_solve_beyond_its_budget_is_the_braking_command(soft: bool):
+def test_a_solve_beyond_its_budget_has_no_answer(soft: bool):
     needed = [1, 1]
     for seed in range(20):
         p = random_problem(seed, 6, soft)

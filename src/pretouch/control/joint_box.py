@@ -133,14 +133,6 @@ def joint_box(q: FloatArray, qd: FloatArray, limits: JointLimits) -> tuple[Float
     return lower, upper
 
 
-def brake(qd: FloatArray, lower: FloatArray, upper: FloatArray, limits: JointLimits) -> FloatArray:
-    """Joint velocities (n,) [rad/s] on the shortest way to rest from `qd` that stays inside the box.
-
-    All joints slow by the same factor, so the hand keeps its course, unless the box asks one of them for less.
-    """
-    return _brake(qd, lower, upper, limits.table)
-
-
 @compiled
 def box_and_brake(q: FloatArray, qd: FloatArray, table: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """`joint_box` and, inside it, `brake` in one call: lower, upper and braking velocities (n,) [rad/s].
@@ -159,7 +151,7 @@ def box_and_brake(q: FloatArray, qd: FloatArray, table: FloatArray) -> tuple[Flo
         # acceleration last, so that it wins: an arm past what is viable brakes at its limit, and lower <= upper always
         lower[i] = np.minimum(np.maximum(down, slowest), fastest)
         upper[i] = np.minimum(np.maximum(up, slowest), fastest)
-    return lower, upper, _brake(qd, lower, upper, table)
+    return lower, upper, brake(qd, lower, upper, table)
 
 
 @kernel
@@ -175,8 +167,12 @@ def _viable(q: float, table: FloatArray, i: int) -> tuple[float, float]:
     return -down, up
 
 
-@compiled
-def _brake(qd: FloatArray, lower: FloatArray, upper: FloatArray, table: FloatArray) -> FloatArray:
+@kernel
+def brake(qd: FloatArray, lower: FloatArray, upper: FloatArray, table: FloatArray) -> FloatArray:
+    """Joint velocities (n,) [rad/s] on the shortest way to rest from `qd` that stays inside the box.
+
+    All joints slow by the same factor, so the hand keeps its course, unless the box asks one of them for less.
+    """
     needed = 0.0  # periods of full braking until the joint that takes longest is at rest
     for i in range(len(qd)):
         needed = np.maximum(needed, abs(qd[i]) / (table[3, i] * table[4, i]))
