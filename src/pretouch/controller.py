@@ -114,8 +114,7 @@ class Controller:
         self._heard = slice(now.places["readings.stamp"].at.start, now.places["readings.distance"].at.stop)
         self._status, self._ending = now.places["readings.status"].at, now.places["answer.ending"].at.start
         self._stamps = [now.places["stamp"].at.start, now.places["robot.stamp"].at.start]
-        self._on_path = slice(now.places["path.point"].at.start, now.places["path.tangent"].at.stop)
-        self._shapes = [(model.n,)] * 5 + [(6,), (len(skin),), (len(skin),), (len(skin),)]
+        self._on_path = slice(now.places["path.phase"].at.start, now.places["path.tangent"].at.stop)
 
     def init(self, robot: RobotState, learnt: ResidualModel | None = None) -> ControllerState:
         """Return the state before the first step; a robot state that cannot be used is a RobotStateError.
@@ -187,32 +186,31 @@ class Controller:
 
     def _taken(self, now: Flat, inputs: Inputs) -> bool:
         """Copy inputs that are as usual; else say so."""
-        robot, readings = inputs.robot, inputs.readings
-        others = inputs.points, inputs.payload, inputs.desired, inputs.moving
-        if inputs.resume or others != (None, None, None, None):
+        robot, readings, n, units = inputs.robot, inputs.readings, self.model.n, len(self.skin)
+        if inputs.resume or inputs.points is not None or inputs.payload is not None:
+            return False
+        if inputs.desired is not None or inputs.moving is not None:
             return False
         try:
             parts: Any = (robot.q, robot.qd, robot.q_commanded, robot.qd_commanded, robot.tau_ext, robot.wrench)
-            given, stamps = (readings.stamp, readings.distance, readings.status), (inputs.stamp, robot.stamp)
-            if [part.shape for part in (*parts, *given)] != self._shapes or readings.status.dtype is not WHOLE:
+            stamps, distance, status = readings.stamp, readings.distance, readings.status
+            if [*map(len, parts)] != [n, n, n, n, n, 6] or not len(stamps) == len(distance) == len(status) == units:
+                return False
+            if status.dtype is not WHOLE or not (isinstance(inputs.stamp, float) and isinstance(robot.stamp, float)):
                 return False
             numbers, whole = now.blocks[0], now.blocks[1]
             np.concatenate(parts, out=numbers[self._joints])
-            np.concatenate(given[:2], out=numbers[self._heard])
-            whole[self._status] = readings.status
-            for at, stamp in zip(self._stamps, stamps, strict=True):
-                if not isinstance(stamp, float):
-                    return False
-                numbers[at] = stamp
+            np.concatenate((stamps, distance), out=numbers[self._heard])
+            whole[self._status] = status
+            numbers[self._stamps[0]], numbers[self._stamps[1]] = inputs.stamp, robot.stamp
+            return True
         except (AttributeError, TypeError, ValueError, OverflowError):
             return False
-        return True
 
     def put_path(self, now: Flat, phase: float) -> None:
         """Write where the path is at an arc length [m]."""
         at = now.blocks[0][self._on_path]
-        at[:3], at[3:] = self.path.point(phase), self.path.tangent(phase)
-        now.put("path.phase", phase)
+        at[0], at[1:4], at[4:] = phase, self.path.point(phase), self.path.tangent(phase)
 
     def restricted(
         self, part: Restriction, state: object, memory: Flat, now: Flat, robot: RobotState, request: MotionRequest
