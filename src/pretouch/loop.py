@@ -264,20 +264,20 @@ def explained(controller: Controller, state: ControllerState, robot: RobotState,
     person looks before the arm moves: whatever acceleration reaches since the last report is then explained. What is no
     report of an arm stays as it is, for the step to name.
     """
-    limits, command, last = controller.limits, state.command, state.watch.robot
+    limits, memory = controller.limits, controller.with_places(state.memory)
+    command, position, before = (memory.get(name) for name in ("command", "watch.robot.q", "watch.stamp"))
     try:
         q, reported, stamp = real(robot.q, copy=False), real(robot.qd_commanded, copy=False), time_of(robot.stamp)
     except (AttributeError, TypeError, ValueError, OverflowError):
         return robot
     if stamp is None or q.shape != command.shape or reported.shape != command.shape:
         return robot
-    late = max(0.0, now - state.watch.stamp - limits.period)
-    moved = np.abs(q - last.q)
+    late, moved = max(0.0, now - before - limits.period), np.abs(q - position)
     if not (moved <= _ENCODER_RAD).all():  # hardly ever at 1 kHz
         # stamps may be times of arrival: states that waited together come together
-        gap = max(limits.period, stamp - last.stamp)
+        gap = max(limits.period, stamp - memory.get("watch.robot.stamp"))
         accelerated = gap if state.mode.latched else max(limits.period, gap - late)
-        speed = np.maximum(np.minimum(np.abs(last.qd), limits.qd_max), np.abs(command))
+        speed = np.maximum(np.minimum(np.abs(memory.get("watch.robot.qd")), limits.qd_max), np.abs(command))
         reach = speed * (gap + controller.profile.failure.state_timeout_s) + limits.qdd_max * accelerated**2
         if (jumped := moved > reach + _ENCODER_RAD).any():
             return replace(robot, q=np.where(jumped, np.nan, q))
@@ -287,7 +287,7 @@ def explained(controller: Controller, state: ControllerState, robot: RobotState,
     braked = np.sign(command) * np.maximum(np.abs(command) - limits.qdd_max * late, 0.0)
     recent = np.array([command, braked, *(earlier for _, earlier in state.watch.sent)])
     explicable = (reported >= recent.min(axis=0) - reach) & (reported <= recent.max(axis=0) + reach)
-    if stamp > state.watch.stamp:  # of after the last command, which it cannot lag behind by all of them
+    if stamp > before:  # of after the last command, which it cannot lag behind by all of them
         reach = reach + limits.qdd_max * _LAG_S
         explicable &= reported >= np.minimum(command, braked) - reach
         explicable &= reported <= np.maximum(command, braked) + reach

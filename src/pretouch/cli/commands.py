@@ -172,6 +172,5 @@ class WarmUp:
         from pretouch.cli.warm_up import compile_step
 
         print("Compiling what all profiles need: about a minute the first time ...", flush=True)
-        kept = compile_step()
-        nowhere = "Compiled, but not cached: HOME is not writable."
-        print(f"Compiled, and cached in {kept}." if kept else nowhere)
+        place = compile_step()
+        print(f"Compiled, and cached in {place}." if place else "Compiled, but not cached: HOME is not writable.")

@@ -117,8 +117,9 @@ class Cycles:
 
     def _goes_on(self, cycle: Cycle) -> bool:
         """Whether a cycle began with what the one before left, and that can be recomputed."""
-        before, command = cycle.before, self._command
-        return command is not None and before.watch.stamp == self._last and bool((before.command == command).all())
+        memory, command = cycle.before.memory, self._command
+        follows = command is not None and memory.get("watch.stamp") == self._last
+        return follows and bool((memory.get("command") == command).all())
 
     def _inputs(self, inputs: Inputs) -> tuple[bytes, bool]:
         """Return inputs as they are kept, and whether that is all a step goes by."""
