@@ -1,30 +1,36 @@
 """All calls into Pretouch: the arm the problem is posed for, and our two contenders."""
 
 from importlib.metadata import version
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 from benchmarks.peers.geometry import Arm, Array
 from benchmarks.peers.problem import TERMS, Problem
 
+from pretouch.compiled import compiled
 from pretouch.control.active_set import minimise_within
-from pretouch.control.approach import approach_rows
-from pretouch.control.joint_box import JointLimits, joint_box
+from pretouch.control.approach import ApproachParams, approach_params, rows_into
+from pretouch.control.joint_box import JointLimits, box_and_brake
 from pretouch.control.path import segment
 from pretouch.control.penalty import Minimum
 from pretouch.control.penalty import Problem as Program
-from pretouch.control.qp import cost_into, cost_params
+from pretouch.control.qp import CostParams, cost_into, cost_params
+from pretouch.control.qp import Rows as Room
 from pretouch.controller import Controller, ControllerState
+from pretouch.groups import CapsuleArrays, Kinematics, Obstacles
 from pretouch.modes import SOLVED
 from pretouch.params import RestrictionParams, TaskParams
-from pretouch.perception.closest import closest_points
+from pretouch.perception.closest import ClosestArrays, closest
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import profile
 from pretouch.robot.description import panda
+from pretouch.robot.kinematics import Hinges, jacobian_into, place
 from pretouch.robot.model import RobotModel
+from pretouch.robot.vectors import placed_capsules
 from pretouch.sensing.skin import Skin, paper_skin
 from pretouch.sensing.unit import SensorUnit
-from pretouch.types import Inputs, RangeReadings, RangeStatus, RobotState
+from pretouch.types import BoolArray, FloatArray, Inputs, IntArray, RangeReadings, RangeStatus, RobotState
 
 _AT_ONCE = 1000
 """Units that a skin wears, of more than it may have."""
@@ -62,39 +68,66 @@ def _moved(T: Array, points: Array) -> Array:
     return np.einsum("cij,cj->ci", T[:, :3, :3], points) + T[:, :3, 3]
 
 
+class _Fixed(NamedTuple):
+    """What does not change from snapshot to snapshot."""
+
+    hinges: Hinges
+    moved_by: BoolArray
+    ee: int
+    body: CapsuleArrays
+    limits: FloatArray
+    q_mid: FloatArray
+    cost: CostParams
+    approach: ApproachParams
+    units: IntArray
+
+
+@compiled
+def _solve(q: Array, qd: Array, points: Array, velocity: Array, fixed: _Fixed, kin: Kinematics, x: Array) -> bool:
+    """Write the joint velocities (n,) of a snapshot; return whether there are any."""
+    n, count, up = len(q), len(points), np.zeros((len(points), 3))
+    place(fixed.hinges, q, kin)
+    up[:, 2] = 1.0
+    on_body, link, distance = np.empty((count, 3)), np.empty(count, np.int64), np.empty(count)
+    closest(placed_capsules(fixed.body, kin), points, ClosestArrays(on_body, link, up, distance))
+    near = Obstacles(fixed.units, points, distance, on_body, link, up, distance, distance)
+    rows = Room(np.empty((count, n)), np.empty(count), np.empty(count, np.int64))
+    k = rows_into(kin, fixed.moved_by, near, fixed.approach, rows)
+    lower, upper, _ = box_and_brake(q, qd, fixed.limits)
+    J, H, f = np.empty((6, n)), np.empty((n, n)), np.empty(n)
+    jacobian_into(kin.anchor, kin.axis, fixed.moved_by[fixed.ee], kin.position[fixed.ee], J)
+    cost_into(J[:3], velocity, q, fixed.q_mid, fixed.cost, H, f)
+    least = Minimum(x, np.empty(k), np.empty(n + k))
+    return minimise_within(Program(H, f, lower, upper, rows.G[:k], rows.h[:k], 0.0), 500, least) == SOLVED
+
+
 class Rows:
-    """Kinematics, closest points, rows, joint box and QP, and nothing else: the very problem."""
+    """Kinematics, closest points, rows, joint box and QP, and nothing else: the very problem, in one compiled call."""
 
     def __init__(self, problem: Problem) -> None:
-        self.problem, self.model = problem, RobotModel(panda())
+        self.problem, model = problem, RobotModel(panda())
         arm, count = problem.arm, problem.points.shape[1]
-        self.limits = JointLimits(arm.q_min, arm.q_max, arm.qd_max, arm.qdd_max, TERMS.period)
-        self.task = TaskParams(
+        limits = JointLimits(arm.q_min, arm.q_max, arm.qd_max, arm.qdd_max, TERMS.period)
+        cost = TaskParams(
             damping_max=TERMS.damping_max, manipulability_threshold=TERMS.manipulability_threshold,
             mid_joint_gain=TERMS.mid_joint_gain, mid_joint_time_s=TERMS.mid_joint_time,
         )  # fmt: skip
-        self.restriction = RestrictionParams(
+        approach = RestrictionParams(
             rows="hard", v_max_m_s=TERMS.v_max, beta=TERMS.beta, d_repulse_m=TERMS.d_repulse,
             d_crit_m=TERMS.d_crit, d_notice_m=TERMS.d_notice,
         )  # fmt: skip
-        self.unit, self.direction = np.arange(count), np.tile([0.0, 0.0, 1.0], (count, 1))
+        self.kin = model.kinematics(problem.q[0])
+        self.fixed = _Fixed(
+            model.hinges, model.moved_by, model.ee, model.body.arrays, limits.table, model.q_mid, cost_params(cost),
+            approach_params(approach), np.arange(count),
+        )  # fmt: skip
 
     def solve(self, s: int) -> Array:
         """Joint velocities (n,) [rad/s] of one snapshot."""
-        p, model = self.problem, self.model
-        q, qd = p.q[s], p.qd[s]
-        kin = model.kinematics(q)
-        obstacles = closest_points(
-            kin, model.body, kin.position[model.ee], self.unit, p.points[s], self.direction
-        )  # fmt: skip
-        rows = approach_rows(kin, model.moved_by, obstacles, self.restriction)
-        lower, upper = joint_box(q, qd, self.limits)
-        n, count = len(q), len(rows.h)
-        H, f, least = np.empty((n, n)), np.empty(n), Minimum(np.empty(n), np.empty(count), np.empty(n + count))
-        cost_into(model.ee_jacobian(kin)[:3], p.velocity[s], q, model.q_mid, cost_params(self.task), H, f)
-        if minimise_within(Program(H, f, lower, upper, rows.G, rows.h, 0.0), 500, least) != SOLVED:
+        p, x = self.problem, np.empty(len(self.fixed.q_mid))
+        if not _solve(p.q[s], p.qd[s], p.points[s], p.velocity[s], self.fixed, self.kin, x):
             raise RuntimeError(f"The program of snapshot {s} has no answer.")
-        return least.x
+        return x
 
 
 class Step:
