@@ -42,19 +42,38 @@ class Place(NamedTuple):
     """Whether it is one number, whatever the sizes of this record are."""
 
 
-def _leaves(record: type, path: str = "") -> Iterator[tuple[str, int, tuple[str | int, ...]]]:
-    """Yield the fields of a record and of those in it: path, index of the block, and dimensions."""
-    for name, hint in _hints(record).items():
-        if hasattr(hint, "_fields"):
-            yield from _leaves(hint, f"{path}{name}.")
-        else:
-            kind, *dimensions = get_args(hint) if get_origin(hint) is Annotated else (hint,)
-            yield path + name, _KINDS[kind], tuple(dimensions)
-
-
 @cache
 def _hints(record: type) -> dict[str, Any]:
     return get_type_hints(record, include_extras=True)
+
+
+class _Part(NamedTuple):
+    """A record with its fields, or a field, and where the table says where it lies."""
+
+    kind: type
+    fields: "Mapping[str, _Part]"
+    block: int = 0
+    entry: int = 0
+    dimensions: tuple[str | int, ...] = ()
+
+
+def _tree(kind: Any, entries: list[int]) -> _Part:
+    """Return a record or field with all in it; `entries` holds how many of the table's numbers are of those before."""
+    if hasattr(kind, "_fields"):
+        return _Part(kind, {name: _tree(hint, entries) for name, hint in _hints(kind).items()})
+    array, *dimensions = get_args(kind) if get_origin(kind) is Annotated else (kind,)
+    entry = entries[0]
+    entries[0] += 1 + len(dimensions)
+    return _Part(array, {}, _KINDS[array], entry, tuple(dimensions))
+
+
+def _leaves(part: _Part, path: str = "") -> Iterator[tuple[str, _Part]]:
+    """Yield the fields of a record and of those in it, with their paths."""
+    for name, inner in part.fields.items():
+        if inner.fields:
+            yield from _leaves(inner, f"{path}{name}.")
+        else:
+            yield path + name, inner
 
 
 def _at(record: Any, path: str) -> Any:
@@ -76,7 +95,7 @@ class Flat:
     def of(cls, record: Any) -> "Flat":
         """Lay out a record; a dimension has one size in all fields of the record that names it, else: ValueError."""
         places, sizes, table, known = dict[str, Place](), [0, 0, 0], list[int](), dict[tuple[str, str], int]()
-        for path, kind, dimensions in _leaves(type(record)):
+        for path, (_, _, kind, _, dimensions) in _leaves(_tree(type(record), [0])):
             shape, owner = np.shape(_at(record, path)), path.rpartition(".")[0]
             named = zip(dimensions, shape, strict=False)
             sized = tuple(known.setdefault((owner, d), s) if isinstance(d, str) else d for d, s in named)
@@ -132,26 +151,6 @@ class Flat:
         return self.blocks[kind][at].reshape(shape)
 
 
-class _Part(NamedTuple):
-    """A record with its fields, or a field, and where the table says where it lies."""
-
-    kind: type
-    fields: "Mapping[str, _Part]"
-    block: int = 0
-    entry: int = 0
-    dimensions: int = 0
-
-
-def _tree(kind: Any, entries: list[int]) -> _Part:
-    """Return a record or field with all in it; `entries` holds how many of the table's numbers are of those before."""
-    if hasattr(kind, "_fields"):
-        return _Part(kind, {name: _tree(hint, entries) for name, hint in _hints(kind).items()})
-    array, *dimensions = get_args(kind) if get_origin(kind) is Annotated else (kind,)
-    entry = entries[0]
-    entries[0] += 1 + len(dimensions)
-    return _Part(array, {}, _KINDS[array], entry, len(dimensions))
-
-
 def opener(record: type, *paths: str) -> Callable[[Blocks], Any]:
     """Return what makes views of fields of a record, or of records in it, from its blocks, in Python and compiled.
 
@@ -175,7 +174,7 @@ def opener(record: type, *paths: str) -> Callable[[Blocks], Any]:
 def _view(part: _Part, blocks: Blocks) -> Any:
     if part.fields:
         return part.kind(*(_view(field, blocks) for field in part.fields.values()))
-    start, *shape = blocks[3][part.entry : part.entry + 1 + part.dimensions]
+    start, *shape = blocks[3][part.entry : part.entry + 1 + len(part.dimensions)]
     row = blocks[part.block][start : start + int(np.prod(shape, dtype=int))]
     return row.reshape(shape) if shape else row[0]
 
@@ -185,7 +184,7 @@ def _type_of(part: _Part, blocks: Any) -> Any:
     if part.fields:
         return types.BaseTuple.from_types([_type_of(field, blocks) for field in part.fields.values()], part.kind)
     block = blocks[part.block]
-    return block.copy(ndim=part.dimensions) if part.dimensions else block.dtype
+    return block.copy(ndim=len(part.dimensions)) if part.dimensions else block.dtype
 
 
 def _write_views(parts: Sequence[_Part], context: Any, builder: Any, signature: Any, given: Any) -> Any:
@@ -206,7 +205,7 @@ def _write_views(parts: Sequence[_Part], context: Any, builder: Any, signature: 
         if not part.dimensions:
             return context.unpack_value(builder, kind, data)
         view, size = context.make_array(kind)(context, builder), blocks[part.block].itemsize
-        shape = [at(part.entry + 1 + d) for d in range(part.dimensions)]
+        shape = [at(part.entry + 1 + d) for d in range(len(part.dimensions))]
         strides = [size]
         for length in shape[:0:-1]:
             strides.insert(0, builder.mul(length, strides[0]))

@@ -2,8 +2,7 @@
 
 import gc
 import os
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import replace
 from multiprocessing import get_context
 from multiprocessing.context import SpawnProcess
@@ -65,15 +64,16 @@ def prepare(wanted: Profile, meanwhile: Callable[[], object] = lambda: None, con
                 others[0].start()
 
     FIRST_START.say = begin  # type: ignore[method-assign]
+    gc.disable()  # the collector looks through all that a compiler makes, for an eighth of the time
     try:
-        with _uncollected():
-            controller, robot = _at_rest(wanted)
-            _detect(controller, robot)
-            for other in others:  # its part is then taken from where it is kept
-                other.join()
-            warm_up(controller, robot, points=True)
-            meanwhile()
+        controller, robot = _at_rest(wanted)
+        _detect(controller, robot)
+        for other in others:  # its part is then taken from where it is kept
+            other.join()
+        warm_up(controller, robot, points=True)
+        meanwhile()
     finally:
+        gc.enable()
         del FIRST_START.say
     if since:
         output.print(f"Compiled in {output.get_time() - since[0]:.0f} s.")
@@ -90,22 +90,12 @@ def _detect(controller: Controller, robot: RobotState) -> None:
 
 
 def compile_stages() -> None:
-    """Compile what is seen and how the arm moves: as much as the detector is."""
+    """Compile what is seen and how the arm moves, as much as the detector is, in a process of its own."""
+    gc.disable()
     controller, robot = _at_rest(profile("pretouch"))
     blocks = controller.fixed.blocks, controller.init(robot).memory.blocks, controller.blank.copy().blocks
-    with _uncollected():
-        see(*blocks, controller.beside)
-        move(*blocks)
-
-
-@contextmanager
-def _uncollected() -> Iterator[None]:
-    """Let the garbage collector rest: it looks through all that a compiler makes, for an eighth of the time."""
-    gc.disable()
-    try:
-        yield
-    finally:
-        gc.enable()
+    see(*blocks, controller.beside)
+    move(*blocks)
 
 
 def _at_rest(wanted: Profile) -> tuple[Controller, RobotState]:
