@@ -1,11 +1,15 @@
 """Records in flat blocks: the same fields for Python and for compiled code."""
 
-from typing import Annotated, NamedTuple
+import sys
+from dataclasses import dataclass
+from operator import attrgetter
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
+from pretouch.checks import Checked, Positive, PositiveCount
 from pretouch.compiled import compiled
 from pretouch.records import Blocks, Cell, Flat, opener
 from pretouch.values import BoolArray, FloatArray, IntArray
@@ -75,3 +79,41 @@ def test_compiled_code_reads_and_writes_fields_of_any_size_and_a_copy_leaves_the
         assert (copy.get("speed"), float(copy.part("pose", Pose).turned), copy.blocks[1][1]) == (0.5, 0.5, k)
         assert (flat.get("speed"), flat.get("pose.place")[0, 2]) == (0.25, 2.0)
     assert len(moved.signatures) == 1
+
+
+@dataclass(frozen=True)
+class Spring(Checked):
+    stiffness: Positive = 100.0
+    steps: PositiveCount = 3
+    damped: bool = True
+    colour: Literal["red", "blue"] = "red"
+    rest_m: float | None = None
+
+
+class Bench(NamedTuple):
+    spring: Spring
+    force: Cell
+
+
+_spring = opener(Bench, "spring", "force")
+
+
+@compiled
+def press(blocks: Blocks, way: float) -> None:
+    spring, force = _spring(blocks)
+    force[0] = push(spring, way)
+
+
+@compiled
+def push(spring: Spring, way: float) -> float:
+    return spring.stiffness * way * spring.steps if spring.damped else 0.0
+
+
+def test_compiled_code_sees_the_plain_numbers_of_a_set_of_parameters():
+    assert Spring.Numbers._fields == ("stiffness", "steps", "damped")
+    bench = Flat.of(Bench(Spring(stiffness=50), np.zeros(1)))
+    press(bench.blocks, 0.1)
+    assert bench.get("force") == 15.0
+    assert push(Spring(stiffness=50).numbers, 0.1) == 15.0  # also where a whole number was given for a real one
+    found = attrgetter(Spring.Numbers.__qualname__)(sys.modules[Spring.Numbers.__module__])
+    assert found is Spring.Numbers  # Numba's cache keeps a class by its name

@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 from functools import cache
 from numbers import Integral, Real
 from types import UnionType
-from typing import Annotated, Literal, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Union, get_args, get_origin, get_type_hints
 
 from pretouch.errors import ParameterError
 
@@ -48,12 +48,40 @@ Count = Annotated[int, Check(low=0)]
 PositiveCount = Annotated[int, Check(low=1)]
 
 
+class _NumbersOf:
+    """Makes the record of a parameter set's plain numbers when it is first asked for."""
+
+    def __get__(self, _instance: object, owner: type) -> Any:
+        return _numbers_of(owner)
+
+
 class Checked:
     """Base of parameter sets: checks every field when it is made."""
+
+    Numbers: ClassVar[Any] = _NumbersOf()
+    """The set as compiled code sees it: a `NamedTuple` of its numbers; what may be none, texts and sets are left out.
+
+    A compiled function says that it takes the set itself: its fields have the same names."""
 
     def __post_init__(self) -> None:
         for name, hint in _hints(type(self)):  # type: ignore[arg-type]
             _check_field(type(self).__name__, name, hint, getattr(self, name))
+
+    @property
+    def numbers(self) -> Any:
+        """The numbers of this set, for a compiled function that Python calls."""
+        kinds = get_type_hints(self.Numbers)
+        return self.Numbers(*(kind(getattr(self, name)) for name, kind in kinds.items()))
+
+
+@cache
+def _numbers_of(kind: type) -> Any:
+    plain = ((name, getattr(hint, "__origin__", hint)) for name, hint in _hints(kind))
+    make: Any = NamedTuple
+    record = make("Numbers", [(name, number) for name, number in plain if number in (float, int, bool)])
+    # Numba's cache looks the class up by its name
+    record.__module__, record.__qualname__ = kind.__module__, f"{kind.__qualname__}.Numbers"
+    return record
 
 
 @cache

@@ -1,6 +1,7 @@
 """Records: quantities that are defined once, for Python, for compiled code and for recordings.
 
-A record is a `NamedTuple`. Its fields are numbers, arrays that are annotated with their dimensions, and other records.
+A record is a `NamedTuple`. Its fields are numbers, arrays that are annotated with their dimensions, and other records;
+or a set of parameters, of which compiled code sees the plain numbers (`Checked.Numbers`).
 Its numbers lie one behind the other in three flat blocks, of float64, int64 and bool. So the same compiled code works
 for all arms, skins and profiles. Compiled code opens the blocks as the named tuple; Python looks single fields up.
 """
@@ -44,7 +45,8 @@ class Place(NamedTuple):
 
 @cache
 def _hints(record: type) -> dict[str, Any]:
-    return get_type_hints(record, include_extras=True)
+    record = getattr(record, "Numbers", record)
+    return get_type_hints(record, include_extras=True) if hasattr(record, "_fields") else {}
 
 
 class _Part(NamedTuple):
@@ -59,8 +61,9 @@ class _Part(NamedTuple):
 
 def _tree(kind: Any, entries: list[int]) -> _Part:
     """Return a record or field with all in it; `entries` holds how many of the table's numbers are of those before."""
-    if hasattr(kind, "_fields"):
-        return _Part(kind, {name: _tree(hint, entries) for name, hint in _hints(kind).items()})
+    if hints := _hints(kind):
+        fields = {name: _tree(hint, entries) for name, hint in hints.items()}
+        return _Part(getattr(kind, "Numbers", kind), fields)
     array, *dimensions = get_args(kind) if get_origin(kind) is Annotated else (kind,)
     entry = entries[0]
     entries[0] += 1 + len(dimensions)
@@ -130,7 +133,7 @@ class Flat:
     def part(self, path: str, record: type) -> Any:
         """Return a record in the record, its arrays as views, single numbers too."""
         return record(*(
-            self.part(f"{path}.{name}", hint) if hasattr(hint, "_fields") else self._row(f"{path}.{name}")
+            self.part(f"{path}.{name}", hint) if _hints(hint) else self._row(f"{path}.{name}")
             for name, hint in _hints(record).items()
         ))  # fmt: skip
 
@@ -138,7 +141,7 @@ class Flat:
         """Write a record in the record."""
         record: type = type(value)
         for name, hint in _hints(record).items():
-            (self.fill if hasattr(hint, "_fields") else self.put)(f"{path}.{name}", getattr(value, name))
+            (self.fill if _hints(hint) else self.put)(f"{path}.{name}", getattr(value, name))
 
     def take(self, other: "Flat", names: Sequence[str]) -> None:
         """Take fields, or records with all of theirs, from another record of the same class, as far as shapes agree."""
