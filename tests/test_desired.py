@@ -12,7 +12,7 @@ from pretouch import desired, loop
 from pretouch.control.commander import _nearer, rotation_about
 from pretouch.control.path import Circle
 from pretouch.controller import Controller
-from pretouch.desired import Desired, DesiredKind, sound_desired
+from pretouch.desired import Desired, DesiredKind
 from pretouch.errors import ParameterError
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import profile
@@ -21,6 +21,7 @@ from pretouch.recording.verify import verify
 from pretouch.recording.writer import Recording
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
+from pretouch.sound import sound_desired
 from pretouch.types import ControlStep, Mode
 from tests.test_loop import DT, World
 
@@ -139,14 +140,17 @@ def test_a_motion_that_goes_stale_brings_the_arm_to_rest_says_so_and_is_taken_up
 @pytest.mark.parametrize(
     ("wrong", "said"),
     [
-        (lambda now: desired.twist(now, np.full(3, np.nan)), "it asks for nan"),
-        (lambda now: desired.twist(now, (1e9, 0.0, 0.0)), "it asks for 1e"),
-        (lambda now: desired.joint_velocities(now, np.zeros(6)), r"numbers \(1, 6\), not .* \(M, 7\)"),
+        (lambda now: desired.twist(now, np.full(3, np.nan)), "Desired.number holds nan"),
+        (lambda now: desired.twist(now, (1e9, 0.0, 0.0)), "Desired.number holds 1e"),
+        (
+            lambda now: desired.joint_velocities(now, np.zeros(6)),
+            r"number has the shape \(1, 6\), not \(1, 7\)",
+        ),
         (lambda now: desired.pose(now, 2.0 * np.eye(4)), "no rotation"),
         (lambda now: desired.twist(now + 1e4, np.zeros(3)), "s in the future"),
         (lambda now: desired.twist((now, now), np.zeros((2, 3))), "do not increase"),
-        (lambda _: "left", "it is a str"),
-        (lambda now: Desired(7, np.array([now]), np.zeros((1, 6))), "holds no kind"),
+        (lambda _: "left", "is of no kind"),
+        (lambda now: Desired(7, np.array([now]), np.zeros((1, 6))), "is of no kind"),
         (lambda now: desired.refused(now, "two programs ask"), r"cannot be used \(two programs ask\)"),
     ],
 )

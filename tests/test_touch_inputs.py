@@ -49,12 +49,15 @@ def test_readings_that_fit_are_copied():
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        (readings(6), "touch have the shapes (6,), (6,), (6,) and (6,), not (7,)"),
-        (replace(readings(), force=np.zeros((7, 1))), "not (7,)"),
-        (replace(readings(), contact=np.zeros(7)), "are of types float64 and int64"),
-        (replace(readings(), status=np.array(["a"] * 7)), "are of types bool and <U1"),
-        (replace(readings(), stamp=["soon"] * 7), "touch readings are not arrays of numbers"),
-        ("nothing", "touch readings are 'nothing'"),
+        (readings(6), "TouchReadings.stamp has the shape (6,), not (7,)"),
+        (replace(readings(), force=np.zeros((7, 1))), "TouchReadings.force has the shape (7, 1), not (7,)"),
+        (
+            replace(readings(), contact=np.zeros(7)),
+            "no array of yes and no",
+        ),
+        (replace(readings(), status=np.array(["a"] * 7)), "no array of whole numbers"),
+        (replace(readings(), stamp=["soon"] * 7), "TouchReadings.stamp is"),
+        ("nothing", "'nothing' is no TouchReadings"),
     ],
 )
 def test_readings_that_do_not_fit_are_said_and_hold_the_arm(panda_model, feeling, given, said):

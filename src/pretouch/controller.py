@@ -8,20 +8,18 @@ every step is one call of `line`. Where something happened, a part is in plain P
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
-from pretouch import faults
 from pretouch.contact.announced_load import LoadState, most_kg
 from pretouch.contact.detector import Body
 from pretouch.contact.model_update import SequentialState
 from pretouch.contact.residual_model import ResidualModel
-from pretouch.control.interface import MotionBody, MotionRequest, Restriction, rows_of
+from pretouch.control.interface import MotionBody
 from pretouch.control.joint_box import joint_limits
 from pretouch.control.path import Path, nearest_phase
 from pretouch.decision import Decision
 from pretouch.errors import RobotStateError, SkinError
-from pretouch.groups import CapsuleArrays, Kinematics, Obstacles
-from pretouch.line import CHECK, MOVE, line, line_within
+from pretouch.faults import Report, Watched, put_robot, robot_of, take_sent
+from pretouch.groups import CapsuleArrays
+from pretouch.line import CHECK, MOVE, line
 from pretouch.line_records import PYTHON, SEQUENTIAL
 from pretouch.line_setup import fixed_of, kinds_of, now_init, remembered_init
 from pretouch.modes import CLEAR, SOLVED, ModeState, mode_init
@@ -32,8 +30,8 @@ from pretouch.profiles import Profile
 from pretouch.records import Flat
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.sound import sound_robot
-from pretouch.types import WHOLE, ControlStep, FloatArray, Inputs, RobotState
+from pretouch.sound import UsualInputs, sound_robot
+from pretouch.types import ControlStep, FloatArray, Inputs, RobotState
 from pretouch.values import value
 
 
@@ -69,9 +67,9 @@ class ControllerState:
         return self.memory.get("pace.phase")
 
     @property
-    def watch(self) -> faults.Watch:
-        """What the next inputs are judged by."""
-        return faults.watch_of(self.memory)
+    def robot(self) -> RobotState:
+        """The arm's state that was believed last."""
+        return robot_of(self.memory.part("watch.robot", Report))
 
     @property
     def heard(self) -> FloatArray:
@@ -100,9 +98,9 @@ class Controller:
         self.body = Body(model, skin, self.limits.period, fixtures.planes, fixtures.capsules)
         self.detector = profile.detect.on(self.body)
         self.kinds, self.most_kg = kinds_of(profile), most_kg(model)
-        self._motion_body = MotionBody(model, len(skin), self.limits, profile.task)
+        self.motion_body = MotionBody(model, len(skin), self.limits, profile.task)
         python = self.kinds.approach == PYTHON and profile.approach is not None
-        self.approach = profile.approach.on(self._motion_body) if python and profile.approach is not None else None
+        self.approach = profile.approach.on(self.motion_body) if python and profile.approach is not None else None
         """A restriction in plain Python; None of one that is compiled."""
         self.touching = profile.detect.reads_touch and len(skin.touching) > 0
         self.outside = outside_setup(model, skin, fixtures, profile.perception)
@@ -110,10 +108,7 @@ class Controller:
         self.fixed, self._begin = Flat.of(fixed_of(self)), Flat.of(remembered_init(self))
         self.blank = now = Flat.of(now_init(self))
         """What a step begins with: not written to."""
-        self._joints = slice(now.places["robot.q"].at.start, now.places["robot.wrench"].at.stop)
-        self._heard = slice(now.places["readings.stamp"].at.start, now.places["readings.distance"].at.stop)
-        self._status, self._ending = now.places["readings.status"].at, now.places["answer.ending"].at.start
-        self._stamps = [now.places["stamp"].at.start, now.places["robot.stamp"].at.start]
+        self._usual = UsualInputs(now)
         self._on_path = slice(now.places["path.phase"].at.start, now.places["path.tangent"].at.stop)
 
     def init(self, robot: RobotState, learnt: ResidualModel | None = None) -> ControllerState:
@@ -125,7 +120,9 @@ class Controller:
         if sound is None:
             raise RobotStateError(f"The controller cannot start: {wrong}: check the connection to the arm.")
         memory = self._begin.copy()
-        faults.keep_watch(memory, faults.watch_init(sound))
+        put_robot(memory.part("watch.robot", Report), sound)
+        memory.put("watch.stamp", sound.stamp)
+        memory.put("watch.force_stamp", sound.stamp)
         memory.put("command", sound.qd_commanded)
         memory.put("rotation_goal", self.model.kinematics(sound.q).rotation[self.model.ee])
         detector = self.kept_detector(memory, self.detector.init(self.body, learnt))
@@ -145,11 +142,11 @@ class Controller:
             raise RobotStateError("The state is that of a controller for another arm or skin: begin with init().")
         same_window = mine.window.samples == theirs.window.samples and type(mine.detect) is type(theirs.detect)
         same_points = _points_per_link(mine) == _points_per_link(theirs)
-        parts = ["tracks", "pace", "command", "rotation_goal", "mass"]
+        parts = ["watch", "tracks", "pace", "command", "rotation_goal", "mass"]
         parts += ["window"] * same_window + ["null_velocity"] * (mine.null_space == theirs.null_space)
         memory.take(remembered, parts + ["slots"] * (mine.approach == theirs.approach and same_points))
-        watch = faults.watch_of(remembered)  # at another rate more or fewer commands are kept
-        faults.keep_watch(memory, watch)
+        watch = memory.part("watch", Watched)
+        take_sent(watch, remembered.part("watch", Watched))
         if self.path is not before.path:
             here = self.model.kinematics(watch.robot.q).position[self.model.ee]
             memory.put("pace.phase", nearest_phase(self.path, here))
@@ -170,9 +167,9 @@ class Controller:
         memory = remembered.copy()
         if state.calm:
             now = self.blank.copy()
-            if self._taken(now, inputs):
+            if self._usual.copied(now, inputs):
                 self.put_path(now, remembered.get("pace.phase"))
-                if self.take(memory, now, self.beside, CHECK, MOVE) and now.blocks[1][self._ending] == SOLVED:
+                if self.take(memory, now, self.beside, CHECK, MOVE) and now.get("answer.ending") == SOLVED:
                     return ControlStep.of(now, CLEAR), ControllerState(
                         memory, CLEAR, state.detector, state.reaction, state.approach, None, None, True, True
                     )
@@ -184,46 +181,10 @@ class Controller:
         """Take stages of a step; see `line`."""
         return line(self.fixed.blocks, memory.blocks, now.blocks, beside, first, last)
 
-    def _taken(self, now: Flat, inputs: Inputs) -> bool:
-        """Copy inputs that are as usual; else say so."""
-        robot, readings, n, units = inputs.robot, inputs.readings, self.model.n, len(self.skin)
-        if inputs.resume or inputs.points is not None or inputs.payload is not None:
-            return False
-        if inputs.desired is not None or inputs.moving is not None:
-            return False
-        try:
-            parts: Any = (robot.q, robot.qd, robot.q_commanded, robot.qd_commanded, robot.tau_ext, robot.wrench)
-            stamps, distance, status = readings.stamp, readings.distance, readings.status
-            if [*map(len, parts)] != [n, n, n, n, n, 6] or not len(stamps) == len(distance) == len(status) == units:
-                return False
-            if status.dtype is not WHOLE or not (isinstance(inputs.stamp, float) and isinstance(robot.stamp, float)):
-                return False
-            numbers, whole = now.blocks[0], now.blocks[1]
-            np.concatenate(parts, out=numbers[self._joints])
-            np.concatenate((stamps, distance), out=numbers[self._heard])
-            whole[self._status] = status
-            numbers[self._stamps[0]], numbers[self._stamps[1]] = inputs.stamp, robot.stamp
-            return True
-        except (AttributeError, TypeError, ValueError, OverflowError):
-            return False
-
     def put_path(self, now: Flat, phase: float) -> None:
         """Write where the path is at an arc length [m]."""
         at = now.blocks[0][self._on_path]
         at[0], at[1:4], at[4:] = phase, self.path.point(phase), self.path.tangent(phase)
-
-    def restricted(
-        self, part: Restriction, state: object, memory: Flat, now: Flat, robot: RobotState, request: MotionRequest
-    ) -> object:
-        """Move within what a restriction in plain Python allows; return what it remembers."""
-        count = now.get("seen.all")
-        obstacles = Obstacles._make(near[:count] for near in now.part("seen.near", Obstacles))
-        kin = now.part("kin", Kinematics)
-        allowed, state = part.step(state, self._motion_body, kin, robot, obstacles, request)
-        if allowed.velocity is not None:
-            now.put("request.velocity", request.velocity + allowed.velocity)
-        line_within(self.fixed.blocks, memory.blocks, now.blocks, *rows_of(allowed, self.model.n))
-        return state
 
     def whole_detector(self, state: ControllerState) -> Any:
         """Return all that the detector remembers."""
@@ -259,7 +220,7 @@ class Controller:
 
     def _approach_init(self) -> object:
         """Return what a restriction in plain Python remembers at first."""
-        return None if self.approach is None else self.approach.init(self._motion_body)
+        return None if self.approach is None else self.approach.init(self.motion_body)
 
 
 def _points_per_link(profile: Profile) -> int:

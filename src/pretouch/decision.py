@@ -5,22 +5,22 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pretouch import faults
 from pretouch.contact.announced_load import announced, kept_free, without_load
 from pretouch.contact.detector import Detection, Sample
 from pretouch.contact.reaction import ReactionInputs
 from pretouch.contact.window import Window, add_force
-from pretouch.control.commander import Asked, asked_by, commanded
-from pretouch.control.interface import MotionRequest
+from pretouch.control.commander import Asked, asked_by
+from pretouch.control.interface import MotionRequest, Restriction, rows_of
+from pretouch.faults import Report, Watched, examine, put_robot
 from pretouch.groups import Kinematics, Obstacles
-from pretouch.line import ASK, MOVE, SEE
+from pretouch.line import ASK, MOVE, SEE, line_within
 from pretouch.modes import CLEAR, Event, QpOutcome, next_mode, outcome_of
-from pretouch.perception.moving import beside, near_moving, sound_moving
+from pretouch.perception.moving import beside, near_moving
 from pretouch.perception.obstacles import TrackState, silent_units, track_init
 from pretouch.perception.outside import outside_silence, see_outside
 from pretouch.records import Flat
-from pretouch.sound import sound_payload, sound_points, sound_readings, sound_touch
-from pretouch.types import ControlStep, Inputs, Mode
+from pretouch.sound import sound_desired, sound_moving, sound_payload, sound_points, sound_readings, sound_touch
+from pretouch.types import ControlStep, Inputs, Mode, RobotState
 
 if TYPE_CHECKING:
     from pretouch.controller import Controller, ControllerState
@@ -64,25 +64,25 @@ class Decision:
     def _judge(self, inputs: Inputs) -> None:
         """Find what of the inputs can be used, and what is wrong with the rest."""
         p, controller, memory, units = self.profile, self.controller, self.memory, len(self.controller.skin)
-        self.robot, events, watch = faults.examine(
-            faults.watch_of(memory), inputs, memory.get("command"), controller.limits.period, controller.limits.qd_max,
-            p.failure, p.detect.by_torques,
+        self.robot, self.events = examine(
+            memory.part("watch", Watched), inputs, memory.get("command"), controller.limits.period,
+            controller.limits.qd_max, p.failure, p.detect.by_torques,
         )  # fmt: skip
-        self.stamp, seeing = watch.stamp, p.perception is not None
+        self.stamp, seeing = memory.get("watch.stamp"), p.perception is not None
         self.readings, unfit = sound_readings(inputs.readings, units)
         self.touches, wrong = sound_touch(inputs.touch, units) if controller.touching else (None, "")
         self.points, self.lost = sound_points(inputs.points)
         payload, heavy = sound_payload(inputs.payload, controller.most_kg)
         self.load = announced(self.state.load, payload, self.robot)
         self.moving, astray = sound_moving(inputs.moving, self.stamp, p.failure.state_timeout_s)
-        self.desired, ended = commanded(inputs.desired, self.model.n, self.stamp, p.failure)
-        self.events = events | ended
-        self._note({Event.LOAD_UNFIT: heavy, Event.MOVING_LOST: astray})
+        self.desired, refused = sound_desired(inputs.desired, self.model.n, self.stamp)
+        self._note({Event.LOAD_UNFIT: heavy, Event.MOVING_LOST: astray, Event.DESIRED_UNFIT: refused})
+        if self.desired is not None and (age := self.stamp - self.desired.stamp[-1]) > p.failure.desired_timeout_s:
+            self.events[Event.DESIRED_STALE] = f"{age:.2f} s"
         self._note({Event.SKIN_UNFIT: (unfit or wrong) if seeing else ""})
-        faults.keep_watch(memory, watch)
         self.now.put("stamp", self.stamp)
         self.now.fill("readings", self.readings)
-        if Event.TIME_BACKWARDS in events:
+        if Event.TIME_BACKWARDS in self.events:
             memory.fill("tracks", track_init(units))
         if self.moving is not None and p.perception is not None:
             fixtures, persistence = controller.fixtures.capsules, p.perception.persistence_s
@@ -95,12 +95,13 @@ class Decision:
     def _see(self) -> None:
         """Find where the arm is, and what is near (eq. 1)."""
         now, see, stamp, robot = self.now, self.profile.perception, self.stamp, self.robot
-        faults.put_robot(now, "robot", robot)
+        report = now.part("robot", Report)
+        put_robot(report, robot)
         self._line(SEE)
         self.kin = kin = now.part("kin", Kinematics)
         if self.load is not None:
             self.robot, self.load = without_load(self.load, self.model, kin, robot, self.controller.limits.period)
-            faults.put_robot(now, "robot", self.robot)
+            put_robot(report, self.robot)
         if see is not None:
             tracks, skin = self.memory.part("tracks", TrackState), self.controller.skin
             heard, self.silent = silent_units(skin, tracks, self.readings.status, now.get("seen.silence"), stamp, see)
@@ -117,17 +118,12 @@ class Decision:
             self._note({Event.SKIN_SILENT: self.silent, Event.POINTS_LOST: self.lost})
         else:
             self.lost = ""
-        self.seen = self._obstacles("seen.found")
+        self.seen = near_of(now, "seen.found")
         now.put("seen.all", now.get("seen.found"))
         if self.moving is not None:
             places = len(self.controller.skin) + (0 if self.outside is None else len(self.outside.sigma))
             self._add(near_moving(self.moving, self.model, kin, stamp, places), "seen.all")
             now.put("request.untouched", places)
-
-    def _obstacles(self, count: str) -> Obstacles:
-        """Return as many obstacles as a field counts."""
-        found = self.now.get(count)
-        return Obstacles._make(part[:found] for part in self.now.part("seen.near", Obstacles))
 
     def _add(self, obstacles: Obstacles, count: str) -> None:
         """Add obstacles to those that a field counts."""
@@ -163,7 +159,7 @@ class Decision:
         missed = bool(self.silent or self.lost)
         phase, goal = memory.get("pace.phase"), memory.get("rotation_goal").copy()
         noticed = ReactionInputs(
-            mode, self.kin, self.robot, detection, self._obstacles("seen.all"), missed, memory.get("command").copy(),
+            mode, self.kin, self.robot, detection, near_of(now, "seen.all"), missed, memory.get("command").copy(),
             phase, resume,
         )  # fmt: skip
         answers, reaction = p.react.sense(controller.whole_reaction(self.state), controller.body, noticed)
@@ -205,7 +201,7 @@ class Decision:
             request = MotionRequest(
                 asked.velocity, asked.rotation_goal, hold, asked.qd, None if np.isnan(touch) else touch
             )
-            approach = controller.restricted(part, approach, self.memory, now, self.robot, request)
+            approach = move_restricted(controller, part, approach, self.memory, now, self.robot, request)
         outcome, status, _ = outcome_of(hold, now.get("answer.ending"), bool(now.get("answer.violated")))
         if outcome in _TROUBLE and (outcome is QpOutcome.FAILED or mode.mode is not Mode.HOLD):
             self.mode = next_mode(mode, {_TROUBLE[outcome]: status}, resume=False)
@@ -214,6 +210,31 @@ class Decision:
 
     def _line(self, stage: int) -> None:
         self.controller.take(self.memory, self.now, self.beside, stage, stage)
+
+
+def move_restricted(
+    controller: "Controller",
+    part: Restriction,
+    state: object,
+    memory: Flat,
+    now: Flat,
+    robot: RobotState,
+    request: MotionRequest,
+) -> object:
+    """Move within what a restriction in plain Python allows; return what it remembers."""
+    obstacles = near_of(now, "seen.all")
+    kin = now.part("kin", Kinematics)
+    allowed, state = part.step(state, controller.motion_body, kin, robot, obstacles, request)
+    if allowed.velocity is not None:
+        now.put("request.velocity", request.velocity + allowed.velocity)
+    line_within(controller.fixed.blocks, memory.blocks, now.blocks, *rows_of(allowed, controller.model.n))
+    return state
+
+
+def near_of(now: Flat, count: str) -> Obstacles:
+    """Return as many obstacles of a step as a field counts."""
+    found = now.get(count)
+    return Obstacles._make(part[:found] for part in now.part("seen.near", Obstacles))
 
 
 _TROUBLE = {QpOutcome.FAILED: Event.SOLVER_FAILED, QpOutcome.INFEASIBLE: Event.BLOCKED}

@@ -1,12 +1,13 @@
 """What a commander asks of the arm: a twist, joint velocities, a pose or joint positions, now or over a horizon."""
 
 from enum import IntEnum
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pretouch.errors import ParameterError
-from pretouch.values import FloatArray, real, value
+from pretouch.values import LARGEST, LATEST, FloatArray, real, value
 
 
 class DesiredKind(IntEnum):
@@ -31,25 +32,12 @@ class Desired:
     """
 
     kind: DesiredKind
-    stamp: FloatArray
+    stamp: Annotated[FloatArray, "M", LATEST]
     """(M,) instants, increasing, by the clock of the steps [s]."""
-    number: FloatArray
+    number: Annotated[FloatArray, "M", "w", LARGEST]
     """(M, w) what is asked, see `DesiredKind`."""
     refused: str = ""
     """Why what was asked is none, found where it came in: the arm holds, and says this."""
-
-
-_MOST = 1000
-"""Instants of a horizon."""
-LARGEST = 1e3
-"""A desired number, a joint position or velocity [rad, rad/s, m, m/s] from here on is none: another unit, or broken."""
-_ROUNDING = 1e-6
-"""By how much the columns of a rotation may miss unit length and right angles."""
-LATEST = 1e12
-"""A time stamp [s] from here on is none, whatever the clock began with."""
-_AHEAD_S = 60.0
-"""A horizon that begins so far in the future is stamped by another clock."""
-_WIDTH = {DesiredKind.TWIST: 6, DesiredKind.POSE: 12}
 
 
 def twist(stamp: ArrayLike, linear: ArrayLike, angular: ArrayLike = (0.0, 0.0, 0.0)) -> Desired:
@@ -88,37 +76,3 @@ def _made(kind: DesiredKind, stamp: ArrayLike, number: FloatArray) -> Desired:
     if stamps.shape != number.shape[:1]:
         raise ParameterError(f"A desired motion has {stamps.size} stamps and {len(number)} rows: give one stamp a row.")
     return Desired(kind, stamps, number)
-
-
-def sound_desired(desired: Desired | None, joints: int, now: float) -> tuple[Desired | None, str]:
-    """Copy a desired motion for an arm of so many joints, or say what keeps it from being one."""
-    if desired is None:
-        return None, ""
-    try:
-        kind = DesiredKind(desired.kind)
-        stamp, number = real(desired.stamp), real(desired.number)
-        if desired.refused:
-            return None, str(desired.refused)
-    except (AttributeError, TypeError, ValueError, OverflowError):
-        return None, f"it is a {type(desired).__name__} that holds no kind, stamps and numbers"
-    wanted = _WIDTH.get(kind, joints)
-    if stamp.ndim != 1 or not 1 <= len(stamp) <= _MOST or number.shape != (len(stamp), wanted):
-        return None, f"stamps {stamp.shape} and numbers {number.shape}, not (M,) and (M, {wanted}) with M up to {_MOST}"
-    wrong = ~(np.abs(number) < LARGEST)
-    if wrong.any():
-        return None, f"it asks for {number[wrong][0]:g}"
-    wrong = ~(np.abs(stamp) < LATEST)
-    if wrong.any():
-        return None, f"its time stamp is {stamp[wrong][0]:g}"
-    if (np.diff(stamp) <= 0.0).any():
-        return None, "its stamps do not increase"
-    if stamp[0] > now + _AHEAD_S:
-        return None, f"it is stamped {stamp[0] - now:.0f} s in the future"
-    if kind is DesiredKind.POSE and not _are_rotations(number[:, 3:].reshape(-1, 3, 3)):
-        return None, "its orientation is no rotation"
-    return Desired(kind, stamp, number), ""
-
-
-def _are_rotations(R: FloatArray) -> bool:
-    orthonormal = np.abs(R @ R.transpose(0, 2, 1) - np.eye(3)) < _ROUNDING
-    return bool(orthonormal.all() and (np.linalg.det(R) > 0.0).all())

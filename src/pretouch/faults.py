@@ -5,39 +5,14 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from pretouch.compiled import kernel
-from pretouch.desired import LARGEST, LATEST
+from pretouch.compiled import compiled, kernel
 from pretouch.modes import Event
 from pretouch.params import FailureParams
-from pretouch.records import Cell, Flat, IntCell
+from pretouch.records import Cell, IntCell
 from pretouch.robot.vectors import below
 from pretouch.sound import FASTEST, STRONGEST, sound_robot, time_of
 from pretouch.types import FloatArray, Inputs, RobotState
-from pretouch.values import value
-
-
-@value
-class Watch:
-    """What is remembered to judge the next inputs."""
-
-    stamp: float
-    """Instant of the last step [s], always finite."""
-    robot: RobotState
-    """The last state that was believed."""
-    force_stamp: float
-    """When the robot last gave a force estimate [s]."""
-    sent: tuple[tuple[float, FloatArray], ...] = ()
-    """Instants [s] and joint velocities (n,) [rad/s] of the commands that the last state may not know yet."""
-
-
-class Belief(NamedTuple):
-    """Which reports of an arm are believed."""
-
-    qd_max: Annotated[FloatArray, "n"]
-    """(n,) joint velocity limits [rad/s]."""
-    state_timeout_s: float
-    overrun_s: float
-    force_max_n: float
+from pretouch.values import LARGEST, LATEST
 
 
 class Report(NamedTuple):
@@ -53,11 +28,14 @@ class Report(NamedTuple):
 
 
 class Watched(NamedTuple):
-    """What is remembered to judge the next inputs, see `faults.Watch`."""
+    """What is remembered to judge the next inputs."""
 
     stamp: Cell
+    """Instant of the last step [s], always finite."""
     force_stamp: Cell
+    """When the robot last gave a force estimate [s]."""
     robot: Report
+    """The last state that was believed."""
     sent: IntCell
     """How many commands the last state may not know yet."""
     sent_stamp: Annotated[FloatArray, "S"]
@@ -66,28 +44,23 @@ class Watched(NamedTuple):
     """(S, n) [rad/s]."""
 
 
-def watch_init(robot: RobotState) -> Watch:
-    """Begin with a state that is known to be good."""
-    return Watch(robot.stamp, robot, robot.stamp)
-
-
 def examine(
-    watch: Watch,
+    watch: Watched,
     inputs: Inputs,
     command: FloatArray,
     period: float,
     qd_max: FloatArray,
     params: FailureParams,
     torques: bool = False,
-) -> tuple[RobotState, dict[Event, str], Watch]:
-    """Return the robot state to go by, the faults found, and what to remember.
+) -> tuple[RobotState, dict[Event, str]]:
+    """Return the robot state to go by, and the faults found; write what is to be remembered.
 
     In place of a state that cannot be believed stands the last one that could, moved on by the last command. One from
     before the last command, lost or late, is moved on by the commands it cannot know of: the next one may differ from
     the last one sent by so much only. What is returned shares no memory with the inputs.
 
     Args:
-        watch: memory.
+        watch: memory, written to.
         inputs: of this step.
         command: (n,) last joint velocity command [rad/s].
         period: time that command was held [s].
@@ -97,36 +70,39 @@ def examine(
     """
     faults: dict[Event, str] = {}
     robot, wrong = sound_robot(inputs.robot, qd_max)
-    stamp = time_of(inputs.stamp)
-    now = watch.stamp if stamp is None else stamp
+    stamp, before = time_of(inputs.stamp), float(watch.stamp[0])
+    now = before if stamp is None else stamp
     if robot is None:
         faults[Event.UNUSABLE] = wrong
     elif stamp is None:
-        faults[Event.UNUSABLE] = f"the step's time stamp is {inputs.stamp}"
+        faults[Event.UNUSABLE] = f"Inputs.stamp is {inputs.stamp!r}"
     elif abs(now - robot.stamp) > params.state_timeout_s:
         faults[Event.STATE_STALE] = _stale(now - robot.stamp)
-    sent = (*watch.sent[-int(params.state_timeout_s / period) - 1 :], (watch.stamp, command))
-    if now < watch.stamp:
-        faults[Event.TIME_BACKWARDS] = f"from {watch.stamp:.3f} s to {now:.3f} s"
-        sent = ()
+    add_sent(watch, command)
+    if now < before:
+        faults[Event.TIME_BACKWARDS] = f"from {before:.3f} s to {now:.3f} s"
+        watch.sent[0] = 0
     if robot is None or faults:
-        last = watch.robot
-        believed = replace(
-            last, q_commanded=last.q_commanded + command * period, qd_commanded=command,
+        last = robot_of(watch.robot)
+        robot = replace(
+            last, q_commanded=last.q_commanded + command * period, qd_commanded=command.copy(),
             tau_ext=np.full(len(last.q), np.nan), wrench=None,
         )  # fmt: skip
-        return believed, faults, Watch(now, believed, min(watch.force_stamp, now), sent)
-    if robot.stamp <= watch.stamp < now:
-        robot = replace(robot, q_commanded=_moved_on(robot, now, sent), qd_commanded=command)
-    if robot.wrench is not None and not below(robot.wrench, params.force_max_n):
-        robot = replace(robot, wrench=None)
-    missing = not below(robot.tau_ext, STRONGEST) if torques else robot.wrench is None
-    force_stamp = min(watch.force_stamp, now) if missing else now
-    if now - watch.stamp > params.overrun_s:
-        faults[Event.OVERRUN] = f"{now - watch.stamp:.3f} s"
-    if now - force_stamp > params.force_timeout_s:
-        faults[Event.NO_FORCE] = f"{now - force_stamp:.2f} s"
-    return robot, faults, Watch(now, robot, force_stamp, sent)
+        watch.force_stamp[0] = min(watch.force_stamp[0], now)
+    else:
+        if robot.stamp <= before < now:
+            robot = replace(robot, q_commanded=_moved_on(robot, now, watch), qd_commanded=command.copy())
+        if robot.wrench is not None and not below(robot.wrench, params.force_max_n):
+            robot = replace(robot, wrench=None)
+        missing = not below(robot.tau_ext, STRONGEST) if torques else robot.wrench is None
+        watch.force_stamp[0] = min(watch.force_stamp[0], now) if missing else now
+        if now - before > params.overrun_s:
+            faults[Event.OVERRUN] = f"{now - before:.3f} s"
+        if now - watch.force_stamp[0] > params.force_timeout_s:
+            faults[Event.NO_FORCE] = f"{now - watch.force_stamp[0]:.2f} s"
+    watch.stamp[0] = now
+    put_robot(watch.robot, robot)
+    return robot, faults
 
 
 def _stale(age: float) -> str:
@@ -139,64 +115,66 @@ def _stale(age: float) -> str:
     )
 
 
-def _moved_on(robot: RobotState, now: float, sent: tuple[tuple[float, FloatArray], ...]) -> FloatArray:
+def _moved_on(robot: RobotState, now: float, watch: Watched) -> FloatArray:
     """Commanded joint positions (n,) [rad] by now of an arm that was sent these commands after its report."""
-    q, ends = robot.q_commanded, [start for start, _ in sent[1:]]
-    for i, (end, (start, command)) in enumerate(zip([*ends, now], sent, strict=True)):
+    q, count = robot.q_commanded, watch.sent[0]
+    for i, (start, command) in enumerate(zip(watch.sent_stamp[:count], watch.sent_command[:count], strict=True)):
         # what came before the first of them is not known, and taken to be the same
-        held = end - (max(start, robot.stamp) if i else robot.stamp)
-        if held > 0:
-            q = q + command * held
+        begin = max(start, robot.stamp) if i else robot.stamp
+        lasted = (watch.sent_stamp[i + 1] if i + 1 < count else now) - begin
+        if lasted > 0:
+            q = q + command * lasted
     return q
 
 
-def watch_of(memory: Flat) -> Watch:
-    """Return what a controller remembers to judge the next inputs."""
-    count, stamps, commands = (memory.get(f"watch.{name}") for name in ("sent", "sent_stamp", "sent_command"))
-    sent = zip(stamps[:count].tolist(), commands[:count], strict=True)
-    return Watch(
-        memory.get("watch.stamp"), robot_of(memory, "watch.robot"), memory.get("watch.force_stamp"), tuple(sent)
+def robot_of(report: Report) -> RobotState:
+    """Return the arm's state that a report in a record holds, as a copy."""
+    stamp, q, qd, q_commanded, qd_commanded, tau_ext, wrench = (part.copy() for part in report)
+    known = None if np.isnan(wrench[0]) else wrench
+    return RobotState(float(stamp[0]), q, qd, q_commanded, qd_commanded, tau_ext, known)
+
+
+def put_robot(report: Report, robot: RobotState) -> None:
+    """Write an arm's state to a report in a record."""
+    for name, part in report._asdict().items():
+        number = getattr(robot, name)
+        part[:] = np.nan if number is None else number
+
+
+@compiled
+def add_sent(watch: Watched, command: FloatArray) -> None:
+    """Note that a command was sent at the last step; of more than there is room for the oldest is forgotten."""
+    count = watch.sent[0]
+    if count == len(watch.sent_stamp):
+        watch.sent_stamp[:-1], watch.sent_command[:-1] = watch.sent_stamp[1:].copy(), watch.sent_command[1:].copy()
+        count -= 1
+    watch.sent_stamp[count], watch.sent_command[count], watch.sent[0] = watch.stamp[0], command, count + 1
+
+
+def take_sent(watch: Watched, other: Watched) -> None:
+    """Take the commands that another record says were sent, of those that there is no room for the newest."""
+    last = other.sent[0]
+    count = watch.sent[0] = min(last, len(watch.sent_stamp))
+    watch.sent_stamp[:count], watch.sent_command[:count] = (
+        part[last - count : last] for part in (other.sent_stamp, other.sent_command)
     )
 
 
-def keep_watch(memory: Flat, watch: Watch) -> None:
-    """Let a controller remember it: of the commands the newest."""
-    most = len(memory.get("watch.sent_stamp"))
-    sent = watch.sent[-most:]
-    memory.put("watch.stamp", watch.stamp)
-    memory.put("watch.force_stamp", watch.force_stamp)
-    memory.put("watch.sent", len(sent))
-    stamps, commands = memory.get("watch.sent_stamp"), memory.get("watch.sent_command")
-    for k, (stamp, command) in enumerate(sent):
-        stamps[k], commands[k] = stamp, command
-    put_robot(memory, "watch.robot", watch.robot)
-
-
-def robot_of(record: Flat, path: str) -> RobotState:
-    """Return the arm's state that a `Report` in a record holds."""
-    known = {name: record.get(f"{path}.{name}") for name in Report._fields}
-    return RobotState(**known | ({"wrench": None} if np.isnan(known["wrench"][0]) else {}))
-
-
-def put_robot(record: Flat, path: str, robot: RobotState) -> None:
-    """Write an arm's state to a `Report` in a record."""
-    for name in Report._fields:
-        number = getattr(robot, name)
-        record.put(f"{path}.{name}", np.nan if number is None else number)
-
-
 @kernel
-def believable(now: float, robot: Report, watch: Watched, command: FloatArray, p: Belief) -> bool:
+def believable(
+    now: float, robot: Report, watch: Watched, command: FloatArray, qd_max: FloatArray, p: FailureParams
+) -> bool:
     """Whether `examine` finds no fault and changes nothing but torques to NaN; then do what it does to the memory.
 
-    `now` [s] is the instant of the step, `command` (n,) the last joint velocity command [rad/s].
+    `now` [s] is the instant of the step, `command` (n,) the last joint velocity command, `qd_max` (n,) its limits
+    [rad/s].
     """
     stamp = robot.stamp[0]
-    for j in range(len(p.qd_max)):
+    for j in range(len(qd_max)):
         for number in (robot.q[j], robot.qd[j], robot.q_commanded[j]):
-            if not abs(number) < LARGEST:
+            if not abs(number) < LARGEST.limit:
                 return False
-        if not abs(robot.qd_commanded[j]) < FASTEST * p.qd_max[j]:
+        if not abs(robot.qd_commanded[j]) < FASTEST * qd_max[j]:
             return False
     for number in robot.wrench:
         if not abs(number) < p.force_max_n:
@@ -204,13 +182,11 @@ def believable(now: float, robot: Report, watch: Watched, command: FloatArray, p
     on_time = abs(now - stamp) <= p.state_timeout_s and 0.0 <= now - watch.stamp[0] <= p.overrun_s
     # a state from before the last command, or one without torques, is for `examine`
     newer = stamp > watch.stamp[0] or now == watch.stamp[0]
-    if not (abs(now) < LATEST and abs(stamp) < LATEST and on_time and newer and below(robot.tau_ext, STRONGEST)):
+    if not (
+        abs(now) < LATEST.limit and abs(stamp) < LATEST.limit and on_time and newer and below(robot.tau_ext, STRONGEST)
+    ):
         return False
-    count = watch.sent[0]
-    if count == len(watch.sent_stamp):
-        watch.sent_stamp[:-1], watch.sent_command[:-1] = watch.sent_stamp[1:].copy(), watch.sent_command[1:].copy()
-        count -= 1
-    watch.sent_stamp[count], watch.sent_command[count], watch.sent[0] = watch.stamp[0], command, count + 1
+    add_sent(watch, command)
     watch.stamp[0] = watch.force_stamp[0] = now
     last = watch.robot
     last.stamp[0], last.q[:], last.qd[:], last.q_commanded[:] = stamp, robot.q, robot.qd, robot.q_commanded

@@ -3,13 +3,13 @@
 import math
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from pretouch.desired import Desired
 from pretouch.errors import ParameterError
-from pretouch.values import BoolArray, FloatArray, IntArray, real_number, value
+from pretouch.values import LARGEST, LATEST, Below, BoolArray, FloatArray, IntArray, real_number, value
 
 
 class RangeStatus(IntEnum):
@@ -38,11 +38,11 @@ class RangeStatus(IntEnum):
 class RangeReadings:
     """The newest reading of each of K units, in the order of the skin; of one never heard -inf, and status NONE."""
 
-    stamp: FloatArray
+    stamp: Annotated[FloatArray, "K"]
     """(K,) instant of each measurement [s]."""
-    distance: FloatArray
+    distance: Annotated[FloatArray, "K"]
     """(K,) distance along the beam from the sensor origin [m]; meaningless unless the status says so."""
-    status: IntArray
+    status: Annotated[IntArray, "K"]
     """(K,) `RangeStatus` codes."""
 
 
@@ -63,13 +63,13 @@ class TouchReadings:
     A unit without a touch sensor, and one that has never been heard, has stamp -inf and status NONE.
     """
 
-    stamp: FloatArray
+    stamp: Annotated[FloatArray, "K"]
     """(K,) instant of each measurement [s]."""
-    contact: BoolArray
+    contact: Annotated[BoolArray, "K"]
     """(K,) whether the unit is touched; meaningless unless the status is OK."""
-    force: FloatArray
+    force: Annotated[FloatArray, "K"]
     """(K,) size of the force on it [N], NaN where it is not measured."""
-    status: IntArray
+    status: Annotated[IntArray, "K"]
     """(K,) `TouchStatus` codes."""
 
 
@@ -77,19 +77,19 @@ class TouchReadings:
 class RobotState:
     """What the robot's own interface reports at one instant, n joints."""
 
-    stamp: float
+    stamp: Annotated[float, LATEST]
     """Instant of the measurement [s]."""
-    q: FloatArray
+    q: Annotated[FloatArray, "n", LARGEST]
     """(n,) measured joint positions [rad]."""
-    qd: FloatArray
+    qd: Annotated[FloatArray, "n", LARGEST]
     """(n,) measured joint velocities [rad/s]."""
-    q_commanded: FloatArray
+    q_commanded: Annotated[FloatArray, "n", LARGEST]
     """(n,) joint positions the robot's motion generator is at [rad] (the vendor's q_d)."""
-    qd_commanded: FloatArray
+    qd_commanded: Annotated[FloatArray, "n", LARGEST]
     """(n,) joint velocities the robot's motion generator is at [rad/s] (the vendor's dq_d)."""
-    tau_ext: FloatArray
+    tau_ext: Annotated[FloatArray, "n"]
     """(n,) estimated torques by the environment on the joints [Nm]; within a step NaN where the robot gave none."""
-    wrench: FloatArray | None
+    wrench: Annotated[FloatArray | None, 6]
     """(6,) estimated force [N] and torque about the TCP [Nm] **on the robot by the environment**, base frame.
 
     None where the robot has no estimate, as near a singularity.
@@ -104,11 +104,11 @@ class SeenPoints(NamedTuple):
 
     heard: float
     """Newest measurement of the source silent for longest [s], -inf before the first; no points: nothing is seen."""
-    stamp: FloatArray
+    stamp: Annotated[FloatArray, "M"]
     """(M,) instant at which each point was measured [s]."""
-    point: FloatArray
+    point: Annotated[FloatArray, "M", 3]
     """(M, 3) [m]."""
-    sigma: FloatArray
+    sigma: Annotated[FloatArray, "M"]
     """(M,) standard deviation of each point in the worst direction, that of the sensor's own pose included [m]."""
 
 
@@ -148,6 +148,10 @@ class Payload:
         object.__setattr__(self, "com_m", (x, y, z))  # an array could not be compared
 
 
+_FAR = Below(100.0)
+"""Of a coordinate [m] or a speed [m/s] of a moving fixture."""
+
+
 class MovingFixtures(NamedTuple):
     """Bodies beside the arm that move and are known: C capsules in the arm's base frame.
 
@@ -157,15 +161,15 @@ class MovingFixtures(NamedTuple):
 
     stamp: float
     """Instant at which they were there [s]."""
-    a: FloatArray
+    a: Annotated[FloatArray, "C", 3, _FAR]
     """(C, 3) one end of each axis [m]."""
-    b: FloatArray
+    b: Annotated[FloatArray, "C", 3, _FAR]
     """(C, 3) other end of each axis [m]."""
-    radius: FloatArray
+    radius: Annotated[FloatArray, "C", _FAR]
     """(C,) [m]."""
-    a_velocity: FloatArray
+    a_velocity: Annotated[FloatArray, "C", 3, _FAR]
     """(C, 3) velocity of the one end [m/s]."""
-    b_velocity: FloatArray
+    b_velocity: Annotated[FloatArray, "C", 3, _FAR]
     """(C, 3) velocity of the other end [m/s]."""
 
     def at(self, time: float) -> tuple[FloatArray, FloatArray]:

@@ -54,15 +54,15 @@ def line(fixed: Blocks, remembered: Blocks, now: Blocks, beside: CapsuleArrays, 
     return True
 
 
-_belief, _watch = opener(Fixed, "belief"), opener(Remembered, "watch", "command")
+_belief, _watch = opener(Fixed, "qd_max", "failure"), opener(Remembered, "watch", "command")
 _report = opener(Now, "stamp", "robot")
 
 
 @inlined
 def believe(fixed: Blocks, remembered: Blocks, now: Blocks) -> bool:
     """Say whether the arm's report is as usual."""
-    (belief,), (watch, command), (stamp, robot) = _belief(fixed), _watch(remembered), _report(now)
-    return believable(stamp[0], robot, watch, command, belief)
+    (qd_max, failure), (watch, command), (stamp, robot) = _belief(fixed), _watch(remembered), _report(now)
+    return believable(stamp[0], robot, watch, command, qd_max, failure)
 
 
 _sight, _tracks = opener(Fixed, "hinges", "mechanism.arm", "sight"), opener(Remembered, "tracks")

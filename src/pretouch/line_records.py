@@ -10,8 +10,9 @@ from pretouch.contact.window import Window
 from pretouch.control.approach import ApproachParams
 from pretouch.control.braking import BrakingLimits, Slots, TouchLimits
 from pretouch.control.motion import MotionNumbers
-from pretouch.faults import Belief, Report, Watched
+from pretouch.faults import Report, Watched
 from pretouch.groups import CapsuleArrays, Kinematics, Mechanism, Obstacles, SkinArrays
+from pretouch.params import FailureParams
 from pretouch.perception.obstacles import TrackState
 from pretouch.perception.perceive import Readings, SightNumbers
 from pretouch.records import Cell, IntCell
@@ -100,7 +101,9 @@ class Fixed(NamedTuple):
     kinds: Kinds
     hinges: Hinges
     mechanism: Mechanism
-    belief: Belief
+    qd_max: Annotated[FloatArray, "n"]
+    """(n,) joint velocity limits [rad/s]."""
+    failure: FailureParams
     sight: Sight
     force: ForceNumbers
     test: SequentialNumbers

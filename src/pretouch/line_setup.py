@@ -19,7 +19,7 @@ from pretouch.contact.window import window_init
 from pretouch.control.approach import ApproachRestriction, BrakingCurve, approach_params, braking_limits, of_table_i
 from pretouch.control.braking import slots_init, touch_limits
 from pretouch.control.motion import motion_numbers
-from pretouch.faults import Belief, Report, Watched
+from pretouch.faults import Report, Watched
 from pretouch.groups import Kinematics, no_obstacles
 from pretouch.line_records import (
     ADMITTANCE,
@@ -73,8 +73,7 @@ def fixed_of(controller: Any) -> Fixed:
     mass, deadband = braking.effective_mass, braking.closing_deadband_m_s
     test = profile.detect if kinds.detect == SEQUENTIAL else SequentialParams()
     return Fixed(
-        kinds, model.hinges, model.mechanism,
-        Belief(limits.qd_max, failure.state_timeout_s, failure.overrun_s, failure.force_max_n),
+        kinds, model.hinges, model.mechanism, limits.qd_max, failure,
         Sight(
             see is not None and len(skin) > 0, seen.place_at_stamp, seen.slow_after_s, seen.silent_after_s,
             model.capsules.arrays, model.body.arrays, controller.fixtures.planes, skin.arrays,

@@ -234,7 +234,7 @@ def run(
                 return
     finally:
         with noted():  # until the arm is at rest
-            come_to_rest(controller.limits, robot, clock, state.watch.robot.q_commanded, sent)
+            come_to_rest(controller.limits, robot, clock, state.robot.q_commanded, sent)
 
 
 def turn(
@@ -285,7 +285,7 @@ def explained(controller: Controller, state: ControllerState, robot: RobotState,
     if (np.abs(reported - command) <= reach).all():  # nearly always, and all commands would cost 10 us at 1 kHz
         return robot
     braked = np.sign(command) * np.maximum(np.abs(command) - limits.qdd_max * late, 0.0)
-    recent = np.array([command, braked, *(earlier for _, earlier in state.watch.sent)])
+    recent = np.array([command, braked, *memory.get("watch.sent_command")[: memory.get("watch.sent")]])
     explicable = (reported >= recent.min(axis=0) - reach) & (reported <= recent.max(axis=0) + reach)
     if stamp > before:  # of after the last command, which it cannot lag behind by all of them
         reach = reach + limits.qdd_max * _LAG_S

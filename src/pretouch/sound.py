@@ -1,13 +1,30 @@
-"""Inputs as arrays of known types and shapes, or what keeps them from being that."""
+"""Inputs as values of known types, sizes and bounds, or what keeps them from being that."""
+
+import reprlib
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from typing import Annotated, Any, NamedTuple, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from pretouch.compiled import compiled
-from pretouch.desired import LARGEST, LATEST
+from pretouch.desired import Desired, DesiredKind
+from pretouch.inputs import (
+    Inputs,
+    MovingFixtures,
+    Payload,
+    RangeReadings,
+    RangeStatus,
+    RobotState,
+    SeenPoints,
+    TouchReadings,
+)
 from pretouch.perception.chosen_points import FARTHEST, LARGEST_SIGMA, usable
+from pretouch.records import Flat
 from pretouch.robot.vectors import below
-from pretouch.types import WHOLE, FloatArray, Payload, RangeReadings, RangeStatus, RobotState, SeenPoints, TouchReadings
-from pretouch.values import real, real_number
+from pretouch.values import LATEST, WHOLE, Below, BoolArray, FloatArray, IntArray, real, real_number
+
+Input = TypeVar("Input")
 
 FASTEST = 2.0
 """Times the arm's limit: a commanded joint velocity from here on is none that any arm was ever given."""
@@ -18,159 +35,199 @@ STRONGEST = 1e4
 MOST_POINTS = 20_000
 """Points of outside sources that are taken in one step: what they cost stays bounded."""
 
-_PARTS = ("joint positions", "joint velocities", "commanded joint positions", "commanded joint velocities")
+_MOST_INSTANTS = 1000
+_ROUNDING = 1e-6
+"""By how much the columns of a rotation may miss unit length and right angles."""
+_AHEAD_S = 60.0
+"""A horizon that begins so far in the future is stamped by another clock."""
+_WIDTH = {DesiredKind.TWIST: 6, DesiredKind.POSE: 12}
 
 
-def time_of(stamp: float) -> float | None:
-    """Return a time stamp, or None if it is none."""
+class _Field(NamedTuple):
+    """What a class of inputs declares of a field."""
+
+    name: str
+    kind: Any
+    dimensions: tuple[str | int, ...]
+    below: float
+
+
+@cache
+def _fields(record: Any) -> list[_Field]:
+    fields = []
+    for name, hint in get_type_hints(record, include_extras=True).items():
+        kind, *notes = get_args(hint) if get_origin(hint) is Annotated else (hint,)
+        limits = [note.limit for note in notes if isinstance(note, Below)]
+        fields.append(_Field(name, kind, tuple(notes[: len(notes) - len(limits)]), min(limits, default=np.inf)))
+    return fields
+
+
+def _of_kind(numbers: object, kinds: str) -> Any:
+    array = np.array(numbers)
+    if array.dtype.kind not in kinds:
+        raise TypeError(f"numbers of type {array.dtype}")
+    return array
+
+
+_COPY: dict[Any, Callable[[Any], Any]] = {
+    float: real_number,
+    FloatArray: real,
+    FloatArray | None: lambda numbers: None if numbers is None else real(numbers),
+    IntArray: lambda numbers: _of_kind(numbers, "iu").astype(np.int64),
+    BoolArray: lambda numbers: _of_kind(numbers, "biu") != 0,
+}
+"""What copies a field, by its annotation; what has another one is taken as it is."""
+_WORDS = {float: "number", IntArray: "array of whole numbers", BoolArray: "array of yes and no"}
+
+
+def taken(record: type[Input], given: object, **sizes: int) -> tuple[Input | None, str]:
+    """Copy an input as a value of its class: types, sizes and bounds are those that the class declares.
+
+    Where it is something else, return None and what is wrong. `sizes` are of the dimensions that are known; another has
+    the size that it has in the first field that names it.
+    """
+    values = dict[str, Any]()
+    for name, kind, dimensions, limit in _fields(record):  # type: ignore[arg-type]
+        field = f"{record.__name__}.{name}"
+        try:
+            value = getattr(given, name)
+            number = values[name] = _COPY[kind](value) if kind in _COPY else value
+        except AttributeError:
+            return None, f"{reprlib.repr(given)} is no {record.__name__}"
+        except (TypeError, ValueError, OverflowError):
+            return None, f"{field} is {reprlib.repr(value)}, no {_WORDS.get(kind, 'array of numbers')}"
+        if dimensions and number is not None:
+            shape, named = number.shape, zip(dimensions, number.shape, strict=False)
+            sized = tuple(sizes.setdefault(d, size) if isinstance(d, str) else d for d, size in named)
+            if sized != shape or len(dimensions) != len(shape):
+                right = tuple(sizes.get(str(d), d) for d in dimensions)
+                return None, f"{field} has the shape {shape}, not {right}"
+            # another order in memory would be compiled for anew, while the arm waits
+            number = values[name] = np.ascontiguousarray(number)
+        if limit < np.inf and not (small := np.abs(number) < limit).all():
+            return None, f"{field} holds {np.ravel(number)[~np.ravel(small)][0]:g}, no number below {limit:g} in size"
+    return record(**values), ""
+
+
+class UsualInputs:
+    """The inputs of nearly every step: reports of the arm and its units, of the usual types, and nothing beside."""
+
+    def __init__(self, blank: Flat) -> None:
+        """Take what a step begins with, see `line_records.Now`."""
+        at = {name: place.at for name, place in blank.places.items()}
+        self._joints = slice(at["robot.q"].start, at["robot.wrench"].stop)
+        self._heard = slice(at["readings.stamp"].start, at["readings.distance"].stop)
+        self._status, self._stamps = at["readings.status"], (at["stamp"].start, at["robot.stamp"].start)
+        n, self._units = len(blank.get("robot.q")), len(blank.get("readings.status"))
+        self._sizes = [n, n, n, n, n, 6]
+
+    def copied(self, now: Flat, inputs: Inputs) -> bool:
+        """Copy inputs that are as usual into a step; say whether they are."""
+        robot, readings, units = inputs.robot, inputs.readings, self._units
+        if inputs.resume or inputs.points is not None or inputs.payload is not None:
+            return False
+        if inputs.desired is not None or inputs.moving is not None:
+            return False
+        try:
+            parts: Any = (robot.q, robot.qd, robot.q_commanded, robot.qd_commanded, robot.tau_ext, robot.wrench)
+            stamps, distance, status = readings.stamp, readings.distance, readings.status
+            if [*map(len, parts)] != self._sizes or not len(stamps) == len(distance) == len(status) == units:
+                return False
+            if status.dtype is not WHOLE or not (isinstance(inputs.stamp, float) and isinstance(robot.stamp, float)):
+                return False
+            numbers, whole = now.blocks[0], now.blocks[1]
+            np.concatenate(parts, out=numbers[self._joints])
+            np.concatenate((stamps, distance), out=numbers[self._heard])
+            whole[self._status] = status
+            numbers[self._stamps[0]], numbers[self._stamps[1]] = inputs.stamp, robot.stamp
+            return True
+        except (AttributeError, TypeError, ValueError, OverflowError):
+            return False
+
+
+def time_of(stamp: object) -> float | None:
+    """Return a time stamp [s], or None if it is none."""
     try:
         time = real_number(stamp)
     except (TypeError, ValueError, OverflowError):
         return None
-    return time if abs(time) < LATEST else None
+    return time if abs(time) < LATEST.limit else None
 
 
 def sound_robot(robot: RobotState, qd_max: FloatArray) -> tuple[RobotState | None, str]:
-    """Copy a robot's state as arrays of float64, or say what keeps it from being that of an arm with these limits.
+    """Copy a robot's state, or say what keeps it from being that of an arm with these limits (n,) [rad/s].
 
     External torques that an arm cannot have are NaN.
     """
     n = len(qd_max)
-    try:
-        stamp, given = time_of(robot.stamp), (robot.q, robot.qd, robot.q_commanded, robot.qd_commanded)
-        tau_ext, wrench = robot.tau_ext, None if robot.wrench is None else real(robot.wrench)
-    except AttributeError:
-        return None, f"it is {robot!r}"
-    except (TypeError, ValueError, OverflowError):
-        return None, "its force estimate is not an array of numbers"
-    if stamp is None:
-        return None, f"its time stamp is {robot.stamp}"
-    numbers = _numbers((*given, tau_ext), n)
-    if numbers is None:  # the torques may be missing, the others not
-        numbers = _numbers((*given, np.full(n, np.nan)), n)
-    if numbers is None:
-        return None, _misfit(given, n)
-    if wrench is not None and wrench.shape != (6,):
-        return None, f"its force estimate has the shape {wrench.shape}, not (6,)"
-    if not _plausible(numbers, qd_max):
-        bounds = np.vstack([np.full((3, n), LARGEST), FASTEST * qd_max])
-        i, j = np.argwhere(~(np.abs(numbers[:4]) < bounds))[0]
-        return None, f"{_PARTS[i]} hold {numbers[i, j]:g}"
-    return RobotState(stamp, numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], wrench), ""
-
-
-def _numbers(given: tuple[object, ...], joints: int) -> FloatArray | None:
-    """Copy what is a number a joint to one array (5, n) of float64; None if a part is something else."""
-    try:
-        numbers = real(given)
-    except (TypeError, ValueError, OverflowError):
-        return None
-    return numbers if numbers.shape == (len(given), joints) else None
-
-
-@compiled
-def _plausible(numbers: FloatArray, qd_max: FloatArray) -> bool:
-    """Whether an arm can have these (5, n) positions, velocities, and commanded ones; not if one is NaN.
-
-    The last row are external torques: all of them are made NaN where an arm cannot have one.
-    """
-    for j in range(len(qd_max)):
-        for i in range(3):
-            if not abs(numbers[i, j]) < LARGEST:
-                return False
-        if not abs(numbers[3, j]) < FASTEST * qd_max[j]:
-            return False
-    if not below(numbers[4], STRONGEST):
-        numbers[4] = np.nan
-    return True
-
-
-def _misfit(given: tuple[FloatArray, ...], joints: int) -> str:
-    """Name the first part of a robot's state that is no array of a number a joint, or ''."""
-    for name, part in zip(_PARTS, given, strict=True):
-        try:
-            shape = np.shape(part)
-            if shape == (joints,):
-                real(part)
-        except (TypeError, ValueError, OverflowError):
-            return f"{name} are not arrays of numbers"
-        if shape != (joints,):
-            return f"{name} have the shape {shape}, not ({joints},)"
-    return ""
+    sound, wrong = taken(RobotState, robot, n=n)
+    if sound is None and "tau_ext" in wrong:
+        sound, wrong = taken(RobotState, replace(robot, tau_ext=np.full(n, np.nan)), n=n)
+    if sound is None:
+        return None, wrong
+    fast = ~(np.abs(sound.qd_commanded) < FASTEST * qd_max)
+    if fast.any():
+        number = sound.qd_commanded[fast][0]
+        return None, f"RobotState.qd_commanded holds {number:g}, no number below {FASTEST:g} times its limit"
+    return sound if below(sound.tau_ext, STRONGEST) else replace(sound, tau_ext=np.full(n, np.nan)), ""
 
 
 def sound_readings(readings: RangeReadings, units: int) -> tuple[RangeReadings, str]:
-    """Copy readings as arrays of float64 and int64; of those that do not fit so many units, take none and say why."""
-    nothing = RangeReadings(np.full(units, -np.inf), np.zeros(units), np.full(units, int(RangeStatus.NONE)))
-    try:
-        stamp, distance, status = real(readings.stamp), real(readings.distance), np.array(readings.status)
-    except AttributeError:
-        return nothing, f"they are {readings!r}"
-    except (TypeError, ValueError, OverflowError):
-        return nothing, "they are not arrays of numbers"
-    if not stamp.shape == distance.shape == status.shape == (units,):
-        shapes = f"{stamp.shape}, {distance.shape} and {status.shape}"
-        return nothing, f"stamps, distances and statuses have the shapes {shapes}, not ({units},)"
-    if status.dtype is not WHOLE:
-        if status.dtype.kind not in "iu":
-            return nothing, f"statuses are of type {status.dtype}, not whole numbers"
-        status = status.astype(np.int64)
-    return RangeReadings(stamp, distance, status), ""
+    """Copy readings; of those that do not fit so many units, take none and say why."""
+    sound, wrong = taken(RangeReadings, readings, K=units)
+    if sound is None:
+        sound = RangeReadings(np.full(units, -np.inf), np.zeros(units), np.full(units, int(RangeStatus.NONE)))
+    return sound, wrong
 
 
 def sound_touch(touch: TouchReadings | None, units: int) -> tuple[TouchReadings | None, str]:
-    """Copy touch readings as arrays of known types; of those that do not fit so many units, take none and say why.
+    """Copy touch readings; of those that do not fit so many units, take none and say why.
 
     A stamp that is no number is that of a unit that was never heard; a force that is no number, or below 0, is not
     measured. None stays None: a skin without touch sensors.
     """
-    if touch is None:
-        return None, ""
-    try:
-        stamp, force = real(touch.stamp), real(touch.force)
-        contact, status = np.array(touch.contact), np.array(touch.status)
-    except AttributeError:
-        return None, f"touch readings are {touch!r}"
-    except (TypeError, ValueError, OverflowError):
-        return None, "touch readings are not arrays of numbers"
-    if not stamp.shape == force.shape == contact.shape == status.shape == (units,):
-        shapes = f"{stamp.shape}, {contact.shape}, {force.shape} and {status.shape}"
-        return None, f"stamps, contacts, forces and statuses of touch have the shapes {shapes}, not ({units},)"
-    if contact.dtype.kind not in "biu" or status.dtype.kind not in "iu":
-        return None, f"contacts and statuses of touch are of types {contact.dtype} and {status.dtype}"
-    stamp[np.isnan(stamp)] = -np.inf
-    force[~((force >= 0.0) & (force < STRONGEST))] = np.nan
-    return TouchReadings(stamp, contact != 0, force, status.astype(np.int64)), ""
+    sound, wrong = (None, "") if touch is None else taken(TouchReadings, touch, K=units)
+    if sound is not None:
+        sound.stamp[np.isnan(sound.stamp)] = -np.inf
+        sound.force[~((sound.force >= 0.0) & (sound.force < STRONGEST))] = np.nan
+    return sound, wrong
 
 
 def sound_points(points: SeenPoints | None) -> tuple[SeenPoints | None, str]:
-    """Give points of outside sources as arrays of float64; of those that cannot be used, take none and say why.
+    """Copy points of outside sources; of those that cannot be used, take none and say why.
 
-    A set of which more than half the points are implausible cannot be used; single ones are left out later. No copy
-    is made, for nothing of the arrays is kept beyond the step.
+    A set of which more than half the points are implausible cannot be used; single ones are left out later.
     """
-    if points is None:
-        return None, ""
-    try:
-        heard = real_number(points.heard)
-        given = points.stamp, points.point, points.sigma
-        stamp, point, sigma = (np.ascontiguousarray(real(part, copy=False)) for part in given)
-    except AttributeError:
-        return None, f"gives {points!r}"
-    except (TypeError, ValueError, OverflowError):
-        return None, "gives something other than arrays of numbers"
-    if stamp.shape != sigma.shape or point.shape != (*stamp.shape, 3) or stamp.ndim != 1:
-        return None, f"gives stamps, points and sigmas of the shapes {stamp.shape}, {point.shape} and {sigma.shape}"
-    if len(stamp) > MOST_POINTS:
-        return None, f"gives {len(stamp)} points, more than {MOST_POINTS}"
-    good, none = usable(stamp, point, sigma)
-    if 2 * good < len(stamp) - none:
-        shown = len(stamp) - none
+    sound, wrong = (None, "") if points is None else taken(SeenPoints, points)
+    if sound is None:
+        return None, wrong and f"cannot be used ({wrong})"
+    if len(sound.stamp) > MOST_POINTS:
+        return None, f"gives {len(sound.stamp)} points, more than {MOST_POINTS}"
+    good, none = usable(sound.stamp, sound.point, sound.sigma)
+    shown = len(sound.stamp) - none
+    if 2 * good < shown:
         return None, (
             f"gives {shown - good} implausible points of {shown}: a coordinate of {FARTHEST:g} m or more, or a sigma"
             f" outside 0 to {LARGEST_SIGMA:g} m"
         )
-    return SeenPoints(heard, stamp, point, sigma), ""
+    return sound, ""
+
+
+def sound_moving(moving: MovingFixtures | None, now: float, longest: float) -> tuple[MovingFixtures | None, str]:
+    """Copy moving fixtures; of those that cannot be used, take none and say why.
+
+    Silence is no free space: what was somewhere longer than `longest` [s] ago may be anywhere by `now` [s].
+    """
+    sound, wrong = (None, "") if moving is None else taken(MovingFixtures, moving)
+    if sound is None or len(sound.radius) == 0:
+        return None, wrong and f"cannot be used ({wrong})"
+    if (sound.radius < 0.0).any():
+        return None, f"have a radius of {sound.radius.min():g} m"
+    if sound.stamp == -np.inf:
+        return None, "have not been told of yet"
+    if not abs(now - sound.stamp) <= longest:
+        return None, f"were last known {now - sound.stamp:.3f} s ago"
+    return sound, ""
 
 
 def sound_payload(payload: Payload | None, most_kg: float) -> tuple[Payload | None, str]:
@@ -180,3 +237,33 @@ def sound_payload(payload: Payload | None, most_kg: float) -> tuple[Payload | No
     if not isinstance(payload, Payload):
         return None, f"a {type(payload).__name__}, no Payload"
     return None, f"{payload.mass_kg:g} kg, more than the {most_kg:.3g} kg that this arm's joints can hold"
+
+
+def sound_desired(desired: Desired | None, joints: int, now: float) -> tuple[Desired | None, str]:
+    """Copy a desired motion for an arm of so many joints, or say what keeps it from being one."""
+    if desired is None:
+        return None, ""
+    if reason := getattr(desired, "refused", ""):
+        return None, str(reason)
+    try:
+        kind = DesiredKind(desired.kind)
+    except (AttributeError, ValueError):
+        return None, f"{reprlib.repr(desired)} is of no kind of a Desired"
+    sound, wrong = taken(Desired, desired, w=_WIDTH.get(kind, joints))
+    if sound is None:
+        return None, wrong
+    stamp, number = sound.stamp, sound.number
+    if not 1 <= len(stamp) <= _MOST_INSTANTS:
+        return None, f"it has {len(stamp)} instants, not 1 to {_MOST_INSTANTS}"
+    if (np.diff(stamp) <= 0.0).any():
+        return None, "its stamps do not increase"
+    if stamp[0] > now + _AHEAD_S:
+        return None, f"it is stamped {stamp[0] - now:.0f} s in the future"
+    if kind is DesiredKind.POSE and not _are_rotations(number[:, 3:].reshape(-1, 3, 3)):
+        return None, "its orientation is no rotation"
+    return replace(sound, kind=kind), ""
+
+
+def _are_rotations(R: FloatArray) -> bool:
+    orthonormal = np.abs(R @ R.transpose(0, 2, 1) - np.eye(3)) < _ROUNDING
+    return bool(orthonormal.all() and (np.linalg.det(R) > 0.0).all())

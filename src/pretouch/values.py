@@ -1,7 +1,7 @@
 """Values that each control step makes anew, and arrays by what they hold; shapes stand where arrays are used."""
 
 from dataclasses import dataclass
-from typing import TypeVar, cast, dataclass_transform
+from typing import NamedTuple, TypeVar, cast, dataclass_transform
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,18 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 Number = TypeVar("Number", float, FloatArray)
+
+
+class Below(NamedTuple):
+    """Annotates a field: its numbers are smaller in size; one that is not has another unit, or is broken."""
+
+    limit: float
+
+
+LARGEST = Below(1e3)
+"""Of a desired number, a joint position or velocity [rad, rad/s, m, m/s]."""
+LATEST = Below(1e12)
+"""Of a time stamp [s], whatever the clock began with."""
 
 _FLOAT = np.dtype(np.float64)
 WHOLE = np.dtype(np.int64)

@@ -5,7 +5,8 @@ import numpy as np
 from pretouch.control.interface import MotionRequest
 from pretouch.control.path import Circle
 from pretouch.controller import Controller
-from pretouch.faults import put_robot
+from pretouch.decision import move_restricted
+from pretouch.faults import Report, put_robot
 from pretouch.groups import Kinematics, Obstacles
 from pretouch.line import MOVE
 from pretouch.modes import CLEAR
@@ -28,7 +29,7 @@ class Mover:
     def step(self, kin: Kinematics, robot: RobotState, obstacles: Obstacles, request: MotionRequest) -> ControlStep:
         """Return the motion of one step."""
         controller, now = self.controller, self.controller.blank.copy()
-        put_robot(now, "robot", robot)
+        put_robot(now.part("robot", Report), robot)
         now.fill("kin", kin)
         now.put("ee", kin.position[controller.model.ee])
         for room, part in zip(now.part("seen.near", Obstacles), obstacles, strict=True):
@@ -43,5 +44,5 @@ class Mover:
             controller.take(self.memory, now, controller.beside, MOVE, MOVE)
         else:
             part = controller.approach
-            self.approach = controller.restricted(part, self.approach, self.memory, now, robot, request)
+            self.approach = move_restricted(controller, part, self.approach, self.memory, now, robot, request)
         return ControlStep.of(now, CLEAR)

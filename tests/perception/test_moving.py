@@ -5,12 +5,13 @@ import pytest
 from tests.perception.watcher import PARAMS, Watcher
 from tests.sim.ranging import FORWARD, ORIGIN
 
-from pretouch.perception.moving import beside, near_moving, sound_moving
+from pretouch.perception.moving import beside, near_moving
 from pretouch.perception.scene_filter import floor_and_pedestal
 from pretouch.robot.self_distance import segment_distance
 from pretouch.robot.vectors import placed
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit
+from pretouch.sound import sound_moving
 from pretouch.types import MovingFixtures, RangeReadings
 
 MARGIN_M = 0.06
@@ -104,11 +105,11 @@ def test_a_moving_axis_comes_nearer_as_fast_as_its_nearest_point(panda_model):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"a": np.zeros((2, 3))}, "shapes"),
-        ({"radius": np.array([-0.1])}, "negative"),
-        ({"b": np.full((1, 3), np.nan)}, "none"),
-        ({"b_velocity": np.full((1, 3), 1e3)}, "100 or more"),
-        ({"a": "here"}, "numbers"),
+        ({"a": np.zeros((2, 3))}, "MovingFixtures.b has the shape (1, 3), not (2, 3)"),
+        ({"radius": np.array([-0.1])}, "have a radius of -0.1 m"),
+        ({"b": np.full((1, 3), np.nan)}, "MovingFixtures.b holds nan, no number below 100"),
+        ({"b_velocity": np.full((1, 3), 1e3)}, "MovingFixtures.b_velocity holds 1000, no number below 100 in size"),
+        ({"a": "here"}, "MovingFixtures.a is 'here', no array of numbers"),
         ({"stamp": -0.2}, "0.200 s ago"),
         ({"stamp": np.nan}, "ago"),
     ],
@@ -125,4 +126,4 @@ def test_something_else_than_moving_fixtures_is_said():
     assert sound_moving(None, 0.0, 0.05) == (None, "")
     none = np.zeros((0, 3))
     assert sound_moving(MovingFixtures(0.0, none, none, np.zeros(0), none, none), 9.0, 0.05) == (None, "")
-    assert "are 7" in sound_moving(7, 0.0, 0.05)[1]
+    assert "7 is no MovingFixtures" in sound_moving(7, 0.0, 0.05)[1]

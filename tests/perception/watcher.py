@@ -6,7 +6,7 @@ import numpy as np
 
 from pretouch.control.path import Circle
 from pretouch.controller import Controller
-from pretouch.faults import put_robot
+from pretouch.faults import Report, put_robot
 from pretouch.groups import CapsuleArrays, Obstacles
 from pretouch.line import SEE
 from pretouch.params import PerceptionParams
@@ -54,7 +54,7 @@ class Watcher:
         """Take readings in at an instant [s]."""
         self.now = self.controller.blank.copy()
         self.now.put("stamp", now)
-        put_robot(self.now, "robot", self.robot(now))
+        put_robot(self.now.part("robot", Report), self.robot(now))
         self.now.fill("readings", readings)
         self.controller.take(self.memory, self.now, beside or self.controller.beside, SEE, SEE)
         return Obstacles._make(part[: self.now.get("seen.found")] for part in self.now.part("seen.near", Obstacles))

@@ -109,15 +109,11 @@ def unusable(inputs: Inputs, qd_max: np.ndarray) -> str:
     """Say the first thing that is no number, or no number a joint can have; '' if there is none."""
     robot = inputs.robot
     if not abs(robot.stamp) < LATEST:
-        return f"its time stamp is {robot.stamp}"
-    parts = {
-        "joint positions": robot.q,
-        "joint velocities": robot.qd,
-        "commanded joint positions": robot.q_commanded,
-        "commanded joint velocities": robot.qd_commanded,
-    }
-    for name, values in parts.items():
-        for value, fastest in zip(values, qd_max, strict=True):
-            if np.isnan(value) or abs(value) >= (2 * fastest if values is robot.qd_commanded else LARGEST):
-                return f"{name} hold {value:g}"
-    return "" if abs(inputs.stamp) < LATEST else f"the step's time stamp is {inputs.stamp}"
+        return f"RobotState.stamp holds {robot.stamp:g}, no number below {LATEST:g} in size"
+    for name in ("q", "qd", "q_commanded", "qd_commanded"):
+        for value, fastest in zip(getattr(robot, name), qd_max, strict=True):
+            if not abs(value) < LARGEST:
+                return f"RobotState.{name} holds {value:g}, no number below {LARGEST:g} in size"
+            if name == "qd_commanded" and abs(value) >= 2 * fastest:
+                return f"RobotState.{name} holds {value:g}, no number below 2 times its limit"
+    return "" if abs(inputs.stamp) < LATEST else f"Inputs.stamp is {inputs.stamp!r}"

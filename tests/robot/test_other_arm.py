@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from pretouch.arms.other_arm import OtherArm
-from pretouch.perception.moving import sound_moving
 from pretouch.perception.scene_filter import floor_and_pedestal
 from pretouch.robot.vectors import placed
+from pretouch.sound import sound_moving
 from pretouch.types import RobotState
 
 T = np.array([[-1.0, 0.0, 0.0, 1.2], [0.0, -1.0, 0.0, 0.3], [0.0, 0.0, 1.0, 0.1], [0.0, 0.0, 0.0, 1.0]])

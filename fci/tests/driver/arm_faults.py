@@ -100,18 +100,18 @@ FAULTS = {
     "values that freeze, new times": Fault(
         "s old", lambda heard, last: replace(last, stamp=heard[-1].stamp), resumes=True
     ),
-    "joint positions that jump": Fault("joint positions hold nan", _jumping, resumes=True),
+    "joint positions that jump": Fault("RobotState.q holds nan", _jumping, resumes=True),
     "an encoder's step of 0.1 rad, for good": Fault(
-        "joint positions hold nan", _state(q=_one(1, 0.1)), resumes=True, lasts_s=np.inf
+        "RobotState.q holds nan", _state(q=_one(1, 0.1)), resumes=True, lasts_s=np.inf
     ),
     "a false commanded velocity": Fault(
-        "commanded joint velocities hold nan", _state(dq_d=lambda qd: qd + 1.0), resumes=True
+        "RobotState.qd_commanded holds nan", _state(dq_d=lambda qd: qd + 1.0), resumes=True
     ),
     "a torque sensor that sticks": Fault(
         "no force estimate", _state(tau_ext=lambda tau: np.where(np.arange(7) == 3, 1.25, tau))
     ),
     "no force estimate": Fault("no force estimate", _state(wrench=np.zeros_like)),
-    "numbers that are none": Fault("joint velocities hold nan", _state(qd=lambda qd: qd * np.nan), resumes=True),
+    "numbers that are none": Fault("RobotState.qd holds nan", _state(qd=lambda qd: qd * np.nan), resumes=True),
     "time that jumps ahead": Fault(
         "in the future", lambda heard, _: replace(heard[-1], stamp=heard[-1].stamp + 10.0), resumes=True
     ),

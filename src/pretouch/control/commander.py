@@ -4,10 +4,9 @@ import math
 
 import numpy as np
 
-from pretouch.desired import Desired, DesiredKind, sound_desired
+from pretouch.desired import Desired, DesiredKind
 from pretouch.groups import Kinematics
-from pretouch.modes import Event
-from pretouch.params import FailureParams, TaskParams
+from pretouch.params import TaskParams
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray, RobotState
 from pretouch.values import value
@@ -30,18 +29,6 @@ class Asked:
     """(3, 3) R_O_ee to hold from here on where nobody asks for another."""
     qd: FloatArray | None = None
     """(n,) joint velocities asked for in place of all that [rad/s]."""
-
-
-def commanded(
-    desired: Desired | None, joints: int, now: float, params: FailureParams
-) -> tuple[Desired | None, dict[Event, str]]:
-    """Return a desired motion as far as it can be used at an instant [s], and what is wrong with it."""
-    sound, wrong = sound_desired(desired, joints, now)
-    if wrong:
-        return None, {Event.DESIRED_UNFIT: wrong}
-    if sound is not None and now - sound.stamp[-1] > params.desired_timeout_s:
-        return sound, {Event.DESIRED_STALE: f"{now - sound.stamp[-1]:.2f} s"}
-    return sound, {}
 
 
 def asked_by(

@@ -8,43 +8,9 @@ from pretouch.robot.model import RobotModel
 from pretouch.robot.self_distance import nearest_points
 from pretouch.robot.vectors import placed
 from pretouch.types import MovingFixtures, Obstacles, RangeReadings
-from pretouch.values import real, real_number
 
-_FARTHEST = 100.0
-"""A coordinate [m] or a speed [m/s] from here on is implausible."""
 _ON_AXIS = 1e-9
 """Distance between two axes below which there is no direction from one to the other [m]."""
-
-
-def sound_moving(
-    moving: MovingFixtures | None, now: float, longest: float
-) -> tuple[MovingFixtures | None, str]:  # fmt: skip
-    """Return moving fixtures as arrays of float64; None and what is wrong with those that cannot be used.
-
-    Silence is no free space: what was somewhere longer than `longest` [s] ago may be anywhere by `now` [s].
-    """
-    if moving is None:
-        return None, ""
-    try:
-        stamp, radius = real_number(moving.stamp), real(moving.radius)
-        given = moving.a, moving.b, moving.a_velocity, moving.b_velocity
-        a, b, a_velocity, b_velocity = map(real, given)
-    except AttributeError:
-        return None, f"are {moving!r}"
-    except (TypeError, ValueError, OverflowError):
-        return None, "are not arrays of numbers"
-    count = len(radius) if radius.ndim == 1 else -1
-    if count == 0:
-        return None, ""
-    if any(part.shape != (count, 3) for part in (a, b, a_velocity, b_velocity)):
-        shapes = f"{a.shape}, {b.shape}, {a_velocity.shape}, {b_velocity.shape} and {radius.shape}"
-        return None, f"have ends, velocities and radii of the shapes {shapes}"
-    numbers = np.concatenate([part.ravel() for part in (a, b, a_velocity, b_velocity, radius)])
-    if not (np.abs(numbers) < _FARTHEST).all() or (radius < 0.0).any():
-        return None, f"hold a number that is none, is {_FARTHEST:g} or more, or a negative radius"
-    if not abs(now - stamp) <= longest:
-        return None, "have not been told of yet" if stamp == -np.inf else f"were last known {now - stamp:.3f} s ago"
-    return MovingFixtures(stamp, a, b, radius, a_velocity, b_velocity), ""
 
 
 def beside(

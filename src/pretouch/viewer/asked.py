@@ -5,12 +5,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pretouch.control.commander import asked_by, commanded
+from pretouch.control.commander import asked_by
 from pretouch.desired import Desired, DesiredKind
 from pretouch.explanation import Explanation, explain
 from pretouch.groups import Kinematics
 from pretouch.limited import ASKED_M_S, FULL, Limit
 from pretouch.robot.model import RobotModel
+from pretouch.sound import sound_desired
 from pretouch.types import ControlStep, FloatArray
 from pretouch.viewer.frame import Frame, World
 
@@ -36,7 +37,7 @@ def asked_in(frame: Frame, world: World, kin: Kinematics) -> Asked | None:
     given = None if frame.inputs is None else frame.inputs.desired
     if frame.inputs is None or given is None:
         return None
-    desired, _ = commanded(given, model.n, step.stamp, world.profile.failure)
+    desired, _ = sound_desired(given, model.n, step.stamp)
     if desired is None:
         return None
     robot = replace(frame.inputs.robot, q_commanded=step.q_commanded)

@@ -76,7 +76,7 @@ class StreamRecorder:
     def record(self, cycle: Cycle) -> None:
         """Keep one turn of the loop."""
         self._plant.take_log()
-        self._robot.append(cycle.after.watch.robot)
+        self._robot.append(cycle.after.robot)
         self._obstacles.append(cycle.step.obstacles)
         self._reacting.append(cycle.before.mode.mode is Mode.REACT)
         heard = cycle.after.heard

@@ -96,7 +96,7 @@ class WanderingController(Controller):
         """Run one control cycle and command the course in place of what it decided."""
         step, after = super().step(state, inputs)
         q, qd = self.course.at(inputs.stamp)
-        command = qd + _PULL_1_S * (q - after.watch.robot.q_commanded)
+        command = qd + _PULL_1_S * (q - after.robot.q_commanded)
         memory = after.memory.copy()
         memory.put("command", command)
         return replace(step, command=command), replace(after, memory=memory)
