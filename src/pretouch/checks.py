@@ -2,8 +2,8 @@
 
 import math
 import sys
-from dataclasses import dataclass, fields
-from functools import cache
+from dataclasses import dataclass, fields, is_dataclass
+from functools import cache, cached_property
 from numbers import Integral, Real
 from types import UnionType
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Union, get_args, get_origin, get_type_hints
@@ -67,7 +67,7 @@ class Checked:
         for name, hint in _hints(type(self)):  # type: ignore[arg-type]
             _check_field(type(self).__name__, name, hint, getattr(self, name))
 
-    @property
+    @cached_property
     def numbers(self) -> Any:
         """The numbers of this set, for a compiled function that Python calls."""
         kinds = get_type_hints(self.Numbers)
@@ -76,9 +76,13 @@ class Checked:
 
 @cache
 def _numbers_of(kind: type) -> Any:
-    plain = ((name, getattr(hint, "__origin__", hint)) for name, hint in _hints(kind))
+    hints = ((name, getattr(hint, "__origin__", hint)) for name, hint in _hints(kind))
+    plain = [(name, number) for name, number in hints if number in (float, int, bool)]
+    for base in kind.__mro__[1:]:  # a part is compiled as the set that it adds no number to
+        if issubclass(base, Checked) and is_dataclass(base) and [*base.Numbers._fields] == [name for name, _ in plain]:
+            return base.Numbers
     make: Any = NamedTuple
-    record = make("Numbers", [(name, number) for name, number in plain if number in (float, int, bool)])
+    record = make("Numbers", plain)
     # Numba's cache looks the class up by its name
     record.__module__, record.__qualname__ = kind.__module__, f"{kind.__qualname__}.Numbers"
     return record

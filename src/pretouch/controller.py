@@ -10,8 +10,7 @@ from typing import Any
 
 from pretouch.contact.announced_load import LoadState, most_kg
 from pretouch.contact.detector import Body
-from pretouch.contact.model_update import SequentialState
-from pretouch.contact.residual_model import ResidualModel
+from pretouch.contact.residual_model import ResidualModel, SequentialState
 from pretouch.control.interface import MotionBody
 from pretouch.control.joint_box import joint_limits
 from pretouch.control.path import Path, nearest_phase

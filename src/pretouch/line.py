@@ -12,9 +12,9 @@ import numpy as np
 from pretouch.cholesky import factor
 from pretouch.compiled import entry, inlined, kernel
 from pretouch.contact.clamp import note_place
-from pretouch.contact.model_update import Situation
 from pretouch.contact.moving_thresholds import compare
-from pretouch.contact.sequential_step import Joints, assess_sample
+from pretouch.contact.sequential import Moment
+from pretouch.contact.sequential_step import assess_sample
 from pretouch.contact.virtual_mass import learn_mean
 from pretouch.contact.window import add_sample
 from pretouch.control.approach import rows_into
@@ -117,10 +117,8 @@ def detect(fixed: Blocks, remembered: Blocks, now: Blocks) -> bool:
         )
         d.residual[:] = robot.tau_ext
     else:
-        assess_sample(
-            state, Joints(robot.qd, robot.qd_commanded, robot.tau_ext), near, Situation(sees, False, no_gain), test,
-            kin, mechanism, d,
-        )  # fmt: skip
+        moment = Moment(kin, robot.qd, robot.qd_commanded, robot.tau_ext, near, no_gain, sees, False)
+        assess_sample(state, moment, test, mechanism, d)
         contact = d.log_likelihood_ratio[0] >= 1.0
     if contact or not armed:
         return True

@@ -2,8 +2,8 @@
 
 from typing import Annotated, NamedTuple
 
-from pretouch.contact.model_update import SequentialNumbers, SequentialState
 from pretouch.contact.moving_thresholds import ThresholdNumbers
+from pretouch.contact.residual_model import SequentialNumbers, SequentialState
 from pretouch.contact.sequential_step import SampleTest
 from pretouch.contact.virtual_mass import FreeMass
 from pretouch.contact.window import Window

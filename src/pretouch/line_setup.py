@@ -10,8 +10,7 @@ from pretouch.contact.admittance import Admittance
 from pretouch.contact.clamp import clamp_init
 from pretouch.contact.decaying_velocity import DecayingVelocity
 from pretouch.contact.moving_thresholds import MovingThresholds, threshold_numbers, thresholds_of
-from pretouch.contact.sequential_detector import sequential_init, sequential_numbers
-from pretouch.contact.sequential_step import sample_test
+from pretouch.contact.sequential_step import sample_test, sequential_init, sequential_numbers
 from pretouch.contact.sequential_test import SequentialTest
 from pretouch.contact.touch_cue import TouchSensors
 from pretouch.contact.virtual_mass import FreeMass

@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from pretouch.contact.detector import Body, Sample
+from pretouch.contact.scatter import LENGTHS, WindowMeans, means_in_free_motion
 from pretouch.contact.sequential_test import SequentialTest, SequentialTestState
 from pretouch.contact.window import window_init
 from pretouch.groups import no_obstacles
@@ -14,6 +15,17 @@ from pretouch.sensing.skin import Skin
 from pretouch.types import RobotState
 
 PERIOD = 0.01
+
+
+def means_of(
+    S: np.ndarray, model_variance: np.ndarray | float = 0.0, scatter: np.ndarray | None = None,
+    mean: np.ndarray | None = None, whole: int = len(LENGTHS),
+) -> WindowMeans:  # fmt: skip
+    """Means (6, n) of residuals with noise (n, n), white without a scatter."""
+    n = len(S)
+    mean = np.zeros((len(LENGTHS), n)) if mean is None else mean
+    scatter = np.zeros((0, n + 2, n)) if scatter is None else scatter
+    return means_in_free_motion(mean, whole, S, np.full(n, model_variance), scatter)
 
 
 class StandingArm:

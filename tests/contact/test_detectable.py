@@ -4,10 +4,9 @@ import math
 
 import numpy as np
 import pytest
-from tests.contact.standing_arm import PERIOD, StandingArm
+from tests.contact.standing_arm import PERIOD, StandingArm, means_of
 
-from pretouch.contact.alarm_level import detectable_force
-from pretouch.contact.scatter import scatter_init, scattered_means, white_means
+from pretouch.contact.scatter import detectable_force, scatter_init
 from pretouch.contact.sequential import log_ratio
 from pretouch.params import MisfitParams
 
@@ -17,7 +16,7 @@ GAIN, TAILS, NEEDED = 15.0, 30.0, 10.0
 def test_by_hand_for_a_cartesian_arm():
     """Three joints of which each moves one axis, with 2, 4 and 1 Nm of noise: the second tells least."""
     J, sigma = np.vstack((np.eye(3), np.zeros((3, 3)))), np.array([2.0, 4.0, 1.0])
-    free = white_means(np.diag(sigma**2), np.zeros(3))
+    free = means_of(np.diag(sigma**2))
     found = detectable_force(J, PERIOD, free, NEEDED, GAIN, TAILS)
     # eight samples fit into 0.1 s
     whitened = found / (4.0 / math.sqrt(8.0)) - 1.645
@@ -28,8 +27,8 @@ def test_by_hand_for_a_cartesian_arm():
 
 def test_noise_that_lasts_does_not_average_out():
     J = np.vstack((np.eye(3), np.zeros((3, 3))))
-    white = detectable_force(J, PERIOD, white_means(np.eye(3), np.zeros(3)), NEEDED, GAIN, TAILS)
-    lasting = detectable_force(J, PERIOD, white_means(1e-9 * np.eye(3), np.ones(3)), NEEDED, GAIN, TAILS)
+    white = detectable_force(J, PERIOD, means_of(np.eye(3)), NEEDED, GAIN, TAILS)
+    lasting = detectable_force(J, PERIOD, means_of(1e-9 * np.eye(3), 1.0), NEEDED, GAIN, TAILS)
     assert lasting == pytest.approx(math.sqrt(8.0) * white, rel=1e-6)
 
 
@@ -37,13 +36,13 @@ def test_a_scatter_of_four_doubles_it():
     J = np.vstack((np.eye(3), np.zeros((3, 3))))
     scatter = scatter_init(3)[1]
     scatter[:, :3] = 4.0 * np.eye(3)
-    white = detectable_force(J, PERIOD, white_means(np.eye(3), np.zeros(3)), NEEDED, GAIN, TAILS)
-    wide = detectable_force(J, PERIOD, scattered_means(np.eye(3), np.zeros(3), scatter), NEEDED, GAIN, TAILS)
+    white = detectable_force(J, PERIOD, means_of(np.eye(3)), NEEDED, GAIN, TAILS)
+    wide = detectable_force(J, PERIOD, means_of(np.eye(3), scatter=scatter), NEEDED, GAIN, TAILS)
     assert wide == pytest.approx(2.0 * white, rel=1e-9)
 
 
 def test_what_no_joint_shows_and_what_tails_forbid_is_never_found():
-    free = white_means(np.eye(3), np.zeros(3))
+    free = means_of(np.eye(3))
     assert detectable_force(np.zeros((6, 3)), PERIOD, free, NEEDED, GAIN, TAILS) == math.inf
     across = np.vstack((np.diag([1.0, 1.0, 0.0]), np.zeros((3, 3))))
     assert detectable_force(across, PERIOD, free, NEEDED, GAIN, TAILS) == math.inf

@@ -7,19 +7,25 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from tests.contact.alone import something, standing
+from tests.contact.alone import sample, something, standing
 
-from pretouch.contact.localisation.localise import LocalisationState, ResidualWindows, localisation_init, localise
-from pretouch.contact.localisation.posterior import Candidates, log_posterior
-from pretouch.contact.localisation.prior import LocalisationNumbers, candidate_poses, hidden_candidates, log_prior
-from pretouch.contact.scatter import LENGTHS
-from pretouch.contact.sequential_detector import Observation
+from pretouch.contact.detector import Body
+from pretouch.contact.localisation import (
+    LocalisationState,
+    candidate_poses,
+    hidden_candidates,
+    localisation_init,
+    localise,
+)
+from pretouch.contact.posterior import Candidates, log_posterior, log_prior
+from pretouch.contact.sequential_step import sample_test
 from pretouch.contact.touch_cue import Cues, gain_of, no_cues, surface_area
 from pretouch.groups import Kinematics, no_obstacles
 from pretouch.params import LocalisationParams, TouchSensorParams
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.robot.vectors import placed_capsules
+from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import TouchPatch
 from pretouch.types import FloatArray, Obstacles, Touched
 
@@ -30,7 +36,8 @@ PERIOD = 0.01
 NOISE = np.diag([0.09, 0.12, 0.09, 0.12, 0.01, 0.01, 0.002])
 MODEL_VARIANCE = np.full(N, 1e-4)
 P = LocalisationParams()
-NUMBERS = LocalisationNumbers(*(getattr(P, name) for name in LocalisationNumbers._fields))
+NUMBERS = P.numbers
+BODY = Body(MODEL, Skin((), MODEL), PERIOD)
 
 
 def posture(seed: int = 0) -> Kinematics:
@@ -70,13 +77,13 @@ def said(
     kin: Kinematics, torque: FloatArray, obstacles: Obstacles | None = None, cues: Cues | None = None, steps: int = 1,
     ratio: float = 5.0, p: LocalisationParams = P, state: LocalisationState | None = None,
 ) -> tuple[Touched, LocalisationState]:  # fmt: skip
-    windows = ResidualWindows(np.tile(torque, (len(LENGTHS), 1)), 32, NOISE + np.diag(MODEL_VARIANCE), MODEL_VARIANCE)
-    seen = Observation(kin, standing(MODEL, torque), obstacles or no_obstacles(), cues or no_cues(len(MODEL.links)))
-    state, found = localisation_init() if state is None else state, None
+    tested = sample_test(N)
+    tested.means[:], tested.covariance[:], tested.model_variance[:] = torque, NOISE + np.diag(MODEL_VARIANCE), 1e-4
+    tested.samples[0], tested.log_likelihood_ratio[0] = 32, ratio
+    felt, state = sample(kin, standing(MODEL, torque), obstacles or no_obstacles(), 0.0), state or localisation_init()
     for _ in range(steps):
-        found, state = localise(state, MODEL, seen, windows, ratio, PERIOD, p)
-    assert found is not None
-    return found, state
+        state = localise(state, BODY, felt, cues or no_cues(len(MODEL.links)), tested, p)
+    return state.touched, state
 
 
 def of(name: str, kin: Kinematics) -> int:
@@ -103,7 +110,7 @@ def prior(kin: Kinematics, cues: Cues, hidden: FloatArray, near: Obstacles | Non
     return np.exp(ln)
 
 
-def candidates(torque: FloatArray, kin: Kinematics, numbers: LocalisationNumbers = NUMBERS) -> Candidates:
+def candidates(torque: FloatArray, kin: Kinematics, numbers: LocalisationParams = NUMBERS) -> Candidates:
     none = np.zeros(len(SURFACE))
     return Candidates(torque, kin, MODEL.moved_by, SURFACE.arrays, *poses(kin), none, numbers)
 

@@ -8,11 +8,19 @@ from itertools import islice
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from tests.contact.standing_arm import PERIOD, StandingArm
+from tests.contact.standing_arm import PERIOD, StandingArm, means_of
 
-from pretouch.contact.alarm_level import BLOCK, earned_level, learn_level, level_init
 from pretouch.contact.detector import Body, Sample
-from pretouch.contact.scatter import LENGTHS, learn_scatter, scatter_init, scattered_means, spread_out
+from pretouch.contact.scatter import (
+    LENGTHS,
+    MAXIMUM_OF,
+    earned_level,
+    learn_level,
+    learn_scatter,
+    level_init,
+    scatter_init,
+    spread_out,
+)
 from pretouch.contact.sequential_test import SequentialTest
 from pretouch.contact.window import window_init
 from pretouch.groups import no_obstacles
@@ -23,18 +31,18 @@ from pretouch.sensing.skin import Skin
 from pretouch.types import RobotState
 
 N = 3
-BOUND, SLACK, RATE = math.log(360_000), 7.0, 1.0 / 360_000
+BOUND, SLACK = math.log(360_000), 7.0
 
 
 def learnt(draw, times: int = 20_000) -> np.ndarray:
     """Return the scatters (6, N + 2, N) of whitened means (6, N) that are drawn."""
     scatter = scatter_init(N)[1]
     for at in range(times):
-        free = scattered_means(np.eye(N), np.zeros(N), scatter)
+        free = means_of(np.eye(N), scatter=scatter)
         free.whitened[:] = draw()
         free.square[:] = (free.whitened**2).sum(axis=1)
         free.ratio[:] = free.whitened**2
-        learn_scatter(at, len(LENGTHS), free, 1e6, 1e-4)
+        learn_scatter(at, free, 1e6, 1e-4)
     return scatter
 
 
@@ -49,9 +57,9 @@ def test_the_scatter_is_the_covariance_of_the_whitened_means_of_each_window():
 
 def test_an_outlier_counts_less_and_never_nothing():
     scatter = scatter_init(N)[1]
-    free = scattered_means(np.eye(N), np.zeros(N), scatter)
+    free = means_of(np.eye(N), scatter=scatter)
     free.whitened[:], free.square[:] = 100.0, 3e4
-    learn_scatter(0, len(LENGTHS), free, 20.0, 1e-4)
+    learn_scatter(0, free, 20.0, 1e-4)
     grown = scatter[0, 0, 0] - 1.0
     assert 0.0 < grown < 1.0, "a mean a hundred deviations off would add 500 if it counted as any other"
 
@@ -71,14 +79,14 @@ def test_the_spread_is_that_of_white_noise_times_the_scatter():
 def level_of(draw, blocks: int = 2000) -> float:
     seen = level_init()[1]
     for _ in range(blocks):
-        for value in draw(BLOCK):
+        for value in draw(MAXIMUM_OF):
             learn_level(float(value), seen)
-    return earned_level(seen, BOUND, SLACK, RATE)
+    return earned_level(seen, BOUND, SLACK)
 
 
 def test_the_level_begins_in_the_middle_a_quiet_arm_gets_all_the_slack_and_one_that_rings_loses_it_in_half_a_minute():
     rng = np.random.default_rng(3)
-    assert earned_level(level_init()[1], BOUND, SLACK, RATE) == pytest.approx(BOUND - 4.7, abs=0.1)
+    assert earned_level(level_init()[1], BOUND, SLACK) == pytest.approx(BOUND - 4.7, abs=0.1)
     assert level_of(lambda size: 1.0 + 2.0 * rng.gumbel(size=size), blocks=120) == BOUND
     assert level_of(lambda size: -3.0 + 0.5 * rng.gumbel(size=size)) == BOUND - SLACK
 

@@ -1,26 +1,20 @@
 """Free motion learnt: mean against batch least squares, spread against its definition, bounds, and what is kept."""
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
+from pretouch.contact.learning import add_to_block, least_squares_step
 from pretouch.contact.residual_model import (
     PLAIN,
-    CalmSample,
-    add_sample,
-    block_size,
-    features,
+    FreeSample,
+    features_into,
     features_of,
-    kept,
-    least_squares_step,
     prior_of,
     residual_init,
-    resumed,
     spread_of_sample,
 )
-from pretouch.errors import ParameterError
 from pretouch.params import SequentialParams
 
 P = SequentialParams()
@@ -63,11 +57,13 @@ def test_the_covariance_stays_between_nothing_and_the_prior_whatever_is_excited(
 def test_features_of_gravity_are_the_gravity_torques_of_the_model_and_that_of_a_load_has_its_inertia(panda_model):
     q, growth = panda_model.description.q_ready + 0.1, np.linspace(-3.0, 4.0, 7)
     kin = panda_model.kinematics(q)
-    x = features(panda_model, kin, np.zeros(7), np.zeros(7))
+    x = np.empty((7, features_of(7)))
+    features_into(kin, panda_model.mechanism, np.zeros(7), np.zeros(7), x)
     gravity = panda_model.dynamics(q, np.zeros(7)).gravity
     # the torque that holds the arm is the opposite of what gravity does, summed over all links
     assert_allclose(x[:, PLAIN : PLAIN + 7].sum(axis=1), -gravity, atol=1e-9)
-    J, x = panda_model.ee_jacobian(kin)[:3], features(panda_model, kin, np.zeros(7), growth)
+    J = panda_model.ee_jacobian(kin)[:3]
+    features_into(kin, panda_model.mechanism, np.zeros(7), growth, x)
     assert_allclose(x[:, -1], J.T @ (np.array([0.0, 0.0, -9.81]) - J @ growth), atol=1e-12)
 
 
@@ -82,36 +78,20 @@ def test_both_variances_are_found_from_samples(panda_model):
     rng, n = np.random.default_rng(0), 7
     true = np.array([np.full(n, 0.2), np.array([0.03, 0.02, 0.02, 0.02, 0.01, 0.01, 0.01])])
     M, _ = panda_model.mass_matrix_and_bias(panda_model.description.q_ready, np.zeros(n), np.zeros(n))
-    spread, x = np.array([np.full(n, 1.0), np.full(n, 0.25)]), np.zeros((n, features_of(n)))
+    model, none, x = residual_init(n, P), np.zeros(n), np.zeros((n, features_of(n)))
+    spread, numbers = model.spread[1], P.numbers._replace(tails=1000.0, noise_floor_nm=0.0)
+    model.filled[0] = 1
     for _ in range(40):
-        block = np.zeros(block_size(n))
+        model.block[:] = 0.0
         for _ in range(250):
             e = M @ (np.sqrt(true[0]) * rng.standard_normal(n)) + np.sqrt(true[1]) * rng.standard_normal(n)
-            add_sample(block, False, CalmSample(e, x, e, M, np.zeros(n), 1, np.zeros(0)), spread, 1000.0, 0.0)
+            add_to_block(model, FreeSample(e, e, none, x, M, none, M, none, np.ones(1, int)), np.zeros(0), numbers)
         start = n + n * features_of(n)
-        spread = block[start : start + 2 * n].reshape(2, n) / block[-2]
+        spread[:] = model.block[start : start + 2 * n].reshape(2, n) / model.block[-2]
     found, expected = np.empty((n, n)), np.empty((n, n))
     spread_of_sample(M, spread, 0.0, found)
     spread_of_sample(M, true, 0.0, expected)
     assert_allclose(np.linalg.eigvals(np.linalg.solve(expected, found)).real, 1.0, atol=0.35)
-
-
-def test_what_is_kept_comes_back():
-    model = residual_init(7, P)
-    model = model._replace(weights=model.weights + 1.0, queue=model.queue + 1.0, waiting=np.full(1, 3))
-    back = resumed(kept(model), P)
-    assert_allclose(back.weights, 1.0)
-    assert back.waiting[0] == 0
-    assert not back.queue.any()
-
-
-@pytest.mark.parametrize(
-    "change",
-    [{"covariance": np.zeros((7, 12, 12))}, {"spread": -np.ones((2, 2, 7))}, {"weights": np.zeros((7, 3))}],
-)
-def test_what_cannot_have_been_learnt_is_refused(change):
-    with pytest.raises(ParameterError, match="anew"):
-        resumed(kept(residual_init(7, P)) | change, P)
 
 
 def test_the_memory_is_bounded_and_the_prior_has_one_variance_a_feature():

@@ -8,8 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.stats import multivariate_normal, multivariate_t
+from tests.contact.standing_arm import means_of
 
-from pretouch.contact.scatter import LENGTHS, LONGEST, white_means, window_means
+from pretouch.contact.scatter import LENGTHS, LONGEST, window_means
 from pretouch.contact.sequential import (
     Hypotheses,
     alarm_bound,
@@ -102,7 +103,7 @@ def test_the_expectation_of_the_statistic_in_free_motion_is_the_sum_of_the_weigh
     for _ in range(20_000):
         means = np.zeros((len(LENGTHS), N))
         means[0] = np.linalg.cholesky(S) @ rng.standard_normal(N) / math.sqrt(rng.chisquare(tails) / tails)
-        log_r, _, _ = judge(means, 1, white_means(S, np.zeros(N)), no_point(weight), 0.5, tails)
+        log_r, _, _ = judge(means_of(S, mean=means, whole=1), no_point(weight), 0.5, tails)
         total.append(math.exp(log_r) * len(LENGTHS))
     assert np.mean(total) == pytest.approx(1.0, abs=0.03)
 
@@ -115,7 +116,7 @@ def test_false_alarms_on_noise_stay_within_the_bound():
         ring[i % LONGEST] = L @ rng.standard_normal(N)
         means = np.zeros((len(LENGTHS), N))
         whole = window_means(ring, (i + 1) % LONGEST, min(i + 1, LONGEST), means)
-        log_r, _, _ = judge(means, whole, white_means(S, np.zeros(N)), no_point(weight), 15.0, 30.0)
+        log_r, _, _ = judge(means_of(S, mean=means, whole=whole), no_point(weight), 15.0, 30.0)
         passed += log_r >= level
     assert passed <= samples * 0.01 * 1.0  # one a second is the bound
 
@@ -124,9 +125,7 @@ def test_a_push_is_found_and_its_window_is_that_of_its_length():
     means = np.zeros((len(LENGTHS), N))
     means[:] = 0.1
     means[3] = [6.0, 0.0, 0.0]
-    log_r, window, _ = judge(
-        means, 6, white_means(np.eye(N), np.full(N, 1e-3)), no_point(np.full(N, 1.0 / N)), 15.0, 30.0
-    )
+    log_r, window, _ = judge(means_of(np.eye(N), 1e-3, mean=means), no_point(np.full(N, 1.0 / N)), 15.0, 30.0)
     assert window == 3
     assert log_r > alarm_bound(SequentialParams(), 0.01)
 
@@ -134,7 +133,7 @@ def test_a_push_is_found_and_its_window_is_that_of_its_length():
 def test_an_outlier_of_one_sample_is_less_to_a_test_with_heavy_tails():
     means = np.full((len(LENGTHS), N), 7.0)
     heavy, light = (
-        judge(means, 1, white_means(np.eye(N), np.zeros(N)), no_point(np.full(N, 1 / N)), 15.0, tails)[0]
+        judge(means_of(np.eye(N), mean=means, whole=1), no_point(np.full(N, 1 / N)), 15.0, tails)[0]
         for tails in (5.0, 1e3)
     )
     assert heavy < 0.3 * light

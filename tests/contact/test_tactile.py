@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from tests.contact.alone import begun as feel_init
 from tests.contact.alone import feel, sample, something, standing
 
-from pretouch.contact.alarm_level import earned_level, level_init
 from pretouch.contact.detector import Body
+from pretouch.contact.scatter import earned_level, level_init
 from pretouch.contact.sequential import alarm_bound
 from pretouch.contact.touch_cue import Cues, TouchSensors, gain_of, no_cues, surface_area, together
 from pretouch.groups import no_obstacles
@@ -168,7 +168,7 @@ def test_a_cue_counts_for_an_object_that_is_seen_at_its_link_as_well_and_no_cue_
     assert evidence[0] == evidence[1]
     # fifty times the prior of what says most: ln 50 in units of ln A, but for what the other hypotheses add
     bound = alarm_bound(ours.detect, ours.task.control_period_s)
-    gained = np.log(50.0) / earned_level(level_init()[1], bound, ours.detect.slack_nats, np.exp(-bound))
+    gained = np.log(50.0) / earned_level(level_init()[1], bound, ours.detect.slack_nats)
     assert 0.8 * gained < evidence[2] - evidence[1] <= gained * (1 + 1e-9)
 
 

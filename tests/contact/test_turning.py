@@ -1,8 +1,11 @@
 """Doubt where an arm accelerates hard: learnt from what is wrong there, bounded, and none elsewhere."""
 
 import numpy as np
+from tests.contact.standing_arm import means_of
 
-from pretouch.contact.scatter import LENGTHS, add_reversal_variance, learn_turning, turning_init
+from pretouch.contact.learning import learn_turning
+from pretouch.contact.residual_model import add_reversal_variance, turning_init
+from pretouch.contact.scatter import LENGTHS
 
 M, S = np.diag([2.0, 1.0]), 0.04 * np.eye(2)
 HARD = np.array([0.0, 10.0])
@@ -13,7 +16,7 @@ def turned(times: int, error: float, growth: np.ndarray) -> np.ndarray:
     for k in range(times):
         doubt = np.full(2, 1e-3)
         add_reversal_variance(M, growth, turning, doubt)
-        learn_turning(k, means, S, doubt, 0.01 / 300.0, turning)
+        learn_turning(k, means_of(S, doubt, mean=means), 0.01 / 300.0, turning)
     doubt = np.zeros(2)
     add_reversal_variance(M, growth, turning, doubt)
     return doubt

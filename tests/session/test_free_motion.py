@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from pretouch.contact.residual_model import kept
 from pretouch.errors import ParameterError, RobotModelError
 from pretouch.profiles import PROFILES
 from pretouch.recording.reader import open_recording
@@ -20,7 +19,7 @@ from pretouch.recording.writer import Recording
 from pretouch.robot.description import fr3
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin as skin_of_arm
-from pretouch.session.free_motion import FreeMotion, ModelFile, model_file_of
+from pretouch.session.free_motion import FreeMotion, ModelFile, kept, model_file_of
 from pretouch.session.residual_file import Residual, save_residual
 from tests.following_arm import Arm
 

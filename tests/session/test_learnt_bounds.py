@@ -6,7 +6,7 @@ import pytest
 from pretouch.contact.residual_model import residual_init
 from pretouch.errors import ParameterError
 from pretouch.params import SequentialParams
-from pretouch.session.free_motion import check_learnt
+from pretouch.session.free_motion import check_learnt, kept, resumed
 
 FRESH = residual_init(7, SequentialParams())
 
@@ -35,3 +35,20 @@ def test_what_an_arm_can_have_learnt_is_bounded(panda_model, name, at, possible,
     check_learnt(changed(name, at, possible), panda_model)
     with pytest.raises(ParameterError, match=words):
         check_learnt(changed(name, at, impossible), panda_model)
+
+
+def test_what_is_kept_comes_back():
+    model = FRESH._replace(weights=FRESH.weights + 1.0, queue=FRESH.queue + 1.0, waiting=np.full(1, 3))
+    back = resumed(kept(model), SequentialParams())
+    assert np.all(back.weights == 1.0)
+    assert back.waiting[0] == 0
+    assert not back.queue.any()
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"covariance": np.zeros((7, 12, 12))}, {"spread": -np.ones((2, 2, 7))}, {"weights": np.zeros((7, 3))}],
+)
+def test_what_cannot_have_been_learnt_is_refused(change):
+    with pytest.raises(ParameterError, match="anew"):
+        resumed(kept(FRESH) | change, SequentialParams())

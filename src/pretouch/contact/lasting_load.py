@@ -5,13 +5,13 @@ small torque on one joint alone, is learnt as free motion, whether the arm stand
 neither: near, or not constant, or not straight down, or measured by more than one joint.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
 from pretouch.cholesky import backward, factor, forward
 from pretouch.compiled import kernel
-from pretouch.contact.residual_model import PLAIN, Learnt, least_squares_step
+from pretouch.contact.learning import least_squares_step
+from pretouch.contact.residual_model import PLAIN, FreeSample, ResidualModel, SequentialNumbers, SequentialState
+from pretouch.contact.scatter import LONGEST, WindowMeans
 from pretouch.types import FloatArray
 
 MOST_KG = 3.0
@@ -40,31 +40,32 @@ _GRAVITY = 9.81
 
 
 @kernel
-def stands_out(residual: FloatArray, S: FloatArray, samples: int) -> bool:
-    """Whether the mean (n,) of so many samples [Nm] is more than noise and friction leave of nothing."""
+def _stands_out(residual: FloatArray, S: FloatArray) -> bool:
+    """Whether a mean (n,) of the longest window [Nm] is more than noise and friction leave of nothing."""
     n = len(residual)
     C, L = np.empty((n, n)), np.zeros((n, n))
-    _spread_of_mean(S, samples, _UNKNOWN_ALONE_NM, C)
+    _spread_of_mean(S, _UNKNOWN_ALONE_NM, C)
     # r^T C^-1 r is chi-square with n degrees of freedom in free motion: mean n, deviation sqrt(2 n)
     return bool(factor(C, L) and forward(L, residual, np.empty(n)) > n + _ALONE_DEVIATIONS * np.sqrt(2.0 * n))
 
 
 @kernel
-def still_explains(
-    lasting: FloatArray, residual: FloatArray, unit: FloatArray, J: FloatArray, S: FloatArray, samples: int,
-    moving: int,
-) -> bool:  # fmt: skip
-    """Whether what has lasted (3 + n,), see `find_lasting`, still explains the mean (n,) of so many samples [Nm].
+def _still_explains(
+    lasting: FloatArray, residual: FloatArray, unit: FloatArray, J: FloatArray, S: FloatArray, moving: int
+) -> bool:
+    """Whether what has lasted (3 + n,), see `find_lasting`, still explains a residual (n,) [Nm].
 
-    It does if no joint's torque has changed, and most of the mean is not left without it.
+    It does if no joint's torque has changed, and most of the residual is not left without it.
     """
     whole = left = largest = 0.0
     for j in range(len(residual)):
         largest = max(largest, abs(unit[j] * lasting[0]))
     for j in range(len(residual)):
-        rest = residual[j] - _torque_of(lasting, unit, J, j)
+        # rows 3 and 4 of J turn about x and y: a weight has no moment about z, the vertical
+        moments = _GRAVITY * (J[3, j] * lasting[1] + J[4, j] * lasting[2])
+        rest = residual[j] - (lasting[0] * unit[j] + moments + lasting[3 + j])
         # what lasts was found from a mean like this one: the difference of both has twice the variance of one
-        allowed = _DEVIATIONS**2 * 2.0 * S[j, j] / samples + _CHANGE_NM**2
+        allowed = _DEVIATIONS**2 * 2.0 * S[j, j] / LONGEST + _CHANGE_NM**2
         if moving:  # the mean is of another posture than this one
             allowed += (_CHANGE_PART * largest) ** 2
         if rest**2 > allowed:
@@ -74,48 +75,33 @@ def still_explains(
 
 
 @kernel
-def _torque_of(lasting: FloatArray, unit: FloatArray, J: FloatArray, j: int) -> float:
-    """Torque on a joint of what has lasted, in this posture [Nm]."""
-    # rows 3 and 4 of J turn about x and y: a weight has no moment about z, the vertical
-    moments = _GRAVITY * (J[3, j] * lasting[1] + J[4, j] * lasting[2])
-    return float(lasting[0] * unit[j] + moments + lasting[3 + j])
-
-
-class WeightPart(NamedTuple):
-    """What of the mean may be weight, as `weight_part` writes it."""
-
-    learnt: FloatArray
-    """(n,) what of the mean learnt so far may be weight [Nm]."""
-    offset: FloatArray
-    """(n,) constant part of that mean [Nm]."""
-    unit: FloatArray
-    """(n,) torques of 1 kg at the end-effector [Nm]."""
-
-
-@kernel
 def find_lasting(
-    residual: FloatArray, weight: WeightPart, J: FloatArray, S: FloatArray, samples: int, offset_prior: float,
+    residual: FloatArray, x: FloatArray, weights: FloatArray, J: FloatArray, S: FloatArray, offset_prior: float,
     lasting: FloatArray,
 ) -> bool:  # fmt: skip
     """Write a load or a step of one joint that a residual can be, and return whether there is one.
 
     Args:
         residual: (n,) mean of the torques that free motion does not explain [Nm].
-        weight: what of the mean may be weight.
+        x: (n, f) features.
+        weights: (n, f) of the mean learnt so far [Nm].
         J: (6, n) Jacobian of the end-effector.
         S: (n, n) spread of a sample [Nm^2].
-        samples: how many the mean is of.
         offset_prior: deviation of a joint's offset [Nm].
         lasting: (3 + n,) written: load [kg], its moments about both horizontal axes [kg m], each joint's torque [Nm].
     """
-    learnt, offset, unit = weight
+    n, last = x.shape[0], x.shape[1] - 1
+    carried, load = np.empty(n), np.zeros(3)
+    for j in range(n):
+        # of the mean, what may be weight: without friction, features 1 to PLAIN - 1
+        carried[j] = weights[j, 0] * x[j, 0]
+        for a in range(PLAIN, last + 1):
+            carried[j] += weights[j, a] * x[j, a]
     lasting[:] = 0.0
-    load, misfit = np.zeros(3), np.inf
-    joint, step, rest = _one_joint(residual, S, samples)
-    if is_load(residual, learnt, unit, J, S, samples):
-        misfit = fit_load(residual, unit, J, S, samples, load)
+    joint, step, rest = _one_joint(residual, S)
+    misfit = load_misfit(residual, carried, x[:, last].copy(), J, S, load)
     # the whole offset is bounded, not the step: pushes that are taken for steps cannot add up
-    if joint >= 0 and abs(offset[joint] + step) <= _OFFSETS * offset_prior and rest < misfit:
+    if joint >= 0 and abs(weights[joint, 0] + step) <= _OFFSETS * offset_prior and rest < misfit:
         lasting[3 + joint] = step
         return True
     if misfit < np.inf:
@@ -125,11 +111,11 @@ def find_lasting(
 
 
 @kernel
-def _one_joint(residual: FloatArray, S: FloatArray, samples: int) -> tuple[int, float, float]:
+def _one_joint(residual: FloatArray, S: FloatArray) -> tuple[int, float, float]:
     """Return the joint whose torque alone explains a residual, that torque and the misfit; joint -1 if none does."""
     n, joint, step, best = len(residual), -1, 0.0, np.inf
     C, L, y, a, unit = np.empty((n, n)), np.zeros((n, n)), np.empty(n), np.empty(n), np.zeros(n)
-    _spread_of_mean(S, samples, _UNKNOWN_ALONE_NM, C)
+    _spread_of_mean(S, _UNKNOWN_ALONE_NM, C)
     if not factor(C, L):
         return -1, 0.0, np.inf
     square = forward(L, residual, y)
@@ -146,31 +132,33 @@ def _one_joint(residual: FloatArray, S: FloatArray, samples: int) -> tuple[int, 
 
 
 @kernel
-def is_load(
-    residual: FloatArray, learnt: FloatArray, unit: FloatArray, J: FloatArray, S: FloatArray, samples: int
-) -> bool:
-    """Whether a weight at the end-effector, or one less, explains a lasting residual; arguments as `find_lasting`."""
-    n, change, whole = len(residual), np.empty(3), np.empty(3)
-    misfit = fit_load(residual, unit, J, S, samples, change)
+def load_misfit(
+    residual: FloatArray, carried: FloatArray, unit: FloatArray, J: FloatArray, S: FloatArray, load: FloatArray
+) -> float:
+    """Write the weight at the end-effector, or one less, that a lasting residual may be (3,), see `find_lasting`.
+
+    Returns what it leaves of the residual's square, infinite where it cannot be a load. `carried` (n,) is what of the
+    mean may be weight, `unit` (n,) are the torques of 1 kg [Nm].
+    """
+    n, whole = len(residual), np.empty(3)
+    misfit = _fit_load(residual, unit, J, S, load)
     # the change has either sign, as a load can be put down; what hangs there then cannot weigh less than nothing
-    fit_load(residual + learnt, unit, J, S, samples, whole)
+    _fit_load(residual + carried, unit, J, S, whole)
     # the centre is too far off: |x| + |y| > 0.3 m; a load below 0.1 kg may have the moments of 0.1 kg
-    if abs(change[1]) + abs(change[2]) > 2.0 * _FAR_M * max(abs(change[0]), 0.1):
-        return False
+    near = abs(load[1]) + abs(load[2]) <= 2.0 * _FAR_M * max(abs(load[0]), 0.1)
     few = misfit < n + _DEVIATIONS * np.sqrt(2.0 * n)
-    return bool(few and abs(change[0]) < MOST_KG - _LEAST_KG and _LEAST_KG < whole[0] < MOST_KG - _LEAST_KG)
+    light = abs(load[0]) < MOST_KG - _LEAST_KG and _LEAST_KG < whole[0] < MOST_KG - _LEAST_KG
+    return misfit if near and few and light else np.inf
 
 
 @kernel
-def fit_load(
-    residual: FloatArray, unit: FloatArray, J: FloatArray, S: FloatArray, samples: int, load: FloatArray
-) -> float:
+def _fit_load(residual: FloatArray, unit: FloatArray, J: FloatArray, S: FloatArray, load: FloatArray) -> float:
     """Write the load (3,) that explains a residual best, see `find_lasting`, and return what is left of its square."""
     n = len(residual)
     C, L, y, a = np.empty((n, n)), np.zeros((n, n)), np.empty(n), np.empty((3, n))
     G, K, b, u = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3), np.empty(3)
     load[:] = 0.0
-    _spread_of_mean(S, samples, _UNKNOWN_NM, C)
+    _spread_of_mean(S, _UNKNOWN_NM, C)
     if not factor(C, L):
         return np.inf
     # ridge regression of the whitened residual on the weight and both of its moments
@@ -193,25 +181,24 @@ def fit_load(
 
 
 @kernel
-def _spread_of_mean(S: FloatArray, samples: int, unknown: float, C: FloatArray) -> None:
-    """Write the spread C (n, n) of a mean of so many samples, each joint's `unknown` [Nm] with it."""
+def _spread_of_mean(S: FloatArray, unknown: float, C: FloatArray) -> None:
+    """Write the spread C (n, n) of a mean of the longest window, each joint's `unknown` [Nm] with it."""
     for i in range(len(S)):
         for j in range(len(S)):
-            C[i, j] = S[i, j] / samples
+            C[i, j] = S[i, j] / LONGEST
         C[i, i] += unknown**2  # an error of the mean does not average out
 
 
 @kernel
-def learn_lasting(
-    lasting: FloatArray, residual: FloatArray, x: FloatArray, S: FloatArray, samples: int, widen: float, known: Learnt
+def _learn_lasting(
+    lasting: FloatArray, residual: FloatArray, x: FloatArray, S: FloatArray, model: ResidualModel, prior: FloatArray
 ) -> None:
     """Take what has lasted into the mean at once: all joints carry a load, one joint its step.
 
-    What is left of the residual (n,) goes into the load and the offset of each joint alone, `widen` being the variance
-    that the offset then has more [Nm^2].
+    What is left of the residual (n,) goes into the load and the offset of each joint alone.
     """
     n, load = x.shape[0], x.shape[1] - 1
-    weights, covariance, kg = known.weights, known.covariance, lasting[0]
+    weights, covariance, kg = model.weights, model.covariance, lasting[0]
     for j in range(n):
         # the torque itself: the residual is what the mean has left of it
         torque = residual[j]
@@ -221,11 +208,11 @@ def learn_lasting(
         weights[j, 0] += lasting[3 + j]
         # the load's moments have no feature: the offsets take them up, as they are in this posture
         if kg != 0.0:
-            covariance[j, 0, 0] += widen
+            covariance[j, 0, 0] += prior[0]
             covariance[j, load, load] += (_LOAD_KG + _LOAD_PART * abs(kg)) ** 2
         elif lasting[3 + j] != 0.0:
             covariance[j, 0, 0] += _UNKNOWN_NM**2
-        least_squares_step(weights[j], covariance[j], x[j], torque, S[j, j] / samples, known.prior, 0.0)
+        least_squares_step(weights[j], covariance[j], x[j], torque, S[j, j] / LONGEST, prior, 0.0)
 
 
 _LOAD_KG, _LOAD_PART = 0.1, 0.05
@@ -233,12 +220,40 @@ _LOAD_KG, _LOAD_PART = 0.1, 0.05
 
 
 @kernel
-def weight_part(weights: FloatArray, x: FloatArray, part: WeightPart) -> None:
-    """Write what of the mean may be weight, its constant part, and the torques of 1 kg."""
-    learnt, offset, unit = part
-    n, load = x.shape[0], x.shape[1] - 1
-    for j in range(n):
-        offset[j], unit[j], learnt[j] = weights[j, 0] * x[j, 0], x[j, load], weights[j, 0] * x[j, 0]
-        # without friction, features 1 to PLAIN - 1, which cannot be weight
-        for a in range(PLAIN, load + 1):
-            learnt[j] += weights[j, a] * x[j, a]
+def follow_lasting(
+    state: SequentialState, reacting: bool, suspected: bool, numbers: SequentialNumbers, sample: FreeSample,
+    means: WindowMeans, J: FloatArray,
+) -> None:  # fmt: skip
+    """Count the samples that the same load or step has explained, and learn it once these are enough.
+
+    Samples count in which a contact is suspected or the arm reacts, but only what stands out is something to find out.
+
+    Args:
+        state: memory, changed.
+        reacting: whether the arm moves with a contact.
+        suspected: whether a contact is.
+        numbers: of the test.
+        sample: the newest.
+        means: of all windows.
+        J: (6, n) Jacobian of the end-effector.
+    """
+    residual, S, x, model, steady = means.mean[-1], means.S, sample.x, state.model, state.steady
+    n, counts = len(residual), suspected or reacting
+    # the torques of 1 kg depend on the posture: they are taken anew in each step
+    if steady[0] and _still_explains(state.lasting, residual, x[:, -1].copy(), J, S, sample.moving[0]):
+        steady[0] += int(counts)
+    else:  # something else, or nothing: the count starts again
+        steady[0], counts = 0, suspected or (reacting and _stands_out(residual, S))
+    if not counts or 0 < steady[0] <= numbers.settle:
+        return
+    lasting = np.empty(3 + n)
+    if not find_lasting(residual, x, model.weights, J, S, numbers.p.offset_prior_nm, lasting):
+        # what has lasted may be unexplained for a while; for too long it is a person
+        steady[0] = steady[0] if steady[0] <= 2 * numbers.settle else 0
+    elif steady[0] > numbers.settle:
+        # found once more at the end, when it is learnt: a load that came slowly was less at the beginning
+        _learn_lasting(lasting, residual, x, S, model, numbers.prior)
+        steady[0] = -1
+    else:
+        state.lasting[:] = lasting
+        steady[0] = 1

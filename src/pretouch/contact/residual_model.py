@@ -1,31 +1,30 @@
 """What a robot's external torques are in free motion: a mean and a spread, learnt while nothing is near.
 
-The mean of each joint's torque is linear in what physics gives (see `features`): an offset, friction, and the gravity
+The mean of each joint's torque is linear in what physics gives (`features_into`): an offset, friction, and the gravity
 of each link's error of mass. Its coefficients follow by recursive least squares with a prior, so that before anything
 is learnt the mean is zero and uncertain.
 
 The spread is S = M A M^T + D: the noise of the measured joint velocities enters an observer's torques through the mass
 matrix M(q), so that it is correlated between the joints and turns with the posture; D is what each joint adds. The
 variances A and D, diagonal, follow by expectation and maximisation, one small step a block, with an outlier counting
-less (the weights of a Student distribution).
+less (the weights of a Student distribution). How both are learnt: `learning`.
 
-What is learnt waits in a queue of blocks for `QUEUE` of them, and the queue is emptied when a contact is suspected: the
-beginning of a contact is never learnt.
+What accelerates hard is known only to a part, and what is wrong with it comes too early or too late (`turning`). That
+is the same for many samples in a row, so that it is variance of the mean and not noise. Each joint's variance is a
+factor on how hard the arm accelerates, learnt with a prior too, also where a contact is suspected: an arm that gave an
+alarm because it turned round would do so for ever.
 """
 
 from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from pretouch.cholesky import backward, factor, forward
 from pretouch.compiled import compiled, kernel
-from pretouch.errors import ParameterError
 from pretouch.groups import Kinematics, Mechanism
-from pretouch.params import SequentialParams
+from pretouch.params import MisfitParams, ProximityPriorParams, SequentialParams
 from pretouch.records import IntCell
-from pretouch.robot.kinematics import column
-from pretouch.robot.model import RobotModel
-from pretouch.types import BoolArray, FloatArray
+from pretouch.robot.kinematics import column, mass_matrix_into
+from pretouch.types import BoolArray, FloatArray, IntArray
 
 BLOCK = 4
 """Samples that are learnt as one: their sums."""
@@ -36,6 +35,29 @@ PLAIN = 4
 _SLOW, _FAST = 0.1, 0.3
 """Joint speeds over which friction turns round [rad/s]: between Coulomb's step and the 0.2 rad/s of a real Panda's."""
 _GRAVITY = 9.81
+
+
+class SequentialNumbers(NamedTuple):
+    """What the sequential test is made with, of one arm and control period."""
+
+    p: SequentialParams
+    near: ProximityPriorParams
+    misfit: MisfitParams
+    period: float
+    """Of control [s]."""
+    delay: float
+    """Part of the commanded velocities of the sample before that the torques still show."""
+    bound: float
+    """ln A of the test, see `alarm_bound`."""
+    learns: int
+    """Whether free motion is learnt: 0 never, 1 while a skin watches, 2 always."""
+    objects: int
+    """How many objects near add a hypothesis."""
+    settle: int
+    """Samples after which what lasts is learnt, 0 for never."""
+    learns_misfit: bool
+    prior: Annotated[FloatArray, "f"]
+    """(f,) variances of the weights before anything is learnt [Nm^2]."""
 
 
 class ResidualModel(NamedTuple):
@@ -60,6 +82,32 @@ class ResidualModel(NamedTuple):
     """Samples in it."""
     waiting: IntCell
     """Blocks in the queue, the oldest first."""
+
+
+class SequentialState(NamedTuple):
+    """All that the sequential test remembers, and changes."""
+
+    model: ResidualModel
+    ring: Annotated[FloatArray, "R", "n"]
+    """(32, n) newest residuals [Nm]."""
+    at: IntCell
+    """Where the next one goes."""
+    samples: IntCell
+    """How many there are."""
+    calm: IntCell
+    """Samples since a contact was suspected, something was near, or the arm reacted."""
+    lasting: Annotated[FloatArray, "3 + n"]
+    """(3 + n,) load or step of a joint's torque that explains a residual that stays, see `find_lasting`."""
+    steady: IntCell
+    """Samples that it has explained with nothing near, the arm reacting or a contact suspected; -1: it was learnt."""
+    turning: Annotated[FloatArray, 3, "n"]
+    """(3, n) how much worse free motion is known where the arm accelerates hard, see `turning_init`."""
+    scatter: Annotated[FloatArray, 2, "W", "n + 2", "n"]
+    """How much more the windows' means vary than white noise would, see `scatter_init`."""
+    level: Annotated[FloatArray, 2, 5]
+    """What the level of an alarm follows, see `level_init`."""
+    settled: IntCell
+    """Samples of free motion at rest."""
 
 
 def features_of(n: int) -> int:
@@ -90,20 +138,13 @@ def block_size(n: int) -> int:
     return n + n * features_of(n) + 3 * n + 2
 
 
-def features(model: RobotModel, kin: Kinematics, speed: FloatArray, growth: FloatArray) -> FloatArray:
-    """Features (n, f) of each joint's mean torque at joint velocities (n,) [rad/s] that grow by `growth` [rad/s^2].
+@compiled
+def features_into(kin: Kinematics, mechanism: Mechanism, speed: FloatArray, growth: FloatArray, x: FloatArray) -> None:
+    """Write features (n, f) of each joint's mean torque, at joint velocities [rad/s] that grow by `growth` [rad/s^2].
 
     1; tanh(qd / 0.1), tanh(qd / 0.3) and qd, friction that turns round smoothly; the torque of weight and inertia of
     the links behind each joint, as point masses [Nm], and that of 1 kg at the end-effector.
     """
-    x = np.empty((model.n, features_of(model.n)))
-    features_into(kin, model.mechanism, speed, growth, x)
-    return x
-
-
-@compiled
-def features_into(kin: Kinematics, mechanism: Mechanism, speed: FloatArray, growth: FloatArray, x: FloatArray) -> None:
-    """Write what `features` returns."""
     position, rotation, anchor, axis = kin
     moved_by, ee = mechanism.arm
     mass, com = mechanism.links.mass, mechanism.links.com
@@ -168,88 +209,55 @@ def mean_and_variance(
                 model_variance[j] += x[j, a] * part
 
 
-@kernel
-def least_squares_step(
-    w: FloatArray, P: FloatArray, x: FloatArray, y: float, noise: float, prior: FloatArray, forget: float
-) -> None:
-    """Take one sample y = w . x + noise into the weights w (f,) and their covariance P (f, f), in place.
-
-    Recursive least squares; then P moves by the part `forget` towards the prior's diagonal, so that it stays between
-    nothing and the prior whatever is or is not excited (stabilised forgetting, Kulhavy and Zarrop 1993).
-    """
-    f, gain = len(w), np.zeros(len(w))
-    total, error = noise, y
-    for a in range(f):
-        for b in range(f):
-            gain[a] += P[a, b] * x[b]
-        total += x[a] * gain[a]
-        error -= w[a] * x[a]
-    for a in range(f):
-        w[a] += gain[a] / total * error  # gain = P x, total = x^T P x + noise
-        for b in range(f):
-            P[a, b] -= gain[a] * gain[b] / total
-            P[a, b] *= 1.0 - forget
-        P[a, a] += forget * prior[a]
-
-
-class CalmSample(NamedTuple):
-    """A sample of free motion."""
+class FreeSample(NamedTuple):
+    """One sample, and room for what free motion is in it."""
 
     torque: FloatArray
     """(n,) [Nm]."""
-    x: FloatArray
-    """(n, f) features."""
     residual: FloatArray
-    """(n,) torques less their mean [Nm]."""
+    """(n,) written: torques less their mean [Nm]."""
+    speed: FloatArray
+    """(n,) written: commanded joint velocities as late as the torques are [rad/s]."""
+    x: FloatArray
+    """(n, f) written: features."""
     M: FloatArray
-    """(n, n) mass matrix [kg m^2]."""
+    """(n, n) written: mass matrix [kg m^2]."""
+    mean: FloatArray
+    """(n,) written: of the torques [Nm]."""
+    covariance: FloatArray
+    """(n, n) written: of their noise [Nm^2]."""
     model_variance: FloatArray
-    """(n,) variance of the error of the mean [Nm^2]."""
-    moving: int
-    """1 if the arm moves, or 0."""
-    ratio: FloatArray
-    """(n,) how many samples in a row say as much of the mean as one would of white noise; (0,): noise is white."""
+    """(n,) written: variance of the error of the mean [Nm^2]."""
+    moving: IntArray
+    """(1,) written: 1 if the arm moves, or 0."""
 
 
 @kernel
-def add_sample(
-    block: FloatArray, first: bool, sample: CalmSample, spread: FloatArray, tails: float, floor: float
-) -> None:
-    """Add a sample to a block, to an empty one if it is the first: torques, features, both variances of the spread.
+def describe_free_motion(
+    commanded: FloatArray, model: ResidualModel, turning: FloatArray, numbers: SequentialNumbers, kin: Kinematics,
+    mechanism: Mechanism, sample: FreeSample,
+) -> None:  # fmt: skip
+    """Write what free motion is in a sample, and the residual.
 
-    With e = M v + d, of spread S = M A M^T + D, the sample's expectation of v_i^2 is (A M^T S^-1 e)_i^2 + A_i -
-    A_i^2 (M^T S^-1 M)_ii, and that of d_i^2 alike with 1 in the place of M. The variance of the mean's error is in the
-    sample but not in D. `spread` (2, n) is A and D of samples of its kind.
+    `commanded` (n,) are the joint velocities [rad/s], `turning` is that of `turning_init`, changed.
     """
-    torque, x, residual, M, model_variance, moving, ratio = sample
-    n, f = x.shape
-    S, L, y, z = np.empty((n, n)), np.zeros((n, n)), np.empty(n), np.empty(n)
-    if first:
-        block[:] = 0.0
-    spread_of_sample(M, spread, floor, S)
-    for i in range(n):
-        S[i, i] += model_variance[i]
-    if not factor(S, L):
-        return
-    trust = (tails + n) / (tails + forward(L, residual, y))  # Student's weight, less than 1 for an outlier
-    backward(L, y, z)
-    unit, start = np.zeros(n), n + n * f
-    for i in range(n):
-        block[i] += torque[i]
-        for a in range(f):
-            block[n + i * f + a] += x[i, a]
-        A, D, along = spread[0, i], spread[1, i] + floor**2 + model_variance[i], 0.0
-        for j in range(n):
-            along += M[j, i] * z[j]
-        block[start + i] += trust * (A * along) ** 2 + A - A * A * forward(L, M[i], y)
-        unit[i] = 1.0
-        jitter = trust * (D * z[i]) ** 2 + D - D * D * forward(L, unit, y)
-        unit[i] = 0.0
-        block[start + n + i] += max(jitter - model_variance[i] - floor**2, 0.0)
-        # an outlier counts less, and what stays the same for many samples is one piece of news
-        block[start + 2 * n + i] += S[i, i] / trust * max(1.0, ratio[i]) if len(ratio) else S[i, i]
-    block[-2] += 1.0
-    block[-1] = moving  # a block is of the kind of its last sample
+    p, before, n = numbers.p, model.speed, len(commanded)
+    acceleration, covariance, variance = np.empty(n), sample.covariance, sample.model_variance
+    # the observer that gives the torques is a low pass of the first order: the velocities go through the same
+    for j in range(n):
+        sample.speed[j] = numbers.delay * before[j] + (1.0 - numbers.delay) * commanded[j]
+        acceleration[j] = (sample.speed[j] - before[j]) / numbers.period
+        if abs(sample.speed[j]) > p.still_rad_s:
+            sample.moving[0] = 1
+    features_into(kin, mechanism, sample.speed, acceleration, sample.x)
+    mean_and_variance(model.weights, model.covariance, sample.x, sample.mean, variance)
+    mass_matrix_into(kin, mechanism, sample.M)
+    spread_of_sample(sample.M, model.spread[sample.moving[0]], p.noise_floor_nm, covariance)
+    for j in range(n):
+        variance[j] += p.bias_floor_nm**2
+        sample.residual[j] = sample.torque[j] - sample.mean[j]
+    if p.widen_at_turns:
+        add_reversal_variance(sample.M, acceleration, turning, variance)
 
 
 @kernel
@@ -266,76 +274,33 @@ def spread_of_sample(M: FloatArray, spread: FloatArray, floor: float, S: FloatAr
         S[i, i] += spread[1, i] + floor**2
 
 
-class Learnt(NamedTuple):
-    """What was learnt, as of `ResidualModel`, and the prior's variances (f,); changed."""
+DEVIATION = 0.3
+"""Deviation of the factor before anything is learnt; its mean is 0."""
+_MOST_NM2 = 25.0
+"""Largest variance: joints that ring after 15 rad/s^2, the limit of the Panda's first, were wrong by up to 13 Nm,
+and with 1 Nm^2 gave an alarm a minute [Nm^2]."""
+_HARD_RAD_S2 = 2.0
+"""Acceleration of a joint up to which it is known well enough [rad/s^2]."""
+_KEEP = float(np.exp(-1.0 / 16.0))
+"""What is left of hard acceleration after one sample: it is in the windows for some more."""
 
-    weights: FloatArray
-    covariance: FloatArray
-    spread: FloatArray
-    seen: FloatArray
-    prior: FloatArray
 
+def turning_init(n: int) -> FloatArray:
+    """Return what is remembered (3, n) of an arm that has learnt nothing.
 
-class Pace(NamedTuple):
-    """How fast is learnt."""
-
-    forget: float
-    """Part by which a block's time fades what was learnt of the mean."""
-    least_gain: float
-    """Weight of a block in the spread once many have been seen."""
-    first: float
-    """What the prior of the spread counts [samples]."""
-    most_velocity: float
-    """Largest variance A [(rad/s^2)^2]."""
-    most_torque: float
-    """Largest variance D [Nm^2]."""
+    How hard it has just accelerated, as the square of a torque [Nm^2], the factor on that, and the factor's variance.
+    """
+    return np.array([np.zeros(n), np.zeros(n), np.full(n, DEVIATION**2)])
 
 
 @kernel
-def learn_block(block: FloatArray, learnt: Learnt, pace: Pace) -> None:
-    """Learn a block of samples: weights by their mean torques and features, and one step of both variances."""
-    weights, covariance, spread, seen, prior = learnt
-    n, f = weights.shape
-    x, samples, start, k = np.empty(f), block[-2], n + n * f, int(block[-1])
-    if samples <= 0.0:
-        return
+def add_reversal_variance(M: FloatArray, growth: FloatArray, turning: FloatArray, model_variance: FloatArray) -> None:
+    """Take in how joint velocities grow (n,) [rad/s^2], and add to the variance (n,) [Nm^2] of the mean."""
+    n = len(growth)
     for j in range(n):
-        for a in range(f):
-            x[a] = block[n + j * f + a] / samples
-        noise = block[start + 2 * n + j] / samples**2  # of a mean: the sum of variances / N^2
-        least_squares_step(weights[j], covariance[j], x, block[j] / samples, noise, prior, pace.forget)
-    seen[k] += samples
-    gain = max(samples / (pace.first + seen[k]), pace.least_gain)  # a mean with the prior, then an exponential one
-    for part in range(2):
-        ceiling = pace.most_torque if part else pace.most_velocity
-        for j in range(n):
-            new = block[start + part * n + j] / samples
-            spread[k, part, j] = min(spread[k, part, j] + gain * (new - spread[k, part, j]), ceiling)
-
-
-KEPT = ("weights", "covariance", "spread", "seen")
-"""What is kept from one session to the next."""
-
-
-def kept(model: ResidualModel) -> dict[str, FloatArray]:
-    """Return what is to be kept of a model, by name."""
-    return {name: getattr(model, name) for name in KEPT}
-
-
-def resumed(numbers: dict[str, FloatArray], p: SequentialParams) -> ResidualModel:
-    """Return a model with what was kept of an earlier one; one that could not be is a ParameterError.
-
-    The covariances must be symmetric and positive definite, the variances and counts not below zero.
-    """
-    n = len(numbers["weights"])
-    fresh = residual_init(n, p)
-    for name in KEPT:
-        if numbers[name].shape != getattr(fresh, name).shape or not np.isfinite(numbers[name]).all():
-            raise ParameterError(f"What was learnt has {name} of the shape {numbers[name].shape}: learn it anew.")
-    turned = numbers["covariance"].swapaxes(1, 2)
-    if not np.array_equal(numbers["covariance"], turned) or np.linalg.eigvalsh(turned).min() <= 0.0:
-        raise ParameterError("What was learnt has a covariance that is none: learn it anew.")
-    if numbers["spread"].min() < 0.0 or numbers["seen"].min() < 0.0:
-        raise ParameterError("What was learnt has a variance or a count below zero: learn it anew.")
-    weights, covariance, spread, seen = (numbers[name].copy() for name in KEPT)
-    return fresh._replace(weights=weights, covariance=covariance, spread=spread, seen=seen)
+        hard = 0.0
+        for k in range(n):
+            # the torque on joint j by the acceleration of joint k; of several the squares add up
+            hard += (M[j, k] * max(0.0, abs(growth[k]) - _HARD_RAD_S2)) ** 2
+        turning[0, j] = max(hard, _KEEP * turning[0, j])
+        model_variance[j] += min(turning[1, j] * turning[0, j], _MOST_NM2)

@@ -1,22 +1,30 @@
-"""How free motion's residuals vary: more than white noise would have them, and most where the arm turns round.
+"""How means of free motion's residuals vary beyond white noise, the level of an alarm, and the force that is found.
 
-**Windows.** What the features of free motion cannot express, friction with memory, a cable, a joint that rings, is the
+**Scatter.** What the features of free motion cannot express, friction with memory, a cable, a joint that rings, is the
 same for many samples in a row: means over longer windows have more of it than S / N + U says. So the scatter of each
 window's whitened means is learnt, with a prior at the identity, from all samples that nobody near can have caused. One
 that stands out counts less, by Student's weight, and never nothing: a sample that is suspected of a contact is not left
 out, for a scatter that leaves out what it does not expect shrinks until it expects nothing.
 
-**Turning.** What accelerates hard is known only to a part, and what is wrong with it comes too early or too late. That
-is the same for many samples in a row, so that it is variance of the mean and not noise. Each joint's variance is a
-factor on how hard the arm accelerates, learnt with a prior (as `residual_model`), also where a contact is suspected: an
-arm that gave an alarm because it turned round would do so for ever.
+**The level** that ln R must pass is the proven bound, less what the arm's own free motion leaves it. Markov's
+inequality bounds how often R passes A in free motion that is as learnt (`sequential`). Of an arm whose free motion the
+model describes well, the largest ln R of a quarter of a second stay far below that, and of one that rings and sticks
+they do not. Maxima of many samples are Gumbel's (Fisher and Tippett 1928): two quantiles of them, followed online with
+nothing near, say from which level on one in so many hours lies above. The level is that, between the bound and
+`slack_nats` below it: neither a person's touches nor a year of alarms can raise it further.
+
+**The force** at the end-effector that is found says in newtons how well free motion is known. A force f there adds
+J^T f to the mean z of a window, and so f^T G f with G = J S^-1 J^T to z^T S^-1 z. Solved for the likelihood ratio of an
+alarm, this gives the force: of all its directions the one in which the torques tell least of it. Evidence by something
+near, by a touch or by other windows comes on top.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.cholesky import factor
+from pretouch.cholesky import factor, forward, largest_eigenvalue
 from pretouch.compiled import kernel
 from pretouch.types import FloatArray
 
@@ -26,9 +34,13 @@ LONGEST = LENGTHS[-1]
 _LENGTHS = np.array(LENGTHS)
 
 
-class FreeMeans(NamedTuple):
-    """What the windows' means are in free motion, and how those of a sample compare with it."""
+class WindowMeans(NamedTuple):
+    """Means of the newest residuals over windows of each of `LENGTHS`, and what they are in free motion."""
 
+    mean: FloatArray
+    """(6, n) [Nm]."""
+    whole: int
+    """How many of the windows are full."""
     S: FloatArray
     """(n, n) spread of a sample [Nm^2]."""
     model_variance: FloatArray
@@ -67,21 +79,18 @@ def scatter_init(n: int) -> FloatArray:
 
 
 @kernel
-def white_means(S: FloatArray, model_variance: FloatArray) -> FreeMeans:
-    """Return means without a scatter: of noise (n, n) that is white, about a mean with variances (n,) [Nm^2]."""
-    n = len(S)
-    return FreeMeans(S, model_variance, np.zeros((0, n + 2, n)), np.zeros((0, n)), np.zeros(0), np.zeros((0, n)))
+def means_in_free_motion(
+    mean: FloatArray, whole: int, S: FloatArray, model_variance: FloatArray, scatter: FloatArray
+) -> WindowMeans:
+    """Return means of residuals with what they are in free motion, and room for how both compare."""
+    size, n = len(scatter), len(S)
+    return WindowMeans(
+        mean, whole, S, model_variance, scatter, np.zeros((size, n)), np.zeros(size), np.zeros((size, n))
+    )
 
 
 @kernel
-def scattered_means(S: FloatArray, model_variance: FloatArray, scatter: FloatArray) -> FreeMeans:
-    """Return means with a scatter (6, n + 2, n), and room for how those of a sample compare."""
-    n, size = len(S), len(scatter)
-    return FreeMeans(S, model_variance, scatter, np.zeros((size, n)), np.zeros(size), np.zeros((size, n)))
-
-
-@kernel
-def covariance_of_mean(free: FreeMeans, k: int, S0: FloatArray) -> None:
+def covariance_of_mean(means: WindowMeans, k: int, S0: FloatArray) -> None:
     """Write the lower triangle of the covariance (n, n) of window k's mean, the last joint first, but for its scatter.
 
     What the joints behind a link say is so the beginning of a whitened mean.
@@ -89,20 +98,17 @@ def covariance_of_mean(free: FreeMeans, k: int, S0: FloatArray) -> None:
     n = len(S0)
     for i in range(n):
         for j in range(i + 1):
-            S0[i, j] = free.S[n - 1 - i, n - 1 - j] / _LENGTHS[k]
+            S0[i, j] = means.S[n - 1 - i, n - 1 - j] / _LENGTHS[k]
         # unlike the noise, not divided by the length of the window
-        S0[i, i] += free.model_variance[n - 1 - i]
+        S0[i, i] += means.model_variance[n - 1 - i]
 
 
 @kernel
-def learn_scatter(at: int, whole: int, free: FreeMeans, tails: float, forget: float) -> None:
-    """Learn from the means of the first `whole` windows; `at` counts samples.
-
-    `forget` is the part by which one sample's time fades.
-    """
-    scatter, whitened, square, ratio = free.scatter, free.whitened, free.square, free.ratio
+def learn_scatter(at: int, means: WindowMeans, tails: float, forget: float) -> None:
+    """Learn from the means of full windows; `at` counts samples, each fades by the part `forget` in its time."""
+    scatter, whitened, square, ratio = means.scatter, means.whitened, means.square, means.ratio
     n = whitened.shape[1]
-    for k in range(whole):
+    for k in range(means.whole):
         stride = max(_LENGTHS[k], _LEAST_STRIDE)
         # no sample is in two means of a long window: those that overlap would say the same twice
         if at % stride:
@@ -165,70 +171,110 @@ def window_means(ring: FloatArray, at: int, count: int, means: FloatArray) -> in
     return whole
 
 
-_DEVIATION = 0.3
-"""Deviation of the factor before anything is learnt; its mean is 0."""
-_MOST = 1.0
-"""Largest factor: nothing is known of what accelerates."""
-_MOST_NM2 = 25.0
-"""Largest variance: joints that ring after 15 rad/s^2, the limit of the Panda's first, were wrong by up to 13 Nm,
-and with 1 Nm^2 gave an alarm a minute [Nm^2]."""
-_WINDOW = 2
-_SAMPLES = LENGTHS[_WINDOW]
-"""The window whose means say how large the factor is [samples]."""
-_HARD_RAD_S2 = 2.0
-"""Acceleration of a joint up to which it is known well enough [rad/s^2]."""
-_KEEP = float(np.exp(-1.0 / 16.0))
-"""What is left of hard acceleration after one sample: it is in the windows for some more."""
-_FALL = 0.2
-"""How much less what is smaller than expected counts: what comes too early or too late is large only for some samples,
-and an expectile above the mean covers these (asymmetric least squares, Newey and Powell 1987)."""
-_OUTLIER = 9.0
-"""Times the expected square that a mean counts at most."""
-_LEAST_NM2 = 0.05
-"""Hard acceleration from which something is learnt of it [Nm^2]."""
+MAXIMUM_OF = 25
+"""Samples of which one maximum is taken."""
+_MIDDLE, _HIGH = 0.8, 0.98
+"""Parts of the maxima that lie below both quantiles. Lower ones say nothing of the tail: arms that stick and ring
+differ from others in one maximum of fifty. Touches that no unit sees raise the level too, to the bound at most."""
+_FIRST = (0.5, 2.5)
+"""Both quantiles before anything is known: the level begins 5 nats below the bound. With all of `slack_nats` a real arm
+that shook gave twice as many alarms in its first minute, and at the bound one sample of 60 N could be missed."""
+_PRIOR_MAXIMA, _MEMORY = 40.0, 600.0
+"""Maxima that the first values count for, and over which the quantiles are averaged at most."""
+_STEP, _STEP_HIGH = 4.0, 20.0
+"""How far one maximum moves each quantile, relative to their distance and the average's weight."""
+_LEAST_APART = 0.5
+"""Least distance of the quantiles: with less they would stand still."""
+_HEAVIER = 1.0
+"""Scales that are added: the maxima are a mixture of speeds and postures, whose tail is heavier than its middle."""
+_GUMBEL_MIDDLE, _GUMBEL_HIGH = -math.log(-math.log(_MIDDLE)), -math.log(-math.log(_HIGH))
+"""Both quantiles of the standard Gumbel distribution."""
 
 
-def turning_init(n: int) -> FloatArray:
-    """Return what is remembered (3, n) of an arm that has learnt nothing.
+def level_init() -> FloatArray:
+    """Return the (REGIMES, 5) memory of an arm of which nothing is known.
 
-    How hard it has just accelerated, as the square of a torque [Nm^2], the factor on that, and the factor's variance.
+    Of each regime both quantiles, the largest ln R of the block so far, samples in it, and blocks seen.
     """
-    return np.array([np.zeros(n), np.zeros(n), np.full(n, _DEVIATION**2)])
+    return np.tile([*_FIRST, -np.inf, 0.0, 0.0], (REGIMES, 1))
 
 
 @kernel
-def add_reversal_variance(M: FloatArray, growth: FloatArray, turning: FloatArray, model_variance: FloatArray) -> None:
-    """Take in how joint velocities grow (n,) [rad/s^2], and add to the variance (n,) [Nm^2] of the mean."""
-    n = len(growth)
-    for j in range(n):
-        hard = 0.0
-        for k in range(n):
-            # the torque on joint j by the acceleration of joint k; of several the squares add up
-            hard += (M[j, k] * max(0.0, abs(growth[k]) - _HARD_RAD_S2)) ** 2
-        turning[0, j] = max(hard, _KEEP * turning[0, j])
-        model_variance[j] += min(turning[1, j] * turning[0, j], _MOST_NM2)
+def earned_level(seen: FloatArray, bound: float, slack: float) -> float:
+    """Return the level for one alarm in exp(`bound`) samples, from `bound` - `slack` to `bound` (both at least 1)."""
+    # both quantiles of Gumbel's distribution give its scale and its location
+    scale = max(seen[1] - seen[0], _LEAST_APART) / (_GUMBEL_HIGH - _GUMBEL_MIDDLE)
+    location = seen[0] - scale * _GUMBEL_MIDDLE
+    # P(maximum > x) is about exp(-(x - location) / scale) far out
+    level = location + scale * (_HEAVIER + bound - math.log(MAXIMUM_OF))
+    return max(1.0, min(max(level, bound - slack), bound))
 
 
 @kernel
-def learn_turning(
-    at: int, means: FloatArray, S: FloatArray, model_variance: FloatArray, forget: float, turning: FloatArray
-) -> None:
-    """Learn the factors from the excess of the means (6, n) of the windows over noise (n, n) and model variance (n,).
-
-    `at` counts the samples: no sample is in two of the means. `forget` is the part by which one sample's time fades.
-    """
-    if at % _SAMPLES:
+def learn_level(log_r: float, seen: FloatArray) -> None:
+    """Take in one sample of free motion of a regime (5,)."""
+    seen[2], seen[3] = max(seen[2], log_r), seen[3] + 1.0
+    if seen[3] < MAXIMUM_OF:
         return
-    for j in range(len(model_variance)):
-        x, value, variance = turning[0, j], turning[1, j], turning[2, j]
-        # fading towards the prior by the time since the last mean
-        variance += _SAMPLES * forget * (_DEVIATION**2 - variance)
-        if x > _LEAST_NM2:
-            expected = S[j, j] / _SAMPLES + model_variance[j]
-            square = min(means[_WINDOW, j] ** 2, _OUTLIER * expected)
-            # a scalar Kalman step: `expected` has the slope x, and the square of a Gaussian the variance 2 expected^2
-            gain = variance * x / (variance * x**2 + 2.0 * expected**2)
-            value += gain * (square - expected) * (1.0 if square > expected else _FALL)
-            variance -= gain * x * variance
-        turning[1, j] = min(max(value, 0.0), _MOST)
-        turning[2, j] = variance
+    step = max(seen[1] - seen[0], _LEAST_APART) / min(_PRIOR_MAXIMA + seen[4], _MEMORY)
+    # stochastic approximation: at rest where the part above each is as it should be (Robbins and Monro 1951)
+    seen[0] += _STEP * step * ((seen[2] > seen[0]) - (1.0 - _MIDDLE))
+    seen[1] += _STEP_HIGH * step * ((seen[2] > seen[1]) - (1.0 - _HIGH))
+    seen[1] = max(seen[1], seen[0] + _LEAST_APART)
+    seen[2], seen[3], seen[4] = -np.inf, 0.0, seen[4] + 1.0
+
+
+HELD_S = 0.1
+"""For how long the force is there [s]."""
+_SURE = 1.645
+"""Deviations of the noise above what would do in half of all cases: so that it does in 95 % of them."""
+
+
+@kernel
+def detectable_force(
+    J: FloatArray, period: float, means: WindowMeans, needed: float, gain: float, tails: float
+) -> float:
+    """Return the force at the end-effector that the test finds in 95 of 100 cases if it is held for `HELD_S` [N].
+
+    Args:
+        J: (6, n) Jacobian of the end-effector.
+        period: of control [s].
+        means: of residuals, and what they are in free motion; the longest window within `HELD_S` counts.
+        needed: ln of the likelihood ratio of one hypothesis in one window that is an alarm.
+        gain: g, how much larger a contact's spread is than that of free motion.
+        tails: degrees of freedom of the Student distribution.
+
+    Returns:
+        Infinite where no force is found.
+    """
+    k, n = 0, J.shape[1]
+    while k + 1 < len(_LENGTHS) and _LENGTHS[k + 1] * period <= HELD_S:
+        k += 1
+    S, L, A, V = np.empty((n, n)), np.zeros((n, n)), np.empty((3, n)), np.zeros((3, 3))
+    # a mean over less time has more noise, and one over more is not whole while the force lasts
+    covariance_of_mean(means, k, S)
+    if not factor(S, L):
+        return np.inf
+    if len(means.scatter):
+        spread_out(means.scatter[k], L, np.empty((n, n)))
+    for a in range(3):
+        forward(L, J[a, ::-1].copy(), A[a])  # the last joint first
+    for a in range(3):
+        for b in range(3):
+            for j in range(n):
+                V[a, b] -= A[a, j] * A[b, j]
+    least, squares = -largest_eigenvalue(V), _squares(needed, n, gain, tails)
+    return (math.sqrt(squares) + _SURE) / math.sqrt(least) if least > 0.0 else np.inf
+
+
+@kernel
+def _squares(needed: float, n: int, gain: float, tails: float) -> float:
+    """Return the f^T G f from which on the mean's likelihood ratio passes exp(`needed`).
+
+    With c = g / (1 + g), z^T S^-1 z = T + n of which the force explains T + 3, the ratio of `log_ratio` has the root
+    E = exp(2 (needed + 3/2 ln(1 + g)) / (nu + n)) = (nu + n + T) / (nu + n - 3 c + (1 - c) T), which is linear in T.
+    """
+    E, c = math.exp(2.0 * (needed + 1.5 * math.log1p(gain)) / (tails + n)), gain / (1.0 + gain)
+    # with few degrees of freedom no residual is so large that it could not be an outlier
+    slope = 1.0 - E * (1.0 - c)
+    return max(0.0, (E * (tails + n - 3.0 * c) - tails - n) / slope) if slope > 0.0 else np.inf

@@ -14,20 +14,17 @@ without a skin.
 """
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from pretouch.cholesky import backward, factor, forward
 from pretouch.compiled import compiled, kernel
-from pretouch.contact.scatter import LENGTHS, FreeMeans, covariance_of_mean, spread_out
+from pretouch.contact.scatter import LENGTHS, WindowMeans, covariance_of_mean, spread_out
 from pretouch.groups import Kinematics, Mechanism, Obstacles
-from pretouch.params import SequentialParams
+from pretouch.params import ProximityPriorParams, SequentialParams
 from pretouch.robot.kinematics import jacobian_into
 from pretouch.types import FloatArray, IntArray
-
-if TYPE_CHECKING:
-    from pretouch.contact.model_update import SequentialNumbers
 
 _LENGTHS = np.array(LENGTHS)
 _LARGEST = 300.0
@@ -41,6 +38,25 @@ def alarm_bound(p: SequentialParams, period: float) -> float:
     """Return ln A for the chosen rate of false alarms, at one sample a period [s]."""
     # A is the number of samples in which one false alarm is allowed
     return max(1.0, math.log(3600.0 / period / p.false_alarms_per_hour))
+
+
+class Moment(NamedTuple):
+    """What one sample of the torques is of. n joints, L links."""
+
+    kin: Kinematics
+    qd: FloatArray
+    """(n,) measured joint velocities [rad/s]."""
+    qd_commanded: FloatArray
+    """(n,) [rad/s]."""
+    tau_ext: FloatArray
+    """(n,) external torques [Nm], which must be numbers."""
+    obstacles: Obstacles
+    touch_gain: FloatArray
+    """(L,) factor on the prior of a contact on each link, by what units say."""
+    watched: bool
+    """Whether a skin watches, all of it heard and none of it touched."""
+    reacting: bool
+    """Whether the arm moves with a contact."""
 
 
 class Hypotheses(NamedTuple):
@@ -60,29 +76,25 @@ class Hypotheses(NamedTuple):
 
 
 @kernel
-def judge(
-    means: FloatArray, whole: int, free: FreeMeans, contacts: Hypotheses, gain: float, tails: float
-) -> tuple[float, int, int]:
+def judge(means: WindowMeans, contacts: Hypotheses, gain: float, tails: float) -> tuple[float, int, int]:
     """Return ln R, and the window and the hypothesis that have the largest part in it.
 
     Args:
-        means: (6, n) means of the windows' samples [Nm].
-        whole: how many of them there are.
-        free: what they are in free motion.
+        means: of residuals, and what they are in free motion.
         contacts: hypotheses.
         gain: g, how much larger a contact's spread is than that of free motion.
         tails: degrees of freedom of the Student distribution.
     """
     J, joints, weight, away = contacts
-    scatter, whitened, squares, ratios = free.scatter, free.whitened, free.square, free.ratio
-    n, total, best, window, which = len(free.S), 0.0, -1.0, 0, 0
+    scatter, whitened, squares, ratios = means.scatter, means.whitened, means.square, means.ratio
+    n, total, best, window, which = len(means.S), 0.0, -1.0, 0, 0
     S0, L, z, y, pivot = np.empty((n, n)), np.zeros((n, n)), np.empty(n), np.empty(n), np.empty(n)
     K = np.empty((n, n))
     scratch, widened = np.empty((n, 3)), np.log1p(gain)
-    for k in range(whole):
+    for k in range(means.whole):
         for i in range(n):
-            z[i] = means[k, n - 1 - i]
-        covariance_of_mean(free, k, S0)
+            z[i] = means.mean[k, n - 1 - i]
+        covariance_of_mean(means, k, S0)
         if not factor(S0, L):
             continue
         if len(scatter):
@@ -190,22 +202,20 @@ def link_prior(mechanism: Mechanism) -> float:
 
 
 @kernel
-def hypotheses(
-    kin: Kinematics, mechanism: Mechanism, qd: FloatArray, obstacles: Obstacles, touch_gain: FloatArray,
-    p: "SequentialNumbers",
-) -> Hypotheses:  # fmt: skip
+def hypotheses(now: Moment, mechanism: Mechanism, most: int, near: ProximityPriorParams) -> Hypotheses:
     """Return the hypotheses: any wrench beyond each joint, a force on each link, one by each of the nearest objects.
 
-    Joints move at `qd` (n,) [rad/s]. All weights are times `touch_gain` (L,) of the link; of several links behind one
+    No more than so many objects count. All weights are times the touch gain of the link; of several links behind one
     joint the largest counts.
     """
-    position, rotation, anchor, axis = kin
+    obstacles, touch_gain, qd = now.obstacles, now.touch_gain, now.qd
+    position, rotation, anchor, axis = now.kin
     moved_by, parts, middle = mechanism.arm.moved_by, mechanism.links.parts, mechanism.links.middle
     distance, direction = obstacles.body_distance, obstacles.direction
     n, count, full, point = len(anchor), len(parts), np.empty((6, len(anchor))), np.empty(3)
-    most = count + (min(MOST, len(distance)) if p.use_proximity else 0)
-    J, joints, weight, away = np.empty((most, 3, n)), np.empty(most, np.int64), np.empty(n + most), np.zeros((most, 3))
-    order, k = nearest_of(distance, len(J) - count), 0
+    order, k = nearest_of(distance, most), 0
+    size = count + len(order)
+    J, joints, weight, away = np.empty((size, 3, n)), np.empty(size, np.int64), np.empty(n + size), np.zeros((size, 3))
     # joints and links without what is seen share a weight of 1: half for any wrench on a link, which moves the joints
     # before it, half for a force at the middle of a link
     weight[:n] = 0.0
@@ -235,7 +245,7 @@ def hypotheses(
                 away[h, a] = -direction[k, a]
                 for j in range(n):
                     speed += direction[k, a] * J[h, a, j] * qd[j]
-            weight[n + h] = p.near_gain * nearness(distance[k], speed, p.near_m, p.near_horizon_s) * touch_gain[link]
+            weight[n + h] = near.gain * nearness(distance[k], speed, near.distance_m, near.horizon_s) * touch_gain[link]
     return Hypotheses(J, joints, weight, away)
 
 

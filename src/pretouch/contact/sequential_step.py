@@ -1,4 +1,4 @@
-"""One sample of the sequential detector in one compiled call: free motion, the test against contacts, what is learnt.
+"""One sample of the sequential test in one compiled call: free motion, the test against contacts, what is learnt.
 
 With tau the external torques, x the features and w the weights of free motion, the residual is r = tau - w^T x. It has
 the noise covariance C = M A M^T + D and the model's variance u = x^T P x, which does not average out
@@ -11,29 +11,60 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from pretouch.compiled import compiled, inlined, kernel
-from pretouch.contact.alarm_level import detectable_force, earned_level
-from pretouch.contact.model_update import CALM, SequentialNumbers, SequentialState, Situation, Tested, update_model
-from pretouch.contact.residual_model import CalmSample, features_into, mean_and_variance, spread_of_sample
-from pretouch.contact.scatter import LENGTHS, LONGEST, add_reversal_variance, scattered_means, white_means, window_means
-from pretouch.contact.sequential import force_map_into, hypotheses, judge, link_prior, nearest_of
-from pretouch.groups import Kinematics, Mechanism, Obstacles
+from pretouch.contact.lasting_load import follow_lasting
+from pretouch.contact.learning import add_to_block, learn_turning, queue_block
+from pretouch.contact.residual_model import (
+    BLOCK,
+    QUEUE,
+    FreeSample,
+    ResidualModel,
+    SequentialNumbers,
+    SequentialState,
+    describe_free_motion,
+    prior_of,
+    residual_init,
+    turning_init,
+)
+from pretouch.contact.scatter import (
+    LENGTHS,
+    LONGEST,
+    WindowMeans,
+    detectable_force,
+    earned_level,
+    learn_level,
+    learn_scatter,
+    level_init,
+    means_in_free_motion,
+    scatter_init,
+    window_means,
+)
+from pretouch.contact.sequential import (
+    MOST,
+    Moment,
+    alarm_bound,
+    force_map_into,
+    hypotheses,
+    judge,
+    link_prior,
+    nearest_of,
+)
+from pretouch.groups import Mechanism
+from pretouch.params import MisfitParams, ProximityPriorParams, SequentialParams
 from pretouch.records import Cell, IntCell
-from pretouch.robot.kinematics import jacobian_into, mass_matrix_into
+from pretouch.robot.kinematics import jacobian_into
 from pretouch.robot.vectors import below
 from pretouch.types import FloatArray
 
+CALM = BLOCK * QUEUE
+"""Calm samples after which one is learnt."""
 _SETTLED_S = 10.0
 """Time at rest, as far as free motion is learnt in it, after which a posture's offsets count as learnt [s]."""
 _STIRS_RAD_S = 0.002
 """Joint speed from which an arm at rest sets out: friction turns round before it counts as moving [rad/s]."""
 
 
-class Joints(NamedTuple):
-    """What is taken of `RobotState`."""
-
-    qd: FloatArray
-    qd_commanded: FloatArray
-    tau_ext: FloatArray
+_NO_MISFIT, _NO_PROXIMITY = MisfitParams(), ProximityPriorParams()
+"""In the place of those that are switched off: no number of them counts."""
 
 
 class SampleTest(NamedTuple):
@@ -72,138 +103,131 @@ def sample_test(n: int) -> SampleTest:
     )  # fmt: skip
 
 
+def sequential_init(n: int, p: SequentialParams, learnt: ResidualModel | None = None) -> SequentialState:
+    """Return the state of n joints before the first sample; `learnt` is what an earlier session knew of the arm."""
+    none = np.zeros(1, np.int64)
+    return SequentialState(
+        residual_init(n, p) if learnt is None else learnt, np.zeros((LONGEST, n)), none, none, none, np.zeros(3 + n),
+        none, turning_init(n), scatter_init(n), level_init(), none,
+    )  # fmt: skip
+
+
+def sequential_numbers(n: int, period: float, p: SequentialParams) -> SequentialNumbers:
+    """Return what compiled code takes of the parameters, of n joints and a control period [s]."""
+    misfit, near = p.misfit or _NO_MISFIT, p.proximity or _NO_PROXIMITY
+    return SequentialNumbers(
+        p.numbers, near.numbers, misfit.numbers, period, math.exp(-p.observer_gain_1_s * period),
+        alarm_bound(p, period), ("never", "watched", "always").index(p.learn), MOST if p.proximity else 0,
+        round(p.relearn_after_s / period) if p.learn != "never" else 0, p.misfit is not None, prior_of(n, p),
+    )  # fmt: skip
+
+
 @compiled
 def assess_sample(
-    state: SequentialState, robot: Joints, obstacles: Obstacles, now: Situation, p: SequentialNumbers,
-    kin: Kinematics, mechanism: Mechanism, results: SampleTest,
-) -> None:  # fmt: skip
+    state: SequentialState, now: Moment, numbers: SequentialNumbers, mechanism: Mechanism, results: SampleTest
+) -> None:
     """Test one sample of the external torques for a contact, and learn from it if nothing can be one.
 
-    Changes the state, and writes what the sample says. The torques must be numbers.
+    Changes the state, and writes what the sample says.
     """
-    arm, n, at = mechanism.arm, len(robot.qd), state.at[0]
-    count = min(state.samples[0] + 1, LONGEST)
-    covariance, means, distance = results.covariance, results.means, obstacles.body_distance
-    means[:] = 0.0  # of windows that are not whole yet
-    x, M = np.empty((n, state.model.weights.shape[1])), np.empty((n, n))
-    free = _FreeMotion(np.empty(n), x, M, np.empty(n), covariance, results.model_variance)
-    moving = _free_motion(robot.qd_commanded, state, p, kin, mechanism, free)
-    for j in range(n):
-        results.residual[j] = robot.tau_ext[j] - free.mean[j]
-        state.ring[at, j] = results.residual[j]
+    arm, n, at, p, kin = mechanism.arm, len(now.qd), state.at[0], numbers.p, now.kin
+    covariance, distance = results.covariance, now.obstacles.body_distance
+    sample = FreeSample(
+        now.tau_ext, results.residual, np.empty(n), np.empty((n, state.model.weights.shape[1])), np.empty((n, n)),
+        np.empty(n), covariance, results.model_variance, np.zeros(1, np.int64),
+    )  # fmt: skip
+    describe_free_motion(now.qd_commanded, state.model, state.turning, numbers, kin, mechanism, sample)
+    state.ring[at] = results.residual
+    results.samples[0] = min(state.samples[0] + 1, LONGEST)
+    results.means[:] = 0.0  # of windows that are not whole yet
+    whole = window_means(state.ring, (at + 1) % LONGEST, results.samples[0], results.means)
 
     # The test against contacts of each joint, of each link and of the nearest objects: R is the sum of prior weights
     # times likelihood ratios, A the level that it passes at the chosen rate of false alarms.
-    whole = window_means(state.ring, (at + 1) % LONGEST, count, means)
-    contacts = hypotheses(kin, mechanism, robot.qd, obstacles, now.touch_gain, p)
-    settled = state.settled[0] if below(free.speed, _STIRS_RAD_S) else 0
+    contacts = hypotheses(now, mechanism, numbers.objects, numbers.near)
+    settled = state.settled[0] if below(sample.speed, _STIRS_RAD_S) else 0
     # At rest the offsets of a posture are learnt in seconds; until then the arm errs as in motion. Time in which
     # nothing may be learnt, with somebody near, does not count.
-    regime = 0 if settled * p.period >= _SETTLED_S else 1
-    expected, ratio = white_means(covariance, results.model_variance), np.zeros(0)
-    level = max(1.0, p.bound - p.slack_nats)
-    if p.learn_misfit:
-        expected = scattered_means(covariance, results.model_variance, state.scatter[regime])
-        ratio = expected.scatter[-1, n + 1]
-        level = earned_level(state.level[regime], p.bound, p.slack_nats, math.exp(-p.bound))
-    log_r, window, which = judge(means, whole, expected, contacts, p.contact_gain, p.tails)
-    log_likelihood_ratio = max(0.0, log_r / level)
+    regime = 0 if settled * numbers.period >= _SETTLED_S else 1
+    scatter, level = np.zeros((0, n + 2, n)), max(1.0, numbers.bound - p.slack_nats)
+    if numbers.learns_misfit:
+        scatter, level = state.scatter[regime], earned_level(state.level[regime], numbers.bound, p.slack_nats)
+    means = means_in_free_motion(results.means, whole, covariance, results.model_variance, scatter)
+    log_r, window, which = judge(means, contacts, p.contact_gain, p.tails)
+    evidence = max(0.0, log_r / level)
 
     J_ee = np.empty((6, n))
     jacobian_into(kin.anchor, kin.axis, arm.moved_by[arm.ee], kin.position[arm.ee], J_ee)
     results.detectable_n[0] = detectable_force(
-        J_ee, p.period, expected, level - link_prior(mechanism), p.contact_gain, p.tails
+        J_ee, numbers.period, means, level - link_prior(mechanism), p.contact_gain, p.tails
     )
     # nothing is learnt while anything that is seen could be what is measured
     clear = len(distance) == 0 or distance[nearest_of(distance, 1)[0]] >= p.clear_m
-    alone = clear and (p.learns == 2 or (p.learns == 1 and now.watched))
-    sample = CalmSample(robot.tau_ext, x, results.residual, M, results.model_variance, moving, ratio)
-    tested = Tested(
-        sample, means, whole, expected, J_ee, alone, log_likelihood_ratio >= p.suspect, log_r, state.level[regime]
-    )  # fmt: skip
-    update_model(state, now, p, tested)
+    alone = clear and (numbers.learns == 2 or (numbers.learns == 1 and now.watched))
+    if numbers.learns_misfit and alone and not now.reacting and whole == len(LENGTHS):
+        learn_level(log_r, state.level[regime])
+    _learn(state, now.reacting, numbers, sample, means, J_ee, alone, evidence >= p.suspect)
 
     for j in range(n):  # only now: what is learnt is learnt of the noise alone
         covariance[j, j] += results.model_variance[j]
     # the first n hypotheses, wrenches beyond a joint, have no direction
     away = contacts.away[max(which - n, 0)] if which >= n else np.zeros(3)
-    _force_and_bands(
-        J_ee, means[window], free.mean, covariance, away, math.sqrt(2.0 * level), results.force, results.bands
-    )  # fmt: skip
-    state.model.speed[:], state.at[0] = free.speed, (at + 1) % LONGEST
+    _force_and_bands(J_ee, results.means[window], sample.mean, away, math.sqrt(2.0 * level), results)
+    state.model.speed[:], state.at[0] = sample.speed, (at + 1) % LONGEST
     state.settled[0] = settled + 1 if alone and not now.reacting else settled
-    _conclude(state, results, log_likelihood_ratio, count)
-
-
-@inlined
-def _conclude(state: SequentialState, results: SampleTest, ratio: float, count: int) -> None:
-    """Write the ratio and what is learnt, and forget a contact that was a load."""
     if state.steady[0] < 0:  # the load that lasted is free motion now, and no contact
-        ratio, results.force[:], count = 0.0, 0.0, 0
+        evidence, results.force[:], results.samples[0] = 0.0, 0.0, 0
         state.steady[0] = state.calm[0] = state.model.filled[0] = state.model.waiting[0] = 0
         results.learning[0] = 1
     else:
         results.learning[0] = 1 if state.calm[0] == CALM else 0
-    state.samples[0] = results.samples[0] = count
-    results.log_likelihood_ratio[0], results.lasting[0] = ratio, 1 if state.steady[0] > 0 else 0
-
-
-class _FreeMotion(NamedTuple):
-    """Room for what is known of a sample without a contact."""
-
-    speed: FloatArray
-    """(n,) commanded joint velocities as late as the torques are [rad/s]."""
-    x: FloatArray
-    """(n, f) features."""
-    M: FloatArray
-    """(n, n) mass matrix [kg m^2]."""
-    mean: FloatArray
-    """(n,) torques [Nm]."""
-    covariance: FloatArray
-    """(n, n) of their noise [Nm^2]."""
-    model_variance: FloatArray
-    """(n,) of the error of the mean [Nm^2]."""
+    state.samples[0] = results.samples[0]
+    results.log_likelihood_ratio[0], results.lasting[0] = evidence, 1 if state.steady[0] > 0 else 0
 
 
 @inlined
-def _free_motion(
-    commanded: FloatArray, state: SequentialState, p: SequentialNumbers, kin: Kinematics, mechanism: Mechanism,
-    free: _FreeMotion,
-) -> int:  # fmt: skip
-    """Write mean, noise and uncertainty of the torques without a contact; return 1 if the arm moves, or 0.
+def _learn(
+    state: SequentialState, reacting: bool, numbers: SequentialNumbers, sample: FreeSample, means: WindowMeans,
+    J: FloatArray, alone: bool, suspected: bool,
+) -> None:  # fmt: skip
+    """Learn from a sample: of the state, count what is calm and what lasts.
 
-    `commanded` (n,) are the joint velocities [rad/s].
+    `J` (6, n) is the Jacobian of the end-effector, `alone` says whether nothing that is seen can touch the arm,
+    `suspected` whether a contact is.
     """
-    learnt, before, moving, n = state.model, state.model.speed, 0, len(commanded)
-    acceleration = np.empty(n)
-    # the observer that gives the torques is a low pass of the first order: the velocities go through the same
-    for j in range(n):
-        free.speed[j] = p.delay * before[j] + (1.0 - p.delay) * commanded[j]
-        acceleration[j] = (free.speed[j] - before[j]) / p.period
-        if abs(free.speed[j]) > p.still_rad_s:
-            moving = 1
-    features_into(kin, mechanism, free.speed, acceleration, free.x)
-    mean_and_variance(learnt.weights, learnt.covariance, free.x, free.mean, free.model_variance)
-    mass_matrix_into(kin, mechanism, free.M)
-    spread_of_sample(free.M, learnt.spread[moving], p.noise_floor_nm, free.covariance)
-    for j in range(n):
-        free.model_variance[j] += p.bias_floor_nm**2
-    if p.widen_at_turns:
-        add_reversal_variance(free.M, acceleration, state.turning, free.model_variance)
-    return moving
+    model, p, period, at, full = state.model, numbers.p, numbers.period, state.at[0], means.whole == len(LENGTHS)
+    # What was gathered before a contact is suspected may be its beginning: it is thrown away, not learnt. Where misfit
+    # is learnt it only counts less: a spread without what it does not expect shrinks, and expects less and less.
+    lost = (suspected and not numbers.learns_misfit) or reacting or not alone
+    state.calm[0] = 0 if lost else min(state.calm[0] + 1, CALM)
+    # learnt also where a contact is suspected: an alarm at a reversal would otherwise come at each of them
+    if p.widen_at_turns and alone and not reacting and full:
+        learn_turning(at, means, period / p.memory_s, state.turning)
+    if numbers.learns_misfit and alone and not reacting:
+        learn_scatter(at, means, p.tails, period / numbers.misfit.memory_s)
+    if state.calm[0] >= CALM:
+        add_to_block(model, sample, means.scatter[-1, -1] if numbers.learns_misfit else np.zeros(0), p)
+        queue_block(model, numbers)
+    else:
+        model.filled[0] = model.waiting[0] = 0
+    # something that lasts is worth finding only if it troubles the arm; calm samples learn it anyway
+    unclear = state.steady[0] > 0 or suspected or reacting
+    if numbers.settle > 0 and alone and full and (state.calm[0] < CALM or suspected) and unclear:
+        follow_lasting(state, reacting, suspected, numbers, sample, means, J)
+    else:
+        state.steady[0] = 0
 
 
 @kernel
 def _force_and_bands(
-    J: FloatArray, torque: FloatArray, mean: FloatArray, covariance: FloatArray, away: FloatArray, wide: float,
-    force: FloatArray, bands: FloatArray,
-) -> None:  # fmt: skip
+    J: FloatArray, torque: FloatArray, mean: FloatArray, away: FloatArray, wide: float, results: SampleTest
+) -> None:
     """Write force (3,) and bands (6, 3) of `SampleTest`, of torques (n,) and of the mean in free motion.
 
     With the damped inverse W of J^T the force is W tau, and its variance diag(W C W^T). The bands are `wide` deviations
     about the mean: sqrt(2 ln A), where a single Gaussian's likelihood ratio, exp(z^2 / 2), is A.
     """
-    n = len(torque)
+    force, bands, covariance, n = results.force, results.bands, results.covariance, len(torque)
     W = np.empty((3, n))
     force_map_into(J, W)  # damped: near a singularity the force is taken to be smaller than it may be
     against = 0.0

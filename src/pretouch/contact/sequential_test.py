@@ -7,17 +7,18 @@ import numpy as np
 
 from pretouch.contact.announced_load import doubted
 from pretouch.contact.detector import Body, Detection, Detector, Sample, no_torques, strongest
-from pretouch.contact.localisation.localise import (
-    LocalisationState,
-    ResidualWindows,
-    localisation_init,
-    localise,
-    most_significant_mean,
+from pretouch.contact.localisation import LocalisationState, localisation_init, localise, most_significant_mean
+from pretouch.contact.residual_model import ResidualModel, SequentialState
+from pretouch.contact.sequential import Moment
+from pretouch.contact.sequential_step import (
+    SampleTest,
+    assess_sample,
+    sample_test,
+    sequential_init,
+    sequential_numbers,
 )
-from pretouch.contact.model_update import SequentialNumbers, SequentialState
-from pretouch.contact.residual_model import ResidualModel
-from pretouch.contact.sequential_detector import Observation, sequential_init, sequential_numbers, sequential_step
 from pretouch.contact.touch_cue import Cue, Cues, no_cues, together
+from pretouch.contact.window import window_init
 from pretouch.errors import ParameterError
 from pretouch.groups import no_obstacles
 from pretouch.params import LocalisationParams, SequentialParams
@@ -62,52 +63,55 @@ class SequentialTest(SequentialParams, Detector, name="sequential"):
         test = sequential_init(body.model.n, self, learnt)
         return SequentialTestState(test, localisation_init() if self.localise else None, self._cues_init(body))
 
-    def numbers(self, body: Body) -> SequentialNumbers:
-        """Return what compiled code takes of the parameters."""
-        return sequential_numbers(body.model.n, body.period, self)
-
     def _cues_init(self, body: Body) -> tuple[object, ...]:
         return tuple(cue.init(body) for cue in self.cues)
 
     def step(self, state: SequentialTestState, body: Body, sample: Sample) -> tuple[Detection, SequentialTestState]:
         """Hold one sample of the torques against free motion, and learn from it if nothing can be a contact."""
-        model, period, location = body.model, body.period, state.localisation
+        location = state.localisation
         # first, for units are heard without torques too: how long a sensor has been stuck counts on
         cues, remembered = self._heard(state.cues, body, sample)
-        found = no_torques(body, sample)
-        if found is not None:
-            return found, SequentialTestState(state.test, localisation_init() if location else None, remembered)
-        said = no_cues(len(model.links)) if cues is None else cues
-        # while a unit is touched free motion is not learnt, whatever the test says
-        alone = sample.watched and not len(said.link)
-        seen = Observation(sample.kin, sample.robot, sample.obstacles, said)
+        blind = no_torques(body, sample)
+        if blind is not None:
+            return blind, SequentialTestState(state.test, localisation_init() if location else None, remembered)
         before = _test_of(state)
         if sample.doubted_kg:
             before = before._replace(model=doubted(before.model, sample.doubted_kg))
-        tested, test = sequential_step(before, model, seen, sample.reacting, alone, self.numbers(body))
-        bands, touched, significant = Thresholds(tested.bands), NOT_TOUCHED, None
-        ratio = float(tested.log_likelihood_ratio[0])
-        windows = ResidualWindows(tested.means, int(tested.samples[0]), tested.covariance, tested.model_variance)
-        contact = strongest(tested.force, bands) if ratio >= 1.0 and sample.armed else None
+        tested, test = self._assessed(before, body, sample, cues)
+        ratio, bands, significant = float(tested.log_likelihood_ratio[0]), Thresholds(tested.bands), None
         if self.localise:
-            touched, location = localise(
-                location or localisation_init(), model, seen, windows, ratio, period, self.localise
-            )
+            location = localise(location or localisation_init(), body, sample, cues, tested, self.localise)
         if ratio >= 1.0:
-            significant = most_significant_mean(windows, period, self.localise or _USUAL)
-        made = Detection(
-            bands, contact, sample.armed, tested.residual, ratio, bool(tested.learning[0]), bool(tested.lasting[0]),
-            touched, significant, float(tested.detectable_n[0]),
+            significant = most_significant_mean(tested, body.period, self.localise or _USUAL)
+        detection = Detection(
+            bands, strongest(tested.force, bands) if ratio >= 1.0 and sample.armed else None, sample.armed,
+            tested.residual, ratio, bool(tested.learning[0]), bool(tested.lasting[0]),
+            location.touched if self.localise and location else NOT_TOUCHED, significant,
+            float(tested.detectable_n[0]),
         )  # fmt: skip
-        return made, SequentialTestState(test, location if self.localise else None, remembered)
+        return detection, SequentialTestState(test, location if self.localise else None, remembered)
 
-    def _heard(self, states: tuple[object, ...], body: Body, sample: Sample) -> tuple[Cues | None, tuple[object, ...]]:
-        """Return what all cues say together, None for nothing, and what each remembers."""
-        if not self.cues:
-            return None, states
+    def _assessed(
+        self, state: SequentialState, body: Body, sample: Sample, cues: Cues
+    ) -> tuple[SampleTest, SequentialState]:
+        """Return what a sample says, and the state after it."""
+        robot, results, n = sample.robot, sample_test(body.model.n), body.model.n
+        # while a unit is touched free motion is not learnt, whatever the test says
+        watched = sample.watched and not len(cues.link)
+        model = ResidualModel._make(part.copy() for part in state.model)
+        after = SequentialState._make((model, *(part.copy() for part in state[1:])))
+        now = Moment(
+            sample.kin, robot.qd, robot.qd_commanded, robot.tau_ext, sample.obstacles, cues.gain, watched,
+            sample.reacting,
+        )  # fmt: skip
+        assess_sample(after, now, sequential_numbers(n, body.period, self), body.model.mechanism, results)
+        return results, after
+
+    def _heard(self, states: tuple[object, ...], body: Body, sample: Sample) -> tuple[Cues, tuple[object, ...]]:
+        """Return what all cues say together, and what each remembers."""
         steps = [cue.step(state, body, sample) for cue, state in zip(self.cues, states, strict=True)]
-        said = [cues for cues, _ in steps if cues is not None]
-        return together(*said) if said else None, tuple(state for _, state in steps)
+        heard = [cues for cues, _ in steps if cues is not None] or [no_cues(len(body.model.links))]
+        return together(*heard), tuple(state for _, state in steps)
 
     def adopted(self, state: Any, body: Body, before: Detector) -> SequentialTestState:
         """Go on from another sequential test's state, with what is known of free motion; other cues begin anew."""
@@ -125,14 +129,14 @@ class SequentialTest(SequentialParams, Detector, name="sequential"):
         By bisection; infinite where it would miss any force up to `_LARGEST_N`.
         """
         model, q, qd = body.model, body.model.description.q_ready, np.full(body.model.n, speed)
-        kin, fresh, said = model.kinematics(q), sequential_init(model.n, self), no_cues(len(model.links))
+        kin, fresh, cues = model.kinematics(q), sequential_init(model.n, self), no_cues(len(model.links))
         # with the delayed velocities at the present ones nothing accelerates
         state, J = fresh._replace(model=fresh.model._replace(speed=qd)), model.ee_jacobian(kin)[:3]
 
         def is_detected(force: FloatArray) -> bool:
             robot = RobotState(0.0, q, qd, q, qd, J.T @ force, None)
-            seen = Observation(kin, robot, no_obstacles(), said)
-            tested, _ = sequential_step(state, model, seen, False, False, self.numbers(body))
+            sample = Sample(0.0, kin, robot, window_init(2), True, no_obstacles())
+            tested, _ = self._assessed(state, body, sample, cues)
             return bool(tested.log_likelihood_ratio[0] >= 1.0)
 
         largest = 0.0

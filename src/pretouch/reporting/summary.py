@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pretouch.contact.alarm_level import HELD_S
+from pretouch.contact.scatter import HELD_S
 from pretouch.explanation import LOUD_N
 from pretouch.reporting.html import Html, Text, bad, element, joined, note, number, percent, table
 from pretouch.reporting.measures import Measures

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pretouch.contact.residual_model import PLAIN, ResidualModel, kept, prior_of, residual_init, resumed
+from pretouch.contact.residual_model import PLAIN, ResidualModel, prior_of, residual_init
 from pretouch.contact.sequential_test import SequentialTest
 from pretouch.controller import Controller
 from pretouch.errors import ParameterError, RobotModelError
@@ -22,6 +22,35 @@ from pretouch.loop import Cycle
 from pretouch.params import SequentialParams
 from pretouch.robot.model import RobotModel
 from pretouch.session.residual_file import Residual, load_residual, save_residual
+from pretouch.types import FloatArray
+
+_LASTING = ("weights", "covariance", "spread", "seen")
+"""What is kept from one session to the next."""
+
+
+def kept(model: ResidualModel) -> dict[str, FloatArray]:
+    """Return what is to be kept of a model, by name."""
+    return {name: getattr(model, name) for name in _LASTING}
+
+
+def resumed(numbers: dict[str, FloatArray], p: SequentialParams) -> ResidualModel:
+    """Return a model with what was kept of an earlier one; one that could not be is a ParameterError.
+
+    The covariances must be symmetric and positive definite, the variances and counts not below zero.
+    """
+    n = len(numbers["weights"])
+    fresh = residual_init(n, p)
+    for name in _LASTING:
+        if numbers[name].shape != getattr(fresh, name).shape or not np.isfinite(numbers[name]).all():
+            raise ParameterError(f"What was learnt has {name} of the shape {numbers[name].shape}: learn it anew.")
+    turned = numbers["covariance"].swapaxes(1, 2)
+    if not np.array_equal(numbers["covariance"], turned) or np.linalg.eigvalsh(turned).min() <= 0.0:
+        raise ParameterError("What was learnt has a covariance that is none: learn it anew.")
+    if numbers["spread"].min() < 0.0 or numbers["seen"].min() < 0.0:
+        raise ParameterError("What was learnt has a variance or a count below zero: learn it anew.")
+    weights, covariance, spread, seen = (numbers[name].copy() for name in _LASTING)
+    return fresh._replace(weights=weights, covariance=covariance, spread=spread, seen=seen)
+
 
 _NOISIEST = 100.0
 """Noise of the measured joint velocities times the observer's gain [rad/s^2]: a real Panda's is 0.5."""

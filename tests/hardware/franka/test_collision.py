@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from pretouch.contact.detector import Body
-from pretouch.contact.sequential_detector import Observation, sequential_init, sequential_numbers, sequential_step
-from pretouch.contact.touch_cue import no_cues
+from pretouch.contact.sequential import Moment
+from pretouch.contact.sequential_step import assess_sample, sample_test, sequential_init, sequential_numbers
 from pretouch.errors import ParameterError
 from pretouch.groups import no_obstacles
 from pretouch.hardware.franka.collision import (
@@ -18,7 +18,6 @@ from pretouch.hardware.franka.collision import (
 from pretouch.profiles import PROFILES, profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.types import RobotState
 
 
 @pytest.mark.parametrize("name", PROFILES)
@@ -76,10 +75,10 @@ def evidence(model: RobotModel, force: np.ndarray) -> float:
     q, speed, p = model.description.q_ready, np.full(7, 0.3), PROFILES["pretouch"].detect
     kin, state = model.kinematics(q), sequential_init(model.n, p)
     state = state._replace(model=state.model._replace(speed=speed))
-    robot = RobotState(0.0, q, speed, q, speed, model.ee_jacobian(kin)[:3].T @ force, None)
-    seen = Observation(kin, robot, no_obstacles(), no_cues(len(model.links)))
-    numbers = sequential_numbers(model.n, 0.01, p)
-    return float(sequential_step(state, model, seen, False, False, numbers)[0].log_likelihood_ratio[0])
+    torque, gain, results = model.ee_jacobian(kin)[:3].T @ force, np.ones(len(model.links)), sample_test(model.n)
+    now = Moment(kin, speed, speed, torque, no_obstacles(), gain, False, False)
+    assess_sample(state, now, sequential_numbers(model.n, 0.01, p), model.mechanism, results)
+    return float(results.log_likelihood_ratio[0])
 
 
 def missed(model: RobotModel) -> float:

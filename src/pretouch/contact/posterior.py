@@ -1,9 +1,9 @@
 """How likely a single contact is at each candidate point, and what that comes to: body, point, and their certainty.
 
-With L the Cholesky factor of the torques' covariance S, a force f at the point p of a rigid body makes the torques J^T
-f, which are linear in the wrench w = [f; m] at the body's origin o, m = (p - o) x f: tau = A w with A (n, 6) the same
-for all points of the body. All that a candidate needs is A^T S^-1 A and A^T S^-1 tau of its body, so that thousands of
-candidates cost little.
+The prior is what is known before the torques are looked at. Then, with L the Cholesky factor of the torques' covariance
+S, a force f at the point p of a rigid body makes the torques J^T f, which are linear in the wrench w = [f; m] at the
+body's origin o, m = (p - o) x f: tau = A w with A (n, 6) the same for all points of the body. All that a candidate
+needs is A^T S^-1 A and A^T S^-1 tau of its body, so that thousands of candidates cost little.
 
 The force pushes inwards. Across the normal it is Gaussian, mu times as large as along it in each direction; along it,
 its size has a wide prior. It is integrated out in closed form (Laplace), so that candidates are compared by marginal
@@ -17,11 +17,95 @@ import numpy as np
 
 from pretouch.cholesky import factor, forward, largest_eigenvalue
 from pretouch.compiled import kernel
-from pretouch.contact.localisation.prior import LocalisationNumbers
-from pretouch.groups import Kinematics, SurfaceArrays
+from pretouch.contact.touch_cue import Cues
+from pretouch.groups import Kinematics, Obstacles, SurfaceArrays
+from pretouch.params import LocalisationParams
 from pretouch.robot.body import SPACING_M
 from pretouch.robot.kinematics import jacobian_into
-from pretouch.types import BoolArray, FloatArray, Touched
+from pretouch.types import BoolArray, FloatArray, IntArray, Touched
+
+_NEVER = 1e-12
+"""Prior of what cannot be: its logarithm stays finite."""
+
+
+@kernel
+def log_prior(
+    point: FloatArray, surface: SurfaceArrays, hidden: BoolArray, seen: Obstacles, cues: Cues,
+    p: LocalisationParams, ln: FloatArray,
+) -> None:  # fmt: skip
+    """Write ln of the prior (N,) of a contact at each candidate; all candidates together have probability 1.
+
+    A mixture of three: contacts spread over the surface that is not hidden, times the units' gain of each link;
+    contacts by what is seen, normally distributed about the points that are, the nearer to the body the likelier;
+    contacts at touched units, spread by their own error. What no unit sees keeps its part.
+    """
+    link, area, distance = surface.link, surface.area, seen.body_distance
+    count, base, nearest = len(point), 0.0, 0.0
+    weight, kernel, touched = np.zeros(count), np.empty(count), np.zeros(count)
+    located = np.zeros(len(cues.gain), np.bool_)
+    # touched units, each with its own error; candidates lie too far apart for less than `unit_m`
+    for k in range(len(cues.link)):
+        sigma = max(cues.sigma[k], p.unit_m)
+        if _normal_kernel(point, link, area, hidden, cues.link[k], cues.point[k], sigma, kernel):
+            located[cues.link[k]] = True
+            for c in range(count):
+                touched[c] += kernel[c]
+    # A touch whose point is known counts by that point, and not once more by the gain of its link: the part that is
+    # left for a false touch would lie on that link too.
+    for c in range(count):
+        if not hidden[c]:
+            weight[c] = area[c] if located[link[c]] else area[c] * cues.gain[link[c]]
+            base += weight[c]
+    for c in range(count):
+        weight[c] /= max(base, 1e-300)
+    # What is seen: a unit sees the side of what touches, so its points lie beside the contact by about `seen_m`. The
+    # nearest one says how much of the probability goes there, and all share it by their nearness.
+    by_seen = np.zeros(count)
+    for k in range(len(distance)):
+        nearness = min(1.0, max(0.0, 1.0 - distance[k] / p.near_m))
+        if nearness > 0.0 and _normal_kernel(point, link, area, hidden, -1, seen.point[k], p.seen_m, kernel):
+            nearest = max(nearest, nearness)
+            for c in range(count):
+                by_seen[c] += nearness * kernel[c]
+    # touched units last: their share is of all, what is seen included
+    _mix(weight, by_seen, p.seen_share * nearest)
+    _mix(weight, touched, p.unit_share)
+    for c in range(count):
+        ln[c] = math.log(max(weight[c], _NEVER))
+
+
+@kernel
+def _normal_kernel(
+    point: FloatArray, link: IntArray, area: FloatArray, hidden: BoolArray, only: int, mean: FloatArray, sigma: float,
+    out: FloatArray,
+) -> bool:  # fmt: skip
+    """Write a normal distribution (N,) about a point (3,), over the candidates of one link if `only` is not -1.
+
+    Returns False where no candidate is near enough for a sum that can be divided by.
+    """
+    total = 0.0
+    for c in range(len(point)):
+        out[c] = 0.0
+        if not hidden[c] and (only < 0 or link[c] == only):
+            x, y, z = point[c, 0] - mean[0], point[c, 1] - mean[1], point[c, 2] - mean[2]
+            # times the area that a candidate stands for: a density on the surface, however it is sampled
+            out[c] = area[c] * math.exp(-0.5 * (x * x + y * y + z * z) / (sigma * sigma))
+            total += out[c]
+    if not total > 1e-30:
+        return False
+    for c in range(len(point)):
+        out[c] /= total
+    return True
+
+
+@kernel
+def _mix(weight: FloatArray, kernels: FloatArray, share: float) -> None:
+    """Mix a share of other distributions (N,), added up, into weights (N,) whose sum is 1."""
+    total = sum(kernels)
+    if total > 0.0:
+        for c in range(len(weight)):
+            weight[c] = (1.0 - share) * weight[c] + share * kernels[c] / total
+
 
 _LEAST_N = 1.0
 """Force along the normal below which the one across it is no longer made smaller [N]."""
@@ -42,7 +126,7 @@ class Candidates(NamedTuple):
     """(N, 3) outwards there."""
     log_prior: FloatArray
     """(N,) of a contact."""
-    p: LocalisationNumbers
+    p: LocalisationParams
 
 
 @kernel
@@ -57,8 +141,7 @@ def log_posterior(S: FloatArray, candidates: Candidates, ln: FloatArray, force: 
     Returns whether S is positive definite; else nothing is written.
     """
     surface, p, kin, normal = candidates.surface, candidates.p, candidates.kin, candidates.normal
-    position, rotation, link, first = kin.position, kin.rotation, surface.link, surface.first
-    n = len(S)
+    position, link, first, n = kin.position, surface.link, surface.first, len(S)
     L, y, G, h, u = np.zeros((n, n)), np.empty(n), np.empty((6, 6)), np.empty(6), np.empty((3, 6))
     if not factor(S, L):
         return False
@@ -73,11 +156,8 @@ def log_posterior(S: FloatArray, candidates: Candidates, ln: FloatArray, force: 
         base = link[first[body]]
         _wrench_information(kin, candidates.moved_by[base], position[base], L, y, G, h)
         for c in range(first[body], first[body + 1]):
-            k = link[c]
             for i in range(3):
-                lever[i] = position[k, i] - position[base, i]
-                for j in range(3):
-                    lever[i] += rotation[k, i, j] * surface.point[c, j]
+                lever[i] = candidates.point[c, i] - position[base, i]
             # the directions of the force at this candidate, and what the best one along them explains
             _unit_wrenches(normal[c], lever, u)
             explained, freedom = _likeliest_force(G, h, u, p.friction, p.force_n, a)

@@ -1,0 +1,178 @@
+"""How free motion is learnt: blocks of calm samples, recursive least squares, and what is wrong where the arm turns.
+
+Samples are learnt in blocks, as their sums. What is learnt waits in a queue of blocks for `QUEUE` of them, and the
+queue is emptied when a contact is suspected: the beginning of a contact is never learnt.
+"""
+
+import numpy as np
+
+from pretouch.cholesky import backward, factor, forward
+from pretouch.compiled import kernel
+from pretouch.contact.residual_model import (
+    BLOCK,
+    DEVIATION,
+    QUEUE,
+    FreeSample,
+    ResidualModel,
+    SequentialNumbers,
+    spread_of_sample,
+)
+from pretouch.contact.scatter import LENGTHS, WindowMeans
+from pretouch.params import SequentialParams
+from pretouch.types import FloatArray
+
+
+@kernel
+def least_squares_step(
+    w: FloatArray, P: FloatArray, x: FloatArray, y: float, noise: float, prior: FloatArray, forget: float
+) -> None:
+    """Take one sample y = w . x + noise into the weights w (f,) and their covariance P (f, f), in place.
+
+    Recursive least squares; then P moves by the part `forget` towards the prior's diagonal, so that it stays between
+    nothing and the prior whatever is or is not excited (stabilised forgetting, Kulhavy and Zarrop 1993).
+    """
+    f, gain = len(w), np.zeros(len(w))
+    total, error = noise, y
+    for a in range(f):
+        for b in range(f):
+            gain[a] += P[a, b] * x[b]
+        total += x[a] * gain[a]
+        error -= w[a] * x[a]
+    for a in range(f):
+        w[a] += gain[a] / total * error  # gain = P x, total = x^T P x + noise
+        for b in range(f):
+            P[a, b] -= gain[a] * gain[b] / total
+            P[a, b] *= 1.0 - forget
+        P[a, a] += forget * prior[a]
+
+
+@kernel
+def add_to_block(model: ResidualModel, sample: FreeSample, ratio: FloatArray, p: SequentialParams) -> None:
+    """Add a sample to the block: torques, features, and both variances of the spread.
+
+    With e = M v + d, of spread S = M A M^T + D, the sample's expectation of v_i^2 is (A M^T S^-1 e)_i^2 + A_i -
+    A_i^2 (M^T S^-1 M)_ii, and that of d_i^2 alike with 1 in the place of M. The variance of the mean's error is in the
+    sample but not in D. `ratio` (n,) is how many samples in a row say as much of the mean as one would of white noise;
+    (0,): noise is white.
+    """
+    block, spread, variance, floor = (
+        model.block,
+        model.spread[sample.moving[0]],
+        sample.model_variance,
+        p.noise_floor_nm,
+    )
+    n, f = sample.x.shape
+    S, L, y, z = np.empty((n, n)), np.zeros((n, n)), np.empty(n), np.empty(n)
+    if model.filled[0] == 0:
+        block[:] = 0.0
+    spread_of_sample(sample.M, spread, floor, S)
+    for i in range(n):
+        S[i, i] += variance[i]
+    if not factor(S, L):
+        return
+    trust = (p.tails + n) / (p.tails + forward(L, sample.residual, y))  # Student's weight, less than 1 for an outlier
+    backward(L, y, z)
+    unit, start = np.zeros(n), n + n * f
+    for i in range(n):
+        block[i] += sample.torque[i]
+        for a in range(f):
+            block[n + i * f + a] += sample.x[i, a]
+        A, D, along = spread[0, i], spread[1, i] + floor**2 + variance[i], 0.0
+        for j in range(n):
+            along += sample.M[j, i] * z[j]
+        block[start + i] += trust * (A * along) ** 2 + A - A * A * forward(L, sample.M[i], y)
+        unit[i] = 1.0
+        jitter = trust * (D * z[i]) ** 2 + D - D * D * forward(L, unit, y)
+        unit[i] = 0.0
+        block[start + n + i] += max(jitter - variance[i] - floor**2, 0.0)
+        # an outlier counts less, and what stays the same for many samples is one piece of news
+        block[start + 2 * n + i] += S[i, i] / trust * max(1.0, ratio[i]) if len(ratio) else S[i, i]
+    block[-2] += 1.0
+    block[-1] = sample.moving[0]  # a block is of the kind of its last sample
+
+
+@kernel
+def queue_block(model: ResidualModel, numbers: SequentialNumbers) -> None:
+    """Count a sample of the block; let a block that is full wait, and learn the one that has waited longest."""
+    # A contact that begins slowly is suspected late. By then its first samples are in the queue, which is thrown away.
+    queue = model.queue
+    model.filled[0] += 1
+    if model.filled[0] < BLOCK:
+        return
+    model.filled[0] = 0
+    if model.waiting[0] < QUEUE:
+        queue[model.waiting[0]] = model.block
+        model.waiting[0] += 1
+        return
+    learn_block(queue[0], model, numbers)
+    queue[:-1] = queue[1:].copy()
+    queue[-1] = model.block
+
+
+_FIRST_S = 2.0
+"""Time that the prior of the noise counts for [s]."""
+_CEILING = 4.0
+"""Times the prior that the noise's standard deviations may grow to."""
+
+
+@kernel
+def learn_block(block: FloatArray, model: ResidualModel, numbers: SequentialNumbers) -> None:
+    """Learn a block of samples: weights by their mean torques and features, and one step of both variances."""
+    p, period, weights, seen = numbers.p, numbers.period, model.weights, model.seen
+    n, f = weights.shape
+    x, samples, start, k = np.empty(f), block[-2], n + n * f, int(block[-1])
+    if samples <= 0.0:
+        return
+    # the part by which a block's time fades what was learnt of the mean
+    forget = BLOCK * period / p.memory_s
+    for j in range(n):
+        for a in range(f):
+            x[a] = block[n + j * f + a] / samples
+        noise = block[start + 2 * n + j] / samples**2  # of a mean: the sum of variances / N^2
+        least_squares_step(weights[j], model.covariance[j], x, block[j] / samples, noise, numbers.prior, forget)
+    seen[k] += samples
+    # a mean with the prior, then an exponential one
+    gain = max(samples / (_FIRST_S / period + seen[k]), BLOCK * period / p.spread_memory_s)
+    for part in range(2):
+        ceiling = (_CEILING * (p.torque_prior_nm if part else p.velocity_prior_rad_s2)) ** 2
+        for j in range(n):
+            new = block[start + part * n + j] / samples
+            spread = model.spread[k, part, j]
+            model.spread[k, part, j] = min(spread + gain * (new - spread), ceiling)
+
+
+_MOST = 1.0
+"""Largest factor: nothing is known of what accelerates."""
+_WINDOW = 2
+_SAMPLES = LENGTHS[_WINDOW]
+"""The window whose means say how large the factor is [samples]."""
+_FALL = 0.2
+"""How much less what is smaller than expected counts: what comes too early or too late is large only for some samples,
+and an expectile above the mean covers these (asymmetric least squares, Newey and Powell 1987)."""
+_OUTLIER = 9.0
+"""Times the expected square that a mean counts at most."""
+_LEAST_NM2 = 0.05
+"""Hard acceleration from which something is learnt of it [Nm^2]."""
+
+
+@kernel
+def learn_turning(at: int, means: WindowMeans, forget: float, turning: FloatArray) -> None:
+    """Learn the factors of `turning_init` from how far the means lie beyond what is expected of them.
+
+    `at` counts the samples: no sample is in two of the means. `forget` is the part by which one sample's time fades.
+    """
+    if at % _SAMPLES:
+        return
+    for j in range(turning.shape[1]):
+        x, value, variance = turning[0, j], turning[1, j], turning[2, j]
+        # fading towards the prior by the time since the last mean
+        variance += _SAMPLES * forget * (DEVIATION**2 - variance)
+        if x > _LEAST_NM2:
+            expected = means.S[j, j] / _SAMPLES + means.model_variance[j]
+            square = min(means.mean[_WINDOW, j] ** 2, _OUTLIER * expected)
+            # a scalar Kalman step: `expected` has the slope x, and the square of a Gaussian the variance 2 expected^2
+            gain = variance * x / (variance * x**2 + 2.0 * expected**2)
+            value += gain * (square - expected) * (1.0 if square > expected else _FALL)
+            variance -= gain * x * variance
+        turning[1, j] = min(max(value, 0.0), _MOST)
+        turning[2, j] = variance
