@@ -6,8 +6,8 @@ from dataclasses import fields, replace
 import pytest
 
 from pretouch.contact.admittance import Admittance
-from pretouch.contact.decaying_velocity import DecayingVelocity
 from pretouch.contact.moving_thresholds import MovingThresholds
+from pretouch.contact.reaction import DecayingVelocity
 from pretouch.control.approach import ApproachRestriction, BrakingCurve
 from pretouch.errors import ParameterError, PretouchError
 from pretouch.params import (

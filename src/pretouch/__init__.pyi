@@ -6,12 +6,12 @@ from pretouch import realtime as realtime
 from pretouch.arms.other_arm import OtherArm as OtherArm
 from pretouch.composition import describe as describe
 from pretouch.contact.admittance import Admittance as Admittance
-from pretouch.contact.decaying_velocity import DecayingVelocity as DecayingVelocity
 from pretouch.contact.detector import Body as Body
 from pretouch.contact.detector import Detection as Detection
 from pretouch.contact.detector import Detector as Detector
 from pretouch.contact.detector import Sample as Sample
 from pretouch.contact.moving_thresholds import MovingThresholds as MovingThresholds
+from pretouch.contact.reaction import DecayingVelocity as DecayingVelocity
 from pretouch.contact.reaction import Reaction as Reaction
 from pretouch.contact.sequential_test import SequentialTest as SequentialTest
 from pretouch.contact.window import add_force as add_force

@@ -107,7 +107,7 @@ def detect(fixed: Blocks, remembered: Blocks, now: Blocks) -> bool:
     kinds, p, test, no_gain, mechanism, notes_path, sees = _test(fixed)
     (window, state, mass), (robot, kin, ee, seen, force, d) = _memory(remembered), _sample(now)
     armed, near = window.samples[0] == len(window.ring), first_of(seen.near, seen.found[0])
-    add_sample(window, robot.wrench[:3], p.alpha, p.lambda_)
+    add_sample(window, robot.wrench[:3], p.window)
     for i in range(3):
         force.filtered[i] = window.sums[0, i]
         force.compared[i] = window.sums[0, i] if p.filtered else robot.wrench[i]

@@ -2,7 +2,6 @@
 
 from typing import Annotated, NamedTuple
 
-from pretouch.contact.moving_thresholds import ThresholdNumbers
 from pretouch.contact.residual_model import SequentialNumbers, SequentialState
 from pretouch.contact.sequential_step import SampleTest
 from pretouch.contact.virtual_mass import FreeMass
@@ -12,7 +11,7 @@ from pretouch.control.braking import BrakingLimits, Slots, TouchLimits
 from pretouch.control.motion import MotionNumbers
 from pretouch.faults import Report, Watched
 from pretouch.groups import CapsuleArrays, Kinematics, Mechanism, Obstacles, SkinArrays
-from pretouch.params import FailureParams
+from pretouch.params import FailureParams, ThresholdParams, WindowParams
 from pretouch.perception.obstacles import TrackState
 from pretouch.perception.perceive import Readings, SightNumbers
 from pretouch.records import Cell, IntCell
@@ -55,13 +54,12 @@ class Sight(NamedTuple):
 
 
 class ForceNumbers(NamedTuple):
-    """What is done with the force, of `WindowParams` and `ThresholdParams`."""
+    """What is done with the force."""
 
-    alpha: float
-    lambda_: float
+    window: WindowParams
     filtered: bool
     """Whether the newest value of the window is held against the thresholds, and not the force itself."""
-    thresholds: ThresholdNumbers
+    thresholds: ThresholdParams
 
 
 class PathNumbers(NamedTuple):

@@ -8,8 +8,8 @@ import numpy as np
 
 from pretouch.contact.admittance import Admittance
 from pretouch.contact.clamp import clamp_init
-from pretouch.contact.decaying_velocity import DecayingVelocity
-from pretouch.contact.moving_thresholds import MovingThresholds, threshold_numbers, thresholds_of
+from pretouch.contact.moving_thresholds import MovingThresholds, thresholds_of
+from pretouch.contact.reaction import DecayingVelocity
 from pretouch.contact.sequential_step import sample_test, sequential_init, sequential_numbers
 from pretouch.contact.sequential_test import SequentialTest
 from pretouch.contact.touch_cue import TouchSensors
@@ -78,10 +78,7 @@ def fixed_of(controller: Any) -> Fixed:
             model.capsules.arrays, model.body.arrays, controller.fixtures.planes, skin.arrays,
             sight_numbers(seen, skin),
         ),
-        ForceNumbers(
-            profile.window.alpha, profile.window.lambda_, thresholds.compare == "filtered",
-            threshold_numbers(thresholds),
-        ),
+        ForceNumbers(profile.window, thresholds.compare == "filtered", thresholds),
         sequential_numbers(n, limits.period, test), np.ones(len(model.links)),
         kinds.react == ADMITTANCE and profile.react.pinch is not None,
         PathNumbers(

@@ -9,10 +9,9 @@ from dataclasses import dataclass, field, fields, replace
 from pretouch.checks import Checked
 from pretouch.composition import changed
 from pretouch.contact.admittance import Admittance
-from pretouch.contact.decaying_velocity import DecayingVelocity
 from pretouch.contact.detector import Detector
 from pretouch.contact.moving_thresholds import MovingThresholds
-from pretouch.contact.reaction import Reaction
+from pretouch.contact.reaction import DecayingVelocity, Reaction
 from pretouch.contact.sequential_test import SequentialTest
 from pretouch.contact.touch_cue import TouchSensors
 from pretouch.control.approach import ApproachRestriction, BrakingCurve

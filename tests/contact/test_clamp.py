@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pretouch.contact.clamp import caught_between, clamp_begun, clamp_init, clamped, gone, opened
+from pretouch.contact.clamp import caught_between, clamp_init, clamped, note_place, opened
 from pretouch.params import ClampParams
 
 P = ClampParams()
@@ -100,16 +100,16 @@ def test_it_does_not_open_into_what_pushes_it():
 
 
 def come(cycles: int = 60):
-    """The state of an arm that has turned a joint by 0.01 rad in each cycle, and where it is."""
-    state = clamp_init(Q)
+    """The path of an arm that has turned a joint by 0.01 rad in each cycle, and where it is."""
+    path, marked = clamp_init(Q).path.copy(), np.zeros(1)
     for k in range(cycles):
-        state = gone(state, 0.01 * (k + 1) * WAY, DT)
-    return state, 0.01 * cycles * WAY
+        note_place(path, marked, 0.01 * (k + 1) * WAY, DT)
+    return path, 0.01 * cycles * WAY
 
 
 def test_the_arm_opens_the_way_it_came_and_does_not_close_again_what_has_been_opened_already():
-    before, q = come()
-    begun = caught_between(clamp_begun(before, q, 1.0 * WAY), "one and other", 50.0, 6.0 * WAY)
+    path, q = come()
+    begun = caught_between(replace(clamp_init(q), path=path, came=1.0 * WAY), "one and other", 50.0, 6.0 * WAY)
     # where it was caught, and four places of the way farther back
     for at in (q, q - 0.22 * WAY):
         way, state = opened(begun, -6.0 * WAY, at, DT, P)
@@ -122,6 +122,6 @@ def test_the_arm_opens_the_way_it_came_and_does_not_close_again_what_has_been_op
 
 
 def test_the_way_begins_anew_where_the_arm_has_been_moved():
-    before, q = come()
-    moved = gone(before, q + 0.5 * ASIDE, DT)
-    assert np.all(moved.path == q + 0.5 * ASIDE)
+    path, q = come()
+    note_place(path, np.zeros(1), q + 0.5 * ASIDE, DT)
+    assert np.all(path == q + 0.5 * ASIDE)

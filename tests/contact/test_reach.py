@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pretouch.contact.reach import BRAKES_S, axis_ends, within_reach
+from pretouch.contact.virtual_mass import BRAKES_S, within_reach
 from pretouch.robot.model import RobotModel
+from pretouch.robot.vectors import placed
 
 REACH = 0.3
 TURN = np.eye(7)[0]
@@ -15,11 +16,11 @@ TURN = np.eye(7)[0]
 
 def slowed(model: RobotModel, q, qd, origin):
     kin = model.kinematics(q)
-    return within_reach(qd, kin, model.moved_by, model.body.arrays, origin, REACH)
+    return within_reach((kin, model.moved_by, model.body.arrays), qd, origin, REACH)
 
 
 def ends(model: RobotModel, q):
-    return axis_ends(model.body, model.kinematics(q))
+    return np.array(placed(model.body, model.kinematics(q)))
 
 
 def test_where_the_contact_began_nothing_is_slower(panda_model: RobotModel):

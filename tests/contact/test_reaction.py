@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from pretouch.contact.admittance import Admittance
-from pretouch.contact.decaying_velocity import DecayingVelocity, advanced, decayed, reaction_velocity
+from pretouch.contact.reaction import DecayingVelocity, reaction_velocity
 
 
 @pytest.mark.parametrize(
@@ -29,9 +29,9 @@ def test_decay_is_linear_and_ends():
     state = part.begun(np.array([0.0, 10.0, 0.0]))
     speeds, active = [], []
     for _ in range(6):
-        speeds.append(decayed(state, 4)[1])
+        speeds.append(state.decayed(4)[1])
         active.append(part.active(state))
-        state = advanced(state)
+        state = state.advanced()
     # 0.02 * 10 = 0.2 m/s, then a quarter less each cycle
     np.testing.assert_allclose(speeds, [0.2, 0.15, 0.1, 0.05, 0.0, 0.0])
     assert active == [True, True, True, True, False, False]

@@ -1,11 +1,12 @@
 """Giving up at a location of the path, and trying again."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from pretouch.contact.repeated_contact import (
     Met,
-    count_contact,
     discount_push,
     forget_passed,
     given_up,
@@ -26,11 +27,12 @@ ON = np.array([0.4, 0.0, 0.0])
 
 
 def met(phase: float = 1.0, q=Q, torque=AGAINST, command=ON, kinetic: float = 0.0) -> Met:
-    return Met(phase, X, np.asarray(q, float), torque, 20.0, command, kinetic)
+    return Met(phase, X, np.asarray(q, float), torque / 20.0, command, kinetic)
 
 
 def count(state, one: Met | None = None, near: bool = False):
-    return count_contact(state, one or met(), near, P)
+    """Meet something, wherever the last contact of all was."""
+    return meet(replace(state, touched=-np.inf), one or met(), near, P)
 
 
 def after(*phases: float, near: bool = False):

@@ -7,15 +7,16 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from pretouch.contact.moving_thresholds import (
-    ThresholdNumbers,
-    crossed,
+    MovingThresholds,
     noise_force,
     obstacle_force,
     side_distances,
     threshold_parts,
 )
+from pretouch.contact.window import window_init
+from pretouch.groups import no_obstacles
 from pretouch.params import ThresholdParams
-from pretouch.types import Thresholds
+from pretouch.types import Obstacles, Thresholds
 
 TABLE_I = ThresholdParams()  # F_b = 10, F_std = 3, sigma_max = 3, F_d = 4, d_max = 0.8, d_min = 0.05
 FAR = np.full(3, np.inf)
@@ -25,9 +26,15 @@ def thresholds(
     mean: np.ndarray, sigma: np.ndarray, positive: np.ndarray, negative: np.ndarray, params: ThresholdParams
 ) -> Thresholds:
     parts = np.empty((6, 3))
-    numbers = ThresholdNumbers(*(getattr(params, name) for name in ThresholdNumbers._fields))
-    threshold_parts(mean, sigma, positive, negative, numbers, parts)
+    threshold_parts(mean, sigma, positive, negative, params.numbers, parts)
     return Thresholds(parts)
+
+
+def crossed(force: tuple[float, float, float], near: Obstacles | None = None) -> list[bool] | None:
+    """Axes of a contact with this force, of a mean of 0, to an end-effector at (0.4, 0, 0.5); None for no contact."""
+    detector, window = MovingThresholds(compare="raw"), window_init(2)
+    found = detector.judged(window, np.array(force), True, np.array([0.4, 0.0, 0.5]), near or no_obstacles())
+    return found.contact and found.contact.axes.tolist()
 
 
 def test_eq_10_by_numbers():
@@ -70,8 +77,9 @@ def test_an_object_at_greater_y_eases_contact_in_minus_y():
     # F_obs+ = 2 on y alone: T_l rises from -10 to -8, T_u stays at 10
     np.testing.assert_allclose(limits.lower, [-10, -8, -10])
     np.testing.assert_allclose(limits.upper, [10, 10, 10])
-    assert crossed(np.array([0.0, -9.0, 0.0]), limits).tolist() == [False, True, False]
-    assert not crossed(np.array([0.0, 9.0, 0.0]), limits).any()
+    near = no_obstacles(1)._replace(point=hand, ee_distance=np.array([0.425]))
+    assert crossed((0.0, -9.0, 0.0), near) == [False, True, False]
+    assert crossed((0.0, 9.0, 0.0), near) is None
 
 
 def test_sides_are_half_spaces_and_the_nearest_object_counts():
@@ -91,9 +99,8 @@ def test_no_object_on_any_side():
 
 
 def test_a_force_on_the_threshold_has_not_crossed_it():
-    limits = thresholds(np.zeros(3), np.zeros(3), FAR, FAR, TABLE_I)
-    assert crossed(np.array([10.0, -10.0, 0.0]), limits).tolist() == [False, False, False]
-    assert crossed(np.array([10.001, -10.001, 0.0]), limits).tolist() == [True, True, False]
+    assert crossed((10.0, -10.0, 0.0)) is None
+    assert crossed((10.001, -10.001, 0.0)) == [True, True, False]
 
 
 axis_values = arrays(np.float64, 3, elements=st.floats(-100, 100))

@@ -23,7 +23,7 @@ def filled(values: list[float]) -> Window:
 def test_eq_8_by_numbers():
     # mu = 0, sigma = 4, so |x| > 0.75 * 4 = 3 is an outlier; x_{t-1} = 2
     reading, last = np.array([10.0, 1.0, -10.0]), np.full(3, 2.0)
-    value = weighted_value(reading, last, np.zeros(3), np.full(3, 4.0), P.alpha, P.lambda_)
+    value = weighted_value(reading, last, np.zeros(3), np.full(3, 4.0), P.numbers)
     # 0.1 * 10 + 0.9 * 2 = 2.8;   1 as it is;   0.1 * -10 + 0.9 * 2 = 0.8
     np.testing.assert_allclose(value, [2.8, 1.0, 0.8], rtol=1e-15)
 
@@ -31,7 +31,7 @@ def test_eq_8_by_numbers():
 def test_a_reading_on_the_bound_is_no_outlier():
     # lambda sigma = 0.75 * 4 = 3 exactly: eq. 8 has ">", not ">="; 3.001 counts with its tenth
     reading = np.array([3.0, -3.0, 3.001])
-    value = weighted_value(reading, np.zeros(3), np.zeros(3), np.full(3, 4.0), P.alpha, P.lambda_)
+    value = weighted_value(reading, np.zeros(3), np.zeros(3), np.full(3, 4.0), P.numbers)
     np.testing.assert_allclose(value, [3.0, -3.0, 0.3001], rtol=1e-12)
 
 

@@ -6,9 +6,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pretouch.contact.admittance import Admittance
-from pretouch.contact.decaying_velocity import DecayingVelocity
 from pretouch.contact.moving_thresholds import MovingThresholds
-from pretouch.contact.reaction import Reaction
+from pretouch.contact.reaction import DecayingVelocity, Reaction
 from pretouch.contact.sequential_test import SequentialTest
 from pretouch.control.approach import ApproachRestriction, BrakingCurve
 from pretouch.control.path import Circle, Path, WayPoints, segment

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from pretouch.contact.decaying_velocity import DecayingVelocity
+from pretouch.contact.reaction import DecayingVelocity
 from pretouch.params import ThresholdParams, WindowParams
 from pretouch.types import Contact, Obstacles, Thresholds
 

@@ -7,8 +7,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from pretouch.contact.decaying_velocity import reaction_velocity
 from pretouch.contact.detector import Detection
+from pretouch.contact.reaction import reaction_velocity
 from pretouch.control.path import Circle
 from pretouch.controller import Controller
 from pretouch.groups import no_obstacles

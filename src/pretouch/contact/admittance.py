@@ -5,20 +5,17 @@ from typing import Literal
 
 import numpy as np
 
-from pretouch.compiled import compiled
 from pretouch.contact.clamp import (
     ClampState,
     caught_between,
-    clamp_begun,
     clamp_init,
     clamped,
     find_self_clamp,
-    gone,
+    note_place,
     opened,
     presses_on_fixture,
 )
-from pretouch.contact.detector import Body, is_known
-from pretouch.contact.reach import axis_ends, within_reach
+from pretouch.contact.detector import Body
 from pretouch.contact.reaction import Reaction, ReactionInputs, ReactionMotion, contact_event, new_contact
 from pretouch.contact.repeated_contact import (
     Met,
@@ -31,6 +28,7 @@ from pretouch.contact.repeated_contact import (
     wait_to_retry,
 )
 from pretouch.contact.virtual_mass import (
+    Axes,
     FreeMass,
     VirtualMass,
     begun,
@@ -39,13 +37,14 @@ from pretouch.contact.virtual_mass import (
     learnt,
     learnt_mass,
     mass_init,
-    yielded,
+    within_reach,
+    yield_to,
 )
 from pretouch.groups import Kinematics
 from pretouch.modes import Event, ModeState
-from pretouch.params.paper import AdmittanceParams, ClampParams
+from pretouch.params import AdmittanceParams, ClampParams
 from pretouch.records import Flat
-from pretouch.robot.model import RobotModel
+from pretouch.robot.vectors import below, placed
 from pretouch.types import FloatArray, Mode
 from pretouch.values import value
 
@@ -61,7 +60,7 @@ class AdmittanceState:
     clamp: ClampState
     place: RepeatedContactState
     origin: FloatArray | None = None
-    """(C, 2, 3) where the ends of the body's axes were when the reaction began [m], None before any."""
+    """(2, C, 3) where the ends of the body's axes were when the reaction began [m], None before any."""
     moved: float = 0.0
     """How far the farthest of them has come since [m]."""
 
@@ -82,18 +81,23 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
     ) -> tuple[dict[Event, str], AdmittanceState]:
         """Let the virtual mass move, look for clamps, count places; name what the reaction is at."""
         doing, near = self._doing(inputs.mode, inputs.detection.armed), self._near(inputs)
-        mass, clamp = self._moved(state, doing, body, inputs), state.clamp
-        mass, moved = self._kept_near(mass, state.origin, doing, body, inputs.kin)
+        mass, clamp, moved = self._moved(state, doing, body, inputs), state.clamp, 0.0
         q, dt = inputs.robot.q_commanded, body.period
+        if doing == "react" and state.origin is not None:
+            # a soft hold has no such bound: who frees somebody, or guides the arm out, may have to move it farther
+            velocity, moved = within_reach(_axes(body, inputs.kin), mass.velocity, state.origin, self.reach_m)
+            mass = mass._replace(velocity=velocity)
         # a clamp that is found stands: the arm opens out of it, and no other is looked for
         if doing == "react" and not clamp.torque:
             if self.clamp is not None:
                 clamp = clamped(clamp, mass.torque, mass.velocity, q, dt, self.clamp)
             clamp = self._pinched(clamp, body, inputs)
         elif doing == "task" and self.pinch is not None:
-            clamp = gone(clamp, q, dt)
+            path, marked = clamp.path.copy(), np.array([clamp.marked])
+            note_place(path, marked, q, dt)
+            clamp = replace(clamp, path=path, marked=float(marked[0]))
         # what the tank holds beyond its start is the least energy that the contact has given
-        place = self._placed(state.place, doing, mass.tank - self.start_energy_j, near, dt, inputs)
+        place = self._placed(state.place, doing, mass.tank[0] - self.start_energy_j, near, dt, inputs)
         state = AdmittanceState(mass, clamp_init(q) if inputs.resume else clamp, place, state.origin, moved)
         return self._events(state, doing, near, inputs), state
 
@@ -106,33 +110,34 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
         doing = self._doing(mode, inputs.detection.armed)
         if doing not in ("react", "soft"):
             return None, state
-        qd, model, kin = state.mass.velocity, body.model, inputs.kin
+        qd, kin = state.mass.velocity, inputs.kin
         opens = doing == "react" and state.clamp.torque > 0 and not state.clamp.open
         if opens:
-            p = self._way_out
+            # also what is caught between links, where no other clamp is looked for
+            p = self.clamp or ClampParams()
             back, clamp = opened(state.clamp, state.mass.torque, inputs.robot.q_commanded, body.period, p)
-            fastest = fastest_point(kin, model.moved_by, model.body.arrays, back)
+            fastest = fastest_point(_axes(body, kin), back)
             qd = back * min(1.0, p.open_m_s / fastest) if fastest > 0 else back  # never beyond the place in one period
             state = replace(state, clamp=clamp, mass=state.mass._replace(velocity=np.zeros(len(qd))))
         if doing == "soft" and not qd.any():
             return None, state
         # a pushed arm touches nothing that it sees; one that is caught is between two objects, and must get out
-        touch_speed = self._way_out.open_m_s if opens else 0.0
-        return ReactionMotion(model.ee_jacobian(kin)[:3] @ qd, qd, touch_speed), state
+        touch_speed = (self.clamp or ClampParams()).open_m_s if opens else 0.0
+        return ReactionMotion(body.model.ee_jacobian(kin)[:3] @ qd, qd, touch_speed), state
 
     def caught_up(self, state: AdmittanceState, memory: Flat) -> AdmittanceState:
         """Return the state with the mean torque of free motion and the places that the task went through."""
-        mean, samples, torque, path, marked = (memory.get(f"mass.{name}") for name in FreeMass._fields)
-        clamp = replace(state.clamp, path=path, marked=marked) if self.pinch is not None else state.clamp
-        return replace(state, mass=learnt_mass(mean, samples, torque, self), clamp=clamp, moved=0.0)
+        free, clamp = memory.part("mass", FreeMass), state.clamp
+        if self.pinch is not None:
+            clamp = replace(clamp, path=free.path, marked=float(free.marked[0]))
+        mass = learnt_mass(free.mean, free.samples, free.torque, self)
+        return replace(state, mass=mass, clamp=clamp, moved=0.0)
 
     def keep_free(self, state: AdmittanceState, memory: Flat) -> bool:
         """Leave the same in the memory; return whether there is neither a clamp nor a place given up."""
         mass, clamp = state.mass, state.clamp
-        for name, number in zip(
-            FreeMass._fields, (mass.mean, mass.samples, mass.torque, clamp.path, clamp.marked), strict=True
-        ):
-            memory.put(f"mass.{name}", number)
+        free = FreeMass(mass.mean, mass.samples, mass.torque, clamp.path, np.array([clamp.marked]))
+        memory.fill("mass", free)
         return not clamp.torque and not state.place.contacts
 
     def announced(self, period: float) -> str:
@@ -141,11 +146,6 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
             f"When pushed, it yields at up to {self.speed_max_m_s:g} m/s as long as the push lasts, by up to"
             f" {self.reach_m:g} m, and continues {self.quiet_s:g} s later: keep everything it could hit away from it."
         )
-
-    @property
-    def _way_out(self) -> ClampParams:
-        """How the arm opens, what is caught between links included where no other clamp is looked for."""
-        return self.clamp or ClampParams()
 
     def _doing(self, mode: ModeState, armed: bool) -> Doing:
         """What the arm does in a mode, as far as contacts matter."""
@@ -157,8 +157,7 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
 
     def _near(self, inputs: ReactionInputs) -> bool:
         """Whether something is seen near the body, or may be missed."""
-        # a compiled loop: NumPy's least of seven numbers takes longer than all else here
-        return inputs.unseen or _any_nearer(inputs.obstacles.body_distance, self.near_m)
+        return inputs.unseen or min(inputs.obstacles.body_distance.tolist(), default=np.inf) < self.near_m
 
     def _moved(self, state: AdmittanceState, doing: Doing, body: Body, inputs: ReactionInputs) -> VirtualMass:
         """Let the mass learn in free motion, and yield to the external torque in a reaction or a soft hold."""
@@ -167,26 +166,15 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
             return learnt(mass, _residual(mass, inputs), dt, self)
         if doing not in ("react", "soft"):
             return mass
-        model, residual, contact = body.model, _residual(mass, inputs), detection.evidence >= 1.0
-        band = dead_band(model.description.tau_max, self)
-        mass = yielded(mass, (model, inputs.kin), residual, inputs.command, band, dt, self, contact)
+        residual, band = _residual(mass, inputs), dead_band(body.model.description.tau_max, self)
+        mass = VirtualMass._make(part.copy() for part in mass)
+        yield_to(
+            mass, residual, inputs.command, band, _axes(body, inputs.kin), self.numbers, dt, detection.evidence >= 1.0
+        )  # fmt: skip
         if doing == "soft" and clamp.torque:
             # out of the clamp it may be moved, not back into it
-            mass = mass._replace(velocity=np.where(mass.velocity * clamp.course > 0, 0.0, mass.velocity))
+            mass.velocity[mass.velocity * clamp.course > 0] = 0.0
         return mass
-
-    def _kept_near(
-        self, mass: VirtualMass, origin: FloatArray | None, doing: Doing, body: Body, kin: Kinematics
-    ) -> tuple[VirtualMass, float]:
-        """Let no contact move the arm farther than its reach; return the mass, and how far it has come [m].
-
-        A soft hold has no such bound: whoever frees somebody, or guides the arm out, may have to move it farther.
-        """
-        if doing != "react" or origin is None:
-            return mass, 0.0
-        moved_by, capsules = body.model.moved_by, body.model.body.arrays
-        velocity, moved = within_reach(mass.velocity, kin, moved_by, capsules, origin, self.reach_m)
-        return mass._replace(velocity=velocity), moved
 
     def _placed(
         self, place: RepeatedContactState, doing: Doing, energy: float, near: bool, dt: float, inputs: ReactionInputs
@@ -211,30 +199,36 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
         # The torque before the onset: the last sample, or in a soft hold the filtered torque. A stiff hold remembers
         # none, and the sample stands for itself.
         before = {"soft": state.mass.steady[0], "still": torque}.get(doing, state.mass.torque)
-        mass = begun(state.mass, model, kin, torque, before, band, self)
-        place = replace(state.place, counted=False)
-        met = _met(model, inputs, torque) if doing == "task" else None
-        if met is not None and self.give_up is not None:
-            place = meet(state.place, met, self._near(inputs), self.give_up)
+        mass, place, contact = begun(state.mass, _axes(body, kin), torque, before, band, self), state.place, None
+        if doing == "task":
+            contact = inputs.detection.contact
+        if contact is not None and self.give_up is not None:
+            q, force = inputs.robot.q, float(np.linalg.norm(contact.force))
+            kinetic = 0.5 * float(command @ model.mass_matrix(q) @ command)
+            met = Met(inputs.path_phase, kin.position[model.ee], q, torque / max(force, _LEAST_N), command, kinetic)
+            place = meet(place, met, self._near(inputs), self.give_up)
+        else:
+            place = replace(place, counted=False)
         # only the arm's own task closes a gap on something: without a motion there is no self-clamping to be found
         came = command if doing == "task" else np.zeros(len(torque))
-        clamp = self._pinched(clamp_begun(state.clamp, inputs.robot.q_commanded, came), body, inputs)
-        return AdmittanceState(mass, clamp, place, axis_ends(model.body, kin), 0.0)
+        clamp = replace(clamp_init(inputs.robot.q_commanded), path=state.clamp.path, came=came)
+        return AdmittanceState(
+            mass, self._pinched(clamp, body, inputs), place, np.array(placed(model.body, kin)), 0.0
+        )  # fmt: skip
 
     def _pinched(self, clamp: ClampState, body: Body, inputs: ReactionInputs) -> ClampState:
         """Look for something caught between two links, or one and a fixture, as long as a contact is detected."""
-        p, found, kin = self.pinch, inputs.detection, inputs.kin
-        if p is None or clamp.torque or found.significant is None:
+        p, significant, touched = self.pinch, inputs.detection.significant, inputs.detection.touched
+        if p is None or clamp.torque or significant is None:
             return clamp
-        torque, covariance = found.significant
-        pinch = find_self_clamp(body.model, kin, torque, covariance, clamp.came, p)
-        names = body.model.links
+        (torque, covariance), names = significant, body.model.links
+        pinch = find_self_clamp(body.model, inputs.kin, torque, covariance, clamp.came, p)
         if pinch is not None:
-            one, other = (names[link] for link in pinch.link)
-            return caught_between(clamp, f"{one} and {other}", pinch.force, torque)
-        if presses_on_fixture(body.model, kin, found.touched, body.planes, body.standing, clamp.came, p):
-            force = float(np.linalg.norm(found.touched.force[0]))
-            return caught_between(clamp, f"{names[found.touched.link[0]]} and a fixture", force, torque)
+            one, other, force = pinch
+            return caught_between(clamp, f"{names[one]} and {names[other]}", force, torque)
+        if presses_on_fixture(body.model, inputs.kin, touched, body.planes, body.standing, clamp.came, p):
+            force = float(np.linalg.norm(touched.force[0]))
+            return caught_between(clamp, f"{names[touched.link[0]]} and a fixture", force, torque)
         return clamp
 
     def _events(self, state: AdmittanceState, doing: Doing, near: bool, inputs: ReactionInputs) -> dict[Event, str]:
@@ -248,13 +242,14 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
             events[Event.CLAMPED if clamp.open else Event.OPENING] = _caught(clamp)
         elif doing == "react" and self._waits(state, near, inputs.detection.lasting):
             until = ", once nothing is seen near it" if near and not given_up(place, self.give_up) else ""
-            far = f"; it is {state.moved:.2f} m away, and goes no farther" if self._at_reach(state) else ""
+            at_reach = state.moved > _FAR * self.reach_m
+            far = f"; it is {state.moved:.2f} m away, and goes no farther" if at_reach else ""
             events[Event.YIELDING] = f"{self.quiet_s:g} s after the last push{until}{far}"
-        elif doing in ("react", "soft") and self._presses(mass) and mass.quiet >= max(self.quiet_s, self.patience_s):
+        elif doing in ("react", "soft") and self._presses(mass) and mass.quiet[0] >= max(self.quiet_s, self.patience_s):
             torque = np.abs(mass.steady[1])
             events[Event.PRESSED] = f"{self.patience_s:g} s, about {torque.max():.0f} Nm at joint {torque.argmax() + 1}"
-        if self.give_up is not None and given_up(place, self.give_up):
-            x, y, z = place.point
+        if self.give_up is not None and place.met is not None and given_up(place, self.give_up):
+            x, y, z = place.met.point
             when = f"{self.give_up.retry_s:g} s have passed"
             when = f"nothing is seen within {self.near_m:g} m of it" if place.seen else when
             events[Event.GIVEN_UP] = (
@@ -269,42 +264,24 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
         For what is near it waits only where it will go on; it waits too while it is being found out if the residual
         is a load (`Detection.lasting`).
         """
-        quiet = state.mass.quiet
+        quiet = state.mass.quiet[0]
         waits_for = (near and not given_up(state.place, self.give_up)) or self._presses(state.mass)
         return lasting or quiet < self.quiet_s or (waits_for and quiet < self.patience_s)
 
-    def _at_reach(self, state: AdmittanceState) -> bool:
-        """Whether the arm has all but come as far as a contact may move it."""
-        return state.moved > _FAR * self.reach_m
-
     def _presses(self, mass: VirtualMass) -> bool:
         """Whether an arm that static friction holds has detected a contact of late."""
-        return self.static_friction_nm > 0 and mass.no_contact < self.quiet_s
+        return self.static_friction_nm > 0 and mass.no_contact[0] < self.quiet_s
 
 
-def _met(model: RobotModel, inputs: ReactionInputs, torque: FloatArray) -> Met | None:
-    """Return the contact that is detected, with its external torques (n,) [Nm]; None without one."""
-    q, command, found = inputs.robot.q, inputs.command, inputs.detection.contact
-    if found is None:
-        return None
-    kinetic = 0.5 * float(command @ model.mass_matrix(q) @ command)
-    point, size = inputs.kin.position[model.ee], float(np.linalg.norm(found.force))
-    return Met(inputs.path_phase, point, q, torque, size, command, kinetic)
+def _axes(body: Body, kin: Kinematics) -> Axes:
+    """Return the axes of the body in a posture."""
+    return kin, body.model.moved_by, body.model.body.arrays
 
 
 def _residual(mass: VirtualMass, inputs: ReactionInputs) -> FloatArray:
     """Return the external torques (n,) [Nm]; without an estimate, those of free motion, which drive nothing."""
-    found = inputs.detection.residual
-    return found if is_known(found) else mass.mean[1]
-
-
-@compiled
-def _any_nearer(distance: FloatArray, bound: float) -> bool:
-    """Whether one of the distances (K,) is less than a bound [m]."""
-    for one in distance:  # noqa: SIM110  compiled code knows no generators
-        if one < bound:
-            return True
-    return False
+    residual = inputs.detection.residual
+    return residual if below(residual, np.inf) else mass.mean[1]
 
 
 def _caught(clamp: ClampState) -> str:
@@ -316,3 +293,5 @@ def _caught(clamp: ClampState) -> str:
 
 _FAR = 0.95
 """Share of its reach from which the arm says that it goes no farther."""
+_LEAST_N = 5.0
+"""Least force by which torques are divided [N]: the estimate of a smaller one is mostly noise."""

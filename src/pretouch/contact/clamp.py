@@ -10,13 +10,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from pretouch.compiled import compiled, kernel
+from pretouch.compiled import compiled
 from pretouch.groups import Kinematics
 from pretouch.params.paper import ClampParams, PinchParams
 from pretouch.robot.body import Capsules
 from pretouch.robot.model import RobotModel
 from pretouch.robot.self_distance import nearest_points
-from pretouch.types import FloatArray, IntArray, Touched
+from pretouch.robot.vectors import below, placed
+from pretouch.types import FloatArray, Touched
 from pretouch.values import value
 
 _MARKS = 12
@@ -62,57 +63,34 @@ class ClampState:
 def clamp_init(q: FloatArray) -> ClampState:
     """Return the state of an arm that has met nothing, at joint positions (n,) [rad]."""
     there, none = np.tile(q, (_MARKS, 1)), np.zeros(len(q))
-    return ClampState(
-        none, np.inf, 0.0, 0, np.inf, there, 0.0, 0.0, 0.0, False, there, none, "", 0.0
-    )  # fmt: skip
-
-
-def clamp_begun(before: ClampState, q: FloatArray, came: FloatArray) -> ClampState:
-    """Return the state at the onset of a contact, to which the arm came with joint velocities (n,) [rad/s]."""
-    return replace(clamp_init(q), path=before.path, came=came)
-
-
-def gone(state: ClampState, q: FloatArray, dt: float) -> ClampState:
-    """Note the path of an arm that follows its task, at commanded joint positions (n,) [rad].
-
-    Where it has been moved meanwhile, by a reaction or by hand, the path begins anew.
-    """
-    path, marked = state.path.copy(), np.array([state.marked])
-    note_place(path, marked, q, dt)
-    return replace(state, path=path, marked=float(marked[0]))
+    return ClampState(none, np.inf, 0.0, 0, np.inf, there, 0.0, 0.0, 0.0, False, there, none, "", 0.0)
 
 
 @compiled
 def note_place(path: FloatArray, marked: FloatArray, q: FloatArray, dt: float) -> None:
-    """Do what `gone` says to a path (M, n) [rad] and the time (1,) since its newest place was noted [s]."""
+    """Note the path (M, n) of an arm that follows its task, at commanded joint positions q (n,) [rad].
+
+    Where it has been moved meanwhile, by a reaction or by hand, the path begins anew. `marked` (1,) is the time since
+    the newest place was noted [s].
+    """
     marked[0] += dt
     # farther from one mark than the task goes until the next: something else has moved the arm
-    if _farther(q, path, _MOVED_RAD):
+    if not below(q - path[0], _MOVED_RAD):
         marked[0], path[:] = 0.0, q
     elif marked[0] >= _APART_S:
         marked[0], path[1:] = 0.0, path[:-1].copy()
         path[0] = q
 
 
-@kernel
-def _farther(q: FloatArray, path: FloatArray, bound: float) -> bool:
-    """Whether a joint is farther than a bound from the newest place (M, n) of a path [rad]."""
-    for j in range(len(q)):  # noqa: SIM110  compiled code knows no generators
-        if abs(q[j] - path[0, j]) > bound:
-            return True
-    return False
-
-
 def caught_between(state: ClampState, between: str, force: float, torque: FloatArray) -> ClampState:
     """Take what is caught between two objects, and turns the joints (n,) [Nm], for a clamp: out of it the arm opens."""
-    return replace(
-        state, torque=float(np.abs(torque).max()), trail=state.path, between=between, force=force, opposed=0.0
-    )  # fmt: skip
+    size = float(np.abs(torque).max())
+    return replace(state, torque=size, trail=state.path, between=between, force=force, opposed=0.0)
 
 
 def clamped(
-    state: ClampState, torque: FloatArray, velocity: FloatArray, q: FloatArray, dt: float, params: ClampParams
-) -> ClampState:  # fmt: skip
+    state: ClampState, torque: FloatArray, velocity: FloatArray, q: FloatArray, dt: float, p: ClampParams
+) -> ClampState:
     """Judge one period of yielding.
 
     A clamp is a torque against the course the arm follows a push on, for longer than noise makes one, and so soon
@@ -125,9 +103,9 @@ def clamped(
         velocity: (n,) of the virtual mass [rad/s].
         q: (n,) commanded joint positions [rad].
         dt: period [s].
-        params: parameters.
+        p: parameters.
     """
-    p, speed = params, float(np.sqrt(velocity @ velocity))
+    speed = float(np.sqrt(velocity @ velocity))
     # the part of the torque along the motion in joint space, negative against it
     along = float(torque @ state.course)
     opposed = state.opposed + dt if along < -p.torque_nm else 0.0
@@ -144,15 +122,16 @@ def clamped(
     trail, marked = state.trail, state.marked + dt
     if marked >= _APART_S:
         trail, marked = np.vstack((q[None], trail[:-1])), 0.0
-    return ClampState(
-        course, pushed, opposed, turns, turned, trail, marked,
-        # never 0, which says that there is no clamp: two reversals may be found at a small torque
-        max(abs(along), p.torque_nm) if caught else 0.0, 0.0, False, state.path, state.came, state.between, state.force,
+    # never 0, which says that there is no clamp: two reversals may be found at a small torque
+    against = max(abs(along), p.torque_nm) if caught else 0.0
+    return replace(
+        state, course=course, pushed=pushed, opposed=opposed, turns=turns, turned=turned, trail=trail, marked=marked,
+        torque=against,
     )  # fmt: skip
 
 
 def opened(
-    state: ClampState, torque: FloatArray, q: FloatArray, dt: float, params: ClampParams
+    state: ClampState, torque: FloatArray, q: FloatArray, dt: float, p: ClampParams
 ) -> tuple[FloatArray, ClampState]:
     """Return the joint velocities (n,) [rad/s] back to the next place of the path the arm came, of any length.
 
@@ -165,7 +144,7 @@ def opened(
         torque: (n,) external torque [Nm].
         q: (n,) commanded joint positions [rad].
         dt: period [s].
-        params: parameters.
+        p: parameters.
     """
     trail = state.trail
     # past the places that are reached, and those that lead back into what is caught
@@ -174,14 +153,11 @@ def opened(
     back = trail[0] - q
     back = np.zeros(len(q)) if _closes(state, back) else back
     length = float(np.sqrt(back @ back))
-    against = length > 0 and float(torque @ back) < -params.torque_nm * length
+    against = length > 0 and float(torque @ back) < -p.torque_nm * length
     opposed = state.opposed + dt if against else 0.0
-    over = state.opening + dt > params.open_s or opposed >= _OPPOSED_S - 1e-9 or float(np.abs(back).max()) < _NEAR_RAD
+    over = state.opening + dt > p.open_s or opposed >= _OPPOSED_S - 1e-9 or float(np.abs(back).max()) < _NEAR_RAD
     # to the place within one period: the caller slows that down to `open_m_s`
-    return back / dt, ClampState(
-        state.course, state.pushed, opposed, state.turns, state.turned, trail, state.marked, state.torque,
-        state.opening + dt, state.open or over, state.path, state.came, state.between, state.force,
-    )  # fmt: skip
+    return back / dt, replace(state, opposed=opposed, trail=trail, opening=state.opening + dt, open=state.open or over)
 
 
 def _closes(state: ClampState, motion: FloatArray) -> bool:
@@ -205,20 +181,12 @@ _NEAR_RAD = 0.002
 """Distance at which a place of the path counts as reached [rad]."""
 
 
-@value
-class SelfClamp:
-    """Something caught between two links."""
-
-    link: IntArray
-    """(2,) index of each."""
-    force: float
-    """Force with which it pushes them apart [N]."""
-
-
 def find_self_clamp(
     model: RobotModel, kin: Kinematics, torque: FloatArray, covariance: FloatArray, qd: FloatArray, p: PinchParams
-) -> SelfClamp | None:
-    """Return what is caught between two links that approach each other, or None.
+) -> tuple[int, int, float] | None:
+    """Return two links that something is caught between, and the force with which it pushes them apart [N], or None.
+
+    The links approach each other.
 
     Args:
         model: the arm.
@@ -229,14 +197,13 @@ def find_self_clamp(
         p: parameters.
     """
     body, (first, second) = model.capsules, model.apart.T
-    a = kin.position[body.link] + np.einsum("cij,cj->ci", kin.rotation[body.link], body.a)
-    b = kin.position[body.link] + np.einsum("cij,cj->ci", kin.rotation[body.link], body.b)
+    a, b = placed(body, kin)
     p1, p2 = nearest_points(a[first], b[first], a[second], b[second])
     between = p2 - p1
     length = np.sqrt((between**2).sum(axis=1))
     gap = length - body.radius[first] - body.radius[second]
     # torques in units of their standard deviations: z = L^-1 tau
-    found, best, white = None, -np.inf, np.linalg.inv(np.linalg.cholesky(covariance))
+    caught, best, white = None, -np.inf, np.linalg.inv(np.linalg.cholesky(covariance))
     z = white @ torque
     size = float(z @ z)
     for k in np.flatnonzero((gap > 0.0) & (gap < p.gap_m)):
@@ -263,8 +230,8 @@ def find_self_clamp(
         # twice a log-posterior: a Gaussian of what is left, an exponential prior of the thickness of what is caught
         odds = -rest - 2.0 * float(gap[k]) / _THICKNESS_M
         if odds > best:
-            found, best = SelfClamp(np.array([one, other]), along), odds
-    return found
+            caught, best = (int(one), int(other), along), odds
+    return caught
 
 
 def presses_on_fixture(

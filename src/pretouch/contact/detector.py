@@ -6,13 +6,13 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from pretouch.compiled import compiled
 from pretouch.composition import Part
 from pretouch.contact.residual_model import ResidualModel
 from pretouch.contact.window import Window
 from pretouch.groups import Kinematics
 from pretouch.robot.body import Capsules, no_capsules
 from pretouch.robot.model import RobotModel
+from pretouch.robot.vectors import below
 from pretouch.sensing.skin import Skin
 from pretouch.types import (
     NOT_TOUCHED,
@@ -140,18 +140,9 @@ class Detector(Part, group="pretouch.detectors"):
 
 def no_torques(body: Body, sample: Sample) -> Detection | None:
     """Return what a detector by torques says where there are none, or None where there are."""
-    if is_known(sample.robot.tau_ext):
+    if below(sample.robot.tau_ext, np.inf):
         return None
     return Detection(Thresholds(np.full((6, 3), np.nan)), None, False, np.full(body.model.n, np.nan), 0.0)
-
-
-@compiled
-def is_known(torque: FloatArray) -> bool:
-    """Whether there are torques (n,): none is NaN."""
-    for number in torque:  # noqa: SIM110  compiled code knows no generators
-        if np.isnan(number):
-            return False
-    return True
 
 
 def strongest(force: FloatArray, bands: Thresholds) -> Contact:

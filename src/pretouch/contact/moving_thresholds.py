@@ -1,7 +1,6 @@
 """Contact detection of the paper (eqs. 9-11): force against thresholds that move with its statistics and nearness."""
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -9,7 +8,7 @@ from pretouch.compiled import compiled, kernel
 from pretouch.contact.detector import Body, Detection, Detector, Sample
 from pretouch.contact.window import Window, window_mean, window_std
 from pretouch.params import ThresholdParams
-from pretouch.types import BoolArray, Contact, FloatArray, Number, Obstacles, Thresholds
+from pretouch.types import Contact, FloatArray, Number, Obstacles, Thresholds
 
 
 @kernel
@@ -48,25 +47,9 @@ def side_distances(
     return positive, negative
 
 
-class ThresholdNumbers(NamedTuple):
-    """What is taken of `ThresholdParams`."""
-
-    f_base_n: float
-    f_std_n: float
-    sigma_max_n: float
-    f_d_n: float
-    d_max_m: float
-    d_min_m: float
-
-
-def threshold_numbers(p: ThresholdParams) -> ThresholdNumbers:
-    """Return what is taken of the parameters."""
-    return ThresholdNumbers(p.f_base_n, p.f_std_n, p.sigma_max_n, p.f_d_n, p.d_max_m, p.d_min_m)
-
-
 @kernel
 def threshold_parts(
-    mean: FloatArray, sigma: FloatArray, positive: FloatArray, negative: FloatArray, p: ThresholdNumbers,
+    mean: FloatArray, sigma: FloatArray, positive: FloatArray, negative: FloatArray, p: ThresholdParams,
     parts: FloatArray,
 ) -> None:  # fmt: skip
     """Write thresholds of each axis [N] and what they are made of, eq. 9 of the paper: `Thresholds.parts` (6, 3).
@@ -85,9 +68,7 @@ def threshold_parts(
         parts[2, i], parts[3, i], parts[4, i], parts[5, i] = mean[i], sigma[i], f_positive, f_negative
 
 
-def crossed(force: FloatArray, limits: Thresholds) -> BoolArray:
-    """Say for each axis (3,) whether the force [N] exceeds its upper or lower threshold."""
-    return (force > limits.upper) | (force < limits.lower)
+_NONE = np.full(3, np.nan)
 
 
 @dataclass(frozen=True)
@@ -100,14 +81,13 @@ class MovingThresholds(ThresholdParams, Detector, name="thresholds"):
         """Move the thresholds to the force window of this step, and hold its force against them."""
         robot, position = sample.robot, sample.kin.position[body.model.ee]
         force = None if robot.wrench is None else robot.wrench[:3]
-        found = self.judged(sample.window, force, sample.armed, position, sample.obstacles)
-        # made anew, for `replace` takes several times as long
-        return Detection(found.thresholds, found.contact, found.armed, robot.tau_ext, found.evidence), None
+        return self.judged(sample.window, force, sample.armed, position, sample.obstacles, robot.tau_ext), None
 
     def judged(
-        self, window: Window, force: FloatArray | None, armed: bool, ee_position: FloatArray, obstacles: Obstacles
-    ) -> Detection:
-        """Hold a force (3,) [N] against the thresholds by its window and by what is near; the residual is NaN.
+        self, window: Window, force: FloatArray | None, armed: bool, ee_position: FloatArray, obstacles: Obstacles,
+        residual: FloatArray = _NONE,
+    ) -> Detection:  # fmt: skip
+        """Hold a force (3,) [N] against the thresholds by its window and by what is near.
 
         A contact has the force less its mean, F_ext of eq. 12.
 
@@ -117,18 +97,18 @@ class MovingThresholds(ThresholdParams, Detector, name="thresholds"):
             armed: whether the window was full before it.
             ee_position: (3,) end-effector origin [m].
             obstacles: what is near.
+            residual: (n,) of the detection.
         """
         parts, o = np.empty((6, 3)), obstacles
         # NaN crosses no threshold: without an estimate nothing is a contact
         compared = _NONE if force is None else window.newest if self.compare == "filtered" else force
         count = int(window.samples[0])
-        found, share = compare(
-            window.sums, count, compared, ee_position, o.point, o.ee_distance, threshold_numbers(self), parts
-        )
+        crosses, share = compare(window.sums, count, compared, ee_position, o.point, o.ee_distance, self.numbers, parts)
         limits, contact = Thresholds(parts), None
-        if found and armed:
-            contact = Contact(compared - limits.mean, crossed(compared, limits))  # F_ext = F_reading - mu, eq. 12
-        return Detection(limits, contact, armed, _NONE, 0.0 if force is None else share)
+        if crosses and armed:
+            axes = (compared > limits.upper) | (compared < limits.lower)
+            contact = Contact(compared - limits.mean, axes)  # F_ext = F_reading - mu, eq. 12
+        return Detection(limits, contact, armed, residual, 0.0 if force is None else share)
 
     def largest_missed_n(self, body: Body, speed: float) -> float:
         """F_b + F_std, of eqs. 9 and 10: nothing near, and a force as noisy as counts."""
@@ -140,22 +120,19 @@ def thresholds_of(detector: Detector) -> MovingThresholds:
     return detector if isinstance(detector, MovingThresholds) else MovingThresholds()
 
 
-_NONE = np.full(3, np.nan)
-
-
 @compiled
 def compare(
     sums: FloatArray, count: int, compared: FloatArray, ee_position: FloatArray, points: FloatArray,
-    ee_distance: FloatArray, p: ThresholdNumbers, parts: FloatArray,
+    ee_distance: FloatArray, p: ThresholdParams, parts: FloatArray,
 ) -> tuple[bool, float]:  # fmt: skip
     """Write the thresholds (6, 3); say whether a force (3,), NaN for none, crosses one, and its part of a band."""
     positive, negative = side_distances(ee_position, points, ee_distance)
     threshold_parts(window_mean(sums, count), window_std(sums, count), positive, negative, p, parts)
-    found, largest = False, 0.0
+    crosses, largest = False, 0.0
     for i in range(3):
-        found = found or compared[i] > parts[0, i] or compared[i] < parts[1, i]
+        crosses = crosses or compared[i] > parts[0, i] or compared[i] < parts[1, i]
         off = compared[i] - parts[2, i]
         # on the lower side both are negative: the part of the band is positive on either
         band = parts[0, i] - parts[2, i] if off > 0.0 else parts[1, i] - parts[2, i]
         largest = max(largest, off / band)
-    return found, largest
+    return crosses, largest

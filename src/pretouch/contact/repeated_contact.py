@@ -10,13 +10,29 @@ from pretouch.values import value
 
 
 @value
+class Met:
+    """A contact in the arm's task."""
+
+    phase: float
+    """Arc length along the path [m]."""
+    point: FloatArray
+    """(3,) where the end-effector is [m]."""
+    q: FloatArray
+    """(n,) joint positions [rad]."""
+    lever: FloatArray
+    """(n,) external torques for each newton of force [m]: times joint velocities, a speed along the force [m/s]."""
+    command: FloatArray
+    """(n,) joint velocities commanded last [rad/s]."""
+    kinetic: float
+    """Energy with which the arm met it [J]."""
+
+
+@value
 class RepeatedContactState:
     """The last location on the path where the arm met something. Recordings keep these names."""
 
-    phase: float
-    """Arc length of the first contact there [m]."""
-    point: FloatArray
-    """(3,) where the end-effector was [m]."""
+    met: Met | None
+    """The last contact there, with phase and point of the first; None for no such location."""
     contacts: int
     """How many contacts, 0 for no such location."""
     seen: bool
@@ -29,37 +45,13 @@ class RepeatedContactState:
     """Whether the contact of the reaction under way is among them."""
     bound: float
     """Energy that contact may give the arm and still be one of an object at rest [J]."""
-    q: FloatArray
-    """(n,) joint positions at the last contact there [rad]; (0,) for no such location."""
-    lever: FloatArray
-    """(n,) external torques of that contact for each newton of its force [m]; (0,) for no such location."""
     touched: float = -np.inf
     """Arc length of the last contact of all, counted or not [m]."""
 
 
-@value
-class Met:
-    """A contact in the arm's task."""
-
-    phase: float
-    """Arc length along the path [m]."""
-    point: FloatArray
-    """(3,) where the end-effector is [m]."""
-    q: FloatArray
-    """(n,) joint positions [rad]."""
-    torque: FloatArray
-    """(n,) external torques [Nm]."""
-    force: float
-    """Size of its force [N]."""
-    command: FloatArray
-    """(n,) joint velocities commanded last [rad/s]."""
-    kinetic: float
-    """Energy with which the arm met it [J]."""
-
-    @property
-    def lever(self) -> FloatArray:
-        """(n,) torques for each newton [m]: their product with joint velocities is a speed along the force [m/s]."""
-        return self.torque / max(self.force, _LEAST_N)
+def repeated_contact_init(touched: float = -np.inf) -> RepeatedContactState:
+    """Return the state of an arm that has met nothing at a location; the last contact of all was `touched` [m]."""
+    return RepeatedContactState(None, 0, False, 0.0, 0.0, False, 0.0, touched)
 
 
 def meet(state: RepeatedContactState, met: Met, near: bool, params: GiveUpParams) -> RepeatedContactState:
@@ -68,18 +60,24 @@ def meet(state: RepeatedContactState, met: Met, near: bool, params: GiveUpParams
     It did if it moved against the force, fast enough to be what brought that about, and had come on along its path
     since the contact before. What touches an arm that stands, or settles again after such a touch, has come by itself;
     what pushes it on has too.
+
+    An object at rest is met where it was met before, and from the same side. A hand that touches the arm lightly, now
+    here and now there, is met at another location each time. An object at rest gives back no more energy than the arm
+    brought, and as much again allows for the drives, which go on until it is detected.
+
+    `near` says whether something is seen near the body.
     """
-    against = float(met.lever @ met.command) < -_CLOSING_M_S
-    if against and met.phase > state.touched + _ADVANCED_M:
-        state = count_contact(state, met, near, params)
+    if float(met.lever @ met.command) >= -_CLOSING_M_S or met.phase <= state.touched + _ADVANCED_M:
+        return replace(state, counted=False, touched=met.phase)
+    contacts, before = 1, state.met
+    if before is not None and abs(met.phase - before.phase) <= _LOCATION_M and _same_object(before, met):
+        # the location stays that of the first contact: one that crept along would never be passed
+        there = replace(met, phase=before.phase, point=before.point)
+        contacts, near = state.contacts + 1, state.seen or near
     else:
-        state = replace(state, counted=False)
-    return replace(state, touched=met.phase)
-
-
-def repeated_contact_init() -> RepeatedContactState:
-    """Return the state of an arm that has met nothing."""
-    return RepeatedContactState(0.0, np.zeros(3), 0, False, 0.0, 0.0, False, 0.0, np.zeros(0), np.zeros(0))
+        there = met
+    bound = params.push_j + 2.0 * met.kinetic
+    return RepeatedContactState(there, contacts, near, 0.0, 0.0, True, bound, met.phase)
 
 
 def given_up(state: RepeatedContactState, params: GiveUpParams | None) -> bool:
@@ -87,37 +85,19 @@ def given_up(state: RepeatedContactState, params: GiveUpParams | None) -> bool:
     return params is not None and state.contacts >= params.contacts
 
 
-def count_contact(state: RepeatedContactState, met: Met, near: bool, params: GiveUpParams) -> RepeatedContactState:
-    """Count a contact that the arm ran into on its path.
-
-    An object at rest is met where it was met before, and from the same side. A hand that touches the arm lightly, now
-    here and now there, is met at another location each time.
-
-    `near` says whether something is seen near the body. An object at rest gives back no more energy than the arm
-    brought, and as much again allows for the drives, which go on until it is detected.
-    """
-    bound = params.push_j + 2.0 * met.kinetic
-    if state.contacts and abs(met.phase - state.phase) <= _LOCATION_M and _same_object(state, met):
-        # the location stays that of the first contact: one that crept along would never be passed
-        return RepeatedContactState(
-            state.phase, state.point, state.contacts + 1, state.seen or near, 0.0, 0.0, True, bound, met.q, met.lever
-        )  # fmt: skip
-    return RepeatedContactState(met.phase, met.point, 1, near, 0.0, 0.0, True, bound, met.q, met.lever)
+def _same_object(before: Met, met: Met) -> bool:
+    """Whether a contact can be with the object at rest that the arm met before at a location."""
+    sizes = float(np.linalg.norm(before.lever) * np.linalg.norm(met.lever))
+    alike = float(before.lever @ met.lever) >= _ALIKE * sizes
+    return alike and -_SHORT_M <= _farther(before, met.q) <= _FARTHER_M
 
 
-def _same_object(state: RepeatedContactState, met: Met) -> bool:
-    """Whether a contact can be with the object at rest that the arm met last at a location."""
-    sizes = float(np.linalg.norm(state.lever) * np.linalg.norm(met.lever))
-    alike = float(state.lever @ met.lever) >= _ALIKE * sizes
-    return alike and -_SHORT_M <= _farther(state.q, state.lever, met.q) <= _FARTHER_M
-
-
-def _farther(q: FloatArray, lever: FloatArray, now: FloatArray) -> float:
-    """How much farther against a force the arm has come from joint positions q (n,) [rad] to those of `now` [m].
+def _farther(met: Met, q: FloatArray) -> float:
+    """How much farther against the force of a contact the arm has come than there, at joint positions (n,) [m].
 
     That is the work against the force, for each newton: to first order the way of the touched point, wherever it is.
     """
-    return -float(lever @ (now - q))
+    return -float(met.lever @ (q - met.q))
 
 
 def discount_push(state: RepeatedContactState, energy: float) -> RepeatedContactState:
@@ -127,20 +107,14 @@ def discount_push(state: RepeatedContactState, energy: float) -> RepeatedContact
     # somebody pushes: that says nothing of the location
     if state.contacts > 1:
         return replace(state, contacts=state.contacts - 1, counted=False)
-    return _nowhere(state)
-
-
-def _nowhere(state: RepeatedContactState) -> RepeatedContactState:
-    """Forget the location, and keep where the last contact was."""
-    return replace(repeated_contact_init(), touched=state.touched)
+    return repeated_contact_init(state.touched)
 
 
 def forget_passed(state: RepeatedContactState, phase: float, q: FloatArray) -> RepeatedContactState:
     """Forget the location once the arm is past it: on its path, or where an object at rest would be in its way."""
-    if not state.contacts:
-        return state
-    there = _farther(state.q, state.lever, q) > _FARTHER_M
-    return _nowhere(state) if there or phase > state.phase + _LOCATION_M else state
+    met = state.met
+    passed = met is not None and (_farther(met, q) > _FARTHER_M or phase > met.phase + _LOCATION_M)
+    return repeated_contact_init(state.touched) if passed else state
 
 
 def wait_to_retry(state: RepeatedContactState, near: bool, dt: float, params: GiveUpParams) -> RepeatedContactState:
@@ -176,5 +150,3 @@ _FARTHER_M = 0.02
 N/mm beside the circle the arm slides on by 0.014 m from one contact to the next."""
 _ALIKE = 0.5
 """Least cosine between the torques of two contacts with an object at rest: with boards at least 0.77."""
-_LEAST_N = 5.0
-"""Least force by which torques are divided [N]: the estimate of a smaller one is mostly noise."""

@@ -26,10 +26,7 @@ from pretouch.composition import Part
 from pretouch.contact.detector import Body, Sample
 from pretouch.params import TouchSensorParams
 from pretouch.robot.body import Capsules
-from pretouch.robot.model import RobotModel
-from pretouch.sensing.skin import Skin
 from pretouch.types import FloatArray, IntArray, TouchStatus
-from pretouch.values import value
 
 
 class Cues(NamedTuple):
@@ -105,30 +102,6 @@ class TouchSettings:
     """(M,) G: times the prior of a contact on the link is larger while it is touched [1]."""
 
 
-@value
-class TouchState:
-    """What is remembered of M touch sensors."""
-
-    account: FloatArray
-    """(M,) time for which each was said to be touched, less what was given back [s]."""
-
-
-def touch_settings(model: RobotModel, skin: Skin, p: TouchSensorParams) -> TouchSettings | None:
-    """Return what is fixed of the units that have a touch sensor; None where none has."""
-    if not len(skin.touching):
-        return None
-    patches = [(k, touch) for k, unit in enumerate(skin.units) if (touch := unit.touch) is not None]
-    unit, link = skin.touching, skin.link[skin.touching]
-    radius = np.array([touch.radius for _, touch in patches])
-    area = np.array([surface_area(model.capsules, int(i)) for i in link])
-    # s: the patch, taken as flat, of the link's surface
-    share = np.minimum(np.pi * radius**2 / area, 1.0)
-    return TouchSettings(
-        unit, link, skin.T_link_sensor[unit, :3, 3].copy(), np.hypot(radius / 2, skin.position_sigma[unit]),
-        gain_of(share, p),
-    )  # fmt: skip
-
-
 def gain_of(share: FloatArray, p: TouchSensorParams) -> FloatArray:
     """Return G (M,) of units whose patches cover these shares (M,) of their links."""
     # p: false touches an hour times how long each lasts
@@ -148,54 +121,56 @@ def surface_area(capsules: Capsules, link: int) -> float:
 class TouchSensors(TouchSensorParams, Cue, name="touch"):
     """The units' touch sensors: a contact is likelier on the link of a unit that is touched, and there is where."""
 
-    State = TouchState
+    def on(self, body: Body) -> "TouchSensors":
+        """Return the cue for an arm, its touch sensors looked up; itself where no unit has one."""
+        skin = body.skin
+        if not len(skin.touching):
+            return self
+        unit, link = skin.touching, skin.link[skin.touching]
+        radius = np.array([sensor.touch.radius for sensor in skin.units if sensor.touch is not None])
+        area = np.array([surface_area(body.model.capsules, int(i)) for i in link])
+        # s: the patch, taken as flat, of the link's surface
+        share = np.minimum(np.pi * radius**2 / area, 1.0)
+        settings = TouchSettings(
+            unit, link, skin.T_link_sensor[unit, :3, 3].copy(), np.hypot(radius / 2, skin.position_sigma[unit]),
+            gain_of(share, self),
+        )  # fmt: skip
+        return _TouchSensorsOn(**{name: getattr(self, name) for name in self.__dataclass_fields__}, settings=settings)
 
-    def on(self, body: Body) -> "_TouchSensorsOn":
-        """Return the cue for an arm, its touch sensors looked up."""
-        return _TouchSensorsOn(**vars(self), settings=touch_settings(body.model, body.skin, self))
+    def step(self, state: Any, body: Body, sample: Sample) -> tuple[Cues | None, Any]:
+        """Return nothing: no unit has a touch sensor."""
+        return None, state
 
 
 @dataclass(frozen=True)
 class _TouchSensorsOn(TouchSensors):
-    """Touch sensors of one arm."""
+    """Touch sensors of one arm; their state is the time (M,) that each said so, less what was given back [s]."""
 
-    settings: TouchSettings | None = field(default=None, compare=False)
-    """None where no unit has one."""
+    settings: TouchSettings = field(compare=False, kw_only=True)
 
-    def init(self, body: Body) -> TouchState | None:
-        return None if self.settings is None else TouchState(np.zeros(len(self.settings.unit)))
+    def init(self, body: Body) -> FloatArray:
+        return np.zeros(len(self.settings.unit))
 
-    def step(self, state: TouchState | None, body: Body, sample: Sample) -> tuple[Cues | None, TouchState | None]:
-        if self.settings is None or state is None:
-            return None, None
-        return said_by(state, self.settings, sample, body.period, self)
+    def step(self, state: FloatArray, body: Body, sample: Sample) -> tuple[Cues | None, FloatArray]:
+        """Return what units say of a touch in one step, None where none is believed to be touched.
 
-
-def said_by(
-    state: TouchState, settings: TouchSettings, sample: Sample, period: float, p: TouchSensorParams
-) -> tuple[Cues | None, TouchState]:
-    """Return what units say of a touch in one step, None where none is believed to be touched.
-
-    The touch readings of the sample are of all K units, of known shapes (`sound.sound_touch`); None of a skin that
-    gave none. `period` [s] is that of control.
-    """
-    account, readings, kin = state.account, sample.touches, sample.kin
-    if readings is None:
-        said = np.zeros(len(account), np.bool_)
-    else:
-        age = sample.stamp - readings.stamp[settings.unit]
-        fresh = (age <= p.fresh_s) & (age >= -_TOLERANCE_S) & (readings.status[settings.unit] == TouchStatus.OK)
-        said = fresh & readings.contact[settings.unit]
-    believed = np.flatnonzero(said & (account < p.patience_s))
-    if said.any() or account.any():
-        # filled by all that is said, believed or not: a sensor that stays stuck is never believed again
-        filled = np.where(said, account + period, account - p.forgiveness * period)
-        state = TouchState(np.clip(filled, 0.0, p.patience_s))
-    if readings is None or not len(believed):
-        return None, state
-    link, gain = settings.link[believed], np.ones(len(kin.position))
-    # several touched units of one link count once, by the largest gain
-    np.maximum.at(gain, link, settings.gain[believed])
-    point = kin.position[link] + np.einsum("mij,mj->mi", kin.rotation[link], settings.place[believed])
-    force = readings.force[settings.unit[believed]]
-    return Cues(gain, link, point, settings.sigma[believed], force), state
+        The touch readings of the sample are of all K units, of known shapes; None of a skin that gave none.
+        """
+        readings, kin, settings, touched = sample.touches, sample.kin, self.settings, np.zeros(len(state), np.bool_)
+        if readings is not None:
+            age = sample.stamp - readings.stamp[settings.unit]
+            fresh = (age <= self.fresh_s) & (age >= -_TOLERANCE_S)
+            touched = fresh & (readings.status[settings.unit] == TouchStatus.OK) & readings.contact[settings.unit]
+        believed = np.flatnonzero(touched & (state < self.patience_s))
+        if touched.any() or state.any():
+            # filled by all that is said, believed or not: a sensor that stays stuck is never believed again
+            filled = np.where(touched, state + body.period, state - self.forgiveness * body.period)
+            state = np.clip(filled, 0.0, self.patience_s)
+        if readings is None or not len(believed):
+            return None, state
+        link, gain = settings.link[believed], np.ones(len(kin.position))
+        # several touched units of one link count once, by the largest gain
+        np.maximum.at(gain, link, settings.gain[believed])
+        point = kin.position[link] + np.einsum("mij,mj->mi", kin.rotation[link], settings.place[believed])
+        force = readings.force[settings.unit[believed]]
+        return Cues(gain, link, point, settings.sigma[believed], force), state

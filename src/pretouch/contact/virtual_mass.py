@@ -2,7 +2,8 @@
 
 Each joint obeys M dv/dt = d(tau) - D v, integrated implicitly, with tau the external torque less its mean in free
 motion. See docs/explanation/reaction.md for why joint space, and for the bound on the energy (Hannaford and Ryu 2002;
-Ferraguti et al. 2015; both bound it with what they call passivity observer and energy tank).
+Ferraguti et al. 2015; both bound it with what they call passivity observer and energy tank). No point of the body's
+axes is faster than a bound, nor comes farther from where it was than another.
 """
 
 import math
@@ -15,9 +16,11 @@ from pretouch.groups import CapsuleArrays, Chain, Kinematics
 from pretouch.params.paper import AdmittanceParams
 from pretouch.records import Cell, IntCell
 from pretouch.robot.kinematics import point_velocity
-from pretouch.robot.model import RobotModel
-from pretouch.robot.vectors import placed_ends
+from pretouch.robot.vectors import dot, placed_ends
 from pretouch.types import BoolArray, FloatArray, IntArray
+
+Axes = tuple[Kinematics, BoolArray, CapsuleArrays]
+"""Posture of an arm, which joints move a link (L, n), and the capsules of its body."""
 
 
 class VirtualMass(NamedTuple):
@@ -25,26 +28,26 @@ class VirtualMass(NamedTuple):
 
     mean: FloatArray
     """(2, n) residual torque filtered once and twice [Nm]; the latter is the mean in free motion."""
-    samples: int
-    """How many samples the mean holds."""
+    samples: IntArray
+    """(1,) how many samples the mean holds."""
     torque: FloatArray
     """(n,) last residual less the mean [Nm]."""
     velocity: FloatArray
     """(n,) of the virtual mass [rad/s]."""
     side: FloatArray
     """(n,) sign of the torque that last drove each joint in this reaction, 0 for none."""
-    tank: float
-    """Energy taken from the push and not given back, with the start value [J]."""
+    tank: FloatArray
+    """(1,) energy taken from the push and not given back, with the start value [J]."""
     steady: FloatArray
     """(2, n) torque filtered once and twice, without most of its noise [Nm]."""
     sliding: FloatArray
     """(n,) 1 of a joint that a push has torn loose from static friction, 0 of one that sticks."""
-    quiet: float
-    """Time since a torque moved a joint or kept it moving [s]."""
-    no_contact: float
-    """Time since the detector found a contact [s]."""
-    since: float
-    """Time since the contact that began a reaction [s], infinite without one."""
+    quiet: FloatArray
+    """(1,) time since a torque moved a joint or kept it moving [s]."""
+    no_contact: FloatArray
+    """(1,) time since the detector found a contact [s]."""
+    since: FloatArray
+    """(1,) time since the contact that began a reaction [s], infinite without one."""
 
 
 class FreeMass(NamedTuple):
@@ -59,7 +62,7 @@ class FreeMass(NamedTuple):
 
 def mass_init(n: int, params: AdmittanceParams) -> VirtualMass:
     """Return the state of n joints at rest, before the first sample."""
-    return learnt_mass(np.zeros((2, n)), 0, np.zeros(n), params)
+    return learnt_mass(np.zeros((2, n)), np.zeros(1, np.int64), np.zeros(n), params)
 
 
 def dead_band(torque_limit: FloatArray, params: AdmittanceParams) -> FloatArray:
@@ -73,15 +76,18 @@ def learnt(state: VirtualMass, residual: FloatArray, dt: float, params: Admittan
     Of two filters in a row the second takes in little of what has only begun: of a torque that has lasted for 60 ms
     less than one part in a hundred.
     """
-    mean, samples, torque = state.mean.copy(), np.array([state.samples]), np.empty(len(residual))
+    mean, samples, torque = state.mean.copy(), state.samples.copy(), np.empty(len(residual))
     learn_mean(mean, samples, residual, dt, torque)
-    return learnt_mass(mean, int(samples[0]), torque, params)
+    return learnt_mass(mean, samples, torque, params)
 
 
-def learnt_mass(mean: FloatArray, samples: int, torque: FloatArray, params: AdmittanceParams) -> VirtualMass:
-    """Return the state in free motion, with its mean, samples in it, and last torque beyond it."""
-    none, twice = np.zeros(len(torque)), np.zeros(mean.shape)
-    return VirtualMass(mean, samples, torque, none, none, params.start_energy_j, twice, none, 0.0, 0.0, math.inf)
+def learnt_mass(mean: FloatArray, samples: IntArray, torque: FloatArray, params: AdmittanceParams) -> VirtualMass:
+    """Return the state in free motion, with its mean, samples in it (1,), and last torque beyond it."""
+    none, zero = np.zeros(len(torque)), np.zeros(1)
+    return VirtualMass(
+        mean, samples, torque, none, none, np.array([params.start_energy_j]), np.zeros(mean.shape), none, zero, zero,
+        np.array([math.inf]),
+    )  # fmt: skip
 
 
 @compiled
@@ -97,9 +103,8 @@ def learn_mean(mean: FloatArray, samples: IntArray, residual: FloatArray, dt: fl
 
 
 def begun(
-    state: VirtualMass, model: RobotModel, kin: Kinematics, torque: FloatArray, before: FloatArray,
-    band: FloatArray, params: AdmittanceParams,
-) -> VirtualMass:  # fmt: skip
+    state: VirtualMass, axes: Axes, torque: FloatArray, before: FloatArray, band: FloatArray, params: AdmittanceParams
+) -> VirtualMass:
     """Begin a reaction: at the speed that the torque (n,) [Nm] would keep up, as far as the start energy allows.
 
     With static friction a joint begins only where the torque measured `before` (n,) [Nm] says the same, and at the
@@ -109,59 +114,17 @@ def begun(
     if params.static_friction_nm > 0:
         lesser = np.where(torque * before > 0, np.sign(torque) * np.minimum(np.abs(torque), np.abs(before)), 0.0)
         least = np.maximum(band, _KEEPS * params.static_friction_nm)
-    drive = np.where(np.abs(lesser) > least, _shrunk(lesser, band), 0.0)
+    drive = np.where(np.abs(lesser) > least, np.sign(lesser) * np.maximum(0.0, np.abs(lesser) - band), 0.0)
     velocity = drive / params.damping_nm_s  # where M dv/dt = d - D v is 0
     energy = 0.5 * params.inertia_kg_m2 * float(velocity @ velocity)
     if energy > params.start_energy_j:
         velocity = velocity * math.sqrt(params.start_energy_j / energy)
-    velocity = _no_faster(velocity, model, kin, params.speed_max_m_s)
+    velocity = velocity * min(1.0, params.speed_max_m_s / max(fastest_point(axes, velocity), _LEAST_M_S))
+    side, zero = np.sign(drive), np.zeros(1)
     return VirtualMass(
-        state.mean, state.samples, torque, velocity, np.sign(drive), params.start_energy_j, np.stack((torque, lesser)),
-        np.abs(np.sign(drive)), 0.0, 0.0, 0.0,
+        state.mean, state.samples, torque, velocity, side, np.array([params.start_energy_j]),
+        np.stack((torque, lesser)), np.abs(side), zero, zero, zero,
     )  # fmt: skip
-
-
-def yielded(
-    state: VirtualMass, arm: tuple[RobotModel, Kinematics], residual: FloatArray, command: FloatArray,
-    band: FloatArray, dt: float, params: AdmittanceParams, contact: bool = True,
-) -> VirtualMass:  # fmt: skip
-    """Move the virtual mass by one period under the external torque.
-
-    Args:
-        state: memory.
-        arm: model and posture.
-        residual: (n,) external torque [Nm].
-        command: (n,) joint velocities commanded last [rad/s].
-        band: (n,) dead band [Nm].
-        dt: period [s].
-        params: parameters.
-        contact: whether the detector finds one.
-    """
-    p, torque = params, residual - state.mean[1]
-    velocity, side, sliding, steady = np.empty_like(band), np.empty_like(band), np.empty_like(band), state.steady.copy()
-    # the estimate is a low pass of the force u, y = keep y_before + (1 - keep) u; `_yield` solves that for u
-    keep = math.exp(-dt / p.lag_s) if p.lag_s > 0 else 0.0
-    # just after a contact the filters still lag, and the detector has found a push already
-    at_once = _KEEPS if state.since < _FIRST_S else _AT_ONCE
-    tank, pushed = _yield(
-        torque, command, band, state,
-        _Period(
-            p.inertia_kg_m2, p.damping_nm_s, p.static_friction_nm, keep, at_once, 1.0 - math.exp(-dt / _STEADY_S), dt
-        ),
-        _After(velocity, side, sliding, steady),
-    )  # fmt: skip
-    velocity = _no_faster(velocity, *arm, p.speed_max_m_s)
-    quiet, no_contact = 0.0 if pushed else state.quiet + dt, 0.0 if contact else state.no_contact + dt
-    return VirtualMass(
-        state.mean, state.samples, torque, velocity, side, tank, steady, sliding, quiet, no_contact, state.since + dt
-    )
-
-
-def _no_faster(velocity: FloatArray, model: RobotModel, kin: Kinematics, most: float) -> FloatArray:
-    """Scale joint velocities (n,) [rad/s] so that no point of the body's axes is faster than `most` [m/s]."""
-    body = model.body
-    fastest = fastest_point(kin, model.moved_by, body.arrays, velocity)
-    return velocity * (most / fastest) if fastest > most else velocity
 
 
 _MEAN_S = 0.5
@@ -183,73 +146,61 @@ _FIRST_S = 0.3
 """Time after the onset of a contact in which two samples beyond what keeps a joint moving do the same [s]."""
 _REST_RAD_S = 1e-3
 """Speed at which a joint that nothing drives sticks [rad/s]: none that can be seen."""
-
-
-class _Period(NamedTuple):
-    """What a period comes to."""
-
-    inertia: float
-    """[kg m^2]"""
-    damping: float
-    """[Nm s/rad]"""
-    friction: float
-    """Static [Nm]."""
-    keep: float
-    """Part of the torque before that the estimate still shows."""
-    at_once: float
-    """Times the static friction from which two samples tear a joint loose."""
-    weight: float
-    """Of a sample in the filters."""
-    dt: float
-    """[s]"""
-
-
-class _After(NamedTuple):
-    """Room for what follows, as of `VirtualMass`; `steady` is that of before."""
-
-    velocity: FloatArray
-    side: FloatArray
-    sliding: FloatArray
-    steady: FloatArray
+_LEAST_M_S = 1e-12
+"""An arm that is no faster stands [m/s]."""
 
 
 @compiled
-def _yield(
-    torque: FloatArray, command: FloatArray, band: FloatArray, state: VirtualMass, period: _Period, after: _After
-) -> tuple[float, bool]:
-    """Write what follows; return the energy in the tank [J], and whether a push goes on."""
-    before, v, side, loose, tank = state.torque, state.velocity, state.side, state.sliding, state.tank
-    inertia, damping, friction, keep, at_once, weight, dt = period
-    velocity, sides, sliding, steady = after
-    n, power, pushed = len(v), 0.0, False
+def yield_to(
+    mass: VirtualMass, residual: FloatArray, command: FloatArray, band: FloatArray, axes: Axes, p: AdmittanceParams,
+    dt: float, contact: bool,
+) -> None:  # fmt: skip
+    """Move the virtual mass by one period under the external torque.
+
+    Args:
+        mass: changed.
+        residual: (n,) external torque [Nm].
+        command: (n,) joint velocities commanded last [rad/s].
+        band: (n,) dead band [Nm].
+        axes: of the body, in this posture.
+        p: parameters.
+        dt: period [s].
+        contact: whether the detector finds one.
+    """
+    before, torque, velocity, side = mass.torque.copy(), mass.torque, mass.velocity, mass.side
+    steady, sliding, friction, damping, n = mass.steady, mass.sliding, p.static_friction_nm, p.damping_nm_s, len(band)
+    # the estimate is a low pass of the force u, y = keep y_before + (1 - keep) u; solved for u below
+    keep, weight = math.exp(-dt / p.lag_s) if p.lag_s > 0.0 else 0.0, 1.0 - math.exp(-dt / _STEADY_S)
+    # just after a contact the filters still lag, and the detector has found a push already
+    at_once = _KEEPS if mass.since[0] < _FIRST_S else _AT_ONCE
+    power, pushed, acted = 0.0, False, np.empty(n)
     for i in range(n):
+        torque[i] = residual[i] - mass.mean[1, i]
         steady[0, i] += weight * (torque[i] - steady[0, i])
         steady[1, i] += weight * (steady[0, i] - steady[1, i])
         # stick and slip: what tears a joint loose has to show in two values, less keeps it moving
         lasts = abs(steady[0, i]) > max(band[i], _KEEPS * friction)
         starts = _both(steady[0, i], steady[1, i], friction) or _both(torque[i], before[i], at_once * friction)
-        sliding[i] = 1.0 if friction == 0.0 or starts or (loose[i] > 0.0 and lasts) else 0.0
+        sliding[i] = 1.0 if friction == 0.0 or starts or (sliding[i] > 0.0 and lasts) else 0.0
         pushed = pushed or (lasts and sliding[i] > 0.0)
 
         # what acted in the last period, by the exact inverse of the estimate's lag over one period
-        acted = (torque[i] - keep * before[i]) / (1.0 - keep)
+        acted[i] = (torque[i] - keep * before[i]) / (1.0 - keep)
         # the least energy that it gave, whichever of the two is true and whatever is wrong within the dead band
-        power += min(torque[i] * v[i], acted * v[i]) - band[i] * abs(v[i])
-        measured, now = _beyond(torque[i], band[i]), _beyond(acted, band[i])
+        power += min(torque[i] * velocity[i], acted[i] * velocity[i]) - band[i] * abs(velocity[i])
+        measured, now = _beyond(torque[i], band[i]), _beyond(acted[i], band[i])
         # the lesser of both, and nothing where they disagree: a force that has ended no longer drives the arm
         drive = 0.0
         if measured * now > 0.0 and sliding[i] > 0.0:
             drive = measured if abs(measured) < abs(now) else now
         # against the push the joint has yielded to: what a release leaves in the estimate, unless well beyond the band
         if drive * side[i] < 0.0:
-            least = _REVERSE_BAND * band[i]
-            far = min(abs(torque[i]), abs(acted)) > least
+            far = min(abs(torque[i]), abs(acted[i])) > _REVERSE_BAND * band[i]
             drive = drive if far else 0.0
         # M (v' - v) / dt = d - D v', implicit: the kinetic energy grows by d v' dt at most, for any dt
-        velocity[i] = (inertia * v[i] + dt * drive) / (inertia + dt * damping)
-        sides[i] = side[i]
+        velocity[i] = (p.inertia_kg_m2 * velocity[i] + dt * drive) / (p.inertia_kg_m2 + dt * damping)
         if drive != 0.0:
-            sides[i] = np.sign(drive)
+            side[i] = np.sign(drive)
         # undriven, a joint stops that the arm does not move that way, or that has all but stopped
         elif velocity[i] * command[i] <= 0.0 or (friction > 0.0 and abs(velocity[i]) < _REST_RAD_S):
             velocity[i] = 0.0
@@ -257,14 +208,16 @@ def _yield(
             # nothing drives it: it is never asked for more than it does
             velocity[i] = command[i]
     # passivity observer; the cap keeps a long push from paying for a long motion after it
-    tank = min(tank + dt * power, _TANK_MAX_J)
-    if tank < 0.0:
+    mass.tank[0] = min(mass.tank[0] + dt * power, _TANK_MAX_J)
+    if mass.tank[0] < 0.0:
         # no more to give: only what takes energy may move
         for i in range(n):
-            acted = (torque[i] - keep * before[i]) / (1.0 - keep)
-            if min(torque[i] * velocity[i], acted * velocity[i]) <= band[i] * abs(velocity[i]):
+            if min(torque[i] * velocity[i], acted[i] * velocity[i]) <= band[i] * abs(velocity[i]):
                 velocity[i] = 0.0
-    return tank, pushed
+    velocity *= min(1.0, p.speed_max_m_s / max(fastest_point(axes, velocity), _LEAST_M_S))
+    mass.quiet[0] = 0.0 if pushed else mass.quiet[0] + dt
+    mass.no_contact[0] = 0.0 if contact else mass.no_contact[0] + dt
+    mass.since[0] += dt
 
 
 @kernel
@@ -279,21 +232,55 @@ def _beyond(torque: float, band: float) -> float:
     return np.sign(torque) * max(0.0, abs(torque) - band)
 
 
-def _shrunk(torque: FloatArray, band: FloatArray) -> FloatArray:
-    return np.sign(torque) * np.maximum(0.0, np.abs(torque) - band)
-
-
 @compiled
-def fastest_point(kin: Kinematics, moved_by: BoolArray, capsules: CapsuleArrays, qd: FloatArray) -> float:
+def fastest_point(axes: Axes, qd: FloatArray) -> float:
     """Speed [m/s] of the fastest end of any capsule's axis at joint velocities `qd` (n,) [rad/s].
 
     The speed along an axis is convex, so no point of it is faster than both its ends.
     """
-    link, chain = capsules.link, Chain(kin.anchor, kin.axis, moved_by, qd)
-    ends, fastest = placed_ends(link, capsules.a, capsules.b, kin.position, kin.rotation), 0.0
-    for c in range(len(link)):
-        for end in range(2):
-            point = ends[end, c]
-            x, y, z = point_velocity(chain, link[c], point[0], point[1], point[2])
+    kin, moved_by, capsules = axes
+    ends, fastest = placed_ends(capsules.link, capsules.a, capsules.b, kin.position, kin.rotation), 0.0
+    chain = Chain(kin.anchor, kin.axis, moved_by, qd)
+    for c in range(len(capsules.link)):
+        for point in ends[:, c]:
+            x, y, z = point_velocity(chain, capsules.link[c], point[0], point[1], point[2])
             fastest = max(fastest, np.sqrt(x * x + y * y + z * z))
     return fastest
+
+
+BRAKES_S = 0.2
+"""Time constant with which the speed away falls near the reach [s]: at 0.3 m/s from 0.06 m before it, by 1.5 m/s^2."""
+_LEAST_M = 1e-6
+"""A point that has come no farther has no direction in which it went [m]."""
+
+
+@compiled
+def within_reach(axes: Axes, qd: FloatArray, origin: FloatArray, reach: float) -> tuple[FloatArray, float]:
+    """Slow joint velocities (n,) [rad/s] that lead the arm too far from where it was.
+
+    How far a point has come is convex along an axis, so no point of it has come farther than both its ends. All joints
+    slow alike: none turns round, and so none turns towards who pushes. What leads no end farther away is left as it is.
+
+    Args:
+        axes: of the body, in this posture.
+        qd: joint velocities.
+        origin: (2, C, 3) where the ends of the axes were [m].
+        reach: how far they may come [m].
+
+    Returns the velocities, and how far the farthest end has come [m].
+    """
+    kin, moved_by, capsules = axes
+    ends, share, farthest = placed_ends(capsules.link, capsules.a, capsules.b, kin.position, kin.rotation), 1.0, 0.0
+    chain = Chain(kin.anchor, kin.axis, moved_by, qd)
+    for c in range(len(capsules.link)):
+        for end in range(2):
+            point = ends[end, c]
+            away = point - origin[end, c]
+            far = np.sqrt(dot(away, away))
+            farthest = max(farthest, far)
+            if far > _LEAST_M:
+                x, y, z = point_velocity(chain, capsules.link[c], point[0], point[1], point[2])
+                speed, allowed = (x * away[0] + y * away[1] + z * away[2]) / far, max(0.0, reach - far) / BRAKES_S
+                if speed > allowed:
+                    share = min(share, allowed / speed)
+    return share * qd, farthest

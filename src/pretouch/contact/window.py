@@ -71,7 +71,7 @@ def window_std(sums: FloatArray, count: int) -> FloatArray:
 
 @kernel
 def weighted_value(
-    reading: FloatArray, last: FloatArray, mean: FloatArray, std: FloatArray, alpha: float, lambda_: float
+    reading: FloatArray, last: FloatArray, mean: FloatArray, std: FloatArray, p: WindowParams
 ) -> FloatArray:
     """Value x_t that enters the window, eq. 8 of the paper: an outlier counts with weight alpha. Per axis [N].
 
@@ -80,8 +80,8 @@ def weighted_value(
     """
     value = reading.copy()
     for i in range(len(value)):
-        if abs(reading[i] - mean[i]) > lambda_ * std[i]:
-            value[i] = alpha * reading[i] + (1 - alpha) * last[i]  # x_{t-1} as it entered, not as it was read
+        if abs(reading[i] - mean[i]) > p.lambda_ * std[i]:
+            value[i] = p.alpha * reading[i] + (1 - p.alpha) * last[i]  # x_{t-1} as it entered, not as it was read
     return value
 
 
@@ -90,12 +90,12 @@ def add_force(window: Window, reading: FloatArray | None, p: WindowParams) -> Wi
     if reading is None:
         return window
     after = Window._make(part.copy() for part in window)
-    add_sample(after, reading, p.alpha, p.lambda_)
+    add_sample(after, reading, p.numbers)
     return after
 
 
 @compiled
-def add_sample(window: Window, reading: FloatArray, alpha: float, lambda_: float) -> None:
+def add_sample(window: Window, reading: FloatArray, p: WindowParams) -> None:
     """Do what `add_force` says to the window itself."""
     ring, sums, at, count = window.ring, window.sums, window.next[0], window.samples[0]
     # Once a turn the sums are taken afresh, so that rounding errors never add up: O(1) on average. That is before the
@@ -110,7 +110,7 @@ def add_sample(window: Window, reading: FloatArray, alpha: float, lambda_: float
     x, full = reading, count == len(ring)
     # not before: the sigma of few values is near 0, and eq. 8 would take most readings for outliers
     if full:
-        x = weighted_value(reading, sums[_NEWEST], window_mean(sums, count), window_std(sums, count), alpha, lambda_)
+        x = weighted_value(reading, sums[_NEWEST], window_mean(sums, count), window_std(sums, count), p)
     for i in range(3):
         gone, ring[at, i], sums[_NEWEST, i] = ring[at, i], x[i], x[i]
         new, old = x[i] - sums[_ORIGIN, i], gone - sums[_ORIGIN, i] if full else 0.0

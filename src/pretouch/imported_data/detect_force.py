@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from pretouch.contact.decaying_velocity import DecayingVelocity, advanced
 from pretouch.contact.moving_thresholds import thresholds_of
+from pretouch.contact.reaction import DecayingVelocity
 from pretouch.contact.window import add_force, window_init
 from pretouch.errors import RecordingError
 from pretouch.groups import no_obstacles
@@ -102,7 +102,7 @@ def _decided(ticks: FloatArray, force: FloatArray, profile: Profile) -> Decision
     """Detect without obstacles; as in the controller, nothing is a contact while a reaction would be under way."""
     p, decided, nowhere, nothing = profile, Decided(profile.name), np.zeros(3), no_obstacles()
     answer, thresholds = DecayingVelocity.of(p.react, p.task.control_period_s), thresholds_of(p.detect)
-    window, mode, react = window_init(p.window.samples), mode_init(), answer.rest()
+    window, mode, react = window_init(p.window.samples), mode_init(), answer.init()
     for time, sample in zip(ticks.tolist(), force, strict=True):
         force_now = None if np.isnan(sample[0]) else sample
         armed, window = window.full, add_force(window, force_now, p.window)
@@ -117,7 +117,7 @@ def _decided(ticks: FloatArray, force: FloatArray, profile: Profile) -> Decision
         begins = reacting and before.mode is not Mode.REACT
         contact = detection.contact if begins else None
         react = answer.begun(contact.force) if contact else react
-        react = advanced(react) if reacting else answer.rest()
+        react = react.advanced() if reacting else answer.init()
         compared = window.newest if force_now is not None and thresholds.compare == "filtered" else sample
         decided.add(time, sample, compared, detection.thresholds, detection.armed, reacting, contact)
     return decided.decisions()

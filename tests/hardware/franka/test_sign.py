@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pretouch.contact.decaying_velocity import DecayingVelocity
+from pretouch.contact.reaction import DecayingVelocity
 from pretouch.hardware.franka.state import FrankaState, error_names, packed, robot_state, unpacked
 from tests.hardware.franka.made import state
 

@@ -6,7 +6,7 @@ from typing import Annotated, Literal, cast
 import numpy as np
 
 from pretouch.checks import Check, Checked, NonNegative
-from pretouch.contact.decaying_velocity import DecayingVelocity
+from pretouch.contact.reaction import DecayingVelocity
 from pretouch.errors import ExperimentError
 from pretouch_lab.baselines.detection import Baseline
 from pretouch_lab.benchmarks.detection.arm import Sensing, model

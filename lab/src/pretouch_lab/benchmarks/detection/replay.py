@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pretouch.contact.decaying_velocity import DecayingVelocity
+from pretouch.contact.reaction import DecayingVelocity
 from pretouch.groups import no_obstacles
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
