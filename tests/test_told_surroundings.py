@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pretouch.control.braking import Slots, slots_init, widened
+from pretouch.control.braking import Slots
 from pretouch.explanation import explain
 from pretouch.limited import Limit
 from pretouch.params import OutsidePoints
@@ -112,16 +112,6 @@ def test_points_that_cannot_be_used_are_named(panda_model, paper_skin, points, s
     assert step.mode is Mode.HOLD
     assert said in step.reason
     assert arm.step(points=seen(arm.time)).mode is Mode.TRACK
-
-
-def test_room_for_more_units_leaves_the_rows_there_are():
-    limit, point = np.arange(4.0), np.arange(12.0).reshape(4, 3)
-    wider = widened(slots_init(2)._replace(link=np.arange(4), limit=limit, point=point), 5)
-    assert wider.link.tolist() == [0, 1, -1, -1, -1, 2, 3, -1, -1, -1]
-    assert (wider.limit[[0, 1, 5, 6]] == limit).all()
-    assert (wider.point[[0, 1, 5, 6]] == point).all()
-    same = widened(wider, 3)
-    assert all((a == b).all() and a is not b for a, b in zip(same, wider, strict=True))
 
 
 def frames(now: float, rng: np.random.Generator) -> SeenPoints:

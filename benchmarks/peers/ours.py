@@ -10,13 +10,12 @@ from benchmarks.peers.problem import TERMS, Problem
 
 from pretouch.compiled import compiled
 from pretouch.control.active_set import minimise_within
-from pretouch.control.approach import ApproachParams, approach_params, rows_into
+from pretouch.control.approach import approach_rows, row_numbers
 from pretouch.control.joint_box import JointLimits, box_and_brake
 from pretouch.control.path import segment
 from pretouch.control.penalty import Minimum
 from pretouch.control.penalty import Problem as Program
-from pretouch.control.qp import CostParams, cost_into, cost_params
-from pretouch.control.qp import Rows as Room
+from pretouch.control.task import cost_into
 from pretouch.controller import Controller, ControllerState
 from pretouch.groups import CapsuleArrays, Kinematics, Obstacles
 from pretouch.modes import SOLVED
@@ -77,8 +76,8 @@ class _Fixed(NamedTuple):
     body: CapsuleArrays
     limits: FloatArray
     q_mid: FloatArray
-    cost: CostParams
-    approach: ApproachParams
+    cost: TaskParams
+    approach: RestrictionParams
     units: IntArray
 
 
@@ -91,14 +90,13 @@ def _solve(q: Array, qd: Array, points: Array, velocity: Array, fixed: _Fixed, k
     on_body, link, distance = np.empty((count, 3)), np.empty(count, np.int64), np.empty(count)
     closest(placed_capsules(fixed.body, kin), points, ClosestArrays(on_body, link, up, distance))
     near = Obstacles(fixed.units, points, distance, on_body, link, up, distance, distance)
-    rows = Room(np.empty((count, n)), np.empty(count), np.empty(count, np.int64))
-    k = rows_into(kin, fixed.moved_by, near, fixed.approach, rows)
+    rows = approach_rows(kin, fixed.moved_by, near, fixed.approach)
     lower, upper, _ = box_and_brake(q, qd, fixed.limits)
     J, H, f = np.empty((6, n)), np.empty((n, n)), np.empty(n)
     jacobian_into(kin.anchor, kin.axis, fixed.moved_by[fixed.ee], kin.position[fixed.ee], J)
-    cost_into(J[:3], velocity, q, fixed.q_mid, fixed.cost, H, f)
-    least = Minimum(x, np.empty(k), np.empty(n + k))
-    return minimise_within(Program(H, f, lower, upper, rows.G[:k], rows.h[:k], 0.0), 500, least) == SOLVED
+    cost_into(J[:3], velocity, q, fixed.q_mid, fixed.cost, np.empty(0), H, f)
+    least = Minimum(x, np.empty(len(rows.h)), np.empty(n + len(rows.h)))
+    return minimise_within(Program(H, f, lower, upper, rows.G, rows.h, rows.weight), 500, least) == SOLVED
 
 
 class Rows:
@@ -118,8 +116,8 @@ class Rows:
         )  # fmt: skip
         self.kin = model.kinematics(problem.q[0])
         self.fixed = _Fixed(
-            model.hinges, model.moved_by, model.ee, model.body.arrays, limits.table, model.q_mid, cost_params(cost),
-            approach_params(approach), np.arange(count),
+            model.hinges, model.moved_by, model.ee, model.body.arrays, limits.table, model.q_mid, cost.numbers,
+            row_numbers(approach), np.arange(count),
         )  # fmt: skip
 
     def solve(self, s: int) -> Array:

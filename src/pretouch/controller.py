@@ -98,8 +98,7 @@ class Controller:
         self.detector = profile.detect.on(self.body)
         self.kinds, self.most_kg = kinds_of(profile), most_kg(model)
         self.motion_body = MotionBody(model, len(skin), self.limits, profile.task)
-        python = self.kinds.approach == PYTHON and profile.approach is not None
-        self.approach = profile.approach.on(self.motion_body) if python and profile.approach is not None else None
+        self.approach = profile.approach if self.kinds.approach == PYTHON else None
         """A restriction in plain Python; None of one that is compiled."""
         self.touching = profile.detect.reads_touch and len(skin.touching) > 0
         self.outside = outside_setup(model, skin, fixtures, profile.perception)

@@ -9,7 +9,6 @@ it needs of them.
 
 import numpy as np
 
-from pretouch.cholesky import factor
 from pretouch.compiled import entry, inlined, kernel
 from pretouch.contact.clamp import note_place
 from pretouch.contact.moving_thresholds import compare
@@ -17,12 +16,11 @@ from pretouch.contact.sequential import Moment
 from pretouch.contact.sequential_step import assess_sample
 from pretouch.contact.virtual_mass import learn_mean
 from pretouch.contact.window import add_sample
-from pretouch.control.approach import rows_into
-from pretouch.control.braking import MOST_ROWS, Mass, Touch, TouchLimits, braking_rows
-from pretouch.control.interface import GivenRows
-from pretouch.control.motion import Allowed, move_within
+from pretouch.control.approach import approach_rows
+from pretouch.control.braking import Touch, TouchLimits, braking_rows, inertia_factor
+from pretouch.control.interface import Rows
+from pretouch.control.motion import move_within
 from pretouch.control.path import advance, follow, reduce_speed, speed_scale
-from pretouch.control.qp import Rows
 from pretouch.faults import believable
 from pretouch.groups import CapsuleArrays, Chain, first_of
 from pretouch.line_records import ADMITTANCE, BRAKING, PAPER, THRESHOLDS, Fixed, Now, Remembered
@@ -30,7 +28,7 @@ from pretouch.modes import SOLVED
 from pretouch.perception.obstacles import measured
 from pretouch.perception.perceive import perceive
 from pretouch.records import Blocks, opener
-from pretouch.robot.kinematics import mass_matrix_into, place
+from pretouch.robot.kinematics import place
 from pretouch.types import FloatArray
 
 CHECK, SEE, DETECT, ASK, MOVE = range(5)
@@ -129,15 +127,17 @@ def detect(fixed: Blocks, remembered: Blocks, now: Blocks) -> bool:
     return False
 
 
-_task, _pace = opener(Fixed, "path"), opener(Remembered, "pace", "rotation_goal")
+_task, _pace = opener(Fixed, "motion.task", "end_m", "slow_m"), opener(Remembered, "pace", "rotation_goal")
 _way = opener(Now, "ee", "seen.nearest", "seen.heard", "path", "request")
 
 
 @inlined
 def ask(fixed: Blocks, remembered: Blocks, now: Blocks, alone: bool) -> None:
     """Follow the path, and slow down near obstacles (eqs. 3-4); ask for just that if nothing else is asked."""
-    (p,), (pace, rotation_goal), (ee, nearest, heard, path, request) = _task(fixed), _pace(remembered), _way(now)
-    slowed = speed_scale(nearest[0], p.d_max_m) if p.d_max_m > 0.0 else 1.0
+    (p, _, slow_m), (pace, rotation_goal), (ee, nearest, heard, path, request) = (
+        _task(fixed), _pace(remembered), _way(now),
+    )  # fmt: skip
+    slowed = speed_scale(nearest[0], slow_m) if slow_m > 0.0 else 1.0
     path.scale[0], pace.scale[0], pace.cycles[0] = reduce_speed(
         pace.scale[0], pace.cycles[0], min(heard[0], slowed), p.restore_cycles
     )
@@ -150,42 +150,30 @@ def ask(fixed: Blocks, remembered: Blocks, now: Blocks, alone: bool) -> None:
             request.velocity[i] = path.scale[0] * path.velocity[i]
 
 
-_body, _slots = opener(Fixed, "kinds.approach", "mechanism", "rows", "motion"), opener(Remembered, "slots")
-_moving = opener(Remembered, "null_velocity", "command")
+_body = opener(Fixed, "kinds.approach", "mechanism", "paper", "braking", "motion")
+_moving = opener(Remembered, "slots", "null_velocity", "command")
 _motion = opener(Now, "robot", "kin", "ee", "seen.near", "seen.all", "request", "answer")
 
 
 @inlined
 def move(fixed: Blocks, remembered: Blocks, now: Blocks) -> None:
     """Write the rows of what restricts the body (eqs. 5-7), and the joint velocities within them (eq. 2)."""
-    (approach, mechanism, p, motion), (slots,), (null_velocity, command) = (
-        _body(fixed), _slots(remembered), _moving(remembered),
-    )  # fmt: skip
+    (approach, mechanism, paper, braking, motion), (slots, null_velocity, command) = _body(fixed), _moving(remembered)
     robot, kin, ee, room, count, request, answer = _motion(now)
-    near, n, none = first_of(room, count[0]), len(robot.q), np.empty(0)
-    G, h, which, found, seen = np.empty((0, n)), np.empty(0), np.empty(0, np.int64), 0, 0
+    near, n, free = first_of(room, count[0]), len(robot.q), np.empty(0)
+    rows = Rows(np.empty((0, n)), np.empty(0), np.empty(0, np.int64), 1.0)
     if approach == PAPER:
-        G, h, which = np.empty((count[0], n)), np.empty(count[0]), np.empty(count[0], np.int64)
-        found = rows_into(kin, mechanism.arm.moved_by, near, p.paper, Rows(G, h, which))
-        seen = found
+        rows = approach_rows(kin, mechanism.arm.moved_by, near, paper)
     elif approach == BRAKING:
-        most = MOST_ROWS * len(room.unit)
-        G, h, which = np.empty((most, n)), np.empty(most), np.empty(count[0], np.int64)
         # posture as measured, speeds as commanded: a row tightens from what the arm was sent last
         chain = Chain(kin.anchor, kin.axis, mechanism.arm.moved_by, robot.qd_commanded)
-        M, L, counts = np.empty((n, n)), np.eye(n), p.weighs and count[0] > 0
-        if counts:
-            mass_matrix_into(kin, mechanism, M)
-            for j in range(n):
-                M[j, j] += p.rotor_inertia_kg_m2
-            counts = factor(M, L)  # a mass matrix that cannot be factored leaves the largest touch speed
-        touch = Touch(p.touch, p.deadband_m_s, request.untouched[0])
+        touch = Touch(braking.touch, braking.deadband_m_s, request.untouched[0])
         if not np.isnan(request.touch_m_s[0]):
             # a touch speed whatever the mass, and no heed of what moves by itself
             touch = Touch(TouchLimits(np.inf, 1.0, 1.0, request.touch_m_s[0]), np.inf, request.untouched[0])
-        seen, found = braking_rows(slots, near, chain, Mass(counts, L), touch, p.braking, Rows(G, h, which))
-    allowed = Allowed(G[:found], h[:found], which[:seen], p.weight, none, none)
-    move_within(motion, robot, (kin, ee), near, request, allowed, null_velocity, answer)
+        L = inertia_factor(braking, kin, mechanism) if count[0] > 0 else np.empty((0, 0))
+        rows = braking_rows(braking, slots, near, chain, L, touch)
+    move_within(motion, robot, (kin, ee, near), request, rows, (free, free), null_velocity, answer)
     command[:] = answer.command
     go_on(fixed, remembered, now)
 
@@ -196,12 +184,12 @@ _going, _gone = opener(Remembered, "pace"), opener(Now, "path", "request", "answ
 @kernel
 def go_on(fixed: Blocks, remembered: Blocks, now: Blocks) -> None:
     """Go on along the path with the motion, or stay at its phase and start gently from it later."""
-    (p,), (pace,), (path, request, answer) = _task(fixed), _going(remembered), _gone(now)
+    (p, end_m, _), (pace,), (path, request, answer) = _task(fixed), _going(remembered), _gone(now)
     if request.advances[0] == 1 and (request.hold[0] == 1 or answer.ending[0] == SOLVED):
         velocity = answer.velocities[1]
-        phase = advance(pace.phase[0], path.tangent, path.velocity, path.forward[0], velocity, p.period_s)
-        pace.phase[0] = min(phase, p.end_m)
-        pace.speed[0] = min(p.speed_m_s, pace.speed[0] + p.acceleration_m_s2 * p.period_s)
+        phase = advance(pace.phase[0], path.tangent, path.velocity, path.forward[0], velocity, p.control_period_s)
+        pace.phase[0] = min(phase, end_m)
+        pace.speed[0] = min(p.speed_m_s, pace.speed[0] + p.acceleration_m_s2 * p.control_period_s)
     else:
         pace.speed[0] = 0.0
 
@@ -211,14 +199,12 @@ _limits = opener(Fixed, "motion")
 
 @entry
 def line_within(
-    fixed: Blocks, remembered: Blocks, now: Blocks, rows: GivenRows, weight: float,
-    speeds: tuple[FloatArray, FloatArray],
+    fixed: Blocks, remembered: Blocks, now: Blocks, rows: Rows, speeds: tuple[FloatArray, FloatArray]
 ) -> None:  # fmt: skip
-    """Take the stage `MOVE` within rows G, h, which, and joint speeds, of a part in plain Python; see `Restricted`."""
-    (motion,), (null_velocity, command) = _limits(fixed), _moving(remembered)
+    """Take the stage `MOVE` within rows and joint speeds of a part in plain Python; see `Restricted`."""
+    (motion,), (_, null_velocity, command) = _limits(fixed), _moving(remembered)
     robot, kin, ee, room, count, request, answer = _motion(now)
-    (G, h, which), (slowest, fastest) = rows, speeds
-    allowed = Allowed(G, h, which, weight, slowest, fastest)
-    move_within(motion, robot, (kin, ee), first_of(room, count[0]), request, allowed, null_velocity, answer)
+    scene = kin, ee, first_of(room, count[0])
+    move_within(motion, robot, scene, request, rows, speeds, null_velocity, answer)
     command[:] = answer.command
     go_on(fixed, remembered, now)

@@ -6,12 +6,11 @@ from pretouch.contact.residual_model import SequentialNumbers, SequentialState
 from pretouch.contact.sequential_step import SampleTest
 from pretouch.contact.virtual_mass import FreeMass
 from pretouch.contact.window import Window
-from pretouch.control.approach import ApproachParams
-from pretouch.control.braking import BrakingLimits, Slots, TouchLimits
+from pretouch.control.braking import BrakingNumbers, Slots
 from pretouch.control.motion import MotionNumbers
 from pretouch.faults import Report, Watched
 from pretouch.groups import CapsuleArrays, Kinematics, Mechanism, Obstacles, SkinArrays
-from pretouch.params import FailureParams, ThresholdParams, WindowParams
+from pretouch.params import FailureParams, RestrictionParams, ThresholdParams, WindowParams
 from pretouch.perception.obstacles import TrackState
 from pretouch.perception.perceive import Readings, SightNumbers
 from pretouch.records import Cell, IntCell
@@ -62,37 +61,6 @@ class ForceNumbers(NamedTuple):
     thresholds: ThresholdParams
 
 
-class PathNumbers(NamedTuple):
-    """How the path is followed, of `TaskParams`, `SpeedReduction` and the path."""
-
-    speed_m_s: float
-    acceleration_m_s2: float
-    position_gain_1_s: float
-    off_path_m: float
-    period_s: float
-    """Of control [s]."""
-    end_m: float
-    """Length of an open path, infinite of a closed one [m]."""
-    d_max_m: float
-    """Of eq. 3, 0 where nothing slows the arm."""
-    restore_cycles: int
-
-
-class RowNumbers(NamedTuple):
-    """What restricts the body."""
-
-    weight: float
-    """Of the rows' slack; 0 for hard rows."""
-    paper: ApproachParams
-    braking: BrakingLimits
-    touch: TouchLimits
-    deadband_m_s: float
-    """Closing speed of an object below which it counts as still [m/s]."""
-    weighs: bool
-    """Whether the touch speed follows from the arm's mass."""
-    rotor_inertia_kg_m2: float
-
-
 class Fixed(NamedTuple):
     """What does not change from step to step."""
 
@@ -109,8 +77,13 @@ class Fixed(NamedTuple):
     """(L,) factor 1 on the prior of a contact on each link: no unit says that it is touched."""
     notes_path: bool
     """Whether the places are noted that the task goes through."""
-    path: PathNumbers
-    rows: RowNumbers
+    end_m: float
+    """Length of an open path, infinite of a closed one [m]."""
+    slow_m: float
+    """Distance d_max of eq. 3, 0 where nothing slows the arm [m]."""
+    paper: RestrictionParams
+    """Of eqs. 5-7, see `row_numbers`."""
+    braking: BrakingNumbers
     motion: MotionNumbers
 
 

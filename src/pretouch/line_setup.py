@@ -15,9 +15,9 @@ from pretouch.contact.sequential_test import SequentialTest
 from pretouch.contact.touch_cue import TouchSensors
 from pretouch.contact.virtual_mass import FreeMass
 from pretouch.contact.window import window_init
-from pretouch.control.approach import ApproachRestriction, BrakingCurve, approach_params, braking_limits, of_table_i
-from pretouch.control.braking import slots_init, touch_limits
-from pretouch.control.motion import motion_numbers
+from pretouch.control.approach import ApproachRestriction, BrakingCurve, of_table_i, row_numbers
+from pretouch.control.braking import braking_numbers, slots_init
+from pretouch.control.motion import MotionNumbers
 from pretouch.faults import Report, Watched
 from pretouch.groups import Kinematics, no_obstacles
 from pretouch.line_records import (
@@ -37,14 +37,12 @@ from pretouch.line_records import (
     Now,
     OnPath,
     Pace,
-    PathNumbers,
     Remembered,
     Request,
-    RowNumbers,
     Seen,
     Sight,
 )
-from pretouch.params import PerceptionParams, SequentialParams
+from pretouch.params import NullSpaceMotion, PerceptionParams, SequentialParams
 from pretouch.perception.obstacles import track_init
 from pretouch.perception.outside import places_of
 from pretouch.perception.perceive import Readings, sight_numbers
@@ -65,11 +63,10 @@ def fixed_of(controller: Any) -> Fixed:
     """Return what does not change from step to step."""
     model, skin, profile, limits = controller.model, controller.skin, controller.profile, controller.limits
     kinds, n, t, see, failure = controller.kinds, model.n, profile.task, profile.perception, profile.failure
-    seen, thresholds, paper = see or PerceptionParams(), thresholds_of(profile.detect), of_table_i(profile.approach)
+    seen, thresholds = see or PerceptionParams(), thresholds_of(profile.detect)
     braking = profile.approach if kinds.approach == BRAKING else BrakingCurve()
-    # hard rows have no price; without rows any but that will do
-    weight = {PAPER: 0.0 if paper.rows == "hard" else paper.slack_weight, BRAKING: braking.slack_weight}
-    mass, deadband = braking.effective_mass, braking.closing_deadband_m_s
+    # nothing is nearer than -inf, so nothing moves away
+    away = profile.null_space or NullSpaceMotion().numbers._replace(distance_m=-math.inf)
     test = profile.detect if kinds.detect == SEQUENTIAL else SequentialParams()
     return Fixed(
         kinds, model.hinges, model.mechanism, limits.qd_max, failure,
@@ -81,17 +78,12 @@ def fixed_of(controller: Any) -> Fixed:
         ForceNumbers(profile.window, thresholds.compare == "filtered", thresholds),
         sequential_numbers(n, limits.period, test), np.ones(len(model.links)),
         kinds.react == ADMITTANCE and profile.react.pinch is not None,
-        PathNumbers(
-            t.speed_m_s, t.acceleration_m_s2, t.position_gain_1_s, t.off_path_m, limits.period,
-            math.inf if controller.path.closed else controller.path.length,
-            0.0 if profile.slow is None else profile.slow.d_max_m, t.restore_cycles,
+        math.inf if controller.path.closed else controller.path.length,
+        0.0 if profile.slow is None else profile.slow.d_max_m,
+        row_numbers(of_table_i(profile.approach)), braking_numbers(braking, t.speed_m_s, limits.period),
+        MotionNumbers(
+            model.arm, t, t.orientation == "hold", failure.solver_iterations, limits.table, model.q_mid, away
         ),
-        RowNumbers(
-            weight.get(kinds.approach, 1.0), approach_params(paper),
-            braking_limits(braking, t.speed_m_s, limits.period), touch_limits(braking),
-            np.inf if deadband is None else deadband, mass is not None, mass.rotor_inertia_kg_m2 if mass else 0.0,
-        ),
-        motion_numbers(model, limits, t, profile.null_space, failure.solver_iterations),
     )  # fmt: skip
 
 

@@ -6,10 +6,12 @@ from tests.reference.qp import Problem
 from pretouch.control.active_set import minimise_within
 from pretouch.control.penalty import Minimum, minimise
 from pretouch.control.penalty import Problem as Program
-from pretouch.control.qp import cost_into, cost_params
+from pretouch.control.task import cost_into
 from pretouch.modes import outcome_of
 from pretouch.params import TaskParams
 from pretouch.types import FloatArray, QpOutcome, QpSolution
+
+_NONE = np.zeros(0)
 
 
 def answered(p: Problem, budget: int = 500) -> QpSolution:
@@ -29,9 +31,9 @@ def assert_none(answer: QpSolution, outcome: QpOutcome) -> None:
 
 
 def task_cost(
-    J: FloatArray, x_d: FloatArray, q: FloatArray, q_mid: FloatArray, params: TaskParams
+    J: FloatArray, x_d: FloatArray, q: FloatArray, q_mid: FloatArray, params: TaskParams, z: FloatArray = _NONE
 ) -> tuple[FloatArray, FloatArray]:
-    """H (n, n) and f (n,) of the cost of eq. 2."""
+    """H (n, n) and f (n,) of the cost of eq. 2; with a motion z (n,) for the null space."""
     H, f = np.empty((len(q), len(q))), np.empty(len(q))
-    cost_into(J, x_d, q, q_mid, cost_params(params), H, f)
+    cost_into(J, x_d, q, q_mid, params.numbers, z, H, f)
     return H, f

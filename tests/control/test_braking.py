@@ -7,18 +7,9 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from pretouch.control.braking import (
-    BrakingLimits,
-    Mass,
-    Touch,
-    TouchLimits,
-    braking_cap,
-    braking_rows,
-    slots_init,
-    tangents_of,
-)
-from pretouch.control.qp import Rows
+from pretouch.control.braking import Touch, braking_cap, braking_numbers, braking_rows, slots_init, tangents_of
 from pretouch.groups import Chain, no_obstacles
+from pretouch.params.pretouch import BrakingParams, Tangential
 from pretouch.types import FloatArray
 
 DT, A, TOUCH, TASK, NOTICE = 0.01, 0.3, 0.03, 0.3, 0.6
@@ -35,27 +26,27 @@ class Sled:
 
     def __init__(self, across: bool = False, units: int = 1) -> None:
         self.slots, self.units = slots_init(units), units
-        near = NEAR if across else -np.inf
-        self.limits = BrakingLimits(NOTICE, A, 0.0, 0.0, RETREAT, near, SLOWEST, TASK, TIGHTEN, LOOSEN, DT)
-        self.touch = Touch(TouchLimits(100.0, 1e5, 1.0, TOUCH), 0.0, sys.maxsize)
+        params = BrakingParams(
+            d_notice_m=NOTICE, deceleration_m_s2=A, latency_s=0.0, margin_m=0.0, retreat_max_m_s=RETREAT,
+            touch_speed_max_m_s=TOUCH, tighten_m_s2=TIGHTEN, loosen_m_s2=LOOSEN,
+            tangential=Tangential(distance_m=NEAR, speed_m_s=SLOWEST) if across else None,
+        )  # fmt: skip
+        self.numbers = braking_numbers(params, TASK, DT)
+        self.touch = Touch(self.numbers.touch, 0.0, sys.maxsize)
 
     def rows(
         self, speed: float, seen: dict[int, tuple[int, float]], closing: float = 0.0, normal: FloatArray = UP
     ) -> tuple[int, FloatArray, FloatArray]:
         """Rows of units that see {unit: (link, distance)}: how many are of what is seen, G in m/s, h."""
         k = len(seen)
-        G, h = np.empty((10 * self.units, 1)), np.empty(10 * self.units)
         obstacles = no_obstacles(k)._replace(
             unit=np.array(list(seen), np.int64), link=np.array([link for link, _ in seen.values()], np.int64),
             direction=np.tile(normal, (k, 1)), body_distance=np.array([d for _, d in seen.values()]),
             closing_speed=np.full(k, closing),
         )  # fmt: skip
         chain = Chain(self.anchor, self.axis, self.moved_by, np.array([speed / 1000.0]))
-        found, rows = braking_rows(
-            self.slots, obstacles, chain, Mass(False, np.eye(1)), self.touch, self.limits,
-            Rows(G, h, np.empty(k, np.int64)),
-        )  # fmt: skip
-        return found, G[:rows, 0] / 1000.0, h[:rows]
+        rows = braking_rows(self.numbers, self.slots, obstacles, chain, np.empty((0, 0)), self.touch)
+        return len(rows.which), rows.G[:, 0] / 1000.0, rows.h
 
 
 def test_what_is_not_to_be_touched_is_not_approached_at_its_surface():

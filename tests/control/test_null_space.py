@@ -6,13 +6,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.control.programs import task_cost
 
-from pretouch.control.null_space import NullSpaceLimits, away, cost_with_null_space, projector
-from pretouch.control.qp import cost_params
+from pretouch.control.task import away, projector
 from pretouch.groups import Obstacles, no_obstacles
-from pretouch.params import TaskParams
+from pretouch.params import NullSpaceMotion, TaskParams
 from pretouch.robot.model import RobotModel
 
-TASK = TaskParams(mid_joint_projected=True)
+PAPER, TASK = TaskParams(), TaskParams(mid_joint_projected=True)
+MOTION = NullSpaceMotion(distance_m=0.25, speed_m_s=0.1, joint_rad_s=0.5, rate_rad_s2=10.0).numbers
 NO_MOTION = np.zeros(7)
 
 
@@ -20,8 +20,8 @@ def postures(model: RobotModel, count: int) -> np.ndarray:
     return np.random.default_rng(1000).uniform(model.q_min, model.q_max, (count, 7))
 
 
-def cost(J, x_d, q, q_mid, null=NO_MOTION, projected=True):
-    return cost_with_null_space(J, x_d, q, q_mid, cost_params(TASK), projected, null)
+def cost(J, x_d, q, q_mid, null=NO_MOTION, params=TASK):
+    return task_cost(J, x_d, q, q_mid, params, null)
 
 
 @pytest.mark.parametrize("m", [3, 6])
@@ -65,7 +65,7 @@ def test_a_motion_in_the_null_space_leaves_the_end_effectors_velocity_unchanged(
 def test_the_papers_term_drags_what_the_projected_one_does_not(panda_model: RobotModel):
     q = panda_model.description.q_ready
     J, x_d = panda_model.ee_jacobian(panda_model.kinematics(q)), np.array([0.0, 0.3, 0.0, 0.0, 0.0, 0.0])
-    paper_H, paper_f = task_cost(J, x_d, q, panda_model.q_mid, TASK)
+    paper_H, paper_f = task_cost(J, x_d, q, panda_model.q_mid, PAPER)
     H, f = cost(J, x_d, q, panda_model.q_mid)
     dragged = np.linalg.norm(J @ np.linalg.solve(paper_H, -paper_f) - x_d)
     assert dragged > 1e-3
@@ -83,8 +83,8 @@ def test_the_hessian_is_positive_definite_where_the_arm_is_singular(panda_model:
 def test_without_the_switch_the_mid_joint_term_is_the_papers(panda_model: RobotModel):
     q = panda_model.description.q_ready + 0.1
     J, x_d = panda_model.ee_jacobian(panda_model.kinematics(q)), np.array([0.0, 0.3, 0.0, 0.0, 0.0, 0.0])
-    paper_H, paper_f = task_cost(J, x_d, q, panda_model.q_mid, TASK)
-    H, f = cost(J, x_d, q, panda_model.q_mid, projected=False)
+    paper_H, paper_f = task_cost(J, x_d, q, panda_model.q_mid, PAPER)
+    H, f = cost(J, x_d, q, panda_model.q_mid, params=PAPER)
     np.testing.assert_allclose(H, paper_H + 0.001 * projector(J), atol=1e-12)
     np.testing.assert_allclose(f, paper_f, atol=1e-12)
 
@@ -98,7 +98,7 @@ def asked(distance: float, row: np.ndarray, hand: bool = False, last: np.ndarray
     moved_by = np.array([[False, False], [True, hand]])
     return away(
         np.zeros(2) if last is None else last, row[None], np.zeros(1, np.int64), at(distance), moved_by,
-        NullSpaceLimits(0.25, 0.1, 0.5, 10.0),
+        MOTION, 1.0,
     )  # fmt: skip
 
 
@@ -122,6 +122,6 @@ def test_it_changes_at_no_more_than_its_rate():
     moved_by = np.array([[False], [False]])
     z = away(
         np.array([0.2]), np.ones((1, 1)), np.zeros(1, np.int64), at(0.0), moved_by,
-        NullSpaceLimits(0.25, 0.1, 0.5, 0.01),
+        MOTION, 0.001,
     )  # fmt: skip
     np.testing.assert_allclose(z, [0.19])

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pretouch.control.approach import ApproachRestriction, approach_limit, approach_rows, velocity_a, velocity_b
+from pretouch.control.approach import approach_limit, approach_rows, row_numbers, velocity_a, velocity_b
 from pretouch.params import RestrictionParams
 from pretouch.perception.closest import closest_points
 from pretouch.robot.model import RobotModel
@@ -14,6 +14,11 @@ from pretouch.types import Obstacles
 TABLE_I = RestrictionParams()  # V_max 0.04, beta -10, d_repulse 0.1, d_crit 0.1, d_notice 0.6
 # V_max / (1 + e^10) = 0.04 / 22027.4658 and V_max / (1 + e^-10) = 0.04 / 1.0000453999
 LEAST, MOST = 0.04 / 22027.4658, 0.04 / 1.0000453999
+
+
+def limits(d: np.ndarray, params: RestrictionParams = TABLE_I) -> np.ndarray:
+    """Eq. 7 at distances (K,) [m]."""
+    return np.array([approach_limit(float(one), row_numbers(params)) for one in d])
 
 
 def test_eq_5_by_numbers():
@@ -35,17 +40,17 @@ def test_eq_6_by_numbers():
 def test_eq_7_by_numbers():
     d = np.array([-0.1, 0.05, 0.35, 0.6, 2.0])
     # deep in penetration V_a vanishes: -V_max;   0.02 - 0.04;   V_b = 0.02;   from d_notice on no restriction
-    np.testing.assert_allclose(approach_limit(d, TABLE_I), [-0.04, -0.02, 0.02, np.inf, np.inf], rtol=1e-8)
+    np.testing.assert_allclose(limits(d), [-0.04, -0.02, 0.02, np.inf, np.inf], rtol=1e-8)
 
 
 def test_eq_7_at_d_repulse_jumps_by_no_more_than_the_tails_of_the_sigmoids():
-    below, at = approach_limit(np.array([0.1 - 1e-12, 0.1]), TABLE_I)
+    below, at = limits(np.array([0.1 - 1e-12, 0.1]))
     # V_a - V_max = MOST - 0.04 = -LEAST below, V_b = LEAST from there on
     np.testing.assert_allclose([below, at], [-LEAST, LEAST], rtol=1e-5)
 
 
 def test_the_limit_grows_with_the_distance():
-    limit = approach_limit(np.linspace(-0.3, 0.5999, 2000), TABLE_I)
+    limit = limits(np.linspace(-0.3, 0.5999, 2000))
     assert np.all(np.diff(limit) >= 0)
     assert limit[0] >= -0.04
     assert limit[-1] <= 0.04
@@ -54,7 +59,7 @@ def test_the_limit_grows_with_the_distance():
 @pytest.mark.parametrize("mode", ["hard", "slack", "floor"])
 def test_no_distance_overflows(mode: str):
     d = np.linspace(-10, 10, 4001)
-    limit = approach_limit(d, replace(TABLE_I, rows=mode))
+    limit = limits(d, replace(TABLE_I, rows=mode))
     assert not np.any(np.isnan(limit))
     assert np.all(limit >= -0.04)
 
@@ -63,7 +68,7 @@ def test_floor_by_numbers():
     d = np.array([-0.1, 0.05, 0.1, 0.5, 0.6])
     # V_b(0.5): exponent -10 * (2 * 0.4 / 0.5 - 1) = -6;  1 + e^-6 = 1.0024787522
     expected = [0.02, 0.02, 0.02, 0.04 / 1.0024787522, np.inf]
-    np.testing.assert_allclose(approach_limit(d, replace(TABLE_I, rows="floor")), expected, rtol=1e-8)
+    np.testing.assert_allclose(limits(d, replace(TABLE_I, rows="floor")), expected, rtol=1e-8)
 
 
 def around(model: RobotModel, q: np.ndarray, points: np.ndarray) -> Obstacles:
@@ -84,7 +89,7 @@ def random_scene(model: RobotModel, seed: int, reach: float) -> tuple[np.ndarray
 @pytest.mark.parametrize("seed", range(20))
 def test_rows_are_the_derivative_of_the_distance_to_a_fixed_point(panda_model: RobotModel, seed: int):
     q, obstacles = random_scene(panda_model, seed, reach=0.3)
-    rows = approach_rows(panda_model.kinematics(q), panda_model.moved_by, obstacles, TABLE_I)
+    rows = approach_rows(panda_model.kinematics(q), panda_model.moved_by, obstacles, row_numbers(TABLE_I))
     step = 1e-6
     for j in range(panda_model.n):
         ahead, back = q.copy(), q.copy()
@@ -101,8 +106,9 @@ def test_rows_are_the_derivative_of_the_distance_to_a_fixed_point(panda_model: R
 @pytest.mark.parametrize("mode", ["hard", "slack", "floor"])
 def test_rows_belong_to_the_obstacles_within_d_notice(panda_model: RobotModel, mode: str):
     q, obstacles = random_scene(panda_model, 1, reach=1.2)
-    part = ApproachRestriction(rows=mode)
-    rows = approach_rows(panda_model.kinematics(q), panda_model.moved_by, obstacles, part)
+    part = replace(TABLE_I, rows=mode)
+    rows = approach_rows(panda_model.kinematics(q), panda_model.moved_by, obstacles, row_numbers(part))
+    assert rows.weight == (0.0 if mode == "hard" else TABLE_I.slack_weight)
     np.testing.assert_array_equal(rows.which, np.flatnonzero(obstacles.body_distance < 0.6))
     assert 0 < len(rows.which) < 12
-    np.testing.assert_allclose(rows.h, approach_limit(obstacles.body_distance[rows.which], part))
+    np.testing.assert_allclose(rows.h, limits(obstacles.body_distance[rows.which], part))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pretouch.control.qp import twist
+from pretouch.control.task import twist
 from pretouch.robot.vectors import rotation_error
 
 

@@ -7,16 +7,22 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pretouch.cholesky import factor
-from pretouch.control.braking import mass_along, touch_limits, touch_speed
+from pretouch.control.braking import TouchLimits, braking_numbers, mass_along, touch_speed
 from pretouch.params.pretouch import REGIONS, BrakingParams, EffectiveMass
 from pretouch.robot.model import RobotModel
 
 UNCAPPED = 100.0
 
 
+def limits(mass: EffectiveMass, fastest: float) -> TouchLimits:
+    return braking_numbers(BrakingParams(touch_speed_max_m_s=fastest, effective_mass=mass), 0.3, 0.01).touch
+
+
 def speed(region: str, mass: float, fraction: float = 1.0, force: float = 0.0) -> float:
     felt = EffectiveMass(body_region=region, force_fraction=fraction, region_force_n=force)  # type: ignore[arg-type]
-    return touch_speed(mass, touch_limits(BrakingParams(touch_speed_max_m_s=UNCAPPED, effective_mass=felt)))
+    return touch_speed(
+        mass, braking_numbers(BrakingParams(touch_speed_max_m_s=UNCAPPED, effective_mass=felt), 0.3, 0.01).touch
+    )
 
 
 def test_the_spring_model_by_numbers():
@@ -41,7 +47,7 @@ def test_field_notes_example_comes_back_as_the_force_of_its_speed():
 
 
 def test_the_cap_holds_whatever_the_mass():
-    params = touch_limits(BrakingParams(touch_speed_max_m_s=0.05, effective_mass=EffectiveMass("abdomen")))
+    params = limits(EffectiveMass("abdomen"), 0.05)
     assert touch_speed(1e-3, params) == 0.05
     assert touch_speed(np.inf, params) <= 0.05
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from pretouch.compiled import compiled
 from pretouch.groups import Kinematics
-from pretouch.params.paper import ClampParams, PinchParams
+from pretouch.params import ClampParams, PinchParams
 from pretouch.robot.body import Capsules
 from pretouch.robot.model import RobotModel
 from pretouch.robot.self_distance import nearest_points

@@ -13,7 +13,7 @@ import numpy as np
 
 from pretouch.compiled import compiled, kernel
 from pretouch.groups import CapsuleArrays, Chain, Kinematics
-from pretouch.params.paper import AdmittanceParams
+from pretouch.params import AdmittanceParams
 from pretouch.records import Cell, IntCell
 from pretouch.robot.kinematics import point_velocity
 from pretouch.robot.vectors import dot, placed_ends

@@ -11,16 +11,16 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from pretouch.cholesky import forward
+from pretouch.cholesky import factor, forward
 from pretouch.compiled import compiled, inlined, kernel
-from pretouch.control.qp import Rows
-from pretouch.groups import Chain, Obstacles
-from pretouch.params.pretouch import REGIONS, BrakingParams, EffectiveMass
-from pretouch.robot.kinematics import column
+from pretouch.control.interface import Rows
+from pretouch.groups import Chain, Kinematics, Mechanism, Obstacles
+from pretouch.params.pretouch import REGIONS, BrakingParams, EffectiveMass, Tangential
+from pretouch.robot.kinematics import column, mass_matrix_into
 from pretouch.types import BoolArray, FloatArray, IntArray
 
 _TANGENTS = 4  # two directions across the normal, both ways along each
-MOST_ROWS = 2 + 2 * _TANGENTS
+_MOST_ROWS = 2 + 2 * _TANGENTS
 """Of a unit: of what it sees and one that fades, and those across the normal of each."""
 
 
@@ -35,13 +35,6 @@ class TouchLimits(NamedTuple):
     """Mass of the body region [kg]."""
     speed_max_m_s: float
     """Largest speed, whatever the mass [m/s]."""
-
-
-def touch_limits(params: BrakingParams) -> TouchLimits:
-    """Return what `touch_speed` takes of the parameters; without an effective mass only the largest speed counts."""
-    mass = params.effective_mass or EffectiveMass()
-    region = REGIONS[mass.body_region]
-    return TouchLimits(mass.allowed_force_n, region.stiffness_n_m, region.mass_kg, params.touch_speed_max_m_s)
 
 
 class Slots(NamedTuple):
@@ -67,39 +60,34 @@ def slots_init(units: int) -> Slots:
     )
 
 
-def widened(slots: Slots, units: int) -> Slots:
-    """Return a copy of the slots with room for at least so many units, those there were first."""
-    # always a copy: the rows are written in place, and the state of the step before has to stay as it was
-    link, limit, across, normal, point = slots
-    half = len(link) // 2
-    if half >= units:
-        return Slots(link.copy(), limit.copy(), across.copy(), normal.copy(), point.copy())
-    wide = slots_init(units)
-    for wider, known in zip(wide, slots, strict=True):
-        # the fading rows begin at the middle, which moves when points of an outside source join the units
-        wider[:half], wider[units : units + half] = known[:half], known[half:]
-    return wide
+class BrakingNumbers(NamedTuple):
+    """What the braking curve takes of parameters and limits."""
 
-
-class BrakingLimits(NamedTuple):
-    """Numbers of the braking curve."""
-
-    notice_m: float
-    """Body distance from which on nothing is restricted [m]."""
-    deceleration_m_s2: float
-    latency_s: float
-    margin_m: float
-    retreat_m_s: float
-    """Fastest retreat that is asked for [m/s]."""
-    across_m: float
-    """Body distance below which motion across the normal is restricted too [m], -inf for none."""
-    across_slowest_m_s: float
-    """Speed across the normal at the surface [m/s]."""
+    curve: BrakingParams
+    touch: TouchLimits
+    mass: EffectiveMass
+    weighs: bool
+    """Whether the touch speed follows from the arm's mass."""
+    deadband_m_s: float
+    """Closing speed of an object below which it counts as still [m/s]; infinite: its speed does not count."""
+    across: Tangential
+    """How motion across the normal is restricted too: within no distance, where it is not."""
     fastest_m_s: float
     """Speed from which on nothing is restricted [m/s]."""
-    tighten_m_s2: float
-    loosen_m_s2: float
     period_s: float
+
+
+def braking_numbers(params: BrakingParams, speed: float, period: float) -> BrakingNumbers:
+    """Return what compiled code takes of the parameters, the task's speed [m/s], and the control period [s]."""
+    mass, deadband = params.effective_mass or EffectiveMass(), params.closing_deadband_m_s
+    region, across = REGIONS[mass.body_region], (params.tangential or Tangential()).numbers
+    touch = TouchLimits(mass.allowed_force_n, region.stiffness_n_m, region.mass_kg, params.touch_speed_max_m_s)
+    if params.tangential is None:
+        across = across._replace(distance_m=-np.inf)  # no distance is below that
+    return BrakingNumbers(
+        params.numbers, touch, mass.numbers, params.effective_mass is not None,
+        np.inf if deadband is None else deadband, across, speed, period,
+    )  # fmt: skip
 
 
 class Touch(NamedTuple):
@@ -110,14 +98,6 @@ class Touch(NamedTuple):
     """Closing speed of an object below which it counts as still [m/s]."""
     untouched: int
     """`Obstacles.unit` from which on an obstacle is not to be touched at any speed."""
-
-
-class Mass(NamedTuple):
-    """The arm's inertia, where the touch speed follows from it."""
-
-    counts: bool
-    factor: FloatArray
-    """(n, n) Cholesky factor of the mass matrix; without meaning where it does not count."""
 
 
 @compiled
@@ -133,59 +113,74 @@ def braking_cap(distance: float, touch: float, deceleration: float, latency: flo
     return np.sqrt(lag * lag + touch * touch + 2.0 * deceleration * left) - lag
 
 
+@kernel
+def inertia_factor(p: BrakingNumbers, kin: Kinematics, mechanism: Mechanism) -> FloatArray:
+    """Cholesky factor (n, n) of the arm's mass matrix; (0, 0) where the touch speed does not follow from the mass."""
+    n = len(kin.anchor)
+    M, L = np.empty((n, n)), np.empty((n, n))
+    if p.weighs:
+        mass_matrix_into(kin, mechanism, M)
+        for j in range(n):
+            M[j, j] += p.mass.rotor_inertia_kg_m2
+        if factor(M, L):
+            return L
+    return np.empty((0, 0))  # a mass matrix that cannot be factored leaves the largest touch speed
+
+
 @inlined
 def braking_rows(
-    slots: Slots, obstacles: Obstacles, chain: Chain, mass: Mass, touch: Touch, limits: BrakingLimits, rows: Rows
-) -> tuple[int, int]:  # fmt: skip
-    """Change `slots` by one period and write rows; return how many are of what is seen, and how many there are.
+    p: BrakingNumbers, slots: Slots, obstacles: Obstacles, chain: Chain, L: FloatArray, touch: Touch
+) -> Rows:  # fmt: skip
+    """Change `slots` by one period, and return rows.
 
     The first are those of the obstacles; then those that fade, then those across the normals.
 
     Args:
+        p: parameters.
         slots: rows so far.
         obstacles: M that are near.
         chain: what moves the points.
-        mass: of the arm.
+        L: `inertia_factor`.
         touch: what may be touched.
-        limits: of the braking curve.
-        rows: room for all rows, and for M indices.
     """
-    half, s, distance, touching = len(slots.link) // 2, limits, obstacles.body_distance, touch.limits
-    seen, found = np.zeros(half, np.bool_), 0
+    half, s, distance, touching = len(slots.link) // 2, p.curve, obstacles.body_distance, touch.limits
+    most, which, seen, count = _MOST_ROWS * half, np.empty(half, np.int64), np.zeros(half, np.bool_), 0
+    rows = Rows(np.empty((most, len(chain.qd))), np.empty(most), which, s.slack_weight)
     for m in range(len(obstacles.unit)):
         k = obstacles.unit[m]
-        if not distance[m] < s.notice_m:
+        if not distance[m] < s.d_notice_m:
             continue  # not counted as seen: a row that its unit has fades below
         seen[k] = True
         _take_slot(slots, k, half, obstacles.link[m])
         for i in range(3):
             slots.normal[k, i], slots.point[k, i] = obstacles.direction[m, i], obstacles.body_point[m, i]
-        row = rows.G[found]
+        row = rows.G[count]
         approach = _row(slots.link[k], slots.point[k], obstacles.direction[m], chain, row)
         # the row is n^T J, so the effective mass along the normal comes of it too
-        speed = touch_speed(mass_along(mass.factor, row), touching) if mass.counts else touching.speed_max_m_s
+        speed = touch_speed(mass_along(L, row), touching) if len(L) > 0 else touching.speed_max_m_s
         if k >= touch.untouched:
             speed = 0.0
         # an object that goes away allows no more; an infinite deadband leaves its speed out
         own = max(0.0, obstacles.closing_speed[m] - touch.deadband_m_s)
         cap = braking_cap(distance[m], speed, s.deceleration_m_s2, s.latency_s, s.margin_m)
-        target = max(cap - own, -s.retreat_m_s)
+        target = max(cap - own, -s.retreat_max_m_s)
         # the same curve at the rate of tightening: the arm can still come down to it at that rate
         last = braking_cap(distance[m], speed, s.tighten_m_s2, s.latency_s, s.margin_m) - own
         # Faster than that, smoothness comes second: the limit falls at once. With 0.0 it falls as far as a stop, while
         # a retreat (target < 0) is still approached at the rate of tightening.
-        slots.limit[k] = min(_eased(target, slots.limit[k], approach, s), max(target, last, 0.0))
-        rows.h[found], rows.which[found] = slots.limit[k], m
+        slots.limit[k] = min(_eased(target, slots.limit[k], approach, p), max(target, last, 0.0))
+        rows.h[count], which[count] = slots.limit[k], m
         across = np.inf
-        if distance[m] < s.across_m:
-            # v_t: linear from the slowest at the surface to the task's speed at across_m
-            share = max(0.0, distance[m]) / s.across_m
-            across = s.across_slowest_m_s + share * max(0.0, s.fastest_m_s - s.across_slowest_m_s)
+        if distance[m] < p.across.distance_m:
+            # v_t: linear from the slowest at the surface to the task's speed at that distance
+            share = max(0.0, distance[m]) / p.across.distance_m
+            across = p.across.speed_m_s + share * max(0.0, p.fastest_m_s - p.across.speed_m_s)
         # it falls at once here; how hard that may slow the arm is bounded where the row is written
-        slots.across[k] = min(across, slots.across[k] + s.loosen_m_s2 * s.period_s)
-        found += 1
-    with_fading = _fading_rows(slots, seen, chain, s, rows, found)
-    return found, _rows_across(slots, chain, s, rows, with_fading)
+        slots.across[k] = min(across, slots.across[k] + s.loosen_m_s2 * p.period_s)
+        count += 1
+    with_fading = _fading_rows(p, slots, seen, chain, rows, count)
+    all_rows = _rows_across(p, slots, chain, rows, with_fading)
+    return Rows(rows.G[:all_rows], rows.h[:all_rows], which[:count], s.slack_weight)
 
 
 @kernel
@@ -219,11 +214,9 @@ def _leave(slots: Slots, k: int, last: int) -> None:
 
 
 @kernel
-def _fading_rows(
-    slots: Slots, seen: BoolArray, chain: Chain, s: BrakingLimits, rows: Rows, found: int
-) -> int:  # fmt: skip
-    """Add the rows of what is no longer seen to those that were found; return how many there are then."""
-    half = len(slots.link) // 2
+def _fading_rows(p: BrakingNumbers, slots: Slots, seen: BoolArray, chain: Chain, rows: Rows, count: int) -> int:
+    """Add the rows of what is no longer seen to those there are; return how many there are then."""
+    half, s = len(slots.link) // 2, p.curve
     for k in range(half):
         if not seen[k]:
             _leave(slots, k, half + k)
@@ -232,26 +225,26 @@ def _fading_rows(
             continue
         # Nothing is known of the object any more: point and normal stay in the base frame while the link moves on under
         # them, which from stop to free takes less than a second at the default rates.
-        slots.limit[last] += s.loosen_m_s2 * s.period_s
-        slots.across[last] += s.loosen_m_s2 * s.period_s
+        slots.limit[last] += s.loosen_m_s2 * p.period_s
+        slots.across[last] += s.loosen_m_s2 * p.period_s
         # what the curve allows at d_notice, but for latency, margin and touch speed, or the task's speed if more
-        free = max(s.fastest_m_s, np.sqrt(2.0 * s.deceleration_m_s2 * s.notice_m))
-        if slots.limit[last] >= free and slots.across[last] >= s.fastest_m_s:
+        free = max(p.fastest_m_s, np.sqrt(2.0 * s.deceleration_m_s2 * s.d_notice_m))
+        if slots.limit[last] >= free and slots.across[last] >= p.fastest_m_s:
             slots.link[last] = -1
             continue
-        approach = _row(slots.link[last], slots.point[last], slots.normal[last], chain, rows.G[found])
+        approach = _row(slots.link[last], slots.point[last], slots.normal[last], chain, rows.G[count])
         # where the link has sped up along the old normal, this slows it no harder than a row tightens
-        rows.h[found] = max(slots.limit[last], approach - s.tighten_m_s2 * s.period_s)
-        found += 1
-    return found
+        rows.h[count] = max(slots.limit[last], approach - s.tighten_m_s2 * p.period_s)
+        count += 1
+    return count
 
 
 @kernel
-def _rows_across(slots: Slots, chain: Chain, s: BrakingLimits, rows: Rows, found: int) -> int:
+def _rows_across(p: BrakingNumbers, slots: Slots, chain: Chain, rows: Rows, count: int) -> int:
     """Add (t + n) . v <= cap for four tangents t of each near point, n its normal: what retreats may slide as fast."""
     tangents, along = np.empty((2, 3)), np.empty(3)
     for k in range(len(slots.link)):
-        if slots.link[k] < 0 or not slots.across[k] < s.fastest_m_s:
+        if slots.link[k] < 0 or not slots.across[k] < p.fastest_m_s:
             continue
         normal = slots.normal[k]
         tangents_of(normal, tangents)
@@ -260,10 +253,10 @@ def _rows_across(slots: Slots, chain: Chain, s: BrakingLimits, rows: Rows, found
             sign = 1.0 if t % 2 == 0 else -1.0
             for i in range(3):
                 along[i] = normal[i] + sign * tangents[t // 2, i]
-            speed = _row(slots.link[k], slots.point[k], along, chain, rows.G[found])
-            rows.h[found] = max(slots.across[k], speed - s.tighten_m_s2 * s.period_s)
-            found += 1
-    return found
+            speed = _row(slots.link[k], slots.point[k], along, chain, rows.G[count])
+            rows.h[count] = max(slots.across[k], speed - p.curve.tighten_m_s2 * p.period_s)
+            count += 1
+    return count
 
 
 @compiled
@@ -284,10 +277,10 @@ def tangents_of(normal: FloatArray, tangents: FloatArray) -> None:
 
 
 @kernel
-def _eased(target: float, last: float, approach: float, s: BrakingLimits) -> float:
-    """Limit between what is wanted, how far it may loosen from the last, and how hard it may slow the arm."""
-    eased = min(target, last + s.loosen_m_s2 * s.period_s)
-    return max(eased, approach - s.tighten_m_s2 * s.period_s)  # comes last: it outweighs the target
+def _eased(target: float, last: float, approach: float, p: BrakingNumbers) -> float:
+    """Limit between what is aimed at, how far it may loosen from the last, and how hard it may slow the arm."""
+    eased = min(target, last + p.curve.loosen_m_s2 * p.period_s)
+    return max(eased, approach - p.curve.tighten_m_s2 * p.period_s)  # comes last: it outweighs the target
 
 
 @kernel

@@ -1,6 +1,6 @@
 """What a restriction of the arm's motion is: what it is given, and what it returns."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -61,33 +61,32 @@ class Restricted:
     """(n,) least and (n,) largest joint velocities [rad/s]; what the acceleration does not allow comes later."""
 
 
-GivenRows = tuple[FloatArray, FloatArray, IntArray]
-"""G, h and which of `Restricted`."""
+class Rows(NamedTuple):
+    """Rows of the QP as compiled code takes them, see `Restricted`."""
+
+    G: FloatArray
+    h: FloatArray
+    which: IntArray
+    weight: float
 
 
-def rows_of(allowed: Restricted, n: int) -> tuple[GivenRows, float, tuple[FloatArray, FloatArray]]:
-    """Return rows, weight and joint speeds for compiled code; a ParameterError for wrong shapes."""
-    count, seen = len(allowed.h), len(allowed.which)
+def rows_of(allowed: Restricted, n: int) -> tuple[Rows, tuple[FloatArray, FloatArray]]:
+    """Return rows and joint speeds for compiled code, (0,) each where they are free; a ParameterError for wrong shapes.
+
+    Other types or orders in memory would be compiled for anew, while the arm waits.
+    """
+    count, seen, free = len(allowed.h), len(allowed.which), np.zeros(0)
     if allowed.G.shape != (count, n) or seen > count:
         shapes = f"G {allowed.G.shape}, h {allowed.h.shape}, which {allowed.which.shape}"
         raise ParameterError(f"A restriction's rows are {shapes}: G is (R, {n}), h is (R,), which is at most (R,).")
-    # other types or orders in memory would be compiled for anew, while the arm waits
     G, h, slowest, fastest = (
-        np.ascontiguousarray(part, float) for part in (allowed.G, allowed.h, *(allowed.speeds or (_NONE, _NONE)))
+        np.ascontiguousarray(part, float) for part in (allowed.G, allowed.h, *(allowed.speeds or (free, free)))
     )
-    return (G, h, np.ascontiguousarray(allowed.which, WHOLE)), float(allowed.weight), (slowest, fastest)
-
-
-_NONE = np.zeros(0)
-"""What stands for joint speeds that are not restricted."""
+    return Rows(G, h, np.ascontiguousarray(allowed.which, WHOLE), float(allowed.weight)), (slowest, fastest)
 
 
 class Restriction(Part, group="pretouch.restrictions"):
     """What keeps the body from what is near. A part of it is a frozen dataclass of its parameters."""
-
-    def on(self, body: MotionBody) -> "Restriction":
-        """Return what a controller works with: itself, or something with what does not change computed once."""
-        return self
 
     def init(self, body: MotionBody) -> Any:
         """Return what is remembered before the first step; None for nothing."""

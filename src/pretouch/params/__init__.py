@@ -1,24 +1,15 @@
 """Every parameter of the controller: value, unit, meaning, source. Table I of the paper gives the defaults.
 
-A profile is a frozen set of them. `replace(profile, ...)` of the standard library makes a variant, checked again.
+Here are those of the paper: perception (eq. 1), task (2), nearness (3-7), thresholds (8-11), failures, reaction (12);
+ours stand in `params.pretouch`. A profile is a frozen set of them; `replace(profile, ...)` of the standard library
+makes a variant, checked again.
 """
 
-from pretouch.params.paper import AdmittanceParams as AdmittanceParams
-from pretouch.params.paper import ClampParams as ClampParams
-from pretouch.params.paper import ClosingSpeed as ClosingSpeed
-from pretouch.params.paper import FailureParams as FailureParams
-from pretouch.params.paper import GiveUpParams as GiveUpParams
-from pretouch.params.paper import Orientation as Orientation
-from pretouch.params.paper import OutsidePoints as OutsidePoints
-from pretouch.params.paper import PerceptionParams as PerceptionParams
-from pretouch.params.paper import PinchParams as PinchParams
-from pretouch.params.paper import RestrictionParams as RestrictionParams
-from pretouch.params.paper import RowKind as RowKind
-from pretouch.params.paper import SpeedReduction as SpeedReduction
-from pretouch.params.paper import TaskParams as TaskParams
-from pretouch.params.paper import ThresholdParams as ThresholdParams
-from pretouch.params.paper import WindowParams as WindowParams
-from pretouch.params.pretouch import BodyRegion as BodyRegion
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from pretouch.checks import Check, Checked, Fraction, Negative, NonNegative, Positive, PositiveCount
+from pretouch.errors import ParameterError
 from pretouch.params.pretouch import BrakingParams as BrakingParams
 from pretouch.params.pretouch import EffectiveMass as EffectiveMass
 from pretouch.params.pretouch import LocalisationParams as LocalisationParams
@@ -28,3 +19,321 @@ from pretouch.params.pretouch import ProximityPriorParams as ProximityPriorParam
 from pretouch.params.pretouch import SequentialParams as SequentialParams
 from pretouch.params.pretouch import Tangential as Tangential
 from pretouch.params.pretouch import TouchSensorParams as TouchSensorParams
+
+
+@dataclass(frozen=True)
+class ClosingSpeed(Checked):
+    """Estimate of the speed with which an object itself comes nearer."""
+
+    memory_s: Positive = 0.09
+    """Time in which the weight of a reading falls by 1/e [s]: ours. A change of speed is followed to half in 0.14 s and
+    to nine tenths in 0.34 s; a range noise of 20 mm at 50 Hz leaves 0.05 m/s."""
+
+
+@dataclass(frozen=True)
+class OutsidePoints(Checked):
+    """Obstacle points of outside sources, such as cameras."""
+
+    per_link: PositiveCount = 2
+    """Points that are kept for each link that moves, in different directions from it."""
+    margin_m: NonNegative = 0.05
+    """A point is taken as the arm or a fixture up to this from its surface, and its uncertainty [m]: 20 mm by which
+    links may differ from their capsules, 15 mm that posture and latency leave, 15 mm of edges: ours."""
+    persistence_s: Positive = 0.15
+    """How long a point is kept after the measurement that showed it [s]: 60 ms of latency and two lost frames of a
+    camera at 30 Hz."""
+    hidden_s: NonNegative = 3.0
+    """How long a point is kept where the arm has come so near to it that it would be taken for the arm [s]: what a
+    source shows there says nothing. At 0.03 m/s, about a touch speed, it is the way through that margin. 0: as any
+    other point."""
+    slow_after_s: Positive = 0.2
+    """Age of a source's newest measurement at which the arm begins to slow [s]: `persistence_s`, and another frame."""
+    silent_after_s: Positive = 0.4
+    """Age of a source's newest measurement at which the arm holds [s]."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _check_order(self)
+
+
+@dataclass(frozen=True)
+class PerceptionParams(Checked):
+    """From readings to obstacle points (eq. 1)."""
+
+    persistence_s: Positive = 0.06
+    """How long a sensed point is kept after the measurement that showed it [s]: two missed readings at 50 Hz."""
+    self_margin_m: NonNegative | None = 0.06
+    """A reading is taken as the arm or a fixture, and left out, from this much before its predicted return [m]: twice
+    the VL53L1X ranging error of 25 mm, and 10 mm of pose error. None: all readings count as obstacles."""
+    self_aside_m: NonNegative = 0.0
+    """By how much the arm or a fixture may lie beside what a unit is believed to see, and be left out where a reading
+    is within that margin of it [m]. `pretouch` has 5 mm: one that a ruler placed saw the arm itself half the time."""
+    spread_sigmas: NonNegative = 2.0
+    """Standard deviations of a unit's place by which what it shows counts as nearer, and as the arm or a fixture
+    earlier [1]: ours, about 95 % along one direction. It has no effect where the skin says no uncertainty."""
+    slow_after_s: Positive = 0.1
+    """Age of a unit's newest telling reading at which the arm begins to slow [s]."""
+    silent_after_s: Positive = 0.3
+    """Age of a unit's newest telling reading at which it counts as silent and the arm holds [s]."""
+
+    reckon_below_minimum: bool = False
+    """Whether something nearer than a sensor measures (40 mm) stays where it was last seen, rather than at 40 mm."""
+    place_at_stamp: bool = False
+    """Whether a reading is placed from where its unit was when it measured, by the joint velocities since, rather than
+    from where it is now: late readings of an arm that moves at 0.3 m/s are 15 mm off after 50 ms."""
+    keep_while_silent: bool = False
+    """Whether the point that a unit showed last is kept until it tells something else, or counts as silent: silence
+    is never free space. Off, it goes after `persistence_s`."""
+    out_of_view_s: NonNegative = 0.0
+    """How long a point is kept from which the arm has carried its unit's beam away, so that no reading says it is gone
+    [s]: worth it with sensors with zones (docs/results/skins.md). 0: as any other point."""
+    closing: ClosingSpeed | None = None
+    """Whether the objects' own closing speeds are estimated, `Obstacles.closing_speed`."""
+    outside: OutsidePoints | None = None
+    """Points of outside sources, such as cameras; none: they are not looked at."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _check_order(self)
+
+
+def _check_order(params: PerceptionParams | OutsidePoints) -> None:
+    if params.slow_after_s >= params.silent_after_s:
+        raise ParameterError(
+            f"{type(params).__name__}.slow_after_s is {params.slow_after_s}: it must be less than silent_after_s,"
+            f" {params.silent_after_s}."
+        )
+
+
+Orientation = Literal["free", "hold"]
+
+
+@dataclass(frozen=True)
+class TaskParams(Checked):
+    """Following the path, and the cost of the QP (eq. 2)."""
+
+    speed_m_s: Positive = 0.3
+    """Largest end-effector speed along the path [m/s] (paper, IV-A)."""
+    acceleration_m_s2: Positive = 1.0
+    """Rate at which the speed along the path may grow [m/s^2]; slowing is not limited by it."""
+    restore_cycles: PositiveCount = 200
+    """Control cycles l_max of eq. 4 until full speed is back after what slowed the arm is gone (Table I, 100 Hz)."""
+    position_gain_1_s: NonNegative = 2.0
+    """Velocity towards the path per metre off it [1/s]."""
+    off_path_m: Positive = 0.1
+    """Distance from the path at which the arm no longer advances along it but only returns [m]."""
+    orientation: Orientation = "hold"
+    """Whether the task is the hand's velocity alone, or also keeps its orientation at the start. The paper does not
+    say. Free, the hand rolls its units out of view of what restricts it (docs/reference/experiments.md)."""
+    orientation_gain_1_s: NonNegative = 1.0
+    """Angular velocity per radian of orientation error when it is held [1/s]."""
+    damping_max: NonNegative = 0.1
+    """Nakamura damping lambda_0, the factor mu of eq. 2 at a singularity (authors' code family)."""
+    manipulability_threshold: Positive = 0.001
+    """Manipulability w_0 below which damping begins (authors' code family)."""
+    mid_joint_gain: Positive = 0.001
+    """Weight k of the mid-joint term in eq. 2; larger values drag the arm off its path. It also keeps the
+    Hessian positive definite."""
+    mid_joint_projected: bool = False
+    """Whether the mid-joint term acts in the task's null space alone, where it drags nothing; the paper's acts on all
+    joint velocities."""
+    mid_joint_time_s: Positive = 5.0
+    """Time t in which the mid-joint velocity would bring the joints to their middle [s]."""
+    control_period_s: Annotated[float, Check(low=1e-4, high=1.0)] = 0.01
+    """Period of the controller [s] (paper: 100 Hz)."""
+    position_margin_rad: NonNegative = 0.01
+    """Distance the commanded joint positions keep from the joint limits [rad]."""
+
+
+@dataclass(frozen=True)
+class SpeedReduction(Checked):
+    """Slowing the end-effector near obstacles (eq. 3). A unit that falls silent slows it with and without this."""
+
+    d_max_m: Positive = 0.8
+    """Distance from the end-effector origin within which an obstacle slows the arm [m] (Table I)."""
+
+
+RowKind = Literal["hard", "slack", "floor"]
+
+
+@dataclass(frozen=True)
+class RestrictionParams(Checked):
+    """Restricting the body's approach to obstacles (eqs. 5-7)."""
+
+    rows: RowKind = "slack"
+    """hard: rows as written, no slack. slack: a weighted slack for each row. floor: as slack, with the limit never
+    below `floor_m_s`."""
+    v_max_m_s: Positive = 0.04
+    """Largest approach and largest repulsive velocity V_max [m/s] (Table I)."""
+    beta: Negative = -10.0
+    """Steepness of eqs. 5 and 6 (Table I); negative, so that nearer means slower."""
+    d_repulse_m: Positive = 0.1
+    """Body distance below which the arm is pushed away [m] (Table I)."""
+    d_crit_m: Positive = 0.1
+    """Body distance d_crit of eqs. 5 and 6 [m] (Table I)."""
+    d_notice_m: Positive = 0.6
+    """Body distance from which an approach is restricted [m] (Table I)."""
+    floor_m_s: NonNegative = 0.02
+    """Smallest approach limit with rows=floor, v_f [m/s]."""
+    slack_weight: Positive = 1000.0
+    """Weight of a row's squared violation against the squared task error of eq. 2, both in (m/s)^2."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.d_notice_m <= self.d_crit_m:
+            raise ParameterError(
+                f"{type(self).__name__}.d_notice_m is {self.d_notice_m}: it must be greater than d_crit_m,"
+                f" {self.d_crit_m}."
+            )
+
+
+@dataclass(frozen=True)
+class WindowParams(Checked):
+    """The sliding window of the external force (eq. 8): it tells when the controller has seen enough to detect."""
+
+    samples: Annotated[int, Check(low=2)] = 100
+    """Samples in the sliding window at the control rate; the paper does not say, the authors' code has 500."""
+    alpha: Fraction = 0.1
+    """Influence of an outlier on the value that enters the window, eq. 8 (Table I)."""
+    lambda_: NonNegative = 0.75
+    """Standard deviations beyond which a sample is an outlier, eq. 8 (Table I)."""
+    freeze_while_reacting: bool = False
+    """Whether the window stands still during a reaction, so that the push does not become its mean and the release a
+    contact. Off in the paper; a rebound towards the person in 10 of 15 releases without it (prototype)."""
+
+
+@dataclass(frozen=True)
+class ThresholdParams(Checked):
+    """The contact thresholds, which move with the force's statistics and with what is near (eqs. 9-11)."""
+
+    f_base_n: Positive = 10.0
+    """Base force F_b above the mean that makes a contact, eq. 9 [N] (Table I)."""
+    f_std_n: NonNegative = 3.0
+    """Largest addition F_std for a noisy signal, eq. 10 [N] (Table I)."""
+    sigma_max_n: Positive = 3.0
+    """Standard deviation at which that addition is full, eq. 10 [N] (Table I)."""
+    f_d_n: NonNegative = 4.0
+    """Largest reduction F_d near an obstacle, eq. 11 [N] (Table I)."""
+    d_max_m: Positive = 0.8
+    """Distance from the end-effector origin at which the reduction begins, eq. 11 [m] (Table I)."""
+    d_min_m: NonNegative = 0.05
+    """Distance from the end-effector origin at which it is full, eq. 11 [m] (Table I)."""
+    compare: Literal["filtered", "raw"] = "filtered"
+    """Which force is held against the thresholds: the newest value in the window (paper) or the raw sample
+    (the authors' code)."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.d_max_m <= self.d_min_m:
+            raise ParameterError(
+                f"ThresholdParams.d_max_m is {self.d_max_m}: it must be greater than d_min_m, {self.d_min_m}."
+            )
+        if self.f_base_n <= self.f_d_n:
+            raise ParameterError(
+                f"ThresholdParams.f_base_n is {self.f_base_n}: it must be greater than f_d_n, {self.f_d_n}, or the"
+                " thresholds could cross."
+            )
+
+
+@dataclass(frozen=True)
+class FailureParams(Checked):
+    """When to stop trusting the inputs."""
+
+    state_timeout_s: Annotated[float, Check(low=0.0, high=1.0, open_low=True)] = 0.05
+    """Age of the robot state at which the arm holds [s]. As long are commands remembered."""
+    overrun_s: Positive = 0.05
+    """Time between two steps from which the later one brakes [s]: a command is meant to be held for one period."""
+    force_max_n: Positive = 1e5
+    """Wrench component from which an estimate is no estimate [N, Nm]: far more than any arm survives. Let in, it would
+    spoil the window's sums."""
+    force_timeout_s: Positive = 0.2
+    """Time without a force estimate after which the arm holds [s]."""
+    desired_timeout_s: Positive = 0.1
+    """Time after the last instant of a desired motion from which the arm is brought to rest [s]: a few messages of a
+    commander at 50 Hz may be late or lost."""
+    solver_iterations: PositiveCount = 500
+    """Iterations of the QP solver after which the arm brakes. A bound on its time that is the same in each replay; most
+    steps need less than 10."""
+
+
+@dataclass(frozen=True)
+class ClampParams(Checked):
+    """Being caught between two objects while the arm yields, and how the arm opens."""
+
+    torque_nm: Positive = 4.0
+    """Torque against the direction of yielding from which the arm is caught between two objects [Nm]: four times the
+    noise of a Panda's estimate, about 8 N on the hand."""
+    open_m_s: Positive = 0.1
+    """Speed of the fastest point of the body while the arm opens along the path it came [m/s]."""
+    open_s: Positive = 0.5
+    """Longest that it opens [s]."""
+
+
+@dataclass(frozen=True)
+class PinchParams(Checked):
+    """Something caught between two of the arm's links, or between one and a fixture: the arm opens and holds.
+
+    It needs the sequential detector; fixtures, localisation too.
+    """
+
+    gap_m: Positive = 0.2
+    """Gap in which something can be caught [m]: a thigh fits in no larger one."""
+    force_n: Positive = 30.0
+    """Force from which something is caught [N]: a step of 2 Nm in one joint's estimate looks like 20 N with the lever
+    that forearm and upper arm have about the elbow. Less is a push, and opens the joint as well."""
+
+
+@dataclass(frozen=True)
+class GiveUpParams(Checked):
+    """Giving up where the arm meets the same object again and again."""
+
+    contacts: PositiveCount = 3
+    """Contacts at one place of the path after which it gives up."""
+    push_j: Positive = 0.3
+    """Energy that a contact gives an arm that stands, from which it is a push and counts for no place [J]: boards met
+    at touch speed gave 0.05 J at most, at 0.3 m/s unbraked 0.5 J, pushes of 15 to 30 N for 0.3 s at least 0.59 J
+    (docs/explanation/reaction.md). To an arm that moves it may give twice its kinetic energy more."""
+    retry_s: Positive = 30.0
+    """Time after which it tries again if no unit saw anything there [s]."""
+
+
+@dataclass(frozen=True)
+class AdmittanceParams(Checked):
+    """A virtual mass and damper in each joint that an external torque moves as long as it lasts."""
+
+    speed_max_m_s: Positive = 0.3
+    """Bound on the speed of every point of the body's axes [m/s] (authors' code family, there of the hand)."""
+    reach_m: Positive = 0.3
+    """How far a contact may move any point of the body's axes from where it was when the contact began [m]: as far as
+    the paper's reaction goes at most, so that the same room has to be free about the arm."""
+    inertia_kg_m2: Positive = 1.5
+    """Virtual inertia of each joint [kg m^2]: with the damping, 0.1 s to come to rest."""
+    damping_nm_s: Positive = 15.0
+    """Virtual damping of each joint [Nm s/rad]: 15 N on the hand at 0.5 m from the axis give about 0.2 m/s."""
+    lag_s: NonNegative = 0.0167
+    """Time constant of the robot's force estimate [s], 0 for none (a Panda's: about 10 Hz). Known, a force that has
+    ended no longer drives the arm while its estimate decays."""
+    dead_band_nm: NonNegative = 0.5
+    """External torque of a joint that moves nothing [Nm]: friction of the smaller joints that the robot does not know.
+    """
+    dead_band_fraction: NonNegative = 0.02
+    """What is added to it, as a fraction of the joint's torque limit: twice the noise of a Panda's larger joints."""
+    static_friction_nm: NonNegative = 0.0
+    """Filtered torque that tears a joint loose which stands [Nm], 0 for none (3 in `pretouch`): a bias of 2 Nm and
+    five deviations of a Panda's filtered noise. 15 N move the arm where they have a lever of 0.2 m."""
+    start_energy_j: NonNegative = 0.2
+    """Kinetic energy of the virtual mass that a contact may begin with, before it has given any [J]."""
+    quiet_s: Positive = 1.0
+    """Time without a push after which the arm goes on with its task [s]."""
+    near_m: NonNegative = 0.1
+    """Distance from the body within which something seen makes the arm wait, as a hand that rests on it [m]."""
+    patience_s: NonNegative = 10.0
+    """Longest that it waits for that [s]."""
+    soft_hold: bool = False
+    """Whether an arm that holds yields to a push where the cause of the HOLD allows it (`modes.TABLE`)."""
+    clamp: ClampParams | None = None
+    """What tells that the arm is caught between two objects while it yields; None where it does not look for that."""
+    pinch: PinchParams | None = None
+    """What tells something caught between links, or a link and a fixture, from a push; None where all is a push."""
+    give_up: GiveUpParams | None = None
+    """When the arm gives up at a place; None where it never does."""

@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from pretouch.control.qp import manipulability
+from pretouch.control.task import manipulability
 from pretouch.robot.model import RobotModel
 from pretouch.sim.plant import TOUCH_N
 from pretouch.traces import mean_over
