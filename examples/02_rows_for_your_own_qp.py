@@ -18,8 +18,8 @@ ee, J = kin.position[arm.ee], arm.ee_jacobian(kin)[:3]
 # obstacle points from wherever you have them: a skin, a camera, a map
 points = ee + np.array([[0.12, 0.0, 0.05], [0.0, 0.3, 0.0]])
 near = pt.closest_points(kin, arm.body, ee, np.arange(2), points, np.tile([1.0, 0.0, 0.0], (2, 1)))
-rows = pt.approach_rows(kin, arm.moved_by, near, pt.ApproachRestriction(rows="hard"))
-lower, upper = pt.joint_box(q, qd, pt.joint_limits(arm, margin=0.01, period=0.01))
+rows = pt.approach_rows(kin, arm.moved_by, near, pt.row_numbers(pt.ApproachRestriction(rows="hard")))
+lower, upper, _ = pt.joint_box(q, qd, pt.joint_limits(arm, margin=0.01, period=0.01).table)
 
 wanted = np.array([0.1, 0.0, 0.0])  # towards the nearer point [m/s]
 H, f = J.T @ J + 1e-3 * np.eye(7), -J.T @ wanted

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pretouch.explanation import Doing, Explanation, explain, finds, still
-from pretouch.limited import Limit, Limited
+from pretouch.explanation import Doing, Explanation, Limit, Limited, explain, finds, still
 from pretouch.modes import TABLE, Event, Transition
 from pretouch.types import Contact, ControlStep, Mode, Obstacles, QpOutcome, QpSolution, Thresholds, Touched
 

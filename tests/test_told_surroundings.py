@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from pretouch.control.braking import Slots
-from pretouch.explanation import explain
-from pretouch.limited import Limit
+from pretouch.explanation import Limit, explain
 from pretouch.params import OutsidePoints
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import PROFILES

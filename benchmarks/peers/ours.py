@@ -11,7 +11,7 @@ from benchmarks.peers.problem import TERMS, Problem
 from pretouch.compiled import compiled
 from pretouch.control.active_set import minimise_within
 from pretouch.control.approach import approach_rows, row_numbers
-from pretouch.control.joint_box import JointLimits, box_and_brake
+from pretouch.control.joint_box import JointLimits, joint_box
 from pretouch.control.path import segment
 from pretouch.control.penalty import Minimum
 from pretouch.control.penalty import Problem as Program
@@ -91,7 +91,7 @@ def _solve(q: Array, qd: Array, points: Array, velocity: Array, fixed: _Fixed, k
     closest(placed_capsules(fixed.body, kin), points, ClosestArrays(on_body, link, up, distance))
     near = Obstacles(fixed.units, points, distance, on_body, link, up, distance, distance)
     rows = approach_rows(kin, fixed.moved_by, near, fixed.approach)
-    lower, upper, _ = box_and_brake(q, qd, fixed.limits)
+    lower, upper, _ = joint_box(q, qd, fixed.limits)
     J, H, f = np.empty((6, n)), np.empty((n, n)), np.empty(n)
     jacobian_into(kin.anchor, kin.axis, fixed.moved_by[fixed.ee], kin.position[fixed.ee], J)
     cost_into(J[:3], velocity, q, fixed.q_mid, fixed.cost, np.empty(0), H, f)

@@ -64,7 +64,7 @@ def drive(domain: int) -> None:
             start = start or now
             state = robot.read()
             wanted = 0.8 * min(now - start, 1.0) * np.sin(2.0 * (now - start) + np.arange(7))
-            sent = np.clip(wanted, *joint_box(state.q_commanded, state.qd_commanded, limits))
+            sent = np.clip(wanted, *joint_box(state.q_commanded, state.qd_commanded, limits.table)[:2])
             robot.command(sent)
             print(*sent, flush=True)
 

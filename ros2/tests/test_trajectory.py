@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pretouch.control.joint_box import JointLimits, box_and_brake, joint_box
+from pretouch.control.joint_box import JointLimits, joint_box
 from pretouch.robot.description import panda
 from pretouch_ros2.trajectory import Reference, StoppingTrajectory, stopping_trajectory
 
@@ -73,7 +73,7 @@ def test_braking_by_itself_ends_inside_the_joint_limits_that_the_controller_kept
     for k in range(60):
         now = 1.0 + k * PERIOD
         q, qd = reference.at(now)
-        lower, upper = joint_box(q, qd, limits)
+        lower, upper = joint_box(q, qd, limits.table)[:2]
         trajectory = reference.command(np.clip(wish, lower, upper), now)
         # should this have been the last command, the arm still stops before its limits
         assert (np.abs(trajectory.q) <= 0.5 + 2e-5).all()
@@ -128,7 +128,7 @@ def test_the_loops_way_to_rest_is_followed_within_the_limits():
     qd = STILL
     for k in range(120):
         q = reference.at(1.0 + k * PERIOD)[0]
-        qd = np.minimum(0.9 * V, qd + A * PERIOD) if k < 40 else box_and_brake(q, qd, limits.table)[2]
+        qd = np.minimum(0.9 * V, qd + A * PERIOD) if k < 40 else joint_box(q, qd, limits.table)[2]
         trajectory = reference.command(qd, 1.0 + k * PERIOD)
         assert (np.abs(np.diff(trajectory.qd, axis=0)) <= A * np.diff(trajectory.time)[:, None] + 1e-4).all()
     assert not qd.any()

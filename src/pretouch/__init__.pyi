@@ -18,6 +18,7 @@ from pretouch.contact.window import add_force as add_force
 from pretouch.contact.window import window_init as window_init
 from pretouch.control.approach import ApproachRestriction as ApproachRestriction
 from pretouch.control.approach import approach_rows as approach_rows
+from pretouch.control.approach import row_numbers as row_numbers
 from pretouch.control.interface import MotionBody as MotionBody
 from pretouch.control.interface import MotionRequest as MotionRequest
 from pretouch.control.interface import Restricted as Restricted
@@ -33,11 +34,11 @@ from pretouch.controller import ControllerState as ControllerState
 from pretouch.desired import Desired as Desired
 from pretouch.errors import PretouchError as PretouchError
 from pretouch.errors import RecordingError as RecordingError
+from pretouch.explanation import Limit as Limit
+from pretouch.explanation import Limited as Limited
 from pretouch.explanation import explain as explain
 from pretouch.groups import Kinematics as Kinematics
 from pretouch.groups import no_obstacles as no_obstacles
-from pretouch.limited import Limit as Limit
-from pretouch.limited import Limited as Limited
 from pretouch.loop import Cycle as Cycle
 from pretouch.loop import MonotonicClock as MonotonicClock
 from pretouch.loop import Recorder as Recorder

@@ -64,8 +64,9 @@ class Checked:
     A compiled function says that it takes the set itself: its fields have the same names."""
 
     def __post_init__(self) -> None:
-        for name, hint in _hints(type(self)):  # type: ignore[arg-type]
-            _check_field(type(self).__name__, name, hint, getattr(self, name))
+        kind: Any = type(self)
+        for name, hint in hints_of(kind).items():
+            _check_field(kind.__name__, name, hint, getattr(self, name))
 
     @cached_property
     def numbers(self) -> Any:
@@ -76,7 +77,7 @@ class Checked:
 
 @cache
 def _numbers_of(kind: type) -> Any:
-    hints = ((name, getattr(hint, "__origin__", hint)) for name, hint in _hints(kind))
+    hints = hints_of(kind, False).items()
     plain = [(name, number) for name, number in hints if number in (float, int, bool)]
     for base in kind.__mro__[1:]:  # a part is compiled as the set that it adds no number to
         if issubclass(base, Checked) and is_dataclass(base) and [*base.Numbers._fields] == [name for name, _ in plain]:
@@ -89,10 +90,10 @@ def _numbers_of(kind: type) -> Any:
 
 
 @cache
-def _hints(kind: type) -> tuple[tuple[str, object], ...]:
-    """Name and type of each field of a parameter set, resolved once."""
-    hints = get_type_hints(kind, include_extras=True)
-    return tuple((item.name, hints[item.name]) for item in fields(kind))
+def hints_of(kind: Any, checks: bool = True) -> dict[str, Any]:
+    """Types of the fields of a parameter set by their names, with the checks that stand in them or without."""
+    hints = get_type_hints(kind, include_extras=checks)
+    return {item.name: hints[item.name] for item in fields(kind)}
 
 
 def _check_field(owner: str, name: str, hint: object, value: object) -> None:

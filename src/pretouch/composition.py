@@ -12,9 +12,9 @@ from functools import cache
 from itertools import pairwise
 from numbers import Real
 from types import MappingProxyType, NoneType, UnionType
-from typing import Any, ClassVar, Literal, Union, get_args, get_origin, get_type_hints
+from typing import Any, ClassVar, Literal, Union, get_args, get_origin
 
-from pretouch.checks import Checked
+from pretouch.checks import Checked, hints_of
 from pretouch.errors import ParameterError
 from pretouch.plugins import load, names
 
@@ -87,12 +87,12 @@ def from_table(hint: Any, table: Any, where: str = "") -> Any:
         return _plain(kind, table, where)
     if not isinstance(table, dict):
         raise ParameterError(f"{where} is {table!r}: it must be a table.")
-    made = kind.called(str(table.get(_PART))) if _is_part(kind) else kind
-    hints, values = _hints(made), {key: item for key, item in table.items() if key != _PART}
+    chosen = kind.called(str(table.get(_PART))) if _is_part(kind) else kind
+    hints, values = hints_of(chosen, False), {key: item for key, item in table.items() if key != _PART}
     if unlike := sorted(values.keys() ^ hints.keys()):
         paths = ", ".join(f"{where}.{name}".lstrip(".") for name in unlike)
-        raise ParameterError(f"{made.__name__} differs in {paths}: use the version of pretouch that wrote it.")
-    return made(**{name: from_table(hints[name], item, f"{where}.{name}") for name, item in values.items()})
+        raise ParameterError(f"{chosen.__name__} differs in {paths}: use the version of pretouch that wrote it.")
+    return chosen(**{name: from_table(hints[name], item, f"{where}.{name}") for name, item in values.items()})
 
 
 def _plain(kind: Any, value: Any, where: str) -> Any:
@@ -114,14 +114,14 @@ def changed(value: Any, changes: Mapping[str, str], where: str = "") -> Any:
     for path, text in changes.items():
         first, _, rest = path.partition(".")
         trees.setdefault(first, {})[rest] = text
-    hints, new = _hints(value.__class__), {}
+    hints, new = hints_of(value.__class__, False), {}
     for name, tree in trees.items():
         path = f"{where}.{name}" if where else name
         if name not in hints:
             raise ParameterError(f"The parameter {path!r} is unknown: choose from {', '.join(hints)}.")
         now, (kind, _) = getattr(value, name), _without_none(hints[name])
         if "" in tree:
-            now = read(hints[name], tree.pop(""), path, now)
+            now = _read(hints[name], tree.pop(""), path, now)
         if tree and isinstance(now, tuple):
             now = tuple(changed(item, _of(tree, item), f"{path}.{item.name}") for item in now)
         elif tree:
@@ -168,25 +168,24 @@ def describe(params: Any) -> str:
     """Return a text with each parameter of a profile, a part or another set: path, value, and meaning with its unit."""
     lines = []
     for path, value in leaves(params):
-        *groups, name = path.split(".")
-        owner = at(params, ".".join(groups)) if groups else params
-        said = field_docs(type(owner)).get(name, "")  # type: ignore[arg-type]
-        lines.append(f"{path} = {_written(value)}: {said}".rstrip(": "))
+        group, _, name = path.rpartition(".")
+        docs = field_docs((at(params, group) if group else params).__class__)
+        lines.append(f"{path} = {_written(value)}: {docs.get(name, '')}".rstrip(": "))
     return "\n".join(lines)
 
 
 def at(value: Any, path: str, where: str = "") -> Any:
     """Return what stands at a path; a ParameterError where nothing does."""
     first, _, rest = path.partition(".")
-    here, kind = (f"{where}.{first}" if where else first), type(value)
+    here, kind = f"{where}.{first}" if where else first, value.__class__
+    names_here = hints_of(kind, False) if is_dataclass(value) else {}
     if isinstance(value, tuple):
-        found = next((item for item in value if isinstance(item, Part) and item.name == first), None)
+        inner = next((item for item in value if isinstance(item, Part) and item.name == first), None)
     else:
-        found = getattr(value, first) if is_dataclass(kind) and first in _hints(kind) else None
-    if found is None and (rest or not is_dataclass(kind) or first not in _hints(kind)):
-        known = ", ".join(_hints(kind)) if is_dataclass(kind) else "no parameters"
-        raise ParameterError(f"The parameter {here!r} is unknown: there is {known}.")
-    return at(found, rest, here) if rest else found
+        inner = getattr(value, first) if first in names_here else None
+    if inner is None and (rest or first not in names_here):
+        raise ParameterError(f"The parameter {here!r} is unknown: there is {', '.join(names_here) or 'no parameters'}.")
+    return at(inner, rest, here) if rest else inner
 
 
 def _of(tree: dict[str, str], item: Part) -> dict[str, str]:
@@ -194,26 +193,22 @@ def _of(tree: dict[str, str], item: Part) -> dict[str, str]:
     return {rest: text for path, text in tree.items() for first, _, rest in [path.partition(".")] if first == item.name}
 
 
-def read(hint: Any, text: str, where: str, now: object = None) -> Any:
+def _read(hint: Any, text: str, where: str, now: object = None) -> Any:
     """Read a value of a type. A part or group that is chosen again keeps its parameters."""
     kind, optional = _without_none(hint)
     if optional and text in NONE:
         return None
     if _is_part(kind):
-        made = kind.called(text)
-        return now if type(now) is made else made()
+        part = kind.called(text)
+        return now if type(now) is part else part()
     if is_dataclass(kind):
         if text not in ("on", "yes"):
             raise ParameterError(f"{where} is {text!r}: write on or none, or change one of its parameters.")
         return now if now is not None else kind()  # type: ignore[operator]
     if get_origin(kind) is tuple:
         inner = get_args(kind)[0]
-        held = {item.name: item for item in now if isinstance(item, Part)} if isinstance(now, tuple) else {}
-        return () if text in NONE else tuple(read(inner, one, where, held.get(one)) for one in text.split(","))
-    return _read(kind, text, where)
-
-
-def _read(kind: Any, text: str, where: str) -> object:
+        before = {item.name: item for item in now if isinstance(item, Part)} if isinstance(now, tuple) else {}
+        return () if text in NONE else tuple(_read(inner, one, where, before.get(one)) for one in text.split(","))
     if kind is bool:
         if text not in _BOOLEANS:
             raise ParameterError(f"{where} is {text!r}: write yes or no.")
@@ -249,13 +244,6 @@ def _written(value: object) -> str:
     if isinstance(value, tuple):
         return ",".join(item.name if isinstance(item, Part) else _written(item) for item in value)
     return f"{value:.12g}" if isinstance(value, Real) and not isinstance(value, int) else str(value)
-
-
-@cache
-def _hints(kind: type) -> dict[str, Any]:
-    """Types of the fields of a dataclass."""
-    hints = get_type_hints(kind)
-    return {f.name: hints[f.name] for f in fields(kind)}
 
 
 def _without_none(hint: Any) -> tuple[Any, bool]:

@@ -197,11 +197,7 @@ class Decision:
         if part is None:
             self._line(MOVE)
         else:
-            touch = now.get("request.touch_m_s")
-            request = MotionRequest(
-                asked.velocity, asked.rotation_goal, hold, asked.qd, None if np.isnan(touch) else touch
-            )
-            approach = move_restricted(controller, part, approach, self.memory, now, self.robot, request)
+            approach = move_restricted(controller, part, approach, self.memory, now, self.robot)
         outcome, status, _ = outcome_of(hold, now.get("answer.ending"), bool(now.get("answer.violated")))
         if outcome in _TROUBLE and (outcome is QpOutcome.FAILED or mode.mode is not Mode.HOLD):
             self.mode = next_mode(mode, {_TROUBLE[outcome]: status}, resume=False)
@@ -213,20 +209,14 @@ class Decision:
 
 
 def move_restricted(
-    controller: "Controller",
-    part: Restriction,
-    state: object,
-    memory: Flat,
-    now: Flat,
-    robot: RobotState,
-    request: MotionRequest,
+    controller: "Controller", part: Restriction, state: object, memory: Flat, now: Flat, robot: RobotState
 ) -> object:
     """Move within what a restriction in plain Python allows; return what it remembers."""
-    obstacles = near_of(now, "seen.all")
+    obstacles, request = near_of(now, "seen.all"), now.part("request", MotionRequest)
     kin = now.part("kin", Kinematics)
     allowed, state = part.step(state, controller.motion_body, kin, robot, obstacles, request)
     if allowed.velocity is not None:
-        now.put("request.velocity", request.velocity + allowed.velocity)
+        request.velocity[:] += allowed.velocity
     line_within(controller.fixed.blocks, memory.blocks, now.blocks, *rows_of(allowed, controller.model.n))
     return state
 

@@ -1,15 +1,24 @@
-"""What the arm does, who limits it and how far, as one word and one sentence of a control step."""
+"""What the arm does, what limits it and how far: as values, and as one word and one sentence of a control step."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pretouch.limited import ASKED_M_S, FULL, Limit, binding
-from pretouch.modes import Event
-from pretouch.types import ControlStep, Mode
+from pretouch.modes import Event, Mode
+from pretouch.values import BoolArray, value
 
+if TYPE_CHECKING:
+    from pretouch.types import ControlStep
+
+FULL = 0.95
+"""Share of the speed asked for from which on the arm is not called slowed: what a joint velocity's noise leaves."""
+ASKED_M_S = 0.005
+"""Speed from which on a motion is asked for [m/s]."""
+_PRESSED = 1e-9
+"""Multiplier above which a limit is pressed against."""
 OFF_PATH_M = 0.01
 """Distance from the path at which the arm is off it [m]; following it takes less."""
 _REST_M_S = 0.015
@@ -20,6 +29,75 @@ _ANSWER_M_S = 1e-3
 """Speed of the end-effector from which on a reaction moves the arm [m/s]."""
 LOUD_N = 15.0
 """Force that should be found; where it takes more, the arm is too loud [N]: a hand that touches lightly has less."""
+
+
+class Limit(Enum):
+    """What keeps the arm from what is asked."""
+
+    NOTHING = "nothing"
+    SLOWED = "slowed"
+    """It is slower near what is seen (eqs. 3, 4), or where units or outside sources are silent."""
+    APPROACH = "approach"
+    """A link may come no faster towards what is seen (eqs. 5-7), or has to back away."""
+    JOINTS = "joints"
+    """A joint is at its limit of position, velocity or acceleration."""
+    CONTACT = "contact"
+    """It yields to a contact."""
+    HOLD = "hold"
+    """It brakes or stands, and `ControlStep.reason` says why."""
+
+
+@value
+class Limited:
+    """What keeps the arm from what is asked, and what is left of it."""
+
+    by: Limit
+    share: float
+    """Part of the end-effector's speed asked for that is left, along it: 1 all, 0 none or in contact and hold.
+
+    By the measured velocity, with its noise; of an end-effector not asked to move the factor of eqs. 3 and 4."""
+    obstacle: int = -1
+    """Row of `ControlStep.obstacles` that limits; -1: none, or it has gone from view."""
+    unit: int = -1
+    """Index in the skin of the unit that sees it; from their number on an outside point, -1 as before."""
+    link: int = -1
+    """Index of the link that is near it, or that is touched; -1 unknown."""
+    joint: int = -1
+    """Index of the joint at its limit; -1 of none."""
+
+
+def limited_by(step: "ControlStep") -> Limited:
+    """Return what limits the motion of a step; a row that binds comes before eq. 3, and both before the joints."""
+    if step.mode is not Mode.TRACK:
+        link = int(step.touched.link[0]) if len(step.touched.link) else -1
+        return Limited(Limit.HOLD if step.mode is Mode.HOLD else Limit.CONTACT, 0.0, link=link)
+    near, rows = step.obstacles, step.restricted[binding(step)]
+    pressed = np.abs(step.qp.multipliers[: len(step.q)])
+    joint = int(pressed.argmax()) if len(pressed) and pressed.max() > _PRESSED else -1
+    by, cause = Limit.NOTHING if joint < 0 else Limit.JOINTS, -1
+    if len(rows):
+        by, cause = Limit.APPROACH, int(rows[near.body_distance[rows].argmin()])
+    elif step.speed_scale < FULL:
+        # what is known to move there slows nothing, and is infinitely far for eq. 3
+        slows = len(near.unit) > 0 and bool(np.isfinite(near.ee_distance.min()))
+        by, cause = Limit.SLOWED, int(near.ee_distance.argmin()) if slows else -1
+    share, speed = step.speed_scale, float(np.linalg.norm(step.desired_velocity))
+    if speed >= ASKED_M_S and (len(rows) or joint >= 0):
+        share *= min(max(float(step.ee_velocity @ step.desired_velocity) / speed**2, 0.0), 1.0)
+    unit, link = (-1, -1) if cause < 0 else (int(near.unit[cause]), int(near.link[cause]))
+    return Limited(by, share, cause, unit, link, joint)
+
+
+def binding(step: "ControlStep") -> BoolArray:
+    """Which of the restricted obstacles (K',) keep the arm from what it would do."""
+    count, qp = len(step.restricted), step.qp
+    bound = np.zeros(count, dtype=np.bool_)
+    if count and len(qp.slack) == count:
+        bound = (qp.multipliers[-count:] > _PRESSED) | (qp.slack > 1e-6)
+        if qp.violated and not bound.any():
+            # a row across a normal, which the solution leaves out: it is of what is nearest
+            bound[step.obstacles.body_distance[step.restricted].argmin()] = True
+    return bound
 
 
 class Doing(Enum):
@@ -46,7 +124,7 @@ class Explanation:
     sentence: str
 
 
-def explain(step: ControlStep, units: Sequence[str], links: Sequence[str]) -> Explanation:
+def explain(step: "ControlStep", units: Sequence[str], links: Sequence[str]) -> Explanation:
     """Say what the arm does in a step, who limits it, and how far.
 
     Args:
@@ -60,7 +138,7 @@ def explain(step: ControlStep, units: Sequence[str], links: Sequence[str]) -> Ex
     return _in_contact(step, names) if step.mode is Mode.REACT else _on_the_way(step, names)
 
 
-def finds(step: ControlStep) -> str:
+def finds(step: "ControlStep") -> str:
     """Say which push is found; '' where the detector does not say."""
     if np.isnan(step.detectable_n):
         return ""
@@ -70,17 +148,17 @@ def finds(step: ControlStep) -> str:
     return f"here, at this speed, {loud}"
 
 
-def resumable(step: ControlStep) -> bool:
+def resumable(step: "ControlStep") -> bool:
     """Whether a person can end the hold of a step: one that latches, or that waits to try a location again."""
     return step.mode is Mode.HOLD and (step.latched or step.event is Event.GIVEN_UP)
 
 
-def still(step: ControlStep) -> bool:
+def still(step: "ControlStep") -> bool:
     """Whether the arm is in contact and does not move."""
     return step.mode is Mode.REACT and float(np.abs(step.command).max(initial=0.0)) < _REST_RAD_S
 
 
-def answers(step: ControlStep) -> bool:
+def answers(step: "ControlStep") -> bool:
     """Whether the arm moves with a contact."""
     return not still(step) and float(np.linalg.norm(step.reaction_velocity)) >= _ANSWER_M_S
 
@@ -92,27 +170,17 @@ class _Names:
     units: Sequence[str]
     links: Sequence[str]
 
-    def sees(self, step: ControlStep, obstacle: int) -> str:
+    def sees(self, step: "ControlStep", obstacle: int) -> str:
         """Say who sees an obstacle, or that it is known, and how far from the arm."""
         distance = max(0.0, float(step.obstacles.body_distance[obstacle]))
         if np.isinf(step.obstacles.ee_distance[obstacle]):
             return f"a fixture that moves is {distance:.2f} m away"
-        return f"{self.who(step, obstacle)} sees something at {distance:.2f} m"
-
-    def sees_nothing(self) -> str:
-        """Say that nothing near is seen, or that there is nothing to see it with."""
-        return "nothing near is seen" if len(self.units) else "no sensor unit is in use"
-
-    def who(self, step: ControlStep, obstacle: int) -> str:
-        """Name the unit that sees an obstacle."""
         unit = int(step.obstacles.unit[obstacle])
-        return self.units[unit] if unit < len(self.units) else "an outside source"
-
-    def link(self, index: int) -> str:
-        return self.links[index]
+        who = self.units[unit] if unit < len(self.units) else "an outside source"
+        return f"{who} sees something at {distance:.2f} m"
 
 
-def _on_the_way(step: ControlStep, names: _Names) -> Explanation:
+def _on_the_way(step: "ControlStep", names: _Names) -> Explanation:
     """Explain a step in which the arm does what is asked, as far as it can."""
     limited = step.limited
     off = float(np.linalg.norm(step.ee_position - step.path_position))
@@ -122,17 +190,18 @@ def _on_the_way(step: ControlStep, names: _Names) -> Explanation:
         if off >= OFF_PATH_M:
             return Explanation(Doing.RETURNING, f"Returning to its path, {off:.2f} m away.")
         near = step.obstacles.body_distance
-        seen = names.sees(step, int(near.argmin())) if len(near) else names.sees_nothing()
+        nothing = "nothing near is seen" if len(names.units) else "no sensor unit is in use"
+        seen = names.sees(step, int(near.argmin())) if len(near) else nothing
         moves = np.linalg.norm(step.desired_velocity) >= ASKED_M_S
         return Explanation(Doing.MOVING, (f"Moving at {speed:.2f} m/s: " if moves else "In its place: ") + f"{seen}.")
     cause, share = limited.obstacle, limited.share if restricted else step.speed_scale
     gone = "what was seen has gone from view, a unit is late, or none looks where it goes"
     why = names.sees(step, cause) if cause >= 0 else gone
     if restricted and off >= OFF_PATH_M:
-        kept = f"{off:.2f} m from its path: {why}."
+        place = f"{off:.2f} m from its path: {why}."
         if speed < _REST_M_S:
-            return Explanation(Doing.BLOCKED, f"At rest {kept} It goes on when the way is clear.")
-        return Explanation(Doing.AVOIDING, f"Kept {kept}")
+            return Explanation(Doing.BLOCKED, f"At rest {place} It goes on when the way is clear.")
+        return Explanation(Doing.AVOIDING, f"Kept {place}")
     if speed < _REST_M_S and share < 0.1:
         return Explanation(Doing.BLOCKED, f"At rest: {why}. It goes on when the way is clear.")
     back = "" if off < OFF_PATH_M else f" on its way back to the path, {off:.2f} m away"
@@ -141,19 +210,19 @@ def _on_the_way(step: ControlStep, names: _Names) -> Explanation:
     return Explanation(Doing.MOVING, f"Moving, but {_limit(step, names, cause)}.")
 
 
-def _limit(step: ControlStep, names: _Names, cause: int) -> str:
+def _limit(step: "ControlStep", names: _Names, cause: int) -> str:
     """Say how fast a link may near what limits it."""
     limit = float(step.approach_limit[np.flatnonzero(step.restricted == cause)[0]])
-    link = names.link(int(step.obstacles.link[cause]))
+    link = names.links[int(step.obstacles.link[cause])]
     may = f"may near it at {limit:.2f} m/s at most" if limit >= 0 else "has to back away from it"
     return f"{names.sees(step, cause)}, and {link} {may}"
 
 
-def _in_contact(step: ControlStep, names: _Names) -> Explanation:
+def _in_contact(step: "ControlStep", names: _Names) -> Explanation:
     """Explain a step in which the arm reacts to a contact."""
     if step.event is Event.OPENING:
         return Explanation(Doing.CAUGHT, step.reason)
-    place = f" at {names.link(int(step.touched.link[0]))}" if len(step.touched.link) else ""
+    place = f" at {names.links[int(step.touched.link[0])]}" if len(step.touched.link) else ""
     force = force_of(step)
     pushed = f"Touched{place}" + (f" with {force:.0f} N" if np.isfinite(force) else "")
     if step.contact is not None:  # it has not moved with it yet
@@ -172,7 +241,7 @@ def _in_contact(step: ControlStep, names: _Names) -> Explanation:
     return Explanation(Doing.TOUCHED, f"{pushed}: held still, the push is below what moves the arm.")
 
 
-def force_of(step: ControlStep) -> float:
+def force_of(step: "ControlStep") -> float:
     """Size of the force of a contact [N]: at the surest place, of a new contact, or of the estimate; NaN of none."""
     if len(step.touched.link):
         force = step.touched.force[0]

@@ -138,12 +138,8 @@ def ask(fixed: Blocks, remembered: Blocks, now: Blocks, alone: bool) -> None:
         _task(fixed), _pace(remembered), _way(now),
     )  # fmt: skip
     slowed = speed_scale(nearest[0], slow_m) if slow_m > 0.0 else 1.0
-    path.scale[0], pace.scale[0], pace.cycles[0] = reduce_speed(
-        pace.scale[0], pace.cycles[0], min(heard[0], slowed), p.restore_cycles
-    )
-    path.forward[0] = follow(
-        path.point, path.tangent, pace.speed[0], ee, p.off_path_m, p.position_gain_1_s, path.velocity
-    )
+    path.scale[0] = reduce_speed(pace, min(heard[0], slowed), p.restore_cycles)
+    follow(path, pace.speed[0], ee, p)
     if alone:
         request.goal[:], request.advances[0] = rotation_goal, 1
         for i in range(3):
@@ -186,9 +182,7 @@ def go_on(fixed: Blocks, remembered: Blocks, now: Blocks) -> None:
     """Go on along the path with the motion, or stay at its phase and start gently from it later."""
     (p, end_m, _), (pace,), (path, request, answer) = _task(fixed), _going(remembered), _gone(now)
     if request.advances[0] == 1 and (request.hold[0] == 1 or answer.ending[0] == SOLVED):
-        velocity = answer.velocities[1]
-        phase = advance(pace.phase[0], path.tangent, path.velocity, path.forward[0], velocity, p.control_period_s)
-        pace.phase[0] = min(phase, end_m)
+        pace.phase[0] = min(advance(pace.phase[0], path, answer.velocities[1], p.control_period_s), end_m)
         pace.speed[0] = min(p.speed_m_s, pace.speed[0] + p.acceleration_m_s2 * p.control_period_s)
     else:
         pace.speed[0] = 0.0

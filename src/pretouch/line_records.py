@@ -7,6 +7,7 @@ from pretouch.contact.sequential_step import SampleTest
 from pretouch.contact.virtual_mass import FreeMass
 from pretouch.contact.window import Window
 from pretouch.control.braking import BrakingNumbers, Slots
+from pretouch.control.interface import MotionRequest
 from pretouch.control.motion import MotionNumbers
 from pretouch.faults import Report, Watched
 from pretouch.groups import CapsuleArrays, Kinematics, Mechanism, Obstacles, SkinArrays
@@ -162,22 +163,6 @@ class OnPath(NamedTuple):
     """Factor on the velocity, of eqs. 3 and 4."""
 
 
-class Request(NamedTuple):
-    """What is asked of the arm, see `MotionRequest`."""
-
-    velocity: Annotated[FloatArray, 3]
-    goal: Annotated[FloatArray, 3, 3]
-    qd: Annotated[FloatArray, "n"]
-    by_joints: IntCell
-    """Whether `qd` is asked for, and not the velocity."""
-    hold: IntCell
-    advances: IntCell
-    """Whether the phase goes on with the motion."""
-    touch_m_s: Cell
-    """NaN for what the profile says."""
-    untouched: IntCell
-
-
 class Answer(NamedTuple):
     """The answer of eq. 2, see `QpSolution`."""
 
@@ -208,5 +193,5 @@ class Now(NamedTuple):
     detection: SampleTest
     """What the detector makes of it; of moving thresholds the bands are theirs, and the ratio is the force's part."""
     path: OnPath
-    request: Request
+    request: MotionRequest
     answer: Answer

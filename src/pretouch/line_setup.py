@@ -17,6 +17,7 @@ from pretouch.contact.virtual_mass import FreeMass
 from pretouch.contact.window import window_init
 from pretouch.control.approach import ApproachRestriction, BrakingCurve, of_table_i, row_numbers
 from pretouch.control.braking import braking_numbers, slots_init
+from pretouch.control.interface import MotionRequest
 from pretouch.control.motion import MotionNumbers
 from pretouch.faults import Report, Watched
 from pretouch.groups import Kinematics, no_obstacles
@@ -38,7 +39,6 @@ from pretouch.line_records import (
     OnPath,
     Pace,
     Remembered,
-    Request,
     Seen,
     Sight,
 )
@@ -123,7 +123,7 @@ def now_init(controller: Any) -> Now:
         Kinematics(np.zeros((links, 3)), np.zeros((links, 3, 3)), np.zeros((n, 3)), np.zeros((n, 3))), three,
         Seen(of_units, no_obstacles(places), count, count, zero, zero, np.ones(1)), Compared(three, three),
         sample_test(n), OnPath(zero, three, three, three, zero, zero),
-        Request(three, np.eye(3), np.zeros(n), count, count, count, np.full(1, np.nan), np.full(1, sys.maxsize)),
+        MotionRequest(three, np.eye(3), np.zeros(n), count, count, count, np.full(1, np.nan), np.full(1, sys.maxsize)),
         Answer(
             np.zeros(n), np.zeros((2, 3)), np.zeros(places, np.int64), rows, rows, np.zeros(n + places), count, count,
             count,

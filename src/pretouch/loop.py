@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from pretouch.contact.residual_model import ResidualModel
-from pretouch.control.joint_box import JointLimits, box_and_brake
+from pretouch.control.joint_box import JointLimits, joint_box
 from pretouch.controller import Controller, ControllerState
 from pretouch.desired import Desired
 from pretouch.errors import ParameterError
@@ -335,7 +335,7 @@ def come_to_rest(limits: JointLimits, robot: Robot, clock: Clock, q: FloatArray,
         except Exception as error:
             errors.append(error)
         q = q + qd * limits.period
-        _, _, slower = box_and_brake(q, qd, limits.table)
+        _, _, slower = joint_box(q, qd, limits.table)
         try:
             robot.command(slower)
             qd = slower

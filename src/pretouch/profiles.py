@@ -76,12 +76,10 @@ class Profile(Checked):
 
 
 _PAPER = Profile()
-_BLIND = Profile(name="blind", perception=None, approach=None)
-
 
 PROFILES: dict[str, Profile] = {
     "paper": _PAPER,
-    "blind": _BLIND,
+    "blind": Profile(name="blind", perception=None, approach=None),
     "slowing-only": replace(_PAPER, name="slowing-only", detect=MovingThresholds(f_d_n=0.0)),
     "thresholds-only": replace(_PAPER, name="thresholds-only", slow=None),
     "paper-0.5m": replace(
@@ -129,8 +127,8 @@ are noisier, see what the arm meets early and lose it, and put it up to half a z
 
 
 def profile_names() -> tuple[str, ...]:
-    """Return the names of all profiles, those of other distributions last."""
-    return tuple(dict.fromkeys((*PROFILES, *names(GROUP))))
+    """Return the names of all profiles: ours, those of other distributions, and the short ones."""
+    return tuple(dict.fromkeys((*PROFILES, *names(GROUP), *SHORT)))
 
 
 def profile(text: str) -> Profile:
@@ -141,8 +139,7 @@ def profile(text: str) -> Profile:
     are, and for a value that is not allowed.
     """
     base, *changes = text.split(":")
-    found = _named(base)
-    return replace(changed(found, _paths(changes)), name=text) if changes else found
+    return replace(changed(_named(base), _paths(changes)), name=text) if changes else _named(base)
 
 
 def _named(name: str) -> Profile:
@@ -151,26 +148,23 @@ def _named(name: str) -> Profile:
     if name in SHORT:
         return replace(profile(SHORT[name]), name=name)
     if name not in names(GROUP):
-        known = ", ".join((*profile_names(), *SHORT))
-        raise ParameterError(f"The profile {name!r} is unknown: choose from {known}.")
-    found = load(GROUP, name)
-    if not isinstance(found, Profile):
-        raise ParameterError(f"The profile {name!r} is {found!r} in its distribution: it must be a Profile.")
-    return found
+        raise ParameterError(f"The profile {name!r} is unknown: choose from {', '.join(profile_names())}.")
+    loaded = load(GROUP, name)
+    if not isinstance(loaded, Profile):
+        raise ParameterError(f"The profile {name!r} is {loaded!r} in its distribution: it must be a Profile.")
+    return loaded
 
 
 def _paths(changes: list[str]) -> dict[str, str]:
     """Read changes: path -> text."""
-    texts: dict[str, str] = {}
+    texts = dict[str, str]()
     groups = [f.name for f in fields(Profile) if f.name != "name"]
     for change in changes:
-        path, equals, text = change.partition("=")
+        path, equals, texts[path] = change.partition("=")
         if not equals:
             raise ParameterError(f"The change {change!r} has no value: write PATH=VALUE.")
-        group = path.partition(".")[0]
-        if group not in groups:
+        if (group := path.partition(".")[0]) not in groups:
             raise ParameterError(f"The group {group!r} of {change!r} is unknown: choose from {', '.join(groups)}.")
-        texts[path] = text
     return texts
 
 

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from pretouch.explanation import Limited, limited_by
 from pretouch.groups import Obstacles as Obstacles
 from pretouch.inputs import SOMEWHERE as SOMEWHERE
 from pretouch.inputs import Inputs as Inputs
@@ -20,7 +21,6 @@ from pretouch.inputs import RobotState as RobotState
 from pretouch.inputs import SeenPoints as SeenPoints
 from pretouch.inputs import TouchReadings as TouchReadings
 from pretouch.inputs import TouchStatus as TouchStatus
-from pretouch.limited import Limited, limited_by
 from pretouch.modes import Event, ModeState, outcome_of
 from pretouch.modes import Mode as Mode
 from pretouch.modes import QpOutcome as QpOutcome

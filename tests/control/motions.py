@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from pretouch.control.interface import MotionRequest
 from pretouch.control.path import Circle
 from pretouch.controller import Controller
 from pretouch.decision import move_restricted
@@ -14,7 +13,7 @@ from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import Profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin
-from pretouch.types import ControlStep, RobotState
+from pretouch.types import ControlStep, FloatArray, RobotState
 
 
 class Mover:
@@ -26,8 +25,11 @@ class Mover:
         state = self.controller.init(RobotState(0.0, q, still, q, still, still, None))
         self.memory, self.approach = state.memory, state.approach
 
-    def step(self, kin: Kinematics, robot: RobotState, obstacles: Obstacles, request: MotionRequest) -> ControlStep:
-        """Return the motion of one step."""
+    def step(
+        self, kin: Kinematics, robot: RobotState, obstacles: Obstacles, velocity: FloatArray, goal: FloatArray,
+        qd: FloatArray | None = None, hold: bool = False,
+    ) -> ControlStep:  # fmt: skip
+        """Return the motion of one step in which velocity, orientation, or joint velocities are asked for."""
         controller, now = self.controller, self.controller.blank.copy()
         put_robot(now.part("robot", Report), robot)
         now.fill("kin", kin)
@@ -35,14 +37,13 @@ class Mover:
         for room, part in zip(now.part("seen.near", Obstacles), obstacles, strict=True):
             room[: len(part)] = part
         now.put("seen.all", len(obstacles.unit))
-        for name, asked in (("velocity", request.velocity), ("goal", request.rotation_goal), ("hold", request.hold)):
-            now.put(f"request.{name}", asked)
-        if request.qd is not None:
-            now.put("request.qd", request.qd)
-            now.put("request.by_joints", 1)
+        still = np.zeros(controller.model.n)
+        asked = {"velocity": velocity, "goal": goal, "hold": hold, "qd": still if qd is None else qd}
+        for name, number in {**asked, "by_joints": qd is not None}.items():
+            now.put(f"request.{name}", number)
         if controller.approach is None:
             controller.take(self.memory, now, controller.beside, MOVE, MOVE)
         else:
             part = controller.approach
-            self.approach = move_restricted(controller, part, self.approach, self.memory, now, robot, request)
+            self.approach = move_restricted(controller, part, self.approach, self.memory, now, robot)
         return ControlStep.of(now, CLEAR)

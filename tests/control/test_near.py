@@ -9,7 +9,7 @@ from tests.control.motions import Mover
 from tests.following_arm import DT, Arm
 
 from pretouch.control.braking import braking_cap
-from pretouch.control.interface import MotionRequest, Restricted, rows_of
+from pretouch.control.interface import Restricted, rows_of
 from pretouch.errors import ParameterError
 from pretouch.groups import no_obstacles
 from pretouch.params import NullSpaceMotion
@@ -170,8 +170,7 @@ def test_the_null_space_moves_the_elbow_away_and_the_hand_stays(panda_model: Rob
                 kin, panda_model.body, kin.position[panda_model.ee], np.zeros(1, np.int64), thing[None], np.eye(3)[:1]
             )
             robot = RobotState(0.0, q, qd, q, qd, np.zeros(7), None)
-            request = MotionRequest(np.zeros(3), start.rotation[panda_model.ee])
-            qd = mover.step(kin, robot, near, request).qp.qd
+            qd = mover.step(kin, robot, near, np.zeros(3), start.rotation[panda_model.ee]).qp.qd
             q = q + qd * DT
         gaps[name] = float(near.body_distance[0])
         np.testing.assert_allclose(kin.position[panda_model.ee], start.position[panda_model.ee], atol=1e-3)
@@ -184,6 +183,6 @@ def test_joint_velocities_asked_for_are_the_answer_within_the_limits(panda_model
     for params in (PROFILES["paper"], PRETOUCH):
         motion = Mover(panda_model, params).step(
             panda_model.kinematics(arm.q), arm.robot(), no_obstacles(),
-            MotionRequest(np.array([0.0, 0.3, 0.0]), np.eye(3), qd=wanted),
+            np.array([0.0, 0.3, 0.0]), np.eye(3), wanted,
         )  # fmt: skip
         np.testing.assert_allclose(motion.qp.qd, wanted, atol=1e-12)

@@ -9,7 +9,6 @@ from tests.control.test_near import LEFT, PRETOUCH, A, hand_speed, on_its_way, t
 from tests.following_arm import DT, Arm
 
 from pretouch.control.braking import braking_cap
-from pretouch.control.interface import MotionRequest
 from pretouch.control.joint_box import joint_limits
 from pretouch.perception.closest import closest_points
 from pretouch.profiles import profile
@@ -118,8 +117,7 @@ def test_in_any_posture_nothing_that_stands_is_met_faster_than_the_curve_allows(
         kin = model.kinematics(q)
         near = closest_points(kin, model.body, kin.position[model.ee], np.arange(3), things, np.eye(3))
         robot = RobotState(0.0, q, qd, q, qd, np.zeros(7), None)
-        request = MotionRequest(course, start.rotation[model.ee])
-        motion = mover.step(kin, robot, near, request)
+        motion = mover.step(kin, robot, near, course, start.rotation[model.ee])
         command = motion.qp.qd
         assert motion.qp.outcome is QpOutcome.SOLVED
         assert np.all(np.abs(command - qd) <= limits.qdd_max * DT + 1e-9)

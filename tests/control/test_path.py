@@ -11,6 +11,7 @@ from tests.following_arm import DT, Arm
 
 from pretouch.control.path import Circle, Path, WayPoints, advance, follow, segment
 from pretouch.errors import PathError
+from pretouch.line_records import OnPath
 from pretouch.params import TaskParams
 
 CIRCLE = Circle()  # paper, IV-A: radius 0.25 m round (0.5, 0, 0.25)
@@ -19,17 +20,16 @@ SQUARE = WayPoints(np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]), clo
 PARAMS = TaskParams()
 
 
-def followed(path: Path, phase: float, speed: float, position: np.ndarray) -> tuple[np.ndarray, float]:
-    """Task velocity, and its speed along the path before it is limited."""
-    p, velocity = PARAMS, np.empty(3)
-    point, tangent = path.point(phase), path.tangent(phase)
-    forward = follow(point, tangent, speed, position, p.off_path_m, p.position_gain_1_s, velocity)
-    return velocity, forward
+def followed(path: Path, phase: float, speed: float, position: np.ndarray) -> OnPath:
+    """The path at a phase, with the task velocity."""
+    on_path = OnPath(np.full(1, phase), path.point(phase), path.tangent(phase), np.empty(3), np.empty(1), np.ones(1))
+    follow(on_path, speed, position, PARAMS.numbers)
+    return on_path
 
 
 def moved(path: Path, phase: float, speed: float, position: np.ndarray, velocity: np.ndarray) -> float:
     """The phase after a cycle with a commanded velocity."""
-    return advance(phase, path.tangent(phase), *followed(path, phase, speed, position), velocity, DT)
+    return advance(phase, followed(path, phase, speed, position), velocity, DT)
 
 
 def test_circle_starts_at_its_left_and_rises():
@@ -103,15 +103,15 @@ SLOWED = 0.02 / np.hypot(0.01, 0.1)
     ],
 )
 def test_along_and_back_to_the_path_by_numbers(speed: float, position: tuple, velocity: tuple):
-    np.testing.assert_allclose(followed(LINE, 0.25, speed, np.array(position))[0], velocity, atol=1e-12)
+    np.testing.assert_allclose(followed(LINE, 0.25, speed, np.array(position)).velocity, velocity, atol=1e-12)
 
 
 @given(arrays(np.float64, 3, elements=st.floats(-2, 2)), st.floats(0, 10), st.floats(0, 0.3))
 @settings(deadline=None, derandomize=True, max_examples=200)
 def test_the_task_is_never_faster_than_allowed_by_now(position: np.ndarray, phase: float, speed: float):
-    velocity, forward = followed(CIRCLE, phase, speed, position)
-    assert 0 <= forward <= speed
-    assert np.linalg.norm(velocity) <= speed * (1 + 1e-12)
+    on_path = followed(CIRCLE, phase, speed, position)
+    assert 0 <= on_path.forward[0] <= speed
+    assert np.linalg.norm(on_path.velocity) <= speed * (1 + 1e-12)
 
 
 @pytest.mark.parametrize(
@@ -132,7 +132,7 @@ def test_the_phase_moves_by_what_was_achieved_along_the_path(path: Path, phase: 
 def test_the_way_back_to_the_path_is_no_way_along_it_by_numbers():
     # 0.05 m behind: asked for 0.2 * 0.5 + 2 * 0.05 = 0.2 m/s, and does it; 0.1 of it is progress, 0.1 catches up
     behind = LINE.point(0.2)
-    np.testing.assert_allclose(followed(LINE, 0.25, 0.2, behind)[0], [0, -0.2, 0], atol=1e-12)
+    np.testing.assert_allclose(followed(LINE, 0.25, 0.2, behind).velocity, [0, -0.2, 0], atol=1e-12)
     np.testing.assert_allclose(moved(LINE, 0.25, 0.2, behind, np.array([0, -0.2, 0])), 0.251)
     # slowed to a half it does 0.1 m/s, 0.1 less than asked: all of that is catching up
     np.testing.assert_allclose(moved(LINE, 0.25, 0.2, behind, np.array([0, -0.1, 0])), 0.25)
@@ -144,7 +144,7 @@ def test_the_way_back_to_the_path_is_no_way_along_it_by_numbers():
 def test_wherever_it_was_pushed_the_arm_comes_back_and_goes_on(path: Path, away: np.ndarray, slowed: float):
     phase, speed, position = 0.0, 0.0, path.point(0.0) + away
     for _ in range(2500):  # 0.5 m at a fifth of 0.3 m/s is 8 s, and then as long again
-        velocity = slowed * followed(path, phase, speed, position)[0]
+        velocity = slowed * followed(path, phase, speed, position).velocity
         phase = moved(path, phase, speed, position, velocity)
         speed = min(PARAMS.speed_m_s, speed + PARAMS.acceleration_m_s2 * DT)
         position = position + DT * velocity

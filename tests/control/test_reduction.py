@@ -7,18 +7,21 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pretouch.control.path import faded_scale, reduce_speed, speed_scale
+from pretouch.control.path import reduce_speed, speed_scale
+from pretouch.line_records import Pace
 
 D_MAX = 0.8
 
 
+def pace_of(scale: float, cycles: int) -> Pace:
+    """What is remembered some cycles after the factor was `scale`."""
+    return Pace(np.full(1, scale), np.full(1, cycles), np.zeros(1), np.zeros(1))
+
+
 def faded(fresh: list[float]) -> list[float]:
     """Factor on the speed for a sequence of fresh factors, with l_max = 4."""
-    scale, cycles, out = 1.0, 0, []
-    for factor in fresh:
-        slowed, scale, cycles = reduce_speed(scale, cycles, factor, 4)
-        out.append(slowed)
-    return out
+    pace = pace_of(1.0, 0)
+    return [reduce_speed(pace, factor, 4) for factor in fresh]
 
 
 def scales(distances: list[float]) -> list[float]:
@@ -37,7 +40,7 @@ def test_eq_3_by_numbers(distance: float, scale: float):
 @pytest.mark.parametrize(("l_obs", "scale"), [(0, 0.25), (50, 0.4375), (200, 1.0), (300, 1.0)])
 def test_eq_4_by_numbers(l_obs: int, scale: float):
     # 0.25 + (1 - 0.25) * 50 / 200 = 0.25 + 0.1875
-    assert faded_scale(0.25, l_obs, 200) == pytest.approx(scale)
+    assert reduce_speed(pace_of(0.25, l_obs - 1), 1.0, 200) == pytest.approx(scale)
 
 
 NONE = np.inf
@@ -102,4 +105,5 @@ def test_the_factor_is_never_above_what_the_nearest_seen_obstacle_allows(distanc
 
 def test_a_factor_that_is_no_number_leaves_a_usable_factor():
     # 0.5 + 0.5 * 3 / 4: as if nothing were seen
-    assert reduce_speed(0.5, 2, np.nan, 4) == (0.875, 0.5, 3)
+    pace = pace_of(0.5, 2)
+    assert (reduce_speed(pace, np.nan, 4), pace.scale[0], pace.cycles[0]) == (0.875, 0.5, 3)

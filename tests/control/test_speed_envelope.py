@@ -10,7 +10,6 @@ from hypothesis.extra.numpy import arrays
 
 from pretouch.control.joint_box import (
     JointLimits,
-    box_and_brake,
     brake,
     joint_box,
     joint_limits,
@@ -127,7 +126,7 @@ def test_no_command_inside_the_box_breaks_a_limit(period: float, greedy: bool):
     q = np.clip(q, limits.envelope.q_lower, limits.envelope.q_upper)
     upwards, used = rng.random(N) < 0.5, np.zeros(N, dtype=bool)
     for i in range(2500):  # 1 050 000 joint steps
-        lower, upper, _ = box_and_brake(q, qd, limits.table)
+        lower, upper, _ = joint_box(q, qd, limits.table)
         assert np.all(lower <= upper)
         command = np.where(upwards, upper, lower) if greedy else rng.uniform(lower, upper)
         assert np.all(np.abs(command - qd) <= limits.qdd_max * period + 1e-9)
@@ -148,13 +147,13 @@ def test_full_braking_brings_a_joint_back_below_the_envelope(period: float):
     q, qd = limits.q_max - 1e-3, 0.9 * limits.qd_max
     assert np.all(qd > allowed(q, limits)[0])
     for _ in range(int(np.ceil((qd / reach).max()))):
-        _, upper = joint_box(q, qd, limits)
+        _, upper = joint_box(q, qd, limits.table)[:2]
         too_fast = qd - reach > allowed(q, limits)[0]
         np.testing.assert_allclose(upper[too_fast], (qd - reach)[too_fast], rtol=1e-12)
         q, qd = q + upper * period, upper
     assert np.all(qd <= allowed(q, limits)[0] + 1e-12)
     for _ in range(int(5.0 / period)):  # and from there it can come back
-        qd = joint_box(q, qd, limits)[0]
+        qd = joint_box(q, qd, limits.table)[0]
         q = q + qd * period
     check(q, qd, limits)
 
@@ -188,7 +187,7 @@ def test_the_course_towards_the_end_is_nearly_as_fast_as_can_be(period: float, s
     best = fastest_time(limits, q, end - 1e-3)
     taken, steps = np.zeros(7), 0
     while steps * period < 4.0:
-        upper = joint_box(q, qd, limits)[1]
+        upper = joint_box(q, qd, limits.table)[1]
         before, q, qd = q, q + upper * period, upper
         passes = (before < end - 1e-3) & (q >= end - 1e-3)
         taken[passes] = (steps + (end - 1e-3 - before)[passes] / (q - before)[passes]) * period
@@ -204,10 +203,10 @@ def test_braking_within_the_envelope_ends_at_rest(period: float):
     q, qd = rng.uniform(limits.q_min, limits.q_max), np.zeros(N)
     upwards = rng.random(N) < 0.5
     for _ in range(int(0.3 / period)):
-        lower, upper = joint_box(q, qd, limits)
+        lower, upper = joint_box(q, qd, limits.table)[:2]
         q, qd = q + np.where(upwards, upper, lower) * period, np.where(upwards, upper, lower)
     for _ in range(int(6.0 / 5.0 / period) + 1):  # 6 rad/s at 5 rad/s^2
-        lower, upper, stop = box_and_brake(q, qd, limits.table)
+        lower, upper, stop = joint_box(q, qd, limits.table)
         np.testing.assert_array_equal(stop, brake(qd, lower, upper, limits.table))
         assert np.all((lower <= stop) & (stop <= upper))
         q, qd = q + stop * period, stop
@@ -224,9 +223,9 @@ def test_the_box_is_sound_from_any_state(at: np.ndarray, fast: np.ndarray, perio
     limits = joint_limits(FR3, 0.01, period)
     q = FR3.q_mid + at * (limits.q_max - FR3.q_mid)
     qd, reach = limits.qd_max * fast, limits.qdd_max * period
-    lower, upper, stop = box_and_brake(q, qd, limits.table)
+    lower, upper, stop = joint_box(q, qd, limits.table)
     assert np.all((qd - reach <= lower) & (lower <= stop) & (stop <= upper) & (upper <= qd + reach))
-    with_margin, without = allowed(q, limits), joint_box(q, qd, replace(limits, envelope=None))
+    with_margin, without = allowed(q, limits), joint_box(q, qd, replace(limits, envelope=None).table)[:2]
     # beyond what the envelope allows at once, only full braking is left, and it takes nothing the brakes cannot
     assert np.all(upper <= np.maximum(with_margin[0], qd - reach) + 1e-9)
     assert np.all(-lower <= np.maximum(with_margin[1], -qd - reach) + 1e-9)
@@ -252,10 +251,10 @@ def test_an_arm_without_an_envelope_has_the_limits_of_its_range(panda_model):
     assert limits.envelope is None
     for q in (arm.q_ready, limits.q_max - 1e-4):
         plain = JointLimits(panda_model.q_min + 0.01, panda_model.q_max - 0.01, arm.qd_max, arm.qdd_max, 0.001)
-        np.testing.assert_array_equal(joint_box(q, np.zeros(7), limits), joint_box(q, np.zeros(7), plain))
+        np.testing.assert_array_equal(joint_box(q, np.zeros(7), limits.table), joint_box(q, np.zeros(7), plain.table))
 
 
 def test_a_speed_away_from_the_end_is_not_limited_by_it():
     limits = joint_limits(FR3, 0.0, 0.01)
-    lower, _ = joint_box(limits.q_max, np.zeros(7), limits)
+    lower, _ = joint_box(limits.q_max, np.zeros(7), limits.table)[:2]
     np.testing.assert_allclose(lower, -0.1)

@@ -7,8 +7,7 @@ import pytest
 
 from pretouch import desired
 from pretouch.desired import Desired
-from pretouch.explanation import explain
-from pretouch.limited import Limit
+from pretouch.explanation import Limit, explain
 from pretouch.profiles import PROFILES
 from pretouch.types import FloatArray
 from pretouch.viewer.asked import Asked, asked_in, told

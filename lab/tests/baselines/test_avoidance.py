@@ -6,7 +6,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.control.motions import Mover
 
-from pretouch.control.interface import MotionRequest
 from pretouch.control.joint_box import joint_limits
 from pretouch.errors import ParameterError
 from pretouch.perception.closest import closest_points
@@ -110,8 +109,8 @@ class Arm:
         self.obstacles = closest_points(self.kin, model.body, hand, np.zeros(k, np.int64), points, aside)
 
     def step(self, velocity, hold=False):
-        request = MotionRequest(np.array(velocity), self.kin.rotation[self.model.ee], hold)
-        return self.mover.step(self.kin, self.robot, self.obstacles, request)
+        goal = self.kin.rotation[self.model.ee]
+        return self.mover.step(self.kin, self.robot, self.obstacles, np.array(velocity), goal, hold=hold)
 
     def move(self, velocity, hold=False):
         """Answer to a velocity once the acceleration box has let the arm get there."""

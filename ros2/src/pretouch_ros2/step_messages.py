@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from pretouch.controller import Controller
-from pretouch.limited import Limit
+from pretouch.explanation import Limit
 from pretouch.loop import Cycle
 from pretouch.recording.ros import Look
 from pretouch.types import ControlStep, FloatArray, Mode, RangeReadings, RangeStatus

@@ -16,7 +16,7 @@ import numpy as np
 
 from pretouch.cholesky import backward, factor, forward
 from pretouch.compiled import kernel
-from pretouch.control.penalty import Minimum, Problem, excesses, finite, possible_rows
+from pretouch.control.penalty import Minimum, Problem, excess_of, excesses, finite, possible_rows
 from pretouch.modes import BUDGET, INFEASIBLE, NOT_CONVEX, NOT_FINITE, SOLVED
 from pretouch.types import FloatArray, IntArray
 
@@ -148,9 +148,7 @@ def _most_violated(A: FloatArray, b: FloatArray, x: FloatArray, from_excess: Flo
     """Return which bound is violated most, -1 for none, and by how much [rad/s]."""
     worst, most = -1, 0.0
     for c in range(len(b)):
-        excess = -b[c]
-        for i in range(len(x)):
-            excess += A[c, i] * x[i]
+        excess = excess_of(A, b, c, x)
         if excess > most and excess > from_excess[c]:
             worst, most = c, excess
     return worst, most

@@ -43,8 +43,8 @@ def asked_by(
     number, rate = _at(desired, now)
     R, here, gain = kin.rotation[model.ee], kin.position[model.ee], params.position_gain_1_s
     if desired.kind is DesiredKind.TWIST:
-        goal, kept = (held, held) if not number[3:].any() else (_led(R, number[3:], params), R)
-        return Asked(scale * number[:3], here, goal, kept)
+        goal, lasting = (held, held) if not number[3:].any() else (_led(R, number[3:], params), R)
+        return Asked(scale * number[:3], here, goal, lasting)
     if desired.kind is DesiredKind.POSE:
         velocity = rate[:3] + gain * (number[:3] - here)
         share = scale * _share(velocity, rate[:3], params)

@@ -1,6 +1,6 @@
 """What a restriction of the arm's motion is: what it is given, and what it returns."""
 
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
@@ -9,6 +9,7 @@ from pretouch.control.joint_box import JointLimits
 from pretouch.errors import ParameterError
 from pretouch.groups import Kinematics
 from pretouch.params import TaskParams
+from pretouch.records import Cell, IntCell
 from pretouch.robot.model import RobotModel
 from pretouch.types import WHOLE, FloatArray, IntArray, Obstacles, RobotState
 from pretouch.values import value
@@ -25,21 +26,26 @@ class MotionBody:
     task: TaskParams
 
 
-@value
-class MotionRequest:
+class MotionRequest(NamedTuple):
     """What is asked of the arm in one step."""
 
-    velocity: FloatArray
+    velocity: Annotated[FloatArray, 3]
     """(3,) of the end-effector origin [m/s]."""
-    rotation_goal: FloatArray
+    goal: Annotated[FloatArray, 3, 3]
     """(3, 3) R_O_ee to hold, if the task asks for it."""
-    hold: bool = False
+    qd: Annotated[FloatArray, "n"]
+    """(n,) joint velocities [rad/s]."""
+    by_joints: IntCell
+    """Whether they are asked for in place of the velocity, within the same limits."""
+    hold: IntCell
     """Whether to brake, whatever else is asked."""
-    qd: FloatArray | None = None
-    """(n,) joint velocities asked for in place of the task's, within the same limits [rad/s]."""
-    touch: float | None = None
+    advances: IntCell
+    """Whether the phase goes on with the motion."""
+    touch_m_s: Cell
     """Speed at which an arm that a contact moves may touch what it sees, and then nothing drives it away from what
-    comes nearer [m/s]; None for what the profile says."""
+    comes nearer [m/s]; NaN for what the profile says."""
+    untouched: IntCell
+    """`Obstacles.unit` from which on an obstacle is not to be touched at any speed."""
 
 
 @value

@@ -117,8 +117,9 @@ def _before_period(k: float, x: float, o: float, b: float) -> float:
     return k + z / (p + np.sqrt(p**2 + z)) if z > 0.0 else k
 
 
-def joint_box(q: FloatArray, qd: FloatArray, limits: JointLimits) -> tuple[FloatArray, FloatArray]:
-    """Lower and upper bounds (n,) [rad/s] on the next joint velocity command; never empty.
+@compiled
+def joint_box(q: FloatArray, qd: FloatArray, table: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Lower and upper bounds (n,) [rad/s] on the next joint velocity command, never empty, and `brake` inside them.
 
     The box of velocity and position limits, and of the envelope if there is one, is met with what the acceleration
     allows from the last commanded velocity. From a state that is no longer viable acceleration wins: the joint brakes
@@ -126,19 +127,6 @@ def joint_box(q: FloatArray, qd: FloatArray, limits: JointLimits) -> tuple[Float
 
     Args:
         q: (n,) commanded joint positions, where the motion generator is [rad].
-        qd: (n,) last commanded joint velocities [rad/s].
-        limits: the limits.
-    """
-    lower, upper, _ = box_and_brake(q, qd, limits.table)
-    return lower, upper
-
-
-@compiled
-def box_and_brake(q: FloatArray, qd: FloatArray, table: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """`joint_box` and, inside it, `brake` in one call: lower, upper and braking velocities (n,) [rad/s].
-
-    Args:
-        q: (n,) commanded joint positions [rad].
         qd: (n,) last commanded joint velocities [rad/s].
         table: `JointLimits.table`.
     """

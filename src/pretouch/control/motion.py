@@ -6,8 +6,8 @@ import numpy as np
 
 from pretouch.compiled import inlined, kernel
 from pretouch.control.active_set import minimise_within
-from pretouch.control.interface import Rows
-from pretouch.control.joint_box import box_and_brake
+from pretouch.control.interface import MotionRequest, Rows
+from pretouch.control.joint_box import joint_box
 from pretouch.control.penalty import Minimum, Problem, excesses, minimise
 from pretouch.control.task import away, cost_into, twist
 from pretouch.groups import Arm, Kinematics, Obstacles
@@ -18,7 +18,7 @@ from pretouch.types import FloatArray
 
 if TYPE_CHECKING:
     from pretouch.faults import Report
-    from pretouch.line_records import Answer, Request
+    from pretouch.line_records import Answer
 
 
 class MotionNumbers(NamedTuple):
@@ -40,8 +40,8 @@ class MotionNumbers(NamedTuple):
 
 @kernel
 def move_within(
-    p: MotionNumbers, robot: "Report", scene: tuple[Kinematics, FloatArray, Obstacles], request: "Request", rows: Rows,
-    speeds: tuple[FloatArray, FloatArray], null_velocity: FloatArray, answer: "Answer",
+    p: MotionNumbers, robot: "Report", scene: tuple[Kinematics, FloatArray, Obstacles], request: MotionRequest,
+    rows: Rows, speeds: tuple[FloatArray, FloatArray], null_velocity: FloatArray, answer: "Answer",
 ) -> None:  # fmt: skip
     """Write the joint velocities of eq. 2 within the joint limits and rows; change the motion in the null space.
 
@@ -60,7 +60,7 @@ def move_within(
     J = np.empty((6, n))
     jacobian_into(kin.anchor, kin.axis, arm.moved_by[arm.ee], ee, J)
     # the box starts from commanded positions and speeds, where it is exact; Jacobian and cost from measured ones
-    lower, upper, stop = box_and_brake(robot.q_commanded, robot.qd_commanded, p.limits)
+    lower, upper, stop = joint_box(robot.q_commanded, robot.qd_commanded, p.limits)
     # what the acceleration does not allow comes later: the box is never empty
     for i in range(len(slowest)):
         least, most = lower[i], upper[i]
@@ -94,7 +94,7 @@ def move_within(
 
 @inlined
 def _cost(
-    p: MotionNumbers, J: FloatArray, q: FloatArray, request: "Request", rotation: FloatArray, z: FloatArray,
+    p: MotionNumbers, J: FloatArray, q: FloatArray, request: MotionRequest, rotation: FloatArray, z: FloatArray,
     H: FloatArray, f: FloatArray,
 ) -> None:  # fmt: skip
     """Write the cost of eq. 2, or of how far the joint velocities are from those asked for."""

@@ -3,13 +3,17 @@
 import math
 from bisect import bisect_right
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from pretouch.compiled import kernel
 from pretouch.errors import PathError
+from pretouch.params import TaskParams
 from pretouch.types import FloatArray
+
+if TYPE_CHECKING:
+    from pretouch.line_records import OnPath, Pace
 
 
 class Path(Protocol):
@@ -56,14 +60,10 @@ class Circle:
     """Where it begins, from +y towards +z [rad]."""
 
     def __post_init__(self) -> None:
-        if not np.all(np.abs([*self.center, self.start_angle]) <= _LARGEST):
+        if not (np.all(np.abs([*self.center, self.start_angle]) <= _LARGEST) and _SHORTEST <= self.radius <= _LARGEST):
             raise PathError(
-                f"The circle has center {self.center} m and start angle {self.start_angle} rad: give finite numbers,"
-                f" none beyond {_LARGEST:g}."
-            )
-        if not _SHORTEST <= self.radius <= _LARGEST:
-            raise PathError(
-                f"The circle has the radius {self.radius} m: it must be from {_SHORTEST:g} to {_LARGEST:g}."
+                f"The circle has center {self.center} m, radius {self.radius} m and start angle {self.start_angle} rad:"
+                f" give finite numbers, none beyond {_LARGEST:g}, and a radius of at least {_SHORTEST:g}."
             )
 
     @property
@@ -148,56 +148,36 @@ def nearest_phase(path: Path, position: FloatArray) -> float:
 
 
 @kernel
-def follow(
-    point: FloatArray, tangent: FloatArray, speed: float, here: FloatArray, off_path: float, gain: float,
-    velocity: FloatArray,
-) -> float:  # fmt: skip
-    """Write the task velocity x_d (3,) [m/s]: along the path, and towards it, no faster than the speed allowed by now.
+def follow(path: "OnPath", speed: float, here: FloatArray, p: TaskParams) -> None:
+    """Write the task velocity x_d: along the path, and towards it, no faster than the speed allowed by now [m/s].
 
-    Off the path the forward part shrinks, to nothing at `off_path` [m]: the arm first returns to where it left. Returns
-    that part, before it is limited [m/s].
-
-    Args:
-        point: (3,) of the path, where the end-effector should be [m].
-        tangent: (3,) unit tangent there.
-        speed: allowed by now [m/s].
-        here: (3,) end-effector origin [m].
-        off_path: see above.
-        gain: of the way back to the path [1/s].
-        velocity: written to.
+    Off the path the forward part shrinks, to nothing at `off_path_m`: the arm first returns to where it left. `here`
+    (3,) is the end-effector origin [m].
     """
-    x, y, z = point[0] - here[0], point[1] - here[1], point[2] - here[2]
-    forward = speed * max(0.0, 1.0 - math.sqrt(x * x + y * y + z * z) / off_path)
+    velocity, square, size = path.velocity, 0.0, 0.0
+    for i in range(3):
+        square += (path.point[i] - here[i]) ** 2
+    path.forward[0] = speed * max(0.0, 1.0 - math.sqrt(square) / p.off_path_m)
     for i in range(3):  # feedforward along the path, feedback towards it
-        velocity[i] = forward * tangent[i] + gain * (point[i] - here[i])
-    size = math.sqrt(velocity[0] ** 2 + velocity[1] ** 2 + velocity[2] ** 2)
+        velocity[i] = path.forward[0] * path.tangent[i] + p.position_gain_1_s * (path.point[i] - here[i])
+        size += velocity[i] ** 2
+    size = math.sqrt(size)
     if size > speed:
         for i in range(3):
             velocity[i] *= speed / size  # as a whole: the direction stays
-    return forward
 
 
 @kernel
-def advance(
-    phase: float, tangent: FloatArray, asked: FloatArray, forward: float, commanded: FloatArray, period: float
-) -> float:
-    """Move the phase [m] on by one period of the forward speed, less what the arm falls short of it, never back.
+def advance(phase: float, path: "OnPath", commanded: FloatArray, period: float) -> float:
+    """Move the phase [m] on by one period [s] of the forward speed, less what the arm falls short of it, never back.
 
     Slowing or blocking the arm so slows the phase. Motion back to the path is no progress along it, so an arm pushed
-    ahead or back meets the path where it left.
-
-    Args:
-        phase: arc length so far [m].
-        tangent: (3,) unit tangent there.
-        asked: (3,) task velocity x_d, before eqs. 3-4 [m/s].
-        forward: its speed along the path, before it is limited [m/s].
-        commanded: (3,) velocity commanded at the end-effector origin [m/s].
-        period: of control [s].
+    ahead or back meets the path where it left. `commanded` (3,) is the velocity of the end-effector origin [m/s].
     """
     missing = 0.0  # what eqs. 3-4, the rows and the joint box took from it
     for i in range(3):
-        missing += (asked[i] - commanded[i]) * tangent[i]
-    return phase + max(0.0, forward - max(0.0, missing)) * period
+        missing += (path.velocity[i] - commanded[i]) * path.tangent[i]
+    return phase + max(0.0, path.forward[0] - max(0.0, missing)) * period
 
 
 @kernel
@@ -211,26 +191,19 @@ def speed_scale(distance: float, d_max: float) -> float:
 
 
 @kernel
-def faded_scale(scale: float, l_obs: int, l_max: int) -> float:
-    """Factor s + (1 - s) l_obs / l_max of eq. 4 of the paper: back to full speed in l_max cycles after a loss."""
-    return scale + (1.0 - scale) * min(1.0, l_obs / l_max)
+def reduce_speed(pace: "Pace", fresh: float, l_max: int) -> float:
+    """One cycle of eqs. 3 and 4: change what is remembered, and return the factor on the end-effector velocity.
 
-
-@kernel
-def reduce_speed(scale: float, cycles: int, fresh: float, l_max: int) -> tuple[float, float, int]:
-    """One cycle of eqs. 3 and 4: the factor on the end-effector velocity, and the scale and cycles to remember.
-
-    The fresh factor holds at once where it is the smaller one, and rises no faster than eq. 4 lets it: whether the
-    nearest obstacle vanished, was seen again farther away, or left another one in view, the speed never jumps up.
-
-    Args:
-        scale: factor when it last fell or kept pace.
-        cycles: l_obs since then.
-        fresh: factor of eq. 3 for what is seen now, or less where a unit is silent; 1 for nothing.
-        l_max: cycles until full speed is restored.
+    Eq. 4 of the paper, s + (1 - s) l_obs / l_max, goes back to full speed in l_max cycles after a loss. The fresh
+    factor, of eq. 3 or of a silent unit, holds at once where it is the smaller one, and rises no faster than that:
+    whether the nearest obstacle vanished, was seen again farther away, or left another one in view, the speed never
+    jumps up.
     """
-    faded = faded_scale(scale, cycles + 1, l_max)
+    scale, cycles = pace.scale[0], pace.cycles[0] + 1
+    faded = scale + (1.0 - scale) * min(1.0, cycles / l_max)
     if fresh <= faded:
-        return fresh, fresh, 0
+        pace.scale[0], pace.cycles[0] = fresh, 0
+        return fresh
     # the factor at the loss stays, and the cycles count on: eq. 4 is linear in them and ends at 1 after l_max
-    return faded, scale, cycles + 1
+    pace.cycles[0] = cycles
+    return faded

@@ -110,15 +110,15 @@ def minimise(problem: Problem, budget: int, answer: Minimum) -> int:
 @kernel
 def possible_rows(G: FloatArray, h: FloatArray, lower: FloatArray, upper: FloatArray) -> IntArray:
     """Indices of the rows G x <= h that some x of the box violates; all others can be left out of any problem in it."""
-    which, found = np.empty(len(h), np.int64), 0
+    which, count = np.empty(len(h), np.int64), 0
     for k in range(len(h)):
         most = 0.0  # the largest G_k x of the box, which is at one of its corners
         for i in range(len(lower)):
             most += max(G[k, i] * lower[i], G[k, i] * upper[i])
         if not most <= h[k]:  # NaN counts as possible
-            which[found] = k
-            found += 1
-    return which[:found]
+            which[count] = k
+            count += 1
+    return which[:count]
 
 
 @inlined
@@ -141,19 +141,24 @@ def finite(problem: Problem) -> bool:
 
 
 @kernel
-def _excess(G: FloatArray, h: FloatArray, k: int, x: FloatArray) -> float:
-    """By how much row k is violated at x; negative where it holds."""
-    total = -h[k]
+def _product(A: FloatArray, k: int, x: FloatArray, start: float) -> float:
+    """Row k of A times x, added to what it starts from."""
     for i in range(len(x)):
-        total += G[k, i] * x[i]
-    return total
+        start += A[k, i] * x[i]
+    return start
+
+
+@kernel
+def excess_of(G: FloatArray, h: FloatArray, k: int, x: FloatArray) -> float:
+    """By how much row k is violated at x; negative where it holds."""
+    return _product(G, k, x, -h[k])
 
 
 @kernel
 def excesses(G: FloatArray, h: FloatArray, x: FloatArray, slack: FloatArray) -> None:
     """Write by how much each row is violated at x, zero where it holds."""
     for k in range(len(h)):
-        slack[k] = max(0.0, _excess(G, h, k, x))
+        slack[k] = max(0.0, excess_of(G, h, k, x))
 
 
 @kernel
@@ -163,7 +168,7 @@ def _take_violated(problem: Problem, which: IntArray, x: FloatArray, piece: _Pie
     hessian, linear, violated = piece.hessian, piece.linear, piece.violated
     n, dropped = len(x), False
     for k in which:
-        dropped = dropped or (violated[k] and not _excess(G, h, k, x) > 0)
+        dropped = dropped or (violated[k] and not excess_of(G, h, k, x) > 0)
     if dropped:
         # to take a row out again would leave the rounding of its large terms
         for i in range(n):
@@ -171,9 +176,9 @@ def _take_violated(problem: Problem, which: IntArray, x: FloatArray, piece: _Pie
             for j in range(n):
                 hessian[i, j] = H[i, j]
     for k in which:
-        known = violated[k] and not dropped
-        violated[k] = _excess(G, h, k, x) > 0
-        if violated[k] and not known:
+        before = violated[k] and not dropped
+        violated[k] = excess_of(G, h, k, x) > 0
+        if violated[k] and not before:
             for i in range(n):
                 linear[i] -= weight * h[k] * G[k, i]
                 for j in range(i + 1):
@@ -187,7 +192,7 @@ def _take_violated(problem: Problem, which: IntArray, x: FloatArray, piece: _Pie
 def _differs(G: FloatArray, h: FloatArray, which: IntArray, x: FloatArray, violated: BoolArray) -> bool:
     """Whether another piece of the cost rules at x, but for rows that x meets to rounding."""
     for k in which:
-        excess = _excess(G, h, k, x)
+        excess = excess_of(G, h, k, x)
         if (excess > 0) != violated[k] and abs(excess) > _ROUNDING * (1.0 + abs(h[k])):
             return True
     return False
@@ -203,18 +208,12 @@ def _shorten(problem: Problem, which: IntArray, x: FloatArray, y: FloatArray) ->
     # along the way the slope of the cost is start + t bend + w sum rate_k max(0, excess_k + t rate_k): it only rises
     start, bend = 0.0, 0.0
     for i in range(n):
-        gradient, change = f[i], 0.0
-        for j in range(n):
-            gradient += H[i, j] * x[j]
-            change += H[i, j] * d[j]
-        start += gradient * d[i]
-        bend += change * d[i]
-    excess, rate = np.empty(len(which)), np.zeros(len(which))
+        start += _product(H, i, x, f[i]) * d[i]
+        bend += _product(H, i, d, 0.0) * d[i]
+    excess, rate = np.empty(len(which)), np.empty(len(which))
     for m in range(len(which)):
         k = which[m]
-        excess[m] = _excess(G, h, k, x)
-        for i in range(n):
-            rate[m] += G[k, i] * d[i]
+        excess[m], rate[m] = excess_of(G, h, k, x), _product(G, k, d, 0.0)
     slope, _ = _slope(start, bend, excess, rate, weight, 1.0)
     if slope <= 0:
         return  # the cost still falls at y
@@ -329,8 +328,6 @@ def _certify(problem: Problem, piece: _Piece, at_bound: IntArray, answer: Minimu
     for k in range(len(problem.h)):
         multipliers[n + k] = problem.weight * slack[k]  # derivative of w/2 s^2
     for i in range(n):
-        pull = linear[i]
-        for j in range(n):
-            pull += hessian[i, j] * x[j]
+        pull = _product(hessian, i, x, linear[i])
         # H x + f + G^T (w s) + multiplier = 0 at the minimum; rounding may turn a sign, which the max takes off
         multipliers[i] = at_bound[i] * max(0.0, -at_bound[i] * pull)

@@ -11,7 +11,7 @@ import numpy as np
 from pretouch.composition import differences, field_docs
 from pretouch.errors import RecordingError
 from pretouch.params import TaskParams
-from pretouch.profiles import SHORT, Profile, profile, profile_names
+from pretouch.profiles import Profile, profile, profile_names
 from pretouch.sim.tcp_push import AXES
 from pretouch.types import FloatArray
 from pretouch.viewer.action_queue import ActionQueue
@@ -27,7 +27,7 @@ RECORDINGS = Path("runs")
 """Folder in which recordings are kept."""
 PUSH_N, PUSH_S = 20.0, 1.0
 """Force [N] and duration [s] of a push unless a person chooses others."""
-_NAMES = (*profile_names(), *SHORT)
+_NAMES = profile_names()
 _TEXT_HINT = "As on the command line, with any parameter: paper:detect.f_base_n=8:approach=none. Enter applies it."
 _NO_RESUME = "Resume: nothing waits for it"
 _RECORD_SETTLE_S = 0.3

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pretouch.explanation import OFF_PATH_M as OFF_PATH_M
-from pretouch.limited import binding as binding
+from pretouch.explanation import binding as binding
 from pretouch.types import ControlStep, FloatArray, Mode
 from pretouch.viewer import palette
 
