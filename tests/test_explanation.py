@@ -36,7 +36,7 @@ def step() -> ControlStep:
         q=np.zeros(7), q_commanded=np.zeros(7),
         ee_position=np.array([0.5, 0.25, 0.25]), ee_velocity=AHEAD, path_position=np.array([0.5, 0.25, 0.25]),
         path_phase=1.0, desired_velocity=AHEAD, speed_scale=1.0, range_distance=np.full(2, np.nan), obstacles=seen(),
-        force=still, filtered_force=still, thresholds=Thresholds(parts), armed=True, contact=None,
+        force=still, filtered_force=still, thresholds=Thresholds(*parts), armed=True, contact=None,
         reaction_velocity=still, restricted=np.zeros(0, int), approach_limit=np.zeros(0), qp=free, command=free.qd,
         residual=np.full(7, np.nan), evidence=0.1,
     )  # fmt: skip

@@ -33,42 +33,21 @@ from pretouch.values import Number as Number
 from pretouch.values import value
 
 
-@value
-class Thresholds:
+class Thresholds(NamedTuple):
     """Contact thresholds of the three axes (eq. 9) and what they are made of. All (3,) [N], base frame."""
 
-    parts: FloatArray
-    """(6, 3) all of them, in the order in which they follow."""
-
-    @property
-    def upper(self) -> FloatArray:
-        """T_u."""
-        return self.parts[0]
-
-    @property
-    def lower(self) -> FloatArray:
-        """T_l."""
-        return self.parts[1]
-
-    @property
-    def mean(self) -> FloatArray:
-        """Mean of the window."""
-        return self.parts[2]
-
-    @property
-    def sigma(self) -> FloatArray:
-        """Standard deviation of the window."""
-        return self.parts[3]
-
-    @property
-    def obstacle_positive(self) -> FloatArray:
-        """F_obs+ of eq. 11: an object at greater coordinate raises the lower threshold by this."""
-        return self.parts[4]
-
-    @property
-    def obstacle_negative(self) -> FloatArray:
-        """F_obs- of eq. 11: an object at smaller coordinate lowers the upper threshold by this."""
-        return self.parts[5]
+    upper: FloatArray
+    """T_u."""
+    lower: FloatArray
+    """T_l."""
+    mean: FloatArray
+    """Mean of the window."""
+    sigma: FloatArray
+    """Standard deviation of the window."""
+    obstacle_positive: FloatArray
+    """F_obs+ of eq. 11: an object at greater coordinate raises the lower threshold by this."""
+    obstacle_negative: FloatArray
+    """F_obs- of eq. 11: an object at smaller coordinate lowers the upper threshold by this."""
 
 
 @value
@@ -236,7 +215,7 @@ _PLACES: dict[str, Callable[[Flat], Any]] = {
     }.items()
 } | {
     "ee_velocity": lambda now: now.get("answer.velocities")[0], "obstacles": _obstacles,
-    "force": lambda now: now.get("robot.wrench")[:3], "thresholds": lambda now: Thresholds(now.get("detection.bands")),
+    "force": lambda now: now.get("robot.wrench")[:3], "thresholds": lambda now: Thresholds(*now.get("detection.bands")),
     "armed": lambda now: True, "contact": lambda now: None, "reaction_velocity": lambda now: np.zeros(3),
     "restricted": lambda now: now.get("answer.which")[: now.get("answer.seen")],
     "approach_limit": lambda now: now.get("answer.limit")[: now.get("answer.seen")], "qp": _solution,

@@ -27,7 +27,7 @@ def thresholds(
 ) -> Thresholds:
     parts = np.empty((6, 3))
     threshold_parts(mean, sigma, positive, negative, params.numbers, parts)
-    return Thresholds(parts)
+    return Thresholds(*parts)
 
 
 def crossed(force: tuple[float, float, float], near: Obstacles | None = None) -> list[bool] | None:

@@ -49,7 +49,7 @@ def test_a_field_without_a_lasting_name_is_found():
 
 def test_the_walk_sees_what_is_within_and_what_is_optional():
     places = set(leaves(ControlStep))
-    assert {"stamp", "contact.axes", "qp.outcome", "touched.sigma", "thresholds.parts"} <= places
+    assert {"stamp", "contact.axes", "qp.outcome", "touched.sigma", "thresholds.upper"} <= places
     assert not places & {"contact", "qp", "touched"}
 
 

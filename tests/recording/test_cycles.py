@@ -90,7 +90,7 @@ def steps(draw: st.DrawFn) -> ControlStep:
         q_commanded=draw(rows(n)), ee_position=draw(row), ee_velocity=draw(row), path_position=draw(row),
         path_phase=draw(NAN_TOO), desired_velocity=draw(row), speed_scale=draw(NAN_TOO),
         range_distance=draw(rows(units)), obstacles=obstacles, force=draw(row), filtered_force=draw(row),
-        thresholds=Thresholds(draw(rows(6, 3))), armed=draw(st.booleans()), contact=draw(st.none() | contact),
+        thresholds=Thresholds(*draw(rows(6, 3))), armed=draw(st.booleans()), contact=draw(st.none() | contact),
         reaction_velocity=draw(row), restricted=draw(wholes(m)), approach_limit=draw(rows(m)), qp=qp,
         command=draw(rows(n)), residual=draw(rows(n)), evidence=draw(NAN_TOO), touched=draw(places()),
         detectable_n=draw(NAN_TOO),
@@ -117,7 +117,7 @@ def test_a_step_comes_back_to_the_bit_in_arrays_as_fresh_ones(step):
     assert struct.unpack_from("<Q", data, 4)[0] == decoded(own("Step"), data).sequence == 7
     assert same(back, step)
     assert encoded_step(7, back) == data
-    for array in (back.q, back.obstacles.point, back.obstacles.unit, back.thresholds.parts, back.command):
+    for array in (back.q, back.obstacles.point, back.obstacles.unit, back.thresholds.lower, back.command):
         assert array.flags.aligned
         assert array.flags.writeable
         assert array.flags.c_contiguous
@@ -252,7 +252,7 @@ def test_messages_mirror_the_types_field_by_field(kind):
 
 
 def test_the_rows_of_the_thresholds_have_their_names(run):
-    step = replace(run.cycles[0].step, thresholds=Thresholds(np.arange(18.0).reshape(6, 3)))
+    step = replace(run.cycles[0].step, thresholds=Thresholds(*np.arange(18.0).reshape(6, 3)))
     message = decoded(own("Step"), encoded_step(0, step)).thresholds
     for name, _ in messages().store.fielddefs[own("Thresholds")][1]:
         assert getattr(message, name).tobytes() == getattr(step.thresholds, name).tobytes()

@@ -47,7 +47,7 @@ class Touch:
             negative = np.where(point < ee, np.maximum(negative, f_obs), negative)
         upper = mean + p.f_base_n + noise - negative  # eq. 9
         lower = mean - p.f_base_n - noise + positive
-        limits = Thresholds(np.array([upper, lower, mean, sigma, positive, negative]))
+        limits = Thresholds(*np.array([upper, lower, mean, sigma, positive, negative]))
         if force is None or not armed:
             return limits, None, armed
         reading = self.newest if p.compare == "filtered" else force

@@ -117,7 +117,7 @@ def step(model, units=7, stamp=0.0, near=(), **changes):
         q_commanded=model.description.q_ready, ee_position=np.array([0.5, 0.0, 0.5]), ee_velocity=zero,
         path_position=np.array([0.5, 0.0, 0.5]), path_phase=0.0, desired_velocity=zero, speed_scale=1.0,
         range_distance=np.full(units, np.nan), obstacles=seen(model, near), force=zero, filtered_force=zero,
-        thresholds=Thresholds(np.zeros((6, 3))), armed=True, contact=None, reaction_velocity=zero,
+        thresholds=Thresholds(*np.zeros((6, 3))), armed=True, contact=None, reaction_velocity=zero,
         restricted=np.zeros(0, np.int64), approach_limit=np.zeros(0),
         qp=QpSolution(np.zeros(n), np.zeros(0), np.zeros(n), QpOutcome.SOLVED, "Solved."), command=np.zeros(n),
         residual=np.zeros(n), evidence=0.0,

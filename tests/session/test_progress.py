@@ -119,7 +119,7 @@ def step(panda_model: RobotModel) -> ControlStep:
     """A step whose thresholds are 11 and -9 N about a mean of 1 N, and whose force is 9 N along y."""
     parts = np.repeat([11.0, -9.0, 1.0, 0.0, 0.0, 0.0], 3).reshape(6, 3)
     return made.step(
-        panda_model, filtered_force=np.array([1.0, 9.0, 1.0]), thresholds=Thresholds(parts), evidence=0.8,
+        panda_model, filtered_force=np.array([1.0, 9.0, 1.0]), thresholds=Thresholds(*parts), evidence=0.8,
         command=np.full(7, 0.1),
     )  # fmt: skip
 

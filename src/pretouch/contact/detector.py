@@ -142,7 +142,7 @@ def no_torques(body: Body, sample: Sample) -> Detection | None:
     """Return what a detector by torques says where there are none, or None where there are."""
     if below(sample.robot.tau_ext, np.inf):
         return None
-    return Detection(Thresholds(np.full((6, 3), np.nan)), None, False, np.full(body.model.n, np.nan), 0.0)
+    return Detection(Thresholds(*np.full((6, 3), np.nan)), None, False, np.full(body.model.n, np.nan), 0.0)
 
 
 def strongest(force: FloatArray, bands: Thresholds) -> Contact:

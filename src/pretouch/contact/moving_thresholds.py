@@ -52,7 +52,7 @@ def threshold_parts(
     mean: FloatArray, sigma: FloatArray, positive: FloatArray, negative: FloatArray, p: ThresholdParams,
     parts: FloatArray,
 ) -> None:  # fmt: skip
-    """Write thresholds of each axis [N] and what they are made of, eq. 9 of the paper: `Thresholds.parts` (6, 3).
+    """Write thresholds of each axis [N] and what they are made of, eq. 9 of the paper: the rows of `Thresholds` (6, 3).
 
     T_u = mu + F_b + F_sigma - F_obs-, T_l = mu - F_b - F_sigma + F_obs+: an object at greater y pushes the arm
     towards -y, so it raises T_l. Mean mu and standard deviation of the window are (3,) [N], distances to the nearest
@@ -104,7 +104,7 @@ class MovingThresholds(ThresholdParams, Detector, name="thresholds"):
         compared = _NONE if force is None else window.newest if self.compare == "filtered" else force
         count = int(window.samples[0])
         crosses, share = compare(window.sums, count, compared, ee_position, o.point, o.ee_distance, self.numbers, parts)
-        limits, contact = Thresholds(parts), None
+        limits, contact = Thresholds(*parts), None
         if crosses and armed:
             axes = (compared > limits.upper) | (compared < limits.lower)
             contact = Contact(compared - limits.mean, axes)  # F_ext = F_reading - mu, eq. 12

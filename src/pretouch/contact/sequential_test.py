@@ -78,7 +78,7 @@ class SequentialTest(SequentialParams, Detector, name="sequential"):
         if sample.doubted_kg:
             before = before._replace(model=doubted(before.model, sample.doubted_kg))
         tested, test = self._assessed(before, body, sample, cues)
-        ratio, bands, significant = float(tested.log_likelihood_ratio[0]), Thresholds(tested.bands), None
+        ratio, bands, significant = float(tested.log_likelihood_ratio[0]), Thresholds(*tested.bands), None
         if self.localise:
             location = localise(location or localisation_init(), body, sample, cues, tested, self.localise)
         if ratio >= 1.0:

@@ -62,7 +62,7 @@ class Decided:
     ) -> None:  # fmt: skip
         """Take in a cycle: instant [s], forces (3,) [N], thresholds, flags, and the contact that began in it."""
         self._time.append(time)
-        self._rows.append((force, compared, limits.parts))
+        self._rows.append((force, compared, np.array(limits)))
         self._flags.append((armed, reacting))
         if contact is not None:
             self._contacts.append(Found(time, contact.force, contact.axes))

@@ -14,7 +14,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 import pretouch
 from pretouch.errors import RecordingError
 from pretouch.recording.fields import hints_of, is_record, optional
-from pretouch.types import FloatArray, Thresholds
+from pretouch.types import FloatArray
 
 LIBRARY = f"pretouch {pretouch.__version__}"
 """What a file says it was written by."""
@@ -222,9 +222,6 @@ def _text(text: str | Enum) -> str:
 @cache
 def _maker(kind: type) -> Callable[[Any], Any]:
     """Return what makes a value of a class from a message."""
-    if kind is Thresholds:
-        names = [name for name, _ in _getters(own("Thresholds"))]
-        return lambda message: Thresholds(np.array([getattr(message, name) for name in names]))
     described = dict(messages().store.fielddefs[own(_NAMED.get(kind.__name__, kind.__name__))][1])
     rows = {name for name in _ROWS if name in described and described[name][0] == Nodetype.SEQUENCE}
     ways = tuple(_way(name, hint, name in rows) for name, hint in hints_of(kind))

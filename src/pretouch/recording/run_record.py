@@ -42,7 +42,7 @@ class DetectorRecord:
     force: FloatArray
     """(S, 3) estimate of each cycle [N], NaN without one."""
     thresholds: FloatArray
-    """(S, 6, 3) thresholds and what they are made of, as `Thresholds.parts` [N]."""
+    """(S, 6, 3) thresholds and what they are made of, the rows of `Thresholds` [N]."""
     armed: BoolArray
     """(S,) whether the force window was full."""
 
@@ -124,7 +124,7 @@ def columns_of(steps: Sequence[ControlStep]) -> Columns:
     return found | {
         "time": np.array([step.stamp for step in steps]),
         "mode": np.array([MODES.index(step.mode) for step in steps]),
-        "thresholds": np.array([step.thresholds.parts for step in steps]),
+        "thresholds": np.array([step.thresholds for step in steps]),
         "sensed_point": np.array([points_of_units(step.obstacles, len(step.range_distance)) for step in steps]),
     }
 

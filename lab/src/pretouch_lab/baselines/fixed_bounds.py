@@ -62,7 +62,7 @@ class FixedBounds(Detector, name="fixed"):
 def bands_of(band: FloatArray) -> Thresholds:
     """Bands (3,) about no force, of a spread that nobody knows."""
     none = np.zeros(3)
-    return Thresholds(np.array([band, -band, none, np.full(3, np.nan), none, none]))
+    return Thresholds(*np.array([band, -band, none, np.full(3, np.nan), none, none]))
 
 
 OBSERVER_NM = (3.2, 5.2, 3.2, 4.0, 1.8, 1.1, 1.4)
