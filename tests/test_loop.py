@@ -162,9 +162,7 @@ def test_no_start_from_a_state_that_is_not_finite(
     first = replace(world.read(), **{name: value if name == "stamp" else np.array([0, 0, 0, value, 0, 0, 0])})
     monkeypatch.setattr(world, "read", lambda: first)
     monkeypatch.setattr(world, "command", lambda qd: pytest.fail("no command is due"))
-    with pytest.raises(
-        RobotStateError, match=rf"cannot start: RobotState\.{name} holds {value}.*: check"
-    ):
+    with pytest.raises(RobotStateError, match=rf"cannot start: RobotState\.{name} holds {value}.*: check"):
         turn(controller, world, FakeRecorder(), never)
 
 

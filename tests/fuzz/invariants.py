@@ -17,7 +17,7 @@ from pretouch.profiles import Profile
 from pretouch.records import Flat
 from pretouch.robot.description import SpeedEnvelope
 from pretouch.robot.model import RobotModel
-from pretouch.types import ControlStep, Mode, QpOutcome, Touched
+from pretouch.types import ControlStep, Mode, QpOutcome, Thresholds, Touched
 from tests.fuzz.oracle import Expected, Oracle
 from tests.reference.motion import limit as eq_7
 
@@ -63,7 +63,7 @@ def check_shapes(step: ControlStep, n: int, units: int) -> None:
     k, rows = len(step.obstacles.unit), len(step.restricted)
     shapes = {
         **dict.fromkeys(("q", "q_commanded", "command", "qd", "residual"), (n,)), "range_distance": (units,),
-        "parts": (6, 3), "restricted": (rows,), "approach_limit": (rows,), "slack": (rows,), "multipliers": (n + rows,),
+        "restricted": (rows,), "approach_limit": (rows,), "slack": (rows,), "multipliers": (n + rows,),
         **dict.fromkeys(("unit", "link", "ee_distance", "body_distance", "closing_speed"), (k,)),
         **dict.fromkeys(("point", "body_point", "direction"), (k, 3)),
     }  # fmt: skip
@@ -89,8 +89,8 @@ def check_touched(touched: Touched) -> None:
 
 def check_finite(step: ControlStep, e: Expected, p: Profile) -> None:
     """Every number is finite but for what is documented to be NaN."""
-    unknown = MAY_BE_NAN if e.strained else MAY_BE_NAN | {"residual", "parts"}
-    unknown = unknown if isinstance(p.detect, MovingThresholds | SequentialTest) else unknown | {"parts"}
+    unknown = MAY_BE_NAN if e.strained else MAY_BE_NAN | {"residual", *Thresholds._fields}
+    unknown = unknown if isinstance(p.detect, MovingThresholds | SequentialTest) else unknown | {*Thresholds._fields}
     numbers = [array.ravel() for name, array in arrays_of(step) if name not in unknown]
     assert np.isfinite(np.concatenate(numbers)).all()
     assert np.isnan(step.force).all() if e.force is None else np.array_equal(step.force, e.force)
