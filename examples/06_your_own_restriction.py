@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 import pretouch as pt
-from pretouch.control.interface import MotionBody, MotionRequest, Restricted, Restriction
+from pretouch.control.approach import MotionBody, MotionRequest, Restricted, Restriction
 from pretouch.groups import Kinematics
 from pretouch.loop import run
 from pretouch.profiles import profile

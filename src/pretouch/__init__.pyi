@@ -17,12 +17,12 @@ from pretouch.contact.sequential_test import SequentialTest as SequentialTest
 from pretouch.contact.window import add_force as add_force
 from pretouch.contact.window import window_init as window_init
 from pretouch.control.approach import ApproachRestriction as ApproachRestriction
+from pretouch.control.approach import MotionBody as MotionBody
+from pretouch.control.approach import MotionRequest as MotionRequest
+from pretouch.control.approach import Restricted as Restricted
+from pretouch.control.approach import Restriction as Restriction
 from pretouch.control.approach import approach_rows as approach_rows
 from pretouch.control.approach import row_numbers as row_numbers
-from pretouch.control.interface import MotionBody as MotionBody
-from pretouch.control.interface import MotionRequest as MotionRequest
-from pretouch.control.interface import Restricted as Restricted
-from pretouch.control.interface import Restriction as Restriction
 from pretouch.control.joint_box import joint_box as joint_box
 from pretouch.control.joint_box import joint_limits as joint_limits
 from pretouch.control.path import Circle as Circle

@@ -11,7 +11,7 @@ from typing import Any
 from pretouch.contact.announced_load import LoadState, most_kg
 from pretouch.contact.detector import Body
 from pretouch.contact.residual_model import ResidualModel, SequentialState
-from pretouch.control.interface import MotionBody
+from pretouch.control.approach import MotionBody
 from pretouch.control.joint_box import joint_limits
 from pretouch.control.path import Path, nearest_phase
 from pretouch.decision import Decision

@@ -9,8 +9,8 @@ from pretouch.contact.announced_load import announced, kept_free, without_load
 from pretouch.contact.detector import Detection, Sample
 from pretouch.contact.reaction import ReactionInputs
 from pretouch.contact.window import Window, add_force
+from pretouch.control.approach import MotionRequest, Restriction, rows_of
 from pretouch.control.commander import Asked, asked_by
-from pretouch.control.interface import MotionRequest, Restriction, rows_of
 from pretouch.faults import Report, Watched, examine, put_robot
 from pretouch.groups import Kinematics, Obstacles
 from pretouch.line import ASK, MOVE, SEE, line_within

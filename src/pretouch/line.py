@@ -16,9 +16,8 @@ from pretouch.contact.sequential import Moment
 from pretouch.contact.sequential_step import assess_sample
 from pretouch.contact.virtual_mass import learn_mean
 from pretouch.contact.window import add_sample
-from pretouch.control.approach import approach_rows
+from pretouch.control.approach import Rows, approach_rows
 from pretouch.control.braking import Touch, TouchLimits, braking_rows, inertia_factor
-from pretouch.control.interface import Rows
 from pretouch.control.motion import move_within
 from pretouch.control.path import advance, follow, reduce_speed, speed_scale
 from pretouch.faults import believable

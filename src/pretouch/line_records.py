@@ -6,8 +6,8 @@ from pretouch.contact.residual_model import SequentialNumbers, SequentialState
 from pretouch.contact.sequential_step import SampleTest
 from pretouch.contact.virtual_mass import FreeMass
 from pretouch.contact.window import Window
+from pretouch.control.approach import MotionRequest
 from pretouch.control.braking import BrakingNumbers, Slots
-from pretouch.control.interface import MotionRequest
 from pretouch.control.motion import MotionNumbers
 from pretouch.faults import Report, Watched
 from pretouch.groups import CapsuleArrays, Kinematics, Mechanism, Obstacles, SkinArrays

@@ -15,9 +15,8 @@ from pretouch.contact.sequential_test import SequentialTest
 from pretouch.contact.touch_cue import TouchSensors
 from pretouch.contact.virtual_mass import FreeMass
 from pretouch.contact.window import window_init
-from pretouch.control.approach import ApproachRestriction, BrakingCurve, of_table_i, row_numbers
+from pretouch.control.approach import ApproachRestriction, BrakingCurve, MotionRequest, of_table_i, row_numbers
 from pretouch.control.braking import braking_numbers, slots_init
-from pretouch.control.interface import MotionRequest
 from pretouch.control.motion import MotionNumbers
 from pretouch.faults import Report, Watched
 from pretouch.groups import Kinematics, no_obstacles

@@ -14,8 +14,7 @@ from pretouch.contact.moving_thresholds import MovingThresholds
 from pretouch.contact.reaction import DecayingVelocity, Reaction
 from pretouch.contact.sequential_test import SequentialTest
 from pretouch.contact.touch_cue import TouchSensors
-from pretouch.control.approach import ApproachRestriction, BrakingCurve
-from pretouch.control.interface import Restriction
+from pretouch.control.approach import ApproachRestriction, BrakingCurve, Restriction
 from pretouch.errors import ParameterError
 from pretouch.params import (
     ClampParams,

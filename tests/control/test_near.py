@@ -8,8 +8,8 @@ import pytest
 from tests.control.motions import Mover
 from tests.following_arm import DT, Arm
 
+from pretouch.control.approach import Restricted, rows_of
 from pretouch.control.braking import braking_cap
-from pretouch.control.interface import Restricted, rows_of
 from pretouch.errors import ParameterError
 from pretouch.groups import no_obstacles
 from pretouch.params import NullSpaceMotion

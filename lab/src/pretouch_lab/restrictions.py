@@ -3,8 +3,7 @@
 from typing import get_args
 
 from pretouch.composition import changed
-from pretouch.control.approach import ApproachRestriction
-from pretouch.control.interface import Restriction
+from pretouch.control.approach import ApproachRestriction, Restriction
 from pretouch.errors import ParameterError
 from pretouch.params import RowKind
 from pretouch.profiles import Profile

@@ -1,16 +1,121 @@
-"""Restricting the body's approach to obstacles: eqs. 5-7 as rows G qd <= h of the QP, or the braking curve."""
+"""Restricting the body's approach to obstacles: as rows G qd <= h of the QP; those of eqs. 5-7, and what others are."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
 from pretouch.compiled import kernel
-from pretouch.control.interface import Restriction, Rows
+from pretouch.composition import Part
+from pretouch.control.joint_box import JointLimits
+from pretouch.errors import ParameterError
 from pretouch.groups import Kinematics, Obstacles
-from pretouch.params import BrakingParams, RestrictionParams
+from pretouch.params import BrakingParams, RestrictionParams, TaskParams
+from pretouch.records import Cell, IntCell
 from pretouch.robot.kinematics import column
-from pretouch.types import BoolArray, Number
+from pretouch.robot.model import RobotModel
+from pretouch.types import WHOLE, BoolArray, FloatArray, IntArray, Number, RobotState
+from pretouch.values import value
+
+
+@value
+class MotionBody:
+    """What does not change from step to step."""
+
+    model: RobotModel
+    units: int
+    """How many units the skin has."""
+    limits: JointLimits
+    task: TaskParams
+
+
+class MotionRequest(NamedTuple):
+    """What is asked of the arm in one step."""
+
+    velocity: Annotated[FloatArray, 3]
+    """(3,) of the end-effector origin [m/s]."""
+    goal: Annotated[FloatArray, 3, 3]
+    """(3, 3) R_O_ee to hold, if the task asks for it."""
+    qd: Annotated[FloatArray, "n"]
+    """(n,) joint velocities [rad/s]."""
+    by_joints: IntCell
+    """Whether they are asked for in place of the velocity, within the same limits."""
+    hold: IntCell
+    """Whether to brake, whatever else is asked."""
+    advances: IntCell
+    """Whether the phase goes on with the motion."""
+    touch_m_s: Cell
+    """Speed at which an arm that a contact moves may touch what it sees, and then nothing drives it away from what
+    comes nearer [m/s]; NaN for what the profile says."""
+    untouched: IntCell
+    """`Obstacles.unit` from which on an obstacle is not to be touched at any speed."""
+
+
+@value
+class Restricted:
+    """What a restriction allows: R rows G @ qd <= h of the QP, and more if it needs to."""
+
+    G: FloatArray
+    """(R, n) approach velocity of a body point per joint velocity [m]."""
+    h: FloatArray
+    """(R,) largest approach velocity [m/s]; negative asks for a retreat."""
+    which: IntArray
+    """(K',) index of the obstacle that each of the first K' rows belongs to; those after them are of none."""
+    weight: float
+    """Weight of a row's squared violation against the squared task error of eq. 2, both in (m/s)^2; 0: the rows are
+    hard, and the arm brakes where the joint box leaves no way to keep them."""
+    velocity: FloatArray | None = None
+    """(3,) added to the velocity asked of the end-effector origin [m/s]."""
+    speeds: tuple[FloatArray, FloatArray] | None = None
+    """(n,) least and (n,) largest joint velocities [rad/s]; what the acceleration does not allow comes later."""
+
+
+class Rows(NamedTuple):
+    """Rows of the QP as compiled code takes them, see `Restricted`."""
+
+    G: FloatArray
+    h: FloatArray
+    which: IntArray
+    weight: float
+
+
+def rows_of(allowed: Restricted, n: int) -> tuple[Rows, tuple[FloatArray, FloatArray]]:
+    """Return rows and joint speeds for compiled code, (0,) each where they are free; a ParameterError for wrong shapes.
+
+    Other types or orders in memory would be compiled for anew, while the arm waits.
+    """
+    count, seen, free = len(allowed.h), len(allowed.which), np.zeros(0)
+    if allowed.G.shape != (count, n) or seen > count:
+        shapes = f"G {allowed.G.shape}, h {allowed.h.shape}, which {allowed.which.shape}"
+        raise ParameterError(f"A restriction's rows are {shapes}: G is (R, {n}), h is (R,), which is at most (R,).")
+    G, h, slowest, fastest = (
+        np.ascontiguousarray(part, float) for part in (allowed.G, allowed.h, *(allowed.speeds or (free, free)))
+    )
+    return Rows(G, h, np.ascontiguousarray(allowed.which, WHOLE), float(allowed.weight)), (slowest, fastest)
+
+
+class Restriction(Part, group="pretouch.restrictions"):
+    """What keeps the body from what is near. A part of it is a frozen dataclass of its parameters."""
+
+    def init(self, body: MotionBody) -> Any:
+        """Return what is remembered before the first step; None for nothing."""
+        return None
+
+    def step(
+        self, state: Any, body: MotionBody, kin: Kinematics, robot: RobotState, obstacles: Obstacles,
+        request: MotionRequest,
+    ) -> tuple[Restricted, Any]:  # fmt: skip
+        """Return what is allowed in one step, and what to remember.
+
+        Args:
+            state: what is remembered.
+            body: what is fixed.
+            kin: posture.
+            robot: state of the arm.
+            obstacles: what is near.
+            request: what is asked of the arm.
+        """
+        raise NotImplementedError
 
 
 @kernel

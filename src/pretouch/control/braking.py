@@ -13,7 +13,7 @@ import numpy as np
 
 from pretouch.cholesky import factor, forward
 from pretouch.compiled import compiled, inlined, kernel
-from pretouch.control.interface import Rows
+from pretouch.control.approach import Rows
 from pretouch.groups import Chain, Kinematics, Mechanism, Obstacles
 from pretouch.params.pretouch import REGIONS, BrakingParams, EffectiveMass, Tangential
 from pretouch.robot.kinematics import column, mass_matrix_into

@@ -6,7 +6,7 @@ import numpy as np
 
 from pretouch.compiled import inlined, kernel
 from pretouch.control.active_set import minimise_within
-from pretouch.control.interface import MotionRequest, Rows
+from pretouch.control.approach import MotionRequest, Rows
 from pretouch.control.joint_box import joint_box
 from pretouch.control.penalty import Minimum, Problem, excesses, minimise
 from pretouch.control.task import away, cost_into, twist

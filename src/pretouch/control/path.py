@@ -194,10 +194,10 @@ def speed_scale(distance: float, d_max: float) -> float:
 def reduce_speed(pace: "Pace", fresh: float, l_max: int) -> float:
     """One cycle of eqs. 3 and 4: change what is remembered, and return the factor on the end-effector velocity.
 
-    Eq. 4 of the paper, s + (1 - s) l_obs / l_max, goes back to full speed in l_max cycles after a loss. The fresh
-    factor, of eq. 3 or of a silent unit, holds at once where it is the smaller one, and rises no faster than that:
-    whether the nearest obstacle vanished, was seen again farther away, or left another one in view, the speed never
-    jumps up.
+    After a loss the factor s + (1 - s) l_obs / l_max of eq. 4 of the paper goes back to full speed in l_max cycles. The
+    fresh factor, of eq. 3 or of a silent unit, holds at once where it is the smaller one, and rises no faster than
+    that: whether the nearest obstacle vanished, was seen again farther away, or left another one in view, the speed
+    never jumps up.
     """
     scale, cycles = pace.scale[0], pace.cycles[0] + 1
     faded = scale + (1.0 - scale) * min(1.0, cycles / l_max)

@@ -12,7 +12,7 @@ import numpy as np
 
 from pretouch.checks import NonNegative, Positive
 from pretouch.contact.moving_thresholds import MovingThresholds
-from pretouch.control.interface import MotionBody, MotionRequest, Restricted, Restriction
+from pretouch.control.approach import MotionBody, MotionRequest, Restricted, Restriction
 from pretouch.errors import ParameterError
 from pretouch.groups import Kinematics
 from pretouch.profiles import profile

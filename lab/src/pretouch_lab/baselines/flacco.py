@@ -13,7 +13,7 @@ import numpy as np
 
 from pretouch.checks import NonNegative, Positive
 from pretouch.contact.moving_thresholds import MovingThresholds
-from pretouch.control.interface import MotionBody, MotionRequest, Restricted, Restriction
+from pretouch.control.approach import MotionBody, MotionRequest, Restricted, Restriction
 from pretouch.groups import Kinematics
 from pretouch.profiles import profile
 from pretouch.types import WHOLE, FloatArray, Obstacles, RobotState
