@@ -169,11 +169,11 @@ def test_a_recording_with_touch_is_recomputed_to_the_bit_and_lacks_what_fits_no_
     found = verify(kept)
     assert found.exact
     assert found.agrees
-    assert run.cycles[-1].after.detector.cues[0].account.any()
+    assert run.cycles[-1].after.detector.cues[0].any()
 
 
 def test_another_arm_feels_as_well(tmp_path):
     model, T = RobotModel(custom_arm(tmp_path)), np.eye(4)
     T[:3, 3] = [0.05, 0.0, 0.0]
     skin = Skin([SensorUnit("u", "b", T, touch=TouchPatch())], model)
-    assert len(Run(controller_of(model, skin, OURS)).state.detector.cues[0].account) == 1
+    assert len(Run(controller_of(model, skin, OURS)).state.detector.cues[0]) == 1

@@ -109,9 +109,7 @@ def detect(fixed: Blocks, remembered: Blocks, now: Blocks) -> bool:
         force.filtered[i] = window.sums[0, i]
         force.compared[i] = window.sums[0, i] if p.filtered else robot.wrench[i]
     if kinds.detect == THRESHOLDS:
-        contact, d.log_likelihood_ratio[0] = compare(
-            window.sums, window.samples[0], force.compared, ee, near.point, near.ee_distance, p.thresholds, d.bands
-        )
+        contact, d.log_likelihood_ratio[0] = compare(window, force.compared, ee, near, p.thresholds, d.bands)
         d.residual[:] = robot.tau_ext
     else:
         moment = Moment(kin, robot.qd, robot.qd_commanded, robot.tau_ext, near, no_gain, sees, False)

@@ -10,7 +10,8 @@ from pretouch.contact.admittance import Admittance
 from pretouch.contact.clamp import clamp_init
 from pretouch.contact.moving_thresholds import MovingThresholds, thresholds_of
 from pretouch.contact.reaction import DecayingVelocity
-from pretouch.contact.sequential_step import sample_test, sequential_init, sequential_numbers
+from pretouch.contact.residual_model import sequential_init, sequential_numbers
+from pretouch.contact.sequential_step import sample_test
 from pretouch.contact.sequential_test import SequentialTest
 from pretouch.contact.touch_cue import TouchSensors
 from pretouch.contact.virtual_mass import FreeMass

@@ -19,7 +19,7 @@ from pretouch.contact.localisation import (
 )
 from pretouch.contact.posterior import Candidates, log_posterior, log_prior
 from pretouch.contact.sequential_step import sample_test
-from pretouch.contact.touch_cue import Cues, gain_of, no_cues, surface_area
+from pretouch.contact.touch_cue import Cues, gain_of, no_cues, surface_areas
 from pretouch.groups import Kinematics, no_obstacles
 from pretouch.params import LocalisationParams, TouchSensorParams
 from pretouch.robot.description import panda
@@ -98,9 +98,9 @@ PATCH = TouchPatch()
 def touched(kin: Kinematics, c: int) -> Cues:
     """What a unit at a candidate says while it is touched, as `TouchSensors` has it."""
     link, gain = SURFACE.link[c], np.ones(len(MODEL.links))
-    share = np.array([np.pi * PATCH.radius**2 / surface_area(MODEL.capsules, int(link))])
+    share = np.array([np.pi * PATCH.radius**2 / surface_areas(MODEL.capsules, len(MODEL.links))[link]])
     gain[link] = gain_of(share, TouchSensorParams())[0]
-    return Cues(gain, np.array([link]), pose_of(kin, c)[0][None], np.array([PATCH.radius / 2]), np.array([5.0]))
+    return Cues(gain, np.array([link]), pose_of(kin, c)[0][None], np.array([PATCH.radius / 2]))
 
 
 def prior(kin: Kinematics, cues: Cues, hidden: FloatArray, near: Obstacles | None = None) -> FloatArray:

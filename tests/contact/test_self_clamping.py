@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 
 from pretouch.contact.clamp import find_self_clamp, presses_on_fixture
+from pretouch.contact.detector import Body
 from pretouch.params import PinchParams
 from pretouch.robot.body import Capsules, no_capsules
 from pretouch.robot.description import RobotDescription
 from pretouch.robot.model import RobotModel
 from pretouch.robot.self_distance import nearest_points, segment_distance
 from pretouch.robot.vectors import placed
+from pretouch.sensing.skin import Skin
 from pretouch.types import NOT_TOUCHED, FloatArray, Touched
 
 P = PinchParams()
@@ -21,7 +23,11 @@ FOLDED = np.array([0.0, -1.2, 0.0, -2.95, 0.0, 1.75, 0.785])
 FOLDING = np.array([0.0, 0.0, 0.0, -0.3, 0.0, 0.0, 0.0])
 NOISE = np.diag([0.3, 0.3, 0.2, 0.2, 0.1, 0.1, 0.05]) ** 2
 FLOOR = np.array([[0.0, 0.0, 1.0, -0.2]])
-NONE = no_capsules()
+
+
+def beside(model: RobotModel, planes: FloatArray | None = None, standing: Capsules | None = None) -> Body:
+    """The arm without a skin, beside fixtures."""
+    return Body(model, Skin((), model), 0.01, np.zeros((0, 4)) if planes is None else planes, standing or no_capsules())
 
 
 def gap_of(model: RobotModel, one: str, other: str, q: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -151,7 +157,7 @@ def test_what_is_pressed_on_a_floor(
 ) -> None:
     kin = panda_model.kinematics(panda_model.description.q_ready)
     qd, floor = down(panda_model, speed), under(panda_model, gap)
-    assert presses_on_fixture(panda_model, kin, touch(panda_model, force), floor, NONE, qd, P) == is_pressed
+    assert presses_on_fixture(beside(panda_model, floor), kin, touch(panda_model, force), qd, P) == is_pressed
 
 
 def test_what_is_pressed_on_a_post(panda_model: RobotModel) -> None:
@@ -161,12 +167,12 @@ def test_what_is_pressed_on_a_post(panda_model: RobotModel) -> None:
         np.zeros(1, np.int64), np.array([[x, y - 1, z - 0.2]]), np.array([[x, y + 1, z - 0.2]]), np.full(1, 0.1)
     )
     up, qd = touch(panda_model, (0.0, 0.0, 30.0)), down(panda_model, 0.1)
-    assert presses_on_fixture(panda_model, kin, up, np.zeros((0, 4)), lying, qd, P)
+    assert presses_on_fixture(beside(panda_model, standing=lying), kin, up, qd, P)
     aside = touch(panda_model, (30.0, 0.0, 0.0))
-    assert not presses_on_fixture(panda_model, kin, aside, np.zeros((0, 4)), lying, qd, P)
-    assert not presses_on_fixture(panda_model, kin, up, np.zeros((0, 4)), NONE, qd, P)
+    assert not presses_on_fixture(beside(panda_model, standing=lying), kin, aside, qd, P)
+    assert not presses_on_fixture(beside(panda_model), kin, up, qd, P)
 
 
 def test_an_arm_that_is_not_touched_presses_nothing(panda_model: RobotModel) -> None:
     kin = panda_model.kinematics(panda_model.description.q_ready)
-    assert not presses_on_fixture(panda_model, kin, NOT_TOUCHED, FLOOR, NONE, down(panda_model, 0.1), P)
+    assert not presses_on_fixture(beside(panda_model, FLOOR), kin, NOT_TOUCHED, down(panda_model, 0.1), P)

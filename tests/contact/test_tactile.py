@@ -12,7 +12,7 @@ from tests.contact.alone import feel, sample, something, standing
 from pretouch.contact.detector import Body
 from pretouch.contact.scatter import earned_level, level_init
 from pretouch.contact.sequential import alarm_bound
-from pretouch.contact.touch_cue import Cues, TouchSensors, gain_of, no_cues, surface_area, together
+from pretouch.contact.touch_cue import Cues, TouchSensors, gain_of, no_cues, surface_areas, together
 from pretouch.groups import no_obstacles
 from pretouch.profiles import profile
 from pretouch.robot.body import Capsules
@@ -34,10 +34,10 @@ def touching(skin: Skin, model: RobotModel, units: tuple[int, ...] = (0, 3), sig
     )
 
 
-def said(units: int, *touched: int, stamp: float = NOW, force: float = np.nan) -> TouchReadings:
+def said(units: int, *touched: int, stamp: float = NOW) -> TouchReadings:
     contact = np.zeros(units, np.bool_)
     contact[list(touched)] = True
-    return TouchReadings(np.full(units, stamp), contact, np.full(units, force), np.zeros(units, np.int64))
+    return TouchReadings(np.full(units, stamp), contact, np.full(units, np.nan), np.zeros(units, np.int64))
 
 
 class Sensors:
@@ -71,12 +71,12 @@ def test_false_touches_at_the_rate_assumed_at_most_double_the_expectation(share,
 def test_the_surface_of_a_link_is_that_of_its_capsules():
     two = Capsules(np.array([1, 1, 2]), np.zeros((3, 3)), np.eye(3) * [0.1, 0.1, 0.1], np.array([0.05, 0.02, 0.5]))
     # 2 pi r l + 4 pi r^2: 0.0314159 + 0.0314159 + 0.0125664 + 0.0050265
-    assert surface_area(two, 1) == pytest.approx(0.0804248, rel=1e-5)
-    assert surface_area(two, 3) == np.inf
+    assert surface_areas(two, 4)[1] == pytest.approx(0.0804248, rel=1e-5)
+    assert surface_areas(two, 4)[3] == np.inf
 
 
 def test_units_that_say_nothing_and_skins_without_sensors_say_nothing(panda_model, paper_skin):
-    assert Sensors(panda_model, paper_skin).state is None
+    assert not len(Sensors(panda_model, paper_skin).state)
     assert Sensors(panda_model, paper_skin).cues(said(len(paper_skin), 0)) is None
     skin = touching(paper_skin, panda_model)
     sensors = Sensors(panda_model, skin)
@@ -89,10 +89,10 @@ def test_units_that_say_nothing_and_skins_without_sensors_say_nothing(panda_mode
 def test_a_touch_raises_the_prior_of_its_link_alone_and_tells_where_it_is(panda_model, paper_skin):
     skin = touching(paper_skin, panda_model, sigma=0.004)
     sensors = Sensors(panda_model, skin)
-    cues = sensors.cues(said(7, 3, force=2.5))
+    cues = sensors.cues(said(7, 3))
     assert cues is not None
     link = int(skin.link[3])
-    share = np.pi * 0.02**2 / surface_area(panda_model.capsules, link)
+    share = np.pi * 0.02**2 / surface_areas(panda_model.capsules, len(panda_model.links))[link]
     assert cues.gain[link] == pytest.approx(7200 * share + 1 - share)
     assert np.delete(cues.gain, link) == pytest.approx(1.0)
     assert cues.link.tolist() == [link]
@@ -100,7 +100,6 @@ def test_a_touch_raises_the_prior_of_its_link_alone_and_tells_where_it_is(panda_
     T[:3, :3], T[:3, 3] = sensors.kin.rotation[link], sensors.kin.position[link]
     assert cues.point[0] == pytest.approx((T @ skin.T_link_sensor[3])[:3, 3])
     assert cues.sigma == pytest.approx([np.hypot(0.01, 0.004)])
-    assert cues.force.tolist() == [2.5]
 
 
 def test_two_units_on_one_link_count_once(panda_model, paper_skin):
@@ -173,12 +172,11 @@ def test_a_cue_counts_for_an_object_that_is_seen_at_its_link_as_well_and_no_cue_
 
 
 def test_gains_multiply_and_places_add_up():
-    one = Cues(np.array([1.0, 2.0, 3.0]), np.array([1]), np.array([[0.1, 0.2, 0.3]]), np.array([0.01]), np.array([4.0]))
-    two = Cues(np.array([1.0, 5.0, 0.5]), np.array([2]), np.array([[0.4, 0.5, 0.6]]), np.array([0.02]), np.array([7.0]))
+    one = Cues(np.array([1.0, 2.0, 3.0]), np.array([1]), np.array([[0.1, 0.2, 0.3]]), np.array([0.01]))
+    two = Cues(np.array([1.0, 5.0, 0.5]), np.array([2]), np.array([[0.4, 0.5, 0.6]]), np.array([0.02]))
     both = together(one, no_cues(3), two)
     assert both.gain == pytest.approx([1.0, 10.0, 1.5])
     assert both.link.tolist() == [1, 2]
     assert both.point.tolist() == [[0.1, 0.2, 0.3], [0.4, 0.5, 0.6]]
     assert both.sigma.tolist() == [0.01, 0.02]
-    assert both.force.tolist() == [4.0, 7.0]
     assert together(one) is one

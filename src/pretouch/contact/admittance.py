@@ -137,7 +137,8 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
         """Leave the same in the memory; return whether there is neither a clamp nor a place given up."""
         mass, clamp = state.mass, state.clamp
         free = FreeMass(mass.mean, mass.samples, mass.torque, clamp.path, np.array([clamp.marked]))
-        memory.fill("mass", free)
+        for name, number in zip(free._fields, free, strict=True):
+            memory.put(f"mass.{name}", number)
         return not clamp.torque and not state.place.contacts
 
     def announced(self, period: float) -> str:
@@ -157,7 +158,7 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
 
     def _near(self, inputs: ReactionInputs) -> bool:
         """Whether something is seen near the body, or may be missed."""
-        return inputs.unseen or min(inputs.obstacles.body_distance.tolist(), default=np.inf) < self.near_m
+        return inputs.unseen or any(distance < self.near_m for distance in inputs.obstacles.body_distance.tolist())
 
     def _moved(self, state: AdmittanceState, doing: Doing, body: Body, inputs: ReactionInputs) -> VirtualMass:
         """Let the mass learn in free motion, and yield to the external torque in a reaction or a soft hold."""
@@ -226,7 +227,7 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
         if pinch is not None:
             one, other, force = pinch
             return caught_between(clamp, f"{names[one]} and {names[other]}", force, torque)
-        if presses_on_fixture(body.model, inputs.kin, touched, body.planes, body.standing, clamp.came, p):
+        if presses_on_fixture(body, inputs.kin, touched, clamp.came, p):
             force = float(np.linalg.norm(touched.force[0]))
             return caught_between(clamp, f"{names[touched.link[0]]} and a fixture", force, torque)
         return clamp

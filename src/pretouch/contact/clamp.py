@@ -11,9 +11,10 @@ from dataclasses import replace
 import numpy as np
 
 from pretouch.compiled import compiled
+from pretouch.contact.detector import Body
 from pretouch.groups import Kinematics
 from pretouch.params import ClampParams, PinchParams
-from pretouch.robot.body import Capsules
+from pretouch.params.paper import ClampParams, PinchParams
 from pretouch.robot.model import RobotModel
 from pretouch.robot.self_distance import nearest_points
 from pretouch.robot.vectors import below, placed
@@ -234,27 +235,22 @@ def find_self_clamp(
     return caught
 
 
-def presses_on_fixture(
-    model: RobotModel, kin: Kinematics, touched: Touched, planes: FloatArray, standing: Capsules, qd: FloatArray,
-    p: PinchParams,
-) -> bool:  # fmt: skip
+def presses_on_fixture(body: Body, kin: Kinematics, touched: Touched, qd: FloatArray, p: PinchParams) -> bool:
     """Whether a link presses something against a fixture, by the most certain contact's point and force.
 
     Args:
-        model: the arm.
+        body: the arm and its fixtures, whose normals point into free space.
         kin: its posture.
         touched: the contacts.
-        planes: (P, 4) rows (normal, offset) of fixtures, normals into free space, base frame.
-        standing: capsules of fixtures, base frame.
         qd: (n,) joint velocities with which the arm came to the contact [rad/s].
         p: parameters.
     """
     if not len(touched.link):
         return False
-    point, force = touched.point[0], touched.force[0]
+    point, force, planes, standing = touched.point[0], touched.force[0], body.planes, body.standing
     size = float(np.sqrt(force @ force))
     # speed at which the contact point moves against the force
-    closing = -float(force @ model.jacobian(kin, int(touched.link[0]), point)[:3] @ qd)
+    closing = -float(force @ body.model.jacobian(kin, int(touched.link[0]), point)[:3] @ qd)
     if size < p.force_n or closing < _CLOSING_M_S * size:
         return False
     gap, away = planes[:, :3] @ point - planes[:, 3], planes[:, :3]

@@ -79,8 +79,6 @@ class Detection:
     """(n,) external joint torques less what the detector takes for free motion [Nm]; NaN without torques."""
     evidence: float
     """How far the test is on the way to a contact: one from 1 on, while armed."""
-    learning: bool = False
-    """Whether the sample is to be learnt as free motion."""
     lasting: bool = False
     """Whether it is being found out if the residual is a load or an error of the estimate: the arm waits for that."""
     touched: Touched = field(default_factory=lambda: NOT_TOUCHED)

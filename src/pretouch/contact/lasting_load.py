@@ -76,21 +76,19 @@ def _still_explains(
 
 @kernel
 def find_lasting(
-    residual: FloatArray, x: FloatArray, weights: FloatArray, J: FloatArray, S: FloatArray, offset_prior: float,
-    lasting: FloatArray,
-) -> bool:  # fmt: skip
-    """Write a load or a step of one joint that a residual can be, and return whether there is one.
+    means: WindowMeans, x: FloatArray, weights: FloatArray, J: FloatArray, offset_prior: float, lasting: FloatArray
+) -> bool:
+    """Write a load or a step of one joint that the residual can be, and return whether there is one.
 
     Args:
-        residual: (n,) mean of the torques that free motion does not explain [Nm].
+        means: of the residual; the longest window counts.
         x: (n, f) features.
         weights: (n, f) of the mean learnt so far [Nm].
         J: (6, n) Jacobian of the end-effector.
-        S: (n, n) spread of a sample [Nm^2].
         offset_prior: deviation of a joint's offset [Nm].
         lasting: (3 + n,) written: load [kg], its moments about both horizontal axes [kg m], each joint's torque [Nm].
     """
-    n, last = x.shape[0], x.shape[1] - 1
+    residual, S, n, last = means.mean[-1], means.S, x.shape[0], x.shape[1] - 1
     carried, load = np.empty(n), np.zeros(3)
     for j in range(n):
         # of the mean, what may be weight: without friction, features 1 to PLAIN - 1
@@ -247,7 +245,7 @@ def follow_lasting(
     if not counts or 0 < steady[0] <= numbers.settle:
         return
     lasting = np.empty(3 + n)
-    if not find_lasting(residual, x, model.weights, J, S, numbers.p.offset_prior_nm, lasting):
+    if not find_lasting(means, x, model.weights, J, numbers.p.offset_prior_nm, lasting):
         # what has lasted may be unexplained for a while; for too long it is a person
         steady[0] = steady[0] if steady[0] <= 2 * numbers.settle else 0
     elif steady[0] > numbers.settle:

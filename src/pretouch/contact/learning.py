@@ -55,13 +55,8 @@ def add_to_block(model: ResidualModel, sample: FreeSample, ratio: FloatArray, p:
     sample but not in D. `ratio` (n,) is how many samples in a row say as much of the mean as one would of white noise;
     (0,): noise is white.
     """
-    block, spread, variance, floor = (
-        model.block,
-        model.spread[sample.moving[0]],
-        sample.model_variance,
-        p.noise_floor_nm,
-    )
-    n, f = sample.x.shape
+    block, spread, variance = model.block, model.spread[sample.moving[0]], sample.model_variance
+    (n, f), floor = sample.x.shape, p.noise_floor_nm
     S, L, y, z = np.empty((n, n)), np.zeros((n, n)), np.empty(n), np.empty(n)
     if model.filled[0] == 0:
         block[:] = 0.0

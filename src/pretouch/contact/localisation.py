@@ -23,8 +23,6 @@ from pretouch.robot.vectors import placed_capsules, rotate
 from pretouch.types import NOT_TOUCHED, BoolArray, FloatArray, IntArray, Touched
 from pretouch.values import value
 
-_LENGTHS = np.array(LENGTHS)
-
 
 def _independent_part(period: float, p: LocalisationParams) -> float:
     """Part of a sample, one a period [s], whose noise is not that of the samples before."""
@@ -53,8 +51,8 @@ def _most_significant(tested: SampleTest, independent: float, relative: float, S
     # z^T S^-1 z grows with the window while the torques last, and falls once it holds samples from before the contact
     n = len(tested.model_variance)
     L, y, best, window = np.zeros((n, n)), np.empty(n), 0.0, -1
-    for k in range(len(_LENGTHS)):
-        if _LENGTHS[k] > tested.samples[0]:
+    for k in range(len(LENGTHS)):
+        if LENGTHS[k] > tested.samples[0]:
             break
         # without the relative error, which would make every large mean stand out alike
         _covariance_of_mean(tested, k, independent, 0.0, S)
@@ -74,7 +72,7 @@ def _covariance_of_mean(tested: SampleTest, k: int, independent: float, relative
     The noise C averages out over N independent samples, the model's variance U does not; windows hold C + U.
     """
     # samples that follow each other closely have the same noise in part: so many of them say something new
-    samples = max(1.0, independent * _LENGTHS[k])
+    samples = max(1.0, independent * LENGTHS[k])
     mean, variance = tested.means[k], tested.model_variance
     for i in range(len(mean)):
         for j in range(len(mean)):

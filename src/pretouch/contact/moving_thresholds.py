@@ -99,11 +99,10 @@ class MovingThresholds(ThresholdParams, Detector, name="thresholds"):
             obstacles: what is near.
             residual: (n,) of the detection.
         """
-        parts, o = np.empty((6, 3)), obstacles
+        parts = np.empty((6, 3))
         # NaN crosses no threshold: without an estimate nothing is a contact
         compared = _NONE if force is None else window.newest if self.compare == "filtered" else force
-        count = int(window.samples[0])
-        crosses, share = compare(window.sums, count, compared, ee_position, o.point, o.ee_distance, self.numbers, parts)
+        crosses, share = compare(window, compared, ee_position, obstacles, self.numbers, parts)
         limits, contact = Thresholds(*parts), None
         if crosses and armed:
             axes = (compared > limits.upper) | (compared < limits.lower)
@@ -122,11 +121,11 @@ def thresholds_of(detector: Detector) -> MovingThresholds:
 
 @compiled
 def compare(
-    sums: FloatArray, count: int, compared: FloatArray, ee_position: FloatArray, points: FloatArray,
-    ee_distance: FloatArray, p: ThresholdParams, parts: FloatArray,
-) -> tuple[bool, float]:  # fmt: skip
+    window: Window, compared: FloatArray, ee: FloatArray, near: Obstacles, p: ThresholdParams, parts: FloatArray
+) -> tuple[bool, float]:
     """Write the thresholds (6, 3); say whether a force (3,), NaN for none, crosses one, and its part of a band."""
-    positive, negative = side_distances(ee_position, points, ee_distance)
+    sums, count = window.sums, window.samples[0]
+    positive, negative = side_distances(ee, near.point, near.ee_distance)
     threshold_parts(window_mean(sums, count), window_std(sums, count), positive, negative, p, parts)
     crosses, largest = False, 0.0
     for i in range(3):

@@ -22,7 +22,7 @@ from pretouch.groups import Kinematics, Obstacles, SurfaceArrays
 from pretouch.params import LocalisationParams
 from pretouch.robot.body import SPACING_M
 from pretouch.robot.kinematics import jacobian_into
-from pretouch.types import BoolArray, FloatArray, IntArray, Touched
+from pretouch.types import BoolArray, FloatArray, Touched
 
 _NEVER = 1e-12
 """Prior of what cannot be: its logarithm stays finite."""
@@ -46,7 +46,7 @@ def log_prior(
     # touched units, each with its own error; candidates lie too far apart for less than `unit_m`
     for k in range(len(cues.link)):
         sigma = max(cues.sigma[k], p.unit_m)
-        if _normal_kernel(point, link, area, hidden, cues.link[k], cues.point[k], sigma, kernel):
+        if _normal_kernel(point, surface, hidden, cues.link[k], cues.point[k], sigma, kernel):
             located[cues.link[k]] = True
             for c in range(count):
                 touched[c] += kernel[c]
@@ -63,7 +63,7 @@ def log_prior(
     by_seen = np.zeros(count)
     for k in range(len(distance)):
         nearness = min(1.0, max(0.0, 1.0 - distance[k] / p.near_m))
-        if nearness > 0.0 and _normal_kernel(point, link, area, hidden, -1, seen.point[k], p.seen_m, kernel):
+        if nearness > 0.0 and _normal_kernel(point, surface, hidden, -1, seen.point[k], p.seen_m, kernel):
             nearest = max(nearest, nearness)
             for c in range(count):
                 by_seen[c] += nearness * kernel[c]
@@ -76,7 +76,7 @@ def log_prior(
 
 @kernel
 def _normal_kernel(
-    point: FloatArray, link: IntArray, area: FloatArray, hidden: BoolArray, only: int, mean: FloatArray, sigma: float,
+    point: FloatArray, surface: SurfaceArrays, hidden: BoolArray, only: int, mean: FloatArray, sigma: float,
     out: FloatArray,
 ) -> bool:  # fmt: skip
     """Write a normal distribution (N,) about a point (3,), over the candidates of one link if `only` is not -1.
@@ -86,10 +86,10 @@ def _normal_kernel(
     total = 0.0
     for c in range(len(point)):
         out[c] = 0.0
-        if not hidden[c] and (only < 0 or link[c] == only):
+        if not hidden[c] and (only < 0 or surface.link[c] == only):
             x, y, z = point[c, 0] - mean[0], point[c, 1] - mean[1], point[c, 2] - mean[2]
             # times the area that a candidate stands for: a density on the surface, however it is sampled
-            out[c] = area[c] * math.exp(-0.5 * (x * x + y * y + z * z) / (sigma * sigma))
+            out[c] = surface.area[c] * math.exp(-0.5 * (x * x + y * y + z * z) / (sigma * sigma))
             total += out[c]
     if not total > 1e-30:
         return False

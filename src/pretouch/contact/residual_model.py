@@ -15,16 +15,20 @@ factor on how hard the arm accelerates, learnt with a prior too, also where a co
 alarm because it turned round would do so for ever.
 """
 
+import math
 from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from pretouch.compiled import compiled, kernel
+from pretouch.contact.scatter import LONGEST, level_init, scatter_init
+from pretouch.contact.sequential import MOST, Moment, alarm_bound
 from pretouch.groups import Kinematics, Mechanism
 from pretouch.params import MisfitParams, ProximityPriorParams, SequentialParams
 from pretouch.records import IntCell
-from pretouch.robot.kinematics import column, mass_matrix_into
-from pretouch.types import BoolArray, FloatArray, IntArray
+from pretouch.robot.kinematics import jacobian_into, mass_matrix_into
+from pretouch.robot.vectors import rotate
+from pretouch.types import FloatArray, IntArray
 
 BLOCK = 4
 """Samples that are learnt as one: their sums."""
@@ -133,6 +137,29 @@ def residual_init(n: int, p: SequentialParams) -> ResidualModel:
     )  # fmt: skip
 
 
+_NO_MISFIT, _NO_PROXIMITY = MisfitParams(), ProximityPriorParams()
+"""In the place of those that are switched off: no number of them counts."""
+
+
+def sequential_init(n: int, p: SequentialParams, learnt: ResidualModel | None = None) -> SequentialState:
+    """Return the state of n joints before the first sample; `learnt` is what an earlier session knew of the arm."""
+    none = np.zeros(1, np.int64)
+    return SequentialState(
+        residual_init(n, p) if learnt is None else learnt, np.zeros((LONGEST, n)), none, none, none, np.zeros(3 + n),
+        none, turning_init(n), scatter_init(n), level_init(), none,
+    )  # fmt: skip
+
+
+def sequential_numbers(n: int, period: float, p: SequentialParams) -> SequentialNumbers:
+    """Return what compiled code takes of the parameters, of n joints and a control period [s]."""
+    misfit, near = p.misfit or _NO_MISFIT, p.proximity or _NO_PROXIMITY
+    return SequentialNumbers(
+        p.numbers, near.numbers, misfit.numbers, period, math.exp(-p.observer_gain_1_s * period),
+        alarm_bound(p, period), ("never", "watched", "always").index(p.learn), MOST if p.proximity else 0,
+        round(p.relearn_after_s / period) if p.learn != "never" else 0, p.misfit is not None, prior_of(n, p),
+    )  # fmt: skip
+
+
 def block_size(n: int) -> int:
     """Count the numbers in a block of an arm with n joints."""
     return n + n * features_of(n) + 3 * n + 2
@@ -149,7 +176,7 @@ def features_into(kin: Kinematics, mechanism: Mechanism, speed: FloatArray, grow
     moved_by, ee = mechanism.arm
     mass, com = mechanism.links.mass, mechanism.links.com
     n, point = len(speed), np.empty(3)
-    V, torque = np.empty((n, 3)), np.empty(n)
+    J = np.empty((6, n))
     x[:] = 0.0
     for j in range(n):
         x[j, 0], x[j, 1], x[j, 2] = 1.0, np.tanh(speed[j] / _SLOW), np.tanh(speed[j] / _FAST)
@@ -166,30 +193,16 @@ def features_into(kin: Kinematics, mechanism: Mechanism, speed: FloatArray, grow
                     last = PLAIN + j  # links that no joint parts share a feature, one relative error of mass
             if last < 0 or mass[m] <= 0.0:
                 continue
-            for i in range(3):
-                point[i] = position[m, i]
-                for k in range(3):
-                    point[i] += rotation[m, i, k] * com[m, k]
-        _carried(anchor, axis, moved_by[link], point, growth, V, torque)
+            rotate(rotation[m], com[m], point)
+            point += position[m]
+        jacobian_into(anchor, axis, moved_by[link], point, J)
+        # held against gravity, a mass is as if accelerated upwards; what the velocities add to it is left out
+        ax, ay, az = 0.0, 0.0, _GRAVITY
         for j in range(n):
-            x[j, last] += (1.0 if m < 0 else mass[m]) * torque[j]
-
-
-@kernel
-def _carried(
-    anchor: FloatArray, axis: FloatArray, moved: BoolArray, point: FloatArray, growth: FloatArray, V: FloatArray,
-    torque: FloatArray,
-) -> None:  # fmt: skip
-    """Write the torques (n,) of weight and inertia of 1 kg at a point; `V` (n, 3) is overwritten."""
-    ax, ay, az = 0.0, 0.0, _GRAVITY  # held against gravity, a mass is as if accelerated upwards
-    for j in range(len(growth)):
-        V[j] = 0.0
-        if moved[j]:
-            V[j, 0], V[j, 1], V[j, 2] = column(anchor, axis, j, point[0], point[1], point[2])
-            # J qdd only: what the velocities add to the acceleration is left out
-            ax, ay, az = ax + V[j, 0] * growth[j], ay + V[j, 1] * growth[j], az + V[j, 2] * growth[j]
-    for j in range(len(growth)):
-        torque[j] = -(V[j, 0] * ax + V[j, 1] * ay + V[j, 2] * az)  # by the load on the joints: -J^T (g + a)
+            ax, ay, az = ax + J[0, j] * growth[j], ay + J[1, j] * growth[j], az + J[2, j] * growth[j]
+        for j in range(n):  # by the load on the joints: -J^T (g + J qdd)
+            torque = -(J[0, j] * ax + J[1, j] * ay + J[2, j] * az)
+            x[j, last] += (1.0 if m < 0 else mass[m]) * torque
 
 
 @kernel
@@ -234,30 +247,26 @@ class FreeSample(NamedTuple):
 
 @kernel
 def describe_free_motion(
-    commanded: FloatArray, model: ResidualModel, turning: FloatArray, numbers: SequentialNumbers, kin: Kinematics,
-    mechanism: Mechanism, sample: FreeSample,
-) -> None:  # fmt: skip
-    """Write what free motion is in a sample, and the residual.
-
-    `commanded` (n,) are the joint velocities [rad/s], `turning` is that of `turning_init`, changed.
-    """
-    p, before, n = numbers.p, model.speed, len(commanded)
+    now: Moment, state: SequentialState, numbers: SequentialNumbers, mechanism: Mechanism, sample: FreeSample
+) -> None:
+    """Write what free motion is in a sample, and the residual; of the state, note how hard the arm accelerates."""
+    p, model, commanded, n = numbers.p, state.model, now.qd_commanded, len(now.qd)
     acceleration, covariance, variance = np.empty(n), sample.covariance, sample.model_variance
     # the observer that gives the torques is a low pass of the first order: the velocities go through the same
     for j in range(n):
-        sample.speed[j] = numbers.delay * before[j] + (1.0 - numbers.delay) * commanded[j]
-        acceleration[j] = (sample.speed[j] - before[j]) / numbers.period
+        sample.speed[j] = numbers.delay * model.speed[j] + (1.0 - numbers.delay) * commanded[j]
+        acceleration[j] = (sample.speed[j] - model.speed[j]) / numbers.period
         if abs(sample.speed[j]) > p.still_rad_s:
             sample.moving[0] = 1
-    features_into(kin, mechanism, sample.speed, acceleration, sample.x)
+    features_into(now.kin, mechanism, sample.speed, acceleration, sample.x)
     mean_and_variance(model.weights, model.covariance, sample.x, sample.mean, variance)
-    mass_matrix_into(kin, mechanism, sample.M)
+    mass_matrix_into(now.kin, mechanism, sample.M)
     spread_of_sample(sample.M, model.spread[sample.moving[0]], p.noise_floor_nm, covariance)
     for j in range(n):
         variance[j] += p.bias_floor_nm**2
         sample.residual[j] = sample.torque[j] - sample.mean[j]
     if p.widen_at_turns:
-        add_reversal_variance(sample.M, acceleration, turning, variance)
+        add_reversal_variance(sample.M, acceleration, state.turning, variance)
 
 
 @kernel

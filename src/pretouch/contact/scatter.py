@@ -31,7 +31,6 @@ from pretouch.types import FloatArray
 LENGTHS = (1, 2, 4, 8, 16, 32)
 """Lengths of the windows [samples]."""
 LONGEST = LENGTHS[-1]
-_LENGTHS = np.array(LENGTHS)
 
 
 class WindowMeans(NamedTuple):
@@ -98,7 +97,7 @@ def covariance_of_mean(means: WindowMeans, k: int, S0: FloatArray) -> None:
     n = len(S0)
     for i in range(n):
         for j in range(i + 1):
-            S0[i, j] = means.S[n - 1 - i, n - 1 - j] / _LENGTHS[k]
+            S0[i, j] = means.S[n - 1 - i, n - 1 - j] / LENGTHS[k]
         # unlike the noise, not divided by the length of the window
         S0[i, i] += means.model_variance[n - 1 - i]
 
@@ -109,7 +108,7 @@ def learn_scatter(at: int, means: WindowMeans, tails: float, forget: float) -> N
     scatter, whitened, square, ratio = means.scatter, means.whitened, means.square, means.ratio
     n = whitened.shape[1]
     for k in range(means.whole):
-        stride = max(_LENGTHS[k], _LEAST_STRIDE)
+        stride = max(LENGTHS[k], _LEAST_STRIDE)
         # no sample is in two means of a long window: those that overlap would say the same twice
         if at % stride:
             continue
@@ -156,17 +155,17 @@ def window_means(ring: FloatArray, at: int, count: int, means: FloatArray) -> in
     """
     size, n = ring.shape
     total = np.zeros(n)
-    taken = whole = 0
-    for k in range(len(_LENGTHS)):
-        if _LENGTHS[k] > count:
+    samples = whole = 0
+    for k in range(len(LENGTHS)):
+        if LENGTHS[k] > count:
             break
         # a longer window goes on with the sum of the shorter one
-        while taken < _LENGTHS[k]:
-            taken += 1
+        while samples < LENGTHS[k]:
+            samples += 1
             for j in range(n):
-                total[j] += ring[(at - taken) % size, j]
+                total[j] += ring[(at - samples) % size, j]
         for j in range(n):
-            means[k, j] = total[j] / taken
+            means[k, j] = total[j] / samples
         whole += 1
     return whole
 
@@ -248,7 +247,7 @@ def detectable_force(
         Infinite where no force is found.
     """
     k, n = 0, J.shape[1]
-    while k + 1 < len(_LENGTHS) and _LENGTHS[k + 1] * period <= HELD_S:
+    while k + 1 < len(LENGTHS) and LENGTHS[k + 1] * period <= HELD_S:
         k += 1
     S, L, A, V = np.empty((n, n)), np.zeros((n, n)), np.empty((3, n)), np.zeros((3, 3))
     # a mean over less time has more noise, and one over more is not whole while the force lasts

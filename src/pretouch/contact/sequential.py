@@ -24,9 +24,9 @@ from pretouch.contact.scatter import LENGTHS, WindowMeans, covariance_of_mean, s
 from pretouch.groups import Kinematics, Mechanism, Obstacles
 from pretouch.params import ProximityPriorParams, SequentialParams
 from pretouch.robot.kinematics import jacobian_into
+from pretouch.robot.vectors import rotate
 from pretouch.types import FloatArray, IntArray
 
-_LENGTHS = np.array(LENGTHS)
 _LARGEST = 300.0
 """Logarithm of a likelihood ratio from which on it is all the same."""
 _SMALLEST = 1e-300
@@ -120,7 +120,7 @@ def judge(means: WindowMeans, contacts: Hypotheses, gain: float, tails: float) -
                 explained, one_sided = explained_by_force(L, pivot, y, J[h - n], joints[h - n], away[h - n], scratch)
             ratio = log_ratio(alone, square, explained, size, n, gain, widened, tails)
             # the windows share the weight alike
-            part = weight[link] * np.exp(min(ratio, _LARGEST)) * one_sided / len(_LENGTHS)
+            part = weight[link] * np.exp(min(ratio, _LARGEST)) * one_sided / len(LENGTHS)
             total += part
             if part > best:
                 best, window, which = part, k, link
@@ -228,10 +228,8 @@ def hypotheses(now: Moment, mechanism: Mechanism, most: int, near: ProximityPrio
         if h < count:
             link = parts[h]
             weight[n + h] = (0.5 / count) * touch_gain[link]
-            for a in range(3):
-                point[a] = position[link, a]
-                for b in range(3):
-                    point[a] += rotation[link, a, b] * middle[h, b]
+            rotate(rotation[link], middle[h], point)
+            point += position[link]
         else:
             k = order[h - count]
             link, point[:] = obstacles.link[k], obstacles.body_point[k]

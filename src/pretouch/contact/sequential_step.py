@@ -17,13 +17,9 @@ from pretouch.contact.residual_model import (
     BLOCK,
     QUEUE,
     FreeSample,
-    ResidualModel,
     SequentialNumbers,
     SequentialState,
     describe_free_motion,
-    prior_of,
-    residual_init,
-    turning_init,
 )
 from pretouch.contact.scatter import (
     LENGTHS,
@@ -33,15 +29,11 @@ from pretouch.contact.scatter import (
     earned_level,
     learn_level,
     learn_scatter,
-    level_init,
     means_in_free_motion,
-    scatter_init,
     window_means,
 )
 from pretouch.contact.sequential import (
-    MOST,
     Moment,
-    alarm_bound,
     force_map_into,
     hypotheses,
     judge,
@@ -49,7 +41,6 @@ from pretouch.contact.sequential import (
     nearest_of,
 )
 from pretouch.groups import Mechanism
-from pretouch.params import MisfitParams, ProximityPriorParams, SequentialParams
 from pretouch.records import Cell, IntCell
 from pretouch.robot.kinematics import jacobian_into
 from pretouch.robot.vectors import below
@@ -61,10 +52,6 @@ _SETTLED_S = 10.0
 """Time at rest, as far as free motion is learnt in it, after which a posture's offsets count as learnt [s]."""
 _STIRS_RAD_S = 0.002
 """Joint speed from which an arm at rest sets out: friction turns round before it counts as moving [rad/s]."""
-
-
-_NO_MISFIT, _NO_PROXIMITY = MisfitParams(), ProximityPriorParams()
-"""In the place of those that are switched off: no number of them counts."""
 
 
 class SampleTest(NamedTuple):
@@ -89,8 +76,6 @@ class SampleTest(NamedTuple):
     """(n, n) of one sample: its noise, and `model_variance` on the diagonal [Nm^2]."""
     model_variance: Annotated[FloatArray, "n"]
     """(n,) of the error of the mean of free motion, which does not average out [Nm^2]."""
-    learning: IntCell
-    """Whether the sample is to be learnt as free motion."""
     lasting: IntCell
     """Whether it is being found out if the residual is a load or a step of an estimate."""
 
@@ -99,26 +84,7 @@ def sample_test(n: int) -> SampleTest:
     """Return room for what a sample of n joints says."""
     return SampleTest(
         np.zeros(n), np.zeros(1), np.full(1, np.nan), np.zeros(3), np.zeros((6, 3)), np.zeros((len(LENGTHS), n)),
-        np.zeros(1, np.int64), np.zeros((n, n)), np.zeros(n), np.zeros(1, np.int64), np.zeros(1, np.int64),
-    )  # fmt: skip
-
-
-def sequential_init(n: int, p: SequentialParams, learnt: ResidualModel | None = None) -> SequentialState:
-    """Return the state of n joints before the first sample; `learnt` is what an earlier session knew of the arm."""
-    none = np.zeros(1, np.int64)
-    return SequentialState(
-        residual_init(n, p) if learnt is None else learnt, np.zeros((LONGEST, n)), none, none, none, np.zeros(3 + n),
-        none, turning_init(n), scatter_init(n), level_init(), none,
-    )  # fmt: skip
-
-
-def sequential_numbers(n: int, period: float, p: SequentialParams) -> SequentialNumbers:
-    """Return what compiled code takes of the parameters, of n joints and a control period [s]."""
-    misfit, near = p.misfit or _NO_MISFIT, p.proximity or _NO_PROXIMITY
-    return SequentialNumbers(
-        p.numbers, near.numbers, misfit.numbers, period, math.exp(-p.observer_gain_1_s * period),
-        alarm_bound(p, period), ("never", "watched", "always").index(p.learn), MOST if p.proximity else 0,
-        round(p.relearn_after_s / period) if p.learn != "never" else 0, p.misfit is not None, prior_of(n, p),
+        np.zeros(1, np.int64), np.zeros((n, n)), np.zeros(n), np.zeros(1, np.int64),
     )  # fmt: skip
 
 
@@ -136,7 +102,7 @@ def assess_sample(
         now.tau_ext, results.residual, np.empty(n), np.empty((n, state.model.weights.shape[1])), np.empty((n, n)),
         np.empty(n), covariance, results.model_variance, np.zeros(1, np.int64),
     )  # fmt: skip
-    describe_free_motion(now.qd_commanded, state.model, state.turning, numbers, kin, mechanism, sample)
+    describe_free_motion(now, state, numbers, mechanism, sample)
     state.ring[at] = results.residual
     results.samples[0] = min(state.samples[0] + 1, LONGEST)
     results.means[:] = 0.0  # of windows that are not whole yet
@@ -178,9 +144,6 @@ def assess_sample(
     if state.steady[0] < 0:  # the load that lasted is free motion now, and no contact
         evidence, results.force[:], results.samples[0] = 0.0, 0.0, 0
         state.steady[0] = state.calm[0] = state.model.filled[0] = state.model.waiting[0] = 0
-        results.learning[0] = 1
-    else:
-        results.learning[0] = 1 if state.calm[0] == CALM else 0
     state.samples[0] = results.samples[0]
     results.log_likelihood_ratio[0], results.lasting[0] = evidence, 1 if state.steady[0] > 0 else 0
 

@@ -8,15 +8,9 @@ import numpy as np
 from pretouch.contact.announced_load import doubted
 from pretouch.contact.detector import Body, Detection, Detector, Sample, no_torques, strongest
 from pretouch.contact.localisation import LocalisationState, localisation_init, localise, most_significant_mean
-from pretouch.contact.residual_model import ResidualModel, SequentialState
+from pretouch.contact.residual_model import ResidualModel, SequentialState, sequential_init, sequential_numbers
 from pretouch.contact.sequential import Moment
-from pretouch.contact.sequential_step import (
-    SampleTest,
-    assess_sample,
-    sample_test,
-    sequential_init,
-    sequential_numbers,
-)
+from pretouch.contact.sequential_step import SampleTest, assess_sample, sample_test
 from pretouch.contact.touch_cue import Cue, Cues, no_cues, together
 from pretouch.contact.window import window_init
 from pretouch.errors import ParameterError
@@ -85,7 +79,7 @@ class SequentialTest(SequentialParams, Detector, name="sequential"):
             significant = most_significant_mean(tested, body.period, self.localise or _USUAL)
         detection = Detection(
             bands, strongest(tested.force, bands) if ratio >= 1.0 and sample.armed else None, sample.armed,
-            tested.residual, ratio, bool(tested.learning[0]), bool(tested.lasting[0]),
+            tested.residual, ratio, bool(tested.lasting[0]),
             location.touched if self.localise and location else NOT_TOUCHED, significant,
             float(tested.detectable_n[0]),
         )  # fmt: skip

@@ -16,7 +16,7 @@ which fills while it is and empties more slowly while it is not; a unit whose ac
 neither raises a prior nor keeps free motion from being learnt, and contacts are found as without it.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache
 from typing import Any, NamedTuple, Self
 
@@ -41,14 +41,12 @@ class Cues(NamedTuple):
     """(C, 3) these places, base frame [m]."""
     sigma: FloatArray
     """(C,) standard deviation of each in the worst direction [m]."""
-    force: FloatArray
-    """(C,) size of the force there [N], NaN where the unit measures none; nothing is inferred from it."""
 
 
 @cache
 def no_cues(links: int) -> Cues:
     """Return what units that say nothing say, of an arm with so many links: one for all steps, to be read only."""
-    return Cues(np.ones(links), np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros(0), np.zeros(0))
+    return Cues(np.ones(links), np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros(0))
 
 
 def together(*cues: Cues) -> Cues:
@@ -61,7 +59,6 @@ def together(*cues: Cues) -> Cues:
         np.concatenate([c.link for c in cues]),
         np.concatenate([c.point for c in cues]),
         np.concatenate([c.sigma for c in cues]),
-        np.concatenate([c.force for c in cues]),
     )
 
 
@@ -85,23 +82,6 @@ _TOLERANCE_S = 1e-9
 """A reading stamped later than the step by more than this is of a wrong clock, and not believed [s]."""
 
 
-@dataclass(frozen=True, eq=False)
-class TouchSettings:
-    """What is fixed of the M units with a touch sensor."""
-
-    unit: IntArray
-    """(M,) index of each in the skin."""
-    link: IntArray
-    """(M,) index of the link of each."""
-    place: FloatArray
-    """(M, 3) where each is, link frame [m]."""
-    sigma: FloatArray
-    """(M,) standard deviation of the touched place in the worst direction [m]: half the radius of the patch, as of an
-    even distribution over it, and the uncertainty of where the unit is."""
-    gain: FloatArray
-    """(M,) G: times the prior of a contact on the link is larger while it is touched [1]."""
-
-
 def gain_of(share: FloatArray, p: TouchSensorParams) -> FloatArray:
     """Return G (M,) of units whose patches cover these shares (M,) of their links."""
     # p: false touches an hour times how long each lasts
@@ -109,68 +89,46 @@ def gain_of(share: FloatArray, p: TouchSensorParams) -> FloatArray:
     return np.asarray(share / false + 1.0 - share)
 
 
-def surface_area(capsules: Capsules, link: int) -> float:
-    """Surface of a link [m^2]: of its capsules, what lies in another one counted too; infinite of one without any."""
-    own = capsules.of_links(np.array([link]))
-    length = np.linalg.norm(own.b - own.a, axis=1)
-    area = float((2 * np.pi * own.radius * length + 4 * np.pi * own.radius**2).sum())
-    return area if area > 0.0 else np.inf  # so that s = 0 and G = 1
+def surface_areas(capsules: Capsules, links: int) -> FloatArray:
+    """Surface of each link (L,) [m^2]: of its capsules, what lies in another one counted too; infinite without any."""
+    length, r = np.linalg.norm(capsules.b - capsules.a, axis=1), capsules.radius
+    area = np.bincount(capsules.link, 2 * np.pi * r * length + 4 * np.pi * r**2, links)
+    return np.where(area > 0.0, area, np.inf)  # so that s = 0 and G = 1
 
 
 @dataclass(frozen=True)
 class TouchSensors(TouchSensorParams, Cue, name="touch"):
     """The units' touch sensors: a contact is likelier on the link of a unit that is touched, and there is where."""
 
-    def on(self, body: Body) -> "TouchSensors":
-        """Return the cue for an arm, its touch sensors looked up; itself where no unit has one."""
-        skin = body.skin
-        if not len(skin.touching):
-            return self
-        unit, link = skin.touching, skin.link[skin.touching]
-        radius = np.array([sensor.touch.radius for sensor in skin.units if sensor.touch is not None])
-        area = np.array([surface_area(body.model.capsules, int(i)) for i in link])
-        # s: the patch, taken as flat, of the link's surface
-        share = np.minimum(np.pi * radius**2 / area, 1.0)
-        settings = TouchSettings(
-            unit, link, skin.T_link_sensor[unit, :3, 3].copy(), np.hypot(radius / 2, skin.position_sigma[unit]),
-            gain_of(share, self),
-        )  # fmt: skip
-        return _TouchSensorsOn(**{name: getattr(self, name) for name in self.__dataclass_fields__}, settings=settings)
-
-    def step(self, state: Any, body: Body, sample: Sample) -> tuple[Cues | None, Any]:
-        """Return nothing: no unit has a touch sensor."""
-        return None, state
-
-
-@dataclass(frozen=True)
-class _TouchSensorsOn(TouchSensors):
-    """Touch sensors of one arm; their state is the time (M,) that each said so, less what was given back [s]."""
-
-    settings: TouchSettings = field(compare=False, kw_only=True)
-
     def init(self, body: Body) -> FloatArray:
-        return np.zeros(len(self.settings.unit))
+        """Return the account of each of M touch sensors (M,): how long it said that it was touched [s]."""
+        return np.zeros(len(body.skin.touching))
 
     def step(self, state: FloatArray, body: Body, sample: Sample) -> tuple[Cues | None, FloatArray]:
         """Return what units say of a touch in one step, None where none is believed to be touched.
 
         The touch readings of the sample are of all K units, of known shapes; None of a skin that gave none.
         """
-        readings, kin, settings, touched = sample.touches, sample.kin, self.settings, np.zeros(len(state), np.bool_)
+        if not len(state):
+            return None, state
+        skin, readings, kin, touched = body.skin, sample.touches, sample.kin, np.zeros(len(state), np.bool_)
         if readings is not None:
-            age = sample.stamp - readings.stamp[settings.unit]
+            age = sample.stamp - readings.stamp[skin.touching]
             fresh = (age <= self.fresh_s) & (age >= -_TOLERANCE_S)
-            touched = fresh & (readings.status[settings.unit] == TouchStatus.OK) & readings.contact[settings.unit]
-        believed = np.flatnonzero(touched & (state < self.patience_s))
+            touched = fresh & (readings.status[skin.touching] == TouchStatus.OK) & readings.contact[skin.touching]
+        unit = skin.touching[touched & (state < self.patience_s)]
         if touched.any() or state.any():
             # filled by all that is said, believed or not: a sensor that stays stuck is never believed again
             filled = np.where(touched, state + body.period, state - self.forgiveness * body.period)
             state = np.clip(filled, 0.0, self.patience_s)
-        if readings is None or not len(believed):
+        if not len(unit):
             return None, state
-        link, gain = settings.link[believed], np.ones(len(kin.position))
+        link, gain = skin.link[unit], np.ones(len(kin.position))
+        radius = np.array([patch.radius for k in unit if (patch := skin.units[k].touch) is not None])
+        # s: the patch, taken as flat, of the link's surface
+        share = np.minimum(np.pi * radius**2 / surface_areas(body.model.capsules, len(gain))[link], 1.0)
         # several touched units of one link count once, by the largest gain
-        np.maximum.at(gain, link, settings.gain[believed])
-        point = kin.position[link] + np.einsum("mij,mj->mi", kin.rotation[link], settings.place[believed])
-        force = readings.force[settings.unit[believed]]
-        return Cues(gain, link, point, settings.sigma[believed], force), state
+        np.maximum.at(gain, link, gain_of(share, self))
+        point = kin.position[link] + np.einsum("mij,mj->mi", kin.rotation[link], skin.T_link_sensor[unit, :3, 3])
+        # half the radius of the patch, as of an even distribution over it, and the uncertainty of where the unit is
+        return Cues(gain, link, point, np.hypot(radius / 2, skin.position_sigma[unit])), state

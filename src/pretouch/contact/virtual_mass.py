@@ -167,6 +167,18 @@ def yield_to(
         dt: period [s].
         contact: whether the detector finds one.
     """
+    pushed, velocity = _drive(mass, residual, command, band, p, dt), mass.velocity
+    velocity *= min(1.0, p.speed_max_m_s / max(fastest_point(axes, velocity), _LEAST_M_S))
+    mass.quiet[0] = 0.0 if pushed else mass.quiet[0] + dt
+    mass.no_contact[0] = 0.0 if contact else mass.no_contact[0] + dt
+    mass.since[0] += dt
+
+
+@kernel
+def _drive(
+    mass: VirtualMass, residual: FloatArray, command: FloatArray, band: FloatArray, p: AdmittanceParams, dt: float
+) -> bool:
+    """Let the torque move the mass, as far as the energy in the tank allows; return whether a push goes on."""
     before, torque, velocity, side = mass.torque.copy(), mass.torque, mass.velocity, mass.side
     steady, sliding, friction, damping, n = mass.steady, mass.sliding, p.static_friction_nm, p.damping_nm_s, len(band)
     # the estimate is a low pass of the force u, y = keep y_before + (1 - keep) u; solved for u below
@@ -214,10 +226,7 @@ def yield_to(
         for i in range(n):
             if min(torque[i] * velocity[i], acted[i] * velocity[i]) <= band[i] * abs(velocity[i]):
                 velocity[i] = 0.0
-    velocity *= min(1.0, p.speed_max_m_s / max(fastest_point(axes, velocity), _LEAST_M_S))
-    mass.quiet[0] = 0.0 if pushed else mass.quiet[0] + dt
-    mass.no_contact[0] = 0.0 if contact else mass.no_contact[0] + dt
-    mass.since[0] += dt
+    return pushed
 
 
 @kernel

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from pretouch.contact.detector import Body
+from pretouch.contact.residual_model import sequential_init, sequential_numbers
 from pretouch.contact.sequential import Moment
-from pretouch.contact.sequential_step import assess_sample, sample_test, sequential_init, sequential_numbers
+from pretouch.contact.sequential_step import assess_sample, sample_test
 from pretouch.errors import ParameterError
 from pretouch.groups import no_obstacles
 from pretouch.hardware.franka.collision import (
