@@ -12,7 +12,7 @@ import pytest
 
 import pretouch
 from pretouch import compiled
-from pretouch.robot.vectors import below
+from pretouch.robot.kinematics import below
 from pretouch.source_digest import source_digest
 
 PACKAGE = Path(pretouch.__file__).parent

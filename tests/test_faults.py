@@ -10,7 +10,7 @@ from pretouch.errors import ParameterError
 from pretouch.faults import Watch, examine, watch_init
 from pretouch.modes import Event
 from pretouch.params import FailureParams
-from pretouch.perception.moving import sound_moving
+from pretouch.perception.closest import sound_moving
 from pretouch.sensing.sensor import PAPER_SENSOR
 from pretouch.sound import sound_points, sound_touch
 from pretouch.types import Inputs, MovingFixtures, Payload, RangeReadings, RobotState, SeenPoints, TouchReadings

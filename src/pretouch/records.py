@@ -7,6 +7,7 @@ for all arms, skins and profiles. Compiled code opens the blocks as the named tu
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import is_dataclass
 from functools import cache, partial, reduce
 from typing import Annotated, Any, NamedTuple, get_args, get_origin, get_type_hints
 
@@ -46,7 +47,8 @@ class Place(NamedTuple):
 @cache
 def _hints(record: type) -> dict[str, Any]:
     record = getattr(record, "Numbers", record)
-    return get_type_hints(record, include_extras=True) if hasattr(record, "_fields") else {}
+    has_fields = hasattr(record, "_fields") or is_dataclass(record)
+    return get_type_hints(record, include_extras=True) if has_fields else {}
 
 
 class _Part(NamedTuple):

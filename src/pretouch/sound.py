@@ -4,8 +4,8 @@ import numpy as np
 
 from pretouch.compiled import compiled
 from pretouch.desired import LARGEST, LATEST
-from pretouch.perception.chosen_points import FARTHEST, LARGEST_SIGMA, usable
-from pretouch.robot.vectors import below
+from pretouch.perception.external_points import FARTHEST, LARGEST_SIGMA, usable
+from pretouch.robot.kinematics import below
 from pretouch.types import WHOLE, FloatArray, Payload, RangeReadings, RangeStatus, RobotState, SeenPoints, TouchReadings
 from pretouch.values import real, real_number
 

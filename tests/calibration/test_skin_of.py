@@ -87,7 +87,7 @@ def test_points_inside_a_link_are_moved_to_its_surface(panda_model):
     for link in sorted(set(panda_model.capsules.link.tolist())):
         own = panda_model.capsules.of_links(np.array([link]))
         for _ in range(50):
-            k = rng.integers(len(own))
+            k = rng.integers(len(own.radius))
             normal = rng.normal(size=3)
             normal /= np.linalg.norm(normal)
             p = own.a[k] + rng.uniform() * (own.b[k] - own.a[k]) + (own.radius[k] - 0.005) * normal

@@ -15,7 +15,7 @@ TURN = np.eye(7)[0]
 
 def slowed(model: RobotModel, q, qd, origin):
     kin = model.kinematics(q)
-    return within_reach(qd, kin, model.moved_by, model.body.arrays, origin, REACH)
+    return within_reach(qd, kin, model.moved_by, model.body, origin, REACH)
 
 
 def ends(model: RobotModel, q):

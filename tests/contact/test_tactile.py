@@ -13,13 +13,12 @@ from pretouch.contact.alarm_level import earned_level, level_init
 from pretouch.contact.detector import Body
 from pretouch.contact.sequential import alarm_bound
 from pretouch.contact.touch_cue import Cues, TouchSensors, gain_of, no_cues, surface_area, together
-from pretouch.groups import no_obstacles
 from pretouch.profiles import profile
 from pretouch.robot.body import Capsules
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import TouchPatch
-from pretouch.types import TouchReadings, TouchStatus
+from pretouch.types import TouchReadings, TouchStatus, no_obstacles
 
 (P,) = profile("pretouch").detect.cues
 PERIOD = 0.01

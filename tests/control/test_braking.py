@@ -18,8 +18,8 @@ from pretouch.control.braking import (
     tangents_of,
 )
 from pretouch.control.qp import Rows
-from pretouch.groups import Chain, no_obstacles
-from pretouch.types import FloatArray
+from pretouch.robot.kinematics import Chain
+from pretouch.types import FloatArray, no_obstacles
 
 DT, A, TOUCH, TASK, NOTICE = 0.01, 0.3, 0.03, 0.3, 0.6
 TIGHTEN, LOOSEN, RETREAT, NEAR, SLOWEST = 3.0, 1.0, 0.1, 0.1, 0.1

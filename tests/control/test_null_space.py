@@ -8,9 +8,9 @@ from tests.control.programs import task_cost
 
 from pretouch.control.null_space import NullSpaceLimits, away, cost_with_null_space, projector
 from pretouch.control.qp import cost_params
-from pretouch.groups import Obstacles, no_obstacles
 from pretouch.params import TaskParams
 from pretouch.robot.model import RobotModel
+from pretouch.types import Obstacles, no_obstacles
 
 TASK = TaskParams(mid_joint_projected=True)
 NO_MOTION = np.zeros(7)

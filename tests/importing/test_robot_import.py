@@ -12,9 +12,9 @@ from pretouch.errors import RobotModelError
 from pretouch.importing.folder import write_folder
 from pretouch.importing.read import read_robot
 from pretouch.importing.robot_import import ImportOptions, import_robot
-from pretouch.robot.description_file import load_description
+from pretouch.robot.description import load_description
 from pretouch.robot.model import RobotModel
-from pretouch.robot.self_distance import capsule_ends, kinematics_of, self_distances
+from pretouch.robot.postures import capsule_ends, kinematics_of, self_distances
 
 READY = (0.0, 0.3, 1.2, 0.0, 1.6, 0.0)
 BARE = six_axis().replace(BOX, "<geometry/>", 5)

@@ -5,8 +5,7 @@ import pytest
 from tests.fuzz.invariants import same
 
 from pretouch.errors import RobotModelError
-from pretouch.robot.description import RobotDescription, fr3, panda
-from pretouch.robot.description_file import description_text, load_description
+from pretouch.robot.description import RobotDescription, description_text, fr3, load_description, panda
 
 
 def written(folder: Path, arm: RobotDescription) -> Path:

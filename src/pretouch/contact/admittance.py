@@ -41,10 +41,10 @@ from pretouch.contact.virtual_mass import (
     mass_init,
     yielded,
 )
-from pretouch.groups import Kinematics
 from pretouch.modes import Event, ModeState
 from pretouch.params.paper import AdmittanceParams, ClampParams
 from pretouch.records import Flat
+from pretouch.robot.kinematics import Kinematics
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray, Mode
 from pretouch.values import value
@@ -111,7 +111,7 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
         if opens:
             p = self._way_out
             back, clamp = opened(state.clamp, state.mass.torque, inputs.robot.q_commanded, body.period, p)
-            fastest = fastest_point(kin, model.moved_by, model.body.arrays, back)
+            fastest = fastest_point(kin, model.moved_by, model.body, back)
             qd = back * min(1.0, p.open_m_s / fastest) if fastest > 0 else back  # never beyond the place in one period
             state = replace(state, clamp=clamp, mass=state.mass._replace(velocity=np.zeros(len(qd))))
         if doing == "soft" and not qd.any():
@@ -184,7 +184,7 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
         """
         if doing != "react" or origin is None:
             return mass, 0.0
-        moved_by, capsules = body.model.moved_by, body.model.body.arrays
+        moved_by, capsules = body.model.moved_by, body.model.body
         velocity, moved = within_reach(mass.velocity, kin, moved_by, capsules, origin, self.reach_m)
         return mass._replace(velocity=velocity), moved
 

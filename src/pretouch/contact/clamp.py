@@ -11,11 +11,11 @@ from dataclasses import replace
 import numpy as np
 
 from pretouch.compiled import compiled, kernel
-from pretouch.groups import Kinematics
 from pretouch.params.paper import ClampParams, PinchParams
 from pretouch.robot.body import Capsules
+from pretouch.robot.kinematics import Kinematics
 from pretouch.robot.model import RobotModel
-from pretouch.robot.self_distance import nearest_points
+from pretouch.robot.postures import nearest_points
 from pretouch.types import FloatArray, IntArray, Touched
 from pretouch.values import value
 
@@ -291,7 +291,7 @@ def presses_on_fixture(
     if size < p.force_n or closing < _CLOSING_M_S * size:
         return False
     gap, away = planes[:, :3] @ point - planes[:, 3], planes[:, :3]
-    if len(standing):
+    if len(standing.radius):
         # distance of the point from each axis: a segment of no length
         there = np.broadcast_to(point, standing.a.shape)
         foot, _ = nearest_points(standing.a, standing.b, there, there)

@@ -10,8 +10,8 @@ from pretouch.compiled import compiled
 from pretouch.composition import Part
 from pretouch.contact.residual_model import ResidualModel
 from pretouch.contact.window import Window
-from pretouch.groups import Kinematics
 from pretouch.robot.body import Capsules, no_capsules
+from pretouch.robot.kinematics import Kinematics
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import (

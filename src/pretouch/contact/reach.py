@@ -3,9 +3,8 @@
 import numpy as np
 
 from pretouch.compiled import compiled, kernel
-from pretouch.groups import CapsuleArrays, Kinematics
-from pretouch.robot.body import Capsules
-from pretouch.robot.vectors import dot, placed_ends
+from pretouch.robot.body import Capsules, placed
+from pretouch.robot.kinematics import Kinematics, dot
 from pretouch.types import BoolArray, FloatArray
 
 BRAKES_S = 0.2
@@ -20,7 +19,7 @@ def axis_ends(capsules: Capsules, kin: Kinematics) -> FloatArray:
 
 
 def within_reach(
-    velocity: FloatArray, kin: Kinematics, moved_by: BoolArray, capsules: CapsuleArrays, origin: FloatArray,
+    velocity: FloatArray, kin: Kinematics, moved_by: BoolArray, capsules: Capsules, origin: FloatArray,
     reach: float,
 ) -> tuple[FloatArray, float]:  # fmt: skip
     """Slow joint velocities that lead the arm too far from where it was.
@@ -44,16 +43,16 @@ def within_reach(
 
 @compiled
 def _share(
-    kin: Kinematics, moved_by: BoolArray, capsules: CapsuleArrays, qd: FloatArray, origin: FloatArray, reach: float
+    kin: Kinematics, moved_by: BoolArray, capsules: Capsules, qd: FloatArray, origin: FloatArray, reach: float
 ) -> tuple[float, float]:
     """Share of the joint velocities (n,) [rad/s] that is allowed, and how far the farthest end has come [m]."""
-    position, rotation, anchor, axis = kin
-    link, ends = capsules.link, placed_ends(capsules.link, capsules.a, capsules.b, position, rotation)
+    anchor, axis = kin.anchor, kin.axis
+    link, a, b, _ = placed(capsules, kin)
     share, farthest = 1.0, 0.0
     for e in range(2 * len(link)):
         c, end = divmod(e, 2)
         k = link[c]
-        point = ends[end, c]
+        point = a[c] if end == 0 else b[c]
         away = point - origin[c, end]
         far = np.sqrt(dot(away, away))
         farthest = max(farthest, far)

@@ -20,10 +20,9 @@ import numpy as np
 from pretouch.cholesky import backward, factor, forward
 from pretouch.compiled import compiled, kernel
 from pretouch.errors import ParameterError
-from pretouch.groups import Kinematics, Mechanism
 from pretouch.params import SequentialParams
 from pretouch.records import IntCell
-from pretouch.robot.kinematics import column
+from pretouch.robot.kinematics import Kinematics, Mechanism, column
 from pretouch.robot.model import RobotModel
 from pretouch.types import BoolArray, FloatArray
 

@@ -21,10 +21,9 @@ import numpy as np
 from pretouch.cholesky import backward, factor, forward
 from pretouch.compiled import compiled, kernel
 from pretouch.contact.scatter import LENGTHS, FreeMeans, covariance_of_mean, spread_out
-from pretouch.groups import Kinematics, Mechanism, Obstacles
 from pretouch.params import SequentialParams
-from pretouch.robot.kinematics import jacobian_into
-from pretouch.types import FloatArray, IntArray
+from pretouch.robot.kinematics import Kinematics, Mechanism, jacobian_into
+from pretouch.types import FloatArray, IntArray, Obstacles
 
 if TYPE_CHECKING:
     from pretouch.contact.model_update import SequentialNumbers

@@ -12,10 +12,10 @@ from pretouch.contact.scatter import LONGEST, scatter_init, turning_init
 from pretouch.contact.sequential import alarm_bound
 from pretouch.contact.sequential_step import Joints, SampleTest, assess_sample, sample_test
 from pretouch.contact.touch_cue import Cues
-from pretouch.groups import Kinematics, Obstacles
 from pretouch.params import MisfitParams, ProximityPriorParams, SequentialParams
+from pretouch.robot.kinematics import Kinematics
 from pretouch.robot.model import RobotModel
-from pretouch.types import RobotState
+from pretouch.types import Obstacles, RobotState
 
 _CEILING = 4.0
 """Times the prior that the noise's standard deviations may grow to."""

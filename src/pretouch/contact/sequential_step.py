@@ -16,11 +16,9 @@ from pretouch.contact.model_update import CALM, SequentialNumbers, SequentialSta
 from pretouch.contact.residual_model import CalmSample, features_into, mean_and_variance, spread_of_sample
 from pretouch.contact.scatter import LENGTHS, LONGEST, add_reversal_variance, scattered_means, white_means, window_means
 from pretouch.contact.sequential import force_map_into, hypotheses, judge, link_prior, nearest_of
-from pretouch.groups import Kinematics, Mechanism, Obstacles
 from pretouch.records import Cell, IntCell
-from pretouch.robot.kinematics import jacobian_into, mass_matrix_into
-from pretouch.robot.vectors import below
-from pretouch.types import FloatArray
+from pretouch.robot.kinematics import Kinematics, Mechanism, below, jacobian_into, mass_matrix_into
+from pretouch.types import FloatArray, Obstacles
 
 _SETTLED_S = 10.0
 """Time at rest, as far as free motion is learnt in it, after which a posture's offsets count as learnt [s]."""

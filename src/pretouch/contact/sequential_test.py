@@ -19,9 +19,8 @@ from pretouch.contact.residual_model import ResidualModel
 from pretouch.contact.sequential_detector import Observation, sequential_init, sequential_numbers, sequential_step
 from pretouch.contact.touch_cue import Cue, Cues, no_cues, together
 from pretouch.errors import ParameterError
-from pretouch.groups import no_obstacles
 from pretouch.params import LocalisationParams, SequentialParams
-from pretouch.types import NOT_TOUCHED, FloatArray, RobotState, Thresholds
+from pretouch.types import NOT_TOUCHED, FloatArray, RobotState, Thresholds, no_obstacles
 from pretouch.values import value
 
 

@@ -11,12 +11,11 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from pretouch.compiled import compiled, kernel
-from pretouch.groups import CapsuleArrays, Chain, Kinematics
 from pretouch.params.paper import AdmittanceParams
 from pretouch.records import Cell, IntCell
-from pretouch.robot.kinematics import point_velocity
+from pretouch.robot.body import Capsules, placed
+from pretouch.robot.kinematics import Chain, Kinematics, point_velocity
 from pretouch.robot.model import RobotModel
-from pretouch.robot.vectors import placed_ends
 from pretouch.types import BoolArray, FloatArray, IntArray
 
 
@@ -160,7 +159,7 @@ def yielded(
 def _no_faster(velocity: FloatArray, model: RobotModel, kin: Kinematics, most: float) -> FloatArray:
     """Scale joint velocities (n,) [rad/s] so that no point of the body's axes is faster than `most` [m/s]."""
     body = model.body
-    fastest = fastest_point(kin, model.moved_by, body.arrays, velocity)
+    fastest = fastest_point(kin, model.moved_by, body, velocity)
     return velocity * (most / fastest) if fastest > most else velocity
 
 
@@ -284,16 +283,15 @@ def _shrunk(torque: FloatArray, band: FloatArray) -> FloatArray:
 
 
 @compiled
-def fastest_point(kin: Kinematics, moved_by: BoolArray, capsules: CapsuleArrays, qd: FloatArray) -> float:
+def fastest_point(kin: Kinematics, moved_by: BoolArray, capsules: Capsules, qd: FloatArray) -> float:
     """Speed [m/s] of the fastest end of any capsule's axis at joint velocities `qd` (n,) [rad/s].
 
     The speed along an axis is convex, so no point of it is faster than both its ends.
     """
     link, chain = capsules.link, Chain(kin.anchor, kin.axis, moved_by, qd)
-    ends, fastest = placed_ends(link, capsules.a, capsules.b, kin.position, kin.rotation), 0.0
+    (_, a, b, _), fastest = placed(capsules, kin), 0.0
     for c in range(len(link)):
-        for end in range(2):
-            point = ends[end, c]
+        for point in (a[c], b[c]):
             x, y, z = point_velocity(chain, link[c], point[0], point[1], point[2])
             fastest = max(fastest, np.sqrt(x * x + y * y + z * z))
     return fastest

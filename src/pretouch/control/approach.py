@@ -9,10 +9,9 @@ from pretouch.compiled import compiled, kernel
 from pretouch.control.braking import BrakingLimits
 from pretouch.control.interface import Restriction
 from pretouch.control.qp import Rows
-from pretouch.groups import Kinematics, Obstacles
 from pretouch.params import BrakingParams, RestrictionParams
-from pretouch.robot.kinematics import column
-from pretouch.types import BoolArray, FloatArray, Number
+from pretouch.robot.kinematics import Kinematics, column
+from pretouch.types import BoolArray, FloatArray, Number, Obstacles
 
 
 @kernel

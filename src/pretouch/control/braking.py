@@ -14,10 +14,9 @@ import numpy as np
 from pretouch.cholesky import forward
 from pretouch.compiled import compiled, inlined, kernel
 from pretouch.control.qp import Rows
-from pretouch.groups import Chain, Obstacles
 from pretouch.params.pretouch import REGIONS, BrakingParams, EffectiveMass
-from pretouch.robot.kinematics import column
-from pretouch.types import BoolArray, FloatArray, IntArray
+from pretouch.robot.kinematics import Chain, column
+from pretouch.types import BoolArray, FloatArray, IntArray, Obstacles
 
 _TANGENTS = 4  # two directions across the normal, both ways along each
 MOST_ROWS = 2 + 2 * _TANGENTS

@@ -5,9 +5,9 @@ import math
 import numpy as np
 
 from pretouch.desired import Desired, DesiredKind, sound_desired
-from pretouch.groups import Kinematics
 from pretouch.modes import Event
 from pretouch.params import FailureParams, TaskParams
+from pretouch.robot.kinematics import Kinematics
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray, RobotState
 from pretouch.values import value

@@ -7,8 +7,8 @@ import numpy as np
 from pretouch.composition import Part
 from pretouch.control.joint_box import JointLimits
 from pretouch.errors import ParameterError
-from pretouch.groups import Kinematics
 from pretouch.params import TaskParams
+from pretouch.robot.kinematics import Kinematics
 from pretouch.robot.model import RobotModel
 from pretouch.types import WHOLE, FloatArray, IntArray, Obstacles, RobotState
 from pretouch.values import value

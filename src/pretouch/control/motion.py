@@ -11,12 +11,11 @@ from pretouch.control.joint_box import JointLimits, box_and_brake
 from pretouch.control.null_space import NullSpaceLimits, away, cost_with_null_space
 from pretouch.control.penalty import Minimum, Problem, excesses, minimise
 from pretouch.control.qp import CostParams, cost_into, cost_params, twist
-from pretouch.groups import Arm, Kinematics, Obstacles
 from pretouch.modes import SOLVED
 from pretouch.params import NullSpaceMotion, TaskParams
-from pretouch.robot.kinematics import jacobian_into
+from pretouch.robot.kinematics import Arm, Kinematics, jacobian_into
 from pretouch.robot.model import RobotModel
-from pretouch.types import FloatArray, IntArray
+from pretouch.types import FloatArray, IntArray, Obstacles
 
 if TYPE_CHECKING:
     from pretouch.faults import Report

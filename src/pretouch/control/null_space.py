@@ -6,8 +6,7 @@ import numpy as np
 
 from pretouch.compiled import compiled, kernel
 from pretouch.control.qp import CostParams, damping, manipulability, mid_joint_velocity
-from pretouch.groups import Obstacles
-from pretouch.types import BoolArray, FloatArray, IntArray
+from pretouch.types import BoolArray, FloatArray, IntArray, Obstacles
 
 _DAMPING = 1e-6
 """Added to J J^T, so that the projector is defined at singularities too [m^2]."""

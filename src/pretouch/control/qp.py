@@ -6,7 +6,7 @@ import numpy as np
 
 from pretouch.compiled import compiled, kernel
 from pretouch.params import TaskParams
-from pretouch.robot.vectors import rotation_error
+from pretouch.robot.kinematics import rotation_error
 from pretouch.types import FloatArray, IntArray, Number
 
 

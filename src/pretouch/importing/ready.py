@@ -6,11 +6,10 @@ from functools import partial
 import numpy as np
 
 from pretouch.errors import RobotModelError
-from pretouch.groups import Kinematics
 from pretouch.importing.sampling import spread
-from pretouch.robot.ik import Pace, posture_at
+from pretouch.robot.kinematics import Kinematics
 from pretouch.robot.model import RobotModel
-from pretouch.robot.self_distance import capsule_ends, kinematics_of, self_distances
+from pretouch.robot.postures import Pace, capsule_ends, kinematics_of, posture_at, self_distances
 from pretouch.types import BoolArray, FloatArray
 
 _STARTS = 96

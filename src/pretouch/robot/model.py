@@ -6,10 +6,9 @@ import mujoco
 import numpy as np
 
 from pretouch.errors import RobotModelError
-from pretouch.groups import Arm, Kinematics, Links, Mechanism
 from pretouch.robot.body import Capsules, Surface, bodies_of, capsules_of, surface_of
 from pretouch.robot.description import RobotDescription
-from pretouch.robot.kinematics import Hinges, jacobian_into, mass_matrix_into, place
+from pretouch.robot.kinematics import Arm, Hinges, Kinematics, Links, Mechanism, jacobian_into, mass_matrix_into, place
 from pretouch.types import BoolArray, FloatArray, IntArray
 
 
@@ -67,7 +66,7 @@ class RobotModel:
         """(L, n) whether a joint moves a link."""
         self.body: Capsules = self.capsules.of_links(np.flatnonzero(self.moved_by.any(axis=1)))
         """The part of the body that any joint moves."""
-        if not len(self.body):
+        if not len(self.body.link):
             raise RobotModelError(f"{description.name}: no joint moves a capsule: give the links capsule geoms.")
         self.apart: IntArray = self._pairs_apart()
         """(P, 2) pairs of capsules that two joints or more part, by their index; see `robot.self_distance`."""
@@ -83,7 +82,7 @@ class RobotModel:
         self.middle: FloatArray = np.array([centers[self.body.link == part].mean(axis=0) for part in self.parts])
         """(P, 3) the middle of each one's capsules, link frame [m]."""
         rest = self.kinematics(np.zeros(self.n))
-        self.surface: Surface = surface_of(self.body, self.moved_by, rest.position, rest.rotation)
+        self.surface: Surface = surface_of(self.body, self.moved_by, rest)
         """Places where the arm may be touched."""
         self.rigid: IntArray = bodies_of(self.moved_by)
         """(L,) the rigid body each link belongs to, from 0; -1 of links that no joint moves."""

@@ -3,15 +3,14 @@
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Annotated, Any, cast
+from typing import Annotated, Any, NamedTuple, cast
 
 import numpy as np
 
 from pretouch.checks import Check, Positive
 from pretouch.composition import Part
 from pretouch.errors import ParameterError, SkinError
-from pretouch.groups import Cones
-from pretouch.types import FloatArray, Number
+from pretouch.types import FloatArray, IntArray, Number
 
 MOST_ZONES = 8
 """Zones along a side: a type with more is a depth camera, whose points are an outside source."""
@@ -196,6 +195,32 @@ class Capacitive(Sensor, name="capacitive"):
         two of (1 - cos a) / 2 leave that. What comes may give another signal than what the map was learnt of, too.
         """
         return math.hypot((1.0 - math.cos(self.angle / 2)) / 2, self.spread_1)
+
+
+class Sensors(NamedTuple):
+    """K sensors, placed in the base frame."""
+
+    position: FloatArray
+    """(K, 3) [m]."""
+    rotation: FloatArray
+    """(K, 3, 3), z along the beam."""
+    link: IntArray
+    """(K,) link each sits on."""
+
+
+class Cones(NamedTuple):
+    """What K sensors of T kinds see: a cone about the axis of each."""
+
+    kind: Annotated[IntArray, "K"]
+    """(K,) which kind each is of."""
+    edge: Annotated[FloatArray, "T", 3]
+    """(T, 3) cosine, sine and tangent of half the angle."""
+    range: Annotated[FloatArray, "T", 2]
+    """(T, 2) nearest and farthest distance that is measured [m]."""
+    rays: Annotated[FloatArray, "T", "R", 3]
+    """(T, R, 3) unit vectors that fill the cone, sensor frame, the axis first."""
+    spread: Annotated[FloatArray, "T"]
+    """(T,) standard deviation of the direction a target lies in, beside what is not known of the unit's own [rad]."""
 
 
 PAPER_SENSOR = VL53L1X()

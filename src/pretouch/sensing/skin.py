@@ -5,17 +5,25 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import tomli_w
 
 from pretouch.atomic_write import atomic_write
 from pretouch.errors import SkinError
-from pretouch.groups import Cones, SkinArrays
 from pretouch.robot.description import RobotDescription
 from pretouch.robot.model import RobotModel
-from pretouch.sensing.sensor import PAPER_SENSOR, Sensor, cones_of, own_type, sensor_called, sensor_tables, tables_of
+from pretouch.sensing.sensor import (
+    PAPER_SENSOR,
+    Cones,
+    Sensor,
+    cones_of,
+    own_type,
+    sensor_called,
+    sensor_tables,
+    tables_of,
+)
 from pretouch.sensing.unit import (
     LARGEST_NUMBER,
     LARGEST_ORIENTATION_SIGMA,
@@ -42,6 +50,21 @@ PAPER_SKIN = Path(str(files("pretouch.sensing") / "data" / "panda_seven_units.to
 """The file of `paper_skin` for the Panda."""
 LIVE_SKIN = PAPER_SKIN.with_name("panda_live.toml")
 """34 units for the Panda of the live page, where people put their hands; the FR3 has the same."""
+
+
+class SkinArrays(NamedTuple):
+    """The K units of a `Skin`."""
+
+    link: Annotated[IntArray, "K"]
+    """(K,) link each sits on."""
+    T_link_sensor: Annotated[FloatArray, "K", 4, 4]
+    """(K, 4, 4)."""
+    position_sigma: Annotated[FloatArray, "K"]
+    """(K,) standard deviation of its position [m]."""
+    orientation_sigma: Annotated[FloatArray, "K"]
+    """(K,) standard deviation of its orientation [rad]."""
+    cones: Cones
+    """What each sees."""
 
 
 class Skin:

@@ -161,7 +161,7 @@ class Seat:
 def seat(model: RobotModel, link: int, p: FloatArray) -> Seat | None:
     """Return where the surface of a link is nearest to a point p (3,) in its frame [m]; None if it has no capsule."""
     own = model.capsules.of_links(np.array([link]))
-    if not len(own):
+    if not len(own.radius):
         return None
     away = from_axes(p[None], own.a, own.b)[1][0]
     distance = np.linalg.norm(away, axis=1)

@@ -8,8 +8,8 @@ import numpy as np
 from pretouch.control.commander import asked_by, commanded
 from pretouch.desired import Desired, DesiredKind
 from pretouch.explanation import Explanation, explain
-from pretouch.groups import Kinematics
 from pretouch.limited import ASKED_M_S, FULL, Limit
+from pretouch.robot.kinematics import Kinematics
 from pretouch.robot.model import RobotModel
 from pretouch.types import ControlStep, FloatArray
 from pretouch.viewer.frame import Frame, World

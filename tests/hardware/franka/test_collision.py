@@ -7,7 +7,6 @@ from pretouch.contact.detector import Body
 from pretouch.contact.sequential_detector import Observation, sequential_init, sequential_numbers, sequential_step
 from pretouch.contact.touch_cue import no_cues
 from pretouch.errors import ParameterError
-from pretouch.groups import no_obstacles
 from pretouch.hardware.franka.collision import (
     CollisionParams,
     check,
@@ -18,7 +17,7 @@ from pretouch.hardware.franka.collision import (
 from pretouch.profiles import PROFILES, profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.types import RobotState
+from pretouch.types import RobotState, no_obstacles
 
 
 @pytest.mark.parametrize("name", PROFILES)

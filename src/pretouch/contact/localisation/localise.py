@@ -23,11 +23,11 @@ from pretouch.contact.localisation.prior import (
 from pretouch.contact.scatter import LENGTHS
 from pretouch.contact.sequential_detector import Observation
 from pretouch.contact.touch_cue import Cues
-from pretouch.groups import CapsuleArrays, Kinematics, Obstacles, SurfaceArrays
 from pretouch.params import LocalisationParams
+from pretouch.robot.body import Capsules, Surface, placed
+from pretouch.robot.kinematics import Kinematics
 from pretouch.robot.model import RobotModel
-from pretouch.robot.vectors import placed_capsules
-from pretouch.types import NOT_TOUCHED, BoolArray, FloatArray, IntArray, Touched
+from pretouch.types import NOT_TOUCHED, BoolArray, FloatArray, IntArray, Obstacles, Touched
 from pretouch.values import value
 
 _LENGTHS = np.array(LENGTHS)
@@ -149,10 +149,10 @@ def localise(
         return state.touched, replace(state, since=since)
     s = model.surface
     # the state is a value: what is written to is copied
-    ln = np.zeros(len(s)) if state.steps == 0 else state.ln.copy()
+    ln = np.zeros(len(s.link)) if state.steps == 0 else state.ln.copy()
     touched = Touched(np.empty(1, np.int64), np.empty((1, 3)), np.empty((1, 3)), np.empty(1), np.empty(1))
     weight = _infer(
-        seen.kin, _Body(model.moved_by, model.rigid, s.arrays, model.capsules.arrays),
+        seen.kin, _Body(model.moved_by, model.rigid, s, model.capsules),
         windows._replace(samples=_steady_samples(windows.samples, seen.robot.qd_commanded, period, p)),
         seen.obstacles, seen.cues, LocalisationNumbers(*(getattr(p, name) for name in LocalisationNumbers._fields)),
         _SoFar(
@@ -183,8 +183,8 @@ class _Body(NamedTuple):
     """(L, n) whether a joint moves a link."""
     rigid: IntArray
     """(L,) rigid body of each link."""
-    surface: SurfaceArrays
-    capsules: CapsuleArrays
+    surface: Surface
+    capsules: Capsules
 
 
 class _SoFar(NamedTuple):
@@ -208,7 +208,7 @@ def _infer(
     n, count = len(kin.anchor), len(surface.link)
     point, normal, hidden = np.empty((count, 3)), np.empty((count, 3)), np.empty(count, np.bool_)
     candidate_poses(kin, surface, point, normal)
-    hidden_candidates(point, surface.body, placed_capsules(capsules, kin), rigid[capsules.link], hidden)
+    hidden_candidates(point, surface.body, placed(capsules, kin), rigid[capsules.link], hidden)
     prior = np.empty(count)
     log_prior(point, surface, hidden, seen, cues, p, prior)
 

@@ -18,9 +18,8 @@ import numpy as np
 from pretouch.cholesky import factor, forward, largest_eigenvalue
 from pretouch.compiled import kernel
 from pretouch.contact.localisation.prior import LocalisationNumbers
-from pretouch.groups import Kinematics, SurfaceArrays
-from pretouch.robot.body import SPACING_M
-from pretouch.robot.kinematics import jacobian_into
+from pretouch.robot.body import SPACING_M, Surface
+from pretouch.robot.kinematics import Kinematics, jacobian_into
 from pretouch.types import BoolArray, FloatArray, Touched
 
 _LEAST_N = 1.0
@@ -35,7 +34,7 @@ class Candidates(NamedTuple):
     kin: Kinematics
     moved_by: BoolArray
     """(L, n) whether a joint moves a link."""
-    surface: SurfaceArrays
+    surface: Surface
     point: FloatArray
     """(N, 3) in the base frame [m]."""
     normal: FloatArray

@@ -7,15 +7,16 @@ import numpy as np
 
 from pretouch.compiled import kernel
 from pretouch.contact.touch_cue import Cues
-from pretouch.groups import CapsuleArrays, Kinematics, Obstacles, SurfaceArrays
-from pretouch.types import BoolArray, FloatArray, IntArray
+from pretouch.robot.body import Capsules, Surface
+from pretouch.robot.kinematics import Kinematics
+from pretouch.types import BoolArray, FloatArray, IntArray, Obstacles
 
 _NEVER = 1e-12
 """Prior of what cannot be: its logarithm stays finite."""
 
 
 @kernel
-def candidate_poses(kin: Kinematics, surface: SurfaceArrays, point: FloatArray, normal: FloatArray) -> None:
+def candidate_poses(kin: Kinematics, surface: Surface, point: FloatArray, normal: FloatArray) -> None:
     """Write points [m] and outward normals (N, 3) of the surface in the base frame."""
     position, rotation, link = kin.position, kin.rotation, surface.link
     for c in range(len(link)):
@@ -29,7 +30,7 @@ def candidate_poses(kin: Kinematics, surface: SurfaceArrays, point: FloatArray, 
 
 @kernel
 def hidden_candidates(
-    point: FloatArray, body: IntArray, capsules: CapsuleArrays, capsule_body: IntArray, hidden: BoolArray
+    point: FloatArray, body: IntArray, capsules: Capsules, capsule_body: IntArray, hidden: BoolArray
 ) -> None:
     """Write whether each point (N, 3) lies inside a capsule of another rigid body, so that nothing can touch it.
 
@@ -68,7 +69,7 @@ class LocalisationNumbers(NamedTuple):
 
 @kernel
 def log_prior(
-    point: FloatArray, surface: SurfaceArrays, hidden: BoolArray, seen: Obstacles, cues: Cues,
+    point: FloatArray, surface: Surface, hidden: BoolArray, seen: Obstacles, cues: Cues,
     p: LocalisationNumbers, ln: FloatArray,
 ) -> None:  # fmt: skip
     """Write ln of the prior (N,) of a contact at each candidate; all candidates together have probability 1.
