@@ -57,7 +57,8 @@ class Decision:
         rests = self.profile.react.keep_free(reaction, self.memory)
         calm = rests and mode == CLEAR and detection.contact is None and not self._has_source and load is None
         return step, {
-            "mode": mode, "detector": detector, "reaction": reaction, "approach": approach, "load": load, "calm": calm and self.controller.may_be_one_call(detector), "quick": False,
+            "mode": mode, "detector": detector, "reaction": reaction, "approach": approach, "load": load,
+            "calm": calm and self.controller.may_be_one_call(detector), "quick": False,
         }  # fmt: skip
 
     def _judge(self, inputs: Inputs) -> None:
@@ -106,8 +107,8 @@ class Decision:
             faults.put_robot(now, "robot", self.robot)
         if see is not None:
             skin, heard = controller.skin, now.get("seen.heard")
-            told = self.memory.get("tracks.heard")
-            self.silent = silent_units(skin, told, self.readings.status, stamp, see.silent_after_s)
+            last = self.memory.get("tracks.heard")
+            self.silent = silent_units(skin, last, self.readings.status, stamp, see.silent_after_s)
             self.watched = len(skin) > 0 and heard >= 1.0 and not self.silent
             slower, self.lost = outside_silence(self.memory.get("outside.heard"), self.lost, stamp, see.outside)
             now.put("seen.heard", min(heard, slower))

@@ -79,7 +79,7 @@ def see(fixed: Blocks, remembered: Blocks, now: Blocks, beside: Capsules) -> flo
     place(hinges, robot.q, kin)
     ee[:] = kin.position[arm.ee]
     seen.found[0], seen.nearest[0], seen.heard[0] = 0, np.inf, 1.0
-    if sight.sees or len(memory[1].sigma) > 0:
+    if sight.sees or memory[1].heard[0] > -np.inf:
         found, nearest, oldest = perceive(
             sight, memory, readings, seen, (kin, Chain(kin.anchor, kin.axis, arm.moved_by, robot.qd), ee),
             (stamp[0], robot.stamp[0]), beside,

@@ -43,10 +43,10 @@ def test_a_unit_that_is_refused_stays_where_the_skin_had_it_or_is_left_out(panda
 
 
 def test_a_unit_that_is_calibrated_keeps_its_sensors(panda_model, found, pair):
-    first = replace(pair.units[0], touch=TouchPatch(radius=0.03), sensor=VL53L5CX())
+    first = replace(pair.units[0], touch=TouchPatch(radius_m=0.03), sensor=VL53L5CX())
     made = skin_of(found, panda_model, Skin([first, pair.units[1]], panda_model))
     assert made.located == pair.ids
-    assert [unit.touch for unit in made.skin.mounted] == [TouchPatch(radius=0.03), None]
+    assert [unit.touch for unit in made.skin.mounted] == [TouchPatch(radius_m=0.03), None]
     assert [unit.sensor.zones for unit in made.skin.mounted] == [4, 1]
 
 

@@ -27,7 +27,7 @@ NOW = 5.0
 
 def touching(skin: Skin, model: RobotModel, units: tuple[int, ...] = (0, 3), sigma: float = 0.0) -> Skin:
     """The skin with touch sensors at some units."""
-    patch = TouchPatch(radius=0.02, force_min=0.5)
+    patch = TouchPatch(radius_m=0.02, force_min_n=0.5)
     return Skin(
         [replace(u, touch=patch, position_sigma=sigma) if k in units else u for k, u in enumerate(skin.units)], model
     )

@@ -217,8 +217,8 @@ def test_links_without_mass_or_inertia_are_estimated_from_their_capsules(tmp_pat
     found = quickly(tmp_path, text)
     at = found.model.link_index("link3")
     assert any("estimated at 1000 kg/m^3" in r and sentence in r and "mass and inertia" in r for r in found.remarks)
-    assert found.model.mass[at] == pytest.approx(kg, rel=0.01)
-    assert found.model.inertia[at] == pytest.approx(0.4 * kg * 0.1**2 * np.eye(3), rel=0.01)
+    assert found.model.mechanism.links.mass[at] == pytest.approx(kg, rel=0.01)
+    assert found.model.mechanism.links.inertia[at] == pytest.approx(0.4 * kg * 0.1**2 * np.eye(3), rel=0.01)
 
 
 def test_fingers_are_fixed_where_they_are_nearest_to_zero_and_named(tmp_path):

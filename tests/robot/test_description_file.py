@@ -28,7 +28,7 @@ def test_a_description_is_read_back_as_it_was(tmp_path, arm):
 @pytest.mark.parametrize(
     ("before", "after", "sentence"),
     [
-        ("offset = ", "ofset = ", "the key 'ofset' is unknown: use offset, slope"),
+        ("offset = ", "ofset = ", "the key 'ofset' is unknown: use source, offset, slope"),
         ("0.3,", '"fast",', r"offset is .*: give a list of 7 finite numbers, one a joint \[rad/s\]"),
         ("12.0,\n    5.17", "-12.0,\n    5.17", r"slope is .*must be positive\. \(in "),
         ("[envelope]", "[[envelope]]", r"envelope is .*: give a table \[envelope\]"),

@@ -119,7 +119,7 @@ def touch_settings(model: RobotModel, skin: Skin, p: TouchSensorParams) -> Touch
         return None
     patches = [(k, touch) for k, unit in enumerate(skin.units) if (touch := unit.touch) is not None]
     unit, link = skin.touching, skin.link[skin.touching]
-    radius = np.array([touch.radius for _, touch in patches])
+    radius = np.array([touch.radius_m for _, touch in patches])
     area = np.array([surface_area(model.capsules, int(i)) for i in link])
     # s: the patch, taken as flat, of the link's surface
     share = np.minimum(np.pi * radius**2 / area, 1.0)

@@ -49,8 +49,9 @@ def motion_numbers(
     p, t = null_space or NullSpaceMotion(), task
     within = -math.inf if null_space is None else p.distance_m  # nothing is nearer than that, so nothing moves away
     return MotionNumbers(
-        model.arm, cost_params(t), t.orientation_gain_1_s, t.orientation == "hold", budget, limits.table, model.q_mid,
-        t.mid_joint_projected, NullSpaceLimits(within, p.speed_m_s, p.joint_rad_s, p.rate_rad_s2 * t.control_period_s),
+        model.mechanism.arm, cost_params(t), t.orientation_gain_1_s, t.orientation == "hold", budget, limits.table,
+        model.q_mid, t.mid_joint_projected,
+        NullSpaceLimits(within, p.speed_m_s, p.joint_rad_s, p.rate_rad_s2 * t.control_period_s),
     )  # fmt: skip
 
 

@@ -104,9 +104,7 @@ def to_axis(point: FloatArray, k: int, a: FloatArray, b: FloatArray, c: int) -> 
     return along, np.sqrt(x * x + y * y + z * z)
 
 
-def sound_moving(
-    moving: MovingFixtures | None, now: float, longest: float
-) -> tuple[MovingFixtures | None, str]:  # fmt: skip
+def sound_moving(moving: MovingFixtures | None, now: float, longest: float) -> tuple[MovingFixtures | None, str]:
     """Return moving fixtures as arrays of float64; None and what is wrong with those that cannot be used.
 
     Silence is no free space: what was somewhere longer than `longest` [s] ago may be anywhere by `now` [s].
@@ -115,8 +113,7 @@ def sound_moving(
         return None, ""
     try:
         stamp, radius = real_number(moving.stamp), real(moving.radius)
-        given = moving.a, moving.b, moving.a_velocity, moving.b_velocity
-        a, b, a_velocity, b_velocity = map(real, given)
+        a, b, a_velocity, b_velocity = map(real, (moving.a, moving.b, moving.a_velocity, moving.b_velocity))
     except AttributeError:
         return None, f"are {moving!r}"
     except (TypeError, ValueError, OverflowError):

@@ -90,7 +90,7 @@ def _is_point(stamp: float, point: FloatArray, m: int, sigma: float) -> bool:
     return bool(0.0 <= sigma <= LARGEST_SIGMA and np.isfinite(stamp))
 
 
-class _Candidates(NamedTuple):
+class _Contenders(NamedTuple):
     """M points that stand for election."""
 
     near: Obstacles
@@ -134,32 +134,33 @@ def take_points(
     here = placed(sight.arm, kin)
     arm = Capsules(here.link, np.empty_like(here.a), np.empty_like(here.b), here.radius)
     _move(here, chain, posed - new.heard, arm)
-    found = _candidates(sight, state, new, now, placed(sight.body, kin), arm)
+    candidates = _candidates(sight, state, new, now, placed(sight.body, kin), arm)
     chosen = np.full(len(state.sigma), -1, np.int64)
-    _elect(found, chosen, sight, (here, arm, fixtures), new.heard, chain, posed)
+    _elect(candidates, chosen, sight, (here, arm, fixtures), new.heard, chain, posed)
 
     points, stamps = np.zeros((len(chosen), 3)), np.full(len(chosen), new.heard)
-    taken = np.zeros(len(chosen), np.bool_)
+    fresh = np.zeros(len(chosen), np.bool_)
     for k in range(len(chosen)):
         if chosen[k] >= 0:
             m = chosen[k]
-            points[k], stamps[k], taken[k] = found.near.point[m], found.stamp[m], found.status[m] == _OBSTACLE
+            points[k], stamps[k] = candidates.near.point[m], candidates.stamp[m]
+            fresh[k] = candidates.status[m] == _OBSTACLE
     if sight.memory_s > 0.0:
-        follow_points(tracks, points, stamps, taken, sight.memory_s)
+        follow_points(tracks, points, stamps, fresh, sight.memory_s)
     for k in range(len(chosen)):
         tracks.heard[k] = new.heard
         if chosen[k] >= 0:
-            tracks.point[k], state.sigma[k], tracks.used[k] = points[k], found.sigma[chosen[k]], stamps[k]
+            tracks.point[k], state.sigma[k], tracks.used[k] = points[k], candidates.sigma[chosen[k]], stamps[k]
             # a hidden point was not seen again: the arm is in front of it, so it is taken to be there still
-            tracks.seen[k] = stamps[k] if taken[k] else new.heard
-            if sight.memory_s > 0.0 and not taken[k]:
+            tracks.seen[k] = stamps[k] if fresh[k] else new.heard
+            if sight.memory_s > 0.0 and not fresh[k]:
                 tracks.motion[0, k], tracks.motion[1, k] = points[k], 0.0
 
 
 @inlined
 def _candidates(
     sight: "Sight", state: OutsideState, new: SeenPoints, now: float, body: Capsules, arm: Capsules
-) -> _Candidates:
+) -> _Contenders:
     """The kept points that the arm hides and the new ones that are young enough, each with its nearest link."""
     p, sigmas, tracks = sight.outside, sight.perception.spread_sigmas, state.tracks
     room, count = len(new.stamp) + len(state.sigma), 0
@@ -184,12 +185,12 @@ def _candidates(
     for m in range(count):
         near.body_distance[m] -= sigmas * sigma[m]
         first[m] = p.per_link * np.searchsorted(links, near.link[m])
-    return _Candidates(near, sigma, stamp, status, first)
+    return _Contenders(near, sigma, stamp, status, first)
 
 
 @inlined
 def _elect(
-    found: _Candidates, chosen: IntArray, sight: "Sight", capsules: tuple[Capsules, Capsules, Capsules],
+    candidates: _Contenders, chosen: IntArray, sight: "Sight", capsules: tuple[Capsules, Capsules, Capsules],
     placed_for: float, chain: Chain, posed: float,
 ) -> None:  # fmt: skip
     """Write the candidate of each place to `chosen`: of each link the nearest, then the nearest apart from it.
@@ -199,27 +200,27 @@ def _elect(
     of fixtures.
     """
     here, arm, fixtures = capsules
-    near, p = found.near, sight.outside
+    near, status, p = candidates.near, candidates.status, sight.outside
     for rank in range(p.per_link):
         for m in range(len(near.unit)):
-            first = found.first[m]
+            first = candidates.first[m]
             best = chosen[first + rank]
-            if found.status[m] == _EXPLAINED or (best >= 0 and not near.body_distance[m] < near.body_distance[best]):
+            if status[m] == _EXPLAINED or (best >= 0 and not near.body_distance[m] < near.body_distance[best]):
                 continue
             if not _is_apart(near.direction, m, chosen[first : first + rank]):
                 continue
-            if found.status[m] == _UNKNOWN:
-                if not abs(found.stamp[m] - placed_for) < _ONE_INSTANT:
-                    placed_for = found.stamp[m]
+            if status[m] == _UNKNOWN:
+                if not abs(candidates.stamp[m] - placed_for) < _ONE_INSTANT:
+                    placed_for = candidates.stamp[m]
                     _move(here, chain, posed - placed_for, arm)
-                within = p.margin_m + sight.perception.spread_sigmas * found.sigma[m]
-                found.status[m] = _OBSTACLE
+                within = p.margin_m + sight.perception.spread_sigmas * candidates.sigma[m]
+                status[m] = _OBSTACLE
                 if (
                     _gap(near.point, m, arm) <= within
                     or _gap(near.point, m, fixtures) <= within
                     or _on_planes(near.point, m, sight.planes, within)
                 ):
-                    found.status[m] = _EXPLAINED
+                    status[m] = _EXPLAINED
                     continue
             chosen[first + rank] = m
 

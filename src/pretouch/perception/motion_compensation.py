@@ -14,7 +14,7 @@ from pretouch.types import BoolArray, FloatArray, Obstacles
 @kernel
 def move_back(
     sensors: Sensors, moved: BoolArray, stamp: FloatArray, chain: Chain, posed: float, longest: float
-) -> None:  # fmt: skip
+) -> None:
     """Move sensor poses, (K, 3) [m] and (K, 3, 3), from the instant of the arm's posture back to their stamps (K,) [s].
 
     That is the motion of their links at the joint velocities (n,) [rad/s], to first order in the place; the rotation is
@@ -86,8 +86,8 @@ def follow_points(tracks: TrackState, points: FloatArray, stamp: FloatArray, tak
         for i in range(3):
             away2 += (points[k, i] - last[k, i]) ** 2
         # not the first reading, whose dt is infinite, nor one after three memories: e^-3 of the old weight is left then
-        known = not np.isnan(motion[0, k, 0]) and 0.0 < dt <= 3.0 * memory
-        if not known or away2 > (FASTEST * dt + _JUMP) ** 2:
+        goes_on = not np.isnan(motion[0, k, 0]) and 0.0 < dt <= 3.0 * memory
+        if not goes_on or away2 > (FASTEST * dt + _JUMP) ** 2:
             for i in range(3):
                 motion[0, k, i], motion[1, k, i] = points[k, i], 0.0
             continue

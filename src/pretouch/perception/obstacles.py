@@ -93,14 +93,14 @@ def measured(distance: FloatArray, status: IntArray, cones: Cones) -> FloatArray
     A target nearer than the sensor can measure is taken to be at its minimum distance, never as gone. A number
     beyond what it can measure shows nothing, whatever its status.
     """
-    shown = np.full(len(distance), np.nan)
+    target = np.full(len(distance), np.nan)
     for k in range(len(distance)):
         nearest, farthest = cones.range[cones.kind[k]]
         if status[k] in _NEAR:
-            shown[k] = nearest
+            target[k] = nearest
         elif status[k] in _SHOWN and 0 <= distance[k] <= farthest:  # false for NaN
-            shown[k] = max(distance[k], nearest)
-    return shown
+            target[k] = max(distance[k], nearest)
+    return target
 
 
 @compiled
@@ -150,10 +150,7 @@ def newer(used: FloatArray, stamp: FloatArray, now: float) -> BoolArray:
 
     A unit whose clock is ahead is so never heard: it must not pass for one that is well.
     """
-    fresh = np.empty(len(stamp), np.bool_)
-    for k in range(len(stamp)):
-        fresh[k] = used[k] < stamp[k] <= now  # false for NaN, and for -inf: never heard
-    return fresh
+    return (used < stamp) & (stamp <= now)  # false for NaN, and for -inf: never heard
 
 
 _FAILURES = {

@@ -15,16 +15,15 @@ from pretouch.perception.obstacles import (
     looks_at,
     measured,
     newer,
-    pose_into,
+    placed_sensors,
     spread_of,
     take_in,
     tells_anything,
     widen,
 )
-from pretouch.perception.scene_filter import leave_out, leave_out_planes
+from pretouch.perception.scene_filter import leave_out, plane_return
 from pretouch.robot.body import Capsules, placed
 from pretouch.robot.kinematics import Chain, Kinematics
-from pretouch.sensing.sensor import Sensors
 from pretouch.types import BoolArray, FloatArray, IntArray, Obstacles, some_of
 
 if TYPE_CHECKING:
@@ -77,7 +76,7 @@ def perceive(
         if sight.sigmas > 0:
             bring_nearer(room, m, spread_of(room.point[m], room.unit[m], sight.sigmas, skin, kin))
     count = units
-    if len(outside.sigma) > 0:
+    if outside.heard[0] > -np.inf:  # false where there was no source
         o = sight.outside
         keeps = _lasting(outside.tracks, o.persistence_s, o.silent_after_s if p.keep_while_silent else 0.0)
         count += _show(outside.tracks, keeps, now, body, ee, estimates, some_of(room, units, len(room.unit)))
@@ -142,12 +141,7 @@ def _take_readings(
     """Take the readings that are new and show what is not known to be there into the tracks."""
     skin, p, distance, cones = sight.skin, sight.perception, seen.distance, sight.skin.cones
     (kin, chain, _), (now, posed) = posture, instants
-    position, rotation = np.zeros((len(fresh), 3)), np.zeros((len(fresh), 3, 3))
-    for k in range(len(fresh)):
-        if fresh[k]:
-            m = skin.link[k]
-            pose_into(kin.position[m], kin.rotation[m], skin.T_link_sensor[k], position[k], rotation[k])
-    sensors = Sensors(position, rotation, skin.link)
+    position, rotation, _ = sensors = placed_sensors(skin, kin)
     tells, shows = tells_anything(readings.distance, readings.status, distance, cones), ~np.isnan(distance)
     # a return expected before `ends`, up to `margin_m` behind the reading, explains it: nothing is seen through a body
     ends = distance + sight.margin_m
@@ -161,14 +155,16 @@ def _take_readings(
         move_back(sensors, fresh, readings.stamp, chain, posed, p.persistence_s)
     if sight.filters:
         leave_out(shows, fresh, distance, ends, p.self_aside_m, sensors, beside, cones)
-        leave_out_planes(shows, fresh, ends, sensors, sight.planes, cones)
+        for k in range(len(fresh)):
+            if fresh[k] and shows[k]:
+                shows[k] = plane_return(sensors, k, sight.planes, cones, ends[k]) > ends[k]
     points = locate(position, rotation, distance)  # eq. 1
     # both look at what was seen last, before `take_in` overwrites it
     if p.reckon_below_minimum:
         reckon(points, distance, readings.stamp, tracks, sensors, cones, 3 * p.persistence_s)
     if sight.memory_s > 0.0:
-        taken = fresh & shows & (now - readings.stamp <= p.persistence_s)  # by `take_in`
-        follow_points(tracks, points, readings.stamp, taken, sight.memory_s)
+        counts = fresh & shows & (now - readings.stamp <= p.persistence_s)  # by `take_in`
+        follow_points(tracks, points, readings.stamp, counts, sight.memory_s)
     if p.out_of_view_s > 0:
         give_up(tracks, sensors, fresh & tells, distance, now - p.persistence_s)
     for k in range(len(fresh)):

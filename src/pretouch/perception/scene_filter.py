@@ -9,7 +9,7 @@ from pretouch.compiled import compiled, inlined, kernel
 from pretouch.errors import FixtureError
 from pretouch.perception.closest import to_axis
 from pretouch.robot.body import Capsules, no_capsules, placed
-from pretouch.robot.kinematics import Kinematics, dot, rotate
+from pretouch.robot.kinematics import Kinematics, dot
 from pretouch.sensing.sensor import Cones, Sensors
 from pretouch.types import BoolArray, FloatArray
 
@@ -138,18 +138,8 @@ def leave_out(
         if fresh[k] and shows[k] and aside > 0:
             # A capsule that is missed hides nothing behind it: only a reading from about there is taken for it. One
             # that comes nearer than that is out at its first such ray.
-            wanted = Wanted(aside, 2 * distance[k] - end, end, 2 * distance[k] - end)
-            shows[k] = capsule_return(sensors, k, capsules, spheres, cones, wanted) > end
-
-
-@kernel
-def leave_out_planes(
-    shows: BoolArray, fresh: BoolArray, ends: FloatArray, sensors: Sensors, planes: FloatArray, cones: Cones
-) -> None:  # fmt: skip
-    """Take from `shows` (K,) what planes explain, as `leave_out` does for capsules."""
-    for k in range(len(shows)):
-        if fresh[k] and shows[k]:
-            shows[k] = plane_return(sensors, k, planes, cones, ends[k]) > ends[k]
+            nearby = Wanted(aside, 2 * distance[k] - end, end, 2 * distance[k] - end)
+            shows[k] = capsule_return(sensors, k, capsules, spheres, cones, nearby) > end
 
 
 @compiled
@@ -195,24 +185,25 @@ def capsule_return(
 def plane_return(sensors: Sensors, k: int, planes: FloatArray, cones: Cones, within: float) -> float:
     """Least distance [m] at which sensor k sees a plane from its free side, infinite for none nearer than `within`."""
     position, rotation, rays = sensors.position, sensors.rotation, cones.rays[cones.kind[k]]
-    least, ray = np.inf, np.empty(3)
+    least, R = np.inf, rotation[k]
     for m in range(len(planes)):
         normal = planes[m]
         height = normal[0] * position[k, 0] + normal[1] * position[k, 1] + normal[2] * position[k, 2] - normal[3]
         # seen from its free side only; no ray comes to the plane in less than the height over it
         if 0 <= height <= within:
+            # in the sensor's frame, where the rays are given
+            x = normal[0] * R[0, 0] + normal[1] * R[1, 0] + normal[2] * R[2, 0]
+            y = normal[0] * R[0, 1] + normal[1] * R[1, 1] + normal[2] * R[2, 1]
+            z = normal[0] * R[0, 2] + normal[1] * R[1, 2] + normal[2] * R[2, 2]
             for i in range(len(rays)):
-                rotate(rotation[k], rays[i], ray)
-                rate = normal[0] * ray[0] + normal[1] * ray[1] + normal[2] * ray[2]
+                rate = x * rays[i, 0] + y * rays[i, 1] + z * rays[i, 2]
                 if rate < 0:
                     least = min(least, -height / rate)  # height + t rate = 0
     return least if least <= within else np.inf
 
 
 @inlined
-def _cone_meets(
-    sensors: Sensors, k: int, capsules: Capsules, c: int, edge: FloatArray, wanted: Wanted
-) -> bool:  # fmt: skip
+def _cone_meets(sensors: Sensors, k: int, capsules: Capsules, c: int, edge: FloatArray, wanted: Wanted) -> bool:
     """Whether the cone of sensor k, of such an edge, can meet capsule c within what is wanted; never wrongly no.
 
     With z along the beam and l across it, z sin - l cos is by how much a point lies inside the tangent plane of the

@@ -102,11 +102,11 @@ class Surface(NamedTuple):
 def bodies_of(moved_by: BoolArray) -> IntArray:
     """Return the rigid body (L,) of each link, given the joints (L, n) that move it; -1 of links that none moves."""
     patterns = [tuple(row) for row in moved_by.tolist()]
-    found: dict[tuple[bool, ...], int] = {}
+    bodies: dict[tuple[bool, ...], int] = {}
     for pattern in patterns:
         if any(pattern):
-            found.setdefault(pattern, len(found))
-    return np.array([found.get(pattern, -1) for pattern in patterns], dtype=np.int64)
+            bodies.setdefault(pattern, len(bodies))
+    return np.array([bodies.get(pattern, -1) for pattern in patterns], dtype=np.int64)
 
 
 def surface_of(body: Capsules, moved_by: BoolArray, kin: Kinematics, spacing: float = SPACING_M) -> Surface:

@@ -153,9 +153,10 @@ def load_description(path: Path | str) -> RobotDescription:
     n = len(_numbers(path, data, "q_ready", "rad", None))
     table = data.pop("envelope", None)
     fields = _fields(path, data, _TEXTS, _LISTS, n, "envelope")
+    envelope = {} if table is None else _fields(path, table, ("source",), _ENVELOPE, n)
     try:
-        if table is not None:
-            fields["envelope"] = SpeedEnvelope(**_fields(path, table, ("source",), _ENVELOPE, n))
+        if envelope:
+            fields["envelope"] = SpeedEnvelope(**envelope)
         return RobotDescription(**fields | {"mjcf": path.parent / fields["mjcf"]})
     except (RobotModelError, OSError) as error:  # a file's name may be too long to look for
         raise RobotModelError(f"{error} (in {path})") from error

@@ -186,35 +186,6 @@ def mass_matrix_into(kin: Kinematics, mechanism: Mechanism, M: FloatArray) -> No
             M[k, j] = M[j, k]
 
 
-@compiled
-def chain_motion(
-    anchor: FloatArray, axis: FloatArray, qd: FloatArray, qdd: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Motion, base frame, of what moves with the first 0, 1, ... n joints: (n + 1, 3) each.
-
-    Angular velocity [rad/s], angular acceleration [rad/s^2], acceleration of a point [m/s^2], and that point [m]. The
-    first two arguments are those of `Kinematics`; joint velocities [rad/s] and accelerations [rad/s^2] are (n,).
-    """
-    n = len(qd)
-    w, alpha, a, point = np.zeros((n + 1, 3)), np.zeros((n + 1, 3)), np.zeros((n + 1, 3)), np.zeros((n + 1, 3))
-    for j in range(n):
-        a[j + 1] = a[j] + lever_acceleration(w[j], alpha[j], anchor[j] - point[j])
-        point[j + 1] = anchor[j]
-        turn = axis[j] * qd[j]
-        alpha[j + 1] = alpha[j] + cross(w[j], turn) + axis[j] * qdd[j]
-        w[j + 1] = w[j] + turn
-    return w, alpha, a, point
-
-
-@compiled
-def lever_acceleration(w: FloatArray, alpha: FloatArray, r: FloatArray) -> FloatArray:
-    """Acceleration (3,) [m/s^2] of one point of a body relative to another that is r (3,) [m] before it.
-
-    `w` (3,) is the body's angular velocity [rad/s], `alpha` (3,) its angular acceleration [rad/s^2].
-    """
-    return cross(alpha, r) + cross(w, cross(w, r))
-
-
 @kernel
 def cross(a: FloatArray, b: FloatArray) -> FloatArray:
     """Cross product (3,)."""
@@ -225,13 +196,6 @@ def cross(a: FloatArray, b: FloatArray) -> FloatArray:
 def dot(a: FloatArray, b: FloatArray) -> float:
     """Scalar product of two vectors (3,)."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@kernel
-def rotate(R: FloatArray, v: FloatArray, out: FloatArray) -> None:
-    """Write R @ v of a matrix (3, 3) and a vector (3,) to `out` (3,), which is another array."""
-    for i in range(3):
-        out[i] = R[i, 0] * v[0] + R[i, 1] * v[1] + R[i, 2] * v[2]
 
 
 @compiled

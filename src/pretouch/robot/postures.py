@@ -17,7 +17,7 @@ from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray
 
 
-class Pace(NamedTuple):
+class Reaching(NamedTuple):
     """How a hand is brought to a place."""
 
     steps: int
@@ -33,22 +33,22 @@ class Pace(NamedTuple):
 
 
 def posture_at(
-    model: RobotModel, q: FloatArray, error_of: Callable[[Kinematics], FloatArray], rest: FloatArray, pace: Pace
+    model: RobotModel, q: FloatArray, error_of: Callable[[Kinematics], FloatArray], rest: FloatArray, way: Reaching
 ) -> FloatArray | None:
     """Move an arm from q (n,) until its hand is where it is to be; None where its joint limits are in the way.
 
     `error_of` gives the motion (6,) that the end-effector still has to make, translation [m] then rotation [rad];
     `rest` is the posture (n,) that the arm is drawn to [rad].
     """
-    for _ in range(pace.steps):
+    for _ in range(way.steps):
         kin = model.kinematics(q)
         error = error_of(kin)
-        if np.abs(error).max() < pace.close:
+        if np.abs(error).max() < way.close:
             return q
-        J, drawn = model.ee_jacobian(kin), pace.pull * (rest - q)
+        J, drawn = model.ee_jacobian(kin), way.pull * (rest - q)
         # damped least squares: no step explodes near a singularity, and elsewhere the damping costs a few steps more
-        step = drawn + J.T @ np.linalg.solve(J @ J.T + pace.damping * np.eye(6), error - J @ drawn)
-        q = np.clip(q + step * min(1.0, pace.step_max / max(np.abs(step).max(), 1e-12)), model.q_min, model.q_max)
+        step = drawn + J.T @ np.linalg.solve(J @ J.T + way.damping * np.eye(6), error - J @ drawn)
+        q = np.clip(q + step * min(1.0, way.step_max / max(np.abs(step).max(), 1e-12)), model.q_min, model.q_max)
     return None
 
 
@@ -64,7 +64,7 @@ def brought_to(model: RobotModel, point: FloatArray) -> FloatArray:
         # metres and radians side by side; the sine of the angle will do, for the hand is never turned far
         return np.concatenate([point - kin.position[model.ee], rotation_error(kin.rotation[model.ee], upright)])
 
-    q = posture_at(model, ready.copy(), error, ready, Pace(2000, 0.02, 1e-4, close=1e-6))
+    q = posture_at(model, ready.copy(), error, ready, Reaching(2000, 0.02, 1e-4, close=1e-6))
     if q is None:
         raise ExperimentError(
             f"The arm cannot reach {np.round(point, 3).tolist()} with its hand upright: choose another."

@@ -258,17 +258,10 @@ _LIKE, _OWN = "like", "own_name"
 
 def sensor_called(name: Any, of: str, types: dict[str, Sensor]) -> Sensor:
     """Return the sensor of a type, by its name in a skin file; `of` says what has it, `types` are the file's own."""
-    known = (*types, *Sensor.choices())
-    if not isinstance(name, str) or name not in known:
-        raise SkinError(f"{of} has the sensor {name!r}: choose from {', '.join(known)}, or describe [sensor.NAME].")
+    names = (*types, *Sensor.choices())
+    if not isinstance(name, str) or name not in names:
+        raise SkinError(f"{of} has the sensor {name!r}: choose from {', '.join(names)}, or describe [sensor.NAME].")
     return types[name] if name in types else cast(Sensor, Sensor.called(name)())
-
-
-def sensor_tables(tables: Any) -> dict[str, Any]:
-    """Return what a skin file has of its own types, by name."""
-    if not isinstance(tables, dict):
-        raise SkinError(f"sensor is {tables!r}: write a table [sensor.NAME] for each type of your own.")
-    return tables
 
 
 def own_type(name: str, table: Any) -> Sensor:
@@ -279,12 +272,17 @@ def own_type(name: str, table: Any) -> Sensor:
     like = sensor_called(table.get(_LIKE, PAPER_SENSOR.name), of, {})
     if name in Sensor.choices():
         raise SkinError(f"{of} is known by that name already: give yours another, and like = {name!r}.")
-    allowed = [f.name for f in fields(like) if f.name != _OWN]
-    unknown = sorted(set(table) - {_LIKE, *allowed})
+    return cast(Sensor, replace(changed_by(like, table, of, _LIKE), own_name=name))
+
+
+def changed_by(usual: Any, table: dict[str, Any], of: str, *others: str) -> Any:
+    """Return parameters with what differs in a table of a skin file, `of` something; the table may have other keys."""
+    allowed = [f.name for f in fields(usual) if f.name != _OWN]
+    unknown = sorted(set(table) - {*others, *allowed})
     if unknown:
-        raise SkinError(f"{of} has the unknown key {unknown[0]!r}: use {_LIKE}, {', '.join(allowed)}.")
+        raise SkinError(f"{of} has the unknown key {unknown[0]!r}: use {', '.join((*others, *allowed))}.")
     try:
-        return replace(like, **{key: value for key, value in table.items() if key != _LIKE}, own_name=name)
+        return replace(usual, **{key: value for key, value in table.items() if key not in others})
     except ParameterError as error:
         raise SkinError(f"{of} cannot be: {error}") from error
 

@@ -10,8 +10,8 @@ import numpy as np
 from pretouch.checks import Check, Checked, Fraction, NonNegative, Positive
 from pretouch.compiled import compiled, kernel
 from pretouch.robot.kinematics import cross
-from pretouch.sensing.imu_scale import ACCELERATION_LSB, ANGULAR_RATE_LSB, STANDARD_GRAVITY
 from pretouch.sensing.skin import Skin
+from pretouch.sensing.unit import ACCELERATION_LSB, ANGULAR_RATE_LSB, STANDARD_GRAVITY
 from pretouch.sim.plant import Plant
 from pretouch.types import FloatArray, IntArray
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from pretouch.errors import ExperimentError
-from pretouch.robot.body import Capsules, placed
+from pretouch.robot.body import Capsules, from_axes, placed
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, save_skin
@@ -37,9 +37,7 @@ def surface(a: FloatArray, b: FloatArray, turn: float, part: float) -> tuple[Flo
 
 def gap(points: FloatArray, a: FloatArray, b: FloatArray, radius: FloatArray) -> FloatArray:
     """Signed distance (P,) [m] of points (P, 3) from the nearest of C capsules (C, 3), (C, 3), (C,)."""
-    axis, rel = b - a, points[:, None] - a
-    part = np.clip((rel * axis).sum(axis=2) / np.maximum((axis**2).sum(axis=1), 1e-12), 0.0, 1.0)
-    return np.asarray((np.linalg.norm(rel - part[:, :, None] * axis, axis=2) - radius).min(axis=1))
+    return np.asarray((np.linalg.norm(from_axes(points, a, b)[1], axis=2) - radius).min(axis=1))
 
 
 def dense_skin(model: RobotModel) -> Skin:
