@@ -187,12 +187,6 @@ def mass_matrix_into(kin: Kinematics, mechanism: Mechanism, M: FloatArray) -> No
 
 
 @kernel
-def cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Cross product (3,)."""
-    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
-
-
-@kernel
 def dot(a: FloatArray, b: FloatArray) -> float:
     """Scalar product of two vectors (3,)."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
