@@ -9,7 +9,7 @@ measurement and its standard deviation, and when it was heard last, seen somethi
 import numpy as np
 
 import pretouch as pt
-from pretouch.robot.ik import brought_to
+from pretouch.robot.postures import brought_to
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.scene import SceneSpec, fixtures

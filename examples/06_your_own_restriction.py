@@ -14,9 +14,9 @@ import numpy as np
 
 import pretouch as pt
 from pretouch.control.approach import MotionBody, MotionRequest, Restricted, Restriction
-from pretouch.groups import Kinematics
 from pretouch.loop import run
 from pretouch.profiles import profile
+from pretouch.robot.kinematics import Kinematics
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders

@@ -2,8 +2,7 @@
 
 from pathlib import Path
 
-from pretouch.robot.description import panda
-from pretouch.robot.description_file import description_text
+from pretouch.robot.description import description_text, panda
 from pretouch.sensing.skin import OWN_SKIN, PAPER_SKIN
 
 

@@ -11,7 +11,7 @@ from pretouch import cli
 from pretouch.cli.calibrate import motion
 from pretouch.hardware.keys import save_keys
 from pretouch.imported_data.reading import read_joints
-from pretouch.robot.self_distance import capsule_ends, kinematics_of
+from pretouch.robot.postures import capsule_ends, kinematics_of
 from pretouch.serving import threaded_arm
 from pretouch.serving.fleet import simulated_keys
 from pretouch.serving.simulated_arm import SimulatedArm

@@ -12,7 +12,7 @@ import pytest
 
 import pretouch
 from pretouch import compiled
-from pretouch.robot.vectors import below
+from pretouch.robot.kinematics import below
 from pretouch.source_digest import source_digest
 
 PACKAGE = Path(pretouch.__file__).parent
@@ -20,7 +20,7 @@ PACKAGE = Path(pretouch.__file__).parent
 
 def test_what_is_kept_carries_the_digest_of_all_that_may_get_into_it():
     assert below(np.ones(3), 2.0)
-    assert list(Path(below.stats.cache_path).glob(f"vectors.below-{source_digest(below)[:12]}*"))
+    assert list(Path(below.stats.cache_path).glob(f"kinematics.below-{source_digest(below)[:12]}*"))
 
 
 def test_a_function_without_text_works_all_the_same():

@@ -41,7 +41,7 @@ def test_it_is_about_our_arm(problem: Problem, panda_model: RobotModel):
         np.testing.assert_allclose(
             linear_jacobian(problem.arm, rotation, origin), panda_model.ee_jacobian(kin)[:3], atol=1e-12
         )
-    assert len(problem.arm.radius) == len(panda_model.body)
+    assert len(problem.arm.radius) == len(panda_model.body.radius)
 
 
 def test_the_motion_keeps_every_limit_by_a_margin_that_is_thin(problem: Problem):

@@ -6,7 +6,7 @@ from subprocess import run
 
 import pytest
 
-from pretouch.robot.vectors import dot
+from pretouch.robot.kinematics import dot
 from pretouch.source_digest import source_digest
 
 TREE = {
@@ -64,7 +64,7 @@ def test_whatever_way_a_module_is_imported_its_text_counts(digest, text):
 
 SCRIPT = """
 from pretouch.source_digest import source_digest
-from pretouch.robot.vectors import dot
+from pretouch.robot.kinematics import dot
 def own(): return dot
 print(source_digest(own) != source_digest(dot))
 """

@@ -8,6 +8,7 @@ import pytest
 from pretouch.control.braking import Slots
 from pretouch.explanation import Limit, explain
 from pretouch.params import OutsidePoints
+from pretouch.perception.external_points import OutsideState
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import PROFILES
 from pretouch.realtime import warm_up
@@ -47,7 +48,9 @@ def test_a_profile_that_takes_no_points_and_one_without_a_source_do_the_same_to_
     mine, other = plain.state.memory, beside.state.memory
     assert same(replace(plain.state, memory=other, quick=beside.state.quick), beside.state)
     assert same(*(tuple(map(of_units, memory.part("slots", Slots))) for memory in (mine, other)))
-    assert all(same(mine.get(path), other.get(path)) for path in mine.places if not path.startswith("slots."))
+    assert all(
+        same(mine.get(path), other.get(path)) for path in mine.places if not path.startswith(("slots.", "outside."))
+    )
 
 
 @pytest.mark.parametrize("units", [7, 0])
@@ -152,11 +155,20 @@ def test_another_number_of_places_begins_anew(panda_model, paper_skin):
     arm.step(points=seen(arm.time, arm.ee() + np.array([0.0, 0.3, 0.0])))
     one = replace(PRETOUCH, perception=replace(PRETOUCH.perception, outside=OutsidePoints(per_link=1)))
     other = controller_of(panda_model, paper_skin, one)
-    assert other.adopt(arm.state, arm.controller).outside is None
+    assert np.isnan(other.adopt(arm.state, arm.controller).memory.get("outside.heard"))
     arm.state, arm.controller = other.adopt(arm.state, arm.controller), other
     step = arm.step(points=seen(arm.time, arm.ee() + np.array([0.0, 0.3, 0.0])))
     assert (step.obstacles.unit >= 7).any()
-    assert same(other.adopt(arm.state, other).outside, arm.state.outside)
+    again = other.adopt(arm.state, other).memory
+    assert same(again.part("outside", OutsideState), arm.state.memory.part("outside", OutsideState))
+
+
+def test_time_that_goes_backwards_forgets_what_a_source_showed(panda_model, paper_skin):
+    arm = Arm(panda_model, paper_skin, PRETOUCH)
+    assert (arm.step(points=seen(arm.time, arm.ee() + np.array([0.0, 0.3, 0.0]))).obstacles.unit >= 7).any()
+    arm.time -= 0.5
+    assert not (arm.step(points=seen(arm.time)).obstacles.unit >= 7).any()
+    assert arm.state.memory.get("outside.heard") < arm.time
 
 
 def test_warming_up_knows_of_points_and_leaves_the_arm_as_it_is(panda_model, paper_skin):

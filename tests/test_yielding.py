@@ -11,8 +11,8 @@ from pretouch.modes import ModeState
 from pretouch.params import ClampParams, GiveUpParams
 from pretouch.profiles import PROFILES, Profile, profile
 from pretouch.recording.cycles import packed_state, state_of
+from pretouch.robot.body import placed
 from pretouch.robot.model import RobotModel
-from pretouch.robot.vectors import placed
 from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, Mode
 from tests.following_arm import DT, Arm

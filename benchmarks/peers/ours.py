@@ -17,19 +17,18 @@ from pretouch.control.penalty import Minimum
 from pretouch.control.penalty import Problem as Program
 from pretouch.control.task import cost_into
 from pretouch.controller import Controller, ControllerState
-from pretouch.groups import CapsuleArrays, Kinematics, Obstacles
 from pretouch.modes import SOLVED
 from pretouch.params import RestrictionParams, TaskParams
-from pretouch.perception.closest import ClosestArrays, closest
+from pretouch.perception.closest import closest
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import profile
+from pretouch.robot.body import Capsules, placed
 from pretouch.robot.description import panda
-from pretouch.robot.kinematics import Hinges, jacobian_into, place
+from pretouch.robot.kinematics import Hinges, Kinematics, jacobian_into, place
 from pretouch.robot.model import RobotModel
-from pretouch.robot.vectors import placed_capsules
 from pretouch.sensing.skin import Skin, paper_skin
 from pretouch.sensing.unit import SensorUnit
-from pretouch.types import BoolArray, FloatArray, Inputs, IntArray, RangeReadings, RangeStatus, RobotState
+from pretouch.types import BoolArray, FloatArray, Inputs, IntArray, RangeReadings, RangeStatus, RobotState, no_obstacles
 
 _AT_ONCE = 1000
 """Units that a skin wears, of more than it may have."""
@@ -73,7 +72,7 @@ class _Fixed(NamedTuple):
     hinges: Hinges
     moved_by: BoolArray
     ee: int
-    body: CapsuleArrays
+    body: Capsules
     limits: FloatArray
     q_mid: FloatArray
     cost: TaskParams
@@ -84,12 +83,10 @@ class _Fixed(NamedTuple):
 @compiled
 def _solve(q: Array, qd: Array, points: Array, velocity: Array, fixed: _Fixed, kin: Kinematics, x: Array) -> bool:
     """Write the joint velocities (n,) of a snapshot; return whether there are any."""
-    n, count, up = len(q), len(points), np.zeros((len(points), 3))
+    n, near = len(q), no_obstacles(len(points))
     place(fixed.hinges, q, kin)
-    up[:, 2] = 1.0
-    on_body, link, distance = np.empty((count, 3)), np.empty(count, np.int64), np.empty(count)
-    closest(placed_capsules(fixed.body, kin), points, ClosestArrays(on_body, link, up, distance))
-    near = Obstacles(fixed.units, points, distance, on_body, link, up, distance, distance)
+    near.unit[:], near.point[:], near.direction[:, 2] = fixed.units, points, 1.0
+    closest(placed(fixed.body, kin), near)
     rows = approach_rows(kin, fixed.moved_by, near, fixed.approach)
     lower, upper, _ = joint_box(q, qd, fixed.limits)
     J, H, f = np.empty((6, n)), np.empty((n, n)), np.empty(n)
@@ -116,7 +113,7 @@ class Rows:
         )  # fmt: skip
         self.kin = model.kinematics(problem.q[0])
         self.fixed = _Fixed(
-            model.hinges, model.moved_by, model.ee, model.body.arrays, limits.table, model.q_mid, cost.numbers,
+            model.hinges, model.moved_by, model.ee, model.body, limits.table, model.q_mid, cost.numbers,
             row_numbers(approach), np.arange(count),
         )  # fmt: skip
 
@@ -193,7 +190,7 @@ def _units(model: RobotModel, count: int) -> list[SensorUnit]:
     rng, body = np.random.default_rng(0), model.body
     units: list[SensorUnit] = []
     while len(units) < count:
-        c = rng.integers(len(body))
+        c = rng.integers(len(body.radius))
         z = rng.normal(size=3)
         axis = body.b[c] - body.a[c]
         z -= axis * (z @ axis) / (axis @ axis)

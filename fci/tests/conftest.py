@@ -22,7 +22,7 @@ import pytest
 from tests.needs import skip_for
 from tests.ports import loopback
 
-from pretouch.robot.description_file import robot_named
+from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.sim.scene import SceneSpec
 from pretouch_fci.arm import ArmSetup, ServedArm

@@ -7,7 +7,7 @@ import pytest
 from fci.tests.conftest import errors_of, smooth
 
 from pretouch.control.commander import rotation_about
-from pretouch.robot.description_file import robot_named
+from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch_fci.cartesian import CARTESIAN_LIMITS, Body, CartesianVelocity
 from pretouch_fci.frames import frames_of

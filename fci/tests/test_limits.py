@@ -10,8 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pretouch.errors import ParameterError, RobotModelError
-from pretouch.robot.description import panda
-from pretouch.robot.description_file import robot_named
+from pretouch.robot.description import panda, robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.sim.tcp_push import TcpPush
 from pretouch_fci.collision import CollisionBehavior, Contacts

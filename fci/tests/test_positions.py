@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from fci.tests.conftest import errors_of, smooth
 
-from pretouch.robot.description_file import robot_named
+from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch_fci.kinds import JointPosition
 from pretouch_fci.limits import MotionLimits, motion_limits

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pretouch.robot.description_file import robot_named
+from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch_fci.limits import motion_limits
 from pretouch_fci.motion import FIRST_WITHIN, Ending, Setpoint, TargetMotion

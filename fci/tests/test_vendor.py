@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from tests.needs import skip_for
 
-from pretouch.robot.description_file import robot_named
+from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.sim.tcp_push import TcpPush
 

@@ -10,9 +10,8 @@ from pretouch.control.path import WayPoints
 from pretouch.explanation import resumable
 from pretouch.modes import Event
 from pretouch.profiles import profile
-from pretouch.robot.ik import brought_to
 from pretouch.robot.model import RobotModel
-from pretouch.robot.self_distance import nearest_points
+from pretouch.robot.postures import brought_to, nearest_points
 from pretouch.sensing.skin import Skin
 from pretouch.sim.hand import HandGoal
 from pretouch.sim.plant import TOUCH_N, Plant

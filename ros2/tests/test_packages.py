@@ -18,7 +18,7 @@ from pretouch import __version__, cli
 from pretouch.cli.run.options import Run, check_options
 from pretouch.profiles import PROFILES
 from pretouch.recording.ros import OWN, own_definition
-from pretouch.robot.description_file import robot_named
+from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch_ros2.params import CommanderParams
 

@@ -37,8 +37,6 @@ from pretouch.errors import RecordingError as RecordingError
 from pretouch.explanation import Limit as Limit
 from pretouch.explanation import Limited as Limited
 from pretouch.explanation import explain as explain
-from pretouch.groups import Kinematics as Kinematics
-from pretouch.groups import no_obstacles as no_obstacles
 from pretouch.loop import Cycle as Cycle
 from pretouch.loop import MonotonicClock as MonotonicClock
 from pretouch.loop import Recorder as Recorder
@@ -58,8 +56,9 @@ from pretouch.reporting.measures import measure as measure
 from pretouch.robot.description import RobotDescription as RobotDescription
 from pretouch.robot.description import fr3 as fr3
 from pretouch.robot.description import panda as panda
-from pretouch.robot.ik import brought_to as brought_to
+from pretouch.robot.kinematics import Kinematics as Kinematics
 from pretouch.robot.model import RobotModel as RobotModel
+from pretouch.robot.postures import brought_to as brought_to
 from pretouch.sensing.skin import Skin as Skin
 from pretouch.sensing.skin import load_skin as load_skin
 from pretouch.sensing.skin import paper_skin as paper_skin
@@ -93,5 +92,6 @@ from pretouch.types import RangeStatus as RangeStatus
 from pretouch.types import RobotState as RobotState
 from pretouch.types import SeenPoints as SeenPoints
 from pretouch.types import Thresholds as Thresholds
+from pretouch.types import no_obstacles as no_obstacles
 
 __version__: str

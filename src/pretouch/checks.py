@@ -102,10 +102,13 @@ def _check_field(owner: str, name: str, hint: object, value: object) -> None:
             _check_field(owner, name, inner, value)
     if get_origin(hint) is Literal and value not in get_args(hint):
         raise ParameterError(f"{owner}.{name} is {value!r}: choose one of {', '.join(map(str, get_args(hint)))}.")
+    if hint is bool and not isinstance(value, bool):
+        raise ParameterError(f"{owner}.{name} is {value!r}: it must be true or false.")
     whole = getattr(hint, "__origin__", None) is int
     for check in getattr(hint, "__metadata__", ()):
         if whole and not isinstance(value, Integral):
             raise ParameterError(f"{owner}.{name} is {value}: it must be a whole number.")
-        problem = check.problem(value) if isinstance(value, Real) else "must be a number"
+        number = isinstance(value, Real) and not isinstance(value, bool)
+        problem = check.problem(value) if number else "must be a number"
         if problem:
             raise ParameterError(f"{owner}.{name} is {value}: it {problem}.")

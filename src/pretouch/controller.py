@@ -17,16 +17,15 @@ from pretouch.control.path import Path, nearest_phase
 from pretouch.decision import Decision
 from pretouch.errors import RobotStateError, SkinError
 from pretouch.faults import Report, Watched, put_robot, robot_of, take_sent
-from pretouch.groups import CapsuleArrays
 from pretouch.line import CHECK, MOVE, line
 from pretouch.line_records import PYTHON, SEQUENTIAL
 from pretouch.line_setup import fixed_of, kinds_of, now_init, remembered_init
 from pretouch.modes import CLEAR, SOLVED, ModeState, mode_init
 from pretouch.perception.obstacles import TrackState
-from pretouch.perception.outside import OutsideState, outside_setup
 from pretouch.perception.scene_filter import Fixtures
 from pretouch.profiles import Profile
 from pretouch.records import Flat
+from pretouch.robot.body import Capsules
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.sound import UsualInputs, sound_robot
@@ -46,8 +45,6 @@ class ControllerState:
     reaction: object
     approach: object
     """What the profile's restriction remembers beside that."""
-    outside: OutsideState | None
-    """What outside sources showed; None before there is one."""
     load: LoadState | None
     """What was announced of a load; None before anything was."""
     calm: bool
@@ -101,8 +98,10 @@ class Controller:
         self.approach = profile.approach if self.kinds.approach == PYTHON else None
         """A restriction in plain Python; None of one that is compiled."""
         self.touching = profile.detect.reads_touch and len(skin.touching) > 0
-        self.outside = outside_setup(model, skin, fixtures, profile.perception)
-        self.beside = fixtures.capsules.arrays
+        outside = None if profile.perception is None else profile.perception.outside
+        self.outside_places = 0 if outside is None else outside.per_link * len(model.parts)
+        """How many points of outside sources are kept."""
+        self.beside = fixtures.capsules
         self.fixed, self._begin = Flat.of(fixed_of(self)), Flat.of(remembered_init(self))
         self.blank = now = Flat.of(now_init(self))
         """What a step begins with: not written to."""
@@ -125,7 +124,7 @@ class Controller:
         memory.put("rotation_goal", self.model.kinematics(sound.q).rotation[self.model.ee])
         detector = self.kept_detector(memory, self.detector.init(self.body, learnt))
         reaction = self.profile.react.init(self.body, sound.q_commanded)
-        return ControllerState(memory, mode_init(), detector, reaction, self._approach_init(), None, None, False, False)
+        return ControllerState(memory, mode_init(), detector, reaction, self._approach_init(), None, False, False)
 
     def adopt(self, state: ControllerState, before: "Controller") -> ControllerState:
         """Go on from a state of another controller of the same arm and skin, with this one's profile and path.
@@ -139,8 +138,8 @@ class Controller:
         if not same_units or remembered.places["command"].shape != memory.places["command"].shape:
             raise RobotStateError("The state is that of a controller for another arm or skin: begin with init().")
         same_window = mine.window.samples == theirs.window.samples and type(mine.detect) is type(theirs.detect)
-        same_points = _points_per_link(mine) == _points_per_link(theirs)
-        parts = ["watch", "tracks", "pace", "command", "rotation_goal", "mass"]
+        same_points = self.outside_places == before.outside_places
+        parts = ["watch", "tracks", "pace", "command", "rotation_goal", "mass"] + ["outside"] * same_points
         parts += ["window"] * same_window + ["null_velocity"] * (mine.null_space == theirs.null_space)
         memory.take(remembered, parts + ["slots"] * (mine.approach == theirs.approach and same_points))
         watch = memory.part("watch", Watched)
@@ -156,7 +155,7 @@ class Controller:
         return replace(
             state, memory=memory, detector=self.kept_detector(memory, detector), reaction=reaction,
             approach=state.approach if mine.approach == theirs.approach else self._approach_init(),
-            outside=state.outside if same_points else None, calm=False, quick=False,
+            calm=False, quick=False,
         )  # fmt: skip
 
     def step(self, state: ControllerState, inputs: Inputs) -> tuple[ControlStep, ControllerState]:
@@ -169,13 +168,13 @@ class Controller:
                 self.put_path(now, remembered.get("pace.phase"))
                 if self.take(memory, now, self.beside, CHECK, MOVE) and now.get("answer.ending") == SOLVED:
                     return ControlStep.of(now, CLEAR), ControllerState(
-                        memory, CLEAR, state.detector, state.reaction, state.approach, None, None, True, True
+                        memory, CLEAR, state.detector, state.reaction, state.approach, None, True, True
                     )
                 memory = remembered.copy()
         step, after = Decision(self, state, memory).taken(inputs)
         return step, ControllerState(memory, **after)
 
-    def take(self, memory: Flat, now: Flat, beside: CapsuleArrays, first: int, last: int) -> bool:
+    def take(self, memory: Flat, now: Flat, beside: Capsules, first: int, last: int) -> bool:
         """Take stages of a step; see `line`."""
         return line(self.fixed.blocks, memory.blocks, now.blocks, beside, first, last)
 
@@ -219,7 +218,3 @@ class Controller:
     def _approach_init(self) -> object:
         """Return what a restriction in plain Python remembers at first."""
         return None if self.approach is None else self.approach.init(self.motion_body)
-
-
-def _points_per_link(profile: Profile) -> int:
-    return 0 if profile.sight.outside is None else profile.sight.outside.per_link

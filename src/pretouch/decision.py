@@ -12,15 +12,15 @@ from pretouch.contact.window import Window, add_force
 from pretouch.control.approach import MotionRequest, Restriction, rows_of
 from pretouch.control.commander import Asked, asked_by
 from pretouch.faults import Report, Watched, examine, put_robot
-from pretouch.groups import Kinematics, Obstacles
-from pretouch.line import ASK, MOVE, SEE, line_within
+from pretouch.line import ASK, MOVE, SEE, line_points, line_within
 from pretouch.modes import CLEAR, Event, QpOutcome, next_mode, outcome_of
-from pretouch.perception.moving import beside, near_moving
-from pretouch.perception.obstacles import TrackState, silent_units, track_init
-from pretouch.perception.outside import outside_silence, see_outside
+from pretouch.perception.closest import beside, near_moving
+from pretouch.perception.external_points import outside_init, outside_silence
+from pretouch.perception.obstacles import silent_units, track_init
 from pretouch.records import Flat
+from pretouch.robot.kinematics import Kinematics
 from pretouch.sound import sound_desired, sound_moving, sound_payload, sound_points, sound_readings, sound_touch
-from pretouch.types import ControlStep, Inputs, Mode, RobotState
+from pretouch.types import ControlStep, Inputs, Mode, Obstacles, RobotState
 
 if TYPE_CHECKING:
     from pretouch.controller import Controller, ControllerState
@@ -33,7 +33,7 @@ class Decision:
         """Take a state, and a copy of what it remembers, which is written to."""
         self.controller, self.state, self.memory, self.now = controller, state, memory, controller.blank.copy()
         self.profile, self.model, self.mode = controller.profile, controller.model, state.mode
-        self.beside, self.outside, self.silent, self.watched = controller.beside, state.outside, "", False
+        self.beside, self.silent, self.watched = controller.beside, "", False
 
     def taken(self, inputs: Inputs) -> tuple[ControlStep, dict[str, Any]]:
         """Take the step; return it, and the fields of the state after it."""
@@ -55,10 +55,10 @@ class Decision:
         load = self.load and kept_free(self.load, self.robot.tau_ext, detection.residual)
         detector = self.controller.kept_detector(self.memory, detector)
         rests = self.profile.react.keep_free(reaction, self.memory)
-        calm = rests and mode == CLEAR and detection.contact is None and self.outside is None and load is None
+        calm = rests and mode == CLEAR and detection.contact is None and not self._has_source and load is None
         return step, {
-            "mode": mode, "detector": detector, "reaction": reaction, "approach": approach, "outside": self.outside,
-            "load": load, "calm": calm and self.controller.may_be_one_call(detector), "quick": False,
+            "mode": mode, "detector": detector, "reaction": reaction, "approach": approach, "load": load,
+            "calm": calm and self.controller.may_be_one_call(detector), "quick": False,
         }  # fmt: skip
 
     def _judge(self, inputs: Inputs) -> None:
@@ -84,6 +84,7 @@ class Decision:
         self.now.fill("readings", self.readings)
         if Event.TIME_BACKWARDS in self.events:
             memory.fill("tracks", track_init(units))
+            memory.fill("outside", outside_init(controller.outside_places, -np.inf if self._has_source else np.nan))
         if self.moving is not None and p.perception is not None:
             fixtures, persistence = controller.fixtures.capsules, p.perception.persistence_s
             self.beside = beside(fixtures, self.moving, self.readings, self.stamp, persistence)
@@ -94,43 +95,44 @@ class Decision:
 
     def _see(self) -> None:
         """Find where the arm is, and what is near (eq. 1)."""
-        now, see, stamp, robot = self.now, self.profile.perception, self.stamp, self.robot
+        now, see, stamp, robot, controller = self.now, self.profile.perception, self.stamp, self.robot, self.controller
         report = now.part("robot", Report)
         put_robot(report, robot)
+        if self.points is not None and controller.outside_places:
+            blocks = controller.fixed.blocks, self.memory.blocks, now.blocks
+            line_points(*blocks, self.points, controller.beside)
         self._line(SEE)
         self.kin = kin = now.part("kin", Kinematics)
         if self.load is not None:
             self.robot, self.load = without_load(self.load, self.model, kin, robot, self.controller.limits.period)
             put_robot(report, self.robot)
         if see is not None:
-            tracks, skin = self.memory.part("tracks", TrackState), self.controller.skin
-            heard, self.silent = silent_units(skin, tracks, self.readings.status, now.get("seen.silence"), stamp, see)
+            skin, heard = controller.skin, now.get("seen.heard")
+            last = self.memory.get("tracks.heard")
+            self.silent = silent_units(skin, last, self.readings.status, stamp, see.silent_after_s)
             self.watched = len(skin) > 0 and heard >= 1.0 and not self.silent
-            anew = Event.TIME_BACKWARDS in self.events
-            shown, self.outside = see_outside(
-                self.outside, anew, self.points, self.controller.outside, kin, robot, stamp
-            )  # fmt: skip
-            if shown is not None:
-                now.put("seen.nearest", min(now.get("seen.nearest"), float(shown.ee_distance.min())))
-                self._add(shown, "seen.found")
-            slower, self.lost = outside_silence(self.outside, self.lost, stamp, see.outside)
+            slower, self.lost = outside_silence(self.memory.get("outside.heard"), self.lost, stamp, see.outside)
             now.put("seen.heard", min(heard, slower))
             self._note({Event.SKIN_SILENT: self.silent, Event.POINTS_LOST: self.lost})
         else:
             self.lost = ""
         self.seen = near_of(now, "seen.found")
-        now.put("seen.all", now.get("seen.found"))
         if self.moving is not None:
-            places = len(self.controller.skin) + (0 if self.outside is None else len(self.outside.sigma))
-            self._add(near_moving(self.moving, self.model, kin, stamp, places), "seen.all")
+            places = len(controller.skin) + controller.outside_places
+            self._add(near_moving(self.moving, self.model, kin, stamp, places))
             now.put("request.untouched", places)
 
-    def _add(self, obstacles: Obstacles, count: str) -> None:
-        """Add obstacles to those that a field counts."""
-        found = self.now.get(count)
+    def _add(self, obstacles: Obstacles) -> None:
+        """Add obstacles to those that are seen."""
+        first = self.now.get("seen.found")
         for room, part in zip(self.now.part("seen.near", Obstacles), obstacles, strict=True):
-            room[found : found + len(part)] = part
-        self.now.put(count, found + len(obstacles.unit))
+            room[first : first + len(part)] = part
+        self.now.put("seen.all", first + len(obstacles.unit))
+
+    @property
+    def _has_source(self) -> bool:
+        """Whether there was a source of outside points."""
+        return not np.isnan(self.memory.get("outside.heard"))
 
     def _detect(self) -> tuple[Detection, Any]:
         """Tell a contact from free motion (eqs. 8-11); return that, and what the detector remembers."""

@@ -9,7 +9,7 @@ from pretouch.compiled import compiled, kernel
 from pretouch.modes import Event
 from pretouch.params import FailureParams
 from pretouch.records import Cell, IntCell
-from pretouch.robot.vectors import below
+from pretouch.robot.kinematics import below
 from pretouch.sound import FASTEST, STRONGEST, sound_robot, time_of
 from pretouch.types import FloatArray, Inputs, RobotState
 from pretouch.values import LARGEST, LATEST

@@ -21,21 +21,22 @@ from pretouch.control.braking import Touch, TouchLimits, braking_rows, inertia_f
 from pretouch.control.motion import move_within
 from pretouch.control.path import advance, follow, reduce_speed, speed_scale
 from pretouch.faults import believable
-from pretouch.groups import CapsuleArrays, Chain, first_of
 from pretouch.line_records import ADMITTANCE, BRAKING, PAPER, THRESHOLDS, Fixed, Now, Remembered
 from pretouch.modes import SOLVED
-from pretouch.perception.obstacles import measured
+from pretouch.perception.external_points import take_points
+from pretouch.perception.obstacles import measured, speed_factor
 from pretouch.perception.perceive import perceive
 from pretouch.records import Blocks, opener
-from pretouch.robot.kinematics import place
-from pretouch.types import FloatArray
+from pretouch.robot.body import Capsules
+from pretouch.robot.kinematics import Chain, place
+from pretouch.types import FloatArray, SeenPoints, some_of
 
 CHECK, SEE, DETECT, ASK, MOVE = range(5)
 """Stages of a step."""
 
 
 @entry
-def line(fixed: Blocks, remembered: Blocks, now: Blocks, beside: CapsuleArrays, first: int, last: int) -> bool:
+def line(fixed: Blocks, remembered: Blocks, now: Blocks, beside: Capsules, first: int, last: int) -> bool:
     """Take the stages from the first to the last; from `CHECK` on, return False where something is to be decided."""
     alone = first == CHECK
     if alone and not believe(fixed, remembered, now):
@@ -62,32 +63,43 @@ def believe(fixed: Blocks, remembered: Blocks, now: Blocks) -> bool:
     return believable(stamp[0], robot, watch, command, qd_max, failure)
 
 
-_sight, _tracks = opener(Fixed, "hinges", "mechanism.arm", "sight"), opener(Remembered, "tracks")
+_sight, _tracks = opener(Fixed, "hinges", "mechanism.arm", "sight"), opener(Remembered, "tracks", "outside")
 _scene = opener(Now, "stamp", "robot", "readings", "kin", "ee", "seen")
 
 
 @inlined
-def see(fixed: Blocks, remembered: Blocks, now: Blocks, beside: CapsuleArrays) -> float:
+def see(fixed: Blocks, remembered: Blocks, now: Blocks, beside: Capsules) -> float:
     """Place the arm, and find the obstacles (eq. 1); return the factor on the speed for units that fall silent."""
-    (hinges, arm, sight), (tracks,), (stamp, robot, readings, kin, ee, seen) = (
+    (hinges, arm, sight), memory, (stamp, robot, readings, kin, ee, seen) = (
         _sight(fixed), _tracks(remembered), _scene(now),
     )  # fmt: skip
     place(hinges, robot.q, kin)
     ee[:] = kin.position[arm.ee]
-    seen.found[0], seen.nearest[0], seen.silence[0], seen.heard[0] = 0, np.inf, 0.0, 1.0
-    if sight.sees:
+    seen.found[0], seen.nearest[0], seen.heard[0] = 0, np.inf, 1.0
+    if sight.sees or memory[1].heard[0] > -np.inf:
         found, nearest, oldest = perceive(
-            sight, tracks, readings, seen, (kin, Chain(kin.anchor, kin.axis, arm.moved_by, robot.qd), ee),
+            sight, memory, readings, seen, (kin, Chain(kin.anchor, kin.axis, arm.moved_by, robot.qd), ee),
             (stamp[0], robot.stamp[0]), beside,
         )  # fmt: skip
         silence = stamp[0] - oldest
-        seen.found[0], seen.nearest[0], seen.silence[0] = found, nearest, silence
-        if silence > sight.slow_after_s:
-            seen.heard[0] = max(0.0, (sight.silent_after_s - silence) / (sight.silent_after_s - sight.slow_after_s))
+        seen.found[0], seen.nearest[0] = found, nearest
+        seen.heard[0] = speed_factor(silence, sight.perception.slow_after_s, sight.perception.silent_after_s)
     else:
-        measured(readings.distance, readings.status, sight.skin.cones, seen.distance)
+        seen.distance[:] = measured(readings.distance, readings.status, sight.skin.cones)
     seen.all[0] = seen.found[0]
     return seen.heard[0]
+
+
+_points, _place = opener(Remembered, "outside"), opener(Now, "stamp", "robot", "kin")
+
+
+@entry
+def line_points(fixed: Blocks, remembered: Blocks, now: Blocks, points: SeenPoints, beside: Capsules) -> None:
+    """Take in points of outside sources before the stage `SEE`; a step in one call has none."""
+    (hinges, arm, sight), (outside,), (stamp, robot, kin) = _sight(fixed), _points(remembered), _place(now)
+    place(hinges, robot.q, kin)
+    chain = Chain(kin.anchor, kin.axis, arm.moved_by, robot.qd)
+    take_points(sight, outside, points, (kin, chain), (stamp[0], robot.stamp[0]), beside)
 
 
 _test = opener(Fixed, "kinds", "force", "test", "no_gain", "mechanism", "notes_path", "sight.sees")
@@ -103,7 +115,7 @@ def detect(fixed: Blocks, remembered: Blocks, now: Blocks) -> bool:
     """
     kinds, p, test, no_gain, mechanism, notes_path, sees = _test(fixed)
     (window, state, mass), (robot, kin, ee, seen, force, d) = _memory(remembered), _sample(now)
-    armed, near = window.samples[0] == len(window.ring), first_of(seen.near, seen.found[0])
+    armed, near = window.samples[0] == len(window.ring), some_of(seen.near, 0, seen.found[0])
     add_sample(window, robot.wrench[:3], p.window)
     for i in range(3):
         force.filtered[i] = window.sums[0, i]
@@ -153,7 +165,7 @@ def move(fixed: Blocks, remembered: Blocks, now: Blocks) -> None:
     """Write the rows of what restricts the body (eqs. 5-7), and the joint velocities within them (eq. 2)."""
     (approach, mechanism, paper, braking, motion), (slots, null_velocity, command) = _body(fixed), _moving(remembered)
     robot, kin, ee, room, count, request, answer = _motion(now)
-    near, n, free = first_of(room, count[0]), len(robot.q), np.empty(0)
+    near, n, free = some_of(room, 0, count[0]), len(robot.q), np.empty(0)
     rows = Rows(np.empty((0, n)), np.empty(0), np.empty(0, np.int64), 1.0)
     if approach == PAPER:
         rows = approach_rows(kin, mechanism.arm.moved_by, near, paper)
@@ -195,7 +207,7 @@ def line_within(
     """Take the stage `MOVE` within rows and joint speeds of a part in plain Python; see `Restricted`."""
     (motion,), (_, null_velocity, command) = _limits(fixed), _moving(remembered)
     robot, kin, ee, room, count, request, answer = _motion(now)
-    scene = kin, ee, first_of(room, count[0])
+    scene = kin, ee, some_of(room, 0, count[0])
     move_within(motion, robot, scene, request, rows, speeds, null_velocity, answer)
     command[:] = answer.command
     go_on(fixed, remembered, now)

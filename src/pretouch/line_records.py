@@ -10,13 +10,22 @@ from pretouch.control.approach import MotionRequest
 from pretouch.control.braking import BrakingNumbers, Slots
 from pretouch.control.motion import MotionNumbers
 from pretouch.faults import Report, Watched
-from pretouch.groups import CapsuleArrays, Kinematics, Mechanism, Obstacles, SkinArrays
-from pretouch.params import FailureParams, RestrictionParams, ThresholdParams, WindowParams
+from pretouch.params import (
+    FailureParams,
+    OutsidePoints,
+    PerceptionParams,
+    RestrictionParams,
+    ThresholdParams,
+    WindowParams,
+)
+from pretouch.perception.external_points import OutsideState
 from pretouch.perception.obstacles import TrackState
-from pretouch.perception.perceive import Readings, SightNumbers
+from pretouch.perception.perceive import Readings
 from pretouch.records import Cell, IntCell
-from pretouch.robot.kinematics import Hinges
-from pretouch.types import FloatArray, IntArray
+from pretouch.robot.body import Capsules
+from pretouch.robot.kinematics import Hinges, Kinematics, Mechanism
+from pretouch.sensing.skin import SkinArrays
+from pretouch.types import FloatArray, IntArray, Obstacles
 
 PYTHON, THRESHOLDS, SEQUENTIAL = range(3)
 """What detects a contact."""
@@ -39,18 +48,23 @@ class Sight(NamedTuple):
 
     sees: bool
     """Whether there are units to see with."""
-    at_stamp: bool
-    """Whether readings are placed from where their units were at the stamp."""
-    slow_after_s: float
-    silent_after_s: float
-    arm: CapsuleArrays
+    filters: bool
+    """Whether readings are explained by what is known to be there."""
+    margin_m: float
+    """Distance before that from which on a reading is explained by it."""
+    memory_s: float
+    """Memory of the estimates of closing speeds, 0 where there are none."""
+    sigmas: float
+    """How many standard deviations of a unit's place are taken off, 0 where all places are exact."""
+    arm: Capsules
     """All capsules of the arm."""
-    body: CapsuleArrays
+    body: Capsules
     """Those that joints move."""
     planes: Annotated[FloatArray, "P", 4]
     """(P, 4) of fixtures."""
     skin: SkinArrays
-    numbers: SightNumbers
+    perception: PerceptionParams
+    outside: OutsidePoints
 
 
 class ForceNumbers(NamedTuple):
@@ -106,6 +120,7 @@ class Remembered(NamedTuple):
 
     watch: Watched
     tracks: TrackState
+    outside: OutsideState
     window: Window
     test: SequentialState
     mass: FreeMass
@@ -131,8 +146,6 @@ class Seen(NamedTuple):
     """With the nearest of moving fixtures, behind them."""
     nearest: Cell
     """Distance of the nearest obstacle from the end-effector origin [m]."""
-    silence: Cell
-    """Time since the unit that has been silent for longest reported anything [s]."""
     heard: Cell
     """Factor on the speed for units and outside sources that fall silent."""
 

@@ -16,11 +16,16 @@ from pretouch.contact.sequential_test import SequentialTest
 from pretouch.contact.touch_cue import TouchSensors
 from pretouch.contact.virtual_mass import FreeMass
 from pretouch.contact.window import window_init
-from pretouch.control.approach import ApproachRestriction, BrakingCurve, MotionRequest, of_table_i, row_numbers
+from pretouch.control.approach import (
+    ApproachRestriction,
+    BrakingCurve,
+    MotionRequest,
+    of_table_i,
+    row_numbers,
+)
 from pretouch.control.braking import braking_numbers, slots_init
 from pretouch.control.motion import MotionNumbers
 from pretouch.faults import Report, Watched
-from pretouch.groups import Kinematics, no_obstacles
 from pretouch.line_records import (
     ADMITTANCE,
     BRAKING,
@@ -42,10 +47,12 @@ from pretouch.line_records import (
     Seen,
     Sight,
 )
-from pretouch.params import NullSpaceMotion, PerceptionParams, SequentialParams
+from pretouch.params import NullSpaceMotion, OutsidePoints, PerceptionParams, SequentialParams
+from pretouch.perception.external_points import outside_init
 from pretouch.perception.obstacles import track_init
-from pretouch.perception.outside import places_of
-from pretouch.perception.perceive import Readings, sight_numbers
+from pretouch.perception.perceive import Readings
+from pretouch.robot.kinematics import Kinematics
+from pretouch.types import no_obstacles
 
 
 def kinds_of(profile: Any) -> Kinds:
@@ -71,9 +78,9 @@ def fixed_of(controller: Any) -> Fixed:
     return Fixed(
         kinds, model.hinges, model.mechanism, limits.qd_max, failure,
         Sight(
-            see is not None and len(skin) > 0, seen.place_at_stamp, seen.slow_after_s, seen.silent_after_s,
-            model.capsules.arrays, model.body.arrays, controller.fixtures.planes, skin.arrays,
-            sight_numbers(seen, skin),
+            see is not None and len(skin) > 0, seen.self_margin_m is not None, seen.self_margin_m or 0.0,
+            0.0 if seen.closing is None else seen.closing.memory_s, 0.0 if skin.exact else seen.spread_sigmas,
+            model.capsules, model.body, controller.fixtures.planes, skin.arrays, seen, seen.outside or OutsidePoints(),
         ),
         ForceNumbers(profile.window, thresholds.compare == "filtered", thresholds),
         sequential_numbers(n, limits.period, test), np.ones(len(model.links)),
@@ -89,9 +96,7 @@ def fixed_of(controller: Any) -> Fixed:
 
 def _places(controller: Any) -> int:
     """Count the obstacles there may be: of units, outside points, and links beside moving fixtures."""
-    model, see = controller.model, controller.profile.perception
-    outside = 0 if see is None or see.outside is None else places_of(model, see.outside.per_link)
-    return len(controller.skin) + outside + len(model.parts)
+    return len(controller.skin) + controller.outside_places + len(controller.model.parts)
 
 
 def _report(n: int) -> Report:
@@ -106,7 +111,7 @@ def remembered_init(controller: Any) -> Remembered:
     zero, cycles = np.zeros(1), np.zeros(1, np.int64)
     return Remembered(
         Watched(zero, zero, _report(n), cycles, np.zeros(sent), np.zeros((sent, n))),
-        track_init(len(controller.skin)), window_init(profile.window.samples),
+        track_init(len(controller.skin)), outside_init(controller.outside_places), window_init(profile.window.samples),
         sequential_init(n if kinds.detect == SEQUENTIAL else 0, SequentialParams()),
         FreeMass(np.zeros((2, n)), cycles, none, clamp_init(none).path, zero), Pace(np.ones(1), cycles, zero, zero),
         slots_init(_places(controller) if kinds.approach == BRAKING else 0), none, none, np.eye(3),
@@ -121,7 +126,7 @@ def now_init(controller: Any) -> Now:
     return Now(
         zero, _report(n), Readings(of_units, of_units, np.zeros(units, np.int64)),
         Kinematics(np.zeros((links, 3)), np.zeros((links, 3, 3)), np.zeros((n, 3)), np.zeros((n, 3))), three,
-        Seen(of_units, no_obstacles(places), count, count, zero, zero, np.ones(1)), Compared(three, three),
+        Seen(of_units, no_obstacles(places), count, count, zero, np.ones(1)), Compared(three, three),
         sample_test(n), OnPath(zero, three, three, three, zero, zero),
         MotionRequest(three, np.eye(3), np.zeros(n), count, count, count, np.full(1, np.nan), np.full(1, sys.maxsize)),
         Answer(

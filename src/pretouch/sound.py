@@ -19,9 +19,9 @@ from pretouch.inputs import (
     SeenPoints,
     TouchReadings,
 )
-from pretouch.perception.chosen_points import FARTHEST, LARGEST_SIGMA, usable
+from pretouch.perception.external_points import FARTHEST, LARGEST_SIGMA, usable
 from pretouch.records import Flat
-from pretouch.robot.vectors import below
+from pretouch.robot.kinematics import below
 from pretouch.values import LATEST, WHOLE, Below, BoolArray, FloatArray, IntArray, real, real_number
 
 Input = TypeVar("Input")

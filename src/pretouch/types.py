@@ -5,12 +5,12 @@ All are set once, when they are made; arrays are read and not written to (`docs/
 
 from collections.abc import Callable
 from dataclasses import field
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
+from pretouch.compiled import compiled
 from pretouch.explanation import Limited, limited_by
-from pretouch.groups import Obstacles as Obstacles
 from pretouch.inputs import SOMEWHERE as SOMEWHERE
 from pretouch.inputs import Inputs as Inputs
 from pretouch.inputs import MovingFixtures as MovingFixtures
@@ -31,6 +31,47 @@ from pretouch.values import FloatArray as FloatArray
 from pretouch.values import IntArray as IntArray
 from pretouch.values import Number as Number
 from pretouch.values import value
+
+
+class Obstacles(NamedTuple):
+    """K sensed points, each with its closest point on the robot's body. Base frame."""
+
+    unit: Annotated[IntArray, "K"]
+    """(K,) index of the sensing unit in the skin; from their number on, of an outside point, then a moving fixture."""
+    point: Annotated[FloatArray, "K", 3]
+    """(K, 3) obstacle positions, eq. 1 [m]."""
+    ee_distance: Annotated[FloatArray, "K"]
+    """(K,) distance from the end-effector origin, less the spread, at least 0 [m] (eqs. 3, 11); inf: moving fixture."""
+    body_point: Annotated[FloatArray, "K", 3]
+    """(K, 3) closest points on the surface of the body [m]."""
+    link: Annotated[IntArray, "K"]
+    """(K,) index of the link that carries the closest point."""
+    direction: Annotated[FloatArray, "K", 3]
+    """(K, 3) unit vectors from body to obstacle, defined in penetration too."""
+    body_distance: Annotated[FloatArray, "K"]
+    """(K,) signed distance from the body's surface, less the point's spread [m] (eqs. 5-7)."""
+    closing_speed: Annotated[FloatArray, "K"]
+    """(K,) estimated speed of the object itself towards the closest body point [m/s]; 0 where it is not estimated."""
+
+
+@compiled
+def no_obstacles(count: int = 0) -> Obstacles:
+    """Return no obstacles, with room for so many."""
+    of_each, points = np.zeros(count), np.zeros((count, 3))
+    return Obstacles(
+        np.zeros(count, np.int64), points, of_each, points.copy(), np.zeros(count, np.int64), points.copy(),
+        of_each.copy(), of_each.copy(),
+    )  # fmt: skip
+
+
+@compiled
+def some_of(obstacles: Obstacles, first: int, end: int) -> Obstacles:
+    """Return obstacles from the first up to, and without, the end, as views."""
+    o, m = obstacles, slice(first, end)
+    return Obstacles(
+        o.unit[m], o.point[m], o.ee_distance[m], o.body_point[m], o.link[m], o.direction[m], o.body_distance[m],
+        o.closing_speed[m],
+    )  # fmt: skip
 
 
 class Thresholds(NamedTuple):

@@ -43,10 +43,10 @@ def test_a_unit_that_is_refused_stays_where_the_skin_had_it_or_is_left_out(panda
 
 
 def test_a_unit_that_is_calibrated_keeps_its_sensors(panda_model, found, pair):
-    first = replace(pair.units[0], touch=TouchPatch(radius=0.03), sensor=VL53L5CX())
+    first = replace(pair.units[0], touch=TouchPatch(radius_m=0.03), sensor=VL53L5CX())
     made = skin_of(found, panda_model, Skin([first, pair.units[1]], panda_model))
     assert made.located == pair.ids
-    assert [unit.touch for unit in made.skin.mounted] == [TouchPatch(radius=0.03), None]
+    assert [unit.touch for unit in made.skin.mounted] == [TouchPatch(radius_m=0.03), None]
     assert [unit.sensor.zones for unit in made.skin.mounted] == [4, 1]
 
 
@@ -87,7 +87,7 @@ def test_points_inside_a_link_are_moved_to_its_surface(panda_model):
     for link in sorted(set(panda_model.capsules.link.tolist())):
         own = panda_model.capsules.of_links(np.array([link]))
         for _ in range(50):
-            k = rng.integers(len(own))
+            k = rng.integers(len(own.radius))
             normal = rng.normal(size=3)
             normal /= np.linalg.norm(normal)
             p = own.a[k] + rng.uniform() * (own.b[k] - own.a[k]) + (own.radius[k] - 0.005) * normal

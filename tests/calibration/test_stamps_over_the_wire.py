@@ -9,7 +9,7 @@ from pretouch.calibration.stamps import instants, retimed
 from pretouch.control.path import Circle
 from pretouch.recording.calibration_data import read_measured
 from pretouch.recording.skin_recording import SkinRecording
-from pretouch.robot.ik import brought_to
+from pretouch.robot.postures import brought_to
 from pretouch.serving.fleet import FleetParams
 from pretouch.serving.network import ChannelParams, NetworkParams
 from pretouch.sim.imu import ImuParams, Imus

@@ -9,8 +9,8 @@ from pretouch.contact.detector import Body, Detection, Sample
 from pretouch.contact.sequential_test import SequentialTest
 from pretouch.contact.touch_cue import Cue, Cues
 from pretouch.contact.window import Window, add_force, window_init
-from pretouch.groups import Kinematics
 from pretouch.profiles import Profile
+from pretouch.robot.kinematics import Kinematics
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import FloatArray, Obstacles, RobotState, TouchReadings

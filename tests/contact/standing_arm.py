@@ -8,11 +8,10 @@ from pretouch.contact.detector import Body, Sample
 from pretouch.contact.scatter import LENGTHS, WindowMeans, means_in_free_motion
 from pretouch.contact.sequential_test import SequentialTest, SequentialTestState
 from pretouch.contact.window import window_init
-from pretouch.groups import no_obstacles
 from pretouch.params import MisfitParams
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.types import RobotState
+from pretouch.types import RobotState, no_obstacles
 
 PERIOD = 0.01
 

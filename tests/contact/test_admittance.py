@@ -20,9 +20,9 @@ from pretouch.contact.virtual_mass import (
 )
 from pretouch.params import AdmittanceParams
 from pretouch.profiles import PROFILES
+from pretouch.robot.body import placed
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
-from pretouch.robot.vectors import placed
 
 DT, N = 0.01, 7
 P = AdmittanceParams(inertia_kg_m2=2.0, damping_nm_s=20.0, speed_max_m_s=1000.0)
@@ -32,7 +32,7 @@ MODEL = RobotModel(panda())
 
 
 def axes_of(q: np.ndarray):
-    return MODEL.kinematics(q), MODEL.moved_by, MODEL.body.arrays
+    return MODEL.kinematics(q), MODEL.moved_by, MODEL.body
 
 
 READY = axes_of(MODEL.description.q_ready)

@@ -6,9 +6,8 @@ import pytest
 from pretouch.contact.detector import Detection
 from pretouch.contact.moving_thresholds import MovingThresholds
 from pretouch.contact.window import Window, add_force, window_init
-from pretouch.groups import no_obstacles
 from pretouch.params import WindowParams
-from pretouch.types import Obstacles
+from pretouch.types import Obstacles, no_obstacles
 
 EE = np.array([0.5, 0.0, 0.3])
 PUSH = np.array([0.0, -50.0, 0.0])

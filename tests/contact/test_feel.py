@@ -11,11 +11,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 from tests.contact.alone import begun as feel_init
 from tests.contact.alone import feel, something, standing
 
-from pretouch.groups import no_obstacles
 from pretouch.profiles import profile
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
-from pretouch.types import Obstacles
+from pretouch.types import Obstacles, no_obstacles
 
 MODEL = RobotModel(panda())
 KIN = MODEL.kinematics(MODEL.description.q_ready)

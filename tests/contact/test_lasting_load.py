@@ -9,11 +9,10 @@ from tests.contact.alone import feel, something, standing
 
 from pretouch.contact.detector import Detection
 from pretouch.contact.lasting_load import load_misfit
-from pretouch.groups import no_obstacles
 from pretouch.profiles import Profile, profile
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
-from pretouch.types import Obstacles
+from pretouch.types import Obstacles, no_obstacles
 
 MODEL = RobotModel(panda())
 KIN = MODEL.kinematics(MODEL.description.q_ready)

@@ -20,14 +20,14 @@ from pretouch.contact.localisation import (
 from pretouch.contact.posterior import Candidates, log_posterior, log_prior
 from pretouch.contact.sequential_step import sample_test
 from pretouch.contact.touch_cue import Cues, gain_of, no_cues, surface_areas
-from pretouch.groups import Kinematics, no_obstacles
 from pretouch.params import LocalisationParams, TouchSensorParams
+from pretouch.robot.body import placed
 from pretouch.robot.description import panda
+from pretouch.robot.kinematics import Kinematics
 from pretouch.robot.model import RobotModel
-from pretouch.robot.vectors import placed_capsules
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import TouchPatch
-from pretouch.types import FloatArray, Obstacles, Touched
+from pretouch.types import FloatArray, Obstacles, Touched, no_obstacles
 
 MODEL = RobotModel(panda())
 SURFACE = MODEL.surface
@@ -53,14 +53,14 @@ def pose_of(kin: Kinematics, c: int) -> tuple[FloatArray, FloatArray]:
 
 def poses(kin: Kinematics) -> tuple[FloatArray, FloatArray]:
     """Return points and normals (N, 3) of all candidates in the base frame."""
-    point, normal = np.empty((len(SURFACE), 3)), np.empty((len(SURFACE), 3))
-    candidate_poses(kin, SURFACE.arrays, point, normal)
+    point, normal = np.empty((len(SURFACE.link), 3)), np.empty((len(SURFACE.link), 3))
+    candidate_poses(kin, SURFACE, point, normal)
     return point, normal
 
 
 def exposed(kin: Kinematics) -> FloatArray:
     """Which candidates (N,) nothing hides."""
-    capsules, hidden = placed_capsules(MODEL.capsules.arrays, kin), np.empty(len(SURFACE), np.bool_)
+    capsules, hidden = placed(MODEL.capsules, kin), np.empty(len(SURFACE.link), np.bool_)
     hidden_candidates(poses(kin)[0], SURFACE.body, capsules, MODEL.rigid[capsules.link], hidden)
     return ~hidden
 
@@ -105,19 +105,19 @@ def touched(kin: Kinematics, c: int) -> Cues:
 
 def prior(kin: Kinematics, cues: Cues, hidden: FloatArray, near: Obstacles | None = None) -> FloatArray:
     """Probability (N,) of each candidate before torques are looked at."""
-    ln = np.empty(len(SURFACE))
-    log_prior(poses(kin)[0], SURFACE.arrays, hidden, near or no_obstacles(), cues, NUMBERS, ln)
+    ln = np.empty(len(SURFACE.link))
+    log_prior(poses(kin)[0], SURFACE, hidden, near or no_obstacles(), cues, NUMBERS, ln)
     return np.exp(ln)
 
 
 def candidates(torque: FloatArray, kin: Kinematics, numbers: LocalisationParams = NUMBERS) -> Candidates:
-    none = np.zeros(len(SURFACE))
-    return Candidates(torque, kin, MODEL.moved_by, SURFACE.arrays, *poses(kin), none, numbers)
+    none = np.zeros(len(SURFACE.link))
+    return Candidates(torque, kin, MODEL.moved_by, SURFACE, *poses(kin), none, numbers)
 
 
 def test_candidates_lie_on_the_capsules_and_stand_for_their_area():
     body = MODEL.body
-    for c in range(0, len(SURFACE), 7):
+    for c in range(0, len(SURFACE.link), 7):
         own = body.of_links(SURFACE.link[c : c + 1])
         axis = own.b - own.a
         part = np.clip(((SURFACE.point[c] - own.a) * axis).sum(axis=1) / (axis**2).sum(axis=1), 0, 1)
@@ -137,7 +137,7 @@ def test_the_likelihood_is_that_of_a_normal_distribution_with_the_force_integrat
     kin, c = posture(), of("panda_link6", posture())
     point, normal = pose_of(kin, c)
     torque = torques(kin, (c, 30.0))
-    ln, force = np.empty(len(SURFACE)), np.empty((len(SURFACE), 3))
+    ln, force = np.empty(len(SURFACE.link)), np.empty((len(SURFACE.link), 3))
     known = NUMBERS._replace(friction=0.25, force_n=1000.0, tails=1e9)
     assert log_posterior(NOISE, candidates(torque, kin, known), ln, force)
     assert_allclose(force[c], -30.0 * normal, atol=0.5)
@@ -152,8 +152,8 @@ def test_the_likelihood_is_that_of_a_normal_distribution_with_the_force_integrat
 
 
 def test_torques_whose_covariance_is_none_say_nothing():
-    kin, ln = posture(), np.zeros(len(SURFACE))
-    assert not log_posterior(-NOISE, candidates(np.zeros(N), kin), ln, np.zeros((len(SURFACE), 3)))
+    kin, ln = posture(), np.zeros(len(SURFACE.link))
+    assert not log_posterior(-NOISE, candidates(np.zeros(N), kin), ln, np.zeros((len(SURFACE.link), 3)))
     assert not ln.any()
 
 
@@ -218,7 +218,7 @@ def test_the_prior_is_one_in_all_and_hides_what_cannot_be_touched():
     kin = posture()
     point, _ = poses(kin)
     hidden = ~exposed(kin)
-    assert 0 < hidden.sum() < len(SURFACE) / 2
+    assert 0 < hidden.sum() < len(SURFACE.link) / 2
     near = no_obstacles(2)._replace(point=point[:2] + 0.03, body_distance=np.array([0.03, 0.2]))
     made = prior(kin, no_cues(len(MODEL.links)), hidden, near)
     assert made.sum() == pytest.approx(1.0, abs=1e-6)

@@ -23,12 +23,11 @@ from pretouch.contact.scatter import (
 )
 from pretouch.contact.sequential_test import SequentialTest
 from pretouch.contact.window import window_init
-from pretouch.groups import no_obstacles
 from pretouch.params import MisfitParams
 from pretouch.profiles import profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.types import RobotState
+from pretouch.types import RobotState, no_obstacles
 
 N = 3
 BOUND, SLACK = math.log(360_000), 7.0

@@ -9,11 +9,10 @@ import pytest
 from pretouch.contact.clamp import find_self_clamp, presses_on_fixture
 from pretouch.contact.detector import Body
 from pretouch.params import PinchParams
-from pretouch.robot.body import Capsules, no_capsules
+from pretouch.robot.body import Capsules, no_capsules, placed
 from pretouch.robot.description import RobotDescription
 from pretouch.robot.model import RobotModel
-from pretouch.robot.self_distance import nearest_points, segment_distance
-from pretouch.robot.vectors import placed
+from pretouch.robot.postures import nearest_points, segment_distance
 from pretouch.sensing.skin import Skin
 from pretouch.types import NOT_TOUCHED, FloatArray, Touched
 
@@ -32,7 +31,7 @@ def beside(model: RobotModel, planes: FloatArray | None = None, standing: Capsul
 
 def gap_of(model: RobotModel, one: str, other: str, q: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Where two links are nearest to each other, on the surface of each, and the unit vector across."""
-    body, (a, b) = model.capsules, placed(model.capsules, model.kinematics(q))
+    body, (_, a, b, _) = model.capsules, placed(model.capsules, model.kinematics(q))
     i, j = np.array(list(product(*(np.flatnonzero(body.link == model.link_index(link)) for link in (one, other))))).T
     least = np.argmin(segment_distance(a[i], b[i], a[j], b[j]) - body.radius[i] - body.radius[j])
     i, j = i[least], j[least]

@@ -13,13 +13,12 @@ from pretouch.contact.detector import Body
 from pretouch.contact.scatter import earned_level, level_init
 from pretouch.contact.sequential import alarm_bound
 from pretouch.contact.touch_cue import Cues, TouchSensors, gain_of, no_cues, surface_areas, together
-from pretouch.groups import no_obstacles
 from pretouch.profiles import profile
 from pretouch.robot.body import Capsules
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import TouchPatch
-from pretouch.types import TouchReadings, TouchStatus
+from pretouch.types import TouchReadings, TouchStatus, no_obstacles
 
 (P,) = profile("pretouch").detect.cues
 PERIOD = 0.01
@@ -28,7 +27,7 @@ NOW = 5.0
 
 def touching(skin: Skin, model: RobotModel, units: tuple[int, ...] = (0, 3), sigma: float = 0.0) -> Skin:
     """The skin with touch sensors at some units."""
-    patch = TouchPatch(radius=0.02, force_min=0.5)
+    patch = TouchPatch(radius_m=0.02, force_min_n=0.5)
     return Skin(
         [replace(u, touch=patch, position_sigma=sigma) if k in units else u for k, u in enumerate(skin.units)], model
     )

@@ -14,9 +14,8 @@ from pretouch.contact.moving_thresholds import (
     threshold_parts,
 )
 from pretouch.contact.window import window_init
-from pretouch.groups import no_obstacles
 from pretouch.params import ThresholdParams
-from pretouch.types import Obstacles, Thresholds
+from pretouch.types import Obstacles, Thresholds, no_obstacles
 
 TABLE_I = ThresholdParams()  # F_b = 10, F_std = 3, sigma_max = 3, F_d = 4, d_max = 0.8, d_min = 0.05
 FAR = np.full(3, np.inf)

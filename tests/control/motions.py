@@ -6,14 +6,14 @@ from pretouch.control.path import Circle
 from pretouch.controller import Controller
 from pretouch.decision import move_restricted
 from pretouch.faults import Report, put_robot
-from pretouch.groups import Kinematics, Obstacles
 from pretouch.line import MOVE
 from pretouch.modes import CLEAR
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import Profile
+from pretouch.robot.kinematics import Kinematics
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin
-from pretouch.types import ControlStep, FloatArray, RobotState
+from pretouch.types import ControlStep, FloatArray, Obstacles, RobotState
 
 
 class Mover:

@@ -7,10 +7,17 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from pretouch.control.braking import Touch, braking_cap, braking_numbers, braking_rows, slots_init, tangents_of
-from pretouch.groups import Chain, no_obstacles
+from pretouch.control.braking import (
+    Touch,
+    braking_cap,
+    braking_numbers,
+    braking_rows,
+    slots_init,
+    tangents_of,
+)
 from pretouch.params.pretouch import BrakingParams, Tangential
-from pretouch.types import FloatArray
+from pretouch.robot.kinematics import Chain
+from pretouch.types import FloatArray, no_obstacles
 
 DT, A, TOUCH, TASK, NOTICE = 0.01, 0.3, 0.03, 0.3, 0.6
 TIGHTEN, LOOSEN, RETREAT, NEAR, SLOWEST = 3.0, 1.0, 0.1, 0.1, 0.1

@@ -11,13 +11,12 @@ from tests.following_arm import DT, Arm
 from pretouch.control.approach import Restricted, rows_of
 from pretouch.control.braking import braking_cap
 from pretouch.errors import ParameterError
-from pretouch.groups import no_obstacles
 from pretouch.params import NullSpaceMotion
 from pretouch.perception.closest import closest_points
 from pretouch.profiles import PROFILES, Profile, profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.types import ControlStep, Mode, RobotState
+from pretouch.types import ControlStep, Mode, RobotState, no_obstacles
 
 PRETOUCH = PROFILES["pretouch"]
 LEFT = 0

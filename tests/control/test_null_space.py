@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 from tests.control.programs import task_cost
 
 from pretouch.control.task import away, projector
-from pretouch.groups import Obstacles, no_obstacles
 from pretouch.params import NullSpaceMotion, TaskParams
 from pretouch.robot.model import RobotModel
+from pretouch.types import Obstacles, no_obstacles
 
 PAPER, TASK = TaskParams(), TaskParams(mid_joint_projected=True)
 MOTION = NullSpaceMotion(distance_m=0.25, speed_m_s=0.1, joint_rad_s=0.5, rate_rad_s2=10.0).numbers

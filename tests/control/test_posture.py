@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from pretouch.errors import ExperimentError
-from pretouch.robot.ik import brought_to
+from pretouch.robot.postures import brought_to
 
 
 def test_the_hand_is_at_the_point_and_as_upright_as_before(panda_model):

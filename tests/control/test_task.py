@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from pretouch.control.task import twist
-from pretouch.robot.vectors import rotation_error
+from pretouch.robot.kinematics import rotation_error
 
 
 def test_held_orientation_adds_the_turn_back():

@@ -8,7 +8,7 @@ from pretouch.coverage.params import CoverageParams
 from pretouch.coverage.surface import surface_of
 from pretouch.coverage.ways import seen_by, ways_met
 from pretouch.perception.scene_filter import no_fixtures
-from pretouch.robot.ik import brought_to
+from pretouch.robot.postures import brought_to
 from pretouch.sensing.sensor import VL53L7CX
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pretouch.coverage.sighting import GRID_M, BallWays, Stretch, View, common_area, in_view, ways_free, ways_seen
-from pretouch.groups import CapsuleArrays, Sensors
-from pretouch.sensing.sensor import PAPER_SENSOR, cones_of
+from pretouch.robot.body import Capsules
+from pretouch.sensing.sensor import PAPER_SENSOR, Sensors, cones_of
 
 HALF = np.deg2rad(13.5)
 LIGHT = 2.0 / 3.0 * 0.5 / 0.17 * 1.3**2
@@ -77,7 +77,7 @@ def free(start, way, radius=0.05, length=0.8, own=0):
     out = np.zeros(1, np.bool_)
     ways_free(
         BallWays(np.array([start]), np.array([way]), radius), length, np.array([own]),
-        CapsuleArrays(np.zeros(2, np.int64), a, b, np.array([0.1, 0.02])), np.array([[0.0, 0.0, 1.0, -0.2]]), out,
+        Capsules(np.zeros(2, np.int64), a, b, np.array([0.1, 0.02])), np.array([[0.0, 0.0, 1.0, -0.2]]), out,
     )  # fmt: skip
     return bool(out[0])
 

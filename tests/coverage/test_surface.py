@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from pretouch.coverage.surface import surface_of
-from pretouch.perception.closest import ClosestArrays, closest
+from pretouch.perception.closest import closest
+from pretouch.types import no_obstacles
 from tests.coverage.made import RADIUS, arm
 
 
@@ -27,13 +28,10 @@ def test_all_points_are_on_the_outside_of_their_link(panda_model):
     assert np.linalg.norm(surface.normal, axis=1) == pytest.approx(1.0)
     for link in panda_model.parts:
         own, here = arm_of.of_links(np.array([link])), surface.only(surface.link == link)
-        count = len(here)
-        distance = np.empty(count)
-        direction = np.zeros((count, 3))
-        found = ClosestArrays(np.empty((count, 3)), np.empty(count, np.int64), direction, distance)
-        closest(own.arrays, here.point, found)
-        assert np.abs(distance).max() < 1e-9
-        np.testing.assert_allclose(direction, here.normal, atol=1e-6)
+        near = no_obstacles(len(here))._replace(point=here.point)
+        closest(own, near)
+        assert np.abs(near.body_distance).max() < 1e-9
+        np.testing.assert_allclose(near.direction, here.normal, atol=1e-6)
 
 
 def test_another_shift_gives_other_points_of_the_same_areas(panda_model):

@@ -9,7 +9,7 @@ from pretouch.coverage.params import CoverageParams
 from pretouch.coverage.workspace import postures
 from pretouch.errors import ExperimentError
 from pretouch.importing.ready import ever_apart
-from pretouch.robot.self_distance import capsule_ends, kinematics_of, self_distances
+from pretouch.robot.postures import capsule_ends, kinematics_of, self_distances
 from pretouch.sim.scene import SceneSpec, fixtures
 
 ROOM = fixtures(SceneSpec())

@@ -6,7 +6,7 @@ import json
 import numpy as np
 
 from pretouch.hardware import wire
-from pretouch.sensing.imu_scale import ACCELERATION_LSB, ANGULAR_RATE_LSB, STANDARD_GRAVITY
+from pretouch.sensing.unit import ACCELERATION_LSB, ANGULAR_RATE_LSB, STANDARD_GRAVITY
 from pretouch.types import RangeStatus
 from tests.firmware.harness import Run
 

@@ -26,8 +26,7 @@ from pretouch.profiles import profile
 from pretouch.recording.reader import open_recording
 from pretouch.recording.skin_reader import read_skin
 from pretouch.recording.skin_recording import SkinRecording
-from pretouch.robot.description import panda
-from pretouch.robot.description_file import description_text, load_description
+from pretouch.robot.description import description_text, load_description, panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import load_skin, paper_skin, skin_file
 from pretouch.session.residual_file import Residual, load_residual, save_residual

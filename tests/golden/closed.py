@@ -14,7 +14,7 @@ from pretouch.controller import Controller
 from pretouch.loop import Cycle, run
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import profile
-from pretouch.robot.ik import brought_to
+from pretouch.robot.postures import brought_to
 from pretouch.sensing.skin import Skin
 from pretouch.sim.hand import Hand
 from pretouch.sim.paper_scenes import Placement, dynamic_pushes, person_scene, static_path, static_scene

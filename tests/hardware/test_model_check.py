@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pretouch.hardware.model_check import ModelCheck, ModelCheckParams
-from pretouch.perception.obstacles import sensor_poses
+from pretouch.perception.obstacles import placed_sensors
 from pretouch.perception.scene_filter import Fixtures, no_fixtures
 from pretouch.sensing.skin import Skin
 from pretouch.sim.plant import Plant
@@ -32,7 +32,7 @@ def wall(panda_model, paper_skin, q):
 
 
 def wall_before(model, skin, q, distance):
-    position, rotation = sensor_poses(skin, model.kinematics(q))
+    position, rotation, _ = placed_sensors(skin.arrays, model.kinematics(q))
     beam = rotation[UNIT][:, 2]
     return Fixtures(np.array([[*-beam, -beam @ (position[UNIT] + distance * beam)]]), no_fixtures().capsules)
 

@@ -28,7 +28,7 @@ class Moving:
             for start, duration, link, force in pushes:
                 if start <= t[i] < start + duration:
                     k = model.link_index(link)
-                    point = kin.position[k] + kin.rotation[k] @ model.com[k]
+                    point = kin.position[k] + kin.rotation[k] @ model.mechanism.links.com[k]
                     self.external[i] += model.jacobian(kin, k, point)[:3].T @ np.array(force)
             mass, bias = model.mass_matrix_and_bias(q, qd, np.empty(n))
             load = payload * model.ee_jacobian(kin)[:3].T @ np.array([0.0, 0.0, 9.81])

@@ -6,7 +6,7 @@ from pretouch.coverage.measure import Setting
 from pretouch.coverage.params import CoverageParams
 from pretouch.coverage.suggest import suggest
 from pretouch.perception.scene_filter import floor_and_pedestal
-from pretouch.robot.description_file import load_description
+from pretouch.robot.description import load_description
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import OWN_SKIN, Skin, save_skin
 

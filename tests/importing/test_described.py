@@ -9,7 +9,7 @@ from tests.importing.made import six_axis, written
 from pretouch.cli import main
 from pretouch.errors import RobotModelError
 from pretouch.importing.described import described, is_description
-from pretouch.robot.description_file import robot_named
+from pretouch.robot.description import robot_named
 
 
 @pytest.fixture

@@ -12,9 +12,9 @@ from pretouch.errors import RobotModelError
 from pretouch.importing.folder import write_folder
 from pretouch.importing.read import read_robot
 from pretouch.importing.robot_import import ImportOptions, import_robot
-from pretouch.robot.description_file import load_description
+from pretouch.robot.description import load_description
 from pretouch.robot.model import RobotModel
-from pretouch.robot.self_distance import capsule_ends, kinematics_of, self_distances
+from pretouch.robot.postures import capsule_ends, kinematics_of, self_distances
 
 READY = (0.0, 0.3, 1.2, 0.0, 1.6, 0.0)
 BARE = six_axis().replace(BOX, "<geometry/>", 5)
@@ -217,8 +217,8 @@ def test_links_without_mass_or_inertia_are_estimated_from_their_capsules(tmp_pat
     found = quickly(tmp_path, text)
     at = found.model.link_index("link3")
     assert any("estimated at 1000 kg/m^3" in r and sentence in r and "mass and inertia" in r for r in found.remarks)
-    assert found.model.mass[at] == pytest.approx(kg, rel=0.01)
-    assert found.model.inertia[at] == pytest.approx(0.4 * kg * 0.1**2 * np.eye(3), rel=0.01)
+    assert found.model.mechanism.links.mass[at] == pytest.approx(kg, rel=0.01)
+    assert found.model.mechanism.links.inertia[at] == pytest.approx(0.4 * kg * 0.1**2 * np.eye(3), rel=0.01)
 
 
 def test_fingers_are_fixed_where_they_are_nearest_to_zero_and_named(tmp_path):

@@ -5,10 +5,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from pretouch.groups import Kinematics
 from pretouch.perception.closest import closest_points
 from pretouch.robot.body import Capsules
 from pretouch.robot.description import panda
+from pretouch.robot.kinematics import Kinematics
 from pretouch.types import Obstacles
 
 ROD = (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 0.1

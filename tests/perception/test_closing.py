@@ -5,9 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pretouch.groups import Sensors
-from pretouch.perception.motion_compensation import LastSeen, closing_speeds, follow_points, motion_init, reckon
-from pretouch.sensing.sensor import PAPER_SENSOR, cones_of
+from pretouch.perception.motion_compensation import closing_speeds, follow_points, reckon
+from pretouch.perception.obstacles import track_init
+from pretouch.sensing.sensor import PAPER_SENSOR, Sensors, cones_of
+from pretouch.types import no_obstacles
 
 MEMORY, PERIOD = 0.09, 0.02
 TOWARDS_ME = np.array([0.0, 0.0, 1.0])
@@ -16,13 +17,13 @@ TOWARDS_ME = np.array([0.0, 0.0, 1.0])
 def followed(distance, stamps=None, memory=MEMORY) -> list[float]:
     """Closing speeds of one unit that looks up from the origin, after each of its readings."""
     stamps = PERIOD * np.arange(len(distance)) if stamps is None else stamps
-    motion, last, last_stamp, found = motion_init(1), np.full((1, 3), np.nan), np.array([-np.inf]), []
+    tracks, near, found = track_init(1), no_obstacles(1)._replace(direction=TOWARDS_ME[None]), []
     for t, d in zip(stamps, distance, strict=True):
-        point, stamp, out = d * TOWARDS_ME[None], np.array([t]), np.empty(1)
-        follow_points(motion, last, last_stamp, point, stamp, np.ones(1, np.bool_), memory)
-        closing_speeds(motion, np.zeros(1, np.int64), TOWARDS_ME[None], out)
-        last, last_stamp = point, stamp
-        found.append(float(out[0]))
+        point, stamp = d * TOWARDS_ME[None], np.array([t])
+        follow_points(tracks, point, stamp, np.ones(1, np.bool_), memory)
+        closing_speeds(tracks.motion, near)
+        tracks = tracks._replace(point=point, seen=stamp)
+        found.append(float(near.closing_speed[0]))
     return found
 
 
@@ -64,11 +65,10 @@ def test_after_a_silence_it_begins_anew():
 
 
 def test_readings_that_are_not_taken_change_nothing():
-    motion = motion_init(2)
-    none = np.full((2, 3), np.nan)
-    follow_points(motion, none, np.zeros(2), np.ones((2, 3)), np.ones(2), np.array([True, False]), MEMORY)
-    np.testing.assert_array_equal(motion[:, 0], [[1, 1, 1], [0, 0, 0]])
-    assert np.isnan(motion[:, 1]).all()
+    tracks = track_init(2)._replace(seen=np.zeros(2))
+    follow_points(tracks, np.ones((2, 3)), np.ones(2), np.array([True, False]), MEMORY)
+    np.testing.assert_array_equal(tracks.motion[:, 0], [[1, 1, 1], [0, 0, 0]])
+    assert np.isnan(tracks.motion[:, 1]).all()
 
 
 @given(st.lists(st.floats(0.0, 1.3), min_size=1, max_size=20), st.lists(st.floats(1e-4, 0.5), min_size=20, max_size=20))
@@ -81,12 +81,12 @@ def test_whatever_is_read_the_speed_is_one_a_hand_can_have(distance, gaps):
 def reckoned(distance: float, last: float | None, sensor: float = 0.0, velocity: float = 0.0, age: float = 0.02):
     """Height of the point of a unit at a height, looking up, that last saw something at another."""
     points = np.array([[0.0, 0.0, sensor + distance]])
-    motion = motion_init(1)
-    motion[0], motion[1] = 0.0, velocity * TOWARDS_ME
+    tracks = track_init(1)
+    tracks.motion[0], tracks.motion[1] = 0.0, velocity * TOWARDS_ME
     before = np.full((1, 3), np.nan) if last is None else last * TOWARDS_ME[None]
     stamp = np.array([-np.inf if last is None else 1.0 - age])
     reckon(
-        points, np.array([distance]), np.ones(1), LastSeen(before, stamp, motion),
+        points, np.array([distance]), np.ones(1), tracks._replace(point=before, seen=stamp),
         Sensors(sensor * TOWARDS_ME[None], np.eye(3)[None], np.zeros(1, np.int64)), cones_of([PAPER_SENSOR]), 0.18,
     )  # fmt: skip
     return float(points[0, 2] - sensor)

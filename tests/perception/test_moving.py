@@ -5,10 +5,10 @@ import pytest
 from tests.perception.watcher import PARAMS, Watcher
 from tests.sim.ranging import FORWARD, ORIGIN
 
-from pretouch.perception.moving import beside, near_moving
+from pretouch.perception.closest import beside, near_moving
 from pretouch.perception.scene_filter import floor_and_pedestal
-from pretouch.robot.self_distance import segment_distance
-from pretouch.robot.vectors import placed
+from pretouch.robot.body import placed
+from pretouch.robot.postures import segment_distance
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit
 from pretouch.sound import sound_moving
@@ -63,7 +63,7 @@ def test_of_each_link_the_nearest_place_is_an_obstacle(panda_model):
     assert found.link.tolist() == panda_model.parts.tolist()
     # it slows nothing by eq. 3
     assert np.isinf(found.ee_distance).all()
-    a, b = placed(panda_model.body, kin)
+    _, a, b, _ = placed(panda_model.body, kin)
     for k, link in enumerate(found.link):
         # the ball's distance from each capsule of the link, by its axis in ten thousand steps
         share = np.linspace(0.0, 1.0, 10_001)[:, None]
@@ -84,8 +84,8 @@ def test_of_another_arm_the_nearest_capsules_are_found(panda_model):
     b[:5] = a[:5]  # balls
     many = MovingFixtures(0.0, a, b, rng.uniform(0.02, 0.1, 30), np.zeros((30, 3)), np.zeros((30, 3)))
     found = near_moving(many, panda_model, kin, 0.0, 0)
-    own, body = placed(panda_model.body, kin), panda_model.body
-    gap = segment_distance(own[0][:, None], own[1][:, None], a[None], b[None]) - body.radius[:, None] - many.radius
+    (_, a_own, b_own, _), body = placed(panda_model.body, kin), panda_model.body
+    gap = segment_distance(a_own[:, None], b_own[:, None], a[None], b[None]) - body.radius[:, None] - many.radius
     assert found.body_distance == pytest.approx([gap[body.link == link].min() for link in panda_model.parts])
 
 

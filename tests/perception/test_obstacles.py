@@ -3,21 +3,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pretouch.groups import no_obstacles
 from pretouch.perception.obstacles import (
     TrackState,
-    is_evidence,
     locate,
-    measured_distance,
+    measured,
     newer,
+    placed_sensors,
     points_of_units,
-    sensor_poses,
     take_in,
+    tells_anything,
     track_init,
 )
 from pretouch.robot.description import panda
 from pretouch.sensing.sensor import PAPER_SENSOR, cones_of
-from pretouch.types import RangeReadings, RangeStatus
+from pretouch.types import RangeStatus, no_obstacles
 
 INF, NAN = np.inf, np.nan
 SHOWN = [RangeStatus.OK, RangeStatus.NO_WRAP_CHECK, RangeStatus.MERGED]
@@ -25,15 +24,16 @@ NEAR = [RangeStatus.MIN_RANGE, RangeStatus.MIN_CLIPPED]
 NO_TARGET = [RangeStatus.SIGNAL, RangeStatus.SIGMA, RangeStatus.OUT_OF_BOUNDS, RangeStatus.WRAPPED]
 
 
-def _reading(distance, status) -> RangeReadings:
-    return RangeReadings(np.zeros(1), np.array([distance]), np.array([int(status)]))
+def _reading(distance, status) -> tuple[np.ndarray, np.ndarray]:
+    return np.array([distance]), np.array([int(status)])
 
 
 def track(
     state: TrackState, stamps: list[float], points: np.ndarray, shows: np.ndarray, tells: np.ndarray, now: float
 ) -> TrackState:
     """The state with readings of these stamps taken in; a point is given up after 0.06 s."""
-    after, stamp = state._replace(point=state.point.copy(), times=state.times.copy()), np.array(stamps)
+    after, stamp = state._replace(point=state.point.copy(), seen=state.seen.copy()), np.array(stamps)
+    after = after._replace(used=state.used.copy(), heard=state.heard.copy())
     take_in(after, stamp, points, newer(state.used, stamp, now), shows, tells, now, 0.06)
     return after
 
@@ -56,7 +56,7 @@ def test_an_obstacle_lies_along_the_beam():
 
 def test_the_left_unit_of_the_hand_looks_left(panda_model, paper_skin):
     kin = panda_model.kinematics(panda().q_ready)
-    position, rotation = sensor_poses(paper_skin, kin)
+    position, rotation, _ = placed_sensors(paper_skin.arrays, kin)
     left = paper_skin.ids.index("hand_left")
     np.testing.assert_allclose(position[left] - kin.position[panda_model.ee], [0.0, 0.108, 0.1034 - 0.045], atol=1e-5)
     np.testing.assert_allclose(rotation[left, :, 2], [0, 1, 0], atol=1e-5)
@@ -70,7 +70,7 @@ ONE = cones_of([PAPER_SENSOR])
 @pytest.mark.parametrize("status", [s for s in [*RangeStatus, -1, 8, 300] if s not in SHOWN])
 def test_only_good_and_too_near_readings_show_a_target(status):
     for distance in (0.5, 0.0, NAN, INF, -1.0):
-        (shown,) = measured_distance(_reading(distance, status), ONE)
+        (shown,) = measured(*_reading(distance, status), ONE)
         np.testing.assert_equal(shown, 0.04 if status in NEAR else NAN)
 
 
@@ -81,7 +81,7 @@ def test_only_good_and_too_near_readings_show_a_target(status):
     + [(impossible, NAN) for impossible in (-0.01, 4.1, 65.535, 1e300, INF, NAN)],
 )
 def test_a_good_reading_is_taken_within_what_the_sensor_can_measure(distance, shown, status):
-    np.testing.assert_equal(measured_distance(_reading(distance, status), ONE), [shown])
+    np.testing.assert_equal(measured(*_reading(distance, status), ONE), [shown])
 
 
 # Which readings tell anything
@@ -89,7 +89,7 @@ def test_a_good_reading_is_taken_within_what_the_sensor_can_measure(distance, sh
 
 def _tells(status, distance) -> bool:
     readings = _reading(distance, status)
-    (tells,) = is_evidence(readings, measured_distance(readings, ONE), ONE)
+    (tells,) = tells_anything(*readings, measured(*readings, ONE), ONE)
     return bool(tells)
 
 

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.perception.watcher import FLOOR, TCP
+from tests.perception.watcher import FLOOR, TCP, readings_of
+from tests.perception.watcher import Watcher as Eyes
 
-from pretouch.groups import no_obstacles
 from pretouch.params import ClosingSpeed, OutsidePoints, PerceptionParams
 from pretouch.perception.closest import closest_points
-from pretouch.perception.outside import moving_links, outside_setup, outside_silence, see_outside
+from pretouch.perception.external_points import outside_silence
 from pretouch.perception.scene_filter import no_fixtures
+from pretouch.robot.body import placed
 from pretouch.robot.description import panda
-from pretouch.robot.vectors import placed
 from pretouch.sensing.skin import paper_skin
-from pretouch.types import RobotState, SeenPoints
+from pretouch.types import SeenPoints
 
 UNITS = 7
 PARAMS = PerceptionParams(outside=OutsidePoints())
@@ -28,21 +28,22 @@ def points_at(stamp: float, *point, sigma: float = 0.0) -> SeenPoints:
     return SeenPoints(stamp, np.full(len(at), stamp), at, np.full(len(at), sigma))
 
 
-class Watcher:
+class Watcher(Eyes):
     """Perception of outside points alone, its state carried along."""
 
     def __init__(self, model, params=PARAMS, fixtures=None):
-        self.model, self.setup = model, outside_setup(model, paper_skin(model), fixtures or no_fixtures(), params)
-        self.state, self.qd = None, np.zeros(7)
+        super().__init__(model, paper_skin(model), fixtures or no_fixtures(), params)
         self.pose(panda().q_ready)
+
+    @property
+    def heard(self):
+        return self.memory.get("outside.heard")
 
     def pose(self, q):
         self.q, self.kin = q, self.model.kinematics(q)
 
-    def see(self, now: float, points: SeenPoints | None, anew: bool = False):
-        robot = RobotState(now, self.q, self.qd, self.q, self.qd, np.zeros(7), None)
-        seen, self.state = see_outside(self.state, anew, points, self.setup, self.kin, robot, now)
-        return seen or no_obstacles()
+    def see(self, now: float, points: SeenPoints | None):
+        return self.take(readings_of(self.skin, now), now, points=points)
 
 
 @pytest.fixture
@@ -68,12 +69,12 @@ def test_a_point_is_an_obstacle_at_its_distance_less_two_sigmas(watcher):
 def test_the_places_follow_the_units_of_the_skin(watcher):
     near = watcher.see(1.0, points_at(1.0, BESIDE))
     place = near.unit[0] - UNITS
-    assert moving_links(watcher.model)[place // 2] == near.link[0]
+    assert watcher.model.parts[place // 2] == near.link[0]
 
 
 def on_the_arm(model, q, count: int = 400):
     """Points on the surface of the arm's capsules in a posture, base included."""
-    rng, (a, b) = np.random.default_rng(5), placed(model.capsules, model.kinematics(q))
+    rng, (_, a, b, _) = np.random.default_rng(5), placed(model.capsules, model.kinematics(q))
     which, along = rng.integers(0, len(a), count), rng.uniform(0, 1, count)[:, None]
     out = rng.standard_normal((count, 3))
     out /= np.linalg.norm(out, axis=1)[:, None]
@@ -135,14 +136,14 @@ def test_of_any_points_the_nearest_of_each_link_are_kept(panda_model, seed, coun
     near = watcher.see(1.0, SeenPoints(1.0, np.full(count, 1.0), points, sigma))
     aside = np.tile([0.0, 0.0, 1.0], (count, 1))
     all_of_them = closest_points(watcher.kin, panda_model.body, TCP, np.zeros(count, int), points, aside)
-    a, b = placed(panda_model.capsules, watcher.kin)
+    _, a, b, _ = placed(panda_model.capsules, watcher.kin)
     along = np.clip(
         ((points[:, None] - a) * (b - a)).sum(2) / np.maximum(((b - a) ** 2).sum(1), 1e-12), 0.0, 1.0
     )  # fmt: skip
     gap = np.linalg.norm(points[:, None] - a - along[..., None] * (b - a), axis=2) - panda_model.capsules.radius
     free = gap.min(axis=1, initial=np.inf) > POINTS.margin_m + 2 * sigma
     lower = all_of_them.body_distance - 2 * sigma
-    for link in moving_links(panda_model):
+    for link in panda_model.parts:
         mine = free & (all_of_them.link == link)
         kept = near.link == link
         assert kept.sum() <= 2
@@ -216,29 +217,28 @@ def test_the_own_speed_of_what_is_seen_is_known(panda_model, speed):
 
 def test_a_set_from_the_future_or_from_before_is_not_heard(watcher):
     assert len(watcher.see(1.0, points_at(1.5, BESIDE)).unit) == 0
-    assert watcher.state.heard == -np.inf
+    assert watcher.heard == -np.inf
     watcher.see(1.0, points_at(1.0, BESIDE))
     watcher.see(1.01, points_at(0.9))
-    assert watcher.state.heard == 1.0
+    assert watcher.heard == 1.0
 
 
-def test_time_that_goes_backwards_forgets_what_was_seen(watcher):
-    watcher.see(1.0, points_at(1.0, BESIDE))
-    assert len(watcher.see(0.5, points_at(0.5), anew=True).unit) == 0
-    assert watcher.state.heard == 0.5
+def test_before_its_first_points_no_source_was_heard(watcher):
+    assert len(watcher.see(0.5, None).unit) == 0
+    assert np.isnan(watcher.heard)
 
 
 def test_a_source_that_falls_silent_slows_the_arm_and_stops_it(watcher):
     watcher.see(1.0, points_at(1.0))
-    assert outside_silence(watcher.state, "", 1.2, POINTS) == (1.0, "")
-    factor, lost = outside_silence(watcher.state, "", 1.3, POINTS)
+    assert outside_silence(watcher.heard, "", 1.2, POINTS) == (1.0, "")
+    factor, lost = outside_silence(watcher.heard, "", 1.3, POINTS)
     assert (factor, lost) == (pytest.approx(0.5), "")
-    assert outside_silence(watcher.state, "", 1.41, POINTS) == (0.0, "has been silent for 0.41 s")
-    assert outside_silence(watcher.state, "gives nonsense", 1.0, POINTS) == (0.0, "gives nonsense")
-    assert outside_silence(watcher.state, "gives nonsense", 1.0, None) == (1.0, "")
-    assert outside_silence(None, "", 1.0, POINTS) == (1.0, "")
+    assert outside_silence(watcher.heard, "", 1.41, POINTS) == (0.0, "has been silent for 0.41 s")
+    assert outside_silence(watcher.heard, "gives nonsense", 1.0, POINTS) == (0.0, "gives nonsense")
+    assert outside_silence(watcher.heard, "gives nonsense", 1.0, None) == (1.0, "")
+    assert outside_silence(np.nan, "", 1.0, POINTS) == (1.0, "")
 
 
 def test_a_source_that_was_never_heard_is_silent(watcher):
     watcher.see(1.0, points_at(-np.inf))
-    assert outside_silence(watcher.state, "", 1.0, POINTS) == (0.0, "has not been heard yet")
+    assert outside_silence(watcher.heard, "", 1.0, POINTS) == (0.0, "has not been heard yet")

@@ -7,9 +7,8 @@ from hypothesis import strategies as st
 from tests.perception.watcher import FLOOR, HAND_LEFT, PARAMS, TCP, Watcher, readings_of
 
 from pretouch.perception.obstacles import silent_units
-from pretouch.robot.body import Capsules
+from pretouch.robot.body import Capsules, placed
 from pretouch.robot.description import panda
-from pretouch.robot.vectors import placed
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit
 from pretouch.types import RangeReadings, RangeStatus
@@ -116,7 +115,7 @@ def test_the_base_is_seen_but_never_the_part_to_move_away(watcher, distance, sho
 
 @pytest.mark.parametrize("last", [None, (0.6, 0.0, 0.8)])
 def test_on_the_axis_the_last_direction_holds_or_else_that_upwards(watcher, last):
-    a, b = placed(watcher.model.body, watcher.model.kinematics(watcher.q))
+    _, a, b, _ = placed(watcher.model.body, watcher.model.kinematics(watcher.q))
     finger = watcher.model.body.radius.argmin()
     unit = watcher.skin.ids.index("hand_left")
     watcher.state.point[unit], watcher.state.seen[unit] = (a[finger] + b[finger]) / 2, 1.0
@@ -158,7 +157,8 @@ def test_whatever_arrives_obstacles_are_whole(panda_model, paper_skin, steps):
 
 def _silent(watcher, now: float, status: RangeStatus = RangeStatus.OK) -> tuple[float, str]:
     reported = np.full(len(watcher.skin), int(status))
-    return silent_units(watcher.skin, watcher.state, reported, watcher.now.get("seen.silence"), now, PARAMS)
+    names = silent_units(watcher.skin, watcher.state.heard, reported, now, PARAMS.silent_after_s)
+    return watcher.now.get("seen.heard"), names
 
 
 def _go_on(watcher, start, duration=0.4, status=RangeStatus.OK, ahead=0.0) -> tuple[float, str]:

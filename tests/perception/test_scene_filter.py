@@ -7,13 +7,13 @@ from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 from tests.perception.watcher import FLOOR
 
-from pretouch.groups import Kinematics, Sensors
 from pretouch.perception.closest import closest_points
-from pretouch.perception.obstacles import placed_sensors, sensor_poses
+from pretouch.perception.obstacles import placed_sensors
 from pretouch.perception.scene_filter import Fixtures, expected_range, no_fixtures, ray_capsule
 from pretouch.robot.body import Capsules
 from pretouch.robot.description import panda
-from pretouch.sensing.sensor import PAPER_SENSOR, cone_rays, cones_of
+from pretouch.robot.kinematics import Kinematics
+from pretouch.sensing.sensor import PAPER_SENSOR, Sensors, cone_rays, cones_of
 
 INF = np.inf
 NOTHING = no_fixtures()
@@ -164,8 +164,10 @@ def test_the_arm_is_seen_where_mujocos_rays_meet_it(panda_model, paper_skin, muj
     for fraction in np.random.default_rng(1).uniform(size=(500, 7)):
         q = panda_model.q_min + fraction * (panda_model.q_max - panda_model.q_min)
         kin = panda_model.kinematics(q)
-        position, rotation = sensor_poses(paper_skin, kin)
-        expected = expected_range(kin, placed_sensors(paper_skin, kin), paper_skin.cones, panda_model.capsules, NOTHING)
+        position, rotation, _ = placed_sensors(paper_skin.arrays, kin)
+        expected = expected_range(
+            kin, placed_sensors(paper_skin.arrays, kin), paper_skin.cones, panda_model.capsules, NOTHING
+        )
         data.qpos[:] = q
         mujoco.mj_kinematics(model, data)
         for k, own in enumerate(paper_skin.link):

@@ -31,7 +31,9 @@ def test_units_a_little_elsewhere_do_not_take_their_own_arm_for_an_obstacle(pand
         for _ in range(50):
             q = rng.uniform(panda_model.q_min, panda_model.q_max)
             kin = panda_model.kinematics(q)
-            at = expected_range(kin, placed_sensors(truly, kin), truly.cones, panda_model.capsules, no_fixtures())
+            at = expected_range(
+                kin, placed_sensors(truly.arrays, kin), truly.cones, panda_model.capsules, no_fixtures()
+            )
             near = {u: max(d, PAPER_SENSOR.nearest_m) for u, d in zip(truly.ids, at, strict=True) if d < 0.3}
             readings += len(near)
             shown += shown_by(panda_model, believed, q, no_fixtures(), near)

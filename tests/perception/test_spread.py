@@ -9,11 +9,10 @@ from hypothesis import strategies as st
 from tests.fuzz.invariants import same
 from tests.perception.watcher import FLOOR, PARAMS, Watcher
 
-from pretouch.groups import Obstacles
 from pretouch.perception.obstacles import spread
 from pretouch.robot.description import panda
 from pretouch.sensing.skin import Skin
-from pretouch.types import RangeReadings, RangeStatus
+from pretouch.types import Obstacles, RangeReadings, RangeStatus
 
 BARE = replace(PARAMS, self_margin_m=None)
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from tests.perception.watcher import Watcher, readings_of
 
-from pretouch.groups import Chain, Sensors
 from pretouch.params import PerceptionParams
 from pretouch.perception.motion_compensation import move_back
-from pretouch.perception.obstacles import poses
+from pretouch.perception.obstacles import placed_sensors
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import PROFILES
+from pretouch.robot.kinematics import Chain
 
 LATE_S = 0.05
 QD = np.array([0.8, -0.2, 0.1, 0.3, 0.0, 0.4, 0.6])
@@ -36,8 +36,7 @@ def errors(model, skin, params: PerceptionParams, noise: float = 0.0) -> list[fl
 
 
 def placed(model, skin, q):
-    kin = model.kinematics(q)
-    return Sensors(*poses(kin.position, kin.rotation, skin.link, skin.T_link_sensor), skin.link)
+    return placed_sensors(skin.arrays, model.kinematics(q))
 
 
 def test_a_plane_stays_where_it_is_while_the_arm_turns(panda_model, paper_skin):

@@ -7,15 +7,15 @@ import numpy as np
 from pretouch.control.path import Circle
 from pretouch.controller import Controller
 from pretouch.faults import Report, put_robot
-from pretouch.groups import CapsuleArrays, Obstacles
-from pretouch.line import SEE
+from pretouch.line import SEE, line_points
 from pretouch.params import PerceptionParams
 from pretouch.perception.obstacles import TrackState
 from pretouch.perception.scene_filter import Fixtures, no_fixtures
 from pretouch.profiles import PROFILES
+from pretouch.robot.body import Capsules
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.types import RangeReadings, RangeStatus, RobotState
+from pretouch.types import Obstacles, RangeReadings, RangeStatus, RobotState, SeenPoints
 
 FLOOR = Fixtures(np.array([[0.0, 0.0, 1.0, -0.2]]), no_fixtures().capsules)
 TCP = np.array([0.30689, 0.0, 0.48688])
@@ -50,12 +50,17 @@ class Watcher:
         """State of the arm."""
         return RobotState(now, self.q, self.qd, self.q, self.qd, np.zeros(self.model.n), None)
 
-    def take(self, readings: RangeReadings, now: float, beside: CapsuleArrays | None = None) -> Obstacles:
-        """Take readings in at an instant [s]."""
+    def take(
+        self, readings: RangeReadings, now: float, beside: Capsules | None = None, points: SeenPoints | None = None
+    ) -> Obstacles:
+        """Take readings and points of outside sources in at an instant [s]."""
         self.now = self.controller.blank.copy()
         self.now.put("stamp", now)
         put_robot(self.now.part("robot", Report), self.robot(now))
         self.now.fill("readings", readings)
+        if points is not None:
+            blocks = self.controller.fixed.blocks, self.memory.blocks, self.now.blocks
+            line_points(*blocks, points, self.controller.beside)
         self.controller.take(self.memory, self.now, beside or self.controller.beside, SEE, SEE)
         return Obstacles._make(part[: self.now.get("seen.found")] for part in self.now.part("seen.near", Obstacles))
 

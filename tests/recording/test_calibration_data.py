@@ -11,7 +11,7 @@ from pretouch.loop import Cycle
 from pretouch.recording.calibration_data import read_measured
 from pretouch.recording.skin_recording import SkinRecording
 from pretouch.recording.writer import Recording
-from pretouch.sensing.imu_scale import ACCELERATION_LSB, ANGULAR_RATE_LSB
+from pretouch.sensing.unit import ACCELERATION_LSB, ANGULAR_RATE_LSB
 from tests.recording.runs import Run
 from tests.recording.test_skin_recording import BATCH, arrival, sample
 

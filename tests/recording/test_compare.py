@@ -7,11 +7,11 @@ import pytest
 
 from pretouch.controller import Controller
 from pretouch.errors import RecordingError
-from pretouch.groups import no_obstacles
 from pretouch.profiles import PROFILES, at_rate, profile
 from pretouch.recording.compare import Found, compare, matched
 from pretouch.recording.reader import open_recording
 from pretouch.recording.writer import Recording
+from pretouch.types import no_obstacles
 from tests.following_arm import Arm
 from tests.imported_data.files import pushed
 from tests.reference.contact import Touch

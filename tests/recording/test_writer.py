@@ -156,7 +156,7 @@ def test_boxes_of_the_scene_and_the_arm_are_drawn(controller, tmp_path):
     (standing,) = (m for topic, m in read if topic == "/markers/scene")
     (box,) = (m for m in standing.markers if m.ns == "box")
     assert (box.scale.x, box.pose.position.y) == (0.2, 0.3)
-    assert sum(m.ns == "arm" for m in standing.markers) == 3 * len(controller.model.capsules)
+    assert sum(m.ns == "arm" for m in standing.markers) == 3 * len(controller.model.capsules.radius)
     q = run.cycles[-1].step.q
     first = links[0].transforms[-1]
     hand = controller.model.kinematics(run.cycles[0].step.q).position[-1]

@@ -29,7 +29,7 @@ def spread(model: RobotModel, count: int, seed: int) -> Skin:
     share = body.radius * (length + 2 * body.radius)
     units: list[SensorUnit] = []
     while len(units) < count:
-        c = int(rng.choice(len(body), p=share / share.sum()))
+        c = int(rng.choice(len(body.radius), p=share / share.sum()))
         out = rng.normal(size=3)
         along, axis = rng.uniform(-body.radius[c], length[c] + body.radius[c]), (body.b[c] - body.a[c]) / length[c]
         if 0 < along < length[c]:

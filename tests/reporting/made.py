@@ -10,7 +10,7 @@ from pretouch.loop import run
 from pretouch.modes import Event
 from pretouch.profiles import profile as find_profile
 from pretouch.recording.simulation import Truth, truth_of
-from pretouch.robot.ik import brought_to
+from pretouch.robot.postures import brought_to
 from pretouch.sim.paper_scenes import static_path, static_scene
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.plant_params import PlantParams

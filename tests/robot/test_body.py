@@ -15,7 +15,7 @@ def _model(geoms: str) -> mujoco.MjModel:
 
 def test_capsules_have_the_ends_and_radius_of_the_file():
     body = capsules_of(_model('<geom type="capsule" fromto="0.3 0 0 0.3 0 -0.4" size="0.05"/>'))
-    assert len(body) == 2
+    assert len(body.radius) == 2
     np.testing.assert_array_equal(body.link, [1, 2])
     np.testing.assert_allclose(body.radius, [0.05, 0.2])
     for a, b, ends in zip(body.a, body.b, [[(0.3, 0, 0), (0.3, 0, -0.4)], [(0, 1, 0), (0, 1, 2)]], strict=True):
@@ -37,4 +37,4 @@ def test_the_body_that_moves_is_all_but_the_base(panda_model):
     base = panda_model.link_index("panda_link0")
     assert base in panda_model.capsules.link
     assert base not in panda_model.body.link
-    assert len(panda_model.body) == len(panda_model.capsules) - 3  # link0_0, link0_1, link0_2
+    assert len(panda_model.body.radius) == len(panda_model.capsules.radius) - 3  # link0_0, link0_1, link0_2

@@ -5,8 +5,7 @@ import pytest
 from tests.fuzz.invariants import same
 
 from pretouch.errors import RobotModelError
-from pretouch.robot.description import RobotDescription, fr3, panda
-from pretouch.robot.description_file import description_text, load_description
+from pretouch.robot.description import RobotDescription, description_text, fr3, load_description, panda
 
 
 def written(folder: Path, arm: RobotDescription) -> Path:
@@ -29,7 +28,7 @@ def test_a_description_is_read_back_as_it_was(tmp_path, arm):
 @pytest.mark.parametrize(
     ("before", "after", "sentence"),
     [
-        ("offset = ", "ofset = ", "the key 'ofset' is unknown: use offset, slope"),
+        ("offset = ", "ofset = ", "the key 'ofset' is unknown: use source, offset, slope"),
         ("0.3,", '"fast",', r"offset is .*: give a list of 7 finite numbers, one a joint \[rad/s\]"),
         ("12.0,\n    5.17", "-12.0,\n    5.17", r"slope is .*must be positive\. \(in "),
         ("[envelope]", "[[envelope]]", r"envelope is .*: give a table \[envelope\]"),

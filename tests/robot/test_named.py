@@ -6,8 +6,7 @@ import pytest
 from tests.other_arm import copied_panda
 
 from pretouch.errors import RobotModelError, SkinError
-from pretouch.robot.description import fr3, panda
-from pretouch.robot.description_file import is_shipped, robot_named
+from pretouch.robot.description import fr3, is_shipped, panda, robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import OWN_SKIN, PAPER_SKIN, skin_for
 

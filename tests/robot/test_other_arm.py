@@ -5,7 +5,7 @@ import pytest
 
 from pretouch.arms.other_arm import OtherArm
 from pretouch.perception.scene_filter import floor_and_pedestal
-from pretouch.robot.vectors import placed
+from pretouch.robot.body import placed
 from pretouch.sound import sound_moving
 from pretouch.types import RobotState
 
@@ -25,8 +25,8 @@ def test_its_capsules_stand_in_the_frame_of_the_arm_beside_it(panda_model):
     q = panda_model.description.q_ready
     pedestal = floor_and_pedestal(-0.2).capsules
     told = OtherArm(panda_model, T, lambda: state(q, np.zeros(7)), pedestal)()
-    a, _ = placed(panda_model.capsules, panda_model.kinematics(q))
-    count = len(panda_model.capsules)
+    _, a, _, _ = placed(panda_model.capsules, panda_model.kinematics(q))
+    count = len(panda_model.capsules.radius)
     assert told.stamp == 2.0
     assert told.a[:count] == pytest.approx(a * [-1.0, -1.0, 1.0] + [1.2, 0.3, 0.1])
     # the pedestal, from the floor to its rounded top

@@ -8,7 +8,7 @@ from scipy.stats import qmc
 
 from pretouch.robot.description import RobotDescription, fr3, panda
 from pretouch.robot.model import RobotModel
-from pretouch.robot.self_distance import capsule_ends, kinematics_of, segment_distance, self_distances
+from pretouch.robot.postures import capsule_ends, kinematics_of, segment_distance, self_distances
 
 ARMS = [panda(), fr3()]
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pretouch.errors import ParameterError, SkinError
-from pretouch.perception.obstacles import measured_distance, placed_sensors
+from pretouch.perception.obstacles import measured, placed_sensors
 from pretouch.perception.scene_filter import Fixtures, expected_range
 from pretouch.robot.body import no_capsules
 from pretouch.sensing.sensor import PAPER_SENSOR, VL53L5CX, VL53L7CX, Sensor, cones_of
@@ -61,7 +61,7 @@ def test_a_unit_has_the_papers_sensor_unless_its_file_says_otherwise(panda_model
 def test_a_wider_cone_meets_what_a_narrow_one_misses(panda_model, tmp_path):
     skin = skin_of(tmp_path, panda_model, WIDE + UNIT.format(id="a", z=0.045) + 'sensor = "wide"\n')
     kin = panda_model.kinematics(panda_model.description.q_ready)
-    sensors = placed_sensors(skin, kin)
+    sensors = placed_sensors(skin.arrays, kin)
     p, R = sensors.position[0], sensors.rotation[0]
     # a wall along the beam, 0.1 m beside it: the edge of a cone of 60 degrees meets it at 0.1 m / sin 30, that of 27 at
     # 0.1 m / sin 13.5; a ray of the rings lies up to 15 degrees beside that edge
@@ -75,9 +75,9 @@ def test_a_reading_counts_within_what_its_own_sensor_measures():
     cones = cones_of([PAPER_SENSOR, Whistle()])
     for distance, shown in ((0.1, (0.1, 0.2)), (5.0, (np.nan, 5.0)), (7.0, (np.nan, np.nan))):
         readings = RangeReadings(np.zeros(2), np.full(2, distance), np.full(2, int(RangeStatus.OK)))
-        np.testing.assert_equal(measured_distance(readings, cones), shown)
+        np.testing.assert_equal(measured(readings.distance, readings.status, cones), shown)
     near = RangeReadings(np.zeros(2), np.zeros(2), np.full(2, int(RangeStatus.MIN_RANGE)))
-    np.testing.assert_equal(measured_distance(near, cones), (0.04, 0.2))
+    np.testing.assert_equal(measured(near.distance, near.status, cones), (0.04, 0.2))
 
 
 @pytest.mark.parametrize(

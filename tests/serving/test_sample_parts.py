@@ -23,7 +23,7 @@ from pretouch.hardware.wire import (
     touch_part,
     zones_size,
 )
-from pretouch.robot.ik import brought_to
+from pretouch.robot.postures import brought_to
 from pretouch.sensing.sensor import VL53L5CX
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import TouchPatch

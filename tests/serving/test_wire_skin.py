@@ -11,7 +11,7 @@ from pretouch.errors import HardwareError
 from pretouch.hardware.wire import Flag
 from pretouch.loop import turn
 from pretouch.profiles import Profile
-from pretouch.robot.ik import brought_to
+from pretouch.robot.postures import brought_to
 from pretouch.serving.fleet import Fleet, FleetParams, simulated_keys
 from pretouch.serving.network import NetworkParams, network
 from pretouch.serving.unit import UnitParams

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from pretouch.errors import ParameterError
-from pretouch.robot.ik import brought_to
 from pretouch.robot.model import RobotModel
+from pretouch.robot.postures import brought_to
 from pretouch.sim.observer import wrench_from_torques
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.plant_params import PlantParams

@@ -97,7 +97,7 @@ class Pusher:
 
 
 def test_a_hand_that_pushes_on_the_unit_is_felt_with_the_force_of_the_contact(panda_model, paper_skin):
-    skin = skin_of(paper_skin, panda_model, TouchPatch(radius=0.04))
+    skin = skin_of(paper_skin, panda_model, TouchPatch(radius_m=0.04))
     q = panda_model.description.q_ready
     kin, link = panda_model.kinematics(q), int(skin.link[UNIT])
     unit = kin.position[link] + kin.rotation[link] @ skin.T_link_sensor[UNIT, :3, 3]

@@ -13,7 +13,7 @@ from pretouch.profiles import profile
 from pretouch.sensing.sensor import VL53L5CX
 from pretouch.sensing.skin import Skin
 from pretouch.sim.scene import HandSpec
-from pretouch.types import RangeReadings, RangeStatus
+from pretouch.types import RangeStatus
 
 EIGHT = VL53L5CX(zones=8)
 
@@ -64,6 +64,5 @@ def test_a_single_cone_does_not_see_it(rig):
 
 def test_a_silent_unit_is_named_once(panda_model, paper_skin):
     skin = Skin([replace(paper_skin.units[0], sensor=VL53L5CX())], panda_model)
-    params, count = profile("pretouch").perception, len(skin)
-    readings = RangeReadings(np.full(count, -np.inf), np.zeros(count), np.full(count, int(RangeStatus.NONE)))
-    assert silent_units(skin, track_init(count), readings.status, np.inf, 1.0, params) == (0.0, "hand_left")
+    silent_after, status = profile("pretouch").perception.silent_after_s, np.full(len(skin), int(RangeStatus.NONE))
+    assert silent_units(skin, track_init(len(skin)).heard, status, 1.0, silent_after) == "hand_left"

@@ -53,7 +53,7 @@ def test_a_hand_is_never_begun_inside_the_arm_or_what_stands_around_it(panda_mod
 def test_even_from_the_middle_of_a_link_it_is_moved_no_farther_than_it_has_to(panda_model, fraction, which, along):
     q = panda_model.q_min + fraction * (panda_model.q_max - panda_model.q_min)
     kin, body = panda_model.kinematics(q), panda_model.capsules
-    c = which % len(body)
+    c = which % len(body.radius)
     place = kin.position[body.link[c]] + kin.rotation[body.link[c]] @ (body.a[c] + along * (body.b[c] - body.a[c]))
     found = clear_place(panda_model, q, SceneSpec(hand=HAND), place, ROOM)
     assert gap_to_arm(panda_model, q, found) >= ROOM - 1e-3

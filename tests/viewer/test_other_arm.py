@@ -9,8 +9,7 @@ from pretouch.control.path import Circle
 from pretouch.importing.folder import write_folder
 from pretouch.importing.robot_import import ImportOptions, import_robot
 from pretouch.profiles import profile
-from pretouch.robot.description import fr3
-from pretouch.robot.description_file import robot_named
+from pretouch.robot.description import fr3, robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import LIVE_SKIN, load_skin, skin_for
 from pretouch.sim.plant_params import plant_params_of

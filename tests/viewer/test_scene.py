@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from tests.viewer.fake_scene import FakeScene, Node
 
-from pretouch.groups import no_obstacles
 from pretouch.profiles import PROFILES
-from pretouch.types import NOT_TOUCHED, ControlStep, Mode, Obstacles, Touched
+from pretouch.types import NOT_TOUCHED, ControlStep, Mode, Obstacles, Touched, no_obstacles
 from pretouch.viewer import palette
 from pretouch.viewer.frame import Frame, World
 from pretouch.viewer.scene import ARROW_MOST_M, PARTS, Scene

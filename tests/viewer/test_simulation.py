@@ -13,7 +13,7 @@ from pretouch.controller import Controller
 from pretouch.errors import ParameterError
 from pretouch.loop import run
 from pretouch.profiles import at_rate, profile
-from pretouch.robot.ik import brought_to
+from pretouch.robot.postures import brought_to
 from pretouch.sim.hand import Hand, PersonArm
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.plant_params import PlantParams
@@ -115,7 +115,7 @@ def test_a_target_inside_the_arm_neither_jumps_nor_crushes(live, seed):
     session.advance(ARMED_S)
     body = session.model.body
     for _ in range(40):
-        kin, c = session.model.kinematics(session.frame.step.q), rng.integers(len(body))
+        kin, c = session.model.kinematics(session.frame.step.q), rng.integers(len(body.radius))
         middle = (body.a[c] + body.b[c]) / 2
         session.move_hand(kin.position[body.link[c]] + kin.rotation[body.link[c]] @ middle)
         session.advance(0.5)

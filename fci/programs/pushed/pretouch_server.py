@@ -4,7 +4,7 @@ import threading
 
 from asked import LinkPush, obey
 
-from pretouch.robot.description_file import robot_named
+from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.sim.scene import SceneSpec
 from pretouch_fci.arm import ArmSetup, ServedArm

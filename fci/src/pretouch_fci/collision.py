@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 
 from pretouch.robot.model import RobotModel
-from pretouch.robot.self_distance import capsule_ends, kinematics_of, self_distances
+from pretouch.robot.postures import capsule_ends, kinematics_of, self_distances
 from pretouch.types import BoolArray, FloatArray
 from pretouch_fci.wire import JOINTS
 

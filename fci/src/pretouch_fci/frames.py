@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import mujoco
 import numpy as np
 
-from pretouch.groups import Kinematics
+from pretouch.robot.kinematics import Kinematics
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray
 

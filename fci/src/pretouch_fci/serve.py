@@ -16,9 +16,9 @@ from pretouch.control.path import Circle
 from pretouch.control.path import Path as ArmPath
 from pretouch.errors import HardwareError, ParameterError
 from pretouch.hardware.keys import load_keys
-from pretouch.robot.description_file import robot_named
-from pretouch.robot.ik import brought_to
+from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
+from pretouch.robot.postures import brought_to
 from pretouch.sensing.skin import skin_for
 from pretouch.serving.simulate import VisitingHand
 from pretouch.signals import ended

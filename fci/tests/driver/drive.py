@@ -15,7 +15,7 @@ from pretouch.hardware.franka.limits import LimiterParams, motion_limits
 from pretouch.hardware.franka.state import FrankaState
 from pretouch.hardware.franka.vendor import VendorClient
 from pretouch.profiles import profile
-from pretouch.robot.description_file import robot_named
+from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray
 

@@ -19,7 +19,7 @@ from pretouch.hardware.franka.arm import FrankaArm
 from pretouch.hardware.franka.collision import collision_behavior
 from pretouch.hardware.franka.limits import FrankaParams
 from pretouch.profiles import profile
-from pretouch.robot.description_file import robot_named
+from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.signals import OF_TERMINAL
 

@@ -6,7 +6,7 @@ import pytest
 from pretouch.hardware.franka.limiter import SetPointLimiter
 from pretouch.hardware.franka.limits import LimiterParams, motion_limits
 from pretouch.hardware.franka.state import FrankaState
-from pretouch.robot.description_file import robot_named
+from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch_fci.kinds import JointVelocity
 from pretouch_fci.limits import motion_limits as served_limits

@@ -10,7 +10,7 @@ from typing import Literal, get_args
 from pretouch.atomic_write import write_json
 from pretouch.errors import ExperimentError, SkinError
 from pretouch.profiles import profile
-from pretouch.robot.description_file import files_digest, robot_named
+from pretouch.robot.description import files_digest, robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import skin_file, skin_for
 from pretouch.sim.placement import placement_for

@@ -2,8 +2,8 @@
 
 from pretouch.contact.detector import Body, Detection, Sample
 from pretouch.contact.window import add_force, window_init
-from pretouch.groups import Kinematics
 from pretouch.profiles import Profile
+from pretouch.robot.kinematics import Kinematics
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import Obstacles, RobotState, TouchReadings

@@ -19,8 +19,8 @@ from pretouch.recording.reader import Recorded, open_recording
 from pretouch.recording.run_record import RunRecord, TrueForces, columns_of, contacts_of
 from pretouch.recording.simulation import Truth, truth_of
 from pretouch.recording.writer import Recording
-from pretouch.robot.ik import brought_to
 from pretouch.robot.model import RobotModel
+from pretouch.robot.postures import brought_to
 from pretouch.sensing.skin import Skin
 from pretouch.sim.hand import Hand, HandScript, PersonArm
 from pretouch.sim.plant import TOUCH_N, Plant, PlantClock, Touch

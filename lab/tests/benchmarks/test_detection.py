@@ -11,16 +11,15 @@ from pretouch.contact.detector import Detection
 from pretouch.contact.reaction import reaction_velocity
 from pretouch.control.path import Circle
 from pretouch.controller import Controller
-from pretouch.groups import no_obstacles
 from pretouch.loop import run
 from pretouch.profiles import profile
-from pretouch.robot.ik import brought_to
+from pretouch.robot.postures import brought_to
 from pretouch.sensing.skin import paper_skin
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import GhostSpec, SceneSpec, fixtures
-from pretouch.types import Contact, RobotState, Thresholds
+from pretouch.types import Contact, RobotState, Thresholds, no_obstacles
 from pretouch_lab.baselines.detection import BASELINES, Baseline, ablated
 from pretouch_lab.benchmarks.bench import EMPTY
 from pretouch_lab.benchmarks.detection import campaign, contacts, free, judge

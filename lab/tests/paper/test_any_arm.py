@@ -12,10 +12,9 @@ from pretouch.errors import ExperimentError
 from pretouch.importing.folder import write_folder
 from pretouch.importing.robot_import import ImportOptions, import_robot
 from pretouch.profiles import profile
-from pretouch.robot.description import RobotDescription, panda
-from pretouch.robot.description_file import robot_named
-from pretouch.robot.ik import brought_to
+from pretouch.robot.description import RobotDescription, panda, robot_named
 from pretouch.robot.model import RobotModel
+from pretouch.robot.postures import brought_to
 from pretouch.sim.placement import placement_for
 from pretouch.sim.plant_params import assumed_plant
 from pretouch.sim.pushes import PALM, robot_hand

@@ -8,12 +8,12 @@ import pytest
 from lab.tests.width import width
 from scipy.spatial.transform import Rotation
 
-from pretouch.groups import no_obstacles
 from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify
 from pretouch.robot.description import panda
 from pretouch.sim.random_skin import Misplacement, misplaced
 from pretouch.sim.scene import Box, SceneSpec
+from pretouch.types import no_obstacles
 from pretouch_lab.cell import Cell, Grid
 from pretouch_lab.studies import mounting
 from pretouch_lab.studies.mounting import EXACT, FORCES, NAME, ROOM, summarise, tables

@@ -5,9 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pretouch.groups import no_obstacles
 from pretouch.profiles import profile
-from pretouch.types import MovingFixtures
+from pretouch.types import MovingFixtures, no_obstacles
 from pretouch_lab.studies import two_arms
 from pretouch_lab.studies.two_arms_trial import BACK, Visits, play, visits, way
 

@@ -4,10 +4,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pretouch.groups import Kinematics
-from pretouch.robot.body import Capsules, no_capsules
+from pretouch.robot.body import Capsules, no_capsules, placed
+from pretouch.robot.kinematics import Kinematics
 from pretouch.robot.model import RobotModel
-from pretouch.robot.vectors import placed
 from pretouch.types import SOMEWHERE, FloatArray, IntArray, MovingFixtures, RobotState
 
 
@@ -39,9 +38,9 @@ class OtherArm:
         """Return where it is in a state of its own."""
         model, still = self._model, self._standing
         kin, R, t = model.kinematics(state.q), self._T[:3, :3], self._T[:3, 3]
-        (a, b), link = placed(model.capsules, kin), model.capsules.link
+        link, a, b, _ = placed(model.capsules, kin)
         speeds = (velocities(model, kin, state.qd, link, end) @ R.T for end in (a, b))
-        rest = np.zeros((len(still), 3))
+        rest = np.zeros((len(still.radius), 3))
         va, vb = (np.concatenate([speed, rest]) for speed in speeds)
         return MovingFixtures(
             state.stamp, np.concatenate([a, still.a]) @ R.T + t, np.concatenate([b, still.b]) @ R.T + t,

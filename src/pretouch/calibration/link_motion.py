@@ -1,6 +1,5 @@
 """How each link moved: what an IMU at its origin, with its axes, would have measured."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -8,7 +7,6 @@ import numpy as np
 
 from pretouch.calibration.params import CalibrationParams
 from pretouch.calibration.signals import HALF_S, gaps, outside, rate_of_change, smooth, times
-from pretouch.robot.kinematics import chain_motion, lever_acceleration
 from pretouch.robot.model import RobotModel
 from pretouch.traces import JointTrace
 from pretouch.types import BoolArray, FloatArray
@@ -66,8 +64,9 @@ class ArmMotion:
         postures = [model.kinematics(row) for row in self.q]
         self._position = np.array([k.position for k in postures])
         self._rotation = np.array([k.rotation for k in postures])
-        motions = [chain_motion(k.anchor, k.axis, *row) for k, *row in zip(postures, self.qd, self._qdd, strict=True)]
-        self._chain = tuple(np.array(part).reshape(len(self.q), model.n + 1, 3) for part in _turned(motions))
+        anchor = np.array([k.anchor for k in postures]).reshape(-1, model.n, 3)
+        axis = np.array([k.axis for k in postures]).reshape(-1, model.n, 3)
+        self._chain = chain_motion(anchor, axis, self.qd, self._qdd)
         """Of what moves with the first 0, 1, ... n joints: what `chain_motion` returns, (N, n + 1, 3) each."""
         self._links: dict[int, LinkMotion] = {}
 
@@ -77,13 +76,35 @@ class ArmMotion:
             joints = int(self.model.moved_by[index].sum())
             w, alpha, a, point = (part[:, joints] for part in self._chain)
             arm = self._position[:, index] - point
-            a = a + np.array([lever_acceleration(*row) for row in zip(w, alpha, arm, strict=True)]).reshape(-1, 3)
+            a = a + lever_acceleration(w, alpha, arm)
             R = self._rotation[:, index].swapaxes(1, 2)
             w, a, alpha = (np.einsum("nij,nj->ni", R, v) for v in (w, a, alpha))
             self._links[index] = LinkMotion(w, a, R, alpha)
         return self._links[index]
 
 
-def _turned(motions: Sequence[tuple[FloatArray, ...]]) -> list[list[FloatArray]]:
-    """Return each part of all motions in place of all parts of each."""
-    return [[motion[part] for motion in motions] for part in range(4)]
+def chain_motion(
+    anchor: FloatArray, axis: FloatArray, qd: FloatArray, qdd: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Motion, base frame, of what moves with the first 0, 1, ... n joints, at each of N instants: (N, n + 1, 3) each.
+
+    Angular velocity [rad/s], angular acceleration [rad/s^2], acceleration of a point [m/s^2], and that point [m]. The
+    first two arguments (N, n, 3) are those of `Kinematics`; joint velocities [rad/s] and accelerations [rad/s^2] are
+    (N, n).
+    """
+    w, alpha, a, point = np.zeros((4, len(qd), qd.shape[1] + 1, 3))
+    for j in range(qd.shape[1]):
+        a[:, j + 1] = a[:, j] + lever_acceleration(w[:, j], alpha[:, j], anchor[:, j] - point[:, j])
+        point[:, j + 1] = anchor[:, j]
+        turn = axis[:, j] * qd[:, j, None]
+        alpha[:, j + 1] = alpha[:, j] + np.cross(w[:, j], turn) + axis[:, j] * qdd[:, j, None]
+        w[:, j + 1] = w[:, j] + turn
+    return w, alpha, a, point
+
+
+def lever_acceleration(w: FloatArray, alpha: FloatArray, r: FloatArray) -> FloatArray:
+    """Acceleration (..., 3) [m/s^2] of one point of a body relative to another that is r (..., 3) [m] before it.
+
+    `w` (..., 3) is the body's angular velocity [rad/s], `alpha` (..., 3) its angular acceleration [rad/s^2].
+    """
+    return np.asarray(np.cross(alpha, r) + np.cross(w, np.cross(w, r)))

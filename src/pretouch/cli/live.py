@@ -33,7 +33,7 @@ def live(command: "Live") -> None:
     settings = LiveSettings(profile=profile, path=path, seed=command.seed)
 
     from pretouch.cli.warm_up import prepare
-    from pretouch.robot.description_file import robot_named
+    from pretouch.robot.description import robot_named
     from pretouch.robot.model import RobotModel
     from pretouch.sim.placement import assumptions
     from pretouch.viewer.live import serve_live
@@ -65,7 +65,7 @@ def live(command: "Live") -> None:
 
 def _skin(command: "Live", model: "RobotModel") -> "Skin":
     """Return the skin that was asked for, or else the live page's for a Panda or FR3, or the one the arm has."""
-    from pretouch.robot.description_file import is_shipped
+    from pretouch.robot.description import is_shipped
     from pretouch.sensing.skin import LIVE_SKIN, skin_for
 
     arm = model.description

@@ -9,7 +9,7 @@ from pretouch.cli.tables import show
 from pretouch.cli.writing import numbers_to
 from pretouch.errors import RobotModelError
 from pretouch.importing.ready import Ready, check_posture, never_apart, rated
-from pretouch.robot.description_file import FILE, load_description
+from pretouch.robot.description import FILE, load_description
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import OWN_SKIN, load_skin
 from pretouch.text_table import TextTable, tabulated
@@ -38,8 +38,8 @@ def _checked(command: "Check") -> dict[str, Any]:
     skin = load_skin(command.skin or own, model) if command.skin or own.exists() else None
     together = ", ".join(f"{a} and {b}" for a, b in never_apart(model)) or "none"
     note = (
-        f"{len(model.capsules)} capsules, {len(model.body)} of them on moving links. {ready_said(ready)} Units:"
-        f" {', '.join(skin.ids) if skin else 'no skin file'}. Pairs of links that always touch, so they are not"
+        f"{len(model.capsules.radius)} capsules, {len(model.body.radius)} of them on moving links. {ready_said(ready)}"
+        f" Units: {', '.join(skin.ids) if skin else 'no skin file'}. Pairs of links that always touch, so they are not"
         f" checked: {together}."
     )
     console = Console(highlight=False)
@@ -58,7 +58,7 @@ def arm_numbers(model: RobotModel, ready: Ready) -> dict[str, Any]:
         "acceleration_rad_s2": arm.qdd_max, "torque_nm": arm.tau_max, "ready_rad": ready.q,
     }  # fmt: skip
     return {
-        "name": arm.name, "end_effector": arm.ee_body, "capsules": len(model.capsules),
+        "name": arm.name, "end_effector": arm.ee_body, "capsules": len(model.capsules.radius),
         "joints": [
             {"name": name, **{key: values[j] for key, values in limits.items()}} for j, name in enumerate(model.joints)
         ],

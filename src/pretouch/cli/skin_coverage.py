@@ -17,7 +17,7 @@ from pretouch.coverage.ways import Ways, seen_by
 from pretouch.errors import ExperimentError, ParameterError, SkinError
 from pretouch.extras import FIGURES
 from pretouch.perception.scene_filter import floor_and_pedestal
-from pretouch.robot.description_file import robot_named
+from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.sensor import sensor_called
 from pretouch.sensing.skin import Skin, load_skin, save_skin, skin_file

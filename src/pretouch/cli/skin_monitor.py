@@ -28,7 +28,7 @@ from pretouch.hardware.receiver import SkinReceiver
 from pretouch.hardware.udp import EVERYWHERE, HOST
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.recording.skin_recording import SkinRecording
-from pretouch.robot.description_file import robot_named
+from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import load_skin
 from pretouch.sensing.unit import NetworkUnits

@@ -8,7 +8,7 @@ from pretouch.cli.skin_keys import keys_file, keys_or_none, with_new
 from pretouch.cli.words import words
 from pretouch.hardware.keys import Keys, save_keys
 from pretouch.profiles import profile as find_profile
-from pretouch.robot.description_file import robot_named
+from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, skin_for
 from pretouch.serving.fleet import FleetParams

@@ -16,7 +16,6 @@ from pretouch.contact.detector import Sample
 from pretouch.contact.window import Window
 from pretouch.control.path import Circle
 from pretouch.controller import Controller
-from pretouch.groups import Obstacles
 from pretouch.line import line, move, see
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import Profile, profile
@@ -25,7 +24,7 @@ from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin
 from pretouch.signals import OF_TERMINAL, kept_from_children
-from pretouch.types import RobotState
+from pretouch.types import Obstacles, RobotState
 
 _PUSH_NM = 30.0
 """At each joint: a contact for any detector that goes by torques."""

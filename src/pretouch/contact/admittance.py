@@ -40,11 +40,11 @@ from pretouch.contact.virtual_mass import (
     within_reach,
     yield_to,
 )
-from pretouch.groups import Kinematics
 from pretouch.modes import Event, ModeState
 from pretouch.params import AdmittanceParams, ClampParams
 from pretouch.records import Flat
-from pretouch.robot.vectors import below, placed
+from pretouch.robot.body import placed
+from pretouch.robot.kinematics import Kinematics, below
 from pretouch.types import FloatArray, Mode
 from pretouch.values import value
 
@@ -276,7 +276,7 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
 
 def _axes(body: Body, kin: Kinematics) -> Axes:
     """Return the axes of the body in a posture."""
-    return kin, body.model.moved_by, body.model.body.arrays
+    return kin, body.model.moved_by, body.model.body
 
 
 def _residual(mass: VirtualMass, inputs: ReactionInputs) -> FloatArray:

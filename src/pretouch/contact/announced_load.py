@@ -10,8 +10,8 @@ from dataclasses import replace
 import numpy as np
 
 from pretouch.contact.residual_model import ResidualModel
-from pretouch.groups import Kinematics
 from pretouch.params import SequentialParams
+from pretouch.robot.kinematics import Kinematics
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray, Payload, RobotState
 from pretouch.values import value

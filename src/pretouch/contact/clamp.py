@@ -12,12 +12,11 @@ import numpy as np
 
 from pretouch.compiled import compiled
 from pretouch.contact.detector import Body
-from pretouch.groups import Kinematics
 from pretouch.params import ClampParams, PinchParams
-from pretouch.params.paper import ClampParams, PinchParams
+from pretouch.robot.body import placed
+from pretouch.robot.kinematics import Kinematics, below
 from pretouch.robot.model import RobotModel
-from pretouch.robot.self_distance import nearest_points
-from pretouch.robot.vectors import below, placed
+from pretouch.robot.postures import nearest_points
 from pretouch.types import FloatArray, Touched
 from pretouch.values import value
 
@@ -198,7 +197,7 @@ def find_self_clamp(
         p: parameters.
     """
     body, (first, second) = model.capsules, model.apart.T
-    a, b = placed(body, kin)
+    _, a, b, _ = placed(body, kin)
     p1, p2 = nearest_points(a[first], b[first], a[second], b[second])
     between = p2 - p1
     length = np.sqrt((between**2).sum(axis=1))
@@ -254,7 +253,7 @@ def presses_on_fixture(body: Body, kin: Kinematics, touched: Touched, qd: FloatA
     if size < p.force_n or closing < _CLOSING_M_S * size:
         return False
     gap, away = planes[:, :3] @ point - planes[:, 3], planes[:, :3]
-    if len(standing):
+    if len(standing.radius):
         # distance of the point from each axis: a segment of no length
         there = np.broadcast_to(point, standing.a.shape)
         foot, _ = nearest_points(standing.a, standing.b, there, there)

@@ -9,10 +9,9 @@ import numpy as np
 from pretouch.composition import Part
 from pretouch.contact.residual_model import ResidualModel
 from pretouch.contact.window import Window
-from pretouch.groups import Kinematics
 from pretouch.robot.body import Capsules, no_capsules
+from pretouch.robot.kinematics import Kinematics, below
 from pretouch.robot.model import RobotModel
-from pretouch.robot.vectors import below
 from pretouch.sensing.skin import Skin
 from pretouch.types import (
     NOT_TOUCHED,

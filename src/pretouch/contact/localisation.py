@@ -17,10 +17,10 @@ from pretouch.contact.posterior import Candidates, log_posterior, log_prior, sum
 from pretouch.contact.scatter import LENGTHS
 from pretouch.contact.sequential_step import SampleTest
 from pretouch.contact.touch_cue import Cues
-from pretouch.groups import CapsuleArrays, Kinematics, Obstacles, SurfaceArrays
 from pretouch.params import LocalisationParams
-from pretouch.robot.vectors import placed_capsules, rotate
-from pretouch.types import NOT_TOUCHED, BoolArray, FloatArray, IntArray, Touched
+from pretouch.robot.body import Capsules, Surface, placed
+from pretouch.robot.kinematics import Kinematics, rotate
+from pretouch.types import NOT_TOUCHED, BoolArray, FloatArray, IntArray, Obstacles, Touched
 from pretouch.values import value
 
 
@@ -124,7 +124,7 @@ def localise(
         return replace(state, since=since)
     s = model.surface
     # the state is a value: what is written to is copied
-    average = np.zeros(len(s)) if state.steps == 0 else state.ln.copy()
+    average = np.zeros(len(s.link)) if state.steps == 0 else state.ln.copy()
     touched = Touched(np.empty(1, np.int64), np.empty((1, 3)), np.empty((1, 3)), np.empty(1), np.empty(1))
     fading = math.exp(-max(since, body.period) / p.memory_s) if p.memory_s > 0.0 else 0.0
     # samples since half of whose time, on average, the posture has changed by `relative` [rad] at most: by so much a
@@ -133,7 +133,7 @@ def localise(
     if fastest * steady * body.period > 2.0 * p.relative:
         steady = int(2.0 * p.relative / (fastest * body.period)) + 1
     weight = _infer(
-        sample.kin, (model.moved_by, model.rigid, s.arrays, model.capsules.arrays),
+        sample.kin, (model.moved_by, model.rigid, s, model.capsules),
         tested._replace(samples=np.array([steady])), sample.obstacles, cues, p.numbers,
         (average, fading * state.weight, _independent_part(body.period, p)), touched,
     )  # fmt: skip
@@ -141,7 +141,7 @@ def localise(
 
 
 @kernel
-def candidate_poses(kin: Kinematics, surface: SurfaceArrays, point: FloatArray, normal: FloatArray) -> None:
+def candidate_poses(kin: Kinematics, surface: Surface, point: FloatArray, normal: FloatArray) -> None:
     """Write points [m] and outward normals (N, 3) of the surface in the base frame."""
     for c in range(len(surface.link)):
         k = surface.link[c]
@@ -153,7 +153,7 @@ def candidate_poses(kin: Kinematics, surface: SurfaceArrays, point: FloatArray, 
 
 @kernel
 def hidden_candidates(
-    point: FloatArray, body: IntArray, capsules: CapsuleArrays, capsule_body: IntArray, hidden: BoolArray
+    point: FloatArray, body: IntArray, capsules: Capsules, capsule_body: IntArray, hidden: BoolArray
 ) -> None:
     """Write whether each point (N, 3) lies inside a capsule of another rigid body, so that nothing can touch it.
 
@@ -178,7 +178,7 @@ def hidden_candidates(
 
 @entry
 def _infer(
-    kin: Kinematics, body: tuple[BoolArray, IntArray, SurfaceArrays, CapsuleArrays], tested: SampleTest,
+    kin: Kinematics, body: tuple[BoolArray, IntArray, Surface, Capsules], tested: SampleTest,
     seen: Obstacles, cues: Cues, p: LocalisationParams, so_far: tuple[FloatArray, float, float], contact: Touched,
 ) -> float:  # fmt: skip
     """Write average and contact; return the weight of the average, -1 where nothing stands out.
@@ -197,7 +197,7 @@ def _infer(
     n, count = len(kin.anchor), len(surface.link)
     point, normal, hidden = np.empty((count, 3)), np.empty((count, 3)), np.empty(count, np.bool_)
     candidate_poses(kin, surface, point, normal)
-    hidden_candidates(point, surface.body, placed_capsules(capsules, kin), rigid[capsules.link], hidden)
+    hidden_candidates(point, surface.body, placed(capsules, kin), rigid[capsules.link], hidden)
     prior = np.empty(count)
     log_prior(point, surface, hidden, seen, cues, p, prior)
 

@@ -18,11 +18,10 @@ import numpy as np
 from pretouch.cholesky import factor, forward, largest_eigenvalue
 from pretouch.compiled import kernel
 from pretouch.contact.touch_cue import Cues
-from pretouch.groups import Kinematics, Obstacles, SurfaceArrays
 from pretouch.params import LocalisationParams
-from pretouch.robot.body import SPACING_M
-from pretouch.robot.kinematics import jacobian_into
-from pretouch.types import BoolArray, FloatArray, Touched
+from pretouch.robot.body import SPACING_M, Surface
+from pretouch.robot.kinematics import Kinematics, jacobian_into
+from pretouch.types import BoolArray, FloatArray, Obstacles, Touched
 
 _NEVER = 1e-12
 """Prior of what cannot be: its logarithm stays finite."""
@@ -30,7 +29,7 @@ _NEVER = 1e-12
 
 @kernel
 def log_prior(
-    point: FloatArray, surface: SurfaceArrays, hidden: BoolArray, seen: Obstacles, cues: Cues,
+    point: FloatArray, surface: Surface, hidden: BoolArray, seen: Obstacles, cues: Cues,
     p: LocalisationParams, ln: FloatArray,
 ) -> None:  # fmt: skip
     """Write ln of the prior (N,) of a contact at each candidate; all candidates together have probability 1.
@@ -76,7 +75,7 @@ def log_prior(
 
 @kernel
 def _normal_kernel(
-    point: FloatArray, surface: SurfaceArrays, hidden: BoolArray, only: int, mean: FloatArray, sigma: float,
+    point: FloatArray, surface: Surface, hidden: BoolArray, only: int, mean: FloatArray, sigma: float,
     out: FloatArray,
 ) -> bool:  # fmt: skip
     """Write a normal distribution (N,) about a point (3,), over the candidates of one link if `only` is not -1.
@@ -119,7 +118,7 @@ class Candidates(NamedTuple):
     kin: Kinematics
     moved_by: BoolArray
     """(L, n) whether a joint moves a link."""
-    surface: SurfaceArrays
+    surface: Surface
     point: FloatArray
     """(N, 3) in the base frame [m]."""
     normal: FloatArray

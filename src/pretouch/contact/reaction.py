@@ -8,10 +8,10 @@ import numpy as np
 from pretouch.checks import Positive, PositiveCount
 from pretouch.composition import Part
 from pretouch.contact.detector import Body, Detection
-from pretouch.groups import Kinematics
 from pretouch.modes import Event, ModeState
 from pretouch.params import TaskParams
 from pretouch.records import Flat
+from pretouch.robot.kinematics import Kinematics
 from pretouch.types import Contact, FloatArray, Mode, Obstacles, RobotState
 from pretouch.values import value
 

@@ -23,11 +23,9 @@ import numpy as np
 from pretouch.compiled import compiled, kernel
 from pretouch.contact.scatter import LONGEST, level_init, scatter_init
 from pretouch.contact.sequential import MOST, Moment, alarm_bound
-from pretouch.groups import Kinematics, Mechanism
 from pretouch.params import MisfitParams, ProximityPriorParams, SequentialParams
 from pretouch.records import IntCell
-from pretouch.robot.kinematics import jacobian_into, mass_matrix_into
-from pretouch.robot.vectors import rotate
+from pretouch.robot.kinematics import Kinematics, Mechanism, jacobian_into, mass_matrix_into, rotate
 from pretouch.types import FloatArray, IntArray
 
 BLOCK = 4

@@ -21,11 +21,9 @@ import numpy as np
 from pretouch.cholesky import backward, factor, forward
 from pretouch.compiled import compiled, kernel
 from pretouch.contact.scatter import LENGTHS, WindowMeans, covariance_of_mean, spread_out
-from pretouch.groups import Kinematics, Mechanism, Obstacles
 from pretouch.params import ProximityPriorParams, SequentialParams
-from pretouch.robot.kinematics import jacobian_into
-from pretouch.robot.vectors import rotate
-from pretouch.types import FloatArray, IntArray
+from pretouch.robot.kinematics import Kinematics, Mechanism, jacobian_into, rotate
+from pretouch.types import FloatArray, IntArray, Obstacles
 
 _LARGEST = 300.0
 """Logarithm of a likelihood ratio from which on it is all the same."""

@@ -40,10 +40,8 @@ from pretouch.contact.sequential import (
     link_prior,
     nearest_of,
 )
-from pretouch.groups import Mechanism
 from pretouch.records import Cell, IntCell
-from pretouch.robot.kinematics import jacobian_into
-from pretouch.robot.vectors import below
+from pretouch.robot.kinematics import Mechanism, below, jacobian_into
 from pretouch.types import FloatArray
 
 CALM = BLOCK * QUEUE

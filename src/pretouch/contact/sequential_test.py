@@ -14,9 +14,8 @@ from pretouch.contact.sequential_step import SampleTest, assess_sample, sample_t
 from pretouch.contact.touch_cue import Cue, Cues, no_cues, together
 from pretouch.contact.window import window_init
 from pretouch.errors import ParameterError
-from pretouch.groups import no_obstacles
 from pretouch.params import LocalisationParams, SequentialParams
-from pretouch.types import NOT_TOUCHED, FloatArray, RobotState, Thresholds
+from pretouch.types import NOT_TOUCHED, FloatArray, RobotState, Thresholds, no_obstacles
 from pretouch.values import value
 
 

@@ -12,14 +12,13 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from pretouch.compiled import compiled, kernel
-from pretouch.groups import CapsuleArrays, Chain, Kinematics
 from pretouch.params import AdmittanceParams
 from pretouch.records import Cell, IntCell
-from pretouch.robot.kinematics import point_velocity
-from pretouch.robot.vectors import dot, placed_ends
+from pretouch.robot.body import Capsules, placed
+from pretouch.robot.kinematics import Chain, Kinematics, dot, point_velocity
 from pretouch.types import BoolArray, FloatArray, IntArray
 
-Axes = tuple[Kinematics, BoolArray, CapsuleArrays]
+Axes = tuple[Kinematics, BoolArray, Capsules]
 """Posture of an arm, which joints move a link (L, n), and the capsules of its body."""
 
 
@@ -248,11 +247,11 @@ def fastest_point(axes: Axes, qd: FloatArray) -> float:
     The speed along an axis is convex, so no point of it is faster than both its ends.
     """
     kin, moved_by, capsules = axes
-    ends, fastest = placed_ends(capsules.link, capsules.a, capsules.b, kin.position, kin.rotation), 0.0
+    (link, a, b, _), fastest = placed(capsules, kin), 0.0
     chain = Chain(kin.anchor, kin.axis, moved_by, qd)
-    for c in range(len(capsules.link)):
-        for point in ends[:, c]:
-            x, y, z = point_velocity(chain, capsules.link[c], point[0], point[1], point[2])
+    for c in range(len(link)):
+        for point in (a[c], b[c]):
+            x, y, z = point_velocity(chain, link[c], point[0], point[1], point[2])
             fastest = max(fastest, np.sqrt(x * x + y * y + z * z))
     return fastest
 
@@ -279,16 +278,16 @@ def within_reach(axes: Axes, qd: FloatArray, origin: FloatArray, reach: float) -
     Returns the velocities, and how far the farthest end has come [m].
     """
     kin, moved_by, capsules = axes
-    ends, share, farthest = placed_ends(capsules.link, capsules.a, capsules.b, kin.position, kin.rotation), 1.0, 0.0
+    (link, a, b, _), share, farthest = placed(capsules, kin), 1.0, 0.0
     chain = Chain(kin.anchor, kin.axis, moved_by, qd)
-    for c in range(len(capsules.link)):
+    for c in range(len(link)):
         for end in range(2):
-            point = ends[end, c]
+            point = a[c] if end == 0 else b[c]
             away = point - origin[end, c]
             far = np.sqrt(dot(away, away))
             farthest = max(farthest, far)
             if far > _LEAST_M:
-                x, y, z = point_velocity(chain, capsules.link[c], point[0], point[1], point[2])
+                x, y, z = point_velocity(chain, link[c], point[0], point[1], point[2])
                 speed, allowed = (x * away[0] + y * away[1] + z * away[2]) / far, max(0.0, reach - far) / BRAKES_S
                 if speed > allowed:
                     share = min(share, allowed / speed)

@@ -9,12 +9,11 @@ from pretouch.compiled import kernel
 from pretouch.composition import Part
 from pretouch.control.joint_box import JointLimits
 from pretouch.errors import ParameterError
-from pretouch.groups import Kinematics, Obstacles
 from pretouch.params import BrakingParams, RestrictionParams, TaskParams
 from pretouch.records import Cell, IntCell
-from pretouch.robot.kinematics import column
+from pretouch.robot.kinematics import Kinematics, column
 from pretouch.robot.model import RobotModel
-from pretouch.types import WHOLE, BoolArray, FloatArray, IntArray, Number, RobotState
+from pretouch.types import WHOLE, BoolArray, FloatArray, IntArray, Number, Obstacles, RobotState
 from pretouch.values import value
 
 

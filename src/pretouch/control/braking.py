@@ -14,10 +14,9 @@ import numpy as np
 from pretouch.cholesky import factor, forward
 from pretouch.compiled import compiled, inlined, kernel
 from pretouch.control.approach import Rows
-from pretouch.groups import Chain, Kinematics, Mechanism, Obstacles
 from pretouch.params.pretouch import REGIONS, BrakingParams, EffectiveMass, Tangential
-from pretouch.robot.kinematics import column, mass_matrix_into
-from pretouch.types import BoolArray, FloatArray, IntArray
+from pretouch.robot.kinematics import Chain, Kinematics, Mechanism, column, mass_matrix_into
+from pretouch.types import BoolArray, FloatArray, IntArray, Obstacles
 
 _TANGENTS = 4  # two directions across the normal, both ways along each
 _MOST_ROWS = 2 + 2 * _TANGENTS

@@ -5,8 +5,8 @@ import math
 import numpy as np
 
 from pretouch.desired import Desired, DesiredKind
-from pretouch.groups import Kinematics
 from pretouch.params import TaskParams
+from pretouch.robot.kinematics import Kinematics
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray, RobotState
 from pretouch.values import value

@@ -10,11 +10,10 @@ from pretouch.control.approach import MotionRequest, Rows
 from pretouch.control.joint_box import joint_box
 from pretouch.control.penalty import Minimum, Problem, excesses, minimise
 from pretouch.control.task import away, cost_into, twist
-from pretouch.groups import Arm, Kinematics, Obstacles
 from pretouch.modes import SOLVED
 from pretouch.params import NullSpaceMotion, TaskParams
-from pretouch.robot.kinematics import jacobian_into
-from pretouch.types import FloatArray
+from pretouch.robot.kinematics import Arm, Kinematics, jacobian_into
+from pretouch.types import FloatArray, Obstacles
 
 if TYPE_CHECKING:
     from pretouch.faults import Report

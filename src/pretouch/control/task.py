@@ -4,10 +4,9 @@ import numpy as np
 
 from pretouch.cholesky import factor, forward
 from pretouch.compiled import compiled, kernel
-from pretouch.groups import Obstacles
 from pretouch.params import NullSpaceMotion, TaskParams
-from pretouch.robot.vectors import rotation_error
-from pretouch.types import BoolArray, FloatArray, IntArray
+from pretouch.robot.kinematics import rotation_error
+from pretouch.types import BoolArray, FloatArray, IntArray, Obstacles
 
 _DAMPING = 1e-6
 """Added to J J^T, so that the projector is defined at singularities too [m^2]."""

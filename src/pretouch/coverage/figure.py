@@ -12,10 +12,9 @@ from scipy.spatial import cKDTree
 from pretouch.coverage.measure import Coverage
 from pretouch.coverage.surface import on_capsule
 from pretouch.coverage.ways import Ways
-from pretouch.groups import Kinematics
-from pretouch.perception.obstacles import sensor_poses
-from pretouch.robot.body import from_axes
-from pretouch.robot.vectors import placed
+from pretouch.perception.obstacles import placed_sensors
+from pretouch.robot.body import from_axes, placed
+from pretouch.robot.kinematics import Kinematics
 from pretouch.sensing.skin import Skin
 from pretouch.types import BoolArray, FloatArray
 
@@ -69,9 +68,9 @@ def _view(axes: Axes3D, faces: Faces) -> None:
 def _surface(ways: Ways, coverage: Coverage, kin: Kinematics) -> list[tuple[FloatArray, float]]:
     """Four-cornered pieces of all capsules outside the others, each with the share of the nearest surface points."""
     arm, share = ways.model.capsules, coverage.point_share
-    a, b = placed(arm, kin)
+    _, a, b, _ = placed(arm, kin)
     pieces = []
-    for c in range(len(arm)):
+    for c in range(len(arm.radius)):
         length = float(np.linalg.norm(arm.b[c] - arm.a[c])) + 2 * float(arm.radius[c])
         u = np.linspace(0.0, 1.0, max(8, int(length / _ALONG_M)) + 1)
         turn = np.linspace(0.0, 2 * np.pi, _ROUND + 1)
@@ -100,7 +99,7 @@ def _inside(point: FloatArray, a: FloatArray, b: FloatArray, radius: FloatArray,
 
 def _skin_faces(kin: Kinematics, skin: Skin, new: frozenset[str]) -> Faces:
     """Return a small disc for each unit, and its beam as a cone one can look through."""
-    position, rotation = sensor_poses(skin, kin)
+    position, rotation, _ = placed_sensors(skin.arrays, kin)
     turn = np.linspace(0.0, 2 * np.pi, 13)
     ring = np.column_stack([np.cos(turn), np.sin(turn), np.zeros(len(turn))])
     faces: Faces = []

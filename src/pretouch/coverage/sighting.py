@@ -10,8 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from pretouch.compiled import compiled, kernel
-from pretouch.groups import CapsuleArrays, Cones, Sensors
 from pretouch.perception.scene_filter import ray_capsule
+from pretouch.robot.body import Capsules
+from pretouch.sensing.sensor import Cones, Sensors
 from pretouch.types import BoolArray, FloatArray, IntArray
 
 GRID_M = 0.01
@@ -43,7 +44,7 @@ class Stretch(NamedTuple):
 
 @compiled
 def ways_free(
-    ways: BallWays, length: float, own: IntArray, capsules: CapsuleArrays, planes: FloatArray, free: BoolArray
+    ways: BallWays, length: float, own: IntArray, capsules: Capsules, planes: FloatArray, free: BoolArray
 ) -> None:
     """Write whether (W,) a ball can come along each way without meeting anything before the contact.
 

@@ -13,12 +13,11 @@ from pretouch.control.braking import tangents_of
 from pretouch.coverage.surface import surface_of
 from pretouch.coverage.ways import Ways, seen_by
 from pretouch.errors import SkinError
-from pretouch.groups import Sensors
-from pretouch.perception.obstacles import poses
+from pretouch.perception.obstacles import placed_sensors
 from pretouch.perception.scene_filter import expected_range
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.sensor import PAPER_SENSOR, Sensor, cones_of
-from pretouch.sensing.skin import Skin
+from pretouch.sensing.skin import Skin, SkinArrays
 from pretouch.sensing.unit import SensorUnit
 from pretouch.types import BoolArray, FloatArray
 
@@ -66,10 +65,11 @@ def candidates(ways: Ways, skin: Skin, sensor: Sensor = PAPER_SENSOR) -> tuple[S
     units = [
         SensorUnit(f"place {i}", model.links[at.link[i]], _looking(at.point[i], at.normal[i])) for i in range(len(at))
     ]
-    T = np.array([unit.T_link_sensor for unit in units])
-    position, rotation = poses(kin.position, kin.rotation, at.link, T)
-    of_no_link = Sensors(position, rotation, np.full(len(at), -1, np.int64))
-    view = expected_range(kin, of_no_link, cones_of([unit.sensor for unit in units]), model.capsules, ways.room)
+    T, exact = np.array([unit.T_link_sensor for unit in units]), np.zeros(len(units))
+    cones = cones_of([unit.sensor for unit in units])
+    sensors = placed_sensors(SkinArrays(at.link, T, exact, exact, cones), kin)
+    of_no_link = sensors._replace(link=np.full(len(at), -1, np.int64))
+    view = expected_range(kin, of_no_link, cones, model.capsules, ways.room)
     taken = [(unit.link, unit.T_link_sensor[:3, 3]) for unit in skin.units]
     return tuple(
         replace(unit, sensor=sensor)

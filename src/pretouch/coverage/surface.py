@@ -77,6 +77,6 @@ def on_capsule(
 
 def _inside(arm: Capsules, c: int, point: FloatArray) -> BoolArray:
     """Whether points (N, 3) of capsule c lie inside another one of its link."""
-    others = (arm.link == arm.link[c]) & (np.arange(len(arm)) != c)
+    others = (arm.link == arm.link[c]) & (np.arange(len(arm.radius)) != c)
     away = np.linalg.norm(from_axes(point, arm.a[others], arm.b[others])[1], axis=2)
     return np.asarray((away < arm.radius[others]).any(axis=1))

@@ -8,11 +8,12 @@ from pretouch.control.braking import tangents_of
 from pretouch.coverage.params import CoverageParams
 from pretouch.coverage.sighting import BallWays, Stretch, View, ways_free, ways_seen
 from pretouch.coverage.surface import Surface
-from pretouch.groups import CapsuleArrays, Kinematics, Sensors
-from pretouch.perception.obstacles import sensor_poses
+from pretouch.perception.obstacles import placed_sensors
 from pretouch.perception.scene_filter import Fixtures, expected_range
+from pretouch.robot.body import Capsules, placed
+from pretouch.robot.kinematics import Kinematics
 from pretouch.robot.model import RobotModel
-from pretouch.robot.vectors import placed
+from pretouch.sensing.sensor import Sensors
 from pretouch.sensing.skin import Skin
 from pretouch.types import WHOLE, BoolArray, FloatArray, IntArray
 
@@ -108,8 +109,8 @@ def _ways(
     centre = here.point + params.object_radius_m * here.normal
     for s, kin in enumerate(postures):
         start[s] = kin.position[here.link] + np.einsum("wij,wj->wi", kin.rotation[here.link], centre)
-        a, b = placed(arm, kin)
-        capsules = CapsuleArrays(
+        _, a, b, _ = placed(arm, kin)
+        capsules = Capsules(
             np.concatenate([arm.link, about.link]), np.vstack([a, about.a]), np.vstack([b, about.b]),
             np.concatenate([arm.radius, about.radius]),
         )  # fmt: skip
@@ -138,7 +139,7 @@ def seen_by(ways: Ways, skin: Skin) -> BoolArray:
     farthest, light, run = np.array([p.seen_by(unit.sensor) for unit in skin.units]).reshape(-1, 3).T.copy()
     free, seen = ways.free, np.zeros((len(skin.first), len(ways.postures), len(ways.point)), np.bool_)
     for s, kin in enumerate(ways.postures):
-        position, rotation = sensor_poses(skin, kin)
+        position, rotation, _ = placed_sensors(skin.arrays, kin)
         of_no_link = Sensors(position, rotation, np.full(len(skin), -1, np.int64))
         own_view = expected_range(kin, of_no_link, skin.cones, ways.model.capsules, ways.room)
         limit = np.minimum(farthest, own_view - p.self_margin_m)

@@ -7,10 +7,9 @@ import numpy as np
 from pretouch.errors import ExperimentError
 from pretouch.importing.ready import ever_apart
 from pretouch.perception.scene_filter import Fixtures
-from pretouch.robot.ik import brought_to
+from pretouch.robot.body import placed
 from pretouch.robot.model import RobotModel
-from pretouch.robot.self_distance import capsule_ends, kinematics_of, self_distances
-from pretouch.robot.vectors import placed
+from pretouch.robot.postures import brought_to, capsule_ends, kinematics_of, self_distances
 from pretouch.sim.paper_scenes import Placement
 from pretouch.sim.placement import placement_for
 from pretouch.types import FloatArray
@@ -74,6 +73,6 @@ def _anywhere(model: RobotModel, room: Fixtures, count: int, rng: np.random.Gene
 
 def _above(model: RobotModel, room: Fixtures, q: FloatArray) -> bool:
     """Whether the moving part of an arm is on the free side of all planes."""
-    ends = np.stack(placed(model.body, model.kinematics(q)))
+    ends = np.stack(placed(model.body, model.kinematics(q))[1:3])
     heights = ends @ room.planes[:, :3].T - room.planes[:, 3]
     return bool(np.all(heights > model.body.radius[:, None]))

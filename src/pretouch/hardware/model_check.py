@@ -7,14 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from pretouch.checks import Checked, Fraction, Positive, PositiveCount
-from pretouch.groups import CapsuleArrays, Cones, Kinematics, Sensors
 from pretouch.hardware.findings import Finding
-from pretouch.perception.closest import bounds
-from pretouch.perception.obstacles import is_evidence, measured_distance, placed_sensors
-from pretouch.perception.scene_filter import Fixtures, expected_range, nearest_capsule, plane_return
-from pretouch.robot.body import Capsules
+from pretouch.perception.obstacles import measured, placed_sensors, tells_anything
+from pretouch.perception.scene_filter import Fixtures, bounds, expected_range, nearest_capsule, plane_return
+from pretouch.robot.body import Capsules, placed
+from pretouch.robot.kinematics import Kinematics
 from pretouch.robot.model import RobotModel
-from pretouch.robot.vectors import placed
+from pretouch.sensing.sensor import Cones, Sensors
 from pretouch.sensing.skin import Skin
 from pretouch.types import BoolArray, FloatArray, RangeReadings
 
@@ -63,8 +62,8 @@ class ModelCheck:
         """
         fresh = readings.stamp > self._used
         self._used = np.maximum(self._used, readings.stamp)
-        distance = measured_distance(readings, self._skin.cones)
-        fresh &= is_evidence(readings, distance, self._skin.cones)
+        distance = measured(readings.distance, readings.status, self._skin.cones)
+        fresh &= tells_anything(readings.distance, readings.status, distance, self._skin.cones)
         if not fresh.any():
             return
         position, nearest, farthest = self._predicted(q, fresh)
@@ -82,7 +81,7 @@ class ModelCheck:
     def _predicted(self, q: FloatArray, wanted: BoolArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Where the sensors are (K, 3), the nearest they can see of the model (K,), and what wanted ones must (K,)."""
         kin = self._model.kinematics(q)
-        sensors, cones = placed_sensors(self._skin, kin), self._skin.cones
+        sensors, cones = placed_sensors(self._skin.arrays, kin), self._skin.cones
         body, fixtures = self._model.capsules, self._fixtures
         nearest = expected_range(kin, sensors, cones, body, fixtures)
         return sensors.position, nearest, _certain_return(kin, sensors, cones, wanted, body, fixtures)
@@ -133,10 +132,7 @@ def _certain_return(
     kin: Kinematics, sensors: Sensors, cones: Cones, wanted: BoolArray, body: Capsules, fixtures: Fixtures
 ) -> FloatArray:  # fmt: skip
     """Distance (K,) [m] by which all inner rays of a wanted sensor have ended, infinite where one goes on."""
-    shapes = []
-    for part in (body, fixtures.capsules):
-        a, b = placed(part, kin)
-        shapes.append((CapsuleArrays(part.link, a, b, part.radius), bounds(a, b, part.radius)))
+    shapes = [(capsules, bounds(capsules)) for capsules in (placed(body, kin), placed(fixtures.capsules, kin))]
     far = np.full(len(sensors.link), np.inf)
     for k in np.flatnonzero(wanted).tolist():
         far[k] = 0.0

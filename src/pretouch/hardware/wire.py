@@ -17,8 +17,8 @@ from hmac import compare_digest
 
 import numpy as np
 
-from pretouch.sensing.imu_scale import counts_of
 from pretouch.sensing.sensor import MOST_ZONES
+from pretouch.sensing.unit import counts_of
 from pretouch.types import FloatArray
 
 MAGIC = b"PT"

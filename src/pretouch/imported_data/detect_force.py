@@ -6,14 +6,13 @@ from pretouch.contact.moving_thresholds import thresholds_of
 from pretouch.contact.reaction import DecayingVelocity
 from pretouch.contact.window import add_force, window_init
 from pretouch.errors import RecordingError
-from pretouch.groups import no_obstacles
 from pretouch.imported_data.forces import ForceRecording
 from pretouch.imported_data.log import Note
 from pretouch.imported_data.torques import pieces
 from pretouch.modes import Event, mode_init, next_mode
 from pretouch.profiles import Profile
 from pretouch.recording.compare import Decided, Decisions
-from pretouch.types import BoolArray, FloatArray, IntArray, Mode
+from pretouch.types import BoolArray, FloatArray, IntArray, Mode, no_obstacles
 from pretouch.values import value
 
 SLOWER = 0.95

@@ -9,7 +9,6 @@ from pretouch.composition import changed
 from pretouch.contact.detector import Body, Detection, Detector, Sample
 from pretouch.contact.window import Window, add_force, window_init
 from pretouch.errors import RecordingError
-from pretouch.groups import no_obstacles
 from pretouch.imported_data.detect_force import ForceResult, cycles, detect_force, slow
 from pretouch.imported_data.forces import ForceRecording
 from pretouch.imported_data.log import Note
@@ -19,7 +18,7 @@ from pretouch.profiles import Profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.sim.observer import wrench_from_torques
-from pretouch.types import BoolArray, FloatArray, RobotState
+from pretouch.types import BoolArray, FloatArray, RobotState, no_obstacles
 from pretouch.values import value
 
 MOVING_RAD_S = 0.02

@@ -9,7 +9,7 @@ from typing import Literal, Protocol
 import numpy as np
 
 from pretouch.errors import RecordingError
-from pretouch.robot.description_file import robot_named
+from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray, IntArray
 from pretouch.values import value

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from pretouch.errors import RobotModelError
 from pretouch.importing.robot_import import MJCF, Imported
-from pretouch.robot.description_file import FILE, description_text
+from pretouch.robot.description import FILE, description_text
 
 
 def write_folder(found: Imported, folder: Path) -> None:

@@ -6,15 +6,14 @@ from functools import partial
 import numpy as np
 
 from pretouch.errors import RobotModelError
-from pretouch.groups import Kinematics
 from pretouch.importing.sampling import spread
-from pretouch.robot.ik import Pace, posture_at
+from pretouch.robot.kinematics import Kinematics
 from pretouch.robot.model import RobotModel
-from pretouch.robot.self_distance import capsule_ends, kinematics_of, self_distances
+from pretouch.robot.postures import Reaching, capsule_ends, kinematics_of, posture_at, self_distances
 from pretouch.types import BoolArray, FloatArray
 
 _STARTS = 96
-_DRAWN, _FREE = Pace(80, 0.2, 1e-3, 0.02), Pace(80, 0.2, 1e-6)
+_DRAWN, _FREE = Reaching(80, 0.2, 1e-3, 0.02), Reaching(80, 0.2, 1e-6)
 """First drawn to the middle of the joints' ranges; arms with small singular values get there only undrawn."""
 _TRIED = 100
 _ANYWHERE = 1000
@@ -103,7 +102,7 @@ def proposed(model: RobotModel) -> tuple[Ready, tuple[str, ...]]:
     )
 
 
-def _hand_at(model: RobotModel, hand: FloatArray, pace: Pace) -> list[FloatArray]:
+def _hand_at(model: RobotModel, hand: FloatArray, pace: Reaching) -> list[FloatArray]:
     """Return postures with the end-effector at a place (3,), pointing down, away from joint limits."""
     low, high = _near_middle(model, 0.8)
     starts = low + spread(_STARTS, model.n) * (high - low)

@@ -1,14 +1,13 @@
-"""The closest point of the body to each obstacle: signed distance and direction, on capsules."""
-
-from typing import NamedTuple
+"""The closest point of the body to each obstacle, on capsules: to points, and to fixtures that move beside the arm."""
 
 import numpy as np
 
 from pretouch.compiled import compiled, kernel
-from pretouch.groups import CapsuleArrays, Kinematics
-from pretouch.robot.body import Capsules
-from pretouch.robot.vectors import placed_capsules
-from pretouch.types import FloatArray, IntArray, Obstacles
+from pretouch.robot.body import Capsules, placed
+from pretouch.robot.kinematics import Kinematics
+from pretouch.robot.model import RobotModel
+from pretouch.robot.postures import nearest_points
+from pretouch.types import FloatArray, IntArray, MovingFixtures, Obstacles, RangeReadings, no_obstacles
 
 _ON_AXIS = 1e-9
 """Distance from a capsule's axis below which the direction to an obstacle is not defined [m]."""
@@ -35,56 +34,33 @@ def closest_points(
         point: (K, 3) obstacles, base frame [m].
         last_direction: (K, 3) unit vectors to fall back on.
     """
-    count = len(point)
-    body_point, link, distance = np.empty((count, 3)), np.empty(count, np.int64), np.empty(count)
-    # a copy: where `closest` finds no direction the last one stays in it
-    direction, ee_distance = last_direction.astype(np.float64), np.empty(count)
-    found = ClosestArrays(body_point, link, direction, distance)
-    closest(placed_capsules(body.arrays, kin), point, found)
-    distances(point, ee_position, ee_distance)
-    return Obstacles(unit, point, ee_distance, body_point, link, direction, distance, np.zeros(count))
+    near = no_obstacles(len(point))._replace(unit=unit, point=point, direction=last_direction.astype(np.float64))
+    closest(placed(body, kin), near)
+    return near._replace(ee_distance=np.linalg.norm(point - ee_position, axis=1))
 
 
 @compiled
-def distances(point: FloatArray, origin: FloatArray, out: FloatArray) -> None:
-    """Write the distance (K,) [m] of points (K, 3) from one point (3,)."""
-    for k in range(len(point)):
-        x, y, z = point[k, 0] - origin[0], point[k, 1] - origin[1], point[k, 2] - origin[2]
-        out[k] = np.sqrt(x * x + y * y + z * z)
+def closest(capsules: Capsules, obstacles: Obstacles) -> None:
+    """Write what of C placed capsules is closest to the points of obstacles, as `closest_points` says.
 
-
-class ClosestArrays(NamedTuple):
-    """Room for the closest points of the body to K points, of `Obstacles`."""
-
-    body_point: FloatArray
-    """(K, 3) [m]."""
-    link: IntArray
-    """(K,) that carries it."""
-    direction: FloatArray
-    """(K, 3) from there; before, what to fall back on."""
-    distance: FloatArray
-    """(K,) [m]."""
-
-
-@compiled
-def closest(capsules: CapsuleArrays, point: FloatArray, found: ClosestArrays) -> None:
-    """Write what is closest to each point (K, 3) of C placed capsules, as `closest_points` says."""
+    Where no direction is defined, the one that stands in the obstacles stays.
+    """
     link, a, b, radius = capsules
-    body_point, on_link, direction, distance = found
-    nearest = nearest_capsules(capsules, point, distance)
+    point, direction = obstacles.point, obstacles.direction
+    nearest = _nearest_capsules(capsules, point, obstacles.body_distance)
     for k in range(len(point)):
         c = nearest[k]
         along, from_axis = to_axis(point, k, a, b, c)
-        on_link[k] = link[c]
+        obstacles.link[k] = link[c]
         for i in range(3):
             foot = a[c, i] + along * (b[c, i] - a[c, i])
             if from_axis > _ON_AXIS:  # on the axis all directions across are alike: the last one stays
                 direction[k, i] = (point[k, i] - foot) / from_axis
-            body_point[k, i] = foot + radius[c] * direction[k, i]
+            obstacles.body_point[k, i] = foot + radius[c] * direction[k, i]
 
 
 @kernel
-def nearest_capsules(capsules: CapsuleArrays, point: FloatArray, distance: FloatArray) -> IntArray:
+def _nearest_capsules(capsules: Capsules, point: FloatArray, distance: FloatArray) -> IntArray:
     """Write how far points (K, 3) are from the nearest of C placed capsules, as `to_axis` has it; return which it is.
 
     A tie goes to the lower index; a point that is NaN is nearest to the first.
@@ -113,29 +89,6 @@ def nearest_capsules(capsules: CapsuleArrays, point: FloatArray, distance: Float
     return nearest
 
 
-@compiled
-def bounds(a: FloatArray, b: FloatArray, radius: FloatArray) -> FloatArray:
-    """Spheres (4, C) round capsules, a little larger than they need to be: x, y, z and radius [m]."""
-    spheres = np.empty((4, len(radius)))
-    for c in range(len(radius)):
-        length2 = 0.0
-        for i in range(3):
-            spheres[i, c] = (a[c, i] + b[c, i]) / 2
-            length2 += (b[c, i] - a[c, i]) ** 2
-        # larger by more than rounding, so that what is left out changes no bit of the answer
-        spheres[3, c] = (np.sqrt(length2) / 2 + radius[c]) * (1 + 1e-12) + 1e-12
-    return spheres
-
-
-@kernel
-def to_spheres(point: FloatArray, k: int, spheres: FloatArray, gap2: FloatArray) -> None:
-    """Write the squared distance (C,) of point[k] from the middle of each sphere [m^2]."""
-    x, y, z = point[k, 0], point[k, 1], point[k, 2]
-    for c in range(len(gap2)):
-        u, v, w = spheres[0, c] - x, spheres[1, c] - y, spheres[2, c] - z
-        gap2[c] = u * u + v * v + w * w
-
-
 @kernel
 def to_axis(point: FloatArray, k: int, a: FloatArray, b: FloatArray, c: int) -> tuple[float, float]:
     """Where on the segment from a[c] to b[c] point[k] is closest, from 0 to 1, and how far from it [m]."""
@@ -146,3 +99,50 @@ def to_axis(point: FloatArray, k: int, a: FloatArray, b: FloatArray, c: int) -> 
     along = 0.0 if length2 == 0 else min(1.0, max(0.0, (x * ux + y * uy + z * uz) / length2))
     x, y, z = x - along * ux, y - along * uy, z - along * uz
     return along, np.sqrt(x * x + y * y + z * z)
+
+
+def beside(
+    still: Capsules, moving: MovingFixtures, readings: RangeReadings, now: float, persistence: float
+) -> Capsules:
+    """Return what stands and what moves, at the newest reading's stamp.
+
+    No reading counts that is older than `persistence` [s] by `now` [s].
+    """
+    stamps = readings.stamp[(readings.stamp <= now) & (readings.stamp >= now - persistence)]
+    a, b = moving.at(float(stamps.max(initial=-np.inf)) if len(stamps) else moving.stamp)
+    return Capsules(
+        np.concatenate([still.link, np.zeros(len(a), np.int64)]),
+        np.concatenate([still.a, a]),
+        np.concatenate([still.b, b]),
+        np.concatenate([still.radius, moving.radius]),
+    )
+
+
+def near_moving(moving: MovingFixtures, model: RobotModel, kin: Kinematics, now: float, first: int) -> Obstacles:
+    """Return where each link that moves is nearest to what moves beside it, one obstacle a link.
+
+    Args:
+        moving: with one capsule at least, as those that `sound_moving` returns.
+        model: the arm.
+        kin: its posture.
+        now: instant of the step [s].
+        first: index that stands for the first link in `Obstacles.unit`; those of the others follow.
+    """
+    (a, b), body, parts = moving.at(now), model.body, model.parts
+    _, own_a, own_b, _ = placed(body, kin)
+    on_body, on_other = nearest_points(own_a[:, None], own_b[:, None], a, b)  # (C, M, 3)
+    between, length = on_other - on_body, np.linalg.norm(b - a, axis=1)
+    apart, along = np.linalg.norm(between, axis=2), np.linalg.norm(on_other - a, axis=2)
+    gap = apart - body.radius[:, None] - moving.radius
+    of_part = np.where((body.link == parts[:, None])[..., None], gap, np.inf).reshape(len(parts), -1)
+    c, m = np.divmod(of_part.argmin(axis=1), len(moving.radius))
+    # any direction will do where the axes meet
+    meets = (apart[c, m] <= _ON_AXIS)[:, None]
+    n = np.where(meets, (0.0, 0.0, 1.0), between[c, m] / np.where(meets, 1.0, apart[c, m][:, None]))
+    share = (along[c, m] / np.where(length[m] > 0.0, length[m], 1.0))[:, None]
+    velocity = moving.a_velocity[m] + share * (moving.b_velocity[m] - moving.a_velocity[m])
+    return Obstacles(
+        unit=first + np.arange(len(parts)), point=on_other[c, m] - moving.radius[m, None] * n,
+        ee_distance=np.full(len(parts), np.inf), body_point=on_body[c, m] + body.radius[c, None] * n,
+        link=parts.copy(), direction=n, body_distance=gap[c, m], closing_speed=-(n * velocity).sum(axis=1),
+    )  # fmt: skip

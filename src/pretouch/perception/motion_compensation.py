@@ -1,20 +1,20 @@
 """Where the sensors were when they measured, and how fast an object itself comes nearer than the arm's motion says."""
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
 from pretouch.compiled import kernel
-from pretouch.groups import Chain, Cones, Sensors
-from pretouch.robot.kinematics import point_velocity
-from pretouch.types import BoolArray, FloatArray, IntArray
+from pretouch.perception.obstacles import TrackState
+from pretouch.robot.kinematics import Chain, point_velocity
+from pretouch.sensing.sensor import Cones, Sensors
+from pretouch.types import BoolArray, FloatArray, Obstacles
 
 
 @kernel
 def move_back(
     sensors: Sensors, moved: BoolArray, stamp: FloatArray, chain: Chain, posed: float, longest: float
-) -> None:  # fmt: skip
+) -> None:
     """Move sensor poses, (K, 3) [m] and (K, 3, 3), from the instant of the arm's posture back to their stamps (K,) [s].
 
     That is the motion of their links at the joint velocities (n,) [rad/s], to first order in the place; the rotation is
@@ -69,32 +69,25 @@ _JUMP = 0.06
 """By how much two readings of one surface may differ beside that, noise and the width of the cone [m]."""
 
 
-def motion_init(units: int) -> FloatArray:
-    """Return what is known of each unit's point (2, K, 3) before any reading: no place and no velocity, NaN."""
-    return np.full((2, units, 3), np.nan)
-
-
 @kernel
-def follow_points(
-    motion: FloatArray, last: FloatArray, last_stamp: FloatArray, points: FloatArray, stamp: FloatArray,
-    taken: BoolArray, memory: float,
-) -> None:  # fmt: skip
-    """Take the points (K, 3) that are `taken` (K,) into the motion (2, K, 3): smoothed places [m], velocities [m/s].
+def follow_points(tracks: TrackState, points: FloatArray, stamp: FloatArray, taken: BoolArray, memory: float) -> None:
+    """Take the points (K, 3) [m] of `stamp` (K,) [s] that are `taken` (K,) into the motion of the tracks.
 
     A fading-memory filter, the least squares of a straight line with weights that fall by 1/e in `memory` [s]: with
     theta = exp(-dt / memory) it corrects the place by 1 - theta^2 and the velocity by (1 - theta)^2 / dt of what was
     not foreseen. A point farther from the unit's last than a hand moves is of another surface, and begins anew, with
-    velocity 0. `last` (K, 3), `last_stamp` (K,) [s] and `stamp` are those of the readings before and now.
+    velocity 0. The tracks still hold what was seen last.
     """
+    motion, last = tracks.motion, tracks.point
     for k in range(len(taken)):
         if not taken[k]:
             continue
-        dt, away2 = stamp[k] - last_stamp[k], 0.0
+        dt, away2 = stamp[k] - tracks.seen[k], 0.0
         for i in range(3):
             away2 += (points[k, i] - last[k, i]) ** 2
         # not the first reading, whose dt is infinite, nor one after three memories: e^-3 of the old weight is left then
-        known = not np.isnan(motion[0, k, 0]) and 0.0 < dt <= 3.0 * memory
-        if not known or away2 > (FASTEST * dt + _JUMP) ** 2:
+        goes_on = not np.isnan(motion[0, k, 0]) and 0.0 < dt <= 3.0 * memory
+        if not goes_on or away2 > (FASTEST * dt + _JUMP) ** 2:
             for i in range(3):
                 motion[0, k, i], motion[1, k, i] = points[k, i], 0.0
             continue
@@ -107,20 +100,9 @@ def follow_points(
             motion[1, k, i] += (1.0 - theta) ** 2 / dt * missed
 
 
-class LastSeen(NamedTuple):
-    """What each of K units showed last."""
-
-    point: FloatArray
-    """(K, 3) [m]."""
-    stamp: FloatArray
-    """(K,) [s]."""
-    motion: FloatArray
-    """(2, K, 3) smoothed place [m] and velocity [m/s]."""
-
-
 @kernel
 def reckon(
-    points: FloatArray, distance: FloatArray, stamp: FloatArray, before: LastSeen, sensors: Sensors, cones: Cones,
+    points: FloatArray, distance: FloatArray, stamp: FloatArray, tracks: TrackState, sensors: Sensors, cones: Cones,
     within: float,
 ) -> None:  # fmt: skip
     """Put points (K, 3) that are nearer than the sensor measures where they were last seen, as far as that may be.
@@ -128,16 +110,16 @@ def reckon(
     A reading of the nearest distance that a sensor measures, `least` [m], says only that something is between 0 and
     that. Where the unit saw a point up to `within` [s] before, it is on the beam at the height of that, moved on if it
     came nearer by itself faster than 0.1 m/s; where it saw none, it is at the sensor. `stamp` (K,) [s] is that of the
-    reading.
+    reading; the tracks still hold what was seen last.
     """
-    last, last_stamp, motion = before
+    last, motion = tracks.point, tracks.motion
     position, rotation = sensors.position, sensors.rotation
     for k in range(len(distance)):
         least = cones.range[cones.kind[k], 0]
         # `measured` has raised what is nearer to that, and NaN is passed over
         if not distance[k] <= least:
             continue
-        dt, ahead, nearing = stamp[k] - last_stamp[k], 0.0, 0.0
+        dt, ahead, nearing = stamp[k] - tracks.seen[k], 0.0, 0.0
         if 0.0 <= dt <= within:
             for i in range(3):
                 # height of the last point along the beam as it is now, and speed of that point against the beam
@@ -155,14 +137,14 @@ def reckon(
 
 
 @kernel
-def closing_speeds(motion: FloatArray, unit: IntArray, direction: FloatArray, out: FloatArray) -> None:
-    """Write the speed (M,) [m/s] at which each obstacle comes nearer: its velocity against the direction (M, 3) to it.
+def closing_speeds(motion: FloatArray, obstacles: Obstacles) -> None:
+    """Write the speed at which each obstacle comes nearer: its velocity, of the tracks' motion, against its direction.
 
     0 where nothing is known, never more than a person's hand reaches.
     """
-    for m in range(len(unit)):
-        k, speed = unit[m], 0.0
+    for m in range(len(obstacles.unit)):
+        k, speed = obstacles.unit[m], 0.0
         if not np.isnan(motion[0, k, 0]):
             for i in range(3):
-                speed -= motion[1, k, i] * direction[m, i]  # -v . u, u from the body to the object
-        out[m] = min(max(speed, -FASTEST), FASTEST)
+                speed -= motion[1, k, i] * obstacles.direction[m, i]  # -v . u, u from the body to the object
+        obstacles.closing_speed[m] = min(max(speed, -FASTEST), FASTEST)

@@ -6,11 +6,10 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from pretouch.compiled import compiled, kernel
-from pretouch.groups import Cones, Kinematics, Sensors, SkinArrays
-from pretouch.params import PerceptionParams
-from pretouch.perception.motion_compensation import motion_init
-from pretouch.sensing.skin import Skin
-from pretouch.types import BoolArray, FloatArray, IntArray, Number, Obstacles, RangeReadings, RangeStatus
+from pretouch.robot.kinematics import Kinematics
+from pretouch.sensing.sensor import Cones, Sensors
+from pretouch.sensing.skin import Skin, SkinArrays
+from pretouch.types import BoolArray, FloatArray, IntArray, Number, Obstacles, RangeStatus
 
 
 class TrackState(NamedTuple):
@@ -20,35 +19,20 @@ class TrackState(NamedTuple):
     """(K, 3) obstacle position, base frame [m]."""
     direction: Annotated[FloatArray, "K", 3]
     """(K, 3) last direction from the body to the point."""
-    times: Annotated[FloatArray, 3, "K"]
-    """(3, K) instants `seen`, `used` and `heard` [s]."""
+    seen: Annotated[FloatArray, "K"]
+    """(K,) instant of the measurement that showed the point [s]."""
+    used: Annotated[FloatArray, "K"]
+    """(K,) stamp of the newest reading taken into account [s]."""
+    heard: Annotated[FloatArray, "K"]
+    """(K,) stamp of the newest reading that reported anything [s]."""
     motion: Annotated[FloatArray, 2, "K", 3]
     """(2, K, 3) smoothed place [m] and velocity [m/s] of each unit's point, where closing speeds are estimated."""
-
-    @property
-    def seen(self) -> FloatArray:
-        """Instant of the measurement that showed the point (K,) [s]."""
-        return self.times[SEEN]
-
-    @property
-    def used(self) -> FloatArray:
-        """Stamp of the newest reading taken into account (K,) [s]."""
-        return self.times[USED]
-
-    @property
-    def heard(self) -> FloatArray:
-        """Stamp of the newest reading that reported anything (K,) [s]."""
-        return self.times[HEARD]
-
-
-SEEN, USED, HEARD = range(3)
 
 
 def track_init(units: int) -> TrackState:
     """Return the state before any reading."""
-    return TrackState(
-        np.full((units, 3), np.nan), np.full((units, 3), np.nan), np.full((3, units), -np.inf), motion_init(units)
-    )
+    nowhere, never = np.full((units, 3), np.nan), np.full(units, -np.inf)
+    return TrackState(nowhere, nowhere.copy(), never, never.copy(), never.copy(), np.full((2, units, 3), np.nan))
 
 
 def points_of_units(obstacles: Obstacles, units: int) -> FloatArray:
@@ -58,25 +42,14 @@ def points_of_units(obstacles: Obstacles, units: int) -> FloatArray:
     return points
 
 
-def sensor_poses(skin: Skin, kin: Kinematics) -> tuple[FloatArray, FloatArray]:
-    """Positions (K, 3) [m] and orientations (K, 3, 3) of the sensors, base frame: T_O_link @ T_link_sensor."""
-    return poses(kin.position, kin.rotation, skin.link, skin.T_link_sensor)
-
-
-def placed_sensors(skin: Skin, kin: Kinematics) -> Sensors:
-    """Return the sensors of a skin where they are in a posture."""
-    return Sensors(*sensor_poses(skin, kin), skin.link)
-
-
 @compiled
-def poses(
-    link_position: FloatArray, link_rotation: FloatArray, link: IntArray, T_link_sensor: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return the poses of `sensor_poses` from those of the links."""
-    position, rotation = np.empty((len(link), 3)), np.empty((len(link), 3, 3))
-    for k in range(len(link)):
-        pose_into(link_position[link[k]], link_rotation[link[k]], T_link_sensor[k], position[k], rotation[k])
-    return position, rotation
+def placed_sensors(skin: SkinArrays, kin: Kinematics) -> Sensors:
+    """Return the sensors of a skin where they are in a posture: T_O_link @ T_link_sensor."""
+    position, rotation = np.empty((len(skin.link), 3)), np.empty((len(skin.link), 3, 3))
+    for k in range(len(skin.link)):
+        m = skin.link[k]
+        pose_into(kin.position[m], kin.rotation[m], skin.T_link_sensor[k], position[k], rotation[k])
+    return Sensors(position, rotation, skin.link)
 
 
 @kernel
@@ -103,27 +76,6 @@ def locate(position: FloatArray, rotation: FloatArray, distance: FloatArray) -> 
     return point
 
 
-def measured_distance(readings: RangeReadings, cones: Cones) -> FloatArray:
-    """Distance (K,) [m] each reading stands for, NaN where it shows no target.
-
-    A target nearer than the sensor can measure is taken to be at its minimum distance, never as gone. A number
-    beyond what it can measure shows nothing, whatever its status.
-    """
-    shown = np.empty(len(readings.distance))
-    measured(readings.distance, readings.status, cones, shown)
-    return shown
-
-
-def is_evidence(readings: RangeReadings, distance: FloatArray, cones: Cones) -> BoolArray:
-    """Say which readings (K,) tell anything: that a target is there, or that none near returns enough light.
-
-    A failure (hardware, synchronisation, cross-talk, no measurement yet, a distance that is negative or no number)
-    tells nothing, and is no more free space than silence is. A target beyond what the sensor can measure is far away.
-    `distance` is what `measured_distance` makes of the readings.
-    """
-    return tells_anything(readings.distance, readings.status, distance, cones)
-
-
 # UM2356: 6 is a valid range whose wrap-around was not checked, 11 one of several pulses merged into one
 _SHOWN = tuple(int(s) for s in (RangeStatus.OK, RangeStatus.NO_WRAP_CHECK, RangeStatus.MERGED))
 # something is there, but the distance that comes with it is not used
@@ -135,8 +87,30 @@ _NO_TARGET = tuple(
 
 
 @compiled
+def measured(distance: FloatArray, status: IntArray, cones: Cones) -> FloatArray:
+    """Distance (K,) [m] each reading (K,) stands for, NaN where it shows no target.
+
+    A target nearer than the sensor can measure is taken to be at its minimum distance, never as gone. A number
+    beyond what it can measure shows nothing, whatever its status.
+    """
+    target = np.full(len(distance), np.nan)
+    for k in range(len(distance)):
+        nearest, farthest = cones.range[cones.kind[k]]
+        if status[k] in _NEAR:
+            target[k] = nearest
+        elif status[k] in _SHOWN and 0 <= distance[k] <= farthest:  # false for NaN
+            target[k] = max(distance[k], nearest)
+    return target
+
+
+@compiled
 def tells_anything(distance: FloatArray, status: IntArray, shown: FloatArray, cones: Cones) -> BoolArray:
-    """Answer of `is_evidence`; `shown` (K,) is that of `measured_distance`."""
+    """Say which readings (K,) tell anything: that a target is there, or that none near returns enough light.
+
+    A failure (hardware, synchronisation, cross-talk, no measurement yet, a distance that is negative or no number)
+    tells nothing, and is no more free space than silence is. A target beyond what the sensor can measure is far away.
+    `shown` is what `measured` makes of the readings.
+    """
     tells = np.empty(len(status), np.bool_)
     for k in range(len(status)):
         # a number beyond the data sheet's range is no distance, but the sensor is at work; infinity and NaN are faults
@@ -144,18 +118,6 @@ def tells_anything(distance: FloatArray, status: IntArray, shown: FloatArray, co
         far = status[k] in _SHOWN and np.isfinite(distance[k]) and distance[k] > farthest
         tells[k] = not np.isnan(shown[k]) or far or status[k] in _NO_TARGET
     return tells
-
-
-@compiled
-def measured(distance: FloatArray, status: IntArray, cones: Cones, shown: FloatArray) -> None:
-    """Write the answer (K,) of `measured_distance`."""
-    for k in range(len(distance)):
-        nearest, farthest = cones.range[cones.kind[k]]
-        shown[k] = np.nan
-        if status[k] in _NEAR:
-            shown[k] = nearest
-        elif status[k] in _SHOWN and 0 <= distance[k] <= farthest:  # false for NaN
-            shown[k] = max(distance[k], nearest)
 
 
 @kernel
@@ -169,18 +131,17 @@ def take_in(
     point as it was, so one missed reading removes no obstacle. From the age `persistence` [s] on a point is given up.
     One that `tells` anything is heard.
     """
-    point, times = tracks.point, tracks.times
     for k in range(len(stamp)):
         if fresh[k]:
             # a failure is used up but not heard, so it ages the unit as silence does
-            times[USED, k] = stamp[k]
+            tracks.used[k] = stamp[k]
             if tells[k]:
-                times[HEARD, k] = stamp[k]
+                tracks.heard[k] = stamp[k]
             # a reading that is too old on arrival shows nothing: its point would be given up in this very step
             if shows[k] and now - stamp[k] <= persistence:
-                times[SEEN, k] = stamp[k]
+                tracks.seen[k] = stamp[k]
                 for i in range(3):
-                    point[k, i] = points[k, i]
+                    tracks.point[k, i] = points[k, i]
 
 
 @kernel
@@ -189,10 +150,7 @@ def newer(used: FloatArray, stamp: FloatArray, now: float) -> BoolArray:
 
     A unit whose clock is ahead is so never heard: it must not pass for one that is well.
     """
-    fresh = np.empty(len(stamp), np.bool_)
-    for k in range(len(stamp)):
-        fresh[k] = used[k] < stamp[k] <= now  # false for NaN, and for -inf: never heard
-    return fresh
+    return (used < stamp) & (stamp <= now)  # false for NaN, and for -inf: never heard
 
 
 _FAILURES = {
@@ -201,22 +159,22 @@ _FAILURES = {
 }
 
 
-def silent_units(
-    skin: Skin, state: TrackState, status: IntArray, silence: float, now: float, params: PerceptionParams
-) -> tuple[float, str]:
-    """Factor in [0, 1] on the speed for units that fall silent, and the names of those that are.
+@compiled
+def speed_factor(silence: float, slow_after: float, silent_after: float) -> float:
+    """Factor in [0, 1] on the speed for who fell silent: 1 up to `slow_after` [s], 0 from `silent_after` [s] on.
 
-    Silence is never free space, and neither is a failure: from `slow_after_s` without a reading that tells anything the
-    arm slows, at `silent_after_s` it stands. `silence` [s] is the longest of any unit, `status` (K,) what the units
-    reported last.
+    Silence is never free space, and neither is a failure. The silence of who was never heard is infinite.
     """
-    if silence <= params.slow_after_s:
-        return 1.0, ""
-    silent = np.flatnonzero(now - state.heard >= params.silent_after_s).tolist()
-    # of a unit with zones the unit is named, once
-    names = ", ".join(dict.fromkeys(skin.boards[k] + _FAILURES.get(int(status[k]), "") for k in silent))
-    # from 1 at `slow_after_s` to 0 at `silent_after_s`; the silence of a unit never heard is infinite
-    return max(0.0, (params.silent_after_s - silence) / (params.silent_after_s - params.slow_after_s)), names
+    return 1.0 if silence <= slow_after else max(0.0, (silent_after - silence) / (silent_after - slow_after))
+
+
+def silent_units(skin: Skin, heard: FloatArray, status: IntArray, now: float, silent_after: float) -> str:
+    """Name the units that told nothing for `silent_after` [s]; of a unit with zones the unit is named, once.
+
+    `heard` (K,) [s] is when each told anything, `status` (K,) what it reported last.
+    """
+    silent = np.flatnonzero(now - heard >= silent_after).tolist()
+    return ", ".join(dict.fromkeys(skin.boards[k] + _FAILURES.get(int(status[k]), "") for k in silent))
 
 
 _ON_AXIS = math.cos(math.radians(0.5))
@@ -233,19 +191,17 @@ def looks_at(kin: Kinematics, skin: SkinArrays, k: int, point: FloatArray) -> bo
 
 
 @kernel
-def give_up(
-    point: FloatArray, seen: FloatArray, sensors: Sensors, told: BoolArray, distance: FloatArray, until: float
-) -> None:  # fmt: skip
-    """Give up each point (K, 3) last `seen` (K,) before `until` [s] through whose place its unit now looks.
+def give_up(tracks: TrackState, sensors: Sensors, tells: BoolArray, distance: FloatArray, until: float) -> None:
+    """Give up each point last seen before `until` [s] through whose place its unit now looks.
 
-    `told` (K,) are units with a new reading that tells something, `distance` (K,) [m] what they show, NaN for nothing.
+    `tells` (K,) are units with a new reading that tells something, `distance` (K,) [m] what they show, NaN for nothing.
     """
-    for k in range(len(seen)):
-        if told[k] and seen[k] < until:
-            away = _on_axis(sensors.position[k], sensors.rotation[k], point[k])
+    for k in range(len(tells)):
+        if tells[k] and tracks.seen[k] < until:
+            away = _on_axis(sensors.position[k], sensors.rotation[k], tracks.point[k])
             # what is nearer may hide the point: such a reading says nothing about it
             if away >= 0 and not distance[k] < away:
-                seen[k] = -np.inf
+                tracks.seen[k] = -np.inf
 
 
 @kernel
@@ -272,39 +228,36 @@ def spread(sigmas: float, position_sigma: Number, orientation_sigma: Number, dis
 
 
 @kernel
-def widen(
-    ends: FloatArray, sigmas: float, position_sigma: FloatArray, orientation_sigma: FloatArray, distance: FloatArray,
-    most: float,
-) -> None:  # fmt: skip
+def widen(ends: FloatArray, sigmas: float, skin: SkinArrays, distance: FloatArray, most: float) -> None:
     """Add to `ends` (K,) [m], up to which the arm and fixtures explain a reading, its spread, but no more than `most`.
 
     `distance` (K,) [m] is what each reading stands for.
     """
     for k in range(len(ends)):
         # an obstacle so close before the arm is not seen: `most` bounds how much a badly placed unit may hide
-        ends[k] += min(spread(sigmas, position_sigma[k], orientation_sigma[k], distance[k]), most)
+        ends[k] += min(spread(sigmas, skin.position_sigma[k], skin.orientation_sigma[k], distance[k]), most)
 
 
 @kernel
-def bring_nearer(
-    body_distance: FloatArray, ee_distance: FloatArray, point: FloatArray, unit: IntArray, sigmas: float,
-    skin: SkinArrays, kin: Kinematics,
-) -> None:  # fmt: skip
-    """Take its spread off the distances (M,) [m] of each point (M, 3), as far as the unit (M,) now is from it.
+def spread_of(point: FloatArray, k: int, sigmas: float, skin: SkinArrays, kin: Kinematics) -> float:
+    """Spread [m] of a point (3,) of unit k, as far as the unit now is from it."""
+    # from the unit as it is now, not as it measured: at 5 degrees u is off by 3 mm at most, without a memory of it
+    origin, R, away2 = kin.position[skin.link[k]], kin.rotation[skin.link[k]], 0.0
+    for i in range(3):
+        at = origin[i]
+        for j in range(3):
+            at += R[i, j] * skin.T_link_sensor[k, j, 3]
+        away2 += (point[i] - at) ** 2
+    turned = np.sqrt(skin.orientation_sigma[k] ** 2 + skin.cones.spread[skin.cones.kind[k]] ** 2)
+    return spread(sigmas, skin.position_sigma[k], turned, np.sqrt(away2))
 
-    The distance from the body may become negative, that from the end-effector is at least 0: eq. 3 makes a factor on
-    the speed of it.
+
+@kernel
+def bring_nearer(obstacles: Obstacles, m: int, u: float) -> None:
+    """Take its spread u [m] off the distances of obstacle m; direction and body point stay those of its point.
+
+    The distance from the body may become negative (eqs. 5-7), that from the end-effector is at least 0: eq. 3 makes a
+    factor on the speed of it.
     """
-    for m in range(len(point)):
-        k = unit[m]
-        # from the unit as it is now, not as it measured: at 5 degrees u is off by 3 mm at most, without a memory of it
-        origin, R, away2 = kin.position[skin.link[k]], kin.rotation[skin.link[k]], 0.0
-        for i in range(3):
-            at = origin[i]
-            for j in range(3):
-                at += R[i, j] * skin.T_link_sensor[k, j, 3]
-            away2 += (point[m, i] - at) ** 2
-        turned = np.sqrt(skin.orientation_sigma[k] ** 2 + skin.cones.spread[skin.cones.kind[k]] ** 2)
-        u = spread(sigmas, skin.position_sigma[k], turned, np.sqrt(away2))
-        body_distance[m] -= u
-        ee_distance[m] = max(0.0, ee_distance[m] - u)
+    obstacles.body_distance[m] -= u
+    obstacles.ee_distance[m] = max(0.0, obstacles.ee_distance[m] - u)

@@ -7,10 +7,10 @@ import numpy as np
 
 from pretouch.compiled import compiled, inlined, kernel
 from pretouch.errors import FixtureError
-from pretouch.groups import CapsuleArrays, Cones, Kinematics, Sensors
-from pretouch.perception.closest import bounds, to_axis, to_spheres
-from pretouch.robot.body import Capsules, no_capsules
-from pretouch.robot.vectors import dot, placed, rotate
+from pretouch.perception.closest import to_axis
+from pretouch.robot.body import Capsules, no_capsules, placed
+from pretouch.robot.kinematics import Kinematics, dot
+from pretouch.sensing.sensor import Cones, Sensors
 from pretouch.types import BoolArray, FloatArray
 
 _ROUNDING = 1e-9
@@ -32,7 +32,7 @@ class Fixtures:
             raise FixtureError(
                 f"The planes are {planes.tolist()}: give rows of four finite numbers, normal and offset."
             )
-        count = len(c)
+        count = len(c.radius)
         if c.a.shape != (count, 3) or c.b.shape != (count, 3) or c.link.shape != (count,):
             shapes = f"{c.link.shape}, {c.a.shape}, {c.b.shape} and {c.radius.shape}"
             raise FixtureError(f"The capsules' links, ends and radii have the shapes {shapes}: give one of each.")
@@ -76,8 +76,8 @@ def expected_range(kin: Kinematics, sensors: Sensors, cones: Cones, body: Capsul
     """
     near = np.array([plane_return(sensors, k, fixtures.planes, cones, np.inf) for k in range(len(sensors.link))])
     for part in (body, fixtures.capsules):
-        a, b = placed(part, kin)
-        capsules, spheres = CapsuleArrays(part.link, a, b, part.radius), bounds(a, b, part.radius)
+        capsules = placed(part, kin)
+        spheres = bounds(capsules)
         for k in range(len(near)):
             near[k] = min(near[k], nearest_capsule(sensors, k, capsules, spheres, cones))
     return near
@@ -96,16 +96,40 @@ class Wanted(NamedTuple):
     """The search ends with the first distance that counts and is no more [m], which then need not be the least."""
 
 
+@compiled
+def bounds(capsules: Capsules) -> FloatArray:
+    """Spheres (4, C) round capsules, a little larger than they need to be: x, y, z and radius [m]."""
+    _, a, b, radius = capsules
+    spheres = np.empty((4, len(radius)))
+    for c in range(len(radius)):
+        length2 = 0.0
+        for i in range(3):
+            spheres[i, c] = (a[c, i] + b[c, i]) / 2
+            length2 += (b[c, i] - a[c, i]) ** 2
+        # larger by more than rounding, so that what is left out changes no bit of the answer
+        spheres[3, c] = (np.sqrt(length2) / 2 + radius[c]) * (1 + 1e-12) + 1e-12
+    return spheres
+
+
+@kernel
+def to_spheres(point: FloatArray, k: int, spheres: FloatArray, gap2: FloatArray) -> None:
+    """Write the squared distance (C,) of point[k] from the middle of each sphere [m^2]."""
+    x, y, z = point[k, 0], point[k, 1], point[k, 2]
+    for c in range(len(gap2)):
+        u, v, w = spheres[0, c] - x, spheres[1, c] - y, spheres[2, c] - z
+        gap2[c] = u * u + v * v + w * w
+
+
 @kernel
 def leave_out(
     shows: BoolArray, fresh: BoolArray, distance: FloatArray, ends: FloatArray, aside: float, sensors: Sensors,
-    capsules: CapsuleArrays, cones: Cones,
+    capsules: Capsules, cones: Cones,
 ) -> None:  # fmt: skip
     """Take from `shows` (K,) each fresh reading that a placed capsule explains: one seen up to its `ends` (K,) [m].
 
     One that is missed by no more than `aside` [m] explains a `distance` (K,) [m] as far before as behind it.
     """
-    spheres = bounds(capsules.a, capsules.b, capsules.radius)
+    spheres = bounds(capsules)
     for k in range(len(shows)):
         end = ends[k]
         if fresh[k] and shows[k]:
@@ -114,29 +138,19 @@ def leave_out(
         if fresh[k] and shows[k] and aside > 0:
             # A capsule that is missed hides nothing behind it: only a reading from about there is taken for it. One
             # that comes nearer than that is out at its first such ray.
-            wanted = Wanted(aside, 2 * distance[k] - end, end, 2 * distance[k] - end)
-            shows[k] = capsule_return(sensors, k, capsules, spheres, cones, wanted) > end
-
-
-@kernel
-def leave_out_planes(
-    shows: BoolArray, fresh: BoolArray, ends: FloatArray, sensors: Sensors, planes: FloatArray, cones: Cones
-) -> None:  # fmt: skip
-    """Take from `shows` (K,) what planes explain, as `leave_out` does for capsules."""
-    for k in range(len(shows)):
-        if fresh[k] and shows[k]:
-            shows[k] = plane_return(sensors, k, planes, cones, ends[k]) > ends[k]
+            nearby = Wanted(aside, 2 * distance[k] - end, end, 2 * distance[k] - end)
+            shows[k] = capsule_return(sensors, k, capsules, spheres, cones, nearby) > end
 
 
 @compiled
-def nearest_capsule(sensors: Sensors, k: int, capsules: CapsuleArrays, spheres: FloatArray, cones: Cones) -> float:
+def nearest_capsule(sensors: Sensors, k: int, capsules: Capsules, spheres: FloatArray, cones: Cones) -> float:
     """Least distance [m] at which sensor k sees a placed capsule; `spheres` are those of `bounds`."""
     return capsule_return(sensors, k, capsules, spheres, cones, Wanted(0.0, -np.inf, np.inf, -np.inf))
 
 
 @kernel
 def capsule_return(
-    sensors: Sensors, k: int, capsules: CapsuleArrays, spheres: FloatArray, cones: Cones, wanted: Wanted
+    sensors: Sensors, k: int, capsules: Capsules, spheres: FloatArray, cones: Cones, wanted: Wanted
 ) -> float:
     """Least distance [m] at which sensor k sees a capsule that counts, infinite for none; `spheres` of `bounds`."""
     position, rotation, link, own = sensors.position, sensors.rotation, capsules.link, sensors.link[k]
@@ -171,24 +185,25 @@ def capsule_return(
 def plane_return(sensors: Sensors, k: int, planes: FloatArray, cones: Cones, within: float) -> float:
     """Least distance [m] at which sensor k sees a plane from its free side, infinite for none nearer than `within`."""
     position, rotation, rays = sensors.position, sensors.rotation, cones.rays[cones.kind[k]]
-    least, ray = np.inf, np.empty(3)
+    least, R = np.inf, rotation[k]
     for m in range(len(planes)):
         normal = planes[m]
         height = normal[0] * position[k, 0] + normal[1] * position[k, 1] + normal[2] * position[k, 2] - normal[3]
         # seen from its free side only; no ray comes to the plane in less than the height over it
         if 0 <= height <= within:
+            # in the sensor's frame, where the rays are given
+            x = normal[0] * R[0, 0] + normal[1] * R[1, 0] + normal[2] * R[2, 0]
+            y = normal[0] * R[0, 1] + normal[1] * R[1, 1] + normal[2] * R[2, 1]
+            z = normal[0] * R[0, 2] + normal[1] * R[1, 2] + normal[2] * R[2, 2]
             for i in range(len(rays)):
-                rotate(rotation[k], rays[i], ray)
-                rate = normal[0] * ray[0] + normal[1] * ray[1] + normal[2] * ray[2]
+                rate = x * rays[i, 0] + y * rays[i, 1] + z * rays[i, 2]
                 if rate < 0:
                     least = min(least, -height / rate)  # height + t rate = 0
     return least if least <= within else np.inf
 
 
 @inlined
-def _cone_meets(
-    sensors: Sensors, k: int, capsules: CapsuleArrays, c: int, edge: FloatArray, wanted: Wanted
-) -> bool:  # fmt: skip
+def _cone_meets(sensors: Sensors, k: int, capsules: Capsules, c: int, edge: FloatArray, wanted: Wanted) -> bool:
     """Whether the cone of sensor k, of such an edge, can meet capsule c within what is wanted; never wrongly no.
 
     With z along the beam and l across it, z sin - l cos is by how much a point lies inside the tangent plane of the
@@ -228,7 +243,7 @@ def _cone_meets(
 
 
 @inlined
-def _cast(sensors: Sensors, k: int, capsules: CapsuleArrays, c: int, rays: FloatArray, wanted: Wanted) -> float:
+def _cast(sensors: Sensors, k: int, capsules: Capsules, c: int, rays: FloatArray, wanted: Wanted) -> float:
     """Least distance [m] to capsule c along the rays of sensor k, or the first one that is enough."""
     position, rotation, a, b = sensors.position, sensors.rotation, capsules.a, capsules.b
     radius = capsules.radius[c] + wanted.aside

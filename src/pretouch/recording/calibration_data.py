@@ -10,8 +10,8 @@ from pretouch.recording.reader import Recorded, open_recording
 from pretouch.recording.ros import IMU, decoded
 from pretouch.recording.skin_reader import ImuRows, JointRows, holds_units, read_skin
 from pretouch.recording.skin_recording import KeptSample
-from pretouch.sensing.imu_scale import ACCELERATION_LSB, ANGULAR_RATE_LSB, LARGEST_COUNT
 from pretouch.sensing.skin import Skin
+from pretouch.sensing.unit import ACCELERATION_LSB, ANGULAR_RATE_LSB, LARGEST_COUNT
 from pretouch.traces import ImuTrace, JointTrace
 from pretouch.types import FloatArray, IntArray
 from pretouch.values import value

@@ -22,8 +22,7 @@ from pretouch.profiles import Profile
 from pretouch.recording.packing import packed, unpacked
 from pretouch.recording.versions import versions
 from pretouch.robot.body import Capsules
-from pretouch.robot.description import RobotDescription, fr3, panda
-from pretouch.robot.description_file import FILE, description_text, load_description
+from pretouch.robot.description import FILE, RobotDescription, description_text, fr3, load_description, panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.sensor import Sensor
 from pretouch.sensing.skin import Skin

@@ -1,36 +1,27 @@
 """The body of an arm as capsules fixed to its links, and places spread over its surface, where it may be touched."""
 
-from dataclasses import dataclass
-from functools import cached_property
+from typing import Annotated, NamedTuple
 
 import mujoco
 import numpy as np
 
+from pretouch.compiled import compiled
 from pretouch.errors import RobotModelError
-from pretouch.groups import CapsuleArrays, SurfaceArrays
+from pretouch.robot.kinematics import Kinematics
 from pretouch.types import BoolArray, FloatArray, IntArray
 
 
-@dataclass(frozen=True)
-class Capsules:
-    """C capsules: the points within `radius` of the segment from `a` to `b`, in the frame of a link."""
+class Capsules(NamedTuple):
+    """C capsules: the points within `radius` of the segment from `a` to `b`; on links, or placed in the base frame."""
 
-    link: IntArray
+    link: Annotated[IntArray, "C"]
     """(C,) index of the link each is fixed to."""
-    a: FloatArray
-    """(C, 3) one end of the axis, link frame [m]."""
-    b: FloatArray
-    """(C, 3) other end of the axis, link frame [m]."""
-    radius: FloatArray
+    a: Annotated[FloatArray, "C", 3]
+    """(C, 3) one end of the axis, link frame or base frame [m]."""
+    b: Annotated[FloatArray, "C", 3]
+    """(C, 3) other end of the axis [m]."""
+    radius: Annotated[FloatArray, "C"]
     """(C,) [m]."""
-
-    def __len__(self) -> int:
-        return len(self.radius)
-
-    @cached_property
-    def arrays(self) -> CapsuleArrays:
-        """The same for compiled code."""
-        return CapsuleArrays(self.link, self.a, self.b, self.radius)
 
     def of_links(self, links: IntArray) -> "Capsules":
         """Return the capsules on the given links, in order."""
@@ -41,6 +32,20 @@ class Capsules:
 def no_capsules() -> Capsules:
     """Return none."""
     return Capsules(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0))
+
+
+@compiled
+def placed(capsules: Capsules, kin: Kinematics) -> Capsules:
+    """Return capsules of an arm in a posture, placed in the base frame."""
+    a, b = np.empty((len(capsules.link), 3)), np.empty((len(capsules.link), 3))
+    for c in range(len(a)):
+        k = capsules.link[c]
+        for i in range(3):
+            a[c, i] = b[c, i] = kin.position[k, i]
+            for j in range(3):
+                a[c, i] += kin.rotation[k, i, j] * capsules.a[c, j]
+                b[c, i] += kin.rotation[k, i, j] * capsules.b[c, j]
+    return Capsules(capsules.link, a, b, capsules.radius)
 
 
 def capsules_of(model: mujoco.MjModel) -> Capsules:
@@ -77,8 +82,7 @@ _MOST_CAPSULES, _MOST_AREA = 200, 50.0
 """Capsules that joints move, and their area [m^2]: a Panda has 18 and 0.9 m^2. Time grows with the product of both."""
 
 
-@dataclass(frozen=True)
-class Surface:
+class Surface(NamedTuple):
     """N places on the outside of the capsules that joints move, those of a rigid body one after the other."""
 
     link: IntArray
@@ -94,58 +98,46 @@ class Surface:
     first: IntArray
     """(B + 1,) where the places of each rigid body begin, and N."""
 
-    def __len__(self) -> int:
-        return len(self.link)
-
-    @cached_property
-    def arrays(self) -> SurfaceArrays:
-        """The same for compiled code."""
-        return SurfaceArrays(self.link, self.point, self.normal, self.area, self.body, self.first)
-
 
 def bodies_of(moved_by: BoolArray) -> IntArray:
     """Return the rigid body (L,) of each link, given the joints (L, n) that move it; -1 of links that none moves."""
     patterns = [tuple(row) for row in moved_by.tolist()]
-    found: dict[tuple[bool, ...], int] = {}
+    bodies: dict[tuple[bool, ...], int] = {}
     for pattern in patterns:
         if any(pattern):
-            found.setdefault(pattern, len(found))
-    return np.array([found.get(pattern, -1) for pattern in patterns], dtype=np.int64)
+            bodies.setdefault(pattern, len(bodies))
+    return np.array([bodies.get(pattern, -1) for pattern in patterns], dtype=np.int64)
 
 
-def surface_of(
-    body: Capsules, moved_by: BoolArray, position: FloatArray, rotation: FloatArray, spacing: float = SPACING_M
-) -> Surface:
+def surface_of(body: Capsules, moved_by: BoolArray, kin: Kinematics, spacing: float = SPACING_M) -> Surface:
     """Spread places over C capsules, but for those inside another capsule of the same rigid body.
 
     Args:
         body: the capsules.
         moved_by: (L, n) whether a joint moves a link.
-        position: (L, 3) of the links in any one posture [m].
-        rotation: (L, 3, 3) of the links in it.
+        kin: any one posture.
         spacing: about the distance of neighbours [m].
 
     Raises RobotModelError for a body far larger than any arm's.
     """
     size = 2 * np.pi * float((body.radius * (np.linalg.norm(body.b - body.a, axis=1) + 2 * body.radius)).sum())
-    if len(body) > _MOST_CAPSULES or not size <= _MOST_AREA:
+    if len(body.radius) > _MOST_CAPSULES or not size <= _MOST_AREA:
         raise RobotModelError(
-            f"The joints move {len(body)} capsules of {size:.3g} m^2: describe the body by at most {_MOST_CAPSULES} of"
-            f" {_MOST_AREA:g} m^2 in metres."
+            f"The joints move {len(body.radius)} capsules of {size:.3g} m^2: describe the body by at most"
+            f" {_MOST_CAPSULES} of {_MOST_AREA:g} m^2 in metres."
         )
     rigid = bodies_of(moved_by)
-    a = position[body.link] + np.einsum("cij,cj->ci", rotation[body.link], body.a)
-    b = position[body.link] + np.einsum("cij,cj->ci", rotation[body.link], body.b)
+    _, a, b, _ = placed(body, kin)
     parts: list[tuple[IntArray, FloatArray, FloatArray, FloatArray]] = []
     for c in np.argsort(rigid[body.link], kind="stable"):
         point, normal, area = _on_capsule(a[c], b[c], float(body.radius[c]), spacing)
-        others = (rigid[body.link] == rigid[body.link[c]]) & (np.arange(len(body)) != c)
+        others = (rigid[body.link] == rigid[body.link[c]]) & (np.arange(len(a)) != c)
         away = np.linalg.norm(from_axes(point, a[others], b[others])[1], axis=2)
         free = (away > body.radius[others]).all(axis=1)
         link = int(body.link[c])
-        R = rotation[link]
+        R = kin.rotation[link]
         parts.append((
-            np.full(int(free.sum()), link), (point[free] - position[link]) @ R, normal[free] @ R, area[free]
+            np.full(int(free.sum()), link), (point[free] - kin.position[link]) @ R, normal[free] @ R, area[free]
         ))  # fmt: skip
     links, points, normals, areas = (np.concatenate(group) for group in zip(*parts, strict=True))
     count = rigid[links]

@@ -1,13 +1,26 @@
-"""What is known of an arm beside its MJCF: limits, names, postures, and where each figure comes from."""
+"""What is known of an arm beside its MJCF: limits, names, postures and where each figure comes from, in robot.toml."""
 
 from dataclasses import dataclass, replace
+from hashlib import sha256
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import tomli_w
 
 from pretouch.errors import RobotModelError
+from pretouch.toml_files import shown, table_of
 from pretouch.types import FloatArray
+
+FILE = "robot.toml"
+
+_TEXTS = ("name", "mjcf", "ee_body", "source")
+_LISTS = {"qd_max": "rad/s", "qdd_max": "rad/s^2", "tau_max": "Nm", "q_ready": "rad"}
+_ENVELOPE = {"offset": "rad/s", "slope": "rad/s^2", "q_upper": "rad", "q_lower": "rad"}
+_LARGEST = 1e6
+"""Largest number in a file: any larger one is a mistake."""
+_SHIPPED = Path(str(files("pretouch.robot") / "data"))
 
 
 @dataclass(frozen=True)
@@ -92,16 +105,7 @@ class RobotDescription:
 
 def panda() -> RobotDescription:
     """Franka Emika Panda with hand. Limits as published by the vendor (libfranka, `rate_limiting.h`)."""
-    return RobotDescription(
-        name="panda",
-        mjcf=Path(str(files("pretouch.robot") / "data" / "panda.xml")),
-        ee_body="panda_hand_tcp",
-        qd_max=np.array([2.175, 2.175, 2.175, 2.175, 2.61, 2.61, 2.61]),
-        qdd_max=np.array([15.0, 7.5, 10.0, 12.5, 15.0, 20.0, 20.0]),
-        tau_max=np.array([87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0]),
-        q_ready=np.array([0.0, -np.pi / 4, 0.0, -3 * np.pi / 4, 0.0, np.pi / 2, np.pi / 4]),
-        source="libfranka rate_limiting.h and the vendor's robot and interface specifications",
-    )
+    return load_description(_SHIPPED / "panda.toml")
 
 
 def fr3() -> RobotDescription:
@@ -109,21 +113,96 @@ def fr3() -> RobotDescription:
 
     The speed envelope of joints 2, 3 and 7 ends 0.1 to 0.4 mrad beyond their position limits: both apply.
     """
-    source = "libfranka rate_limiting.h for the FR3, franka_description 1.1.0"
-    return RobotDescription(
-        name="fr3",
-        mjcf=Path(str(files("pretouch.robot") / "data" / "fr3.xml")),
-        ee_body="fr3_hand_tcp",
-        qd_max=np.array([2.62, 2.62, 2.62, 2.62, 5.26, 4.18, 5.26]),
-        qdd_max=np.full(7, 10.0),
-        tau_max=np.array([87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0]),
-        q_ready=np.array([0.0, -np.pi / 4, 0.0, -3 * np.pi / 4, 0.0, np.pi / 2, np.pi / 4]),
-        source=source,
-        envelope=SpeedEnvelope(
-            offset=np.array([0.30, 0.20, 0.20, 0.30, 0.35, 0.35, 0.35]),
-            slope=np.array([12.0, 5.17, 7.0, 8.0, 34.0, 11.0, 34.0]),
-            q_upper=np.array([2.7501, 1.7918, 2.9065, -0.1458, 2.8101, 4.5205, 3.0196]),
-            q_lower=np.array([-2.7501, -1.7918, -2.9065, -3.0481, -2.8101, 0.54092, -3.0196]),
-            source=source,
-        ),
-    )
+    return load_description(_SHIPPED / "fr3.toml")
+
+
+ROBOTS = {"panda": panda, "fr3": fr3}
+"""Those that come with the package."""
+
+
+def is_shipped(arm: RobotDescription) -> bool:
+    """Whether an arm's model is one that comes with the package: a Panda or an FR3."""
+    return arm.mjcf.parent == _SHIPPED
+
+
+def robot_named(name: str) -> RobotDescription:
+    """Return the description of an arm, by its name or by the folder or robot.toml that it was imported to.
+
+    Raises RobotModelError where there is neither, or where the file is wrong.
+    """
+    if name in ROBOTS:
+        return ROBOTS[name]()
+    if not Path(name).exists():
+        raise RobotModelError(
+            f"There is no arm {name!r}: take one of {', '.join(ROBOTS)}, or a folder that"
+            " `pretouch robot import FILE --out FOLDER` wrote."
+        )
+    return load_description(name)
+
+
+def load_description(path: Path | str) -> RobotDescription:
+    """Read the description of an arm from robot.toml, or from the folder that holds it.
+
+    What is wrong with it is a RobotModelError that names the file, the key, the value and the way out.
+    """
+    path = Path(path)
+    if path.is_dir():
+        path = path / FILE
+    way_out = f"give {FILE} or its folder, as `pretouch robot import` writes it"
+    data = table_of(path, "robot file", RobotModelError, way_out)
+    n = len(_numbers(path, data, "q_ready", "rad", None))
+    table = data.pop("envelope", None)
+    fields = _fields(path, data, _TEXTS, _LISTS, n, "envelope")
+    envelope = {} if table is None else _fields(path, table, ("source",), _ENVELOPE, n)
+    try:
+        if envelope:
+            fields["envelope"] = SpeedEnvelope(**envelope)
+        return RobotDescription(**fields | {"mjcf": path.parent / fields["mjcf"]})
+    except (RobotModelError, OSError) as error:  # a file's name may be too long to look for
+        raise RobotModelError(f"{error} (in {path})") from error
+
+
+def description_text(arm: RobotDescription, mjcf: str = "") -> str:
+    """Return the robot.toml that `load_description` reads back to the same arm, beside its MJCF file of this name."""
+    texts = {"name": arm.name, "mjcf": mjcf or arm.mjcf.name, "ee_body": arm.ee_body, "source": arm.source}
+    e = arm.envelope
+    envelope = {} if e is None else {"envelope": _lists(e, _ENVELOPE) | {"source": e.source}}
+    return tomli_w.dumps(texts | _lists(arm, _LISTS) | envelope)
+
+
+def _lists(described: RobotDescription | SpeedEnvelope, names: dict[str, str]) -> dict[str, Any]:
+    return {name: getattr(described, name).tolist() for name in names}
+
+
+def files_digest(arm: RobotDescription) -> str:
+    """Return the SHA-256 of an arm's description and MJCF file."""
+    return sha256(description_text(arm).encode() + arm.mjcf.read_bytes()).hexdigest()
+
+
+def _fields(
+    path: Path, table: Any, texts: tuple[str, ...], lists: dict[str, str], n: int, *others: str
+) -> dict[str, Any]:
+    """Return the texts and the lists of n numbers of a table, which has no other keys than these and `others`."""
+    if not isinstance(table, dict):
+        raise RobotModelError(f"{path}: envelope is {shown(table)}: give a table [envelope].")
+    unknown = sorted(set(table) - {*texts, *lists})
+    if unknown:
+        raise RobotModelError(f"{path}: the key {unknown[0]!r} is unknown: use {', '.join((*texts, *lists, *others))}.")
+    for key in texts:
+        text = table.get(key)
+        if not isinstance(text, str) or (key != "source" and not (text.isprintable() and text)):
+            raise RobotModelError(f"{path}: {key} is {shown(text)}: give printable text in quotes.")
+    return {key: table[key] for key in texts} | {
+        key: _numbers(path, table, key, unit, n) for key, unit in lists.items()
+    }
+
+
+def _numbers(path: Path, table: dict[str, Any], key: str, unit: str, n: int | None) -> FloatArray:
+    numbers = table.get(key)
+    ok = isinstance(numbers, list) and len(numbers) > 0 and n in (None, len(numbers))
+    if not ok or not all(type(v) in (int, float) and abs(v) <= _LARGEST for v in numbers or []):
+        count = "" if n is None else f"{n} "
+        raise RobotModelError(
+            f"{path}: {key} is {shown(numbers)}: give a list of {count}finite numbers, one a joint [{unit}]."
+        )
+    return np.array(numbers, dtype=np.float64)

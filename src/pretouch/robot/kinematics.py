@@ -6,7 +6,6 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from pretouch.compiled import compiled, kernel
-from pretouch.groups import Chain, Kinematics, Mechanism
 from pretouch.types import BoolArray, FloatArray, IntArray
 
 
@@ -21,6 +20,63 @@ class Hinges(NamedTuple):
     """(L, 3, 4) rotation and origin [m] of each link in its parent's frame, with its joints at rest."""
     joint: Annotated[FloatArray, "n", 7]
     """(n, 7) of each joint a point on its axis [m] and the axis, frame of its link, and q at rest [rad]."""
+
+
+class Arm(NamedTuple):
+    """What moves what, of `RobotModel`. L links, n joints."""
+
+    moved_by: Annotated[BoolArray, "L", "n"]
+    """(L, n) whether a joint moves a link."""
+    ee: int
+    """Index of the end-effector's link."""
+
+
+class Links(NamedTuple):
+    """Masses and places of the links, of `RobotModel`."""
+
+    mass: Annotated[FloatArray, "L"]
+    """(L,) [kg]."""
+    com: Annotated[FloatArray, "L", 3]
+    """(L, 3) centre of mass, link frame [m]."""
+    inertia: Annotated[FloatArray, "L", 3, 3]
+    """(L, 3, 3) about it, axes of the link frame [kg m^2]."""
+    parts: Annotated[IntArray, "P"]
+    """(P,) links of the body that joints move."""
+    middle: Annotated[FloatArray, "P", 3]
+    """(P, 3) the middle of each one's capsules, link frame [m]."""
+
+
+class Mechanism(NamedTuple):
+    """An arm with its masses."""
+
+    arm: Arm
+    links: Links
+
+
+class Kinematics(NamedTuple):
+    """Where everything is in one posture, base frame. L links (bodies of the MJCF, world first), n joints."""
+
+    position: Annotated[FloatArray, "L", 3]
+    """(L, 3) link origins [m]."""
+    rotation: Annotated[FloatArray, "L", 3, 3]
+    """(L, 3, 3) link orientations R_O_link."""
+    anchor: Annotated[FloatArray, "n", 3]
+    """(n, 3) a point on each joint's axis [m]."""
+    axis: Annotated[FloatArray, "n", 3]
+    """(n, 3) unit vectors of the joint axes."""
+
+
+class Chain(NamedTuple):
+    """The moving joints (n,) in one posture: what a point's Jacobian and its speed are made of."""
+
+    anchor: FloatArray
+    """(n, 3) a point on each axis [m]."""
+    axis: FloatArray
+    """(n, 3) its direction."""
+    moved_by: BoolArray
+    """(L, n) whether a joint moves a link."""
+    qd: FloatArray
+    """(n,) joint velocities [rad/s]."""
 
 
 @compiled
@@ -130,36 +186,37 @@ def mass_matrix_into(kin: Kinematics, mechanism: Mechanism, M: FloatArray) -> No
             M[k, j] = M[j, k]
 
 
-@compiled
-def chain_motion(
-    anchor: FloatArray, axis: FloatArray, qd: FloatArray, qdd: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Motion, base frame, of what moves with the first 0, 1, ... n joints: (n + 1, 3) each.
-
-    Angular velocity [rad/s], angular acceleration [rad/s^2], acceleration of a point [m/s^2], and that point [m]. The
-    first two arguments are those of `Kinematics`; joint velocities [rad/s] and accelerations [rad/s^2] are (n,).
-    """
-    n = len(qd)
-    w, alpha, a, point = np.zeros((n + 1, 3)), np.zeros((n + 1, 3)), np.zeros((n + 1, 3)), np.zeros((n + 1, 3))
-    for j in range(n):
-        a[j + 1] = a[j] + lever_acceleration(w[j], alpha[j], anchor[j] - point[j])
-        point[j + 1] = anchor[j]
-        turn = axis[j] * qd[j]
-        alpha[j + 1] = alpha[j] + cross(w[j], turn) + axis[j] * qdd[j]
-        w[j + 1] = w[j] + turn
-    return w, alpha, a, point
-
-
-@compiled
-def lever_acceleration(w: FloatArray, alpha: FloatArray, r: FloatArray) -> FloatArray:
-    """Acceleration (3,) [m/s^2] of one point of a body relative to another that is r (3,) [m] before it.
-
-    `w` (3,) is the body's angular velocity [rad/s], `alpha` (3,) its angular acceleration [rad/s^2].
-    """
-    return cross(alpha, r) + cross(w, cross(w, r))
+@kernel
+def rotate(R: FloatArray, v: FloatArray, out: FloatArray) -> None:
+    """Write R @ v of a matrix (3, 3) and a vector (3,) to `out` (3,), which is another array."""
+    for i in range(3):
+        out[i] = R[i, 0] * v[0] + R[i, 1] * v[1] + R[i, 2] * v[2]
 
 
 @kernel
-def cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Cross product (3,)."""
-    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+def dot(a: FloatArray, b: FloatArray) -> float:
+    """Scalar product of two vectors (3,)."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@compiled
+def below(numbers: FloatArray, bound: float) -> bool:
+    """Whether all numbers (k,) are smaller than a bound in size; one that is NaN is not."""
+    for number in numbers:  # noqa: SIM110  compiled code knows no generators
+        if not abs(number) < bound:
+            return False
+    return True
+
+
+@compiled
+def rotation_error(rotation: FloatArray, goal: FloatArray) -> FloatArray:
+    """Rotation from one orientation to the other (3,): the unit axis times the sine of the angle, base frame."""
+    error = np.zeros(3)
+    # Half the sum of the cross products of each axis of the one with its like of the other. The sine falls again beyond
+    # a right angle and is 0 for a half turn: good for holding an orientation, not for turning to a far one.
+    for i in range(3):
+        x, y, z = rotation[0, i], rotation[1, i], rotation[2, i]
+        error[0] += 0.5 * (y * goal[2, i] - z * goal[1, i])
+        error[1] += 0.5 * (z * goal[0, i] - x * goal[2, i])
+        error[2] += 0.5 * (x * goal[1, i] - y * goal[0, i])
+    return error

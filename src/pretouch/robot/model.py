@@ -6,10 +6,9 @@ import mujoco
 import numpy as np
 
 from pretouch.errors import RobotModelError
-from pretouch.groups import Arm, Kinematics, Links, Mechanism
 from pretouch.robot.body import Capsules, Surface, bodies_of, capsules_of, surface_of
 from pretouch.robot.description import RobotDescription
-from pretouch.robot.kinematics import Hinges, jacobian_into, mass_matrix_into, place
+from pretouch.robot.kinematics import Arm, Hinges, Kinematics, Links, Mechanism, jacobian_into, mass_matrix_into, place
 from pretouch.types import BoolArray, FloatArray, IntArray
 
 
@@ -48,9 +47,6 @@ class RobotModel:
         self.scratch = self._model, self._data
         """MuJoCo's model and data, for compiled code that does in them what the methods here do."""
         self.n: int = self._model.nv
-        # views into MuJoCo's memory, taken once: looking an attribute up costs as much as the arithmetic
-        data = self._data
-        self._qpos, self._qvel = data.qpos, data.qvel
         self._check()
         self.links: tuple[str, ...] = tuple(self._model.body(i).name for i in range(self._model.nbody))
         """Names of the links; a link's index is its place here, 0 is the world."""
@@ -67,29 +63,22 @@ class RobotModel:
         """(L, n) whether a joint moves a link."""
         self.body: Capsules = self.capsules.of_links(np.flatnonzero(self.moved_by.any(axis=1)))
         """The part of the body that any joint moves."""
-        if not len(self.body):
+        if not len(self.body.link):
             raise RobotModelError(f"{description.name}: no joint moves a capsule: give the links capsule geoms.")
         self.apart: IntArray = self._pairs_apart()
-        """(P, 2) pairs of capsules that two joints or more part, by their index; see `robot.self_distance`."""
-        self.mass: FloatArray = self._model.body_mass.copy()
-        """(L,) mass of each link [kg]."""
-        self.com: FloatArray = self._model.body_ipos.copy()
-        """(L, 3) centre of mass of each link, link frame [m]."""
-        self.inertia: FloatArray = self._inertia()
-        """(L, 3, 3) of each link about it, axes of the link frame [kg m^2]."""
+        """(P, 2) pairs of capsules that two joints or more part, by their index; see `robot.postures`."""
         self.parts: IntArray = np.unique(self.body.link)
         """(P,) links of the body."""
         centers = (self.body.a + self.body.b) / 2
-        self.middle: FloatArray = np.array([centers[self.body.link == part].mean(axis=0) for part in self.parts])
-        """(P, 3) the middle of each one's capsules, link frame [m]."""
+        middle = np.array([centers[self.body.link == part].mean(axis=0) for part in self.parts])
+        mass, com = self._model.body_mass.copy(), self._model.body_ipos.copy()
+        self.mechanism = Mechanism(Arm(self.moved_by, self.ee), Links(mass, com, self._inertia(), self.parts, middle))
+        """Its links, for compiled code."""
         rest = self.kinematics(np.zeros(self.n))
-        self.surface: Surface = surface_of(self.body, self.moved_by, rest.position, rest.rotation)
+        self.surface: Surface = surface_of(self.body, self.moved_by, rest)
         """Places where the arm may be touched."""
         self.rigid: IntArray = bodies_of(self.moved_by)
         """(L,) the rigid body each link belongs to, from 0; -1 of links that no joint moves."""
-        self.arm = Arm(self.moved_by, self.ee)
-        self.mechanism = Mechanism(self.arm, Links(self.mass, self.com, self.inertia, self.parts, self.middle))
-        """Both for compiled code."""
         self.q_min: FloatArray = self._model.jnt_range[:, 0].copy()
         self.q_max: FloatArray = self._model.jnt_range[:, 1].copy()
         self.q_mid: FloatArray = (self.q_min + self.q_max) / 2
@@ -138,8 +127,8 @@ class RobotModel:
         try:
             return self.links.index(name)
         except ValueError:
-            known = ", ".join(self.links[1:])
-            raise RobotModelError(f"The link {name!r} is unknown: choose from {known}.") from None
+            links = ", ".join(self.links[1:])
+            raise RobotModelError(f"The link {name!r} is unknown: choose from {links}.") from None
 
     def kinematics(self, q: FloatArray) -> Kinematics:
         """Compute poses and joint axes at joint positions q (n,) [rad]."""
@@ -177,8 +166,7 @@ class RobotModel:
     def mass_matrix_and_bias(self, q: FloatArray, qd: FloatArray, bias: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Compute the mass matrix (n, n) and, into `bias` (n,), Coriolis plus gravity torques [Nm]."""
         model, data = self._model, self._data
-        self._qpos[:] = q
-        self._qvel[:] = qd
+        data.qpos[:], data.qvel[:] = q, qd
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
         mujoco.mj_crb(model, data)

@@ -3,15 +3,14 @@
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Annotated, Any, cast
+from typing import Annotated, Any, NamedTuple, cast
 
 import numpy as np
 
 from pretouch.checks import Check, Positive
 from pretouch.composition import Part
 from pretouch.errors import ParameterError, SkinError
-from pretouch.groups import Cones
-from pretouch.types import FloatArray, Number
+from pretouch.types import FloatArray, IntArray, Number
 
 MOST_ZONES = 8
 """Zones along a side: a type with more is a depth camera, whose points are an outside source."""
@@ -198,6 +197,32 @@ class Capacitive(Sensor, name="capacitive"):
         return math.hypot((1.0 - math.cos(self.angle / 2)) / 2, self.spread_1)
 
 
+class Sensors(NamedTuple):
+    """K sensors, placed in the base frame."""
+
+    position: FloatArray
+    """(K, 3) [m]."""
+    rotation: FloatArray
+    """(K, 3, 3), z along the beam."""
+    link: IntArray
+    """(K,) link each sits on."""
+
+
+class Cones(NamedTuple):
+    """What K sensors of T kinds see: a cone about the axis of each."""
+
+    kind: Annotated[IntArray, "K"]
+    """(K,) which kind each is of."""
+    edge: Annotated[FloatArray, "T", 3]
+    """(T, 3) cosine, sine and tangent of half the angle."""
+    range: Annotated[FloatArray, "T", 2]
+    """(T, 2) nearest and farthest distance that is measured [m]."""
+    rays: Annotated[FloatArray, "T", "R", 3]
+    """(T, R, 3) unit vectors that fill the cone, sensor frame, the axis first."""
+    spread: Annotated[FloatArray, "T"]
+    """(T,) standard deviation of the direction a target lies in, beside what is not known of the unit's own [rad]."""
+
+
 PAPER_SENSOR = VL53L1X()
 """What a unit has unless its skin file says otherwise."""
 
@@ -233,17 +258,10 @@ _LIKE, _OWN = "like", "own_name"
 
 def sensor_called(name: Any, of: str, types: dict[str, Sensor]) -> Sensor:
     """Return the sensor of a type, by its name in a skin file; `of` says what has it, `types` are the file's own."""
-    known = (*types, *Sensor.choices())
-    if not isinstance(name, str) or name not in known:
-        raise SkinError(f"{of} has the sensor {name!r}: choose from {', '.join(known)}, or describe [sensor.NAME].")
+    names = (*types, *Sensor.choices())
+    if not isinstance(name, str) or name not in names:
+        raise SkinError(f"{of} has the sensor {name!r}: choose from {', '.join(names)}, or describe [sensor.NAME].")
     return types[name] if name in types else cast(Sensor, Sensor.called(name)())
-
-
-def sensor_tables(tables: Any) -> dict[str, Any]:
-    """Return what a skin file has of its own types, by name."""
-    if not isinstance(tables, dict):
-        raise SkinError(f"sensor is {tables!r}: write a table [sensor.NAME] for each type of your own.")
-    return tables
 
 
 def own_type(name: str, table: Any) -> Sensor:
@@ -254,12 +272,17 @@ def own_type(name: str, table: Any) -> Sensor:
     like = sensor_called(table.get(_LIKE, PAPER_SENSOR.name), of, {})
     if name in Sensor.choices():
         raise SkinError(f"{of} is known by that name already: give yours another, and like = {name!r}.")
-    allowed = [f.name for f in fields(like) if f.name != _OWN]
-    unknown = sorted(set(table) - {_LIKE, *allowed})
+    return cast(Sensor, replace(changed_by(like, table, of, _LIKE), own_name=name))
+
+
+def changed_by(usual: Any, table: dict[str, Any], of: str, *others: str) -> Any:
+    """Return parameters with what differs in a table of a skin file, `of` something; the table may have other keys."""
+    allowed = [f.name for f in fields(usual) if f.name != _OWN]
+    unknown = sorted(set(table) - {*others, *allowed})
     if unknown:
-        raise SkinError(f"{of} has the unknown key {unknown[0]!r}: use {_LIKE}, {', '.join(allowed)}.")
+        raise SkinError(f"{of} has the unknown key {unknown[0]!r}: use {', '.join((*others, *allowed))}.")
     try:
-        return replace(like, **{key: value for key, value in table.items() if key != _LIKE}, own_name=name)
+        return replace(usual, **{key: value for key, value in table.items() if key not in others})
     except ParameterError as error:
         raise SkinError(f"{of} cannot be: {error}") from error
 

@@ -1,33 +1,32 @@
 """A set of sensor units on one arm, and the TOML file that describes it."""
 
 import math
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
+from dataclasses import asdict
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import tomli_w
+from msgspec import Struct, ValidationError, convert
 
 from pretouch.atomic_write import atomic_write
 from pretouch.errors import SkinError
-from pretouch.groups import Cones, SkinArrays
 from pretouch.robot.description import RobotDescription
 from pretouch.robot.model import RobotModel
-from pretouch.sensing.sensor import PAPER_SENSOR, Sensor, cones_of, own_type, sensor_called, sensor_tables, tables_of
-from pretouch.sensing.unit import (
-    LARGEST_NUMBER,
-    LARGEST_ORIENTATION_SIGMA,
-    LARGEST_POSITION_SIGMA,
-    NetworkUnits,
-    SensorUnit,
-    TouchPatch,
-    mounted,
-    seat,
-    zones_of,
+from pretouch.sensing.sensor import (
+    PAPER_SENSOR,
+    Cones,
+    Sensor,
+    changed_by,
+    cones_of,
+    own_type,
+    sensor_called,
+    tables_of,
 )
-from pretouch.toml_files import read_toml
+from pretouch.sensing.unit import NetworkUnits, SensorUnit, TouchPatch, mounted, seat, zones_of
+from pretouch.toml_files import shown, table_of
 from pretouch.types import FloatArray, IntArray
 
 _FAR = 0.5
@@ -35,13 +34,26 @@ _FAR = 0.5
 
 _MOST_UNITS = 2048
 """Units and zones on one arm, 32 units of 8 x 8: what a step and a model's check take grows with their number."""
-_LARGEST_COMPONENT = 10.0
-"""Largest component of a quaternion that is looked at any further."""
 
 PAPER_SKIN = Path(str(files("pretouch.sensing") / "data" / "panda_seven_units.toml"))
 """The file of `paper_skin` for the Panda."""
 LIVE_SKIN = PAPER_SKIN.with_name("panda_live.toml")
 """34 units for the Panda of the live page, where people put their hands; the FR3 has the same."""
+
+
+class SkinArrays(NamedTuple):
+    """The K units of a `Skin`."""
+
+    link: Annotated[IntArray, "K"]
+    """(K,) link each sits on."""
+    T_link_sensor: Annotated[FloatArray, "K", 4, 4]
+    """(K, 4, 4)."""
+    position_sigma: Annotated[FloatArray, "K"]
+    """(K,) standard deviation of its position [m]."""
+    orientation_sigma: Annotated[FloatArray, "K"]
+    """(K,) standard deviation of its orientation [rad]."""
+    cones: Cones
+    """What each sees."""
 
 
 class Skin:
@@ -123,39 +135,25 @@ def _check_place(unit: SensorUnit, model: RobotModel) -> None:
 
 def load_skin(path: Path | str, model: RobotModel) -> Skin:
     """Read a skin file. What is wrong with it is a SkinError that names the file and the unit, and the way out."""
-    path = Path(path)
-    try:
-        data = read_toml(path)
-    except OSError as error:
-        raise SkinError(f"The skin file {path} cannot be read: {error.strerror}.") from error
-    except UnicodeDecodeError as error:
-        raise SkinError(f"The skin file {path} is not UTF-8 text: {error.reason} at byte {error.start}.") from error
-    except ValueError as error:  # not of TOML, an integer too long, brackets too deep
-        raise SkinError(f"The skin file {path} is not valid TOML: {error}.") from error
-    entries = data.get("unit")
+    path, place = Path(path), ""
+    data = table_of(path, "skin file", SkinError)
+    entries, tables = data.get("unit"), data.get("sensor", {})
     if not isinstance(entries, list) or not entries:
         raise SkinError(f"The skin file {path} has no unit: give at least one [[unit]] with id, link and pose.")
-    types, units = dict[str, Sensor](), list[SensorUnit]()
-    with _said_where(path):
-        tables = sensor_tables(data.get("sensor", {}))
+    try:
+        if not isinstance(tables, dict):
+            raise SkinError(f"sensor is {tables!r}: write a table [sensor.NAME] for each type of your own.")
+        types = {name: own_type(name, table) for name, table in tables.items()}
         _check_count(len(entries))
-    for name, table in tables.items():
-        with _said_where(path):
-            types[name] = own_type(name, table)
-    for number, entry in enumerate(entries, 1):
-        with _said_where(path, f", unit {number} of {len(entries)}"):
+        units = list[SensorUnit]()
+        for number, entry in enumerate(entries, 1):
+            place = f", unit {number} of {len(entries)}"
             units.append(_unit_from(entry, types))
             _check_place(units[-1], model)
-    with _said_where(path):
+        place = ""
         return Skin(units, model)
-
-
-@contextmanager
-def _said_where(path: Path, unit: str = "") -> Iterator[None]:
-    try:
-        yield
     except SkinError as error:
-        raise SkinError(f"{error} (in {path}{unit})") from error
+        raise SkinError(f"{error} (in {path}{place})") from error
 
 
 def save_skin(skin: Skin, path: Path) -> None:
@@ -208,28 +206,31 @@ def skin_for(model: RobotModel, file: Path | str = "") -> Skin:
     return load_skin(file or skin_file(model.description), model)
 
 
-_KEYS = ("id", "link", "position_m", "quaternion_wxyz", "position_sigma_m", "orientation_sigma_rad", "touch", "sensor")
-_ARRAYS = ("position_m", "quaternion_wxyz")
-_TOUCH_KEYS = {"radius_m": "radius", "force_min_n": "force_min", "measures_force": "measures_force"}
+class _UnitTable(Struct, forbid_unknown_fields=True):
+    """A [[unit]] of a skin file."""
+
+    id: str
+    link: str
+    position_m: tuple[float, float, float]
+    """From the link's origin [m]."""
+    quaternion_wxyz: tuple[float, float, float, float]
+    """Of the sensor's axes in the link's."""
+    position_sigma_m: float = 0.0
+    orientation_sigma_rad: float = 0.0
+    touch: bool | dict[str, Any] = False
+    """True for the usual touch sensor, or what differs from it."""
+    sensor: Any = PAPER_SENSOR.label
+    """Name of its type."""
 
 
 def _entry(unit: SensorUnit) -> dict[str, Any]:
     """Return the table of a unit in a skin file."""
-    entry: dict[str, Any] = {
-        "id": unit.id,
-        "link": unit.link,
-        "position_m": [float(v) for v in unit.T_link_sensor[:3, 3]],
-        "quaternion_wxyz": _quaternion(unit.T_link_sensor[:3, :3]),
-    }
-    sigmas = {"position_sigma_m": unit.position_sigma, "orientation_sigma_rad": unit.orientation_sigma}
-    entry |= {key: sigma for key, sigma in sigmas.items() if sigma}
-    entry |= {} if unit.sensor == PAPER_SENSOR else {"sensor": unit.sensor.label}
-    return entry if unit.touch is None else entry | {"touch": _touch_entry(unit.touch)}
-
-
-def _touch_entry(touch: TouchPatch) -> bool | dict[str, float | bool]:
-    """Return what stands of a touch sensor in a skin file: true for the usual one."""
-    return touch == TouchPatch() or {key: getattr(touch, name) for key, name in _TOUCH_KEYS.items()}
+    T, touch = unit.T_link_sensor, unit.touch is not None and (unit.touch == TouchPatch() or asdict(unit.touch))
+    pose, sigmas = (T[:3, 3].tolist(), _quaternion(T[:3, :3])), (unit.position_sigma, unit.orientation_sigma)
+    entry = (unit.id, unit.link, *pose, *sigmas, touch, unit.sensor.label)
+    names, usual = _UnitTable.__struct_fields__, _UnitTable.__struct_defaults__
+    defaults = dict(zip(names[-len(usual) :], usual, strict=True))
+    return {name: value for name, value in zip(names, entry, strict=True) if value != defaults.get(name)}
 
 
 def sensor_unit(**entry: Any) -> SensorUnit:
@@ -240,82 +241,31 @@ def sensor_unit(**entry: Any) -> SensorUnit:
             in the link's, and, where they are known, `position_sigma_m` [m], `orientation_sigma_rad` [rad], `touch`
             (true, or its values) and `sensor` (the name of a type).
     """
-    return _unit_from(
-        {key: np.asarray(value).tolist() if key in _ARRAYS else value for key, value in entry.items()}, {}
-    )
+    arrays = ("position_m", "quaternion_wxyz")
+    return _unit_from({key: np.asarray(v).tolist() if key in arrays else v for key, v in entry.items()}, {})
 
 
 def _unit_from(entry: Any, types: dict[str, Sensor]) -> SensorUnit:
     if not isinstance(entry, dict):
-        raise SkinError(f"A unit is {_shown(entry)}: write it as a [[unit]] table.")
-    name = entry.get("id")
-    if not isinstance(name, str) or not name.isprintable():
-        raise SkinError(f"A unit has the id {_shown(name)}: give each [[unit]] an id in quotes, printable throughout.")
-    unknown = sorted(set(entry) - set(_KEYS))
-    if unknown:
-        key = unknown[0] if unknown[0].isprintable() else repr(unknown[0])
-        raise SkinError(f"Unit {name} has the unknown key {key}: use {', '.join(_KEYS)}.")
-    if not isinstance(entry.get("link"), str):
-        raise SkinError(f"Unit {name} has the link {_shown(entry.get('link'))}: give the name of a link in quotes.")
+        raise SkinError(f"A unit is {shown(entry)}: write it as a [[unit]] table.")
+    id = entry.get("id")
+    name = f"Unit {id}" if isinstance(id, str) and id.isprintable() else "A unit"
+    try:
+        table = convert(entry, _UnitTable)
+    except ValidationError as error:
+        what = str(error) if str(error).isprintable() else ascii(str(error))
+        raise SkinError(f"{name}: {what}: a [[unit]] has {', '.join(_UnitTable.__struct_fields__)}.") from error
+    length = math.hypot(*table.quaternion_wxyz)
+    if not abs(length - 1.0) <= 1e-3:
+        raise SkinError(f"{name}: quaternion_wxyz has length {length:.4g}: it must be 1 to be a rotation.")
     T = np.eye(4)
-    T[:3, 3] = _numbers(entry, "position_m", 3, LARGEST_NUMBER)
-    quaternion = _numbers(entry, "quaternion_wxyz", 4, _LARGEST_COMPONENT)
-    if abs(np.linalg.norm(quaternion) - 1) > 1e-3:
-        raise SkinError(
-            f"Unit {name}: quaternion_wxyz has length {np.linalg.norm(quaternion):.4f}: it must be 1 to be a rotation."
-        )
-    T[:3, :3] = _rotation(*quaternion.tolist())
-    position_sigma = _sigma(entry, "position_sigma_m", LARGEST_POSITION_SIGMA)
-    orientation_sigma = _sigma(entry, "orientation_sigma_rad", LARGEST_ORIENTATION_SIGMA)
-    sensor = sensor_called(entry.get("sensor", PAPER_SENSOR.name), f"Unit {name}", types)
-    return SensorUnit(name, entry["link"], T, position_sigma, orientation_sigma, _touch(entry), sensor)
-
-
-def _touch(entry: dict[str, Any]) -> TouchPatch | None:
-    """Read a unit's touch sensor: true or false, or a table."""
-    value = entry.get("touch", False)
-    if isinstance(value, bool):
-        return TouchPatch() if value else None
-    if not isinstance(value, dict):
-        raise SkinError(f"Unit {entry['id']}: touch is {_shown(value)}: write true, or a table of {_TOUCH_TABLE}.")
-    unknown = sorted(set(value) - set(_TOUCH_KEYS))
-    if unknown:
-        raise SkinError(f"Unit {entry['id']}: touch has the unknown key {unknown[0]!r}: use {_TOUCH_TABLE}.")
-    try:
-        return TouchPatch(**{_TOUCH_KEYS[key]: item for key, item in value.items()})
-    except SkinError as error:
-        raise SkinError(f"Unit {entry['id']}: {error}") from error
-
-
-_TOUCH_TABLE = ", ".join(_TOUCH_KEYS)
-
-
-def _numbers(entry: dict[str, Any], key: str, count: int, largest: float) -> FloatArray:
-    value = entry.get(key)
-    ok = isinstance(value, list) and len(value) == count
-    if not ok or not all(type(v) in (int, float) and abs(v) <= largest for v in value or []):
-        raise SkinError(
-            f"Unit {entry['id']}: {key} is {_shown(value)}:"
-            f" give {count} finite numbers, none beyond {largest:g} or -{largest:g}."
-        )
-    return np.array(value, dtype=np.float64)
-
-
-def _sigma(entry: dict[str, Any], key: str, largest: float) -> float:
-    value = entry.get(key, 0.0)
-    if type(value) not in (int, float) or not 0 <= value <= largest:
-        raise SkinError(
-            f"Unit {entry['id']}: {key} is {_shown(value)}: give a standard deviation from 0 to {largest:.4g}."
-        )
-    return float(value)
-
-
-def _shown(value: Any) -> str:
-    """Show a value in a message. An integer in hexadecimal may have more digits than Python writes out."""
-    try:
-        return repr(value)
-    except ValueError:
-        return "too long to show"
+    T[:3, :3], T[:3, 3] = _rotation(*table.quaternion_wxyz), table.position_m
+    touch = changed_by(TouchPatch(), table.touch, f"{name}: touch") if isinstance(table.touch, dict) else None
+    sensor = sensor_called(table.sensor, name, types)
+    return SensorUnit(
+        table.id, table.link, T, table.position_sigma_m, table.orientation_sigma_rad,
+        TouchPatch() if table.touch is True else touch, sensor,
+    )  # fmt: skip
 
 
 def _rotation(w: float, x: float, y: float, z: float) -> FloatArray:

@@ -1,11 +1,13 @@
-"""One sensor unit: a range finder at a known place on a link, of one beam or of zones; and units on the network."""
+"""One sensor unit: a range finder at a known place on a link, of one beam or of zones; its traffic, and its IMU."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from itertools import accumulate
+from typing import Annotated
 
 import numpy as np
 
+from pretouch.checks import Check, Checked
 from pretouch.errors import SkinError
 from pretouch.robot.body import from_axes
 from pretouch.robot.model import RobotModel
@@ -22,38 +24,20 @@ LARGEST_ORIENTATION_SIGMA = np.pi / 2
 """Largest standard deviation of a unit's orientation [rad]: beyond it nothing is known of where it looks."""
 
 
-LARGEST_PATCH = 0.2
-"""Largest radius of the patch a unit measures a touch in [m]: a larger one says nothing of where."""
-
-LARGEST_FORCE = 100.0
-"""Largest force [N] a touch sensor may need to report a touch: beyond it a person is hurt before."""
-
-
 @dataclass(frozen=True)
-class TouchPatch:
+class TouchPatch(Checked):
     """The touch sensor of a unit: a round patch about the unit, on its link's surface.
 
     The values are those of a unit whose case, 40 mm wide, rests on a force-sensing resistor of Interlink's 400 series
     (data sheet: it measures from 0.1 N on; a case held by foam so that it does not press by itself takes more).
     """
 
-    radius: float = 0.02
-    """Radius of the patch [m]."""
-    force_min: float = 0.5
-    """Smallest force that counts as a touch [N]."""
+    radius_m: Annotated[float, Check(0.0, 0.2, open_low=True)] = 0.02
+    """Radius of the patch [m]: a larger one says nothing of where."""
+    force_min_n: Annotated[float, Check(0.0, 100.0, open_low=True)] = 0.5
+    """Smallest force that counts as a touch [N]: beyond 100 N a person is hurt before."""
     measures_force: bool = True
     """Whether it tells the size of the force, or contact only."""
-
-    def __post_init__(self) -> None:
-        for name, largest, si in (("radius", LARGEST_PATCH, "m"), ("force_min", LARGEST_FORCE, "N")):
-            number = getattr(self, name)
-            if isinstance(number, bool) or not isinstance(number, int | float) or not 0 < number <= largest:
-                raise SkinError(
-                    f"The {name} of a touch patch is {number!r}: give more than 0, at most {largest:g} {si}."
-                )
-            object.__setattr__(self, name, float(number))
-        if not isinstance(self.measures_force, bool):
-            raise SkinError(f"measures_force of a touch patch is {self.measures_force!r}: give true or false.")
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,13 +110,13 @@ def zones_of(unit: SensorUnit) -> tuple[SensorUnit, ...]:
     """Return what measures a distance each: the unit, or its zones; the first has the unit's touch sensor."""
     if unit.zone is not None or unit.sensor.zones == 1:
         return (unit,)
-    found = []
+    zones = []
     for zone, look in enumerate(unit.sensor.looks()):
         T = unit.T_link_sensor.copy()
         T[:3, :3] = T[:3, :3] @ look
         touch = None if zone else unit.touch
-        found.append(replace(unit, id=f"{unit.id}{_OF}{zone}", T_link_sensor=T, zone=zone, touch=touch))
-    return tuple(found)
+        zones.append(replace(unit, id=f"{unit.id}{_OF}{zone}", T_link_sensor=T, zone=zone, touch=touch))
+    return tuple(zones)
 
 
 def mounted(units: Iterable[SensorUnit]) -> tuple[SensorUnit, ...]:
@@ -161,7 +145,7 @@ class Seat:
 def seat(model: RobotModel, link: int, p: FloatArray) -> Seat | None:
     """Return where the surface of a link is nearest to a point p (3,) in its frame [m]; None if it has no capsule."""
     own = model.capsules.of_links(np.array([link]))
-    if not len(own):
+    if not len(own.radius):
         return None
     away = from_axes(p[None], own.a, own.b)[1][0]
     distance = np.linalg.norm(away, axis=1)
@@ -195,3 +179,28 @@ class NetworkUnits:
     def rows(self) -> int:
         """K."""
         return sum(side**2 for side in self.zones)
+
+
+STANDARD_GRAVITY = 9.80665
+"""Of the LSM6DS3, the inertial sensor of a unit [m/s^2]; the data sheet gives accelerations in its thousandths."""
+ACCELERATION_LSB = {g: 1e-3 * mg * STANDARD_GRAVITY for g, mg in ((2, 0.061), (4, 0.122), (8, 0.244), (16, 0.488))}
+"""One count of the accelerometer [m/s^2] by its full scale [g] (data sheet, LA_So)."""
+ANGULAR_RATE_LSB = {
+    dps: float(np.deg2rad(1e-3 * mdps))
+    for dps, mdps in ((125, 4.375), (245, 8.75), (500, 17.5), (1000, 35.0), (2000, 70.0))
+}
+"""One count of the gyroscope [rad/s] by its full scale [degrees/s] (data sheet, G_So)."""
+LARGEST_COUNT = 2**15 - 1
+"""Where counts end, whatever the full scale is called."""
+
+
+def counts_of(scale: int) -> tuple[float, float]:
+    """Return one count of accelerometer [m/s^2] and gyroscope [rad/s] by the scales of a datagram.
+
+    Scales are those of docs/reference/wire.md; others are a ValueError.
+    """
+    rates = list(ANGULAR_RATE_LSB.values())
+    code = scale >> 4 & 7
+    if code >= len(rates):
+        raise ValueError(f"the gyroscope's full scale has the code {code}: there are 0 to {len(rates) - 1}")
+    return list(ACCELERATION_LSB.values())[scale & 3], rates[code]

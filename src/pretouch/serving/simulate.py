@@ -11,7 +11,7 @@ import numpy as np
 from pretouch.controller import Controller
 from pretouch.loop import Cycle
 from pretouch.loop import run as turn_on
-from pretouch.robot.ik import brought_to
+from pretouch.robot.postures import brought_to
 from pretouch.serving.fleet import Fleet
 from pretouch.serving.real_time import RealTime
 from pretouch.serving.simulated_arm import SimulatedArm, SimulateOptions

@@ -26,7 +26,7 @@ from pretouch.hardware.wire import (
     decode_beacon,
     session_mac,
 )
-from pretouch.sensing.imu_scale import ACCELERATION_LSB, ANGULAR_RATE_LSB
+from pretouch.sensing.unit import ACCELERATION_LSB, ANGULAR_RATE_LSB
 from pretouch.sim.imu import ImuParams, ImuSample
 from pretouch.sim.range_finder import RangeSample
 from pretouch.sim.touch_sensor import TouchSample

@@ -63,7 +63,7 @@ def check_learnt(learnt: ResidualModel, model: RobotModel) -> None:
     mass, and an unknown load within the mass of the arm. None is less certain than by its bound.
     """
     torque, n = model.description.tau_max, model.n
-    largest = np.column_stack([*[torque] * PLAIN, np.ones((n, n)), np.full(n, model.mass.sum())])
+    largest = np.column_stack([*[torque] * PLAIN, np.ones((n, n)), np.full(n, model.mechanism.links.mass.sum())])
     noisiest = np.stack([np.full(n, _NOISIEST), torque]) ** 2
     known = np.diagonal(learnt.covariance, axis1=1, axis2=2)
     for name, found, bound in (

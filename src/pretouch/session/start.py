@@ -8,8 +8,8 @@ from pretouch.calibration.motion.route import approach
 from pretouch.control.path import Path
 from pretouch.controller import Controller
 from pretouch.errors import CalibrationError, ExperimentError, RobotError
-from pretouch.robot.ik import brought_to
 from pretouch.robot.model import RobotModel
+from pretouch.robot.postures import brought_to
 from pretouch.session.preflight import Finding
 from pretouch.types import FloatArray
 

@@ -9,9 +9,8 @@ import numpy as np
 
 from pretouch.checks import Check, Checked, Fraction, NonNegative, Positive
 from pretouch.compiled import compiled, kernel
-from pretouch.robot.kinematics import cross
-from pretouch.sensing.imu_scale import ACCELERATION_LSB, ANGULAR_RATE_LSB, STANDARD_GRAVITY
 from pretouch.sensing.skin import Skin
+from pretouch.sensing.unit import ACCELERATION_LSB, ANGULAR_RATE_LSB, STANDARD_GRAVITY
 from pretouch.sim.plant import Plant
 from pretouch.types import FloatArray, IntArray
 
@@ -282,3 +281,9 @@ def _true(
             own[i] += R[j, i] * w[j]
             own[3 + i] += R[j, i] * acceleration[j]
     return own
+
+
+@kernel
+def cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Cross product (3,)."""
+    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])

@@ -7,10 +7,9 @@ import numpy as np
 
 from pretouch.control.path import Path
 from pretouch.errors import ExperimentError
-from pretouch.robot.description_file import is_shipped
-from pretouch.robot.ik import brought_to
+from pretouch.robot.description import is_shipped
 from pretouch.robot.model import RobotModel
-from pretouch.robot.self_distance import capsule_ends, kinematics_of, segment_distance, self_distances
+from pretouch.robot.postures import brought_to, capsule_ends, kinematics_of, segment_distance, self_distances
 from pretouch.sim.paper_scenes import HandSide, Placement, Side, sign_of
 from pretouch.sim.plant_params import assumed_plant
 from pretouch.sim.scene import SceneSpec
@@ -107,7 +106,7 @@ def hand_side(model: RobotModel, side: Side) -> HandSide:
     """Return where the arm's hand, all that its last joint moves, is widest on a side, posture as in q_ready."""
     kin = model.kinematics(model.description.q_ready)
     hand = model.body.of_links(np.flatnonzero(model.moved_by.all(axis=1)))
-    if not len(hand):
+    if not len(hand.radius):
         return HandSide(0.02, 0.0)
     ends = np.concatenate([
         kin.position[hand.link] + np.einsum("kij,kj->ki", kin.rotation[hand.link], end) for end in (hand.a, hand.b)

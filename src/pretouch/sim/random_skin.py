@@ -44,7 +44,7 @@ def _random_unit(model: RobotModel, link: int, rng: np.random.Generator) -> Sens
 
 def _random_pose(surface: Capsules, rng: np.random.Generator) -> FloatArray:
     """Draw a pose (4, 4) on the side of one of some capsules, link frame: z outwards, `HEIGHT` above it [m]."""
-    k = rng.integers(len(surface))
+    k = rng.integers(len(surface.radius))
     along = surface.b[k] - surface.a[k]
     outwards = rng.normal(size=3)
     outwards -= along * (outwards @ along) / max(along @ along, 1e-12)

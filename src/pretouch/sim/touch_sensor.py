@@ -142,7 +142,7 @@ class TouchSensors:
         for i, (unit, patch) in enumerate(self._patches):
             pressed = sum(self._pressing(unit, patch, force) for force in forces)
             self._passed[i] += follow * (pressed - self._passed[i])
-            level = patch.force_min * (self._params.release if self._on[i] else 1.0)
+            level = patch.force_min_n * (self._params.release if self._on[i] else 1.0)
             changed = (self._passed[i] * self._gain[i] >= level) != self._on[i]
             if time >= self._due[i] or (changed and time - self._last[i] >= self._params.shortest_s):
                 self._measure(i, unit, patch, time)
@@ -155,7 +155,7 @@ class TouchSensors:
         rotation = self._plant.link_rotation[link] @ self._T[unit, :3, :3]
         origin = self._plant.link_position[link] + self._plant.link_rotation[link] @ self._T[unit, :3, 3]
         x, y, z = rotation.T @ (force.point - origin)
-        if x * x + y * y > patch.radius**2 or abs(z) > patch.radius:
+        if x * x + y * y > patch.radius_m**2 or abs(z) > patch.radius_m:
             return 0.0
         return max(0.0, -float(force.force @ rotation[:, 2]))
 
@@ -164,16 +164,16 @@ class TouchSensors:
         self._last[i], self._due[i] = time, time + p.period_s * (1.0 + p.period_jitter * rng.standard_normal())
         if time >= self._next_false[i]:
             self._false_until[i] = time + p.false_s * rng.standard_exponential()
-            self._false_n[i] = patch.force_min + p.false_n * rng.standard_exponential()
+            self._false_n[i] = patch.force_min_n + p.false_n * rng.standard_exponential()
             self._next_false[i] = self._draw_next(self._false_until[i : i + 1])[0]
         force = float(self._passed[i])
         falling, self._before[i] = force < self._before[i], force
         force *= self._gain[i] * (1.0 + (p.hysteresis if falling else 0.0))
         force += (p.noise_floor_n + p.noise * force) * rng.standard_normal()
         if time < self._false_until[i] or unit in self.stuck:
-            force = max(force, float(self._false_n[i]), 2.0 * patch.force_min)
+            force = max(force, float(self._false_n[i]), 2.0 * patch.force_min_n)
         force = round(min(max(force, 0.0), p.most_n) / p.step_n) * p.step_n
-        self._on[i] = force >= patch.force_min * (p.release if self._on[i] else 1.0)
+        self._on[i] = force >= patch.force_min_n * (p.release if self._on[i] else 1.0)
         arrival, lost = time + p.latency_s + rng.exponential(p.jitter_s), rng.random() < p.dropout
         if unit in self.silenced:
             return

@@ -8,7 +8,7 @@ import numpy as np
 from pretouch.control.commander import asked_by
 from pretouch.desired import Desired, DesiredKind
 from pretouch.explanation import ASKED_M_S, FULL, Explanation, Limit, explain
-from pretouch.groups import Kinematics
+from pretouch.robot.kinematics import Kinematics
 from pretouch.robot.model import RobotModel
 from pretouch.sound import sound_desired
 from pretouch.types import ControlStep, FloatArray

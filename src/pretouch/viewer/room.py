@@ -10,8 +10,8 @@ from pretouch.control.path import Path, WayPoints
 from pretouch.errors import ParameterError
 from pretouch.ports import Skin as UnitPort
 from pretouch.profiles import PROFILES, Profile
-from pretouch.robot.ik import brought_to
 from pretouch.robot.model import RobotModel
+from pretouch.robot.postures import brought_to
 from pretouch.sensing.skin import Skin
 from pretouch.sim.hand import Hand, PersonArm
 from pretouch.sim.paper_scenes import FACE_M, Placement, Side, board_beside

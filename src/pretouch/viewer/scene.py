@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pretouch.contact.moving_thresholds import thresholds_of
-from pretouch.groups import Kinematics
+from pretouch.robot.kinematics import Kinematics
 from pretouch.types import ControlStep, FloatArray
 from pretouch.viewer import palette
 from pretouch.viewer.arm import Arm, capsule_surfaces, quaternions

@@ -7,8 +7,8 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from pretouch.groups import Kinematics
-from pretouch.perception.obstacles import locate, points_of_units, sensor_poses
+from pretouch.perception.obstacles import locate, placed_sensors, points_of_units
+from pretouch.robot.kinematics import Kinematics
 from pretouch.sensing.skin import Skin
 from pretouch.types import BoolArray, ControlStep, FloatArray, IntArray
 from pretouch.viewer import palette
@@ -100,7 +100,7 @@ class Units:
     def _sensed(self, step: ControlStep, kin: Kinematics, reading: FloatArray, perceiving: bool) -> FloatArray:
         """Where each unit senses something (K, 3) [m], base frame; NaN where it does not."""
         if not perceiving:
-            return locate(*sensor_poses(self._skin, kin), reading)
+            return locate(*placed_sensors(self._skin.arrays, kin)[:2], reading)
         return points_of_units(step.obstacles, len(reading))
 
 

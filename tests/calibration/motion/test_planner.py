@@ -17,7 +17,7 @@ from pretouch.calibration.motion.route import approach
 from pretouch.errors import CalibrationError, ParameterError
 from pretouch.robot.description import fr3, panda
 from pretouch.robot.model import RobotModel
-from pretouch.robot.self_distance import capsule_ends, kinematics_of, self_distances
+from pretouch.robot.postures import capsule_ends, kinematics_of, self_distances
 
 QUICK = PlanParams(duration_s=30.0, poses=3, swings=1)
 STARTS = {

@@ -8,7 +8,6 @@ from pretouch.contact.residual_model import sequential_init, sequential_numbers
 from pretouch.contact.sequential import Moment
 from pretouch.contact.sequential_step import assess_sample, sample_test
 from pretouch.errors import ParameterError
-from pretouch.groups import no_obstacles
 from pretouch.hardware.franka.collision import (
     CollisionParams,
     check,
@@ -19,6 +18,7 @@ from pretouch.hardware.franka.collision import (
 from pretouch.profiles import PROFILES, profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
+from pretouch.types import no_obstacles
 
 
 @pytest.mark.parametrize("name", PROFILES)

@@ -14,8 +14,8 @@ from pretouch.checks import NonNegative, Positive
 from pretouch.contact.moving_thresholds import MovingThresholds
 from pretouch.control.approach import MotionBody, MotionRequest, Restricted, Restriction
 from pretouch.errors import ParameterError
-from pretouch.groups import Kinematics
 from pretouch.profiles import profile
+from pretouch.robot.kinematics import Kinematics
 from pretouch.types import FloatArray, Obstacles, RobotState
 
 _WEIGHT = 1000.0

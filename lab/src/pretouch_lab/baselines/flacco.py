@@ -14,8 +14,8 @@ import numpy as np
 from pretouch.checks import NonNegative, Positive
 from pretouch.contact.moving_thresholds import MovingThresholds
 from pretouch.control.approach import MotionBody, MotionRequest, Restricted, Restriction
-from pretouch.groups import Kinematics
 from pretouch.profiles import profile
+from pretouch.robot.kinematics import Kinematics
 from pretouch.types import WHOLE, FloatArray, Obstacles, RobotState
 
 _STILL = 1e-9

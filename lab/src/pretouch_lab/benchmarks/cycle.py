@@ -17,7 +17,7 @@ from pretouch.loop import MonotonicClock
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import Profile, at_rate, profile
 from pretouch.realtime import real_time, warm_up
-from pretouch.robot.description_file import robot_named
+from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.types import IntArray, Mode
 from pretouch_lab.benchmarks.workload import UNIT_RATE, Workload

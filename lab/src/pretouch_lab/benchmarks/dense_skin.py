@@ -9,10 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from pretouch.errors import ExperimentError
-from pretouch.robot.body import Capsules
+from pretouch.robot.body import Capsules, from_axes, placed
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
-from pretouch.robot.vectors import placed
 from pretouch.sensing.skin import Skin, save_skin
 from pretouch.sensing.unit import SensorUnit
 from pretouch.types import FloatArray
@@ -38,9 +37,7 @@ def surface(a: FloatArray, b: FloatArray, turn: float, part: float) -> tuple[Flo
 
 def gap(points: FloatArray, a: FloatArray, b: FloatArray, radius: FloatArray) -> FloatArray:
     """Signed distance (P,) [m] of points (P, 3) from the nearest of C capsules (C, 3), (C, 3), (C,)."""
-    axis, rel = b - a, points[:, None] - a
-    part = np.clip((rel * axis).sum(axis=2) / np.maximum((axis**2).sum(axis=1), 1e-12), 0.0, 1.0)
-    return np.asarray((np.linalg.norm(rel - part[:, :, None] * axis, axis=2) - radius).min(axis=1))
+    return np.asarray((np.linalg.norm(from_axes(points, a, b)[1], axis=2) - radius).min(axis=1))
 
 
 def dense_skin(model: RobotModel) -> Skin:
@@ -86,11 +83,11 @@ def spread_skin(model: RobotModel, count: int) -> Skin:
 def _candidates(model: RobotModel, link: int) -> tuple[FloatArray, FloatArray]:
     """Places (P, 3) [m] and normals (P, 3) on a link, link frame, whose beams leave the arm in the ready posture."""
     kin, arm = model.kinematics(model.description.q_ready), model.capsules
-    a, b = placed(arm, kin)
+    _, a, b, _ = placed(arm, kin)
     own: Capsules = arm.of_links(np.array([link]))
     rotation, origin = kin.rotation[link], kin.position[link]
     places, normals = [], []
-    for c in range(len(own)):
+    for c in range(len(own.radius)):
         for turn in 2 * np.pi * np.arange(_TURNS) / _TURNS:
             for part in np.linspace(0.0, 1.0, _PLACES):
                 foot, normal = surface(own.a[c], own.b[c], turn, part)

@@ -55,7 +55,7 @@ def study_of(command: Calibration) -> "Study":
 
     from pretouch.calibration.motion.planner import plan_motion
     from pretouch.cli.calibrate.motion import plan_params
-    from pretouch.robot.description_file import robot_named
+    from pretouch.robot.description import robot_named
     from pretouch.robot.model import RobotModel
     from pretouch_lab.cli.progress import bar
     from pretouch_lab.studies.calibration.study import study

@@ -83,7 +83,7 @@ def _identified(command: Identify, out: Path | None, figure: Path | None) -> dic
 
 
 def _model(arm: str) -> "RobotModel | None":
-    from pretouch.robot.description_file import robot_named
+    from pretouch.robot.description import robot_named
     from pretouch.robot.model import RobotModel
 
     return RobotModel(robot_named(arm)) if arm else None

@@ -8,7 +8,7 @@ from pretouch.controller import Controller
 from pretouch.desired import Desired, twist
 from pretouch.loop import Options, turn
 from pretouch.profiles import Profile
-from pretouch.robot.ik import brought_to
+from pretouch.robot.postures import brought_to
 from pretouch.sim.hand import Hand
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.range_finder import RangeFinders

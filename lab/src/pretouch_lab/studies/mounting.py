@@ -133,7 +133,7 @@ def missed(record: Record, setup: Setup) -> float | None:
     shown, left_out, margin = 0, 0, setup.profile.sight.self_margin_m or 0.0
     for step in steps:
         kin = model.kinematics(step.q)
-        expected = expected_range(kin, placed_sensors(skin, kin), skin.cones, model.capsules, room)
+        expected = expected_range(kin, placed_sensors(skin.arrays, kin), skin.cones, model.capsules, room)
         board = np.flatnonzero(step.range_distance < expected - margin)
         shown += len(board)
         left_out += len(np.setdiff1d(board, step.obstacles.unit))

@@ -5,7 +5,7 @@ from itertools import product
 import numpy as np
 
 from pretouch.profiles import profile
-from pretouch.robot.self_distance import nearest_points
+from pretouch.robot.postures import nearest_points
 from pretouch.sim.plant import TOUCH_N
 from pretouch.sim.scene import HandSpec
 from pretouch.text_table import TextTable, tabulated

@@ -11,7 +11,7 @@ from pretouch.control.path import WayPoints
 from pretouch.controller import Controller
 from pretouch.loop import Options, turn
 from pretouch.profiles import Profile
-from pretouch.robot.ik import brought_to
+from pretouch.robot.postures import brought_to
 from pretouch.sim.arm_in_world import ArmInWorld
 from pretouch.sim.hand import Hand, HandGoal, PersonArm
 from pretouch.sim.plant import Plant, PlantClock

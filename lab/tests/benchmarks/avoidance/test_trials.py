@@ -8,7 +8,7 @@ import pytest
 
 from pretouch.perception.closest import closest_points
 from pretouch.profiles import profile
-from pretouch.robot.ik import brought_to
+from pretouch.robot.postures import brought_to
 from pretouch_lab.benchmarks.avoidance.obstacle import truth_of
 from pretouch_lab.benchmarks.avoidance.scenario import FAMILIES, scenarios
 from pretouch_lab.benchmarks.avoidance.setting import setting

@@ -7,7 +7,7 @@ from pretouch.calibration.motion.plan import Plan, PlanSamples
 from pretouch.errors import CalibrationError
 from pretouch.robot.description import SpeedEnvelope
 from pretouch.robot.model import RobotModel
-from pretouch.robot.self_distance import capsule_ends, kinematics_of, self_distances
+from pretouch.robot.postures import capsule_ends, kinematics_of, self_distances
 from pretouch.types import BoolArray, FloatArray
 
 RATE_HZ = 50.0

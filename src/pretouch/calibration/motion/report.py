@@ -8,7 +8,7 @@ from pretouch.calibration.motion.limits import RATE_HZ, MotionLimits, point_spee
 from pretouch.calibration.motion.params import PlanParams
 from pretouch.calibration.motion.plan import Plan
 from pretouch.robot.model import RobotModel
-from pretouch.robot.self_distance import capsule_ends, kinematics_of
+from pretouch.robot.postures import capsule_ends, kinematics_of
 from pretouch.types import FloatArray
 
 

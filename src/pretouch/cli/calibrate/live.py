@@ -28,7 +28,7 @@ from pretouch.loop import Cycle, MonotonicClock
 from pretouch.ports import Arm
 from pretouch.profiles import PROFILES
 from pretouch.recording.skin_recording import SkinRecording
-from pretouch.robot.description_file import robot_named
+from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import skin_for
 from pretouch.session.motion import Ending, go

@@ -8,7 +8,7 @@ from pretouch.calibration.motion.plan import Plan
 from pretouch.calibration.motion.planner import plan_motion
 from pretouch.calibration.motion.report import report_on
 from pretouch.cli.writing import check_free, check_writable, unwritable_said
-from pretouch.robot.description_file import robot_named
+from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 
 if TYPE_CHECKING:

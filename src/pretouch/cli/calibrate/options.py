@@ -159,7 +159,7 @@ def calibrate_skin(command: Calibrate, mode: Mode) -> int:
     """Calibrate; return 1 if a unit was refused or the motion was not finished, or else 0."""
     from pretouch.cli.calibrate.outputs import outputs_of
     from pretouch.cli.calibrate.recording import Sources, calibrate_recording
-    from pretouch.robot.description_file import robot_named
+    from pretouch.robot.description import robot_named
     from pretouch.robot.model import RobotModel
 
     if mode == "plan":

@@ -21,9 +21,9 @@ from pretouch.perception.scene_filter import Fixtures, floor_and_pedestal
 from pretouch.ports import Skin as SkinPort
 from pretouch.profiles import Profile
 from pretouch.profiles import profile as find_profile
-from pretouch.robot.description_file import robot_named
-from pretouch.robot.ik import brought_to
+from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
+from pretouch.robot.postures import brought_to
 from pretouch.sensing.skin import Skin, skin_for
 from pretouch.session.confirmations import state_folder
 from pretouch.session.free_motion import FreeMotion, ModelFile, model_file_of

@@ -6,10 +6,9 @@ from typing import Protocol
 
 import numpy as np
 
-from pretouch.groups import Kinematics
-from pretouch.robot.body import Capsules
+from pretouch.robot.body import Capsules, placed
+from pretouch.robot.kinematics import Kinematics
 from pretouch.robot.model import RobotModel
-from pretouch.robot.vectors import placed
 from pretouch.sim.hand import HandGoal
 from pretouch.sim.plant import Plant
 from pretouch.types import FloatArray
@@ -116,7 +115,7 @@ def nearest(kin: Kinematics, body: Capsules, shape: Shape) -> Nearest:
 
     Exact to a fiftieth of a capsule's length along its axis.
     """
-    a, b = placed(body, kin)
+    _, a, b, _ = placed(body, kin)
     along = a + _ALONG * (b - a)
     distance, direction = shape.closest(along)
     gap = distance - body.radius

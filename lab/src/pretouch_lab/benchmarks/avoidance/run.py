@@ -7,7 +7,7 @@ from hashlib import sha256
 from typing import ClassVar
 
 from pretouch.errors import ExperimentError
-from pretouch.robot.description_file import files_digest, robot_named
+from pretouch.robot.description import files_digest, robot_named
 from pretouch_lab.baselines.avoidance import ABLATED, ABLATED_IN, ABLATED_SEEDS, BASELINES, profile_text
 from pretouch_lab.benchmarks.ablations import BASE
 from pretouch_lab.benchmarks.avoidance.scenario import Scenario, scenarios

@@ -8,7 +8,7 @@ import numpy as np
 
 from pretouch.control.path import Path, segment
 from pretouch.profiles import Profile
-from pretouch.robot.description_file import robot_named
+from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, load_skin, paper_skin, skin_for
 from pretouch.sim.hand import HandScript, PersonArm

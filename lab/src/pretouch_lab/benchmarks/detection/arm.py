@@ -12,8 +12,8 @@ from pretouch.controller import Controller
 from pretouch.loop import Cycle, run
 from pretouch.profiles import profile
 from pretouch.robot.description import panda
-from pretouch.robot.ik import brought_to
 from pretouch.robot.model import RobotModel
+from pretouch.robot.postures import brought_to
 from pretouch.sensing.skin import Skin, load_skin, paper_skin
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.plant_params import PlantParams

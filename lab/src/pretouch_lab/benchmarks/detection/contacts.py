@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from pretouch.robot.ik import brought_to
-from pretouch.robot.vectors import placed
+from pretouch.robot.body import placed
+from pretouch.robot.postures import brought_to
 from pretouch.sim.plant import Plant, PointForce
 from pretouch.sim.plant_params import PlantParams
 from pretouch.types import FloatArray
@@ -134,10 +134,10 @@ def place_on(
     That is judged in one posture (n,) [rad]. Where no free place is found, the last one drawn is taken.
     """
     kin, arm = model().kinematics(q), model().capsules
-    a, b = placed(arm, kin)
+    _, a, b, _ = placed(arm, kin)
     own = arm.of_links(np.array([link]))
     for _ in range(_TRIES):
-        c = int(rng.integers(len(own)))
+        c = int(rng.integers(len(own.radius)))
         foot, normal = surface(own.a[c], own.b[c], rng.uniform(0, 2 * np.pi), rng.uniform())
         point = foot + own.radius[c] * normal
         ways = point + np.outer(radius + np.linspace(0.0, from_m, 9), normal)

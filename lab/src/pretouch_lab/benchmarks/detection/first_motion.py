@@ -4,9 +4,9 @@ import numpy as np
 
 from pretouch.contact.detector import Body, Detection
 from pretouch.contact.reaction import ReactionInputs
-from pretouch.groups import Kinematics
 from pretouch.modes import Event, ModeState
 from pretouch.profiles import Profile
+from pretouch.robot.kinematics import Kinematics
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import FloatArray, Mode, Obstacles, RobotState

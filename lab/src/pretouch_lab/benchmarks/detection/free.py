@@ -6,7 +6,7 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from pretouch.loop import Cycle
-from pretouch.robot.vectors import placed
+from pretouch.robot.body import placed
 from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams
 from pretouch.types import FloatArray
@@ -92,7 +92,7 @@ def free_stream(cell: FreeCell, plant: PlantParams, sensing: Sensing, before_s: 
         steps[0] += 1
         if steps[0] % _LOOK_EVERY == 0:
             kin, body = model().kinematics(cycle.step.q), model().body
-            a, b = placed(body, kin)
+            _, a, b, _ = placed(body, kin)
             nearest[0] = min(nearest[0], float(gap(ghost.position[None], a, b, body.radius)[0]) - near["radius_m"])
 
     stream = record(what, _bystander(cell), look)

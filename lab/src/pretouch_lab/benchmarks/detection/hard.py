@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from pretouch.profiles import profile
-from pretouch.robot.vectors import placed
+from pretouch.robot.body import placed
 from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams
 from pretouch.types import FloatArray
@@ -105,7 +105,7 @@ def _beside(motion: Motion, seed: int) -> FloatArray:
     best, found = np.inf, AWAY
     for _ in range(_TRIES):
         place = rng.uniform([-0.9, -0.9, 0.0], [0.9, 0.9, 1.2])
-        least = min(float(gap(place[None], a, b, body.radius)[0]) for a, b in swept) - near["radius_m"]
+        least = min(float(gap(place[None], a, b, body.radius)[0]) for _, a, b, _ in swept) - near["radius_m"]
         off = max(low - least, least - high, 0.0)
         if off < best:
             best, found = off, place

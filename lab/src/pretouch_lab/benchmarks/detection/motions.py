@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from pretouch.robot.ik import brought_to
+from pretouch.robot.postures import brought_to
 from pretouch.types import FloatArray
 from pretouch_lab.benchmarks.detection.arm import model
 from pretouch_lab.benchmarks.localization.motion import PEAK, Wandering, is_free, posture

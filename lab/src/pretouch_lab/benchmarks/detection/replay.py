@@ -6,10 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from pretouch.contact.reaction import DecayingVelocity
-from pretouch.groups import no_obstacles
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.types import NOT_TOUCHED, BoolArray, FloatArray, Touched, TouchReadings
+from pretouch.types import NOT_TOUCHED, BoolArray, FloatArray, Touched, TouchReadings, no_obstacles
 from pretouch_lab.baselines.detection import Baseline
 from pretouch_lab.benchmarks.detection.first_motion import FirstMotion
 from pretouch_lab.benchmarks.detection.stream import Stream

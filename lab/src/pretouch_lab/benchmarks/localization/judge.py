@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from pretouch.atomic_write import write_json
-from pretouch.groups import Kinematics
 from pretouch.profiles import profile
+from pretouch.robot.kinematics import Kinematics
 from pretouch.types import FloatArray, Touched
 from pretouch_lab.benchmarks.detection.arm import model
 from pretouch_lab.benchmarks.detection.contacts import Touching, touches_of

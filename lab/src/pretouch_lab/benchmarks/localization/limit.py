@@ -7,8 +7,8 @@ free motion was learnt to be, of the mean of so many independent samples; across
 
 import numpy as np
 
-from pretouch.groups import Kinematics
 from pretouch.params import LocalisationParams, SequentialParams
+from pretouch.robot.kinematics import Kinematics
 from pretouch.types import FloatArray
 from pretouch_lab.benchmarks.detection.arm import model
 from pretouch_lab.benchmarks.detection.contacts import Touching

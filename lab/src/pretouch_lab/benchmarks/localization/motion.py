@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from pretouch.controller import Controller, ControllerState
-from pretouch.robot.vectors import placed
+from pretouch.robot.body import placed
 from pretouch.types import ControlStep, FloatArray, Inputs
 from pretouch_lab.benchmarks.dense_skin import gap
 from pretouch_lab.benchmarks.detection.arm import model
@@ -70,7 +70,7 @@ def is_free(q: FloatArray) -> bool:
     """Whether the arm is clear of the floor and of itself."""
     chosen, arm = scenario("localization")["motion"], model()
     body = arm.capsules
-    a, b = placed(body, arm.kinematics(q))
+    _, a, b, _ = placed(body, arm.kinematics(q))
     moves = np.asarray(arm.rigid >= 0)[body.link]
     lowest = np.minimum(a[:, 2], b[:, 2]) - body.radius
     order = arm.moved_by.sum(axis=1)[body.link]

@@ -10,7 +10,7 @@ from scipy.signal import lfilter
 from pretouch.imported_data.log import Choice, Log
 from pretouch.imported_data.torques import TorqueRecording, observed, torque_recording
 from pretouch.params import SequentialParams
-from pretouch.robot.description_file import robot_named
+from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.types import BoolArray, FloatArray, IntArray
 from pretouch.values import value

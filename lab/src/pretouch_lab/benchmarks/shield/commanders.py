@@ -7,8 +7,8 @@ import numpy as np
 
 from pretouch.control.path import Path
 from pretouch.desired import Desired, joint_velocities, twist
-from pretouch.groups import Kinematics
 from pretouch.robot.body import Capsules
+from pretouch.robot.kinematics import Kinematics
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray
 from pretouch_lab.benchmarks.avoidance.obstacle import Shape, nearest
@@ -56,7 +56,7 @@ class AtPerson:
 
 def part_of(body: Capsules, share: float) -> Capsules:
     """Return one of a body's capsules, from the first at 0 to the last at 1."""
-    c = min(int(share * len(body)), len(body) - 1)
+    c = min(int(share * len(body.radius)), len(body.radius) - 1)
     return Capsules(body.link[c : c + 1], body.a[c : c + 1], body.b[c : c + 1], body.radius[c : c + 1])
 
 

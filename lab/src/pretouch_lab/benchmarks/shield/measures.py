@@ -4,8 +4,8 @@ import numpy as np
 
 from pretouch.control.joint_box import JointLimits
 from pretouch.desired import Desired, DesiredKind
-from pretouch.groups import Kinematics
 from pretouch.params import FailureParams
+from pretouch.robot.kinematics import Kinematics
 from pretouch.robot.model import RobotModel
 from pretouch.sound import sound_desired
 from pretouch.types import FloatArray

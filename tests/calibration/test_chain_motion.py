@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from pretouch.robot.kinematics import chain_motion, lever_acceleration
+from pretouch.calibration.link_motion import chain_motion, lever_acceleration
 from pretouch.robot.model import RobotModel
 
 
@@ -14,7 +14,7 @@ def test_a_point_of_each_link_accelerates_as_by_mujoco(panda_model: RobotModel, 
     q = panda_model.description.q_ready + rng.uniform(-0.3, 0.3, panda_model.n)
     qd, qdd = rng.uniform(-1, 1, (2, panda_model.n))
     kin = panda_model.kinematics(q)
-    w, alpha, a, point = chain_motion(kin.anchor, kin.axis, qd, qdd)
+    w, alpha, a, point = (part[0] for part in chain_motion(kin.anchor[None], kin.axis[None], qd[None], qdd[None]))
     arm = mujoco.MjModel.from_xml_path(str(panda_model.description.mjcf))
     arm.opt.gravity[:] = 0.0
     data = mujoco.MjData(arm)

@@ -1,4 +1,4 @@
-"""How near an arm comes to itself, in many postures at once.
+"""Postures: inverse kinematics by damped least squares, and how near an arm comes to itself in many at once.
 
 Pairs of links that are fixed to each other, or that a single joint parts, are left out: how near they come is settled
 by the joint's range, and at the joint their capsules overlap whatever the posture. All other pairs count, the base's
@@ -6,11 +6,70 @@ too. Of the Panda's and the FR3's, each comes apart somewhere, and several can c
 hand and the last link with the forearm, the forearm with the upper arm.
 """
 
+from collections.abc import Callable
+from typing import NamedTuple
+
 import numpy as np
 
-from pretouch.groups import Kinematics
+from pretouch.errors import ExperimentError
+from pretouch.robot.kinematics import Kinematics, rotation_error
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray
+
+
+class Reaching(NamedTuple):
+    """How a hand is brought to a place."""
+
+    steps: int
+    """At most."""
+    step_max: float
+    """Largest motion of a joint in one step, within which the Jacobian is taken for constant [rad]."""
+    damping: float
+    """Of the pseudo-inverse: near singularities the hand is slow, and drawn off its place by `pull`."""
+    pull: float = 0.0
+    """Part of the way to the posture at rest that is gone in one step, as far as the hand stays where it is."""
+    close: float = 1e-4
+    """Largest entry of the error of a hand that is there [m, rad]."""
+
+
+def posture_at(
+    model: RobotModel, q: FloatArray, error_of: Callable[[Kinematics], FloatArray], rest: FloatArray, way: Reaching
+) -> FloatArray | None:
+    """Move an arm from q (n,) until its hand is where it is to be; None where its joint limits are in the way.
+
+    `error_of` gives the motion (6,) that the end-effector still has to make, translation [m] then rotation [rad];
+    `rest` is the posture (n,) that the arm is drawn to [rad].
+    """
+    for _ in range(way.steps):
+        kin = model.kinematics(q)
+        error = error_of(kin)
+        if np.abs(error).max() < way.close:
+            return q
+        J, drawn = model.ee_jacobian(kin), way.pull * (rest - q)
+        # damped least squares: no step explodes near a singularity, and elsewhere the damping costs a few steps more
+        step = drawn + J.T @ np.linalg.solve(J @ J.T + way.damping * np.eye(6), error - J @ drawn)
+        q = np.clip(q + step * min(1.0, way.step_max / max(np.abs(step).max(), 1e-12)), model.q_min, model.q_max)
+    return None
+
+
+def brought_to(model: RobotModel, point: FloatArray) -> FloatArray:
+    """Joint positions (n,) [rad] of the ready posture, its hand moved to a point (3,) [m] without being turned.
+
+    Raises ExperimentError where the arm cannot reach it within its joint limits.
+    """
+    ready = model.description.q_ready
+    upright = model.kinematics(ready).rotation[model.ee]
+
+    def error(kin: Kinematics) -> FloatArray:
+        # metres and radians side by side; the sine of the angle will do, for the hand is never turned far
+        return np.concatenate([point - kin.position[model.ee], rotation_error(kin.rotation[model.ee], upright)])
+
+    q = posture_at(model, ready.copy(), error, ready, Reaching(2000, 0.02, 1e-4, close=1e-6))
+    if q is None:
+        raise ExperimentError(
+            f"The arm cannot reach {np.round(point, 3).tolist()} with its hand upright: choose another."
+        )
+    return q
 
 
 def kinematics_of(model: RobotModel, q: FloatArray) -> Kinematics:
