@@ -89,7 +89,7 @@ def fixed_of(controller: Any) -> Fixed:
         0.0 if profile.slow is None else profile.slow.d_max_m,
         row_numbers(of_table_i(profile.approach)), braking_numbers(braking, t.speed_m_s, limits.period),
         MotionNumbers(
-            model.arm, t, t.orientation == "hold", failure.solver_iterations, limits.table, model.q_mid, away
+            model.mechanism.arm, t, t.orientation == "hold", failure.solver_iterations, limits.table, model.q_mid, away
         ),
     )  # fmt: skip
 

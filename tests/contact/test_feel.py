@@ -156,7 +156,7 @@ def test_the_place_of_a_push_is_told_and_changes_nothing_else_that_is_felt():
     for _ in range(8):
         found, one = feel(one, MODEL, KIN, robot(push), NOTHING, False, PRETOUCH)
         other, two = feel(two, MODEL, KIN, robot(push), NOTHING, False, off)
-        assert_array_equal(found.thresholds.parts, other.thresholds.parts)
+        assert_array_equal(found.thresholds, other.thresholds)
         assert found.evidence == other.evidence
         assert not len(other.touched.link)
         said.append(found.touched)

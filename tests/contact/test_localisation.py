@@ -98,7 +98,7 @@ PATCH = TouchPatch()
 def touched(kin: Kinematics, c: int) -> Cues:
     """What a unit at a candidate says while it is touched, as `TouchSensors` has it."""
     link, gain = SURFACE.link[c], np.ones(len(MODEL.links))
-    share = np.array([np.pi * PATCH.radius**2 / surface_areas(MODEL.capsules, len(MODEL.links))[link]])
+    share = np.array([np.pi * PATCH.radius_m**2 / surface_areas(MODEL.capsules, len(MODEL.links))[link]])
     gain[link] = gain_of(share, TouchSensorParams())[0]
     return Cues(gain, np.array([link]), pose_of(kin, c)[0][None], np.array([PATCH.radius / 2]))
 

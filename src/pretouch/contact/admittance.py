@@ -214,7 +214,7 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
         came = command if doing == "task" else np.zeros(len(torque))
         clamp = replace(clamp_init(inputs.robot.q_commanded), path=state.clamp.path, came=came)
         return AdmittanceState(
-            mass, self._pinched(clamp, body, inputs), place, np.array(placed(model.body, kin)), 0.0
+            mass, self._pinched(clamp, body, inputs), place, np.array(placed(model.body, kin)[1:3]), 0.0
         )  # fmt: skip
 
     def _pinched(self, clamp: ClampState, body: Body, inputs: ReactionInputs) -> ClampState:

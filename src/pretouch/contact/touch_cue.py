@@ -124,7 +124,7 @@ class TouchSensors(TouchSensorParams, Cue, name="touch"):
         if not len(unit):
             return None, state
         link, gain = skin.link[unit], np.ones(len(kin.position))
-        radius = np.array([patch.radius for k in unit if (patch := skin.units[k].touch) is not None])
+        radius = np.array([patch.radius_m for k in unit if (patch := skin.units[k].touch) is not None])
         # s: the patch, taken as flat, of the link's surface
         share = np.minimum(np.pi * radius**2 / surface_areas(body.model.capsules, len(gain))[link], 1.0)
         # several touched units of one link count once, by the largest gain
