@@ -31,7 +31,7 @@ class Cusum(pt.Detector, name="cusum"):
         force = np.zeros(3) if sample.robot.wrench is None else sample.robot.wrench[:3] - mean
         total = max(0.0, state + float(np.linalg.norm(force)) - self.drift_n) if sample.armed else 0.0
         band, still = np.full(3, self.limit_n), np.zeros(3)
-        limits = pt.Thresholds(np.array([mean + band, mean - band, mean, sample.window.std(), still, still]))
+        limits = pt.Thresholds(mean + band, mean - band, mean, sample.window.std(), still, still)
         contact = pt.Contact(force, np.abs(force) == np.abs(force).max()) if total >= self.limit_n else None
         return pt.Detection(limits, contact, sample.armed, none, total / self.limit_n), total
 

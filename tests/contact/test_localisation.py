@@ -100,7 +100,7 @@ def touched(kin: Kinematics, c: int) -> Cues:
     link, gain = SURFACE.link[c], np.ones(len(MODEL.links))
     share = np.array([np.pi * PATCH.radius_m**2 / surface_areas(MODEL.capsules, len(MODEL.links))[link]])
     gain[link] = gain_of(share, TouchSensorParams())[0]
-    return Cues(gain, np.array([link]), pose_of(kin, c)[0][None], np.array([PATCH.radius / 2]))
+    return Cues(gain, np.array([link]), pose_of(kin, c)[0][None], np.array([PATCH.radius_m / 2]))
 
 
 def prior(kin: Kinematics, cues: Cues, hidden: FloatArray, near: Obstacles | None = None) -> FloatArray:

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pretouch.types import ControlStep
+from pretouch.types import ControlStep, Thresholds
 from pretouch.viewer.plots import FORCE_N, SAMPLES, SPAN_S, History, Plots
 
 K = 7
@@ -76,7 +76,7 @@ def test_axes_of_force_are_symmetric_and_grow_with_the_force_and_no_scale_change
     history, gui = History(np.arange(K)), FakeGui()
     plots = Plots(gui, history, [f"unit {i}" for i in range(K)])  # type: ignore[arg-type]
     gui.more.value = True
-    limits = replace(some_step.thresholds, parts=np.zeros((6, 3)))
+    limits = Thresholds(*np.zeros((6, 3)))
     seen, before = [], [plot.scales for plot in gui.plots]
     for i, force in enumerate((3.0, -20.0, 65.0, np.nan)):
         history.add(replace(some_step, stamp=float(i), force=np.array([0.0, force, 0.0]), thresholds=limits))

@@ -127,7 +127,7 @@ def test_a_push_on_an_inner_link_that_feels_backwards_at_the_hand_moves_the_arm_
 def felt(torque):
     """What a detector says of joint torques (n,): a contact, where there are any."""
     contact = Contact(np.ones(3), np.ones(3, np.bool_)) if torque.any() else None
-    return Detection(Thresholds(np.zeros((6, 3))), contact, True, torque, 2.0 if torque.any() else 0.0)
+    return Detection(Thresholds(*np.zeros((6, 3))), contact, True, torque, 2.0 if torque.any() else 0.0)
 
 
 def test_the_sweep_of_one_replay_is_what_each_value_would_find_itself():
