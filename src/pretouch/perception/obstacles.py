@@ -150,7 +150,10 @@ def newer(used: FloatArray, stamp: FloatArray, now: float) -> BoolArray:
 
     A unit whose clock is ahead is so never heard: it must not pass for one that is well.
     """
-    return (used < stamp) & (stamp <= now)  # false for NaN, and for -inf: never heard
+    fresh = np.empty(len(stamp), np.bool_)
+    for k in range(len(stamp)):
+        fresh[k] = used[k] < stamp[k] <= now  # false for NaN, and for -inf: never heard
+    return fresh
 
 
 _FAILURES = {

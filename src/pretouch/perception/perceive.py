@@ -15,7 +15,7 @@ from pretouch.perception.obstacles import (
     looks_at,
     measured,
     newer,
-    placed_sensors,
+    pose_into,
     spread_of,
     take_in,
     tells_anything,
@@ -24,6 +24,7 @@ from pretouch.perception.obstacles import (
 from pretouch.perception.scene_filter import leave_out, plane_return
 from pretouch.robot.body import Capsules, placed
 from pretouch.robot.kinematics import Chain, Kinematics
+from pretouch.sensing.sensor import Sensors
 from pretouch.types import BoolArray, FloatArray, IntArray, Obstacles, some_of
 
 if TYPE_CHECKING:
@@ -141,7 +142,12 @@ def _take_readings(
     """Take the readings that are new and show what is not known to be there into the tracks."""
     skin, p, distance, cones = sight.skin, sight.perception, seen.distance, sight.skin.cones
     (kin, chain, _), (now, posed) = posture, instants
-    position, rotation, _ = sensors = placed_sensors(skin, kin)
+    position, rotation = np.zeros((len(fresh), 3)), np.zeros((len(fresh), 3, 3))
+    for k in range(len(fresh)):
+        if fresh[k]:  # at 1 kHz one of twenty is
+            m = skin.link[k]
+            pose_into(kin.position[m], kin.rotation[m], skin.T_link_sensor[k], position[k], rotation[k])
+    sensors = Sensors(position, rotation, skin.link)
     tells, shows = tells_anything(readings.distance, readings.status, distance, cones), ~np.isnan(distance)
     # a return expected before `ends`, up to `margin_m` behind the reading, explains it: nothing is seen through a body
     ends = distance + sight.margin_m
