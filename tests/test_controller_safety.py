@@ -82,7 +82,7 @@ def spoiled(inputs: Inputs, fault: str, value: float = np.nan) -> Inputs:
     return replace(inputs, readings=replace(readings, **{name: wrong}))
 
 
-@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("value", [np.nan, np.inf, -1e15, 1e306])
 @pytest.mark.parametrize("fault", FAULTS)
 def test_one_fault_that_lasts(arm: Arm, fault: str, value: float):
     arm.run(60)
@@ -96,18 +96,6 @@ def test_one_fault_that_lasts(arm: Arm, fault: str, value: float):
     # what latches stays, and what does not goes on by itself
     assert arm.run(60)[-1].mode is (Mode.HOLD if fault in LATCHING else Mode.TRACK)
     assert arm.step(resume=True).mode is Mode.TRACK
-
-
-@pytest.mark.parametrize("value", [1e3, -1e9, 1e306, -1.7e308])
-@pytest.mark.parametrize("name", ["q", "qd", "q_commanded", "qd_commanded"])
-def test_a_number_no_arm_has_is_not_believed(arm: Arm, name: str, value: float):
-    arm.run(60)
-    before = np.linalg.norm(arm.qd)
-    step = arm.give(spoiled(arm.inputs(), name, value)).step
-    assert step.mode is Mode.HOLD
-    assert arm.state.mode.latched
-    assert np.linalg.norm(arm.qd) < before
-    assert f"RobotState.{name} holds" in step.reason
 
 
 @pytest.mark.parametrize("value", [5.0, -20.0, 999.0])

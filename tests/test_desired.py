@@ -21,7 +21,6 @@ from pretouch.recording.verify import verify
 from pretouch.recording.writer import Recording
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.sound import sound_desired
 from pretouch.types import ControlStep, Mode
 from tests.test_loop import DT, World
 
@@ -149,6 +148,7 @@ def test_a_motion_that_goes_stale_brings_the_arm_to_rest_says_so_and_is_taken_up
         (lambda now: desired.pose(now, 2.0 * np.eye(4)), "no rotation"),
         (lambda now: desired.twist(now + 1e4, np.zeros(3)), "s in the future"),
         (lambda now: desired.twist((now, now), np.zeros((2, 3))), "do not increase"),
+        (lambda _: desired.twist((-1e308, 1e308), np.zeros((2, 3))), "Desired.stamp holds -1e"),
         (lambda _: "left", "is of no kind"),
         (lambda now: Desired(7, np.array([now]), np.zeros((1, 6))), "is of no kind"),
         (lambda now: desired.refused(now, "two programs ask"), r"cannot be used \(two programs ask\)"),
@@ -225,12 +225,3 @@ def test_while_the_arm_yields_its_orientation_is_held_and_not_turned_to_what_is_
     assert len(yielding) > 20
     goals = {run.cycles[k].after.memory.get("rotation_goal").tobytes() for k in yielding}
     assert len(goals) == 1
-
-
-def test_what_is_sound_is_copied():
-    asked = desired.twist(1.0, (0.0, 0.1, 0.0))
-    found, wrong = sound_desired(asked, 7, 1.0)
-    assert wrong == ""
-    assert found is not None
-    assert not np.shares_memory(found.number, asked.number)
-    assert sound_desired(None, 7, 1.0) == (None, "")

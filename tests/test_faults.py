@@ -6,14 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pretouch.desired import Desired, DesiredKind, twist
+from pretouch.desired import twist
 from pretouch.errors import ParameterError
 from pretouch.faults import Report, Watched, examine, put_robot, robot_of
 from pretouch.modes import Event
 from pretouch.params import FailureParams
 from pretouch.sensing.sensor import PAPER_SENSOR
-from pretouch.sound import sound_desired, sound_moving, sound_points, sound_touch
-from pretouch.types import Inputs, MovingFixtures, Payload, RangeReadings, RobotState, SeenPoints, TouchReadings
+from pretouch.sound import sound_touch
+from pretouch.types import Inputs, Payload, RangeReadings, RobotState, TouchReadings
 
 PARAMS = FailureParams()  # state older than 0.05 s, step more than 0.05 s after the last, no force for 0.2 s
 PERIOD = 0.01
@@ -21,7 +21,6 @@ QD_MAX = np.array([2.0, 2.0])
 COMMAND = np.array([0.5, -0.2])
 COMPLEX = np.full(2, 0.1 + 0.0j)
 READINGS = RangeReadings(np.zeros(1), np.full(1, PAPER_SENSOR.nearest_m), np.zeros(1, np.int64))
-PARTS = ["q", "qd", "q_commanded", "qd_commanded"]
 
 
 def robot(stamp: float = 1.0) -> RobotState:
@@ -33,11 +32,10 @@ def robot(stamp: float = 1.0) -> RobotState:
 
 def watched(stamp: float = 1.0, room: int = 7) -> Watched:
     """What is remembered after a step at an instant with a good state, before any command was sent."""
-    numbers = [np.zeros(2) for _ in range(5)]
-    report = Report(np.zeros(1), *numbers, np.zeros(6))
+    report = Report(np.zeros(1), *np.zeros((5, 2)), np.zeros(6))
     put_robot(report, robot(stamp))
-    sent = np.zeros(1, np.int64)
-    return Watched(np.full(1, stamp), np.full(1, stamp), report, sent, np.zeros(room), np.zeros((room, 2)))
+    sent = np.zeros(1, np.int64), np.zeros(room), np.zeros((room, 2))
+    return Watched(np.full(1, stamp), np.full(1, stamp), report, *sent)
 
 
 def judge(inputs: Inputs, watch: Watched | None = None) -> tuple[RobotState, dict[Event, str], Watched]:
@@ -94,16 +92,12 @@ def test_a_state_from_before_the_last_command_is_moved_on_by_it():
         (np.zeros((1, 2)), "has the shape (1, 2), not (2,)"),
         (0.5, "has the shape (), not (2,)"),
         (["a", "b"], "no array of numbers"),
-        ([[1.0], [1.0, 2.0]], "no array of numbers"),
         (None, "is None, no array of numbers"),
         (np.full(2, np.longdouble("1e4000")), "holds inf, "),
         (COMPLEX, "no array of numbers"),
-        (list(COMPLEX), "no array of numbers"),
-        (COMPLEX.tolist(), "no array of numbers"),
-        (COMPLEX.astype(object), "no array of numbers"),
     ],
 )
-@pytest.mark.parametrize("name", PARTS)
+@pytest.mark.parametrize("name", ["q", "qd", "q_commanded", "qd_commanded"])
 def test_a_part_that_no_arm_can_have_is_named_and_not_believed(name: str, part: object, said: str):
     believed, faults, watch = judge(inputs(**{name: part}))
     assert list(faults) == [Event.UNUSABLE]
@@ -219,30 +213,13 @@ def test_a_clock_set_back_does_not_hide_a_missing_wrench():
     assert Event.NO_FORCE in faults
 
 
-def test_complex_numbers_are_no_torque_touch_points_motion_fixtures_or_load():
-    z = COMPLEX
-    believed, faults, _ = judge(inputs(tau_ext=z))
+def test_complex_numbers_are_no_torque_touch_load_or_motion():
+    believed, faults, _ = judge(inputs(tau_ext=COMPLEX))
     assert faults == {}
     assert np.isnan(believed.tau_ext).all()
-    touch = TouchReadings(np.zeros(2), np.zeros(2, bool), np.zeros(2), np.zeros(2, np.int64))
-    points = SeenPoints(0.0, np.zeros(2), np.zeros((2, 3)), np.zeros(2))
-    moving = MovingFixtures(1.0, *np.zeros((2, 1, 3)), np.zeros(1), *np.zeros((2, 1, 3)))
-    wanted = Desired(DesiredKind.JOINT_VELOCITIES, np.ones(1), np.zeros((1, 2)))
-    for name in ("stamp", "force"):
-        assert sound_touch(replace(touch, **{name: z}), 2)[1].endswith("no array of numbers")
-    for name, part in {"heard": z[0], "stamp": z, "point": np.zeros((2, 3), complex), "sigma": z}.items():
-        assert f"SeenPoints.{name} is" in sound_points(points._replace(**{name: part}))[1]
-    for name, part in {"stamp": z[0], "radius": z[:1], "a": np.zeros((1, 3), complex)}.items():
-        assert f"MovingFixtures.{name} is" in sound_moving(moving._replace(**{name: part}), 1.0, 1.0)[1]
-    for name, part in {"stamp": z[:1], "number": z[None]}.items():
-        assert f"Desired.{name} is" in sound_desired(replace(wanted, **{name: part}), 2, 1.0)[1]
+    touch = TouchReadings(np.zeros(2), np.zeros(2, bool), COMPLEX, np.zeros(2, np.int64))
+    assert "TouchReadings.force is array([0.1+0.j" in sound_touch(touch, 2)[1]
     with pytest.raises(ParameterError, match="is no payload: give numbers"):
-        Payload(z[0], (0.0, 0.0, 0.0))
+        Payload(COMPLEX[0], (0.0, 0.0, 0.0))
     with pytest.raises(TypeError, match="complex128 are not real"):
         twist(1.0, np.zeros(3, complex))
-
-
-def test_stamps_of_a_motion_as_large_as_a_float_can_be_are_refused_in_a_sentence():
-    for stamps in ((-1e308, 1e308), (1e308, 1.1e308), (0.0, np.nan), (-np.inf, 0.0)):
-        wanted = Desired(DesiredKind.JOINT_VELOCITIES, np.array(stamps), np.zeros((2, 2)))
-        assert sound_desired(wanted, 2, 1.0)[1].startswith("Desired.stamp holds ")

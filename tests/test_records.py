@@ -90,20 +90,6 @@ class Spring(Checked):
     rest_m: float | None = None
 
 
-class Bench(NamedTuple):
-    spring: Spring
-    force: Cell
-
-
-_spring = opener(Bench, "spring", "force")
-
-
-@compiled
-def press(blocks: Blocks, way: float) -> None:
-    spring, force = _spring(blocks)
-    force[0] = push(spring, way)
-
-
 @compiled
 def push(spring: Spring, way: float) -> float:
     return spring.stiffness * way * spring.steps if spring.damped else 0.0
@@ -111,9 +97,6 @@ def push(spring: Spring, way: float) -> float:
 
 def test_compiled_code_sees_the_plain_numbers_of_a_set_of_parameters():
     assert Spring.Numbers._fields == ("stiffness", "steps", "damped")
-    bench = Flat.of(Bench(Spring(stiffness=50), np.zeros(1)))
-    press(bench.blocks, 0.1)
-    assert bench.get("force") == 15.0
     assert push(Spring(stiffness=50).numbers, 0.1) == 15.0  # also where a whole number was given for a real one
     found = attrgetter(Spring.Numbers.__qualname__)(sys.modules[Spring.Numbers.__module__])
     assert found is Spring.Numbers  # Numba's cache keeps a class by its name

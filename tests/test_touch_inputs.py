@@ -49,14 +49,9 @@ def test_readings_that_fit_are_copied():
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        (readings(6), "TouchReadings.stamp has the shape (6,), not (7,)"),
         (replace(readings(), force=np.zeros((7, 1))), "TouchReadings.force has the shape (7, 1), not (7,)"),
-        (
-            replace(readings(), contact=np.zeros(7)),
-            "no array of yes and no",
-        ),
+        (replace(readings(), contact=np.zeros(7)), "no array of yes and no"),
         (replace(readings(), status=np.array(["a"] * 7)), "no array of whole numbers"),
-        (replace(readings(), stamp=["soon"] * 7), "TouchReadings.stamp is"),
         ("nothing", "'nothing' is no TouchReadings"),
     ],
 )

@@ -107,9 +107,7 @@ def test_a_moving_axis_comes_nearer_as_fast_as_its_nearest_point(panda_model):
     [
         ({"a": np.zeros((2, 3))}, "MovingFixtures.b has the shape (1, 3), not (2, 3)"),
         ({"radius": np.array([-0.1])}, "have a radius of -0.1 m"),
-        ({"b": np.full((1, 3), np.nan)}, "MovingFixtures.b holds nan, no number below 100"),
         ({"b_velocity": np.full((1, 3), 1e3)}, "MovingFixtures.b_velocity holds 1000, no number below 100 in size"),
-        ({"a": "here"}, "MovingFixtures.a is 'here', no array of numbers"),
         ({"stamp": -0.2}, "0.200 s ago"),
         ({"stamp": np.nan}, "ago"),
     ],

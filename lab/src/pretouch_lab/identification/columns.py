@@ -53,8 +53,10 @@ def columns_of(found: Usable, motions: list[Motion], model: RobotModel) -> Colum
         time, path = s.stamp[span], motion.between()
         M = np.array([model.mass_matrix(q) for q in motion.q])
         masses.append(M)
-        rows = zip(motion.q, motion.qd, motion.qdd, strict=True)
-        carried.append(np.array([_carried(model, *row) for row in rows]))
+        x = np.empty((len(motion.q), model.n, features_of(model.n)))
+        for i, (q, qd, qdd) in enumerate(zip(motion.q, motion.qd, motion.qdd, strict=True)):
+            features_into(model.kinematics(q), model.mechanism, qd, qdd, x[i])
+        carried.append(x[:, :, PLAIN:])
         calm[span] = _calm(motion, time)
         if s.qd is not None:
             growth = on_grid(time, motion.at[0], GRID_S, motion.qdd)
@@ -72,13 +74,6 @@ def columns_of(found: Usable, motions: list[Motion], model: RobotModel) -> Colum
     return Columns(
         tuple(motions), tuple(fine), tuple(positions), tuple(speeds), tuple(carried), kick, noise, square, calm
     )  # fmt: skip
-
-
-def _carried(model: RobotModel, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray:
-    """Torque (n, n + 1) of each joint by weight and inertia of what is behind each joint, and of 1 kg [Nm]."""
-    x = np.empty((model.n, features_of(model.n)))
-    features_into(model.kinematics(q), model.mechanism, qd, qdd, x)
-    return x[:, PLAIN:]
 
 
 def _calm(motion: Motion, time: FloatArray) -> BoolArray:
