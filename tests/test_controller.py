@@ -188,7 +188,7 @@ def test_a_command_changed_by_its_user_is_not_the_one_remembered(arm: Arm):
     step, after = arm.controller.step(arm.state, Inputs(arm.time, arm.robot(), arm.readings()))
     sent = step.command.copy()
     step.command[:] = 0.0
-    np.testing.assert_array_equal(after.command, sent)
+    np.testing.assert_array_equal(after.memory.get("command"), sent)
 
 
 def test_a_path_that_hands_out_its_own_memory_changes_no_step(panda_model: RobotModel, paper_skin: Skin):

@@ -8,7 +8,7 @@ import pytest
 
 from pretouch.desired import twist
 from pretouch.errors import ParameterError
-from pretouch.faults import Report, Watched, examine, put_robot, robot_of
+from pretouch.faults import Report, Watched, begin_watch, examine, robot_of
 from pretouch.modes import Event
 from pretouch.params import FailureParams
 from pretouch.sensing.sensor import PAPER_SENSOR
@@ -33,9 +33,9 @@ def robot(stamp: float = 1.0) -> RobotState:
 def watched(stamp: float = 1.0, room: int = 7) -> Watched:
     """What is remembered after a step at an instant with a good state, before any command was sent."""
     report = Report(np.zeros(1), *np.zeros((5, 2)), np.zeros(6))
-    put_robot(report, robot(stamp))
     sent = np.zeros(1, np.int64), np.zeros(room), np.zeros((room, 2))
-    return Watched(np.full(1, stamp), np.full(1, stamp), report, *sent)
+    begin_watch(watch := Watched(np.zeros(1), np.zeros(1), report, *sent), robot(stamp))
+    return watch
 
 
 def judge(inputs: Inputs, watch: Watched | None = None) -> tuple[RobotState, dict[Event, str], Watched]:

@@ -16,12 +16,11 @@ from pretouch.control.joint_box import joint_limits
 from pretouch.control.path import Path, nearest_phase
 from pretouch.decision import Decision
 from pretouch.errors import RobotStateError, SkinError
-from pretouch.faults import Report, Watched, put_robot, robot_of, take_sent
+from pretouch.faults import Report, Watched, begin_watch, robot_of, take_sent
 from pretouch.line import CHECK, MOVE, line
 from pretouch.line_records import PYTHON, SEQUENTIAL
 from pretouch.line_setup import fixed_of, kinds_of, now_init, remembered_init
 from pretouch.modes import CLEAR, SOLVED, ModeState, mode_init
-from pretouch.perception.obstacles import TrackState
 from pretouch.perception.scene_filter import Fixtures
 from pretouch.profiles import Profile
 from pretouch.records import Flat
@@ -29,7 +28,7 @@ from pretouch.robot.body import Capsules
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.sound import UsualInputs, sound_robot
-from pretouch.types import ControlStep, FloatArray, Inputs, RobotState
+from pretouch.types import ControlStep, Inputs, RobotState
 from pretouch.values import value
 
 
@@ -53,11 +52,6 @@ class ControllerState:
     """Whether the step before was."""
 
     @property
-    def command(self) -> FloatArray:
-        """(n,) last joint velocity command [rad/s]."""
-        return self.memory.get("command")
-
-    @property
     def phase(self) -> float:
         """Arc length travelled along the path [m]."""
         return self.memory.get("pace.phase")
@@ -66,11 +60,6 @@ class ControllerState:
     def robot(self) -> RobotState:
         """The arm's state that was believed last."""
         return robot_of(self.memory.part("watch.robot", Report))
-
-    @property
-    def heard(self) -> FloatArray:
-        """(K,) stamp of each unit's newest reading that reported anything [s]."""
-        return self.memory.part("tracks", TrackState).heard
 
     @property
     def learnt(self) -> ResidualModel:
@@ -97,9 +86,9 @@ class Controller:
         self.motion_body = MotionBody(model, len(skin), self.limits, profile.task)
         self.approach = profile.approach if self.kinds.approach == PYTHON else None
         """A restriction in plain Python; None of one that is compiled."""
+        self._begin_approach = None if self.approach is None else self.approach.init(self.motion_body)
         self.touching = profile.detect.reads_touch and len(skin.touching) > 0
-        outside = None if profile.perception is None else profile.perception.outside
-        self.outside_places = 0 if outside is None else outside.per_link * len(model.parts)
+        self.outside_places = profile.outside_per_link * len(model.parts)
         """How many points of outside sources are kept."""
         self.beside = fixtures.capsules
         self.fixed, self._begin = Flat.of(fixed_of(self)), Flat.of(remembered_init(self))
@@ -117,14 +106,12 @@ class Controller:
         if sound is None:
             raise RobotStateError(f"The controller cannot start: {wrong}: check the connection to the arm.")
         memory = self._begin.copy()
-        put_robot(memory.part("watch.robot", Report), sound)
-        memory.put("watch.stamp", sound.stamp)
-        memory.put("watch.force_stamp", sound.stamp)
+        begin_watch(memory.part("watch", Watched), sound)
         memory.put("command", sound.qd_commanded)
         memory.put("rotation_goal", self.model.kinematics(sound.q).rotation[self.model.ee])
         detector = self.kept_detector(memory, self.detector.init(self.body, learnt))
         reaction = self.profile.react.init(self.body, sound.q_commanded)
-        return ControllerState(memory, mode_init(), detector, reaction, self._approach_init(), None, False, False)
+        return ControllerState(memory, mode_init(), detector, reaction, self._begin_approach, None, False, False)
 
     def adopt(self, state: ControllerState, before: "Controller") -> ControllerState:
         """Go on from a state of another controller of the same arm and skin, with this one's profile and path.
@@ -154,7 +141,7 @@ class Controller:
         reaction = mine.react.adopted(before.whole_reaction(state), self.body, theirs.react, watch.robot.q_commanded)
         return replace(
             state, memory=memory, detector=self.kept_detector(memory, detector), reaction=reaction,
-            approach=state.approach if mine.approach == theirs.approach else self._approach_init(),
+            approach=state.approach if mine.approach == theirs.approach else self._begin_approach,
             calm=False, quick=False,
         )  # fmt: skip
 
@@ -197,11 +184,6 @@ class Controller:
         memory.fill("test", state.test)
         return replace(state, test=None)
 
-    def may_be_one_call(self, detector: Any) -> bool:
-        """Whether all parts are compiled, and a detector remembers nothing of a contact."""
-        located = self.kinds.detect == SEQUENTIAL and detector.localisation is not None
-        return PYTHON not in self.kinds and not self.touching and not (located and detector.localisation.steps)
-
     def whole_reaction(self, state: ControllerState) -> Any:
         """Return all that the reaction remembers."""
         memory = self.with_places(state.memory)
@@ -214,7 +196,3 @@ class Controller:
         if [len(block) for block in memory.blocks] != [len(block) for block in self._begin.blocks]:
             raise RobotStateError("The state is that of a controller for another arm or skin: begin with init().")
         return memory if memory.places else Flat(memory.blocks, self._begin.places)
-
-    def _approach_init(self) -> object:
-        """Return what a restriction in plain Python remembers at first."""
-        return None if self.approach is None else self.approach.init(self.motion_body)

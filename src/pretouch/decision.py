@@ -13,6 +13,7 @@ from pretouch.control.approach import MotionRequest, Restriction, rows_of
 from pretouch.control.commander import Asked, asked_by
 from pretouch.faults import Report, Watched, examine, put_robot
 from pretouch.line import ASK, MOVE, SEE, line_points, line_within
+from pretouch.line_records import PYTHON, SEQUENTIAL
 from pretouch.modes import CLEAR, Event, QpOutcome, next_mode, outcome_of
 from pretouch.perception.closest import beside, near_moving
 from pretouch.perception.external_points import outside_init, outside_silence
@@ -58,8 +59,14 @@ class Decision:
         calm = rests and mode == CLEAR and detection.contact is None and not self._has_source and load is None
         return step, {
             "mode": mode, "detector": detector, "reaction": reaction, "approach": approach, "load": load,
-            "calm": calm and self.controller.may_be_one_call(detector), "quick": False,
+            "calm": calm and self._is_compiled(detector), "quick": False,
         }  # fmt: skip
+
+    def _is_compiled(self, detector: Any) -> bool:
+        """Whether all parts are compiled, and a detector remembers nothing of a contact."""
+        controller = self.controller
+        located = controller.kinds.detect == SEQUENTIAL and detector.localisation is not None
+        return PYTHON not in controller.kinds and not (controller.touching or (located and detector.localisation.steps))
 
     def _judge(self, inputs: Inputs) -> None:
         """Find what of the inputs can be used, and what is wrong with the rest."""

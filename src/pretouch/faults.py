@@ -151,6 +151,12 @@ def add_sent(watch: Watched, command: FloatArray) -> None:
     watch.sent_stamp[count], watch.sent_command[count], watch.sent[0] = watch.stamp[0], command, count + 1
 
 
+def begin_watch(watch: Watched, robot: RobotState) -> None:
+    """Begin with a state of the arm that is known to be good."""
+    watch.stamp[0] = watch.force_stamp[0] = robot.stamp
+    put_robot(watch.robot, robot)
+
+
 def take_sent(watch: Watched, other: Watched) -> None:
     """Take the commands that another record says were sent, of those that there is no room for the newest."""
     last = other.sent[0]

@@ -223,7 +223,7 @@ def run(
 ) -> None:  # fmt: skip
     """Turn the controller until `done` says so of a step. However it ends, the arm is first brought to rest."""
     state = controller.init(robot.read(), options.learnt)
-    sent = state.command
+    sent = state.memory.get("command")
     try:
         while True:
             tick = clock.tick()

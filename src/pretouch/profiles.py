@@ -69,6 +69,12 @@ class Profile(Checked):
         return self.perception or PerceptionParams()
 
     @property
+    def outside_per_link(self) -> int:
+        """How many points of outside sources are kept for each link; 0: such points are not used."""
+        outside = None if self.perception is None else self.perception.outside
+        return 0 if outside is None else outside.per_link
+
+    @property
     def d_max_m(self) -> float:
         """Distance from the end-effector origin within which something is near it [m]: of eq. 3, or Table I's."""
         return (self.slow or SpeedReduction()).d_max_m

@@ -124,7 +124,7 @@ def test_a_window_that_fills_keeps_no_buffer(panda_model, paper_skin):
     robot = deepcopy(moving.next.robot)
     state = moving.controller.init(robot)
     robot.qd_commanded[:] = 99.0
-    np.testing.assert_array_equal(state.command, moving.next.robot.qd_commanded)
+    np.testing.assert_array_equal(state.memory.get("command"), moving.next.robot.qd_commanded)
 
 
 SHAPES = [

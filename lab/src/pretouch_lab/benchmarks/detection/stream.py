@@ -79,7 +79,7 @@ class StreamRecorder:
         self._robot.append(cycle.after.robot)
         self._obstacles.append(cycle.step.obstacles)
         self._reacting.append(cycle.before.mode.mode is Mode.REACT)
-        heard = cycle.after.heard
+        heard = cycle.after.memory.get("tracks.heard")
         self._watched.append(len(heard) > 0 and cycle.step.stamp - float(heard.min()) <= self._patience)
         self._look(cycle)
 
