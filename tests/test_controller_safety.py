@@ -82,7 +82,7 @@ def spoiled(inputs: Inputs, fault: str, value: float = np.nan) -> Inputs:
     return replace(inputs, readings=replace(readings, **{name: wrong}))
 
 
-@pytest.mark.parametrize("value", [np.nan, np.inf, -1e15, 1e306])
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, -1e15, 1e306])
 @pytest.mark.parametrize("fault", FAULTS)
 def test_one_fault_that_lasts(arm: Arm, fault: str, value: float):
     arm.run(60)

@@ -141,10 +141,7 @@ def test_a_motion_that_goes_stale_brings_the_arm_to_rest_says_so_and_is_taken_up
     [
         (lambda now: desired.twist(now, np.full(3, np.nan)), "Desired.number holds nan"),
         (lambda now: desired.twist(now, (1e9, 0.0, 0.0)), "Desired.number holds 1e"),
-        (
-            lambda now: desired.joint_velocities(now, np.zeros(6)),
-            r"number has the shape \(1, 6\), not \(1, 7\)",
-        ),
+        (lambda now: desired.joint_velocities(now, np.zeros(6)), r"number has the shape \(1, 6\), not \(1, 7\)"),
         (lambda now: desired.pose(now, 2.0 * np.eye(4)), "no rotation"),
         (lambda now: desired.twist(now + 1e4, np.zeros(3)), "s in the future"),
         (lambda now: desired.twist((now, now), np.zeros((2, 3))), "do not increase"),

@@ -12,8 +12,8 @@ from pretouch.faults import Report, Watched, begin_watch, examine, robot_of
 from pretouch.modes import Event
 from pretouch.params import FailureParams
 from pretouch.sensing.sensor import PAPER_SENSOR
-from pretouch.sound import sound_touch
-from pretouch.types import Inputs, Payload, RangeReadings, RobotState, TouchReadings
+from pretouch.sound import sound_points, sound_touch
+from pretouch.types import Inputs, Payload, RangeReadings, RobotState, SeenPoints, TouchReadings
 
 PARAMS = FailureParams()  # state older than 0.05 s, step more than 0.05 s after the last, no force for 0.2 s
 PERIOD = 0.01
@@ -95,6 +95,7 @@ def test_a_state_from_before_the_last_command_is_moved_on_by_it():
         (None, "is None, no array of numbers"),
         (np.full(2, np.longdouble("1e4000")), "holds inf, "),
         (COMPLEX, "no array of numbers"),
+        (COMPLEX.astype(object), "no array of numbers"),
     ],
 )
 @pytest.mark.parametrize("name", ["q", "qd", "q_commanded", "qd_commanded"])
@@ -219,6 +220,14 @@ def test_complex_numbers_are_no_torque_touch_load_or_motion():
     assert np.isnan(believed.tau_ext).all()
     touch = TouchReadings(np.zeros(2), np.zeros(2, bool), COMPLEX, np.zeros(2, np.int64))
     assert "TouchReadings.force is array([0.1+0.j" in sound_touch(touch, 2)[1]
+    points = SeenPoints(0.0, np.zeros(2), np.zeros((2, 3)), np.zeros(2))
+    for name, part in {
+        "heard": COMPLEX[0],
+        "stamp": COMPLEX,
+        "point": np.zeros((2, 3), complex),
+        "sigma": COMPLEX,
+    }.items():
+        assert f"SeenPoints.{name} is" in sound_points(points._replace(**{name: part}))[1]
     with pytest.raises(ParameterError, match="is no payload: give numbers"):
         Payload(COMPLEX[0], (0.0, 0.0, 0.0))
     with pytest.raises(TypeError, match="complex128 are not real"):

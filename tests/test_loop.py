@@ -154,11 +154,13 @@ def test_a_command_that_was_not_sent_is_not_reckoned_with(
     assert_brought_to_rest(world)
 
 
-def test_no_start_from_a_state_that_cannot_be_used(controller: Controller, world: World, monkeypatch):
-    first = replace(world.read(), qd=np.array([0, 0, 0, np.nan, 0, 0, 0]))
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("name", ["q", "qd", "q_commanded", "qd_commanded", "stamp"])
+def test_no_start_from_a_state_that_is_not_finite(controller: Controller, world: World, monkeypatch, name, value):
+    first = replace(world.read(), **{name: value if name == "stamp" else np.array([0, 0, 0, value, 0, 0, 0])})
     monkeypatch.setattr(world, "read", lambda: first)
     monkeypatch.setattr(world, "command", lambda qd: pytest.fail("no command is due"))
-    with pytest.raises(RobotStateError, match=r"cannot start: RobotState\.qd holds nan.*: check"):
+    with pytest.raises(RobotStateError, match=rf"cannot start: RobotState\.{name} holds {value}.*: check"):
         turn(controller, world, FakeRecorder(), never)
 
 

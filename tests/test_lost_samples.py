@@ -21,9 +21,7 @@ DT = 0.001
 PAPER = PROFILES["paper"]
 # hard accelerations, so that they are at their limits often; a short window, so that the arm soon moves
 BRISK = replace(
-    PAPER,
-    task=replace(PAPER.task, acceleration_m_s2=50.0, speed_m_s=0.8),
-    window=replace(PAPER.window, samples=20),
+    PAPER, task=replace(PAPER.task, acceleration_m_s2=50.0, speed_m_s=0.8), window=replace(PAPER.window, samples=20)
 )
 
 

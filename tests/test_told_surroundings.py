@@ -91,6 +91,7 @@ def test_a_source_once_given_that_falls_silent_stops_the_arm_and_lets_it_go_on(p
     [
         (5, "cannot be used (5 is no SeenPoints)"),
         (SeenPoints(1.0, np.zeros(1), np.zeros(3), np.zeros(1)), "SeenPoints.point has the shape (3,), not (1, 3)"),
+        (SeenPoints("soon", np.zeros(1), np.zeros((1, 3)), np.zeros(1)), "SeenPoints.heard is 'soon', no number"),
         (seen(1.0, *np.zeros((MOST_POINTS + 1, 3))), f"gives 20001 points, more than {MOST_POINTS}"),
         (seen(1.0, *np.full((5, 3), 500.0), [np.nan] * 3, [0.0] * 3), "5 implausible points of 6: a coordinate"),
     ],

@@ -97,12 +97,7 @@ def test_nothing_is_learnt_near_an_object(distance):
 
 
 @pytest.mark.parametrize(
-    "how",
-    [
-        {"reacting": True},
-        {"watched": False},
-        {"p": profile("pretouch:window.samples=10:detect.learn=never")},
-    ],
+    "how", [{"reacting": True}, {"watched": False}, {"p": profile("pretouch:window.samples=10:detect.learn=never")}]
 )
 def test_nothing_is_learnt_while_reacting_unwatched_or_when_told_not_to(how):
     before = SETTLED.state.test.model

@@ -7,14 +7,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from pretouch.control.braking import (
-    Touch,
-    braking_cap,
-    braking_numbers,
-    braking_rows,
-    slots_init,
-    tangents_of,
-)
+from pretouch.control.braking import Touch, braking_cap, braking_numbers, braking_rows, slots_init, tangents_of
 from pretouch.params.pretouch import BrakingParams, Tangential
 from pretouch.robot.kinematics import Chain
 from pretouch.types import FloatArray, no_obstacles

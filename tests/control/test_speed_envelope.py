@@ -8,12 +8,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from pretouch.control.joint_box import (
-    JointLimits,
-    joint_box,
-    joint_limits,
-    viable_speed_in_envelope,
-)
+from pretouch.control.joint_box import JointLimits, joint_box, joint_limits, viable_speed_in_envelope
 from pretouch.robot.description import SpeedEnvelope, fr3, panda
 from pretouch.robot.model import RobotModel
 

@@ -166,3 +166,10 @@ def test_readings_that_do_not_fit_the_skin_are_refused(moving: Moving, parts: li
 def test_what_is_no_array_of_numbers_is_refused(moving: Moving, part: str, wrong: object):
     step, _ = moving.given(changed(moving.next, lambda a: wrong, [part]))
     assert_held(moving, step)
+
+
+@pytest.mark.parametrize("status", [np.full(7, 0.5), np.full(7, np.nan), np.array([RangeStatus.OK] * 7, dtype=object)])
+def test_statuses_that_are_no_whole_numbers_are_refused(moving: Moving, status: np.ndarray):
+    step, _ = moving.given(changed(moving.next, lambda a: status, ["status"]))
+    assert_held(moving, step)
+    assert "status" in step.reason

@@ -10,16 +10,7 @@ from pretouch.imported_data.forces import read_force
 from pretouch.imported_data.log import Choice
 from pretouch.imported_data.reading import open_log, read_joints
 from pretouch.recording.skin_recording import SkinRecording
-from tests.imported_data.files import (
-    PANDA,
-    START,
-    by_time,
-    joints,
-    stamps,
-    wrench,
-    wrenches,
-    write_bag,
-)
+from tests.imported_data.files import PANDA, START, by_time, joints, stamps, wrench, wrenches, write_bag
 
 FORCE = np.random.default_rng(0).normal(size=(40, 3))
 Q = np.array([0.1, -0.7, 0.2, -2.3, 0.3, 1.6, 0.7])

@@ -19,6 +19,17 @@ def test_bounds_are_read_from_a_profiles_text_and_bad_ones_refused():
         profile("fixed:detect.joint_torques_nm=many")
 
 
+@pytest.mark.parametrize("name", ["fixed", "observer"])
+def test_without_torques_nothing_is_felt(name):
+    p = profile(f"{name}:window.samples=10")
+    state = feel_init(MODEL, p)
+    for _ in range(12):
+        found, state = feel(state, MODEL, KIN, robot(np.full(7, np.nan)), NOTHING, False, p)
+    assert found.contact is None
+    assert not found.armed
+    assert found.evidence == 0.0
+
+
 def test_fixed_bounds_by_numbers():
     p = profile("fixed:window.samples=2")
     state = feel_init(MODEL, p)
