@@ -68,13 +68,13 @@ test: setup
 # imports, a trial, a recording and its replay, the page's start: whether another Python works
 test-quick: setup
 	$(PYTEST) -n 2 -m "not slow" tests/test_compiled.py tests/test_controller.py lab/tests/paper/test_avoidance.py \
-		tests/recording/test_writer.py tests/test_cli_replay.py tests/viewer/test_serve_live.py
+		tests/recording/test_writer.py tests/test_cli_replay.py tests/page/test_serve_live.py
 
 # the files in which the last `make test` skipped something, with the real libraries, and the page in a browser
 test-contracts: setup
 	@test ! -s build/skipped || $(PYTEST) -n 2 --dist worksteal -m "not slow" \
 		--skip-only="make meshes,make learn" $$(cat build/skipped)
-	$(PYTEST) -n 2 --dist worksteal -m "not alone" --skip-only= tests/viewer/test_page_in_browser.py
+	$(PYTEST) -n 2 --dist worksteal -m "not alone" --skip-only= tests/page/test_page_in_browser.py
 
 # the same files once all that they need is installed: nothing may be skipped now
 test-skipped: setup

@@ -23,9 +23,9 @@ from pathlib import Path
 
 import numpy as np
 
-from pretouch.hardware.keys import Keys, UnitKey, new_key
-from pretouch.hardware.network_skin import NetworkSkin
-from pretouch.hardware.wire import (
+from pretouch.units.keys import Keys, UnitKey, new_key
+from pretouch.units.network_skin import NetworkSkin
+from pretouch.units.wire import (
     CHALLENGE_SIZE,
     Beacon,
     Flag,

@@ -3,7 +3,7 @@
     pretouch serve-fci --robot fr3 --lockstep --once --push 3:0,30,0:0.3     # in another terminal, or a real arm
     python examples/09_libfranka_program.py 127.0.0.1
 
-Without units the arm only feels. Readings of real units (`pretouch.hardware`) go in beside the state.
+Without units the arm only feels. Readings of real units (`pretouch.units`) go in beside the state.
 """
 
 import math
@@ -13,9 +13,9 @@ import numpy as np
 import pylibfranka
 
 import pretouch as pt
-from pretouch.hardware.franka.limiter import SetPointLimiter
-from pretouch.hardware.franka.limits import LimiterParams, motion_limits, planned
-from pretouch.hardware.franka.state import FrankaState, franka_state, robot_state
+from pretouch.arms.franka.limiter import SetPointLimiter
+from pretouch.arms.franka.limits import LimiterParams, motion_limits, planned
+from pretouch.arms.franka.state import FrankaState, franka_state, robot_state
 
 arm = pt.RobotModel(planned(pt.fr3(), LimiterParams()))
 none = pt.RangeReadings(np.zeros(0), np.zeros(0), np.zeros(0, np.int64))

@@ -12,7 +12,6 @@ from pretouch.cli.skin_record import record_samples
 from pretouch.recording.skin_recording import SkinRecording
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.serving.fleet import FleetParams
 from pretouch.session.session import NoUnits
 from pretouch.sim.imu import ImuParams
 from pretouch.sim.plant import Plant, PlantClock
@@ -20,6 +19,7 @@ from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.range_finder import RangeFinderParams
 from pretouch.sim.scene import SceneSpec
 from pretouch.traces import JointTrace
+from pretouch.units.fleet import FleetParams
 from tests.wire_skin import WireSkin
 
 

@@ -13,9 +13,9 @@ from pretouch.imported_data.log import Choice
 from pretouch.recording.skin_recording import SkinRecording
 from pretouch.recording.writer import Recording
 from tests.following_arm import Arm
-from tests.hardware.traffic import heard
 from tests.imported_data.files import PUSHES, force_columns, pushed, wrenches, write_bag, write_csv
 from tests.imported_data.joint_files import Moving
+from tests.units.traffic import heard
 
 
 @pytest.fixture

@@ -11,8 +11,8 @@ from pretouch.cli.commands import Replay
 from pretouch.cli.replay import replay
 from pretouch.controller import Controller
 from pretouch.errors import ParameterError, RecordingError
+from pretouch.page import server
 from pretouch.recording.writer import Recording
-from pretouch.viewer import server
 from tests.following_arm import Arm
 from tests.imported_data.files import pushed
 
@@ -35,7 +35,7 @@ def page(monkeypatch):
     """Take the page's place, and keep what it was given."""
     given = []
     stand_in = SimpleNamespace(show_replay=lambda *args: given.append(args))
-    monkeypatch.setitem(sys.modules, "pretouch.viewer.replay", stand_in)
+    monkeypatch.setitem(sys.modules, "pretouch.page.replay", stand_in)
     return given
 
 

@@ -13,12 +13,12 @@ import pytest
 from pretouch import cli, plugins
 from pretouch.arms import OpenedArm
 from pretouch.arms.simulated import Simulated
+from pretouch.arms.simulated.threaded import ThreadedArm
 from pretouch.cli.run.options import RobotOptions, Run, TaskOptions
 from pretouch.cli.run.setup import run_setup
 from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify
 from pretouch.recording.writer import Recording
-from pretouch.serving.threaded_arm import ThreadedArm
 from pretouch.session.confirmations import Identity
 from pretouch.session.preflight import PreflightParams
 from pretouch.session.push import GuidedPush, PushParams

@@ -16,13 +16,13 @@ import pytest
 
 from pretouch import cli
 from pretouch.cli.skin_monitor import only_here
-from pretouch.hardware.keys import Keys, UnitKey, load_keys, new_key, save_keys
-from pretouch.hardware.udp import EVERYWHERE
 from pretouch.recording.skin_reader import read_skin
 from pretouch.sensing.skin import PAPER_SKIN
 from pretouch.types import RangeStatus
-from tests.hardware.desk import Desk
+from pretouch.units.keys import Keys, UnitKey, load_keys, new_key, save_keys
+from pretouch.units.udp import EVERYWHERE
 from tests.ports import free_port
+from tests.units.desk import Desk
 
 ROOT = Path(__file__).parents[1]
 

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from pretouch import cli
+from pretouch.arms.simulated import threaded
+from pretouch.arms.simulated.arm import SimulatedArm
 from pretouch.cli.calibrate import motion
-from pretouch.hardware.keys import save_keys
 from pretouch.imported_data.reading import read_joints
 from pretouch.robot.postures import capsule_ends, kinematics_of
-from pretouch.serving import threaded_arm
-from pretouch.serving.fleet import simulated_keys
-from pretouch.serving.simulated_arm import SimulatedArm
+from pretouch.units.fleet import simulated_keys
+from pretouch.units.keys import save_keys
 
 ASIDE = np.array([-1.2, 0, 0, 0, 0, 0, 0])
 """From the ready posture to where the arm of a test stands [rad]: to its right."""
@@ -127,7 +127,7 @@ def test_the_arm_does_not_move_without_a_persons_word(tmp_path, capsys, monkeypa
 
 
 def test_the_way_to_the_start_is_part_of_what_is_asked_about(panda_model, tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(threaded_arm, "SimulatedArm", elsewhere)
+    monkeypatch.setattr(threaded, "SimulatedArm", elsewhere)
     questions = []
     monkeypatch.setattr("builtins.input", lambda question: questions.append(question) or "n")
     files = ("--out", tmp_path / "s.toml")

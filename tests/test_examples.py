@@ -11,7 +11,7 @@ from pretouch.sensing.skin import load_skin
 
 EXAMPLES = sorted((Path(__file__).parents[1] / "examples").glob("*.py"))
 ELSEWHERE = "07_first_controller", "09_libfranka_program"
-"""The tutorial's runs below; the other against an arm: `tests/hardware/franka/test_shielded_program.py`."""
+"""The tutorial's runs below; the other against an arm: `tests/arms/franka/test_shielded_program.py`."""
 
 
 @pytest.mark.parametrize("example", [e for e in EXAMPLES if e.stem not in ELSEWHERE], ids=lambda path: path.stem)

@@ -1,6 +1,6 @@
 """Peers that take a connection and say nothing: whoever waits for one gives up with a sentence, within a bound.
 
-Of the others that wait, each has its test beside it: `hardware/franka/test_connect` (the arm's process),
+Of the others that wait, each has its test beside it: `arms/franka/test_connect` (the arm's process),
 `hardware/test_provision` (a unit's line), `ros2/tests` (topics).
 """
 
@@ -11,10 +11,10 @@ from collections.abc import Iterator
 
 import pytest
 
-from pretouch.hardware.network_skin import NetworkSkin
-from pretouch.viewer.server import ServeOptions, served
-from tests.hardware.fake_unit import IDS, KEYS
+from pretouch.page.server import ServeOptions, served
+from pretouch.units.network_skin import NetworkSkin
 from tests.ports import free_port
+from tests.units.fake_unit import IDS, KEYS
 
 
 @pytest.fixture(autouse=True)

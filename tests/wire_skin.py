@@ -5,15 +5,15 @@ from typing import Self
 import numpy as np
 
 from pretouch.errors import HardwareError
-from pretouch.hardware.link import LinkParams
-from pretouch.hardware.receiver import SkinReceiver
 from pretouch.sensing.skin import Skin
-from pretouch.serving.fleet import Fleet, FleetParams, simulated_keys
 from pretouch.sim.imu import Imus
 from pretouch.sim.plant import Plant
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.touch_sensor import Forces, TouchSensors, no_forces
 from pretouch.types import RangeReadings, TouchReadings
+from pretouch.units.fleet import Fleet, FleetParams, simulated_keys
+from pretouch.units.link import LinkParams
+from pretouch.units.receiver import SkinReceiver
 
 _PATIENCE_S = 5.0
 """The machine's own loopback may take this long to hand a datagram over [s]."""

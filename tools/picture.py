@@ -15,17 +15,17 @@ from types import SimpleNamespace
 
 import numpy as np
 from PIL import Image
+from tests.page.browser import Visitor, chromium
 from tests.ports import free_port
-from tests.viewer.browser import Visitor, chromium
 
 import pretouch as pt
+from pretouch.page.gui import PANEL_PX
+from pretouch.page.replay import ReplayPage
+from pretouch.page.room import LiveSettings
+from pretouch.page.server import ServeOptions, served
+from pretouch.page.simulation import LiveSimulation
 from pretouch.recording.reader import Recorded
 from pretouch.sensing.skin import LIVE_SKIN
-from pretouch.viewer.gui import PANEL_PX
-from pretouch.viewer.replay import ReplayPage
-from pretouch.viewer.room import LiveSettings
-from pretouch.viewer.server import ServeOptions, served
-from pretouch.viewer.simulation import LiveSimulation
 
 FROM_S, TO_S, FRAMES_PER_S = 2.2, 10.2, 10
 """Part of the opening that is shown, in the simulation's time [s]: from the hand's setting out on."""

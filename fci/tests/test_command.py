@@ -13,11 +13,11 @@ from fci.tests.conftest import RawClient, arm_of
 
 from pretouch.cli import main
 from pretouch.cli.skin_keys import with_new
-from pretouch.hardware.keys import Keys, save_keys
-from pretouch.hardware.receiver import SkinReceiver
 from pretouch.robot.description import fr3
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin
+from pretouch.units.keys import Keys, save_keys
+from pretouch.units.receiver import SkinReceiver
 from pretouch_fci.motion import Setpoint
 from pretouch_fci.serve import TypedPushes
 from pretouch_fci.wire import PANDA, Controller, Generator, RobotMode

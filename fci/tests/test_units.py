@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from pretouch.cli.skin_keys import with_new
-from pretouch.hardware.keys import Keys
-from pretouch.hardware.receiver import SkinReceiver
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin
+from pretouch.units.keys import Keys
+from pretouch.units.receiver import SkinReceiver
 from pretouch_fci.units import UnitsSetup
 
 _LASTING = 600

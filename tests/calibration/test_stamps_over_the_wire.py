@@ -10,13 +10,13 @@ from pretouch.control.path import Circle
 from pretouch.recording.calibration_data import read_measured
 from pretouch.recording.skin_recording import SkinRecording
 from pretouch.robot.postures import brought_to
-from pretouch.serving.fleet import FleetParams
-from pretouch.serving.network import ChannelParams, NetworkParams
 from pretouch.sim.imu import ImuParams, Imus
 from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.range_finder import RangeFinderParams
 from pretouch.sim.scene import SceneSpec
+from pretouch.units.channel import ChannelParams, NetworkParams
+from pretouch.units.fleet import FleetParams
 from tests.wire_skin import WireSkin
 
 EVEN = ChannelParams(delay_s=0.0012, jitter_s=0.0012, jitter_shape=2.0)

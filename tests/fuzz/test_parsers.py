@@ -14,8 +14,6 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 
 from pretouch.errors import PretouchError
-from pretouch.hardware.keys import load_keys, save_keys
-from pretouch.hardware.wire import TAG_SIZE
 from pretouch.imported_data.forces import read_force
 from pretouch.imported_data.log import Choice, Log
 from pretouch.imported_data.reading import open_log
@@ -32,13 +30,15 @@ from pretouch.sensing.skin import load_skin, paper_skin, skin_file
 from pretouch.session.residual_file import Residual, load_residual, save_residual
 from pretouch.sim.randomisation import FOLDER, world_set
 from pretouch.types import RangeStatus
+from pretouch.units.keys import load_keys, save_keys
+from pretouch.units.wire import TAG_SIZE
 from tests.fuzz.mutations import Change, changed, changes
-from tests.hardware.fake_unit import KEYS, Bench
 from tests.imported_data.files import STORE1, pushed, wrenches, write_bag1, write_csv
 from tests.imported_data.joint_files import Moving
 from tests.importing.made import six_axis
 from tests.recording.runs import controller_of, recorded_run
 from tests.recording.test_skin_recording import record
+from tests.units.fake_unit import KEYS, Bench
 
 SOON_S = 10.0
 """Longest time for anything that is read [s]."""

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pretouch.hardware.traffic import Received, imu_batch
-from pretouch.hardware.wire import IMU_SAMPLE, imu_values
 from pretouch.loop import Cycle
 from pretouch.recording.calibration_data import read_measured
 from pretouch.recording.skin_recording import SkinRecording
 from pretouch.recording.writer import Recording
 from pretouch.sensing.unit import ACCELERATION_LSB, ANGULAR_RATE_LSB
+from pretouch.units.traffic import Received, imu_batch
+from pretouch.units.wire import IMU_SAMPLE, imu_values
 from tests.recording.runs import Run
 from tests.recording.test_skin_recording import BATCH, arrival, sample
 

@@ -11,11 +11,11 @@ from rosbags.highlevel import AnyReader
 
 from pretouch import cli
 from pretouch.errors import RecordingError
-from pretouch.hardware.traffic import Received
-from pretouch.hardware.wire import Flag, Sample, TouchPart, imu_values
 from pretouch.recording.reader import open_recording
 from pretouch.recording.skin_reader import read_skin
 from pretouch.recording.skin_recording import Diagnosis, Level, SkinRecording
+from pretouch.units.traffic import Received
+from pretouch.units.wire import Flag, Sample, TouchPart, imu_values
 from tests.recording.runs import changed, recorded_run
 
 BATCH = 8

@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pretouch.arms.franka.limits import LimiterParams
 from pretouch.control.path import Circle, segment
 from pretouch.controller import Controller
 from pretouch.errors import RobotError
-from pretouch.hardware.franka.limits import LimiterParams
 from pretouch.loop import MonotonicClock
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import PROFILES, profile

@@ -5,16 +5,16 @@ import time
 
 import pytest
 
+from pretouch.arms.simulated.arm import SimulateOptions
+from pretouch.arms.simulated.threaded import ThreadedArm
 from pretouch.errors import HardwareError
-from pretouch.hardware.health import HealthParams
-from pretouch.hardware.network_skin import NetworkSkin
 from pretouch.loop import MonotonicClock
 from pretouch.robot.model import RobotModel
-from pretouch.serving.fleet import simulated_keys
-from pretouch.serving.simulated_arm import SimulateOptions
-from pretouch.serving.threaded_arm import ThreadedArm
 from pretouch.session.units import UnitCheck
 from pretouch.sim.scene import SceneSpec, fixtures
+from pretouch.units.fleet import simulated_keys
+from pretouch.units.health import HealthParams
+from pretouch.units.network_skin import NetworkSkin
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ from urllib.parse import urlsplit
 
 import pytest
 from tests.needs import skip_for
-from tests.viewer.browser import chromium
+from tests.page.browser import chromium
 
 import pretouch
 

@@ -9,7 +9,7 @@ from PIL import Image, ImageSequence
 from tools.picture import FROM_S, HEIGHT_PX, TO_S, WIDTH_PX, drawn, record
 
 import pretouch as pt
-from pretouch.viewer import palette
+from pretouch.page import palette
 
 ROOT = Path(__file__).parents[2]
 

@@ -12,21 +12,21 @@ from typing import TYPE_CHECKING, TextIO
 
 import numpy as np
 
+from pretouch.arms.simulated.skin import VisitingHand
 from pretouch.control.path import Circle
 from pretouch.control.path import Path as ArmPath
 from pretouch.errors import HardwareError, ParameterError
-from pretouch.hardware.keys import load_keys
 from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.robot.postures import brought_to
 from pretouch.sensing.skin import skin_for
-from pretouch.serving.simulate import VisitingHand
 from pretouch.signals import ended
 from pretouch.sim.hand import HandScript
 from pretouch.sim.paper_scenes import dynamic_pushes, static_path, static_scene
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
 from pretouch.sim.tcp_push import TcpPush
 from pretouch.types import FloatArray
+from pretouch.units.keys import load_keys
 from pretouch_fci.arm import ArmSetup, ServedArm
 from pretouch_fci.gripper import object_of
 from pretouch_fci.options import ServeOptions, drop_of

@@ -4,12 +4,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypeVar
 
-from pretouch.hardware.keys import Keys
 from pretouch.sensing.skin import Skin
-from pretouch.serving.fleet import Fleet, FleetParams
 from pretouch.sim.imu import ImuParams, Imus, ImuSample
 from pretouch.sim.plant import Plant
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders, RangeSample
+from pretouch.units.fleet import Fleet, FleetParams
+from pretouch.units.keys import Keys
 
 Measured = TypeVar("Measured", RangeSample, ImuSample)
 

@@ -16,13 +16,13 @@ from fci.tests.driver.served import Served, child
 from fci.tests.soak.truth import Truth
 
 from pretouch import loop
+from pretouch.arms.franka.arm import FrankaArm
+from pretouch.arms.franka.collision import collision_behavior
+from pretouch.arms.franka.limits import LimiterParams, planned
+from pretouch.arms.franka.mailboxes import Feedback
 from pretouch.control.path import Circle
 from pretouch.controller import Controller
 from pretouch.errors import RobotError
-from pretouch.hardware.franka.arm import FrankaArm
-from pretouch.hardware.franka.collision import collision_behavior
-from pretouch.hardware.franka.limits import LimiterParams, planned
-from pretouch.hardware.franka.mailboxes import Feedback
 from pretouch.modes import TABLE
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import profile

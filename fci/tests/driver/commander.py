@@ -5,7 +5,7 @@ import time
 
 import numpy as np
 
-from pretouch.hardware.franka.arm import FrankaArm
+from pretouch.arms.franka.arm import FrankaArm
 from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 

@@ -6,14 +6,14 @@ import sys
 
 import numpy as np
 
+from pretouch.arms.franka.client import connect
+from pretouch.arms.franka.collision import collision_behavior
+from pretouch.arms.franka.errors import MotionAborted
+from pretouch.arms.franka.limiter import SetPointLimiter
+from pretouch.arms.franka.limits import LimiterParams, motion_limits
+from pretouch.arms.franka.state import FrankaState
+from pretouch.arms.franka.vendor import VendorClient
 from pretouch.errors import RobotError
-from pretouch.hardware.franka.client import connect
-from pretouch.hardware.franka.collision import collision_behavior
-from pretouch.hardware.franka.errors import MotionAborted
-from pretouch.hardware.franka.limiter import SetPointLimiter
-from pretouch.hardware.franka.limits import LimiterParams, motion_limits
-from pretouch.hardware.franka.state import FrankaState
-from pretouch.hardware.franka.vendor import VendorClient
 from pretouch.profiles import profile
 from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel

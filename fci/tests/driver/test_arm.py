@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 from fci.tests.driver.served import Served, child, wait_for
 
+from pretouch.arms.franka.arm import FrankaArm
+from pretouch.arms.franka.collision import collision_behavior
+from pretouch.arms.franka.limits import FrankaParams
 from pretouch.errors import RobotError
-from pretouch.hardware.franka.arm import FrankaArm
-from pretouch.hardware.franka.collision import collision_behavior
-from pretouch.hardware.franka.limits import FrankaParams
 from pretouch.profiles import profile
 from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel

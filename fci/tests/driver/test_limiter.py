@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from pretouch.hardware.franka.limiter import SetPointLimiter
-from pretouch.hardware.franka.limits import LimiterParams, motion_limits
-from pretouch.hardware.franka.state import FrankaState
+from pretouch.arms.franka.limiter import SetPointLimiter
+from pretouch.arms.franka.limits import LimiterParams, motion_limits
+from pretouch.arms.franka.state import FrankaState
 from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch_fci.kinds import JointVelocity

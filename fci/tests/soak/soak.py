@@ -22,12 +22,12 @@ from websockets.sync.client import connect
 
 from pretouch.arms.franka import identity
 from pretouch.cli.skin_keys import with_new
-from pretouch.hardware.keys import Keys, save_keys
 from pretouch.recording.reader import open_recording
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin
 from pretouch.session.confirmations import ConfirmedRobots
+from pretouch.units.keys import Keys, save_keys
 
 MEMORY_GROWS, AT_FIRST, FIRST_S = 0.05, 0.15, 1200.0
 """Largest share by which the memory of a process may grow once it has all it needs; and in a run that stays for less

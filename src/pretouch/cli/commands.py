@@ -10,7 +10,7 @@ from typing import Literal
 import tyro
 
 from pretouch.cli.words import words
-from pretouch.hardware.udp import HOST, PORT
+from pretouch.units.udp import HOST, PORT
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class Replay:
 
     def run(self) -> int:
         """Describe the recording, and check, compare or show it; where the page is, is said before anything is read."""
-        from pretouch.viewer.server import ServeOptions, begun, browser_here
+        from pretouch.page.server import ServeOptions, begun, browser_here
 
         place, page = Path(self.file), None
         with ExitStack() as stack:

@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING, cast
 
 from pretouch.errors import HardwareError, ParameterError
 from pretouch.extras import LIVE
-from pretouch.hardware.udp import EVERYWHERE, HOST
+from pretouch.page.room import LiveSettings, PathName, Room, live_path, settings_for
+from pretouch.page.server import ServeOptions, browser_here, check_port
 from pretouch.profiles import profile as find_profile
 from pretouch.signals import ended
-from pretouch.viewer.room import LiveSettings, PathName, Room, live_path, settings_for
-from pretouch.viewer.server import ServeOptions, browser_here, check_port
+from pretouch.units.udp import EVERYWHERE, HOST
 
 if TYPE_CHECKING:
     from pretouch.cli.commands import Live
+    from pretouch.page.real_units import RealUnits
     from pretouch.robot.model import RobotModel
     from pretouch.sensing.skin import Skin
-    from pretouch.viewer.real_units import RealUnits
 
 
 def live(command: "Live") -> None:
@@ -33,11 +33,11 @@ def live(command: "Live") -> None:
     settings = LiveSettings(profile=profile, path=path, seed=command.seed)
 
     from pretouch.cli.warm_up import prepare
+    from pretouch.page.live import serve_live
+    from pretouch.page.simulation import LiveSimulation
     from pretouch.robot.description import robot_named
     from pretouch.robot.model import RobotModel
     from pretouch.sim.placement import assumptions
-    from pretouch.viewer.live import serve_live
-    from pretouch.viewer.simulation import LiveSimulation
 
     model = RobotModel(robot_named(command.arm))
     settings = settings_for(model, settings)
@@ -81,9 +81,9 @@ def _units(command: "Live", skin: "Skin") -> Iterator["RealUnits | None"]:
         return
     if not command.units_host:
         raise HardwareError(f"--units-host is empty: give {HOST}, or {EVERYWHERE} for every address of this machine.")
-    from pretouch.hardware.keys import load_keys
-    from pretouch.hardware.network_skin import NetworkSkin
-    from pretouch.viewer.real_units import RealUnits
+    from pretouch.page.real_units import RealUnits
+    from pretouch.units.keys import load_keys
+    from pretouch.units.network_skin import NetworkSkin
 
     with NetworkSkin(skin.network, load_keys(Path(command.keys)), command.units_host, command.units_port) as source:
         heard = "anywhere" if command.units_host == EVERYWHERE else f"{command.units_host} only"

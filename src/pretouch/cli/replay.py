@@ -65,7 +65,7 @@ def replay(
             _show(console, comparison)
         write(_numbers(recorded, found, verdict, comparison))
         if page and not verify:
-            from pretouch.viewer.replay import show_replay
+            from pretouch.page.replay import show_replay
 
             show_replay(recorded, page(), ended)
     return int(verdict is not None and not verdict.agrees)

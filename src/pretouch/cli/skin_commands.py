@@ -9,7 +9,7 @@ import tyro
 from pretouch.arms import arm_class
 from pretouch.cli.calibrate.options import Calibrate, CalibrateArm
 from pretouch.cli.words import split_arm
-from pretouch.hardware.udp import HOST, PORT
+from pretouch.units.udp import HOST, PORT
 
 
 @dataclass(frozen=True)

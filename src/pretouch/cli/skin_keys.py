@@ -7,8 +7,8 @@ from typing import Any
 
 from pretouch.cli.words import words
 from pretouch.errors import HardwareError
-from pretouch.hardware.keys import Keys, UnitKey, load_keys, new_key, save_keys
-from pretouch.hardware.provision import fingerprint
+from pretouch.units.keys import Keys, UnitKey, load_keys, new_key, save_keys
+from pretouch.units.provision import fingerprint
 
 
 def list_keys(place: Path, new: str = "", revoke: str = "") -> dict[str, Any]:

@@ -20,12 +20,6 @@ from pretouch.cli.skin_table import line, thrown_away, view
 from pretouch.cli.words import numbers, words
 from pretouch.cli.writing import numbers_to
 from pretouch.errors import HardwareError
-from pretouch.hardware.health import HealthParams
-from pretouch.hardware.keys import load_keys
-from pretouch.hardware.model_check import ModelCheck, ModelCheckParams
-from pretouch.hardware.monitor import MonitorUpdate, Posture, watch
-from pretouch.hardware.receiver import SkinReceiver
-from pretouch.hardware.udp import EVERYWHERE, HOST
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.recording.skin_recording import SkinRecording
 from pretouch.robot.description import robot_named
@@ -34,6 +28,12 @@ from pretouch.sensing.skin import load_skin
 from pretouch.sensing.unit import NetworkUnits
 from pretouch.signals import Terminated
 from pretouch.types import FloatArray
+from pretouch.units.health import HealthParams
+from pretouch.units.keys import load_keys
+from pretouch.units.model_check import ModelCheck, ModelCheckParams
+from pretouch.units.monitor import MonitorUpdate, Posture, watch
+from pretouch.units.receiver import SkinReceiver
+from pretouch.units.udp import EVERYWHERE, HOST
 
 if TYPE_CHECKING:
     from pretouch.cli.skin_commands import Monitor

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from pretouch.cli.skin_keys import free_number, keys_file, keys_or_none
 from pretouch.errors import HardwareError
 from pretouch.extras import UNITS
-from pretouch.hardware.keys import Keys, UnitKey, new_key, save_keys
-from pretouch.hardware.provision import Network, configuration, copy_to_unit, fingerprint
+from pretouch.units.keys import Keys, UnitKey, new_key, save_keys
+from pretouch.units.provision import Network, configuration, copy_to_unit, fingerprint
 
 if TYPE_CHECKING:
     from pretouch.cli.skin_commands import Provision

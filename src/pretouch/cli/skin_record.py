@@ -3,11 +3,11 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 
-from pretouch.hardware.monitor import MonitorUpdate
-from pretouch.hardware.receiver import SkinReceiver
-from pretouch.hardware.traffic import Received, imu_batch
-from pretouch.hardware.wire import Flag
 from pretouch.recording.skin_recording import Diagnosis, Level, SkinRecording
+from pretouch.units.monitor import MonitorUpdate
+from pretouch.units.receiver import SkinReceiver
+from pretouch.units.traffic import Received, imu_batch
+from pretouch.units.wire import Flag
 
 _LEVELS = {"warning": Level.WARN, "fault": Level.ERROR}
 

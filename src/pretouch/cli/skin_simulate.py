@@ -4,19 +4,19 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from pretouch.arms.simulated.arm import SimulateOptions
+from pretouch.arms.simulated.skin import run
 from pretouch.cli.skin_keys import keys_file, keys_or_none, with_new
 from pretouch.cli.words import words
-from pretouch.hardware.keys import Keys, save_keys
 from pretouch.profiles import profile as find_profile
 from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, skin_for
-from pretouch.serving.fleet import FleetParams
-from pretouch.serving.network import ChannelParams, NetworkParams
-from pretouch.serving.simulate import run
-from pretouch.serving.simulated_arm import SimulateOptions
 from pretouch.sim.imu import ImuParams
 from pretouch.sim.placement import assumptions, placement_for
+from pretouch.units.channel import ChannelParams, NetworkParams
+from pretouch.units.fleet import FleetParams
+from pretouch.units.keys import Keys, save_keys
 
 if TYPE_CHECKING:
     from pretouch.cli.skin_commands import Simulate

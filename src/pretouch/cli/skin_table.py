@@ -7,10 +7,10 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from pretouch.cli.tables import PlainTable
-from pretouch.hardware.findings import Finding
-from pretouch.hardware.health import UnitHealth, status_name
-from pretouch.hardware.monitor import MonitorUpdate
 from pretouch.types import RangeStatus
+from pretouch.units.findings import Finding
+from pretouch.units.health import UnitHealth, status_name
+from pretouch.units.monitor import MonitorUpdate
 
 _COLUMNS = (
     "unit", "state", "rate\n[Hz]", "loss\n[%]", "latency\n[ms]", "dist.\n[m]", "sigma\n[mm]", "batt.\n[V]",

@@ -49,7 +49,7 @@ class KeptSample:
     bound: float
     """Most the true offset differs from it [s]."""
     sample: Mapping[str, Any]
-    """All fields of the datagram by their names in `pretouch.hardware.wire.Sample`, integers and bytes as sent."""
+    """All fields of the datagram by their names in `pretouch.units.wire.Sample`, integers and bytes as sent."""
 
 
 class Level(IntEnum):

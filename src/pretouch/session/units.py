@@ -8,17 +8,17 @@ from typing import Protocol
 import numpy as np
 
 from pretouch.errors import HardwareError
-from pretouch.hardware.findings import findings
-from pretouch.hardware.health import HealthParams, Lateness, UnitWindow
-from pretouch.hardware.model_check import ModelCheck, ModelCheckParams
-from pretouch.hardware.receiver_process import Traffic
-from pretouch.hardware.traffic import Received, UnitTraffic
 from pretouch.perception.scene_filter import Fixtures
 from pretouch.ports import Clock, Robot
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.session.preflight import Finding
 from pretouch.types import RangeReadings
+from pretouch.units.findings import findings
+from pretouch.units.health import HealthParams, Lateness, UnitWindow
+from pretouch.units.model_check import ModelCheck, ModelCheckParams
+from pretouch.units.receiver_process import Traffic
+from pretouch.units.traffic import Received, UnitTraffic
 
 _TAKE_S = 0.1
 """Time between two looks at the units [s]."""

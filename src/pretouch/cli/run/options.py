@@ -9,7 +9,7 @@ import tyro
 from pretouch.arms import ArmOptions, arm_class, arm_names
 from pretouch.cli.words import split_arm
 from pretouch.errors import HardwareError, ParameterError, RobotError
-from pretouch.hardware.udp import HOST, PORT
+from pretouch.units.udp import HOST, PORT
 
 A = TypeVar("A", bound=ArmOptions)
 

@@ -15,8 +15,6 @@ from pretouch.contact.sequential_test import SequentialTest
 from pretouch.control.path import Circle, Path, WayPoints, segment
 from pretouch.controller import Controller
 from pretouch.errors import HardwareError, ParameterError
-from pretouch.hardware.keys import load_keys
-from pretouch.hardware.network_skin import NetworkSkin
 from pretouch.perception.scene_filter import Fixtures, floor_and_pedestal
 from pretouch.ports import Skin as SkinPort
 from pretouch.profiles import Profile
@@ -35,6 +33,8 @@ from pretouch.sim.paper_scenes import Placement
 from pretouch.sim.placement import assumptions, placement_for
 from pretouch.sim.scene import SceneSpec
 from pretouch.types import FloatArray
+from pretouch.units.keys import load_keys
+from pretouch.units.network_skin import NetworkSkin
 
 if TYPE_CHECKING:
     from pretouch.cli.run.options import RobotOptions, Run, TaskOptions, UnitOptions

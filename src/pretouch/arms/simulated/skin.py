@@ -1,0 +1,112 @@
+"""Simulated units in real time: an arm moves on its path, a hand comes and goes, and the units tell a receiver of it.
+
+Where the receiver is does not matter to them: in another program, or on another machine. The arm's own controller has
+its readings within the process, so that the arm moves whatever becomes of the datagrams.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from pretouch.arms.simulated.arm import SimulatedArm, SimulateOptions
+from pretouch.arms.simulated.real_time import RealTime
+from pretouch.controller import Controller
+from pretouch.loop import Cycle
+from pretouch.loop import run as turn_on
+from pretouch.robot.postures import brought_to
+from pretouch.sim.hand import Hand, HandGoal
+from pretouch.sim.plant import Plant
+from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
+from pretouch.sim.scene import HandSpec, SceneSpec, fixtures
+from pretouch.types import FloatArray
+from pretouch.units.fleet import Fleet
+
+_SAY_S = 1.0
+_ANSWER_S = 3.0
+"""Time without any unit in session after which it is said that nobody answers [s]: a session takes 0.1 s to begin."""
+
+
+class VisitingHand:
+    """A hand that every 15 s comes to 0.3 m before the robot's hand, stays with it for 5 s, and goes."""
+
+    away = (1.2, 0.0, 0.8)
+
+    def __init__(self, link: int) -> None:
+        self._link = link
+
+    def goal(self, time: float, hand: FloatArray, plant: Plant) -> HandGoal:
+        """Be where this time of the visit wants it, without any force to speak of."""
+        here = 5.0 <= time % 15.0 < 10.0
+        before = plant.link_position[self._link] + np.array([0.3, 0.0, 0.0])
+        return HandGoal(before if here else np.array(self.away), 20.0)
+
+
+class _StatusPrinter:
+    """Prints the status each second."""
+
+    def __init__(self, fleet: Fleet, clock: RealTime, say: Callable[[str], None]) -> None:
+        self._fleet, self._clock, self._say = fleet, clock, say
+        self._next, self._sent = _SAY_S, 0
+        self._answered, self._named = 0.0, False
+
+    def record(self, cycle: Cycle) -> None:
+        """Print the status of an arm under the controller."""
+        step = cycle.step
+        self.print_status(f"{step.mode.value:5}  {np.linalg.norm(step.ee_velocity):.2f} m/s")
+
+    def print_status(self, doing: str) -> None:
+        """Print the status of an arm and its units."""
+        if self._clock.now >= self._next:
+            self._next += _SAY_S
+            self._say(self._line(doing))
+            self._name_receiver()
+
+    def _name_receiver(self) -> None:
+        """Say once that a receiver does not answer."""
+        now, sending = self._clock.now, [unit for unit in self._fleet.units if not unit.silent]
+        if not sending or any(unit.in_session for unit in sending):
+            self._answered, self._named = now, False
+        elif not self._named and now - self._answered >= _ANSWER_S:
+            self._named = True
+            host, port = self._fleet.receiver
+            self._say(
+                f"No answer from {host}:{port}: start `pretouch skin monitor` there with the same keys, or check"
+                " address and firewall."
+            )
+
+    def _line(self, doing: str) -> str:
+        fleet = self._fleet
+        silent = [name for name, unit in zip(fleet.ids, fleet.units, strict=True) if not unit.in_session]
+        sent, self._sent = fleet.sent - self._sent, fleet.sent
+        parts = [
+            f"{self._clock.now:7.1f} s  {doing}",
+            f"{sent} datagrams",
+            f"{len(fleet.ids) - len(silent)} of {len(fleet.ids)} units in session",
+        ]
+        if silent:
+            parts.append(f"without session: {', '.join(silent)}")
+        if fleet.lost:
+            parts.append(f"{fleet.lost} could not be sent")
+        if self._clock.left_out:
+            parts.append(f"this machine is too slow by {self._clock.left_out:.1f} s")
+        return "; ".join(parts)
+
+
+def run(options: SimulateOptions, done: Callable[[], bool], say: Callable[[str], None]) -> None:
+    """Simulate until `done` says so or the time is over; the arm is brought to rest and the sockets are closed.
+
+    `say` is handed a line each second, and a sentence when nobody answers. A receiver that cannot be found is a
+    HardwareError.
+    """
+    model, profile = options.model, options.profile
+    scene = SceneSpec(hand=HandSpec(start=VisitingHand.away)) if options.hand else SceneSpec()
+    begin = brought_to(model, options.path.point(0.0))
+    with SimulatedArm(options, begin, profile.task.control_period_s, scene) as arm:
+        if options.hand:
+            Hand(arm.plant, VisitingHand(model.ee))
+        # it draws the same numbers as the units that send: what is sent is what the arm's own controller has
+        finders = RangeFinders(arm.plant, options.skin, RangeFinderParams(), options.seed)
+        controller = Controller(model, options.skin, fixtures(scene), options.path, profile)
+        arm.begin()
+        printer, end = _StatusPrinter(arm.fleet, arm.clock, say), options.duration_s or np.inf
+        turn_on(controller, arm, finders, arm, printer, lambda _: done() or arm.clock.now >= end)

@@ -1,1 +1,0 @@
-"""Franka arms over the vendor's own client libraries."""

@@ -1,0 +1,295 @@
+"""What people may change in a live page. Each control puts an action into the queue; the loop does it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, get_args
+
+import numpy as np
+
+from pretouch.composition import differences, field_docs
+from pretouch.errors import RecordingError
+from pretouch.page.action_queue import ActionQueue
+from pretouch.page.gui import SETTLE_S, add_button, add_view_boxes, put, when_changed
+from pretouch.page.room import ObjectName, PathName
+from pretouch.page.simulation import LiveSimulation
+from pretouch.page.status import legend
+from pretouch.params import TaskParams
+from pretouch.profiles import Profile, profile, profile_names
+from pretouch.sim.tcp_push import AXES
+from pretouch.types import FloatArray
+
+if TYPE_CHECKING:
+    from viser import GuiApi
+
+RECORDINGS = Path("runs")
+"""Folder in which recordings are kept."""
+PUSH_N, PUSH_S = 20.0, 1.0
+"""Force [N] and duration [s] of a push unless a person chooses others."""
+_NAMES = profile_names()
+_TEXT_HINT = "As on the command line, with any parameter: paper:detect.f_base_n=8:approach=none. Enter applies it."
+_NO_RESUME = "Resume: nothing waits for it"
+_RECORD_SETTLE_S = 0.3
+"""Time without another click from which on one on Record counts [s]: each begins a file."""
+_CLOCK = 0.1, 1.0
+"""Range of the clock's speed, simulated over real time."""
+
+
+@dataclass
+class ClockState:
+    """How time passes."""
+
+    paused: bool = False
+    speed: float = 1.0
+    """Simulated over real time."""
+    single: int = 0
+    """Control cycles that are to pass one by one, paused or not."""
+
+
+def with_name(variant: Profile, base: str) -> Profile:
+    """Name a profile by the one it was made from and what is different, as `pretouch.profiles.profile` reads it."""
+    mine, theirs = (replace(p, name="") for p in (variant, profile(base)))
+    return replace(variant, name=":".join([base, *differences(mine, theirs)]))
+
+
+class Controls:
+    """All controls of a live page: few of them shown, the others in folders.
+
+    Methods without underscore are called by the loop.
+    """
+
+    def __init__(self, gui: "GuiApi", simulation: LiveSimulation, commands: ActionQueue) -> None:
+        self._gui, self._simulation, self._actions = gui, simulation, commands
+        self.running = ClockState()
+        self._shown: list[tuple[Any, str, Callable[[], object]]] = []
+        self.on_view: Callable[[str, bool], None] = lambda name, visible: None
+        """Told which part of the scene to show or hide."""
+        self._text: Any = None
+        """The field for a profile's text, once it is there."""
+        self._written = ""
+        """The profile that the field shows, or showed before somebody typed."""
+        self._first()
+        self.refresh()
+
+    # what is always shown, and what is folded
+
+    def _first(self) -> None:
+        gui, simulation = self._gui, self._simulation
+        self._button("Push the hand", self._push, icon="HAND_FINGER", hint="With the force of the folder Push.")
+        names = gui.add_dropdown("Profile", _NAMES)
+        self._choice(names, self._choose_profile, "profile", lambda: self._base)
+        self._pause = self._button("Pause", self._toggle_pause, icon="PLAYER_PAUSE", color="gray")
+        self._resume = self._button(
+            _NO_RESUME, simulation.resume, hint="Leave a hold that waits for you.", disabled=True
+        )
+        self._button("Reset", simulation.reset, color="gray", hint="Restart at time 0 with the current settings.")
+        record = partial(toggle_recording, simulation)
+        self._record = self._button("Record", record, settle=_RECORD_SETTLE_S, color="gray")
+
+    def fold_rest(self) -> None:
+        """Add all other controls, each group folded."""
+        gui = self._gui
+        folders: tuple[tuple[str, Callable[[], None]], ...] = (
+            ("Push", self._push_folder), ("Hand", self._hand_folder), ("Clock", self._clock_folder),
+            ("Controller", self._controller_folder), ("World", self._world_folder),
+            ("View", self._view_folder),
+        )  # fmt: skip
+        for name, add in folders:
+            with gui.add_folder(name, expand_by_default=False):
+                add()
+        self.refresh()
+
+    def _push_folder(self) -> None:
+        gui = self._gui
+        self._axis = gui.add_dropdown("Direction", tuple(AXES), initial_value="+y", hint="Of the base frame.")
+        self._force = gui.add_slider("Force [N]", 5.0, 60.0, 1.0, PUSH_N)
+        self._lasting = gui.add_slider("Duration [s]", 0.1, 3.0, 0.1, PUSH_S)
+
+    def _hand_folder(self) -> None:
+        low, high = self._simulation.hand_space
+        self._hand = [
+            self._gui.add_slider(f"{axis} [m]", float(low[k]), float(high[k]), 0.01, 0.0, hint="Or drag the hand.")
+            for k, axis in enumerate("xyz")
+        ]
+        for axis, slider in enumerate(self._hand):
+            when_changed(slider, self._actions, partial(self._move_hand, axis), f"hand {axis}", quiet=True)
+
+    def _clock_folder(self) -> None:
+        running = self.running
+        clock = self._gui.add_slider("Clock speed", *_CLOCK, 0.1, 1.0, hint="Simulated over real time.")
+        self._number(clock, self._set_clock, "clock speed", lambda: running.speed)
+        self._button("Single step", self._single_step, color="gray", hint="One control cycle; pauses.")
+
+    def _view_folder(self) -> None:
+        add_view_boxes(self._gui, self._actions, lambda name, visible: self.on_view(name, visible))
+        self._gui.add_html(legend())
+
+    def _controller_folder(self) -> None:
+        gui = self._gui
+        hint = field_docs(TaskParams)["speed_m_s"]
+        speed = gui.add_slider("Path speed [m/s]", 0.05, 0.5, 0.05, 0.3, hint=hint)
+        self._number(speed, self._choose_speed, "path speed", lambda: self._profile.task.speed_m_s)
+        form = gui.add_form(None)
+        with form:
+            self._text = gui.add_text("Profile text", "", hint=_TEXT_HINT)
+        form.on_submit(self._submit)
+
+    def _world_folder(self) -> None:
+        gui, simulation = self._gui, self._simulation
+        path = gui.add_dropdown("Path", get_args(PathName))
+        self._choice(path, simulation.set_path, "path", lambda: simulation.settings.path)
+        thing = gui.add_dropdown("Object", get_args(ObjectName), hint="Restarts at time 0.")
+        self._choice(thing, self._choose_object, "object", lambda: simulation.settings.object)
+        hint = "Of hand and object; changes as soon as nothing touches."
+        stiffness = gui.add_slider("Stiffness [kN/m]", 3.0, 150.0, 1.0, 75.0, hint=hint)
+        self._number(stiffness, self._set_stiffness, "stiffness", lambda: simulation.settings.stiffness / 1000.0)
+        if not simulation.real:
+            with gui.add_folder("Sensor units"):
+                self._fault_controls()
+
+    def _fault_controls(self) -> None:
+        gui, simulation = self._gui, self._simulation
+        self._units = {
+            unit.id: gui.add_checkbox(unit.id, True, hint="Off: the unit is silent.")
+            for unit in simulation.skin.mounted
+        }
+        for unit, box in self._units.items():
+            self._choice(box, self._set_faults, "faults", partial(self._is_enabled, unit))
+        self._noise = gui.add_slider("Noise factor", 0.0, 20.0, 0.5, 1.0)
+        self._number(self._noise, self._set_faults, "faults", lambda: simulation.settings.faults.noise_factor)
+        self._latency = gui.add_slider("More latency [s]", 0.0, 0.5, 0.01, 0.0)
+        self._number(self._latency, self._set_faults, "faults", lambda: simulation.settings.faults.latency_s)
+
+    def _choice(self, handle: Any, act: Callable[[Any], object], kind: str, current: Callable[[], object]) -> None:
+        """Have a control act at once; `current` says what it is to show."""
+        when_changed(handle, self._actions, act, kind)
+        self._shown.append((handle, kind, current))
+
+    def _number(self, handle: Any, act: Callable[[Any], object], kind: str, current: Callable[[], object]) -> None:
+        """Have a control act when nobody types in it any more; `current` says what it is to show."""
+        when_changed(handle, self._actions, act, kind, SETTLE_S)
+        self._shown.append((handle, kind, current))
+
+    def _button(self, label: str, act: Callable[[], object], **more: Any) -> Any:
+        return add_button(self._gui, self._actions, label, act, **more)
+
+    # what they do
+
+    @property
+    def _profile(self) -> Profile:
+        return self._simulation.settings.profile
+
+    def _show_text(self) -> None:
+        """Show another profile in the field; else it keeps what somebody types, to be put right.
+
+        What is typed is never written back: letters that come meanwhile would be lost.
+        """
+        changed = self._profile.name != self._written
+        if self._text is not None and changed and not self._actions.is_waiting("profile text"):
+            self._written = self._profile.name
+            put(self._text, self._written)
+
+    @property
+    def _base(self) -> str:
+        """Name of the profile that the session's was made from."""
+        name = self._profile.name.partition(":")[0]
+        return name if name in _NAMES else _NAMES[0]
+
+    async def _submit(self, event: Any) -> None:
+        text = self._text.value
+        if self._actions.admits(event.client_id):
+            self._actions.put(lambda: self._simulation.set_profile(profile(text.strip())), "profile text")
+        else:
+            put(self._text, self._written)
+
+    def _choose_profile(self, base: str) -> None:
+        self._set_speed(profile(base), base, self._profile.task.speed_m_s)
+
+    def _choose_speed(self, speed: float) -> None:
+        self._set_speed(self._profile, self._base, float(speed))
+
+    def _set_speed(self, variant: Profile, base: str, speed: float) -> None:
+        variant = replace(variant, task=replace(variant.task, speed_m_s=speed))
+        self._simulation.set_profile(with_name(variant, base))
+
+    def _choose_object(self, name: ObjectName) -> None:
+        self._simulation.reset(object=name)
+
+    def _set_stiffness(self, stiffness: float) -> None:
+        self._simulation.set_stiffness(1000.0 * stiffness)
+
+    def _is_enabled(self, unit: str) -> bool:
+        return unit not in self._simulation.settings.faults.silenced
+
+    def _push(self) -> None:
+        """Push the hand as the folder says; the notice tells what became of it."""
+        axis = np.array(AXES[self._axis.value])
+        self._simulation.push(float(self._force.value) * axis, float(self._lasting.value))
+
+    def _toggle_pause(self) -> None:
+        self.running.paused = not self.running.paused
+
+    def hold(self) -> None:
+        """Let no time pass until somebody goes on."""
+        self.running.paused, self._pause.label = True, "Go on"
+
+    def _single_step(self) -> None:
+        self.running.paused = True
+        self.running.single += 1
+
+    def _set_clock(self, speed: float) -> None:
+        self.running.speed = float(np.clip(speed, *_CLOCK))
+
+    def _move_hand(self, axis: int, value: float) -> None:
+        """Draw the hand along one axis from where it is to be; the sliders may show by now what was so before."""
+        self._simulation.move_hand(np.where(np.arange(3) == axis, value, self._simulation.hand_target))
+
+    def _set_faults(self, _: object) -> None:
+        silenced = frozenset(unit for unit, box in self._units.items() if not box.value)
+        self._simulation.set_faults(silenced, float(self._noise.value), float(self._latency.value))
+
+    def refresh(self) -> None:
+        """Have all controls show what holds, but for those that somebody types in: what was refused goes back."""
+        for handle, kind, current in self._shown:
+            if not self._actions.is_waiting(kind):
+                put(handle, current())
+        self._show_text()
+        self._pause.label = "Go on" if self.running.paused else "Pause"
+        self._record.label = "Stop recording" if self._simulation.recording else "Record"
+
+    def offer_resume(self, possible: bool) -> None:
+        """Let the button to resume be pressed while a hold waits for it; else it says that none does."""
+        if self._resume.disabled is possible:
+            self._resume.disabled, self._resume.label = not possible, "Resume" if possible else _NO_RESUME
+
+    def show_hand(self, target: FloatArray) -> None:
+        """Have the sliders show where the hand is to be (3,) [m]."""
+        for slider, value in zip(self._hand, target.tolist(), strict=True):
+            put(slider, round(value, 2))
+
+
+def _fresh_place(folder: Path) -> Path:
+    """A file in the folder that is not there yet."""
+    number = 1
+    while (place := folder / f"live-{number}.mcap").exists():
+        number += 1
+    return place
+
+
+def toggle_recording(simulation: LiveSimulation) -> None:
+    """Begin a recording in a file of its own, or end the one under way; the simulation's notice says where it is.
+
+    A RecordingError says why none can be begun.
+    """
+    if simulation.recording is not None:
+        closed = simulation.stop_recording()
+        simulation.notice = closed.sentence if closed else ""
+        return
+    try:
+        RECORDINGS.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RecordingError(f"The folder {RECORDINGS} cannot be created: {error.strerror}.") from error
+    place = _fresh_place(RECORDINGS)
+    simulation.start_recording(place)
+    simulation.notice = f"Recording to {place}."

@@ -1,0 +1,97 @@
+"""Who may open a page: whoever has its address. No page of somebody else may, nor can anybody share it.
+
+viser's server asks nobody where they come from, and opens a tunnel to the outside for whoever asks.
+"""
+
+import ipaddress
+import secrets
+import socket
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from http import HTTPStatus
+from typing import TYPE_CHECKING, Any
+from urllib.parse import urlsplit
+
+from viser import ViserServer
+from viser._messages import ShareUrlDisconnect, ShareUrlRequest
+from websockets.asyncio import server as websockets_server
+from websockets.asyncio.server import ServerConnection
+from websockets.http11 import Request, Response
+
+from pretouch.errors import ViewerError
+
+if TYPE_CHECKING:
+    from pretouch.page.server import ServeOptions
+
+_ADDRESS = "Open the page at the address that the program printed: each start has its own."
+_STARTING = threading.Lock()
+
+
+class Door:
+    """Stands between a server of pages and everybody."""
+
+    def __init__(self, options: "ServeOptions") -> None:
+        self._token = options.token.encode()
+        here = socket.gethostname().lower()
+        self._names = {options.host.lower(), "localhost", here, f"{here}.local"}
+        self._built = False
+
+    @contextmanager
+    def built(self) -> Iterator[None]:
+        """Have the server that is begun in the context ask this door.
+
+        viser begins it with a `process_request` of its own, keeps no reference to it, and takes no other: so the
+        function that it calls is replaced meanwhile.
+        """
+        serve = websockets_server.serve
+
+        def guarded(*place: Any, process_request: Any, **more: Any) -> Any:
+            self._built = True
+            return serve(*place, process_request=partial(self._answer, process_request), **more)
+
+        with _STARTING:
+            setattr(websockets_server, "serve", guarded)  # noqa: B010  # to mypy a class cannot be replaced
+            try:
+                yield
+            finally:
+                setattr(websockets_server, "serve", serve)  # noqa: B010
+
+    def check(self, server: ViserServer) -> None:
+        """Have a server share its page no longer; one that was begun without this door is a ViewerError."""
+        if not self._built:
+            raise ViewerError("This version of viser begins its server in another way: install viser 1.1.1.")
+        for kind in (ShareUrlRequest, ShareUrlDisconnect):
+            server._websock_server.unregister_handler(kind)
+
+    def _answer(
+        self, answer: Callable[..., Response | None], connection: ServerConnection, request: Request
+    ) -> Response | None:
+        refusal = self._refusal(request)
+        if refusal:  # a name in it may be no ASCII, as its lone surrogates say
+            refusal = refusal.encode(errors="backslashreplace").decode()
+            return connection.respond(HTTPStatus.FORBIDDEN, refusal + "\n")
+        request.path = "/" + request.path.partition("?")[0].lstrip("/").partition("/")[2]
+        response = answer(connection, request)
+        if response is not None:
+            response.headers["Referrer-Policy"] = "no-referrer"  # it would tell the token
+        return response
+
+    def _refusal(self, request: Request) -> str:
+        """Say why a request is not answered, or ''."""
+        hosts, origins = request.headers.get_all("Host"), request.headers.get_all("Origin")
+        if len(hosts) != 1 or not self._is_own(hosts[0]):
+            return f"This page is not at {' and '.join(hosts)}. {_ADDRESS}"
+        if any(origin.partition("//")[2] != hosts[0] for origin in origins):
+            return f"Pages of {' and '.join(origins)} may not use this one. {_ADDRESS}"
+        token = request.path.partition("?")[0].lstrip("/").partition("/")[0]
+        return "" if secrets.compare_digest(token.encode(errors="surrogateescape"), self._token) else _ADDRESS
+
+    def _is_own(self, host: str) -> bool:
+        """Whether a name is this machine's: one that somebody else chose may lead here, a number may not."""
+        try:
+            name = urlsplit(f"//{host}").hostname or ""
+            return name in self._names or bool(ipaddress.ip_address(name))
+        except ValueError:
+            return False

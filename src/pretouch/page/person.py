@@ -1,0 +1,116 @@
+"""A person's hand on a page: a fist that is seen, grabbed and dragged.
+
+The simulated hand is a ball. The fist is drawn into that ball, so that what is seen is what touches and what the units
+see. The cuff is drawn only: it is short, and always on the side away from the arm.
+"""
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import trimesh
+
+from pretouch.page import palette
+from pretouch.page.expectation import surface_of
+from pretouch.robot.body import Capsules
+from pretouch.types import FloatArray
+
+if TYPE_CHECKING:
+    from viser import SceneApi, ViserServer
+
+Drag = Callable[[int, FloatArray, FloatArray], None]
+"""Is told from where a person looks, and to what place in view the hand is dragged, both (3,) [m]."""
+
+BALL_M = 0.05
+"""Radius of the ball that the fist is made for [m]."""
+GRIP = 1.7
+"""Radius within which the hand is grabbed, as a multiple of the ball's: a finger on a screen is not exact."""
+
+_FINGERS = ((-0.0255, 0.0115), (-0.0088, 0.0125), (0.0088, 0.0125), (0.0255, 0.0115))
+"""Place across the fist, and radius of each finger [m]."""
+_AROUND = 14
+"""Vertices round a finger."""
+_SIDE_M = 0.08
+"""Distance from the plane y = 0 from which on the forearm lies along y [m]."""
+_APART_M = 0.015
+"""Distance between hand and target from which the target is shown [m]."""
+
+
+def fist(radius: float) -> trimesh.Trimesh:
+    """A closed hand in a ball of a radius [m] round the origin: knuckles to +x, its back to +z, the thumb at +y."""
+    segments = [
+        ((-0.012, -0.010, 0.003), (-0.012, 0.010, 0.003), 0.034),  # palm
+        ((-0.022, 0.031, -0.004), (0.008, 0.033, -0.020), 0.0115),  # thumb
+        ((0.008, 0.033, -0.020), (0.025, 0.014, -0.028), 0.0105),
+    ]
+    for y, radius_of_it in _FINGERS:
+        bent = 1.0 - (y / 0.06) ** 2
+        knuckle, joint, tip = (0.020 * bent, y, 0.025), (0.034 * bent, y, -0.004), (0.014, y, -0.028)
+        segments += [(knuckle, joint, radius_of_it), (joint, tip, radius_of_it)]
+        segments.append(((-0.024, 0.7 * y, 0.022), knuckle, radius_of_it))
+    return surface_of(_capsules(segments), _AROUND).apply_scale(radius / BALL_M)
+
+
+def cuff(radius: float) -> trimesh.Trimesh:
+    """The end of a sleeve behind the fist of a radius [m], along -x."""
+    return surface_of(_capsules([((-0.062, 0.0, 0.0), (-0.105, 0.0, 0.0), 0.030)])).apply_scale(radius / BALL_M)
+
+
+def _capsules(segments: list[tuple[tuple[float, float, float], tuple[float, float, float], float]]) -> Capsules:
+    a, b, radii = zip(*segments, strict=True)
+    return Capsules(np.zeros(len(radii), np.int64), np.array(a), np.array(b), np.array(radii))
+
+
+class PersonHand:
+    """A fist where the simulated hand is, and a faint one where it is to be while that is elsewhere."""
+
+    def __init__(self, server: "ViserServer", radius: float, root: str = "") -> None:
+        self._hand = server.scene.add_frame(f"{root}/hand", show_axes=False)
+        self._target = server.scene.add_frame(f"{root}/hand_target", show_axes=False, visible=False)
+        _add_meshes(server.scene, f"{root}/hand", radius)
+        _add_meshes(server.scene, f"{root}/hand_target", radius, 0.3)
+        # barely there, and as lines, so that it hides nothing behind it
+        self._grip = server.scene.add_icosphere(
+            f"{root}/hand/grip", GRIP * radius, color=palette.HAND, opacity=0.01, wireframe=True, subdivisions=2,
+            cast_shadow=False, receive_shadow=False,
+        )  # fmt: skip
+        self._held = np.zeros(3)
+        self._position = np.zeros(3)
+
+    def on_drag(self, act: Drag) -> None:
+        """Have a function told of each drag, from the page's own thread. A drag of the hand never moves the camera."""
+
+        @self._grip.on_drag
+        async def _(event: Any) -> None:
+            if event.phase == "start":
+                self._held = self._position - np.array(event.start_position)
+            act(event.client_id, np.array(event.client.camera.position), np.array(event.end_position) + self._held)
+
+    def draw(self, hand: FloatArray | None, target: FloatArray | None) -> None:
+        """Show hand and target (3,) [m]; None and what is not finite are not shown."""
+        there = hand is not None and bool(np.all(np.isfinite(hand)))
+        self._hand.visible = there
+        if hand is None or not there:
+            self._target.visible = False
+            return
+        self._position = hand
+        self._hand.position, self._hand.wxyz = hand, _turn(hand)
+        apart = target is not None and float(np.linalg.norm(target - hand)) > _APART_M
+        self._target.visible = apart
+        if target is not None and apart:
+            self._target.position, self._target.wxyz = target, _turn(target)
+
+
+def _add_meshes(scene: "SceneApi", name: str, radius: float, opacity: float | None = None) -> None:
+    for part, mesh, colour in (("fist", fist(radius), palette.HAND), ("cuff", cuff(radius), palette.CUFF)):
+        scene.add_mesh_simple(
+            f"{name}/{part}", mesh.vertices, mesh.faces, color=colour, opacity=opacity, cast_shadow=False,
+            receive_shadow=False,
+        )  # fmt: skip
+
+
+def _turn(place: FloatArray) -> FloatArray:
+    """Quaternion (w, x, y, z) that has the fist point towards the arm: along y from the side, along -x in front."""
+    yaw = math.pi + math.pi / 2 * float(np.clip(place[1] / _SIDE_M, -1.0, 1.0))
+    return np.array([math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2)])

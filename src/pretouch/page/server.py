@@ -1,0 +1,171 @@
+"""The web server of a page: on this machine alone unless asked, on the port that was asked for, and quiet."""
+
+import errno
+import ipaddress
+import logging
+import os
+import secrets
+import socket
+import sys
+import webbrowser
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from html import escape
+from typing import TYPE_CHECKING
+
+from pretouch.errors import ViewerError
+from pretouch.extras import LIVE
+
+if TYPE_CHECKING:
+    from viser import ViserServer
+
+_PORTS_TRIED = 100
+_EVERYWHERE = {"0.0.0.0": "localhost", "::": "localhost"}  # noqa: S104  # named to be replaced
+
+
+@dataclass(frozen=True)
+class ServeOptions:
+    """Where a page is to be found."""
+
+    host: str = "127.0.0.1"
+    """Address to listen on: by default this machine alone can open the page, 0.0.0.0 lets everybody."""
+    port: int = 8080
+    """Port to listen on."""
+    opened: bool = False
+    """Whether to open the page in this machine's browser."""
+    token: str = field(default_factory=secrets.token_urlsafe, repr=False)
+    """What an address needs to be answered; another for each start."""
+
+
+def url_of(options: ServeOptions) -> str:
+    """What to type into a browser; whoever has it may use the page."""
+    host = _EVERYWHERE.get(options.host, options.host)
+    return f"http://{f'[{host}]' if ':' in host else host}:{options.port}/{options.token}/"
+
+
+def announce(options: ServeOptions, what: str, exposed: str, say: Callable[[str], None]) -> None:
+    """Say where a page is, and beyond this machine what is `exposed` there; open it if that is asked for."""
+    say(f"{what} is at {url_of(options)} (Ctrl-C ends it).")
+    if not _stays_here(options.host):
+        say(f"Mind: other machines reach this page, unencrypted. Whoever has the address can {exposed}.")
+    if options.opened:
+        webbrowser.open(url_of(options))
+
+
+def browser_here() -> bool:
+    """Whether somebody sits at this machine's terminal and has a screen to open a page on."""
+    return sys.stdout.isatty() and not os.environ.keys().isdisjoint({"DISPLAY", "WAYLAND_DISPLAY"})
+
+
+def failure(error: Exception) -> str:
+    """Say that a page came upon an error that nobody foresaw."""
+    return f"The page failed, and holds: {type(error).__name__}: {error}. Please report this."
+
+
+def _stays_here(host: str) -> bool:
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
+_GREYED = "div[style*='opacity: 0.5'][style*='pointer-events: none']"
+_LOST = (
+    f"<style>#lost{{display:none}}{_GREYED}:has(#lost){{opacity:1!important}}{_GREYED} #lost{{display:block;"
+    "position:fixed;top:0;left:0;right:0;z-index:99;padding:14px;text-align:center;font-size:17px;font-weight:700;"
+    "background:#d62839;color:#fff}</style><div id='lost'>Connection lost: the program behind this page has ended or"
+    " cannot be reached. What is drawn is out of date.</div>"
+)
+"""A sentence that the page shows by itself. viser's client only greys its controls while it is not connected, and lets
+nobody add a script; a style sheet can tell by the greying."""
+
+
+@contextmanager
+def served(options: ServeOptions, title: str) -> Iterator["ViserServer"]:
+    """Serve an empty page while the context lasts; a ViewerError says what is missing or in the way."""
+    LIVE.need("The page")
+    check_port(options)
+    from viser import ViserServer
+
+    from pretouch.page.door import Door
+
+    door = Door(options)
+    with _quiet():
+        with door.built():
+            server = ViserServer(options.host, options.port, label=title, verbose=False)
+        try:
+            if server.get_port() != options.port:
+                raise _busy(options, server.get_port())
+            door.check(server)
+            server.gui.add_html(_LOST)
+            yield server
+        finally:
+            server.stop()
+
+
+@contextmanager
+def begun(
+    options: ServeOptions, title: str, what: str, exposed: str, say: Callable[[str], None]
+) -> Iterator[Callable[[], "ViserServer"]]:
+    """Serve a page that says it is being made, and announce it: reading and compiling may take a while.
+
+    Gives what takes the notice away and returns the server, for when there is something to see.
+    """
+    with served(options, title) as server:
+        notice = server.gui.add_html(f"<div style='padding:12px'>{escape(what)} is being read.</div>")
+        announce(options, what, exposed, say)
+
+        def ready() -> "ViserServer":
+            notice.remove()
+            return server
+
+        yield ready
+
+
+def check_port(options: ServeOptions) -> None:
+    """Refuse a port that is taken, naming the next free one, and a host that is not this machine's."""
+    if not 1 <= options.port <= 65535:
+        raise ViewerError(f"The port is {options.port}: give one from 1 to 65535.")
+    if _free(options.host, options.port):
+        return
+    following = range(options.port + 1, min(options.port + _PORTS_TRIED, 65536))
+    raise _busy(options, next((port for port in following if _free(options.host, port)), None))
+
+
+def _busy(options: ServeOptions, free: int | None) -> ViewerError:
+    way_out = f"--port {free} is free" if free else "choose another with --port"
+    return ViewerError(f"Port {options.port} on {options.host} is in use, perhaps by another page: {way_out}.")
+
+
+def _free(host: str, port: int) -> bool:
+    try:
+        family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        with socket.socket(family, kind, protocol) as tried:
+            tried.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            tried.bind(address)
+            return True
+    except PermissionError as error:
+        raise ViewerError(f"This user may not open port {port}: choose one from 1024 on with --port.") from error
+    except OSError as error:
+        if isinstance(error, socket.gaierror) or error.errno == errno.EADDRNOTAVAIL:
+            raise ViewerError(
+                f"The host {host!r} is not an address of this machine: leave it out, or give one."
+            ) from error
+        return False
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep the server from printing its own banner, and what it thinks of visitors who do not speak its protocol."""
+    import rich
+
+    console, log = rich.get_console(), logging.getLogger("websockets")
+    before, console.quiet = console.quiet, True
+    level = log.level
+    log.setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        console.quiet = before
+        log.setLevel(level)

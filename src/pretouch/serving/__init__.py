@@ -1,1 +1,0 @@
-"""The simulated skin on a real wire."""

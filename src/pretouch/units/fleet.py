@@ -1,0 +1,158 @@
+"""The simulated units of a skin, each behind its own UDP socket and its own stretch of a simulated network."""
+
+import socket
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from itertools import count
+
+import numpy as np
+
+from pretouch.checks import Checked, NonNegative
+from pretouch.errors import HardwareError
+from pretouch.sensing.unit import NetworkUnits
+from pretouch.sim.imu import ImuParams, ImuSample
+from pretouch.sim.range_finder import RangeSample
+from pretouch.sim.touch_sensor import TouchSample, TouchSensorParams
+from pretouch.units.channel import Channel, NetworkParams
+from pretouch.units.keys import Keys, UnitKey
+from pretouch.units.simulated import SimulatedUnit, UnitParams
+from pretouch.units.wire import KEY_SIZE
+
+_LARGEST = 2048
+_LAST_PORT = 0xFFFF
+
+
+@dataclass(frozen=True)
+class FleetParams(Checked):
+    """Units, and the network between them and their receiver."""
+
+    network: NetworkParams = field(default_factory=NetworkParams)
+    """What becomes of datagrams."""
+    unit: UnitParams = field(default_factory=UnitParams)
+    """How units keep their time and their sessions."""
+    imu: ImuParams | None = None
+    """How their IMUs err; None, and they have none."""
+    touch: TouchSensorParams = field(default_factory=TouchSensorParams)
+    """How the touch sensors err of units that have one by the skin file."""
+    reboot_every_s: NonNegative = 0.0
+    """Time from each reboot of a unit to its next one, the first at a random part of it [s]; 0: none."""
+
+
+class Fleet:
+    """All units of a skin. `step` moves them on; nothing happens in between."""
+
+    def __init__(
+        self, units: NetworkUnits | Iterable[str], keys: Keys, params: FleetParams, seed: int, address: tuple[str, int]
+    ) -> None:
+        """Switch the units on: `Skin.network`, or the ids of units without zones.
+
+        The seed decides clocks, challenges, reboots and the network's course.
+
+        A unit without a key, and an address that cannot be found, are a HardwareError.
+        """
+        network = NetworkUnits.of(units)
+        ids = self.ids = network.ids
+        missing = [name for name in ids if name not in keys]
+        if missing:
+            raise HardwareError(f"No key for unit {', '.join(missing)}: create keys for all units of the skin.")
+        family, self._found = _resolved(address)
+        self.receiver = address
+        """Name or address, and port, of the receiver."""
+        seeds = np.random.SeedSequence([seed, 6]).spawn(len(ids))
+        rngs = [[np.random.default_rng(s) for s in one.spawn(3)] for one in seeds]
+        self.units = tuple(
+            SimulatedUnit(keys[name], params.unit, own, params.imu, _reboots(params.reboot_every_s, own), side)
+            for name, side, (own, _, _) in zip(ids, network.zones, rngs, strict=True)
+        )
+        """In the order of the skin."""
+        self._rows = [
+            (unit, zone) for unit, side in zip(self.units, network.zones, strict=True) for zone in range(side**2)
+        ]
+        self._up = [Channel[bytes](params.network.up, rng) for _, rng, _ in rngs]
+        self._down = [Channel[bytes](params.network.down, rng) for _, _, rng in rngs]
+        self._sockets = [socket.socket(family, socket.SOCK_DGRAM) for _ in ids]
+        for one in self._sockets:
+            one.setblocking(False)
+        self.sent = 0
+        """Datagrams that reached the socket."""
+        self.lost = 0
+        """Datagrams that the machine would not send, as while its network is down."""
+
+    def take_range(self, sample: RangeSample) -> None:
+        """Let a unit's range finder measure, or one of its zones."""
+        unit, zone = self._rows[sample.unit]
+        unit.take_range(sample, zone)
+
+    def take_touch(self, sample: TouchSample) -> None:
+        """Let a unit's touch sensor measure."""
+        self._rows[sample.unit][0].take_touch(sample)
+
+    def take_imu(self, sample: ImuSample) -> None:
+        """Let a unit's IMU take a sample."""
+        self._rows[sample.unit][0].take_imu(sample)
+
+    def step(self, clock: Callable[[], float]) -> int:
+        """Hand on what has come, do what is due, send what has arrived by now; return how many were sent.
+
+        `clock` gives the time [s]. It is asked once, after the sockets: no beacon is heard before it was sent.
+        """
+        before, arrived = self.sent, [_heard(one) for one in self._sockets]
+        now = clock()
+        for unit, came, down, up, one in zip(self.units, arrived, self._down, self._up, self._sockets, strict=True):
+            for datagram in came:
+                down.put(datagram, now)
+            for datagram in down.take(now):
+                unit.receive_beacon(datagram, now)
+            for datagram in unit.tick(now):
+                up.put(datagram, now)
+            for datagram in up.take(now):
+                self._send(one, datagram)
+        return self.sent - before
+
+    def _send(self, one: socket.socket, datagram: bytes) -> None:
+        try:
+            one.sendto(datagram, self._found)
+            self.sent += 1
+        except OSError:
+            self.lost += 1
+
+    def close(self) -> None:
+        """Give the sockets back."""
+        for one in self._sockets:
+            one.close()
+
+
+def simulated_keys(ids: tuple[str, ...], seed: int) -> Keys:
+    """Keys that are the same with the same seed: for simulated units alone."""
+    rng = np.random.default_rng([seed, 7])
+    return Keys(UnitKey(name, number, rng.bytes(KEY_SIZE)) for number, name in enumerate(ids, 1))
+
+
+def _reboots(every: float, rng: np.random.Generator) -> "count[float] | tuple[()]":
+    return count(every * float(rng.uniform()), every) if every > 0 else ()
+
+
+def _resolved(address: tuple[str, int]) -> tuple[int, tuple[object, ...]]:
+    """Family and address of a receiver by its name and port."""
+    host, port = address
+    if not host:
+        raise HardwareError("The receiver's address is empty: give its name or address.")
+    if not 1 <= port <= _LAST_PORT:
+        raise HardwareError(f"The receiver's port is {port}: give one from 1 to {_LAST_PORT}.")
+    try:
+        family, _, _, _, found = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
+    except (OSError, UnicodeError) as error:
+        raise HardwareError(f"The receiver {host}:{port} cannot be found ({error}): check its name and port.") from None
+    return family, found
+
+
+def _heard(one: socket.socket) -> list[bytes]:
+    """All datagrams that wait at a socket."""
+    arrived = []
+    while True:
+        try:
+            arrived.append(one.recv(_LARGEST))
+        except BlockingIOError:
+            return arrived
+        except ConnectionError:  # nobody listens at the receiver's port; it may begin to
+            continue

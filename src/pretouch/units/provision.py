@@ -1,0 +1,147 @@
+"""A unit's configuration file, with its key and where it sends, and putting it on the unit over USB.
+
+MicroPython's own program `mpremote` copies it. No message and no exception here holds a key or a password.
+"""
+
+import ipaddress
+import json
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+
+from pretouch.atomic_write import atomic_write
+from pretouch.errors import HardwareError
+from pretouch.units.keys import UnitKey
+
+COPY_S = 60.0
+"""How long copying may take [s]."""
+_FULL_MOST_MV = 20_000
+_NO_HOSTS, _FIRST_MULTICAST = (0, 127), 224
+"""First numbers of IPv4 addresses that are no host a unit could send to; multicast and broadcast are the upper ones."""
+_SSID_MOST, _PASSWORD_LEAST, _PASSWORD_MOST = 32, 8, 63
+
+
+SENSORS = ("vl53l1x", "vl53l5cx", "vl53l7cx")
+"""Range finders that the firmware knows; the first has no zones."""
+
+
+@dataclass(frozen=True)
+class Network:
+    """Where a unit sends: what cannot be is a HardwareError."""
+
+    ssid: str
+    password: str
+    host: str
+    """IPv4 address of the receiver in the unit's network."""
+    port: int
+    battery_full_mv: int = 0
+    """Voltage of the unit's battery that fills its converter [mV] (docs/how-to/wiring.md); 0: none is wired to it."""
+    touch_ohm: int = 0
+    """Resistor from the touch sensor's pin to ground [ohm] (docs/how-to/wiring.md); 0: it has no such sensor."""
+    touch_least_mn: int = 500
+    """Smallest force that is a touch [mN]."""
+    touch_mn_per_us: int = 10
+    """Force by the touch sensor's conductance [mN/uS]: of the FSR 402 about 10, to be calibrated."""
+    sensor: str = "vl53l1x"
+    """Range finder of the unit: one of `SENSORS`."""
+    zones: int = 4
+    """Zones along each side of its range finder, 4 or 8, if it has some."""
+
+    def __post_init__(self) -> None:
+        if not 1 <= _size(self.ssid, "network's name") <= _SSID_MOST or "\0" in self.ssid:
+            raise HardwareError(f"The network's name {self.ssid!r} is not valid: give 1 to {_SSID_MOST} bytes.")
+        size = _size(self.password, "password")
+        if (size and not _PASSWORD_LEAST <= size <= _PASSWORD_MOST) or "\0" in self.password:
+            raise HardwareError(
+                f"The password has {size} bytes: give {_PASSWORD_LEAST} to {_PASSWORD_MOST} for WPA, or leave it empty"
+                " for an open network."
+            )
+        try:
+            address = ipaddress.IPv4Address(self.host)
+        except ValueError:
+            raise HardwareError(
+                f"The host {self.host!r} is not an IPv4 address: give one such as 192.168.1.10."
+            ) from None
+        if address.packed[0] in _NO_HOSTS or address.packed[0] >= _FIRST_MULTICAST:
+            raise HardwareError(
+                f"A unit cannot send to {self.host}: give the address this machine has in the unit's network."
+            )
+        if not 1 <= self.port <= 0xFFFF:
+            raise HardwareError(f"The port is {self.port}: give one from 1 to 65535.")
+        if not 0 <= self.battery_full_mv <= _FULL_MOST_MV:
+            raise HardwareError(
+                f"The battery voltage at the converter's full scale is {self.battery_full_mv} mV: give 0 to"
+                f" {_FULL_MOST_MV}, for example 5000."
+            )
+        if self.sensor not in SENSORS or self.zones not in (4, 8):
+            raise HardwareError(
+                f"The unit's sensor is {self.sensor!r} with {self.zones} zones along a side: choose from"
+                f" {', '.join(SENSORS)}, and 4 or 8."
+            )
+        limits = {"touch_ohm": (0, 1_000_000), "touch_least_mn": (1, 100_000), "touch_mn_per_us": (1, 10_000)}
+        for name, (least, most) in limits.items():
+            if not least <= getattr(self, name) <= most:
+                raise HardwareError(f"The unit's {name} is {getattr(self, name)}: give {least} to {most}.")
+
+    def __repr__(self) -> str:
+        """Without the password."""
+        return f"Network(ssid={self.ssid!r}, host={self.host!r}, port={self.port})"
+
+
+def fingerprint(key: bytes) -> str:
+    """Return what tells keys apart without showing them: the first 8 hex digits of the SHA-256."""
+    return sha256(key).hexdigest()[:8]
+
+
+def configuration(key: UnitKey, network: Network) -> str:
+    """Return the text of a unit's configuration file, JSON on one line."""
+    values: dict[str, int | str] = {
+        "unit": key.number, "key": key.key.hex(), "ssid": network.ssid, "password": network.password,
+        "host": network.host, "port": network.port, "battery_full_mv": network.battery_full_mv,
+        "sensor": network.sensor, "zones": 1 if network.sensor == SENSORS[0] else network.zones,
+        "touch_ohm": network.touch_ohm, "touch_least_mn": network.touch_least_mn,
+        "touch_mn_per_us": network.touch_mn_per_us,
+    }  # fmt: skip
+    return json.dumps(values, ensure_ascii=False) + "\n"  # units join no halves of \u escapes
+
+
+def copy_to_unit(device: str, text: str, timeout: float = COPY_S) -> None:
+    """Put a configuration on the unit at a serial device, and have it begin anew; what fails is a HardwareError."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "config.json"
+        atomic_write(file, text, private=True)
+        command = "connect", device, "cp", str(file), ":config.json", "+", "reset"
+        try:
+            copied = subprocess.run(  # noqa: S603  # by words, no shell
+                [sys.executable, "-m", "mpremote", *command],
+                capture_output=True,
+                text=True,
+                timeout=timeout,
+                check=False,
+            )
+        except subprocess.TimeoutExpired:
+            raise HardwareError(
+                f"The unit at {device} did not answer within {timeout:g} s: press its reset button and try again."
+            ) from None
+    if copied.returncode:
+        lines = (copied.stderr or copied.stdout).split("\n")
+        reason = next((line.strip() for line in reversed(lines) if line.strip()), f"code {copied.returncode}")
+        raise HardwareError(
+            f"mpremote could not write to the unit at {device} ({_printable(reason)}): start the command within 3 s"
+            " after its reset button, and see that nothing else uses the line."
+        )
+
+
+def _size(text: str, name: str) -> int:
+    """Return the bytes of a text; one that is no Unicode text is a HardwareError."""
+    try:
+        return len(text.encode())
+    except UnicodeEncodeError:
+        raise HardwareError(f"The {name} is not Unicode text: give it in UTF-8.") from None
+
+
+def _printable(text: str) -> str:
+    return "".join(c if c.isprintable() else "?" for c in text[:120])

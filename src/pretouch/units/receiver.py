@@ -1,0 +1,263 @@
+"""All sensor units of a skin at one UDP socket (docs/reference/wire.md): who may speak, what was measured, and when."""
+
+import errno
+import secrets
+import select
+import socket
+import struct
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from typing import Self
+
+import numpy as np
+
+from pretouch.errors import HardwareError
+from pretouch.sensing.unit import NetworkUnits
+from pretouch.types import FloatArray, RangeReadings, TouchReadings
+from pretouch.units.keys import Keys, UnitKey
+from pretouch.units.link import LinkParams
+from pretouch.units.traffic import REASONS, ImuBatch, Received, UnitTraffic, imu_batch
+from pretouch.units.udp import bind
+from pretouch.units.unit import NO_READING, NO_TOUCH, Address, UnitEndpoint
+from pretouch.units.wire import (
+    HELLO_SIZE,
+    MAGIC,
+    SAMPLE_LEAST,
+    VERSION,
+    Kind,
+    sample_size,
+)
+
+_HEAD = struct.Struct("<4sHHI")
+"""Magic, version and kind as one; number of the unit; and, of a sample, flags and sequence."""
+_SAMPLE = MAGIC + bytes([VERSION, Kind.SAMPLE])
+_HELLO = MAGIC + bytes([VERSION, Kind.HELLO])
+_LEAST = min(HELLO_SIZE, SAMPLE_LEAST)
+_BEACON_CHECK_S = 0.02
+"""Time between two looks for beacons that are due [s]."""
+_CHECK_EVERY = 256
+"""Datagrams after which a flood makes room for the beacons."""
+
+
+Deliver = Callable[[Received, memoryview], None]
+
+
+def keys_of(ids: Sequence[str], keys: Keys) -> tuple[UnitKey, ...]:
+    """Return the keys of a skin's units in their order; a unit without one, or named twice, is a HardwareError."""
+    missing = [id for id in ids if id not in keys]
+    if missing:
+        raise HardwareError(f"There is no key for {', '.join(missing)}: add it to the file of keys.")
+    if len(set(ids)) != len(ids):
+        raise HardwareError(f"A unit is named twice in {', '.join(ids)}: name each unit once.")
+    return tuple(keys[id] for id in ids)
+
+
+def touch_readings(table: FloatArray) -> TouchReadings | None:
+    """Return the touch readings of a table (4, K) as `SkinReceiver.touch_table` has them; None of one without any."""
+    stamp, contact, force, status = table
+    if not np.isfinite(stamp).any():
+        return None
+    return TouchReadings(stamp.copy(), contact != 0.0, force.copy(), status.astype(np.int64))
+
+
+class SkinReceiver:
+    """Receives the datagrams of a skin's units, and sends them beacons. One thread; nothing here blocks but `receive`.
+
+    What is not genuine changes nothing but counters. `with` closes it.
+    """
+
+    def __init__(
+        self,
+        units: NetworkUnits | Sequence[str],
+        keys: Keys,
+        host: str = "127.0.0.1",
+        port: int = 0,
+        *,
+        clock: Callable[[], float] = time.monotonic,
+        draw: Callable[[int], bytes] = secrets.token_bytes,
+        params: LinkParams | None = None,
+        deliver: Deliver | None = None,
+    ) -> None:
+        """Listen.
+
+        Args:
+            units: `Skin.network`, or the ids of units without zones; one without a key is a HardwareError.
+            keys: of all units.
+            host: address to listen at; 0.0.0.0 for every one of this machine.
+            port: 0 lets the system choose one; one that is taken is a HardwareError.
+            clock: gives the time [s] of all stamps.
+            draw: gives so many random bytes.
+            params: how units are treated.
+            deliver: is called with each accepted sample and its datagram, which changes afterwards; then none are kept
+                to be taken.
+        """
+        self._params = params or LinkParams()
+        self.network = NetworkUnits.of(units)
+        """Whom it hears."""
+        sides, first, rows = self.network.zones, self.network.first, self.network.rows
+        known = keys_of(self.network.ids, keys)
+        self.table = np.array([NO_READING]).T.repeat(rows, axis=1)
+        """Stamps [s], distances [m] and statuses of the newest readings, (3, K); not to be written to."""
+        self.touch_table = np.array([NO_TOUCH]).T.repeat(rows, axis=1)
+        """Stamps [s], contacts, forces [N] and statuses of the newest touch readings, (4, K); as that."""
+        self._endpoints = [
+            UnitEndpoint(i, unit, self._params, draw, self.table.T[k : k + side**2], self.touch_table[:, k], side)
+            for i, (unit, k, side) in enumerate(zip(known, first, sides, strict=True))
+        ]
+        self._by_number = {unit.number: endpoint for unit, endpoint in zip(known, self._endpoints, strict=True)}
+        self.units: tuple[UnitTraffic, ...] = tuple(endpoint.traffic for endpoint in self._endpoints)
+        self.rejected: dict[str, int] = dict.fromkeys(REASONS, 0)
+        """How many datagrams were thrown away, by reason (`traffic.REASONS`)."""
+        self.unsent = 0
+        """Beacons the system did not take."""
+        self.taken = 0
+        """Datagrams that the last call of `receive` took in, genuine or not."""
+        self._samples: deque[Received] = deque(maxlen=self._params.samples_most)
+        self._imu: deque[Received] = deque(maxlen=self._params.samples_most)
+        self._deliver = deliver
+        self._clock, self._next_beacon_check = clock, -np.inf
+        self._buffer = bytearray(2048)
+        self._view = memoryview(self._buffer)
+        self._socket = bind(host, port, 1024 * self._params.buffer_kib)
+        self._poll = select.poll()
+        self._poll.register(self._socket, select.POLLIN)
+        host, port = self._socket.getsockname()[:2]
+        self.address: tuple[str, int] = (host, port)
+        """Where it listens."""
+
+    @property
+    def behind(self) -> bool:
+        """Whether the last call of `receive` left datagrams for the next."""
+        return self.taken == self._params.drain_most
+
+    @property
+    def buffer_bytes(self) -> int:
+        """Size of the queue of arrived datagrams that the system gave [B], bookkeeping included."""
+        return self._socket.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Listen no more; what was received stays."""
+        self._socket.close()
+
+    def receive(self, timeout: float = 0.0) -> int:
+        """Take in all that has arrived, and send the beacons that are due; return how many samples were accepted.
+
+        Under a flood, no more than `LinkParams.drain_most` datagrams are taken in.
+
+        Args:
+            timeout: longest time to wait for a datagram if none is there [s].
+        """
+        if self._socket.fileno() < 0:
+            raise HardwareError("The receiver is closed: make another one.")
+        self._send_due_beacons()
+        accepted, any_came = self._drain()
+        if any_came or timeout <= 0:
+            return accepted
+        end = time.monotonic() + timeout
+        while (left := end - time.monotonic()) > 0:
+            if self._poll.poll(1e3 * min(left, _BEACON_CHECK_S)):
+                self._send_due_beacons()
+                return self._drain()[0]
+            self._send_due_beacons()
+        return 0
+
+    def readings(self) -> RangeReadings:
+        """Return the newest reading of each unit and zone, stamped with the earliest instant it can be of."""
+        stamp, distance, status = self.table
+        return RangeReadings(stamp.copy(), distance.copy(), status.astype(np.int64))
+
+    def touch(self) -> TouchReadings | None:
+        """Return the newest touch reading of each unit; None while no unit has told one."""
+        return touch_readings(self.touch_table)
+
+    def take_samples(self) -> list[Received]:
+        """Return the samples accepted since the last call, in their order of arrival."""
+        taken = list(self._samples)
+        self._samples.clear()
+        return taken
+
+    def take_imu(self) -> list[ImuBatch]:
+        """Return the IMU samples that came since the last call, but for those of no known instant, scale or rate."""
+        batches = [imu_batch(received) for received in self._imu]
+        self._imu.clear()
+        return [batch for batch in batches if batch is not None]
+
+    def _drain(self) -> tuple[int, bool]:
+        """Take in what has arrived; return how many samples were accepted, and whether anything came at all."""
+        take, buffer, view, clock = self._socket.recvfrom_into, self._buffer, self._view, self._clock
+        accepted = 0
+        for k in range(self._params.drain_most):
+            try:
+                size, address = take(buffer)
+            except BlockingIOError:
+                self.taken = k
+                return accepted, k > 0
+            except OSError as error:  # news of an earlier beacon that found nobody
+                if error.errno in (errno.EBADF, errno.ENOTSOCK):
+                    raise HardwareError("The receiver's socket was closed: make another receiver.") from None
+                continue
+            reason = self._take_in(view[:size], size, address, clock())
+            if reason is None:
+                accepted += 1
+            elif reason:
+                self.rejected[reason] += 1
+            if not k % _CHECK_EVERY:
+                self._send_due_beacons()
+        self.taken = self._params.drain_most
+        return accepted, True
+
+    def _take_in(self, datagram: memoryview, size: int, address: Address, now: float) -> str | None:
+        """Take in one datagram: return None for a sample, "" for a hello, or why it is thrown away."""
+        if size < _LEAST:
+            return "size"
+        head, number, _, sequence = _HEAD.unpack_from(datagram)
+        if head == _SAMPLE:
+            if size < SAMPLE_LEAST or sample_size(datagram) != size:
+                return "size"
+        elif head != _HELLO:
+            return "format"
+        elif size != HELLO_SIZE:
+            return "size"
+        endpoint = self._by_number.get(number)
+        if endpoint is None:
+            return "unit"
+        if head == _HELLO:
+            answer = endpoint.hello(datagram, now)
+            if isinstance(answer, str):
+                return answer
+            self._send(answer, address)
+            return ""
+        received = endpoint.sample(datagram, sequence, address, now)
+        if isinstance(received, str):
+            return received
+        if self._deliver is not None:
+            self._deliver(received, datagram)
+            return None
+        self._samples.append(received)
+        if received.sample.imu_count:
+            self._imu.append(received)
+        return None
+
+    def _send_due_beacons(self) -> None:
+        """Send the beacons that are due."""
+        now = self._clock()
+        if now < self._next_beacon_check:
+            return
+        self._next_beacon_check = now + _BEACON_CHECK_S
+        for endpoint in self._endpoints:
+            if endpoint.beacon_due(now) and endpoint.address is not None:
+                self._send(endpoint.beacon(self._clock()), endpoint.address)
+
+    def _send(self, beacon: bytes, address: Address) -> None:
+        """Send, or count what cannot be sent: another beacon follows."""
+        try:
+            self._socket.sendto(beacon, address)
+        except OSError:
+            self.unsent += 1

@@ -1,0 +1,218 @@
+"""One unit as its receiver sees it: session, clock, newest reading, traffic."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from pretouch.types import FloatArray, IntArray, RangeStatus, TouchStatus
+from pretouch.units.clock import UnitClock
+from pretouch.units.keys import UnitKey
+from pretouch.units.link import Link, LinkParams, Session
+from pretouch.units.traffic import Received, UnitTraffic
+from pretouch.units.wire import NO_FORCE, ZONE, ZONES, Flag, Sample, touch_part
+
+_LEAST = 10
+"""Readings that must be alike; fewer may be so by chance."""
+_NEW = int(Flag.RANGE_NEW)
+
+
+class StuckDetector:
+    """Watches the readings of one unit: a range finder that repeats itself to the last digit does not measure."""
+
+    def __init__(self, after: float) -> None:
+        """Call a unit stuck whose readings are alike for so long [s]."""
+        self._after = after
+        self.stuck = False
+        self._values: tuple[int | bytes, ...] = ()
+        self._alikes, self._values_since = 0, math.inf
+        self.forget_stream()
+
+    def forget_stream(self) -> None:
+        """Let the count of measurements begin anew, as after a reboot; values that were alike still are."""
+        self._stream, self._streams, self._stream_since = -1, 0, math.inf
+
+    def update(self, sample: Sample, now: float) -> bool:
+        """Take in a sample newer than those before, that arrived at this instant [s]; return whether it is stuck."""
+        if not sample.flags & _NEW:
+            return self.stuck
+        if sample.range_stream != self._stream:
+            self._stream, self._streams, self._stream_since = sample.range_stream, 0, now
+        values = (
+            sample.range_mm,
+            sample.range_sigma,
+            sample.range_signal,
+            sample.range_ambient,
+            sample.range_spads,
+            sample.zones,
+        )
+        if values != self._values:
+            self._values, self._alikes, self._values_since = values, 0, now
+        self._streams += 1
+        self._alikes += 1
+        self.stuck = (self._streams >= _LEAST and now - self._stream_since >= self._after) or (
+            self._alikes >= _LEAST and now - self._values_since >= self._after
+        )
+        return self.stuck
+
+
+_RANGE_NEW, _STUCK = int(Flag.RANGE_NEW), int(RangeStatus.STUCK)
+NO_READING = (-math.inf, 0.0, float(RangeStatus.NONE))
+"""Stamp [s], distance [m] and status of a unit that has measured nothing."""
+_GREETING_S = 1.0
+"""Time without a hello after which a unit no longer asks for a session [s]; it would ask ten times in it."""
+
+NO_TOUCH = (-math.inf, 0.0, math.nan, float(TouchStatus.NONE))
+"""Stamp [s], contact, force [N] and status of a unit that has told of no touch sensor."""
+
+Address = tuple[str, int]
+
+
+class UnitEndpoint:
+    """What is known of one unit. Times in seconds of the host's clock."""
+
+    def __init__(
+        self, index: int, unit: UnitKey, params: LinkParams, draw: Callable[[int], bytes], reading: FloatArray,
+        touch: FloatArray, zones: int = 1,
+    ) -> None:  # fmt: skip
+        """Know nothing yet of the unit with this index in the `NetworkUnits` of the skin.
+
+        Stamp, distance and status of its range, or of each of its `zones` along a side squared, go to the rows of
+        `reading`, those of `NO_TOUCH` to `touch`.
+        """
+        self._reading, self._touch = reading, touch
+        self.traffic = UnitTraffic(unit.id, unit.number, zones=zones)
+        self.address: Address | None = None
+        """Where its last sample came from, as the socket knows it."""
+        self._index, self._params = index, params
+        self._link = Link(unit.key, params, draw)
+        self._clock = UnitClock(1e-6 * params.drift_ppm, params.clock_window_s)
+        self._stuck = StuckDetector(params.stuck_after_s)
+        self._session: Session | None = None
+        self._last_hello = -math.inf
+        self._echoed = 0
+        """Beacon whose echo was used last: the same one again tells nothing new."""
+        self._trusted_from = 0
+        """First beacon whose echo tells the time: those before were heard before the unit's clock jumped."""
+
+    def hello(self, datagram: memoryview, now: float) -> bytes | str:
+        """Return the answer to what looks like a hello, or why there is none."""
+        answer = self._link.hello(datagram, now)
+        if isinstance(answer, bytes):
+            traffic = self.traffic
+            traffic.hellos += 1
+            self._last_hello = now
+            if traffic.state in ("never heard", "silent"):
+                traffic.state = "greeting"
+        return answer
+
+    def sample(self, datagram: memoryview, sequence: int, address: Address, now: float) -> Received | str:
+        """Return what a datagram that looks like a sample brought, or why it is not believed."""
+        verified = self._link.sample(datagram, sequence, now)
+        traffic = self.traffic
+        if isinstance(verified, str):
+            traffic.replayed += verified == "replayed"
+            return verified
+        session, sample, lost = verified
+        if session is not self._session:
+            self._begin(session)
+        traffic.state = "live"
+        traffic.accepted += 1
+        traffic.lost += lost
+        traffic.last_arrival = now
+        traffic.sample = sample
+        if address != self.address:
+            self.address, traffic.address = address, address[:2]
+        self._tell_time(session, sample, now)
+        if sample.touch:
+            self._take_touch(sample)
+        new = sample.flags & _RANGE_NEW and self._fits(sample)
+        stamp = self._take_reading(sample, now) if new else math.nan
+        return Received(self._index, now, stamp, traffic.offset, traffic.bound, sample)
+
+    def beacon_due(self, now: float) -> bool:
+        """Return whether a beacon is to be sent to `address`; do what else time asks for."""
+        traffic = self.traffic
+        if (traffic.state == "live" and now - traffic.last_arrival > self._params.silent_after_s) or (
+            traffic.state == "greeting" and now - self._last_hello > _GREETING_S
+        ):
+            traffic.state = "silent"
+        self._link.expire(now)
+        return now >= self._link.beacon_due
+
+    def beacon(self, now: float) -> bytes:
+        """Return the beacon that is due, to be sent at once."""
+        return self._link.beacon(now)
+
+    def _begin(self, session: Session) -> None:
+        """Another session is live."""
+        traffic, before = self.traffic, self.traffic.sample
+        traffic.sessions += 1
+        if before is not None and session.hello.uptime_us < before.time_us:
+            traffic.reboots += 1
+            self._stuck.forget_stream()
+        traffic.firmware, traffic.reset = session.hello.firmware, session.hello.reset
+        self._session, self._trusted_from, self._echoed = session, 0, 0
+        self._clock.forget()
+
+    def _distrust_beacons(self, now: float) -> None:
+        """Take the time from no beacon that was sent already, and send another soon."""
+        if self._session is not None:
+            self._trusted_from = self._session.number + 1
+            self._link.beacon_due = now
+
+    def _tell_time(self, session: Session, sample: Sample, now: float) -> None:
+        """Renew offset, bound and latency."""
+        clock, traffic = self._clock, self.traffic
+        made, hold = 1e-6 * sample.time_us, sample.beacon_hold_us
+        sent = None
+        if sample.beacon != self._echoed and sample.beacon >= self._trusted_from:
+            sent, self._echoed = session.sent.get(sample.beacon), sample.beacon
+        if not clock.update(made, now, sent, 1e-6 * hold):
+            self._distrust_beacons(now)
+        traffic.clock_jumps = clock.jumps
+        traffic.offset, traffic.bound = clock.offset, clock.bound
+        if clock.known:
+            latency = now - clock.earliest(made)
+            known = traffic.latency
+            traffic.latency = latency if math.isnan(known) else known + 0.0625 * (latency - known)
+
+    def _fits(self, sample: Sample) -> bool:
+        """Whether a range has the zones of the skin's sensor; otherwise where each looks is not known."""
+        traffic = self.traffic
+        traffic.zones_told = sample.zones[0] if sample.zones else 1
+        fits = traffic.zones_told == traffic.zones
+        traffic.misfits += not fits
+        return fits
+
+    def _take_reading(self, sample: Sample, now: float) -> float:
+        """Keep a reading if it is the newest; return its stamp, NaN if it cannot be told."""
+        traffic, clock = self.traffic, self._clock
+        instant = 1e-6 * (sample.time_us - sample.range_age_us)
+        newest = instant > clock.last_reading
+        if newest:
+            traffic.stuck = self._stuck.update(sample, now)
+        stamp = clock.stamp(instant)
+        if not clock.known:
+            return math.nan
+        if newest and stamp > traffic.last_reading_stamp:
+            traffic.last_reading_stamp = stamp
+            mm: int | IntArray = sample.range_mm
+            status: int | IntArray = sample.range_status
+            if sample.zones:
+                zones = np.frombuffer(sample.zones, ZONE, offset=ZONES.size)
+                mm, status = zones["mm"], zones["status"]
+            stamps, distances, statuses = self._reading.T
+            stamps[:], distances[:] = stamp, 1e-3 * mm
+            statuses[:] = _STUCK if traffic.stuck else status
+        return stamp
+
+    def _take_touch(self, sample: Sample) -> None:
+        """Keep a touch reading if it is the newest whose instant is known."""
+        part = touch_part(sample)
+        if part is None or not self._clock.known:
+            return
+        stamp = self._clock.earliest(1e-6 * (sample.time_us - part.age_us))
+        if stamp > self._touch[0]:
+            force = math.nan if part.force_mn == NO_FORCE else 1e-3 * part.force_mn
+            self._touch[:] = stamp, float(part.contact != 0), force, part.status

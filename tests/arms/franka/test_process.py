@@ -1,0 +1,135 @@
+"""What the process does with its commands, over an arm that does as it is told; a script sends the commands."""
+
+import os
+import signal
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+
+from pretouch.arms.franka.client import StateCallback
+from pretouch.arms.franka.limits import FrankaParams, motion_limits
+from pretouch.arms.franka.mailboxes import Command, Feedback, Mailboxes, Request
+from pretouch.arms.franka.process import ArmServer, ProcessSettings
+from pretouch.arms.franka.state import FrankaState
+from pretouch.errors import RobotError
+from pretouch.robot.model import RobotModel
+from tests.arms.franka.made import CheckingArm, middle
+
+
+class ScriptedClient:
+    """Before each of its states, the script is handed the number of it, from 1 on."""
+
+    def __init__(self, arm: CheckingArm, script: Callable[[int], None]) -> None:
+        self._arm, self._script, self._states = arm, script, 0
+        self.did: list[str] = []
+
+    def read(self) -> FrankaState:
+        self._states += 1
+        self._script(self._states)
+        return self._arm.state()
+
+    def control(self, on_state: StateCallback) -> None:
+        self.did.append("motion")
+        finished = False
+        while not finished:
+            velocity, finished = on_state(self.read(), 1e-3)
+            self._arm.take(velocity.tolist())
+
+    def recover(self) -> None:
+        self.did.append("recovery")
+        raise RobotError("there is nothing to recover from")
+
+
+class Program:
+    """Gives orders by the number of the state."""
+
+    def __init__(self, model: RobotModel) -> None:
+        self.mailboxes, self.steps = Mailboxes(), {}
+        self.limits = motion_limits(model, "panda")
+        self.arm = CheckingArm(self.limits, middle(self.limits))
+        self.client = ScriptedClient(self.arm, self._at)
+
+    def _at(self, number: int) -> None:
+        self.steps.get(number, lambda: None)()
+
+    def command(self, at: int, number: int, request: Request, speed: float = 0.0) -> None:
+        """From the state with a number on, want this."""
+        self.steps[at] = lambda: self.mailboxes.send_command(
+            Command(number, request, time.monotonic() + 1000.0, [speed] * 7)
+        )
+
+    def look(self, at: int) -> list[Feedback | None]:
+        """Note the feedback before the state with a number."""
+        feedback: list[Feedback | None] = []
+        self.steps[at] = lambda: feedback.append(self.mailboxes.newest_feedback())
+        return feedback
+
+    def run(self) -> Feedback:
+        """Serve until the command to quit; return the last feedback."""
+        task = ProcessSettings("robot", "panda", self.limits, None, FrankaParams(), None, os.getppid())
+        ArmServer(self.client, task, self.mailboxes).serve()  # type: ignore[arg-type]
+        feedback = self.mailboxes.newest_feedback()
+        assert feedback is not None
+        return feedback
+
+
+@pytest.fixture
+def program(panda_model: RobotModel) -> Iterator[Program]:
+    before = signal.getsignal(signal.SIGTERM)
+    yield Program(panda_model)
+    signal.signal(signal.SIGTERM, before)
+
+
+@pytest.mark.parametrize("asked_for", [Request.MOVE, Request.RECOVER])
+def test_what_is_asked_in_a_motion_ends_it_at_rest_and_is_not_done_later(program: Program, asked_for: Request) -> None:
+    program.command(3, 1, Request.MOVE, 0.2)
+    in_motion = program.look(99)
+    program.command(100, 2, asked_for, 0.2)
+    asked = program.look(101)
+    program.command(2000, 3, Request.QUIT)
+    last = program.run()
+    assert program.client.did == ["motion"]
+    assert np.abs(program.arm.qd).max() < 1e-4
+    assert [feedback and (feedback.answered, feedback.moving) for feedback in (*in_motion, *asked)] == [
+        (1, True),
+        (1, True),
+    ]
+    assert (last.answered, last.moving) == (2, False)
+
+
+def test_a_request_that_is_taken_back_does_not_begin_a_motion(program: Program) -> None:
+    program.command(3, 1, Request.WAIT)
+    program.command(100, 2, Request.QUIT)
+    assert program.run().answered == 1
+    assert program.client.did == []
+
+
+def test_motions_and_a_recovery_are_done_in_turn_and_trouble_is_told_once(program: Program) -> None:
+    program.command(3, 1, Request.MOVE, 0.1)
+    program.command(100, 1, Request.END)
+    program.command(1000, 2, Request.RECOVER)
+    recovered = program.look(1002)
+    program.command(1010, 3, Request.MOVE, 0.1)
+    program.command(1100, 3, Request.END)
+    program.command(2000, 4, Request.QUIT)
+    assert program.run().trouble == ""
+    assert program.client.did == ["motion", "recovery", "motion"]
+    assert [feedback and feedback.trouble for feedback in recovered] == ["there is nothing to recover from"]
+
+
+def test_an_arm_that_is_lost_in_motion_is_told_as_it_was_last_seen(program: Program) -> None:
+    def fail() -> None:
+        raise RobotError("the line is dead")
+
+    program.command(3, 1, Request.MOVE, 0.2)
+    before = program.look(100)
+    program.steps[101] = program.steps[102] = fail
+    last = program.run()
+    assert last.trouble == "the line is dead"
+    assert not last.moving
+    assert before[0] is not None
+    assert last.state.time > before[0].state.time
+    assert last.state.qd.max() > 0.01
+    assert before[0].stamp <= last.stamp < time.monotonic()

@@ -1,0 +1,191 @@
+"""The door of a page, tried from outside: by pages of others, by strangers, and by visitors who do not command."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.page.visitor import Visitor, answered, control, refusal, until, update
+from tests.ports import free_port
+from viser import ViserServer
+
+from pretouch.errors import ViewerError
+from pretouch.page.commander import Commander
+from pretouch.page.door import Door
+from pretouch.page.live import PERIOD_S, LivePage
+from pretouch.page.server import ServeOptions, served
+
+ADDRESS = "Open the page at the address that the program printed: each start has its own.\n"
+DRAG = {
+    "type": "SceneNodeDragMessage", "phase": "start", "name": "/hand/grip", "instance_index": None,
+    "start_position": [0.8, 0.2, 0.2], "start_screen_pos": [0.5, 0.5], "end_position": [0.9, 0.3, 0.4],
+    "end_screen_pos": [0.6, 0.5], "button": "left", "modifier": None, "owner": "",
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def door() -> Iterator[ServeOptions]:
+    """One page for all that is refused."""
+    options = ServeOptions(port=free_port())
+    with served(options, "test"):
+        yield options
+
+
+def turns(page: LivePage, count: int) -> None:
+    for number in range(count):
+        page.turn(number * PERIOD_S)
+
+
+# who comes in
+
+
+def test_the_address_with_its_token_is_answered_and_tells_it_to_nobody_else(door: ServeOptions) -> None:
+    status, text, kind = answered(door)
+    assert (status, kind) == (200, "text/html")
+    assert text.startswith("<!doctype html>")
+    assert refusal(door) == (101, "")
+    assert refusal(door, origin=f"http://127.0.0.1:{door.port}") == (101, "")
+
+
+PLAIN = [b"/", b"/index.html", b"/wrong/", b"/wrong/index.html", b"/?token=", b"//"]
+NOT_ASCII = [b"/\xff", b"/\xc3\xa9/", b"/{token}\xff/", b"/\xff/{token}/", "/tokén/".encode()]
+
+
+@pytest.mark.parametrize("path", PLAIN + NOT_ASCII)
+def test_without_the_token_there_is_a_sentence(door: ServeOptions, path: bytes) -> None:
+    asked = path.replace(b"{token}", door.token.encode())
+    assert answered(door, asked) == (403, ADDRESS, "text/plain; charset=utf-8")
+    if path in PLAIN:
+        assert refusal(door, path.decode()) == (403, ADDRESS)
+
+
+@pytest.mark.parametrize("rest", [b"\xff", b"\xc3\xa9.js", b"%ff", b"%00", b"../%2e%2e/\xff", b"?\xff"])
+def test_behind_the_token_a_path_that_is_not_ascii_is_a_file_or_none(door: ServeOptions, rest: bytes) -> None:
+    assert answered(door, b"/" + door.token.encode() + b"/" + rest)[0] in (200, 404)
+
+
+@pytest.mark.parametrize(
+    ("header", "line"),
+    [("This page is not at", b"Host: \xff"), ("Pages of", b"Host: 127.0.0.1:{port}\r\nOrigin: http://\xff")],
+)
+def test_a_header_that_is_not_ascii_is_refused_in_a_sentence(door: ServeOptions, header: str, line: bytes) -> None:
+    status, text, _ = answered(door, b"/", line.replace(b"{port}", str(door.port).encode()))
+    assert (status, text.startswith(header)) == (403, True)
+
+
+def test_a_page_of_somebody_else_does_not_get_in_though_it_knows_the_token(door: ServeOptions) -> None:
+    for origin in ("http://evil.example", "null", f"http://127.0.0.1:{door.port + 1}", "http://127.0.0.1"):
+        said = f"Pages of {origin} may not use this one. {ADDRESS}"
+        assert refusal(door, origin=origin) == (403, said)
+
+
+@pytest.mark.parametrize("host", ["evil.example", "127.0.0.1.evil.example", "localhost.", "", "[", "a b"])
+def test_a_name_that_leads_here_but_is_not_ours_does_not_get_in(door: ServeOptions, host: str) -> None:
+    assert answered(door, headers=f"Host: {host}:{door.port}".encode())[0] in (400, 403)
+
+
+@pytest.mark.parametrize("host", ["localhost", "127.0.0.1", "192.168.1.7", "[::1]"])
+def test_numbers_and_names_of_this_machine_get_in(door: ServeOptions, host: str) -> None:
+    assert answered(door, headers=f"Host: {host}:{door.port}".encode())[0] == 200
+
+
+def test_nobody_can_have_the_page_shared(
+    server: ViserServer, visitor: Visitor, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[object] = []
+    monkeypatch.setattr(server, "request_share_url", lambda: asked.append(0))
+    visitor.say({"type": "ShareUrlRequest"})
+    visitor.settle()
+    assert not [kind for kind in server._websock_server._incoming_handlers if "Share" in kind.__name__]
+    server._thread_executor.submit(int).result()
+    assert asked == []
+
+
+def test_a_server_begun_round_the_door_is_not_kept() -> None:
+    with pytest.raises(ViewerError, match=r"install viser 1\.1\.1"):
+        Door(ServeOptions()).check(None)  # type: ignore[arg-type]
+
+
+# what is said
+
+
+def test_what_a_page_says_is_done(page: LivePage, visitor: Visitor) -> None:
+    before = page._simulation.hand_target
+    visitor.set(control(page, "Profile"), "blind")
+    visitor.set(control(page, "Pause"), True)
+    visitor.say(DRAG)
+    until(lambda: len(page._actions) == 3)
+    turns(page, 1)
+    assert page.controls.running.paused
+    assert page._simulation.settings.profile.name == "blind"
+    assert not np.allclose(page._simulation.hand_target, before, atol=0.05)
+
+
+def test_sixty_clicks_on_record_begin_one_recording(
+    page: LivePage, visitor: Visitor, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    now = 0.0
+    for _ in range(60):
+        visitor.set(control(page, "Record"), True)
+        visitor.settle()
+        now += PERIOD_S
+        page.turn(now)
+    for _ in range(20):
+        now += PERIOD_S
+        page.turn(now)
+    assert [place.name for place in Path("runs").iterdir()] == ["live-1.mcap"]
+    page._simulation.stop_recording()
+
+
+# who commands
+
+
+def test_one_visitor_commands_all_see_who_and_the_others_look(
+    page: LivePage, options: ServeOptions, visitor: Visitor
+) -> None:
+    pause, speed, take = (control(page, label) for label in ("Pause", "Clock speed", "Take command"))
+    assert not take.visible
+    with Visitor(page._server, options) as other:
+        until(lambda: take.visible)
+        assert shown(page) == "Nobody commands: the first to act does."
+        visitor.set(pause, True)
+        visitor.settle()
+        assert shown(page) == "Visitor 1 commands."
+        for message in (update(pause, value=True), update(speed, value=0.5), DRAG):
+            other.say(message)
+        other.settle()
+        assert len(page._actions) == 1
+        assert speed.value == 1.0
+        other.set(take, True)
+        other.set(speed, 0.5)
+        other.settle()
+        assert shown(page) == "Visitor 2 commands."
+        assert speed.value == 0.5
+        visitor.set(speed, 0.7)
+        visitor.settle()
+        assert speed.value == 0.5
+        text = control(page, "Profile text")
+        visitor.set(text, "blind")
+        visitor.say({"type": "GuiFormSubmitMessage", "uuid": text._impl.parent_container_id})
+        visitor.settle()
+        assert text.value == "paper"
+    until(lambda: not take.visible)
+    visitor.set(speed, 0.7)
+    visitor.settle()
+    assert speed.value == 0.7
+
+
+def test_who_comes_while_another_commands_is_told_so(page: LivePage, options: ServeOptions, visitor: Visitor) -> None:
+    visitor.set(control(page, "Pause"), True)
+    visitor.settle()
+    with Visitor(page._server, options) as other:
+        told = other.heard("NotificationShowMessage")["props"]
+        assert (told["title"], told["body"]) == ("You are Visitor 2", "Visitor 1 commands.")
+
+
+def shown(page: LivePage) -> str:
+    """What the page says of who commands."""
+    (commander,) = {told.__self__ for told in page._server._client_disconnect_cb if hasattr(told, "__self__")}
+    assert isinstance(commander, Commander)
+    return commander._line.content.split(">", 1)[1].removesuffix("</div>")

@@ -1,0 +1,183 @@
+"""Driving the arm from a page: what a visitor asks is done while that visitor is there and commands."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.page.test_door import turns
+from tests.page.visitor import Visitor, control
+
+from pretouch.desired import DesiredKind
+from pretouch.page.asked import asked_in
+from pretouch.page.drive import REACH_M, TASKS, Steering
+from pretouch.page.live import LivePage
+from pretouch.page.replay import frame_of, world_of
+from pretouch.page.server import ServeOptions
+from pretouch.recording.reader import open_recording
+from pretouch.recording.verify import verify
+from pretouch.types import FloatArray, Mode
+
+
+@pytest.fixture
+def driver(page: LivePage, options: ServeOptions) -> Iterator[Visitor]:
+    """Somebody who drives an arm that stands."""
+    page._simulation.advance(1.5)
+    with Visitor(page._server, options) as somebody:
+        do(page, somebody, control(page, "Task"), TASKS[1])
+        turns(page, 30)
+        yield somebody
+
+
+def do(page: LivePage, visitor: Visitor, handle: Any, value: object) -> None:
+    """Have a visitor set a control, and the page do it."""
+    visitor.set(handle, value)
+    visitor.settle()
+    turns(page, 1)
+
+
+def aim(page: LivePage, visitor: Visitor, position: FloatArray, wxyz: tuple[float, ...] = (0.0, 1.0, 0.0, 0.0)) -> None:
+    """Have a visitor drag the target, the hand's fingers down."""
+    visitor.say({
+        "type": "TransformControlsUpdateMessage", "name": "/target", "wxyz": list(wxyz), "position": position.tolist(),
+        "owner": "",
+    })  # fmt: skip
+    visitor.settle()
+    turns(page, 1)
+
+
+def hand(page: LivePage) -> FloatArray:
+    return page._simulation.frame.step.ee_position
+
+
+def speed(page: LivePage) -> float:
+    """Speed at which the end-effector is commanded [m/s]."""
+    frame, world = page._simulation.frame, page._simulation.world
+    asked = asked_in(frame, world, world.model.kinematics(frame.step.q))
+    assert asked
+    return float(np.linalg.norm(asked.allowed))
+
+
+def test_the_arm_stands_where_it_was_until_somebody_drives(page: LivePage, driver: Visitor) -> None:
+    before = hand(page)
+    turns(page, 30)
+    np.testing.assert_allclose(hand(page), before, atol=0.002)
+    assert page._simulation.frame.step.mode is Mode.TRACK
+    np.testing.assert_allclose(page.drive._target.position, hand(page), atol=0.01)
+    do(page, driver, control(page, "Task"), TASKS[0])
+    turns(page, 60)
+    assert page._simulation.frame.inputs.desired is None  # type: ignore[union-attr]
+    assert np.linalg.norm(hand(page) - before) > 0.1
+    assert not page.drive._target.visible
+
+
+def test_the_hand_goes_to_a_target_that_is_dragged_and_stays(page: LivePage, driver: Visitor) -> None:
+    goal = hand(page) + np.array([-0.05, 0.1, 0.05])
+    aim(page, driver, goal)
+    turns(page, 120)
+    np.testing.assert_allclose(hand(page), goal, atol=0.005)
+    assert page._simulation.frame.inputs.desired.kind is DesiredKind.POSE  # type: ignore[union-attr]
+    aim(page, driver, goal + 0.1, (0.0, 0.0, 0.0, 0.0))  # no orientation
+    turns(page, 15)
+    np.testing.assert_allclose(hand(page), goal, atol=0.005)
+
+
+def test_a_driver_from_whom_the_command_is_taken_or_who_leaves_has_the_arm_come_to_rest_and_the_next_goes_on(
+    page: LivePage, options: ServeOptions, driver: Visitor
+) -> None:
+    aim(page, driver, hand(page) + np.array([0.0, 0.4, 0.0]))
+    turns(page, 10)
+    with Visitor(page._server, options) as other:
+        do(page, other, control(page, "Take command"), True)
+        turns(page, 15)
+        assert page._simulation.frame.step.mode is Mode.HOLD
+        aim(page, other, hand(page) - np.array([0.0, 0.4, 0.0]))
+        turns(page, 10)
+        assert speed(page) > 0.1
+    turns(page, 15)
+    step = page._simulation.frame.step
+    assert (step.mode, step.reason.split(" ended ")[0]) == (Mode.HOLD, "The desired motion")
+    assert np.abs(step.command).max() < 1e-9
+    rest = hand(page)
+    turns(page, 30)
+    np.testing.assert_allclose(hand(page), rest, atol=0.002)
+    aim(page, driver, rest)
+    turns(page, 3)
+    assert page._simulation.frame.step.mode is Mode.TRACK
+
+
+def test_who_does_not_command_drives_nothing_and_is_shown_again_where_the_target_is(
+    page: LivePage, options: ServeOptions, driver: Visitor
+) -> None:
+    before = page.drive._target.position
+    with Visitor(page._server, options) as other:
+        aim(page, other, np.array([0.3, 0.3, 0.3]))
+        assert page.drive.steering.goal is None
+        aim(page, driver, before)
+        aim(page, other, np.array([0.3, 0.3, 0.3]))
+        np.testing.assert_allclose(page.drive._target.position, before)
+        do(page, other, control(page, "Task"), TASKS[0])
+        assert control(page, "Task").value == TASKS[1]
+    turns(page, 5)
+    np.testing.assert_allclose(page.drive.steering.goal[:3, 3], before)  # type: ignore[index]
+    assert speed(page) < 0.01
+
+
+def test_a_reset_has_a_driven_arm_stand_at_its_beginning(page: LivePage, driver: Visitor) -> None:
+    aim(page, driver, hand(page) + np.array([0.0, 0.3, 0.0]))
+    turns(page, 10)
+    do(page, driver, control(page, "Reset"), True)
+    begun = hand(page)
+    turns(page, 60)
+    np.testing.assert_allclose(hand(page), begun, atol=0.003)
+    assert page._simulation.frame.step.mode is Mode.TRACK
+
+
+@pytest.mark.slow
+def test_a_drive_at_the_person_is_recorded_shown_again_and_replayed_to_the_bit(
+    page: LivePage, driver: Visitor, tmp_path: Path
+) -> None:
+    simulation, start = page._simulation, hand(page)
+    simulation.move_hand(start + np.array([0.0, 0.4, 0.05]))
+    turns(page, 60)
+    simulation.start_recording(tmp_path / "drive.mcap")
+    turns(page, 5)
+    aim(page, driver, simulation.hand_target)
+    turns(page, 90)
+    simulation.stop_recording()
+    recorded = open_recording(tmp_path / "drive.mcap")
+    verdict = verify(recorded)
+    assert verdict.exact, verdict.said
+    assert (verdict.checked, verdict.skipped) == (len(recorded), {})
+    assert {kept.inputs.desired.kind for kept in recorded} == {DesiredKind.TWIST, DesiredKind.POSE}
+    kept, world = recorded[len(recorded) - 1], world_of(recorded.runs[0])
+    asked = asked_in(frame_of(kept), world, world.model.kinematics(kept.step.q))
+    assert asked
+    np.testing.assert_allclose(asked.goal[:3, 3], simulation.hand_target)  # type: ignore[index]
+    limits = [kept.step.limited for kept in recorded]
+    assert {simulation.skin.ids[limit.unit] for limit in limits if limit.unit >= 0} >= {"hand_left"}
+    assert max(np.linalg.norm(kept.truth.force, axis=1).max() for kept in recorded) < 30.0
+
+
+def test_a_target_counts_until_another_is_asked_and_lies_within_reach() -> None:
+    steering = Steering()
+    steering.held = True
+    assert steering(0.5).kind is DesiredKind.TWIST
+    assert not steering(0.5).number.any()
+    turned = np.diag([1.0, -1.0, -1.0])
+    steering.target(np.array([0.5, -9.0, 0.3]), turned)
+    for now in (1.0, 100.0):
+        asked = steering(now)
+        assert (asked.kind, asked.stamp.tolist()) == (DesiredKind.POSE, [now])
+        assert asked.number[0].tolist() == [0.5, -REACH_M, 0.3, *turned.ravel()]
+
+
+def test_what_is_asked_ages_while_who_asked_it_is_away() -> None:
+    steering = Steering()
+    steering.held = True
+    steering(2.0)
+    steering.held = False
+    assert [float(steering(now).stamp[0]) for now in (2.5, 9.0)] == [2.0, 2.0]
+    assert float(steering(0.3).stamp[0]) == 0.3  # after a reset it is of now at most, and ages from there
+    assert float(steering(0.4).stamp[0]) == 0.3

@@ -1,0 +1,96 @@
+"""The opening as the simulation plays it: what the arm does about the scripted hand, without a page."""
+
+import numpy as np
+import pytest
+
+from pretouch.explanation import Doing, explain
+from pretouch.page.room import LiveSettings
+from pretouch.page.simulation import LiveSimulation
+from pretouch.profiles import profile
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import LIVE_SKIN, load_skin
+from pretouch.types import ControlStep, Mode
+
+SHOWN_S = 10.0
+"""Time within which the promise is to be seen."""
+
+
+class Played:
+    """An opening from its begin to its end."""
+
+    def __init__(self, model: RobotModel, name: str) -> None:
+        self.simulation = LiveSimulation(LiveSettings(profile=profile(name)), model, load_skin(LIVE_SKIN, model))
+        self.simulation.play_opening()
+        self.steps: list[ControlStep] = []
+        self.force: list[float] = []
+        while self.simulation.opening and self.simulation.time < 2 * SHOWN_S:
+            self.steps.append(self.simulation.single_step())
+            true = self.simulation.frame.true_force
+            self.force.append(0.0 if true is None else float(np.linalg.norm(true)))
+
+    @property
+    def touch(self) -> int:
+        """The step of the first touch."""
+        return int(np.argmax(np.array(self.force) > 0.5))
+
+    def slowest_before(self) -> float:
+        """Least speed over the path's before the touch, once the arm has started."""
+        speeds = [
+            float(np.linalg.norm(s.ee_velocity)) for s in self.steps[: self.touch]
+            if s.mode is Mode.TRACK and s.stamp > 2.0
+        ]  # fmt: skip
+        return min(speeds) / self.simulation.settings.profile.task.speed_m_s
+
+
+@pytest.fixture(scope="module")
+def protected(panda_model: RobotModel) -> Played:
+    return Played(panda_model, "pretouch")
+
+
+@pytest.fixture(scope="module")
+def blind(panda_model: RobotModel) -> Played:
+    return Played(panda_model, "blind")
+
+
+def test_the_arm_sees_the_hand_slows_is_touched_yields_and_goes_on(protected: Played) -> None:
+    assert protected.slowest_before() < 0.5
+    before = protected.steps[protected.touch - 1]
+    seen = {protected.simulation.skin.ids[unit] for unit in before.obstacles.unit}
+    assert "hand_left" in seen
+    model, skin = protected.simulation.model, protected.simulation.skin
+    told = [explain(s, skin.ids, model.links) for s in protected.steps[protected.touch - 50 : protected.touch]]
+    slowed = [found.sentence for found in told if found.doing is Doing.SLOWED]
+    assert len(slowed) > 40, "the half second before the touch is told as what it is"
+    assert all("hand_left sees something at 0.0" in sentence for sentence in slowed)
+    contacts = [s.stamp for s in protected.steps if s.contact is not None]
+    touched = protected.steps[protected.touch].stamp
+    assert len(contacts) == 1
+    assert touched <= contacts[0] < touched + 0.1
+    modes = [s.mode for i, s in enumerate(protected.steps) if i == 0 or s.mode is not protected.steps[i - 1].mode]
+    off = [np.linalg.norm(s.ee_position - s.path_position) for s in protected.steps if s.mode is Mode.REACT]
+    assert max(off) > 0.08, "it has moved with the push"
+    assert modes[-3:] == [Mode.TRACK, Mode.REACT, Mode.TRACK]
+    assert protected.steps[-1].stamp < SHOWN_S
+    assert protected.simulation.opening is None
+
+
+def test_a_blind_arm_runs_into_the_same_hand_unslowed_and_with_more_force(protected: Played, blind: Played) -> None:
+    assert blind.slowest_before() > 0.8
+    assert max(protected.force) < 0.5 * max(blind.force)
+    assert max(blind.force) > 30.0
+
+
+@pytest.mark.parametrize("how", ["move", "point"])
+def test_a_person_who_moves_the_hand_ends_it_at_once(panda_model: RobotModel, how: str) -> None:
+    simulation = LiveSimulation(model=panda_model)
+    simulation.play_opening()
+    simulation.advance(3.0)
+    assert simulation.opening
+    wanted = np.array([0.9, 0.6, 0.5])
+    if how == "move":
+        simulation.move_hand(wanted)
+    else:
+        simulation.point_hand(np.array([1.75, 0.95, 0.85]), wanted)
+    simulation.advance(0.5)
+    assert simulation.opening is None
+    np.testing.assert_allclose(simulation.frame.hand_target, wanted, atol=0.01)
