@@ -10,8 +10,7 @@ import pytest
 
 from pretouch import cli, extras, plugins
 from pretouch.atomic_write import write_json
-from pretouch.cli.overview import GROUPS, SHELLS, overview
-from pretouch.cli.registry import FCI, GROUP, LAB, OWN
+from pretouch.cli.app import COMMANDS, GROUP, OWN, SHELLS, commands_of, overview
 from pretouch.cli.writing import check_writable
 from pretouch.profiles import profile
 
@@ -25,7 +24,6 @@ def run(capsys, *args):
     ("args", "words"),
     [
         (("live", "--port", "0"), "The port is 0: give one from 1 to 65535"),
-        (("live", "--path", "square"), "The path is 'square': choose circle or line"),
         (("replay", "/dev/null", "--no-page"), "/dev/null is no file"),
         (("report", "/nowhere.mcap"), "/nowhere.mcap cannot be read: it does not exist"),
     ],
@@ -70,7 +68,7 @@ def installed(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("name", "owner"), [*((name, extras.LAB) for name in LAB), *((name, extras.FCI) for name in FCI)]
+    ("name", "owner"), [(name, owner) for owner in (extras.LAB, extras.FCI) for name in commands_of(owner)]
 )
 def test_a_command_of_another_distribution_that_is_not_there_is_said_with_what_installs_it(
     installed, capsys, name, owner
@@ -133,17 +131,16 @@ def test_a_command_of_two_distributions_is_refused(installed, capsys):
 
 
 def test_the_overview_fits_a_screen_and_has_each_command_once():
-    names = [name for group in GROUPS.values() for name in group]
-    assert sorted(names) == sorted((*OWN, *FCI, *LAB))
-    lines = overview(dict.fromkeys((*OWN, *FCI, *LAB, "mine"), "Do a thing of my own. " * 5)).splitlines()
-    assert len(lines) < 24
+    names = [name for group in COMMANDS.values() for name in group]
+    lines = overview(names, {"mine": "Do a thing of my own. " * 5}).splitlines()
+    assert len(lines) <= 24
     assert max(map(len, lines)) <= 80
     assert "live" in lines[1]
     assert any(line.startswith("Added") and " mine " in line for line in lines)
 
 
 def test_the_overview_leaves_out_what_is_not_installed():
-    said = overview(dict.fromkeys(OWN, ""))
+    said = overview(OWN, {})
     assert " demo " not in said
     assert "Experiments" not in said
 
@@ -154,9 +151,10 @@ def test_the_overview_leaves_out_what_is_not_installed():
         ("live --seed many", "--seed: invalid literal"),
         ("run --radius wide", "parsing --radius"),
         ("live --prot 8080", "--port"),
+        ("robot import a.urdf --qd-max fast", "--qd-max: 'fast': give numbers, separated by commas"),
         ("run --path square", "'circle', 'line', 'hold'"),
         ("replay", "Recording; that of a killed process works too."),
-        ("skin dance", "monitor, calibrate, coverage, simulate, provision, keys"),
+        ("bench dance", "detection, avoidance"),
     ],
 )
 def test_wrong_words_are_answered_with_what_is_right(capsys, monkeypatch, words, said):
@@ -172,6 +170,12 @@ def test_wrong_words_are_answered_with_what_is_right(capsys, monkeypatch, words,
     [
         ("repaly", "repaly is no command of pretouch: perhaps replay."),
         ("xyz", "xyz is no command of pretouch: pretouch --help lists them."),
+        (
+            "skin dance",
+            "skin dance is no command of pretouch: choose from "
+            + ", ".join(n for n in OWN if n.startswith("skin "))
+            + ".",
+        ),
         ("completion fish", f"pretouch completion is for one shell: choose from {', '.join(SHELLS)}."),
     ],
 )

@@ -1,15 +1,15 @@
 """`pretouch detect`: what is printed, drawn and written."""
 
 import json
+import math
 from pathlib import Path
 
 import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from pretouch.cli.detect import detect, gains_of
+from pretouch.cli.detect import Detect
 from pretouch.errors import ParameterError, PretouchError, RecordingError
-from pretouch.imported_data.log import Choice
 from pretouch.recording.skin_recording import SkinRecording
 from pretouch.recording.writer import Recording
 from tests.following_arm import Arm
@@ -25,7 +25,7 @@ def file(tmp_path):
 
 def test_what_was_read_assumed_and_found_is_printed_and_on_a_page(capsys, file, tmp_path):
     page = tmp_path / "a.html"
-    detect(file, Choice(), out=page)
+    Detect(file, out=page).run()
     said = capsys.readouterr().out
     assert "mine.csv: 1400 samples in 14.0 s, 100 Hz, the first at" in said
     assert (
@@ -48,13 +48,13 @@ def test_of_a_recording_of_units_it_is_said_what_can_be_done_with_it(tmp_path):
     with pytest.raises(
         RecordingError, match="holds samples of sensor units, but none of geometry_msgs/WrenchStamped: read it with"
     ) as caught:
-        detect(place, Choice())
+        Detect(place).run()
     assert len(str(caught.value)) < 300
 
 
 def test_profiles_stand_side_by_side_and_their_figure_and_numbers_are_written(capsys, file, tmp_path):
     figure, numbers, names = tmp_path / "new" / "a.png", tmp_path / "a.json", ("paper", "paper:detect.f_base_n=31")
-    detect(file, Choice(), names, out=figure, json_file=numbers)
+    Detect(file, names, out=figure, json=numbers).run()
     said = capsys.readouterr().out
     assert "paper and paper:detect.f_base_n=31: 0 contacts in both, 3 only in paper, 0 only in" in said
     assert "paper:detect.f_base_n=31: no contact in 0.2 min" in said
@@ -73,10 +73,10 @@ def test_profiles_stand_side_by_side_and_their_figure_and_numbers_are_written(ca
 
 def test_a_rate_is_that_of_the_detector(capsys, tmp_path):
     bag = write_bag(tmp_path / "slow", wrenches(pushed(14.0, PUSHES, rate=30.0), rate=30.0))
-    detect(bag, Choice())
+    Detect(bag).run()
     assert "--rate 30 runs it at the data's own rate" in capsys.readouterr().out
     numbers = tmp_path / "a.json"
-    detect(bag, Choice(), rate=30.0, json_file=numbers)
+    Detect(bag, rate=30.0, json=numbers).run()
     assert "repeated samples" not in capsys.readouterr().out
     assert json.loads(numbers.read_text())["profiles"][0]["control_rate_hz"] == pytest.approx(30.0)
 
@@ -86,16 +86,18 @@ def test_a_rate_is_that_of_the_detector(capsys, tmp_path):
     [
         ({"profiles": ("brave",)}, ParameterError, "The profile 'brave' is unknown"),
         ({"profiles": ()}, ParameterError, "No profile is given"),
+        ({"gains": (1.0, 0.0)}, ParameterError, "--gains is 1,0"),
+        ({"gains": (1.0, math.inf)}, ParameterError, "--gains is 1,inf"),
+        ({"gains": (1.0, -2.0)}, ParameterError, "--gains is 1,-2"),
         ({"rate": 10.0}, ParameterError, "The rate is 10 Hz"),
-        ({"out": "a.gif"}, RecordingError, "a.gif has an unknown format"),
-        ({"out": "/dev/null/a.png"}, PretouchError, "/dev/null/a.png cannot be written"),
-        ({"place": "gone.csv"}, RecordingError, "The recording gone.csv does not exist"),
+        ({"out": Path("a.gif")}, RecordingError, "a.gif has an unknown format"),
+        ({"out": Path("/dev/null/a.png")}, PretouchError, "/dev/null/a.png cannot be written"),
+        ({"file": Path("gone.csv")}, RecordingError, "The recording gone.csv does not exist"),
     ],
 )
 def test_bad_input_is_one_sentence_and_nothing_is_printed(capsys, file, given, error, words):
-    paths = {k: Path(v) if k in ("out", "json_file", "place") else v for k, v in given.items()}
     with pytest.raises(error, match=words) as caught:
-        detect(**{"place": file, "choice": Choice()} | paths)
+        Detect(**{"file": file} | given).run()
     assert "\n" not in str(caught.value)
     assert capsys.readouterr().out == ""
 
@@ -106,7 +108,7 @@ def test_a_recording_of_ours_gives_the_contacts_and_thresholds_it_holds(capsys, 
         cycles = [arm.turn(tuple(sample)) for sample in pushed(6.0, PUSHES[:1])]
         for cycle in cycles:
             recording.record(cycle)
-    detect(place, Choice(), ("paper",), json_file=numbers)
+    Detect(place, profiles=("paper",), json=numbers).run()
     assert "Without a skin no obstacle is known" in capsys.readouterr().out
     (paper,) = json.loads(numbers.read_text())["profiles"]
     contacts = [cycle.step for cycle in cycles if cycle.step.contact is not None]
@@ -124,7 +126,7 @@ def pushed_arm(tmp_path_factory, panda_model):
 @pytest.mark.slow
 def test_joint_torques_are_detected_on_by_pretouch_and_paper(capsys, pushed_arm, tmp_path):
     numbers, page, figure = tmp_path / "a.json", tmp_path / "a.html", tmp_path / "a.png"
-    detect(pushed_arm[0], Choice(), json_file=numbers, out=page)
+    Detect(pushed_arm[0], json=numbers, out=page).run()
     said = capsys.readouterr().out
     assert "arm.csv: 13000 samples in 26.0 s, 500 Hz" in said
     assert "assumed to be on the robot (otherwise --sign by-robot). The arm is assumed to be panda (--arm)." in said
@@ -146,13 +148,13 @@ def test_joint_torques_are_detected_on_by_pretouch_and_paper(capsys, pushed_arm,
     assert text.count("<img src=") == 2
     assert "panda_link5" in text
     assert 'src="http' not in text
-    detect(pushed_arm[0], Choice(), ("pretouch",), out=figure)
+    Detect(pushed_arm[0], profiles=("pretouch",), out=figure).run()
     assert imread(figure).std() > 0.05
 
 
 def test_long_names_of_profiles_are_numbered_in_tables_and_whole_in_numbers(capsys, pushed_arm, tmp_path):
     name, numbers = "pretouch:detect.slack_nats=0:detect.tails=8", tmp_path / "a.json"
-    detect(pushed_arm[0], Choice(), (name,), json_file=numbers)
+    Detect(pushed_arm[0], (name,), json=numbers).run()
     assert f"pretouch (1) is {name}." in capsys.readouterr().out
     assert json.loads(numbers.read_text())["profiles"][0]["profile"] == name
 
@@ -163,25 +165,19 @@ def test_with_a_force_beside_torques_each_can_be_had(capsys, pushed_arm, tmp_pat
     kinds = (("q*_rad", moving.q), ("tau_ext*_Nm", moving.tau_ext))
     columns = moving.columns(*kinds) | {f"force_{axis}_N": np.zeros(len(moving.time)) for axis in "xyz"}
     both = write_csv(tmp_path / "both.csv", columns)
-    detect(both, Choice(), ("paper",))
+    Detect(both, profiles=("paper",)).run()
     assert "Force from force_x_N, assumed" in capsys.readouterr().out
-    detect(both, Choice())
+    Detect(both).run()
     assert (
         "External torques, from tau_ext1_Nm, positions from q1_rad, assumed to be on the robot"
         in capsys.readouterr().out
     )
     del columns["q7_rad"]
-    detect(write_csv(tmp_path / "six.csv", columns), Choice())
+    Detect(write_csv(tmp_path / "six.csv", columns)).run()
     said = capsys.readouterr().out
     assert "Joint torques are not used: " in said
     assert "Force from force_x_N, assumed" in said
     with pytest.raises(RecordingError, match="are not the 7 joints of panda"):
-        detect(tmp_path / "six.csv", Choice(), ("pretouch",))
+        Detect(tmp_path / "six.csv", profiles=("pretouch",)).run()
     with pytest.raises(RecordingError, match="gives only a force: choose one with"):
-        detect(write_csv(tmp_path / "force.csv", force_columns(pushed(5.0, ()))), Choice(), ("pretouch",))
-
-
-@pytest.mark.parametrize("text", ["a,b", "1,0", "1,inf", "1,-2"])
-def test_gains_that_are_none_are_refused(text):
-    with pytest.raises(PretouchError, match="--gains is "):
-        gains_of(text)
+        Detect(write_csv(tmp_path / "force.csv", force_columns(pushed(5.0, ()))), profiles=("pretouch",)).run()

@@ -7,11 +7,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from pretouch.cli.commands import Replay
-from pretouch.cli.replay import replay
+from pretouch.cli.replay import Replay
 from pretouch.controller import Controller
 from pretouch.errors import ParameterError, RecordingError
-from pretouch.page import server
 from pretouch.recording.writer import Recording
 from tests.following_arm import Arm
 from tests.imported_data.files import pushed
@@ -49,12 +47,12 @@ def begun(monkeypatch):
         announced.append((options, title))
         yield lambda: "server"
 
-    monkeypatch.setattr(server, "begun", begin)
+    monkeypatch.setattr("pretouch.cli.replay.begun", begin)
     return announced
 
 
 def test_a_line_says_what_ran_for_how_long_and_what_happened(capsys, whole, page, begun):
-    assert Replay(str(whole), page=False).run() == 0
+    assert Replay(whole, page=False).run() == 0
     assert begun == page == []
     said = capsys.readouterr().out
     what = "pretouch test: profile paper on panda with 7 units, 5.0 s, 500 steps"
@@ -66,14 +64,14 @@ def test_of_a_run_that_was_held_from_the_start_on_it_is_said_that_it_was(capsys,
     with Recording(tmp_path / "held.mcap", arm.controller) as recording:
         for sample in pushed(1.0, ()):
             recording.record(arm.turn(tuple(sample), silent={0: 9.0}))
-    assert replay(tmp_path / "held.mcap") == 0
+    assert Replay(tmp_path / "held.mcap", page=False).run() == 0
     assert "0 contacts, 0 holds after the start, held for 100% of the time." in capsys.readouterr().out
 
 
 def test_of_a_killed_run_it_is_said_what_is_missing(capsys, whole, tmp_path):
     cut, content = tmp_path / "cut.mcap", whole.read_bytes()
     cut.write_bytes(content[: 2 * len(content) // 3])
-    assert replay(cut) == 0
+    assert Replay(cut, page=False).run() == 0
     said = capsys.readouterr().out.splitlines()
     assert "the end is missing" in said[0]
     assert "every whole part" in said[0]
@@ -81,7 +79,7 @@ def test_of_a_killed_run_it_is_said_what_is_missing(capsys, whole, tmp_path):
 
 
 def test_a_recording_that_can_be_recomputed_ends_with_code_0_and_no_page(capsys, whole, page, begun):
-    assert Replay(str(whole), verify=True).run() == 0
+    assert Replay(whole, verify=True).run() == 0
     assert "All 500 steps were recomputed and are the same bit for bit." in capsys.readouterr().out
     assert begun == page == []
 
@@ -95,14 +93,14 @@ def test_a_difference_ends_with_code_1(capsys, whole, monkeypatch):
         return made, after
 
     monkeypatch.setattr(Controller, "step", otherwise)
-    assert replay(whole, verify=True) == 1
+    assert Replay(whole, verify=True, page=False).run() == 1
     said = capsys.readouterr().out
     assert "speed_scale" in said
     assert "steps differ" in said
 
 
 def test_another_profile_is_shown_beside_the_recorded_one(capsys, whole):
-    assert replay(whole, profile="paper:detect.f_base_n=35") == 0
+    assert Replay(whole, profile="paper:detect.f_base_n=35", page=False).run() == 0
     said = capsys.readouterr().out
     assert "Contacts: paper as recorded, paper:detect.f_base_n=35 on the same data" in said
     (row,) = [line.split() for line in said.splitlines() if line.strip().startswith("2.1")]
@@ -112,14 +110,14 @@ def test_another_profile_is_shown_beside_the_recorded_one(capsys, whole):
 
 
 def test_the_same_profile_is_later_by_nothing(capsys, whole):
-    replay(whole, profile="paper")
+    Replay(whole, profile="paper", page=False).run()
     (row,) = [line.split() for line in capsys.readouterr().out.splitlines() if line.strip().startswith("2.1")]
     assert row[0] == row[3]
     assert row[-1] == "+0.00"
 
 
 def test_the_page_is_given_recording_and_server(whole, page, begun):
-    assert Replay(str(whole), host="127.0.0.1", port=8123).run() == 0
+    assert Replay(whole, host="127.0.0.1", port=8123).run() == 0
     ((recorded, ours, *_),) = page
     assert (recorded.place, ours) == (whole, "server")
     ((options, title),) = begun
@@ -133,7 +131,7 @@ def test_the_address_is_said_before_the_recording_is_read(whole, page, begun, mo
 
     monkeypatch.setattr("pretouch.cli.replay.open_recording", read)
     with pytest.raises(RecordingError, match="read"):
-        Replay(str(whole)).run()
+        Replay(whole).run()
 
 
 @pytest.mark.parametrize("name", ["gone.mcap", "text.mcap", "empty.mcap"])
@@ -141,11 +139,11 @@ def test_what_is_no_recording_is_one_sentence(capsys, tmp_path, name):
     if not name.startswith("gone"):
         (tmp_path / name).write_text("time_s\n" if name.startswith("text") else "")
     with pytest.raises(RecordingError, match=name) as error:
-        Replay(str(tmp_path / name), page=False).run()
+        Replay(tmp_path / name, page=False).run()
     assert "\n" not in str(error.value)
     assert capsys.readouterr().out == ""
 
 
 def test_an_unknown_profile_is_said_before_the_file_is_read(tmp_path):
     with pytest.raises(ParameterError, match="'brave' is unknown"):
-        replay(tmp_path / "gone.mcap", profile="brave")
+        Replay(tmp_path / "gone.mcap", profile="brave", page=False).run()

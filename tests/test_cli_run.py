@@ -59,9 +59,6 @@ def at_begin(monkeypatch, seconds, then):
     ("words", "said"),
     [
         (("frank",), "No arm to move is called 'frank': perhaps franka."),
-        (("--robot", "franka", "--ip", "1.2.3.4"), "`--robot franka` is `pretouch run franka` now"),
-        (("--yes", "--robot=ros2"), "`--robot ros2` is `pretouch run ros2` now"),
-        (("--ros-own-clock",), "--ros-own-clock is an option of `pretouch run ros2` now"),
         (("franka", "--ip", "192.0.2.1"), "The arm brings no sensor units: give the file of their keys with --keys"),
         (("--no-skin",), "choose --profile blind"),
         (("--no-skin", "--skin", "a.toml"), "--no-skin does not go with --skin"),

@@ -163,7 +163,6 @@ def test_a_disk_that_is_full_is_said_and_the_exit_code_tells_of_it(keys, port, t
         (("--posture", "0,0"), "--posture needs --skin"),
         (("--skin", "/nowhere.toml"), "/nowhere.toml cannot be read"),
         (("--skin", str(PAPER_SKIN), "--posture", "99,0,0,-2,0,2,0"), "joint 1 at 99 rad, outside its range of -2.90"),
-        (("--keys", ""), "The file of keys is missing: name one with --keys."),
         (("--host", ""), "The address to listen on is empty"),
         (("--host", "no.such.host.invalid"), "no.such.host.invalid"),
         (("--port", "70000"), "70000"),
@@ -255,7 +254,6 @@ def test_the_key_of_a_lost_unit_is_revoked_or_replaced_and_the_others_stay(tmp_p
         (("--duration", "-2"), "-2"),
         (("--seed", "-1"), "SimulateOptions.seed is -1: it must be at least 0."),
         (("--host", ""), "The receiver's address is empty"),
-        (("--keys", ""), "The file of keys is missing: name one with --keys."),
     ],
 )
 def test_a_simulation_that_makes_no_sense_is_refused(tmp_path, capsys, more, words):

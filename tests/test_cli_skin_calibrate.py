@@ -29,9 +29,7 @@ def calibrate(*words):
     [
         ((), "give --recording FILE or --plan FILE, or name an arm, as in `pretouch skin calibrate simulated`."),
         (("--plan", "m.csv", "--recording", "x"), "--recording and --plan are given: choose one of them."),
-        (("--robot", "simulated"), "`--robot simulated` is `pretouch skin calibrate simulated` now"),
         (("--recording", "x.mcap", "--duration", "30"), "--duration does not go with --recording"),
-        (("--simulate", "--skins", "20"), "is `pretouch bench calibration` now"),
         (("--recording", "joints.csv"), "give the recording with --recording, and joint states with --joints."),
         (("--recording", "/nowhere.mcap"), "The recording /nowhere.mcap cannot be read: it does not exist."),
         (("--recording", "x.mcap", "--skin", "/nowhere.toml"), "/nowhere.toml cannot be read"),

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from pretouch import extras
-from pretouch.cli.registry import OWN
+from pretouch.cli.app import OWN, split_name
 from pretouch.errors import MissingExtraError
 from pretouch.extras import FIGURES, FRANKA, LIVE, MESHES, UNITS
 
@@ -21,7 +21,7 @@ URDF = """<robot name="a"><link name="base"><collision><geometry><mesh filename=
 ARM = ("run", "franka", "--ip", "127.0.0.1", "--no-skin", "--profile", "blind")
 # what is asked for, and the extra it needs; the others end for another reason, beyond all imports
 ASKED = [
-    (("live", "--path", "spiral"), LIVE),
+    (("live", "--profile", "spiral"), LIVE),
     (("replay", "cut.mcap"), LIVE),
     (("replay", "gone.mcap", "--no-page"), None),
     (ARM, FRANKA),
@@ -65,7 +65,7 @@ for hidden, asked in json.loads(sys.argv[1]):
 
 
 def test_every_command_is_asked_for():
-    assert {words[0] for words, _ in ASKED} == set(OWN)
+    assert {split_name(words, ())[0] for words, _ in ASKED} == set(OWN)
 
 
 @pytest.mark.slow

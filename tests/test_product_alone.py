@@ -32,7 +32,7 @@ def alone(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([sys.executable, "-c", _ALONE, *words], cwd=folder, capture_output=True, text=True)
 
 
-@pytest.mark.parametrize("name", ["live", "skin", "run", "replay", "detect", "robot import"])
+@pytest.mark.parametrize("name", ["live", "skin keys", "run", "replay", "detect", "robot import"])
 def test_help(tmp_path: Path, name: str):
     done = alone(tmp_path, *name.split(), "--help")
     assert (done.returncode, done.stderr) == (0, "")

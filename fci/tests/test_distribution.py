@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pretouch
 from pretouch import plugins
-from pretouch.cli.registry import FCI, GROUP, command_class
+from pretouch.cli.app import GROUP, command_class, commands_of
+from pretouch.extras import FCI
 
 PROJECT = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text())["project"]
 _ALONE = """
@@ -26,9 +27,9 @@ def test_it_is_of_the_products_version_and_needs_that():
 
 
 def test_its_commands_are_those_the_product_names():
-    assert tuple(PROJECT["entry-points"][GROUP]) == FCI
-    assert set(FCI) <= set(plugins.names(GROUP))
-    assert all(command_class(name) for name in FCI)
+    assert tuple(PROJECT["entry-points"][GROUP]) == commands_of(FCI)
+    assert set(commands_of(FCI)) <= set(plugins.names(GROUP))
+    assert all(command_class(name) for name in commands_of(FCI))
 
 
 def test_it_serves_without_the_lab_and_without_any_extra(tmp_path):

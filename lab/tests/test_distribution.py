@@ -8,7 +8,8 @@ import pytest
 
 import pretouch
 from pretouch import cli, plugins
-from pretouch.cli.registry import GROUP, LAB, command_class
+from pretouch.cli.app import GROUP, command_class, commands_of
+from pretouch.extras import LAB
 from pretouch_lab.learning import LEARN
 from pretouch_lab.sweep.play import SWEEP
 
@@ -21,9 +22,9 @@ def test_it_is_of_the_products_version_and_needs_that():
 
 
 def test_its_commands_are_those_the_product_names():
-    assert sorted(PROJECT["entry-points"][GROUP]) == sorted(LAB)
-    assert set(LAB) <= set(plugins.names(GROUP))
-    for name in LAB:
+    assert sorted(PROJECT["entry-points"][GROUP]) == sorted(commands_of(LAB))
+    assert set(commands_of(LAB)) <= set(plugins.names(GROUP))
+    for name in commands_of(LAB):
         assert command_class(name) is not None
 
 

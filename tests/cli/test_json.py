@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from pretouch import cli
-from pretouch.cli.registry import command_class, command_names
+from pretouch.cli.app import command_class, command_names
 from pretouch.cli.writing import numbers_to
 from pretouch.recording.writer import Recording
 from pretouch.session.push import GuidedPush
@@ -43,9 +43,9 @@ def test_every_command_has_help_which_says_what_a_dash_does_if_it_concludes_with
     assert stop.value.code == 0
     said = " ".join(capsys.readouterr().out.replace("│", " ").split())
     assert f"usage: pretouch {name} " in said
-    kept = {one.name: one.default for one in fields(COMMANDS[name]) if one.name == "json"}
-    assert kept == ({} if name in WITHOUT else {"json": ""})
-    assert ("standard output" in said.partition("--json STR ")[2].partition("--")[0]) == (name not in WITHOUT)
+    assert any(one.name == "json" for one in fields(COMMANDS[name])) == (name not in WITHOUT)
+    of_json = [part.partition("--")[0] for part in said.split("--json ")[1:]]
+    assert any("standard output" in part for part in of_json) == (name not in WITHOUT)
 
 
 @pytest.fixture(scope="module")

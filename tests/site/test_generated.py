@@ -7,7 +7,7 @@ from tools.site.links import Layout
 from tools.site.navigation import navigation
 
 import pretouch
-from pretouch.cli.registry import command_names
+from pretouch.cli.app import command_names
 from pretouch.composition import field_docs
 
 

@@ -12,7 +12,7 @@ from unittest.mock import patch
 import pretouch
 from pretouch.checks import Checked
 from pretouch.cli import main
-from pretouch.cli.registry import command_names
+from pretouch.cli.app import command_names
 from pretouch.composition import field_docs
 
 API = {

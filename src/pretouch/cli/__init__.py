@@ -3,14 +3,14 @@
 import os
 import sys
 from collections.abc import Sequence
+from dataclasses import make_dataclass
 from difflib import get_close_matches
 from typing import Annotated, Any, NoReturn, Union, cast
 
 import tyro
 from rich.console import Console
 
-from pretouch.cli.overview import SHELLS, overview
-from pretouch.cli.registry import Command, check_moved, command_class, command_names
+from pretouch.cli.app import COMMANDS, SHELLS, Command, command_class, command_names, overview, split_name
 from pretouch.errors import PluginError, PretouchError, UsageError
 from pretouch.signals import Terminated, ends_raise, exit_code
 
@@ -43,38 +43,44 @@ def main(args: list[str] | None = None) -> int:
 
 
 def _read(args: Sequence[str], errors: Console) -> Command:
-    """Return the command that words say. With a command's name first, no other command is loaded."""
-    check_moved(args)
-    name = args[0] if args else ""
-    wanted: Any = None if name.startswith("-") else command_class(name)
-    if wanted is not None:
-        words, prog = args[1:], name
-        if hasattr(wanted, "of_words"):  # its options depend on what the first words name
-            wanted, words, prog = wanted.of_words(words)
-        return cast(Command, tyro.cli(wanted, prog=f"pretouch {prog}", args=words, config=_CONFIG))
+    """Return the command that words name. With a command's name first, no other command is loaded."""
+    names = command_names()
+    name, words = split_name(args, names)
+    kind: Any = None if name.startswith("-") else command_class(name)
+    if kind is not None:
+        if hasattr(kind, "of_words"):  # its options depend on what the first words name
+            kind, words, name = kind.of_words(words)
+        return cast(Command, tyro.cli(kind, prog=f"pretouch {name}", args=words, config=_CONFIG))
     if name == "completion":
-        _write_completion(args[1:], errors)
-    if name in ("", "-h", "--help"):
-        print(overview({each: _summary(kind) for each, kind in _every(errors).items()}))
-        raise SystemExit(_USAGE if not name else 0)
-    near = get_close_matches(name, command_names(), 1)
+        _write_completion(words, errors)
+    below = [each for each in names if each.startswith(f"{name} ")]
+    if name in ("", "-h", "--help") or (below and (not words or words[0] in ("-h", "--help"))):
+        shown = below or names
+        grouped = {each for group in COMMANDS.values() for each in group}
+        others = {n: _first_line(kind) for n, kind in _loaded([n for n in shown if n not in grouped], errors).items()}
+        print(overview(shown, others))
+        raise SystemExit(0 if args and args[-1].startswith("-") else _USAGE)
+    near = get_close_matches(name, names, 1)
+    advice = f"perhaps {near[0]}" if near else "pretouch --help lists them"
     raise PluginError(
-        f"{name} is no command of pretouch: {f'perhaps {near[0]}' if near else 'pretouch --help lists them'}."
+        f"{' '.join(args[:2])} is no command of pretouch: choose from {', '.join(below)}."
+        if below
+        else f"{name} is no command of pretouch: {advice}."
     )
 
 
-def _every(errors: Console) -> dict[str, Any]:
-    """Return the class of each command that can be loaded; what keeps another from it is printed."""
-    known: dict[str, Any] = {}
-    for each in command_names():
+def _loaded(names: Sequence[str], errors: Console) -> dict[str, Any]:
+    """Return the class of each of some commands that can be loaded; what keeps another from it is printed."""
+    kinds: dict[str, Any] = {}
+    for each in names:
         try:
-            known[each] = command_class(each)
+            kinds[each] = command_class(each)
         except PluginError as error:
             errors.print(str(error), markup=False)
-    return known
+    return kinds
 
 
-def _summary(command: Any) -> str:
+def _first_line(command: Any) -> str:
     return (command.__doc__ or "").strip().partition("\n")[0]
 
 
@@ -82,10 +88,17 @@ def _write_completion(shells: Sequence[str], errors: Console) -> NoReturn:
     """Print what a shell needs to complete the words of all commands, and end."""
     if len(shells) != 1 or shells[0] not in SHELLS:
         raise UsageError(f"pretouch completion is for one shell: choose from {', '.join(SHELLS)}.")
-    kinds = [
-        Annotated[kind.of_all() if hasattr(kind, "of_all") else kind, tyro.conf.subcommand(name)]
-        for name, kind in _every(errors).items()
-    ]
-    every: Any = Union[tuple(kinds)]  # noqa: UP007  # made when it is asked for
-    tyro.cli(every, prog="pretouch", args=["--tyro-print-completion", *shells], config=_CONFIG)
+    tree: dict[str, dict[str, Any]] = {}
+    for name, kind in _loaded(command_names(), errors).items():
+        first, _, second = name.partition(" ")
+        tree.setdefault(first, {})[second] = kind.of_all() if hasattr(kind, "of_all") else kind
+    kinds = {
+        first: kinds[""] if "" in kinds else make_dataclass(first, [("what", _one_of(kinds))])
+        for first, kinds in tree.items()
+    }
+    tyro.cli(_one_of(kinds), prog="pretouch", args=["--tyro-print-completion", *shells], config=_CONFIG)
     raise SystemExit(0)
+
+
+def _one_of(kinds: dict[str, Any]) -> Any:
+    return Union[tuple(Annotated[kind, tyro.conf.subcommand(name)] for name, kind in kinds.items())]  # noqa: UP007  # made when it is asked for

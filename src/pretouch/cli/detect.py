@@ -1,17 +1,18 @@
 """What `pretouch detect` does: the detector of some profiles on a recording of any arm, as tables, figure and file."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+import tyro
 
 from pretouch.cli.detect_account import ENDINGS, Account, give
 from pretouch.cli.detect_torques import torque_account
 from pretouch.cli.detect_words import force_guidance, sentences
-from pretouch.cli.words import numbers
+from pretouch.cli.options import JsonFile, Numbers, OptionalFile, Words
 from pretouch.cli.writing import check_writable, numbers_to
 from pretouch.contact.moving_thresholds import thresholds_of
 from pretouch.errors import ParameterError, RecordingError
@@ -20,6 +21,7 @@ from pretouch.imported_data.detect_force import ForceResult, detect_force
 from pretouch.imported_data.forces import ForceRecording, read_force
 from pretouch.imported_data.log import TORQUES, Choice, LogFile
 from pretouch.imported_data.reading import open_log
+from pretouch.imported_data.renaming import mapping_of
 from pretouch.imported_data.torques import torque_recording
 from pretouch.profiles import Profile, at_rate
 from pretouch.profiles import profile as find_profile
@@ -30,35 +32,72 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def detect(
-    place: Path,
-    choice: Choice,
-    profiles: Sequence[str] | None = None,
-    rate: float = 0.0,
-    out: Path | None = None,
-    json_file: Path | None = None,
-) -> None:
-    """Run detectors over a recording, show what they found, and write a figure and the numbers where asked.
+AUTO = ("auto",)
 
-    Args:
-        place: bag, MCAP or CSV file.
-        choice: what the recording does not say of itself.
-        profiles: names of the profiles to compare; None: `pretouch` and `paper` where there are joint torques, else
-            `paper`.
-        rate: of the detector [Hz]; 0 for the profile's own.
-        out: figure to write, or page.
-        json_file: file for the numbers.
-    """
-    given = None if profiles is None else [_profile(name, rate) for name in profiles]
-    if given is not None and not given:
-        raise ParameterError("No profile is given: name one or more, separated by commas.")
-    if out and out.suffix not in ENDINGS:
-        raise RecordingError(f"The figure {out} has an unknown format: use one of the endings {', '.join(ENDINGS)}.")
-    if out:
-        FIGURES.need("A figure")
-        check_writable("figure", out)
-    with numbers_to(json_file) as write:
-        give(_account(open_log(place, choice), choice, given, rate), out, write)
+
+@dataclass(frozen=True)
+class Detect:
+    """Detect contacts in a recording of your own arm: a ROS bag, an MCAP file, a CSV or a Parquet file."""
+
+    file: tyro.conf.Positional[Path]
+    """ROS 2 bag (folder, .mcap, .db3), ROS 1 .bag, or .csv or .parquet with columns time_s, q1_rad ..., dq1_rad_s ...
+    and tau_ext1_Nm ... (or tau1_Nm ..., current1_A ...), or force_x_N, force_y_N, force_z_N; or a log of libfranka."""
+    profiles: Words = AUTO
+    """Profiles to compare, separated by commas. PROFILE:GROUP.FIELD=VALUE is one with another parameter. auto:
+    pretouch,paper where there are joint torques, else paper."""
+    sign: Literal["auto", "on-robot", "by-robot"] = "auto"
+    """Whether force and external torques are on the robot (by its environment) or by the robot, as Franka's
+    O_F_ext_hat_K; auto: on the robot, but for torques by the name tau_ext_hat_filtered."""
+    frame: Literal["base", "ee"] = "base"
+    """Frame of the force; ee, the end-effector's, needs joint positions of a Panda or FR3."""
+    zeros: Literal["auto", "missing", "kept"] = "auto"
+    """Whether six zeros mean no estimate; auto: yes with --sign by-robot."""
+    wrench: str = ""
+    """Topic of the force, if there are several."""
+    joints: str = ""
+    """Topic of the joint positions, if there are several."""
+    torques: str = ""
+    """Topic of the joint torques: JointState with efforts, FrankaState or FrankaRobotState; by default what is
+    found."""
+    arm: str = "auto"
+    """The arm: panda, fr3, or the folder of `pretouch robot import`; auto: by the names of its joints, otherwise a
+    Panda."""
+    columns: str = ""
+    """Columns of other names, THEIRS=OURS separated by commas, or FILE.toml: tau_J_0=tau1_Nm; tau_J_*=tau*_Nm is all
+    joints."""
+    gains: Numbers = ()
+    """Torque by motor current of each joint, gear included [Nm/A], separated by commas: for current1_A."""
+    payload: float = 0.0
+    """Load at the end-effector that the arm's model does not have [kg]: for measured torques."""
+    rate: float = 0.0
+    """Rate of the detector [Hz]; by default the profile's own, 100."""
+    out: OptionalFile = None
+    """Figure to write, ending in .png, .pdf or .svg, or page, ending in .html."""
+    json: JsonFile = None
+
+    def run(self) -> None:
+        """Run the detectors, show what they found, and write a figure or page and the numbers where asked."""
+        if not all(np.isfinite(gain) and gain > 0.0 for gain in self.gains):
+            raise ParameterError(
+                f"--gains is {','.join(map('{:g}'.format, self.gains))}: give torques by current [Nm/A] above 0."
+            )
+        choice = Choice(
+            self.wrench, self.joints, self.sign, self.frame, self.zeros, self.arm, self.torques,
+            mapping_of(self.columns), self.gains, self.payload,
+        )  # fmt: skip
+        profiles = None if self.profiles == AUTO else [_profile(name, self.rate) for name in self.profiles]
+        if profiles is not None and not profiles:
+            raise ParameterError("No profile is given: name one or more, separated by commas.")
+        out = self.out
+        if out and out.suffix not in ENDINGS:
+            raise RecordingError(
+                f"The figure {out} has an unknown format: use one of the endings {', '.join(ENDINGS)}."
+            )
+        if out:
+            FIGURES.need("A figure")
+            check_writable("figure", out)
+        with numbers_to(self.json) as write:
+            give(_account(open_log(self.file, choice), choice, profiles, self.rate), out, write)
 
 
 def _account(file: LogFile, choice: Choice, given: Sequence[Profile] | None, rate: float) -> Account:
@@ -74,14 +113,6 @@ def _account(file: LogFile, choice: Choice, given: Sequence[Profile] | None, rat
             return torque_account(recording, given or [_profile(name, rate) for name in ("pretouch", "paper")])
     account = _force_account(read_force(file, choice), given or [_profile("paper", rate)])
     return replace(account, notes=[*unused, *account.notes])
-
-
-def gains_of(text: str) -> tuple[float, ...]:
-    """Read the gains of motors [Nm/A]; ParameterError for what is not above zero."""
-    gains = numbers("--gains", text)
-    if not all(np.isfinite(gain) and gain > 0.0 for gain in gains):
-        raise ParameterError(f"--gains is {text!r}: give torques by current [Nm/A], one a joint, separated by commas.")
-    return gains
 
 
 def _by_torques(file: LogFile, choice: Choice, given: Sequence[Profile] | None) -> bool:

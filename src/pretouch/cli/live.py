@@ -2,90 +2,112 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import Literal
 
-from pretouch.errors import HardwareError, ParameterError
+from pretouch.cli.options import OptionalFile
+from pretouch.cli.warm_up import prepare
+from pretouch.errors import HardwareError
 from pretouch.extras import LIVE
-from pretouch.page.room import LiveSettings, PathName, Room, live_path, settings_for
+from pretouch.page.real_units import RealUnits
+from pretouch.page.room import LiveSettings, Room, live_path, settings_for
 from pretouch.page.server import ServeOptions, browser_here, check_port
+from pretouch.page.simulation import LiveSimulation
 from pretouch.profiles import profile as find_profile
+from pretouch.robot.description import is_shipped, robot_named
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import LIVE_SKIN, Skin, skin_for
 from pretouch.signals import ended
-from pretouch.units.udp import EVERYWHERE, HOST
-
-if TYPE_CHECKING:
-    from pretouch.cli.commands import Live
-    from pretouch.page.real_units import RealUnits
-    from pretouch.robot.model import RobotModel
-    from pretouch.sensing.skin import Skin
-
-
-def live(command: "Live") -> None:
-    """Serve the page until interrupted."""
-    options = ServeOptions(command.host, command.port, browser_here())
-    LIVE.need("The page")
-    check_port(options)  # before the seconds that the simulation takes to begin
-    if command.path not in ("circle", "line"):
-        raise ParameterError(f"The path is {command.path!r}: choose circle or line.")
-    path, profile = cast(PathName, command.path), find_profile(command.profile)
-    settings = LiveSettings(profile=profile, path=path, seed=command.seed)
-
-    from pretouch.cli.warm_up import prepare
-    from pretouch.page.live import serve_live
-    from pretouch.page.simulation import LiveSimulation
-    from pretouch.robot.description import robot_named
-    from pretouch.robot.model import RobotModel
-    from pretouch.sim.placement import assumptions
-
-    model = RobotModel(robot_named(command.arm))
-    settings = settings_for(model, settings)
-    believed = skin = _skin(command, model)
-    if command.world:
-        from pretouch.sim.random_skin import Misplacement, misplaced
-        from pretouch.sim.randomisation import drawn, world_set
-
-        world = drawn(world_set(command.world), command.seed, settings.plant)
-        settings = replace(settings, plant=world.plant, ranging=world.ranging)
-        if not command.keys:
-            believed, _ = misplaced(skin, model, Misplacement(world.position_mm, world.orientation_deg), command.seed)
-    prepare(profile, lambda: Room(settings, live_path(settings), model, skin).tick())
-    with _units(command, skin) as real:
-        simulation = LiveSimulation(settings, model, believed, real, skin)
-        for sentence in assumptions(model, settings.placement):
-            print(sentence, flush=True)
-            simulation.notice = f"{simulation.notice} {sentence}".strip()
-        if command.opening and not real and not command.record:
-            simulation.play_opening()
-        if command.record:
-            simulation.start_recording(Path(command.record))
-        serve_live(simulation, options, ended, partial(print, flush=True))
+from pretouch.sim.placement import assumptions
+from pretouch.sim.random_skin import Misplacement, misplaced
+from pretouch.sim.randomisation import drawn, world_set
+from pretouch.units.keys import load_keys
+from pretouch.units.network_skin import NetworkSkin
+from pretouch.units.udp import EVERYWHERE, HOST, PORT
 
 
-def _skin(command: "Live", model: "RobotModel") -> "Skin":
+@dataclass(frozen=True)
+class Live:
+    """Watch the simulated arm in a browser and touch it: a page with the arm, your hand, plots and all parameters."""
+
+    profile: str = "pretouch"
+    """Profile to start with, or PROFILE:GROUP.FIELD=VALUE."""
+    arm: str = "panda"
+    """panda, fr3, or the folder of an imported arm, to which the room is scaled."""
+    path: Literal["circle", "line"] = "circle"
+    """The paper's path that the arm follows."""
+    seed: int = 0
+    """Seed of the simulated arm: each has different errors and noise."""
+    world: OptionalFile = None
+    """Set of simulated arms, sensors and delays: nominal, realistic, stress, or a TOML file, as `pretouch identify`
+    writes one, of which the seed draws its own; by default the usual ones."""
+    record: OptionalFile = None
+    """Recording to write from the start; the page can also start and stop recordings."""
+    host: str = "127.0.0.1"
+    """Address to serve the page at. Beyond this machine, whoever has the printed address can move the simulated arm."""
+    port: int = 8080
+    """Port to serve the page at."""
+    keys: OptionalFile = None
+    """File of the keys of real sensor units, which the simulated arm then carries in place of simulated ones."""
+    skin: OptionalFile = None
+    """Skin file; by default 34 units all over hand, wrist, forearm and elbow, and with --keys the seven of other
+    commands; of an imported arm the skin in its folder."""
+    opening: bool = True
+    """Whether a hand comes by itself at first, until somebody drags or clicks; never with --keys or --record."""
+    units_host: str = HOST
+    """Address to receive real units at. They need 0.0.0.0, which is every address of this machine."""
+    units_port: int = PORT
+    """UDP port to receive real units at."""
+
+    def run(self) -> None:
+        """Serve the page until interrupted."""
+        options = ServeOptions(self.host, self.port, browser_here())
+        LIVE.need("The page")
+        from pretouch.page.live import serve_live  # needs the extra
+
+        check_port(options)  # before the seconds that the simulation takes to begin
+        profile = find_profile(self.profile)
+        settings = LiveSettings(profile=profile, path=self.path, seed=self.seed)
+
+        model = RobotModel(robot_named(self.arm))
+        settings = settings_for(model, settings)
+        believed = skin = _skin(self, model)
+        if self.world:
+            world = drawn(world_set(str(self.world)), self.seed, settings.plant)
+            settings = replace(settings, plant=world.plant, ranging=world.ranging)
+            if not self.keys:
+                believed, _ = misplaced(skin, model, Misplacement(world.position_mm, world.orientation_deg), self.seed)
+        prepare(profile, lambda: Room(settings, live_path(settings), model, skin).tick())
+        with _units(self, skin) as real:
+            simulation = LiveSimulation(settings, model, believed, real, skin)
+            for sentence in assumptions(model, settings.placement):
+                print(sentence, flush=True)
+                simulation.notice = f"{simulation.notice} {sentence}".strip()
+            if self.opening and not real and not self.record:
+                simulation.play_opening()
+            if self.record:
+                simulation.start_recording(self.record)
+            serve_live(simulation, options, ended, partial(print, flush=True))
+
+
+def _skin(command: Live, model: RobotModel) -> Skin:
     """Return the skin that was asked for, or else the live page's for a Panda or FR3, or the one the arm has."""
-    from pretouch.robot.description import is_shipped
-    from pretouch.sensing.skin import LIVE_SKIN, skin_for
-
     arm = model.description
     of_page = LIVE_SKIN.with_name(f"{arm.name}_live.toml") if is_shipped(arm) and not command.keys else ""
     return skin_for(model, command.skin or of_page)
 
 
 @contextmanager
-def _units(command: "Live", skin: "Skin") -> Iterator["RealUnits | None"]:
+def _units(command: Live, skin: Skin) -> Iterator[RealUnits | None]:
     """Hear the real units of a skin, if there is a file of their keys."""
     if not command.keys:
         yield None
         return
     if not command.units_host:
         raise HardwareError(f"--units-host is empty: give {HOST}, or {EVERYWHERE} for every address of this machine.")
-    from pretouch.page.real_units import RealUnits
-    from pretouch.units.keys import load_keys
-    from pretouch.units.network_skin import NetworkSkin
 
-    with NetworkSkin(skin.network, load_keys(Path(command.keys)), command.units_host, command.units_port) as source:
+    with NetworkSkin(skin.network, load_keys(command.keys), command.units_host, command.units_port) as source:
         heard = "anywhere" if command.units_host == EVERYWHERE else f"{command.units_host} only"
         print(f"Receiving units from {heard}, at UDP port {source.address[1]}.", flush=True)
         yield RealUnits(source)

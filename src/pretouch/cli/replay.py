@@ -1,18 +1,24 @@
 """What `pretouch replay` does: a recording told, recomputed, compared, shown."""
 
+import sys
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import tyro
 from rich.console import Console
 from rich.progress import Progress
 
 from pretouch.cli.detect import axes_shown
+from pretouch.cli.options import JsonFile
 from pretouch.cli.tables import PlainTable
 from pretouch.cli.warm_up import prepare
-from pretouch.cli.writing import numbers_to
+from pretouch.cli.writing import STANDARD_OUTPUT, numbers_to
+from pretouch.page.server import ServeOptions, begun, browser_here
 from pretouch.profiles import profile as find_profile
 from pretouch.recording.compare import Comparison, Decisions, Found, compare
 from pretouch.recording.reader import Recorded, open_recording
@@ -25,50 +31,68 @@ if TYPE_CHECKING:
     from viser import ViserServer
 
 
-def replay(
-    place: Path,
-    verify: bool = False,
-    profile: str = "",
-    page: "Callable[[], ViserServer] | None" = None,
-    json: str = "",
-) -> int:
-    """Tell of a recording, and check, compare or show it. Return the exit code.
+@dataclass(frozen=True)
+class Replay:
+    """View a recording on the page, recompute it, or compare it with what another profile would have detected."""
 
-    Args:
-        place: recording, finished or cut off.
-        verify: whether to recompute each step; then there is no page, and the code is 1 if anything differs.
-        profile: one whose decisions on the same data are shown beside the recorded ones, or ''.
-        page: gives the server of its page (`viewer.server.begun`); None for none.
-        json: where the numbers go, see `numbers_to`.
-    """
-    console = Console(highlight=False, soft_wrap=True)
-    other = find_profile(profile) if profile else None
-    with numbers_to(json) as write:
-        recorded, found = open_recording(place), None
-        if recorded.said:
-            console.print(recorded.said, markup=False)
-        if page and not verify and not json:
-            console.print(told(recorded), markup=False)
-        else:
-            with _Progress("Reading", len(recorded)) as advance:
-                found = happened(recorded, advance)
-            console.print(f"{told(recorded)[:-1]}: {found.said}.", markup=False)
-        verdict = comparison = None
-        if verify:
-            prepare(recorded.runs[0].profile)
-            with _Progress("Recomputing", len(recorded)) as advance:
-                verdict = recompute(recorded, advance)
-            console.print(verdict.said, markup=False)
-        elif other:
-            with _Progress("Comparing", len(recorded)) as advance:
-                comparison = compare(recorded, other, advance)
-            _show(console, comparison)
-        write(_numbers(recorded, found, verdict, comparison))
-        if page and not verify:
-            from pretouch.page.replay import show_replay
+    file: tyro.conf.Positional[Path]
+    """Recording; that of a killed process works too."""
+    verify: bool = False
+    """Recompute every step, and report the first that differs; the exit code is then 1. Opens no page."""
+    profile: str = ""
+    """Profile whose decisions on the same force and range data are shown beside the recorded ones."""
+    page: bool = True
+    """Whether to open the page; --no-page only prints."""
+    json: JsonFile = None
+    host: str = "127.0.0.1"
+    """Address to serve the page at. Beyond this machine, whoever has the printed address sees the recording."""
+    port: int = 8080
+    """Port to serve the page at."""
 
-            show_replay(recorded, page(), ended)
-    return int(verdict is not None and not verdict.agrees)
+    def run(self) -> int:
+        """Tell of the recording, and check, compare or show it; where the page is, is said before anything is read.
+
+        The exit code is 1 if a step differs when it is recomputed.
+        """
+        with ExitStack() as stack:
+            page = None
+            if self.page and not self.verify and self.file.is_file():
+                options = ServeOptions(self.host, self.port, browser_here())
+                say = partial(print, file=sys.stderr if str(self.json) == STANDARD_OUTPUT else None, flush=True)
+                page = stack.enter_context(
+                    begun(options, self.file.name, "The recording", "see the recording, and play it", say)
+                )
+            return self._replay(page)
+
+    def _replay(self, page: "Callable[[], ViserServer] | None") -> int:
+        console = Console(highlight=False, soft_wrap=True)
+        other = find_profile(self.profile) if self.profile else None
+        with numbers_to(self.json) as write:
+            recorded, found = open_recording(self.file), None
+            if recorded.said:
+                console.print(recorded.said, markup=False)
+            if page and not self.verify and not self.json:
+                console.print(told(recorded), markup=False)
+            else:
+                with _Progress("Reading", len(recorded)) as advance:
+                    found = happened(recorded, advance)
+                console.print(f"{told(recorded)[:-1]}: {found.said}.", markup=False)
+            verdict = comparison = None
+            if self.verify:
+                prepare(recorded.runs[0].profile)
+                with _Progress("Recomputing", len(recorded)) as advance:
+                    verdict = recompute(recorded, advance)
+                console.print(verdict.said, markup=False)
+            elif other:
+                with _Progress("Comparing", len(recorded)) as advance:
+                    comparison = compare(recorded, other, advance)
+                _show(console, comparison)
+            write(_numbers(recorded, found, verdict, comparison))
+            if page and not self.verify:
+                from pretouch.page.replay import show_replay  # needs the extra
+
+                show_replay(recorded, page(), ended)
+        return int(verdict is not None and not verdict.agrees)
 
 
 @dataclass(frozen=True)

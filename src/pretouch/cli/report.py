@@ -2,14 +2,33 @@
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
+
+import tyro
 
 from pretouch.cli.writing import check_writable, unwritable_said
 from pretouch.errors import RecordingError
 from pretouch.extras import FIGURES
 from pretouch.recording.reader import open_recording
 from pretouch.reporting.measures import Measures, measure
+
+
+@dataclass(frozen=True)
+class Report:
+    """Write a report of recordings as one page that needs no network: contacts, forces, distances, margins, health."""
+
+    files: tyro.conf.Positional[tuple[Path, ...]]
+    """Recordings."""
+    out: Path = Path("report.html")
+    """File to write."""
+    replace: bool = False
+    """Overwrite a file that is there though it is no report of these recordings."""
+
+    def run(self) -> None:
+        """Write the page."""
+        print(f"Report: {write_page(self.files, self.out, self.replace)}")
 
 
 def write_page(files: Sequence[Path], out: Path, replace: bool = False) -> Path:

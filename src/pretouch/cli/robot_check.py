@@ -1,10 +1,13 @@
 """Checking an imported arm on the command line."""
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import tyro
 from rich.console import Console
 
+from pretouch.cli.options import JsonFile, OptionalFile
 from pretouch.cli.tables import show
 from pretouch.cli.writing import numbers_to
 from pretouch.errors import RobotModelError
@@ -14,20 +17,26 @@ from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import OWN_SKIN, load_skin
 from pretouch.text_table import TextTable, tabulated
 
-if TYPE_CHECKING:
-    from pretouch.cli.robot_commands import Check
+
+@dataclass(frozen=True)
+class Check:
+    """Check an arm's folder after a change by hand, and report what is wrong with it."""
+
+    folder: tyro.conf.Positional[Path]
+    """Folder of the arm, or its robot.toml."""
+    skin: OptionalFile = None
+    """Skin file; by default the folder's own."""
+    json: JsonFile = None
+
+    def run(self) -> None:
+        """Load an arm and its skin, and print what is known of them; what is wrong is an error of this package."""
+        with numbers_to(self.json) as write:
+            write(_checked(self))
 
 
-def check_arm(command: "Check") -> None:
-    """Load an arm and its skin, and print what is known of them; what is wrong is an error of this package."""
-    with numbers_to(command.json) as write:
-        write(_checked(command))
-
-
-def _checked(command: "Check") -> dict[str, Any]:
-    folder = Path(command.folder)
-    description = load_description(folder)
-    file = folder / FILE if folder.is_dir() else folder
+def _checked(command: Check) -> dict[str, Any]:
+    description = load_description(command.folder)
+    file = command.folder / FILE if command.folder.is_dir() else command.folder
     try:
         model = RobotModel(description)
     except RobotModelError as error:
@@ -46,7 +55,7 @@ def _checked(command: "Check") -> dict[str, Any]:
     show(console, [joint_table(model, ready, note)])
     if ready.conflict:
         raise RobotModelError(f"{ready.conflict} ({file}: q_ready)")
-    console.print(f"No problem found: {folder}.", markup=False, soft_wrap=True)
+    console.print(f"No problem found: {command.folder}.", markup=False, soft_wrap=True)
     return arm_numbers(model, ready) | {"units": skin.ids if skin else None}
 
 

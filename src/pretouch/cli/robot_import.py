@@ -1,14 +1,16 @@
 """Importing an arm on the command line: the report of what was read, fitted and assumed."""
 
 import re
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import tyro
 from rich.console import Console
 
+from pretouch.cli.options import JsonFile, Numbers, OptionalFile, Paths
 from pretouch.cli.robot_check import arm_numbers, joint_table, ready_said
 from pretouch.cli.tables import show
-from pretouch.cli.words import numbers, words
 from pretouch.cli.writing import numbers_to
 from pretouch.importing.described import described, is_description
 from pretouch.importing.folder import check_free, write_folder
@@ -17,37 +19,67 @@ from pretouch.importing.robot_import import Imported, ImportOptions, import_robo
 from pretouch.sensing.skin import OWN_SKIN
 from pretouch.text_table import TextTable, tabulated
 
-if TYPE_CHECKING:
-    from pretouch.cli.robot_commands import Import
-
 _NEGLIGIBLE = 0.001
 """What sticks out less is not spoken of [m]."""
 
 
-def import_arm(command: "Import") -> None:
-    """Import an arm, print what came of it, and write its folder."""
-    file, packages = Path(command.file), tuple(Path(folder) for folder in words(command.package_path))
-    if is_description(command.file):
-        file, package = described(command.file)
-        packages = (*packages, package)
-    options = ImportOptions(
-        ee=command.ee,
-        name=command.name,
-        packages=packages,
-        qd_max=numbers("--qd-max", command.qd_max),
-        qdd_max=numbers("--qdd-max", command.qdd_max),
-        tau_max=numbers("--tau-max", command.tau_max),
-        ready=numbers("--ready", command.ready),
-        capsules=command.capsules,
-        cover=command.cover,
-    )
-    folder = Path(command.out or _file_name(command.name or read_robot(file, options.packages).name))
-    check_free(folder)
-    with numbers_to(command.json) as write:
-        write(_imported(command, file, options, folder))
+@dataclass(frozen=True)
+class Import:
+    """Read your own arm from a URDF or MJCF file: fit capsules to its links, and write a description of it.
+
+    Look at what is printed: all that the file does not say is assumed, with a sentence for each.
+    """
+
+    file: tyro.conf.Positional[str]
+    """URDF file (not a xacro template) or MJCF file, or a name of the package robot_descriptions, if it is installed,
+    such as ur5e_mj_description."""
+    out: OptionalFile = None
+    """Folder to write robot.toml and arm.xml to; by default the arm's name."""
+    ee: str = ""
+    """Link whose origin is the end-effector; by default the most likely one."""
+    name: str = ""
+    """Name of the arm; by default the file's."""
+    package_path: Paths = ()
+    """Folders that hold the ROS packages of package:// paths, separated by commas; those above the file are
+    searched in any case."""
+    qd_max: Numbers = ()
+    """Joint velocity limits [rad/s], one for all or one per joint, separated by commas; by default the file's."""
+    qdd_max: Numbers = ()
+    """Joint acceleration limits [rad/s^2]; no file has them."""
+    tau_max: Numbers = ()
+    """Joint torque limits [Nm]; by default the file's."""
+    ready: Numbers = ()
+    """Usual start posture [rad], one position per joint, separated by commas; by default one is searched for."""
+    capsules: int = 3
+    """Largest number of capsules per link."""
+    cover: bool = False
+    """Enlarge the capsules until no surface sticks out of them: the arm then keeps more distance than necessary."""
+    json: JsonFile = None
+
+    def run(self) -> None:
+        """Import an arm, print what came of it, and write its folder."""
+        file, packages = Path(self.file), self.package_path
+        if is_description(self.file):
+            file, package = described(self.file)
+            packages = (*packages, package)
+        options = ImportOptions(
+            ee=self.ee,
+            name=self.name,
+            packages=packages,
+            qd_max=self.qd_max,
+            qdd_max=self.qdd_max,
+            tau_max=self.tau_max,
+            ready=self.ready,
+            capsules=self.capsules,
+            cover=self.cover,
+        )
+        folder = self.out or Path(_file_name(self.name or read_robot(file, options.packages).name))
+        check_free(folder)
+        with numbers_to(self.json) as write:
+            write(_imported(file, options, folder))
 
 
-def _imported(command: "Import", file: Path, options: ImportOptions, folder: Path) -> dict[str, Any]:
+def _imported(file: Path, options: ImportOptions, folder: Path) -> dict[str, Any]:
     """Import an arm, write its folder, and print what came of it; return the numbers."""
     found = import_robot(file, options)
     write_folder(found, folder)

@@ -1,36 +1,48 @@
 """What `pretouch skin keys` does: the units of a file of keys, listed, added to, or without those that were lost."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 from typing import Any
 
-from pretouch.cli.words import words
+from pretouch.cli.options import JsonFile, Words
+from pretouch.cli.writing import numbers_to
 from pretouch.errors import HardwareError
 from pretouch.units.keys import Keys, UnitKey, load_keys, new_key, save_keys
 from pretouch.units.provision import fingerprint
 
 
-def list_keys(place: Path, new: str = "", revoke: str = "") -> dict[str, Any]:
+@dataclass(frozen=True)
+class ListKeys:
+    """List the units of a file of keys, add some with random keys to try `simulate` and `monitor`, or revoke keys."""
+
+    keys: Path
+    """File of the units' keys; created if it is missing, readable only by you."""
+    new: Words = ()
+    """Names of units to add, separated by commas."""
+    revoke: Words = ()
+    """Names of units whose keys no longer count, separated by commas: lost or stolen. The others keep theirs."""
+    json: JsonFile = None
+
+    def run(self) -> None:
+        """Print name, number and fingerprint of each unit, after revoking keys and adding names."""
+        with numbers_to(self.json) as write:
+            write(list_keys(self.keys, self.new, self.revoke))
+
+
+def list_keys(place: Path, new: Sequence[str] = (), revoke: Sequence[str] = ()) -> dict[str, Any]:
     """Print name, number and fingerprint of each unit in a file, after revoking keys and adding names; return them."""
-    names, lost = words(new), words(revoke)
-    keys = keys_or_none(place) if names and not lost else load_keys(place)
-    if names or lost:
-        keys = with_new(without(keys, lost), names)
+    keys = keys_or_none(place) if new and not revoke else load_keys(place)
+    if new or revoke:
+        keys = with_new(without(keys, revoke), new)
         save_keys(keys, place)
-    if lost:
-        print(f"Revoked: {', '.join(lost)}. A receiver that runs goes on with the keys it has read: start it anew.")
+    if revoke:
+        print(f"Revoked: {', '.join(revoke)}. A receiver that runs goes on with the keys it has read: start it anew.")
     listed = [{"unit": u.id, "number": u.number, "fingerprint": fingerprint(u.key)} for u in keys.values()]
     for unit in listed:
         print("{unit}: number {number}, key {fingerprint}...".format(**unit))
     return {"units": listed}
-
-
-def keys_file(text: str) -> Path:
-    """Return the file of keys that is named; none is a HardwareError."""
-    if not text:
-        raise HardwareError("The file of keys is missing: name one with --keys.")
-    return Path(text)
 
 
 def keys_or_none(place: Path) -> Keys:

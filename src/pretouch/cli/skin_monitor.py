@@ -4,20 +4,19 @@ import math
 import socket
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, nullcontext, suppress
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from functools import cache
 from ipaddress import ip_address
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from rich.console import Console
 from rich.live import Live
 
-from pretouch.cli.skin_keys import keys_file
+from pretouch.cli.options import JsonFile, Numbers, OptionalFile, Words
 from pretouch.cli.skin_record import record
 from pretouch.cli.skin_table import line, thrown_away, view
-from pretouch.cli.words import numbers, words
 from pretouch.cli.writing import numbers_to
 from pretouch.errors import HardwareError
 from pretouch.perception.scene_filter import no_fixtures
@@ -33,32 +32,56 @@ from pretouch.units.keys import load_keys
 from pretouch.units.model_check import ModelCheck, ModelCheckParams
 from pretouch.units.monitor import MonitorUpdate, Posture, watch
 from pretouch.units.receiver import SkinReceiver
-from pretouch.units.udp import EVERYWHERE, HOST
-
-if TYPE_CHECKING:
-    from pretouch.cli.skin_commands import Monitor
+from pretouch.units.udp import EVERYWHERE, HOST, PORT
 
 _ONCE_S = 5.0
 _SECOND_S = 1.0
 
 
-def monitor(command: "Monitor") -> int:
-    """Watch units; return 1 if one is faulty after a given time or recording failed, or else 0."""
-    duration = _duration(command)
-    with numbers_to(command.json) as write:
-        return _monitored(command, duration, write)
+@dataclass(frozen=True)
+class Monitor:
+    """Watch sensor units: rates, losses, latency, batteries, and what is wrong, with what to do about it."""
+
+    keys: Path
+    """File of the units' keys."""
+    skin: OptionalFile = None
+    """Skin file whose units to watch; by default all in the file of keys."""
+    units: Words = ()
+    """Names of the units to watch, separated by commas."""
+    arm: str = "panda"
+    """The arm of the skin file: panda, fr3, or the folder of an imported arm."""
+    posture: Numbers = ()
+    """Joint positions [rad], separated by commas, of the arm that stands still: with --skin, units whose readings
+    contradict the model are named. Nothing but the arm may be near."""
+    host: str = HOST
+    """Address to listen at. Real units need 0.0.0.0, which is every address of this machine."""
+    port: int = PORT
+    """UDP port to listen at."""
+    record: OptionalFile = None
+    """Recording to write: all samples as received, ranges, IMU and diagnostics."""
+    duration: float = 0.0
+    """Time to watch [s]; 0: until Ctrl-C. The exit code is then 1 if a unit is faulty at the end."""
+    once: bool = False
+    """Watch for 5 s and print one table."""
+    json: JsonFile = None
+
+    def run(self) -> int:
+        """Watch units; return 1 if one is faulty after a given time or recording failed, or else 0."""
+        duration = _duration(self)
+        with numbers_to(self.json) as write:
+            return _monitored(self, duration, write)
 
 
-def _monitored(command: "Monitor", duration: float, write: Callable[[Any], None]) -> int:
+def _monitored(command: Monitor, duration: float, write: Callable[[Any], None]) -> int:
     if not command.host:
         raise HardwareError(
             f"The address to listen on is empty: give {HOST}, or {EVERYWHERE} for every address of this machine."
         )
-    keys = load_keys(keys_file(command.keys))
+    keys = load_keys(command.keys)
     units, posture = _watched(command, tuple(keys))
     with ExitStack() as stack:
         receiver = stack.enter_context(SkinReceiver(units, keys, command.host, command.port))
-        recording = stack.enter_context(SkinRecording(Path(command.record))) if command.record else None
+        recording = stack.enter_context(SkinRecording(command.record)) if command.record else None
         updates, last = watch(receiver, HealthParams(), duration, posture), None
         try:
             for update in _shown(updates, receiver, recording, command.once):
@@ -86,25 +109,25 @@ def _conclude(
         console.print(sentence, markup=False)
 
 
-def _duration(command: "Monitor") -> float:
+def _duration(command: Monitor) -> float:
     if not (math.isfinite(command.duration) and command.duration >= 0):
         raise HardwareError(f"--duration is {command.duration:g} s: give 0 or more.")
     return command.duration or (_ONCE_S if command.once else math.inf)
 
 
-def _watched(command: "Monitor", all_ids: tuple[str, ...]) -> tuple[NetworkUnits, Posture | None]:
+def _watched(command: Monitor, all_ids: tuple[str, ...]) -> tuple[NetworkUnits, Posture | None]:
     """The units to watch, and the posture they are to agree with, if one is given."""
     if command.skin and command.units:
         raise HardwareError("Both --skin and --units are given: leave one of them out.")
     if command.posture and not command.skin:
         raise HardwareError("--posture needs --skin, the file with the poses of the units.")
     if not command.skin:
-        ids = words(command.units) or all_ids
+        ids = command.units or all_ids
         if not ids:
             raise HardwareError(f"{command.keys} holds no unit: `pretouch skin provision` or `skin keys` adds one.")
         return NetworkUnits.of(ids), None
     model = RobotModel(robot_named(command.arm))
-    skin = load_skin(Path(command.skin), model)
+    skin = load_skin(command.skin, model)
     if not command.posture:
         return skin.network, None
     return skin.network, Posture(
@@ -112,10 +135,13 @@ def _watched(command: "Monitor", all_ids: tuple[str, ...]) -> tuple[NetworkUnits
     )
 
 
-def _posture(text: str, model: RobotModel) -> FloatArray:
-    q = np.array(numbers("--posture", text))
+def _posture(positions: tuple[float, ...], model: RobotModel) -> FloatArray:
+    q = np.array(positions)
     if q.shape != (model.n,) or not np.isfinite(q).all():
-        raise HardwareError(f"The posture is {text!r}: give {model.n} joint positions [rad], separated by commas.")
+        raise HardwareError(
+            f"The posture is {','.join(map('{:g}'.format, q))}: give {model.n} joint positions [rad], separated by"
+            " commas."
+        )
     beyond = np.flatnonzero((q < model.q_min) | (q > model.q_max))
     if len(beyond):
         i = beyond[0]

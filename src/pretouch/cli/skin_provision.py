@@ -2,37 +2,70 @@
 
 import getpass
 import warnings
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from pretouch.cli.skin_keys import free_number, keys_file, keys_or_none
+from pretouch.cli.options import OptionalFile
+from pretouch.cli.skin_keys import free_number, keys_or_none
 from pretouch.errors import HardwareError
 from pretouch.extras import UNITS
 from pretouch.units.keys import Keys, UnitKey, new_key, save_keys
 from pretouch.units.provision import Network, configuration, copy_to_unit, fingerprint
-
-if TYPE_CHECKING:
-    from pretouch.cli.skin_commands import Provision
+from pretouch.units.udp import PORT
 
 
-def provision_unit(command: "Provision") -> None:
-    """Make a key if the unit has none, and copy it to the unit with the rest of its configuration."""
-    place = keys_file(command.keys)
-    keys = keys_or_none(place)
-    unit = _unit(keys, command.id, command.number, place)
-    network = Network(command.ssid, "", command.host, command.port, command.battery_full_mv,
-        command.touch_ohm, command.touch_least_mn, command.touch_mn_per_us, command.sensor, command.zones,
-    )  # fmt: skip  # what is wrong is said before the password is asked for
-    UNITS.need("Provisioning")
-    text = configuration(unit, replace(network, password=_password(command)))
-    if unit.id not in keys:
-        save_keys(Keys([*keys.values(), unit]), place)  # first: a unit with a key that nobody knows is mute
-    copy_to_unit(command.device, text)
-    print(
-        f"{unit.id} is number {unit.number} with the key {fingerprint(unit.key)}..., and sends to"
-        f" {network.host}:{network.port}. Its key is in {place}."
-    )
+@dataclass(frozen=True)
+class Provision:
+    """Set up a unit over USB: its number, its own random key, your Wi-Fi, and the receiver's address.
+
+    The password is asked for, and shown nowhere.
+    """
+
+    id: str
+    """Name of the unit, as in the skin file."""
+    keys: Path
+    """File of the units' keys; created if it is missing, readable only by you."""
+    ssid: str
+    """Name of the Wi-Fi network (2.4 GHz)."""
+    host: str
+    """IPv4 address of this machine in that network."""
+    number: int = 0
+    """Number of the unit in datagrams, 1 to 65535; by default that in the file of keys, or the first free one."""
+    device: str = "/dev/ttyUSB0"
+    """Serial device of the unit."""
+    port: int = PORT
+    """UDP port of the receiver."""
+    battery_full_mv: int = 0
+    """Battery voltage at the full scale of the unit's converter [mV] (docs/how-to/wiring.md); 0: no battery."""
+    sensor: str = "vl53l1x"
+    """Range finder of the unit: vl53l1x, vl53l5cx or vl53l7cx (docs/how-to/flashing.md)."""
+    zones: int = 4
+    """Zones along each side of its range finder, 4 or 8, if it has some."""
+    touch_ohm: int = 0
+    """Resistor from the touch sensor's pin to ground [ohm] (docs/how-to/wiring.md); 0: no touch sensor."""
+    touch_least_mn: int = 500
+    """Smallest force that counts as a touch [mN]: `force_min_n` of the skin file."""
+    touch_mn_per_us: int = 10
+    """Force by the touch sensor's conductance [mN/uS], as calibrated."""
+    password_file: OptionalFile = None
+    """File whose first line is the Wi-Fi password, instead of typing it."""
+
+    def run(self) -> None:
+        """Make a key if the unit has none, and copy it to the unit with the rest of its configuration."""
+        keys = keys_or_none(self.keys)
+        unit = _unit(keys, self.id, self.number, self.keys)
+        network = Network(self.ssid, "", self.host, self.port, self.battery_full_mv,
+            self.touch_ohm, self.touch_least_mn, self.touch_mn_per_us, self.sensor, self.zones,
+        )  # fmt: skip  # what is wrong is said before the password is asked for
+        UNITS.need("Provisioning")
+        text = configuration(unit, replace(network, password=_password(self)))
+        if unit.id not in keys:
+            save_keys(Keys([*keys.values(), unit]), self.keys)  # first: a unit with a key that nobody knows is mute
+        copy_to_unit(self.device, text)
+        print(
+            f"{unit.id} is number {unit.number} with the key {fingerprint(unit.key)}..., and sends to"
+            f" {network.host}:{network.port}. Its key is in {self.keys}."
+        )
 
 
 def _unit(keys: Keys, name: str, number: int, place: Path) -> UnitKey:
@@ -50,7 +83,7 @@ def _unit(keys: Keys, name: str, number: int, place: Path) -> UnitKey:
     return keys[name]
 
 
-def _password(command: "Provision") -> str:
+def _password(command: Provision) -> str:
     if not command.password_file:
         try:
             with warnings.catch_warnings():
@@ -59,7 +92,7 @@ def _password(command: "Provision") -> str:
         except (EOFError, getpass.GetPassWarning):
             raise HardwareError("There is no terminal for the password: give a --password-file.") from None
     try:
-        lines = Path(command.password_file).read_text(encoding="utf-8").splitlines()
+        lines = command.password_file.read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         why = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
         raise HardwareError(f"The password file {command.password_file} cannot be read: {why}.") from error

@@ -1,13 +1,13 @@
 """What `pretouch skin simulate` does: a simulated skin that sends to a receiver in real time."""
 
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from pretouch.arms.simulated.arm import SimulateOptions
 from pretouch.arms.simulated.skin import run
-from pretouch.cli.skin_keys import keys_file, keys_or_none, with_new
-from pretouch.cli.words import words
+from pretouch.cli.options import OptionalFile, Words
+from pretouch.cli.skin_keys import keys_or_none, with_new
 from pretouch.profiles import profile as find_profile
 from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
@@ -17,35 +17,82 @@ from pretouch.sim.placement import assumptions, placement_for
 from pretouch.units.channel import ChannelParams, NetworkParams
 from pretouch.units.fleet import FleetParams
 from pretouch.units.keys import Keys, save_keys
-
-if TYPE_CHECKING:
-    from pretouch.cli.skin_commands import Simulate
+from pretouch.units.udp import HOST, PORT
 
 _say = partial(print, flush=True)
 
 
-def simulate_units(command: "Simulate") -> None:
-    """Simulate until interrupted, or for the given time."""
-    c = command
-    up = ChannelParams(
-        loss=c.loss, loss_run=c.loss_run, delay_s=c.delay, jitter_s=c.jitter, overtaken=c.overtaken, doubled=c.doubled
-    )
-    down = ChannelParams(
-        loss=c.loss, loss_run=c.loss_run, delay_s=0.15 * c.delay, jitter_s=0.3 * c.jitter, jitter_shape=2.0
-    )
-    fleet = FleetParams(network=NetworkParams(up, down), imu=ImuParams(), reboot_every_s=c.reboot_every)
-    profile = find_profile(c.profile)
-    model = RobotModel(robot_named(c.arm))
-    skin = skin_for(model, c.skin)
-    placement = placement_for(model)
-    for sentence in assumptions(model, placement):
-        _say(sentence)
-    options = SimulateOptions(
-        model, skin, keys_for(keys_file(c.keys), skin), c.host, c.port, fleet, placement.path("circle", -1.0),
-        profile=profile, hand=c.hand, silenced=frozenset(words(c.silenced)),
-        stuck=frozenset(words(c.stuck)), seed=c.seed, duration_s=c.duration,
-    )  # fmt: skip
-    run(options, lambda: False, _say)
+@dataclass(frozen=True)
+class Simulate:
+    """Simulate a skin that sends what real units send: an arm on its path, and a hand that comes and goes."""
+
+    keys: Path
+    """File of the units' keys, created if it is missing. `pretouch skin monitor` needs the same file."""
+    skin: OptionalFile = None
+    """Skin file; by default the seven units that come with the package."""
+    arm: str = "panda"
+    """panda, fr3, or the folder of an imported arm."""
+    host: str = HOST
+    """Name or address of the receiver."""
+    port: int = PORT
+    """UDP port of the receiver."""
+    loss: float = 0.0
+    """Share of datagrams lost, in either direction."""
+    loss_run: float = 0.0
+    """Mean number lost in a row; 0: each is lost or not by itself."""
+    delay: float = 0.008
+    """Least time on the way to the receiver [s]."""
+    jitter: float = 0.004
+    """Mean of what is added to it at random [s]."""
+    overtaken: float = 0.0
+    """Share of datagrams held up so that later ones overtake them."""
+    doubled: float = 0.0
+    """Share of datagrams that arrive twice."""
+    reboot_every: float = 0.0
+    """Time between two reboots of each unit [s]; 0: none."""
+    silenced: Words = ()
+    """Names of units that send nothing, separated by commas."""
+    stuck: Words = ()
+    """Names of units whose range finder repeats its first reading, separated by commas."""
+    hand: bool = True
+    """Whether a person's hand comes and goes."""
+    profile: str = "paper"
+    """Profile of the arm's controller, or PROFILE:GROUP.FIELD=VALUE."""
+    seed: int = 0
+    """Decides all that is random."""
+    duration: float = 0.0
+    """Time to simulate [s]; 0: until Ctrl-C."""
+
+    def run(self) -> None:
+        """Simulate until interrupted, or for the given time."""
+        up = ChannelParams(
+            loss=self.loss,
+            loss_run=self.loss_run,
+            delay_s=self.delay,
+            jitter_s=self.jitter,
+            overtaken=self.overtaken,
+            doubled=self.doubled,
+        )
+        down = ChannelParams(
+            loss=self.loss,
+            loss_run=self.loss_run,
+            delay_s=0.15 * self.delay,
+            jitter_s=0.3 * self.jitter,
+            jitter_shape=2.0,
+        )
+        fleet = FleetParams(network=NetworkParams(up, down), imu=ImuParams(), reboot_every_s=self.reboot_every)
+        profile = find_profile(self.profile)
+        model = RobotModel(robot_named(self.arm))
+        skin = skin_for(model, self.skin)
+        placement = placement_for(model)
+        for sentence in assumptions(model, placement):
+            _say(sentence)
+        options = SimulateOptions(
+            model, skin, keys_for(self.keys, skin), self.host, self.port, fleet, placement.path("circle", -1.0),
+            profile=profile, hand=self.hand, silenced=frozenset(self.silenced),
+            stuck=frozenset(self.stuck), seed=self.seed, duration_s=self.duration,
+        )  # fmt: skip
+        run(options, lambda: False, _say)
 
 
 def keys_for(place: Path, skin: Skin) -> Keys:

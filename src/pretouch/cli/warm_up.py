@@ -3,7 +3,7 @@
 import gc
 import os
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from multiprocessing import get_context
 from multiprocessing.context import SpawnProcess
 from pathlib import Path
@@ -28,6 +28,17 @@ from pretouch.types import Obstacles, RobotState
 
 _PUSH_NM = 30.0
 """At each joint: a contact for any detector that goes by torques."""
+
+
+@dataclass(frozen=True)
+class WarmUp:
+    """Compile a control step, once after an installation: later commands then start within a second."""
+
+    def run(self) -> None:
+        """Compile, and print where it is cached."""
+        print("Compiling what all profiles need: about a minute the first time ...", flush=True)
+        place = compile_step()
+        print(f"Compiled, and cached in {place}." if place else "Compiled, but not cached: HOME is not writable.")
 
 
 def compile_step() -> str:

@@ -43,15 +43,14 @@ def check_writable(what: str, place: Path) -> None:
             raise IsADirectoryError(21, "Is a directory")
 
 
-def check_outputs(outputs: Iterable[tuple[str, str]], inputs: Iterable[str], replace: bool) -> None:
+def check_outputs(outputs: Iterable[tuple[str, Path | None]], inputs: Iterable[Path | None], replace: bool) -> None:
     """Raise ExperimentError for a file to write that is read too, is there already, or cannot be written.
 
-    Outputs are files with what they are; '' and the standard output are none.
+    Outputs are files with what they are; None and the standard output are none.
     """
-    taken = [Path(text) for text in inputs if text]
-    for what, text in outputs:
-        if text and text != STANDARD_OUTPUT:
-            place = Path(text)
+    taken = [place for place in inputs if place]
+    for what, place in outputs:
+        if place and str(place) != STANDARD_OUTPUT:
             if any(same_file(other, place) or same_file(place, other) for other in taken):
                 raise ExperimentError(f"The {what} {place} is also another input or output file: give another name.")
             check_free(what, place, replace)
@@ -108,6 +107,8 @@ def plain(value: Any) -> Any:
         return {name: plain(getattr(value, name)) for name in (*(field.name for field in fields(value)), *told)}
     if isinstance(value, dict):
         return {name: plain(part) for name, part in value.items()}
+    if isinstance(value, Path):
+        return str(value)
     if isinstance(value, np.ndarray | np.generic):
         return plain(value.tolist())
     if isinstance(value, list | tuple):

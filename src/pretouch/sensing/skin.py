@@ -201,7 +201,7 @@ def skin_file(arm: RobotDescription) -> Path:
     return own if own.is_file() else _seven_units(arm)
 
 
-def skin_for(model: RobotModel, file: Path | str = "") -> Skin:
+def skin_for(model: RobotModel, file: Path | str | None = None) -> Skin:
     """Return the skin of a file, or without one the skin that the arm comes with."""
     return load_skin(file or skin_file(model.description), model)
 

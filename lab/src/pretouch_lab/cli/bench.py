@@ -5,8 +5,7 @@ from typing import Annotated
 
 import tyro
 
-from pretouch.cli.words import words
-from pretouch.errors import ParameterError
+from pretouch.cli.options import Counts, JsonFile
 from pretouch_lab.cli.bench_calibration import Calibration
 from pretouch_lab.cli.bench_real import Real
 from pretouch_lab.cli.benchmarks import Avoidance, Both, Detection, Localization, Shield
@@ -16,7 +15,7 @@ from pretouch_lab.cli.benchmarks import Avoidance, Both, Detection, Localization
 class Cycle:
     """How long a control step takes: processor and wall time at a rate, and overruns."""
 
-    points: str = "7,32,128,1000"
+    points: Counts = (7, 32, 128, 1000)
     """Numbers of sensed points, separated by commas, each shown by a unit 50 times a second."""
     rate: float = 1000.0
     """Cycles a second; everything the profile counts in cycles is brought to it."""
@@ -26,8 +25,7 @@ class Cycle:
     """Profile of the controller, or PROFILE:GROUP.FIELD=VALUE."""
     arm: str = "panda"
     """Name of an arm, or the folder of an imported one."""
-    json: str = ""
-    """File for the numbers, or - for standard output: text then goes to standard error."""
+    json: JsonFile = None
     priority: int | None = None
     """Real-time priority, 1 to 99 (80 is usual); by default the process keeps its own."""
     cpu: int | None = None
@@ -39,7 +37,7 @@ class Cycle:
         from pretouch_lab.cli.bench_cycle import bench_cycle
 
         request = CycleRequest(self.rate, self.cycles, self.profile, self.priority, self.cpu, arm=self.arm)
-        bench_cycle(_counts(self.points), request, self.json)
+        bench_cycle(self.points, request, self.json)
 
 
 @dataclass(frozen=True)
@@ -60,10 +58,3 @@ class Bench:
     def run(self) -> int | None:
         """Run the benchmark."""
         return self.what.run()
-
-
-def _counts(text: str) -> tuple[int, ...]:
-    numbers = words(text)
-    if not numbers or not all(number.isdecimal() for number in numbers):
-        raise ParameterError(f"The numbers of points are {text!r}: give whole numbers, separated by commas.")
-    return tuple(map(int, numbers))

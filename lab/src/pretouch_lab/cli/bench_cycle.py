@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from rich.console import Console
@@ -17,7 +18,7 @@ from pretouch_lab.rows import Row
 _SPREAD = {"median": "median_us", "99 %": "p99_us", "99.9 %": "p999_us", "largest": "max_us"}
 
 
-def bench_cycle(points: tuple[int, ...], request: CycleRequest, json: str = "") -> None:
+def bench_cycle(points: tuple[int, ...], request: CycleRequest, json: Path | None = None) -> None:
     """Measure the control step, show what it takes, and write the numbers where `numbers_to` takes `json` to say.
 
     What was measured before something ended the run is shown and written all the same.

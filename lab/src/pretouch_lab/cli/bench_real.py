@@ -7,6 +7,8 @@ from typing import Any
 
 import tyro
 
+from pretouch.cli.options import Words
+
 
 @dataclass(frozen=True)
 class Real:
@@ -18,7 +20,7 @@ class Real:
 
     folder: tyro.conf.Positional[Path]
     """Of the sets, each by its name, with `arms` as `pretouch robot import` wrote them."""
-    detectors: str = ""
+    detectors: Words = ()
     """Profiles, separated by commas; by default fixed, observer, paper and pretouch."""
     json: str = ""
     """File for the rows, or - for standard output: text then goes to standard error."""
@@ -33,7 +35,6 @@ def bench_real(command: Real) -> None:
     from rich.console import Console
 
     from pretouch.cli.tables import show
-    from pretouch.cli.words import words
     from pretouch.cli.writing import numbers_to
     from pretouch.profiles import profile
     from pretouch_lab.benchmarks.real.bench import DETECTORS, Work, play, tables_of
@@ -41,7 +42,7 @@ def bench_real(command: Real) -> None:
     from pretouch_lab.cli.progress import bar
     from pretouch_lab.engine import run_jobs
 
-    detectors = words(command.detectors) or DETECTORS
+    detectors = command.detectors or DETECTORS
     for name in detectors:
         profile(name)  # an hour later would be late
     sets, missing = sets_in(command.folder)

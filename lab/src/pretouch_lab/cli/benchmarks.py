@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from pretouch.cli.words import words
+from pretouch.cli.options import Words
 from pretouch.errors import PretouchError
 
 if TYPE_CHECKING:  # the help is to need none of the heavy packages
@@ -64,10 +64,10 @@ class Avoidance(BenchOptions):
     json: str = ""
     """File for the numbers, with a row for each baseline and scenario; by default results.json in the folder.
     -: also to standard output, and text to standard error."""
-    baselines: Annotated[str, tyro.conf.arg(aliases=["--contenders"])] = ""
+    baselines: Annotated[Words, tyro.conf.arg(aliases=["--contenders"])] = ()
     """Baselines, separated by commas: blind, flacco, flacco-surface, ding, ding-near, paper, paper-off, or any
     profile; by default all, and pretouch with each switch off alone."""
-    scenarios: str = ""
+    scenarios: Words = ()
     """Scenarios, separated by commas; by default all."""
     arm: str = "panda"
     """Name of an arm, or the folder of an imported one, in a folder of results of its own: give --out. The scenarios'
@@ -79,7 +79,7 @@ class Avoidance(BenchOptions):
         from pretouch_lab.benchmarks.avoidance.run import AvoidanceBench
         from pretouch_lab.benchmarks.avoidance.setting import PANDA, arm, place
 
-        out, some = self.folder("bench-avoidance"), (words(self.baselines), words(self.scenarios))
+        out, some = self.folder("bench-avoidance"), (self.baselines, self.scenarios)
         bench = AvoidanceBench(out, self.quick, self.seeds, self.world, *some, self.arm)
         if self.arm != PANDA:
             described = arm(self.arm).description

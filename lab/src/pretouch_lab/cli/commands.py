@@ -6,8 +6,7 @@ from pathlib import Path
 
 import tyro
 
-from pretouch.cli.words import words
-from pretouch.errors import ParameterError
+from pretouch.cli.options import Numbers, Words
 
 _DEMONSTRATED = ("blind", "paper", "pretouch")
 
@@ -50,12 +49,12 @@ class Reproduce:
     """Trials of each cell; each seed is another arm with other errors, noise and geometry."""
     first_seed: int = 0
     """The first of them; only seed 0 is recorded and drawn unasked."""
-    profiles: str = "blind,paper"
+    profiles: Words = ("blind", "paper")
     """Profiles to compare, separated by commas. PROFILE:GROUP.FIELD=VALUE is one with another parameter. With `all`
     the studies have their own."""
-    restrictions: str = ""
+    restrictions: Words = ()
     """off, hard, slack or floor, or several of them; by default off in the static experiment and slack in others."""
-    stiffness: str = "25000"
+    stiffness: Numbers = (25000.0,)
     """Contact stiffness of the static object [N/m], or several, separated by commas."""
     skin: str = ""
     """Skin file; by default the seven units that come with the package."""
@@ -86,9 +85,9 @@ class Reproduce:
         request = Request(
             experiments=tuple(EXPERIMENTS) if everything else (self.experiment,),
             seeds=self.seeds,
-            profiles=words(self.profiles),
-            restrictions=words(self.restrictions),
-            stiffness=tuple(map(_number, words(self.stiffness))),
+            profiles=self.profiles,
+            restrictions=self.restrictions,
+            stiffness=self.stiffness,
             skin=self.skin or None,
             record=self.record,
             arm=self.arm or None,
@@ -128,10 +127,3 @@ class Figure:
 def new_folder(name: str) -> Path:
     """Return a folder under runs/ that is not there yet."""
     return next(path for n in count(1) if not (path := Path("runs") / f"{name}-{n}").exists())
-
-
-def _number(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        raise ParameterError(f"The stiffness is {text!r}: give numbers in N/m, separated by commas.") from None

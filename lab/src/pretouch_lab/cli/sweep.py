@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import tyro
 
+from pretouch.cli.options import Words
 from pretouch.errors import ExperimentError
 
 if TYPE_CHECKING:  # the help is to need none of the heavy packages
@@ -35,7 +36,7 @@ class Sweep:
     """Base points of Sobol indices, a power of two, each of which is parameters + 2 cells."""
     arms: int = 16
     """Simulated arms; each seed is another one, in another scene."""
-    metrics: str = ""
+    metrics: Words = ()
     """Numbers that table and figure show, separated by commas; by default all. The CSV file has all."""
     profile: str = ""
     """Profile to start from, or PROFILE:GROUP.FIELD=VALUE; by default the experiment's own."""
@@ -58,7 +59,6 @@ class Sweep:
 
 def sweep(command: Sweep) -> dict[str, Any]:
     """Play what is missing, write and show what came out, and return the indices."""
-    from pretouch.cli.words import words
     from pretouch_lab.cli.progress import worked
     from pretouch_lab.engine import run_tasks
     from pretouch_lab.sweep.design import sweep_of
@@ -70,7 +70,7 @@ def sweep(command: Sweep) -> dict[str, Any]:
         command.experiment, _pairs("vary", command.vary), _pairs("fix", command.fix), command.profile, command.design,
         command.samples, command.arms, command.seeds,
     )  # fmt: skip
-    metrics = words(command.metrics) or tuple(defined.measure.metrics)
+    metrics = command.metrics or tuple(defined.measure.metrics)
     unknown = [name for name in metrics if name not in defined.measure.metrics]
     if unknown:
         known = ", ".join(defined.measure.metrics)

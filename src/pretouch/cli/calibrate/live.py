@@ -45,9 +45,9 @@ _AFTER_S = 0.5
 """What was measured up to the end of a motion has arrived then [s]."""
 
 
-def calibrate_live(command: "CalibrateArm[Any]", outputs: Outputs) -> int:
+def calibrate_live(command: "CalibrateArm[Any]", out: Path, outputs: Outputs) -> int:
     """Calibrate the units of an arm that is moved; return 1 if a unit was refused or the motion ended early, or 0."""
-    place = _recording_place(command)
+    place = _recording_place(command, out)
     model, again = RobotModel(command.connection.described(robot_named(command.arm))), _again(command, place)
     skin = skin_for(model, command.skin)
     setup = ArmSetup(
@@ -84,19 +84,19 @@ def calibrate_live(command: "CalibrateArm[Any]", outputs: Outputs) -> int:
     if early:
         return 1
     try:
-        return calibrate_recording(model, Sources(place, skin=Path(command.skin) if command.skin else None), outputs)
+        return calibrate_recording(model, Sources(place, skin=command.skin), outputs)
     except BaseException:
         with suppress(OSError):  # the terminal may be gone
             print(f"The calibration was not finished. The measurements are in {place}. {again}", flush=True)
         raise
 
 
-def _recording_place(command: "CalibrateArm[Any]") -> Path:
+def _recording_place(command: "CalibrateArm[Any]", out: Path) -> Path:
     """Return the recording to write, which is not there yet."""
-    out, others = Path(command.out), [Path(file) for file in (command.out, command.json) if file]
+    others = [file for file in (out, command.json) if file]
     beside = (out.with_name(f"{out.stem}-calibration-{n}.mcap") for n in count(1))
     free = (one for one in beside if not one.exists() and not any(same_file(file, one) for file in others))
-    place = Path(command.record or next(free))
+    place = command.record or next(free)
     check_free("recording", place, replace=False)
     check_writable("recording", place)
     return place
@@ -201,7 +201,17 @@ def _move(opened: OpenedArm, model: RobotModel, plans: list[Plan], measurements:
 
 def _again(command: "CalibrateArm[Any]", place: Path) -> str:
     """Say how to calibrate from the recording alone."""
-    words = ["pretouch", "skin", "calibrate", "--recording", str(place), "--arm", command.arm, "--out", command.out]
+    words = [
+        "pretouch",
+        "skin",
+        "calibrate",
+        "--recording",
+        str(place),
+        "--arm",
+        command.arm,
+        "--out",
+        str(command.out),
+    ]
     for option, value in (("--skin", command.skin), ("--json", command.json)):
-        words += [option, value] if value else []
+        words += [option, str(value)] if value else []
     return f"To calibrate from it: {join([*words, *(['--replace'] if command.replace else [])])}"

@@ -30,9 +30,8 @@ def planned(model: RobotModel, options: "MotionOptions") -> tuple[Plan, PlanPara
     return plan_motion(model, params), params
 
 
-def write_motion(command: "Calibrate") -> None:
+def write_motion(command: "Calibrate", place: Path) -> None:
     """Plan the motion, write it as CSV, and print the time and the room it takes."""
-    place = Path(command.plan)
     check_free("motion", place, command.replace)
     check_writable("file", place)
     model = RobotModel(robot_named(command.arm))

@@ -1,10 +1,12 @@
 """What can be said after `pretouch skin calibrate`, and which of it goes together."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import MISSING, Field, dataclass, field, fields, is_dataclass
 from pathlib import Path
 from typing import Any, Generic, Literal
 
+from pretouch.arms import arm_class
+from pretouch.cli.options import JsonFile, OptionalFile, split_arm
 from pretouch.cli.run.options import A, UnitOptions
 from pretouch.errors import CalibrationError, HardwareError
 
@@ -13,9 +15,9 @@ from pretouch.errors import CalibrationError, HardwareError
 class RecordingOptions:
     """From what was recorded while the arm made a calibration motion."""
 
-    recording: str = ""
+    recording: OptionalFile = None
     """Recording of the units, by `pretouch skin monitor --record`, or of a run with real units."""
-    joints: str = ""
+    joints: OptionalFile = None
     """Joint states, if they are not in the recording: a CSV file (time_s,q1_rad,...), an MCAP file or a bag, with any
     clock."""
     topic: str = ""
@@ -51,19 +53,31 @@ class Calibrate:
 
     recorded: RecordingOptions = field(default_factory=RecordingOptions)
     motion: MotionOptions = field(default_factory=MotionOptions)
-    plan: str = ""
+    plan: OptionalFile = None
     """CSV file to write the motion to, for your own driver (time_s, q1_rad to qn_rad, qd1_rad_s to qdn_rad_s),
     instead of running it."""
-    skin: str = ""
+    skin: OptionalFile = None
     """Skin file with the units and their assumed links, which are checked; without it, links are identified."""
-    out: str = ""
+    out: OptionalFile = None
     """Skin file to write: places and how well they are known. Refused units are as in --skin, or left out."""
-    json: str = ""
-    """File for the numbers, or - for standard output: text then goes to standard error."""
+    json: JsonFile = None
     replace: bool = False
     """Overwrite existing files."""
     arm: str = "panda"
     """panda, fr3, or the folder of an imported arm."""
+
+    @staticmethod
+    def of_words(words: Sequence[str]) -> tuple[Any, Sequence[str], str]:
+        """Return the command, the other words, and what is in front of them: the first word may name an arm."""
+        name, others = split_arm(words)
+        if len(others) == len(words):
+            return Calibrate, words, "skin calibrate"
+        return CalibrateArm[arm_class(name)], others, f"skin calibrate {name}"  # type: ignore[misc]
+
+    @staticmethod
+    def of_all() -> Any:
+        """Return the command without an arm."""
+        return Calibrate
 
     def run(self) -> int:
         """Calibrate, and show and write the answer."""
@@ -80,15 +94,14 @@ class CalibrateArm(Generic[A]):
     connection: A
     units: UnitOptions = field(default_factory=UnitOptions)
     motion: MotionOptions = field(default_factory=MotionOptions)
-    skin: str = ""
+    skin: OptionalFile = None
     """Skin file with the units and their assumed links, which are checked; without it, the seven that come with the
     package are heard, and links are identified."""
-    out: str = ""
+    out: OptionalFile = None
     """Skin file to write: places and how well they are known. Refused units are as in --skin, or left out."""
-    record: str = ""
+    record: OptionalFile = None
     """Recording to write; by default a new one beside the skin file."""
-    json: str = ""
-    """File for the numbers, or - for standard output: text then goes to standard error."""
+    json: JsonFile = None
     replace: bool = False
     """Overwrite existing files."""
     arm: str = "panda"
@@ -107,7 +120,7 @@ class CalibrateArm(Generic[A]):
             raise HardwareError("The arm brings no sensor units: give the file of their keys with --keys.")
         self.units.check()
         with outputs_of(self) as outputs:
-            return calibrate_live(self, outputs)
+            return calibrate_live(self, self.out, outputs)
 
 
 Mode = Literal["recording", "plan"]
@@ -162,13 +175,12 @@ def calibrate_skin(command: Calibrate, mode: Mode) -> int:
     from pretouch.robot.description import robot_named
     from pretouch.robot.model import RobotModel
 
-    if mode == "plan":
+    if command.plan:
         from pretouch.cli.calibrate.motion import write_motion
 
-        write_motion(command)
+        write_motion(command, command.plan)
         return 0
     with outputs_of(command) as outputs:
-        c = command.recorded
-        joints, skin = (Path(text) if text else None for text in (c.joints, command.skin))
-        sources = Sources(Path(c.recording), joints, c.topic, skin)
+        recorded = command.recorded
+        sources = Sources(recorded.recording or Path(), recorded.joints, recorded.topic, command.skin)
         return calibrate_recording(RobotModel(robot_named(command.arm)), sources, outputs)

@@ -28,10 +28,10 @@ def outputs_of(command: "Calibrate | CalibrateArm[Any]") -> Iterator[Outputs]:
     ExperimentError for what could not be written, or is also another input or output file; --out may be --skin.
     """
     recorded, units = getattr(command, "recorded", None), getattr(command, "units", None)
-    inputs = [getattr(recorded, "recording", ""), getattr(recorded, "joints", ""), getattr(units, "keys", "")]
-    if command.skin and not (command.out and same_file(Path(command.skin), Path(command.out))):
+    inputs = [getattr(recorded, "recording", None), getattr(recorded, "joints", None), getattr(units, "keys", None)]
+    if command.skin and not (command.out and same_file(command.skin, command.out)):
         inputs.append(command.skin)
-    outputs = ("skin file", command.out), ("file", command.json), ("recording", getattr(command, "record", ""))
+    outputs = ("skin file", command.out), ("file", command.json), ("recording", getattr(command, "record", None))
     check_outputs(outputs, inputs, command.replace)
     with numbers_to(command.json) as write:
-        yield Outputs(Path(command.out) if command.out else None, write)
+        yield Outputs(command.out, write)

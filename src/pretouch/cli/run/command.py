@@ -37,7 +37,7 @@ def run(command: "Run[Any]", write: Callable[[Any], None]) -> int:
     """Move an arm, and write its numbers; return 1 if the run ended early or its recording failed, or else 0."""
     check_wishes(command.priority, command.cpu)
     if command.record:
-        _check_free(Path(command.record))
+        _check_free(command.record)
     made = run_setup(command)
     setup = made.of_arm(command)
     command.connection.check(setup)

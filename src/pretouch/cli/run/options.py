@@ -7,7 +7,7 @@ from typing import Annotated, Any, Generic, Literal, TypeVar, Union
 import tyro
 
 from pretouch.arms import ArmOptions, arm_class, arm_names
-from pretouch.cli.words import split_arm
+from pretouch.cli.options import JsonFile, OptionalFile, split_arm
 from pretouch.errors import HardwareError, ParameterError, RobotError
 from pretouch.units.udp import HOST, PORT
 
@@ -22,7 +22,7 @@ class RobotOptions:
     """Model of the arm: panda, fr3, or the folder of an imported arm."""
     confirm_push: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
     """Ask for the guided pushes even if the force sign of this robot is confirmed."""
-    learnt: str = ""
+    learnt: OptionalFile = None
     """File of the arm's free-motion model, loaded at the start and saved at the end; by default one file per robot."""
     learn_anew: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
     """Start without a free-motion model, and replace the saved one by what this run learns."""
@@ -34,7 +34,7 @@ class RobotOptions:
 class UnitOptions:
     """Where the sensor units are heard."""
 
-    keys: str = ""
+    keys: OptionalFile = None
     """File of the keys of units that are received over the network; without it, the units that the arm brings."""
     units_host: str = HOST
     """Address to receive units at; real ones need 0.0.0.0, which is every address of this machine."""
@@ -51,7 +51,7 @@ class UnitOptions:
 class SkinOptions(UnitOptions):
     """The sensor units."""
 
-    skin: str = ""
+    skin: OptionalFile = None
     """Skin file; by default the seven units that come with the package."""
     no_skin: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
     """The arm carries no units. The profile must not need any, such as blind."""
@@ -90,10 +90,9 @@ class Run(Generic[A]):
     robot: RobotOptions = field(default_factory=RobotOptions)
     units: SkinOptions = field(default_factory=SkinOptions)
     task: TaskOptions = field(default_factory=TaskOptions)
-    record: str = ""
+    record: OptionalFile = None
     """Recording to write."""
-    json: str = ""
-    """File for the numbers at the end, or - for standard output: text then goes to standard error."""
+    json: JsonFile = None
     holds: str = "runs/holds"
     """Folder for the last seconds before a HOLD that lasts until a person resumes."""
     priority: int | None = None
@@ -106,7 +105,7 @@ class Run(Generic[A]):
     @staticmethod
     def of_words(words: Sequence[str]) -> tuple[Any, Sequence[str], str]:
         """Return the command for the arm that the first word names, the other words, and what is in front of them."""
-        name, others = split_arm(words, "run")
+        name, others = split_arm(words)
         return Run[arm_class(name)], others, f"run {name}" if len(others) < len(words) else "run"  # type: ignore[misc]
 
     @staticmethod

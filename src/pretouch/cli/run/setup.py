@@ -3,13 +3,11 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from pretouch.arms import ArmSetup, OpenedArm
-from pretouch.cli.skin_keys import keys_file
 from pretouch.cli.writing import check_writable
 from pretouch.contact.sequential_test import SequentialTest
 from pretouch.control.path import Circle, Path, WayPoints, segment
@@ -144,7 +142,7 @@ def free_motion(options: "RobotOptions", controller: Controller, robot: str) -> 
         return None
     file = model_file_of(robot, state_folder())
     if options.learnt:
-        file = ModelFile(robot, FilePath(options.learnt), True)
+        file = ModelFile(robot, options.learnt, True)
         check_writable("free-motion file", file.path)
     found = FreeMotion(file, controller, options.learn_anew)
     for sentence in found.found:
@@ -164,7 +162,7 @@ def heard_units(where: "UnitOptions", skin: Skin, opened: OpenedArm) -> Iterator
             print(f"Receiving units at {opened.units.address[0]}:{opened.units.address[1]}.", flush=True)
         yield opened.skin, opened.units
     else:
-        keys = load_keys(keys_file(where.keys))
+        keys = load_keys(where.keys)
         with children_undisturbed():
             receiver = NetworkSkin(skin.network, keys, where.units_host, where.units_port)
         with receiver as units:
