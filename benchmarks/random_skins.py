@@ -14,10 +14,9 @@ import numpy as np
 from scipy.stats import spearmanr
 
 from pretouch.control.path import Circle
-from pretouch.coverage.measure import POINTS, Setting, covered
+from pretouch.coverage.measure import Setting, covered
 from pretouch.coverage.params import CoverageParams
 from pretouch.coverage.suggest import candidates
-from pretouch.coverage.surface import surface_of
 from pretouch.coverage.ways import seen_by
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
@@ -38,8 +37,7 @@ LEAST, MOST = 4, 32
 def blind_share(model: RobotModel, skin: Skin, seed: int) -> float:
     """Share of the balls that reach the moving arm unseen."""
     params = CoverageParams()
-    surface = surface_of(model, POINTS, float(np.random.default_rng([seed, 54]).uniform()))
-    approaching = ApproachingObstacles(model, skin, surface, params, COUNT, seed)
+    approaching = ApproachingObstacles(model, skin, params, COUNT, seed)
     parked = (float(PARKED[0]), float(PARKED[1]), float(PARKED[2]))
     setup = Context(model, skin).setup(
         Cell("coverage", "pretouch"), seed, SceneSpec(ghost=GhostSpec(params.object_radius_m, parked)), Circle(),

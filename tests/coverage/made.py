@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from pretouch.coverage.surface import Surface
 from pretouch.perception.scene_filter import no_fixtures
+from pretouch.robot.body import Surface
 from pretouch.robot.description import RobotDescription
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.sensor import PAPER_SENSOR
@@ -45,7 +45,12 @@ def below_it(model):
     """The one surface point below that unit."""
     link = model.link_index("one")
     return Surface(
-        np.array([link]), np.array([0]), np.array([[RADIUS, 0.0, 0.2]]), np.array([[1.0, 0.0, 0.0]]), np.array([0.01])
+        np.array([link]),
+        np.array([[RADIUS, 0.0, 0.2]]),
+        np.array([[1.0, 0.0, 0.0]]),
+        np.array([0.01]),
+        np.array([0]),
+        np.array([0, 1]),
     )
 
 

@@ -9,23 +9,22 @@ from hypothesis import strategies as st
 
 from pretouch.coverage.measure import covered
 from pretouch.coverage.params import CoverageParams
-from pretouch.coverage.surface import surface_of
 from pretouch.coverage.ways import seen_by, ways_to
 from pretouch.sensing.sensor import VL53L1X
 from pretouch.sim.scene import SceneSpec, fixtures
 from tests.coverage.made import HEIGHT, ROOM, arm, below_it, skin, unit_at
 
 BRIGHT = CoverageParams(range_m=10.0, reflectance_limit=1e-3)
-READY = np.zeros((1, 2))
 
 
-def ways(model, params, surface=None, each=20_000, q=READY, room=ROOM):
-    rng = np.random.default_rng(5)
-    return ways_to(model, room, params, below_it(model) if surface is None else surface, q, each, rng)
+def ways(model, params, each=20_000):
+    """Ways to the one point below the unit."""
+    points = np.zeros(each, np.int64)
+    return ways_to(model, ROOM, params, np.zeros((1, 2)), points, np.random.default_rng(5), below_it(model))
 
 
 def share(model, params, units, each=20_000):
-    found, worn = ways(model, params, each=each), skin(model, *units)
+    found, worn = ways(model, params, each), skin(model, *units)
     return covered(found, seen_by(found, worn)).arm.ways
 
 
@@ -90,7 +89,7 @@ def test_two_units_see_what_either_sees(tmp_path):
 @pytest.fixture(scope="module")
 def few(panda_model):
     q = panda_model.description.q_ready + 0.2 * np.random.default_rng(3).uniform(-1, 1, (2, 7))
-    return surface_of(panda_model, 400), q
+    return q, np.repeat(np.arange(0, len(panda_model.surface.link), 4), 2)
 
 
 @pytest.fixture(scope="module")
@@ -100,7 +99,7 @@ def usual(panda_model, paper_skin, few):
 
 
 def found_by(model, worn, few, params):
-    made = ways_to(model, fixtures(SceneSpec()), params, few[0], q=few[1], each=2, rng=np.random.default_rng(4))
+    made = ways_to(model, fixtures(SceneSpec()), params, *few, np.random.default_rng(4))
     return made, seen_by(made, worn)
 
 

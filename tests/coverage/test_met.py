@@ -5,7 +5,6 @@ import pytest
 
 from pretouch.coverage.measure import Setting, coverage_of, covered
 from pretouch.coverage.params import CoverageParams
-from pretouch.coverage.surface import surface_of
 from pretouch.coverage.ways import seen_by, ways_met
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.robot.postures import brought_to
@@ -20,7 +19,7 @@ PARAMS = CoverageParams()
 
 @pytest.fixture(scope="module")
 def surface(panda_model):
-    return surface_of(panda_model, 600)
+    return panda_model.surface
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +39,7 @@ def normals(model, surface):
 
 def test_the_hand_meets_what_lies_ahead_as_often_as_its_surface_faces_it(panda_model, surface, hand):
     to = np.array([0.6, 0.0, -0.8])
-    met = ways_met(panda_model, no_fixtures(), PARAMS, surface, ready(panda_model), to[None])
+    met = ways_met(panda_model, no_fixtures(), PARAMS, ready(panda_model), to[None])
     ahead = normals(panda_model, surface) @ to
     came = hand & met.free[0]
     assert 0.1 < came[hand].mean() < 0.6
@@ -57,7 +56,7 @@ def test_points_move_as_the_arm_turns(panda_model, surface):
     ends = [k.position[surface.link] + np.einsum("pij,pj->pi", k.rotation[surface.link], surface.point)
             for k in (at, later)]  # fmt: skip
     velocity = (ends[1] - ends[0]) / step
-    met = ways_met(panda_model, no_fixtures(), PARAMS, surface, q[None], down[None])
+    met = ways_met(panda_model, no_fixtures(), PARAMS, q[None], down[None])
     onto = np.einsum("pi,pi->p", velocity, normals(panda_model, surface))
     free = met.free[0]
     assert free.sum() > 50
@@ -72,14 +71,14 @@ def test_a_unit_at_the_hands_side_sees_what_that_side_meets(panda_model, surface
     T[:3, 3] = 0.0, 0.115, 0.045
     skin = Skin([SensorUnit("side", "panda_hand", T, sensor=VL53L7CX())], panda_model)
     R = panda_model.kinematics(panda_model.description.q_ready).rotation[panda_model.link_index("panda_hand")]
-    met = ways_met(panda_model, ROOM, PARAMS, surface, ready(panda_model), ahead * R[None, :, 1])
+    met = ways_met(panda_model, ROOM, PARAMS, ready(panda_model), ahead * R[None, :, 1])
     links = {one.name: one.ways for one in covered(met, seen_by(met, skin)).links}
     assert low <= links["panda_hand"] <= high
 
 
 def test_a_skin_is_measured_along_its_path_or_in_any_direction(panda_model, paper_skin):
     for workspace in ("circle", "joints"):
-        setting = Setting(panda_model, ROOM, PARAMS, workspace, 6, 3, 400)
+        setting = Setting(panda_model, ROOM, PARAMS, workspace, 6, 3)
         met = setting.met()
         tip = np.flatnonzero(panda_model.moved_by.all(axis=1)[met.surface.link])
         fast = met.way[:, tip][met.free[:, tip]]

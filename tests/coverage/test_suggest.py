@@ -11,8 +11,8 @@ from pretouch.coverage.blind import BLIND, blind_spots
 from pretouch.coverage.measure import covered
 from pretouch.coverage.params import CoverageParams
 from pretouch.coverage.suggest import HEIGHT_M, candidates, greedy, suggest
-from pretouch.coverage.surface import surface_of
 from pretouch.coverage.ways import seen_by, ways_met, ways_to
+from pretouch.robot.body import surface_of
 from pretouch.sensing.skin import Skin, load_skin, save_skin
 from pretouch.sensing.unit import seat
 from pretouch.sim.scene import SceneSpec, fixtures
@@ -22,8 +22,14 @@ from tests.coverage.made import ROOM, arm, skin
 @pytest.fixture(scope="module")
 def made(panda_model):
     q = panda_model.description.q_ready + 0.1 * np.random.default_rng(3).uniform(-1, 1, (3, 7))
-    surface = surface_of(panda_model, 500)
-    return ways_to(panda_model, fixtures(SceneSpec()), CoverageParams(), surface, q, 3, np.random.default_rng(4))
+    points = np.repeat(np.arange(0, len(panda_model.surface.link), 3), 3)
+    return ways_to(panda_model, fixtures(SceneSpec()), CoverageParams(), q, points, np.random.default_rng(4))
+
+
+def ways_all_over(model, q, each, spacing):
+    surface = surface_of(model.body, model.moved_by, model.kinematics(q[0]), spacing)
+    points = np.repeat(np.arange(len(surface.link)), each)
+    return ways_to(model, ROOM, CoverageParams(), q, points, np.random.default_rng(1), surface)
 
 
 @given(st.integers(0, 10_000), st.integers(1, 4))
@@ -42,7 +48,7 @@ def test_a_greedy_choice_is_near_the_best(seed, count):
 
 def test_gains_fall_and_add_up_to_what_the_larger_skin_sees_of_what_comes_and_is_met(made, panda_model, paper_skin):
     q = np.array([panda_model.description.q_ready])
-    met = ways_met(panda_model, made.room, made.params, made.surface, q, np.array([[0.0, 1.0, 0.0]]))
+    met = ways_met(panda_model, made.room, made.params, q, np.array([[0.0, 1.0, 0.0]]))
     for ways in ((made,), (made, met)):
         found = suggest(ways, paper_skin, 4)
         gains = [one.gain for one in found.chosen]
@@ -58,10 +64,9 @@ def test_places_sit_on_the_surface_and_look_off_the_arm(made, panda_model, paper
     places = candidates(made, paper_skin)
     assert len(places) > 50
     for unit in places:
-        below = seat(panda_model, panda_model.link_index(unit.link), unit.T_link_sensor[:3, 3])
-        assert 0 < below.height <= HEIGHT_M + 2e-5
-        if below.height > HEIGHT_M - 2e-5:  # elsewhere another capsule of the link is a little nearer
-            assert unit.T_link_sensor[:3, 2] @ below.normal > 0.999
+        link, (beam, place) = panda_model.link_index(unit.link), unit.T_link_sensor[:3, 2:].T
+        assert 0 < seat(panda_model, link, place).height <= HEIGHT_M + 2e-5  # another capsule may be a little nearer
+        assert seat(panda_model, link, place - HEIGHT_M * beam).height == pytest.approx(0.0, abs=2e-5)
         for other in paper_skin.units:
             apart = np.linalg.norm(other.T_link_sensor[:3, 3] - unit.T_link_sensor[:3, 3])
             assert other.link != unit.link or apart >= 0.03
@@ -80,9 +85,7 @@ def test_the_file_with_new_units_keeps_the_old_ones(made, panda_model, paper_ski
 
 def test_the_back_of_a_capsule_with_a_unit_in_front(tmp_path):
     model = arm(tmp_path)
-    made = ways_to(
-        model, ROOM, CoverageParams(), surface_of(model, 1500), np.zeros((2, 2)), 10, np.random.default_rng(1)
-    )
+    made = ways_all_over(model, np.zeros((2, 2)), 10, 0.01)
     worn = skin(model)
     found = covered(made, seen_by(made, worn))
     spots = blind_spots(made, found)
@@ -91,8 +94,8 @@ def test_the_back_of_a_capsule_with_a_unit_in_front(tmp_path):
     assert sum(areas) == pytest.approx(made.surface.area[found.point_share < BLIND].sum())
     assert all(spot.share < BLIND for spot in spots)
     back = next(spot for spot in spots if spot.link == "one" and spot.facing == "-x")
-    # a quarter of the way round along 0.4 m, and what of the two ends faces that way
-    assert back.area_m2 == pytest.approx(np.pi / 2 * 0.05 * 0.4 + 0.003, abs=0.0025)
+    # a quarter of the way round along 0.4 m, and a sixth of the two ends
+    assert back.area_m2 == pytest.approx(np.pi / 2 * 0.05 * 0.4 + 4 * np.pi * 0.05**2 / 6, abs=0.0025)
     assert back.side == "back"
     assert back.center == pytest.approx([-0.045, 0.0, 0.2], abs=0.01)
     assert back.share == 0.0
@@ -103,7 +106,7 @@ def test_the_back_of_a_capsule_with_a_unit_in_front(tmp_path):
 def test_a_side_that_changes_with_the_posture_has_no_name(tmp_path):
     model = arm(tmp_path)
     q = np.array([[0.0, 0.0], [3.0, 0.0], [-1.5, 0.0], [1.5, 0.0]])
-    made = ways_to(model, ROOM, CoverageParams(), surface_of(model, 600), q, 4, np.random.default_rng(1))
+    made = ways_all_over(model, q, 4, 0.015)
     found = covered(made, np.zeros((0, *made.free.shape), np.bool_))
     spots = blind_spots(made, found)
     assert {spot.side for spot in spots if spot.facing in ("-x", "+y")} == {""}

@@ -8,8 +8,7 @@ from pretouch.coverage.measure import Setting, coverage_of
 from pretouch.coverage.params import CoverageParams
 from pretouch.coverage.workspace import postures
 from pretouch.errors import ExperimentError
-from pretouch.importing.ready import ever_apart
-from pretouch.robot.postures import capsule_ends, kinematics_of, self_distances
+from pretouch.robot.postures import capsule_ends, ever_apart, kinematics_of, self_distances
 from pretouch.sim.scene import SceneSpec, fixtures
 
 ROOM = fixtures(SceneSpec())
@@ -49,7 +48,7 @@ def test_one_posture_is_none_of_a_workspace(panda_model):
 
 
 def test_the_same_seed_gives_the_same_numbers_and_the_figure_can_be_drawn(panda_model, paper_skin):
-    setting = Setting(panda_model, ROOM, CoverageParams(), "circle", 4, 1000, 400)
+    setting = Setting(panda_model, ROOM, CoverageParams(), "circle", 4, 1000)
     (one, _), (other, _) = (coverage_of(setting.ways(), paper_skin) for _ in range(2))
     assert one.links == other.links
     ways = setting.ways(1)

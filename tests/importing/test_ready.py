@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pretouch.importing.ready import ever_apart, proposed
+from pretouch.importing.ready import proposed
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
+from pretouch.robot.postures import ever_apart
 
 LUMP = '<geom name="lump" size="0.03 0.001" pos="0 0 0.24" type="capsule" mass="0"/>'
 

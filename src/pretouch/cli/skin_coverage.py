@@ -13,7 +13,7 @@ from pretouch.cli.tables import show
 from pretouch.cli.writing import check_outputs, numbers_to, unwritable_said
 from pretouch.coverage import measure
 from pretouch.coverage.blind import BlindSpot, blind_spots
-from pretouch.coverage.measure import Both, Setting, coverage_of, covered
+from pretouch.coverage.measure import Setting, coverage_of, covered
 from pretouch.coverage.params import CoverageParams
 from pretouch.coverage.suggest import Suggestions, candidates, suggest
 from pretouch.coverage.ways import Ways, seen_by
@@ -184,11 +184,13 @@ def _suggested(
     }  # fmt: skip
 
 
-def _both(ways: tuple[Ways, Ways], seen: list[BoolArray]) -> Both:
+def _both(ways: tuple[Ways, Ways], seen: list[BoolArray]) -> tuple[measure.Coverage, measure.Coverage]:
     return covered(ways[0], seen[0]), covered(ways[1], seen[1])
 
 
-def _numbers(command: Coverage, setting: Setting, both: Both, spots: tuple[BlindSpot, ...]) -> dict[str, Any]:
+def _numbers(
+    command: Coverage, setting: Setting, both: tuple[measure.Coverage, measure.Coverage], spots: tuple[BlindSpot, ...]
+) -> dict[str, Any]:
     return {
         "asked": asdict(command),
         "parameters": asdict(setting.params) | {"warning_m": setting.params.warning_m},
@@ -197,7 +199,7 @@ def _numbers(command: Coverage, setting: Setting, both: Both, spots: tuple[Blind
     }
 
 
-def _links(both: Both) -> list[dict[str, Any]]:
+def _links(both: tuple[measure.Coverage, measure.Coverage]) -> list[dict[str, Any]]:
     found, met = both
     meets = {one.name: one.ways for one in (*met.links, met.arm)}
     return [

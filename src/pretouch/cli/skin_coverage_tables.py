@@ -3,7 +3,7 @@
 import numpy as np
 
 from pretouch.coverage.blind import BLIND, BlindSpot
-from pretouch.coverage.measure import Both, Setting
+from pretouch.coverage.measure import Coverage, Setting
 from pretouch.coverage.suggest import Suggestions
 from pretouch.coverage.ways import Ways
 from pretouch.sensing.skin import Skin
@@ -11,7 +11,7 @@ from pretouch.text_table import TextTable, tabulated
 from pretouch.types import BoolArray
 
 
-def link_table(both: Both, setting: Setting) -> TextTable:
+def link_table(both: tuple[Coverage, Coverage], setting: Setting) -> TextTable:
     """Show the shares of each link and of the arm."""
     p, (found, met) = setting.params, both
     meets = {one.name: one.ways for one in (*met.links, met.arm)}
@@ -53,7 +53,9 @@ def unit_table(skin: Skin, ways: Ways, sees: BoolArray) -> TextTable:
     )
 
 
-def suggestion_table(suggested: Suggestions, before: Both, after: Both) -> TextTable:
+def suggestion_table(
+    suggested: Suggestions, before: tuple[Coverage, Coverage], after: tuple[Coverage, Coverage]
+) -> TextTable:
     """Show the places of the new units, and what they change."""
     was, now = ([f"{_percent(one.arm.ways)} %" for one in both] for both in (before, after))
     columns = (

@@ -45,46 +45,34 @@ class BlindSpot:
 
 def blind_spots(ways: Ways, coverage: Coverage) -> tuple[BlindSpot, ...]:
     """Find the patches of blind points that hang together and face one way, the largest first."""
-    share = coverage.point_share
     surface = ways.surface
-    facing = _axis(surface.normal)
-    found = []
-    for link in np.unique(surface.link):
-        for axis in range(6):
-            with np.errstate(invalid="ignore"):
-                here = np.flatnonzero((surface.link == link) & (facing == axis) & (share < BLIND))
-            found += [_spot(ways, coverage, here[part]) for part in _patches(surface.point[here], surface.area[here])]
-    return tuple(sorted(found, key=lambda spot: -spot.area_m2))
+    blind = np.flatnonzero(coverage.point_share < BLIND)
+    side = 6 * surface.link + _axis(surface.normal)  # a number for each axis of each link
+    spots = list[BlindSpot]()
+    for one in np.unique(side[blind]):
+        here = blind[side[blind] == one]
+        tree = cKDTree(surface.point[here])
+        near = tree.sparse_distance_matrix(tree, _NEIGHBOURS * float(np.sqrt(surface.area[here].max())))
+        count, patch = connected_components(near, directed=False)
+        spots += [_spot(ways, coverage, here[patch == i]) for i in range(count)]
+    return tuple(sorted(spots, key=lambda spot: -spot.area_m2))
 
 
 def _axis(normal: FloatArray) -> IntArray:
     """Index in `_AXES` of the axis that each normal (P, 3) is closest to."""
-    largest = np.abs(normal).argmax(axis=1)
-    return 2 * largest + (normal[np.arange(len(normal)), largest] < 0)
-
-
-def _patches(point: FloatArray, area: FloatArray) -> list[IntArray]:
-    """Indices of the points (N, 3) of each patch."""
-    if not len(point):
-        return []
-    near = cKDTree(point).sparse_distance_matrix(cKDTree(point), _NEIGHBOURS * float(np.sqrt(area.max())))
-    count, label = connected_components(near, directed=False)
-    return [np.flatnonzero(label == i) for i in range(count)]
+    return np.stack([normal, -normal], axis=2).reshape(-1, 6).argmax(axis=1)
 
 
 def _spot(ways: Ways, coverage: Coverage, points: IntArray) -> BlindSpot:
-    model, surface = ways.model, ways.surface
-    link, area = int(surface.link[points[0]]), surface.area[points]
-    center = np.average(surface.point[points], axis=0, weights=area)
-    normal = np.average(surface.normal[points], axis=0, weights=area)
+    surface, link = ways.surface, int(ways.surface.link[points[0]])
+    area = surface.area[points]
+    center, normal = (np.average(x[points], axis=0, weights=area) for x in (surface.point, surface.normal))
     in_base = np.mean([kin.rotation[link] @ normal for kin in ways.postures], axis=0)
-    steady = np.linalg.norm(in_base) > _STEADY
-    free = float(coverage.free[:, points].sum())
     return BlindSpot(
-        model.links[link],
+        ways.model.links[link],
         _AXES[int(_axis(normal[None])[0])],
-        _SIDES[int(_axis(in_base[None])[0])] if steady else "",
+        _SIDES[int(_axis(in_base[None])[0])] if np.linalg.norm(in_base) > _STEADY else "",
         float(area.sum()),
         center,
-        float(coverage.seen[:, points].sum()) / free,
+        float(coverage.seen[:, points].sum() / coverage.free[:, points].sum()),
     )

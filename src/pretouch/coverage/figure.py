@@ -10,21 +10,24 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from scipy.spatial import cKDTree
 
 from pretouch.coverage.measure import Coverage
-from pretouch.coverage.surface import on_capsule
 from pretouch.coverage.ways import Ways
 from pretouch.perception.obstacles import placed_sensors
-from pretouch.robot.body import from_axes, placed
+from pretouch.robot.body import surface_of
 from pretouch.robot.kinematics import Kinematics
 from pretouch.sensing.skin import Skin
-from pretouch.types import BoolArray, FloatArray
+from pretouch.types import FloatArray
 
 _VIEWS = (("from the front left", 20, 40), ("from the back right", 20, 220), ("from below", -35, -50))
 """Title, elevation and azimuth of each view [deg]."""
-_ALONG_M, _ROUND = 0.02, 20
+_SPACING_M = 0.016
+"""Distance between the plates that the surface is drawn by [m]."""
 _BEAM_M = 0.15
 _NEW, _OLD, _NOTHING = "tab:red", "black", (0.75, 0.75, 0.75, 1.0)
 _SMOOTH = 6
-"""Surface points over which the colour of a piece is averaged."""
+"""Surface points over which the colour of a plate is averaged."""
+_TURN = np.linspace(0.0, 2 * np.pi, 13)
+_RING = np.column_stack([np.cos(_TURN), np.sin(_TURN), np.zeros(13)])
+"""(13, 3) a circle of radius 1 round z."""
 
 Faces = list[tuple[FloatArray, object, object]]
 """Corners (M, 3) [m], colour of the face, colour of its edge."""
@@ -32,10 +35,11 @@ Faces = list[tuple[FloatArray, object, object]]
 
 def coverage_figure(ways: Ways, coverage: Coverage, skin: Skin, new: frozenset[str] = frozenset()) -> Figure:
     """Draw the arm in its ready posture from three sides; units named in `new` are red."""
-    kin = ways.model.kinematics(ways.model.description.q_ready)
+    model = ways.model
+    kin = model.kinematics(model.description.q_ready)
     colours, scale = colormaps["viridis"], Normalize(0.0, 1.0)
     faces = _skin_faces(kin, skin, new)
-    for corners, share in _surface(ways, coverage, kin):
+    for corners, share in _plates(ways, coverage, kin):
         colour = colours(scale(share)) if np.isfinite(share) else _NOTHING
         faces.append((corners, colour, colour))
     figure = Figure(figsize=(11, 4.4), layout="constrained")
@@ -46,10 +50,9 @@ def coverage_figure(ways: Ways, coverage: Coverage, skin: Skin, new: frozenset[s
         axes.set_title(title, fontsize="medium")
     bar = figure.colorbar(ScalarMappable(scale, colours), ax=panels, shrink=0.8, pad=0.02)
     bar.set_label("share of the paths to it seen in time")
-    seen = 100 * coverage.arm.ways
     figure.suptitle(
-        f"{ways.model.description.name}, {len(skin.first)} units: {seen:.0f} % of the paths to its surface are seen in"
-        " time (grey: the base, or no free path)",
+        f"{model.description.name}, {len(skin.first)} units: {100 * coverage.arm.ways:.0f} % of the paths to its"
+        " surface are seen in time (grey: the base, or no free path)",
         fontsize="medium",
     )
     return figure
@@ -65,47 +68,31 @@ def _view(axes: Axes3D, faces: Faces) -> None:
     axes.set_axis_off()
 
 
-def _surface(ways: Ways, coverage: Coverage, kin: Kinematics) -> list[tuple[FloatArray, float]]:
-    """Four-cornered pieces of all capsules outside the others, each with the share of the nearest surface points."""
-    arm, share = ways.model.capsules, coverage.point_share
-    _, a, b, _ = placed(arm, kin)
-    pieces = []
-    for c in range(len(arm.radius)):
-        length = float(np.linalg.norm(arm.b[c] - arm.a[c])) + 2 * float(arm.radius[c])
-        u = np.linspace(0.0, 1.0, max(8, int(length / _ALONG_M)) + 1)
-        turn = np.linspace(0.0, 2 * np.pi, _ROUND + 1)
-        place = np.repeat(u, len(turn)), np.tile(turn, len(u))
-        local = on_capsule(arm.a[c], arm.b[c], float(arm.radius[c]), *place)[0].reshape(len(u), len(turn), 3)
-        corners = np.stack([local[:-1, :-1], local[1:, :-1], local[1:, 1:], local[:-1, 1:]], axis=2).reshape(-1, 4, 3)
-        middle, link = corners.mean(axis=1), int(arm.link[c])
-        in_base = corners @ kin.rotation[link].T + kin.position[link]
-        outside = ~_inside(in_base.mean(axis=1), a, b, arm.radius, c)
-        here = np.flatnonzero((coverage.surface.link == link) & np.isfinite(share))
-        if len(here):
-            near = cKDTree(coverage.surface.point[here]).query(middle, k=min(_SMOOTH, len(here)))[1]
-            colour = share[here][near.reshape(len(middle), -1)].mean(axis=1)
-        else:
-            colour = np.full(len(middle), np.nan)
-        pieces += [(in_base[i], float(colour[i])) for i in np.flatnonzero(outside)]
-    return pieces
-
-
-def _inside(point: FloatArray, a: FloatArray, b: FloatArray, radius: FloatArray, own: int) -> BoolArray:
-    """Whether points (N, 3) lie well inside a capsule that is not their own."""
-    others = np.arange(len(radius)) != own
-    depth = radius[others] - np.linalg.norm(from_axes(point, a[others], b[others])[1], axis=2)
-    return np.asarray(depth.max(axis=1) > 0.003)
+def _plates(ways: Ways, coverage: Coverage, kin: Kinematics) -> list[tuple[FloatArray, float]]:
+    """Plates all over the arm, base frame [m], each with the share of the nearest surface points."""
+    model, share = ways.model, coverage.point_share
+    outside = surface_of(model.capsules, np.ones((len(model.links), 1), np.bool_), kin, _SPACING_M)
+    plates = []
+    for link in np.unique(outside.link):
+        own, here = outside.link == link, (ways.surface.link == link) & np.isfinite(share)
+        colour = np.full(own.sum(), np.nan)
+        if here.any():
+            near = cKDTree(ways.surface.point[here]).query(outside.point[own], k=min(_SMOOTH, here.sum()))[1]
+            colour = share[here][near.reshape(len(colour), -1)].mean(axis=1)
+        for point, normal, area, value in zip(*(x[own] for x in outside[1:4]), colour, strict=True):
+            across = np.linalg.svd(normal[None])[2]  # rows: the normal, then two vectors across it
+            corners = point + 1.4 * np.sqrt(area / np.pi) * _RING[::3, :2] @ across[1:]
+            plates.append((kin.position[link] + corners @ kin.rotation[link].T, float(value)))
+    return plates
 
 
 def _skin_faces(kin: Kinematics, skin: Skin, new: frozenset[str]) -> Faces:
     """Return a small disc for each unit, and its beam as a cone one can look through."""
     position, rotation, _ = placed_sensors(skin.arrays, kin)
-    turn = np.linspace(0.0, 2 * np.pi, 13)
-    ring = np.column_stack([np.cos(turn), np.sin(turn), np.zeros(len(turn))])
     faces: Faces = []
     for unit, p, R in zip(skin.units, position, rotation, strict=True):
-        half, colour = unit.sensor.angle / 2, _NEW if unit.board in new else _OLD
-        faces.append((p + 0.014 * ring @ R.T, colour, colour))
-        rim = p + (_BEAM_M * np.array([0, 0, 1]) + _BEAM_M * np.tan(half) * ring) @ R.T
+        wide, colour = np.tan(unit.sensor.angle / 2), _NEW if unit.board in new else _OLD
+        faces.append((p + 0.014 * _RING @ R.T, colour, colour))
+        rim = p + _BEAM_M * (np.array([0.0, 0.0, 1.0]) + wide * _RING) @ R.T
         faces += [(np.array([p, *rim[i : i + 2]]), (0, 0, 0, 0.08), to_rgba(colour, 0.35)) for i in range(12)]
     return faces

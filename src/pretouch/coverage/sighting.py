@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from pretouch.compiled import compiled, kernel
-from pretouch.perception.scene_filter import ray_capsule
 from pretouch.robot.body import Capsules
+from pretouch.robot.postures import segment_distance
 from pretouch.sensing.sensor import Cones, Sensors
 from pretouch.types import BoolArray, FloatArray, IntArray
 
@@ -33,45 +33,19 @@ class BallWays(NamedTuple):
     """Of the ball [m]."""
 
 
-class Stretch(NamedTuple):
-    """Which places of the grid count."""
-
-    first: int
-    """Number of the nearest one, s = first GRID_M."""
-    last: int
-    """Number of the farthest."""
-
-
-@compiled
-def ways_free(
-    ways: BallWays, length: float, own: IntArray, capsules: Capsules, planes: FloatArray, free: BoolArray
-) -> None:
-    """Write whether (W,) a ball can come along each way without meeting anything before the contact.
+def ways_free(ways: BallWays, length: float, capsules: Capsules, planes: FloatArray) -> BoolArray:
+    """Whether (W,) a ball can come along each way of a length [m] without meeting anything before the contact.
 
     Args:
-        ways: of the ball.
+        ways: of the ball; the capsule that one begins at is not in its way.
         length: of the ways [m].
-        own: (W,) index of the capsule that each touches.
         capsules: C of arm and room, base frame, as all else.
         planes: (P, 4) rows (normal, offset), the normal pointing into free space.
-        free: (W,) the answer.
     """
-    start, way, radius = ways
-    a, b, thickness = capsules.a, capsules.b, capsules.radius
-    for w in range(len(start)):
-        free[w] = True
-        for m in range(len(planes)):
-            # the height of the centre over the plane is linear along the way: it is least at one of its ends
-            height, rise = -planes[m, 3], 0.0
-            for i in range(3):
-                height += planes[m, i] * start[w, i]
-                rise += planes[m, i] * way[w, i]
-            free[w] &= height + min(0.0, length * rise) >= radius
-        for c in range(len(thickness)):
-            if free[w] and c != own[w]:
-                # the ball meets it where its centre is within both radii: a ray against a capsule grown by the ball's
-                reach = max(thickness[c] + radius - _TOUCHING_M, 0.0)
-                free[w] = ray_capsule(start[w], way[w], a[c], b[c], reach) > length
+    ends = ways.start, ways.start + length * ways.way
+    gap = segment_distance(ends[0][:, None], ends[1][:, None], capsules.a, capsules.b) - capsules.radius
+    height = [(end @ planes[:, :3].T - planes[:, 3]).min(axis=1, initial=np.inf) for end in ends]
+    return np.asarray((gap.min(axis=1) >= ways.radius - _TOUCHING_M) & (np.min(height, axis=0) >= ways.radius))
 
 
 class View(NamedTuple):
@@ -87,22 +61,21 @@ class View(NamedTuple):
 
 @compiled
 def ways_seen(
-    ways: BallWays, free: BoolArray, stretch: Stretch, sensors: Sensors, cones: Cones, view: View,
-    seen: BoolArray,
-) -> None:  # fmt: skip
+    ways: BallWays, free: BoolArray, first: int, last: int, sensors: Sensors, cones: Cones, view: View, seen: BoolArray
+) -> None:
     """Write whether (K, W) each unit has the ball in view at its `run` + 1 places of the grid in a row.
 
     Args:
         ways: of the ball.
         free: (W,) ways to look at; the others count as not seen.
-        stretch: places that count.
+        first: number of the nearest place of the grid that counts, s = first GRID_M.
+        last: number of the farthest.
         sensors: K units.
         cones: what each sees.
         view: how far they see.
         seen: (K, W) the answer.
     """
     start, way, radius = ways
-    first, last = stretch
     position, rotation = sensors.position, sensors.rotation
     near, far = first * GRID_M, last * GRID_M
     for k in range(len(position)):
@@ -138,9 +111,7 @@ def ways_seen(
 
 
 @kernel
-def in_view(
-    depth: float, distance2: float, radius: float, widening: float, limit: float, light: float
-) -> bool:  # fmt: skip
+def in_view(depth: float, distance2: float, radius: float, widening: float, limit: float, light: float) -> bool:
     """Whether a unit sees a ball: enough of it in the cone, and nearer than `limit` [m].
 
     A reading comes from the ball's surface, on average 2/3 of the radius before its centre, d. With A the part of the

@@ -6,15 +6,16 @@ way see at least 1 - 1/e, 63 %, of what the best N of the same places could add 
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import count as count_from
 
 import numpy as np
 
 from pretouch.control.braking import tangents_of
-from pretouch.coverage.surface import surface_of
 from pretouch.coverage.ways import Ways, seen_by
 from pretouch.errors import SkinError
 from pretouch.perception.obstacles import placed_sensors
 from pretouch.perception.scene_filter import expected_range
+from pretouch.robot.body import surface_of
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.sensor import PAPER_SENSOR, Sensor, cones_of
 from pretouch.sensing.skin import Skin, SkinArrays
@@ -25,8 +26,8 @@ HEIGHT_M = 0.008
 """Height of a range finder above the surface [m]."""
 _CLEAR_M = 0.4
 """How far the beam of a place has to leave the arm and the room, in the ready posture [m]."""
-PLACES = 320
-"""Places that are looked at, less those from which a unit would see its own arm."""
+_SPACING_M = 0.055
+"""Distance between places that are looked at [m]; a Panda has about 300."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,21 +62,17 @@ def candidates(ways: Ways, skin: Skin, sensor: Sensor = PAPER_SENSOR) -> tuple[S
     """
     model = ways.model
     kin = model.kinematics(model.description.q_ready)
-    at = surface_of(model, PLACES)
-    units = [
-        SensorUnit(f"place {i}", model.links[at.link[i]], _looking(at.point[i], at.normal[i])) for i in range(len(at))
-    ]
-    T, exact = np.array([unit.T_link_sensor for unit in units]), np.zeros(len(units))
-    cones = cones_of([unit.sensor for unit in units])
-    sensors = placed_sensors(SkinArrays(at.link, T, exact, exact, cones), kin)
-    of_no_link = sensors._replace(link=np.full(len(at), -1, np.int64))
+    at = surface_of(model.body, model.moved_by, kin, _SPACING_M)
+    poses = np.array([_looking(*place) for place in zip(at.point, at.normal, strict=True)])
+    exact, cones = np.zeros(len(poses)), cones_of([PAPER_SENSOR] * len(poses))
+    sensors = placed_sensors(SkinArrays(at.link, poses, exact, exact, cones), kin)
+    of_no_link = sensors._replace(link=np.full(len(poses), -1, np.int64))
     view = expected_range(kin, of_no_link, cones, model.capsules, ways.room)
-    taken = [(unit.link, unit.T_link_sensor[:3, 3]) for unit in skin.units]
-    return tuple(
-        replace(unit, sensor=sensor)
-        for unit, free in zip(units, view, strict=True)
-        if free > _CLEAR_M and _fits(unit, model) and not _beside(unit, taken)
+    units = (
+        SensorUnit(f"place {i}", model.links[at.link[i]], poses[i], sensor=sensor)
+        for i in np.flatnonzero(view > _CLEAR_M)
     )
+    return tuple(unit for unit in units if _fits(unit, model) and not _beside(unit, skin))
 
 
 def suggest(ways: Sequence[Ways], skin: Skin, count: int, places: tuple[SensorUnit, ...] | None = None) -> Suggestions:
@@ -93,10 +90,8 @@ def suggest(ways: Sequence[Ways], skin: Skin, count: int, places: tuple[SensorUn
     # each place alone: together they may be more zones than a skin has
     by_place = np.concatenate([_seen(ways, Skin([place], ways[0].model)) for place in places])
     order, gains, left = greedy(by_place, np.where(by_skin, 0.0, weight), count)
-    ids = _free_ids(skin, len(order))
-    chosen = tuple(
-        Suggestion(replace(places[i], id=name), gain) for name, i, gain in zip(ids, order, gains, strict=True)
-    )
+    free = (name for number in count_from(1) if (name := f"suggested_{number}") not in skin.boards)
+    chosen = tuple(Suggestion(replace(places[i], id=next(free)), gain) for i, gain in zip(order, gains, strict=True))
     added = sum(gains)
     most = min(added + left, float(weight[~by_skin].sum()), added / (1 - 1 / np.e))
     return Suggestions(chosen, float(most), len(places))
@@ -142,15 +137,9 @@ def _fits(unit: SensorUnit, model: RobotModel) -> bool:
     return True
 
 
-def _beside(unit: SensorUnit, taken: list[tuple[str, FloatArray]]) -> bool:
+def _beside(unit: SensorUnit, skin: Skin) -> bool:
     """Whether another unit is where this one would be: a board has about 3 cm."""
-    return any(link == unit.link and np.linalg.norm(unit.T_link_sensor[:3, 3] - p) < 0.03 for link, p in taken)
-
-
-def _free_ids(skin: Skin, count: int) -> list[str]:
-    taken, ids, number = set(skin.boards), list[str](), 1
-    while len(ids) < count:
-        if (name := f"suggested_{number}") not in taken:
-            ids.append(name)
-        number += 1
-    return ids
+    p = unit.T_link_sensor[:3, 3]
+    return any(
+        other.link == unit.link and np.linalg.norm(other.T_link_sensor[:3, 3] - p) < 0.03 for other in skin.units
+    )

@@ -5,12 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from pretouch.errors import ExperimentError
-from pretouch.importing.ready import ever_apart
 from pretouch.perception.scene_filter import Fixtures
-from pretouch.robot.body import placed
 from pretouch.robot.model import RobotModel
-from pretouch.robot.postures import brought_to, capsule_ends, kinematics_of, self_distances
-from pretouch.sim.paper_scenes import Placement
+from pretouch.robot.postures import brought_to, capsule_ends, ever_apart, kinematics_of, self_distances
 from pretouch.sim.placement import placement_for
 from pretouch.types import FloatArray
 
@@ -45,34 +42,27 @@ def postures(model: RobotModel, room: Fixtures, workspace: str, count: int, rng:
     place = placement_for(model)
     names = ("circle", "line") if workspace == "paths" else (workspace,)
     parts = np.array_split((np.arange(count) + rng.uniform(size=count)) / count, len(names))
-    found = [_along(model, place, name, part * len(names) % 1.0) for name, part in zip(names, parts, strict=True)]
-    return Postures(np.vstack([q for q, _ in found]), np.vstack([along for _, along in found]))
-
-
-def _along(model: RobotModel, place: Placement, name: str, parts: FloatArray) -> tuple[FloatArray, FloatArray]:
-    path = place.path(name, 1.0)
-    phases = parts * path.length
-    q = np.array([brought_to(model, path.point(phase)) for phase in phases])
-    return q, np.array([path.tangent(phase) for phase in phases])
+    q, along = list[FloatArray](), list[FloatArray]()
+    for path, part in zip((place.path(name, 1.0) for name in names), parts, strict=True):
+        phases = part * len(names) % 1.0 * path.length
+        q += [brought_to(model, path.point(phase)) for phase in phases]
+        along += [path.tangent(phase) for phase in phases]
+    return Postures(np.array(q), np.array(along))
 
 
 def _anywhere(model: RobotModel, room: Fixtures, count: int, rng: np.random.Generator) -> FloatArray:
-    half = np.minimum((model.q_max - model.q_min) / 2, np.pi)
-    apart, found = ever_apart(model), list[FloatArray]()
-    for _ in range(_DRAWN * count):
-        q = model.q_mid + half * rng.uniform(-1, 1, model.n)
-        between = self_distances(model, capsule_ends(model, kinematics_of(model, q[None])))[0, apart]
-        if between.min(initial=np.inf) > 0 and _above(model, room, q):
-            found.append(q)
-        if len(found) == count:
-            return np.array(found)
+    """Postures (S, n) in which the arm is clear of itself, and its moving part on the free side of all planes."""
+    half, apart = np.minimum((model.q_max - model.q_min) / 2, np.pi), ever_apart(model)
+    moving = np.isin(model.capsules.link, model.parts)
+    drawn = model.q_mid + half * rng.uniform(-1, 1, (_DRAWN * count, model.n))
+    free = list[FloatArray]()
+    for q in drawn:
+        ends = capsule_ends(model, kinematics_of(model, q[None]))
+        heights = ends[0, moving] @ room.planes[:, :3].T - room.planes[:, 3] - model.body.radius[:, None, None]
+        if self_distances(model, ends)[0, apart].min(initial=np.inf) > 0 and heights.min(initial=np.inf) > 0:
+            free.append(q)
+        if len(free) == count:
+            return np.array(free)
     raise ExperimentError(
         f"{model.description.name} is free of itself and the floor in too few postures: choose another workspace."
     )
-
-
-def _above(model: RobotModel, room: Fixtures, q: FloatArray) -> bool:
-    """Whether the moving part of an arm is on the free side of all planes."""
-    ends = np.stack(placed(model.body, model.kinematics(q))[1:3])
-    heights = ends @ room.planes[:, :3].T - room.planes[:, 3]
-    return bool(np.all(heights > model.body.radius[:, None]))

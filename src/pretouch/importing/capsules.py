@@ -12,9 +12,10 @@ from trimesh.sample import sample_surface
 
 from pretouch.errors import RobotModelError
 from pretouch.importing.chain import Arm
-from pretouch.importing.sampling import directions, spread
+from pretouch.importing.sampling import directions
 from pretouch.importing.tree import Shape
 from pretouch.robot.body import from_axes
+from pretouch.robot.postures import spread
 from pretouch.types import BoolArray, FloatArray, IntArray
 
 MOST = 3

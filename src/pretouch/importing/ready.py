@@ -6,16 +6,22 @@ from functools import partial
 import numpy as np
 
 from pretouch.errors import RobotModelError
-from pretouch.importing.sampling import spread
 from pretouch.robot.kinematics import Kinematics
 from pretouch.robot.model import RobotModel
-from pretouch.robot.postures import Reaching, capsule_ends, kinematics_of, posture_at, self_distances
+from pretouch.robot.postures import (
+    Reaching,
+    capsule_ends,
+    ever_apart,
+    kinematics_of,
+    posture_at,
+    self_distances,
+    spread,
+)
 from pretouch.types import BoolArray, FloatArray
 
 _STARTS = 96
 _DRAWN, _FREE = Reaching(80, 0.2, 1e-3, 0.02), Reaching(80, 0.2, 1e-6)
 """First drawn to the middle of the joints' ranges; arms with small singular values get there only undrawn."""
-_TRIED = 100
 _ANYWHERE = 1000
 """Postures that are looked at where no hand in front of the base points down."""
 _IN_FRONT, _HEIGHT = 0.55, 0.4
@@ -150,16 +156,6 @@ def pointing(model: RobotModel, kin: Kinematics) -> FloatArray:
     if away > 0.01 and abs(axis @ out) < away / 2:
         return out / away
     return axis if axis @ out >= 0 else -axis
-
-
-def ever_apart(model: RobotModel, by: float = 0.0) -> BoolArray:
-    """Whether the pairs (P,) of `RobotModel.apart` come apart, by more than `by` [m], in some of many postures.
-
-    In a short wrist not all do; nor does an upper arm that turns close above its base, whatever the posture.
-    """
-    q = model.q_min + spread(_TRIED, model.n) * (model.q_max - model.q_min)
-    ends = capsule_ends(model, kinematics_of(model, q))
-    return np.asarray(np.any(self_distances(model, ends) > by, axis=0))
 
 
 def never_apart(model: RobotModel) -> tuple[tuple[str, str], ...]:

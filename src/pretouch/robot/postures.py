@@ -14,7 +14,10 @@ import numpy as np
 from pretouch.errors import ExperimentError
 from pretouch.robot.kinematics import Kinematics, rotation_error
 from pretouch.robot.model import RobotModel
-from pretouch.types import FloatArray
+from pretouch.types import BoolArray, FloatArray
+
+_TRIED = 100
+"""Postures in which pairs of links may come apart."""
 
 
 class Reaching(NamedTuple):
@@ -100,6 +103,25 @@ def self_distances(model: RobotModel, ends: FloatArray) -> FloatArray:
     first, second = model.apart.T
     a, b, radius = ends[:, first], ends[:, second], model.capsules.radius
     return segment_distance(a[..., 0, :], a[..., 1, :], b[..., 0, :], b[..., 1, :]) - radius[first] - radius[second]
+
+
+def spread(count: int, dimensions: int, skip: int = 20) -> FloatArray:
+    """Points (count, dimensions) of the unit cube: multiples of an irrational vector after the first (Roberts 2018)."""
+    step = 2.0
+    for _ in range(40):  # the root of x^(d + 1) = x + 1
+        step = (1 + step) ** (1 / (dimensions + 1))
+    multiple = np.arange(1 + skip, 1 + skip + count)[:, None]
+    return np.asarray(multiple / step ** np.arange(1, dimensions + 1) % 1.0)
+
+
+def ever_apart(model: RobotModel, by: float = 0.0) -> BoolArray:
+    """Whether the pairs (P,) of `RobotModel.apart` come apart, by more than `by` [m], in some of many postures.
+
+    In a short wrist not all do; nor does an upper arm that turns close above its base, whatever the posture.
+    """
+    q = model.q_min + spread(_TRIED, model.n) * (model.q_max - model.q_min)
+    ends = capsule_ends(model, kinematics_of(model, q))
+    return np.asarray(np.any(self_distances(model, ends) > by, axis=0))
 
 
 def segment_distance(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> FloatArray:

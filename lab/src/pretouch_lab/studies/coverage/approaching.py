@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pretouch.coverage.params import CoverageParams
-from pretouch.coverage.surface import Surface
 from pretouch.coverage.ways import seen_by, ways_to
 from pretouch.errors import ExperimentError
 from pretouch.robot.model import RobotModel
@@ -44,10 +43,8 @@ class ApproachingObstacle:
 class ApproachingObstacles:
     """Moves the ghost of a scene: it follows the link that it comes at, so that they meet whatever the arm does."""
 
-    def __init__(
-        self, model: RobotModel, skin: Skin, surface: Surface, params: CoverageParams, count: int, seed: int
-    ) -> None:
-        self._model, self._skin, self._surface, self._params = model, skin, surface, params
+    def __init__(self, model: RobotModel, skin: Skin, params: CoverageParams, count: int, seed: int) -> None:
+        self._model, self._skin, self._params = model, skin, params
         self._rng = np.random.default_rng([seed, 52])
         self.came: list[ApproachingObstacle] = []
         self.end = START_S + EVERY_S * count
@@ -79,17 +76,17 @@ class ApproachingObstacles:
     def _drawn(self) -> ApproachingObstacle:
         """Draw a free way to the arm as it stands."""
         q = self._plant.mj_data.qpos[: self._model.n].copy()
-        surface, r = self._surface, self._params.object_radius_m
+        surface, r = self._model.surface, self._params.object_radius_m
         for _ in range(_BATCHES):
-            drawn = self._rng.choice(len(surface), _BATCH, p=surface.area / surface.area.sum())
-            ways = ways_to(self._model, self._room, self._params, surface.only(drawn), q[None], 1, self._rng)
+            drawn = self._rng.choice(len(surface.link), _BATCH, p=surface.area / surface.area.sum())
+            ways = ways_to(self._model, self._room, self._params, q[None], drawn, self._rng)
             if not ways.free.any():
                 continue
             i = int(np.argmax(ways.free[0]))
             sees = seen_by(ways, self._skin)[:, 0, i]
-            link, normal = int(ways.surface.link[i]), ways.surface.normal[i]
+            link, point, normal = int(surface.link[drawn[i]]), surface.point[drawn[i]], surface.normal[drawn[i]]
             along = ways.postures[0].rotation[link].T @ ways.way[0, i]
-            return ApproachingObstacle(link, ways.surface.point[i] + r * normal, normal, along, bool(sees.any()))
+            return ApproachingObstacle(link, point + r * normal, normal, along, bool(sees.any()))
         raise ExperimentError("Nothing can come at the arm where it stands: make the ways shorter.")
 
     def _speed(self, obstacle: ApproachingObstacle, R: FloatArray, p: FloatArray) -> float:

@@ -8,10 +8,9 @@ from itertools import product
 import numpy as np
 
 from pretouch.control.path import Circle
-from pretouch.coverage.measure import POINTS, Setting, covered
+from pretouch.coverage.measure import Setting, covered
 from pretouch.coverage.params import CoverageParams
 from pretouch.coverage.suggest import candidates, suggest
-from pretouch.coverage.surface import surface_of
 from pretouch.coverage.ways import Ways, seen_by
 from pretouch.profiles import profile
 from pretouch.robot.model import RobotModel
@@ -82,8 +81,7 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
     """Run one trial; return its row of results and what it left behind."""
     model, params = context.model, CoverageParams()
     skin = skin_of(str(cell.where["skin"]), model, context.skin, seed)
-    surface = surface_of(model, POINTS, float(np.random.default_rng([seed, 54]).uniform()))
-    approaching = ApproachingObstacles(model, skin, surface, params, COUNT, seed)
+    approaching = ApproachingObstacles(model, skin, params, COUNT, seed)
     found, speed = context.profile(cell), ARMS[str(cell.where["arm"])]
     if speed is not None:
         found = replace(found, task=replace(found.task, speed_m_s=speed))
