@@ -9,9 +9,8 @@ import pytest
 from tests.importing.made import BOX, joint, link, six_axis, small, written
 
 from pretouch.errors import RobotModelError
-from pretouch.importing.folder import write_folder
 from pretouch.importing.read import read_robot
-from pretouch.importing.robot_import import ImportOptions, import_robot
+from pretouch.importing.robot_import import ImportOptions, import_robot, write_folder
 from pretouch.robot.description import load_description
 from pretouch.robot.model import RobotModel
 from pretouch.robot.postures import capsule_ends, kinematics_of, self_distances
@@ -121,7 +120,7 @@ def test_a_folder_that_is_there_is_refused(imported, tmp_path):
 
 
 def test_an_import_that_is_cut_short_leaves_nothing(imported, tmp_path, monkeypatch):
-    monkeypatch.setattr("pretouch.importing.folder.description_text", Mock(side_effect=KeyboardInterrupt))
+    monkeypatch.setattr("pretouch.importing.robot_import.description_text", Mock(side_effect=KeyboardInterrupt))
     with pytest.raises(KeyboardInterrupt):
         write_folder(imported, tmp_path / "arm")
     assert list(tmp_path.iterdir()) == []
@@ -228,7 +227,7 @@ def test_fingers_are_fixed_where_they_are_nearest_to_zero_and_named(tmp_path):
         "f2", "link6", "right", "prismatic", "0 -1 0", limit=slide, more='<mimic joint="f1"/>'
     )
     found = quickly(tmp_path, six_axis(fingers).replace(BOX, "<geometry/>", 5))
-    assert any("2 joints off the arm are fixed at 0, or at the nearest limit: f1, f2" in r for r in found.remarks)
+    assert any("Joints off the arm, fixed at 0 or at the nearest limit: f1, f2" in r for r in found.remarks)
     model = found.model
     kin, hand, left = model.kinematics(np.zeros(6)), model.link_index("link6"), model.link_index("left")
     offset = kin.rotation[hand].T @ (kin.position[left] - kin.position[hand])
@@ -268,8 +267,8 @@ def mjcf():
 def test_an_mjcf_file_keeps_its_mechanics(tmp_path):
     file = written(tmp_path, mjcf(), "arm.xml")
     found = import_robot(file, ImportOptions(ready=READY, capsules=1))
-    assert found.description.ee_body == "tip"
-    assert found.limits.tau_max[:2].tolist() == [30.0, 50.0]
+    assert found.model.description.ee_body == "tip"
+    assert found.model.description.tau_max[:2].tolist() == [30.0, 50.0]
     assert not any("Armature" in r for r in found.remarks)
     assert_same_mechanics(found.model, mujoco.MjModel.from_xml_path(str(file)))
 

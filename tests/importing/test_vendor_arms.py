@@ -42,7 +42,7 @@ def test_a_panda_is_imported_as_ours_is(panda_model):
 def test_other_arms_are_imported_as_well_and_follow_the_papers_paths(file, joints, ee, scale):
     found = import_robot(robot(file), ImportOptions())
     assert found.model.n == joints
-    assert found.description.ee_body == ee
+    assert found.model.description.ee_body == ee
     assert max(body.sticks_out for body in found.bodies) < 0.03
     assert not any("No posture was found" in remark for remark in found.remarks)
     assert_same_mechanics(found.model, stripped(robot(file)))

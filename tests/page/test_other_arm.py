@@ -6,8 +6,7 @@ from tests.importing.made import equipped, six_axis, written
 from tests.other_arm import copied_panda
 
 from pretouch.control.path import Circle
-from pretouch.importing.folder import write_folder
-from pretouch.importing.robot_import import ImportOptions, import_robot
+from pretouch.importing.robot_import import ImportOptions, import_robot, write_folder
 from pretouch.page.mouse import Mouse
 from pretouch.page.room import LiveSettings, live_path, settings_for
 from pretouch.page.simulation import LiveSimulation

@@ -9,8 +9,7 @@ from tests.limits import assert_within_limits
 from tests.other_arm import copied_panda
 
 from pretouch.errors import ExperimentError
-from pretouch.importing.folder import write_folder
-from pretouch.importing.robot_import import ImportOptions, import_robot
+from pretouch.importing.robot_import import ImportOptions, import_robot, write_folder
 from pretouch.profiles import profile
 from pretouch.robot.description import RobotDescription, panda, robot_named
 from pretouch.robot.model import RobotModel

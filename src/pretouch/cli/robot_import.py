@@ -12,10 +12,8 @@ from pretouch.cli.options import JsonFile, Numbers, OptionalFile, Paths
 from pretouch.cli.robot_check import arm_numbers, joint_table, ready_said
 from pretouch.cli.tables import show
 from pretouch.cli.writing import numbers_to
-from pretouch.importing.described import described, is_description
-from pretouch.importing.folder import check_free, write_folder
-from pretouch.importing.read import read_robot
-from pretouch.importing.robot_import import Imported, ImportOptions, import_robot
+from pretouch.importing.read import described, is_description, read_robot
+from pretouch.importing.robot_import import Imported, ImportOptions, check_free, import_robot, write_folder
 from pretouch.sensing.skin import OWN_SKIN
 from pretouch.text_table import TextTable, tabulated
 

@@ -5,8 +5,7 @@ import numpy as np
 
 from pretouch.errors import RobotModelError
 from pretouch.importing.capsules import LinkBody, Rods
-from pretouch.importing.chain import Arm
-from pretouch.importing.limits import Limits
+from pretouch.importing.chain import Arm, Limits
 from pretouch.types import FloatArray
 
 DENSITY = 1000.0
@@ -23,37 +22,27 @@ def arm_file(name: str, arm: Arm, limits: Limits, bodies: tuple[LinkBody, ...]) 
     A link without any inertial has that of its capsules, if a joint moves it and nothing that is fixed to it has a
     mass. One with a mass alone has the inertia of its capsules.
     """
-    links, model, known = arm.robot.links, arm.robot.model, arm.robot.beside.mass
-    rods, T = {body.name: body.rods for body in bodies}, _poses(arm)
+    links, rods, T = arm.robot.links, {body.name: body.rods for body in bodies}, _poses(arm)
     spec = mujoco.MjSpec()
     spec.compiler.degree = False
     spec.modelname, spec.option.timestep, spec.option.integrator = name, 0.001, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    placed, estimated = [spec.worldbody], list[str]()
+    placed, estimates = [spec.worldbody], list[str]()
     for i, link in enumerate(links):
         if i:
-            position, quaternion = _in_parent(T[link.parent], T[i])
-            placed.append(placed[link.parent].add_body(name=link.name, pos=position, quat=quaternion))
-        body, mass = placed[i], known.get(link.name, 0.0)
+            within, quaternion = np.linalg.solve(T[link.parent], T[i]), np.zeros(4)
+            mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(within[:3, :3]).ravel())
+            placed.append(placed[link.parent].add_body(name=link.name, pos=within[:3, 3], quat=quaternion))
         for joint in (joint for joint in link.joints if joint in arm.joints):
-            _add_joint(body, arm, limits, arm.joints.index(joint))
-        density = 0.0
-        if link.mass > 0:
-            body.mass, body.ipos, body.iquat = link.mass, model.body_ipos[i], model.body_iquat[i]
-            body.inertia, body.explicitinertial = model.body_inertia[i], True
-        elif mass > 0 and link.name in rods:
-            density = mass / _volume(rods[link.name]).sum()
-            estimated.append(f"{link.name} (inertia only, of {mass:.2g} kg)")
-        elif _needs_mass(arm, i):
-            density = DENSITY
-            wrong = f"{mass:g} kg in the file, " if mass else ""
-            estimated.append(f"{link.name} ({wrong}{_estimate(body, rods.get(link.name)):.2g} kg)")
-        _add_capsules(body, link.name, rods.get(link.name), density)
+            _add_joint(placed[i], arm, limits, arm.joints.index(joint))
+        density = _set_inertial(placed[i], arm, i, rods.get(link.name), estimates)
+        if link.name in rods:
+            _add_capsules(placed[i], link.name, rods[link.name], density)
     remarks = []
     if heavy := [f"{link.name} ({link.mass:g} kg)" for link in links if link.mass > _LARGEST_MASS]:
         remarks.append(f"Implausible masses, correct them in the file: {', '.join(heavy)}.")
-    if estimated:
+    if estimates:
         remarks.append(
-            f"Without a mass or inertia that is possible, so estimated at {DENSITY:g} kg/m^3: {', '.join(estimated)}."
+            f"Without a mass or inertia that is possible, so estimated at {DENSITY:g} kg/m^3: {', '.join(estimates)}."
             " Simulated forces are only as accurate as that: give each its mass and inertia in the file."
         )
     try:
@@ -77,52 +66,60 @@ def _poses(arm: Arm) -> FloatArray:
     return T
 
 
-def _in_parent(parent: FloatArray, own: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Position (3,) and quaternion (4,) of a pose in another one, both (4, 4)."""
-    T = np.asarray(np.linalg.solve(parent, own), dtype=np.float64)
-    quaternion: FloatArray = np.zeros(4)
-    mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(T[:3, :3]).ravel())
-    return T[:3, 3], quaternion
-
-
 def _add_joint(body: mujoco.MjsBody, arm: Arm, limits: Limits, j: int) -> None:
     joint, model, torque = arm.joints[j], arm.robot.model, float(limits.tau_max[j])
     body.add_joint(
-        name=joint.name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=model.jnt_axis[joint.index],
-        pos=model.jnt_pos[joint.index], ref=float(model.qpos0[model.jnt_qposadr[joint.index]]),
-        range=[limits.q_min[j], limits.q_max[j]], actfrcrange=[-torque, torque],
-    )  # fmt: skip
+        name=joint.name,
+        type=mujoco.mjtJoint.mjJNT_HINGE,
+        axis=model.jnt_axis[joint.index],
+        pos=model.jnt_pos[joint.index],
+        ref=float(model.qpos0[model.jnt_qposadr[joint.index]]),
+        range=[limits.q_min[j], limits.q_max[j]],
+        actfrcrange=[-torque, torque],
+    )
 
 
-def _add_capsules(body: mujoco.MjsBody, link: str, rods: Rods | None, density: float) -> None:
-    ends = [] if rods is None else zip(rods.a, rods.b, rods.radius, strict=True)
-    for k, (a, b, radius) in enumerate(ends):
-        body.add_geom(
-            name=f"{link}_{k}", type=mujoco.mjtGeom.mjGEOM_CAPSULE, size=[radius, 0, 0], fromto=[*a, *b],
-            contype=1, conaffinity=2, group=3, density=density,
-        )  # fmt: skip
+def _add_capsules(body: mujoco.MjsBody, link: str, rods: Rods, density: float) -> None:
+    for k, (a, b, radius) in enumerate(zip(rods.a, rods.b, rods.radius, strict=True)):
+        capsule = body.add_geom(name=f"{link}_{k}", type=mujoco.mjtGeom.mjGEOM_CAPSULE, size=[radius, 0, 0])
+        capsule.fromto, capsule.density = [*a, *b], density
+        capsule.contype, capsule.conaffinity, capsule.group = 1, 2, 3
+
+
+def _set_inertial(body: mujoco.MjsBody, arm: Arm, i: int, rods: Rods | None, estimates: list[str]) -> float:
+    """Give a body the inertial of its link; return the density of its capsules [kg/m^3] where it has none.
+
+    A mass or inertia that is estimated is added to `estimates`.
+    """
+    link, model = arm.robot.links[i], arm.robot.model
+    mass = arm.robot.beside.mass.get(link.name, 0.0)
+    if link.mass > 0:
+        body.mass, body.ipos, body.iquat = link.mass, model.body_ipos[i], model.body_iquat[i]
+        body.inertia, body.explicitinertial = model.body_inertia[i], True
+        return 0.0
+    if mass > 0 and rods is not None:
+        estimates.append(f"{link.name} (inertia only, of {mass:.2g} kg)")
+        return mass / _volume(rods)
+    if not _needs_mass(arm, i):
+        return 0.0
+    if rods is None:
+        body.mass, body.inertia, body.explicitinertial = _LEAST_MASS, [_LEAST_INERTIA] * 3, True
+    wrong = f"{mass:g} kg in the file, " if mass else ""
+    estimates.append(f"{link.name} ({wrong}{_LEAST_MASS if rods is None else DENSITY * _volume(rods):.2g} kg)")
+    return DENSITY
 
 
 def _needs_mass(arm: Arm, link: int) -> bool:
     """Whether a joint of the arm moves the link and neither it nor what is fixed to it has a mass."""
-    links = arm.robot.links
-    if not any(joint in arm.joints for joint in links[link].joints):
-        return False
+    links, masses = arm.robot.links, arm.robot.beside.mass
+    moved = [any(joint in arm.joints for joint in one.joints) for one in links]
     fixed = {link}
     for i in range(link + 1, len(links)):
-        if links[i].parent in fixed and not any(joint in arm.joints for joint in links[i].joints):
+        if links[i].parent in fixed and not moved[i]:
             fixed.add(i)
-    return not any(links[i].mass > 0 or arm.robot.beside.mass.get(links[i].name, 0.0) > 0 for i in fixed)
+    return moved[link] and not any(links[i].mass > 0 or masses.get(links[i].name, 0.0) > 0 for i in fixed)
 
 
-def _estimate(body: mujoco.MjsBody, rods: Rods | None) -> float:
-    """Return the mass that a link's capsules give it [kg]; without capsules, give it the least."""
-    if rods is not None:
-        return float(DENSITY * _volume(rods).sum())
-    body.mass, body.inertia, body.explicitinertial = _LEAST_MASS, [_LEAST_INERTIA] * 3, True
-    return _LEAST_MASS
-
-
-def _volume(rods: Rods) -> FloatArray:
-    """Volumes (K,) of capsules [m^3]; where two overlap it counts twice."""
-    return np.pi * rods.radius**2 * (np.linalg.norm(rods.b - rods.a, axis=1) + 4 / 3 * rods.radius)
+def _volume(rods: Rods) -> float:
+    """Volume of capsules [m^3]; where two overlap it counts twice."""
+    return float((np.pi * rods.radius**2 * (np.linalg.norm(rods.b - rods.a, axis=1) + 4 / 3 * rods.radius)).sum())

@@ -12,15 +12,14 @@ from trimesh.sample import sample_surface
 
 from pretouch.errors import RobotModelError
 from pretouch.importing.chain import Arm
-from pretouch.importing.sampling import directions
 from pretouch.importing.tree import Shape
 from pretouch.robot.body import from_axes
 from pretouch.robot.postures import spread
-from pretouch.types import BoolArray, FloatArray, IntArray
+from pretouch.types import BoolArray, FloatArray
 
 MOST = 3
 """Capsules for one link at most, unless more are asked for."""
-_MOST_GIVEN = 6
+_MOST_OWN = 6
 """A link whose shapes are as many balls and capsules at most keeps them as they are."""
 _LARGEST = 5.0
 """Size of a link beyond which it is taken for one in millimetres [m]."""
@@ -103,50 +102,46 @@ def bodies_of(arm: Arm, most: int = MOST, cover: bool = False) -> tuple[tuple[Li
     """
     links = arm.robot.links
     # every mesh is read before the first link is fitted: what is wrong with one is said at once
-    surfaces = {i: _checked(link.name, link.surface()) for i, link in enumerate(links) if link.shapes}
-    jointed = {i for i, link in enumerate(links) if any(joint in arm.joints for joint in link.joints)}
-    if not any(jointed.intersection(arm.robot.ancestors(i)) for i in surfaces):
+    surfaces = {link: link.surface() for link in links if link.shapes}
+    jointed = [link for link in links if any(joint in arm.joints for joint in link.joints)]
+    moving = [link for link in surfaces if any(links[i] in jointed for i in arm.robot.ancestors(links.index(link)))]
+    if not moving:
         raise RobotModelError(
             f"No moving link of {arm.robot.name} has any geometry: give the links <collision> or <visual> shapes."
         )
-    visual = [links[i].name for i in surfaces if not links[i].collision]
-    bare = [links[i].name for i in sorted(jointed - set(surfaces))]
+    for link, surface in surfaces.items():
+        if (size := float(surface.extents.max())) > _LARGEST:
+            raise RobotModelError(
+                f"The link {link.name} is {size:.4g} m long: if its meshes are in millimetres, give them the scale"
+                ' "0.001 0.001 0.001" in the file.'
+            )
+    visual = [link.name for link in surfaces if not link.collision]
+    bare = [link.name for link in jointed if not link.shapes]
     remarks = []
     if visual:
         remarks.append(f"Without collision geometry, so fitted to the visual geometry: {', '.join(visual)}.")
     if bare:
         remarks.append(f"Without any geometry, so without a capsule: {', '.join(bare)}.")
-    bodies = [
-        link_body(links[i].name, outside_of(surface), given_by(links[i].shapes), most, cover)
-        for i, surface in surfaces.items()
-    ]
+    bodies = (
+        link_body(link.name, outside_of(surface), own_capsules(link.shapes), most, cover)
+        for link, surface in surfaces.items()
+    )
     return tuple(bodies), tuple(remarks)
 
 
-def _checked(link: str, surface: Trimesh) -> Trimesh:
-    """Return a link's surface; one of no possible size is a RobotModelError."""
-    size = float(surface.extents.max())
-    if size > _LARGEST:
-        raise RobotModelError(
-            f"The link {link} is {size:.4g} m long: if its meshes are in millimetres, give them the scale"
-            ' "0.001 0.001 0.001" in the file.'
-        )
-    return surface
-
-
-def link_body(name: str, outside: Outside, given: Rods | None, most: int = MOST, cover: bool = False) -> LinkBody:
+def link_body(name: str, outside: Outside, own: Rods | None, most: int = MOST, cover: bool = False) -> LinkBody:
     """Return a link's own capsules if there are any, otherwise fitted ones."""
-    rods = given or fitted(outside, most)
-    if cover and given is None:
+    rods = own or fitted(outside, most)
+    if cover and own is None:
         rods = covering(rods, outside.on)
     over = (outside.height - rods(outside.around)).max(initial=0.0)
-    return LinkBody(name, rods, given is None, max(0.0, float(rods(outside.on).max())), float(over))
+    return LinkBody(name, rods, own is None, max(0.0, float(rods(outside.on).max())), float(over))
 
 
-def given_by(shapes: tuple[Shape, ...]) -> Rods | None:
-    """Return a link's own capsules and balls, if it has nothing else."""
+def own_capsules(shapes: tuple[Shape, ...]) -> Rods | None:
+    """Return the capsules and balls of a link, if it has nothing else and few of them."""
     kinds = {mujoco.mjtGeom.mjGEOM_SPHERE: 0.0, mujoco.mjtGeom.mjGEOM_CAPSULE: 1.0}
-    if len(shapes) > _MOST_GIVEN or not all(shape.kind in kinds for shape in shapes):
+    if len(shapes) > _MOST_OWN or not all(shape.kind in kinds for shape in shapes):
         return None
     half = [max(kinds[shape.kind] * shape.size[1], _SHORTEST) * shape.T[:3, 2] for shape in shapes]
     middle = [shape.T[:3, 3] for shape in shapes]
@@ -158,7 +153,9 @@ def outside_of(surface: Trimesh) -> Outside:
     samples, face = sample_surface(surface, _SAMPLES, seed=0)
     u = spread(_AROUND, 3)
     height = _NEAREST * (min(_FARTHEST, max(float(surface.scale), 0.04)) / _NEAREST) ** u[:, :1]
-    around = samples[:_AROUND] + height * directions(u[:, 1:])
+    z, turn = 2 * u[:, 1] - 1, 2 * np.pi * u[:, 2]
+    flat = np.sqrt(1 - z * z)
+    around = samples[:_AROUND] + height * np.stack([flat * np.cos(turn), flat * np.sin(turn), z], axis=1)
     around = around[~_inside(around, samples[:_WINDING], surface.face_normals[face[:_WINDING]], float(surface.area))]
     distance, nearest = cKDTree(samples).query(around)
     on = np.vstack([samples, surface.vertices[surface.referenced_vertices]]).view(np.ndarray)
@@ -180,15 +177,15 @@ def fitted(outside: Outside, most: int = MOST) -> Rods:
     """Fit as few capsules as are worth it, `most` at most, to a surface. The same surface has the same capsules."""
     near = outside.nearest[:_FITTED]
     points = np.vstack([near, outside.around[:_FITTED]])
-    wanted = np.concatenate([np.zeros(len(near)), outside.height[:_FITTED]])
+    height = np.concatenate([np.zeros(len(near)), outside.height[:_FITTED]])
     best: Rods | None = None
     for count in range(1, most + 1):
-        starts = _starts(near, count, best)
-        rods = min((_refined(start, points, wanted) for start in starts), key=lambda r: _cost(r, points, wanted))
-        if best is not None and _cost(rods, points, wanted) > _WORTH**2 * _cost(best, points, wanted):
+        fits = [_refined(start, points, height) for start in _starts(near, count, best)]
+        rods = min(fits, key=lambda rods: _cost(rods, points, height))
+        if best is not None and _cost(rods, points, height) > _WORTH**2 * _cost(best, points, height):
             break
         best = rods
-        if np.percentile(np.abs(best(points) - wanted), 95) < _GOOD:
+        if np.percentile(np.abs(best(points) - height), 95) < _GOOD:
             break
     assert best is not None  # noqa: S101  the loop runs at least once
     return best
@@ -206,36 +203,37 @@ def _weighted(error: FloatArray) -> FloatArray:
     return np.where(error > 0, _TOO_SHORT, 1.0) * error
 
 
-def _cost(rods: Rods, points: FloatArray, wanted: FloatArray) -> float:
-    return float((_weighted(rods(points) - wanted) ** 2).mean())
+def _cost(rods: Rods, points: FloatArray, height: FloatArray) -> float:
+    return float((_weighted(rods(points) - height) ** 2).mean())
 
 
-def _refined(start: Rods, points: FloatArray, wanted: FloatArray) -> Rods:
+def _refined(start: Rods, points: FloatArray, height: FloatArray) -> Rods:
     """Move capsules to where the squared errors of their distances (P,) from points (P, 3) are least."""
-
-    def error(x: FloatArray) -> FloatArray:
-        return _weighted(_unpacked(x)(points) - wanted)
-
-    def slope(x: FloatArray) -> FloatArray:
-        return _slope(_unpacked(x), points, wanted)
-
     x = np.column_stack([start.a, start.b, start.radius]).ravel()
     if len(points) < len(x):
         return start  # too few to move capsules by
-    rods = _unpacked(least_squares(error, x, slope, method="lm", max_nfev=60).x)
+    rods = _unpacked(
+        least_squares(
+            lambda x: _weighted(_unpacked(x)(points) - height),
+            x,
+            lambda x: _slope(_unpacked(x), points, height),
+            method="lm",
+            max_nfev=60,
+        ).x
+    )
     along = rods.b - rods.a
     short = np.linalg.norm(along, axis=1) < 2 * _SHORTEST
     step, middle = np.where(short[:, None], np.array([0.0, 0.0, _SHORTEST]), along / 2), (rods.a + rods.b) / 2
     return Rods(middle - step, middle + step, rods.radius)
 
 
-def _slope(rods: Rods, points: FloatArray, wanted: FloatArray) -> FloatArray:
+def _slope(rods: Rods, points: FloatArray, height: FloatArray) -> FloatArray:
     """Derivatives (P, 7 K) of the weighed errors: of each point's distance, by its nearest capsule only."""
     part, away = from_axes(points, rods.a, rods.b)
     length = np.linalg.norm(away, axis=2)
     k, rows = (length - rods.radius).argmin(axis=1), np.arange(len(points))
     part, away, each = part[rows, k, None], away[rows, k] / np.maximum(length[rows, k, None], 1e-9), length[rows, k]
-    weight = np.where(each - rods.radius[k] > wanted, _TOO_SHORT, 1.0)[:, None]
+    weight = np.where(each - rods.radius[k] > height, _TOO_SHORT, 1.0)[:, None]
     table = np.zeros((len(points), len(rods), 7))
     table[rows, k] = weight * np.hstack([-(1 - part) * away, -part * away, -np.ones((len(points), 1))])
     return table.reshape(len(points), -1)
@@ -247,15 +245,18 @@ def _unpacked(x: FloatArray) -> Rods:
 
 
 def _starts(points: FloatArray, count: int, before: Rods | None) -> list[Rods]:
-    """Return where to begin from with so many capsules: slices of the surface, and what was found with one fewer."""
+    """Return where to begin from with so many capsules: slices of the surface, and the best ones with one fewer."""
     axes = _axes(points)
-    centred = points - points.mean(axis=0)
-    found = [_by_slice(points, _slices(centred @ axis, count)) for axis in axes[: 1 if count == 1 else 3]]
+    along = (points - points.mean(axis=0)) @ axes.T
+    starts = []
+    for values in along.T[: 1 if count == 1 else 3]:
+        part = np.digitize(values, np.linspace(values.min(), values.max(), count + 1)[1:-1])
+        starts.append(_through([points[part == k] if np.any(part == k) else points for k in range(count)]))
     if before is not None:
         worst = points[np.argmax(before(points))] + np.array([[-0.005], [0.005]]) * axes[0]
         radius = np.append(before.radius, before.radius.min() / 2)
-        found.append(Rods(np.vstack([before.a, worst[:1]]), np.vstack([before.b, worst[1:]]), radius))
-    return found
+        starts.append(Rods(np.vstack([before.a, worst[:1]]), np.vstack([before.b, worst[1:]]), radius))
+    return starts
 
 
 def _axes(points: FloatArray) -> FloatArray:
@@ -264,22 +265,13 @@ def _axes(points: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.eigh(centred.T @ centred)[1].T[::-1])
 
 
-def _slices(values: FloatArray, count: int) -> IntArray:
-    """Part (P,) of the range of some values (P,) that each lies in, of so many equal parts."""
-    low, high = values.min(), values.max()
-    return np.clip(((values - low) / max(high - low, 1e-12) * count).astype(np.int64), 0, count - 1)
-
-
-def _by_slice(points: FloatArray, part: IntArray) -> Rods:
-    """Lay one capsule through each slice of points (P, 3), along its longest extent."""
-    a, b, radius = [], [], []
-    for k in range(part.max() + 1):
-        own = points[part == k] if np.any(part == k) else points
+def _through(slices: list[FloatArray]) -> Rods:
+    """Lay one capsule through each of some sets of points (P, 3), along its longest extent."""
+    ends = []
+    for own in slices:
         axes, middle = _axes(own), (own.min(axis=0) + own.max(axis=0)) / 2
         extent = (own - middle) @ axes.T
-        r = max(0.9 * float(np.linalg.norm(extent[:, 1:], axis=1).mean()), 2e-3)
-        reach = max(float(np.abs(extent[:, 0]).max()) - r, 1e-3) * axes[0]
-        a.append(middle - reach)
-        b.append(middle + reach)
-        radius.append(r)
-    return Rods(np.array(a), np.array(b), np.array(radius))
+        radius = max(0.9 * float(np.linalg.norm(extent[:, 1:], axis=1).mean()), 2e-3)
+        reach = max(float(np.abs(extent[:, 0]).max()) - radius, 1e-3) * axes[0]
+        ends.append([*(middle - reach), *(middle + reach), radius])
+    return _unpacked(np.array(ends))

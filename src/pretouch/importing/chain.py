@@ -1,18 +1,26 @@
-"""Which of a robot's joints make the arm: one chain of hinges from the first link to the end-effector."""
+"""Which of a robot's joints make the arm, one chain of hinges from the first link to the end-effector; their limits."""
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from pretouch.errors import RobotModelError
 from pretouch.importing.tree import Joint, Link, Robot
+from pretouch.types import FloatArray
 
-_ARM_JOINTS = 4
-"""A branch with as many hinges that nothing leads is an arm; one with fewer is a finger."""
-_USUAL_JOINTS = 6
-"""An arm with fewer may have been cut short where it branches."""
+_ARM_JOINTS = 6
+"""Where a chain with as many joints branches, it ends in fingers; one with fewer has several arms."""
 _GRIPPER, _FINGER = ("gripper", "finger", "jaw"), ("finger", "jaw")
-"""What a single finger's joint, or its link, is called; a link called gripper may be the arm's last."""
+"""What a finger's joint, or its link, is called; a link called gripper may be the arm's last."""
 _NAMES = ("tcp", "tool", "grasp", "ee", "eef", "effector", "tip")
 """What an end-effector's frame is called, the surest first."""
+
+
+_ENDLESS = 2 * np.pi
+_SPEED, _ACCELERATION, _TORQUE = 1.0, 5.0, 50.0
+"""Where nothing is known: slow, gentle and middling [rad/s, rad/s^2, Nm]."""
+_LARGEST_POSITION, _LARGEST_SPEED, _LARGEST_TORQUE = 4 * np.pi, 50.0, 5000.0
+"""What no joint of an arm has [rad, rad/s, Nm]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,157 +41,157 @@ def arm_of(robot: Robot, ee: str = "") -> Arm:
 
     Raises RobotModelError where there is no such chain, or where several arms leave the choice open.
     """
+    end, *others = [robot.index(ee)] if ee else _likely_ends(robot, _last_moved(robot))
     remarks = list(robot.beside.remarks)
-    if ee:
-        end = robot.index(ee)
-    else:
-        trunk, grips = _trunk(robot)
-        end, others = _likeliest_end(robot, trunk)
-        if grips:
-            remarks.append(
-                f"{grips} is treated as a gripper's joint, not as a joint of the arm; --ee {_moved_by(robot, grips)}"
-                " includes it."
-            )
-        if others:
-            remarks.append(f"The end-effector is assumed to be {robot.links[end].name}; choose another"
-                           f" one with --ee: {', '.join(robot.links[i].name for i in others)}.")  # fmt: skip
-    way = robot.ancestors(end)
-    joints = tuple(joint for i in way for joint in robot.links[i].joints)
+    if others:
+        names = ", ".join(robot.links[i].name for i in others)
+        remarks.append(
+            f"The end-effector is assumed to be {robot.links[end].name}; choose another one with --ee: {names}."
+        )
+    joints = tuple(joint for i in robot.ancestors(end) for joint in robot.links[i].joints)
     _check_chain(robot, end, joints)
-    remarks += [] if ee or len(joints) >= _USUAL_JOINTS else _branching(robot, trunk)
     fixed = [joint.name for link in robot.links for joint in link.joints if joint not in joints]
     if fixed:
         remarks.append(
-            f"{_counted(fixed)} off the arm {'is' if len(fixed) == 1 else 'are'} fixed at 0, or at the nearest limit:"
-            f" {', '.join(fixed)}. To close fingers differently, set their positions in the file."
+            f"Joints off the arm, fixed at 0 or at the nearest limit: {', '.join(fixed)}. Set the positions of fingers"
+            " in the file, or give the link that a joint moves as --ee if it is one of the arm's."
         )
     return Arm(robot, end, joints, tuple(remarks))
 
 
-def _counted(names: list[str]) -> str:
-    return f"{len(names)} joint{'s' if len(names) > 1 else ''}"
+def _hinges(link: Link) -> int:
+    """Number of joints that may be an arm's: hinges that nothing leads, other than a gripper's."""
+    finger = any(word in link.name.lower() for word in _FINGER)
+    return sum(
+        joint.kind == "hinge" and not (joint.coupled or finger or any(w in joint.name.lower() for w in _GRIPPER))
+        for joint in link.joints
+    )
 
 
-def _children(robot: Robot) -> list[list[int]]:
-    found: list[list[int]] = [[] for _ in robot.links]
-    for i, link in enumerate(robot.links):
-        if link.parent >= 0:
-            found[link.parent].append(i)
-    return found
-
-
-def _independent(robot: Robot) -> list[int]:
-    """Number of joints that nothing leads, of each link and what hangs on it, along its longest branch."""
-    count = [sum(not joint.coupled for joint in link.joints) for link in robot.links]
-    deepest = [0] * len(count)
-    for i in reversed(range(len(count))):
-        count[i] += deepest[i]
+def _last_moved(robot: Robot) -> int:
+    """Return the last link that an arm's hinge moves; several arms are a RobotModelError that names their ends."""
+    hinges = [_hinges(link) for link in robot.links]
+    longest, end = hinges.copy(), list(range(len(hinges)))  # of each link's branches: their hinges, and the last link
+    for i in reversed(range(1, len(hinges))):
         parent = robot.links[i].parent
-        if parent >= 0:
-            deepest[parent] = max(deepest[parent], count[i])
-    return count
+        if longest[i] and hinges[parent] + longest[i] > longest[parent]:
+            longest[parent], end[parent] = hinges[parent] + longest[i], end[i]
+    at, before = 0, hinges[0]
+    while branches := [i for i, link in enumerate(robot.links) if link.parent == at and longest[i]]:
+        best = max(branches, key=lambda i: longest[i])
+        rivals = [i for i in branches if longest[i] == longest[best]]
+        if len(branches) > 1 and before >= _ARM_JOINTS:
+            return at
+        if len(rivals) > 1:
+            names = ", ".join(robot.links[end[i]].name for i in rivals)
+            raise RobotModelError(
+                f"{robot.name} has {len(rivals)} arms, or one that branches: choose one by --ee, such as {names}."
+            )
+        at, before = best, before + hinges[best]
+    return at
 
 
-def _moved_by(robot: Robot, joint: str) -> str:
-    return next(link.name for link in robot.links if joint in [one.name for one in link.joints])
-
-
-def _grips(link: Link) -> str | None:
-    """Name of the joint of a link, if it or the link is called as those of grippers are."""
-    for joint in link.joints:
-        if any(word in joint.name.lower() for word in _GRIPPER) or any(word in link.name.lower() for word in _FINGER):
-            return joint.name
-    return None
-
-
-def _trunk(robot: Robot) -> tuple[int, str | None]:
-    """Return the last link before the arm ends or branches into fingers, and the joint of a single finger on it.
-
-    Several branches that are arms are a RobotModelError that names their ends.
-    """
-    children, count = _children(robot), _independent(robot)
-    coupled = [any(joint.coupled for joint in link.joints) for link in robot.links]
-    at = 0
-    while True:
-        onward = [i for i in children[at] if count[i] or coupled[i]]
-        arms = [i for i in onward if count[i] >= _ARM_JOINTS]
-        if len(arms) > 1:
-            ends = [robot.links[_last(robot, children, count, i)].name for i in arms]
-            raise RobotModelError(f"The robot has {len(arms)} arms: choose one by --ee, such as {', '.join(ends)}.")
-        if not onward or (len(onward) > 1 and not arms):
-            return at, None
-        ahead = (arms or onward)[0]
-        if coupled[ahead] and not count[ahead]:
-            return at, None
-        if count[ahead] == 1 and (joint := _grips(robot.links[ahead])):
-            return at, joint
-        at = ahead
-
-
-def _branching(robot: Robot, trunk: int) -> list[str]:
-    """Say it, where the arm ends because several branches with joints begin there."""
-    children, count = _children(robot), _independent(robot)
-    ends = [robot.links[_last(robot, children, count, i)].name for i in children[trunk] if count[i]]
-    if len(ends) < 2:
-        return []
-    return [
-        f"The arm is assumed to end at {robot.links[trunk].name}, where it branches towards {', '.join(ends)}: if one"
-        " branch belongs to it, choose that one's last link with --ee."
-    ]
-
-
-def _last(robot: Robot, children: list[list[int]], count: list[int], at: int) -> int:
-    """Return the last link of an arm: the end of its longest branch before it splits into fingers."""
-    while True:
-        onward = [i for i in children[at] if count[i]]
-        if len(onward) != 1:
-            return at if robot.links[at].name else robot.links[at].parent
-        at = onward[0]
-
-
-def _likeliest_end(robot: Robot, trunk: int) -> tuple[int, list[int]]:
-    """Return the end-effector among the links fixed to the trunk's last, and the other ones that could be meant."""
-    children = _children(robot)
-    ends, waiting = [], [trunk]
+def _likely_ends(robot: Robot, last: int) -> list[int]:
+    """Return the ends of what is fixed to a link, itself if nothing is: the likeliest end-effector first."""
+    ends, waiting = list[int](), [last]
     while waiting:
         at = waiting.pop(0)
-        fixed = [i for i in children[at] if not robot.links[i].joints]
-        waiting += fixed
-        if not fixed:
-            ends.append(at)
+        onward = [i for i, link in enumerate(robot.links) if link.parent == at and not link.joints]
+        waiting += onward
+        ends += [] if onward else [at]
 
-    def likelihood(link: int) -> int:
+    def rank(link: int) -> int:
         words = robot.links[link].name.lower().replace("-", "_").split("_")
         return next((k for k, name in enumerate(_NAMES) if any(word.startswith(name) for word in words)), len(_NAMES))
 
-    ends.sort(key=likelihood)
-    return ends[0], ends[1:]
+    return sorted(ends, key=rank)
 
 
 def _check_chain(robot: Robot, end: int, joints: tuple[Joint, ...]) -> None:
     """Refuse what is no chain of hinges each of which moves by itself and has limits."""
-    name = robot.links[end].name
     if not joints:
-        moved = [link.name for i, link in enumerate(robot.links) if link.joints and i]
+        moved = ", ".join(link.name for link in robot.links[1:] if link.joints) or "none, for no joint moves one"
         raise RobotModelError(
-            f"No joint moves {name}: choose another end-effector by --ee"
-            + (f", such as {', '.join(moved[-8:])}." if moved else "; the file has no joint that moves.")
+            f"No joint moves {robot.links[end].name}: choose another end-effector by --ee, such as {moved}."
         )
     for joint in joints:
+        low, high = joint.limits or (0.0, 1.0)
+        if joint.kind != "hinge":
+            trouble = "is prismatic" if joint.kind == "slide" else "is not a hinge"
+        elif joint.coupled:
+            trouble = "mimics another one, as fingers do"
+        elif not low < high:
+            trouble = f"has the range {low:g} to {high:g}"
+        else:
+            continue
         before = next(link.parent for link in robot.links if joint in link.joints)
-        way_out = f"choose an end-effector before it by --ee, such as {robot.links[max(before, 0)].name}, or fix it"
-        if joint.kind == "slide":
-            raise RobotModelError(
-                f"The joint {joint.name} is prismatic, but only hinge joints are supported: {way_out} in the file."
+        raise RobotModelError(
+            f"The joint {joint.name} {trouble}, but only hinges that move by themselves from a lower to an upper limit"
+            " are supported: correct the file, or choose an end-effector before it by --ee, such as"
+            f" {robot.links[max(before, 0)].name}."
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Limits:
+    """Limits of n joints."""
+
+    q_min: FloatArray
+    """(n,) [rad]."""
+    q_max: FloatArray
+    """(n,) [rad]."""
+    qd_max: FloatArray
+    """(n,) [rad/s]."""
+    qdd_max: FloatArray
+    """(n,) [rad/s^2]."""
+    tau_max: FloatArray
+    """(n,) [Nm]."""
+    remarks: tuple[str, ...]
+    """What was assumed, a sentence each."""
+
+
+def limits_of(
+    arm: Arm, qd_max: tuple[float, ...] = (), qdd_max: tuple[float, ...] = (), tau_max: tuple[float, ...] = ()
+) -> Limits:
+    """Return an arm's limits; those given, one for all joints or one for each, take the place of the file's."""
+    n, remarks = len(arm.joints), list[str]()
+
+    def among(names: list[str]) -> str:
+        return "all joints" if len(names) == n else ", ".join(names)
+
+    def settled(
+        what: str, unit: str, option: str, options: tuple[float, ...], in_file: list[float | None], usual: float
+    ) -> FloatArray:
+        if options and (len(options) not in (1, n) or not all(np.isfinite(options)) or min(options) <= 0):
+            listed = ", ".join(f"{v:g}" for v in options)
+            raise RobotModelError(f"{option} is {listed}: give one positive number [{unit}], or {n}, by commas.")
+        if options:
+            return np.broadcast_to(np.array(options, dtype=np.float64), n).copy()
+        if missing := [joint.name for joint, value in zip(arm.joints, in_file, strict=True) if value is None]:
+            remarks.append(
+                f"The file has no {what} limit of {among(missing)}: {usual:g} {unit} is assumed; give {option}."
             )
-        if joint.kind == "other":
-            raise RobotModelError(
-                f"The joint {joint.name} is not a hinge, but only hinge joints are supported: {way_out}."
+        return np.array([usual if value is None else abs(value) for value in in_file])
+
+    if endless := [joint.name for joint in arm.joints if joint.limits is None]:
+        remarks.append(
+            f"The file has no position limits of {among(endless)}: -2 pi to 2 pi is assumed; give each a lower and an"
+            " upper one there, or correct the range in arm.xml."
+        )
+    ranges = np.array([joint.limits or (-_ENDLESS, _ENDLESS) for joint in arm.joints])
+    speed, torque = [joint.velocity for joint in arm.joints], [joint.effort for joint in arm.joints]
+    speeds = settled("velocity", "rad/s", "--qd-max", qd_max, speed, _SPEED)
+    accelerations = settled("acceleration", "rad/s^2", "--qdd-max", qdd_max, [None] * n, _ACCELERATION)
+    torques = settled("torque", "Nm", "--tau-max", tau_max, torque, _TORQUE)
+    for what, unit, values, largest in (
+        ("position", "rad", np.abs(ranges).max(axis=1), _LARGEST_POSITION),
+        ("velocity", "rad/s", speeds, _LARGEST_SPEED),
+        ("torque", "Nm", torques, _LARGEST_TORQUE),
+    ):
+        beyond = [f"{joint.name} ({v:g} {unit})" for joint, v in zip(arm.joints, values, strict=True) if v > largest]
+        if beyond:
+            remarks.append(
+                f"Implausible {what} limits, perhaps of another unit, correct them in the file or robot.toml:"
+                f" {', '.join(beyond)}."
             )
-        if joint.coupled:
-            raise RobotModelError(f"The joint {joint.name} mimics another one, as fingers do: {way_out}.")
-        if joint.limits is not None and not joint.limits[0] < joint.limits[1]:
-            raise RobotModelError(
-                f"The joint {joint.name} has the range {joint.limits[0]:g} to {joint.limits[1]:g}: give it lower and"
-                " upper limits in the file."
-            )
+    return Limits(ranges[:, 0], ranges[:, 1], speeds, accelerations, torques, tuple(remarks))

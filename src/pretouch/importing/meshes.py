@@ -14,43 +14,25 @@ from pretouch.extras import MESHES
 SUFFIXES = (".stl", ".obj", ".dae")
 
 
-class MeshFinder:
-    """Finds mesh files: relative to the URDF, by absolute path, or in a ROS package.
+def find_mesh(uri: str, file: Path, folders: tuple[Path, ...]) -> Path:
+    """Return the mesh file that a URDF names: relative to it, by absolute path, or in a ROS package.
 
-    The package `p` of package://p/rest is looked for as the folder `p` in the folders given, in the folder of the
-    file, and in each folder above it.
+    The package `p` of package://p/rest is looked for as the folder `p` in `folders`, or one of them, then in the folder
+    of the URDF and in each above it. A mesh that is not found is a RobotModelError.
     """
-
-    def __init__(self, file: Path, folders: tuple[Path, ...]) -> None:
-        """Take the URDF, and folders that hold packages, or are packages themselves."""
-        for folder in folders:
-            if not folder.is_dir():
-                raise RobotModelError(f"The package path {folder} is not a folder: give one that holds ROS packages.")
-        self._near = file.resolve().parent
-        self._folders = [*folders, self._near, *self._near.parents]
-
-    def find(self, uri: str) -> Path:
-        """Return the file that a URI names; RobotModelError if there is none."""
-        scheme, _, name = unquote(uri).replace("\\", "/").rpartition("://")
-        if scheme in ("package", "model"):
-            package, _, rest = name.partition("/")
-            own = [folder / rest for folder in self._folders if folder.name == package]
-            places = [folder / package / rest for folder in self._folders] + own
-            way_out = f"give --package-path the folder that holds the package {package}"
-        else:
-            places = [self._near / (name.removeprefix("localhost") if scheme == "file" else name)]
-            way_out = f"put it at {places[0]}, where the URDF says"
-        place = next((place for place in places if _is_file(place)), None)
-        if place is None:
-            raise RobotModelError(f"The mesh {uri} was not found: {way_out}.")
-        return place
-
-
-def _is_file(path: Path) -> bool:
-    try:
-        return path.is_file()
-    except (OSError, ValueError):  # a name too long, or with a zero
-        return False
+    scheme, _, name = unquote(uri).replace("\\", "/").rpartition("://")
+    near = file.resolve().parent
+    places = [near / (name.removeprefix("localhost") if scheme == "file" else name)]
+    way_out = f"put it at {places[0]}, where the URDF says"
+    if scheme in ("package", "model"):
+        package, _, rest = name.partition("/")
+        around = [*folders, near, *near.parents]
+        places = [folder / name for folder in around] + [folder / rest for folder in around if folder.name == package]
+        way_out = f"give --package-path the folder that holds the package {package}"
+    for place in places:
+        if place.is_file():
+            return place
+    raise RobotModelError(f"The mesh {uri} was not found: {way_out}.")
 
 
 def read_mesh(path: Path) -> trimesh.Trimesh:
@@ -75,13 +57,9 @@ def read_mesh(path: Path) -> trimesh.Trimesh:
     except Exception as error:  # whatever a library makes of a broken file
         reason = " ".join(str(error).split())[:200] or type(error).__name__
         raise RobotModelError(f"The mesh {path} is damaged: {reason}.") from error
-    if not len(mesh.faces):
-        raise RobotModelError(f"The mesh {path} holds no triangle, or is truncated: give a complete file.")
-    if not np.all(np.isfinite(mesh.triangles)):
-        raise RobotModelError(f"The mesh {path} is damaged: a coordinate is not finite.")
-    if not np.any(mesh.triangles_cross):
+    if not len(mesh.faces) or not np.isfinite(mesh.triangles).all() or not np.any(mesh.triangles_cross):
         raise RobotModelError(
-            f"The mesh {path} has no area, because its triangles are lines or points: give one with area."
+            f"The mesh {path} holds no triangle with an area and finite corners, or is truncated: give a complete file."
         )
     return mesh
 

@@ -91,50 +91,40 @@ def rated(model: RobotModel, q: FloatArray, apart: BoolArray | None = None) -> R
 
 def proposed(model: RobotModel) -> tuple[Ready, tuple[str, ...]]:
     """Search for a good posture. Where none has its hand in front and pointing down, a sentence says so."""
-    reach = reach_of(model)
-    hand = np.array([_IN_FRONT * reach, 0.0, _HEIGHT * reach])
-    apart = ever_apart(model, _CLEAR)
-    for pace in (_DRAWN if model.n > 5 else _FREE, _FREE):
-        found = [rated(model, q, apart) for q in _hand_at(model, hand, pace)]
-        best = max((one for one in found if _is_clear(model, one)), key=partial(_worth, model), default=None)
-        if best is not None:
+    reach, (low, high) = reach_of(model), _near_middle(model, 0.8)
+    hand, apart = np.array([_IN_FRONT * reach, 0.0, _HEIGHT * reach]), ever_apart(model, _CLEAR)
+
+    def to_hand(kin: Kinematics) -> FloatArray:
+        """Motion (6,) that brings the end-effector to its place, pointing down."""
+        direction = pointing(model, kin)
+        turn = np.cross(direction, [0.0, 0.0, -1.0]) if direction[2] <= 0.999 else np.array([1.0, 0.0, 0.0])
+        return np.concatenate([hand - kin.position[model.ee], turn])
+
+    for way in (_DRAWN if model.n > 5 else _FREE, _FREE):
+        starts = low + spread(_STARTS, model.n) * (high - low)
+        reached = [posture_at(model, q, to_hand, model.q_mid, way) for q in starts]
+        postures = [rated(model, q, apart) for q in reached if q is not None and _room(model, q) > _MARGIN]
+        best = max(postures, key=partial(_grade, model), default=None)
+        if best and _grade(model, best)[0]:
             return best, ()
-    low, high = _near_middle(model, 0.8)
-    found = [rated(model, low + u * (high - low), apart) for u in spread(_ANYWHERE, model.n)]
-    best = max(found, key=lambda one: (_is_clear(model, one), min(one.clear, _CLEAR), _worth(model, one)))
-    return best, (
+    postures = [rated(model, low + u * (high - low), apart) for u in spread(_ANYWHERE, model.n)]
+    return max(postures, key=partial(_grade, model)), (
         "No posture was found with the hand in front of the base and pointing down, so another one was used: give"
         " yours with --ready, or as q_ready in robot.toml.",
     )
 
 
-def _hand_at(model: RobotModel, hand: FloatArray, pace: Reaching) -> list[FloatArray]:
-    """Return postures with the end-effector at a place (3,), pointing down, away from joint limits."""
-    low, high = _near_middle(model, 0.8)
-    starts = low + spread(_STARTS, model.n) * (high - low)
-    found = [posture_at(model, q, partial(_to_hand, model, hand), model.q_mid, pace) for q in starts]
-    return [q for q in found if q is not None and _room(model, q) > _MARGIN]
+def _grade(model: RobotModel, ready: Ready) -> tuple[bool, float, bool, float]:
+    """Rate a posture, the best highest: clear of itself and of the base's plane, and by how much; then lifted.
 
-
-def _to_hand(model: RobotModel, hand: FloatArray, kin: Kinematics) -> FloatArray:
-    """Motion (6,) that brings the end-effector to a place (3,), pointing down."""
-    direction = pointing(model, kin)
-    turn = np.cross(direction, [0.0, 0.0, -1.0]) if direction[2] <= 0.999 else np.array([1.0, 0.0, 0.0])
-    return np.concatenate([hand - kin.position[model.ee], turn])
-
-
-def _is_clear(model: RobotModel, found: Ready) -> bool:
-    """Tell whether a posture is clear of itself and of the base's plane."""
-    lowest = model.kinematics(found.q).position[model.body.link, 2].min()
-    return bool(found.clear >= _CLEAR and lowest >= _CLEAR)
-
-
-def _worth(model: RobotModel, found: Ready) -> tuple[bool, float]:
-    """Rate a posture: first one whose body, but for what the first joint alone moves, stays above the base's plane."""
-    ends = capsule_ends(model, kinematics_of(model, found.q[None]))[0]
-    lifted = model.moved_by[model.capsules.link].sum(axis=1) > 1
-    lowest = (ends[lifted][..., 2] - model.capsules.radius[lifted, None]).min(initial=np.inf)
-    return bool(lowest >= _CLEAR), found.singular_value + 0.2 * _room(model, found.q)
+    That is one whose body, but for what the first joint alone moves, stays above that plane.
+    """
+    clear = ready.clear >= _CLEAR and model.kinematics(ready.q).position[model.body.link, 2].min() >= _CLEAR
+    ends = capsule_ends(model, kinematics_of(model, ready.q[None]))[0]
+    upper = model.moved_by[model.capsules.link].sum(axis=1) > 1
+    lowest = (ends[upper][..., 2] - model.capsules.radius[upper, None]).min(initial=np.inf)
+    value = ready.singular_value + 0.2 * _room(model, ready.q)
+    return bool(clear), min(ready.clear, _CLEAR), bool(lowest >= _CLEAR), value
 
 
 def _near_middle(model: RobotModel, part: float) -> tuple[FloatArray, FloatArray]:

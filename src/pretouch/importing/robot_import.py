@@ -1,5 +1,6 @@
-"""From a robot's file to everything that the rest of the package takes."""
+"""From a robot's file to everything that the rest of the package takes: the folder of an arm."""
 
+import shutil
 import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -9,11 +10,10 @@ import numpy as np
 from pretouch.errors import RobotModelError
 from pretouch.importing.arm_file import arm_file
 from pretouch.importing.capsules import MOST, LinkBody, bodies_of
-from pretouch.importing.chain import Arm, arm_of
-from pretouch.importing.limits import Limits, limits_of
+from pretouch.importing.chain import arm_of, limits_of
 from pretouch.importing.read import read_robot
 from pretouch.importing.ready import Ready, check_posture, proposed, rated
-from pretouch.robot.description import RobotDescription
+from pretouch.robot.description import FILE, RobotDescription, description_text
 from pretouch.robot.model import RobotModel
 
 MJCF = "arm.xml"
@@ -51,12 +51,9 @@ class ImportOptions:
 class Imported:
     """An arm that was read, and how good what stands for it is."""
 
-    description: RobotDescription
-    """Its `mjcf` is a file of the name `MJCF` that is gone; `mjcf_text` is what was in it."""
     mjcf_text: str
     model: RobotModel
-    arm: Arm
-    limits: Limits
+    """The MJCF file of its description has the name `MJCF` and is gone; `mjcf_text` is what was in it."""
     bodies: tuple[LinkBody, ...]
     ready: Ready
     remarks: tuple[str, ...]
@@ -76,12 +73,40 @@ def import_robot(file: Path, options: ImportOptions) -> Imported:
         mjcf = Path(folder) / MJCF
         mjcf.write_text(text, encoding="utf-8")
         description = RobotDescription(
-            name, mjcf, arm.robot.links[arm.ee].name, limits.qd_max, limits.qdd_max, limits.tau_max,
-            (limits.q_min + limits.q_max) / 2, f"imported from {file.name}",
-        )  # fmt: skip
+            name,
+            mjcf,
+            arm.robot.links[arm.ee].name,
+            limits.qd_max,
+            limits.qdd_max,
+            limits.tau_max,
+            (limits.q_min + limits.q_max) / 2,
+            f"imported from {file.name}",
+        )
         model = RobotModel(description)
         ready, about_ready = (rated(model, np.array(options.ready)), ()) if options.ready else proposed(model)
-        description = replace(description, q_ready=ready.q)
-        model = RobotModel(description)
+        model = RobotModel(replace(description, q_ready=ready.q))
     remarks = (*arm.remarks, *limits.remarks, *about_bodies, *about_inertials, *about_ready)
-    return Imported(description, text, model, arm, limits, bodies, ready, remarks)
+    return Imported(text, model, bodies, ready, remarks)
+
+
+def check_free(folder: Path) -> None:
+    """Raise RobotModelError if a folder is there."""
+    if folder.exists() or folder.is_symlink():
+        raise RobotModelError(f"The folder {folder} exists already: give another --out, or remove it.")
+
+
+def write_folder(imported: Imported, folder: Path) -> None:
+    """Write an arm's folder, whole or not at all; one that is there is a RobotModelError."""
+    check_free(folder)
+    try:
+        folder.mkdir(parents=True)
+        try:
+            (folder / MJCF).write_text(imported.mjcf_text, encoding="utf-8")
+            (folder / FILE).write_text(description_text(imported.model.description), encoding="utf-8")
+        except BaseException:
+            shutil.rmtree(folder, ignore_errors=True)
+            raise
+    except OSError as error:
+        raise RobotModelError(
+            f"The folder {folder} cannot be written: {error.strerror}: give another --out."
+        ) from error

@@ -148,8 +148,9 @@ class Robot:
     def _link(self, body: int) -> Link:
         m, name = self.model, self.model.body(body).name or f"link{body}"
         geoms = range(m.body_geomadr[body], m.body_geomadr[body] + m.body_geomnum[body]) if body else range(0)
-        shapes = [(bool(m.geom_contype[g] or m.geom_conaffinity[g]), self._shape(g)) for g in geoms
-                  if m.geom_type[g] in SOLIDS] + self.beside.meshes.get(name, [])  # fmt: skip
+        solids = [g for g in geoms if m.geom_type[g] in SOLIDS]
+        shapes = [(bool(m.geom_contype[g] or m.geom_conaffinity[g]), self._shape(g)) for g in solids]
+        shapes += self.beside.meshes.get(name, [])
         first = m.body_jntadr[body]
         return Link(
             name,
