@@ -4,10 +4,8 @@ import numpy as np
 import pytest
 
 from pretouch.recording.run_record import TrueForces
-from pretouch.reporting.measures import measure
-from pretouch.reporting.sections.contact import contact_section
-from pretouch.reporting.summary import summary
-from pretouch.reporting.touches import touches_of
+from pretouch.reporting.contacts import contact_section, touches_of
+from pretouch.reporting.measures import measure, summary
 from pretouch.sim.plant import TOUCH_N
 from pretouch.traces import mean_over
 from pretouch.types import Mode
@@ -84,7 +82,7 @@ def pushed(panda_model, paper_skin):
 
 
 def test_a_detection_tells_force_axes_delay_and_reaction(pushed):
-    first = pushed.detections[0]
+    first = pushed.contacts.detections[0]
     assert first.time == 0.55
     assert list(first.axes) == [False, True, False]
     assert list(first.filtered) == [1.0, -9.0, 6.0]
@@ -99,19 +97,19 @@ def test_a_detection_tells_force_axes_delay_and_reaction(pushed):
 
 
 def test_a_touch_while_yielding_is_not_missed_and_a_later_one_is(pushed):
-    assert [u.mode for u in pushed.unanswered] == [Mode.REACT, Mode.TRACK]
-    assert [u.touch.peak for u in pushed.missed] == [5.0]
+    assert pushed.contacts.unanswered == {1: Mode.REACT, 2: Mode.TRACK}
+    assert [touch.peak for touch in pushed.contacts.missed] == [5.0]
 
 
 def test_a_detection_without_a_touch_is_told(pushed):
-    assert [d.time for d in pushed.without_touch] == [2.8]
-    assert pushed.detections[1].delay is None
+    assert [d.time for d in pushed.contacts.without_touch] == [2.8]
+    assert pushed.contacts.detections[1].delay is None
 
 
 def test_a_contact_that_held_the_arm_still_is_told_as_that(pushed):
-    assert pushed.detections[1].moved_s == 0.0
+    assert pushed.contacts.detections[1].moved_s == 0.0
     assert "2 contacts were detected, 1 of which did not move the arm" in summary(pushed)
-    assert contact_section(pushed).count("<td>held still</td>") == 1
+    assert contact_section(pushed.course, pushed.contacts).count("<td>held still</td>") == 1
 
 
 def test_the_force_that_is_found_is_told_where_the_detector_says_it(panda_model, paper_skin, pushed):
@@ -123,8 +121,8 @@ def test_the_force_that_is_found_is_told_where_the_detector_says_it(panda_model,
 
 
 def test_the_largest_true_force_counts_felt_or_not(pushed):
-    assert pushed.peak == 50.0
-    assert pushed.held is None
+    assert pushed.contacts.peak == 50.0
+    assert pushed.contacts.held is None
 
 
 def test_without_truth_the_peak_is_that_of_the_estimate(panda_model, paper_skin):
@@ -132,12 +130,11 @@ def test_without_truth_the_peak_is_that_of_the_estimate(panda_model, paper_skin)
     for i in range(40, 60):
         steps[i] = replace(steps[i], mode=Mode.REACT, force=np.array([3.0 * (i - 39), 0.0, 0.0]))
     steps[40] = replace(steps[40], contact=made.contact([12.0, 0.0, 0.0], [True, False, False]))
-    m = measure(made.recorded(panda_model, paper_skin, steps), "felt")
-    assert not m.truth_known
-    assert m.detections[0].touch is None
-    assert m.peak == pytest.approx(60.0)
-    assert m.without_touch == ()
-    assert m.missed == ()
+    contacts = measure(made.recorded(panda_model, paper_skin, steps), "felt").contacts
+    assert not contacts.truth_known
+    assert contacts.detections[0].touch is None
+    assert contacts.peak == pytest.approx(60.0)
+    assert contacts.without_touch == contacts.missed == ()
 
 
 @pytest.mark.parametrize(("side", "push"), [("-y", 1.0), ("+y", -1.0)])
@@ -148,7 +145,7 @@ def test_numbers_of_a_collision_are_those_of_the_physics(panda_model, paper_skin
     size = np.linalg.norm(force, axis=1)
     start = time[np.flatnonzero(size > TOUCH_N)[0]]
     m = measure(recorded, "static")
-    touch, detection = m.touches[0], m.detections[0]
+    touch, detection = m.contacts.touches[0], m.contacts.detections[0]
     answer = next(kept.step for kept in recorded if kept.step.contact is not None and kept.step.stamp >= start)
     assert touch.link == panda_model.links[plant.touches[0].link]
     assert touch.velocity[1] == pytest.approx(plant.touches[0].velocity[1])
@@ -156,8 +153,8 @@ def test_numbers_of_a_collision_are_those_of_the_physics(panda_model, paper_skin
     assert detection.delay == pytest.approx(answer.stamp - start)
     assert detection.filtered[1] == pytest.approx(answer.filtered_force[1])
     assert detection.raw[1] == pytest.approx(answer.force[1])
-    assert m.peak == pytest.approx(size.max())
+    assert m.contacts.peak == pytest.approx(size.max())
     assert touch.peak_20ms == pytest.approx(mean_over(size, 20).max())
-    assert m.without_touch == ()
+    assert m.contacts.without_touch == ()
     nearest = min(kept.step.obstacles.body_distance.min(initial=np.inf) for kept in recorded)
     assert (m.distances.body.distance if m.distances.body else np.inf) == pytest.approx(nearest)

@@ -5,14 +5,10 @@ import pytest
 
 from pretouch.modes import Event
 from pretouch.profiles import profile
-from pretouch.reporting.distances import distances
-from pretouch.reporting.gather import gather
-from pretouch.reporting.health import loop_health, robot_health, unit_health
-from pretouch.reporting.limits import limit_margins
-from pretouch.reporting.measures import measure
-from pretouch.reporting.numbers import durations, least, least_of_each, spread
-from pretouch.reporting.speeds import speeds
-from pretouch.reporting.states import states
+from pretouch.reporting.health import loop_health, unit_health
+from pretouch.reporting.limits import limit_margins, states, violations
+from pretouch.reporting.motion import distances, speeds
+from pretouch.reporting.record import gather, least, spread
 from pretouch.robot.description import fr3
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, paper_skin
@@ -31,9 +27,12 @@ def test_small_measures_leave_out_what_is_no_number():
     assert spread(np.array([1.0, np.nan, 3.0, 2.0])).median == 2.0
     assert least(np.array([np.nan, 2.0, 1.0, np.nan])) == (1.0, 2)
     assert least(np.full(3, np.nan)) is None
-    assert least_of_each(np.array([[np.nan, 2.0], [np.nan, np.nan]])) == pytest.approx([2.0, np.nan], nan_ok=True)
-    assert list(durations(np.array([0.0, 1.0, 1.5, 2.5]))) == [1.0, 0.5, 1.0, 1.0]
-    assert list(durations(np.array([5.0]))) == [0.0]
+
+
+@pytest.mark.parametrize(("stamps", "lasted"), [((0.0, 1.0, 1.5, 2.5), (1.0, 0.5, 1.0, 1.0)), ((5.0,), (0.0,))])
+def test_a_step_lasts_until_the_next_and_the_last_as_long_as_is_usual(panda_model, paper_skin, stamps, lasted):
+    course = course_of(panda_model, paper_skin, [made.step(panda_model, stamp=stamp) for stamp in stamps])
+    assert tuple(course.lasted) == lasted
 
 
 def test_distances_are_least_by_unit_by_link_and_in_time(panda_model, paper_skin):
@@ -121,9 +120,9 @@ def test_exceeded_limits_are_named(panda_model, paper_skin):
     beyond[3] = panda_model.q_max[3] + 0.1
     steps = commanded(panda_model, np.zeros(7), 3.0 * np.eye(7)[1])
     steps[1] = replace(steps[1], q=beyond)
-    m = measure(made.recorded(panda_model, paper_skin, steps), "beyond")
-    assert m.violations == ("velocity of joint 2", "acceleration of joint 2", "position of joint 4")
-    assert m.joints[3].margin_measured == pytest.approx(-0.1)
+    joints = limit_margins(course_of(panda_model, paper_skin, steps))
+    assert violations(joints) == ["velocity of joint 2", "acceleration of joint 2", "position of joint 4"]
+    assert joints[3].margin_measured == pytest.approx(-0.1)
 
 
 def test_an_envelope_allows_less_towards_the_end_of_a_range():
@@ -225,10 +224,10 @@ def test_robot_and_loop(panda_model, paper_skin):
     given[1] = replace(given[1], robot=replace(given[1].robot, wrench=None))
     given[4] = None
     course = course_of(panda_model, paper_skin, steps, given=given)
-    robot, loop = robot_health(course), loop_health(course)
-    assert robot.force_missing == 0.25
-    assert robot.age.max == pytest.approx(0.002)
-    assert robot.rate == pytest.approx(3 / 0.05)
+    loop = loop_health(course)
+    assert loop.force_missing == 0.25
+    assert loop.age.max == pytest.approx(0.002)
+    assert loop.rate == pytest.approx(3 / 0.05)
     assert (loop.late, loop.without_inputs) == (1, 1)
     assert loop.period.max == pytest.approx(0.03)
 

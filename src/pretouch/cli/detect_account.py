@@ -67,7 +67,7 @@ def _draw(account: Account, sentences: list[str], out: Path) -> None:
     """Write the first of the figures, or with the ending .html a page of all with sentences and tables."""
     figures = account.figures()
     if out.suffix == ".html":
-        from pretouch.reporting.detection import detection_page
+        from pretouch.reporting.page import detection_page
 
         page = detection_page(account.recording.place.name, sentences, account.tables, figures)
         with unwritable_said("page", out):

@@ -1,18 +1,56 @@
-"""Detected contacts, held against what truly touched."""
+"""Detected contacts, held against what truly touched, which only a simulation knows."""
 
+from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from pretouch.recording.run_record import MODES
-from pretouch.reporting.course import Course
-from pretouch.reporting.numbers import durations
-from pretouch.reporting.touches import TRANSIENT_S, Touch
+from pretouch.recording.run_record import MODES, TrueForces
+from pretouch.reporting.html import NOTHING, Html, Text, bad, element, joined, number, table, vector
+from pretouch.reporting.record import Course
+from pretouch.sim.plant import TOUCH_N
+from pretouch.traces import mean_over, spans
 from pretouch.types import BoolArray, FloatArray, Mode
 
+BOUNCE_S = 0.1
+"""Touches with less than this between them are one [s]."""
+TRANSIENT_S = 0.5
+"""From this long after its beginning a contact counts as quasi-static [s] (ISO/TS 15066)."""
+MEAN_S = 0.02
+"""Length of the mean that peaks are also given of [s]."""
 GRACE_S = 0.2
 """A detection this long after a touch still answers it [s]: the estimate lags, and the value of eq. 8 more."""
+AXES = "xyz"
+_ROWS = 40
+"""Contacts and touches that are listed; touches that were not answered are listed up to `_MOST`."""
+_MOST = 200
+_FORCE = {
+    True: "Force: norm of the estimate above the window's mean",
+    False: "Force: at the end-effector, as the joint torques beyond those of free motion tell it; the contact may be"
+    " elsewhere. Axes: where that passes the band of one sample, or is nearest to it",
+}
+"""What a contact's force is, by whether the paper's thresholds detect it."""
+
+
+@dataclass(frozen=True)
+class Touch:
+    """One true touch: from the true force passing 1 N until it is below for good."""
+
+    start: float
+    """[s]"""
+    end: float
+    """[s]"""
+    peak: float
+    """Largest true force [N]."""
+    peak_20ms: float
+    """Largest 20 ms mean of the true force [N]."""
+    held: float
+    """Largest 20 ms mean that begins 0.5 s after the touch or later [N], NaN if it was over by then."""
+    link: str
+    """Link that touched first, '' where that is not known."""
+    velocity: FloatArray
+    """(3,) velocity of the touching point before the contact [m/s], NaN where that is not known."""
 
 
 @dataclass(frozen=True)
@@ -21,7 +59,8 @@ class Detection:
 
     time: float
     """[s]"""
-    run: int
+    profile: str
+    """Name of the profile that detected it."""
     force: FloatArray
     """(3,) F_ext of eq. 12: the reading above the window's mean, or what explains the torques best [N]."""
     axes: BoolArray
@@ -49,24 +88,102 @@ class Detection:
 
 
 @dataclass(frozen=True)
-class Unanswered:
-    """A true touch without a detection."""
+class Contacts:
+    """Detections and true touches in order."""
 
-    touch: Touch
-    index: int
-    """Of the touch among all."""
-    mode: Mode | None
-    """What the arm was doing when it began."""
+    truth_known: bool
+    detections: tuple[Detection, ...]
+    touches: tuple[Touch, ...]
+    unanswered: dict[int, Mode | None]
+    """Touches without a detection, by index: what the arm was doing when each began."""
+
+    @property
+    def missed(self) -> tuple[Touch, ...]:
+        """True touches that were never answered, those aside that came while the arm was yielding already."""
+        return tuple(self.touches[i] for i, mode in self.unanswered.items() if mode is not Mode.REACT)
+
+    @property
+    def without_touch(self) -> tuple[Detection, ...]:
+        """Detections without a true touch; none where the truth is not known."""
+        return tuple(d for d in self.detections if d.touch is None) if self.truth_known else ()
+
+    @property
+    def delays(self) -> tuple[float, ...]:
+        """Time from each touch that was answered to its first detection [s]."""
+        return tuple(d.delay for d in self.detections if d.delay is not None)
+
+    @property
+    def peak(self) -> float | None:
+        """Largest true force [N], or where it is not known the largest estimate during a contact."""
+        if self.truth_known:
+            return max((touch.peak for touch in self.touches), default=0.0)
+        return _largest([d.peak_norm for d in self.detections])
+
+    @property
+    def held(self) -> float | None:
+        """Largest force later than 0.5 s into a contact [N], from the same source as the peak; None if none lasted."""
+        return _largest([t.held for t in self.touches] if self.truth_known else [d.held_norm for d in self.detections])
 
 
-def detections(course: Course, touches: Sequence[Touch]) -> list[Detection]:
+def contacts_in(course: Course) -> Contacts:
+    """Find what touched in a recording and what was detected of it."""
+    touches = touches_of(course.truth)
+    detections = _detections(course, touches)
+    answered = {detection.touch for detection in detections}
+    unanswered = {i: _mode_at(course, touch.start) for i, touch in enumerate(touches) if i not in answered}
+    return Contacts(course.truth is not None, tuple(detections), tuple(touches), unanswered)
+
+
+def touches_of(truth: TrueForces | None) -> list[Touch]:
+    """All true touches in order; none where nothing is known, or what is said to be known cannot be."""
+    if truth is None or len(truth.time) < 2 or not np.all(np.isfinite(truth.time)):
+        return []
+    time, force = truth.time, np.linalg.norm(truth.force, axis=1)
+    samples = max(1, round(MEAN_S / max(float(np.median(np.diff(time))), 1e-9)))
+    mean, begun = mean_over(force, samples), [instant for instant, _, _ in truth.touches]
+    touches, before = list[Touch](), -np.inf
+    for first, past in _merged(spans(force > TOUCH_N), time):
+        start, end = float(time[first]), float(time[past - 1])
+        late = int(np.searchsorted(time, start + TRANSIENT_S))
+        # the last contact that began after the touch before, and by now
+        last = bisect_right(begun, start + 1e-9) - 1
+        known = last >= 0 and begun[last] > before
+        _, link, velocity = truth.touches[last] if known else (start, "", np.full(3, np.nan))
+        touches.append(
+            Touch(
+                start,
+                end,
+                peak=float(force[first:past].max()),
+                peak_20ms=float(mean[max(first - samples + 1, 0) : past].max(initial=0.0)),
+                held=float(mean[late:past].max(initial=0.0)) if late < past else float("nan"),
+                link=link,
+                velocity=velocity,
+            )
+        )
+        before = end
+    return touches
+
+
+def _merged(flags: list[tuple[int, int]], time: FloatArray) -> list[tuple[int, int]]:
+    """Join spans with less than `BOUNCE_S` between them."""
+    merged: list[tuple[int, int]] = []
+    for first, past in flags:
+        if merged and time[first] - time[merged[-1][1] - 1] < BOUNCE_S:
+            merged[-1] = (merged[-1][0], past)
+        else:
+            merged.append((first, past))
+    return merged
+
+
+def _detections(course: Course, touches: Sequence[Touch]) -> list[Detection]:
     """All detected contacts in order, each with the touch it answers if there is one."""
-    found: list[Detection] = []
+    detections: list[Detection] = []
     answered: set[int | None] = set()
-    lasted, steps = durations(course.time), [i for i, _, _ in course.contacts]
+    lasted, steps = course.lasted, [i for i, _, _ in course.contacts]
     for (i, contact, speed), following in zip(course.contacts, [*steps[1:], len(course)], strict=False):
         time, end = float(course.time[i]), _reaction_end(course, i)
-        touch = _answered(time, touches)
+        under_way = [k for k, touch in enumerate(touches) if touch.start <= time <= touch.end + GRACE_S]
+        touch = under_way[-1] if under_way else None
         first = touch is not None and touch not in answered
         answered.add(touch)
         begun = touches[touch].start if first and touch is not None else time
@@ -76,35 +193,32 @@ def detections(course: Course, touches: Sequence[Touch]) -> list[Detection]:
             min(max(end, int(np.searchsorted(course.time, over, side="right"))), following),
         )
         force, late = course.force[during], course.time[during] >= begun + TRANSIENT_S
-        found.append(
+        size = np.linalg.norm(np.where(np.isfinite(force), force, np.nan), axis=1)
+        detections.append(
             Detection(
-                time=time, run=int(course.run[i]), force=contact.force, axes=contact.axes,
-                filtered=course.filtered_force[i], raw=course.force[i],
-                peak=_farthest(force), peak_norm=_norm(force), held_norm=_norm(force[late]),
-                reaction_speed=speed, reaction_s=float(lasted[i:end].sum()), touch=touch,
+                time=time,
+                profile=course.runs[course.run[i]].profile.name,
+                force=contact.force,
+                axes=contact.axes,
+                filtered=course.filtered_force[i],
+                raw=course.force[i],
+                peak=_farthest(force),
+                peak_norm=float(np.fmax.reduce(size, initial=np.nan)),
+                held_norm=float(np.fmax.reduce(size[late], initial=np.nan)),
+                reaction_speed=speed,
+                reaction_s=float(lasted[i:end].sum()),
                 moved_s=float(lasted[i:end][course.answering[i:end]].sum()),
+                touch=touch,
                 delay=time - begun if first else None,
             )
-        )  # fmt: skip
-    return found
-
-
-def unanswered(course: Course, touches: Sequence[Touch], found: Sequence[Detection]) -> list[Unanswered]:
-    """True touches that no detection answers."""
-    answered = {detection.touch for detection in found}
-    return [Unanswered(touch, i, _mode_at(course, touch.start)) for i, touch in enumerate(touches) if i not in answered]
+        )
+    return detections
 
 
 def _reaction_end(course: Course, first: int) -> int:
     """Index one past the last step of the reaction that begins in a step."""
     other = np.flatnonzero(course.mode[first:] != MODES.index(Mode.REACT))
     return max(first + int(other[0]), first + 1) if len(other) else len(course)
-
-
-def _answered(time: float, touches: Sequence[Touch]) -> int | None:
-    """Index of the last touch under way, or just over, at an instant [s]."""
-    under_way = [i for i, touch in enumerate(touches) if touch.start <= time <= touch.end + GRACE_S]
-    return under_way[-1] if under_way else None
 
 
 def _mode_at(course: Course, time: float) -> Mode | None:
@@ -121,7 +235,110 @@ def _farthest(force: FloatArray) -> FloatArray:
     return known[np.abs(known).argmax(axis=0), np.arange(3)]
 
 
-def _norm(force: FloatArray) -> float:
-    """Largest norm of forces (S, 3), NaN of none."""
-    norms = np.linalg.norm(force[np.isfinite(force).all(axis=1)], axis=1)
-    return float(norms.max()) if len(norms) else float("nan")
+def _largest(values: list[float]) -> float | None:
+    return max((value for value in values if np.isfinite(value)), default=None)
+
+
+def contact_section(course: Course, contacts: Contacts) -> Html:
+    """Detected contacts and, where it is known, what truly touched and what was missed."""
+    parts = [_detected(course, contacts.detections)]
+    if contacts.truth_known:
+        parts += [_touched(contacts), _false(contacts.detections)]
+    else:
+        unknown = "True touches are not known: delays, missed touches and false detections cannot be counted."
+        parts.append(element("p", unknown, "note"))
+    return joined(parts)
+
+
+def _detected(course: Course, detections: Sequence[Detection]) -> Html:
+    if not detections:
+        return element("p", "No contact was detected.")
+    columns = [
+        ("no.", lambda row: str(row[0])),
+        ("axes", lambda row: " ".join(axis for axis, hit in zip(AXES, row[1].axes, strict=True) if hit)),
+        ("towards", lambda row: heading(row[1].force)),
+        ("time [s]", lambda row: number(row[1].time, 2)),
+        ("force [N]", lambda row: number(float(np.linalg.norm(row[1].force)), 1)),
+        ("direction x y z", lambda row: vector(_unit(row[1].force), 2)),
+        ("filtered x y z [N]", lambda row: vector(row[1].filtered, 1)),
+        ("raw x y z [N]", lambda row: vector(row[1].raw, 1)),
+        ("peak x y z [N]", lambda row: vector(row[1].peak, 1)),
+        ("reaction [m/s]", lambda row: number(row[1].reaction_speed, 3)),
+        ("lasted [s]", lambda row: number(row[1].reaction_s, 2)),
+        ("moved [s]", lambda row: number(row[1].moved_s, 2) if row[1].moved_s else "held still"),
+    ]
+    if len(course.runs) > 1:
+        columns.append(("profile", lambda row: row[1].profile))
+    note = (
+        f"{_left_out(len(detections) - _ROWS)}{_FORCE[course.by_thresholds]}; on the arm, base frame. Filtered: value"
+        " of eq. 8. Raw: the estimate. Peak: on each axis the estimate farthest from zero during the contact. Held"
+        " still: the contact was below what moves the arm."
+    )
+    return table(columns, list(enumerate(detections, 1))[:_ROWS], note, 3, "Detected contacts")
+
+
+def _touched(contacts: Contacts) -> Html:
+    if not contacts.touches:
+        return element("p", "Nothing truly touched the arm.")
+    answers = {d.touch: (i, d) for i, d in reversed(list(enumerate(contacts.detections, 1)))}
+    rows: list[tuple[int, Touch]] = []
+    for i, touch in enumerate(contacts.touches):
+        if len(rows) < (_ROWS if i in answers else _MOST):
+            rows.append((i, touch))
+
+    def answer(i: int) -> Text:
+        return f"contact {answers[i][0]}" if i in answers else _why(contacts.unanswered[i])
+
+    columns = [
+        ("no.", lambda row: str(row[0] + 1)),
+        ("first link", lambda row: row[1].link or NOTHING),
+        ("answered by", lambda row: answer(row[0])),
+        ("time [s]", lambda row: number(row[1].start, 3)),
+        ("duration [s]", lambda row: number(row[1].end - row[1].start, 3)),
+        ("delay [ms]", lambda row: number(answers[row[0]][1].delay if row[0] in answers else None, 0, 1000.0)),
+        ("speed [m/s]", lambda row: number(float(np.linalg.norm(row[1].velocity)), 3)),
+        ("true peak [N]", lambda row: number(row[1].peak, 1)),
+        ("true 20 ms [N]", lambda row: number(row[1].peak_20ms, 1)),
+        (f"held {TRANSIENT_S:g} s [N]", lambda row: number(row[1].held, 1)),
+    ]
+    note = (
+        f"{_left_out(len(contacts.touches) - len(rows))}A touch begins as the true force passes 1 N; the delay runs"
+        f" from there to the detection. Interruptions of less than {BOUNCE_S:g} s are bounces of one touch. Speed: of"
+        " the point of the arm that touched first."
+    )
+    return table(columns, rows, note, 3, "True touches (simulation)")
+
+
+def _why(mode: Mode | None) -> Text:
+    """Why a touch has no detection."""
+    if mode is Mode.REACT:
+        return "none: the arm was yielding already"
+    return bad("missed" + (" in HOLD" if mode is Mode.HOLD else ""))
+
+
+def _false(detections: Sequence[Detection]) -> Html:
+    """Say which detections no touch explains."""
+    false = [f"contact {i} at {d.time:.2f} s" for i, d in enumerate(detections, 1) if d.touch is None]
+    if not false:
+        return element("p", "Every detection answers a true touch.") if detections else Html("")
+    listed = ", ".join(false[:_ROWS]) + (" ..." if len(false) > _ROWS else "")
+    return element(
+        "p", bad(f"Detections without a touch under way or over for less than {GRACE_S:g} s: {len(false)} ({listed}).")
+    )
+
+
+def _left_out(count: int) -> str:
+    return f"{count} more are left out here; all count in the summary. " if count > 0 else ""
+
+
+def _unit(force: FloatArray) -> FloatArray:
+    norm = float(np.linalg.norm(force))
+    return force / norm if norm > 0 else np.full(3, np.nan)
+
+
+def heading(force: FloatArray) -> str:
+    """Base axis that a force points along most, with its sign."""
+    if not np.all(np.isfinite(force)) or not np.any(force):
+        return NOTHING
+    axis = int(np.abs(force).argmax())
+    return ("+" if force[axis] > 0 else "−") + AXES[axis]

@@ -4,14 +4,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pretouch.reporting.course import NO_READING, Course
-from pretouch.reporting.numbers import Spread, share, spread
+from pretouch.reporting.html import NOTHING, Html, Text, bad, element, facts, joined, number, percent, table, vector
+from pretouch.reporting.record import NO_READING, Course, Spread, spread
 from pretouch.types import BoolArray, FloatArray, RangeStatus
 
 _MAD_TO_SIGMA = 1.4826
 """Standard deviation over median absolute deviation, of a normal distribution."""
 _FEW = 5
 """Fewer readings than this tell no rate and no noise."""
+_LOST = 0.05
+"""Share of lost measurements from which it is marked."""
 
 
 @dataclass(frozen=True)
@@ -36,34 +38,28 @@ class UnitHealth:
 
 
 @dataclass(frozen=True)
-class RobotHealth:
-    """The robot's interface."""
+class LoopHealth:
+    """The robot's interface, and how the steps followed each other."""
 
     rate: float | None
-    """New states a second that the steps were given [Hz]."""
+    """New robot states a second that the steps were given [Hz]."""
     age: Spread | None
-    """Of the state at the step [s]."""
+    """Of the robot state at the step [s]."""
     force_missing: float | None
     """Share of the steps without a force estimate."""
     sigma: FloatArray
     """(3,) median standard deviation of the force window while it is full [N], NaN without any."""
-
-
-@dataclass(frozen=True)
-class LoopHealth:
-    """How the steps followed each other."""
-
     period: Spread | None
     """Time from one step to the next [s]."""
     late: int
     """Steps that came half a period late or more."""
     without_inputs: int
-    """Steps whose inputs could not be kept."""
+    """Steps whose inputs are not in the recording."""
 
 
-def unit_health(course: Course) -> list[UnitHealth]:
+def unit_health(course: Course) -> tuple[UnitHealth, ...]:
     """Each unit of the skin."""
-    return [_unit(course, k) for k in range(len(course.units))]
+    return tuple(_unit(course, k) for k in range(len(course.units)))
 
 
 def _unit(course: Course, k: int) -> UnitHealth:
@@ -73,7 +69,7 @@ def _unit(course: Course, k: int) -> UnitHealth:
     gaps = np.diff(stamps)
     usual = float(np.median(gaps)) if len(stamps) >= _FEW else 0.0
     expected = float(np.round(gaps / usual).sum()) if usual > 0 else 0.0
-    known = course.time[course.given]
+    time = course.time[course.with_inputs]
     return UnitHealth(
         name=course.units[k],
         readings=len(stamps),
@@ -81,29 +77,26 @@ def _unit(course: Course, k: int) -> UnitHealth:
         lost=max(0.0, 1 - len(gaps) / expected) if expected else None,
         latency=spread(course.time[fresh] - stamps),
         status={_status(code): int(np.sum(statuses == code)) for code in np.unique(statuses)},
-        silence=float(np.diff(np.concatenate([known[:1], np.sort(stamps), known[-1:]])).max()) if len(known) else None,
+        silence=float(np.diff(np.concatenate([time[:1], np.sort(stamps), time[-1:]])).max()) if len(time) else None,
         noise=_noise(np.where(statuses == RangeStatus.OK, course.reading_distance[fresh, k], np.nan)),
     )
 
 
-def robot_health(course: Course) -> RobotHealth:
-    """What the robot reported."""
+def loop_health(course: Course) -> LoopHealth:
+    """What the robot reported, and how the steps followed each other."""
     stamps = course.robot_stamp[_fresh(course.robot_stamp)]
     lasted = float(stamps[-1] - stamps[0]) if len(stamps) > 1 else 0.0
     armed = course.sigma[course.armed & np.isfinite(course.sigma).all(axis=1)]
-    return RobotHealth(
+    gaps, period = np.diff(course.time), course.of_runs(lambda run: run.profile.task.control_period_s)[1:]
+    return LoopHealth(
         rate=(len(stamps) - 1) / lasted if lasted > 0 else None,
         age=spread(course.time - course.robot_stamp),
-        force_missing=share(course.force_missing[course.given]),
+        force_missing=float(np.mean(course.force_missing[course.with_inputs])) if course.with_inputs.any() else None,
         sigma=np.median(armed, axis=0) if len(armed) else np.full(3, np.nan),
+        period=spread(gaps),
+        late=int(np.sum(gaps >= 1.5 * period)),
+        without_inputs=int(np.sum(~course.with_inputs)),
     )
-
-
-def loop_health(course: Course) -> LoopHealth:
-    """How the steps followed each other."""
-    gaps = np.diff(course.time)
-    period = course.of_runs(lambda run: run.profile.task.control_period_s)[1:]
-    return LoopHealth(spread(gaps), int(np.sum(gaps >= 1.5 * period)), int(np.sum(~course.given)))
 
 
 def _fresh(stamp: FloatArray) -> BoolArray:
@@ -126,3 +119,38 @@ def _noise(distance: FloatArray) -> float | None:
         return None
     # the second difference of independent errors has 1 + 4 + 1 times their variance
     return float(_MAD_TO_SIGMA * np.median(np.abs(bend - np.median(bend))) / np.sqrt(6.0))
+
+
+def health_section(units: tuple[UnitHealth, ...], loop: LoopHealth) -> Html:
+    """Units, robot interface and loop."""
+    columns = [
+        ("unit", lambda unit: unit.name),
+        ("readings", lambda unit: str(unit.readings)),
+        ("rate [Hz]", lambda unit: number(unit.rate, 1)),
+        ("lost", lambda unit: bad(percent(unit.lost, 1)) if (unit.lost or 0.0) > _LOST else percent(unit.lost, 1)),
+        ("latency, median [ms]", lambda unit: number(unit.latency and unit.latency.median, 1, 1000.0)),
+        ("99 % [ms]", lambda unit: number(unit.latency and unit.latency.p99, 1, 1000.0)),
+        ("longest silence [s]", lambda unit: number(unit.silence, 2)),
+        ("noise [mm]", lambda unit: number(unit.noise, 1, 1000.0)),
+        ("status", lambda unit: ", ".join(f"{name} {count}" for name, count in unit.status.items()) or NOTHING),
+    ]
+    note = (
+        "Of the readings that the steps were given: a unit faster than the loop is counted at the loop's rate. Latency:"
+        " from a measurement to the first step that had it. Noise: of distances, a steady motion left out."
+    )
+    rest: list[tuple[Text, Text]] = [
+        ("robot states", f"{number(loop.rate, 1)} Hz; age {_milliseconds(loop.age)}"),
+        ("force estimate missing", percent(loop.force_missing, 1)),
+        ("noise of the force estimate x y z (median of the detector's σ)", Html(vector(loop.sigma, 2) + " N")),
+        ("period of the loop", _milliseconds(loop.period)),
+        ("late steps (by half a period or more)", str(loop.late)),
+        ("steps whose inputs could not be kept", bad(str(loop.without_inputs)) if loop.without_inputs else "0"),
+    ]
+    return joined([table(columns, units, note) if units else element("p", "The arm wears no unit."), facts(rest)])
+
+
+def _milliseconds(values: Spread | None) -> str:
+    if values is None:
+        return NOTHING
+    median, p99, largest = (number(value, 1, 1000.0) for value in (values.median, values.p99, values.max))
+    return f"median {median}, 99 % {p99}, largest {largest} ms"

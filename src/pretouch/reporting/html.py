@@ -3,11 +3,12 @@
 from collections.abc import Iterable, Sequence
 from html import escape
 from string import Template
+from typing import Any
 
 import numpy as np
 
 from pretouch import __version__
-from pretouch.text_table import TextTable
+from pretouch.text_table import Column, TextTable, tabulated
 
 NOTHING = "–"
 """Stands where there is no number."""
@@ -32,7 +33,7 @@ _PAGE = Template(
 <body>
 <main>
 $body
-<footer>Written by Pretouch $version. $note</footer>
+<footer>Written by Pretouch $version. Nothing here claims conformity with a safety standard.</footer>
 </main>
 </body>
 </html>
@@ -104,37 +105,32 @@ def bad(text: Text) -> Html:
     return element("span", text, "bad")
 
 
-def note(text: Text) -> Html:
-    """Write a remark below a table or figure."""
-    return element("p", text, "note")
+def table(columns: Sequence[Column], rows: Iterable[Any], note: Text = "", names: int = 1, title: str = "") -> Html:
+    """Make a table of a line a row; the first columns, `names` of them, hold words and the others numbers."""
+    return shown(tabulated(title, columns, rows, note, names), "h4")
 
 
-def table(head: Sequence[Text], rows: Sequence[Sequence[Text]], words: int = 1) -> Html:
-    """Make a table whose first columns, `words` of them, hold words and the others numbers."""
+def shown(made: TextTable, heading: str = "h3") -> Html:
+    """Make a table with its title above, as a heading, and its note below, where it has them."""
 
     def line(cells: Sequence[Text], name: str) -> Html:
-        kinds = ["w" if i < words else "" for i in range(len(cells))]
-        return element("tr", joined((element(name, c, k) for c, k in zip(cells, kinds, strict=True)), ""))
+        kinds = ["w" if i < made.names else "" for i in range(len(cells))]
+        texts = (cell if isinstance(cell, Html) else joined(cell.split("\n"), "<br>") for cell in cells)
+        return element("tr", joined((element(name, c, k) for c, k in zip(texts, kinds, strict=True)), ""))
 
-    body = joined(line(row, "td") for row in rows)
-    whole = element("thead", line(head, "th")) + element("tbody", body)
-    return element("div", element("table", Html(whole)), "scroll")
-
-
-def titled_table(made: TextTable) -> Html:
-    """Make a table with its title above and its note below."""
-
-    def lines(text: str) -> Html:
-        return joined(text.split("\n"), "<br>")
-
-    rows = [[lines(text) for text in row] for row in made.rows]
-    shown = table([lines(text) for text in made.header], rows, made.names)
-    return joined([element("h3", made.title), shown, note(made.note)])
+    whole = element("thead", line(made.header, "th")) + element("tbody", joined(line(row, "td") for row in made.rows))
+    return joined(
+        [
+            *([element(heading, made.title)] if made.title else []),
+            element("div", element("table", Html(whole)), "scroll"),
+            *([element("p", made.note, "note")] if made.note else []),
+        ]
+    )
 
 
-def document(title: str, body: Html, remark: str) -> str:
-    """Make a page of what is in its body, with a remark at its foot."""
-    return _PAGE.substitute(title=html(title), style=_STYLE, body=body, version=__version__, note=html(remark))
+def document(title: str, body: Html) -> str:
+    """Make a page of what is in its body."""
+    return _PAGE.substitute(title=html(title), style=_STYLE, body=body, version=__version__)
 
 
 def facts(rows: Iterable[tuple[Text, Text]]) -> Html:

@@ -1,24 +1,22 @@
-"""All that a report says of one recording."""
+"""All that a report says of one recording, in a few sentences, and several recordings side by side."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pretouch.reporting.contacts import Detection, Unanswered, detections, unanswered
-from pretouch.reporting.course import Course
-from pretouch.reporting.distances import Distances, distances
-from pretouch.reporting.gather import gather
-from pretouch.reporting.health import LoopHealth, RobotHealth, UnitHealth, loop_health, robot_health, unit_health
-from pretouch.reporting.limits import JointMargin, limit_margins
-from pretouch.reporting.numbers import durations
-from pretouch.reporting.speeds import Speeds, speeds
-from pretouch.reporting.states import States, states
-from pretouch.reporting.touches import Touch, touches_of
-from pretouch.types import Mode
-
-if TYPE_CHECKING:
-    from pretouch.recording.reader import Recorded
+from pretouch.contact.scatter import HELD_S
+from pretouch.explanation import LOUD_N
+from pretouch.recording.reader import Recorded
+from pretouch.reporting.contacts import Contacts, contacts_in
+from pretouch.reporting.health import LoopHealth, UnitHealth, loop_health, unit_health
+from pretouch.reporting.html import Html, Text, bad, element, joined, number, percent, shown
+from pretouch.reporting.limits import JointMargin, States, limit_margins, states, violations
+from pretouch.reporting.motion import Distances, Speeds, distances, speeds
+from pretouch.reporting.record import Course, gather
+from pretouch.reporting.setting import started
+from pretouch.text_table import TextTable
+from pretouch.types import FloatArray, Mode
 
 
 @dataclass(frozen=True)
@@ -27,74 +25,139 @@ class Measures:
 
     title: str
     """Name of the file, with as much of its folder as tells it from the others."""
-    complete: bool
-    said: str
-    """What is missing of a file that is not complete."""
+    lacking: str
+    """What is missing of a file that is not complete, as a sentence, or ''."""
     course: Course
-    touches: tuple[Touch, ...]
-    detections: tuple[Detection, ...]
-    unanswered: tuple[Unanswered, ...]
+    contacts: Contacts
     distances: Distances
     speeds: Speeds
     joints: tuple[JointMargin, ...]
     states: States
     units: tuple[UnitHealth, ...]
-    robot: RobotHealth
     loop: LoopHealth
 
-    @property
-    def truth_known(self) -> bool:
-        """Whether the true forces are known."""
-        return self.course.truth is not None
 
-    @property
-    def duration(self) -> float:
-        """How long the recording lasted [s]."""
-        return float(durations(self.course.time).sum())
-
-    @property
-    def missed(self) -> tuple[Unanswered, ...]:
-        """True touches that were never answered, those aside that came while the arm was yielding already."""
-        return tuple(u for u in self.unanswered if u.mode is not Mode.REACT)
-
-    @property
-    def without_touch(self) -> tuple[Detection, ...]:
-        """Detections without a true touch; none where the truth is not known."""
-        return tuple(d for d in self.detections if d.touch is None) if self.truth_known else ()
-
-    @property
-    def peak(self) -> float | None:
-        """Largest true force [N], or where it is not known the largest estimate during a contact."""
-        if self.truth_known:
-            return max((touch.peak for touch in self.touches), default=0.0)
-        return _largest([d.peak_norm for d in self.detections])
-
-    @property
-    def held(self) -> float | None:
-        """Largest force later than 0.5 s into a contact [N], from the same source as the peak; None if none lasted."""
-        if self.truth_known:
-            return _largest([touch.held for touch in self.touches])
-        return _largest([d.held_norm for d in self.detections])
-
-    @property
-    def violations(self) -> tuple[str, ...]:
-        """Limits that were exceeded, by joint."""
-        return tuple(f"{name} of joint {j}" for j, joint in enumerate(self.joints, 1) for name in joint.violations)
-
-
-def measure(recorded: "Recorded", title: str) -> Measures:
+def measure(recorded: Recorded, title: str) -> Measures:
     """Measure a recording."""
     course = gather(recorded)
-    touches = touches_of(course.truth)
-    found = detections(course, touches)
     return Measures(
-        title=title, complete=recorded.complete, said=recorded.said, course=course, touches=tuple(touches),
-        detections=tuple(found), unanswered=tuple(unanswered(course, touches, found)), distances=distances(course),
-        speeds=speeds(course), joints=tuple(limit_margins(course)), states=states(course),
-        units=tuple(unit_health(course)), robot=robot_health(course), loop=loop_health(course),
+        title=title,
+        lacking="" if recorded.complete else recorded.said or "The file is not complete.",
+        course=course,
+        contacts=contacts_in(course),
+        distances=distances(course),
+        speeds=speeds(course),
+        joints=limit_margins(course),
+        states=states(course),
+        units=unit_health(course),
+        loop=loop_health(course),
+    )
+
+
+def summary(m: Measures) -> Html:
+    """Say the most important of a recording."""
+    exceeded = violations(m.joints)
+    sentences: list[Text] = [
+        _what(m.course),
+        _contacts(m.contacts),
+        _detectable(m.course),
+        _forces(m.contacts),
+        _nearest(m),
+        f"The arm followed its path for {percent(m.states.share[Mode.TRACK])} of the time, yielded for"
+        f" {percent(m.states.share[Mode.REACT])} and held for {percent(m.states.share[Mode.HOLD])}.",
+        bad(f"Limits of the arm were exceeded: {', '.join(exceeded)}.") if exceeded else "No joint limit was exceeded.",
+        bad(m.lacking) if m.lacking else "",
+    ]
+    return element("p", joined((sentence for sentence in sentences if sentence), " "), "summary")
+
+
+def _what(course: Course) -> str:
+    names, first, seconds = course.profile_names, course.runs[0], float(course.lasted.sum())
+    minutes, rest = divmod(round(seconds), 60)
+    lasted = f"{minutes} min {rest} s" if minutes else f"{seconds:.1f} s"
+    units = f"{len(course.units)} unit{'s' if len(course.units) != 1 else ''}"
+    listed = " and ".join([", ".join(names[:-1]), names[-1]]) if len(names) > 1 else names[0]
+    return (
+        f"{lasted} of {first.model.description.name} with {units}, profile{'s' if len(names) > 1 else ''} {listed},"
+        f" begun {started(first)}."
+    )
+
+
+def _contacts(c: Contacts) -> Text:
+    count, unmoved = len(c.detections), sum(not d.moved_s for d in c.detections)
+    sentence = f"{count or 'No'} contact{'s' if count != 1 else ''} {'were' if count != 1 else 'was'} detected"
+    sentence += f", {unmoved} of which did not move the arm" if unmoved else ""
+    if not c.truth_known:
+        return f"{sentence}; what truly touched is not known."
+    if c.delays:
+        sentence += f", {1000 * float(np.median(c.delays)):.0f} ms (median) after the true touch"
+    wrong = f"; {len(c.missed)} of {len(c.touches)} true touches missed, {len(c.without_touch)} detections without one."
+    return joined([sentence, bad(wrong) if c.missed or c.without_touch else wrong], "")
+
+
+def _detectable(course: Course) -> Text:
+    """Say what force the detector finds, as `Detection.detectable_n`."""
+    forces = course.detectable_n[course.armed & ~np.isnan(course.detectable_n)]
+    if not len(forces):
+        return ""
+    half, most = (float(np.quantile(forces, share, method="inverted_cdf")) for share in (0.5, 0.95))
+    sentence = (
+        f"A force that is held on the end-effector for {HELD_S:g} s is found from {half:.0f} N on half of the time, and"
+        f" from {most:.0f} N on 95 % of the time."
+    )
+    return sentence if most <= LOUD_N else bad(sentence)
+
+
+def _forces(c: Contacts) -> str:
+    which = "true force" if c.truth_known else "force estimate during a contact"
+    return f"The largest {which} was {c.peak:.1f} N." if c.peak else ""
+
+
+def _nearest(m: Measures) -> str:
+    nearest = m.distances.body
+    if not m.course.proximity_used:
+        return "Proximity was not used."
+    if nearest is None:
+        return "Nothing was sensed near the arm."
+    distance, where = f"{nearest.distance:.3f} m", f"{nearest.name}, at {nearest.time:.1f} s"
+    return f"The nearest obstacle sensed was {distance} from the body ({where})."
+
+
+def comparison(rows: Sequence[Sequence[Text]]) -> Html:
+    """Put several recordings side by side, from what `compared` says of each."""
+    headings = (
+        "recording", "profiles", "duration [s]", "contacts", "missed", "without touch", "delay [ms]", "filtered [N]",
+        "raw [N]", "largest force [N]", "nearest [m]", "fastest [m/s]", "REACT", "HOLD",
     )  # fmt: skip
+    note = (
+        "Delay, filtered and raw: medians, of forces the norm at the detection. Largest force: the true one where it is"
+        " known (*), else the estimate during a contact."
+    )
+    return shown(TextTable("", headings, tuple(map(tuple, rows)), note))
 
 
-def _largest(values: list[float]) -> float | None:
-    known = [value for value in values if np.isfinite(value)]
-    return max(known, default=None)
+def compared(order: int, m: Measures) -> list[Text]:
+    """Row of a recording in the comparison; `order` counts the recordings of the page from 1."""
+    link = Html(f'<a href="#recording-{order}">{element("span", m.title)}</a>')
+    c, body, fastest = m.contacts, m.distances.body, m.speeds.all
+    return [
+        joined([link, bad(" (incomplete)")], "") if m.lacking else link,
+        ", ".join(m.course.profile_names),
+        number(float(m.course.lasted.sum()), 1),
+        str(len(c.detections)),
+        str(len(c.missed)) if c.truth_known else "?",
+        str(len(c.without_touch)) if c.truth_known else "?",
+        number(float(np.median(c.delays)) if c.delays else None, 0, 1000.0),
+        number(_median_norm([d.filtered for d in c.detections]), 1),
+        number(_median_norm([d.raw for d in c.detections]), 1),
+        number(c.peak, 1) + ("*" if c.truth_known else ""),
+        number(body.distance if body else None, 3),
+        number(fastest.max if fastest else None, 3),
+        percent(m.states.share[Mode.REACT]),
+        percent(m.states.share[Mode.HOLD]),
+    ]
+
+
+def _median_norm(forces: Sequence[FloatArray]) -> float | None:
+    """Median norm [N] of forces (3,) each, None of none."""
+    return float(np.median(np.linalg.norm(np.array(forces), axis=1))) if forces else None

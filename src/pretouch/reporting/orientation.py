@@ -1,6 +1,9 @@
-"""Force limits of body regions, to hold the recorded forces against: for orientation, not conformity."""
+"""Force limits of body regions beside the recorded forces: for orientation, not conformity."""
 
 from typing import NamedTuple
+
+from pretouch.reporting.contacts import TRANSIENT_S, Contacts
+from pretouch.reporting.html import Html, Text, bad, element, joined, number, percent, table
 
 
 class Region(NamedTuple):
@@ -28,3 +31,51 @@ REGIONS = (
     Region("Hands and fingers", 280.0, 140.0),
 )
 """As `SOURCE` has them; public copies of the table disagree in places."""
+
+
+def orientation_section(contacts: Contacts) -> Html:
+    """The largest forces beside what regions of the body are said to bear."""
+    peak, held = contacts.peak, contacts.held
+    source, here, unsure = (
+        ("true force, as the simulation knows it", "", "")
+        if contacts.truth_known
+        else (
+            "force estimate during detected contacts",
+            " (here of the estimate as it is)",
+            " The estimate has a bandwidth of about 10 Hz and understates the peaks of impacts, and contacts that were"
+            " not detected are not in it.",
+        )
+    )
+    lasting = "none" if held is None else f"{held:.1f} N"
+
+    def shares(region: Region) -> tuple[float | None, float | None]:
+        transient = peak / region.transient if peak is not None and region.transient else None
+        return transient, held / region.quasi_static if held is not None else None
+
+    columns = [
+        ("body region", lambda region: region.name),
+        ("transient [N]", lambda region: number(region.transient, 0)),
+        ("of it", lambda region: _marked(shares(region)[0])),
+        ("quasi-static [N]", lambda region: number(region.quasi_static, 0)),
+        ("of it", lambda region: _marked(shares(region)[1])),
+        ("", lambda region: _bar(max((share for share in shares(region) if share is not None), default=None))),
+    ]
+    note = (
+        f"For orientation, not conformity. Figures: {SOURCE}. Public copies of such tables disagree. The transient"
+        " figure is held against the largest force, the quasi-static one against the largest 20 ms mean later than"
+        f" {TRANSIENT_S:g} s into a contact{here}. Which region would be hit, and over what area, is not known here;"
+        f" pressures are not looked at.{unsure}"
+    )
+    largest = f"Largest {source}: {number(peak, 1)} N; later than {TRANSIENT_S:g} s into a contact: {lasting}."
+    return joined([element("p", largest), table(columns, REGIONS, note)])
+
+
+def _marked(share: float | None) -> Text:
+    return bad(percent(share)) if share is not None and share > 1 else percent(share)
+
+
+def _bar(share: float | None) -> Html:
+    if share is None:
+        return Html("")
+    kind = "bar over" if share > 1 else "bar"
+    return Html(f'<div class="{kind}"><div style="width:{100 * min(share, 1.0):.0f}%"></div></div>')

@@ -1,0 +1,236 @@
+"""Figures of a report, drawn from the course of a recording as SVG."""
+
+from base64 import b64encode
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
+from html import escape
+from io import BytesIO
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from pretouch.recording.run_record import MODES
+from pretouch.reporting.contacts import AXES
+from pretouch.reporting.html import Html, element, html
+from pretouch.reporting.limits import acceleration_fraction, position_margin, speed_fraction
+from pretouch.reporting.motion import d_crit, d_notice, within_d_max
+from pretouch.reporting.record import Course
+from pretouch.types import FloatArray, Mode
+
+INK, BLUE, RED, GREEN, AMBER, GREY = "#1f2933", "#2b6cb0", "#c53030", "#2f855a", "#b7791f", "#a0aab4"
+_SHADES = {Mode.REACT: (RED, 0.16), Mode.HOLD: (GREY, 0.28)}
+_COLOURS = {Mode.TRACK: INK, Mode.REACT: RED, Mode.HOLD: GREY}
+_LINES = (
+    (BLUE, "-"), (AMBER, "--"), (GREEN, "-."), (INK, ":"), ("#805ad5", "-"), ("#b83280", "--"), ("#0b7285", "-."),
+    (GREY, "-"),
+)  # fmt: skip
+"""Colour and style of each of several lines; more lines than these begin again."""
+_SWITCHES = 12
+"""More changes of the profile than this are not drawn."""
+_BEFORE_S, _AFTER_S = 0.3, 0.7
+"""Time shown about a contact [s]."""
+_SENSED = 400
+"""Sensed points that are drawn: more would hide each other."""
+_LEAST_SIDE_M = 0.4
+_MARKS = 3
+"""Order of what is drawn over the lines, and never as pixels."""
+_MOST_DRAWN = 3000
+"""Steps beyond which lines are drawn as pixels: an hour of them would be a page of 100 MB."""
+_STYLE: Any = {
+    "font.size": 9.0,
+    "axes.labelsize": 9.0,
+    "axes.edgecolor": "#616e7c",
+    "axes.formatter.useoffset": False,
+    "path.simplify_threshold": 0.3,
+    "svg.hashsalt": "pretouch",
+    "svg.fonttype": "path",
+}
+
+
+def style() -> AbstractContextManager[None]:
+    """Context in which the figures of a report are made and drawn."""
+    return matplotlib.rc_context(_STYLE)
+
+
+def picture(figure: Figure, text: str) -> Html:
+    """Draw a figure as SVG into the page, with a caption: no file beside it, nothing to fetch."""
+    image, metadata = BytesIO(), {"Date": None, "Creator": None}
+    figure.savefig(image, format="svg", dpi=160, bbox_inches="tight", pad_inches=0.05, metadata=metadata)
+    data = b64encode(image.getvalue()).decode("ascii")
+    drawn = Html(f'<img src="data:image/svg+xml;base64,{data}" alt="{escape(text)}">')
+    return element("figure", Html(drawn + element("figcaption", html(text))))
+
+
+def _panels(course: Course, heights: Sequence[float], height: float) -> tuple[Figure, list[Axes]]:
+    """Make a figure of panels one below the other that share the time of a course."""
+    figure = Figure(figsize=(10, height), layout="constrained")
+    panels: list[Axes] = list(figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0])
+    switches = course.time[1:][np.diff(course.run) != 0]
+    for axes in panels:
+        _frame(axes, course)
+        axes.margins(x=0)
+        for mode, colour in _SHADES.items():
+            flags = course.mode == MODES.index(mode)
+            if flags.any():
+                until = flags | np.append(False, flags[:-1])  # a mode lasts until the next step
+                whole = axes.get_xaxis_transform()
+                axes.fill_between(
+                    course.time, 0.0, 1.0, where=until, transform=whole, facecolor=colour, lw=0, zorder=0,
+                    label=mode.name,
+                )  # fmt: skip
+        for time in switches if len(switches) <= _SWITCHES else ():
+            axes.axvline(time, color=INK, lw=0.8, ls=(0, (1, 2)))
+    panels[-1].set_xlabel("time [s]")
+    return figure, panels
+
+
+def _frame(axes: Axes, course: Course) -> None:
+    axes.grid(alpha=0.25, lw=0.6)
+    axes.spines[["top", "right"]].set_visible(False)
+    if len(course) > _MOST_DRAWN:
+        axes.set_rasterization_zorder(_MARKS)
+
+
+def _legend(axes: Axes, columns: int) -> None:
+    """Put what a panel shows above it."""
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(
+            loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, fontsize="small", frameon=False,
+            borderaxespad=0.1, columnspacing=1.2, handlelength=1.8,
+        )  # fmt: skip
+
+
+def force_figure(course: Course) -> Figure:
+    """One panel an axis: estimate, value of eq. 8, thresholds, true force where it is known, and detections.
+
+    Below them the evidence. Detectors without thresholds have bands in which one sample alone is no contact.
+    """
+    figure, (*along, evidence) = _panels(course, (1, 1, 1, 0.7), 9.2)
+    for k, axes in enumerate(along):
+        _along(axes, course, k, (-np.inf, np.inf))
+    _legend(along[0], 7)
+    evidence.plot(course.time, course.evidence, color=BLUE, lw=1.0)
+    evidence.axhline(1.0, color=INK, lw=1.0)
+    evidence.set_ylabel("evidence")
+    return figure
+
+
+def close_up_figure(course: Course, time: float, force: FloatArray) -> Figure:
+    """The same about one contact [s], along the axis to which its force (3,) points most."""
+    figure, (axes,) = _panels(course, (1,), 3.2)
+    span = time - _BEFORE_S, time + _AFTER_S
+    _along(axes, course, int(np.abs(np.nan_to_num(force)).argmax()), span)
+    axes.set_xlim(span)
+    _legend(axes, 7)
+    return figure
+
+
+def _along(axes: Axes, course: Course, k: int, span: tuple[float, float]) -> None:
+    """Draw the force along an axis of the base frame in a span of time [s]."""
+
+    def within(time: FloatArray) -> slice:
+        return slice(*np.searchsorted(time, span).tolist())
+
+    steps = within(course.time)
+    time, force, filtered = course.time[steps], course.force[steps, k], course.filtered_force[steps, k]
+    if course.truth is not None:
+        known = within(course.truth.time)
+        true = course.truth.force[known, k]
+        axes.plot(course.truth.time[known], true, color=GREEN, lw=0.9, ls="--", label="true force")
+    axes.plot(time, force, color=GREY, lw=0.9, label="estimate")
+    if course.by_thresholds:
+        axes.plot(time, filtered, color=BLUE, lw=1.3, label="value of eq. 8")
+    bounds = "thresholds" if course.by_thresholds else "bands of one sample"
+    axes.plot(time, course.upper[steps, k], color=INK, lw=1.0, label=bounds)
+    axes.plot(time, course.lower[steps, k], color=INK, lw=1.0)
+    detected = [i for i, contact, _ in course.contacts if contact.axes[k] or not course.by_thresholds]
+    at = [i - steps.start for i in detected if steps.start <= i < steps.stop]
+    value = filtered if course.by_thresholds else force
+    mark: Any = {"color": RED, "mec": "white", "mew": 0.6, "ms": 7, "zorder": _MARKS, "label": "detected"}
+    axes.plot(time[at], value[at], "v", **mark)
+    axes.set_ylabel(f"force along {AXES[k]} [N]")
+
+
+def motion_figure(course: Course) -> Figure:
+    """Distance of what each unit showed from the body, where proximity was used; speed; speed factor."""
+    heights, height = ((1.5, 1, 0.6), 7.6) if course.proximity_used else ((1, 0.6), 4.6)
+    figure, (*above, speed, factor) = _panels(course, heights, height)
+    for axes in above:
+        names = [_plain(name) for name in course.units]
+        _lines(axes, course.time, course.body_distance, names)
+        axes.plot(course.time, d_notice(course), color=INK, lw=0.9, ls=(0, (1, 3)), label="d_notice")
+        axes.plot(course.time, d_crit(course), color=RED, lw=0.9, ls=(0, (1, 3)), label="d_crit")
+        axes.axhline(0.0, color=INK, lw=0.8)
+        axes.set_ylabel("distance from the body [m]")
+        _legend(axes, 5)
+    speed.plot(course.time, course.speed, color=BLUE, lw=1.0)
+    speed.set_ylabel("end-effector [m/s]")
+    speed.set_ylim(bottom=0.0)
+    factor.plot(course.time, course.speed_scale, color=INK, lw=1.0)
+    factor.set(ylabel="speed factor", ylim=(-0.05, 1.1))
+    return figure
+
+
+def _plain(name: str) -> str:
+    """Write a name from a file so that Matplotlib shows it as it is: no formula, and not hidden."""
+    shown = name.replace("\\", "\\\\").replace("$", r"\$") if "$" in name else name
+    return f" {shown}" if shown.startswith("_") else shown
+
+
+def _lines(axes: Axes, time: FloatArray, values: FloatArray, names: Sequence[str]) -> None:
+    """Draw each column of values (S, K)."""
+    for k, name in enumerate(names):
+        colour, dashes = _LINES[k % len(_LINES)]
+        axes.plot(time, values[:, k], color=colour, ls=dashes, lw=1.1, label=name)
+
+
+def path_figure(course: Course) -> Figure:
+    """Path, end-effector by mode, and the nearest sensed points, seen from the front (+x)."""
+    figure = Figure(figsize=(7.2, 5.6), layout="constrained")
+    axes: Axes = figure.subplots()
+    _frame(axes, course)
+    _, *path = course.path_position.T
+    axes.plot(*path, color=BLUE, lw=6, alpha=0.25, solid_capstyle="round", label="path")
+    for i, mode in enumerate(MODES):
+        flags = course.mode == i
+        if flags.any():
+            until = flags | np.append(False, flags[:-1])
+            _, *at = np.where(
+                until[:, None], course.ee_position, np.nan
+            ).T  # where it is not in the mode the line breaks
+            axes.plot(*at, color=_COLOURS[mode], lw=1.5, label=mode.name)
+    near = np.flatnonzero(within_d_max(course))
+    _, *point = course.nearest_point[near[:: max(1, len(near) // _SENSED)]].T
+    if len(near):
+        dots: Any = {"color": GREEN, "alpha": 0.5, "mew": 0, "ms": 3.5, "zorder": 1, "label": "nearest sensed"}
+        axes.plot(*point, "o", **dots)
+    axes.set_aspect("equal")
+    for get, put in ((axes.get_xlim, axes.set_xlim), (axes.get_ylim, axes.set_ylim)):
+        low, high = get()
+        lacking = max(0.0, _LEAST_SIDE_M - (high - low)) / 2  # a straight path has no height
+        put(low - lacking, high + lacking)
+    axes.set(xlabel="y [m]", ylabel="z [m]")
+    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize="small")
+    return figure
+
+
+def joint_figure(course: Course) -> Figure:
+    """Distance from the position limits by joint; speed and acceleration of the worst joint as fractions."""
+    figure, (top, bottom) = _panels(course, (1.2, 1), 5.2)
+    margin = position_margin(course, course.q_commanded)
+    _lines(top, course.time, margin, [f"joint {j}" for j in range(1, 1 + margin.shape[1])])
+    top.axhline(0.0, color=RED, lw=1.0)
+    top.set_ylabel("to position limit [rad]")
+    _legend(top, 9)
+    fractions = (("acceleration", GREY, acceleration_fraction), ("velocity", BLUE, speed_fraction))
+    for name, colour, fraction in fractions:
+        values = fraction(course)
+        worst = np.where(np.isfinite(values), values, -np.inf).max(axis=1, initial=-np.inf)
+        bottom.plot(course.time, np.where(worst < 0, np.nan, worst), color=colour, lw=0.9, label=name)
+    bottom.axhline(1.0, color=RED, lw=1.0, label="limit")
+    bottom.set_ylabel("fraction of limit")
+    _legend(bottom, 5)
+    return figure

@@ -1,1 +1,0 @@
-"""Figures of a report, drawn from the course of a recording."""

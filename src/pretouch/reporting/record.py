@@ -1,0 +1,219 @@
+"""A recording as arrays: all that a report tells of it, read in one pass."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import groupby, islice
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pretouch.contact.moving_thresholds import MovingThresholds
+from pretouch.explanation import answers
+from pretouch.recording.reader import Kept, Recorded, Run
+from pretouch.recording.run_record import Columns, RunRecord, TrueForces, columns_of, contacts_of
+from pretouch.robot.model import RobotModel
+from pretouch.types import BoolArray, FloatArray, IntArray, QpOutcome, RangeReadings
+
+OUTCOMES = tuple(QpOutcome)
+"""What the numbers in `Course.outcome` stand for."""
+NO_READING = -1
+"""Stands in `Course.reading_status` where there is no reading."""
+_BATCH = 4096
+"""Cycles that are objects at a time: an hour of them fits into memory as arrays only."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Course(RunRecord):
+    """S control cycles of one recording, with n joints, K units and L links. Base frame; NaN where there is nothing."""
+
+    runs: tuple[Run, ...]
+    """All with the same arm and the same skin."""
+    run: IntArray
+    """(S,) index of the run."""
+    event: NDArray[np.object_]
+    """(S,) `Event` that made the mode so."""
+    reason: NDArray[np.object_]
+    """(S,) sentences."""
+    q: FloatArray
+    """(S, n) measured positions [rad]."""
+    q_commanded: FloatArray
+    """(S, n) [rad]"""
+    command: FloatArray
+    """(S, n) [rad/s]"""
+    body_distance: FloatArray
+    """(S, K) distance of what each unit showed from the surface of the body [m]."""
+    link_distance: FloatArray
+    """(S, L) least distance of anything sensed from the surface of each link, where that link was the closest [m]."""
+    ee_distance: FloatArray
+    """(S,) distance of the nearest sensed point from the end-effector's origin [m]."""
+    nearest_point: FloatArray
+    """(S, 3) that point [m]."""
+    answering: BoolArray
+    """(S,) whether the arm moves with a contact."""
+    detectable_n: FloatArray
+    """(S,) force at the end-effector that is detected if it lasts for 0.1 s [N]."""
+    restricted: IntArray
+    """(S,) how many obstacles restrict the arm."""
+    outcome: IntArray
+    """(S,) index in `OUTCOMES`."""
+    slack: FloatArray
+    """(S,) largest violation of an approach row [m/s], 0 without rows."""
+    with_inputs: BoolArray
+    """(S,) whether the inputs of the step are in the recording."""
+    robot_stamp: FloatArray
+    """(S,) of the robot state among the inputs [s]"""
+    force_missing: BoolArray
+    """(S,) whether that state had no force estimate."""
+    reading_stamp: FloatArray
+    """(S, K) of the readings among the inputs [s]"""
+    reading_distance: FloatArray
+    """(S, K) [m]"""
+    reading_status: IntArray
+    """(S, K) `RangeStatus` codes, `NO_READING` for none."""
+
+    @property
+    def model(self) -> RobotModel:
+        """The arm."""
+        return self.runs[0].model
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Names of the units, in order."""
+        return self.runs[0].skin.ids
+
+    @property
+    def lasted(self) -> FloatArray:
+        """How long each step (S,) lasted: until the next one; the last as long as is usual [s]."""
+        if len(self) < 2:
+            return np.zeros(len(self))
+        steps = np.maximum(np.diff(self.time), 0.0)
+        return np.append(steps, np.median(steps))
+
+    @property
+    def proximity_used(self) -> bool:
+        """Whether any of the profiles looks at what the units say."""
+        return any(run.profile.perception is not None for run in self.runs)
+
+    @property
+    def by_thresholds(self) -> bool:
+        """Whether any of the profiles detects contacts by the paper's thresholds."""
+        return any(isinstance(run.profile.detect, MovingThresholds) for run in self.runs)
+
+    @property
+    def profile_names(self) -> tuple[str, ...]:
+        """Names of the profiles that ran, each once."""
+        return tuple(dict.fromkeys(run.profile.name for run in self.runs))
+
+    def of_runs(self, value: Callable[[Run], float]) -> FloatArray:
+        """Value (S,) that each step's run has."""
+        return np.array([value(run) for run in self.runs], dtype=np.float64)[self.run]
+
+
+def gather(recorded: Recorded) -> Course:
+    """Read all cycles of a recording."""
+    blocks, contacts, touches, count = list[Columns](), [], [], 0
+    model, units = recorded.runs[0].model, len(recorded.runs[0].skin)
+    for batch in _batches(recorded):
+        blocks.append(_block(batch, model, units))
+        contacts += contacts_of([kept.step for kept in batch], count)
+        truths = [kept.truth for kept in batch if kept.truth is not None]
+        touches += [(time, model.links[link], velocity) for t in truths for time, link, velocity in t.touches]
+        count += len(batch)
+    columns = {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
+    truth = TrueForces(columns.pop("true_time"), columns.pop("true_force"), tuple(touches))
+    known = columns.pop("truth_known").any()
+    return Course(runs=tuple(recorded.runs), contacts=tuple(contacts), truth=truth if known else None, **columns)
+
+
+def _batches(recorded: Recorded) -> Iterator[list[Kept]]:
+    """Cycles of one run each, no more than `_BATCH` at a time."""
+    for _, cycles in groupby(recorded, key=lambda kept: kept.run):
+        while batch := list(islice(cycles, _BATCH)):
+            yield batch
+
+
+def _block(batch: list[Kept], model: RobotModel, units: int) -> Columns:
+    """Arrays of a batch of one run, and what is known of the true forces meanwhile."""
+    steps, truths = [kept.step for kept in batch], [kept.truth for kept in batch if kept.truth is not None]
+    copied = ("q", "q_commanded", "command", "detectable_n")
+    return {
+        **columns_of(steps),
+        **{name: np.array([getattr(step, name) for step in steps]) for name in copied},
+        "run": np.full(len(batch), batch[0].run),
+        "event": np.array([step.event for step in steps], dtype=object),
+        "reason": np.array([step.reason for step in steps], dtype=object),
+        "answering": np.array([answers(step) for step in steps]),
+        "restricted": np.array([len(step.restricted) for step in steps]),
+        "outcome": np.array([OUTCOMES.index(step.qp.outcome) for step in steps]),
+        "slack": np.array([np.max(step.qp.slack, initial=0.0) for step in steps]),
+        "truth_known": np.array([bool(truths)]),
+        "true_time": np.concatenate([np.zeros(0), *(truth.time for truth in truths)]),
+        "true_force": np.vstack([np.zeros((0, 3)), *(truth.force for truth in truths)]),
+        **_near(batch, len(model.links), units),
+        **_inputs(batch, units),
+    }
+
+
+def _near(batch: list[Kept], links: int, units: int) -> Columns:
+    """What was sensed, as the least distance of each step by unit and by link, and the nearest point."""
+    seen = [kept.step.obstacles for kept in batch]
+    row = np.repeat(np.arange(len(seen)), [len(o.unit) for o in seen])
+    unit = np.concatenate([o.unit for o in seen])
+    link = np.concatenate([o.link for o in seen])
+    body = np.concatenate([o.body_distance for o in seen])
+    ee = np.concatenate([o.ee_distance for o in seen])
+    point = np.concatenate([o.point for o in seen]).reshape(-1, 3)
+    by_unit = np.full((len(seen), units), np.nan)
+    by_link = np.full((len(seen), links), np.nan)
+    own = unit < units  # what outside sources see is of no unit
+    np.fmin.at(by_unit, (row[own], unit[own]), body[own])
+    np.fmin.at(by_link, (row, link), body)
+    nearest, where = np.full(len(seen), np.nan), np.full((len(seen), 3), np.nan)
+    farthest_first = np.argsort(-ee, kind="stable")  # of several entries for a row the last one stays
+    farthest_first = farthest_first[np.isfinite(ee[farthest_first])]
+    nearest[row[farthest_first]], where[row[farthest_first]] = ee[farthest_first], point[farthest_first]
+    return {"body_distance": by_unit, "link_distance": by_link, "ee_distance": nearest, "nearest_point": where}
+
+
+def _inputs(batch: list[Kept], units: int) -> Columns:
+    """What the steps went by; inputs that a controller could not use may hold anything."""
+    inputs = [kept.inputs for kept in batch]
+    lacking = RangeReadings(np.full(units, np.nan), np.full(units, np.nan), np.full(units, NO_READING))
+    readings = [lacking if i is None or not _fit(i.readings, units) else i.readings for i in inputs]
+    return {
+        "with_inputs": np.array([i is not None for i in inputs]),
+        "robot_stamp": np.array([np.nan if i is None else float(i.robot.stamp) for i in inputs]),
+        "force_missing": np.array([i is not None and i.robot.wrench is None for i in inputs]),
+        "reading_stamp": np.array([r.stamp for r in readings]),
+        "reading_distance": np.array([r.distance for r in readings]),
+        "reading_status": np.array([r.status for r in readings]),
+    }
+
+
+def _fit(readings: RangeReadings, units: int) -> bool:
+    return all(np.shape(part) == (units,) for part in (readings.stamp, readings.distance, readings.status))
+
+
+@dataclass(frozen=True)
+class Spread:
+    """How some numbers are spread."""
+
+    median: float
+    p99: float
+    max: float
+
+
+def spread(values: FloatArray) -> Spread | None:
+    """Median, 99 % and largest of the finite ones of some values, None of none."""
+    finite = values[np.isfinite(values)]
+    if not finite.size:
+        return None
+    median, p99 = np.percentile(finite, [50, 99])
+    return Spread(float(median), float(p99), float(finite.max()))
+
+
+def least(values: FloatArray) -> tuple[float, int] | None:
+    """Least of the finite ones of some values (S,) and where it is, None of none."""
+    finite = np.where(np.isfinite(values), values, np.inf)
+    place = int(np.argmin(finite))
+    return (float(finite[place]), place) if np.isfinite(finite[place]) else None

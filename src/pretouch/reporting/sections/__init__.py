@@ -1,1 +1,0 @@
-"""Sections of a report, each from the measures of one recording."""
