@@ -16,8 +16,8 @@ from pretouch.profiles import profile
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin
+from pretouch.sim.hand import Pusher
 from pretouch.sim.paper_scenes import dynamic_pushes
-from pretouch.sim.pushes import Pusher
 from pretouch.sim.scene import HandSpec, SceneSpec
 from pretouch_lab.benchmarks.workload import Workload
 from pretouch_lab.trial import Setup, play

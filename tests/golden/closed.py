@@ -16,11 +16,10 @@ from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import profile
 from pretouch.robot.postures import brought_to
 from pretouch.sensing.skin import Skin
-from pretouch.sim.hand import Hand
+from pretouch.sim.hand import Hand, Pusher
 from pretouch.sim.paper_scenes import Placement, dynamic_pushes, person_scene, static_path, static_scene
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.plant_params import PlantParams
-from pretouch.sim.pushes import Pusher
 from pretouch.sim.random_skin import random_skin
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import HandSpec, SceneSpec, fixtures

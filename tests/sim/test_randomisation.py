@@ -5,12 +5,12 @@ import pytest
 from pretouch.errors import ParameterError
 from pretouch.robot.description import panda
 from pretouch.sim.plant_params import PlantParams, plant_params_of
-from pretouch.sim.randomisation import SETS, World, drawn, world_set
+from pretouch.sim.randomisation import SETS, DrawnWorld, drawn, world_set
 from pretouch.sim.range_finder import RangeFinderParams
 
 
 def test_the_nominal_world_is_the_usual_one():
-    assert drawn(world_set("nominal"), 5) == World(PlantParams(), RangeFinderParams())
+    assert drawn(world_set("nominal"), 5) == DrawnWorld(PlantParams(), RangeFinderParams())
 
 
 @pytest.mark.parametrize("name", SETS)
@@ -24,9 +24,8 @@ def test_one_seed_is_one_world(name):
 def test_every_draw_is_within_its_range_and_has_a_source(name):
     chosen = world_set(name)
     assert chosen.about
-    for spread in chosen.spreads:
-        assert spread.source, spread.field
-    by_name = {spread.field: spread for spread in chosen.spreads}
+    assert all(spread.source for spread in chosen.spreads.values())
+    by_name = chosen.spreads
     for seed in range(1000, 1040):
         world = drawn(chosen, seed)
         low, high = by_name["plant.observer_gain_1_s"].numbers
@@ -38,7 +37,9 @@ def test_every_draw_is_within_its_range_and_has_a_source(name):
 
 
 def test_stress_reaches_farther_than_realistic():
-    wide, narrow = ({s.field: s.numbers for s in world_set(name).spreads} for name in ("stress", "realistic"))
+    wide, narrow = (
+        {field: s.numbers for field, s in world_set(name).spreads.items()} for name in ("stress", "realistic")
+    )
     assert set(wide) == set(narrow)
     for name in narrow:
         assert wide[name][0] <= narrow[name][0] or wide[name][1] > narrow[name][1], name
@@ -69,6 +70,8 @@ def test_what_an_experiment_varies_stays():
         ("[plant.mass_error]\nuniform = [0.2, 0.1]\n", "give two numbers, the lower first"),
         ("[plant.mass_error]\nlog_uniform = [0.0, 0.1]\n", "and above 0"),
         ("[plant.mass_error]\nuniform = [0.0, 0.1]\nvalue = 3\n", "give one of value, uniform"),
+        ("[plant.mass_error]\nuniform = [0.0, nan]\n", "give two numbers"),
+        ("[plant.mass_error]\nunform = [0.0, 0.1]\n", "unknown field `unform`"),
         ("[plant.mass_error]\nvalue = 1.5\n", "PlantParams.mass_error is 1.5: it must be at most 1"),
         ("[plant.mass_error]\nvalue = 'much'\n", "give a number"),
         ("[plant.ripple_nm]\nvalue = 0.1\n", "give a list of numbers"),

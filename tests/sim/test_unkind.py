@@ -9,7 +9,7 @@ from tests.sim.test_plant import NONE, PERFECT, record
 
 from pretouch.errors import ParameterError
 from pretouch.robot.model import RobotModel
-from pretouch.sim.drive import Cogging, Friction, Impedance, Joints, MotionGenerator, TorqueSensors, drive, sensed
+from pretouch.sim.physics import Drives, Friction, Simulation, TorqueSensors, drive, sensed
 from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.randomisation import drawn, world_set
@@ -34,21 +34,17 @@ def lost(speeds: FloatArray, **given: float) -> FloatArray:
     cold = np.array([numbers.pop("cold", 0.0)])
     one, none = np.ones(1), np.zeros(1)
     friction = Friction(none, one, none, np.zeros(1), **numbers, cold=cold)
-    moved, found = np.zeros(1), []
+    drives, taken = Drives(np.zeros(1), np.zeros(1), 0.001, 1.0, none, none, none, 90.0 * one), []
     for speed in speeds:
-        joints = Joints(np.zeros(1), np.array([speed]), np.zeros(1))
-        generator = MotionGenerator(np.zeros(1), moved, 0.001, 1.0)
-        _, taken = drive(
-            none,
-            5.0 * one,
-            joints,
-            generator,
-            Impedance(none, none, none, 90.0 * one),
-            friction,
-            Cogging(none, one, none),
-        )
-        found.append(taken[0])
-    return np.array(found)
+        world = Simulation(0, 0, np.zeros(1), np.array([speed]), none, np.zeros(1), none)
+        taken.append(drive(none, 5.0 * one, world, drives, friction, rigid_sensors())[1][0])
+    return np.array(taken)
+
+
+def rigid_sensors(turn: float = 0.0) -> TorqueSensors:
+    """Sensors of one joint that do not err; its spring turns by so much in a step [rad]."""
+    none = np.zeros(1)
+    return TorqueSensors(none, none, np.ones(1), none, 0.0, none.copy(), 0.0, 0.0, 0.0, np.zeros((2, 1)), turn, 0.05)
 
 
 def test_friction_remembers_where_a_joint_came_from_until_it_has_turned_far_enough():
@@ -75,13 +71,8 @@ def test_bristles_stay_within_their_bounds_at_any_speed(speed):
 
 
 def test_a_joint_on_a_spring_rings_at_its_frequency_and_settles_at_the_torque():
-    found = []
-    none, one = np.zeros(1), np.ones(1)
-    turn = 2 * np.pi * 15.0 * 0.001
-    sensors = TorqueSensors(none, none, one, none, np.zeros(1), 0.0, 0.0, 0.0, np.zeros((2, 1)), turn, 0.05)
-    for _ in range(3000):
-        found.append(sensed(2.0 * one, none, none, none, none, sensors)[0])
-    rung = np.array(found)
+    none, sensors = np.zeros(1), rigid_sensors(turn=2 * np.pi * 15.0 * 0.001)
+    rung = np.array([sensed(np.full(1, 2.0), none, none, none, none, sensors)[0] for _ in range(3000)])
     assert rung.max() > 3.5  # a step overshoots by exp(-pi d): 0.85
     crossings = np.flatnonzero(np.diff(np.sign(rung[:400] - 2.0)))
     assert_allclose(np.diff(crossings).mean(), 1000 / 15 / 2, rtol=0.03)

@@ -200,7 +200,7 @@ def _posture(start: str, model: RobotModel, path: ArmPath) -> FloatArray:
 
 def _scene(c: "ServeFci", model: RobotModel) -> tuple[SceneSpec, HandScript | None, ArmPath]:
     """Return what is there, what its hand does, and the path of the end-effector."""
-    from pretouch.sim.pushes import Pusher
+    from pretouch.sim.hand import Pusher
 
     match c.scene:
         case "static":

@@ -27,7 +27,7 @@ from pretouch.sim.plant import TOUCH_N, Plant, PlantClock, Touch
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import SceneSpec, described, fixtures
-from pretouch.sim.touch_sensor import SimulatedTouchSkin, TouchSensorParams, TouchSensors
+from pretouch.sim.touch_sensor import SimulatedTouchSkin, TouchErrors, TouchSensors
 from pretouch.types import ControlStep, FloatArray, Mode
 from pretouch_lab.domain_randomisation import Parts, randomised
 
@@ -216,4 +216,4 @@ def _with_touch(setup: Setup, plant: Plant, units: RangeFinders) -> ports.Skin:
     """Return the units with their touch sensors, where the skin has such."""
     if not len(setup.skin.touching):
         return units
-    return SimulatedTouchSkin(units, TouchSensors(plant, setup.skin, TouchSensorParams(), setup.seed))
+    return SimulatedTouchSkin(units, TouchSensors(plant, setup.skin, TouchErrors(), setup.seed))

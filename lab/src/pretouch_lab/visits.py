@@ -5,9 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pretouch.robot.model import RobotModel
-from pretouch.sim.hand import HandGoal, point_on_arm
+from pretouch.sim.hand import FREE_N, HOME, LEAD_S, OUTWARDS, HandGoal, point_on_arm, robot_hand, way_round
 from pretouch.sim.plant import Plant
-from pretouch.sim.pushes import FREE_N, HOME, LEAD_S, OUTWARDS, robot_hand, way_round
 from pretouch.types import FloatArray
 
 _CLEAR_M = 0.4

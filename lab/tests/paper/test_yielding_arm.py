@@ -10,10 +10,9 @@ from pretouch.params import GiveUpParams
 from pretouch.profiles import Profile, profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.sim.hand import USUAL_ARM, HandGoal, point_on_arm
+from pretouch.sim.hand import FREE_N, USUAL_ARM, HandGoal, Push, Pusher, point_on_arm
 from pretouch.sim.paper_scenes import static_path, static_scene
 from pretouch.sim.plant import Plant
-from pretouch.sim.pushes import FREE_N, Push, Pusher
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
 from pretouch.types import FloatArray, Mode
 from pretouch_lab.trial import Record, Setup, play

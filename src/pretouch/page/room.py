@@ -22,7 +22,7 @@ from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.plant_params import PlantParams, plant_params_of
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
-from pretouch.sim.touch_sensor import SimulatedTouchSkin, TouchSensorParams, TouchSensors
+from pretouch.sim.touch_sensor import SimulatedTouchSkin, TouchErrors, TouchSensors
 from pretouch.types import FloatArray
 
 PathName = Literal["circle", "line"]
@@ -120,7 +120,7 @@ class Room:
         self._simulated = None if real else RangeFinders(self.plant, skin, settings.ranging, settings.seed)
         self.units: UnitPort = self._simulated or cast(RealUnits, real)
         if self._simulated and len(skin.touching):
-            touch = TouchSensors(self.plant, skin, TouchSensorParams(), settings.seed)
+            touch = TouchSensors(self.plant, skin, TouchErrors(), settings.seed)
             self.units = SimulatedTouchSkin(self._simulated, touch)
         self.hand = Hand(self.plant, self.mouse, PersonArm(speed_max=HAND_SPEED_M_S))
         self.clock = PlantClock(self.plant, settings.profile.task.control_period_s)

@@ -1,8 +1,8 @@
 """One arm in a simulated world: its errors, sensors, own computer, and the port `Robot`. Time passes elsewhere."""
 
 from collections import deque
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from itertools import repeat
 from typing import Any, NamedTuple
 
@@ -10,10 +10,9 @@ import mujoco
 import numpy as np
 
 from pretouch.robot.model import RobotModel
-from pretouch.sim.drive import Cogging, Friction, Impedance, Joints, MotionGenerator, TorqueSensors
-from pretouch.sim.observer import observer_init, wrench_from_torques
-from pretouch.sim.physics import Computer, Nominal, SimulatedArm, World
-from pretouch.sim.plant_params import PlantParams
+from pretouch.sim.observer import wrench_from_torques
+from pretouch.sim.physics import ArmMemory, Computer, Drives, Friction, Simulation, TorqueSensors
+from pretouch.sim.plant_params import Joints, PlantParams
 from pretouch.sim.scene import CONTACTS, ArmError, CableSpec
 from pretouch.types import FloatArray, RobotState
 
@@ -65,29 +64,19 @@ class ArmInWorld:
         params.check_joints(model.n, len(model.links))
         self.model, self.params, self._n = model, params, model.n
         rng = np.random.default_rng([seed, 1])
-        self._rng = np.random.default_rng([seed, 2])
+        self._rng, self._wander = np.random.default_rng([seed, 2]), np.random.default_rng([seed, 3])
+        mass_factor = _known(params.mass_factors, 1.0 + params.mass_error * rng.uniform(-1, 1, len(model.links)))
+        payload = params.payload_max_kg * rng.uniform()
         self.error = ArmError(
-            mass_factor=1.0 + params.mass_error * rng.uniform(-1, 1, len(model.links)),
-            payload=params.payload_max_kg * rng.uniform(),
-            armature=params.armature_kg_m2,
-            cable=CableSpec(params.cable_n_m, params.cable_slack_m, params.cable_kg, params.cable_friction_n)
-            if params.cable_n_m else None,
-        )  # fmt: skip
-        self._offset = np.array(params.torque_offset_nm) * rng.uniform(-1, 1, self._n)
-        self._wander = np.random.default_rng([seed, 3])
-        self._ripple_phase = rng.uniform(0, 2 * np.pi, self._n)
-        self._know(params)
-
-    def _know(self, params: PlantParams) -> None:
-        """Put what is known of one arm in the place of what was drawn; the draws are the same either way."""
-        if params.offsets_nm:
-            self._offset = np.array(params.offsets_nm)
-        if params.ripple_phases_rad:
-            self._ripple_phase = np.array(params.ripple_phases_rad)
-        if params.mass_factors:
-            self.error = replace(self.error, mass_factor=np.array(params.mass_factors))
-        if params.payload_kg is not None:
-            self.error = replace(self.error, payload=params.payload_kg)
+            mass_factor,
+            payload if params.payload_kg is None else params.payload_kg,
+            params.armature_kg_m2,
+            CableSpec(params.cable_n_m, params.cable_slack_m, params.cable_kg, params.cable_friction_n)
+            if params.cable_n_m
+            else None,
+        )
+        self._offset = _known(params.offsets_nm, np.array(params.torque_offset_nm) * rng.uniform(-1, 1, self._n))
+        self._ripple_phase = _known(params.ripple_phases_rad, rng.uniform(0, 2 * np.pi, self._n))
 
     @property
     def offset_nm(self) -> FloatArray:
@@ -106,28 +95,17 @@ class ArmInWorld:
         self.mj_model, self.mj_data, self.first_body = mj_model, mj_data, body
         """`first_body` is the index in MuJoCo's of what is link 0 of the arm: its links follow."""
         self._arm_geoms = {g for g in range(mj_model.ngeom) if self._on_arm(g)}
-        n, data, own = self._n, mj_data, slice(joint, joint + self._n)
+        data, own = mj_data, slice(joint, joint + self._n)
         # views into the simulation's memory, taken once: MuJoCo's attribute look-ups cost as much as the arithmetic
-        joints = Joints(data.qpos[own], data.qvel[own], data.qfrc_applied[own])
-        self._q = joints.q
+        self._q = data.qpos[own]
         self.link_position, self.link_rotation = data.xpos[body:], data.xmat.reshape(-1, 3, 3)[body:]
         """(L', 3) origins [m] and (L', 3, 3) orientations of the links, then of whatever else moves."""
         self._q[:] = q
         mujoco.mj_forward(mj_model, data)
-        mass, bias = self.model.mass_matrix_and_bias(q, np.zeros(n), np.zeros(n))
         self.stiffness = np.array(self.params.stiffness_nm_rad)
         """Of the joint impedance (n,) [Nm/rad]; `set_stiffness` changes it."""
-        self._impedance = Impedance(
-            self.stiffness.copy(), self._damping(mass), np.zeros(n), self.model.description.tau_max
-        )
-        # at rest the impedance settles where it holds what the model does not know; start there, not with a jerk
-        self._q_d, self._qd_set = q + (data.qfrc_bias[own] - bias) / self.stiffness, np.zeros(n)
+        self._group(own)
         dt = self.params.period_s
-        zero = observer_init(mass, np.zeros(n))
-        self._computer = Computer(
-            q.copy(), np.zeros(n), bias, zero.residual, zero.integral, mass, self.params.observer_gain_1_s, dt
-        )
-        self._group(joints, data.qacc[own])
         self._states: deque[_Past] = deque(maxlen=1 + round(self.params.state_delay_s / dt))
         self._late_commands: deque[tuple[float, FloatArray]] = deque()
         self._states.append(self._now())
@@ -143,35 +121,42 @@ class ArmInWorld:
         link = int(self.mj_model.geom_bodyid[geom]) - self.first_body
         return 0 <= link < len(self.model.links) and bool(self.model.moved_by[link].any())
 
-    def _group(self, joints: Joints, qdd: FloatArray) -> None:
-        """Put together what physics steps are given."""
-        p, n = self.params, self._n
+    def _group(self, own: slice) -> None:
+        """Put together what physics steps take: `own` are the arm's joints among MuJoCo's."""
+        p, data, q, zero = self.params, self.mj_data, self._q.copy(), np.zeros(self._n)
+        mass, bias = self.model.mass_matrix_and_bias(q, zero, zero.copy())
         keep = float(np.exp(-2 * np.pi * p.torque_noise_hz * p.period_s))
         follow = 1.0 - float(np.exp(-2 * np.pi * p.set_point_hz * p.period_s))
-        self._generator = generator = MotionGenerator(self._q_d, np.zeros(n), p.period_s, follow)
-        self._cold, self._drift = np.array([p.cold_friction]), np.zeros(n)
+        counted = int(self.mj_model.sensor(CONTACTS).adr[0])
+        world = Simulation(
+            self.mj_model._address, data._address, self._q, data.qvel[own], data.qacc[own], data.qfrc_applied[own],
+            data.sensordata[counted : counted + 1],
+        )  # fmt: skip
+        # at rest the impedance settles where it holds what the model does not know; start there, not with a jerk
+        q_d, self._qd_set = q + (data.qfrc_bias[own] - bias) / self.stiffness, zero.copy()
+        self._drives = Drives(
+            q_d, zero.copy(), p.period_s, follow, self.stiffness.copy(), self._damping(mass), zero.copy(),
+            self.model.description.tau_max,
+        )  # fmt: skip
+        self._cold, self._drift = np.array([p.cold_friction]), zero
         f1, f2, f3 = np.array([p.friction_f1_nm, p.friction_f2_s_rad, p.friction_f3_rad_s])
         friction = Friction(
-            f1, f2, f3, np.zeros(n), p.bristle_nm,
+            f1, f2, f3, zero.copy(), p.bristle_nm,
             p.bristle_rad, p.stribeck, p.stribeck_rad_s, p.load_friction, self._cold,
         )  # fmt: skip
-        ripple, cycles = np.array([p.ripple_nm, p.ripple_cycles])
         self._err = self._offset.copy()
         sensors = TorqueSensors(
-            self._err, ripple, cycles, self._ripple_phase, np.zeros(n), keep, p.armature_kg_m2,
-            p.friction_compensated, np.stack([self._computer.bias, np.zeros(n)]), 2 * np.pi * p.ring_hz * p.period_s,
+            self._err, np.array(p.ripple_nm), np.array(p.ripple_cycles), self._ripple_phase, p.cogging, zero.copy(),
+            keep, p.armature_kg_m2, p.friction_compensated, np.stack([bias, zero]), 2 * np.pi * p.ring_hz * p.period_s,
             p.ring_damping,
         )  # fmt: skip
-        cogging = Cogging(p.cogging * ripple, cycles, self._ripple_phase)
-        data, (known, scratch) = self.mj_data, self.model.scratch
-        counted = int(self.mj_model.sensor(CONTACTS).adr[0])
-        world = World(self.mj_model._address, data._address, qdd, data.sensordata[counted : counted + 1])
-        nominal = Nominal(known._address, scratch._address, scratch.qpos, scratch.qvel)
-        self._qd_before = np.zeros(n)
-        self._arm = SimulatedArm(
-            world, joints, generator, self._impedance, friction, cogging, sensors, nominal, self._computer,
-            self._qd_before,
+        known, scratch = self.model.scratch
+        self._computer = Computer(
+            known._address, scratch._address, scratch.qpos, scratch.qvel, q, zero.copy(), bias, zero.copy(),
+            zero.copy(), mass, p.observer_gain_1_s, p.period_s,
         )  # fmt: skip
+        self._qd_before = zero.copy()
+        self._arm = ArmMemory(world, self._drives, friction, sensors, self._computer, self._qd_before)
         # what is added to coloured noise at each step, so that its variance stays that of the sensor
         self._torque_noise = np.array(p.torque_noise_nm) * np.sqrt(1 - keep**2)
 
@@ -198,43 +183,43 @@ class ArmInWorld:
 
     def command(self, qd: FloatArray) -> None:
         """Take joint velocities (n,) [rad/s] as the set-point."""
-        wanted = np.array(qd, dtype=np.float64)
+        set_point = np.array(qd, dtype=np.float64)
         if self.params.command_delay_s:
-            self._late_commands.append((self.time + self.params.command_delay_s, wanted))
+            self._late_commands.append((self.time + self.params.command_delay_s, set_point))
         else:
-            self._qd_set = wanted
+            self._qd_set = set_point
 
     # its drives, for an interface that lets a client set them
 
     @property
     def desired(self) -> tuple[FloatArray, FloatArray]:
         """Positions [rad] and velocities [rad/s] (n,) that the motion generator asks for."""
-        return self._q_d, self._generator.qd_d
+        return self._drives.q_d, self._drives.qd_d
 
     def drive_by(self, tau: FloatArray) -> None:
         """Have torques (n,) beyond gravity's [Nm] act in the next physics steps in place of the joint impedance."""
-        impedance, own = self._impedance, self._computer
+        drives, own = self._drives, self._computer
         _, gravity = self.model.mass_matrix_and_bias(own.q, np.zeros(self._n), np.empty(self._n))
-        impedance.stiffness[:] = impedance.damping[:] = 0.0
+        drives.stiffness[:] = drives.damping[:] = 0.0
         # the drives add what the model says of Coriolis torques, too, which a commanded torque has to itself
-        impedance.feed_forward[:] = tau + gravity - own.bias
+        drives.feed_forward[:] = tau + gravity - own.bias
 
     def begin_at(self, q: FloatArray) -> None:
         """Have the motion generator ask for q (n,) [rad], near where the arm is, at once and at rest."""
-        self._q_d[:], self._generator.qd_d[:] = q, 0.0
+        self._drives.q_d[:], self._drives.qd_d[:] = q, 0.0
 
     def hold(self) -> None:
         """Have the joint impedance act again, where the arm is, within its limits, and with the velocities it has."""
-        impedance, own = self._impedance, self._computer
-        impedance.stiffness[:], impedance.damping[:] = self.stiffness, self._damping(own.mass_matrix)
-        impedance.feed_forward[:] = 0.0
-        self._q_d[:], self._generator.qd_d[:] = np.clip(own.q, self.model.q_min, self.model.q_max), own.qd
+        drives, own = self._drives, self._computer
+        drives.stiffness[:], drives.damping[:] = self.stiffness, self._damping(own.mass_matrix)
+        drives.feed_forward[:] = 0.0
+        drives.q_d[:], drives.qd_d[:] = np.clip(own.q, self.model.q_min, self.model.q_max), own.qd
 
     def set_stiffness(self, stiffness: FloatArray) -> None:
         """Give the joint impedance another stiffness (n,) [Nm/rad], with the same damping ratio."""
         self.stiffness = stiffness.copy()
-        self._impedance.stiffness[:] = stiffness
-        self._impedance.damping[:] = self._damping(self._computer.mass_matrix)
+        self._drives.stiffness[:] = stiffness
+        self._drives.damping[:] = self._damping(self._computer.mass_matrix)
 
     def _damping(self, mass_matrix: FloatArray) -> FloatArray:
         inertia = np.diag(mass_matrix) + self.params.armature_kg_m2
@@ -242,12 +227,12 @@ class ArmInWorld:
 
     def _now(self) -> _Past:
         own = self._computer
-        return self.time, np.array([own.q, own.qd, self._q_d, self._qd_set, own.residual])
+        return self.time, np.array([own.q, own.qd, self._drives.q_d, self._qd_set, own.residual])
 
     def _note_contacts(self, times: list[float]) -> None:
         """Note what touched in steps that ended at these instants [s]: nothing, but for the last of them."""
         touched = self.true_force is not _NO_FORCE
-        self.true_force = self._contact_force() if self.touching else _NO_FORCE
+        self.true_force = sum((one.force for one in self.contact_forces()), start=_NO_FORCE)
         self.true_log += zip(times[:-1], repeat(_NO_FORCE))
         self.true_log.append((self.time, self.true_force))
         if self.true_force is not _NO_FORCE and not (touched and len(times) == 1):
@@ -266,9 +251,7 @@ class ArmInWorld:
 
     def _touch(self, qd: FloatArray) -> Touch:
         """Describe the first contact there is; `qd` (n,) are the joint velocities before it [rad/s]."""
-        contact, sign = next(found for found in map(self._on_the_arm, range(self.mj_data.ncon)) if found[1])
-        geom = int(contact.geom2) if sign > 0 else int(contact.geom1)
-        link = int(self.mj_model.geom_bodyid[geom]) - self.first_body
+        _, contact, link, _ = next(self._on_the_arm())
         kin = self.model.kinematics(self._q)
         return Touch(self.time, link, self.model.jacobian(kin, link, self._in_base(contact.pos.copy()))[:3] @ qd)
 
@@ -278,27 +261,23 @@ class ArmInWorld:
 
     def contact_forces(self) -> list[PointForce]:
         """Return the forces of all contacts of the arm with anything else, at the last physics step."""
-        found, wrench = [], np.zeros(6)
-        for i in range(self.mj_data.ncon):
-            contact, sign = self._on_the_arm(i)
-            if sign:
-                mujoco.mj_contactForce(self.mj_model, self.mj_data, i, wrench)
-                geom = int(contact.geom2) if sign > 0 else int(contact.geom1)
-                force = sign * (contact.frame.reshape(3, 3).T @ wrench[:3])
-                link = int(self.mj_model.geom_bodyid[geom]) - self.first_body
-                found.append(PointForce(link, contact.pos.copy(), force))
-        return found
+        forces, wrench = [], np.zeros(6)
+        for number, contact, link, sign in self._on_the_arm():
+            mujoco.mj_contactForce(self.mj_model, self.mj_data, number, wrench)
+            force = sign * (contact.frame.reshape(3, 3).T @ wrench[:3])
+            forces.append(PointForce(link, contact.pos.copy(), force))
+        return forces
 
-    def _contact_force(self) -> FloatArray:
-        """Sum of contact forces on the arm (3,) [N]; `_NO_FORCE` itself if nothing touches it."""
-        total = _NO_FORCE
-        for one in self.contact_forces():
-            total = total + one.force
-        return total
+    def _on_the_arm(self) -> Iterator[tuple[int, Any, int, int]]:
+        """Each contact of the arm: its number, itself, the arm's link, and the sign its force has on the arm."""
+        for number in range(self.mj_data.ncon):
+            contact = self.mj_data.contact[number]
+            for geom, sign in ((int(contact.geom2), 1), (int(contact.geom1), -1)):  # MuJoCo's acts on the second
+                if geom in self._arm_geoms:
+                    yield number, contact, int(self.mj_model.geom_bodyid[geom]) - self.first_body, sign
+                    break
 
-    def _on_the_arm(self, number: int) -> tuple[Any, int]:
-        """Return a contact, and the sign its force has on the arm: MuJoCo's acts on the second geom; 0 elsewhere."""
-        contact = self.mj_data.contact[number]
-        if int(contact.geom2) in self._arm_geoms:
-            return contact, 1
-        return contact, -1 if int(contact.geom1) in self._arm_geoms else 0
+
+def _known(values: Joints, drawn: FloatArray) -> FloatArray:
+    """What is known of one arm takes the place of what was drawn; the draws are the same either way."""
+    return np.array(values) if values else drawn

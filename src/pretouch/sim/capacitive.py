@@ -8,7 +8,7 @@ import numpy as np
 from pretouch.compiled import compiled
 from pretouch.sensing.sensor import Capacitive, cone_rays
 from pretouch.sensing.skin import Skin
-from pretouch.sim.rays import Geoms, cast, placed_rays
+from pretouch.sim.rays import Geoms, cast, placed, turned
 from pretouch.types import FloatArray, IntArray, RangeStatus
 
 ELECTRODE_M = 0.03
@@ -54,7 +54,8 @@ def field(electrode: Electrode, position: FloatArray, rotation: FloatArray, geom
     bodies.
     """
     body, T_body, rays = electrode
-    origin, lines = placed_rays(position[body], rotation[body], T_body, rays)
+    origin, R = placed(position[body], rotation[body], T_body)
+    lines = turned(R, rays)
     distance, normal, met = cast(origin, lines, geoms, body, farthest)
     total, all_of_it = 0.0, 0.0
     for i in range(len(rays)):

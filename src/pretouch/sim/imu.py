@@ -12,6 +12,7 @@ from pretouch.compiled import compiled, kernel
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import ACCELERATION_LSB, ANGULAR_RATE_LSB, STANDARD_GRAVITY
 from pretouch.sim.plant import Plant
+from pretouch.sim.rays import placed
 from pretouch.types import FloatArray, IntArray
 
 _SI = np.repeat((np.deg2rad(1.0), STANDARD_GRAVITY), 3)
@@ -51,14 +52,6 @@ class ImuParams(Checked):
     """Density of white noise [ug/sqrt(Hz)] (data sheet, An)."""
     angular_rate_noise_mdps: NonNegative = 7.0
     """Density of white noise [mdps/sqrt(Hz)] (data sheet, Rn)."""
-    vibration_m_s2: NonNegative = 0.0
-    """Standard deviation of what gears and structure shake each axis of the accelerometer with [m/s^2]. The links of
-    the simulated arm are rigid, so that they would not shake by themselves. An assumption, as is the resonance: each
-    unit's own, at rest as in motion."""
-    vibration_hz: Positive = 25.0
-    """Frequency of that resonance [Hz]: gear ripple of 241 cycles a turn at 0.65 rad/s."""
-    vibration_damping: Annotated[float, Check(low=0.0, high=1.0, open_low=True)] = 0.2
-    """Damping of it as a fraction of critical."""
 
 
 class ImuSample(NamedTuple):
@@ -82,17 +75,12 @@ class _Bodies(NamedTuple):
     acceleration: FloatArray  # (L, 6) likewise [rad/s^2, m/s^2]; see `_true`
 
 
-class _Mounting(NamedTuple):
-    """Where K sensors sit."""
+class _ImusOnLinks(NamedTuple):
+    """Where K sensors sit, how they err, gyroscope first, and what they keep from one physics step to the next."""
 
     link: IntArray  # (K,)
     root: IntArray  # (K,) first body of the tree that the link is in: `center` is that of its tree
     T_link_sensor: FloatArray  # (K, 4, 4)
-
-
-class _Sensors(NamedTuple):
-    """How K sensors err; gyroscope first."""
-
     rate: FloatArray  # (K,) [Hz]
     mix: FloatArray  # (K, 2, 3, 3) from true to sensed values
     bias: FloatArray  # (K, 6) [rad/s, m/s^2]
@@ -100,17 +88,12 @@ class _Sensors(NamedTuple):
     lsb: FloatArray  # (6,) a count [rad/s, m/s^2]
     follow: FloatArray  # (6,) share of the way to the true value that the low-pass goes in one physics step
     dt: float  # physics step [s]
-
-
-class _Memory(NamedTuple):
-    """What K sensors keep from one physics step to the next."""
-
     filtered: FloatArray  # (K, 6) what the low-pass gives [rad/s, m/s^2], NaN before the first step
     due: FloatArray  # (K,) when the next sample is taken [s]
 
 
-class _Taken(NamedTuple):
-    """Room for the M samples of a step."""
+class _Samples(NamedTuple):
+    """Memory for the M samples of a step."""
 
     unit: IntArray  # (M,)
     time: FloatArray  # (M,) [s]
@@ -141,26 +124,21 @@ class Imus:
         bandwidth = np.repeat((params.angular_rate_bandwidth_hz, params.acceleration_bandwidth_hz), 3)
         follow = 1.0 - np.exp(-2 * np.pi * bandwidth * dt)
         most = count * (int(dt * self.rate.max(initial=0.0)) + 2)
-        self._taken = _Taken(np.zeros(most, np.int64), np.zeros(most), np.zeros((most, 6), np.int64))
+        self._samples = _Samples(np.zeros(most, np.int64), np.zeros(most), np.zeros((most, 6), np.int64))
         root = plant.mj_model.body_rootid[link].astype(np.int64)
         data = plant.mj_data
         # views into the simulation's memory, taken once
-        self._given = (
-            _Bodies(data.xpos, data.xmat, data.subtree_com, data.cvel, data.cacc),
-            _Mounting(link, root, skin.T_link_board[skin.first]),
-            _Sensors(self.rate, mix, bias, noise, imu_counts(params), follow, dt),
-            _Memory(np.full((count, 6), np.nan), due),
-            self._taken,
-        )
+        self._bodies = _Bodies(data.xpos, data.xmat, data.subtree_com, data.cvel, data.cacc)
+        self._imus = _ImusOnLinks(
+            link, root, skin.T_link_board[skin.first], self.rate, mix, bias, noise, imu_counts(params), follow, dt,
+            np.full((count, 6), np.nan), due,
+        )  # fmt: skip
         self._qvel, self._last_qvel = data.qvel, data.qvel.copy()
-        self._shaking = np.zeros((2, count, 3))
-        self._shaken_by = np.random.default_rng([seed, 9])
-        self._resonance = _resonance(params, dt) if params.vibration_m_s2 > 0.0 else None
         plant.before_each_step(self._sample)
 
     def _sample(self, time: float) -> None:
         """Take the samples due by one step before `time`: what MuJoCo derives from a state is one step behind it."""
-        plant, room, most = self._plant, self._taken, len(self._taken.unit)
+        plant, samples, most = self._plant, self._samples, len(self._samples.unit)
         if self._drawn + most > len(self._draws):
             self._draws, self._drawn = self._rng.standard_normal((max(_DRAWS, most), 6)), 0
         dt, qvel = plant.params.period_s, self._qvel.copy()
@@ -169,19 +147,10 @@ class Imus:
         mujoco.mj_comVel(plant.mj_model, plant.mj_data)
         mujoco.mj_rnePostConstraint(plant.mj_model, plant.mj_data)
         self._qvel[:] = self._last_qvel = qvel
-        taken = _take(time - dt, self._shaken(), self._draws[self._drawn :], *self._given)
-        self._drawn += taken
-        for i in range(taken):
-            self._send(ImuSample(int(self._first[room.unit[i]]), float(room.time[i]), room.counts[i].copy()))
-
-    def _shaken(self) -> FloatArray:
-        """Return the vibration (K, 3) [m/s^2] at the accelerometers, one step after the last call."""
-        now, before = self._shaking
-        if self._resonance is not None:
-            keep, back, drive = self._resonance
-            now, before = keep * now - back * before + drive * self._shaken_by.standard_normal(now.shape), now
-            self._shaking = np.array((now, before))
-        return np.asarray(now)
+        count = _take(time - dt, self._draws[self._drawn :], self._bodies, self._imus, samples)
+        self._drawn += count
+        for unit, instant, counts in zip(*(part[:count] for part in samples), strict=True):
+            self._send(ImuSample(int(self._first[unit]), float(instant), counts.copy()))
 
 
 def imu_counts(params: ImuParams) -> FloatArray:
@@ -201,75 +170,47 @@ def _errors(params: ImuParams, count: int, rng: np.random.Generator) -> tuple[Fl
     return scale * turn, most * rng.uniform(-1, 1, (count, 6))
 
 
-def _resonance(params: ImuParams, dt: float) -> tuple[float, float, float]:
-    """Coefficients of x_k = keep x_(k-1) - back x_(k-2) + drive e_k, of white e: the vibration once a step `dt` [s]."""
-    w, damping = 2 * np.pi * params.vibration_hz, params.vibration_damping
-    back = np.exp(-2 * damping * w * dt)
-    keep = 2 * np.sqrt(back) * np.cos(w * np.sqrt(1 - damping**2) * dt)
-    # the variance of such a process (Box and Jenkins), for e of variance 1
-    variance = (1 + back) / ((1 - back) * ((1 + back) ** 2 - keep**2))
-    return float(keep), float(back), float(params.vibration_m_s2 / np.sqrt(variance))
-
-
 @compiled
-def _take(
-    now: float, shaken: FloatArray, draws: FloatArray, bodies: _Bodies, mounting: _Mounting, sensors: _Sensors,
-    memory: _Memory, taken: _Taken,
-) -> int:  # fmt: skip
+def _take(now: float, draws: FloatArray, bodies: _Bodies, imus: _ImusOnLinks, samples: _Samples) -> int:
     """Follow the motion to `now`, one physics step after the last call [s], and take what samples are due.
 
-    Advances `memory`, writes `taken`, and returns how many samples that are. `shaken` is the vibration (K, 3) [m/s^2]
-    in sensor frames, `draws` (D, 6) are normal, a row for each sample.
+    Writes `samples`, and returns how many they are; `draws` (D, 6) are normal, a row for each sample.
     """
-    dt, filtered, due = sensors.dt, memory.filtered, memory.due
+    filtered, due = imus.filtered, imus.due
     count, sensed, before = 0, np.zeros(6), np.zeros(6)
     for k in range(len(due)):
-        body = mounting.link[k]
-        true = _true(
-            bodies.position[body], bodies.rotation[body], bodies.center[mounting.root[k]], bodies.velocity[body],
-            bodies.acceleration[body], mounting.T_link_sensor[k],
-        )  # fmt: skip
-        for i in range(3):
-            true[3 + i] += shaken[k, i]
+        true = _true(bodies, imus.link[k], imus.root[k], imus.T_link_sensor[k])
         for i in range(6):
             begun = not np.isnan(filtered[k, i])
             before[i] = filtered[k, i] if begun else true[i]
-            filtered[k, i] = before[i] + sensors.follow[i] * (true[i] - before[i])
+            filtered[k, i] = before[i] + imus.follow[i] * (true[i] - before[i])
         while due[k] <= now:
             # a sample falls between two physics steps: the filtered signal is taken as straight between them
-            part = 1.0 - (now - due[k]) / dt
+            part = 1.0 - (now - due[k]) / imus.dt
             for i in range(6):
                 sensed[i] = before[i] + part * (filtered[k, i] - before[i])
             for i in range(6):
                 kind = i // 3
-                value = sensors.bias[k, i] + sensors.noise[k, i] * draws[count, i]
+                value = imus.bias[k, i] + imus.noise[k, i] * draws[count, i]
                 for j in range(3):
-                    value += sensors.mix[k, kind, i % 3, j] * sensed[3 * kind + j]
+                    value += imus.mix[k, kind, i % 3, j] * sensed[3 * kind + j]
                 # beyond full scale the counts stay at the ends of 16 bits
-                taken.counts[count, i] = int(min(max(np.round(value / sensors.lsb[i]), -32768.0), 32767.0))
-            taken.unit[count], taken.time[count] = k, due[k]
+                samples.counts[count, i] = int(min(max(np.round(value / imus.lsb[i]), -32768.0), 32767.0))
+            samples.unit[count], samples.time[count] = k, due[k]
             count += 1
-            due[k] += 1.0 / sensors.rate[k]
+            due[k] += 1.0 / imus.rate[k]
     return count
 
 
 @kernel
-def _true(
-    xpos: FloatArray, xmat: FloatArray, center: FloatArray, cvel: FloatArray, cacc: FloatArray,
-    T_link_sensor: FloatArray,
-) -> FloatArray:  # fmt: skip
+def _true(bodies: _Bodies, link: int, root: int, T_link_sensor: FloatArray) -> FloatArray:
     """True angular velocity and proper acceleration (6,) of a sensor, in its own frame.
 
     MuJoCo gives each body's velocity and acceleration as those of its point at `center` (3,), turning first, along
     the base frame's axes; the acceleration has gravity taken off, and lacks the part from the velocity's own turning.
     """
-    R, arm = np.zeros((3, 3)), np.zeros(3)
-    for i in range(3):
-        arm[i] = xpos[i] - center[i]
-        for k in range(3):
-            arm[i] += xmat[3 * i + k] * T_link_sensor[k, 3]
-            for j in range(3):
-                R[i, j] += xmat[3 * i + k] * T_link_sensor[k, j]
+    cvel, cacc = bodies.velocity[link], bodies.acceleration[link]
+    arm, R = placed(bodies.position[link] - bodies.center[root], bodies.rotation[link], T_link_sensor)
     w, alpha = cvel[:3], cacc[:3]
     velocity = cvel[3:] + cross(w, arm)
     # a spatial acceleration is how the velocity changes at a point fixed in space; a point that moves with the body has

@@ -7,7 +7,7 @@ import numpy as np
 
 from pretouch.control.path import Circle, Path, segment
 from pretouch.errors import PathError
-from pretouch.sim.pushes import FACES, Push, against
+from pretouch.sim.hand import FACES, Push, against
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
 
 Side = Literal["-y", "+y"]

@@ -61,7 +61,7 @@ class PlantParams(Checked):
     command_delay_s: NonNegative = 0.0
     """Time from a command to when the arm takes it [s], in whole physics steps."""
     bristle_nm: NonNegative = 0.0
-    """Friction of each joint that remembers how it came to be where it is (`sim.drive`), where the joint slides fast
+    """Friction of each joint that remembers how it came to be where it is (`sim.physics`), where the joint slides fast
     [Nm]; 0: none."""
     bristle_rad: Positive = 0.002
     """Angle over which that friction turns round [rad]: the presliding displacement."""

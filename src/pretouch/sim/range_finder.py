@@ -9,11 +9,11 @@ import numpy as np
 from pretouch.checks import Check, Checked, Fraction, NonNegative, Positive
 from pretouch.compiled import compiled, kernel
 from pretouch.errors import ParameterError
-from pretouch.sensing.sensor import PAPER_SENSOR, Sensor, cone_rays
+from pretouch.sensing.sensor import Sensor, cone_rays
 from pretouch.sensing.skin import Skin
 from pretouch.sim.arm_in_world import ArmInWorld
 from pretouch.sim.capacitive import Electrodes
-from pretouch.sim.rays import Geoms, cast, geoms_of, placed_rays
+from pretouch.sim.rays import Geoms, cast, geoms_of, placed, turned
 from pretouch.sim.under_way import ROUNDING_S, UnderWay
 from pretouch.types import FloatArray, IntArray, RangeReadings, RangeStatus
 
@@ -55,11 +55,6 @@ class RangeFinderParams(Checked):
     """Times longer than that the period is: units that share a channel, or a processor."""
     dropout: Fraction = 0.005
     """Probability that a reading is lost on its way."""
-
-    @property
-    def period_s(self) -> float:
-        """Time between readings of a unit with the paper's sensor [s]."""
-        return self.period_of(PAPER_SENSOR)
 
     def period_of(self, sensor: Sensor) -> float:
         """Time between readings of a unit with a sensor [s]."""
@@ -105,16 +100,18 @@ class RangeFinders:
         """
         self._plant, self._skin, self._params = plant, skin, params
         count, data, rays = len(skin), plant.mj_data, 1 + 3 * params.rings * (params.rings + 1)
-        cones = [cone_rays(params.rings, unit.sensor.angle) for unit in skin.units]
-        self._kinds = [_kind(unit.sensor, params, cone) for unit, cone in zip(skin.units, cones, strict=True)]
+        cones = np.array([cone_rays(params.rings, unit.sensor.angle) for unit in skin.units]).reshape(count, rays, 3)
         self._rng = np.random.default_rng([seed, 3])
         self._send, self._light = send, np.random.default_rng([seed, 4])
         offset = params.offset_max_m * self._rng.uniform(-1, 1, count)
-        cone = np.array(cones).reshape(count, rays, 3)
-        bodies = plant.first_body + skin.link
-        mounting = _Mounting(data.xpos, data.xmat, bodies, skin.T_link_sensor, cone, offset)
-        geoms = geoms_of(plant.mj_model, data)
-        self._mounted, self._errors = (mounting, geoms), _errors(params)
+        bodies, geoms = plant.first_body + skin.link, geoms_of(plant.mj_model, data)
+        kinds = [(u.sensor.ranging(params.mode).distance_max_m, u.sensor.nearest_m, u.sensor.noise) for u in skin.units]
+        farthest, nearest, noise = np.array(kinds, dtype=np.float64).reshape(count, 3).T.copy()
+        self._finders = _Finders(
+            data.xpos, data.xmat, bodies, skin.T_link_sensor, cones, offset, farthest, nearest,
+            _flat_wall(cones[:, :, 2]), noise,
+        )  # fmt: skip
+        self._geoms, self._errors = geoms, _errors(params)
         self._electrodes = Electrodes(skin, bodies, data, geoms, seed)
         boards: dict[str, list[int]] = {}
         for unit, board in enumerate(skin.boards):
@@ -175,7 +172,7 @@ class RangeFinders:
         """Return distance [m], status, standard deviation [m], and strength of a measurement; `draw` is normal."""
         if unit in self._electrodes:
             return self._electrodes.measure(unit, time, draw)
-        return _measure(unit, draw, self._kinds[unit], self._errors, *self._mounted)
+        return _measure(unit, draw, self._errors, self._finders, self._geoms)
 
 
 _SIGNAL_LIMIT_MCPS = 1.024
@@ -198,39 +195,18 @@ def _light(strength: float, rng: np.random.Generator) -> tuple[float, float, flo
     return signal, ambient, _SPADS * share
 
 
-def _flat_wall(cosines: FloatArray) -> float:
-    """Factor that makes a flat wall square to the beam read at its distance, as a calibrated sensor does.
+def _flat_wall(cosines: FloatArray) -> FloatArray:
+    """Factor (K,) that makes a flat wall square to the beam read at its distance, as a calibrated sensor does.
 
-    Rays at an angle meet it farther away by 1 / cos, and with strength cos^3: slant, and the distance squared.
+    Rays at an angle, by their cosines (K, N), meet it farther away by 1 / cos, and with strength cos^3: slant, and the
+    distance squared.
     """
-    return float((cosines**3).sum() / (cosines**2).sum())
+    return np.asarray((cosines**3).sum(axis=1) / (cosines**2).sum(axis=1))
 
 
 _OK, _SIGMA, _SIGNAL, _MIN_RANGE = (
     int(s) for s in (RangeStatus.OK, RangeStatus.SIGMA, RangeStatus.SIGNAL, RangeStatus.MIN_RANGE)
 )
-
-
-class _Kind(NamedTuple):
-    """How a type of sensor measures."""
-
-    distance_max: float  # farthest target [m]
-    nearest: float  # [m]
-    calibration: float  # of `_flat_wall`
-    noise: float  # times that of the VL53L1X
-
-
-def _kind(sensor: Sensor, params: RangeFinderParams, rays: FloatArray) -> _Kind:
-    farthest = sensor.ranging(params.mode).distance_max_m
-    return _Kind(farthest, sensor.nearest_m, _flat_wall(rays[:, 2]), sensor.noise)
-
-
-class _Returns(NamedTuple):
-    """What N rays met."""
-
-    distance: FloatArray  # (N,) [m], negative of a ray that met nothing
-    rays: FloatArray  # (N, 3) unit vectors of the rays, base frame
-    normal: FloatArray  # (N, 3) outward normals where they met something, base frame
 
 
 class _Errors(NamedTuple):
@@ -249,8 +225,8 @@ def _errors(params: RangeFinderParams) -> _Errors:
     return _Errors(*(getattr(params, name) for name in _Errors._fields))
 
 
-class _Mounting(NamedTuple):
-    """Where K sensors sit, and on what."""
+class _Finders(NamedTuple):
+    """Where K sensors sit, and on what; and how the type of each measures."""
 
     position: FloatArray  # (L, 3) origins of the bodies [m], in MuJoCo's memory
     rotation: FloatArray  # (L, 9) rows of their rotation matrices
@@ -258,35 +234,27 @@ class _Mounting(NamedTuple):
     T_link_sensor: FloatArray  # (K, 4, 4)
     cone: FloatArray  # (K, N, 3) unit vectors of the rays, sensor frame
     offset: FloatArray  # (K,) constant errors [m]
+    distance_max: FloatArray  # (K,) farthest target [m]
+    nearest: FloatArray  # (K,) [m]
+    calibration: FloatArray  # (K,) of `_flat_wall`
+    noise: FloatArray  # (K,) times that of the VL53L1X
 
 
 @compiled
 def _measure(
-    unit: int, draw: float, kind: _Kind, errors: _Errors, mounting: _Mounting, geoms: Geoms
+    unit: int, draw: float, errors: _Errors, finders: _Finders, geoms: Geoms
 ) -> tuple[float, int, float, float]:
-    """Measure with a sensor; `draw` is normal. Return what `_reading` does."""
-    link = mounting.link[unit]
-    origin, rays = placed_rays(
-        mounting.position[link], mounting.rotation[link], mounting.T_link_sensor[unit], mounting.cone[unit]
-    )
-    distance, normal, _ = cast(origin, rays, geoms, link, kind.distance_max)
-    return _reading(_Returns(distance, rays, normal), kind, mounting.offset[unit], draw, errors)
-
-
-@kernel
-def _reading(
-    returns: _Returns, kind: _Kind, offset: float, draw: float, errors: _Errors
-) -> tuple[float, int, float, float]:
-    """One reading [m], its status, its standard deviation [m], and the strength of what it shows.
+    """Measure with a sensor; `draw` is normal. Return distance [m], status, standard deviation [m], and strength.
 
     The nearest group of returns strong enough to be detected is reported. Strength falls with the square of the
     distance and the cosine of incidence. It is relative to a target that is just detected: one that fills the cone, at
     `distance_max`, square to the beam, of `reflectance_limit`, has 1 in all.
-    `offset` is the sensor's constant error [m], `draw` normal.
     """
-    distance, rays, normal, distance_max = returns.distance, returns.rays, returns.normal, kind.distance_max
-    brightness = errors.reflectance / errors.reflectance_limit
-    count = len(distance)
+    link, distance_max = finders.link[unit], finders.distance_max[unit]
+    origin, R = placed(finders.position[link], finders.rotation[link], finders.T_link_sensor[unit])
+    rays = turned(R, finders.cone[unit])
+    distance, normal, _ = cast(origin, rays, geoms, link, distance_max)
+    brightness, count = errors.reflectance / errors.reflectance_limit, len(distance)
     strength = np.zeros(count)
     for i in range(count):
         if 0.0 <= distance[i] <= distance_max:
@@ -299,32 +267,42 @@ def _reading(
                 slant = slant**errors.slant_power
             ratio = distance_max / max(distance[i], 0.01)  # 10 mm: no return is infinitely strong
             strength[i] = brightness * slant * ratio * ratio / count
-    # groups of returns by distance, nearest first: a weak group hides nothing that is behind it
-    start = 0.0
-    while True:
-        nearest = np.inf
-        for i in range(count):
-            if strength[i] > 0 and start <= distance[i] < nearest:
-                nearest = distance[i]
-        if nearest == np.inf:
-            return 0.0, _SIGNAL, 0.0, sum(strength)
-        total, mean = 0.0, 0.0
-        for i in range(count):
-            if nearest <= distance[i] <= nearest + errors.merge_m:
-                total += strength[i]
-                mean += strength[i] * distance[i]
-        if total >= 1.0:
-            break
-        start = nearest + errors.merge_m
-    mean *= kind.calibration / total
+    total, mean = _nearest_group(distance, strength, errors.merge_m)
+    if total == 0.0:
+        return 0.0, _SIGNAL, 0.0, sum(strength)
+    mean *= finders.calibration[unit] / total
     # shot noise: with a share of the light that a target filling the cone would return, 1 / sqrt(share) times the noise
     full = brightness * (distance_max / max(mean, 0.01)) ** 2
     sigma = errors.noise_floor_m + errors.noise_rate * mean * np.sqrt(max(1.0, full / total))
     trusted = sigma <= errors.sigma_limit_m
-    sigma *= kind.noise
-    measured = max(0.0, mean + offset + sigma * draw)
+    sigma *= finders.noise[unit]
+    measured = max(0.0, mean + finders.offset[unit] + sigma * draw)
     if not trusted:
         return measured, _SIGMA, sigma, total
-    if measured < kind.nearest:
+    if measured < finders.nearest[unit]:
         return measured, _MIN_RANGE, sigma, total
     return measured, _OK, sigma, total
+
+
+@kernel
+def _nearest_group(distance: FloatArray, strength: FloatArray, merge_m: float) -> tuple[float, float]:
+    """Strength of the nearest group of returns that is detected, and the sum of strength times distance; or zeros.
+
+    A weak group hides nothing that is behind it.
+    """
+    start = 0.0
+    while True:
+        nearest = np.inf
+        for i in range(len(distance)):
+            if strength[i] > 0 and start <= distance[i] < nearest:
+                nearest = distance[i]
+        if nearest == np.inf:
+            return 0.0, 0.0
+        total, mean = 0.0, 0.0
+        for i in range(len(distance)):
+            if nearest <= distance[i] <= nearest + merge_m:
+                total += strength[i]
+                mean += strength[i] * distance[i]
+        if total >= 1.0:
+            return total, mean
+        start = nearest + merge_m

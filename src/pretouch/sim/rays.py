@@ -45,16 +45,10 @@ def geoms_of(model: mujoco.MjModel, data: mujoco.MjData) -> Geoms:
 
 
 @kernel
-def placed_rays(
-    xpos: FloatArray, xmat: FloatArray, T_link_sensor: FloatArray, cone: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Origin (3,) [m] and unit vectors (N, 3) of a sensor's rays in the base frame.
+def placed(xpos: FloatArray, xmat: FloatArray, T_link_sensor: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Origin (3,) [m] and rotation matrix (3, 3) of a sensor in the base frame.
 
-    Args:
-        xpos: (3,) origin of its body [m].
-        xmat: (9,) rows of its body's rotation matrix.
-        T_link_sensor: (4, 4) where it sits on the body.
-        cone: (N, 3) unit vectors, sensor frame.
+    It sits at T_link_sensor (4, 4) on a body with the origin `xpos` (3,) [m] and the rotation matrix `xmat` (9,), rows.
     """
     origin, R = np.zeros(3), np.zeros((3, 3))
     for i in range(3):
@@ -63,12 +57,18 @@ def placed_rays(
             origin[i] += xmat[3 * i + k] * T_link_sensor[k, 3]
             for j in range(3):
                 R[i, j] += xmat[3 * i + k] * T_link_sensor[k, j]
+    return origin, R
+
+
+@kernel
+def turned(R: FloatArray, cone: FloatArray) -> FloatArray:
+    """Unit vectors (N, 3) of a cone in the frame that R (3, 3) brings them to."""
     rays = np.zeros_like(cone)
     for ray in range(len(cone)):
         for i in range(3):
             for j in range(3):
                 rays[ray, i] += R[i, j] * cone[ray, j]
-    return origin, rays
+    return rays
 
 
 @kernel

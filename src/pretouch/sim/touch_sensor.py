@@ -12,11 +12,11 @@ from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import TouchPatch
 from pretouch.sim.arm_in_world import ArmInWorld, PointForce
 from pretouch.sim.under_way import ROUNDING_S, UnderWay
-from pretouch.types import FloatArray, RangeReadings, TouchReadings, TouchStatus
+from pretouch.types import RangeReadings, TouchReadings, TouchStatus
 
 
 @dataclass(frozen=True)
-class TouchSensorParams(Checked):
+class TouchErrors(Checked):
     """How touch sensors err. Figures of the FSR 402 (Interlink, data sheet of the 400 series) where it has them."""
 
     period_s: Positive = 0.02
@@ -49,12 +49,6 @@ class TouchSensorParams(Checked):
     """Mean of the exponential addition to it [s]."""
     dropout: Fraction = 0.005
     """Probability that a reading is lost on its way."""
-    false_per_hour: NonNegative = 0.0
-    """Rate of false touches of each unit [1/h]: a cable or a bent link presses on it, or water."""
-    false_s: Positive = 0.5
-    """Mean length of one, exponential [s]."""
-    false_n: Positive = 2.0
-    """Mean force that one reads above the smallest one, exponential [N]: an assumption."""
 
 
 class TouchSample(NamedTuple):
@@ -86,10 +80,10 @@ class TouchSensors:
     """
 
     def __init__(
-        self, plant: ArmInWorld, skin: Skin, params: TouchSensorParams, seed: int, laid: Forces = no_forces,
+        self, plant: ArmInWorld, skin: Skin, params: TouchErrors, seed: int, laid: Forces = no_forces,
         send: Callable[[TouchSample], None] | None = None,
     ) -> None:  # fmt: skip
-        """Mount the sensors on a simulated arm; the seed decides their errors, phases, noise, losses, false touches.
+        """Mount the sensors on a simulated arm; the seed decides their errors, phases, noise and losses.
 
         Args:
             plant: the arm; forces of its contacts are measured.
@@ -103,13 +97,10 @@ class TouchSensors:
         self._rng = np.random.default_rng([seed, 5])
         units = [(int(k), touch) for k in skin.touching if (touch := skin.units[k].touch) is not None]
         self._patches: list[tuple[int, TouchPatch]] = units
-        self._link, self._T = skin.link, skin.T_link_sensor
-        count = len(units)
+        self._link, self._T, count = skin.link, skin.T_link_sensor, len(units)
         self._gain = 1.0 + params.gain_error * self._rng.uniform(-1, 1, count)
         self._due: list[float] = self._rng.uniform(0, params.period_s, count).tolist()
         self._last = np.full(count, -np.inf)
-        self._false_until, self._false_n = np.full(count, -np.inf), np.zeros(count)
-        self._next_false = self._draw_next(np.zeros(count))
         self._passed, self._before, self._on = np.zeros(count), np.zeros(count), np.zeros(count, np.bool_)
         self._time = plant.time
         self._sent = UnderWay[tuple[int, float, bool, float]]()
@@ -129,11 +120,6 @@ class TouchSensors:
                 self._stamp[unit], self._contact[unit], self._force[unit] = stamp, contact, force
                 self._status[unit] = TouchStatus.OK
         return TouchReadings(self._stamp.copy(), self._contact.copy(), self._force.copy(), self._status.copy())
-
-    def _draw_next(self, after: FloatArray) -> FloatArray:
-        rate = self._params.false_per_hour / 3600.0
-        draws = self._rng.standard_exponential(len(after))
-        return after + draws / rate if rate > 0 else np.full(len(after), np.inf)
 
     def _sample(self, time: float) -> None:
         forces = self._plant.contact_forces() + self._laid(time)
@@ -162,16 +148,12 @@ class TouchSensors:
     def _measure(self, i: int, unit: int, patch: TouchPatch, time: float) -> None:
         p, rng = self._params, self._rng
         self._last[i], self._due[i] = time, time + p.period_s * (1.0 + p.period_jitter * rng.standard_normal())
-        if time >= self._next_false[i]:
-            self._false_until[i] = time + p.false_s * rng.standard_exponential()
-            self._false_n[i] = patch.force_min_n + p.false_n * rng.standard_exponential()
-            self._next_false[i] = self._draw_next(self._false_until[i : i + 1])[0]
         force = float(self._passed[i])
         falling, self._before[i] = force < self._before[i], force
         force *= self._gain[i] * (1.0 + (p.hysteresis if falling else 0.0))
         force += (p.noise_floor_n + p.noise * force) * rng.standard_normal()
-        if time < self._false_until[i] or unit in self.stuck:
-            force = max(force, float(self._false_n[i]), 2.0 * patch.force_min_n)
+        if unit in self.stuck:
+            force = max(force, 2.0 * patch.force_min_n)
         force = round(min(max(force, 0.0), p.most_n) / p.step_n) * p.step_n
         self._on[i] = force >= patch.force_min_n * (p.release if self._on[i] else 1.0)
         arrival, lost = time + p.latency_s + rng.exponential(p.jitter_s), rng.random() < p.dropout

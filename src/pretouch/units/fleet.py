@@ -12,7 +12,7 @@ from pretouch.errors import HardwareError
 from pretouch.sensing.unit import NetworkUnits
 from pretouch.sim.imu import ImuParams, ImuSample
 from pretouch.sim.range_finder import RangeSample
-from pretouch.sim.touch_sensor import TouchSample, TouchSensorParams
+from pretouch.sim.touch_sensor import TouchErrors, TouchSample
 from pretouch.units.channel import Channel, NetworkParams
 from pretouch.units.keys import Keys, UnitKey
 from pretouch.units.simulated import SimulatedUnit, UnitParams
@@ -32,7 +32,7 @@ class FleetParams(Checked):
     """How units keep their time and their sessions."""
     imu: ImuParams | None = None
     """How their IMUs err; None, and they have none."""
-    touch: TouchSensorParams = field(default_factory=TouchSensorParams)
+    touch: TouchErrors = field(default_factory=TouchErrors)
     """How the touch sensors err of units that have one by the skin file."""
     reboot_every_s: NonNegative = 0.0
     """Time from each reboot of a unit to its next one, the first at a random part of it [s]; 0: none."""

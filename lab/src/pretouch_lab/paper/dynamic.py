@@ -3,8 +3,8 @@
 import numpy as np
 
 from pretouch.profiles import profile
+from pretouch.sim.hand import Push, Pusher
 from pretouch.sim.paper_scenes import dynamic_pushes, person_scene
-from pretouch.sim.pushes import Push, Pusher
 from pretouch.sim.scene import HandSpec
 from pretouch.traces import mean_over
 from pretouch.types import ControlStep, FloatArray

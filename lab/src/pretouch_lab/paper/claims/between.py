@@ -4,7 +4,7 @@ import numpy as np
 
 from pretouch.control.path import Circle
 from pretouch.profiles import profile
-from pretouch.sim.pushes import FACES, Push, Pusher, against
+from pretouch.sim.hand import FACES, Push, Pusher, against
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
 from pretouch.text_table import TextTable, tabulated
 from pretouch.types import ControlStep
