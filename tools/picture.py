@@ -19,7 +19,7 @@ from tests.page.browser import Visitor, chromium
 from tests.ports import free_port
 
 import pretouch as pt
-from pretouch.page.gui import PANEL_PX
+from pretouch.page.panel import PANEL_PX
 from pretouch.page.replay import ReplayPage
 from pretouch.page.room import LiveSettings
 from pretouch.page.server import ServeOptions, served

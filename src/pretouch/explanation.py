@@ -1,14 +1,14 @@
 """What the arm does, what limits it and how far: as values, and as one word and one sentence of a control step."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pretouch.modes import Event, Mode
-from pretouch.values import BoolArray, value
+from pretouch.values import BoolArray, FloatArray, value
 
 if TYPE_CHECKING:
     from pretouch.types import ControlStep
@@ -124,18 +124,42 @@ class Explanation:
     sentence: str
 
 
-def explain(step: "ControlStep", units: Sequence[str], links: Sequence[str]) -> Explanation:
+def explain(
+    step: "ControlStep",
+    units: Sequence[str],
+    links: Sequence[str],
+    velocities: tuple[FloatArray, FloatArray] | None = None,
+) -> Explanation:
     """Say what the arm does in a step, who limits it, and how far.
 
     Args:
         step: of the controller.
         units: ids of the skin's units, in its order; () where the profile has no perception, as `blind`.
         links: names of the arm's links, in the order of the model.
+        velocities: of the end-effector's origin (3,) [m/s], base frame: what a commander asks, and what is commanded.
     """
     if step.mode is Mode.HOLD:
-        return Explanation(Doing.STOPPED if resumable(step) else Doing.WAITING, step.reason)
-    names = _Names(units, links)
-    return _in_contact(step, names) if step.mode is Mode.REACT else _on_the_way(step, names)
+        explanation = Explanation(Doing.STOPPED if resumable(step) else Doing.WAITING, step.reason)
+    else:
+        explanation = (_in_contact if step.mode is Mode.REACT else _on_the_way)(step, units, links)
+    if velocities is None:
+        return explanation
+    return replace(explanation, sentence=f"{explanation.sentence} {_allowed(step, links, *velocities)}.")
+
+
+def _allowed(step: "ControlStep", links: Sequence[str], velocity: FloatArray, allowed: FloatArray) -> str:
+    """Say how much of a velocity is allowed, and what the sentence before does not say of who limits it."""
+    speeds, limited, why = (float(np.linalg.norm(velocity)), float(np.linalg.norm(allowed))), step.limited, ""
+    if max(speeds) < ASKED_M_S:
+        return "No motion is asked"
+    if step.mode is Mode.TRACK and float(allowed @ velocity) < FULL * speeds[0] ** 2:
+        if limited.link >= 0:
+            why = f" near {links[limited.link]}"
+        elif limited.by is Limit.JOINTS:
+            why = f": joint {limited.joint + 1} is at its limit"
+        elif limited.by is Limit.NOTHING:  # as near a singularity: at the end of its reach
+            why = ": this posture allows no more"
+    return f"Asked {speeds[0]:.2f} m/s, allowed {speeds[1]:.2f} m/s{why}"
 
 
 def finds(step: "ControlStep") -> str:
@@ -163,24 +187,16 @@ def answers(step: "ControlStep") -> bool:
     return not still(step) and float(np.linalg.norm(step.reaction_velocity)) >= _ANSWER_M_S
 
 
-@dataclass(frozen=True)
-class _Names:
-    """Names of units and links."""
-
-    units: Sequence[str]
-    links: Sequence[str]
-
-    def sees(self, step: "ControlStep", obstacle: int) -> str:
-        """Say who sees an obstacle, or that it is known, and how far from the arm."""
-        distance = max(0.0, float(step.obstacles.body_distance[obstacle]))
-        if np.isinf(step.obstacles.ee_distance[obstacle]):
-            return f"a fixture that moves is {distance:.2f} m away"
-        unit = int(step.obstacles.unit[obstacle])
-        who = self.units[unit] if unit < len(self.units) else "an outside source"
-        return f"{who} sees something at {distance:.2f} m"
+def _sees(step: "ControlStep", units: Sequence[str], obstacle: int) -> str:
+    """Say who sees an obstacle, or that it is known, and how far from the arm."""
+    distance = max(0.0, float(step.obstacles.body_distance[obstacle]))
+    if np.isinf(step.obstacles.ee_distance[obstacle]):
+        return f"a fixture that moves is {distance:.2f} m away"
+    unit = int(step.obstacles.unit[obstacle])
+    return f"{units[unit] if unit < len(units) else 'an outside source'} sees something at {distance:.2f} m"
 
 
-def _on_the_way(step: "ControlStep", names: _Names) -> Explanation:
+def _on_the_way(step: "ControlStep", units: Sequence[str], links: Sequence[str]) -> Explanation:
     """Explain a step in which the arm does what is asked, as far as it can."""
     limited = step.limited
     off = float(np.linalg.norm(step.ee_position - step.path_position))
@@ -190,13 +206,13 @@ def _on_the_way(step: "ControlStep", names: _Names) -> Explanation:
         if off >= OFF_PATH_M:
             return Explanation(Doing.RETURNING, f"Returning to its path, {off:.2f} m away.")
         near = step.obstacles.body_distance
-        nothing = "nothing near is seen" if len(names.units) else "no sensor unit is in use"
-        seen = names.sees(step, int(near.argmin())) if len(near) else nothing
+        nothing = "nothing near is seen" if len(units) else "no sensor unit is in use"
+        seen = _sees(step, units, int(near.argmin())) if len(near) else nothing
         moves = np.linalg.norm(step.desired_velocity) >= ASKED_M_S
         return Explanation(Doing.MOVING, (f"Moving at {speed:.2f} m/s: " if moves else "In its place: ") + f"{seen}.")
     cause, share = limited.obstacle, limited.share if restricted else step.speed_scale
     gone = "what was seen has gone from view, a unit is late, or none looks where it goes"
-    why = names.sees(step, cause) if cause >= 0 else gone
+    why = _sees(step, units, cause) if cause >= 0 else gone
     if restricted and off >= OFF_PATH_M:
         place = f"{off:.2f} m from its path: {why}."
         if speed < _REST_M_S:
@@ -207,24 +223,19 @@ def _on_the_way(step: "ControlStep", names: _Names) -> Explanation:
     back = "" if off < OFF_PATH_M else f" on its way back to the path, {off:.2f} m away"
     if share < FULL:
         return Explanation(Doing.SLOWED, f"Slowed to {100 * share:.0f} %{back}: {why}.")
-    return Explanation(Doing.MOVING, f"Moving, but {_limit(step, names, cause)}.")
-
-
-def _limit(step: "ControlStep", names: _Names, cause: int) -> str:
-    """Say how fast a link may near what limits it."""
     limit = float(step.approach_limit[np.flatnonzero(step.restricted == cause)[0]])
-    link = names.links[int(step.obstacles.link[cause])]
     may = f"may near it at {limit:.2f} m/s at most" if limit >= 0 else "has to back away from it"
-    return f"{names.sees(step, cause)}, and {link} {may}"
+    return Explanation(Doing.MOVING, f"Moving, but {why}, and {links[limited.link]} {may}.")
 
 
-def _in_contact(step: "ControlStep", names: _Names) -> Explanation:
+def _in_contact(step: "ControlStep", units: Sequence[str], links: Sequence[str]) -> Explanation:
     """Explain a step in which the arm reacts to a contact."""
     if step.event is Event.OPENING:
         return Explanation(Doing.CAUGHT, step.reason)
-    place = f" at {names.links[int(step.touched.link[0])]}" if len(step.touched.link) else ""
-    force = force_of(step)
-    pushed = f"Touched{place}" + (f" with {force:.0f} N" if np.isfinite(force) else "")
+    place, force = "", step.force - step.thresholds.mean if step.contact is None else step.contact.force
+    if len(step.touched.link):  # the surest place comes first
+        place, force = f" at {links[int(step.touched.link[0])]}", step.touched.force[0]
+    pushed = f"Touched{place}" + (f" with {np.linalg.norm(force):.0f} N" if np.isfinite(force).all() else "")
     if step.contact is not None:  # it has not moved with it yet
         return Explanation(Doing.TOUCHED, f"{pushed}.")
     if not (len(step.touched.link) or step.evidence >= 1.0):
@@ -237,16 +248,5 @@ def _in_contact(step: "ControlStep", names: _Names) -> Explanation:
         return Explanation(Doing.YIELDING, f"{pushed}: moving with the push at {speed:.2f} m/s.")
     limiting = step.restricted[binding(step)]
     if len(limiting) and float(np.linalg.norm(step.reaction_velocity)) >= ASKED_M_S:
-        return Explanation(Doing.TOUCHED, f"{pushed}: held still, for {names.sees(step, int(limiting[0]))}.")
+        return Explanation(Doing.TOUCHED, f"{pushed}: held still, for {_sees(step, units, int(limiting[0]))}.")
     return Explanation(Doing.TOUCHED, f"{pushed}: held still, the push is below what moves the arm.")
-
-
-def force_of(step: "ControlStep") -> float:
-    """Size of the force of a contact [N]: at the surest place, of a new contact, or of the estimate; NaN of none."""
-    if len(step.touched.link):
-        force = step.touched.force[0]
-    elif step.contact is not None:
-        force = step.contact.force
-    else:
-        force = step.force - step.thresholds.mean
-    return float(np.linalg.norm(force))

@@ -1,20 +1,32 @@
+"""The arm of the page: where it is, and where contact is expected on it."""
+
 import io
-import math
 
 import numpy as np
 import pytest
 import trimesh
-from tests.needs import skip_without
+from hypothesis import given
+from hypothesis import strategies as st
 from tests.page.fake_scene import FakeScene
 
-from pretouch.extras import MESHES
-from pretouch.page import vendor
-from pretouch.page.arm import SETTLE_S, Arm, capsule_surfaces, coloured, seen_from
-from pretouch.page.expectation import EDGE_M, LEVELS, surface_of
-from pretouch.page.vendor import coarse, vendor_surfaces
-from pretouch.robot.body import Capsules, from_axes
+from pretouch.page import palette
+from pretouch.page.arm import (
+    LEVELS,
+    SETTLE_S,
+    SPREAD_M,
+    Arm,
+    coloured,
+    expectation,
+    in_levels,
+    on_surface,
+    seen_from,
+    shares,
+)
+from pretouch.page.surfaces import capsule_surfaces
+from pretouch.params import ThresholdParams
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
+from pretouch.types import Obstacles
 
 PERIOD = 1 / 30
 
@@ -90,34 +102,6 @@ def test_the_links_are_drawn_where_they_are(fake: FakeScene, arm: Arm, panda_mod
     np.testing.assert_allclose(third, kin.rotation[hand][:, 2], atol=1e-12)
 
 
-# what the links are drawn by: surfaces of their capsules, or the vendor's
-
-
-def capsule(a: tuple[float, float, float], b: tuple[float, float, float], radius: float) -> Capsules:
-    return Capsules(np.zeros(1, np.int64), np.array([a]), np.array([b]), np.array([radius]))
-
-
-@pytest.mark.parametrize("end", [(0.02, 0.0, 0.1), (0.0, 0.0, 0.1), (0.0, 0.0, -0.3), (0.0, 0.0, -0.1)])
-def test_the_surface_of_a_capsule_is_closed_and_encloses_its_volume(end: tuple[float, float, float]) -> None:
-    start = (0.0, 0.0, -0.1)
-    mesh = surface_of(capsule(start, end, 0.05))
-    length = math.dist(start, end)
-    assert mesh.is_watertight
-    assert mesh.volume == pytest.approx(math.pi * 0.05**2 * length + 4 / 3 * math.pi * 0.05**3, rel=0.06)
-    np.testing.assert_allclose(mesh.centroid, np.add(start, end) / 2, atol=1e-3)
-
-
-def test_the_surface_of_every_link_lies_on_its_body_dense_enough_to_be_coloured(panda_model: RobotModel) -> None:
-    surfaces = capsule_surfaces(panda_model)
-    assert set(surfaces) == set(panda_model.capsules.link.tolist())
-    for link, mesh in surfaces.items():
-        shape = panda_model.capsules.of_links(np.array([link]))
-        apart = np.linalg.norm(from_axes(mesh.vertices, shape.a, shape.b)[1], axis=2) - shape.radius
-        assert np.abs(apart).min(axis=1).max() < 1e-3
-        assert mesh.volume > 0
-        assert np.percentile(mesh.edges_unique_length, 90) < 1.5 * EDGE_M
-
-
 def test_a_coloured_surface_is_read_by_another_program(panda_model: RobotModel) -> None:
     mesh = capsule_surfaces(panda_model)[5]
     colours = np.random.default_rng(0).uniform(0, 255, mesh.vertices.shape)
@@ -131,41 +115,65 @@ def test_a_coloured_surface_is_read_by_another_program(panda_model: RobotModel) 
     assert rgba.tobytes() in data
 
 
-def sphere(rings: int = 60) -> trimesh.Trimesh:
-    """A sphere of radius 5 cm, each triangle with vertices of its own, as the vendor's files have them."""
-    ball = trimesh.creation.uv_sphere(0.05, count=(rings, rings))
-    corners = np.arange(3 * len(ball.faces)).reshape(-1, 3)
-    return trimesh.Trimesh(ball.triangles.reshape(-1, 3), corners, process=False)
+# where contact is expected
+
+UP = np.array([[0.0, 0.0, 1.0]])
 
 
-def test_a_coarse_mesh_has_few_vertices_near_the_fine_one_looks_outwards_and_has_no_empty_or_double_triangle() -> None:
-    fine = sphere()
-    mesh = coarse(fine, 0.006)
-    assert len(mesh.vertices) < len(fine.vertices) / 10
-    assert np.abs(np.linalg.norm(mesh.vertices, axis=1) - 0.05).max() < 0.003
-    assert np.einsum("vi,vi->v", mesh.vertex_normals, mesh.vertices).min() > 0
-    assert set(np.unique(mesh.faces)) == set(range(len(mesh.vertices)))
-    corners = np.sort(mesh.faces, axis=1)
-    assert (np.diff(corners, axis=1) > 0).all()
-    assert len(np.unique(corners, axis=0)) == len(corners)
+def obstacles(units: list[int], distances: list[float]) -> Obstacles:
+    count = len(units)
+    zeros = np.zeros((count, 3))
+    return Obstacles(
+        np.array(units, np.int64), zeros, np.zeros(count), zeros, np.zeros(count, np.int64), zeros,
+        np.array(distances), np.zeros(count),
+    )  # fmt: skip
 
 
-def test_without_the_extra_the_capsules_are_drawn_and_a_sentence_says_why(
-    panda_model: RobotModel, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("units", "distances", "expected"),
+    [
+        ([0, 1, 2, 3, 4], [0.05, 0.45, 0.85, 2.0, -0.01], [1.0, 0.5, 0.0, 0.0, 1.0, 0.0, 0.0]),
+        ([1, 1], [0.65, 0.25], [0.0, 0.75, 0.0, 0.0, 0.0, 0.0, 0.0]),  # the nearest of two points counts
+        ([1, 7, 12], [0.45, 0.05, 0.05], [0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0]),  # two seen by outside sources
+        ([], [], [0.0] * 7),
+    ],
+)
+def test_contact_is_expected_fully_at_d_min_not_at_all_at_d_max_and_by_half_between(
+    units: list[int], distances: list[float], expected: list[float]
 ) -> None:
-    monkeypatch.setattr(vendor, "_folder", lambda: None)
-    found, said = vendor_surfaces(panda_model)
-    assert found == {}
-    assert said == f"The arm is drawn by its capsules; for the vendor's surfaces run {MESHES.command}"
+    result = expectation(obstacles(units, distances), 7, ThresholdParams(d_min_m=0.05, d_max_m=0.85))
+    np.testing.assert_allclose(result, expected, atol=1e-12)
 
 
-def test_with_the_extra_every_link_has_a_surface_near_its_capsules(panda_model: RobotModel) -> None:
-    skip_without(MESHES)
-    found, said = vendor_surfaces(panda_model)
-    assert said == ""
-    for link in np.unique(panda_model.capsules.link):
-        capsules, mesh = panda_model.capsules.of_links(np.array([link])), found[int(link)]
-        low = (capsules.a - capsules.radius[:, None]).min(axis=0)
-        assert (
-            mesh.vertices.min(axis=0) > np.minimum(low, (capsules.b - capsules.radius[:, None]).min(axis=0)) - 0.06
-        ).all()
+def test_a_unit_colours_the_surface_under_it_fully_nothing_from_the_spread_on_nor_the_far_side_of_a_thin_link() -> None:
+    vertices = np.array([[0.0, 0.0, 0.0], [SPREAD_M, 0.0, 0.0], [0.0, 3 * SPREAD_M, 0.0]])
+    share = shares(vertices, np.repeat(UP, 3, axis=0), np.zeros((1, 3)), UP)
+    np.testing.assert_allclose(share[:, 0], [1.0, 0.0, 0.0], atol=1e-12)
+    normals = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+    share = shares(np.zeros((3, 3)), normals, np.zeros((1, 3)), UP)
+    np.testing.assert_allclose(share[:, 0], [1.0, 0.5, 0.0], atol=1e-12)
+
+
+@given(st.floats(0.0, 0.2), st.floats(1e-4, 2e-3))
+def test_patches_are_smooth(at: float, apart: float) -> None:
+    vertices = np.array([[at, 0.0, 0.0], [at + apart, 0.0, 0.0]])
+    a, b = shares(vertices, np.repeat(UP, 2, axis=0), np.zeros((1, 3)), UP)[:, 0]
+    steepest = 16 / (3 * np.sqrt(3)) / 2 / SPREAD_M  # of (1 - x^2)^2, at x = 1 / sqrt 3
+    assert abs(a - b) <= steepest * apart + 1e-12
+
+
+@given(st.lists(st.floats(0, 1), min_size=3, max_size=3), st.lists(st.floats(0, 1), min_size=3, max_size=3))
+def test_what_units_expect_adds_up_within_one(share: list[float], expected: list[float]) -> None:
+    (total,) = on_surface(np.array([share]), np.array(expected))
+    most = max(s * e for s, e in zip(share, expected, strict=True))
+    assert most - 1e-12 <= total <= 1.0
+
+
+def test_levels_are_even_steps_and_colours_go_from_the_arms_own_to_red() -> None:
+    assert in_levels(np.array([0.0, 0.5, 1.0])) == (0, LEVELS // 2, LEVELS)
+    assert len({in_levels(np.array([e])) for e in np.linspace(0, 1, 1000)}) == LEVELS + 1
+    plain, half, full = palette.expected(np.array([0.0, 0.5, 1.0]))
+    np.testing.assert_allclose(plain, palette.ARM)
+    assert full[0] > 190
+    assert full[1:].max() < 50
+    assert full[1] < half[1] < plain[1]

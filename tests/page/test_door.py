@@ -1,19 +1,19 @@
-"""The door of a page, tried from outside: by pages of others, by strangers, and by visitors who do not command."""
+"""The door of a page, tried from outside: by pages of others, by strangers, and by visitors."""
 
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from tests.page.visitor import Visitor, answered, control, refusal, until, update
+from tests.page.visitor import Visitor, answered, control, refusal, until
 from tests.ports import free_port
-from viser import ViserServer
 
 from pretouch.errors import ViewerError
-from pretouch.page.commander import Commander
-from pretouch.page.door import Door
-from pretouch.page.live import PERIOD_S, LivePage
-from pretouch.page.server import ServeOptions, served
+from pretouch.page import door as door_module
+from pretouch.page.live import LivePage
+from pretouch.page.panel import PERIOD_S
+from pretouch.page.server import ServeOptions, check_port, served
 
 ADDRESS = "Open the page at the address that the program printed: each start has its own.\n"
 DRAG = {
@@ -53,8 +53,8 @@ NOT_ASCII = [b"/\xff", b"/\xc3\xa9/", b"/{token}\xff/", b"/\xff/{token}/", "/tok
 
 @pytest.mark.parametrize("path", PLAIN + NOT_ASCII)
 def test_without_the_token_there_is_a_sentence(door: ServeOptions, path: bytes) -> None:
-    asked = path.replace(b"{token}", door.token.encode())
-    assert answered(door, asked) == (403, ADDRESS, "text/plain; charset=utf-8")
+    path_of_door = path.replace(b"{token}", door.token.encode())
+    assert answered(door, path_of_door) == (403, ADDRESS, "text/plain; charset=utf-8")
     if path in PLAIN:
         assert refusal(door, path.decode()) == (403, ADDRESS)
 
@@ -75,8 +75,7 @@ def test_a_header_that_is_not_ascii_is_refused_in_a_sentence(door: ServeOptions,
 
 def test_a_page_of_somebody_else_does_not_get_in_though_it_knows_the_token(door: ServeOptions) -> None:
     for origin in ("http://evil.example", "null", f"http://127.0.0.1:{door.port + 1}", "http://127.0.0.1"):
-        said = f"Pages of {origin} may not use this one. {ADDRESS}"
-        assert refusal(door, origin=origin) == (403, said)
+        assert refusal(door, origin=origin) == (403, f"Pages of {origin} may not use this one. {ADDRESS}")
 
 
 @pytest.mark.parametrize("host", ["evil.example", "127.0.0.1.evil.example", "localhost.", "", "[", "a b"])
@@ -89,21 +88,20 @@ def test_numbers_and_names_of_this_machine_get_in(door: ServeOptions, host: str)
     assert answered(door, headers=f"Host: {host}:{door.port}".encode())[0] == 200
 
 
-def test_nobody_can_have_the_page_shared(
-    server: ViserServer, visitor: Visitor, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    asked: list[object] = []
-    monkeypatch.setattr(server, "request_share_url", lambda: asked.append(0))
+def test_nobody_can_have_the_page_shared(visitor: Visitor, monkeypatch: pytest.MonkeyPatch) -> None:
+    tunnels: list[object] = []
+    monkeypatch.setattr("viser._viser.ViserTunnel", lambda *place: tunnels.append(place))
     visitor.say({"type": "ShareUrlRequest"})
     visitor.settle()
-    assert not [kind for kind in server._websock_server._incoming_handlers if "Share" in kind.__name__]
-    server._thread_executor.submit(int).result()
-    assert asked == []
+    visitor.wait_for_callbacks()
+    assert tunnels == []
 
 
-def test_a_server_begun_round_the_door_is_not_kept() -> None:
-    with pytest.raises(ViewerError, match=r"install viser 1\.1\.1"):
-        Door(ServeOptions()).check(None)  # type: ignore[arg-type]
+def test_a_server_begun_round_the_door_is_not_kept(options: ServeOptions, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(door_module, "websockets_server", SimpleNamespace(serve=None))
+    with pytest.raises(ViewerError, match=r"install viser 1\.1\.1"), served(options, "test"):
+        pass
+    check_port(options)  # it has been stopped
 
 
 # what is said
@@ -114,11 +112,14 @@ def test_what_a_page_says_is_done(page: LivePage, visitor: Visitor) -> None:
     visitor.set(control(page, "Profile"), "blind")
     visitor.set(control(page, "Pause"), True)
     visitor.say(DRAG)
-    until(lambda: len(page._actions) == 3)
+    until(lambda: len(page.actions) == 3)
     turns(page, 1)
     assert page.controls.running.paused
     assert page._simulation.settings.profile.name == "blind"
     assert not np.allclose(page._simulation.hand_target, before, atol=0.05)
+    visitor.type_text(control(page, "Profile text"), " paper:detect.f_base_n=8 ")
+    turns(page, 1)
+    assert page._simulation.settings.profile.name == "paper:detect.f_base_n=8"
 
 
 def test_sixty_clicks_on_record_begin_one_recording(
@@ -136,56 +137,3 @@ def test_sixty_clicks_on_record_begin_one_recording(
         page.turn(now)
     assert [place.name for place in Path("runs").iterdir()] == ["live-1.mcap"]
     page._simulation.stop_recording()
-
-
-# who commands
-
-
-def test_one_visitor_commands_all_see_who_and_the_others_look(
-    page: LivePage, options: ServeOptions, visitor: Visitor
-) -> None:
-    pause, speed, take = (control(page, label) for label in ("Pause", "Clock speed", "Take command"))
-    assert not take.visible
-    with Visitor(page._server, options) as other:
-        until(lambda: take.visible)
-        assert shown(page) == "Nobody commands: the first to act does."
-        visitor.set(pause, True)
-        visitor.settle()
-        assert shown(page) == "Visitor 1 commands."
-        for message in (update(pause, value=True), update(speed, value=0.5), DRAG):
-            other.say(message)
-        other.settle()
-        assert len(page._actions) == 1
-        assert speed.value == 1.0
-        other.set(take, True)
-        other.set(speed, 0.5)
-        other.settle()
-        assert shown(page) == "Visitor 2 commands."
-        assert speed.value == 0.5
-        visitor.set(speed, 0.7)
-        visitor.settle()
-        assert speed.value == 0.5
-        text = control(page, "Profile text")
-        visitor.set(text, "blind")
-        visitor.say({"type": "GuiFormSubmitMessage", "uuid": text._impl.parent_container_id})
-        visitor.settle()
-        assert text.value == "paper"
-    until(lambda: not take.visible)
-    visitor.set(speed, 0.7)
-    visitor.settle()
-    assert speed.value == 0.7
-
-
-def test_who_comes_while_another_commands_is_told_so(page: LivePage, options: ServeOptions, visitor: Visitor) -> None:
-    visitor.set(control(page, "Pause"), True)
-    visitor.settle()
-    with Visitor(page._server, options) as other:
-        told = other.heard("NotificationShowMessage")["props"]
-        assert (told["title"], told["body"]) == ("You are Visitor 2", "Visitor 1 commands.")
-
-
-def shown(page: LivePage) -> str:
-    """What the page says of who commands."""
-    (commander,) = {told.__self__ for told in page._server._client_disconnect_cb if hasattr(told, "__self__")}
-    assert isinstance(commander, Commander)
-    return commander._line.content.split(">", 1)[1].removesuffix("</div>")

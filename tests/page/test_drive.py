@@ -1,4 +1,4 @@
-"""Driving the arm from a page: what a visitor asks is done while that visitor is there and commands."""
+"""Driving the arm from a page: what a visitor asks is done while that visitor is there."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,8 +10,8 @@ from tests.page.test_door import turns
 from tests.page.visitor import Visitor, control
 
 from pretouch.desired import DesiredKind
-from pretouch.page.asked import asked_in
 from pretouch.page.drive import REACH_M, TASKS, Steering
+from pretouch.page.frame import driven_motion
 from pretouch.page.live import LivePage
 from pretouch.page.replay import frame_of, world_of
 from pretouch.page.server import ServeOptions
@@ -39,10 +39,8 @@ def do(page: LivePage, visitor: Visitor, handle: Any, value: object) -> None:
 
 def aim(page: LivePage, visitor: Visitor, position: FloatArray, wxyz: tuple[float, ...] = (0.0, 1.0, 0.0, 0.0)) -> None:
     """Have a visitor drag the target, the hand's fingers down."""
-    visitor.say({
-        "type": "TransformControlsUpdateMessage", "name": "/target", "wxyz": list(wxyz), "position": position.tolist(),
-        "owner": "",
-    })  # fmt: skip
+    place = {"wxyz": list(wxyz), "position": position.tolist()}
+    visitor.say({"type": "TransformControlsUpdateMessage", "name": "/target", "owner": "", **place})
     visitor.settle()
     turns(page, 1)
 
@@ -54,9 +52,9 @@ def hand(page: LivePage) -> FloatArray:
 def speed(page: LivePage) -> float:
     """Speed at which the end-effector is commanded [m/s]."""
     frame, world = page._simulation.frame, page._simulation.world
-    asked = asked_in(frame, world, world.model.kinematics(frame.step.q))
-    assert asked
-    return float(np.linalg.norm(asked.allowed))
+    motion = driven_motion(frame, world, world.model.kinematics(frame.step.q))
+    assert motion
+    return float(np.linalg.norm(motion.allowed))
 
 
 def test_the_arm_stands_where_it_was_until_somebody_drives(page: LivePage, driver: Visitor) -> None:
@@ -83,16 +81,11 @@ def test_the_hand_goes_to_a_target_that_is_dragged_and_stays(page: LivePage, dri
     np.testing.assert_allclose(hand(page), goal, atol=0.005)
 
 
-def test_a_driver_from_whom_the_command_is_taken_or_who_leaves_has_the_arm_come_to_rest_and_the_next_goes_on(
+def test_a_driver_who_leaves_has_the_arm_come_to_rest_and_the_next_goes_on(
     page: LivePage, options: ServeOptions, driver: Visitor
 ) -> None:
-    aim(page, driver, hand(page) + np.array([0.0, 0.4, 0.0]))
-    turns(page, 10)
     with Visitor(page._server, options) as other:
-        do(page, other, control(page, "Take command"), True)
-        turns(page, 15)
-        assert page._simulation.frame.step.mode is Mode.HOLD
-        aim(page, other, hand(page) - np.array([0.0, 0.4, 0.0]))
+        aim(page, other, hand(page) + np.array([0.0, 0.4, 0.0]))
         turns(page, 10)
         assert speed(page) > 0.1
     turns(page, 15)
@@ -105,23 +98,6 @@ def test_a_driver_from_whom_the_command_is_taken_or_who_leaves_has_the_arm_come_
     aim(page, driver, rest)
     turns(page, 3)
     assert page._simulation.frame.step.mode is Mode.TRACK
-
-
-def test_who_does_not_command_drives_nothing_and_is_shown_again_where_the_target_is(
-    page: LivePage, options: ServeOptions, driver: Visitor
-) -> None:
-    before = page.drive._target.position
-    with Visitor(page._server, options) as other:
-        aim(page, other, np.array([0.3, 0.3, 0.3]))
-        assert page.drive.steering.goal is None
-        aim(page, driver, before)
-        aim(page, other, np.array([0.3, 0.3, 0.3]))
-        np.testing.assert_allclose(page.drive._target.position, before)
-        do(page, other, control(page, "Task"), TASKS[0])
-        assert control(page, "Task").value == TASKS[1]
-    turns(page, 5)
-    np.testing.assert_allclose(page.drive.steering.goal[:3, 3], before)  # type: ignore[index]
-    assert speed(page) < 0.01
 
 
 def test_a_reset_has_a_driven_arm_stand_at_its_beginning(page: LivePage, driver: Visitor) -> None:
@@ -151,10 +127,10 @@ def test_a_drive_at_the_person_is_recorded_shown_again_and_replayed_to_the_bit(
     assert verdict.exact, verdict.said
     assert (verdict.checked, verdict.skipped) == (len(recorded), {})
     assert {kept.inputs.desired.kind for kept in recorded} == {DesiredKind.TWIST, DesiredKind.POSE}
-    kept, world = recorded[len(recorded) - 1], world_of(recorded.runs[0])
-    asked = asked_in(frame_of(kept), world, world.model.kinematics(kept.step.q))
-    assert asked
-    np.testing.assert_allclose(asked.goal[:3, 3], simulation.hand_target)  # type: ignore[index]
+    last, world = recorded[len(recorded) - 1], world_of(recorded.runs[0])
+    motion = driven_motion(frame_of(last), world, world.model.kinematics(last.step.q))
+    assert motion
+    np.testing.assert_allclose(motion.goal[:3, 3], simulation.hand_target)  # type: ignore[index]
     limits = [kept.step.limited for kept in recorded]
     assert {simulation.skin.ids[limit.unit] for limit in limits if limit.unit >= 0} >= {"hand_left"}
     assert max(np.linalg.norm(kept.truth.force, axis=1).max() for kept in recorded) < 30.0
@@ -162,22 +138,22 @@ def test_a_drive_at_the_person_is_recorded_shown_again_and_replayed_to_the_bit(
 
 def test_a_target_counts_until_another_is_asked_and_lies_within_reach() -> None:
     steering = Steering()
-    steering.held = True
+    steering.attended = True
     assert steering(0.5).kind is DesiredKind.TWIST
     assert not steering(0.5).number.any()
     turned = np.diag([1.0, -1.0, -1.0])
     steering.target(np.array([0.5, -9.0, 0.3]), turned)
     for now in (1.0, 100.0):
-        asked = steering(now)
-        assert (asked.kind, asked.stamp.tolist()) == (DesiredKind.POSE, [now])
-        assert asked.number[0].tolist() == [0.5, -REACH_M, 0.3, *turned.ravel()]
+        motion = steering(now)
+        assert (motion.kind, motion.stamp.tolist()) == (DesiredKind.POSE, [now])
+        assert motion.number[0].tolist() == [0.5, -REACH_M, 0.3, *turned.ravel()]
 
 
 def test_what_is_asked_ages_while_who_asked_it_is_away() -> None:
     steering = Steering()
-    steering.held = True
+    steering.attended = True
     steering(2.0)
-    steering.held = False
+    steering.attended = False
     assert [float(steering(now).stamp[0]) for now in (2.5, 9.0)] == [2.0, 2.0]
     assert float(steering(0.3).stamp[0]) == 0.3  # after a reset it is of now at most, and ages from there
     assert float(steering(0.4).stamp[0]) == 0.3

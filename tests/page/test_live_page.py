@@ -1,6 +1,7 @@
 """The live page without a browser: what it does between two ticks."""
 
 import asyncio
+import re
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -13,10 +14,10 @@ from viser import ViserServer
 
 from pretouch.page.controls import toggle_recording, with_name
 from pretouch.page.drive import TASKS
-from pretouch.page.gui import PANEL_PX, SETTLE_S
-from pretouch.page.live import PERIOD_S, LivePage
+from pretouch.page.live import LivePage
+from pretouch.page.panel import PANEL_PX, PERIOD_S, SETTLE_S
 from pretouch.page.room import Faults, LiveSettings
-from pretouch.page.scene import CAMERA_FROM
+from pretouch.page.scene import CAMERA_FROM, PARTS
 from pretouch.page.simulation import LiveSimulation
 from pretouch.profiles import PROFILES, profile
 from pretouch.recording.reader import open_recording
@@ -40,10 +41,10 @@ class Clock:
 
 def give(page: LivePage, label: str, value: object) -> None:
     """Give a control a value as somebody at the page does."""
-    found = control(page, label)
-    found._impl.value = value
-    for told in found._impl.update_cb:
-        asyncio.run(told(SimpleNamespace(client_id=0, client=None, target=found)))
+    handle = control(page, label)
+    handle._impl.value = value
+    for callback in handle._impl.update_cb:
+        asyncio.run(callback(SimpleNamespace(client_id=0, client=None, target=handle)))
 
 
 def click(page: LivePage, label: str) -> None:
@@ -85,11 +86,11 @@ def test_nobody_watching_costs_nothing_but_the_simulation(clock: Clock, monkeypa
 def test_a_page_that_is_open_for_long_keeps_no_more_and_more(clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None:
     server = clock.page._server
     monkeypatch.setattr(server, "get_clients", lambda: {0: None})
-    kept = server._websock_server._broadcast_buffer.message_from_id
+    messages = server._websock_server._broadcast_buffer.message_from_id
     clock.turn(6.0)
-    after_a_while = len(kept)
+    after_a_while = len(messages)
     clock.turn(4.0)
-    assert len(kept) < after_a_while + 0.5 * 4.0 / PERIOD_S
+    assert len(messages) < after_a_while + 0.5 * 4.0 / PERIOD_S
 
 
 def test_each_recording_gets_a_file_of_its_own_that_is_named(
@@ -97,10 +98,10 @@ def test_each_recording_gets_a_file_of_its_own_that_is_named(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     for number in (1, 2):
-        clock.page.ask(lambda: toggle_recording(simulation))
+        clock.page.actions.put(lambda: toggle_recording(simulation))
         clock.turn(0.3)
         assert clock.page.notice == f"Recording to runs/live-{number}.mcap."
-        clock.page.ask(lambda: toggle_recording(simulation))
+        clock.page.actions.put(lambda: toggle_recording(simulation))
         clock.turn(0.1)
         assert f"runs/live-{number}.mcap" in clock.page.notice
         assert len(open_recording(Path(f"runs/live-{number}.mcap"))) >= 25
@@ -111,7 +112,7 @@ def test_a_folder_for_recordings_that_cannot_be_made_is_said(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     Path("runs").write_text("in the way")
-    clock.page.ask(lambda: toggle_recording(simulation))
+    clock.page.actions.put(lambda: toggle_recording(simulation))
     clock.turn(0.1)
     assert clock.page.notice == "Not done: The folder runs cannot be created: File exists."
     assert simulation.recording is None
@@ -136,16 +137,16 @@ def test_a_changed_profile_is_named_so_that_it_can_be_found_again() -> None:
 def test_all_controls_show_what_holds(clock: Clock, simulation: LiveSimulation) -> None:
     assert control(clock.page, "Profile text").value == "paper"
     clock.page.controls.running.speed = 0.5
-    clock.page.ask(lambda: simulation.set_profile(profile("pretouch:task.speed_m_s=0.2")))
-    clock.page.ask(lambda: simulation.set_path("line"))
-    clock.page.ask(lambda: simulation.reset(object="board -y", faults=Faults(frozenset({"hand_left"}), 2.0, 0.1)))
+    clock.page.actions.put(lambda: simulation.set_profile(profile("pretouch:task.speed_m_s=0.2")))
+    clock.page.actions.put(lambda: simulation.set_path("line"))
+    clock.page.actions.put(
+        lambda: simulation.reset(object="board -y", faults=Faults(frozenset({"hand_left"}), 2.0, 0.1))
+    )
     clock.turn(0.1)
-    shown = {
-        "Clock speed": 0.5, "Path": "line", "Object": "board -y", "hand_left": False, "Noise factor": 2.0,
-        "More latency [s]": 0.1, "Profile": "pretouch", "Path speed [m/s]": 0.2,
-        "Profile text": "pretouch:task.speed_m_s=0.2",
-    }  # fmt: skip
-    assert {label: control(clock.page, label).value for label in shown} == shown
+    faults = {"hand_left": False, "Noise factor": 2.0, "More latency [s]": 0.1}
+    profiles = {"Profile": "pretouch", "Path speed [m/s]": 0.2, "Profile text": "pretouch:task.speed_m_s=0.2"}
+    values = {"Clock speed": 0.5, "Path": "line", "Object": "board -y", **faults, **profiles}
+    assert {label: control(clock.page, label).value for label in values} == values
 
 
 @pytest.mark.parametrize("speed", [0.0, 7.0])
@@ -184,12 +185,12 @@ def test_what_is_refused_is_said_until_the_next_click_though_the_hand_moves_and_
     clock: Clock, simulation: LiveSimulation
 ) -> None:
     before = simulation.world.profile
-    clock.page.ask(lambda: set_speed(simulation, -1.0))
+    clock.page.actions.put(lambda: set_speed(simulation, -1.0))
     clock.turn(0.1)
     assert simulation.world.profile == before
     give(clock.page, "x [m]", 0.9)
     give(clock.page, "Cones", False)
-    clock.page._drag(0, np.array(CAMERA_FROM), np.array([1.0, 0.4, 0.3]))
+    clock.page._drag(np.array(CAMERA_FROM), np.array([1.0, 0.4, 0.3]))
     clock.turn(0.1)
     assert clock.page.notice.startswith("Not done: TaskParams.speed_m_s is -1")
     click(clock.page, "Pause")
@@ -208,7 +209,7 @@ def test_the_hand_begins_beside_the_panel(simulation: LiveSimulation, width: int
 
 
 def test_a_push_is_felt_or_the_page_says_what_it_lacked(clock: Clock, simulation: LiveSimulation) -> None:
-    clock.page.ask(lambda: simulation.move_hand(np.array([1.4, 0.0, 1.2])))
+    clock.page.actions.put(lambda: simulation.move_hand(np.array([1.4, 0.0, 1.2])))
     clock.turn(1.5)  # the force window is full
     give(clock.page, "Force [N]", 60.0)
     click(clock.page, "Push the hand")
@@ -271,16 +272,34 @@ def test_three_arms_with_one_hand_go_through_the_same_cycles(
     assert 0.0 < beside._most < 0.5 * beside._arms[0].most
     assert beside._arms[0].label.text.endswith(f"touched with {beside._arms[0].most:.0f} N")
     give(clock.page, "Task", TASKS[1])
-    clock.page.ask(lambda: simulation.set_path("line"))
-    clock.page.ask(lambda: simulation.set_faults(frozenset({"hand_left"})))
+    clock.page.actions.put(lambda: simulation.set_path("line"))
+    clock.page.actions.put(lambda: simulation.set_faults(Faults(frozenset({"hand_left"}))))
     clock.turn(0.1)
     assert {arm.simulation.settings.path for arm in beside._arms} == {"line"}
     assert {arm.simulation.settings.faults for arm in beside._arms} == {simulation.settings.faults}
     assert {arm.simulation.commander for arm in beside._arms} == {clock.page.drive.steering}
-    clock.page.ask(simulation.reset)
+    clock.page.actions.put(simulation.reset)
     clock.turn(0.1)
     assert max(arm.simulation.time for arm in beside._arms) < 1.0
     give(clock.page, "Arms", "one arm")
     clock.turn(0.1)
     assert clock.page._companions is None
     assert not any("blind" in name for name in server.scene._handle_from_node_name)
+
+
+def test_the_tutorial_names_the_controls_there_are_and_no_others() -> None:
+    root = Path(__file__).parents[2]
+    source = "".join(
+        (root / f"src/pretouch/page/{name}.py").read_text() for name in ("controls", "drive", "live", "plots")
+    )
+    labels = set(re.findall(r'(?:add_(?:dropdown|slider|checkbox|text|button)|_button)\(\s*"([^"]+)"', source))
+    labels = {label.partition(" [")[0] for label in labels} | {"Resume"}
+    folders = set(re.findall(r'"(\w+)": (?:self\._\w+_folder|lambda)', source))
+    captions = set(re.findall(r'_caption\("(\w+)', source))
+    assert len(labels) > 15
+    assert len(folders) > 4
+    text = " ".join((root / "docs/tutorial/live.md").read_text().split())
+    words = set(re.findall(r"(?<!\*)\*([^*]+)\*(?!\*)", text))
+    assert words - labels - folders - captions - {part.capitalize() for part in PARTS} == set()
+    assert labels - words == set()
+    assert {folder for folder in folders if f"- **{folder}**" not in text} == set()

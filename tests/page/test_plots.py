@@ -4,7 +4,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pretouch.page.plots import FORCE_N, SAMPLES, SPAN_S, History, Plots
+from pretouch.page.plots import FORCE_N, SAMPLE_S, SAMPLES, SPAN_S, History, Plots
 from pretouch.types import ControlStep, Thresholds
 
 K = 7
@@ -14,61 +14,48 @@ def test_a_history_holds_the_last_seconds_and_no_more(some_step: ControlStep) ->
     history = History(np.arange(K))
     for i in range(6000):
         history.add(replace(some_step, stamp=i / 100))
-    time = history.columns()[0]
+    time = history.column("time")
     assert len(time) <= SAMPLES + 1
     assert time[-1] == pytest.approx(59.99, abs=0.1)
     assert SPAN_S - 0.2 <= time[-1] - time[0] <= SPAN_S + 0.2
     assert np.all(np.diff(time) > 0)
 
 
-def test_a_short_peak_of_force_or_evidence_is_not_lost(some_step: ControlStep) -> None:
+def test_columns_are_what_their_names_say_and_a_short_peak_of_force_or_evidence_is_not_lost(
+    some_step: ControlStep,
+) -> None:
     history = History(np.arange(K))
     for i in range(500):
         peak = float(i == 251)
         history.add(replace(some_step, stamp=i / 100, force=np.array([0.0, -40.0 * peak, 0.0]), evidence=1.2 * peak))
-    assert history.columns()[1 + K + 1].min() == -40.0
-    assert history.columns()[12 + K].max() == 1.2
-
-
-def test_columns_are_what_their_names_say(some_step: ControlStep) -> None:
-    history = History(np.arange(K))
-    for i in range(50):
-        history.add(replace(some_step, stamp=i / 100))
-    last = history.columns()[:, -1]
-    np.testing.assert_array_equal(last[1 + K : 4 + K], some_step.force)
-    np.testing.assert_array_equal(last[4 + K : 7 + K], some_step.thresholds.upper)
-    np.testing.assert_array_equal(last[7 + K : 10 + K], some_step.thresholds.lower)
+    assert history.column("force").min(axis=0).tolist() == [0.0, -40.0, 0.0]
+    assert history.column("evidence").max() == 1.2
+    limits = some_step.thresholds
+    np.testing.assert_array_equal(history.column("limits")[-1], [limits.upper, limits.lower])
     speeds = [np.linalg.norm(some_step.ee_velocity), np.linalg.norm(some_step.desired_velocity)]
-    np.testing.assert_array_equal(last[10 + K : 12 + K], speeds)
-    assert last[12 + K] == some_step.evidence
-    assert last[13 + K] == min(some_step.obstacles.body_distance, default=9.0)
+    np.testing.assert_array_equal(history.column("speeds")[-1], speeds)
+    assert history.column("nearest")[-1] == min(some_step.obstacles.body_distance, default=9.0)
 
 
 def test_time_counts_from_the_start_and_going_back_begins_anew(some_step: ControlStep) -> None:
     history = History(np.arange(K), start=100.0)
     for stamp in (*np.arange(0, 5, 0.01), *np.arange(0, 1, 0.01)):
         history.add(replace(some_step, stamp=100.0 + float(stamp)))
-    time = history.columns()[0]
+    time = history.column("time")
     assert time[0] == 0.0
     assert time[-1] < 1.0
 
 
-@pytest.mark.parametrize("samples", [0, 1])
-def test_a_history_of_little_can_be_drawn(some_step: ControlStep, samples: int) -> None:
-    history = History(np.arange(K))
-    for _ in range(samples):
-        history.add(some_step)
-    columns = history.columns()
-    assert columns.shape[0] == 1 + K + 13
-    assert columns.shape[1] >= 2
-    assert np.all(np.isfinite(columns[0]))
-
-
-def test_a_unit_whose_reading_is_late_shows_nothing(some_step: ControlStep) -> None:
+def test_a_history_of_one_sample_is_a_line_and_a_unit_whose_reading_is_late_shows_nothing(
+    some_step: ControlStep,
+) -> None:
     history, step = History(np.arange(K)), replace(some_step, range_distance=np.full(K, 0.5))
+    assert len(history.column("time")) == 0
     history.add(step, late=np.arange(K) == 3)
-    distances = history.columns()[1 : 1 + K, -1]
-    assert np.flatnonzero(distances > 1.0).tolist() == [3]  # the axis ends at 1 m
+    assert np.diff(history.column("time")) == pytest.approx([SAMPLE_S])
+    distances = history.column("distance")
+    assert distances.shape == (2, K)
+    assert np.flatnonzero(distances[-1] > 1.0).tolist() == [3]  # the axis ends at 1 m
 
 
 def test_axes_of_force_are_symmetric_and_grow_with_the_force_and_no_scale_changes(some_step: ControlStep) -> None:
@@ -102,6 +89,9 @@ def test_what_is_folded_is_sent_only_while_it_is_shown(some_step: ControlStep) -
     gui.more.value = True
     plots.draw(1.0)
     assert all(plot.data is not data for plot, data in zip(gui.plots, before, strict=True))
+    history.clear()
+    plots.draw(2.0)
+    assert np.isnan([plot.data[1] for plot in gui.plots[:3]]).all()
 
 
 class FakeGui:
@@ -117,6 +107,6 @@ class FakeGui:
         self.more = SimpleNamespace(value=value, on_update=lambda act: None)
         return self.more
 
-    def add_uplot(self, data: object, series: object, **given: object) -> SimpleNamespace:
-        self.plots.append(SimpleNamespace(data=data, **given))
+    def add_uplot(self, data: object, series: object, **look: object) -> SimpleNamespace:
+        self.plots.append(SimpleNamespace(data=data, **look))
         return self.plots[-1]

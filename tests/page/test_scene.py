@@ -44,10 +44,8 @@ def drawn(scene: Scene, fake: FakeScene) -> Drawn:
 def sensing(step: ControlStep, multiplier: float = 0.0) -> ControlStep:
     """A step in which unit 2 senses a point, 0.2 m off the body, whose restriction has a multiplier."""
     at, direction = POINT[None], np.array([[1.0, 0.0, 0.0]])
-    obstacles = Obstacles(
-        np.array([2]), at, np.array([0.2]), at - 0.2 * direction, np.array([10]), direction, np.array([0.2]),
-        np.zeros(1),
-    )  # fmt: skip
+    unit, away, body_point = np.array([2]), np.array([0.2]), at - 0.2 * direction
+    obstacles = Obstacles(unit, at, away, body_point, np.array([10]), direction, away, np.zeros(1))
     qp = replace(step.qp, slack=np.zeros(1), multipliers=np.append(np.zeros(len(step.q)), multiplier))
     distance = np.where(np.arange(7) == 2, 0.2, np.nan)
     return replace(step, obstacles=obstacles, range_distance=distance, restricted=np.array([0]), qp=qp)

@@ -9,6 +9,7 @@ from tests.limits import assert_within_limits
 from tests.page.sessions import ARMED_S, AWAY, modes, poke, set_speed
 
 from pretouch.errors import ParameterError
+from pretouch.page.room import Faults
 from pretouch.page.simulation import LiveSimulation
 from pretouch.profiles import PROFILES, profile
 from pretouch.types import Mode
@@ -95,9 +96,9 @@ def test_what_cannot_be_is_refused_and_nothing_changes(running):
     with pytest.raises(ParameterError, match=r"LiveSettings.stiffness is 10: it must be at least 3000"):
         running.set_stiffness(10)
     with pytest.raises(ParameterError, match=r"Unknown unit nose: choose from "):
-        running.set_faults(frozenset({"nose"}))
+        running.set_faults(Faults(frozenset({"nose"})))
     with pytest.raises(ParameterError, match=r"Faults.noise_factor is 21: it must be at most 20"):
-        running.set_faults(noise_factor=21)
+        running.set_faults(Faults(noise_factor=21))
     assert running.settings == settings
     assert running.world is world
     assert modes(running.advance(0.1)) == [Mode.TRACK]
@@ -131,7 +132,7 @@ def test_another_path_is_joined_where_it_is_nearest(running):
 def test_a_dropped_unit_is_named_and_may_come_back_and_a_reset_does_not_bring_it(running):
     lost = running.skin.ids[3]
     assert np.all(running.frame.age < 0.1)
-    running.set_faults(frozenset({lost}))
+    running.set_faults(Faults(frozenset({lost})))
     after = running.advance(1.0)
     late = running.frame.late(running.world.profile.sight.silent_after_s)
     assert np.flatnonzero(late).tolist() == [3]
@@ -140,11 +141,11 @@ def test_a_dropped_unit_is_named_and_may_come_back_and_a_reset_does_not_bring_it
     assert lost in after[-1].reason
     assert "check the unit's power" in after[-1].reason
     assert not np.any(after[-1].command)
-    running.set_faults()
+    running.set_faults(Faults())
     again = running.advance(1.0)
     assert modes(again) == [Mode.HOLD, Mode.TRACK]
     assert sum(s.mode is Mode.HOLD for s in again) < 10, "a unit that is heard again goes unnoticed"
-    running.set_faults(frozenset({lost}))
+    running.set_faults(Faults(frozenset({lost})))
     running.reset()
     after = running.advance(1.5)
     assert after[-1].mode is Mode.HOLD, "faults do not outlast a reset"
@@ -161,13 +162,13 @@ def test_noise_and_latency_are_those_asked_for(running):
         return float(np.nanstd(seen[:, np.isfinite(seen).mean(axis=0) > 0.5], axis=0).mean())
 
     quiet = spread()
-    running.set_faults(noise_factor=2.0)
+    running.set_faults(Faults(noise_factor=2.0))
     assert spread() == pytest.approx(2.0 * quiet, rel=0.35)
-    running.set_faults(latency_s=0.35)
+    running.set_faults(Faults(latency_s=0.35))
     late = running.advance(1.0)
     assert late[-1].mode is Mode.HOLD
     assert all(unit in late[-1].reason for unit in running.skin.ids)
-    running.set_faults()
+    running.set_faults(Faults())
     assert running.advance(1.0)[-1].mode is Mode.TRACK
 
 
@@ -238,8 +239,8 @@ def test_no_command_leaves_the_limits_whatever_a_person_does(live, seed):
         lambda: session.set_profile(profile("paper:react.decay_cycles=50:task.position_margin_rad=0.05")),
         lambda: set_speed(session, rng.uniform(0.05, 1.0)),
         lambda: session.set_path(str(rng.choice(["circle", "line"]))),
-        lambda: session.set_faults(frozenset({ids[rng.integers(len(ids))]}), rng.uniform(0, 10), rng.uniform(0, 0.1)),
-        lambda: session.set_faults(),
+        lambda: session.set_faults(Faults(frozenset({rng.choice(ids)}), rng.uniform(0, 10), rng.uniform(0, 0.1))),
+        lambda: session.set_faults(Faults()),
         lambda: session.set_stiffness(rng.uniform(3_000.0, 150_000.0)),
         lambda: session.move_hand(session.frame.step.ee_position + 0.1 * rng.standard_normal(3)),
         lambda: session.move_hand(AWAY),
@@ -250,7 +251,7 @@ def test_no_command_leaves_the_limits_whatever_a_person_does(live, seed):
         wishes[rng.integers(len(wishes))]()
         steps += session.advance(0.2)
     # whatever was wished for, the arm can still be touched
-    session.set_faults()
+    session.set_faults(Faults())
     session.set_profile(PROFILES["paper"])
     session.move_hand(AWAY)
     session.resume()

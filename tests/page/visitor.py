@@ -11,7 +11,6 @@ from typing import Any
 
 import msgspec
 import viser
-import zstandard
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 from websockets.typing import Subprotocol
@@ -76,6 +75,16 @@ class Visitor:
         """Give a control a value, as the page does."""
         self.say(update(handle, value=value))
 
+    def type_text(self, handle: Any, text: str) -> None:
+        """Type into a field of a form, and press Enter."""
+        self.set(handle, text)
+        self.say({"type": "GuiFormSubmitMessage", "uuid": handle._impl.parent_container_id})
+        self.settle()
+
+    def wait_for_callbacks(self) -> None:
+        """Wait until all that viser does in threads of its own for what was said has been done."""
+        self._server._thread_executor.submit(int).result()
+
     def settle(self) -> None:
         """Wait until all that was said has been heard: what is said last is where somebody looks from."""
         near = 0.1 + 0.001 * next(self._marks)
@@ -85,15 +94,6 @@ class Visitor:
             return math.isclose(self._server.get_clients()[self.number].camera.near, near)
 
         until(heard)
-
-    def heard(self, kind: str, **fields: object) -> dict[str, Any]:
-        """The next message of a kind that this visitor is sent, of those with some fields."""
-        deadline = time.monotonic() + PATIENCE_S
-        while time.monotonic() < deadline:
-            for message in _messages(self._socket.recv(timeout=PATIENCE_S)):
-                if message["type"] == kind and fields.items() <= message.items():
-                    return message
-        raise AssertionError(f"no {kind} has come")
 
 
 def control(page: LivePage, label: str) -> Any:
@@ -115,9 +115,3 @@ def refusal(options: ServeOptions, path: str = "", origin: str | None = None) ->
             return 101, ""
     except InvalidStatus as error:
         return error.response.status_code, error.response.body.decode()
-
-
-def _messages(frame: Any) -> list[dict[str, Any]]:
-    """Messages of a frame, without what is behind them."""
-    size = int.from_bytes(frame[8:16], "little")
-    return list(msgspec.msgpack.decode(zstandard.decompress(frame[16 : 16 + size]))["messages"])

@@ -1,27 +1,36 @@
-"""The arm of the page: its links, coloured where contact is expected, and the units on them."""
+"""The arm of the page: its links, coloured where contact is expected (paper, Fig. 1).
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+The formula is ours, the paper gives none. A unit whose obstacle is at distance d from the body expects contact by e =
+(d_max - d) / (d_max - d_min), clipped to [0, 1], as eq. 11 grades it. A vertex at distance r from a unit, whose normal
+makes the angle phi with the unit's beam, takes the share w = (1 - (r / L)^2)^2 (1 + cos phi) / 2 of it, 0 from r = L
+on, and what several units expect adds up as 1 - prod(1 - e w).
+"""
+
+from typing import Any
 
 import numpy as np
 import trimesh
 from scipy.spatial.transform import Rotation
+from viser import SceneApi
 
+from pretouch.contact.moving_thresholds import obstacle_force
 from pretouch.page import palette
-from pretouch.page.expectation import LEVELS, on_surface, shares, surface_of
+from pretouch.params import ThresholdParams
 from pretouch.robot.kinematics import Kinematics
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.types import FloatArray, IntArray
+from pretouch.types import FloatArray, IntArray, Obstacles
 
-if TYPE_CHECKING:
-    from viser import GlbHandle, SceneApi
-
+SPREAD_M = 0.12
+"""Distance L from a unit at which its reading colours the surface no more [m]."""
+LEVELS = 24
+"""Steps from nothing expected to all of it: a part whose units keep theirs is not sent again."""
 SETTLE_S = 0.2
 """Time a page is given to read a mesh before it is shown [s]; a link is sent at most once in it."""
-
 _UNDER_M = 0.0015
 """How deep the plain surface lies under the coloured one [m]: a page too slow to read one in time shows the other."""
+SHADELESS: dict[str, Any] = {"cast_shadow": False, "receive_shadow": False}
+"""Of all things in the scene: shadows would cost a phone more than they show."""
 
 
 def quaternions(rotation: FloatArray) -> FloatArray:
@@ -29,9 +38,38 @@ def quaternions(rotation: FloatArray) -> FloatArray:
     return np.asarray(Rotation.from_matrix(rotation).as_quat(scalar_first=True), dtype=np.float64)
 
 
-def capsule_surfaces(model: RobotModel) -> dict[int, trimesh.Trimesh]:
-    """The surface of each link that has a body, by its index, link frame."""
-    return {int(i): surface_of(model.capsules.of_links(np.array([i]))) for i in np.unique(model.capsules.link)}
+def expectation(obstacles: Obstacles, units: int, params: ThresholdParams) -> FloatArray:
+    """By how much each of the units (K,) expects contact, from 0 to 1; 0 for one that shows no obstacle."""
+    expected = np.zeros(units)
+    if len(obstacles.unit):
+        graded = obstacle_force(obstacles.body_distance, 1.0, params.d_max_m, params.d_min_m)
+        own = obstacles.unit < units  # what other sources see is at no unit
+        np.maximum.at(expected, obstacles.unit[own], graded[own])
+    return expected
+
+
+def in_levels(expected: FloatArray) -> tuple[int, ...]:
+    """Round to the nearest of `LEVELS` steps."""
+    return tuple(np.rint(expected * LEVELS).astype(int).tolist())
+
+
+def shares(vertices: FloatArray, normals: FloatArray, origin: FloatArray, beam: FloatArray) -> FloatArray:
+    """Shares w (V, K) that vertices have in what units expect.
+
+    Args:
+        vertices: (V, 3) [m].
+        normals: (V, 3) unit vectors, outwards.
+        origin: (K, 3) of the units [m], same frame.
+        beam: (K, 3) unit vectors, same frame.
+    """
+    apart = np.linalg.norm(vertices[:, None] - origin[None], axis=2)
+    near = np.maximum(1.0 - (apart / SPREAD_M) ** 2, 0.0) ** 2
+    return near * (1.0 + normals @ beam.T) / 2.0
+
+
+def on_surface(share: FloatArray, expected: FloatArray) -> FloatArray:
+    """By how much contact is expected at each vertex (V,), of shares (V, K) and what the units expect (K,)."""
+    return 1.0 - np.prod(1.0 - share * expected, axis=1)
 
 
 def seen_from(model: RobotModel, skin: Skin, link: int) -> tuple[IntArray, FloatArray, FloatArray]:
@@ -65,51 +103,39 @@ def _matt(document: dict[str, Any]) -> None:
     document["meshes"][0]["primitives"][0]["material"] = 0
 
 
-@dataclass
-class _Sent:
-    levels: tuple[int, ...]
-    time: float
-    shown: bool
-
-
 class PaintedLink:
     """A link whose colours change, without flicker: what is sent is hidden until the page has had time to read it."""
 
-    def __init__(self, scene: "SceneApi", name: str, mesh: trimesh.Trimesh, share: FloatArray) -> None:
+    def __init__(self, scene: SceneApi, name: str, mesh: trimesh.Trimesh, share: FloatArray) -> None:
         self._mesh, self._share = mesh, share
-        neutral = (0,) * share.shape[1]
-        plain = self._painted(neutral)
-        self._front: GlbHandle = scene.add_glb(f"{name}/front", plain, cast_shadow=False, receive_shadow=False)
-        self._back: GlbHandle = scene.add_glb(
-            f"{name}/back", plain, cast_shadow=False, receive_shadow=False, visible=False
-        )
-        self._sent = _Sent(neutral, -np.inf, shown=True)
+        self._levels, self._sent, self._waits = (0,) * share.shape[1], -np.inf, False
+        plain = self._painted()
+        self._front = scene.add_glb(f"{name}/front", plain, **SHADELESS)
+        self._back = scene.add_glb(f"{name}/back", plain, visible=False, **SHADELESS)
 
-    def _painted(self, levels: tuple[int, ...]) -> bytes:
-        expected = np.array(levels, dtype=np.float64) / LEVELS
-        return coloured(self._mesh, palette.expected(on_surface(self._share, expected)))
+    def _painted(self) -> bytes:
+        levels = np.array(self._levels, dtype=np.float64) / LEVELS
+        return coloured(self._mesh, palette.expected(on_surface(self._share, levels)))
 
     def paint(self, levels: tuple[int, ...], now: float) -> int:
         """Colour by what the units expect, in `LEVELS`, at a time [s]; returns the bytes that were sent."""
-        if now - self._sent.time < SETTLE_S:
+        if now - self._sent < SETTLE_S:
             return 0
-        if not self._sent.shown:
+        if self._waits:
             self._front, self._back = self._back, self._front
-            self._front.visible, self._back.visible = True, False
-            self._sent.shown = True
-        if levels == self._sent.levels:
+            self._front.visible, self._back.visible, self._waits = True, False, False
+        if levels == self._levels:
             return 0
-        data = self._painted(levels)
-        self._back.glb_data = data
-        self._sent = _Sent(levels, now, shown=False)
+        self._levels, self._sent, self._waits = levels, now, True
+        data = self._back.glb_data = self._painted()
         return len(data)
 
 
 class Arm:
-    """The links of an arm and the units on them, to be moved and coloured."""
+    """The links of an arm, to be moved and coloured."""
 
     def __init__(
-        self, scene: "SceneApi", model: RobotModel, skin: Skin, surfaces: dict[int, trimesh.Trimesh], root: str = ""
+        self, scene: SceneApi, model: RobotModel, skin: Skin, surfaces: dict[int, trimesh.Trimesh], root: str = ""
     ) -> None:
         self._frames = {}
         self._painted: list[tuple[IntArray, PaintedLink]] = []
@@ -119,11 +145,8 @@ class Arm:
             units, origin, beam = seen_from(model, skin, link)
             share = shares(mesh.vertices, mesh.vertex_normals, origin, beam)
             reached = share.any(axis=0)
-            under = _UNDER_M if reached.any() else 0.0
-            scene.add_mesh_simple(
-                f"{name}/plain", mesh.vertices - under * mesh.vertex_normals, mesh.faces, color=palette.ARM,
-                cast_shadow=False, receive_shadow=False,
-            )  # fmt: skip
+            under = mesh.vertices - (_UNDER_M if reached.any() else 0.0) * mesh.vertex_normals
+            scene.add_mesh_simple(f"{name}/plain", under, mesh.faces, color=palette.ARM, **SHADELESS)
             if reached.any():
                 self._painted.append((units[reached], PaintedLink(scene, name, mesh, share[:, reached])))
 

@@ -1,17 +1,14 @@
 """Other arms beside that of the live page, each with another profile, and the same hand at all of them."""
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
+from viser import LabelHandle, ViserServer
 
 from pretouch.page.scene import CAMERA_AT, CAMERA_FROM, Scene
 from pretouch.page.simulation import LiveSimulation
 from pretouch.profiles import PROFILES
 from pretouch.types import FloatArray
-
-if TYPE_CHECKING:
-    from viser import LabelHandle, ViserServer
 
 SIDE_BY_SIDE = ("blind", "paper", "pretouch")
 """Profiles that are compared, those of them that the page's own arm does not have."""
@@ -29,7 +26,7 @@ class Companion:
     name: str
     simulation: LiveSimulation
     scene: Scene
-    label: "LabelHandle"
+    label: LabelHandle
     most: float = 0.0
     """Largest force of a touch so far [N]."""
 
@@ -40,21 +37,20 @@ class Companions:
     Each is a simulation of its own, at rest at first where its path begins, with the same seed, skin and faults.
     """
 
-    def __init__(self, server: "ViserServer", main: LiveSimulation) -> None:
+    def __init__(self, server: ViserServer, main: LiveSimulation) -> None:
         own = main.settings.profile.name.partition(":")[0]
         others = [name for name in SIDE_BY_SIDE if name != own][:2]
         self._server, self._main, self._most = server, main, 0.0
-        self._arms = [
-            self._beside(server, name, side * APART_M) for name, side in zip(others, (-1.0, 1.0), strict=True)
-        ]
+        self._arms = [self._beside(name, side * APART_M) for name, side in zip(others, (-1.0, 1.0), strict=True)]
         self._own = server.scene.add_label("/own_label", own, position=_LABEL_AT)
         self._look(_LOOK_FROM, _LOOK_AT)
 
-    def _beside(self, server: "ViserServer", name: str, offset: float) -> Companion:
+    def _beside(self, name: str, offset: float) -> Companion:
         main, root = self._main, f"/{name}"
         simulation = LiveSimulation(replace(main.settings, profile=PROFILES[name]), main.model, main.skin)
-        scene = Scene(server, simulation.world, root, offset)
-        return Companion(name, simulation, scene, server.scene.add_label(f"{root}/label", name, position=_LABEL_AT))
+        scene = Scene(self._server, simulation.world, root, offset)
+        label = self._server.scene.add_label(f"{root}/label", name, position=_LABEL_AT)
+        return Companion(name, simulation, scene, label)
 
     def _look(self, place: tuple[float, float, float], at: tuple[float, float, float]) -> None:
         """Have all visitors look from a place (3,) [m] at another, and those that are still to come."""
@@ -74,34 +70,31 @@ class Companions:
     def follow(self, steps: int) -> None:
         """Let the control cycles pass that the page's own arm went through."""
         self._most = max(self._most, _size(self._main.frame.true_force))
-        target = self._main.frame.hand_target
         for arm in self._arms:
-            self._tell(arm)
-            if target is not None:
-                arm.simulation.move_hand(target)
+            self._copy_settings(arm)
+            arm.simulation.move_hand(self._main.hand_target)
             for _ in range(steps):
                 arm.scene.trail.add(arm.simulation.single_step())
                 arm.most = max(arm.most, _size(arm.simulation.frame.true_force))
 
-    def _tell(self, arm: Companion) -> None:
+    def _copy_settings(self, arm: Companion) -> None:
         """Have an arm go by what has been changed of the page's own, but for the profile."""
-        wanted, simulation = self._main.settings, arm.simulation
+        settings, simulation = self._main.settings, arm.simulation
         simulation.commander = self._main.commander
-        if simulation.settings.path != wanted.path:
-            simulation.set_path(wanted.path)
+        if simulation.settings.path != settings.path:
+            simulation.set_path(settings.path)
             arm.scene.show_world(simulation.world)
-        if simulation.settings.stiffness != wanted.stiffness:
-            simulation.set_stiffness(wanted.stiffness)
-        if simulation.settings.faults != wanted.faults:
-            faults = wanted.faults
-            simulation.set_faults(faults.silenced, faults.noise_factor, faults.latency_s)
+        if simulation.settings.stiffness != settings.stiffness:
+            simulation.set_stiffness(settings.stiffness)
+        if simulation.settings.faults != settings.faults:
+            simulation.set_faults(settings.faults)
 
     def draw(self, now: float) -> None:
         """Show them at a time of the machine [s]."""
         for arm in self._arms:
             arm.scene.draw(arm.simulation.frame, now)
-            arm.label.text = _said(arm.name, arm.simulation, arm.most)
-        self._own.text = _said(self._main.settings.profile.name, self._main, self._most)
+            arm.label.text = _label(arm.name, arm.simulation, arm.most)
+        self._own.text = _label(self._main.settings.profile.name, self._main, self._most)
 
     def remove(self) -> None:
         """Take them out of the page."""
@@ -111,9 +104,9 @@ class Companions:
             arm.scene.remove()
 
 
-def _said(name: str, simulation: LiveSimulation, most: float) -> str:
-    touched = f" · touched with {most:.0f} N" if most >= 1.0 else ""
-    return f"{name}: {simulation.frame.step.mode.name}{touched}"
+def _label(name: str, simulation: LiveSimulation, most: float) -> str:
+    touch = f" · touched with {most:.0f} N" if most >= 1.0 else ""
+    return f"{name}: {simulation.frame.step.mode.name}{touch}"
 
 
 def _size(force: FloatArray | None) -> float:

@@ -3,25 +3,22 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import count
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args
+from typing import Any, get_args
 
 import numpy as np
+from viser import GuiApi
 
 from pretouch.composition import differences, field_docs
 from pretouch.errors import RecordingError
-from pretouch.page.action_queue import ActionQueue
-from pretouch.page.gui import SETTLE_S, add_button, add_view_boxes, put, when_changed
-from pretouch.page.room import ObjectName, PathName
+from pretouch.page.panel import SETTLE_S, ActionQueue, add_button, add_view_boxes, put, when_changed
+from pretouch.page.room import Faults, ObjectName, PathName
 from pretouch.page.simulation import LiveSimulation
-from pretouch.page.status import legend
 from pretouch.params import TaskParams
 from pretouch.profiles import Profile, profile, profile_names
 from pretouch.sim.tcp_push import AXES
 from pretouch.types import FloatArray
-
-if TYPE_CHECKING:
-    from viser import GuiApi
 
 RECORDINGS = Path("runs")
 """Folder in which recordings are kept."""
@@ -59,44 +56,38 @@ class Controls:
     Methods without underscore are called by the loop.
     """
 
-    def __init__(self, gui: "GuiApi", simulation: LiveSimulation, commands: ActionQueue) -> None:
-        self._gui, self._simulation, self._actions = gui, simulation, commands
+    def __init__(self, gui: GuiApi, simulation: LiveSimulation, actions: ActionQueue) -> None:
+        self._gui, self._simulation, self._actions = gui, simulation, actions
         self.running = ClockState()
-        self._shown: list[tuple[Any, str, Callable[[], object]]] = []
-        self.on_view: Callable[[str, bool], None] = lambda name, visible: None
-        """Told which part of the scene to show or hide."""
+        self._settings: list[tuple[Any, str, Callable[[], object]]] = []
+        """Controls that show a setting, the kind of their action, and what they are to show."""
         self._text: Any = None
         """The field for a profile's text, once it is there."""
         self._written = ""
         """The profile that the field shows, or showed before somebody typed."""
-        self._first()
-        self.refresh()
-
-    # what is always shown, and what is folded
-
-    def _first(self) -> None:
-        gui, simulation = self._gui, self._simulation
         self._button("Push the hand", self._push, icon="HAND_FINGER", hint="With the force of the folder Push.")
         names = gui.add_dropdown("Profile", _NAMES)
-        self._choice(names, self._choose_profile, "profile", lambda: self._base)
+        self._setting(names, self._choose_profile, "profile", lambda: self._base)
         self._pause = self._button("Pause", self._toggle_pause, icon="PLAYER_PAUSE", color="gray")
-        self._resume = self._button(
-            _NO_RESUME, simulation.resume, hint="Leave a hold that waits for you.", disabled=True
-        )
+        hint = "Leave a hold that waits for you."
+        self._resume = self._button(_NO_RESUME, simulation.resume, hint=hint, disabled=True)
         self._button("Reset", simulation.reset, color="gray", hint="Restart at time 0 with the current settings.")
         record = partial(toggle_recording, simulation)
         self._record = self._button("Record", record, settle=_RECORD_SETTLE_S, color="gray")
+        self.refresh()
 
-    def fold_rest(self) -> None:
-        """Add all other controls, each group folded."""
-        gui = self._gui
-        folders: tuple[tuple[str, Callable[[], None]], ...] = (
-            ("Push", self._push_folder), ("Hand", self._hand_folder), ("Clock", self._clock_folder),
-            ("Controller", self._controller_folder), ("World", self._world_folder),
-            ("View", self._view_folder),
-        )  # fmt: skip
-        for name, add in folders:
-            with gui.add_folder(name, expand_by_default=False):
+    def fold_rest(self, show: Callable[[str, bool], None]) -> None:
+        """Add all other controls, each group folded; `show` shows or hides a part of the scene."""
+        folders: dict[str, Callable[[], None]] = {
+            "Push": self._push_folder,
+            "Hand": self._hand_folder,
+            "Clock": self._clock_folder,
+            "Controller": self._controller_folder,
+            "World": self._world_folder,
+            "View": lambda: add_view_boxes(self._gui, self._actions, show),
+        }
+        for name, add in folders.items():
+            with self._gui.add_folder(name, expand_by_default=False):
                 add()
         self.refresh()
 
@@ -116,20 +107,14 @@ class Controls:
             when_changed(slider, self._actions, partial(self._move_hand, axis), f"hand {axis}", quiet=True)
 
     def _clock_folder(self) -> None:
-        running = self.running
         clock = self._gui.add_slider("Clock speed", *_CLOCK, 0.1, 1.0, hint="Simulated over real time.")
-        self._number(clock, self._set_clock, "clock speed", lambda: running.speed)
+        self._setting(clock, self._set_clock, "clock speed", lambda: self.running.speed, SETTLE_S)
         self._button("Single step", self._single_step, color="gray", hint="One control cycle; pauses.")
 
-    def _view_folder(self) -> None:
-        add_view_boxes(self._gui, self._actions, lambda name, visible: self.on_view(name, visible))
-        self._gui.add_html(legend())
-
     def _controller_folder(self) -> None:
-        gui = self._gui
-        hint = field_docs(TaskParams)["speed_m_s"]
+        gui, hint = self._gui, field_docs(TaskParams)["speed_m_s"]
         speed = gui.add_slider("Path speed [m/s]", 0.05, 0.5, 0.05, 0.3, hint=hint)
-        self._number(speed, self._choose_speed, "path speed", lambda: self._profile.task.speed_m_s)
+        self._setting(speed, self._choose_speed, "path speed", lambda: self._profile.task.speed_m_s, SETTLE_S)
         form = gui.add_form(None)
         with form:
             self._text = gui.add_text("Profile text", "", hint=_TEXT_HINT)
@@ -138,38 +123,37 @@ class Controls:
     def _world_folder(self) -> None:
         gui, simulation = self._gui, self._simulation
         path = gui.add_dropdown("Path", get_args(PathName))
-        self._choice(path, simulation.set_path, "path", lambda: simulation.settings.path)
+        self._setting(path, simulation.set_path, "path", lambda: simulation.settings.path)
         thing = gui.add_dropdown("Object", get_args(ObjectName), hint="Restarts at time 0.")
-        self._choice(thing, self._choose_object, "object", lambda: simulation.settings.object)
+        self._setting(thing, lambda name: simulation.reset(object=name), "object", lambda: simulation.settings.object)
         hint = "Of hand and object; changes as soon as nothing touches."
-        stiffness = gui.add_slider("Stiffness [kN/m]", 3.0, 150.0, 1.0, 75.0, hint=hint)
-        self._number(stiffness, self._set_stiffness, "stiffness", lambda: simulation.settings.stiffness / 1000.0)
+        slider = gui.add_slider("Stiffness [kN/m]", 3.0, 150.0, 1.0, 75.0, hint=hint)
+        self._setting(slider, self._set_stiffness, "stiffness", lambda: simulation.settings.stiffness / 1e3, SETTLE_S)
         if not simulation.real:
             with gui.add_folder("Sensor units"):
                 self._fault_controls()
 
     def _fault_controls(self) -> None:
-        gui, simulation = self._gui, self._simulation
-        self._units = {
-            unit.id: gui.add_checkbox(unit.id, True, hint="Off: the unit is silent.")
-            for unit in simulation.skin.mounted
-        }
+        gui, units = self._gui, [unit.id for unit in self._simulation.skin.mounted]
+        self._units = {unit: gui.add_checkbox(unit, True, hint="Off: the unit is silent.") for unit in units}
         for unit, box in self._units.items():
-            self._choice(box, self._set_faults, "faults", partial(self._is_enabled, unit))
+            self._setting(box, self._set_faults, "faults", partial(self._hears, unit))
         self._noise = gui.add_slider("Noise factor", 0.0, 20.0, 0.5, 1.0)
-        self._number(self._noise, self._set_faults, "faults", lambda: simulation.settings.faults.noise_factor)
+        self._setting(self._noise, self._set_faults, "faults", lambda: self._faults.noise_factor, SETTLE_S)
         self._latency = gui.add_slider("More latency [s]", 0.0, 0.5, 0.01, 0.0)
-        self._number(self._latency, self._set_faults, "faults", lambda: simulation.settings.faults.latency_s)
+        self._setting(self._latency, self._set_faults, "faults", lambda: self._faults.latency_s, SETTLE_S)
 
-    def _choice(self, handle: Any, act: Callable[[Any], object], kind: str, current: Callable[[], object]) -> None:
-        """Have a control act at once; `current` says what it is to show."""
-        when_changed(handle, self._actions, act, kind)
-        self._shown.append((handle, kind, current))
-
-    def _number(self, handle: Any, act: Callable[[Any], object], kind: str, current: Callable[[], object]) -> None:
-        """Have a control act when nobody types in it any more; `current` says what it is to show."""
-        when_changed(handle, self._actions, act, kind, SETTLE_S)
-        self._shown.append((handle, kind, current))
+    def _setting(
+        self,
+        handle: Any,
+        act: Callable[[Any], object],
+        kind: str,
+        current: Callable[[], object],
+        settle: float = 0.0,
+    ) -> None:
+        """Have a control act, where it settles when nobody types in it any more; `current` is what it is to show."""
+        when_changed(handle, self._actions, act, kind, settle)
+        self._settings.append((handle, kind, current))
 
     def _button(self, label: str, act: Callable[[], object], **more: Any) -> Any:
         return add_button(self._gui, self._actions, label, act, **more)
@@ -180,15 +164,9 @@ class Controls:
     def _profile(self) -> Profile:
         return self._simulation.settings.profile
 
-    def _show_text(self) -> None:
-        """Show another profile in the field; else it keeps what somebody types, to be put right.
-
-        What is typed is never written back: letters that come meanwhile would be lost.
-        """
-        changed = self._profile.name != self._written
-        if self._text is not None and changed and not self._actions.is_waiting("profile text"):
-            self._written = self._profile.name
-            put(self._text, self._written)
+    @property
+    def _faults(self) -> Faults:
+        return self._simulation.settings.faults
 
     @property
     def _base(self) -> str:
@@ -196,12 +174,9 @@ class Controls:
         name = self._profile.name.partition(":")[0]
         return name if name in _NAMES else _NAMES[0]
 
-    async def _submit(self, event: Any) -> None:
-        text = self._text.value
-        if self._actions.admits(event.client_id):
-            self._actions.put(lambda: self._simulation.set_profile(profile(text.strip())), "profile text")
-        else:
-            put(self._text, self._written)
+    async def _submit(self, _: Any) -> None:
+        text = self._text.value.strip()
+        self._actions.put(lambda: self._simulation.set_profile(profile(text)), "profile text")
 
     def _choose_profile(self, base: str) -> None:
         self._set_speed(profile(base), base, self._profile.task.speed_m_s)
@@ -213,14 +188,11 @@ class Controls:
         variant = replace(variant, task=replace(variant.task, speed_m_s=speed))
         self._simulation.set_profile(with_name(variant, base))
 
-    def _choose_object(self, name: ObjectName) -> None:
-        self._simulation.reset(object=name)
-
     def _set_stiffness(self, stiffness: float) -> None:
-        self._simulation.set_stiffness(1000.0 * stiffness)
+        self._simulation.set_stiffness(1e3 * stiffness)
 
-    def _is_enabled(self, unit: str) -> bool:
-        return unit not in self._simulation.settings.faults.silenced
+    def _hears(self, unit: str) -> bool:
+        return unit not in self._faults.silenced
 
     def _push(self) -> None:
         """Push the hand as the folder says; the notice tells what became of it."""
@@ -247,14 +219,21 @@ class Controls:
 
     def _set_faults(self, _: object) -> None:
         silenced = frozenset(unit for unit, box in self._units.items() if not box.value)
-        self._simulation.set_faults(silenced, float(self._noise.value), float(self._latency.value))
+        self._simulation.set_faults(Faults(silenced, float(self._noise.value), float(self._latency.value)))
 
     def refresh(self) -> None:
-        """Have all controls show what holds, but for those that somebody types in: what was refused goes back."""
-        for handle, kind, current in self._shown:
+        """Have all controls show what holds, but for those that somebody types in: what was refused goes back.
+
+        The text of a profile stays, to be put right: only another profile is written over it, for letters that come
+        meanwhile would be lost.
+        """
+        for handle, kind, current in self._settings:
             if not self._actions.is_waiting(kind):
                 put(handle, current())
-        self._show_text()
+        changed = self._profile.name != self._written
+        if self._text is not None and changed and not self._actions.is_waiting("profile text"):
+            self._written = self._profile.name
+            put(self._text, self._written)
         self._pause.label = "Go on" if self.running.paused else "Pause"
         self._record.label = "Stop recording" if self._simulation.recording else "Record"
 
@@ -267,14 +246,6 @@ class Controls:
         """Have the sliders show where the hand is to be (3,) [m]."""
         for slider, value in zip(self._hand, target.tolist(), strict=True):
             put(slider, round(value, 2))
-
-
-def _fresh_place(folder: Path) -> Path:
-    """A file in the folder that is not there yet."""
-    number = 1
-    while (place := folder / f"live-{number}.mcap").exists():
-        number += 1
-    return place
 
 
 def toggle_recording(simulation: LiveSimulation) -> None:
@@ -290,6 +261,7 @@ def toggle_recording(simulation: LiveSimulation) -> None:
         RECORDINGS.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise RecordingError(f"The folder {RECORDINGS} cannot be created: {error.strerror}.") from error
-    place = _fresh_place(RECORDINGS)
+    numbered = (RECORDINGS / f"live-{number}.mcap" for number in count(1))
+    place = next(place for place in numbered if not place.exists())
     simulation.start_recording(place)
     simulation.notice = f"Recording to {place}."

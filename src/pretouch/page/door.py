@@ -7,15 +7,13 @@ import ipaddress
 import secrets
 import socket
 import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from functools import partial
 from http import HTTPStatus
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
 from viser import ViserServer
-from viser._messages import ShareUrlDisconnect, ShareUrlRequest
 from websockets.asyncio import server as websockets_server
 from websockets.asyncio.server import ServerConnection
 from websockets.http11 import Request, Response
@@ -29,41 +27,36 @@ _ADDRESS = "Open the page at the address that the program printed: each start ha
 _STARTING = threading.Lock()
 
 
-class Door:
-    """Stands between a server of pages and everybody."""
+class GuardedServer(ViserServer):
+    """A server of pages that answers whoever has the address, and is shared with nobody."""
 
-    def __init__(self, options: "ServeOptions") -> None:
-        self._token = options.token.encode()
-        here = socket.gethostname().lower()
-        self._names = {options.host.lower(), "localhost", here, f"{here}.local"}
-        self._built = False
+    def __init__(self, options: "ServeOptions", title: str) -> None:
+        """Begin to serve an empty page.
 
-    @contextmanager
-    def built(self) -> Iterator[None]:
-        """Have the server that is begun in the context ask this door.
-
-        viser begins it with a `process_request` of its own, keeps no reference to it, and takes no other: so the
-        function that it calls is replaced meanwhile.
+        viser begins its websockets with a `process_request` of its own, keeps no reference to it, and takes no other:
+        so the function that it calls is replaced meanwhile.
         """
-        serve = websockets_server.serve
+        self._token, here = options.token.encode(), socket.gethostname().lower()
+        self._names = {options.host.lower(), "localhost", here, f"{here}.local"}
+        serve, begun = websockets_server.serve, threading.Event()
 
         def guarded(*place: Any, process_request: Any, **more: Any) -> Any:
-            self._built = True
+            begun.set()
             return serve(*place, process_request=partial(self._answer, process_request), **more)
 
         with _STARTING:
             setattr(websockets_server, "serve", guarded)  # noqa: B010  # to mypy a class cannot be replaced
             try:
-                yield
+                super().__init__(options.host, options.port, label=title, verbose=False)
             finally:
                 setattr(websockets_server, "serve", serve)  # noqa: B010
-
-    def check(self, server: ViserServer) -> None:
-        """Have a server share its page no longer; one that was begun without this door is a ViewerError."""
-        if not self._built:
+        if not begun.is_set():
+            self.stop()
             raise ViewerError("This version of viser begins its server in another way: install viser 1.1.1.")
-        for kind in (ShareUrlRequest, ShareUrlDisconnect):
-            server._websock_server.unregister_handler(kind)
+
+    def request_share_url(self, verbose: bool = True) -> str | None:
+        """Open no tunnel to the outside, whoever asks."""
+        return None
 
     def _answer(
         self, answer: Callable[..., Response | None], connection: ServerConnection, request: Request

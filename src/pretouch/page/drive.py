@@ -1,20 +1,17 @@
 """Driving the arm from a page, by a target of its hand."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
+from viser import ViserServer
 
 from pretouch import desired
 from pretouch.desired import Desired
-from pretouch.page.action_queue import ActionQueue
 from pretouch.page.arm import quaternions
-from pretouch.page.commander import Commander
+from pretouch.page.panel import ActionQueue
 from pretouch.page.simulation import LiveSimulation, nobody
 from pretouch.types import ControlStep, FloatArray
-
-if TYPE_CHECKING:
-    from viser import ViserServer
 
 TASKS = ("follow the path", "drive yourself")
 REACH_M = 1.2
@@ -31,8 +28,8 @@ class Steering:
     """A commander that asks for a pose; for no motion before the first. No page, no thread, no clock."""
 
     def __init__(self) -> None:
-        self.held = False
-        """Whether who steers is there and commands: else what is asked ages, and the arm comes to rest."""
+        self.attended = False
+        """Whether who steers is there: else what is asked ages, and the arm comes to rest."""
         self.goal: FloatArray | None = None
         """(4, 4) T_O_ee to go to; None: no motion is asked for."""
         self._stamp = 0.0
@@ -44,7 +41,7 @@ class Steering:
 
     def __call__(self, now: float) -> Desired:
         """Return what is asked at an instant [s]."""
-        self._stamp = now if self.held else min(self._stamp, now)
+        self._stamp = now if self.attended else min(self._stamp, now)
         if self.goal is not None:
             return desired.pose(self._stamp, self.goal)
         return desired.twist(self._stamp, np.zeros(3))
@@ -53,15 +50,11 @@ class Steering:
 class Drive:
     """The control of who has the arm move, and the target. The visitor who drove last is the one who asks."""
 
-    def __init__(
-        self, server: "ViserServer", commander: Commander, simulation: LiveSimulation, actions: ActionQueue
-    ) -> None:
-        self._commander, self._simulation, self._actions = commander, simulation, actions
-        self.steering = Steering()
-        self._driver = -1
+    def __init__(self, server: ViserServer, simulation: LiveSimulation, actions: ActionQueue) -> None:
+        self._server, self._simulation, self._actions = server, simulation, actions
+        self.steering, self._driver = Steering(), -1
         task = server.gui.add_dropdown("Task", TASKS, hint="Driven, the arm does what you ask, as far as it may.")
         task.on_update(self._choose_task)
-        self._task = TASKS[0]
         self._how = server.gui.add_html(_HOW, visible=False)
         limits = (-REACH_M, REACH_M)
         self._target = server.scene.add_transform_controls(
@@ -75,43 +68,28 @@ class Drive:
         return self._simulation.commander is self.steering
 
     async def _choose_task(self, event: Any) -> None:
-        if event.client_id is None:
-            return
-        if not self._commander.admits(event.client_id):
-            event.target.value = self._task
-            return
-        self._task = task = event.target.value
-        self._actions.put(lambda: self._begin(event.client_id, task), "task")
+        visitor, task = event.client_id, event.target.value
+        if visitor is not None:
+            self._actions.put(lambda: self._begin(visitor, task), "task")
 
     def _begin(self, visitor: int, task: str) -> None:
-        self._driver = visitor
-        self.steering.goal = None
+        self._driver, self.steering.goal = visitor, None
         self._simulation.commander = self.steering if task == TASKS[1] else nobody
         self._target.visible = self._how.visible = self.on
 
     async def _drag(self, event: Any) -> None:
-        if event.phase != "update" or event.client_id is None:
-            return
-        if not self._commander.admits(event.client_id):
-            self._actions.put(self._show_goal, "goal", quiet=True)
-            return
-        position, wxyz = np.array(event.target.position), np.array(event.target.wxyz)
-        self._actions.put(lambda: self._aim(event.client_id, position, wxyz), "drive", quiet=True)
+        visitor, position, wxyz = event.client_id, np.array(event.target.position), np.array(event.target.wxyz)
+        if event.phase == "update" and visitor is not None:
+            self._actions.put(lambda: self._aim(visitor, position, wxyz), "drive", quiet=True)
 
     def _aim(self, visitor: int, position: FloatArray, wxyz: FloatArray) -> None:
         if np.linalg.norm(wxyz) > 0.5:  # else it is no orientation
             self._driver = visitor
             self.steering.target(position, Rotation.from_quat(wxyz, scalar_first=True).as_matrix())
 
-    def _show_goal(self) -> None:
-        """Have the target stand where it is asked for again."""
-        goal = self.steering.goal
-        if goal is not None:
-            self._target.position, self._target.wxyz = goal[:3, 3], quaternions(goal[:3, :3])
-
     def turn(self) -> None:
-        """Look, before time passes, whether who drove last is still there and commands."""
-        self.steering.held = self._commander.holds(self._driver)
+        """Look, before time passes, whether who drove last is still there."""
+        self.steering.attended = self._driver in self._server.get_clients()
 
     def draw(self, step: ControlStep) -> None:
         """Have a target that nobody has dragged wait at the hand."""

@@ -1,14 +1,18 @@
-"""What a page shows: the world that stands still, and one instant in it."""
+"""What a page shows: the world that stands still, one instant in it, and what was asked of the arm then."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pretouch.control.commander import asked_by
 from pretouch.control.path import Path
+from pretouch.desired import Desired, DesiredKind
 from pretouch.profiles import Profile
 from pretouch.recording.simulation import KnownBox
+from pretouch.robot.kinematics import Kinematics
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
+from pretouch.sound import sound_desired
 from pretouch.types import BoolArray, ControlStep, FloatArray, Inputs
 
 
@@ -55,3 +59,45 @@ class Frame:
         if self.age is None:
             return np.zeros(len(self.step.range_distance), dtype=np.bool_)
         return self.age > limit
+
+
+@dataclass(frozen=True, slots=True)
+class DrivenMotion:
+    """What a commander asked for and what was commanded in one step. Base frame."""
+
+    velocity: FloatArray
+    """(3,) of the end-effector origin that was asked for, before anything limits it [m/s]."""
+    allowed: FloatArray
+    """(3,) that was commanded [m/s]."""
+    goal: FloatArray | None
+    """(4, 4) T_O_ee that was asked for; None: a velocity was."""
+
+
+def driven_motion(frame: Frame, world: World, kin: Kinematics) -> DrivenMotion | None:
+    """Return what a commander asked in a step; None where nobody did, or nothing that can be used.
+
+    `kin` is of the measured joint positions of the step.
+    """
+    step, model = frame.step, world.model
+    if frame.inputs is None or frame.inputs.desired is None:
+        return None
+    desired, _ = sound_desired(frame.inputs.desired, model.n, step.stamp)
+    if desired is None:
+        return None
+    robot = replace(frame.inputs.robot, q_commanded=step.q_commanded)
+    request = asked_by(desired, step.stamp, kin, robot, model, kin.rotation[model.ee], world.profile.task, 1.0)
+    allowed = model.ee_jacobian(kin)[:3] @ step.command
+    return DrivenMotion(request.velocity, allowed, _goal(desired, model))
+
+
+def _goal(desired: Desired, model: RobotModel) -> FloatArray | None:
+    """Pose (4, 4) that a motion ends at; None of velocities."""
+    last, T = desired.number[-1], np.eye(4)
+    if desired.kind is DesiredKind.POSE:
+        T[:3, 3], T[:3, :3] = last[:3], last[3:].reshape(3, 3)
+    elif desired.kind is DesiredKind.JOINT_POSITIONS:
+        kin = model.kinematics(last)
+        T[:3, 3], T[:3, :3] = kin.position[model.ee], kin.rotation[model.ee]
+    else:
+        return None
+    return T

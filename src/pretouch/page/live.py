@@ -1,31 +1,22 @@
 """The live page: a simulated arm in a browser, and a hand to touch it with."""
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
+from viser import ViserServer
 
 from pretouch.errors import PretouchError
-from pretouch.explanation import finds, resumable
+from pretouch.explanation import explain, finds, resumable
 from pretouch.loop import MonotonicClock
-from pretouch.page.action_queue import Action, ActionQueue
-from pretouch.page.asked import told
-from pretouch.page.commander import Commander
 from pretouch.page.companions import Companions
 from pretouch.page.controls import Controls
 from pretouch.page.drive import Drive
-from pretouch.page.gui import PERIOD_S, style_page, when_changed
-from pretouch.page.pacing import Pace
+from pretouch.page.panel import PERIOD_S, ActionQueue, Pace, Status, style_page, when_changed
 from pretouch.page.plots import History, Plots
 from pretouch.page.scene import Scene
 from pretouch.page.server import ServeOptions, announce, failure, served
 from pretouch.page.simulation import LiveSimulation
-from pretouch.page.status import Status
 from pretouch.types import ControlStep, FloatArray
-
-if TYPE_CHECKING:
-    from viser import ViserServer
-
 
 _ARMS = ("one arm", "three arms")
 
@@ -37,12 +28,13 @@ class LivePage:
     """
 
     def __init__(
-        self, server: "ViserServer", simulation: LiveSimulation, say: Callable[[str], None] = lambda line: None
+        self, server: ViserServer, simulation: LiveSimulation, say: Callable[[str], None] = lambda line: None
     ) -> None:
         self._server, self._simulation, self._say = server, simulation, say
         self._world, self._time = simulation.world, simulation.time
-        self.pace = Pace()
+        self.pace, self.actions = Pace(), ActionQueue()
         self._pointed: FloatArray | None = None
+        """Where the sliders say that the hand is to be."""
         self._visited = False
         """Whether anybody has opened the page: an opening waits until then."""
         self._companions: Companions | None = None
@@ -50,39 +42,27 @@ class LivePage:
         self._receiver_ended = False
         """Whether the receiver of the real units has ended."""
         style_page(server)
-        commander = Commander(server)
-        self._actions = ActionQueue(commander.admits)
         self._status = Status(server.gui)
         if not simulation.real:
             arms = server.gui.add_dropdown("Arms", _ARMS, hint="Three: blind, paper and pretouch with one hand.")
-            when_changed(arms, self._actions, self._show_arms, "arms")
-        self.controls = Controls(server.gui, simulation, self._actions)
-        self.drive = Drive(server, commander, simulation, self._actions)
+            when_changed(arms, self.actions, self._show_arms, "arms")
+        self.controls = Controls(server.gui, simulation, self.actions)
+        self.drive = Drive(server, simulation, self.actions)
         self._scene = Scene(server, simulation.world)
-        self._status.notice = f"{self._scene.said} {simulation.notice}".strip()
+        self._status.notice = f"{self._scene.notice} {simulation.notice}".strip()
         simulation.notice = ""
-        self.controls.on_view = self._scene.show
         self._scene.on_hand(self._drag)
         self._history = History(simulation.skin.first)
         self._plots = Plots(server.gui, self._history, [unit.id for unit in simulation.skin.mounted])
-        self.controls.fold_rest()
+        self.controls.fold_rest(self._scene.show)
 
     @property
     def notice(self) -> str:
         """The notice shown to people, or ''."""
         return self._status.notice
 
-    def ask(self, action: Action, kind: str = "", settle: float = 0.0, quiet: bool = False) -> None:
-        """Have something done between two ticks, from any thread, as `ActionQueue.put` does."""
-        self._actions.put(action, kind, settle, quiet)
-
-    def _drag(self, visitor: int, eye: FloatArray, place: FloatArray) -> None:
-        if self._actions.admits(visitor):
-            self.ask(lambda: self._move_hand(eye, place), "hand", quiet=True)
-
-    def _move_hand(self, eye: FloatArray, place: FloatArray) -> None:
-        self._simulation.point_hand(eye, place)
-        self.controls.show_hand(self._simulation.hand_target)  # also while the arm is paused
+    def _drag(self, eye: FloatArray, place: FloatArray) -> None:
+        self.actions.put(lambda: self._simulation.point_hand(eye, place), "hand", quiet=True)
 
     def _show_arms(self, arms: str) -> None:
         """Begin again with two more arms, or go on with one."""
@@ -102,30 +82,29 @@ class LivePage:
 
     def turn(self, now: float) -> None:
         """Run queued actions, let time pass, and draw; `now` is the time of the machine [s]."""
+        simulation, running = self._simulation, self.controls.running
         self._run_actions(now)
         self._visited = self._visited or bool(self._server.get_clients())
-        if self._simulation.opening and not self._visited:
+        if simulation.opening and not self._visited:
             return
-        running, recording = self.controls.running, self._simulation.recording
-        before = self._simulation.time
+        recording, before = simulation.recording, simulation.time
         self.drive.turn()
         steps = self._pass_time()
-        late = self._simulation.frame.late(self._simulation.world.profile.sight.slow_after_s)
+        late = simulation.frame.late(simulation.world.profile.sight.slow_after_s)
         for step in steps:
             self._history.add(step, late=late)
             self._scene.trail.add(step)
         if self._companions:
             self._companions.follow(len(steps))
-        self.pace.tick(now, max(0.0, self._simulation.time - before), 0.0 if running.paused else running.speed)
+        self.pace.tick(now, max(0.0, simulation.time - before), 0.0 if running.paused else running.speed)
         if recording and recording.trouble:
             self._say(recording.trouble)
-        real = self._simulation.real
-        if real and not self._receiver_ended and not real.source.alive:
+        if simulation.real and not self._receiver_ended and not simulation.real.source.alive:
             self._receiver_ended = True
-            self._simulation.notice = "The receiver of the sensor units has ended: start the page again."
-            self._say(self._simulation.notice)
-        if self._simulation.notice:
-            self._status.notice, self._simulation.notice = self._simulation.notice, ""
+            simulation.notice = "The receiver of the sensor units has ended: start the page again."
+            self._say(simulation.notice)
+        if simulation.notice:
+            self._status.notice, simulation.notice = simulation.notice, ""
             self.controls.refresh()
         if self._server.get_clients():
             self._draw(now)
@@ -139,58 +118,53 @@ class LivePage:
         return [] if running.paused else simulation.advance(running.speed * PERIOD_S)
 
     def _run_actions(self, now: float) -> None:
-        actions = self._actions.take(now)
+        simulation, actions = self._simulation, self.actions.take(now)
         if actions:
-            self._simulation.opening = None  # from the first drag or click on, the page is the visitor's
+            simulation.opening = None  # from the first drag or click on, the page is the visitor's
         for action in actions:
             if not action.quiet:
                 self._status.notice = ""
             try:
-                action()
+                action.run()
             except PretouchError as error:
                 self._status.notice = f"Not done: {error}"
         if actions:
             self.controls.refresh()
-        if self._simulation.time < self._time:
+        if simulation.time < self._time:
             if self._companions:
                 self._companions.begin()
             self._scene.trail.clear()
             self._history.clear()
             self.drive.steering.goal = None
-        self._time = self._simulation.time
-        if self._simulation.world is not self._world:
-            self._world = self._simulation.world
+        self._time = simulation.time
+        if simulation.world is not self._world:
+            self._world = simulation.world
             self._scene.show_world(self._world)
 
     def _draw(self, now: float) -> None:
-        frame, pace = self._simulation.frame, self.pace
+        frame, pace, recording = self._simulation.frame, self.pace, self._simulation.recording
+        step, world = frame.step, self._world
         with self._server.atomic():
-            asked = self._scene.draw(frame, now)
-            self._follow_target(frame.hand_target)
-            self.drive.draw(frame.step)
+            motion = self._scene.draw(frame, now)
+            self._follow_target(self._simulation.hand_target)
+            self.drive.draw(step)
             if self._companions:
                 self._companions.draw(now)
             self._plots.draw(now)
-            recording = self._simulation.recording
+            velocities = (motion.velocity, motion.allowed) if motion else None
+            explanation = explain(step, world.units_in_use, world.model.links, velocities)
+            rates = f"{pace.factor:.2f} × real time · {pace.updates:.0f} updates/s"
+            rates = "paused" if self.controls.running.paused else rates
             recorded = f"recording {recording.place.name}" if recording else ""
-            rates = (
-                "paused" if self.controls.running.paused
-                else f"{pace.factor:.2f} × real time · {pace.updates:.0f} updates/s"
-            )  # fmt: skip
-            step, world = frame.step, self._simulation.world
-            self._status.draw(
-                step.mode, told(asked, step, world.units_in_use, world.model.links),
-                " · ".join(filter(None, (f"{step.stamp:.1f} s", rates, finds(step), recorded))),
-                pace.sentence(), now,
-            )  # fmt: skip
+            line = " · ".join(filter(None, (f"{step.stamp:.1f} s", rates, finds(step), recorded)))
+            self._status.draw(step.mode, explanation, line, pace.sentence(), now)
             self.controls.offer_resume(resumable(step))
 
-    def _follow_target(self, target: FloatArray | None) -> None:
+    def _follow_target(self, target: FloatArray) -> None:
         """Have the sliders show where the hand is to be, wherever that came from."""
-        if target is None or (self._pointed is not None and np.array_equal(target, self._pointed)):
-            return
-        self.controls.show_hand(target)
-        self._pointed = target.copy()
+        if self._pointed is None or not np.array_equal(target, self._pointed):
+            self.controls.show_hand(target)
+            self._pointed = target.copy()
 
 
 def serve_live(

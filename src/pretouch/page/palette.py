@@ -1,9 +1,9 @@
-"""The colours of the page, as (red, green, blue) from 0 to 255."""
+"""The colours of the page, as (red, green, blue) from 0 to 255, and what they mean."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pretouch.types import FloatArray, Mode
+from pretouch.types import FloatArray
 
 Colour = tuple[int, int, int]
 
@@ -32,17 +32,28 @@ PLACE: Colour = (190, 24, 120)
 HAND: Colour = (232, 178, 146)
 CUFF: Colour = (58, 92, 148)
 BOARD: Colour = (201, 176, 140)
-
-MODES: dict[Mode, Colour] = {Mode.TRACK: RECOVERING, Mode.REACT: REACTING, Mode.HOLD: HOLDING}
+BROWN: Colour = (140, 100, 75)
+PINK: Colour = (214, 110, 176)
+TEAL: Colour = (90, 160, 170)
+OLIVE: Colour = (170, 150, 40)
 
 EXPECTED: tuple[Colour, ...] = (ARM, (250, 208, 138), (242, 130, 58), (204, 28, 36))
 """The arm where contact is not expected, less, more, and most."""
-
-UNITS: tuple[Colour, ...] = (
-    (49, 104, 196), (232, 119, 34), (38, 166, 91), (214, 40, 57), (138, 79, 190), (140, 100, 75), (214, 110, 176),
-    (90, 160, 170), (170, 150, 40), (110, 121, 136),
-)  # fmt: skip
+UNITS = (PATH, FORCE, SENSED, LIMITING, REACTING, BROWN, PINK, TEAL, OLIVE, FOLLOWING)
 """A colour for each unit, over again from the eleventh on."""
+
+_LINES = {
+    "path": PATH,
+    "followed": FOLLOWING,
+    "avoiding": LIMITING,
+    "recovering": RECOVERING,
+    "reacting": REACTING,
+    "holding": HOLDING,
+    "force estimate": FORCE,
+    "true force": TRUE_FORCE,
+    "asked": ASKED,
+    "allowed": RECOVERING,
+}
 
 
 def expected(expectation: FloatArray) -> FloatArray:
@@ -52,16 +63,32 @@ def expected(expectation: FloatArray) -> FloatArray:
     return np.stack([np.interp(at, steps, [colour[i] for colour in EXPECTED]) for i in range(3)], axis=1)
 
 
-def linear(screen: FloatArray) -> FloatArray:
-    """Turn sRGB (...), from 0 to 1, into linear light."""
-    return np.where(screen <= 0.04045, screen / 12.92, ((screen + 0.055) / 1.055) ** 2.4)
-
-
 def as_vertex(colours: ArrayLike) -> NDArray[np.uint8]:
-    """Colours (..., 3) for vertices and instances, which the page takes for linear light; all others it converts."""
-    return np.rint(255 * linear(np.asarray(colours, dtype=np.float64) / 255)).astype(np.uint8)
+    """Turn sRGB (..., 3) into linear light, as the page takes colours of vertices and instances, and no others."""
+    screen = np.asarray(colours, dtype=np.float64) / 255
+    linear = np.where(screen <= 0.04045, screen / 12.92, ((screen + 0.055) / 1.055) ** 2.4)
+    return np.rint(255 * linear).astype(np.uint8)
 
 
 def css(colour: Colour) -> str:
     """Write a colour for a style sheet."""
     return "#{:02x}{:02x}{:02x}".format(*colour)
+
+
+def legend() -> str:
+    """What the colours in space mean, as HTML."""
+    marks = "".join(_mark(name, css(colour), 14, 4, 2) for name, colour in _LINES.items())
+    marks += _mark("sensed", css(SENSED), 9, 9, 5) + _mark("closest pair", css(PAIR), 14, 2, 0)
+    marks += _mark("silent unit", css(UNIT_SILENT), 8, 8, 1)
+    ramp = ",".join(css(colour) for colour in EXPECTED)
+    marks += _mark("contact expected", f"linear-gradient(90deg,{ramp})", 46, 8, 4)
+    return f"<div style='padding:4px 12px 10px;font-size:11px;display:flex;flex-wrap:wrap;gap:3px 12px'>{marks}</div>"
+
+
+def _mark(name: str, background: str, width: int, height: int, radius: int) -> str:
+    """A colour in a shape [px], and its name."""
+    shape = f"width:{width}px;height:{height}px;border-radius:{radius}px;background:{background}"
+    return (
+        f"<span style='white-space:nowrap'><span style='display:inline-block;vertical-align:middle;{shape};"
+        f"margin:0 5px 2px 0'></span>{name}</span>"
+    )

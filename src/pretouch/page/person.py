@@ -6,21 +6,20 @@ see. The cuff is drawn only: it is short, and always on the side away from the a
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import trimesh
+from viser import SceneApi
 
 from pretouch.page import palette
-from pretouch.page.expectation import surface_of
+from pretouch.page.arm import SHADELESS
+from pretouch.page.surfaces import surface_of
 from pretouch.robot.body import Capsules
 from pretouch.types import FloatArray
 
-if TYPE_CHECKING:
-    from viser import SceneApi, ViserServer
-
-Drag = Callable[[int, FloatArray, FloatArray], None]
-"""Is told from where a person looks, and to what place in view the hand is dragged, both (3,) [m]."""
+Drag = Callable[[FloatArray, FloatArray], None]
+"""Receives from where a person looks, and to what place in view the hand is dragged, both (3,) [m]."""
 
 BALL_M = 0.05
 """Radius of the ball that the fist is made for [m]."""
@@ -65,18 +64,16 @@ def _capsules(segments: list[tuple[tuple[float, float, float], tuple[float, floa
 class PersonHand:
     """A fist where the simulated hand is, and a faint one where it is to be while that is elsewhere."""
 
-    def __init__(self, server: "ViserServer", radius: float, root: str = "") -> None:
-        self._hand = server.scene.add_frame(f"{root}/hand", show_axes=False)
-        self._target = server.scene.add_frame(f"{root}/hand_target", show_axes=False, visible=False)
-        _add_meshes(server.scene, f"{root}/hand", radius)
-        _add_meshes(server.scene, f"{root}/hand_target", radius, 0.3)
+    def __init__(self, scene: SceneApi, radius: float, root: str = "") -> None:
+        self._hand = scene.add_frame(f"{root}/hand", show_axes=False)
+        self._target = scene.add_frame(f"{root}/hand_target", show_axes=False, visible=False)
+        for part, mesh, colour in (("fist", fist(radius), palette.HAND), ("cuff", cuff(radius), palette.CUFF)):
+            for name, opacity in ((f"{root}/hand/{part}", None), (f"{root}/hand_target/{part}", 0.3)):
+                scene.add_mesh_simple(name, mesh.vertices, mesh.faces, color=colour, opacity=opacity, **SHADELESS)
         # barely there, and as lines, so that it hides nothing behind it
-        self._grip = server.scene.add_icosphere(
-            f"{root}/hand/grip", GRIP * radius, color=palette.HAND, opacity=0.01, wireframe=True, subdivisions=2,
-            cast_shadow=False, receive_shadow=False,
-        )  # fmt: skip
-        self._held = np.zeros(3)
-        self._position = np.zeros(3)
+        look: dict[str, Any] = {"color": palette.HAND, "opacity": 0.01, "wireframe": True, "subdivisions": 2}
+        self._grip = scene.add_icosphere(f"{root}/hand/grip", GRIP * radius, **look, **SHADELESS)
+        self._position = self._offset = np.zeros(3)
 
     def on_drag(self, act: Drag) -> None:
         """Have a function told of each drag, from the page's own thread. A drag of the hand never moves the camera."""
@@ -84,30 +81,18 @@ class PersonHand:
         @self._grip.on_drag
         async def _(event: Any) -> None:
             if event.phase == "start":
-                self._held = self._position - np.array(event.start_position)
-            act(event.client_id, np.array(event.client.camera.position), np.array(event.end_position) + self._held)
+                self._offset = self._position - np.array(event.start_position)
+            act(np.array(event.client.camera.position), np.array(event.end_position) + self._offset)
 
     def draw(self, hand: FloatArray | None, target: FloatArray | None) -> None:
         """Show hand and target (3,) [m]; None and what is not finite are not shown."""
-        there = hand is not None and bool(np.all(np.isfinite(hand)))
-        self._hand.visible = there
-        if hand is None or not there:
-            self._target.visible = False
-            return
-        self._position = hand
-        self._hand.position, self._hand.wxyz = hand, _turn(hand)
-        apart = target is not None and float(np.linalg.norm(target - hand)) > _APART_M
-        self._target.visible = apart
-        if target is not None and apart:
-            self._target.position, self._target.wxyz = target, _turn(target)
-
-
-def _add_meshes(scene: "SceneApi", name: str, radius: float, opacity: float | None = None) -> None:
-    for part, mesh, colour in (("fist", fist(radius), palette.HAND), ("cuff", cuff(radius), palette.CUFF)):
-        scene.add_mesh_simple(
-            f"{name}/{part}", mesh.vertices, mesh.faces, color=colour, opacity=opacity, cast_shadow=False,
-            receive_shadow=False,
-        )  # fmt: skip
+        hand = hand if hand is not None and np.isfinite(hand).all() else None
+        near = hand is None or target is None or np.linalg.norm(target - hand) <= _APART_M
+        for node, place in ((self._hand, hand), (self._target, None if near else target)):
+            node.visible = place is not None
+            if place is not None:
+                node.position, node.wxyz = place, _turn(place)
+        self._position = self._position if hand is None else hand
 
 
 def _turn(place: FloatArray) -> FloatArray:

@@ -3,12 +3,12 @@
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from pretouch.ports import touch_of
-from pretouch.types import RangeReadings, TouchReadings
+from pretouch.types import FloatArray, RangeReadings, TouchReadings
 
 
 class UnitSource(Protocol):
@@ -24,6 +24,13 @@ class UnitSource(Protocol):
         ...
 
 
+class _Stamps(NamedTuple):
+    """Stamps (K,) of the newest readings [s]."""
+
+    source: FloatArray
+    simulated: FloatArray
+
+
 class RealUnits:
     """The port `Skin` of a simulated arm that carries real units.
 
@@ -34,35 +41,29 @@ class RealUnits:
         """Take the source, and the clock its stamps come from."""
         self.source, self._clock = source, clock
         self._simulated: Callable[[], float] = lambda: 0.0
-        first = source.read()
-        self._seen = np.full(len(first.stamp), -np.inf)
-        self._stamp = self._seen.copy()
-        self._touch_seen, self._touch_stamp = self._seen.copy(), self._seen.copy()
+        count = len(source.read().stamp)
+        self._ranges, self._touches = (_Stamps(np.full(count, -np.inf), np.full(count, -np.inf)) for _ in range(2))
 
     def begin(self, simulated: Callable[[], float]) -> None:
         """Go by another simulation's time [s]; what was measured before stays as old as it is."""
         self._simulated = simulated
-        self._seen[:] = self._stamp[:] = -np.inf
-        self._touch_seen[:] = self._touch_stamp[:] = -np.inf
+        for stamps in (self._ranges, self._touches):
+            stamps.source[:] = stamps.simulated[:] = -np.inf
 
     def read(self) -> RangeReadings:
         """Return the newest reading of each unit, stamped in the simulation's time."""
         readings = self.source.read()
-        fresh = readings.stamp > self._seen
-        self._seen[fresh] = readings.stamp[fresh]
-        self._stamp[fresh] = np.maximum(self._stamp[fresh], readings.stamp[fresh] + self._ahead())
-        return RangeReadings(self._stamp.copy(), readings.distance, readings.status)
+        return RangeReadings(self._moved(self._ranges, readings.stamp), readings.distance, readings.status)
 
     def touch(self) -> TouchReadings | None:
         """Return the newest touch reading of each unit, stamped as ranges are; None while none is known."""
         touch = touch_of(self.source)
-        if touch is None:
-            return None
-        fresh = touch.stamp > self._touch_seen
-        self._touch_seen[fresh] = touch.stamp[fresh]
-        self._touch_stamp[fresh] = np.maximum(self._touch_stamp[fresh], touch.stamp[fresh] + self._ahead())
-        return replace(touch, stamp=self._touch_stamp.copy())
+        return None if touch is None else replace(touch, stamp=self._moved(self._touches, touch.stamp))
 
-    def _ahead(self) -> float:
-        """By how much the simulation's clock is ahead of the machine's [s]."""
-        return self._simulated() - self._clock()
+    def _moved(self, before: "_Stamps", stamp: FloatArray) -> FloatArray:
+        """Return stamps (K,) [s] of the machine's clock on the simulation's; those that are not new keep theirs."""
+        fresh = stamp > before.source
+        before.source[fresh] = stamp[fresh]
+        ahead = self._simulated() - self._clock()
+        before.simulated[fresh] = np.maximum(before.simulated[fresh], stamp[fresh] + ahead)
+        return before.simulated.copy()

@@ -1,4 +1,4 @@
-"""The simulated room of a live session: arm, sensor units, object and a person's hand."""
+"""The simulated room of a live session: arm, sensor units, object, and a person's hand that follows a mouse."""
 
 from dataclasses import dataclass, field, replace
 from typing import Annotated, Literal, cast
@@ -8,14 +8,14 @@ import numpy as np
 from pretouch.checks import Check, Checked
 from pretouch.control.path import Path, WayPoints
 from pretouch.errors import ParameterError
-from pretouch.page.mouse import GAP_M, HAND_SPEED_M_S, Mouse, clear_place
 from pretouch.page.real_units import RealUnits
+from pretouch.perception.closest import closest_points
 from pretouch.ports import Skin as UnitPort
 from pretouch.profiles import PROFILES, Profile
 from pretouch.robot.model import RobotModel
 from pretouch.robot.postures import brought_to
 from pretouch.sensing.skin import Skin
-from pretouch.sim.hand import Hand, PersonArm
+from pretouch.sim.hand import Hand, HandGoal, PersonArm
 from pretouch.sim.paper_scenes import FACE_M, Placement, Side, board_beside
 from pretouch.sim.placement import placement_for
 from pretouch.sim.plant import Plant, PlantClock
@@ -34,6 +34,21 @@ ObjectName = Literal["none", "board -y", "board +y"]
 Stiffness = Annotated[float, Check(low=3_000.0, high=150_000.0)]
 """Of a contact with the arm [N/m]. On a softer one a hand that pushes hard sinks through a thin link; a stiffer one of
 a hand of 0.6 kg swings too quickly for physics in steps of 1 ms."""
+
+_SETTLE_S = 0.2
+"""Time the arm stands before the controller starts [s]: the observer's transient is over."""
+HAND_SPEED_M_S = 0.8
+"""Largest speed at which the hand is drawn along [m/s]. At 75 kN/m a hand of 0.6 kg so meets one capsule of an arm that
+comes at 0.3 m/s with (0.8 + 0.3) sqrt(75 000 * 0.6) = 233 N; ISO/TS 15066 gives 280 N for a moment."""
+HAND_FORCE_N = 60.0
+"""Largest force the person moves the hand with [N], as in the experiments; ISO/TS 15066 gives 140 N for longer."""
+_LOWEST, _HIGHEST = np.array([-1.0, -1.2, -1.0]), np.array([1.4, 1.2, 1.4])
+"""Corners of the space the hand is led through [m], base frame: what a Panda reaches, and half a metre round it."""
+_DEPTHS, _LOOKS = (0.4, 1.6), 121
+"""Shares of the distance from the eye between which a line of sight is looked along, and at how many points."""
+_NEAR_M, _OWN_M, _STAY = 0.04, 0.35, 0.2
+"""How quickly a point of it counts less for the depth with its distance from the arm and from the place [m], and what
+the place's own depth counts."""
 
 
 @dataclass(frozen=True)
@@ -69,8 +84,7 @@ class LiveSettings(Checked):
     ranging: RangeFinderParams = field(default_factory=RangeFinderParams)
     """How simulated units err without faults."""
     hand_start: tuple[float, float, float] = (1.0, 0.5, 0.3)
-    """Where the person's hand begins [m], base frame: in view, and clear of both paths; moved aside if that is inside
-    something."""
+    """Where the person's hand begins [m], base frame: in view, and clear of both paths."""
     placement: Placement = field(default_factory=Placement)
     """Where the paper's paths are for the arm."""
 
@@ -85,14 +99,68 @@ def settings_for(model: RobotModel, settings: LiveSettings) -> LiveSettings:
     return replace(settings, placement=placement, hand_start=hand, plant=plant)
 
 
-_SETTLE_S = 0.2
-"""Time the arm stands before the controller starts [s]: the observer's transient is over."""
-
-
 def live_path(settings: LiveSettings) -> Path:
     """Return the path by its name, begun on the side away from the object."""
     path = settings.placement.path(settings.path, 1.0 if settings.object == "board +y" else -1.0)
     return WayPoints(path.points, closed=True) if isinstance(path, WayPoints) else path
+
+
+class Mouse:
+    """The script of a hand that follows a pointer."""
+
+    def __init__(self, target: FloatArray, scene: SceneSpec, hand: HandSpec, size: float = 1.0) -> None:
+        """Begin with the pointer at a place (3,) [m]. Round an arm of `size` times a Panda's there is as much space."""
+        space = max(1.0, size)
+        self.lowest, self.highest = space * _LOWEST, space * _HIGHEST
+        """Corners (3,) of the space the hand is led through [m], base frame."""
+        self.lowest[2] = max(self.lowest[2], scene.floor_height + hand.radius)
+        self.target = target
+        """(3,) where the hand is to be [m], base frame; to be set by `move`."""
+        self.move(target)
+
+    def move(self, target: FloatArray) -> None:
+        """Point to a place (3,) [m], or the nearest to it in the workspace; what is no place is a ParameterError."""
+        self.target = np.clip(_place("The hand's target", target), self.lowest, self.highest)
+
+    def point(self, eye: FloatArray, place: FloatArray, model: RobotModel, q: FloatArray) -> None:
+        """Point to what a person sees at a place (3,) [m] from an `eye` (3,) [m], as `move` does; see `at_depth`."""
+        seen = _place("The hand's target", place)
+        self.move(at_depth(model, q, _place("The camera's position", eye), seen))
+
+    def goal(self, time: float, hand: FloatArray, plant: Plant) -> HandGoal:
+        """Go straight there, whatever is in the way."""
+        return HandGoal(self.target, HAND_FORCE_N)
+
+
+def _place(what: str, numbers: FloatArray) -> FloatArray:
+    place = np.asarray(numbers, dtype=np.float64)
+    if place.shape != (3,) or not np.all(np.isfinite(place)):
+        raise ParameterError(f"{what} is {place.tolist()}: give x, y and z in metres.")
+    return place
+
+
+def at_depth(model: RobotModel, q: FloatArray, eye: FloatArray, place: FloatArray) -> FloatArray:
+    """Place (3,) [m] on the line of sight through another, at the arm's depth where that line passes the arm.
+
+    A pointer has no depth: without this a hand dragged onto the arm in the picture may pass half a metre before it.
+    Each point of the line counts for the depth by how near it is to the arm and to the place, so that nothing jumps
+    from one link to another behind it; far from the arm the place stays as it is.
+
+    Args:
+        model: the arm.
+        q: (n,) its joint positions [rad].
+        eye: (3,) where the person looks from [m], base frame.
+        place: (3,) [m], base frame.
+    """
+    shares = np.linspace(*_DEPTHS, _LOOKS)
+    points = eye + shares[:, None] * (place - eye)
+    kin, none = model.kinematics(q), np.zeros(_LOOKS, np.int64)
+    aside = np.tile([0.0, 0.0, 1.0], (_LOOKS, 1))
+    gaps = closest_points(kin, model.capsules, kin.position[model.ee], none, points, aside).body_distance
+    apart = np.linalg.norm(points - place, axis=1)
+    weight = np.exp(-np.maximum(gaps, 0.0) / _NEAR_M - (apart / _OWN_M) ** 2)
+    farther = float(weight @ (shares - 1.0)) / (_STAY + float(weight.sum()))
+    return np.asarray(place + farther * (place - eye))
 
 
 class Room:
@@ -113,9 +181,7 @@ class Room:
             boxes = (board_beside(path, side, settings.stiffness, face, hand=met_by),)
         scene = SceneSpec(boxes=boxes, hand=hand)
         self.mouse = Mouse(np.array(settings.hand_start), scene, hand, settings.placement.scale)
-        start = clear_place(model, q, scene, self.mouse.target, hand.radius + GAP_M)
-        self.mouse.move(start)
-        self.scene = replace(scene, hand=replace(hand, start=tuple(start.tolist())))
+        self.scene = replace(scene, hand=replace(hand, start=tuple(self.mouse.target.tolist())))
         self.plant = Plant(model, self.scene, settings.plant, q, settings.seed)
         self._simulated = None if real else RangeFinders(self.plant, skin, settings.ranging, settings.seed)
         self.units: UnitPort = self._simulated or cast(RealUnits, real)
@@ -124,7 +190,7 @@ class Room:
             self.units = SimulatedTouchSkin(self._simulated, touch)
         self.hand = Hand(self.plant, self.mouse, PersonArm(speed_max=HAND_SPEED_M_S))
         self.clock = PlantClock(self.plant, settings.profile.task.control_period_s)
-        self.stiffness = self._wanted = settings.stiffness
+        self.stiffness = self._next_stiffness = settings.stiffness
         self._skin, self._nominal = skin, settings.ranging
         self._moving = np.flatnonzero(model.moved_by.any(axis=1))
         self.set_faults(settings.faults)
@@ -143,18 +209,16 @@ class Room:
             return
         unknown = sorted(faults.silenced - set(self._skin.boards))
         if unknown:
-            known = ", ".join(unit.id for unit in self._skin.mounted)
-            raise ParameterError(f"Unknown unit {', '.join(unknown)}: choose from {known}.")
-        sound = self._nominal
+            units = ", ".join(unit.id for unit in self._skin.mounted)
+            raise ParameterError(f"Unknown unit {', '.join(unknown)}: choose from {units}.")
         self._simulated.silenced = {i for i, name in enumerate(self._skin.boards) if name in faults.silenced}
-        self._simulated.change(replace(
-            sound, noise_floor_m=sound.noise_floor_m * faults.noise_factor,
-            noise_rate=sound.noise_rate * faults.noise_factor, latency_s=sound.latency_s + faults.latency_s,
-        ))  # fmt: skip
+        sound, factor, latency = self._nominal, faults.noise_factor, self._nominal.latency_s + faults.latency_s
+        floor, rate = factor * sound.noise_floor_m, factor * sound.noise_rate
+        self._simulated.change(replace(sound, noise_floor_m=floor, noise_rate=rate, latency_s=latency))
 
     def set_stiffness(self, stiffness: float) -> None:
         """Give hand and object another stiffness [N/m], as soon as nothing touches."""
-        self._wanted = stiffness
+        self._next_stiffness = stiffness
 
     @property
     def touched(self) -> FloatArray | None:
@@ -167,8 +231,8 @@ class Room:
 
     def tick(self) -> float:
         """Let one control period pass and return the time [s]."""
-        if self._wanted != self.stiffness and not self.plant.touching:
-            self.stiffness = self._wanted
+        if self._next_stiffness != self.stiffness and not self.plant.touching:
+            self.stiffness = self._next_stiffness
             for thing in ("hand", *(box.name for box in self.scene.boxes)):
                 self.plant.stiffen(thing, self.stiffness)
         return self.clock.tick()

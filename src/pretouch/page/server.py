@@ -20,7 +20,6 @@ from pretouch.extras import LIVE
 if TYPE_CHECKING:
     from viser import ViserServer
 
-_PORTS_TRIED = 100
 _EVERYWHERE = {"0.0.0.0": "localhost", "::": "localhost"}  # noqa: S104  # named to be replaced
 
 
@@ -70,35 +69,18 @@ def _stays_here(host: str) -> bool:
         return host == "localhost"
 
 
-_GREYED = "div[style*='opacity: 0.5'][style*='pointer-events: none']"
-_LOST = (
-    f"<style>#lost{{display:none}}{_GREYED}:has(#lost){{opacity:1!important}}{_GREYED} #lost{{display:block;"
-    "position:fixed;top:0;left:0;right:0;z-index:99;padding:14px;text-align:center;font-size:17px;font-weight:700;"
-    "background:#d62839;color:#fff}</style><div id='lost'>Connection lost: the program behind this page has ended or"
-    " cannot be reached. What is drawn is out of date.</div>"
-)
-"""A sentence that the page shows by itself. viser's client only greys its controls while it is not connected, and lets
-nobody add a script; a style sheet can tell by the greying."""
-
-
 @contextmanager
 def served(options: ServeOptions, title: str) -> Iterator["ViserServer"]:
     """Serve an empty page while the context lasts; a ViewerError says what is missing or in the way."""
     LIVE.need("The page")
     check_port(options)
-    from viser import ViserServer
+    from pretouch.page.door import GuardedServer
 
-    from pretouch.page.door import Door
-
-    door = Door(options)
     with _quiet():
-        with door.built():
-            server = ViserServer(options.host, options.port, label=title, verbose=False)
+        server = GuardedServer(options, title)
         try:
             if server.get_port() != options.port:
-                raise _busy(options, server.get_port())
-            door.check(server)
-            server.gui.add_html(_LOST)
+                raise _busy(options)
             yield server
         finally:
             server.stop()
@@ -124,35 +106,30 @@ def begun(
 
 
 def check_port(options: ServeOptions) -> None:
-    """Refuse a port that is taken, naming the next free one, and a host that is not this machine's."""
+    """Refuse a port that is taken, or may not be opened, and a host that is not this machine's."""
     if not 1 <= options.port <= 65535:
         raise ViewerError(f"The port is {options.port}: give one from 1 to 65535.")
-    if _free(options.host, options.port):
-        return
-    following = range(options.port + 1, min(options.port + _PORTS_TRIED, 65536))
-    raise _busy(options, next((port for port in following if _free(options.host, port)), None))
-
-
-def _busy(options: ServeOptions, free: int | None) -> ViewerError:
-    way_out = f"--port {free} is free" if free else "choose another with --port"
-    return ViewerError(f"Port {options.port} on {options.host} is in use, perhaps by another page: {way_out}.")
-
-
-def _free(host: str, port: int) -> bool:
     try:
-        family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
-        with socket.socket(family, kind, protocol) as tried:
-            tried.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            tried.bind(address)
-            return True
+        family, kind, protocol, _, address = socket.getaddrinfo(options.host, options.port, type=socket.SOCK_STREAM)[0]
+        with socket.socket(family, kind, protocol) as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            probe.bind(address)
     except PermissionError as error:
-        raise ViewerError(f"This user may not open port {port}: choose one from 1024 on with --port.") from error
+        raise ViewerError(
+            f"This user may not open port {options.port}: choose one from 1024 on with --port."
+        ) from error
     except OSError as error:
         if isinstance(error, socket.gaierror) or error.errno == errno.EADDRNOTAVAIL:
             raise ViewerError(
-                f"The host {host!r} is not an address of this machine: leave it out, or give one."
+                f"The host {options.host!r} is not an address of this machine: leave it out, or give one."
             ) from error
-        return False
+        raise _busy(options) from error
+
+
+def _busy(options: ServeOptions) -> ViewerError:
+    return ViewerError(
+        f"Port {options.port} on {options.host} is in use, perhaps by another page: choose another with --port."
+    )
 
 
 @contextmanager

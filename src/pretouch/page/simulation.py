@@ -17,6 +17,7 @@ from pretouch.errors import ParameterError
 from pretouch.loop import Cycle, Options, turn
 from pretouch.page.frame import Frame, World
 from pretouch.page.opening import Opening
+from pretouch.page.real_units import RealUnits
 from pretouch.page.room import Faults, LiveSettings, PathName, Room, live_path
 from pretouch.profiles import Profile
 from pretouch.recording.simulation import surroundings, truth_of
@@ -29,7 +30,6 @@ from pretouch.sim.tcp_push import Pushes, TcpPush
 from pretouch.types import ControlStep, FloatArray
 
 if TYPE_CHECKING:
-    from pretouch.page.real_units import RealUnits
     from pretouch.recording.writer import Closed, Recording
 
 
@@ -49,13 +49,15 @@ class LiveSimulation:
     """What stands still; another object after each change of it."""
     frame: Frame
     """The newest instant."""
-    _push: PushOutcome | None
-    """The newest push, until what it led to is known."""
 
     def __init__(
-        self, settings: LiveSettings | None = None, model: RobotModel | None = None, skin: Skin | None = None,
-        real: "RealUnits | None" = None, true_skin: Skin | None = None,
-    ) -> None:  # fmt: skip
+        self,
+        settings: LiveSettings | None = None,
+        model: RobotModel | None = None,
+        skin: Skin | None = None,
+        real: RealUnits | None = None,
+        true_skin: Skin | None = None,
+    ) -> None:
         """Begin with the first control cycle done. Without others, the arm is a Panda with the paper's skin.
 
         Another arm needs `room.settings_for`.
@@ -90,7 +92,9 @@ class LiveSimulation:
         self._room, self._state = room, self.controller.init(room.plant.read())
         self._boxes = surroundings({"scene": described(room.scene)}).boxes
         self._resume, self._remainder, self.opening = False, 0.0, None
-        self._pushes, self._push = Pushes(room.plant, (), 0.0), None
+        self._pushes = Pushes(room.plant, (), 0.0)
+        self._push: PushOutcome | None = None
+        """The newest push, until what it led to is known."""
         self._update_world()
         self.single_step()
 
@@ -176,11 +180,8 @@ class LiveSimulation:
         self.settings = replace(self.settings, stiffness=stiffness)
         self._room.set_stiffness(stiffness)
 
-    def set_faults(
-        self, silenced: frozenset[str] = frozenset(), noise_factor: float = 1.0, latency_s: float = 0.0
-    ) -> None:
-        """Have the units of these ids silent, all noisier by a factor, and all later by some time [s]."""
-        faults = Faults(frozenset(silenced), noise_factor, latency_s)
+    def set_faults(self, faults: Faults) -> None:
+        """Have the units err as faults say; an unknown id, and any fault of real units, is a ParameterError."""
         self._room.set_faults(faults)
         self.settings = replace(self.settings, faults=faults)
 
@@ -231,10 +232,9 @@ class LiveSimulation:
 
     def _update_world(self) -> None:
         scene = self._room.scene
-        self.world = World(
-            self.model, self.skin, self.controller.path, self.controller.profile, self._boxes,
-            scene.hand.radius if scene.hand else None, scene.floor_height,
-        )  # fmt: skip
+        radius = scene.hand.radius if scene.hand else None
+        path, profile = self.controller.path, self.controller.profile
+        self.world = World(self.model, self.skin, path, profile, self._boxes, radius, scene.floor_height)
 
     def _keep(self, cycle: Cycle, hand: FloatArray) -> None:
         """Empty the plant's log, into the recording if there is one."""

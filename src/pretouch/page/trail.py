@@ -1,17 +1,13 @@
 """The way the end-effector went, coloured as in the paper's Fig. 4, of bounded length and bounded traffic."""
 
 from enum import Enum
-from typing import TYPE_CHECKING
 
 import numpy as np
+from viser import SceneApi
 
-from pretouch.explanation import OFF_PATH_M as OFF_PATH_M
-from pretouch.explanation import binding as binding
+from pretouch.explanation import OFF_PATH_M, binding
 from pretouch.page import palette
 from pretouch.types import ControlStep, FloatArray, Mode
-
-if TYPE_CHECKING:
-    from viser import LineSegmentsHandle, SceneApi
 
 SPACING_M = 0.005
 """Length of a segment, about [m]."""
@@ -19,7 +15,6 @@ BLOCK = 40
 """Segments sent together: the newest block is sent again as it grows, the others stay."""
 BLOCKS = 16
 """Blocks kept: 3.2 m, twice round the paper's circle."""
-
 _PERIOD_S = 0.1
 
 
@@ -37,10 +32,8 @@ class Activity(Enum):
 
 def activity(step: ControlStep) -> Activity:
     """Tell how the arm goes in a step."""
-    if step.mode is Mode.REACT:
-        return Activity.REACTING
-    if step.mode is Mode.HOLD:
-        return Activity.HOLDING
+    if step.mode is not Mode.TRACK:
+        return Activity.REACTING if step.mode is Mode.REACT else Activity.HOLDING
     if np.linalg.norm(step.ee_position - step.path_position) < OFF_PATH_M:
         return Activity.FOLLOWING
     return Activity.AVOIDING if binding(step).any() else Activity.RECOVERING
@@ -52,19 +45,18 @@ class Trail:
     Blocks are used over again: a page keeps what was ever added to it, and may be open for days.
     """
 
-    def __init__(self, scene: "SceneApi", root: str = "") -> None:
-        self._blocks: list[LineSegmentsHandle] = [
+    def __init__(self, scene: SceneApi, root: str = "") -> None:
+        none = np.zeros((1, 2, 3))
+        self._blocks = [
             scene.add_line_segments(
-                f"{root}/trail/{i}", np.zeros((1, 2, 3)), np.zeros((1, 2, 3), dtype=np.uint8), thickness=3.5,
-                thickness_units="screen", visible=False,
+                f"{root}/trail/{i}", none, none.astype(np.uint8), thickness=3.5, thickness_units="screen", visible=False
             )
             for i in range(BLOCKS)
-        ]  # fmt: skip
-        self._visible = True
+        ]
+        self._visible, self._sent = True, -np.inf
         self._points: list[FloatArray] = []
         self._colours: list[palette.Colour] = []
         self._last: FloatArray | None = None
-        self._sent = -np.inf
         self._full = 0
         """Blocks filled so far, those that were used over again included."""
 

@@ -1,22 +1,20 @@
 """The sensor units of the page: where they sit, what their cones cover, and what they see."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import trimesh
 from numpy.typing import NDArray
+from viser import BatchedMeshHandle, SceneApi
 
+from pretouch.explanation import binding
 from pretouch.page import palette
-from pretouch.page.arm import quaternions
-from pretouch.page.trail import binding
+from pretouch.page.arm import SHADELESS, quaternions
 from pretouch.perception.obstacles import locate, placed_sensors, points_of_units
 from pretouch.robot.kinematics import Kinematics
 from pretouch.sensing.skin import Skin
 from pretouch.types import BoolArray, ControlStep, FloatArray, IntArray
-
-if TYPE_CHECKING:
-    from viser import BatchedMeshHandle, SceneApi
 
 _IDLE_M = 0.06
 """Length at which a cone is drawn that shows nothing [m]."""
@@ -30,34 +28,45 @@ _GONE = 1e-6
 class Units:
     """All units of a skin, each as a plate and a cone on its link, and a sphere where it senses something."""
 
-    def __init__(self, scene: "SceneApi", skin: Skin, links: Sequence[str], root: str = "") -> None:
+    def __init__(self, scene: SceneApi, skin: Skin, links: Sequence[str], root: str = "") -> None:
         """Put the units under the nodes `ROOT/arm/LINK` of their links, named in order of their index."""
-        self._skin, count = skin, len(skin)
+        self._scene, self._skin = scene, skin
         self._plates: list[tuple[IntArray, BatchedMeshHandle]] = []
         self._cones: list[tuple[IntArray, BatchedMeshHandle]] = []
-        plate, ball = _parts(trimesh.creation.box(_UNIT_M)), _parts(trimesh.creation.icosphere(subdivisions=2))
-        plain: dict[str, Any] = {"cast_shadow": False, "receive_shadow": False, "lod": "off"}
+        plate, ball = trimesh.creation.box(_UNIT_M), trimesh.creation.icosphere(subdivisions=2)
+        boards, poses = skin.first, np.array([unit.T_link_sensor for unit in skin.mounted])
         for link in np.unique(skin.link):
-            units, boards = np.flatnonzero(skin.link == link), np.flatnonzero(skin.link[skin.first] == link)
-            place = _places(skin.T_link_sensor[units])
-            node = f"{root}/arm/{links[link]}"
-            plates = scene.add_batched_meshes_simple(
-                f"{node}/units", *plate, *_places(np.array([skin.mounted[b].T_link_sensor for b in boards])),
-                batched_colors=_all(palette.UNIT, boards), flat_shading=True, **plain,
-            )  # fmt: skip
-            self._plates.append((boards, plates))
-            for kind in np.unique(skin.cones.kind[units]):
-                alike = skin.cones.kind[units] == kind
-                cones = scene.add_batched_meshes_simple(
-                    f"{node}/cones{kind or ''}", *_cone(skin.cones.edge[kind, 2]), *(part[alike] for part in place),
-                    batched_scales=np.full(alike.sum(), _IDLE_M), batched_colors=_all(palette.CONE, units[alike]),
-                    batched_opacities=np.full(alike.sum(), _FAINT), opacity=0.5, side="double", **plain,
-                )  # fmt: skip
-                self._cones.append((units[alike], cones))
-        self.points = scene.add_batched_meshes_simple(
-            f"{root}/points", *ball, np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)), np.zeros((count, 3)),
-            batched_scales=np.full(count, _GONE), batched_colors=_all(palette.SENSED, np.arange(count)), **plain,
-        )  # fmt: skip
+            node, here = f"{root}/arm/{links[link]}", np.flatnonzero(skin.link[boards] == link)
+            plates = self._add(f"{node}/units", plate, poses[here], palette.UNIT, flat_shading=True)
+            self._plates.append((here, plates))
+            for kind in np.unique(skin.cones.kind[skin.link == link]):
+                alike = np.flatnonzero((skin.link == link) & (skin.cones.kind == kind))
+                # out to 1 m along z, without a lid
+                profile = np.array([[0.0, 0.0], [skin.cones.edge[kind, 2], 1.0]])
+                cones = self._add(
+                    f"{node}/cones{kind or ''}",
+                    trimesh.creation.revolve(profile, sections=28),
+                    skin.T_link_sensor[alike],
+                    palette.CONE,
+                    batched_scales=np.full(len(alike), _IDLE_M),
+                    batched_opacities=np.full(len(alike), _FAINT),
+                    opacity=0.5,
+                    side="double",
+                )
+                self._cones.append((alike, cones))
+        nowhere = np.tile(np.eye(4), (len(skin), 1, 1))
+        hidden = np.full(len(skin), _GONE)
+        self.points = self._add(f"{root}/points", ball, nowhere, palette.SENSED, batched_scales=hidden)
+
+    def _add(
+        self, name: str, shape: trimesh.Trimesh, poses: FloatArray, colour: palette.Colour, **look: Any
+    ) -> BatchedMeshHandle:
+        """Add a shape at poses (N, 4, 4)."""
+        colours = np.tile(palette.as_vertex(colour), (len(poses), 1))
+        turns, places = quaternions(poses[:, :3, :3]), poses[:, :3, 3]
+        return self._scene.add_batched_meshes_simple(
+            name, shape.vertices, shape.faces, turns, places, batched_colors=colours, lod="off", **SHADELESS, **look
+        )
 
     def show_cones(self, visible: bool) -> None:
         """Show or hide the fields of view."""
@@ -74,13 +83,16 @@ class Units:
         # of zones, what any of them says
         plates = _coloured([np.logical_or.reduceat(mark, self._skin.first) for mark in marks], palette.UNIT)
         reading = np.where(silent, np.nan, step.range_distance)
-        points = self._sensed(step, kin, reading, perceiving)
+        if perceiving:
+            points = points_of_units(step.obstacles, len(reading))
+        else:
+            points = locate(*placed_sensors(self._skin.arrays, kin)[:2], reading)
         seen = np.isfinite(points[:, 0])
         # a unit that sees the floor, or the arm itself, senses nothing
         lengths = np.where(seen, np.round(reading, 2), _IDLE_M).astype(np.float32)
         opacities = np.where(seen, _CLEAR, _FAINT).astype(np.float32)
-        for units, handle in self._plates:
-            handle.batched_colors = plates[units]
+        for boards, handle in self._plates:
+            handle.batched_colors = plates[boards]
         for units, handle in self._cones:
             handle.batched_colors, handle.batched_scales = cones[units], lengths[units]
             handle.batched_opacities = opacities[units]
@@ -89,40 +101,15 @@ class Units:
 
     def _glowing(self, step: ControlStep) -> tuple[BoolArray, BoolArray]:
         """Which units (K,) see an obstacle, and whose obstacles keep the arm from what it would do."""
-        seeing, limiting = np.zeros((2, len(self._skin)), np.bool_)
-        unit = step.obstacles.unit
-        own = unit < len(self._skin)  # what other sources see is at no unit
-        seeing[unit[own]] = True
-        held = unit[step.restricted[binding(step)]]
-        limiting[held[held < len(self._skin)]] = True
+        unit, count = step.obstacles.unit, len(self._skin)  # what other sources see is at no unit
+        seeing, limiting = np.zeros((2, count), np.bool_)
+        seeing[unit[unit < count]] = True
+        limits = unit[step.restricted[binding(step)]]
+        limiting[limits[limits < count]] = True
         return seeing, limiting
-
-    def _sensed(self, step: ControlStep, kin: Kinematics, reading: FloatArray, perceiving: bool) -> FloatArray:
-        """Where each unit senses something (K, 3) [m], base frame; NaN where it does not."""
-        if not perceiving:
-            return locate(*placed_sensors(self._skin.arrays, kin)[:2], reading)
-        return points_of_units(step.obstacles, len(reading))
 
 
 def _coloured(marks: Sequence[BoolArray], plain: palette.Colour) -> NDArray[np.uint8]:
     """Colour of each that is silent, limits, sees something (3, N), or none of it."""
     colours = [palette.UNIT_SILENT, palette.LIMITING, palette.SEEING]
     return palette.as_vertex(np.select([mark[:, None] for mark in marks], colours, plain))
-
-
-def _places(pose: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Orientations and places of poses (N, 4, 4)."""
-    return quaternions(pose[:, :3, :3]), pose[:, :3, 3]
-
-
-def _all(colour: palette.Colour, units: IntArray) -> NDArray[np.uint8]:
-    return np.tile(palette.as_vertex(colour), (len(units), 1))
-
-
-def _cone(radius: float) -> tuple[FloatArray, IntArray]:
-    """A field of view out to 1 m along z, of a radius [m] there, without a lid."""
-    return _parts(trimesh.creation.revolve(np.array([[0.0, 0.0], [radius, 1.0]]), sections=28))
-
-
-def _parts(shape: trimesh.Trimesh) -> tuple[FloatArray, IntArray]:
-    return np.asarray(shape.vertices), np.asarray(shape.faces)
