@@ -63,12 +63,12 @@ def chromium(width: int = 1280, height: int = 800) -> Iterator["Visitor"]:
         skip_for("make browser")
     from playwright import sync_api
 
-    found = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-    if found is None:
+    program = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    if program is None:
         skip_for("apt-get install chromium")
     software = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]
     with sync_api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=found, args=["--no-sandbox", *software])
+        browser = playwright.chromium.launch(executable_path=program, args=["--no-sandbox", *software])
         try:
             yield Visitor(browser.new_page(viewport={"width": width, "height": height}, has_touch=True))
         finally:
@@ -113,9 +113,9 @@ class Visitor:
                 arg=[name, contained],
             )
         except Exception as error:
-            shown = {line: self.page.evaluate("name => document.getElementById(name)?.textContent", line)
-                     for line in ("word", "reason", "mode", "rates", "warning", "notice")}  # fmt: skip
-            raise AssertionError(f"{name} never said {contained!r}: {shown}") from error
+            text = "name => document.getElementById(name)?.textContent"
+            lines = {line: self.page.evaluate(text, line) for line in ("word", "reason", "mode", "rates", "notice")}
+            raise AssertionError(f"{name} never said {contained!r}: {lines}") from error
 
     def wait_until(self, true: Callable[[], bool]) -> None:
         """Wait until something holds outside of the page."""

@@ -36,19 +36,19 @@ def test_what_was_asked_is_drawn_as_a_velocity_and_where_it_leads(simulation: Li
     kin = model.kinematics(simulation.frame.step.q)
     twist = drawn(simulation, desired.twist(now, (0.1, 0.0, -0.2)))
     assert twist
-    assert twist.velocity.tolist() == [0.1, 0.0, -0.2]
+    assert twist.velocities[0].tolist() == [0.1, 0.0, -0.2]
     assert twist.goal is None
-    np.testing.assert_allclose(twist.allowed, model.ee_jacobian(kin)[:3] @ simulation.frame.step.command)
+    np.testing.assert_allclose(twist.velocities[1], model.ee_jacobian(kin)[:3] @ simulation.frame.step.command)
     T = np.eye(4)
     T[:3, :3], T[:3, 3] = kin.rotation[model.ee], here + np.array([0.0, 0.05, 0.0])
     pose = drawn(simulation, desired.pose(now, T))
     assert pose
-    np.testing.assert_allclose(pose.velocity, [0.0, 0.1, 0.0], atol=1e-12)  # 2 1/s times 5 cm
+    np.testing.assert_allclose(pose.velocities[0], [0.0, 0.1, 0.0], atol=1e-12)  # 2 1/s times 5 cm
     np.testing.assert_array_equal(pose.goal, T)
     q = simulation.frame.step.q_commanded
     joints = drawn(simulation, desired.joint_positions(now, q))
     assert joints
-    np.testing.assert_allclose(joints.velocity, 0.0, atol=1e-12)
+    np.testing.assert_allclose(joints.velocities[0], 0.0, atol=1e-12)
     assert joints.goal is not None
     np.testing.assert_allclose(joints.goal[:3, 3], model.kinematics(q).position[model.ee])
 
@@ -73,7 +73,7 @@ def approaching(place: FloatArray, velocity: FloatArray) -> tuple[LiveSimulation
     step, names = simulation.frame.step, (simulation.skin.ids, simulation.model.links)
     motion = driven_motion(simulation.frame, simulation.world, simulation.model.kinematics(step.q))
     assert motion
-    sentence = explain(step, *names, (motion.velocity, motion.allowed)).sentence
+    sentence = explain(step, *names, motion.velocities).sentence
     assert sentence.startswith(explain(step, *names).sentence)
     return simulation, sentence
 

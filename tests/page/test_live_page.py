@@ -100,10 +100,10 @@ def test_each_recording_gets_a_file_of_its_own_that_is_named(
     for number in (1, 2):
         clock.page.actions.put(lambda: toggle_recording(simulation))
         clock.turn(0.3)
-        assert clock.page.notice == f"Recording to runs/live-{number}.mcap."
+        assert clock.page.status.notice == f"Recording to runs/live-{number}.mcap."
         clock.page.actions.put(lambda: toggle_recording(simulation))
         clock.turn(0.1)
-        assert f"runs/live-{number}.mcap" in clock.page.notice
+        assert f"runs/live-{number}.mcap" in clock.page.status.notice
         assert len(open_recording(Path(f"runs/live-{number}.mcap"))) >= 25
 
 
@@ -114,7 +114,7 @@ def test_a_folder_for_recordings_that_cannot_be_made_is_said(
     Path("runs").write_text("in the way")
     clock.page.actions.put(lambda: toggle_recording(simulation))
     clock.turn(0.1)
-    assert clock.page.notice == "Not done: The folder runs cannot be created: File exists."
+    assert clock.page.status.notice == "Not done: The folder runs cannot be created: File exists."
     assert simulation.recording is None
 
 
@@ -175,10 +175,10 @@ def test_what_was_said_of_the_simulation_before_is_on_the_page_at_first(
     simulation.notice = "The paper's paths for mine: 0.8 times as large."
     clock = Clock(LivePage(server, simulation))
     clock.turn(1.0)
-    assert clock.page.notice.endswith("for mine: 0.8 times as large.")
+    assert clock.page.status.notice.endswith("for mine: 0.8 times as large.")
     click(clock.page, "Reset")
     clock.turn(1.0)
-    assert clock.page.notice == ""
+    assert clock.page.status.notice == ""
 
 
 def test_what_is_refused_is_said_until_the_next_click_though_the_hand_moves_and_changes_nothing(
@@ -192,10 +192,10 @@ def test_what_is_refused_is_said_until_the_next_click_though_the_hand_moves_and_
     give(clock.page, "Cones", False)
     clock.page._drag(np.array(CAMERA_FROM), np.array([1.0, 0.4, 0.3]))
     clock.turn(0.1)
-    assert clock.page.notice.startswith("Not done: TaskParams.speed_m_s is -1")
+    assert clock.page.status.notice.startswith("Not done: TaskParams.speed_m_s is -1")
     click(clock.page, "Pause")
     clock.turn(0.1)
-    assert clock.page.notice == ""
+    assert clock.page.status.notice == ""
 
 
 @pytest.mark.parametrize(("width", "height"), [(1024, 768), (1440, 900)])
@@ -214,8 +214,8 @@ def test_a_push_is_felt_or_the_page_says_what_it_lacked(clock: Clock, simulation
     give(clock.page, "Force [N]", 60.0)
     click(clock.page, "Push the hand")
     clock.turn(1.6)
-    assert clock.page.notice.startswith("The push of 60 N was detected after 0.")
-    assert clock.page.notice.endswith("and the arm moved with it.")
+    assert clock.page.status.notice.startswith("The push of 60 N was detected after 0.")
+    assert clock.page.status.notice.endswith("and the arm moved with it.")
     assert simulation.frame.step.mode is Mode.REACT
     clock.turn(4.0)
     assert simulation.frame.step.mode is Mode.TRACK
@@ -223,8 +223,8 @@ def test_a_push_is_felt_or_the_page_says_what_it_lacked(clock: Clock, simulation
     give(clock.page, "Duration [s]", 0.3)
     click(clock.page, "Push the hand")
     clock.turn(0.8)
-    assert clock.page.notice.startswith("The push of 5 N was not detected: the filtered force came to ")
-    assert clock.page.notice.endswith(" N would have been a contact then.")
+    assert clock.page.status.notice.startswith("The push of 5 N was not detected: the filtered force came to ")
+    assert clock.page.status.notice.endswith(" N would have been a contact then.")
 
 
 def test_resuming_is_offered_only_where_a_hold_waits_for_it(clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None:

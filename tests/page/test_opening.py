@@ -35,11 +35,11 @@ class Played:
 
     def slowest_before(self) -> float:
         """Least speed over the path's before the touch, once the arm has started."""
-        speeds = [
-            float(np.linalg.norm(s.ee_velocity)) for s in self.steps[: self.touch]
-            if s.mode is Mode.TRACK and s.stamp > 2.0
-        ]  # fmt: skip
-        return min(speeds) / self.simulation.settings.profile.task.speed_m_s
+        steps = [step for step in self.steps[: self.touch] if step.mode is Mode.TRACK and step.stamp > 2.0]
+        return (
+            min(float(np.linalg.norm(step.ee_velocity)) for step in steps)
+            / self.simulation.settings.profile.task.speed_m_s
+        )
 
 
 @pytest.fixture(scope="module")
@@ -58,8 +58,9 @@ def test_the_arm_sees_the_hand_slows_is_touched_yields_and_goes_on(protected: Pl
     seen = {protected.simulation.skin.ids[unit] for unit in before.obstacles.unit}
     assert "hand_left" in seen
     model, skin = protected.simulation.model, protected.simulation.skin
-    told = [explain(s, skin.ids, model.links) for s in protected.steps[protected.touch - 50 : protected.touch]]
-    slowed = [found.sentence for found in told if found.doing is Doing.SLOWED]
+    half_second = protected.steps[protected.touch - 50 : protected.touch]
+    explanations = [explain(step, skin.ids, model.links) for step in half_second]
+    slowed = [explanation.sentence for explanation in explanations if explanation.doing is Doing.SLOWED]
     assert len(slowed) > 40, "the half second before the touch is told as what it is"
     assert all("hand_left sees something at 0.0" in sentence for sentence in slowed)
     contacts = [s.stamp for s in protected.steps if s.contact is not None]
@@ -86,11 +87,11 @@ def test_a_person_who_moves_the_hand_ends_it_at_once(panda_model: RobotModel, ho
     simulation.play_opening()
     simulation.advance(3.0)
     assert simulation.opening
-    wanted = np.array([0.9, 0.6, 0.5])
+    place = np.array([0.9, 0.6, 0.5])
     if how == "move":
-        simulation.move_hand(wanted)
+        simulation.move_hand(place)
     else:
-        simulation.point_hand(np.array([1.75, 0.95, 0.85]), wanted)
+        simulation.point_hand(np.array([1.75, 0.95, 0.85]), place)
     simulation.advance(0.5)
     assert simulation.opening is None
-    np.testing.assert_allclose(simulation.frame.hand_target, wanted, atol=0.01)
+    np.testing.assert_allclose(simulation.frame.hand_target, place, atol=0.01)

@@ -115,5 +115,5 @@ def test_a_receiver_that_has_ended_is_said_once(server: ViserServer, room: Room,
     room.alive = False
     for turn in range(10):
         page.turn(turn / 30)
-    assert page.notice == "The receiver of the sensor units has ended: start the page again."
-    assert said == [page.notice]
+    assert page.status.notice == "The receiver of the sensor units has ended: start the page again."
+    assert said == [page.status.notice]

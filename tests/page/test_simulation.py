@@ -38,12 +38,12 @@ def test_a_session_runs_as_an_experiment_does(live, panda_model, paper_skin):
     units = RangeFinders(plant, paper_skin, RangeFinderParams(), 7)
     Hand(plant, Mouse(np.array(hand.start), scene, hand), PersonArm(HAND_SPEED_M_S))
     plant.advance(0.2)
-    kept: list[ControlStep] = []
+    recorded: list[ControlStep] = []
 
-    recorder = SimpleNamespace(record=lambda cycle: kept.append(cycle.step))
+    recorder = SimpleNamespace(record=lambda cycle: recorded.append(cycle.step))
     controller = Controller(panda_model, paper_skin, fixtures(scene), path, session.settings.profile)
-    run(controller, plant, units, PlantClock(plant, 0.01), recorder, lambda step: len(kept) == len(steps))
-    for ours, theirs in zip(steps, kept, strict=True):
+    run(controller, plant, units, PlantClock(plant, 0.01), recorder, lambda step: len(recorded) == len(steps))
+    for ours, theirs in zip(steps, recorded, strict=True):
         assert ours.stamp == theirs.stamp
         np.testing.assert_array_equal(ours.command, theirs.command)
         np.testing.assert_array_equal(ours.range_distance, theirs.range_distance)
@@ -108,7 +108,7 @@ IMPACT_N = (HAND_M_S + ARM_M_S) * np.sqrt(2 * HandSpec.stiffness * HandSpec.mass
 @pytest.mark.parametrize("seed", [0, 1])
 def test_a_target_inside_the_arm_neither_jumps_nor_crushes(live, seed):
     session, rng = live(seed=seed), np.random.default_rng(seed)
-    plant, hand = session._room.plant, session._room.hand
+    plant, hand = session.room.plant, session.room.hand
     seen = []
     plant.before_each_step(lambda time: seen.append((*hand.position, *plant.true_force)))
     session.advance(ARMED_S)
@@ -130,7 +130,7 @@ def test_a_target_inside_the_arm_neither_jumps_nor_crushes(live, seed):
 @pytest.mark.parametrize("thing", OBJECTS)
 def test_nothing_touches_at_the_start_and_the_hand_begins_where_it_is_to(live, thing, path):
     session = live(object=thing, path=path)
-    assert not session._room.plant.touching
+    assert not session.room.plant.touching
     np.testing.assert_allclose(session.frame.hand, LiveSettings().hand_start, atol=1e-3)
     np.testing.assert_allclose(session.frame.hand, session.frame.hand_target, atol=1e-6)
 

@@ -117,18 +117,16 @@ class PaintedLink:
         levels = np.array(self._levels, dtype=np.float64) / LEVELS
         return coloured(self._mesh, palette.expected(on_surface(self._share, levels)))
 
-    def paint(self, levels: tuple[int, ...], now: float) -> int:
-        """Colour by what the units expect, in `LEVELS`, at a time [s]; returns the bytes that were sent."""
+    def paint(self, levels: tuple[int, ...], now: float) -> None:
+        """Colour by what the units expect, in `LEVELS`, at a time [s]."""
         if now - self._sent < SETTLE_S:
-            return 0
+            return
         if self._waits:
             self._front, self._back = self._back, self._front
             self._front.visible, self._back.visible, self._waits = True, False, False
-        if levels == self._levels:
-            return 0
-        self._levels, self._sent, self._waits = levels, now, True
-        data = self._back.glb_data = self._painted()
-        return len(data)
+        if levels != self._levels:
+            self._levels, self._sent, self._waits = levels, now, True
+            self._back.glb_data = self._painted()
 
 
 class Arm:
@@ -156,6 +154,7 @@ class Arm:
         for link, frame in self._frames.items():
             frame.position, frame.wxyz = kin.position[link], turns[link]
 
-    def paint(self, levels: tuple[int, ...], now: float) -> int:
-        """Colour the links by what each unit (K,) expects, in `LEVELS`, at a time [s]; returns the bytes sent."""
-        return sum(link.paint(tuple(levels[u] for u in units), now) for units, link in self._painted)
+    def paint(self, levels: tuple[int, ...], now: float) -> None:
+        """Colour the links by what each unit (K,) expects, in `LEVELS`, at a time [s]."""
+        for units, link in self._painted:
+            link.paint(tuple(levels[u] for u in units), now)

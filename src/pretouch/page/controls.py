@@ -98,7 +98,7 @@ class Controls:
         self._lasting = gui.add_slider("Duration [s]", 0.1, 3.0, 0.1, PUSH_S)
 
     def _hand_folder(self) -> None:
-        low, high = self._simulation.hand_space
+        low, high = self._simulation.room.mouse.lowest, self._simulation.room.mouse.highest
         self._hand = [
             self._gui.add_slider(f"{axis} [m]", float(low[k]), float(high[k]), 0.01, 0.0, hint="Or drag the hand.")
             for k, axis in enumerate("xyz")

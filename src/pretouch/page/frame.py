@@ -65,10 +65,8 @@ class Frame:
 class DrivenMotion:
     """What a commander asked for and what was commanded in one step. Base frame."""
 
-    velocity: FloatArray
-    """(3,) of the end-effector origin that was asked for, before anything limits it [m/s]."""
-    allowed: FloatArray
-    """(3,) that was commanded [m/s]."""
+    velocities: tuple[FloatArray, FloatArray]
+    """(3,) of the end-effector's origin [m/s]: asked for, before anything limits it, and commanded."""
     goal: FloatArray | None
     """(4, 4) T_O_ee that was asked for; None: a velocity was."""
 
@@ -87,7 +85,7 @@ def driven_motion(frame: Frame, world: World, kin: Kinematics) -> DrivenMotion |
     robot = replace(frame.inputs.robot, q_commanded=step.q_commanded)
     request = asked_by(desired, step.stamp, kin, robot, model, kin.rotation[model.ee], world.profile.task, 1.0)
     allowed = model.ee_jacobian(kin)[:3] @ step.command
-    return DrivenMotion(request.velocity, allowed, _goal(desired, model))
+    return DrivenMotion((request.velocity, allowed), _goal(desired, model))
 
 
 def _goal(desired: Desired, model: RobotModel) -> FloatArray | None:

@@ -42,24 +42,18 @@ class LivePage:
         self._receiver_ended = False
         """Whether the receiver of the real units has ended."""
         style_page(server)
-        self._status = Status(server.gui)
+        self.status = Status(server.gui)
         if not simulation.real:
             arms = server.gui.add_dropdown("Arms", _ARMS, hint="Three: blind, paper and pretouch with one hand.")
             when_changed(arms, self.actions, self._show_arms, "arms")
         self.controls = Controls(server.gui, simulation, self.actions)
         self.drive = Drive(server, simulation, self.actions)
-        self._scene = Scene(server, simulation.world)
-        self._status.notice = f"{self._scene.notice} {simulation.notice}".strip()
+        self._scene = Scene(server, simulation.world, on_drag=self._drag)
+        self.status.notice = f"{self._scene.notice} {simulation.notice}".strip()
         simulation.notice = ""
-        self._scene.on_hand(self._drag)
         self._history = History(simulation.skin.first)
         self._plots = Plots(server.gui, self._history, [unit.id for unit in simulation.skin.mounted])
         self.controls.fold_rest(self._scene.show)
-
-    @property
-    def notice(self) -> str:
-        """The notice shown to people, or ''."""
-        return self._status.notice
 
     def _drag(self, eye: FloatArray, place: FloatArray) -> None:
         self.actions.put(lambda: self._simulation.point_hand(eye, place), "hand", quiet=True)
@@ -76,8 +70,8 @@ class LivePage:
         """Have the arm hold after an error that nobody foresaw, and say it once."""
         sentence = failure(error)
         self.controls.hold()
-        if self.notice != sentence:
-            self._status.notice = sentence
+        if self.status.notice != sentence:
+            self.status.notice = sentence
             self._say(sentence)
 
     def turn(self, now: float) -> None:
@@ -104,7 +98,7 @@ class LivePage:
             simulation.notice = "The receiver of the sensor units has ended: start the page again."
             self._say(simulation.notice)
         if simulation.notice:
-            self._status.notice, simulation.notice = simulation.notice, ""
+            self.status.notice, simulation.notice = simulation.notice, ""
             self.controls.refresh()
         if self._server.get_clients():
             self._draw(now)
@@ -123,11 +117,11 @@ class LivePage:
             simulation.opening = None  # from the first drag or click on, the page is the visitor's
         for action in actions:
             if not action.quiet:
-                self._status.notice = ""
+                self.status.notice = ""
             try:
                 action.run()
             except PretouchError as error:
-                self._status.notice = f"Not done: {error}"
+                self.status.notice = f"Not done: {error}"
         if actions:
             self.controls.refresh()
         if simulation.time < self._time:
@@ -151,13 +145,12 @@ class LivePage:
             if self._companions:
                 self._companions.draw(now)
             self._plots.draw(now)
-            velocities = (motion.velocity, motion.allowed) if motion else None
-            explanation = explain(step, world.units_in_use, world.model.links, velocities)
+            explanation = explain(step, world.units_in_use, world.model.links, motion.velocities if motion else None)
             rates = f"{pace.factor:.2f} × real time · {pace.updates:.0f} updates/s"
             rates = "paused" if self.controls.running.paused else rates
             recorded = f"recording {recording.place.name}" if recording else ""
             line = " · ".join(filter(None, (f"{step.stamp:.1f} s", rates, finds(step), recorded)))
-            self._status.draw(step.mode, explanation, line, pace.sentence(), now)
+            self.status.draw(step.mode, explanation, line, pace.sentence(), now)
             self.controls.offer_resume(resumable(step))
 
     def _follow_target(self, target: FloatArray) -> None:

@@ -64,7 +64,8 @@ def _capsules(segments: list[tuple[tuple[float, float, float], tuple[float, floa
 class PersonHand:
     """A fist where the simulated hand is, and a faint one where it is to be while that is elsewhere."""
 
-    def __init__(self, scene: SceneApi, radius: float, root: str = "") -> None:
+    def __init__(self, scene: SceneApi, radius: float, root: str = "", on_drag: Drag | None = None) -> None:
+        """Add it under a node; `on_drag` is called from the page's own thread. A drag of it never moves the camera."""
         self._hand = scene.add_frame(f"{root}/hand", show_axes=False)
         self._target = scene.add_frame(f"{root}/hand_target", show_axes=False, visible=False)
         for part, mesh, colour in (("fist", fist(radius), palette.HAND), ("cuff", cuff(radius), palette.CUFF)):
@@ -72,17 +73,15 @@ class PersonHand:
                 scene.add_mesh_simple(name, mesh.vertices, mesh.faces, color=colour, opacity=opacity, **SHADELESS)
         # barely there, and as lines, so that it hides nothing behind it
         look: dict[str, Any] = {"color": palette.HAND, "opacity": 0.01, "wireframe": True, "subdivisions": 2}
-        self._grip = scene.add_icosphere(f"{root}/hand/grip", GRIP * radius, **look, **SHADELESS)
+        grip = scene.add_icosphere(f"{root}/hand/grip", GRIP * radius, **look, **SHADELESS)
         self._position = self._offset = np.zeros(3)
+        if on_drag:
 
-    def on_drag(self, act: Drag) -> None:
-        """Have a function told of each drag, from the page's own thread. A drag of the hand never moves the camera."""
-
-        @self._grip.on_drag
-        async def _(event: Any) -> None:
-            if event.phase == "start":
-                self._offset = self._position - np.array(event.start_position)
-            act(np.array(event.client.camera.position), np.array(event.end_position) + self._offset)
+            @grip.on_drag
+            async def _(event: Any) -> None:
+                if event.phase == "start":
+                    self._offset = self._position - np.array(event.start_position)
+                on_drag(np.array(event.client.camera.position), np.array(event.end_position) + self._offset)
 
     def draw(self, hand: FloatArray | None, target: FloatArray | None) -> None:
         """Show hand and target (3,) [m]; None and what is not finite are not shown."""

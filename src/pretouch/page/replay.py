@@ -249,8 +249,7 @@ class ReplayPage:
             put(self._slider, round(player.time, 2))
         self._play.label = "Pause" if player.playing else "Play"
         rates = f"{player.time:.2f} of {player.duration:.2f} s · stamp {step.stamp:.2f} s · {self.run_name(cycle.run)}"
-        velocities = (motion.velocity, motion.allowed) if motion else None
-        explanation = explain(step, world.units_in_use, world.model.links, velocities)
+        explanation = explain(step, world.units_in_use, world.model.links, motion.velocities if motion else None)
         self._status.draw(step.mode, explanation, " · ".join(filter(None, (rates, finds(step)))), "", now)
 
     def run_name(self, run: int) -> str:

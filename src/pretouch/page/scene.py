@@ -32,8 +32,13 @@ PARTS = ("cones", "points", "pairs", "path", "trail", "forces")
 class Scene:
     """Draws worlds and frames; `now` is the time of the machine [s], which bounds how much is sent."""
 
-    def __init__(self, server: ViserServer, world: World, root: str = "", offset: float = 0.0) -> None:
-        """Draw a world under the node `root`, moved along y by an offset [m]; one without a root has the room."""
+    def __init__(
+        self, server: ViserServer, world: World, root: str = "", offset: float = 0.0, on_drag: Drag | None = None
+    ) -> None:
+        """Draw a world under the node `root`, moved along y by an offset [m]; one without a root has the room.
+
+        `on_drag` is called at each drag of the hand.
+        """
         self._world, self._root = world, root
         self._scene = scene = server.scene
         if root:
@@ -70,16 +75,11 @@ class Scene:
         self._touched = scene.add_frame(f"{root}/touched", show_axes=False)
         self._true_force = self._arrow(f"{root}/touched/true_force", palette.TRUE_FORCE)
         self._place = self._arrow(f"{root}/place", palette.PLACE)
-        self._hand = None if world.hand_radius is None else PersonHand(scene, world.hand_radius, root)
+        self._hand = None if world.hand_radius is None else PersonHand(scene, world.hand_radius, root, on_drag)
 
     def _arrow(self, name: str, colour: palette.Colour, radius: float = 0.007) -> ArrowsHandle:
         shape: dict[str, Any] = {"shaft_radius": radius, "head_radius": 2.5 * radius, "head_length": 0.04}
         return self._scene.add_arrows(name, np.zeros((1, 2, 3)), colour, **shape, visible=False)
-
-    def on_hand(self, act: Drag) -> None:
-        """Have a function told of each drag of the hand."""
-        if self._hand:
-            self._hand.on_drag(act)
 
     def remove(self) -> None:
         """Take a world that has a root out of the page."""
@@ -142,7 +142,7 @@ class Scene:
         self._goal.visible = goal is not None
         if goal is not None:
             self._goal.position, self._goal.wxyz = goal[:3, 3], quaternions(goal[:3, :3])
-        velocity, allowed = (None, None) if motion is None else (motion.velocity, motion.allowed)
+        velocity, allowed = (None, None) if motion is None else motion.velocities
         _point(self._asked, velocity, ARROW_LEAST_M_S)
         _point(self._allowed, allowed, ARROW_LEAST_M_S)
 

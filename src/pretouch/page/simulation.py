@@ -49,6 +49,8 @@ class LiveSimulation:
     """What stands still; another object after each change of it."""
     frame: Frame
     """The newest instant."""
+    room: Room
+    """What is simulated; another one after a reset."""
 
     def __init__(
         self,
@@ -89,7 +91,7 @@ class LiveSimulation:
         self.settings = settings
         """As it is set by now: what a reset begins with."""
         self.controller = Controller(self.model, self.skin, fixtures(room.scene), path, settings.profile)
-        self._room, self._state = room, self.controller.init(room.plant.read())
+        self.room, self._state = room, self.controller.init(room.plant.read())
         self._boxes = surroundings({"scene": described(room.scene)}).boxes
         self._resume, self._remainder, self.opening = False, 0.0, None
         self._pushes = Pushes(room.plant, (), 0.0)
@@ -101,12 +103,7 @@ class LiveSimulation:
     @property
     def time(self) -> float:
         """Time in the simulation [s]."""
-        return self._room.plant.time
-
-    @property
-    def stiffness(self) -> float:
-        """Of the person's hand and the object [N/m], as it is now."""
-        return self._room.stiffness
+        return self.room.plant.time
 
     # time passes
 
@@ -120,7 +117,7 @@ class LiveSimulation:
 
     def single_step(self) -> ControlStep:
         """Let one control cycle pass and return its step."""
-        room, resume = self._room, self._resume
+        room, resume = self.room, self._resume
         self._resume = False
         if self.opening:
             room.mouse.move(self.opening.target(self.frame.step))
@@ -141,24 +138,19 @@ class LiveSimulation:
     # what a person does
 
     @property
-    def hand_space(self) -> tuple[FloatArray, FloatArray]:
-        """Lowest and highest corner (3,) of where the hand can be led [m], base frame."""
-        return self._room.mouse.lowest, self._room.mouse.highest
-
-    @property
     def hand_target(self) -> FloatArray:
         """Where the hand is to be (3,) [m], base frame."""
-        return self._room.mouse.target
+        return self.room.mouse.target
 
     def move_hand(self, target: FloatArray) -> None:
         """Draw the hand to a place (3,) [m], base frame, or the nearest to it in the workspace; ends an opening."""
         self.opening = None
-        self._room.mouse.move(target)
+        self.room.mouse.move(target)
 
     def point_hand(self, eye: FloatArray, place: FloatArray) -> None:
         """Draw the hand to what an `eye` (3,) [m] sees at a place (3,) [m], as `Mouse.point` does; ends an opening."""
         self.opening = None
-        self._room.mouse.point(eye, place, self.model, self.frame.step.q)
+        self.room.mouse.point(eye, place, self.model, self.frame.step.q)
 
     def set_profile(self, profile: Profile) -> None:
         """Go on with other parameters; another control period is a ParameterError."""
@@ -178,11 +170,11 @@ class LiveSimulation:
     def set_stiffness(self, stiffness: float) -> None:
         """Give the person's hand and the object another stiffness [N/m], as soon as nothing touches."""
         self.settings = replace(self.settings, stiffness=stiffness)
-        self._room.set_stiffness(stiffness)
+        self.room.set_stiffness(stiffness)
 
     def set_faults(self, faults: Faults) -> None:
         """Have the units err as faults say; an unknown id, and any fault of real units, is a ParameterError."""
-        self._room.set_faults(faults)
+        self.room.set_faults(faults)
         self.settings = replace(self.settings, faults=faults)
 
     def push(self, force: FloatArray, duration: float) -> None:
@@ -199,7 +191,7 @@ class LiveSimulation:
         """Begin again at time 0 with a scripted hand, which is a person's again as soon as it is moved."""
         self.reset()
         scale = self.settings.placement.scale
-        self.opening = Opening(self.model, self._true_skin, self.controller.path, scale, self._room.mouse.target)
+        self.opening = Opening(self.model, self._true_skin, self.controller.path, scale, self.room.mouse.target)
 
     def reset(self, **changes: Any) -> None:
         """Begin again at time 0 with all as it is set by now, but for changes of `LiveSettings`; ends a recording."""
@@ -231,14 +223,14 @@ class LiveSimulation:
         self._update_world()
 
     def _update_world(self) -> None:
-        scene = self._room.scene
+        scene = self.room.scene
         radius = scene.hand.radius if scene.hand else None
         path, profile = self.controller.path, self.controller.profile
         self.world = World(self.model, self.skin, path, profile, self._boxes, radius, scene.floor_height)
 
     def _keep(self, cycle: Cycle, hand: FloatArray) -> None:
         """Empty the plant's log, into the recording if there is one."""
-        log, touches = self._room.plant.take_log()
+        log, touches = self.room.plant.take_log()
         if self.recording is None:
             return
         forces = [(time, force + self._pushes.at(time)) for time, force in log]
@@ -256,6 +248,6 @@ class LiveSimulation:
             "path": settings.path,
             "units": "real" if self.real else "simulated",
             "object": settings.object,
-            "stiffness_n_m": self.stiffness,
-            "scene": described(self._room.scene),
+            "stiffness_n_m": self.room.stiffness,
+            "scene": described(self.room.scene),
         }
