@@ -31,4 +31,4 @@ with TemporaryDirectory() as folder:
 
     recorded = pt.open_recording(place)
     speed = max(float(np.linalg.norm(kept.step.ee_velocity)) for kept in recorded)
-    print(f"Fastest: {speed:.2f} m/s. {pt.verify(recorded).said}")
+    print(f"Fastest: {speed:.2f} m/s. {pt.verify(recorded).sentence}")

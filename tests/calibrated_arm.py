@@ -8,8 +8,6 @@ from scipy.spatial.transform import Rotation
 from pretouch import loop
 from pretouch.calibration.motion.follow import PlanCommander, plan_controller
 from pretouch.calibration.motion.plan import Plan, Swing
-from pretouch.cli.skin_record import record_samples
-from pretouch.recording.skin_recording import SkinRecording
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.session.session import NoUnits
@@ -20,6 +18,7 @@ from pretouch.sim.range_finder import RangeFinderParams
 from pretouch.sim.scene import SceneSpec
 from pretouch.traces import JointTrace
 from pretouch.units.fleet import FleetParams
+from pretouch.units.skin_recording import SkinRecording
 from tests.wire_skin import WireSkin
 
 
@@ -49,7 +48,7 @@ def record_motion(model: RobotModel, skin: Skin, place: Path, joints_too: bool =
                 positions.append(np.array(state.q))
                 if joints_too:
                     recording.joints(np.array([state.stamp]), positions[-1][None], None, model.joints)
-                record_samples(recording, wire.receiver.take_samples(), skin.ids)
+                recording.add(wire.receiver.take_samples(), skin.ids)
 
         clock, options = PlantClock(plant, 0.01), loop.Options(desired=commander)
         loop.run(controller, plant, NoUnits(), clock, Recorder(), commander.done, options)

@@ -10,8 +10,8 @@ from matplotlib.image import imread
 
 from pretouch.cli.detect import Detect
 from pretouch.errors import ParameterError, PretouchError, RecordingError
-from pretouch.recording.skin_recording import SkinRecording
 from pretouch.recording.writer import Recording
+from pretouch.units.skin_recording import SkinRecording
 from tests.following_arm import Arm
 from tests.imported_data.files import PUSHES, force_columns, pushed, wrenches, write_bag, write_csv
 from tests.imported_data.joint_files import Moving
@@ -44,7 +44,7 @@ def test_what_was_read_assumed_and_found_is_printed_and_on_a_page(capsys, file, 
 def test_of_a_recording_of_units_it_is_said_what_can_be_done_with_it(tmp_path):
     place = tmp_path / "units.mcap"
     with SkinRecording(place) as recording:
-        recording.sample("wrist", heard(0.02)[0], new=True)
+        recording.add(heard(0.02)[:1], ["wrist"])
     with pytest.raises(
         RecordingError, match="holds samples of sensor units, but none of geometry_msgs/WrenchStamped: read it with"
     ) as caught:

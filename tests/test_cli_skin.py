@@ -16,10 +16,10 @@ import pytest
 
 from pretouch import cli
 from pretouch.cli.skin_monitor import only_here
-from pretouch.recording.skin_reader import read_skin
 from pretouch.sensing.skin import PAPER_SKIN
 from pretouch.types import RangeStatus
 from pretouch.units.keys import Keys, UnitKey, load_keys, new_key, save_keys
+from pretouch.units.skin_reader import read_skin
 from pretouch.units.udp import EVERYWHERE
 from tests.ports import free_port
 from tests.units.desk import Desk
@@ -205,7 +205,7 @@ def test_a_monitor_that_is_ended_leaves_its_recording(keys, port, tmp_path, numb
     assert "Traceback" not in err
     trace = read_skin(place)
     assert trace.complete == (number != signal.SIGKILL)
-    assert sent - trace.units["wrist"].samples[-1].sample["sequence"] <= 55
+    assert sent - trace.units["wrist"].samples[-1].sample.sequence <= 55
     assert out.count("units.mcap holds") == (number != signal.SIGKILL)
 
 

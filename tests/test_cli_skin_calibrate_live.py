@@ -18,10 +18,10 @@ from pretouch.calibration.motion.follow import plan_controller
 from pretouch.calibration.motion.plan import Plan
 from pretouch.cli.calibrate import live
 from pretouch.errors import RecordingError
-from pretouch.recording.calibration_data import read_measured
 from pretouch.sensing.skin import load_skin
 from pretouch.session.motion import Ending, go
 from pretouch.signals import Terminated, ends_raise, exit_code, noted_in_motion
+from pretouch.units.skin_reader import read_skin
 from tests.calibrated_arm import assert_same_places
 from tests.session.arms import FollowingArm
 
@@ -136,7 +136,7 @@ def test_the_units_of_an_arm_that_moves_here_and_now_are_found(panda_model, pape
     assert "Skin file: skin.toml has 7 units where they were found." in out
     # each board of the simulation is glued on askew by up to half a degree about each axis
     assert_same_places(load_skin(tmp_path / "skin.toml", panda_model), paper_skin, within_deg=1.0)
-    measured = read_measured(tmp_path / "skin-calibration-1.mcap")
+    measured = read_skin(tmp_path / "skin-calibration-1.mcap")
     assert measured.complete
     assert 35.0 < np.ptp(measured.joints.stamp) < 40.0
     assert sorted(measured.units) == sorted(paper_skin.ids)
@@ -159,4 +159,4 @@ def test_a_motion_that_is_interrupted_leaves_its_recording_and_says_how_to_go_on
     assert re.search(r"The arm was stopped\. skin-calibration-1\.mcap holds \d+ samples, in .* MB\.", out)
     assert "pretouch skin calibrate --recording skin-calibration-1.mcap --arm panda --out skin.toml" in out
     assert not (tmp_path / "skin.toml").exists()
-    assert read_measured(tmp_path / "skin-calibration-1.mcap").joints is not None
+    assert read_skin(tmp_path / "skin-calibration-1.mcap").joints is not None

@@ -9,9 +9,9 @@ import pytest
 
 from pretouch import cli
 from pretouch.cli.calibrate import recording as recording_way
-from pretouch.recording.calibration_data import read_measured
 from pretouch.sensing.skin import Skin, load_skin, save_skin
 from pretouch.traces import JointTrace
+from pretouch.units.skin_reader import read_skin
 from tests.calibrated_arm import assert_same_places, record_motion
 
 pytestmark = pytest.mark.slow
@@ -43,9 +43,9 @@ def read_as(recorded, monkeypatch):
     """Have the recording read as if some of it were otherwise; `whole` is all of it."""
 
     def changed(**changes):
-        monkeypatch.setattr(recording_way, "read_measured", lambda place: replace(changed.whole, **changes))
+        monkeypatch.setattr(recording_way, "read_skin", lambda place: replace(changed.whole, **changes))
 
-    changed.whole = read_measured(recorded / "units.mcap")
+    changed.whole = read_skin(recorded / "units.mcap")
     return changed
 
 

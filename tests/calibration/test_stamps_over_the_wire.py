@@ -7,8 +7,6 @@ import pytest
 
 from pretouch.calibration.stamps import instants, retimed
 from pretouch.control.path import Circle
-from pretouch.recording.calibration_data import read_measured
-from pretouch.recording.skin_recording import SkinRecording
 from pretouch.robot.postures import brought_to
 from pretouch.sim.imu import ImuParams, Imus
 from pretouch.sim.plant import Plant
@@ -17,6 +15,8 @@ from pretouch.sim.range_finder import RangeFinderParams
 from pretouch.sim.scene import SceneSpec
 from pretouch.units.channel import ChannelParams, NetworkParams
 from pretouch.units.fleet import FleetParams
+from pretouch.units.skin_reader import read_skin
+from pretouch.units.skin_recording import SkinRecording
 from tests.wire_skin import WireSkin
 
 EVEN = ChannelParams(delay_s=0.0012, jitter_s=0.0012, jitter_shape=2.0)
@@ -39,15 +39,14 @@ def recorded(place, model, skin, network, duration, reboot_every):
         )
         for _ in range(round(duration / 0.1)):
             plant.advance(0.1)
-            for heard in units.receiver.take_samples():
-                recording.sample(skin.ids[heard.unit], heard, False)
+            recording.add(units.receiver.take_samples(), skin.ids)
         reboots = sum(unit.reboots for unit in units.receiver.units)
     return true, reboots
 
 
 def instants_of_samples(place, ids, true):
     """Yield what was found for each unit, the true instants of its samples, and its samples."""
-    found = read_measured(place)
+    found = read_skin(place)
     lsb = 1e-3 * np.repeat((np.deg2rad(17.5), 0.122 * 9.80665), 3)
     for name, by_counts in zip(ids, true, strict=True):
         imu, counters = found.units[name].imu, found.units[name].counters

@@ -22,8 +22,6 @@ from pretouch.importing.chain import arm_of
 from pretouch.importing.read import read_robot
 from pretouch.profiles import profile
 from pretouch.recording.reader import open_recording
-from pretouch.recording.skin_reader import read_skin
-from pretouch.recording.skin_recording import SkinRecording
 from pretouch.robot.description import description_text, load_description, panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import load_skin, paper_skin, skin_file
@@ -31,14 +29,16 @@ from pretouch.session.residual_file import Residual, load_residual, save_residua
 from pretouch.sim.randomisation import FOLDER, world_set
 from pretouch.types import RangeStatus
 from pretouch.units.keys import load_keys, save_keys
+from pretouch.units.skin_reader import read_skin
+from pretouch.units.skin_recording import SkinRecording
 from pretouch.units.wire import TAG_SIZE
 from tests.fuzz.mutations import Change, changed, changes
 from tests.imported_data.files import STORE1, pushed, wrenches, write_bag1, write_csv
 from tests.imported_data.joint_files import Moving
 from tests.importing.made import six_axis
 from tests.recording.runs import controller_of, recorded_run
-from tests.recording.test_skin_recording import record
 from tests.units.fake_unit import KEYS, Bench
+from tests.units.test_skin_recording import record
 
 SOON_S = 10.0
 """Longest time for anything that is read [s]."""

@@ -10,7 +10,7 @@ from typing import get_args
 
 import numpy as np
 
-from pretouch.recording.fields import hints_of, is_record
+from pretouch.recording.ros import hints_of, is_record
 from pretouch.types import ControlStep
 
 FIELDS = {

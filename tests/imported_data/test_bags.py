@@ -9,7 +9,7 @@ from pretouch.errors import RecordingError
 from pretouch.imported_data.forces import read_force
 from pretouch.imported_data.log import Choice
 from pretouch.imported_data.reading import open_log, read_joints
-from pretouch.recording.skin_recording import SkinRecording
+from pretouch.units.skin_recording import SkinRecording
 from tests.imported_data.files import PANDA, START, by_time, joints, stamps, wrench, wrenches, write_bag
 
 FORCE = np.random.default_rng(0).normal(size=(40, 3))

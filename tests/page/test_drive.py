@@ -124,7 +124,7 @@ def test_a_drive_at_the_person_is_recorded_shown_again_and_replayed_to_the_bit(
     simulation.stop_recording()
     recorded = open_recording(tmp_path / "drive.mcap")
     verdict = verify(recorded)
-    assert verdict.exact, verdict.said
+    assert verdict.exact, verdict.sentence
     assert (verdict.checked, verdict.skipped) == (len(recorded), {})
     assert {kept.inputs.desired.kind for kept in recorded} == {DesiredKind.TWIST, DesiredKind.POSE}
     last, world = recorded[len(recorded) - 1], world_of(recorded.runs[0])

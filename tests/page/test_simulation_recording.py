@@ -69,7 +69,7 @@ def test_each_step_is_kept_with_what_only_the_simulation_knows_and_is_recomputed
     assert [box["name"] for box in scene["boxes"]] == ["object"]
     assert scene["hand_radius_m"] == 0.05
     verdict = verify(recorded)
-    assert verdict.agrees, verdict.said
+    assert verdict.agrees, verdict.sentence
     assert verdict.exact
     assert (verdict.checked, verdict.skipped) == (len(steps), {})
     assert any(kept.step.mode is Mode.REACT for kept in recorded)

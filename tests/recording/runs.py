@@ -15,7 +15,7 @@ from pretouch.controller import Controller, ControllerState
 from pretouch.loop import Cycle
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import PROFILES, Profile
-from pretouch.recording.cycles import encoded_step, step_of
+from pretouch.recording.ros import encode, value_of
 from pretouch.recording.writer import Recording
 from pretouch.robot.description import RobotDescription
 from pretouch.robot.model import RobotModel
@@ -129,6 +129,6 @@ def steps_changed(source: Path, place: Path, changes: dict[int, Callable[[Contro
     def change(topic: str, number: int, data: bytes) -> bytes:
         if topic != "/pretouch/step" or number not in changes:
             return data
-        return encoded_step(number, changes[number](step_of(data)))
+        return encode(changes[number](value_of(ControlStep, data)), number)
 
     return changed(source, place, change)

@@ -15,19 +15,9 @@ from pretouch.contact.window import window_init
 from pretouch.errors import RecordingError
 from pretouch.loop import Cycle
 from pretouch.modes import Event, ModeState
-from pretouch.recording.cycles import (
-    Cycles,
-    encoded_step,
-    encoded_truth,
-    inputs_of,
-    packed_inputs,
-    packed_state,
-    state_of,
-    step_of,
-    truth_of_message,
-)
-from pretouch.recording.fields import hints_of
-from pretouch.recording.ros import OWN, decoded, definition, messages, own, own_definition
+from pretouch.recording.cycles import Cycles, KeptInputs, KeptState, inputs_of, packed_inputs, packed_state
+from pretouch.recording.packing import unpacked
+from pretouch.recording.ros import OWN, decoded, definition, encode, hints_of, messages, own, own_definition, value_of
 from pretouch.recording.simulation import Truth, truth_of
 from pretouch.records import Flat
 from pretouch.types import (
@@ -105,39 +95,36 @@ def places(draw: st.DrawFn) -> Touched:
 
 @given(all_inputs(), st.integers(-1, 2**62))
 def test_inputs_come_back_to_the_bit_whatever_their_lengths(inputs, points_at):
-    back, at, unreadable = inputs_of(packed_inputs(inputs, points_at))
-    assert (at, unreadable) == (points_at, "")
-    assert same(back, inputs)
+    assert same(inputs_of(packed_inputs(inputs, points_at)), KeptInputs(inputs, points_at, ""))
 
 
 @given(steps())
 def test_a_step_comes_back_to_the_bit_in_arrays_as_fresh_ones(step):
-    data = encoded_step(7, step)
-    back = step_of(data)
+    data = encode(step, 7)
+    back = value_of(ControlStep, data)
     assert struct.unpack_from("<Q", data, 4)[0] == decoded(own("Step"), data).sequence == 7
     assert same(back, step)
-    assert encoded_step(7, back) == data
+    assert encode(back, 7) == data
     for array in (back.q, back.obstacles.point, back.obstacles.unit, back.thresholds.lower, back.command):
         assert array.flags.aligned
         assert array.flags.writeable
         assert array.flags.c_contiguous
 
 
-@given(rows(4), rows(4, 3), rows(3), st.lists(st.tuples(NAN_TOO, st.integers(-5, 99), rows(3)), max_size=3))
-def test_truth_comes_back_to_the_bit(time, force, hand, touches):
-    truth = Truth(time, force, hand, tuple(touches))
-    assert same(truth_of_message(encoded_truth(3, truth)), truth)
+@given(st.builds(Truth, rows(4), rows(4, 3), rows(3), rows(2), wholes(2), rows(2, 3)))
+def test_truth_comes_back_to_the_bit(truth):
+    assert same(value_of(Truth, encode(truth, 3)), truth)
 
 
 def test_what_a_simulation_logged_is_gathered_as_it_is():
     log = [(0.5, np.array([1.0, 2.0, 3.0])), (0.501, np.zeros(3))]
-    touch = SimpleNamespace(time=0.501, link=4, velocity=np.array([0.0, 0.1, 0.0]))
+    touch = (0.501, 4, np.array([0.0, 0.1, 0.0]))
     truth = truth_of(log, [touch], np.array([0.7, 0.0, 0.4]))
     assert truth.time.tolist() == [0.5, 0.501]
     assert truth.force.tolist() == [[1.0, 2.0, 3.0], [0.0, 0.0, 0.0]]
     assert truth.hand.tolist() == [0.7, 0.0, 0.4]
-    assert truth.touches == ((0.501, 4, touch.velocity),)
-    nothing = truth_of_message(encoded_truth(3, truth_of([], [], None)))
+    assert [(time, link, v.tolist()) for time, link, v in truth.touches] == [(0.501, 4, [0.0, 0.1, 0.0])]
+    nothing = value_of(Truth, encode(truth_of([], [], None), 3))
     assert (nothing.force.shape, len(nothing.touches), np.isnan(nothing.hand).all()) == ((0, 3), 0, True)
 
 
@@ -183,9 +170,9 @@ SPOILED = [
 def test_inputs_that_cannot_be_kept_are_none_and_said(run, spoil):
     cycle = run.cycles[3]
     kept = Cycles(run.controller, {}).keep(Cycle(spoil(cycle.inputs), cycle.before, cycle.step, cycle.after))
-    back, _, unreadable = inputs_of(kept.inputs)
-    assert back is None
-    assert 0 < len(unreadable) < 5000
+    back = inputs_of(kept.inputs)
+    assert back.inputs is None
+    assert 0 < len(back.unreadable) < 5000
 
 
 @pytest.mark.parametrize(
@@ -208,14 +195,12 @@ def test_inputs_that_cannot_be_kept_are_none_and_said(run, spoil):
 def test_arrays_of_other_types_and_shapes_are_kept_as_they_are_and_numbers_as_the_controller_takes_them(
     change, same_as
 ):
-    assert same(inputs_of(packed_inputs(change(usual())))[0], same_as(usual()))
+    assert same(inputs_of(packed_inputs(change(usual()))).inputs, same_as(usual()))
 
 
 def test_each_state_of_a_run_comes_back_to_the_bit(run):
     for cycle in run.cycles:
-        anew, back = state_of(packed_state(cycle.before, True))
-        assert anew
-        assert same(back, cycle.before)
+        assert same(unpacked(KeptState, packed_state(cycle.before, True)), KeptState(True, cycle.before))
 
 
 ANY = st.floats() | st.sampled_from([-0.0, np.inf, -np.inf, 5e-324])
@@ -227,17 +212,15 @@ def test_any_numbers_counts_and_lengths_come_back(run, number, samples, latched,
     odd = replace(
         run.cycles[-1].before, memory=memory, mode=ModeState(mode, event, "Für", "Für ä: 'x'.", latched)
     )  # fmt: skip
-    anew, back = state_of(packed_state(odd, False))
-    assert not anew
-    assert same(back, odd)
+    assert same(unpacked(KeptState, packed_state(odd, False)), KeptState(False, odd))
 
 
 def test_a_state_of_another_version_is_refused_with_what_differs(run):
     data = packed_state(run.cycles[-1].before, False)
     with pytest.raises(RecordingError, match=r"reaction.*from another version"):
-        state_of(data.replace(b"reaction", b"reacsion"))
+        unpacked(KeptState, data.replace(b"reaction", b"reacsion"))
     with pytest.raises(RecordingError, match="cannot be read"):
-        state_of(data[:-9])
+        unpacked(KeptState, data[:-9])
 
 
 MIRRORED = {Obstacles: "Obstacles", Contact: "Contact", QpSolution: "QpSolution", Touched: "Touched",
@@ -247,20 +230,19 @@ MIRRORED = {Obstacles: "Obstacles", Contact: "Contact", QpSolution: "QpSolution"
 @pytest.mark.parametrize("kind", MIRRORED)
 def test_messages_mirror_the_types_field_by_field(kind):
     there = {name for name, _ in messages().store.fielddefs[own(MIRRORED[kind])][1]}
-    beside = {"sequence", "has_contact", "touch_time", "touch_link", "touch_velocity", "touches"}
-    assert there - beside == {name for name, _ in hints_of(kind)} - beside
+    assert there - {"sequence", "has_contact"} == {name for name, _ in hints_of(kind)}
 
 
 def test_the_rows_of_the_thresholds_have_their_names(run):
     step = replace(run.cycles[0].step, thresholds=Thresholds(*np.arange(18.0).reshape(6, 3)))
-    message = decoded(own("Step"), encoded_step(0, step)).thresholds
+    message = decoded(own("Step"), encode(step, 0)).thresholds
     for name, _ in messages().store.fielddefs[own("Thresholds")][1]:
         assert getattr(message, name).tobytes() == getattr(step.thresholds, name).tobytes()
 
 
 def test_an_array_of_another_type_than_its_field_is_refused(run):
     with pytest.raises(ValueError, match="q is an array of float32, not float64"):
-        encoded_step(0, replace(run.cycles[0].step, q=np.zeros(7, np.float32)))
+        encode(replace(run.cycles[0].step, q=np.zeros(7, np.float32)), 0)
 
 
 @pytest.mark.parametrize("name", OWN)
@@ -275,12 +257,12 @@ def test_each_field_of_a_message_file_is_explained_and_the_definition_that_is_em
 
 @given(steps(), st.data())
 def test_a_step_that_is_cut_or_changed_is_no_worse_than_a_recording_error(step, data):
-    whole = bytearray(encoded_step(0, step))
+    whole = bytearray(encode(step, 0))
     cut = data.draw(st.integers(0, len(whole)))
     at = data.draw(st.integers(0, len(whole) - 1))
     whole[at] = data.draw(st.integers(0, 255))
     for spoiled in (bytes(whole[:cut]), bytes(whole)):
         try:
-            step_of(spoiled)
+            value_of(ControlStep, spoiled)
         except RecordingError:
             continue

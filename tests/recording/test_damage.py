@@ -61,7 +61,7 @@ def test_a_file_cut_off_at_any_byte_gives_its_whole_chunks(tmp_path, stride):
     counts = [len(kept[size]) for size in sorted(kept)]
     assert refused < min(kept)
     assert counts == sorted(counts)
-    assert all("the end is missing" in recorded.said for recorded in kept.values())
+    assert all("the end is missing" in recorded.sentence for recorded in kept.values())
     assert len(kept[max(kept)]) == len(run.cycles)
     assert opened(place).complete
 
@@ -80,7 +80,7 @@ def test_a_damaged_chunk_without_an_index_ends_what_is_read(tiny, tmp_path, at):
     data[start + at] ^= 0xFF
     (tmp_path / "a.mcap").write_bytes(data)
     recorded = opened(tmp_path / "a.mcap")
-    assert "damaged; every whole part before it is read" in recorded.said
+    assert "damaged; every whole part before it is read" in recorded.sentence
     assert 0 < len(recorded) < len(run.cycles)
     assert all(same(kept.step, c.step) for kept, c in zip(recorded, run.cycles, strict=False))
 
@@ -220,8 +220,8 @@ def test_a_profile_of_another_version_or_that_cannot_be_is_refused_with_what_dif
     [
         {"profile": 3}, {"versions": "3"}, {"about": "x"}, {"robot": "name = 3"}, {"arm": "<mujoco"},
         {"arm": "<mujoco/>"}, {"units": {}}, {"units": [{"id": "a"}]}, {"planes": bytes(24)}, {"planes": [1, "a"]},
-        {"path": {"kind": "Circle", "numbers": bytes(16), "length": 1.0, "closed": True}},
-        {"path": {"kind": "WayPoints", "numbers": ["<f8", [1, 3], bytes(24)], "length": 1.0, "closed": True}},
+        {"path": {"kind": "Circle", "numbers": bytes(16), "closed": True}},
+        {"path": {"kind": "WayPoints", "numbers": ["<f8", [1, 3], bytes(24)], "closed": True}},
         {"path": None},
     ],
     ids=lambda parts: "-".join(parts),

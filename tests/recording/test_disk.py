@@ -64,12 +64,12 @@ def test_a_disk_without_room_for_anything_is_one_sentence(controller, tmp_path):
     [(errno.EIO, "check the disk"), *((full, "free some space") for full in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG))],
 )
 def test_a_disk_that_fails_is_one_sentence(controller, tmp_path, monkeypatch, number, remedy):
-    def fail(handle, data):
+    def fail(writer):
         raise OSError(number, os.strerror(number))
 
     run = Run(controller)
     recording = Recording(tmp_path / "a.mcap", controller)
-    monkeypatch.setattr(disk.os, "write", fail)
+    monkeypatch.setattr(disk.Writer, "flush", fail)
     recording.record(run.turn())
     said = recording.close().sentence
     assert os.strerror(number) in said
@@ -155,7 +155,7 @@ else:
 def ended(place: Path, how: str, after: float, number: int | None) -> tuple[float, int, str]:
     """Let a program record, end it by a signal; return the last stamp it told, its exit code and its errors."""
     root = Path(__file__).parents[2]
-    environment = {**os.environ, "PYTHONPATH": str(root)}
+    environment = {**os.environ, "PYTHONPATH": f"{root / 'src'}{os.pathsep}{root}"}
     with subprocess.Popen(
         [sys.executable, "-c", PROGRAM, str(place), how], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         env=environment,
@@ -177,7 +177,7 @@ def test_a_killed_process_loses_at_most_the_last_second(tmp_path):
     assert code == -signal.SIGKILL
     recorded = open_recording(place)
     assert not recorded.complete
-    assert "the end is missing" in recorded.said
+    assert "the end is missing" in recorded.sentence
     assert recorded.stamps()[-1] >= last - 1.0
     assert verify(recorded).agrees
 

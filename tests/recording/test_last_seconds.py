@@ -49,7 +49,7 @@ def test_a_latched_hold_leaves_its_last_seconds(controller, tmp_path):
     assert last.step.mode is Mode.HOLD
     assert recorded.stamps()[[0, -1]] == pytest.approx([3.0, 6.5], abs=0.015)
     verdict = verify(recorded)
-    assert verdict.agrees, verdict.said
+    assert verdict.agrees, verdict.sentence
     assert verdict.checked == len(recorded) >= 350
 
 
@@ -134,7 +134,7 @@ def test_inputs_that_fit_no_message_and_arrays_used_again_are_no_trouble(control
     kept.close()
     found = open_recording(tmp_path / "hold-1.mcap")
     assert found[20].inputs is None
-    assert "robot=None" in found.unreadable(20)
+    assert "robot=None" in found[20].unreadable
     assert verify(found).agrees
 
 

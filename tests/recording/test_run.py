@@ -47,14 +47,13 @@ def test_a_path_of_another_class_is_drawn_and_has_to_be_given_to_go_on(controlle
     recorded_run(tmp_path / "a.mcap", controller_of(controller.model, controller.skin, path=path), 40)
     recorded = open_recording(tmp_path / "a.mcap")
     near = recorded.runs[0].path
-    assert (near.length, near.closed) == (1.0, False)
-    for phase in (0.0, 0.2, 0.55, 1.0):
-        assert np.allclose(near.point(phase), path.point(phase), atol=1e-3)
-    assert np.linalg.norm(near.tangent(0.2)) == pytest.approx(1.0)
+    assert near.closed is False
+    for share in (0.0, 0.2, 0.55, 1.0):
+        assert np.linalg.norm(near.points - path.point(share), axis=1).min() < 2e-3
     with pytest.raises(RecordingError, match=r"class SimpleNamespace.*run\.controller\(path=\.\.\.\)"):
         verify(recorded)
     verdict = verify(recorded, path=path)
-    assert verdict.agrees, verdict.said
+    assert verdict.agrees, verdict.sentence
     assert verdict.exact
 
 

@@ -39,7 +39,7 @@ def test_a_run_is_recomputed_bit_for_bit(made):
     assert verdict.agrees
     assert verdict.exact
     assert (verdict.steps, verdict.checked, verdict.skipped, verdict.differing) == (400, 400, {}, 0)
-    assert verdict.said == "All 400 steps were recomputed and are the same bit for bit."
+    assert verdict.sentence == "All 400 steps were recomputed and are the same bit for bit."
     assert done == list(range(1, 401))
 
 
@@ -64,7 +64,7 @@ def test_whatever_comes_in_is_recomputed_bit_for_bit(seed, tmp_path):
         course.run(250)
     recorded = open_recording(tmp_path / "a.mcap")
     verdict = verify(recorded)
-    assert verdict.agrees, verdict.said
+    assert verdict.agrees, verdict.sentence
     assert verdict.checked == len(recorded) == 250
 
 
@@ -74,10 +74,10 @@ def test_inputs_that_could_not_be_kept_are_skipped_and_the_rest_is_recomputed(co
         for i in range(60):
             recording.record(run.turn(lambda inputs, i=i: replace(inputs, robot=None) if i in (20, 21, 40) else inputs))
     verdict = verify(open_recording(tmp_path / "a.mcap"))
-    assert verdict.agrees, verdict.said
+    assert verdict.agrees, verdict.sentence
     assert verdict.checked == 57
     assert verdict.skipped == {"inputs that could not be kept": 3}
-    assert "3 steps have inputs that could not be kept" in verdict.said
+    assert "3 steps have inputs that could not be kept" in verdict.sentence
 
 
 def test_a_change_of_profile_and_path_is_followed(controller, tmp_path):
@@ -96,7 +96,7 @@ def test_a_change_of_profile_and_path_is_followed(controller, tmp_path):
     assert [(each.profile.name, each.sequence) for each in recorded.runs] == [(SHORT.name, 0), ("p30", 30), ("p60", 60)]
     assert recorded.runs[0].about == {"command": "test"}
     verdict = verify(recorded)
-    assert verdict.agrees, verdict.said
+    assert verdict.agrees, verdict.sentence
     assert verdict.checked == 90
 
 
@@ -117,8 +117,8 @@ def test_a_bit_that_was_flipped_is_the_first_difference(place, tmp_path):
     assert verdict.first.stamp == made[123].step.stamp
     assert np.nextafter(verdict.first.recomputed, 1.0) == verdict.first.recorded
     assert (verdict.largest, verdict.largest_field) == (pytest.approx(0.25), "ee_position[1]")
-    assert "step 123 at 1.2" in verdict.said
-    assert "qp.qd[3] was" in verdict.said
+    assert "step 123 at 1.2" in verdict.sentence
+    assert "qp.qd[3] was" in verdict.sentence
 
 
 @pytest.mark.parametrize(
@@ -170,11 +170,11 @@ def test_steps_that_are_missing_are_passed_to_the_next_snapshot(place, tmp_path)
 
     made = open_recording(changed(place, tmp_path / "b.mcap", change))
     verdict = verify(made)
-    second = made.number(snapshots(made)[1])
+    second = made[snapshots(made)[1]].number
     assert verdict.first is None
     assert not verdict.agrees
     assert verdict.skipped == {"gone missing": 10, "no snapshot before": second - 60}
-    assert "10 steps have gone missing" in verdict.said
+    assert "10 steps have gone missing" in verdict.sentence
     assert verdict.checked == 390 - (second - 60)
 
 
@@ -184,7 +184,7 @@ def test_inputs_that_are_missing_are_no_inputs_that_could_not_be_kept(place, tmp
         changed(place, tmp_path / "b.mcap", lambda topic, number, data: None if (topic, number) == gone else data)
     )
     assert recorded[50].inputs is None
-    assert recorded.unreadable(50) == "they are missing"
+    assert recorded[50].unreadable == "they are missing"
     verdict = verify(recorded)
     assert not verdict.agrees
     assert verdict.skipped["no inputs in the file"] == 1
@@ -201,10 +201,10 @@ def test_other_versions_are_held_against_a_tolerance_and_named(place, tmp_path, 
 
     elsewhere(monkeypatch)
     verdict = shifted(9e-7)
-    assert verdict.agrees, verdict.said
+    assert verdict.agrees, verdict.sentence
     assert not verdict.exact
-    assert "within 1e-06" in verdict.said
-    assert "here 9" in verdict.said
+    assert "within 1e-06" in verdict.sentence
+    assert "here 9" in verdict.sentence
     verdict = shifted(2e-6)
     assert (verdict.first.number, verdict.first.field) == (5, "path_phase")
 

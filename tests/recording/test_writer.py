@@ -33,7 +33,7 @@ def test_all_cycles_come_back_to_the_bit(made):
     place, run = made
     recorded = open_recording(place)
     assert recorded.complete
-    assert recorded.said == ""
+    assert recorded.sentence == ""
     assert recorded.runs[0].about == {"seed": 0}
     assert len(recorded) == len(run.cycles)
     for kept, cycle in zip(recorded, run.cycles, strict=True):
@@ -132,8 +132,8 @@ def test_a_snapshot_follows_inputs_that_fit_no_message_and_time_that_went_back(c
     recorded = open_recording(tmp_path / "a.mcap")
     assert [i for i, kept in enumerate(recorded) if kept.snapshot] == [0, 5, 8]
     assert [i for i, kept in enumerate(recorded) if kept.inputs is None] == [4]
-    assert "robot=None" in recorded.unreadable(4)
-    assert recorded.unreadable(5) == ""
+    assert "robot=None" in recorded[4].unreadable
+    assert recorded[5].unreadable == ""
 
 
 def test_a_state_that_was_begun_anew_is_noticed(controller, tmp_path):
@@ -210,7 +210,6 @@ def test_closing_twice_says_the_same_and_later_cycles_are_left_out(controller, t
     recording.record(run.turn())
     closed = recording.close()
     recording.record(run.turn())
-    recording.imu("hand_left", np.zeros(1), np.zeros((1, 3)), np.zeros((1, 3)))
     assert recording.close() is closed
     assert (closed.steps, closed.duration_s) == (2, 0.01)
     assert "2 control steps" in closed.sentence

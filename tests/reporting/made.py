@@ -54,7 +54,7 @@ class Recorded:
     runs: tuple
     kept: list
     complete: bool = True
-    said: str = ""
+    sentence: str = ""
 
     def __len__(self):
         return len(self.kept)
@@ -137,7 +137,7 @@ def truth(time, force, touches=()):
     """True forces along -y at some instants."""
     along = np.zeros((len(time), 3))
     along[:, 1] = -np.asarray(force)
-    return Truth(np.asarray(time, dtype=float), along, np.full(3, np.nan), tuple(touches))
+    return truth_of(list(zip(time, along, strict=True)), touches, None)
 
 
 def recorded(model, skin, steps, *, given=None, truths=None, **changes):

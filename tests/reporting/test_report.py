@@ -65,7 +65,7 @@ def test_a_killed_file_makes_a_page_that_says_so(folder, tmp_path):
     whole = (place / "trial.mcap").read_bytes()
     cut = tmp_path / "cut.mcap"
     cut.write_bytes(whole[: 2 * len(whole) // 3])
-    said = open_recording(cut).said
+    said = open_recording(cut).sentence
     assert said
     text = write_page([cut], tmp_path / "cut.html").read_text()
     assert '<span class="bad">' in text

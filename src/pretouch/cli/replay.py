@@ -69,8 +69,8 @@ class Replay:
         other = find_profile(self.profile) if self.profile else None
         with numbers_to(self.json) as write:
             recorded, found = open_recording(self.file), None
-            if recorded.said:
-                console.print(recorded.said, markup=False)
+            if recorded.sentence:
+                console.print(recorded.sentence, markup=False)
             if page and not self.verify and not self.json:
                 console.print(told(recorded), markup=False)
             else:
@@ -82,7 +82,7 @@ class Replay:
                 prepare(recorded.runs[0].profile)
                 with _Progress("Recomputing", len(recorded)) as advance:
                     verdict = recompute(recorded, advance)
-                console.print(verdict.said, markup=False)
+                console.print(verdict.sentence, markup=False)
             elif other:
                 with _Progress("Comparing", len(recorded)) as advance:
                     comparison = compare(recorded, other, advance)

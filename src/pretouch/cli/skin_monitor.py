@@ -15,12 +15,10 @@ from rich.console import Console
 from rich.live import Live
 
 from pretouch.cli.options import JsonFile, Numbers, OptionalFile, Words
-from pretouch.cli.skin_record import record
 from pretouch.cli.skin_table import line, thrown_away, view
 from pretouch.cli.writing import numbers_to
 from pretouch.errors import HardwareError
 from pretouch.perception.scene_filter import no_fixtures
-from pretouch.recording.skin_recording import SkinRecording
 from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import load_skin
@@ -32,6 +30,7 @@ from pretouch.units.keys import load_keys
 from pretouch.units.model_check import ModelCheck, ModelCheckParams
 from pretouch.units.monitor import MonitorUpdate, Posture, watch
 from pretouch.units.receiver import SkinReceiver
+from pretouch.units.skin_recording import SkinRecording
 from pretouch.units.udp import EVERYWHERE, HOST, PORT
 
 _ONCE_S = 5.0
@@ -164,7 +163,9 @@ def _shown(
             full = update.elapsed >= second
             second += _SECOND_S * full
             if recording:
-                record(recording, update, receiver, full)
+                recording.add(update.heard, [unit.id for unit in receiver.units])
+                if full:
+                    recording.health(update)
             if live:
                 live.update(view(update, receiver.rejected, _notes(receiver, recording)), refresh=True)
             elif lines and full:

@@ -13,7 +13,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from pretouch.errors import RecordingError
 from pretouch.imported_data.log import Choice, Log, Note, arm_of, check_steps_back, interpolated, joint_places, listed
-from pretouch.recording.skin_recording import READ_WITH, UNIT_SAMPLE
+from pretouch.recording.ros import READ_WITH, UNIT_SAMPLE
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray, IntArray
 from pretouch.values import value

@@ -35,8 +35,8 @@ def world_of(run: Run) -> World:
     room, planes = surroundings(run.about), run.fixtures.planes
     flat = planes[np.all(planes[:, :3] == (0.0, 0.0, 1.0), axis=1)]
     floor = -float(flat[0, 3]) if len(flat) else 0.0
-    height = floor if room.floor_height is None else room.floor_height
-    return World(run.model, run.skin, run.path, run.profile, room.boxes, room.hand_radius, height)
+    height = floor if room.floor_height_m is None else room.floor_height_m
+    return World(run.model, run.skin, run.path, run.profile, room.boxes, room.hand_radius_m, height)
 
 
 def frame_of(cycle: Kept) -> Frame:
@@ -161,7 +161,7 @@ class ReplayPage:
         world = self._world(0)
         style_page(server)
         self._status = Status(server.gui)
-        self._status.notice = recorded.said
+        self._status.notice = recorded.sentence
         self._add_controls(server.gui)
         self._scene = Scene(server, world)
         self.history = History(world.skin.first, stamps[0])

@@ -5,17 +5,16 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-import msgspec
 import numpy as np
 
 from pretouch.controller import Controller, ControllerState
 from pretouch.desired import Desired
 from pretouch.errors import RecordingError
 from pretouch.loop import Cycle
-from pretouch.recording import packing, ros
+from pretouch.recording import ros
 from pretouch.recording.disk import Item
-from pretouch.recording.packing import marked, packed, unmarked, unpacked
-from pretouch.recording.ros import PACKED, decoded, encode, own, packed_message, value_of
+from pretouch.recording.packing import decoder, packed, unpacked, with_parts
+from pretouch.recording.ros import PACKED, encode, own, packed_message
 from pretouch.recording.run import packed_run
 from pretouch.recording.simulation import Truth
 from pretouch.recording.viewer_topics import KINDS, nanoseconds
@@ -45,7 +44,7 @@ _SHOWN = 500
 
 
 @value
-class _KeptInputs:
+class KeptInputs:
     """Inputs of a step as they are packed."""
 
     inputs: Inputs | None
@@ -54,6 +53,15 @@ class _KeptInputs:
     """Number of the step with which the points of outside sources stand: a set is kept once; -1 without any."""
     unreadable: str = ""
     """What was given where it cannot be kept."""
+
+
+@value
+class KeptState:
+    """The controller's state before a step, as it is packed."""
+
+    anew: bool
+    """Whether it does not follow from the step before."""
+    state: ControllerState
 
 
 class KeptCycle(NamedTuple):
@@ -75,7 +83,7 @@ class KeptCycle(NamedTuple):
 def prepare() -> None:
     """Make the code that packs and encodes cycles: at the first one, a control loop would wait for it."""
     ros.prepare(*TOPICS.values(), *KINDS)
-    packing.prepare(_KeptInputs, ControllerState)
+    decoder(KeptInputs)
     zero = np.zeros(1)
     robot = RobotState(0.0, zero, zero, zero, zero, zero, None)
     inputs_of(packed_inputs(Inputs(0.0, robot, RangeReadings(zero, zero, np.zeros(1, np.int64)))))
@@ -91,9 +99,9 @@ class Cycles:
         self._last = math.nan
         self._points: SeenPoints | None = None
         self._points_at = -1
-        self.begin(controller)
+        self.change(controller)
 
-    def begin(self, controller: Controller) -> None:
+    def change(self, controller: Controller) -> None:
         """Let the cycles from the next one on be those of a controller."""
         self._run: bytes | None = packed_run(controller, self._about)
         self._snapshot_due = -math.inf
@@ -132,7 +140,7 @@ class Cycles:
             return packed_inputs(inputs, self._points_at if points is not None else -1), True
         except Exception as error:  # inputs may be anything, with any behaviour
             self._points = None
-            return packed(_KeptInputs(None, -1, _described(inputs, error))), False
+            return packed(KeptInputs(None, -1, _described(inputs, error))), False
 
 
 def packed_inputs(inputs: Inputs, points_at: int = -1) -> bytes:
@@ -146,7 +154,7 @@ def packed_inputs(inputs: Inputs, points_at: int = -1) -> bytes:
             raise TypeError(f"{name} is a {type(part).__name__}")
     if not isinstance(robot.tau_ext, np.ndarray):  # such are no torques to a step either
         inputs = replace(inputs, robot=replace(robot, tau_ext=np.zeros(0)))
-    return packed(_KeptInputs(inputs, points_at))
+    return packed(KeptInputs(inputs, points_at))
 
 
 def _described(inputs: object, error: Exception) -> str:
@@ -158,64 +166,23 @@ def _described(inputs: object, error: Exception) -> str:
     return text[:_SHOWN].encode("utf-8", "backslashreplace").decode()
 
 
-def inputs_of(data: bytes) -> tuple[Inputs | None, int, str]:
-    """Return what a step was given, the step that has the points (-1: none), and what is known of what was not kept."""
+def inputs_of(data: bytes) -> KeptInputs:
+    """Return what a step was given."""
     try:
-        kept = unpacked(_KeptInputs, data)
+        return unpacked(KeptInputs, data)
     except RecordingError as error:
-        return None, -1, str(error)
-    return kept.inputs, kept.points_at, kept.unreadable
+        return KeptInputs(None, -1, str(error))
 
 
 def packed_state(state: ControllerState, anew: bool) -> bytes:
     """Return the state a step begins with; `anew` if it does not follow from the step before."""
     try:
-        return packed({"anew": anew, "state": marked(ControllerState, state)})
+        return packed({"anew": anew, "state": with_parts(state)})
     except TypeError as error:
         raise RecordingError(
             f"The controller's state cannot be kept, because a part of the profile remembers what a recording cannot"
             f" hold ({error}): let it remember numbers, arrays of numbers, or classes of such fields."
         ) from error
-
-
-def state_of(data: bytes) -> tuple[bool, ControllerState]:
-    """Return whether a state does not follow from the step before, and the state."""
-    try:
-        table = msgspec.msgpack.decode(data)
-        return table["anew"], unmarked(ControllerState, table["state"])
-    except (msgspec.MsgspecError, LookupError, TypeError, RecursionError) as error:
-        raise RecordingError(f"A state of the controller in the recording cannot be read: {error}") from error
-
-
-def encoded_step(number: int, step: ControlStep) -> bytes:
-    """Return a step as CDR."""
-    return encode("Step", step, sequence=number)
-
-
-def step_of(data: bytes) -> ControlStep:
-    """Return the step that CDR holds."""
-    return value_of(ControlStep, decoded(own("Step"), data))
-
-
-def encoded_truth(number: int, truth: Truth) -> bytes:
-    """Return what a simulation knows as CDR."""
-    times, links, velocities = zip(*truth.touches, strict=True) if truth.touches else ((), (), ())
-    return encode(
-        "Truth",
-        truth,
-        sequence=number,
-        touch_time=np.array(times, dtype=np.float64),
-        touch_link=np.array(links, dtype=np.int64),
-        touch_velocity=np.array(velocities, dtype=np.float64).reshape(-1),
-    )
-
-
-def truth_of_message(data: bytes) -> Truth:
-    """Return what a simulation knew."""
-    m = decoded(own("Truth"), data)
-    velocities = m.touch_velocity.reshape(-1, 3)
-    touches = tuple(zip(m.touch_time.tolist(), m.touch_link.tolist(), velocities, strict=True))
-    return Truth(m.time, m.force.reshape(-1, 3), m.hand, touches)
 
 
 def items(kept: KeptCycle) -> Iterator[Item]:
@@ -224,6 +191,6 @@ def items(kept: KeptCycle) -> Iterator[Item]:
     for topic, data in ((RUN, kept.run), (STATE, kept.state), (INPUTS, kept.inputs)):
         if data is not None:
             yield Item(topic, PACKED, number, time, packed_message(number, data))
-    yield Item(STEP, TOPICS[STEP], number, time, encoded_step(number, kept.step))
-    if kept.truth is not None:
-        yield Item(TRUTH, TOPICS[TRUTH], number, time, encoded_truth(number, kept.truth))
+    for topic, result in ((STEP, kept.step), (TRUTH, kept.truth)):
+        if result is not None:
+            yield Item(topic, TOPICS[topic], number, time, encode(result, number))

@@ -44,30 +44,6 @@ Job = Callable[[], Iterable[Item]]
 """Makes the messages of a cycle."""
 
 
-class _File:
-    """A file without a buffer: what is written is with the operating system, which a killed process does not undo."""
-
-    def __init__(self, place: Path) -> None:
-        self._handle = os.open(place, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666)
-        self._at = 0
-
-    def write(self, data: bytes) -> int:
-        left = memoryview(data)
-        while left:
-            left = left[os.write(self._handle, left) :]
-        self._at += len(data)
-        return len(data)
-
-    def tell(self) -> int:
-        return self._at
-
-    def flush(self) -> None:
-        """Nothing waits."""
-
-    def close(self) -> None:
-        os.close(self._handle)
-
-
 class Disk:
     """Takes what makes messages at once, and writes these in a thread of its own.
 
@@ -76,11 +52,14 @@ class Disk:
 
     def __init__(self, place: Path) -> None:
         self._place = place
-        self._file = _opened(place)
+        try:
+            self._file = place.open("xb")
+        except OSError as error:
+            raise _refused(place, error) from error
         self._queue: SimpleQueue[Job | None] = SimpleQueue()
         self._since: deque[float] = deque()
         """When each cycle was put that is not written yet [s]."""
-        self._writer = Writer(self._file, chunk_size=1 << 62)  # type: ignore[arg-type]
+        self._writer = Writer(self._file, chunk_size=1 << 62)
         self._schemas: dict[str, int] = {}
         self._channels: dict[str, int] = {}
         self._waiting = self._newest = 0
@@ -89,8 +68,10 @@ class Disk:
         """Latest time in the file [ns]."""
         try:
             self._writer.start("ros2", LIBRARY)
+            self._file.flush()
         except OSError as error:
-            self._file.close()
+            with suppress(OSError):
+                self._file.close()
             place.unlink()
             raise _refused(place, error) from error
         self.trouble = ""
@@ -135,9 +116,10 @@ class Disk:
             self._write_all()
             self._flush()
             self._writer.finish()
+            self._file.flush()
         except Exception as error:  # the run goes on, whatever failed here
             self.trouble = self._sentence(error)
-        with suppress(OSError):  # of what was written, the system has said by now what it has to say
+        with suppress(OSError):  # what failed to be written fails again
             self._file.close()
 
     def _write_all(self) -> None:
@@ -174,25 +156,19 @@ class Disk:
 
     def _flush(self) -> None:
         self._writer.flush()
+        self._file.flush()  # to the operating system: what it has, a killed process does not undo
         if self._waiting:
             self._waiting, self._written = 0, self._newest
 
     def _sentence(self, error: Exception) -> str:
         """Say why nothing more is written, and what the file holds."""
-        held = "nothing" if self._written is None else f"the run up to {self._written / 1e9:.2f} s"
+        content = "nothing" if self._written is None else f"the run up to {self._written / 1e9:.2f} s"
         if not isinstance(error, OSError):
             cause, remedy = f"{type(error).__name__}: {error}", "report this"
         else:
             cause = os.strerror(error.errno) if error.errno else str(error)
             remedy = "free some space, then record again" if error.errno in _FULL else "check the disk"
-        return f"The recording {self._place} ended early ({cause}) and it holds {held}: {remedy}."
-
-
-def _opened(place: Path) -> _File:
-    try:
-        return _File(place)
-    except OSError as error:
-        raise _refused(place, error) from error
+        return f"The recording {self._place} ended early ({cause}) and it holds {content}: {remedy}."
 
 
 def _refused(place: Path, error: OSError) -> RecordingError:

@@ -40,9 +40,10 @@ class LastSeconds:
         """The files so far; each is finished once `close` has returned."""
         self.trouble = ""
         """Why a file could not be written, as a sentence, or ''."""
-        self._controller, self._folder, self._recording = controller, Path(folder), recording
+        self._controller, self._folder = controller, Path(folder)
         self._seconds, self._most, self._about = seconds, most, dict(about or {})
-        self._cycles = Cycles(controller, self._about) if recording is None else None
+        self._source: Recording | Cycles | None = recording or Cycles(controller, self._about)
+        """What makes bytes of a cycle; None where it cannot."""
         self._run = b""
         self._ring: deque[KeptCycle] = deque()
         self._begins: deque[KeptCycle] = deque()
@@ -52,8 +53,14 @@ class LastSeconds:
 
     def record(self, cycle: Cycle, truth: Truth | None = None) -> None:
         """Keep one turn of the loop for a while."""
-        kept = self._keep(cycle, truth)
-        if kept is None:
+        if self._source is None:
+            return
+        try:
+            kept = self._source.keep(cycle, truth)
+        except RecordingError as error:  # a part of the profile remembers what no recording can hold
+            if isinstance(self._source, Recording):
+                raise
+            self.trouble, self._source = f"The last seconds before a HOLD are not kept: {error}", None
             return
         self._run = kept.run or self._run
         self._ring.append(kept)
@@ -62,15 +69,6 @@ class LastSeconds:
         self._forget(cycle.step.stamp - self._seconds)
         if cycle.after.mode.latched and not cycle.before.mode.latched:
             self._write()
-
-    def _keep(self, cycle: Cycle, truth: Truth | None) -> KeptCycle | None:
-        if self._recording is not None:
-            return self._recording.keep(cycle, truth)
-        try:
-            return self._cycles.keep(cycle, truth) if self._cycles else None
-        except RecordingError as error:  # a part of the profile remembers what no recording can hold
-            self.trouble, self._cycles = f"The last seconds before a HOLD are not kept: {error}", None
-            return None
 
     def _forget(self, begin: float) -> None:
         """Drop what lies before the last snapshot that is older than an instant [s]."""
@@ -81,10 +79,8 @@ class LastSeconds:
 
     def change(self, controller: Controller) -> None:
         """Let the cycles from the next one on be those of another controller of the same arm."""
-        if self._recording is not None:
-            self._recording.change(controller)
-        if self._cycles is not None:
-            self._cycles.begin(controller)
+        if self._source is not None:
+            self._source.change(controller)
         self._controller = controller
         self._ring.clear()
         self._begins.clear()

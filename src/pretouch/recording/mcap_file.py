@@ -4,7 +4,7 @@ import struct
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import BinaryIO, NamedTuple
+from typing import BinaryIO, NamedTuple, TypeVar
 
 from mcap.exceptions import McapError
 from mcap.reader import SeekingReader
@@ -21,6 +21,7 @@ _LARGEST = 1 << 26
 _DAMAGE = (McapError, ZstdError, struct.error, ValueError, KeyError, OverflowError, RuntimeError, MemoryError, OSError)
 """What the library and its decompressors raise for bytes that are cut off or damaged: RuntimeError is lz4's, OSError a
 file shorter than its last record, or a disk that cannot read on."""
+_Kind = TypeVar("_Kind")
 
 
 class Message(NamedTuple):
@@ -109,20 +110,6 @@ def read_messages(file: BinaryIO, contents: Contents) -> Iterator[Message]:
         yield from messages
 
 
-def chunk_at(file: BinaryIO, offset: int, contents: Contents) -> list[Message]:
-    """Return the messages of the chunk at an offset; a damaged one is a RecordingError."""
-    try:
-        file.seek(offset)
-        record = next(StreamReader(file, skip_magic=True, emit_chunks=True, record_size_limit=_LARGEST).records)
-        if not isinstance(record, Chunk):
-            raise ValueError("it is none")
-        return contents.messages(record)
-    except _DAMAGE as error:
-        raise RecordingError(
-            f"The chunk at byte {offset} of the recording is damaged ({error}): use a copy that is whole."
-        ) from error
-
-
 def indexed_chunks(file: BinaryIO, contents: Contents) -> list[ChunkIndex]:
     """Return what the index at the end of a file says of each chunk, in order; nothing where there is none."""
     try:
@@ -139,18 +126,35 @@ def indexed_chunks(file: BinaryIO, contents: Contents) -> list[ChunkIndex]:
     return sorted(summary.chunk_indexes, key=lambda chunk: chunk.chunk_start_offset)
 
 
+def chunk_at(file: BinaryIO, offset: int, contents: Contents) -> list[Message]:
+    """Return the messages of the chunk at an offset; a damaged one is a RecordingError."""
+    try:
+        return contents.messages(_record_at(file, offset, Chunk))
+    except _DAMAGE as error:
+        raise _damaged("chunk", offset, error) from error
+
+
 def message_count(file: BinaryIO, chunk: ChunkIndex, channel: int) -> int:
     """Return how many messages of a channel the index of a chunk lists; damage is a RecordingError."""
     offset = chunk.message_index_offsets.get(channel)
     if offset is None:
         return 0
     try:
-        file.seek(offset)
-        record = next(StreamReader(file, skip_magic=True, record_size_limit=_LARGEST).records)
-        if not isinstance(record, MessageIndex):
-            raise ValueError("it is none")
+        return len(_record_at(file, offset, MessageIndex).records)
     except _DAMAGE as error:
-        raise RecordingError(
-            f"The index at byte {offset} of the recording is damaged ({error}): use a copy that is whole."
-        ) from error
-    return len(record.records)
+        raise _damaged("index", offset, error) from error
+
+
+def _record_at(file: BinaryIO, offset: int, kind: type[_Kind]) -> _Kind:
+    """Return the record at an offset; a damaged one raises."""
+    file.seek(offset)
+    record = next(StreamReader(file, skip_magic=True, emit_chunks=True, record_size_limit=_LARGEST).records)
+    if not isinstance(record, kind):
+        raise ValueError("it is none")
+    return record
+
+
+def _damaged(what: str, offset: int, error: Exception) -> RecordingError:
+    return RecordingError(
+        f"The {what} at byte {offset} of the recording is damaged ({error}): use a copy that is whole."
+    )

@@ -1,20 +1,20 @@
 """Values of ours as MessagePack with the names of their fields, and back to the bit, by their annotations.
 
 A row of float64 is its bytes, little-endian; any other array is [dtype, shape, bytes]. What a part of the profile
-remembers is annotated with `object`: it is {"part": group and name of the part, "value": ...}.
+remembers is {"part": group and name of the part, "value": ...}.
 """
 
-from collections.abc import Iterator
+from dataclasses import is_dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar, get_args, get_origin
+from typing import Any, TypeVar, cast, get_args, get_origin
 
 import msgspec
 import numpy as np
 
 from pretouch.composition import Part
 from pretouch.errors import PretouchError, RecordingError
-from pretouch.recording.fields import hints_of, is_record, optional
+from pretouch.recording.ros import hints_of, is_record
 from pretouch.records import BLOCK_TYPES, Flat
 
 Value = TypeVar("Value")
@@ -39,8 +39,13 @@ def _plain(value: Any) -> Any:
     raise TypeError(f"a {type(value).__name__} cannot be kept")
 
 
-def _array(hint: Any, plain: Any) -> Any:
-    """Return what `_plain` made of an array or a record; numbers in a list come as an array too."""
+def custom(hint: Any, plain: Any) -> Any:
+    """Return a value of a type that msgspec does not know, of what it was packed as.
+
+    Numbers in a list come as an array too. `object` is what a part remembers.
+    """
+    if hint is object:
+        return _part(plain)
     if hint is Flat:
         f, i, b, table = (np.frombuffer(bytearray(data), kind) for data, kind in zip(plain, _BLOCKS, strict=True))
         return Flat((f, i, b, table))
@@ -57,6 +62,14 @@ def _array(hint: Any, plain: Any) -> Any:
     return array
 
 
+def _part(plain: Any) -> Any:
+    """Return what a part of the profile remembers."""
+    if not isinstance(plain, dict):
+        return plain
+    kind = _state_of(plain["part"]) if plain["part"] else np.ndarray
+    return msgspec.convert(plain["value"], kind, dec_hook=custom)
+
+
 _ENCODER = msgspec.msgpack.Encoder(enc_hook=_plain)
 
 
@@ -65,94 +78,47 @@ def packed(value: Any) -> bytes:
     return _ENCODER.encode(value)
 
 
+@cache
+def decoder(kind: Any) -> Any:
+    """Return what decodes values of a type: the first time takes some milliseconds."""
+    return msgspec.msgpack.Decoder(kind, dec_hook=custom)
+
+
 def unpacked(kind: type[Value], data: bytes) -> Value:
     """Return the value of a class that MessagePack holds; RecordingError if it holds none."""
     try:
-        return _decoder(kind).decode(data)  # type: ignore[arg-type]
-    except (msgspec.MsgspecError, ValueError, TypeError, RecursionError) as error:
-        raise RecordingError(_unreadable(kind, error)) from error
+        return cast(Value, decoder(cast(Any, kind)).decode(data))
+    except RecordingError:
+        raise
+    except (msgspec.MsgspecError, ValueError, TypeError, LookupError, AttributeError, RecursionError) as error:
+        raise RecordingError(
+            f"{kind.__name__.strip('_')} in the recording cannot be read ({' '.join(str(error).split())}): it is"
+            " damaged, or from another version: open it with the version that made it."
+        ) from error
 
 
-def prepare(kind: type, state: type) -> None:
-    """Make ready to unpack a class, and to pack one with parts: the first time takes some milliseconds."""
-    _decoder(kind)
-    _holds_parts(state)
-
-
-@cache
-def _decoder(kind: Any) -> Any:
-    return msgspec.msgpack.Decoder(kind, dec_hook=_array)
-
-
-def _unreadable(kind: Any, error: Exception) -> str:
-    name = getattr(kind, "__name__", "value").strip("_")
-    return (
-        f"{name} in the recording cannot be read ({' '.join(str(error).split())}): it is damaged, or from another"
-        " version: open it with the version that made it."
-    )
-
-
-def marked(hint: Any, value: Any) -> Any:
-    """Return a value to pack, with the name of its part beside what is annotated with `object`."""
-    if hint is object:
-        if value is None or isinstance(value, _NUMBERS):
-            return value
-        if isinstance(value, np.ndarray):
-            return {"part": "", "value": (value.dtype.str, value.shape, value.tobytes())}
-        if not is_record(type(value)):
-            raise RecordingError(
-                f"A part of the profile remembers a {type(value).__name__}, which a recording cannot hold: let it"
-                " remember a number, an array of numbers, or a class of such fields, named as `State` of the part."
-            )
-        return {"part": _owner(type(value)), "value": marked(type(value), value)}
-    kind = optional(hint) or hint
-    if value is None or not _holds_parts(kind):
+def with_parts(value: Any) -> Any:
+    """Return a record to pack, with the name of its part beside what is annotated with `object`."""
+    hints = hints_of(type(value))
+    if not any(object in (hint, *get_args(hint)) for _, hint in hints):
         return value
-    if get_origin(kind) is tuple:
-        return [marked(inner, item) for inner, item in zip(_items(kind, len(value)), value, strict=True)]
-    return {name: marked(inner, getattr(value, name)) for name, inner in hints_of(kind)}
+    fields = {name: _named(hint, getattr(value, name)) for name, hint in hints}
+    return fields if is_dataclass(value) else list(fields.values())
 
 
-def unmarked(hint: Any, plain: Any) -> Any:
-    """Return the value of which `marked`, packed and decoded without a type, made plain values.
-
-    RecordingError for what is none.
-    """
-    try:
-        return _unmarked(hint, plain)
-    except (msgspec.MsgspecError, ValueError, TypeError, LookupError, AttributeError) as error:
-        if isinstance(error, RecordingError):
-            raise
-        raise RecordingError(_unreadable(hint, error)) from error
-
-
-def _unmarked(hint: Any, plain: Any) -> Any:
-    if hint is object:
-        if not isinstance(plain, dict):
-            return plain
-        kind = _state_of(plain["part"]) if plain["part"] else np.ndarray
-        return _unmarked(kind, plain["value"])
-    kind = optional(hint) or hint
-    if plain is None or not _holds_parts(kind):
-        return msgspec.convert(plain, hint, dec_hook=_array)
-    if get_origin(kind) is tuple:
-        return tuple(_unmarked(inner, item) for inner, item in zip(_items(kind, len(plain)), plain, strict=True))
-    return kind(**{name: _unmarked(inner, plain[name]) for name, inner in hints_of(kind)})
-
-
-@cache
-def _holds_parts(hint: Any) -> bool:
-    """Whether something in a type is annotated with `object`."""
-    kind = optional(hint) or hint
-    if get_origin(kind) is tuple:
-        return any(_holds_parts(inner) for inner in get_args(kind))
-    return kind is object or (is_record(kind) and any(_holds_parts(inner) for _, inner in hints_of(kind)))
-
-
-def _items(hint: Any, count: int) -> Iterator[Any]:
-    """Types of the items of a tuple."""
-    args = get_args(hint)
-    return iter(args[:1] * count if args[-1] is Ellipsis else args)
+def _named(hint: Any, value: Any) -> Any:
+    if object in get_args(hint):
+        return [_named(object, item) for item in value]
+    if hint is not object or value is None or isinstance(value, _NUMBERS):
+        return value
+    if isinstance(value, np.ndarray):
+        return {"part": "", "value": value}
+    if not is_record(type(value)):
+        raise RecordingError(
+            f"A part of the profile remembers a {type(value).__name__}, which a recording cannot hold: let it"
+            " remember a number, an array of numbers, or a class of such fields, named as `State` of the part."
+        )
+    return {"part": _owner(type(value)), "value": with_parts(value)}
 
 
 def _owner(state: type) -> str:

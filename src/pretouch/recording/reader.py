@@ -9,27 +9,15 @@ from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
 import numpy as np
-from mcap.records import Channel
 
 from pretouch.controller import ControllerState
 from pretouch.errors import RecordingError
-from pretouch.recording.cycles import (
-    INPUTS,
-    RUN,
-    STATE,
-    STEP,
-    TOPICS,
-    TRUTH,
-    inputs_of,
-    state_of,
-    step_of,
-    truth_of_message,
-)
+from pretouch.recording.cycles import INPUTS, RUN, STATE, STEP, TOPICS, TRUTH, KeptInputs, KeptState, inputs_of
 from pretouch.recording.mcap_file import Contents, Message, chunk_at, chunks, indexed_chunks, message_count, open_mcap
-from pretouch.recording.ros import LIBRARY, UNIT_SAMPLE, definition, packed_data
+from pretouch.recording.packing import unpacked
+from pretouch.recording.ros import LIBRARY, READ_WITH, UNIT_SAMPLE, check_version, packed_data, value_of
 from pretouch.recording.run import Run
 from pretouch.recording.simulation import Truth
-from pretouch.recording.skin_recording import READ_WITH
 from pretouch.types import ControlStep, FloatArray, Inputs, IntArray, RobotState
 from pretouch.values import value
 
@@ -45,10 +33,14 @@ _HEAD = 4
 class Kept:
     """One control step of a recording."""
 
+    number: int
+    """The number it had when it was recorded: where some are missing it is not its place."""
     run: int
     """Which of the runs made it."""
     inputs: Inputs | None
     """None if they could not be put into a message."""
+    unreadable: str
+    """Why there are no inputs, or ''."""
     step: ControlStep
     truth: Truth | None
     """None if there was no simulation."""
@@ -87,8 +79,8 @@ class Recorded:
     def __init__(self, place: Path, contents: Contents, spans: list[_Span], numbers: IntArray, runs: Raw) -> None:
         self.place = place
         self.complete = contents.complete
-        self.said = "" if self.complete else f"{place}: {_CUT}."
-        """What is missing, as a sentence, or ''."""
+        self.sentence = "" if self.complete else f"{place}: {_CUT}."
+        """What is missing, or ''."""
         self._contents, self._spans, self._numbers = contents, spans, numbers
         self._firsts, self._lasts = [span.first for span in spans], [span.last for span in spans]
         self._chunk = lru_cache(_CHUNKS)(self._read)
@@ -112,27 +104,32 @@ class Recorded:
         return len(self._numbers)
 
     def __getitem__(self, i: int) -> Kept:
-        number = self.number(i)
+        number = int(self._numbers[i])
         truth, state = self._get(TRUTH, number), self._get(STATE, number)
-        anew, snapshot = (False, None) if state is None else state_of(packed_data(state))
+        before = None if state is None else unpacked(KeptState, packed_data(state))
+        inputs = self._inputs(number)
         return Kept(
+            number=number,
             run=max(0, bisect_right(self._begins, number) - 1),
-            inputs=self._inputs(number),
+            inputs=inputs.inputs,
+            unreadable=inputs.unreadable,
             step=self.step(i),
-            truth=None if truth is None else truth_of_message(truth),
-            snapshot=snapshot,
-            anew=anew,
+            truth=None if truth is None else value_of(Truth, truth),
+            snapshot=None if before is None else before.state,
+            anew=before is not None and before.anew,
         )
 
-    def _inputs(self, number: int, points: bool = True) -> Inputs | None:
+    def _inputs(self, number: int) -> KeptInputs:
         """Return all that a step was given, the points of outside sources with it; None where a part is missing."""
         data = self._get(INPUTS, number)
-        inputs, points_at, _ = (None, -1, "") if data is None else inputs_of(packed_data(data))
-        if inputs is None or not points or points_at in (-1, number):
-            return inputs
-        data = self._get(INPUTS, points_at)
-        others = None if data is None else inputs_of(packed_data(data))[0]
-        return None if others is None else replace(inputs, points=others.points)
+        kept = KeptInputs(None, -1, MISSING_INPUTS) if data is None else inputs_of(packed_data(data))
+        if kept.inputs is None or kept.points_at in (-1, number):
+            return kept
+        data = self._get(INPUTS, kept.points_at)
+        others = None if data is None else inputs_of(packed_data(data)).inputs
+        if others is None:
+            return KeptInputs(None, -1, MISSING_INPUTS)
+        return KeptInputs(replace(kept.inputs, points=others.points))
 
     def __iter__(self) -> Iterator[Kept]:
         return (self[i] for i in range(len(self)))
@@ -140,29 +137,22 @@ class Recorded:
     def robot_states(self) -> Iterator[RobotState]:
         """Yield the robot's state of each step whose inputs were kept."""
         for number in self._numbers.tolist():
-            inputs = self._inputs(number, points=False)
+            data = self._get(INPUTS, number)
+            inputs = None if data is None else inputs_of(packed_data(data)).inputs
             if inputs is not None:
                 yield inputs.robot
 
-    def number(self, i: int) -> int:
-        """Return the number a step had when it was recorded: where some are missing it is not `i`."""
-        return int(self._numbers[i])
-
-    def unreadable(self, i: int) -> str:
-        """Say what is known of inputs that could not be kept, or ''."""
-        data = self._get(INPUTS, self.number(i))
-        return MISSING_INPUTS if data is None else inputs_of(packed_data(data))[2]
-
     def step(self, i: int) -> ControlStep:
         """Return a step alone."""
-        return step_of(self.step_data(i))
+        step: ControlStep = value_of(ControlStep, self.step_data(i))
+        return step
 
     def step_data(self, i: int) -> bytes:
         """Return a step as it was written."""
-        data = self._get(STEP, self.number(i))
+        data = self._get(STEP, int(self._numbers[i]))
         if data is None:
             raise RecordingError(
-                f"Step {self.number(i)} is missing in {self.place}, whose index lists it: use a copy that is whole."
+                f"Step {self._numbers[i]} is missing in {self.place}, whose index lists it: use a copy that is whole."
             )
         return data
 
@@ -180,15 +170,17 @@ def open_recording(place: Path) -> Recorded:
     place, contents = Path(place), Contents()
     with open_mcap(place, _REMEDY) as file:
         spans, numbers, runs = _by_index(file, contents) or _by_reading(file, contents)
-    _check(place, contents, runs, numbers)
+    check_version(place, contents)
+    if not (len(numbers) and runs):
+        raise RecordingError(_why_none(place, contents))
     return Recorded(place, contents, spans, numbers, runs)
 
 
-_Found = tuple[list[_Span], IntArray, Raw]
+_Parts = tuple[list[_Span], IntArray, Raw]
 """Chunks with messages of ours, the numbers of all steps, and what describes their runs."""
 
 
-def _by_index(file: BinaryIO, contents: Contents) -> _Found | None:
+def _by_index(file: BinaryIO, contents: Contents) -> _Parts | None:
     """Use the index at the end of a file of ours: its chunks hold whole cycles, and none is missing."""
     listed = indexed_chunks(file, contents)
     ids = {channel.topic: channel.id for channel in contents.channels.values()}
@@ -209,7 +201,7 @@ def _by_index(file: BinaryIO, contents: Contents) -> _Found | None:
     return spans, np.arange(spans[0].first, spans[-1].last + 1), runs
 
 
-def _by_reading(file: BinaryIO, contents: Contents) -> _Found:
+def _by_reading(file: BinaryIO, contents: Contents) -> _Parts:
     """Read a file through that has no index, or was written by another tool."""
     spans: list[_Span] = []
     runs: Raw = {}
@@ -238,25 +230,10 @@ def _by_us(contents: Contents) -> bool:
     return contents.library.partition(" ")[0] == LIBRARY.partition(" ")[0]
 
 
-def _check(place: Path, contents: Contents, runs: Raw, numbers: IntArray) -> None:
-    """Refuse a file without a step of ours, or with messages that are not these."""
-    for channel in contents.channels.values():
-        kind = contents.kind(channel)
-        if TOPICS.get(channel.topic) == kind and not is_ours(contents, channel):
-            raise RecordingError(
-                f"{place} was recorded by another version of pretouch, with different messages on {channel.topic}: open"
-                " it with that version."
-            )
-    if len(numbers) and runs:
-        return
+def _why_none(place: Path, contents: Contents) -> str:
+    """Say what a file is that has no step of ours."""
     if any(contents.kind(channel) == UNIT_SAMPLE for channel in contents.channels.values()):
-        raise RecordingError(f"{place} holds samples of sensor units, but no control step: {READ_WITH}.")
+        return f"{place} holds samples of sensor units, but no control step: {READ_WITH}."
     if _by_us(contents) or any(channel.topic in TOPICS for channel in contents.channels.values()):
-        raise RecordingError(f"{place} holds no control step, because the run ended before the first was written.")
-    raise RecordingError(f"{place} is not a recording of pretouch: {_REMEDY}.")
-
-
-def is_ours(contents: Contents, channel: Channel) -> bool:
-    """Whether the messages of a channel are defined as those of a type of ours."""
-    schema = contents.schemas[channel.schema_id]
-    return schema.data == definition(schema.name).encode()
+        return f"{place} holds no control step, because the run ended before the first was written."
+    return f"{place} is not a recording of pretouch: {_REMEDY}."

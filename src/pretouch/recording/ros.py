@@ -1,11 +1,14 @@
 """ROS 2 messages by rosbags: the standard ones, and ours of `msg/`, made of our classes and back to the bit."""
 
 from collections.abc import Callable
+from dataclasses import fields, is_dataclass
 from enum import Enum
 from functools import cache
 from importlib.resources import files
 from operator import attrgetter
-from typing import Any
+from pathlib import Path
+from types import NoneType, UnionType
+from typing import Any, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 from rosbags.interfaces import Nodetype
@@ -13,7 +16,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 import pretouch
 from pretouch.errors import RecordingError
-from pretouch.recording.fields import hints_of, is_record, optional
+from pretouch.recording.mcap_file import Contents
 from pretouch.types import FloatArray
 
 LIBRARY = f"pretouch {pretouch.__version__}"
@@ -22,7 +25,9 @@ PACKAGE = "pretouch_msgs"
 OWN = ("Contact", "Obstacles", "QpSolution", "Thresholds", "Touched", "Step", "Truth", "Packed", "UnitSample")
 """Our types, each after those that it holds; each has a file in `msg/`."""
 PACKED, UNIT_SAMPLE = f"{PACKAGE}/msg/Packed", f"{PACKAGE}/msg/UnitSample"
-"""Types of what is MessagePack."""
+"""Types of what is MessagePack, and of datagrams."""
+READ_WITH = "read it with pretouch.units.skin_reader.read_skin, or open it in Foxglove"
+"""What can be done with a recording of sensor units, as the end of a sentence."""
 JOINT_STATE, WRENCH = "sensor_msgs/msg/JointState", "geometry_msgs/msg/WrenchStamped"
 RANGE, IMU = "sensor_msgs/msg/Range", "sensor_msgs/msg/Imu"
 TRANSFORMS, MARKERS = "tf2_msgs/msg/TFMessage", "visualization_msgs/msg/MarkerArray"
@@ -31,7 +36,7 @@ DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
 Look = tuple[int, tuple[float, ...], tuple[float, ...]]
 """Kind of a marker, its size (3,) [m] and its colour: red, green, blue, opacity."""
 _DTYPES = {"byte": "uint8", "octet": "uint8", "char": "uint8"}
-_ROWS = ("point", "body_point", "direction", "force")
+_ROWS = ("point", "body_point", "direction", "force", "touch_velocity")
 """Fields of ours that are rows of three numbers, where a message has any number of them: there they lie one by one."""
 _NAMED = {"ControlStep": "Step"}
 """Message of a class that is not named as it."""
@@ -154,34 +159,48 @@ def decoded(kind: str, data: bytes) -> Any:
         raise RecordingError(f"A message of the type {kind} in the recording cannot be read: {error}") from error
 
 
-def encode(kind: str, value: Any, **more: Any) -> bytes:
-    """Return a value of one of our classes as CDR; `more` are fields that it does not have.
-
-    Raises ValueError for an array of another type than its field.
-    """
-    return messages().encoded(own(kind), _message(own(kind), value, more))
+def encode(value: Any, sequence: int) -> bytes:
+    """Return a value of one of our classes as CDR. Raises ValueError for an array of another type than its field."""
+    kind = _own_name(type(value))
+    return messages().encoded(kind, _message(kind, value, sequence))
 
 
-def packed_message(number: int, data: bytes, kind: str = PACKED) -> bytes:
+def packed_message(number: int, data: bytes) -> bytes:
     """Return packed data as CDR."""
-    return messages().encoded(kind, messages().types[kind](number, np.frombuffer(data, np.uint8)))
+    return messages().encoded(PACKED, messages().types[PACKED](number, np.frombuffer(data, np.uint8)))
 
 
-def packed_data(message: bytes, kind: str = PACKED) -> bytes:
+def packed_data(message: bytes) -> bytes:
     """Return the packed data that CDR holds."""
-    return decoded(kind, message).data.tobytes()
+    return decoded(PACKED, message).data.tobytes()
 
 
-def value_of(kind: type, message: Any) -> Any:
-    """Return a value of one of our classes from a message; one that cannot be is a RecordingError."""
+def check_version(place: Path, contents: Contents) -> None:
+    """Refuse a file whose messages of a type of ours are defined otherwise."""
+    for channel in contents.channels.values():
+        schema = contents.schemas.get(channel.schema_id)
+        if schema and schema.name in map(own, OWN) and schema.data != definition(schema.name).encode():
+            raise RecordingError(
+                f"{place} was recorded by another version of pretouch, with different messages on {channel.topic}: open"
+                " it with that version."
+            )
+
+
+def value_of(kind: type, data: bytes) -> Any:
+    """Return the value of one of our classes that CDR holds; RecordingError if it holds none."""
+    message = decoded(_own_name(kind), data)
     try:
         return _maker(kind)(message)
     except ValueError as error:
         raise RecordingError(f"A {kind.__name__} in the recording cannot be read: {error}") from error
 
 
-def _message(kind: str, value: Any, more: dict[str, Any]) -> Any:
-    return messages().types[kind](*[more[name] if name in more else get(value) for name, get in _getters(kind)])
+def _own_name(kind: type) -> str:
+    return own(_NAMED.get(kind.__name__, kind.__name__))
+
+
+def _message(kind: str, value: Any, sequence: int = 0) -> Any:
+    return messages().types[kind](*[sequence if name == "sequence" else get(value) for name, get in _getters(kind)])
 
 
 @cache
@@ -199,7 +218,7 @@ def _getter(name: str, node: Nodetype, of: Any) -> Callable[[Any], Any]:
 
         def inner(value: Any) -> Any:
             part = get(value)
-            return messages().types[of](**messages().blank(of)) if part is None else _message(of, part, {})
+            return messages().types[of](**messages().blank(of)) if part is None else _message(of, part)
 
         return inner
     if node == Nodetype.BASE:
@@ -222,7 +241,7 @@ def _text(text: str | Enum) -> str:
 @cache
 def _maker(kind: type) -> Callable[[Any], Any]:
     """Return what makes a value of a class from a message."""
-    described = dict(messages().store.fielddefs[own(_NAMED.get(kind.__name__, kind.__name__))][1])
+    described = dict(messages().store.fielddefs[_own_name(kind)][1])
     rows = {name for name in _ROWS if name in described and described[name][0] == Nodetype.SEQUENCE}
     ways = tuple(_way(name, hint, name in rows) for name, hint in hints_of(kind))
     return lambda message: kind(*[way(message) for way in ways])
@@ -230,9 +249,10 @@ def _maker(kind: type) -> Callable[[Any], Any]:
 
 def _way(name: str, hint: Any, rows: bool) -> Callable[[Any], Any]:
     """Return what makes a field of a class from a message."""
-    get, left = attrgetter(name), optional(hint)
-    if left is not None:
-        there, made = attrgetter(f"has_{name}"), _way(name, left, rows)
+    get = attrgetter(name)
+    if get_origin(hint) in (Union, UnionType):  # of a class and None
+        (inner_hint,) = (inner for inner in get_args(hint) if inner is not NoneType)
+        there, made = attrgetter(f"has_{name}"), _way(name, inner_hint, rows)
         return lambda message: made(message) if there(message) else None
     if isinstance(hint, type) and issubclass(hint, Enum):
         return lambda message: hint(get(message))
@@ -240,3 +260,15 @@ def _way(name: str, hint: Any, rows: bool) -> Callable[[Any], Any]:
         inner = _maker(hint)
         return lambda message: inner(get(message))
     return (lambda message: get(message).reshape(-1, 3)) if rows else get
+
+
+def is_record(hint: Any) -> bool:
+    """Whether a type is a dataclass or a named tuple."""
+    return isinstance(hint, type) and (is_dataclass(hint) or hasattr(hint, "_fields"))
+
+
+@cache
+def hints_of(kind: type) -> tuple[tuple[str, Any], ...]:
+    """Return names and annotations of the fields of a dataclass or named tuple, in order."""
+    hints = get_type_hints(kind)
+    return tuple((name, hints[name]) for name in (getattr(kind, "_fields", None) or [f.name for f in fields(kind)]))

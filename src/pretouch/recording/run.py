@@ -1,10 +1,12 @@
 """What made the steps of a recording: arm, skin, surroundings, path, parameters and versions, to bytes and back."""
 
 import json
+import platform
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
+from importlib.metadata import version
 from pathlib import Path as FilePath
 from shutil import rmtree
 from tempfile import mkdtemp
@@ -13,6 +15,7 @@ from weakref import finalize
 
 import numpy as np
 
+from pretouch import __version__
 from pretouch.composition import as_table, from_table
 from pretouch.control.path import Circle, Path, WayPoints
 from pretouch.controller import Controller
@@ -20,19 +23,21 @@ from pretouch.errors import PretouchError, RecordingError
 from pretouch.perception.scene_filter import Fixtures
 from pretouch.profiles import Profile
 from pretouch.recording.packing import packed, unpacked
-from pretouch.recording.versions import versions
 from pretouch.robot.body import Capsules
 from pretouch.robot.description import FILE, RobotDescription, description_text, fr3, load_description, panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.sensor import Sensor
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit, TouchPatch
+from pretouch.source_digest import source_digest
 from pretouch.types import FloatArray
 
 JSON = Any
 """What JSON can hold: None, bool, numbers, text, and lists and dicts with text keys of these."""
 
 _MJCF = "arm.xml"
+_LIBRARIES = ("numpy", "numba", "mujoco-core", "scipy")
+"""Those whose numbers a result rests on."""
 _SAMPLES = 400
 """Points kept of a path whose class is not ours, to draw it by."""
 Result = TypeVar("Result")
@@ -60,7 +65,6 @@ class _KeptPath:
     """Name of its class."""
     numbers: FloatArray
     """Circle: centre [m], radius [m], start angle [rad]; otherwise points (W, 3) [m]."""
-    length: float
     closed: bool
 
 
@@ -82,25 +86,23 @@ class _KeptRun:
     path: _KeptPath
 
 
-class SampledPath:
-    """A path of a class that is not ours, drawn through points of it: near it, not the path that was followed."""
+@cache
+def versions() -> dict[str, str]:
+    """Return what a recomputation to the bit rests on: program, its source, libraries, machine."""
+    program = {"pretouch": __version__, "source": source_digest(Controller)[:12]}
+    libraries = {name: version(name) for name in _LIBRARIES}
+    system = {"python": platform.python_version(), "system": platform.system(), "machine": _machine()}
+    return program | libraries | system
 
-    def __init__(self, samples: FloatArray, length: float, closed: bool) -> None:
-        """Take samples (S, 3) [m] at equal arc lengths."""
-        self.length, self.closed, self._samples = length, closed, samples
 
-    def point(self, phase: float) -> FloatArray:
-        """Return the position (3,) [m] at an arc length [m]."""
-        s = phase % self.length if self.closed else min(max(phase, 0.0), self.length)
-        places = np.linspace(0.0, self.length, len(self._samples))
-        return np.array([np.interp(s, places, self._samples[:, i]) for i in range(3)])
-
-    def tangent(self, phase: float) -> FloatArray:
-        """Return the unit tangent (3,) at an arc length [m]; zero where samples on either side coincide."""
-        step = self.length / (len(self._samples) - 1)
-        along = self.point(phase + step / 2) - self.point(phase - step / 2)
-        size = float(np.linalg.norm(along))
-        return along / size if size else along
+def _machine() -> str:
+    """Name the processor: its kind decides how a sum is rounded."""
+    try:
+        lines = FilePath("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError):
+        lines = []
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return f"{platform.machine()} {names[0] if names else platform.processor()}".strip()
 
 
 class Run:
@@ -115,7 +117,7 @@ class Run:
         self.started = kept.started
         """When it began [s since 1970, UTC]."""
         self.about: dict[str, JSON] = kept.about
-        """Whatever the caller said of the run."""
+        """Facts that the caller gave."""
         self.profile: Profile = _sound(lambda: from_table(Profile, kept.profile))
 
     @cached_property
@@ -143,7 +145,7 @@ class Run:
 
         A path of another class than ours is not in the recording: give it, or it is a RecordingError.
         """
-        if path is None and isinstance(self.path, SampledPath):
+        if path is None and self._kept.path.kind not in (Circle.__name__, WayPoints.__name__):
             raise RecordingError(
                 f"The path of the run is of the class {self._kept.path.kind}, which a recording cannot hold: give it,"
                 " as run.controller(path=...) or verify(recorded, path=...)."
@@ -234,15 +236,13 @@ def _kept_path(path: Path) -> _KeptPath:
     elif type(path) is WayPoints:
         numbers = path.points
     else:
-        phases = np.linspace(0.0, path.length, _SAMPLES)
+        phases = np.linspace(0.0, path.length, _SAMPLES, endpoint=not path.closed)
         numbers = np.array([path.point(phase) for phase in phases.tolist()], dtype=np.float64)
-    return _KeptPath(type(path).__name__, numbers, float(path.length), bool(path.closed))
+    return _KeptPath(type(path).__name__, numbers, bool(path.closed))
 
 
 def _path(kept: _KeptPath) -> Path:
     if kept.kind == "Circle":
         x, y, z, radius, start_angle = kept.numbers.tolist()
         return Circle((x, y, z), radius, start_angle)
-    if kept.kind == "WayPoints":
-        return WayPoints(kept.numbers, kept.closed)
-    return SampledPath(kept.numbers, kept.length, kept.closed)
+    return WayPoints(kept.numbers, kept.closed)

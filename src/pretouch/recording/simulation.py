@@ -1,20 +1,20 @@
 """What only a simulation knows, and what stood round the arm as far as the facts of a run tell."""
 
-import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
+import msgspec
 import numpy as np
 
 from pretouch.errors import RecordingError
-from pretouch.types import FloatArray
+from pretouch.recording.packing import custom
+from pretouch.types import FloatArray, IntArray
 from pretouch.values import value
 
 
 @value
 class Truth:
-    """What only a simulation knows, of the time since the cycle before. M instants of the physics."""
+    """What only a simulation knows, of the time since the cycle before. M instants of the physics, T touches."""
 
     time: FloatArray
     """(M,) instants of the physics [s]."""
@@ -22,86 +22,76 @@ class Truth:
     """(M, 3) true contact force on the arm [N], base frame."""
     hand: FloatArray
     """(3,) centre of the person's hand [m], NaN without one."""
-    touches: tuple[tuple[float, int, FloatArray], ...]
-    """Beginnings of contacts: instant [s], link index, velocity (3,) of the touching point [m/s]."""
-
-
-class Beginning(Protocol):
-    """The beginning of a contact, as a simulation reports it."""
-
-    @property
-    def time(self) -> float:
-        """Instant [s]."""
-        ...
+    touch_time: FloatArray
+    """(T,) beginnings of contacts [s]."""
+    touch_link: IntArray
+    """(T,) index of the link that was touched."""
+    touch_velocity: FloatArray
+    """(T, 3) velocity of the touching point [m/s]."""
 
     @property
-    def link(self) -> int:
-        """Index of the link that touches."""
-        ...
-
-    @property
-    def velocity(self) -> FloatArray:
-        """Velocity of the touching point (3,) [m/s]."""
-        ...
+    def touches(self) -> list[tuple[float, int, FloatArray]]:
+        """Beginnings of contacts one by one: instant [s], link index, velocity (3,) [m/s]."""
+        return list(zip(self.touch_time.tolist(), self.touch_link.tolist(), self.touch_velocity, strict=True))
 
 
-def truth_of(log: Sequence[tuple[float, FloatArray]], touches: Sequence[Beginning], hand: FloatArray | None) -> Truth:
+def truth_of(
+    log: Sequence[tuple[float, FloatArray]], touches: Sequence[tuple[float, int, FloatArray]], hand: FloatArray | None
+) -> Truth:
     """Gather what a simulation logged since the cycle before: (instant, force (3,)) of each step of its physics.
 
-    `hand` is the centre of the person's hand (3,) [m], None without one.
+    Args:
+        log: instants [s] and forces (3,) [N].
+        touches: beginnings of contacts: instant [s], link index, velocity (3,) of the touching point [m/s].
+        hand: centre of the person's hand (3,) [m], None without one.
     """
+    time, force = zip(*log, strict=True) if log else ((), ())
+    begun, link, velocity = zip(*touches, strict=True) if touches else ((), (), ())
     return Truth(
-        np.array([time for time, _ in log], dtype=np.float64),
-        np.array([force for _, force in log], dtype=np.float64).reshape(-1, 3),
+        np.array(time, dtype=np.float64),
+        np.array(force, dtype=np.float64).reshape(-1, 3),
         np.full(3, np.nan) if hand is None else hand,
-        tuple((touch.time, touch.link, touch.velocity) for touch in touches),
+        np.array(begun, dtype=np.float64),
+        np.array(link, dtype=np.int64),
+        np.array(velocity, dtype=np.float64).reshape(-1, 3),
     )
 
 
-@dataclass(frozen=True, eq=False)
+@value
 class KnownBox:
-    """A box that stood still."""
+    """A box that stood still. ValueError for numbers that are none."""
 
-    name: str
     center: FloatArray
     """(3,) base frame [m]."""
     half_size: FloatArray
     """(3,) [m]."""
+    name: str = "box"
+
+    def __post_init__(self) -> None:
+        for numbers in (self.center, self.half_size):
+            if numbers.shape != (3,) or not np.isfinite(numbers).all():
+                raise ValueError(f"{numbers.tolist()} is no place and no size")
 
 
-@dataclass(frozen=True)
+@value
 class Surroundings:
     """Boxes, a person's hand and the floor."""
 
-    boxes: tuple[KnownBox, ...]
-    hand_radius: float | None
-    """[m], None without a hand."""
-    floor_height: float | None
-    """In the base frame [m], None if it was not said."""
+    boxes: tuple[KnownBox, ...] = ()
+    hand_radius_m: float | None = None
+    """None without a hand."""
+    floor_height_m: float | None = None
+    """In the base frame, None if nobody gave it."""
 
 
 def surroundings(about: Mapping[str, Any]) -> Surroundings:
-    """Read `scene` of what is said about a run: `boxes`, `hand_radius_m`, `floor_height_m`, each if it is there.
+    """Read `scene` of the facts of a run: `boxes`, `hand_radius_m`, `floor_height_m`, each if it is there.
 
-    RecordingError for a box that cannot be drawn.
+    RecordingError for what cannot be drawn.
     """
-    scene = about.get("scene")
-    said: Mapping[str, Any] = scene if isinstance(scene, Mapping) else {}
     try:
-        boxes = tuple(_box(given) for given in said.get("boxes") or ())
-    except (TypeError, KeyError, ValueError) as error:
+        return msgspec.convert(about.get("scene") or {}, Surroundings, dec_hook=custom)
+    except (msgspec.ValidationError, ValueError, TypeError) as error:
         raise RecordingError(
-            "A box of the scene cannot be drawn: give each a name, center (x, y, z) and half_size (x, y, z) [m]."
+            f"The scene cannot be drawn ({error}): give each of its boxes center (x, y, z) and half_size (x, y, z) [m]."
         ) from error
-    return Surroundings(boxes, _number(said.get("hand_radius_m")), _number(said.get("floor_height_m")))
-
-
-def _box(given: Mapping[str, Any]) -> KnownBox:
-    center, half_size = (np.array(given[name], dtype=np.float64) for name in ("center", "half_size"))
-    if center.shape != (3,) or half_size.shape != (3,) or not np.all(np.isfinite([center, half_size])):
-        raise ValueError(given)
-    return KnownBox(str(given.get("name", "box")), center, half_size)
-
-
-def _number(given: object) -> float | None:
-    return float(given) if isinstance(given, int | float) and math.isfinite(given) else None

@@ -3,7 +3,7 @@
 import math
 from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Any
 
@@ -11,11 +11,9 @@ import numpy as np
 
 from pretouch.control.path import Path
 from pretouch.controller import Controller, ControllerState
-from pretouch.recording.cycles import encoded_step
-from pretouch.recording.fields import hints_of, is_record
-from pretouch.recording.reader import MISSING_INPUTS, Kept, Recorded
-from pretouch.recording.run import Run
-from pretouch.recording.versions import versions
+from pretouch.recording.reader import MISSING_INPUTS, Recorded
+from pretouch.recording.ros import encode, hints_of, is_record
+from pretouch.recording.run import Run, versions
 from pretouch.records import Flat
 
 TOLERANCE = 1e-6
@@ -27,25 +25,29 @@ _SENTENCES = frozenset({"reason", "status"})
 
 
 @dataclass(frozen=True)
-class Part:
-    """One number or text that differs."""
+class Difference:
+    """One number or text that was recomputed otherwise than it was recorded."""
 
     field: str
-    """Where it stands, e.g. `qp.qd[3]`."""
+    """Where it stands, e.g. `qp.qd[3]`; what the controller remembered before a step begins with `state before`."""
     recorded: Any
     recomputed: Any
     size: float
-    """Of the difference, in the field's unit; infinite for what is no number, or is one in one of them only."""
+    """In the field's unit; infinite for what is no number, or is one in one of them only."""
+    number: int = -1
+    """Of the step, from 0."""
+    stamp: float = math.nan
+    """Of the step [s]."""
 
 
-def differing(recorded: Any, recomputed: Any, exact: bool, field: str = "") -> Iterator[Part]:
+def differing(recorded: Any, recomputed: Any, exact: bool, field: str = "") -> Iterator[Difference]:
     """Yield each part of a value that differs: in any bit if `exact`, else by more than `TOLERANCE`.
 
     NaN is the same as NaN.
     """
     a, b = recorded, recomputed
     if type(a) is not type(b) and not (isinstance(a, float | int) and isinstance(b, float | int)):
-        yield Part(field, a, b, math.inf)
+        yield Difference(field, a, b, math.inf)
     elif is_record(type(a)):
         kind: type = type(a)
         for name, _ in hints_of(kind):
@@ -63,13 +65,13 @@ def differing(recorded: Any, recomputed: Any, exact: bool, field: str = "") -> I
     elif isinstance(a, float):
         yield from _in_arrays(np.array(a), np.array(float(b)), exact, field)
     elif a != b:
-        yield Part(field, a.value if isinstance(a, Enum) else a, b.value if isinstance(b, Enum) else b, math.inf)
+        yield Difference(field, a.value if isinstance(a, Enum) else a, b.value if isinstance(b, Enum) else b, math.inf)
 
 
-def _in_arrays(a: Any, b: Any, exact: bool, field: str) -> Iterator[Part]:
+def _in_arrays(a: Any, b: Any, exact: bool, field: str) -> Iterator[Difference]:
     """Compare arrays element by element."""
     if a.shape != b.shape:
-        yield Part(field, f"shape {a.shape}", f"shape {b.shape}", math.inf)
+        yield Difference(field, f"shape {a.shape}", f"shape {b.shape}", math.inf)
         return
     if a.dtype != np.float64:
         differ = np.asarray(a != b)
@@ -84,27 +86,13 @@ def _in_arrays(a: Any, b: Any, exact: bool, field: str) -> Iterator[Part]:
     for place in np.argwhere(differ):
         at = tuple(place.tolist())
         where = f"{field}[{', '.join(map(str, at))}]" if at else field
-        yield Part(where, a[at].item(), b[at].item(), float(size[at]))
+        yield Difference(where, a[at].item(), b[at].item(), float(size[at]))
 
 
 _NO_SNAPSHOT = "no snapshot before"
 _NO_INPUTS = "inputs that could not be kept"
 _MISSING = "no inputs in the file"
 _GONE = "gone missing"
-
-
-@dataclass(frozen=True)
-class Difference:
-    """The first thing recomputed otherwise than it was recorded."""
-
-    number: int
-    """Of the step, from 0."""
-    stamp: float
-    """Of the step [s]."""
-    field: str
-    """Of the step, e.g. `qp.qd[3]`; what the controller remembered before it begins with `state before`."""
-    recorded: object
-    recomputed: object
 
 
 @dataclass
@@ -126,7 +114,7 @@ class Verdict:
     """Largest difference of a number, in its field's SI unit; infinite if a mode, a text or a shape differs."""
     largest_field: str = ""
 
-    def note(self, number: int, stamp: float, parts: list[Part]) -> None:
+    def note(self, number: int, stamp: float, parts: list[Difference]) -> None:
         """Take in what differs in one step."""
         if not parts:
             return
@@ -135,8 +123,7 @@ class Verdict:
         if not self.largest_field or worst.size > self.largest:
             self.largest, self.largest_field = worst.size, worst.field
         if self.first is None:
-            part = parts[0]
-            self.first = Difference(number, stamp, part.field, part.recorded, part.recomputed)
+            self.first = replace(parts[0], number=number, stamp=stamp)
 
     @property
     def exact(self) -> bool:
@@ -149,11 +136,11 @@ class Verdict:
         return self.checked > 0 and self.first is None and not {_MISSING, _GONE} & set(self.skipped)
 
     @property
-    def said(self) -> str:
+    def sentence(self) -> str:
         """All this as a sentence or two."""
         if self.first is not None:
             size = "one of kind" if math.isinf(self.largest) else f"{self.largest:.3g}"
-            said = (
+            result = (
                 f"{self.differing} of {self.checked} steps differ when they are recomputed; the first is step"
                 f" {self.first.number} at {self.first.stamp:.3f} s: {self.first.field} was {self.first.recorded},"
                 f" recomputed {self.first.recomputed}. The largest difference is {size}, of"
@@ -162,11 +149,11 @@ class Verdict:
         elif self.checked:
             how = "bit for bit" if self.exact else f"within {TOLERANCE:g} of their SI units"
             one, more = "The only step was recomputed and is", f"All {self.checked} steps were recomputed and are"
-            said = f"{one if self.checked == 1 else more} the same {how}."
+            result = f"{one if self.checked == 1 else more} the same {how}."
         else:
-            said = "No step could be recomputed."
+            result = "No step could be recomputed."
         skipped = "; ".join(f"{n} {'step has' if n == 1 else 'steps have'} {why}" for why, n in self.skipped.items())
-        return " ".join(filter(None, (said, f"{skipped}." if skipped else "", self.elsewhere)))
+        return " ".join(filter(None, (result, f"{skipped}." if skipped else "", self.elsewhere)))
 
 
 def verify(
@@ -184,7 +171,8 @@ def verify(
     state: ControllerState | None = None
     before: tuple[int, int] | None = None
     for i in range(len(recorded)):
-        kept, number = recorded[i], recorded.number(i)
+        kept = recorded[i]
+        number = kept.number
         if before is not None and number > before[1] + 1:
             verdict.skipped[_GONE] += number - before[1] - 1
         if before != (kept.run, number - 1):
@@ -192,29 +180,23 @@ def verify(
         before = kept.run, number
         if kept.run not in controllers:
             controllers = {kept.run: recorded.runs[kept.run].controller(path)}
-        parts: list[Part] = []
+        parts: list[Difference] = []
         if kept.snapshot is not None:
             if state is not None and exact[kept.run] and not kept.anew:
                 parts += differing(kept.snapshot, state, True, "state before")
             state = kept.snapshot
         if state is None or kept.inputs is None:
-            verdict.skipped[_unchecked(recorded, i, kept)] += 1
+            missing = _MISSING if kept.unreadable == MISSING_INPUTS else _NO_INPUTS
+            verdict.skipped[_NO_SNAPSHOT if kept.inputs is not None else missing] += 1
             state = None
         else:
             step, state = controllers[kept.run].step(state, kept.inputs)
-            if not exact[kept.run] or encoded_step(number, step) != recorded.step_data(i):
+            if not exact[kept.run] or encode(step, number) != recorded.step_data(i):
                 parts += differing(kept.step, step, exact[kept.run])
             verdict.checked += 1
         verdict.note(number, kept.step.stamp, parts)
         progress(i + 1)
     return verdict
-
-
-def _unchecked(recorded: Recorded, i: int, kept: Kept) -> str:
-    """Say what a step has that keeps it from being recomputed."""
-    if kept.inputs is not None:
-        return _NO_SNAPSHOT
-    return _NO_INPUTS if recorded.unreadable(i) != MISSING_INPUTS else _MISSING
 
 
 def _elsewhere(runs: tuple[Run, ...]) -> str:

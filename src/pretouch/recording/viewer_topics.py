@@ -9,14 +9,14 @@ import numpy as np
 
 from pretouch.controller import Controller
 from pretouch.recording.disk import Item
-from pretouch.recording.ros import IMU, JOINT_STATE, MARKERS, RANGE, TRANSFORMS, WRENCH, messages
+from pretouch.recording.ros import JOINT_STATE, MARKERS, RANGE, TRANSFORMS, WRENCH, messages
 from pretouch.recording.simulation import surroundings
 from pretouch.robot.body import Capsules
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.sensor import PAPER_SENSOR, Sensor
 from pretouch.types import ControlStep, FloatArray, Inputs, RangeReadings, RangeStatus
 
-KINDS = (JOINT_STATE, WRENCH, RANGE, IMU, TRANSFORMS, MARKERS)
+KINDS = (JOINT_STATE, WRENCH, RANGE, TRANSFORMS, MARKERS)
 """Types of these topics."""
 
 _LATEST = (2**31 - 1) * 10**9
@@ -25,9 +25,6 @@ _INFRARED = 1
 _ACCURACY_M = 0.025
 """Ranging error of the VL53L1X, at most [m] (data sheet DS12385)."""
 _MEASURED = (RangeStatus.OK, RangeStatus.NO_WRAP_CHECK, RangeStatus.MERGED)
-_UNKNOWN = np.array([-1.0, *np.zeros(8)])
-"""Covariance that says a quantity is not there (sensor_msgs/Imu)."""
-
 _PERIOD_NS = 33_000_000
 """Least time between two drawings [ns]: about 30 a second."""
 _CUBE, _SPHERE, _CYLINDER, _LINE_STRIP, _LINE_LIST, _SPHERE_LIST = 1, 2, 3, 4, 5, 7
@@ -155,19 +152,6 @@ def range_item(
     sees = sensor.angle, sensor.nearest_m, sensor.farthest_m
     message = messages().make(RANGE, at, _INFRARED, *sees, shown, _ACCURACY_M**2)
     return _item(f"/skin/{topic_name(unit_id)}/range", RANGE, sequence, time, message)
-
-
-def imu_items(
-    unit_id: str, instead: int, stamp: FloatArray, acceleration: FloatArray, angular_velocity: FloatArray
-) -> Iterator[Item]:
-    """Yield what a unit's IMU measured at instants (M,) [s]; one that is no time stands at `instead` [ns]."""
-    topic = f"/skin/{topic_name(unit_id)}/imu"
-    turn, nothing = messages().make("geometry_msgs/msg/Quaternion", 0.0, 0.0, 0.0, 1.0), np.zeros(9)
-    for t, a, w in zip(stamp.tolist(), acceleration, angular_velocity, strict=True):
-        time = nanoseconds(t, instead)
-        pair = messages().xyz("Vector3", w), messages().xyz("Vector3", a)
-        message = messages().make(IMU, header(time, unit_id), turn, _UNKNOWN, pair[0], nothing, pair[1], nothing)
-        yield _item(topic, IMU, 0, time, message)
 
 
 def _item(topic: str, kind: str, sequence: int, time: int, message: Any) -> Item:

@@ -17,10 +17,9 @@ from pretouch.recording.cycles import Cycles, KeptCycle, inputs_of, items
 from pretouch.recording.disk import Disk, Item
 from pretouch.recording.run import JSON
 from pretouch.recording.simulation import Truth
-from pretouch.recording.viewer_topics import ViewerTopics, imu_items
+from pretouch.recording.viewer_topics import ViewerTopics
 from pretouch.robot.model import RobotModel
 from pretouch.signals import ended_in_order
-from pretouch.types import FloatArray
 
 _FASTER = 1.2
 """A run whose time passes this much faster than the clock's is a simulation."""
@@ -44,10 +43,10 @@ class CycleFile:
     def __init__(self, place: Path, controller: Controller, about: Mapping[str, JSON]) -> None:
         self._about = about
         self._model: RobotModel | None = None
-        self.begin(controller)
+        self.change(controller)
         self.disk = Disk(place)
 
-    def begin(self, controller: Controller) -> None:
+    def change(self, controller: Controller) -> None:
         """Let the cycles from the next one on be those of another controller of the same arm."""
         arm = controller.model.description
         if self._model is None or self._model.description is not arm:
@@ -62,7 +61,7 @@ class CycleFile:
 def _all_items(topics: ViewerTopics, kept: KeptCycle) -> Iterator[Item]:
     """Yield the messages of a cycle, and what it is to tools that do not know our types."""
     yield from items(kept)
-    yield from topics.items(inputs_of(kept.inputs)[0], kept.step, kept.number, kept.time)
+    yield from topics.items(inputs_of(kept.inputs).inputs, kept.step, kept.number, kept.time)
 
 
 class Recording:
@@ -85,7 +84,7 @@ class Recording:
         self.place = Path(place)
         self._cycles = Cycles(controller, about or {})
         self._file = CycleFile(self.place, controller, about or {})
-        self._steps = self._log_time = 0
+        self._steps = 0
         self._first = self._last = self._begun_at = math.nan
         self._closed: Closed | None = None
         self._as_context = ExitStack()
@@ -93,8 +92,8 @@ class Recording:
 
     def change(self, controller: Controller) -> None:
         """Let the steps from the next one on be those of another controller of the same arm."""
-        self._cycles.begin(controller)
-        self._file.begin(controller)
+        self._cycles.change(controller)
+        self._file.change(controller)
 
     def record(self, cycle: Cycle, truth: Truth | None = None) -> None:
         """Keep one turn of the loop, and what only a simulation knows. Of the disk's troubles it raises none."""
@@ -112,13 +111,8 @@ class Recording:
             self._first, self._begun_at = stamp, monotonic()
         elif self._file.disk.behind() and stamp - self._first > _FASTER * (monotonic() - self._begun_at):
             self._file.disk.wait()  # a simulation that outruns the clock can wait, a control loop cannot
-        self._steps, self._last, self._log_time = self._steps + 1, stamp, kept.time
+        self._steps, self._last = self._steps + 1, stamp
         return kept
-
-    def imu(self, unit_id: str, stamp: FloatArray, acceleration: FloatArray, angular_velocity: FloatArray) -> None:
-        """Keep what a unit's IMU measured at instants (M,) [s]: (M, 3) [m/s^2], (M, 3) [rad/s], sensor frame."""
-        if self._closed is None and not self.trouble:
-            self._file.disk.put(partial(imu_items, unit_id, self._log_time, stamp, acceleration, angular_velocity))
 
     @property
     def trouble(self) -> str:
@@ -129,17 +123,14 @@ class Recording:
         """End the file; a second time says the same again."""
         if self._closed is None:
             self._file.disk.close()
-            self._closed = self._summary()
+            duration = self._last - self._first if self._steps else 0.0
+            sentence = self.trouble or (
+                f"{self.place} holds {self._steps} control steps, {duration:.1f} s, in"
+                f" {self._file.disk.size() / 1e6:.1f} MB."
+            )
+            self._closed = Closed(self.place, self._steps, duration, sentence)
             atexit.unregister(self.close)
         return self._closed
-
-    def _summary(self) -> Closed:
-        duration = self._last - self._first if self._steps else 0.0
-        size = self._file.disk.size()
-        sentence = self.trouble or (
-            f"{self.place} holds {self._steps} control steps, {duration:.1f} s, in {size / 1e6:.1f} MB."
-        )
-        return Closed(self.place, self._steps, duration, sentence)
 
     def __enter__(self) -> Self:
         self._as_context.enter_context(ended_in_order())

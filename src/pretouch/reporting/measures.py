@@ -42,7 +42,7 @@ def measure(recorded: Recorded, title: str) -> Measures:
     course = gather(recorded)
     return Measures(
         title=title,
-        lacking="" if recorded.complete else recorded.said or "The file is not complete.",
+        lacking="" if recorded.complete else recorded.sentence or "The file is not complete.",
         course=course,
         contacts=contacts_in(course),
         distances=distances(course),

@@ -2,7 +2,7 @@
 
 from collections import deque
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import repeat
 from typing import Any, NamedTuple
 
@@ -23,8 +23,7 @@ _Past = tuple[float, FloatArray]
 """An instant, and (5, n) q, qd, q_d, qd_d and external torques at it."""
 
 
-@dataclass(frozen=True, slots=True)
-class Touch:
+class Touch(NamedTuple):
     """The beginning of a contact of the arm, after none."""
 
     time: float

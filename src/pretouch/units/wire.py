@@ -246,15 +246,19 @@ class Sample:
     zones: bytes = b""
     """`ZONES` and each zone's `ZONE` with `Flag.ZONES`, else nothing. The fields of the range are of the nearest."""
 
-    def encode(self, session: Mac) -> bytes:
-        """As a datagram of a session."""
+    def body(self) -> bytes:
+        """As a datagram without its tag: what `sample_of` takes."""
         body = PREFIX.pack(MAGIC, VERSION, Kind.SAMPLE, self.unit) + SAMPLE.pack(
             self.flags, self.sequence, self.time_us, self.beacon, self.beacon_hold_us, self.battery_mv,
             self.temperature_cdeg, self.bus_errors, self.range_stream, self.range_status, self.range_mm,
             self.range_age_us, self.range_sigma, self.range_signal, self.range_ambient, self.range_spads,
             self.imu_count, self.imu_scale, self.imu_rate_hz, self.imu_index, self.imu_age_us,
         )  # fmt: skip
-        body += self.imu + self.touch + self.zones
+        return body + self.imu + self.touch + self.zones
+
+    def encode(self, session: Mac) -> bytes:
+        """As a datagram of a session."""
+        body = self.body()
         return body + session.tag(body)
 
 

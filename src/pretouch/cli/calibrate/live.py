@@ -21,13 +21,11 @@ from pretouch.cli.calibrate.motion import planned
 from pretouch.cli.calibrate.outputs import Outputs
 from pretouch.cli.calibrate.recording import Sources, calibrate_recording
 from pretouch.cli.run.setup import heard_units
-from pretouch.cli.skin_record import record_samples
 from pretouch.cli.writing import check_free, check_writable, same_file
 from pretouch.errors import CalibrationError, HardwareError, RecordingError, RobotError
 from pretouch.loop import Cycle, MonotonicClock
 from pretouch.ports import Arm
 from pretouch.profiles import PROFILES
-from pretouch.recording.skin_recording import SkinRecording
 from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import skin_for
@@ -35,6 +33,7 @@ from pretouch.session.motion import Ending, go
 from pretouch.session.units import Units, wait_until_live
 from pretouch.signals import Terminated
 from pretouch.types import RobotState
+from pretouch.units.skin_recording import SkinRecording
 
 if TYPE_CHECKING:
     from pretouch.cli.calibrate.options import CalibrateArm
@@ -156,7 +155,7 @@ class Measurements:
         """Record what the units have measured."""
         if not self._units.alive:
             raise HardwareError("The receiver of the units has ended: see what it printed.")
-        record_samples(self._recording, self._units.take_samples(), self._ids)
+        self._recording.add(self._units.take_samples(), self._ids)
 
 
 def _recorded(

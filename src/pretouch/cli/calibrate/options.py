@@ -16,7 +16,7 @@ class RecordingOptions:
     """From what was recorded while the arm made a calibration motion."""
 
     recording: OptionalFile = None
-    """Recording of the units, by `pretouch skin monitor --record`, or of a run with real units."""
+    """Recording of the units, by `pretouch skin monitor --record`."""
     joints: OptionalFile = None
     """Joint states, if they are not in the recording: a CSV file (time_s,q1_rad,...), an MCAP file or a bag, with any
     clock."""

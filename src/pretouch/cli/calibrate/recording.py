@@ -16,10 +16,10 @@ from pretouch.cli.detect_words import sentences
 from pretouch.errors import CalibrationError
 from pretouch.imported_data.log import TABLES
 from pretouch.imported_data.reading import read_joints
-from pretouch.recording.calibration_data import Measured, MeasuredUnit, read_measured
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, load_skin
 from pretouch.traces import ImuTrace, JointTrace
+from pretouch.units.skin_reader import SkinTrace, UnitTrace, read_skin
 
 _NO_IMU = ImuTrace(np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)))
 
@@ -46,15 +46,15 @@ def calibrate_recording(model: RobotModel, sources: Sources, outputs: Outputs) -
             " states with --joints."
         )
     believed = load_skin(sources.skin, model) if sources.skin else None
-    measured = read_measured(sources.recording)
+    whole = read_skin(sources.recording)
+    measured = replace(whole, units={name: unit for name, unit in whole.units.items() if len(unit.imu.stamp)})
     joints, notes = _joints(model, measured, sources)
     if not measured.complete:
         notes = [f"{sources.recording} is incomplete or damaged: the readable part is used.", *notes]
     data = CalibrationData(joints, _units(measured, believed))
     if not data.units:
         raise CalibrationError(
-            f"{sources.recording} holds no IMU data: record units that have an IMU by `pretouch skin monitor --record`,"
-            " or a run with such units; a simulated run has none."
+            f"{sources.recording} holds no IMU data: record units that have an IMU by `pretouch skin monitor --record`."
         )
     if believed:
         notes += _differences(measured, believed, sources.skin)
@@ -67,7 +67,7 @@ def calibrate_recording(model: RobotModel, sources: Sources, outputs: Outputs) -
     return give(Answer(model, found, believed, ahead, tuple(notes)), outputs)
 
 
-def _joints(model: RobotModel, measured: Measured, sources: Sources) -> tuple[JointTrace, list[str]]:
+def _joints(model: RobotModel, measured: SkinTrace, sources: Sources) -> tuple[JointTrace, list[str]]:
     """Return the joint positions in the order of the model, and what is to be said of them."""
     if sources.joints:
         trace, log = read_joints(sources.joints, model, sources.topic)
@@ -89,23 +89,22 @@ def _joints(model: RobotModel, measured: Measured, sources: Sources) -> tuple[Jo
     return JointTrace(measured.joints.stamp, measured.joints.q[:, order]), []
 
 
-def _units(measured: Measured, believed: Skin | None) -> tuple[UnitData, ...]:
+def _units(measured: SkinTrace, believed: Skin | None) -> tuple[UnitData, ...]:
     """Return the units of the skin in its order, then others that were heard; a link that nobody names is None."""
     links = {unit.id: unit.link for unit in believed.units} if believed else {}
     names = dict.fromkeys((*links, *measured.units))
     return tuple(_unit(name, measured.units.get(name), links.get(name)) for name in names)
 
 
-def _unit(name: str, measured: MeasuredUnit | None, link: str | None) -> UnitData:
+def _unit(name: str, measured: UnitTrace | None, link: str | None) -> UnitData:
     if measured is None:
         return UnitData(name, _NO_IMU, link)
-    imu, c = measured.imu, measured.counters
-    if c is not None:
-        imu = retimed(imu, instants(c.index, c.count, c.time_us, c.imu_age_us, c.offset, c.bound))
+    c = measured.counters
+    imu = retimed(measured.imu, instants(c.index, c.count, c.time_us, c.imu_age_us, c.offset, c.bound))
     return UnitData(name, imu, link, measured.acceleration_max, measured.angular_velocity_max)
 
 
-def _differences(measured: Measured, believed: Skin, place: Path | None) -> list[str]:
+def _differences(measured: SkinTrace, believed: Skin, place: Path | None) -> list[str]:
     """Say which units were heard that the skin does not name."""
     others = [name for name in measured.units if name not in believed.ids]
     return [f"{place} does not name {', '.join(others)}: their links are found."] if others else []

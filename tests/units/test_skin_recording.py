@@ -2,7 +2,7 @@
 
 import math
 import time
-from dataclasses import asdict
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,11 +12,15 @@ from rosbags.highlevel import AnyReader
 from pretouch import cli
 from pretouch.errors import RecordingError
 from pretouch.recording.reader import open_recording
-from pretouch.recording.skin_reader import read_skin
-from pretouch.recording.skin_recording import Diagnosis, Level, SkinRecording
-from pretouch.units.traffic import Received
-from pretouch.units.wire import Flag, Sample, TouchPart, imu_values
-from tests.recording.runs import changed, recorded_run
+from pretouch.sensing.unit import ACCELERATION_LSB, ANGULAR_RATE_LSB
+from pretouch.units.findings import Finding
+from pretouch.units.health import UnitHealth, UnitStatus
+from pretouch.units.monitor import MonitorUpdate
+from pretouch.units.skin_reader import SkinTrace, read_skin
+from pretouch.units.skin_recording import SkinRecording
+from pretouch.units.traffic import Received, imu_batch
+from pretouch.units.wire import IMU_SAMPLE, Flag, Sample, TouchPart
+from tests.recording.runs import changed, controller_of, recorded_run
 
 BATCH = 8
 
@@ -43,12 +47,19 @@ def stamp(number: int) -> float:
     return arrival(number) - 0.015 if number > 2 else math.nan
 
 
+def heard(number: int, **changes) -> Received:
+    return Received(0, arrival(number), stamp(number), 90.0, 1e-4, replace(sample(number), **changes))
+
+
 def record(recording: SkinRecording, number: int, unit: str = "hand/1") -> None:
-    sent = sample(number)
-    new = bool(sent.flags & Flag.RANGE_NEW)
-    recording.sample(unit, Received(0, arrival(number), stamp(number), 90.0, 1e-4, sent), new)
-    at = arrival(number) + np.arange(BATCH) / 416
-    recording.imu(unit, at, *imu_values(sent.imu, sent.imu_scale))
+    recording.add([heard(number)], [unit])
+
+
+def cold(unit: str) -> MonitorUpdate:
+    """What a monitor says of a unit that is too cold."""
+    health = UnitHealth(unit, UnitStatus(), *[1.0] * 11, {}, 3.7, -5.1, *[0] * 8)
+    finding = Finding(unit, "warning", "temperature", f"{unit} is cold.")
+    return MonitorUpdate(102.0, 2.0, [], (health,), (finding,), False)
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +69,7 @@ def place(tmp_path_factory) -> Path:
         for number in range(1, 101):
             record(recording, number)
             record(recording, number, "wrist")
-        recording.health(102.0, [Diagnosis("wrist", Level.WARN, "wrist is cold.", {"temperature_c": "-5.1"})])
+        recording.health(cold("wrist"))
     return place
 
 
@@ -67,28 +78,74 @@ def test_every_field_of_every_sample_comes_back(place):
     assert trace.complete
     assert list(trace.units) == ["hand/1", "wrist"]
     assert (trace.joints, trace.joint_names) == (None, ())
-    for unit in trace.units.values():
+    for index, unit in enumerate(trace.units.values()):
         assert len(unit.samples) == 100
-        for number, kept in enumerate(unit.samples, 1):
-            sent = sample(number)
-            assert kept.sample == asdict(sent)
-            assert kept.arrival == arrival(number)
-            assert kept.stamp == stamp(number) or number <= 2
-            assert (kept.offset, kept.bound) == (90.0, 1e-4)
+        for number, received in enumerate(unit.samples, 1):
+            sent = heard(number)
+            assert received.sample == sent.sample
+            assert (received.unit, received.arrival) == (index, sent.arrival)
+            assert received.stamp == sent.stamp or number <= 2
+            assert (received.offset, received.bound) == (90.0, 1e-4)
 
 
-def test_ranges_and_imu_come_back_as_arrays(place):
+def test_ranges_come_back_as_arrays(place):
     unit = read_skin(place).units["wrist"]
     fresh = [n for n in range(1, 101) if n % 4]
     assert np.allclose(unit.range.distance, [0.5 + n / 1000 for n in fresh], atol=1e-12)
     assert np.array_equal(unit.range.stamp, [stamp(n) for n in fresh], equal_nan=True)
     assert np.array_equal(unit.range.status, [0 if n % 7 else 4 for n in fresh])
     assert np.allclose(unit.range.sigma, 0.003)
-    values = [imu_values(sample(n).imu, 0x21) for n in range(1, 101)]
-    at = np.concatenate([arrival(n) + np.arange(BATCH) / 416 for n in range(1, 101)])
-    assert np.allclose(unit.imu.stamp, at, atol=1e-8)
-    assert np.array_equal(unit.imu.acceleration, np.concatenate([a for a, _ in values]))
-    assert np.array_equal(unit.imu.angular_velocity, np.concatenate([w for _, w in values]))
+
+
+def read_back(place, received) -> SkinTrace:
+    with SkinRecording(place) as recording:
+        recording.add(received, ["hand/1"])
+    return read_skin(place)
+
+
+def test_imu_samples_come_back_as_arrays_with_their_counters(tmp_path):
+    received = [heard(n) for n in range(1, 40)]
+    unit = read_back(tmp_path / "a.mcap", received).units["hand/1"]
+    batches = [imu_batch(one) for one in received]
+    np.testing.assert_array_equal(unit.imu.acceleration, np.concatenate([b.acceleration for b in batches]))
+    np.testing.assert_array_equal(unit.imu.angular_velocity, np.concatenate([b.angular_velocity for b in batches]))
+    # the receiver stamps with the earliest an instant can be, this with the middle
+    np.testing.assert_allclose(unit.imu.stamp, np.concatenate([b.stamp for b in batches]) + 1e-4, atol=1e-9)
+    for name in ("imu_index", "imu_count", "time_us", "imu_age_us"):
+        sent = [getattr(one.sample, name) for one in received]
+        column = getattr(unit.counters, name if name == "imu_age_us" else name.removeprefix("imu_"))
+        assert column.tolist() == sent
+    assert (set(unit.counters.offset), set(unit.counters.bound)) == ({90.0}, {1e-4})
+
+
+@pytest.mark.parametrize("acceleration", range(4))
+@pytest.mark.parametrize("rate", range(5))
+def test_full_scales_are_the_largest_values_a_sensor_can_tell(tmp_path, acceleration, rate):
+    full, scale = IMU_SAMPLE.pack(*[32767] * 6), acceleration | rate << 4
+    unit = read_back(tmp_path / "a.mcap", [heard(1, imu=full, imu_count=1, imu_scale=scale)]).units["hand/1"]
+    range_g, range_dps = list(ACCELERATION_LSB)[acceleration], list(ANGULAR_RATE_LSB)[rate]
+    assert unit.acceleration_max == pytest.approx(9.80665 * range_g, rel=1e-3)
+    assert np.deg2rad(range_dps) < unit.angular_velocity_max < 1.2 * np.deg2rad(range_dps)
+    assert unit.imu.acceleration.max() == unit.acceleration_max
+    assert unit.imu.angular_velocity.max() == unit.angular_velocity_max
+
+
+def test_of_two_scales_the_smaller_is_the_full_scale_and_one_there_is_not_is_left_out(tmp_path):
+    received = [heard(number, imu_scale=scale) for number, scale in ((1, 0x21), (2, 0x42), (3, 0x51))]
+    unit = read_back(tmp_path / "a.mcap", received).units["hand/1"]
+    assert unit.acceleration_max == pytest.approx(4 * 9.80665, rel=1e-3)
+    assert unit.angular_velocity_max == pytest.approx(np.deg2rad(573.4), rel=1e-3)
+    assert unit.counters.index.tolist() == [BATCH, 2 * BATCH]
+    assert len(unit.imu.stamp) == 2 * BATCH
+
+
+def test_imu_samples_of_unknown_time_have_their_places_and_a_unit_without_an_imu_has_none(tmp_path):
+    received = [replace(heard(1), offset=np.nan), heard(2), heard(3, imu_rate_hz=0)]
+    unit = read_back(tmp_path / "a.mcap", received).units["hand/1"]
+    assert np.isnan(unit.imu.stamp).tolist() == [True] * BATCH + [False] * BATCH + [True] * BATCH
+    assert np.isnan(unit.counters.offset).tolist() == [True, False, False]
+    unit = read_back(tmp_path / "b.mcap", [heard(1, imu_count=0, imu=b"")]).units["hand/1"]
+    assert (len(unit.imu.stamp), len(unit.counters.index), unit.acceleration_max) == (0, 0, np.inf)
 
 
 def test_the_usual_tools_read_the_standard_topics(place):
@@ -108,17 +165,20 @@ def test_the_usual_tools_read_the_standard_topics(place):
             if connection.topic == "/diagnostics":
                 (status,) = message.status
                 assert (status.name, status.level, status.message) == ("wrist", 1, "wrist is cold.")
-                assert [(v.key, v.value) for v in status.values] == [("temperature_c", "-5.1")]
+                assert ("temperature_c", "-5.1") in [(v.key, v.value) for v in status.values]
             if connection.topic == "/skin/wrist/range":
                 assert 0.5 < message.range < 0.61 or math.isinf(message.range)
+            if connection.topic == "/skin/wrist/imu":
+                at = message.header.stamp.sec + message.header.stamp.nanosec / 1e9
+                assert (message.header.frame_id, 90.0 < at < 93.0) == ("wrist", True)
 
 
 @pytest.mark.parametrize("command", [("replay", "--no-page"), ("report",)])
 def test_other_commands_say_what_can_be_done_with_it(place, capsys, command):
     assert cli.main([command[0], str(place), *command[1:]]) == 2
-    said = capsys.readouterr().err
-    assert "holds samples of sensor units, but no control step" in said
-    assert said.count("\n") == 1
+    sentence = capsys.readouterr().err
+    assert "holds samples of sensor units, but no control step" in sentence
+    assert sentence.count("\n") == 1
 
 
 def test_a_file_that_is_cut_off_gives_its_whole_part(place, tmp_path):
@@ -127,7 +187,7 @@ def test_a_file_that_is_cut_off_gives_its_whole_part(place, tmp_path):
     cut.write_bytes(whole[: whole.rindex(b"\x0f\x04\0\0\0\0\0\0\0")])  # before the end of the data
     trace = read_skin(cut)
     assert not trace.complete
-    assert trace.samples == 200
+    assert [len(unit.samples) for unit in trace.units.values()] == [100, 100]
 
 
 def test_what_came_is_in_the_file_within_a_second_though_nobody_closes_it(tmp_path):
@@ -137,11 +197,11 @@ def test_what_came_is_in_the_file_within_a_second_though_nobody_closes_it(tmp_pa
     time.sleep(1.0)
     trace = read_skin(tmp_path / "a.mcap")
     recording.close()
-    assert (trace.complete, trace.samples) == (False, 5)
+    assert (trace.complete, len(trace.units["hand/1"].samples)) == (False, 5)
 
 
-def test_a_recording_of_control_steps_is_no_recording_of_units(controller, tmp_path):
-    recorded_run(tmp_path / "run.mcap", controller, 3)
+def test_a_recording_of_control_steps_is_no_recording_of_units(panda_model, paper_skin, tmp_path):
+    recorded_run(tmp_path / "run.mcap", controller_of(panda_model, paper_skin), 3)
     with pytest.raises(RecordingError, match="holds no samples of sensor units"):
         read_skin(tmp_path / "run.mcap")
     assert len(open_recording(tmp_path / "run.mcap")) == 3
@@ -157,7 +217,7 @@ STAMP = 100.0 + np.arange(200) / 1000
 Q = np.random.default_rng(0).normal(size=(200, 2))
 
 
-def recorded(place, *parts):
+def with_joints(place, *parts):
     """Record units, and states of joints in parts: (stamp, q, qd, names)."""
     with SkinRecording(place) as recording:
         for number in range(1, 6):
@@ -168,7 +228,7 @@ def recorded(place, *parts):
 
 
 def test_the_usual_tools_read_states_of_joints(tmp_path):
-    recorded(tmp_path / "a.mcap", (STAMP, Q, 0.1 * Q, NAMES))
+    with_joints(tmp_path / "a.mcap", (STAMP, Q, 0.1 * Q, NAMES))
     with AnyReader([tmp_path / "a.mcap"]) as reader:
         (connection,) = (c for c in reader.connections if c.topic == "/joint_states")
         assert (connection.msgtype, connection.msgcount) == ("sensor_msgs/msg/JointState", 200)
@@ -184,7 +244,7 @@ def test_the_usual_tools_read_states_of_joints(tmp_path):
 def test_states_of_joints_are_sorted_and_what_is_no_number_or_came_twice_is_left_out(tmp_path):
     q = Q.copy()
     q[5] = np.nan
-    trace = recorded(
+    trace = with_joints(
         tmp_path / "a.mcap", (STAMP[100:], q[100:], None, NAMES), (STAMP[:101], q[:101] + 1.0, None, NAMES)
     )
     np.testing.assert_array_equal(trace.joints.q, np.delete(np.vstack([q[:101] + 1.0, q[101:]]), 5, axis=0))
@@ -193,7 +253,7 @@ def test_states_of_joints_are_sorted_and_what_is_no_number_or_came_twice_is_left
 
 def test_joints_of_another_arm_in_the_same_file_are_refused(tmp_path):
     with pytest.raises(RecordingError, match="states of the joints a, b and of panda_joint1, panda_joint2"):
-        recorded(tmp_path / "a.mcap", (STAMP, Q, None, NAMES), (STAMP, Q, None, ("a", "b")))
+        with_joints(tmp_path / "a.mcap", (STAMP, Q, None, NAMES), (STAMP, Q, None, ("a", "b")))
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,172 @@
+"""A recording of sensor units, opened: what each unit measured, as arrays."""
+
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pretouch.errors import RecordingError
+from pretouch.recording.mcap_file import Contents, open_mcap, read_messages
+from pretouch.recording.ros import JOINT_STATE, UNIT_SAMPLE, check_version, decoded
+from pretouch.sensing.unit import LARGEST_COUNT, counts_of
+from pretouch.traces import ImuTrace, JointTrace
+from pretouch.types import FloatArray, IntArray
+from pretouch.units.traffic import Received
+from pretouch.units.wire import SAMPLE_LEAST, TAG_SIZE, Flag, imu_values, sample_of
+from pretouch.values import value
+
+
+@value
+class RangeTrace:
+    """Readings of one unit, in the order in which they came. R of them."""
+
+    stamp: FloatArray
+    """(R,) earliest instant of the measurement [s], NaN while the unit's clock was not known."""
+    bound: FloatArray
+    """(R,) most the unit's clock can have been off by [s]."""
+    arrival: FloatArray
+    """(R,) when the datagram came [s]."""
+    distance: FloatArray
+    """(R,) [m]."""
+    status: IntArray
+    """(R,) `RangeStatus` codes."""
+    sigma: FloatArray
+    """(R,) standard deviation by the sensor's own estimate [m]."""
+
+
+@value
+class ImuCounters:
+    """What tells when IMU samples were taken: B batches of one unit, in the order in which they came."""
+
+    index: IntArray
+    """(B,) number of the first sample of each since the unit's reset."""
+    count: IntArray
+    """(B,) how many samples each has."""
+    time_us: IntArray
+    """(B,) unit's clock when the datagram was made [us]."""
+    imu_age_us: IntArray
+    """(B,) from the newest sample to `time_us` [us]."""
+    offset: FloatArray
+    """(B,) the receiver's time minus the unit's [s]; NaN while that was not known."""
+    bound: FloatArray
+    """(B,) most the true offset differs from it [s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class UnitTrace:
+    """All that one unit measured."""
+
+    samples: list[Received]
+    """Its datagrams, in the order in which they came; `unit` is the index of the unit in the recording."""
+    range: RangeTrace
+    imu: ImuTrace
+    """In the order of the datagrams, at stamps spaced by the nominal rate; NaN where the unit's clock was not known."""
+    counters: ImuCounters
+    """Of the same samples."""
+    acceleration_max: float
+    """Largest that the accelerometer could tell [m/s^2]; inf without a sample."""
+    angular_velocity_max: float
+    """Largest that the gyroscope could tell [rad/s]; inf without a sample."""
+
+
+@dataclass(frozen=True, eq=False)
+class SkinTrace:
+    """A recording of sensor units. All times are of one clock, but for the units' unknown delays."""
+
+    units: dict[str, UnitTrace]
+    """By name, in the order in which they were first heard."""
+    joints: JointTrace | None
+    """Where the arm's joints were, if that was recorded."""
+    joint_names: tuple[str, ...]
+    """Names of these joints, in the order of the columns."""
+    complete: bool
+    """Whether the recording was ended in order."""
+
+
+def read_skin(place: Path) -> SkinTrace:
+    """Read what `SkinRecording` wrote, finished or cut off. RecordingError for a file that holds nothing of it."""
+    place, contents, way_out = Path(place), Contents(), "give a recording made by `pretouch skin monitor --record`"
+    samples: dict[str, list[Received]] = {}
+    states: list[Any] = []
+    with open_mcap(place, way_out) as file:
+        for message in read_messages(file, contents):
+            if message.kind == JOINT_STATE:
+                states.append(decoded(JOINT_STATE, message.data))
+            elif message.kind == UNIT_SAMPLE:
+                if not samples:
+                    check_version(place, contents)
+                datagram = decoded(UNIT_SAMPLE, message.data)
+                samples.setdefault(datagram.unit, []).append(_received(place, datagram, list(samples)))
+    if not samples:
+        raise RecordingError(f"{place} holds no samples of sensor units: {way_out}.")
+    joints, names = _joints(place, states)
+    return SkinTrace({unit: _unit(heard) for unit, heard in samples.items()}, joints, names, contents.complete)
+
+
+def _received(place: Path, message: Any, ids: list[str]) -> Received:
+    body = message.datagram.tobytes()
+    sample = sample_of(body) if len(body) >= SAMPLE_LEAST - TAG_SIZE else None
+    if sample is None:
+        raise RecordingError(f"{place} holds a datagram of {message.unit} that is no sample: use a copy that is whole.")
+    unit = ids.index(message.unit)
+    return Received(unit, message.arrival, message.stamp, message.offset, message.bound, sample)
+
+
+def _unit(heard: list[Received]) -> UnitTrace:
+    batches = []
+    for one in heard:
+        with suppress(ValueError):  # full scales that the sensor does not have
+            batches.append((one, *imu_values(one.sample.imu, one.sample.imu_scale)))
+    used = [one for one, *_ in batches if one.sample.imu_count]
+    index, count, time_us, age_us, rate = (
+        _column(used, name) for name in ("imu_index", "imu_count", "time_us", "imu_age_us", "imu_rate_hz")
+    )
+    counters = ImuCounters(index, count, time_us, age_us, _times(used, "offset"), _times(used, "bound"))
+    scales = [counts_of(one.sample.imu_scale) for one in used]
+    full = [LARGEST_COUNT * min(lsb) for lsb in zip(*scales, strict=True)] or [np.inf, np.inf]
+    stamp = _nominal(counters, rate.astype(np.float64))
+    values = (np.concatenate([np.zeros((0, 3)), *(batch[k] for batch in batches)]) for k in (1, 2))
+    return UnitTrace(heard, _ranges(heard), ImuTrace(stamp, *values), counters, *full)
+
+
+def _column(heard: list[Received], name: str) -> IntArray:
+    return np.array([getattr(one.sample, name) for one in heard], dtype=np.uint64).astype(np.int64)
+
+
+def _times(heard: list[Received], name: str) -> FloatArray:
+    return np.array([getattr(one, name) for one in heard], dtype=np.float64)
+
+
+def _ranges(heard: list[Received]) -> RangeTrace:
+    fresh = [one for one in heard if one.sample.flags & Flag.RANGE_NEW]
+    stamp, bound, arrival = (_times(fresh, name) for name in ("stamp", "bound", "arrival"))
+    distance, status, sigma = (_column(fresh, f"range_{name}") for name in ("mm", "status", "sigma"))
+    return RangeTrace(stamp, bound, arrival, distance / 1000, status, sigma / 4000)
+
+
+def _nominal(counters: ImuCounters, rate: FloatArray) -> FloatArray:
+    """Stamps (M,) [s] of samples that came at nominal rates (B,) [Hz]; NaN where nothing tells them."""
+    newest = 1e-6 * (counters.time_us - counters.imu_age_us) + counters.offset
+    period = np.divide(1.0, rate, out=np.full_like(rate, np.nan), where=rate > 0)
+    left = np.repeat(np.cumsum(counters.count), counters.count) - np.arange(counters.count.sum()) - 1
+    return np.repeat(newest, counters.count) - left * np.repeat(period, counters.count)
+
+
+def _joints(place: Path, states: list[Any]) -> tuple[JointTrace | None, tuple[str, ...]]:
+    """Return positions by time, the later ones of two at one instant, and the joints' names.
+
+    Those that are not one number for each joint are left out. States of several arms are a RecordingError.
+    """
+    names = tuple(dict.fromkeys(tuple(state.name) for state in states))
+    if len(names) > 1:
+        one, other = (", ".join(joints) for joints in names[:2])
+        raise RecordingError(f"{place} has states of the joints {other} and of {one}: record one arm per file.")
+    sound = [s for s in states if s.position.shape == (len(s.name),) and np.isfinite(s.position).all()]
+    if not sound:
+        return None, names[0] if names else ()
+    stamp = np.array([s.header.stamp.sec + s.header.stamp.nanosec / 1e9 for s in sound])
+    order = np.argsort(stamp, kind="stable")
+    order = order[np.append(np.diff(stamp[order]) > 0, True)]
+    return JointTrace(stamp[order], np.stack([s.position for s in sound])[order]), names[0]

@@ -1,0 +1,146 @@
+"""What sensor units send, recorded without a controller: one MCAP file for the usual viewers and for calibration."""
+
+import atexit
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict
+from functools import partial
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+
+from pretouch.errors import RecordingError
+from pretouch.recording.disk import Disk, Item
+from pretouch.recording.ros import DIAGNOSTICS, IMU, JOINT_STATE, RANGE, UNIT_SAMPLE, messages
+from pretouch.recording.viewer_topics import header, nanoseconds, range_item, topic_name
+from pretouch.types import FloatArray
+from pretouch.units.monitor import MonitorUpdate
+from pretouch.units.traffic import Received, imu_batch
+from pretouch.units.wire import Flag
+
+_LEVELS = {"warning": 1, "fault": 2}
+"""As diagnostic_msgs/DiagnosticStatus has them."""
+_UNKNOWN = np.array([-1.0, *np.zeros(8)])
+"""Covariance that says a quantity is not there (sensor_msgs/Imu)."""
+
+
+class SkinRecording:
+    """An MCAP file that datagrams of sensor units are written to as they come; a context manager.
+
+    A thread writes about twice a second; a killed process loses what was not written by then. A file that is there
+    already is never written over: RecordingError.
+    """
+
+    def __init__(self, place: Path) -> None:
+        self.place = Path(place)
+        self.samples = 0
+        """Datagrams in it."""
+        self._time = 0
+        messages().prepare(UNIT_SAMPLE, RANGE, IMU, JOINT_STATE, DIAGNOSTICS)
+        self._sentence = ""
+        self._disk = Disk(self.place)
+        atexit.register(self.close)
+
+    @property
+    def trouble(self) -> str:
+        """'' or, once nothing more can be written, a sentence that says why and what the file holds."""
+        return self._disk.trouble
+
+    def add(self, heard: Iterable[Received], ids: Sequence[str]) -> None:
+        """Add datagrams of the units of these ids, in their order in the skin. Nobody may change them from here on."""
+        for one in heard:
+            if self._advance(one.arrival):
+                self.samples += 1
+                self._disk.put(partial(_sample_items, ids[one.unit], self._time, one))
+
+    def joints(self, stamp: FloatArray, q: FloatArray, qd: FloatArray | None, names: Sequence[str]) -> None:
+        """Add where an arm's n joints were at instants (M,) [s], on the clock of the samples' arrivals.
+
+        Positions q (M, n) [rad], velocities qd (M, n) [rad/s] if they are known, by the joints' names. Nobody may
+        change these arrays from here on. RecordingError for other shapes.
+        """
+        shape = len(stamp), len(names)
+        for what, rows in (("positions", q), ("velocities", q if qd is None else qd)):
+            if rows.shape != shape:
+                raise RecordingError(
+                    f"The joint {what} have the shape {rows.shape}: give {shape}, a row for each instant and a column"
+                    " for each joint's name."
+                )
+        if not self._sentence and not self.trouble:
+            self._disk.put(partial(_joint_items, self._time, stamp, q, qd, names))
+
+    def health(self, update: MonitorUpdate) -> None:
+        """Add how the units are."""
+        if self._advance(update.time):
+            self._disk.put(partial(_health_items, self._time, update))
+
+    def _advance(self, stamp: float) -> bool:
+        """Go on to an instant; False if nothing more is written."""
+        if self._sentence or self.trouble:
+            return False
+        self._time = nanoseconds(stamp, self._time)
+        return True
+
+    def close(self) -> str:
+        """End the file, and say what it holds; a second time says the same again."""
+        if not self._sentence:
+            self._disk.close()
+            size = self._disk.size() / 1e6
+            self._sentence = self.trouble or f"{self.place} holds {self.samples} samples, in {size:.1f} MB."
+            atexit.unregister(self.close)
+        return self._sentence
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def _sample_items(unit: str, time: int, heard: Received) -> Iterator[Item]:
+    """Yield a datagram as it came, and its range and IMU samples, each with a known time, for viewers."""
+    sample, topic = heard.sample, f"/skin/{topic_name(unit)}"
+    times = heard.arrival, heard.stamp, heard.offset, heard.bound
+    datagram = np.frombuffer(sample.body(), np.uint8)
+    yield _item(f"{topic}/sample", UNIT_SAMPLE, time, (sample.sequence, unit, *times, datagram), sample.sequence)
+    if sample.flags & Flag.RANGE_NEW and heard.stamp == heard.stamp:
+        distance = sample.range_mm / 1000
+        yield range_item(unit, sample.sequence, time, heard.stamp, distance, sample.range_status)
+    if (batch := imu_batch(heard)) is None:
+        return
+    turn, nothing = messages().make("geometry_msgs/msg/Quaternion", 0.0, 0.0, 0.0, 1.0), np.zeros(9)
+    for stamp, a, w in zip(batch.stamp.tolist(), batch.acceleration, batch.angular_velocity, strict=True):
+        at = nanoseconds(stamp, time)
+        vectors = messages().xyz("Vector3", w), nothing, messages().xyz("Vector3", a), nothing
+        yield _item(f"{topic}/imu", IMU, at, (header(at, unit), turn, _UNKNOWN, *vectors))
+
+
+def _joint_items(
+    instead: int, stamp: FloatArray, q: FloatArray, qd: FloatArray | None, names: Sequence[str]
+) -> Iterator[Item]:
+    """Yield states of joints at instants (M,) [s]: (M, n) [rad], [rad/s]; what is no time stands at `instead` [ns]."""
+    nothing, texts = np.zeros(0), list(names)
+    for i, t in enumerate(stamp.tolist()):
+        time = nanoseconds(t, instead)
+        velocity = nothing if qd is None else np.array(qd[i], dtype=np.float64)
+        row = np.array(q[i], dtype=np.float64)
+        yield _item("/joint_states", JOINT_STATE, time, (header(time, ""), texts, row, velocity, nothing))
+
+
+def _health_items(time: int, update: MonitorUpdate) -> Iterator[Item]:
+    make, statuses = messages().make, []
+    for unit in update.units:
+        findings = [finding for finding in update.findings if finding.unit == unit.unit]
+        level = max((_LEVELS[finding.level] for finding in findings), default=0)
+        text = " ".join(finding.sentence for finding in findings) or "Nothing is wrong."
+        numbers = {name: str(value) for name, value in asdict(unit).items() if name not in ("unit", "standing")}
+        values = [make("diagnostic_msgs/msg/KeyValue", *pair) for pair in numbers.items()]
+        statuses.append(make("diagnostic_msgs/msg/DiagnosticStatus", level, unit.unit, text, unit.unit, values))
+    yield _item("/diagnostics", DIAGNOSTICS, time, (header(time, ""), statuses))
+
+
+def _item(topic: str, kind: str, time: int, fields: tuple[Any, ...], sequence: int = 0) -> Item:
+    return Item(topic, kind, sequence, time, messages().encoded(kind, messages().make(kind, *fields)))
