@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pretouch.errors import RecordingError
-from pretouch.imported_data.detect_force import detect_force
+from pretouch.imported_data.detect import detect
 from pretouch.imported_data.forces import read_force
 from pretouch.imported_data.log import Choice
 from pretouch.imported_data.reading import open_log
@@ -28,7 +28,7 @@ def of_force(tmp_path):
 
 
 def decided(recording, p):
-    return detect_force(recording, p).decisions
+    return detect(recording, p)[1]
 
 
 @pytest.fixture
@@ -58,10 +58,10 @@ def test_a_controller_given_the_same_forces_decides_the_same(of_force, controlle
     force, p = pushed(14.0, pushes), profile(name)
     found, (steps, cycles) = decided(of_force(force), p), controlled(force, p)
     assert len(cycles) >= 3
-    assert [round((c.time - 0.005) * 100) for c in found.contacts] == cycles
+    assert [round((c.time_s - 0.005) * 100) for c in found.contacts] == cycles
     for contact, cycle in zip(found.contacts, cycles, strict=True):
-        np.testing.assert_array_equal(contact.force, steps[cycle].contact.force)
-        np.testing.assert_array_equal(contact.axes, steps[cycle].contact.axes)
+        np.testing.assert_array_equal(contact.force_n, steps[cycle].contact.force)
+        assert [axis in contact.axes for axis in "xyz"] == steps[cycle].contact.axes.tolist()
     np.testing.assert_array_equal(found.force, force)
     np.testing.assert_array_equal(found.upper, [s.thresholds.upper for s in steps])
     np.testing.assert_array_equal(found.lower, [s.thresholds.lower for s in steps])
@@ -89,12 +89,12 @@ def test_slower_data_are_held_and_the_way_out_is_named(of_force, controlled):
     found = decided(imported, PAPER)
     np.testing.assert_array_equal(found.force[:100:4], force[:25])
     np.testing.assert_array_equal(found.force[3:100:4], force[:25])
-    (note,) = detect_force(imported, PAPER).notes
+    (note,) = detect(imported, PAPER)[0].notes
     assert (note.code, note.values["rate"], note.values["own"]) == ("slower", pytest.approx(25.0), 100.0)
     slow = at_rate(PAPER, 25.0)
     found = decided(imported, slow)
-    assert [c.time for c in found.contacts] == pytest.approx([0.02 + i / 25 for i in controlled(force, slow)[1]])
-    assert detect_force(imported, slow).notes == ()
+    assert [c.time_s for c in found.contacts] == pytest.approx([0.02 + i / 25 for i in controlled(force, slow)[1]])
+    assert detect(imported, slow)[0].notes == ()
 
 
 def test_after_a_gap_there_is_no_force_and_nothing_is_felt_until_it_comes_back(tmp_path):
@@ -104,10 +104,10 @@ def test_after_a_gap_there_is_no_force_and_nothing_is_felt_until_it_comes_back(t
     file = write_csv(tmp_path / "gap.csv", {name: values[kept] for name, values in columns.items()})
     imported = read(file)
     found = decided(imported, PAPER)
-    assert [round(c.time, 1) for c in found.contacts] == [3.1, 16.1]
+    assert [round(c.time_s, 1) for c in found.contacts] == [3.1, 16.1]
     assert np.isnan(found.force[(found.time > 8.2) & (found.time < 15.0)]).all()
     assert np.isfinite(found.force[(found.time > 7.99) & (found.time < 8.18)]).all()
-    gap, without = detect_force(imported, PAPER).notes
+    gap, without = detect(imported, PAPER)[0].notes
     assert (gap.code, gap.values["count"], gap.values["seconds"]) == ("force_gaps", 1, pytest.approx(7.01))
     assert without.values["count"] == np.isnan(found.force[:, 0]).sum()
 
@@ -139,19 +139,21 @@ def test_data_too_short_or_too_slow_are_one_sentence(of_force):
 
 def test_base_forces_that_the_summary_names_are_the_borderline(of_force):
     imported = of_force(pushed(14.0, PUSHES))
-    found = detect_force(imported, PAPER)
-    for f_base, contacts in ((found.f_base_all - 0.01, 1), (found.f_base_all + 0.01, 0)):
+    found = detect(imported, PAPER)[0].thresholds
+    for f_base, contacts in ((found.f_base_all_n - 0.01, 1), (found.f_base_all_n + 0.01, 0)):
         p = replace(PAPER, detect=replace(PAPER.detect, f_base_n=f_base))
         assert len(decided(imported, p).contacts) == contacts
-    assert found.f_base_free < 10.0 < found.f_base_all
+    assert found.f_base_free_n < 10.0 < found.f_base_all_n
 
 
 def test_the_noise_in_free_motion_is_that_of_the_data(of_force):
-    found = detect_force(of_force(pushed(60.0, PUSHES, noise=0.4)), PAPER)
-    np.testing.assert_allclose(found.mean, [1.0, -2.0, 0.5], atol=0.2)
-    np.testing.assert_allclose(found.sigma, 0.4, rtol=0.1)
-    assert np.all((found.sigma_window > 0.0) & (found.sigma_window < found.sigma))  # eq. 8 makes outliers smaller
-    np.testing.assert_allclose(found.width, 10.0 + found.sigma_window, atol=0.02)
-    assert found.duration == pytest.approx(59.0, abs=0.05)
-    assert 50.0 < found.free < 53.0
-    assert len(found.decisions.contacts) == 3
+    result, _ = detect(of_force(pushed(60.0, PUSHES, noise=0.4)), PAPER)
+    noise = result.thresholds
+    np.testing.assert_allclose(noise.mean_n, [1.0, -2.0, 0.5], atol=0.2)
+    np.testing.assert_allclose(noise.sigma_n, 0.4, rtol=0.1)
+    assert np.all((noise.window_sigma_n > 0.0) & (noise.window_sigma_n < noise.sigma_n))  # eq. 8 makes outliers smaller
+    np.testing.assert_allclose(noise.width_n, 10.0 + noise.window_sigma_n, atol=0.02)
+    assert result.armed_s == pytest.approx(59.0, abs=0.05)
+    assert 50.0 < result.free_s < 53.0
+    assert np.isnan(result.motion_s)
+    assert len(result.contacts) == 3

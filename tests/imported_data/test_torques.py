@@ -10,10 +10,10 @@ import pytest
 from pyarrow import parquet
 
 from pretouch.errors import ParameterError, RecordingError
-from pretouch.imported_data.detect_torque import result_of
+from pretouch.imported_data.detect import detect
 from pretouch.imported_data.log import Choice
 from pretouch.imported_data.reading import open_log
-from pretouch.imported_data.renaming import mapping_of, renamed
+from pretouch.imported_data.tables import mapping_of, renamed
 from pretouch.imported_data.torques import observed, torque_recording
 from pretouch.profiles import profile
 from tests.imported_data.files import write_csv
@@ -41,7 +41,7 @@ def codes(notes):
 
 
 def found_in(recording):
-    return result_of(recording, profile("pretouch"))
+    return detect(recording, profile("pretouch"))[0]
 
 
 @pytest.mark.parametrize("kind", ["external", pytest.param("raw", marks=pytest.mark.slow)])
@@ -51,13 +51,12 @@ def test_pushes_are_found_with_their_link_and_force_and_nothing_else(tmp_path, p
     result = found_in(recording)
     assert [c.link for c in result.contacts] == ["panda_link5", "panda_hand"]
     for contact, (start, _, _, force) in zip(result.contacts, PUSHES, strict=True):
-        assert start < contact.time < start + 0.1
-        np.testing.assert_allclose(contact.force, force, atol=4.0)
-    assert result.in_motion == 2
-    assert result.per_hour == pytest.approx(2 * 3600 / result.motion)
-    d = result.by_torques
-    assert (d.in_free(d.residual)[1] < d.in_free(d.tau_ext)[1]).all()
-    assert d.largest < 1.0
+        assert start < contact.time_s < start + 0.1
+        np.testing.assert_allclose(contact.force_n, force, atol=4.0)
+    assert result.contacts_in_motion == 2
+    assert result.contacts_per_hour_of_motion == pytest.approx(2 * 3600 / result.motion_s)
+    assert (result.torques.residual_sigma_nm < result.torques.external_sigma_nm).all()
+    assert result.torques.largest_evidence < 1.0
     assert "unwatched" in codes(result.notes)
 
 
@@ -179,7 +178,7 @@ def test_numbers_of_joints_in_a_pattern_begin_at_one_or_zero():
 @pytest.mark.parametrize(
     ("columns", "error", "words"),
     [
-        ("tau_J_0", ParameterError, "--columns has 'tau_J_0': write THEIRS=OURS"),
+        ("tau_J_0", ParameterError, "--columns has 'tau_J_0' for '': write THEIRS=OURS"),
         ("gone.toml", ParameterError, "gone.toml cannot be read"),
         ("nothing=q1_rad", RecordingError, "has no column 'nothing'"),
         ("no_*=q*_rad", RecordingError, r"has no column 'no_\*'"),

@@ -8,7 +8,7 @@ import pytest
 from pretouch.controller import Controller
 from pretouch.errors import RecordingError
 from pretouch.profiles import PROFILES, at_rate, profile
-from pretouch.recording.compare import Found, compare, matched
+from pretouch.recording.compare import DetectedContact, compare, paired
 from pretouch.recording.reader import open_recording
 from pretouch.recording.writer import Recording
 from pretouch.types import no_obstacles
@@ -55,13 +55,14 @@ def played(arm, force=None, seen=None):
 def test_the_same_profile_decides_exactly_what_was_recorded(arm):
     found = compare(played(arm, seen={0: 0.25}), PAPER)
     assert len(found.recorded.contacts) == 2
-    assert [(c.time, *c.force) for c in found.other.contacts] == [(c.time, *c.force) for c in found.recorded.contacts]
+    assert [(c.time_s, *c.force_n) for c in found.other.contacts] == [
+        (c.time_s, *c.force_n) for c in found.recorded.contacts
+    ]
     for name in ("time", "force", "compared", "upper", "lower", "sigma", "armed", "reacting"):
         np.testing.assert_array_equal(getattr(found.recorded, name), getattr(found.other, name))
     np.testing.assert_array_equal(found.recorded.upper, [s.thresholds.upper for s in arm.steps])
-    assert len(found.both) == 2
-    assert all(other.time == recorded.time for recorded, other in found.both)
-    assert found.only_recorded == found.only_other == ()
+    assert len(found.pairs) == 2
+    assert all(other.time_s == recorded.time_s for recorded, other in found.pairs)
     assert found.left_out == 0
 
 
@@ -81,12 +82,11 @@ def test_another_profile_decides_what_the_plain_detector_does(arm):
 def test_a_contact_that_only_one_finds_is_told_apart(arm):
     deaf = profile("paper:detect.f_base_n=20")
     found = compare(played(arm), deaf)
-    assert [round(c.time, 1) for c in found.recorded.contacts] == [2.1, 5.2]
-    assert [round(c.time, 1) for c in found.other.contacts] == [2.2]
-    assert [c.time for c in found.only_recorded] == [found.recorded.contacts[1].time]
-    assert found.only_other == ()
-    ((recorded, other),) = found.both
-    assert other.time > recorded.time
+    assert [round(c.time_s, 1) for c in found.recorded.contacts] == [2.1, 5.2]
+    assert [round(c.time_s, 1) for c in found.other.contacts] == [2.2]
+    (recorded, other), alone = found.pairs
+    assert other.time_s > recorded.time_s
+    assert alone == (found.recorded.contacts[1], None)
 
 
 def test_it_goes_on_through_a_change_of_profile(arm):
@@ -96,8 +96,8 @@ def test_it_goes_on_through_a_change_of_profile(arm):
     arm.switch(replace(BLIND, detect=replace(BLIND.detect, f_base_n=30.0)))
     found = compare(played(arm, force[400:]), PAPER)
     assert len(found.recorded.time) == len(found.other.time) == 700
-    assert [round(c.time, 1) for c in found.recorded.contacts] == [2.1]
-    assert [round(c.time, 1) for c in found.other.contacts] == [2.1, 5.2]
+    assert [round(c.time_s, 1) for c in found.recorded.contacts] == [2.1]
+    assert [round(c.time_s, 1) for c in found.other.contacts] == [2.1, 5.2]
     assert found.recorded.name == "paper, blind"
 
 
@@ -132,16 +132,16 @@ def test_a_recording_without_a_usable_cycle_is_refused(arm):
 
 
 def at(*times):
-    return [Found(t, np.zeros(3), np.zeros(3, np.bool_)) for t in times]
+    return [DetectedContact(t, np.zeros(3)) for t in times]
 
 
-def test_contacts_are_paired_once_with_the_nearest_within_three_tenths_of_a_second():
-    first, second = at(1.0, 5.0, 9.0), at(1.25, 1.4, 5.2, 4.9, 9.31)
-    both, only_first, only_second = matched(first, second)
-    assert [(a.time, b.time) for a, b in both] == [(1.0, 1.25), (5.0, 4.9)]
-    assert [c.time for c in only_first] == [9.0]
-    assert [c.time for c in only_second] == [1.4, 5.2, 9.31]
-    both, only_first, only_second = matched(at(1.0, 1.1), at(1.05))
-    assert [(a.time, b.time) for a, b in both] in ([(1.0, 1.05)], [(1.1, 1.05)])
-    assert len(only_first) == 1
-    assert only_second == ()
+@pytest.mark.parametrize(
+    ("first", "second", "pairs"),
+    [
+        (at(1.0, 5.0, 9.0), at(1.25, 1.4, 5.2, 4.9, 9.31),
+         [(1.0, 1.25), (None, 1.4), (5.0, 4.9), (None, 5.2), (9.0, None), (None, 9.31)]),
+        (at(1.0, 1.1), at(1.06), [(1.0, None), (1.1, 1.06)]),
+    ],
+)  # fmt: skip
+def test_contacts_are_paired_once_with_the_nearest_within_three_tenths_of_a_second(first, second, pairs):
+    assert [(a and a.time_s, b and b.time_s) for a, b in paired(first, second)] == pairs

@@ -181,8 +181,8 @@ NESTED = reduce(lambda inner, _: [inner], range(900), [])
 @pytest.mark.parametrize(
     ("section", "run", "file", "said"),
     [
-        (summary, {}, {"complete": False, "said": CUT}, bad(CUT)),
-        (lambda m: setting_section(m.course, m.lacking), {}, {"complete": False, "said": CUT}, bad(CUT)),
+        (summary, {}, {"complete": False, "sentence": CUT}, bad(CUT)),
+        (lambda m: setting_section(m.course, m.lacking), {}, {"complete": False, "sentence": CUT}, bad(CUT)),
         (lambda m: setting_section(m.course, ""), {"about": {"nested": NESTED}}, {}, "((((((...))))))"),
         (lambda m: contact_section(m.course, m.contacts), {}, {}, "True touches are not known"),
         (lambda m: orientation_section(m.contacts), {}, {}, "understates the peaks of impacts"),

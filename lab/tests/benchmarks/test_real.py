@@ -11,7 +11,7 @@ from tests.imported_data.joint_files import Moving
 
 from pretouch import cli
 from pretouch.errors import ExperimentError
-from pretouch.imported_data.detect_torque import ContactEvent
+from pretouch.recording.compare import DetectedContact
 from pretouch_lab.benchmarks.bounds import rate_bounds
 from pretouch_lab.benchmarks.real import bench
 from pretouch_lab.benchmarks.real.bench import Work, halves, parted, play
@@ -175,7 +175,7 @@ def test_poisson_bounds_are_the_exact_ones():
 
 
 def alarm(time, end, link="panda_link5"):
-    return ContactEvent(time, end, link, np.zeros(3), np.zeros(3), 1.0, 2.0)
+    return DetectedContact(time, np.zeros(3), "", link or None, np.zeros(3), end, 1.0, 2.0)
 
 
 def test_alarms_are_counted_by_hand(stream):

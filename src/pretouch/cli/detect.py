@@ -1,38 +1,44 @@
-"""What `pretouch detect` does: the detector of some profiles on a recording of any arm, as tables, figure and file."""
+"""`pretouch detect`: the detectors of some profiles on a recording of any arm, as tables, figure or page, and file."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import partial
+from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import tyro
+from rich.console import Console
 
-from pretouch.cli.detect_account import ENDINGS, Account, give
-from pretouch.cli.detect_torques import torque_account
-from pretouch.cli.detect_words import force_guidance, sentences
+from pretouch.atomic_write import atomic_write
+from pretouch.cli.detect_words import guidance, read_from, sentences, shown
 from pretouch.cli.options import JsonFile, Numbers, OptionalFile, Words
-from pretouch.cli.writing import check_writable, numbers_to
+from pretouch.cli.tables import show
+from pretouch.cli.writing import check_writable, numbers_to, unwritable_said
 from pretouch.contact.moving_thresholds import thresholds_of
 from pretouch.errors import ParameterError, RecordingError
 from pretouch.extras import FIGURES
-from pretouch.imported_data.detect_force import ForceResult, detect_force
+from pretouch.imported_data.detect import detect
 from pretouch.imported_data.forces import ForceRecording, read_force
 from pretouch.imported_data.log import TORQUES, Choice, LogFile
 from pretouch.imported_data.reading import open_log
-from pretouch.imported_data.renaming import mapping_of
-from pretouch.imported_data.torques import torque_recording
+from pretouch.imported_data.results import Course, DetectorResult
+from pretouch.imported_data.tables import mapping_of
+from pretouch.imported_data.torques import TorqueRecording, torque_recording
 from pretouch.profiles import Profile, at_rate
 from pretouch.profiles import profile as find_profile
-from pretouch.recording.compare import Found, matched
 from pretouch.text_table import TextTable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-
 AUTO = ("auto",)
+ENDINGS = (".png", ".pdf", ".svg", ".html")
+_DOTS_PER_INCH = 150
+_NO = "–"
+_OF_TORQUES = ("joint", "external torque, sigma", "residual, mean", "residual, sigma")
+_LONGEST = 24
+"""Characters of a profile's name that a table has room for."""
 
 
 @dataclass(frozen=True)
@@ -57,8 +63,8 @@ class Detect:
     joints: str = ""
     """Topic of the joint positions, if there are several."""
     torques: str = ""
-    """Topic of the joint torques: JointState with efforts, FrankaState or FrankaRobotState; by default what is
-    found."""
+    """Topic of the joint torques: JointState with efforts, FrankaState or FrankaRobotState; by default the one that the
+    recording has."""
     arm: str = "auto"
     """The arm: panda, fr3, or the folder of `pretouch robot import`; auto: by the names of its joints, otherwise a
     Panda."""
@@ -76,125 +82,209 @@ class Detect:
     json: JsonFile = None
 
     def run(self) -> None:
-        """Run the detectors, show what they found, and write a figure or page and the numbers where asked."""
+        """Run the detectors, show what they find, and write a figure or page and the numbers where asked."""
         if not all(np.isfinite(gain) and gain > 0.0 for gain in self.gains):
             raise ParameterError(
                 f"--gains is {','.join(map('{:g}'.format, self.gains))}: give torques by current [Nm/A] above 0."
             )
+        profiles = None if self.profiles == AUTO else [self._profile(name) for name in self.profiles]
+        if profiles is not None and not profiles:
+            raise ParameterError("No profile is given: name one or more, separated by commas.")
+        if self.out and self.out.suffix not in ENDINGS:
+            raise RecordingError(
+                f"The figure {self.out} has an unknown format: use one of the endings {', '.join(ENDINGS)}."
+            )
+        if self.out:
+            FIGURES.need("A figure")
+            check_writable("figure", self.out)
+        with numbers_to(self.json) as write:
+            recording, notes = self._read(profiles)
+            names = ("pretouch", "paper") if isinstance(recording, TorqueRecording) else ("paper",)
+            answer = _answer(recording, profiles or [self._profile(name) for name in names], notes)
+            write(answer.numbers())
+            answer.show()
+            if self.out:
+                answer.draw(self.out)
+                print(f"{'Page' if self.out.suffix == '.html' else 'Figure'}: {self.out}")
+
+    def _profile(self, name: str) -> Profile:
+        return at_rate(find_profile(name), self.rate) if self.rate else find_profile(name)
+
+    def _read(self, profiles: Sequence[Profile] | None) -> tuple[ForceRecording | TorqueRecording, list[str]]:
+        """Return the torques or the force to detect on, and sentences on what is not used."""
         choice = Choice(
             self.wrench, self.joints, self.sign, self.frame, self.zeros, self.arm, self.torques,
             mapping_of(self.columns), self.gains, self.payload,
         )  # fmt: skip
-        profiles = None if self.profiles == AUTO else [_profile(name, self.rate) for name in self.profiles]
-        if profiles is not None and not profiles:
-            raise ParameterError("No profile is given: name one or more, separated by commas.")
-        out = self.out
-        if out and out.suffix not in ENDINGS:
-            raise RecordingError(
-                f"The figure {out} has an unknown format: use one of the endings {', '.join(ENDINGS)}."
-            )
-        if out:
-            FIGURES.need("A figure")
-            check_writable("figure", out)
-        with numbers_to(self.json) as write:
-            give(_account(open_log(self.file, choice), choice, profiles, self.rate), out, write)
+        file, unused = open_log(self.file, choice), list[str]()
+        if _by_torques(file, choice, profiles):
+            try:
+                return torque_recording(file.torques(), choice), unused
+            except RecordingError as error:
+                if profiles is not None or "force" not in file.kinds:
+                    raise
+                unused.append(f"Joint torques are not used: {error}")
+        return read_force(file, choice), unused
 
 
-def _account(file: LogFile, choice: Choice, given: Sequence[Profile] | None, rate: float) -> Account:
-    unused = []
-    if _by_torques(file, choice, given):
-        try:
-            recording = torque_recording(file.torques(), choice)
-        except RecordingError as error:
-            if given is not None or "force" not in file.kinds:
-                raise
-            unused = [f"Joint torques are not used: {error}"]
-        else:
-            return torque_account(recording, given or [_profile(name, rate) for name in ("pretouch", "paper")])
-    account = _force_account(read_force(file, choice), given or [_profile("paper", rate)])
-    return replace(account, notes=[*unused, *account.notes])
-
-
-def _by_torques(file: LogFile, choice: Choice, given: Sequence[Profile] | None) -> bool:
+def _by_torques(file: LogFile, choice: Choice, profiles: Sequence[Profile] | None) -> bool:
     """Whether the detectors run on joint torques: where there are some, unless only thresholds of a force are asked."""
     if choice.frame == "ee":
         return False
     if choice.torques or choice.gains or choice.payload_kg:
         return True
     force, torques = "force" in file.kinds, bool(set(TORQUES) & file.kinds)
-    if choice.wrench or (force and given is not None and not any(p.detect.by_torques for p in given)):
+    if choice.wrench or (force and profiles is not None and not any(p.detect.by_torques for p in profiles)):
         return False
     return torques or ("q" in file.kinds and not force)
 
 
-def _profile(name: str, rate: float) -> Profile:
-    return at_rate(find_profile(name), rate) if rate else find_profile(name)
+@dataclass(frozen=True)
+class _Answer:
+    """What detectors make of a recording."""
 
+    recording: ForceRecording | TorqueRecording
+    results: dict[str, DetectorResult]
+    """By the profiles' names for tables."""
+    courses: list[Course]
+    notes: list[str]
+    """Sentences on what was read, and on what detectors made of it."""
 
-def _force_account(force: ForceRecording, profiles: Sequence[Profile]) -> Account:
-    """Run thresholds over a force, and give an account of what they found."""
-    results = [detect_force(force, profile) for profile in profiles]
-    notes = sentences([*force.notes, *(note for r in results for note in r.notes)])
-    if any(r.profile.perception is not None and thresholds_of(r.profile.detect).f_d_n for r in results):
-        notes.append("Without a skin no obstacle is known, so eq. 11 lowers no threshold.")
-    first, *others = (r.decisions for r in results)
-    guidance = []
-    for d in others:
-        both, only_first, only_other = matched(first.contacts, d.contacts)
-        guidance.append(
-            f"{first.name} and {d.name}: {len(both)} contacts in both, {len(only_first)} only in {first.name},"
-            f" {len(only_other)} only in {d.name}."
+    @property
+    def tables(self) -> list[TextTable]:
+        """Contacts, how the detectors fared, and free motion."""
+        return [_contacts(self.results), _detection(self.results), *_free_motion(self.results, self.recording)]
+
+    def numbers(self) -> dict[str, Any]:
+        """Return what goes into the JSON file."""
+        r = self.recording
+        return {
+            "recording": str(r.place), "arm": r.model.description.name, "assumed": read_from(r), "notes": self.notes,
+            "samples": len(r.time), "first_sample_s": r.first_s, "duration_s": r.time[-1], "rate_hz": r.rate,
+            "profiles": list(self.results.values()),
+        }  # fmt: skip
+
+    def show(self) -> None:
+        """Print sentences and tables."""
+        r, console = self.recording, Console(highlight=False, soft_wrap=True)
+        first = (
+            f"{r.place}: {len(r.time)} samples in {r.time[-1]:.1f} s, {r.rate:.4g} Hz, the first at {r.first_s:.3f} s:"
+            " times below count from it."
         )
-    guidance += map(force_guidance, results)
-    figures = partial(_figures, results, force.place.name)
-    tables = [_contacts(results), _free_motion(results)]
-    return Account(force, notes, tables, guidance, figures, {"profiles": [_of_profile(r) for r in results]})
+        for sentence in (first, read_from(r), *self.notes):
+            console.print(sentence, markup=False)
+        show(console, self.tables)
+        for sentence in guidance(self.results):
+            console.print(sentence, markup=False)
+
+    def draw(self, out: Path) -> None:
+        """Write the first of the figures, or with the ending .html a page of all with sentences and tables."""
+        figures = self._figures()
+        if out.suffix == ".html":
+            from pretouch.reporting.page import detection_page  # needs the extra
+
+            told = [*guidance(self.results), read_from(self.recording), *self.notes]
+            page = detection_page(self.recording.place.name, told, self.tables, figures)
+            with unwritable_said("page", out):
+                atomic_write(out, page)
+            return
+        image = BytesIO()
+        figures[0][0].savefig(image, format=out.suffix[1:], dpi=_DOTS_PER_INCH)
+        with unwritable_said("figure", out):
+            out.write_bytes(image.getvalue())
+
+    def _figures(self) -> list[tuple["Figure", str]]:
+        """Draw figures, each with what it shows."""
+        from pretouch.imported_data.figures import decisions_figure, torque_figure  # needs the extra
+        from pretouch.recording.compare import Decisions
+
+        title, caption = self.recording.place.name, "joint torques, what free motion does not explain of them, and"
+        figures = [
+            (torque_figure(course, self.recording.model.joints, f"{title}: {name}"),
+             f"{name}: {caption} the evidence. Red: contacts.")
+            for name, course in zip(self.results, self.courses, strict=True) if not isinstance(course, Decisions)
+        ]  # fmt: skip
+        if forces := [course for course in self.courses if isinstance(course, Decisions)]:
+            where = "at the end-effector by the torques" if figures else "along each axis"
+            figures.append((decisions_figure(forces, title), f"Force {where}, thresholds, and contacts."))
+        return figures
 
 
-def _figures(results: list[ForceResult], title: str) -> list[tuple["Figure", str]]:
-    from pretouch.imported_data.figures import decisions_figure
+def _answer(recording: ForceRecording | TorqueRecording, profiles: Sequence[Profile], unused: list[str]) -> _Answer:
+    """Run profiles over a recording. One that cannot run is a note, if another can."""
+    results, courses, notes = dict[str, DetectorResult](), list[Course](), [*unused, *sentences(recording.notes)]
+    failures: list[RecordingError] = []
+    for k, profile in enumerate(profiles, 1):
+        name = profile.name
+        label = name if len(name) <= _LONGEST else f"{name.partition(':')[0]} ({k})"
+        try:
+            results[label], course = detect(recording, profile)
+        except RecordingError as error:
+            failures.append(error)
+            notes.append(f"{name} cannot run: {error}")
+            continue
+        courses.append(course)
+        notes += [sentence for sentence in sentences(results[label].notes) if sentence not in notes]
+        if label != name:
+            notes.append(f"{label} is {name}.")
+    if not results:
+        raise failures[0]
+    if any(p.perception is not None and not p.detect.by_torques and thresholds_of(p.detect).f_d_n for p in profiles):
+        notes.append("Without a skin no obstacle is known, so eq. 11 lowers no threshold.")
+    return _Answer(recording, results, courses, notes)
 
-    caption = "Force along each axis between its thresholds, and contacts."
-    return [(decisions_figure([r.decisions for r in results], title), caption)]
 
-
-def _contacts(results: list[ForceResult]) -> TextTable:
+def _contacts(results: dict[str, DetectorResult]) -> TextTable:
+    pairs = sorted(((n, c) for n, r in results.items() for c in r.contacts), key=lambda pair: pair[1].time_s)
     rows = []
-    for name, c in sorted(((r.decisions.name, c) for r in results for c in r.decisions.contacts), key=_time):
-        force = [f"{value:.1f}" for value in (*c.force, np.linalg.norm(c.force))]
-        rows.append((name, f"{c.time:.3f}", *force, axes_shown(c)))
-    header = ("profile", "time [s]", "x", "y", "z", "norm", "axes")
-    note = "Force on the robot, base frame, less its mean (eq. 12); axes whose threshold it crossed."
-    return TextTable("Contacts [N]", header, tuple(rows) or (("none", *[""] * 6),), note, 1)
+    for name, c in pairs:
+        place = np.full(3, np.nan) if c.point_m is None else c.point_m
+        force = (*c.force_n, c.norm_n)
+        numbers = (f"{c.time_s:.3f}", *(shown(x, 3) for x in place), *(shown(x, 1) for x in force))
+        rows.append((name, c.link or _NO, *numbers, c.axes or _NO))
+    header = ("profile", "link", "time [s]", *(f"{a} [m]" for a in "xyz"), "force x [N]", "y", "z", "norm", "axes")
+    note = (
+        "Force on the robot, base frame. By torques, link, place and force are those where the contact stands out most."
+        " By thresholds, it is the force at the end-effector less its mean (eq. 12), with the axes whose threshold it"
+        " crossed."
+    )
+    return TextTable("Contacts", header, tuple(rows) or (("none", *[""] * 10),), note, 1)
 
 
-def _time(pair: tuple[str, Found]) -> float:
-    return pair[1].time
+def _detection(results: dict[str, DetectorResult]) -> TextTable:
+    rows = [
+        (
+            name, str(len(r.contacts)), f"{r.armed_s:.1f}", f"{r.free_s:.1f}", shown(r.motion_s, 1),
+            shown(r.contacts_per_hour_of_motion, 1), shown(r.torques.largest_evidence, 2) if r.torques else _NO,
+            shown(r.detectable_n, 1),
+        )
+        for name, r in results.items()
+    ]  # fmt: skip
+    header = (
+        "profile", "contacts", "armed [s]", "free [s]", "in motion [s]", "contacts an hour of motion",
+        "evidence without contact", "says it finds [N]",
+    )  # fmt: skip
+    note = (
+        "A contact is evidence from 1 on. The last is the force at the end-effector that the detector itself says it"
+        " finds, in the direction the torques tell least of (median; of the paper's thresholds their distance from the"
+        " mean)."
+    )
+    return TextTable("Detection", header, tuple(rows), note, 1)
 
 
-def axes_shown(found: Found) -> str:
-    """Name the axes whose threshold a contact crossed."""
-    return "".join(axis for axis, crossed in zip("xyz", found.axes, strict=True) if crossed)
-
-
-def _free_motion(results: list[ForceResult]) -> TextTable:
-    rows = []
-    for s in results:
-        name = f"{s.decisions.name}, {s.free:.1f} of {s.duration:.1f} s"
-        for axis, *values in zip("xyz", s.mean, s.sigma, s.sigma_window, s.width, strict=True):
-            rows.append((name if axis == "x" else "", axis, *(f"{value:.2f}" for value in values)))
-    header = ("profile", "along", "mean", "sigma", "sigma in window", "thresholds at +-")
-    return TextTable("Free motion [N]", header, tuple(rows), "Outside contacts and reactions.")
-
-
-def _of_profile(r: ForceResult) -> dict[str, Any]:
-    return {
-        "profile": r.decisions.name, "control_rate_hz": 1 / r.profile.task.control_period_s,
-        "contacts": [
-            {"time_s": c.time, "force_n": c.force, "norm_n": np.linalg.norm(c.force), "axes": axes_shown(c)}
-            for c in r.decisions.contacts
-        ],
-        "armed_s": r.duration, "free_s": r.free, "free_mean_n": r.mean, "free_sigma_n": r.sigma,
-        "free_window_sigma_n": r.sigma_window,
-        "threshold_width_n": r.width, "f_base_no_contact_free_n": r.f_base_free, "f_base_no_contact_n": r.f_base_all,
-    }  # fmt: skip
+def _free_motion(results: dict[str, DetectorResult], recording: ForceRecording | TorqueRecording) -> list[TextTable]:
+    """One table of the forces in free motion, and one of the torques for each profile that goes by them."""
+    forces, tables = [], []
+    for name, r in results.items():
+        if t := r.thresholds:
+            for axis, *values in zip("xyz", t.mean_n, t.sigma_n, t.window_sigma_n, t.width_n, strict=True):
+                forces.append((name if axis == "x" else "", axis, *(shown(value, 2) for value in values)))
+        if s := r.torques:
+            columns = s.external_sigma_nm, s.residual_mean_nm, s.residual_sigma_nm
+            rows = zip(recording.model.joints, *([shown(x, 3) for x in column] for column in columns), strict=True)
+            note = "Outside contacts; the residual is what learnt free motion does not explain."
+            tables.append(TextTable(f"Torques in free motion [Nm], {name}", _OF_TORQUES, tuple(rows), note, 1))
+    if forces:
+        header = ("profile", "along", "mean", "sigma", "sigma in window", "thresholds at +-")
+        tables.append(TextTable("Free motion [N]", header, tuple(forces), "Outside contacts and reactions."))
+    return tables

@@ -1,15 +1,14 @@
 """What is said of a log of another program and of what detectors made of it: a sentence for each code."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from pretouch.contact.moving_thresholds import thresholds_of
-from pretouch.imported_data.detect_force import ForceResult
-from pretouch.imported_data.detect_torque import ProfileResult
 from pretouch.imported_data.forces import ForceRecording
 from pretouch.imported_data.log import Note
+from pretouch.imported_data.results import DetectorResult, ThresholdSummary
 from pretouch.imported_data.torques import TorqueRecording
+from pretouch.recording.compare import paired
 
 _SENTENCES = {
     "no_time": "{rows} {have} no time and {were} left out.",
@@ -42,7 +41,6 @@ _SENTENCES = {
     " detect.offset_prior_nm, detect.torque_prior_nm).",
     "for_currents": "{profile}: currents have gear friction in them, so more is allowed for before it is learnt:"
     " {allowed}.",
-    "cannot_run": "{profile} cannot run: {why}",
 }
 _TORQUES = {
     "tau_ext": "External torques",
@@ -89,32 +87,46 @@ def read_from(r: ForceRecording | TorqueRecording) -> str:
     )
 
 
-def force_guidance(r: ForceResult) -> str:
-    """Say what contacts by a force mean for an arm that nobody touched."""
-    name, count, minutes = r.decisions.name, len(r.decisions.contacts), r.duration / 60
-    f_base = thresholds_of(r.profile.detect).f_base_n
+def guidance(results: Mapping[str, DetectorResult]) -> list[str]:
+    """Say which contacts profiles share, and what contacts mean for an arm that nobody touched."""
+    (first, one), *others = results.items()
+    texts = []
+    for name, r in others:
+        pairs = paired(one.contacts, r.contacts)
+        both = sum(a is not None and b is not None for a, b in pairs)
+        texts.append(
+            f"{first} and {name}: {both} contacts in both, {len(one.contacts) - both} only in {first},"
+            f" {len(r.contacts) - both} only in {name}."
+        )
+    for name, r in results.items():
+        known = r.thresholds if np.isnan(r.motion_s) else None
+        texts.append(_motion_guidance(name, r) if known is None else _threshold_guidance(name, r, known))
+    return texts
+
+
+def _threshold_guidance(name: str, r: DetectorResult, t: ThresholdSummary) -> str:
+    count, minutes = len(r.contacts), r.armed_s / 60
     if not count:
         return (
-            f"{name}: no contact in {minutes:.1f} min; an F_b below {r.f_base_all:.1f} N would have given one (F_b is"
-            f" {f_base:g} N)."
+            f"{name}: no contact in {minutes:.1f} min; an F_b below {t.f_base_all_n:.1f} N would have given one (F_b is"
+            f" {t.f_base_n:g} N)."
         )
     contacts = "1 false contact" if count == 1 else f"{count} false contacts"
     return (
-        f"{name}: if nobody touched the arm, {contacts} in {minutes:.1f} min; an F_b above {r.f_base_all:.1f} N would"
-        f" have given none, one above {r.f_base_free:.1f} N none but {'this' if count == 1 else 'these'} (it is"
-        f" {f_base:g} N)."
+        f"{name}: if nobody touched the arm, {contacts} in {minutes:.1f} min; an F_b above {t.f_base_all_n:.1f} N would"
+        f" have given none, one above {t.f_base_free_n:.1f} N none but {'this' if count == 1 else 'these'} (it is"
+        f" {t.f_base_n:g} N)."
     )
 
 
-def torque_guidance(name: str, r: ProfileResult) -> str:
-    """Say what contacts by torques mean for an arm that nobody touched."""
+def _motion_guidance(name: str, r: DetectorResult) -> str:
     count = len(r.contacts)
-    contacts = f"{count or 'no'} contact{'' if count == 1 else 's'} in {r.duration / 60:.1f} min"
-    if not r.motion:
+    contacts = f"{count or 'no'} contact{'' if count == 1 else 's'} in {r.armed_s / 60:.1f} min"
+    if not r.motion_s:
         return f"{name}: {contacts}; the arm does not move."
     return (
-        f"{name}: {contacts}, {r.in_motion} of them in {r.motion / 60:.1f} min of motion; if nobody touched the arm,"
-        f" these are {r.per_hour:.3g} false alarms an hour."
+        f"{name}: {contacts}, {r.contacts_in_motion} of them in {r.motion_s / 60:.1f} min of motion; if nobody touched"
+        f" the arm, these are {r.contacts_per_hour_of_motion:.3g} false alarms an hour."
     )
 
 

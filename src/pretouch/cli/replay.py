@@ -1,28 +1,26 @@
 """What `pretouch replay` does: a recording told, recomputed, compared, shown."""
 
 import sys
-from collections.abc import Callable
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import tyro
 from rich.console import Console
 from rich.progress import Progress
 
-from pretouch.cli.detect import axes_shown
 from pretouch.cli.options import JsonFile
 from pretouch.cli.tables import PlainTable
 from pretouch.cli.warm_up import prepare
 from pretouch.cli.writing import STANDARD_OUTPUT, numbers_to
 from pretouch.page.server import ServeOptions, begun, browser_here
 from pretouch.profiles import profile as find_profile
-from pretouch.recording.compare import Comparison, Decisions, Found, compare
+from pretouch.recording.compare import Comparison, Decisions, DetectedContact, compare
 from pretouch.recording.reader import Recorded, open_recording
-from pretouch.recording.verify import Verdict
 from pretouch.recording.verify import verify as recompute
 from pretouch.signals import ended
 from pretouch.types import Mode
@@ -68,26 +66,32 @@ class Replay:
         console = Console(highlight=False, soft_wrap=True)
         other = find_profile(self.profile) if self.profile else None
         with numbers_to(self.json) as write:
-            recorded, found = open_recording(self.file), None
+            recorded = open_recording(self.file)
+            numbers = _described(recorded)
             if recorded.sentence:
                 console.print(recorded.sentence, markup=False)
             if page and not self.verify and not self.json:
-                console.print(told(recorded), markup=False)
+                console.print(f"{_what_ran(recorded)}.", markup=False)
             else:
-                with _Progress("Reading", len(recorded)) as advance:
-                    found = happened(recorded, advance)
-                console.print(f"{told(recorded)[:-1]}: {found.said}.", markup=False)
-            verdict = comparison = None
+                with _progress("Reading", len(recorded)) as advance:
+                    events = _events(recorded, advance)
+                console.print(f"{_what_ran(recorded)}: {events.sentence}.", markup=False)
+                numbers |= asdict(events)
+            verdict = None
             if self.verify:
                 prepare(recorded.runs[0].profile)
-                with _Progress("Recomputing", len(recorded)) as advance:
-                    verdict = recompute(recorded, advance)
+                with _progress("Recomputing", len(recorded)) as advance:
+                    numbers["verified"] = verdict = recompute(recorded, advance)
                 console.print(verdict.sentence, markup=False)
             elif other:
-                with _Progress("Comparing", len(recorded)) as advance:
+                with _progress("Comparing", len(recorded)) as advance:
                     comparison = compare(recorded, other, advance)
                 _show(console, comparison)
-            write(_numbers(recorded, found, verdict, comparison))
+                contacts = [{"recorded": mine, "other": theirs} for mine, theirs in comparison.pairs]
+                numbers["compared"] = {
+                    "other": comparison.other.name, "contacts": contacts, "left_out": comparison.left_out,
+                }  # fmt: skip
+            write(numbers)
             if page and not self.verify:
                 from pretouch.page.replay import show_replay  # needs the extra
 
@@ -95,8 +99,38 @@ class Replay:
         return int(verdict is not None and not verdict.agrees)
 
 
+@contextmanager
+def _progress(what: str, total: int) -> Iterator[Callable[[int], None]]:
+    """Show a bar on standard error, and give the function that moves it on."""
+    with Progress(console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(what, total=total)
+        yield lambda done: bar.update(task, completed=done)
+
+
+def _described(recorded: Recorded) -> dict[str, object]:
+    """Return what a recording is of, for JSON."""
+    stamps, run = recorded.stamps(), recorded.runs[0]
+    return {
+        "recording": str(recorded.place), "complete": recorded.complete, "arm": run.model.description.name,
+        "profiles": [run.profile.name for run in recorded.runs], "units": [unit.id for unit in run.skin.mounted],
+        "steps": len(recorded), "duration_s": stamps[-1] - stamps[0],
+    }  # fmt: skip
+
+
+def _what_ran(recorded: Recorded) -> str:
+    """Say in a line what ran, and for how long."""
+    stamps, run = recorded.stamps(), recorded.runs[0]
+    profiles = ", then ".join(run.profile.name for run in recorded.runs)
+    command = run.about.get("command")
+    what = f"{command}: " if isinstance(command, str) else ""
+    return (
+        f"{what}profile {profiles} on {run.model.description.name} with {_many(len(run.skin.mounted), 'unit')},"
+        f" {stamps[-1] - stamps[0]:.1f} s, {_many(len(recorded), 'step')}"
+    )
+
+
 @dataclass(frozen=True)
-class Happened:
+class _Events:
     """What happened in a recording."""
 
     contacts: int
@@ -106,118 +140,51 @@ class Happened:
     """Of the time."""
 
     @property
-    def said(self) -> str:
+    def sentence(self) -> str:
         """All of it in words."""
         holds = f"{_many(self.holds, 'hold')} after the start"
         return f"{_many(self.contacts, 'contact')}, {holds}, held for {self.held_share:.0%} of the time"
 
 
-def happened(recorded: Recorded, advance: Callable[[int], None] = lambda done: None) -> Happened:
-    """Count contacts and holds; `advance` is told how many steps were read."""
-    contacts = holds = held = 0
+def _events(recorded: Recorded, advance: Callable[[int], None]) -> _Events:
+    """Count contacts and holds; `advance` gets how many steps were read."""
+    contacts = holds = cycles = 0
     before: Mode | None = None
     for i, kept in enumerate(recorded):
         contacts += kept.step.contact is not None
         holds += kept.step.mode is Mode.HOLD and before in (Mode.TRACK, Mode.REACT)
-        held += kept.step.mode is Mode.HOLD
+        cycles += kept.step.mode is Mode.HOLD
         before = kept.step.mode
         advance(i + 1)
-    return Happened(contacts, holds, held / len(recorded))
-
-
-def told(recorded: Recorded) -> str:
-    """Say in a line what ran, and for how long."""
-    stamps, run = recorded.stamps(), recorded.runs[0]
-    profiles = ", then ".join(run.profile.name for run in recorded.runs)
-    command = run.about.get("command")
-    what = f"{command}: " if isinstance(command, str) else ""
-    return (
-        f"{what}profile {profiles} on {run.model.description.name} with {_many(len(run.skin.mounted), 'unit')},"
-        f" {stamps[-1] - stamps[0]:.1f} s, {_many(len(recorded), 'step')}."
-    )
+    return _Events(contacts, holds, cycles / len(recorded))
 
 
 def _many(count: int, what: str) -> str:
     return f"{count} {what}{'' if count == 1 else 's'}"
 
 
-class _Progress:
-    """A bar on standard error for as long as the context lasts; it gives the function that moves it on."""
-
-    def __init__(self, what: str, total: int) -> None:
-        self._bar = Progress(console=Console(stderr=True), transient=True)
-        self._task = self._bar.add_task(what, total=total)
-
-    def __enter__(self) -> Callable[[int], None]:
-        self._bar.start()
-        return lambda done: self._bar.update(self._task, completed=done)
-
-    def __exit__(self, *_: object) -> None:
-        self._bar.stop()
-
-
 def _show(console: Console, comparison: Comparison) -> None:
     mine, other = comparison.recorded, comparison.other
     console.print(f"\nContacts: {mine.name} as recorded, {other.name} on the same data", style="bold", markup=False)
-    console.print(_table(comparison), crop=False)
+    rows = [(*_cells(a), *_cells(b), f"{b.time_s - a.time_s:+.2f}" if a and b else "") for a, b in comparison.pairs]
+    header = "recorded at [s]", "force [N]", "axes", "other at [s]", "force [N]", "axes", "later by [s]"
+    console.print(PlainTable(header, rows or [("none", "", "", "none", "", "", "")], left=()), crop=False)
     console.print(
         "Thresholds from their middle, median along x / y / z:"
         f" {_width(mine)} N ({mine.name}), {_width(other)} N ({other.name}).",
         markup=False,
     )
     if comparison.left_out:
-        console.print(
-            (f"{_many(comparison.left_out, 'step')} left out, without usable inputs in the recording."), markup=False
-        )
+        left_out = f"{_many(comparison.left_out, 'step')} left out, without usable inputs in the recording."
+        console.print(left_out, markup=False)
     console.print(
         "Detector only: both use the recorded motion of the arm, which another profile would have changed.\n",
         style="dim", markup=False,
     )  # fmt: skip
 
 
-def _numbers(
-    recorded: Recorded, found: Happened | None, verdict: Verdict | None, comparison: Comparison | None
-) -> dict[str, Any]:
-    stamps, run = recorded.stamps(), recorded.runs[0]
-    return {
-        "recording": str(recorded.place), "complete": recorded.complete, "arm": run.model.description.name,
-        "profiles": [run.profile.name for run in recorded.runs], "units": [unit.id for unit in run.skin.mounted],
-        "steps": len(recorded), "duration_s": stamps[-1] - stamps[0], **(asdict(found) if found else {}),
-        **({"verified": verdict} if verdict else {}),
-        **({"compared": _comparison_numbers(comparison)} if comparison else {}),
-    }  # fmt: skip
-
-
-def _comparison_numbers(comparison: Comparison) -> dict[str, Any]:
-    pairs = [{"recorded": _found_numbers(mine), "other": _found_numbers(other)} for mine, other in _pairs(comparison)]
-    return {"other": comparison.other.name, "contacts": pairs, "left_out": comparison.left_out}
-
-
-def _found_numbers(found: Found | None) -> dict[str, Any] | None:
-    return None if found is None else {"time_s": found.time, "force_n": found.force, "axes": axes_shown(found)}
-
-
-def _pairs(comparison: Comparison) -> list[tuple[Found | None, Found | None]]:
-    """Return contacts of both, or of one of them, in time order."""
-    pairs: list[tuple[Found | None, Found | None]] = [*comparison.both]
-    pairs += [(found, None) for found in comparison.only_recorded]
-    pairs += [(None, found) for found in comparison.only_other]
-    return sorted(pairs, key=lambda pair: min(found.time for found in pair if found))
-
-
-def _table(comparison: Comparison) -> PlainTable:
-    rows = [
-        (*_cells(mine), *_cells(other), f"{other.time - mine.time:+.2f}" if mine and other else "")
-        for mine, other in _pairs(comparison)
-    ]
-    header = "recorded at [s]", "force [N]", "axes", "other at [s]", "force [N]", "axes", "later by [s]"
-    return PlainTable(header, rows or [("none", "", "", "none", "", "", "")], left=())
-
-
-def _cells(found: Found | None) -> tuple[str, str, str]:
-    if found is None:
-        return "-", "", ""
-    return f"{found.time:.3f}", f"{np.linalg.norm(found.force):.1f}", axes_shown(found)
+def _cells(contact: DetectedContact | None) -> tuple[str, str, str]:
+    return ("-", "", "") if contact is None else (f"{contact.time_s:.3f}", f"{contact.norm_n:.1f}", contact.axes)
 
 
 def _width(decisions: Decisions) -> str:

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from pretouch.imported_data.detect_torque import TorqueDecisions
+from pretouch.imported_data.results import TorqueCourse
 from pretouch.recording.compare import Decisions
 from pretouch.types import FloatArray
 
@@ -28,9 +28,9 @@ def decisions_figure(columns: Sequence[Decisions], title: str) -> Figure:
         column[-1].set_xlabel("time [s]")
     for axis, axes in enumerate(panels[:, 0]):
         axes.set_ylabel(f"force along {_AXES[axis]} [N]")
-    found = [axes.get_legend_handles_labels() for axes in panels[0]]
-    shown = {label: handle for pair in found for handle, label in zip(*pair, strict=True)}
-    figure.legend(list(shown.values()), list(shown), loc="outside lower center", ncols=5, fontsize="small")
+    pairs = [axes.get_legend_handles_labels() for axes in panels[0]]
+    legend = {label: handle for pair in pairs for handle, label in zip(*pair, strict=True)}
+    figure.legend(list(legend.values()), list(legend), loc="outside lower center", ncols=5, fontsize="small")
     figure.suptitle(title, fontsize="medium")
     return figure
 
@@ -39,26 +39,20 @@ def _panel(axes: Axes, d: Decisions, axis: int) -> None:
     axes.plot(d.time, d.force[:, axis], color="0.7", lw=0.8, label="estimate")
     axes.plot(d.time, d.compared[:, axis], color="tab:blue", lw=1.2, label="held against the thresholds")
     for bound, label in ((d.upper, "thresholds"), (d.lower, None)):
-        axes.plot(d.time, _where(bound[:, axis], d), color="black", lw=1, label=label)
+        armed = np.where(d.armed, bound[:, axis], np.nan)  # before the window is full it detects nothing
+        axes.plot(d.time, armed, color="black", lw=1, label=label)
     for i, contact in enumerate(d.contacts):
-        crossed = bool(contact.axes[axis])
+        crossed = _AXES[axis] in contact.axes
         label = "contact (filled: this axis)" if i == 0 else None
-        axes.axvline(contact.time, color="tab:red", lw=1, ls="-" if crossed else ":")
+        axes.axvline(contact.time_s, color="tab:red", lw=1, ls="-" if crossed else ":")
         axes.plot(
-            contact.time, d.compared[d.time == contact.time, axis][0], "v", color="tab:red", mec="black", ms=7,
+            contact.time_s, d.compared[d.time == contact.time_s, axis][0], "v", color="tab:red", mec="black", ms=7,
             mfc="tab:red" if crossed else "white", label=label,
         )  # fmt: skip
     axes.grid(alpha=0.3)
 
 
-def _where(bound: FloatArray, d: Decisions) -> FloatArray:
-    """Leave a threshold out where it detects nothing: before the window is full."""
-    shown = bound.copy()
-    shown[~d.armed] = float("nan")
-    return shown
-
-
-def torque_figure(d: TorqueDecisions, joints: tuple[str, ...], title: str) -> Figure:
+def torque_figure(d: TorqueCourse, joints: tuple[str, ...], title: str) -> Figure:
     """Draw one row a joint, and one for the evidence, with the contacts."""
     n = len(joints)
     figure = Figure(figsize=(11, 1.3 * n + 3), layout="constrained")
@@ -76,10 +70,16 @@ def torque_figure(d: TorqueDecisions, joints: tuple[str, ...], title: str) -> Fi
     for k, contact in enumerate(d.contacts):
         for axes in panels:
             label = "contact" if k == 0 and axes is panels[0] else None
-            axes.axvspan(contact.time, max(contact.end, contact.time + 0.01), color="tab:red", alpha=0.25, label=label)
+            axes.axvspan(
+                contact.time_s,
+                max(contact.end_s or 0.0, contact.time_s + 0.01),
+                color="tab:red",
+                alpha=0.25,
+                label=label,
+            )
         if len(d.contacts) <= 40:
             evidence.annotate(
-                contact.link, (contact.time, 1.0), (1, 2), textcoords="offset points", rotation=90, fontsize=5
+                contact.link or "", (contact.time_s, 1.0), (1, 2), textcoords="offset points", rotation=90, fontsize=5
             )
     for axes in panels:
         axes.grid(alpha=0.3)

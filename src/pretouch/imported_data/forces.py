@@ -6,7 +6,7 @@ import numpy as np
 
 from pretouch.imported_data.log import Choice, LogFile, Note, check_reach
 from pretouch.robot.model import RobotModel
-from pretouch.types import FloatArray
+from pretouch.types import BoolArray, FloatArray
 from pretouch.values import value
 
 _EE_FRAMES = ("_k", "_ee", "_tcp", "_hand", "link8", "tool0", "_flange")
@@ -31,6 +31,8 @@ class ForceRecording:
     force: FloatArray
     """(N, 3) on the robot by the environment [N], base frame, NaN where there is no estimate."""
     notes: tuple[Note, ...] = ()
+    moving: BoolArray | None = None
+    """(N,) whether a joint turns; None where that is not known."""
 
     @property
     def rate(self) -> float:

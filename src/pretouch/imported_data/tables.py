@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from pretouch.errors import RecordingError
+from pretouch.errors import ParameterError, RecordingError
 from pretouch.imported_data.log import (
     PARQUET,
     TORQUES,
@@ -22,7 +22,7 @@ from pretouch.imported_data.log import (
     joint_places,
     listed,
 )
-from pretouch.imported_data.renaming import renamed
+from pretouch.toml_files import read_toml
 from pretouch.types import FloatArray, IntArray
 from pretouch.values import value
 
@@ -54,13 +54,17 @@ _LATEST_S = 4e9
 _LONGEST_LIST = 64
 """Places of a list in a Parquet file that are columns: more joints nobody has."""
 
-
 _SHOWN = {
     "time": "time_s",
     "q": "q1_rad ...",
     "force": "force_x_N, force_y_N, force_z_N",
     "tau_ext": "tau_ext1_Nm ... or tau1_Nm ...",
 }
+
+
+Columns = tuple[tuple[str, str], ...]
+"""Columns of other programs and our names for them: `tau_J_0` and `tau1_Nm`, or all joints at once, `tau_J_*` and
+`tau*_Nm`."""
 
 
 @value
@@ -302,3 +306,48 @@ def _floats(place: Path, name: str, column: Any) -> FloatArray:
         raise RecordingError(f"The column {name!r} of {place} holds {kind}: give numbers.")
     # of epoch nanoseconds a float64 keeps 0.3 us
     return np.asarray(column.cast(pa.float64(), safe=False).to_numpy(), dtype=np.float64)
+
+
+def mapping_of(text: str) -> Columns:
+    """Read a mapping: pairs THEIRS=OURS separated by commas, or the name of a TOML file of such pairs.
+
+    ParameterError for what is neither.
+    """
+    if text.endswith(".toml"):
+        try:
+            pairs = tuple(read_toml(Path(text)).items())
+        except (OSError, ValueError) as error:
+            raise ParameterError(f"The columns {text} cannot be read ({error}): give a file of TOML.") from error
+    else:
+        parts = (part.rpartition("=") for part in text.split(",") if part.strip())
+        pairs = tuple((theirs.strip(), ours.strip()) for theirs, _, ours in parts)
+    for theirs, ours in pairs:
+        if not (theirs and ours and isinstance(ours, str)):
+            raise ParameterError(
+                f"--columns has {ours!r} for {theirs!r}: write THEIRS=OURS, as tau_J_0=tau1_Nm, or FILE.toml of lines"
+                ' "THEIRS" = "OURS".'
+            )
+    return pairs
+
+
+def renamed(place: Path, names: list[str], mapping: Columns) -> list[str]:
+    """Return columns' names with those of a mapping in place of theirs; RecordingError for one that is not there.
+
+    `*` is the number of a joint, from 0 or 1 on: where there is a column with 0, they count from 0.
+    """
+    columns = list(names)
+    for theirs, ours in mapping:
+        numbers = _numbers(names, theirs) if "*" in theirs else {names.index(theirs): ""} if theirs in names else {}
+        if not numbers:
+            raise RecordingError(f"{place} has no column {theirs!r} (it has {listed(names)}): change --columns.")
+        first = 1 if "0" in numbers.values() else 0
+        for i, number in numbers.items():
+            columns[i] = ours.replace("*", str(int(number) + first)) if number else ours
+    return columns
+
+
+def _numbers(names: list[str], pattern: str) -> dict[int, str]:
+    """Which columns a name with a * fits, and the number that stands for it."""
+    form = re.compile(r"(\d{1,2})".join(re.escape(part) for part in pattern.split("*", 1)))
+    fits = {i: form.fullmatch(name) for i, name in enumerate(names)}
+    return {i: fit[1] for i, fit in fits.items() if fit}

@@ -20,17 +20,36 @@ if TYPE_CHECKING:
 SAME_CONTACT_S = 0.3
 """Two detectors' contacts within this time of each other [s] are one."""
 
+Decision = tuple[float, FloatArray, FloatArray, Thresholds, bool, bool, Contact | None]
+"""Of a cycle: its instant [s], the force (3,) and what was held against the thresholds (3,) [N], the thresholds,
+whether the force window was full, whether a reaction was under way, and the contact that began."""
+
 
 @value
-class Found:
-    """A contact that a detector found."""
+class DetectedContact:
+    """A contact that a detector reported."""
 
-    time: float
-    """[s]"""
-    force: FloatArray
-    """(3,) external force F_ext of eq. 12 [N], base frame."""
-    axes: BoolArray
-    """(3,) axes whose threshold was crossed."""
+    time_s: float
+    """When it was detected."""
+    force_n: FloatArray
+    """(3,) on the robot, base frame: F_ext of eq. 12, or where the joint torques place the contact."""
+    axes: str = ""
+    """Axes whose threshold was crossed, as "xz"."""
+    link: str | None = None
+    """The link that is touched; None where the profile does not say."""
+    point_m: FloatArray | None = None
+    """(3,) where on its surface, base frame; None likewise."""
+    end_s: float | None = None
+    """Time of the last evidence of it; None where there is no evidence but the contact itself."""
+    probability: float | None = None
+    """That it is this link's rigid body."""
+    evidence: float | None = None
+    """Largest of the contact."""
+
+    @property
+    def norm_n(self) -> float:
+        """Size of the force."""
+        return float(np.linalg.norm(self.force_n))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,50 +62,33 @@ class Decisions(DetectorRecord):
     """(S, 3) what was held against the thresholds [N], NaN without an estimate."""
     reacting: BoolArray
     """(S,) whether a reaction was under way, so that contacts are ignored."""
-    contacts: tuple[Found, ...]
+    contacts: tuple[DetectedContact, ...]
+
+    @property
+    def judged(self) -> BoolArray:
+        """(S,) whether a contact could be detected."""
+        return self.armed & np.isfinite(self.compared).all(axis=1)
 
 
-class Decided:
-    """Gathers decisions cycle by cycle."""
+def decisions_of(name: str, cycles: Sequence[Decision]) -> Decisions:
+    """Return the decisions of one or more cycles as arrays."""
+    time, force, compared, limits, armed, reacting, contacts = zip(*cycles, strict=True)
+    return Decisions(
+        name=name, time=np.array(time), force=np.array(force), compared=np.array(compared),
+        thresholds=np.array(limits), armed=np.array(armed), reacting=np.array(reacting),
+        contacts=tuple(
+            DetectedContact(t, c.force, "".join(axis for axis, crossed in zip("xyz", c.axes, strict=True) if crossed))
+            for t, c in zip(time, contacts, strict=True) if c is not None
+        ),
+    )  # fmt: skip
 
-    def __init__(self, name: str) -> None:
-        self._name = name
-        self._time: list[float] = []
-        self._rows: list[tuple[FloatArray, FloatArray, FloatArray]] = []
-        self._flags: list[tuple[bool, bool]] = []
-        self._contacts: list[Found] = []
 
-    def add(
-        self, time: float, force: FloatArray, compared: FloatArray, limits: Thresholds, armed: bool, reacting: bool,
-        contact: Contact | None,
-    ) -> None:  # fmt: skip
-        """Take in a cycle: instant [s], forces (3,) [N], thresholds, flags, and the contact that began in it."""
-        self._time.append(time)
-        self._rows.append((force, compared, np.array(limits)))
-        self._flags.append((armed, reacting))
-        if contact is not None:
-            self._contacts.append(Found(time, contact.force, contact.axes))
-
-    def add_step(self, step: ControlStep, profile: Profile) -> None:
-        """Take in a controller's step; the profile says which force it compared."""
-        filtered = isinstance(profile.detect, MovingThresholds) and profile.detect.compare == "filtered"
-        compared = step.filtered_force if filtered else step.force
-        without = np.isnan(step.force).any()
-        self.add(
-            step.stamp, step.force, step.force if without else compared, step.thresholds, step.armed,
-            step.mode is Mode.REACT, step.contact,
-        )  # fmt: skip
-
-    def decisions(self) -> Decisions:
-        """Return all that was gathered."""
-        count = len(self._time)
-        flags = np.array(self._flags, dtype=np.bool_).reshape(count, 2)
-        shapes = ((3,), (3,), (6, 3))
-        force, compared, parts = (np.array([r[k] for r in self._rows]).reshape(count, *shapes[k]) for k in range(3))
-        return Decisions(
-            name=self._name, time=np.array(self._time), force=force, compared=compared, thresholds=parts,
-            armed=flags[:, 0], reacting=flags[:, 1], contacts=tuple(self._contacts),
-        )  # fmt: skip
+def _decision_of(step: ControlStep, profile: Profile) -> Decision:
+    """Return a controller's decision; the profile says which force it compared."""
+    filtered = isinstance(profile.detect, MovingThresholds) and profile.detect.compare == "filtered"
+    compared = step.filtered_force if filtered and not np.isnan(step.force).any() else step.force
+    reacting = step.mode is Mode.REACT
+    return step.stamp, step.force, compared, step.thresholds, step.armed, reacting, step.contact
 
 
 @value
@@ -95,10 +97,8 @@ class Comparison:
 
     recorded: Decisions
     other: Decisions
-    both: tuple[tuple[Found, Found], ...]
-    """Contacts that both found, the recorded one first."""
-    only_recorded: tuple[Found, ...]
-    only_other: tuple[Found, ...]
+    pairs: tuple[tuple[DetectedContact | None, DetectedContact | None], ...]
+    """Contacts in time order, the recorded one first; None where only one has it."""
     left_out: int
     """Cycles whose inputs are not in the recording."""
 
@@ -110,8 +110,7 @@ def compare(recorded: "Recorded", profile: Profile, progress: Callable[[int], No
     another rate is brought to that of the run. `progress` gets how many cycles are done. Raises RecordingError if
     none has usable inputs.
     """
-    names = dict.fromkeys(run.profile.name for run in recorded.runs)
-    theirs, ours = Decided(", ".join(names)), Decided(profile.name)
+    theirs, ours = list[Decision](), list[Decision]()
     controllers = [run.controller() for run in recorded.runs]
     others = [_with_profile(c, profile) for c in controllers]
     state: ControllerState | None = None
@@ -119,52 +118,46 @@ def compare(recorded: "Recorded", profile: Profile, progress: Callable[[int], No
     for i, kept in enumerate(recorded):
         progress(i + 1)
         other = others[kept.run]
-        if kept.inputs is None:
-            left_out += 1
-            continue
-        if state is None:
+        if kept.inputs is not None and state is None:
             state = _first_state(other, controllers[kept.run], kept.snapshot, kept.inputs.robot)
-        elif kept.run != last:
+        elif kept.inputs is not None and state is not None and kept.run != last:
             state = other.adopt(state, others[last])
-        if state is None:
+        if kept.inputs is None or state is None:
             left_out += 1
             continue
         last = kept.run
         step, state = other.step(state, kept.inputs)
-        theirs.add_step(kept.step, recorded.runs[kept.run].profile)
-        ours.add_step(step, other.profile)
-    if state is None:
+        theirs.append(_decision_of(kept.step, recorded.runs[kept.run].profile))
+        ours.append(_decision_of(step, other.profile))
+    if not ours:
         raise RecordingError(f"{recorded.place} has no cycle with a usable robot state: nothing can be compared.")
-    a, b = theirs.decisions(), ours.decisions()
-    both, only_a, only_b = matched(a.contacts, b.contacts)
-    return Comparison(a, b, both, only_a, only_b, left_out)
+    names = dict.fromkeys(run.profile.name for run in recorded.runs)
+    a, b = decisions_of(", ".join(names), theirs), decisions_of(profile.name, ours)
+    return Comparison(a, b, paired(a.contacts, b.contacts), left_out)
 
 
-def matched(
-    first: Sequence[Found], second: Sequence[Found], within: float = SAME_CONTACT_S
-) -> tuple[tuple[tuple[Found, Found], ...], tuple[Found, ...], tuple[Found, ...]]:
-    """Pair contacts of two detectors that are within a time [s] of each other, the closest pairs first.
+def paired(
+    first: Sequence[DetectedContact], second: Sequence[DetectedContact], within: float = SAME_CONTACT_S
+) -> tuple[tuple[DetectedContact | None, DetectedContact | None], ...]:
+    """Pair contacts of two detectors that are within a time [s] of each other, the closest first; in time order.
 
-    Returns the pairs in time order, what only the first found, and what only the second found.
+    What only one of them has is paired with None.
     """
     close = sorted(
-        (abs(a.time - b.time), i, j)
+        (abs(a.time_s - b.time_s), i, j)
         for i, a in enumerate(first)
         for j, b in enumerate(second)
-        if abs(a.time - b.time) <= within
+        if abs(a.time_s - b.time_s) <= within
     )
     partner: dict[int, int] = {}
-    taken: set[int] = set()
     for _, i, j in close:
-        if i not in partner and j not in taken:
+        if i not in partner and j not in partner.values():
             partner[i] = j
-            taken.add(j)
-    pairs = tuple((first[i], second[partner[i]]) for i in sorted(partner))
-    return (
-        pairs,
-        tuple(a for i, a in enumerate(first) if i not in partner),
-        tuple(b for j, b in enumerate(second) if j not in taken),
-    )
+    pairs: list[tuple[DetectedContact | None, DetectedContact | None]] = [
+        (a, second[partner[i]] if i in partner else None) for i, a in enumerate(first)
+    ]
+    pairs += [(None, b) for j, b in enumerate(second) if j not in partner.values()]
+    return tuple(sorted(pairs, key=lambda pair: min(contact.time_s for contact in pair if contact)))
 
 
 def _with_profile(controller: Controller, profile: Profile) -> Controller:

@@ -99,7 +99,8 @@ def unpacked(kind: type[Value], data: bytes) -> Value:
 
 def with_parts(value: Any) -> Any:
     """Return a record to pack, with the name of its part beside what is annotated with `object`."""
-    hints = hints_of(type(value))
+    kind: Any = type(value)
+    hints = hints_of(kind)
     if not any(object in (hint, *get_args(hint)) for _, hint in hints):
         return value
     fields = {name: _named(hint, getattr(value, name)) for name, hint in hints}

@@ -5,14 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pretouch.imported_data.detect_torque import (
-    MOVING_RAD_S,
-    ContactEvent,
-    detect_torques,
-    for_currents,
-    result_of,
-)
+from pretouch.errors import RecordingError
+from pretouch.imported_data.detect import MOVING_RAD_S, detect
 from pretouch.profiles import Profile
+from pretouch.recording.compare import DetectedContact
 from pretouch.types import BoolArray, FloatArray
 from pretouch_lab.benchmarks.bounds import rate_bounds
 from pretouch_lab.benchmarks.real.external import Stream
@@ -28,7 +24,7 @@ _NEAR_S = 0.5
 class Said:
     """What a detector said in S cycles."""
 
-    alarms: tuple[ContactEvent, ...]
+    alarms: tuple[DetectedContact, ...]
     time: FloatArray
     """(S,) [s]."""
     armed: BoolArray
@@ -37,15 +33,11 @@ class Said:
 
 def said_of(stream: Stream, profile: Profile) -> Said:
     """Let a detector run over a stream, as `pretouch detect` does."""
-    r = stream.recording
-    if profile.detect.by_torques:
-        by_torques = detect_torques(r, for_currents(r, profile)[0])
-        return Said(by_torques.contacts, by_torques.time, by_torques.judged)
-    result = result_of(r, profile)
-    if result.by_force is None:
+    try:
+        result, course = detect(stream.recording, profile)
+    except RecordingError:  # too short for its window
         return Said((), np.zeros(0), np.zeros(0, np.bool_))
-    d = result.by_force.decisions
-    return Said(result.contacts, d.time + r.time[0], d.armed & np.isfinite(d.compared).all(axis=1))
+    return Said(result.contacts, course.time, course.judged)
 
 
 @dataclass(frozen=True)
@@ -92,7 +84,7 @@ def tally(stream: Stream, said: Said, judged: Sequence[int], joints: Sequence[tu
         free &= (said.time < begin) | (said.time > end)
     count = Tally(
         motion_s=float(free.sum() * np.median(np.diff(said.time))) if free.any() else 0.0,
-        false_alarms=int(free[np.searchsorted(said.time, [alarm.time for alarm in said.alarms])].sum()),
+        false_alarms=int(free[np.searchsorted(said.time, [alarm.time_s for alarm in said.alarms])].sum()),
     )
     for (first, touch, _), (begin, end) in zip(spans, from_to, strict=True):
         if touch >= 0:
@@ -102,14 +94,15 @@ def tally(stream: Stream, said: Said, judged: Sequence[int], joints: Sequence[tu
 
 def _contact(said: Said, times: tuple[float, float, float], stream: Stream, joints: tuple[int, ...]) -> Tally:
     begin, touch, end = times
-    alarm = next((alarm for alarm in said.alarms if begin <= alarm.time <= end), None)
+    alarm = next((alarm for alarm in said.alarms if begin <= alarm.time_s <= end), None)
     if alarm is None:
-        busy = any(alarm.time < begin <= alarm.end for alarm in said.alarms)
+        busy = any(alarm.time_s < begin <= (alarm.end_s or alarm.time_s) for alarm in said.alarms)
         return Tally(busy=int(busy), contacts=int(not busy))
-    model, named = stream.recording.model, bool(joints and alarm.link)
-    right = named and int(model.moved_by[model.link_index(alarm.link)].sum()) in joints
+    model, link = stream.recording.model, alarm.link if joints else None
+    named = link is not None
+    right = link is not None and int(model.moved_by[model.link_index(link)].sum()) in joints
     return Tally(
-        found=1, contacts=1, delays_s=(alarm.time - touch,), links_right=int(right), links_said=int(named)
+        found=1, contacts=1, delays_s=(alarm.time_s - touch,), links_right=int(right), links_said=int(named)
     )  # fmt: skip
 
 

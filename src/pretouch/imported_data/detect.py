@@ -1,0 +1,280 @@
+"""Detectors on a recorded force or recorded joint torques, cycle by cycle as in the controller, without a skin."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from pretouch.composition import changed
+from pretouch.contact.detector import Body, Detection, Detector, Sample
+from pretouch.contact.moving_thresholds import thresholds_of
+from pretouch.contact.reaction import DecayingVelocity
+from pretouch.contact.window import Window, add_force, window_init
+from pretouch.errors import RecordingError
+from pretouch.imported_data.forces import ForceRecording
+from pretouch.imported_data.log import Note
+from pretouch.imported_data.results import (
+    NEAR_S,
+    Course,
+    DetectorResult,
+    ThresholdSummary,
+    TorqueCourse,
+    TorqueSummary,
+    free_cycles,
+    result_of,
+)
+from pretouch.imported_data.torques import GAP_S, TorqueRecording, pieces
+from pretouch.modes import Event, mode_init, next_mode
+from pretouch.params import SequentialParams
+from pretouch.profiles import Profile
+from pretouch.recording.compare import Decision, Decisions, DetectedContact, decisions_of
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import Skin
+from pretouch.sim.observer import wrench_from_torques
+from pretouch.types import BoolArray, FloatArray, IntArray, Mode, RobotState, no_obstacles
+
+MOVING_RAD_S = 0.02
+"""Speed of any joint from which the arm moves [rad/s]."""
+_SLOWER = 0.95
+"""Share of the detector's rate below which data count as slower."""
+_DAMPING, _SINGULAR = 0.01, 0.02
+"""Of the least squares by which a robot's interface makes a wrench of torques, and the smallest singular value of the
+Jacobian at which it does."""
+_LONG_S = 15.0
+"""Time from which on a contact is doubted [s]."""
+_OF_CURRENTS = {"friction_prior_nm": 0.1, "offset_prior_nm": 0.03, "torque_prior_nm": 0.02}
+"""What is not known of torques by currents, as parts of the usual torque limit of a joint [1]; by the UR10e's."""
+
+
+def detect(recording: ForceRecording | TorqueRecording, profile: Profile) -> tuple[DetectorResult, Course]:
+    """Let a profile's detector run over a recording at the profile's rate, the newest sample in each cycle.
+
+    There are no obstacles. A detector of a force runs on the one that a robot's interface would make of torques.
+    Raises RecordingError for a recording in which it detects nothing.
+    """
+    if isinstance(recording, ForceRecording):
+        return _by_force(recording, profile)
+    if not profile.detect.by_torques:
+        return _by_force(_force_of(recording, profile.task.control_period_s), profile)
+    return _by_torques(recording, profile)
+
+
+def _by_force(r: ForceRecording, p: Profile) -> tuple[DetectorResult, Decisions]:
+    """Hold a force against thresholds. A sample is held while no other comes; after `force_timeout_s` there is none."""
+    if p.detect.by_torques:
+        raise RecordingError(
+            f"The profile {p.name} detects by joint torques, but {r.place} gives only a force: choose one with"
+            " detect=thresholds."
+        )
+    timeout, gap, period = p.failure.force_timeout_s, float(np.median(np.diff(r.time))), p.task.control_period_s
+    if gap > timeout:
+        raise RecordingError(
+            f"The force of {r.place} comes every {gap:.3g} s, but the detector needs it every {timeout:g} s: check the"
+            " unit of the time."
+        )
+    # after a gap in which nothing can change any more the cycles begin anew
+    decay = DecayingVelocity.of(p.react, period).decay_cycles + 2
+    ticks, newest, _ = cycles(r.time, period, timeout + decay * period, hold=True)
+    force = r.force[newest]
+    usable = (ticks - r.time[newest] <= timeout) & (np.abs(force) < p.failure.force_max_n).all(axis=1)
+    d = _decided(ticks, np.where(usable[:, None], force, np.nan), p)
+    if not d.armed.any():
+        raise RecordingError(
+            f"{r.place} has {usable.sum() * period:.2f} s of usable force, but the window of {p.name} takes"
+            f" {p.window.samples * period:g} s to fill: give a longer recording."
+        )
+    free = free_cycles(d.judged & ~d.reacting, d)
+    summary = _summary(d, free, thresholds_of(p.detect).f_base_n)
+    moving = None if r.moving is None else r.moving[newest]
+    notes = (*_slower(r.rate, p), *_without(r.time, d, p))
+    return result_of(p, d, free, moving, float(summary.width_n.max()), summary, None, notes), d
+
+
+def cycles(time: FloatArray, period: float, gap_s: float, hold: bool) -> tuple[FloatArray, IntArray, BoolArray]:
+    """Instants (S,) of cycles [s], the newest sample at each, and whether it is the first of all or after a gap.
+
+    They lie in the middle between samples, so that jitter neither doubles nor skips one. With `hold` they go on for
+    the length of a gap behind the last sample before one.
+    """
+    phase = 0.5 * min(period, float(np.median(np.diff(time))))
+    stretches = pieces(time, gap_s)
+    times, first = [], []
+    for piece in stretches:
+        lasting = gap_s if hold and piece is not stretches[-1] else 0.0
+        count = int((time[piece.stop - 1] + lasting - time[piece.start]) / period + 1e-6) + 1
+        times.append(time[piece.start] + phase + period * np.arange(count))
+        first.append(np.arange(count) == 0)
+    ticks = np.concatenate(times)
+    return ticks, np.searchsorted(time, ticks, side="right") - 1, np.concatenate(first)
+
+
+def _decided(ticks: FloatArray, force: FloatArray, profile: Profile) -> Decisions:
+    """Detect without obstacles; as in the controller, nothing is a contact while a reaction would be under way."""
+    p, decisions, nowhere, nothing = profile, list[Decision](), np.zeros(3), no_obstacles()
+    answer, thresholds = DecayingVelocity.of(p.react, p.task.control_period_s), thresholds_of(p.detect)
+    window, mode, react = window_init(p.window.samples), mode_init(), answer.init()
+    for time, sample in zip(ticks.tolist(), force, strict=True):
+        force_now = None if np.isnan(sample[0]) else sample
+        armed, window = window.full, add_force(window, force_now, p.window)
+        detection = thresholds.judged(window, force_now, armed, nowhere, nothing)
+        events = {Event.WINDOW_FILLING: ""} if not detection.armed else {}
+        if detection.contact is not None:
+            events[Event.CONTACT] = ""
+        if answer.active(react):
+            events[Event.REACTING] = ""
+        before, mode = mode, next_mode(mode, events, resume=False)
+        reacting = mode.mode is Mode.REACT
+        contact = detection.contact if reacting and before.mode is not Mode.REACT else None
+        react = answer.begun(contact.force) if contact else react
+        react = react.advanced() if reacting else answer.init()
+        compared = window.newest if force_now is not None and thresholds.compare == "filtered" else sample
+        decisions.append((time, sample, compared, detection.thresholds, detection.armed, reacting, contact))
+    return decisions_of(p.name, decisions)
+
+
+def _summary(d: Decisions, free: BoolArray, f_base: float) -> ThresholdSummary:
+    beyond, widths = np.maximum(d.compared - d.upper, d.lower - d.compared).max(axis=1), d.upper - d.lower
+    some, nothing = bool(free.any()), np.full(3, np.nan)
+    return ThresholdSummary(
+        mean_n=d.force[free].mean(axis=0) if some else nothing,
+        sigma_n=d.force[free].std(axis=0) if some else nothing,
+        window_sigma_n=np.median(d.sigma[free], axis=0) if some else nothing,
+        width_n=np.median(widths[free] / 2, axis=0) if some else nothing,
+        f_base_n=f_base,
+        f_base_free_n=f_base + float(beyond[free].max()) if some else np.nan,
+        f_base_all_n=f_base + float(beyond[d.judged].max()) if d.judged.any() else np.nan,
+    )
+
+
+def _slower(rate: float, profile: Profile) -> list[Note]:
+    """Say that data come at a rate [Hz] below the detector's."""
+    own = 1.0 / profile.task.control_period_s
+    return [Note("slower", {"profile": profile.name, "rate": rate, "own": own})] if rate < _SLOWER * own else []
+
+
+def _without(time: FloatArray, d: Decisions, profile: Profile) -> list[Note]:
+    """Say what time is without a force."""
+    timeout, steps = profile.failure.force_timeout_s, np.diff(time)
+    gaps, without = steps[steps > timeout], int(np.count_nonzero(~np.isfinite(d.force).all(axis=1)))
+    notes = []
+    if len(gaps):
+        notes.append(Note("force_gaps", {"count": len(gaps), "longer_s": timeout, "seconds": float(gaps.sum())}))
+    if without:
+        notes.append(Note("cycles_without", {"profile": d.name, "count": without, "of": len(d.time)}))
+    return notes
+
+
+def _force_of(r: TorqueRecording, period: float) -> ForceRecording:
+    """Return the force that a robot's interface would make of torques, at the detector's cycles."""
+    time, newest, _ = cycles(r.time, period, GAP_S, hold=False)
+    wrenches = [_wrench(r.model, r.q[i], r.tau_ext[i]) for i in newest]
+    force = np.array([np.full(3, np.nan) if wrench is None else wrench[:3] for wrench in wrenches])
+    return ForceRecording(r.place, "", r.model, False, False, r.first_s, time, force, (), _moving(r, newest))
+
+
+def _moving(r: TorqueRecording, at: IntArray) -> BoolArray:
+    """Whether the arm moves at samples (S,)."""
+    return np.abs(r.qd_commanded[at]).max(axis=1) > MOVING_RAD_S
+
+
+def _wrench(model: RobotModel, q: FloatArray, tau: FloatArray) -> FloatArray | None:
+    """Wrench (6,) that a robot's interface would make of external torques, or None where it has none."""
+    if np.isnan(tau).any():
+        return None
+    return wrench_from_torques(model.ee_jacobian(model.kinematics(q)), tau, _DAMPING, _SINGULAR)
+
+
+def _by_torques(r: TorqueRecording, profile: Profile) -> tuple[DetectorResult, TorqueCourse]:
+    profile, notes = _for_currents(r, profile)
+    time, newest, first = cycles(r.time, profile.task.control_period_s, GAP_S, hold=False)
+    course = _judged(r, profile, time, newest, first)
+    name, free = profile.name, free_cycles(course.judged, course)
+    if getattr(profile.detect, "learn", "") == "watched":
+        notes.append(Note("unwatched", {"profile": name}))
+    notes += _slower(r.rate, profile)
+    if not course.armed.any():
+        notes.append(Note("never_armed", {"profile": name}))
+    lengths = [((c.end_s or c.time_s) - c.time_s, c.time_s) for c in course.contacts]
+    if lengths and max(lengths)[0] > _LONG_S:
+        notes.append(Note("long", dict(zip(("seconds", "time"), max(lengths), strict=True)) | {"profile": name}))
+    residual, tau_ext, nothing = course.residual[free], course.tau_ext[free], np.full(r.model.n, np.nan)
+    some = bool(free.any())
+    summary = TorqueSummary(
+        residual.mean(axis=0) if some else nothing, residual.std(axis=0) if some else nothing,
+        tau_ext.std(axis=0) if some else nothing, float(course.evidence[free].max()) if some else np.nan,
+    )  # fmt: skip
+    detectable = float(np.median(course.detectable_n[free])) if some else np.nan
+    return result_of(profile, course, free, _moving(r, newest), detectable, None, summary, tuple(notes)), course
+
+
+def _for_currents(recording: TorqueRecording, profile: Profile) -> tuple[Profile, list[Note]]:
+    """Allow for what currents do not tell, as the friction of gears, where the profile leaves that as usual."""
+    p, usual = profile.detect, SequentialParams()
+    if not (recording.kind == "current" and isinstance(p, SequentialParams)):
+        return profile, []
+    large = float(np.median(recording.model.description.tau_max))
+    wide = {name: share * large for name, share in _OF_CURRENTS.items()} | {"mass_prior": 0.3, "payload_prior_kg": 2.0}
+    texts = {name: f"{number:.3g}" for name, number in wide.items() if getattr(p, name) == getattr(usual, name)}
+    if not texts:
+        return profile, []
+    note = Note("for_currents", {"profile": profile.name, "allowed": ", ".join(f"{n} = {t}" for n, t in texts.items())})
+    return changed(profile, {f"detect.{name}": text for name, text in texts.items()}), [note]
+
+
+def _judged(r: TorqueRecording, profile: Profile, time: FloatArray, newest: IntArray, first: BoolArray) -> TorqueCourse:
+    """Let a detector judge torques at cycles, see `cycles`."""
+    body = Body(r.model, Skin((), r.model), profile.task.control_period_s)
+    detector: Detector = profile.detect.on(body)
+    without = np.asarray(np.isnan(r.tau_ext[newest]).any(axis=1))
+    if without.all():
+        raise RecordingError(f"{r.place} has no usable torques: give a longer recording without gaps.")
+    contacts, detections = list[DetectedContact](), list[Detection]()
+    state, window, waiting = None, window_init(profile.window.samples), True
+    for cycle, i in enumerate(newest):
+        sample = _sample(r, i, float(time[cycle]), window, profile)
+        window, waiting = sample.window, waiting or bool(first[cycle])
+        if state is None or (waiting and not without[cycle]):
+            state, waiting = _begun(detector, body, state, r.qd_commanded[i]), bool(without[cycle])
+        detection, state = detector.step(state, body, sample)
+        _follow(contacts, r.model, sample.stamp, detection)
+        detections.append(replace(detection, significant=None))
+    columns = {name: np.array([getattr(d, name) for d in detections])
+               for name in ("residual", "evidence", "detectable_n", "armed")}  # fmt: skip
+    return TorqueCourse(name=profile.name, time=time, tau_ext=r.tau_ext[newest], contacts=tuple(contacts), **columns)
+
+
+def _sample(r: TorqueRecording, i: int, time: float, window: Window, profile: Profile) -> Sample:
+    """Return a cycle's sample, with the force window after it."""
+    kin, wrench = r.model.kinematics(r.q[i]), _wrench(r.model, r.q[i], r.tau_ext[i])
+    robot = RobotState(time, r.q[i], r.qd[i], r.q[i], r.qd_commanded[i], r.tau_ext[i], wrench)
+    after = add_force(window, None if wrench is None else wrench[:3], profile.window)
+    # watched: whoever gives the recording stands in for the skin that would tell when free motion can be learnt
+    return Sample(time, kin, robot, after, window.full, no_obstacles(), watched=True)
+
+
+def _begun(detector: Detector, body: Body, before: Any, speed: FloatArray) -> Any:
+    """Return a detector's state at the first cycle with torques after a gap: what was learnt stays."""
+    learnt = detector.learnt(detector.init(body) if before is None else before)
+    none = np.zeros(1, np.int64)
+    return detector.init(body, learnt and learnt._replace(speed=speed, filled=none, waiting=none))
+
+
+def _follow(contacts: list[DetectedContact], model: RobotModel, time: float, d: Detection) -> None:
+    """Begin a contact, or go on with the last one while there is evidence of it."""
+    last = contacts[-1] if contacts else None
+    goes_on = last is not None and last.end_s is not None and time - last.end_s <= NEAR_S
+    if d.contact is not None and not goes_on:
+        last, goes_on = DetectedContact(time, d.contact.force, end_s=time, evidence=-1.0), True
+        contacts.append(last)
+    if last is None or not goes_on or not d.armed or not d.evidence >= 1.0:
+        return
+    touched, best = d.touched, last.evidence or 0.0
+    # the place gathers what all samples say: it is surest late, when the evidence may have passed its peak
+    if len(touched.link) and touched.probability[0] > (last.probability or 0.0):
+        last = replace(
+            last, link=model.links[touched.link[0]], point_m=touched.point[0], force_n=touched.force[0],
+            probability=float(touched.probability[0]),
+        )  # fmt: skip
+    elif last.link is None and d.contact is not None and d.evidence > best:
+        last = replace(last, force_n=d.contact.force)
+    contacts[-1] = replace(last, end_s=time, evidence=max(best, d.evidence))

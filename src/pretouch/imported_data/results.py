@@ -1,0 +1,140 @@
+"""What detectors make of recordings: numbers for tables and files, and the course of each cycle for figures."""
+
+import numpy as np
+
+from pretouch.imported_data.log import Note
+from pretouch.profiles import Profile
+from pretouch.recording.compare import Decisions, DetectedContact
+from pretouch.types import BoolArray, FloatArray
+from pretouch.values import value
+
+NEAR_S = 0.5
+"""Time about a contact that is no free motion, and without evidence of a contact after which it is over [s]."""
+
+
+@value
+class ThresholdSummary:
+    """How thresholds on a force fared, by axis; NaN without free motion. Base frame."""
+
+    mean_n: FloatArray
+    """(3,) of the force in free motion."""
+    sigma_n: FloatArray
+    """(3,) standard deviation of the force in free motion."""
+    window_sigma_n: FloatArray
+    """(3,) median of that within the window in free motion, after eq. 8."""
+    width_n: FloatArray
+    """(3,) median distance of a threshold from the mean between both in free motion."""
+    f_base_n: float
+    """F_b of the profile."""
+    f_base_free_n: float
+    """F_b above which the free motion would hold no contact."""
+    f_base_all_n: float
+    """F_b above which the whole recording would hold none."""
+
+
+@value
+class TorqueSummary:
+    """How a detector on torques fared in free motion, by joint; NaN without any."""
+
+    residual_mean_nm: FloatArray
+    """(n,) of what learnt free motion does not explain of the torques."""
+    residual_sigma_nm: FloatArray
+    """(n,) standard deviation of that."""
+    external_sigma_nm: FloatArray
+    """(n,) standard deviation of the external torques."""
+    largest_evidence: float
+    """A contact from 1 on."""
+
+
+@value
+class DetectorResult:
+    """What a profile's detector makes of a recording. Times count from the first sample."""
+
+    profile: str
+    control_rate_hz: float
+    contacts: tuple[DetectedContact, ...]
+    armed_s: float
+    """Time in which it could detect."""
+    free_s: float
+    """Part of it outside contacts and what is near them in time."""
+    motion_s: float
+    """Part of it in which the arm moved; NaN where its motion is not known."""
+    contacts_in_motion: int
+    """Contacts that began in motion."""
+    detectable_n: float
+    """Force at the end-effector that the detector itself says it finds: median in free motion, or median distance of a
+    threshold from its mean along the worst axis; NaN if it does not say."""
+    thresholds: ThresholdSummary | None
+    torques: TorqueSummary | None
+    notes: tuple[Note, ...]
+
+    @property
+    def contacts_per_hour_of_motion(self) -> float:
+        """False alarms, if nobody touched the arm. NaN without motion."""
+        return 3600.0 * self.contacts_in_motion / self.motion_s if self.motion_s else np.nan
+
+
+@value
+class TorqueCourse:
+    """What a detector made of torques in S cycles."""
+
+    name: str
+    """The profile."""
+    time: FloatArray
+    """(S,) since the first sample [s]."""
+    tau_ext: FloatArray
+    """(S, n) external torques [Nm]."""
+    residual: FloatArray
+    """(S, n) what free motion does not explain of them [Nm], NaN without torques."""
+    evidence: FloatArray
+    """(S,) a contact from 1 on, while armed."""
+    detectable_n: FloatArray
+    """(S,) force at the end-effector that the detector says it finds, see `Detection.detectable_n` [N]."""
+    armed: BoolArray
+    """(S,)."""
+    contacts: tuple[DetectedContact, ...]
+
+    @property
+    def judged(self) -> BoolArray:
+        """(S,) whether a contact could be detected."""
+        return self.armed & np.isfinite(self.residual).all(axis=1)
+
+
+Course = Decisions | TorqueCourse
+"""What a detector made of each cycle."""
+
+
+def free_cycles(judged: BoolArray, course: Course) -> BoolArray:
+    """Return which of the cycles (S,) in which a contact could be detected are not near one in time."""
+    free = judged.copy()
+    for c in course.contacts:
+        end = c.time_s if c.end_s is None else c.end_s + NEAR_S
+        free &= (course.time < c.time_s - NEAR_S) | (course.time > end)
+    return free
+
+
+def result_of(
+    profile: Profile, course: Course, free: BoolArray, moving: BoolArray | None, detectable: float,
+    thresholds: ThresholdSummary | None, torques: TorqueSummary | None, notes: tuple[Note, ...],
+) -> DetectorResult:  # fmt: skip
+    """Sum up the course of a detector.
+
+    Args:
+        profile: that it is of.
+        course: its cycles.
+        free: (S,) which of them are free motion.
+        moving: (S,) in which of them the arm moves; None where that is not known.
+        detectable: see `DetectorResult.detectable_n`.
+        thresholds: how they fared, of a detector by a force.
+        torques: how they fared, of a detector by torques.
+        notes: what a person should know.
+    """
+    period, judged = profile.task.control_period_s, course.judged
+    begins = np.searchsorted(course.time, [c.time_s for c in course.contacts])
+    return DetectorResult(
+        profile=profile.name, control_rate_hz=1.0 / period, contacts=course.contacts,
+        armed_s=float(judged.sum() * period), free_s=float(free.sum() * period),
+        motion_s=np.nan if moving is None else float((judged & moving).sum() * period),
+        contacts_in_motion=0 if moving is None else int(moving[begins].sum()), detectable_n=detectable,
+        thresholds=thresholds, torques=torques, notes=notes,
+    )  # fmt: skip
