@@ -8,7 +8,8 @@ import pytest
 from pretouch.contact.reaction import Reaction, ReactionMotion, contact_event
 from pretouch.modes import Event
 from pretouch.profiles import profile
-from pretouch.recording.cycles import packed_state, state_of
+from pretouch.recording.cycles import KeptState, packed_state
+from pretouch.recording.packing import unpacked
 from pretouch.types import Mode
 from tests.following_arm import PAPER, Arm
 
@@ -54,7 +55,7 @@ def test_a_reaction_of_somebody_else_moves_the_arm_as_long_as_it_says(arm: Arm):
 
 def test_its_state_is_recorded_and_another_profile_goes_on_without_it(arm: Arm, panda_model, paper_skin):
     arm.run(6, force=(0.0, 40.0, 0.0))
-    _, back = state_of(packed_state(arm.state, False))
+    back = unpacked(KeptState, packed_state(arm.state, False)).state
     assert back.reaction == arm.state.reaction > 0
     paper = Arm(panda_model, paper_skin)
     arm.state, arm.controller = paper.controller.adopt(arm.state, arm.controller), paper.controller

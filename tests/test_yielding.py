@@ -10,7 +10,8 @@ from pretouch.contact.reaction import DecayingVelocity
 from pretouch.modes import ModeState
 from pretouch.params import ClampParams, GiveUpParams
 from pretouch.profiles import PROFILES, Profile, profile
-from pretouch.recording.cycles import packed_state, state_of
+from pretouch.recording.cycles import KeptState, packed_state
+from pretouch.recording.packing import unpacked
 from pretouch.robot.body import placed
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
@@ -308,7 +309,7 @@ def test_the_reaction_is_a_part_chosen_by_its_name():
 def test_the_state_of_a_clamp_is_recorded_to_the_bit(arm: Pushed):
     caught(arm)
     arm.run(3)
-    _, back = state_of(packed_state(arm.state, False))
+    back = unpacked(KeptState, packed_state(arm.state, False)).state
     assert same(back, arm.state)
     assert back.reaction.clamp.torque > 0
 

@@ -1,13 +1,10 @@
 """What is installed only where it is wanted: which modules an extra brings, and what to run where they are missing."""
 
-import json
 import shlex
 import sys
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, distribution, version
 from importlib.util import find_spec
 from pathlib import Path
-from urllib.parse import unquote, urlsplit
 
 from pretouch.errors import MissingExtraError
 
@@ -59,36 +56,16 @@ UNITS = Extra("units", ("mpremote",), "units")
 def install_command(owner: str, extra: str = "", target: str = "setup") -> str:
     """Return the command that installs a distribution, or an extra of it, where this Python is.
 
-    In a clone that is a target of make, or pip of the folder in an environment other than the clone's own. A
-    distribution beside this one that is missing is looked for beside the wheel of Pretouch too.
+    In a clone that is a target of make, or pip of the folder in an environment other than the clone's own.
     """
     python = shlex.quote(sys.executable)
     pip = f"{python} -m pip install" if find_spec("pip") else f"uv pip install --python {python}"
-    if (_CLONE / "lab" / "pyproject.toml").is_file():
-        if Path(sys.prefix) == _CLONE / ".venv":
-            there = "" if Path.cwd() == _CLONE else f"-C {shlex.quote(str(_CLONE))} "
-            return f"make {there}{target}"
-        return f"{pip} -e {_quoted(_CLONE / _FOLDERS.get(owner, ''), extra)}"
-    if owner not in _FOLDERS or _installed(owner):
+    if not (_CLONE / "lab" / "pyproject.toml").is_file():
         return f"{pip} {_quoted(owner, extra)}"
-    origin = Path(unquote(urlsplit(_origin()).path)).parent if _origin().startswith("file:") else None
-    beside = f"--find-links {shlex.quote(str(origin))} " if origin else ""
-    return f"{pip} {beside}{_quoted(owner, extra, '==' + version('pretouch'))}"
+    if Path(sys.prefix) != _CLONE / ".venv":
+        return f"{pip} -e {_quoted(_CLONE / _FOLDERS.get(owner, ''), extra)}"
+    return f"make {'' if Path.cwd() == _CLONE else f'-C {shlex.quote(str(_CLONE))} '}{target}"
 
 
-def _installed(owner: str) -> bool:
-    try:
-        distribution(owner)
-    except PackageNotFoundError:
-        return False
-    return True
-
-
-def _origin() -> str:
-    """Return the URL that this distribution was installed from; '' for an index."""
-    text = distribution("pretouch").read_text("direct_url.json") if _installed("pretouch") else None
-    return str(json.loads(text)["url"]) if text else ""
-
-
-def _quoted(what: object, extra: str = "", source: str = "") -> str:
-    return f"'{what}{f'[{extra}]' if extra else ''}{source}'"
+def _quoted(what: object, extra: str) -> str:
+    return f"'{what}{f'[{extra}]' if extra else ''}'"

@@ -10,8 +10,7 @@ from tests.other_arm import copied_panda
 
 from pretouch.control.path import Circle
 from pretouch.errors import ParameterError
-from pretouch.importing.folder import write_folder
-from pretouch.importing.robot_import import ImportOptions, import_robot
+from pretouch.importing.robot_import import ImportOptions, import_robot, write_folder
 from pretouch.page.room import HAND_FORCE_N, LiveSettings, Mouse, at_depth, live_path, settings_for
 from pretouch.page.simulation import LiveSimulation
 from pretouch.profiles import profile
