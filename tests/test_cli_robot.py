@@ -40,7 +40,7 @@ def test_an_arm_is_imported_checked_and_reported(tmp_path, capsys):
         assert part in printed
     assert "of its capsules most, by" in printed
     assert "raise approach.d_repulse_m by as much, or import with --cover" in printed
-    assert json.loads(numbers.read_text())["links"]["link1"]["sticks_out_m"] > 1e-3
+    assert json.loads(numbers.read_text())["links"][1]["sticks_out"] > 1e-3
     assert main(["robot", "check", str(tmp_path / "out")]) == 0
     assert "No problem found" in capsys.readouterr().out
     assert imported(*told) == 2

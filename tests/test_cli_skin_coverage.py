@@ -23,12 +23,10 @@ def test_numbers_figure_and_a_skin_with_more_units(tmp_path, capsys, panda_model
     assert load_skin(skin, panda_model).ids[-2:] == ("suggested_1", "suggested_2")
     assert figure.read_bytes().startswith(b"\x89PNG")
     found = json.loads(numbers.read_text())
-    assert found["parameters"]["warning_m"] == pytest.approx(0.373)
-    before, after = (found["suggested"][when][-1]["ways"] for when in ("before", "after"))
-    assert after > before
-    assert found["links"][-1]["link"] == "whole arm"
-    met = [found["suggested"][when][-1]["met"] for when in ("before", "after")]
-    assert met[1] > met[0] > 0
+    assert found["asked"]["params"]["warning_m"] == pytest.approx(0.373)
+    assert found["links"][-1]["name"] == "whole arm"
+    for what in ("links", "met"):
+        assert found["after"][what][-1]["ways"] > found["before"][what][-1]["ways"] > 0
     areas = [spot["area_m2"] for spot in found["blind_spots"]]
     assert areas == sorted(areas, reverse=True)
     assert main(told) == 2
@@ -67,7 +65,7 @@ def test_an_imported_arm_gets_its_first_units(tmp_path, capsys):
         (["--out", "x.toml"], "give their number with --suggest"),
         (["--suggest", "-1"], "--suggest is -1: give 1 or more"),
         (["--figure", "arm.gif"], "has an unknown format: use one of the endings .png, .pdf, .svg"),
-        (["--speed", "3"], "before contact, but the paths are only 0.8 m long: give lower speeds"),
+        (["--object-speed-m-s", "3"], "before contact, but the paths are only 0.8 m long: give lower speeds"),
         (["--seed", "-1"], "The seed is -1: give 0 or more"),
         (["--workspace", "moon"], "The workspace is 'moon': give circle"),
         (["--suggest", "400", "--postures", "2"], "400 more units were requested, but"),

@@ -70,7 +70,7 @@ def files(tmp_path_factory, panda_model, paper_skin):
         ("skin keys --keys keys.toml", {"units"}),
         ("skin monitor --keys keys.toml --port 0 --duration 0.3", {"elapsed_s", "units", "findings"}),
         ("skin coverage --postures 2", {"links", "blind_spots"}),
-        ("robot check arm", {"joints", "manipulability", "clear_m"}),
+        ("robot check arm", {"joints", "ready", "arm"}),
         ("detect force.csv --profiles paper,blind", {"first_sample_s", "profiles"}),
         ("replay run.mcap --no-page", {"contacts", "held_share", "duration_s"}),
         ("replay run.mcap --verify", {"verified"}),

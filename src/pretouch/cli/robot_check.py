@@ -60,20 +60,9 @@ def _checked(command: Check) -> dict[str, Any]:
 
 
 def arm_numbers(model: RobotModel, ready: Ready) -> dict[str, Any]:
-    """Return limits of an arm's joints, and its ready posture, as JSON is to have them."""
-    arm = model.description
-    limits = {
-        "lower_rad": model.q_min, "upper_rad": model.q_max, "speed_rad_s": arm.qd_max,
-        "acceleration_rad_s2": arm.qdd_max, "torque_nm": arm.tau_max, "ready_rad": ready.q,
-    }  # fmt: skip
-    return {
-        "name": arm.name, "end_effector": arm.ee_body, "capsules": len(model.capsules.radius),
-        "joints": [
-            {"name": name, **{key: values[j] for key, values in limits.items()}} for j, name in enumerate(model.joints)
-        ],
-        "manipulability": ready.manipulability, "smallest_singular_value": ready.singular_value,
-        "clear_m": ready.clear, "never_apart": never_apart(model),
-    }  # fmt: skip
+    """Return what is known of an arm, and its ready posture, as JSON is to have them."""
+    limits = {"joints": model.joints, "q_min": model.q_min, "q_max": model.q_max}
+    return {"arm": model.description, "ready": ready, "never_apart": never_apart(model)} | limits
 
 
 def joint_table(model: RobotModel, ready: Ready, note: str) -> TextTable:

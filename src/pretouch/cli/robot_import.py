@@ -1,7 +1,7 @@
 """Importing an arm on the command line: the report of what was read, fitted and assumed."""
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +12,9 @@ from pretouch.cli.options import JsonFile, Numbers, OptionalFile, Paths
 from pretouch.cli.robot_check import arm_numbers, joint_table, ready_said
 from pretouch.cli.tables import show
 from pretouch.cli.writing import numbers_to
+from pretouch.importing.capsules import LinkBody
 from pretouch.importing.read import described, is_description, read_robot
-from pretouch.importing.robot_import import Imported, ImportOptions, check_free, import_robot, write_folder
+from pretouch.importing.robot_import import ImportOptions, check_free, import_robot, write_folder
 from pretouch.sensing.skin import OWN_SKIN
 from pretouch.text_table import TextTable, tabulated
 
@@ -60,17 +61,8 @@ class Import:
         if is_description(self.file):
             file, package = described(self.file)
             packages = (*packages, package)
-        options = ImportOptions(
-            ee=self.ee,
-            name=self.name,
-            packages=packages,
-            qd_max=self.qd_max,
-            qdd_max=self.qdd_max,
-            tau_max=self.tau_max,
-            ready=self.ready,
-            capsules=self.capsules,
-            cover=self.cover,
-        )
+        own = {one.name: getattr(self, one.name) for one in fields(ImportOptions) if one.name != "packages"}
+        options = ImportOptions(**own, packages=packages)
         folder = self.out or Path(_file_name(self.name or read_robot(file, options.packages).name))
         check_free(folder)
         with numbers_to(self.json) as write:
@@ -79,17 +71,27 @@ class Import:
 
 def _imported(file: Path, options: ImportOptions, folder: Path) -> dict[str, Any]:
     """Import an arm, write its folder, and print what came of it; return the numbers."""
-    found = import_robot(file, options)
-    write_folder(found, folder)
+    imported = import_robot(file, options)
+    model, ready = imported.model, imported.ready
+    write_folder(imported, folder)
     console = Console(highlight=False)
-    links = f"Links: {', '.join(found.model.links[1:])}."
-    show(console, [joint_table(found.model, found.ready, links), _capsules(found)])
-    for sentence in [*found.remarks, *_said(found)]:
+    show(console, [joint_table(model, ready, f"Links: {', '.join(model.links[1:])}."), _capsules(imported.bodies)])
+    moving = [body for body in imported.bodies if model.moved_by[model.link_index(body.name)].any()]
+    worst = max(moving, key=lambda body: body.sticks_out)
+    sentences = [*imported.remarks, f"{ready_said(ready)} Use --ready to set another one."]
+    if worst.sticks_out >= _NEGLIGIBLE:
+        sentences.append(
+            f"Of the moving links {worst.name} sticks out of its capsules most, by {1000 * worst.sticks_out:.1f} mm:"
+            " raise approach.d_repulse_m by as much, or import with --cover."
+        )
+    if ready.conflict:
+        sentences.append(ready.conflict)
+    for sentence in sentences:
         console.print(f"- {sentence}", markup=False, soft_wrap=True)
     units = f"pretouch skin coverage --arm {folder} --workspace joints --suggest 8 --out {folder / OWN_SKIN}"
     after = f"Next, sensor units: {units}\nThen try it: pretouch live --arm {folder}"
     console.print(f"\nWritten: {folder}. {after}", markup=False, soft_wrap=True)
-    return _numbers_of(found)
+    return arm_numbers(model, ready) | {"links": imported.bodies, "remarks": imported.remarks}
 
 
 def _file_name(name: str) -> str:
@@ -97,7 +99,7 @@ def _file_name(name: str) -> str:
     return re.sub(r"[^A-Za-z0-9_.-]+", "-", name).strip("-.")[:60] or "arm"
 
 
-def _capsules(found: Imported) -> TextTable:
+def _capsules(bodies: tuple[LinkBody, ...]) -> TextTable:
     columns = (
         ("link", lambda body: body.name),
         ("capsules", lambda body: str(len(body.rods))),
@@ -108,36 +110,4 @@ def _capsules(found: Imported) -> TextTable:
         "By how much the capsules stand over the surface at most, and it sticks out of them: a person may be that much"
         " closer."
     )
-    return tabulated("Capsules for the links", columns, found.bodies, note, 1)
-
-
-def _said(found: Imported) -> list[str]:
-    return [
-        *_sticking_out(found),
-        f"{ready_said(found.ready)} Use --ready to set another one.",
-        *([found.ready.conflict] if found.ready.conflict else []),
-    ]
-
-
-def _sticking_out(found: Imported) -> list[str]:
-    """Name the moving link that sticks out most, and say what to do about it."""
-    model = found.model
-    moving = [body for body in found.bodies if model.moved_by[model.link_index(body.name)].any()]
-    worst = max(moving, key=lambda body: body.sticks_out)
-    if worst.sticks_out < _NEGLIGIBLE:
-        return []
-    return [
-        f"Of the moving links {worst.name} sticks out of its capsules most, by {1000 * worst.sticks_out:.1f} mm: raise"
-        " approach.d_repulse_m by as much, or import with --cover."
-    ]
-
-
-def _numbers_of(found: Imported) -> dict[str, Any]:
-    links = {
-        body.name: {
-            "capsules": len(body.rods), "fitted": body.fitted, "sticks_out_m": body.sticks_out,
-            "stands_over_m": body.stands_over,
-        }
-        for body in found.bodies
-    }  # fmt: skip
-    return arm_numbers(found.model, found.ready) | {"links": links, "remarks": found.remarks}
+    return tabulated("Capsules for the links", columns, bodies, note, 1)

@@ -1,18 +1,18 @@
 """`pretouch skin coverage`: what a skin sees in time, its blind spots, and where more units help most."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import tyro
 from rich.console import Console
 
 from pretouch.cli.options import JsonFile, OptionalFile
-from pretouch.cli.skin_coverage_tables import link_table, spot_lines, suggestion_table, unit_table
 from pretouch.cli.tables import show
 from pretouch.cli.writing import check_outputs, numbers_to, unwritable_said
 from pretouch.coverage import measure
-from pretouch.coverage.blind import BlindSpot, blind_spots
+from pretouch.coverage.blind import BLIND, blind_spots
 from pretouch.coverage.measure import Setting, coverage_of, covered
 from pretouch.coverage.params import CoverageParams
 from pretouch.coverage.suggest import Suggestions, candidates, suggest
@@ -24,6 +24,7 @@ from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.sensor import sensor_called
 from pretouch.sensing.skin import Skin, load_skin, save_skin, skin_file
+from pretouch.text_table import TextTable, tabulated
 from pretouch.types import BoolArray
 
 _FORMATS = (".png", ".pdf", ".svg")
@@ -41,24 +42,7 @@ class Coverage:
     """panda, fr3, or the folder of an imported arm."""
     workspace: str = "paths"
     """Postures to average over: circle, line, paths (both of the paper's), or joints (their whole range)."""
-    speed: float = 0.5
-    """Speed of the approaching object [m/s]."""
-    arm_speed: float = 0.3
-    """Speed at which the arm moves towards it [m/s]."""
-    deceleration: float = 0.6
-    """Deceleration with which the arm brakes [m/s^2]."""
-    object_radius: float = 0.05
-    """Radius of the approaching object [m]: a fist by default."""
-    rate: float = 50.0
-    """Readings of a unit a second [Hz]."""
-    latency: float = 0.04
-    """Time from a measurement to a motion [s]."""
-    range: float = 1.3
-    """Farthest target that fills a unit's cone [m]."""
-    reflectance: float = 0.5
-    """Reflectance of the approaching object at 940 nm."""
-    way: float = 0.8
-    """Length of the straight path on which it approaches [m]."""
+    params: CoverageParams = field(default_factory=CoverageParams)
     floor: float = -0.2
     """Height of the floor in the base frame [m]."""
     postures: int = 50
@@ -79,133 +63,147 @@ class Coverage:
 
     def run(self) -> None:
         """Measure, show, and write the requested files."""
-        model, skin, source = _arm_and_skin(self)
-        _check_outputs(self, source)
+        model = RobotModel(robot_named(self.arm))
+        try:
+            source: Path | None = self.skin or skin_file(model.description)
+        except SkinError:  # the first units of an arm are to be suggested
+            if not self.suggest:
+                raise
+            source = None
+        skin = load_skin(source, model) if source else Skin([], model)
+        self._check_outputs(source)
+        setting = Setting(model, floor_and_pedestal(self.floor), self.params, self.workspace, self.postures, self.seed)
         with numbers_to(self.json) as write:
-            write(_measured(self, model, skin))
+            write({"asked": self} | _measured(self, setting, skin))
+
+    def _check_outputs(self, source: Path | None) -> None:
+        """Refuse, before anything is computed, what could not be done or would be lost."""
+        if self.suggest < 0:
+            raise SkinError(f"--suggest is {self.suggest}: give 1 or more, or leave it out.")
+        if self.out and not self.suggest:
+            raise SkinError(
+                f"--out {self.out} writes the skin with the suggested units: give their number with --suggest."
+            )
+        if self.seed < 0:
+            raise ParameterError(f"The seed is {self.seed}: give 0 or more.")
+        if self.figure and self.figure.suffix not in _FORMATS:
+            raise ExperimentError(
+                f"The figure {self.figure} has an unknown format: use one of the endings {', '.join(_FORMATS)}."
+            )
+        if self.figure:
+            FIGURES.need("A figure")
+        outputs = ("skin file", self.out), ("figure", self.figure), ("file", self.json)
+        check_outputs(outputs, [source], self.replace)
 
 
-def _measured(command: Coverage, model: RobotModel, skin: Skin) -> dict[str, Any]:
+def _measured(command: Coverage, setting: Setting, skin: Skin) -> dict[str, Any]:
     """Measure, print and draw; return the numbers."""
-    setting = Setting(
-        model, floor_and_pedestal(command.floor), _params(command), command.workspace,
-        command.postures, command.seed,
-    )  # fmt: skip
     ways, met = setting.ways(), setting.met()
     console = Console(highlight=False)
     found, sees = coverage_of(ways, skin)
-    both = found, coverage_of(met, skin)[0]
+    both, new = (found, coverage_of(met, skin)[0]), frozenset[str]()
     spots = blind_spots(ways, found)
-    show(console, [link_table(both, setting), *([unit_table(skin, ways, sees)] if len(skin) else [])])
-    for line in spot_lines(spots, _SPOTS):
-        console.print(line, markup=False, soft_wrap=True)
-    numbers = _numbers(command, setting, both, spots)
-    shown, new = skin, frozenset[str]()
+    show(console, [_link_table(setting, *both), *([_unit_table(skin, ways, sees)] if len(skin) else [])])
+    total = 1e4 * sum(spot.area_m2 for spot in spots)
+    lines = [f"Blind spots, with less than {100 * BLIND:g} % of the paths seen: {len(spots)}, {total:.0f} cm^2 in all."]
+    lines += [f"  {spot.sentence}" for spot in spots[:_SPOTS]]
+    lines += [f"  and {len(spots) - _SPOTS} smaller ones"] if len(spots) > _SPOTS else []
+    console.print("\n".join(lines), markup=False, soft_wrap=True)
+    numbers = _numbers(*both) | {"blind_spots": spots}
     if command.suggest:
         own = {unit.sensor.label: unit.sensor for unit in skin.mounted}
         places = candidates(ways, skin, sensor_called(command.sensor, "--sensor", own))
         suggested = suggest((ways, met), skin, command.suggest, places)
-        shown, new = Skin((*skin.units, *suggested.units), model), frozenset(unit.id for unit in suggested.units)
-        found, numbers["suggested"] = _suggested(console, setting, skin, shown, suggested)
+        old, skin, ways = skin, Skin((*skin.units, *suggested.units), setting.model), setting.ways(1)
+        new = frozenset(unit.id for unit in suggested.units)
+        # what the new units add, by ways that they were not chosen by
+        fresh, first = (ways, setting.met(1)), len(old.first)
+        seen = [seen_by(one, skin) for one in fresh]
+        before = [covered(one, sees[:first]) for one, sees in zip(fresh, seen, strict=True)]
+        after = [covered(one, sees) for one, sees in zip(fresh, seen, strict=True)]
+        found = after[0]
+        show(console, [_suggestion_table(suggested, before, after)])
+        numbers["suggested"] = suggested
+        numbers["before"], numbers["after"] = _numbers(*before), _numbers(*after)
         if command.out:
-            save_skin(shown, command.out)
+            save_skin(skin, command.out)
             console.print(f"Skin: {command.out}", markup=False, soft_wrap=True)
     if command.figure:
         from pretouch.coverage.figure import coverage_figure  # needs the extra
 
         with unwritable_said("figure", command.figure):
-            figure = coverage_figure(setting.ways(1) if new else ways, found, shown, new)
-            figure.savefig(command.figure, dpi=110)
+            coverage_figure(ways, found, skin, new).savefig(command.figure, dpi=110)
         console.print(f"Figure: {command.figure}", markup=False, soft_wrap=True)
     return numbers
 
 
-def _arm_and_skin(command: Coverage) -> tuple[RobotModel, Skin, Path | None]:
-    """Return the arm, its skin, and the skin's file; no units and no file where the first units are to be suggested."""
-    model = RobotModel(robot_named(command.arm))
-    try:
-        source = command.skin or skin_file(model.description)
-    except SkinError:
-        if not command.suggest:
-            raise
-        return model, Skin([], model), None
-    return model, load_skin(source, model), source
+def _numbers(found: measure.Coverage, met: measure.Coverage) -> dict[str, Any]:
+    return {"links": (*found.links, found.arm), "met": (*met.links, met.arm)}
 
 
-def _params(command: Coverage) -> CoverageParams:
-    return CoverageParams(
-        object_radius_m=command.object_radius, object_speed_m_s=command.speed, arm_speed_m_s=command.arm_speed,
-        deceleration_m_s2=command.deceleration, rate_hz=command.rate, latency_s=command.latency,
-        range_m=command.range, way_m=command.way, reflectance=command.reflectance,
-    )  # fmt: skip
+def _link_table(setting: Setting, found: measure.Coverage, met: measure.Coverage) -> TextTable:
+    """Show the shares of each link and of the arm."""
+    p, meets = setting.params, {one.name: one.ways for one in (*met.links, met.arm)}
+    columns = (
+        ("link", lambda one: one.name),
+        ("area\n[cm^2]", lambda one: f"{1e4 * one.area_m2:.0f}"),
+        ("ways\n[%]", lambda one: f"{100 * one.ways:.1f}"),
+        ("surface\n[%]", lambda one: f"{100 * one.surface:.1f}"),
+        ("met\n[%]", lambda one: f"{100 * meets[one.name]:.1f}" if one.name in meets else "-"),
+    )
+    return tabulated(
+        f"Seen in time: {setting.model.description.name}, {setting.postures} postures of {setting.workspace}",
+        columns,
+        (*found.links, found.arm),
+        f"A ball of {100 * p.object_radius_m:g} cm radius approaches a point in a straight line at"
+        f" {p.object_speed_m_s:g} m/s, and the arm moves towards it at {p.arm_speed_m_s:g} m/s: it must be seen"
+        f" {p.warning_m:.2f} m before contact. Paths: share of the free paths to the surface that are seen in time."
+        " Surface: points to which at least half of the paths are seen in time. Met: share of what stands in the way of"
+        f" the moving arm that is seen, {p.standing().warning_m:.2f} m before contact at the latest.",
+        names=1,
+    )
 
 
-def _check_outputs(command: Coverage, source: Path | None) -> None:
-    """Refuse, before anything is computed, what could not be done or would be lost."""
-    if command.suggest < 0:
-        raise SkinError(f"--suggest is {command.suggest}: give 1 or more, or leave it out.")
-    if command.out and not command.suggest:
-        raise SkinError(
-            f"--out {command.out} writes the skin with the suggested units: give their number with --suggest."
-        )
-    if command.seed < 0:
-        raise ParameterError(f"The seed is {command.seed}: give 0 or more.")
-    if command.figure and command.figure.suffix not in _FORMATS:
-        raise ExperimentError(
-            f"The figure {command.figure} has an unknown format: use one of the endings {', '.join(_FORMATS)}."
-        )
-    if command.figure:
-        FIGURES.need("A figure")
-    outputs = ("skin file", command.out), ("figure", command.figure), ("file", command.json)
-    check_outputs(outputs, [source], command.replace)
+def _unit_table(skin: Skin, ways: Ways, sees: BoolArray) -> TextTable:
+    """Show what each unit sees, and what would be lost without it; `sees` (B, S, W)."""
+    weight, alone = ways.share, sees.sum(axis=0) == 1
+    columns = (
+        ("unit", lambda k: skin.mounted[k].id),
+        ("link", lambda k: skin.mounted[k].link),
+        ("ways\n[%]", lambda k: f"{100 * float((weight * sees[k]).sum()):.2f}"),
+        ("alone\n[%]", lambda k: f"{100 * float((weight * (sees[k] & alone)).sum()):.2f}"),
+    )
+    return tabulated(
+        "What each unit sees",
+        columns,
+        range(len(skin.mounted)),
+        "Share of all free paths to the arm. Alone: paths that no other unit sees, which would be lost without this"
+        " unit.",
+    )
 
 
-def _suggested(
-    console: Console, setting: Setting, skin: Skin, more: Skin, suggested: Suggestions
-) -> tuple[measure.Coverage, dict[str, Any]]:
-    """Print what the new units add, by ways that they were not chosen by."""
-    fresh = setting.ways(1), setting.met(1)
-    seen = [seen_by(ways, more) for ways in fresh]
-    before = _both(fresh, [sees[: len(skin.first)] for sees in seen])
-    after = _both(fresh, seen)
-    show(console, [suggestion_table(suggested, before, after)])
-    return after[0], {
-        "units": [
-            {
-                "id": s.unit.id, "sensor": s.unit.sensor.label, "link": s.unit.link,
-                "T_link_sensor": s.unit.T_link_sensor.tolist(), "gain": s.gain,
-            }
-            for s in suggested.chosen
-        ],
-        "places": suggested.candidates,
-        "most_any_could_add": suggested.most,
-        "before": _links(before),
-        "after": _links(after),
-    }  # fmt: skip
+def _suggestion_table(
+    suggested: Suggestions, before: list[measure.Coverage], after: list[measure.Coverage]
+) -> TextTable:
+    """Show the places of the new units, and what they change of what comes and of what is met."""
+    was, now = ([f"{100 * one.arm.ways:.1f} %" for one in both] for both in (before, after))
+    columns = (
+        ("unit", lambda one: one.unit.id),
+        ("sensor", lambda one: one.unit.sensor.label),
+        ("link", lambda one: one.unit.link),
+        ("position\n[m]", lambda one: _vector(one.unit.T_link_sensor[:3, 3], 3)),
+        ("beam", lambda one: _vector(one.unit.T_link_sensor[:3, 2], 2)),
+        ("gain\n[%]", lambda one: f"{100 * one.gain:.2f}"),
+    )
+    return tabulated(
+        f"{len(suggested.chosen)} more units: {was[0]} before, {now[0]} after; met {was[1]} and {now[1]}",
+        columns,
+        suggested.chosen,
+        f"Chosen one by one from {suggested.candidates} positions, each that which adds most to what comes at"
+        " the arm and to what it meets, which count the same. Gains are measured on the paths used for choosing, before"
+        f" and after on others. No choice of as many could add more than {100 * suggested.most:.1f} %.",
+    )
 
 
-def _both(ways: tuple[Ways, Ways], seen: list[BoolArray]) -> tuple[measure.Coverage, measure.Coverage]:
-    return covered(ways[0], seen[0]), covered(ways[1], seen[1])
-
-
-def _numbers(
-    command: Coverage, setting: Setting, both: tuple[measure.Coverage, measure.Coverage], spots: tuple[BlindSpot, ...]
-) -> dict[str, Any]:
-    return {
-        "asked": asdict(command),
-        "parameters": asdict(setting.params) | {"warning_m": setting.params.warning_m},
-        "links": _links(both),
-        "blind_spots": spots,
-    }
-
-
-def _links(both: tuple[measure.Coverage, measure.Coverage]) -> list[dict[str, Any]]:
-    found, met = both
-    meets = {one.name: one.ways for one in (*met.links, met.arm)}
-    return [
-        {
-            "link": one.name, "area_m2": one.area_m2, "ways": one.ways, "surface": one.surface,
-            "met": meets.get(one.name),
-        }
-        for one in (*found.links, found.arm)
-    ]  # fmt: skip
+def _vector(values: np.ndarray, digits: int) -> str:
+    return " ".join(f"{value:.{digits}f}" for value in values)

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from pretouch.calibration.motion.params import PlanParams
+from pretouch.calibration.motion.limits import PlanParams
 from pretouch.calibration.motion.plan import Plan
-from pretouch.calibration.motion.route import approach
+from pretouch.calibration.motion.planner import approach
 from pretouch.control.path import Path
 from pretouch.controller import Controller
 from pretouch.errors import CalibrationError, ExperimentError, RobotError

@@ -9,11 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pretouch.calibration.motion.params import PlanParams
+from pretouch.calibration.motion.limits import MotionLimits, PlanParams
 from pretouch.calibration.motion.plan import Plan, Swing
-from pretouch.calibration.motion.planner import plan_motion
-from pretouch.calibration.motion.report import report_on
-from pretouch.calibration.motion.route import approach
+from pretouch.calibration.motion.planner import approach, plan_motion
 from pretouch.errors import CalibrationError, ParameterError
 from pretouch.robot.description import fr3, panda
 from pretouch.robot.model import RobotModel
@@ -128,7 +126,7 @@ def test_every_joint_turns_and_links_stand_at_several_angles_to_gravity(name: st
 
 def test_the_report_says_what_time_and_room_are_needed(panda_model: RobotModel):
     plan = planned("panda")
-    report = report_on(panda_model, plan, PlanParams())
+    report = MotionLimits(panda_model, PlanParams()).report(plan)
     assert report.standing == pytest.approx(7 * 1.5)
     tcp = kinematics_of(panda_model, plan.sampled(20.0).q).position[:, panda_model.ee]
     assert np.all(tcp > report.low)

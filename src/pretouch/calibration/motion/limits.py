@@ -1,15 +1,18 @@
-"""Whether a motion keeps to the limits of an arm, to itself, and above the floor."""
+"""What a motion for calibration consists of, and whether it keeps to the limits of an arm, to itself, and above the floor."""
+
+from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
-from pretouch.calibration.motion.params import PlanParams
 from pretouch.calibration.motion.plan import Plan, PlanSamples
-from pretouch.errors import CalibrationError
-from pretouch.robot.description import SpeedEnvelope
+from pretouch.checks import Check, Checked, NonNegative, Positive
+from pretouch.errors import CalibrationError, ParameterError
 from pretouch.robot.model import RobotModel
 from pretouch.robot.postures import capsule_ends, kinematics_of, self_distances
 from pretouch.types import BoolArray, FloatArray
 
+Share = Annotated[float, Check(low=0.0, high=1.0, open_low=True)]
 RATE_HZ = 50.0
 """Instants a second at which a motion is looked at [Hz]."""
 _USED = 0.98
@@ -19,14 +22,90 @@ _BEND = 0.2
 that is steady, and some more."""
 
 
+@dataclass(frozen=True)
+class PlanParams(Checked):
+    """What a motion for calibration consists of, and what it keeps to. Figures without a source are ours."""
+
+    duration_s: Annotated[float, Check(low=0.0, open_low=True, high=90.0)] = 60.0
+    """Duration of all of it [s]."""
+    poses: Annotated[int, Check(low=1, high=30)] = 6
+    """Postures in which the arm stands for a while, beside its start."""
+    dwell_s: Positive = 1.5
+    """How long it stands in each [s]."""
+    swings: Annotated[int, Check(low=1, high=10)] = 3
+    """In how many of them it then swings: all joints at once, by two sines each."""
+    slowest_hz: Positive = 0.2
+    """Frequency of the slowest sine [Hz]."""
+    fastest_hz: Annotated[float, Check(low=0.0, open_low=True, high=2.0)] = 1.2
+    """Frequency of the fastest sine [Hz]; no two have the same."""
+    reach_rad: Positive = 0.5
+    """Furthest from its position at the start [rad] a joint is where the arm stands: less, and the arm needs less room.
+    Swings go beyond."""
+    margin_rad: NonNegative = 0.1
+    """Distance kept from joint limits, and from where a speed envelope lets a joint no longer move [rad]."""
+    speed_share: Share = 0.5
+    """Share of the joint velocity limits that is used."""
+    acceleration_share: Share = 0.5
+    """Share of the joint acceleration limits that is used."""
+    speed_m_s: Positive = 0.7
+    """Largest speed of any part of the arm [m/s]."""
+    clearance_m: NonNegative = 0.03
+    """Distance kept between parts of the arm, and from the floor [m]."""
+    floor_m: Annotated[float, Check()] = 0.0
+    """Height of what is below the arm, base frame [m]: by default what the base stands on."""
+    variant: Annotated[int, Check(low=0, high=1000)] = 0
+    """Another number, another motion: of use where the room does not allow the one that was planned."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.slowest_hz >= self.fastest_hz:
+            raise ParameterError(
+                f"PlanParams.slowest_hz is {self.slowest_hz}: it must be less than fastest_hz, {self.fastest_hz}."
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class PlanReport:
+    """A motion in figures: to be read before the arm moves."""
+
+    duration: float
+    """[s]"""
+    standing: float
+    """Time in which the arm stands [s]."""
+    low: FloatArray
+    """(3,) lowest coordinates of the box that the moving links stay in [m], base frame."""
+    high: FloatArray
+    """(3,) highest coordinates of that box [m]."""
+    nearest: float
+    """Least distance between parts of the arm [m]."""
+    floor: float
+    """Least distance from the floor [m]."""
+    speed: float
+    """Largest speed of any part [m/s]."""
+
+    @property
+    def room(self) -> str:
+        """The box in words."""
+        return ", ".join(f"{axis} {a:.2f} to {b:.2f}" for axis, a, b in zip("xyz", self.low, self.high, strict=True))
+
+    def __str__(self) -> str:
+        return (
+            f"{self.duration:.0f} s, {self.standing:.0f} s of them at rest; parts move at up to {self.speed:.2f} m/s.\n"
+            f"The arm needs the space {self.room} m (base frame) and comes within {self.nearest:.3f} m of itself and"
+            f" {self.floor:.3f} m of the floor."
+        )
+
+
 class MotionLimits:
     """What the motions of one arm must keep to."""
 
     def __init__(self, model: RobotModel, params: PlanParams) -> None:
         """Take an arm; margins that leave a joint nothing of its range are a CalibrationError."""
         arm, self.model, self.params = model.description, model, params
-        self._envelope = arm.envelope
-        low, high = _range(model)
+        low, high = model.q_min, model.q_max
+        if arm.envelope is not None:  # within its sides the joints may move both ways
+            still = arm.envelope.offset**2 / arm.envelope.slope
+            low, high = np.maximum(low, arm.envelope.q_lower + still), np.minimum(high, arm.envelope.q_upper - still)
         self.q_min: FloatArray = low + params.margin_rad
         self.q_max: FloatArray = high - params.margin_rad
         narrowest = int(np.argmin(high - low))
@@ -38,8 +117,6 @@ class MotionLimits:
         self.qd_max: FloatArray = params.speed_share * arm.qd_max
         self.qdd_max: FloatArray = params.acceleration_share * arm.qdd_max
         self._moving: BoolArray = np.isin(model.capsules.link, model.body.link)
-        pairs = model.capsules.link[model.apart]
-        self._pair_names = [f"{model.links[a]} and {model.links[b]}" for a, b in pairs]
 
     def distances(self, ends: FloatArray) -> FloatArray:
         """Distances (S, P + 1) [m] of the pairs of `RobotModel.apart`, then of the lowest moving part and the floor."""
@@ -57,16 +134,22 @@ class MotionLimits:
 
     def use(self, samples: PlanSamples) -> tuple[float, float]:
         """Largest shares of what is allowed that a motion uses: of a velocity, and of an acceleration. 1 is all."""
-        ends = capsule_ends(self.model, kinematics_of(self.model, samples.q))
         speed = np.abs(samples.qd) / self._speed_at(samples)
-        point = point_speed(ends, samples.time) / self.params.speed_m_s
-        return max(float(speed.max()), point) / _USED, float((np.abs(samples.qdd) / self.qdd_max).max()) / _USED
+        fastest = point_speed(self._ends(samples), samples.time) / self.params.speed_m_s
+        return max(float(speed.max()), fastest) / _USED, float((np.abs(samples.qdd) / self.qdd_max).max()) / _USED
+
+    def _ends(self, samples: PlanSamples) -> FloatArray:
+        """Ends of the capsules' axes (T, C, 2, 3) [m] along a motion."""
+        return capsule_ends(self.model, kinematics_of(self.model, samples.q))
 
     def _speed_at(self, samples: PlanSamples) -> FloatArray:
         """Largest joint velocities (T, n) allowed along a motion [rad/s], by position and direction."""
-        if self._envelope is None:
+        envelope = self.model.description.envelope
+        if envelope is None:
             return np.broadcast_to(self.qd_max, samples.q.shape)
-        return np.minimum(self.qd_max, self.params.speed_share * _allowed(self._envelope, samples) + 1e-9)
+        distance = np.where(samples.qd > 0, envelope.q_upper - samples.q, samples.q - envelope.q_lower)
+        allowed = np.maximum(0.0, np.sqrt(envelope.slope * np.maximum(distance, 0.0)) - envelope.offset)
+        return np.minimum(self.qd_max, self.params.speed_share * allowed + 1e-9)
 
     def broken(self, plan: Plan, rate: float = RATE_HZ) -> str | None:
         """Say which limit a motion does not keep, as a clause, or None."""
@@ -77,37 +160,33 @@ class MotionLimits:
         velocity, acceleration = self.use(samples)
         if max(velocity, acceleration) > 1.0:
             return f"it needs {max(velocity, acceleration):.2f} times the allowed speed or acceleration"
-        return self._too_near(samples)
-
-    def _too_near(self, samples: PlanSamples) -> str | None:
-        distances = self.distances(capsule_ends(self.model, kinematics_of(self.model, samples.q)))
+        distances = self.distances(self._ends(samples))
         nearest = distances.min(axis=0) - _BEND * np.abs(np.diff(distances, 2, axis=0)).max(axis=0, initial=0.0)
         pair = int(np.argmin(nearest))
         if nearest[pair] >= self.params.clearance_m:
             return None
-        names = [*self._pair_names, "the arm and the floor"]
-        return (
-            f"{names[pair]} come within {nearest[pair]:.3f} m of each other (clearance_m is {self.params.clearance_m:g}"
-            " m)"
+        names = "the arm and the floor"
+        if pair < len(self.model.apart):
+            names = " and ".join(self.model.links[i] for i in self.model.capsules.link[self.model.apart[pair]])
+        return f"{names} come within {nearest[pair]:.3f} m of each other (clearance_m is {self.params.clearance_m:g} m)"
+
+    def report(self, plan: Plan) -> PlanReport:
+        """Say how long a motion takes, and how much room."""
+        samples = plan.sampled(RATE_HZ)
+        ends, radius = self._ends(samples), self.model.capsules.radius[self._moving][:, None, None]
+        distances = self.distances(ends).min(axis=0)
+        return PlanReport(
+            duration=plan.duration,
+            standing=sum(end - begin for begin, end in plan.still),
+            low=(ends[:, self._moving] - radius).min(axis=(0, 1, 2)),
+            high=(ends[:, self._moving] + radius).max(axis=(0, 1, 2)),
+            nearest=float(distances[:-1].min()),
+            floor=float(distances[-1]),
+            speed=point_speed(ends, samples.time),
         )
-
-
-def _range(model: RobotModel) -> tuple[FloatArray, FloatArray]:
-    """Lowest and highest positions (n,) [rad] at which the joints may move both ways."""
-    envelope = model.description.envelope
-    if envelope is None:
-        return model.q_min, model.q_max
-    still = envelope.offset**2 / envelope.slope
-    return np.maximum(model.q_min, envelope.q_lower + still), np.minimum(model.q_max, envelope.q_upper - still)
 
 
 def point_speed(ends: FloatArray, time: FloatArray) -> float:
     """Largest speed [m/s] of the ends of the capsules' axes (T, C, 2, 3) from one instant (T,) [s] to the next."""
     way = np.linalg.norm(np.diff(ends, axis=0), axis=-1)
     return float((way / np.diff(time)[:, None, None]).max())
-
-
-def _allowed(envelope: SpeedEnvelope, samples: PlanSamples) -> FloatArray:
-    """Largest velocities (T, n) of an envelope in the direction in which each joint moves [rad/s]."""
-    distance = np.where(samples.qd > 0, envelope.q_upper - samples.q, samples.q - envelope.q_lower)
-    return np.maximum(0.0, np.sqrt(envelope.slope * np.maximum(distance, 0.0)) - envelope.offset)

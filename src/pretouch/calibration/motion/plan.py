@@ -46,10 +46,6 @@ class Swing:
         """Return the swing with its amplitudes times a factor."""
         return replace(self, amplitude=self.amplitude * factor)
 
-    def begun_at(self, time: float) -> "Swing":
-        """Return the swing with another beginning [s]."""
-        return replace(self, begin=time)
-
 
 @value
 class PlanSamples:

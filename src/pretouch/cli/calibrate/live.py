@@ -15,8 +15,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from pretouch.arms import ArmSetup, OpenedArm
 from pretouch.calibration.motion.follow import START_RAD, plan_controller
 from pretouch.calibration.motion.plan import Plan
-from pretouch.calibration.motion.report import report_on
-from pretouch.calibration.motion.route import approach
+from pretouch.calibration.motion.planner import approach
 from pretouch.cli.calibrate.motion import planned
 from pretouch.cli.calibrate.outputs import Outputs
 from pretouch.cli.calibrate.recording import Sources, calibrate_recording

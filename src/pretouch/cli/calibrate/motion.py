@@ -3,10 +3,9 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pretouch.calibration.motion.params import PlanParams
+from pretouch.calibration.motion.limits import PlanParams
 from pretouch.calibration.motion.plan import Plan
 from pretouch.calibration.motion.planner import plan_motion
-from pretouch.calibration.motion.report import report_on
 from pretouch.cli.writing import check_free, check_writable, unwritable_said
 from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
