@@ -5,7 +5,7 @@ import os
 import pytest
 
 from pretouch import cli
-from pretouch.cli.report import titles, write_page
+from pretouch.cli.report import Report, titles
 from pretouch.controller import Controller
 from pretouch.errors import ExperimentError, RecordingError
 from pretouch.loop import Cycle
@@ -33,6 +33,12 @@ def folder(panda_model, paper_skin, tmp_path_factory):
                 recording.change(Controller(panda_model, paper_skin, fixed, path, changed))
             recording.record(Cycle(kept.inputs, state, kept.step, state), kept.truth)
     return place, played
+
+
+def written(files, out, replace=False):
+    """The page that the command writes."""
+    Report(tuple(files), out, replace).run()
+    return out.read_text()
 
 
 def test_a_report_of_a_file_is_that_of_what_was_recorded(folder):
@@ -67,7 +73,7 @@ def test_a_killed_file_makes_a_page_that_says_so(folder, tmp_path):
     cut.write_bytes(whole[: 2 * len(whole) // 3])
     said = open_recording(cut).sentence
     assert said
-    text = write_page([cut], tmp_path / "cut.html").read_text()
+    text = written([cut], tmp_path / "cut.html")
     assert '<span class="bad">' in text
     assert said.replace("&", "&amp;").split("'")[0][:40] in text
 
@@ -75,21 +81,21 @@ def test_a_killed_file_makes_a_page_that_says_so(folder, tmp_path):
 def test_what_is_wrong_with_a_request_is_one_sentence(folder, tmp_path):
     trial, out = folder[0] / "trial.mcap", tmp_path / "page.html"
     with pytest.raises(RecordingError, match="No recording is given"):
-        write_page([], out)
+        written([], out)
     with pytest.raises(ExperimentError, match="is also another input or output file: give another name"):
-        write_page([trial], trial, replace=True)
+        written([trial], trial, replace=True)
     with pytest.raises(ExperimentError, match="cannot be written"):
-        write_page([trial], tmp_path)
+        written([trial], tmp_path)
     out.write_text("notes of my own")
     with pytest.raises(ExperimentError, match="exists already: give another name, or --replace"):
-        write_page([trial], out)
-    assert "</html>" in write_page([trial], out, replace=True).read_text()
+        written([trial], out)
+    assert "</html>" in written([trial], out, replace=True)
 
 
 def test_a_name_that_is_no_text_can_be_reported(folder, tmp_path):
     odd = tmp_path / os.fsdecode(b"odd\xff.mcap")
     odd.write_bytes((folder[0] / "trial.mcap").read_bytes())
-    assert "odd?.mcap" in write_page([odd], tmp_path / "page.html").read_text()
+    assert "odd?.mcap" in written([odd], tmp_path / "page.html")
 
 
 def test_titles_tell_files_apart_by_as_little_as_they_can(tmp_path):
