@@ -14,6 +14,7 @@ SET_SIZE = const(12)
 
 _NO_DEVICE, _IO, _TIMEOUT = const(19), const(5), const(110)
 _LSM6DS3, _LSM6DS3TR_C = const(0x69), const(0x6A)
+_ADDRESSES = (0x6A, 0x6B)
 
 _FIFO_CTRL3 = const(0x08)
 _FIFO_CTRL5 = const(0x0A)
@@ -24,8 +25,6 @@ _TEMPERATURE = const(0x20)
 _FIFO_STATUS1 = const(0x3A)
 _FIFO_DATA = const(0x3E)
 
-_CONTINUOUS = const(0x06)
-_NOT_DECIMATED = b"\x09\x00"
 _WHOLE_WORDS = b"\x44"  # CTRL3_C: block data update, address counts up
 _SOFT_RESET = b"\x05"
 _EMPTY = const(0x10)
@@ -39,56 +38,44 @@ _SETTLE_MS = const(80)
 _SILENT_PERIODS = const(20)
 """An empty FIFO for so many periods: the device has lost its set-up."""
 
-_RATES_HZ = (26, 52, 104, 208, 416, 833, 1660)
-_ACCELEROMETER_G = (2, 4, 8, 16)
-_ACCELEROMETER_BITS = b"\x00\x08\x0c\x04"
-_GYROSCOPE_DPS = (125, 245, 500, 1000, 2000)
-_GYROSCOPE_BITS = b"\x02\x00\x04\x08\x0c"
+_RATE_HZ = const(416)
+# registers at that rate: accelerometer of 4 g and gyroscope of 500 dps; FIFO without decimation; FIFO at the rate
+_SCALES, _NOT_DECIMATED, _CONTINUOUS = b"\x68\x64", b"\x09\x00", b"\x36"
+_SCALE_CODE = const(0x21)
 
 
 class LSM6DS3:
     """One sensor on an I2C bus. `begin` fills its FIFO; then, each cycle: `count = sensor.drain(buffer, most)`."""
 
-    def __init__(self, i2c, address=None, sleep_ms=time.sleep_ms, ticks_us=time.ticks_us, ticks_diff=time.ticks_diff):
-        """Without an address, it is looked for at both that it can have."""
+    rate_hz = _RATE_HZ
+    """Nominal rate of both [Hz]; the true one may be some per cent off."""
+    scale_code = _SCALE_CODE
+    """Full scales as the wire has them: accelerometer in bits 0-1, gyroscope in bits 4-6."""
+
+    def __init__(self, i2c, time=time):
         self._i2c = i2c
-        self._addresses = (0x6A, 0x6B) if address is None else (address,)
-        self._address = self._addresses[0]
-        self._sleep_ms = sleep_ms
-        self._ticks_us = ticks_us
-        self._ticks_diff = ticks_diff
+        self._address = _ADDRESSES[0]
+        self._sleep_ms, self._ticks_us, self._ticks_diff = time.sleep_ms, time.ticks_us, time.ticks_diff
         self._status = bytearray(4)
         self._word = bytearray(2)
         self._identity = 0
         self._room = 0
         self._looked_us = 0
         self._gap = False
-        self.rate_hz = 0
-        """Nominal rate of both [Hz]; the true one may be some per cent off."""
-        self.scale_code = 0
-        """Full scales as the wire has them: accelerometer in bits 0-1, gyroscope in bits 4-6."""
         self.waiting = 0
         """Samples that the last `drain` left in the FIFO."""
         self.lost = 0
         """Samples that were lost before those of the last `drain`, estimated by the time; 0: none."""
 
-    def begin(self, rate_hz=416, accelerometer_g=4, gyroscope_dps=500):
-        """Reset and set up the sensor and start its FIFO; takes some 80 ms."""
-        if rate_hz not in _RATES_HZ or accelerometer_g not in _ACCELEROMETER_G or gyroscope_dps not in _GYROSCOPE_DPS:
-            raise ValueError(f"rates are {_RATES_HZ} Hz, scales {_ACCELEROMETER_G} g and {_GYROSCOPE_DPS} dps")
-        rate = _RATES_HZ.index(rate_hz) + 2
-        accelerometer, gyroscope = _ACCELEROMETER_G.index(accelerometer_g), _GYROSCOPE_DPS.index(gyroscope_dps)
+    def begin(self):
+        """Reset and set up the sensor, which may have either address, and start its FIFO; takes some 80 ms."""
         self._find()
         self._reset()
         self._keep(_CTRL3_C, _WHOLE_WORDS)
-        self._keep(
-            _CTRL1_XL, bytes((rate << 4 | _ACCELEROMETER_BITS[accelerometer], rate << 4 | _GYROSCOPE_BITS[gyroscope]))
-        )
+        self._keep(_CTRL1_XL, _SCALES)
         self._sleep_ms(_SETTLE_MS)
         self._keep(_FIFO_CTRL3, _NOT_DECIMATED)
-        self._keep(_FIFO_CTRL5, bytes((rate << 3 | _CONTINUOUS,)))
-        self.rate_hz = rate_hz
-        self.scale_code = gyroscope << 4 | accelerometer
+        self._keep(_FIFO_CTRL5, _CONTINUOUS)
         self.waiting = self.lost = 0
         self._gap = False
         self._looked_us = self._ticks_us()
@@ -114,7 +101,7 @@ class LSM6DS3:
         if count:
             self._i2c.readfrom_mem_into(self._address, _FIFO_DATA, buffer[: count * SET_SIZE])
         self._gap = False
-        produced = self.waiting + self._ticks_diff(now, self._looked_us) * self.rate_hz // 1_000_000
+        produced = self.waiting + self._ticks_diff(now, self._looked_us) * _RATE_HZ // 1_000_000
         self.lost = max(produced - held, 1) if gap else 0
         self.waiting = held - count
         self._looked_us = now
@@ -140,7 +127,7 @@ class LSM6DS3:
 
     def _nothing(self, now):
         self.lost = 0
-        if self._ticks_diff(now, self._looked_us) * self.rate_hz > _SILENT_PERIODS * 1_000_000:
+        if self._ticks_diff(now, self._looked_us) * _RATE_HZ > _SILENT_PERIODS * 1_000_000:
             raise OSError(_IO, "LSM6DS3 fills no FIFO: it lost its set-up")
         return 0
 
@@ -152,7 +139,7 @@ class LSM6DS3:
         return dropped
 
     def _find(self):
-        for address in self._addresses:
+        for address in _ADDRESSES:
             try:
                 identity = self._i2c.readfrom_mem(address, _WHO_AM_I, 1)[0]
             except OSError as error:

@@ -8,11 +8,10 @@ import time
 
 from micropython import const
 
-SHORT = const(0)
-"""Distance mode up to 1.3 m; the less ambient light matters, the shorter the budget may be."""
-LONG = const(1)
-"""Distance mode up to 4 m, in the dark and at budgets of 140 ms and more."""
-
+_BUDGET_MS, _PERIOD_MS = const(15), const(20)
+"""How long a measurement integrates, and from one start to the next: ST wants them 4 ms apart (UM2356, 2.2), so that no
+start is missed."""
+_ADDRESS = const(0x29)
 _NO_DEVICE, _IO, _TIMEOUT = const(19), const(5), const(110)
 _MODEL_ID = const(0xEACC)
 
@@ -37,8 +36,6 @@ _BOOT_STATE = const(0x00E5)
 _MODEL = const(0x010F)
 
 _STOP, _TIMED = b"\x00", b"\x40"
-_GUARD_MS = const(4)
-"""By how much the period must exceed the budget [ms]: ST wants them apart (UM2356, 2.2), so that no start is missed."""
 _VHV_WAIT_MS = const(300)
 _BOOT_WAIT_MS = const(50)
 
@@ -60,14 +57,17 @@ _DEFAULTS = (
     b"\x00\x00"  # 0x86: interrupt clear, 0x87: mode start
 )
 
-_BUDGETS_MS = (15, 20, 33, 50, 100, 200, 500)
-# timeouts A and B of each budget, in macro periods of the mode's VCSEL periods (mantissa << exponent)
-_TIMEOUTS = (
-    b"\x00\x1d\x00\x27\x00\x51\x00\x6e\x00\xd6\x00\x6e\x01\xae\x01\xe8\x02\xe1\x03\x88\x03\xe1\x04\x96\x05\x91\x05\xc1",
-    b"\x00\x00\x00\x00\x00\x1e\x00\x22\x00\x60\x00\x6e\x00\xad\x00\xc6\x01\xcc\x01\xea\x02\xd9\x02\xf8\x04\x8f\x04\xa4",
+# the short distance mode, up to 1.3 m, in which ambient light matters least; the timeouts are those of the budget, in
+# macro periods of these VCSEL periods (mantissa << exponent)
+_SHORT_MODE = (
+    (_PHASECAL_TIMEOUT, b"\x14"),
+    (_VCSEL_PERIOD_A, b"\x07"),
+    (_VCSEL_PERIOD_B, b"\x05"),
+    (_VALID_PHASE_HIGH, b"\x38"),
+    (_WINDOW_AND_PHASE, b"\x07\x05\x06\x06"),
+    (_RANGE_TIMEOUT_A, b"\x00\x1d"),
+    (_RANGE_TIMEOUT_B, b"\x00\x27"),
 )
-# of each mode: phase calibration timeout, VCSEL period A and B, valid phase; window and initial phase of A and B
-_MODES = (b"\x14\x07\x05\x38\x07\x05\x06\x06", b"\x0a\x0f\x0d\xb8\x0f\x0d\x0e\x0e")
 
 # the device's 5-bit status to the status codes of UM2356; what that does not know is 14, invalid
 _STATUS = (
@@ -78,16 +78,16 @@ _STATUS = (
 class VL53L1X:
     """One sensor on an I2C bus. `begin` makes it range; then, each cycle: `if sensor.ready(): sensor.read()`."""
 
-    def __init__(self, i2c, address=0x29, sleep_ms=time.sleep_ms):
+    budget_us = 1000 * _BUDGET_MS
+    """How long a measurement integrates [us]: its middle lies half of this before it is ready."""
+    period_us = 1000 * _PERIOD_MS
+    """From the start of a measurement to that of the next [us]."""
+
+    def __init__(self, i2c, time=time):
         self._i2c = i2c
-        self._address = address
-        self._sleep_ms = sleep_ms
+        self._sleep_ms = time.sleep_ms
         self._byte = bytearray(1)
         self._block = bytearray(17)
-        self.budget_us = 0
-        """How long a measurement integrates [us]: its middle lies half of this before it is ready."""
-        self.period_us = 0
-        """From the start of a measurement to that of the next [us]."""
         self.stream = 0
         """The sensor's count of measurements, from 0 to 255 and then from 128 on again."""
         self.status = 255
@@ -103,14 +103,14 @@ class VL53L1X:
         self.spads = 0
         """SPADs in use [1 / 256]."""
 
-    def begin(self, mode=SHORT, budget_ms=15, period_ms=20):
+    def begin(self):
         """Reset and set up the sensor and make it range until `stop`; takes some 0.15 s."""
         self._reset()
         self._write(_CONFIGURATION, _DEFAULTS)
         self._calibrate()
-        self._set_mode(mode)
-        self._set_budget(mode, budget_ms)
-        self._set_period(period_ms)
+        for register, values in _SHORT_MODE:
+            self._keep(register, values)
+        self._set_period()
         self._write(_MODE_START, _TIMED)
 
     def ready(self):
@@ -148,18 +148,18 @@ class VL53L1X:
         self._write(_MODE_START, _TIMED)
 
     def _read(self, register, into):
-        self._i2c.readfrom_mem_into(self._address, register, into, addrsize=16)
+        self._i2c.readfrom_mem_into(_ADDRESS, register, into, addrsize=16)
 
     def _write(self, register, data):
-        self._i2c.writeto_mem(self._address, register, data, addrsize=16)
+        self._i2c.writeto_mem(_ADDRESS, register, data, addrsize=16)
 
     def _word(self, register):
-        return int.from_bytes(self._i2c.readfrom_mem(self._address, register, 2, addrsize=16), "big")
+        return int.from_bytes(self._i2c.readfrom_mem(_ADDRESS, register, 2, addrsize=16), "big")
 
     def _keep(self, register, data):
         """Write a register and make sure that it holds what was written."""
         self._write(register, data)
-        if self._i2c.readfrom_mem(self._address, register, len(data), addrsize=16) != data:
+        if self._i2c.readfrom_mem(_ADDRESS, register, len(data), addrsize=16) != data:
             raise OSError(_IO, f"VL53L1X does not keep register 0x{register:02x}")
 
     def _reset(self):
@@ -193,28 +193,9 @@ class VL53L1X:
         self._write(_VHV_LOOP_BOUND, b"\x09")
         self._write(_VHV_START, b"\x00")
 
-    def _set_mode(self, mode):
-        values = _MODES[mode]
-        self._keep(_PHASECAL_TIMEOUT, values[0:1])
-        self._keep(_VCSEL_PERIOD_A, values[1:2])
-        self._keep(_VCSEL_PERIOD_B, values[2:3])
-        self._keep(_VALID_PHASE_HIGH, values[3:4])
-        self._keep(_WINDOW_AND_PHASE, values[4:8])
-
-    def _set_budget(self, mode, budget_ms):
-        if budget_ms not in _BUDGETS_MS or (mode == LONG and budget_ms == 15):
-            raise ValueError(f"budgets are 20, 33, 50, 100, 200, 500 ms, and 15 ms in short mode; not {budget_ms}")
-        at = 4 * _BUDGETS_MS.index(budget_ms)
-        self._keep(_RANGE_TIMEOUT_A, _TIMEOUTS[mode][at : at + 2])
-        self._keep(_RANGE_TIMEOUT_B, _TIMEOUTS[mode][at + 2 : at + 4])
-        self.budget_us = 1000 * budget_ms
-
-    def _set_period(self, period_ms):
-        if 1000 * (period_ms - _GUARD_MS) < self.budget_us:
-            raise ValueError(f"a period of {period_ms} ms is less than {_GUARD_MS} ms above the budget")
+    def _set_period(self):
         # counts of the slow oscillator; 1.075 is ST's own factor
-        counts = (self._word(_OSCILLATOR) & 0x3FF) * period_ms * 43 // 40
+        counts = (self._word(_OSCILLATOR) & 0x3FF) * _PERIOD_MS * 43 // 40
         if counts == 0:
             raise OSError(_IO, "VL53L1X does not know the rate of its oscillator")
         self._keep(_PERIOD, counts.to_bytes(4, "big"))
-        self.period_us = 1000 * period_ms

@@ -14,6 +14,7 @@ from vl53l5cx_processor import Processor
 
 _CHUNK = const(1024)
 _IO = const(5)
+_ADDRESS = const(0x29)
 
 # what a rectangle of zones is set by: in driver structures, byte and value
 _DSS, _ZONES, _RATE, _MODE, _ORDER = const(0xAD38), const(0x5450), const(0x5458), const(0xAD30), const(0xAE64)
@@ -46,14 +47,13 @@ class VL53L5CX:
     device tells them square to its window. `feed` is called all along `begin`, which takes some 3 s at 400 kHz.
     """
 
-    def __init__(self, i2c, side=4, view_deg=45, feed=None, address=0x29, sleep_ms=time.sleep_ms):
+    def __init__(self, i2c, side=4, view_deg=45, feed=None, time=time):
         if side not in _FASTEST_HZ:
             raise ValueError(f"zones along a side are 4 or 8, not {side}")
         self._i2c = i2c
-        self._address = address
         self._side = side
         block = bytearray(_CHUNK)
-        self._processor = Processor(i2c, address, sleep_ms, feed or _rest, block)
+        self._processor = Processor(i2c, _ADDRESS, time.sleep_ms, feed or _rest, block)
         self._four = bytearray(4)
         self._longer = _lengthening(side, view_deg)
         self._frame = memoryview(block)[: _frame_size(side)]
@@ -88,7 +88,7 @@ class VL53L5CX:
     def ready(self):
         """Whether there is a measurement that was not read."""
         four = self._four
-        self._i2c.readfrom_mem_into(self._address, 0, four, addrsize=16)
+        self._i2c.readfrom_mem_into(_ADDRESS, 0, four, addrsize=16)
         if four[3] & 0x80 and four[0] != 255:
             raise OSError(_IO, "VL53L5CX has failed")
         fresh = four[0] != self._device_stream and four[0] != 255
@@ -97,7 +97,7 @@ class VL53L5CX:
     def read(self):
         """Take the newest measurement into `zones` and `stream` to `ambient`; allocates nothing."""
         frame = self._frame
-        self._i2c.readfrom_mem_into(self._address, 0, frame, addrsize=16)
+        self._i2c.readfrom_mem_into(_ADDRESS, 0, frame, addrsize=16)
         size = len(frame)
         if frame[10] != frame[size - 2] or frame[11] != frame[size - 1] or frame[0] == 255:
             raise OSError(_IO, "VL53L5CX: a torn frame")

@@ -46,11 +46,11 @@ class Port:
 
 with open("vl53l5cx.bin", "wb") as file: file.write(fake_vl53l5cx.FILE)
 made = FakeUnit(zones={zones}, now=Now(), receiver=Port())
-made.vl53l1x.target = lambda us: (9, 500 + us // 20_000 % 10, 10, 3000, 100, 40 << 8)
 def zone(k, us):
     light = 16 * (20 + us // 20_000 % 10)
     return (255, 0, 0, 0, light) if k == 3 else (5, 1, 4 * (500 + k), 384, light)
-made.vl53l5cx.target = lambda us: [zone(k, us) for k in range({zones} ** 2)]
+one = lambda us: (9, 500 + us // 20_000 % 10, 10, 3000, 100, 40 << 8)
+made.range_finder.target = one if {zones} == 1 else lambda us: [zone(k, us) for k in range({zones} ** 2)]
 step = made.unit.step
 """
 """A unit of so many zones along a side. Zone k sees a target k mm beyond 500 mm, but for zone 3."""

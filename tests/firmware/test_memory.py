@@ -58,7 +58,7 @@ print((gc.mem_alloc() - before) // 500)
 """With sensors and a network that take nothing."""
 REPLAY = """
 import fake_vl53l5cx
-from fake_bus import Bus, Clock
+from fake_bus import driven
 from micropython import heap_lock, heap_unlock
 from vl53l1x import VL53L1X
 from vl53l5cx import VL53L5CX
@@ -88,10 +88,8 @@ def look(sensor, *told):
 look(VL53L1X(Replay(bytes(range(9, 26)))), "mm")
 with open("vl53l5cx.bin", "wb") as file: file.write(fake_vl53l5cx.FILE)
 for side in (4, 8):
-    clock = Clock()
-    bus = Bus(clock)
-    bus.add(fake_vl53l5cx.FakeVl53l5cx(clock))
-    sensor = VL53L5CX(bus, side, sleep_ms=clock.sleep_ms)
+    zoned = lambda bus, time: VL53L5CX(bus, side, time=time)
+    clock, bus, _, sensor = driven(zoned, fake_vl53l5cx.FakeVl53l5cx)
     sensor.begin()
     clock.advance(100_000)
     sensor._i2c = Replay(bus.readfrom_mem(0x29, 0, len(sensor._frame), addrsize=16))

@@ -1,24 +1,27 @@
-"""The driver of the sensor with zones on a fake one. Runs in both interpreters."""
+"""The driver of the sensor with zones on a fake one."""
 
 import os
 import struct
 import sys
 
 import fake_vl53l5cx
-from fake_bus import Bus, Clock, error_of
+from fake_bus import driven, error_of
+from fake_receiver import steps
 from fake_vl53l5cx import FakeVl53l5cx
 from vl53l5cx import VL53L5CX
 
 os.chdir(sys.path[0])
 
 
-def _made(side=4, view_deg=45, **faults):
+def _made(side=4, feed=None):
     _file(fake_vl53l5cx.FILE)
-    clock = Clock()
-    bus = Bus(clock)
-    device = FakeVl53l5cx(clock, **faults)
-    bus.add(device)
-    return clock, bus, device, VL53L5CX(bus, side, view_deg, sleep_ms=clock.sleep_ms)
+    return driven(lambda bus, time: VL53L5CX(bus, side, feed=feed, time=time), FakeVl53l5cx)
+
+
+def _begun(side=4):
+    clock, _, device, sensor = _made(side)
+    sensor.begin()
+    return clock, device, sensor
 
 
 def _file(content):
@@ -28,9 +31,8 @@ def _file(content):
 
 def _read(target):
     """Let 4 x 4 zones see this, and read them."""
-    clock, _, device, sensor = _made(4)
+    clock, device, sensor = _begun(4)
     device.target = lambda us: target
-    sensor.begin()
     clock.advance(17_000)
     sensor.read()
     return sensor
@@ -42,8 +44,7 @@ def _zones(sensor):
 
 def it_ranges_at_sixty_and_at_fifteen_hertz():
     for side, rate in ((4, 60), (8, 15)):
-        clock, _, device, sensor = _made(side)
-        sensor.begin()
+        clock, device, sensor = _begun(side)
         assert device.side == side
         count, end = 0, clock.now_us + 1_000_000
         while clock.now_us < end:
@@ -57,23 +58,20 @@ def it_ranges_at_sixty_and_at_fifteen_hertz():
 
 
 def what_it_is_set_to_is_as_sts_driver_has_it():
-    _, _, device, sensor = _made(4)
-    sensor.begin()
+    _, device, _ = _begun(4)
     told = [device.part(0xAD38, k) for k in (4, 6, 9)], [device.part(0x5450, k) for k in (0, 1, 4, 5)]
     assert told == ([64, 64, 4], [4, 4, 8, 8]), told
     assert (device.part(0xAD30, 1), device.part(0xAD30, 3), device.part(0xE108, 0x25), device.part(0xE108, 0x26)) == (
         1, 3, 1, 1,
     )  # fmt: skip
     assert device.sends[0xD964] == bytes(4)
-    _, _, device, sensor = _made(8)
-    sensor.begin()
+    _, device, _ = _begun(8)
     assert device.sends[0x2E18] == fake_vl53l5cx.NVM[8:488] + b"\x00\x00\x00\x0f\x03\x01\x01\xe4"
     assert device.sends[0x2CF8] == fake_vl53l5cx.CROSSTALK
 
 
 def grids_of_4_x_4_are_means():
-    _, _, device, sensor = _made(4)
-    sensor.begin()
+    _, device, _ = _begun(4)
     sent, nvm = device.sends[0x2E18], fake_vl53l5cx.NVM
     words = struct.unpack(">64I", nvm[0x3C : 0x3C + 256])
     means = struct.unpack(">16I", sent[0x34 : 0x34 + 64])
@@ -97,8 +95,7 @@ def a_reading_has_each_zones_own_distance_along_its_beam():
 
 def every_status_is_translated_and_no_target_is_nothing_near():
     expected = {0: 255, 1: 2, 2: 4, 3: 1, 4: 14, 5: 0, 6: 6, 7: 14, 8: 2, 9: 11, 10: 0, 11: 14, 12: 14, 13: 14, 255: 2}
-    clock, _, device, sensor = _made(4)
-    sensor.begin()
+    clock, device, sensor = _begun(4)
     for told in tuple(range(16)) + (200, 255):  # noqa: RUF005 MicroPython unpacks no star here
         device.target = lambda us, told=told: [(told, 1, 400, 128, 0)] * 15 + [(5, 0, 400, 128, 0)]
         clock.advance(17_000)
@@ -117,8 +114,7 @@ def a_negative_distance_is_none():
 
 
 def a_torn_frame_is_an_error_and_no_reading():
-    clock, _, device, sensor = _made(4)
-    sensor.begin()
+    clock, device, sensor = _begun(4)
     clock.advance(17_000)
     device.corrupt = True
     before = bytes(sensor.zones)
@@ -140,40 +136,8 @@ def a_program_that_is_missing_or_not_whole_is_named():
     assert error_of(sensor.begin) == 110, "it does not run"
 
 
-def another_chip_and_none_are_errors():
-    _, _, device, sensor = _made(revision=0x0C)
-    assert error_of(sensor.begin) == 19
-    device.power_off()
-    assert error_of(sensor.begin) == 19
-
-
-def lost_power_is_no_reading_and_it_begins_anew():
-    clock, _, device, sensor = _made()
-    sensor.begin()
-    clock.advance(17_000)
-    device.power_off()
-    device.power_on()
-    assert not sensor.ready()
-    assert error_of(sensor.read) == 5
-    sensor.begin()
-    clock.advance(17_000)
-    assert sensor.ready()
-
-
-def a_data_line_that_is_held_never_reads_as_a_range():
-    clock, bus, _, sensor = _made()
-    sensor.begin()
-    clock.advance(17_000)
-    for level in (0xFF, 0x00):
-        bus.held = lambda level=level: level
-        assert not sensor.ready()
-        assert error_of(sensor.read) == 5
-        assert error_of(sensor.begin) == 19
-
-
 def it_recalibrates_and_goes_on():
-    clock, _, device, sensor = _made()
-    sensor.begin()
+    clock, device, sensor = _begun()
     before = clock.now_us
     sensor.recalibrate()
     assert clock.now_us - before < 100_000
@@ -184,11 +148,9 @@ def it_recalibrates_and_goes_on():
 
 def the_watchdog_is_fed_all_along():
     fed = []
-    clock, bus, _, _ = _made()
-    sensor = VL53L5CX(bus, 8, 45, lambda: fed.append(clock.now_us), sleep_ms=clock.sleep_ms)
+    clock, _, _, sensor = _made(8, lambda: fed.append(clock.now_us))
     sensor.begin()
-    gaps = [fed[k + 1] - fed[k] for k in range(len(fed) - 1)]
-    assert max(gaps) < 200_000, max(gaps)
+    assert max(steps(fed)) < 200_000, max(steps(fed))
 
 
 def other_counts_of_zones_are_refused():

@@ -1,13 +1,7 @@
 """A clock that tests advance, and an I2C bus with fake devices on it, as `machine.I2C` shows them.
 
-    clock = Clock()
-    bus = Bus(clock)
-    bus.add(FakeVl53l1x(clock))
-    clock.advance(20_000)
-
-A device has `addresses` it answers to, `address_bits` of its registers (8 or 16), `answers()`, `read(register, count)`
-and `write(register, data)`. What a real device would take without a word and do wrong, a fake refuses: `Refused`, which
-is no OSError, so that no driver can swallow it.
+What a real device would take without a word and do wrong, a fake refuses: `Refused`, which is no OSError, so that no
+driver can swallow it.
 """
 
 NO_ANSWER = 19
@@ -45,13 +39,33 @@ class Clock:
         return (end - start + self.PERIOD // 2) % self.PERIOD - self.PERIOD // 2
 
 
+class Device:
+    """A device on the bus. Each has `address_bits` of its registers, `read(register, count)`, `write(register, data)`,
+    and `_clear()`, which is called when it gets its power."""
+
+    def __init__(self, clock, address):
+        self.address, self._clock, self._powered = address, clock, True
+        self._clear()
+
+    def power_off(self):
+        self._powered = False
+
+    def power_on(self):
+        self._powered = True
+        self._clear()
+
+    def answers(self):
+        return self._powered
+
+
 class Bus:
     """The bus. Each transfer takes its time; faults are there on demand."""
 
-    def __init__(self, clock, us_per_byte=25):
-        """A byte takes 9 bits: 22.5 us at 400 kHz."""
+    us_per_byte = 25
+    """A byte takes 9 bits: 22.5 us at 400 kHz."""
+
+    def __init__(self, clock, *devices):
         self.clock = clock
-        self.us_per_byte = us_per_byte
         self.transfers = 0
         self.fail_at = 0
         """Number of the transfer that fails, from 1 on; 0: none."""
@@ -60,11 +74,8 @@ class Bus:
         self.held = None
         """The data line is not the device's own: this tells each byte that is read, what is written vanishes, and no
         transfer fails. So it is where that line is held down, as its level counts as the acknowledgement."""
-        self._devices = []
+        self._devices = devices
         self._fail_next = self._break_next = 0
-
-    def add(self, device):
-        self._devices.append(device)
 
     def fail_next(self, count):
         """Let so many transfers fail."""
@@ -109,7 +120,7 @@ class Bus:
             self._fail_next = max(self._fail_next - 1, 0)
             raise OSError(NO_ANSWER)
         for device in self._devices:
-            if address in device.addresses and device.answers():
+            if address == device.address and device.answers():
                 if addrsize != device.address_bits:
                     raise Refused(f"registers of 0x{address:02x} have {device.address_bits} bits")
                 if count == 0 or not 0 <= register < 1 << addrsize:
@@ -117,6 +128,15 @@ class Bus:
                 self.clock.advance(self.us_per_byte * (count + 2))
                 return device
         raise OSError(NO_ANSWER)
+
+
+def driven(driver, fake, start_us=0, **faults):
+    """Return clock, bus, fake device and a driver of it."""
+    clock = Clock(start_us)
+    device = fake(clock, **faults)
+    bus = Bus(clock, device)
+    clock.advance(10_000)
+    return clock, bus, device, driver(bus, time=clock)
 
 
 def error_of(action, *arguments, kind=OSError):

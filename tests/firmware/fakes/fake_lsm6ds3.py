@@ -1,42 +1,31 @@
 """The LSM6DS3 at the level of its registers, with time: a FIFO that fills, runs over and keeps its pattern."""
 
-from fake_bus import Refused
+from fake_bus import Device, Refused
 
 TURN_ON_US = 70_000
 """Of the gyroscope: what the FIFO takes in sooner is wrong."""
 RESET_US = 50
 
-_RATES = {1: 12.5, 2: 26, 3: 52, 4: 104, 5: 208, 6: 416, 7: 833, 8: 1660}
+_CODE, _RATE_HZ = 6, 416
 _WRITABLE = {0x01, 0x0B, 0x0D, 0x0E} | set(range(0x04, 0x0B)) | set(range(0x10, 0x1B)) | set(range(0x58, 0x60))
 _READABLE = {0x0F} | set(range(0x1B, 0x40)) | set(range(0x49, 0x4E))
 _DEFAULTS = {0x12: 0x04, 0x18: 0x38, 0x19: 0x38}
 
 
-class FakeLsm6ds3:
+class FakeLsm6ds3(Device):
     """The device. `sample(k)` tells the six words of sample number k since the FIFO was started, as signed integers."""
 
     address_bits = 8
 
     def __init__(self, clock, address=0x6A, identity=0x69, rate=1.0):
         """`rate`: by what factor the true rate is off the nominal one."""
-        self.addresses = (address,)
         self.sample = lambda k: (k & 0x7FFF, 2, -3, 4, -5, 8192)
         self.temperature = 0
         """As in its registers: signed, 0 is 25 degrees C."""
         self.size = 2048 if identity == 0x6A else 4096
         """Words that the FIFO holds."""
-        self._clock, self._identity, self._rate = clock, identity, rate
-        self._powered = True
-        self._clear()
-
-    # what tests do to it
-
-    def power_off(self):
-        self._powered = False
-
-    def power_on(self):
-        self._powered = True
-        self._clear()
+        self._identity, self._rate = identity, rate
+        super().__init__(clock, address)
 
     def slip(self, words):
         """Lose words from the FIFO, so that it begins inside a sample."""
@@ -44,9 +33,6 @@ class FakeLsm6ds3:
         self._taken += words
 
     # the bus
-
-    def answers(self):
-        return self._powered
 
     def read(self, register, count):
         self._fill()
@@ -102,7 +88,7 @@ class FakeLsm6ds3:
         mode, code = r[0x0A] & 7, r[0x0A] >> 3 & 15
         if mode == 0:
             return
-        if mode != 6 or code not in _RATES:
+        if (mode, code) != (6, _CODE):
             raise Refused(f"FIFO mode {mode} at rate {code}")
         if r[0x10] >> 4 != code or r[0x11] >> 4 != code:
             raise Refused("FIFO at another rate than the sensors")
@@ -115,8 +101,7 @@ class FakeLsm6ds3:
     def _fill(self):
         if self._filling_us is None:
             return
-        rate = _RATES[self._registers[0x0A] >> 3 & 15] * self._rate
-        self._written = int((self._clock.now_us - self._filling_us) * rate / 1e6) * 6
+        self._written = int((self._clock.now_us - self._filling_us) * _RATE_HZ * self._rate / 1e6) * 6
         if self._written - self._taken >= self.size:
             self._taken = self._written - self.size
             self._overrun = True

@@ -15,6 +15,11 @@ from vl53l1x import VL53L1X
 from vl53l5cx import VL53L5CX
 
 KEY = bytes(range(32))
+CONFIG = {
+    "unit": 7, "key": "00112233445566778899aabbccddeeff" * 2, "ssid": "net", "password": "correct horse",
+    "host": "10.0.0.1", "port": 4950, "battery_full_mv": 0, "sensor": "vl53l1x", "zones": 1, "touch_ohm": 0,
+    "touch_least_mn": 500, "touch_mn_per_us": 10,
+}  # fmt: skip
 
 
 class FakeUnit:
@@ -24,25 +29,18 @@ class FakeUnit:
         `now` and `receiver` are a clock and a port in place of the fakes.
         """
         self.now = now or FakeClock(start_us)
-        self.bus = FakeBus(self.now)
-        self.vl53l1x, self.lsm6ds3 = FakeVl53l1x(self.now), FakeLsm6ds3(self.now)
-        self.vl53l5cx = FakeVl53l5cx(self.now)
-        self.bus.add(self.vl53l1x if zones == 1 else self.vl53l5cx)
-        self.bus.add(self.lsm6ds3)
+        self.range_finder, self.lsm6ds3 = (FakeVl53l1x if zones == 1 else FakeVl53l5cx)(self.now), FakeLsm6ds3(self.now)
+        self.bus = FakeBus(self.now, self.range_finder, self.lsm6ds3)
         self.receiver = receiver or FakeReceiver(7, KEY)
         self.battery_mv = 3900
         self.errors = Bus()
         clock = Clock(self.now)
-        sleep_ms = self.now.sleep_ms
-        device = VL53L1X(self.bus, 0x29, sleep_ms)
-        if zones > 1:
-            device = VL53L5CX(self.bus, zones, sleep_ms=sleep_ms)
-        imu = LSM6DS3(self.bus, None, sleep_ms, self.now.ticks_us, self.now.ticks_diff)
+        device = VL53L1X(self.bus, self.now) if zones == 1 else VL53L5CX(self.bus, zones, time=self.now)
         self.unit = Unit(
             7,
             Link(7, KEY, self.receiver, clock, Draw(), 1, 1),
             RangeFinder(device, clock, self.errors),
-            Imu(imu, clock, self.errors),
+            Imu(LSM6DS3(self.bus, self.now), clock, self.errors),
             self.errors,
             clock,
             lambda: self.battery_mv,

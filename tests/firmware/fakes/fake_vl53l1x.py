@@ -8,7 +8,7 @@ the worst that it can be; others of ST's papers let the next measurement begin a
 
 from binascii import crc32
 
-from fake_bus import Refused
+from fake_bus import Device, Refused
 
 BOOT_US = 1_200
 """From the end of a reset until it answers (DS12385, 2.7)."""
@@ -30,19 +30,19 @@ _SETTABLE |= set(range(0x5E, 0x6A)) | set(range(0x72, 0x76)) | set(range(0x78, 0
 _OTHERS_CRC = 0xA673CB5E
 """CRC of ST's defaults of 0x2D to 0x87 with the settable ones zero."""
 
-SHORT = {0x4B: 0x14, 0x60: 7, 0x63: 5, 0x69: 0x38, 0x78: 7, 0x79: 5, 0x7A: 6, 0x7B: 6}
-LONG = {0x4B: 0x0A, 0x60: 15, 0x63: 13, 0x69: 0xB8, 0x78: 15, 0x79: 13, 0x7A: 14, 0x7B: 14}
+_SHORT_MODE = {0x4B: 0x14, 0x60: 7, 0x63: 5, 0x69: 0x38, 0x78: 7, 0x79: 5, 0x7A: 6, 0x7B: 6}
+_LONG_MODE = {0x4B: 0x0A, 0x60: 15, 0x63: 13, 0x69: 0xB8, 0x78: 15, 0x79: 13, 0x7A: 14, 0x7B: 14}
+"""That of ST's defaults, in which it is calibrated."""
 
 
-class FakeVl53l1x:
+class FakeVl53l1x(Device):
     """The device. `target(us)` tells what a measurement with its middle at this time sees:
     (device status, mm, sigma, signal, ambient, spads), the last four as in the registers."""
 
     address_bits = 16
 
-    def __init__(self, clock, address=0x29, model=0xEACC, slow=1.0, fast=1.0):
+    def __init__(self, clock, model=0xEACC, slow=1.0, fast=1.0):
         """`slow` and `fast`: by what factor the slow oscillator and the fast clock are off."""
-        self.addresses = (address,)
         self.target = lambda us: (9, 500, 10, 3000, 100, 40 << 8)
         self.measured = 0
         """Measurements since it was made."""
@@ -50,19 +50,8 @@ class FakeVl53l1x:
         """Middle of the newest measurement."""
         self.starts = 0
         """How often ranging was started."""
-        self._clock, self._model = clock, model
-        self._slow, self._fast = slow, fast
-        self._powered = True
-        self._clear(clock.now_us)
-
-    # what tests do to it
-
-    def power_off(self):
-        self._powered = False
-
-    def power_on(self):
-        self._powered = True
-        self._clear(self._clock.now_us)
+        self._model, self._slow, self._fast = model, slow, fast
+        super().__init__(clock, 0x29)
 
     def duration_us(self):
         """How long a measurement takes as it is set."""
@@ -76,7 +65,7 @@ class FakeVl53l1x:
     # the bus
 
     def answers(self):
-        return self._powered and self._clock.now_us >= self._booted_us
+        return super().answers() and self._clock.now_us >= self._booted_us
 
     def read(self, register, count):
         self._advance()
@@ -102,10 +91,10 @@ class FakeVl53l1x:
 
     # inside
 
-    def _clear(self, now):
+    def _clear(self):
         self._registers = bytearray(0x111)
         self._held = False
-        self._booted_us = now + BOOT_US
+        self._booted_us = self._clock.now_us + BOOT_US
         self._start_us = self._end_us = None
         self._origin_us = 0
         self._interrupt = False
@@ -123,7 +112,7 @@ class FakeVl53l1x:
     def _soft_reset(self, value):
         if value not in (0, 1):
             raise Refused(f"soft reset 0x{value:02x}")
-        self._clear(self._clock.now_us)
+        self._clear()
         if value == 0:
             self._held, self._booted_us = True, self._clock.now_us
 
@@ -173,7 +162,7 @@ class FakeVl53l1x:
             raise Refused("ranging without ST's default configuration")
         if r[0x46] != 0x20 or r[0x30] & 0x0F != 1:
             raise Refused("ranging without an interrupt at each measurement")
-        if not any(all(r[at] == values[at] for at in values) for values in (SHORT, LONG)):
+        if not any(all(r[at] == values[at] for at in values) for values in (_SHORT_MODE, _LONG_MODE)):
             raise Refused("ranging in half a distance mode")
         if self._period_us() <= 0:
             raise Refused("ranging without a period")

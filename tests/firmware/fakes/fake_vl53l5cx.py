@@ -7,7 +7,7 @@ leaves that way, and ranges only with all that the driver of ST sends.
 
 import struct
 
-from fake_bus import Refused
+from fake_bus import Device, Refused
 
 PROGRAM = bytes((7 * k + (k >> 8)) & 0xFF for k in range(1024)) * 84
 CONFIGURATION = bytes(k % 251 for k in range(972))
@@ -20,31 +20,19 @@ _BYTES = {0x54D0: 4, 0xDB84: 1, 0xDEC4: 2, 0xDF44: 2, 0xE084: 1}
 BOOT_US = 60_000
 
 
-class FakeVl53l5cx:
+class FakeVl53l5cx(Device):
     """The device. `target(us)` gives what each zone sees: (status, targets, quarters of a mm, mm / 128, ambient)."""
 
     address_bits = 16
 
-    def __init__(self, clock, address=0x29, revision=2):
-        self.addresses = (address,)
+    def __init__(self, clock, revision=2):
         self.target = lambda us: [(5, 1, 4 * (100 + k), 128 * 3, 16 * 20) for k in range(self.side**2)]
-        self._clock, self._revision = clock, revision
-        self._powered = True
+        self._revision = revision
         self.corrupt = False
         """Whether the next frames are torn."""
         self.sends = {}
         """Structures by index, and grids by their address, as they were sent."""
-        self._clear()
-
-    def power_off(self):
-        self._powered = False
-
-    def power_on(self):
-        self._powered = True
-        self._clear()
-
-    def answers(self):
-        return self._powered
+        super().__init__(clock, 0x29)
 
     def _clear(self):
         self._page, self._memory = 0, {9: bytearray(0x8000), 10: bytearray(0x8000), 11: bytearray(0x5000)}

@@ -1,4 +1,6 @@
-"""The radio as MicroPython's `network` shows it."""
+"""The radio as MicroPython's `network` shows it. `state` is what tests set and look at."""
+
+import machine
 
 AP_IF, STA_IF = 1, 0
 
@@ -7,9 +9,20 @@ class State:
     def __init__(self):
         self.active = {AP_IF: True, STA_IF: False}
         self.there = True
-        self.asked = None
+        """Whether the network answers."""
+        self.takes_us = 0
+        """Time from an attempt to join until it has."""
+        self.asked = []
+        """When, for which network and with which password."""
+        self.busy = 0
+        """So many attempts are refused."""
+        self.disconnects = 0
         self.pm = self.reconnects = None
-        self.joined = False
+        self.joined_us = None
+
+    @property
+    def joined(self):
+        return self.there and self.joined_us is not None and machine.state.clock.now_us >= self.joined_us
 
 
 state = State()
@@ -28,11 +41,16 @@ class WLAN:
         state.pm, state.reconnects = pm, reconnects
 
     def isconnected(self):
-        state.joined = state.there and state.asked is not None
         return state.joined
 
     def connect(self, ssid, password):
-        state.asked = (ssid, password)
+        now = machine.state.clock.now_us
+        state.asked.append((now, ssid, password))
+        if state.busy:
+            state.busy -= 1
+            raise OSError("Wifi Internal Error")
+        state.joined_us = now + state.takes_us
 
     def disconnect(self):
-        state.asked = None
+        state.disconnects += 1
+        state.joined_us = None

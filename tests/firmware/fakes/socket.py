@@ -15,7 +15,11 @@ def getaddrinfo(host, port):
 
 
 class socket:
-    def __init__(self, family, kind):
+    errno = 0
+    """With which it fails."""
+    closed = False
+
+    def __init__(self, family=AF_INET, kind=SOCK_DGRAM):
         assert (family, kind) == (AF_INET, SOCK_DGRAM)
 
     def bind(self, address):
@@ -25,14 +29,16 @@ class socket:
         assert not blocking
 
     def sendto(self, datagram, address):
-        if not network.state.joined:
-            raise OSError(118)
+        if self.errno or not network.state.joined:
+            raise OSError(self.errno or 118)
         if address not in state.sent_to:
             state.sent_to += (address,)
         state.receiver.send(datagram)
 
     def readinto(self, buffer):
+        if self.errno:
+            raise OSError(self.errno)
         return state.receiver.receive(buffer) or None
 
     def close(self):
-        pass
+        self.closed = True
