@@ -9,20 +9,34 @@ from pretouch.robot.description import SpeedEnvelope, fr3, panda
 from pretouch.robot.model import RobotModel
 
 
-def test_panda_has_the_limits_its_vendor_publishes():
-    arm = panda()
-    np.testing.assert_allclose(arm.qd_max, [2.175] * 4 + [2.61] * 3)
-    np.testing.assert_allclose(arm.qdd_max, [15, 7.5, 10, 12.5, 15, 20, 20])
-    np.testing.assert_allclose(arm.tau_max, [87] * 4 + [12] * 3)
+@pytest.mark.parametrize(
+    ("arm", "q_min", "q_max", "qd_max", "qdd_max"),
+    [
+        (
+            panda(),
+            [-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973],
+            [2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973],
+            [2.175] * 4 + [2.61] * 3,
+            [15, 7.5, 10, 12.5, 15, 20, 20],
+        ),
+        (
+            fr3(),
+            [-2.7437, -1.7837, -2.9007, -3.0421, -2.8065, 0.5445, -3.0159],
+            [2.7437, 1.7837, 2.9007, -0.1518, 2.8065, 4.5169, 3.0159],
+            [2.62] * 4 + [5.26, 4.18, 5.26],
+            [10] * 7,
+        ),
+    ],
+    ids=["panda", "fr3"],
+)
+def test_an_arm_has_the_names_and_limits_its_vendor_publishes(arm, q_min, q_max, qd_max, qdd_max):
+    model = RobotModel(arm)
+    np.testing.assert_allclose([model.q_min, model.q_max], [q_min, q_max])
+    np.testing.assert_allclose(model.q_mid, np.add(q_min, q_max) / 2, atol=1e-12)
+    np.testing.assert_allclose([arm.qd_max, arm.qdd_max, arm.tau_max], [qd_max, qdd_max, [87] * 4 + [12] * 3])
     np.testing.assert_allclose(np.rad2deg(arm.q_ready), [0, -45, 0, -135, 0, 90, 45])
-
-
-def test_fr3_has_the_limits_its_vendor_publishes():
-    arm = fr3()
-    np.testing.assert_allclose(arm.qd_max, [2.62] * 4 + [5.26, 4.18, 5.26])
-    np.testing.assert_allclose(arm.qdd_max, [10] * 7)
-    np.testing.assert_allclose(arm.tau_max, [87] * 4 + [12] * 3)
-    np.testing.assert_allclose(np.rad2deg(arm.q_ready), [0, -45, 0, -135, 0, 90, 45])
+    assert np.all((model.q_min < arm.q_ready) & (arm.q_ready < model.q_max))
+    assert model.joints == tuple(f"{arm.name}_joint{j}" for j in range(1, 8))
 
 
 def test_the_envelope_of_the_fr3_is_the_one_its_vendor_publishes():

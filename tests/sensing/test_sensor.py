@@ -92,6 +92,15 @@ def test_a_reading_counts_within_what_its_own_sensor_measures():
         ("[sensor.odd]\nown_name = 'x'\n", "has the unknown key 'own_name'"),
         ('[sensor.odd]\nlike = "odder"\n', r"\[sensor.odd\] has the sensor 'odder': choose from"),
         ("[sensor.vl53l1x]\nrate_hz = 10\n", r"\[sensor.vl53l1x\] is known by that name already"),
+        (
+            '[sensor.mine]\nlike = "vl53l5cx"\nzones = 5\n',
+            r"zones is 5: it measures 4 x 4 or 8 x 8. \(in .*skin.toml\)",
+        ),
+        ("[sensor.many]\nzones = 9\n", "zones is 9: it must be at most 8"),
+        (
+            UNIT.format(id="a", z=0.045) + UNIT.format(id="b", z=0.02) + 'sensor = "sonar"\n',
+            r"Unit b has the sensor 'sonar': .* \(in .*skin.toml, unit 2 of 2\)",
+        ),
         ("sensor = 4\n", "sensor is 4: write a table"),
         ("sensor = {odd = 4}\n", r"\[sensor.odd\] is 4: write a table"),
     ],
@@ -138,20 +147,6 @@ def test_each_zone_looks_along_its_own_beam_and_the_file_keeps_the_unit_whole(pa
     assert again.ids == skin.ids
     assert (tmp_path / "again.toml").read_text().count("[[unit]]") == 2
     np.testing.assert_allclose(again.T_link_sensor, skin.T_link_sensor, atol=1e-12)
-
-
-def test_zones_that_a_sensor_does_not_have_are_named(panda_model, tmp_path):
-    text = '[sensor.mine]\nlike = "vl53l5cx"\nzones = 5\n' + UNIT.format(id="a", z=0.045)
-    with pytest.raises(SkinError, match=r"zones is 5: it measures 4 x 4 or 8 x 8. \(in .*skin.toml\)"):
-        skin_of(tmp_path, panda_model, text)
-    with pytest.raises(SkinError, match=r"zones is 9: it must be at most 8"):
-        skin_of(tmp_path, panda_model, "[sensor.many]\nzones = 9\n" + UNIT.format(id="a", z=0.045))
-
-
-def test_an_error_in_a_unit_names_the_file_and_the_unit(panda_model, tmp_path):
-    text = UNIT.format(id="a", z=0.045) + UNIT.format(id="b", z=0.02) + 'sensor = "sonar"\n'
-    with pytest.raises(SkinError, match=r"Unit b has the sensor 'sonar': .* \(in .*skin.toml, unit 2 of 2\)"):
-        skin_of(tmp_path, panda_model, text)
 
 
 def test_zones_of_more_units_than_a_step_can_take_are_refused(panda_model, paper_skin):

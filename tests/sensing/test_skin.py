@@ -55,23 +55,19 @@ def test_units_keep_their_order(panda_model):
     np.testing.assert_array_equal(skin.T_link_sensor[:, 0, 3], [0, 0.2, 0])
 
 
-def test_a_skin_knows_how_uncertain_the_places_of_its_units_are(panda_model):
-    units = [replace(_unit("a"), position_sigma=0.01), replace(_unit("b"), orientation_sigma=0.02)]
-    skin = Skin(units, panda_model)
-    np.testing.assert_array_equal(skin.position_sigma, [0.01, 0.0])
-    np.testing.assert_array_equal(skin.orientation_sigma, [0.0, 0.02])
-    assert [Skin(some, panda_model).exact for some in (units, units[:1], units[1:])] == [False] * 3
-    assert Skin([_unit("a")], panda_model).exact
-
-
-def test_an_empty_skin_has_empty_arrays(panda_model):
-    skin = Skin([], panda_model)
-    assert len(skin) == 0
-    assert skin.ids == ()
-    assert skin.link.shape == (0,)
-    assert skin.T_link_sensor.shape == (0, 4, 4)
-    assert skin.position_sigma.shape == skin.orientation_sigma.shape == (0,)
-    assert skin.exact
+@pytest.mark.parametrize(("position", "orientation"), [([], []), ([0.0], [0.0]), ([0.01, 0.0], [0.0, 0.02])])
+def test_a_skin_knows_how_uncertain_the_places_of_its_units_are(panda_model, position, orientation):
+    sigmas = enumerate(zip(position, orientation, strict=True))
+    units = [replace(_unit(str(k)), position_sigma=p, orientation_sigma=o) for k, (p, o) in sigmas]
+    skin, count = Skin(units, panda_model), len(position)
+    assert (len(skin), skin.ids, skin.link.shape) == (count, tuple(map(str, range(count))), (count,))
+    assert skin.T_link_sensor.shape == (count, 4, 4)
+    np.testing.assert_array_equal(skin.position_sigma, position)
+    np.testing.assert_array_equal(skin.orientation_sigma, orientation)
+    assert skin.exact == (not any(position + orientation))
+    assert [Skin([unit], panda_model).exact for unit in units] == [
+        not (unit.position_sigma or unit.orientation_sigma) for unit in units
+    ]
 
 
 def test_duplicate_ids_are_named(panda_model):
@@ -126,24 +122,22 @@ def test_the_paper_skin_looks_outwards_from_the_surface(panda_model, paper_skin)
     position=st.tuples(st.floats(0.2, 0.4), st.floats(-0.2, 0.2), st.floats(-0.2, 0.2)),
     names=st.lists(st.text(min_size=1, alphabet=PRINTABLE), min_size=3, max_size=3, unique=True),
     sigmas=st.tuples(st.floats(0.0, 0.5), st.floats(0.0, 1.5)) | st.just((0.0, 0.0)),
+    patches=st.lists(st.sampled_from([None, TouchPatch(), TouchPatch(0.05, 2.0, False)]), min_size=3, max_size=3),
 )
-def test_a_saved_skin_is_read_back(panda_model, tmp_path_factory, turns, position, names, sigmas):
-    units = [
-        replace(
-            _unit(name, "panda_link6", position, Rotation.from_rotvec(turn).as_matrix()),
-            position_sigma=sigmas[0], orientation_sigma=sigmas[1],
-        )
-        for name, turn in zip(names, turns, strict=False)
-    ]  # fmt: skip
+def test_a_saved_skin_is_read_back(panda_model, tmp_path_factory, turns, position, names, sigmas, patches):
+    units = []
+    for name, turn, patch in zip(names, turns, patches, strict=False):
+        unit = _unit(name, "panda_link6", position, Rotation.from_rotvec(turn).as_matrix())
+        units.append(replace(unit, position_sigma=sigmas[0], orientation_sigma=sigmas[1], touch=patch))
     skin, path = Skin(units, panda_model), tmp_path_factory.mktemp("skin") / "skin.toml"
     save_skin(skin, path)
     back = load_skin(path, panda_model)
     assert back.ids == skin.ids
-    np.testing.assert_array_equal(back.link, skin.link)
+    for part in ("link", "position_sigma", "orientation_sigma", "touching"):
+        np.testing.assert_array_equal(getattr(back, part), getattr(skin, part))
     np.testing.assert_array_equal(back.T_link_sensor[:, :3, 3], skin.T_link_sensor[:, :3, 3])
     np.testing.assert_allclose(back.T_link_sensor, skin.T_link_sensor, atol=1e-14)
-    np.testing.assert_array_equal(back.position_sigma, skin.position_sigma)
-    np.testing.assert_array_equal(back.orientation_sigma, skin.orientation_sigma)
+    assert [unit.touch for unit in back.units] == [unit.touch for unit in units]
 
 
 def test_uncertainties_and_touch_sensors_are_written_only_where_there_are_any(panda_model, tmp_path):
@@ -226,39 +220,23 @@ def test_a_rounded_quaternion_and_uncertainties_in_whole_numbers_are_taken(panda
         ({"id": r'"a\nb"'}, r"the id 'a\\nb': use printable characters only"),
         ({r'"a\nb"': "1"}, r"unit left: .*unknown field `a\\nb`"),
         ({"id": '""'}, "empty id: give each unit a name"),
-        ({"link": None}, "unit left: .*missing required field `link`"),
         ({"link": '"elbow"'}, "unit left .*'elbow'.*choose from panda_link0"),
         ({"colour": '"red"'}, "unit left: .*unknown field `colour`: a .*unit.* has id, link, position_m"),
-        ({"position_m": None}, "unit left: .*missing required field `position_m`"),
         ({"position_m": "[0.0, 0.1]"}, r"expected `array` of length 3, got 2 - at `\$.position_m`"),
-        ({"position_m": "0.1"}, r"expected `array`, got `float` - at `\$.position_m`"),
         ({"position_m": "[nan, 0, 0]"}, "unit left: its pose holds .*nan.*: give a finite 4 x 4 matrix, in metres"),
-        ({"position_m": '["0.1", 0, 0]'}, r"expected `float`, got `str` - at `\$.position_m\[0\]`"),
         ({"position_m": "[true, 0, 0]"}, r"expected `float`, got `bool` - at `\$.position_m\[0\]`"),
         ({"position_m": f"[1{'0' * 400}, 0, 0]"}, r"number out of range - at `\$.position_m\[0\]`"),
         ({"position_m": "[0.0, -108.0, 45.0]"}, "unit left lies .* m off panda_hand: give its position in metres"),
         ({"position_m": "[1e308, 0, 0]"}, r"its pose holds .*1e\+308"),
         ({"position_m": "[0, 0, -1001]"}, "its pose holds .*-1001.*: give a finite 4 x 4 matrix, in metres"),
-        ({"position_m": f"[0x{'f' * 5000}, 0, 0]"}, "number out of range"),
         ({"quaternion_wxyz": "[1e200, 0, 0, 0]"}, "unit left: quaternion_wxyz has length 1.*: it must be 1"),
         ({"quaternion_wxyz": "[nan, 0, 0, 0]"}, "unit left: quaternion_wxyz has length nan: it must be 1"),
         ({"quaternion_wxyz": "[0, 0, 0, 0]"}, "unit left: quaternion_wxyz has length 0: it must be 1"),
         ({"quaternion_wxyz": "[1, 1, 0, 0]"}, "has length 1.414: it must be 1"),
-        (
-            {"position_sigma_m": "-0.001"},
-            "unit left: its position_sigma is -0.001: give a standard deviation",
-        ),
         ({"position_sigma_m": "2.5"}, r"its position_sigma is 2.5: give a standard deviation from 0 to 0\.5"),
-        ({"position_sigma_m": "nan"}, "its position_sigma is nan: give a standard deviation"),
-        ({"position_sigma_m": '"0.1"'}, r"expected `float`, got `str` - at `\$.position_sigma_m`"),
         ({"orientation_sigma_rad": "5"}, r"its orientation_sigma is 5.0: give a standard deviation from 0 to 1\.571"),
-        ({"orientation_sigma_rad": "true"}, r"expected `float`, got `bool` - at `\$.orientation_sigma_rad`"),
-        ({"orientation_sigma_rad": f"0x{'f' * 5000}"}, "number out of range"),
         ({"touch": '"yes"'}, r"unit left: expected `bool \| object`, got `str` - at `\$.touch`"),
-        (
-            {"touch": "{radius = 0.03}"},
-            "unit left: touch has the unknown key 'radius': use radius_m, force_min_n",
-        ),
+        ({"touch": "{radius = 0.03}"}, "unit left: touch has the unknown key 'radius': use radius_m, force_min_n"),
         ({"touch": "{radius_m = 0.0}"}, "unit left: touch cannot be: .*radius_m is 0.0: it must be greater than 0"),
         ({"touch": "{radius_m = nan}"}, "radius_m is nan: it must be finite"),
         ({"touch": "{radius_m = 20}"}, "radius_m is 20: it must be at most 0.2"),
@@ -335,12 +313,3 @@ def test_a_touch_sensor_is_read(panda_model, tmp_path, line, patch):
     skin = load_skin(_file(tmp_path, _entry() + line), panda_model)
     assert skin.units[0].touch == patch
     assert skin.touching.tolist() == ([] if patch is None else [0])
-
-
-def test_touch_sensors_are_written_and_read_back(panda_model, paper_skin, tmp_path):
-    patches = [None, TouchPatch(), TouchPatch(0.05, 2.0, False), *[None] * 4]
-    units = [replace(u, touch=p) for u, p in zip(paper_skin.units, patches, strict=True)]
-    save_skin(Skin(units, panda_model), tmp_path / "a.toml")
-    made = load_skin(tmp_path / "a.toml", panda_model)
-    assert [u.touch for u in made.units] == patches
-    assert made.touching.tolist() == [1, 2]
