@@ -2,16 +2,12 @@
 
 import numpy as np
 import pytest
-from scipy.optimize import linprog
 
 from pretouch.controller import Controller
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, QpOutcome
-from tests.control.programs import answered
-from tests.reference.problems import TOUCH, facing_rows, grazed, problem, stiff_row
-from tests.reference.qp import Problem, kkt_residual
-from tests.reference.qp import solve as solve_exactly
+from tests.reference.qp import kkt_residual
 from tests.reference.scenes import SCENES, Scene, World, looking_inwards, path_of, singular
 from tests.reference.skins import spread
 from tests.reference.step import Reference, ReferenceController
@@ -129,71 +125,3 @@ def assert_all_same(scene: Scene, steps: list[tuple[ControlStep, Reference]]) ->
                 assert np.all((reference.problem.lower <= real.command) & (real.command <= reference.problem.upper))
         except AssertionError as error:
             raise AssertionError(f"in cycle {cycle} of {scene.name}: {error}") from error
-
-
-# the quadratic program by itself
-
-
-def assert_exact(p: Problem) -> bool:
-    """Hold the real solver to the reference on the problem with all its rows; return whether there is an answer."""
-    real, exact = answered(p), solve_exactly(p)
-    if exact.x is None:
-        assert real.outcome is QpOutcome.INFEASIBLE
-        assert_contradiction(p, exact.multipliers)
-        return False
-    assert real.outcome is QpOutcome.SOLVED
-    assert kkt_residual(p, exact.x, exact.multipliers) <= 1e-12
-    np.testing.assert_allclose(real.qd, exact.x, rtol=0, atol=COMMAND)
-    assert kkt_residual(p, real.qd, real.multipliers) <= 1e-8
-    np.testing.assert_allclose(real.slack, np.maximum(p.G @ real.qd - p.h, 0.0), rtol=0, atol=1e-12)
-    return True
-
-
-def assert_contradiction(p: Problem, y: np.ndarray) -> None:
-    """Farkas: the sum of the rows by weights y >= 0 reads 0 x <= a negative number; linear programming says so too."""
-    A, b, _ = p.rows()
-    assert np.all(y >= 0)
-    assert b @ y < -1e3 * np.abs(A.T @ y).max() * np.abs([p.lower, p.upper]).max()
-    program = linprog(np.zeros(len(p.f)), A_ub=p.G, b_ub=p.h, bounds=list(zip(p.lower, p.upper, strict=True)))
-    assert program.status == 2
-
-
-ROWS = (0, 1, 2, 4, 8, 20, 60, 128, 300)
-
-
-@pytest.mark.parametrize("soft", [True, False])
-@pytest.mark.parametrize("count", ROWS)
-def test_rows_left_out_change_no_answer(count: int, soft: bool):
-    seeds = range(100 * count, 100 * count + (4 if count > 100 else 12))
-    for seed in seeds:
-        assert assert_exact(problem(seed, count, soft))
-
-
-@pytest.mark.parametrize("count", ROWS[1:])
-def test_rows_left_out_hide_no_contradiction(count: int):
-    seeds = range(100 * count, 100 * count + (4 if count > 100 else 12))
-    for seed in seeds:
-        assert not assert_exact(problem(seed, count, soft=False, feasible=False))
-
-
-@pytest.mark.parametrize("gap", TOUCH)
-def test_rows_met_by_a_hair(gap: float):
-    for seed in range(5):
-        assert assert_exact(grazed(problem(seed, 12, soft=True), seed, gap))
-        # hard rows that are missed may leave no answer, or one by rounding alone
-        assert assert_exact(grazed(problem(seed, 12, soft=False), seed, abs(gap)))
-
-
-@pytest.mark.parametrize("soft", [True, False])
-@pytest.mark.parametrize("gap", [2e-9, 9e-10, 5e-10, 1e-10])
-def test_a_row_missed_by_less_than_a_nanometre_a_second_is_met(gap: float, soft: bool):
-    # a solver that lets a row be missed by 1e-9 is off by up to 1.3e-8 rad/s here
-    for seed in range(10):
-        assert assert_exact(stiff_row(seed, soft, gap))
-
-
-@pytest.mark.parametrize("angle", [1e-1, 1e-2, 1e-3])
-def test_hard_rows_that_face_each_other(angle: float):
-    # the edge of the wedge moves by rounding / angle: from 1e-5 on no solver in double precision is sure of 1e-8
-    for seed in range(10):
-        assert assert_exact(facing_rows(seed, angle))

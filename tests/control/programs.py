@@ -9,7 +9,7 @@ from pretouch.control.penalty import Problem as Program
 from pretouch.control.task import cost_into
 from pretouch.modes import outcome_of
 from pretouch.params import TaskParams
-from pretouch.types import FloatArray, QpOutcome, QpSolution
+from pretouch.types import FloatArray, QpSolution
 
 _NONE = np.zeros(0)
 
@@ -21,13 +21,6 @@ def answered(p: Problem, budget: int = 500) -> QpSolution:
     solver = minimise if weight else minimise_within
     ending = solver(Program(p.H, p.f, p.lower, p.upper, p.G, p.h, weight), budget, least)
     return QpSolution(*least, *outcome_of(False, ending, weight > 0.0 and bool(least.slack.max(initial=0.0) > 0.0)))
-
-
-def assert_none(answer: QpSolution, outcome: QpOutcome) -> None:
-    """There is no answer, for this reason; weights of what contradicts are numbers all the same."""
-    assert answer.outcome is outcome
-    assert answer.status
-    assert np.all(np.isfinite(answer.multipliers))
 
 
 def task_cost(
