@@ -123,7 +123,7 @@ class Weather:
 def spoiled(inputs: Inputs, fault: str, value: float, joint: int = 3) -> Inputs:
     """The same inputs with one thing wrong."""
     robot, now = inputs.robot, inputs.stamp
-    if fault in ("q", "qd", "q_commanded", "qd_commanded"):
+    if fault in ("q", "qd", "q_commanded", "qd_commanded", "wrench"):
         wrong = getattr(robot, fault).copy()
         wrong[joint] = value
         return replace(inputs, robot=replace(robot, **{fault: wrong}))
