@@ -16,21 +16,19 @@ from pretouch.desired import Desired, DesiredKind
 from pretouch.errors import ParameterError
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import profile
-from pretouch.recording.reader import open_recording
-from pretouch.recording.verify import verify
-from pretouch.recording.writer import Recording
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.types import ControlStep, Mode
+from pretouch.types import ControlStep, Inputs, Mode
+from tests.recording.runs import Run, assert_replays, controller_of
 from tests.test_loop import DT, World
 
 
 class Commanded:
     """An arm that follows its commands, driven by a commander: asks(time, arm) for each step."""
 
-    def __init__(self, model: RobotModel, asks, seconds=4.0, recorder=None, arm=World):
+    def __init__(self, model: RobotModel, asks, seconds=4.0, arm=World, name="paper"):
         self.model = model
-        self.control = Controller(model, Skin([], model), no_fixtures(), Circle(), profile("paper"))
+        self.control = Controller(model, Skin([], model), no_fixtures(), Circle(), profile(name))
         self.arm = arm(model, 0)
         self.begin = model.kinematics(self.arm.read().q)
         self.steps: list[ControlStep] = []
@@ -43,8 +41,6 @@ class Commanded:
             state = cycle.after
             self.steps.append(cycle.step)
             self.cycles.append(cycle)
-            if recorder is not None:
-                recorder.record(cycle)
             if now > seconds:
                 break
 
@@ -85,9 +81,10 @@ def test_without_an_angular_velocity_the_orientation_is_held_where_it_has_come_t
     assert np.arccos((np.trace(later[-1] @ run.begin.rotation[panda_model.ee].T) - 1.0) / 2.0) > 0.2
 
 
-def test_joint_velocities_are_done_joint_by_joint_within_their_limits(panda_model):
+@pytest.mark.parametrize("name", ["paper", "pretouch"])
+def test_joint_velocities_are_done_joint_by_joint_within_their_limits(panda_model, name):
     wanted = np.array([0.1, -0.05, 0.0, 0.1, 0.0, 0.05, 9.0])
-    run = Commanded(panda_model, asks=lambda now, _: desired.joint_velocities(now, wanted), seconds=2.0)
+    run = Commanded(panda_model, asks=lambda now, _: desired.joint_velocities(now, wanted), seconds=2.0, name=name)
     np.testing.assert_allclose(run.steps[130].command[:6], wanted[:6], atol=1e-6)
     assert 0.5 < max(step.command[6] for step in run.steps) <= panda_model.description.qd_max[6]
     change = np.abs(np.diff([step.command for step in run.steps], axis=0))
@@ -177,35 +174,29 @@ def test_a_far_orientation_is_approached_the_short_way(seed):
 
 
 def test_a_recording_holds_what_was_asked_nonsense_too_and_replays_to_the_bit(panda_model, tmp_path):
-    place, count, q = tmp_path / "a.mcap", iter(range(10_000)), panda_model.description.q_ready
+    q = panda_model.description.q_ready
     plan = desired.joint_positions((0.5, 2.0), (q, q + 0.1))
 
-    def asks(now, _):
-        two = np.array([now, now + 0.1])
-        return (
+    def asked(k: int, inputs: Inputs) -> Inputs:
+        now = inputs.stamp
+        motions = (
             None,
             plan,
             desired.twist(now, np.full(3, np.nan)),
             desired.refused(now, "two programs ask"),
-            Desired(DesiredKind.TWIST, two, np.zeros((1, 5))),
+            Desired(DesiredKind.TWIST, np.array([now, now + 0.1]), np.zeros((1, 5))),
             Desired(DesiredKind.TWIST, np.zeros(0), np.zeros((0, 6))),
             "left",
             desired.twist(now, (0.0, 0.05, 0.0)),
-        )[next(count) // 40 % 8]
+        )
+        return replace(inputs, desired=motions[k // 40 % 8])
 
-    control = Controller(panda_model, Skin([], panda_model), no_fixtures(), Circle(), profile("paper"))
-    with Recording(place, control) as recording:
-        run = Commanded(panda_model, asks=asks, recorder=recording, seconds=4.5)
-    recorded = open_recording(place)
-    assert len(recorded) == len(run.steps)
+    recorded = assert_replays(Run(controller_of(panda_model, Skin([], panda_model))), tmp_path, asked, 450)
     unread = [kept.inputs is None for kept in recorded]
-    assert [all(unread[k + 1 : k + 39]) for k in range(0, 320, 40)] == [False] * 6 + [True, False]
+    assert [all(unread[k : k + 40]) for k in range(0, 320, 40)] == [False] * 6 + [True, False]
     assert recorded[20].inputs.desired is None
     np.testing.assert_array_equal(recorded[60].inputs.desired.number, plan.number)
     assert recorded[300].inputs.desired.kind == DesiredKind.TWIST
-    verdict = verify(recorded)
-    assert verdict.differing == 0
-    assert verdict.checked == unread.count(False)
 
 
 def test_while_the_arm_yields_its_orientation_is_held_and_not_turned_to_what_is_asked(panda_model):

@@ -13,15 +13,12 @@ from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import PROFILES
 from pretouch.realtime import warm_up
 from pretouch.recording.cycles import Cycles, inputs_of
-from pretouch.recording.reader import open_recording
-from pretouch.recording.verify import verify
-from pretouch.recording.writer import Recording
 from pretouch.sensing.skin import Skin
 from pretouch.sound import MOST_POINTS, sound_points
-from pretouch.types import SOMEWHERE, Mode, MovingFixtures, SeenPoints
+from pretouch.types import SOMEWHERE, Inputs, Mode, MovingFixtures, SeenPoints
 from tests.following_arm import PAPER, Arm
 from tests.fuzz.invariants import same
-from tests.recording.runs import Run, controller_of
+from tests.recording.runs import Run, assert_replays, controller_of
 
 PRETOUCH = PROFILES["pretouch"]
 DEAF = replace(PRETOUCH, perception=replace(PRETOUCH.perception, outside=None))
@@ -109,27 +106,16 @@ def test_points_that_cannot_be_used_are_named(panda_model, paper_skin, points, s
     assert arm.step(points=seen(arm.time)).mode is Mode.TRACK
 
 
-def frames(now: float, rng: np.random.Generator) -> SeenPoints:
-    """Points about the arm, a new set every 40 ms."""
-    return seen(now, *rng.uniform([-0.2, -0.6, 0.1], [0.9, 0.6, 1.0], (40, 3)))
-
-
 def test_a_run_with_points_of_any_shape_is_recomputed_bit_for_bit(panda_model, paper_skin, tmp_path):
-    controller, rng = controller_of(panda_model, paper_skin, PRETOUCH), np.random.default_rng(4)
-    run, held = Run(controller, 2), None
-    odd = SeenPoints(0.0, np.zeros(2), np.zeros(5), np.zeros(2))
-    with Recording(tmp_path / "a.mcap", controller) as recording:
-        for k in range(500):
-            if k > 100 and k % 4 == 0:
-                held = frames(run.time, rng)
-            given = odd if k == 50 else held
-            recording.record(run.turn(lambda inputs, given=given: replace(inputs, points=given)))
-    recorded = open_recording(tmp_path / "a.mcap")
-    for kept, cycle in zip(recorded, run.cycles, strict=True):
-        assert same(kept.inputs, cycle.inputs)
-    verdict = verify(recorded)
-    assert verdict.exact
-    assert verdict.agrees
+    rng, sets = np.random.default_rng(4), [SeenPoints(0.0, np.zeros(2), np.zeros(5), np.zeros(2))]
+
+    def with_points(k: int, inputs: Inputs) -> Inputs:
+        """Points about the arm, a new set every 40 ms, and once such as cannot be."""
+        if k > 100 and k % 4 == 0:
+            sets.append(seen(inputs.stamp, *rng.uniform([-0.2, -0.6, 0.1], [0.9, 0.6, 1.0], (40, 3))))
+        return replace(inputs, points=sets[-1] if k == 50 or k > 100 else None)
+
+    recorded = assert_replays(Run(controller_of(panda_model, paper_skin, PRETOUCH), 2), tmp_path, with_points, 500)
     assert any((kept.step.obstacles.unit >= 7).any() for kept in recorded)
 
 
@@ -246,13 +232,7 @@ def test_silence_of_who_tells_holds_the_arm_until_it_is_told_for_the_first_time_
 
 
 def test_a_recording_holds_them_to_the_bit_and_replays(panda_model, paper_skin, tmp_path):
-    run = Run(controller_of(panda_model, paper_skin))
-    for i in range(60):
-        run.turn(lambda inputs, i=i: replace(inputs, moving=rod(0.6, 0.3 + 0.001 * i, inputs.stamp, 0.1)))
-    place = tmp_path / "beside.mcap"
-    with Recording(place, run.controller) as recording:
-        for cycle in run.cycles:
-            recording.record(cycle)
-    found = open_recording(place)
-    assert [same(kept.inputs, cycle.inputs) for kept, cycle in zip(found, run.cycles, strict=True)] == 60 * [True]
-    assert verify(found).agrees
+    def beside(k: int, inputs: Inputs) -> Inputs:
+        return replace(inputs, moving=rod(0.6, 0.3 + 0.001 * k, inputs.stamp, 0.1))
+
+    assert_replays(Run(controller_of(panda_model, paper_skin)), tmp_path, beside, 60)

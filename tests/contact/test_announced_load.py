@@ -5,17 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from tests.following_arm import DT, Arm
-from tests.fuzz.invariants import same
-from tests.recording.runs import Run, controller_of
+from tests.recording.runs import Run, assert_replays, controller_of
 
 from pretouch.contact.announced_load import announced, doubted, kept_free, most_kg, without_load, wrench_of
 from pretouch.contact.residual_model import residual_init
 from pretouch.errors import ParameterError
 from pretouch.params import SequentialParams
 from pretouch.profiles import PROFILES
-from pretouch.recording.reader import open_recording
-from pretouch.recording.verify import verify
-from pretouch.recording.writer import Recording
 from pretouch.types import Mode, Payload, RobotState
 
 PRETOUCH = PROFILES["pretouch"]
@@ -197,17 +193,8 @@ def grips(k: int) -> Payload | None:
 
 @pytest.mark.parametrize("name", ["pretouch", "paper"])
 def test_a_run_with_a_payload_is_recorded_and_recomputed_bit_for_bit(panda_model, paper_skin, tmp_path, name):
-    controller = controller_of(panda_model, paper_skin, PROFILES[name])
-    run = Run(controller, 2)
-    with Recording(tmp_path / "a.mcap", controller) as recording:
-        for k in range(700):  # with snapshots of before, between and after
-            recording.record(run.turn(lambda inputs, k=k: replace(inputs, payload=grips(k))))
-    recorded = open_recording(tmp_path / "a.mcap")
-    for kept, cycle in zip(recorded, run.cycles, strict=True):
-        assert same(kept.inputs, cycle.inputs)
-        assert kept.snapshot is None or same(kept.snapshot, cycle.before)
+    run = Run(controller_of(panda_model, paper_skin, PROFILES[name]), 2)
+    # with snapshots of before, between and after
+    recorded = assert_replays(run, tmp_path, lambda k, inputs: replace(inputs, payload=grips(k)), 700)
     assert recorded[699].inputs.payload is None
     assert run.state.load.payload == Payload(0.0)
-    verdict = verify(recorded)
-    assert verdict.exact
-    assert verdict.agrees

@@ -15,12 +15,15 @@ from pretouch.controller import Controller, ControllerState
 from pretouch.loop import Cycle
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import PROFILES, Profile
+from pretouch.recording.reader import Recorded, open_recording
 from pretouch.recording.ros import encode, value_of
+from pretouch.recording.verify import verify
 from pretouch.recording.writer import Recording
 from pretouch.robot.description import RobotDescription
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, Inputs, RangeReadings, RobotState
+from tests.fuzz.invariants import same
 
 SHORT: Profile = replace(PROFILES["paper"], window=replace(PROFILES["paper"].window, samples=5))
 """The paper's profile, with a window that is soon full."""
@@ -88,6 +91,22 @@ def recorded_run(place: Path, controller: Controller, cycles: int, seed: int = 0
         for _ in range(cycles):
             recording.record(run.turn())
     return run
+
+
+def assert_replays(run: Run, folder: Path, change: Callable[[int, Inputs], Inputs], cycles: int) -> Recorded:
+    """Record a run whose inputs are changed: they are read back to the bit, but for nonsense, and so is each step."""
+    with Recording(folder / "a.mcap", run.controller) as recording:
+        for k in range(cycles):
+            recording.record(run.turn(lambda inputs, k=k: change(k, inputs)))
+    recorded = open_recording(folder / "a.mcap")
+    for kept, cycle in zip(recorded, run.cycles, strict=True):
+        assert kept.inputs is None or same(kept.inputs, cycle.inputs)
+        assert kept.snapshot is None or same(kept.snapshot, cycle.before)
+    verdict = verify(recorded)
+    assert verdict.exact
+    assert verdict.agrees
+    assert verdict.checked == sum(kept.inputs is not None for kept in recorded)
+    return recorded
 
 
 def changed(
