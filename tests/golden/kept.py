@@ -24,8 +24,6 @@ def write(path: Path, steps: Steps) -> None:
     for name in names:
         values = [values[name] for cycles in steps.values() for values in cycles.values()]
         there = [value for value in values if value is not None]
-        if len({value.dtype.kind for value in there}) > 1:
-            raise TypeError(f"The field {name} is not of one type in all steps.")
         columns[f"{name}/values"] = np.concatenate([np.zeros(0), *there] if not there else [v.ravel() for v in there])
         columns[f"{name}/shape"] = np.array([_shape(value) for value in values], np.int32)
     np.savez_compressed(path, **columns)

@@ -7,9 +7,8 @@ from pretouch.profiles import PROFILES
 from pretouch.types import ControlStep
 from tests.golden import streams
 from tests.golden.closed import CLOSED
-from tests.golden.fields import FIELDS, forgotten, leaves
+from tests.golden.fields import FIELDS, leaves
 from tests.golden.kept import Steps, close, first_difference, read
-from tests.golden.script import Script
 from tests.golden.streams import STREAMS, run
 from tests.golden.values import FILE, STORED
 
@@ -36,15 +35,6 @@ def test_all_of_the_stored_values_are_compared(stored: Steps):
 def test_every_profile_has_an_input():
     assert set(streams.PROFILES) == set(PROFILES)
     assert not any(" " in name for name in (*STREAMS, *CLOSED))
-
-
-def test_a_field_without_a_lasting_name_is_found():
-    found, script = streams.controller(STREAMS["course/paper"]), Script(2)
-    step, _ = found.step(found.init(script.state(0)), script.inputs(0))
-    assert forgotten(step) == []
-    for name in ("command", "contact.force", "thresholds.sigma", "localisation.link"):
-        rest = {lasting: place for lasting, place in FIELDS.items() if lasting != name}
-        assert forgotten(step, rest) == [FIELDS[name].removesuffix(".3")]
 
 
 def test_the_walk_sees_what_is_within_and_what_is_optional():

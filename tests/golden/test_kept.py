@@ -36,13 +36,6 @@ def test_a_file_gives_back_every_bit(tmp_path: Path):
     assert back["calm"][0]["obstacles.point"].shape == (0, 3)
 
 
-def test_a_field_of_two_types_is_refused(tmp_path: Path):
-    steps = made_up()
-    steps["calm"][1]["armed"] = np.array(1.0)
-    with pytest.raises(TypeError, match="armed is not of one type"):
-        write(tmp_path / "a.npz", steps)
-
-
 def test_one_bit_is_found_and_named():
     steps, other = made_up(), made_up()
     command = other["push"][1]["command"]
