@@ -3,12 +3,21 @@
 import os
 import subprocess
 import sys
+from copy import copy
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from tests.fuzz import weather
-from tests.fuzz.machine import Machine
+from pretouch.control.path import Circle
+from pretouch.modes import Event
+from pretouch.perception.scene_filter import no_fixtures
+from pretouch.profiles import PROFILES
+from pretouch.types import Inputs, Mode, QpOutcome, RangeReadings
+from tests.fuzz import invariants, weather
+from tests.fuzz.machine import Course, Machine
+from tests.fuzz.worlds import World
 
 MODES = ("HOLD", "TRACK", "REACT")
 EVENTS = (
@@ -57,3 +66,83 @@ def test_no_compiled_loop_leaves_its_arrays(tmp_path: Path):
         [sys.executable, "-W", "error", "-c", run], cwd=root, env=checked, capture_output=True, text=True
     )
     assert done.returncode == 0, done.stderr
+
+
+# the checks notice what they are there for
+
+
+PAPER = PROFILES["paper"]
+SHORT = replace(PAPER, window=replace(PAPER.window, samples=5))
+
+
+def honest(course: Course) -> Inputs:
+    k = len(course.world.skin)
+    return Inputs(
+        course.time, course.robot(), RangeReadings(np.full(k, course.time), np.full(k, 0.25), np.zeros(k, int))
+    )
+
+
+@pytest.fixture(scope="module")
+def arm(panda_model, paper_skin):
+    """An arm on the move with an obstacle near its hand: its course, and a step with what is expected of it."""
+    ready = panda_model.description.q_ready
+    world = World(panda_model, SHORT, paper_skin, no_fixtures(), Circle(), ready, np.zeros(7), False, 0.0)
+    course = Course(Machine(0), world)
+    course.weather.feel = "denormal"
+    for _ in range(30):
+        course.step(honest(course), deep=True)
+    inputs = honest(course)
+    step, _ = course.controller.step(course.state, inputs)
+    assert step.qp.outcome is QpOutcome.SOLVED
+    assert len(step.restricted) > 2
+    return course, step, course.oracle.expect(inputs)
+
+
+def commanded(step, e, command, model):
+    invariants.check_command(replace(step, command=command), e, SHORT, model)
+
+
+def braked(step, e, factor, model):
+    held = replace(step, qp=replace(step.qp, outcome=QpOutcome.SKIPPED), command=factor * e.qd)
+    invariants.check_braking(held, e, SHORT, model)
+
+
+def told(course, step, e):
+    invariants.check_mode(step, e, copy(course.oracle), resume=False)
+
+
+@pytest.mark.parametrize(
+    "check",
+    [
+        lambda c, s, e: commanded(s, e, e.qd + 1.001 * c.other.description.qdd_max * 0.01, c.other),
+        lambda c, s, e: commanded(s, replace(e, qd=c.other.description.qd_max - 1e-3), e.qd + 2e-3, c.other),
+        # at 0.5 rad/s a joint of 7.5 rad/s^2 needs 17 mrad to stand
+        lambda c, s, e: commanded(
+            s, replace(e, q=c.other.q_max - 0.01 - 0.015, qd=np.full(7, 0.5)), np.full(7, 0.5), c.other
+        ),
+        lambda c, s, e: commanded(s, e, s.command * np.nan, c.other),
+        *(lambda c, s, e, factor=factor: braked(s, e, factor, c.other) for factor in (1.01, -0.01, 0.999)),
+        lambda c, s, e: invariants.check_rows(replace(s, command=s.command + 1e-3), SHORT, c.other),
+        lambda c, s, e: invariants.check_rows(replace(s, approach_limit=s.approach_limit + 1e-6), SHORT, c.other),
+        lambda c, s, e: invariants.check_rows(replace(s, restricted=s.restricted[1:]), SHORT, c.other),
+        lambda c, s, e: invariants.check_speed_scale(replace(s, speed_scale=1.0), SHORT),
+        lambda c, s, e: invariants.check_finite(replace(s, ee_velocity=s.ee_velocity * np.inf), e, SHORT),
+        lambda c, s, e: invariants.check_shapes(replace(s, q=s.q[:6]), 7, 7),
+        lambda c, s, e: invariants.check_shapes(replace(s, command=s.command.astype(np.float32)), 7, 7),
+        lambda c, s, e: told(c, replace(s, mode=Mode.HOLD), e),
+        lambda c, s, e: told(c, replace(s, mode=Mode.REACT), e),
+        lambda c, s, e: told(c, replace(s, event=Event.OVERRUN), e),
+        lambda c, s, e: told(c, s, replace(e, silent=["hand_left"])),
+        lambda c, s, e: told(c, s, replace(e, fault=Event.STATE_STALE)),
+    ],
+)
+def test_what_breaks_an_invariant_is_noticed(arm, check):
+    told(*arm)
+    with pytest.raises(AssertionError):
+        check(*arm)
+
+
+def test_a_difference_in_the_last_bit_is_noticed(arm):
+    _, step, _ = arm
+    assert invariants.same(step, replace(step, command=step.command.copy()))
+    assert not invariants.same(step, replace(step, command=np.nextafter(step.command, 9.0)))

@@ -1,30 +1,20 @@
 """What a fuzzed controller is made of: profile, skin, fixtures, path, and where the arm starts."""
 
-from dataclasses import dataclass, fields, replace
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass, fields, is_dataclass, replace
+from types import NoneType, UnionType
+from typing import Literal, get_args, get_origin
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pretouch.contact.admittance import Admittance
+from pretouch.checks import Checked, hints_of
 from pretouch.contact.moving_thresholds import MovingThresholds
-from pretouch.contact.reaction import DecayingVelocity, Reaction
-from pretouch.contact.sequential_test import SequentialTest
-from pretouch.control.approach import ApproachRestriction, BrakingCurve
+from pretouch.contact.reaction import DecayingVelocity
+from pretouch.control.approach import ApproachRestriction
 from pretouch.control.path import Circle, Path, WayPoints, segment
-from pretouch.params import (
-    ClampParams,
-    ClosingSpeed,
-    FailureParams,
-    GiveUpParams,
-    LocalisationParams,
-    PerceptionParams,
-    PinchParams,
-    ProximityPriorParams,
-    SpeedReduction,
-    TaskParams,
-    WindowParams,
-)
-from pretouch.params.pretouch import EffectiveMass, NullSpaceMotion, Tangential
+from pretouch.errors import ParameterError
 from pretouch.perception.scene_filter import Fixtures, no_fixtures
 from pretouch.profiles import Profile, profile
 from pretouch.robot.body import Capsules
@@ -32,81 +22,12 @@ from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, paper_skin
 from tests.reference.skins import spread
 
-# for each parameter its usual value and values far to both sides; what a check bounds, up to the bound
-CHOICES: dict[type, dict[str, tuple[object, ...]]] = {
-    PerceptionParams: {
-        "persistence_s": (0.06, 0.005, 1.0), "self_margin_m": (0.06, 0.0, 1.0, None), "slow_after_s": (0.1, 0.02),
-        "silent_after_s": (0.3, 0.101), "spread_sigmas": (2.0, 0.0, 20.0),
-    },
-    TaskParams: {
-        "speed_m_s": (0.3, 1e-3, 5.0), "acceleration_m_s2": (1.0, 1e-3, 100.0), "restore_cycles": (20, 1, 10_000),
-        "position_gain_1_s": (2.0, 0.0, 50.0),
-        "off_path_m": (0.1, 1e-3, 10.0), "orientation": ("hold", "free"), "orientation_gain_1_s": (1.0, 0.0, 20.0),
-        "damping_max": (0.1, 0.0, 10.0), "manipulability_threshold": (0.001, 1e-6, 10.0),
-        "mid_joint_gain": (0.001, 1e-6, 1.0), "mid_joint_time_s": (5.0, 0.01, 1e3),
-        "control_period_s": (0.01, 0.001), "position_margin_rad": (0.01, 0.0, 0.2),
-    },
-    SpeedReduction: {"d_max_m": (0.8, 1e-3, 5.0)},
-    ApproachRestriction: {
-        "rows": ("slack", "hard", "floor"), "v_max_m_s": (0.04, 1e-4, 2.0), "beta": (-10.0, -1e-3, -1e3),
-        "d_repulse_m": (0.1, 1e-3, 1.0), "d_crit_m": (0.1, 1e-3), "d_notice_m": (0.6, 0.2, 5.0),
-        "floor_m_s": (0.02, 0.0, 1.0), "slack_weight": (1000.0, 1e-2, 1e6),
-    },
-    WindowParams: {"samples": (5, 2, 30), "alpha": (0.1, 0.0, 1.0), "lambda_": (0.75, 0.0, 5.0)},
-    MovingThresholds: {
-        "f_base_n": (10.0, 4.1), "f_std_n": (3.0, 0.0), "sigma_max_n": (3.0, 1e-3), "f_d_n": (4.0, 0.0),
-        "d_max_m": (0.8, 5.0), "d_min_m": (0.05, 0.0, 0.79), "compare": ("filtered", "raw"),
-    },
-    DecayingVelocity: {
-        "compliance_m_s_n": (0.03, 1e-4, 1.0), "speed_max_m_s": (0.3, 0.01, 2.0), "decay_cycles": (20, 1, 200),
-    },
-    FailureParams: {
-        "state_timeout_s": (0.05, 1.0), "overrun_s": (0.05, 0.5), "force_max_n": (1e5, 200.0),
-        "force_timeout_s": (0.2, 0.05),
-    },
-}  # fmt: skip
-
-
-# the same of what the paper has not: all of these are drawn for half of the worlds
-OURS: dict[type, dict[str, tuple[object, ...]]] = {
-    PerceptionParams: {
-        "closing": (ClosingSpeed(), ClosingSpeed(0.01), ClosingSpeed(1.0), None),
-        "reckon_below_minimum": (True, False), "place_at_stamp": (True, False),
-    },
-    TaskParams: {"mid_joint_projected": (True, False)},
-    BrakingCurve: {
-        "d_notice_m": (0.6, 0.2, 5.0), "slack_weight": (1000.0, 1e-2, 1e6),
-        "deceleration_m_s2": (0.6, 0.01, 10.0), "latency_s": (0.06, 0.0, 1.0), "margin_m": (0.01, 0.0, 0.3),
-        "touch_speed_max_m_s": (0.05, 1e-3, 1.0), "retreat_max_m_s": (0.1, 0.0, 1.0),
-        "effective_mass": (
-            EffectiveMass("chest"), EffectiveMass(), EffectiveMass(region_force_n=1.0),
-            EffectiveMass("chest", region_force_n=1e3), None,
-        ),
-        "closing_deadband_m_s": (0.05, 0.0, None), "tangential": (Tangential(), None),
-        "tighten_m_s2": (3.0, 0.1, 100.0), "loosen_m_s2": (1.0, 0.1, 100.0),
-    },
-    NullSpaceMotion: {"speed_m_s": (0.1, 2.0), "joint_rad_s": (0.5, 5.0), "rate_rad_s2": (1.0, 100.0)},
-    WindowParams: {"freeze_while_reacting": (True, False)},
-    SequentialTest: {
-        "false_alarms_per_hour": (1.0, 3600.0),
-        "proximity": (ProximityPriorParams(), ProximityPriorParams(gain=1e4), None),
-        "learn": ("watched", "always", "never"), "memory_s": (300.0, 1.0), "tails": (30.0, 3.0), "suspect": (0.6, 1.0),
-        "localise": (LocalisationParams(), None),
-    },
-    Admittance: {
-        "speed_max_m_s": (0.3, 0.01, 2.0), "soft_hold": (True, False), "lag_s": (0.0167, 0.0, 0.2),
-        "inertia_kg_m2": (1.5, 1e-3, 100.0), "damping_nm_s": (15.0, 0.1, 1e3), "dead_band_nm": (0.5, 0.0),
-        "dead_band_fraction": (0.02, 0.0, 0.5), "static_friction_nm": (3.0, 0.0, 20.0),
-        "start_energy_j": (0.2, 0.0, 50.0), "quiet_s": (0.05, 1.0), "patience_s": (0.1, 10.0),
-    },
-    ClampParams: {"torque_nm": (4.0, 0.1), "open_m_s": (0.1, 2.0), "open_s": (0.05, 0.5)},
-    PinchParams: {"gap_m": (0.2, 5.0), "force_n": (10.0, 0.01)},
-    GiveUpParams: {"contacts": (3, 1), "push_j": (0.3, 1e-3, 50.0), "retry_s": (0.3, 30.0)},
-}  # fmt: skip
-DETECTORS = (SequentialTest, SequentialTest, MovingThresholds)
-NAMED = ("pretouch",)
-NAMED_SHARE = 0.15
-"""Share of profiles that are the named one as it is."""
+ONLY = {"control_period_s": (0.01, 0.001), "samples": (2, 5, 30), "solver_iterations": (500,)}
+"""Parameters that have only these values."""
+SOON = {"samples": 5, "restore_cycles": 20, "decay_cycles": 20, "quiet_s": 0.05, "patience_s": 0.1, "retry_s": 0.3}
+"""What is usual here in place of what a profile says, so that much happens in few steps."""
+FAR = 30.0
+"""How many times a parameter is as large, or as small, as usual."""
 
 
 @dataclass(frozen=True)
@@ -137,45 +58,54 @@ def any_world(rng: np.random.Generator, model: RobotModel) -> World:
 
 
 def any_profile(rng: np.random.Generator) -> Profile:
-    """Draw each parameter, mostly the usual value in a third of the profiles; a few are named ones as they are."""
-    usual = 0.85 if rng.random() < 1 / 3 else 0.4
-    if rng.random() < NAMED_SHARE:
-        named = profile(str(rng.choice(NAMED)))
-        return replace(named, window=replace(named.window, samples=5))
-    ours = rng.random() < 0.6
-    groups = {f.name: f.type for f in fields(Profile) if f.type in CHOICES or (ours and f.type in OURS)}
-    groups["perception"] = PerceptionParams
-    choices = {group: CHOICES.get(group, {}) | (OURS.get(group, {}) if ours else {}) for group in groups.values()}
-    drawn = {name: group(**_drawn(rng, choices[group], usual)) for name, group in groups.items()}
-    detector = DETECTORS[int(rng.integers(len(DETECTORS)))] if ours else MovingThresholds
-    drawn["detect"] = detector(**_drawn(rng, CHOICES.get(detector, {}) | OURS.get(detector, {}), usual))
-    if rng.random() < 0.25 * (1 - usual):
-        drawn["perception"] = None
-    drawn |= {"slow": _one_of(rng, usual, SpeedReduction, None), "null_space": None}
-    drawn["approach"] = _one_of(rng, usual, ApproachRestriction, ApproachRestriction, None)
-    if ours:
-        drawn["approach"] = _one_of(rng, usual, BrakingCurve, BrakingCurve, ApproachRestriction, None)
-        drawn["null_space"] = _one_of(rng, usual, NullSpaceMotion, None)
-    return Profile(**{**drawn, "name": "fuzzed", "react": any_reaction(rng, ours, usual)})
+    """Draw the paper's profile or ours, some of its parts in place of others, and each parameter of each part.
+
+    A parameter is mostly the usual one in a third of the profiles, and always in a few.
+    """
+    usual = float(rng.choice([1.0, 0.85, 0.4], p=[0.15, 0.3, 0.55]))
+    base = profile("pretouch" if rng.random() < 0.6 else "paper")
+    others = {
+        "perception": (None,), "slow": (None,), "null_space": (None,), "approach": (ApproachRestriction(), None),
+        "detect": (MovingThresholds(),), "react": (DecayingVelocity(),),
+    }  # fmt: skip
+    drawn = {}
+    for name, kinds in others.items():
+        rare = rng.random() < (1.0 - usual) * (0.25 if name == "perception" else 0.6)
+        drawn[name] = kinds[rng.integers(len(kinds))] if rare else getattr(base, name)
+    parts = {item.name: drawn.get(item.name, getattr(base, item.name)) for item in fields(base)}
+    varied = {name: _varied(rng, part, usual) if is_dataclass(part) else part for name, part in parts.items()}
+    return Profile(**{**varied, "name": "fuzzed"})
 
 
-def any_reaction(rng: np.random.Generator, ours: bool, usual: float) -> Reaction:
-    """Draw the paper's reaction, or an admittance that looks for clamps, for things caught, for places, or not."""
-    if not ours or rng.random() < 0.2:
-        return DecayingVelocity(**_drawn(rng, CHOICES[DecayingVelocity], usual))
-    drawn = {kind: kind(**_drawn(rng, OURS[kind], usual)) for kind in (ClampParams, PinchParams, GiveUpParams)}
-    clamp, pinch, give_up = (found if rng.random() < 0.8 else None for found in drawn.values())
-    return Admittance(**_drawn(rng, OURS[Admittance], usual), clamp=clamp, pinch=pinch, give_up=give_up)
+def _varied(rng: np.random.Generator, part: Checked, usual: float) -> Checked:
+    """Draw each parameter of a part: the usual value, or one far off that its checks allow."""
+    for name, hint in hints_of(type(part)).items():
+        value = SOON.get(name, getattr(part, name))
+        value = _varied(rng, value, usual) if isinstance(value, Checked) else value
+        choices = [value, *(ONLY.get(name) or _far(rng, hint, value, usual))]
+        order = rng.permutation(len(choices)) if rng.random() > usual else [0]
+        for i in (*order, 0):
+            with suppress(ParameterError):
+                part = replace(part, **{name: choices[i]})
+                break
+    return part
 
 
-def _one_of(rng: np.random.Generator, usual: float, *kinds: type | None) -> object:
-    """Draw a part, or none, and its parameters; the first kind mostly."""
-    kind = kinds[0] if rng.random() < usual else kinds[rng.integers(len(kinds))]
-    return None if kind is None else kind(**_drawn(rng, CHOICES.get(kind) or OURS[kind], usual))
-
-
-def _drawn(rng: np.random.Generator, choices: dict[str, tuple[object, ...]], usual: float) -> dict[str, object]:
-    return {name: v[0] if rng.random() < usual else v[rng.integers(len(v))] for name, v in choices.items()}
+def _far(rng: np.random.Generator, hint: object, value: object, usual: float) -> Iterator[object]:
+    """What else a parameter may be: what a check bounds, up to the bound."""
+    for kind in get_args(hint) if get_origin(hint) is UnionType else (hint,):
+        if kind is NoneType:
+            yield None
+        elif kind is bool:
+            yield not value
+        elif get_origin(kind) is Literal:
+            yield from get_args(kind)
+        elif isinstance(kind, type) and issubclass(kind, Checked):
+            yield _varied(rng, kind(), usual)
+        for check in getattr(kind, "__metadata__", ()):
+            number = kind.__origin__
+            yield from (number(end) for end in (check.low, check.high) if np.isfinite(end))
+            yield from (number(times * value) for times in (FAR, 1 / FAR) if value is not None)
 
 
 def any_skin(rng: np.random.Generator, model: RobotModel) -> Skin:
