@@ -58,18 +58,12 @@ def test_a_point_is_an_obstacle_at_its_distance_less_two_sigmas(watcher):
     near = watcher.see(1.0, points_at(1.0, BESIDE, sigma=0.01))
     exact = closest_points(watcher.kin, watcher.model.body, TCP, np.zeros(1, int), BESIDE[None], np.eye(3)[:1])
     assert len(near.unit) == 1
-    assert near.unit[0] >= UNITS
+    assert watcher.model.parts[(near.unit[0] - UNITS) // 2] == near.link[0], "places follow the units of the skin"
     assert near.point == pytest.approx(BESIDE[None])
     assert near.body_distance == pytest.approx(exact.body_distance - 0.02)
     assert near.ee_distance == pytest.approx([0.4 - 0.02], abs=1e-5)
     assert near.direction == pytest.approx(exact.direction)
     assert near.link.tolist() == exact.link.tolist()
-
-
-def test_the_places_follow_the_units_of_the_skin(watcher):
-    near = watcher.see(1.0, points_at(1.0, BESIDE))
-    place = near.unit[0] - UNITS
-    assert watcher.model.parts[place // 2] == near.link[0]
 
 
 def on_the_arm(model, q, count: int = 400):
@@ -216,6 +210,8 @@ def test_the_own_speed_of_what_is_seen_is_known(panda_model, speed):
 
 
 def test_a_set_from_the_future_or_from_before_is_not_heard(watcher):
+    assert len(watcher.see(0.5, None).unit) == 0
+    assert np.isnan(watcher.heard)
     assert len(watcher.see(1.0, points_at(1.5, BESIDE)).unit) == 0
     assert watcher.heard == -np.inf
     watcher.see(1.0, points_at(1.0, BESIDE))
@@ -223,12 +219,9 @@ def test_a_set_from_the_future_or_from_before_is_not_heard(watcher):
     assert watcher.heard == 1.0
 
 
-def test_before_its_first_points_no_source_was_heard(watcher):
-    assert len(watcher.see(0.5, None).unit) == 0
-    assert np.isnan(watcher.heard)
-
-
 def test_a_source_that_falls_silent_slows_the_arm_and_stops_it(watcher):
+    watcher.see(1.0, points_at(-np.inf))
+    assert outside_silence(watcher.heard, "", 1.0, POINTS) == (0.0, "has not been heard yet")
     watcher.see(1.0, points_at(1.0))
     assert outside_silence(watcher.heard, "", 1.2, POINTS) == (1.0, "")
     factor, lost = outside_silence(watcher.heard, "", 1.3, POINTS)
@@ -237,8 +230,3 @@ def test_a_source_that_falls_silent_slows_the_arm_and_stops_it(watcher):
     assert outside_silence(watcher.heard, "gives nonsense", 1.0, POINTS) == (0.0, "gives nonsense")
     assert outside_silence(watcher.heard, "gives nonsense", 1.0, None) == (1.0, "")
     assert outside_silence(np.nan, "", 1.0, POINTS) == (1.0, "")
-
-
-def test_a_source_that_was_never_heard_is_silent(watcher):
-    watcher.see(1.0, points_at(-np.inf))
-    assert outside_silence(watcher.heard, "", 1.0, POINTS) == (0.0, "has not been heard yet")

@@ -1,14 +1,16 @@
+"""From readings to obstacles: which, where, for how long, and what silence does."""
+
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.perception.watcher import FLOOR, HAND_LEFT, PARAMS, TCP, Watcher, readings_of
+from tests.perception.watcher import HAND_LEFT, PARAMS, TCP, Watcher, readings_of
 
 from pretouch.perception.obstacles import silent_units
-from pretouch.robot.body import Capsules, placed
-from pretouch.robot.description import panda
+from pretouch.perception.scene_filter import no_fixtures
+from pretouch.profiles import PROFILES
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit
 from pretouch.types import RangeReadings, RangeStatus
@@ -62,14 +64,6 @@ def test_an_obstacle_is_given_up_after_its_persistence(watcher):
     assert len(watcher.take(old, 1.02).unit) == 1  # by the time it was seen, not by how often it was asked
 
 
-def test_an_obstacle_stays_where_it_was_while_the_arm_moves(watcher):
-    shown = watcher.see(1.0, hand_left=0.3)
-    watcher.q = panda().q_ready + 0.3 * np.eye(7)[0]  # turn towards it
-    kept = watcher.take(readings_of(watcher.skin, 1.0, hand_left=0.3), 1.03)
-    np.testing.assert_array_equal(kept.point, shown.point)
-    assert kept.body_distance[0] < shown.body_distance[0] - 0.05
-
-
 # What is known to be there
 
 
@@ -93,14 +87,6 @@ def test_only_the_unit_that_sees_the_arm_is_silenced(watcher):
     assert [watcher.skin.ids[k] for k in found.unit] == ["hand_left", "wrist_front"]
 
 
-def test_a_declared_post_is_no_obstacle(panda_model, paper_skin):
-    ends = np.array([[0.307, 0.6, -0.2], [0.307, 0.6, 1.0]])
-    post = Capsules(np.zeros(1, np.int64), ends[:1], ends[1:], np.array([0.1]))
-    watcher = Watcher(panda_model, paper_skin, replace(FLOOR, capsules=post))
-    assert len(watcher.see(1.0, hand_left=0.39).unit) == 0  # its surface is at 0.6 - 0.1 - 0.108 = 0.392 m
-    assert len(watcher.see(1.02, hand_left=0.3).unit) == 1
-
-
 @pytest.mark.parametrize(("distance", "shown"), [(0.42, 0), (0.37, 0), (0.34, 1)])
 def test_the_base_is_seen_but_never_the_part_to_move_away(watcher, distance, shown):
     # hand low before the base, its back 0.416 m from it; the first link lies 35 mm behind the base's front
@@ -108,22 +94,6 @@ def test_the_base_is_seen_but_never_the_part_to_move_away(watcher, distance, sho
     found = watcher.see(1.0, hand_back=distance)
     assert len(found.unit) == shown
     assert "panda_link0" not in [watcher.model.links[link] for link in found.link]
-
-
-# On the axis of a capsule
-
-
-@pytest.mark.parametrize("last", [None, (0.6, 0.0, 0.8)])
-def test_on_the_axis_the_last_direction_holds_or_else_that_upwards(watcher, last):
-    _, a, b, _ = placed(watcher.model.body, watcher.model.kinematics(watcher.q))
-    finger = watcher.model.body.radius.argmin()
-    unit = watcher.skin.ids.index("hand_left")
-    watcher.state.point[unit], watcher.state.seen[unit] = (a[finger] + b[finger]) / 2, 1.0
-    if last:
-        watcher.state.direction[unit] = last
-    found = watcher.take(readings_of(watcher.skin, -np.inf), 1.01)
-    np.testing.assert_allclose(found.direction, [last or (0, 0, 1)], atol=1e-5)
-    np.testing.assert_array_equal(watcher.state.direction[unit], found.direction[0])
 
 
 # Whatever arrives
@@ -208,3 +178,78 @@ def test_the_arm_stands_exactly_when_a_unit_is_named(panda_model, paper_skin, ag
     assert 0.0 <= left <= 1.0
     assert (left == 0.0) == bool(silent)
     assert left == 1.0 or max(ages) > 0.0999 or min(ages) < 0.0
+
+
+# a point from which the arm carries the beam away is kept, and given up once its place is seen empty
+
+
+KEPT_S = 1.0
+NOTHING = (np.nan, RangeStatus.SIGNAL)
+"""Too little light: nothing is near."""
+
+
+class TurnedWatcher(Watcher):
+    """Perception of the hand's left unit alone."""
+
+    def __init__(self, model, skin, kept=KEPT_S):
+        super().__init__(model, skin, no_fixtures(), replace(PROFILES["paper"].perception, out_of_view_s=kept))
+
+    def at(self, now, turned, reading):
+        """Points at an instant [s] with joint 1 turned by an angle [deg], a new reading of the unit."""
+        self.q = self.model.description.q_ready + np.deg2rad(turned) * np.eye(7)[0]
+        return self.see(now, reading[1], hand_left=reading[0]).point
+
+
+OBJECT = (0.3, RangeStatus.OK)
+
+
+@pytest.fixture
+def turned(panda_model, paper_skin):
+    return TurnedWatcher(panda_model, paper_skin)
+
+
+def test_a_point_is_kept_for_its_time_while_the_beam_goes_on(turned):
+    there = turned.at(0.0, 0.0, OBJECT)
+    assert len(there) == 1
+    for now in (0.1, 0.5, 0.99):
+        np.testing.assert_array_equal(turned.at(now, 40 * now, NOTHING), there)
+    assert len(turned.at(1.02, 40.0, NOTHING)) == 0
+
+
+def test_without_it_the_point_goes(panda_model, paper_skin):
+    turned = TurnedWatcher(panda_model, paper_skin, kept=0.0)
+    turned.at(0.0, 0.0, OBJECT)
+    assert len(turned.at(0.1, 4.0, NOTHING)) == 0
+
+
+def test_of_an_arm_at_rest_it_goes_as_ever(turned):
+    turned.at(0.0, 0.0, OBJECT)
+    assert len(turned.at(0.05, 0.0, NOTHING)) == 1, "one missed reading"
+    assert len(turned.at(0.1, 0.0, NOTHING)) == 0
+
+
+def test_a_place_seen_empty_is_empty_when_the_beam_leaves_it_again(turned):
+    turned.at(0.0, 0.0, OBJECT)
+    assert len(turned.at(0.1, 4.0, NOTHING)) == 1
+    assert len(turned.at(0.2, 0.0, NOTHING)) == 0
+    assert len(turned.at(0.3, 4.0, NOTHING)) == 0
+
+
+@pytest.mark.parametrize(
+    ("reading", "kept"),
+    [((np.nan, RangeStatus.HARDWARE), True), ((1.2, RangeStatus.OK), False)],
+    ids=["a failure tells nothing", "what lies behind it is seen"],
+)
+def test_only_a_look_through_its_place_says_that_it_is_empty(turned, reading, kept):
+    first = turned.at(0.0, 0.0, OBJECT)
+    turned.at(0.1, 4.0, NOTHING)
+    turned.at(0.2, 0.0, reading)
+    points = turned.at(0.3, 4.0, NOTHING)
+    assert any(np.array_equal(point, first[0]) for point in points) == kept
+
+
+def test_what_is_seen_next_takes_its_place(turned):
+    turned.at(0.0, 0.0, OBJECT)
+    points = turned.at(0.1, 4.0, (0.2, RangeStatus.OK))
+    assert len(points) == 1
+    np.testing.assert_array_equal(turned.at(0.2, 8.0, NOTHING), points)

@@ -1,3 +1,5 @@
+"""What a sensor is expected to see of the arm and of fixtures, which is no obstacle."""
+
 import mujoco
 import numpy as np
 import pytest
@@ -5,8 +7,9 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
-from tests.perception.watcher import FLOOR
+from tests.perception.watcher import FLOOR, HAND_LEFT, Watcher
 
+from pretouch.params import PerceptionParams
 from pretouch.perception.closest import closest_points
 from pretouch.perception.obstacles import placed_sensors
 from pretouch.perception.scene_filter import Fixtures, expected_range, no_fixtures, ray_capsule
@@ -14,6 +17,8 @@ from pretouch.robot.body import Capsules
 from pretouch.robot.description import panda
 from pretouch.robot.kinematics import Kinematics
 from pretouch.sensing.sensor import PAPER_SENSOR, Sensors, cone_rays, cones_of
+from pretouch.sensing.skin import LIVE_SKIN, load_skin
+from pretouch.sim.random_skin import Misplacement, misplaced
 
 INF = np.inf
 NOTHING = no_fixtures()
@@ -185,3 +190,39 @@ def test_the_arm_is_seen_where_mujocos_rays_meet_it(panda_model, paper_skin, muj
             seen += np.isfinite(nearest)
     assert seen > 200
     assert buried > 10
+
+
+# the arm itself, seen by a unit that is not quite where it is believed to be
+
+
+ASIDE = PerceptionParams(self_aside_m=0.005)
+
+
+def test_units_a_little_elsewhere_do_not_take_their_own_arm_for_an_obstacle(panda_model):
+    rng, placed_by_hand = np.random.default_rng(5), Misplacement(5.0, 3.0)
+    shown, readings = 0, 0
+    for seed in range(10):
+        truly = load_skin(LIVE_SKIN, panda_model)
+        believed = misplaced(truly, panda_model, placed_by_hand, seed)[0]
+        watcher = Watcher(panda_model, believed, no_fixtures(), ASIDE)
+        for now in range(1, 51):  # a second apart, so that nothing is remembered
+            watcher.q = rng.uniform(panda_model.q_min, panda_model.q_max)
+            kin = panda_model.kinematics(watcher.q)
+            at = expected_range(
+                kin, placed_sensors(truly.arrays, kin), truly.cones, panda_model.capsules, no_fixtures()
+            )
+            near = {u: max(d, PAPER_SENSOR.nearest_m) for u, d in zip(truly.ids, at, strict=True) if d < 0.3}
+            readings += len(near)
+            shown += len(watcher.see(now, **near).unit)
+    assert readings > 1000
+    assert shown < 10  # 46 without the allowance
+
+
+@pytest.mark.parametrize(("distance", "shown"), [(0.05, 1), (0.13, 1), (0.15, 0), (0.25, 0), (0.27, 1), (0.5, 1)])
+def test_what_is_barely_missed_explains_what_is_about_there_and_hides_nothing(panda_model, paper_skin, distance, shown):
+    # a post whose surface lies 3 mm outside of the cone, 0.2 m before the unit of the hand that looks along +y
+    edge = 0.2 * np.tan(PAPER_SENSOR.angle / 2) + 0.003 / np.cos(PAPER_SENSOR.angle / 2)
+    post = HAND_LEFT + np.array([0.0, 0.2, edge + 0.01 / np.cos(PAPER_SENSOR.angle / 2)])
+    ends = post[None] - np.array([0.3, 0, 0]), post[None] + np.array([0.3, 0, 0])
+    beside = Fixtures(np.zeros((0, 4)), Capsules(np.zeros(1, np.int64), *ends, np.full(1, 0.01)))
+    assert len(Watcher(panda_model, paper_skin, beside, ASIDE).see(1.0, hand_left=distance).unit) == shown
