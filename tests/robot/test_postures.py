@@ -1,3 +1,5 @@
+"""Postures: how far an arm is from itself, and one that brings the hand to a point."""
+
 import mujoco
 import numpy as np
 import pytest
@@ -6,9 +8,10 @@ from hypothesis import strategies as st
 from scipy.optimize import lsq_linear
 from scipy.stats import qmc
 
+from pretouch.errors import ExperimentError
 from pretouch.robot.description import RobotDescription, fr3, panda
 from pretouch.robot.model import RobotModel
-from pretouch.robot.postures import capsule_ends, kinematics_of, segment_distance, self_distances
+from pretouch.robot.postures import brought_to, capsule_ends, kinematics_of, segment_distance, self_distances
 
 ARMS = [panda(), fr3()]
 
@@ -81,3 +84,21 @@ def test_parallel_segments_too(a, b, begin, end, offset):
 def test_points_are_segments_of_no_length(a, b, c):
     assert segment_distance(a, a, b, b) == pytest.approx(float(np.linalg.norm(a - b)), abs=1e-12)
     assert segment_distance(a, a, b, c) == pytest.approx(float(segment_distance(b, c, a, a)), abs=1e-9)
+
+
+# the hand brought to a point
+
+
+def test_the_hand_is_at_the_point_and_as_upright_as_before(panda_model):
+    point = np.array([0.5, -0.25, 0.25])
+    q = brought_to(panda_model, point)
+    kin, ready = panda_model.kinematics(q), panda_model.kinematics(panda_model.description.q_ready)
+    ee = panda_model.ee
+    np.testing.assert_allclose(kin.position[ee], point, atol=2e-6)
+    np.testing.assert_allclose(kin.rotation[ee], ready.rotation[ee], atol=1e-5)
+    assert np.all((q > panda_model.q_min) & (q < panda_model.q_max))
+
+
+def test_a_point_out_of_reach_is_named(panda_model):
+    with pytest.raises(ExperimentError, match=r"cannot reach \[2.0, 0.0, 0.5\]"):
+        brought_to(panda_model, np.array([2.0, 0.0, 0.5]))
