@@ -115,3 +115,11 @@ def test_a_state_for_another_skin_is_refused(arm: Arm, panda_model: RobotModel, 
         Controller(panda_model, few, arm.controller.fixtures, arm.controller.path, PAPER).adopt(
             arm.state, arm.controller
         )
+
+
+def test_another_method_begins_anew_and_what_was_learnt_can_be_given(arm: Arm, panda_model, paper_skin):
+    ours = Arm(panda_model, paper_skin, PROFILES["pretouch"]).controller
+    model = ours.adopt(arm.state, arm.controller).learnt
+    assert not model.weights.any()
+    again = ours.init(arm.robot(), model._replace(weights=model.weights + 0.5)).learnt
+    np.testing.assert_array_equal(again.weights, 0.5)

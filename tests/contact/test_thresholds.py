@@ -1,4 +1,4 @@
-"""Eqs. 9-11 by numbers, and which side of the arm eases which contact."""
+"""Eqs. 9-11 by numbers, which side of the arm eases which contact, and the way from a force sample to a contact."""
 
 import numpy as np
 import pytest
@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from pretouch.contact.detector import Detection
 from pretouch.contact.moving_thresholds import (
     MovingThresholds,
     noise_force,
@@ -13,12 +14,11 @@ from pretouch.contact.moving_thresholds import (
     side_distances,
     threshold_parts,
 )
-from pretouch.contact.window import window_init
-from pretouch.params import ThresholdParams
+from pretouch.contact.window import Window, add_force, window_init
+from pretouch.params import ThresholdParams, WindowParams
 from pretouch.types import Obstacles, Thresholds, no_obstacles
 
 TABLE_I = ThresholdParams()  # F_b = 10, F_std = 3, sigma_max = 3, F_d = 4, d_max = 0.8, d_min = 0.05
-FAR = np.full(3, np.inf)
 
 
 def thresholds(
@@ -91,12 +91,6 @@ def test_sides_are_half_spaces_and_the_nearest_object_counts():
     np.testing.assert_array_equal(negative, [0.14, 0.7, np.inf])
 
 
-def test_no_object_on_any_side():
-    positive, negative = side_distances(np.zeros(3), np.zeros((0, 3)), np.zeros(0))
-    np.testing.assert_array_equal(positive, FAR)
-    np.testing.assert_array_equal(negative, FAR)
-
-
 def test_a_force_on_the_threshold_has_not_crossed_it():
     assert crossed((10.0, -10.0, 0.0)) is None
     assert crossed((10.001, -10.001, 0.0)) == [True, True, False]
@@ -124,3 +118,79 @@ def test_nearer_is_never_less_sensitive(a, b):
     distant = thresholds(np.zeros(3), np.zeros(3), far, far, TABLE_I)
     assert np.all(close.upper <= distant.upper)
     assert np.all(close.lower >= distant.lower)
+
+
+# from a force sample to a contact: arming, filtered against raw, the help of proximity, and a missing estimate
+
+
+EE = np.array([0.5, 0.0, 0.3])
+PUSH = np.array([0.0, -50.0, 0.0])
+
+
+def points(*at: tuple[float, float, float]) -> Obstacles:
+    """Sensed points; what belongs to the body plays no part in detection."""
+    p = np.array(at).reshape(-1, 3)
+    return no_obstacles()._replace(point=p, ee_distance=np.linalg.norm(p - EE, axis=1))
+
+
+def detect(
+    state: Window, force: np.ndarray | None, obstacles: Obstacles, params: MovingThresholds
+) -> tuple[Detection, Window]:
+    window = add_force(state, force, WindowParams())
+    return params.judged(window, force, state.full, EE, obstacles), window
+
+
+def quiet(samples: int = 100) -> Window:
+    """A full window of zeros."""
+    state = window_init(samples)
+    for _ in range(samples):
+        state = add_force(state, np.zeros(3), WindowParams())
+    return state
+
+
+def push(params: MovingThresholds, obstacles: Obstacles, samples: int, force: np.ndarray = PUSH) -> list[Detection]:
+    """Let a constant force act after a quiet time."""
+    state, found = quiet(), []
+    for _ in range(samples):
+        detection, state = detect(state, force, obstacles, params)
+        found.append(detection)
+    return found
+
+
+def test_nothing_is_detected_before_the_window_is_full():
+    params = MovingThresholds(compare="raw")
+    state = window_init(3)
+    for force in (0.0, 0.0, 1e3):
+        detection, state = detect(state, np.full(3, force), points(), params)
+        assert not detection.armed
+        assert detection.contact is None
+    detection, _ = detect(state, np.full(3, 1e4), points(), params)
+    assert detection.armed
+    assert detection.contact is not None
+
+
+def test_the_filtered_value_crosses_later_by_numbers():
+    found = push(MovingThresholds(), points(), 3)
+    # eq. 8 on -50 N: -5, then -5 * 0.9 - 5 = -9.5, then -9.5 * 0.9 - 5 = -13.55
+    # 3rd sample: mu = -(5 + 9.5 + 13.55) / 100 = -0.2805
+    # sum of squares 25 + 90.25 + 183.6025 = 298.8525; sigma^2 = (298.8525 - 100 * 0.2805^2) / 99 = 2.93924
+    # sigma = 1.71442 = F_sigma (F_std = sigma_max), T_l = -0.2805 - 10 - 1.71442 = -11.99492
+    assert [d.contact is not None for d in found] == [False, False, True]
+    assert found[2].thresholds.lower[1] == pytest.approx(-11.99492, abs=1e-5)
+    # F_ext = -13.55 + 0.2805 = -13.2695, on y only
+    np.testing.assert_allclose(found[2].contact.force, [0.0, -13.2695, 0.0], atol=1e-12)
+    assert found[2].contact.axes.tolist() == [False, True, False]
+
+
+def test_the_raw_sample_crosses_at_once():
+    found = push(MovingThresholds(compare="raw"), points(), 1)
+    # the window got -5: mu = -0.05, so F_ext = -50 + 0.05
+    np.testing.assert_allclose(found[0].contact.force, [0.0, -49.95, 0.0], atol=1e-12)
+
+
+def test_without_an_estimate_the_window_waits():
+    state = quiet(3)
+    detection, after = detect(state, None, points(), MovingThresholds())
+    assert after is state
+    assert detection.contact is None
+    assert detection.armed
