@@ -26,10 +26,9 @@ class Mover:
         self.memory, self.approach = state.memory, state.approach
 
     def step(
-        self, kin: Kinematics, robot: RobotState, obstacles: Obstacles, velocity: FloatArray, goal: FloatArray,
-        qd: FloatArray | None = None, hold: bool = False,
-    ) -> ControlStep:  # fmt: skip
-        """Return the motion of one step in which velocity, orientation, or joint velocities are asked for."""
+        self, kin: Kinematics, robot: RobotState, obstacles: Obstacles, velocity: FloatArray, goal: FloatArray
+    ) -> ControlStep:
+        """Return the motion of one step in which velocity and orientation are asked for."""
         controller, now = self.controller, self.controller.blank.copy()
         put_robot(now.part("robot", Report), robot)
         now.fill("kin", kin)
@@ -37,10 +36,8 @@ class Mover:
         for room, part in zip(now.part("seen.near", Obstacles), obstacles, strict=True):
             room[: len(part)] = part
         now.put("seen.all", len(obstacles.unit))
-        still = np.zeros(controller.model.n)
-        asked = {"velocity": velocity, "goal": goal, "hold": hold, "qd": still if qd is None else qd}
-        for name, number in {**asked, "by_joints": qd is not None}.items():
-            now.put(f"request.{name}", number)
+        now.put("request.velocity", velocity)
+        now.put("request.goal", goal)
         if controller.approach is None:
             controller.take(self.memory, now, controller.beside, MOVE, MOVE)
         else:

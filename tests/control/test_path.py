@@ -1,13 +1,11 @@
 """The paths of the paper by numbers, and how the phase moves along them."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from tests.following_arm import DT, Arm
+from tests.following_arm import DT
 
 from pretouch.control.path import Circle, Path, WayPoints, advance, follow, segment
 from pretouch.errors import PathError
@@ -151,24 +149,3 @@ def test_wherever_it_was_pushed_the_arm_comes_back_and_goes_on(path: Path, away:
     assert np.linalg.norm(path.point(phase) - position) < 0.005
     assert np.linalg.norm(velocity) > 0.95 * slowed * PARAMS.speed_m_s
     assert phase > 0.2
-
-
-def test_the_speed_grows_to_the_task_speed_and_starts_again_after_a_pause(panda_model, paper_skin):
-    arm, speeds = Arm(panda_model, paper_skin), [0.0]
-    arm.run(arm.controller.profile.window.samples)  # it stands until the window is full
-    for _ in range(35):
-        arm.step()
-        speeds.append(arm.state.memory.get("pace.speed"))
-    assert [speeds[1], speeds[29]] == pytest.approx([0.01, 0.29])
-    assert speeds[35] == 0.3
-    before = arm.state.phase
-    arm.step(change=lambda robot: replace(robot, stamp=robot.stamp - 1.0))  # stale: it holds
-    assert (arm.state.phase, arm.state.memory.get("pace.speed")) == (before, 0.0)
-
-
-def test_an_open_path_ends_where_it_ends(panda_model, paper_skin):
-    x = panda_model.kinematics(panda_model.description.q_ready).position[panda_model.ee]
-    arm = Arm(panda_model, paper_skin, path=segment(tuple(x), (x[0], x[1] + 0.1, x[2])))
-    phases = [step.path_phase for step in arm.run(200)]
-    assert max(phases) == phases[-1] == arm.controller.path.length
-    assert phases == sorted(phases)

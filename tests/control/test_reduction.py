@@ -96,13 +96,6 @@ def test_each_factor_is_the_fresh_one_or_on_its_way_up_to_it(fresh: list[float])
         assert after == factor or before <= after < factor
 
 
-@given(readings)
-@settings(deadline=None, derandomize=True, max_examples=300)
-def test_the_factor_is_never_above_what_the_nearest_seen_obstacle_allows(distances: list[float]):
-    for scale, distance in zip(scales(distances), distances, strict=True):
-        assert scale <= speed_scale(distance, D_MAX) + 1e-12
-
-
 def test_a_factor_that_is_no_number_leaves_a_usable_factor():
     # 0.5 + 0.5 * 3 / 4: as if nothing were seen
     pace = pace_of(0.5, 2)
