@@ -14,12 +14,13 @@ from pretouch.sensing.skin import Skin
 from pretouch.types import Inputs, Mode, QpOutcome, RangeReadings, RangeStatus
 from tests import following_arm
 from tests.following_arm import DT
+from tests.fuzz import weather
 
 SHORT = replace(PROFILES["paper"], window=replace(PROFILES["paper"].window, samples=5))
 HARD = replace(SHORT, approach=ApproachRestriction(rows="hard"))
 FAULTS = [
     "q", "qd", "q_commanded", "qd_commanded", "wrench", "no wrench", "robot stamp", "step stamp", "stale", "backwards",
-    "jump", "distance", "range stamp", "dead",
+    "jump", "distance", "stamp", "dead",
 ]  # fmt: skip
 LATCHING = FAULTS[:4] + FAULTS[6:11]
 
@@ -63,23 +64,17 @@ def hand(model: RobotModel) -> tuple[float, float, float]:
 
 def spoiled(inputs: Inputs, fault: str, value: float = np.nan) -> Inputs:
     """The same inputs with one thing wrong."""
-    robot, readings, now = inputs.robot, inputs.readings, inputs.stamp
-    if fault in ("q", "qd", "q_commanded", "qd_commanded", "wrench"):
-        wrong = getattr(robot, fault).copy()
-        wrong[3] = value
-        return replace(inputs, robot=replace(robot, **{fault: wrong}))
-    if fault in ("no wrench", "robot stamp", "stale"):
-        wrong = {"no wrench": {"wrench": None}, "robot stamp": {"stamp": value}, "stale": {"stamp": now - 0.2}}[fault]
-        return replace(inputs, robot=replace(robot, **wrong))
-    if fault in ("step stamp", "backwards", "jump"):
-        return replace(inputs, stamp={"step stamp": value, "backwards": now - 1.0, "jump": now + 60.0}[fault])
+    robot, readings = inputs.robot, inputs.readings
+    if fault == "no wrench":
+        return replace(inputs, robot=replace(robot, wrench=None))
     if fault == "dead":
-        silent = replace(readings, stamp=np.full(len(readings.stamp), -np.inf))
-        return replace(inputs, readings=replace(silent, status=np.full(len(readings.status), 255)))
-    name = {"distance": "distance", "range stamp": "stamp"}[fault]
-    wrong = getattr(readings, name).copy()
-    wrong[::2] = value
-    return replace(inputs, readings=replace(readings, **{name: wrong}))
+        silent = np.full(len(readings.stamp), -np.inf), np.full(len(readings.status), int(RangeStatus.NONE))
+        return replace(inputs, readings=replace(readings, stamp=silent[0], status=silent[1]))
+    if fault in ("distance", "stamp"):
+        wrong = getattr(readings, fault).copy()
+        wrong[::2] = value
+        return replace(inputs, readings=replace(readings, **{fault: wrong}))
+    return weather.spoiled(inputs, fault, value)
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, -1e15, 1e306])
@@ -96,13 +91,6 @@ def test_one_fault_that_lasts(arm: Arm, fault: str, value: float):
     # what latches stays, and what does not goes on by itself
     assert arm.run(60)[-1].mode is (Mode.HOLD if fault in LATCHING else Mode.TRACK)
     assert arm.step(resume=True).mode is Mode.TRACK
-
-
-@pytest.mark.parametrize("value", [5.0, -20.0, 999.0])
-def test_no_reported_velocity_makes_a_command_no_arm_can_follow(arm: Arm, value: float):
-    arm.run(60)
-    step, _ = arm.controller.step(arm.state, spoiled(arm.inputs(), "qd_commanded", value))
-    assert np.all(np.abs(step.command) <= arm.limits.qd_max + arm.limits.qdd_max * DT)
 
 
 @pytest.mark.parametrize("goal", [(0.0, 0.0, 3.0), (0.0, 0.0, 0.4), (0.3, 1.5, 0.3)])
@@ -148,17 +136,11 @@ def test_a_unit_that_only_reports_failures_is_a_silent_one(arm: Arm, status: Ran
     assert "hand_right" in steps[-1].reason
     assert "hand_left" not in steps[-1].reason
     assert not arm.qd.any()
-    assert arm.step().mode is Mode.TRACK
-
-
-def test_a_late_step_brakes_and_the_next_goes_on(arm: Arm):
-    arm.run(60)
-    before, arm.time = np.linalg.norm(arm.qd), arm.time + 0.06
-    late = arm.step()
-    assert late.mode is Mode.HOLD
-    assert "0.070 s ago, for this machine is busy" in late.reason
-    assert np.linalg.norm(arm.qd) < before
-    assert arm.step().mode is Mode.TRACK
+    again = arm.run(4)
+    assert {s.mode for s in again} == {Mode.TRACK}
+    # gently: the speed along the path grows from nothing, and the factor as after any obstacle
+    assert np.linalg.norm(again[0].desired_velocity) < 0.05
+    np.testing.assert_allclose([s.speed_scale for s in again], np.arange(1, 5) / 200)
 
 
 def test_a_blocked_arm_brakes_and_tries_again_at_each_step(panda_model: RobotModel, paper_skin: Skin):
@@ -196,17 +178,6 @@ def test_an_arm_that_starts_beyond_a_joint_limit_never_goes_further(arm: Arm, jo
         if sign * (before - (beyond - sign * 0.05)) > 0:
             assert sign * arm.qd[joint] <= 1e-12
     assert sign * (arm.q[joint] - beyond) <= 1e-12
-
-
-@pytest.mark.parametrize("factor", [0.9, 1.5])
-def test_an_arm_that_is_handed_over_moving_brakes_within_its_limits(arm: Arm, factor: float):
-    arm.qd = factor * arm.limits.qd_max * np.array([1, -1, 1, 1, -1, 1, -1])
-    arm.state = arm.controller.init(arm.robot())
-    for _ in range(5):  # the window is filling, so the arm holds
-        before = np.abs(arm.qd)
-        arm.step()
-        assert np.all(np.abs(arm.qd) <= before)
-    assert np.all(np.abs(arm.qd) < factor * arm.limits.qd_max)
 
 
 @pytest.mark.parametrize("goal", [(3.0, 0.0, 0.5), (0.0, 0.0, 3.0), (0.0, 0.0, 0.4), (0.4, 2.0, 0.1)])

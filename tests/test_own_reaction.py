@@ -12,6 +12,7 @@ from pretouch.recording.cycles import KeptState, packed_state
 from pretouch.recording.packing import unpacked
 from pretouch.types import Mode
 from tests.following_arm import PAPER, Arm
+from tests.fuzz.invariants import same
 
 
 @dataclass(frozen=True)
@@ -53,10 +54,15 @@ def test_a_reaction_of_somebody_else_moves_the_arm_as_long_as_it_says(arm: Arm):
     assert steps[-1].mode is Mode.TRACK
 
 
-def test_its_state_is_recorded_and_another_profile_goes_on_without_it(arm: Arm, panda_model, paper_skin):
+@pytest.mark.parametrize("name", ["rise", "pretouch"])
+def test_its_state_is_recorded_and_another_profile_goes_on_without_it(arm: Arm, panda_model, paper_skin, name: str):
+    if name == "pretouch":
+        arm = Arm(panda_model, paper_skin, profile(name))
+        arm.run(150)
     arm.run(6, force=(0.0, 40.0, 0.0))
+    assert arm.state.mode.mode is Mode.REACT
     back = unpacked(KeptState, packed_state(arm.state, False)).state
-    assert back.reaction == arm.state.reaction > 0
+    assert same(back, arm.state)
     paper = Arm(panda_model, paper_skin)
     arm.state, arm.controller = paper.controller.adopt(arm.state, arm.controller), paper.controller
     assert arm.step().mode is Mode.TRACK

@@ -5,19 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pretouch.contact.admittance import Admittance
-from pretouch.contact.reaction import DecayingVelocity
-from pretouch.modes import ModeState
-from pretouch.params import ClampParams, GiveUpParams
+from pretouch.params import GiveUpParams
 from pretouch.profiles import PROFILES, Profile, profile
-from pretouch.recording.cycles import KeptState, packed_state
-from pretouch.recording.packing import unpacked
 from pretouch.robot.body import placed
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, Mode
 from tests.following_arm import DT, Arm
-from tests.fuzz.invariants import same
 from tests.golden.script import Script
 from tests.golden.streams import CROOK_NM, FOLDING, HAND, Stream, controller, model
 
@@ -100,14 +94,6 @@ def test_it_yields_as_long_as_it_is_pushed_stands_and_goes_on_gently(arm: Pushed
     assert np.linalg.norm(begins.desired_velocity) <= 1.0 * DT + 1e-9, "the speed along the path grows from 0"
 
 
-def test_a_hand_that_keeps_pushing_keeps_it_away(arm: Pushed):
-    arm.push((0.0, -20.0, 0.0), cycles=100)
-    aside = arm.ee()[1]
-    steps = arm.push((0.0, -8.0, 0.0), cycles=500)
-    assert modes(steps) == {Mode.REACT}
-    assert arm.ee()[1] <= aside
-
-
 @pytest.mark.parametrize("force", [(0.0, -20.0, 0.0), (-20.0, 0.0, 0.0), (0.0, 0.0, 30.0)])
 def test_a_push_that_is_held_moves_it_no_farther_than_its_reach_and_back_it_still_yields(arm: Pushed, force):
     start, reach = np.array(placed(arm.model.body, arm.model.kinematics(arm.q))[1:3]), OURS.react.reach_m
@@ -130,15 +116,6 @@ def test_another_contact_may_move_it_as_far_again(arm: Pushed):
     first = arm.ee()[1]
     arm.push((0.0, -20.0, 0.0), cycles=500)
     assert arm.ee()[1] < first - 0.2
-
-
-@pytest.mark.parametrize("link", ["panda_link4", "panda_link6", "panda_hand"])
-@pytest.mark.parametrize("force", [(0.0, -30.0, 0.0), (0.0, 30.0, 0.0), (0.0, 0.0, 30.0)])
-def test_the_link_that_is_pushed_goes_with_the_push(arm: Pushed, link: str, force):
-    arm.push(force, link, cycles=20)
-    before = arm.point(link)
-    arm.push(force, link, cycles=20)
-    assert (arm.point(link) - before) @ np.array(force) > 0
 
 
 def test_caught_between_two_things_it_opens_the_way_it_came_and_holds_until_resumed(arm: Pushed):
@@ -298,26 +275,3 @@ def test_the_paper_does_not_look_at_joint_torques(panda_model, paper_skin, name:
         two = other.feel(rng.normal(0, 20, 7), force=force)
         np.testing.assert_array_equal(one.command, two.command)
         assert (one.mode, one.reason) == (two.mode, two.reason)
-
-
-def test_the_reaction_is_a_part_chosen_by_its_name():
-    assert profile("pretouch:react=decay").react == PROFILES["paper"].react == DecayingVelocity()
-    chosen = profile("paper:react=admittance:react.clamp=on:react.clamp.torque_nm=5")
-    assert chosen.react == Admittance(clamp=ClampParams(torque_nm=5.0))
-
-
-def test_the_state_of_a_clamp_is_recorded_to_the_bit(arm: Pushed):
-    caught(arm)
-    arm.run(3)
-    back = unpacked(KeptState, packed_state(arm.state, False)).state
-    assert same(back, arm.state)
-    assert back.reaction.clamp.torque > 0
-
-
-def test_another_profile_can_take_over_in_a_reaction(arm: Pushed, panda_model, paper_skin):
-    arm.push((0.0, -25.0, 0.0), cycles=20)
-    other = Arm(panda_model, paper_skin, PROFILES["paper"])
-    arm.state = other.controller.adopt(arm.state, arm.controller)
-    arm.controller = other.controller
-    assert np.isfinite([s.command for s in arm.run(10)]).all()
-    assert isinstance(arm.state.mode, ModeState)
