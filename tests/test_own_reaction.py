@@ -61,8 +61,7 @@ def test_its_state_is_recorded_and_another_profile_goes_on_without_it(arm: Arm, 
         arm.run(150)
     arm.run(6, force=(0.0, 40.0, 0.0))
     assert arm.state.mode.mode is Mode.REACT
-    back = unpacked(KeptState, packed_state(arm.state, False)).state
-    assert same(back, arm.state)
+    assert same(unpacked(KeptState, packed_state(arm.state, False)), KeptState(False, arm.state))
     paper = Arm(panda_model, paper_skin)
     arm.state, arm.controller = paper.controller.adopt(arm.state, arm.controller), paper.controller
     assert arm.step().mode is Mode.TRACK

@@ -123,10 +123,10 @@ def test_points_are_written_once_and_with_each_snapshot(panda_model, paper_skin)
     run, points = Run(controller_of(panda_model, paper_skin, PRETOUCH)), seen(1.0, [0.1, 0.2, 0.3])
     cycles = Cycles(run.controller, {})
     kept = [cycles.keep(run.turn(lambda inputs: replace(inputs, points=points))) for _ in range(400)]
-    whole = [i for i, each in enumerate(kept) if inputs_of(each.inputs)[0].points is not None]
+    whole = [i for i, each in enumerate(kept) if inputs_of(each.inputs).inputs.points is not None]
     assert whole == [i for i, each in enumerate(kept) if each.state is not None]
     assert len(whole) == 2
-    assert [inputs_of(each.inputs)[1] for each in kept] == [whole[0]] * whole[1] + [whole[1]] * (400 - whole[1])
+    assert [inputs_of(each.inputs).points_at for each in kept] == [whole[0]] * whole[1] + [whole[1]] * (400 - whole[1])
 
 
 def test_another_number_of_places_begins_anew(panda_model, paper_skin):

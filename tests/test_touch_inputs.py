@@ -152,7 +152,7 @@ def test_a_recording_with_touch_is_recomputed_to_the_bit_and_lacks_what_fits_no_
 
     kept = assert_replays(run, tmp_path, lambda k, given: replace(given, touch=touch(k, given.stamp)), 60)
     assert [k for k in range(60) if kept[k].inputs is None] == [30]
-    assert "numbers are none" in kept.unreadable(30)
+    assert "numbers are none" in kept[30].unreadable
     assert [u.touch for u in kept.runs[0].skin.units] == [u.touch for u in feeling.units]
     assert run.cycles[-1].after.detector.cues[0].any()
 
