@@ -125,15 +125,6 @@ def test_the_window_is_frozen_while_reacting_only_if_the_profile_says_so():
         assert bool(abs(state.window.mean()[1]) > 1.0) is moved
 
 
-def test_without_torques_nothing_is_felt():
-    state = feel_init(MODEL, PRETOUCH)
-    for _ in range(12):
-        found, state = feel(state, MODEL, KIN, robot(np.full(7, np.nan)), NOTHING, False, PRETOUCH)
-    assert found.contact is None
-    assert not found.armed
-    assert found.evidence == 0.0
-
-
 def test_the_papers_rule_tells_its_evidence_and_passes_torques_on():
     p = profile("paper:window.samples=4:detect.compare=raw")
     state = feel_init(MODEL, p)

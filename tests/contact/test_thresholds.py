@@ -101,7 +101,7 @@ distances = arrays(np.float64, 3, elements=st.one_of(st.floats(0.0, 1e6), st.jus
 
 
 @given(axis_values, arrays(np.float64, 3, elements=st.floats(0, 50)), distances, distances)
-@settings(deadline=None, derandomize=True, max_examples=200)
+@settings(max_examples=200)
 def test_thresholds_always_enclose_the_mean(mean, sigma, positive, negative):
     limits = thresholds(mean, sigma, positive, negative, TABLE_I)
     # at least F_b - F_d = 6 N and at most F_b + F_std = 13 N from the mean
@@ -111,7 +111,7 @@ def test_thresholds_always_enclose_the_mean(mean, sigma, positive, negative):
 
 
 @given(distances, distances)
-@settings(deadline=None, derandomize=True, max_examples=200)
+@settings(max_examples=200)
 def test_nearer_is_never_less_sensitive(a, b):
     near, far = np.minimum(a, b), np.maximum(a, b)
     close = thresholds(np.zeros(3), np.zeros(3), near, near, TABLE_I)

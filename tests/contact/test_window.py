@@ -131,7 +131,7 @@ def test_without_an_arm_an_answer_lasts_as_long_as_the_reaction_or_that_of_the_p
 
 
 @given(arrays(np.float64, 3, elements=st.floats(-1e4, 1e4)))
-@settings(deadline=None, derandomize=True, max_examples=200)
+@settings(max_examples=200)
 def test_velocity_points_along_the_force_within_the_bound(force: np.ndarray):
     velocity = reaction_velocity(force, 0.03, 0.3)
     speed, size = np.linalg.norm(velocity), np.linalg.norm(force)

@@ -61,7 +61,6 @@ def test_closed_way_points_by_numbers():
 
 @pytest.mark.parametrize("path", [CIRCLE, LINE, SQUARE])
 @given(phase=st.floats(0.0, 10.0))
-@settings(deadline=None, derandomize=True, max_examples=100)
 def test_tangent_is_the_derivative_of_the_point_by_arc_length(path: Path, phase: float):
     step = 1e-6
     at_corner = not isinstance(path, Circle) and (phase + step) % 1.0 < 2 * step
@@ -105,7 +104,7 @@ def test_along_and_back_to_the_path_by_numbers(speed: float, position: tuple, ve
 
 
 @given(arrays(np.float64, 3, elements=st.floats(-2, 2)), st.floats(0, 10), st.floats(0, 0.3))
-@settings(deadline=None, derandomize=True, max_examples=200)
+@settings(max_examples=200)
 def test_the_task_is_never_faster_than_allowed_by_now(position: np.ndarray, phase: float, speed: float):
     on_path = followed(CIRCLE, phase, speed, position)
     assert 0 <= on_path.forward[0] <= speed
@@ -138,7 +137,7 @@ def test_the_way_back_to_the_path_is_no_way_along_it_by_numbers():
 
 @pytest.mark.parametrize("path", [CIRCLE, segment((0.0, 0.0, 0.0), (0.0, 9.0, 0.0))])
 @given(away=arrays(np.float64, 3, elements=st.floats(-0.3, 0.3)), slowed=st.floats(0.2, 1.0))
-@settings(deadline=None, derandomize=True, max_examples=30)
+@settings(max_examples=30)
 def test_wherever_it_was_pushed_the_arm_comes_back_and_goes_on(path: Path, away: np.ndarray, slowed: float):
     phase, speed, position = 0.0, 0.0, path.point(0.0) + away
     for _ in range(2500):  # 0.5 m at a fifth of 0.3 m/s is 8 s, and then as long again

@@ -81,7 +81,7 @@ def begun(profile: Profile, q: np.ndarray, qd: np.ndarray) -> Course:
 
 
 @given(profiles, postures, speeds, st.lists(readings, min_size=1, max_size=6))
-@settings(deadline=None, derandomize=True, max_examples=80)
+@settings(max_examples=80)
 def test_any_posture_and_any_readings(profile, q, qd, sequence):
     arm = begun(profile, q, qd)
     for stamp, distance, status in sequence:
@@ -90,7 +90,7 @@ def test_any_posture_and_any_readings(profile, q, qd, sequence):
 
 
 @given(profiles, st.lists(st.tuples(wrenches, st.booleans()), min_size=1, max_size=10))
-@settings(deadline=None, derandomize=True, max_examples=60)
+@settings(max_examples=60)
 def test_any_force(profile, sequence):
     arm = begun(profile, READY, np.zeros(N))
     for wrench, resume in sequence:
@@ -102,7 +102,7 @@ stamps = st.one_of(st.just(0.0), st.floats(-0.2, 0.2), st.floats())
 
 
 @given(profiles, st.lists(st.tuples(stamps, stamps, stamps, st.booleans()), min_size=1, max_size=10))
-@settings(deadline=None, derandomize=True, max_examples=60)
+@settings(max_examples=60)
 def test_any_stamps(profile, sequence):
     arm = begun(profile, READY, np.zeros(N))
     for step, robot, unit, resume in sequence:
@@ -116,7 +116,7 @@ parts = st.sampled_from(["q", "qd", "q_commanded", "qd_commanded", "tau_ext"])
 
 
 @given(profiles, st.lists(st.tuples(parts, st.integers(0, N - 1), st.floats(), st.booleans()), min_size=1, max_size=10))
-@settings(deadline=None, derandomize=True, max_examples=80)
+@settings(max_examples=80)
 def test_any_robot_state(profile, sequence):
     arm = begun(profile, READY, np.zeros(N))
     for part, joint, value, resume in sequence:
