@@ -1,10 +1,11 @@
 """An arm that follows its commands exactly, under a controller."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
-from pretouch.control.path import Path, segment
+from pretouch.control.path import Circle, Path, segment
 from pretouch.controller import Controller
 from pretouch.loop import Cycle
 from pretouch.perception.scene_filter import no_fixtures
@@ -15,6 +16,13 @@ from pretouch.types import ControlStep, Inputs, RangeReadings, RangeStatus, Robo
 
 DT = 0.01
 PAPER = PROFILES["paper"]
+SHORT = replace(PAPER, window=replace(PAPER.window, samples=5))
+"""The paper's profile, with a window that is soon full."""
+
+
+def controller_of(model: RobotModel, skin: Skin, profile: Profile = SHORT, path: Path | None = None) -> Controller:
+    """A controller of an arm without fixtures, on a circle unless it is given another path."""
+    return Controller(model, skin, no_fixtures(), path or Circle(), profile)
 
 
 class Arm:
@@ -25,7 +33,7 @@ class Arm:
         self.q, self.qd, self.time = model.description.q_ready.copy(), np.zeros(7), 0.0
         x = self.ee()
         path = path or segment(tuple(x), (x[0], x[1] + 0.4, x[2]))
-        self.controller = Controller(model, skin, no_fixtures(), path, profile)
+        self.controller = controller_of(model, skin, profile, path)
         self.state = self.controller.init(self.robot())
 
     def ee(self) -> np.ndarray:

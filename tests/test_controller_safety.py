@@ -8,15 +8,14 @@ import pytest
 from pretouch.control.approach import ApproachRestriction
 from pretouch.control.path import Circle, Path, segment
 from pretouch.loop import Cycle
-from pretouch.profiles import PROFILES, Profile
+from pretouch.profiles import Profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import Inputs, Mode, QpOutcome, RangeReadings, RangeStatus
 from tests import following_arm
-from tests.following_arm import DT
+from tests.following_arm import DT, SHORT
 from tests.fuzz import weather
 
-SHORT = replace(PROFILES["paper"], window=replace(PROFILES["paper"].window, samples=5))
 HARD = replace(SHORT, approach=ApproachRestriction(rows="hard"))
 FAULTS = [
     "q", "qd", "q_commanded", "qd_commanded", "wrench", "no wrench", "robot stamp", "step stamp", "stale", "backwards",

@@ -10,16 +10,14 @@ from hypothesis import strategies as st
 
 from pretouch import desired, loop
 from pretouch.control.commander import _nearer, rotation_about
-from pretouch.control.path import Circle
-from pretouch.controller import Controller
 from pretouch.desired import Desired, DesiredKind
 from pretouch.errors import ParameterError
-from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, Inputs, Mode
-from tests.recording.runs import Run, assert_replays, controller_of
+from tests.following_arm import controller_of
+from tests.recording.runs import Run, assert_replays
 from tests.test_loop import DT, World
 
 
@@ -28,7 +26,7 @@ class Commanded:
 
     def __init__(self, model: RobotModel, asks, seconds=4.0, arm=World, name="paper"):
         self.model = model
-        self.control = Controller(model, Skin([], model), no_fixtures(), Circle(), profile(name))
+        self.control = controller_of(model, Skin([], model), profile(name))
         self.arm = arm(model, 0)
         self.begin = model.kinematics(self.arm.read().q)
         self.steps: list[ControlStep] = []

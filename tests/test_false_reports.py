@@ -9,14 +9,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pretouch import loop
-from pretouch.control.path import Circle
 from pretouch.controller import Controller
 from pretouch.faults import Watched, add_sent
-from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, Mode, RobotState
+from tests.following_arm import controller_of
 from tests.test_loop import DT, World
 
 Lie = Callable[[RobotState], RobotState]
@@ -46,7 +45,7 @@ class Irregular(Liar):
 
 
 def controller(model: RobotModel, name: str) -> Controller:
-    return Controller(model, Skin([], model), no_fixtures(), Circle(), profile(name))
+    return controller_of(model, Skin([], model), profile(name))
 
 
 def turned(control: Controller, arm: Liar, steps: int) -> list[ControlStep]:
@@ -265,7 +264,7 @@ def test_a_stamp_that_is_none_is_named_though_a_position_jumps_too(panda_model, 
 @pytest.mark.parametrize("value", [1e308, -1e308, 0.5j])
 def test_readings_with_such_stamps_are_named_or_not_used(panda_model, paper_skin, value):
     arm = Liar(panda_model, len(paper_skin))
-    control = Controller(panda_model, paper_skin, no_fixtures(), Circle(), profile("pretouch"))
+    control = controller_of(panda_model, paper_skin, profile("pretouch"))
     state, skin = control.init(arm.read()), arm.skin()
     readings = replace(skin.read(), stamp=np.full(len(paper_skin), value))
     skin.read = lambda: readings

@@ -9,14 +9,13 @@ import pytest
 
 from pretouch import loop
 from pretouch.control.joint_box import JointLimits
-from pretouch.control.path import Circle
 from pretouch.controller import Controller
 from pretouch.errors import RobotStateError
-from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import PROFILES, at_rate
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, Mode, RangeReadings, RangeStatus, RobotState
+from tests.following_arm import controller_of
 
 DT = 0.01
 PAPER = PROFILES["paper"]
@@ -79,7 +78,7 @@ def world(panda_model: RobotModel, paper_skin: Skin) -> World:
 
 @pytest.fixture
 def controller(panda_model: RobotModel, paper_skin: Skin) -> Controller:
-    return Controller(panda_model, paper_skin, no_fixtures(), Circle(), PROFILE)
+    return controller_of(panda_model, paper_skin, PROFILE)
 
 
 def turn(controller: Controller, world: World, recorder: FakeRecorder, done: Callable[[ControlStep], bool]) -> None:
@@ -274,7 +273,7 @@ class Arm:
 
 @pytest.mark.parametrize("rate", [30.0, 100.0, 1000.0, 4000.0])
 def test_an_arm_at_full_speed_comes_to_rest_at_any_rate(panda_model: RobotModel, paper_skin: Skin, rate: float):
-    limits = Controller(panda_model, paper_skin, no_fixtures(), Circle(), at_rate(PROFILES["paper"], rate)).limits
+    limits = controller_of(panda_model, paper_skin, at_rate(PROFILES["paper"], rate)).limits
     arm = Arm()
     loop.come_to_rest(limits, arm, arm, panda_model.q_mid, limits.qd_max)
     arm.assert_braked(limits)

@@ -7,15 +7,13 @@ import numpy as np
 import pytest
 
 from pretouch import loop
-from pretouch.control.path import Circle
-from pretouch.controller import Controller
 from pretouch.loop import Cycle
-from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import PROFILES, at_rate
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, Mode, RangeReadings, RobotState
 from tests import test_loop
+from tests.following_arm import controller_of
 
 DT = 0.001
 PAPER = PROFILES["paper"]
@@ -62,7 +60,7 @@ class SilentFor(test_loop.FakeSkin):
 
 
 def turn(model: RobotModel, skin: Skin, world: World, seconds: float) -> list[Mode]:
-    controller = Controller(model, skin, no_fixtures(), Circle(), at_rate(BRISK, 1 / DT))
+    controller = controller_of(model, skin, at_rate(BRISK, 1 / DT))
     loop.run(controller, world, SilentFor(world), world, world, lambda step: world.now >= seconds)
     return [step.mode for step in world.steps]
 

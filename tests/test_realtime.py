@@ -11,19 +11,18 @@ from collections.abc import Iterator
 from contextlib import suppress
 from types import SimpleNamespace
 
-import numpy as np
 import pytest
 
 from pretouch import realtime
-from pretouch.control.path import Circle
 from pretouch.controller import Controller
 from pretouch.errors import ParameterError
 from pretouch.loop import Cycle, MonotonicClock
-from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import PROFILES, at_rate
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.types import ControlStep, RangeReadings, RobotState
+from pretouch.types import ControlStep, RobotState
+from tests.following_arm import controller_of
+from tests.test_loop import World
 
 linux = pytest.mark.skipif(sys.platform != "linux", reason="priorities and processors are chosen on Linux only")
 FAST = at_rate(PROFILES["paper"], 1000.0)
@@ -46,7 +45,7 @@ def nothing_frozen() -> Iterator[None]:
 
 @pytest.fixture
 def controller(panda_model: RobotModel, paper_skin: Skin) -> Controller:
-    return Controller(panda_model, paper_skin, no_fixtures(), Circle(), FAST)
+    return controller_of(panda_model, paper_skin, FAST)
 
 
 @pytest.mark.usefixtures("nothing_frozen")
@@ -161,22 +160,13 @@ def test_elsewhere_than_on_linux_one_sentence_says_so(monkeypatch: pytest.Monkey
     assert said.startswith("This is darwin, not Linux")
 
 
-class Arm:
-    """A robot at rest and a recorder, beside a skin that was never heard."""
+class Arm(World):
+    """A robot at rest and a recorder, beside a skin that is heard no more."""
 
     def __init__(self, controller: Controller) -> None:
-        self.q, k = controller.model.description.q_ready, len(controller.skin)
-        unheard = RangeReadings(np.full(k, -np.inf), np.zeros(k), np.full(k, 255))
-        self.skin = SimpleNamespace(read=lambda: unheard)
+        super().__init__(controller.model, len(controller.skin))
         self.steps: list[ControlStep] = []
         self.collecting: list[bool] = []
-
-    def read(self, stamp: float = 0.0) -> RobotState:
-        zero = np.zeros(7)
-        return RobotState(stamp, self.q, zero, self.q, zero, zero, np.zeros(6))
-
-    def command(self, qd: np.ndarray) -> None:
-        assert np.all(np.isfinite(qd))
 
     def record(self, cycle: Cycle) -> None:
         self.steps.append(cycle.step)
@@ -188,7 +178,7 @@ def test_the_runner_prepares_tells_and_reports(controller: Controller, monkeypat
         fails(monkeypatch, "sched_setaffinity", INVALID)
     clock, told, arm = MonotonicClock(0.001), [], Arm(controller)
     options = realtime.Options(cpu=CPU, tell=told.append)
-    realtime.run(controller, arm, arm.skin, clock, arm, lambda step: len(arm.steps) == 20, options)
+    realtime.run(controller, arm, arm.skin(), clock, arm, lambda step: len(arm.steps) == 20, options)
     assert len(told) == 1
     assert arm.collecting == [False] * 20
     assert clock.timing().cycles == 20
@@ -204,11 +194,12 @@ def test_the_loop_begins_with_a_state_that_is_newer_than_the_preparations(contro
     def read() -> RobotState:
         """The state of before until the fourth look after the collection, which kept who receives it waiting."""
         looks.extend(collected)
-        return Arm.read(arm, time.monotonic() if len(looks) > 3 else 0.0)
+        arm.now = time.monotonic() if len(looks) > 3 else 0.0
+        return Arm.read(arm)
 
     monkeypatch.setattr(arm, "read", read)
     monkeypatch.setattr(arm, "record", lambda cycle: firsts.append(cycle.inputs.robot))
-    realtime.run(controller, arm, arm.skin, MonotonicClock(0.001), arm, lambda step: True)
+    realtime.run(controller, arm, arm.skin(), MonotonicClock(0.001), arm, lambda step: True)
     assert len(collected) == 1
     assert firsts[0].stamp >= collected[0]
 
@@ -225,7 +216,7 @@ def test_a_signal_that_ends_processes_ends_the_loop_in_order(controller: Control
 
     try:
         with pytest.raises(SystemExit) as ended:
-            realtime.run(controller, arm, arm.skin, clock, arm, done)
+            realtime.run(controller, arm, arm.skin(), clock, arm, done)
         assert signal.getsignal(number) is signal.SIG_DFL
     finally:
         signal.signal(number, before)
@@ -238,5 +229,5 @@ def test_a_clock_of_another_period_is_refused(controller: Controller):
     clock = MonotonicClock(0.01)
     arm = Arm(controller)
     with pytest.raises(ParameterError, match=r"period of 0\.01 s, the controller 0\.001 s: make them the same"):
-        realtime.run(controller, arm, arm.skin, clock, arm, lambda step: True)
+        realtime.run(controller, arm, arm.skin(), clock, arm, lambda step: True)
     assert arm.steps == []

@@ -16,9 +16,9 @@ from pretouch.recording.cycles import Cycles, inputs_of
 from pretouch.sensing.skin import Skin
 from pretouch.sound import MOST_POINTS, sound_points
 from pretouch.types import SOMEWHERE, Inputs, Mode, MovingFixtures, SeenPoints
-from tests.following_arm import PAPER, Arm
+from tests.following_arm import PAPER, Arm, controller_of
 from tests.fuzz.invariants import same
-from tests.recording.runs import Run, assert_replays, controller_of
+from tests.recording.runs import Run, assert_replays
 
 PRETOUCH = PROFILES["pretouch"]
 DEAF = replace(PRETOUCH, perception=replace(PRETOUCH.perception, outside=None))

@@ -15,8 +15,9 @@ from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit, TouchPatch
 from pretouch.sound import sound_touch
 from pretouch.types import Inputs, Mode, TouchReadings, TouchStatus
+from tests.following_arm import controller_of
 from tests.fuzz.invariants import same
-from tests.recording.runs import Run, assert_replays, controller_of, custom_arm
+from tests.recording.runs import Run, assert_replays, custom_arm
 
 OURS = PROFILES["pretouch"]
 

@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 
 from pretouch import realtime
-from pretouch.control.path import Circle
 from pretouch.controller import Controller
-from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import at_rate, profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, Inputs, Mode, RobotState
+from tests.following_arm import controller_of
 
 
 @pytest.fixture
@@ -38,7 +37,7 @@ def recorded(controller: Controller, monkeypatch: pytest.MonkeyPatch) -> list[Co
 @pytest.mark.parametrize("name", ["paper", "blind", "paper:approach.rows=hard", "paper:detect.compare=raw", "pretouch"])
 @pytest.mark.parametrize("rate", [100.0, 1000.0])
 def test_a_warm_up_sees_every_mode(panda_model, paper_skin, robot: RobotState, monkeypatch, name: str, rate: float):
-    controller = Controller(panda_model, paper_skin, no_fixtures(), Circle(), at_rate(profile(name), rate))
+    controller = controller_of(panda_model, paper_skin, at_rate(profile(name), rate))
     steps = recorded(controller, monkeypatch)
     realtime.warm_up(controller, robot)
     assert {step.mode for step in steps} == set(Mode)
@@ -49,7 +48,7 @@ def test_a_warm_up_sees_every_mode(panda_model, paper_skin, robot: RobotState, m
 
 
 def test_steps_leave_nothing_for_the_collector(panda_model: RobotModel, paper_skin: Skin, robot: RobotState):
-    controller = Controller(panda_model, paper_skin, no_fixtures(), Circle(), at_rate(profile("paper"), 1000.0))
+    controller = controller_of(panda_model, paper_skin, at_rate(profile("paper"), 1000.0))
     realtime.warm_up(controller, robot)
     with realtime.real_time():
         realtime.warm_up(controller, robot)

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.following_arm import DT, Arm
-from tests.recording.runs import Run, assert_replays, controller_of
+from tests.following_arm import DT, Arm, controller_of
+from tests.recording.runs import Run, assert_replays
 
 from pretouch.contact.announced_load import announced, doubted, kept_free, most_kg, without_load, wrench_of
 from pretouch.contact.residual_model import residual_init

@@ -1,14 +1,12 @@
 """One step of the motion, with obstacles that a test chooses."""
 
 import numpy as np
+from tests.following_arm import controller_of
 
-from pretouch.control.path import Circle
-from pretouch.controller import Controller
 from pretouch.decision import move_restricted
 from pretouch.faults import Report, put_robot
 from pretouch.line import MOVE
 from pretouch.modes import CLEAR
-from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import Profile
 from pretouch.robot.kinematics import Kinematics
 from pretouch.robot.model import RobotModel
@@ -20,7 +18,7 @@ class Mover:
     """An arm's motion with a profile, and what it remembers."""
 
     def __init__(self, model: RobotModel, profile: Profile) -> None:
-        self.controller = Controller(model, paper_skin(model), no_fixtures(), Circle(), profile)
+        self.controller = controller_of(model, paper_skin(model), profile)
         q, still = model.description.q_ready, np.zeros(model.n)
         state = self.controller.init(RobotState(0.0, q, still, q, still, still, None))
         self.memory, self.approach = state.memory, state.approach

@@ -75,14 +75,13 @@ def check_shapes(step: ControlStep, n: int, units: int) -> None:
 
 
 def check_touched(touched: Touched) -> None:
-    """One contact or two on different links, finite, with a probability each; or none."""
+    """One contact, finite, with a probability; or none."""
     count = len(touched.link)
-    assert count <= 2
+    assert count <= 1
     assert touched.link.dtype == np.int64
     assert touched.point.shape == touched.force.shape == (count, 3)
     assert touched.link.shape == touched.sigma.shape == touched.probability.shape == (count,)
     assert all(np.isfinite(array).all() for _, array in arrays_of(touched))
-    assert len(set(touched.link.tolist())) == count
     assert (touched.sigma >= 0.0).all()
     assert ((touched.probability > 0.0) & (touched.probability <= 1.0 + 1e-9)).all()
 

@@ -14,10 +14,10 @@ from pretouch.robot.body import Capsules
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, paper_skin
 from pretouch.types import Inputs, QpOutcome, RangeReadings, RobotState
+from tests.following_arm import SHORT, controller_of
 from tests.fuzz.invariants import arrays_of
 
 PAPER = PROFILES["paper"]
-SHORT = replace(PAPER, window=replace(PAPER.window, samples=5))
 PARAMETERS = [
     f"{group.name}.{item.name}"
     for group in fields(Profile)
@@ -56,7 +56,7 @@ def test_an_extreme_value_is_refused_or_works(panda_model: RobotModel, paper_ski
     for value in (*SIZES, *(-size for size in SIZES)):
         try:
             profile = replace(SHORT, **{group: replace(getattr(SHORT, group), **{field: value})})
-            controller = Controller(panda_model, paper_skin, no_fixtures(), Circle(), profile)
+            controller = controller_of(panda_model, paper_skin, profile)
         except PretouchError:
             continue
         allowed += 1
@@ -68,7 +68,7 @@ def test_an_extreme_value_is_refused_or_works(panda_model: RobotModel, paper_ski
 def test_a_margin_that_leaves_a_joint_no_range_is_refused(panda_model: RobotModel, paper_skin: Skin, margin: float):
     profile = replace(SHORT, task=replace(SHORT.task, position_margin_rad=margin))
     with pytest.raises(PretouchError, match="margin"):
-        Controller(panda_model, paper_skin, no_fixtures(), Circle(), profile)
+        controller_of(panda_model, paper_skin, profile)
 
 
 @pytest.mark.parametrize(
@@ -115,4 +115,4 @@ def test_a_skin_of_another_arm_is_refused(panda_model: RobotModel):
     skin = paper_skin(panda_model)
     skin.link[:] = 500  # as of an arm with more links
     with pytest.raises(PretouchError, match="skin"):
-        Controller(panda_model, skin, no_fixtures(), Circle(), SHORT)
+        controller_of(panda_model, skin, SHORT)

@@ -13,8 +13,8 @@ import pytest
 from pretouch.control.path import Circle
 from pretouch.modes import Event
 from pretouch.perception.scene_filter import no_fixtures
-from pretouch.profiles import PROFILES
 from pretouch.types import Inputs, Mode, QpOutcome, RangeReadings
+from tests.following_arm import SHORT
 from tests.fuzz import invariants, weather
 from tests.fuzz.machine import Course, Machine
 from tests.fuzz.worlds import World
@@ -69,10 +69,6 @@ def test_no_compiled_loop_leaves_its_arrays(tmp_path: Path):
 
 
 # the checks notice what they are there for
-
-
-PAPER = PROFILES["paper"]
-SHORT = replace(PAPER, window=replace(PAPER.window, samples=5))
 
 
 def honest(course: Course) -> Inputs:

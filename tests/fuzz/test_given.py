@@ -12,15 +12,12 @@ from numba.core.registry import CPUDispatcher
 from pretouch.contact.window import Window
 from pretouch.controller import ControllerState
 from pretouch.errors import PretouchError
-from pretouch.profiles import PROFILES
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, Inputs, Mode, RangeReadings, RangeStatus, RobotState
-from tests.following_arm import Arm
+from tests.following_arm import SHORT, Arm
 from tests.fuzz.invariants import arrays_of, same
 
-PAPER = PROFILES["paper"]
-SHORT = replace(PAPER, window=replace(PAPER.window, samples=5))
 NUMBERS = ["q", "qd", "q_commanded", "qd_commanded", "wrench", "stamp", "distance"]
 
 

@@ -32,11 +32,12 @@ from pretouch.units.keys import load_keys, save_keys
 from pretouch.units.skin_reader import read_skin
 from pretouch.units.skin_recording import SkinRecording
 from pretouch.units.wire import TAG_SIZE
+from tests.following_arm import controller_of
 from tests.fuzz.mutations import Change, changed, changes
 from tests.imported_data.files import STORE1, pushed, wrenches, write_bag1, write_csv
 from tests.imported_data.joint_files import Moving
 from tests.importing.made import six_axis
-from tests.recording.runs import controller_of, recorded_run
+from tests.recording.runs import recorded_run
 from tests.units.fake_unit import KEYS, Bench
 from tests.units.test_skin_recording import record
 

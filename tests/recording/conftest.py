@@ -5,7 +5,7 @@ import pytest
 from pretouch.controller import Controller
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from tests.recording.runs import controller_of
+from tests.following_arm import controller_of
 
 
 @pytest.fixture(scope="session")

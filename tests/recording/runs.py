@@ -1,7 +1,7 @@
 """Runs to record: an arm that follows commands exactly, what its units and its force estimate say drawn from a seed."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -9,24 +9,15 @@ import numpy as np
 from mcap.reader import make_reader
 from mcap.writer import Writer
 
-from pretouch.control.path import Circle
-from pretouch.control.path import Path as Course
 from pretouch.controller import Controller, ControllerState
 from pretouch.loop import Cycle
-from pretouch.perception.scene_filter import no_fixtures
-from pretouch.profiles import PROFILES, Profile
 from pretouch.recording.reader import Recorded, open_recording
 from pretouch.recording.ros import encode, value_of
 from pretouch.recording.verify import verify
 from pretouch.recording.writer import Recording
 from pretouch.robot.description import RobotDescription
-from pretouch.robot.model import RobotModel
-from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, Inputs, RangeReadings, RobotState
 from tests.fuzz.invariants import same
-
-SHORT: Profile = replace(PROFILES["paper"], window=replace(PROFILES["paper"].window, samples=5))
-"""The paper's profile, with a window that is soon full."""
 
 
 @dataclass
@@ -67,10 +58,6 @@ class Run:
         self.time += period
         self.cycles.append(Cycle(inputs, before, step, self.state))
         return self.cycles[-1]
-
-
-def controller_of(model: RobotModel, skin: Skin, profile: Profile = SHORT, path: Course | None = None) -> Controller:
-    return Controller(model, skin, no_fixtures(), path or Circle(), profile)
 
 
 def custom_arm(folder: Path) -> RobotDescription:

@@ -17,8 +17,9 @@ from pretouch.recording.reader import Recorded, open_recording
 from pretouch.recording.ros import definition, packed_data, packed_message
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
+from tests.following_arm import controller_of
 from tests.fuzz.invariants import same
-from tests.recording.runs import Run, changed, controller_of, custom_arm, recorded_run
+from tests.recording.runs import Run, changed, custom_arm, recorded_run
 
 
 @pytest.fixture(scope="module")

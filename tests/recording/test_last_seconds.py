@@ -13,8 +13,9 @@ from pretouch.recording.writer import Recording
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import TouchPatch
 from pretouch.types import Mode, SeenPoints, TouchReadings
+from tests.following_arm import SHORT, controller_of
 from tests.fuzz.invariants import same
-from tests.recording.runs import SHORT, Run, controller_of
+from tests.recording.runs import Run
 
 
 def broken(inputs):

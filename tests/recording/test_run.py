@@ -18,8 +18,9 @@ from pretouch.robot.model import RobotModel
 from pretouch.sensing.sensor import VL53L5CX
 from pretouch.sensing.skin import Skin, paper_skin
 from pretouch.sensing.unit import SensorUnit, TouchPatch
+from tests.following_arm import SHORT, controller_of
 from tests.fuzz.invariants import same
-from tests.recording.runs import SHORT, controller_of, custom_arm, recorded_run
+from tests.recording.runs import custom_arm, recorded_run
 
 PATHS = [Circle((0.4, 0.1, 0.3), 0.17, 0.3), WayPoints(np.random.default_rng(0).normal(size=(5, 3)), closed=True),
          segment((0.1, 0.2, 0.3), (0.7, 0.1, 0.2))]  # fmt: skip

@@ -15,9 +15,10 @@ from pretouch.recording.ros import packed_data, packed_message
 from pretouch.recording.verify import differing, verify
 from pretouch.recording.writer import Recording
 from pretouch.types import Mode
+from tests.following_arm import SHORT, controller_of
 from tests.fuzz.machine import Course, Machine
 from tests.fuzz.worlds import any_world
-from tests.recording.runs import SHORT, Run, changed, controller_of, recorded_run, steps_changed
+from tests.recording.runs import Run, changed, recorded_run, steps_changed
 
 
 @pytest.fixture(scope="module")

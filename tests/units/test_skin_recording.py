@@ -20,7 +20,8 @@ from pretouch.units.skin_reader import SkinTrace, read_skin
 from pretouch.units.skin_recording import SkinRecording
 from pretouch.units.traffic import Received, imu_batch
 from pretouch.units.wire import IMU_SAMPLE, Flag, Sample, TouchPart
-from tests.recording.runs import changed, controller_of, recorded_run
+from tests.following_arm import controller_of
+from tests.recording.runs import changed, recorded_run
 
 BATCH = 8
 
