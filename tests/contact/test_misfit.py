@@ -8,7 +8,7 @@ from itertools import islice
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from tests.contact.standing_arm import PERIOD, StandingArm, means_of
+from tests.contact.alone import PERIOD, StandingArm, means_of
 
 from pretouch.contact.detector import Body, Sample
 from pretouch.contact.scatter import (

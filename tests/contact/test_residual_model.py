@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from tests.contact.standing_arm import means_of
+from tests.contact.alone import means_of
 
 from pretouch.contact.learning import add_to_block, learn_turning, least_squares_step
 from pretouch.contact.residual_model import (

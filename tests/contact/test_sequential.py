@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.stats import multivariate_normal, multivariate_t
-from tests.contact.standing_arm import means_of
+from tests.contact.alone import means_of
 
 from pretouch.contact.scatter import LENGTHS, LONGEST, window_means
 from pretouch.contact.sequential import (

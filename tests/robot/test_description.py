@@ -1,14 +1,24 @@
-"""Descriptions of arms: limits, speed envelopes, and their names."""
+"""Descriptions of arms: limits, speed envelopes, names, and files."""
 
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.fuzz.invariants import same
 from tests.other_arm import copied_panda
 
 from pretouch.errors import PretouchError, RobotModelError, SkinError
-from pretouch.robot.description import SpeedEnvelope, fr3, is_shipped, panda, robot_named
+from pretouch.robot.description import (
+    RobotDescription,
+    SpeedEnvelope,
+    description_text,
+    fr3,
+    is_shipped,
+    load_description,
+    panda,
+    robot_named,
+)
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import OWN_SKIN, PAPER_SKIN, skin_for
 
@@ -58,18 +68,14 @@ def test_the_envelope_of_the_fr3_is_the_one_its_vendor_publishes():
 
 
 @pytest.mark.parametrize("name", ["qd_max", "qdd_max", "tau_max"])
-@pytest.mark.parametrize("bad", [0.0, -1.0, np.nan, np.inf])
-def test_a_limit_that_is_no_positive_number_is_refused(name, bad):
-    limits = np.ones(7)
-    limits[3] = bad
-    with pytest.raises(RobotModelError, match=f"panda: {name} is .*give 7 positive, finite numbers"):
-        replace(panda(), **{name: limits})
-
-
-@pytest.mark.parametrize("shape", [(6,), (8,), (7, 1), ()])
-def test_limits_of_the_wrong_shape_are_refused(shape):
-    with pytest.raises(RobotModelError, match=r"panda: qdd_max is [^:]*: give 7 positive"):
-        replace(panda(), qdd_max=np.ones(shape))
+@pytest.mark.parametrize(
+    "bad",
+    [*(np.where(np.arange(7) == 3, value, 1.0) for value in (0.0, -1.0, np.nan, np.inf))]
+    + [np.ones(shape) for shape in ((6,), (8,), (7, 1), ())],
+)
+def test_limits_that_are_not_one_positive_number_a_joint_are_refused(name, bad):
+    with pytest.raises(RobotModelError, match=f"panda: {name} is [^:]*: give 7 positive, finite numbers"):
+        replace(panda(), **{name: bad})
 
 
 def test_a_missing_mjcf_file_is_named():
@@ -90,17 +96,13 @@ GOOD = SpeedEnvelope(np.full(2, 0.3), np.full(2, 12.0), np.ones(2), -np.ones(2),
         ("slope", np.array([12.0, np.nan]), r"slope is .*give one finite number a joint"),
         ("q_upper", np.array([1.0, np.inf]), r"q_upper is .*give one finite number a joint"),
         ("q_lower", -np.ones(3), r"q_lower is .*give one finite number a joint"),
+        ("offset", np.array(0.3), r"offset is 0\.3: give one finite number a joint"),
         ("q_upper", np.array([1.0, -0.99]), "cannot move in both directions: give each q_upper above its q_lower"),
     ],
 )
 def test_an_envelope_that_is_none_is_refused(name, bad, message):
     with pytest.raises(RobotModelError, match=message):
         replace(GOOD, **{name: bad})
-
-
-def test_an_envelope_of_numbers_that_are_not_one_a_joint_is_refused():
-    with pytest.raises(RobotModelError, match=r"offset is 0\.3: give one finite number a joint"):
-        SpeedEnvelope(*(np.array(v) for v in (0.3, 12.0, 1.0, -1.0)), "a test")
 
 
 def test_an_envelope_for_another_number_of_joints_is_refused():
@@ -148,3 +150,64 @@ def test_a_folder_is_an_arm_and_the_skin_beside_it_is_its_skin(tmp_path: Path):
     assert len(skin_for(model, PAPER_SKIN)) == 7
     with pytest.raises(SkinError, match=r"/nowhere\.toml cannot be read"):
         skin_for(model, "/nowhere.toml")
+
+
+# their files
+
+
+def written(folder: Path, arm: RobotDescription) -> Path:
+    """A folder with an arm's files, and its description in it."""
+    (folder / arm.mjcf.name).write_bytes(arm.mjcf.read_bytes())
+    file = folder / "robot.toml"
+    file.write_text(description_text(arm))
+    return file
+
+
+@pytest.mark.parametrize("arm", [panda(), fr3()], ids=lambda arm: arm.name)
+def test_a_description_is_read_back_as_it_was(tmp_path, arm):
+    file = written(tmp_path, arm)
+    for path in (tmp_path, file, str(tmp_path)):
+        found = load_description(path)
+        assert found.mjcf == tmp_path / arm.mjcf.name
+        assert same(replace(found, mjcf=arm.mjcf), arm)
+
+
+@pytest.mark.parametrize(
+    ("arm", "before", "after", "sentence"),
+    [
+        (fr3, "offset = ", "ofset = ", "the key 'ofset' is unknown: use source, offset, slope"),
+        (fr3, "0.3,", '"fast",', r"offset is .*: give a list of 7 finite numbers, one a joint \[rad/s\]"),
+        (fr3, "12.0,\n    5.17", "-12.0,\n    5.17", r"slope is .*must be positive\. \(in "),
+        (fr3, "[envelope]", "[[envelope]]", r"envelope is .*: give a table \[envelope\]"),
+        (panda, "name = ", "naem = ", "the key 'naem' is unknown: use name, mjcf"),
+        (panda, '"panda"', "7", "name is 7: give printable text"),
+        (panda, '"panda.xml"', '"none.xml"', r"the MJCF file .*none.xml does not exist: check its name\. \(in "),
+        (panda, '"panda.xml"', '"' + "x" * 5000 + '"', "in .*robot.toml"),
+        (panda, "2.175,", '"fast",', r"qd_max is .*: give a list of 7 finite numbers, one a joint \[rad/s\]"),
+        (panda, "2.175,", "nan,", "qd_max is"),
+        (panda, "2.175,", "0.0,", "qd_max is .* positive"),
+        (panda, "2.175,", "", "qd_max is .*give a list of 7"),
+        (panda, "qdd_max", "#", "not valid TOML"),
+    ],
+)
+def test_what_is_wrong_is_said_with_file_key_and_value(tmp_path, arm, before, after, sentence):
+    file = written(tmp_path, arm())
+    assert before in file.read_text()
+    file.write_text(file.read_text().replace(before, after, 1))
+    with pytest.raises(RobotModelError, match=sentence) as caught:
+        load_description(file)
+    assert str(file) in str(caught.value)
+
+
+@pytest.mark.parametrize("content", [b"\xff\xfe", b"a = [" * 3000, b"name = 0x" + b"f" * 9000])
+def test_a_file_that_is_none_is_refused(tmp_path, content):
+    (tmp_path / "robot.toml").write_bytes(content)
+    with pytest.raises(RobotModelError, match=r"robot.toml"):
+        load_description(tmp_path)
+
+
+def test_a_file_that_is_not_there_is_said(tmp_path):
+    with pytest.raises(
+        RobotModelError, match=r"robot.toml cannot be read: No such file .* give robot.toml or its folder"
+    ):
+        load_description(tmp_path)
