@@ -24,7 +24,7 @@ from pathlib import Path
 import numpy as np
 
 from pretouch.units.keys import Keys, UnitKey, new_key
-from pretouch.units.network_skin import NetworkSkin
+from pretouch.units.skin import NetworkSkin
 from pretouch.units.wire import (
     CHALLENGE_SIZE,
     Beacon,

@@ -8,9 +8,9 @@ from scipy.spatial.transform import Rotation
 from pretouch import loop
 from pretouch.calibration.motion.follow import PlanCommander, plan_controller
 from pretouch.calibration.motion.plan import Plan, Swing
+from pretouch.ports import NoUnits
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.session.session import NoUnits
 from pretouch.sim.imu import ImuParams
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.plant_params import PlantParams

@@ -13,15 +13,15 @@ import pytest
 from pretouch import cli, plugins
 from pretouch.arms import OpenedArm
 from pretouch.arms.simulated import Simulated
-from pretouch.arms.simulated.threaded import ThreadedArm
-from pretouch.cli.run.options import RobotOptions, Run, TaskOptions
+from pretouch.arms.simulated.arm import ThreadedArm
+from pretouch.cli.run.command import Run
+from pretouch.cli.run.options import RobotOptions, SkinOptions, TaskOptions
 from pretouch.cli.run.setup import run_setup
 from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify
 from pretouch.recording.writer import Recording
-from pretouch.session.confirmations import Identity
-from pretouch.session.preflight import PreflightParams
-from pretouch.session.push import GuidedPush, PushParams
+from pretouch.session.memory import Identity
+from pretouch.session.push import GuidedPush
 from pretouch.types import Mode
 from tests.other_arm import copied_panda
 
@@ -33,7 +33,7 @@ BLIND = ("run", "--no-skin", "--profile", "blind", "--path", "hold")
 def _state_of_its_own(tmp_path, monkeypatch):
     """A folder of its own, in which the force sign counts as confirmed: pushes take seconds."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
-    monkeypatch.setattr("pretouch.cli.run.command.PREFLIGHT", PreflightParams(watch_s=1.0))
+    monkeypatch.setattr("pretouch.session.may_move.WATCH_S", 1.0)
     monkeypatch.setattr(GuidedPush, "confirm", lambda *_: None)
     monkeypatch.chdir(tmp_path)
 
@@ -81,7 +81,7 @@ def test_what_does_not_fit_together_is_refused_in_a_sentence(words, said, capsys
 @pytest.mark.parametrize("words", [(), ("simulated",), ("--seed", "0")])
 def test_without_the_name_of_an_arm_a_simulated_one_is_rehearsed(words, monkeypatch):
     commands = []
-    monkeypatch.setattr("pretouch.cli.run.command.run", lambda command, _write: commands.append(command))
+    monkeypatch.setattr(Run, "run", commands.append)
     assert cli.main(["run", *words]) == 0
     assert commands == [Run(Simulated())]
 
@@ -102,14 +102,15 @@ def test_a_franka_arm_is_a_panda_or_an_fr3(tmp_path, capsys):
 
 def test_an_arm_that_does_not_come_with_the_package_has_its_path_placed_and_that_is_said(tmp_path):
     folder = str(copied_panda(tmp_path))
-    made = run_setup(Run(Simulated(), RobotOptions(arm=folder)))
+    made = run_setup(Simulated(), RobotOptions(arm=folder), SkinOptions(), TaskOptions())
     assert made.assumed[0].startswith("The paper's paths for panda:")
     at = made.model.kinematics(made.simulated_start()).position[made.model.ee]
     assert np.linalg.norm(at - made.placement.point(0.5, 0.0, 0.25)) == pytest.approx(0.25 * made.placement.scale)
-    given = run_setup(Run(Simulated(), RobotOptions(arm=folder), task=TaskOptions(center=(0.45, 0.0, 0.3), radius=0.1)))
+    task = TaskOptions(center=(0.45, 0.0, 0.3), radius=0.1)
+    given = run_setup(Simulated(), RobotOptions(arm=folder), SkinOptions(), task)
     assert given.floor == -0.2
     assert len(given.assumed) == 1  # of the simulated arm, not of a path that is given
-    usual = run_setup(Run(Simulated()))
+    usual = run_setup(Simulated(), RobotOptions(), SkinOptions(), TaskOptions())
     assert usual.assumed == ()
 
 
@@ -283,7 +284,7 @@ def test_a_wrong_sign_is_refused_before_anything_moves(capsys, monkeypatch):
 @pytest.mark.usefixtures("_pushes")
 def test_without_a_push_nothing_moves(capsys, monkeypatch):
     monkeypatch.setattr(ThreadedArm, "push", lambda *_: None)
-    monkeypatch.setattr("pretouch.cli.run.command.PUSH", PushParams(timeout_s=0.5))
+    monkeypatch.setattr("pretouch.session.push.TIMEOUT_S", 0.5)
     assert cli.main([*BLIND, "--seconds", "1", "--yes"]) == 2
     assert "No clear push towards +y" in capsys.readouterr().err
 

@@ -15,12 +15,14 @@ import numpy as np
 import pytest
 
 from pretouch import cli
+from pretouch.cli import skin_monitor
 from pretouch.cli.skin_monitor import only_here
 from pretouch.sensing.skin import PAPER_SKIN
 from pretouch.types import RangeStatus
+from pretouch.units import EVERYWHERE
 from pretouch.units.keys import Keys, UnitKey, load_keys, new_key, save_keys
 from pretouch.units.skin_reader import read_skin
-from pretouch.units.udp import EVERYWHERE
+from pretouch.units.skin_recording import SkinRecording
 from tests.ports import free_port
 from tests.units.desk import Desk
 
@@ -57,7 +59,7 @@ def test_units_that_are_well_are_shown_recorded_and_written_as_numbers(keys, por
     assert [unit["unit"] for unit in told["units"]] == ["wrist", "hand-1"]
     assert not any(finding["level"] == "fault" for finding in told["findings"])
     for unit in told["units"]:
-        assert unit["standing"]["state"] == "live"
+        assert unit["traffic"]["state"] == "live"
         assert unit["distance_m"] == pytest.approx(0.5, abs=0.02)
         assert unit["imu_rate_hz"] == pytest.approx(416, rel=0.02)
     trace = read_skin(place)
@@ -139,11 +141,16 @@ def test_a_terminal_shows_a_table_that_changes(keys, port, tmp_path, capsys, mon
 
 
 @pytest.mark.slow
-def test_a_disk_that_is_full_is_said_and_the_exit_code_tells_of_it(keys, port, tmp_path, capsys):
+def test_a_disk_that_is_full_is_said_and_the_exit_code_tells_of_it(keys, port, tmp_path, capsys, monkeypatch):
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    try:
+
+    def limited(place):  # after the receiver has its shared memory
         resource.setrlimit(resource.RLIMIT_FSIZE, (30_000, before[1]))
+        return SkinRecording(place)
+
+    monkeypatch.setattr(skin_monitor, "SkinRecording", limited)
+    try:
         with Desk(keys, port):
             code = monitor(tmp_path, port, "--duration", "3", "--record", str(tmp_path / "units.mcap"))
     finally:
@@ -252,7 +259,7 @@ def test_the_key_of_a_lost_unit_is_revoked_or_replaced_and_the_others_stay(tmp_p
         (("--stuck", "elbow"), "Unknown unit elbow"),
         (("--skin", "/nowhere.toml"), "/nowhere.toml cannot be read"),
         (("--duration", "-2"), "-2"),
-        (("--seed", "-1"), "SimulateOptions.seed is -1: it must be at least 0."),
+        (("--seed", "-1"), "--seed is -1"),
         (("--host", ""), "The receiver's address is empty"),
     ],
 )

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pretouch import cli
-from pretouch.arms.simulated import threaded
+from pretouch.arms.simulated import arm
 from pretouch.arms.simulated.arm import SimulatedArm
 from pretouch.cli.calibrate import motion
 from pretouch.imported_data.reading import read_joints
@@ -125,7 +125,7 @@ def test_the_arm_does_not_move_without_a_persons_word(tmp_path, capsys, monkeypa
 
 
 def test_the_way_to_the_start_is_part_of_what_is_asked_about(panda_model, tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(threaded, "SimulatedArm", elsewhere)
+    monkeypatch.setattr(arm, "SimulatedArm", elsewhere)
     questions = []
     monkeypatch.setattr("builtins.input", lambda question: questions.append(question) or "n")
     files = ("--out", tmp_path / "s.toml")
@@ -140,8 +140,8 @@ def test_the_way_to_the_start_is_part_of_what_is_asked_about(panda_model, tmp_pa
     assert float(told[3]) < float(re.search(r"The arm needs the space .*, y (\S+) to", said)[1])
 
 
-def elsewhere(options, q, *words, **more):
-    return SimulatedArm(options, q + ASIDE, *words, **more)
+def elsewhere(model, q, *words):
+    return SimulatedArm(model, q + ASIDE, *words)
 
 
 def test_the_motion_is_written_for_another_driver_and_then_the_room_it_takes(

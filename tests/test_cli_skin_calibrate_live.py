@@ -19,8 +19,9 @@ from pretouch.calibration.motion.plan import Plan
 from pretouch.cli.calibrate import live
 from pretouch.errors import RecordingError
 from pretouch.sensing.skin import load_skin
-from pretouch.session.motion import Ending, go
+from pretouch.session.run import Ending, go
 from pretouch.signals import Terminated, ends_raise, exit_code, noted_in_motion
+from pretouch.units.skin import NetworkSkin, Traffic
 from pretouch.units.skin_reader import read_skin
 from tests.calibrated_arm import assert_same_places
 from tests.session.arms import FollowingArm
@@ -35,13 +36,19 @@ def started(folder, *words):
     )  # fmt: skip
 
 
-class Units:
+class Units(NetworkSkin):
     """Hear nothing."""
 
     alive, address = True, ("127.0.0.1", 5)
 
+    def __init__(self):
+        pass
+
     def take_samples(self):
         return []
+
+    def traffic(self):
+        return Traffic((), {}, 0)
 
 
 def ended(model, recording, units=None):
@@ -97,11 +104,11 @@ def at_once(monkeypatch, paper_skin):
     @contextmanager
     def opened(*_):
         arm = SimpleNamespace(unfit=lambda: (), report=lambda: "")
-        yield OpenedArm(arm, skin=Units(), units=Units())
+        yield OpenedArm(arm, skin=Units())
 
     monkeypatch.setattr(Simulated, "open", opened)
     monkeypatch.setattr(live, "skin_for", lambda *_: paper_skin)
-    monkeypatch.setattr(live, "wait_until_live", lambda *_: None)
+    monkeypatch.setattr(live.UnitWatch, "wait", lambda *_: None)
     monkeypatch.setattr(live, "_plans", lambda *_: [])
     monkeypatch.setattr(live, "_recorded", lambda *_: print("It moves."))
 

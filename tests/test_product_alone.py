@@ -20,9 +20,9 @@ sys.modules.update(dict.fromkeys({HIDDEN}))  # to import one of them is an Impor
 from pretouch.cli import main
 if sys.argv[1:2] == ["run"]:  # pushes and checks take seconds
     from pretouch.cli.run import command
-    from pretouch.session.preflight import PreflightParams
     command.GuidedPush.confirm = lambda *_: None
-    command.PREFLIGHT = PreflightParams(watch_s=1.0)
+    from pretouch.session import may_move
+    may_move.WATCH_S = 1.0
 sys.exit(main(sys.argv[1:]))
 """
 

@@ -5,7 +5,6 @@ import gc
 import os
 import re
 import signal
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import suppress
@@ -24,7 +23,6 @@ from pretouch.types import ControlStep, RobotState
 from tests.following_arm import controller_of
 from tests.test_loop import World
 
-linux = pytest.mark.skipif(sys.platform != "linux", reason="priorities and processors are chosen on Linux only")
 FAST = at_rate(PROFILES["paper"], 1000.0)
 
 
@@ -52,7 +50,7 @@ def controller(panda_model: RobotModel, paper_skin: Skin) -> Controller:
 @pytest.mark.parametrize("ends", [None, RuntimeError("lost")])
 def test_nothing_is_collected_meanwhile_however_it_ends(ends: Exception | None):
     with suppress(RuntimeError), realtime.real_time() as missing:
-        assert missing == () or sys.platform != "linux"
+        assert missing == ()
         assert not gc.isenabled()
         assert gc.get_freeze_count() > 1000
         if ends:
@@ -75,7 +73,7 @@ def test_a_collector_somebody_switched_off_and_froze_stays_so():
 
 
 NOT_ALLOWED, INVALID = PermissionError(1, "Operation not permitted"), OSError(22, "Invalid argument")
-CPU = 0 if sys.platform != "linux" else min(os.sched_getaffinity(0))
+CPU = min(os.sched_getaffinity(0))
 
 
 def fails(monkeypatch: pytest.MonkeyPatch, function: str, error: OSError) -> None:
@@ -85,7 +83,6 @@ def fails(monkeypatch: pytest.MonkeyPatch, function: str, error: OSError) -> Non
     monkeypatch.setattr(os, function, refuse)
 
 
-@linux
 @pytest.mark.parametrize(
     ("function", "error", "wish", "words"),
     [
@@ -102,7 +99,6 @@ def test_what_is_refused_is_one_sentence_and_the_run_goes_on(monkeypatch, functi
     assert re.match(words, said)
 
 
-@linux
 @pytest.mark.parametrize("ends", [None, RuntimeError("lost")])
 def test_a_priority_is_set_and_taken_back(monkeypatch: pytest.MonkeyPatch, ends: Exception | None):
     calls = []
@@ -116,7 +112,6 @@ def test_a_priority_is_set_and_taken_back(monkeypatch: pytest.MonkeyPatch, ends:
     assert [(who, policy) for who, policy, _ in calls[1:]] == [(0, before)]
 
 
-@linux
 def test_the_process_stays_on_a_processor_meanwhile():
     before = os.sched_getaffinity(0)
     with realtime.real_time(cpu=max(before)) as missing:
@@ -125,7 +120,6 @@ def test_the_process_stays_on_a_processor_meanwhile():
     assert os.sched_getaffinity(0) == before
 
 
-@linux
 @pytest.mark.parametrize(
     ("wish", "words"),
     [
@@ -141,7 +135,6 @@ def test_wishes_that_cannot_be_name_the_range(wish: dict[str, int], words: str):
     assert gc.isenabled()
 
 
-@linux
 def test_timers_are_sharp_meanwhile():
     prctl = ctypes.CDLL(None).prctl
     first = prctl(30, 0, 0, 0, 0)
@@ -174,8 +167,7 @@ class Arm(World):
 
 
 def test_the_runner_prepares_tells_and_reports(controller: Controller, monkeypatch: pytest.MonkeyPatch):
-    if sys.platform == "linux":
-        fails(monkeypatch, "sched_setaffinity", INVALID)
+    fails(monkeypatch, "sched_setaffinity", INVALID)
     clock, told, arm = MonotonicClock(0.001), [], Arm(controller)
     options = realtime.Options(cpu=CPU, tell=told.append)
     realtime.run(controller, arm, arm.skin(), clock, arm, lambda step: len(arm.steps) == 20, options)

@@ -8,7 +8,7 @@ from contextlib import suppress
 
 import pytest
 
-from pretouch.signals import Terminated, children_undisturbed, ended, ends_raise, exit_code, noted_in_motion
+from pretouch.signals import Terminated, ended, ends_raise, exit_code, kept_from_children, noted_in_motion
 
 
 @pytest.mark.parametrize(
@@ -70,7 +70,7 @@ def test_what_was_ignored_stays_ignored():
 
 
 def test_a_child_survives_a_terminal_that_closes_and_ends_by_sigterm():
-    with children_undisturbed():
+    with kept_from_children():
         child = subprocess.Popen([sys.executable, "-c", "print(flush=True); input()"], stdout=-1, stdin=-1)
     child.stdout.readline()
     for number in (signal.SIGHUP, signal.SIGTSTP):

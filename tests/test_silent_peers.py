@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import pytest
 
 from pretouch.page.server import ServeOptions, served
-from pretouch.units.network_skin import NetworkSkin
+from pretouch.units.skin import NetworkSkin
 from tests.ports import free_port
 from tests.units.fake_unit import IDS, KEYS
 

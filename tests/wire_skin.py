@@ -1,22 +1,29 @@
 """A simulated skin whose readings come as real ones do: units, network, sockets, receiver, all in simulated time."""
 
+from dataclasses import replace
 from typing import Self
 
 import numpy as np
 
 from pretouch.errors import HardwareError
 from pretouch.sensing.skin import Skin
-from pretouch.sim.imu import Imus
 from pretouch.sim.plant import Plant
-from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
-from pretouch.sim.touch_sensor import Forces, TouchSensors, no_forces
+from pretouch.sim.range_finder import RangeFinderParams
+from pretouch.sim.touch_sensor import Forces, no_forces
 from pretouch.types import RangeReadings, TouchReadings
-from pretouch.units.fleet import Fleet, FleetParams, simulated_keys
-from pretouch.units.link import LinkParams
+from pretouch.units.fleet import Fleet, FleetParams, NetworkParams, simulated_keys
 from pretouch.units.receiver import SkinReceiver
+from pretouch.units.session import LinkParams
 
 _PATIENCE_S = 5.0
 """The machine's own loopback may take this long to hand a datagram over [s]."""
+
+
+def network(loss: float = 0.0, overtaken: float = 0.0, doubled: float = 0.0) -> NetworkParams:
+    """The default network with these fractions lost, overtaken and doubled in either direction."""
+    plain = NetworkParams()
+    up, down = (replace(one, loss=loss, overtaken=overtaken, doubled=doubled) for one in (plain.up, plain.down))
+    return NetworkParams(up, down)
 
 
 class WireSkin:
@@ -47,12 +54,8 @@ class WireSkin:
             raise
         self._taken_in = 0
         plant.before_each_step(self._step)
-        self.range_finders = RangeFinders(plant, skin, ranging, seed, self.fleet.take_range)
+        self.range_finders = self.fleet.mount(plant, skin, lambda time: time, ranging, laid)
         """What measures; `silenced` ones do not, while their units go on sending."""
-        if len(skin.touching):
-            TouchSensors(plant, skin, params.touch, seed, laid, self.fleet.take_touch)
-        if params.imu is not None:
-            Imus(plant, skin, params.imu, seed, self.fleet.take_imu)
 
     def __enter__(self) -> Self:
         return self

@@ -12,7 +12,6 @@ import pytest
 from fci.tests.conftest import RawClient, arm_of
 
 from pretouch.cli import main
-from pretouch.cli.skin_keys import with_new
 from pretouch.robot.description import fr3
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin
@@ -52,7 +51,7 @@ def test_it_says_where_it_listens_and_ends_in_order_on_sigterm(tmp_path):
 
 def test_its_units_are_heard_in_real_time(tmp_path):
     skin = paper_skin(RobotModel(fr3()))
-    keys = with_new(Keys(), skin.ids)
+    keys = Keys().with_new(skin.ids)
     save_keys(keys, tmp_path / "keys.toml")
     with SkinReceiver(skin.ids, keys) as receiver:
         units = f"127.0.0.1:{receiver.address[1]}"

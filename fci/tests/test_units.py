@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pretouch.cli.skin_keys import with_new
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin
@@ -29,7 +28,7 @@ def test_in_lockstep_readings_are_the_same_to_the_last_bit(serve, raw):
 
 def _readings(serve: Any, raw: Any, skin: Any) -> Any:
     """Stamps, distances and statuses (T, 3, K) after each millisecond of a motion."""
-    keys, rng, now = with_new(Keys(), skin.ids), np.random.default_rng([0, 8]), [0.0]
+    keys, rng, now = Keys().with_new(skin.ids), np.random.default_rng([0, 8]), [0.0]
     with SkinReceiver(skin.ids, keys, clock=lambda: now[0], draw=rng.bytes) as receiver:
         served = serve(setup={"units": UnitsSetup(skin, keys, receiver.address)})
         client = raw(served)
@@ -37,7 +36,7 @@ def _readings(serve: Any, raw: Any, skin: Any) -> Any:
         for _ in range(_LASTING):
             now[0] = 1e-3 * float(state["message_id"])
             receiver.receive()
-            tables.append(receiver.table.copy())
+            tables.append(receiver.table[:, :3].T.copy())
             state = client.turn(state, np.zeros(7))
         served.stop()
     return np.array(tables)

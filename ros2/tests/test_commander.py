@@ -19,10 +19,10 @@ from pretouch.controller import Controller
 from pretouch.desired import Desired, DesiredKind
 from pretouch.errors import ParameterError, RobotError
 from pretouch.perception.scene_filter import no_fixtures
+from pretouch.ports import NoUnits
 from pretouch.profiles import profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.session.session import NoUnits
 from pretouch.sound import sound_desired
 from pretouch.types import ControlStep, Mode
 from pretouch_ros2.commander import Ros2Commander

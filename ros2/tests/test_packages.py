@@ -15,7 +15,7 @@ from rich.console import Console
 from ruamel.yaml import YAML
 
 from pretouch import __version__, cli
-from pretouch.cli.run.options import Run, check_options
+from pretouch.cli.run.command import Run, check_options
 from pretouch.profiles import PROFILES
 from pretouch.recording.ros import OWN, own_definition
 from pretouch.robot.description import robot_named

@@ -16,7 +16,7 @@ from ros2.tests.asking import publishing, twist
 from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify
 from pretouch.robot.description import panda
-from pretouch.session.confirmations import ConfirmedRobots
+from pretouch.session.memory import ConfirmedRobots
 from pretouch.session.push import DIRECTIONS
 from pretouch_ros2.arm import identity
 from pretouch_ros2.messages import TWIST
@@ -50,7 +50,7 @@ def running(domain: int, folder: Path, *words: str, profile: str = PROFILE) -> I
 
 def confirmed(domain: int, folder: Path) -> None:
     known = identity(NodeParams(domain=domain), ArmParams("by-robot", "base"))
-    ConfirmedRobots(folder / "state" / "pretouch").keep(known)
+    ConfirmedRobots(folder / "state" / "pretouch").add(known)
 
 
 def lines_until(process: subprocess.Popen[str], sign: str) -> list[str]:

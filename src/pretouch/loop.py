@@ -4,7 +4,7 @@ import math
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, astuple, dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -81,6 +81,13 @@ class Durations:
         return Spread(median, p99, p999, self._largest)
 
 
+def spread_table(rows: dict[str, Spread]) -> str:
+    """Return spreads as lines of a table [us]."""
+    lines = [f"{'[us]':14}{'median':>10}{'99 %':>10}{'99.9 %':>10}{'largest':>10}"]
+    lines += [f"{name:14}" + "".join(f"{1e6 * time:10.0f}" for time in astuple(s)) for name, s in rows.items()]
+    return "\n".join(lines)
+
+
 @dataclass(frozen=True, slots=True)
 class Timing:
     """How a loop kept its time."""
@@ -109,14 +116,11 @@ class Timing:
         return counts | {name: asdict(spread) for name, spread in spreads.items()}
 
     def __str__(self) -> str:
-        lines = [
-            f"{self.cycles} cycles at {1 / self.period:g} Hz: {self.overruns} overruns, {self.missed} ticks missed.",
-            f"{'[us]':14}{'median':>10}{'99 %':>10}{'99.9 %':>10}{'largest':>10}",
-        ]
         rows = {"period": self.measured, "late wake-up": self.wake_up, "busy": self.busy, "busy, CPU": self.cpu}
-        for name, s in rows.items():
-            lines.append(f"{name:14}" + "".join(f"{1e6 * value:10.0f}" for value in (s.median, s.p99, s.p999, s.max)))
-        return "\n".join(lines)
+        return (
+            f"{self.cycles} cycles at {1 / self.period:g} Hz: {self.overruns} overruns, {self.missed} ticks missed.\n"
+            + spread_table(rows)
+        )
 
 
 class MonotonicClock:
@@ -144,7 +148,10 @@ class MonotonicClock:
         """Wait for the next tick and return the time [s]."""
         now = time.monotonic()
         if self._cycles:
-            self._account(now - self._given, time.thread_time() - self._cpu_given)
+            busy = now - self._given
+            self._busy.add(busy)
+            self._cpu.add(time.thread_time() - self._cpu_given)
+            self.overruns += busy > self.period
             late = int((now - self._next) / self.period)
             if late > 0:
                 self.missed += late
@@ -162,18 +169,11 @@ class MonotonicClock:
         self._given, self._cpu_given = now, time.thread_time()
         return now
 
-    def _account(self, busy: float, cpu: float) -> None:
-        self._busy.add(busy)
-        self._cpu.add(cpu)
-        if busy > self.period:
-            self.overruns += 1
-
     def timing(self) -> Timing:
         """Report on all ticks so far; what the caller does since the last one is not in it."""
-        return Timing(
-            period=self.period, cycles=self._cycles, measured=self._measured.spread(), wake_up=self._wake_up.spread(),
-            busy=self._busy.spread(), cpu=self._cpu.spread(), overruns=self.overruns, missed=self.missed,
-        )  # fmt: skip
+        measured, wake_up = self._measured.spread(), self._wake_up.spread()
+        busy, cpu = self._busy.spread(), self._cpu.spread()
+        return Timing(self.period, self._cycles, measured, wake_up, busy, cpu, self.overruns, self.missed)
 
 
 @value
@@ -209,7 +209,6 @@ class Options:
     """What the arm carries, asked in the loop; None: nothing is said, and what was said last stays."""
     desired: Callable[[], Desired | None] = lambda: None
     """What a commander asks for, asked in the loop: the newest again while there is no newer; None: the path."""
-
     moving: Callable[[], MovingFixtures | None] = lambda: None
     """What is known to move beside the arm, asked in the loop; None: nothing is said of any."""
 

@@ -2,6 +2,8 @@
 
 from typing import Protocol
 
+import numpy as np
+
 from pretouch.types import FloatArray, RangeReadings, RobotState, SeenPoints, TouchReadings
 
 
@@ -48,6 +50,14 @@ class Skin(Protocol):
     def read(self) -> RangeReadings:
         """Return the newest reading of each unit."""
         ...
+
+
+class NoUnits:
+    """The port `Skin` of an arm without units."""
+
+    def read(self) -> RangeReadings:
+        """Return the readings of none."""
+        return RangeReadings(np.zeros(0), np.zeros(0), np.zeros(0, np.int64))
 
 
 def touch_of(skin: object) -> TouchReadings | None:

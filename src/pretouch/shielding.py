@@ -36,9 +36,9 @@ class Shield:
         before, period = self.state, self.controller.limits.period
         now = instant(inputs.stamp, period, inputs.robot, inputs.readings, inputs.touch)
         robot = explained(self.controller, before, inputs.robot, now)
-        given = replace(inputs, stamp=now, robot=robot, desired=inputs.desired or twist(now, _STILL))
-        step, self.state = self.controller.step(before, given)
-        self.cycle = Cycle(given, before, step, self.state)
+        inputs = replace(inputs, stamp=now, robot=robot, desired=inputs.desired or twist(now, _STILL))
+        step, self.state = self.controller.step(before, inputs)
+        self.cycle = Cycle(inputs, before, step, self.state)
         return step
 
 

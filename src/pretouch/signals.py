@@ -64,30 +64,26 @@ def ended_in_order() -> AbstractContextManager[object]:
     return handled(at_once, end)
 
 
-def children_undisturbed() -> AbstractContextManager[object]:
-    """Let processes that are started meanwhile ignore a terminal that closes, and Ctrl-Z: their parent ends them."""
-    return handled((signal.SIGHUP, signal.SIGTSTP), signal.SIG_IGN)  # stays ignored in a program that is started
-
-
 @contextmanager
-def kept_from_children(numbers: Iterable[int]) -> Iterator[None]:
-    """Start a process in here, and the signals do not reach it from its first instruction on.
+def kept_from_children() -> Iterator[None]:
+    """Start a process in here, and what a terminal sends, as Ctrl-C, does not reach it from its first instruction on.
 
     It calls `leave_to_parent` as soon as it can, and its parent ends it.
     """
-    resource_tracker.ensure_running()  # begun with the first process, it would unblock Ctrl-C
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, numbers)
+    with handled((signal.SIGHUP, signal.SIGTSTP), signal.SIG_IGN):  # stays so in what outlives a terminal
+        resource_tracker.ensure_running()  # begun with the first process, it would unblock Ctrl-C
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, OF_TERMINAL)
     try:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def leave_to_parent(numbers: Iterable[int]) -> None:
-    """Ignore signals in this process, which was started with them blocked."""
-    for number in numbers:
+def leave_to_parent() -> None:
+    """Ignore `OF_TERMINAL` in this process, which was started with them blocked."""
+    for number in OF_TERMINAL:
         signal.signal(number, signal.SIG_IGN)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, numbers)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, OF_TERMINAL)
 
 
 _received: list[int] = []

@@ -10,8 +10,7 @@ from pretouch import cli, plugins
 from pretouch.arms import arm_class, arm_names
 from pretouch.errors import PluginError
 from pretouch.recording.reader import open_recording
-from pretouch.session.confirmations import ConfirmedRobots
-from pretouch.session.preflight import PreflightParams
+from pretouch.session.memory import ConfirmedRobots
 from pretouch.session.push import GuidedPush
 
 PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "your-own-arm.md"
@@ -36,7 +35,7 @@ def _installed(tmp_path, monkeypatch):
 
 
 def test_it_is_run_with_options_of_its_own(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("pretouch.cli.run.command.PREFLIGHT", PreflightParams(watch_s=0.5))
+    monkeypatch.setattr("pretouch.session.may_move.WATCH_S", 0.5)
     monkeypatch.setattr(GuidedPush, "confirm", lambda *_: None)
     words = "--device", "/dev/ttyS7", "--no-skin", "--profile", "blind", "--path", "hold", "--yes"
     assert cli.main(["run", "mine", *words, "--seconds", "0.2", "--record", "a.mcap"]) == 0

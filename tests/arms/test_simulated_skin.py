@@ -2,38 +2,43 @@
 
 import threading
 import time
-from dataclasses import replace
+from contextlib import ExitStack, closing
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from pretouch.arms.simulated import skin, threaded
-from pretouch.arms.simulated.arm import SimulatedArm
-from pretouch.arms.simulated.skin import SimulateOptions, VisitingHand, run
-from pretouch.arms.simulated.threaded import ThreadedArm
+from pretouch.arms.simulated import arm as arms
+from pretouch.arms.simulated import skin
+from pretouch.arms.simulated.arm import SimulatedArm, ThreadedArm
+from pretouch.arms.simulated.skin import VisitingHand, run
+from pretouch.control.path import Circle
 from pretouch.errors import HardwareError
 from pretouch.params import FailureParams
+from pretouch.profiles import Profile
 from pretouch.sim.imu import ImuParams
 from pretouch.sim.plant import Plant
 from pretouch.sim.scene import SceneSpec
 from pretouch.types import Mode, RobotState
-from pretouch.units.channel import network
-from pretouch.units.fleet import FleetParams, simulated_keys
+from pretouch.units.fleet import Fleet, FleetParams, simulated_keys
 from pretouch.units.receiver import SkinReceiver
 from pretouch.units.simulated import UnitParams
+from tests.wire_skin import network
 
 NOBODY = ("127.0.0.1", 9)
 """No one listens at the discard port."""
 
 
 @pytest.fixture
-def options(panda_model, paper_skin):
-    def made(address: tuple[str, int], **changes) -> SimulateOptions:
-        keys = simulated_keys(paper_skin.ids, 0)
-        return replace(SimulateOptions(panda_model, paper_skin, keys, *address), **changes)
+def fleet_to(paper_skin):
+    """Make the units of the paper's skin, which send to an address."""
+    with ExitStack() as stack:
 
-    return made
+        def made(address: tuple[str, int], params: FleetParams | None = None) -> Fleet:
+            keys = simulated_keys(paper_skin.ids, 0)
+            return stack.enter_context(closing(Fleet(paper_skin.network, keys, params or FleetParams(), 3, address)))
+
+        yield made
 
 
 @pytest.fixture
@@ -42,45 +47,33 @@ def receiver(paper_skin):
         yield made
 
 
-def simulated(options: SimulateOptions, receiver: SkinReceiver, until) -> list[str]:
-    """Simulate beside a receiver until that knows what it is to know, and return what was said."""
-    said, over = [], threading.Event()
-    other = threading.Thread(target=run, args=(options, over.is_set, said.append))
+def test_units_that_are_silent_stuck_or_reboot_are_so_at_the_receiver(fleet_to, receiver, panda_model, paper_skin):
+    params = FleetParams(network(loss=0.05), UnitParams(boot_s=0.1), ImuParams(), reboot_every_s=2.5)
+    silent, stuck, said, over = paper_skin.ids[0], paper_skin.ids[1], [], threading.Event()
+    fleet = fleet_to(receiver.address, params)
+    fleet.set_faults({silent}, {stuck})
+    args = panda_model, paper_skin, fleet, Circle(), Profile(), False, lambda _: over.is_set(), said.append
+    other = threading.Thread(target=run, args=args)
     other.start()
-    give_up = time.monotonic() + 60
+    give_up, was_stuck = time.monotonic() + 60, False
     try:
-        while not until(receiver, said) and other.is_alive() and time.monotonic() < give_up:
+        while not (was_stuck and sum(unit.reboots for unit in receiver.units) > 3):
+            assert time.monotonic() < give_up, "it never came to that"
+            assert other.is_alive()
             receiver.receive(0.02)
+            was_stuck = was_stuck or receiver.units[1].stuck
     finally:
         over.set()
         other.join()
-    assert time.monotonic() < give_up, "it never came to that"
-    return said
-
-
-def test_units_that_are_silent_stuck_or_reboot_are_so_at_the_receiver(options, receiver, paper_skin):
-    fleet = FleetParams(network(loss=0.05), UnitParams(boot_s=0.1), ImuParams(), reboot_every_s=2.5)
-    silent, stuck = paper_skin.ids[0], paper_skin.ids[1]
-    chosen = options(
-        receiver.address, fleet=fleet, silenced=frozenset({silent}), stuck=frozenset({stuck}), hand=False, seed=3
-    )
-    seen_stuck = []
-
-    def enough(r: SkinReceiver, _: list[str]) -> bool:
-        seen_stuck.append(r.units[1].stuck)
-        return any(seen_stuck) and sum(unit.reboots for unit in r.units) > 3
-
-    said = simulated(chosen, receiver, enough)
     assert receiver.units[0].state == "never heard"
     assert not any(unit.stuck for unit in receiver.units[2:])
     assert all(silent in line for line in said)
 
 
 @pytest.mark.slow
-def test_it_ends_by_itself_in_order_and_says_how_it_went_each_second(options):
-    said = []
-    begin = time.monotonic()
-    run(options(NOBODY, duration_s=2.1, fleet=FleetParams()), lambda: False, said.append)
+def test_it_ends_in_order_and_says_how_it_went_each_second(fleet_to, panda_model, paper_skin):
+    said, begin = [], time.monotonic()
+    run(panda_model, paper_skin, fleet_to(NOBODY), Circle(), Profile(), True, lambda now: now >= 2.1, said.append)
     assert 2.0 < time.monotonic() - begin < 30.0
     assert len(said) == 2
     assert all("0 of 7 units in session" in line for line in said)
@@ -89,19 +82,19 @@ def test_it_ends_by_itself_in_order_and_says_how_it_went_each_second(options):
 def test_a_receiver_that_does_not_answer_is_named_once():
     units, said = [SimpleNamespace(in_session=False, silent=False)], []
     fleet = SimpleNamespace(ids=["a"], units=units, sent=0, lost=0, receiver=("desk", 29470))
-    clock = SimpleNamespace(now=0.0, left_out=0.0)
+    arm = SimpleNamespace(now=0.0, left_out=0.0, fleet=fleet)
     cycle = SimpleNamespace(step=SimpleNamespace(ee_velocity=np.zeros(3), mode=Mode.TRACK))
-    printer = skin._StatusPrinter(fleet, clock, said.append)
+    printer = skin._StatusPrinter(arm, said.append)
     for second in range(1, 20):
-        clock.now, units[0].in_session = float(second), 8 <= second < 12
+        arm.now, units[0].in_session = float(second), 8 <= second < 12
         printer.record(cycle)
     named = [i for i, line in enumerate(said) if line.startswith("No answer from desk:29470: ")]
     assert [i - k for k, i in enumerate(named)] == [3, 14]  # after the lines of so many seconds
 
 
-def test_a_unit_there_is_not_cannot_be_silenced(options):
+def test_a_unit_there_is_not_cannot_be_silenced(fleet_to):
     with pytest.raises(HardwareError, match=r"Unknown unit elbow: choose from hand_left"):
-        options(NOBODY, silenced=frozenset({"elbow"}))
+        fleet_to(NOBODY).set_faults({"elbow"}, ())
 
 
 def test_the_hand_comes_and_goes():
@@ -114,25 +107,29 @@ def test_the_hand_comes_and_goes():
 # The arm by itself: its clock
 
 
-def test_instants_of_the_simulation_are_told_by_the_machines_clock(panda_model, options):
-    with SimulatedArm(options(NOBODY), panda_model.description.q_ready, 0.01) as arm:
-        arm.begin()
-        for _ in range(5):
-            tick = arm.tick()
-            assert 0.0 <= time.monotonic() - arm.monotonic(tick) < 1.0
-        first = arm.monotonic(tick)
-        assert arm.monotonic(tick + 0.25) - first == pytest.approx(0.25)
+@pytest.fixture
+def begun(panda_model, paper_skin, fleet_to):
+    q, fleet = panda_model.description.q_ready, fleet_to(NOBODY)
+    arm = SimulatedArm(panda_model, q, paper_skin, fleet, SceneSpec(), 0.01)
+    arm.begin()
+    return arm
 
 
-def test_a_machine_that_is_late_leaves_time_out(panda_model, options):
-    with SimulatedArm(options(NOBODY), panda_model.description.q_ready, 0.01) as arm:
-        arm.begin()
-        begun = arm.tick()
-        time.sleep(0.3)
-        tick = arm.tick()
-        assert arm.clock.left_out > 0.1
-        assert tick - begun == pytest.approx(0.01)
-        assert arm.monotonic(tick) <= time.monotonic()
+def test_instants_of_the_simulation_are_told_by_the_machines_clock(begun):
+    for _ in range(5):
+        tick = begun.tick()
+        assert 0.0 <= time.monotonic() - begun.monotonic(tick) < 1.0
+    first = begun.monotonic(tick)
+    assert begun.monotonic(tick + 0.25) - first == pytest.approx(0.25)
+
+
+def test_a_machine_that_is_late_leaves_time_out(begun):
+    before = begun.tick()
+    time.sleep(0.3)
+    tick = begun.tick()
+    assert begun.left_out > 0.1
+    assert tick - before == pytest.approx(0.01)
+    assert begun.monotonic(tick) <= time.monotonic()
 
 
 # The arm that moves on by itself: what its states are stamped with, and how far the machine is behind
@@ -142,7 +139,7 @@ class ScriptedArm:
     """A simulation whose states are stamped so much after their tick [s], and which stands while it is not let go."""
 
     def __init__(self, q):
-        self.q, self.ahead, self.clock, self.plant = q, 0.0, SimpleNamespace(left_out=0.0), SimpleNamespace()
+        self.q, self.ahead, self.left_out, self.plant = q, 0.0, 0.0, SimpleNamespace()
         self.plant.mj_data = SimpleNamespace(xfrc_applied=np.zeros((20, 6)))
         self.plant.before_each_step = lambda call: None
         self.goes_on, self.stands = threading.Event(), threading.Event()
@@ -167,9 +164,6 @@ class ScriptedArm:
     def monotonic(self, instant):
         return instant + self.ahead
 
-    def __exit__(self, *_):
-        pass
-
 
 @pytest.fixture
 def simulation(panda_model):
@@ -177,9 +171,9 @@ def simulation(panda_model):
 
 
 @pytest.fixture
-def arm(panda_model, options, simulation, monkeypatch):
-    monkeypatch.setattr(threaded, "SimulatedArm", lambda *_: simulation)
-    with ThreadedArm(options(NOBODY), panda_model.description.q_ready, SceneSpec()) as arm:
+def arm(panda_model, paper_skin, simulation, monkeypatch):
+    monkeypatch.setattr(arms, "SimulatedArm", lambda *_: simulation)
+    with ThreadedArm(panda_model, panda_model.description.q_ready, paper_skin, None, SceneSpec()) as arm:
         yield arm
         simulation.goes_on.set()
 
@@ -200,7 +194,7 @@ def test_a_simulation_that_stands_still_falls_behind_until_it_goes_on(arm, simul
         assert time.monotonic() < stood.stamp + 10.0
     assert stood.stamp < arm.read().stamp < time.monotonic() - 0.02
     assert arm.measured().stamp <= stood.stamp  # what was measured keeps its time
-    simulation.clock.left_out = 0.3
+    simulation.left_out = 0.3
     simulation.goes_on.set()
     while arm.left_out < 0.3:
         assert time.monotonic() < stood.stamp + 10.0
@@ -208,7 +202,7 @@ def test_a_simulation_that_stands_still_falls_behind_until_it_goes_on(arm, simul
 
 
 def test_a_machine_that_is_always_too_slow_still_hands_out_states_that_a_controller_believes(
-    panda_model, options, monkeypatch
+    panda_model, paper_skin, fleet_to, monkeypatch
 ):
     advance = Plant.advance
 
@@ -217,7 +211,7 @@ def test_a_machine_that_is_always_too_slow_still_hands_out_states_that_a_control
         advance(plant, duration)
 
     monkeypatch.setattr(Plant, "advance", slowly)
-    with ThreadedArm(options(NOBODY), panda_model.description.q_ready, SceneSpec()) as arm:
+    with ThreadedArm(panda_model, panda_model.description.q_ready, paper_skin, fleet_to(NOBODY), SceneSpec()) as arm:
         begin, ages = time.monotonic(), []
         while time.monotonic() < begin + 2.0:
             ages.append(-arm.read().stamp + time.monotonic())

@@ -13,8 +13,7 @@ from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.range_finder import RangeFinderParams
 from pretouch.sim.scene import SceneSpec
-from pretouch.units.channel import ChannelParams, NetworkParams
-from pretouch.units.fleet import FleetParams
+from pretouch.units.fleet import ChannelParams, FleetParams, NetworkParams
 from pretouch.units.skin_reader import read_skin
 from pretouch.units.skin_recording import SkinRecording
 from tests.wire_skin import WireSkin

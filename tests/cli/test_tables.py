@@ -8,11 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
 
-from pretouch.cli.skin_table import table
+from pretouch.cli.skin_monitor import table
 from pretouch.cli.tables import show
 from pretouch.text_table import TextTable
 from pretouch.types import RangeStatus
-from pretouch.units.health import Counts, UnitStatus, unit_health
+from pretouch.units.health import Counts, unit_health
 from tests.units.traffic import NOW, heard, traffic
 
 WORDS = st.text("abcdefgh_ \n", max_size=60).map(str.strip)
@@ -60,9 +60,8 @@ def test_headings_are_wrapped_and_words_are_broken_for_numbers_to_stand_side_by_
 
 def unit(state="live", **changes):
     """A unit with the widest numbers there are."""
-    made = unit_health("hand_right", heard(), NOW, UnitStatus.of(traffic()), Counts(500))
-    standing = replace(made.standing, state=state, bound=0.01234)
-    return replace(made, latency_s=0.1042, loss=1.0, temperature_c=-20.1, standing=standing, **changes)
+    widest = unit_health(heard(), NOW, traffic(id="hand_right", state=state, bound=0.01234), Counts(500))
+    return replace(widest, latency_s=0.1042, loss=1.0, temperature_c=-20.1, **changes)
 
 
 def shown(*units):
@@ -86,4 +85,4 @@ def test_a_unit_that_is_live_shows_what_its_newest_reading_is_and_others_their_s
     assert " greeting " in shown(unit("greeting"))
     assert " OK " not in shown(unit("silent"))
     stuck = unit()
-    assert " STUCK " in shown(replace(stuck, standing=replace(stuck.standing, stuck=True)))
+    assert " STUCK " in shown(replace(stuck, traffic=replace(stuck.traffic, stuck=True)))

@@ -18,6 +18,7 @@ from pretouch.types import RangeStatus
 from pretouch.units import wire
 from pretouch.units.keys import Keys, UnitKey
 from pretouch.units.receiver import SkinReceiver
+from pretouch.units.unit import imu_batch
 from tests.firmware import harness
 
 KEYS = Keys([UnitKey("one", 7, bytes(range(32)))])
@@ -88,8 +89,8 @@ def served(receiver: SkinReceiver, samples: int, longest: float = 30.0) -> None:
 def test_the_firmware_serves_a_receiver_and_one_that_takes_its_place(tmp_path: Path) -> None:
     with SkinReceiver(["one"], KEYS) as receiver, running_unit(receiver.address[1], tmp_path):
         served(receiver, 100)
-        readings, traffic, batches = receiver.readings(), receiver.units[0], receiver.take_imu()
-        samples = [received.sample for received in receiver.take_samples()]
+        readings, traffic, heard = receiver.readings(), receiver.units[0], receiver.take_samples()
+        samples, batches = [received.sample for received in heard], list(filter(None, map(imu_batch, heard)))
         rejected, port = receiver.rejected, receiver.address[1]
         receiver.close()
         with SkinReceiver(["one"], KEYS, port=port) as other:

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 
+from pretouch.contact.residual_model import residual_init
 from pretouch.errors import PretouchError
 from pretouch.imported_data.forces import read_force
 from pretouch.imported_data.log import Choice, Log
@@ -20,12 +21,13 @@ from pretouch.imported_data.reading import open_log
 from pretouch.imported_data.torques import torque_recording
 from pretouch.importing.chain import arm_of
 from pretouch.importing.read import read_robot
+from pretouch.params import SequentialParams
 from pretouch.profiles import profile
 from pretouch.recording.reader import open_recording
 from pretouch.robot.description import description_text, load_description, panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import load_skin, paper_skin, skin_file
-from pretouch.session.residual_file import Residual, load_residual, save_residual
+from pretouch.session.memory import load_learnt, save_learnt
 from pretouch.sim.randomisation import FOLDER, world_set
 from pretouch.types import RangeStatus
 from pretouch.units.keys import load_keys, save_keys
@@ -154,8 +156,8 @@ def _of_tables(folder: Path, model: RobotModel) -> dict[str, Parser]:
 
 def _of_tomls(folder: Path, model: RobotModel) -> dict[str, Parser]:
     save_keys(KEYS, folder / "keys.toml")
-    save_residual(folder / "learnt.toml", model, Residual({"weights": np.zeros((7, 4))}, "panda", 0.0, 1.0))
-    load_learnt = partial(load_residual, model=model, shapes={"weights": (7, 4)})
+    read_learnt = partial(load_learnt, arm=model, p=SequentialParams())
+    save_learnt(folder / "learnt.toml", model, residual_init(model.n, SequentialParams()), "panda", 0.0, 1.0)
 
     def keys(place: Path) -> object:
         place.chmod(0o600)
@@ -168,7 +170,7 @@ def _of_tomls(folder: Path, model: RobotModel) -> dict[str, Parser]:
         "skin": _of_file(folder, "s.toml", partial(load_skin, model=model), skin_file(panda()).read_bytes()),
         "keys": _of_file(folder, "k.toml", keys, (folder / "keys.toml").read_bytes()),
         "world": _of_file(folder, "w.toml", lambda p: world_set(str(p)), world, world.replace(b"0.06", _HUGE)),
-        "learnt": _of_file(folder, "l.toml", load_learnt, (folder / "learnt.toml").read_bytes()),
+        "learnt": _of_file(folder, "l.toml", read_learnt, (folder / "learnt.toml").read_bytes()),
         "description": _of_file(folder / "described", "robot.toml", load_description, described),
     }
 

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from tests.page.browser import chromium, serving
 
-from pretouch.arms.simulated.skin import SimulateOptions
 from pretouch.arms.simulated.skin import run as simulate
+from pretouch.control.path import Circle
 from pretouch.explanation import explain
 from pretouch.page.live import LivePage, serve_live
 from pretouch.page.real_units import RealUnits
@@ -20,14 +20,15 @@ from pretouch.page.replay import show_replay
 from pretouch.page.room import LiveSettings
 from pretouch.page.server import ServeOptions, begun
 from pretouch.page.simulation import LiveSimulation
-from pretouch.profiles import profile
+from pretouch.profiles import Profile, profile
 from pretouch.recording.reader import open_recording
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin
 from pretouch.types import FloatArray, Mode
+from pretouch.units.fleet import Fleet, FleetParams
 from pretouch.units.keys import Keys, UnitKey
-from pretouch.units.network_skin import NetworkSkin
+from pretouch.units.skin import NetworkSkin
 
 pytestmark = pytest.mark.slow
 
@@ -214,8 +215,10 @@ def test_real_units_on_a_simulated_arm_are_shown_and_missed(tmp_path: Path) -> N
     keys = Keys([UnitKey(unit, k + 1, bytes([k]) * 32) for k, unit in enumerate(skin.ids)])
     over = Event()
     with NetworkSkin(skin.ids, keys) as units:
-        desk = SimulateOptions(other, paper_skin(other), keys, *units.address, hand=False)
-        thread = Thread(target=simulate, args=(desk, over.is_set, lambda line: None))
+        fleet = Fleet(skin.network, keys, FleetParams(), 0, units.address)
+        path, done = Circle(), lambda _: over.is_set()
+        desk = other, paper_skin(other), fleet, path, Profile(), False, done, lambda line: None
+        thread = Thread(target=simulate, args=desk)
         thread.start()
         try:
             simulation = LiveSimulation(model=model, skin=skin, real=RealUnits(units))
@@ -229,3 +232,4 @@ def test_real_units_on_a_simulated_arm_are_shown_and_missed(tmp_path: Path) -> N
         finally:
             over.set()
             thread.join()
+            fleet.close()

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from pretouch.errors import RobotError
-from pretouch.session.confirmations import ConfirmedRobots, Identity, state_folder
+from pretouch.session.memory import ConfirmedRobots, Identity, state_folder
 
 ROBOT = Identity("panda", "172.16.0.2", "libfranka 0.9.2, server 5")
 
@@ -16,7 +16,7 @@ def test_a_robot_is_known_once_it_was_kept_and_others_stay_known(tmp_path):
     other = Identity("fr3", "172.16.0.3", "libfranka 0.21.3, server 10")
     for robot in (ROBOT, other):
         assert not ConfirmedRobots(tmp_path / "new").is_confirmed(robot)
-        ConfirmedRobots(tmp_path / "new").keep(robot)
+        ConfirmedRobots(tmp_path / "new").add(robot)
     assert all(ConfirmedRobots(tmp_path / "new").is_confirmed(robot) for robot in (ROBOT, other))
     assert [file.name for file in (tmp_path / "new").iterdir()] == ["force-sign.json"]
 
@@ -25,7 +25,7 @@ def test_a_robot_is_known_once_it_was_kept_and_others_stay_known(tmp_path):
     "change", [{"kind": "fr3"}, {"address": "172.16.0.3"}, {"connection": "libfranka 0.10, server 5"}]
 )
 def test_another_robot_address_or_library_is_not_known(tmp_path, change):
-    ConfirmedRobots(tmp_path).keep(ROBOT)
+    ConfirmedRobots(tmp_path).add(ROBOT)
     assert not ConfirmedRobots(tmp_path).is_confirmed(replace(ROBOT, **change))
 
 
@@ -33,7 +33,7 @@ def test_another_robot_address_or_library_is_not_known(tmp_path, change):
 def test_a_damaged_file_is_a_sentence_with_the_way_out(tmp_path, content):
     file = tmp_path / "force-sign.json"
     file.write_bytes(content)
-    for use in (ConfirmedRobots(tmp_path).is_confirmed, ConfirmedRobots(tmp_path).keep):
+    for use in (ConfirmedRobots(tmp_path).is_confirmed, ConfirmedRobots(tmp_path).add):
         with pytest.raises(RobotError, match="is damaged: delete it"):
             use(ROBOT)
     assert file.read_bytes() == content
@@ -42,18 +42,18 @@ def test_a_damaged_file_is_a_sentence_with_the_way_out(tmp_path, content):
 def test_a_folder_that_cannot_be_made_is_a_sentence(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(RobotError, match=r"cannot be (read|noted)"):
-        ConfirmedRobots(tmp_path / "file" / "folder").keep(ROBOT)
+        ConfirmedRobots(tmp_path / "file" / "folder").add(ROBOT)
 
 
 def test_writing_that_fails_leaves_the_old_file(tmp_path, monkeypatch):
-    ConfirmedRobots(tmp_path).keep(ROBOT)
+    ConfirmedRobots(tmp_path).add(ROBOT)
 
     def fail(*_):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(os, "replace", fail)
     with pytest.raises(RobotError, match="No space left"):
-        ConfirmedRobots(tmp_path).keep(Identity("fr3", "a", "b"))
+        ConfirmedRobots(tmp_path).add(Identity("fr3", "a", "b"))
     assert ConfirmedRobots(tmp_path).is_confirmed(ROBOT)
 
 

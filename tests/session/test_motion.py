@@ -13,10 +13,11 @@ from pretouch.control.path import segment
 from pretouch.controller import Controller
 from pretouch.loop import MonotonicClock
 from pretouch.perception.scene_filter import no_fixtures
+from pretouch.ports import NoUnits
 from pretouch.profiles import PROFILES
 from pretouch.sensing.skin import Skin
-from pretouch.session.motion import Ending, follow, go
-from pretouch.session.session import NoUnits
+from pretouch.session.may_move import StandingArm
+from pretouch.session.run import Ending, follow, go
 from pretouch.signals import Terminated, ends_raise
 from pretouch.types import Mode
 from tests.session.arms import FollowingArm
@@ -52,7 +53,8 @@ def followed(controller, arm, keeper, cycles=80):
     ending = Ending()
     clock = MonotonicClock(0.01)
     options = realtime.Options(tell=lambda _: None)
-    follow(controller, arm, NoUnits(), clock, keeper, lambda _: len(keeper.steps) >= cycles, options, ending)
+    standing = StandingArm(arm, NoUnits(), controller, 0.0, clock)
+    follow(standing, clock, keeper, lambda _: len(keeper.steps) >= cycles, options, ending)
     return ending
 
 

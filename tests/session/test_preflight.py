@@ -12,12 +12,11 @@ from pretouch.controller import Controller
 from pretouch.errors import RobotError
 from pretouch.loop import MonotonicClock
 from pretouch.perception.scene_filter import no_fixtures
+from pretouch.ports import NoUnits
 from pretouch.profiles import PROFILES, profile
 from pretouch.sensing.skin import Skin
-from pretouch.session.preflight import PreflightParams, check
-from pretouch.session.session import NoUnits, Session
-from pretouch.session.standstill import watch
-from pretouch.session.start import check_start, plan_to_start
+from pretouch.session.may_move import LEAST_ROOM_RAD, StandingArm, check, check_start, watch
+from pretouch.session.run import plan_to_start
 from tests.session.arms import PushedArm
 
 
@@ -31,7 +30,7 @@ def seen(arm, seconds=2.0):
 
 
 def found(controller, seen, floor=-0.2):
-    return check(controller, seen, floor, PreflightParams())
+    return check(controller, seen, floor)
 
 
 def test_a_sound_arm_is_found_fit(controller, panda_model):
@@ -51,7 +50,7 @@ def test_a_sound_arm_is_found_fit(controller, panda_model):
 )  # fmt: skip
 def test_a_force_at_rest_that_would_hide_contacts_is_refused(controller, panda_model, about, what, said):
     findings = {finding.what: finding for finding in found(controller, seen(PushedArm(panda_model, **about)))}
-    assert findings[what].refused
+    assert findings[what].level == "fault"
     assert re.search(said, findings[what].sentence)
 
 
@@ -85,13 +84,13 @@ def test_a_joint_near_its_limit_is_named(controller, panda_model, room, refused)
     q = standing.newest.q.copy()
     q[5] = panda_model.q_max[5] - room
     (finding,) = found(controller, replace(standing, newest=replace(standing.newest, q=q)))
-    assert finding.refused == refused
+    assert (finding.level == "fault") == refused
     assert f"joint6 is at {q[5]:.3f} rad, {room:.3f} rad from its limit" in finding.sentence
 
 
 def test_an_arm_that_its_own_limiter_has_brought_to_a_limit_is_not_refused(panda_model):
-    assert LimiterParams().position_margin_rad < PreflightParams().least_room_rad
-    assert PreflightParams().least_room_rad < PROFILES["paper"].task.position_margin_rad - 0.002
+    assert LimiterParams().position_margin_rad < LEAST_ROOM_RAD
+    assert PROFILES["paper"].task.position_margin_rad - 0.002 > LEAST_ROOM_RAD
 
 
 def test_a_path_that_comes_down_to_the_floor_is_refused(controller, panda_model):
@@ -164,40 +163,39 @@ def test_a_state_that_stands_still_or_is_no_number_is_an_error(arm, change, said
 # between the checks and the motion
 
 
-def checked(model, path=None):
-    """A session of an arm that stands where its path begins, and what was seen of it."""
+def checked(model, path=None, approach=False):
+    """An arm that stands where its path begins, and what was seen of it."""
     arm = PushedArm(model)
     arm.unfit = lambda: ()
     here = model.kinematics(arm.q).position[model.ee]
     path = path or segment(tuple(here), tuple(here + np.array([0.0, 0.4, 0.0])))
     controller = Controller(model, Skin((), model), no_fixtures(), path, PROFILES["blind"])
-    session = Session(arm, NoUnits(), None, controller, 0.0, MonotonicClock(0.01))
-    return session, seen(arm)
+    return StandingArm(arm, NoUnits(), controller, 0.0, MonotonicClock(0.01), approach), seen(arm)
 
 
 def test_an_arm_that_stands_where_it_was_checked_may_move(panda_model):
-    session, standing = checked(panda_model)
-    assert np.array_equal(session.recheck(standing, PreflightParams(), approach=False), panda_model.description.q_ready)
+    arm, standing = checked(panda_model)
+    assert np.array_equal(arm.recheck(standing), panda_model.description.q_ready)
 
 
 @pytest.mark.parametrize("moved", [0.01, np.nan])
 @pytest.mark.parametrize("approach", [True, False])
 def test_an_arm_that_was_guided_since_it_was_checked_may_not(panda_model, approach, moved):
-    session, standing = checked(panda_model)
-    session.arm.q = session.arm.q + moved * np.eye(7)[1]
+    arm, standing = checked(panda_model, approach=approach)
+    arm.arm.q = arm.arm.q + moved * np.eye(7)[1]
     with pytest.raises(RobotError, match=r"moved after the checks, panda_joint\d by .* start again"):
-        session.recheck(standing, PreflightParams(), approach)
+        arm.recheck(standing)
 
 
 def test_an_arm_away_from_its_path_may_only_where_it_goes_there_first(panda_model):
-    session, standing = checked(panda_model, Circle())
-    session.recheck(standing, PreflightParams(), approach=True)
+    arm, standing = checked(panda_model, Circle(), approach=True)
+    arm.recheck(standing)
     with pytest.raises(RobotError, match="--approach"):
-        session.recheck(standing, PreflightParams(), approach=False)
+        replace(arm, approach=False).recheck(standing)
 
 
 def test_what_the_arm_itself_has_against_it_counts(panda_model):
-    session, standing = checked(panda_model)
-    session.arm.unfit = lambda: ("Its stop button is pressed.",)
+    arm, standing = checked(panda_model)
+    arm.arm.unfit = lambda: ("Its stop button is pressed.",)
     with pytest.raises(RobotError, match="stop button"):
-        session.recheck(standing, PreflightParams(), approach=False)
+        arm.recheck(standing)

@@ -9,8 +9,7 @@ import pytest
 from pretouch.profiles import PROFILES
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.session.progress import ProgressReporter, RunSummary
-from pretouch.session.push import PushOutcome
+from pretouch.session.progress import ProgressReporter, PushOutcome, RunSummary
 from pretouch.types import Contact, ControlStep, Mode, Thresholds
 from tests.following_arm import Arm
 from tests.reporting import made

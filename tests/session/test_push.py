@@ -4,11 +4,15 @@ import numpy as np
 import pytest
 
 from pretouch.errors import RobotError
-from pretouch.session.push import DIRECTIONS, GuidedPush, PushParams
-from pretouch.session.standstill import watch
+from pretouch.session import push as pushes
+from pretouch.session.may_move import watch
+from pretouch.session.push import DIRECTIONS, GuidedPush
 from tests.session.arms import PushedArm
 
-PARAMS = PushParams(timeout_s=8.0)
+
+@pytest.fixture(autouse=True)
+def _not_patient(monkeypatch):
+    monkeypatch.setattr(pushes, "TIMEOUT_S", 8.0)
 
 
 class Person:
@@ -32,7 +36,7 @@ def confirmed(model, push=lambda axis: 14.0 * axis, said=None, felt=lambda perso
     person, said = Person(push), [] if said is None else said
     arm = PushedArm(model, lambda time: felt(person, time), **about)
     rest = watch(arm, arm, model.description.qd_max, 2.0)
-    GuidedPush(arm, arm, model, person.ask(arm), said.append, PARAMS).confirm(rest)
+    GuidedPush(arm, arm, model, person.ask(arm), said.append).confirm(rest)
     assert person.asked == len(DIRECTIONS)
     return said
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 from pretouch.sensing.unit import NetworkUnits
 from pretouch.units.keys import Keys, UnitKey
 from pretouch.units.receiver import SkinReceiver
+from pretouch.units.unit import ImuBatch, imu_batch
 from pretouch.units.wire import Beacon, Flag, Hello, Mac, Sample, decode_beacon, session_mac
 
 KEYS = Keys(UnitKey(f"unit {n}", n, bytes([n]) * 32) for n in (3, 4, 5))
@@ -17,6 +18,11 @@ PLAIN = Sample(
     range_sigma=8, range_signal=300, range_ambient=5, range_spads=4000, imu_count=2, imu_scale=0x10, imu_rate_hz=500,
     imu_index=0, imu_age_us=1000, imu=bytes(24),
 )  # fmt: skip
+
+
+def imu_taken(receiver: SkinReceiver) -> list[ImuBatch]:
+    """IMU samples since the last call."""
+    return [batch for received in receiver.take_samples() if (batch := imu_batch(received))]
 
 
 class FakeUnit:

@@ -8,7 +8,7 @@ import pytest
 
 from pretouch.errors import ParameterError
 from pretouch.units.findings import findings
-from pretouch.units.health import Counts, HealthParams, UnitStatus, unit_health
+from pretouch.units.health import Counts, HealthParams, unit_health
 from pretouch.units.wire import NO_FORCE, Flag, TouchPart
 from tests.units.traffic import NOW, heard, traffic
 
@@ -18,8 +18,8 @@ LATE = int(Flag.RANGE_NEW | Flag.RANGE_LATE)
 SILENT = {"state": "silent", "last_arrival": NOW - 2.0}
 
 
-def found(samples, counted=None, machine_late=0.0, **standing):
-    unit = unit_health("hand-1", samples, NOW, UnitStatus.of(traffic(**standing)), counted or Counts(500))
+def found(samples, counted=None, machine_late=0.0, **known):
+    unit = unit_health(samples, NOW, traffic(**known), counted or Counts(500))
     return findings([unit], LIMITS, machine_late)
 
 

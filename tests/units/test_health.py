@@ -6,14 +6,14 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from pretouch.units.health import Counts, Lateness, UnitStatus, UnitWindow, unit_health
-from pretouch.units.traffic import UnitTraffic
+from pretouch.units.health import Counts, Lateness, UnitWindow, unit_health
+from pretouch.units.unit import UnitTraffic
 from pretouch.units.wire import NO_TEMPERATURE, Flag
 from tests.units.traffic import NOW, heard, traffic
 
 
-def health(samples, counted=None, **standing):
-    return unit_health("hand-1", samples, NOW, UnitStatus.of(traffic(**standing)), counted or Counts(500))
+def health(samples, counted=None, **known):
+    return unit_health(samples, NOW, traffic(**known), counted or Counts(500))
 
 
 def test_a_unit_that_is_well_has_the_numbers_it_was_given():
@@ -99,14 +99,14 @@ def test_what_a_unit_cannot_tell_is_not_known():
     unit = health(heard(battery_mv=0, temperature_cdeg=NO_TEMPERATURE))
     assert math.isnan(unit.battery_v)
     assert math.isnan(unit.temperature_c)
-    nothing = unit_health("hand-1", [], NOW, UnitStatus())
+    nothing = unit_health([], NOW, UnitTraffic("hand-1", 7))
     assert nothing.silent_s == math.inf
     assert math.isnan(nothing.rate_hz)
     assert nothing.statuses == {}
 
 
 def test_a_window_forgets_what_is_older_than_it():
-    window, told = UnitWindow("hand-1", 10.0), UnitTraffic("hand-1", 7)
+    window, told = UnitWindow(10.0), UnitTraffic("hand-1", 7)
     samples = heard(30.0)
     for step in range(30):
         now = NOW - 29.0 + step

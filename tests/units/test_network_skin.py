@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from pretouch.errors import HardwareError
-from pretouch.units.network_skin import NetworkSkin
+from pretouch.units.skin import NetworkSkin
 from tests.units.fake_unit import IDS, KEYS, FakeUnit
 
 SHARED = Path("/dev/shm")  # noqa: S108  where named shared memory would lie
@@ -22,7 +22,7 @@ ALONE = """
 import multiprocessing, sys
 sys.path.insert(0, {tests!r})
 from pretouch.errors import HardwareError
-from pretouch.units.network_skin import NetworkSkin
+from pretouch.units.skin import NetworkSkin
 from tests.units.fake_unit import IDS, KEYS
 
 def start():
@@ -39,7 +39,7 @@ if __name__ == "__main__":
 PROGRAM = """
 import os, sys, time
 sys.path.insert(0, {tests!r})
-from pretouch.units.network_skin import NetworkSkin
+from pretouch.units.skin import NetworkSkin
 from tests.units.fake_unit import IDS, KEYS
 
 if __name__ == "__main__":
@@ -110,16 +110,15 @@ def test_readings_samples_and_counts_come_over(skin, player):
     now, readings = time.monotonic(), skin.read()
     assert np.all(readings.stamp < now)
     assert np.all((readings.distance >= 0.5) & (readings.distance < 0.507))
-    samples, imu = skin.take_samples(), skin.take_imu()
+    samples = skin.take_samples()
     sequences = [one.sample.sequence for one in samples if one.unit == 0]
     assert len(sequences) > 10
     assert sequences == list(range(1, len(sequences) + 1))
     assert all(abs(one.offset - player.units[one.unit].offset) <= one.bound + 1e-5 for one in samples)
     assert all(one.sample.unit == KEYS[IDS[one.unit]].number for one in samples)
-    assert len(imu) == len(samples)
+    assert all(one.sample.imu_count == 2 for one in samples)
     assert skin.take_samples() == []
     traffic = skin.traffic()
-    assert traffic.units[0].sample.imu_count == 2
     assert traffic.units[1].state == "live"
     assert set(traffic.rejected.values()) == {0}
     assert traffic.unsent == 0
@@ -153,7 +152,7 @@ def test_a_taken_port_a_missing_key_and_a_priority_there_is_not_are_told_at_the_
 
 @pytest.mark.parametrize("port", ["x", 70000, 1.5, True])
 def test_what_is_no_port_is_told_before_anything_starts(port, monkeypatch):
-    monkeypatch.setattr("pretouch.units.network_skin.get_context", None)
+    monkeypatch.setattr("pretouch.units.skin.get_context", None)
     with pytest.raises(HardwareError, match="is not valid"):
         NetworkSkin(IDS, KEYS, port=port)
 
@@ -186,7 +185,7 @@ def test_ctrl_c_while_it_starts_leaves_no_process(monkeypatch):
         raise KeyboardInterrupt
 
     before = set(active_children())
-    monkeypatch.setattr("pretouch.units.network_skin._wait_listening", interrupted)
+    monkeypatch.setattr("pretouch.units.skin._wait_listening", interrupted)
     with pytest.raises(KeyboardInterrupt):
         NetworkSkin(IDS, KEYS)
     assert set(begun) - before

@@ -10,7 +10,7 @@ import pytest
 from pretouch import cli
 from pretouch.errors import HardwareError
 from pretouch.units.keys import UnitKey, load_keys
-from pretouch.units.provision import Network, configuration, copy_to_unit, fingerprint
+from pretouch.units.provision import Network, configuration, copy_to_unit
 
 NETWORK = Network("lab", "correct horse", "192.168.1.10", 29470)
 MPREMOTE = """
@@ -72,7 +72,7 @@ def test_a_new_unit_is_given_its_key_and_begins_anew(mpremote, tmp_path, passwor
     )  # fmt: skip
     assert not Path(source).exists()
     said = "".join(capsys.readouterr())
-    assert "hand-1 is number 1 with the key " + fingerprint(key.key) in said
+    assert "hand-1 is number 1 with the key " + key.fingerprint in said
     assert key.key.hex() not in said
     assert "correct horse" not in said
 
@@ -106,7 +106,7 @@ def test_a_unit_is_told_its_range_finder_where_that_has_zones(mpremote, tmp_path
         (("--host", "010.0.0.1"), "The host '010.0.0.1' is not an IPv4 address"),
         (("--ssid", "caf\udce9"), "The network's name is not Unicode text: give it in UTF-8."),
         (("--host", "my-pc"), "The host 'my-pc' is not an IPv4 address"),
-        (("--port", "0"), "The port is 0"),
+        (("--port", "0"), "The unit's port is 0"),
         (("--ssid", "x" * 33), "give 1 to 32 bytes"),
         (("--number", "70000"), "The number of unit hand-1 is 70000"),
         (("--touch-ohm", "-1"), "The unit's touch_ohm is -1"),

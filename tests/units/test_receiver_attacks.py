@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pretouch.units.link import LinkParams
+from pretouch.units.session import LinkParams
 from pretouch.units.wire import SAMPLE_LEAST, Hello, Mac, decode_beacon
-from tests.units.fake_unit import KEYS, PLAIN, FakeUnit
+from tests.units.fake_unit import KEYS, PLAIN, FakeUnit, imu_taken
 
 
 def counters(bench):
@@ -32,7 +32,7 @@ def test_a_unit_gone_mad_harms_only_itself(bench, changes):
         bench.now += 0.02
         bench.send(bench.units[0].sample(bench.now, **changes), bench.units[1].sample(bench.now))
         bench.deliver()
-        bench.receiver.take_imu()
+        imu_taken(bench.receiver)
         readings = bench.receiver.readings()
         assert readings.stamp[0] <= bench.now
         assert bench.now - readings.stamp[1] < 0.1

@@ -11,10 +11,10 @@ from pretouch.sensing.unit import NetworkUnits
 from pretouch.types import RangeStatus
 from pretouch.units.findings import findings
 from pretouch.units.health import HealthParams, UnitWindow
-from pretouch.units.link import LinkParams
-from pretouch.units.receiver_process import SharedOutputs, packed
+from pretouch.units.session import LinkParams
+from pretouch.units.skin import SharedOutputs
 from pretouch.units.wire import Flag, TouchPart
-from tests.units.fake_unit import IDS, Bench
+from tests.units.fake_unit import IDS, Bench, imu_taken
 
 UNITS = NetworkUnits(IDS, (2, 1))
 """Rows 0 to 3, and 4."""
@@ -43,7 +43,7 @@ def test_a_range_with_zones_is_a_row_for_each(bench):
     assert readings.status.tolist() == [5, 5, 5, 5, 0]
     assert len(set(readings.stamp[:4])) == 1
     assert bench.receiver.touch().contact.tolist() == [True, False, False, False, False]
-    assert [(batch.unit, len(batch.stamp)) for batch in bench.receiver.take_imu()] == [(0, 2), (1, 2)]
+    assert [(batch.unit, len(batch.stamp)) for batch in imu_taken(bench.receiver)] == [(0, 2), (1, 2)]
 
 
 def test_zones_without_a_new_range_are_no_reading(bench):
@@ -72,7 +72,7 @@ def test_other_zones_than_the_skins_are_no_reading_and_are_named(bench, unit, ch
     traffic, heard = bench.receiver.units[unit], bench.receiver.take_samples()
     assert traffic.misfits == 20
     assert all(math.isnan(one.stamp) for one in heard)
-    window = UnitWindow(traffic.id, 10.0)
+    window = UnitWindow(10.0)
     window.take(bench.now, heard, traffic)
     found = findings([window.health(bench.now, traffic)], HealthParams())
     assert [(f.level, f.sentence[: len(what)]) for f in found if f.what == "zones"] == [("fault", what)]
@@ -117,9 +117,9 @@ def test_samples_with_zones_come_through_shared_memory_however_large(bench):
         plain.sample(bench.now, flags=ZONED | Flag.TOUCH, zones=eight, touch=bytes(12), imu_count=32, imu=bytes(384)),
     ):
         bench.send(datagram)
-        (received,) = bench.receiver.take_samples()
-        outputs.put_samples([packed(received, memoryview(datagram))])
+        (arrival,) = bench.receiver.take_samples()
+        bench.receiver._arrivals.append(arrival)
+        outputs.put(bench.receiver)
         (back,) = outputs.take_samples()
-        np.testing.assert_equal(asdict(back), asdict(received))  # of zones that do not fit the stamp is NaN
-    outputs.put_readings(bench.receiver.table.tobytes())
-    assert np.frombuffer(outputs.readings()).reshape(3, 5)[1, :4] == pytest.approx([0.1, 0.2, 0.3, 0.4])
+        np.testing.assert_equal(asdict(back), asdict(arrival))  # of zones that do not fit the stamp is NaN
+    assert outputs.table()[:4, 1] == pytest.approx([0.1, 0.2, 0.3, 0.4])

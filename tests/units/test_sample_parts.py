@@ -32,6 +32,7 @@ from pretouch.units.wire import (
     touch_part,
     zones_size,
 )
+from tests.units.fake_unit import imu_taken
 from tests.wire_skin import WireSkin
 
 SESSION = Mac(bytes(range(32)))
@@ -163,7 +164,7 @@ def test_a_unit_with_zones_has_one_imu_in_its_own_axes(arm, panda_model, zoned, 
         sent = []
         Imus(arm, zoned, ImuParams(), 0, lambda s: sent.append((s.unit, s.counts.tolist())))
         arm.advance(0.5)
-        batches = skin.receiver.take_imu()
+        batches = imu_taken(skin.receiver)
     assert {batch.unit for batch in batches} == {0, 1, 2}
     assert sent == [(int(zoned.first[unit]), counts) for unit, counts in true]
 
@@ -199,6 +200,5 @@ def test_a_touch_comes_over_the_wire_with_its_force_and_never_fresher_than_it_is
         assert 2.5 < on[-1][0] <= 2.56
         assert np.median([force for _, force in on]) == pytest.approx(3.0, rel=0.12)
         assert not any(told.contact[2] for _, told in last if told is not None)
-        taken = wire.receiver.take_samples()
-        assert {received.unit for received in taken if received.sample.touch} == {0, 2}
+        assert {received.unit for received in wire.receiver.take_samples() if received.sample.touch} == {0, 2}
         assert sum(wire.receiver.rejected.values()) == 0

@@ -14,11 +14,11 @@ from pretouch.errors import RecordingError
 from pretouch.recording.reader import open_recording
 from pretouch.sensing.unit import ACCELERATION_LSB, ANGULAR_RATE_LSB
 from pretouch.units.findings import Finding
-from pretouch.units.health import UnitHealth, UnitStatus
-from pretouch.units.monitor import MonitorUpdate
+from pretouch.units.health import UnitHealth
 from pretouch.units.skin_reader import SkinTrace, read_skin
 from pretouch.units.skin_recording import SkinRecording
-from pretouch.units.traffic import Received, imu_batch
+from pretouch.units.unit import Received, UnitTraffic, imu_batch
+from pretouch.units.watch import WatchUpdate
 from pretouch.units.wire import IMU_SAMPLE, Flag, Sample, TouchPart
 from tests.following_arm import controller_of
 from tests.recording.runs import changed, recorded_run
@@ -56,11 +56,11 @@ def record(recording: SkinRecording, number: int, unit: str = "hand/1") -> None:
     recording.add([heard(number)], [unit])
 
 
-def cold(unit: str) -> MonitorUpdate:
+def cold(unit: str) -> WatchUpdate:
     """What a monitor says of a unit that is too cold."""
-    health = UnitHealth(unit, UnitStatus(), *[1.0] * 11, {}, 3.7, -5.1, *[0] * 8)
+    health = UnitHealth(unit, UnitTraffic(unit, 1), *[1.0] * 11, {}, 3.7, -5.1, *[0] * 8)
     finding = Finding(unit, "warning", "temperature", f"{unit} is cold.")
-    return MonitorUpdate(102.0, 2.0, [], (health,), (finding,), False)
+    return WatchUpdate(102.0, 2.0, [], (health,), (finding,), False)
 
 
 @pytest.fixture(scope="module")

@@ -16,11 +16,11 @@ from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.range_finder import RangeFinderParams
 from pretouch.sim.scene import Box, SceneSpec, fixtures
 from pretouch.types import ControlStep, Mode, RangeStatus
-from pretouch.units.channel import NetworkParams, network
-from pretouch.units.fleet import Fleet, FleetParams, simulated_keys
+from pretouch.units.fleet import Fleet, FleetParams, NetworkParams, simulated_keys
 from pretouch.units.simulated import UnitParams
 from pretouch.units.wire import Flag
-from tests.wire_skin import WireSkin
+from tests.units.fake_unit import imu_taken
+from tests.wire_skin import WireSkin, network
 
 WALL = Box("wall", (0.9, 0.0, 0.5), (0.05, 2.0, 2.0), 25_000.0)
 
@@ -52,7 +52,7 @@ def test_the_wire_is_deterministic_bit_for_bit(plant, paper_skin):
         with WireSkin(arm, paper_skin, RangeFinderParams(), params, seed) as skin:
             told = watched(arm, skin, 4.0)
             counted = [(u.accepted, u.lost, u.replayed, u.sessions, u.offset) for u in skin.receiver.units]
-            imu = [(batch.unit, batch.index, batch.stamp.tobytes()) for batch in skin.receiver.take_imu()]
+            imu = [(batch.unit, batch.index, batch.stamp.tobytes()) for batch in imu_taken(skin.receiver)]
         runs.append((*(told[key].tobytes() for key in ("stamp", "distance", "status")), counted, imu))
     assert runs[0] == runs[1]
     assert runs[0][0] != runs[2][0], "another seed takes another course"
@@ -64,7 +64,9 @@ def test_the_receiver_counts_what_the_network_lost(plant, paper_skin, loss):
     with WireSkin(arm, paper_skin, RangeFinderParams(), FleetParams(network(loss)), 0) as skin:
         watched(arm, skin, 6.0)
         steady = [u for u in skin.receiver.units if u.sessions == 1]
-        share = 1 - sum(u.accepted for u in steady) / sum(u.sample.sequence for u in steady)
+        sequences = {one.unit: one.sample.sequence for one in skin.receiver.take_samples()}
+        sent = sum(sequences[k] for k, u in enumerate(skin.receiver.units) if u.sessions == 1)
+        share = 1 - sum(u.accepted for u in steady) / sent
     assert share == pytest.approx(loss, abs=0.03)
     assert len(steady) >= (5 if loss else 7)
 
@@ -73,7 +75,7 @@ def test_imu_samples_come_through_the_wire_in_their_own_time(plant, paper_skin):
     arm = plant()
     with WireSkin(arm, paper_skin, RangeFinderParams(), FleetParams(imu=ImuParams()), 0) as skin:
         watched(arm, skin, 2.0)
-        batches = [batch for batch in skin.receiver.take_imu() if batch.unit == 0]
+        batches = [batch for batch in imu_taken(skin.receiver) if batch.unit == 0]
     assert all(late.index == early.index + len(early.stamp) for early, late in pairwise(batches)), (
         "samples are missing between batches"
     )

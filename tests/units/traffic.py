@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pretouch.units.traffic import Received, UnitTraffic
+from pretouch.units.unit import Received, UnitTraffic
 from pretouch.units.wire import Flag, Sample
 
 NOW, BOOTED = 1000.0, 400.0

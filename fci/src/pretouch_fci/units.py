@@ -2,16 +2,12 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeVar
 
 from pretouch.sensing.skin import Skin
-from pretouch.sim.imu import ImuParams, Imus, ImuSample
+from pretouch.sim.imu import ImuParams
 from pretouch.sim.plant import Plant
-from pretouch.sim.range_finder import RangeFinderParams, RangeFinders, RangeSample
 from pretouch.units.fleet import Fleet, FleetParams
 from pretouch.units.keys import Keys
-
-Measured = TypeVar("Measured", RangeSample, ImuSample)
 
 
 @dataclass(frozen=True)
@@ -33,12 +29,11 @@ class ServedUnits:
 
         A receiver that cannot be found, and a unit without a key, are a HardwareError.
         """
-        skin, imu = setup.skin, ImuParams()
-        self._fleet = Fleet(skin.network, setup.keys, FleetParams(imu=imu), seed, setup.address)
+        params = FleetParams(imu=ImuParams())
+        self._fleet = Fleet(setup.skin.network, setup.keys, params, seed, setup.address)
         self.offset: float | None = None
         """What their time is ahead of the plant's [s]; None: they measure nothing yet."""
-        RangeFinders(plant, skin, RangeFinderParams(), seed, lambda s: self._hand_on(s, self._fleet.take_range))
-        Imus(plant, skin, imu, seed, lambda s: self._hand_on(s, self._fleet.take_imu))
+        self._fleet.mount(plant, setup.skin, lambda time: None if self.offset is None else time + self.offset)
 
     def step(self, clock: Callable[[], float]) -> None:
         """Let them hear and say what is due by their time [s]."""
@@ -47,7 +42,3 @@ class ServedUnits:
     def close(self) -> None:
         """Give the sockets back."""
         self._fleet.close()
-
-    def _hand_on(self, sample: Measured, take: Callable[[Measured], None]) -> None:
-        if self.offset is not None:
-            take(sample._replace(time=sample.time + self.offset))

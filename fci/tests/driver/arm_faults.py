@@ -17,20 +17,19 @@ from fci.tests.soak.truth import Truth
 
 from pretouch import loop
 from pretouch.arms.franka.arm import FrankaArm
-from pretouch.arms.franka.collision import collision_behavior
-from pretouch.arms.franka.limits import LimiterParams, planned
-from pretouch.arms.franka.mailboxes import Feedback
+from pretouch.arms.franka.exchange import Feedback
+from pretouch.arms.franka.limits import LimiterParams, collision_behavior, planned
 from pretouch.control.path import Circle
 from pretouch.controller import Controller
 from pretouch.errors import RobotError
 from pretouch.modes import TABLE
 from pretouch.perception.scene_filter import no_fixtures
+from pretouch.ports import NoUnits
 from pretouch.profiles import profile
 from pretouch.realtime import warm_up
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.session.session import NoUnits
 from pretouch.types import ControlStep, Mode
 
 PERIOD_S = 0.01

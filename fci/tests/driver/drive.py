@@ -6,13 +6,10 @@ import sys
 
 import numpy as np
 
-from pretouch.arms.franka.client import connect
-from pretouch.arms.franka.collision import collision_behavior
-from pretouch.arms.franka.errors import MotionAborted
+from pretouch.arms.franka.connection import FrankaClient, MotionAborted
 from pretouch.arms.franka.limiter import SetPointLimiter
-from pretouch.arms.franka.limits import LimiterParams, motion_limits
+from pretouch.arms.franka.limits import LimiterParams, collision_behavior, motion_limits
 from pretouch.arms.franka.state import FrankaState
-from pretouch.arms.franka.vendor import VendorClient
 from pretouch.errors import RobotError
 from pretouch.profiles import profile
 from pretouch.robot.description import robot_named
@@ -23,7 +20,7 @@ from pretouch.types import FloatArray
 class Staircase:
     """Velocities that change every 10 ms, with the steps of a reaction to a contact, for so long [s]."""
 
-    def __init__(self, client: VendorClient, model: RobotModel, lasts: float = 1.5) -> None:
+    def __init__(self, client: FrankaClient, model: RobotModel, lasts: float = 1.5) -> None:
         self._limiter, self._lasts = SetPointLimiter(motion_limits(model, client.kind), LimiterParams()), lasts
         self.states = self.lost = 0
         self.force: list[float] = []
@@ -40,13 +37,13 @@ class Staircase:
         return velocity, over and self._limiter.at_rest
 
 
-def staircase(client: VendorClient, model: RobotModel) -> dict:
+def staircase(client: FrankaClient, model: RobotModel) -> dict:
     stairs = Staircase(client, model)
     client.control(stairs)
     return {"lost": stairs.lost, "mode": client.read().mode}
 
 
-def contact(client: VendorClient, model: RobotModel) -> dict:
+def contact(client: FrankaClient, model: RobotModel) -> dict:
     """Meet the contact that the server was told to make, recover, and go on."""
     client.set_collision_behavior(collision_behavior(profile("paper"), model))
     stairs, found = Staircase(client, model), {}
@@ -65,7 +62,7 @@ def contact(client: VendorClient, model: RobotModel) -> dict:
     return found
 
 
-def raises(client: VendorClient, model: RobotModel) -> dict:
+def raises(client: FrankaClient, model: RobotModel) -> dict:
     """Fail in the middle of a motion, and keep the exception, as a caller may; then move again."""
     stairs = Staircase(client, model)
 
@@ -87,7 +84,7 @@ def raises(client: VendorClient, model: RobotModel) -> dict:
 
 def main(kind: str, address: str, task: str) -> None:
     tasks = {one.__name__: one for one in (staircase, contact, raises)}
-    with connect(address, kind) as client:  # type: ignore[arg-type]
+    with FrankaClient(address, kind) as client:  # type: ignore[arg-type]
         print(json.dumps(tasks[task](client, RobotModel(robot_named(kind)))))
 
 

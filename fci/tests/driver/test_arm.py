@@ -15,8 +15,7 @@ import pytest
 from fci.tests.driver.served import Served, child, wait_for
 
 from pretouch.arms.franka.arm import FrankaArm
-from pretouch.arms.franka.collision import collision_behavior
-from pretouch.arms.franka.limits import FrankaParams
+from pretouch.arms.franka.limits import FrankaParams, collision_behavior
 from pretouch.errors import RobotError
 from pretouch.profiles import profile
 from pretouch.robot.description import robot_named

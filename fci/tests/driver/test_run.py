@@ -12,7 +12,7 @@ from fci.tests.soak.programs import program
 
 from pretouch.arms.franka import identity
 from pretouch.recording.reader import open_recording
-from pretouch.session.confirmations import ConfirmedRobots
+from pretouch.session.memory import ConfirmedRobots
 
 pytestmark = [pytest.mark.slow, pytest.mark.alone]
 _FOLLOWING = "--no-skin", "--profile", "blind", "--floor", "-0.2", "--yes", "--seconds", "25"
@@ -39,7 +39,7 @@ def known(serve, tmp_path):
 
     def start(kind="panda"):
         server = serve(kind, "--start", "path")
-        ConfirmedRobots(tmp_path / "state" / "pretouch").keep(identity(kind, server.address))
+        ConfirmedRobots(tmp_path / "state" / "pretouch").add(identity(kind, server.address))
         return server
 
     return start

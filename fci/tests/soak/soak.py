@@ -21,12 +21,11 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 from pretouch.arms.franka import identity
-from pretouch.cli.skin_keys import with_new
 from pretouch.recording.reader import open_recording
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin
-from pretouch.session.confirmations import ConfirmedRobots
+from pretouch.session.memory import ConfirmedRobots
 from pretouch.units.keys import Keys, save_keys
 
 MEMORY_GROWS, AT_FIRST, FIRST_S = 0.05, 0.15, 1200.0
@@ -137,8 +136,8 @@ class Soak:
         self._address, self._units, self._runs = loopback(), free_port(), 0
         model = RobotModel(panda())
         self._qd_max = model.description.qd_max
-        save_keys(with_new(Keys(), paper_skin(model).ids), folder / "keys.toml")
-        ConfirmedRobots(folder / "state" / "pretouch").keep(identity("panda", self._address))
+        save_keys(Keys().with_new(paper_skin(model).ids), folder / "keys.toml")
+        ConfirmedRobots(folder / "state" / "pretouch").add(identity("panda", self._address))
         self._memory: dict[str, list[tuple[float, float]]] = {}
 
     def run(self) -> Found:

@@ -119,13 +119,13 @@ def _interrupt_held_back() -> Iterator[None]:
 
     Here it may come by another thread of a library, which this one's mask does not keep from calling the handler.
     """
-    with noted(signal.SIGINT), kept_from_children({signal.SIGINT}):
+    with noted(signal.SIGINT), kept_from_children():
         yield
 
 
 def _start() -> None:
     """Leave Ctrl-C to the parent, which ends the workers in order; and do not outlive it if it is killed."""
-    leave_to_parent({signal.SIGINT})
+    leave_to_parent()
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     Thread(target=_end_with_parent, daemon=True).start()
 

@@ -10,7 +10,7 @@ from pretouch.errors import ParameterError
 from pretouch_ros2.params import ArmParams, CommanderParams, NodeParams, OutputParams, SkinParams
 
 if TYPE_CHECKING:
-    from pretouch.session.confirmations import Identity
+    from pretouch.session.memory import Identity
 
 _PATIENCE_S = 10.0
 
@@ -74,13 +74,13 @@ class Ros2(ArmOptions):
                 robot, robot_known, skin,
                 notes=lambda: tuple(note for source in sources for note in source.notes),
                 output=lambda controller: Ros2Output(OutputParams(base_frame=self.base_frame), controller, node),
-                free_motion_id=robot_known.key, commander=commander,
+                free_motion_id=robot_known.key, commander=commander, announced=commander.announced if commander else "",
             )  # fmt: skip
 
 
 def identity(node: NodeParams, arm: ArmParams) -> "Identity":
     """Return what a robot is known by: its topics, and the settings that say what they mean."""
-    from pretouch.session.confirmations import Identity
+    from pretouch.session.memory import Identity
     from pretouch_ros2.network import domain_of
 
     where = ", ".join(filter(None, (node.interface, f"domain {domain_of(node)}", arm.wrench, arm.torques)))

@@ -23,9 +23,8 @@ if TYPE_CHECKING:
     from pretouch.robot.description import RobotDescription
     from pretouch.robot.model import RobotModel
     from pretouch.sensing import skin
-    from pretouch.session.confirmations import Identity
+    from pretouch.session.memory import Identity
     from pretouch.session.push import Direction
-    from pretouch.session.units import Units
     from pretouch.types import FloatArray, RobotState
 
 # options and their help are shown without what takes a second to import
@@ -75,19 +74,6 @@ class Output(Protocol):
         ...
 
 
-class Commander(Protocol):
-    """Who asks for a motion in place of a path; see `loop.Options.desired`."""
-
-    def __call__(self) -> "Desired | None":
-        """Return what is asked for now."""
-        ...
-
-    @property
-    def announced(self) -> str:
-        """Say what the arm will do, before it moves."""
-        ...
-
-
 def _no_output(_controller: "Controller") -> AbstractContextManager[Output | None]:
     return nullcontext()
 
@@ -100,9 +86,7 @@ class OpenedArm:
     identity: "Identity | None" = None
     """By which its confirmed force sign is remembered; None: it is not."""
     skin: "Skin | None" = None
-    """Its sensor units; None: it brings none."""
-    units: "Units | None" = None
-    """What hears these, where their health can be told."""
+    """Its sensor units, a `NetworkSkin` where their health is to be judged; None: it brings none."""
     push: "Callable[[Direction], None]" = lambda _: None
     """Called as a person is asked to push: a simulated one does."""
     notes: Callable[[], tuple[str, ...]] = lambda: ()
@@ -115,8 +99,10 @@ class OpenedArm:
     """Time that this machine was too slow to simulate it so far [s]."""
     measured: "Callable[[], RobotState] | None" = None
     """Its newest state by the clock of its units, where that of `arm` may be stamped otherwise."""
-    commander: Commander | None = None
-    """Whom the arm follows, if it is not the path."""
+    commander: "Callable[[], Desired | None] | None" = None
+    """Whom the arm follows, if it is not the path; see `loop.Options.desired`."""
+    announced: str = ""
+    """What a commander lets the arm do, to be said before it moves."""
 
 
 class ArmOptions(ABC):

@@ -18,7 +18,7 @@ COMMANDS: dict[str, dict[str, tuple[str, str]]] = {
     "Begin with": {
         "live": ("live:Live", "a simulated arm in your browser: reach for it"),
         "demo": (extras.LAB, "the paper's three experiments in small"),
-        "run": ("run.options:Run", "move an arm: simulated, Franka, or over ROS 2"),
+        "run": ("run.command:Run", "move an arm: simulated, Franka, or over ROS 2"),
     },
     "Recordings": {
         "replay": ("replay:Replay", "view, recompute, or compare with another profile"),

@@ -22,9 +22,9 @@ from pretouch.signals import ended
 from pretouch.sim.placement import assumptions
 from pretouch.sim.random_skin import Misplacement, misplaced
 from pretouch.sim.randomisation import drawn, world_set
+from pretouch.units import EVERYWHERE, HOST, PORT
 from pretouch.units.keys import load_keys
-from pretouch.units.network_skin import NetworkSkin
-from pretouch.units.udp import EVERYWHERE, HOST, PORT
+from pretouch.units.skin import NetworkSkin
 
 
 @dataclass(frozen=True)

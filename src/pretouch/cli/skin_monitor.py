@@ -2,20 +2,21 @@
 
 import math
 import socket
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, nullcontext, suppress
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cache
 from ipaddress import ip_address
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Console
+from rich.console import Console, Group, RenderableType
 from rich.live import Live
+from rich.text import Text
 
 from pretouch.cli.options import JsonFile, Numbers, OptionalFile, Words
-from pretouch.cli.skin_table import line, thrown_away, view
+from pretouch.cli.tables import PlainTable
 from pretouch.cli.writing import numbers_to
 from pretouch.errors import HardwareError
 from pretouch.perception.scene_filter import no_fixtures
@@ -24,17 +25,34 @@ from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import load_skin
 from pretouch.sensing.unit import NetworkUnits
 from pretouch.signals import Terminated
-from pretouch.types import FloatArray
-from pretouch.units.health import HealthParams
+from pretouch.types import FloatArray, RangeStatus
+from pretouch.units import EVERYWHERE, HOST, PORT
+from pretouch.units.findings import Finding
+from pretouch.units.health import UnitHealth, status_name
 from pretouch.units.keys import load_keys
 from pretouch.units.model_check import ModelCheck, ModelCheckParams
-from pretouch.units.monitor import MonitorUpdate, Posture, watch
-from pretouch.units.receiver import SkinReceiver
+from pretouch.units.skin import NetworkSkin
 from pretouch.units.skin_recording import SkinRecording
-from pretouch.units.udp import EVERYWHERE, HOST, PORT
+from pretouch.units.watch import UnitWatch, WatchUpdate
 
-_ONCE_S = 5.0
-_SECOND_S = 1.0
+_ONCE_S, _SECOND_S = 5.0, 1.0
+_UPDATE_S = 0.25
+"""Time between two updates [s]: as often as a person can read."""
+_COLUMNS = ["unit", "state", "rate\n[Hz]", "loss\n[%]", "latency\n[ms]", "dist.\n[m]", "sigma\n[mm]", "batt.\n[V]"]
+_COLUMNS += ["temp.\n[C]", "IMU\n[Hz]", "clock\n[ms]"]
+_TARGET = (RangeStatus.OK, RangeStatus.NO_WRAP_CHECK, RangeStatus.MERGED, RangeStatus.MIN_CLIPPED)
+"""Statuses of readings that have a distance."""
+_STYLES = {"fault": "bold red", "warning": "yellow"}
+_MEANINGS = {
+    "size": "a size that no message has",
+    "format": "an unknown magic, version or kind",
+    "unit": "the number of an unknown unit",
+    "tag": "a wrong tag (another key, or a forgery)",
+    "replayed": "a sequence number seen already",
+    "no session": "a sample outside a session",
+    "too many hellos": "more hellos than are answered",
+    "old hello": "a hello of the session that is live",
+}
 
 
 @dataclass(frozen=True)
@@ -66,7 +84,9 @@ class Monitor:
 
     def run(self) -> int:
         """Watch units; return 1 if one is faulty after a given time or recording failed, or else 0."""
-        duration = _duration(self)
+        if not (math.isfinite(self.duration) and self.duration >= 0):
+            raise HardwareError(f"--duration is {self.duration:g} s: give 0 or more.")
+        duration = self.duration or (_ONCE_S if self.once else math.inf)
         with numbers_to(self.json) as write:
             return _monitored(self, duration, write)
 
@@ -77,11 +97,12 @@ def _monitored(command: Monitor, duration: float, write: Callable[[Any], None]) 
             f"The address to listen on is empty: give {HOST}, or {EVERYWHERE} for every address of this machine."
         )
     keys = load_keys(command.keys)
-    units, posture = _watched(command, tuple(keys))
+    units, check, q = _watched(command, tuple(keys))
+    last: WatchUpdate | None = None
     with ExitStack() as stack:
-        receiver = stack.enter_context(SkinReceiver(units, keys, command.host, command.port))
+        receiver = stack.enter_context(NetworkSkin(units, keys, command.host, command.port))
         recording = stack.enter_context(SkinRecording(command.record)) if command.record else None
-        updates, last = watch(receiver, HealthParams(), duration, posture), None
+        updates = UnitWatch(receiver, _UPDATE_S, check, lambda: q).updates(duration)
         try:
             for update in _shown(updates, receiver, recording, command.once):
                 last = update
@@ -94,134 +115,150 @@ def _monitored(command: Monitor, duration: float, write: Callable[[Any], None]) 
     return int(faulty or bool(recording and recording.trouble))
 
 
-def _conclude(
-    last: MonitorUpdate | None, receiver: SkinReceiver, recording: SkinRecording | None, write: Callable[[Any], None]
-) -> None:
-    """Close the recording, and show and write the last update."""
-    sentence = recording.close() if recording else ""
-    notes = [note for note in (_nothing_received(receiver), sentence) if note]
-    console = Console(highlight=False, soft_wrap=True)
-    if last is not None:
-        console.print(view(last, receiver.rejected, notes))
-        write(_numbers(last, receiver, notes))
-    elif sentence:
-        console.print(sentence, markup=False)
-
-
-def _duration(command: Monitor) -> float:
-    if not (math.isfinite(command.duration) and command.duration >= 0):
-        raise HardwareError(f"--duration is {command.duration:g} s: give 0 or more.")
-    return command.duration or (_ONCE_S if command.once else math.inf)
-
-
-def _watched(command: Monitor, all_ids: tuple[str, ...]) -> tuple[NetworkUnits, Posture | None]:
-    """The units to watch, and the posture they are to agree with, if one is given."""
+def _watched(command: Monitor, all_ids: tuple[str, ...]) -> tuple[NetworkUnits, ModelCheck | None, FloatArray]:
+    """The units to watch, and what they are to agree with, if a posture (n,) [rad] is given."""
     if command.skin and command.units:
         raise HardwareError("Both --skin and --units are given: leave one of them out.")
     if command.posture and not command.skin:
         raise HardwareError("--posture needs --skin, the file with the poses of the units.")
+    q = np.array(command.posture)
     if not command.skin:
         ids = command.units or all_ids
         if not ids:
             raise HardwareError(f"{command.keys} holds no unit: `pretouch skin provision` or `skin keys` adds one.")
-        return NetworkUnits.of(ids), None
+        return NetworkUnits.of(ids), None, q
     model = RobotModel(robot_named(command.arm))
     skin = load_skin(command.skin, model)
     if not command.posture:
-        return skin.network, None
-    return skin.network, Posture(
-        _posture(command.posture, model), ModelCheck(model, skin, no_fixtures(), ModelCheckParams())
-    )
-
-
-def _posture(positions: tuple[float, ...], model: RobotModel) -> FloatArray:
-    q = np.array(positions)
+        return skin.network, None, q
     if q.shape != (model.n,) or not np.isfinite(q).all():
         raise HardwareError(
             f"The posture is {','.join(map('{:g}'.format, q))}: give {model.n} joint positions [rad], separated by"
             " commas."
         )
-    beyond = np.flatnonzero((q < model.q_min) | (q > model.q_max))
-    if len(beyond):
-        i = beyond[0]
+    for i in np.flatnonzero((q < model.q_min) | (q > model.q_max)).tolist():
         raise HardwareError(
             f"The posture has joint {i + 1} at {q[i]:g} rad, outside its range of {model.q_min[i]:.2f} to"
             f" {model.q_max[i]:.2f} rad: give joint positions of this arm."
         )
-    return q
+    return skin.network, ModelCheck(model, skin, no_fixtures(), ModelCheckParams()), q
 
 
 def _shown(
-    updates: Iterator[MonitorUpdate], receiver: SkinReceiver, recording: SkinRecording | None, quiet: bool
-) -> Iterator[MonitorUpdate]:
+    updates: Iterator[WatchUpdate], receiver: NetworkSkin, recording: SkinRecording | None, quiet: bool
+) -> Iterator[WatchUpdate]:
     """Show, record and yield each update."""
-    console, second = Console(highlight=False, soft_wrap=True), 0.0
+    console, second, before = Console(highlight=False, soft_wrap=True), 0.0, dict[tuple[str, str], str]()
     live = None if quiet or not console.is_terminal else Live(console=console, auto_refresh=False, transient=True)
-    lines = None if quiet or live else _Lines(console)
     with live or nullcontext():
         for update in updates:
             full = update.elapsed >= second
             second += _SECOND_S * full
             if recording:
-                recording.add(update.heard, [unit.id for unit in receiver.units])
+                recording.add(update.heard, [unit.unit for unit in update.units])
                 if full:
                     recording.health(update)
             if live:
-                live.update(view(update, receiver.rejected, _notes(receiver, recording)), refresh=True)
-            elif lines and full:
-                lines.show(update)
+                notes = _nothing_received(receiver)
+                if recording:
+                    notes.append(recording.trouble or f"Recording {recording.place}: {recording.samples} samples.")
+                live.update(view(update, receiver.traffic().rejected, notes), refresh=True)
+            elif full and not quiet:
+                before = _print_line(console, update, before)
             yield update
 
 
-class _Lines:
-    """Prints a line for each update, and each finding when it appears and when it is over."""
-
-    def __init__(self, console: Console) -> None:
-        self._console = console
-        self._known: dict[tuple[str, str], str] = {}
-
-    def show(self, update: MonitorUpdate) -> None:
-        """Say it."""
-        self._console.print(line(update), markup=False)
-        known = {(f.unit, f.what): f"{f.level}: {f.sentence}" for f in update.findings}
-        for sentence in (known[key] for key in known if key not in self._known):
-            self._console.print(f"  {sentence}", markup=False)
-        for unit, what in (key for key in self._known if key not in known):
-            self._console.print(f"  over: {unit}, {what}", markup=False)
-        self._known = known
+def _print_line(
+    console: Console, update: WatchUpdate, before: dict[tuple[str, str], str]
+) -> dict[tuple[str, str], str]:
+    """Print a line for an update, and each finding when it appears and when it is over; return those there are."""
+    console.print(_line(update), markup=False)
+    current = {(f.unit, f.what): f"{f.level}: {f.sentence}" for f in update.findings}
+    for sentence in (sentence for key, sentence in current.items() if key not in before):
+        console.print(f"  {sentence}", markup=False)
+    for unit, what in (key for key in before if key not in current):
+        console.print(f"  over: {unit}, {what}", markup=False)
+    return current
 
 
-def _notes(receiver: SkinReceiver, recording: SkinRecording | None) -> list[str]:
-    notes = [_nothing_received(receiver)]
-    if recording:
-        notes.append(recording.trouble or f"Recording {recording.place}: {recording.samples} samples.")
-    return [note for note in notes if note]
+def _conclude(
+    last: WatchUpdate | None, receiver: NetworkSkin, recording: SkinRecording | None, write: Callable[[Any], None]
+) -> None:
+    """Close the recording, and show and write the last update."""
+    sentences = [recording.close()] if recording else []
+    console = Console(highlight=False, soft_wrap=True)
+    if last is None:
+        console.print(*sentences, markup=False)
+        return
+    rejected, notes = receiver.traffic().rejected, [*_nothing_received(receiver), *sentences]
+    console.print(view(last, rejected, notes))
+    numbers = {"elapsed_s": last.elapsed, "units": last.units, "findings": last.findings}
+    write(numbers | {"rejected": rejected, "notes": [*notes, *_thrown_away(rejected)]})
 
 
-def _nothing_received(receiver: SkinReceiver) -> str:
-    """Return where the receiver listens and what may be wrong while nothing has been received, or ''."""
-    if any(unit.state != "never heard" for unit in receiver.units):
-        return ""
+def _nothing_received(receiver: NetworkSkin) -> list[str]:
+    """Say where the receiver listens and what may be wrong while nothing has been received."""
+    if any(unit.state != "never heard" for unit in receiver.traffic().units):
+        return []
     host, port = receiver.address
     local = f", which only programs on this machine can reach: real units need --host {EVERYWHERE}"
-    return f"Nothing was received at {host}:{port}{local if only_here(host) else ''}."
+    return [f"Nothing was received at {host}:{port}{local if only_here(host) else ''}."]
 
 
 @cache
 def only_here(host: str) -> bool:
     """Whether only what runs on this machine can send to an address of it."""
     try:
-        found = socket.getaddrinfo(host, None, type=socket.SOCK_DGRAM)[0][4][0]
+        address = socket.getaddrinfo(host, None, type=socket.SOCK_DGRAM)[0][4][0]
     except (OSError, UnicodeError):
         return False
-    return ip_address(str(found).partition("%")[0]).is_loopback
+    return ip_address(str(address).partition("%")[0]).is_loopback
 
 
-def _numbers(update: MonitorUpdate, receiver: SkinReceiver, notes: list[str]) -> dict[str, Any]:
-    return {
-        "elapsed_s": update.elapsed,
-        "units": [asdict(unit) for unit in update.units],
-        "findings": [asdict(finding) for finding in update.findings],
-        "rejected": dict(receiver.rejected),
-        "notes": [*notes, *filter(None, [thrown_away(receiver.rejected)])],
-    }
+def view(update: WatchUpdate, rejected: Mapping[str, int], notes: Sequence[str]) -> RenderableType:
+    """Return the whole view of an update: a table, the findings below it, and what was thrown away at the socket."""
+    lines = [Text(f"{f.level}: {f.sentence}", style=_STYLES[f.level]) for f in update.findings]
+    below = [Text(text, style="dim") for text in (*notes, *_thrown_away(rejected))]
+    return Group(table(update.units, update.findings), *(lines or [Text("Nothing is wrong.", style="green")]), *below)
+
+
+def table(units: Sequence[UnitHealth], findings: Sequence[Finding]) -> PlainTable:
+    """Return one row per unit, coloured by the worst that is wrong with it."""
+    worst = {f.unit: f.level for f in sorted(findings, key=lambda f: f.level, reverse=True)}
+    styles = [_STYLES.get(worst.get(unit.unit, ""), "") for unit in units]
+    return PlainTable(tuple(_COLUMNS), [_cells(unit) for unit in units], left=(0, 1), styles=styles)
+
+
+def _cells(unit: UnitHealth) -> tuple[str, ...]:
+    """Return a unit's row; its state is the status of its newest reading while it is live."""
+    state: str = unit.traffic.state
+    if state == "live" and unit.statuses:
+        state = RangeStatus.STUCK.name if unit.traffic.stuck else status_name(unit.status)
+    distance = unit.distance_m if unit.status in _TARGET else math.nan
+    of_range = (100 * unit.loss, 1), (1000 * unit.latency_s, 1), (distance, 3), (1000 * unit.sigma_m, 1)
+    of_unit = (unit.battery_v, 2), (unit.temperature_c, 1), (unit.imu_rate_hz, 0), (1000 * unit.traffic.bound, 2)
+    numbers = (unit.rate_hz, 1), *of_range, *of_unit
+    return unit.unit, state, *(_number(value, digits) for value, digits in numbers)
+
+
+def _number(value: float, digits: int) -> str:
+    """Return a number as text, '-' for one that is not known."""
+    return f"{value:.{digits}f}" if math.isfinite(value) else "-"
+
+
+def _line(update: WatchUpdate) -> str:
+    """Return an update as one line."""
+    live = [unit for unit in update.units if unit.traffic.state == "live"]
+    slowest = min((unit.rate_hz for unit in live if math.isfinite(unit.rate_hz)), default=math.nan)
+    most = max((unit.loss for unit in live if math.isfinite(unit.loss)), default=math.nan)
+    faults = sum(f.level == "fault" for f in update.findings)
+    return (
+        f"{update.elapsed:.0f} s: {len(live)} of {len(update.units)} units live, slowest {_number(slowest, 1)} Hz,"
+        f" largest loss {_number(100 * most, 1)} %, {faults} faults, {len(update.findings) - faults} warnings."
+    )
+
+
+def _thrown_away(rejected: Mapping[str, int]) -> list[str]:
+    """Say what was thrown away at the socket and why."""
+    parts = [f"{count} with {_MEANINGS.get(why, why)}" for why, count in rejected.items() if count]
+    return [f"Thrown away: {', '.join(parts)}."] if parts else []

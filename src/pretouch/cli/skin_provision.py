@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from pretouch.cli.options import OptionalFile
-from pretouch.cli.skin_keys import free_number, keys_or_none
+from pretouch.cli.skin_keys import keys_or_none
 from pretouch.errors import HardwareError
 from pretouch.extras import UNITS
+from pretouch.units import PORT
 from pretouch.units.keys import Keys, UnitKey, new_key, save_keys
-from pretouch.units.provision import Network, configuration, copy_to_unit, fingerprint
-from pretouch.units.udp import PORT
+from pretouch.units.provision import Network, configuration, copy_to_unit
 
 
 @dataclass(frozen=True)
@@ -54,16 +54,17 @@ class Provision:
         """Make a key if the unit has none, and copy it to the unit with the rest of its configuration."""
         keys = keys_or_none(self.keys)
         unit = _unit(keys, self.id, self.number, self.keys)
-        network = Network(self.ssid, "", self.host, self.port, self.battery_full_mv,
-            self.touch_ohm, self.touch_least_mn, self.touch_mn_per_us, self.sensor, self.zones,
-        )  # fmt: skip  # what is wrong is said before the password is asked for
+        # what is wrong is said before the password is asked for
+        touch = self.touch_ohm, self.touch_least_mn, self.touch_mn_per_us
+        place = self.ssid, "", self.host, self.port
+        network = Network(*place, self.battery_full_mv, *touch, self.sensor, self.zones)
         UNITS.need("Provisioning")
         text = configuration(unit, replace(network, password=_password(self)))
         if unit.id not in keys:
             save_keys(Keys([*keys.values(), unit]), self.keys)  # first: a unit with a key that nobody knows is mute
         copy_to_unit(self.device, text)
         print(
-            f"{unit.id} is number {unit.number} with the key {fingerprint(unit.key)}..., and sends to"
+            f"{unit.id} is number {unit.number} with the key {unit.fingerprint}..., and sends to"
             f" {network.host}:{network.port}. Its key is in {self.keys}."
         )
 
@@ -71,10 +72,10 @@ class Provision:
 def _unit(keys: Keys, name: str, number: int, place: Path) -> UnitKey:
     """Return the unit's entry of the file, or a new one."""
     if name not in keys:
-        taken = keys.by_number.get(number)
-        if taken is not None:
-            raise HardwareError(f"The number {number} belongs to {taken.id} in {place}: give another, or leave it out.")
-        return UnitKey(name, number or free_number(keys), new_key())
+        other = keys.by_number.get(number)
+        if other is not None:
+            raise HardwareError(f"The number {number} belongs to {other.id} in {place}: give another, or leave it out.")
+        return UnitKey(name, number or keys.free_number, new_key())
     if number not in (0, keys[name].number):
         raise HardwareError(
             f"{name} has the number {keys[name].number} in {place}, not {number}: give {keys[name].number}, or leave it"

@@ -1,23 +1,23 @@
 """What `pretouch skin simulate` does: a simulated skin that sends to a receiver in real time."""
 
+from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
+from math import inf
 from pathlib import Path
 
-from pretouch.arms.simulated.arm import SimulateOptions
 from pretouch.arms.simulated.skin import run
 from pretouch.cli.options import OptionalFile, Words
-from pretouch.cli.skin_keys import keys_or_none, with_new
+from pretouch.errors import ParameterError
 from pretouch.profiles import profile as find_profile
 from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, skin_for
 from pretouch.sim.imu import ImuParams
 from pretouch.sim.placement import assumptions, placement_for
-from pretouch.units.channel import ChannelParams, NetworkParams
-from pretouch.units.fleet import FleetParams
-from pretouch.units.keys import Keys, save_keys
-from pretouch.units.udp import HOST, PORT
+from pretouch.units import HOST, PORT
+from pretouch.units.fleet import ChannelParams, Fleet, FleetParams, NetworkParams
+from pretouch.units.keys import Keys, load_keys, save_keys
 
 _say = partial(print, flush=True)
 
@@ -38,8 +38,6 @@ class Simulate:
     """UDP port of the receiver."""
     loss: float = 0.0
     """Share of datagrams lost, in either direction."""
-    loss_run: float = 0.0
-    """Mean number lost in a row; 0: each is lost or not by itself."""
     delay: float = 0.008
     """Least time on the way to the receiver [s]."""
     jitter: float = 0.004
@@ -65,41 +63,27 @@ class Simulate:
 
     def run(self) -> None:
         """Simulate until interrupted, or for the given time."""
-        up = ChannelParams(
-            loss=self.loss,
-            loss_run=self.loss_run,
-            delay_s=self.delay,
-            jitter_s=self.jitter,
-            overtaken=self.overtaken,
-            doubled=self.doubled,
-        )
-        down = ChannelParams(
-            loss=self.loss,
-            loss_run=self.loss_run,
-            delay_s=0.15 * self.delay,
-            jitter_s=0.3 * self.jitter,
-            jitter_shape=2.0,
-        )
-        fleet = FleetParams(network=NetworkParams(up, down), imu=ImuParams(), reboot_every_s=self.reboot_every)
-        profile = find_profile(self.profile)
-        model = RobotModel(robot_named(self.arm))
-        skin = skin_for(model, self.skin)
-        placement = placement_for(model)
+        if self.seed < 0 or not 0.0 <= self.duration < inf:
+            raise ParameterError(f"--seed is {self.seed}, --duration {self.duration:g} s: give 0 or more of both.")
+        up = ChannelParams(self.loss, self.delay, self.jitter, overtaken=self.overtaken, doubled=self.doubled)
+        down = ChannelParams(self.loss, 0.15 * self.delay, 0.3 * self.jitter, jitter_shape=2.0)
+        params = FleetParams(network=NetworkParams(up, down), imu=ImuParams(), reboot_every_s=self.reboot_every)
+        model, profile, end = RobotModel(robot_named(self.arm)), find_profile(self.profile), self.duration or inf
+        skin, placement = skin_for(model, self.skin), placement_for(model)
         for sentence in assumptions(model, placement):
             _say(sentence)
-        options = SimulateOptions(
-            model, skin, keys_for(self.keys, skin), self.host, self.port, fleet, placement.path("circle", -1.0),
-            profile=profile, hand=self.hand, silenced=frozenset(self.silenced),
-            stuck=frozenset(self.stuck), seed=self.seed, duration_s=self.duration,
-        )  # fmt: skip
-        run(options, lambda: False, _say)
+        keys = keys_for(self.keys, skin)
+        with closing(Fleet(skin.network, keys, params, self.seed, (self.host, self.port))) as fleet:
+            fleet.set_faults(self.silenced, self.stuck)
+            path = placement.path("circle", -1.0)
+            run(model, skin, fleet, path, profile, self.hand, lambda now: now >= end, _say)
 
 
 def keys_for(place: Path, skin: Skin) -> Keys:
     """Return the keys of a file, made for the skin's units if it is not there."""
     if place.exists():
-        return keys_or_none(place)
-    keys = with_new(Keys(), skin.network.ids)
+        return load_keys(place)
+    keys = Keys().with_new(skin.network.ids)
     save_keys(keys, place)
     _say(f"Made keys for {len(keys)} units: {place}")
     return keys

@@ -23,7 +23,7 @@ from pretouch.realtime import warm_up
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin
-from pretouch.signals import OF_TERMINAL, kept_from_children
+from pretouch.signals import kept_from_children
 from pretouch.types import Obstacles, RobotState
 
 _PUSH_NM = 30.0
@@ -68,9 +68,9 @@ def prepare(wanted: Profile, meanwhile: Callable[[], object] = lambda: None, con
     def begin(sentence: str) -> None:
         output.print(sentence)
         since.append(output.get_time())
-        if len(os.sched_getaffinity(0)) > 1 and kept_in():
+        if (os.cpu_count() or 1) > 1 and kept_in():
             others.append(get_context("spawn").Process(target=compile_stages, daemon=True))  # ends with this one
-            with kept_from_children(OF_TERMINAL):
+            with kept_from_children():
                 others[0].start()
 
     FIRST_START.say = begin  # type: ignore[method-assign]

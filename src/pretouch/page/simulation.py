@@ -24,7 +24,7 @@ from pretouch.recording.simulation import surroundings, truth_of
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, paper_skin
-from pretouch.session.push import PushOutcome
+from pretouch.session.progress import PushOutcome
 from pretouch.sim.scene import described, fixtures
 from pretouch.sim.tcp_push import Pushes, TcpPush
 from pretouch.types import ControlStep, FloatArray

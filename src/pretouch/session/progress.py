@@ -1,4 +1,4 @@
-"""Progress messages of a run, and its summary at the end."""
+"""What is said of a run: progress messages, its summary, and what became of a push."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -10,8 +10,7 @@ from pretouch.controller import Controller
 from pretouch.explanation import Doing, answers, explain, resumable
 from pretouch.loop import Cycle, Recorder
 from pretouch.modes import Event
-from pretouch.session.push import lacked
-from pretouch.types import ControlStep, Mode
+from pretouch.types import ControlStep, FloatArray, Mode
 
 _LINE_S = 5.0
 """Time between two lines on how it goes [s]."""
@@ -21,6 +20,10 @@ _NEAR, _GONE = 0.6, 0.3
 """Evidence from which on a force comes near a contact, and below which it is over: free motion came to 0.5."""
 _BRIEF_S = 0.05
 """A HOLD shorter than this is not counted at the end [s]."""
+_GRACE_S = 0.3
+"""A contact this long after the end of a push is still of it [s]: the estimate lags."""
+_SAME = 1e-6
+"""Difference of shares below which the detector's evidence is the force over its threshold."""
 
 
 @dataclass
@@ -36,21 +39,19 @@ class RunSummary:
 
     def numbers(self, period: float) -> dict[str, Any]:
         """Return the summary for JSON."""
-        return {
-            "steps": self.steps, "duration_s": self.steps * period, "contacts": self.contacts,
-            "contacts_without_motion": self.unmoved, "held_s": self.holds,
-        }  # fmt: skip
+        counts = {"contacts": self.contacts, "contacts_without_motion": self.unmoved, "held_s": self.holds}
+        return {"steps": self.steps, "duration_s": self.steps * period} | counts
 
     def sentences(self, period: float) -> tuple[str, ...]:
         """Return the summary in sentences."""
-        found = [
+        sentences = [
             f"{self.steps} control steps, {self.steps * period:.1f} s; {self.contacts}"
             f" {'contact' if self.contacts == 1 else 'contacts'}"
             + (f", {self.unmoved} of which did not move the arm." if self.unmoved else ".")
         ]
         lasting = [(seconds, reason) for reason, seconds in self.holds.items() if seconds >= _BRIEF_S]
-        found += [f"Held for {seconds:.1f} s: {reason}" for seconds, reason in sorted(lasting, reverse=True)]
-        return tuple(found)
+        sentences += [f"Held for {seconds:.1f} s: {reason}" for seconds, reason in sorted(lasting, reverse=True)]
+        return tuple(sentences)
 
 
 class ProgressReporter:
@@ -78,15 +79,15 @@ class ProgressReporter:
         if step.mode is Mode.HOLD:
             reason = self._examples.setdefault(step.event, step.reason)
             summary.holds[reason] = summary.holds.get(reason, 0.0) + self._period
-        found = explain(step, *self._names)
-        part = {Mode.HOLD: step.event, Mode.REACT: found.doing, Mode.TRACK: None}[step.mode]
+        account = explain(step, *self._names)
+        part = {Mode.HOLD: step.event, Mode.REACT: account.doing, Mode.TRACK: None}[step.mode]
         kind = (step.mode, part, resumable(step))
         if kind == self._kind:
             if step.stamp >= self._line_due:
-                self._say(step, found.sentence)
+                self._say(step, account.sentence)
         elif self._kind is None or kind[0] is not self._kind[0] or step.stamp >= self._said + _AGAIN_S:
             self._kind, self._said = kind, step.stamp
-            self._say(step, found.sentence)
+            self._say(step, account.sentence)
 
     def _count_answer(self, step: ControlStep) -> None:
         """Count a contact that has ended without a motion of the arm."""
@@ -112,3 +113,54 @@ class ProgressReporter:
     def _say(self, step: ControlStep, sentence: str) -> None:
         self._line_due = step.stamp + _LINE_S
         self._tell(f"{step.mode.value.upper():5} {sentence}{self._latched if resumable(step) else ''}")
+
+
+def lacked(step: ControlStep | None) -> str:
+    """Say what a contact would have taken in the step that was nearest to one, as the end of a sentence."""
+    if step is None:
+        return "no control step ran meanwhile"
+    if step.mode is Mode.HOLD:
+        return f"the arm held ({step.reason.rstrip('.')})"
+    limits, force = step.thresholds, step.filtered_force - step.thresholds.mean
+    band = np.where(force > 0, limits.upper - limits.mean, limits.mean - limits.lower)
+    share = np.abs(force) / band
+    axis = int(np.argmax(share))
+    if abs(float(share[axis]) - step.evidence) < _SAME:
+        return (
+            f"the filtered force came to {abs(force[axis]):.1f} N along {'xyz'[axis]}, and {band[axis]:.1f} N would"
+            " have been a contact then"
+        )
+    return f"the evidence came to {step.evidence:.2f}, and 1 would have been a contact"
+
+
+class PushOutcome:
+    """A push of known force, followed step by step until its outcome is known."""
+
+    def __init__(self, force: FloatArray, begin: float, duration: float) -> None:
+        """Take the force (3,) [N], base frame, when it begins [s], and how long it lasts [s]."""
+        self._size, self._begin, self._end = float(np.linalg.norm(force)), begin, begin + duration
+        self._before = ""
+        self._detected: float | None = None
+        self._moved = False
+        self._nearest: ControlStep | None = None
+
+    def take(self, step: ControlStep) -> str:
+        """Take a step in; return what became of the push once that is known, '' before."""
+        if step.stamp < self._begin:
+            return ""
+        if self._nearest is None and step.mode is Mode.REACT and step.contact is None:
+            self._before = " came while the arm was yielding already"
+        if self._nearest is None or step.evidence > self._nearest.evidence:
+            self._nearest = step
+        if self._detected is None and step.contact is not None:
+            self._detected = step.stamp - self._begin
+        elif self._detected is not None:
+            self._moved = self._moved or answers(step)
+        return self._sentence() if step.stamp >= self._end + _GRACE_S else ""
+
+    def _sentence(self) -> str:
+        push = f"The push of {self._size:.0f} N"
+        if self._detected is not None:
+            answer = "the arm moved with it" if self._moved else "the arm held still: it was below what moves the arm"
+            return f"{push} was detected after {self._detected:.2f} s, and {answer}."
+        return f"{push}{self._before}." if self._before else f"{push} was not detected: {lacked(self._nearest)}."

@@ -7,96 +7,33 @@ asked along x and y, and up is down.
 """
 
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
 
-from pretouch.checks import Checked, Fraction, Positive
 from pretouch.errors import RobotError
-from pretouch.explanation import answers
 from pretouch.ports import Clock, Robot
 from pretouch.robot.model import RobotModel
-from pretouch.session.standstill import MEAN_S, Standstill
-from pretouch.sound import sound_robot
-from pretouch.types import ControlStep, FloatArray, Mode, RobotState
+from pretouch.session.may_move import MEAN_S, Standstill, new_states, vector
+from pretouch.types import FloatArray, RobotState
 
-_GRACE_S = 0.3
-"""A contact this long after the end of a push is still of it [s]: the estimate lags."""
-_SAME = 1e-6
-"""Difference of shares below which the detector's evidence is the force over its threshold."""
-
-
-class PushOutcome:
-    """A push of known force, followed step by step until its outcome is known."""
-
-    def __init__(self, force: FloatArray, begin: float, duration: float) -> None:
-        """Take the force (3,) [N], base frame, when it begins [s], and how long it lasts [s]."""
-        self._size, self._begin, self._end = float(np.linalg.norm(force)), begin, begin + duration
-        self._before = ""
-        self._detected: float | None = None
-        self._moved = False
-        self._nearest: ControlStep | None = None
-
-    def take(self, step: ControlStep) -> str:
-        """Take a step in; return what became of the push once that is known, '' before."""
-        if step.stamp < self._begin:
-            return ""
-        if self._nearest is None and step.mode is Mode.REACT and step.contact is None:
-            self._before = " came while the arm was yielding already"
-        if self._nearest is None or step.evidence > self._nearest.evidence:
-            self._nearest = step
-        if self._detected is None and step.contact is not None:
-            self._detected = step.stamp - self._begin
-        elif self._detected is not None:
-            self._moved = self._moved or answers(step)
-        return self._sentence() if step.stamp >= self._end + _GRACE_S else ""
-
-    def _sentence(self) -> str:
-        push = f"The push of {self._size:.0f} N"
-        if self._detected is not None:
-            answer = "the arm moved with it" if self._moved else "the arm held still: it was below what moves the arm"
-            return f"{push} was detected after {self._detected:.2f} s, and {answer}."
-        return f"{push}{self._before}." if self._before else f"{push} was not detected: {lacked(self._nearest)}."
-
-
-def lacked(step: ControlStep | None) -> str:
-    """Say what a contact would have taken in the step that was nearest to one, as the end of a sentence."""
-    if step is None:
-        return "no control step ran meanwhile"
-    if step.mode is Mode.HOLD:
-        return f"the arm held ({step.reason.rstrip('.')})"
-    limits, force = step.thresholds, step.filtered_force - step.thresholds.mean
-    band = np.where(force > 0, limits.upper - limits.mean, limits.mean - limits.lower)
-    share = np.abs(force) / band
-    axis = int(np.argmax(share))
-    if abs(float(share[axis]) - step.evidence) < _SAME:
-        return (
-            f"the filtered force came to {abs(force[axis]):.1f} N along {'xyz'[axis]}, and {band[axis]:.1f} N would"
-            " have been a contact then"
-        )
-    return f"the evidence came to {step.evidence:.2f}, and 1 would have been a contact"
-
-
-@dataclass(frozen=True)
-class PushParams(Checked):
-    """What makes a push a clear one. Figures without a source are ours."""
-
-    force_n: Positive = 8.0
-    """Least force, beyond that at rest [N]: a gentle push has 10 to 20."""
-    noise_sigmas: Positive = 4.0
-    """Least force in standard deviations of single samples of the force at rest."""
-    cone_rad: Positive = 0.6
-    """Largest angle between the push and what was asked for [rad]."""
-    lasting_s: Positive = 0.5
-    """How long it must last [s]."""
-    agreement: Fraction = 0.8
-    """Least cosine between the joint torques that the push makes by the Jacobian, and those the robot reports."""
-    release_s: Positive = 0.5
-    """How long nobody may push before the next push [s]."""
-    timeout_s: Positive = 60.0
-    """How long a push is waited for [s]."""
+# What makes a push a clear one. Figures without a source are ours.
+FORCE_N = 8.0
+"""Least force, beyond that at rest [N]: a gentle push has 10 to 20."""
+NOISE_SIGMAS = 4.0
+"""Least force in standard deviations of single samples of the force at rest."""
+CONE_RAD = 0.6
+"""Largest angle between the push and what was asked for [rad]."""
+LASTING_S = 0.5
+"""How long it must last [s]."""
+AGREEMENT = 0.8
+"""Least cosine between the joint torques that the push makes by the Jacobian, and those the robot reports."""
+RELEASE_S = 0.5
+"""How long nobody may push before the next push [s]."""
+TIMEOUT_S = 60.0
+"""How long a push is waited for [s]."""
 
 
 @dataclass(frozen=True)
@@ -130,11 +67,11 @@ class Verdict(Enum):
 class PushEvaluator:
     """Evaluates one push, state by state."""
 
-    def __init__(self, model: RobotModel, rest: Standstill, direction: Direction, params: PushParams) -> None:
+    def __init__(self, model: RobotModel, rest: Standstill, direction: Direction) -> None:
         """Take the arm, what it measured at rest, and where it is pushed."""
-        self._model, self._axis, self._params = model, np.array(direction.axis), params
+        self._model, self._axis = model, np.array(direction.axis)
         self._rest_wrench, self._rest_torque = rest.rest_wrench, rest.rest_torque
-        self._least = max(params.force_n, params.noise_sigmas * float(rest.noise.max()))
+        self._least = max(FORCE_N, NOISE_SIGMAS * float(rest.noise.max()))
         self._newest: deque[tuple[float, FloatArray]] = deque()
         self._push: list[tuple[float, FloatArray, FloatArray]] = []
         self.force = np.zeros(3)
@@ -158,22 +95,19 @@ class PushEvaluator:
             self._push.clear()
             return None
         self._push.append((state.stamp, wrench, state.tau_ext - self._rest_torque))
-        if state.stamp - self._push[0][0] < self._params.lasting_s:
+        if state.stamp - self._push[0][0] < LASTING_S:
             return None
         _, wrenches, torques = zip(*self._push, strict=True)
         self._push.clear()
         return self._verdict(state.q, np.mean(wrenches, axis=0), np.mean(torques, axis=0))
 
     def _verdict(self, q: FloatArray, wrench: FloatArray, torque: FloatArray) -> Verdict:
-        if np.all(np.isfinite(torque)):  # an arm on ROS 2 tells none
-            made = self._model.ee_jacobian(self._model.kinematics(q)).T @ wrench
-            agreement = _cosine(made, torque)
-            if agreement < -self._params.agreement:
-                return Verdict.CONTRADICTORY
-            if agreement < self._params.agreement:
-                return Verdict.DOUBTFUL
+        if np.all(np.isfinite(torque)):  # an arm on ROS 2 may give none
+            agreement = _cosine(self._model.ee_jacobian(self._model.kinematics(q)).T @ wrench, torque)
+            if agreement < AGREEMENT:
+                return Verdict.CONTRADICTORY if agreement < -AGREEMENT else Verdict.DOUBTFUL
         along = _cosine(wrench[:3], self._axis)
-        if abs(along) < np.cos(self._params.cone_rad):
+        if abs(along) < np.cos(CONE_RAD):
             return Verdict.SIDEWAYS
         return Verdict.AS_ASKED if along > 0 else Verdict.OPPOSITE
 
@@ -214,7 +148,6 @@ class GuidedPush:
     ask: Callable[[Direction], None]
     """Called as a push is wanted."""
     say: Callable[[str], None]
-    params: PushParams = PushParams()
 
     def confirm(self, rest: Standstill) -> None:
         """Return once force sign and frame are confirmed; raise RobotError where they are wrong, or stay unclear.
@@ -224,10 +157,10 @@ class GuidedPush:
         """
         verdicts = []
         for direction in DIRECTIONS:
-            evaluator = PushEvaluator(self.model, rest, direction, self.params)
+            evaluator = PushEvaluator(self.model, rest, direction)
             self.ask(direction)
             verdicts.append(self._wait(evaluator, direction))
-            self.say(f"Measured: {_vector(evaluator.force)} N. Let go.")
+            self.say(f"Measured: {vector(evaluator.force, 0, '+')} N. Let go.")
             self._wait_for_release(evaluator)
         wrong = set(verdicts) - {Verdict.AS_ASKED}
         if wrong:
@@ -236,43 +169,25 @@ class GuidedPush:
 
     def _wait(self, evaluator: PushEvaluator, direction: Direction) -> Verdict:
         """Wait for a push that is clear."""
-        for state in self._states(self.params.timeout_s):
+        for state in filter(None, new_states(self.robot, self.clock, self.model.description.qd_max, TIMEOUT_S)):
             verdict = evaluator.take(state)
             if verdict in _RETRY_HINTS:
-                self.say(_RETRY_HINTS[verdict].format(force=_vector(evaluator.force)))
+                self.say(_RETRY_HINTS[verdict].format(force=vector(evaluator.force, 0, "+")))
             elif verdict is not None:
                 return verdict
         raise RobotError(
-            f"No clear push towards {direction.words} was measured within {self.params.timeout_s:g} s, so the arm is"
+            f"No clear push towards {direction.words} was measured within {TIMEOUT_S:g} s, so the arm is"
             " not moved: start again when somebody is there to push."
         )
 
     def _wait_for_release(self, evaluator: PushEvaluator) -> None:
         """Wait until nobody pushes."""
         since = None
-        for state in self._states(self.params.timeout_s):
+        for state in filter(None, new_states(self.robot, self.clock, self.model.description.qd_max, TIMEOUT_S)):
             evaluator.take(state)
             since = None if evaluator.pushed else state.stamp if since is None else since
-            if since is not None and state.stamp - since >= self.params.release_s:
+            if since is not None and state.stamp - since >= RELEASE_S:
                 return
         raise RobotError(
-            f"The push did not end within {self.params.timeout_s:g} s, so the arm is not moved: check what presses"
-            " against it."
+            f"The push did not end within {TIMEOUT_S:g} s, so the arm is not moved: check what presses against it."
         )
-
-    def _states(self, seconds: float) -> Iterator[RobotState]:
-        """Yield the robot's states for some seconds."""
-        begin = now = self.clock.tick()
-        last = -np.inf
-        while now - begin < seconds:
-            state, wrong = sound_robot(self.robot.read(), self.model.description.qd_max)
-            if state is None:
-                raise RobotError(f"The robot's state cannot be used ({wrong}): check the connection to the arm.")
-            if state.stamp > last:
-                last = state.stamp
-                yield state
-            now = self.clock.tick()
-
-
-def _vector(values: FloatArray) -> str:
-    return f"({', '.join(f'{value:+.0f}' for value in values)})"

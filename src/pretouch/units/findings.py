@@ -1,19 +1,15 @@
 """What is wrong with a unit, as sentences: unit, value, limit, and what to do."""
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
-from pretouch.types import RangeStatus
 from pretouch.units.health import HealthParams, UnitHealth
 from pretouch.units.wire import Reset
 
-_MEASURED = {s.name for s in (
-    RangeStatus.OK, RangeStatus.NO_WRAP_CHECK, RangeStatus.MERGED, RangeStatus.MIN_CLIPPED, RangeStatus.MIN_RANGE,
-    RangeStatus.SIGMA, RangeStatus.SIGNAL, RangeStatus.OUT_OF_BOUNDS, RangeStatus.WRAPPED,
-)}  # fmt: skip
-"""Statuses that say that something is there, or that nothing near is; all others are of a sensor that failed."""
+_FAILURES = frozenset(["HARDWARE", "CROSSTALK", "SYNC", "INVALID", "STUCK", "NONE"])
+"""Statuses of a sensor that failed; others say that something is there, or that nothing near is."""
 _MOST_DIGITS = 4
 _ENDS: dict[int, str] = {
     Reset.POWER_ON: "it was powered on: check its battery and plug",
@@ -21,15 +17,18 @@ _ENDS: dict[int, str] = {
     Reset.WATCHDOG: "its watchdog ended a hang: check its firmware and bus",
     Reset.SOFT: "its program restarted: check its firmware",
 }
+_FAST = 4
+"""Zones along a side up to which a sensor keeps the rate of one without."""
 
 Level = Literal["fault", "warning"]
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that is wrong with a unit."""
+    """One thing that is wrong."""
 
     unit: str
+    """With which unit, or with what else."""
     level: Level
     what: str
     """A word for programs, as `rate` or `battery`."""
@@ -59,130 +58,142 @@ def findings(units: Iterable[UnitHealth], params: HealthParams, late: float = 0.
     return machine, *(finding for finding in every if finding.what not in _OF_TIME)
 
 
-def _of(unit: UnitHealth, params: HealthParams) -> Iterator[Finding]:
+class _Findings(list[Finding]):
+    """What is wrong with one unit; each sentence goes on from its name."""
+
+    def __init__(self, unit: str) -> None:
+        super().__init__()
+        self._unit = unit
+
+    def add(self, level: Level, what: str, sentence: str) -> None:
+        """Add what is wrong."""
+        self.append(Finding(self._unit, level, what, self._unit + sentence))
+
+    def beyond(
+        self, what: str, value: float, limits: tuple[float, ...], sentence: str, digits: int = 0, below: bool = False
+    ) -> None:
+        """Add a warning if a value is over, or `below`, the first limit; a fault if it is beyond the second as well.
+
+        The sentence has {value} and {limit} in it.
+        """
+        passed = [limit for limit in limits if (value < limit if below else value > limit)]
+        if passed:
+            words = sentence.format(value=_formatted(value, passed[-1], digits), limit=f"{passed[-1]:g}")
+            self.add("fault" if len(passed) > 1 else "warning", what, words)
+
+
+def _formatted(value: float, limit: float, digits: int = 0) -> str:
+    """Return a value with so many digits, or as many more as set it off from its limit."""
+    while digits < _MOST_DIGITS and f"{value:.{digits}f}" == f"{limit:.{digits}f}":
+        digits += 1
+    return f"{value:.{digits}f}"
+
+
+def _of(unit: UnitHealth, params: HealthParams) -> list[Finding]:
+    wrong = _Findings(unit.unit)
     silence = _silence(unit, params)
     if silence:
-        yield Finding(unit.unit, "fault", "silent", silence)
+        wrong.add("fault", "silent", silence)
     else:
-        yield from _range_finder(unit, params)
-        yield from _touch_sensor(unit, params)
+        _range_finder(wrong, unit, params)
+        _touch_sensor(wrong, unit, params)
         if unit.heard_s >= params.settle_s:
-            yield from _rates(unit, params)
-            yield from _clock(unit, params)
+            _rates(wrong, unit, params)
+            _clock(wrong, unit, params)
     if unit.heard_s > 0:
-        yield from _unit_itself(unit, params)
+        _unit_itself(wrong, unit, params)
+    return wrong
 
 
 def _silence(unit: UnitHealth, params: HealthParams) -> str:
     """Say why nothing comes of a unit, or ''."""
-    name, state = unit.unit, unit.standing.state
-    if state == "greeting":
+    if unit.silent_s <= params.silent_s:
+        return ""
+    if unit.traffic.state == "greeting":
         return (
-            f"{name} asks for a session but does not receive the answers: allow UDP to it through the firewall and the"
-            " access point (no client isolation)."
+            " asks for a session but does not receive the answers: allow UDP to it through the firewall and the access"
+            " point (no client isolation)."
         )
-    if state == "never heard":
+    if not math.isfinite(unit.silent_s):
         return (
-            f"{name} has sent nothing so far: check its power and Wi-Fi, and that it was provisioned with this host's"
-            " address and port and with this key."
+            " has sent nothing so far: check its power and Wi-Fi, and that it was provisioned with this host's address"
+            " and port and with this key."
         )
-    if unit.silent_s > params.silent_s:
-        return (
-            f"{name} has sent nothing for {unit.silent_s:.1f} s (limit {params.silent_s:g} s): check its power and its"
-            " distance from the access point."
-        )
-    return ""
+    return (
+        f" has sent nothing for {unit.silent_s:.1f} s (limit {params.silent_s:g} s): check its power and its distance"
+        " from the access point."
+    )
 
 
-def _range_finder(unit: UnitHealth, params: HealthParams) -> Iterator[Finding]:
-    if unit.standing.stuck:
-        yield Finding(
-            unit.unit, "fault", "stuck",
-            f"{unit.unit} repeats {unit.distance_m:.3f} m to the last digit, so its range finder hangs: restart the"
-            " unit, and replace the sensor if this happens again.",
-        )  # fmt: skip
-    zones, told = unit.standing.zones, unit.standing.zones_told
-    if told not in (0, zones):
-        yield Finding(
-            unit.unit, "fault", "zones",
-            f"{unit.unit} sends {_square(told)}, but the skin file has {_square(zones)}, so its readings are not used:"
-            " set zones and type of its sensor in the skin file, or provision and flash the unit for them.",
-        )  # fmt: skip
-    failed = {status: count for status, count in unit.statuses.items() if status not in _MEASURED}
+def _range_finder(wrong: _Findings, unit: UnitHealth, params: HealthParams) -> None:
+    if unit.traffic.stuck:
+        hangs = f" repeats {unit.distance_m:.3f} m to the last digit, so its range finder hangs: restart the unit, and"
+        wrong.add("fault", "stuck", f"{hangs} replace the sensor if this happens again.")
+    zones, sent = unit.traffic.zones, unit.traffic.zones_told
+    if sent not in (0, zones):
+        misfit = f" sends {_square(sent)}, but the skin file has {_square(zones)}, so its readings are not used: set"
+        remedy = "zones and type of its sensor in the skin file, or provision and flash the unit for them."
+        wrong.add("fault", "zones", f"{misfit} {remedy}")
+    failed = {status: count for status, count in unit.statuses.items() if status in _FAILURES or status.isdecimal()}
     if failed:
         kinds = ", ".join(f"{count} {status}" for status, count in sorted(failed.items()))
-        yield from _beyond(
-            unit, "status", 100 * sum(failed.values()) / sum(unit.statuses.values()),
-            (100 * params.failed, 100 * params.failed_fault),
-            f" fails in {{value}}% of its readings ({kinds}; limit {{limit}}%): check its wiring and supply, and"
-            " replace the sensor if this continues.",
-        )  # fmt: skip
-    yield from _beyond(
-        unit, "sigma", 1000 * unit.sigma_m, (1000 * params.sigma_m,),
-        " estimates its own error at {value} mm (limit {limit} mm): clean its window, and shade it from the sun.",
-    )  # fmt: skip
-    yield from _beyond(
-        unit, "noise", 1000 * unit.noise_m, (1000 * params.noise_m,),
-        " scatters by {value} mm from reading to reading (limit {limit} mm): clean its window, and remove anything"
-        " shiny or moving in front of it.",
-    )  # fmt: skip
+        share = 100 * sum(failed.values()) / sum(unit.statuses.values())
+        fails = f" fails in {{value}}% of its readings ({kinds}; limit {{limit}}%): check its wiring and supply, and"
+        limits = 100 * params.failed, 100 * params.failed_fault
+        wrong.beyond("status", share, limits, f"{fails} replace the sensor if this continues.")
+    sigma = " estimates its own error at {value} mm (limit {limit} mm): clean its window, and shade it from the sun."
+    wrong.beyond("sigma", 1000 * unit.sigma_m, (1000 * params.sigma_m,), sigma)
+    noise = " scatters by {value} mm from reading to reading (limit {limit} mm): clean its window, and remove"
+    wrong.beyond(
+        "noise", 1000 * unit.noise_m, (1000 * params.noise_m,), f"{noise} anything shiny or moving in front of it."
+    )
 
 
 def _square(side: int) -> str:
     return f"{side} x {side} zones" if side > 1 else "a single range"
 
 
-def _touch_sensor(unit: UnitHealth, params: HealthParams) -> Iterator[Finding]:
+def _touch_sensor(wrong: _Findings, unit: UnitHealth, params: HealthParams) -> None:
     if unit.touched == 1.0 and unit.heard_s >= params.touch_held_s:
-        yield Finding(
-            unit.unit, "warning", "touch held",
-            f"{unit.unit} has reported a touch for {unit.heard_s:.0f} s (limit {params.touch_held_s:g} s), so its"
-            " touch sensor is ignored: check that no cable or case presses on it, and calibrate it.",
-        )  # fmt: skip
-    yield from _beyond(
-        unit, "touch failed", 100 * unit.touch_failed, (100 * params.touch_failed,),
-        "'s touch sensor fails in {value}% of its readings (limit {limit}%): check its leads and the resistor across"
-        " it.",
-    )  # fmt: skip
+        touched = (
+            f" has reported a touch for {unit.heard_s:.0f} s (limit {params.touch_held_s:g} s), so its touch sensor"
+        )
+        wrong.add(
+            "warning",
+            "touch held",
+            f"{touched} is ignored: check that no cable or case presses on it, and calibrate it.",
+        )
+    failing = "'s touch sensor fails in {value}% of its readings (limit {limit}%): check its leads and the resistor"
+    wrong.beyond("touch failed", 100 * unit.touch_failed, (100 * params.touch_failed,), f"{failing} across it.")
 
 
-_FAST = 4
-_FEW_ZONES = "measure 4 x 4 zones, which is faster."
-_SUPPLY = "check its wiring and supply, and its radio if samples are lost."
-
-
-def _rates(unit: UnitHealth, params: HealthParams) -> Iterator[Finding]:
+def _rates(wrong: _Findings, unit: UnitHealth, params: HealthParams) -> None:
     if _unbroken(unit, params):
-        yield from _beyond(
-            unit, "rate", unit.rate_hz, (params.rate_hz, params.rate_fault_hz),
-            " gives {value} readings a second (limit {limit}): "
-            + (_FEW_ZONES if unit.standing.zones_told > _FAST else _SUPPLY),
-            digits=1, below=True,
-        )  # fmt: skip
+        remedy = "check its wiring and supply, and its radio if samples are lost."
+        if unit.traffic.zones_told > _FAST:
+            remedy = "measure 4 x 4 zones, which is faster."
+        slow = f" gives {{value}} readings a second (limit {{limit}}): {remedy}"
+        wrong.beyond("rate", unit.rate_hz, (params.rate_hz, params.rate_fault_hz), slow, digits=1, below=True)
     if unit.range_late >= params.range_late:
-        yield Finding(
-            unit.unit, "warning", "range late",
-            f"{unit.unit} had no new range in time {unit.range_late} times in {params.window_s:g} s (limit"
-            f" {params.range_late}): check its interrupt line and bus.",
-        )  # fmt: skip
-    yield from _beyond(
-        unit, "loss", 100 * unit.loss, (100 * params.loss, 100 * params.loss_fault),
+        late = (
+            f" had no new range in time {unit.range_late} times in {params.window_s:g} s (limit {params.range_late}):"
+        )
+        wrong.add("warning", "range late", f"{late} check its interrupt line and bus.")
+    loss = (
         " loses {value}% of its samples in transmission (limit {limit}%): move the access point closer, or use a free"
-        " channel.",
-    )  # fmt: skip
-    yield from _beyond(
-        unit, "imu rate", unit.imu_rate_hz, (params.imu_rate_hz,),
-        " gives {value} IMU samples a second (limit {limit}): check the IMU's wiring and its rate in the firmware.",
-        below=True,
-    )  # fmt: skip
-    yield from _beyond(
-        unit, "imu loss", 100 * unit.imu_loss, (100 * params.imu_loss,),
+    )
+    wrong.beyond("loss", 100 * unit.loss, (100 * params.loss, 100 * params.loss_fault), f"{loss} channel.")
+    rate = " gives {value} IMU samples a second (limit {limit}): check the IMU's wiring and its rate in the firmware."
+    wrong.beyond("imu rate", unit.imu_rate_hz, (params.imu_rate_hz,), rate, below=True)
+    lost = (
         " loses {value}% of its IMU samples before they are sent (limit {limit}%): its loop is too slow for the IMU's"
-        " rate; lower the rate in the firmware.",
-    )  # fmt: skip
+    )
+    wrong.beyond(
+        "imu loss", 100 * unit.imu_loss, (100 * params.imu_loss,), f"{lost} rate; lower the rate in the firmware."
+    )
 
 
-def _clock(unit: UnitHealth, params: HealthParams) -> Iterator[Finding]:
+def _clock(wrong: _Findings, unit: UnitHealth, params: HealthParams) -> None:
     over = [
         f"{kind} {_formatted(1000 * value, 1000 * limit)} ms (limit {1000 * limit:g} ms)"
         for kind, value, limit in (
@@ -192,31 +203,20 @@ def _clock(unit: UnitHealth, params: HealthParams) -> Iterator[Finding]:
         if value > limit
     ]
     if over:
-        yield Finding(
-            unit.unit, "warning", "latency",
-            f"{unit.unit}'s readings arrive late, {' and '.join(over)}: move the access point closer, and switch its"
-            " power saving off.",
-        )  # fmt: skip
-    if math.isfinite(unit.standing.bound) and _unbroken(unit, params):
-        yield from _beyond(
-            unit, "clock", 1000 * unit.standing.bound, (1000 * params.bound_s,),
-            "'s clock is known only to within {value} ms (limit {limit} ms), because the network to it is slow or"
-            " asymmetric: move the access point closer.",
-            digits=1,
-        )  # fmt: skip
+        remedy = "move the access point closer, and switch its power saving off."
+        wrong.add("warning", "latency", f"'s readings arrive late, {' and '.join(over)}: {remedy}")
+    if math.isfinite(unit.traffic.bound) and _unbroken(unit, params):
+        vague = "'s clock is known only to within {value} ms (limit {limit} ms), because the network to it is slow or"
+        limits = (1000 * params.bound_s,)
+        vague += " asymmetric: move the access point closer."
+        wrong.beyond("clock", 1000 * unit.traffic.bound, limits, vague, digits=1)
     if unit.clock_unknown_s >= params.settle_s:
-        yield Finding(
-            unit.unit, "fault", "clock",
-            f"{unit.unit}'s clock has been unknown for {unit.clock_unknown_s:.0f} s (limit {params.settle_s:g} s), so"
-            " its readings are not used: it echoes no beacon in time; move the access point closer, and check its"
-            " firmware.",
-        )  # fmt: skip
+        unknown = f"'s clock has been unknown for {unit.clock_unknown_s:.0f} s (limit {params.settle_s:g} s), so its"
+        remedy = "it echoes no beacon in time; move the access point closer, and check its firmware."
+        wrong.add("fault", "clock", f"{unknown} readings are not used: {remedy}")
     if unit.clock_jumps:
-        yield Finding(
-            unit.unit, "warning", "clock jump",
-            f"{unit.unit}'s clock jumped {unit.clock_jumps} times in {params.window_s:g} s: its crystal or firmware is"
-            " faulty; replace the board if this happens again.",
-        )  # fmt: skip
+        jumps = f"'s clock jumped {unit.clock_jumps} times in {params.window_s:g} s: its crystal or firmware is faulty;"
+        wrong.add("warning", "clock jump", f"{jumps} replace the board if this happens again.")
 
 
 def _unbroken(unit: UnitHealth, params: HealthParams) -> bool:
@@ -224,52 +224,20 @@ def _unbroken(unit: UnitHealth, params: HealthParams) -> bool:
     return unit.gap_s <= params.silent_s and not unit.reboots
 
 
-def _unit_itself(unit: UnitHealth, params: HealthParams) -> Iterator[Finding]:
-    yield from _beyond(
-        unit, "battery", unit.battery_v, (params.battery_v, params.battery_fault_v),
-        "'s battery is at {value} V (limit {limit} V): charge it.",
-        digits=2, below=True,
-    )  # fmt: skip
-    yield from _beyond(
-        unit, "temperature", unit.temperature_c, (params.temperature_c, params.temperature_fault_c),
-        " is at {value} degrees C (limit {limit}): move it away from the heat source.",
-    )  # fmt: skip
-    yield from _beyond(
-        unit, "temperature", unit.temperature_c, (params.temperature_low_c,),
-        " is at {value} degrees C (limit {limit}): warm it.",
-        below=True,
-    )  # fmt: skip
-    name = unit.unit
+def _unit_itself(wrong: _Findings, unit: UnitHealth, params: HealthParams) -> None:
+    battery, hot, window = (params.battery_v, params.battery_fault_v), params.temperature_c, f"{params.window_s:g} s"
+    charge = "'s battery is at {value} V (limit {limit} V): charge it."
+    wrong.beyond("battery", unit.battery_v, battery, charge, digits=2, below=True)
+    degrees = " is at {value} degrees C (limit {limit}): "
+    cool = f"{degrees}move it away from the heat source."
+    wrong.beyond("temperature", unit.temperature_c, (hot, params.temperature_fault_c), cool)
+    wrong.beyond("temperature", unit.temperature_c, (params.temperature_low_c,), f"{degrees}warm it.", below=True)
     if unit.bus_errors >= params.bus_errors or unit.restarts:
-        yield Finding(
-            name, "warning", "bus",
-            f"{name} had {unit.bus_errors} failed transfers on its bus and {unit.restarts} sensor restarts in"
-            f" {params.window_s:g} s (limits {params.bus_errors} and 1): check the plugs and the length of its wires.",
-        )  # fmt: skip
+        bus = f" had {unit.bus_errors} failed transfers on its bus and {unit.restarts} sensor restarts in {window}"
+        limits = f"(limits {params.bus_errors} and 1)"
+        wrong.add("warning", "bus", f"{bus} {limits}: check the plugs and the length of its wires.")
     if unit.reboots >= params.reboots:
-        yield Finding(
-            name, "warning", "reboot",
-            f"{name} restarted {unit.reboots} times in {params.window_s:g} s (limit {params.reboots}):"
-            f" {_ENDS.get(unit.standing.reset, 'check its supply and firmware')}.",
-        )  # fmt: skip
-
-
-def _beyond(
-    unit: UnitHealth, what: str, value: float, limits: tuple[float, ...], sentence: str, *,
-    digits: int = 0, below: bool = False,
-) -> Iterator[Finding]:  # fmt: skip
-    """Yield a warning if a value is over, or `below`, the first limit; a fault if it is beyond the second as well.
-
-    The sentence goes on from the unit's name, with {value} and {limit} in it.
-    """
-    passed = [limit for limit in limits if (value < limit if below else value > limit)]
-    if passed:
-        told = sentence.format(value=_formatted(value, passed[-1], digits), limit=f"{passed[-1]:g}")
-        yield Finding(unit.unit, "fault" if len(passed) > 1 else "warning", what, unit.unit + told)
-
-
-def _formatted(value: float, limit: float, digits: int = 0) -> str:
-    """Return a value with so many digits, or as many more as set it off from its limit."""
-    while digits < _MOST_DIGITS and f"{value:.{digits}f}" == f"{limit:.{digits}f}":
-        digits += 1
-    return f"{value:.{digits}f}"
+        cause = _ENDS.get(unit.traffic.reset, "check its supply and firmware")
+        wrong.add(
+            "warning", "reboot", f" restarted {unit.reboots} times in {window} (limit {params.reboots}): {cause}."
+        )

@@ -1,32 +1,97 @@
-"""The simulated units of a skin, each behind its own UDP socket and its own stretch of a simulated network."""
+"""The simulated units of a skin, each behind its own UDP socket and its own stretch of a simulated network.
+
+The network loses, delays, overtakes and doubles datagrams, as a wireless one does.
+"""
 
 import socket
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass, field
 from itertools import count
+from typing import Annotated, Generic, TypeVar
 
 import numpy as np
 
-from pretouch.checks import Checked, NonNegative
+from pretouch.checks import Check, Checked, Fraction, NonNegative, Positive
 from pretouch.errors import HardwareError
+from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import NetworkUnits
-from pretouch.sim.imu import ImuParams, ImuSample
-from pretouch.sim.range_finder import RangeSample
-from pretouch.sim.touch_sensor import TouchErrors, TouchSample
-from pretouch.units.channel import Channel, NetworkParams
+from pretouch.sim.imu import ImuParams, Imus, ImuSample
+from pretouch.sim.plant import Plant
+from pretouch.sim.range_finder import RangeFinderParams, RangeFinders, RangeSample
+from pretouch.sim.touch_sensor import Forces, TouchErrors, TouchSample, TouchSensors, no_forces
+from pretouch.sim.under_way import UnderWay
 from pretouch.units.keys import Keys, UnitKey
 from pretouch.units.simulated import SimulatedUnit, UnitParams
 from pretouch.units.wire import KEY_SIZE
 
+Measured = TypeVar("Measured", RangeSample, ImuSample, TouchSample)
+Item = TypeVar("Item")
 _LARGEST = 2048
 _LAST_PORT = 0xFFFF
+
+
+@dataclass(frozen=True)
+class ChannelParams(Checked):
+    """Loss and delay of datagrams in one direction. By default none is lost, and all are late."""
+
+    loss: Annotated[float, Check(low=0.0, high=1.0)] = 0.0
+    """Probability that a datagram is lost."""
+    delay_s: NonNegative = 0.008
+    """Least delay [s]."""
+    jitter_s: NonNegative = 0.004
+    """Mean of what is added to it [s], distributed as gamma."""
+    jitter_shape: Positive = 1.0
+    """Shape of that distribution; 1 is exponential."""
+    overtaken: Fraction = 0.0
+    """Probability that a datagram is held up, so that later ones overtake it."""
+    held_up_s: NonNegative = 0.05
+    """For how long it is held up [s]: two to three samples of a unit."""
+    doubled: Fraction = 0.0
+    """Probability that a datagram arrives twice, the second time after delays of its own."""
+
+
+@dataclass(frozen=True)
+class NetworkParams(Checked):
+    """The network between the units of a skin and their receiver."""
+
+    up: ChannelParams = ChannelParams()
+    """From units to receiver: latency and jitter as of `sim.range_finder.RangeFinderParams`."""
+    down: ChannelParams = ChannelParams(delay_s=0.0012, jitter_s=0.0012, jitter_shape=2.0)
+    """From receiver to units: a quiet access point, with power saving of the units off."""
+
+
+class Channel(Generic[Item]):
+    """One direction of the network for the datagrams of one unit; the same random numbers give the same course."""
+
+    def __init__(self, params: ChannelParams, rng: np.random.Generator) -> None:
+        self._params, self._rng = params, rng
+        self._sent = UnderWay[Item]()
+        self.lost = 0
+        """How many were lost so far."""
+
+    def put(self, item: Item, now: float) -> None:
+        """Send a datagram at a time [s]."""
+        if self._rng.random() < self._params.loss:
+            self.lost += 1
+            return
+        for _ in range(1 + int(self._rng.random() < self._params.doubled)):
+            self._sent.send(now + self._delay(), item)
+
+    def take(self, now: float) -> list[Item]:
+        """Return what has arrived by a time [s] and was not taken yet, in the order of arrival."""
+        return list(self._sent.arrived(now))
+
+    def _delay(self) -> float:
+        p, rng = self._params, self._rng
+        held_up = p.held_up_s if rng.random() < p.overtaken else 0.0
+        return p.delay_s + float(rng.gamma(p.jitter_shape, p.jitter_s / p.jitter_shape)) + held_up
 
 
 @dataclass(frozen=True)
 class FleetParams(Checked):
     """Units, and the network between them and their receiver."""
 
-    network: NetworkParams = field(default_factory=NetworkParams)
+    network: NetworkParams = NetworkParams()
     """What becomes of datagrams."""
     unit: UnitParams = field(default_factory=UnitParams)
     """How units keep their time and their sessions."""
@@ -55,11 +120,12 @@ class Fleet:
         missing = [name for name in ids if name not in keys]
         if missing:
             raise HardwareError(f"No key for unit {', '.join(missing)}: create keys for all units of the skin.")
-        family, self._found = _resolved(address)
+        family, self._address = _resolved(address)
         self.receiver = address
         """Name or address, and port, of the receiver."""
         seeds = np.random.SeedSequence([seed, 6]).spawn(len(ids))
         rngs = [[np.random.default_rng(s) for s in one.spawn(3)] for one in seeds]
+        self._params, self.seed = params, seed
         self.units = tuple(
             SimulatedUnit(keys[name], params.unit, own, params.imu, _reboots(params.reboot_every_s, own), side)
             for name, side, (own, _, _) in zip(ids, network.zones, rngs, strict=True)
@@ -77,6 +143,47 @@ class Fleet:
         """Datagrams that reached the socket."""
         self.lost = 0
         """Datagrams that the machine would not send, as while its network is down."""
+
+    def mount(
+        self,
+        plant: Plant,
+        skin: Skin,
+        at: Callable[[float], float | None],
+        ranging: RangeFinderParams | None = None,
+        laid: Forces = no_forces,
+    ) -> RangeFinders:
+        """Let the units measure on a simulated arm that has not moved yet; return their range finders.
+
+        Args:
+            plant: the arm.
+            skin: the units on it; one with a touch sensor by the skin file measures touches.
+            at: gives the units' time at an instant of the arm's [s]; None while they measure nothing.
+            ranging: how range finders err.
+            laid: forces that act on the arm without a contact of the simulation.
+        """
+
+        def handed_to(take: Callable[[Measured], None]) -> Callable[[Measured], None]:
+            def hand_on(sample: Measured) -> None:
+                time = at(sample.time)
+                if time is not None:
+                    take(sample._replace(time=time))
+
+            return hand_on
+
+        finders = RangeFinders(plant, skin, ranging or RangeFinderParams(), self.seed, handed_to(self.take_range))
+        if len(skin.touching):
+            TouchSensors(plant, skin, self._params.touch, self.seed, laid, handed_to(self.take_touch))
+        if self._params.imu is not None:
+            Imus(plant, skin, self._params.imu, self.seed, handed_to(self.take_imu))
+        return finders
+
+    def set_faults(self, silenced: Collection[str], stuck: Collection[str]) -> None:
+        """Let units send nothing, or repeat their first range; a name that no unit has is a HardwareError."""
+        unknown = sorted({*silenced, *stuck} - set(self.ids))
+        if unknown:
+            raise HardwareError(f"Unknown unit {', '.join(unknown)}: choose from {', '.join(self.ids)}.")
+        for name, unit in zip(self.ids, self.units, strict=True):
+            unit.silent, unit.stuck = name in silenced, name in stuck
 
     def take_range(self, sample: RangeSample) -> None:
         """Let a unit's range finder measure, or one of its zones."""
@@ -111,7 +218,7 @@ class Fleet:
 
     def _send(self, one: socket.socket, datagram: bytes) -> None:
         try:
-            one.sendto(datagram, self._found)
+            one.sendto(datagram, self._address)
             self.sent += 1
         except OSError:
             self.lost += 1
@@ -140,10 +247,10 @@ def _resolved(address: tuple[str, int]) -> tuple[int, tuple[object, ...]]:
     if not 1 <= port <= _LAST_PORT:
         raise HardwareError(f"The receiver's port is {port}: give one from 1 to {_LAST_PORT}.")
     try:
-        family, _, _, _, found = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
+        family, _, _, _, resolved = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
     except (OSError, UnicodeError) as error:
         raise HardwareError(f"The receiver {host}:{port} cannot be found ({error}): check its name and port.") from None
-    return family, found
+    return family, resolved
 
 
 def _heard(one: socket.socket) -> list[bytes]:

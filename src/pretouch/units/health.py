@@ -3,16 +3,16 @@
 import math
 from collections import Counter, deque
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from itertools import pairwise
-from typing import Self
+from typing import NamedTuple
 
 import numpy as np
 
 from pretouch.checks import Checked, Fraction, Positive, PositiveCount
 from pretouch.types import FloatArray, RangeStatus, TouchStatus
-from pretouch.units.traffic import Received, UnitState, UnitTraffic
-from pretouch.units.wire import NO_TEMPERATURE, Flag, Reset, Sample, touch_part
+from pretouch.units.unit import Received, UnitTraffic
+from pretouch.units.wire import NO_TEMPERATURE, Flag, Sample, touch_part
 
 
 @dataclass(frozen=True)
@@ -92,49 +92,16 @@ _FEW = 5
 """Fewer readings than this tell no noise."""
 
 
-@dataclass(frozen=True)
-class Counts:
-    """What a receiver has counted of a unit since it began."""
+class Counts(NamedTuple):
+    """What a receiver has counted of a unit."""
 
     accepted: int = 0
     lost: int = 0
     reboots: int = 0
     clock_jumps: int = 0
 
-    @classmethod
-    def of(cls, traffic: UnitTraffic) -> Self:
-        """Return what is counted by now."""
-        return cls(*(getattr(traffic, f.name) for f in fields(cls)))
 
-    def since(self, before: "Counts") -> "Counts":
-        """Return what was counted after an earlier count."""
-        return Counts(*(getattr(self, f.name) - getattr(before, f.name) for f in fields(self)))
-
-
-@dataclass(frozen=True)
-class UnitStatus:
-    """What a receiver knows of a unit at an instant."""
-
-    state: UnitState = "never heard"
-    last_arrival: float = -math.inf
-    """When its last sample came [s]."""
-    bound: float = math.inf
-    """Most its clock can be off by [s], infinite while it is not known."""
-    stuck: bool = False
-    """Whether its readings repeat to the last digit."""
-    zones: int = 1
-    """Zones along each side of its sensor, by the skin."""
-    zones_told: int = 0
-    """The same by its newest range, 0 before the first."""
-    firmware: int = 0
-    """Major version * 256 + minor version, 0 before it has said."""
-    reset: int = Reset.UNKNOWN
-    """Why it last began anew: a `Reset`."""
-
-    @classmethod
-    def of(cls, traffic: UnitTraffic) -> Self:
-        """Return what is known by now."""
-        return cls(*(getattr(traffic, f.name) for f in fields(cls)))
+NO_COUNTS = Counts()
 
 
 @dataclass(frozen=True)
@@ -142,7 +109,7 @@ class UnitHealth:
     """One unit over the last seconds. NaN where something is not known."""
 
     unit: str
-    standing: UnitStatus
+    traffic: UnitTraffic
     heard_s: float
     """Time within the window since its first sample [s]."""
     silent_s: float
@@ -221,16 +188,16 @@ class Lateness:
 class UnitWindow:
     """What was heard of one unit within the last seconds."""
 
-    def __init__(self, unit: str, length: float) -> None:
-        """Take the unit's name and the window's length [s]."""
-        self.unit, self._length = unit, length
+    def __init__(self, length: float) -> None:
+        """Take the window's length [s]."""
+        self._length = length
         self._heard: deque[Received] = deque()
         self._counts: deque[tuple[float, Counts]] = deque()
 
     def take(self, now: float, heard: Iterable[Received], traffic: UnitTraffic) -> None:
         """Take in what was heard since the last time, and what the receiver has counted by now [s]."""
         self._heard.extend(heard)
-        self._counts.append((now, Counts.of(traffic)))
+        self._counts.append((now, Counts(traffic.accepted, traffic.lost, traffic.reboots, traffic.clock_jumps)))
         while self._heard and self._heard[0].arrival <= now - self._length:
             self._heard.popleft()
         while len(self._counts) > 1 and self._counts[1][0] <= now - self._length:
@@ -238,20 +205,17 @@ class UnitWindow:
 
     def health(self, now: float, traffic: UnitTraffic) -> UnitHealth:
         """Return how the unit is at an instant [s]."""
-        counted = self._counts[-1][1].since(self._counts[0][1]) if self._counts else Counts()
-        return unit_health(self.unit, list(self._heard), now, UnitStatus.of(traffic), counted)
+        ends = (self._counts[0][1], self._counts[-1][1]) if self._counts else (NO_COUNTS, NO_COUNTS)
+        return unit_health(list(self._heard), now, traffic, Counts(*(b - a for a, b in zip(*ends, strict=True))))
 
 
-def unit_health(
-    unit: str, heard: Sequence[Received], now: float, standing: UnitStatus, counted: Counts = Counts()
-) -> UnitHealth:
+def unit_health(heard: Sequence[Received], now: float, traffic: UnitTraffic, counted: Counts = NO_COUNTS) -> UnitHealth:
     """Make numbers of what was heard.
 
     Args:
-        unit: its name.
-        heard: its samples within the window, as they came.
+        heard: the unit's samples within the window, as they came.
         now: instant [s].
-        standing: what the receiver knows of it.
+        traffic: what the receiver knows of it.
         counted: what the receiver counted within the window.
     """
     fresh = [h for h in heard if h.sample.flags & _NEW]
@@ -267,10 +231,10 @@ def unit_health(
     flags = [s.flags for s in boot]
     touch = [part for s in boot if (part := touch_part(s)) is not None]
     return UnitHealth(
-        unit=unit,
-        standing=standing,
+        unit=traffic.id,
+        traffic=traffic,
         heard_s=heard_s,
-        silent_s=now - standing.last_arrival,
+        silent_s=now - traffic.last_arrival,
         gap_s=max((b - a for a, b in pairwise(sorted(h.arrival for h in heard))), default=0.0),
         rate_hz=len(fresh) / heard_s if heard_s > 0 else math.nan,
         loss=counted.lost / sent if sent else math.nan,
@@ -286,7 +250,7 @@ def unit_health(
         # its count ends at 65535, its flags do not
         bus_errors=max(last.bus_errors - boot[0].bus_errors, sum(bool(f & _BUS_ERROR) for f in flags)) if last else 0,
         restarts=sum(bool(f & _RESTARTED) for f in flags),
-        clock_unknown_s=_clock_unknown(heard, now, standing),
+        clock_unknown_s=_clock_unknown(heard, now, traffic),
         range_late=sum(bool(f & _LATE) for f in flags),
         imu_rate_hz=imu_rate_hz,
         imu_loss=imu_loss,
@@ -302,9 +266,9 @@ def status_name(code: int) -> str:
     return RangeStatus(code).name if code in RangeStatus._value2member_map_ else str(code)
 
 
-def _clock_unknown(heard: Sequence[Received], now: float, standing: UnitStatus) -> float:
+def _clock_unknown(heard: Sequence[Received], now: float, traffic: UnitTraffic) -> float:
     """Return for how long [s] a unit's clock has not been known."""
-    if math.isfinite(standing.bound) or not heard:
+    if math.isfinite(traffic.bound) or not heard:
         return 0.0
     return now - max((h.arrival for h in heard if math.isfinite(h.bound)), default=heard[0].arrival)
 
@@ -327,10 +291,8 @@ def _imu(samples: Sequence[Sample]) -> tuple[float, float]:
     first, last = full[0], full[-1]
     elapsed = (last.time_us - last.imu_age_us - first.time_us + first.imu_age_us) / 1e6
     counted = last.imu_index + last.imu_count - first.imu_index - first.imu_count
-    missing = sum(
-        b.imu_index - a.imu_index - a.imu_count for a, b in pairwise(full)
-        if b.sequence == a.sequence + 1
-    )  # fmt: skip
+    neighbours = [(a, b) for a, b in pairwise(full) if b.sequence == a.sequence + 1]
+    missing = sum(b.imu_index - a.imu_index - a.imu_count for a, b in neighbours)
     if elapsed <= 0 or counted <= 0:
         return math.nan, math.nan
     return counted / elapsed, max(0, missing) / counted

@@ -3,11 +3,12 @@
 import os
 import secrets
 import stat
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import suppress
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from hashlib import sha256
+from itertools import count
 from pathlib import Path
-from types import MappingProxyType
+from typing import Self
 
 import tomli_w
 
@@ -17,7 +18,8 @@ from pretouch.toml_files import parse_toml
 from pretouch.units.wire import KEY_SIZE
 
 _LAST_NUMBER = 0xFFFF
-_SHOWN_BITS = 64
+_NO_SECRET = 10**9
+"""A number below this is no key, which must not get into logs."""
 
 
 @dataclass(frozen=True)
@@ -32,61 +34,73 @@ class UnitKey:
     """32 random bytes that only the unit and its receiver know."""
 
     def __post_init__(self) -> None:
-        if not isinstance(self.id, str) or not self.id or not self.id.isprintable():
+        if not self.id or not self.id.isprintable():
             raise HardwareError(
                 f"The name of a unit is {self.id!r}: give it a printable name, the one in the skin file."
             )
         if type(self.number) is not int or not 1 <= self.number <= _LAST_NUMBER:
+            value = self.number if isinstance(self.number, int) and abs(self.number) < _NO_SECRET else "none"
+            raise HardwareError(f"The number of unit {self.id} is {value}: choose 1 to {_LAST_NUMBER}.")
+        if len(self.key) != KEY_SIZE:
             raise HardwareError(
-                f"The number of unit {self.id} is {_described(self.number)}: choose 1 to {_LAST_NUMBER}."
+                f"The key of unit {self.id} is {len(self.key)} bytes, not {KEY_SIZE} bytes: make one with new_key()."
             )
-        if not isinstance(self.key, bytes) or len(self.key) != KEY_SIZE:
-            size = f"{len(self.key)} bytes" if isinstance(self.key, bytes) else f"of type {type(self.key).__name__}"
-            raise HardwareError(f"The key of unit {self.id} is {size}, not {KEY_SIZE} bytes: make one with new_key().")
 
     def __repr__(self) -> str:
         """Without the key: it must not get into logs."""
         return f"UnitKey(id={self.id!r}, number={self.number})"
 
-
-def _described(number: object) -> str:
-    """What stands in the place of a number: itself only if it is none of a key, which must not get into logs."""
-    if not isinstance(number, int):
-        return f"of type {type(number).__name__}"
-    return str(number) if number.bit_length() <= _SHOWN_BITS else f"one of {number.bit_length()} bits"
+    @property
+    def fingerprint(self) -> str:
+        """What tells keys apart without showing them: the first 8 hex digits of the SHA-256."""
+        return sha256(self.key).hexdigest()[:8]
 
 
-class Keys(Mapping[str, UnitKey]):
+class Keys(dict[str, UnitKey]):
     """Keys of units by name; two with the same name, number or key are a HardwareError."""
 
     def __init__(self, units: Iterable[UnitKey] = ()) -> None:
-        by_id: dict[str, UnitKey] = {}
-        by_number: dict[int, UnitKey] = {}
-        by_key: dict[bytes, UnitKey] = {}
+        super().__init__()
         for unit in units:
-            if unit.id in by_id:
-                raise HardwareError(f"Two units are named {unit.id}: give each its own name.")
-            if unit.number in by_number:
-                raise HardwareError(
-                    f"Units {by_number[unit.number].id} and {unit.id} both have the number {unit.number}: renumber one."
-                )
-            if unit.key in by_key:
-                raise HardwareError(f"Units {by_key[unit.key].id} and {unit.id} have the same key: make a new one.")
-            by_id[unit.id] = by_number[unit.number] = by_key[unit.key] = unit
-        self._by_id = by_id
-        self.by_number: Mapping[int, UnitKey] = MappingProxyType(by_number)
+            for other in self.values():
+                if unit.id == other.id:
+                    raise HardwareError(f"Two units are named {unit.id}: give each its own name.")
+                if unit.number == other.number:
+                    raise HardwareError(
+                        f"Units {other.id} and {unit.id} both have the number {unit.number}: renumber one."
+                    )
+                if unit.key == other.key:
+                    raise HardwareError(f"Units {other.id} and {unit.id} have the same key: make a new one.")
+            self[unit.id] = unit
 
-    def __getitem__(self, id: str) -> UnitKey:
-        return self._by_id[id]
+    @property
+    def by_number(self) -> dict[int, UnitKey]:
+        """The units by their numbers in datagrams."""
+        return {unit.number: unit for unit in self.values()}
 
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._by_id)
+    @property
+    def free_number(self) -> int:
+        """The first number that no unit has."""
+        return next(number for number in count(1) if number not in self.by_number)
 
-    def __len__(self) -> int:
-        return len(self._by_id)
+    def with_new(self, names: Sequence[str]) -> Self:
+        """Return keys with new ones for some names, under free numbers. One there already is a HardwareError."""
+        present = [name for name in names if name in self]
+        if present:
+            raise HardwareError(f"{', '.join(present)} already has a key: give other names.")
+        keys = self
+        for name in names:
+            keys = type(self)([*keys.values(), UnitKey(name, keys.free_number, new_key())])
+        return keys
 
-    def __reduce__(self) -> tuple[type["Keys"], tuple[tuple[UnitKey, ...]]]:
-        return Keys, (tuple(self.values()),)
+    def without(self, names: Sequence[str]) -> Self:
+        """Return keys without those of some names; a name there is not is a HardwareError."""
+        absent = [name for name in names if name not in self]
+        if absent:
+            raise HardwareError(
+                f"{', '.join(absent)} has no key to revoke: give names of {', '.join(self) or 'no unit'}."
+            )
+        return type(self)(unit for unit in self.values() if unit.id not in names)
 
 
 def new_key() -> bytes:
@@ -115,7 +129,7 @@ def load_keys(path: Path) -> Keys:
 
 
 def _demand_private(status: os.stat_result, path: Path) -> None:
-    if hasattr(os, "geteuid") and status.st_uid != os.geteuid():
+    if status.st_uid != os.geteuid():
         raise HardwareError(
             f"{path} belongs to user {status.st_uid}, who can read its keys: make yourself its owner (chown"
             f" {os.geteuid()} {path})."
@@ -130,9 +144,12 @@ def _demand_private(status: os.stat_result, path: Path) -> None:
 
 def _unit(id: str, table: object) -> UnitKey:
     """Return the unit of a table of the file."""
-    if isinstance(table, dict) and set(table) == {"number", "key"} and isinstance(table["key"], str):
-        with suppress(ValueError):
-            return UnitKey(id, table["number"], bytes.fromhex(table["key"]))
+    try:
+        match table:
+            case {"number": number, "key": str(key), **others} if not others:
+                return UnitKey(id, number, bytes.fromhex(key))
+    except ValueError:
+        pass
     raise HardwareError(
         f"Unit {id!r} must have a number and a key of {2 * KEY_SIZE} hexadecimal digits, and nothing else."
     )

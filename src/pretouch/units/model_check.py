@@ -42,7 +42,7 @@ class ModelCheckParams(Checked):
 class ModelCheck:
     """Compares readings with predicted returns, for an arm whose joint positions are known.
 
-    Two things are found: a unit that again and again does not see what it must (misplaced, covered, the wrong skin
+    It names a unit that again and again does not see what it must (misplaced, covered, the wrong skin
     file), and one that sees something near wherever it goes (covered).
     """
 
@@ -78,13 +78,13 @@ class ModelCheck:
             else:
                 self._near[k] = _NearReadings()
 
-    def _predicted(self, q: FloatArray, wanted: BoolArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Where the sensors are (K, 3), the nearest they can see of the model (K,), and what wanted ones must (K,)."""
+    def _predicted(self, q: FloatArray, tested: BoolArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Where the sensors are (K, 3), the nearest they can see of the model (K,), and what those tested must (K,)."""
         kin = self._model.kinematics(q)
         sensors, cones = placed_sensors(self._skin.arrays, kin), self._skin.cones
         body, fixtures = self._model.capsules, self._fixtures
         nearest = expected_range(kin, sensors, cones, body, fixtures)
-        return sensors.position, nearest, _certain_return(kin, sensors, cones, wanted, body, fixtures)
+        return sensors.position, nearest, _certain_return(kin, sensors, cones, tested, body, fixtures)
 
     def findings(self) -> tuple[Finding, ...]:
         """Return what disagrees by now, in the order of the skin."""
@@ -96,18 +96,17 @@ class ModelCheck:
         if len(tests) == params.tests and len(missed) >= params.share * params.tests:
             seen, predicted = np.median(np.array(missed), axis=0)
             what = f"{seen:.2f} m" if np.isfinite(seen) else "nothing"
-            yield Finding(
-                unit, "fault", "model",
-                f"{unit} reports {what} where the model has the arm or a fixture at {predicted:.2f} m, in"
-                f" {len(missed)} of {len(tests)} readings: check its pose in the skin file, its window, and the"
-                " positions of the fixtures.",
-            )  # fmt: skip
+            sees = (
+                f"{unit} reports {what} where the model has the arm or a fixture at {predicted:.2f} m, in {len(missed)}"
+            )
+            remedy = "check its pose in the skin file, its window, and the positions of the fixtures."
+            yield Finding(unit, "fault", "model", f"{sees} of {len(tests)} readings: {remedy}")
         if near.count >= params.tests and near.moved >= params.moved_m:
-            yield Finding(
-                unit, "fault", "covered",
-                f"{unit} reports {near.distance:.3f} m everywhere along {near.moved:.1f} m of its motion, but the"
-                " model has nothing so close: its window is covered or its cover glass is dirty; clean it.",
-            )  # fmt: skip
+            sees = (
+                f"{unit} reports {near.distance:.3f} m everywhere along {near.moved:.1f} m of its motion, but the model"
+            )
+            remedy = "its window is covered or its cover glass is dirty; clean it."
+            yield Finding(unit, "fault", "covered", f"{sees} has nothing so close: {remedy}")
 
 
 class _NearReadings:
@@ -129,12 +128,12 @@ class _NearReadings:
 
 
 def _certain_return(
-    kin: Kinematics, sensors: Sensors, cones: Cones, wanted: BoolArray, body: Capsules, fixtures: Fixtures
-) -> FloatArray:  # fmt: skip
-    """Distance (K,) [m] by which all inner rays of a wanted sensor have ended, infinite where one goes on."""
+    kin: Kinematics, sensors: Sensors, cones: Cones, tested: BoolArray, body: Capsules, fixtures: Fixtures
+) -> FloatArray:
+    """Distance (K,) [m] by which all inner rays of a tested sensor have ended, infinite where one goes on."""
     shapes = [(capsules, bounds(capsules)) for capsules in (placed(body, kin), placed(fixtures.capsules, kin))]
     far = np.full(len(sensors.link), np.inf)
-    for k in np.flatnonzero(wanted).tolist():
+    for k in np.flatnonzero(tested).tolist():
         far[k] = 0.0
         for i in range(_INNER):
             ray = cones._replace(rays=cones.rays[:, i : i + 1])

@@ -8,8 +8,7 @@ import json
 import subprocess
 import sys
 import tempfile
-from dataclasses import dataclass
-from hashlib import sha256
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from pretouch.atomic_write import atomic_write
@@ -18,14 +17,17 @@ from pretouch.units.keys import UnitKey
 
 COPY_S = 60.0
 """How long copying may take [s]."""
-_FULL_MOST_MV = 20_000
-_NO_HOSTS, _FIRST_MULTICAST = (0, 127), 224
-"""First numbers of IPv4 addresses that are no host a unit could send to; multicast and broadcast are the upper ones."""
 _SSID_MOST, _PASSWORD_LEAST, _PASSWORD_MOST = 32, 8, 63
-
-
 SENSORS = ("vl53l1x", "vl53l5cx", "vl53l7cx")
 """Range finders that the firmware knows; the first has no zones."""
+_LIMITS = {
+    "port": (1, 0xFFFF),
+    "battery_full_mv": (0, 20_000),
+    "touch_ohm": (0, 1_000_000),
+    "touch_least_mn": (1, 100_000),
+    "touch_mn_per_us": (1, 10_000),
+}
+"""Least and most of what is a number."""
 
 
 @dataclass(frozen=True)
@@ -65,24 +67,16 @@ class Network:
             raise HardwareError(
                 f"The host {self.host!r} is not an IPv4 address: give one such as 192.168.1.10."
             ) from None
-        if address.packed[0] in _NO_HOSTS or address.packed[0] >= _FIRST_MULTICAST:
+        if address.packed[0] in (0, 127) or address.packed[0] >= 224:  # this host itself; multicast and broadcast
             raise HardwareError(
                 f"A unit cannot send to {self.host}: give the address this machine has in the unit's network."
-            )
-        if not 1 <= self.port <= 0xFFFF:
-            raise HardwareError(f"The port is {self.port}: give one from 1 to 65535.")
-        if not 0 <= self.battery_full_mv <= _FULL_MOST_MV:
-            raise HardwareError(
-                f"The battery voltage at the converter's full scale is {self.battery_full_mv} mV: give 0 to"
-                f" {_FULL_MOST_MV}, for example 5000."
             )
         if self.sensor not in SENSORS or self.zones not in (4, 8):
             raise HardwareError(
                 f"The unit's sensor is {self.sensor!r} with {self.zones} zones along a side: choose from"
                 f" {', '.join(SENSORS)}, and 4 or 8."
             )
-        limits = {"touch_ohm": (0, 1_000_000), "touch_least_mn": (1, 100_000), "touch_mn_per_us": (1, 10_000)}
-        for name, (least, most) in limits.items():
+        for name, (least, most) in _LIMITS.items():
             if not least <= getattr(self, name) <= most:
                 raise HardwareError(f"The unit's {name} is {getattr(self, name)}: give {least} to {most}.")
 
@@ -91,20 +85,11 @@ class Network:
         return f"Network(ssid={self.ssid!r}, host={self.host!r}, port={self.port})"
 
 
-def fingerprint(key: bytes) -> str:
-    """Return what tells keys apart without showing them: the first 8 hex digits of the SHA-256."""
-    return sha256(key).hexdigest()[:8]
-
-
 def configuration(key: UnitKey, network: Network) -> str:
     """Return the text of a unit's configuration file, JSON on one line."""
-    values: dict[str, int | str] = {
-        "unit": key.number, "key": key.key.hex(), "ssid": network.ssid, "password": network.password,
-        "host": network.host, "port": network.port, "battery_full_mv": network.battery_full_mv,
-        "sensor": network.sensor, "zones": 1 if network.sensor == SENSORS[0] else network.zones,
-        "touch_ohm": network.touch_ohm, "touch_least_mn": network.touch_least_mn,
-        "touch_mn_per_us": network.touch_mn_per_us,
-    }  # fmt: skip
+    values = {"unit": key.number, "key": key.key.hex(), **asdict(network)}
+    if network.sensor == SENSORS[0]:
+        values["zones"] = 1
     return json.dumps(values, ensure_ascii=False) + "\n"  # units join no halves of \u escapes
 
 
@@ -116,11 +101,7 @@ def copy_to_unit(device: str, text: str, timeout: float = COPY_S) -> None:
         command = "connect", device, "cp", str(file), ":config.json", "+", "reset"
         try:
             copied = subprocess.run(  # noqa: S603  # by words, no shell
-                [sys.executable, "-m", "mpremote", *command],
-                capture_output=True,
-                text=True,
-                timeout=timeout,
-                check=False,
+                [sys.executable, "-m", "mpremote", *command], capture_output=True, text=True, timeout=timeout
             )
         except subprocess.TimeoutExpired:
             raise HardwareError(
@@ -129,8 +110,9 @@ def copy_to_unit(device: str, text: str, timeout: float = COPY_S) -> None:
     if copied.returncode:
         lines = (copied.stderr or copied.stdout).split("\n")
         reason = next((line.strip() for line in reversed(lines) if line.strip()), f"code {copied.returncode}")
+        printable = "".join(c if c.isprintable() else "?" for c in reason[:120])
         raise HardwareError(
-            f"mpremote could not write to the unit at {device} ({_printable(reason)}): start the command within 3 s"
+            f"mpremote could not write to the unit at {device} ({printable}): start the command within 3 s"
             " after its reset button, and see that nothing else uses the line."
         )
 
@@ -141,7 +123,3 @@ def _size(text: str, name: str) -> int:
         return len(text.encode())
     except UnicodeEncodeError:
         raise HardwareError(f"The {name} is not Unicode text: give it in UTF-8.") from None
-
-
-def _printable(text: str) -> str:
-    return "".join(c if c.isprintable() else "?" for c in text[:120])

@@ -16,19 +16,16 @@ from pretouch.errors import HardwareError
 from pretouch.sensing.unit import NetworkUnits
 from pretouch.types import FloatArray, RangeReadings, TouchReadings
 from pretouch.units.keys import Keys, UnitKey
-from pretouch.units.link import LinkParams
-from pretouch.units.traffic import REASONS, ImuBatch, Received, UnitTraffic, imu_batch
-from pretouch.units.udp import bind
-from pretouch.units.unit import NO_READING, NO_TOUCH, Address, UnitEndpoint
-from pretouch.units.wire import (
-    HELLO_SIZE,
-    MAGIC,
-    SAMPLE_LEAST,
-    VERSION,
-    Kind,
-    sample_size,
-)
+from pretouch.units.session import LinkParams
+from pretouch.units.unit import NOTHING, Address, Received, UnitEndpoint, UnitTraffic
+from pretouch.units.wire import HELLO_SIZE, MAGIC, SAMPLE_LEAST, VERSION, Kind, sample_size
 
+REASONS = ("size", "format", "unit", "tag", "replayed", "no session", "too many hellos", "old hello")
+"""Why datagrams are thrown away: no size, or no magic, version and kind, of ours; a unit this skin lacks; a wrong tag;
+a sequence number seen already or long past; a sample of a unit without session; more hellos than are answered; a hello
+of the very session that is live."""
+_SO_RCVBUFFORCE = 33
+"""Of Linux, which Python has no name for."""
 _HEAD = struct.Struct("<4sHHI")
 """Magic, version and kind as one; number of the unit; and, of a sample, flags and sequence."""
 _SAMPLE = MAGIC + bytes([VERSION, Kind.SAMPLE])
@@ -38,9 +35,6 @@ _BEACON_CHECK_S = 0.02
 """Time between two looks for beacons that are due [s]."""
 _CHECK_EVERY = 256
 """Datagrams after which a flood makes room for the beacons."""
-
-
-Deliver = Callable[[Received, memoryview], None]
 
 
 def keys_of(ids: Sequence[str], keys: Keys) -> tuple[UnitKey, ...]:
@@ -53,9 +47,15 @@ def keys_of(ids: Sequence[str], keys: Keys) -> tuple[UnitKey, ...]:
     return tuple(keys[id] for id in ids)
 
 
+def range_readings(table: FloatArray) -> RangeReadings:
+    """Return the range readings of a table (K, 7) as `SkinReceiver.table` has it."""
+    stamp, distance, status = table[:, :3].T
+    return RangeReadings(stamp.copy(), distance.copy(), status.astype(np.int64))
+
+
 def touch_readings(table: FloatArray) -> TouchReadings | None:
-    """Return the touch readings of a table (4, K) as `SkinReceiver.touch_table` has them; None of one without any."""
-    stamp, contact, force, status = table
+    """Return the touch readings of a table (K, 7) as `SkinReceiver.table` has it; None of one without any."""
+    stamp, contact, force, status = table[:, 3:].T
     if not np.isfinite(stamp).any():
         return None
     return TouchReadings(stamp.copy(), contact != 0.0, force.copy(), status.astype(np.int64))
@@ -77,7 +77,6 @@ class SkinReceiver:
         clock: Callable[[], float] = time.monotonic,
         draw: Callable[[int], bytes] = secrets.token_bytes,
         params: LinkParams | None = None,
-        deliver: Deliver | None = None,
     ) -> None:
         """Listen.
 
@@ -89,33 +88,25 @@ class SkinReceiver:
             clock: gives the time [s] of all stamps.
             draw: gives so many random bytes.
             params: how units are treated.
-            deliver: is called with each accepted sample and its datagram, which changes afterwards; then none are kept
-                to be taken.
         """
         self._params = params or LinkParams()
-        self.network = NetworkUnits.of(units)
-        """Whom it hears."""
-        sides, first, rows = self.network.zones, self.network.first, self.network.rows
-        known = keys_of(self.network.ids, keys)
-        self.table = np.array([NO_READING]).T.repeat(rows, axis=1)
-        """Stamps [s], distances [m] and statuses of the newest readings, (3, K); not to be written to."""
-        self.touch_table = np.array([NO_TOUCH]).T.repeat(rows, axis=1)
-        """Stamps [s], contacts, forces [N] and statuses of the newest touch readings, (4, K); as that."""
+        network = NetworkUnits.of(units)
+        keyed = keys_of(network.ids, keys)
+        self.table = np.tile(NOTHING, (network.rows, 1))
+        """Newest reading of each unit and zone, (K, 7), as `unit.NOTHING` has it; not to be written to."""
         self._endpoints = [
-            UnitEndpoint(i, unit, self._params, draw, self.table.T[k : k + side**2], self.touch_table[:, k], side)
-            for i, (unit, k, side) in enumerate(zip(known, first, sides, strict=True))
+            UnitEndpoint(i, unit, side, self._params, draw, self.table[k : k + side**2])
+            for i, (unit, k, side) in enumerate(zip(keyed, network.first, network.zones, strict=True))
         ]
-        self._by_number = {unit.number: endpoint for unit, endpoint in zip(known, self._endpoints, strict=True)}
+        self._by_number = {unit.number: endpoint for unit, endpoint in zip(keyed, self._endpoints, strict=True)}
         self.units: tuple[UnitTraffic, ...] = tuple(endpoint.traffic for endpoint in self._endpoints)
         self.rejected: dict[str, int] = dict.fromkeys(REASONS, 0)
-        """How many datagrams were thrown away, by reason (`traffic.REASONS`)."""
+        """How many datagrams were thrown away, by reason (`REASONS`)."""
         self.unsent = 0
         """Beacons the system did not take."""
         self.taken = 0
         """Datagrams that the last call of `receive` took in, genuine or not."""
-        self._samples: deque[Received] = deque(maxlen=self._params.samples_most)
-        self._imu: deque[Received] = deque(maxlen=self._params.samples_most)
-        self._deliver = deliver
+        self._arrivals: deque[Received] = deque(maxlen=self._params.samples_most)
         self._clock, self._next_beacon_check = clock, -np.inf
         self._buffer = bytearray(2048)
         self._view = memoryview(self._buffer)
@@ -170,24 +161,17 @@ class SkinReceiver:
 
     def readings(self) -> RangeReadings:
         """Return the newest reading of each unit and zone, stamped with the earliest instant it can be of."""
-        stamp, distance, status = self.table
-        return RangeReadings(stamp.copy(), distance.copy(), status.astype(np.int64))
+        return range_readings(self.table)
 
     def touch(self) -> TouchReadings | None:
-        """Return the newest touch reading of each unit; None while no unit has told one."""
-        return touch_readings(self.touch_table)
+        """Return the newest touch reading of each unit; None while no unit has sent one."""
+        return touch_readings(self.table)
 
     def take_samples(self) -> list[Received]:
-        """Return the samples accepted since the last call, in their order of arrival."""
-        taken = list(self._samples)
-        self._samples.clear()
-        return taken
-
-    def take_imu(self) -> list[ImuBatch]:
-        """Return the IMU samples that came since the last call, but for those of no known instant, scale or rate."""
-        batches = [imu_batch(received) for received in self._imu]
-        self._imu.clear()
-        return [batch for batch in batches if batch is not None]
+        """Return the samples accepted since the last call as they arrived, the newest `samples_most`."""
+        arrivals = list(self._arrivals)
+        self._arrivals.clear()
+        return arrivals
 
     def _drain(self) -> tuple[int, bool]:
         """Take in what has arrived; return how many samples were accepted, and whether anything came at all."""
@@ -237,12 +221,7 @@ class SkinReceiver:
         received = endpoint.sample(datagram, sequence, address, now)
         if isinstance(received, str):
             return received
-        if self._deliver is not None:
-            self._deliver(received, datagram)
-            return None
-        self._samples.append(received)
-        if received.sample.imu_count:
-            self._imu.append(received)
+        self._arrivals.append(received)
         return None
 
     def _send_due_beacons(self) -> None:
@@ -261,3 +240,43 @@ class SkinReceiver:
             self._socket.sendto(beacon, address)
         except OSError:
             self.unsent += 1
+
+
+def demand_port(host: str, port: int) -> None:
+    """Raise a HardwareError for what is no port."""
+    if type(port) is not int or not 0 <= port <= 0xFFFF:
+        raise HardwareError(
+            f"The port {port!r} for {host} is not valid: choose one from 1 to 65535, or 0 for any free port."
+        )
+
+
+def bind(host: str, port: int, buffer_bytes: int) -> socket.socket:
+    """Open a socket that never blocks, at this address; one that cannot be had is a HardwareError."""
+    demand_port(host, port)
+    try:
+        family, kind, protocol, _, address = socket.getaddrinfo(
+            host or None, port, type=socket.SOCK_DGRAM, flags=socket.AI_PASSIVE
+        )[0]
+        bound = socket.socket(family, kind, protocol)
+    except (OSError, UnicodeError) as error:
+        raise HardwareError(f"The address {host}, port {port}, cannot be listened on: {error}.") from None
+    try:
+        bound.setblocking(False)
+        _widen(bound, buffer_bytes)
+        bound.bind(address)
+    except OSError as error:
+        bound.close()
+        if error.errno == errno.EADDRINUSE:
+            raise HardwareError(
+                f"Port {port} of {host} is in use: end the program that listens there, or choose another port."
+            ) from None
+        raise HardwareError(f"Listening on {host}, port {port}, failed: {error.strerror}.") from None
+    return bound
+
+
+def _widen(bound: socket.socket, buffer_bytes: int) -> None:
+    """Ask for a long queue: past the system's limit if that is allowed."""
+    try:
+        bound.setsockopt(socket.SOL_SOCKET, _SO_RCVBUFFORCE, buffer_bytes)
+    except PermissionError:
+        bound.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, buffer_bytes)

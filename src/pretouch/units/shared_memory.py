@@ -8,8 +8,6 @@ and whatever order a processor shows the writes in.
 import mmap
 import os
 import struct
-import sys
-import tempfile
 import weakref
 from multiprocessing import reduction
 from typing import Any
@@ -23,11 +21,7 @@ class SharedMemory:
     """
 
     def __init__(self, size: int) -> None:
-        if sys.platform == "linux":
-            handle = os.memfd_create("pretouch", os.MFD_CLOEXEC)
-        else:
-            with tempfile.TemporaryFile() as file:
-                handle = os.dup(file.fileno())
+        handle = os.memfd_create("pretouch", os.MFD_CLOEXEC)
         os.ftruncate(handle, size)
         self._open(handle, size)
 
@@ -53,97 +47,81 @@ _SLOTS = 4
 _TRIES = 16
 
 
-class Mailbox:
-    """One writer, any number of readers. Pickled for a process that is being spawned, it is the same mailbox there."""
+class _Slots:
+    """Values by their numbers, as far as there is room. One writer; pickled for a process that is being spawned."""
+
+    def __init__(self, slots: int, most: int) -> None:
+        self._slots, self._most = slots, most
+        self._stride = -(-(_SLOT.size + most) // 64) * 64
+        self._memory = SharedMemory(_FIRST + slots * self._stride)
+
+    @property
+    def newest(self) -> int:
+        """Number of the newest value, 0 before the first."""
+        return self._memory.count[0]
+
+    def write(self, value: bytes) -> int:
+        """Make a value of at most that size the newest, in place of the oldest; return its number."""
+        if len(value) > self._most:
+            raise ValueError(f"a value of {len(value)} bytes does not fit into {self._most}")
+        memory, number = self._memory.bytes, self.newest + 1
+        offset = self._offset(number)
+        _SLOT.pack_into(memory, offset, number, len(value), crc32(value, number & 0xFFFFFFFF))
+        memory[offset + _SLOT.size : offset + _SLOT.size + len(value)] = value
+        self._memory.count[0] = number
+        return number
+
+    def value(self, number: int) -> bytes | None:
+        """Return the value of a number, None if its slot holds another one or is being written."""
+        memory, offset = self._memory.bytes, self._offset(number)
+        stored, size, checksum = _SLOT.unpack_from(memory, offset)
+        if stored != number or size > self._most:
+            return None
+        value = bytes(memory[offset + _SLOT.size : offset + _SLOT.size + size])
+        return value if crc32(value, number & 0xFFFFFFFF) == checksum else None
+
+    def _offset(self, number: int) -> int:
+        return _FIRST + number % self._slots * self._stride
+
+
+class Mailbox(_Slots):
+    """The newest value, for any number of readers."""
 
     def __init__(self, most: int) -> None:
         """Make an empty one for values of at most so many bytes."""
-        self._most = most
-        self._stride = _aligned(_SLOT.size + most)
-        self._memory = SharedMemory(_FIRST + _SLOTS * self._stride)
+        super().__init__(_SLOTS, most)
         self._last: tuple[int, bytes] = (0, b"")
-
-    def write(self, value: bytes) -> int:
-        """Make a value of at most that size the newest; return its number."""
-        if len(value) > self._most:
-            raise ValueError(f"a value of {len(value)} bytes does not fit into the {self._most} of this mailbox")
-        memory = self._memory.bytes
-        number = self._memory.count[0] + 1
-        _fill(memory, self._offset(number), number, value)
-        self._memory.count[0] = number
-        return number
 
     def read(self) -> tuple[int, bytes]:
         """Return number and bytes of the newest value; 0 and b"" before the first.
 
         A reader that the writer overtakes again and again gets the last value it had got whole.
         """
-        memory = self._memory.bytes
         for _ in range(_TRIES):
-            number = self._memory.count[0]
+            number = self.newest
             if number == self._last[0]:
                 break
-            value = _read(memory, self._offset(number), number, self._most)
+            value = self.value(number)
             if value is not None:
                 self._last = number, value
                 break
         return self._last
 
-    def _offset(self, number: int) -> int:
-        return _FIRST + number % _SLOTS * self._stride
 
+class Ring(_Slots):
+    """The last so many values: a reader gets each that was written since it last looked, as far as there is room.
 
-class Ring:
-    """The last so many values: a reader gets every one that was written since it last looked, as far as there is room.
-
-    One writer; each reader has a `Ring` of its own, pickled for the process that is being spawned.
+    Each reader has a `Ring` of its own.
     """
 
     def __init__(self, slots: int, most: int) -> None:
         """Make an empty one for so many values of at most so many bytes each."""
-        self._slots, self._most = slots, most
-        self._stride = -(-(_SLOT.size + most) // 8) * 8
-        self._memory = SharedMemory(_FIRST + slots * self._stride)
-        self._written = self._taken = 0
-
-    def write(self, value: bytes) -> None:
-        """Add a value of at most that size; the oldest makes room."""
-        if len(value) > self._most:
-            raise ValueError(f"a value of {len(value)} bytes does not fit into the {self._most} of this ring")
-        self._written += 1
-        _fill(self._memory.bytes, self._offset(self._written), self._written, value)
-        self._memory.count[0] = self._written
+        super().__init__(slots, most)
+        self._taken = 0
 
     def take(self) -> list[bytes]:
         """Return what was written since the last call, oldest first."""
-        written = self._memory.count[0]
-        first = max(self._taken, written - self._slots) + 1
-        found = [
-            _read(self._memory.bytes, self._offset(number), number, self._most) for number in range(first, written + 1)
-        ]
-        self._taken = written
-        return [value for value in found if value is not None]
-
-    def _offset(self, number: int) -> int:
-        return _FIRST + number % self._slots * self._stride
-
-
-def _fill(memory: mmap.mmap, offset: int, number: int, value: bytes) -> None:
-    """Write a value and what guards it."""
-    _SLOT.pack_into(memory, offset, number, len(value), crc32(value, number & 0xFFFFFFFF))
-    start = offset + _SLOT.size
-    memory[start : start + len(value)] = value
-
-
-def _read(memory: mmap.mmap, offset: int, number: int, most: int) -> bytes | None:
-    """Return the value of this number, None if the slot holds another one or is being written."""
-    found, size, checksum = _SLOT.unpack_from(memory, offset)
-    if found != number or size > most:
-        return None
-    start = offset + _SLOT.size
-    value = bytes(memory[start : start + size])
-    return value if crc32(value, number & 0xFFFFFFFF) == checksum else None
-
-
-def _aligned(size: int) -> int:
-    return -(-size // 64) * 64
+        newest = self.newest
+        numbers = range(max(self._taken, newest - self._slots) + 1, newest + 1)
+        self._taken = newest
+        return [value for value in map(self.value, numbers) if value is not None]

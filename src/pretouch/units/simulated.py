@@ -286,9 +286,7 @@ class SimulatedUnit:
         return sample.encode(session)
 
 
-_SHOWS = (
-    RangeStatus.OK, RangeStatus.NO_WRAP_CHECK, RangeStatus.MERGED, RangeStatus.MIN_RANGE, RangeStatus.MIN_CLIPPED,
-)  # fmt: skip
+_SHOWS = [RangeStatus[name] for name in ("OK", "NO_WRAP_CHECK", "MERGED", "MIN_RANGE", "MIN_CLIPPED")]
 """Statuses with a target."""
 
 

@@ -13,7 +13,7 @@ from pretouch.recording.ros import JOINT_STATE, UNIT_SAMPLE, check_version, deco
 from pretouch.sensing.unit import LARGEST_COUNT, counts_of
 from pretouch.traces import ImuTrace, JointTrace
 from pretouch.types import FloatArray, IntArray
-from pretouch.units.traffic import Received
+from pretouch.units.unit import Received
 from pretouch.units.wire import SAMPLE_LEAST, TAG_SIZE, Flag, imu_values, sample_of
 from pretouch.values import value
 

@@ -15,8 +15,8 @@ from pretouch.recording.disk import Disk, Item
 from pretouch.recording.ros import DIAGNOSTICS, IMU, JOINT_STATE, RANGE, UNIT_SAMPLE, messages
 from pretouch.recording.viewer_topics import header, nanoseconds, range_item, topic_name
 from pretouch.types import FloatArray
-from pretouch.units.monitor import MonitorUpdate
-from pretouch.units.traffic import Received, imu_batch
+from pretouch.units.unit import Received, imu_batch
+from pretouch.units.watch import WatchUpdate
 from pretouch.units.wire import Flag
 
 _LEVELS = {"warning": 1, "fault": 2}
@@ -70,7 +70,7 @@ class SkinRecording:
         if not self._sentence and not self.trouble:
             self._disk.put(partial(_joint_items, self._time, stamp, q, qd, names))
 
-    def health(self, update: MonitorUpdate) -> None:
+    def health(self, update: WatchUpdate) -> None:
         """Add how the units are."""
         if self._advance(update.time):
             self._disk.put(partial(_health_items, self._time, update))
@@ -130,13 +130,13 @@ def _joint_items(
         yield _item("/joint_states", JOINT_STATE, time, (header(time, ""), texts, row, velocity, nothing))
 
 
-def _health_items(time: int, update: MonitorUpdate) -> Iterator[Item]:
+def _health_items(time: int, update: WatchUpdate) -> Iterator[Item]:
     make, statuses = messages().make, []
     for unit in update.units:
         findings = [finding for finding in update.findings if finding.unit == unit.unit]
         level = max((_LEVELS[finding.level] for finding in findings), default=0)
         text = " ".join(finding.sentence for finding in findings) or "Nothing is wrong."
-        numbers = {name: str(value) for name, value in asdict(unit).items() if name not in ("unit", "standing")}
+        numbers = {name: str(value) for name, value in asdict(unit).items() if name not in ("unit", "traffic")}
         values = [make("diagnostic_msgs/msg/KeyValue", *pair) for pair in numbers.items()]
         statuses.append(make("diagnostic_msgs/msg/DiagnosticStatus", level, unit.unit, text, unit.unit, values))
     yield _item("/diagnostics", DIAGNOSTICS, time, (header(time, ""), statuses))

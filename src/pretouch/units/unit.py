@@ -1,20 +1,123 @@
-"""One unit as its receiver sees it: session, clock, newest reading, traffic."""
+"""One unit as its receiver sees it: session, clock, newest reading, and what is counted of it."""
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
 from pretouch.types import FloatArray, IntArray, RangeStatus, TouchStatus
 from pretouch.units.clock import UnitClock
 from pretouch.units.keys import UnitKey
-from pretouch.units.link import Link, LinkParams, Session
-from pretouch.units.traffic import Received, UnitTraffic
-from pretouch.units.wire import NO_FORCE, ZONE, ZONES, Flag, Sample, touch_part
+from pretouch.units.session import Link, LinkParams, Session
+from pretouch.units.wire import NO_FORCE, ZONE, ZONES, Flag, Reset, Sample, imu_values, touch_part
 
+UnitState = Literal["never heard", "greeting", "live", "silent"]
+"""Nothing genuine yet; hellos only; samples; neither any more."""
+Address = tuple[str, int]
+
+_RANGE_NEW, _STUCK = int(Flag.RANGE_NEW), int(RangeStatus.STUCK)
 _LEAST = 10
 """Readings that must be alike; fewer may be so by chance."""
-_NEW = int(Flag.RANGE_NEW)
+_GREETING_S = 1.0
+"""Time without a hello after which a unit no longer asks for a session [s]; it would ask ten times in it."""
+NOTHING = (-math.inf, 0.0, float(RangeStatus.NONE), -math.inf, 0.0, math.nan, float(TouchStatus.NONE))
+"""Row of a unit that has measured nothing: stamp [s], distance [m] and status of its range; stamp [s], contact, force
+[N] and status of its touch sensor."""
+
+
+@dataclass(slots=True)
+class UnitTraffic:
+    """What was heard of one unit: plain numbers, cheap to keep."""
+
+    id: str
+    number: int
+    state: UnitState = "never heard"
+    accepted: int = 0
+    """Samples believed."""
+    lost: int = 0
+    """Samples that never came: counted once 64 later ones were sent, or another session began."""
+    replayed: int = 0
+    """Datagrams with a sequence number that was used already or is long past; their tags are not looked at."""
+    hellos: int = 0
+    """Hellos answered; recorded ones among them."""
+    sessions: int = 0
+    """Sessions that were live."""
+    reboots: int = 0
+    """Sessions that found the unit's clock begun anew."""
+    firmware: int = 0
+    """Version that it sent as its session began: major * 256 + minor."""
+    reset: int = Reset.UNKNOWN
+    """Why it last began anew, by what it sent then: a `Reset`."""
+    address: Address | None = None
+    """Host and port of its last sample."""
+    last_arrival: float = -math.inf
+    """When its last sample arrived [s]."""
+    last_reading_stamp: float = -math.inf
+    """Stamp of its newest reading [s]."""
+    offset: float = math.nan
+    """Host time minus unit time [s]; NaN while it is not known."""
+    bound: float = math.inf
+    """Most the true offset differs from it [s]."""
+    clock_jumps: int = 0
+    """How often the unit's clock contradicted itself."""
+    stuck: bool = False
+    """Whether its readings repeat to the last digit."""
+    zones: int = 1
+    """Zones along each side of its sensor, by the skin."""
+    zones_told: int = 0
+    """The same by its newest range, 1 of one without zones; 0 before the first."""
+    misfits: int = 0
+    """Ranges that were no reading because of other zones than the skin's."""
+
+
+@dataclass(slots=True)
+class Received:
+    """A sample as it arrived."""
+
+    unit: int
+    """Index in the `NetworkUnits` of the skin."""
+    arrival: float
+    """When it was taken in [s], host's clock."""
+    stamp: float
+    """Stamp of its range reading [s], the earliest it can have been; NaN if it has none, or it cannot be known."""
+    offset: float
+    """Host time minus unit time [s]; NaN while it is not known."""
+    bound: float
+    """Most the true offset differs from it [s]."""
+    sample: Sample
+
+
+@dataclass(slots=True)
+class ImuBatch:
+    """Consecutive IMU samples of one unit, sensor frame."""
+
+    unit: int
+    """Index in the `NetworkUnits` of the skin."""
+    stamp: FloatArray
+    """(M,) instants [s]: the newest is the earliest it can have been; the others lie before it by the nominal period,
+    which a sensor keeps to some per cent."""
+    acceleration: FloatArray
+    """(M, 3) specific force [m/s^2]."""
+    angular_velocity: FloatArray
+    """(M, 3) [rad/s]."""
+    index: int
+    """Number of the first of them since the unit's reset; a gap to the batch before shows what was lost."""
+
+
+def imu_batch(received: Received) -> ImuBatch | None:
+    """Return the IMU samples that came with a sample; None if there are none, no instant, or no such scale or rate."""
+    sample = received.sample
+    if not sample.imu_count or not sample.imu_rate_hz or math.isnan(received.offset):
+        return None
+    try:
+        acceleration, angular_velocity = imu_values(sample.imu, sample.imu_scale)
+    except ValueError:  # a scale the sensor does not have
+        return None
+    newest = 1e-6 * (sample.time_us - sample.imu_age_us) + received.offset - received.bound
+    stamp = newest + np.arange(1 - sample.imu_count, 1) / sample.imu_rate_hz
+    return ImuBatch(received.unit, stamp, acceleration, angular_velocity, sample.imu_index)
 
 
 class StuckDetector:
@@ -34,18 +137,12 @@ class StuckDetector:
 
     def update(self, sample: Sample, now: float) -> bool:
         """Take in a sample newer than those before, that arrived at this instant [s]; return whether it is stuck."""
-        if not sample.flags & _NEW:
+        if not sample.flags & _RANGE_NEW:
             return self.stuck
         if sample.range_stream != self._stream:
             self._stream, self._streams, self._stream_since = sample.range_stream, 0, now
-        values = (
-            sample.range_mm,
-            sample.range_sigma,
-            sample.range_signal,
-            sample.range_ambient,
-            sample.range_spads,
-            sample.zones,
-        )
+        light = sample.range_signal, sample.range_ambient, sample.range_spads
+        values = sample.range_mm, sample.range_sigma, *light, sample.zones
         if values != self._values:
             self._values, self._alikes, self._values_since = values, 0, now
         self._streams += 1
@@ -56,31 +153,17 @@ class StuckDetector:
         return self.stuck
 
 
-_RANGE_NEW, _STUCK = int(Flag.RANGE_NEW), int(RangeStatus.STUCK)
-NO_READING = (-math.inf, 0.0, float(RangeStatus.NONE))
-"""Stamp [s], distance [m] and status of a unit that has measured nothing."""
-_GREETING_S = 1.0
-"""Time without a hello after which a unit no longer asks for a session [s]; it would ask ten times in it."""
-
-NO_TOUCH = (-math.inf, 0.0, math.nan, float(TouchStatus.NONE))
-"""Stamp [s], contact, force [N] and status of a unit that has told of no touch sensor."""
-
-Address = tuple[str, int]
-
-
 class UnitEndpoint:
     """What is known of one unit. Times in seconds of the host's clock."""
 
     def __init__(
-        self, index: int, unit: UnitKey, params: LinkParams, draw: Callable[[int], bytes], reading: FloatArray,
-        touch: FloatArray, zones: int = 1,
-    ) -> None:  # fmt: skip
+        self, index: int, unit: UnitKey, zones: int, params: LinkParams, draw: Callable[[int], bytes], rows: FloatArray
+    ) -> None:
         """Know nothing yet of the unit with this index in the `NetworkUnits` of the skin.
 
-        Stamp, distance and status of its range, or of each of its `zones` along a side squared, go to the rows of
-        `reading`, those of `NO_TOUCH` to `touch`.
+        What it measures goes to `rows` (`zones` squared, 7), as `NOTHING` has it; a touch to the first of them.
         """
-        self._reading, self._touch = reading, touch
+        self._reading, self._touch = rows[:, :3], rows[0, 3:]
         self.traffic = UnitTraffic(unit.id, unit.number, zones=zones)
         self.address: Address | None = None
         """Where its last sample came from, as the socket knows it."""
@@ -89,6 +172,8 @@ class UnitEndpoint:
         self._clock = UnitClock(1e-6 * params.drift_ppm, params.clock_window_s)
         self._stuck = StuckDetector(params.stuck_after_s)
         self._session: Session | None = None
+        self._newest_us = 0
+        """The unit's clock in its last sample [us]."""
         self._last_hello = -math.inf
         self._echoed = 0
         """Beacon whose echo was used last: the same one again tells nothing new."""
@@ -120,7 +205,7 @@ class UnitEndpoint:
         traffic.accepted += 1
         traffic.lost += lost
         traffic.last_arrival = now
-        traffic.sample = sample
+        self._newest_us = sample.time_us
         if address != self.address:
             self.address, traffic.address = address, address[:2]
         self._tell_time(session, sample, now)
@@ -146,36 +231,26 @@ class UnitEndpoint:
 
     def _begin(self, session: Session) -> None:
         """Another session is live."""
-        traffic, before = self.traffic, self.traffic.sample
+        traffic = self.traffic
         traffic.sessions += 1
-        if before is not None and session.hello.uptime_us < before.time_us:
+        if session.hello.uptime_us < self._newest_us:
             traffic.reboots += 1
             self._stuck.forget_stream()
         traffic.firmware, traffic.reset = session.hello.firmware, session.hello.reset
         self._session, self._trusted_from, self._echoed = session, 0, 0
         self._clock.forget()
 
-    def _distrust_beacons(self, now: float) -> None:
-        """Take the time from no beacon that was sent already, and send another soon."""
-        if self._session is not None:
-            self._trusted_from = self._session.number + 1
-            self._link.beacon_due = now
-
     def _tell_time(self, session: Session, sample: Sample, now: float) -> None:
-        """Renew offset, bound and latency."""
+        """Renew offset and bound."""
         clock, traffic = self._clock, self.traffic
-        made, hold = 1e-6 * sample.time_us, sample.beacon_hold_us
         sent = None
         if sample.beacon != self._echoed and sample.beacon >= self._trusted_from:
             sent, self._echoed = session.sent.get(sample.beacon), sample.beacon
-        if not clock.update(made, now, sent, 1e-6 * hold):
-            self._distrust_beacons(now)
+        if not clock.update(1e-6 * sample.time_us, now, sent, 1e-6 * sample.beacon_hold_us):
+            # take the time from no beacon that was sent already, and send another soon
+            self._trusted_from, self._link.beacon_due = session.number + 1, now
         traffic.clock_jumps = clock.jumps
         traffic.offset, traffic.bound = clock.offset, clock.bound
-        if clock.known:
-            latency = now - clock.earliest(made)
-            known = traffic.latency
-            traffic.latency = latency if math.isnan(known) else known + 0.0625 * (latency - known)
 
     def _fits(self, sample: Sample) -> bool:
         """Whether a range has the zones of the skin's sensor; otherwise where each looks is not known."""

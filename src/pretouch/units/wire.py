@@ -11,9 +11,10 @@ Three kinds, all little-endian, each ended by the first 16 bytes of an HMAC-SHA2
 
 import hmac
 import struct
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import IntEnum, IntFlag
 from hmac import compare_digest
+from operator import attrgetter
 
 import numpy as np
 
@@ -147,9 +148,8 @@ class Hello:
 
     def encode(self, key: Mac) -> bytes:
         """As a datagram under the unit's key."""
-        body = PREFIX.pack(MAGIC, VERSION, Kind.HELLO, self.unit) + HELLO.pack(
-            self.firmware, self.reset, 0, self.challenge, self.uptime_us
-        )
+        hello = HELLO.pack(self.firmware, self.reset, 0, self.challenge, self.uptime_us)
+        body = PREFIX.pack(MAGIC, VERSION, Kind.HELLO, self.unit) + hello
         return body + key.tag(_HELLO_LABEL, body)
 
 
@@ -248,18 +248,17 @@ class Sample:
 
     def body(self) -> bytes:
         """As a datagram without its tag: what `sample_of` takes."""
-        body = PREFIX.pack(MAGIC, VERSION, Kind.SAMPLE, self.unit) + SAMPLE.pack(
-            self.flags, self.sequence, self.time_us, self.beacon, self.beacon_hold_us, self.battery_mv,
-            self.temperature_cdeg, self.bus_errors, self.range_stream, self.range_status, self.range_mm,
-            self.range_age_us, self.range_sigma, self.range_signal, self.range_ambient, self.range_spads,
-            self.imu_count, self.imu_scale, self.imu_rate_hz, self.imu_index, self.imu_age_us,
-        )  # fmt: skip
+        body = PREFIX.pack(MAGIC, VERSION, Kind.SAMPLE, self.unit) + SAMPLE.pack(*_NUMBERS(self))
         return body + self.imu + self.touch + self.zones
 
     def encode(self, session: Mac) -> bytes:
         """As a datagram of a session."""
         body = self.body()
         return body + session.tag(body)
+
+
+_NUMBERS = attrgetter(*[field.name for field in fields(Sample)][1:-3])
+"""Gives what `SAMPLE` holds of a sample."""
 
 
 def decode_sample(datagram: bytes | memoryview, session: Mac) -> Sample | None:

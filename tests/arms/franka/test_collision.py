@@ -3,8 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pretouch.arms.franka.collision import (
-    CollisionParams,
+from pretouch.arms.franka.limits import (
+    BIAS_N,
     check,
     collision_behavior,
     largest_threshold,
@@ -24,7 +24,7 @@ from pretouch.types import no_obstacles
 @pytest.mark.parametrize("name", PROFILES)
 def test_ours_lies_below_the_lower_and_that_below_the_upper_threshold(name: str, panda_model: RobotModel) -> None:
     behavior = collision_behavior(profile(name), panda_model)
-    ours = largest_threshold(profile(name), panda_model, CollisionParams())
+    ours = largest_threshold(profile(name), panda_model)
     assert np.all(ours < behavior.lower_force[:3])
     assert np.all(behavior.lower_force < behavior.upper_force)
     assert np.all(behavior.lower_torque < behavior.upper_torque)
@@ -57,7 +57,7 @@ def test_a_higher_threshold_of_ours_raises_the_arms(panda_model: RobotModel) -> 
     assert higher.upper_force[0] == collision_behavior(profile("paper"), panda_model).upper_force[0] + 10.0
 
 
-def test_thresholds_in_the_wrong_order_are_refused(panda_model: RobotModel) -> None:
+def test_thresholds_in_the_wrong_order_are_refused(panda_model: RobotModel, monkeypatch: pytest.MonkeyPatch) -> None:
     good = collision_behavior(profile("paper"), panda_model)
     with pytest.raises(
         ParameterError, match=r"report a contact from 15 N on, but our detection may need up to 18 N: set"
@@ -67,8 +67,9 @@ def test_thresholds_in_the_wrong_order_are_refused(panda_model: RobotModel) -> N
         check(replace(good, upper_torque=np.full(7, 5.0)), profile("paper"), panda_model)
     with pytest.raises(ParameterError, match=r"upper_force\[0\] is nan"):
         check(replace(good, upper_force=np.full(6, np.nan)), profile("paper"), panda_model)
+    monkeypatch.setattr("pretouch.arms.franka.limits.UPPER_ABOVE_N", 5.0)
     with pytest.raises(ParameterError, match=r"upper_force\[0\] is 23"):
-        collision_behavior(profile("paper"), panda_model, CollisionParams(upper_above_n=5.0))
+        collision_behavior(profile("paper"), panda_model)
 
 
 def evidence(model: RobotModel, force: np.ndarray) -> float:
@@ -101,7 +102,7 @@ def test_ours_stops_by_itself_later_than_it_is_felt_and_before_it_hurts(panda_mo
     felt = missed(panda_model)
     assert np.all(behavior.lower_force[:3] >= felt + 6.0)
     assert np.all(behavior.upper_force[:3] >= felt + 12.0)
-    face_n, bias_n = 65.0, CollisionParams().bias_n
+    face_n, bias_n = 65.0, BIAS_N
     assert np.all(behavior.upper_force[:3] + bias_n <= face_n)
 
 

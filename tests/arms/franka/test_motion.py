@@ -5,10 +5,9 @@ import time
 import numpy as np
 import pytest
 
+from pretouch.arms.franka.exchange import Command, Communication, Mailboxes, Request
 from pretouch.arms.franka.limits import FrankaParams, motion_limits
-from pretouch.arms.franka.mailboxes import Command, Mailboxes, Request
-from pretouch.arms.franka.motion import VelocityMotion
-from pretouch.arms.franka.report import Communication
+from pretouch.arms.franka.process import ProcessSettings, VelocityMotion
 from pretouch.robot.model import RobotModel
 from tests.arms.franka.made import CheckingArm, middle
 
@@ -20,7 +19,8 @@ class Bench:
         limits = motion_limits(model, "panda")
         self.mailboxes, self.communication, self.over = Mailboxes(), Communication(), False
         self.arm = CheckingArm(limits, middle(limits))
-        self.motion = VelocityMotion(1, limits, FrankaParams(), self.mailboxes, self.communication, lambda: self.over)
+        settings = ProcessSettings("robot", "panda", limits, None, FrankaParams(), None, 0)
+        self.motion = VelocityMotion(1, settings, self.mailboxes, self.communication, lambda: self.over)
         self.finished = False
 
     def command(self, qd: float, age: float = -1000.0, request: Request = Request.MOVE) -> None:
@@ -54,7 +54,7 @@ def test_stale_set_points_bring_it_to_rest_in_the_motion_and_fresh_ones_move_it_
     bench.run(500)
     assert bench.speed < 1e-9
     assert not bench.finished
-    assert bench.communication.report().stale == 1
+    assert bench.communication.stale == 1
     bench.command(0.1)
     bench.run(300)
     assert bench.speed == pytest.approx(0.1)
@@ -80,7 +80,7 @@ def test_commands_of_another_request_end_it(bench: Bench) -> None:
 def test_a_set_point_that_is_old_but_not_stale_still_counts(bench: Bench) -> None:
     bench.command(0.1, age=FrankaParams().stale_after_s - 0.03)
     bench.run(1)
-    assert bench.communication.report().stale == 0
+    assert bench.communication.stale == 0
 
 
 @pytest.mark.parametrize("wrong", [np.nan, np.inf, -50.0])
@@ -118,9 +118,10 @@ def test_it_does_not_end_before_the_arm_says_that_it_rests(bench: Bench) -> None
 
 
 def test_lost_states_are_counted(bench: Bench) -> None:
-    before = bench.communication.report()
+    line = bench.communication
+    cycles, lost = line.cycles, line.lost_states
     bench.motion.answer(bench.arm.state(), 4e-3)
-    after = bench.communication.report()
-    assert (before.lost_states, after.lost_states, after.longest_gap) == (0, 3, 4e-3)
-    assert after.cycles == before.cycles + 1
-    assert "3 lost (0.99 %), longest gap 4 ms" in str(after)
+    assert (lost, line.lost_states, line.longest_gap, line.cycles) == (0, 3, 4e-3, cycles + 1)
+    assert "3 lost (0.99 %), longest gap 4 ms" in str(line)
+    bench.mailboxes.put_report(line)
+    assert str(bench.mailboxes.report()) == str(line)

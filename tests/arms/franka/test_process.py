@@ -8,9 +8,9 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
-from pretouch.arms.franka.client import StateCallback
+from pretouch.arms.franka.connection import StateCallback
+from pretouch.arms.franka.exchange import Command, Feedback, Mailboxes, Request
 from pretouch.arms.franka.limits import FrankaParams, motion_limits
-from pretouch.arms.franka.mailboxes import Command, Feedback, Mailboxes, Request
 from pretouch.arms.franka.process import ArmServer, ProcessSettings
 from pretouch.arms.franka.state import FrankaState
 from pretouch.errors import RobotError

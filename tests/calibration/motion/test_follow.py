@@ -9,8 +9,8 @@ import pytest
 from pretouch import loop
 from pretouch.calibration.motion.follow import PlanCommander, plan_controller
 from pretouch.calibration.motion.plan import Plan
+from pretouch.ports import NoUnits
 from pretouch.robot.model import RobotModel
-from pretouch.session.session import NoUnits
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.scene import SceneSpec

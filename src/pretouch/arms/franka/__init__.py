@@ -13,9 +13,9 @@ from pretouch.errors import RobotError
 
 if TYPE_CHECKING:
     from pretouch.arms.franka.arm import FrankaArm
-    from pretouch.arms.franka.client import Kind
+    from pretouch.arms.franka.connection import Kind
     from pretouch.robot.description import RobotDescription
-    from pretouch.session.confirmations import Identity
+    from pretouch.session.memory import Identity
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Franka(ArmOptions):
 
     def check(self, setup: ArmSetup) -> None:
         """Refuse other arms, and go on with the vendor's library only."""
-        from pretouch.arms.franka.client import LIBRARIES, need_library
+        from pretouch.arms.franka.connection import LIBRARIES, need_library
 
         if setup.name not in LIBRARIES:
             raise RobotError(
@@ -48,21 +48,18 @@ class Franka(ArmOptions):
     def open(self, setup: ArmSetup) -> Iterator[OpenedArm]:
         """Connect to the arm, and set its collision behaviour by the profile's thresholds."""
         from pretouch.arms.franka.arm import FrankaArm
-        from pretouch.arms.franka.collision import CollisionParams, collision_behavior, largest_threshold
+        from pretouch.arms.franka.limits import collision_behavior, largest_threshold
         from pretouch.session.terminal import say
-        from pretouch.signals import children_undisturbed
 
         kind = cast("Kind", setup.name)
         robot = identity(kind, self.ip)
         behavior = collision_behavior(setup.profile, setup.model)
         say(
             f"The arm stops by itself from {behavior.upper_force[0]:.0f} N on; the profile detects"
-            f" {largest_threshold(setup.profile, setup.model, CollisionParams()):.0f} N at the latest."
+            f" {largest_threshold(setup.profile, setup.model):.0f} N at the latest."
         )
         priority = setup.priority and min(setup.priority + 1, 99)
-        with children_undisturbed():
-            connection = FrankaArm(self.ip, kind, setup.model, behavior=behavior, priority=priority)
-        with connection as arm:
+        with FrankaArm(self.ip, kind, setup.model, behavior=behavior, priority=priority) as arm:
             if self.recover:
                 _recover(arm, setup.yes)
             state = arm.state()
@@ -73,8 +70,8 @@ class Franka(ArmOptions):
 
 def identity(kind: "Kind", address: str) -> "Identity":
     """Return what a robot at an address is known by: another library asks for the guided pushes again."""
-    from pretouch.arms.franka.client import LIBRARIES
-    from pretouch.session.confirmations import Identity
+    from pretouch.arms.franka.connection import LIBRARIES
+    from pretouch.session.memory import Identity
 
     library = LIBRARIES[kind].distribution
     return Identity(kind, address, f"{library} {version(library)}")

@@ -7,18 +7,15 @@ from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from typing import Self
 
-from pretouch.arms.franka.client import Kind, attempt
-from pretouch.arms.franka.collision import CollisionBehavior
-from pretouch.arms.franka.errors import check_ready
-from pretouch.arms.franka.limits import FrankaParams, motion_limits
-from pretouch.arms.franka.mailboxes import Command, Feedback, Mailboxes, Request
+from pretouch.arms.franka.connection import Kind, attempt, check_ready
+from pretouch.arms.franka.exchange import Command, Communication, Feedback, Mailboxes, Request
+from pretouch.arms.franka.limits import CollisionBehavior, FrankaParams, motion_limits
 from pretouch.arms.franka.process import ProcessSettings, serve
-from pretouch.arms.franka.report import CommunicationReport
 from pretouch.arms.franka.state import JOINTS, FrankaState, TorqueWatch, robot_state
 from pretouch.errors import RobotError
 from pretouch.realtime import check_wishes
 from pretouch.robot.model import RobotModel
-from pretouch.signals import OF_TERMINAL, kept_from_children
+from pretouch.signals import kept_from_children
 from pretouch.types import FloatArray, RobotState
 
 _START_S = 30.0
@@ -40,9 +37,14 @@ class FrankaArm:
     """
 
     def __init__(
-        self, address: str, kind: Kind, model: RobotModel, params: FrankaParams | None = None,
-        behavior: CollisionBehavior | None = None, priority: int | None = None,
-    ) -> None:  # fmt: skip
+        self,
+        address: str,
+        kind: Kind,
+        model: RobotModel,
+        params: FrankaParams | None = None,
+        behavior: CollisionBehavior | None = None,
+        priority: int | None = None,
+    ) -> None:
         """Start the process and connect; what stands in the way is a RobotError.
 
         Args:
@@ -62,7 +64,7 @@ class FrankaArm:
         context = get_context("spawn")
         ours, theirs = context.Pipe(duplex=False)
         self._process = context.Process(target=serve, args=(settings, self._mailboxes, theirs), daemon=True)
-        with kept_from_children(OF_TERMINAL):
+        with kept_from_children():
             self._process.start()
         theirs.close()
         try:
@@ -130,7 +132,7 @@ class FrankaArm:
         return self.state().mode == _REFLEX
 
     @property
-    def communication(self) -> CommunicationReport:
+    def communication(self) -> Communication:
         """How well the process kept up, in the motions that have ended."""
         return self._mailboxes.report()
 

@@ -71,11 +71,11 @@ class SetPointLimiter:
                 f"The arm reports the desired state {at} rad, {now} rad/s and {changing} rad/s^2, which is not finite:"
                 " check the arm and its library."
             )
-        told = self._sent or [0.0] * JOINTS
-        far = [i for i in range(JOINTS) if abs(now[i] - told[i]) > self._unheard[i]]
+        sent = self._sent or [0.0] * JOINTS
+        far = [i for i in range(JOINTS) if abs(now[i] - sent[i]) > self._unheard[i]]
         if far:
             raise RobotError(
-                f"Joint {far[0] + 1} is said to be commanded to {now[far[0]]:.3f} rad/s after {told[far[0]]:.3f} rad/s,"
+                f"Joint {far[0] + 1} is said to be commanded to {now[far[0]]:.3f} rad/s after {sent[far[0]]:.3f} rad/s,"
                 " which no lost command explains: check what else commands the arm, then begin again."
             )
         self.lost = self._sent is not None and self._differs(now, self._sent)

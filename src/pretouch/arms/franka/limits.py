@@ -1,4 +1,28 @@
-"""Within what a Franka arm takes velocity commands, one a millisecond, and the share of it that is used."""
+"""Within what a Franka arm takes velocity commands, one a millisecond, and from where on it stops by itself.
+
+The arm's own collision reflex lies above our thresholds, or it would stop the arm before we react.
+
+The vendor holds the *whole* estimate against fixed thresholds. With the paper's detection ours are about the mean of a
+window (eq. 9), so the largest reading at which we react, on one axis, is `f_base + f_std` (13 N in the paper) above the
+largest mean:
+
+- the mean in free motion is at most `BIAS_N`: real Pandas show 0.4 to 1.7 N per axis with nothing attached
+  (franka_ros issue 404), and a slow drift with the posture of 2 to 5 N when they move;
+- the arm reports a contact from `LOWER_ABOVE_N` above that, so that what it calls a contact is one for us too;
+- and stops by itself from `UPPER_ABOVE_N` above: between our threshold and the arm yielding lie up to 0.17 s of the
+  filtered comparison, in which the force of a push still grows. For the paper's parameters that is 48 N, between the
+  40 N below which a reaction comes too late and the 60 N that a hand meets at 0.3 m/s.
+
+The sequential test has no threshold: it is least sensitive while it has learnt nothing. The largest force on one axis
+that it may then miss at the arm's ready posture is 38 N with the profile `pretouch`; once it has learnt, 4 to 9 N on a
+simulated Panda. The arm stops by itself `UPPER_ABOVE_N` above that, but from `MOST_N` on at the latest: with an error
+of `BIAS_N` that is the 65 N of ISO/TS 15066 for a face, the least of its quasi-static figures. By then an arm that is
+pushed yields at 0.27 m/s at least in any direction; its limit is 0.3 m/s.
+
+Joint torques are those of such a force at the end-effector with the longest lever its joint ever has, but at least the
+figures of the vendor's examples, which are above the noise of the estimate (20 20 18 18 16 14 12 Nm; libfranka,
+`examples_common.cpp`). Moments are to forces as in the same examples, 25 Nm to 20 N.
+"""
 
 from dataclasses import dataclass, field, replace
 from typing import Annotated
@@ -6,8 +30,13 @@ from typing import Annotated
 import numpy as np
 
 from pretouch.checks import Check, Checked, Fraction, NonNegative, Positive
+from pretouch.contact.detector import Body
+from pretouch.contact.sequential_test import SequentialTest
+from pretouch.errors import ParameterError
+from pretouch.profiles import Profile
 from pretouch.robot.description import RobotDescription, SpeedEnvelope, fr3, panda
 from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import Skin
 from pretouch.types import FloatArray
 
 JERK = {
@@ -17,6 +46,21 @@ JERK = {
 """Largest jerk of each joint [rad/s^3]: `kMaxJointJerk` in `rate_limiting.h` of libfranka 0.9, and 0.21 for the FR3."""
 
 _ARMS = {"panda": panda, "fr3": fr3}
+_VENDOR_NM = np.array([20.0, 20.0, 18.0, 18.0, 16.0, 14.0, 12.0])
+"""Joint torques of the vendor's examples [Nm]."""
+_MOMENT_M = 1.25
+"""Moment to force in the vendor's examples [m]."""
+_UPPER_SHARE = 1.5
+"""Least ratio of an upper joint threshold to the vendor's figure."""
+_POSTURES = 1000
+BIAS_N = 5.0
+"""Largest mean of the force estimate in free motion, per axis [N]."""
+LOWER_ABOVE_N = 10.0
+"""From our largest threshold to the arm's lower one [N]."""
+UPPER_ABOVE_N = 30.0
+"""From our largest threshold to the arm's upper one, at which it stops by itself [N]."""
+MOST_N = 60.0
+"""Most that upper one may be with the sequential detector [N]."""
 
 Share = Annotated[float, Check(low=0.01, high=0.9)]
 
@@ -83,3 +127,92 @@ class FrankaParams(Checked):
     end_after_s: Positive = 1.0
     """Age of the newest set-point at which the motion is ended, and has to be begun anew [s]: a program that was
     stopped for that long does not know where the arm is, nor who stands there by now."""
+
+
+@dataclass(frozen=True)
+class CollisionBehavior:
+    """From where on the arm reports a contact (lower) and stops by itself (upper)."""
+
+    lower_torque: FloatArray
+    """(7,) [Nm]"""
+    upper_torque: FloatArray
+    """(7,) [Nm]"""
+    lower_force: FloatArray
+    """(6,) forces [N] and moments [Nm]."""
+    upper_force: FloatArray
+    """(6,) forces [N] and moments [Nm]."""
+
+    def in_order(self) -> tuple[list[float], list[float], list[float], list[float]]:
+        """Return them as the vendor's `set_collision_behavior` takes them."""
+        torques = self.lower_torque.tolist(), self.upper_torque.tolist()
+        return *torques, self.lower_force.tolist(), self.upper_force.tolist()
+
+
+def largest_threshold(profile: Profile, model: RobotModel) -> float:
+    """Largest force on one axis at which our detection may still be silent [N]."""
+    body = Body(model, Skin((), model), profile.task.control_period_s)
+    missed = profile.detect.largest_missed_n(body, profile.task.speed_m_s)
+    # the estimate's bias moves a threshold on the force, and is learnt by a test on torques
+    return missed if profile.detect.by_torques else missed + BIAS_N
+
+
+def collision_behavior(profile: Profile, model: RobotModel) -> CollisionBehavior:
+    """Return thresholds for the arm that leave room for our reaction; see the top of this file."""
+    ours = largest_threshold(profile, model)
+    lower, upper = ours + LOWER_ABOVE_N, ours + UPPER_ABOVE_N
+    if isinstance(profile.detect, SequentialTest):
+        upper = min(upper, MOST_N)
+        lower = min(lower, 0.5 * (ours + upper))
+        if not ours < upper:
+            raise ParameterError(
+                f"The profile {profile.name} may miss {ours:.0f} N before it has learnt anything, but the arm must stop"
+                f" by itself from {MOST_N:g} N on: make its detection more sensitive, by smaller priors of free"
+                " motion or more detect.false_alarms_per_hour."
+            )
+    levers, shape = longest_levers(model), np.array([1.0, 1.0, 1.0, _MOMENT_M, _MOMENT_M, _MOMENT_M])
+    behavior = CollisionBehavior(
+        lower_torque=np.maximum(lower * levers, _VENDOR_NM),
+        upper_torque=np.maximum(upper * levers, _UPPER_SHARE * _VENDOR_NM),
+        lower_force=lower * shape,
+        upper_force=upper * shape,
+    )
+    check(behavior, profile, model)
+    return behavior
+
+
+def check(behavior: CollisionBehavior, profile: Profile, model: RobotModel) -> None:
+    """Raise a ParameterError unless ours < lower < upper on each axis, and lower < upper for all else."""
+    ours = largest_threshold(profile, model)
+    lowest = float(behavior.lower_force[:3].min())
+    if not lowest > ours:
+        raise ParameterError(
+            f"The arm would report a contact from {lowest:g} N on, but our detection may need up to {ours:g} N: set"
+            f" CollisionBehavior.lower_force higher than that, or give profile {profile.name!r} a smaller"
+            " detect.f_base_n."
+        )
+    for what, lower, upper in (
+        ("force", behavior.lower_force, behavior.upper_force),
+        ("torque", behavior.lower_torque, behavior.upper_torque),
+    ):
+        wrong = np.flatnonzero(~(upper > lower))
+        if len(wrong):
+            i = int(wrong[0])
+            raise ParameterError(
+                f"CollisionBehavior.upper_{what}[{i}] is {upper[i]:g}: it must be greater than the lower, {lower[i]:g}."
+            )
+
+
+def longest_levers(model: RobotModel) -> FloatArray:
+    """Largest torque (n,) on each joint [Nm] that 1 N at the end-effector gives in any posture, to a few per cent.
+
+    The postures fill the joints' ranges evenly: multiples of powers of one irrational number, modulo 1.
+    """
+    root = 1.0
+    for _ in range(60):
+        root = (1.0 + root) ** (1.0 / (model.n + 1))
+    share = np.outer(np.arange(1, _POSTURES + 1), root ** -np.arange(1, model.n + 1)) % 1.0
+    longest = np.zeros(model.n)
+    for q in model.q_min + share * (model.q_max - model.q_min):
+        jacobian = model.ee_jacobian(model.kinematics(q))
+        longest = np.maximum(longest, np.linalg.norm(jacobian[:3], axis=0))
+    return longest

@@ -13,23 +13,30 @@ another one is begun.
 import os
 import signal
 import time
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from types import FrameType
 
-from pretouch.arms.franka.client import Kind, connect
-from pretouch.arms.franka.collision import CollisionBehavior
-from pretouch.arms.franka.limits import FrankaParams, MotionLimits
-from pretouch.arms.franka.mailboxes import Command, Feedback, Mailboxes, Request
-from pretouch.arms.franka.motion import VelocityMotion
-from pretouch.arms.franka.report import Communication
-from pretouch.arms.franka.vendor import VendorClient
+import numpy as np
+
+from pretouch.arms.franka.connection import FrankaClient, Kind
+from pretouch.arms.franka.exchange import Command, Communication, Feedback, Mailboxes, Request
+from pretouch.arms.franka.limiter import SetPointLimiter, refusal
+from pretouch.arms.franka.limits import CollisionBehavior, FrankaParams, MotionLimits
+from pretouch.arms.franka.state import JOINTS, FrankaState
 from pretouch.errors import PretouchError, RobotError
 from pretouch.realtime import real_time
-from pretouch.signals import OF_TERMINAL, leave_to_parent
+from pretouch.signals import leave_to_parent
+from pretouch.types import FloatArray
 
 _TERMINATED = "The process that moves the arm was told to end, so the arm was brought to rest: reconnect."
+
+
+_REST = [0.0] * JOINTS
+_ARRIVED_RAD_S = 1e-4
+"""Velocity that the arm may still report when its motion is ended."""
 
 
 @dataclass(frozen=True)
@@ -46,12 +53,73 @@ class ProcessSettings:
     """Number of the process that sends the commands."""
 
 
+class VelocityMotion:
+    """Follows the set-points of one request, comes to rest without them, and ends at rest."""
+
+    def __init__(
+        self,
+        number: int,
+        settings: ProcessSettings,
+        mailboxes: Mailboxes,
+        communication: Communication,
+        is_over: Callable[[], bool],
+    ) -> None:
+        """Take the request's number, where commands come from and feedback goes, and what else ends the motion."""
+        self._number, self._mailboxes = number, mailboxes
+        self._limits, self._params = settings.limits, settings.params
+        self._communication, self._is_over = communication, is_over
+        self._limiter = SetPointLimiter(settings.limits, settings.params.limiter)
+        self._command: Command | None = None
+        self._ending = self._stale = False
+        self.trouble = ""
+        """Why the motion was ended, if nobody asked for that."""
+        communication.in_motion = 0
+
+    def answer(self, state: FrankaState, since: float) -> tuple[FloatArray, bool]:
+        """Return joint velocities (7,) [rad/s] and whether the motion is finished, `since` [s] after the last state."""
+        now = time.monotonic()
+        command = self._mailboxes.newest_command()
+        velocity = self._limiter.step(state, self._target(command, now))
+        finished = self._ending and self._limiter.at_rest and max(map(abs, state.dq_d.tolist())) < _ARRIVED_RAD_S
+        self._mailboxes.send_feedback(Feedback(now, self._number, True, self.trouble, state))
+        self._communication.reseeds += self._limiter.lost
+        self._communication.answered(since, state.success_rate, time.monotonic() - now)
+        return np.array(velocity), finished
+
+    def _target(self, command: Command, now: float) -> list[float]:
+        """Return the velocities to go to: the set-point, or rest."""
+        requested = command.request is Request.MOVE and command.number == self._number
+        self._ending = self._ending or not requested or self._is_over()
+        if not self._ending:
+            self.trouble = self._objection(command, now)
+            self._ending = bool(self.trouble)
+        if self._ending:
+            return _REST
+        was, self._stale = self._stale, now - command.stamp > self._params.stale_after_s
+        if self._stale and not was and not self._limiter.at_rest:
+            self._communication.stale += 1
+        return _REST if self._stale else command.qd
+
+    def _objection(self, command: Command, now: float) -> str:
+        """Say what about a command ends the motion, or ''."""
+        wrong = ""
+        if command is not self._command:
+            self._command, wrong = command, refusal(command.qd, self._limits)
+        most = self._params.end_after_s
+        if now - command.stamp > most:
+            return (
+                f"The arm was brought to rest and its motion ended, because no set-point came for {most:g} s: check the"
+                " program that commands it, then begin again."
+            )
+        return f"The arm was brought to rest, because {wrong}: check the program that commands it." if wrong else ""
+
+
 def serve(settings: ProcessSettings, mailboxes: Mailboxes, started: Connection) -> None:
     """Carry out commands until told to quit or the program is gone; tell it '', or as a sentence what is wrong."""
-    leave_to_parent(OF_TERMINAL)
+    leave_to_parent()
     with ExitStack() as opened:
         try:
-            client = opened.enter_context(connect(settings.address, settings.kind))
+            client = opened.enter_context(FrankaClient(settings.address, settings.kind))
             if settings.behavior is not None:
                 client.set_collision_behavior(settings.behavior)
             server = ArmServer(client, settings, mailboxes)
@@ -67,7 +135,7 @@ def serve(settings: ProcessSettings, mailboxes: Mailboxes, started: Connection) 
 class ArmServer:
     """Turns commands into what the client does, one after the other."""
 
-    def __init__(self, client: VendorClient, settings: ProcessSettings, mailboxes: Mailboxes) -> None:
+    def __init__(self, client: FrankaClient, settings: ProcessSettings, mailboxes: Mailboxes) -> None:
         self._client, self._settings, self._mailboxes = client, settings, mailboxes
         self._communication = Communication()
         self._answered, self._trouble = 0, ""
@@ -85,7 +153,7 @@ class ArmServer:
                 break
             if command.number > self._answered:
                 self._execute(command)
-                self._mailboxes.put_report(self._communication.report())
+                self._mailboxes.put_report(self._communication)
             try:
                 self._state, self._stamp = self._client.read(), time.monotonic()
             except RobotError as error:
@@ -105,23 +173,15 @@ class ArmServer:
         try:
             if command.request is Request.MOVE:
                 settings = self._settings
-                motion = VelocityMotion(
-                    command.number,
-                    settings.limits,
-                    settings.params,
-                    self._mailboxes,
-                    self._communication,
-                    self._is_over,
-                )
+                motion = VelocityMotion(command.number, settings, self._mailboxes, self._communication, self._is_over)
                 self._client.control(motion.answer)
                 self._trouble = motion.trouble
             elif command.request is Request.RECOVER:
                 self._client.recover()
         except RobotError as error:
             self._trouble = str(error)
-        if (
-            feedback := self._mailboxes.newest_feedback()
-        ) is not None:  # the motion's last state: there may be no other
+        feedback = self._mailboxes.newest_feedback()
+        if feedback is not None:  # the motion's last state: there may be no other
             self._state, self._stamp = feedback.state, feedback.stamp
         # what was asked during a motion ended it, and is not to be done at some later time
         self._answered = self._mailboxes.newest_command().number if command.request is Request.MOVE else command.number

@@ -1,7 +1,6 @@
 """What a Franka arm reports, as the vendor's libraries give it, and the one place where its sign becomes ours."""
 
 import re
-import struct
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,11 +14,6 @@ JOINTS = 7
 MODES = ("other", "idle", "move", "guiding", "reflex", "user stopped", "automatic error recovery")
 """The vendor's robot modes, each at its number on the wire."""
 
-_PLAIN = struct.Struct("<4dBHH")
-_ARRAYS = struct.Struct(f"<{6 * JOINTS + 6}d")
-_CUTS = *(slice(JOINTS * i, JOINTS * (i + 1)) for i in range(6)), slice(6 * JOINTS, None)
-PACKED_MOST = _PLAIN.size + _ARRAYS.size + 4096
-"""Bytes that a packed state has at most."""
 STUCK_S = 0.1
 """Time for which a joint's external torque may repeat to the last digit [s]: each of the arm's states has new noise."""
 _NAME = re.compile(r"[a-z]\w+")
@@ -92,14 +86,11 @@ class TorqueWatch:
 
 def franka_state(raw: Any) -> FrankaState:
     """Return the state that one of the vendor's libraries gave: both name and number alike what is used here."""
-    array = np.array
-    return FrankaState(
-        time=raw.time.to_sec(), mode=MODES[int(raw.robot_mode)], errors=_names(raw.current_errors),
-        last_motion_errors=_names(raw.last_motion_errors), q=array(raw.q), qd=array(raw.dq), q_d=array(raw.q_d),
-        dq_d=array(raw.dq_d), ddq_d=array(raw.ddq_d), tau_ext=array(raw.tau_ext_hat_filtered),
-        wrench=array(raw.O_F_ext_hat_K), success_rate=raw.control_command_success_rate, m_ee=raw.m_ee,
-        m_load=raw.m_load,
-    )  # fmt: skip
+    motion, force = (raw.q, raw.dq, raw.q_d, raw.dq_d, raw.ddq_d), (raw.tau_ext_hat_filtered, raw.O_F_ext_hat_K)
+    q, qd, q_d, dq_d, ddq_d, tau_ext, wrench = (np.array(values) for values in (*motion, *force))
+    errors, last = _names(raw.current_errors), _names(raw.last_motion_errors)
+    time, mode, rate = raw.time.to_sec(), MODES[int(raw.robot_mode)], raw.control_command_success_rate
+    return FrankaState(time, mode, errors, last, q, qd, q_d, dq_d, ddq_d, tau_ext, wrench, rate, raw.m_ee, raw.m_load)
 
 
 def error_names(text: str) -> tuple[str, ...]:
@@ -110,23 +101,3 @@ def error_names(text: str) -> tuple[str, ...]:
 
 def _names(errors: Any) -> tuple[str, ...]:
     return error_names(str(errors)) if errors else ()
-
-
-def packed(state: FrankaState) -> bytes:
-    """Return a state as bytes for another process of this machine, in 3 us."""
-    errors, last = (" ".join(names).encode() for names in (state.errors, state.last_motion_errors))
-    plain = _PLAIN.pack(
-        state.time, state.success_rate, state.m_ee, state.m_load, MODES.index(state.mode), len(errors), len(last)
-    )
-    parts = state.q, state.qd, state.q_d, state.dq_d, state.ddq_d, state.tau_ext, state.wrench
-    return b"".join((plain, *(part.tobytes() for part in parts), errors, last))
-
-
-def unpacked(data: bytes) -> FrankaState:
-    """Return the state that `packed` made bytes of."""
-    time, rate, m_ee, m_load, mode, length, length_last = _PLAIN.unpack_from(data)
-    arrays = np.frombuffer(data, offset=_PLAIN.size, count=6 * JOINTS + 6)
-    names = data[_PLAIN.size + _ARRAYS.size :].decode()
-    errors, last = tuple(names[:length].split()), tuple(names[length : length + length_last].split())
-    q, qd, q_d, dq_d, ddq_d, tau_ext, wrench = (arrays[cut] for cut in _CUTS)
-    return FrankaState(time, MODES[mode], errors, last, q, qd, q_d, dq_d, ddq_d, tau_ext, wrench, rate, m_ee, m_load)

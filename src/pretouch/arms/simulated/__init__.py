@@ -1,7 +1,7 @@
 """A rehearsal for `pretouch run`: a simulated arm with simulated units."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -26,27 +26,29 @@ class Simulated(ArmOptions):
     @contextmanager
     def open(self, setup: ArmSetup) -> Iterator[OpenedArm]:
         """Let the arm live in a thread, and its units send to a receiver of this machine."""
-        from pretouch.arms.simulated.arm import SimulateOptions
-        from pretouch.arms.simulated.threaded import ThreadedArm
+        from pretouch.arms.simulated.arm import ThreadedArm
         from pretouch.robot.model import RobotModel
         from pretouch.sensing.skin import Skin
-        from pretouch.signals import children_undisturbed
+        from pretouch.sim.imu import ImuParams
         from pretouch.sim.scene import SceneSpec
-        from pretouch.units.fleet import simulated_keys
-        from pretouch.units.network_skin import NetworkSkin
-        from pretouch.units.udp import HOST
+        from pretouch.units import HOST
+        from pretouch.units.fleet import Fleet, FleetParams, simulated_keys
+        from pretouch.units.skin import NetworkSkin
 
         model = RobotModel(setup.model.description)
         skin = setup.skin if setup.units else Skin((), setup.model)
-        keys = simulated_keys(skin.network.ids, self.seed)
-        with children_undisturbed():
-            receiver = NetworkSkin(skin.network, keys, HOST, 0) if len(skin) else nullcontext()
-        with receiver as units:
-            port = units.address[1] if units else 9
-            options = SimulateOptions(model, skin, keys, HOST, port, hand=False, seed=self.seed)
-            with ThreadedArm(options, setup.start(), SceneSpec(floor_height=setup.floor)) as arm:
-                yield OpenedArm(
-                    arm, skin=units, units=units, push=lambda direction: arm.push(direction.axis),
-                    free_motion_id=f"{arm.name}, seed {self.seed}", left_out=lambda: arm.left_out,
-                    measured=arm.measured,
-                )  # fmt: skip
+        keys, params = simulated_keys(skin.network.ids, self.seed), FleetParams(imu=ImuParams())
+        with ExitStack() as stack:
+            units = stack.enter_context(NetworkSkin(skin.network, keys, HOST)) if len(skin) else None
+            address = units.address if units else (HOST, 9)
+            fleet = stack.enter_context(closing(Fleet(skin.network, keys, params, self.seed, address)))
+            scene = SceneSpec(floor_height=setup.floor)
+            arm = stack.enter_context(ThreadedArm(model, setup.start(), skin, fleet, scene))
+            yield OpenedArm(
+                arm,
+                skin=units,
+                push=lambda direction: arm.push(direction.axis),
+                free_motion_id=f"{arm.name}, seed {self.seed}",
+                left_out=lambda: arm.left_out,
+                measured=arm.measured,
+            )

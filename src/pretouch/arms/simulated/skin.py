@@ -8,12 +8,15 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pretouch.arms.simulated.arm import SimulatedArm, SimulateOptions
-from pretouch.arms.simulated.real_time import RealTime
+from pretouch.arms.simulated.arm import SimulatedArm
+from pretouch.control.path import Path
 from pretouch.controller import Controller
 from pretouch.loop import Cycle
 from pretouch.loop import run as turn_on
+from pretouch.profiles import Profile
+from pretouch.robot.model import RobotModel
 from pretouch.robot.postures import brought_to
+from pretouch.sensing.skin import Skin
 from pretouch.sim.hand import Hand, HandGoal
 from pretouch.sim.plant import Plant
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
@@ -44,26 +47,22 @@ class VisitingHand:
 class _StatusPrinter:
     """Prints the status each second."""
 
-    def __init__(self, fleet: Fleet, clock: RealTime, say: Callable[[str], None]) -> None:
-        self._fleet, self._clock, self._say = fleet, clock, say
+    def __init__(self, arm: SimulatedArm, say: Callable[[str], None]) -> None:
+        self._arm, self._fleet, self._say = arm, arm.fleet, say
         self._next, self._sent = _SAY_S, 0
         self._answered, self._named = 0.0, False
 
     def record(self, cycle: Cycle) -> None:
-        """Print the status of an arm under the controller."""
-        step = cycle.step
-        self.print_status(f"{step.mode.value:5}  {np.linalg.norm(step.ee_velocity):.2f} m/s")
-
-    def print_status(self, doing: str) -> None:
-        """Print the status of an arm and its units."""
-        if self._clock.now >= self._next:
+        """Print the status of an arm and its units, when it is due."""
+        if self._arm.now >= self._next:
             self._next += _SAY_S
-            self._say(self._line(doing))
+            step = cycle.step
+            self._say(self._line(f"{step.mode.value:5}  {np.linalg.norm(step.ee_velocity):.2f} m/s"))
             self._name_receiver()
 
     def _name_receiver(self) -> None:
         """Say once that a receiver does not answer."""
-        now, sending = self._clock.now, [unit for unit in self._fleet.units if not unit.silent]
+        now, sending = self._arm.now, [unit for unit in self._fleet.units if not unit.silent]
         if not sending or any(unit.in_session for unit in sending):
             self._answered, self._named = now, False
         elif not self._named and now - self._answered >= _ANSWER_S:
@@ -79,7 +78,7 @@ class _StatusPrinter:
         silent = [name for name, unit in zip(fleet.ids, fleet.units, strict=True) if not unit.in_session]
         sent, self._sent = fleet.sent - self._sent, fleet.sent
         parts = [
-            f"{self._clock.now:7.1f} s  {doing}",
+            f"{self._arm.now:7.1f} s  {doing}",
             f"{sent} datagrams",
             f"{len(fleet.ids) - len(silent)} of {len(fleet.ids)} units in session",
         ]
@@ -87,26 +86,39 @@ class _StatusPrinter:
             parts.append(f"without session: {', '.join(silent)}")
         if fleet.lost:
             parts.append(f"{fleet.lost} could not be sent")
-        if self._clock.left_out:
-            parts.append(f"this machine is too slow by {self._clock.left_out:.1f} s")
+        if self._arm.left_out:
+            parts.append(f"this machine is too slow by {self._arm.left_out:.1f} s")
         return "; ".join(parts)
 
 
-def run(options: SimulateOptions, done: Callable[[], bool], say: Callable[[str], None]) -> None:
-    """Simulate until `done` says so or the time is over; the arm is brought to rest and the sockets are closed.
+def run(
+    model: RobotModel,
+    skin: Skin,
+    fleet: Fleet,
+    path: Path,
+    profile: Profile,
+    hand: bool,
+    done: Callable[[float], bool],
+    say: Callable[[str], None],
+) -> None:
+    """Simulate an arm on a path whose units are a fleet, until `done` says so; then the arm is brought to rest.
 
-    `say` is handed a line each second, and a sentence when nobody answers. A receiver that cannot be found is a
-    HardwareError.
+    Args:
+        model: the arm.
+        skin: its units.
+        fleet: the same units, as they send.
+        path: of the end-effector.
+        profile: parameters of the controller.
+        hand: whether a person's hand comes and goes.
+        done: is asked at each step, with the time since the begin [s].
+        say: is handed a line each second, and a sentence when nobody answers.
     """
-    model, profile = options.model, options.profile
-    scene = SceneSpec(hand=HandSpec(start=VisitingHand.away)) if options.hand else SceneSpec()
-    begin = brought_to(model, options.path.point(0.0))
-    with SimulatedArm(options, begin, profile.task.control_period_s, scene) as arm:
-        if options.hand:
-            Hand(arm.plant, VisitingHand(model.ee))
-        # it draws the same numbers as the units that send: what is sent is what the arm's own controller has
-        finders = RangeFinders(arm.plant, options.skin, RangeFinderParams(), options.seed)
-        controller = Controller(model, options.skin, fixtures(scene), options.path, profile)
-        arm.begin()
-        printer, end = _StatusPrinter(arm.fleet, arm.clock, say), options.duration_s or np.inf
-        turn_on(controller, arm, finders, arm, printer, lambda _: done() or arm.clock.now >= end)
+    scene = SceneSpec(hand=HandSpec(start=VisitingHand.away)) if hand else SceneSpec()
+    arm = SimulatedArm(model, brought_to(model, path.point(0.0)), skin, fleet, scene, profile.task.control_period_s)
+    if hand:
+        Hand(arm.plant, VisitingHand(model.ee))
+    # it draws the same numbers as the units that send: what is sent is what the arm's own controller has
+    finders = RangeFinders(arm.plant, skin, RangeFinderParams(), fleet.seed)
+    controller = Controller(model, skin, fixtures(scene), path, profile)
+    arm.begin()
+    turn_on(controller, arm, finders, arm, _StatusPrinter(arm, say), lambda _: done(arm.now))

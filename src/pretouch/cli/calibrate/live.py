@@ -28,17 +28,18 @@ from pretouch.profiles import PROFILES
 from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import skin_for
-from pretouch.session.motion import Ending, go
-from pretouch.session.units import Units, wait_until_live
+from pretouch.session.run import Ending, go
 from pretouch.signals import Terminated
 from pretouch.types import RobotState
+from pretouch.units.skin import NetworkSkin
 from pretouch.units.skin_recording import SkinRecording
+from pretouch.units.watch import UnitWatch
 
 if TYPE_CHECKING:
     from pretouch.cli.calibrate.options import CalibrateArm
 
-_STEADY_S, _PATIENCE_S = 3.0, 20.0
-"""Units that were heard for so long have clocks that are known; for so long they are waited for [s]."""
+_LOOK_S = 0.1
+"""Time between two looks at the units before the motion [s]."""
 _AFTER_S = 0.5
 """What was measured up to the end of a motion has arrived then [s]."""
 
@@ -62,9 +63,9 @@ def calibrate_live(command: "CalibrateArm[Any]", out: Path, outputs: Outputs) ->
     command.connection.check(setup)
     with (
         command.connection.open(setup) as opened,
-        heard_units(command.units, skin, opened) as (_, units),
+        heard_units(command.units, skin, opened) as units,
     ):
-        if units is None:
+        if not isinstance(units, NetworkSkin):
             raise HardwareError("A calibration hears the units' IMUs over the network: give their keys with --keys.")
         plans = _plans(opened.arm, model, command)
         if not command.yes:
@@ -73,7 +74,7 @@ def calibrate_live(command: "CalibrateArm[Any]", out: Path, outputs: Outputs) ->
         if against:
             raise RobotError(" ".join(against))
         print("Waiting for the units.", flush=True)
-        wait_until_live(units, MonotonicClock(0.01), lambda _: None, _PATIENCE_S, _STEADY_S)
+        UnitWatch(units, _LOOK_S).wait(MonotonicClock(0.01))
         print(f"All measurements are recorded in {place}. {again}", flush=True)
         early = _recorded(opened, model, plans, units, skin.network.ids, place, again)
         report = opened.arm.report()
@@ -128,7 +129,9 @@ def _ask(duration: float) -> None:
 class Measurements:
     """Records what units and joints measure while an arm moves; a `loop.Recorder`."""
 
-    def __init__(self, recording: SkinRecording, units: Units, ids: tuple[str, ...], joints: tuple[str, ...]) -> None:
+    def __init__(
+        self, recording: SkinRecording, units: NetworkSkin, ids: tuple[str, ...], joints: tuple[str, ...]
+    ) -> None:
         """Take where to record, what hears the units of these ids, and the names of the joints."""
         self._recording, self._units, self._ids, self._joints = recording, units, ids, joints
         self._newest = -np.inf
@@ -158,7 +161,13 @@ class Measurements:
 
 
 def _recorded(
-    opened: OpenedArm, model: RobotModel, plans: list[Plan], units: Units, ids: tuple[str, ...], place: Path, again: str
+    opened: OpenedArm,
+    model: RobotModel,
+    plans: list[Plan],
+    units: NetworkSkin,
+    ids: tuple[str, ...],
+    place: Path,
+    again: str,
 ) -> bool:
     """Let the arm move, and record all; return whether that ended early."""
     ending = Ending()

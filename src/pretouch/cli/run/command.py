@@ -2,123 +2,136 @@
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Annotated, Any, Generic, Union
 
 import numpy as np
+import tyro
 
-from pretouch.arms import OpenedArm
-from pretouch.cli.run.motion import PlannedRun, execute
-from pretouch.cli.run.setup import RunSetup, free_motion, heard_units, run_setup
+from pretouch.arms import ArmSetup, OpenedArm, arm_class, arm_names
+from pretouch.calibration.motion.plan import Plan
+from pretouch.cli.options import JsonFile, OptionalFile, split_arm
+from pretouch.cli.run.options import A, RobotOptions, SkinOptions, TaskOptions
+from pretouch.cli.run.setup import free_motion, heard_units, run_setup
 from pretouch.cli.warm_up import prepare
-from pretouch.cli.writing import check_writable
-from pretouch.errors import RecordingError, RobotError
+from pretouch.cli.writing import check_writable, numbers_to
+from pretouch.errors import HardwareError, ParameterError, RecordingError, RobotError
 from pretouch.loop import MonotonicClock
-from pretouch.ports import Skin
-from pretouch.realtime import check_wishes
-from pretouch.session.confirmations import ConfirmedRobots, state_folder
-from pretouch.session.preflight import PreflightParams, refusals
-from pretouch.session.push import Direction, GuidedPush, PushParams
-from pretouch.session.session import Session
-from pretouch.session.standstill import Standstill
-from pretouch.session.start import announcement, plan_to_start
-from pretouch.session.terminal import require_yes, say
-from pretouch.session.units import Units
+from pretouch.realtime import Options, check_wishes
+from pretouch.session.may_move import StandingArm, Standstill, refusals, vector
+from pretouch.session.memory import ConfirmedRobots, FreeMotion, state_folder
+from pretouch.session.progress import ProgressReporter
+from pretouch.session.push import Direction, GuidedPush
+from pretouch.session.run import Ending, announcement, execute, open_run_files, plan_to_start
+from pretouch.session.terminal import BackgroundPrinter, EnterKey, require_yes, say
 from pretouch.signals import noted_in_motion
 
-if TYPE_CHECKING:
-    from pretouch.cli.run.options import Run
 
-PREFLIGHT, PUSH = PreflightParams(), PushParams()
-"""What arm and pushes must be like."""
+@dataclass(frozen=True)
+class Run(Generic[A]):
+    """Move an arm: checks, a guided push that confirms the force sign, the controller in real time, and rest.
+
+    `pretouch run` and `pretouch run simulated` rehearse. `pretouch run NAME` moves another arm, with options of its
+    own: franka, ros2 of the distribution pretouch-ros2, or one that another distribution adds.
+    The exit code is 1 if the run ended early or its recording failed, 2 if it was refused before anything moved.
+    """
+
+    connection: A
+    robot: RobotOptions = field(default_factory=RobotOptions)
+    units: SkinOptions = field(default_factory=SkinOptions)
+    task: TaskOptions = field(default_factory=TaskOptions)
+    record: OptionalFile = None
+    """Recording to write."""
+    json: JsonFile = None
+    holds: str = "runs/holds"
+    """Folder for the last seconds before a HOLD that lasts until a person resumes."""
+    priority: int | None = None
+    """Real-time priority of the control loop, 1 to 99; by default the process keeps its own."""
+    cpu: int | None = None
+    """Processor to run on; by default the system decides."""
+    yes: bool = False
+    """Do not ask before the arm moves."""
+
+    @staticmethod
+    def of_words(words: Sequence[str]) -> tuple[Any, Sequence[str], str]:
+        """Return the command for the arm that the first word names, the other words, and what is in front of them."""
+        name, others = split_arm(words)
+        return Run[arm_class(name)], others, f"run {name}" if len(others) < len(words) else "run"  # type: ignore[misc]
+
+    @staticmethod
+    def of_all() -> Any:
+        """Return the command with all arms as words that follow it."""
+        arms = [Annotated[arm_class(name), tyro.conf.subcommand(name)] for name in arm_names()]
+        return Run[Union[tuple(arms)]]  # type: ignore[misc]  # noqa: UP007  # made when it is asked for
+
+    def run(self) -> int | None:
+        """Move the arm. Where a signal ended the run in order, its code is the exit code."""
+        check_options(self)
+        with numbers_to(self.json) as write:
+            return _run(self, write) or None
 
 
-def run(command: "Run[Any]", write: Callable[[Any], None]) -> int:
+def check_options(command: Run[Any]) -> None:
+    """Raise an error for options that cannot be combined."""
+    robot, units, arm = command.robot, command.units, command.connection
+    if units.no_skin and (units.skin or units.keys):
+        raise HardwareError("--no-skin does not go with --skin and --keys: leave one or the other out.")
+    if not (units.no_skin or units.keys or arm.brings_units):
+        raise HardwareError("The arm brings no sensor units: give the file of their keys with --keys, or --no-skin.")
+    if robot.no_learnt and (robot.learnt or robot.learn_anew):
+        raise RobotError("--no-learnt does not go with --learnt and --learn-anew: leave one or the other out.")
+    units.check()
+    if not 0.0 <= command.task.seconds < float("inf"):
+        raise ParameterError(f"--seconds is {command.task.seconds:g}: give 0 or more.")
+
+
+def _run(command: Run[Any], write: Callable[[Any], None]) -> int:
     """Move an arm, and write its numbers; return 1 if the run ended early or its recording failed, or else 0."""
     check_wishes(command.priority, command.cpu)
     if command.record:
         _check_free(command.record)
-    made = run_setup(command)
-    setup = made.of_arm(command)
-    command.connection.check(setup)
-    for sentence in made.assumed:
+    setup = run_setup(command.connection, command.robot, command.units, command.task)
+    connection = ArmSetup(
+        name=command.robot.arm,
+        model=setup.model,
+        skin=setup.skin,
+        units=bool(len(setup.skin)) and not command.units.keys,
+        profile=setup.profile,
+        start=setup.simulated_start,
+        floor=setup.floor,
+        priority=command.priority,
+        yes=command.yes,
+    )
+    command.connection.check(connection)
+    for sentence in setup.assumed:
         say(sentence)
-    prepare(made.profile)
+    prepare(setup.profile)
     with (
         ExitStack() as last,
-        command.connection.open(setup) as found,
-        heard_units(command.units, made.skin, found) as (skin, units),
+        command.connection.open(connection) as opened,
+        heard_units(command.units, setup.skin, opened) as skin,
     ):
         try:
-            return _run(command, made, found, (skin, units), last, write)
+            remembered = ConfirmedRobots(state_folder())
+            # a damaged file is named before anything is checked
+            confirmed = opened.identity is not None and remembered.is_confirmed(opened.identity)
+            controller = setup.controller(np.array(opened.arm.read().q))
+            learnt = free_motion(command.robot, controller, opened.free_motion_id or opened.arm.name)
+            clock, approach = MonotonicClock(controller.limits.period), command.task.approach
+            standing = StandingArm(opened.arm, skin, controller, setup.floor, clock, approach, opened.left_out)
+            rest = _checked(standing, opened.notes())
+            if confirmed and not command.robot.confirm_push:
+                say("The force sign of this robot was confirmed before; --confirm-push repeats it.")
+            else:
+                _confirm(standing, opened, rest)
+                if opened.identity:
+                    remembered.add(opened.identity)
+                say("The force sign is confirmed: the robot reports the force on the arm, in the base frame.")
+            way = _allowed_way(command, standing, opened, rest)
+            return _executed(command, standing, opened, way, learnt, last, write)
         finally:
             last.enter_context(noted_in_motion())  # until arm and units are closed
-
-
-def _run(
-    command: "Run[Any]",
-    made: RunSetup,
-    found: OpenedArm,
-    heard: tuple[Skin, Units | None],
-    last: ExitStack,
-    write: Callable[[Any], None],
-) -> int:
-    """Check, ask, and let the arm move; see `execute`."""
-    remembered = ConfirmedRobots(state_folder())
-    known = found.identity is not None and remembered.is_confirmed(found.identity)  # a damaged file is found out first
-    controller = made.controller(np.array(found.arm.read().q))
-    clock = MonotonicClock(made.profile.task.control_period_s)
-    learnt = free_motion(command.robot, controller, found.free_motion_id or found.arm.name)
-    session = Session(found.arm, *heard, controller, made.floor, clock, found.left_out)
-    say(f"{found.arm.name}: checking it; let it stand still and do not touch it.")
-    rest = _checked(session, command.task.approach, found.notes())
-    if known and not command.robot.confirm_push:
-        say("The force sign of this robot was confirmed before; --confirm-push repeats it.")
-    else:
-        _confirm(session, found, rest)
-        if found.identity:
-            remembered.keep(found.identity)
-        say("The force sign is confirmed: the robot reports the force on the arm, in the base frame.")
-    asks = found.commander.announced if found.commander else ""
-    return execute(command, session, found, _confirm_motion(command, session, made, rest, asks), learnt, last, write)
-
-
-def _checked(session: Session, approach: bool, notes: Sequence[str]) -> Standstill:
-    """Check arm and units, print what was found, and raise RobotError for what forbids a run."""
-    rest, findings = session.preflight(PREFLIGHT, approach)
-    for note in (*notes, *(finding.sentence for finding in findings if not finding.refused)):
-        say(f"Mind: {note}")
-    refused = refusals(findings)
-    if refused:
-        raise RobotError("The arm is not moved:\n" + "\n".join(f"  {sentence}" for sentence in refused))
-    say(f"All checks passed. Force at rest: {_vector(rest.rest_wrench[:3])} N.")
-    return rest
-
-
-def _confirm(session: Session, found: OpenedArm, rest: Standstill) -> None:
-    """Have the force sign confirmed by guided pushes."""
-
-    def ask(direction: Direction) -> None:
-        say(f"Push the hand gently, with about 15 N and for a second, towards {direction.words}.")
-        found.push(direction)
-
-    GuidedPush(session.arm, session.clock, session.controller.model, ask, say, PUSH).confirm(rest)
-
-
-def _confirm_motion(command: "Run[Any]", session: Session, made: RunSetup, rest: Standstill, asks: str) -> PlannedRun:
-    """Say what the arm will do, and ask; return it if the arm may do it, and stands where it was checked."""
-    approach = command.task.approach
-    q = session.recheck(rest, PREFLIGHT, approach)
-    way = PlannedRun(
-        plan_to_start(made.model, q, session.controller.path, made.floor) if approach else None,
-        command.task.seconds or np.inf,
-    )
-    for sentence in announcement(session.controller, way.seconds, way.approach, asks):
-        say(sentence)
-    if not command.yes:
-        require_yes("Go on?", "The arm was not moved")
-    session.recheck(rest, PREFLIGHT, approach)
-    return way
 
 
 def _check_free(place: Path) -> None:
@@ -131,5 +144,83 @@ def _check_free(place: Path) -> None:
         say(f"The folder {place.parent} was created for the recording.")
 
 
-def _vector(values: np.ndarray) -> str:
-    return f"({', '.join(f'{value:.1f}' for value in values)})"
+def _checked(standing: StandingArm, notes: Sequence[str]) -> Standstill:
+    """Check arm and units, print what there is to know, and raise RobotError for what forbids a run."""
+    say(f"{standing.arm.name}: checking it; let it stand still and do not touch it.")
+    rest, findings = standing.check()
+    for note in (*notes, *(finding.sentence for finding in findings if finding.level == "warning")):
+        say(f"Mind: {note}")
+    refused = refusals(findings)
+    if refused:
+        raise RobotError("The arm is not moved:\n" + "\n".join(f"  {sentence}" for sentence in refused))
+    say(f"All checks passed. Force at rest: {vector(rest.rest_wrench[:3])} N.")
+    return rest
+
+
+def _confirm(standing: StandingArm, opened: OpenedArm, rest: Standstill) -> None:
+    """Have the force sign confirmed by guided pushes."""
+
+    def ask(direction: Direction) -> None:
+        say(f"Push the hand gently, with about 15 N and for a second, towards {direction.words}.")
+        opened.push(direction)
+
+    GuidedPush(standing.arm, standing.clock, standing.controller.model, ask, say).confirm(rest)
+
+
+def _allowed_way(command: Run[Any], standing: StandingArm, opened: OpenedArm, rest: Standstill) -> Plan | None:
+    """Say what the arm will do, and ask; return its way to the start of its path, if it goes there first.
+
+    Before and after, the arm must stand where it was checked.
+    """
+    c, q = standing.controller, standing.recheck(rest)
+    way = plan_to_start(c.model, q, c.path, standing.floor) if standing.approach else None
+    for sentence in announcement(c, command.task.seconds or np.inf, way, opened.announced):
+        say(sentence)
+    if not command.yes:
+        require_yes("Go on?", "The arm was not moved")
+    standing.recheck(rest)
+    return way
+
+
+def _executed(
+    command: Run[Any],
+    standing: StandingArm,
+    opened: OpenedArm,
+    way: Plan | None,
+    learnt: FreeMotion | None,
+    last: ExitStack,
+    write: Callable[[Any], None],
+) -> int:
+    """Let the arm move and report, whatever ends it; return 1 if it did not end as asked, or else 0.
+
+    All files of the run are opened first. From the report to the end of `last`, signals are only noted.
+    """
+    controller, enter = standing.controller, EnterKey()
+    latched = " Press Enter to resume." if enter.possible else " There is no terminal for resuming: end the run."
+    ending, clock = Ending(), MonotonicClock(controller.limits.period)
+    with ExitStack() as stack:
+        tell = stack.enter_context(BackgroundPrinter(say))
+        output = stack.enter_context(opened.output(controller))
+        opening = open_run_files(standing, command.record, Path(command.holds), tell, learnt, output)
+        files = stack.enter_context(opening)
+        reporter = ProgressReporter(files.recorder, tell, latched, controller)
+        options = Options(
+            enter,
+            learnt.begin if learnt else None,
+            desired=opened.commander or (lambda: None),
+            priority=command.priority,
+            cpu=command.cpu,
+            tell=tell,
+        )
+        try:
+            execute(standing, way, command.task.seconds or np.inf, reporter, clock, options, ending)
+        finally:
+            last.enter_context(noted_in_motion())
+            tell.close()
+            lines = list(ending.sentences())
+            if reporter.summary.steps:
+                lines += [*reporter.summary.sentences(clock.period), str(clock.timing())]
+            lines += filter(None, (standing.arm.report(), *(output.notes if output else ()), *files.close()))
+            say("\n".join(lines))
+            write(reporter.summary.numbers(clock.period) | ending.numbers() | {"timing": clock.timing().numbers()})
+    return int(ending.early or bool(files.trouble))

@@ -1,15 +1,14 @@
-"""What can be said after `pretouch run`."""
+"""Groups of options of `pretouch run`, some of which other commands have too."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import Annotated, Any, Generic, Literal, TypeVar, Union
+from dataclasses import dataclass
+from typing import Annotated, Literal, TypeVar
 
 import tyro
 
-from pretouch.arms import ArmOptions, arm_class, arm_names
-from pretouch.cli.options import JsonFile, OptionalFile, split_arm
-from pretouch.errors import HardwareError, ParameterError, RobotError
-from pretouch.units.udp import HOST, PORT
+from pretouch.arms import ArmOptions
+from pretouch.cli.options import OptionalFile
+from pretouch.errors import HardwareError
+from pretouch.units import HOST, PORT
 
 A = TypeVar("A", bound=ArmOptions)
 
@@ -75,64 +74,3 @@ class TaskOptions:
     """First move slowly to the start of the path."""
     floor: float | None = None
     """Height of the floor below the arm, base frame [m]; by default 0, level with its base, and -0.2 in simulation."""
-
-
-@dataclass(frozen=True)
-class Run(Generic[A]):
-    """Move an arm: checks, a guided push that confirms the force sign, the controller in real time, and rest.
-
-    `pretouch run` and `pretouch run simulated` rehearse. `pretouch run NAME` moves another arm, with options of its
-    own: franka, ros2 of the distribution pretouch-ros2, or one that another distribution adds.
-    The exit code is 1 if the run ended early or its recording failed, 2 if it was refused before anything moved.
-    """
-
-    connection: A
-    robot: RobotOptions = field(default_factory=RobotOptions)
-    units: SkinOptions = field(default_factory=SkinOptions)
-    task: TaskOptions = field(default_factory=TaskOptions)
-    record: OptionalFile = None
-    """Recording to write."""
-    json: JsonFile = None
-    holds: str = "runs/holds"
-    """Folder for the last seconds before a HOLD that lasts until a person resumes."""
-    priority: int | None = None
-    """Real-time priority of the control loop, 1 to 99; by default the process keeps its own."""
-    cpu: int | None = None
-    """Processor to run on; by default the system decides."""
-    yes: bool = False
-    """Do not ask before the arm moves."""
-
-    @staticmethod
-    def of_words(words: Sequence[str]) -> tuple[Any, Sequence[str], str]:
-        """Return the command for the arm that the first word names, the other words, and what is in front of them."""
-        name, others = split_arm(words)
-        return Run[arm_class(name)], others, f"run {name}" if len(others) < len(words) else "run"  # type: ignore[misc]
-
-    @staticmethod
-    def of_all() -> Any:
-        """Return the command with all arms as words that follow it."""
-        arms = [Annotated[arm_class(name), tyro.conf.subcommand(name)] for name in arm_names()]
-        return Run[Union[tuple(arms)]]  # type: ignore[misc]  # noqa: UP007  # made when it is asked for
-
-    def run(self) -> int | None:
-        """Move the arm. Where a signal ended the run in order, its code is the exit code."""
-        from pretouch.cli.run.command import run
-        from pretouch.cli.writing import numbers_to
-
-        check_options(self)
-        with numbers_to(self.json) as write:
-            return run(self, write) or None
-
-
-def check_options(command: Run[Any]) -> None:
-    """Raise an error for options that cannot be combined."""
-    robot, units, arm = command.robot, command.units, command.connection
-    if units.no_skin and (units.skin or units.keys):
-        raise HardwareError("--no-skin does not go with --skin and --keys: leave one or the other out.")
-    if not (units.no_skin or units.keys or arm.brings_units):
-        raise HardwareError("The arm brings no sensor units: give the file of their keys with --keys, or --no-skin.")
-    if robot.no_learnt and (robot.learnt or robot.learn_anew):
-        raise RobotError("--no-learnt does not go with --learnt and --learn-anew: leave one or the other out.")
-    units.check()
-    if not 0.0 <= command.task.seconds < float("inf"):
-        raise ParameterError(f"--seconds is {command.task.seconds:g}: give 0 or more.")

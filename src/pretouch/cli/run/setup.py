@@ -1,19 +1,21 @@
 """Arm, units, profile and path of a run, from the command line."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, cast
+from typing import cast
 
 import numpy as np
 
-from pretouch.arms import ArmSetup, OpenedArm
+from pretouch.arms import ArmOptions, OpenedArm
+from pretouch.cli.run.options import RobotOptions, SkinOptions, TaskOptions, UnitOptions
 from pretouch.cli.writing import check_writable
 from pretouch.contact.sequential_test import SequentialTest
 from pretouch.control.path import Circle, Path, WayPoints, segment
 from pretouch.controller import Controller
 from pretouch.errors import HardwareError, ParameterError
-from pretouch.perception.scene_filter import Fixtures, floor_and_pedestal
+from pretouch.perception.scene_filter import floor_and_pedestal
+from pretouch.ports import NoUnits
 from pretouch.ports import Skin as SkinPort
 from pretouch.profiles import Profile
 from pretouch.profiles import profile as find_profile
@@ -21,21 +23,14 @@ from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.robot.postures import brought_to
 from pretouch.sensing.skin import Skin, skin_for
-from pretouch.session.confirmations import state_folder
-from pretouch.session.free_motion import FreeMotion, ModelFile, model_file_of
-from pretouch.session.session import NoUnits
+from pretouch.session.memory import FreeMotion, ModelFile, model_file_of, state_folder
 from pretouch.session.terminal import say
-from pretouch.session.units import Units
-from pretouch.signals import children_undisturbed
 from pretouch.sim.paper_scenes import Placement
 from pretouch.sim.placement import assumptions, placement_for
 from pretouch.sim.scene import SceneSpec
 from pretouch.types import FloatArray
 from pretouch.units.keys import load_keys
-from pretouch.units.network_skin import NetworkSkin
-
-if TYPE_CHECKING:
-    from pretouch.cli.run.options import RobotOptions, Run, TaskOptions, UnitOptions
+from pretouch.units.skin import NetworkSkin
 
 _SHORTEST_M = 1e-5
 """A path must have a length: over so little an arm stands."""
@@ -50,28 +45,15 @@ class RunSetup:
     profile: Profile
     floor: float
     """Height of the floor below the arm, base frame [m]."""
-    task: "TaskOptions"
+    task: TaskOptions
     placement: Placement
     """Where the paper's paths are for the arm."""
     assumed: tuple[str, ...]
     """What of the arm and its path had to be assumed, a sentence each."""
 
-    @property
-    def fixtures(self) -> Fixtures:
-        """What stands still around the arm: the floor, and what its base stands on."""
-        return floor_and_pedestal(self.floor)
-
     def controller(self, q: FloatArray) -> Controller:
         """Return the controller for an arm that stands at q (n,) [rad]."""
-        return Controller(self.model, self.skin, self.fixtures, self._path(q), self.profile)
-
-    def of_arm(self, command: "Run[Any]") -> ArmSetup:
-        """Return what the arm is opened with."""
-        return ArmSetup(
-            name=command.robot.arm, model=self.model, skin=self.skin,
-            units=bool(len(self.skin)) and not command.units.keys, profile=self.profile, start=self.simulated_start,
-            floor=self.floor, priority=command.priority, yes=command.yes,
-        )  # fmt: skip
+        return Controller(self.model, self.skin, floor_and_pedestal(self.floor), self._path(q), self.profile)
 
     def simulated_start(self) -> FloatArray:
         """Joint positions (n,) [rad] at which a simulated arm begins: at its path, unless it is to go there."""
@@ -96,11 +78,10 @@ class RunSetup:
         return segment((x, y, z), (x, y, z + _SHORTEST_M))
 
 
-def run_setup(command: "Run[Any]") -> RunSetup:
+def run_setup(arm: ArmOptions, robot: RobotOptions, units: SkinOptions, task: TaskOptions) -> RunSetup:
     """Read files and parameters; what does not fit together is an error."""
-    units, task, profile = command.units, command.task, find_profile(command.task.profile)
-    arm = command.connection
-    model = RobotModel(arm.described(robot_named(command.robot.arm)))
+    profile = find_profile(task.profile)
+    model = RobotModel(arm.described(robot_named(robot.arm)))
     if units.no_skin:
         if profile.perception is not None:
             raise ParameterError(
@@ -119,12 +100,13 @@ def run_setup(command: "Run[Any]") -> RunSetup:
     placement = placement_for(model) if circle or task.path == "line" else Placement()
     assumed = assumptions(model, placement)
     if not arm.simulated:  # a real arm is what it is, wherever its path is
-        assumed = tuple(said for said in assumed if said == placement.paths_sentence(model.description.name))
+        paths = placement.paths_sentence(model.description.name)
+        assumed = tuple(sentence for sentence in assumed if sentence == paths)
     return RunSetup(model, skin, profile, floor, task, placement, assumed)
 
 
-def free_motion(options: "RobotOptions", controller: Controller, robot: str) -> FreeMotion | None:
-    """Find what is known of a robot's free motion, and say it; None where none is kept.
+def free_motion(options: RobotOptions, controller: Controller, robot: str) -> FreeMotion | None:
+    """Read what is known of a robot's free motion, and say it; None where none is remembered.
 
     Args:
         options: `learnt`, `learn_anew` and `no_learnt` of them.
@@ -144,27 +126,23 @@ def free_motion(options: "RobotOptions", controller: Controller, robot: str) -> 
     if options.learnt:
         file = ModelFile(robot, options.learnt, True)
         check_writable("free-motion file", file.path)
-    found = FreeMotion(file, controller, options.learn_anew)
-    for sentence in found.found:
-        say(sentence)
-    return found
+    motion = FreeMotion(file, controller, options.learn_anew)
+    say(motion.sentence)
+    return motion
 
 
 @contextmanager
-def heard_units(where: "UnitOptions", skin: Skin, opened: OpenedArm) -> Iterator[tuple[SkinPort, Units | None]]:
+def heard_units(where: UnitOptions, skin: Skin, opened: OpenedArm) -> Iterator[SkinPort]:
     """Hear the units of a skin: over the network where there are keys, or else those that the arm brings."""
-    if not len(skin):
-        yield NoUnits(), None
-    elif not where.keys:
-        if opened.skin is None:
+    with ExitStack() as stack:
+        units: SkinPort | None = NoUnits()
+        if len(skin) and where.keys:
+            receiver = NetworkSkin(skin.network, load_keys(where.keys), where.units_host, where.units_port)
+            units = stack.enter_context(receiver)
+        elif len(skin):
+            units = opened.skin
+        if units is None:
             raise HardwareError(f"{opened.arm.name} brings no sensor units: give the file of their keys with --keys.")
-        if opened.units is not None:
-            print(f"Receiving units at {opened.units.address[0]}:{opened.units.address[1]}.", flush=True)
-        yield opened.skin, opened.units
-    else:
-        keys = load_keys(where.keys)
-        with children_undisturbed():
-            receiver = NetworkSkin(skin.network, keys, where.units_host, where.units_port)
-        with receiver as units:
-            print(f"Receiving units at {units.address[0]}:{units.address[1]}.", flush=True)
-            yield units, units
+        if isinstance(units, NetworkSkin):
+            say(f"Receiving units at {units.address[0]}:{units.address[1]}.")
+        yield units

@@ -7,9 +7,9 @@ from pretouch.calibration.motion.follow import PlanCommander, plan_controller
 from pretouch.calibration.motion.plan import Plan
 from pretouch.errors import ExperimentError
 from pretouch.loop import Cycle, Options, run
+from pretouch.ports import NoUnits
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.session.session import NoUnits
 from pretouch.sim.imu import ImuParams, Imus, ImuSample, imu_counts
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.plant_params import PlantParams

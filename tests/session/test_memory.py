@@ -1,4 +1,4 @@
-"""What was learnt of free motion, from one run to the next."""
+"""What is remembered of a robot from one run to the next: its free motion, and bounds by physics on it."""
 
 import os
 import re
@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
+from pretouch.contact.residual_model import residual_init
 from pretouch.errors import ParameterError, RobotModelError
+from pretouch.params import SequentialParams
 from pretouch.profiles import PROFILES
 from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify
@@ -19,8 +21,14 @@ from pretouch.recording.writer import Recording
 from pretouch.robot.description import fr3
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin as skin_of_arm
-from pretouch.session.free_motion import FreeMotion, ModelFile, kept, model_file_of
-from pretouch.session.residual_file import Residual, save_residual
+from pretouch.session.memory import (
+    FreeMotion,
+    ModelFile,
+    check_learnt,
+    load_learnt,
+    model_file_of,
+    save_learnt,
+)
 from tests.following_arm import Arm
 
 PROFILE = PROFILES["pretouch"]
@@ -54,7 +62,7 @@ def learnt(file, arm, steps=200, **more):
     """Begin, let an arm follow its path, and keep what is learnt; return what is said of that."""
     free = begun(file, arm, **more)
     turned(arm, free, steps)
-    return free.keep()
+    return free.save()
 
 
 @pytest.fixture
@@ -70,12 +78,12 @@ def another(panda_model, paper_skin):
 def test_a_second_run_begins_with_what_the_first_has_learnt(file, arm, another):
     first = begun(file, arm)
     assert first.begin is None
-    assert "This robot's free motion is not known yet" in first.found[0]
+    assert "This robot's free motion is not known yet" in first.sentence
     residuals = turned(arm, first, 400)
-    (said,) = first.keep()
+    (said,) = first.save()
     assert str(file.path) in said
     second = begun(file, another, now=1e9 + DAY_S)
-    assert "this robot is known since 2001-09-09 01:46 UTC (3 s" in second.found[0]
+    assert "this robot is known since 2001-09-09 01:46 UTC (3 s" in second.sentence
     assert_array_equal(second.begin.weights, arm.state.learnt.weights)
     again = turned(another, second, 100)
     assert residuals[0] > 1.0
@@ -131,8 +139,8 @@ def test_it_adds_up_over_runs_and_keeps_since_when(file, arm, another):
     learnt(file, another, now=1e9 + DAY_S)
     third = begun(file, another, now=1e9 + 2 * DAY_S)
     assert third.begin.seen.sum() > 1.5 * arm.state.learnt.seen.sum()
-    assert "since 2001-09-09 01:46 UTC" in third.found[0]
-    assert "last saved 2001-09-10 01:46 UTC" in third.found[0]
+    assert "since 2001-09-09 01:46 UTC" in third.sentence
+    assert "last saved 2001-09-10 01:46 UTC" in third.sentence
 
 
 def test_anew_begins_with_nothing_and_replaces_what_was(file, arm, another):
@@ -141,15 +149,15 @@ def test_anew_begins_with_nothing_and_replaces_what_was(file, arm, another):
     assert second.begin is None
     assert file.path.exists()
     turned(another, second, 200)
-    second.keep()
-    assert "since 2033-05-18 03:33 UTC" in begun(file, arm, now=2e9).found[0]
+    second.save()
+    assert "since 2033-05-18 03:33 UTC" in begun(file, arm, now=2e9).sentence
 
 
 @pytest.mark.parametrize(
     ("spoil", "said"),
     [
-        (lambda text: text[: len(text) // 2], "not valid TOML"),
-        (lambda text: "", "format = None"),
+        (lambda text: text[: len(text) // 2], "holds no free motion"),
+        (lambda text: "", "missing required field `format`"),
         (lambda text: text.replace('arm = "panda"', 'arm = "fr3"'), "arm = 'fr3'"),
         (lambda text: text.replace("format = 1", "format = 2"), "format = 2"),
         (lambda text: text.replace("joint1", "joint9", 1), "has joints = "),
@@ -167,11 +175,11 @@ def test_a_file_that_cannot_be_used_is_named_and_put_aside_once_something_is_lea
     file.path.write_text(spoilt)
     free = begun(file, arm)
     assert free.begin is None
-    assert said in " ".join(free.found[0].split())
-    assert str(file.path) in free.found[0]
+    assert said in " ".join(free.sentence.split())
+    assert str(file.path) in free.sentence
     assert file.path.read_text() == spoilt
     turned(arm, free, 200)
-    assert "saved" in free.keep()[0]
+    assert "saved" in free.save()[0]
     assert file.path.with_name(file.path.name + ".unusable").read_text() == spoilt
     assert begun(file, arm).begin is not None
 
@@ -188,30 +196,11 @@ def test_a_named_file_may_be_of_another_robot_of_the_kind_but_not_of_another_kin
     named = ModelFile("panda at 172.16.0.9", file.path, True)
     found = begun(named, arm)
     assert found.begin is not None
-    assert "of panda at 172.16.0.2" in found.found[0]
+    assert "of panda at 172.16.0.2" in found.sentence
     model = RobotModel(fr3())
     other = Arm(model, skin_of_arm(model), PROFILE)
     with pytest.raises(RobotModelError, match="arm = 'panda'"):
         begun(named, other)
-
-
-@pytest.mark.parametrize(
-    ("name", "change"),
-    [
-        ("covariance", lambda a: -a),
-        ("covariance", lambda a: a + np.triu(np.ones(12), 1)),
-        ("spread", lambda a: -a),
-        ("seen", lambda a: -a - 1.0),
-    ],
-)
-def test_numbers_that_no_arm_can_have_are_not_taken(file, arm, name, change):
-    numbers = kept(arm.state.learnt)
-    numbers[name] = change(numbers[name])
-    file.path.parent.mkdir(parents=True)
-    save_residual(file.path, arm.model, Residual(numbers, file.robot, 1e9, 1e9))
-    free = begun(file, arm)
-    assert free.begin is None
-    assert "learn it anew" in free.found[0]
 
 
 def test_writing_that_fails_is_a_sentence_and_leaves_the_old_file(file, arm, another, monkeypatch):
@@ -261,3 +250,57 @@ def test_robots_have_files_of_their_own(tmp_path):
 def test_the_paper_s_detector_learns_nothing_to_keep(file, panda_model, paper_skin):
     with pytest.raises(ParameterError, match="The profile paper learns no free motion"):
         begun(file, Arm(panda_model, paper_skin))
+
+
+FRESH = residual_init(7, SequentialParams())
+
+
+def changed(name, at, value):
+    array = getattr(FRESH, name).copy()
+    array[at] = value
+    return FRESH._replace(**{name: array})
+
+
+@pytest.mark.parametrize(
+    ("name", "at", "possible", "impossible", "words"),
+    [
+        ("weights", (0, 0), -87.0, -87.1, "a weight of 87.1, beyond the 87"),  # the Panda's first joint gives 87 Nm
+        ("weights", (6, 3), 12.0, 1e6, r"a weight of 1e\+06, beyond the 12"),
+        ("weights", (0, 0), 0.0, np.nan, "a weight of nan"),
+        ("weights", (2, 8), -1.0, -1.01, "a weight of 1.01, beyond the 1 "),
+        ("weights", (0, 11), 17.0, 18.0, "a weight of 18, beyond the 17.4"),  # kg of the arm
+        ("covariance", (6, 0, 0), 143.0, 1e6, "a variance of"),
+        ("spread", (1, 1, 6), 143.0, 145.0, "a spread of 145, beyond the 144"),
+        ("spread", (0, 0, 3), 9999.0, 1e6, "a spread of"),
+    ],
+)
+def test_what_an_arm_can_have_learnt_is_bounded(panda_model, name, at, possible, impossible, words):
+    check_learnt(FRESH, panda_model)
+    check_learnt(changed(name, at, possible), panda_model)
+    with pytest.raises(ParameterError, match=words):
+        check_learnt(changed(name, at, impossible), panda_model)
+
+
+def test_what_is_saved_comes_back(panda_model, tmp_path):
+    model = FRESH._replace(weights=FRESH.weights + 0.5, queue=FRESH.queue + 1.0, waiting=np.full(1, 3))
+    save_learnt(tmp_path / "a.toml", panda_model, model, "panda at home", 1.0, 2.0)
+    back, *about = load_learnt(tmp_path / "a.toml", panda_model, SequentialParams())
+    assert np.all(back.weights == 0.5)
+    assert back.waiting[0] == 0
+    assert not back.queue.any()
+    assert about == ["panda at home", 1.0, 2.0]
+
+
+@pytest.mark.parametrize(
+    ("name", "change"),
+    [
+        ("covariance", lambda a: 0.0 * a),
+        ("covariance", lambda a: a + np.triu(np.ones(12), 1)),
+        ("covariance", lambda a: a + np.where(np.eye(12)[::-1] == 1.0, np.inf, 0.0)),
+        ("spread", lambda a: -a),
+        ("seen", lambda a: -a - 1.0),
+    ],
+)
+def test_numbers_that_no_arm_can_have_are_refused(panda_model, name, change):
+    with pytest.raises(ParameterError, match="anew"):
+        check_learnt(FRESH._replace(**{name: change(getattr(FRESH, name))}), panda_model)

@@ -1,0 +1,140 @@
+"""What program and process of an arm exchange in shared memory: commands, feedback, and how well the line kept up."""
+
+import pickle
+import struct
+from dataclasses import dataclass, field
+from enum import IntEnum
+
+from pretouch.arms.franka.limiter import PERIOD_S
+from pretouch.arms.franka.state import JOINTS, FrankaState
+from pretouch.loop import Durations, spread_table
+from pretouch.units.shared_memory import Mailbox
+from pretouch.values import value
+
+_COMMAND = struct.Struct(f"<qqd{JOINTS}d")
+_MOST = 16_384
+"""Most bytes of feedback, of which a state takes 2000 and the vendor's error names 4000, and of a report."""
+
+
+class Request(IntEnum):
+    """What the program asks of the arm."""
+
+    WAIT = 0
+    """Nothing."""
+    MOVE = 1
+    """Follow the set-points."""
+    END = 2
+    """Come to rest and end the motion."""
+    RECOVER = 3
+    """Leave the mode "reflex"."""
+    QUIT = 4
+    """End the motion, if there is one, and then the process."""
+
+
+@value
+class Command:
+    """What the program sends; the newest one counts."""
+
+    number: int
+    """Number of the request; a new number asks again."""
+    request: Request
+    stamp: float
+    """Instant of the set-point, by `time.monotonic` [s]."""
+    qd: list[float]
+    """(7,) set-point [rad/s]."""
+
+
+@value
+class Feedback:
+    """What the process reports."""
+
+    stamp: float
+    """When the state arrived, by `time.monotonic` [s]."""
+    answered: int
+    """Number of the last request that was carried out; a motion counts from its first state on."""
+    moving: bool
+    """Whether a motion is running."""
+    trouble: str
+    """A sentence on what went wrong with that request, or ''."""
+    state: FrankaState
+
+
+@dataclass
+class Communication:
+    """How the line to the arm kept up, in all motions so far."""
+
+    cycles: int = 0
+    """States that were answered with a command."""
+    lost_states: int = 0
+    """States of the arm that never came, or too late."""
+    longest_gap: float = 0.0
+    """Longest time between two states, by the arm's clock [s]."""
+    reseeds: int = 0
+    """How often the arm's desired velocity was not what it had been sent: commands were lost."""
+    success_rate: float = 1.0
+    """Smallest share of 100 commands in a row that reached the arm in time, once a hundred were sent."""
+    stale: int = 0
+    """How often the set-points went stale while the arm moved, so that it was brought to rest."""
+    answers: Durations = field(default_factory=Durations)
+    """Times from a state to the command for it, in this process [s]."""
+    in_motion: int = 0
+    """States of the motion that runs."""
+
+    def answered(self, since: float, success_rate: float, took: float) -> None:
+        """Count a state that came `since` [s] after the one before, and was answered after `took` [s]."""
+        self.cycles += 1
+        self.in_motion += 1
+        self.answers.add(took)
+        if self.in_motion > 1:
+            self.lost_states += max(round(since / PERIOD_S) - 1, 0)
+            self.longest_gap = max(self.longest_gap, since)
+        if self.in_motion > 100:
+            self.success_rate = min(self.success_rate, success_rate)
+
+    def __str__(self) -> str:
+        share = 100 * self.lost_states / max(self.cycles + self.lost_states, 1)
+        return (
+            f"{self.cycles} states answered, {self.lost_states} lost ({share:.2f} %), longest gap"
+            f" {self.longest_gap * 1e3:.0f} ms; commands lost {self.reseeds} times, success rate at least"
+            f" {100 * self.success_rate:.0f} %; set-points stale {self.stale} times.\n"
+            + spread_table({"answer": self.answers.spread()})
+        )
+
+
+class Mailboxes:
+    """Mailboxes in both directions. Passed to a spawned process, they are the same mailboxes there."""
+
+    def __init__(self) -> None:
+        self._commands, self._feedback = Mailbox(_COMMAND.size), Mailbox(_MOST)
+        self._report = Mailbox(_MOST)
+        self._number, self._command = 0, Command(0, Request.WAIT, 0.0, [0.0] * JOINTS)
+
+    def send_command(self, command: Command) -> None:
+        """Make a command the newest one."""
+        self._commands.write(_COMMAND.pack(command.number, command.request, command.stamp, *command.qd))
+
+    def newest_command(self) -> Command:
+        """Return the newest command: the same object until there is another one; WAIT before the first."""
+        number, data = self._commands.read()
+        if number != self._number:
+            request_number, request, stamp, *qd = _COMMAND.unpack(data)
+            self._number, self._command = number, Command(request_number, Request(request), stamp, qd)
+        return self._command
+
+    def send_feedback(self, feedback: Feedback) -> None:
+        """Make a state the newest one."""
+        self._feedback.write(pickle.dumps(feedback))
+
+    def newest_feedback(self) -> Feedback | None:
+        """Return the newest state; None before the first."""
+        number, data = self._feedback.read()
+        return pickle.loads(data) if number else None  # noqa: S301  our own process wrote it
+
+    def put_report(self, report: Communication) -> None:
+        """Make a report the newest one."""
+        self._report.write(pickle.dumps(report))
+
+    def report(self) -> Communication:
+        """Return the newest report."""
+        number, data = self._report.read()
+        return pickle.loads(data) if number else Communication()  # noqa: S301  our own process wrote it

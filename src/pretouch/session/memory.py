@@ -1,0 +1,310 @@
+"""What is remembered of a robot from one run to the next: its confirmed force sign, and its learnt free motion.
+
+What is read is held against bounds by physics; after a pause less of free motion is still known.
+"""
+
+import json
+import math
+import os
+import re
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import tomli_w
+
+from pretouch.atomic_write import atomic_write
+from pretouch.contact.residual_model import PLAIN, ResidualModel, prior_of, residual_init
+from pretouch.contact.sequential_test import SequentialTest
+from pretouch.controller import Controller
+from pretouch.errors import ParameterError, RobotError, RobotModelError
+from pretouch.loop import Cycle
+from pretouch.params import SequentialParams
+from pretouch.robot.model import RobotModel
+from pretouch.toml_files import read_toml
+from pretouch.types import FloatArray
+
+_SIGN_FILE, _FOLDER, _UNUSABLE = "force-sign.json", "free-motion", ".unusable"
+_FORMAT = 1
+_LASTING = ("weights", "covariance", "spread", "seen")
+"""What is saved of a model of free motion."""
+_LATEST = 253_402_300_800.0
+"""The year 10 000 [s since 1970]."""
+_ANEW = "let the arm learn its free motion again"
+_NOISIEST = 100.0
+"""Noise of the measured joint velocities times the observer's gain [rad/s^2]: a real Panda's is 0.5."""
+_DRIFT = 0.25
+"""Part of the prior's standard deviations that offset and friction may drift by while nobody looks: an arm cools."""
+_COOLING_S = 300.0  # an assumption
+
+
+@dataclass(frozen=True)
+class Identity:
+    """A robot, and through what it is spoken to: with any of it changed, the push is asked for again."""
+
+    kind: str
+    """As `panda`, `fr3`, `ros2`."""
+    address: str
+    """Where it is."""
+    connection: str
+    """Library, driver settings and versions that lie between."""
+
+    @property
+    def key(self) -> str:
+        """Name of its entry."""
+        return f"{self.kind} at {self.address}"
+
+
+def state_folder(environment: Mapping[str, str] = os.environ) -> Path:
+    """Return the folder for what is remembered, by the XDG base directory specification."""
+    named = environment.get("XDG_STATE_HOME", "")
+    base = Path(named) if os.path.isabs(named) else Path.home() / ".local" / "state"
+    return base / "pretouch"
+
+
+class ConfirmedRobots:
+    """The file of robots in a folder whose force sign a guided push has confirmed."""
+
+    def __init__(self, folder: Path) -> None:
+        self.path = folder / _SIGN_FILE
+
+    def is_confirmed(self, robot: Identity) -> bool:
+        """Whether this robot has been confirmed; a file that cannot be read is a RobotError."""
+        return self._read().get(robot.key) == robot.connection
+
+    def add(self, robot: Identity) -> None:
+        """Note that a robot is confirmed; RobotError where that cannot be written."""
+        entries = self._read() | {robot.key: robot.connection}
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            atomic_write(self.path, json.dumps(entries, indent=1))
+        except OSError as error:
+            raise RobotError(
+                f"The confirmation cannot be saved in {self.path} ({error.strerror}): make that folder writable, or"
+                " set XDG_STATE_HOME to another one."
+            ) from error
+
+    def _read(self) -> dict[str, str]:
+        try:
+            return msgspec.json.decode(self.path.read_bytes(), type=dict[str, str])
+        except FileNotFoundError:
+            return {}
+        except OSError as error:
+            raise RobotError(f"The file {self.path} cannot be read: {error.strerror}.") from error
+        except (msgspec.MsgspecError, ValueError, RecursionError):
+            raise RobotError(f"The file {self.path} is damaged: delete it, and repeat the guided pushes.") from None
+
+
+class _StoredArray(msgspec.Struct):
+    """An array in a file of free motion."""
+
+    shape: list[int]
+    values: list[float]
+
+
+class _StoredMotion(msgspec.Struct):
+    """A file of free motion."""
+
+    format: int
+    arm: str
+    joints: list[str]
+    robot: str
+    """Which robot it was learnt of, as `panda at 172.16.0.2`."""
+    since: float
+    """When that began [s since 1970, UTC]."""
+    saved: float
+    """When it was written [s since 1970, UTC]."""
+    array: dict[str, _StoredArray]
+
+
+def save_learnt(path: Path, arm: RobotModel, learnt: ResidualModel, robot: str, since: float, saved: float) -> None:
+    """Write a file of free motion; one that is there is replaced whole or, with an OSError, not at all."""
+    arrays = {name: getattr(learnt, name) for name in _LASTING}
+    stored = {name: _StoredArray(list(a.shape), a.reshape(-1).tolist()) for name, a in arrays.items()}
+    file = _StoredMotion(_FORMAT, arm.description.name, list(arm.joints), robot, since, saved, stored)
+    atomic_write(path, tomli_w.dumps(msgspec.to_builtins(file)))
+
+
+def load_learnt(path: Path, arm: RobotModel, p: SequentialParams) -> tuple[ResidualModel, str, float, float]:
+    """Read a file of free motion: the model, robot, since and saved; one that cannot be used is a RobotModelError."""
+    try:
+        stored = msgspec.convert(read_toml(path), _StoredMotion)
+    except OSError as error:
+        raise RobotModelError(f"The file {path} cannot be read: {error.strerror}: give one that was saved.") from error
+    except (ValueError, msgspec.MsgspecError) as error:  # not of TOML, not UTF-8, or of something else
+        raise RobotModelError(f"The file {path} holds no free motion: {error}: {_ANEW}.") from error
+    for key, ours in (("format", _FORMAT), ("arm", arm.description.name), ("joints", list(arm.joints))):
+        if getattr(stored, key) != ours:
+            raise RobotModelError(f"{path} has {key} = {getattr(stored, key)!r}, but {ours!r} is needed: {_ANEW}.")
+    if not (0.0 <= stored.since < _LATEST and 0.0 <= stored.saved < _LATEST):
+        raise RobotModelError(f"{path} has no possible start time: {_ANEW}.")
+    fresh, arrays = residual_init(arm.n, p), list[FloatArray]()
+    for name in _LASTING:
+        shape, array = getattr(fresh, name).shape, stored.array.get(name)
+        if array is None or array.shape != list(shape) or len(array.values) != np.prod(shape):
+            raise RobotModelError(f"{path}: {name} is not of the shape {shape}: {_ANEW}.")
+        arrays.append(np.array(array.values).reshape(shape))
+    weights, covariance, spread, seen = arrays
+    learnt = fresh._replace(weights=weights, covariance=covariance, spread=spread, seen=seen)
+    try:
+        check_learnt(learnt, arm)
+    except ParameterError as error:
+        raise RobotModelError(f"{path}: {error}") from error
+    return learnt, stored.robot, stored.since, stored.saved
+
+
+def check_learnt(learnt: ResidualModel, arm: RobotModel) -> None:
+    """Refuse, by a ParameterError, what no free motion of an arm can be: believed, it would hide every contact.
+
+    Covariances are symmetric and positive definite, variances and counts not below zero. Offset, friction and noise of
+    a joint stay within the torque it can give, the error of a link's mass within that mass, and an unknown load within
+    the mass of the arm. None is less certain than by its bound.
+    """
+    if not np.isfinite(learnt.seen).all() or learnt.spread.min() < 0.0 or learnt.seen.min() < 0.0:
+        raise ParameterError("What was learnt has a variance or a count below zero: learn it anew.")
+    torque, n = arm.description.tau_max, arm.n
+    largest = np.column_stack([*[torque] * PLAIN, np.ones((n, n)), np.full(n, arm.mechanism.links.mass.sum())])
+    noisiest = np.stack([np.full(n, _NOISIEST), torque]) ** 2
+    variance = np.diagonal(learnt.covariance, axis1=1, axis2=2)
+    for name, values, bound in (
+        ("weight", np.abs(learnt.weights), largest),
+        ("variance", variance, largest**2),
+        ("spread", learnt.spread.max(axis=0), noisiest),
+    ):
+        at = np.unravel_index(int(np.argmax(values / bound)), bound.shape)
+        if not values[at] <= bound[at]:
+            raise ParameterError(
+                f"What was learnt has a {name} of {values[at]:.3g}, beyond the {bound[at]:.3g} that this arm can have:"
+                " learn it anew."
+            )
+    covariance = learnt.covariance
+    symmetric = np.isfinite(covariance).all() and np.array_equal(covariance, covariance.swapaxes(1, 2))
+    if not symmetric or np.linalg.eigvalsh(covariance).min() <= 0.0:
+        raise ParameterError("What was learnt has a covariance that is none: learn it anew.")
+
+
+def rested(model: ResidualModel, pause_s: float, p: SequentialParams) -> ResidualModel:
+    """Return the model after a pause [s]: the mean as it was, its covariance larger, the noise covariance as it was.
+
+    Within minutes the covariance of offset and friction goes part of the way to the prior, and that of the payload all
+    of it, for what the arm holds may be another. The links' masses stay what they are.
+    """
+    n = len(model.weights)
+    prior, gone = prior_of(n, p), -math.expm1(-max(pause_s, 0.0) / _COOLING_S)
+    share = np.zeros(len(prior))
+    share[:PLAIN], share[-1] = _DRIFT**2 * gone, gone
+    left = np.sqrt(1.0 - share)
+    # scaled from both sides, by which it stays positive definite: of each variance a share is replaced by the prior's
+    covariance = model.covariance * (left[:, None] * left) + np.diag(share * prior)
+    return model._replace(covariance=covariance)
+
+
+@dataclass(frozen=True)
+class ModelFile:
+    """Where free motion is saved."""
+
+    robot: str
+    """What the robot is known by: kind, address, and the payload set in it."""
+    path: Path
+    named: bool
+    """Whether a person named the file: what cannot be used is then an error, and another robot's is taken."""
+
+
+def model_file_of(robot: str, folder: Path) -> ModelFile:
+    """Return the file of a robot in the folder of what is remembered."""
+    name = re.sub(r"[^A-Za-z0-9.]+", "-", robot).strip("-.")
+    return ModelFile(robot, folder / _FOLDER / f"{name}.toml", False)
+
+
+class FreeMotion:
+    """A recorder that remembers what the controller has learnt, and saves it at the end of a run."""
+
+    begin: ResidualModel | None = None
+    """What the controller is to begin with; None: it knows nothing."""
+    sentence = "This robot's free motion is not known yet: at first only firm pushes are detected."
+    """What is known."""
+
+    def __init__(
+        self, file: ModelFile, controller: Controller, relearn: bool = False, now: Callable[[], float] = time.time
+    ) -> None:
+        """Read what is known of the robot. A file that a person named and that cannot be used is a RobotModelError.
+
+        Args:
+            file: the file, which may be missing.
+            controller: that moves the arm, with the sequential detector.
+            relearn: whether to begin with nothing whatever the file holds.
+            now: gives the time [s since 1970].
+        """
+        self._file, self._model, self._now = file, controller.model, now
+        detector = controller.profile.detect
+        if not isinstance(detector, SequentialTest):
+            raise ParameterError(f"The profile {controller.profile.name} learns no free motion.")
+        self._params, self._period = detector, controller.limits.period
+        self._since, self._unusable = now(), False
+        self._newest: ResidualModel | None = None
+        if os.path.exists(file.path):
+            self._load()  # also where it begins anew: a file of another kind is not to be written over
+        if relearn:
+            self.begin, self._since = None, now()
+            self.sentence = "This robot's free motion is learnt again from the beginning."
+
+    def record(self, cycle: Cycle) -> None:
+        """Remember what is known after one turn of the loop."""
+        self._newest = cycle.after.learnt
+
+    def save(self) -> tuple[str, ...]:
+        """Write what is known by now, if anything was learnt; return a sentence on it. Nothing is raised."""
+        model, path = self._newest, self._file.path
+        first = residual_init(self._model.n, self._params) if self.begin is None else self.begin
+        if model is None or (np.array_equal(model.seen, first.seen) and np.array_equal(model.weights, first.weights)):
+            return ()
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            if self._unusable:
+                os.replace(path, _aside(path))
+            save_learnt(path, self._model, model, self._file.robot, self._since, self._now())
+        except OSError as error:
+            return (
+                f"The free motion learnt in this run could not be saved. {path}: {error.strerror}. The previous file is"
+                " unchanged: make the folder writable, or give another file with --learnt.",
+            )
+        return (f"Free motion saved ({self._amount(model)}): {path}",)
+
+    def _load(self) -> None:
+        file = self._file
+        try:
+            learnt, robot, since, saved = load_learnt(file.path, self._model, self._params)
+            if robot != file.robot and not file.named:
+                raise RobotModelError(f"The file {file.path} belongs to {robot}, but this robot is {file.robot}.")
+        except RobotModelError as error:
+            if file.named:
+                raise RobotModelError(f"{file.path} cannot be used as --learnt: {error}") from error
+            self._unusable = True
+            self.sentence = (
+                f"This robot's free motion starts empty: {error} If this run learns any, the file is renamed to"
+                f" {_aside(file.path).name}."
+            )
+            return
+        pause = self._now() - saved
+        self.begin = rested(learnt, pause if pause >= 0.0 else np.inf, self._params)
+        self._since = since
+        self.sentence = (
+            f"Free motion of {'this robot' if robot == file.robot else robot} is known since {_date(since)}"
+            f" ({self._amount(learnt)}, last saved {_date(saved)}): {file.path}"
+        )
+
+    def _amount(self, model: ResidualModel) -> str:
+        seconds = float(model.seen.sum()) * self._period
+        return f"{seconds:.0f} s" if seconds < 120.0 else f"{seconds / 60.0:.0f} minutes"
+
+
+def _aside(path: Path) -> Path:
+    return path.with_name(path.name + _UNUSABLE)
+
+
+def _date(instant: float) -> str:
+    return f"{datetime.fromtimestamp(instant, UTC):%Y-%m-%d %H:%M} UTC"

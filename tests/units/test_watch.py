@@ -1,0 +1,73 @@
+"""Units watched, over real sockets."""
+
+import itertools
+import time
+
+import pytest
+
+from pretouch.errors import HardwareError
+from pretouch.loop import MonotonicClock
+from pretouch.perception.scene_filter import no_fixtures
+from pretouch.units.fleet import simulated_keys
+from pretouch.units.health import HealthParams
+from pretouch.units.model_check import ModelCheck, ModelCheckParams
+from pretouch.units.skin import NetworkSkin
+from pretouch.units.watch import UnitWatch
+from tests.units.desk import Desk
+
+
+@pytest.fixture
+def units(paper_skin):
+    """Units on a desk, and what hears them."""
+    keys = simulated_keys(paper_skin.ids, 0)
+    with NetworkSkin(paper_skin.ids, keys) as skin, Desk(keys, skin.address[1]) as desk:
+        yield desk.fleet.units, skin
+
+
+@pytest.mark.slow
+def test_units_that_are_well_are_found_well_and_one_that_falls_silent_is_named(units, panda_model, paper_skin):
+    agree = ModelCheck(panda_model, paper_skin, no_fixtures(), ModelCheckParams())
+    watch, clock = UnitWatch(units[1], 0.1, agree, lambda: panda_model.description.q_ready), MonotonicClock(0.01)
+    watch.wait(clock, 20.0, 1.0)
+    assert not [finding.sentence for finding in watch.judge()[1] if finding.level == "fault"]
+
+    units[0][2].silent = True
+    end = time.monotonic() + 1.0
+    while clock.tick() < end:
+        watch.take()
+    faults = [finding for finding in watch.judge()[1] if finding.level == "fault" and finding.what != "machine"]
+    assert [finding.sentence.startswith("hand_front has sent nothing for") for finding in faults] == [True]
+
+
+def test_a_machine_too_slow_to_simulate_is_named_in_place_of_units(units, monkeypatch):
+    limits = HealthParams(settle_s=0.2, rate_hz=1e3, rate_fault_hz=1e3)
+    monkeypatch.setattr("pretouch.units.watch.HealthParams", lambda: limits)
+    left_out = itertools.count(0.0, 0.2)
+    watch, clock = UnitWatch(units[1], 0.1, left_out=lambda: next(left_out)), MonotonicClock(0.01)
+    watch.wait(clock, 20.0, 0.6)
+    end = time.monotonic() + 20.0
+    while not (faults := [finding.what for finding in watch.judge()[1] if finding.level == "fault"]):
+        assert time.monotonic() < end
+        clock.tick()
+        watch.take()
+    assert faults == ["machine"]
+
+
+def test_units_that_are_not_heard_are_named(units):
+    units[0][0].silent = True
+    with pytest.raises(HardwareError, match=f"No data from hand_left at 127.0.0.1:{units[1].address[1]}"):
+        UnitWatch(units[1], 0.1).wait(MonotonicClock(0.01), 1.5, 1.0)
+
+
+def test_a_receiver_that_has_ended_is_said(units):
+    units[1].close()
+    with pytest.raises(HardwareError, match="receiver of the units has ended"):
+        UnitWatch(units[1], 0.1).wait(MonotonicClock(0.01), 1.5, 1.0)
+
+
+def test_updates_come_in_time_and_the_last_is_marked(units):
+    updates = list(UnitWatch(units[1], 0.2).updates(0.9))
+    assert [update.last for update in updates] == [*[False] * (len(updates) - 1), True]
+    assert 0.9 <= updates[-1].elapsed < 1.4
+    heard = [one for update in updates for one in update.heard]
+    assert len({(one.unit, one.sample.sequence) for one in heard}) == len(heard) > 7 * 20
