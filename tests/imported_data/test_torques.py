@@ -9,11 +9,12 @@ import pyarrow as pa
 import pytest
 from pyarrow import parquet
 
+from pretouch.cli.detect import mapping_of
 from pretouch.errors import ParameterError, RecordingError
 from pretouch.imported_data.detect import detect
 from pretouch.imported_data.log import Choice
 from pretouch.imported_data.reading import open_log
-from pretouch.imported_data.tables import mapping_of, renamed
+from pretouch.imported_data.tables import renamed
 from pretouch.imported_data.torques import observed, torque_recording
 from pretouch.profiles import profile
 from tests.imported_data.files import write_csv

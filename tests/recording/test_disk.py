@@ -111,7 +111,7 @@ def test_a_disk_that_does_not_keep_up_is_one_sentence(controller, tmp_path, monk
 
 
 def test_a_simulation_that_outruns_the_clock_waits_for_the_disk(controller, tmp_path, monkeypatch):
-    monkeypatch.setattr(disk, "_LATE_S", 0.001)
+    monkeypatch.setattr(disk, "_BEHIND", 10)
     monkeypatch.setattr(disk, "_MOST_WAITING", 30)
     run = Run(controller)
     with Recording(tmp_path / "a.mcap", controller) as recording:

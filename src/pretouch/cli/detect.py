@@ -23,11 +23,11 @@ from pretouch.imported_data.forces import ForceRecording, read_force
 from pretouch.imported_data.log import TORQUES, Choice, LogFile
 from pretouch.imported_data.reading import open_log
 from pretouch.imported_data.results import Course, DetectorResult
-from pretouch.imported_data.tables import mapping_of
 from pretouch.imported_data.torques import TorqueRecording, torque_recording
 from pretouch.profiles import Profile, at_rate
 from pretouch.profiles import profile as find_profile
 from pretouch.text_table import TextTable
+from pretouch.toml_files import read_toml
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -125,6 +125,28 @@ class Detect:
                     raise
                 unused.append(f"Joint torques are not used: {error}")
         return read_force(file, choice), unused
+
+
+def mapping_of(text: str) -> tuple[tuple[str, str], ...]:
+    """Read a mapping: pairs THEIRS=OURS separated by commas, or the name of a TOML file of such pairs.
+
+    ParameterError for what is neither.
+    """
+    if text.endswith(".toml"):
+        try:
+            pairs = tuple(read_toml(Path(text)).items())
+        except (OSError, ValueError) as error:
+            raise ParameterError(f"The columns {text} cannot be read ({error}): give a file of TOML.") from error
+    else:
+        parts = (part.rpartition("=") for part in text.split(",") if part.strip())
+        pairs = tuple((theirs.strip(), ours.strip()) for theirs, _, ours in parts)
+    for theirs, ours in pairs:
+        if not (theirs and ours and isinstance(ours, str)):
+            raise ParameterError(
+                f"--columns has {ours!r} for {theirs!r}: write THEIRS=OURS, as tau_J_0=tau1_Nm, or FILE.toml of lines"
+                ' "THEIRS" = "OURS".'
+            )
+    return pairs
 
 
 def _by_torques(file: LogFile, choice: Choice, profiles: Sequence[Profile] | None) -> bool:

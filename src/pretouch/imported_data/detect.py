@@ -169,7 +169,7 @@ def _force_of(r: TorqueRecording, period: float) -> ForceRecording:
     time, newest, _ = cycles(r.time, period, GAP_S, hold=False)
     wrenches = [_wrench(r.model, r.q[i], r.tau_ext[i]) for i in newest]
     force = np.array([np.full(3, np.nan) if wrench is None else wrench[:3] for wrench in wrenches])
-    return ForceRecording(r.place, "", r.model, False, False, r.first_s, time, force, (), _moving(r, newest))
+    return ForceRecording(r.place, r.model, False, r.first_s, time, (), "", False, force, _moving(r, newest))
 
 
 def _moving(r: TorqueRecording, at: IntArray) -> BoolArray:

@@ -1,10 +1,8 @@
 """Forces of an arm that we know nothing of: read, and brought to our sign and frame."""
 
-from pathlib import Path
-
 import numpy as np
 
-from pretouch.imported_data.log import Choice, LogFile, Note, check_reach
+from pretouch.imported_data.log import Choice, ImportedRecording, LogFile, Note, check_reach
 from pretouch.robot.model import RobotModel
 from pretouch.types import BoolArray, FloatArray
 from pretouch.values import value
@@ -13,31 +11,17 @@ _EE_FRAMES = ("_k", "_ee", "_tcp", "_hand", "link8", "tool0", "_flange")
 
 
 @value
-class ForceRecording:
-    """An external force, as our controller would be given it. N samples in the order of time."""
+class ForceRecording(ImportedRecording):
+    """An external force, as our controller would be given it. N samples."""
 
-    place: Path
     source: str
     """The topic or column that it was taken from."""
-    model: RobotModel
     in_ee: bool
     """Whether it was taken to be in the end-effector's frame, and turned by the arm's posture."""
-    by_robot: bool
-    """Whether it was taken to be the force by the robot, and turned round."""
-    first_s: float
-    """Instant of the first sample on the recording's clock [s]."""
-    time: FloatArray
-    """(N,) since then [s]."""
     force: FloatArray
     """(N, 3) on the robot by the environment [N], base frame, NaN where there is no estimate."""
-    notes: tuple[Note, ...] = ()
     moving: BoolArray | None = None
     """(N,) whether a joint turns; None where that is not known."""
-
-    @property
-    def rate(self) -> float:
-        """Median rate of the samples [Hz]."""
-        return float(1.0 / np.median(np.diff(self.time)))
 
 
 def read_force(file: LogFile, choice: Choice) -> ForceRecording:
@@ -59,9 +43,8 @@ def read_force(file: LogFile, choice: Choice) -> ForceRecording:
     elif log.frame_id.lower().endswith(_EE_FRAMES):
         notes.append(Note("looks_ee", {"frame": log.frame_id}))
     time = log.time - log.time[0]
-    return ForceRecording(
-        log.place, log.sources["force"], log.model, in_ee, by_robot, log.time[0] / 1e9, time / 1e9, force, tuple(notes)
-    )
+    source, first = log.sources["force"], log.time[0] / 1e9
+    return ForceRecording(log.place, log.model, by_robot, first, time / 1e9, tuple(notes), source, in_ee, force)
 
 
 def _in_base(model: RobotModel, q: FloatArray, force: FloatArray) -> FloatArray:

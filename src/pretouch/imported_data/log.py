@@ -119,6 +119,26 @@ class Log:
         return log
 
 
+@value
+class ImportedRecording:
+    """What is known of an arm by a log. N samples in the order of time."""
+
+    place: Path
+    model: RobotModel
+    by_robot: bool
+    """Whether force or torques were taken to be by the robot, or to brake it, and turned round."""
+    first_s: float
+    """Instant of the first sample on the recording's clock [s]."""
+    time: FloatArray
+    """(N,) since then [s]."""
+    notes: tuple[Note, ...]
+
+    @property
+    def rate(self) -> float:
+        """Median rate of the samples [Hz]."""
+        return float(1.0 / np.median(np.diff(self.time)))
+
+
 class LogFile(Protocol):
     """A log that was opened: a table, or a bag."""
 

@@ -4,13 +4,13 @@ import csv
 import math
 import re
 from array import array
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pretouch.errors import ParameterError, RecordingError
+from pretouch.errors import RecordingError
 from pretouch.imported_data.log import (
     PARQUET,
     TORQUES,
@@ -22,7 +22,6 @@ from pretouch.imported_data.log import (
     joint_places,
     listed,
 )
-from pretouch.toml_files import read_toml
 from pretouch.types import FloatArray, IntArray
 from pretouch.values import value
 
@@ -60,11 +59,6 @@ _SHOWN = {
     "force": "force_x_N, force_y_N, force_z_N",
     "tau_ext": "tau_ext1_Nm ... or tau1_Nm ...",
 }
-
-
-Columns = tuple[tuple[str, str], ...]
-"""Columns of other programs and our names for them: `tau_J_0` and `tau1_Nm`, or all joints at once, `tau_J_*` and
-`tau*_Nm`."""
 
 
 @value
@@ -308,29 +302,7 @@ def _floats(place: Path, name: str, column: Any) -> FloatArray:
     return np.asarray(column.cast(pa.float64(), safe=False).to_numpy(), dtype=np.float64)
 
 
-def mapping_of(text: str) -> Columns:
-    """Read a mapping: pairs THEIRS=OURS separated by commas, or the name of a TOML file of such pairs.
-
-    ParameterError for what is neither.
-    """
-    if text.endswith(".toml"):
-        try:
-            pairs = tuple(read_toml(Path(text)).items())
-        except (OSError, ValueError) as error:
-            raise ParameterError(f"The columns {text} cannot be read ({error}): give a file of TOML.") from error
-    else:
-        parts = (part.rpartition("=") for part in text.split(",") if part.strip())
-        pairs = tuple((theirs.strip(), ours.strip()) for theirs, _, ours in parts)
-    for theirs, ours in pairs:
-        if not (theirs and ours and isinstance(ours, str)):
-            raise ParameterError(
-                f"--columns has {ours!r} for {theirs!r}: write THEIRS=OURS, as tau_J_0=tau1_Nm, or FILE.toml of lines"
-                ' "THEIRS" = "OURS".'
-            )
-    return pairs
-
-
-def renamed(place: Path, names: list[str], mapping: Columns) -> list[str]:
+def renamed(place: Path, names: list[str], mapping: Sequence[tuple[str, str]]) -> list[str]:
     """Return columns' names with those of a mapping in place of theirs; RecordingError for one that is not there.
 
     `*` is the number of a joint, from 0 or 1 on: where there is a column with 0, they count from 0.

@@ -7,7 +7,7 @@ from scipy.ndimage import uniform_filter1d
 
 from pretouch.errors import RecordingError
 from pretouch.imported_data.checks import GRAVITY, check_torques, check_velocities
-from pretouch.imported_data.log import TORQUES, Choice, Log, Note, check_reach
+from pretouch.imported_data.log import TORQUES, Choice, ImportedRecording, Log, Note, check_reach
 from pretouch.params import SequentialParams
 from pretouch.robot.model import RobotModel
 from pretouch.sim.observer import observe, observer_init
@@ -25,21 +25,13 @@ _SETTLED = 5.0
 
 
 @value
-class TorqueRecording:
-    """An arm's motion and the external torques on it. N samples of n joints, in the order of time."""
+class TorqueRecording(ImportedRecording):
+    """An arm's motion and the external torques on it. N samples of n joints; NaN where there is no torque."""
 
-    place: Path
     kind: str
     """What the external torques were made of: one of `TORQUES`."""
     sources: tuple[str, str]
     """Topics or first columns of the torques and of the positions."""
-    by_robot: bool
-    """Whether the torques were taken to be by the robot or to brake it, and turned round."""
-    model: RobotModel
-    first_s: float
-    """Instant of the first sample on the recording's clock [s]."""
-    time: FloatArray
-    """(N,) since then [s]."""
     q: FloatArray
     """(N, n) [rad]."""
     qd: FloatArray
@@ -47,13 +39,7 @@ class TorqueRecording:
     qd_commanded: FloatArray
     """(N, n) [rad/s]; where the recording has none, the measured ones smoothed."""
     tau_ext: FloatArray
-    """(N, n) on the robot by its environment [Nm], NaN where there is none."""
-    notes: tuple[Note, ...]
-
-    @property
-    def rate(self) -> float:
-        """Median rate of the samples [Hz]."""
-        return float(1.0 / np.median(np.diff(self.time)))
+    """(N, n) on the robot by its environment [Nm]."""
 
 
 def torque_recording(log: Log, choice: Choice) -> TorqueRecording:
@@ -81,7 +67,7 @@ def torque_recording(log: Log, choice: Choice) -> TorqueRecording:
     commanded = log.arrays.get("dq_d", smoothed(time, qd))
     sources, first = (log.sources[kind], log.sources["q"]), log.time[0] / 1e9
     return TorqueRecording(
-        log.place, kind, sources, by_robot, model, first, time, q, qd, commanded, torque, tuple(notes)
+        log.place, model, by_robot, first, time, tuple(notes), kind, sources, q, qd, commanded, torque
     )
 
 

@@ -4,7 +4,6 @@ import errno
 import os
 import threading
 import time
-from collections import deque
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from pathlib import Path
@@ -21,8 +20,8 @@ _FLUSH_S = 0.5
 _CHUNK = 1 << 18
 """Bytes of messages from which on a chunk is written: to index more at once would keep a fast loop waiting."""
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-_LATE_S = 0.2
-"""Time for which a cycle waits to be written when a run that is faster than the clock should wait too [s]."""
+_BEHIND = 100
+"""Cycles that wait to be written when a simulation should wait too."""
 _PATIENCE_S = 10.0
 """Time it then waits at most [s]."""
 _MOST_WAITING = 20_000
@@ -57,8 +56,6 @@ class Disk:
         except OSError as error:
             raise _refused(place, error) from error
         self._queue: SimpleQueue[Job | None] = SimpleQueue()
-        self._since: deque[float] = deque()
-        """When each cycle was put that is not written yet [s]."""
         self._writer = Writer(self._file, chunk_size=1 << 62)
         self._schemas: dict[str, int] = {}
         self._channels: dict[str, int] = {}
@@ -79,25 +76,14 @@ class Disk:
         self._thread = threading.Thread(target=self._work, name=f"recording {place.name}", daemon=True)
         self._thread.start()
 
-    def put(self, job: Job) -> None:
-        """Hand over what makes the messages of a cycle, in the thread."""
+    def put(self, job: Job, wait: bool = False) -> None:
+        """Hand over what makes the messages of a cycle, in the thread; with `wait`, let that catch up first."""
+        until = time.monotonic() + _PATIENCE_S
+        while wait and self._queue.qsize() > _BEHIND and self._thread.is_alive() and time.monotonic() < until:
+            time.sleep(0.002)
         if self._queue.qsize() > _MOST_WAITING and not self.trouble:
             self.trouble = f"The recording {self._place} ended early, because the disk is too slow: use a faster one."
-        self._since.append(time.monotonic())
         self._queue.put(job)
-
-    def behind(self) -> bool:
-        """Whether something has waited to be written for a while."""
-        try:
-            return time.monotonic() - self._since[0] > _LATE_S
-        except IndexError:  # the thread has just written the last
-            return False
-
-    def wait(self) -> None:
-        """Let the thread catch up for a while."""
-        until = time.monotonic() + _PATIENCE_S
-        while self._since and self._thread.is_alive() and time.monotonic() < until:
-            time.sleep(0.002)
 
     def close(self) -> None:
         """Write what waits, end the file, and stop."""
@@ -134,7 +120,6 @@ class Disk:
                     return
                 for item in job():
                     self._add(item)
-                self._since.popleft()
                 time.sleep(0)  # lets the control loop have the interpreter, if it waits for it
             if self._waiting > _CHUNK or time.monotonic() >= due:
                 self._flush()

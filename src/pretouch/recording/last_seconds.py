@@ -12,7 +12,7 @@ from pretouch.loop import Cycle
 from pretouch.recording.cycles import SNAPSHOT_S, Cycles, KeptCycle
 from pretouch.recording.run import JSON
 from pretouch.recording.simulation import Truth
-from pretouch.recording.writer import CycleFile, Recording
+from pretouch.recording.writer import Recording
 
 
 class LastSeconds:
@@ -111,11 +111,11 @@ class LastSeconds:
             number = 1
             while (place := self._folder / f"hold-{number}.mcap").exists():
                 number += 1
-            file = CycleFile(place, controller, self._about)
+            recording = Recording(place, controller, self._about)
             for kept in cycles:
-                file.put(kept)
-            file.disk.close()
+                recording.write(kept)
+            recording.close()
             self.written.append(place)
-            self.trouble = file.disk.trouble or self.trouble
+            self.trouble = recording.trouble or self.trouble
         except Exception as error:  # the arm is stopping, and nothing may come between
             self.trouble = f"The last seconds before a HOLD were not saved: {error}"

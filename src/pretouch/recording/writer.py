@@ -37,33 +37,6 @@ class Closed:
     """How it ended, for a person to read."""
 
 
-class CycleFile:
-    """A file of kept cycles, with what they are to other tools."""
-
-    def __init__(self, place: Path, controller: Controller, about: Mapping[str, JSON]) -> None:
-        self._about = about
-        self._model: RobotModel | None = None
-        self.change(controller)
-        self.disk = Disk(place)
-
-    def change(self, controller: Controller) -> None:
-        """Let the cycles from the next one on be those of another controller of the same arm."""
-        arm = controller.model.description
-        if self._model is None or self._model.description is not arm:
-            self._model = RobotModel(arm)  # for the thread: one model serves one thread
-        self._topics = ViewerTopics(controller, self._about, self._model)
-
-    def put(self, kept: KeptCycle) -> None:
-        """Hand a cycle over to the thread."""
-        self.disk.put(partial(_all_items, self._topics, kept))
-
-
-def _all_items(topics: ViewerTopics, kept: KeptCycle) -> Iterator[Item]:
-    """Yield the messages of a cycle, and what it is to tools that do not know our types."""
-    yield from items(kept)
-    yield from topics.items(inputs_of(kept.inputs).inputs, kept.step, kept.number, kept.time)
-
-
 class Recording:
     """One MCAP file that a run is written to while it goes on; a recorder of `loop.run`, and a context manager.
 
@@ -81,9 +54,10 @@ class Recording:
             controller: whose cycles will be recorded.
             about: what else is to be known of the run, as JSON has it; `scene` with `boxes` is drawn by viewers.
         """
-        self.place = Path(place)
-        self._cycles = Cycles(controller, about or {})
-        self._file = CycleFile(self.place, controller, about or {})
+        self.place, self._about = Path(place), about or {}
+        self._cycles = Cycles(controller, self._about)
+        self._show(controller)
+        self._disk = Disk(self.place)
         self._steps = 0
         self._first = self._last = self._begun_at = math.nan
         self._closed: Closed | None = None
@@ -93,7 +67,11 @@ class Recording:
     def change(self, controller: Controller) -> None:
         """Let the steps from the next one on be those of another controller of the same arm."""
         self._cycles.change(controller)
-        self._file.change(controller)
+        self._show(controller)
+
+    def _show(self, controller: Controller) -> None:
+        """Make what tools see that do not know our types, in the thread: one model serves one thread."""
+        self._topics = ViewerTopics(controller, self._about, RobotModel(controller.model.description))
 
     def record(self, cycle: Cycle, truth: Truth | None = None) -> None:
         """Keep one turn of the loop, and what only a simulation knows. Of the disk's troubles it raises none."""
@@ -103,30 +81,34 @@ class Recording:
     def keep(self, cycle: Cycle, truth: Truth | None = None) -> KeptCycle:
         """Record a cycle, and return what is kept of it: also where no file takes it any more."""
         kept = self._cycles.keep(cycle, truth)
+        self.write(kept)
+        return kept
+
+    def write(self, kept: KeptCycle) -> None:
+        """Have what is kept of a cycle written, unless nothing is written any more."""
         if self._closed is not None or self.trouble:
-            return kept
-        self._file.put(kept)
-        stamp = cycle.step.stamp
+            return
+        stamp = kept.step.stamp
         if not self._steps:
             self._first, self._begun_at = stamp, monotonic()
-        elif self._file.disk.behind() and stamp - self._first > _FASTER * (monotonic() - self._begun_at):
-            self._file.disk.wait()  # a simulation that outruns the clock can wait, a control loop cannot
+        # a simulation that outruns the clock can wait, a control loop cannot
+        wait = stamp - self._first > _FASTER * (monotonic() - self._begun_at)
+        self._disk.put(partial(_all_items, self._topics, kept), wait)
         self._steps, self._last = self._steps + 1, stamp
-        return kept
 
     @property
     def trouble(self) -> str:
         """'' or, once nothing more can be written, a sentence that says why and what the file holds."""
-        return self._file.disk.trouble
+        return self._disk.trouble
 
     def close(self) -> Closed:
         """End the file; a second time says the same again."""
         if self._closed is None:
-            self._file.disk.close()
+            self._disk.close()
             duration = self._last - self._first if self._steps else 0.0
             sentence = self.trouble or (
                 f"{self.place} holds {self._steps} control steps, {duration:.1f} s, in"
-                f" {self._file.disk.size() / 1e6:.1f} MB."
+                f" {self._disk.size() / 1e6:.1f} MB."
             )
             self._closed = Closed(self.place, self._steps, duration, sentence)
             atexit.unregister(self.close)
@@ -141,3 +123,9 @@ class Recording:
     ) -> None:
         self.close()
         self._as_context.close()
+
+
+def _all_items(topics: ViewerTopics, kept: KeptCycle) -> Iterator[Item]:
+    """Yield the messages of a cycle, and what it is to tools that do not know our types."""
+    yield from items(kept)
+    yield from topics.items(inputs_of(kept.inputs).inputs, kept.step, kept.number, kept.time)
