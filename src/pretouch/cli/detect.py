@@ -205,8 +205,8 @@ class _Answer:
         if out.suffix == ".html":
             from pretouch.reporting.page import detection_page  # needs the extra
 
-            told = [*guidance(self.results), read_from(self.recording), *self.notes]
-            page = detection_page(self.recording.place.name, told, self.tables, figures)
+            text = [*guidance(self.results), read_from(self.recording), *self.notes]
+            page = detection_page(self.recording.place.name, text, self.tables, figures)
             with unwritable_said("page", out):
                 atomic_write(out, page)
             return

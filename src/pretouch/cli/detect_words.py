@@ -14,8 +14,6 @@ _SENTENCES = {
     "no_time": "{rows} {have} no time and {were} left out.",
     "unused": "Columns that are not used: {names}.",
     "no_stamps": "Some headers have no stamp, so the times of recording are used.",
-    "drift": "The headers' stamps and the times of recording drift {seconds:.3g} s apart, so the {used}, which are"
-    " steadier, are used.",
     "not_finite": "{samples} not finite numbers and left out.",
     "sorted": "{what}: the time went backwards {times}; the samples were sorted.",
     "repeated": "{what}: a stamp was repeated {times}; the later sample counts.",
@@ -99,8 +97,8 @@ def guidance(results: Mapping[str, DetectorResult]) -> list[str]:
             f" {len(r.contacts) - both} only in {name}."
         )
     for name, r in results.items():
-        known = r.thresholds if np.isnan(r.motion_s) else None
-        texts.append(_motion_guidance(name, r) if known is None else _threshold_guidance(name, r, known))
+        thresholds = r.thresholds if np.isnan(r.motion_s) else None
+        texts.append(_threshold_guidance(name, r, thresholds) if thresholds else _motion_guidance(name, r))
     return texts
 
 

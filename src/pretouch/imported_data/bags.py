@@ -25,10 +25,6 @@ _EXTERNAL = "external_joint_torques"
 """Last part of the topic on which franka_ros2 publishes external torques, as efforts."""
 _FIELDS = {_WRENCH: ("force", "torque"), _JOINTS: ("q", "dq", "effort")}
 _STATE_FIELDS = ("q", "dq", "dq_d", "tau_ext")
-_CLOCKS_APART_S = 5.0
-"""How far header stamps may drift from the times of recording [s] before only one of the two is believed."""
-_RATES_APART = 10
-"""How many times faster than the recording's a simulation's clock may run."""
 _LATE_NS = 500_000_000
 """How far a stamp may lie before an earlier one [ns]: messages overtake each other by less."""
 _POSTURE_GAP_S, _MOTION_GAP_S = 0.2, 0.1
@@ -145,7 +141,9 @@ class Bag:
         joints = [topic for topic in topics.values() if topic.fields[0] == "q"]
         model = arm_of([name for topic in joints for name in topic.names], self._choice.arm)
         parts = [topic.rows(self._place, model if topic in joints else None) for topic in topics.values()]
-        headers, notes = _believed(parts)
+        # a simulation's stamps may begin with one of zero
+        headers = all(np.count_nonzero(rows.header == 0) <= 1 for rows in parts)
+        notes = () if headers else (Note("no_stamps", {}),)
         logs: list[Log] = []
         for topic, rows in zip(topics.values(), parts, strict=True):
             if headers:
@@ -238,28 +236,6 @@ def _franka_state(message: Any) -> tuple[tuple[str, ...], list[Sequence[float]]]
         measured, desired = message.measured_joint_state, message.desired_joint_state
         return names, [measured.position, measured.velocity, desired.velocity, message.tau_ext_hat_filtered.effort]
     return names, [message.q, message.dq, message.dq_d, message.tau_ext_hat_filtered]
-
-
-def _believed(topics: Sequence[_Rows]) -> tuple[bool, tuple[Note, ...]]:
-    """Whether the headers' stamps are used or else the times of recording, and why; where they drift, the steadier."""
-    logged, header = (np.concatenate([getattr(rows, name) for rows in topics]) for name in ("logged", "header"))
-    if not len(logged) or not np.ptp(logged):
-        return True, ()
-    if any(np.count_nonzero(rows.header == 0) > 1 for rows in topics):  # a simulation's may begin with one
-        return False, (Note("no_stamps", {}),)
-    drift = float(np.ptp(header - logged)) / 1e9
-    if drift < _CLOCKS_APART_S:
-        return True, ()
-    headers = all(_steadier(rows.header, rows.logged) for rows in topics)
-    return headers, (Note("drift", {"seconds": drift, "used": "stamps" if headers else "times of recording"}),)
-
-
-def _steadier(stamps: IntArray, logged: IntArray) -> bool:
-    """Whether stamps (N,) go on as steadily as times of recording, at whatever rate: none the same, no long step."""
-    own, other = np.diff(stamps), np.diff(logged)
-    if np.count_nonzero(own <= 0) > np.count_nonzero(other <= 0):
-        return False
-    return int(own.max(initial=0)) <= _RATES_APART * int(other.max(initial=0))
 
 
 def _check_header(place: Path, name: str, rows: _Rows) -> None:

@@ -28,9 +28,9 @@ def open_log(place: Path, choice: Choice) -> LogFile:
 
         return Bag(place, choice)
     if ending not in (*TABLES, PARQUET):
-        known = ", ".join((*BAGS, *TABLES, PARQUET))
+        formats = ", ".join((*BAGS, *TABLES, PARQUET))
         raise RecordingError(
-            f"{place} has an unknown format: give a file that ends in {known}, or the folder of a bag."
+            f"{place} has an unknown format: give a file that ends in {formats}, or the folder of a bag."
         )
     if ending == PARQUET:
         extras.PARQUET.need("A Parquet file")

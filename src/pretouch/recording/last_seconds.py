@@ -56,16 +56,16 @@ class LastSeconds:
         if self._source is None:
             return
         try:
-            kept = self._source.keep(cycle, truth)
+            packed = self._source.keep(cycle, truth)
         except RecordingError as error:  # a part of the profile remembers what no recording can hold
             if isinstance(self._source, Recording):
                 raise
             self.trouble, self._source = f"The last seconds before a HOLD are not kept: {error}", None
             return
-        self._run = kept.run or self._run
-        self._ring.append(kept)
-        if kept.state is not None:
-            self._begins.append(kept)
+        self._run = packed.run or self._run
+        self._ring.append(packed)
+        if packed.state is not None:
+            self._begins.append(packed)
         self._forget(cycle.step.stamp - self._seconds)
         if cycle.after.mode.latched and not cycle.before.mode.latched:
             self._write()

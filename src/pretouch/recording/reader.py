@@ -122,14 +122,14 @@ class Recorded:
     def _inputs(self, number: int) -> KeptInputs:
         """Return all that a step was given, the points of outside sources with it; None where a part is missing."""
         data = self._get(INPUTS, number)
-        kept = KeptInputs(None, -1, MISSING_INPUTS) if data is None else inputs_of(packed_data(data))
-        if kept.inputs is None or kept.points_at in (-1, number):
-            return kept
-        data = self._get(INPUTS, kept.points_at)
+        packed = KeptInputs(None, -1, MISSING_INPUTS) if data is None else inputs_of(packed_data(data))
+        if packed.inputs is None or packed.points_at in (-1, number):
+            return packed
+        data = self._get(INPUTS, packed.points_at)
         others = None if data is None else inputs_of(packed_data(data)).inputs
         if others is None:
             return KeptInputs(None, -1, MISSING_INPUTS)
-        return KeptInputs(replace(kept.inputs, points=others.points))
+        return KeptInputs(replace(packed.inputs, points=others.points))
 
     def __iter__(self) -> Iterator[Kept]:
         return (self[i] for i in range(len(self)))

@@ -252,8 +252,8 @@ def _way(name: str, hint: Any, rows: bool) -> Callable[[Any], Any]:
     get = attrgetter(name)
     if get_origin(hint) in (Union, UnionType):  # of a class and None
         (inner_hint,) = (inner for inner in get_args(hint) if inner is not NoneType)
-        there, made = attrgetter(f"has_{name}"), _way(name, inner_hint, rows)
-        return lambda message: made(message) if there(message) else None
+        is_there, make = attrgetter(f"has_{name}"), _way(name, inner_hint, rows)
+        return lambda message: make(message) if is_there(message) else None
     if isinstance(hint, type) and issubclass(hint, Enum):
         return lambda message: hint(get(message))
     if is_record(hint):

@@ -110,15 +110,15 @@ class Run:
 
     def __init__(self, sequence: int, data: bytes) -> None:
         """Take the number of the first step it made, and what `packed_run` returned."""
-        kept = unpacked(_KeptRun, data)
-        self._kept, self.sequence = kept, sequence
-        self.versions = kept.versions
+        run = unpacked(_KeptRun, data)
+        self._kept, self.sequence = run, sequence
+        self.versions = run.versions
         """Program, libraries and machine it ran on."""
-        self.started = kept.started
+        self.started = run.started
         """When it began [s since 1970, UTC]."""
-        self.about: dict[str, JSON] = kept.about
+        self.about: dict[str, JSON] = run.about
         """Facts that the caller gave."""
-        self.profile: Profile = _sound(lambda: from_table(Profile, kept.profile))
+        self.profile: Profile = _sound(lambda: from_table(Profile, run.profile))
 
     @cached_property
     def model(self) -> RobotModel:

@@ -97,9 +97,9 @@ class RunRecord(DetectorRecord):
     @property
     def detected(self) -> BoolArray:
         """(S,) whether a contact was found in a step."""
-        found = np.zeros(len(self), dtype=np.bool_)
-        found[[i for i, _, _ in self.contacts]] = True
-        return found
+        flags = np.zeros(len(self), dtype=np.bool_)
+        flags[[i for i, _, _ in self.contacts]] = True
+        return flags
 
     @property
     def true_force(self) -> FloatArray:
@@ -120,8 +120,8 @@ _AS_THEY_ARE = (
 
 def columns_of(steps: Sequence[ControlStep]) -> Columns:
     """Return the arrays of a `RunRecord` that steps with the same units tell alone."""
-    found: Columns = {name: np.array([getattr(step, name) for step in steps]) for name in _AS_THEY_ARE}
-    return found | {
+    columns: Columns = {name: np.array([getattr(step, name) for step in steps]) for name in _AS_THEY_ARE}
+    return columns | {
         "time": np.array([step.stamp for step in steps]),
         "mode": np.array([MODES.index(step.mode) for step in steps]),
         "thresholds": np.array([step.thresholds for step in steps]),

@@ -171,30 +171,30 @@ def verify(
     state: ControllerState | None = None
     before: tuple[int, int] | None = None
     for i in range(len(recorded)):
-        kept = recorded[i]
-        number = kept.number
+        cycle = recorded[i]
+        number = cycle.number
         if before is not None and number > before[1] + 1:
             verdict.skipped[_GONE] += number - before[1] - 1
-        if before != (kept.run, number - 1):
+        if before != (cycle.run, number - 1):
             state = None
-        before = kept.run, number
-        if kept.run not in controllers:
-            controllers = {kept.run: recorded.runs[kept.run].controller(path)}
+        before = cycle.run, number
+        if cycle.run not in controllers:
+            controllers = {cycle.run: recorded.runs[cycle.run].controller(path)}
         parts: list[Difference] = []
-        if kept.snapshot is not None:
-            if state is not None and exact[kept.run] and not kept.anew:
-                parts += differing(kept.snapshot, state, True, "state before")
-            state = kept.snapshot
-        if state is None or kept.inputs is None:
-            missing = _MISSING if kept.unreadable == MISSING_INPUTS else _NO_INPUTS
-            verdict.skipped[_NO_SNAPSHOT if kept.inputs is not None else missing] += 1
+        if cycle.snapshot is not None:
+            if state is not None and exact[cycle.run] and not cycle.anew:
+                parts += differing(cycle.snapshot, state, True, "state before")
+            state = cycle.snapshot
+        if state is None or cycle.inputs is None:
+            missing = _MISSING if cycle.unreadable == MISSING_INPUTS else _NO_INPUTS
+            verdict.skipped[_NO_SNAPSHOT if cycle.inputs is not None else missing] += 1
             state = None
         else:
-            step, state = controllers[kept.run].step(state, kept.inputs)
-            if not exact[kept.run] or encode(step, number) != recorded.step_data(i):
-                parts += differing(kept.step, step, exact[kept.run])
+            step, state = controllers[cycle.run].step(state, cycle.inputs)
+            if not exact[cycle.run] or encode(step, number) != recorded.step_data(i):
+                parts += differing(cycle.step, step, exact[cycle.run])
             verdict.checked += 1
-        verdict.note(number, kept.step.stamp, parts)
+        verdict.note(number, cycle.step.stamp, parts)
         progress(i + 1)
     return verdict
 
@@ -208,5 +208,5 @@ def _elsewhere(runs: tuple[Run, ...]) -> str:
         for name in sorted({*run.versions, *here})
         if run.versions.get(name) != here.get(name)
     }
-    shown = ", ".join(f"{name} {there}, here {now}" for name, (there, now) in differ.items())
-    return f"It was made with {shown}: sums may round otherwise." if differ else ""
+    listed = ", ".join(f"{name} {there}, here {now}" for name, (there, now) in differ.items())
+    return f"It was made with {listed}: sums may round otherwise." if differ else ""

@@ -148,9 +148,9 @@ def range_item(
 ) -> Item:  # fmt: skip
     """Return a unit's reading measured at a stamp [s], logged at an instant [ns]: distance [m] and `RangeStatus`."""
     at = header(nanoseconds(stamp, time), unit_id)
-    shown = _single(distance) if status in _MEASURED else math.inf
+    seen_m = _single(distance) if status in _MEASURED else math.inf
     sees = sensor.angle, sensor.nearest_m, sensor.farthest_m
-    message = messages().make(RANGE, at, _INFRARED, *sees, shown, _ACCURACY_M**2)
+    message = messages().make(RANGE, at, _INFRARED, *sees, seen_m, _ACCURACY_M**2)
     return _item(f"/skin/{topic_name(unit_id)}/range", RANGE, sequence, time, message)
 
 

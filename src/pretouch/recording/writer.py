@@ -80,9 +80,9 @@ class Recording:
 
     def keep(self, cycle: Cycle, truth: Truth | None = None) -> KeptCycle:
         """Record a cycle, and return what is kept of it: also where no file takes it any more."""
-        kept = self._cycles.keep(cycle, truth)
-        self.write(kept)
-        return kept
+        packed = self._cycles.keep(cycle, truth)
+        self.write(packed)
+        return packed
 
     def write(self, kept: KeptCycle) -> None:
         """Have what is kept of a cycle written, unless nothing is written any more."""
