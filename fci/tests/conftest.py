@@ -1,7 +1,7 @@
 """A served arm in a thread, a client that speaks bytes, and the vendor's clients, each in a process of its own.
 
-Of the product's tests these use three modules that know nothing of any distribution: `tests.needs` (what is skipped is
-said in one way), `tests.ports` and `tests.fuzz.mutations`.
+Of the product's tests these use two modules that know nothing of any distribution: `tests.needs` (what is skipped is
+said in one way) and `tests.ports`.
 """
 
 import itertools
@@ -26,8 +26,7 @@ from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.sim.scene import SceneSpec
 from pretouch_fci.arm import ArmSetup, ServedArm
-from pretouch_fci.options import ServeOptions
-from pretouch_fci.server import FciServer
+from pretouch_fci.server import FciServer, ServeOptions
 from pretouch_fci.wire import CONNECT, ERRORS, HEADER, PROTOCOLS, Protocol, RobotKind
 
 _VENDOR = Path(__file__).with_name("vendor_client.py")
@@ -94,7 +93,7 @@ def serve(host):
     with ExitStack() as running:
 
         def start(kind: RobotKind = "panda", setup: dict[str, Any] | None = None, **options: Any) -> Served:
-            given = ServeOptions(**{"host": host, "lockstep": True, "patience_s": 5.0, **options})
+            given = ServeOptions(**{"host": host, "lockstep": True, "patience": 5.0, **options})
             served = Served(arm_of(kind, **(setup or {})), given)
             running.callback(served.stop)
             return served

@@ -2,7 +2,6 @@
 
 import csv
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -18,7 +17,7 @@ from pretouch.sensing.skin import paper_skin
 from pretouch.units.keys import Keys, save_keys
 from pretouch.units.receiver import SkinReceiver
 from pretouch_fci.motion import Setpoint
-from pretouch_fci.serve import TypedPushes
+from pretouch_fci.typed import TypedPushes
 from pretouch_fci.wire import PANDA, Controller, Generator, RobotMode
 
 
@@ -55,7 +54,8 @@ def test_its_units_are_heard_in_real_time(tmp_path):
     save_keys(keys, tmp_path / "keys.toml")
     with SkinReceiver(skin.ids, keys) as receiver:
         units = f"127.0.0.1:{receiver.address[1]}"
-        with _served("--robot", "fr3", "--units", units, "--keys", str(tmp_path / "keys.toml")) as server:
+        words = "--units", units, "--keys", str(tmp_path / "keys.toml"), "--loss", "0.1"
+        with _served("--robot", "fr3", *words) as server:
             _address(server)
             while not all(unit.accepted for unit in receiver.units):
                 receiver.receive(timeout=5.0)
@@ -66,7 +66,6 @@ def test_its_units_are_heard_in_real_time(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--port", "70000"], "must be at most 65535"),
         (["--host", "192.0.2.1"], "Listening on 192.0.2.1:1337 failed"),
         (["--drop", "3"], "as 3/50"),
         (["--push", "1:2"], "as 2.0:0,15,0:0.5"),
@@ -75,7 +74,6 @@ def test_its_units_are_heard_in_real_time(tmp_path):
         (["--units", "127.0.0.1:7337"], "needs --keys"),
         (["--hand", "--scene", "static"], "--hand needs --scene empty"),
         (["--scene", "nonesuch"], "--scene is nonesuch: give empty, static, dynamic, or an MJCF file"),
-        (["--seed", "-1"], "give 0 or more"),
         (
             ["--start", "-0.1,0"],
             "--start is '-0.1,0': give ready, path, or 7 joint angles between commas",
@@ -85,13 +83,26 @@ def test_its_units_are_heard_in_real_time(tmp_path):
         (["--box", "1,1,1"], "give centre and edges, such as 0.5,0.3,0.4:0.3,0.04,0.24"),
         (["--box", "0,0,nan:1,1,1"], "--box is '0,0,nan:1,1,1'"),
         (["--box", "0.4,0,0.5:0.3,0.3,0.3"], "The arm touches something where it stands at first"),
-        (["--scene", "static", "--stiffness", "0"], "--stiffness is 0 N/m: give more than 0"),
-        (["--scene", "static", "--stiffness", "nan"], "--stiffness is nan N/m"),
         (["--truth", "/nowhere/truth.csv"], "The truth cannot be written"),
     ],
 )
 def test_what_cannot_be_served_is_said_in_a_sentence(arguments, words, capsys):
     assert main(["serve-fci", *arguments]) == 2
+    assert words in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "words"),
+    [
+        ("--port", "70000", "port is 70000: it must be at most 65535"),
+        ("--seed", "-1", "seed is -1: it must be at least 0"),
+        ("--stiffness", "0", "stiffness is 0.0: it must be greater than 0"),
+        ("--stiffness", "nan", "stiffness is nan: it must be finite"),
+    ],
+)
+def test_a_number_out_of_its_range_is_said(option, value, words, capsys):
+    with pytest.raises(SystemExit, match="2"):
+        main(["serve-fci", option, value])
     assert words in capsys.readouterr().err
 
 
@@ -176,33 +187,6 @@ def test_an_arm_that_is_led_by_hand_hears_what_is_typed_but_in_lockstep(arm, pip
         arm.step(None)
     typed.take()
     assert arm.mode is RobotMode.IDLE
-
-
-def test_a_line_without_an_end_is_not_kept_whole(arm, pipe, capsys):
-    typed = TypedPushes(arm, pipe[0], program=True)
-    for _ in range(50):
-        pipe[1].write(b"0,15,0" + 4000 * b" ")
-        typed.take()
-    assert capsys.readouterr().out == ""
-    pipe[1].write(b"\n" + b"time\n")
-    typed.take()
-    refused, time = capsys.readouterr().out.splitlines()
-    assert refused == "A line of more than 256 characters is left out."
-    assert time.startswith("The arm's time is")
-    arm.step(None)
-    assert not arm.true_force.any()
-
-
-def test_a_push_that_is_over_is_said_with_what_the_arm_measured_of_it(arm, pipe, capsys):
-    typed = TypedPushes(arm, pipe[0], program=True)
-    pipe[1].write(b"0,20,0:0.4\n")
-    for _ in range(650):
-        typed.take()
-        arm.step(None)
-    (said,) = capsys.readouterr().out.splitlines()
-    found = re.fullmatch(r"The push of 20 N is over. The arm's estimate of it came to ([\d.]+) N; .*", said)
-    assert found is not None
-    assert 15.0 < float(found[1]) < 30.0
 
 
 def test_nobody_types_where_there_is_no_terminal(arm, tmp_path):

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from fci.tests.conftest import errors_of
 
-from pretouch_fci.options import Drop
 from pretouch_fci.wire import ERRORS, HEADER, PROTOCOLS
 
 _REFLEX, _IDLE, _MOVE = 4, 1, 2
@@ -137,12 +136,17 @@ def test_numbers_that_are_none_end_the_motion(serve, raw, generator, error, bad)
         assert client.request("AutomaticErrorRecovery") == b"\0"
 
 
-def test_a_motion_may_not_end_while_it_moves(serve, raw):
+@pytest.mark.parametrize(("generator", "axis", "prefix"), [(1, 6, "joint"), (3, 2, "cartesian")])
+def test_a_motion_may_not_end_while_it_moves(serve, raw, generator, axis, prefix):
     client = raw(serve())
-    state = _sped_up(client, 0.3)
-    state = client.turn(state, state["dq_d"], finished=True)
+    state, velocity = client.begun(generator), np.zeros(7 if generator == 1 else 6)
+    for _ in range(100):
+        velocity[axis] += 1e-3
+        state = client.moved(state, velocity)
+    state = client.turn(state, velocity, finished=True)
     assert client.ended() == "reflex"
-    assert errors_of(state) == ["joint_motion_generator_velocity_discontinuity"] == errors_of(state, "reflex_reason")
+    error = [f"{prefix}_motion_generator_velocity_discontinuity"]
+    assert errors_of(state) == errors_of(state, "reflex_reason") == error
 
 
 def test_commands_of_other_states_sizes_and_senders_are_no_commands(serve, raw, kind):
@@ -165,7 +169,7 @@ def test_commands_of_other_states_sizes_and_senders_are_no_commands(serve, raw, 
 
 def test_twenty_lost_commands_in_a_row_end_the_motion(serve, raw):
     # the very first command is never lost: so nineteen, and from the sixtieth millisecond on twenty
-    client = raw(serve(drop=Drop(20, 60)))
+    client = raw(serve(drop="20/60"))
     state, rates = client.begun(), []
     while state["robot_mode"] == _MOVE:
         state = client.turn(state, _STILL)
@@ -278,7 +282,7 @@ def test_requests_in_pieces_and_in_one_go_are_understood(serve, raw):
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_nothing_that_is_sent_kills_the_server(serve, raw, kind, seed):
-    served, rng = serve(kind, patience_s=0.02), np.random.default_rng([seed, 8])
+    served, rng = serve(kind, patience=0.02), np.random.default_rng([seed, 8])
     for _ in range(12):
         client = raw(served)
         if rng.random() < 0.7:
@@ -295,6 +299,8 @@ def test_nothing_that_is_sent_kills_the_server(serve, raw, kind, seed):
                 client.tcp.sendall(_some_request(client.protocol, rng))
             except OSError:  # let go: states have ended
                 break
+            frames = served.arm.frames
+            assert np.all(np.isfinite([*frames.F_T_EE.ravel(), *frames.load.inertia.ravel()]))
         client.close()
     assert raw(served).connected[0] == 0
 

@@ -8,8 +8,7 @@ from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.sim.scene import SceneSpec
 from pretouch_fci.arm import ArmSetup, ServedArm
-from pretouch_fci.options import ServeOptions
-from pretouch_fci.server import FciServer
+from pretouch_fci.server import FciServer, ServeOptions
 
 model = RobotModel(robot_named("fr3"))
 with ServedArm(ArmSetup(model, "fr3", model.description.q_ready.copy(), SceneSpec())) as arm:

@@ -14,14 +14,8 @@ from pretouch.sim.scene import SceneSpec
 from pretouch.sim.tcp_push import Pushes, TcpPush
 from pretouch.types import FloatArray
 from pretouch_fci.cartesian import CARTESIAN_LIMITS, Body, CartesianPose, CartesianVelocity
-from pretouch_fci.collision import Contacts, SelfCollision, default_behavior
-from pretouch_fci.controllers import (
-    CARTESIAN_STIFFNESS,
-    CartesianImpedance,
-    DriveController,
-    ExternalTorques,
-    guiding,
-)
+from pretouch_fci.collision import DEFAULT_BEHAVIOR, Contacts, SelfCollision
+from pretouch_fci.controllers import CARTESIAN_STIFFNESS, CartesianImpedance, ExternalTorques, guiding
 from pretouch_fci.frames import Inertial, announce, frames_of, inertials
 from pretouch_fci.gripper import Gripper, GripperObject
 from pretouch_fci.kinds import JointPosition, JointVelocity, MotionKind, NoMotion
@@ -93,7 +87,7 @@ class ServedArm:
         self.guiding_axes = np.ones(JOINTS, np.bool_)
         """Which axes of the end-effector, and whether the elbow, can be moved by hand in guiding mode."""
         self._flange, self._announced = inertials(model)[self.frames.flange], self.frames.load
-        self._drives: DriveController | None = None
+        self._drives: ExternalTorques | CartesianImpedance | None = None
         self._since_motion, self._stop_pressed = _COMES_TO_REST, False
         for _ in range(round(SETTLE_S / PERIOD_S)):
             self._pass_time()
@@ -217,7 +211,7 @@ class ServedArm:
 
     def forget_settings(self) -> None:
         """Undo what a client has set: the next one finds the arm as it was delivered."""
-        self.contacts.behavior, self.frames = default_behavior(), frames_of(self.model)
+        self.contacts.behavior, self.frames = DEFAULT_BEHAVIOR, frames_of(self.model)
         self.cartesian_stiffness, self.guiding_axes = CARTESIAN_STIFFNESS, np.ones(JOINTS, np.bool_)
         self.plant.set_stiffness(np.array(self.plant.params.stiffness_nm_rad))
         self.announce(self.frames.load)
@@ -269,12 +263,12 @@ class ServedArm:
         return self.report.q_commanded
 
     def _pass_time(self) -> None:
-        asked = None if self._drives is None else self._drives.torques()
-        if asked is not None:
-            self.plant.drive_by(asked)
+        tau = None if self._drives is None else self._drives.torques()
+        if tau is not None:
+            self.plant.drive_by(tau)
         self.plant.advance(PERIOD_S)
         self.report = self.plant.read()
-        self.torques.update(self.report.q, asked)
+        self.torques.update(self.report.q, tau)
         self.true_force = self.plant.true_force + self.pushes.force
         """(3,) all forces on the arm [N], base frame."""
         self.plant.take_log()
@@ -327,7 +321,7 @@ class JointTorques:
     def _keep(self, _time: float) -> None:
         self._before = self._qd.copy()
 
-    def update(self, q: FloatArray, asked: FloatArray | None = None) -> None:
+    def update(self, q: FloatArray, tau: FloatArray | None = None) -> None:
         """Take in a physics step that led to measured positions q (n,) [rad], under torques (n,) if any were asked."""
         p, gravity = self._plant.params, np.empty(len(q))
         self._plant.model.mass_matrix_and_bias(q, self._still, gravity)
@@ -336,7 +330,7 @@ class JointTorques:
         measured = motor - p.armature_kg_m2 * self._qdd - p.friction_compensated * lost
         self.rate = (measured - self.measured) / p.period_s if self._known else self._still
         self.measured, self._known = measured, True
-        self.desired = motor - gravity if asked is None else asked
+        self.desired = motor - gravity if tau is None else tau
 
     def _lost(self, qd: FloatArray) -> FloatArray:
         """Torques (n,) [Nm] lost to friction at velocities qd (n,) [rad/s]."""

@@ -1,7 +1,7 @@
 """Motions of the end-effector, by poses or velocities: limits, elbow, and the joints that follow."""
 
 import math
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -11,7 +11,7 @@ from pretouch.control.commander import rotation_about
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray
 from pretouch_fci.frames import Frames, pose, pose_of
-from pretouch_fci.kinds import START_M, START_RAD, Asked
+from pretouch_fci.kinds import START_M, START_RAD, Asked, MotionKind
 from pretouch_fci.limits import PERIOD_S, SLACK
 from pretouch_fci.wire import JOINTS, Generator, RobotKind
 
@@ -77,7 +77,7 @@ class Body(NamedTuple):
         return T, self.model.jacobian(kin, flange, T[:3, 3])
 
 
-class _OfEndEffector(ABC):
+class _OfEndEffector(MotionKind):
     """What both kinds of motion of the end-effector have in common."""
 
     moves_at_end = f"{_PREFIX}_velocity_discontinuity"
@@ -93,7 +93,7 @@ class _OfEndEffector(ABC):
 
     @property
     def commanded(self) -> FloatArray:
-        """Velocities and rates, as of `MotionKind`; those of an elbow that is not commanded are 0."""
+        """Velocities and rates; those of an elbow that is not commanded are 0."""
         return self._now
 
     def read(self, command: np.void) -> FloatArray:
@@ -133,11 +133,11 @@ class _OfEndEffector(ABC):
     def _follow(self, q: FloatArray, twist: FloatArray, elbow: float | None, T: FloatArray | None = None) -> Asked:
         """Check velocities (6,) of the end-effector and find the joints that lead it to T, or where they lead."""
         speed = 0.0 if elbow is None else (elbow - q[_ELBOW]) / PERIOD_S
-        wanted = np.append(twist, speed)
-        errors = self._body.limits.violated(self._now, wanted)
+        velocities = np.append(twist, speed)
+        errors = self._body.limits.violated(self._now, velocities)
         if errors:
             return Asked(np.zeros(JOINTS), errors)
-        self._now = np.stack([wanted, (wanted - self._now[0]) / PERIOD_S])
+        self._now = np.stack([velocities, (velocities - self._now[0]) / PERIOD_S])
         if T is None:
             T = _advanced(self._body.end_effector(q)[0], twist)
         return Asked((self._reached(q, T, elbow) - q) / PERIOD_S)
@@ -159,10 +159,6 @@ class CartesianVelocity(_OfEndEffector):
 
     generator, field, _size = Generator.CARTESIAN_VELOCITY, "O_dP_EE_c", 6
     not_a_number = f"{_PREFIX}_velocity_limits_violation"
-
-    def start(self, values: FloatArray, q: FloatArray) -> FloatArray | None:
-        """Leave it open: velocities begin anywhere."""
-        return None
 
     def _of_field(self, field: FloatArray, q: FloatArray, elbow: float | None, first: bool) -> Asked:
         return self._follow(q, field, elbow)

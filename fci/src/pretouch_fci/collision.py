@@ -3,8 +3,7 @@
 Pure but for its own memory.
 """
 
-from dataclasses import dataclass
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -13,8 +12,6 @@ from pretouch.robot.postures import capsule_ends, kinematics_of, self_distances
 from pretouch.types import BoolArray, FloatArray
 from pretouch_fci.wire import JOINTS
 
-_DEFAULT = 20.0
-"""Thresholds before any are set [Nm, N]: those the vendor's examples set."""
 _LOOKS_EVERY = 10
 """In so many milliseconds the arm looks once whether it comes into itself."""
 _CLOSES_M = 1e-5
@@ -23,63 +20,46 @@ _MOVING = 1e-3
 """Commanded acceleration from which the thresholds for accelerations hold [rad/s^2]."""
 
 
-@dataclass(frozen=True, slots=True)
-class Thresholds:
-    """From where on there is a contact (lower) and a collision (upper)."""
+class CollisionBehavior(NamedTuple):
+    """From where on there is a contact and a collision.
 
-    lower_torque: FloatArray
-    """(7,) [Nm]"""
-    upper_torque: FloatArray
-    """(7,) [Nm]"""
-    lower_force: FloatArray
-    """(6,) [N, Nm]"""
-    upper_force: FloatArray
-    """(6,) [N, Nm]"""
+    The first axis tells whether the robot changes its speed or goes steadily; the second has the lower threshold, of a
+    contact, and the upper one, of a collision.
+    """
 
-
-@dataclass(frozen=True, slots=True)
-class CollisionBehavior:
-    """Thresholds while the robot speeds up or slows down, and at constant speed."""
-
-    accelerating: Thresholds
-    steady: Thresholds
+    torque: FloatArray
+    """(2, 2, 7) [Nm]"""
+    force: FloatArray
+    """(2, 2, 6) [N, Nm]"""
 
     @classmethod
     def of(cls, values: FloatArray) -> Self | None:
         """Read the body (52,) of the request that sets it; None if a number in it is no threshold."""
         if not np.all(np.isfinite(values)) or np.any(values < 0):
             return None
-        torques, forces = values[: 4 * JOINTS].reshape(4, JOINTS), values[4 * JOINTS :].reshape(4, 6)
-        return cls(
-            Thresholds(torques[0], torques[1], forces[0], forces[1]),
-            Thresholds(torques[2], torques[3], forces[2], forces[3]),
-        )
+        return cls(values[: 4 * JOINTS].reshape(2, 2, JOINTS), values[4 * JOINTS :].reshape(2, 2, 6))
 
 
-def default_behavior() -> CollisionBehavior:
-    """Return what holds before anything is set."""
-    same = Thresholds(*(np.full(n, _DEFAULT) for n in (JOINTS, JOINTS, 6, 6)))
-    return CollisionBehavior(same, same)
+DEFAULT_BEHAVIOR = CollisionBehavior(np.full((2, 2, JOINTS), 20.0), np.full((2, 2, 6), 20.0))
+"""Before any is set: that of the vendor's examples."""
 
 
 class Contacts:
     """Which joints and directions are in contact, and which in collision; the latter until they are forgotten."""
 
     def __init__(self) -> None:
-        self.behavior = default_behavior()
+        self.behavior = DEFAULT_BEHAVIOR
         self.joint_contact, self.cartesian_contact = np.zeros(JOINTS, np.bool_), np.zeros(6, np.bool_)
-        self.joint_collision, self.cartesian_collision = np.zeros(JOINTS, np.bool_), np.zeros(6, np.bool_)
+        self.forget()
 
     def update(self, torques: FloatArray, wrench: FloatArray, qdd: FloatArray) -> tuple[str, ...]:
         """Take external torques (7,) [Nm] and the wrench (6,) [N, Nm]; return the reflexes they cause.
 
         `qdd` (7,) are the commanded accelerations [rad/s^2].
         """
-        moving = bool(np.any(np.abs(qdd) > _MOVING))
-        limits = self.behavior.accelerating if moving else self.behavior.steady
-        torque, force = np.abs(torques), np.abs(wrench)
-        self.joint_contact, self.cartesian_contact = torque > limits.lower_torque, force > limits.lower_force
-        joint, cartesian = torque > limits.upper_torque, force > limits.upper_force
+        steady = int(not np.any(np.abs(qdd) > _MOVING))
+        self.joint_contact, joint = np.abs(torques) > self.behavior.torque[steady]
+        self.cartesian_contact, cartesian = np.abs(wrench) > self.behavior.force[steady]
         self.joint_collision, self.cartesian_collision = (
             self.joint_collision | joint,
             self.cartesian_collision | cartesian,

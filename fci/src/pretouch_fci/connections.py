@@ -58,10 +58,10 @@ class Connection:
         if not data:
             raise Disconnected(CLOSED)
         self._received += data
-        found = []
+        requests = []
         while (request := self._next(interface)) is not None:
-            found.append(request)
-        return found
+            requests.append(request)
+        return requests
 
     def _next(self, interface: Interface) -> Request | None:
         header = interface.header

@@ -1,7 +1,5 @@
 """What acts in place of the drives' own joint impedance: Cartesian impedance, guiding, and torques from outside."""
 
-from typing import Protocol
-
 import numpy as np
 
 from pretouch.sim.plant import Plant
@@ -19,14 +17,6 @@ _TORQUE_RATE_NM_S = 1000.0
 """How fast commanded torques may change (libfranka, `rate_limiting.h`)."""
 
 
-class DriveController(Protocol):
-    """What the drives do instead of their joint impedance."""
-
-    def torques(self) -> FloatArray:
-        """Return the torques (7,) for the next millisecond, without gravity's [Nm]."""
-        ...
-
-
 class ExternalTorques:
     """Torques that a client commands."""
 
@@ -40,14 +30,14 @@ class ExternalTorques:
         """Take torques (7,) [Nm], or return the errors: too far from those before, or beyond the limits."""
         with np.errstate(over="ignore"):
             jumps = np.abs(wanted - self._near).min(axis=0) > _TORQUE_RATE_NM_S * PERIOD_S * (1 + SLACK)
-        found = {"controller_torque_discontinuity": jumps, "tau_j_range_violation": np.abs(wanted) > self._most}
-        errors = tuple(name for name, wrong in found.items() if wrong.any())
+        violations = {"controller_torque_discontinuity": jumps, "tau_j_range_violation": np.abs(wanted) > self._most}
+        errors = tuple(name for name, wrong in violations.items() if wrong.any())
         if not errors:
             self._values, self._near = wanted, wanted[None]
         return errors
 
     def torques(self) -> FloatArray:
-        """Return the last torques that were taken: a lost command leaves them as they are."""
+        """Return the last torques (7,) that were taken, without gravity's [Nm]: a lost command leaves them."""
         return self._values
 
 
@@ -72,7 +62,7 @@ class CartesianImpedance:
         self._rotor = plant.params.armature_kg_m2 * np.eye(plant.model.n)
 
     def torques(self) -> FloatArray:
-        """Return the torques of springs and dampers."""
+        """Return the torques (7,) of springs and dampers, without gravity's [Nm]."""
         data, n = self._plant.mj_data, self._plant.model.n
         q, qd = data.qpos[:n].copy(), data.qvel[:n].copy()
         q_d, qd_d = self._plant.desired

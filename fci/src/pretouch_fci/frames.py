@@ -1,9 +1,12 @@
-"""Frames and loads at the flange, as the robot's interface lets set them, and the masses of the arm's links."""
+"""Frames and loads at the flange, as the robot's interface lets set them, masses of the arm's links, and its URDF."""
 
 from dataclasses import dataclass, field
+from functools import cache
+from xml.etree.ElementTree import Element, SubElement, tostring
 
 import mujoco
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from pretouch.robot.kinematics import Kinematics
 from pretouch.robot.model import RobotModel
@@ -76,16 +79,21 @@ def frames_of(model: RobotModel) -> Frames:
     return Frames(flange, np.linalg.inv(pose(kin, flange)) @ pose(kin, model.ee), hand_of(model, flange))
 
 
+@cache
+def _as_described(model: RobotModel) -> mujoco.MjModel:
+    """Return MuJoCo's model as it was before any load was announced."""
+    return mujoco.MjModel.from_xml_path(str(model.description.mjcf))
+
+
 def inertials(model: RobotModel) -> list[Inertial]:
     """Return the inertial of each link of the model, in the link's frame."""
-    mj = mujoco.MjModel.from_xml_path(str(model.description.mjcf))
-    found = []
+    mj, bodies = _as_described(model), []
     for body in range(mj.nbody):
         R = np.zeros((3, 3))
         mujoco.mju_quat2Mat(R.reshape(-1), mj.body_iquat[body])
         inertia = R @ np.diag(mj.body_inertia[body]) @ R.T
-        found.append(Inertial(float(mj.body_mass[body]), mj.body_ipos[body].copy(), inertia))
-    return found
+        bodies.append(Inertial(float(mj.body_mass[body]), mj.body_ipos[body].copy(), inertia))
+    return bodies
 
 
 def hand_of(model: RobotModel, flange: int) -> Inertial:
@@ -130,3 +138,58 @@ def combined(parts: list[Inertial]) -> Inertial:
 def moved(inertial: Inertial, R: FloatArray, p: FloatArray) -> Inertial:
     """Return a body in another frame, in which its own one is turned by R (3, 3) and at p (3,) [m]."""
     return Inertial(inertial.mass, R @ inertial.com + p, R @ inertial.inertia @ R.T)
+
+
+@cache
+def urdf_of(model: RobotModel) -> str:
+    """Return the URDF of an arm up to its flange. Hand and load are not in it: a client has them from the state."""
+    flange, mj, bodies = flange_of(model), _as_described(model), inertials(model)
+    robot = Element("robot", name=model.description.name)
+    base = 1
+    for link in range(base, flange + 1):
+        element = SubElement(robot, "link", name=f"link{link - base}")
+        if bodies[link].mass > 0:
+            _add_inertial(element, bodies[link])
+        if link > base:
+            _add_joint(robot, model, mj, link, link - base)
+    return tostring(robot, encoding="unicode")
+
+
+def _add_inertial(link: Element, body: Inertial) -> None:
+    inertial = SubElement(link, "inertial")
+    SubElement(inertial, "origin", xyz=_text(body.com), rpy="0 0 0")
+    SubElement(inertial, "mass", value=repr(body.mass))
+    moments = {
+        f"i{'xyz'[i]}{'xyz'[j]}": repr(float(body.inertia[i, j])) for i in range(3) for j in range(i, 3)
+    }  # fmt: skip
+    SubElement(inertial, "inertia", moments)
+
+
+def _add_joint(robot: Element, model: RobotModel, mj: mujoco.MjModel, link: int, number: int) -> None:
+    """Add the joint between a link and the one before it."""
+    moves = int(mj.body_jntnum[link]) > 0
+    joint = SubElement(robot, "joint", name=f"joint{number}", type="revolute" if moves else "fixed")
+    SubElement(joint, "parent", link=f"link{number - 1}")
+    SubElement(joint, "child", link=f"link{number}")
+    angles = Rotation.from_quat(mj.body_quat[link], scalar_first=True).as_euler("xyz")  # about fixed axes
+    SubElement(joint, "origin", xyz=_text(mj.body_pos[link]), rpy=_text(angles))
+    if not moves:
+        return
+    j, d = int(mj.body_jntadr[link]), model.description
+    SubElement(joint, "axis", xyz=_text(mj.jnt_axis[j]))
+    low, high = float(model.q_min[j]), float(model.q_max[j])
+    if d.envelope is not None:
+        low, high = float(d.envelope.q_lower[j]), float(d.envelope.q_upper[j])
+    SubElement(
+        joint, "limit", lower=repr(low), upper=repr(high), velocity=repr(float(d.qd_max[j])),
+        effort=repr(float(d.tau_max[j])),
+    )  # fmt: skip
+    if d.envelope is not None:
+        SubElement(
+            joint, "position_based_velocity_limits", velocity_offset=repr(float(d.envelope.offset[j])),
+            deceleration_limit=repr(float(d.envelope.slope[j] / 2)),
+        )  # fmt: skip
+
+
+def _text(numbers: FloatArray) -> str:
+    return " ".join(repr(float(x)) for x in numbers)

@@ -1,15 +1,113 @@
-"""Requests of the one client: what the robot does, and what it answers."""
+"""Requests of the one client: what the robot does, how it is set, and what it answers."""
 
 from collections.abc import Callable
+from enum import IntEnum
+from typing import NamedTuple
 
+import numpy as np
+
+from pretouch.types import FloatArray
 from pretouch_fci.arm import ServedArm
-from pretouch_fci.commands import Status, set_or_get, wanted_motion
+from pretouch_fci.collision import CollisionBehavior
 from pretouch_fci.connections import Connection, Disconnected, Request
+from pretouch_fci.controllers import CARTESIAN_LEAST, CARTESIAN_STIFFNESS, JOINT_MOST_NM_RAD
+from pretouch_fci.frames import Inertial, pose_of, urdf_of
 from pretouch_fci.model_library import library_answer
 from pretouch_fci.motion import Ending
 from pretouch_fci.state import StateDatagram
-from pretouch_fci.urdf import urdf_of
-from pretouch_fci.wire import OF_END_EFFECTOR, Protocol, RobotMode
+from pretouch_fci.wire import MOVE, OF_END_EFFECTOR, Controller, Generator, Protocol, RobotMode, fastest_of
+
+_EIGENVALUE_SLACK = 1e-9
+_LARGEST = 1e9
+"""No value that can be set is larger."""
+
+
+class Status(IntEnum):
+    """Answers to most requests."""
+
+    SUCCESS = 0
+    NOT_POSSIBLE = 1
+    INVALID = 2
+
+
+_WHILE_MOVING = frozenset({"SetCollisionBehavior"})
+"""What can be set while a motion runs."""
+_CARTESIAN_LIMIT = bytes(8 * 3) + np.eye(4).tobytes() + b"\0"
+"""A virtual wall: size, pose, and that it is not active."""
+
+
+class WantedMotion(NamedTuple):
+    """A motion that is served."""
+
+    generator: Generator
+    controller: Controller
+    fastest: FloatArray | None = None
+    """(7,) largest velocities [rad/s] of a motion whose way the robot finds; None if commands say the way."""
+
+
+def wanted_motion(protocol: Protocol, body: bytes) -> WantedMotion | None:
+    """Read the request to move; None where the motion is not served."""
+    controller, generator, *_ = MOVE.unpack_from(body)
+    if generator not in protocol.generators or controller not in tuple(Controller)[: Controller.NONE]:
+        return None
+    if generator == Generator.NONE and controller != Controller.EXTERNAL:
+        return None
+    fastest = fastest_of(body)
+    if fastest is not None:  # the vendor has that for positions of joints alone
+        if generator != Generator.JOINT_POSITION or controller == Controller.EXTERNAL:
+            return None
+        if not np.all((fastest > 0) & np.isfinite(fastest)):
+            return None
+    return WantedMotion(Generator(generator), Controller(controller), fastest)
+
+
+def set_or_get(arm: ServedArm, name: str, body: bytes) -> bytes:
+    """Do what a request asks, if the robot may and can; return the body of the answer."""
+    if arm.moving and name not in _WHILE_MOVING:
+        return bytes([Status.NOT_POSSIBLE])
+    if name == "GetCartesianLimit":
+        return bytes([Status.SUCCESS]) + _CARTESIAN_LIMIT
+    if name == "SetGuidingMode":
+        arm.guiding_axes = np.frombuffer(body, "u1") != 0
+        return bytes([Status.SUCCESS])
+    values = np.frombuffer(body, "<f8").copy()
+    if not np.all(np.abs(values) <= _LARGEST):
+        return bytes([Status.INVALID])
+    return bytes([Status.SUCCESS if _set(arm, name, values) else Status.INVALID])
+
+
+def _set(arm: ServedArm, name: str, values: FloatArray) -> bool:
+    """Set it, and return whether the values can be set."""
+    sound = True
+    match name:
+        case "SetCollisionBehavior":
+            behavior = CollisionBehavior.of(values)
+            arm.contacts.behavior, sound = behavior or arm.contacts.behavior, behavior is not None
+        case "SetEEToK" | "SetNEToEE":
+            T = pose_of(values)
+            if T is None:
+                return False
+            setattr(arm.frames, {"SetEEToK": "EE_T_K", "SetNEToEE": "NE_T_EE"}[name], T)
+        case "SetLoad":
+            load = Inertial(float(values[0]), values[1:4], values[4:13].reshape(3, 3).T)
+            sound = load.mass >= 0 and np.allclose(load.inertia, load.inertia.T)
+            sound = sound and bool(np.linalg.eigvalsh(load.inertia)[0] >= -_EIGENVALUE_SLACK)
+            if sound:
+                arm.announce(load)
+        case "SetJointImpedance":
+            sound = _within(values, 0.0, JOINT_MOST_NM_RAD)
+            if sound:
+                arm.plant.set_stiffness(values)
+        case "SetCartesianImpedance":
+            sound = _within(values, CARTESIAN_LEAST, CARTESIAN_STIFFNESS)
+            arm.cartesian_stiffness = values if sound else arm.cartesian_stiffness
+        case _:  # filters: taken, and the simulated ones stay what they are
+            sound = bool(np.all(values >= 0) and np.any(values > 0))
+    return sound
+
+
+def _within(values: FloatArray, least: FloatArray | float, most: FloatArray | float) -> bool:
+    return bool(np.all((values >= least) & (values <= most)))
 
 
 class RequestHandler:
@@ -75,18 +173,18 @@ class RequestHandler:
                 self._state.frames_changed()
 
     def _begin(self, request: Request) -> None:
-        arm, wanted = self._arm, wanted_motion(self._protocol, request.body)
+        arm, motion = self._arm, wanted_motion(self._protocol, request.body)
         self._settle()
-        if wanted is None:
+        if motion is None:
             self._say("Refused: this motion is not served.")
-        if arm.mode is not RobotMode.IDLE or not arm.at_rest or wanted is None:
+        if arm.mode is not RobotMode.IDLE or not arm.at_rest or motion is None:
             self._answer("Move", request.identifier, self._status("not possible"))
             return
-        if wanted.generator in OF_END_EFFECTOR and arm.singular:
+        if motion.generator in OF_END_EFFECTOR and arm.singular:
             self._answer("Move", request.identifier, self._status("singular"))
             return
         self._begins()
-        arm.begin(*wanted)
+        arm.begin(*motion)
         self._move = request.identifier
         self._answer("Move", request.identifier, self._status("started"))
 

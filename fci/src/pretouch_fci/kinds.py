@@ -1,6 +1,7 @@
 """Kinds of motion: which fields of a command count, and which joint velocities they ask for. A kind is one motion's."""
 
-from typing import NamedTuple, Protocol
+from abc import ABC, abstractmethod
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,15 +23,15 @@ class Asked(NamedTuple):
     """Why it cannot be followed, whatever the joints' limits say."""
 
 
-class MotionKind(Protocol):
-    """One kind of motion."""
+class MotionKind(ABC):
+    """One kind of motion. Where nothing else is said, it is one of the joints that begins anywhere."""
 
     generator: Generator
     not_a_number: str
     """The error of a command that is not finite."""
-    moves_at_end: str
+    moves_at_end = "joint_motion_generator_velocity_discontinuity"
     """The error of a motion that ends while it moves."""
-    joints: str
+    joints = "joint_motion_generator"
     """What the errors of the joints' limits begin with."""
 
     @property
@@ -39,16 +40,17 @@ class MotionKind(Protocol):
 
         The end-effector's are as of the base frame, at its origin.
         """
-        ...
+        return None
 
+    @abstractmethod
     def read(self, command: np.void) -> FloatArray:
         """Return what counts of a command."""
-        ...
 
     def start(self, values: FloatArray, q: FloatArray) -> FloatArray | None:
         """Return the positions (7,) [rad] at which a first command begins; None if that is not near q (7,) [rad]."""
-        ...
+        return None
 
+    @abstractmethod
     def asked(self, values: FloatArray, q: FloatArray, first: bool) -> Asked:
         """Return what a command asks for.
 
@@ -57,7 +59,6 @@ class MotionKind(Protocol):
             q: (7,) commanded positions so far [rad].
             first: whether no command has come before.
         """
-        ...
 
     def bridged(self, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> Asked:
         """Return what is done in place of a lost command: the same acceleration once more.
@@ -67,22 +68,10 @@ class MotionKind(Protocol):
             qd: (7,) commanded velocities [rad/s].
             qdd: (7,) commanded accelerations [rad/s^2].
         """
-        ...
-
-
-class _OfJoints:
-    """What both kinds of motion of the joints have in common."""
-
-    moves_at_end = "joint_motion_generator_velocity_discontinuity"
-    joints = "joint_motion_generator"
-    commanded = None
-
-    def bridged(self, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> Asked:
-        """Go on with the same acceleration of the joints."""
         return Asked(qd + qdd * PERIOD_S)
 
 
-class JointVelocity(_OfJoints):
+class JointVelocity(MotionKind):
     """Velocities (7,) [rad/s]."""
 
     generator = Generator.JOINT_VELOCITY
@@ -91,10 +80,6 @@ class JointVelocity(_OfJoints):
     def read(self, command: np.void) -> FloatArray:
         """Return the velocities."""
         return np.array(command["dq_c"])
-
-    def start(self, values: FloatArray, q: FloatArray) -> FloatArray | None:
-        """Leave it open: velocities begin anywhere."""
-        return None
 
     def asked(self, values: FloatArray, q: FloatArray, first: bool) -> Asked:
         """Take them as they are."""
@@ -111,7 +96,7 @@ class NoMotion(JointVelocity):
         return np.zeros_like(command["dq_c"])
 
 
-class JointPosition(_OfJoints):
+class JointPosition(MotionKind):
     """Positions (7,) [rad], differentiated backwards as the vendor's documents say."""
 
     generator = Generator.JOINT_POSITION

@@ -75,11 +75,11 @@ class MotionLimits:
         A joint beyond a limit of its position that stands or goes back is no error.
         """
         leaves = ((q > self.q_max) & (qd > _STANDS)) | ((q < self.q_min) & (qd < -_STANDS))
-        found = {
+        errors = {
             "joint_position_limits_violation": leaves,
             "joint_velocity_violation": np.abs(qd) > self.qd,
         }
-        return tuple(name for name, wrong in found.items() if wrong.any())
+        return tuple(name for name, wrong in errors.items() if wrong.any())
 
     def ends_at_rest(self, qd: FloatArray) -> bool:
         """Whether a motion may end at commanded velocities (n,) [rad/s]: the acceleration limit stops it at once."""

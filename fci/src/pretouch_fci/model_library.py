@@ -36,10 +36,10 @@ def library_answer(model: RobotModel, request: bytes, say: Callable[[str], None]
 
 def _check_platform(machine: int, system: int) -> None:
     """Raise RobotError unless this is a machine such as the client's."""
-    asked = f"{_name(_SYSTEMS, system)} on {_name(_MACHINES, machine)}"
+    client = f"{_name(_SYSTEMS, system)} on {_name(_MACHINES, machine)}"
     here = f"{platform.system()} on {platform.machine()}"
-    if asked != here:
-        raise RobotError(f"it asks for one for {asked}, and here is {here}: start the server on such a machine.")
+    if client != here:
+        raise RobotError(f"it asks for one for {client}, and here is {here}: start the server on such a machine.")
 
 
 def _name(names: tuple[str, ...], number: int) -> str:

@@ -146,9 +146,9 @@ class TargetMotion(Motion):
         brakes, left = _BRAKES * self._limits.qdd, target - q
         far = np.abs(left)
         near = brakes / _APPROACH_1_S**2
-        wanted = np.where(far < near, _APPROACH_1_S * far, np.sqrt(2 * brakes * np.maximum(far - near / 2, 0.0)))
+        goal = np.where(far < near, _APPROACH_1_S * far, np.sqrt(2 * brakes * np.maximum(far - near / 2, 0.0)))
         least, greatest = self._limits.speeds(q)
-        wanted = np.clip(np.sign(left) * np.minimum(wanted, self._fastest), _ENVELOPE * least, _ENVELOPE * greatest)
+        goal = np.clip(np.sign(left) * np.minimum(goal, self._fastest), _ENVELOPE * least, _ENVELOPE * greatest)
         most, jerk = self._limits.qdd, self._limits.qddd * PERIOD_S
-        acceleration = np.clip((wanted - self.qd) / _FOLLOWS_S, -most, most)
+        acceleration = np.clip((goal - self.qd) / _FOLLOWS_S, -most, most)
         return self.qd + PERIOD_S * (self.qdd + np.clip(acceleration - self.qdd, -jerk, jerk))

@@ -22,13 +22,13 @@ def franka_server() -> "Iterator[Callable[..., FrankaServer]]":
     """
     from pretouch_fci.testing import FrankaServer
 
-    made: list[FrankaServer] = []
+    servers: list[FrankaServer] = []
     with ExitStack() as running:
 
         def start(**options: object) -> FrankaServer:
-            made.append(running.enter_context(FrankaServer(**options)))  # type: ignore[arg-type]
-            return made[-1]
+            servers.append(running.enter_context(FrankaServer(**options)))  # type: ignore[arg-type]
+            return servers[-1]
 
         yield start
-    for server in made:
+    for server in servers:
         print(f"{server.host}:", *server.said, sep="\n  ")

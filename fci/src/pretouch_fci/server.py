@@ -3,21 +3,22 @@
 import select
 import time
 from collections.abc import Callable
-from typing import Self
+from dataclasses import dataclass
+from typing import Annotated, Self
 
 import numpy as np
 
-from pretouch.errors import RobotError
+from pretouch.checks import Check, Checked, NonNegative, Positive
+from pretouch.errors import ParameterError, RobotError
 from pretouch_fci.arm import ServedArm
 from pretouch_fci.connections import ClientPort, Connection, Request
+from pretouch_fci.frames import urdf_of
 from pretouch_fci.gripper_server import GripperServer
 from pretouch_fci.handler import RequestHandler
 from pretouch_fci.limits import PERIOD_S
 from pretouch_fci.motion import Setpoint
-from pretouch_fci.options import ServeOptions
 from pretouch_fci.state import StateDatagram
-from pretouch_fci.urdf import urdf_of
-from pretouch_fci.wire import PROTOCOLS
+from pretouch_fci.wire import PORT, PROTOCOLS
 
 _LATE_S = 0.003
 """A machine that is later than this leaves the time out [s]: states in a burst could not be answered in time."""
@@ -30,6 +31,35 @@ _ANSWERED = 6
 """Of the first so many states of a motion, libfranka answers one: those before it has waited for."""
 _MOTION_EVERY = 1_000_000
 """In lockstep, each motion begins at a multiple of this [ms], so that its times do not depend on the time before it."""
+
+
+@dataclass(frozen=True)
+class ServeOptions(Checked):
+    """Where to serve, and at which pace."""
+
+    host: str = "127.0.0.1"
+    """Address to serve at. Anyone who can reach it can move the simulated arm."""
+    port: Annotated[int, Check(low=0, high=0xFFFF)] = PORT
+    """TCP port; the vendor's library supports no other. The gripper has the next. 0 lets the system choose both."""
+    lockstep: bool = False
+    """Send each state only after the command for the last one: repeatable, and faster than real time."""
+    patience: Positive = 60.0
+    """In lockstep, a command that has not arrived after this time is lost [s]."""
+    grace: NonNegative = 0.01
+    """In real time, extra time beyond its millisecond to wait for a command [s]: this machine may be slow. 0 is as
+    strict as the robot."""
+    drop: str = ""
+    """Commands to lose, such as 3/50: the first 3 of every 50."""
+    once: bool = False
+    """End when the first client has disconnected."""
+
+
+def drop_of(text: str) -> tuple[int, int]:
+    """Read N/M: of how many commands the first are lost; none is."""
+    lost, slash, of = (text or "0/1").partition("/")
+    if text and not (slash and lost.isdecimal() and of.isdecimal() and 0 < int(lost) < int(of)):
+        raise ParameterError(f"--drop is {text!r}: give two numbers, such as 3/50 for 3 of 50 commands.")
+    return int(lost), int(of)
 
 
 class FciServer(ClientPort):
@@ -48,6 +78,7 @@ class FciServer(ClientPort):
             say: is handed a line when a client comes or goes, and when a motion ends otherwise than it should.
         """
         self._arm, self._options, self._watch = arm, options, watch
+        self._drop = drop_of(options.drop)
         self.protocol = PROTOCOLS[arm.kind]
         urdf_of(arm.model)  # made while no clock runs yet
         super().__init__(options.host, options.port, self.protocol, say)
@@ -108,11 +139,11 @@ class FciServer(ClientPort):
                 self._next = now
             self._poll_sockets(self._next)
             if self._command is None and self._command_due:
-                self._poll_sockets(self._next + self._options.grace_s, for_command=True)
+                self._poll_sockets(self._next + self._options.grace, for_command=True)
         elif arm.motion is None or not arm.motion.awaited:
             self._poll_sockets(now + PERIOD_S)
         elif arm.motion.begun:
-            self._poll_sockets(now + self._options.patience_s, for_command=True)
+            self._poll_sockets(now + self._options.patience, for_command=True)
         else:
             self._poll_sockets(now + _FIRST_WAITS_S[min(self._unanswered, 1)], for_command=True)
 
@@ -154,13 +185,12 @@ class FciServer(ClientPort):
     def _setpoint(self) -> Setpoint | None:
         """Return what the command says that came for this millisecond, None if it was lost."""
         command, motion = self._command, self._arm.motion
-        if command is None or motion is None:
-            lost = True
-        else:
-            drop = self._options.drop
-            lost = drop is not None and motion.begun and drop.takes(self._of_motion)
-        self._of_motion += motion is not None and (motion.begun or not lost)
-        if lost or command is None or motion is None:
+        if motion is None:
+            return None
+        losses, of = self._drop
+        lost = command is None or (motion.begun and self._of_motion % of < losses)
+        self._of_motion += motion.begun or not lost
+        if command is None or lost:
             return None
         names = command.dtype.names or ()
         finished = any(command[name] for name in names if name.endswith("_finished"))

@@ -1,12 +1,12 @@
 """The arm's sensor units, which speak for themselves over UDP: nothing of them is in the robot's interface."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from pretouch.sensing.skin import Skin
 from pretouch.sim.imu import ImuParams
 from pretouch.sim.plant import Plant
-from pretouch.units.fleet import Fleet, FleetParams
+from pretouch.units.fleet import Fleet, FleetParams, NetworkParams
 from pretouch.units.keys import Keys
 
 
@@ -19,6 +19,8 @@ class UnitsSetup:
     """Keys of all of them; the receiver has the same."""
     address: tuple[str, int]
     """Name or address of the receiver, and its UDP port."""
+    loss: float = 0.0
+    """Share of datagrams lost, in either direction."""
 
 
 class ServedUnits:
@@ -29,8 +31,9 @@ class ServedUnits:
 
         A receiver that cannot be found, and a unit without a key, are a HardwareError.
         """
-        params = FleetParams(imu=ImuParams())
-        self._fleet = Fleet(setup.skin.network, setup.keys, params, seed, setup.address)
+        network = NetworkParams()
+        lossy = NetworkParams(replace(network.up, loss=setup.loss), replace(network.down, loss=setup.loss))
+        self._fleet = Fleet(setup.skin.network, setup.keys, FleetParams(lossy, imu=ImuParams()), seed, setup.address)
         self.offset: float | None = None
         """What their time is ahead of the plant's [s]; None: they measure nothing yet."""
         self._fleet.mount(plant, setup.skin, lambda time: None if self.offset is None else time + self.offset)

@@ -96,37 +96,21 @@ def test_the_arm_yields_to_a_push_and_sigterm_brings_it_to_rest_without_a_reflex
     assert steps[felt + 20].ee_velocity[1] > 0.0
 
 
-def test_the_process_that_speaks_with_the_arm_dying_is_said(known, running):
-    server = known()
-    run = running(server, *_FOLLOWING, until="TRACK")
-    for child in run.family()[1:]:
-        os.kill(child, signal.SIGKILL)
-    code, out = run.left()
-    assert code == 1, out
-    assert "The run ended early: The process that moves the arm" in out
-    assert "The arm may not be at rest" in out
-
-
-def test_an_arm_whose_computer_dies_in_motion_is_not_said_to_stand(known, running):
-    server = known()
-    run = running(server, *_FOLLOWING, until="TRACK")
-    os.kill(server.process.pid, signal.SIGKILL)
-    code, out = run.left()
-    assert code == 1, out
-    assert "The arm may not be at rest" in out
-    assert "The arm is at rest." not in out
-
-
-@pytest.mark.parametrize("frozen", ["server", "process"])
-def test_an_arm_of_which_no_state_comes_ends_the_run(known, running, frozen):
+@pytest.mark.parametrize(("who", "sign", "said"), [
+    ("process", signal.SIGKILL, "The run ended early: The process that moves the arm"),
+    ("process", signal.SIGSTOP, ""), ("server", signal.SIGKILL, ""), ("server", signal.SIGSTOP, ""),
+])  # fmt: skip
+def test_an_arm_that_is_not_heard_any_more_ends_the_run_and_is_not_said_to_stand(known, running, who, sign, said):
     """A pulled cable leaves the connection open; so does a process that stands still."""
     server = known()
     run = running(server, *_FOLLOWING, until="TRACK")
-    for process in [server.process.pid] if frozen == "server" else run.family()[1:]:
-        os.kill(process, signal.SIGSTOP)
-    code, out = run.left(8.0)
+    for process in [server.process.pid] if who == "server" else run.family()[1:]:
+        os.kill(process, sign)
+    code, out = run.left(8.0 if sign == signal.SIGSTOP else 60.0)
     assert code == 1, out
+    assert said in out
     assert "The arm may not be at rest" in out
+    assert "The arm is at rest." not in out
 
 
 def test_an_arm_in_reflex_is_refused_with_the_way_out_and_recovers(known, running):

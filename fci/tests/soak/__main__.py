@@ -6,8 +6,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-from fci.tests.soak.relay import LOSS
-from fci.tests.soak.soak import AT_FIRST, FIRST_S, MEMORY_GROWS, RESTS_S, Found, Soak
+from fci.tests.soak.soak import AT_FIRST, FIRST_S, LOSS, MEMORY_GROWS, RESTS_S, Found, Soak
 
 
 def table(found: Found) -> str:

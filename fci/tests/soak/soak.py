@@ -12,10 +12,9 @@ from threading import Event, Thread
 
 import msgspec
 import numpy as np
-import viser
 from fci.tests.soak.programs import Program, WallClock, program
-from fci.tests.soak.relay import Relay
 from fci.tests.soak.truth import Truth
+from tests.page.visitor import CAMERA, PROTOCOL
 from tests.ports import free_port, loopback
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
@@ -47,11 +46,8 @@ _BUSY = ("communication_constraints_violation",)
 
 
 _AT_ONCE = 3
-CAMERA = {
-    "type": "ViewerCameraMessage", "wxyz": [1.0, 0.0, 0.0, 0.0], "position": [2.0, 1.0, 1.0], "fov": 0.9, "near": 0.1,
-    "far": 100.0, "image_height": 600, "image_width": 800, "look_at": [0.0, 0.0, 0.5], "up_direction": [0.0, 0.0, 1.0],
-}  # fmt: skip
-"""What viser's page says of where it looks from."""
+LOSS = 0.1
+"""Share of the units' datagrams lost, each way."""
 
 
 class Visitors:
@@ -88,8 +84,8 @@ class Visitors:
             self._over.wait(rng.uniform(0.0, 5.0))
 
     def _visit(self, rng: np.random.Generator) -> None:
-        protocol, reads = f"viser-v{viser.__version__}", rng.random() < 0.7
-        with connect(self._address, subprotocols=[protocol], max_size=None, max_queue=None if reads else 1) as page:  # type: ignore[list-item]
+        reads = rng.random() < 0.7
+        with connect(self._address, subprotocols=[PROTOCOL], max_size=None, max_queue=None if reads else 1) as page:
             page.send(msgspec.msgpack.encode(CAMERA))
             for _ in range(int(rng.integers(1, 40))):
                 if self._over.wait(0.25):
@@ -146,11 +142,10 @@ class Soak:
         words = "live", "--port", str(free_port()), "--record", str(self._folder / "page.mcap")
         end = begun + self._seconds
         with self._stack as opened:
-            relay = opened.enter_context(Relay(self._units, int(self._rng.integers(2**32))))
             page = opened.enter_context(program(self._folder, "page", *words, clock=self._clock))
             visitors = opened.enter_context(Visitors(page.said_within(r"(http://\S+)"), int(self._rng.integers(2**32))))
             with ExitStack() as serving:
-                self._serve(serving, relay)
+                self._serve(serving)
                 self._one_run(page, begun + 0.5 * self._seconds, "SIGINT")
                 kinds: list[str] = []
                 while time.monotonic() < end:
@@ -159,7 +154,7 @@ class Soak:
                     self._one_run(page, time.monotonic() + self._rng.uniform(4.0, 20.0), kind)
                     if kind == "robot" or self._server.process.poll() is not None:
                         serving.close()
-                        self._serve(serving, relay)
+                        self._serve(serving)
             found.visits = visitors.visits
             found.troubles += [f"A visitor was let go: {error}" for error in visitors.errors]
             self._judge_text("page", page.said())
@@ -167,10 +162,10 @@ class Soak:
         found.seconds = time.monotonic() - begun
         return found
 
-    def _serve(self, opened: ExitStack, relay: Relay) -> None:
+    def _serve(self, opened: ExitStack) -> None:
         place = self._folder / "truth.csv"
-        units = "--units", f"127.0.0.1:{relay.port}", "--keys", "keys.toml", "--start", "path"
-        words = "serve-fci", "--host", self._address, "--truth", str(place), *units
+        units = "--units", f"127.0.0.1:{self._units}", "--keys", "keys.toml", "--loss", str(LOSS)
+        words = "serve-fci", "--host", self._address, "--truth", str(place), "--start", "path", *units
         self._server = opened.enter_context(program(self._folder, "server", *words, clock=self._clock))
         self._server.said_within(r"(Listening) at")
         self._truth = Truth(place, self._qd_max)
