@@ -1,7 +1,7 @@
 """Peers that take a connection and say nothing: whoever waits for one gives up with a sentence, within a bound.
 
 Of the others that wait, each has its test beside it: `arms/franka/test_connect` (the arm's process),
-`hardware/test_provision` (a unit's line), `ros2/tests` (topics).
+`units/test_provision` (a unit's line), `ros2/tests` (topics).
 """
 
 import http.client
