@@ -31,14 +31,14 @@ def source_digest(function: Callable[..., object]) -> str:
         raise SourceError(f"The source text of {function.__qualname__} cannot be found: put it in a file.")
     package = getattr(sys.modules.get(own.partition(".")[0]), "__path__", [])
     above = {__name__.partition(".")[0]: Path(__file__).parents[1]} | {Path(at).name: Path(at).parent for at in package}
-    found: dict[str, str] = {}
+    digests: dict[str, str] = {}
     todo = [(own, Path(file))]
     while todo:
         name, place = todo.pop()
-        if name not in found:
-            found[name], needed = _read(name, place, tuple(above.items()))
+        if name not in digests:
+            digests[name], needed = _read(name, place, tuple(above.items()))
             todo += needed
-    return sha256(repr(sorted(found.items())).encode()).hexdigest()
+    return sha256(repr(sorted(digests.items())).encode()).hexdigest()
 
 
 @cache

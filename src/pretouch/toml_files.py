@@ -10,7 +10,7 @@ from pretouch.errors import PretouchError
 def table_of(path: Path, kind: str, error: type[PretouchError], way_out: str = "") -> dict[str, Any]:
     """Return the table of a TOML file. What keeps it from being read is an error that names its kind, and a way out."""
     try:
-        return read_toml(path)
+        return parse_toml(path.read_bytes())
     except OSError as reason:
         sentence = f"The {kind} {path} cannot be read: {reason.strerror or reason}"
         raise error(f"{sentence}: {way_out}." if way_out else f"{sentence}.") from reason
@@ -29,13 +29,8 @@ def shown(value: Any) -> str:
     return text if len(text) <= 200 else f"{text[:200]} ..."
 
 
-def read_toml(path: Path) -> dict[str, Any]:
-    """Return the table of a TOML file. Raises OSError, and ValueError for what is not TOML or not UTF-8."""
-    return parse_toml(path.read_bytes())
-
-
 def parse_toml(data: bytes) -> dict[str, Any]:
-    """Return the table that the bytes of a TOML file hold. Raises ValueError as `read_toml` does."""
+    """Return the table that the bytes of a TOML file hold. Raises ValueError for what is not TOML or not UTF-8."""
     try:
         return tomllib.loads(data.decode())
     except RecursionError as error:

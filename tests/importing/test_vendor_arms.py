@@ -9,7 +9,7 @@ from tests.importing.test_robot_import import assert_same_mechanics, stripped
 from tests.needs import skip_for
 
 from pretouch.importing.robot_import import ImportOptions, import_robot
-from pretouch.sim.placement import placement_for
+from pretouch.sim.paper_scenes import placement_for
 
 pytestmark = pytest.mark.slow
 

@@ -5,12 +5,13 @@ import pytest
 from pretouch.errors import ParameterError
 from pretouch.robot.description import panda
 from pretouch.sim.plant_params import PlantParams, plant_params_of
+from pretouch.sim.random_skin import Misplacement
 from pretouch.sim.randomisation import SETS, DrawnWorld, drawn, world_set
 from pretouch.sim.range_finder import RangeFinderParams
 
 
 def test_the_nominal_world_is_the_usual_one():
-    assert drawn(world_set("nominal"), 5) == DrawnWorld(PlantParams(), RangeFinderParams())
+    assert drawn(world_set("nominal"), 5) == DrawnWorld(PlantParams(), RangeFinderParams(), Misplacement())
 
 
 @pytest.mark.parametrize("name", SETS)
@@ -33,7 +34,7 @@ def test_every_draw_is_within_its_range_and_has_a_source(name):
         low, high = by_name["plant.ripple_nm"].numbers
         for value, usual in zip(world.plant.ripple_nm, PlantParams().ripple_nm, strict=True):
             assert low * usual <= value <= high * usual
-        assert 0.0 <= world.position_mm <= by_name["misplaced.position_mm"].numbers[1]
+        assert 0.0 <= world.misplaced.position_mm <= by_name["misplaced.position_mm"].numbers[1]
 
 
 def test_stress_reaches_farther_than_realistic():

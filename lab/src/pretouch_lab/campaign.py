@@ -13,7 +13,7 @@ from pretouch.profiles import profile
 from pretouch.robot.description import files_digest, robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import skin_file, skin_for
-from pretouch.sim.placement import placement_for
+from pretouch.sim.paper_scenes import placement_for
 from pretouch.sim.randomisation import world_set
 from pretouch_lab.cell import Cell, Context, Grid
 from pretouch_lab.domain_randomisation import digest_of

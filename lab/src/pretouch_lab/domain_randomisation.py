@@ -39,7 +39,7 @@ def randomised(name: str, seed: int, model: RobotModel, parts: Parts) -> Parts:
         return parts
     usual = plant_params_of(model.description)
     world = drawn(_set(name), seed, usual)
-    believed, off = parts.believed, Misplacement(world.position_mm, world.orientation_deg)
+    believed, off = parts.believed, world.misplaced
     if believed is None and off != Misplacement() and len(parts.skin):
         believed = misplaced(parts.skin, model, off, seed)[0]
     return Parts(world.plant_with(parts.plant, usual), world.ranging_with(parts.ranging), parts.skin, believed)

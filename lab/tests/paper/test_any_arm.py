@@ -15,7 +15,7 @@ from pretouch.robot.description import RobotDescription, panda, robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.robot.postures import brought_to
 from pretouch.sim.hand import PALM, robot_hand
-from pretouch.sim.placement import placement_for
+from pretouch.sim.paper_scenes import placement_for
 from pretouch.sim.plant_params import assumed_plant
 from pretouch_lab.benchmarks.avoidance.scenario import scenarios
 from pretouch_lab.benchmarks.avoidance.setting import setting

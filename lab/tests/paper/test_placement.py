@@ -8,8 +8,17 @@ from pretouch.errors import ExperimentError
 from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.sim.hand import way_round
-from pretouch.sim.paper_scenes import PANDA_SIDE, HandSide, Placement, person_scene, static_path, static_scene
-from pretouch.sim.placement import assumptions, hand_side, placement_for
+from pretouch.sim.paper_scenes import (
+    PANDA_SIDE,
+    HandSide,
+    Placement,
+    assumptions,
+    hand_side,
+    person_scene,
+    placement_for,
+    static_path,
+    static_scene,
+)
 from pretouch.sim.scene import HandSpec
 
 

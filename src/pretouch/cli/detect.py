@@ -27,7 +27,7 @@ from pretouch.imported_data.torques import TorqueRecording, torque_recording
 from pretouch.profiles import Profile, at_rate
 from pretouch.profiles import profile as find_profile
 from pretouch.text_table import TextTable
-from pretouch.toml_files import read_toml
+from pretouch.toml_files import parse_toml
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -134,7 +134,7 @@ def mapping_of(text: str) -> tuple[tuple[str, str], ...]:
     """
     if text.endswith(".toml"):
         try:
-            pairs = tuple(read_toml(Path(text)).items())
+            pairs = tuple(parse_toml(Path(text).read_bytes()).items())
         except (OSError, ValueError) as error:
             raise ParameterError(f"The columns {text} cannot be read ({error}): give a file of TOML.") from error
     else:

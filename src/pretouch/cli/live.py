@@ -19,8 +19,8 @@ from pretouch.robot.description import is_shipped, robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import LIVE_SKIN, Skin, skin_for
 from pretouch.signals import ended
-from pretouch.sim.placement import assumptions
-from pretouch.sim.random_skin import Misplacement, misplaced
+from pretouch.sim.paper_scenes import assumptions
+from pretouch.sim.random_skin import misplaced
 from pretouch.sim.randomisation import drawn, world_set
 from pretouch.units import EVERYWHERE, HOST, PORT
 from pretouch.units.keys import load_keys
@@ -77,7 +77,7 @@ class Live:
             world = drawn(world_set(str(self.world)), self.seed, settings.plant)
             settings = replace(settings, plant=world.plant, ranging=world.ranging)
             if not self.keys:
-                believed, _ = misplaced(skin, model, Misplacement(world.position_mm, world.orientation_deg), self.seed)
+                believed, _ = misplaced(skin, model, world.misplaced, self.seed)
         prepare(profile, lambda: Room(settings, live_path(settings), model, skin).tick())
         with _units(self, skin) as real:
             simulation = LiveSimulation(settings, model, believed, real, skin)

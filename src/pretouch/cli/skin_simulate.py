@@ -14,7 +14,7 @@ from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, skin_for
 from pretouch.sim.imu import ImuParams
-from pretouch.sim.placement import assumptions, placement_for
+from pretouch.sim.paper_scenes import assumptions, placement_for
 from pretouch.units import HOST, PORT
 from pretouch.units.fleet import ChannelParams, Fleet, FleetParams, NetworkParams
 from pretouch.units.keys import Keys, load_keys, save_keys

@@ -8,7 +8,7 @@ from pretouch.errors import ExperimentError
 from pretouch.perception.scene_filter import Fixtures
 from pretouch.robot.model import RobotModel
 from pretouch.robot.postures import brought_to, capsule_ends, ever_apart, kinematics_of, self_distances
-from pretouch.sim.placement import placement_for
+from pretouch.sim.paper_scenes import placement_for
 from pretouch.types import FloatArray
 
 KINDS = ("circle", "line", "paths", "joints")

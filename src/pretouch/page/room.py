@@ -16,8 +16,7 @@ from pretouch.robot.model import RobotModel
 from pretouch.robot.postures import brought_to
 from pretouch.sensing.skin import Skin
 from pretouch.sim.hand import Hand, HandGoal, PersonArm
-from pretouch.sim.paper_scenes import FACE_M, Placement, Side, board_beside
-from pretouch.sim.placement import placement_for
+from pretouch.sim.paper_scenes import FACE_M, Placement, Side, board_beside, placement_for
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.plant_params import PlantParams, plant_params_of
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders

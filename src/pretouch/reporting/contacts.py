@@ -8,7 +8,7 @@ import numpy as np
 
 from pretouch.recording.run_record import MODES, TrueForces
 from pretouch.reporting.html import NOTHING, Html, Text, bad, element, joined, number, table, vector
-from pretouch.reporting.record import Course
+from pretouch.reporting.record import RunCourse
 from pretouch.sim.plant import TOUCH_N
 from pretouch.traces import mean_over, spans
 from pretouch.types import BoolArray, FloatArray, Mode
@@ -34,7 +34,7 @@ _FORCE = {
 
 
 @dataclass(frozen=True)
-class Touch:
+class TrueTouch:
     """One true touch: from the true force passing 1 N until it is below for good."""
 
     start: float
@@ -54,7 +54,7 @@ class Touch:
 
 
 @dataclass(frozen=True)
-class Detection:
+class DetectedContact:
     """One detected contact and the reaction to it. Base frame."""
 
     time: float
@@ -88,22 +88,22 @@ class Detection:
 
 
 @dataclass(frozen=True)
-class Contacts:
+class ContactMeasures:
     """Detections and true touches in order."""
 
     truth_known: bool
-    detections: tuple[Detection, ...]
-    touches: tuple[Touch, ...]
+    detections: tuple[DetectedContact, ...]
+    touches: tuple[TrueTouch, ...]
     unanswered: dict[int, Mode | None]
     """Touches without a detection, by index: what the arm was doing when each began."""
 
     @property
-    def missed(self) -> tuple[Touch, ...]:
+    def missed(self) -> tuple[TrueTouch, ...]:
         """True touches that were never answered, those aside that came while the arm was yielding already."""
         return tuple(self.touches[i] for i, mode in self.unanswered.items() if mode is not Mode.REACT)
 
     @property
-    def without_touch(self) -> tuple[Detection, ...]:
+    def without_touch(self) -> tuple[DetectedContact, ...]:
         """Detections without a true touch; none where the truth is not known."""
         return tuple(d for d in self.detections if d.touch is None) if self.truth_known else ()
 
@@ -125,32 +125,32 @@ class Contacts:
         return _largest([t.held for t in self.touches] if self.truth_known else [d.held_norm for d in self.detections])
 
 
-def contacts_in(course: Course) -> Contacts:
+def contacts_in(course: RunCourse) -> ContactMeasures:
     """Find what touched in a recording and what was detected of it."""
     touches = touches_of(course.truth)
     detections = _detections(course, touches)
     answered = {detection.touch for detection in detections}
     unanswered = {i: _mode_at(course, touch.start) for i, touch in enumerate(touches) if i not in answered}
-    return Contacts(course.truth is not None, tuple(detections), tuple(touches), unanswered)
+    return ContactMeasures(course.truth is not None, tuple(detections), tuple(touches), unanswered)
 
 
-def touches_of(truth: TrueForces | None) -> list[Touch]:
+def touches_of(truth: TrueForces | None) -> list[TrueTouch]:
     """All true touches in order; none where nothing is known, or what is said to be known cannot be."""
     if truth is None or len(truth.time) < 2 or not np.all(np.isfinite(truth.time)):
         return []
     time, force = truth.time, np.linalg.norm(truth.force, axis=1)
     samples = max(1, round(MEAN_S / max(float(np.median(np.diff(time))), 1e-9)))
     mean, begun = mean_over(force, samples), [instant for instant, _, _ in truth.touches]
-    touches, before = list[Touch](), -np.inf
+    touches, before = list[TrueTouch](), -np.inf
     for first, past in _merged(spans(force > TOUCH_N), time):
         start, end = float(time[first]), float(time[past - 1])
         late = int(np.searchsorted(time, start + TRANSIENT_S))
         # the last contact that began after the touch before, and by now
         last = bisect_right(begun, start + 1e-9) - 1
-        known = last >= 0 and begun[last] > before
-        _, link, velocity = truth.touches[last] if known else (start, "", np.full(3, np.nan))
+        begins_here = last >= 0 and begun[last] > before
+        _, link, velocity = truth.touches[last] if begins_here else (start, "", np.full(3, np.nan))
         touches.append(
-            Touch(
+            TrueTouch(
                 start,
                 end,
                 peak=float(force[first:past].max()),
@@ -175,9 +175,9 @@ def _merged(flags: list[tuple[int, int]], time: FloatArray) -> list[tuple[int, i
     return merged
 
 
-def _detections(course: Course, touches: Sequence[Touch]) -> list[Detection]:
+def _detections(course: RunCourse, touches: Sequence[TrueTouch]) -> list[DetectedContact]:
     """All detected contacts in order, each with the touch it answers if there is one."""
-    detections: list[Detection] = []
+    detections: list[DetectedContact] = []
     answered: set[int | None] = set()
     lasted, steps = course.lasted, [i for i, _, _ in course.contacts]
     for (i, contact, speed), following in zip(course.contacts, [*steps[1:], len(course)], strict=False):
@@ -195,7 +195,7 @@ def _detections(course: Course, touches: Sequence[Touch]) -> list[Detection]:
         force, late = course.force[during], course.time[during] >= begun + TRANSIENT_S
         size = np.linalg.norm(np.where(np.isfinite(force), force, np.nan), axis=1)
         detections.append(
-            Detection(
+            DetectedContact(
                 time=time,
                 profile=course.runs[course.run[i]].profile.name,
                 force=contact.force,
@@ -215,13 +215,13 @@ def _detections(course: Course, touches: Sequence[Touch]) -> list[Detection]:
     return detections
 
 
-def _reaction_end(course: Course, first: int) -> int:
+def _reaction_end(course: RunCourse, first: int) -> int:
     """Index one past the last step of the reaction that begins in a step."""
     other = np.flatnonzero(course.mode[first:] != MODES.index(Mode.REACT))
     return max(first + int(other[0]), first + 1) if len(other) else len(course)
 
 
-def _mode_at(course: Course, time: float) -> Mode | None:
+def _mode_at(course: RunCourse, time: float) -> Mode | None:
     """Mode of the step in force at an instant [s], None before the first."""
     i = int(np.searchsorted(course.time, time, side="right")) - 1
     return MODES[course.mode[i]] if i >= 0 else None
@@ -229,17 +229,17 @@ def _mode_at(course: Course, time: float) -> Mode | None:
 
 def _farthest(force: FloatArray) -> FloatArray:
     """Value farthest from zero (3,) of each column of forces (S, 3), NaN of none."""
-    known = force[np.isfinite(force).all(axis=1)]
-    if not len(known):
+    finite = force[np.isfinite(force).all(axis=1)]
+    if not len(finite):
         return np.full(3, np.nan)
-    return known[np.abs(known).argmax(axis=0), np.arange(3)]
+    return finite[np.abs(finite).argmax(axis=0), np.arange(3)]
 
 
 def _largest(values: list[float]) -> float | None:
     return max((value for value in values if np.isfinite(value)), default=None)
 
 
-def contact_section(course: Course, contacts: Contacts) -> Html:
+def contact_section(course: RunCourse, contacts: ContactMeasures) -> Html:
     """Detected contacts and, where it is known, what truly touched and what was missed."""
     parts = [_detected(course, contacts.detections)]
     if contacts.truth_known:
@@ -250,7 +250,7 @@ def contact_section(course: Course, contacts: Contacts) -> Html:
     return joined(parts)
 
 
-def _detected(course: Course, detections: Sequence[Detection]) -> Html:
+def _detected(course: RunCourse, detections: Sequence[DetectedContact]) -> Html:
     if not detections:
         return element("p", "No contact was detected.")
     columns = [
@@ -277,11 +277,11 @@ def _detected(course: Course, detections: Sequence[Detection]) -> Html:
     return table(columns, list(enumerate(detections, 1))[:_ROWS], note, 3, "Detected contacts")
 
 
-def _touched(contacts: Contacts) -> Html:
+def _touched(contacts: ContactMeasures) -> Html:
     if not contacts.touches:
         return element("p", "Nothing truly touched the arm.")
     answers = {d.touch: (i, d) for i, d in reversed(list(enumerate(contacts.detections, 1)))}
-    rows: list[tuple[int, Touch]] = []
+    rows: list[tuple[int, TrueTouch]] = []
     for i, touch in enumerate(contacts.touches):
         if len(rows) < (_ROWS if i in answers else _MOST):
             rows.append((i, touch))
@@ -316,7 +316,7 @@ def _why(mode: Mode | None) -> Text:
     return bad("missed" + (" in HOLD" if mode is Mode.HOLD else ""))
 
 
-def _false(detections: Sequence[Detection]) -> Html:
+def _false(detections: Sequence[DetectedContact]) -> Html:
     """Say which detections no touch explains."""
     false = [f"contact {i} at {d.time:.2f} s" for i, d in enumerate(detections, 1) if d.touch is None]
     if not false:

@@ -17,7 +17,7 @@ from pretouch.reporting.contacts import AXES
 from pretouch.reporting.html import Html, element, html
 from pretouch.reporting.limits import acceleration_fraction, position_margin, speed_fraction
 from pretouch.reporting.motion import d_crit, d_notice, within_d_max
-from pretouch.reporting.record import Course
+from pretouch.reporting.record import RunCourse
 from pretouch.types import FloatArray, Mode
 
 INK, BLUE, RED, GREEN, AMBER, GREY = "#1f2933", "#2b6cb0", "#c53030", "#2f855a", "#b7791f", "#a0aab4"
@@ -64,7 +64,7 @@ def picture(figure: Figure, text: str) -> Html:
     return element("figure", Html(drawn + element("figcaption", html(text))))
 
 
-def _panels(course: Course, heights: Sequence[float], height: float) -> tuple[Figure, list[Axes]]:
+def _panels(course: RunCourse, heights: Sequence[float], height: float) -> tuple[Figure, list[Axes]]:
     """Make a figure of panels one below the other that share the time of a course."""
     figure = Figure(figsize=(10, height), layout="constrained")
     panels: list[Axes] = list(figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0])
@@ -87,7 +87,7 @@ def _panels(course: Course, heights: Sequence[float], height: float) -> tuple[Fi
     return figure, panels
 
 
-def _frame(axes: Axes, course: Course) -> None:
+def _frame(axes: Axes, course: RunCourse) -> None:
     axes.grid(alpha=0.25, lw=0.6)
     axes.spines[["top", "right"]].set_visible(False)
     if len(course) > _MOST_DRAWN:
@@ -103,7 +103,7 @@ def _legend(axes: Axes, columns: int) -> None:
         )  # fmt: skip
 
 
-def force_figure(course: Course) -> Figure:
+def force_figure(course: RunCourse) -> Figure:
     """One panel an axis: estimate, value of eq. 8, thresholds, true force where it is known, and detections.
 
     Below them the evidence. Detectors without thresholds have bands in which one sample alone is no contact.
@@ -118,7 +118,7 @@ def force_figure(course: Course) -> Figure:
     return figure
 
 
-def close_up_figure(course: Course, time: float, force: FloatArray) -> Figure:
+def close_up_figure(course: RunCourse, time: float, force: FloatArray) -> Figure:
     """The same about one contact [s], along the axis to which its force (3,) points most."""
     figure, (axes,) = _panels(course, (1,), 3.2)
     span = time - _BEFORE_S, time + _AFTER_S
@@ -128,7 +128,7 @@ def close_up_figure(course: Course, time: float, force: FloatArray) -> Figure:
     return figure
 
 
-def _along(axes: Axes, course: Course, k: int, span: tuple[float, float]) -> None:
+def _along(axes: Axes, course: RunCourse, k: int, span: tuple[float, float]) -> None:
     """Draw the force along an axis of the base frame in a span of time [s]."""
 
     def within(time: FloatArray) -> slice:
@@ -137,9 +137,9 @@ def _along(axes: Axes, course: Course, k: int, span: tuple[float, float]) -> Non
     steps = within(course.time)
     time, force, filtered = course.time[steps], course.force[steps, k], course.filtered_force[steps, k]
     if course.truth is not None:
-        known = within(course.truth.time)
-        true = course.truth.force[known, k]
-        axes.plot(course.truth.time[known], true, color=GREEN, lw=0.9, ls="--", label="true force")
+        instants = within(course.truth.time)
+        true = course.truth.force[instants, k]
+        axes.plot(course.truth.time[instants], true, color=GREEN, lw=0.9, ls="--", label="true force")
     axes.plot(time, force, color=GREY, lw=0.9, label="estimate")
     if course.by_thresholds:
         axes.plot(time, filtered, color=BLUE, lw=1.3, label="value of eq. 8")
@@ -154,7 +154,7 @@ def _along(axes: Axes, course: Course, k: int, span: tuple[float, float]) -> Non
     axes.set_ylabel(f"force along {AXES[k]} [N]")
 
 
-def motion_figure(course: Course) -> Figure:
+def motion_figure(course: RunCourse) -> Figure:
     """Distance of what each unit showed from the body, where proximity was used; speed; speed factor."""
     heights, height = ((1.5, 1, 0.6), 7.6) if course.proximity_used else ((1, 0.6), 4.6)
     figure, (*above, speed, factor) = _panels(course, heights, height)
@@ -176,8 +176,8 @@ def motion_figure(course: Course) -> Figure:
 
 def _plain(name: str) -> str:
     """Write a name from a file so that Matplotlib shows it as it is: no formula, and not hidden."""
-    shown = name.replace("\\", "\\\\").replace("$", r"\$") if "$" in name else name
-    return f" {shown}" if shown.startswith("_") else shown
+    plain = name.replace("\\", "\\\\").replace("$", r"\$") if "$" in name else name
+    return f" {plain}" if plain.startswith("_") else plain
 
 
 def _lines(axes: Axes, time: FloatArray, values: FloatArray, names: Sequence[str]) -> None:
@@ -187,7 +187,7 @@ def _lines(axes: Axes, time: FloatArray, values: FloatArray, names: Sequence[str
         axes.plot(time, values[:, k], color=colour, ls=dashes, lw=1.1, label=name)
 
 
-def path_figure(course: Course) -> Figure:
+def path_figure(course: RunCourse) -> Figure:
     """Path, end-effector by mode, and the nearest sensed points, seen from the front (+x)."""
     figure = Figure(figsize=(7.2, 5.6), layout="constrained")
     axes: Axes = figure.subplots()
@@ -217,7 +217,7 @@ def path_figure(course: Course) -> Figure:
     return figure
 
 
-def joint_figure(course: Course) -> Figure:
+def joint_figure(course: RunCourse) -> Figure:
     """Distance from the position limits by joint; speed and acceleration of the worst joint as fractions."""
     figure, (top, bottom) = _panels(course, (1.2, 1), 5.2)
     margin = position_margin(course, course.q_commanded)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pretouch.reporting.html import NOTHING, Html, Text, bad, element, facts, joined, number, percent, table, vector
-from pretouch.reporting.record import NO_READING, Course, Spread, spread
+from pretouch.reporting.record import NO_READING, Percentiles, RunCourse, spread
 from pretouch.types import BoolArray, FloatArray, RangeStatus
 
 _MAD_TO_SIGMA = 1.4826
@@ -17,7 +17,7 @@ _LOST = 0.05
 
 
 @dataclass(frozen=True)
-class UnitHealth:
+class UnitMeasures:
     """One unit, by the readings of it that the steps were given."""
 
     name: str
@@ -27,7 +27,7 @@ class UnitHealth:
     """One over the median time between measurements [Hz]."""
     lost: float | None
     """Share of measurements at that rate that are missing."""
-    latency: Spread | None
+    latency: Percentiles | None
     """From a measurement to the first step that was given it [s]."""
     status: dict[str, int]
     """New readings by status."""
@@ -43,13 +43,13 @@ class LoopHealth:
 
     rate: float | None
     """New robot states a second that the steps were given [Hz]."""
-    age: Spread | None
+    age: Percentiles | None
     """Of the robot state at the step [s]."""
     force_missing: float | None
     """Share of the steps without a force estimate."""
     sigma: FloatArray
     """(3,) median standard deviation of the force window while it is full [N], NaN without any."""
-    period: Spread | None
+    period: Percentiles | None
     """Time from one step to the next [s]."""
     late: int
     """Steps that came half a period late or more."""
@@ -57,12 +57,12 @@ class LoopHealth:
     """Steps whose inputs are not in the recording."""
 
 
-def unit_health(course: Course) -> tuple[UnitHealth, ...]:
+def unit_health(course: RunCourse) -> tuple[UnitMeasures, ...]:
     """Each unit of the skin."""
     return tuple(_unit(course, k) for k in range(len(course.units)))
 
 
-def _unit(course: Course, k: int) -> UnitHealth:
+def _unit(course: RunCourse, k: int) -> UnitMeasures:
     stamp, status = course.reading_stamp[:, k], course.reading_status[:, k]
     fresh = _fresh(np.where(status == NO_READING, np.nan, stamp))
     stamps, statuses = stamp[fresh], status[fresh]
@@ -70,7 +70,7 @@ def _unit(course: Course, k: int) -> UnitHealth:
     usual = float(np.median(gaps)) if len(stamps) >= _FEW else 0.0
     expected = float(np.round(gaps / usual).sum()) if usual > 0 else 0.0
     time = course.time[course.with_inputs]
-    return UnitHealth(
+    return UnitMeasures(
         name=course.units[k],
         readings=len(stamps),
         rate=1 / usual if usual > 0 else None,
@@ -82,7 +82,7 @@ def _unit(course: Course, k: int) -> UnitHealth:
     )
 
 
-def loop_health(course: Course) -> LoopHealth:
+def loop_health(course: RunCourse) -> LoopHealth:
     """What the robot reported, and how the steps followed each other."""
     stamps = course.robot_stamp[_fresh(course.robot_stamp)]
     lasted = float(stamps[-1] - stamps[0]) if len(stamps) > 1 else 0.0
@@ -101,9 +101,9 @@ def loop_health(course: Course) -> LoopHealth:
 
 def _fresh(stamp: FloatArray) -> BoolArray:
     """Whether each stamp (S,) is finite and another than the last finite one."""
-    known = np.flatnonzero(np.isfinite(stamp))
+    finite = np.flatnonzero(np.isfinite(stamp))
     fresh = np.zeros(len(stamp), np.bool_)
-    fresh[known] = np.diff(stamp[known], prepend=np.nan) != 0
+    fresh[finite] = np.diff(stamp[finite], prepend=np.nan) != 0
     return fresh
 
 
@@ -121,7 +121,7 @@ def _noise(distance: FloatArray) -> float | None:
     return float(_MAD_TO_SIGMA * np.median(np.abs(bend - np.median(bend))) / np.sqrt(6.0))
 
 
-def health_section(units: tuple[UnitHealth, ...], loop: LoopHealth) -> Html:
+def health_section(units: tuple[UnitMeasures, ...], loop: LoopHealth) -> Html:
     """Units, robot interface and loop."""
     columns = [
         ("unit", lambda unit: unit.name),
@@ -149,7 +149,7 @@ def health_section(units: tuple[UnitHealth, ...], loop: LoopHealth) -> Html:
     return joined([table(columns, units, note) if units else element("p", "The arm wears no unit."), facts(rest)])
 
 
-def _milliseconds(values: Spread | None) -> str:
+def _milliseconds(values: Percentiles | None) -> str:
     if values is None:
         return NOTHING
     median, p99, largest = (number(value, 1, 1000.0) for value in (values.median, values.p99, values.max))

@@ -107,25 +107,22 @@ def bad(text: Text) -> Html:
 
 def table(columns: Sequence[Column], rows: Iterable[Any], note: Text = "", names: int = 1, title: str = "") -> Html:
     """Make a table of a line a row; the first columns, `names` of them, hold words and the others numbers."""
-    return shown(tabulated(title, columns, rows, note, names), "h4")
+    return table_html(tabulated(title, columns, rows, note, names), "h4")
 
 
-def shown(made: TextTable, heading: str = "h3") -> Html:
+def table_html(contents: TextTable, heading: str = "h3") -> Html:
     """Make a table with its title above, as a heading, and its note below, where it has them."""
 
     def line(cells: Sequence[Text], name: str) -> Html:
-        kinds = ["w" if i < made.names else "" for i in range(len(cells))]
+        kinds = ["w" if i < contents.names else "" for i in range(len(cells))]
         texts = (cell if isinstance(cell, Html) else joined(cell.split("\n"), "<br>") for cell in cells)
         return element("tr", joined((element(name, c, k) for c, k in zip(texts, kinds, strict=True)), ""))
 
-    whole = element("thead", line(made.header, "th")) + element("tbody", joined(line(row, "td") for row in made.rows))
-    return joined(
-        [
-            *([element(heading, made.title)] if made.title else []),
-            element("div", element("table", Html(whole)), "scroll"),
-            *([element("p", made.note, "note")] if made.note else []),
-        ]
-    )
+    body = element("tbody", joined(line(row, "td") for row in contents.rows))
+    grid = element("table", Html(element("thead", line(contents.header, "th")) + body))
+    title = [element(heading, contents.title)] if contents.title else []
+    note = [element("p", contents.note, "note")] if contents.note else []
+    return joined([*title, element("div", grid, "scroll"), *note])
 
 
 def document(title: str, body: Html) -> str:

@@ -7,7 +7,7 @@ import numpy as np
 
 from pretouch.recording.run_record import MODES
 from pretouch.reporting.html import Html, Text, bad, element, joined, number, percent, table
-from pretouch.reporting.record import OUTCOMES, Course, Spread, least, spread
+from pretouch.reporting.record import OUTCOMES, Percentiles, RunCourse, least, spread
 from pretouch.types import FloatArray, Mode, QpOutcome
 
 _MOST = 1000.0
@@ -26,9 +26,9 @@ class JointMargin:
     """Least distance of the commanded position from the nearer limit [rad]."""
     margin_measured: float | None
     """The same of the measured position [rad]."""
-    speed: Spread | None
+    speed: Percentiles | None
     """Command as a fraction of the largest speed the arm allows at that position."""
-    acceleration: Spread | None
+    acceleration: Percentiles | None
     """Change of the command as a fraction of the largest acceleration the arm allows."""
 
     @property
@@ -43,7 +43,7 @@ class JointMargin:
         return tuple(name for name, beyond in exceeded.items() if beyond)
 
 
-def limit_margins(course: Course) -> tuple[JointMargin, ...]:
+def limit_margins(course: RunCourse) -> tuple[JointMargin, ...]:
     """Each joint of the arm."""
     columns = zip(
         position_margin(course, course.q_commanded).T,
@@ -63,12 +63,12 @@ def _least(values: FloatArray) -> float | None:
     return low and low[0]
 
 
-def position_margin(course: Course, q: FloatArray) -> FloatArray:
+def position_margin(course: RunCourse, q: FloatArray) -> FloatArray:
     """Distance (S, n) of positions from the nearer limit of each joint [rad], negative beyond it."""
     return np.minimum(q - course.model.q_min, course.model.q_max - q)
 
 
-def speed_fraction(course: Course) -> FloatArray:
+def speed_fraction(course: RunCourse) -> FloatArray:
     """Commands (S, n) as fractions of what the arm allows there in their direction, no more than `_MOST`."""
     arm, q, command = course.model.description, course.q_commanded, course.command
     allowed, envelope = np.broadcast_to(arm.qd_max, q.shape), arm.envelope
@@ -81,7 +81,7 @@ def speed_fraction(course: Course) -> FloatArray:
     return np.where(command == 0, 0.0, np.minimum(fraction, _MOST))
 
 
-def acceleration_fraction(course: Course) -> FloatArray:
+def acceleration_fraction(course: RunCourse) -> FloatArray:
     """Changes (S, n) of the command as fractions of what the arm allows in the whole periods they took; first row NaN.
 
     A command is in force for a period. A step that came later, or after cycles that the recording lost, had longer.
@@ -128,7 +128,7 @@ def violations(joints: tuple[JointMargin, ...]) -> list[str]:
     return [f"{name} of joint {j}" for j, joint in enumerate(joints, 1) for name in joint.violations]
 
 
-def _percent(values: Spread | None, which: str) -> str:
+def _percent(values: Percentiles | None, which: str) -> str:
     return percent(getattr(values, which, None), 1)
 
 
@@ -153,7 +153,7 @@ class States:
     holds: tuple[Hold, ...]
     outcomes: dict[QpOutcome, int]
     """Steps by how their quadratic program ended."""
-    slack: Spread | None
+    slack: Percentiles | None
     """Largest violation of an approach row in the steps that had any row [m/s]."""
 
     @property
@@ -163,7 +163,7 @@ class States:
         return {mode: lasted / total if total else 0.0 for mode, lasted in self.time.items()}
 
 
-def states(course: Course) -> States:
+def states(course: RunCourse) -> States:
     """Modes, holds and solver outcomes of a recording."""
     lasted, holds = course.lasted, list[Hold]()
     holding = course.mode == MODES.index(Mode.HOLD)

@@ -8,12 +8,12 @@ import numpy as np
 from pretouch.contact.scatter import HELD_S
 from pretouch.explanation import LOUD_N
 from pretouch.recording.reader import Recorded
-from pretouch.reporting.contacts import Contacts, contacts_in
-from pretouch.reporting.health import LoopHealth, UnitHealth, loop_health, unit_health
-from pretouch.reporting.html import Html, Text, bad, element, joined, number, percent, shown
+from pretouch.reporting.contacts import ContactMeasures, contacts_in
+from pretouch.reporting.health import LoopHealth, UnitMeasures, loop_health, unit_health
+from pretouch.reporting.html import Html, Text, bad, element, joined, number, percent, table_html
 from pretouch.reporting.limits import JointMargin, States, limit_margins, states, violations
 from pretouch.reporting.motion import Distances, Speeds, distances, speeds
-from pretouch.reporting.record import Course, gather
+from pretouch.reporting.record import RunCourse, gather
 from pretouch.reporting.setting import started
 from pretouch.text_table import TextTable
 from pretouch.types import FloatArray, Mode
@@ -27,13 +27,13 @@ class Measures:
     """Name of the file, with as much of its folder as tells it from the others."""
     lacking: str
     """What is missing of a file that is not complete, as a sentence, or ''."""
-    course: Course
-    contacts: Contacts
+    course: RunCourse
+    contacts: ContactMeasures
     distances: Distances
     speeds: Speeds
     joints: tuple[JointMargin, ...]
     states: States
-    units: tuple[UnitHealth, ...]
+    units: tuple[UnitMeasures, ...]
     loop: LoopHealth
 
 
@@ -71,7 +71,7 @@ def summary(m: Measures) -> Html:
     return element("p", joined((sentence for sentence in sentences if sentence), " "), "summary")
 
 
-def _what(course: Course) -> str:
+def _what(course: RunCourse) -> str:
     names, first, seconds = course.profile_names, course.runs[0], float(course.lasted.sum())
     minutes, rest = divmod(round(seconds), 60)
     lasted = f"{minutes} min {rest} s" if minutes else f"{seconds:.1f} s"
@@ -83,7 +83,7 @@ def _what(course: Course) -> str:
     )
 
 
-def _contacts(c: Contacts) -> Text:
+def _contacts(c: ContactMeasures) -> Text:
     count, unmoved = len(c.detections), sum(not d.moved_s for d in c.detections)
     sentence = f"{count or 'No'} contact{'s' if count != 1 else ''} {'were' if count != 1 else 'was'} detected"
     sentence += f", {unmoved} of which did not move the arm" if unmoved else ""
@@ -95,8 +95,8 @@ def _contacts(c: Contacts) -> Text:
     return joined([sentence, bad(wrong) if c.missed or c.without_touch else wrong], "")
 
 
-def _detectable(course: Course) -> Text:
-    """Say what force the detector finds, as `Detection.detectable_n`."""
+def _detectable(course: RunCourse) -> Text:
+    """Say what force the detector finds, as `ControlStep.detectable_n`."""
     forces = course.detectable_n[course.armed & ~np.isnan(course.detectable_n)]
     if not len(forces):
         return ""
@@ -108,7 +108,7 @@ def _detectable(course: Course) -> Text:
     return sentence if most <= LOUD_N else bad(sentence)
 
 
-def _forces(c: Contacts) -> str:
+def _forces(c: ContactMeasures) -> str:
     which = "true force" if c.truth_known else "force estimate during a contact"
     return f"The largest {which} was {c.peak:.1f} N." if c.peak else ""
 
@@ -133,7 +133,7 @@ def comparison(rows: Sequence[Sequence[Text]]) -> Html:
         "Delay, filtered and raw: medians, of forces the norm at the detection. Largest force: the true one where it is"
         " known (*), else the estimate during a contact."
     )
-    return shown(TextTable("", headings, tuple(map(tuple, rows)), note))
+    return table_html(TextTable("", headings, tuple(map(tuple, rows)), note))
 
 
 def compared(order: int, m: Measures) -> list[Text]:

@@ -7,7 +7,7 @@ import numpy as np
 from pretouch.control.approach import notice_m, of_table_i
 from pretouch.recording.run_record import MODES
 from pretouch.reporting.html import Html, element, facts, joined, number, percent, table
-from pretouch.reporting.record import Course, Spread, least, spread
+from pretouch.reporting.record import Percentiles, RunCourse, least, spread
 from pretouch.types import BoolArray, FloatArray, Mode
 
 _SLOWED = 0.99
@@ -15,7 +15,7 @@ _SLOWED = 0.99
 
 
 @dataclass(frozen=True)
-class Nearest:
+class LeastDistance:
     """The least distance of something."""
 
     name: str
@@ -29,13 +29,13 @@ class Nearest:
 class Distances:
     """Least distances, and how long something was near: by what the units showed, not by what truly was near."""
 
-    body: Nearest | None
+    body: LeastDistance | None
     """From the surface of the body, with the unit that showed it."""
-    ee: Nearest | None
+    ee: LeastDistance | None
     """From the end-effector's origin."""
-    units: tuple[Nearest | None, ...]
+    units: tuple[LeastDistance | None, ...]
     """By unit."""
-    links: tuple[Nearest, ...]
+    links: tuple[LeastDistance, ...]
     """By link, where it was the closest to anything, nearest first."""
     below_crit_s: float
     """Time with anything below d_crit from the body [s]."""
@@ -45,14 +45,14 @@ class Distances:
     """Time with anything within d_max of the end-effector's origin [s]."""
 
 
-def distances(course: Course) -> Distances:
+def distances(course: RunCourse) -> Distances:
     """Least distances of a recording."""
 
-    def nearest(name: str, values: FloatArray) -> Nearest | None:
+    def nearest(name: str, values: FloatArray) -> LeastDistance | None:
         low = least(values)
-        return None if low is None else Nearest(name, low[0], float(course.time[low[1]]))
+        return None if low is None else LeastDistance(name, low[0], float(course.time[low[1]]))
 
-    def by_distance(one: Nearest) -> float:
+    def by_distance(one: LeastDistance) -> float:
         return one.distance
 
     units = [nearest(name, values) for name, values in zip(course.units, course.body_distance.T, strict=True)]
@@ -69,22 +69,22 @@ def distances(course: Course) -> Distances:
     )
 
 
-def d_crit(course: Course) -> FloatArray:
+def d_crit(course: RunCourse) -> FloatArray:
     """Distance from the body (S,) below which nothing may come nearer [m]."""
     return course.of_runs(lambda run: of_table_i(run.profile.approach).d_crit_m)
 
 
-def d_notice(course: Course) -> FloatArray:
+def d_notice(course: RunCourse) -> FloatArray:
     """Distance from the body (S,) from which on what comes nearer counts [m]."""
     return course.of_runs(lambda run: notice_m(run.profile.approach))
 
 
-def within_d_max(course: Course) -> BoolArray:
+def within_d_max(course: RunCourse) -> BoolArray:
     """Whether anything sensed was within d_max of the end-effector's origin (S,)."""
     return np.asarray(course.ee_distance < course.of_runs(lambda run: run.profile.d_max_m))
 
 
-def distance_section(course: Course, d: Distances) -> Html:
+def distance_section(course: RunCourse, d: Distances) -> Html:
     """Least distances by unit and by link, and how long something was near."""
     if not course.proximity_used:
         return element("p", "Proximity was not used: the profile leaves the units aside.")
@@ -100,7 +100,7 @@ def distance_section(course: Course, d: Distances) -> Html:
         ]
     )
 
-    def least_table(name: str, distance: str, rows: list[tuple[str, Nearest | None]]) -> Html:
+    def least_table(name: str, distance: str, rows: list[tuple[str, LeastDistance | None]]) -> Html:
         return table(
             [
                 (name, lambda row: row[0]),
@@ -123,11 +123,11 @@ def distance_section(course: Course, d: Distances) -> Html:
 class Speeds:
     """Speeds of the end-effector [m/s], and the factor on the speed along the path."""
 
-    all: Spread | None
-    by_mode: dict[Mode, Spread | None]
-    near: Spread | None
+    all: Percentiles | None
+    by_mode: dict[Mode, Percentiles | None]
+    near: Percentiles | None
     """While anything sensed was within d_max."""
-    free: Spread | None
+    free: Percentiles | None
     """While nothing was, following the path."""
     median_factor: float | None
     """While following the path."""
@@ -137,7 +137,7 @@ class Speeds:
     """Share of the time following the path with a factor below 0.99."""
 
 
-def speeds(course: Course) -> Speeds:
+def speeds(course: RunCourse) -> Speeds:
     """Speeds of a recording."""
     near, tracking = within_d_max(course), course.mode == MODES.index(Mode.TRACK)
     factor = course.speed_scale[tracking & np.isfinite(course.speed_scale)]

@@ -2,11 +2,11 @@
 
 from typing import NamedTuple
 
-from pretouch.reporting.contacts import TRANSIENT_S, Contacts
+from pretouch.reporting.contacts import TRANSIENT_S, ContactMeasures
 from pretouch.reporting.html import Html, Text, bad, element, joined, number, percent, table
 
 
-class Region(NamedTuple):
+class BodyRegion(NamedTuple):
     """What a region of the body is said to bear."""
 
     name: str
@@ -21,21 +21,21 @@ SOURCE = (
     " has none"
 )
 REGIONS = (
-    Region("Skull and forehead", None, 130.0),
-    Region("Face", None, 65.0),
-    Region("Chest", 280.0, 140.0),
-    Region("Abdomen", 220.0, 110.0),
-    Region("Back and shoulders", 420.0, 210.0),
-    Region("Upper arms and elbows", 300.0, 150.0),
-    Region("Forearms and wrists", 320.0, 160.0),
-    Region("Hands and fingers", 280.0, 140.0),
+    BodyRegion("Skull and forehead", None, 130.0),
+    BodyRegion("Face", None, 65.0),
+    BodyRegion("Chest", 280.0, 140.0),
+    BodyRegion("Abdomen", 220.0, 110.0),
+    BodyRegion("Back and shoulders", 420.0, 210.0),
+    BodyRegion("Upper arms and elbows", 300.0, 150.0),
+    BodyRegion("Forearms and wrists", 320.0, 160.0),
+    BodyRegion("Hands and fingers", 280.0, 140.0),
 )
 """As `SOURCE` has them; public copies of the table disagree in places."""
 
 
-def orientation_section(contacts: Contacts) -> Html:
+def orientation_section(contacts: ContactMeasures) -> Html:
     """The largest forces beside what regions of the body are said to bear."""
-    peak, held = contacts.peak, contacts.held
+    peak, lasting = contacts.peak, contacts.held
     source, here, unsure = (
         ("true force, as the simulation knows it", "", "")
         if contacts.truth_known
@@ -46,11 +46,11 @@ def orientation_section(contacts: Contacts) -> Html:
             " not detected are not in it.",
         )
     )
-    lasting = "none" if held is None else f"{held:.1f} N"
+    later = "none" if lasting is None else f"{lasting:.1f} N"
 
-    def shares(region: Region) -> tuple[float | None, float | None]:
+    def shares(region: BodyRegion) -> tuple[float | None, float | None]:
         transient = peak / region.transient if peak is not None and region.transient else None
-        return transient, held / region.quasi_static if held is not None else None
+        return transient, lasting / region.quasi_static if lasting is not None else None
 
     columns = [
         ("body region", lambda region: region.name),
@@ -66,7 +66,7 @@ def orientation_section(contacts: Contacts) -> Html:
         f" {TRANSIENT_S:g} s into a contact{here}. Which region would be hit, and over what area, is not known here;"
         f" pressures are not looked at.{unsure}"
     )
-    largest = f"Largest {source}: {number(peak, 1)} N; later than {TRANSIENT_S:g} s into a contact: {lasting}."
+    largest = f"Largest {source}: {number(peak, 1)} N; later than {TRANSIENT_S:g} s into a contact: {later}."
     return joined([element("p", largest), table(columns, REGIONS, note)])
 
 

@@ -16,7 +16,7 @@ from pretouch.reporting.figures import (
     style,
 )
 from pretouch.reporting.health import health_section
-from pretouch.reporting.html import Html, Text, document, element, joined, shown
+from pretouch.reporting.html import Html, Text, document, element, joined, table_html
 from pretouch.reporting.limits import limit_section, mode_section
 from pretouch.reporting.measures import Measures, compared, comparison, summary
 from pretouch.reporting.motion import distance_section, speed_section
@@ -101,4 +101,4 @@ def detection_page(
         drawn = [picture(figure, text) for figure, text in figures]
     head = [element("h1", f"Contacts in {title}"), *(element("p", sentence, "summary") for sentence in sentences[:1])]
     notes = [element("ul", joined(element("li", text) for text in sentences[1:]))] if sentences[1:] else []
-    return document(f"Contacts in {title}", joined([*head, *notes, *map(shown, tables), *drawn]))
+    return document(f"Contacts in {title}", joined([*head, *notes, *map(table_html, tables), *drawn]))

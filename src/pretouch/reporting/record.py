@@ -15,15 +15,15 @@ from pretouch.robot.model import RobotModel
 from pretouch.types import BoolArray, FloatArray, IntArray, QpOutcome, RangeReadings
 
 OUTCOMES = tuple(QpOutcome)
-"""What the numbers in `Course.outcome` stand for."""
+"""What the numbers in `RunCourse.outcome` stand for."""
 NO_READING = -1
-"""Stands in `Course.reading_status` where there is no reading."""
+"""Stands in `RunCourse.reading_status` where there is no reading."""
 _BATCH = 4096
 """Cycles that are objects at a time: an hour of them fits into memory as arrays only."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Course(RunRecord):
+class RunCourse(RunRecord):
     """S control cycles of one recording, with n joints, K units and L links. Base frame; NaN where there is nothing."""
 
     runs: tuple[Run, ...]
@@ -109,7 +109,7 @@ class Course(RunRecord):
         return np.array([value(run) for run in self.runs], dtype=np.float64)[self.run]
 
 
-def gather(recorded: Recorded) -> Course:
+def gather(recorded: Recorded) -> RunCourse:
     """Read all cycles of a recording."""
     blocks, contacts, touches, count = list[Columns](), [], [], 0
     model, units = recorded.runs[0].model, len(recorded.runs[0].skin)
@@ -121,8 +121,10 @@ def gather(recorded: Recorded) -> Course:
         count += len(batch)
     columns = {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
     truth = TrueForces(columns.pop("true_time"), columns.pop("true_force"), tuple(touches))
-    known = columns.pop("truth_known").any()
-    return Course(runs=tuple(recorded.runs), contacts=tuple(contacts), truth=truth if known else None, **columns)
+    with_truth = columns.pop("truth_known").any()
+    return RunCourse(
+        runs=tuple(recorded.runs), contacts=tuple(contacts), truth=truth if with_truth else None, **columns
+    )
 
 
 def _batches(recorded: Recorded) -> Iterator[list[Kept]]:
@@ -195,7 +197,7 @@ def _fit(readings: RangeReadings, units: int) -> bool:
 
 
 @dataclass(frozen=True)
-class Spread:
+class Percentiles:
     """How some numbers are spread."""
 
     median: float
@@ -203,13 +205,13 @@ class Spread:
     max: float
 
 
-def spread(values: FloatArray) -> Spread | None:
+def spread(values: FloatArray) -> Percentiles | None:
     """Median, 99 % and largest of the finite ones of some values, None of none."""
     finite = values[np.isfinite(values)]
     if not finite.size:
         return None
     median, p99 = np.percentile(finite, [50, 99])
-    return Spread(float(median), float(p99), float(finite.max()))
+    return Percentiles(float(median), float(p99), float(finite.max()))
 
 
 def least(values: FloatArray) -> tuple[float, int] | None:

@@ -9,7 +9,7 @@ from pretouch.composition import at, field_docs, leaves
 from pretouch.profiles import PROFILES, Profile
 from pretouch.recording.run import Run
 from pretouch.reporting.html import NOTHING, Html, Text, bad, element, facts, joined, number, table
-from pretouch.reporting.record import Course
+from pretouch.reporting.record import RunCourse
 
 _LONGEST = 300
 """Characters of a fact that are shown."""
@@ -19,7 +19,7 @@ _PROFILES = 6
 """Profiles that are shown side by side."""
 
 
-def setting_section(course: Course, lacking: str) -> Html:
+def setting_section(course: RunCourse, lacking: str) -> Html:
     """What ran, when, on which arm; and what is lacking of the file, '' if it is whole."""
     first = course.runs[0]
     rows: list[tuple[Text, Text]] = [
@@ -44,7 +44,7 @@ def started(run: Run) -> str:
         return "not known"
 
 
-def _runs(course: Course) -> Html:
+def _runs(course: RunCourse) -> Html:
     """Which profile and path were in force when."""
     times = [(run, course.time[course.run == i]) for i, run in enumerate(course.runs)]
     rows = [(run, time) for run, time in times if len(time)]
@@ -82,7 +82,7 @@ def written(value: object, depth: int = 6) -> str:
     return f"{value:.6g}".replace("-", "−") if isinstance(value, float) else str(value)
 
 
-def parameter_section(course: Course) -> Html:
+def parameter_section(course: RunCourse) -> Html:
     """All parameters of all profiles that ran, marked where they are not those of `paper`."""
     profiles = list(dict.fromkeys(run.profile for run in course.runs))
     beside = [PROFILES["paper"], *profiles[:_PROFILES]]

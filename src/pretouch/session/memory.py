@@ -25,7 +25,7 @@ from pretouch.errors import ParameterError, RobotError, RobotModelError
 from pretouch.loop import Cycle
 from pretouch.params import SequentialParams
 from pretouch.robot.model import RobotModel
-from pretouch.toml_files import read_toml
+from pretouch.toml_files import parse_toml
 from pretouch.types import FloatArray
 
 _SIGN_FILE, _FOLDER, _UNUSABLE = "force-sign.json", "free-motion", ".unusable"
@@ -132,7 +132,7 @@ def save_learnt(path: Path, arm: RobotModel, learnt: ResidualModel, robot: str, 
 def load_learnt(path: Path, arm: RobotModel, p: SequentialParams) -> tuple[ResidualModel, str, float, float]:
     """Read a file of free motion: the model, robot, since and saved; one that cannot be used is a RobotModelError."""
     try:
-        stored = msgspec.convert(read_toml(path), _StoredMotion)
+        stored = msgspec.convert(parse_toml(path.read_bytes()), _StoredMotion)
     except OSError as error:
         raise RobotModelError(f"The file {path} cannot be read: {error.strerror}: give one that was saved.") from error
     except (ValueError, msgspec.MsgspecError) as error:  # not of TOML, not UTF-8, or of something else

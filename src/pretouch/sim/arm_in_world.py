@@ -148,9 +148,9 @@ class ArmInWorld:
             keep, p.armature_kg_m2, p.friction_compensated, np.stack([bias, zero]), 2 * np.pi * p.ring_hz * p.period_s,
             p.ring_damping,
         )  # fmt: skip
-        known, scratch = self.model.scratch
+        model, scratch = self.model.scratch
         self._computer = Computer(
-            known._address, scratch._address, scratch.qpos, scratch.qvel, q, zero.copy(), bias, zero.copy(),
+            model._address, scratch._address, scratch.qpos, scratch.qvel, q, zero.copy(), bias, zero.copy(),
             zero.copy(), mass, p.observer_gain_1_s, p.period_s,
         )  # fmt: skip
         self._qd_before = zero.copy()
@@ -160,8 +160,8 @@ class ArmInWorld:
 
     def take_log(self) -> tuple[list[tuple[float, FloatArray]], list[Touch]]:
         """Return `true_log` and `touches`, and begin both anew: in a run without an end they would fill the memory."""
-        taken, self.true_log, self.touches = (self.true_log, self.touches), [], []
-        return taken
+        log, self.true_log, self.touches = (self.true_log, self.touches), [], []
+        return log
 
     @property
     def touching(self) -> bool:

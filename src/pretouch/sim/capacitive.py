@@ -92,8 +92,10 @@ class Electrodes:
         """
         sensor = self._units[unit]
         clean = field(self._mounted[unit], *self._room, sensor.farthest_m)
-        kept = float(np.exp((self._last[unit] - time) / DRIFT_S))  # Ornstein and Uhlenbeck; 0 at first
-        self._drift[unit] = kept * self._drift[unit] + DRIFT * np.sqrt(1.0 - kept**2) * self._rng.standard_normal()
+        remembered = float(np.exp((self._last[unit] - time) / DRIFT_S))  # Ornstein and Uhlenbeck; 0 at first
+        self._drift[unit] = (
+            remembered * self._drift[unit] + DRIFT * np.sqrt(1.0 - remembered**2) * self._rng.standard_normal()
+        )
         self._last[unit] = time
         return told(sensor, clean + self._drift[unit] + NOISE * draw)
 

@@ -49,23 +49,23 @@ class Plant(ArmInWorld):
     def advance(self, duration: float) -> None:
         """Let time pass [s], in whole physics steps."""
         p, n = self.params, self._n
-        steps, taken = round(duration / p.period_s), 0
+        steps, done = round(duration / p.period_s), 0
         draws = self._rng.standard_normal((steps, 2, n))
         velocity_noise = p.velocity_noise_rad_s * draws[:, 0]
         torque_noise = self._torque_noise * draws[:, 1]
         past = np.empty((steps if p.state_delay_s else 0, 5, n))
         times = list(accumulate(repeat(p.period_s, steps), initial=self.time))
         self._age(duration)
-        while taken < steps:
-            first, until = taken, self._prepare_step()
+        while done < steps:
+            first, until = done, self._prepare_step()
             last = bisect_left(times, until, first + 1, steps)
-            taken += take_steps(
+            done += take_steps(
                 self._qd_set, velocity_noise[first:last], torque_noise[first:last], past[first:last], self._arm
             )
-            self.time = times[taken]
+            self.time = times[done]
             if p.state_delay_s:
-                self._states.extend(zip(times[first + 1 : taken + 1], past[first:taken], strict=True))
-            self._note_contacts(times[first + 1 : taken + 1])
+                self._states.extend(zip(times[first + 1 : done + 1], past[first:done], strict=True))
+            self._note_contacts(times[first + 1 : done + 1])
 
     def _prepare_step(self) -> float:
         """Do what is due before the next physics step, and return up to when nothing else will be [s]."""

@@ -126,8 +126,8 @@ class PlantParams(Checked):
                 raise ParameterError(
                     f"PlantParams.{name} has {count} values, the arm {n} joints: take plant_params_of(description)."
                 )
-        wanted = {"offsets_nm": n, "ripple_phases_rad": n, "mass_factors": links}
-        for name, number in wanted.items():
+        counts = {"offsets_nm": n, "ripple_phases_rad": n, "mass_factors": links}
+        for name, number in counts.items():
             count = len(getattr(self, name))
             if count and number is not None and count != number:
                 raise ParameterError(
@@ -150,9 +150,9 @@ def plant_params_of(arm: RobotDescription) -> PlantParams:
     noise, offset and ripple are scaled by the ratio of the two joints' torque limits; all else is kept. An arm with as
     many joints as the Panda and its torque limits, such as the FR3, so has the Panda's own.
     """
-    known, n = panda(), len(arm.q_ready)
-    place = np.rint(np.linspace(0, len(known.q_ready) - 1, n)).astype(np.int64)
-    size = arm.tau_max / known.tau_max[place]
+    model, n = panda(), len(arm.q_ready)
+    place = np.rint(np.linspace(0, len(model.q_ready) - 1, n)).astype(np.int64)
+    size = arm.tau_max / model.tau_max[place]
     own = PlantParams()
     figures: dict[str, Any] = {
         name: tuple((np.array(getattr(own, name))[place] * (size if name in _SCALED else 1.0)).tolist())

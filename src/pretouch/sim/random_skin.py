@@ -75,9 +75,11 @@ def misplaced(skin: Skin, model: RobotModel, error: Misplacement, seed: int) -> 
     depend on the seed and the unit, not on the error's size. A pose that `Skin` refuses, inside the unit's own link, is
     drawn again.
     """
-    made = [_believed(unit, model, error, np.random.default_rng([seed, 13, k])) for k, unit in enumerate(skin.mounted)]
-    units = [_telling(unit, error) if error.told else unit for unit, _ in made]
-    return Skin(units, model), sum(refused for _, refused in made)
+    believed = [
+        _believed(unit, model, error, np.random.default_rng([seed, 13, k])) for k, unit in enumerate(skin.mounted)
+    ]
+    units = [_telling(unit, error) if error.told else unit for unit, _ in believed]
+    return Skin(units, model), sum(refused for _, refused in believed)
 
 
 def _telling(unit: SensorUnit, error: Misplacement) -> SensorUnit:

@@ -14,6 +14,7 @@ from msgspec import UNSET, Struct, UnsetType, ValidationError, convert
 from pretouch.checks import is_number
 from pretouch.errors import ParameterError
 from pretouch.sim.plant_params import PlantParams
+from pretouch.sim.random_skin import Misplacement
 from pretouch.sim.range_finder import RangeFinderParams
 from pretouch.toml_files import parse_toml
 from pretouch.types import FloatArray
@@ -102,10 +103,8 @@ class DrawnWorld:
 
     plant: PlantParams
     ranging: RangeFinderParams
-    position_mm: float = 0.0
-    """By how far each unit sits elsewhere than the controller believes [mm]."""
-    orientation_deg: float = 0.0
-    """By how much it is turned [deg]."""
+    misplaced: Misplacement
+    """By how much each unit sits elsewhere than the controller believes."""
 
     def plant_with(self, own: PlantParams, usual: PlantParams) -> PlantParams:
         """Return this world's plant, but for what an experiment has otherwise than the usual arm: that stays."""
@@ -146,8 +145,8 @@ def _spreads(place: Path, table: dict[str, Any]) -> Iterator[tuple[str, FieldSpr
             raise ParameterError(f"{place} has an unknown table {part!r}: use about, {', '.join(_FIELDS)}.")
         for name, entry in entries.items():
             if name not in _FIELDS[part]:
-                known = ", ".join(_FIELDS[part])
-                raise ParameterError(f"{place} has an unknown field {part}.{name}: choose from {known}.")
+                names = ", ".join(_FIELDS[part])
+                raise ParameterError(f"{place} has an unknown field {part}.{name}: choose from {names}.")
             try:
                 yield f"{part}.{name}", convert(entry if isinstance(entry, dict) else {"value": entry}, FieldSpread)
             except ValidationError as error:
@@ -167,7 +166,9 @@ def drawn(chosen: WorldSet, seed: int, usual: PlantParams | None = None) -> Draw
         values[part][name] = _value(field, spread, seed, getattr(of, name) if of is not None else 0.0)
     try:
         return DrawnWorld(
-            replace(plant, **values["plant"]), replace(ranging, **values["ranging"]), **values["misplaced"]
+            replace(plant, **values["plant"]),
+            replace(ranging, **values["ranging"]),
+            Misplacement(**values["misplaced"]),
         )
     except ParameterError as error:
         raise ParameterError(f"The world {chosen.name}, seed {seed}: {error}") from error

@@ -169,8 +169,8 @@ def build(model: RobotModel, spec: SceneSpec, error: ArmError) -> mujoco.MjModel
             geomname1=one, geomname2=other, condim=3, friction=[0.5, 0.5, 0.005, 0.0001, 0.0001],
             solimp=[_IMPEDANCE, _IMPEDANCE, 0.001, 0.5, 2.0],
         )  # fmt: skip
-    found = 1 << int(mujoco.mjtConDataField.mjCONDATA_FOUND)
-    mj.add_sensor(name=CONTACTS, type=mujoco.mjtSensor.mjSENS_CONTACT, intprm=[found, 0, 1])
+    found_flag = 1 << int(mujoco.mjtConDataField.mjCONDATA_FOUND)
+    mj.add_sensor(name=CONTACTS, type=mujoco.mjtSensor.mjSENS_CONTACT, intprm=[found_flag, 0, 1])
     built = mj.compile()
     _err(built, 0, error.mass_factor)
     if spec.second:

@@ -44,10 +44,10 @@ def _check(alone: mujoco.MjModel, file: Path) -> None:
             raise ParameterError(f"The scene {file} has {things}, which are not simulated: take them out.")
     usual = mujoco.MjSpec().compile().opt
     for name in _PHYSICS:
-        given, expected = (np.asarray(getattr(opt, name)) for opt in (alone.opt, usual))
-        if np.any(given != expected):
+        value, expected = (np.asarray(getattr(opt, name)) for opt in (alone.opt, usual))
+        if np.any(value != expected):
             raise ParameterError(
-                f"The scene {file} has the option {name} {given}, and the arm's world has {expected}: take it out."
+                f"The scene {file} has the option {name} {value}, and the arm's world has {expected}: take it out."
             )
 
 

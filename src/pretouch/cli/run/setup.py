@@ -25,8 +25,7 @@ from pretouch.robot.postures import brought_to
 from pretouch.sensing.skin import Skin, skin_for
 from pretouch.session.memory import FreeMotion, ModelFile, model_file_of, state_folder
 from pretouch.session.terminal import say
-from pretouch.sim.paper_scenes import Placement
-from pretouch.sim.placement import assumptions, placement_for
+from pretouch.sim.paper_scenes import Placement, assumptions, placement_for
 from pretouch.sim.scene import SceneSpec
 from pretouch.types import FloatArray
 from pretouch.units.keys import load_keys

@@ -12,8 +12,7 @@ from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, load_skin, paper_skin, skin_for
 from pretouch.sim.hand import HandScript, PersonArm
-from pretouch.sim.paper_scenes import Placement, person_scene, static_path, static_scene
-from pretouch.sim.placement import placement_for
+from pretouch.sim.paper_scenes import Placement, person_scene, placement_for, static_path, static_scene
 from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams, plant_params_of
 from pretouch.sim.random_skin import Misplacement, misplaced
