@@ -15,9 +15,8 @@ from hypothesis import HealthCheck, given, settings
 
 from pretouch.contact.residual_model import residual_init
 from pretouch.errors import PretouchError
-from pretouch.imported_data.forces import read_force
 from pretouch.imported_data.log import Choice, Log
-from pretouch.imported_data.reading import open_log
+from pretouch.imported_data.reading import open_log, read_force
 from pretouch.imported_data.torques import torque_recording
 from pretouch.importing.chain import arm_of
 from pretouch.importing.read import read_robot

@@ -6,9 +6,8 @@ from rosbags.rosbag2 import StoragePlugin
 from scipy.spatial.transform import Rotation
 
 from pretouch.errors import RecordingError
-from pretouch.imported_data.forces import read_force
 from pretouch.imported_data.log import Choice
-from pretouch.imported_data.reading import open_log, read_joints
+from pretouch.imported_data.reading import open_log, read_force, read_joints
 from pretouch.units.skin_recording import SkinRecording
 from tests.imported_data.files import PANDA, START, by_time, joints, stamps, wrench, wrenches, write_bag
 

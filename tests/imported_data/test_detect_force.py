@@ -7,9 +7,8 @@ import pytest
 
 from pretouch.errors import RecordingError
 from pretouch.imported_data.detect import detect
-from pretouch.imported_data.forces import read_force
 from pretouch.imported_data.log import Choice
-from pretouch.imported_data.reading import open_log
+from pretouch.imported_data.reading import open_log, read_force
 from pretouch.profiles import PROFILES, at_rate, profile
 from tests.following_arm import Arm
 from tests.imported_data.files import PUSHES, force_columns, pushed, write_csv

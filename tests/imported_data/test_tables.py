@@ -6,9 +6,8 @@ import pytest
 from pyarrow import parquet
 
 from pretouch.errors import RecordingError
-from pretouch.imported_data.forces import read_force
 from pretouch.imported_data.log import Choice
-from pretouch.imported_data.reading import open_log, read_joints
+from pretouch.imported_data.reading import open_log, read_force, read_joints
 from tests.imported_data.files import force_columns, write_csv
 
 FORCE = np.random.default_rng(0).normal(size=(50, 3))

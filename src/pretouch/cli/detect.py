@@ -19,9 +19,8 @@ from pretouch.contact.moving_thresholds import thresholds_of
 from pretouch.errors import ParameterError, RecordingError
 from pretouch.extras import FIGURES
 from pretouch.imported_data.detect import detect
-from pretouch.imported_data.forces import ForceRecording, read_force
 from pretouch.imported_data.log import TORQUES, Choice, LogFile
-from pretouch.imported_data.reading import open_log
+from pretouch.imported_data.reading import ForceRecording, open_log, read_force
 from pretouch.imported_data.results import Course, DetectorResult
 from pretouch.imported_data.torques import TorqueRecording, torque_recording
 from pretouch.profiles import Profile, at_rate

@@ -4,8 +4,8 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from pretouch.imported_data.forces import ForceRecording
 from pretouch.imported_data.log import Note
+from pretouch.imported_data.reading import ForceRecording
 from pretouch.imported_data.results import DetectorResult, ThresholdSummary
 from pretouch.imported_data.torques import TorqueRecording
 from pretouch.recording.compare import paired

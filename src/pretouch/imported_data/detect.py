@@ -11,8 +11,8 @@ from pretouch.contact.moving_thresholds import thresholds_of
 from pretouch.contact.reaction import DecayingVelocity
 from pretouch.contact.window import Window, add_force, window_init
 from pretouch.errors import RecordingError
-from pretouch.imported_data.forces import ForceRecording
 from pretouch.imported_data.log import Note
+from pretouch.imported_data.reading import ForceRecording
 from pretouch.imported_data.results import (
     NEAR_S,
     Course,
