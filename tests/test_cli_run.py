@@ -81,7 +81,7 @@ def test_what_does_not_fit_together_is_refused_in_a_sentence(words, said, capsys
 @pytest.mark.parametrize("words", [(), ("simulated",), ("--seed", "0")])
 def test_without_the_name_of_an_arm_a_simulated_one_is_rehearsed(words, monkeypatch):
     commands = []
-    monkeypatch.setattr(Run, "run", commands.append)
+    monkeypatch.setattr(Run, "run", lambda command: commands.append(command))
     assert cli.main(["run", *words]) == 0
     assert commands == [Run(Simulated())]
 

@@ -63,7 +63,9 @@ def ended(model, recording, units=None):
 
 def test_joint_states_are_recorded_as_the_controller_has_them(panda_model):
     rows = []
-    ending, arm = ended(panda_model, SimpleNamespace(joints=lambda *row: rows.append(row), trouble=""))
+    ending, arm = ended(
+        panda_model, SimpleNamespace(joints=lambda *row: rows.append(row), add=lambda *_: None, trouble="")
+    )
     assert ending == Ending()
     stamps, q = (np.concatenate(column) for column in list(zip(*rows, strict=True))[:2])
     assert np.all(np.diff(stamps) > 0.0)
@@ -73,9 +75,9 @@ def test_joint_states_are_recorded_as_the_controller_has_them(panda_model):
 
 
 def test_a_receiver_that_ends_and_a_full_disk_stop_the_arm(panda_model):
-    full = SimpleNamespace(joints=lambda *_: None, sample=None, imu=None, trouble="The disk is full.")
+    full = SimpleNamespace(joints=lambda *_: None, add=lambda *_: None, trouble="The disk is full.")
     assert ended(panda_model, full)[0].stopped == "The disk is full."
-    well, dead = SimpleNamespace(joints=lambda *_: None, trouble=""), Units()
+    well, dead = SimpleNamespace(joints=lambda *_: None, add=lambda *_: None, trouble=""), Units()
     dead.alive = False
     assert "The receiver of the units has ended" in ended(panda_model, well, dead)[0].stopped
 

@@ -12,8 +12,8 @@ from pretouch.units.shared_memory import Mailbox
 from pretouch.values import value
 
 _COMMAND = struct.Struct(f"<qqd{JOINTS}d")
-_MOST = 16_384
-"""Most bytes of feedback, of which a state takes 2000 and the vendor's error names 4000, and of a report."""
+_MOST = 65_536
+"""Most bytes of feedback, of which a state takes 2000 and the vendor's error names 4000, and of a report, 12 000."""
 
 
 class Request(IntEnum):

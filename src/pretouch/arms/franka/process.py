@@ -32,8 +32,6 @@ from pretouch.signals import leave_to_parent
 from pretouch.types import FloatArray
 
 _TERMINATED = "The process that moves the arm was told to end, so the arm was brought to rest: reconnect."
-
-
 _REST = [0.0] * JOINTS
 _ARRIVED_RAD_S = 1e-4
 """Velocity that the arm may still report when its motion is ended."""
