@@ -38,8 +38,8 @@ EACH = 4
 class Peer:
     """The arm and its controller behind topics."""
 
-    def __init__(self, node: Ros2Node, ideal: bool) -> None:
-        self.node, self.ideal = node, ideal
+    def __init__(self, node: Ros2Node) -> None:
+        self.node = node
         model = RobotModel(panda())
         skin, q = paper_skin(model), model.description.q_ready
         self.plant = Plant(model, SceneSpec(), PlantParams(), q, 0)
@@ -65,9 +65,8 @@ class Peer:
                 self.spline.take(message, time_ns() / 1e9 - monotonic())
         commanded = self.spline.update(now)
         self.rows.append([now, *commanded])
-        if not self.ideal:
-            self.plant.command((commanded - before) / (steps * DT))
-            self.plant.advance(steps * DT)
+        self.plant.command((commanded - before) / (steps * DT))
+        self.plant.advance(steps * DT)
 
     def obey(self, order: list[str], day: int) -> bool:
         """Do what a line of the input says; return whether to go on."""
@@ -90,10 +89,8 @@ class Peer:
         # the time of the state, though it was long in the making
         stamp = divmod(self.frozen or day, 10**9)
         robot = self.plant.read()
-        positions, velocities = self.spline.commanded if self.ideal else (robot.q, robot.qd)
-        self.states.publish(make(JOINT_STATE, header(stamp, ""), self.names,
-                                 np.append(positions[self.shuffled], self.more),
-                                 np.append(velocities[self.shuffled], self.more), np.zeros(0)))  # fmt: skip
+        pair = (np.append(values[self.shuffled], self.more) for values in (robot.q, robot.qd))
+        self.states.publish(make(JOINT_STATE, header(stamp, ""), self.names, *pair, np.zeros(0)))
         # as a state broadcaster does: positions and velocities that say nothing
         nothing = np.zeros(len(self.shuffled))
         self.torques.publish(make(JOINT_STATE, header(stamp, ""), self.names[: len(nothing)], nothing, nothing,
@@ -106,11 +103,11 @@ class Peer:
                 publisher.publish(make(RANGE, header(stamp, name), 1, 0.47, 0.04, 4.0, np.inf, 0.0))
 
 
-def main(domain: int, log: str, ideal: bool) -> None:
+def main(domain: int, log: str) -> None:
     orders = SimpleQueue()
     Thread(target=lambda: [orders.put(line.split()) for line in sys.stdin], daemon=True).start()
     with Ros2Node(NodeParams(domain=domain)) as node:
-        peer = Peer(node, ideal)
+        peer = Peer(node)
         print("ready", flush=True)
         begin, tick = monotonic(), 0
         while True:
@@ -153,8 +150,8 @@ class ArmPeer:
 
 
 @contextmanager
-def arm_peer(domain: int, log: Path, *options: str) -> Iterator[ArmPeer]:
-    command = [sys.executable, "-m", "ros2.tests.arm_peer", str(domain), str(log), *options]
+def arm_peer(domain: int, log: Path) -> Iterator[ArmPeer]:
+    command = [sys.executable, "-m", "ros2.tests.arm_peer", str(domain), str(log)]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=ROOT) as process:
         try:
             assert process.stdout.readline() == "ready\n"
@@ -174,4 +171,4 @@ def speeds(log: np.ndarray) -> np.ndarray:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]), sys.argv[2], "--ideal" in sys.argv)
+    main(int(sys.argv[1]), sys.argv[2])

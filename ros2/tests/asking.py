@@ -1,7 +1,7 @@
-"""What commanders send in the tests of ROS 2, one that goes on sending, and a controller that is turned."""
+"""What arms, units and commanders send in tests, a commander that goes on sending, and a controller that is turned."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from threading import Event, Thread
 from time import time
@@ -13,7 +13,7 @@ import numpy as np
 from pretouch import loop
 from pretouch.controller import Controller
 from pretouch.types import ControlStep
-from pretouch_ros2.messages import TRAJECTORY, TWIST, Messages
+from pretouch_ros2.messages import JOINT_STATE, RANGE, TRAJECTORY, TWIST, Messages
 from pretouch_ros2.node import Ros2Node
 
 MESSAGES = Messages("jazzy")
@@ -25,10 +25,22 @@ def stamp(seconds: float) -> tuple[int, int]:
     return math.floor(seconds), round(seconds % 1 * 1e9)
 
 
+def header(at: float, frame: str = "f") -> Any:
+    return MESSAGES.header(stamp(at), frame)
+
+
+def joint_state(at: float, names: Sequence[str], q: Any = (), qd: Any = (), tau: Any = ()) -> Any:
+    return MESSAGES.make(JOINT_STATE, header(at), list(names), *(np.array(one, float) for one in (q, qd, tau)))
+
+
+def measured_range(at: float, name: str, distance: float, least: float = 0.04, most: float = 4.0) -> Any:
+    return MESSAGES.make(RANGE, header(at, name), 1, 0.47, least, most, distance, 0.0)
+
+
 def twist(linear: Any, angular: Any = (0, 0, 0), frame: str = "panda_link0", at: float | None = None) -> Any:
     pair = MESSAGES.xyz("Vector3", linear), MESSAGES.xyz("Vector3", angular)
-    header = MESSAGES.header(stamp(time() if at is None else at), frame)
-    return MESSAGES.make(TWIST, header, MESSAGES.make("geometry_msgs/msg/Twist", *pair))
+    at = time() if at is None else at
+    return MESSAGES.make(TWIST, header(at, frame), MESSAGES.make("geometry_msgs/msg/Twist", *pair))
 
 
 def trajectory(names: tuple[str, ...], *points: tuple[float, Any], at: float = 0.0) -> Any:
@@ -39,7 +51,7 @@ def trajectory(names: tuple[str, ...], *points: tuple[float, Any], at: float = 0
              make("builtin_interfaces/msg/Duration", *stamp(after)))
         for after, qd in points
     ]  # fmt: skip
-    return make(TRAJECTORY, MESSAGES.header(stamp(at), ""), list(names), made)
+    return make(TRAJECTORY, header(at, ""), list(names), made)
 
 
 @contextmanager

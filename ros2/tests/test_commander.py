@@ -190,7 +190,7 @@ def test_a_twist_drives_the_arm_by_its_torques_and_what_goes_wrong_holds_it_and_
         opened.enter_context(publishing(other, topic, TWIST, made))
         stages = iter([
             (lambda: asked.update(frame="camera"), "in the frame 'camera'"),
-            (lambda: asked.update(at=-30.0), "The desired motion ended 30"),
+            (lambda: asked.update(at=-30.0), "The desired motion ended"),
             (lambda: opened.enter_context(publishing(third, topic, TWIST, made)), "several programs ask on"),
         ])  # fmt: skip
 

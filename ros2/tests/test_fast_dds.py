@@ -15,11 +15,11 @@ import numpy as np
 import pytest
 from tests.needs import skip_for
 
+from pretouch_ros2.estimates import JointTorques
 from pretouch_ros2.messages import FRANKA_STATE, JOINT_STATE, RANGE, TRAJECTORY, TWIST, WRENCH
 from pretouch_ros2.node import Ros2Node
 from pretouch_ros2.params import ArmParams, NodeParams
 from pretouch_ros2.stamps import Stamps
-from pretouch_ros2.torques import JointTorques
 
 HERE = Path(__file__).parent
 LAYOUTS = {

@@ -6,29 +6,19 @@ from typing import Any
 
 import numpy as np
 import pytest
+from ros2.tests.asking import MESSAGES, header, joint_state, measured_range
 from scipy.spatial.transform import Rotation
 
 from pretouch.errors import RobotError
-from pretouch.recording import viewer_topics
 from pretouch.types import RangeStatus
+from pretouch_ros2.estimates import JointTorques, Wrench
 from pretouch_ros2.joints import Joints
-from pretouch_ros2.messages import FRANKA_STATE, JOINT_STATE, RANGE, WRENCH, Messages
+from pretouch_ros2.messages import FRANKA_STATE, WRENCH
 from pretouch_ros2.params import ArmParams
-from pretouch_ros2.skin import status_of, topic_name
+from pretouch_ros2.skin import status_of
 from pretouch_ros2.stamps import Stamps
-from pretouch_ros2.torques import JointTorques
-from pretouch_ros2.wrench import Wrench
 
-MESSAGES = Messages("jazzy")
 NAMES = ("a", "b", "c")
-
-
-def header(stamp: float) -> Any:
-    return MESSAGES.header((math.floor(stamp), round(stamp % 1 * 1e9)), "f")
-
-
-def joint_state(stamp: float, names: str, q: Any = (), qd: Any = (), tau: Any = ()) -> Any:
-    return MESSAGES.make(JOINT_STATE, header(stamp), list(names), *(np.array(one, float) for one in (q, qd, tau)))
 
 
 def wrench(stamp: float, *numbers: float) -> Any:
@@ -78,15 +68,12 @@ def test_a_position_that_is_no_number_is_handed_on_for_the_controller_to_name(jo
     assert np.isnan(joints.newest.q[1])
 
 
-_BACK = [(5 + k / 100, 1.2 + k / 100, 8) for k in range(4)]
-
-
 @pytest.mark.parametrize(
     ("told", "expected"),
     [
         pytest.param([(10, 1.0, 7), (10, 1.1, 7), (9.5, 1.2, 7), (10.01, 1.3, 7)], [1.0, None, None, 1.3], id="late"),
         pytest.param([(10, 1.0, 7), (9.9, 1.1, 8)], [1.0, 1.1], id="another publisher"),
-        pytest.param([(9.9, 1.1, 8), *_BACK, _BACK[-1]], [1.1, None, None, 1.22, 1.23, None], id="clock set back"),
+        pytest.param([(9.9, 1.1, 8), (5.0, 1.2, 8), (5.1, 1.3, 8)], [1.1, None, None], id="clock set back"),
         pytest.param([(10, 1.0, 1), (10, 1.1, 2), (10, 1.2, 1), (10, 1.3, 2)], [1.0, 1.1, None, None], id="frozen"),
         pytest.param([(10 - 2 * (k % 2), 1.0 + k, 1) for k in range(9)], [1.0, *[None] * 8], id="alternating"),
         pytest.param([(0, 1.0, 7), (0, 1.1, 7)], [1.0, 1.1], id="no stamps"),
@@ -114,8 +101,6 @@ def test_what_strangers_publish_takes_bounded_memory():
         joints.take(SimpleNamespace(name=[f"x{k}"], position=[0.0], velocity=[], header=header(0)), 0.0, 1)
         stamps.instant(header(10), float(k), k)
     joints.take(SimpleNamespace(name=["a"] * 2000, position=[0.0] * 2000, velocity=[], header=header(0)), 0.0, 1)
-    assert len(joints._places) <= 64
-    assert max(map(len, joints._places)) == 1
     assert len(joints.others) <= 65
     assert len(stamps._writers) <= 8
     joints.take(joint_state(1, "a", [1.0]), 5.0, 1)
@@ -233,10 +218,4 @@ def test_a_frame_id_that_does_not_fit_the_setting_is_named(frame_id, frame, doub
     ],
 )
 def test_a_range_says_what_rep_117_says(distance, least, most, status):
-    message = MESSAGES.make(RANGE, header(1), 1, 0.5, least, most, distance, 0.0)
-    assert status_of(message) is status
-
-
-@pytest.mark.parametrize("name", ["forearm_1", "1st", "links/rechts", "größe", "a b", "_", "9"])
-def test_a_unit_has_the_same_topic_as_in_recordings(name):
-    assert topic_name(name) == viewer_topics.topic_name(name)
+    assert status_of(measured_range(1, "f", distance, least, most)) is status

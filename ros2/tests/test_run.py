@@ -1,6 +1,7 @@
 """`pretouch run ros2`, as a program of its own, with a simulated arm in another process."""
 
 import os
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -79,24 +80,24 @@ def test_a_run_checks_yields_to_a_push_and_ends_at_rest(domain, tmp_path, arm):
     assert speeds(log)[-50:].max() < 1e-9
 
 
-def test_a_run_that_is_killed_in_motion_leaves_the_arm_at_rest(domain, tmp_path, arm):
+@pytest.mark.parametrize("ending", [signal.SIGKILL, signal.SIGSTOP], ids=["killed", "frozen"])
+def test_a_run_that_is_killed_or_frozen_in_motion_leaves_the_arm_at_rest(domain, tmp_path, arm, ending):
     confirmed(domain, tmp_path)
     with running(domain, tmp_path, "--seconds", "30") as run:
         lines_until(run, "TRACK")
         arm.tell("push 0 0 20")
         lines_until(run, "REACT")
         sleep(0.2)
-        run.kill()
-        killed = monotonic()
-        run.wait(10)
+        run.send_signal(ending)
+        ended = monotonic()
         sleep(1.0)
-    log = arm.stop()
+        log = arm.stop()
     fast, time = speeds(log), log[1:, 0]
-    assert fast[time < killed][-50:].max() > 0.05  # samples, not a time: a busy machine may log none for a while
-    assert time[fast > 1e-6][-1] - killed < 0.4 + LATE_S
-    limits = panda().qdd_max
-    braking = slice(np.searchsorted(time, killed + 0.1), None)
-    acceleration = np.abs(np.diff(velocities(log)[braking], axis=0)) / 1e-3 / limits
+    assert fast[time < ended][-50:].max() > 0.05  # samples, not a time: a busy machine may log none for a while
+    assert time[fast > 1e-6][-1] - ended < 0.4 + LATE_S
+    assert not (fast[-300:] > 1e-6).any()
+    braking = slice(np.searchsorted(time, ended + 0.1), None)
+    acceleration = np.abs(np.diff(velocities(log)[braking], axis=0)) / 1e-3 / panda().qdd_max
     assert np.percentile(acceleration, 99) < 1.1
 
 

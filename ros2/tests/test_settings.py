@@ -75,7 +75,7 @@ def test_a_network_that_the_environment_forbids_is_refused(environment, interfac
 
 def test_an_interface_that_is_not_there_is_refused(domain):
     with pytest.raises(RobotError, match="cannot be joined through the interface 'nowhere0': give the address or name"):
-        Ros2Node(NodeParams(domain=domain, interface="nowhere0"))
+        Ros2Node(NodeParams(domain=domain + 100, interface="nowhere0"))  # a domain that no node of this process is in
 
 
 def test_two_nodes_of_a_program_share_a_domain_and_so_its_network(domain):

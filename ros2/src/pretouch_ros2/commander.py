@@ -82,7 +82,8 @@ class Ros2Commander:
             return
         try:
             self._check_clock()
-            self._newest = self._read(message, instant)
+            read = self._twist if self.kind == TWIST else self._trajectory
+            self._newest = read(message, instant)
         except _UnfitError as unfit:
             self._newest = desired.refused(received, str(unfit)), False
 
@@ -94,24 +95,19 @@ class Ros2Commander:
                 " clocks by NTP, or say that ROS has its own clock"
             )
 
-    def _read(self, message: Any, instant: float) -> tuple[Desired, bool]:
-        """Return what a message asks for, and whether it is a twist in the end-effector's frame."""
-        if self.kind == TWIST:
-            return self._twist(message, instant)
-        return self._trajectory(message, instant), False
-
     def _twist(self, message: Any, instant: float) -> tuple[Desired, bool]:
+        """Return what a message asks for, and whether that is in the end-effector's frame."""
         frame = message.header.frame_id
         if frame not in (*self._base, self._ee):
-            known = ", ".join((*self._base, self._ee))
+            frames = ", ".join((*self._base, self._ee))
             raise _UnfitError(
-                f"on {self.params.heard_on} twists are in the frame {frame[:_SHOWN]!r}: give one of {known}"
+                f"on {self.params.heard_on} twists are in the frame {frame[:_SHOWN]!r}: give one of {frames}"
             )
         v, w = message.twist.linear, message.twist.angular
         return desired.twist(instant, (v.x, v.y, v.z), (w.x, w.y, w.z)), frame == self._ee
 
-    def _trajectory(self, message: Any, instant: float) -> Desired:
-        """Return the velocities of a trajectory's points, which may lie ahead."""
+    def _trajectory(self, message: Any, instant: float) -> tuple[Desired, bool]:
+        """Return the velocities of a trajectory's points, which may lie ahead; they are in no frame."""
         names, ours, points = tuple(message.joint_names), self._robot.joints, message.points
         other = next((pair for pair in zip_longest(ours, names, fillvalue="") if pair[0] != pair[1]), None)
         if other is not None:
@@ -124,19 +120,16 @@ class Ros2Commander:
                 f"on {self.params.heard_on} a trajectory has {len(points)} points: give 1 to {_POINTS_MOST}"
             )
         for point in points:
-            self._check_count(len(point.velocities))
+            if len(point.velocities) != len(ours):
+                raise _UnfitError(
+                    f"on {self.params.heard_on} {len(point.velocities)} joint velocities are asked for: give"
+                    f" {len(ours)}, of {', '.join(ours)}"
+                )
         stamp = seconds(message.header.stamp.sec, message.header.stamp.nanosec)
         ahead = max(stamp - wall_clock(), 0.0) if self.params.shared_clock and stamp else 0.0
         times = [seconds(point.time_from_start.sec, point.time_from_start.nanosec) for point in points]
-        return desired.joint_velocities(instant + ahead + np.array(times), np.array([p.velocities for p in points]))
-
-    def _check_count(self, given: int) -> None:
-        ours = self._robot.joints
-        if given != len(ours):
-            raise _UnfitError(
-                f"on {self.params.heard_on} {given} joint velocities are asked for: give {len(ours)}, of"
-                f" {', '.join(ours)}"
-            )
+        velocities = np.array([point.velocities for point in points])
+        return desired.joint_velocities(instant + ahead + np.array(times), velocities), False
 
 
 def _resting_links(model: RobotModel) -> tuple[str, ...]:

@@ -11,8 +11,8 @@ from pretouch_ros2.stamps import Stamps
 
 _NAMES_MOST = 1000
 """Joints of a message; one with more is nobody's whose joints are ours."""
-_REMEMBERED = 64
-"""Orders of names, and joints of others, that are kept: whoever publishes ever other names must not fill the memory."""
+_OTHERS_MOST = 64
+"""Joints of others that are kept: whoever publishes ever other names must not fill the memory."""
 
 
 @value
@@ -27,6 +27,14 @@ class Measured:
     """(n,) [rad/s]."""
 
 
+def places_of(ours: Sequence[str], names: Sequence[str]) -> list[int] | None:
+    """Return where our joints stand among the names of a message; None unless it has all of them."""
+    if len(names) > _NAMES_MOST:
+        return None
+    places = {name: i for i, name in enumerate(names)}
+    return [places[name] for name in ours] if all(name in places for name in ours) else None
+
+
 class Joints:
     """Takes in sensor_msgs/JointState: names in any order, with others beside them."""
 
@@ -38,14 +46,15 @@ class Joints:
         """Joints named in messages that do not have all of ours; some of them, where there are many."""
         self.differentiated = False
         """Whether the messages have no velocities, so that they are taken from the positions."""
-        self._places: dict[tuple[str, ...], list[int] | None] = {}
 
     def take(self, message: Any, received: float, writer: int) -> None:
         """Take a message in; one without all of our joints is another device's."""
-        if len(message.name) > _NAMES_MOST:
-            return
-        places = self._where(tuple(message.name), len(message.position))
+        places = places_of(self.names, message.name)
         if places is None:
+            few = message.name[:_NAMES_MOST]
+            self.others |= set(self.names).intersection(few) | set(few[: max(_OTHERS_MOST - len(self.others), 0)])
+            return
+        if len(message.position) != len(message.name):
             return
         stamp = self.stamps.instant(message.header, received, writer)
         if stamp is None:
@@ -61,19 +70,6 @@ class Joints:
     def missing(self) -> tuple[str, ...]:
         """Our joints that no message has named."""
         return tuple(name for name in self.names if name not in self.others)
-
-    def _where(self, names: tuple[str, ...], positions: int) -> list[int] | None:
-        if names not in self._places:
-            if len(self._places) >= _REMEMBERED:
-                self._places.clear()
-            known = {name: i for i, name in enumerate(names)}
-            complete = all(name in known for name in self.names)
-            self._places[names] = [known[name] for name in self.names] if complete else None
-        places = self._places[names]
-        if places is None:
-            ours = set(self.names).intersection(names)
-            self.others |= ours | set(names[: max(_REMEMBERED - len(self.others), 0)])
-        return places if places is not None and positions == len(names) else None
 
     def _difference(self, stamp: float, q: FloatArray) -> FloatArray:
         """Velocities (n,) [rad/s] since the last positions."""

@@ -92,10 +92,10 @@ class Messages(ros.Messages):
 
     def _wire_type(self, kind: str) -> Any:
         """Class of a type's messages for DDS, which know their type and hold `cdr`: rosbags takes half the time."""
-        made: Any = make_idl_struct(kind.rpartition("/")[2], _dds_name(kind), self._fields(kind))
-        made.serialize = _as_it_is
-        made.deserialize = made.deserialize_key = classmethod(_held)
-        return made
+        message_type: Any = make_idl_struct(kind.rpartition("/")[2], _dds_name(kind), self._fields(kind))
+        message_type.serialize = _as_it_is
+        message_type.deserialize = message_type.deserialize_key = classmethod(_held)
+        return message_type
 
     def _idl_type(self, kind: str) -> type[IdlStruct]:
         """Class of a type that cyclonedds can encode by itself."""

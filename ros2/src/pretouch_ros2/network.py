@@ -2,7 +2,6 @@
 
 import os
 from collections.abc import Mapping
-from weakref import WeakValueDictionary
 
 from cyclonedds.core import DDSException
 from cyclonedds.domain import Domain, DomainParticipant
@@ -23,10 +22,8 @@ _BY_ASKING = (
 """The loopback has no multicast: each of 33 participants is asked by itself, as rmw_cyclonedds does."""
 
 
-_DOMAINS: WeakValueDictionary[int, Domain] = WeakValueDictionary()
-"""DDS has one network a domain and process: nodes share it."""
-_MADE_WITH: dict[int, str] = {}
-"""The configuration that the domain of a number was last made with."""
+_DOMAINS: dict[int, tuple[str, Domain]] = {}
+"""Configuration and domain by its number: DDS has one network a domain and process, which all nodes share."""
 
 
 def domain_of(params: NodeParams, environment: Mapping[str, str] = os.environ) -> int:
@@ -53,14 +50,18 @@ def check_range(params: NodeParams, environment: Mapping[str, str] = os.environ)
         )
 
 
-def participant(params: NodeParams) -> tuple[DomainParticipant, Domain | None]:
-    """Join the domain; what keeps the node from it is a RobotError. The domain lasts as long as its object."""
+def participant(params: NodeParams) -> DomainParticipant:
+    """Join the domain; what keeps the node from it is a RobotError."""
     check_range(params)
     number = domain_of(params)
+    first = number not in _DOMAINS
     try:
-        domain = None if params.interface == ENVIRONMENT else _domain(number, _configuration(params.interface))
-        return DomainParticipant(number), domain
+        if params.interface != ENVIRONMENT:
+            _configure(number, _configuration(params.interface))
+        return DomainParticipant(number)
     except DDSException as error:
+        if first:
+            _DOMAINS.pop(number, None)
         raise RobotError(
             f"The domain {number} cannot be joined through the interface {params.interface!r}: give the address or name"
             f" of an interface of this machine, or {LOOPBACK} ({error})."
@@ -77,11 +78,8 @@ def _configuration(interface: str) -> str:
     )
 
 
-def _domain(number: int, xml: str) -> Domain:
-    domain = _DOMAINS.get(number)
-    if domain is None:
-        domain = Domain(number, xml)
-        _DOMAINS[number], _MADE_WITH[number] = domain, xml
-    if _MADE_WITH[number] != xml:
+def _configure(number: int, xml: str) -> None:
+    if number not in _DOMAINS:
+        _DOMAINS[number] = xml, Domain(number, xml)
+    if _DOMAINS[number][0] != xml:
         raise RobotError(f"Domain {number} is in use by this program with another interface: use one for both.")
-    return domain

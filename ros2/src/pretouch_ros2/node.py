@@ -131,7 +131,7 @@ class Ros2Node:
         """Join a domain. A RobotError says what keeps it from that."""
         self.params = params
         self.messages = Messages(params.distribution)
-        self._participant, self._domain = participant(params)
+        self._participant = participant(params)
         self._topics: dict[tuple[str, str], Topic[Any]] = {}
         self._publishers: list[Publisher] = []
         self._subscriptions: list[Subscription] = []
@@ -152,9 +152,9 @@ class Ros2Node:
     def publisher(self, topic: str, kind: str, *, latched: bool = False, depth: int = _DEPTH) -> Publisher:
         """Publish on a topic: reliable, the last `depth` kept, for who comes later too if it is `latched`."""
         qos = self._qos(kind, reliable=True, latched=latched, depth=depth)
-        made = Publisher(kind, topic, DataWriter(self._participant, self._topic(topic, kind), qos), self.messages)
-        self._publishers.append(made)
-        return made
+        result = Publisher(kind, topic, DataWriter(self._participant, self._topic(topic, kind), qos), self.messages)
+        self._publishers.append(result)
+        return result
 
     def subscribe(
         self, topic: str, kind: str, on_message: OnMessage, *, reliable: bool = False, latched: bool = False
@@ -162,19 +162,19 @@ class Ros2Node:
         """Have messages handed on; best effort, so that publishers of sensor data match as others do."""
         qos = self._qos(kind, reliable=reliable, latched=latched, depth=_DEPTH)
         reader = DataReader(self._participant, self._topic(topic, kind), qos)
-        made = Subscription(kind, topic, reader, self.messages, on_message)
+        subscription = Subscription(kind, topic, reader, self.messages, on_message)
         with self._lock:
-            self._subscriptions.append(made)
-        self._waits.attach(made.ready)
-        return made
+            self._subscriptions.append(subscription)
+        self._waits.attach(subscription.ready)
+        return subscription
 
     def topics(self, kind: str, *, subscribed: bool = False) -> tuple[str, ...]:
         """Names of the topics of a type that others publish, or subscribe to, sorted."""
         builtin = BuiltinTopicDcpsSubscription if subscribed else BuiltinTopicDcpsPublication
-        wanted = self.messages.wire_type(kind).__idl_typename__
+        type_name = self.messages.wire_type(kind).__idl_typename__
         there = BuiltinDataReader(self._participant, builtin).read(1000)
         ours = self._participant.guid
-        names = {e.topic_name for e in there if getattr(e, "type_name", "") == wanted and e.participant_key != ours}
+        names = {e.topic_name for e in there if getattr(e, "type_name", "") == type_name and e.participant_key != ours}
         return tuple(sorted(name.removeprefix("rt") for name in names if name.startswith("rt/")))
 
     def others(self, publisher: Publisher) -> int:
@@ -206,7 +206,6 @@ class Ros2Node:
             subscription.close()
         self._topics.clear()
         del self._participant
-        self._domain = None
 
     def __enter__(self) -> Self:
         return self
@@ -247,7 +246,7 @@ class Ros2Node:
 
     def _discover(self) -> None:
         self._publications = {
-            found.key: found.topic_name
-            for found in self._discovered.read(1000)
-            if found.sample_info.instance_state == InstanceState.Alive
+            publication.key: publication.topic_name
+            for publication in self._discovered.read(1000)
+            if publication.sample_info.instance_state == InstanceState.Alive
         }

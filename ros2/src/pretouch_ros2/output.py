@@ -7,7 +7,7 @@ from typing import Self
 
 from pretouch.controller import Controller
 from pretouch.loop import Cycle
-from pretouch.types import ControlStep, Mode
+from pretouch.types import Mode
 from pretouch_ros2.messages import CLOUD, DIAGNOSTICS, MARKERS, STATUS, TEXT, TRANSFORMS, WRENCH
 from pretouch_ros2.node import Ros2Node
 from pretouch_ros2.params import OutputParams
@@ -90,15 +90,7 @@ class Ros2Output:
                 return
 
     def _publish(self, cycle: Cycle, at: Stamp) -> None:
-        self._publish_step(cycle.step, at)
-        now, changed = monotonic(), cycle.step.mode is not self._published
-        self._published = cycle.step.mode
-        if changed or now >= self._next_diagnostics:
-            self._next_diagnostics = now + self._diagnostics_period
-            self._diagnostics.publish(self._step_messages.diagnostics(cycle, at))
-
-    def _publish_step(self, step: ControlStep, at: Stamp) -> None:
-        step_messages = self._step_messages
+        step, step_messages = cycle.step, self._step_messages
         if step.contact is not None:
             self._contact.publish(step_messages.wrench(step.contact.force, at))
         self._force.publish(step_messages.wrench(step.force, at))
@@ -106,6 +98,11 @@ class Ros2Output:
         self._cloud.publish(step_messages.cloud(step, at))
         self._markers.publish(step_messages.markers(step, at))
         self._mode_text.publish(self._messages.make(TEXT, f"{step.mode.name}: {step.reason}"))
+        now, changed = monotonic(), step.mode is not self._published
+        self._published = step.mode
+        if changed or now >= self._next_diagnostics:
+            self._next_diagnostics = now + self._diagnostics_period
+            self._diagnostics.publish(step_messages.diagnostics(cycle, at))
 
 
 def _now() -> Stamp:

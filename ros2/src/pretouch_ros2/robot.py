@@ -9,14 +9,13 @@ import numpy as np
 from pretouch.errors import RobotError
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray, RobotState
+from pretouch_ros2.estimates import JointTorques, Wrench
 from pretouch_ros2.joints import Joints, Measured
 from pretouch_ros2.messages import JOINT_STATE, TRAJECTORY, WRENCH
 from pretouch_ros2.node import Ros2Node
 from pretouch_ros2.params import ArmParams
 from pretouch_ros2.stamps import Stamps
-from pretouch_ros2.torques import JointTorques
 from pretouch_ros2.trajectory_commands import TrajectoryCommands
-from pretouch_ros2.wrench import Wrench
 
 _PERIOD_S = 0.01
 SHARED_S = 0.05
@@ -66,17 +65,17 @@ class Ros2Robot:
     @property
     def notes(self) -> tuple[str, ...]:
         """What a person should know of what came, a sentence each."""
-        p, found = self.params, [self._wrench.warning]
-        found += [heard.unreadable for heard in (self._states, self._wrenches, *self._efforts)]
+        p, sentences = self.params, [self._wrench.warning]
+        sentences += [heard.unreadable for heard in (self._states, self._wrenches, *self._efforts)]
         if self._joints.differentiated:
-            found.append(f"{p.joint_states} has no velocities: they are computed from the positions.")
+            sentences.append(f"{p.joint_states} has no velocities: they are computed from the positions.")
         if p.shared_clock and self._joints.newest is not None and self._joints.stamps.behind is None:
-            found.append(f"{p.joint_states} has no stamps: whether its clock is this machine's cannot be checked.")
+            sentences.append(f"{p.joint_states} has no stamps: whether its clock is this machine's cannot be checked.")
         if self._commands.publisher.subscribers > 1:
-            found.append(f"{p.command_topic} has {self._commands.publisher.subscribers} subscribers.")
+            sentences.append(f"{p.command_topic} has {self._commands.publisher.subscribers} subscribers.")
         if not p.shared_clock:
-            found.append("Without a shared clock only joint_trajectory_controller 4.17 to 4.20 moves smoothly.")
-        return tuple(filter(None, found))
+            sentences.append("Without a shared clock only joint_trajectory_controller 4.17 to 4.20 moves smoothly.")
+        return tuple(filter(None, sentences))
 
     def unfit(self) -> tuple[str, ...]:
         """Return nothing: no topic says what the arm has against being moved."""
@@ -217,8 +216,8 @@ class Ros2Robot:
 
 
 def _no_publisher(topic: str, kind: str, setting: str, there: tuple[str, ...]) -> str:
-    known = ", ".join(there) or "the topics that exist (none yet)"
+    choices = ", ".join(there) or "the topics that exist (none yet)"
     return (
         f"Nothing was received on {topic}: start its publisher, in the same domain and network, or set {setting} to one"
-        f" of {known} ({kind.replace('/msg/', '/')})."
+        f" of {choices} ({kind.replace('/msg/', '/')})."
     )

@@ -1,13 +1,13 @@
 """The port `Skin` over ROS 2 topics of sensor_msgs/Range."""
 
 import math
-import re
 from functools import partial
 from typing import Any, Self
 
 import numpy as np
 
 from pretouch.errors import HardwareError
+from pretouch.recording.viewer_topics import topic_name
 from pretouch.sensing import skin as skins
 from pretouch.types import RangeReadings, RangeStatus
 from pretouch_ros2.messages import RANGE
@@ -54,8 +54,10 @@ class Ros2Skin:
     def notes(self) -> tuple[str, ...]:
         """What a person should know of what came, a sentence each."""
         several = [name for name, stamps in zip(self._ids, self._stamps, strict=True) if stamps.together()]
-        found = [f"Several publishers send as {name}: run only one; until then the unit is silent." for name in several]
-        return (*(s.unreadable for s in self._subscriptions if s.unreadable), *found)
+        conflicts = [
+            f"Several publishers send as {name}: run only one; until then the unit is silent." for name in several
+        ]
+        return (*(s.unreadable for s in self._subscriptions if s.unreadable), *conflicts)
 
     def read(self) -> RangeReadings:
         """Return the newest reading of each unit, stamped with when it was received by the monotonic clock.
@@ -106,9 +108,3 @@ def status_of(message: Any) -> RangeStatus:
     if distance > most:
         return RangeStatus.SIGNAL
     return RangeStatus.MIN_RANGE if distance < least else RangeStatus.OK
-
-
-def topic_name(name: str) -> str:
-    """Return a unit's id as recordings have it in a topic: ASCII letters, digits and underscores, no digit first."""
-    plain = re.sub(r"\W", "_", name, flags=re.ASCII)
-    return f"_{plain}" if plain[0].isdigit() else plain

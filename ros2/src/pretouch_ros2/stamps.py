@@ -11,10 +11,6 @@ from time import time as wall_clock
 
 from pretouch_ros2.params import seconds
 
-SET_BACK_S = 1.0
-"""A stamp older than the one before by this much may be of a clock that was set back, and no late message [s]."""
-_RISING = 3
-"""Stamps in a row, each newer than the one before, that show a clock that was set back to go on."""
 _TOGETHER_S = 0.5
 """Writers that were heard within this time publish at once [s]."""
 _WRITERS = 8
@@ -29,10 +25,6 @@ class _Writer:
     """When it was heard last [s]."""
     newest: float
     """Its newest stamp [s]."""
-    back: float = 0.0
-    """Newest stamp since the clock seems to have been set back [s]."""
-    rising: int = 0
-    """How many stamps in a row have been newer since."""
 
 
 class Stamps:
@@ -55,38 +47,25 @@ class Stamps:
         """
         at = header.stamp  # type: ignore[attr-defined]
         stamp = seconds(at.sec, at.nanosec)
-        known = self._known(writer, received)
+        entry = self._known(writer, received)
         if stamp == 0:
             return received
-        if not _is_new(known, stamp):
+        if stamp <= entry.newest:
             return None
+        entry.newest = stamp
         behind = self._now() - stamp
         self.behind = behind if self.behind is None else min(behind, self.behind, key=abs)
         return received - max(behind, 0.0) if self._shared else received
 
     def together(self) -> bool:
         """Whether several writers publish at once."""
-        instants = sorted(known.last_received for known in tuple(self._writers.values()))
+        instants = sorted(each.last_received for each in tuple(self._writers.values()))
         return len(instants) > 1 and instants[-1] - instants[-2] < _TOGETHER_S
 
     def _known(self, writer: int, received: float) -> _Writer:
-        known = self._writers.pop(writer, None) or _Writer(received, 0.0)
-        known.last_received = received
+        entry = self._writers.pop(writer, None) or _Writer(received, 0.0)
+        entry.last_received = received
         if len(self._writers) >= _WRITERS:
             del self._writers[next(iter(self._writers))]
-        self._writers[writer] = known  # the last of them is the one heard last
-        return known
-
-
-def _is_new(known: _Writer, stamp: float) -> bool:
-    """Whether a stamp is newer than what its writer stamped before; note it if it is."""
-    if stamp <= known.newest - SET_BACK_S:
-        known.rising = known.rising + 1 if stamp > known.back and known.rising else 1
-        known.back = stamp
-        if known.rising < _RISING:
-            return False
-    elif stamp <= known.newest:
-        known.rising = 0
-        return False
-    known.newest, known.rising = stamp, 0
-    return True
+        self._writers[writer] = entry  # the last of them is the one heard last
+        return entry

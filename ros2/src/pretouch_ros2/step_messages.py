@@ -69,13 +69,13 @@ class StepMessages:
         lines = np.stack([seen.body_point, seen.point], axis=1).reshape(-1, 3)
         force = np.nan_to_num(step.force) / _NEWTONS_A_METRE
         above = ee + np.array([0.0, 0.0, 0.3])
-        made = [
+        parts = [
             self._marker(0, (_SPHERES, (0.04, 0.04, 0.04), _BLUE), at, points=seen.point),
             self._marker(1, (_LINES, (0.005, 0.0, 0.0), _BLUE), at, points=lines),
             self._marker(2, (_ARROW, (0.01, 0.02, 0.0), _RED), at, points=np.stack([ee, ee + force])),
             self._marker(3, (_TEXT, (0.0, 0.0, 0.04), _WHITE), at, position=above, text=step.mode.name),
         ]
-        return self._m.make(MARKERS, made)
+        return self._m.make(MARKERS, parts)
 
     def limited(self, step: ControlStep) -> Any:
         """What keeps the arm from what is asked, for who asks: `ControlStep.limited` by name."""
@@ -98,14 +98,14 @@ class StepMessages:
         if not len(readings.stamp) == len(readings.status) == len(self._skin):
             return []
         slow, silent = self._sight.slow_after_s, self._sight.silent_after_s
-        made = []
+        statuses = []
         for name, stamp, code in zip(self._skin.ids, readings.stamp.tolist(), readings.status.tolist(), strict=True):
             age = step.stamp - stamp
             level = _OK if age < slow else _WARN if age < silent else _ERROR
-            said = "never heard" if math.isinf(age) else f"received {age:.2f} s ago"
+            sentence = "never heard" if math.isinf(age) else f"received {age:.2f} s ago"
             status = RangeStatus(code).name if code in set(RangeStatus) else str(code)
-            made.append(self._status(f"pretouch: unit {name}", level, said, name, {"status": status}))
-        return made
+            statuses.append(self._status(f"pretouch: unit {name}", level, sentence, name, {"status": status}))
+        return statuses
 
     def _status(self, name: str, level: int, said: str, hardware: str, values: dict[str, str]) -> Any:
         pairs = [self._m.make("diagnostic_msgs/msg/KeyValue", *pair) for pair in values.items()]

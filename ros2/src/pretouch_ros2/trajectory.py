@@ -79,13 +79,13 @@ def stopping_trajectory(
     ramp = max(period, float((np.abs(wanted - qd) / qdd_max).max()))
     brake = max(ramp, hold)
     stops = np.unique(np.ceil(np.abs(wanted) / qdd_max / _FINEST_S) * _FINEST_S)
-    kept = brake - ramp > _FINEST_S
-    time = np.concatenate([[0.0, ramp], [brake] if kept else [], brake + stops[stops > 0]])
+    holds = brake - ramp > _FINEST_S
+    time = np.concatenate([[0.0, ramp], [brake] if holds else [], brake + stops[stops > 0]])
     speed = np.maximum(np.abs(wanted) - qdd_max * np.maximum(time[1:, None] - brake, 0.0), 0.0) * np.sign(wanted)
     speed[-1] = 0.0  # and no rounding error of it
     qd = np.vstack([qd, speed])
     steps = (qd[1:] + qd[:-1]) / 2 * np.diff(time)[:, None]
-    return StoppingTrajectory(time, np.vstack([q, q + np.cumsum(steps, axis=0)]), qd, 2 if kept else 1)
+    return StoppingTrajectory(time, np.vstack([q, q + np.cumsum(steps, axis=0)]), qd, 2 if holds else 1)
 
 
 @value
@@ -152,11 +152,11 @@ class Reference:
         for sent, until in zip(self._sent, [*begins[1:], math.inf], strict=True):
             knots = sent.began + sent.trajectory.time
             places += knots[knots < min(until, now) - _NEAREST_S].tolist()
-        found: list[Point] = []
+        points: list[Point] = []
         for place in sorted(p for p in places if now - past <= p < now - _NEAREST_S):
-            if not found or place - now > found[-1].time + _NEAREST_S:
-                found.append(Point(place - now, *self.motion_at(place)))
-        return tuple(found)
+            if not points or place - now > points[-1].time + _NEAREST_S:
+                points.append(Point(place - now, *self.motion_at(place)))
+        return tuple(points)
 
     def motion_at(self, instant: float) -> tuple[FloatArray, FloatArray]:
         """Return positions [rad] and velocities [rad/s] (n,) that were asked for at an instant [s]."""
@@ -167,8 +167,8 @@ class Reference:
         """Return the commanded positions and velocities (n,) at an instant [s], as of a set-point that is held."""
         sent = self._active(instant)
         q, qd = sent.trajectory.at(instant - sent.began)
-        kept = instant - sent.began <= max(self._hold, float(sent.trajectory.time[1]))
-        return q + qd * self._period / 2, sent.wanted if kept else qd
+        holds = instant - sent.began <= max(self._hold, float(sent.trajectory.time[1]))
+        return q + qd * self._period / 2, sent.wanted if holds else qd
 
     def _active(self, instant: float) -> _SentTrajectory:
         for sent in reversed(self._sent):

@@ -129,12 +129,12 @@ class TrajectoryCommands:
         if self._params.shared_clock:
             first = min(points[0].time, 0.0)
             begin = parts_of_day(began + self._ahead + first)
-        made = [
+        messages = [
             make("trajectory_msgs/msg/JointTrajectoryPoint", p.q, p.qd, nothing, nothing,
                  make("builtin_interfaces/msg/Duration", *parts(p.time - first)))
             for p in points
         ]  # fmt: skip
-        self.publisher.publish(make(TRAJECTORY, self._messages.header(begin, ""), self._names, made))
+        self.publisher.publish(make(TRAJECTORY, self._messages.header(begin, ""), self._names, messages))
 
 
 def parts_of_day(instant: float) -> tuple[int, int]:
@@ -174,7 +174,7 @@ class Lag:
         wanted, qd = reference.motion_at(instant)
         unknown = _LARGEST_LAG_S * np.abs(qd) * _UNKNOWN_RAD2_S2 / (self._moved + _UNKNOWN_RAD2_S2)
         # a lag may be a delay, or that of a filter: they differ by this where the velocity changes
-        found = np.abs(usual - self._offset - q) - unknown - self._qdd_max * lag**2 / 2
+        distance = np.abs(usual - self._offset - q) - unknown - self._qdd_max * lag**2 / 2
         self._behind = _MEMORY * self._behind + float((wanted - self._offset - q) @ qd)
         self._moved = _MEMORY * self._moved + float(qd @ qd)
-        return np.maximum(found, 0.0)
+        return np.maximum(distance, 0.0)
