@@ -50,7 +50,7 @@ class Contacts:
     def __init__(self) -> None:
         self.behavior = DEFAULT_BEHAVIOR
         self.joint_contact, self.cartesian_contact = np.zeros(JOINTS, np.bool_), np.zeros(6, np.bool_)
-        self.forget()
+        self.joint_collision, self.cartesian_collision = self.joint_contact, self.cartesian_contact
 
     def update(self, torques: FloatArray, wrench: FloatArray, qdd: FloatArray) -> tuple[str, ...]:
         """Take external torques (7,) [Nm] and the wrench (6,) [N, Nm]; return the reflexes they cause.

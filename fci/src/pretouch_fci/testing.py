@@ -6,7 +6,6 @@ thread beside them would never send it.
 
 import itertools
 import os
-import select
 import socket
 import subprocess
 import sys
@@ -28,6 +27,8 @@ _STARTS_S = 120.0
 """The first server after an installation compiles [s]."""
 _ANSWERS_S = 10.0
 _ENDS_S = 10.0
+_LOOKS_S = 0.005
+"""Time between two looks at what it says [s]."""
 _ADDRESSES = 250
 """A process has so many addresses of its own."""
 _numbers = itertools.count()
@@ -57,16 +58,17 @@ class FrankaServer:
         """
         self.host = _free_address()
         """Its address; the port is the only one that the vendor's libraries know."""
-        self._said: list[str] = []
-        self._folder, self._begun = TemporaryDirectory(), ""
-        self._truth = Path(self._folder.name) / "truth.csv"
+        self._said: tuple[str, ...] = ()
+        self._folder = TemporaryDirectory()
+        self._truth, self._log = (Path(self._folder.name) / name for name in ("truth.csv", "said.txt"))
         ours = {"host": self.host, "stdin": True, "truth": self._truth}
         words = _words({"robot": robot, "lockstep": True, **options, **ours})
         # -P: a module of the tests must not stand in for one of the server's
-        self._process = subprocess.Popen(  # noqa: S603  our own program
-            [sys.executable, "-P", "-m", "pretouch.cli", "serve-fci", *words],
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, bufsize=0,
-        )  # fmt: skip
+        command = [sys.executable, "-P", "-m", "pretouch.cli", "serve-fci", *words]
+        with self._log.open("wb") as log:
+            self._process = subprocess.Popen(  # noqa: S603  our own program
+                command, stdin=subprocess.PIPE, stdout=log, stderr=subprocess.STDOUT, bufsize=0
+            )
         try:
             self._wait_for("Listening at", _STARTS_S, 0)
         except BaseException:
@@ -105,8 +107,10 @@ class FrankaServer:
     @property
     def said(self) -> tuple[str, ...]:
         """What it said so far, line by line, such as why a motion ended."""
-        self._drain()
-        return tuple(self._said)
+        if self._log.exists():
+            *lines, _ = self._log.read_text(errors="replace").split("\n")
+            self._said = tuple(lines)
+        return self._said
 
     @property
     def truth(self) -> Truth:
@@ -121,18 +125,15 @@ class FrankaServer:
     def close(self) -> None:
         """End it, whatever its client does."""
         process = self._process
-        if process.stdout is None or process.stdout.closed:
-            return
         process.terminate()
         try:
             process.wait(_ENDS_S)
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()
-        self._drain()
-        for pipe in (process.stdin, process.stdout):
-            if pipe is not None:
-                pipe.close()
+        if process.stdin is not None:
+            process.stdin.close()
+        self._said = self.said  # the last that it said
         self._folder.cleanup()
 
     def _type(self, line: str) -> None:
@@ -145,30 +146,15 @@ class FrankaServer:
     def _wait_for(self, beginning: str, most: float, seen: int) -> None:
         """Wait for a line with a beginning, behind so many others, up to a time [s]."""
         until = time.monotonic() + most
-        while not any(line.startswith(beginning) for line in self.said[seen:]):
-            if not self._listen(until - time.monotonic()):
-                why = "has ended" if time.monotonic() < until else f"does not answer within {most:g} s"
-                raise RobotError(f"The simulated robot {why}: {' '.join(self.said[seen:]) or 'is it in a motion?'}")
-
-    def _drain(self) -> None:
-        while self._listen(0.0):
-            pass
-
-    def _listen(self, seconds: float) -> bool:
-        """Take in what it says next, waiting up to a time [s] for it; False if it says nothing or has ended.
-
-        No thread does that: a test may fork. Between two calls the pipe holds about a thousand lines.
-        """
-        pipe = self._process.stdout
-        if pipe is None or pipe.closed:
-            return False
-        source = pipe.fileno()
-        if not select.select([source], [], [], max(0.0, seconds))[0]:
-            return False
-        read = os.read(source, 65536)
-        *lines, self._begun = (self._begun + read.decode(errors="replace")).split("\n")
-        self._said += lines
-        return bool(read)
+        while True:
+            ended = self._process.poll() is not None
+            lines = self.said[seen:]
+            if any(line.startswith(beginning) for line in lines):
+                return
+            if ended or time.monotonic() > until:
+                why = "has ended" if ended else f"does not answer within {most:g} s"
+                raise RobotError(f"The simulated robot {why}: {' '.join(lines) or 'is it in a motion?'}")
+            time.sleep(_LOOKS_S)
 
 
 def _words(options: dict[str, object]) -> list[str]:
