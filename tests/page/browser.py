@@ -78,7 +78,7 @@ def chromium(width: int = 1280, height: int = 800) -> Iterator["Visitor"]:
 class Visitor:
     """Somebody at a page."""
 
-    def __init__(self, page) -> None:  # type: ignore[no-untyped-def]
+    def __init__(self, page) -> None:
         self.page = page
         self.received = 0
         """Bytes the page was sent."""
@@ -130,7 +130,7 @@ class Visitor:
     def tab(self, name: str) -> None:
         self.page.get_by_text(name, exact=True).first.click()
 
-    def field(self, label: str):  # type: ignore[no-untyped-def]
+    def field(self, label: str):
         """Where something is typed, or the field of a slider."""
         row = self.page.locator("label", has_text=label).first.locator("xpath=../../..")
         return row.locator("input:not([type=hidden])").last

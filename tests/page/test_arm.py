@@ -7,7 +7,6 @@ import pytest
 import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.page.fake_scene import FakeScene
 
 from pretouch.page import palette
 from pretouch.page.arm import (
@@ -24,19 +23,17 @@ from pretouch.page.arm import (
 )
 from pretouch.page.surfaces import capsule_surfaces
 from pretouch.params import ThresholdParams
-from pretouch.robot.model import RobotModel
-from pretouch.sensing.skin import Skin
 from pretouch.types import Obstacles
 
 PERIOD = 1 / 30
 
 
 @pytest.fixture
-def arm(fake: FakeScene, panda_model: RobotModel, paper_skin: Skin) -> Arm:
-    return Arm(fake, panda_model, paper_skin, capsule_surfaces(panda_model))  # type: ignore[arg-type]
+def arm(fake, panda_model, paper_skin):
+    return Arm(fake, panda_model, paper_skin, capsule_surfaces(panda_model))
 
 
-def test_units_colour_the_links_that_move_as_one_with_theirs(panda_model: RobotModel, paper_skin: Skin) -> None:
+def test_units_colour_the_links_that_move_as_one_with_theirs(panda_model, paper_skin):
     def names(link: str) -> set[str]:
         return {paper_skin.ids[i] for i in seen_from(panda_model, paper_skin, panda_model.link_index(link))[0]}
 
@@ -46,7 +43,7 @@ def test_units_colour_the_links_that_move_as_one_with_theirs(panda_model: RobotM
     assert names("panda_link1") == set()
 
 
-def test_units_are_seen_from_another_link_where_kinematics_puts_them(panda_model: RobotModel, paper_skin: Skin) -> None:
+def test_units_are_seen_from_another_link_where_kinematics_puts_them(panda_model, paper_skin):
     link = panda_model.link_index("panda_link7")
     units, origin, beam = seen_from(panda_model, paper_skin, link)
     kin = panda_model.kinematics(np.array([0.3, -0.5, 0.2, -2.0, 0.4, 1.5, 0.9]))
@@ -57,23 +54,21 @@ def test_units_are_seen_from_another_link_where_kinematics_puts_them(panda_model
         np.testing.assert_allclose(kin.rotation[link] @ along, kin.rotation[own] @ pose[:3, 2], atol=1e-12)
 
 
-def test_an_unchanged_link_is_not_sent_again(fake: FakeScene, arm: Arm) -> None:
+def test_an_unchanged_link_is_not_sent_again(fake, arm):
     for i in range(90):
         arm.paint((0, 0, 12, 0, 0, 0, 0), i * PERIOD)
     painted = [name.split("/")[2] for name, key, _ in fake.sent if key == "glb_data"]
     assert sorted(painted) == ["panda_hand", "panda_link7"]
 
 
-def test_however_much_changes_the_traffic_is_bounded(fake: FakeScene, arm: Arm) -> None:
+def test_however_much_changes_the_traffic_is_bounded(fake, arm):
     seconds, random = 10.0, np.random.default_rng(0)
     for i in range(int(seconds / PERIOD)):
         arm.paint(tuple(random.integers(0, LEVELS + 1, 7).tolist()), i * PERIOD)
     assert 0 < fake.bytes_of("glb_data") / seconds < 600_000
 
 
-def test_what_is_shown_was_sent_long_enough_before_and_one_surface_of_each_coloured_link_is_always_shown(
-    fake: FakeScene, arm: Arm
-) -> None:
+def test_what_is_shown_was_sent_long_enough_before_and_one_surface_of_each_coloured_link_is_always_shown(fake, arm):
     time_sent: dict[str, float] = {}
     shown_after = []
     for i in range(200):
@@ -92,7 +87,7 @@ def test_what_is_shown_was_sent_long_enough_before_and_one_surface_of_each_colou
     assert min(shown_after) >= SETTLE_S - 1e-9
 
 
-def test_the_links_are_drawn_where_they_are(fake: FakeScene, arm: Arm, panda_model: RobotModel) -> None:
+def test_the_links_are_drawn_where_they_are(fake, arm, panda_model):
     kin = panda_model.kinematics(panda_model.q_mid)
     arm.place(kin)
     hand = panda_model.link_index("panda_hand")
@@ -102,7 +97,7 @@ def test_the_links_are_drawn_where_they_are(fake: FakeScene, arm: Arm, panda_mod
     np.testing.assert_allclose(third, kin.rotation[hand][:, 2], atol=1e-12)
 
 
-def test_a_coloured_surface_is_read_by_another_program(panda_model: RobotModel) -> None:
+def test_a_coloured_surface_is_read_by_another_program(panda_model):
     mesh = capsule_surfaces(panda_model)[5]
     colours = np.random.default_rng(0).uniform(0, 255, mesh.vertices.shape)
     data = coloured(mesh, colours)
@@ -138,14 +133,12 @@ def obstacles(units: list[int], distances: list[float]) -> Obstacles:
         ([], [], [0.0] * 7),
     ],
 )
-def test_contact_is_expected_fully_at_d_min_not_at_all_at_d_max_and_by_half_between(
-    units: list[int], distances: list[float], expected: list[float]
-) -> None:
+def test_contact_is_expected_fully_at_d_min_not_at_all_at_d_max_and_by_half_between(units, distances, expected):
     result = expectation(obstacles(units, distances), 7, ThresholdParams(d_min_m=0.05, d_max_m=0.85))
     np.testing.assert_allclose(result, expected, atol=1e-12)
 
 
-def test_a_unit_colours_the_surface_under_it_fully_nothing_from_the_spread_on_nor_the_far_side_of_a_thin_link() -> None:
+def test_a_unit_colours_the_surface_under_it_fully_nothing_from_the_spread_on_nor_the_far_side_of_a_thin_link():
     vertices = np.array([[0.0, 0.0, 0.0], [SPREAD_M, 0.0, 0.0], [0.0, 3 * SPREAD_M, 0.0]])
     share = shares(vertices, np.repeat(UP, 3, axis=0), np.zeros((1, 3)), UP)
     np.testing.assert_allclose(share[:, 0], [1.0, 0.0, 0.0], atol=1e-12)
@@ -155,7 +148,7 @@ def test_a_unit_colours_the_surface_under_it_fully_nothing_from_the_spread_on_no
 
 
 @given(st.floats(0.0, 0.2), st.floats(1e-4, 2e-3))
-def test_patches_are_smooth(at: float, apart: float) -> None:
+def test_patches_are_smooth(at, apart):
     vertices = np.array([[at, 0.0, 0.0], [at + apart, 0.0, 0.0]])
     a, b = shares(vertices, np.repeat(UP, 2, axis=0), np.zeros((1, 3)), UP)[:, 0]
     steepest = 16 / (3 * np.sqrt(3)) / 2 / SPREAD_M  # of (1 - x^2)^2, at x = 1 / sqrt 3
@@ -163,13 +156,13 @@ def test_patches_are_smooth(at: float, apart: float) -> None:
 
 
 @given(st.lists(st.floats(0, 1), min_size=3, max_size=3), st.lists(st.floats(0, 1), min_size=3, max_size=3))
-def test_what_units_expect_adds_up_within_one(share: list[float], expected: list[float]) -> None:
+def test_what_units_expect_adds_up_within_one(share, expected):
     (total,) = on_surface(np.array([share]), np.array(expected))
     most = max(s * e for s, e in zip(share, expected, strict=True))
     assert most - 1e-12 <= total <= 1.0
 
 
-def test_levels_are_even_steps_and_colours_go_from_the_arms_own_to_red() -> None:
+def test_levels_are_even_steps_and_colours_go_from_the_arms_own_to_red():
     assert in_levels(np.array([0.0, 0.5, 1.0])) == (0, LEVELS // 2, LEVELS)
     assert len({in_levels(np.array([e])) for e in np.linspace(0, 1, 1000)}) == LEVELS + 1
     plain, half, full = palette.expected(np.array([0.0, 0.5, 1.0]))

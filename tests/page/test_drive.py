@@ -1,7 +1,5 @@
 """Driving the arm from a page: what a visitor asks is done while that visitor is there."""
 
-from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,14 +12,13 @@ from pretouch.page.drive import REACH_M, TASKS, Steering
 from pretouch.page.frame import driven_motion
 from pretouch.page.live import LivePage
 from pretouch.page.replay import frame_of, world_of
-from pretouch.page.server import ServeOptions
 from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify
 from pretouch.types import FloatArray, Mode
 
 
 @pytest.fixture
-def driver(page: LivePage, options: ServeOptions) -> Iterator[Visitor]:
+def driver(page, options):
     """Somebody who drives an arm that stands."""
     page._simulation.advance(1.5)
     with Visitor(page._server, options) as somebody:
@@ -57,7 +54,7 @@ def speed(page: LivePage) -> float:
     return float(np.linalg.norm(motion.velocities[1]))
 
 
-def test_the_arm_stands_where_it_was_until_somebody_drives(page: LivePage, driver: Visitor) -> None:
+def test_the_arm_stands_where_it_was_until_somebody_drives(page, driver):
     before = hand(page)
     turns(page, 30)
     np.testing.assert_allclose(hand(page), before, atol=0.002)
@@ -65,25 +62,23 @@ def test_the_arm_stands_where_it_was_until_somebody_drives(page: LivePage, drive
     np.testing.assert_allclose(page.drive._target.position, hand(page), atol=0.01)
     do(page, driver, control(page, "Task"), TASKS[0])
     turns(page, 60)
-    assert page._simulation.frame.inputs.desired is None  # type: ignore[union-attr]
+    assert page._simulation.frame.inputs.desired is None
     assert np.linalg.norm(hand(page) - before) > 0.1
     assert not page.drive._target.visible
 
 
-def test_the_hand_goes_to_a_target_that_is_dragged_and_stays(page: LivePage, driver: Visitor) -> None:
+def test_the_hand_goes_to_a_target_that_is_dragged_and_stays(page, driver):
     goal = hand(page) + np.array([-0.05, 0.1, 0.05])
     aim(page, driver, goal)
     turns(page, 120)
     np.testing.assert_allclose(hand(page), goal, atol=0.005)
-    assert page._simulation.frame.inputs.desired.kind is DesiredKind.POSE  # type: ignore[union-attr]
+    assert page._simulation.frame.inputs.desired.kind is DesiredKind.POSE
     aim(page, driver, goal + 0.1, (0.0, 0.0, 0.0, 0.0))  # no orientation
     turns(page, 15)
     np.testing.assert_allclose(hand(page), goal, atol=0.005)
 
 
-def test_a_driver_who_leaves_has_the_arm_come_to_rest_and_the_next_goes_on(
-    page: LivePage, options: ServeOptions, driver: Visitor
-) -> None:
+def test_a_driver_who_leaves_has_the_arm_come_to_rest_and_the_next_goes_on(page, options, driver):
     with Visitor(page._server, options) as other:
         aim(page, other, hand(page) + np.array([0.0, 0.4, 0.0]))
         turns(page, 10)
@@ -100,7 +95,7 @@ def test_a_driver_who_leaves_has_the_arm_come_to_rest_and_the_next_goes_on(
     assert page._simulation.frame.step.mode is Mode.TRACK
 
 
-def test_a_reset_has_a_driven_arm_stand_at_its_beginning(page: LivePage, driver: Visitor) -> None:
+def test_a_reset_has_a_driven_arm_stand_at_its_beginning(page, driver):
     aim(page, driver, hand(page) + np.array([0.0, 0.3, 0.0]))
     turns(page, 10)
     do(page, driver, control(page, "Reset"), True)
@@ -111,9 +106,7 @@ def test_a_reset_has_a_driven_arm_stand_at_its_beginning(page: LivePage, driver:
 
 
 @pytest.mark.slow
-def test_a_drive_at_the_person_is_recorded_shown_again_and_replayed_to_the_bit(
-    page: LivePage, driver: Visitor, tmp_path: Path
-) -> None:
+def test_a_drive_at_the_person_is_recorded_shown_again_and_replayed_to_the_bit(page, driver, tmp_path):
     simulation, start = page._simulation, hand(page)
     simulation.move_hand(start + np.array([0.0, 0.4, 0.05]))
     turns(page, 60)
@@ -126,17 +119,17 @@ def test_a_drive_at_the_person_is_recorded_shown_again_and_replayed_to_the_bit(
     verdict = verify(recorded)
     assert verdict.exact, verdict.sentence
     assert (verdict.checked, verdict.skipped) == (len(recorded), {})
-    assert {kept.inputs.desired.kind for kept in recorded} == {DesiredKind.TWIST, DesiredKind.POSE}
+    assert {cycle.inputs.desired.kind for cycle in recorded} == {DesiredKind.TWIST, DesiredKind.POSE}
     last, world = recorded[len(recorded) - 1], world_of(recorded.runs[0])
     motion = driven_motion(frame_of(last), world, world.model.kinematics(last.step.q))
     assert motion
-    np.testing.assert_allclose(motion.goal[:3, 3], simulation.hand_target)  # type: ignore[index]
-    limits = [kept.step.limited for kept in recorded]
+    np.testing.assert_allclose(motion.goal[:3, 3], simulation.hand_target)
+    limits = [cycle.step.limited for cycle in recorded]
     assert {simulation.skin.ids[limit.unit] for limit in limits if limit.unit >= 0} >= {"hand_left"}
-    assert max(np.linalg.norm(kept.truth.force, axis=1).max() for kept in recorded) < 30.0
+    assert max(np.linalg.norm(cycle.truth.force, axis=1).max() for cycle in recorded) < 30.0
 
 
-def test_a_target_counts_until_another_is_asked_and_lies_within_reach() -> None:
+def test_a_target_counts_until_another_is_asked_and_lies_within_reach():
     steering = Steering()
     steering.attended = True
     assert steering(0.5).kind is DesiredKind.TWIST
@@ -149,7 +142,7 @@ def test_a_target_counts_until_another_is_asked_and_lies_within_reach() -> None:
         assert motion.number[0].tolist() == [0.5, -REACH_M, 0.3, *turned.ravel()]
 
 
-def test_what_is_asked_ages_while_who_asked_it_is_away() -> None:
+def test_what_is_asked_ages_while_who_asked_it_is_away():
     steering = Steering()
     steering.attended = True
     steering(2.0)

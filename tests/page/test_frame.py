@@ -24,13 +24,13 @@ def drawn(simulation: LiveSimulation, motion: Desired | None) -> DrivenMotion | 
 
 
 @pytest.fixture(scope="module")
-def simulation() -> LiveSimulation:
+def simulation():
     simulation = LiveSimulation()
     simulation.advance(1.5)
     return simulation
 
 
-def test_what_was_asked_is_drawn_as_a_velocity_and_where_it_leads(simulation: LiveSimulation) -> None:
+def test_what_was_asked_is_drawn_as_a_velocity_and_where_it_leads(simulation):
     now, model = simulation.frame.step.stamp, simulation.model
     here = simulation.frame.step.ee_position
     kin = model.kinematics(simulation.frame.step.q)
@@ -53,7 +53,7 @@ def test_what_was_asked_is_drawn_as_a_velocity_and_where_it_leads(simulation: Li
     np.testing.assert_allclose(joints.goal[:3, 3], model.kinematics(q).position[model.ee])
 
 
-def test_nothing_is_drawn_of_what_nobody_asked_or_nobody_can_use(simulation: LiveSimulation) -> None:
+def test_nothing_is_drawn_of_what_nobody_asked_or_nobody_can_use(simulation):
     now = simulation.frame.step.stamp
     for motion in (None, desired.twist(now, (np.nan, 0.0, 0.0)), desired.joint_velocities(now, np.zeros(3))):
         assert drawn(simulation, motion) is None
@@ -78,7 +78,7 @@ def approaching(place: FloatArray, velocity: FloatArray) -> tuple[LiveSimulation
     return simulation, sentence
 
 
-def test_the_sentence_names_unit_and_link_that_limit_what_is_asked() -> None:
+def test_the_sentence_names_unit_and_link_that_limit_what_is_asked():
     simulation, sentence = approaching(np.array([0.0, 0.42, 0.05]), np.array([0.0, 0.3, 0.0]))
     assert simulation.skin.ids[simulation.frame.step.limited.unit] == "hand_left"
     assert "hand_left sees something at 0." in sentence
@@ -86,9 +86,7 @@ def test_the_sentence_names_unit_and_link_that_limit_what_is_asked() -> None:
     assert sentence.endswith(" m/s near panda_hand.")
 
 
-def test_an_arm_at_the_end_of_its_reach_one_at_a_joint_limit_and_one_without_units_say_what_limits_them(
-    simulation: LiveSimulation,
-) -> None:
+def test_an_arm_at_the_end_of_its_reach_one_at_a_joint_limit_and_one_without_units_say_what_limits_them(simulation):
     step, way, links = simulation.frame.step, np.array([0.0, 0.2, 0.0]), simulation.model.links
     assert step.limited.by is Limit.NOTHING
     halved = " Asked 0.20 m/s, allowed 0.10 m/s"
@@ -102,12 +100,12 @@ def test_an_arm_at_the_end_of_its_reach_one_at_a_joint_limit_and_one_without_uni
     assert sentence.endswith(f"{halved}.")
 
 
-def test_the_page_of_a_blind_arm_knows_no_unit_in_use() -> None:
+def test_the_page_of_a_blind_arm_knows_no_unit_in_use():
     world = LiveSimulation(LiveSettings(profile=PROFILES["blind"])).world
     assert world.units_in_use == ()
     assert LiveSimulation().world.units_in_use == world.skin.ids
 
 
-def test_what_is_allowed_in_full_needs_no_reason_and_rest_is_named() -> None:
+def test_what_is_allowed_in_full_needs_no_reason_and_rest_is_named():
     assert approaching(np.array([0.5, 0.5, 0.5]), np.array([0.0, -0.1, 0.0]))[1].endswith("allowed 0.10 m/s.")
     assert approaching(np.array([0.5, 0.5, 0.5]), np.zeros(3))[1].endswith(" No motion is asked.")

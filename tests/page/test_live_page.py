@@ -10,7 +10,6 @@ import pytest
 from tests.page.browser import seen_at
 from tests.page.sessions import set_speed
 from tests.page.visitor import control
-from viser import ViserServer
 
 from pretouch.page.controls import toggle_recording, with_name
 from pretouch.page.drive import TASKS
@@ -52,13 +51,11 @@ def click(page: LivePage, label: str) -> None:
 
 
 @pytest.fixture
-def clock(page: LivePage) -> Clock:
+def clock(page):
     return Clock(page)
 
 
-def test_a_second_of_ticks_is_a_second_of_the_simulation_but_in_slow_motion_and_while_paused(
-    clock: Clock, simulation: LiveSimulation
-) -> None:
+def test_a_second_of_ticks_is_a_second_of_the_simulation_but_in_slow_motion_and_while_paused(clock, simulation):
     before = simulation.time
     clock.turn(1.0)
     assert simulation.time - before == pytest.approx(1.0, abs=0.011)
@@ -66,24 +63,25 @@ def test_a_second_of_ticks_is_a_second_of_the_simulation_but_in_slow_motion_and_
     clock.page.controls.running.speed = 0.1
     clock.turn(2.0)
     assert simulation.time - before == pytest.approx(0.2, abs=0.011)
+    assert clock.page.pace.factor == pytest.approx(0.1, abs=0.02)
     clock.page.controls.running.paused = True
     before = simulation.time
     clock.turn(1.0)
-    assert simulation.time == before
+    assert (simulation.time, clock.page.pace.factor) == (before, 0.0)
     for _ in range(10):
         click(clock.page, "Single step")
         clock.turn(0.1)
     assert simulation.time - before == pytest.approx(0.1)
 
 
-def test_nobody_watching_costs_nothing_but_the_simulation(clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_nobody_watching_costs_nothing_but_the_simulation(clock, monkeypatch):
     drawn: list[float] = []
     monkeypatch.setattr(LivePage, "_draw", lambda self, now: drawn.append(now))
     clock.turn(0.5)
     assert drawn == []
 
 
-def test_a_page_that_is_open_for_long_keeps_no_more_and_more(clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_page_that_is_open_for_long_keeps_no_more_and_more(clock, monkeypatch):
     server = clock.page._server
     monkeypatch.setattr(server, "get_clients", lambda: {0: None})
     messages = server._websock_server._broadcast_buffer.message_from_id
@@ -93,9 +91,7 @@ def test_a_page_that_is_open_for_long_keeps_no_more_and_more(clock: Clock, monke
     assert len(messages) < after_a_while + 0.5 * 4.0 / PERIOD_S
 
 
-def test_each_recording_gets_a_file_of_its_own_that_is_named(
-    clock: Clock, simulation: LiveSimulation, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_each_recording_gets_a_file_of_its_own_that_is_named(clock, simulation, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for number in (1, 2):
         clock.page.actions.put(lambda: toggle_recording(simulation))
@@ -107,9 +103,7 @@ def test_each_recording_gets_a_file_of_its_own_that_is_named(
         assert len(open_recording(Path(f"runs/live-{number}.mcap"))) >= 25
 
 
-def test_a_folder_for_recordings_that_cannot_be_made_is_said(
-    clock: Clock, simulation: LiveSimulation, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_folder_for_recordings_that_cannot_be_made_is_said(clock, simulation, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("runs").write_text("in the way")
     clock.page.actions.put(lambda: toggle_recording(simulation))
@@ -118,7 +112,7 @@ def test_a_folder_for_recordings_that_cannot_be_made_is_said(
     assert simulation.recording is None
 
 
-def test_a_number_counts_when_nobody_types_any_more(clock: Clock, simulation: LiveSimulation) -> None:
+def test_a_number_counts_when_nobody_types_any_more(clock, simulation):
     for typed in (0.1, 0.5, 0.2):
         give(clock.page, "Path speed [m/s]", typed)
         clock.turn(0.7)
@@ -127,14 +121,14 @@ def test_a_number_counts_when_nobody_types_any_more(clock: Clock, simulation: Li
     assert simulation.world.profile.name == control(clock.page, "Profile text").value == "paper:task.speed_m_s=0.2"
 
 
-def test_a_changed_profile_is_named_so_that_it_can_be_found_again() -> None:
+def test_a_changed_profile_is_named_so_that_it_can_be_found_again():
     changed = with_name(profile("paper:detect.f_base_n=8.12345678:task.restore_cycles=150"), "paper")
     assert changed.name == "paper:task.restore_cycles=150:detect.f_base_n=8.12345678"
     assert profile(changed.name) == changed
     assert with_name(PROFILES["blind"], "blind") == PROFILES["blind"]
 
 
-def test_all_controls_show_what_holds(clock: Clock, simulation: LiveSimulation) -> None:
+def test_all_controls_show_what_holds(clock, simulation):
     assert control(clock.page, "Profile text").value == "paper"
     clock.page.controls.running.speed = 0.5
     clock.page.actions.put(lambda: simulation.set_profile(profile("pretouch:task.speed_m_s=0.2")))
@@ -150,16 +144,14 @@ def test_all_controls_show_what_holds(clock: Clock, simulation: LiveSimulation) 
 
 
 @pytest.mark.parametrize("speed", [0.0, 7.0])
-def test_a_clock_speed_out_of_range_is_the_nearest_in_it(clock: Clock, speed: float) -> None:
+def test_a_clock_speed_out_of_range_is_the_nearest_in_it(clock, speed):
     give(clock.page, "Clock speed", speed)
     clock.turn(SETTLE_S + 0.1)
     assert clock.page.controls.running.speed == np.clip(speed, 0.1, 1.0)
     assert control(clock.page, "Clock speed").value == np.clip(speed, 0.1, 1.0)
 
 
-def test_what_a_person_gives_the_hand_holds_though_the_sliders_show_another_place_before_it_is_done(
-    clock: Clock, simulation: LiveSimulation
-) -> None:
+def test_what_a_person_gives_the_hand_holds_though_the_sliders_show_another_place_before_it_is_done(clock, simulation):
     clock.turn(0.1)
     give(clock.page, "x [m]", 1.2)
     give(clock.page, "z [m]", 0.7)
@@ -169,9 +161,7 @@ def test_what_a_person_gives_the_hand_holds_though_the_sliders_show_another_plac
     np.testing.assert_array_equal(simulation.hand_target, [1.2, y, 0.7])
 
 
-def test_what_was_said_of_the_simulation_before_is_on_the_page_at_first(
-    server: ViserServer, simulation: LiveSimulation
-) -> None:
+def test_what_was_said_of_the_simulation_before_is_on_the_page_at_first(server, simulation):
     simulation.notice = "The paper's paths for mine: 0.8 times as large."
     clock = Clock(LivePage(server, simulation))
     clock.turn(1.0)
@@ -181,9 +171,7 @@ def test_what_was_said_of_the_simulation_before_is_on_the_page_at_first(
     assert clock.page.status.notice == ""
 
 
-def test_what_is_refused_is_said_until_the_next_click_though_the_hand_moves_and_changes_nothing(
-    clock: Clock, simulation: LiveSimulation
-) -> None:
+def test_what_is_refused_is_said_until_the_next_click_though_the_hand_moves_and_changes_nothing(clock, simulation):
     before = simulation.world.profile
     clock.page.actions.put(lambda: set_speed(simulation, -1.0))
     clock.turn(0.1)
@@ -199,7 +187,7 @@ def test_what_is_refused_is_said_until_the_next_click_though_the_hand_moves_and_
 
 
 @pytest.mark.parametrize(("width", "height"), [(1024, 768), (1440, 900)])
-def test_the_hand_begins_beside_the_panel(simulation: LiveSimulation, width: int, height: int) -> None:
+def test_the_hand_begins_beside_the_panel(simulation, width, height):
     box = {"x": 0, "y": 0, "width": width - PANEL_PX, "height": height}
     assert simulation.frame.hand is not None
     np.testing.assert_allclose(simulation.frame.hand, LiveSettings().hand_start, atol=0.01)
@@ -208,7 +196,7 @@ def test_the_hand_begins_beside_the_panel(simulation: LiveSimulation, width: int
     assert 0 < y < height
 
 
-def test_a_push_is_felt_or_the_page_says_what_it_lacked(clock: Clock, simulation: LiveSimulation) -> None:
+def test_a_push_is_felt_or_the_page_says_what_it_lacked(clock, simulation):
     clock.page.actions.put(lambda: simulation.move_hand(np.array([1.4, 0.0, 1.2])))
     clock.turn(1.5)  # the force window is full
     give(clock.page, "Force [N]", 60.0)
@@ -227,7 +215,7 @@ def test_a_push_is_felt_or_the_page_says_what_it_lacked(clock: Clock, simulation
     assert clock.page.status.notice.endswith(" N would have been a contact then.")
 
 
-def test_resuming_is_offered_only_where_a_hold_waits_for_it(clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_resuming_is_offered_only_where_a_hold_waits_for_it(clock, monkeypatch):
     monkeypatch.setattr(clock.page._server, "get_clients", lambda: {0: None})
     clock.turn(0.1)
     button = control(clock.page, "Resume: nothing waits for it")
@@ -236,9 +224,7 @@ def test_resuming_is_offered_only_where_a_hold_waits_for_it(clock: Clock, monkey
     assert (button.label, button.disabled) == ("Resume", False)
 
 
-def test_an_opening_waits_for_somebody_and_ends_with_the_first_click(
-    clock: Clock, simulation: LiveSimulation, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_opening_waits_for_somebody_and_ends_with_the_first_click(clock, simulation, monkeypatch):
     simulation.play_opening()
     begun = simulation.time
     clock.turn(1.0)
@@ -253,9 +239,7 @@ def test_an_opening_waits_for_somebody_and_ends_with_the_first_click(
 
 
 @pytest.mark.slow
-def test_three_arms_with_one_hand_go_through_the_same_cycles(
-    server: ViserServer, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_three_arms_with_one_hand_go_through_the_same_cycles(server, monkeypatch):
     model = RobotModel(panda())
     simulation = LiveSimulation(LiveSettings(profile=PROFILES["pretouch"]), model, load_skin(LIVE_SKIN, model))
     clock = Clock(LivePage(server, simulation))
@@ -287,7 +271,7 @@ def test_three_arms_with_one_hand_go_through_the_same_cycles(
     assert not any("blind" in name for name in server.scene._handle_from_node_name)
 
 
-def test_the_tutorial_names_the_controls_there_are_and_no_others() -> None:
+def test_the_tutorial_names_the_controls_there_are_and_no_others():
     root = Path(__file__).parents[2]
     source = "".join(
         (root / f"src/pretouch/page/{name}.py").read_text() for name in ("controls", "drive", "live", "plots")

@@ -43,16 +43,16 @@ class Played:
 
 
 @pytest.fixture(scope="module")
-def protected(panda_model: RobotModel) -> Played:
+def protected(panda_model):
     return Played(panda_model, "pretouch")
 
 
 @pytest.fixture(scope="module")
-def blind(panda_model: RobotModel) -> Played:
+def blind(panda_model):
     return Played(panda_model, "blind")
 
 
-def test_the_arm_sees_the_hand_slows_is_touched_yields_and_goes_on(protected: Played) -> None:
+def test_the_arm_sees_the_hand_slows_is_touched_yields_and_goes_on(protected):
     assert protected.slowest_before() < 0.5
     before = protected.steps[protected.touch - 1]
     seen = {protected.simulation.skin.ids[unit] for unit in before.obstacles.unit}
@@ -75,14 +75,14 @@ def test_the_arm_sees_the_hand_slows_is_touched_yields_and_goes_on(protected: Pl
     assert protected.simulation.opening is None
 
 
-def test_a_blind_arm_runs_into_the_same_hand_unslowed_and_with_more_force(protected: Played, blind: Played) -> None:
+def test_a_blind_arm_runs_into_the_same_hand_unslowed_and_with_more_force(protected, blind):
     assert blind.slowest_before() > 0.8
     assert max(protected.force) < 0.5 * max(blind.force)
     assert max(blind.force) > 30.0
 
 
 @pytest.mark.parametrize("how", ["move", "point"])
-def test_a_person_who_moves_the_hand_ends_it_at_once(panda_model: RobotModel, how: str) -> None:
+def test_a_person_who_moves_the_hand_ends_it_at_once(panda_model, how):
     simulation = LiveSimulation(model=panda_model)
     simulation.play_opening()
     simulation.advance(3.0)

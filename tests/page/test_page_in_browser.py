@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from pathlib import Path
 from threading import Event, Thread
 from types import SimpleNamespace
 from typing import Any
@@ -38,7 +37,7 @@ def live(simulation: LiveSimulation) -> AbstractContextManager[SimpleNamespace]:
 
 
 @pytest.fixture
-def pages(monkeypatch: pytest.MonkeyPatch) -> list[LivePage]:
+def pages(monkeypatch):
     """The live pages that are served, for their clients' cameras."""
     pages: list[LivePage] = []
 
@@ -58,9 +57,7 @@ def camera(page: LivePage) -> FloatArray:
 
 
 @pytest.mark.parametrize("touch", [False, True])
-def test_a_hand_dragged_into_the_arm_leads_to_a_reaction_and_back_and_the_camera_stays(
-    tmp_path: Path, pages: list[LivePage], touch: bool
-) -> None:
+def test_a_hand_dragged_into_the_arm_leads_to_a_reaction_and_back_and_the_camera_stays(tmp_path, pages, touch):
     start = np.array([0.85, 0.25, 0.25])
     simulation = LiveSimulation(LiveSettings(profile=profile("blind"), hand_start=tuple(start)))
     with live(simulation) as served, chromium() as visitor:
@@ -95,7 +92,7 @@ def off_line(point: FloatArray, eye: FloatArray, through: FloatArray) -> float:
     return float(np.linalg.norm(np.cross(point - eye, along)))
 
 
-def test_the_page_changes_profile_refuses_what_is_not_allowed_and_drops_a_unit(tmp_path: Path) -> None:
+def test_the_page_changes_profile_refuses_what_is_not_allowed_and_drops_a_unit(tmp_path):
     simulation = LiveSimulation()
     with live(simulation) as served, chromium() as visitor:
         visitor.open(served)
@@ -122,9 +119,7 @@ def test_the_page_changes_profile_refuses_what_is_not_allowed_and_drops_a_unit(t
 
 
 @pytest.mark.parametrize(("width", "height"), [(390, 844), (1024, 768), (1440, 900)])
-def test_the_page_shows_word_and_sentence_of_the_step_and_the_panel_covers_no_scene(
-    tmp_path: Path, width: int, height: int
-) -> None:
+def test_the_page_shows_word_and_sentence_of_the_step_and_the_panel_covers_no_scene(tmp_path, width, height):
     simulation = LiveSimulation(LiveSettings(profile=profile("paper"), hand_start=(0.5, 0.45, 0.25)))
     with live(simulation) as served, chromium(width, height) as visitor:
         visitor.open(served)
@@ -145,7 +140,7 @@ def test_the_page_shows_word_and_sentence_of_the_step_and_the_panel_covers_no_sc
         visitor.keep(f"panel-{width}", tmp_path)
 
 
-def test_one_page_keeps_its_traffic_bounded(tmp_path: Path) -> None:
+def test_one_page_keeps_its_traffic_bounded(tmp_path):
     simulation = LiveSimulation()
     with live(simulation) as served, chromium() as visitor:
         visitor.open(served)
@@ -154,14 +149,14 @@ def test_one_page_keeps_its_traffic_bounded(tmp_path: Path) -> None:
         assert visitor.received - before < 5 * 1_000_000
 
 
-def test_a_recording_is_played_and_jumped_through(tmp_path: Path) -> None:
+def test_a_recording_is_played_and_jumped_through(tmp_path):
     simulation = LiveSimulation(LiveSettings(profile=profile("blind")))
     simulation.move_hand(np.array([0.5, 0.0, 0.5]))  # on the circle
     simulation.start_recording(tmp_path / "session.mcap")
     simulation.advance(12.0)
     simulation.stop_recording()
     recorded = open_recording(tmp_path / "session.mcap")
-    contacts = [kept.step for kept in recorded if kept.step.contact is not None]
+    contacts = [cycle.step for cycle in recorded if cycle.step.contact is not None]
     assert contacts
 
     def play(options: ServeOptions, until: Callable[[], bool], say: Callable[[str], None]) -> None:
@@ -185,7 +180,7 @@ def test_a_recording_is_played_and_jumped_through(tmp_path: Path) -> None:
         visitor.wait_for("rates", f"{recorded.stamps()[-1] - recorded.stamps()[0]:.2f} of ")
 
 
-def test_a_person_drives_the_arm_at_another_by_target(tmp_path: Path, pages: list[LivePage]) -> None:
+def test_a_person_drives_the_arm_at_another_by_target(tmp_path, pages):
     simulation = LiveSimulation()
     while simulation.frame.step.mode is not Mode.TRACK:
         simulation.advance(0.1)
@@ -209,7 +204,7 @@ def test_a_person_drives_the_arm_at_another_by_target(tmp_path: Path, pages: lis
         assert np.linalg.norm(goal[[0, 2], 3] - start[[0, 2]]) < 0.05
 
 
-def test_real_units_on_a_simulated_arm_are_shown_and_missed(tmp_path: Path) -> None:
+def test_real_units_on_a_simulated_arm_are_shown_and_missed(tmp_path):
     model, other = RobotModel(panda()), RobotModel(panda())  # each thread its own
     skin = paper_skin(model)
     keys = Keys([UnitKey(unit, k + 1, bytes([k]) * 32) for k, unit in enumerate(skin.ids)])

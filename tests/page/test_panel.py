@@ -15,7 +15,7 @@ from pretouch.types import Mode
 PERIOD = 1 / 30
 
 
-def test_of_one_kind_only_the_newest_waits_and_in_its_own_place() -> None:
+def test_of_one_kind_only_the_newest_waits_and_in_its_own_place():
     actions, done = ActionQueue(), []
     for i in range(1000):
         actions.put(lambda i=i: done.append(i), "hand")
@@ -28,7 +28,7 @@ def test_of_one_kind_only_the_newest_waits_and_in_its_own_place() -> None:
     assert actions.take() == []
 
 
-def test_what_has_to_settle_waits_until_nothing_newer_came_for_so_long() -> None:
+def test_what_has_to_settle_waits_until_nothing_newer_came_for_so_long():
     actions, done = ActionQueue(), []
 
     def tick(now: float) -> None:
@@ -46,7 +46,7 @@ def test_what_has_to_settle_waits_until_nothing_newer_came_for_so_long() -> None
     assert not actions.is_waiting("number")
 
 
-def test_nothing_is_lost_between_threads() -> None:
+def test_nothing_is_lost_between_threads():
     actions, done, end = ActionQueue(), [], threading.Event()
 
     def ask(start: int) -> None:
@@ -82,7 +82,7 @@ def run(pace: Pace, start: float, seconds: float, period: float, speed: float = 
 
 
 @pytest.mark.parametrize("speed", [1.0, 0.1])
-def test_a_machine_that_keeps_up_runs_at_real_time_and_says_nothing_in_slow_motion_too(speed: float) -> None:
+def test_a_machine_that_keeps_up_runs_at_real_time_and_says_nothing_in_slow_motion_too(speed):
     pace = Pace()
     run(pace, 0.0, 10.0, PERIOD, speed)
     assert pace.factor == pytest.approx(speed, rel=1e-6)
@@ -90,7 +90,7 @@ def test_a_machine_that_keeps_up_runs_at_real_time_and_says_nothing_in_slow_moti
     assert (pace.slow, pace.sentence()) == (False, "")
 
 
-def test_a_slow_machine_is_named_after_a_while_with_its_share_until_it_keeps_up_or_time_stands_still() -> None:
+def test_a_slow_machine_is_named_after_a_while_with_its_share_until_it_keeps_up():
     pace = Pace()
     now = run(pace, 0.0, 1.5, 2 * PERIOD)
     assert not pace.slow
@@ -101,16 +101,11 @@ def test_a_slow_machine_is_named_after_a_while_with_its_share_until_it_keeps_up_
     now = run(pace, now, 0.8, PERIOD)
     assert pace.slow
     assert "100 %" not in pace.sentence()
-    now = run(pace, now, 1.5, PERIOD)
+    run(pace, now, 1.5, PERIOD)
     assert not pace.slow
-    now = run(pace, now, 6.0, 2 * PERIOD)
-    pace.tick(now + PERIOD, 0.0, 0.0)
-    assert not pace.slow
-    run(pace, now + 60.0, 1.2, PERIOD)
-    assert pace.factor == pytest.approx(1.0, rel=0.01)
 
 
-def test_a_hiccup_is_not_slowness_and_what_is_said_does_not_flap_at_the_limit() -> None:
+def test_a_hiccup_is_not_slowness_and_what_is_said_does_not_flap_at_the_limit():
     pace = Pace()
     now = run(pace, 0.0, 5.0, PERIOD)
     pace.tick(now + 0.5, PERIOD, 1.0)
@@ -138,19 +133,19 @@ class Html:
 
 
 @pytest.fixture
-def html() -> Html:
+def html():
     return Html()
 
 
 @pytest.fixture
-def status(html: Html) -> Status:
-    return Status(SimpleNamespace(add_html=lambda content: html))  # type: ignore[arg-type]
+def status(html):
+    return Status(SimpleNamespace(add_html=lambda content: html))
 
 
 FREE = Explanation(Doing.MOVING, "Moving.")
 
 
-def test_each_word_comes_with_its_sentence_and_the_mode(status: Status, html: Html) -> None:
+def test_each_word_comes_with_its_sentence_and_the_mode(status, html):
     for i, doing in enumerate(Doing):
         status.draw(Mode.REACT, Explanation(doing, f"Why {doing.value}."), "1.0 s", "", float(i))
         assert f">{doing.value.upper()}<" in html.sent[-1]
@@ -158,7 +153,7 @@ def test_each_word_comes_with_its_sentence_and_the_mode(status: Status, html: Ht
         assert "<span id='mode'>REACT</span> · 1.0 s" in html.sent[-1]
 
 
-def test_it_is_sent_five_times_a_second_and_at_once_when_there_is_news(status: Status, html: Html) -> None:
+def test_it_is_sent_five_times_a_second_and_at_once_when_there_is_news(status, html):
     for i in range(300):
         status.draw(Mode.TRACK, FREE, f"t = {i} s", "", i / 30)
     assert len(html.sent) <= 10 / STATUS_PERIOD_S + 1
@@ -167,7 +162,7 @@ def test_it_is_sent_five_times_a_second_and_at_once_when_there_is_news(status: S
     assert len(html.sent) == sent + 1
 
 
-def test_notice_and_warning_are_both_shown_and_no_words_are_taken_for_markup(status: Status, html: Html) -> None:
+def test_notice_and_warning_are_both_shown_and_no_words_are_taken_for_markup(status, html):
     status.draw(Mode.TRACK, FREE, "", "Too slow.", 0.0)
     assert "id='warning'" in html.sent[-1]
     assert "id='notice'" not in html.sent[-1]
@@ -178,7 +173,7 @@ def test_notice_and_warning_are_both_shown_and_no_words_are_taken_for_markup(sta
     assert "<i>" not in html.sent[-1]
 
 
-def test_the_legend_names_every_colour_of_the_trail_and_the_marks_of_sensing() -> None:
+def test_the_legend_names_every_colour_of_the_trail_and_the_marks_of_sensing():
     legend = palette.legend()
     for activity in Activity:
         assert palette.css(activity.value) in legend

@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 
 from pretouch.page.plots import FORCE_N, SAMPLE_S, SAMPLES, SPAN_S, History, Plots
-from pretouch.types import ControlStep, Thresholds
+from pretouch.types import Thresholds
 
 K = 7
 
 
-def test_a_history_holds_the_last_seconds_and_no_more(some_step: ControlStep) -> None:
+def test_a_history_holds_the_last_seconds_and_no_more(some_step):
     history = History(np.arange(K))
     for i in range(6000):
         history.add(replace(some_step, stamp=i / 100))
@@ -21,9 +21,7 @@ def test_a_history_holds_the_last_seconds_and_no_more(some_step: ControlStep) ->
     assert np.all(np.diff(time) > 0)
 
 
-def test_columns_are_what_their_names_say_and_a_short_peak_of_force_or_evidence_is_not_lost(
-    some_step: ControlStep,
-) -> None:
+def test_columns_are_what_their_names_say_and_a_short_peak_of_force_or_evidence_is_not_lost(some_step):
     history = History(np.arange(K))
     for i in range(500):
         peak = float(i == 251)
@@ -37,7 +35,7 @@ def test_columns_are_what_their_names_say_and_a_short_peak_of_force_or_evidence_
     assert history.column("nearest")[-1] == min(some_step.obstacles.body_distance, default=9.0)
 
 
-def test_time_counts_from_the_start_and_going_back_begins_anew(some_step: ControlStep) -> None:
+def test_time_counts_from_the_start_and_going_back_begins_anew(some_step):
     history = History(np.arange(K), start=100.0)
     for stamp in (*np.arange(0, 5, 0.01), *np.arange(0, 1, 0.01)):
         history.add(replace(some_step, stamp=100.0 + float(stamp)))
@@ -46,9 +44,7 @@ def test_time_counts_from_the_start_and_going_back_begins_anew(some_step: Contro
     assert time[-1] < 1.0
 
 
-def test_a_history_of_one_sample_is_a_line_and_a_unit_whose_reading_is_late_shows_nothing(
-    some_step: ControlStep,
-) -> None:
+def test_a_history_of_one_sample_is_a_line_and_a_unit_whose_reading_is_late_shows_nothing(some_step):
     history, step = History(np.arange(K)), replace(some_step, range_distance=np.full(K, 0.5))
     assert len(history.column("time")) == 0
     history.add(step, late=np.arange(K) == 3)
@@ -58,10 +54,10 @@ def test_a_history_of_one_sample_is_a_line_and_a_unit_whose_reading_is_late_show
     assert np.flatnonzero(distances[-1] > 1.0).tolist() == [3]  # the axis ends at 1 m
 
 
-def test_axes_of_force_are_symmetric_and_grow_with_the_force_and_no_scale_changes(some_step: ControlStep) -> None:
+def test_axes_of_force_are_symmetric_and_grow_with_the_force_and_no_scale_changes(some_step):
     """A page whose scale is changed no longer follows the time."""
     history, gui = History(np.arange(K)), FakeGui()
-    plots = Plots(gui, history, [f"unit {i}" for i in range(K)])  # type: ignore[arg-type]
+    plots = Plots(gui, history, [f"unit {i}" for i in range(K)])
     gui.more.value = True
     limits = Thresholds(*np.zeros((6, 3)))
     seen, before = [], [plot.scales for plot in gui.plots]
@@ -77,9 +73,9 @@ def test_axes_of_force_are_symmetric_and_grow_with_the_force_and_no_scale_change
     assert all(len({len(line) for line in plot.data}) == 1 for plot in gui.plots)
 
 
-def test_what_is_folded_is_sent_only_while_it_is_shown(some_step: ControlStep) -> None:
+def test_what_is_folded_is_sent_only_while_it_is_shown(some_step):
     history, gui = History(np.arange(K)), FakeGui()
-    plots = Plots(gui, history, [f"unit {i}" for i in range(K)])  # type: ignore[arg-type]
+    plots = Plots(gui, history, [f"unit {i}" for i in range(K)])
     history.add(some_step)
     before = [plot.data for plot in gui.plots]
     plots.draw(0.0)

@@ -1,10 +1,7 @@
 """Real units on the simulated arm: readings are as old in the simulation as they are in the room."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
-from viser import ViserServer
 
 from pretouch.errors import ParameterError
 from pretouch.page.live import LivePage
@@ -37,18 +34,18 @@ class Room:
 
 
 @pytest.fixture
-def room() -> Room:
+def room():
     return Room()
 
 
 @pytest.fixture
-def real(room: Room) -> RealUnits:
+def real(room):
     return RealUnits(room, clock=lambda: room.now)
 
 
 def test_a_reading_is_as_old_in_the_simulation_as_in_the_room_and_keeps_its_stamp_however_fast_the_clocks_go(
-    room: Room, real: RealUnits
-) -> None:
+    room, real
+):
     time = [5.0]
     real.begin(lambda: time[0])
     assert np.all(np.isneginf(real.read().stamp)), "what was never heard stays unheard"
@@ -59,7 +56,7 @@ def test_a_reading_is_as_old_in_the_simulation_as_in_the_room_and_keeps_its_stam
     np.testing.assert_array_equal(real.read().stamp, first)
 
 
-def test_no_stamp_goes_back_while_the_simulation_stands(room: Room, real: RealUnits) -> None:
+def test_no_stamp_goes_back_while_the_simulation_stands(room, real):
     real.begin(lambda: 5.0)
     room.hear(age=0.010)
     first = real.read().stamp
@@ -69,8 +66,8 @@ def test_no_stamp_goes_back_while_the_simulation_stands(room: Room, real: RealUn
 
 
 def test_an_arm_with_real_units_goes_while_they_are_heard_and_holds_when_they_are_not_and_all_is_recorded(
-    room: Room, real: RealUnits, tmp_path: Path
-) -> None:
+    room, real, tmp_path
+):
     simulation = LiveSimulation(real=real)
     simulation.start_recording(tmp_path / "desk.mcap")
     for _ in range(200):
@@ -97,7 +94,7 @@ def test_an_arm_with_real_units_goes_while_they_are_heard_and_holds_when_they_ar
     assert verdict.checked == 280
 
 
-def test_real_units_cannot_be_made_to_fail_but_can_be_reset(room: Room, real: RealUnits) -> None:
+def test_real_units_cannot_be_made_to_fail_but_can_be_reset(room, real):
     simulation = LiveSimulation(real=real)
     with pytest.raises(ParameterError, match="units are real: unplug or cover one"):
         simulation.set_faults(Faults(frozenset({"hand_left"})))
@@ -107,13 +104,13 @@ def test_real_units_cannot_be_made_to_fail_but_can_be_reset(room: Room, real: Re
     np.testing.assert_allclose(simulation.frame.age, 0.012, atol=1e-9)
 
 
-def test_a_receiver_that_has_ended_is_said_once(server: ViserServer, room: Room, real: RealUnits) -> None:
-    said: list[str] = []
-    page = LivePage(server, LiveSimulation(real=real), said.append)
+def test_a_receiver_that_has_ended_is_said_once(server, room, real):
+    lines: list[str] = []
+    page = LivePage(server, LiveSimulation(real=real), lines.append)
     page.turn(0.0)
-    assert not said
+    assert not lines
     room.alive = False
     for turn in range(10):
         page.turn(turn / 30)
     assert page.status.notice == "The receiver of the sensor units has ended: start the page again."
-    assert said == [page.status.notice]
+    assert lines == [page.status.notice]

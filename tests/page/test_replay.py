@@ -6,20 +6,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.ports import free_port
-from viser import ViserServer
 
 from pretouch.page.replay import Player, ReplayPage, Timeline, frame_of, show_replay, world_of
 from pretouch.page.server import ServeOptions, begun, url_of
 from pretouch.page.simulation import LiveSimulation
 from pretouch.profiles import PROFILES
-from pretouch.recording.reader import Recorded, open_recording
-from pretouch.types import Contact, ControlStep, Mode
+from pretouch.recording.reader import open_recording
+from pretouch.types import Contact, Mode
 
 STAMPS = 100.0 + np.arange(101) / 100
 
 
 @pytest.fixture(scope="module")
-def recorded(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
+def recorded(tmp_path_factory):
     place: Path = tmp_path_factory.mktemp("recorded") / "session.mcap"
     simulation = LiveSimulation()
     simulation.reset(object="board +y")
@@ -31,7 +30,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
     return open_recording(place)
 
 
-def test_the_world_of_a_recording_is_the_one_it_was_made_in(recorded: Recorded) -> None:
+def test_the_world_of_a_recording_is_the_one_it_was_made_in(recorded):
     first, second = (world_of(run) for run in recorded.runs)
     assert first.profile == PROFILES["paper"]
     assert len(first.boxes) == 1
@@ -42,7 +41,7 @@ def test_the_world_of_a_recording_is_the_one_it_was_made_in(recorded: Recorded) 
     assert not second.path.closed or second.path.length != first.path.length
 
 
-def test_a_frame_shows_what_was_recorded_and_knows_how_old_the_readings_were(recorded: Recorded) -> None:
+def test_a_frame_shows_what_was_recorded_and_knows_how_old_the_readings_were(recorded):
     cycle = recorded[100]
     frame = frame_of(cycle)
     assert frame.step.stamp == cycle.step.stamp
@@ -55,7 +54,7 @@ def test_a_frame_shows_what_was_recorded_and_knows_how_old_the_readings_were(rec
     assert not frame_of(replace(cycle, inputs=None)).late(0.0).any()
 
 
-def test_playing_and_jumping_show_the_steps_at_that_time(server: ViserServer, recorded: Recorded) -> None:
+def test_playing_and_jumping_show_the_steps_at_that_time(server, recorded):
     page = ReplayPage(server, recorded)
     page.player.play()
     for i in range(30):
@@ -71,7 +70,7 @@ def test_playing_and_jumping_show_the_steps_at_that_time(server: ViserServer, re
     assert page.draw(3.0).step.mode is Mode.HOLD
 
 
-def test_the_address_is_said_and_the_page_ends_when_told(recorded: Recorded, capfd: pytest.CaptureFixture[str]) -> None:
+def test_the_address_is_said_and_the_page_ends_when_told(recorded, capfd):
     options, turns = ServeOptions(port=free_port()), iter([False, True])
     with begun(options, "test", "The recording", "see it", print) as ready:
         assert capfd.readouterr().out == f"The recording is at {url_of(options)} (Ctrl-C ends it).\n"
@@ -81,9 +80,7 @@ def test_the_address_is_said_and_the_page_ends_when_told(recorded: Recorded, cap
         show_replay(recorded, server, until=lambda: next(turns))
 
 
-def test_whatever_fails_in_the_page_it_plays_no_further_and_it_is_said_once(
-    server: ViserServer, recorded: Recorded, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_whatever_fails_in_the_page_it_plays_no_further_and_it_is_said_once(server, recorded, monkeypatch):
     def fail(*_: object) -> None:
         raise KeyError("nosuch")
 
@@ -96,7 +93,7 @@ def test_whatever_fails_in_the_page_it_plays_no_further_and_it_is_said_once(
 # where in a recording a page is, and what happened there
 
 
-def test_playing_takes_as_long_as_it_took_and_a_paused_player_stands() -> None:
+def test_playing_takes_as_long_as_it_took_and_a_paused_player_stands():
     player = Player(STAMPS)
     player.advance(1.0)
     assert player.index == 0
@@ -112,7 +109,7 @@ def test_playing_takes_as_long_as_it_took_and_a_paused_player_stands() -> None:
     assert player.index == 100
 
 
-def test_from_the_end_it_plays_from_the_start() -> None:
+def test_from_the_end_it_plays_from_the_start():
     player = Player(STAMPS)
     player.seek(9.0)
     assert player.time == pytest.approx(1.0)
@@ -121,7 +118,7 @@ def test_from_the_end_it_plays_from_the_start() -> None:
 
 
 @pytest.mark.parametrize("index", range(0, 101, 7))
-def test_steps_on_and_back_are_single_and_pause(index: int) -> None:
+def test_steps_on_and_back_are_single_and_pause(index):
     player = Player(STAMPS)
     player.play()
     for by, place in ((0, index), (1, min(index + 1, 100)), (-1, min(index, 99)), (-1, max(min(index, 99) - 1, 0))):
@@ -129,7 +126,7 @@ def test_steps_on_and_back_are_single_and_pause(index: int) -> None:
         assert (player.index, player.playing) == (place, False)
 
 
-def test_what_happened_is_found_bit_by_bit(some_step: ControlStep) -> None:
+def test_what_happened_is_found_bit_by_bit(some_step):
     contact = Contact(np.array([12.0, 0.0, 0.0]), np.array([True, False, False]))
     moves = {"reaction_velocity": np.array([0.1, 0.0, 0.0]), "command": np.full(7, 0.1)}
     steps = [
@@ -155,7 +152,7 @@ def test_what_happened_is_found_bit_by_bit(some_step: ControlStep) -> None:
     assert timeline.before(40) is None
 
 
-def test_a_contact_that_did_not_move_the_arm_is_told_as_it_ends(some_step: ControlStep) -> None:
+def test_a_contact_that_did_not_move_the_arm_is_told_as_it_ends(some_step):
     contact = Contact(np.array([6.0, 0.0, 0.0]), np.array([True, False, False]))
     still = replace(some_step, mode=Mode.REACT, command=np.zeros(7), reaction_velocity=np.zeros(3))
     steps = [some_step, replace(still, contact=contact), still, some_step]

@@ -98,7 +98,7 @@ def test_what_is_no_place_is_refused_and_the_target_stays(target):
     np.testing.assert_array_equal(mouse.target, [0.5, 0.3, 0.2])
 
 
-def test_a_place_pointed_to_on_the_arm_is_at_the_arms_depth(panda_model: RobotModel) -> None:
+def test_a_place_pointed_to_on_the_arm_is_at_the_arms_depth(panda_model):
     q = panda_model.description.q_ready
     palm = panda_model.kinematics(q).position[panda_model.link_index("panda_hand")]
     before = EYE + 0.8 * (palm - EYE)  # nearer, in the same place of the picture
@@ -108,7 +108,7 @@ def test_a_place_pointed_to_on_the_arm_is_at_the_arms_depth(panda_model: RobotMo
     assert np.linalg.norm(np.cross(place - EYE, palm - EYE)) < 1e-9
 
 
-def test_a_place_pointed_to_far_from_the_arm_stays_and_in_between_nothing_jumps(panda_model: RobotModel) -> None:
+def test_a_place_pointed_to_far_from_the_arm_stays_and_in_between_nothing_jumps(panda_model):
     q = panda_model.description.q_ready
     far = np.array([0.6, 1.1, 0.4])
     np.testing.assert_allclose(at_depth(panda_model, q, EYE, far), far, atol=1e-3)
@@ -118,7 +118,7 @@ def test_a_place_pointed_to_far_from_the_arm_stays_and_in_between_nothing_jumps(
 
 
 @pytest.mark.parametrize("eye", [(np.nan, 0.0, 0.0), (1.0, 2.0)])
-def test_an_eye_that_is_no_place_is_refused(panda_model: RobotModel, eye: tuple[float, ...]) -> None:
+def test_an_eye_that_is_no_place_is_refused(panda_model, eye):
     mouse = Mouse(np.zeros(3), SceneSpec(), HandSpec())
     with pytest.raises(ParameterError, match="The camera's position is"):
         mouse.point(np.array(eye), np.zeros(3), panda_model, panda_model.description.q_ready)

@@ -4,10 +4,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from tests.page.fake_scene import FakeScene, Node
+from tests.page.fake_scene import Node
 
 from pretouch.page import palette
-from pretouch.page.frame import Frame, World
+from pretouch.page.frame import Frame
 from pretouch.page.scene import ARROW_MOST_M, PARTS, Scene
 from pretouch.page.simulation import LiveSimulation
 from pretouch.page.trail import BLOCK, BLOCKS, SPACING_M, Activity, Trail, activity
@@ -20,22 +20,22 @@ Drawn = Callable[..., dict[str, Node]]
 
 
 @pytest.fixture(scope="module")
-def world() -> World:
+def world():
     return LiveSimulation().world
 
 
 @pytest.fixture
-def scene(world: World, fake: FakeScene) -> Scene:
-    return Scene(SimpleNamespace(scene=fake, initial_camera=SimpleNamespace()), world)  # type: ignore[arg-type]
+def scene(world, fake):
+    return Scene(SimpleNamespace(scene=fake, initial_camera=SimpleNamespace()), world)
 
 
 @pytest.fixture
-def drawn(scene: Scene, fake: FakeScene) -> Drawn:
+def drawn(scene, fake):
     """Draw a step, with more that a frame has, at a time [s], and return what there is by name."""
 
     def draw(step: ControlStep, now: float = 0.0, **more: object) -> dict[str, Node]:
         parts = {"hand": None, "hand_target": None, "true_force": None, **more}
-        scene.draw(Frame(step, **parts), now)  # type: ignore[arg-type]
+        scene.draw(Frame(step, **parts), now)
         return fake.nodes
 
     return draw
@@ -51,9 +51,7 @@ def sensing(step: ControlStep, multiplier: float = 0.0) -> ControlStep:
     return replace(step, obstacles=obstacles, range_distance=distance, restricted=np.array([0]), qp=qp)
 
 
-def test_a_sensed_point_is_a_sphere_where_it_is_and_the_cone_reaches_as_far(
-    drawn: Drawn, some_step: ControlStep
-) -> None:
+def test_a_sensed_point_is_a_sphere_where_it_is_and_the_cone_reaches_as_far(drawn, some_step):
     nodes = drawn(sensing(some_step))
     np.testing.assert_allclose(nodes["/points"].batched_positions[2], POINT, atol=1e-6)
     assert (nodes["/points"].batched_scales > 1e-3).tolist() == [False, False, True, False, False, False, False]
@@ -61,9 +59,7 @@ def test_a_sensed_point_is_a_sphere_where_it_is_and_the_cone_reaches_as_far(
     assert nodes[CONES].batched_opacities[2] > nodes[CONES].batched_opacities[0]
 
 
-def test_a_unit_silent_for_longer_than_the_profile_allows_is_red_and_its_cone_too(
-    drawn: Drawn, world: World, some_step: ControlStep
-) -> None:
+def test_a_unit_silent_for_longer_than_the_profile_allows_is_red_and_its_cone_too(drawn, world, some_step):
     limit, red = world.profile.sight.silent_after_s, palette.as_vertex(palette.UNIT_SILENT)
     age = np.array([0.0, limit + 0.01, limit - 0.01, 0.0, 0.0, 0.0, 0.0])
     nodes = drawn(replace(some_step, range_distance=np.full(7, 0.5)), age=age)
@@ -74,9 +70,7 @@ def test_a_unit_silent_for_longer_than_the_profile_allows_is_red_and_its_cone_to
     assert not np.any(np.all(nodes[UNITS].batched_colors == red, axis=1))
 
 
-def test_a_reading_that_no_obstacle_is_made_of_is_a_point_only_where_perception_is_off(
-    scene: Scene, drawn: Drawn, world: World, some_step: ControlStep
-) -> None:
+def test_a_reading_that_no_obstacle_is_made_of_is_a_point_only_where_perception_is_off(scene, drawn, world, some_step):
     distance = np.where(np.arange(7) == 2, 0.03, np.nan)
     step = replace(some_step, range_distance=distance, obstacles=no_obstacles())
     nodes = drawn(step)
@@ -102,8 +96,8 @@ def test_a_reading_that_no_obstacle_is_made_of_is_a_point_only_where_perception_
     ("multiplier", "line", "glow"), [(0.0, palette.PAIR, palette.SEEING), (0.5, palette.LIMITING, palette.LIMITING)]
 )
 def test_each_point_is_joined_to_the_body_and_line_and_unit_say_whether_it_holds_the_arm_back(
-    drawn: Drawn, some_step: ControlStep, multiplier: float, line: palette.Colour, glow: palette.Colour
-) -> None:
+    drawn, some_step, multiplier, line, glow
+):
     nodes = drawn(sensing(some_step, multiplier))
     pairs, plates = nodes["/pairs"], nodes[UNITS].batched_colors
     assert pairs.visible
@@ -113,9 +107,7 @@ def test_each_point_is_joined_to_the_body_and_line_and_unit_say_whether_it_holds
 
 
 @pytest.mark.parametrize("size", [7.0, 20.0, 5000.0])
-def test_a_force_is_an_arrow_of_bounded_length_at_the_end_effector_or_where_the_true_one_acts(
-    drawn: Drawn, some_step: ControlStep, size: float
-) -> None:
+def test_a_force_is_an_arrow_of_bounded_length_at_the_end_effector_or_where_the_true_one_acts(drawn, some_step, size):
     force = np.array([0.0, 0.6 * size, -0.8 * size])
     nodes = drawn(replace(some_step, force=force), true_force=force)
     for name in ("/ee/force", "/touched/true_force"):
@@ -131,7 +123,7 @@ def test_a_force_is_an_arrow_of_bounded_length_at_the_end_effector_or_where_the_
     np.testing.assert_array_equal(nodes["/touched"].position, elbow)
 
 
-def test_a_touched_place_is_an_arrow_that_ends_there(drawn: Drawn, some_step: ControlStep) -> None:
+def test_a_touched_place_is_an_arrow_that_ends_there(drawn, some_step):
     at, force = np.array([[0.3, 0.1, 0.6]]), np.array([[0.0, 0.0, -20.0]])
     touched = Touched(np.array([5]), at, force, np.array([0.02]), np.array([0.9]))
     nodes = drawn(replace(some_step, touched=touched))
@@ -143,18 +135,14 @@ def test_a_touched_place_is_an_arrow_that_ends_there(drawn: Drawn, some_step: Co
 
 
 @pytest.mark.parametrize("force", [np.zeros(3), np.array([0.0, 5.0, 0.0]), np.full(3, np.nan), None])
-def test_without_a_force_above_the_noise_there_is_no_arrow(
-    drawn: Drawn, some_step: ControlStep, force: np.ndarray | None
-) -> None:
+def test_without_a_force_above_the_noise_there_is_no_arrow(drawn, some_step, force):
     nodes = drawn(some_step if force is None else replace(some_step, force=force), true_force=force)
     assert not nodes["/touched/true_force"].visible
     if force is not None:
         assert not nodes["/ee/force"].visible
 
 
-def test_the_hand_is_drawn_where_it_is_and_its_target_when_that_is_elsewhere(
-    drawn: Drawn, some_step: ControlStep
-) -> None:
+def test_the_hand_is_drawn_where_it_is_and_its_target_when_that_is_elsewhere(drawn, some_step):
     hand = np.array([0.8, 0.1, 0.4])
     nodes = drawn(some_step, hand=hand, hand_target=hand + 0.001)
     np.testing.assert_array_equal(nodes["/hand"].position, hand)
@@ -167,7 +155,7 @@ def test_the_hand_is_drawn_where_it_is_and_its_target_when_that_is_elsewhere(
     assert not nodes["/hand_target"].visible
 
 
-def test_every_part_can_be_hidden_and_shown(scene: Scene, drawn: Drawn, some_step: ControlStep) -> None:
+def test_every_part_can_be_hidden_and_shown(scene, drawn, some_step):
     step = replace(sensing(some_step, 0.5), force=np.array([20.0, 0.0, 0.0]))
 
     def shown(now: float) -> set[str]:
@@ -184,9 +172,7 @@ def test_every_part_can_be_hidden_and_shown(scene: Scene, drawn: Drawn, some_ste
         assert shown(2.0 * i + 2.0) == before, part
 
 
-def test_another_world_has_its_own_boxes_and_path_and_what_stays_is_not_sent_again(
-    scene: Scene, fake: FakeScene
-) -> None:
+def test_another_world_has_its_own_boxes_and_path_and_what_stays_is_not_sent_again(scene, fake):
     simulation = LiveSimulation()
     simulation.reset(object="board -y", path="line")
     scene.show_world(simulation.world)
@@ -206,8 +192,8 @@ def test_another_world_has_its_own_boxes_and_path_and_what_stays_is_not_sent_aga
 
 
 @pytest.fixture
-def trail(fake: FakeScene) -> Trail:
-    return Trail(fake)  # type: ignore[arg-type]
+def trail(fake):
+    return Trail(fake)
 
 
 def at(step: ControlStep, x: float) -> ControlStep:
@@ -225,8 +211,8 @@ def at(step: ControlStep, x: float) -> ControlStep:
     ],
 )
 def test_off_the_path_an_arm_avoids_while_an_obstacle_holds_it_or_its_row_is_violated_and_else_recovers(
-    some_step: ControlStep, mode: Mode, multiplier: float, slack: float, expected: Activity
-) -> None:
+    some_step, mode, multiplier, slack, expected
+):
     assert activity(replace(some_step, mode=Mode.TRACK)) is Activity.FOLLOWING
     multipliers = np.append(np.zeros(len(some_step.q)), multiplier)
     qp = replace(some_step.qp, slack=np.array([slack]), multipliers=multipliers)
@@ -234,7 +220,7 @@ def test_off_the_path_an_arm_avoids_while_an_obstacle_holds_it_or_its_row_is_vio
     assert activity(replace(some_step, mode=mode, path_position=beside, restricted=np.array([0]), qp=qp)) is expected
 
 
-def test_a_trail_is_of_bounded_length(some_step: ControlStep, fake: FakeScene, trail: Trail) -> None:
+def test_a_trail_is_of_bounded_length(some_step, fake, trail):
     for i in range(5000):
         trail.add(at(some_step, i * SPACING_M * 1.01))
         trail.draw(i / 100)
@@ -246,7 +232,7 @@ def test_a_trail_is_of_bounded_length(some_step: ControlStep, fake: FakeScene, t
     assert furthest - nearest < BLOCK * BLOCKS * SPACING_M * 1.02
 
 
-def test_a_trail_sends_only_its_newest_block_and_little(some_step: ControlStep, fake: FakeScene, trail: Trail) -> None:
+def test_a_trail_sends_only_its_newest_block_and_little(some_step, fake, trail):
     for i in range(3000):
         trail.add(at(some_step, 0.003 * i))  # 0.3 m/s
         trail.draw(i / 100)
@@ -255,7 +241,7 @@ def test_a_trail_sends_only_its_newest_block_and_little(some_step: ControlStep, 
     assert max(points) <= BLOCK * 2 * 3 * 4
 
 
-def test_a_standing_arm_adds_nothing(some_step: ControlStep, fake: FakeScene, trail: Trail) -> None:
+def test_a_standing_arm_adds_nothing(some_step, fake, trail):
     for i in range(1000):
         trail.add(at(some_step, 0.002 * (i % 2)))
         trail.draw(i / 100)
@@ -263,9 +249,7 @@ def test_a_standing_arm_adds_nothing(some_step: ControlStep, fake: FakeScene, tr
     assert fake.sent == []
 
 
-def test_the_segments_of_a_trail_join_until_it_is_cleared_and_begins_anew(
-    some_step: ControlStep, fake: FakeScene, trail: Trail
-) -> None:
+def test_the_segments_of_a_trail_join_until_it_is_cleared_and_begins_anew(some_step, fake, trail):
     for i in range(300):
         trail.add(at(some_step, 0.006 * i))
         trail.draw(i / 10)
@@ -281,7 +265,7 @@ def test_the_segments_of_a_trail_join_until_it_is_cleared_and_begins_anew(
     assert len(trail) == 1
 
 
-def test_a_hidden_trail_stays_hidden_as_it_grows(some_step: ControlStep, fake: FakeScene, trail: Trail) -> None:
+def test_a_hidden_trail_stays_hidden_as_it_grows(some_step, fake, trail):
     for i in range(200):
         trail.add(at(some_step, 0.006 * i))
         trail.draw(i / 10)

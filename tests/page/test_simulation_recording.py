@@ -56,14 +56,14 @@ def test_each_step_is_kept_with_what_only_the_simulation_knows_and_is_recomputed
     assert [run.profile.window.samples for run in recorded.runs] == [100, 100, 40, 40]
     assert [run.profile.task.speed_m_s for run in recorded.runs] == [0.3, 0.3, 0.3, 0.2]
     assert [run.path.length for run in recorded.runs][-1] == pytest.approx(2.0)
-    for kept, step in zip(recorded, steps, strict=True):
-        assert kept.step.stamp == step.stamp
-        np.testing.assert_array_equal(kept.step.command, step.command)
-        assert kept.truth.time == pytest.approx(step.stamp + 0.001 * np.arange(-9, 1))
-    forces = np.vstack([kept.truth.force for kept in recorded])
+    for cycle, step in zip(recorded, steps, strict=True):
+        assert cycle.step.stamp == step.stamp
+        np.testing.assert_array_equal(cycle.step.command, step.command)
+        assert cycle.truth.time == pytest.approx(step.stamp + 0.001 * np.arange(-9, 1))
+    forces = np.vstack([cycle.truth.force for cycle in recorded])
     assert np.linalg.norm(forces, axis=1).max() > 10.0
-    assert sum(len(kept.truth.touches) for kept in recorded) > 0
-    hands = np.array([kept.truth.hand for kept in recorded])
+    assert sum(len(cycle.truth.touches) for cycle in recorded) > 0
+    hands = np.array([cycle.truth.hand for cycle in recorded])
     assert np.ptp(hands[:, 1]) > 0.05
     scene = recorded.runs[0].about["scene"]
     assert [box["name"] for box in scene["boxes"]] == ["object"]
@@ -72,7 +72,7 @@ def test_each_step_is_kept_with_what_only_the_simulation_knows_and_is_recomputed
     assert verdict.agrees, verdict.sentence
     assert verdict.exact
     assert (verdict.checked, verdict.skipped) == (len(steps), {})
-    assert any(kept.step.mode is Mode.REACT for kept in recorded)
+    assert any(cycle.step.mode is Mode.REACT for cycle in recorded)
 
 
 def test_a_reset_ends_the_recording_and_says_so(session, tmp_path):

@@ -12,7 +12,6 @@ from pretouch.page import surfaces
 from pretouch.page.person import cuff, fist
 from pretouch.page.surfaces import EDGE_M, capsule_surfaces, coarse, surface_of, vendor_surfaces
 from pretouch.robot.body import Capsules, from_axes
-from pretouch.robot.model import RobotModel
 from pretouch.sim.scene import HandSpec
 
 
@@ -21,7 +20,7 @@ def capsule(a: tuple[float, float, float], b: tuple[float, float, float], radius
 
 
 @pytest.mark.parametrize("end", [(0.02, 0.0, 0.1), (0.0, 0.0, 0.1), (0.0, 0.0, -0.3), (0.0, 0.0, -0.1)])
-def test_the_surface_of_a_capsule_is_closed_and_encloses_its_volume(end: tuple[float, float, float]) -> None:
+def test_the_surface_of_a_capsule_is_closed_and_encloses_its_volume(end):
     start = (0.0, 0.0, -0.1)
     mesh = surface_of(capsule(start, end, 0.05))
     length = math.dist(start, end)
@@ -30,7 +29,7 @@ def test_the_surface_of_a_capsule_is_closed_and_encloses_its_volume(end: tuple[f
     np.testing.assert_allclose(mesh.centroid, np.add(start, end) / 2, atol=1e-3)
 
 
-def test_the_surface_of_every_link_lies_on_its_body_dense_enough_to_be_coloured(panda_model: RobotModel) -> None:
+def test_the_surface_of_every_link_lies_on_its_body_dense_enough_to_be_coloured(panda_model):
     surfaces = capsule_surfaces(panda_model)
     assert set(surfaces) == set(panda_model.capsules.link.tolist())
     for link, mesh in surfaces.items():
@@ -48,7 +47,7 @@ def sphere(rings: int = 60) -> trimesh.Trimesh:
     return trimesh.Trimesh(ball.triangles.reshape(-1, 3), corners, process=False)
 
 
-def test_a_coarse_mesh_has_few_vertices_near_the_fine_one_looks_outwards_and_has_no_empty_or_double_triangle() -> None:
+def test_a_coarse_mesh_has_few_vertices_near_the_fine_one_looks_outwards_and_has_no_empty_or_double_triangle():
     fine = sphere()
     mesh = coarse(fine, 0.006)
     assert len(mesh.vertices) < len(fine.vertices) / 10
@@ -60,16 +59,14 @@ def test_a_coarse_mesh_has_few_vertices_near_the_fine_one_looks_outwards_and_has
     assert len(np.unique(corners, axis=0)) == len(corners)
 
 
-def test_without_the_extra_the_capsules_are_drawn_and_a_sentence_says_why(
-    panda_model: RobotModel, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_the_extra_the_capsules_are_drawn_and_a_sentence_says_why(panda_model, monkeypatch):
     monkeypatch.setattr(surfaces, "_vendor_folder", lambda: None)
     meshes, sentence = vendor_surfaces(panda_model)
     assert meshes == {}
     assert sentence == f"The arm is drawn by its capsules; for the vendor's surfaces run {MESHES.command}"
 
 
-def test_with_the_extra_every_link_has_a_surface_near_its_capsules(panda_model: RobotModel) -> None:
+def test_with_the_extra_every_link_has_a_surface_near_its_capsules(panda_model):
     skip_without(MESHES)
     meshes, sentence = vendor_surfaces(panda_model)
     assert sentence == ""
@@ -85,7 +82,7 @@ def test_with_the_extra_every_link_has_a_surface_near_its_capsules(panda_model: 
 
 
 @pytest.mark.parametrize("radius", [HandSpec.radius, 0.1])
-def test_the_fist_fills_the_simulated_ball_and_does_not_leave_it(radius: float) -> None:
+def test_the_fist_fills_the_simulated_ball_and_does_not_leave_it(radius):
     mesh = fist(radius)
     reach = np.linalg.norm(mesh.vertices, axis=1)
     assert reach.max() < 1.05 * radius
@@ -95,7 +92,7 @@ def test_the_fist_fills_the_simulated_ball_and_does_not_leave_it(radius: float) 
     assert np.median(farthest) > 0.85 * radius
 
 
-def test_the_fist_is_turned_outwards_and_small_enough_to_send() -> None:
+def test_the_fist_is_turned_outwards_and_small_enough_to_send():
     mesh = fist(0.05)
     ball = 4 / 3 * np.pi * 0.05**3
     assert 0.4 * ball < mesh.convex_hull.volume < ball
@@ -103,5 +100,5 @@ def test_the_fist_is_turned_outwards_and_small_enough_to_send() -> None:
     assert len(mesh.vertices) < 4000
 
 
-def test_the_cuff_lies_behind_the_fist() -> None:
+def test_the_cuff_lies_behind_the_fist():
     assert cuff(0.05).vertices[:, 0].max() < -0.02

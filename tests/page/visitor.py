@@ -111,7 +111,7 @@ def refusal(options: ServeOptions, path: str = "", origin: str | None = None) ->
     """Status and sentence with which a connection is refused."""
     address = f"ws://{options.host}:{options.port}{path or '/' + options.token}"
     try:
-        with connect(address, origin=origin, subprotocols=[PROTOCOL]):  # type: ignore[arg-type]
+        with connect(address, origin=origin, subprotocols=[PROTOCOL]):
             return 101, ""
     except InvalidStatus as error:
         return error.response.status_code, error.response.body.decode()

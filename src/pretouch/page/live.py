@@ -14,7 +14,7 @@ from pretouch.page.drive import Drive
 from pretouch.page.panel import PERIOD_S, ActionQueue, Pace, Status, style_page, when_changed
 from pretouch.page.plots import History, Plots
 from pretouch.page.scene import Scene
-from pretouch.page.server import ServeOptions, announce, failure, served
+from pretouch.page.server import ServeOptions, announce, served
 from pretouch.page.simulation import LiveSimulation
 from pretouch.types import ControlStep, FloatArray
 
@@ -68,11 +68,8 @@ class LivePage:
 
     def hold(self, error: Exception) -> None:
         """Have the arm hold after an error that nobody foresaw, and say it once."""
-        sentence = failure(error)
         self.controls.hold()
-        if self.status.notice != sentence:
-            self.status.notice = sentence
-            self._say(sentence)
+        self.status.fail(error, self._say)
 
     def turn(self, now: float) -> None:
         """Run queued actions, let time pass, and draw; `now` is the time of the machine [s]."""
@@ -90,7 +87,10 @@ class LivePage:
             self._scene.trail.add(step)
         if self._companions:
             self._companions.follow(len(steps))
-        self.pace.tick(now, max(0.0, simulation.time - before), 0.0 if running.paused else running.speed)
+        if running.paused:
+            self.pace = Pace()
+        else:
+            self.pace.tick(now, max(0.0, simulation.time - before), running.speed)
         if recording and recording.trouble:
             self._say(recording.trouble)
         if simulation.real and not self._receiver_ended and not simulation.real.source.alive:

@@ -62,6 +62,13 @@ class Status:
         self.notice = ""
         """The notice for a person, until another replaces it."""
 
+    def fail(self, error: Exception, say: Callable[[str], None]) -> None:
+        """Say that a page came upon an error that nobody foresaw, on the page and elsewhere, once."""
+        sentence = f"The page failed, and holds: {type(error).__name__}: {error}. Please report this."
+        if self.notice != sentence:
+            self.notice = sentence
+            say(sentence)
+
     def draw(self, mode: Mode, explanation: Explanation, rates: str, warning: str, now: float) -> None:
         """Show what the arm does, at a time [s]; five times a second at most, unless there is something new to say."""
         news = (mode, explanation.doing, warning, self.notice)
@@ -92,7 +99,7 @@ def _banner(name: str, sentence: str, tint: palette.Colour) -> str:
 
 
 class Pace:
-    """Simulated against real time, by windows of a second; with speed 0 time stands still, and it begins anew."""
+    """Simulated against real time, by windows of a second."""
 
     def __init__(self) -> None:
         self.slow = False
@@ -100,25 +107,19 @@ class Pace:
         self.factor = self.updates = 0.0
         """Simulated over real time, and updates a second, of the last window."""
         self._shares = (1.0, 1.0)
-        self._begin, self._ticks, self._simulated, self._due = -math.inf, 0, 0.0, 0.0
-        self._before = -math.inf
+        self._begin, self._updates, self._simulated = -math.inf, 0, 0.0
 
     def tick(self, now: float, advanced: float, speed: float) -> None:
         """Count an update at a time [s] before which the simulation advanced [s], as it should at a speed."""
-        if speed == 0.0:
-            return Pace.__init__(self)
         if math.isinf(self._begin):
-            self._begin = self._before = now
-            return None
-        self._ticks, self._simulated = self._ticks + 1, self._simulated + advanced
-        self._due, self._before = self._due + speed * (now - self._before), now
-        lasted = now - self._begin
+            self._begin = now
+            return
+        self._updates, self._simulated, lasted = self._updates + 1, self._simulated + advanced, now - self._begin
         if lasted >= 1.0:
-            self.factor, self.updates = self._simulated / lasted, self._ticks / lasted
-            self._shares = (self._shares[1], self._simulated / self._due)
+            self.factor, self.updates = self._simulated / lasted, self._updates / lasted
+            self._shares = (self._shares[1], self.factor / speed)
             self.slow = max(self._shares) < (0.97 if self.slow else 0.9)
-            self._begin, self._ticks, self._simulated, self._due = now, 0, 0.0, 0.0
-        return None
+            self._begin, self._updates, self._simulated = now, 0, 0.0
 
     def sentence(self) -> str:
         """Say that the machine is too slow, or nothing."""

@@ -3,25 +3,15 @@
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from typing import NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from pretouch.ports import touch_of
 from pretouch.types import FloatArray, RangeReadings, TouchReadings
 
-
-class UnitSource(Protocol):
-    """Where readings of real units come from, stamped by the machine's monotonic clock."""
-
-    def read(self) -> RangeReadings:
-        """Return the newest reading of each unit."""
-        ...
-
-    @property
-    def alive(self) -> bool:
-        """Whether anything can come."""
-        ...
+if TYPE_CHECKING:  # a simulated arm without real units needs no network
+    from pretouch.units.skin import NetworkSkin
 
 
 class _Stamps(NamedTuple):
@@ -37,8 +27,8 @@ class RealUnits:
     A reading that comes is as old in the simulation as it is in the room; from then on it ages with the simulation.
     """
 
-    def __init__(self, source: UnitSource, clock: Callable[[], float] = time.monotonic) -> None:
-        """Take the source, and the clock its stamps come from."""
+    def __init__(self, source: "NetworkSkin", clock: Callable[[], float] = time.monotonic) -> None:
+        """Take where readings come from, and the clock of their stamps."""
         self.source, self._clock = source, clock
         self._simulated: Callable[[], float] = lambda: 0.0
         count = len(source.read().stamp)

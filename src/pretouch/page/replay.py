@@ -16,7 +16,6 @@ from pretouch.page.frame import DrivenMotion, Frame, World
 from pretouch.page.panel import PERIOD_S, ActionQueue, Status, add_button, add_view_boxes, put, style_page, when_changed
 from pretouch.page.plots import SPAN_S, History, Plots
 from pretouch.page.scene import Scene
-from pretouch.page.server import failure
 from pretouch.recording.reader import Kept, Recorded, Run
 from pretouch.recording.simulation import surroundings
 from pretouch.types import ControlStep, FloatArray, Mode
@@ -195,11 +194,8 @@ class ReplayPage:
 
     def hold(self, error: Exception, say: Callable[[str], None]) -> None:
         """Play no further after an error that nobody foresaw, and say it once."""
-        sentence = failure(error)
         self.player.playing = False
-        if self._status.notice != sentence:
-            self._status.notice = sentence
-            say(sentence)
+        self._status.fail(error, say)
 
     def turn(self, now: float, elapsed: float) -> None:
         """Run queued actions, play on by some real time [s], and draw; `now` is the time of the machine [s]."""

@@ -191,7 +191,6 @@ class Room:
         self.clock = PlantClock(self.plant, settings.profile.task.control_period_s)
         self.stiffness = self._next_stiffness = settings.stiffness
         self._skin, self._nominal = skin, settings.ranging
-        self._moving = np.flatnonzero(model.moved_by.any(axis=1))
         self.set_faults(settings.faults)
         self.plant.advance(_SETTLE_S)
         if real:
@@ -222,11 +221,8 @@ class Room:
     @property
     def touched(self) -> FloatArray | None:
         """Middle (3,) of the points at which something touches the arm [m], base frame; None while nothing does."""
-        data, owner = self.plant.mj_data, self.plant.mj_model.geom_bodyid
-        if not data.ncon:
-            return None
-        on_arm = np.isin(owner[data.contact.geom], self._moving).any(axis=1)
-        return np.mean(data.contact.pos[on_arm], axis=0) if on_arm.any() else None
+        points = [force.point for force in self.plant.contact_forces()]
+        return np.mean(points, axis=0) if points else None
 
     def tick(self) -> float:
         """Let one control period pass and return the time [s]."""

@@ -57,11 +57,6 @@ def browser_here() -> bool:
     return sys.stdout.isatty() and not os.environ.keys().isdisjoint({"DISPLAY", "WAYLAND_DISPLAY"})
 
 
-def failure(error: Exception) -> str:
-    """Say that a page came upon an error that nobody foresaw."""
-    return f"The page failed, and holds: {type(error).__name__}: {error}. Please report this."
-
-
 def _stays_here(host: str) -> bool:
     try:
         return ipaddress.ip_address(host).is_loopback
