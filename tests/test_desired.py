@@ -13,6 +13,7 @@ from pretouch.control.commander import _nearer, rotation_about
 from pretouch.desired import Desired, DesiredKind
 from pretouch.errors import ParameterError
 from pretouch.profiles import profile
+from pretouch.recording.verify import verify
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, Inputs, Mode
@@ -192,6 +193,7 @@ def test_a_recording_holds_what_was_asked_nonsense_too_and_replays_to_the_bit(pa
     recorded = assert_replays(Run(controller_of(panda_model, Skin([], panda_model))), tmp_path, asked, 450)
     unread = [kept.inputs is None for kept in recorded]
     assert [all(unread[k : k + 40]) for k in range(0, 320, 40)] == [False] * 6 + [True, False]
+    assert verify(recorded).checked == unread.count(False)
     assert recorded[20].inputs.desired is None
     np.testing.assert_array_equal(recorded[60].inputs.desired.number, plan.number)
     assert recorded[300].inputs.desired.kind == DesiredKind.TWIST

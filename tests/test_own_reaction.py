@@ -64,5 +64,5 @@ def test_its_state_is_recorded_and_another_profile_goes_on_without_it(arm: Arm, 
     assert same(unpacked(KeptState, packed_state(arm.state, False)), KeptState(False, arm.state))
     paper = Arm(panda_model, paper_skin)
     arm.state, arm.controller = paper.controller.adopt(arm.state, arm.controller), paper.controller
-    assert arm.step().mode is Mode.TRACK
+    assert arm.step().mode is (Mode.TRACK if name == "rise" else Mode.HOLD), "a window of another length has to fill"
     assert "as the part rise does" in Rise().announced(0.01)

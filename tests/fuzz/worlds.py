@@ -26,6 +26,10 @@ ONLY = {"control_period_s": (0.01, 0.001), "samples": (2, 5, 30), "solver_iterat
 """Parameters that have only these values."""
 SOON = {"samples": 5, "restore_cycles": 20, "decay_cycles": 20, "quiet_s": 0.05, "patience_s": 0.1, "retry_s": 0.3}
 """What is usual here in place of what a profile says, so that much happens in few steps."""
+BASES = ("pretouch", "pretouch", "paper")
+"""Profiles whose parts and parameters are drawn."""
+USUAL = (1.0, 0.85, 0.85, 0.4, 0.4, 0.4)
+"""Shares of parameters that are the usual ones, of which one is drawn for each profile."""
 FAR = 30.0
 """How many times a parameter is as large, or as small, as usual."""
 
@@ -58,12 +62,8 @@ def any_world(rng: np.random.Generator, model: RobotModel) -> World:
 
 
 def any_profile(rng: np.random.Generator) -> Profile:
-    """Draw the paper's profile or ours, some of its parts in place of others, and each parameter of each part.
-
-    A parameter is mostly the usual one in a third of the profiles, and always in a few.
-    """
-    usual = float(rng.choice([1.0, 0.85, 0.4], p=[0.15, 0.3, 0.55]))
-    base = profile("pretouch" if rng.random() < 0.6 else "paper")
+    """Draw the paper's profile or ours, other parts in place of some of its own, and each parameter of each part."""
+    usual, base = USUAL[rng.integers(len(USUAL))], profile(BASES[rng.integers(len(BASES))])
     others = {
         "perception": (None,), "slow": (None,), "null_space": (None,), "approach": (ApproachRestriction(), None),
         "detect": (MovingThresholds(),), "react": (DecayingVelocity(),),

@@ -92,7 +92,6 @@ def assert_replays(run: Run, folder: Path, change: Callable[[int, Inputs], Input
     verdict = verify(recorded)
     assert verdict.exact
     assert verdict.agrees
-    assert verdict.checked == sum(kept.inputs is not None for kept in recorded)
     return recorded
 
 

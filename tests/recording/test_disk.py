@@ -128,7 +128,8 @@ from pretouch.recording.writer import Recording
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin
-from tests.recording.runs import Run, controller_of
+from tests.following_arm import controller_of
+from tests.recording.runs import Run
 
 place, how = Path(sys.argv[1]), sys.argv[2]
 model = RobotModel(panda())

@@ -25,8 +25,8 @@ def test_steps_are_the_stored_ones(name: str) -> None:
 
 
 def test_some_thousand_steps_of_anything(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(worlds, "NAMED", tuple(REACHED))
-    monkeypatch.setattr(worlds, "NAMED_SHARE", 1.0)
+    monkeypatch.setattr(worlds, "BASES", tuple(REACHED))
+    monkeypatch.setattr(worlds, "USUAL", (1.0,))
     assert Machine(1003).run(2_400, each=120)["mode TRACK"] > 100
 
 
