@@ -10,7 +10,7 @@ import pytest
 from pretouch import cli
 from pretouch.arms.simulated import arm
 from pretouch.arms.simulated.arm import SimulatedArm
-from pretouch.cli.calibrate import motion
+from pretouch.calibration.motion.limits import MotionLimits
 from pretouch.imported_data.reading import read_joints
 from pretouch.robot.postures import capsule_ends, kinematics_of
 from pretouch.units.fleet import simulated_keys
@@ -29,13 +29,13 @@ def calibrate(*words):
     [
         ((), "give --recording FILE or --plan FILE, or name an arm, as in `pretouch skin calibrate simulated`."),
         (("--plan", "m.csv", "--recording", "x"), "--recording and --plan are given: choose one of them."),
-        (("--recording", "x.mcap", "--duration", "30"), "--duration does not go with --recording"),
+        (("--recording", "x.mcap", "--duration-s", "30"), "Options of the motion do not go with --recording"),
+        (("--plan", "m.csv", "--out", "s.toml"), "Options of a recording, or --out do not go with --plan"),
         (("--recording", "joints.csv"), "give the recording with --recording, and joint states with --joints."),
         (("--recording", "/nowhere.mcap"), "The recording /nowhere.mcap cannot be read: it does not exist."),
         (("--recording", "x.mcap", "--skin", "/nowhere.toml"), "/nowhere.toml cannot be read"),
         (("--recording", "x.mcap", "--out", "/dev/null/x.toml"), "/dev/null/x.toml cannot be written"),
         (("--recording", "x.mcap", "--json", "/dev/null/x.json"), "/dev/null/x.json cannot be written"),
-        (("--plan", "m.csv", "--duration", "100"), "PlanParams.duration_s is 100.0: it must be at most 90"),
         (("--plan", "/dev/null/m.csv"), "/dev/null/m.csv cannot be written"),
         (("fr3", "--out", "s.toml"), "No arm to move is called 'fr3'"),
         (("simulated",), "--out is missing: name the skin file to write."),
@@ -51,7 +51,13 @@ def test_what_makes_no_sense_is_said_in_one_sentence(tmp_path, monkeypatch, caps
     told = capsys.readouterr()
     assert said in told.err
     assert told.err.count("\n") == 1
-    assert "planned" not in told.out or "PlanParams" in said
+    assert "planned" not in told.out
+
+
+def test_a_motion_that_would_be_too_long_is_said(capsys):
+    with pytest.raises(SystemExit):
+        calibrate("--plan", "m.csv", "--duration-s", "100")
+    assert "PlanParams.duration_s is 100.0" in capsys.readouterr().err
 
 
 def test_files_that_are_there_are_not_written_over_unasked(tmp_path, capsys):
@@ -129,7 +135,7 @@ def test_the_way_to_the_start_is_part_of_what_is_asked_about(panda_model, tmp_pa
     questions = []
     monkeypatch.setattr("builtins.input", lambda question: questions.append(question) or "n")
     files = ("--out", tmp_path / "s.toml")
-    assert calibrate("simulated", *files, "--duration", 45) == 2
+    assert calibrate("simulated", *files, "--duration-s", 45) == 2
     said = capsys.readouterr().out
     told = re.search(r"moving to its start takes (\d+) s and needs the space x (\S+) to .*, y (\S+) to", said)
     assert told
@@ -147,10 +153,10 @@ def elsewhere(model, q, *words):
 def test_the_motion_is_written_for_another_driver_and_then_the_room_it_takes(
     panda_model, tmp_path, capsys, monkeypatch
 ):
-    place, report_on = tmp_path / "motion.csv", motion.report_on
+    place, report = tmp_path / "motion.csv", MotionLimits.report
     # though nobody reads on: a closed pipe ends the command
-    monkeypatch.setattr(motion, "report_on", lambda *given: place.stat().st_size and report_on(*given))
-    assert calibrate("--plan", place, "--duration", 45) == 0
+    monkeypatch.setattr(MotionLimits, "report", lambda *given: place.stat().st_size and report(*given))
+    assert calibrate("--plan", place, "--duration-s", 45) == 0
     said = capsys.readouterr().out
     assert said.index("45 s, ") < said.index("The arm needs the space") < said.index("Keep everybody out of")
     with place.open() as file:

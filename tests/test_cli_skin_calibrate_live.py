@@ -123,7 +123,7 @@ def test_how_to_calibrate_from_the_recording_is_said_before_the_motion_and_after
         raise error
 
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(live, "calibrate_recording", fails)
+    monkeypatch.setattr(live, "calibrate_recorded", fails)
     (tmp_path / "skin.toml").touch()
     taken = "skin-calibration-1.mcap"
     assert cli.main(["skin", "calibrate", *FILES, "--json", taken, "--skin", "skin.toml", "--replace"]) == code
@@ -139,7 +139,7 @@ def test_how_to_calibrate_from_the_recording_is_said_before_the_motion_and_after
 @pytest.mark.alone
 @pytest.mark.slow
 def test_the_units_of_an_arm_that_moves_here_and_now_are_found(panda_model, paper_skin, tmp_path):
-    process = started(tmp_path, "calibrate", *FILES, "--duration", "35")
+    process = started(tmp_path, "calibrate", *FILES, "--duration-s", "35")
     out, err = process.communicate(timeout=200)
     assert process.returncode == 0, out + err
     assert "Skin file: skin.toml has 7 units where they were found." in out

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pretouch import cli
-from pretouch.cli.calibrate import recording as recording_way
+from pretouch.cli.calibrate import recorded as recording_way
 from pretouch.sensing.skin import Skin, load_skin, save_skin
 from pretouch.traces import JointTrace
 from pretouch.units.skin_reader import read_skin
@@ -122,7 +122,7 @@ def test_a_skin_file_is_replaced_only_if_that_is_said(panda_model, skin, recorde
     assert calibrate("--recording", recorded / "units.mcap", "--skin", place, "--out", place) == 2
     assert place.read_bytes() == before
     assert calibrate("--recording", recorded / "units.mcap", "--skin", place, "--out", place, "--replace") == 0
-    assert load_skin(place, panda_model).position_sigma.all()
+    assert load_skin(place, panda_model).arrays.position_sigma.all()
 
 
 @pytest.mark.parametrize(

@@ -65,7 +65,6 @@ def test_an_imported_arm_gets_its_first_units(tmp_path, capsys):
         (["--out", "x.toml"], "give their number with --suggest"),
         (["--suggest", "-1"], "--suggest is -1: give 1 or more"),
         (["--figure", "arm.gif"], "has an unknown format: use one of the endings .png, .pdf, .svg"),
-        (["--object-speed-m-s", "3"], "before contact, but the paths are only 0.8 m long: give lower speeds"),
         (["--seed", "-1"], "The seed is -1: give 0 or more"),
         (["--workspace", "moon"], "The workspace is 'moon': give circle"),
         (["--suggest", "400", "--postures", "2"], "400 more units were requested, but"),
@@ -78,6 +77,13 @@ def test_what_cannot_be_done_is_said(more, said, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main(["skin", "coverage", *more]) == 2
     assert said in " ".join(capsys.readouterr().err.split())
+
+
+def test_parameters_that_leave_no_time_are_said(capsys):
+    with pytest.raises(SystemExit):
+        main(["skin", "coverage", "--object-speed-m-s", "3"])
+    words = " ".join(capsys.readouterr().err.replace("│", " ").split())
+    assert "before contact, but the paths are only 0.8 m long: give lower speeds" in words
 
 
 def test_the_skin_file_that_is_read_is_never_written(tmp_path, capsys):

@@ -2,7 +2,7 @@
 
 import pytest
 
-from pretouch.calibration.data import CalibrationData
+from pretouch.calibration.values import CalibrationData
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.sim.random_skin import random_skin

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pretouch.calibration.data import CalibrationData, UnitData
+from pretouch.calibration.values import CalibrationData, UnitData
 from pretouch.traces import ImuTrace
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pretouch.calibration.data import CalibrationData, UnitData
+from pretouch.calibration.values import CalibrationData, UnitData
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pretouch.calibration.calibrate import calibrate
-from pretouch.calibration.data import CalibrationData
+from pretouch.calibration.values import CalibrationData
 from pretouch.errors import CalibrationError, RobotModelError
 from pretouch.sensing.skin import Skin
 from pretouch.sim.random_skin import random_skin

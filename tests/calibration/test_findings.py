@@ -8,9 +8,7 @@ from scipy.interpolate import CubicSpline
 
 from pretouch.calibration.calibrate import calibrate
 from pretouch.calibration.checks import checked_joints
-from pretouch.calibration.data import CalibrationData
-from pretouch.calibration.params import CalibrationParams
-from pretouch.calibration.result import Calibration
+from pretouch.calibration.values import Calibration, CalibrationData, CalibrationParams
 from pretouch.errors import CalibrationError
 from pretouch.sensing.skin import Skin
 from pretouch.traces import JointTrace

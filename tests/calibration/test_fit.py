@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pretouch.calibration.fit import Estimate, Fit, Measured, Problem, fit, start
+from pretouch.calibration.fit import Estimate, Fit, Problem, fit, start
 from pretouch.calibration.link_motion import LinkMotion
-from pretouch.calibration.params import CalibrationParams
+from pretouch.calibration.signals import Measured
+from pretouch.calibration.values import CalibrationParams
 
 PARAMS = CalibrationParams()
 NOISE = np.repeat((0.003, 0.02), 3)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pretouch.calibration.calibrate import calibrate
-from pretouch.calibration.params import CalibrationParams
+from pretouch.calibration.values import CalibrationParams
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit
 from pretouch.sim.random_skin import random_skin

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pretouch.calibration.link_motion import ArmMotion
-from pretouch.calibration.params import CalibrationParams
+from pretouch.calibration.values import CalibrationParams
 from pretouch.traces import JointTrace
 
 PARAMS = CalibrationParams()

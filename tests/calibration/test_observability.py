@@ -8,8 +8,8 @@ from pretouch.calibration.identify import Identifier
 from pretouch.calibration.joint_noise import JointNoise
 from pretouch.calibration.link_motion import ArmMotion
 from pretouch.calibration.observability import Axis, observability
-from pretouch.calibration.params import CalibrationParams
 from pretouch.calibration.signals import rate_of_change, smooth, times
+from pretouch.calibration.values import CalibrationParams
 from pretouch.sensing.skin import Skin
 from pretouch.sim.random_skin import random_skin
 from pretouch.traces import JointTrace

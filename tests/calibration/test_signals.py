@@ -5,10 +5,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from pretouch.calibration.alignment import align
-from pretouch.calibration.data import UnitData
-from pretouch.calibration.imu_signal import ImuSignal, saturated
-from pretouch.calibration.params import CalibrationParams
-from pretouch.calibration.signals import FINE_S, gaps, outside, rate_of_change, smooth, times
+from pretouch.calibration.signals import FINE_S, ImuSignal, gaps, outside, rate_of_change, saturated, smooth, times
+from pretouch.calibration.values import CalibrationParams, UnitData
 from pretouch.traces import ImuTrace, on_grid
 
 PARAMS = CalibrationParams()

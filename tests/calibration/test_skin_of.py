@@ -6,9 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pretouch.calibration.calibrate import calibrate
-from pretouch.calibration.mounting import moved_out
-from pretouch.calibration.skin_of import skin_of
+from pretouch.calibration.calibrate import calibrate, skin_of
+from pretouch.calibration.findings import moved_out
 from pretouch.errors import CalibrationError
 from pretouch.sensing.sensor import VL53L5CX
 from pretouch.sensing.skin import Skin, load_skin, save_skin

@@ -209,7 +209,7 @@ def test_a_unit_keeps_its_own_read_only_pose():
         (_pose(rotation=np.diag([1.0, 1.0, -1.0])), "not a proper rotation .determinant -1.*right-handed"),
         (_pose(rotation=1.01 * np.eye(3)), "not a proper rotation .*give a right-handed rotation"),
         (_pose(rotation=np.zeros((3, 3))), "not a proper rotation .determinant 0"),
-        (_pose(last_row=(0, 0, 0, 2)), "last row of its pose .*must be 0 0 0 1"),
+        (_pose(last_row=(0, 0, 0, 2)), "0 0 0 1 as the last row"),
     ],
 )
 def test_a_pose_that_is_none_is_refused_with_the_units_name(pose, message):

@@ -76,8 +76,8 @@ def test_a_skin_file_that_tells_its_error_does_so_as_a_deviation_per_axis(panda_
     untold, _ = misplaced(paper_skin, panda_model, Misplacement(3.0, 0.5), seed=1)
     assert np.array_equal(told.T_link_sensor, untold.T_link_sensor)
     count = len(paper_skin)
-    assert told.position_sigma == pytest.approx(np.full(count, 0.003 / np.sqrt(3)))
-    assert told.orientation_sigma == pytest.approx(np.full(count, np.radians(0.5) / np.sqrt(3)))
+    assert told.arrays.position_sigma == pytest.approx(np.full(count, 0.003 / np.sqrt(3)))
+    assert told.arrays.orientation_sigma == pytest.approx(np.full(count, np.radians(0.5) / np.sqrt(3)))
     assert untold.exact
 
 

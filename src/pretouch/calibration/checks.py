@@ -4,11 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from pretouch.calibration.data import UnitData
-from pretouch.calibration.imu_signal import saturated
-from pretouch.calibration.params import CalibrationParams
-from pretouch.calibration.result import Finding
-from pretouch.calibration.signals import gaps
+from pretouch.calibration.signals import gaps, saturated
+from pretouch.calibration.values import CalibrationParams, Finding, UnitData
 from pretouch.errors import CalibrationError
 from pretouch.robot.model import RobotModel
 from pretouch.traces import ImuTrace, JointTrace

@@ -19,7 +19,8 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from pretouch.calibration.link_motion import LinkMotion, skew
-from pretouch.calibration.params import CalibrationParams
+from pretouch.calibration.signals import Measured
+from pretouch.calibration.values import CalibrationParams
 from pretouch.types import FloatArray
 
 TURN, PLACE, ACC_BIAS, GYRO_BIAS, CLOCK, LAG = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12), 12, 13
@@ -31,16 +32,6 @@ _REWEIGHTINGS = 4
 POSE_PRIOR = np.array([np.pi, np.pi, np.pi, 0.5, 0.5, 0.5])
 """Standard deviation of the pose before anything is measured [rad, m]: no unit is further from its link's origin. Only
 what a motion does not tell at all depends on it."""
-
-
-@dataclass(frozen=True, eq=False)
-class Measured:
-    """What one IMU measured at N instants, and how fast that changed."""
-
-    values: FloatArray
-    """(N, 6) angular velocity [rad/s], proper acceleration [m/s^2]."""
-    rates: FloatArray
-    """(N, 6) their derivatives by time."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,14 +6,11 @@ import numpy as np
 
 from pretouch.calibration.alignment import Alignment, align
 from pretouch.calibration.checks import mistaken
-from pretouch.calibration.data import UnitData
-from pretouch.calibration.imu_signal import ImuSignal
 from pretouch.calibration.link_motion import ArmMotion
 from pretouch.calibration.locate import Located, enough, known_instants, locate
-from pretouch.calibration.params import CalibrationParams
-from pretouch.calibration.result import Finding
+from pretouch.calibration.signals import ImuSignal
+from pretouch.calibration.values import CalibrationParams, Finding, UnitData
 from pretouch.errors import CalibrationError
-from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray
 
 _CLOSE = 0.02
@@ -44,14 +41,6 @@ class Identified:
     findings: list[Finding] = field(default_factory=list)
 
 
-def rigid_bodies(model: RobotModel) -> list[tuple[int, ...]]:
-    """Sets of links that are fixed to each other, from the base on, without those that no joint moves."""
-    bodies: dict[bytes, list[int]] = {}
-    for link in np.flatnonzero(model.moved_by.any(axis=1)).tolist():
-        bodies.setdefault(model.moved_by[link].tobytes(), []).append(link)
-    return [tuple(links) for links in bodies.values()]
-
-
 class Identifier:
     """Finds links, on one arm in one motion."""
 
@@ -59,7 +48,9 @@ class Identifier:
         self.arm, self.params = arm, params
         self._step = float(arm.time[1] - arm.time[0])
         self._half_s = 0.5 * float(np.ptp(arm.time)) + params.clock_error_s
-        turning = {body: float(_rms(arm.link(body[0]).w[arm.usable])) for body in rigid_bodies(arm.model)}
+        rigid = arm.model.rigid
+        bodies = [tuple(np.flatnonzero(rigid == body).tolist()) for body in range(int(rigid.max()) + 1)]
+        turning = {body: float(_rms(arm.link(body[0]).w[arm.usable])) for body in bodies}
         least = params.least_swing_rad / np.ptp(arm.time)
         self._turning = {body: rms for body, rms in turning.items() if rms > least}
         if not self._turning:

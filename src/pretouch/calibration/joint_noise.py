@@ -11,8 +11,9 @@ import numpy as np
 from pretouch.calibration.fit import PLACE, POSE_PRIOR
 from pretouch.calibration.link_motion import ArmMotion
 from pretouch.calibration.locate import Located
-from pretouch.calibration.params import CalibrationParams
 from pretouch.calibration.signals import FINE_S, smooth, times
+from pretouch.calibration.values import CalibrationParams
+from pretouch.robot.postures import kinematics_of
 from pretouch.traces import JointTrace, on_grid
 from pretouch.types import FloatArray
 
@@ -37,10 +38,7 @@ class JointNoise:
         self.acceleration: FloatArray = np.sqrt(density * (2 * np.pi) ** 4 * params.cutoff_hz**5 / 5)
         """(n,) standard deviation of the joints' accelerations after the low-pass [rad/s^2]."""
         self._model = arm.model
-        kin = [arm.model.kinematics(q) for q in arm.q[::_EVERY]]
-        self._position = np.array([k.position for k in kin])
-        self._rotation = np.array([k.rotation for k in kin])
-        self._anchor, self._axis = np.array([k.anchor for k in kin]), np.array([k.axis for k in kin])
+        self._position, self._rotation, self._anchor, self._axis = kinematics_of(arm.model, arm.q[::_EVERY])
 
     def covariance(self, located: Located) -> FloatArray:
         """Covariance (6, 6) of a place, with the error that noise of the joints makes added to it.

@@ -5,9 +5,10 @@ from functools import cached_property
 
 import numpy as np
 
-from pretouch.calibration.params import CalibrationParams
 from pretouch.calibration.signals import HALF_S, gaps, outside, rate_of_change, smooth, times
+from pretouch.calibration.values import CalibrationParams
 from pretouch.robot.model import RobotModel
+from pretouch.robot.postures import kinematics_of
 from pretouch.traces import JointTrace
 from pretouch.types import BoolArray, FloatArray
 
@@ -61,11 +62,7 @@ class ArmMotion:
         self.qd: FloatArray = qd[chosen]
         """(N, n) joint velocities [rad/s]."""
         self._qdd = rate_of_change(qd)[chosen]
-        postures = [model.kinematics(row) for row in self.q]
-        self._position = np.array([k.position for k in postures])
-        self._rotation = np.array([k.rotation for k in postures])
-        anchor = np.array([k.anchor for k in postures]).reshape(-1, model.n, 3)
-        axis = np.array([k.axis for k in postures]).reshape(-1, model.n, 3)
+        self._position, self._rotation, anchor, axis = kinematics_of(model, self.q)
         self._chain = chain_motion(anchor, axis, self.qd, self._qdd)
         """Of what moves with the first 0, 1, ... n joints: what `chain_motion` returns, (N, n + 1, 3) each."""
         self._links: dict[int, LinkMotion] = {}

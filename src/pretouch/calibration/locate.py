@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pretouch.calibration.fit import Estimate, Fit, Measured, fit, start
-from pretouch.calibration.imu_signal import ImuSignal
+from pretouch.calibration.fit import Estimate, Fit, fit, start
 from pretouch.calibration.link_motion import ArmMotion, LinkMotion
-from pretouch.calibration.params import CalibrationParams
+from pretouch.calibration.signals import ImuSignal, Measured
+from pretouch.calibration.values import CalibrationParams
 from pretouch.types import BoolArray, FloatArray
 
 _ROUNDS = 4
@@ -82,20 +82,10 @@ def locate(arm: ArmMotion, signal: ImuSignal, link: int, late: float, params: Ca
 
 
 def explained(estimate: Estimate, motion: LinkMotion, measured: Measured, params: CalibrationParams) -> BoolArray:
-    """Tell at which instants (N,) the model is near what was measured."""
-    size = sizes(estimate.differences(motion, measured))
-    return np.all(size <= limits(size, params), axis=1)
-
-
-def sizes(differences: FloatArray) -> FloatArray:
-    """Sizes (N, 2) of differences (N, 6), by sensor [rad/s, m/s^2]."""
-    return np.linalg.norm(differences.reshape(-1, 2, 3), axis=2)
-
-
-def limits(size: FloatArray, params: CalibrationParams) -> FloatArray:
-    """Largest sizes (2,) of differences that are no outliers [rad/s, m/s^2]."""
+    """Tell at which instants (N,) the model is near what both sensors measured."""
+    size = np.linalg.norm(estimate.differences(motion, measured).reshape(-1, 2, 3), axis=2)
     tolerated = np.array([params.tolerated_angular_velocity, params.tolerated_acceleration])
-    return np.maximum(tolerated, params.outlier_factor * np.median(size, axis=0))
+    return np.all(size <= np.maximum(tolerated, params.outlier_factor * np.median(size, axis=0)), axis=1)
 
 
 def _final(

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pretouch.calibration.fit import PLACE, TURN
-from pretouch.calibration.params import CalibrationParams
+from pretouch.calibration.values import CalibrationParams, Observability
 from pretouch.types import FloatArray
 
 _SAME = 0.9
@@ -21,24 +21,6 @@ class Axis:
     """(3,) [m]."""
     direction: FloatArray
     """(3,) unit vector."""
-
-
-@dataclass(frozen=True, eq=False)
-class Observability:
-    """How well each direction is known. All directions are in the link frame, the best known first."""
-
-    position_directions: FloatArray
-    """(3, 3) unit vectors in rows."""
-    position_sigma: FloatArray
-    """(3,) standard deviation of the position along each [m]."""
-    orientation_axes: FloatArray
-    """(3, 3) unit vectors in rows."""
-    orientation_sigma: FloatArray
-    """(3,) standard deviation of the orientation about each [rad]."""
-    unknown: tuple[str, ...]
-    """What is not known as well as it has to be, in words; empty if all is."""
-    known: tuple[str, ...]
-    """What is known nevertheless, in words; empty if all is."""
 
 
 def observability(
@@ -58,7 +40,7 @@ def observability(
     place, directions = np.linalg.eigh(C[PLACE, PLACE])
     turn, axes = np.linalg.eigh(C[TURN, TURN])
     r = T_link_sensor[:3, 3] - axis.point
-    limit = np.repeat((params.orientation_limit, params.position_limit), 3)
+    limit = np.repeat((params.orientation_limit, params.position_sigma_m), 3)
     span, freedoms = _joint_freedoms(C / np.outer(limit, limit), r, axis, limit)
     words = (*freedoms, *_directions(C / np.outer(limit, limit), span, limit))
     known = _seen_from(C, r, axis) if len(freedoms) == 2 else ()

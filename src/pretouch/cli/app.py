@@ -27,7 +27,7 @@ COMMANDS: dict[str, dict[str, tuple[str, str]]] = {
     },
     "Sensor units": {
         "skin monitor": ("skin_monitor:Monitor", "watch units: rates, losses, batteries, faults"),
-        "skin calibrate": ("calibrate.options:Calibrate", "find where units sit, from a motion"),
+        "skin calibrate": ("calibrate.command:Calibrate", "find where units sit, from a motion"),
         "skin coverage": ("skin_coverage:Coverage", "what units see in time, where more help"),
         "skin simulate": ("skin_simulate:Simulate", "send what real units send"),
         "skin provision": ("skin_provision:Provision", "set up a unit over USB"),

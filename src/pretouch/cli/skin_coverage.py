@@ -114,7 +114,7 @@ def _measured(command: Coverage, setting: Setting, skin: Skin) -> dict[str, Any]
         own = {unit.sensor.label: unit.sensor for unit in skin.mounted}
         places = candidates(ways, skin, sensor_called(command.sensor, "--sensor", own))
         suggested = suggest((ways, met), skin, command.suggest, places)
-        old, skin, ways = skin, Skin((*skin.units, *suggested.units), setting.model), setting.ways(1)
+        old, skin, ways = skin, Skin((*skin.mounted, *suggested.units), setting.model), setting.ways(1)
         new = frozenset(unit.id for unit in suggested.units)
         # what the new units add, by ways that they were not chosen by
         fresh, first = (ways, setting.met(1)), len(old.first)

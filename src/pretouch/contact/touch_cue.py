@@ -131,4 +131,4 @@ class TouchSensors(TouchSensorParams, Cue, name="touch"):
         np.maximum.at(gain, link, gain_of(share, self))
         point = kin.position[link] + np.einsum("mij,mj->mi", kin.rotation[link], skin.T_link_sensor[unit, :3, 3])
         # half the radius of the patch, as of an even distribution over it, and the uncertainty of where the unit is
-        return Cues(gain, link, point, np.hypot(radius / 2, skin.position_sigma[unit])), state
+        return Cues(gain, link, point, np.hypot(radius / 2, skin.arrays.position_sigma[unit])), state

@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 
 from pretouch.errors import RobotModelError
-from pretouch.importing.capsules import LinkBody, Rods
+from pretouch.importing.capsules import LinkBody
 from pretouch.importing.chain import Arm, Limits
 from pretouch.types import FloatArray
 
@@ -79,14 +79,14 @@ def _add_joint(body: mujoco.MjsBody, arm: Arm, limits: Limits, j: int) -> None:
     )
 
 
-def _add_capsules(body: mujoco.MjsBody, link: str, rods: Rods, density: float) -> None:
-    for k, (a, b, radius) in enumerate(zip(rods.a, rods.b, rods.radius, strict=True)):
-        capsule = body.add_geom(name=f"{link}_{k}", type=mujoco.mjtGeom.mjGEOM_CAPSULE, size=[radius, 0, 0])
-        capsule.fromto, capsule.density = [*a, *b], density
+def _add_capsules(body: mujoco.MjsBody, link: str, rods: FloatArray, density: float) -> None:
+    for k, rod in enumerate(rods):
+        capsule = body.add_geom(name=f"{link}_{k}", type=mujoco.mjtGeom.mjGEOM_CAPSULE, size=[rod[6], 0, 0])
+        capsule.fromto, capsule.density = rod[:6], density
         capsule.contype, capsule.conaffinity, capsule.group = 1, 2, 3
 
 
-def _set_inertial(body: mujoco.MjsBody, arm: Arm, i: int, rods: Rods | None, estimates: list[str]) -> float:
+def _set_inertial(body: mujoco.MjsBody, arm: Arm, i: int, rods: FloatArray | None, estimates: list[str]) -> float:
     """Give a body the inertial of its link; return the density of its capsules [kg/m^3] where it has none.
 
     A mass or inertia that is estimated is added to `estimates`.
@@ -120,6 +120,7 @@ def _needs_mass(arm: Arm, link: int) -> bool:
     return moved[link] and not any(links[i].mass > 0 or masses.get(links[i].name, 0.0) > 0 for i in fixed)
 
 
-def _volume(rods: Rods) -> float:
+def _volume(rods: FloatArray) -> float:
     """Volume of capsules [m^3]; where two overlap it counts twice."""
-    return float((np.pi * rods.radius**2 * (np.linalg.norm(rods.b - rods.a, axis=1) + 4 / 3 * rods.radius)).sum())
+    length, radius = np.linalg.norm(rods[:, 3:6] - rods[:, :3], axis=1), rods[:, 6]
+    return float((np.pi * radius**2 * (length + 4 / 3 * radius)).sum())

@@ -39,27 +39,17 @@ _SHORTEST = 1e-4
 """Half the length of a capsule's axis, at least [m]: the file format has no balls."""
 
 
-@dataclass(frozen=True, eq=False)
-class Rods:
-    """K capsules in the frame of a link."""
+def distances(rods: FloatArray, points: FloatArray) -> FloatArray:
+    """Distances (P, K) of points (P, 3) to each of the capsules (K, 7), negative inside [m].
 
-    a: FloatArray
-    """(K, 3) one end of each axis [m]."""
-    b: FloatArray
-    """(K, 3) the other end [m]."""
-    radius: FloatArray
-    """(K,) [m]."""
+    A row holds both ends of a capsule's axis and its radius [m], in the frame of a link, here as everywhere below.
+    """
+    return np.linalg.norm(from_axes(points, rods[:, :3], rods[:, 3:6])[1], axis=2) - rods[:, 6]
 
-    def __len__(self) -> int:
-        return len(self.radius)
 
-    def each(self, points: FloatArray) -> FloatArray:
-        """Distances (P, K) of points (P, 3) to each capsule, negative inside [m]."""
-        return np.linalg.norm(from_axes(points, self.a, self.b)[1], axis=2) - self.radius
-
-    def __call__(self, points: FloatArray) -> FloatArray:
-        """Distances (P,) of points (P, 3) to the nearest capsule, negative inside [m]."""
-        return self.each(points).min(axis=1)
+def _distance(rods: FloatArray, points: FloatArray) -> FloatArray:
+    """Distances (P,) of points (P, 3) to the nearest capsule, negative inside [m]."""
+    return distances(rods, points).min(axis=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,8 +58,8 @@ class LinkBody:
 
     name: str
     """Of the link."""
-    rods: Rods
-    """Link frame."""
+    rods: FloatArray
+    """(K, 7), see `distances`."""
     fitted: bool
     """Whether they stand for other shapes; otherwise the file has them so."""
     sticks_out: float
@@ -129,23 +119,23 @@ def bodies_of(arm: Arm, most: int = MOST, cover: bool = False) -> tuple[tuple[Li
     return tuple(bodies), tuple(remarks)
 
 
-def link_body(name: str, outside: Outside, own: Rods | None, most: int = MOST, cover: bool = False) -> LinkBody:
+def link_body(name: str, outside: Outside, own: FloatArray | None, most: int = MOST, cover: bool = False) -> LinkBody:
     """Return a link's own capsules if there are any, otherwise fitted ones."""
-    rods = own or fitted(outside, most)
+    rods = fitted(outside, most) if own is None else own
     if cover and own is None:
         rods = covering(rods, outside.on)
-    over = (outside.height - rods(outside.around)).max(initial=0.0)
-    return LinkBody(name, rods, own is None, max(0.0, float(rods(outside.on).max())), float(over))
+    over = (outside.height - _distance(rods, outside.around)).max(initial=0.0)
+    return LinkBody(name, rods, own is None, max(0.0, float(_distance(rods, outside.on).max())), float(over))
 
 
-def own_capsules(shapes: tuple[Shape, ...]) -> Rods | None:
-    """Return the capsules and balls of a link, if it has nothing else and few of them."""
+def own_capsules(shapes: tuple[Shape, ...]) -> FloatArray | None:
+    """Return the capsules (K, 7) and balls of a link, if it has nothing else and few of them."""
     kinds = {mujoco.mjtGeom.mjGEOM_SPHERE: 0.0, mujoco.mjtGeom.mjGEOM_CAPSULE: 1.0}
     if len(shapes) > _MOST_OWN or not all(shape.kind in kinds for shape in shapes):
         return None
     half = [max(kinds[shape.kind] * shape.size[1], _SHORTEST) * shape.T[:3, 2] for shape in shapes]
     middle = [shape.T[:3, 3] for shape in shapes]
-    return Rods(np.subtract(middle, half), np.add(middle, half), np.array([shape.size[0] for shape in shapes]))
+    return np.column_stack([np.subtract(middle, half), np.add(middle, half), [shape.size[0] for shape in shapes]])
 
 
 def outside_of(surface: Trimesh) -> Outside:
@@ -173,89 +163,88 @@ def _inside(places: FloatArray, points: FloatArray, normals: FloatArray, area: f
     return np.asarray(np.abs(share * (above / (away * away * away)).sum(axis=1)) > 0.5)
 
 
-def fitted(outside: Outside, most: int = MOST) -> Rods:
-    """Fit as few capsules as are worth it, `most` at most, to a surface. The same surface has the same capsules."""
+def fitted(outside: Outside, most: int = MOST) -> FloatArray:
+    """Fit as few capsules (K, 7) as are worth it, `most` at most, to a surface; to the same one always the same."""
     near = outside.nearest[:_FITTED]
     points = np.vstack([near, outside.around[:_FITTED]])
     height = np.concatenate([np.zeros(len(near)), outside.height[:_FITTED]])
-    best: Rods | None = None
+    best: FloatArray | None = None
     for count in range(1, most + 1):
         fits = [_refined(start, points, height) for start in _starts(near, count, best)]
         rods = min(fits, key=lambda rods: _cost(rods, points, height))
         if best is not None and _cost(rods, points, height) > _WORTH**2 * _cost(best, points, height):
             break
         best = rods
-        if np.percentile(np.abs(best(points) - height), 95) < _GOOD:
+        if np.percentile(np.abs(_distance(best, points) - height), 95) < _GOOD:
             break
     assert best is not None  # noqa: S101  the loop runs at least once
     return best
 
 
-def covering(rods: Rods, points: FloatArray) -> Rods:
+def covering(rods: FloatArray, points: FloatArray) -> FloatArray:
     """Raise the radii until each of some points (P, 3) is inside the capsule that it is nearest to."""
-    each = rods.each(points)
+    each, wider = distances(rods, points), rods.copy()
     more = np.zeros(len(rods))
     np.maximum.at(more, each.argmin(axis=1), each.min(axis=1))
-    return Rods(rods.a, rods.b, rods.radius + more)
+    wider[:, 6] += more
+    return wider
 
 
 def _weighted(error: FloatArray) -> FloatArray:
     return np.where(error > 0, _TOO_SHORT, 1.0) * error
 
 
-def _cost(rods: Rods, points: FloatArray, height: FloatArray) -> float:
-    return float((_weighted(rods(points) - height) ** 2).mean())
+def _cost(rods: FloatArray, points: FloatArray, height: FloatArray) -> float:
+    return float((_weighted(_distance(rods, points) - height) ** 2).mean())
 
 
-def _refined(start: Rods, points: FloatArray, height: FloatArray) -> Rods:
+def _refined(start: FloatArray, points: FloatArray, height: FloatArray) -> FloatArray:
     """Move capsules to where the squared errors of their distances (P,) from points (P, 3) are least."""
-    x = np.column_stack([start.a, start.b, start.radius]).ravel()
-    if len(points) < len(x):
+    if len(points) < start.size:
         return start  # too few to move capsules by
-    rods = _unpacked(
-        least_squares(
-            lambda x: _weighted(_unpacked(x)(points) - height),
-            x,
-            lambda x: _slope(_unpacked(x), points, height),
-            method="lm",
-            max_nfev=60,
-        ).x
+    best = least_squares(
+        lambda x: _weighted(_distance(_with_radii(x), points) - height),
+        start.ravel(),
+        lambda x: _slope(_with_radii(x), points, height),
+        method="lm",
+        max_nfev=60,
     )
-    along = rods.b - rods.a
-    short = np.linalg.norm(along, axis=1) < 2 * _SHORTEST
-    step, middle = np.where(short[:, None], np.array([0.0, 0.0, _SHORTEST]), along / 2), (rods.a + rods.b) / 2
-    return Rods(middle - step, middle + step, rods.radius)
+    a, b, radius = np.split(_with_radii(best.x), [3, 6], axis=1)
+    short = np.linalg.norm(b - a, axis=1, keepdims=True) < 2 * _SHORTEST
+    step, middle = np.where(short, np.array([0.0, 0.0, _SHORTEST]), (b - a) / 2), (a + b) / 2
+    return np.hstack([middle - step, middle + step, radius])
 
 
-def _slope(rods: Rods, points: FloatArray, height: FloatArray) -> FloatArray:
+def _slope(rods: FloatArray, points: FloatArray, height: FloatArray) -> FloatArray:
     """Derivatives (P, 7 K) of the weighed errors: of each point's distance, by its nearest capsule only."""
-    part, away = from_axes(points, rods.a, rods.b)
-    length = np.linalg.norm(away, axis=2)
-    k, rows = (length - rods.radius).argmin(axis=1), np.arange(len(points))
+    part, away = from_axes(points, rods[:, :3], rods[:, 3:6])
+    length, radius = np.linalg.norm(away, axis=2), rods[:, 6]
+    k, rows = (length - radius).argmin(axis=1), np.arange(len(points))
     part, away, each = part[rows, k, None], away[rows, k] / np.maximum(length[rows, k, None], 1e-9), length[rows, k]
-    weight = np.where(each - rods.radius[k] > height, _TOO_SHORT, 1.0)[:, None]
+    weight = np.where(each - radius[k] > height, _TOO_SHORT, 1.0)[:, None]
     table = np.zeros((len(points), len(rods), 7))
     table[rows, k] = weight * np.hstack([-(1 - part) * away, -part * away, -np.ones((len(points), 1))])
     return table.reshape(len(points), -1)
 
 
-def _unpacked(x: FloatArray) -> Rods:
-    table = x.reshape(-1, 7)
-    return Rods(table[:, :3], table[:, 3:6], np.maximum(np.abs(table[:, 6]), 1e-3))
+def _with_radii(x: FloatArray) -> FloatArray:
+    """Return capsules (K, 7) of the unknowns (7 K,) of a fit, whose radii may be negative."""
+    rods = x.reshape(-1, 7).copy()
+    rods[:, 6] = np.maximum(np.abs(rods[:, 6]), 1e-3)
+    return rods
 
 
-def _starts(points: FloatArray, count: int, before: Rods | None) -> list[Rods]:
+def _starts(points: FloatArray, count: int, before: FloatArray | None) -> list[FloatArray]:
     """Return where to begin from with so many capsules: slices of the surface, and the best ones with one fewer."""
     axes = _axes(points)
     along = (points - points.mean(axis=0)) @ axes.T
     starts = []
     for values in along.T[: 1 if count == 1 else 3]:
         part = np.digitize(values, np.linspace(values.min(), values.max(), count + 1)[1:-1])
-        starts.append(_through([points[part == k] if np.any(part == k) else points for k in range(count)]))
+        starts.append(np.array([_through(points[part == k] if np.any(part == k) else points) for k in range(count)]))
     if before is not None:
-        worst = points[np.argmax(before(points))] + np.array([[-0.005], [0.005]]) * axes[0]
-        radius = np.append(before.radius, before.radius.min() / 2)
-        starts.append(Rods(np.vstack([before.a, worst[:1]]), np.vstack([before.b, worst[1:]]), radius))
+        worst = points[np.argmax(_distance(before, points))] + np.array([[-0.005], [0.005]]) * axes[0]
+        starts.append(np.vstack([before, [*worst.ravel(), before[:, 6].min() / 2]]))
     return starts
 
 
@@ -265,13 +254,10 @@ def _axes(points: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.eigh(centred.T @ centred)[1].T[::-1])
 
 
-def _through(slices: list[FloatArray]) -> Rods:
-    """Lay one capsule through each of some sets of points (P, 3), along its longest extent."""
-    ends = []
-    for own in slices:
-        axes, middle = _axes(own), (own.min(axis=0) + own.max(axis=0)) / 2
-        extent = (own - middle) @ axes.T
-        radius = max(0.9 * float(np.linalg.norm(extent[:, 1:], axis=1).mean()), 2e-3)
-        reach = max(float(np.abs(extent[:, 0]).max()) - radius, 1e-3) * axes[0]
-        ends.append([*(middle - reach), *(middle + reach), radius])
-    return _unpacked(np.array(ends))
+def _through(points: FloatArray) -> FloatArray:
+    """Lay a capsule (7,) through points (P, 3), along their longest extent."""
+    axes, middle = _axes(points), (points.min(axis=0) + points.max(axis=0)) / 2
+    extent = (points - middle) @ axes.T
+    radius = max(0.9 * float(np.linalg.norm(extent[:, 1:], axis=1).mean()), 2e-3)
+    reach = max(float(np.abs(extent[:, 0]).max()) - radius, 1e-3) * axes[0]
+    return np.concatenate([middle - reach, middle + reach, [radius]])

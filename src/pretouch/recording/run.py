@@ -54,7 +54,6 @@ class _KeptUnit:
     orientation_sigma: float
     touch: TouchPatch | None
     sensor: dict[str, Any]
-    zone: int | None
 
 
 @dataclass(frozen=True)
@@ -157,10 +156,9 @@ def packed_run(controller: Controller, about: Mapping[str, JSON]) -> bytes:
     """Return what describes a controller. Facts that JSON cannot hold are a RecordingError."""
     model, fixtures = controller.model, controller.fixtures
     units = [
-        _KeptUnit(u.id, u.link, u.T_link_sensor, u.position_sigma, u.orientation_sigma, u.touch, as_table(u.sensor),
-                  u.zone)
-        for u in controller.skin.units
-    ]  # fmt: skip
+        _KeptUnit(u.id, u.link, u.T_link_sensor, u.position_sigma, u.orientation_sigma, u.touch, as_table(u.sensor))
+        for u in controller.skin.mounted
+    ]
     return packed(_KeptRun(
         time.time(), versions(), _as_json(about), _as_json(as_table(controller.profile)),
         description_text(model.description, _MJCF), _mjcf(model.description), tuple(units), fixtures.planes,
@@ -226,7 +224,7 @@ def _model(kept: _KeptRun) -> RobotModel:
 def _unit(kept: _KeptUnit) -> SensorUnit:
     return SensorUnit(
         kept.id, kept.link, kept.T_link_sensor, kept.position_sigma, kept.orientation_sigma, kept.touch,
-        from_table(Sensor, kept.sensor, "sensor"), kept.zone,
+        from_table(Sensor, kept.sensor, "sensor"),
     )  # fmt: skip
 
 

@@ -77,13 +77,7 @@ def brought_to(model: RobotModel, point: FloatArray) -> FloatArray:
 
 def kinematics_of(model: RobotModel, q: FloatArray) -> Kinematics:
     """Compute poses and joint axes in S postures q (S, n) [rad]: each array of `Kinematics` by posture."""
-    postures = [model.kinematics(row) for row in q]
-    return Kinematics(
-        np.array([k.position for k in postures]),
-        np.array([k.rotation for k in postures]),
-        np.array([k.anchor for k in postures]),
-        np.array([k.axis for k in postures]),
-    )
+    return Kinematics(*map(np.array, zip(*(model.kinematics(row) for row in q), strict=True)))
 
 
 def capsule_ends(model: RobotModel, kin: Kinematics) -> FloatArray:

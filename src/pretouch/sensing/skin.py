@@ -25,7 +25,7 @@ from pretouch.sensing.sensor import (
     sensor_called,
     tables_of,
 )
-from pretouch.sensing.unit import NetworkUnits, SensorUnit, TouchPatch, mounted, seat, zones_of
+from pretouch.sensing.unit import NetworkUnits, SensorUnit, TouchPatch, seat, zones_of
 from pretouch.toml_files import shown, table_of
 from pretouch.types import FloatArray, IntArray
 
@@ -66,7 +66,9 @@ class Skin:
     """
 
     def __init__(self, units: Sequence[SensorUnit], model: RobotModel) -> None:
-        _check_count(sum(unit.sensor.zones**2 if unit.zone is None else 1 for unit in units))
+        count = sum(unit.sensor.zones**2 for unit in units)
+        if count > _MOST_UNITS:
+            raise SkinError(f"The skin has {count} units, each zone counted: give at most {_MOST_UNITS}.")
         self.units = tuple(zone for unit in units for zone in zones_of(unit))
         ids = [unit.id for unit in self.units]
         twice = sorted({i for i in ids if ids.count(i) > 1})
@@ -77,7 +79,7 @@ class Skin:
         self.ids: tuple[str, ...] = tuple(ids)
         self.boards: tuple[str, ...] = tuple(unit.board for unit in self.units)
         """(K,) id of the mounted unit each belongs to: its own, but for zones."""
-        self.mounted = mounted(self.units)
+        self.mounted = tuple(units)
         """The B units as they are mounted: those with zones whole."""
         self.first: IntArray = np.array([k for k, unit in enumerate(self.units) if not unit.zone], dtype=np.int64)
         """(B,) index of each one's first zone, or its own."""
@@ -85,32 +87,24 @@ class Skin:
         """(K,) index of the mounted unit each belongs to."""
         self.network = NetworkUnits(tuple(u.id for u in self.mounted), tuple(u.sensor.zones for u in self.mounted))
         """The same units as they speak over the network."""
-        self.link: IntArray = np.array([model.link_index(u.link) for u in self.units], dtype=np.int64)
-        """(K,) index of the link each unit sits on."""
-        self.T_link_sensor: FloatArray = np.array([u.T_link_sensor for u in self.units]).reshape(-1, 4, 4)
-        """(K, 4, 4)."""
+        self.arrays = SkinArrays(
+            np.array([model.link_index(u.link) for u in self.units], dtype=np.int64),
+            np.array([u.T_link_sensor for u in self.units]).reshape(-1, 4, 4),
+            np.array([u.position_sigma for u in self.units], dtype=np.float64),
+            np.array([u.orientation_sigma for u in self.units], dtype=np.float64),
+            cones_of([u.sensor for u in self.units]),
+        )
+        """The same for compiled code."""
+        self.link, self.T_link_sensor, position_sigma, orientation_sigma, self.cones = self.arrays
+        self.exact = not (position_sigma.any() or orientation_sigma.any() or self.cones.spread.any())
+        """Whether the place of every unit is taken as exact, and that of what it sees."""
         self.T_link_board: FloatArray = np.array([u.T_link_sensor for u in self.mounted]).reshape(-1, 4, 4)[self.board]
         """(K, 4, 4) pose of the mounted unit each belongs to: the IMU's."""
-        self.position_sigma: FloatArray = np.array([u.position_sigma for u in self.units], dtype=np.float64)
-        """(K,) standard deviation of each unit's position [m]."""
-        self.orientation_sigma: FloatArray = np.array([u.orientation_sigma for u in self.units], dtype=np.float64)
-        """(K,) standard deviation of each unit's orientation [rad]."""
-        self.cones: Cones = cones_of([u.sensor for u in self.units])
-        """What each unit sees, for compiled code."""
-        self.arrays = SkinArrays(self.link, self.T_link_sensor, self.position_sigma, self.orientation_sigma, self.cones)
-        """The same for compiled code."""
-        self.exact = not (self.position_sigma.any() or self.orientation_sigma.any() or self.cones.spread.any())
-        """Whether the place of every unit is taken as exact, and that of what it sees."""
         self.touching: IntArray = np.array([k for k, u in enumerate(self.units) if u.touch is not None], dtype=np.int64)
         """(M,) indices of the units with a touch sensor."""
 
     def __len__(self) -> int:
         return len(self.units)
-
-
-def _check_count(count: int) -> None:
-    if count > _MOST_UNITS:
-        raise SkinError(f"The skin has {count} units, each zone counted: give at most {_MOST_UNITS}.")
 
 
 def _check_place(unit: SensorUnit, model: RobotModel) -> None:
@@ -144,7 +138,6 @@ def load_skin(path: Path | str, model: RobotModel) -> Skin:
         if not isinstance(tables, dict):
             raise SkinError(f"sensor is {tables!r}: write a table [sensor.NAME] for each type of your own.")
         types = {name: own_type(name, table) for name, table in tables.items()}
-        _check_count(len(entries))
         units = list[SensorUnit]()
         for number, entry in enumerate(entries, 1):
             place = f", unit {number} of {len(entries)}"

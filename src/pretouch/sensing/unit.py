@@ -70,14 +70,12 @@ class SensorUnit:
         T = np.asarray(self.T_link_sensor, dtype=np.float64)
         if T.shape != (4, 4) or not np.all(np.abs(T) <= LARGEST_NUMBER):
             raise SkinError(f"Unit {self.id}: its pose holds {T.tolist()}: give a finite 4 x 4 matrix, in metres.")
-        R = T[:3, :3]
-        if np.abs(R @ R.T - np.eye(3)).max() > 1e-6 or np.linalg.det(R) < 0:
+        off, determinant = float(np.abs(T[:3, :3] @ T[:3, :3].T - np.eye(3)).max()), np.linalg.det(T[:3, :3])
+        if off > 1e-6 or determinant < 0 or T[3].tolist() != [0.0, 0.0, 0.0, 1.0]:
             raise SkinError(
-                f"Unit {self.id}: its orientation is not a proper rotation (determinant {np.linalg.det(R):.6f}, R R^T"
-                f" off by {np.abs(R @ R.T - np.eye(3)).max():.2g}): give a right-handed rotation."
+                f"Unit {self.id}: its pose {T.tolist()} is not a proper rotation (determinant {determinant:.6f}, R R^T"
+                f" off by {off:.2g}) and a place: give a right-handed rotation, and 0 0 0 1 as the last row."
             )
-        if np.abs(T[3] - [0.0, 0.0, 0.0, 1.0]).max() > 0:
-            raise SkinError(f"Unit {self.id}: the last row of its pose is {T[3].tolist()}: it must be 0 0 0 1.")
         frozen = T.copy()
         frozen.flags.writeable = False
         object.__setattr__(self, "T_link_sensor", frozen)
@@ -107,8 +105,10 @@ _OF = "/"
 
 
 def zones_of(unit: SensorUnit) -> tuple[SensorUnit, ...]:
-    """Return what measures a distance each: the unit, or its zones; the first has the unit's touch sensor."""
-    if unit.zone is not None or unit.sensor.zones == 1:
+    """Return what measures a distance each: a whole unit, or its zones; the first has the unit's touch sensor."""
+    if unit.zone is not None:
+        raise SkinError(f"Unit {unit.id} is a zone: give the whole unit, of `Skin.mounted`.")
+    if unit.sensor.zones == 1:
         return (unit,)
     zones = []
     for zone, look in enumerate(unit.sensor.looks()):
@@ -117,19 +117,6 @@ def zones_of(unit: SensorUnit) -> tuple[SensorUnit, ...]:
         touch = None if zone else unit.touch
         zones.append(replace(unit, id=f"{unit.id}{_OF}{zone}", T_link_sensor=T, zone=zone, touch=touch))
     return tuple(zones)
-
-
-def mounted(units: Iterable[SensorUnit]) -> tuple[SensorUnit, ...]:
-    """Return whole units, in order, where zones are given: what is mounted on the arm."""
-    whole = []
-    for unit in units:
-        if unit.zone is None:
-            whole.append(unit)
-        elif unit.zone == 0:
-            T = unit.T_link_sensor.copy()
-            T[:3, :3] = T[:3, :3] @ unit.sensor.looks()[0].T
-            whole.append(replace(unit, id=unit.board, T_link_sensor=T, zone=None))
-    return tuple(whole)
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from pretouch.cli.calibrate.options import MotionOptions
+from pretouch.calibration.motion.limits import PlanParams
 from pretouch.errors import CalibrationError
 
 if TYPE_CHECKING:  # the help is to need none of the heavy packages
@@ -18,7 +18,7 @@ class Calibration:
     """How many; each has a unit on each link from the second on."""
     find_links: bool = False
     """Do not tell the calibration which links the units sit on."""
-    motion: MotionOptions = field(default_factory=MotionOptions)
+    motion: PlanParams = field(default_factory=PlanParams)
     arm: str = "panda"
     """panda, fr3, or the folder of an imported arm."""
     json: str = ""
@@ -54,14 +54,13 @@ def study_of(command: Calibration) -> "Study":
     from rich.console import Console
 
     from pretouch.calibration.motion.planner import plan_motion
-    from pretouch.cli.calibrate.motion import plan_params
     from pretouch.robot.description import robot_named
     from pretouch.robot.model import RobotModel
     from pretouch_lab.cli.progress import bar
     from pretouch_lab.studies.calibration.study import study
 
     model = RobotModel(robot_named(command.arm))
-    plan = None if command.motion == MotionOptions() else plan_motion(model, plan_params(command.motion))
+    plan = None if command.motion == PlanParams() else plan_motion(model, command.motion)
     name = "simulations"
     with bar(Console(stderr=True), name, command.skins) as advance:
         return study(

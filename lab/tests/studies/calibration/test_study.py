@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from tests.calibration.made import turned
 
-from pretouch.calibration.result import Place
+from pretouch.calibration.values import Place
 from pretouch.errors import ExperimentError
 from pretouch.sim.random_skin import random_skin
 from pretouch_lab.studies.calibration.errors import NOT_FOUND, place_row

@@ -1,4 +1,4 @@
-"""What a motion for calibration consists of, and whether it keeps to the limits of an arm, to itself, and above the floor."""
+"""What a calibration motion consists of, and whether it keeps to the limits of an arm, to itself and to the floor."""
 
 from dataclasses import dataclass
 from typing import Annotated

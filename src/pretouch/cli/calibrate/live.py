@@ -1,12 +1,13 @@
-"""What `pretouch skin calibrate ARM` does: the arm makes the motion, all is recorded, and that is calibrated."""
+"""`pretouch skin calibrate ARM`: the arm makes the motion, all is recorded, and that is calibrated."""
 
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import dataclass, field
 from functools import partial
 from itertools import count
 from pathlib import Path
 from shlex import join
-from typing import TYPE_CHECKING, Any
+from typing import Generic
 
 import numpy as np
 from rich.console import Console
@@ -14,13 +15,14 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from pretouch.arms import ArmSetup, OpenedArm
 from pretouch.calibration.motion.follow import START_RAD, plan_controller
+from pretouch.calibration.motion.limits import MotionLimits, PlanParams
 from pretouch.calibration.motion.plan import Plan
-from pretouch.calibration.motion.planner import approach
-from pretouch.cli.calibrate.motion import planned
-from pretouch.cli.calibrate.outputs import Outputs
-from pretouch.cli.calibrate.recording import Sources, calibrate_recording
+from pretouch.calibration.motion.planner import approach, plan_motion
+from pretouch.cli.calibrate.recorded import Recorded, calibrate_recorded, check_files
+from pretouch.cli.options import JsonFile, OptionalFile
+from pretouch.cli.run.options import A, UnitOptions
 from pretouch.cli.run.setup import heard_units
-from pretouch.cli.writing import check_free, check_writable, same_file
+from pretouch.cli.writing import check_free, check_writable, numbers_to, same_file
 from pretouch.errors import CalibrationError, HardwareError, RecordingError, RobotError
 from pretouch.loop import Cycle, MonotonicClock
 from pretouch.ports import Arm
@@ -35,83 +37,118 @@ from pretouch.units.skin import NetworkSkin
 from pretouch.units.skin_recording import SkinRecording
 from pretouch.units.watch import UnitWatch
 
-if TYPE_CHECKING:
-    from pretouch.cli.calibrate.options import CalibrateArm
-
 _LOOK_S = 0.1
 """Time between two looks at the units before the motion [s]."""
 _AFTER_S = 0.5
 """What was measured up to the end of a motion has arrived then [s]."""
 
 
-def calibrate_live(command: "CalibrateArm[Any]", out: Path, outputs: Outputs) -> int:
-    """Calibrate the units of an arm that is moved; return 1 if a unit was refused or the motion ended early, or 0."""
-    place = _recording_place(command, out)
-    model, again = RobotModel(command.connection.described(robot_named(command.arm))), _again(command, place)
-    skin = skin_for(model, command.skin)
-    setup = ArmSetup(
-        name=command.arm,
-        model=model,
-        skin=skin,
-        units=not command.units.keys,
-        profile=PROFILES["blind"],
-        start=lambda: model.description.q_ready,
-        floor=command.motion.floor,
-        priority=None,
-        yes=command.yes,
-    )
-    command.connection.check(setup)
-    with (
-        command.connection.open(setup) as opened,
-        heard_units(command.units, skin, opened) as units,
-    ):
-        if not isinstance(units, NetworkSkin):
-            raise HardwareError("A calibration hears the units' IMUs over the network: give their keys with --keys.")
-        plans = _plans(opened.arm, model, command)
-        if not command.yes:
-            _ask(sum(plan.duration for plan in plans))
-        against = opened.arm.unfit()
-        if against:
-            raise RobotError(" ".join(against))
-        print("Waiting for the units.", flush=True)
-        UnitWatch(units, _LOOK_S).wait(MonotonicClock(0.01))
-        print(f"All measurements are recorded in {place}. {again}", flush=True)
-        early = _recorded(opened, model, plans, units, skin.network.ids, place, again)
-        report = opened.arm.report()
-        if report:
-            print(report, flush=True)
-    if early:
-        return 1
-    try:
-        return calibrate_recording(model, Sources(place, skin=command.skin), outputs)
-    except BaseException:
-        with suppress(OSError):  # the terminal may be gone
-            print(f"The calibration was not finished. The measurements are in {place}. {again}", flush=True)
-        raise
+@dataclass(frozen=True)
+class CalibrateArm(Generic[A]):
+    """Let an arm make the calibration motion, find the pose of each unit from that, and write the skin file.
+
+    Nothing sees a person meanwhile. The exit code is 1 if a unit was refused or the motion ended early.
+    """
+
+    connection: A
+    units: UnitOptions = field(default_factory=UnitOptions)
+    motion: PlanParams = field(default_factory=PlanParams)
+    skin: OptionalFile = None
+    """Skin file with the units and their assumed links, which are checked; without it, the seven that come with the
+    package are heard, and links are identified."""
+    out: OptionalFile = None
+    """Skin file to write: places and how well they are known. Refused units are as in --skin, or left out."""
+    record: OptionalFile = None
+    """Recording to write; by default a new one beside the skin file."""
+    json: JsonFile = None
+    replace: bool = False
+    """Overwrite existing files."""
+    arm: str = "panda"
+    """panda, fr3, or the folder of an imported arm."""
+    yes: bool = False
+    """Do not ask before the arm moves."""
+
+    def run(self) -> int:
+        """Move the arm, calibrate, and show and write the answer."""
+        if not self.out:
+            raise CalibrationError("--out is missing: name the skin file to write.")
+        if not (self.units.keys or self.connection.brings_units):
+            raise HardwareError("The arm brings no sensor units: give the file of their keys with --keys.")
+        self.units.check()
+        check_files(self.out, self.json, [self.units.keys], self.skin, self.replace, self.record)
+        with numbers_to(self.json) as write:
+            place = self._recording_place(self.out)
+            model, again = RobotModel(self.connection.described(robot_named(self.arm))), self._again(place)
+            if self._moved(model, place, again):
+                return 1
+            try:
+                return calibrate_recorded(model, Recorded(place), self.skin, self.out, write)
+            except BaseException:
+                with suppress(OSError):  # the terminal may be gone
+                    print(f"The calibration was not finished. The measurements are in {place}. {again}", flush=True)
+                raise
+
+    def _recording_place(self, out: Path) -> Path:
+        """Return the recording to write, which is not there yet."""
+        others = [file for file in (out, self.json) if file]
+        beside = (out.with_name(f"{out.stem}-calibration-{n}.mcap") for n in count(1))
+        free = (one for one in beside if not one.exists() and not any(same_file(file, one) for file in others))
+        place = self.record or next(free)
+        check_free("recording", place, replace=False)
+        check_writable("recording", place)
+        return place
+
+    def _again(self, place: Path) -> str:
+        """Say how to calibrate from the recording alone."""
+        files = {"--recording": place, "--arm": self.arm, "--out": self.out, "--skin": self.skin, "--json": self.json}
+        words = [word for option, value in files.items() if value for word in (option, str(value))]
+        words += ["--replace"] if self.replace else []
+        return f"To calibrate from it: pretouch skin calibrate {join(words)}"
+
+    def _moved(self, model: RobotModel, place: Path, again: str) -> bool:
+        """Let the arm make the motion, and record all; return whether that ended early."""
+        skin = skin_for(model, self.skin)
+        setup = ArmSetup(
+            name=self.arm,
+            model=model,
+            skin=skin,
+            units=not self.units.keys,
+            profile=PROFILES["blind"],
+            start=lambda: model.description.q_ready,
+            floor=self.motion.floor_m,
+            priority=None,
+            yes=self.yes,
+        )
+        self.connection.check(setup)
+        with self.connection.open(setup) as opened, heard_units(self.units, skin, opened) as units:
+            if not isinstance(units, NetworkSkin):
+                raise HardwareError(
+                    "The units' IMUs are heard over the network: give the file of their keys with --keys."
+                )
+            plans = _plans(opened.arm, model, self.motion)
+            if not self.yes:
+                _ask(sum(plan.duration for plan in plans))
+            if against := opened.arm.unfit():
+                raise RobotError(" ".join(against))
+            print("Waiting for the units.", flush=True)
+            UnitWatch(units, _LOOK_S).wait(MonotonicClock(0.01))
+            print(f"All measurements are recorded in {place}. {again}", flush=True)
+            early = _recorded(opened, model, plans, units, skin.network.ids, place, again)
+            if report := opened.arm.report():
+                print(report, flush=True)
+        return early
 
 
-def _recording_place(command: "CalibrateArm[Any]", out: Path) -> Path:
-    """Return the recording to write, which is not there yet."""
-    others = [file for file in (out, command.json) if file]
-    beside = (out.with_name(f"{out.stem}-calibration-{n}.mcap") for n in count(1))
-    free = (one for one in beside if not one.exists() and not any(same_file(file, one) for file in others))
-    place = command.record or next(free)
-    check_free("recording", place, replace=False)
-    check_writable("recording", place)
-    return place
-
-
-def _plans(arm: Arm, model: RobotModel, command: "CalibrateArm[Any]") -> list[Plan]:
+def _plans(arm: Arm, model: RobotModel, params: PlanParams) -> list[Plan]:
     """Return the motion, after a motion to its start if the arm is elsewhere, and print the space for both."""
-    plan, params = planned(model, command.motion)
-    print(report_on(model, plan, params), flush=True)
-    q = np.array(arm.read().q)
+    print("The motion is being planned.", flush=True)
+    plan, limits, q = plan_motion(model, params), MotionLimits(model, params), np.array(arm.read().q)
+    print(limits.report(plan), flush=True)
     if np.abs(q - plan.start).max() <= START_RAD / 2:
         return [plan]
     way = approach(model, q, plan, params)
-    room = report_on(model, way, params)
-    ranges = ", ".join(f"{axis} {a:.2f} to {b:.2f}" for axis, a, b in zip("xyz", room.low, room.high, strict=True))
-    print(f"Before that, moving to its start takes {way.duration:.0f} s and needs the space {ranges} m.", flush=True)
+    room = limits.report(way).room
+    print(f"Before that, moving to its start takes {way.duration:.0f} s and needs the space {room} m.", flush=True)
     return [way, plan]
 
 
@@ -204,21 +241,3 @@ def _move(opened: OpenedArm, model: RobotModel, plans: list[Plan], measurements:
     begin = clock.tick()
     while clock.tick() - begin < _AFTER_S:
         measurements.take()
-
-
-def _again(command: "CalibrateArm[Any]", place: Path) -> str:
-    """Say how to calibrate from the recording alone."""
-    words = [
-        "pretouch",
-        "skin",
-        "calibrate",
-        "--recording",
-        str(place),
-        "--arm",
-        command.arm,
-        "--out",
-        str(command.out),
-    ]
-    for option, value in (("--skin", command.skin), ("--json", command.json)):
-        words += [option, str(value)] if value else []
-    return f"To calibrate from it: {join([*words, *(['--replace'] if command.replace else [])])}"

@@ -3,8 +3,8 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pretouch.calibration.mounting import seen_from
-from pretouch.calibration.result import Place
+from pretouch.calibration.findings import seen_from
+from pretouch.calibration.values import Place
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.unit import SensorUnit
 from pretouch.types import FloatArray

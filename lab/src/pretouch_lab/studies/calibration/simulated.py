@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from pretouch.calibration.data import CalibrationData, UnitData
 from pretouch.calibration.motion.follow import PlanCommander, plan_controller
 from pretouch.calibration.motion.plan import Plan
+from pretouch.calibration.values import CalibrationData, UnitData
 from pretouch.errors import ExperimentError
 from pretouch.loop import Cycle, Options, run
 from pretouch.ports import NoUnits

@@ -72,9 +72,9 @@ def skin_of(kind: str, model: RobotModel, skin: Skin, seed: int) -> Skin:
         return skin
     _, places, best = _prepared(model, skin)
     if kind == "suggested":
-        return Skin((*skin.units, *best), model)
+        return Skin((*skin.mounted, *best), model)
     drawn = np.random.default_rng([seed, 53]).choice(len(places), MORE, replace=False)
-    return Skin((*skin.units, *(places[i] for i in drawn)), model)
+    return Skin((*skin.mounted, *(places[i] for i in drawn)), model)
 
 
 def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:

@@ -1,0 +1,84 @@
+"""`pretouch skin calibrate` without an arm to move: from what was recorded, or the motion for one's own driver."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from pretouch.arms import arm_class
+from pretouch.calibration.motion.limits import MotionLimits, PlanParams
+from pretouch.calibration.motion.planner import plan_motion
+from pretouch.cli.calibrate.live import CalibrateArm
+from pretouch.cli.calibrate.recorded import Recorded, calibrate_recorded, check_files
+from pretouch.cli.options import JsonFile, OptionalFile, split_arm
+from pretouch.cli.writing import check_outputs, numbers_to, unwritable_said
+from pretouch.errors import CalibrationError
+from pretouch.robot.description import robot_named
+from pretouch.robot.model import RobotModel
+
+
+@dataclass(frozen=True)
+class Calibrate:
+    """Find the pose of each unit, from its IMU and the joint positions of the moving arm, and write the skin file.
+
+    `pretouch skin calibrate NAME` moves an arm itself: simulated, franka, or one that another distribution adds.
+    The exit code is 1 if a unit was refused.
+    """
+
+    recorded: Recorded = field(default_factory=Recorded)
+    motion: PlanParams = field(default_factory=PlanParams)
+    plan: OptionalFile = None
+    """CSV file to write the motion to, for your own driver (time_s, q1_rad to qn_rad, qd1_rad_s to qdn_rad_s),
+    instead of running it."""
+    skin: OptionalFile = None
+    """Skin file with the units and their assumed links, which are checked; without it, links are identified."""
+    out: OptionalFile = None
+    """Skin file to write: places and how well they are known. Refused units are as in --skin, or left out."""
+    json: JsonFile = None
+    replace: bool = False
+    """Overwrite existing files."""
+    arm: str = "panda"
+    """panda, fr3, or the folder of an imported arm."""
+
+    @staticmethod
+    def of_words(words: Sequence[str]) -> tuple[Any, Sequence[str], str]:
+        """Return the command, the other words, and what is in front of them: the first word may name an arm."""
+        name, others = split_arm(words)
+        if len(others) == len(words):
+            return Calibrate, words, "skin calibrate"
+        return CalibrateArm[arm_class(name)], others, f"skin calibrate {name}"  # type: ignore[misc]
+
+    @staticmethod
+    def of_all() -> Any:
+        """Return the command without an arm."""
+        return Calibrate
+
+    def run(self) -> int:
+        """Calibrate, and show and write the answer; or write the motion."""
+        recording, moved, files = self.recorded.recording, self.motion != PlanParams(), (self.skin, self.out, self.json)
+        if self.plan and recording:
+            raise CalibrationError("--recording and --plan are given: choose one of them.")
+        if not (self.plan or recording):
+            raise CalibrationError(
+                "The source of the calibration is missing: give --recording FILE or --plan FILE, or name an arm, as in"
+                " `pretouch skin calibrate simulated`."
+            )
+        if (recording and moved) or (self.plan and (self.recorded != Recorded() or any(files))):
+            wrong, mode = ("of the motion", "--recording") if recording else ("of a recording, or --out", "--plan")
+            raise CalibrationError(f"Options {wrong} do not go with {mode}: leave them out.")
+        if self.plan:
+            self._write_motion()
+            return 0
+        check_files(self.out, self.json, [recording, self.recorded.joints], self.skin, self.replace)
+        with numbers_to(self.json) as write:
+            return calibrate_recorded(RobotModel(robot_named(self.arm)), self.recorded, self.skin, self.out, write)
+
+    def _write_motion(self) -> None:
+        check_outputs([("motion", self.plan)], [], self.replace)
+        model = RobotModel(robot_named(self.arm))
+        print("The motion is being planned.", flush=True)
+        plan = plan_motion(model, self.motion)
+        if self.plan:
+            with unwritable_said("file", self.plan):  # first, for nobody may read on what is printed
+                plan.save(self.plan)
+        print(MotionLimits(model, self.motion).report(plan))
+        print(f"Motion: {self.plan}. Keep everybody out of the arm's reach while it runs.", flush=True)

@@ -1,0 +1,214 @@
+"""From what was recorded while an arm moved to the answer of a calibration: table, sentences, skin file, numbers."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+
+from pretouch.calibration.calibrate import calibrate, skin_of
+from pretouch.calibration.stamps import instants, retimed
+from pretouch.calibration.values import Calibration, CalibrationData, CalibrationParams, UnitCalibration, UnitData
+from pretouch.cli.detect_words import sentences
+from pretouch.cli.options import OptionalFile
+from pretouch.cli.tables import PlainTable
+from pretouch.cli.writing import check_outputs, plain, same_file
+from pretouch.errors import CalibrationError
+from pretouch.imported_data.log import TABLES
+from pretouch.imported_data.reading import read_joints
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import Skin, load_skin, save_skin
+from pretouch.traces import ImuTrace, JointTrace
+from pretouch.units.skin_reader import SkinTrace, read_skin
+
+_NO_IMU = ImuTrace(np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)))
+_COLUMNS = (
+    "unit",
+    "link",
+    "position\n[mm]",
+    "sigma\n[mm]",
+    "sigma\n[deg]",
+    "clock\n[ms]",
+    "residual\n[m/s^2]",
+    "verdict",
+)
+_TEXT = (0, 1, 7)
+"""Columns that hold no numbers."""
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """From what was recorded while the arm made a calibration motion."""
+
+    recording: OptionalFile = None
+    """Recording of the units, by `pretouch skin monitor --record`, or of a run with real units."""
+    joints: OptionalFile = None
+    """Joint states, if they are not in the recording: a CSV file (time_s,q1_rad,...), an MCAP file or a bag, with any
+    clock."""
+    topic: str = ""
+    """Topic of the joint states in that file, if there are several."""
+
+
+def check_files(
+    out: Path | None, json: Path | None, inputs: Iterable[Path | None], skin: Path | None, replace: bool,
+    record: Path | None = None,
+) -> None:  # fmt: skip
+    """Refuse what could not be written, or is another input or output file too; --out may be --skin."""
+    read = [*inputs, *([] if skin and out and same_file(skin, out) else [skin])]
+    check_outputs([("skin file", out), ("file", json), ("recording", record)], read, replace)
+
+
+def calibrate_recorded(
+    model: RobotModel, recorded: Recorded, skin: Path | None, out: Path | None, write: Callable[[Any], None]
+) -> int:
+    """Calibrate from recordings, show and write the answer; return 1 if a unit was refused, or else 0.
+
+    Args:
+        model: the arm.
+        recorded: what was recorded; `recording` is there.
+        skin: the skin file as it is believed to be.
+        out: skin file to write.
+        write: takes the numbers.
+    """
+    recording = recorded.recording or Path()
+    if recording.suffix.lower() in TABLES:
+        raise CalibrationError(
+            f"{recording} is a table, not a recording of units: give the recording with --recording, and joint states"
+            " with --joints."
+        )
+    believed = load_skin(skin, model) if skin else None
+    measured = read_skin(recording)
+    joints, notes = _joints(model, measured, recorded)
+    if not measured.complete:
+        notes = [f"{recording} is incomplete or damaged: the readable part is used.", *notes]
+    data = CalibrationData(joints, _units(measured, believed))
+    if not data.units:
+        raise CalibrationError(
+            f"{recording} holds no IMU data: record units that have an IMU by `pretouch skin monitor --record`."
+        )
+    others = [unit.id for unit in data.units if believed and unit.id not in believed.ids]
+    if others:
+        notes.append(f"{skin} does not name {', '.join(others)}: their links are found.")
+    answer, ahead, witnesses = aligned(model, data) if recorded.joints else (calibrate(model, data), 0.0, ())
+    if recorded.joints and np.isfinite(ahead):
+        way = "ahead of" if ahead > 0 else "behind"
+        notes.append(f"The clock of {recording} is {abs(ahead):.3f} s {way} that of {recorded.joints}.")
+        if len(witnesses) == 1:
+            notes.append(f"Only {witnesses[0]} shows this: no other unit agrees with it, and all poses depend on it.")
+    notes += [finding.sentence for finding in answer.findings]
+    console = Console(highlight=False)
+    _show(console, answer, notes)
+    write({"arm": model.description.name, "clock_ahead_s": ahead, "notes": notes} | plain(answer))
+    if out:
+        console.print(_written(answer, model, believed, out), soft_wrap=True, markup=False)
+    return int(not all(unit.accepted for unit in answer.units))
+
+
+def _joints(model: RobotModel, measured: SkinTrace, recorded: Recorded) -> tuple[JointTrace, list[str]]:
+    """Return the joint positions in the order of the model, and what is to be said of them."""
+    if recorded.joints:
+        trace, log = read_joints(recorded.joints, model, recorded.topic)
+        return trace, [f"Joint states are {log.sources['q']} of {recorded.joints}.", *sentences(log.notes)]
+    if recorded.topic:
+        raise CalibrationError("--topic needs --joints: it names a topic of that file.")
+    if measured.joints is None:
+        raise CalibrationError(
+            f"{recorded.recording} has no joint states: give the file that has them with --joints, or let"
+            " `pretouch skin calibrate NAME` move the arm."
+        )
+    missing = [name for name in model.joints if name not in measured.joint_names]
+    if missing:
+        raise CalibrationError(
+            f"{recorded.recording} has no states of {', '.join(missing)} (it has {', '.join(measured.joint_names)}):"
+            " give the arm they are of with --arm."
+        )
+    order = [measured.joint_names.index(name) for name in model.joints]
+    return JointTrace(measured.joints.stamp, measured.joints.q[:, order]), []
+
+
+def _units(measured: SkinTrace, believed: Skin | None) -> tuple[UnitData, ...]:
+    """Return the units of the skin in its order, then others that have an IMU; a link that nobody names is None."""
+    links = {unit.id: unit.link for unit in believed.units} if believed else {}
+    heard = {name: unit for name, unit in measured.units.items() if len(unit.imu.stamp)}
+    units = []
+    for name in dict.fromkeys((*links, *heard)):
+        if name not in heard:
+            units.append(UnitData(name, _NO_IMU, links.get(name)))
+            continue
+        unit, c = heard[name], heard[name].counters
+        imu = retimed(unit.imu, instants(c.index, c.count, c.time_us, c.imu_age_us, c.offset, c.bound))
+        units.append(UnitData(name, imu, links.get(name), unit.acceleration_max, unit.angular_velocity_max))
+    return tuple(units)
+
+
+def aligned(model: RobotModel, data: CalibrationData) -> tuple[Calibration, float, tuple[str, ...]]:
+    """Calibrate where joints and units have different clocks.
+
+    All units were recorded by one clock: the offset on which two of them agree is taken for all, or else that of the
+    first which tells one. Returned too are by how much the units' clock is ahead [s], NaN where no unit tells it, and
+    the names of the units that tell it.
+    """
+    ahead, witnesses = _ahead(model, data)
+    late = ahead if np.isfinite(ahead) else 0.0
+    units = tuple(replace(unit, imu=replace(unit.imu, stamp=unit.imu.stamp - late)) for unit in data.units)
+    return calibrate(model, replace(data, units=units)), ahead, witnesses
+
+
+def _ahead(model: RobotModel, data: CalibrationData) -> tuple[float, tuple[str, ...]]:
+    offsets: dict[str, float] = {}
+    for unit in data.units:
+        answer = calibrate(model, replace(data, units=(unit,))).units[0]
+        # one whose clock is far off is refused for that, but by how much is found
+        if answer.place is None or any(finding.refused and finding.kind != "clock" for finding in answer.findings):
+            continue
+        offset = answer.place.clock_offset
+        for name, other in offsets.items():
+            if abs(offset - other) < CalibrationParams().clock_error_s:
+                return offset, (name, unit.id)
+        offsets[unit.id] = offset
+    return next(((offset, (name,)) for name, offset in offsets.items()), (np.nan, ()))
+
+
+def _show(console: Console, answer: Calibration, notes: list[str]) -> None:
+    """Print a table of the units, and what is to be known of the data and of each unit, refused ones first."""
+    styles = ["bold red" if not unit.accepted else "yellow" if unit.findings else "" for unit in answer.units]
+    console.print(PlainTable(_COLUMNS, [_cells(unit) for unit in answer.units], _TEXT, styles), crop=False)
+    for unit in sorted(answer.units, key=lambda unit: unit.accepted):
+        notes = [*notes, *(f"{unit.id}{' is refused' * one.refused}: {one.sentence}" for one in unit.findings)]
+    for sentence in notes:
+        console.print(sentence, soft_wrap=True, markup=False)
+
+
+def _cells(unit: UnitCalibration) -> tuple[str, ...]:
+    place, verdict = unit.place, "good" if unit.accepted else "refused"
+    if place is None:
+        return unit.id, *("-" for _ in _COLUMNS[2:]), verdict
+    return (
+        unit.id,
+        place.link,
+        " ".join(f"{1000 * value:.1f}" for value in place.T_link_sensor[:3, 3]),
+        f"{1000 * place.position_sigma:.2f}",
+        f"{np.rad2deg(place.orientation_sigma):.3f}",
+        f"{1000 * place.clock_offset:.2f}",
+        f"{place.acceleration_residual:.3f}",
+        verdict,
+    )
+
+
+def _written(answer: Calibration, model: RobotModel, believed: Skin | None, out: Path) -> str:
+    """Write the skin file, and say what it holds."""
+    try:
+        skin = skin_of(answer, model, believed)
+    except CalibrationError as error:
+        return f"{error} {out} is not written."
+    if not skin.located:
+        return f"No unit was located well enough, so {out} is not written."
+    save_skin(skin.skin, out)
+    parts = [f"Skin file: {out} has {len(skin.located)} units where they were found."]
+    if skin.kept:
+        parts.append(f"Kept as before, without calibration: {', '.join(skin.kept)}.")
+    if skin.left_out:
+        parts.append(f"Left out: {', '.join(skin.left_out)}.")
+    return " ".join(parts)
