@@ -9,10 +9,9 @@ import pyarrow as pa
 import pytest
 from pyarrow import parquet
 
-from pretouch.cli.detect import mapping_of
 from pretouch.errors import ParameterError, RecordingError
 from pretouch.imported_data.detect import detect
-from pretouch.imported_data.log import Choice
+from pretouch.imported_data.log import Choice, mapping_of
 from pretouch.imported_data.reading import open_log
 from pretouch.imported_data.tables import renamed
 from pretouch.imported_data.torques import observed, torque_recording
@@ -153,11 +152,11 @@ def test_columns_of_other_names_are_mapped_one_by_one_or_by_a_pattern_or_by_a_fi
     columns["t"] = columns.pop("time_s")
     file = write_csv(tmp_path / "a.csv", columns)
     text = "t=time_s, pos_*=q*_rad, vel.*=dq*_rad_s, effort[*]=tau_ext*_Nm"
-    by_text = read_torques(file, Choice(columns=mapping_of(text)))
+    by_text = read_torques(file, Choice(columns=text))
     np.testing.assert_allclose(by_text.tau_ext, short.tau_ext)
     toml = tmp_path / "columns.toml"
     toml.write_text("\n".join(f'"{a}" = "{b}"' for a, b in mapping_of(text)))
-    by_file = read_torques(file, Choice(columns=mapping_of(str(toml))))
+    by_file = read_torques(file, Choice(columns=str(toml)))
     np.testing.assert_allclose(by_file.q, by_text.q)
 
 
@@ -188,7 +187,7 @@ def test_numbers_of_joints_in_a_pattern_begin_at_one_or_zero():
 def test_a_mapping_that_is_wrong_is_one_sentence(tmp_path, short, columns, error, words):
     file = short.external_csv(tmp_path / "a.csv")
     with pytest.raises(error, match=words) as caught:
-        read_torques(file, Choice(columns=mapping_of(columns)))
+        read_torques(file, Choice(columns=columns))
     assert "\n" not in str(caught.value)
 
 
@@ -203,7 +202,7 @@ def test_a_mapping_that_is_wrong_is_one_sentence(tmp_path, short, columns, error
         (lambda c: c.pop("time_s"), {}, "but not time_s: name them so"),
         (lambda c: c.update(time_s=50 * c["time_s"]), {}, "come at 10 Hz: record at 40 Hz or more"),
         (lambda c: c.update(time_s=np.zeros_like(c["time_s"])), {}, "and 1 of them is usable"),
-        (lambda c: None, {"payload_kg": 1.0}, "which --payload does not change"),
+        (lambda c: None, {"payload": 1.0}, "which --payload does not change"),
         (lambda c: None, {"gains": (1.0,) * 7}, "--gains is for motor currents"),
         (lambda c: None, {"torques": "/x"}, "has no topics: leave out"),
     ],

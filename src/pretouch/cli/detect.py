@@ -1,10 +1,10 @@
 """`pretouch detect`: the detectors of some profiles on a recording of any arm, as tables, figure or page, and file."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import tyro
@@ -26,7 +26,6 @@ from pretouch.imported_data.torques import TorqueRecording, torque_recording
 from pretouch.profiles import Profile, at_rate
 from pretouch.profiles import profile as find_profile
 from pretouch.text_table import TextTable
-from pretouch.toml_files import parse_toml
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -41,7 +40,7 @@ _LONGEST = 24
 
 
 @dataclass(frozen=True)
-class Detect:
+class Detect(Choice):
     """Detect contacts in a recording of your own arm: a ROS bag, an MCAP file, a CSV or a Parquet file."""
 
     file: tyro.conf.Positional[Path]
@@ -50,30 +49,11 @@ class Detect:
     profiles: Words = AUTO
     """Profiles to compare, separated by commas. PROFILE:GROUP.FIELD=VALUE is one with another parameter. auto:
     pretouch,paper where there are joint torques, else paper."""
-    sign: Literal["auto", "on-robot", "by-robot"] = "auto"
-    """Whether force and external torques are on the robot (by its environment) or by the robot, as Franka's
-    O_F_ext_hat_K; auto: on the robot, but for torques by the name tau_ext_hat_filtered."""
-    frame: Literal["base", "ee"] = "base"
-    """Frame of the force; ee, the end-effector's, needs joint positions of a Panda or FR3."""
-    zeros: Literal["auto", "missing", "kept"] = "auto"
-    """Whether six zeros mean no estimate; auto: yes with --sign by-robot."""
-    wrench: str = ""
-    """Topic of the force, if there are several."""
-    joints: str = ""
-    """Topic of the joint positions, if there are several."""
-    torques: str = ""
-    """Topic of the joint torques: JointState with efforts, FrankaState or FrankaRobotState; by default the one that the
-    recording has."""
-    arm: str = "auto"
+    arm: str = field(default="auto", kw_only=True)
     """The arm: panda, fr3, or the folder of `pretouch robot import`; auto: by the names of its joints, otherwise a
     Panda."""
-    columns: str = ""
-    """Columns of other names, THEIRS=OURS separated by commas, or FILE.toml: tau_J_0=tau1_Nm; tau_J_*=tau*_Nm is all
-    joints."""
-    gains: Numbers = ()
+    gains: Numbers = field(default=(), kw_only=True)
     """Torque by motor current of each joint, gear included [Nm/A], separated by commas: for current1_A."""
-    payload: float = 0.0
-    """Load at the end-effector that the arm's model does not have [kg]: for measured torques."""
     rate: float = 0.0
     """Rate of the detector [Hz]; by default the profile's own, 100."""
     out: OptionalFile = None
@@ -111,48 +91,22 @@ class Detect:
 
     def _read(self, profiles: Sequence[Profile] | None) -> tuple[ForceRecording | TorqueRecording, list[str]]:
         """Return the torques or the force to detect on, and sentences on what is not used."""
-        choice = Choice(
-            self.wrench, self.joints, self.sign, self.frame, self.zeros, self.arm, self.torques,
-            mapping_of(self.columns), self.gains, self.payload,
-        )  # fmt: skip
-        file, unused = open_log(self.file, choice), list[str]()
-        if _by_torques(file, choice, profiles):
+        file, unused = open_log(self.file, self), list[str]()
+        if _by_torques(file, self, profiles):
             try:
-                return torque_recording(file.torques(), choice), unused
+                return torque_recording(file.torques(), self), unused
             except RecordingError as error:
                 if profiles is not None or "force" not in file.kinds:
                     raise
                 unused.append(f"Joint torques are not used: {error}")
-        return read_force(file, choice), unused
-
-
-def mapping_of(text: str) -> tuple[tuple[str, str], ...]:
-    """Read a mapping: pairs THEIRS=OURS separated by commas, or the name of a TOML file of such pairs.
-
-    ParameterError for what is neither.
-    """
-    if text.endswith(".toml"):
-        try:
-            pairs = tuple(parse_toml(Path(text).read_bytes()).items())
-        except (OSError, ValueError) as error:
-            raise ParameterError(f"The columns {text} cannot be read ({error}): give a file of TOML.") from error
-    else:
-        parts = (part.rpartition("=") for part in text.split(",") if part.strip())
-        pairs = tuple((theirs.strip(), ours.strip()) for theirs, _, ours in parts)
-    for theirs, ours in pairs:
-        if not (theirs and ours and isinstance(ours, str)):
-            raise ParameterError(
-                f"--columns has {ours!r} for {theirs!r}: write THEIRS=OURS, as tau_J_0=tau1_Nm, or FILE.toml of lines"
-                ' "THEIRS" = "OURS".'
-            )
-    return pairs
+        return read_force(file, self), unused
 
 
 def _by_torques(file: LogFile, choice: Choice, profiles: Sequence[Profile] | None) -> bool:
     """Whether the detectors run on joint torques: where there are some, unless only thresholds of a force are asked."""
     if choice.frame == "ee":
         return False
-    if choice.torques or choice.gains or choice.payload_kg:
+    if choice.torques or choice.gains or choice.payload:
         return True
     force, torques = "force" in file.kinds, bool(set(TORQUES) & file.kinds)
     if choice.wrench or (force and profiles is not None and not any(p.detect.by_torques for p in profiles)):

@@ -8,15 +8,13 @@ from typing import Literal, Protocol
 
 import numpy as np
 
-from pretouch.errors import RecordingError
+from pretouch.errors import ParameterError, RecordingError
 from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
+from pretouch.toml_files import parse_toml
 from pretouch.types import FloatArray, IntArray
 from pretouch.values import value
 
-Sign = Literal["auto", "on-robot", "by-robot"]
-Frame = Literal["base", "ee"]
-Zeros = Literal["auto", "missing", "kept"]
 TORQUES = ("tau_ext", "tau", "current")
 """Kinds of joint torques; of those that a log holds the first is used."""
 BAGS = (".mcap", ".db3", ".bag")
@@ -29,31 +27,55 @@ _OUT_OF_RANGE_RAD = 0.5
 _NUMBERED = re.compile(r"(.*?)(\d{1,2})(\D*)")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Choice:
-    """What a log does not say of itself."""
+    """What a log does not say of itself: options of `pretouch detect`."""
 
+    sign: Literal["auto", "on-robot", "by-robot"] = "auto"
+    """Whether force and external torques are on the robot (by its environment) or by the robot, as Franka's
+    O_F_ext_hat_K; auto: on the robot, but for torques by the name tau_ext_hat_filtered."""
+    frame: Literal["base", "ee"] = "base"
+    """Frame of the force; ee, the end-effector's, needs joint positions of a Panda or FR3."""
+    zeros: Literal["auto", "missing", "kept"] = "auto"
+    """Whether six zeros mean no estimate; auto: yes with --sign by-robot."""
     wrench: str = ""
-    """Topic of the force; needed if there are several."""
+    """Topic of the force, if there are several."""
     joints: str = ""
-    """Topic of the joint positions; needed if there are several."""
-    sign: Sign = "auto"
-    """Whether forces and external torques are on the robot by the environment, as ours, or by the robot, as the
-    vendor's O_F_ext_hat_K; auto: on the robot, but for torques by the name that Franka gives them."""
-    frame: Frame = "base"
-    """Frame the force is given in: the arm's base or its end-effector."""
-    zeros: Zeros = "auto"
-    """Whether a wrench of zeros only means that there is no estimate; auto: where the force is by the robot."""
+    """Topic of the joint positions, if there are several."""
+    torques: str = ""
+    """Topic of the joint torques: JointState with efforts, FrankaState or FrankaRobotState; by default the one that the
+    recording has."""
     arm: str | RobotModel = "auto"
     """The arm, or its name or the folder it was imported to; auto: by the names of its joints, otherwise a Panda."""
-    torques: str = ""
-    """Topic of the joint torques; needed if it is not clear."""
-    columns: tuple[tuple[str, str], ...] = ()
-    """Columns of other names: theirs and ours. `*` stands for the number of a joint."""
+    columns: str = ""
+    """Columns of other names, THEIRS=OURS separated by commas, or FILE.toml: tau_J_0=tau1_Nm; tau_J_*=tau*_Nm is all
+    joints."""
     gains: tuple[float, ...] = ()
     """Torque of each joint by its motor's current [Nm/A]."""
-    payload_kg: float = 0.0
-    """Load at the end-effector that measured torques carry and the model does not [kg]."""
+    payload: float = 0.0
+    """Load at the end-effector that the arm's model does not have [kg]: for measured torques."""
+
+
+def mapping_of(text: str) -> tuple[tuple[str, str], ...]:
+    """Read a mapping: pairs THEIRS=OURS separated by commas, or the name of a TOML file of such pairs.
+
+    ParameterError for what is neither.
+    """
+    if text.endswith(".toml"):
+        try:
+            pairs = tuple(parse_toml(Path(text).read_bytes()).items())
+        except (OSError, ValueError) as error:
+            raise ParameterError(f"The columns {text} cannot be read ({error}): give a file of TOML.") from error
+    else:
+        parts = (part.rpartition("=") for part in text.split(",") if part.strip())
+        pairs = tuple((theirs.strip(), ours.strip()) for theirs, _, ours in parts)
+    for theirs, ours in pairs:
+        if not (theirs and ours and isinstance(ours, str)):
+            raise ParameterError(
+                f"--columns has {ours!r} for {theirs!r}: write THEIRS=OURS, as tau_J_0=tau1_Nm, or FILE.toml of lines"
+                ' "THEIRS" = "OURS".'
+            )
+    return pairs
 
 
 @value

@@ -21,6 +21,7 @@ from pretouch.imported_data.log import (
     check_steps_back,
     joint_places,
     listed,
+    mapping_of,
 )
 from pretouch.types import FloatArray, IntArray
 from pretouch.values import value
@@ -85,7 +86,9 @@ class Table:
             raise RecordingError(f"{place} is a table and has no topics: leave out the option that names one.")
         self._place, self._choice = place, choice
         self._parquet = _parquet(place) if place.suffix.lower() == PARQUET else None
-        self._names = renamed(place, _header(place) if self._parquet is None else list(self._parquet), choice.columns)
+        self._names = renamed(
+            place, _header(place) if self._parquet is None else list(self._parquet), mapping_of(choice.columns)
+        )
         self._columns = _columns([name.lower() for name in self._names])
         self.kinds = frozenset(column.kind for column in self._columns.values())
 

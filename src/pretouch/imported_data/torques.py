@@ -68,9 +68,9 @@ def torque_recording(log: Log, choice: Choice) -> TorqueRecording:
     notes += _check_velocities(log.place, derived, qd) if "dq" in log.arrays else [Note("derived_velocities", {})]
     by_robot = choice.sign == "by-robot" or (choice.sign == "auto" and log.by_robot)
     torque = (-1.0 if by_robot else 1.0) * log.arrays[kind] * (np.array(choice.gains) if kind == "current" else 1.0)
-    _check_torques(log.place, q, qd, torque, model, kind != "tau_ext", choice.payload_kg)
+    _check_torques(log.place, q, qd, torque, model, kind != "tau_ext", choice.payload)
     if kind != "tau_ext":
-        torque = observed(model, time, q, qd, torque, SequentialParams().observer_gain_1_s, choice.payload_kg)
+        torque = observed(model, time, q, qd, torque, SequentialParams().observer_gain_1_s, choice.payload)
     if "dq_d" not in log.arrays:
         notes.append(Note("no_commands", {}))
     commanded = log.arrays.get("dq_d", smoothed(time, qd))
@@ -88,7 +88,7 @@ def _check_options(place: Path, kind: str, n: int, choice: Choice) -> None:
         )
     if choice.gains and kind != "current":
         raise RecordingError(f"{place} has torques, and --gains is for motor currents (current1_A ...): leave it out.")
-    if choice.payload_kg and kind == "tau_ext":
+    if choice.payload and kind == "tau_ext":
         raise RecordingError(f"{place} has external torques, which --payload does not change: tell the robot its load.")
 
 
