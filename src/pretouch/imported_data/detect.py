@@ -240,7 +240,7 @@ def _judged(r: TorqueRecording, profile: Profile, time: FloatArray, newest: IntA
         detections.append(replace(detection, significant=None))
     columns = {name: np.array([getattr(d, name) for d in detections])
                for name in ("residual", "evidence", "detectable_n", "armed")}  # fmt: skip
-    return TorqueCourse(name=profile.name, time=time, tau_ext=r.tau_ext[newest], contacts=tuple(contacts), **columns)
+    return TorqueCourse(time=time, tau_ext=r.tau_ext[newest], contacts=tuple(contacts), **columns)
 
 
 def _sample(r: TorqueRecording, i: int, time: float, window: Window, profile: Profile) -> Sample:

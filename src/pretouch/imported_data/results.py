@@ -78,8 +78,6 @@ class DetectorResult:
 class TorqueCourse:
     """What a detector made of torques in S cycles."""
 
-    name: str
-    """The profile."""
     time: FloatArray
     """(S,) since the first sample [s]."""
     tau_ext: FloatArray
