@@ -143,3 +143,17 @@ def test_durations_however_odd_are_counted_and_the_largest_is_told_as_it_is():
         durations.add(value)
     assert (durations.count, durations.spread().max) == (8, 1e6)
     assert durations.spread().p999 <= 1e6
+
+
+def test_durations_take_no_more_memory_however_many_and_odd_they_are():
+    durations = Durations()
+    places = len(durations._counts)
+    durations.add(3e-4)
+    found = durations.spread()
+    np.testing.assert_allclose([found.median, found.p99, found.p999, found.max], 3e-4, rtol=0.005)
+    for value in (0.0, -1e-9, 1e-12, 1e-7, 1.0, 1e3, 1e6):
+        durations.add(value)
+    assert len(durations._counts) == places
+    assert sum(durations._counts) == durations.count == 8
+    assert durations.spread().max == 1e6
+    assert durations.spread().p999 <= 1e6

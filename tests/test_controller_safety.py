@@ -92,6 +92,13 @@ def test_one_fault_that_lasts(arm: Arm, fault: str, value: float):
     assert arm.step(resume=True).mode is Mode.TRACK
 
 
+@pytest.mark.parametrize("value", [5.0, -20.0, 999.0])
+def test_no_reported_velocity_makes_a_command_no_arm_can_follow(arm: Arm, value: float):
+    arm.run(60)
+    step, _ = arm.controller.step(arm.state, spoiled(arm.inputs(), "qd_commanded", value))
+    assert np.all(np.abs(step.command) <= arm.limits.qd_max + arm.limits.qdd_max * DT)
+
+
 @pytest.mark.parametrize("goal", [(0.0, 0.0, 3.0), (0.0, 0.0, 0.4), (0.3, 1.5, 0.3)])
 @pytest.mark.parametrize("cycles", [1, 2, 4])
 def test_reports_that_come_late_cost_no_limit(panda_model: RobotModel, cycles: int, goal: tuple[float, float, float]):
@@ -142,6 +149,16 @@ def test_a_unit_that_only_reports_failures_is_a_silent_one(arm: Arm, status: Ran
     np.testing.assert_allclose([s.speed_scale for s in again], np.arange(1, 5) / 200)
 
 
+def test_a_late_step_brakes_and_the_next_goes_on(arm: Arm):
+    arm.run(60)
+    before, arm.time = np.linalg.norm(arm.qd), arm.time + 0.06
+    late = arm.step()
+    assert late.mode is Mode.HOLD
+    assert "0.070 s ago, for this machine is busy" in late.reason
+    assert np.linalg.norm(arm.qd) < before
+    assert arm.step().mode is Mode.TRACK
+
+
 def test_a_blocked_arm_brakes_and_tries_again_at_each_step(panda_model: RobotModel, paper_skin: Skin):
     x, y, z = hand(panda_model)
     arm = Arm(panda_model, paper_skin, HARD, Circle((x, y - 0.25, z)))  # it begins at the hand
@@ -177,6 +194,17 @@ def test_an_arm_that_starts_beyond_a_joint_limit_never_goes_further(arm: Arm, jo
         if sign * (before - (beyond - sign * 0.05)) > 0:
             assert sign * arm.qd[joint] <= 1e-12
     assert sign * (arm.q[joint] - beyond) <= 1e-12
+
+
+@pytest.mark.parametrize("factor", [0.9, 1.5])
+def test_an_arm_that_is_handed_over_moving_brakes_within_its_limits(arm: Arm, factor: float):
+    arm.qd = factor * arm.limits.qd_max * np.array([1, -1, 1, 1, -1, 1, -1])
+    arm.state = arm.controller.init(arm.robot())
+    for _ in range(5):  # the window is filling, so the arm holds
+        before = np.abs(arm.qd)
+        arm.step()
+        assert np.all(np.abs(arm.qd) <= before)
+    assert np.all(np.abs(arm.qd) < factor * arm.limits.qd_max)
 
 
 @pytest.mark.parametrize("goal", [(3.0, 0.0, 0.5), (0.0, 0.0, 3.0), (0.0, 0.0, 0.4), (0.4, 2.0, 0.1)])

@@ -94,6 +94,14 @@ def test_it_yields_as_long_as_it_is_pushed_stands_and_goes_on_gently(arm: Pushed
     assert np.linalg.norm(begins.desired_velocity) <= 1.0 * DT + 1e-9, "the speed along the path grows from 0"
 
 
+def test_a_hand_that_keeps_pushing_keeps_it_away(arm: Pushed):
+    arm.push((0.0, -20.0, 0.0), cycles=100)
+    aside = arm.ee()[1]
+    steps = arm.push((0.0, -8.0, 0.0), cycles=500)
+    assert modes(steps) == {Mode.REACT}
+    assert arm.ee()[1] <= aside
+
+
 @pytest.mark.parametrize("force", [(0.0, -20.0, 0.0), (-20.0, 0.0, 0.0), (0.0, 0.0, 30.0)])
 def test_a_push_that_is_held_moves_it_no_farther_than_its_reach_and_back_it_still_yields(arm: Pushed, force):
     start, reach = np.array(placed(arm.model.body, arm.model.kinematics(arm.q))[1:3]), OURS.react.reach_m
@@ -116,6 +124,15 @@ def test_another_contact_may_move_it_as_far_again(arm: Pushed):
     first = arm.ee()[1]
     arm.push((0.0, -20.0, 0.0), cycles=500)
     assert arm.ee()[1] < first - 0.2
+
+
+@pytest.mark.parametrize("link", ["panda_link4", "panda_link6", "panda_hand"])
+@pytest.mark.parametrize("force", [(0.0, -30.0, 0.0), (0.0, 30.0, 0.0), (0.0, 0.0, 30.0)])
+def test_the_link_that_is_pushed_goes_with_the_push(arm: Pushed, link: str, force):
+    arm.push(force, link, cycles=20)
+    before = arm.point(link)
+    arm.push(force, link, cycles=20)
+    assert (arm.point(link) - before) @ np.array(force) > 0
 
 
 def test_caught_between_two_things_it_opens_the_way_it_came_and_holds_until_resumed(arm: Pushed):
