@@ -25,8 +25,8 @@ from tests.ports import loopback
 from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.sim.scene import SceneSpec
-from pretouch_fci.arm import ArmSetup, ServedArm
-from pretouch_fci.server import FciServer, ServeOptions
+from pretouch_fci.arm import ServedArm, ServedSetup
+from pretouch_fci.server import FciOptions, FciServer
 from pretouch_fci.wire import CONNECT, ERRORS, HEADER, PROTOCOLS, Protocol, RobotKind
 
 _VENDOR = Path(__file__).with_name("vendor_client.py")
@@ -44,7 +44,7 @@ def arm_of(kind: RobotKind = "panda", **setup: Any) -> ServedArm:
     """An arm that stands at its usual posture, in an empty scene."""
     model = RobotModel(robot_named(kind))
     usual = {"model": model, "kind": kind, "q": model.description.q_ready.copy(), "scene": SceneSpec()}
-    return ServedArm(ArmSetup(**usual | setup))
+    return ServedArm(ServedSetup(**usual | setup))
 
 
 @pytest.fixture
@@ -56,7 +56,7 @@ def host():
 class Served:
     """A server in a thread."""
 
-    def __init__(self, arm: ServedArm, options: ServeOptions) -> None:
+    def __init__(self, arm: ServedArm, options: FciOptions) -> None:
         self.arm, self.host, self.said, self._ending = arm, options.host, list[str](), threading.Event()
         self.truth: list[list[float]] = []
         """Time [s], true force [N] and joint positions [rad] of each millisecond of the plant."""
@@ -93,7 +93,7 @@ def serve(host):
     with ExitStack() as running:
 
         def start(kind: RobotKind = "panda", setup: dict[str, Any] | None = None, **options: Any) -> Served:
-            given = ServeOptions(**{"host": host, "lockstep": True, "patience": 5.0, **options})
+            given = FciOptions(**{"host": host, "lockstep": True, "patience": 5.0, **options})
             served = Served(arm_of(kind, **(setup or {})), given)
             running.callback(served.stop)
             return served

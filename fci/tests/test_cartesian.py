@@ -9,11 +9,11 @@ from fci.tests.conftest import errors_of, smooth
 from pretouch.control.commander import rotation_about
 from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
-from pretouch_fci.cartesian import CARTESIAN_LIMITS, Body, CartesianVelocity
+from pretouch_fci.cartesian import CARTESIAN_LIMITS, ArmBody, CartesianVelocity
 from pretouch_fci.frames import frames_of
 from pretouch_fci.limits import motion_limits
 from pretouch_fci.motion import Motion, Setpoint
-from pretouch_fci.wire import Controller
+from pretouch_fci.wire import ControllerMode
 
 _MS = 1e-3
 _POSE, _VELOCITY = 2, 3
@@ -140,8 +140,8 @@ def test_each_limit_has_its_own_name(kind, part, axis):
 @pytest.mark.parametrize("kind", ["panda", "fr3"])
 def test_limits_of_joints_that_follow_have_names_of_their_own(kind):
     model = RobotModel(robot_named(kind))
-    body = Body(model, frames_of(model), CARTESIAN_LIMITS[kind])
-    motion = Motion(motion_limits(model, kind), Controller.JOINT_IMPEDANCE, CartesianVelocity(body))
+    body = ArmBody(model, frames_of(model), CARTESIAN_LIMITS[kind])
+    motion = Motion(motion_limits(model, kind), ControllerMode.JOINT_IMPEDANCE, CartesianVelocity(body))
     q, speed, acceleration, ending = model.description.q_ready.copy(), 0.0, 0.0, None
     while ending is None:  # until the arm is stretched
         acceleration = min(acceleration + 500.0 * _MS, 2.0) if speed < 0.4 else max(acceleration - 500.0 * _MS, 0.0)

@@ -18,7 +18,7 @@ from pretouch.units.keys import Keys, save_keys
 from pretouch.units.receiver import SkinReceiver
 from pretouch_fci.motion import Setpoint
 from pretouch_fci.typed import TypedPushes
-from pretouch_fci.wire import PANDA, Controller, Generator, RobotMode
+from pretouch_fci.wire import PANDA, ControllerMode, Generator, RobotMode
 
 
 def _served(*arguments: str) -> subprocess.Popen[str]:
@@ -152,7 +152,7 @@ def test_a_program_types_in_place_of_a_person_and_ends_the_server_by_ending_what
 
 
 def test_all_that_was_typed_before_the_end_of_a_pipe_is_done_once_the_arm_has_come_to_rest(arm, pipe, capsys):
-    arm.begin(Generator.JOINT_VELOCITY, Controller.JOINT_IMPEDANCE)
+    arm.begin(Generator.JOINT_VELOCITY, ControllerMode.JOINT_IMPEDANCE)
     arm.step(Setpoint(np.zeros(7)))
     arm.step(Setpoint(np.zeros(7), finished=True))
     typed = TypedPushes(arm, pipe[0], program=True)

@@ -13,7 +13,7 @@ from fci.tests.conftest import Client, arm_of
 
 from pretouch.errors import ParameterError, RobotError
 from pretouch_fci.gripper import HOMING, Course, Gripper, GripperObject, Outcome, grasp_of, move_of, object_of
-from pretouch_fci.server import FciServer, ServeOptions
+from pretouch_fci.server import FciOptions, FciServer
 
 _CUBE = GripperObject(0.04, 0.5)
 _CONNECT, _HOMING, _GRASP, _MOVE, _STOP = range(5)
@@ -231,8 +231,8 @@ def test_a_second_client_is_turned_away_and_the_next_finds_what_the_first_left(s
 def test_without_its_port_the_arm_is_not_served_either(host):
     arm = arm_of()
     with socket.create_server((host, 1338)), pytest.raises(RobotError, match=f"Listening on {host}:1338 failed"):
-        FciServer(arm, ServeOptions(host))
-    FciServer(arm, ServeOptions(host)).close()
+        FciServer(arm, FciOptions(host))
+    FciServer(arm, FciOptions(host)).close()
 
 
 @pytest.mark.parametrize("message", [struct.pack("<HIIHH", _CONNECT, 1, 14, 3, 9), b"GET / HTTP/1.1\r\n\r\n"])

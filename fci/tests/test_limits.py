@@ -12,14 +12,14 @@ from pretouch.errors import ParameterError, RobotModelError
 from pretouch.robot.description import panda, robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.sim.tcp_push import TcpPush
-from pretouch_fci.collision import CollisionBehavior, Contacts
+from pretouch_fci.collision import CollisionThresholds, Contacts
 from pretouch_fci.frames import flange_of, urdf_of
 from pretouch_fci.limits import motion_limits
 from pretouch_fci.motion import Setpoint
 from pretouch_fci.pushes import push_of
 from pretouch_fci.server import drop_of
 from pretouch_fci.state import StateDatagram, by_robot_at
-from pretouch_fci.wire import PANDA, Controller, Generator, RobotMode
+from pretouch_fci.wire import PANDA, ControllerMode, Generator, RobotMode
 
 _MODELS = {kind: RobotModel(robot_named(kind)) for kind in ("panda", "fr3")}
 _LIMITS = {kind: motion_limits(model, kind) for kind, model in _MODELS.items()}
@@ -67,7 +67,7 @@ def test_the_fr3s_speed_limits_are_those_the_vendor_publishes():
 
 def test_a_motion_that_breaks_off_ends_in_braking_at_the_acceleration_limit():
     arm = arm_of()
-    arm.begin(Generator.JOINT_VELOCITY, Controller.JOINT_IMPEDANCE)
+    arm.begin(Generator.JOINT_VELOCITY, ControllerMode.JOINT_IMPEDANCE)
     for k in range(1, 501):
         assert arm.step(Setpoint(2e-3 * k * np.eye(7)[6])) is None
     assert arm.step(Setpoint(np.full(7, np.nan))) is not None
@@ -85,7 +85,7 @@ def test_thresholds_are_those_of_what_the_arm_does():
     # lower and upper torque, accelerating then steady; then forces alike
     body = np.concatenate([np.repeat([10.0, 20.0, 1.0, 2.0], 7), np.repeat([30.0, 60.0, 3.0, 6.0], 6)])
     contacts = Contacts()
-    contacts.behavior = CollisionBehavior.of(body)
+    contacts.behavior = CollisionThresholds.of(body)
     torque, force = 1.5 * np.eye(7)[2], -4.0 * np.eye(6)[0]
     assert contacts.update(torque, force, _ZERO) == ()
     assert contacts.joint_contact.tolist() == [False, False, True, False, False, False, False]

@@ -9,8 +9,8 @@ import pytest
 from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch_fci.limits import motion_limits
-from pretouch_fci.motion import FIRST_WITHIN, Ending, Setpoint, TargetMotion
-from pretouch_fci.wire import Controller
+from pretouch_fci.motion import FIRST_WITHIN, MotionEnding, Setpoint, TargetMotion
+from pretouch_fci.wire import ControllerMode
 
 _MODEL = RobotModel(robot_named("fr3"))
 _LIMITS = motion_limits(_MODEL, "fr3")
@@ -22,7 +22,7 @@ class Going:
     """An arm that does what it is told."""
 
     def __init__(self, fastest: float) -> None:
-        self.motion = TargetMotion(_LIMITS, Controller.JOINT_IMPEDANCE, np.full(7, fastest))
+        self.motion = TargetMotion(_LIMITS, ControllerMode.JOINT_IMPEDANCE, np.full(7, fastest))
         self.q, self.courses = _READY.copy(), [_READY.copy()]
 
     def go(self, milliseconds: int, target: np.ndarray) -> None:
@@ -64,14 +64,14 @@ def test_it_ends_by_its_last_command_or_if_no_first_one_comes():
     going = Going(0.5)
     going.go(300, _READY + 0.5)
     assert np.min(going.motion.qd) > 0.4
-    assert going.motion.follow(going.q, Setpoint(np.zeros(7), finished=True)) == Ending("success")
-    assert going.motion.follow(going.q, Setpoint(np.full(7, np.nan))) == Ending(
+    assert going.motion.follow(going.q, Setpoint(np.zeros(7), finished=True)) == MotionEnding("success")
+    assert going.motion.follow(going.q, Setpoint(np.full(7, np.nan))) == MotionEnding(
         "input error", ("joint_motion_generator_position_limits_violation",)
     )
     silent = Going(0.5).motion
     endings = [silent.follow(_READY, None) for _ in range(FIRST_WITHIN)]
     assert endings[:-1] == [None] * (FIRST_WITHIN - 1)
-    assert endings[-1] == Ending("reflex", ("communication_constraints_violation",))
+    assert endings[-1] == MotionEnding("reflex", ("communication_constraints_violation",))
 
 
 def _asked(client: Any, generator: int, fastest: float) -> str:

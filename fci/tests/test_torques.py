@@ -13,8 +13,8 @@ from pretouch_fci.arm import ServedArm
 from pretouch_fci.controllers import _critical
 from pretouch_fci.frames import Inertial
 from pretouch_fci.gripper import GripperObject
-from pretouch_fci.motion import Ending, Setpoint
-from pretouch_fci.wire import Controller, Generator, RobotMode
+from pretouch_fci.motion import MotionEnding, Setpoint
+from pretouch_fci.wire import ControllerMode, Generator, RobotMode
 
 _ZERO = np.zeros(7)
 _JOINT_7 = np.eye(7)[6]
@@ -24,11 +24,11 @@ _TORQUE_ONLY = {"panda": Generator.JOINT_VELOCITY, "fr3": Generator.NONE}
 def _tried(arm: ServedArm | None = None) -> ServedArm:
     """An arm that torques act on."""
     arm = arm or arm_of()
-    arm.begin(Generator.JOINT_VELOCITY, Controller.EXTERNAL)
+    arm.begin(Generator.JOINT_VELOCITY, ControllerMode.EXTERNAL)
     return arm
 
 
-def _commanded(arm: ServedArm, *torques: np.ndarray) -> Ending | None:
+def _commanded(arm: ServedArm, *torques: np.ndarray) -> MotionEnding | None:
     """Command torques, one a millisecond, until the motion ends."""
     endings = (arm.step(Setpoint(_ZERO, torques=tau)) for tau in torques)
     return next((ending for ending in endings if ending is not None), None)
@@ -64,7 +64,7 @@ def test_torques_alone_move_the_joints_and_after_them_the_arm_brakes_and_stays()
     speed, there = arm.report.qd[6], arm.report.q[6]
     np.testing.assert_array_equal(arm.report.q_commanded, asked)
     assert there > asked[6] + 0.05
-    assert arm.step(Setpoint(_ZERO, finished=True)) == Ending("success")
+    assert arm.step(Setpoint(_ZERO, finished=True)) == MotionEnding("success")
     _settled(arm)
     # half a v^2 / a at 20 rad/s^2, and what the impedance swings
     assert arm.report.q[6] == pytest.approx(there + 0.5 * speed**2 / 20.0, abs=0.02)
@@ -74,17 +74,17 @@ def test_torques_alone_move_the_joints_and_after_them_the_arm_brakes_and_stays()
 
 def test_torques_that_jump_or_are_too_large_are_refused():
     ramp = [k * _JOINT_7 for k in range(1, 12)]
-    assert _commanded(_tried(), *ramp, 13.2 * _JOINT_7) == Ending("reflex", (
+    assert _commanded(_tried(), *ramp, 13.2 * _JOINT_7) == MotionEnding("reflex", (
         "controller_torque_discontinuity", "tau_j_range_violation",
     ))  # fmt: skip
-    assert _commanded(_tried(), 2.0 * _JOINT_7) == Ending("reflex", ("controller_torque_discontinuity",))
-    assert _commanded(_tried(), *ramp, 12.001 * _JOINT_7) == Ending("reflex", ("tau_j_range_violation",))
-    assert _commanded(_tried(), np.full(7, np.nan)) == Ending("input error", ("controller_torque_discontinuity",))
+    assert _commanded(_tried(), 2.0 * _JOINT_7) == MotionEnding("reflex", ("controller_torque_discontinuity",))
+    assert _commanded(_tried(), *ramp, 12.001 * _JOINT_7) == MotionEnding("reflex", ("tau_j_range_violation",))
+    assert _commanded(_tried(), np.full(7, np.nan)) == MotionEnding("input error", ("controller_torque_discontinuity",))
     assert _commanded(_tried(), np.full(7, 1e308)).errors[0] == "controller_torque_discontinuity"
 
 
 def test_torques_that_drive_a_joint_too_fast_or_too_far_end_in_a_reflex():
-    assert _commanded(_tried(), *[k * _JOINT_7 for k in range(1, 6)], *[6.0 * _JOINT_7] * 400) == Ending(
+    assert _commanded(_tried(), *[k * _JOINT_7 for k in range(1, 6)], *[6.0 * _JOINT_7] * 400) == MotionEnding(
         "reflex", ("joint_velocity_violation",)
     )
     model = arm_of().model
@@ -92,7 +92,7 @@ def test_torques_that_drive_a_joint_too_fast_or_too_far_end_in_a_reflex():
     ready[6] = model.q_max[6] - 0.02
     arm = _tried(arm_of(q=ready))
     ending = _commanded(arm, *[0.9 * _JOINT_7] * 2000)
-    assert ending == Ending("reflex", ("joint_position_limits_violation",))
+    assert ending == MotionEnding("reflex", ("joint_position_limits_violation",))
     arm.recover()
     _settled(arm)
     assert _commanded(_tried(arm), *[max(-0.9, -0.1 * k) * _JOINT_7 for k in range(200)]) is None, "it may go back"
@@ -105,14 +105,14 @@ def test_a_lost_command_leaves_the_torques_as_they_are():
     for _ in range(19):
         assert arm.step(None) is None
         np.testing.assert_array_equal(arm.torques.desired, 0.9 * _JOINT_7)
-    assert arm.step(None) == Ending("reflex", ("communication_constraints_violation",))
+    assert arm.step(None) == MotionEnding("reflex", ("communication_constraints_violation",))
 
 
 def test_each_protocol_serves_torques_alone_and_beside_a_motion(serve, raw, kind):
     client = raw(serve(kind))
     for generator in (_TORQUE_ONLY[kind], Generator.JOINT_POSITION):
-        state = client.begun(generator, Controller.EXTERNAL)
-        assert (state["controller_mode"], state["motion_generator_mode"]) == (Controller.EXTERNAL, generator + 1)
+        state = client.begun(generator, ControllerMode.EXTERNAL)
+        assert (state["controller_mode"], state["motion_generator_mode"]) == (ControllerMode.EXTERNAL, generator + 1)
         still = state["q_d"] if generator == Generator.JOINT_POSITION else 0.0
         for k in range(1, 50):
             state = client.turn(state, still, tau_J_d=0.01 * k * _JOINT_7)
@@ -129,7 +129,7 @@ def test_a_push_moves_the_end_effector_as_the_cartesian_stiffness_says(frame):
         R = arm.body.end_effector(arm.report.q)[0][:3, :3]
         arm.frames.EE_T_K = np.block([[R.T, np.zeros((3, 1))], [np.zeros((1, 3)), np.eye(1)]])
     arm.cartesian_stiffness = soft
-    arm.begin(Generator.JOINT_VELOCITY, Controller.CARTESIAN_IMPEDANCE)
+    arm.begin(Generator.JOINT_VELOCITY, ControllerMode.CARTESIAN_IMPEDANCE)
     _still(arm, 450)
     before = arm.body.end_effector(arm.report.q)[0][:3, 3]
     _still(arm, 2000)
@@ -142,7 +142,7 @@ def test_a_push_moves_the_end_effector_as_the_cartesian_stiffness_says(frame):
 def test_a_push_moves_the_joints_as_their_stiffness_says():
     arm = arm_of(pushes=(TcpPush(0.5, (0.0, 12.0, 0.0), 2.0),))
     arm.plant.set_stiffness(np.full(7, 200.0))
-    arm.begin(Generator.JOINT_VELOCITY, Controller.JOINT_IMPEDANCE)
+    arm.begin(Generator.JOINT_VELOCITY, ControllerMode.JOINT_IMPEDANCE)
     _still(arm, 450)
     before = arm.report.q
     _still(arm, 2000)
@@ -256,18 +256,18 @@ def test_impedances_within_the_vendors_limits_act(serve, raw):
 
 def test_an_arm_that_comes_into_itself_stops():
     arm = arm_of()
-    arm.begin(Generator.JOINT_POSITION, Controller.JOINT_IMPEDANCE)
+    arm.begin(Generator.JOINT_POSITION, ControllerMode.JOINT_IMPEDANCE)
     begun, folded = arm.report.q_commanded.copy(), np.array([0.0, 1.2, 0.0, -3.0, 0.0, 0.1, 0.785])
     k, ending = 0, None
     while ending is None:
         k += 1
         ending = arm.step(Setpoint(begun + smooth(k, 2000) * (folded - begun)))
-    assert ending == Ending("reflex", ("self_collision_avoidance_violation",))
+    assert ending == MotionEnding("reflex", ("self_collision_avoidance_violation",))
     assert k < 2000
     _settled(arm)
     # back where it came from it may go
     arm.recover()
-    arm.begin(Generator.JOINT_POSITION, Controller.JOINT_IMPEDANCE)
+    arm.begin(Generator.JOINT_POSITION, ControllerMode.JOINT_IMPEDANCE)
     stopped = arm.report.q_commanded.copy()
     for k in range(2000):
         assert arm.step(Setpoint(stopped + smooth(k, 2000) * (begun - stopped))) is None, arm.errors

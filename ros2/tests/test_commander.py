@@ -26,7 +26,7 @@ from pretouch.sensing.skin import Skin
 from pretouch.sound import sound_desired
 from pretouch.types import ControlStep, Mode
 from pretouch_ros2.commander import Ros2Commander
-from pretouch_ros2.joints import Measured
+from pretouch_ros2.joints import JointReading
 from pretouch_ros2.messages import TWIST
 from pretouch_ros2.node import Ros2Node
 from pretouch_ros2.params import ArmParams, Asked, CommanderParams
@@ -47,7 +47,7 @@ class Told:
             params=ArmParams("on-robot", "base"),
             joints=NAMES,
             orientation=lambda: R,
-            measured=lambda: Measured(0.0, Q, SLOW),
+            measured=lambda: JointReading(0.0, Q, SLOW),
         )
         node: Any = SimpleNamespace(subscribe=self._subscribe)
         self.commander = Ros2Commander(CommanderParams(asked, **settings), robot, model, node)

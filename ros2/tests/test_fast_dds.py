@@ -15,11 +15,11 @@ import numpy as np
 import pytest
 from tests.needs import skip_for
 
-from pretouch_ros2.estimates import JointTorques
+from pretouch_ros2.estimates import TorqueEstimate
 from pretouch_ros2.messages import FRANKA_STATE, JOINT_STATE, RANGE, TRAJECTORY, TWIST, WRENCH
 from pretouch_ros2.node import Ros2Node
 from pretouch_ros2.params import ArmParams, NodeParams
-from pretouch_ros2.stamps import Stamps
+from pretouch_ros2.stamps import SourceStamps
 
 HERE = Path(__file__).parent
 LAYOUTS = {
@@ -124,7 +124,7 @@ def test_the_torques_in_a_state_of_franka_are_read_and_what_follows_them_is_not(
     layout = f"ius{'d' * 26}{joints * 3}{'d' * 14}{joints}[d]dsb"
     words = ["7 8 :fr3_link0", *["1"] * 26, *["0 0 :l 1 :j 1 0.5 0 0"] * 3, *["2"] * 14,
              "7 8 :fr3_link0 3 :a :b :c 3 0 0 0 3 0 0 0 3", *map(str, efforts), "2 0.1 0.2 9.5 :more 1"]  # fmt: skip
-    torques = JointTorques(ArmParams("by-robot", "base", torques="/arm/robot_state"), ("c", "a", "b"), Stamps())
+    torques = TorqueEstimate(ArmParams("by-robot", "base", torques="/arm/robot_state"), ("c", "a", "b"), SourceStamps())
     assert torques.kind == FRANKA_STATE
     read: list[list[float]] = []
 

@@ -11,12 +11,12 @@ from scipy.spatial.transform import Rotation
 
 from pretouch.errors import RobotError
 from pretouch.types import RangeStatus
-from pretouch_ros2.estimates import JointTorques, Wrench
+from pretouch_ros2.estimates import TorqueEstimate, Wrench
 from pretouch_ros2.joints import Joints
 from pretouch_ros2.messages import FRANKA_STATE, WRENCH
 from pretouch_ros2.params import ArmParams
 from pretouch_ros2.skin import status_of
-from pretouch_ros2.stamps import Stamps
+from pretouch_ros2.stamps import SourceStamps
 
 NAMES = ("a", "b", "c")
 
@@ -28,7 +28,7 @@ def wrench(stamp: float, *numbers: float) -> Any:
 
 @pytest.fixture
 def joints():
-    return Joints(NAMES, Stamps())
+    return Joints(NAMES, SourceStamps())
 
 
 def test_joints_are_found_by_name_in_any_order_and_beside_others(joints):
@@ -80,12 +80,12 @@ def test_a_position_that_is_no_number_is_handed_on_for_the_controller_to_name(jo
     ],
 )
 def test_only_what_is_newer_than_what_its_writer_said_before_is_new(told, expected):
-    stamps = Stamps()
+    stamps = SourceStamps()
     assert [stamps.instant(header(stamp), received, writer) for stamp, received, writer in told] == expected
 
 
 def test_writers_that_publish_at_once_are_noticed_and_one_that_follows_another_is_not():
-    stamps = Stamps()
+    stamps = SourceStamps()
     for k in range(3):
         stamps.instant(header(10 + k), 1.0 + k, 1)
     assert not stamps.together()
@@ -96,7 +96,7 @@ def test_writers_that_publish_at_once_are_noticed_and_one_that_follows_another_i
 
 
 def test_what_strangers_publish_takes_bounded_memory():
-    joints, stamps = Joints(("a",), Stamps()), Stamps()
+    joints, stamps = Joints(("a",), SourceStamps()), SourceStamps()
     for k in range(1000):
         joints.take(SimpleNamespace(name=[f"x{k}"], position=[0.0], velocity=[], header=header(0)), 0.0, 1)
         stamps.instant(header(10), float(k), k)
@@ -109,11 +109,11 @@ def test_what_strangers_publish_takes_bounded_memory():
 
 @pytest.mark.parametrize(("clock", "expected"), [(100.2, 4.8), (100.0, 5.0), (99.0, 5.0)])
 def test_with_one_clock_the_headers_age_counts(clock, expected):
-    assert Stamps(True, lambda: clock).instant(header(100.0), 5.0, 7) == pytest.approx(expected)
+    assert SourceStamps(True, lambda: clock).instant(header(100.0), 5.0, 7) == pytest.approx(expected)
 
 
 def test_how_far_a_clock_is_behind_is_what_the_promptest_message_shows():
-    stamps = Stamps(now=lambda: 100.0)
+    stamps = SourceStamps(now=lambda: 100.0)
     stamps.instant(header(0), 5.0, 7)
     assert stamps.behind is None
     for stamp in (99.5, 99.99, 99.995 - 0.1, 99.996):
@@ -125,7 +125,7 @@ def test_how_far_a_clock_is_behind_is_what_the_promptest_message_shows():
 @pytest.mark.parametrize("frame", ["base", "ee"])
 def test_the_wrench_is_brought_to_our_sign_and_frame(sign, factor, frame):
     R = Rotation.from_euler("z", 90, degrees=True).as_matrix()
-    taken = Wrench(ArmParams(sign, frame), Stamps())
+    taken = Wrench(ArmParams(sign, frame), SourceStamps())
     taken.take(wrench(1, 10, 2, 3, 0.1, 0.2, 0.3), 5.0, 1)
     expected = [10, 2, 3, 0.1, 0.2, 0.3] if frame == "base" else [-2, 10, 3, -0.2, 0.1, 0.3]
     assert taken.read(5.0, R) == pytest.approx(factor * np.array(expected))
@@ -139,14 +139,14 @@ def test_the_wrench_is_brought_to_our_sign_and_frame(sign, factor, frame):
     ],
 )  # fmt: skip
 def test_six_zeros_are_no_estimate_where_that_is_set(sign, zeros, none):
-    taken = Wrench(ArmParams(sign, "base", zeros), Stamps())
+    taken = Wrench(ArmParams(sign, "base", zeros), SourceStamps())
     taken.take(wrench(1, *[0.0] * 6), 5.0, 1)
     assert taken.received_any
     assert (taken.read(5.0, np.eye(3)) is None) == none
 
 
 def test_a_wrench_that_is_old_or_no_number_is_no_estimate():
-    taken = Wrench(ArmParams("on-robot", "base"), Stamps())
+    taken = Wrench(ArmParams("on-robot", "base"), SourceStamps())
     assert taken.read(5.0, np.eye(3)) is None
     taken.take(wrench(1, 1, 2, 3, 4, 5, 6), 5.0, 1)
     assert taken.read(5.04, np.eye(3)) is not None
@@ -157,7 +157,7 @@ def test_a_wrench_that_is_old_or_no_number_is_no_estimate():
 
 @pytest.mark.parametrize(("sign", "factor"), [("on-robot", 1), ("by-robot", -1)])
 def test_torques_are_those_of_our_joints_in_our_order_and_sign_while_they_are_new(sign, factor):
-    torques = JointTorques(ArmParams(sign, "base", torques="/tau"), NAMES, Stamps())
+    torques = TorqueEstimate(ArmParams(sign, "base", torques="/tau"), NAMES, SourceStamps())
     assert np.isnan(torques.read(5.0)).all()
     torques.take(joint_state(1, "xcab", tau=[9, 3, 1, 2]), 5.0, 1)
     assert torques.read(5.04).tolist() == [factor, factor * 2, factor * 3]
@@ -167,14 +167,14 @@ def test_torques_are_those_of_our_joints_in_our_order_and_sign_while_they_are_ne
 
 
 def test_torques_of_others_or_too_few_are_none_and_zeros_neither_where_they_mean_that():
-    torques = JointTorques(ArmParams("by-robot", "base", torques="/tau"), NAMES, Stamps())
+    torques = TorqueEstimate(ArmParams("by-robot", "base", torques="/tau"), NAMES, SourceStamps())
     torques.take(joint_state(1, "abd", tau=[1, 2, 3]), 5.0, 1)
     torques.take(joint_state(2, "abc", tau=[]), 5.1, 1)
     assert (torques.received_any, torques.others) == (False, ("a", "b", "c"))
     torques.take(joint_state(3, "abc", tau=[0, 0, 0]), 5.2, 1)
     assert torques.received_any
     assert np.isnan(torques.read(5.2)).all()
-    kept = JointTorques(ArmParams("on-robot", "base", torques="/tau"), NAMES, Stamps())
+    kept = TorqueEstimate(ArmParams("on-robot", "base", torques="/tau"), NAMES, SourceStamps())
     kept.take(joint_state(3, "abc", tau=[0, 0, 0]), 5.2, 1)
     assert not kept.read(5.2).any()
 
@@ -192,7 +192,7 @@ def test_only_the_beginning_of_a_state_of_franka_is_read_and_half_of_it_is_refus
     [("fr3_hand_tcp", "base", True), ("fr3_hand_tcp", "ee", False), ("base", "ee", True), ("", "ee", False)],
 )
 def test_a_frame_id_that_does_not_fit_the_setting_is_named(frame_id, frame, doubted):
-    taken = Wrench(ArmParams("on-robot", frame), Stamps())
+    taken = Wrench(ArmParams("on-robot", frame), SourceStamps())
     message = wrench(1, *[1.0] * 6)
     message.header.frame_id = frame_id
     taken.take(message, 5.0, 1)

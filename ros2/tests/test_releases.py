@@ -15,7 +15,7 @@ from ros2.tests.spline import Release, Spline
 from pretouch.errors import RobotError
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
-from pretouch_ros2.joints import Measured
+from pretouch_ros2.joints import JointReading
 from pretouch_ros2.messages import Messages
 from pretouch_ros2.params import ArmParams
 from pretouch_ros2.trajectory_commands import TrajectoryCommands, parts_of_day
@@ -102,7 +102,7 @@ class Course:
 
     def _tick(self, commands: TrajectoryCommands, now: float, qd: np.ndarray) -> None:
         back = round(self.lag * self.rate) + 1
-        joints = Measured(now, self.asked[-back] if len(self.asked) >= back else Q, np.zeros(7))
+        joints = JointReading(now, self.asked[-back] if len(self.asked) >= back else Q, np.zeros(7))
         if not commands.begun:
             commands.begin(joints, now)
         try:

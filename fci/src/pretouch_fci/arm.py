@@ -13,16 +13,16 @@ from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.scene import SceneSpec
 from pretouch.sim.tcp_push import Pushes, TcpPush
 from pretouch.types import FloatArray
-from pretouch_fci.cartesian import CARTESIAN_LIMITS, Body, CartesianPose, CartesianVelocity
+from pretouch_fci.cartesian import CARTESIAN_LIMITS, ArmBody, CartesianPose, CartesianVelocity
 from pretouch_fci.collision import DEFAULT_BEHAVIOR, Contacts, SelfCollision
 from pretouch_fci.controllers import CARTESIAN_STIFFNESS, CartesianImpedance, ExternalTorques, guiding
 from pretouch_fci.frames import Inertial, announce, frames_of, inertials
 from pretouch_fci.gripper import Gripper, GripperObject
 from pretouch_fci.kinds import JointPosition, JointVelocity, MotionKind, NoMotion
 from pretouch_fci.limits import PERIOD_S, motion_limits
-from pretouch_fci.motion import Ending, Motion, Setpoint, TargetMotion
+from pretouch_fci.motion import Motion, MotionEnding, Setpoint, TargetMotion
 from pretouch_fci.units import ServedUnits, UnitsSetup
-from pretouch_fci.wire import JOINTS, Controller, Generator, RobotKind, RobotMode
+from pretouch_fci.wire import JOINTS, ControllerMode, Generator, RobotKind, RobotMode
 
 SETTLE_S = 0.2
 """Time the arm stands before its time begins [s]: the observer's transient is over."""
@@ -31,7 +31,7 @@ _COMES_TO_REST = 500
 
 
 @dataclass(frozen=True)
-class ArmSetup:
+class ServedSetup:
     """What is served, and what happens to it."""
 
     model: RobotModel
@@ -54,7 +54,7 @@ class ArmSetup:
 class ServedArm:
     """One arm, as its owner's client sees it. A context manager, for its units' sockets."""
 
-    def __init__(self, setup: ArmSetup) -> None:
+    def __init__(self, setup: ServedSetup) -> None:
         """Let it stand; its time begins."""
         if setup.model.n != JOINTS:
             raise RobotModelError(
@@ -130,20 +130,20 @@ class ServedArm:
         return self.mode is RobotMode.GUIDING and self.pushes.under_way
 
     @property
-    def body(self) -> Body:
+    def body(self) -> ArmBody:
         """The arm and its end-effector as they are set now."""
-        return Body(self.model, self.frames, CARTESIAN_LIMITS[self.kind])
+        return ArmBody(self.model, self.frames, CARTESIAN_LIMITS[self.kind])
 
-    def begin(self, generator: Generator, controller: Controller, fastest: FloatArray | None = None) -> None:
+    def begin(self, generator: Generator, controller: ControllerMode, fastest: FloatArray | None = None) -> None:
         """Begin a motion of a kind that is served, at rest and without errors: whoever calls it has looked.
 
         With largest velocities, (7,) [rad/s], the arm itself finds the way.
         """
         external = None
         match controller:
-            case Controller.EXTERNAL:
+            case ControllerMode.EXTERNAL:
                 self._drives = external = ExternalTorques(self.model.description.tau_max, self.torques.desired)
-            case Controller.CARTESIAN_IMPEDANCE:
+            case ControllerMode.CARTESIAN_IMPEDANCE:
                 self._drives = CartesianImpedance(self.plant, self.body, self.cartesian_stiffness, self.plant.stiffness)
         if fastest is None:
             self.motion = Motion(self.limits, controller, self._kind(generator), external)
@@ -230,11 +230,11 @@ class ServedArm:
             self._since_motion = 0
         self.gripper = gripper
 
-    def step(self, setpoint: Setpoint | None) -> Ending | None:
+    def step(self, setpoint: Setpoint | None) -> MotionEnding | None:
         """Let a millisecond pass under the command that came for it, None if none did; say how a motion ended."""
         ending = None
         if self.motion is not None and self._stop_pressed:
-            ending = Ending("emergency")
+            ending = MotionEnding("emergency")
             self.stop()
             self.mode = RobotMode.USER_STOPPED
         elif self.motion is not None:
@@ -273,7 +273,7 @@ class ServedArm:
         """(3,) all forces on the arm [N], base frame."""
         self.plant.take_log()
 
-    def _check_contacts(self) -> Ending | None:
+    def _check_contacts(self) -> MotionEnding | None:
         """Look for contacts; a collision is a reflex, which ends a motion."""
         wrench = np.zeros(6) if self.report.wrench is None else self.report.wrench
         reflexes = self.contacts.update(self.report.tau_ext, wrench, self.qdd)
@@ -281,18 +281,18 @@ class ServedArm:
             return None
         moved = self.moving
         self._end(reflexes)
-        return Ending("reflex", reflexes) if moved else None
+        return MotionEnding("reflex", reflexes) if moved else None
 
-    def _check_joints(self) -> Ending | None:
+    def _check_joints(self) -> MotionEnding | None:
         """Look where a motion leads the joints; their limits are looked at before a commanded motion is followed."""
         if self.motion is None:
             return None
-        q, driven = self.report.q, self.motion.controller is Controller.EXTERNAL
+        q, driven = self.report.q, self.motion.controller is ControllerMode.EXTERNAL
         errors = self._own.update(q) or (self.limits.left(q, self.report.qd) if driven else ())
         if not errors:
             return None
         self._end(errors)
-        return Ending("reflex", errors)
+        return MotionEnding("reflex", errors)
 
     def _end(self, errors: tuple[str, ...]) -> None:
         self.stop()

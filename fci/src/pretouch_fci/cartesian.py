@@ -11,7 +11,7 @@ from pretouch.control.commander import rotation_about
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray
 from pretouch_fci.frames import Frames, pose, pose_of
-from pretouch_fci.kinds import START_M, START_RAD, Asked, MotionKind
+from pretouch_fci.kinds import START_M, START_RAD, JointStep, MotionKind
 from pretouch_fci.limits import PERIOD_S, SLACK
 from pretouch_fci.wire import JOINTS, Generator, RobotKind
 
@@ -63,7 +63,7 @@ CARTESIAN_LIMITS: dict[RobotKind, CartesianLimits] = {
 """Those of libfranka 0.9 and 0.21, `rate_limiting.h`, without what it leaves for lost commands."""
 
 
-class Body(NamedTuple):
+class ArmBody(NamedTuple):
     """The arm that moves, and where its end-effector is."""
 
     model: RobotModel
@@ -87,7 +87,7 @@ class _OfEndEffector(MotionKind):
     _size: int
     """Numbers in the field."""
 
-    def __init__(self, body: Body) -> None:
+    def __init__(self, body: ArmBody) -> None:
         self._body, self._with_elbow = body, False
         self._now = np.zeros((2, JOINTS))
 
@@ -101,24 +101,24 @@ class _OfEndEffector(MotionKind):
         elbow = command["elbow_c"] if command["valid_elbow"] else ()
         return np.concatenate([command[self.field], elbow])
 
-    def asked(self, values: FloatArray, q: FloatArray, first: bool) -> Asked:
+    def asked(self, values: FloatArray, q: FloatArray, first: bool) -> JointStep:
         """Have the joints lead the end-effector there, if it may go there."""
         field, elbow = np.split(values, [self._size])
         errors = self._elbow_errors(elbow, q, first)
         if errors:
-            return Asked(np.zeros(JOINTS), errors)
+            return JointStep(np.zeros(JOINTS), errors)
         self._with_elbow = len(elbow) > 0
         with np.errstate(over="ignore", invalid="ignore"):  # what becomes of a number that is too large breaks limits
             return self._of_field(field, q, float(elbow[0]) if self._with_elbow else None, first)
 
-    def bridged(self, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> Asked:
+    def bridged(self, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> JointStep:
         """Go on with the same acceleration of end-effector and elbow."""
         going = self._now[0] + self._now[1] * PERIOD_S
         elbow = q[_ELBOW] + going[6] * PERIOD_S if self._with_elbow else None
         return self._follow(q, going[:6], elbow)
 
     @abstractmethod
-    def _of_field(self, field: FloatArray, q: FloatArray, elbow: float | None, first: bool) -> Asked:
+    def _of_field(self, field: FloatArray, q: FloatArray, elbow: float | None, first: bool) -> JointStep:
         """Return what the field asks for, with the elbow's angle [rad] if there is one."""
 
     def _elbow_errors(self, elbow: FloatArray, q: FloatArray, first: bool) -> tuple[str, ...]:
@@ -130,17 +130,17 @@ class _OfEndEffector(MotionKind):
             return (f"{_PREFIX}_start_elbow_invalid",)
         return (f"{_PREFIX}_elbow_sign_inconsistent",) if inconsistent else ()
 
-    def _follow(self, q: FloatArray, twist: FloatArray, elbow: float | None, T: FloatArray | None = None) -> Asked:
+    def _follow(self, q: FloatArray, twist: FloatArray, elbow: float | None, T: FloatArray | None = None) -> JointStep:
         """Check velocities (6,) of the end-effector and find the joints that lead it to T, or where they lead."""
         speed = 0.0 if elbow is None else (elbow - q[_ELBOW]) / PERIOD_S
         velocities = np.append(twist, speed)
         errors = self._body.limits.violated(self._now, velocities)
         if errors:
-            return Asked(np.zeros(JOINTS), errors)
+            return JointStep(np.zeros(JOINTS), errors)
         self._now = np.stack([velocities, (velocities - self._now[0]) / PERIOD_S])
         if T is None:
             T = _advanced(self._body.end_effector(q)[0], twist)
-        return Asked((self._reached(q, T, elbow) - q) / PERIOD_S)
+        return JointStep((self._reached(q, T, elbow) - q) / PERIOD_S)
 
     def _reached(self, q: FloatArray, T: FloatArray, elbow: float | None) -> FloatArray:
         """Positions (7,) [rad] near q with the end-effector at T (4, 4): with this elbow, or with the least motion."""
@@ -160,7 +160,7 @@ class CartesianVelocity(_OfEndEffector):
     generator, field, _size = Generator.CARTESIAN_VELOCITY, "O_dP_EE_c", 6
     not_a_number = f"{_PREFIX}_velocity_limits_violation"
 
-    def _of_field(self, field: FloatArray, q: FloatArray, elbow: float | None, first: bool) -> Asked:
+    def _of_field(self, field: FloatArray, q: FloatArray, elbow: float | None, first: bool) -> JointStep:
         return self._follow(q, field, elbow)
 
 
@@ -181,15 +181,15 @@ class CartesianPose(_OfEndEffector):
             return None
         return self._reached(q, T, float(elbow[0]) if len(elbow) else None)
 
-    def _of_field(self, field: FloatArray, q: FloatArray, elbow: float | None, first: bool) -> Asked:
+    def _of_field(self, field: FloatArray, q: FloatArray, elbow: float | None, first: bool) -> JointStep:
         T = pose_of(field)
         if T is None:
-            return Asked(np.zeros(JOINTS), (self.not_a_number,))
+            return JointStep(np.zeros(JOINTS), (self.not_a_number,))
         twist = difference(T, self._body.end_effector(q)[0]) / PERIOD_S
         # how far it may be off at first is our choice, as for positions of joints
         line, turn, _ = (most * PERIOD_S for most in self._body.limits.acceleration)
         if first and (math.hypot(*twist[:3]) > line or math.hypot(*twist[3:]) > turn):
-            return Asked(np.zeros(JOINTS), ("cartesian_position_motion_generator_start_pose_invalid",))
+            return JointStep(np.zeros(JOINTS), ("cartesian_position_motion_generator_start_pose_invalid",))
         return self._follow(q, twist, elbow, T)
 
 

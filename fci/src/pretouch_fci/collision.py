@@ -20,7 +20,7 @@ _MOVING = 1e-3
 """Commanded acceleration from which the thresholds for accelerations hold [rad/s^2]."""
 
 
-class CollisionBehavior(NamedTuple):
+class CollisionThresholds(NamedTuple):
     """From where on there is a contact and a collision.
 
     The first axis tells whether the robot changes its speed or goes steadily; the second has the lower threshold, of a
@@ -40,7 +40,7 @@ class CollisionBehavior(NamedTuple):
         return cls(values[: 4 * JOINTS].reshape(2, 2, JOINTS), values[4 * JOINTS :].reshape(2, 2, 6))
 
 
-DEFAULT_BEHAVIOR = CollisionBehavior(np.full((2, 2, JOINTS), 20.0), np.full((2, 2, 6), 20.0))
+DEFAULT_BEHAVIOR = CollisionThresholds(np.full((2, 2, JOINTS), 20.0), np.full((2, 2, 6), 20.0))
 """Before any is set: that of the vendor's examples."""
 
 

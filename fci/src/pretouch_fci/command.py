@@ -25,10 +25,10 @@ from pretouch.sim.paper_scenes import dynamic_pushes, static_path, static_scene
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
 from pretouch.types import FloatArray
 from pretouch.units.keys import load_keys
-from pretouch_fci.arm import ArmSetup, ServedArm
+from pretouch_fci.arm import ServedArm, ServedSetup
 from pretouch_fci.gripper import object_of
 from pretouch_fci.pushes import push_of
-from pretouch_fci.server import FciServer, ServeOptions
+from pretouch_fci.server import FciOptions, FciServer
 from pretouch_fci.typed import HELP, TypedPushes, say
 from pretouch_fci.units import UnitsSetup
 
@@ -37,7 +37,7 @@ _LARGEST_M = 10.0
 
 
 @dataclass(frozen=True)
-class ServeFci(ServeOptions):
+class ServeFci(FciOptions):
     """Serve a simulated Panda or FR3 to programs that use the vendor's library, as the robot itself would be."""
 
     robot: Literal["panda", "fr3"] = "panda"
@@ -96,14 +96,14 @@ class ServeFci(ServeOptions):
             server.serve(lambda: ended() or typed.take())
 
 
-def _setup(c: ServeFci) -> ArmSetup:
+def _setup(c: ServeFci) -> ServedSetup:
     model = RobotModel(robot_named(c.robot))
     if (c.hand or c.box) and c.scene != "empty":
         raise ParameterError(f"--{'hand' if c.hand else 'box'} needs --scene empty, and it is {c.scene}.")
     scene, hand, path = _scene(c, model)
     q = _posture(c.start, model, path)
     pushes, gripped = tuple(map(push_of, c.push)), object_of(c.object) if c.object else None
-    return ArmSetup(model, c.robot, q, scene, hand, pushes, _units(c, model), gripped, c.seed)
+    return ServedSetup(model, c.robot, q, scene, hand, pushes, _units(c, model), gripped, c.seed)
 
 
 def _posture(start: str, model: RobotModel, path: ArmPath) -> FloatArray:

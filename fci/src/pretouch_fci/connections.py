@@ -5,7 +5,7 @@ from collections.abc import Callable, Container
 from dataclasses import dataclass
 
 from pretouch.errors import RobotError
-from pretouch_fci.wire import CONNECT, REQUEST_MOST, Interface
+from pretouch_fci.wire import CONNECT, REQUEST_MOST, WireInterface
 
 _WAITING_MOST = 16
 """So many connections may be open without having asked to be served."""
@@ -29,7 +29,7 @@ class Request:
     """One request of a client."""
 
     name: str
-    """As of `Interface.requests`."""
+    """As of `WireInterface.requests`."""
     identifier: int
     body: bytes
 
@@ -47,7 +47,7 @@ class Connection:
             if hasattr(socket, option):
                 sock.setsockopt(socket.IPPROTO_TCP, getattr(socket, option), value)
 
-    def requests(self, interface: Interface) -> list[Request]:
+    def requests(self, interface: WireInterface) -> list[Request]:
         """Return the requests that have come; raise Disconnected if the other end closed, or sends anything else."""
         try:
             data = self.sock.recv(_READ_MOST)
@@ -63,7 +63,7 @@ class Connection:
             requests.append(request)
         return requests
 
-    def _next(self, interface: Interface) -> Request | None:
+    def _next(self, interface: WireInterface) -> Request | None:
         header = interface.header
         if len(self._received) < header.size:
             return None
@@ -116,7 +116,9 @@ class ClientPort:
     for something, and has gone.
     """
 
-    def __init__(self, host: str, port: int, interface: Interface, say: Callable[[str], None], of: str = "") -> None:
+    def __init__(
+        self, host: str, port: int, interface: WireInterface, say: Callable[[str], None], of: str = ""
+    ) -> None:
         """Listen; an address that cannot be had is a RobotError. `say` is handed a line on each client, of what."""
         self._interface, self._say, self._of = interface, say, of
         self._listening = _listening(host, port)

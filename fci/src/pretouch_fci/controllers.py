@@ -4,7 +4,7 @@ import numpy as np
 
 from pretouch.sim.plant import Plant
 from pretouch.types import BoolArray, FloatArray
-from pretouch_fci.cartesian import Body, difference
+from pretouch_fci.cartesian import ArmBody, difference
 from pretouch_fci.limits import PERIOD_S, SLACK
 
 CARTESIAN_STIFFNESS = np.array([3000.0, 3000.0, 3000.0, 300.0, 300.0, 300.0])
@@ -48,7 +48,7 @@ class CartesianImpedance:
     M = L L^T, L^-1 (J^T K J + N K_q N) L^-T = U diag(w^2) U^T, D = L U diag(2 w) U^T L^T.
     """
 
-    def __init__(self, plant: Plant, body: Body, stiffness: FloatArray, joint_stiffness: FloatArray) -> None:
+    def __init__(self, plant: Plant, body: ArmBody, stiffness: FloatArray, joint_stiffness: FloatArray) -> None:
         """Take the arm.
 
         Args:
@@ -84,7 +84,7 @@ class CartesianImpedance:
         return K
 
 
-def guiding(plant: Plant, body: Body, free: BoolArray) -> CartesianImpedance:
+def guiding(plant: Plant, body: ArmBody, free: BoolArray) -> CartesianImpedance:
     """Hold the arm where it is but for the axes of the end-effector and the elbow, (7,), that are free."""
     stiffness = np.where(free[:6], 0.0, CARTESIAN_STIFFNESS)
     return CartesianImpedance(plant, body, stiffness, np.where(free[6], 0.0, plant.stiffness))

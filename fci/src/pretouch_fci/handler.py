@@ -8,21 +8,21 @@ import numpy as np
 
 from pretouch.types import FloatArray
 from pretouch_fci.arm import ServedArm
-from pretouch_fci.collision import CollisionBehavior
+from pretouch_fci.collision import CollisionThresholds
 from pretouch_fci.connections import Connection, Disconnected, Request
 from pretouch_fci.controllers import CARTESIAN_LEAST, CARTESIAN_STIFFNESS, JOINT_MOST_NM_RAD
 from pretouch_fci.frames import Inertial, pose_of, urdf_of
 from pretouch_fci.model_library import library_answer
-from pretouch_fci.motion import Ending
+from pretouch_fci.motion import MotionEnding
 from pretouch_fci.state import StateDatagram
-from pretouch_fci.wire import MOVE, OF_END_EFFECTOR, Controller, Generator, Protocol, RobotMode, fastest_of
+from pretouch_fci.wire import MOVE, OF_END_EFFECTOR, ControllerMode, Generator, Protocol, RobotMode, fastest_of
 
 _EIGENVALUE_SLACK = 1e-9
 _LARGEST = 1e9
 """No value that can be set is larger."""
 
 
-class Status(IntEnum):
+class AnswerStatus(IntEnum):
     """Answers to most requests."""
 
     SUCCESS = 0
@@ -40,7 +40,7 @@ class WantedMotion(NamedTuple):
     """A motion that is served."""
 
     generator: Generator
-    controller: Controller
+    controller: ControllerMode
     fastest: FloatArray | None = None
     """(7,) largest velocities [rad/s] of a motion whose way the robot finds; None if commands say the way."""
 
@@ -48,32 +48,32 @@ class WantedMotion(NamedTuple):
 def wanted_motion(protocol: Protocol, body: bytes) -> WantedMotion | None:
     """Read the request to move; None where the motion is not served."""
     controller, generator, *_ = MOVE.unpack_from(body)
-    if generator not in protocol.generators or controller not in tuple(Controller)[: Controller.NONE]:
+    if generator not in protocol.generators or controller not in tuple(ControllerMode)[: ControllerMode.NONE]:
         return None
-    if generator == Generator.NONE and controller != Controller.EXTERNAL:
+    if generator == Generator.NONE and controller != ControllerMode.EXTERNAL:
         return None
     fastest = fastest_of(body)
     if fastest is not None:  # the vendor has that for positions of joints alone
-        if generator != Generator.JOINT_POSITION or controller == Controller.EXTERNAL:
+        if generator != Generator.JOINT_POSITION or controller == ControllerMode.EXTERNAL:
             return None
         if not np.all((fastest > 0) & np.isfinite(fastest)):
             return None
-    return WantedMotion(Generator(generator), Controller(controller), fastest)
+    return WantedMotion(Generator(generator), ControllerMode(controller), fastest)
 
 
 def set_or_get(arm: ServedArm, name: str, body: bytes) -> bytes:
     """Do what a request asks, if the robot may and can; return the body of the answer."""
     if arm.moving and name not in _WHILE_MOVING:
-        return bytes([Status.NOT_POSSIBLE])
+        return bytes([AnswerStatus.NOT_POSSIBLE])
     if name == "GetCartesianLimit":
-        return bytes([Status.SUCCESS]) + _CARTESIAN_LIMIT
+        return bytes([AnswerStatus.SUCCESS]) + _CARTESIAN_LIMIT
     if name == "SetGuidingMode":
         arm.guiding_axes = np.frombuffer(body, "u1") != 0
-        return bytes([Status.SUCCESS])
+        return bytes([AnswerStatus.SUCCESS])
     values = np.frombuffer(body, "<f8").copy()
     if not np.all(np.abs(values) <= _LARGEST):
-        return bytes([Status.INVALID])
-    return bytes([Status.SUCCESS if _set(arm, name, values) else Status.INVALID])
+        return bytes([AnswerStatus.INVALID])
+    return bytes([AnswerStatus.SUCCESS if _set(arm, name, values) else AnswerStatus.INVALID])
 
 
 def _set(arm: ServedArm, name: str, values: FloatArray) -> bool:
@@ -81,7 +81,7 @@ def _set(arm: ServedArm, name: str, values: FloatArray) -> bool:
     sound = True
     match name:
         case "SetCollisionBehavior":
-            behavior = CollisionBehavior.of(values)
+            behavior = CollisionThresholds.of(values)
             arm.contacts.behavior, sound = behavior or arm.contacts.behavior, behavior is not None
         case "SetEEToK" | "SetNEToEE":
             T = pose_of(values)
@@ -131,7 +131,7 @@ class RequestHandler:
         for request in requests:
             self._serve(request)
 
-    def motion_ended(self, ending: Ending) -> None:
+    def motion_ended(self, ending: MotionEnding) -> None:
         """Tell how the motion ended."""
         if ending.errors:
             self._say(f"Motion ended: {', '.join(ending.errors)}.")
@@ -143,7 +143,7 @@ class RequestHandler:
         for name, identifier in waiting:
             if name == "AutomaticErrorRecovery":
                 self._arm.recover()
-            self._answer(name, identifier, bytes([Status.SUCCESS]))
+            self._answer(name, identifier, bytes([AnswerStatus.SUCCESS]))
 
     def _serve(self, request: Request) -> None:
         arm, name, identifier = self._arm, request.name, request.identifier
@@ -159,13 +159,13 @@ class RequestHandler:
                 self._when_at_rest(name, identifier)
             case "AutomaticErrorRecovery":
                 if arm.moving:
-                    self._answer(name, identifier, bytes([Status.NOT_POSSIBLE]))
+                    self._answer(name, identifier, bytes([AnswerStatus.NOT_POSSIBLE]))
                 else:
                     self._when_at_rest(name, identifier)
             case "LoadModelLibrary":
                 self._answer(name, identifier, library_answer(arm.model, request.body, self._say))
             case "GetRobotModel":
-                self._answer(name, identifier, bytes([Status.SUCCESS]) + urdf_of(arm.model).encode())
+                self._answer(name, identifier, bytes([AnswerStatus.SUCCESS]) + urdf_of(arm.model).encode())
             case _:
                 answer = set_or_get(arm, name, request.body)
                 self._settle()

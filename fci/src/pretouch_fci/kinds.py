@@ -14,7 +14,7 @@ START_M, START_RAD = 1e-3, 1e-3
 milliseconds old when the command comes, and the arm may still swing."""
 
 
-class Asked(NamedTuple):
+class JointStep(NamedTuple):
     """What a command comes to."""
 
     qd: FloatArray
@@ -51,7 +51,7 @@ class MotionKind(ABC):
         return None
 
     @abstractmethod
-    def asked(self, values: FloatArray, q: FloatArray, first: bool) -> Asked:
+    def asked(self, values: FloatArray, q: FloatArray, first: bool) -> JointStep:
         """Return what a command asks for.
 
         Args:
@@ -60,7 +60,7 @@ class MotionKind(ABC):
             first: whether no command has come before.
         """
 
-    def bridged(self, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> Asked:
+    def bridged(self, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> JointStep:
         """Return what is done in place of a lost command: the same acceleration once more.
 
         Args:
@@ -68,7 +68,7 @@ class MotionKind(ABC):
             qd: (7,) commanded velocities [rad/s].
             qdd: (7,) commanded accelerations [rad/s^2].
         """
-        return Asked(qd + qdd * PERIOD_S)
+        return JointStep(qd + qdd * PERIOD_S)
 
 
 class JointVelocity(MotionKind):
@@ -81,9 +81,9 @@ class JointVelocity(MotionKind):
         """Return the velocities."""
         return np.array(command["dq_c"])
 
-    def asked(self, values: FloatArray, q: FloatArray, first: bool) -> Asked:
+    def asked(self, values: FloatArray, q: FloatArray, first: bool) -> JointStep:
         """Take them as they are."""
-        return Asked(values)
+        return JointStep(values)
 
 
 class NoMotion(JointVelocity):
@@ -115,10 +115,10 @@ class JointPosition(MotionKind):
         """Return the positions themselves."""
         return values if np.all(np.abs(values - q) <= START_RAD) else None
 
-    def asked(self, values: FloatArray, q: FloatArray, first: bool) -> Asked:
+    def asked(self, values: FloatArray, q: FloatArray, first: bool) -> JointStep:
         """Go there within the millisecond; the first must be where the arm is commanded to be already."""
         with np.errstate(over="ignore"):
             qd = (values - q) / PERIOD_S
         if first and np.any(np.abs(values - q) > self._start_within):
-            return Asked(qd, ("joint_position_motion_generator_start_pose_invalid",))
-        return Asked(qd)
+            return JointStep(qd, ("joint_position_motion_generator_start_pose_invalid",))
+        return JointStep(qd)

@@ -7,9 +7,9 @@ import numpy as np
 
 from pretouch.types import FloatArray
 from pretouch_fci.controllers import ExternalTorques
-from pretouch_fci.kinds import Asked, JointPosition, MotionKind
+from pretouch_fci.kinds import JointPosition, JointStep, MotionKind
 from pretouch_fci.limits import PERIOD_S, MotionLimits
-from pretouch_fci.wire import JOINTS, Controller
+from pretouch_fci.wire import JOINTS, ControllerMode
 
 LOST_MOST = 20
 """So many commands lost in a row end a motion."""
@@ -40,7 +40,7 @@ class Setpoint:
 
 
 @dataclass(frozen=True, slots=True)
-class Ending:
+class MotionEnding:
     """How a motion ended."""
 
     status: str
@@ -56,7 +56,11 @@ class Motion:
     """Whether a command is due in each millisecond."""
 
     def __init__(
-        self, limits: MotionLimits, controller: Controller, kind: MotionKind, external: ExternalTorques | None = None
+        self,
+        limits: MotionLimits,
+        controller: ControllerMode,
+        kind: MotionKind,
+        external: ExternalTorques | None = None,
     ) -> None:
         """Begin at rest; an external controller takes the torques."""
         n = len(limits.qd)
@@ -73,7 +77,7 @@ class Motion:
         """Fraction of the last commands that were received in time."""
         return sum(self._received) / len(self._received) if self._received else 0.0
 
-    def follow(self, q: FloatArray, setpoint: Setpoint | None) -> Ending | None:
+    def follow(self, q: FloatArray, setpoint: Setpoint | None) -> MotionEnding | None:
         """Take the command of a millisecond, None if it was lost, at commanded positions q (n,) [rad].
 
         Where it ended, the commanded velocities are the last ones: whoever moves the arm brakes from there.
@@ -83,30 +87,30 @@ class Motion:
         first, self.begun, self._lost = not self.begun, True, 0
         self._received.append(True)
         if not np.all(np.isfinite(setpoint.values)):
-            return Ending("input error", (self.kind.not_a_number,))
+            return MotionEnding("input error", (self.kind.not_a_number,))
         if self._external is not None and not np.all(np.isfinite(setpoint.torques)):
-            return Ending("input error", ("controller_torque_discontinuity",))
+            return MotionEnding("input error", ("controller_torque_discontinuity",))
         if setpoint.finished:
             if self._limits.ends_at_rest(self.qd):
-                return Ending("success")
-            return Ending("reflex", (self.kind.moves_at_end,))
+                return MotionEnding("success")
+            return MotionEnding("reflex", (self.kind.moves_at_end,))
         errors = () if self._external is None else self._external.take(setpoint.torques)
-        return Ending("reflex", errors) if errors else self._moved(q, self.kind.asked(setpoint.values, q, first))
+        return MotionEnding("reflex", errors) if errors else self._moved(q, self.kind.asked(setpoint.values, q, first))
 
-    def _without(self, q: FloatArray) -> Ending | None:
+    def _without(self, q: FloatArray) -> MotionEnding | None:
         """Go on with the same acceleration, as the robot does for a lost command."""
         self._lost += 1
         if self._lost >= (LOST_MOST if self.begun else FIRST_WITHIN):
-            return Ending("reflex", ("communication_constraints_violation",))
+            return MotionEnding("reflex", ("communication_constraints_violation",))
         if not self.begun:
             return None
         self._received.append(False)
         return self._moved(q, self.kind.bridged(q, self.qd, self.qdd))
 
-    def _moved(self, q: FloatArray, asked: Asked) -> Ending | None:
+    def _moved(self, q: FloatArray, asked: JointStep) -> MotionEnding | None:
         errors = asked.errors or self._limits.violated(q, self.qd, self.qdd, asked.qd, self.kind.joints)
         if errors:
-            return Ending("reflex", errors)
+            return MotionEnding("reflex", errors)
         self.qdd = (asked.qd - self.qd) / PERIOD_S
         self.qd = asked.qd
         return None
@@ -121,25 +125,25 @@ class TargetMotion(Motion):
 
     awaited = False
 
-    def __init__(self, limits: MotionLimits, controller: Controller, fastest: FloatArray) -> None:
+    def __init__(self, limits: MotionLimits, controller: ControllerMode, fastest: FloatArray) -> None:
         """Begin at rest; `fastest` (7,) are the largest velocities on the way [rad/s]."""
         super().__init__(limits, controller, JointPosition(limits))
         self._fastest = np.minimum(fastest, limits.qd)
         self._target: FloatArray | None = None
 
-    def follow(self, q: FloatArray, setpoint: Setpoint | None) -> Ending | None:
+    def follow(self, q: FloatArray, setpoint: Setpoint | None) -> MotionEnding | None:
         """Go on towards the newest target; none is lost, and the last command has the arm brake."""
         self.begun |= setpoint is not None
         if setpoint is not None:
             if not np.all(np.isfinite(setpoint.values)):
-                return Ending("input error", (self.kind.not_a_number,))
+                return MotionEnding("input error", (self.kind.not_a_number,))
             if setpoint.finished:
-                return Ending("success")
+                return MotionEnding("success")
             self._target = setpoint.values
         if self._target is None:
             return self._without(q)
         self._received.append(True)
-        return self._moved(q, Asked(self._towards(self._target, q)))
+        return self._moved(q, JointStep(self._towards(self._target, q)))
 
     def _towards(self, target: FloatArray, q: FloatArray) -> FloatArray:
         """Return the next velocities (7,) [rad/s] on the way from q (7,) to a target (7,) [rad]."""

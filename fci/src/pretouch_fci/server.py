@@ -34,7 +34,7 @@ _MOTION_EVERY = 1_000_000
 
 
 @dataclass(frozen=True)
-class ServeOptions(Checked):
+class FciOptions(Checked):
     """Where to serve, and at which pace."""
 
     host: str = "127.0.0.1"
@@ -66,7 +66,7 @@ class FciServer(ClientPort):
     """Serves one arm. A context manager, for the sockets."""
 
     def __init__(
-        self, arm: ServedArm, options: ServeOptions,
+        self, arm: ServedArm, options: FciOptions,
         watch: Callable[[float, ServedArm], None] = lambda _time, _arm: None, say: Callable[[str], None] = print,
     ) -> None:  # fmt: skip
         """Listen; an address that cannot be had is a RobotError.

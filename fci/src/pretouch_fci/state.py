@@ -7,7 +7,7 @@ import numpy as np
 from pretouch.types import FloatArray
 from pretouch_fci.arm import ServedArm
 from pretouch_fci.frames import pose
-from pretouch_fci.wire import ERRORS, Controller, Protocol
+from pretouch_fci.wire import ERRORS, ControllerMode, Protocol
 
 _GRAVITY = (0.0, 0.0, -9.81)
 """Acceleration of a base at rest as the vendor gives it, whatever the truth [m/s^2]."""
@@ -42,7 +42,7 @@ class StateDatagram:
         self._write_poses()
         motion = arm.motion
         to["motion_generator_mode"][...] = 0 if motion is None else motion.kind.generator + 1
-        to["controller_mode"][...] = Controller.NONE if motion is None else motion.controller
+        to["controller_mode"][...] = ControllerMode.NONE if motion is None else motion.controller
         to["robot_mode"][...] = arm.mode
         to["control_command_success_rate"][...] = arm.success_rate
         for name, errors in (("errors", arm.errors), ("reflex_reason", arm.reflex_reason)):

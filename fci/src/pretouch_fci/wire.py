@@ -53,7 +53,7 @@ OF_END_EFFECTOR = (Generator.CARTESIAN_POSITION, Generator.CARTESIAN_VELOCITY)
 """Those that command the end-effector."""
 
 
-class Controller(IntEnum):
+class ControllerMode(IntEnum):
     """Controllers, as requests and states number them."""
 
     JOINT_IMPEDANCE = 0
@@ -134,7 +134,7 @@ def fastest_of(body: bytes) -> FloatArray | None:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Interface:
+class WireInterface:
     """Requests and their answers, in one version."""
 
     name: str
@@ -156,7 +156,7 @@ class Interface:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Protocol(Interface):
+class Protocol(WireInterface):
     """One version of the interface of the arm."""
 
     name: str = "FCI"
@@ -215,7 +215,7 @@ MOVE_FINGERS = struct.Struct("<2d")
 """Body of the request to move the fingers: width [m] and speed [m/s]."""
 GRIPPER_STATE = struct.Struct("<Idd?H")
 """Datagram from the hand: its time [ms], width [m], largest width [m], whether it grasps, temperature [deg C]."""
-GRIPPER = Interface(
+GRIPPER = WireInterface(
     name="the protocol of the hand",
     version=3,
     header=struct.Struct("<HII"),

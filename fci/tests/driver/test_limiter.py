@@ -11,7 +11,7 @@ from pretouch.robot.model import RobotModel
 from pretouch_fci.kinds import JointVelocity
 from pretouch_fci.limits import motion_limits as served_limits
 from pretouch_fci.motion import Motion, Setpoint
-from pretouch_fci.wire import Controller
+from pretouch_fci.wire import ControllerMode
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -20,7 +20,7 @@ def test_bursts_of_lost_commands_at_any_time_break_no_limit_of_the_served_arm(ki
     model, draw = RobotModel(robot_named(kind)), np.random.default_rng([seed, 15])
     limits = motion_limits(model, kind)
     q, limiter = (limits.q_min + limits.q_max) / 2, SetPointLimiter(limits, LimiterParams())
-    motion, burst = Motion(served_limits(model, kind), Controller.JOINT_IMPEDANCE, JointVelocity()), Bursts(draw)
+    motion, burst = Motion(served_limits(model, kind), ControllerMode.JOINT_IMPEDANCE, JointVelocity()), Bursts(draw)
     # set-points that change often meet the limits of speed, others those of position
     changes = (0.05, 0.01)[seed % 2]
     wanted, lost = np.zeros(7), 0

@@ -14,7 +14,7 @@ from pretouch_ros2.messages import TRAJECTORY, TWIST
 from pretouch_ros2.node import Ros2Node
 from pretouch_ros2.params import CommanderParams, seconds
 from pretouch_ros2.robot import SHARED_S, Ros2Robot
-from pretouch_ros2.stamps import Stamps
+from pretouch_ros2.stamps import SourceStamps
 
 _KINDS = {"twist": TWIST, "trajectory": TRAJECTORY}
 _POINTS_MOST = 1000
@@ -42,7 +42,7 @@ class Ros2Commander:
         self.kind = _KINDS[params.asked]
         self._base = (*_resting_links(model), *filter(None, [params.base_frame]))
         self._ee = model.links[model.ee]
-        self._stamps = Stamps(params.shared_clock)
+        self._stamps = SourceStamps(params.shared_clock)
         self._newest: tuple[Desired, bool] | None = None
         self._heard = node.subscribe(params.heard_on, self.kind, self._take)
 

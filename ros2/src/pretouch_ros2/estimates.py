@@ -9,16 +9,16 @@ from pretouch.types import FloatArray
 from pretouch_ros2.joints import places_of
 from pretouch_ros2.messages import FRANKA_STATE, JOINT_STATE
 from pretouch_ros2.params import ArmParams
-from pretouch_ros2.stamps import Stamps
+from pretouch_ros2.stamps import SourceStamps
 
 _EE_FRAMES = ("_k", "_ee", "_tcp", "_hand", "link8", "tool0", "_flange")
 """How the names of end-effectors' frames end."""
 
 
-class _Estimate:
+class _ForceEstimate:
     """The newest numbers of one topic."""
 
-    def __init__(self, params: ArmParams, stamps: Stamps) -> None:
+    def __init__(self, params: ArmParams, stamps: SourceStamps) -> None:
         self._params, self.stamps = params, stamps
         self._newest: tuple[float, FloatArray] | None = None
 
@@ -40,7 +40,7 @@ class _Estimate:
         return -numbers if self._params.sign == "by-robot" else numbers.copy()
 
 
-class Wrench(_Estimate):
+class Wrench(_ForceEstimate):
     """Takes in geometry_msgs/WrenchStamped."""
 
     received_any = False
@@ -77,13 +77,13 @@ class Wrench(_Estimate):
         )
 
 
-class JointTorques(_Estimate):
+class TorqueEstimate(_ForceEstimate):
     """Takes in sensor_msgs/JointState, or the one in franka_msgs/FrankaRobotState, whose efforts they are."""
 
     others: tuple[str, ...] = ()
     """Joints named in the newest message that was not of all of ours; some of them, where there are many."""
 
-    def __init__(self, params: ArmParams, names: Sequence[str], stamps: Stamps) -> None:
+    def __init__(self, params: ArmParams, names: Sequence[str], stamps: SourceStamps) -> None:
         super().__init__(params, stamps)
         self._names = tuple(names)
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from pretouch.types import FloatArray
 from pretouch.values import value
-from pretouch_ros2.stamps import Stamps
+from pretouch_ros2.stamps import SourceStamps
 
 _NAMES_MOST = 1000
 """Joints of a message; one with more is nobody's whose joints are ours."""
@@ -16,7 +16,7 @@ _OTHERS_MOST = 64
 
 
 @value
-class Measured:
+class JointReading:
     """Joints at one instant."""
 
     stamp: float
@@ -38,9 +38,9 @@ def places_of(ours: Sequence[str], names: Sequence[str]) -> list[int] | None:
 class Joints:
     """Takes in sensor_msgs/JointState: names in any order, with others beside them."""
 
-    def __init__(self, names: Sequence[str], stamps: Stamps) -> None:
+    def __init__(self, names: Sequence[str], stamps: SourceStamps) -> None:
         self.names, self.stamps = tuple(names), stamps
-        self.newest: Measured | None = None
+        self.newest: JointReading | None = None
         """What was measured last."""
         self.others: set[str] = set()
         """Joints named in messages that do not have all of ours; some of them, where there are many."""
@@ -64,7 +64,7 @@ class Joints:
         if len(message.velocity) == len(message.position):
             qd = np.array(message.velocity, dtype=np.float64)[places]
         self.differentiated = qd is None or not np.isfinite(qd).all()
-        self.newest = Measured(stamp, q, self._difference(stamp, q) if qd is None or self.differentiated else qd)
+        self.newest = JointReading(stamp, q, self._difference(stamp, q) if qd is None or self.differentiated else qd)
 
     @property
     def missing(self) -> tuple[str, ...]:

@@ -9,12 +9,12 @@ import numpy as np
 from pretouch.errors import RobotError
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray, RobotState
-from pretouch_ros2.estimates import JointTorques, Wrench
-from pretouch_ros2.joints import Joints, Measured
+from pretouch_ros2.estimates import TorqueEstimate, Wrench
+from pretouch_ros2.joints import JointReading, Joints
 from pretouch_ros2.messages import JOINT_STATE, TRAJECTORY, WRENCH
 from pretouch_ros2.node import Ros2Node
 from pretouch_ros2.params import ArmParams
-from pretouch_ros2.stamps import Stamps
+from pretouch_ros2.stamps import SourceStamps
 from pretouch_ros2.trajectory_commands import TrajectoryCommands
 
 _PERIOD_S = 0.01
@@ -40,11 +40,11 @@ class Ros2Robot:
             raise RobotError(f"hold_s is {params.hold_s:g} s: give at least the control period, {period:g} s.")
         self.params, self._node = params, node
         self._model = model
-        self._joints = Joints(params.joint_names or model.joints, Stamps(params.shared_clock))
-        self._wrench = Wrench(params, Stamps(params.shared_clock))
+        self._joints = Joints(params.joint_names or model.joints, SourceStamps(params.shared_clock))
+        self._wrench = Wrench(params, SourceStamps(params.shared_clock))
         self._states = node.subscribe(params.joint_states, JOINT_STATE, self._joints.take)
         self._wrenches = node.subscribe(params.wrench, WRENCH, self._wrench.take)
-        self._torques = JointTorques(params, self._joints.names, Stamps(params.shared_clock))
+        self._torques = TorqueEstimate(params, self._joints.names, SourceStamps(params.shared_clock))
         self._efforts = (
             [node.subscribe(params.torques, self._torques.kind, self._torques.take)] if params.torques else []
         )
@@ -144,7 +144,7 @@ class Ros2Robot:
         """The arm's joints as the messages call them."""
         return self._joints.names
 
-    def measured(self) -> Measured:
+    def measured(self) -> JointReading:
         """Return the newest joint state; a RobotError where there is none."""
         if self._joints.newest is None:
             raise RobotError(self._missing_input())

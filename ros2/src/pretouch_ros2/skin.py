@@ -13,7 +13,7 @@ from pretouch.types import RangeReadings, RangeStatus
 from pretouch_ros2.messages import RANGE
 from pretouch_ros2.node import Ros2Node
 from pretouch_ros2.params import UNIT, SkinParams
-from pretouch_ros2.stamps import Stamps
+from pretouch_ros2.stamps import SourceStamps
 
 _NOTHING = (-math.inf, 0.0, RangeStatus.NONE)
 """Stamp, distance and status of a unit that is not heard."""
@@ -26,7 +26,7 @@ class Ros2Skin:
 
     def __init__(self, params: SkinParams, skin: skins.Skin, node: Ros2Node) -> None:
         self._ids, self._node, self.params = skin.ids, node, params
-        self._stamps = [Stamps(params.shared_clock) for _ in skin.ids]
+        self._stamps = [SourceStamps(params.shared_clock) for _ in skin.ids]
         self._newest: list[tuple[float, float, RangeStatus]] = [_NOTHING for _ in skin.ids]
         self._unknown: set[str] = set()
         if UNIT in params.topic:

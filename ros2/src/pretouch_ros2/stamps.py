@@ -27,7 +27,7 @@ class _Writer:
     """Its newest stamp [s]."""
 
 
-class Stamps:
+class SourceStamps:
     """The stamps of one source, whose messages each have a header."""
 
     def __init__(self, shared_clock: bool = False, now: Callable[[], float] = wall_clock) -> None:

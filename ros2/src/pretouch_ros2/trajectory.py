@@ -43,12 +43,12 @@ class StoppingTrajectory:
     first: int = 1
     """Which of the instants is the first way-point."""
 
-    def points(self) -> Iterator["Point"]:
+    def points(self) -> Iterator["TrajectoryPoint"]:
         """Yield all points, the first at its begin."""
         for time, q, qd in zip(self.time.tolist(), self.q, self.qd, strict=True):
-            yield Point(time, q, qd)
+            yield TrajectoryPoint(time, q, qd)
 
-    def way_points(self) -> Iterator["Point"]:
+    def way_points(self) -> Iterator["TrajectoryPoint"]:
         """Yield the points from where the velocity was kept for a while on."""
         yield from islice(self.points(), self.first, None)
 
@@ -89,7 +89,7 @@ def stopping_trajectory(
 
 
 @value
-class Point:
+class TrajectoryPoint:
     """Where to be, relative to the begin of a trajectory."""
 
     time: float
@@ -145,17 +145,17 @@ class Reference:
         )
         return self._sent[-1].trajectory
 
-    def passed(self, now: float, past: float) -> tuple[Point, ...]:
+    def passed(self, now: float, past: float) -> tuple[TrajectoryPoint, ...]:
         """Return what was asked for in a time [s] before an instant [s]: its begin, and each change since."""
         begins = [sent.began for sent in self._sent]
         places = [now - past]
         for sent, until in zip(self._sent, [*begins[1:], math.inf], strict=True):
             knots = sent.began + sent.trajectory.time
             places += knots[knots < min(until, now) - _NEAREST_S].tolist()
-        points: list[Point] = []
+        points: list[TrajectoryPoint] = []
         for place in sorted(p for p in places if now - past <= p < now - _NEAREST_S):
             if not points or place - now > points[-1].time + _NEAREST_S:
-                points.append(Point(place - now, *self.motion_at(place)))
+                points.append(TrajectoryPoint(place - now, *self.motion_at(place)))
         return tuple(points)
 
     def motion_at(self, instant: float) -> tuple[FloatArray, FloatArray]:

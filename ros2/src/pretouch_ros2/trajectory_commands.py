@@ -9,11 +9,11 @@ import numpy as np
 from pretouch.errors import RobotError
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray
-from pretouch_ros2.joints import Measured
+from pretouch_ros2.joints import JointReading
 from pretouch_ros2.messages import TRAJECTORY
 from pretouch_ros2.node import Ros2Node
 from pretouch_ros2.params import ArmParams, parts
-from pretouch_ros2.trajectory import Point, Reference
+from pretouch_ros2.trajectory import Reference, TrajectoryPoint
 
 _FRESH_S = 0.1
 """Age of a joint state up to which it tells where the arm is [s]."""
@@ -60,7 +60,7 @@ class TrajectoryCommands:
         """When the last trajectory ends [s]."""
         return self._reference.ends + self._ahead
 
-    def begin(self, joints: Measured, now: float) -> float:
+    def begin(self, joints: JointReading, now: float) -> float:
         """Begin at rest where the arm is; return how long that takes [s]. A RobotError if that is not known."""
         if not np.isfinite(joints.q).all():
             raise RobotError(
@@ -83,11 +83,11 @@ class TrajectoryCommands:
         trajectory = reference.command(qd, now)
         self._publish((*passed, *trajectory.points()) if passed else trajectory.way_points(), now)
 
-    def at(self, joints: Measured, instant: float) -> tuple[FloatArray, FloatArray]:
+    def at(self, joints: JointReading, instant: float) -> tuple[FloatArray, FloatArray]:
         """Return positions and velocities (n,) that were commanded by an instant [s]."""
         return self._reference.at(instant) if self.begun else (joints.q, np.zeros_like(joints.q))
 
-    def check(self, joints: Measured, now: float) -> None:
+    def check(self, joints: JointReading, now: float) -> None:
         """Look whether the arm is where it was sent. Far elsewhere is a RobotError; else it may begin anew."""
         if not self.begun or now < self._settled or not now - joints.stamp < _FRESH_S or np.isnan(joints.q).any():
             return
@@ -113,14 +113,14 @@ class TrajectoryCommands:
         self._settled, self._known = now + self._params.settle_s, False
         self._publish(self._reference.begin(q, now, self._params.settle_s).way_points(), now)
 
-    def _elsewhere(self, joint: int, joints: Measured, instant: float) -> str:
+    def _elsewhere(self, joint: int, joints: JointReading, instant: float) -> str:
         return (
             f"The arm does not follow: {self._names[joint]} is at {joints.q[joint]:.3f} rad, but was commanded to"
             f" {self._reference.motion_at(instant)[0][joint]:.3f} rad: check that its controller runs and receives the"
             " commands, then start again from there."
         )
 
-    def _publish(self, points: Iterable[Point], began: float) -> None:
+    def _publish(self, points: Iterable[TrajectoryPoint], began: float) -> None:
         points, make, nothing = tuple(points), self._messages.make, np.zeros(0)
         if not all(np.isfinite(p.q).all() and np.isfinite(p.qd).all() for p in points):
             raise RobotError("A trajectory is not finite, so it is not sent: check the arm's joint states.")
