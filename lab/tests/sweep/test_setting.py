@@ -3,6 +3,7 @@ from hashlib import sha256
 from itertools import pairwise
 
 from pretouch.profiles import profile
+from pretouch.sensing.sensor import PAPER_SENSOR
 from pretouch.sim.randomisation import drawn, world_set
 from pretouch_lab.benchmarks.dense_skin import UNITS, units_of
 from pretouch_lab.sweep.measures import StaticScene
@@ -20,7 +21,7 @@ def test_each_value_arrives_where_its_name_says():
     assert made.profile.approach.rows == "floor"
     assert made.profile.slow is None
     assert (made.plant.mass_error, made.plant.payload_max_kg) == (0.1, 0.5)
-    assert (made.sensing.latency_s, made.sensing.period_s) == (0.1, 0.1)
+    assert (made.sensing.latency_s, made.sensing.period_of(PAPER_SENSOR)) == (0.1, 0.1)
     assert (len(made.skin), made.scene.side, made.seed) == (3, "+y", 1003)
 
 
@@ -28,7 +29,7 @@ def test_nothing_varied_is_the_profile_and_the_arm_of_all_other_experiments():
     made = built("paper", StaticScene(), {}, 0)
     assert made.profile == profile("paper")
     assert len(made.skin) == 7
-    assert made.sensing.period_s == 0.02
+    assert made.sensing.period_of(PAPER_SENSOR) == 0.02
 
 
 def test_a_world_draws_arm_and_sensors_under_what_is_varied(tmp_path):
