@@ -13,9 +13,8 @@ from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import SceneSpec
 from pretouch.types import RangeReadings, RangeStatus
-from pretouch.units.model_check import ModelCheck, ModelCheckParams
+from pretouch.units.model_check import ModelCheck
 
-PARAMS = ModelCheckParams()
 UNIT = 0
 FAR = 0.4
 
@@ -45,7 +44,7 @@ def readings(count, stamp, distance, status=RangeStatus.OK):
 
 
 def checked(model, skin, fixtures, reports, postures):
-    check = ModelCheck(model, skin, fixtures, PARAMS)
+    check = ModelCheck(model, skin, fixtures)
     for i, ((distance, status), q) in enumerate(zip(reports, postures, strict=True)):
         check.take(q, readings(len(skin), 0.02 * i, distance, status))
     return check.findings()
@@ -82,7 +81,7 @@ def test_a_fixture_out_of_reach_need_not_be_seen(panda_model, paper_skin, q):
 
 
 def test_the_same_reading_counts_once(panda_model, paper_skin, wall, q):
-    check = ModelCheck(panda_model, paper_skin, wall, PARAMS)
+    check = ModelCheck(panda_model, paper_skin, wall)
     for _ in range(200):
         check.take(q, readings(len(paper_skin), 1.0, 0.9))
     assert check.findings() == ()
@@ -110,7 +109,7 @@ def simulated(model, worn, thought, q):
     """What a check says of units that are worn in one way, and thought to be in another."""
     plant = Plant(model, SceneSpec(), PlantParams(), q, seed=0)
     finders = RangeFinders(plant, worn, RangeFinderParams(), 0)
-    check = ModelCheck(model, thought, no_fixtures(), PARAMS)
+    check = ModelCheck(model, thought, no_fixtures())
     for _ in range(250):
         plant.advance(0.01)
         check.take(q, finders.read())

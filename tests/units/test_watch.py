@@ -10,7 +10,7 @@ from pretouch.loop import MonotonicClock
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.units.fleet import simulated_keys
 from pretouch.units.health import HealthParams
-from pretouch.units.model_check import ModelCheck, ModelCheckParams
+from pretouch.units.model_check import ModelCheck
 from pretouch.units.skin import NetworkSkin
 from pretouch.units.watch import UnitWatch
 from tests.units.desk import Desk
@@ -26,7 +26,7 @@ def units(paper_skin):
 
 @pytest.mark.slow
 def test_units_that_are_well_are_found_well_and_one_that_falls_silent_is_named(units, panda_model, paper_skin):
-    agree = ModelCheck(panda_model, paper_skin, no_fixtures(), ModelCheckParams())
+    agree = ModelCheck(panda_model, paper_skin, no_fixtures())
     watch, clock = UnitWatch(units[1], 0.1, agree, lambda: panda_model.description.q_ready), MonotonicClock(0.01)
     watch.wait(clock, 20.0, 1.0)
     assert not [finding.sentence for finding in watch.judge()[1] if finding.level == "fault"]

@@ -30,7 +30,7 @@ from pretouch.units import EVERYWHERE, HOST, PORT
 from pretouch.units.findings import Finding
 from pretouch.units.health import UnitHealth, status_name
 from pretouch.units.keys import load_keys
-from pretouch.units.model_check import ModelCheck, ModelCheckParams
+from pretouch.units.model_check import ModelCheck
 from pretouch.units.skin import NetworkSkin
 from pretouch.units.skin_recording import SkinRecording
 from pretouch.units.watch import UnitWatch, WatchUpdate
@@ -141,7 +141,7 @@ def _watched(command: Monitor, all_ids: tuple[str, ...]) -> tuple[NetworkUnits, 
             f"The posture has joint {i + 1} at {q[i]:g} rad, outside its range of {model.q_min[i]:.2f} to"
             f" {model.q_max[i]:.2f} rad: give joint positions of this arm."
         )
-    return skin.network, ModelCheck(model, skin, no_fixtures(), ModelCheckParams()), q
+    return skin.network, ModelCheck(model, skin, no_fixtures()), q
 
 
 def _shown(

@@ -12,7 +12,7 @@ from pretouch.ports import Arm, Clock, Robot, Skin
 from pretouch.sound import sound_robot
 from pretouch.types import FloatArray, RobotState
 from pretouch.units.findings import Finding
-from pretouch.units.model_check import ModelCheck, ModelCheckParams
+from pretouch.units.model_check import ModelCheck
 from pretouch.units.skin import NetworkSkin
 from pretouch.units.watch import UnitWatch
 
@@ -296,7 +296,7 @@ class StandingArm:
         self.demand_fit()
         c, wrong = self.controller, tuple[Finding, ...]()
         if isinstance(self.skin, NetworkSkin):
-            agree = ModelCheck(c.model, c.skin, c.fixtures, ModelCheckParams())
+            agree = ModelCheck(c.model, c.skin, c.fixtures)
             units = UnitWatch(self.skin, _LOOK_S, agree, lambda: self.arm.read().q, self.left_out)
             units.wait(self.clock)
             seen = watch(self.arm, self.clock, c.limits.qd_max, WATCH_S, units.take)

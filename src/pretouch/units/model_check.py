@@ -2,11 +2,9 @@
 
 from collections import deque
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
-from pretouch.checks import Checked, Fraction, Positive, PositiveCount
 from pretouch.perception.obstacles import measured, placed_sensors, tells_anything
 from pretouch.perception.scene_filter import Fixtures, bounds, expected_range, nearest_capsule, plane_return
 from pretouch.robot.body import Capsules, placed
@@ -19,24 +17,18 @@ from pretouch.units.findings import Finding
 
 _INNER = 7
 """Rays: the axis, and the ring half-way to the edge of the cone: where all of these end, a return is strong."""
-
-
-@dataclass(frozen=True)
-class ModelCheckParams(Checked):
-    """When a unit is said to disagree with the model."""
-
-    reach_m: Positive = 0.6
-    """Predicted return up to which a unit must see it [m]: in strong light the sensor sees 0.7 m."""
-    margin_m: Positive = 0.1
-    """By how much a reading may be farther than predicted [m]: ranging error, placement, and capsules for surfaces."""
-    tests: PositiveCount = 100
-    """Readings from which a verdict is given: four seconds' worth of the monitor's 25 a second."""
-    share: Fraction = 0.8
-    """Share of the last ones that must contradict the model."""
-    near_m: Positive = 0.1
-    """Reading up to which a lens may be covered [m]."""
-    moved_m: Positive = 0.2
-    """How far a unit must have moved while it reads something near all the time [m]: no person's hand follows so."""
+REACH_M = 0.6
+"""Predicted return up to which a unit must see it [m]: in strong light the sensor sees 0.7 m."""
+MARGIN_M = 0.1
+"""By how much a reading may be farther than predicted [m]: ranging error, placement, and capsules for surfaces."""
+TESTS = 100
+"""Readings from which a verdict is given: four seconds' worth of the monitor's 25 a second."""
+SHARE = 0.8
+"""Share of the last ones that must contradict the model."""
+NEAR_M = 0.1
+"""Reading up to which a lens may be covered [m]."""
+MOVED_M = 0.2
+"""How far a unit must have moved while it reads something near all the time [m]: no person's hand follows so."""
 
 
 class ModelCheck:
@@ -46,11 +38,11 @@ class ModelCheck:
     file), and one that sees something near wherever it goes (covered).
     """
 
-    def __init__(self, model: RobotModel, skin: Skin, fixtures: Fixtures, params: ModelCheckParams) -> None:
-        self._model, self._skin, self._fixtures, self._params = model, skin, fixtures, params
+    def __init__(self, model: RobotModel, skin: Skin, fixtures: Fixtures) -> None:
+        self._model, self._skin, self._fixtures = model, skin, fixtures
         count = len(skin)
         self._used = np.full(count, -np.inf)
-        self._tests: list[deque[tuple[bool, float, float]]] = [deque(maxlen=params.tests) for _ in range(count)]
+        self._tests: list[deque[tuple[bool, float, float]]] = [deque(maxlen=TESTS) for _ in range(count)]
         self._near = [_NearReadings() for _ in range(count)]
         self._predicted(model.description.q_ready, np.ones(count, np.bool_))  # compiled before readings wait for it
 
@@ -69,10 +61,10 @@ class ModelCheck:
         position, nearest, farthest = self._predicted(q, fresh)
         seen = np.where(np.isnan(distance), np.inf, distance)
         for k in np.flatnonzero(fresh).tolist():
-            if farthest[k] <= self._params.reach_m:
-                missed = bool(seen[k] > farthest[k] + self._params.margin_m)
+            if farthest[k] <= REACH_M:
+                missed = bool(seen[k] > farthest[k] + MARGIN_M)
                 self._tests[k].append((missed, float(seen[k]), float(farthest[k])))
-            covered = seen[k] <= self._params.near_m and seen[k] < nearest[k] - self._params.margin_m
+            covered = seen[k] <= NEAR_M and seen[k] < nearest[k] - MARGIN_M
             if covered:
                 self._near[k].take(float(seen[k]), position[k])
             else:
@@ -91,9 +83,9 @@ class ModelCheck:
         return tuple(finding for k, unit in enumerate(self._skin.ids) for finding in self._of(k, unit))
 
     def _of(self, k: int, unit: str) -> Iterator[Finding]:
-        tests, near, params = self._tests[k], self._near[k], self._params
+        tests, near = self._tests[k], self._near[k]
         missed = [(seen, predicted) for wrong, seen, predicted in tests if wrong]
-        if len(tests) == params.tests and len(missed) >= params.share * params.tests:
+        if len(tests) == TESTS and len(missed) >= SHARE * TESTS:
             seen, predicted = np.median(np.array(missed), axis=0)
             what = f"{seen:.2f} m" if np.isfinite(seen) else "nothing"
             sees = (
@@ -101,7 +93,7 @@ class ModelCheck:
             )
             remedy = "check its pose in the skin file, its window, and the positions of the fixtures."
             yield Finding(unit, "fault", "model", f"{sees} of {len(tests)} readings: {remedy}")
-        if near.count >= params.tests and near.moved >= params.moved_m:
+        if near.count >= TESTS and near.moved >= MOVED_M:
             sees = (
                 f"{unit} reports {near.distance:.3f} m everywhere along {near.moved:.1f} m of its motion, but the model"
             )
