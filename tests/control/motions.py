@@ -24,9 +24,15 @@ class Mover:
         self.memory, self.approach = state.memory, state.approach
 
     def step(
-        self, kin: Kinematics, robot: RobotState, obstacles: Obstacles, velocity: FloatArray, goal: FloatArray
+        self,
+        kin: Kinematics,
+        robot: RobotState,
+        obstacles: Obstacles,
+        velocity: FloatArray,
+        goal: FloatArray,
+        hold: bool = False,
     ) -> ControlStep:
-        """Return the motion of one step in which velocity and orientation are asked for."""
+        """Return the motion of one step in which velocity and orientation are asked for, or to hold."""
         controller, now = self.controller, self.controller.blank.copy()
         put_robot(now.part("robot", Report), robot)
         now.fill("kin", kin)
@@ -36,6 +42,7 @@ class Mover:
         now.put("seen.all", len(obstacles.unit))
         now.put("request.velocity", velocity)
         now.put("request.goal", goal)
+        now.put("request.hold", hold)
         if controller.approach is None:
             controller.take(self.memory, now, controller.beside, MOVE, MOVE)
         else:
