@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import tyro
@@ -36,7 +36,7 @@ _SPOTS = 8
 class Coverage:
     """Share of the paths to the arm on which a skin sees an object in time; blind spots; where more units help most."""
 
-    skin: tyro.conf.Positional[Path | None] = None
+    skin: tyro.conf.Positional[Annotated[Path | None, tyro.conf.arg(metavar="[FILE]")]] = None
     """Skin file; by default the seven units that come with the package, or the skin in the arm's folder."""
     arm: str = "panda"
     """panda, fr3, or the folder of an imported arm."""
