@@ -50,8 +50,8 @@ def test_an_arm_is_imported_by_its_name(package, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ("raise OSError('git: no route to host')", "could not bring sixer_description: git: no route to host"),
-        ("PACKAGE_PATH = '/there'", "could not bring sixer_description: .* no attribute 'MJCF_PATH'"),
+        ("raise OSError('git: no route to host')", "could not bring it: git: no route to host"),
+        ("PACKAGE_PATH = '/there'", "could not bring it: .* no attribute 'MJCF_PATH'"),
     ],
 )
 def test_what_the_package_cannot_bring_is_said(package, text, sentence):
@@ -60,12 +60,12 @@ def test_what_the_package_cannot_bring_is_said(package, text, sentence):
 
 
 def test_an_unknown_name_is_said(package):
-    with pytest.raises(RobotModelError, match="could not bring sixerr_description: No module named"):
+    with pytest.raises(RobotModelError, match="could not bring it: No module named"):
         described("sixerr_description")
 
 
 def test_without_the_package_it_is_said_how_to_get_it(monkeypatch):
-    monkeypatch.setattr("pretouch.importing.read.find_spec", lambda name: None)
+    monkeypatch.setitem(sys.modules, "robot_descriptions", None)
     with pytest.raises(RobotModelError, match=r"There is no file ur5_description, .* pip install robot_descriptions"):
         described("ur5_description")
 

@@ -3,7 +3,6 @@
 import re
 from functools import partial
 from importlib import import_module
-from importlib.util import find_spec
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -44,11 +43,6 @@ def described(name: str) -> tuple[Path, Path]:
     The package robot_descriptions of PyPI has them, and fetches each by git. It is not required: where it is not
     installed, does not know the name, or cannot fetch the files, a RobotModelError says so.
     """
-    if find_spec(_PACKAGE) is None:
-        raise RobotModelError(
-            f"There is no file {name}, and by this name only the package {_PACKAGE} could bring one, which is not"
-            f" installed: run pip install {_PACKAGE}, or give a URDF or MJCF file."
-        )
     try:
         module = import_module(f"{_PACKAGE}.{name}")
         file = Path(getattr(module, "URDF_PATH", None) or module.MJCF_PATH)
@@ -56,8 +50,9 @@ def described(name: str) -> tuple[Path, Path]:
     except Exception as error:  # whatever git, its cache or a macro processor have to say
         reason = " ".join(str(error).split())[:300] or type(error).__name__
         raise RobotModelError(
-            f"The package {_PACKAGE} could not bring {name}: {reason}. It fetches each robot that it knows once, by git"
-            " from the Internet: get that to work, or give a URDF or MJCF file."
+            f"There is no file {name}, and the package {_PACKAGE} could not bring it: {reason}. Give a URDF or MJCF"
+            f" file; or run pip install {_PACKAGE}, which fetches each robot that it knows once, by git from the"
+            " Internet."
         ) from error
     return file, package.parent
 
