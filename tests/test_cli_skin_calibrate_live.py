@@ -112,7 +112,7 @@ def at_once(monkeypatch, paper_skin):
     monkeypatch.setattr(live, "skin_for", lambda *_: paper_skin)
     monkeypatch.setattr(live.UnitWatch, "wait", lambda *_: None)
     monkeypatch.setattr(live, "_plans", lambda *_: [])
-    monkeypatch.setattr(live, "_recorded", lambda *_: print("It moves."))
+    monkeypatch.setattr(live, "_move", lambda *_: print("It moves."))
 
 
 @pytest.mark.parametrize(("error", "code"), [(RecordingError("The disk is bad."), 2), (KeyboardInterrupt(), 130)])
@@ -125,11 +125,11 @@ def test_how_to_calibrate_from_the_recording_is_said_before_the_motion_and_after
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(live, "calibrate_recorded", fails)
     (tmp_path / "skin.toml").touch()
-    taken = "skin-calibration-1.mcap"
-    assert cli.main(["skin", "calibrate", *FILES, "--json", taken, "--skin", "skin.toml", "--replace"]) == code
+    (tmp_path / "skin-calibration-1.mcap").touch()
+    assert cli.main(["skin", "calibrate", *FILES, "--json", "numbers", "--skin", "skin.toml", "--replace"]) == code
     command = (
         "pretouch skin calibrate --recording skin-calibration-2.mcap --arm panda --out skin.toml --skin skin.toml"
-        f" --json {taken} --replace\n"
+        " --json numbers --replace\n"
     )
     before, after = capsys.readouterr().out.split("It moves.\n")
     assert before.endswith(f"All measurements are recorded in skin-calibration-2.mcap. To calibrate from it: {command}")
@@ -165,7 +165,7 @@ def test_a_motion_that_is_interrupted_leaves_its_recording_and_says_how_to_go_on
     out, err = process.communicate(timeout=30)
     assert process.returncode == code
     assert "Traceback" not in err
-    assert re.search(r"The arm was stopped\. skin-calibration-1\.mcap holds \d+ samples, in .* MB\.", out)
+    assert re.search(r"ended early: A signal came\.\nskin-calibration-1\.mcap holds \d+ samples, in .* MB\.", out)
     assert "pretouch skin calibrate --recording skin-calibration-1.mcap --arm panda --out skin.toml" in out
     assert not (tmp_path / "skin.toml").exists()
     assert read_skin(tmp_path / "skin-calibration-1.mcap").joints is not None

@@ -72,7 +72,6 @@ def test_a_recording_of_units_and_joints_becomes_a_skin_file(panda_model, skin, 
         assert written.orientation_sigma == pytest.approx(np.hypot(place["orientation_sigma"], floor))
         assert np.array(place["covariance"]).shape == (6, 6)
         assert unit["id"] in said
-        assert unit["observability"]["unknown"] == []
 
 
 def test_joint_states_of_another_clock_are_aligned(panda_model, skin, recorded, tmp_path, capsys):

@@ -8,7 +8,7 @@ from scipy.interpolate import CubicSpline
 
 from pretouch.calibration.calibrate import calibrate
 from pretouch.calibration.checks import checked_joints
-from pretouch.calibration.values import Calibration, CalibrationData, CalibrationParams
+from pretouch.calibration.values import Calibration, CalibrationData
 from pretouch.errors import CalibrationError
 from pretouch.sensing.skin import Skin
 from pretouch.traces import JointTrace
@@ -77,7 +77,7 @@ REFUSED = {
     "degrees": ("gyroscope_scale", lambda data, unit: scaled(data, unit, 1.0, np.rad2deg(1.0)), "look like degrees/s"),
     "mirrored": ("mirrored", lambda data, unit: scaled(data, unit, 1.0, np.array([1, 1, -1])), "axes are mirrored"),
     "sign": ("scale", lambda data, unit: scaled(data, unit, np.array([1, 1, -1])), "accelerometer z .* its sign"),
-    "lying": ("never_moved", on_the_table, "never moved"),
+    "lying": ("no_link", on_the_table, "fits no link"),
     "backwards": ("no_link", backwards, "fits no link"),
     "early end": ("unusable", lambda data, unit: silent(data, unit, 20.0, 99.0), "could not be used"),
 }
@@ -246,7 +246,7 @@ def test_joint_values_given_more_than_once_are_named_and_taken_once(panda_model,
 def test_an_arm_that_stands_repeats_its_values_for_good_reason(panda_model, good):
     q = good.joints.q.copy()
     q[4000:4400] = q[4000]
-    joints_then, findings = checked_joints(panda_model, JointTrace(good.joints.stamp, q), CalibrationParams())
+    joints_then, findings = checked_joints(panda_model, JointTrace(good.joints.stamp, q))
     assert findings == ()
     assert len(joints_then.stamp) == len(q)
 

@@ -7,11 +7,10 @@ from scipy.spatial.transform import Rotation
 from pretouch.calibration.fit import Estimate, Fit, Problem, fit, start
 from pretouch.calibration.link_motion import LinkMotion
 from pretouch.calibration.signals import Measured
-from pretouch.calibration.values import CalibrationParams
+from pretouch.calibration.values import GRAVITY, RATE_HZ
 
-PARAMS = CalibrationParams()
 NOISE = np.repeat((0.003, 0.02), 3)
-TIME = np.arange(0, 60, 1 / PARAMS.rate_hz)
+TIME = np.arange(0, 60, 1 / RATE_HZ)
 
 
 def motion(seed=0):
@@ -46,7 +45,7 @@ def measured(link, true, noise=None, seed=0):
 
 def test_the_jacobian_is_that_of_finite_differences():
     link, true = motion(), truth()
-    problem = Problem(link, measured(link, truth(3)), true, NOISE, PARAMS)
+    problem = Problem(link, measured(link, truth(3)), true, NOISE)
     x = np.random.default_rng(5).uniform(-0.3, 0.3, 23)
     J, h = problem.jacobian(x), 1e-6
     for k in range(23):
@@ -58,7 +57,7 @@ def test_the_jacobian_is_that_of_finite_differences():
 def test_the_closed_form_is_near_enough_to_start_from():
     for seed in range(20):
         link, true = motion(seed=seed), truth(seed)
-        found = start(link, measured(link, true, NOISE, seed), PARAMS.gravity)
+        found = start(link, measured(link, true, NOISE, seed), GRAVITY)
         assert np.linalg.norm(found.p - true.p) < 0.02
         assert Rotation.from_matrix(found.R.T @ true.R).magnitude() < 0.05
         assert np.linalg.det(found.R) == pytest.approx(1.0)
@@ -75,7 +74,7 @@ def test_the_covariance_is_honest():
     for seed in range(150):
         true = truth(seed)
         data = measured(link, true, NOISE, seed)
-        told.append(nees(fit(link, data, start(link, data, PARAMS.gravity), NOISE, PARAMS), true))
+        told.append(nees(fit(link, data, start(link, data, GRAVITY), NOISE), true))
     # the mean of 150 chi-squares of 6 degrees of freedom is within 6 +- 4 * sqrt(12 / 150), but that the covariance of
     # 60 blocks is itself uncertain, which adds some
     assert 4.9 < np.mean(told) < 8.5
@@ -89,7 +88,7 @@ def test_few_blocks_are_not_believed_beyond_what_independent_errors_would_say():
         true = truth(seed)
         data = measured(link, true, NOISE, seed)
         part = LinkMotion(link.w[short], link.a[short], link.R_link_base[short], link.alpha[short])
-        told.append(nees(fit(part, Measured(data.values[short], data.rates[short]), true, NOISE, PARAMS), true))
+        told.append(nees(fit(part, Measured(data.values[short], data.rates[short]), true, NOISE), true))
     assert np.mean(told) < 6.0
     assert np.max(told) < 30.0
 
@@ -100,7 +99,7 @@ def test_the_covariance_counts_errors_that_last():
     exact = measured(link, true)
     lasting = Measured(exact.values + NOISE * slow, exact.rates)
     fast = measured(link, true, NOISE)
-    sigma = [np.trace(fit(link, d, true, NOISE, PARAMS).covariance[3:6, 3:6]) ** 0.5 for d in (fast, lasting)]
+    sigma = [np.trace(fit(link, d, true, NOISE).covariance[3:6, 3:6]) ** 0.5 for d in (fast, lasting)]
     assert sigma[1] > 2.5 * sigma[0]
 
 
@@ -108,8 +107,8 @@ def test_large_differences_count_less_when_robust():
     link, true = motion(), truth()
     data = measured(link, true, NOISE)
     data.values[200:260] += 5.0
-    plain = fit(link, data, true, NOISE, PARAMS).estimate
-    robust = fit(link, data, true, NOISE, PARAMS, robust=True).estimate
+    plain = fit(link, data, true, NOISE).estimate
+    robust = fit(link, data, true, NOISE, robust=True).estimate
     assert np.linalg.norm(robust.p - true.p) < 0.25 * np.linalg.norm(plain.p - true.p)
 
 
@@ -117,6 +116,6 @@ def test_large_differences_count_less_when_robust():
 def test_an_arm_elsewhere_or_off_level_does_not_move_the_unit(gravity):
     link, true = motion(seed=4), truth(4, gravity)
     data = measured(link, true)
-    found = fit(link, data, start(link, data, PARAMS.gravity), NOISE, PARAMS).estimate
+    found = fit(link, data, start(link, data, GRAVITY), NOISE).estimate
     assert found.p == pytest.approx(true.p, abs=2e-4)
     assert found.gravity == pytest.approx(true.gravity, abs=2e-3)

@@ -4,10 +4,8 @@ import numpy as np
 import pytest
 
 from pretouch.calibration.link_motion import ArmMotion
-from pretouch.calibration.values import CalibrationParams
 from pretouch.traces import JointTrace
 
-PARAMS = CalibrationParams()
 FREQUENCIES = np.array([0.3, 0.4, 0.5, 0.35, 0.7, 0.6, 0.9])
 
 
@@ -23,7 +21,7 @@ def swing(model, time):
 @pytest.fixture(scope="module")
 def arm(panda_model):
     time = 100.0 + np.arange(0, 6.0, 0.001)
-    return ArmMotion(panda_model, JointTrace(time, swing(panda_model, time)[0]), PARAMS)
+    return ArmMotion(panda_model, JointTrace(time, swing(panda_model, time)[0]))
 
 
 def test_near_the_ends_nothing_is_usable(arm):
@@ -54,7 +52,7 @@ def test_a_point_of_a_link_moves_as_its_motion_says(arm, panda_model, link):
 def test_gaps_in_joint_positions_are_not_used(panda_model):
     time = np.arange(0, 8.0, 0.001)
     time = time[(time < 3.0) | (time > 3.4)]
-    arm = ArmMotion(panda_model, JointTrace(time, swing(panda_model, time)[0]), PARAMS)
+    arm = ArmMotion(panda_model, JointTrace(time, swing(panda_model, time)[0]))
     assert not arm.usable[(arm.time > 2.75) & (arm.time < 3.65)].any()
     assert arm.usable[(arm.time > 2.0) & (arm.time < 2.7)].all()
     q = swing(panda_model, arm.time)[0]

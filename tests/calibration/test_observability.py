@@ -9,13 +9,11 @@ from pretouch.calibration.joint_noise import JointNoise
 from pretouch.calibration.link_motion import ArmMotion
 from pretouch.calibration.observability import Axis, observability
 from pretouch.calibration.signals import rate_of_change, smooth, times
-from pretouch.calibration.values import CalibrationParams
 from pretouch.sensing.skin import Skin
 from pretouch.sim.random_skin import random_skin
 from pretouch.traces import JointTrace
 from tests.calibration.made import MovingArm, Noise, pose_error
 
-PARAMS = CalibrationParams()
 AXIS = Axis("panda_joint3", np.array([0.0, 0.1, 0.0]), np.array([0.0, 0.0, 1.0]))
 
 
@@ -39,21 +37,21 @@ def covariance(*free: tuple[np.ndarray, float]) -> np.ndarray:
 def test_a_turn_about_the_joint_s_axis_is_seen_through_the_place_that_it_moves():
     T = pose(0.1, 0.0, 0.2)
     about = np.concatenate([AXIS.direction, np.cross(AXIS.direction, T[:3, 3] - AXIS.point)])
-    known = observability(covariance((about, 1.0), (np.eye(6)[5], 0.3)), T, AXIS, PARAMS)
-    assert known.unknown == (
+    unknown, known = observability(covariance((about, 1.0), (np.eye(6)[5], 0.3)), T, AXIS)
+    assert unknown == (
         "where it sits along the axis of panda_joint3",
         "its angle about the axis of panda_joint3",
     )
     # from the axis at (0, 0.1) to the unit at (0.1, 0): the root of 0.02
-    assert "141.4 mm (sigma 0.1 mm)" in known.known[0]
-    assert "0.0" in known.known[1]
+    assert "141.4 mm (sigma 0.1 mm)" in known[0]
+    assert "0.0" in known[1]
 
 
 def test_any_other_direction_is_named_by_its_coordinates():
     along = np.concatenate([np.zeros(3), [0.6, 0.8, 0.0]])
     turn = np.concatenate([[1.0, 0.0, 0.0], np.zeros(3)])
-    known = observability(covariance((along, 0.05), (turn, 0.2)), pose(0.1, 0.0, 0.2), AXIS, PARAMS)
-    assert known.unknown == (
+    unknown, _ = observability(covariance((along, 0.05), (turn, 0.2)), pose(0.1, 0.0, 0.2), AXIS)
+    assert unknown == (
         "its position along (0.60, 0.80, 0.00) of the link (sigma 50 mm)",
         "its orientation about x of the link (sigma 11.5 degrees)",
     )
@@ -99,9 +97,9 @@ def test_the_accelerations_noise_is_told_from_the_positions(panda_model, rate):
     swing = 0.4 * np.sin(2 * np.pi * 0.4 * stamp)[:, None]
     noise = 1e-4 * rng.standard_normal((len(stamp), 7))
     joints = JointTrace(stamp, panda_model.q_mid + swing + noise)
-    found = JointNoise(ArmMotion(panda_model, joints, PARAMS), joints, PARAMS).acceleration
+    found = JointNoise(ArmMotion(panda_model, joints), joints).acceleration
     fine = times(0.0, 19.9)
-    acceleration = rate_of_change(rate_of_change(smooth(stamp, noise, fine, PARAMS)))[200:-200]
+    acceleration = rate_of_change(rate_of_change(smooth(stamp, noise, fine)))[200:-200]
     assert found == pytest.approx(acceleration.std(axis=0), rel=0.3)
 
 
@@ -120,7 +118,7 @@ def test_a_weak_motion_and_noisy_joints_give_no_place_that_is_said_to_be_sure(pa
 
 def test_noisy_joints_make_a_position_less_certain_in_every_direction(panda_model, moving_arm, pair):
     data = moving_arm.data(pair, noise=Noise(joints=1e-4))
-    arm = ArmMotion(panda_model, data.joints, PARAMS)
-    located = Identifier(arm, PARAMS).identify(data.units[0]).located
-    added = (JointNoise(arm, data.joints, PARAMS).covariance(located) - located.covariance)[3:, 3:]
+    arm = ArmMotion(panda_model, data.joints)
+    located = Identifier(arm).identify(data.units[0]).located
+    added = (JointNoise(arm, data.joints).covariance(located) - located.covariance)[3:, 3:]
     assert np.linalg.matrix_rank(added, tol=1e-6 * np.linalg.norm(added)) == 3

@@ -6,10 +6,9 @@ from scipy.spatial.transform import Rotation
 
 from pretouch.calibration.alignment import align
 from pretouch.calibration.signals import FINE_S, ImuSignal, gaps, outside, rate_of_change, saturated, smooth, times
-from pretouch.calibration.values import CalibrationParams, UnitData
+from pretouch.calibration.values import UnitData
 from pretouch.traces import ImuTrace, on_grid
 
-PARAMS = CalibrationParams()
 STEP = 0.04
 TIME = np.arange(0, 40, STEP)
 
@@ -82,7 +81,7 @@ def test_fast_signals_do_not_pass():
     stamp = np.arange(0, 10, 1 / 416)
     at = times(0.5, 9.5)
     for frequency in (20.0, 50.0, 90.0, 170.0):
-        passed = smooth(stamp, np.cos(2 * np.pi * frequency * stamp)[:, None], at, PARAMS)[200:-200]
+        passed = smooth(stamp, np.cos(2 * np.pi * frequency * stamp)[:, None], at)[200:-200]
         assert np.abs(passed).max() < 1e-3
 
 
@@ -123,7 +122,7 @@ def test_where_a_value_is_cut_off_nothing_is_used():
     rate[1000] = [0.0, -8.726, 0.0]
     made = unit(stamp, acceleration, rate, angular_velocity_max=8.7266, acceleration_max=39.2)
     assert np.flatnonzero(saturated(made)).tolist() == [1000]
-    signal = ImuSignal(made, PARAMS)
+    signal = ImuSignal(made)
     at = np.arange(0, 5, 0.04)
     expected = (at > 0.26) & (at < stamp[-1] - 0.26) & (np.abs(at - stamp[1000]) > 0.26)
     assert np.array_equal(signal.usable(at), expected)
@@ -133,7 +132,7 @@ def test_where_a_value_is_cut_off_nothing_is_used():
 def test_an_imu_signal_tells_values_and_rates_at_any_instant():
     stamp = 1000 + np.arange(0, 6, 1 / 416)
     phase = 2 * np.pi * (stamp - 1000)[:, None] * [0.5, 0.7, 0.9]
-    signal = ImuSignal(unit(stamp, np.sin(phase), np.cos(phase)), PARAMS)
+    signal = ImuSignal(unit(stamp, np.sin(phase), np.cos(phase)))
     at = np.array([1001.234, 1003.3, 1004.9])
     turn = 2 * np.pi * np.array([0.5, 0.7, 0.9])
     phase = turn * (at - 1000)[:, None]

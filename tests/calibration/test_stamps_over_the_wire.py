@@ -1,7 +1,5 @@
 """Instants of IMU samples that came from simulated units over a lossy network, through a recording."""
 
-from dataclasses import astuple
-
 import numpy as np
 import pytest
 
@@ -54,7 +52,7 @@ def instants_of_samples(place, ids, true):
             min(by_counts[tuple(row)], key=lambda instant: abs(instant - stamp))
             for row, stamp in zip(counts.tolist(), imu.stamp.tolist(), strict=True)
         ]
-        yield instants(*astuple(counters)), np.array(truth), imu
+        yield instants(counters), np.array(truth), imu
 
 
 @pytest.mark.slow

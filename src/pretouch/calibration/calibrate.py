@@ -18,38 +18,31 @@ from pretouch.calibration.identify import Identified, Identifier
 from pretouch.calibration.joint_noise import JointNoise
 from pretouch.calibration.link_motion import ArmMotion
 from pretouch.calibration.locate import Located
-from pretouch.calibration.observability import Axis, observability
-from pretouch.calibration.values import (
-    Calibration,
-    CalibrationData,
-    CalibrationParams,
-    Finding,
-    Observability,
-    Place,
-    UnitCalibration,
-    UnitData,
-)
+from pretouch.calibration.values import Calibration, CalibrationData, Finding, Place, UnitCalibration, UnitData
 from pretouch.errors import CalibrationError
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import LARGEST_ORIENTATION_SIGMA, LARGEST_POSITION_SIGMA, SensorUnit, seat
 from pretouch.types import FloatArray
 
+BOARD_MISALIGNMENT_DEG = 0.29
+"""Standard deviation of the angle between the IMU's axes and the range finder's [degrees], which no IMU can tell;
+added to what a skin file says of an orientation. Up to half a degree either way: how well a board is glued on."""
 
-def calibrate(model: RobotModel, data: CalibrationData, params: CalibrationParams | None = None) -> Calibration:
+
+def calibrate(model: RobotModel, data: CalibrationData) -> Calibration:
     """Find where each unit sits, and say what is wrong with its data.
 
     Raises:
         CalibrationError: nothing can be made from the joints' data, or two units have the same id.
         RobotModelError: the arm has no link that a unit is said to sit on.
     """
-    params = params or CalibrationParams()
     _check_ids(data.units)
-    joints, notes = checked_joints(model, data.joints, params)
-    arm = ArmMotion(model, joints, params)
-    identifier, noise = Identifier(arm, params), JointNoise(arm, joints, params)
-    units = tuple(_settled(arm, noise, unit, _identified(identifier, unit, params), params) for unit in data.units)
-    return Calibration(units, notes, float(np.deg2rad(params.board_misalignment_deg)))
+    joints, notes = checked_joints(model, data.joints)
+    arm = ArmMotion(model, joints)
+    identifier, noise = Identifier(arm), JointNoise(arm, joints)
+    units = tuple(_calibrated(identifier, noise, unit) for unit in data.units)
+    return Calibration(units, notes, float(np.deg2rad(BOARD_MISALIGNMENT_DEG)))
 
 
 def _check_ids(units: tuple[UnitData, ...]) -> None:
@@ -59,61 +52,42 @@ def _check_ids(units: tuple[UnitData, ...]) -> None:
         raise CalibrationError(f"The unit id {', '.join(twice)} is used more than once: give each unit its own id.")
 
 
-def _identified(identifier: Identifier, unit: UnitData, params: CalibrationParams) -> Identified:
-    clean, findings = checked_unit(unit, params)
+def _calibrated(identifier: Identifier, noise: JointNoise, unit: UnitData) -> UnitCalibration:
+    """Find where one unit sits, if its data pass all checks of their own."""
+    arm, model = identifier.arm, identifier.arm.model
+    clean, findings = checked_unit(unit)
     if any(finding.refused for finding in findings):
-        return Identified(findings=findings)
-    found = identifier.identify(clean)
-    found.findings[:0] = findings
-    return found
-
-
-def _settled(
-    arm: ArmMotion, noise: JointNoise, unit: UnitData, found: Identified, params: CalibrationParams
-) -> UnitCalibration:
-    wrong = _wrong_link(arm.model, unit, found)
-    findings = [*wrong, *found.findings]
-    if found.located is None:
         return UnitCalibration(unit.id, None, tuple(findings))
-    located, model = found.located, arm.model
-    doubts = [*share_findings(arm, located, params), *scale_findings(located, params)]
+    identified = identifier.identify(clean)
+    wrong = _wrong_link(model, unit, identified)
+    findings = [*wrong, *findings, *identified.findings]
+    located = identified.located
+    if located is None:
+        return UnitCalibration(unit.id, None, tuple(findings))
     link = located.link
     if unit.link is None or wrong:
-        link = likely_member(model, found.body, link, located.pose)
+        link = likely_member(model, identified.body, link, located.pose)
     T, covariance = seen_from(model, link, located.link, located.pose, noise.covariance(located))
-    known = _observability(arm, link, T, covariance, params)
+    doubts = [*share_findings(arm, located), *scale_findings(located)]
     if not any(doubt.refused for doubt in doubts):
-        bare = _observability(arm, link, T, seen_from(model, link, located.link, T, located.covariance)[1], params)
-        hiding = None if bare.unknown else noise.acceleration
-        doubts += unknown_finding(arm, link, known, hiding, params) or mounting_findings(model, link, T)
-    return UnitCalibration(unit.id, _place(arm, located, link, T, covariance), (*findings, *doubts), known)
+        doubts += unknown_finding(arm, link, T, covariance) or mounting_findings(model, link, T)
+    return UnitCalibration(unit.id, _place(model, located, link, T, covariance), (*findings, *doubts))
 
 
-def _wrong_link(model: RobotModel, unit: UnitData, found: Identified) -> list[Finding]:
+def _wrong_link(model: RobotModel, unit: UnitData, identified: Identified) -> list[Finding]:
     """Say which link the data of a unit fit that is said to sit on another one."""
-    if unit.link is None or not found.body or model.link_index(unit.link) in found.body:
+    if unit.link is None or not identified.body or model.link_index(unit.link) in identified.body:
         return []
-    covered = [link for link in found.body if link in model.capsules.link]
-    fitting = " or ".join(model.links[link] for link in covered or found.body)
+    covered = [link for link in identified.body if link in model.capsules.link]
+    fitting = " or ".join(model.links[link] for link in covered or identified.body)
     sentence = f"It is said to sit on {unit.link}, but its data fit {fitting}: correct its link, or move it."
     return [Finding("wrong_link", sentence, True)]
 
 
-def _observability(
-    arm: ArmMotion, link: int, T: FloatArray, covariance: FloatArray, params: CalibrationParams
-) -> Observability:
-    model = arm.model
-    kin = model.kinematics(model.q_mid)
-    joint = int(np.flatnonzero(model.moved_by[link])[-1])
-    R = kin.rotation[link]
-    axis = Axis(model.joints[joint], R.T @ (kin.anchor[joint] - kin.position[link]), R.T @ kin.axis[joint])
-    return observability(covariance, T, axis, params)
-
-
-def _place(arm: ArmMotion, located: Located, link: int, T: FloatArray, covariance: FloatArray) -> Place:
+def _place(model: RobotModel, located: Located, link: int, T: FloatArray, covariance: FloatArray) -> Place:
     e = located.estimate
     return Place(
-        link=arm.model.links[link],
+        link=model.links[link],
         T_link_sensor=T,
         covariance=covariance,
         acceleration_bias=e.acceleration_bias,

@@ -5,7 +5,16 @@ from dataclasses import replace
 import numpy as np
 
 from pretouch.calibration.signals import gaps, saturated
-from pretouch.calibration.values import CalibrationParams, Finding, UnitData
+from pretouch.calibration.values import (
+    CUTOFF_HZ,
+    GRAVITY,
+    LEAST_SWING_RAD,
+    LONGEST_GAP_S,
+    SHORTEST_S,
+    UNUSABLE,
+    Finding,
+    UnitData,
+)
 from pretouch.errors import CalibrationError
 from pretouch.robot.model import RobotModel
 from pretouch.traces import ImuTrace, JointTrace
@@ -27,34 +36,19 @@ _STUCK_S = 1.0
 _VARIES = np.repeat((0.05, 0.3), 3)
 """By how much others vary then at least: angular velocities [rad/s], accelerations [m/s^2]."""
 _AXES = tuple(f"{sensor} {axis}" for sensor in ("gyroscope", "accelerometer") for axis in "xyz")
-_GRAVITY = 9.80665
 _MISTAKEN = {
-    "accelerometer": (
-        (1 / _GRAVITY, "m/s^2 is needed and these look like g: multiply by 9.80665"),
-        (1000 / _GRAVITY, "m/s^2 is needed and these look like thousandths of g: multiply by 0.00980665"),
-        (100.0, "m/s^2 is needed and these look like cm/s^2: divide by 100"),
-    ),
-    "gyroscope": (
-        (np.rad2deg(1.0), "rad/s is needed and these look like degrees/s: multiply by pi / 180"),
-        (1000 * np.rad2deg(1.0), "rad/s is needed and these look like thousandths of degrees/s: divide by 57296"),
-        (np.deg2rad(1.0), "these look like rad/s taken for degrees/s: multiply by 180 / pi"),
-    ),
+    "accelerometer": (1 / GRAVITY, "m/s^2 is needed and these look like g: multiply by 9.80665"),
+    "gyroscope": (np.rad2deg(1.0), "rad/s is needed and these look like degrees/s: multiply by pi / 180"),
 }
-_RANGES = (
-    (2.0, "the range it is read with is probably twice the one it was set to"),
-    (0.5, "the range it is read with is probably half the one it was set to"),
-)
 
 
 def mistaken(sensor: str, scale: float) -> str:
     """Say what mistake makes a sensor measure so many times what is right, and the way out."""
-    causes = (*_MISTAKEN[sensor], *_RANGES)
-    return next((cause for factor, cause in causes if abs(scale / factor - 1) < 0.1), "check its scale and axes")
+    factor, cause = _MISTAKEN[sensor]
+    return cause if abs(scale / factor - 1) < 0.1 else "check its units, range and axes"
 
 
-def checked_joints(
-    model: RobotModel, joints: JointTrace, params: CalibrationParams
-) -> tuple[JointTrace, tuple[Finding, ...]]:
+def checked_joints(model: RobotModel, joints: JointTrace) -> tuple[JointTrace, tuple[Finding, ...]]:
     """Return joint positions at increasing instants, and what is to be known of them.
 
     Joints that did not move are at rest in them: their noise would pass for a motion. Raises CalibrationError for what
@@ -71,8 +65,8 @@ def checked_joints(
     _check_order(clean.stamp)
     _check_range(model, clean.q)
     for choice in (_own_stamp, _spaced, _renewed):
-        clean = clean.at(choice(clean, params))
-    _check_rate(clean, params)
+        clean = clean.at(choice(clean))
+    _check_rate(clean)
     findings = []
     if len(clean.stamp) < len(stamp):
         sentence = (
@@ -81,9 +75,9 @@ def checked_joints(
             " stamped where it is measured."
         )
         findings.append(Finding("joints_left_out", sentence, False))
-    moved = _moved(clean.q, params)
+    moved = _moved(clean.q)
     still = JointTrace(clean.stamp, np.where(moved, clean.q, np.median(clean.q, axis=0)))
-    return still, (*findings, *_missing(clean.stamp, params), *_standing(model, moved))
+    return still, (*findings, *_missing(clean.stamp), *_standing(model, moved))
 
 
 def _check_order(stamp: FloatArray) -> None:
@@ -106,17 +100,17 @@ def _check_range(model: RobotModel, q: FloatArray) -> None:
         )
 
 
-def _own_stamp(joints: JointTrace, params: CalibrationParams) -> BoolArray:
+def _own_stamp(joints: JointTrace) -> BoolArray:
     """Tell which states (T,) have a stamp of their own; where more than a few have none, they came in batches."""
     same = np.diff(joints.stamp) == 0
     shared = np.append(same, False) | np.append(False, same)[: len(joints.stamp)]
     return ~shared[: len(joints.stamp)] | bool(shared.sum() > _FEW * len(shared))
 
 
-def _spaced(joints: JointTrace, params: CalibrationParams) -> BoolArray:
+def _spaced(joints: JointTrace) -> BoolArray:
     """Tell which states (T,) no other follows closely: stamped on receipt, the last is the least late."""
     stamp, steps = joints.stamp, np.diff(joints.stamp)
-    regular = steps[steps <= params.longest_gap_s]
+    regular = steps[steps <= LONGEST_GAP_S]
     nearest, following = _BUNCHED * float(regular.mean()) if len(regular) else 0.0, np.inf
     keep = np.ones(len(stamp), np.bool_)
     for i in range(len(stamp) - 1, -1, -1):
@@ -125,11 +119,11 @@ def _spaced(joints: JointTrace, params: CalibrationParams) -> BoolArray:
     return keep
 
 
-def _renewed(joints: JointTrace, params: CalibrationParams) -> BoolArray:
+def _renewed(joints: JointTrace) -> BoolArray:
     """Tell which states (T,) are not of a value that was only held until the next one came; an arm may stand longer."""
     first = np.flatnonzero(_changed(joints.q))
     lasts = np.append(np.diff(joints.stamp[first]), np.inf)[: len(first)]
-    long = np.repeat(lasts > params.longest_gap_s, np.diff(np.append(first, len(joints.q))))
+    long = np.repeat(lasts > LONGEST_GAP_S, np.diff(np.append(first, len(joints.q))))
     return np.asarray(_changed(joints.q) | long)
 
 
@@ -138,22 +132,22 @@ def _changed(q: FloatArray) -> BoolArray:
     return np.asarray(np.append(True, (np.diff(q, axis=0) != 0).any(axis=1))[: len(q)])
 
 
-def _check_rate(joints: JointTrace, params: CalibrationParams) -> None:
+def _check_rate(joints: JointTrace) -> None:
     """Refuse too few states, and changes of them that are too far apart."""
-    steps, rate = np.diff(joints.stamp), 1.0 / (_REGULAR * params.longest_gap_s)
-    span, known = float(steps.sum()), float(steps[steps <= params.longest_gap_s].sum())
+    steps, rate = np.diff(joints.stamp), 1.0 / (_REGULAR * LONGEST_GAP_S)
+    span, known = float(steps.sum()), float(steps[steps <= LONGEST_GAP_S].sum())
     news = np.diff(joints.stamp[_changed(joints.q)])
     period = float(np.median(news)) if len(news) else 0.0
-    if known < max(params.shortest_s, _SPARSE * span) or period > 1.05 / rate:
+    if known < max(SHORTEST_S, _SPARSE * span) or period > 1.05 / rate:
         raise CalibrationError(
             f"{len(joints.stamp)} joint states in {span:.3g} s make up {known:.3g} s without gaps, with new positions"
-            f" every {period:.3g} s: at least {params.shortest_s:g} s at {rate:g} Hz are needed; record 60 s at 100 Hz"
+            f" every {period:.3g} s: at least {SHORTEST_S:g} s at {rate:g} Hz are needed; record 60 s at 100 Hz"
             " or more, on one clock, in seconds."
         )
 
 
-def _missing(stamp: FloatArray, params: CalibrationParams) -> tuple[Finding, ...]:
-    long = np.diff(gaps(stamp, params.longest_gap_s)[1:-1], axis=1)
+def _missing(stamp: FloatArray) -> tuple[Finding, ...]:
+    long = np.diff(gaps(stamp, LONGEST_GAP_S)[1:-1], axis=1)
     if not len(long):
         return ()
     sentence = (
@@ -163,10 +157,10 @@ def _missing(stamp: FloatArray, params: CalibrationParams) -> tuple[Finding, ...
     return (Finding("joints_missing", sentence, False),)
 
 
-def _moved(q: FloatArray, params: CalibrationParams) -> BoolArray:
+def _moved(q: FloatArray) -> BoolArray:
     """Tell which joints moved (n,). CalibrationError if none did."""
     low, high = np.percentile(q, (1.0, 99.0), axis=0)
-    moved: BoolArray = high - low > params.least_swing_rad
+    moved: BoolArray = high - low > LEAST_SWING_RAD
     if not moved.any():
         raise CalibrationError(
             f"The arm did not move: no joint by more than {np.rad2deg((high - low).max()):.2g} degrees; run a"
@@ -187,7 +181,7 @@ def _standing(model: RobotModel, moved: BoolArray) -> tuple[Finding, ...]:
     return (Finding("joints_stood", sentence, False),)
 
 
-def checked_unit(unit: UnitData, params: CalibrationParams) -> tuple[UnitData, list[Finding]]:
+def checked_unit(unit: UnitData) -> tuple[UnitData, list[Finding]]:
     """Return a unit's data at increasing instants, and what is wrong with it; what is refused cannot be used at all."""
     imu, findings = unit.imu, []
     values = np.column_stack([imu.stamp, imu.acceleration, imu.angular_velocity])
@@ -200,11 +194,11 @@ def checked_unit(unit: UnitData, params: CalibrationParams) -> tuple[UnitData, l
             f"{np.mean(~keep):.1%} of its samples are not finite, or not later than those before, and were left out:"
             " check their source, and whether the unit restarted."
         )
-        findings.append(Finding("left_out", sentence, bool(np.mean(~keep) > params.unusable)))
-    span, rate = float(np.ptp(clean.imu.stamp)) if keep.any() else 0.0, 4.0 * params.cutoff_hz
-    if span < params.shortest_s or keep.sum() < (1.0 - params.unusable) * rate * span:
+        findings.append(Finding("left_out", sentence, bool(np.mean(~keep) > UNUSABLE)))
+    span, rate = float(np.ptp(clean.imu.stamp)) if keep.any() else 0.0, 4.0 * CUTOFF_HZ
+    if span < SHORTEST_S or keep.sum() < (1.0 - UNUSABLE) * rate * span:
         sentence = (
-            f"It has {keep.sum()} samples in {span:.3g} s: at least {params.shortest_s:g} s at {rate:g} Hz are needed,"
+            f"It has {keep.sum()} samples in {span:.3g} s: at least {SHORTEST_S:g} s at {rate:g} Hz are needed,"
             " of one run. Check that it is switched on and has an IMU, and its connection."
         )
         findings.append(Finding("too_little", sentence, True))
@@ -245,8 +239,8 @@ def _stuck(imu: ImuTrace, cut: BoolArray) -> list[Finding]:
 def _gravity(imu: ImuTrace) -> list[Finding]:
     """Find an accelerometer that does not measure gravity, which a calibration motion hardly adds to."""
     gravity = float(np.median(np.linalg.norm(imu.acceleration, axis=1)))
-    if 0.7 < gravity / _GRAVITY < 1.4:
+    if 0.7 < gravity / GRAVITY < 1.4:
         return []
-    cause = mistaken("accelerometer", gravity / _GRAVITY)
+    cause = mistaken("accelerometer", gravity / GRAVITY)
     sentence = f"Its accelerometer measures {gravity:.4g} m/s^2 where gravity is 9.81: {cause}."
     return [Finding("gravity", sentence, True)]

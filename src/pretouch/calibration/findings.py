@@ -4,7 +4,15 @@ import numpy as np
 
 from pretouch.calibration.link_motion import ArmMotion
 from pretouch.calibration.locate import Located
-from pretouch.calibration.values import CalibrationParams, Finding, Observability
+from pretouch.calibration.observability import Axis, observability
+from pretouch.calibration.values import (
+    LEAST_SWING_RAD,
+    SCALE_ERROR,
+    TOLERATED_ACCELERATION,
+    TOLERATED_ANGULAR_VELOCITY,
+    UNUSABLE,
+    Finding,
+)
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.unit import seat
 from pretouch.types import FloatArray
@@ -27,14 +35,14 @@ _INSIDE, _FACING = 3.0, 0.02
 surface is worth [m]."""
 
 
-def share_findings(arm: ArmMotion, located: Located, params: CalibrationParams) -> list[Finding]:
+def share_findings(arm: ArmMotion, located: Located) -> list[Finding]:
     """Say how much of the run was left out, and what of the rest is not explained."""
     whole = float(arm.usable.sum())
     missing, outliers = (1 - located.known.sum() / whole), float((located.known & ~located.used).sum()) / whole
     findings = _slipped(arm, located)
-    if missing + outliers > params.unusable:
+    if missing + outliers > UNUSABLE:
         sentence = (
-            f"{missing + outliers:.0%} of the run could not be used (limit {params.unusable:.0%}): during {missing:.0%}"
+            f"{missing + outliers:.0%} of the run could not be used (limit {UNUSABLE:.0%}): during {missing:.0%}"
             f" it measured nothing or was out of range, and during {outliers:.0%} it did not move with its link. Fix"
             " that and calibrate again."
         )
@@ -46,10 +54,10 @@ def share_findings(arm: ArmMotion, located: Located, params: CalibrationParams) 
         )
         findings.append(Finding("outliers", sentence, False))
     turning, acceleration = float(located.noise[0]), float(located.noise[3])
-    if turning > params.tolerated_angular_velocity or acceleration > params.tolerated_acceleration:
+    if turning > TOLERATED_ANGULAR_VELOCITY or acceleration > TOLERATED_ACCELERATION:
         sentence = (
             f"{turning:.3g} rad/s and {acceleration:.3g} m/s^2 of its measurements are unexplained (limits"
-            f" {params.tolerated_angular_velocity:g} rad/s and {params.tolerated_acceleration:g} m/s^2). Check that it"
+            f" {TOLERATED_ANGULAR_VELOCITY:g} rad/s and {TOLERATED_ACCELERATION:g} m/s^2). Check that it"
             " is fastened, and that scales and axes of both sensors are right."
         )
         findings.append(Finding("unexplained", sentence, True))
@@ -69,12 +77,12 @@ def _slipped(arm: ArmMotion, located: Located) -> list[Finding]:
     return [Finding("slipped", sentence, True)]
 
 
-def scale_findings(located: Located, params: CalibrationParams) -> list[Finding]:
+def scale_findings(located: Located) -> list[Finding]:
     """Name errors of the IMU's scales that are too large to be its own."""
     findings, e = [], located.estimate
     for sensor, scale in (("accelerometer", e.acceleration_scale), ("gyroscope", e.angular_velocity_scale)):
         axis = int(np.argmax(np.abs(scale)))
-        if abs(scale[axis]) > _UNUSUAL * params.scale_error:
+        if abs(scale[axis]) > _UNUSUAL * SCALE_ERROR:
             way_out = "correct its sign" if scale[axis] < -1 else "check its range"
             sentence = (
                 f"The scale of its {sensor} {'xyz'[axis]} seems to be {1 + scale[axis]:.2f} instead of 1: {way_out}."
@@ -83,38 +91,28 @@ def scale_findings(located: Located, params: CalibrationParams) -> list[Finding]
     return findings
 
 
-def unknown_finding(
-    arm: ArmMotion, link: int, known: Observability, noise: FloatArray | None, params: CalibrationParams
-) -> list[Finding]:
-    """Say what of a place is not known, why, and what to do.
-
-    Args:
-        arm: the run.
-        link: index of the link.
-        known: what of the place is known.
-        noise: (n,) of the joints' accelerations [rad/s^2], if it is what hides the place.
-        params: what has not moved.
-    """
-    if not known.unknown:
-        return []
+def unknown_finding(arm: ArmMotion, link: int, T: FloatArray, covariance: FloatArray) -> list[Finding]:
+    """Say what of a place, T_link_sensor (4, 4) with its covariance (6, 6), is not known, and what to do."""
     model, moving = arm.model, arm.model.moved_by[link]
+    kin, last = model.kinematics(model.q_mid), int(np.flatnonzero(moving)[-1])
+    R = kin.rotation[link]
+    axis = Axis(model.joints[last], R.T @ (kin.anchor[last] - kin.position[link]), R.T @ kin.axis[last])
+    unknown, known = observability(covariance, T, axis)
+    if not unknown:
+        return []
     swing: FloatArray = np.ptp(arm.q[arm.usable], axis=0)
-    lazy = np.flatnonzero(moving & (swing < 10 * params.least_swing_rad))
+    lazy = np.flatnonzero(moving & (swing < 10 * LEAST_SWING_RAD))
     names = ", ".join(f"{model.joints[j]} (it moved by {np.rad2deg(swing[j]):.1f} degrees)" for j in lazy)
-    way_out = "Move for longer, or faster, and turn about more axes."
+    way_out = (
+        "Move for longer, or faster, turn about more axes, and record joint positions with all their digits, each with"
+        " its own stamp."
+    )
     if len(lazy):
         way_out = f"Move {names} more."
-    elif noise is not None:
-        worst = int(np.argmax(np.where(moving, noise, 0.0)))
-        way_out = (
-            f"The noise of the joint positions hides it, mostly that of {model.joints[worst]}, equal to"
-            f" {noise[worst]:.2g} rad/s^2: record positions with all their digits, each with its own stamp."
-        )
     if moving.sum() == 1:
-        joint = model.joints[int(np.flatnonzero(moving)[0])]
-        way_out = f"{joint} alone moves {model.links[link]}, so no motion can determine it: measure it by hand."
-    rest = f" Known: {', and '.join(known.known)}." if known.known else ""
-    return [Finding("unobservable", f"Not known: {', and '.join(known.unknown)}.{rest} {way_out}", True)]
+        way_out = f"{axis.joint} alone moves {model.links[link]}, so no motion can determine it: measure it by hand."
+    rest = f" Known: {', and '.join(known)}." if known else ""
+    return [Finding("unobservable", f"Not known: {', and '.join(unknown)}.{rest} {way_out}", True)]
 
 
 def mounting_findings(model: RobotModel, link: int, T: FloatArray) -> list[Finding]:

@@ -20,14 +20,28 @@ from scipy.spatial.transform import Rotation
 
 from pretouch.calibration.link_motion import LinkMotion, skew
 from pretouch.calibration.signals import Measured
-from pretouch.calibration.values import CalibrationParams
+from pretouch.calibration.values import GRAVITY, RATE_HZ, SCALE_ERROR
 from pretouch.types import FloatArray
 
 TURN, PLACE, ACC_BIAS, GYRO_BIAS, CLOCK, LAG = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12), 12, 13
-ACC_SCALE, GYRO_SCALE, GRAVITY = slice(14, 17), slice(17, 20), slice(20, 23)
+ACC_SCALE, GYRO_SCALE, UPWARDS = slice(14, 17), slice(17, 20), slice(20, 23)
 """Of the unknowns: rotation in the sensor frame [rad], position in the link frame [m], biases, lateness of the clock
 and lag of the accelerometer [s], errors of scale, and what holds against gravity, in the base frame [m/s^2]."""
 UNKNOWNS = 23
+_ACCELERATION_BIAS = 0.4
+"""Standard deviation of the accelerometer's constant error, before anything is measured [m/s^2]: 40 mg (LSM6DS3
+data sheet, zero-g level offset)."""
+_ANGULAR_VELOCITY_BIAS = 0.17
+"""The same of the gyroscope [rad/s]: 10 degrees/s (LSM6DS3 data sheet, zero-rate level)."""
+_GRAVITY_ERROR = 0.02
+"""Its standard deviation [m/s^2]: from 9.780 at the equator to 9.832 at the poles."""
+_LEAN_DEG = 1.0
+"""Standard deviation of the angle by which the arm's base is off level, towards either side [degrees]."""
+_DELAY_DIFFERENCE_S = 0.0005
+"""Standard deviation of the delay by which the accelerometer's filter lags behind the gyroscope's [s]."""
+_BLOCK_S = 1.0
+"""Errors within this time are taken as wholly dependent on each other [s]: the answer's covariance comes from what
+blocks of this length say."""
 _REWEIGHTINGS = 4
 POSE_PRIOR = np.array([np.pi, np.pi, np.pi, 0.5, 0.5, 0.5])
 """Standard deviation of the pose before anything is measured [rad, m]: no unit is further from its link's origin. Only
@@ -70,7 +84,7 @@ class Estimate:
         return Estimate(
             self.R @ Rotation.from_rotvec(x[TURN]).as_matrix(), self.p + x[PLACE], x[ACC_BIAS], x[GYRO_BIAS],
             x[ACC_SCALE], x[GYRO_SCALE], float(x[CLOCK]), float(x[LAG]),
-            x[GRAVITY],
+            x[UPWARDS],
         )  # fmt: skip
 
     def specific_force(self, motion: LinkMotion) -> FloatArray:
@@ -103,29 +117,25 @@ def start(motion: LinkMotion, measured: Measured, gravity: float) -> Estimate:
     return Estimate(R, found[:3], found[3:] @ R, bias, none, none, 0.0, 0.0, np.array([0.0, 0.0, gravity]))
 
 
-def prior(params: CalibrationParams, late: float) -> FloatArray:
-    """Standard deviations (23,) of the unknowns before anything is measured; `late` is the clock's [s]."""
-    return np.concatenate([
-        POSE_PRIOR, np.full(3, params.acceleration_bias), np.full(3, params.angular_velocity_bias),
-        [late, params.delay_difference_s], np.full(6, params.scale_error),
-        np.full(2, params.gravity * np.deg2rad(params.lean_deg)), [params.gravity_error],
-    ])  # fmt: skip
+_PRIOR = np.concatenate([
+    POSE_PRIOR, np.full(3, _ACCELERATION_BIAS), np.full(3, _ANGULAR_VELOCITY_BIAS),
+    [np.inf, _DELAY_DIFFERENCE_S], np.full(6, SCALE_ERROR),
+    np.full(2, GRAVITY * np.deg2rad(_LEAN_DEG)), [_GRAVITY_ERROR],
+])  # fmt: skip
+"""Standard deviations (23,) of the unknowns before anything is measured."""
 
 
 class Problem:
     """The least squares for the unknowns x (23,): the pose relative to an estimate, the rest itself."""
 
-    def __init__(
-        self, motion: LinkMotion, measured: Measured, base: Estimate, noise: FloatArray, params: CalibrationParams
-    ) -> None:
+    def __init__(self, motion: LinkMotion, measured: Measured, base: Estimate, noise: FloatArray) -> None:
         self.motion, self.measured, self.base, self.noise = motion, measured, base, noise
-        self.prior = prior(params, np.inf)
-        self.expected = np.append(np.zeros(UNKNOWNS - 1), params.gravity)
+        self.expected = np.append(np.zeros(UNKNOWNS - 1), GRAVITY)
 
     def residuals(self, x: FloatArray) -> FloatArray:
         """Differences from data and priors (6 N + 23,), each divided by its standard deviation."""
         differences = self.base.moved(x).differences(self.motion, self.measured) / self.noise
-        return np.concatenate([differences.reshape(-1), (x - self.expected) / self.prior])
+        return np.concatenate([differences.reshape(-1), (x - self.expected) / _PRIOR])
 
     @property
     def equal(self) -> FloatArray:
@@ -148,7 +158,7 @@ class Problem:
         for half, v in enumerate(turned):
             J[:, 3 * half : 3 * half + 3, TURN] = skew(v) @ _right_jacobian(x[TURN])
         J[:, 3:, PLACE] = e.R.T @ motion.lever
-        J[:, 3:, GRAVITY] = e.R.T @ motion.R_link_base
+        J[:, 3:, UPWARDS] = e.R.T @ motion.R_link_base
         J *= scales[:, None]
         for i in range(3):
             J[:, i, GYRO_BIAS.start + i] = J[:, 3 + i, ACC_BIAS.start + i] = 1.0
@@ -157,7 +167,7 @@ class Problem:
         J[:, :, CLOCK] = -self.measured.rates
         J[:, 3:, LAG] = -self.measured.rates[:, 3:]
         J /= self.noise[:, None]
-        return np.vstack([J.reshape(-1, UNKNOWNS), np.diag(1 / self.prior)])
+        return np.vstack([J.reshape(-1, UNKNOWNS), np.diag(1 / _PRIOR)])
 
 
 def _right_jacobian(turn: FloatArray) -> FloatArray:
@@ -181,7 +191,7 @@ class Fit:
 
 
 def fit(
-    motion: LinkMotion, measured: Measured, begin: Estimate, noise: FloatArray, params: CalibrationParams,
+    motion: LinkMotion, measured: Measured, begin: Estimate, noise: FloatArray,
     robust: bool = False,
 ) -> Fit:  # fmt: skip
     """Find the most likely estimate.
@@ -191,10 +201,9 @@ def fit(
         measured: by the IMU at the same instants.
         begin: an estimate near the right one.
         noise: (6,) standard deviation to weight angular velocities [rad/s] and accelerations [m/s^2] by.
-        params: priors, and the length of the blocks that the covariance is made of.
         robust: let large differences count less.
     """
-    problem = Problem(motion, measured, begin, noise, params)
+    problem = Problem(motion, measured, begin, noise)
     x = np.concatenate([np.zeros(6), begin.rest])
     for _ in range(_REWEIGHTINGS if robust else 1):
         weights = problem.weights(x) if robust else problem.equal
@@ -206,8 +215,8 @@ def fit(
     estimate = begin.moved(x)
     spread = np.sqrt(np.mean(estimate.differences(motion, measured) ** 2, axis=0))
     # the unknowns on the manifold at the answer, not at the start
-    J = Problem(motion, measured, estimate, noise, params).jacobian(np.concatenate([np.zeros(6), x[6:]]))
-    per_block = max(1, round(params.block_s * params.rate_hz))
+    J = Problem(motion, measured, estimate, noise).jacobian(np.concatenate([np.zeros(6), x[6:]]))
+    per_block = max(1, round(_BLOCK_S * RATE_HZ))
     return Fit(estimate, _covariance(J, problem.residuals(x), per_block), spread)
 
 

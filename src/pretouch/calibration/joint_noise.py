@@ -12,7 +12,7 @@ from pretouch.calibration.fit import PLACE, POSE_PRIOR
 from pretouch.calibration.link_motion import ArmMotion
 from pretouch.calibration.locate import Located
 from pretouch.calibration.signals import FINE_S, smooth, times
-from pretouch.calibration.values import CalibrationParams
+from pretouch.calibration.values import CUTOFF_HZ
 from pretouch.robot.postures import kinematics_of
 from pretouch.traces import JointTrace, on_grid
 from pretouch.types import FloatArray
@@ -27,15 +27,15 @@ expected one are smaller, but count for more where the motion is strong."""
 class JointNoise:
     """Noise of measured joint positions, taken as white."""
 
-    def __init__(self, arm: ArmMotion, joints: JointTrace, params: CalibrationParams) -> None:
+    def __init__(self, arm: ArmMotion, joints: JointTrace) -> None:
         fine = times(joints.stamp[0], joints.stamp[-1])
-        rest = joints.q - on_grid(joints.stamp, fine[0], FINE_S, smooth(joints.stamp, joints.q, fine, params))
+        rest = joints.q - on_grid(joints.stamp, fine[0], FINE_S, smooth(joints.stamp, joints.q, fine))
         rate = 1 / float(np.median(np.diff(joints.stamp)))
-        passed = min(1.0, 2 * params.cutoff_hz / rate)
+        passed = min(1.0, 2 * CUTOFF_HZ / rate)
         # of normal noise, half the values are within 0.6745 standard deviations
         variance = (np.median(np.abs(rest), axis=0) / 0.6745) ** 2 / max(1 - passed, 0.1)
         density = 2 * variance / rate
-        self.acceleration: FloatArray = np.sqrt(density * (2 * np.pi) ** 4 * params.cutoff_hz**5 / 5)
+        self.acceleration: FloatArray = np.sqrt(density * (2 * np.pi) ** 4 * CUTOFF_HZ**5 / 5)
         """(n,) standard deviation of the joints' accelerations after the low-pass [rad/s^2]."""
         self._model = arm.model
         self._position, self._rotation, self._anchor, self._axis = kinematics_of(arm.model, arm.q[::_EVERY])

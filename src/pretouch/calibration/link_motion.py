@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from pretouch.calibration.signals import HALF_S, gaps, outside, rate_of_change, smooth, times
-from pretouch.calibration.values import CalibrationParams
+from pretouch.calibration.values import LONGEST_GAP_S, RATE_HZ
 from pretouch.robot.model import RobotModel
 from pretouch.robot.postures import kinematics_of
 from pretouch.traces import JointTrace
@@ -46,16 +46,16 @@ def skew(v: FloatArray) -> FloatArray:
 class ArmMotion:
     """Motion of all links at common instants, from measured joint positions."""
 
-    def __init__(self, model: RobotModel, joints: JointTrace, params: CalibrationParams) -> None:
+    def __init__(self, model: RobotModel, joints: JointTrace) -> None:
         """Take joint positions at increasing instants. An interval that is short of what the filter needs has none."""
         self.model = model
         fine = times(joints.stamp[0], joints.stamp[-1])
-        q = smooth(joints.stamp, joints.q, fine, params)
+        q = smooth(joints.stamp, joints.q, fine)
         qd = rate_of_change(q)
-        chosen = slice(None, None, max(1, round(1 / (params.rate_hz * (fine[1] - fine[0])))))
+        chosen = slice(None, None, max(1, round(1 / (RATE_HZ * (fine[1] - fine[0])))))
         self.time: FloatArray = fine[chosen]
         """(N,) instants [s]."""
-        self.usable: BoolArray = outside(self.time, gaps(joints.stamp, params.longest_gap_s), HALF_S + 0.01)
+        self.usable: BoolArray = outside(self.time, gaps(joints.stamp, LONGEST_GAP_S), HALF_S + 0.01)
         """(N,) whether joint positions were measured all around."""
         self.q: FloatArray = q[chosen]
         """(N, n) joint positions [rad]."""

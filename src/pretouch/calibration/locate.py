@@ -7,9 +7,11 @@ import numpy as np
 from pretouch.calibration.fit import Estimate, Fit, fit, start
 from pretouch.calibration.link_motion import ArmMotion, LinkMotion
 from pretouch.calibration.signals import ImuSignal, Measured
-from pretouch.calibration.values import CalibrationParams
+from pretouch.calibration.values import GRAVITY, SHORTEST_S, TOLERATED_ACCELERATION, TOLERATED_ANGULAR_VELOCITY
 from pretouch.types import BoolArray, FloatArray
 
+_OUTLIER_FACTOR = 6.0
+"""Beyond this many times the median difference, and what is tolerated, an instant is left out."""
 _ROUNDS = 4
 _SETTLED_S = 1e-4
 
@@ -50,49 +52,47 @@ def known_instants(arm: ArmMotion, signal: ImuSignal, late: float) -> BoolArray:
     return arm.usable & signal.usable(arm.time + late)
 
 
-def enough(arm: ArmMotion, which: BoolArray, params: CalibrationParams) -> bool:
+def enough(arm: ArmMotion, which: BoolArray) -> bool:
     """Tell whether instants (N,) are enough to find anything from."""
-    return bool(which.sum() * (arm.time[1] - arm.time[0]) >= params.shortest_s)
+    return bool(which.sum() * (arm.time[1] - arm.time[0]) >= SHORTEST_S)
 
 
-def locate(arm: ArmMotion, signal: ImuSignal, link: int, late: float, params: CalibrationParams) -> Located | None:
+def locate(arm: ArmMotion, signal: ImuSignal, link: int, late: float) -> Located | None:
     """Find where on a link a unit sits whose clock is late by about so much [s]; None if too little was measured."""
     motion = arm.link(link)
-    noise = np.repeat((params.tolerated_angular_velocity, params.tolerated_acceleration), 3) / 10
+    noise = np.repeat((TOLERATED_ANGULAR_VELOCITY, TOLERATED_ACCELERATION), 3) / 10
     estimate: Estimate | None = None
     for _ in range(_ROUNDS):
         known = known_instants(arm, signal, late)
-        if not enough(arm, known, params):
+        if not enough(arm, known):
             return None
         here, measured = motion.at(known), signal.at(arm.time[known] + late)
-        found = fit(here, measured, estimate or start(here, measured, params.gravity), noise, params, robust=True)
+        found = fit(here, measured, estimate or start(here, measured, GRAVITY), noise, robust=True)
         estimate, assumed = found.estimate, late
         late += estimate.late
         if abs(estimate.late) < _SETTLED_S:
             break
-    inliers = explained(found.estimate, here, measured, params)
+    inliers = explained(found.estimate, here, measured)
     used = known.copy()
     used[known] = inliers
-    if not enough(arm, used, params):
+    if not enough(arm, used):
         inliers, used = np.ones_like(inliers), known
     here, measured = here.at(inliers), Measured(measured.values[inliers], measured.rates[inliers])
-    found, noise = _final(found, here, measured, noise, params)
+    found, noise = _final(found, here, measured, noise)
     C = 0.5 * (found.covariance + found.covariance.T)
     return Located(link, found.estimate, C[:6, :6], noise, assumed, known, used)
 
 
-def explained(estimate: Estimate, motion: LinkMotion, measured: Measured, params: CalibrationParams) -> BoolArray:
+def explained(estimate: Estimate, motion: LinkMotion, measured: Measured) -> BoolArray:
     """Tell at which instants (N,) the model is near what both sensors measured."""
     size = np.linalg.norm(estimate.differences(motion, measured).reshape(-1, 2, 3), axis=2)
-    tolerated = np.array([params.tolerated_angular_velocity, params.tolerated_acceleration])
-    return np.all(size <= np.maximum(tolerated, params.outlier_factor * np.median(size, axis=0)), axis=1)
+    tolerated = np.array([TOLERATED_ANGULAR_VELOCITY, TOLERATED_ACCELERATION])
+    return np.all(size <= np.maximum(tolerated, _OUTLIER_FACTOR * np.median(size, axis=0)), axis=1)
 
 
-def _final(
-    found: Fit, motion: LinkMotion, measured: Measured, noise: FloatArray, params: CalibrationParams
-) -> tuple[Fit, FloatArray]:
+def _final(found: Fit, motion: LinkMotion, measured: Measured, noise: FloatArray) -> tuple[Fit, FloatArray]:
     """Fit without robustness, weighted by what each sensor leaves unexplained (6,)."""
     for _ in range(2):
-        found = fit(motion, measured, found.estimate, noise, params)
+        found = fit(motion, measured, found.estimate, noise)
         noise = np.repeat(np.sqrt((found.noise.reshape(2, 3) ** 2).mean(axis=1)), 3)
     return found, noise

@@ -5,9 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from pretouch.calibration.fit import PLACE, TURN
-from pretouch.calibration.values import CalibrationParams, Observability
 from pretouch.types import FloatArray
 
+_POSITION_SIGMA_M = 0.01
+"""An answer with a larger standard deviation of its position, in any direction, is refused [m]."""
+_ORIENTATION_SIGMA_DEG = 2.0
+"""An answer with a larger standard deviation of its orientation, about any axis, is refused [degrees]."""
 _SAME = 0.9
 """Share of a direction that lies in what is not known, from which on it is named as not known."""
 
@@ -24,27 +27,25 @@ class Axis:
 
 
 def observability(
-    covariance: FloatArray, T_link_sensor: FloatArray, axis: Axis, params: CalibrationParams
-) -> Observability:
-    """Tell what is known of a pose.
+    covariance: FloatArray, T_link_sensor: FloatArray, axis: Axis
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Say in words what of a pose is not known as well as it has to be, and what is known nevertheless.
+
+    Both are empty if all of it is known.
 
     Args:
         covariance: (6, 6) of rotation vector in the sensor frame [rad] and position in the link frame [m].
         T_link_sensor: (4, 4) the pose.
         axis: of the last joint that moves the link.
-        params: limits of what counts as known.
     """
     turned = np.eye(6)
     turned[TURN, TURN] = T_link_sensor[:3, :3]
     C = turned @ covariance @ turned.T
-    place, directions = np.linalg.eigh(C[PLACE, PLACE])
-    turn, axes = np.linalg.eigh(C[TURN, TURN])
     r = T_link_sensor[:3, 3] - axis.point
-    limit = np.repeat((params.orientation_limit, params.position_sigma_m), 3)
+    limit = np.repeat((np.deg2rad(_ORIENTATION_SIGMA_DEG), _POSITION_SIGMA_M), 3)
     span, freedoms = _joint_freedoms(C / np.outer(limit, limit), r, axis, limit)
-    words = (*freedoms, *_directions(C / np.outer(limit, limit), span, limit))
-    known = _seen_from(C, r, axis) if len(freedoms) == 2 else ()
-    return Observability(directions.T, np.sqrt(place), axes.T, np.sqrt(turn), words, known)
+    unknown = (*freedoms, *_directions(C / np.outer(limit, limit), span, limit))
+    return unknown, _seen_from(C, r, axis) if len(freedoms) == 2 else ()
 
 
 def _joint_freedoms(

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.signal import firwin, oaconvolve
 
-from pretouch.calibration.values import CalibrationParams, UnitData
+from pretouch.calibration.values import CUTOFF_HZ, LONGEST_GAP_S, UnitData
 from pretouch.traces import on_grid
 from pretouch.types import BoolArray, FloatArray
 
@@ -24,10 +24,10 @@ def times(begin: float, end: float) -> FloatArray:
     return begin + FINE_S * np.arange(count, dtype=np.float64)
 
 
-def smooth(stamp: FloatArray, signal: FloatArray, at: FloatArray, params: CalibrationParams) -> FloatArray:
+def smooth(stamp: FloatArray, signal: FloatArray, at: FloatArray) -> FloatArray:
     """Low-pass a signal (M, c), sampled at increasing instants (M,) [s]; returns (F, c) at `at`, from `times`."""
     n = round(HALF_S / FINE_S)
-    kernel = firwin(2 * n + 1, params.cutoff_hz, fs=1 / FINE_S, window=("kaiser", 8.0))
+    kernel = firwin(2 * n + 1, CUTOFF_HZ, fs=1 / FINE_S, window=("kaiser", 8.0))
     between = CubicSpline(stamp, signal, axis=0)(np.clip(at, stamp[0], stamp[-1]))
     padded = np.pad(between, ((n, n), (0, 0)), mode="edge")
     return np.asarray(oaconvolve(padded, kernel[:, None], mode="valid", axes=0))
@@ -68,14 +68,14 @@ class Measured:
 class ImuSignal:
     """Signals of one unit, whose stamps increase."""
 
-    def __init__(self, unit: UnitData, params: CalibrationParams) -> None:
+    def __init__(self, unit: UnitData) -> None:
         imu = unit.imu
         values = np.hstack([imu.angular_velocity, imu.acceleration])
         self._fine = times(imu.stamp[0], imu.stamp[-1])
-        self._values = smooth(imu.stamp, values, self._fine, params)
+        self._values = smooth(imu.stamp, values, self._fine)
         self._rates = rate_of_change(self._values)
         cut = imu.stamp[saturated(unit)]
-        self._unusable = np.vstack([gaps(imu.stamp, params.longest_gap_s), np.column_stack([cut, cut])])
+        self._unusable = np.vstack([gaps(imu.stamp, LONGEST_GAP_S), np.column_stack([cut, cut])])
 
     def at(self, stamp: FloatArray) -> Measured:
         """Return what it measured at instants (N,) of its clock [s]."""

@@ -11,9 +11,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pretouch.errors import ParameterError
 from pretouch.traces import ImuTrace
 from pretouch.types import FloatArray, IntArray
+from pretouch.values import value
 
 _STEADY_S = 10.0
 """Time over which the sensor's rate is taken as constant [s]; it changes by 0.1 % in half a minute of warming up."""
@@ -34,33 +34,35 @@ _UNKNOWN_US = 2**32 - 1
 """An age that tells nothing [us]."""
 
 
-def instants(
-    index: IntArray, count: IntArray, time_us: IntArray, imu_age_us: IntArray, offset: FloatArray, bound: FloatArray
-) -> FloatArray:
+@value
+class ImuCounters:
+    """What tells when IMU samples were taken: B batches of one unit, in the order in which they came."""
+
+    index: IntArray
+    """(B,) number of the first sample of each since the unit's reset."""
+    count: IntArray
+    """(B,) how many samples each has."""
+    time_us: IntArray
+    """(B,) unit's clock when the datagram was made [us]."""
+    imu_age_us: IntArray
+    """(B,) from the newest sample to `time_us` [us]."""
+    offset: FloatArray
+    """(B,) the receiver's time minus the unit's [s]; NaN while that was not known."""
+    bound: FloatArray
+    """(B,) most the true offset differs from it [s]."""
+
+
+def instants(batches: ImuCounters) -> FloatArray:
     """Find when the samples of one unit were taken, by the receiver's clock; returns (M,) [s], M the sum of `count`.
 
-    Batches, a datagram each, are in the order in which they came: lost ones, overtaken ones and units that boot are
-    dealt with. Where the clock is not known, or was heard for less than a second, instants are NaN.
-
-    Args:
-        index: (B,) number of the first sample of each since the unit's reset.
-        count: (B,) how many samples each has.
-        time_us: (B,) unit's clock when the datagram was made [us].
-        imu_age_us: (B,) from the newest sample to `time_us` [us].
-        offset: (B,) the receiver's time minus the unit's [s]; NaN while that is not known.
-        bound: (B,) most the true offset differs from it [s].
-
-    Raises:
-        ParameterError: the arrays are not of one length.
+    Lost batches, overtaken ones and units that boot are dealt with. Where the clock is not known, or was heard for less
+    than a second, instants are NaN.
     """
-    lengths = {len(a) for a in (index, count, time_us, imu_age_us, offset, bound)}
-    if len(lengths) > 1:
-        raise ParameterError(f"The batches' arrays have {sorted(lengths)} numbers: give one of each for each batch.")
-    count, newest = np.asarray(count, dtype=np.int64), np.asarray(index, dtype=np.int64) + count - 1
-    age = 1e-6 * np.asarray(imu_age_us, dtype=np.float64)
-    unit, end = 1e-6 * np.asarray(time_us) - age, np.cumsum(count)
+    count, offset, bound = batches.count.astype(np.int64), batches.offset, batches.bound
+    newest, age = batches.index.astype(np.int64) + count - 1, 1e-6 * batches.imu_age_us
+    unit, end = 1e-6 * batches.time_us - age, np.cumsum(count)
     instant = np.full(int(count.sum()), np.nan)
-    known = (count > 0) & (np.asarray(imu_age_us) < _UNKNOWN_US) & np.isfinite(offset) & np.isfinite(bound)
+    known = (count > 0) & (batches.imu_age_us < _UNKNOWN_US) & np.isfinite(offset) & np.isfinite(bound)
     for clock in _clocks(np.flatnonzero(known), newest, unit, offset, bound):
         ahead = _offset(unit[clock], offset[clock], np.maximum(bound[clock], 1e-6))
         for piece in _pieces(clock, newest, unit):

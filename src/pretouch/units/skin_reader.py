@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from pretouch.calibration.stamps import ImuCounters
 from pretouch.errors import RecordingError
 from pretouch.recording.mcap_file import Contents, open_mcap, read_messages
 from pretouch.recording.ros import JOINT_STATE, UNIT_SAMPLE, check_version, decoded
@@ -34,24 +35,6 @@ class RangeTrace:
     """(R,) `RangeStatus` codes."""
     sigma: FloatArray
     """(R,) standard deviation by the sensor's own estimate [m]."""
-
-
-@value
-class ImuCounters:
-    """What tells when IMU samples were taken: B batches of one unit, in the order in which they came."""
-
-    index: IntArray
-    """(B,) number of the first sample of each since the unit's reset."""
-    count: IntArray
-    """(B,) how many samples each has."""
-    time_us: IntArray
-    """(B,) unit's clock when the datagram was made [us]."""
-    imu_age_us: IntArray
-    """(B,) from the newest sample to `time_us` [us]."""
-    offset: FloatArray
-    """(B,) the receiver's time minus the unit's [s]; NaN while that was not known."""
-    bound: FloatArray
-    """(B,) most the true offset differs from it [s]."""
 
 
 @dataclass(frozen=True, eq=False)

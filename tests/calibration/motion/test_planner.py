@@ -1,5 +1,6 @@
 """Motions by sines and ways, and planned ones against their limits, looked at more often than the planner does."""
 
+import re
 from dataclasses import replace
 from functools import cache
 from itertools import cycle, product
@@ -126,16 +127,18 @@ def test_every_joint_turns_and_links_stand_at_several_angles_to_gravity(name: st
 
 def test_the_report_says_what_time_and_room_are_needed(panda_model: RobotModel):
     plan = planned("panda")
-    report = MotionLimits(panda_model, PlanParams()).report(plan)
-    assert report.standing == pytest.approx(7 * 1.5)
+    words = re.fullmatch(
+        r"60 s, 10 s of them at rest; parts move at up to (\S+) m/s\.\n"
+        r"The arm needs the space x (\S+) to (\S+), y (\S+) to (\S+), z (\S+) to (\S+) m \(base frame\)"
+        r" and comes within (\S+) m of itself and (\S+) m of the floor\.",
+        MotionLimits(panda_model, PlanParams()).report(plan),
+    )
+    speed, *box, nearest, floor = map(float, words.groups())
     tcp = kinematics_of(panda_model, plan.sampled(20.0).q).position[:, panda_model.ee]
-    assert np.all(tcp > report.low)
-    assert np.all(tcp < report.high)
-    assert report.nearest >= 0.03
-    assert report.floor >= 0.03
-    assert 0.3 < report.speed <= 0.7
-    for words in ("60 s", "at rest", "base frame", "of the floor"):
-        assert words in str(report)
+    assert np.all(tcp > box[::2])
+    assert np.all(tcp < box[1::2])
+    assert min(nearest, floor) >= 0.03
+    assert 0.3 < speed <= 0.7
 
 
 def test_the_way_to_its_start_keeps_clear_and_within_limits(panda_model: RobotModel):
@@ -176,9 +179,7 @@ def test_an_impossible_request_says_why(panda_model: RobotModel, params: PlanPar
         plan_motion(panda_model, params, None if start is None else np.array(start))
 
 
-@pytest.mark.parametrize(
-    "wrong", [{"duration_s": 91.0}, {"swings": 0}, {"speed_share": 0.0}, {"fastest_hz": 2.5}, {"slowest_hz": 1.5}]
-)
+@pytest.mark.parametrize("wrong", [{"duration_s": 91.0}, {"swings": 0}, {"speed_share": 0.0}])
 def test_parameters_beyond_their_range_are_refused(wrong: dict[str, float]):
     with pytest.raises(ParameterError, match=next(iter(wrong))):
         PlanParams(**wrong)

@@ -7,7 +7,7 @@ import numpy as np
 
 from pretouch.calibration.motion.plan import Plan, PlanSamples
 from pretouch.checks import Check, Checked, NonNegative, Positive
-from pretouch.errors import CalibrationError, ParameterError
+from pretouch.errors import CalibrationError
 from pretouch.robot.model import RobotModel
 from pretouch.robot.postures import capsule_ends, kinematics_of, self_distances
 from pretouch.types import BoolArray, FloatArray
@@ -30,14 +30,8 @@ class PlanParams(Checked):
     """Duration of all of it [s]."""
     poses: Annotated[int, Check(low=1, high=30)] = 6
     """Postures in which the arm stands for a while, beside its start."""
-    dwell_s: Positive = 1.5
-    """How long it stands in each [s]."""
     swings: Annotated[int, Check(low=1, high=10)] = 3
     """In how many of them it then swings: all joints at once, by two sines each."""
-    slowest_hz: Positive = 0.2
-    """Frequency of the slowest sine [Hz]."""
-    fastest_hz: Annotated[float, Check(low=0.0, open_low=True, high=2.0)] = 1.2
-    """Frequency of the fastest sine [Hz]; no two have the same."""
     reach_rad: Positive = 0.5
     """Furthest from its position at the start [rad] a joint is where the arm stands: less, and the arm needs less room.
     Swings go beyond."""
@@ -55,45 +49,6 @@ class PlanParams(Checked):
     """Height of what is below the arm, base frame [m]: by default what the base stands on."""
     variant: Annotated[int, Check(low=0, high=1000)] = 0
     """Another number, another motion: of use where the room does not allow the one that was planned."""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.slowest_hz >= self.fastest_hz:
-            raise ParameterError(
-                f"PlanParams.slowest_hz is {self.slowest_hz}: it must be less than fastest_hz, {self.fastest_hz}."
-            )
-
-
-@dataclass(frozen=True, eq=False)
-class PlanReport:
-    """A motion in figures: to be read before the arm moves."""
-
-    duration: float
-    """[s]"""
-    standing: float
-    """Time in which the arm stands [s]."""
-    low: FloatArray
-    """(3,) lowest coordinates of the box that the moving links stay in [m], base frame."""
-    high: FloatArray
-    """(3,) highest coordinates of that box [m]."""
-    nearest: float
-    """Least distance between parts of the arm [m]."""
-    floor: float
-    """Least distance from the floor [m]."""
-    speed: float
-    """Largest speed of any part [m/s]."""
-
-    @property
-    def room(self) -> str:
-        """The box in words."""
-        return ", ".join(f"{axis} {a:.2f} to {b:.2f}" for axis, a, b in zip("xyz", self.low, self.high, strict=True))
-
-    def __str__(self) -> str:
-        return (
-            f"{self.duration:.0f} s, {self.standing:.0f} s of them at rest; parts move at up to {self.speed:.2f} m/s.\n"
-            f"The arm needs the space {self.room} m (base frame) and comes within {self.nearest:.3f} m of itself and"
-            f" {self.floor:.3f} m of the floor."
-        )
 
 
 class MotionLimits:
@@ -170,19 +125,22 @@ class MotionLimits:
             names = " and ".join(self.model.links[i] for i in self.model.capsules.link[self.model.apart[pair]])
         return f"{names} come within {nearest[pair]:.3f} m of each other (clearance_m is {self.params.clearance_m:g} m)"
 
-    def report(self, plan: Plan) -> PlanReport:
-        """Say how long a motion takes, and how much room."""
+    def room(self, plan: Plan) -> str:
+        """Say in what box the moving links stay, base frame."""
+        ends, radius = self._ends(plan.sampled(RATE_HZ)), self.model.capsules.radius[self._moving][:, None, None]
+        low, high = ((ends[:, self._moving] + side * radius) for side in (-1, 1))
+        box = zip("xyz", low.min(axis=(0, 1, 2)), high.max(axis=(0, 1, 2)), strict=True)
+        return ", ".join(f"{axis} {a:.2f} to {b:.2f}" for axis, a, b in box)
+
+    def report(self, plan: Plan) -> str:
+        """Say how long a motion takes, how fast it is and how much room it needs, to be read before the arm moves."""
         samples = plan.sampled(RATE_HZ)
-        ends, radius = self._ends(samples), self.model.capsules.radius[self._moving][:, None, None]
+        ends, standing = self._ends(samples), sum(end - begin for begin, end in plan.still)
         distances = self.distances(ends).min(axis=0)
-        return PlanReport(
-            duration=plan.duration,
-            standing=sum(end - begin for begin, end in plan.still),
-            low=(ends[:, self._moving] - radius).min(axis=(0, 1, 2)),
-            high=(ends[:, self._moving] + radius).max(axis=(0, 1, 2)),
-            nearest=float(distances[:-1].min()),
-            floor=float(distances[-1]),
-            speed=point_speed(ends, samples.time),
+        return (
+            f"{plan.duration:.0f} s, {standing:.0f} s of them at rest; parts move at up to"
+            f" {point_speed(ends, samples.time):.2f} m/s.\nThe arm needs the space {self.room(plan)} m (base frame) and"
+            f" comes within {distances[:-1].min():.3f} m of itself and {distances[-1]:.3f} m of the floor."
         )
 
 

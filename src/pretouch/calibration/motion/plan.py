@@ -1,6 +1,5 @@
 """The motion by which units are calibrated, as a value: postures to stand in, ways between them, and swings."""
 
-import csv
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -119,11 +118,9 @@ class Plan:
         """Write it as CSV for another program to play: time_s, q1_rad to qn_rad, qd1_rad_s to qdn_rad_s."""
         numbers = range(1, len(self.start) + 1)
         samples = self.sampled(rate)
-        with path.open("w", newline="") as file:
-            writer = csv.writer(file)
-            writer.writerow(["time_s", *(f"q{i}_rad" for i in numbers), *(f"qd{i}_rad_s" for i in numbers)])
-            table = np.column_stack([samples.time, samples.q, samples.qd])
-            writer.writerows([f"{number:.9g}" for number in row] for row in table.tolist())
+        names = ["time_s", *(f"q{i}_rad" for i in numbers), *(f"qd{i}_rad_s" for i in numbers)]
+        table = np.column_stack([samples.time, samples.q, samples.qd])
+        np.savetxt(path, table, "%.9g", ",", header=",".join(names), comments="")
 
     def _states(self, time: FloatArray) -> FloatArray:
         """Joint positions, velocities and accelerations (3, T, n) at instants (T,) [s]."""

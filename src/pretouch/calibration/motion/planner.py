@@ -19,7 +19,11 @@ from pretouch.errors import CalibrationError
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray
 
-FADE_S = 1.5
+_DWELL_S = 1.5
+"""How long the arm stands in each posture [s]."""
+_SLOWEST_HZ, _FASTEST_HZ = 0.2, 1.2
+"""Frequencies of the sines of a swing, no two the same [Hz]."""
+_FADE_S = 1.5
 """Time a swing takes to fade in, and out [s]."""
 _SHORTEST_S = 5.0
 """Shortest swing [s]."""
@@ -145,8 +149,8 @@ def _route(limits: MotionLimits, start: FloatArray, postures: FloatArray) -> lis
     All of them can be gone to from the start; where there is something in the way between two, it leads by there.
     Returned are the spans: how long each takes [s], where it ends, and which posture the arm has stood in then.
     """
-    at, left, dwell = start, list(range(len(postures))), limits.params.dwell_s
-    spans: list[tuple[float, FloatArray, int | None]] = [(dwell, start, None)]
+    at, left = start, list(range(len(postures)))
+    spans: list[tuple[float, FloatArray, int | None]] = [(_DWELL_S, start, None)]
     while left or at is not start:
         stop = min(left, key=lambda i: float(np.abs(postures[i] - at).max())) if left else None
         to = start if stop is None else postures[stop]
@@ -155,20 +159,20 @@ def _route(limits: MotionLimits, start: FloatArray, postures: FloatArray) -> lis
             at = end
         if stop is not None:
             left.remove(stop)
-            spans.append((dwell, at, stop))
+            spans.append((_DWELL_S, at, stop))
     return spans
 
 
 def _swing(limits: MotionLimits, posture: FloatArray, draw: FloatArray, duration: float) -> Swing | None:
     """Make the swing about a posture, as wide as the limits allow; None where there is no room."""
-    n, params = len(posture), limits.params
+    n = len(posture)
     weight, phase = np.split(draw[n:].reshape(4, n), 2)
-    tones = np.geomspace(params.slowest_hz, params.fastest_hz, 2 * n).reshape(2, n)
+    tones = np.geomspace(_SLOWEST_HZ, _FASTEST_HZ, 2 * n).reshape(2, n)
     rate = 2.0 * np.pi * tones
     room = np.minimum(limits.q_max - posture, posture - limits.q_min)
     widest = np.minimum(np.minimum(limits.qd_max / rate, limits.qdd_max / rate**2), room)
     amplitude = widest * (0.3 + 0.7 * weight)
-    swing = Swing(0.0, duration, min(FADE_S, duration / 2), amplitude, tones, 2.0 * np.pi * phase)
+    swing = Swing(0.0, duration, min(_FADE_S, duration / 2), amplitude, tones, 2.0 * np.pi * phase)
     still = np.array([posture, posture])
 
     def plan(factor: float) -> Plan:

@@ -3,15 +3,12 @@
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
-from functools import partial
 from itertools import count
 from pathlib import Path
 from shlex import join
 from typing import Generic
 
 import numpy as np
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from pretouch.arms import ArmSetup, OpenedArm
 from pretouch.calibration.motion.follow import START_RAD, plan_controller
@@ -22,7 +19,7 @@ from pretouch.cli.calibrate.recorded import Recorded, calibrate_recorded, check_
 from pretouch.cli.options import JsonFile, OptionalFile
 from pretouch.cli.run.options import A, UnitOptions
 from pretouch.cli.run.setup import heard_units
-from pretouch.cli.writing import check_free, check_writable, numbers_to, same_file
+from pretouch.cli.writing import numbers_to
 from pretouch.errors import CalibrationError, HardwareError, RecordingError, RobotError
 from pretouch.loop import Cycle, MonotonicClock
 from pretouch.ports import Arm
@@ -31,7 +28,6 @@ from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import skin_for
 from pretouch.session.run import Ending, go
-from pretouch.signals import Terminated
 from pretouch.types import RobotState
 from pretouch.units.skin import NetworkSkin
 from pretouch.units.skin_recording import SkinRecording
@@ -75,9 +71,10 @@ class CalibrateArm(Generic[A]):
         if not (self.units.keys or self.connection.brings_units):
             raise HardwareError("The arm brings no sensor units: give the file of their keys with --keys.")
         self.units.check()
-        check_files(self.out, self.json, [self.units.keys], self.skin, self.replace, self.record)
+        beside = (self.out.with_name(f"{self.out.stem}-calibration-{n}.mcap") for n in count(1))
+        place = self.record or next(one for one in beside if not one.exists())
+        check_files(self.out, self.json, [self.units.keys], self.skin, self.replace, place)
         with numbers_to(self.json) as write:
-            place = self._recording_place(self.out)
             model, again = RobotModel(self.connection.described(robot_named(self.arm))), self._again(place)
             if self._moved(model, place, again):
                 return 1
@@ -87,16 +84,6 @@ class CalibrateArm(Generic[A]):
                 with suppress(OSError):  # the terminal may be gone
                     print(f"The calibration was not finished. The measurements are in {place}. {again}", flush=True)
                 raise
-
-    def _recording_place(self, out: Path) -> Path:
-        """Return the recording to write, which is not there yet."""
-        others = [file for file in (out, self.json) if file]
-        beside = (out.with_name(f"{out.stem}-calibration-{n}.mcap") for n in count(1))
-        free = (one for one in beside if not one.exists() and not any(same_file(file, one) for file in others))
-        place = self.record or next(free)
-        check_free("recording", place, replace=False)
-        check_writable("recording", place)
-        return place
 
     def _again(self, place: Path) -> str:
         """Say how to calibrate from the recording alone."""
@@ -133,7 +120,9 @@ class CalibrateArm(Generic[A]):
             print("Waiting for the units.", flush=True)
             UnitWatch(units, _LOOK_S).wait(MonotonicClock(0.01))
             print(f"All measurements are recorded in {place}. {again}", flush=True)
-            early = _recorded(opened, model, plans, units, skin.network.ids, place, again)
+            with SkinRecording(place) as recording:
+                measurements = Measurements(recording, units, skin.network.ids, model.joints, opened.measured)
+                early = _move(opened, model, plans, measurements)
             if report := opened.arm.report():
                 print(report, flush=True)
         return early
@@ -147,7 +136,7 @@ def _plans(arm: Arm, model: RobotModel, params: PlanParams) -> list[Plan]:
     if np.abs(q - plan.start).max() <= START_RAD / 2:
         return [plan]
     way = approach(model, q, plan, params)
-    room = limits.report(way).room
+    room = limits.room(way)
     print(f"Before that, moving to its start takes {way.duration:.0f} s and needs the space {room} m.", flush=True)
     return [way, plan]
 
@@ -167,77 +156,51 @@ class Measurements:
     """Records what units and joints measure while an arm moves; a `loop.Recorder`."""
 
     def __init__(
-        self, recording: SkinRecording, units: NetworkSkin, ids: tuple[str, ...], joints: tuple[str, ...]
+        self,
+        recording: SkinRecording,
+        units: NetworkSkin,
+        ids: tuple[str, ...],
+        joints: tuple[str, ...],
+        measured: Callable[[], RobotState] | None = None,
     ) -> None:
-        """Take where to record, what hears the units of these ids, and the names of the joints."""
-        self._recording, self._units, self._ids, self._joints = recording, units, ids, joints
-        self._newest = -np.inf
-        self.progress: Callable[[], None] = lambda: None
-        """Called at each step."""
-        self.measured: Callable[[], RobotState] | None = None
-        """`OpenedArm.measured`."""
+        """Take where to record, what hears the units of these ids, the joints' names, and `OpenedArm.measured`."""
+        self.recording, self._units, self._ids, self._joints = recording, units, ids, joints
+        self._measured, self._newest = measured, -np.inf
         units.take_samples()  # of before
 
     def record(self, cycle: Cycle) -> None:
         """Record what is new; a receiver that has ended, and a disk that is full, are an error."""
         self.take()
-        state = self.measured() if self.measured else cycle.inputs.robot
+        state = self._measured() if self._measured else cycle.inputs.robot
         if state.stamp > self._newest:
             self._newest = state.stamp
             q, qd = (np.array(values)[None] for values in (state.q, state.qd))
-            self._recording.joints(np.array([state.stamp]), q, qd, self._joints)
-        if self._recording.trouble:
-            raise RecordingError(self._recording.trouble)
-        self.progress()
+            self.recording.joints(np.array([state.stamp]), q, qd, self._joints)
+        if self.recording.trouble:
+            raise RecordingError(self.recording.trouble)
 
     def take(self) -> None:
         """Record what the units have measured."""
         if not self._units.alive:
             raise HardwareError("The receiver of the units has ended: see what it printed.")
-        self._recording.add(self._units.take_samples(), self._ids)
+        self.recording.add(self._units.take_samples(), self._ids)
 
 
-def _recorded(
-    opened: OpenedArm,
-    model: RobotModel,
-    plans: list[Plan],
-    units: NetworkSkin,
-    ids: tuple[str, ...],
-    place: Path,
-    again: str,
-) -> bool:
-    """Let the arm move, and record all; return whether that ended early."""
-    ending = Ending()
-    with SkinRecording(place) as recording:
-        try:
-            _move(opened, model, plans, Measurements(recording, units, ids, model.joints), ending)
-        except (KeyboardInterrupt, Terminated):
-            with suppress(OSError):  # the terminal may be gone
-                print(f"The arm was stopped. {recording.close()} {again}", flush=True)
-            raise
-        except BaseException:
-            print(recording.close(), flush=True)
-            raise
-        sentence = recording.close()
-    if ending.early:
-        print("\n".join((*ending.sentences(), f"{sentence} {again}")), flush=True)
-    else:
-        print(sentence, flush=True)
-    return ending.early
-
-
-def _move(opened: OpenedArm, model: RobotModel, plans: list[Plan], measurements: Measurements, ending: Ending) -> None:
-    """Let the arm go to the start of the motion and make it, and stand until all that was measured has arrived."""
-    controller, measurements.measured = plan_controller(model, np.array(opened.arm.read().q)), opened.measured
-    columns = TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn()
-    with Progress(*columns, console=Console(stderr=True)) as bar:
+def _move(opened: OpenedArm, model: RobotModel, plans: list[Plan], measurements: Measurements) -> bool:
+    """Let the arm follow plans, and stand until all that was measured has arrived; return whether that ended early."""
+    controller, ending = plan_controller(model, np.array(opened.arm.read().q)), Ending()
+    try:
         for plan in plans:
-            task = bar.add_task("motion" if plan is plans[-1] else "motion to its start", total=plan.duration)
-            measurements.progress = partial(bar.advance, task, controller.limits.period)
+            print(f"The arm moves for {plan.duration:.0f} s.", flush=True)
             go(opened.arm, controller, plan, ending, measurements, opened.left_out)
             if ending.early:
-                return
-    clock = MonotonicClock(controller.limits.period)
-    begin = clock.tick()
-    while clock.tick() - begin < _AFTER_S:
-        measurements.take()
+                return True
+        clock = MonotonicClock(controller.limits.period)
+        begin = clock.tick()
+        while clock.tick() - begin < _AFTER_S:
+            measurements.take()
+    finally:
+        sentences = (*ending.sentences(), measurements.recording.close())
+        with suppress(OSError):  # the terminal may be gone
+            print("\n".join(sentences), flush=True)
+    return False

@@ -10,7 +10,7 @@ from rich.console import Console
 
 from pretouch.calibration.calibrate import calibrate, skin_of
 from pretouch.calibration.stamps import instants, retimed
-from pretouch.calibration.values import Calibration, CalibrationData, CalibrationParams, UnitCalibration, UnitData
+from pretouch.calibration.values import CLOCK_ERROR_S, Calibration, CalibrationData, UnitCalibration, UnitData
 from pretouch.cli.detect_words import sentences
 from pretouch.cli.options import OptionalFile
 from pretouch.cli.tables import PlainTable
@@ -137,8 +137,8 @@ def _units(measured: SkinTrace, believed: Skin | None) -> tuple[UnitData, ...]:
         if name not in heard:
             units.append(UnitData(name, _NO_IMU, links.get(name)))
             continue
-        unit, c = heard[name], heard[name].counters
-        imu = retimed(unit.imu, instants(c.index, c.count, c.time_us, c.imu_age_us, c.offset, c.bound))
+        unit = heard[name]
+        imu = retimed(unit.imu, instants(unit.counters))
         units.append(UnitData(name, imu, links.get(name), unit.acceleration_max, unit.angular_velocity_max))
     return tuple(units)
 
@@ -165,7 +165,7 @@ def _ahead(model: RobotModel, data: CalibrationData) -> tuple[float, tuple[str, 
             continue
         offset = answer.place.clock_offset
         for name, other in offsets.items():
-            if abs(offset - other) < CalibrationParams().clock_error_s:
+            if abs(offset - other) < CLOCK_ERROR_S:
                 return offset, (name, unit.id)
         offsets[unit.id] = offset
     return next(((offset, (name,)) for name, offset in offsets.items()), (np.nan, ()))
