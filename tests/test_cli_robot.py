@@ -51,7 +51,7 @@ def test_a_folder_of_the_arms_own_name_is_refused_before_anything_is_fitted(tmp_
     file = written(tmp_path, six_axis())
     (tmp_path / "sixer").mkdir()
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("pretouch.cli.robot_import.import_robot", lambda *_: pytest.fail("imported"))
+    monkeypatch.setattr("pretouch.cli.robot.import_robot", lambda *_: pytest.fail("imported"))
     assert main(["robot", "import", str(file)]) == 2
     assert "The folder sixer exists already" in capsys.readouterr().err
 

@@ -4,8 +4,8 @@ import math
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import asdict, astuple, dataclass, replace
-from typing import Any, Protocol
+from dataclasses import astuple, dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
@@ -108,12 +108,6 @@ class Timing:
     """Cycles that were busy for longer than a period."""
     missed: int
     """Ticks left out, because the loop was late by a period or more."""
-
-    def numbers(self) -> dict[str, Any]:
-        """Return it for JSON."""
-        spreads = {"period_s": self.measured, "wake_up_s": self.wake_up, "busy_s": self.busy, "cpu_s": self.cpu}
-        counts = {"cycles": self.cycles, "overruns": self.overruns, "missed": self.missed}
-        return counts | {name: asdict(spread) for name, spread in spreads.items()}
 
     def __str__(self) -> str:
         rows = {"period": self.measured, "late wake-up": self.wake_up, "busy": self.busy, "busy, CPU": self.cpu}

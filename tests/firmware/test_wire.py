@@ -155,7 +155,7 @@ print(read.unit, read.port, read.key == bytes(range(32)), read.zones, read.senso
 
 def test_a_unit_reads_what_the_host_writes_with_characters_beyond_16_bits(unit_python: Run) -> None:
     name, password = 'caf\u00e9 "x" \U0001f600', "\U0001f600" * 2
-    network = Network(name, password, "10.0.0.1", 4950, sensor="vl53l7cx", zones=8)
-    text = configuration(UnitKey("left", 7, bytes(range(32))), network)
+    network = Network(name, "10.0.0.1", 4950, sensor="vl53l7cx", zones=8)
+    text = configuration(UnitKey("left", 7, bytes(range(32))), network, password)
     lines = unit_python({"config.json": text}, SHOW)
     assert lines == [str(name.encode()), str(password.encode()), "b'10.0.0.1'", "7 4950 True 8 vl53l7cx"]

@@ -6,10 +6,10 @@ import mujoco
 import numpy as np
 import pytest
 
-from pretouch.sensing.sensor import Capacitive
+from pretouch.sensing.sensor import Capacitive, cone_rays
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit
-from pretouch.sim.capacitive import DIELECTRIC, DRIFT, ELECTRODE_M, LEAST, Electrodes, electrode_on, field, told
+from pretouch.sim.capacitive import DIELECTRIC, DRIFT, ELECTRODE_M, LEAST, RINGS, Electrode, Electrodes, field, told
 from pretouch.sim.rays import geoms_of
 from pretouch.types import RangeStatus
 
@@ -30,7 +30,9 @@ def room(distance, in_the_world=False, half=5.0):
 
 def felt(distance, sensor=SENSOR, **kind):
     model, data = room(distance, **kind)
-    return field(electrode_on(sensor, 1, np.eye(4)), data.xpos, data.xmat, geoms_of(model, data), 20.0)
+    return field(
+        Electrode(1, np.eye(4), cone_rays(RINGS, sensor.angle)), data.xpos, data.xmat, geoms_of(model, data), 20.0
+    )
 
 
 def test_a_wall_is_felt_as_the_sum_over_the_field_lines_says():

@@ -2,13 +2,13 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Literal
 
 from pretouch.cli.options import OptionalFile
+from pretouch.cli.run.options import UnitOptions
 from pretouch.cli.warm_up import prepare
-from pretouch.errors import HardwareError
 from pretouch.extras import LIVE
 from pretouch.page.real_units import RealUnits
 from pretouch.page.room import LiveSettings, Room, live_path, settings_for
@@ -22,7 +22,7 @@ from pretouch.signals import ended
 from pretouch.sim.paper_scenes import assumptions
 from pretouch.sim.random_skin import misplaced
 from pretouch.sim.randomisation import drawn, world_set
-from pretouch.units import EVERYWHERE, HOST, PORT
+from pretouch.units import EVERYWHERE
 from pretouch.units.keys import load_keys
 from pretouch.units.skin import NetworkSkin
 
@@ -48,17 +48,12 @@ class Live:
     """Address to serve the page at. Beyond this machine, whoever has the printed address can move the simulated arm."""
     port: int = 8080
     """Port to serve the page at."""
-    keys: OptionalFile = None
-    """File of the keys of real sensor units, which the simulated arm then carries in place of simulated ones."""
     skin: OptionalFile = None
     """Skin file; by default 34 units all over hand, wrist, forearm and elbow, and with --keys the seven of other
     commands; of an imported arm the skin in its folder."""
     opening: bool = True
     """Whether a hand comes by itself at first, until somebody drags or clicks; never with --keys or --record."""
-    units_host: str = HOST
-    """Address to receive real units at. They need 0.0.0.0, which is every address of this machine."""
-    units_port: int = PORT
-    """UDP port to receive real units at."""
+    units: UnitOptions = field(default_factory=UnitOptions)
 
     def run(self) -> None:
         """Serve the page until interrupted."""
@@ -76,9 +71,10 @@ class Live:
         if self.world:
             world = drawn(world_set(str(self.world)), self.seed, settings.plant)
             settings = replace(settings, plant=world.plant, ranging=world.ranging)
-            if not self.keys:
+            if not self.units.keys:
                 believed, _ = misplaced(skin, model, world.misplaced, self.seed)
-        prepare(profile, lambda: Room(settings, live_path(settings), model, skin).tick())
+        prepare(profile)
+        Room(settings, live_path(settings), model, skin).tick()  # compiles what simulates
         with _units(self, skin) as real:
             simulation = LiveSimulation(settings, model, believed, real, skin)
             for sentence in assumptions(model, settings.placement):
@@ -94,20 +90,19 @@ class Live:
 def _skin(command: Live, model: RobotModel) -> Skin:
     """Return the skin that was asked for, or else the live page's for a Panda or FR3, or the one the arm has."""
     arm = model.description
-    of_page = LIVE_SKIN.with_name(f"{arm.name}_live.toml") if is_shipped(arm) and not command.keys else ""
+    of_page = LIVE_SKIN.with_name(f"{arm.name}_live.toml") if is_shipped(arm) and not command.units.keys else ""
     return skin_for(model, command.skin or of_page)
 
 
 @contextmanager
 def _units(command: Live, skin: Skin) -> Iterator[RealUnits | None]:
     """Hear the real units of a skin, if there is a file of their keys."""
-    if not command.keys:
+    units = command.units
+    if not units.keys:
         yield None
         return
-    if not command.units_host:
-        raise HardwareError(f"--units-host is empty: give {HOST}, or {EVERYWHERE} for every address of this machine.")
-
-    with NetworkSkin(skin.network, load_keys(command.keys), command.units_host, command.units_port) as source:
-        heard = "anywhere" if command.units_host == EVERYWHERE else f"{command.units_host} only"
+    units.check()
+    with NetworkSkin(skin.network, load_keys(units.keys), units.units_host, units.units_port) as source:
+        heard = "anywhere" if units.units_host == EVERYWHERE else f"{units.units_host} only"
         print(f"Receiving units from {heard}, at UDP port {source.address[1]}.", flush=True)
         yield RealUnits(source)

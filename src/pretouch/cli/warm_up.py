@@ -2,7 +2,6 @@
 
 import gc
 import os
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from multiprocessing import get_context
 from multiprocessing.context import SpawnProcess
@@ -35,16 +34,10 @@ class WarmUp:
     """Compile a control step, once after an installation: later commands then start within a second."""
 
     def run(self) -> None:
-        """Compile, and print where it is cached."""
-        print("Compiling what all profiles need: about a minute the first time ...", flush=True)
-        place = compile_step()
+        """Compile, and print where it is cached. All profiles have the same compiled functions."""
+        prepare(profile("pretouch"))
+        place = kept_in()
         print(f"Compiled, and cached in {place}." if place else "Compiled, but not cached: HOME is not writable.")
-
-
-def compile_step() -> str:
-    """Compile a control step, and say where that is kept; '' for nowhere. All profiles have the same."""
-    prepare(profile("pretouch"), console=Console(quiet=True))
-    return kept_in()
 
 
 def kept_in() -> str:
@@ -53,17 +46,12 @@ def kept_in() -> str:
     return str(Path(stats.cache_path).parent) if stats and stats.cache_path else ""
 
 
-def prepare(wanted: Profile, meanwhile: Callable[[], object] = lambda: None, console: Console | None = None) -> None:
+def prepare(chosen: Profile) -> None:
     """Compile a step of a profile where that is not kept yet, in two processes, and say so on the standard error.
 
     What the other process does not come to, or what cannot be kept, is compiled where it is first needed.
-
-    Args:
-        wanted: the profile.
-        meanwhile: what else the command compiles at its start.
-        console: where it is said, in place of the standard error.
     """
-    output, since, others = console or Console(stderr=True, highlight=False), list[float](), list[SpawnProcess]()
+    output, since, others = Console(stderr=True, highlight=False), list[float](), list[SpawnProcess]()
 
     def begin(sentence: str) -> None:
         output.print(sentence)
@@ -76,12 +64,11 @@ def prepare(wanted: Profile, meanwhile: Callable[[], object] = lambda: None, con
     FIRST_START.say = begin  # type: ignore[method-assign]
     gc.disable()  # the collector looks through all that a compiler makes, for an eighth of the time
     try:
-        controller, robot = _at_rest(wanted)
+        controller, robot = _at_rest(chosen)
         _detect(controller, robot)
         for other in others:  # its part is then taken from where it is kept
             other.join()
         warm_up(controller, robot, points=True)
-        meanwhile()
     finally:
         gc.enable()
         del FIRST_START.say
@@ -108,9 +95,9 @@ def compile_stages() -> None:
     move(*blocks)
 
 
-def _at_rest(wanted: Profile) -> tuple[Controller, RobotState]:
+def _at_rest(chosen: Profile) -> tuple[Controller, RobotState]:
     """Return a controller of a Panda with the paper's skin, and the state of an arm at rest."""
     model = RobotModel(panda())
     q, rest = model.description.q_ready, np.zeros(model.n)
     robot = RobotState(0.0, q, rest, q, rest, rest, np.zeros(6))
-    return Controller(model, paper_skin(model), no_fixtures(), Circle(), wanted), robot
+    return Controller(model, paper_skin(model), no_fixtures(), Circle(), chosen), robot

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -36,11 +35,6 @@ class RunSummary:
     """Contacts that the arm did not move with, for they were below what moves it."""
     holds: dict[str, float] = field(default_factory=dict)
     """Time held [s] by the sentence with which an event first held the arm."""
-
-    def numbers(self, period: float) -> dict[str, Any]:
-        """Return the summary for JSON."""
-        counts = {"contacts": self.contacts, "contacts_without_motion": self.unmoved, "held_s": self.holds}
-        return {"steps": self.steps, "duration_s": self.steps * period} | counts
 
     def sentences(self, period: float) -> tuple[str, ...]:
         """Return the summary in sentences."""

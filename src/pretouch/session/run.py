@@ -55,10 +55,6 @@ class Ending:
         """Whether it did not end as asked."""
         return bool(self.stopped or self.rest_unknown)
 
-    def numbers(self) -> dict[str, str | None]:
-        """Return it for JSON."""
-        return {"ended_early": self.stopped or None, "rest_unknown": self.rest_unknown or None}
-
     def sentences(self) -> tuple[str, ...]:
         """Say it."""
         rest = "The arm is at rest."

@@ -22,7 +22,7 @@ DRIFT, DRIFT_S = 0.001, 60.0
 _FELT = 4.0
 """Standard deviations of noise and drift from which on a signal tells something."""
 LEAST = _FELT * float(np.hypot(NOISE, DRIFT))
-_RINGS = 8
+RINGS = 8
 """217 field lines: a fist at 18 cm has seven."""
 _STREAM = 64
 """Number of the random stream of drift."""
@@ -38,11 +38,6 @@ class Electrode(NamedTuple):
     """(4, 4)"""
     rays: FloatArray
     """(N, 3) unit vectors, sensor frame."""
-
-
-def electrode_on(sensor: Capacitive, body: int, T_body: FloatArray) -> Electrode:
-    """Return an electrode on a body of MuJoCo's, at T_body (4, 4) in its frame."""
-    return Electrode(body, T_body, cone_rays(_RINGS, sensor.angle))
 
 
 @compiled
@@ -75,7 +70,8 @@ class Electrodes:
         """Mount those of a skin whose units sit on such bodies (K,) of MuJoCo's."""
         self._units = {k: unit.sensor for k, unit in enumerate(skin.units) if isinstance(unit.sensor, Capacitive)}
         self._mounted = {
-            k: electrode_on(sensor, int(bodies[k]), skin.T_link_sensor[k]) for k, sensor in self._units.items()
+            k: Electrode(int(bodies[k]), skin.T_link_sensor[k], cone_rays(RINGS, sensor.angle))
+            for k, sensor in self._units.items()
         }
         self._room = data.xpos, data.xmat, geoms
         self._rng = np.random.default_rng([seed, _STREAM])

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from pretouch.atomic_write import atomic_write
 from pretouch.errors import HardwareError
+from pretouch.units import PORT
 from pretouch.units.keys import UnitKey
 
 COPY_S = 60.0
@@ -32,35 +33,30 @@ _LIMITS = {
 
 @dataclass(frozen=True)
 class Network:
-    """Where a unit sends: what cannot be is a HardwareError."""
+    """Where a unit sends, and what it carries: what cannot be is a HardwareError."""
 
     ssid: str
-    password: str
+    """Name of the Wi-Fi network (2.4 GHz)."""
     host: str
-    """IPv4 address of the receiver in the unit's network."""
-    port: int
+    """IPv4 address of this machine in that network."""
+    port: int = PORT
+    """UDP port of the receiver."""
     battery_full_mv: int = 0
-    """Voltage of the unit's battery that fills its converter [mV] (docs/how-to/wiring.md); 0: none is wired to it."""
+    """Battery voltage at the full scale of the unit's converter [mV] (docs/how-to/wiring.md); 0: no battery."""
     touch_ohm: int = 0
-    """Resistor from the touch sensor's pin to ground [ohm] (docs/how-to/wiring.md); 0: it has no such sensor."""
+    """Resistor from the touch sensor's pin to ground [ohm] (docs/how-to/wiring.md); 0: no touch sensor."""
     touch_least_mn: int = 500
-    """Smallest force that is a touch [mN]."""
+    """Smallest force that counts as a touch [mN]: `force_min_n` of the skin file."""
     touch_mn_per_us: int = 10
     """Force by the touch sensor's conductance [mN/uS]: of the FSR 402 about 10, to be calibrated."""
-    sensor: str = "vl53l1x"
-    """Range finder of the unit: one of `SENSORS`."""
+    sensor: str = SENSORS[0]
+    """Range finder of the unit: vl53l1x, vl53l5cx or vl53l7cx (docs/how-to/flashing.md)."""
     zones: int = 4
     """Zones along each side of its range finder, 4 or 8, if it has some."""
 
     def __post_init__(self) -> None:
         if not 1 <= _size(self.ssid, "network's name") <= _SSID_MOST or "\0" in self.ssid:
             raise HardwareError(f"The network's name {self.ssid!r} is not valid: give 1 to {_SSID_MOST} bytes.")
-        size = _size(self.password, "password")
-        if (size and not _PASSWORD_LEAST <= size <= _PASSWORD_MOST) or "\0" in self.password:
-            raise HardwareError(
-                f"The password has {size} bytes: give {_PASSWORD_LEAST} to {_PASSWORD_MOST} for WPA, or leave it empty"
-                " for an open network."
-            )
         try:
             address = ipaddress.IPv4Address(self.host)
         except ValueError:
@@ -80,14 +76,16 @@ class Network:
             if not least <= getattr(self, name) <= most:
                 raise HardwareError(f"The unit's {name} is {getattr(self, name)}: give {least} to {most}.")
 
-    def __repr__(self) -> str:
-        """Without the password."""
-        return f"Network(ssid={self.ssid!r}, host={self.host!r}, port={self.port})"
 
-
-def configuration(key: UnitKey, network: Network) -> str:
-    """Return the text of a unit's configuration file, JSON on one line."""
-    values = {"unit": key.number, "key": key.key.hex(), **asdict(network)}
+def configuration(key: UnitKey, network: Network, password: str) -> str:
+    """Return the text of a unit's configuration file, JSON on one line; an empty password is of an open network."""
+    size = _size(password, "password")
+    if (size and not _PASSWORD_LEAST <= size <= _PASSWORD_MOST) or "\0" in password:
+        raise HardwareError(
+            f"The password has {size} bytes: give {_PASSWORD_LEAST} to {_PASSWORD_MOST} for WPA, or leave it empty for"
+            " an open network."
+        )
+    values = {"unit": key.number, "key": key.key.hex(), **asdict(network), "password": password}
     if network.sensor == SENSORS[0]:
         values["zones"] = 1
     return json.dumps(values, ensure_ascii=False) + "\n"  # units join no halves of \u escapes

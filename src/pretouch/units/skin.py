@@ -106,33 +106,26 @@ class NetworkSkin:
         keys: Keys,
         host: str = "127.0.0.1",
         port: int = 0,
-        params: LinkParams | None = None,
         *,
         priority: int | None = None,
     ) -> None:
-        """Start a receiver; one that cannot listen, or not have its priority, is a HardwareError.
+        """Start a `SkinReceiver`; one that cannot listen, or not have its priority, is a HardwareError.
 
-        Args:
-            units: see `SkinReceiver`.
-            keys: see `SkinReceiver`.
-            host: see `SkinReceiver`.
-            port: see `SkinReceiver`.
-            params: see `SkinReceiver`.
-            priority: of its process in the scheduling class SCHED_FIFO, 1 to 99, below that of the control loop; None
-                leaves the class as it is.
+        The priority is of its process in the scheduling class SCHED_FIFO, 1 to 99, below that of the control loop; None
+        leaves the class as it is.
         """
-        network, params = NetworkUnits.of(units), params or LinkParams()
+        network = NetworkUnits.of(units)
         keyed = keys_of(network.ids, keys)
         demand_port(host, port)
         if current_process().daemon:
             raise HardwareError("A daemonic process cannot start a receiver: create this process with daemon=False.")
         self._owner = os.getpid()
-        self._outputs = SharedOutputs(network, params.samples_most)
+        self._outputs = SharedOutputs(network, LinkParams().samples_most)
         sides = zip(keyed, network.zones, strict=True)
         self._no_traffic = Traffic(tuple(UnitTraffic(unit.id, unit.number, zones=side) for unit, side in sides), {}, 0)
         context = get_context("spawn")
         ours, theirs = context.Pipe(duplex=False)
-        arguments = (self._owner, (network, keyed, host, port, params), priority, self._outputs, theirs)
+        arguments = (self._owner, (network, keyed, host, port), priority, self._outputs, theirs)
         self._process = context.Process(target=_serve, args=arguments, daemon=True)
         with kept_from_children():
             self._process.start()
@@ -203,17 +196,17 @@ def _wait_listening(started: Connection) -> tuple[tuple[str, int], int]:
 
 def _serve(
     parent: int,
-    listening: tuple[NetworkUnits, tuple[UnitKey, ...], str, int, LinkParams],
+    listening: tuple[NetworkUnits, tuple[UnitKey, ...], str, int],
     priority: int | None,
     outputs: SharedOutputs,
     started: Connection,
 ) -> None:
     """Receive until the parent is gone, or kills this process; send it the address, or a sentence on what is wrong."""
     leave_to_parent()
-    network, keyed, host, port, params = listening
+    network, keyed, host, port = listening
     try:
         _set_priority(priority)
-        receiver = SkinReceiver(network, Keys(keyed), host, port, params=params)
+        receiver = SkinReceiver(network, Keys(keyed), host, port)
     except HardwareError as error:
         started.send(str(error))
         return

@@ -1,15 +1,10 @@
 from dataclasses import replace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
-from pretouch.arms.franka.limits import (
-    BIAS_N,
-    check,
-    collision_behavior,
-    largest_threshold,
-    longest_levers,
-)
+from pretouch.arms.franka.limits import BIAS_N, collision_behavior, largest_threshold, longest_levers
 from pretouch.contact.detector import Body
 from pretouch.contact.residual_model import sequential_init, sequential_numbers
 from pretouch.contact.sequential import Moment
@@ -57,19 +52,11 @@ def test_a_higher_threshold_of_ours_raises_the_arms(panda_model: RobotModel) -> 
     assert higher.upper_force[0] == collision_behavior(profile("paper"), panda_model).upper_force[0] + 10.0
 
 
-def test_thresholds_in_the_wrong_order_are_refused(panda_model: RobotModel, monkeypatch: pytest.MonkeyPatch) -> None:
-    good = collision_behavior(profile("paper"), panda_model)
-    with pytest.raises(
-        ParameterError, match=r"report a contact from 15 N on, but our detection may need up to 18 N: set"
-    ):
-        check(replace(good, lower_force=np.full(6, 15.0)), profile("paper"), panda_model)
-    with pytest.raises(ParameterError, match=r"upper_torque\[0\] is 5: it must be greater than the lower"):
-        check(replace(good, upper_torque=np.full(7, 5.0)), profile("paper"), panda_model)
-    with pytest.raises(ParameterError, match=r"upper_force\[0\] is nan"):
-        check(replace(good, upper_force=np.full(6, np.nan)), profile("paper"), panda_model)
-    monkeypatch.setattr("pretouch.arms.franka.limits.UPPER_ABOVE_N", 5.0)
-    with pytest.raises(ParameterError, match=r"upper_force\[0\] is 23"):
-        collision_behavior(profile("paper"), panda_model)
+def test_a_detector_that_cannot_tell_what_it_misses_is_refused(panda_model: RobotModel) -> None:
+    for missed_n in (np.nan, np.inf):
+        own = replace(profile("paper"), detect=Mock(largest_missed_n=lambda *_, n=missed_n: n, by_torques=False))
+        with pytest.raises(ParameterError, match=f"may miss {missed_n} N"):
+            collision_behavior(own, panda_model)
 
 
 def evidence(model: RobotModel, force: np.ndarray) -> float:

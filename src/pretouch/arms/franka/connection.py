@@ -6,6 +6,7 @@ import struct
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import astuple
 from importlib import import_module
 from typing import Any, Literal, NamedTuple, Self
 
@@ -267,7 +268,7 @@ class FrankaClient:
     def set_collision_behavior(self, behavior: CollisionBehavior) -> None:
         """Tell the arm from which forces on it reports a contact, and from which it stops."""
         with self._translated_errors("accept the collision behaviour"):
-            self._robot.set_collision_behavior(*behavior.in_order())
+            self._robot.set_collision_behavior(*(part.tolist() for part in astuple(behavior)))
 
     def recover(self) -> None:
         """Leave the mode "reflex", as pressing the button in Desk does; a RobotError if no state says that it has.

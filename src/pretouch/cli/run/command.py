@@ -222,5 +222,5 @@ def _executed(
                 lines += [*reporter.summary.sentences(clock.period), str(clock.timing())]
             lines += filter(None, (standing.arm.report(), *(output.notes if output else ()), *files.close()))
             say("\n".join(lines))
-            write(reporter.summary.numbers(clock.period) | ending.numbers() | {"timing": clock.timing().numbers()})
+            write({"summary": reporter.summary, "ending": ending, "timing": clock.timing()})
     return int(ending.early or bool(files.trouble))
