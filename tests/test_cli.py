@@ -152,6 +152,7 @@ def test_the_overview_leaves_out_what_is_not_installed():
         ("run --radius wide", "parsing --radius"),
         ("live --prot 8080", "--port"),
         ("robot import a.urdf --qd-max fast", "--qd-max: 'fast': give numbers, separated by commas"),
+        ("skin simulate --keys keys.toml --loss 1.5", "ChannelParams.loss is 1.5: it must be at most 1."),
         ("run --path square", "'circle', 'line', 'hold'"),
         ("replay", "Recording; that of a killed process works too."),
         ("bench dance", "detection, avoidance"),

@@ -255,7 +255,6 @@ def test_the_key_of_a_lost_unit_is_revoked_or_replaced_and_the_others_stay(tmp_p
 @pytest.mark.parametrize(
     ("more", "words"),
     [
-        (("--loss", "1.5"), "ChannelParams.loss is 1.5"),
         (("--port", "0"), "The receiver's port is 0"),
         (("--stuck", "elbow"), "Unknown unit elbow"),
         (("--skin", "/nowhere.toml"), "/nowhere.toml cannot be read"),

@@ -13,7 +13,6 @@ from pretouch.sim.touch_sensor import Forces, no_forces
 from pretouch.types import RangeReadings, TouchReadings
 from pretouch.units.fleet import Fleet, FleetParams, NetworkParams, simulated_keys
 from pretouch.units.receiver import SkinReceiver
-from pretouch.units.session import LinkParams
 
 _PATIENCE_S = 5.0
 """The machine's own loopback may take this long to hand a datagram over [s]."""
@@ -35,7 +34,7 @@ class WireSkin:
 
     def __init__(
         self, plant: Plant, skin: Skin, ranging: RangeFinderParams, params: FleetParams, seed: int,
-        link: LinkParams | None = None, laid: Forces = no_forces,
+        laid: Forces = no_forces,
     ) -> None:  # fmt: skip
         """Mount the units on an arm and switch them on; measurements are those of `RangeFinders` with this seed.
 
@@ -44,7 +43,7 @@ class WireSkin:
         """
         self._plant = plant
         keys, rng = simulated_keys(skin.network.ids, seed), np.random.default_rng([seed, 8])
-        self.receiver = SkinReceiver(skin.network, keys, clock=lambda: plant.time, draw=rng.bytes, params=link)
+        self.receiver = SkinReceiver(skin.network, keys, clock=lambda: plant.time, draw=rng.bytes)
         """What came of it all: traffic of each unit, what was rejected, samples."""
         try:
             self.fleet = Fleet(skin.network, keys, params, seed, self.receiver.address)

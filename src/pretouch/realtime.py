@@ -108,7 +108,7 @@ def real_time(priority: int | None = None, cpu: int | None = None) -> Iterator[t
         undo.enter_context(_no_collections())
         if sys.platform == "linux":
             _sharpen_timers(undo)
-            yield tuple(said for said in (_go_first(priority, undo), _stay(cpu, undo)) if said)
+            yield tuple(filter(None, (_go_first(priority, undo), _stay(cpu, undo))))
         else:
             yield (f"This is {sys.platform}, not Linux: the loop runs without priority, and wakes as late as it does.",)
 
@@ -154,7 +154,7 @@ def _sharpen_timers(undo: ExitStack) -> None:
 
 
 def _go_first(priority: int | None, undo: ExitStack) -> str:
-    if sys.platform != "linux" or priority is None:
+    if priority is None:
         return ""
     policy, param = os.sched_getscheduler(0), os.sched_getparam(0)
     try:
@@ -172,7 +172,7 @@ def _go_first(priority: int | None, undo: ExitStack) -> str:
 
 
 def _stay(cpu: int | None, undo: ExitStack) -> str:
-    if sys.platform != "linux" or cpu is None:
+    if cpu is None:
         return ""
     before = os.sched_getaffinity(0)
     try:

@@ -75,7 +75,7 @@ def files(tmp_path_factory, panda_model, paper_skin):
         ("replay run.mcap --no-page", {"contacts", "held_share", "duration_s"}),
         ("replay run.mcap --verify", {"verified"}),
         ("replay run.mcap --no-page --profile blind", {"compared"}),
-        ("run --no-skin --profile blind --path hold --seconds 0.2 --yes", {"contacts", "held_s", "timing"}),
+        ("run --no-skin --profile blind --path hold --seconds 0.2 --yes", {"summary", "ending", "timing"}),
     ],
 )
 def test_a_dash_is_one_document_on_standard_output_and_text_beside_it(files, capsys, monkeypatch, words, holds):

@@ -5,7 +5,7 @@ import os
 import pytest
 
 from pretouch import cli
-from pretouch.cli.report import Report, titles
+from pretouch.cli.report import WriteReport, titles
 from pretouch.controller import Controller
 from pretouch.errors import ExperimentError, RecordingError
 from pretouch.loop import Cycle
@@ -37,7 +37,7 @@ def folder(panda_model, paper_skin, tmp_path_factory):
 
 def written(files, out, replace=False):
     """The page that the command writes."""
-    Report(tuple(files), out, replace).run()
+    WriteReport(tuple(files), out, replace).run()
     return out.read_text()
 
 

@@ -6,7 +6,7 @@ from pretouch.errors import ParameterError
 from pretouch.robot.description import panda
 from pretouch.sim.plant_params import PlantParams, plant_params_of
 from pretouch.sim.random_skin import Misplacement
-from pretouch.sim.randomisation import SETS, DrawnWorld, drawn, world_set
+from pretouch.sim.randomisation import SETS, DrawnWorld, drawn, with_own, world_set
 from pretouch.sim.range_finder import RangeFinderParams
 
 
@@ -58,9 +58,10 @@ def test_a_field_is_drawn_alike_whatever_else_is(tmp_path):
 def test_what_an_experiment_varies_stays():
     world, usual = drawn(world_set("stress"), 1003), plant_params_of(panda())
     own = replace(usual, payload_max_kg=0.33)
-    merged = world.plant_with(own, usual)
+    merged = with_own(world.plant, own, usual)
     assert merged == replace(world.plant, payload_max_kg=0.33)
-    assert world.ranging_with(RangeFinderParams(dropout=0.9)) == replace(world.ranging, dropout=0.9)
+    ranging = with_own(world.ranging, RangeFinderParams(dropout=0.9), RangeFinderParams())
+    assert ranging == replace(world.ranging, dropout=0.9)
 
 
 @pytest.mark.parametrize(

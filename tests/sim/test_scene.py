@@ -17,7 +17,7 @@ TIP = 0.0087
 
 
 def nominal(model: RobotModel, payload: float = 0.0) -> ArmError:
-    return ArmError(np.ones(len(model.links)), payload, armature=0.1)
+    return ArmError(PlantParams(), np.ones(len(model.links)), payload)
 
 
 def fingertip(model: RobotModel) -> FloatArray:
@@ -148,7 +148,7 @@ def test_a_thing_that_is_stiffened_is_as_one_built_so(panda_model, stiffness):
 
 def test_the_arm_differs_from_its_model_as_asked(panda_model):
     factor = np.linspace(0.96, 1.04, len(panda_model.links))
-    built = build(panda_model, SceneSpec(), ArmError(factor, payload=0.07, armature=0.12))
+    built = build(panda_model, SceneSpec(), ArmError(PlantParams(armature_kg_m2=0.12), factor, payload=0.07))
     plain = mujoco.MjModel.from_xml_path(str(panda_model.description.mjcf))
     links = len(panda_model.links)
     assert built.body_mass[:links] == pytest.approx(factor * plain.body_mass)

@@ -73,12 +73,10 @@ class FakeUnit:
 class Bench:
     """A receiver under a clock that is set by hand, and a socket that stands for all units."""
 
-    def __init__(
-        self, start: float = 100.0, drawn: int = 0, units: NetworkUnits | tuple[str, ...] = IDS, **more: object
-    ) -> None:
+    def __init__(self, start: float = 100.0, drawn: int = 0, units: NetworkUnits | tuple[str, ...] = IDS) -> None:
         self.now = start
         self._drawn = drawn
-        self.receiver = SkinReceiver(units, KEYS, clock=lambda: self.now, draw=self._draw, **more)
+        self.receiver = SkinReceiver(units, KEYS, clock=lambda: self.now, draw=self._draw)
         self.socket = self.new_socket()
         self.units = [FakeUnit(KEYS[id], start - 50.0 - 7.0 * k) for k, id in enumerate(IDS)]
 

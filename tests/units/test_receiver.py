@@ -11,7 +11,6 @@ from pretouch.errors import HardwareError
 from pretouch.types import RangeStatus
 from pretouch.units import PORT, receiver
 from pretouch.units.receiver import SkinReceiver
-from pretouch.units.session import LinkParams
 from pretouch.units.wire import Flag
 from tests.units.fake_unit import IDS, KEYS, Bench, imu_taken
 
@@ -165,8 +164,9 @@ def test_imu_settings_there_are_not_leave_only_the_imu_out(bench, changes):
     assert imu_taken(bench.receiver) == []
 
 
-def test_samples_for_recordings_are_bounded_and_the_rest_is_dropped():
-    with Bench(params=LinkParams(samples_most=10)) as bench:
+def test_samples_for_recordings_are_bounded_and_the_rest_is_dropped(monkeypatch):
+    monkeypatch.setattr(receiver, "SAMPLES_MOST", 10)
+    with Bench() as bench:
         bench.join()
         bench.run(0.2)
         samples = bench.receiver.take_samples()
@@ -247,5 +247,5 @@ def test_without_the_right_to_more_the_queue_is_as_long_as_the_system_allows():
         if option != socket.SO_RCVBUF:
             raise PermissionError
 
-    receiver._widen(SimpleNamespace(setsockopt=set_option), 12345)
-    assert options[-1] == (socket.SO_RCVBUF, 12345)
+    receiver._widen(SimpleNamespace(setsockopt=set_option))
+    assert options[-1] == (socket.SO_RCVBUF, receiver.BUFFER_BYTES)

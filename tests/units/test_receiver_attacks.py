@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pretouch.units.session import LinkParams
+from pretouch.units.session import PENDING_MOST
 from pretouch.units.wire import SAMPLE_LEAST, Hello, Mac, decode_beacon
 from tests.units.fake_unit import KEYS, PLAIN, FakeUnit, imu_taken
 
@@ -178,4 +178,4 @@ def test_a_flood_takes_no_memory(bench):
     for made in sockets:
         made.close()
     assert grown < 20_000
-    assert len(bench.receiver._endpoints[0]._link._pending) <= LinkParams().pending_most
+    assert len(bench.receiver._endpoints[0]._link._pending) <= PENDING_MOST

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import pytest
 
-from pretouch.units.session import LinkParams
 from pretouch.units.wire import Mac, decode_beacon
 from tests.units.fake_unit import PLAIN, Bench
 
@@ -125,8 +124,9 @@ def test_the_first_beacon_of_a_session_is_due_a_period_after_its_answer(bench):
     assert bench.now - sent == pytest.approx(0.25, abs=0.03)
 
 
-def test_beacons_are_sent_during_a_flood_that_fills_a_call():
-    with Bench(params=LinkParams(drain_most=2000)) as bench:
+def test_beacons_are_sent_during_a_flood_that_fills_a_call(monkeypatch):
+    monkeypatch.setattr("pretouch.units.receiver.DRAIN_MOST", 2000)
+    with Bench() as bench:
         bench.join()
         forged = replace(PLAIN, sequence=10**6).encode(Mac(bytes(32)))
         for _ in range(1500):

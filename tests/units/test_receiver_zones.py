@@ -11,7 +11,6 @@ from pretouch.sensing.unit import NetworkUnits
 from pretouch.types import RangeStatus
 from pretouch.units.findings import findings
 from pretouch.units.health import HealthParams, UnitWindow
-from pretouch.units.session import LinkParams
 from pretouch.units.skin import SharedOutputs
 from pretouch.units.wire import Flag, TouchPart
 from tests.units.fake_unit import IDS, Bench, imu_taken
@@ -109,7 +108,7 @@ def test_cut_datagrams_with_zones_change_nothing(bench):
 
 
 def test_samples_with_zones_come_through_shared_memory_however_large(bench):
-    outputs = SharedOutputs(UNITS, LinkParams().samples_most)
+    outputs = SharedOutputs(UNITS)
     zoned, plain = bench.units
     eight = b"\x08\x00" + bytes(5 * 64)
     for datagram in (

@@ -9,7 +9,7 @@ from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.sim.plant_params import PlantParams, plant_params_of
 from pretouch.sim.random_skin import Misplacement, misplaced
-from pretouch.sim.randomisation import SETS, WorldSet, drawn, world_set
+from pretouch.sim.randomisation import SETS, WorldSet, drawn, with_own, world_set
 from pretouch.sim.range_finder import RangeFinderParams
 
 
@@ -42,7 +42,8 @@ def randomised(name: str, seed: int, model: RobotModel, parts: Parts) -> Parts:
     believed, off = parts.believed, world.misplaced
     if believed is None and off != Misplacement() and len(parts.skin):
         believed = misplaced(parts.skin, model, off, seed)[0]
-    return Parts(world.plant_with(parts.plant, usual), world.ranging_with(parts.ranging), parts.skin, believed)
+    plant, ranging = parts.plant, with_own(world.ranging, parts.ranging, RangeFinderParams())
+    return Parts(with_own(world.plant, plant, usual), ranging, parts.skin, believed)
 
 
 def folder_part(name: str) -> str:

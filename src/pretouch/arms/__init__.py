@@ -74,10 +74,6 @@ class Output(Protocol):
         ...
 
 
-def _no_output(_controller: "Controller") -> AbstractContextManager[Output | None]:
-    return nullcontext()
-
-
 @dataclass(frozen=True)
 class OpenedArm:
     """An arm that can be read, and what it brings."""
@@ -91,7 +87,7 @@ class OpenedArm:
     """Called as a person is asked to push: a simulated one does."""
     notes: Callable[[], tuple[str, ...]] = lambda: ()
     """What is to be known of the connection by now, a sentence each."""
-    output: "Callable[[Controller], AbstractContextManager[Output | None]]" = _no_output
+    output: "Callable[[Controller], AbstractContextManager[Output | None]]" = lambda _: nullcontext()
     """Opens what else is told of each control step."""
     free_motion_id: str = ""
     """What the arm is known by as its free motion is remembered; '': by its name."""

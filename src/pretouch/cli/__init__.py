@@ -55,10 +55,11 @@ def _read(args: Sequence[str], errors: Console) -> Command:
         _write_completion(words, errors)
     below = [each for each in names if each.startswith(f"{name} ")]
     if name in ("", "-h", "--help") or (below and (not words or words[0] in ("-h", "--help"))):
-        shown = below or names
+        listed = below or names
         grouped = {each for group in COMMANDS.values() for each in group}
-        others = {n: _first_line(kind) for n, kind in _loaded([n for n in shown if n not in grouped], errors).items()}
-        print(overview(shown, others))
+        added = _loaded([each for each in listed if each not in grouped], errors)
+        first_lines = {each: (kind.__doc__ or "").strip().partition("\n")[0] for each, kind in added.items()}
+        print(overview(listed, first_lines))
         raise SystemExit(0 if args and args[-1].startswith("-") else _USAGE)
     near = get_close_matches(name, names, 1)
     advice = f"perhaps {near[0]}" if near else "pretouch --help lists them"
@@ -78,10 +79,6 @@ def _loaded(names: Sequence[str], errors: Console) -> dict[str, Any]:
         except PluginError as error:
             errors.print(str(error), markup=False)
     return kinds
-
-
-def _first_line(command: Any) -> str:
-    return (command.__doc__ or "").strip().partition("\n")[0]
 
 
 def _write_completion(shells: Sequence[str], errors: Console) -> NoReturn:

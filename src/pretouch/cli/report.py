@@ -1,5 +1,6 @@
 """`pretouch report`: one page of what recordings tell."""
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +15,7 @@ from pretouch.reporting.measures import measure
 
 
 @dataclass(frozen=True)
-class Report:
+class WriteReport:
     """Write a report of recordings as one page that needs no network: contacts, forces, distances, margins, health."""
 
     files: tyro.conf.Positional[tuple[Path, ...]]
@@ -40,13 +41,9 @@ class Report:
 
 
 def titles(files: Sequence[Path]) -> list[str]:
-    """Name of each file, with as many of its folders as tell it from the others."""
-    whole = [place.absolute().parts for place in files]
-    lengths = [1] * len(files)
-    while True:
-        names = ["/".join(parts[-length:]) for parts, length in zip(whole, lengths, strict=True)]
-        again = [i for i, title in enumerate(names) if names.count(title) > 1 and lengths[i] < len(whole[i])]
-        if not again:
-            return names
-        for i in again:
-            lengths[i] += 1
+    """Name of each file; where two have the same, their places below the folder that all are in."""
+    names, whole = [place.name for place in files], [place.absolute() for place in files]
+    if len(set(names)) == len(set(whole)):
+        return names
+    common = os.path.commonpath([place.parent for place in whole])
+    return [str(place.relative_to(common)) for place in whole]

@@ -26,7 +26,7 @@ _NEGLIGIBLE = 0.001
 
 
 @dataclass(frozen=True)
-class Import:
+class ImportArm:
     """Read your own arm from a URDF or MJCF file: fit capsules to its links, and write a description of it.
 
     Look at what is printed: all that the file does not say is assumed, with a sentence for each.
@@ -66,7 +66,10 @@ class Import:
             packages = (*packages, package)
         own = {one.name: getattr(self, one.name) for one in fields(ImportOptions) if one.name != "packages"}
         options = ImportOptions(**own, packages=packages)
-        folder = self.out or Path(_file_name(self.name or read_robot(file, options.packages).name))
+        folder = self.out
+        if not folder:  # of the arm's name: letters, digits, dashes and dots only
+            name = self.name or read_robot(file, options.packages).name
+            folder = Path(re.sub(r"[^A-Za-z0-9_.-]+", "-", name).strip("-.")[:60] or "arm")
         check_free(folder)
         with numbers_to(self.json) as write:
             write(_imported(file, options, folder))
@@ -97,11 +100,6 @@ def _imported(file: Path, options: ImportOptions, folder: Path) -> dict[str, Any
     return arm_numbers(model, ready) | {"links": imported.bodies, "remarks": imported.remarks}
 
 
-def _file_name(name: str) -> str:
-    """Make a folder's name of an arm's: letters, digits, dashes and dots only."""
-    return re.sub(r"[^A-Za-z0-9_.-]+", "-", name).strip("-.")[:60] or "arm"
-
-
 def _capsules(bodies: tuple[LinkBody, ...]) -> TextTable:
     columns = (
         ("link", lambda body: body.name),
@@ -117,7 +115,7 @@ def _capsules(bodies: tuple[LinkBody, ...]) -> TextTable:
 
 
 @dataclass(frozen=True)
-class Check:
+class CheckArm:
     """Check an arm's folder after a change by hand, and report what is wrong with it."""
 
     folder: tyro.conf.Positional[Path]
@@ -132,7 +130,7 @@ class Check:
             write(_checked(self))
 
 
-def _checked(command: Check) -> dict[str, Any]:
+def _checked(command: CheckArm) -> dict[str, Any]:
     description = load_description(command.folder)
     file = command.folder / FILE if command.folder.is_dir() else command.folder
     try:

@@ -33,7 +33,7 @@ _SPOTS = 8
 
 
 @dataclass(frozen=True)
-class Coverage:
+class MeasureCoverage:
     """Share of the paths to the arm on which a skin sees an object in time; blind spots; where more units help most."""
 
     skin: tyro.conf.Positional[Annotated[Path | None, tyro.conf.arg(metavar="[FILE]")]] = None
@@ -96,13 +96,13 @@ class Coverage:
         check_outputs(outputs, [source], self.replace)
 
 
-def _measured(command: Coverage, setting: Setting, skin: Skin) -> dict[str, Any]:
+def _measured(command: MeasureCoverage, setting: Setting, skin: Skin) -> dict[str, Any]:
     """Measure, print and draw; return the numbers."""
     ways, met = setting.ways(), setting.met()
     console = Console(highlight=False)
-    found, sees = coverage_of(ways, skin)
-    both, new = (found, coverage_of(met, skin)[0]), frozenset[str]()
-    spots = blind_spots(ways, found)
+    shares, sees = coverage_of(ways, skin)
+    both, new = (shares, coverage_of(met, skin)[0]), frozenset[str]()
+    spots = blind_spots(ways, shares)
     show(console, [_link_table(setting, *both), *([_unit_table(skin, ways, sees)] if len(skin) else [])])
     total = 1e4 * sum(spot.area_m2 for spot in spots)
     lines = [f"Blind spots, with less than {100 * BLIND:g} % of the paths seen: {len(spots)}, {total:.0f} cm^2 in all."]
@@ -121,7 +121,7 @@ def _measured(command: Coverage, setting: Setting, skin: Skin) -> dict[str, Any]
         seen = [seen_by(one, skin) for one in fresh]
         before = [covered(one, sees[:first]) for one, sees in zip(fresh, seen, strict=True)]
         after = [covered(one, sees) for one, sees in zip(fresh, seen, strict=True)]
-        found = after[0]
+        shares = after[0]
         show(console, [_suggestion_table(suggested, before, after)])
         numbers["suggested"] = suggested
         numbers["before"], numbers["after"] = _numbers(*before), _numbers(*after)
@@ -132,7 +132,7 @@ def _measured(command: Coverage, setting: Setting, skin: Skin) -> dict[str, Any]
         from pretouch.coverage.figure import coverage_figure  # needs the extra
 
         with unwritable_said("figure", command.figure):
-            coverage_figure(ways, found, skin, new).savefig(command.figure, dpi=110)
+            coverage_figure(ways, shares, skin, new).savefig(command.figure, dpi=110)
         console.print(f"Figure: {command.figure}", markup=False, soft_wrap=True)
     return numbers
 

@@ -1,7 +1,7 @@
 """What `pretouch skin simulate` does: a simulated skin that sends to a receiver in real time."""
 
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from math import inf
 from pathlib import Path
@@ -36,16 +36,7 @@ class Simulate:
     """Name or address of the receiver."""
     port: int = PORT
     """UDP port of the receiver."""
-    loss: float = 0.0
-    """Share of datagrams lost, in either direction."""
-    delay: float = 0.008
-    """Least time on the way to the receiver [s]."""
-    jitter: float = 0.004
-    """Mean of what is added to it at random [s]."""
-    overtaken: float = 0.0
-    """Share of datagrams held up so that later ones overtake them."""
-    doubled: float = 0.0
-    """Share of datagrams that arrive twice."""
+    up: ChannelParams = field(default_factory=ChannelParams)
     reboot_every: float = 0.0
     """Time between two reboots of each unit [s]; 0: none."""
     silenced: Words = ()
@@ -65,8 +56,8 @@ class Simulate:
         """Simulate until interrupted, or for the given time."""
         if self.seed < 0 or not 0.0 <= self.duration < inf:
             raise ParameterError(f"--seed is {self.seed}, --duration {self.duration:g} s: give 0 or more of both.")
-        up = ChannelParams(self.loss, self.delay, self.jitter, overtaken=self.overtaken, doubled=self.doubled)
-        down = ChannelParams(self.loss, 0.15 * self.delay, 0.3 * self.jitter, jitter_shape=2.0)
+        up = self.up
+        down = ChannelParams(up.loss, 0.15 * up.delay_s, 0.3 * up.jitter_s, jitter_shape=2.0)
         params = FleetParams(network=NetworkParams(up, down), imu=ImuParams(), reboot_every_s=self.reboot_every)
         model, profile, end = RobotModel(robot_named(self.arm)), find_profile(self.profile), self.duration or inf
         skin, placement = skin_for(model, self.skin), placement_for(model)

@@ -48,14 +48,14 @@ def check_outputs(outputs: Iterable[tuple[str, Path | None]], inputs: Iterable[P
 
     Outputs are files with what they are; None and the standard output are none.
     """
-    taken = [place for place in inputs if place]
+    places = [place for place in inputs if place]
     for what, place in outputs:
         if place and str(place) != STANDARD_OUTPUT:
-            if any(same_file(other, place) or same_file(place, other) for other in taken):
+            if any(same_file(other, place) or same_file(place, other) for other in places):
                 raise ExperimentError(f"The {what} {place} is also another input or output file: give another name.")
             check_free(what, place, replace)
             check_writable(what, place)
-            taken.append(place)
+            places.append(place)
 
 
 def check_free(what: str, place: Path, replace: bool) -> None:
@@ -103,8 +103,8 @@ def plain(value: Any) -> Any:
     A dataclass becomes a dictionary of its fields and properties.
     """
     if is_dataclass(value) and not isinstance(value, type):
-        told = [name for name, member in vars(type(value)).items() if isinstance(member, property)]
-        return {name: plain(getattr(value, name)) for name in (*(field.name for field in fields(value)), *told)}
+        properties = [name for name, member in vars(type(value)).items() if isinstance(member, property)]
+        return {name: plain(getattr(value, name)) for name in (*(field.name for field in fields(value)), *properties)}
     if isinstance(value, dict):
         return {name: plain(part) for name, part in value.items()}
     if isinstance(value, Path):

@@ -52,7 +52,7 @@ DIRECTIONS = (
 )
 
 
-class Verdict(Enum):
+class PushVerdict(Enum):
     """What a push has shown."""
 
     AS_ASKED = "as asked"
@@ -82,7 +82,7 @@ class PushEvaluator:
         """Whether somebody pushes."""
         return bool(np.linalg.norm(self.force) >= self._least)
 
-    def take(self, state: RobotState) -> Verdict | None:
+    def take(self, state: RobotState) -> PushVerdict | None:
         """Take a state in; return a verdict once a push has lasted long enough, and again each time it has."""
         if state.wrench is None:
             return None
@@ -101,15 +101,15 @@ class PushEvaluator:
         self._push.clear()
         return self._verdict(state.q, np.mean(wrenches, axis=0), np.mean(torques, axis=0))
 
-    def _verdict(self, q: FloatArray, wrench: FloatArray, torque: FloatArray) -> Verdict:
+    def _verdict(self, q: FloatArray, wrench: FloatArray, torque: FloatArray) -> PushVerdict:
         if np.all(np.isfinite(torque)):  # an arm on ROS 2 may give none
             agreement = _cosine(self._model.ee_jacobian(self._model.kinematics(q)).T @ wrench, torque)
             if agreement < AGREEMENT:
-                return Verdict.CONTRADICTORY if agreement < -AGREEMENT else Verdict.DOUBTFUL
+                return PushVerdict.CONTRADICTORY if agreement < -AGREEMENT else PushVerdict.DOUBTFUL
         along = _cosine(wrench[:3], self._axis)
         if abs(along) < np.cos(CONE_RAD):
-            return Verdict.SIDEWAYS
-        return Verdict.AS_ASKED if along > 0 else Verdict.OPPOSITE
+            return PushVerdict.SIDEWAYS
+        return PushVerdict.AS_ASKED if along > 0 else PushVerdict.OPPOSITE
 
 
 def _cosine(a: FloatArray, b: FloatArray) -> float:
@@ -118,16 +118,16 @@ def _cosine(a: FloatArray, b: FloatArray) -> float:
 
 
 _RETRY_HINTS = {
-    Verdict.SIDEWAYS: "The measured push is {force} N, not along the requested axis: push straight along it.",
-    Verdict.DOUBTFUL: "The joint torques do not match the force of {force} N: push only at the hand, not at the arm.",
+    PushVerdict.SIDEWAYS: "The measured push is {force} N, not along the requested axis: push straight along it.",
+    PushVerdict.DOUBTFUL: "The joint torques do not match the force of {force} N: push at the hand, not at the arm.",
 }
 
 _SIGN_ERRORS = {
-    Verdict.OPPOSITE: (
+    PushVerdict.OPPOSITE: (
         "The reported force is opposite to the pushes: it is the force by the robot, not on it, and the arm would move"
         " towards whoever touches it. Correct the sign setting."
     ),
-    Verdict.CONTRADICTORY: (
+    PushVerdict.CONTRADICTORY: (
         "The robot's force and its joint torques contradict each other: one is by the arm, the other on it. Correct the"
         " sign of one of them in its driver."
     ),
@@ -162,12 +162,12 @@ class GuidedPush:
             verdicts.append(self._wait(evaluator, direction))
             self.say(f"Measured: {vector(evaluator.force, 0, '+')} N. Let go.")
             self._wait_for_release(evaluator)
-        wrong = set(verdicts) - {Verdict.AS_ASKED}
+        wrong = set(verdicts) - {PushVerdict.AS_ASKED}
         if wrong:
             same = len(set(verdicts)) == 1
             raise RobotError(f"{_SIGN_ERRORS[wrong.pop()] if same else _INCONSISTENT} The arm is not moved.")
 
-    def _wait(self, evaluator: PushEvaluator, direction: Direction) -> Verdict:
+    def _wait(self, evaluator: PushEvaluator, direction: Direction) -> PushVerdict:
         """Wait for a push that is clear."""
         for state in filter(None, new_states(self.robot, self.clock, self.model.description.qd_max, TIMEOUT_S)):
             verdict = evaluator.take(state)

@@ -12,7 +12,7 @@ from pretouch.robot.model import RobotModel
 from pretouch.sim.observer import wrench_from_torques
 from pretouch.sim.physics import ArmMemory, Computer, Drives, Friction, Simulation, TorqueSensors
 from pretouch.sim.plant_params import Joints, PlantParams
-from pretouch.sim.scene import CONTACTS, ArmError, CableSpec
+from pretouch.sim.scene import CONTACTS, ArmError
 from pretouch.types import FloatArray, RobotState
 
 TOUCH_N = 1.0
@@ -65,14 +65,7 @@ class ArmInWorld:
         self._rng, self._wander = np.random.default_rng([seed, 2]), np.random.default_rng([seed, 3])
         mass_factor = _known(params.mass_factors, 1.0 + params.mass_error * rng.uniform(-1, 1, len(model.links)))
         payload = params.payload_max_kg * rng.uniform()
-        self.error = ArmError(
-            mass_factor,
-            payload if params.payload_kg is None else params.payload_kg,
-            params.armature_kg_m2,
-            CableSpec(params.cable_n_m, params.cable_slack_m, params.cable_kg, params.cable_friction_n)
-            if params.cable_n_m
-            else None,
-        )
+        self.error = ArmError(params, mass_factor, payload if params.payload_kg is None else params.payload_kg)
         self._offset = _known(params.offsets_nm, np.array(params.torque_offset_nm) * rng.uniform(-1, 1, self._n))
         self._ripple_phase = _known(params.ripple_phases_rad, rng.uniform(0, 2 * np.pi, self._n))
 

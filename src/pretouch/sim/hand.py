@@ -156,11 +156,6 @@ def against(face: FloatArray, rng: np.random.Generator, tilt: float = 0.25) -> F
     return np.asarray(inwards / np.linalg.norm(inwards))
 
 
-def hand_of(model: RobotModel) -> int:
-    """Return the index of a Franka arm's hand, whose faces are pushed."""
-    return model.link_index(f"{model.description.name}_hand")
-
-
 @dataclass(frozen=True, eq=False)
 class RobotHand:
     """The robot's hand as a person sees it: x to the front, y to the right, z down in the ready posture."""
@@ -183,8 +178,9 @@ _FRONT_RIGHT_DOWN = np.diag([1.0, -1.0, -1.0])
 
 def robot_hand(model: RobotModel) -> RobotHand:
     """Return what of an arm is pushed: a Franka's hand, or the middle of the outermost link that has a body."""
-    if f"{model.description.name}_hand" in model.links:
-        return RobotHand(hand_of(model), PALM, np.eye(3))
+    franka = f"{model.description.name}_hand"
+    if franka in model.links:
+        return RobotHand(model.link_index(franka), PALM, np.eye(3))
     joints = model.moved_by[model.body.link].sum(axis=1)
     link = int(model.body.link[joints == joints.max()].max())
     own = model.body.of_links(np.array([link]))

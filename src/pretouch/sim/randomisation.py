@@ -106,16 +106,9 @@ class DrawnWorld:
     misplaced: Misplacement
     """By how much each unit sits elsewhere than the controller believes."""
 
-    def plant_with(self, own: PlantParams, usual: PlantParams) -> PlantParams:
-        """Return this world's plant, but for what an experiment has otherwise than the usual arm: that stays."""
-        return _with(self.plant, own, usual)
 
-    def ranging_with(self, own: RangeFinderParams) -> RangeFinderParams:
-        """Return this world's range finders, but for what an experiment has otherwise than the usual ones."""
-        return _with(self.ranging, own, RangeFinderParams())
-
-
-def _with(world: Params, own: Params, usual: Params) -> Params:
+def with_own(world: Params, own: Params, usual: Params) -> Params:
+    """Return parameters of a world, but for those that an experiment has otherwise than is usual: its own stay."""
     names = [f.name for f in fields(own)]
     return replace(world, **{n: getattr(own, n) for n in names if getattr(own, n) != getattr(usual, n)})
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from pretouch.perception.scene_filter import Fixtures, floor_and_pedestal
 from pretouch.robot.model import RobotModel
+from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.world_file import attach_world
 from pretouch.types import FloatArray
 
@@ -114,20 +115,6 @@ def fixtures(spec: SceneSpec) -> Fixtures:
     return floor_and_pedestal(spec.floor_height, spec.pedestal_radius)
 
 
-@dataclass(frozen=True)
-class CableSpec:
-    """A cable from a hook above the base to the hand."""
-
-    stiffness: float
-    """Once it is taut [N/m]."""
-    slack: float
-    """How much longer than at the ready posture it may become before it is [m]."""
-    mass: float
-    """What of its mass hangs at the hand [kg]."""
-    friction: float
-    """Along it [N]."""
-
-
 _HOOK_M = (0.0, 0.0, 1.4)
 """Where the cable begins [m], base frame."""
 
@@ -136,13 +123,12 @@ _HOOK_M = (0.0, 0.0, 1.4)
 class ArmError:
     """How the simulated arm differs from its model."""
 
+    params: PlantParams
+    """Of the kind of arm: rotor inertia and cable."""
     mass_factor: FloatArray
     """(L,) factor on each link's mass and inertia."""
     payload: float
     """Unknown mass at the TCP [kg]."""
-    armature: float
-    """Rotor inertia reflected to the joint [kg m^2]."""
-    cable: CableSpec | None = None
 
 
 def build(model: RobotModel, spec: SceneSpec, error: ArmError) -> mujoco.MjModel:
@@ -196,7 +182,7 @@ def _arm(model: RobotModel, error: ArmError) -> tuple[mujoco.MjSpec, _ArmGeoms]:
     for actuator in list(mj.actuators):
         mj.delete(actuator)
     for joint in mj.joints:
-        joint.armature = error.armature
+        joint.armature = error.params.armature_kg_m2
         joint.damping = np.zeros_like(joint.damping)
     arm = [geom.name for geom in mj.geoms if model.moved_by[model.link_index(geom.parent.name)].any()]
     base = [geom.name for geom in mj.geoms if geom.name not in arm]
@@ -204,8 +190,8 @@ def _arm(model: RobotModel, error: ArmError) -> tuple[mujoco.MjSpec, _ArmGeoms]:
         body = mj.body(model.description.ee_body).add_body(name="payload")
         body.mass, body.inertia = error.payload, np.full(3, 1e-5)
         body.explicitinertial = True
-    if error.cable:
-        _add_cable(mj, model, error.cable)
+    if error.params.cable_n_m:
+        _add_cable(mj, model, error.params)
     return mj, _ArmGeoms(arm, base)
 
 
@@ -246,17 +232,17 @@ def _add_pedestal(mj: mujoco.MjSpec, name: str, spec: SceneSpec, at: tuple[float
     )  # fmt: skip
 
 
-def _add_cable(mj: mujoco.MjSpec, model: RobotModel, cable: CableSpec) -> None:
+def _add_cable(mj: mujoco.MjSpec, model: RobotModel, params: PlantParams) -> None:
     """Hang a cable at the hand: a tendon with a range of lengths at which it is slack."""
     hand = mj.body(model.description.ee_body)
     mj.worldbody.add_site(name="hook", pos=_HOOK_M)
     hand.add_site(name="plug")
     weight = hand.add_body(name="cable")
-    weight.mass, weight.inertia, weight.explicitinertial = max(cable.mass, 1e-6), np.full(3, 1e-6), True
+    weight.mass, weight.inertia, weight.explicitinertial = max(params.cable_kg, 1e-6), np.full(3, 1e-6), True
     ready = model.kinematics(model.description.q_ready).position[model.ee]
-    taut = float(np.linalg.norm(ready - _HOOK_M)) + cable.slack
+    taut = float(np.linalg.norm(ready - _HOOK_M)) + params.cable_slack_m
     tendon = mj.add_tendon(
-        name="cable", stiffness=cable.stiffness, springlength=[0.0, taut], frictionloss=cable.friction
+        name="cable", stiffness=params.cable_n_m, springlength=[0.0, taut], frictionloss=params.cable_friction_n
     )
     for site in ("hook", "plug"):
         tendon.wrap_site(site)

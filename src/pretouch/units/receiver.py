@@ -16,7 +16,6 @@ from pretouch.errors import HardwareError
 from pretouch.sensing.unit import NetworkUnits
 from pretouch.types import FloatArray, RangeReadings, TouchReadings
 from pretouch.units.keys import Keys, UnitKey
-from pretouch.units.session import LinkParams
 from pretouch.units.unit import NOTHING, Address, Received, UnitEndpoint, UnitTraffic
 from pretouch.units.wire import HELLO_SIZE, MAGIC, SAMPLE_LEAST, VERSION, Kind, sample_size
 
@@ -31,6 +30,12 @@ _HEAD = struct.Struct("<4sHHI")
 _SAMPLE = MAGIC + bytes([VERSION, Kind.SAMPLE])
 _HELLO = MAGIC + bytes([VERSION, Kind.HELLO])
 _LEAST = min(HELLO_SIZE, SAMPLE_LEAST)
+SAMPLES_MOST = 8192
+"""Most samples kept until they are taken: 4 s of 40 units."""
+DRAIN_MOST = 1024
+"""Most datagrams taken in by one call of `receive`: a flood must not keep it for ever."""
+BUFFER_BYTES = 4096 * 1024
+"""Size asked of the system for the queue of arrived datagrams [B]; more than half of it is bookkeeping."""
 _BEACON_CHECK_S = 0.02
 """Time between two looks for beacons that are due [s]."""
 _CHECK_EVERY = 256
@@ -76,7 +81,6 @@ class SkinReceiver:
         *,
         clock: Callable[[], float] = time.monotonic,
         draw: Callable[[int], bytes] = secrets.token_bytes,
-        params: LinkParams | None = None,
     ) -> None:
         """Listen.
 
@@ -87,15 +91,13 @@ class SkinReceiver:
             port: 0 lets the system choose one; one that is taken is a HardwareError.
             clock: gives the time [s] of all stamps.
             draw: gives so many random bytes.
-            params: how units are treated.
         """
-        self._params = params or LinkParams()
         network = NetworkUnits.of(units)
         keyed = keys_of(network.ids, keys)
         self.table = np.tile(NOTHING, (network.rows, 1))
         """Newest reading of each unit and zone, (K, 7), as `unit.NOTHING` has it; not to be written to."""
         self._endpoints = [
-            UnitEndpoint(i, unit, side, self._params, draw, self.table[k : k + side**2])
+            UnitEndpoint(i, unit, side, draw, self.table[k : k + side**2])
             for i, (unit, k, side) in enumerate(zip(keyed, network.first, network.zones, strict=True))
         ]
         self._by_number = {unit.number: endpoint for unit, endpoint in zip(keyed, self._endpoints, strict=True)}
@@ -106,11 +108,11 @@ class SkinReceiver:
         """Beacons the system did not take."""
         self.taken = 0
         """Datagrams that the last call of `receive` took in, genuine or not."""
-        self._arrivals: deque[Received] = deque(maxlen=self._params.samples_most)
+        self._arrivals: deque[Received] = deque(maxlen=SAMPLES_MOST)
         self._clock, self._next_beacon_check = clock, -np.inf
         self._buffer = bytearray(2048)
         self._view = memoryview(self._buffer)
-        self._socket = bind(host, port, 1024 * self._params.buffer_kib)
+        self._socket = bind(host, port)
         self._poll = select.poll()
         self._poll.register(self._socket, select.POLLIN)
         host, port = self._socket.getsockname()[:2]
@@ -120,7 +122,7 @@ class SkinReceiver:
     @property
     def behind(self) -> bool:
         """Whether the last call of `receive` left datagrams for the next."""
-        return self.taken == self._params.drain_most
+        return self.taken == DRAIN_MOST
 
     @property
     def buffer_bytes(self) -> int:
@@ -140,7 +142,7 @@ class SkinReceiver:
     def receive(self, timeout: float = 0.0) -> int:
         """Take in all that has arrived, and send the beacons that are due; return how many samples were accepted.
 
-        Under a flood, no more than `LinkParams.drain_most` datagrams are taken in.
+        Under a flood, no more than `DRAIN_MOST` datagrams are taken in.
 
         Args:
             timeout: longest time to wait for a datagram if none is there [s].
@@ -168,7 +170,7 @@ class SkinReceiver:
         return touch_readings(self.table)
 
     def take_samples(self) -> list[Received]:
-        """Return the samples accepted since the last call as they arrived, the newest `samples_most`."""
+        """Return the samples accepted since the last call as they arrived, the newest `SAMPLES_MOST`."""
         arrivals = list(self._arrivals)
         self._arrivals.clear()
         return arrivals
@@ -177,7 +179,7 @@ class SkinReceiver:
         """Take in what has arrived; return how many samples were accepted, and whether anything came at all."""
         take, buffer, view, clock = self._socket.recvfrom_into, self._buffer, self._view, self._clock
         accepted = 0
-        for k in range(self._params.drain_most):
+        for k in range(DRAIN_MOST):
             try:
                 size, address = take(buffer)
             except BlockingIOError:
@@ -194,7 +196,7 @@ class SkinReceiver:
                 self.rejected[reason] += 1
             if not k % _CHECK_EVERY:
                 self._send_due_beacons()
-        self.taken = self._params.drain_most
+        self.taken = DRAIN_MOST
         return accepted, True
 
     def _take_in(self, datagram: memoryview, size: int, address: Address, now: float) -> str | None:
@@ -250,7 +252,7 @@ def demand_port(host: str, port: int) -> None:
         )
 
 
-def bind(host: str, port: int, buffer_bytes: int) -> socket.socket:
+def bind(host: str, port: int) -> socket.socket:
     """Open a socket that never blocks, at this address; one that cannot be had is a HardwareError."""
     demand_port(host, port)
     try:
@@ -262,7 +264,7 @@ def bind(host: str, port: int, buffer_bytes: int) -> socket.socket:
         raise HardwareError(f"The address {host}, port {port}, cannot be listened on: {error}.") from None
     try:
         bound.setblocking(False)
-        _widen(bound, buffer_bytes)
+        _widen(bound)
         bound.bind(address)
     except OSError as error:
         bound.close()
@@ -274,9 +276,9 @@ def bind(host: str, port: int, buffer_bytes: int) -> socket.socket:
     return bound
 
 
-def _widen(bound: socket.socket, buffer_bytes: int) -> None:
+def _widen(bound: socket.socket) -> None:
     """Ask for a long queue: past the system's limit if that is allowed."""
     try:
-        bound.setsockopt(socket.SOL_SOCKET, _SO_RCVBUFFORCE, buffer_bytes)
+        bound.setsockopt(socket.SOL_SOCKET, _SO_RCVBUFFORCE, BUFFER_BYTES)
     except PermissionError:
-        bound.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, buffer_bytes)
+        bound.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER_BYTES)

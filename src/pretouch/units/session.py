@@ -8,10 +8,7 @@ is live; samples and beacons belong to one challenge and one nonce, so none of a
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Annotated
 
-from pretouch.checks import Check, Checked, Positive, PositiveCount
 from pretouch.units.wire import (
     CHALLENGE_SIZE,
     NONCE_SIZE,
@@ -33,37 +30,16 @@ _CHALLENGE = slice(PREFIX.size + 4, PREFIX.size + 4 + CHALLENGE_SIZE)
 _REMEMBERED = 64
 """Beacons of a session whose instants are kept."""
 _ROUNDING_S = 1e-9
-
-
-@dataclass(frozen=True)
-class LinkParams(Checked):
-    """How a receiver treats its units."""
-
-    beacon_period_s: Positive = 0.25
-    """Time between the beacons to a unit [s]. Without one for 2 s it leaves the session (docs/reference/wire.md). Where
-    30 % are lost, that happens once in an hour and a half with eight in that time, and every minute and a half with
-    four."""
-    pending_most: PositiveCount = 4
-    """Most sessions offered to one unit at once."""
-    pending_expiry_s: Positive = 5.0
-    """How long an offer stands [s]."""
-    answers_per_s: Annotated[float, Check(low=1.0)] = 20.0
-    """Most hellos of one unit that are answered in a second; a unit says ten."""
-    drift_ppm: Positive = 50.0
-    """Largest difference in rate between a unit's clock and the host's [1e-6] (crystals of 20 ppm, their temperature,
-    and the steering of the host's clock)."""
-    clock_window_s: Positive = 10.0
-    """How long a bound on a unit's clock counts [s]."""
-    silent_after_s: Positive = 0.3
-    """Time without a sample after which a unit is called silent [s]; the controller judges by itself."""
-    stuck_after_s: Positive = 1.0
-    """How long a unit may repeat a reading to the last digit before it counts as stuck [s]; noise alone changes it."""
-    samples_most: PositiveCount = 8192
-    """Most samples kept until they are taken: 4 s of 40 units."""
-    drain_most: PositiveCount = 1024
-    """Most datagrams taken in by one call of `receive`: a flood must not keep it for ever."""
-    buffer_kib: PositiveCount = 4096
-    """Size asked of the system for the queue of arrived datagrams [KiB]; more than half of it is bookkeeping."""
+BEACON_PERIOD_S = 0.25
+"""Time between the beacons to a unit [s]. Without one for 2 s it leaves the session (docs/reference/wire.md). Where
+30 % are lost, that happens once in an hour and a half with eight in that time, and every minute and a half with
+four."""
+PENDING_MOST = 4
+"""Most sessions offered to one unit at once."""
+PENDING_EXPIRY_S = 5.0
+"""How long an offer stands [s]."""
+ANSWERS_PER_S = 20.0
+"""Most hellos of one unit that are answered in a second; a unit says ten."""
 
 
 class ReplayWindow:
@@ -138,16 +114,16 @@ class Session:
         return Beacon(self.hello.unit, self.number, self.nonce).encode(key, self.hello.challenge)
 
 
-class Link:
+class UnitLink:
     """What the receiver knows of one unit's sessions."""
 
-    def __init__(self, key: bytes, params: LinkParams, draw: Callable[[int], bytes]) -> None:
+    def __init__(self, key: bytes, draw: Callable[[int], bytes]) -> None:
         """Know of no session; `draw` gives so many random bytes."""
-        self._key, self._params, self._draw = Mac(key), params, draw
+        self._key, self._draw = Mac(key), draw
         self.live: Session | None = None
         self._pending: dict[bytes, Session] = {}
         """Sessions on offer by their challenge, the oldest first."""
-        self._answers = RateLimiter(params.answers_per_s)
+        self._answers = RateLimiter(ANSWERS_PER_S)
         self.beacon_due = math.inf
         """When the live session's next beacon is to be sent [s]; never while there is none."""
 
@@ -163,7 +139,7 @@ class Link:
             return "too many hellos"
         pending = self._pending
         if challenge not in pending:
-            if len(pending) >= self._params.pending_most:
+            if len(pending) >= PENDING_MOST:
                 del pending[next(iter(pending))]
             pending[challenge] = Session(self._key, hello, self._draw(NONCE_SIZE), now)
         return pending[challenge].beacon(self._key, now)
@@ -198,18 +174,18 @@ class Link:
         self.live = session
         offers = list(self._pending.items())
         self._pending = dict(offers[offers.index((session.hello.challenge, session)) + 1 :])
-        self.beacon_due = session.sent[session.number] + self._params.beacon_period_s
+        self.beacon_due = session.sent[session.number] + BEACON_PERIOD_S
         return lost
 
     def beacon(self, now: float) -> bytes:
         """Return the live session's next beacon, to be sent at once; without a live session there is none."""
         if self.live is None:
             raise RuntimeError("no beacon can be sent to a unit without a session")
-        self.beacon_due = now + self._params.beacon_period_s
+        self.beacon_due = now + BEACON_PERIOD_S
         return self.live.beacon(self._key, now)
 
     def expire(self, now: float) -> None:
         """Forget offers that were not taken."""
         for challenge, session in list(self._pending.items()):
-            if now - session.offered > self._params.pending_expiry_s:
+            if now - session.offered > PENDING_EXPIRY_S:
                 del self._pending[challenge]

@@ -47,7 +47,7 @@ _SLOTS = 4
 _TRIES = 16
 
 
-class _Slots:
+class _ValueSlots:
     """Values by their numbers, as far as there is room. One writer; pickled for a process that is being spawned."""
 
     def __init__(self, slots: int, most: int) -> None:
@@ -84,7 +84,7 @@ class _Slots:
         return _FIRST + number % self._slots * self._stride
 
 
-class Mailbox(_Slots):
+class Mailbox(_ValueSlots):
     """The newest value, for any number of readers."""
 
     def __init__(self, most: int) -> None:
@@ -108,7 +108,7 @@ class Mailbox(_Slots):
         return self._last
 
 
-class Ring(_Slots):
+class Ring(_ValueSlots):
     """The last so many values: a reader gets each that was written since it last looked, as far as there is room.
 
     Each reader has a `Ring` of its own.

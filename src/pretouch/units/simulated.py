@@ -226,7 +226,12 @@ class SimulatedUnit:
             return []
         if self._session is None:
             return self._greet(now)
-        return [] if sample is None else [self._sealed(sample, now, self._session)]
+        if sample is None:
+            return []
+        self._sequence += 1
+        sample.sequence, sample.beacon = self._sequence, self._beacon
+        sample.beacon_hold_us = self._since(self._heard, now)
+        return [sample.encode(self._session)]
 
     def _greet(self, now: float) -> list[bytes]:
         if now < self._next_hello:
@@ -266,7 +271,7 @@ class SimulatedUnit:
         first, count = self._fifo_first, min(len(self._fifo), IMU_MOST)
         imu = [self._fifo.popleft() for _ in range(count)]
         self._fifo_first += count
-        seen = _nearest(self._range) if self._range else _nothing(now)
+        seen = min(self._range, key=lambda zone: (zone.status not in _SHOWS, zone.distance), default=_nothing(now))
         return Sample(
             unit=self.key.number, flags=int(flags), sequence=0, time_us=self._own(now), beacon=0, beacon_hold_us=0,
             battery_mv=_BATTERY_MV, temperature_cdeg=_TEMPERATURE_CDEG, bus_errors=0, range_stream=self._stream,
@@ -278,21 +283,9 @@ class SimulatedUnit:
             imu=b"".join(IMU_SAMPLE.pack(*sample.counts) for sample in imu), touch=touch, zones=zones,
         )  # fmt: skip
 
-    def _sealed(self, sample: Sample, now: float, session: Mac) -> bytes:
-        """Return a sample as the session's next datagram."""
-        self._sequence += 1
-        sample.sequence, sample.beacon = self._sequence, self._beacon
-        sample.beacon_hold_us = self._since(self._heard, now)
-        return sample.encode(session)
-
 
 _SHOWS = [RangeStatus[name] for name in ("OK", "NO_WRAP_CHECK", "MERGED", "MIN_RANGE", "MIN_CLIPPED")]
 """Statuses with a target."""
-
-
-def _nearest(zones: list[RangeSample]) -> RangeSample:
-    """Return the zone with the nearest target."""
-    return min(zones, key=lambda seen: (seen.status not in _SHOWS, seen.distance))
 
 
 def _nothing(time: float) -> RangeSample:

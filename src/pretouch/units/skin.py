@@ -23,8 +23,7 @@ from pretouch.sensing.unit import NetworkUnits
 from pretouch.signals import kept_from_children, leave_to_parent
 from pretouch.types import FloatArray, RangeReadings, TouchReadings
 from pretouch.units.keys import Keys, UnitKey
-from pretouch.units.receiver import SkinReceiver, demand_port, keys_of, range_readings, touch_readings
-from pretouch.units.session import LinkParams
+from pretouch.units.receiver import SAMPLES_MOST, SkinReceiver, demand_port, keys_of, range_readings, touch_readings
 from pretouch.units.shared_memory import Mailbox, Ring
 from pretouch.units.unit import NOTHING, Received, UnitTraffic
 from pretouch.units.wire import SAMPLE_MOST, TAG_SIZE, sample_of
@@ -58,11 +57,11 @@ class Traffic:
 class SharedOutputs:
     """Where a receiver puts what it has; as an argument of a process that is being spawned it is the same there."""
 
-    def __init__(self, units: NetworkUnits, samples_most: int) -> None:
+    def __init__(self, units: NetworkUnits) -> None:
         self._nothing = np.tile(NOTHING, (units.rows, 1))
         self._table = Mailbox(self._nothing.nbytes)
         self._traffic = Mailbox(4096 + sum(2560 + len(id.encode()) for id in units.ids))
-        self._samples = Ring(samples_most, _RECORD.size + SAMPLE_MOST - TAG_SIZE)
+        self._samples = Ring(SAMPLES_MOST, _RECORD.size + SAMPLE_MOST - TAG_SIZE)
 
     def put(self, receiver: SkinReceiver) -> None:
         """Give what a receiver has: its table, and the samples that it accepted."""
@@ -120,7 +119,7 @@ class NetworkSkin:
         if current_process().daemon:
             raise HardwareError("A daemonic process cannot start a receiver: create this process with daemon=False.")
         self._owner = os.getpid()
-        self._outputs = SharedOutputs(network, LinkParams().samples_most)
+        self._outputs = SharedOutputs(network)
         sides = zip(keyed, network.zones, strict=True)
         self._no_traffic = Traffic(tuple(UnitTraffic(unit.id, unit.number, zones=side) for unit, side in sides), {}, 0)
         context = get_context("spawn")
@@ -171,7 +170,7 @@ class NetworkSkin:
         return touch_readings(self._outputs.table())
 
     def take_samples(self) -> list[Received]:
-        """Return the samples accepted since the last call, in their order of arrival: the newest `samples_most`."""
+        """Return the samples accepted since the last call, in their order of arrival: the newest `SAMPLES_MOST`."""
         return self._outputs.take_samples()
 
     def traffic(self) -> Traffic:

@@ -10,7 +10,7 @@ import numpy as np
 from pretouch.types import FloatArray, IntArray, RangeStatus, TouchStatus
 from pretouch.units.clock import UnitClock
 from pretouch.units.keys import UnitKey
-from pretouch.units.session import Link, LinkParams, Session
+from pretouch.units.session import Session, UnitLink
 from pretouch.units.wire import NO_FORCE, ZONE, ZONES, Flag, Reset, Sample, imu_values, touch_part
 
 UnitState = Literal["never heard", "greeting", "live", "silent"]
@@ -20,6 +20,15 @@ Address = tuple[str, int]
 _RANGE_NEW, _STUCK = int(Flag.RANGE_NEW), int(RangeStatus.STUCK)
 _LEAST = 10
 """Readings that must be alike; fewer may be so by chance."""
+DRIFT = 50e-6
+"""Largest difference in rate between a unit's clock and the host's, as a fraction (crystals of 20 ppm, their
+temperature, and the steering of the host's clock)."""
+CLOCK_WINDOW_S = 10.0
+"""How long a bound on a unit's clock counts [s]."""
+SILENT_AFTER_S = 0.3
+"""Time without a sample after which a unit is called silent [s]; the controller judges by itself."""
+STUCK_AFTER_S = 1.0
+"""How long a unit may repeat a reading to the last digit before it counts as stuck [s]; noise alone changes it."""
 _GREETING_S = 1.0
 """Time without a hello after which a unit no longer asks for a session [s]; it would ask ten times in it."""
 NOTHING = (-math.inf, 0.0, float(RangeStatus.NONE), -math.inf, 0.0, math.nan, float(TouchStatus.NONE))
@@ -156,9 +165,7 @@ class StuckDetector:
 class UnitEndpoint:
     """What is known of one unit. Times in seconds of the host's clock."""
 
-    def __init__(
-        self, index: int, unit: UnitKey, zones: int, params: LinkParams, draw: Callable[[int], bytes], rows: FloatArray
-    ) -> None:
+    def __init__(self, index: int, unit: UnitKey, zones: int, draw: Callable[[int], bytes], rows: FloatArray) -> None:
         """Know nothing yet of the unit with this index in the `NetworkUnits` of the skin.
 
         What it measures goes to `rows` (`zones` squared, 7), as `NOTHING` has it; a touch to the first of them.
@@ -167,10 +174,10 @@ class UnitEndpoint:
         self.traffic = UnitTraffic(unit.id, unit.number, zones=zones)
         self.address: Address | None = None
         """Where its last sample came from, as the socket knows it."""
-        self._index, self._params = index, params
-        self._link = Link(unit.key, params, draw)
-        self._clock = UnitClock(1e-6 * params.drift_ppm, params.clock_window_s)
-        self._stuck = StuckDetector(params.stuck_after_s)
+        self._index = index
+        self._link = UnitLink(unit.key, draw)
+        self._clock = UnitClock(DRIFT, CLOCK_WINDOW_S)
+        self._stuck = StuckDetector(STUCK_AFTER_S)
         self._session: Session | None = None
         self._newest_us = 0
         """The unit's clock in its last sample [us]."""
@@ -211,14 +218,19 @@ class UnitEndpoint:
         self._tell_time(session, sample, now)
         if sample.touch:
             self._take_touch(sample)
-        new = sample.flags & _RANGE_NEW and self._fits(sample)
-        stamp = self._take_reading(sample, now) if new else math.nan
+        stamp = math.nan
+        if sample.flags & _RANGE_NEW:
+            traffic.zones_told = sample.zones[0] if sample.zones else 1
+            if traffic.zones_told == traffic.zones:
+                stamp = self._take_reading(sample, now)
+            else:  # where each zone looks is not known
+                traffic.misfits += 1
         return Received(self._index, now, stamp, traffic.offset, traffic.bound, sample)
 
     def beacon_due(self, now: float) -> bool:
         """Return whether a beacon is to be sent to `address`; do what else time asks for."""
         traffic = self.traffic
-        if (traffic.state == "live" and now - traffic.last_arrival > self._params.silent_after_s) or (
+        if (traffic.state == "live" and now - traffic.last_arrival > SILENT_AFTER_S) or (
             traffic.state == "greeting" and now - self._last_hello > _GREETING_S
         ):
             traffic.state = "silent"
@@ -251,14 +263,6 @@ class UnitEndpoint:
             self._trusted_from, self._link.beacon_due = session.number + 1, now
         traffic.clock_jumps = clock.jumps
         traffic.offset, traffic.bound = clock.offset, clock.bound
-
-    def _fits(self, sample: Sample) -> bool:
-        """Whether a range has the zones of the skin's sensor; otherwise where each looks is not known."""
-        traffic = self.traffic
-        traffic.zones_told = sample.zones[0] if sample.zones else 1
-        fits = traffic.zones_told == traffic.zones
-        traffic.misfits += not fits
-        return fits
 
     def _take_reading(self, sample: Sample, now: float) -> float:
         """Keep a reading if it is the newest; return its stamp, NaN if it cannot be told."""

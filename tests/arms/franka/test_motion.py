@@ -5,7 +5,7 @@ import time
 import numpy as np
 import pytest
 
-from pretouch.arms.franka.exchange import Command, Communication, Mailboxes, Request
+from pretouch.arms.franka.exchange import ArmCommand, ArmRequest, Communication, Mailboxes
 from pretouch.arms.franka.limits import FrankaParams, motion_limits
 from pretouch.arms.franka.process import ProcessSettings, VelocityMotion
 from pretouch.robot.model import RobotModel
@@ -23,9 +23,9 @@ class Bench:
         self.motion = VelocityMotion(1, settings, self.mailboxes, self.communication, lambda: self.over)
         self.finished = False
 
-    def command(self, qd: float, age: float = -1000.0, request: Request = Request.MOVE) -> None:
+    def command(self, qd: float, age: float = -1000.0, request: ArmRequest = ArmRequest.MOVE) -> None:
         """Have all joints wanted to move so fast [rad/s]; one from the future stays fresh."""
-        self.mailboxes.send_command(Command(1, request, time.monotonic() - age, [qd] * 7))
+        self.mailboxes.send_command(ArmCommand(1, request, time.monotonic() - age, [qd] * 7))
 
     def run(self, states: int) -> None:
         for _ in range(states):
@@ -71,7 +71,7 @@ def test_without_set_points_for_long_the_motion_ends_and_fresh_ones_do_not_count
 
 
 def test_commands_of_another_request_end_it(bench: Bench) -> None:
-    bench.mailboxes.send_command(Command(2, Request.MOVE, time.monotonic() + 1000.0, [0.2] * 7))
+    bench.mailboxes.send_command(ArmCommand(2, ArmRequest.MOVE, time.monotonic() + 1000.0, [0.2] * 7))
     bench.run(1000)
     assert bench.finished
     assert bench.mailboxes.newest_feedback().answered == 1
@@ -96,8 +96,8 @@ def test_a_set_point_that_is_none_ends_the_motion_at_rest_and_later_ones_do_not_
     assert bench.mailboxes.newest_feedback().trouble == bench.motion.trouble
 
 
-@pytest.mark.parametrize("asked_for", [Request.WAIT, Request.END, Request.QUIT])
-def test_it_ends_at_rest_when_asked_to(bench: Bench, asked_for: Request) -> None:
+@pytest.mark.parametrize("asked_for", [ArmRequest.WAIT, ArmRequest.END, ArmRequest.QUIT])
+def test_it_ends_at_rest_when_asked_to(bench: Bench, asked_for: ArmRequest) -> None:
     bench.command(0.0, request=asked_for)
     bench.run(1000)
     assert bench.finished
@@ -111,7 +111,7 @@ def test_it_ends_at_rest_when_the_program_has_died(bench: Bench) -> None:
 
 
 def test_it_does_not_end_before_the_arm_says_that_it_rests(bench: Bench) -> None:
-    bench.command(0.0, request=Request.END)
+    bench.command(0.0, request=ArmRequest.END)
     bench.run(60)
     assert not bench.finished
     assert bench.speed > 1e-4

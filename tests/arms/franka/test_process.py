@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pretouch.arms.franka.connection import StateCallback
-from pretouch.arms.franka.exchange import Command, Feedback, Mailboxes, Request
+from pretouch.arms.franka.exchange import ArmCommand, ArmRequest, Feedback, Mailboxes
 from pretouch.arms.franka.limits import FrankaParams, motion_limits
 from pretouch.arms.franka.process import ArmServer, ProcessSettings
 from pretouch.arms.franka.state import FrankaState
@@ -54,10 +54,10 @@ class Program:
     def _at(self, number: int) -> None:
         self.steps.get(number, lambda: None)()
 
-    def command(self, at: int, number: int, request: Request, speed: float = 0.0) -> None:
+    def command(self, at: int, number: int, request: ArmRequest, speed: float = 0.0) -> None:
         """From the state with a number on, want this."""
         self.steps[at] = lambda: self.mailboxes.send_command(
-            Command(number, request, time.monotonic() + 1000.0, [speed] * 7)
+            ArmCommand(number, request, time.monotonic() + 1000.0, [speed] * 7)
         )
 
     def look(self, at: int) -> list[Feedback | None]:
@@ -82,13 +82,15 @@ def program(panda_model: RobotModel) -> Iterator[Program]:
     signal.signal(signal.SIGTERM, before)
 
 
-@pytest.mark.parametrize("asked_for", [Request.MOVE, Request.RECOVER])
-def test_what_is_asked_in_a_motion_ends_it_at_rest_and_is_not_done_later(program: Program, asked_for: Request) -> None:
-    program.command(3, 1, Request.MOVE, 0.2)
+@pytest.mark.parametrize("asked_for", [ArmRequest.MOVE, ArmRequest.RECOVER])
+def test_what_is_asked_in_a_motion_ends_it_at_rest_and_is_not_done_later(
+    program: Program, asked_for: ArmRequest
+) -> None:
+    program.command(3, 1, ArmRequest.MOVE, 0.2)
     in_motion = program.look(99)
     program.command(100, 2, asked_for, 0.2)
     asked = program.look(101)
-    program.command(2000, 3, Request.QUIT)
+    program.command(2000, 3, ArmRequest.QUIT)
     last = program.run()
     assert program.client.did == ["motion"]
     assert np.abs(program.arm.qd).max() < 1e-4
@@ -100,20 +102,20 @@ def test_what_is_asked_in_a_motion_ends_it_at_rest_and_is_not_done_later(program
 
 
 def test_a_request_that_is_taken_back_does_not_begin_a_motion(program: Program) -> None:
-    program.command(3, 1, Request.WAIT)
-    program.command(100, 2, Request.QUIT)
+    program.command(3, 1, ArmRequest.WAIT)
+    program.command(100, 2, ArmRequest.QUIT)
     assert program.run().answered == 1
     assert program.client.did == []
 
 
 def test_motions_and_a_recovery_are_done_in_turn_and_trouble_is_told_once(program: Program) -> None:
-    program.command(3, 1, Request.MOVE, 0.1)
-    program.command(100, 1, Request.END)
-    program.command(1000, 2, Request.RECOVER)
+    program.command(3, 1, ArmRequest.MOVE, 0.1)
+    program.command(100, 1, ArmRequest.END)
+    program.command(1000, 2, ArmRequest.RECOVER)
     recovered = program.look(1002)
-    program.command(1010, 3, Request.MOVE, 0.1)
-    program.command(1100, 3, Request.END)
-    program.command(2000, 4, Request.QUIT)
+    program.command(1010, 3, ArmRequest.MOVE, 0.1)
+    program.command(1100, 3, ArmRequest.END)
+    program.command(2000, 4, ArmRequest.QUIT)
     assert program.run().trouble == ""
     assert program.client.did == ["motion", "recovery", "motion"]
     assert [feedback and feedback.trouble for feedback in recovered] == ["there is nothing to recover from"]
@@ -123,7 +125,7 @@ def test_an_arm_that_is_lost_in_motion_is_told_as_it_was_last_seen(program: Prog
     def fail() -> None:
         raise RobotError("the line is dead")
 
-    program.command(3, 1, Request.MOVE, 0.2)
+    program.command(3, 1, ArmRequest.MOVE, 0.2)
     before = program.look(100)
     program.steps[101] = program.steps[102] = fail
     last = program.run()

@@ -17,7 +17,7 @@ from pretouch.errors import ExperimentError, ParameterError
 from pretouch.profiles import Profile, profile
 from pretouch.sensing.skin import Skin, paper_skin
 from pretouch.sim.plant_params import PlantParams
-from pretouch.sim.randomisation import WorldSet, drawn, world_set
+from pretouch.sim.randomisation import WorldSet, drawn, with_own, world_set
 from pretouch.sim.range_finder import RangeFinderParams
 from pretouch_lab.benchmarks.dense_skin import spread_skin
 from pretouch_lab.benchmarks.detection.arm import model, plant_of
@@ -130,7 +130,7 @@ def built(profile_text: str, scene: Checked, values: Values, seed: int) -> Setti
     plant, ranging = plant_of(kind), RangeFinderParams()
     if world != USUAL_WORLD:
         drawn_world = drawn(_set(world), seed, PlantParams())
-        plant, ranging = drawn_world.plant_with(plant, PlantParams()), drawn_world.ranging
+        plant, ranging = with_own(drawn_world.plant, plant, PlantParams()), drawn_world.ranging
     return Setting(
         text, replace(plant, **parts["plant"]), replace(ranging, **parts["sensing"]), units,
         replace(scene, **parts["scene"]), seed,  # type: ignore[type-var]

@@ -8,7 +8,7 @@ from multiprocessing.connection import Connection
 from typing import Self
 
 from pretouch.arms.franka.connection import Kind, attempt, check_ready
-from pretouch.arms.franka.exchange import Command, Communication, Feedback, Mailboxes, Request
+from pretouch.arms.franka.exchange import ArmCommand, ArmRequest, Communication, Feedback, Mailboxes
 from pretouch.arms.franka.limits import CollisionBehavior, FrankaParams, motion_limits
 from pretouch.arms.franka.process import ProcessSettings, serve
 from pretouch.arms.franka.state import JOINTS, FrankaState, TorqueWatch, robot_state
@@ -92,7 +92,7 @@ class FrankaArm:
 
     def begin(self) -> None:
         """Begin a motion at rest. Commands must follow within `FrankaParams.end_after_s`."""
-        self._make_request(Request.MOVE)
+        self._make_request(ArmRequest.MOVE)
 
     def command(self, qd: FloatArray) -> None:
         """Take joint velocities (7,) [rad/s] as the set-point; a RobotError says why the arm follows none."""
@@ -102,12 +102,12 @@ class FrankaArm:
         self._demand_fresh(feedback)
         if not feedback.moving:
             raise RobotError(f"The arm at {self._address} is not in a motion: begin one first.")
-        self._send(Request.MOVE, [float(v) for v in qd])
+        self._send(ArmRequest.MOVE, [float(v) for v in qd])
 
     def end(self) -> None:
         """Bring the arm to rest and end the motion; a RobotError says what had ended it before."""
         if self._feedback().moving:
-            self._send(Request.END, [0.0] * JOINTS)
+            self._send(ArmRequest.END, [0.0] * JOINTS)
             self._wait(self._at_rest, "come to rest")
         trouble = self._feedback().trouble
         if trouble:
@@ -115,7 +115,7 @@ class FrankaArm:
 
     def recover(self) -> None:
         """Let the arm leave the mode "reflex"."""
-        self._make_request(Request.RECOVER)
+        self._make_request(ArmRequest.RECOVER)
 
     def unfit(self) -> tuple[str, ...]:
         """Say why the arm is in no mode to be moved."""
@@ -148,7 +148,7 @@ class FrankaArm:
         if os.getpid() != self._owner:
             return
         self._number += 1
-        self._send(Request.QUIT, [0.0] * JOINTS)
+        self._send(ArmRequest.QUIT, [0.0] * JOINTS)
         until = time.monotonic() + _ANSWER_S
         while self._process.is_alive() and time.monotonic() < min(until, self._feedback().stamp + _STATE_MOST_S):
             self._process.join(_LOOK_S)
@@ -161,7 +161,7 @@ class FrankaArm:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _make_request(self, request: Request) -> None:
+    def _make_request(self, request: ArmRequest) -> None:
         """Make a request and wait until it is answered; raise a RobotError with what went wrong."""
         if self._fresh_feedback().moving:
             raise RobotError(f"The arm at {self._address} is in a motion: end it first.")
@@ -170,14 +170,14 @@ class FrankaArm:
         try:
             self._wait(lambda feedback: feedback.answered >= self._number, request.name.lower())
         except BaseException:
-            self._send(Request.WAIT, [0.0] * JOINTS)  # it is not to happen later
+            self._send(ArmRequest.WAIT, [0.0] * JOINTS)  # it is not to happen later
             raise
         trouble = self._feedback().trouble
         if trouble:
             raise RobotError(trouble)
 
-    def _send(self, request: Request, qd: list[float]) -> None:
-        self._mailboxes.send_command(Command(self._number, request, time.monotonic(), qd))
+    def _send(self, request: ArmRequest, qd: list[float]) -> None:
+        self._mailboxes.send_command(ArmCommand(self._number, request, time.monotonic(), qd))
 
     def _wait(self, answered: Callable[[Feedback], bool], what: str) -> None:
         until = time.monotonic() + _ANSWER_S

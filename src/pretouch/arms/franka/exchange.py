@@ -16,7 +16,7 @@ _MOST = 65_536
 """Most bytes of feedback, of which a state takes 2000 and the vendor's error names 4000, and of a report, 12 000."""
 
 
-class Request(IntEnum):
+class ArmRequest(IntEnum):
     """What the program asks of the arm."""
 
     WAIT = 0
@@ -32,12 +32,12 @@ class Request(IntEnum):
 
 
 @value
-class Command:
+class ArmCommand:
     """What the program sends; the newest one counts."""
 
     number: int
     """Number of the request; a new number asks again."""
-    request: Request
+    request: ArmRequest
     stamp: float
     """Instant of the set-point, by `time.monotonic` [s]."""
     qd: list[float]
@@ -107,18 +107,18 @@ class Mailboxes:
     def __init__(self) -> None:
         self._commands, self._feedback = Mailbox(_COMMAND.size), Mailbox(_MOST)
         self._report = Mailbox(_MOST)
-        self._number, self._command = 0, Command(0, Request.WAIT, 0.0, [0.0] * JOINTS)
+        self._number, self._command = 0, ArmCommand(0, ArmRequest.WAIT, 0.0, [0.0] * JOINTS)
 
-    def send_command(self, command: Command) -> None:
+    def send_command(self, command: ArmCommand) -> None:
         """Make a command the newest one."""
         self._commands.write(_COMMAND.pack(command.number, command.request, command.stamp, *command.qd))
 
-    def newest_command(self) -> Command:
+    def newest_command(self) -> ArmCommand:
         """Return the newest command: the same object until there is another one; WAIT before the first."""
         number, data = self._commands.read()
         if number != self._number:
             request_number, request, stamp, *qd = _COMMAND.unpack(data)
-            self._number, self._command = number, Command(request_number, Request(request), stamp, qd)
+            self._number, self._command = number, ArmCommand(request_number, ArmRequest(request), stamp, qd)
         return self._command
 
     def send_feedback(self, feedback: Feedback) -> None:

@@ -78,7 +78,8 @@ class SetPointLimiter:
                 f"Joint {far[0] + 1} is said to be commanded to {now[far[0]]:.3f} rad/s after {sent[far[0]]:.3f} rad/s,"
                 " which no lost command explains: check what else commands the arm, then begin again."
             )
-        self.lost = self._sent is not None and self._differs(now, self._sent)
+        apart = max(abs(a - b) for a, b in zip(now, sent, strict=True))
+        self.lost = self._sent is not None and apart > self._params.reseed_rad_s
         if self._sent is None or self.lost:
             self._input.current_velocity = now
             self._input.current_acceleration = [
@@ -98,9 +99,6 @@ class SetPointLimiter:
         self._output.pass_to_input(self._input)
         self._sent = list(self._output.new_velocity)
         return self._sent
-
-    def _differs(self, now: list[float], sent: list[float]) -> bool:
-        return max(abs(a - b) for a, b in zip(now, sent, strict=True)) > self._params.reseed_rad_s
 
 
 def _ends(

@@ -22,7 +22,7 @@ from types import FrameType
 import numpy as np
 
 from pretouch.arms.franka.connection import FrankaClient, Kind
-from pretouch.arms.franka.exchange import Command, Communication, Feedback, Mailboxes, Request
+from pretouch.arms.franka.exchange import ArmCommand, ArmRequest, Communication, Feedback, Mailboxes
 from pretouch.arms.franka.limiter import SetPointLimiter, refusal
 from pretouch.arms.franka.limits import CollisionBehavior, FrankaParams, MotionLimits
 from pretouch.arms.franka.state import JOINTS, FrankaState
@@ -67,7 +67,7 @@ class VelocityMotion:
         self._limits, self._params = settings.limits, settings.params
         self._communication, self._is_over = communication, is_over
         self._limiter = SetPointLimiter(settings.limits, settings.params.limiter)
-        self._command: Command | None = None
+        self._command: ArmCommand | None = None
         self._ending = self._stale = False
         self.trouble = ""
         """Why the motion was ended, if nobody asked for that."""
@@ -84,9 +84,9 @@ class VelocityMotion:
         self._communication.answered(since, state.success_rate, time.monotonic() - now)
         return np.array(velocity), finished
 
-    def _target(self, command: Command, now: float) -> list[float]:
+    def _target(self, command: ArmCommand, now: float) -> list[float]:
         """Return the velocities to go to: the set-point, or rest."""
-        requested = command.request is Request.MOVE and command.number == self._number
+        requested = command.request is ArmRequest.MOVE and command.number == self._number
         self._ending = self._ending or not requested or self._is_over()
         if not self._ending:
             self.trouble = self._objection(command, now)
@@ -98,7 +98,7 @@ class VelocityMotion:
             self._communication.stale += 1
         return _REST if self._stale else command.qd
 
-    def _objection(self, command: Command, now: float) -> str:
+    def _objection(self, command: ArmCommand, now: float) -> str:
         """Say what about a command ends the motion, or ''."""
         wrong = ""
         if command is not self._command:
@@ -147,7 +147,7 @@ class ArmServer:
         """Carry out commands until it is time to quit."""
         while not self._is_over():
             command = self._mailboxes.newest_command()
-            if command.request is Request.QUIT:
+            if command.request is ArmRequest.QUIT:
                 break
             if command.number > self._answered:
                 self._execute(command)
@@ -166,15 +166,15 @@ class ArmServer:
         """Pass on the state there is while no motion runs."""
         self._mailboxes.send_feedback(Feedback(self._stamp, self._answered, False, self._trouble, self._state))
 
-    def _execute(self, command: Command) -> None:
+    def _execute(self, command: ArmCommand) -> None:
         self._trouble = ""
         try:
-            if command.request is Request.MOVE:
+            if command.request is ArmRequest.MOVE:
                 settings = self._settings
                 motion = VelocityMotion(command.number, settings, self._mailboxes, self._communication, self._is_over)
                 self._client.control(motion.answer)
                 self._trouble = motion.trouble
-            elif command.request is Request.RECOVER:
+            elif command.request is ArmRequest.RECOVER:
                 self._client.recover()
         except RobotError as error:
             self._trouble = str(error)
@@ -182,7 +182,9 @@ class ArmServer:
         if feedback is not None:  # the motion's last state: there may be no other
             self._state, self._stamp = feedback.state, feedback.stamp
         # what was asked during a motion ended it, and is not to be done at some later time
-        self._answered = self._mailboxes.newest_command().number if command.request is Request.MOVE else command.number
+        self._answered = (
+            self._mailboxes.newest_command().number if command.request is ArmRequest.MOVE else command.number
+        )
 
     def _is_over(self) -> bool:
         """Whether there is nobody left to serve."""
