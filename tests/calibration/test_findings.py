@@ -79,7 +79,11 @@ REFUSED = {
     "sign": ("scale", lambda data, unit: scaled(data, unit, np.array([1, 1, -1])), "accelerometer z .* its sign"),
     "lying": ("no_link", on_the_table, "fits no link"),
     "backwards": ("no_link", backwards, "fits no link"),
-    "early end": ("unusable", lambda data, unit: silent(data, unit, 20.0, 99.0), "could not be used"),
+    "early end": (
+        "unusable",
+        lambda data, unit: silent(data, unit, 20.0, 99.0),
+        "it measured nothing or was out of range",
+    ),
 }
 
 

@@ -22,7 +22,7 @@ from pretouch.calibration.values import Calibration, CalibrationData, Finding, P
 from pretouch.errors import CalibrationError
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.sensing.unit import LARGEST_ORIENTATION_SIGMA, LARGEST_POSITION_SIGMA, SensorUnit, seat
+from pretouch.sensing.unit import LARGEST_ORIENTATION_SIGMA, LARGEST_POSITION_SIGMA, SensorUnit
 from pretouch.types import FloatArray
 
 BOARD_MISALIGNMENT_DEG = 0.29
@@ -119,47 +119,38 @@ def skin_of(calibration: Calibration, model: RobotModel, keep: Skin | None = Non
 
     Raises CalibrationError if the skin has no unit.
     """
-    found = {unit.id: unit for unit in calibration.units}
-    located = {
-        name: _sensor_unit(unit, model, calibration.orientation_floor) for name, unit in found.items() if unit.accepted
-    }
+    calibrated = {unit.id: unit for unit in calibration.units}
     old = {unit.id: unit for unit in keep.mounted} if keep else {}
-    for name, unit in located.items():
-        if name in old:
-            # where a unit is says nothing of its sensors
-            located[name] = replace(unit, touch=old[name].touch, sensor=old[name].sensor)
-    names = [*old, *(name for name in found if name not in old)]
-    units = {name: located.get(name) or old.get(name) for name in names}
-    there = [unit for unit in units.values() if unit is not None]
-    if not there:
+    located = {
+        name: _sensor_unit(name, unit.place, model, calibration.orientation_floor)
+        for name, unit in calibrated.items()
+        if unit.place and unit.accepted
+    }
+    for name in located.keys() & old.keys():  # where a unit is says nothing of its sensors
+        located[name] = replace(located[name], touch=old[name].touch, sensor=old[name].sensor)
+    names = list(dict.fromkeys((*old, *calibrated)))
+    units = [(old | located)[name] for name in names if name in old or name in located]
+    if not units:
         raise CalibrationError("No unit was located reliably, so no skin can be made: see the findings of each unit.")
     return CalibratedSkin(
-        Skin(there, model),
+        Skin(units, model),
         tuple(name for name in names if name in located),
         tuple(name for name in names if name in old and name not in located),
-        tuple(name for name in names if units[name] is None),
+        tuple(name for name in names if name not in old and name not in located),
     )
 
 
-def _sensor_unit(unit: UnitCalibration, model: RobotModel, orientation_floor: float) -> SensorUnit:
+def _sensor_unit(name: str, place: Place, model: RobotModel, orientation_floor: float) -> SensorUnit:
     """Return a unit of a skin; one that lies inside its link's capsules is moved out, as its findings say.
 
     Its orientation's standard deviation is about each axis: of the fit's worst one, and how well the board is glued on.
     """
-    place = unit.place
-    if place is None:
-        raise CalibrationError(f"Unit {unit.id} was not located: leave it out.")
-    T = place.T_link_sensor.copy()
-    link = model.link_index(place.link)
-    below = seat(model, link, T[:3, 3])
-    sigma = place.position_sigma
-    if below is not None and below.height < 0:
-        out = moved_out(model, link, T[:3, 3])
-        if out is None:
-            raise CalibrationError(f"Unit {unit.id} lies inside {place.link}: there is no surface near it.")
-        sigma = float(np.hypot(sigma, np.linalg.norm(out - T[:3, 3])))
-        T[:3, 3] = out
+    T, sigma = place.T_link_sensor.copy(), place.position_sigma
+    outside = moved_out(model, model.link_index(place.link), T[:3, 3])
+    if outside is not None:
+        sigma = float(np.hypot(sigma, np.linalg.norm(outside - T[:3, 3])))
+        T[:3, 3] = outside
     return SensorUnit(
-        unit.id, place.link, T, min(sigma, LARGEST_POSITION_SIGMA),
+        name, place.link, T, min(sigma, LARGEST_POSITION_SIGMA),
         min(float(np.hypot(place.orientation_sigma, orientation_floor)), LARGEST_ORIENTATION_SIGMA),
     )  # fmt: skip

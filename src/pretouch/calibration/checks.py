@@ -102,9 +102,9 @@ def _check_range(model: RobotModel, q: FloatArray) -> None:
 
 def _own_stamp(joints: JointTrace) -> BoolArray:
     """Tell which states (T,) have a stamp of their own; where more than a few have none, they came in batches."""
-    same = np.diff(joints.stamp) == 0
-    shared = np.append(same, False) | np.append(False, same)[: len(joints.stamp)]
-    return ~shared[: len(joints.stamp)] | bool(shared.sum() > _FEW * len(shared))
+    _, which, count = np.unique(joints.stamp, return_inverse=True, return_counts=True)
+    shared = count[which] > 1
+    return np.asarray(~shared | (shared.sum() > _FEW * len(shared)))
 
 
 def _spaced(joints: JointTrace) -> BoolArray:

@@ -40,19 +40,13 @@ def share_findings(arm: ArmMotion, located: Located) -> list[Finding]:
     whole = float(arm.usable.sum())
     missing, outliers = (1 - located.known.sum() / whole), float((located.known & ~located.used).sum()) / whole
     findings = _slipped(arm, located)
-    if missing + outliers > UNUSABLE:
+    unusable = missing + outliers > UNUSABLE
+    if unusable or (outliers > _MANY and not findings):
         sentence = (
-            f"{missing + outliers:.0%} of the run could not be used (limit {UNUSABLE:.0%}): during {missing:.0%}"
-            f" it measured nothing or was out of range, and during {outliers:.0%} it did not move with its link. Fix"
-            " that and calibrate again."
+            f"During {outliers:.0%} of the run it did not move with its link, and during {missing:.0%} it measured"
+            f" nothing or was out of range. That was left out (limit {UNUSABLE:.0%}): check whether it is loose."
         )
-        findings.append(Finding("unusable", sentence, True))
-    elif outliers > _MANY and not findings:
-        sentence = (
-            f"During {outliers:.0%} of the run it did not move with its link, so that part was left out: check whether"
-            " it is loose."
-        )
-        findings.append(Finding("outliers", sentence, False))
+        findings.append(Finding("unusable" if unusable else "outliers", sentence, unusable))
     turning, acceleration = float(located.noise[0]), float(located.noise[3])
     if turning > TOLERATED_ANGULAR_VELOCITY or acceleration > TOLERATED_ACCELERATION:
         sentence = (

@@ -8,8 +8,8 @@ from pretouch.arms import arm_class
 from pretouch.calibration.motion.limits import MotionLimits, PlanParams
 from pretouch.calibration.motion.planner import plan_motion
 from pretouch.cli.calibrate.live import CalibrateArm
-from pretouch.cli.calibrate.recorded import Recorded, calibrate_recorded, check_files
-from pretouch.cli.options import JsonFile, OptionalFile, split_arm
+from pretouch.cli.calibrate.recorded import CalibrationFiles, Recorded, calibrate_recorded
+from pretouch.cli.options import OptionalFile, split_arm
 from pretouch.cli.writing import check_outputs, numbers_to, unwritable_said
 from pretouch.errors import CalibrationError
 from pretouch.robot.description import robot_named
@@ -29,15 +29,7 @@ class Calibrate:
     plan: OptionalFile = None
     """CSV file to write the motion to, for your own driver (time_s, q1_rad to qn_rad, qd1_rad_s to qdn_rad_s),
     instead of running it."""
-    skin: OptionalFile = None
-    """Skin file with the units and their assumed links, which are checked; without it, links are identified."""
-    out: OptionalFile = None
-    """Skin file to write: places and how well they are known. Refused units are as in --skin, or left out."""
-    json: JsonFile = None
-    replace: bool = False
-    """Overwrite existing files."""
-    arm: str = "panda"
-    """panda, fr3, or the folder of an imported arm."""
+    files: CalibrationFiles = field(default_factory=CalibrationFiles)
 
     @staticmethod
     def of_words(words: Sequence[str]) -> tuple[Any, Sequence[str], str]:
@@ -54,7 +46,7 @@ class Calibrate:
 
     def run(self) -> int:
         """Calibrate, and show and write the answer; or write the motion."""
-        recording, moved, files = self.recorded.recording, self.motion != PlanParams(), (self.skin, self.out, self.json)
+        recording, moved, files = self.recorded.recording, self.motion != PlanParams(), self.files
         if self.plan and recording:
             raise CalibrationError("--recording and --plan are given: choose one of them.")
         if not (self.plan or recording):
@@ -62,19 +54,21 @@ class Calibrate:
                 "The source of the calibration is missing: give --recording FILE or --plan FILE, or name an arm, as in"
                 " `pretouch skin calibrate simulated`."
             )
-        if (recording and moved) or (self.plan and (self.recorded != Recorded() or any(files))):
+        if (recording and moved) or (
+            self.plan and (self.recorded != Recorded() or files.skin or files.out or files.json)
+        ):
             wrong, mode = ("of the motion", "--recording") if recording else ("of a recording, or --out", "--plan")
             raise CalibrationError(f"Options {wrong} do not go with {mode}: leave them out.")
         if self.plan:
             self._write_motion()
             return 0
-        check_files(self.out, self.json, [recording, self.recorded.joints], self.skin, self.replace)
-        with numbers_to(self.json) as write:
-            return calibrate_recorded(RobotModel(robot_named(self.arm)), self.recorded, self.skin, self.out, write)
+        files.check([recording, self.recorded.joints])
+        with numbers_to(files.json) as write:
+            return calibrate_recorded(RobotModel(robot_named(files.arm)), self.recorded, files, write)
 
     def _write_motion(self) -> None:
-        check_outputs([("motion", self.plan)], [], self.replace)
-        model = RobotModel(robot_named(self.arm))
+        check_outputs([("motion", self.plan)], [], self.files.replace)
+        model = RobotModel(robot_named(self.files.arm))
         print("The motion is being planned.", flush=True)
         plan = plan_motion(model, self.motion)
         if self.plan:

@@ -15,8 +15,8 @@ from pretouch.calibration.motion.follow import START_RAD, plan_controller
 from pretouch.calibration.motion.limits import MotionLimits, PlanParams
 from pretouch.calibration.motion.plan import Plan
 from pretouch.calibration.motion.planner import approach, plan_motion
-from pretouch.cli.calibrate.recorded import Recorded, calibrate_recorded, check_files
-from pretouch.cli.options import JsonFile, OptionalFile
+from pretouch.cli.calibrate.recorded import CalibrationFiles, Recorded, calibrate_recorded
+from pretouch.cli.options import OptionalFile
 from pretouch.cli.run.options import A, UnitOptions
 from pretouch.cli.run.setup import heard_units
 from pretouch.cli.writing import numbers_to
@@ -49,54 +49,40 @@ class CalibrateArm(Generic[A]):
     connection: A
     units: UnitOptions = field(default_factory=UnitOptions)
     motion: PlanParams = field(default_factory=PlanParams)
-    skin: OptionalFile = None
-    """Skin file with the units and their assumed links, which are checked; without it, the seven that come with the
-    package are heard, and links are identified."""
-    out: OptionalFile = None
-    """Skin file to write: places and how well they are known. Refused units are as in --skin, or left out."""
+    files: CalibrationFiles = field(default_factory=CalibrationFiles)
     record: OptionalFile = None
     """Recording to write; by default a new one beside the skin file."""
-    json: JsonFile = None
-    replace: bool = False
-    """Overwrite existing files."""
-    arm: str = "panda"
-    """panda, fr3, or the folder of an imported arm."""
     yes: bool = False
     """Do not ask before the arm moves."""
 
     def run(self) -> int:
         """Move the arm, calibrate, and show and write the answer."""
-        if not self.out:
+        out = self.files.out
+        if not out:
             raise CalibrationError("--out is missing: name the skin file to write.")
         if not (self.units.keys or self.connection.brings_units):
             raise HardwareError("The arm brings no sensor units: give the file of their keys with --keys.")
         self.units.check()
-        beside = (self.out.with_name(f"{self.out.stem}-calibration-{n}.mcap") for n in count(1))
+        beside = (out.with_name(f"{out.stem}-calibration-{n}.mcap") for n in count(1))
         place = self.record or next(one for one in beside if not one.exists())
-        check_files(self.out, self.json, [self.units.keys], self.skin, self.replace, place)
-        with numbers_to(self.json) as write:
-            model, again = RobotModel(self.connection.described(robot_named(self.arm))), self._again(place)
-            if self._moved(model, place, again):
-                return 1
-            try:
-                return calibrate_recorded(model, Recorded(place), self.skin, self.out, write)
-            except BaseException:
-                with suppress(OSError):  # the terminal may be gone
-                    print(f"The calibration was not finished. The measurements are in {place}. {again}", flush=True)
-                raise
+        self.files.check([self.units.keys], place)
+        model = RobotModel(self.connection.described(robot_named(self.files.arm)))
+        with numbers_to(self.files.json) as write:
+            early = self._moved(model, place)
+            return 1 if early else calibrate_recorded(model, Recorded(place), self.files, write)
 
     def _again(self, place: Path) -> str:
         """Say how to calibrate from the recording alone."""
-        files = {"--recording": place, "--arm": self.arm, "--out": self.out, "--skin": self.skin, "--json": self.json}
-        words = [word for option, value in files.items() if value for word in (option, str(value))]
-        words += ["--replace"] if self.replace else []
+        files = {"recording": place} | vars(self.files)
+        options = ((f"--{name}", value) for name, value in files.items() if value)
+        words = [part for option, value in options for part in ([option] if value is True else [option, str(value)])]
         return f"To calibrate from it: pretouch skin calibrate {join(words)}"
 
-    def _moved(self, model: RobotModel, place: Path, again: str) -> bool:
+    def _moved(self, model: RobotModel, place: Path) -> bool:
         """Let the arm make the motion, and record all; return whether that ended early."""
-        skin = skin_for(model, self.skin)
+        skin = skin_for(model, self.files.skin)
         setup = ArmSetup(
-            name=self.arm,
+            name=self.files.arm,
             model=model,
             skin=skin,
             units=not self.units.keys,
@@ -119,7 +105,7 @@ class CalibrateArm(Generic[A]):
                 raise RobotError(" ".join(against))
             print("Waiting for the units.", flush=True)
             UnitWatch(units, _LOOK_S).wait(MonotonicClock(0.01))
-            print(f"All measurements are recorded in {place}. {again}", flush=True)
+            print(f"All measurements are recorded in {place}. {self._again(place)}", flush=True)
             with SkinRecording(place) as recording:
                 measurements = Measurements(recording, units, skin.network.ids, model.joints, opened.measured)
                 early = _move(opened, model, plans, measurements)

@@ -12,7 +12,7 @@ from pretouch.calibration.calibrate import calibrate, skin_of
 from pretouch.calibration.stamps import instants, retimed
 from pretouch.calibration.values import CLOCK_ERROR_S, Calibration, CalibrationData, UnitCalibration, UnitData
 from pretouch.cli.detect_words import sentences
-from pretouch.cli.options import OptionalFile
+from pretouch.cli.options import JsonFile, OptionalFile
 from pretouch.cli.tables import PlainTable
 from pretouch.cli.writing import check_outputs, plain, same_file
 from pretouch.errors import CalibrationError
@@ -51,34 +51,39 @@ class Recorded:
     """Topic of the joint states in that file, if there are several."""
 
 
-def check_files(
-    out: Path | None, json: Path | None, inputs: Iterable[Path | None], skin: Path | None, replace: bool,
-    record: Path | None = None,
-) -> None:  # fmt: skip
-    """Refuse what could not be written, or is another input or output file too; --out may be --skin."""
-    read = [*inputs, *([] if skin and out and same_file(skin, out) else [skin])]
-    check_outputs([("skin file", out), ("file", json), ("recording", record)], read, replace)
+@dataclass(frozen=True)
+class CalibrationFiles:
+    """What a calibration reads and writes beside what was recorded."""
+
+    skin: OptionalFile = None
+    """Skin file with the units and their assumed links, which are checked; without it, links are identified. Of an arm
+    that moves, the seven units that come with the package are heard then."""
+    out: OptionalFile = None
+    """Skin file to write: places and how well they are known. Refused units are as in --skin, or left out."""
+    json: JsonFile = None
+    replace: bool = False
+    """Overwrite existing files."""
+    arm: str = "panda"
+    """panda, fr3, or the folder of an imported arm."""
+
+    def check(self, inputs: Iterable[Path | None], record: Path | None = None) -> None:
+        """Refuse what could not be written, or is another input or output file too; --out may be --skin."""
+        read = [*inputs, *([] if self.skin and self.out and same_file(self.skin, self.out) else [self.skin])]
+        outputs = ("skin file", self.out), ("file", self.json), ("recording", record)
+        check_outputs(outputs, read, self.replace)
 
 
 def calibrate_recorded(
-    model: RobotModel, recorded: Recorded, skin: Path | None, out: Path | None, write: Callable[[Any], None]
+    model: RobotModel, recorded: Recorded, files: CalibrationFiles, write: Callable[[Any], None]
 ) -> int:
-    """Calibrate from recordings, show and write the answer; return 1 if a unit was refused, or else 0.
-
-    Args:
-        model: the arm.
-        recorded: what was recorded; `recording` is there.
-        skin: the skin file as it is believed to be.
-        out: skin file to write.
-        write: takes the numbers.
-    """
+    """Calibrate from recordings, show the answer and `write` it; return 1 if a unit was refused, or else 0."""
     recording = recorded.recording or Path()
     if recording.suffix.lower() in TABLES:
         raise CalibrationError(
             f"{recording} is a table, not a recording of units: give the recording with --recording, and joint states"
             " with --joints."
         )
-    believed = load_skin(skin, model) if skin else None
+    believed = load_skin(files.skin, model) if files.skin else None
     measured = read_skin(recording)
     joints, notes = _joints(model, measured, recorded)
     if not measured.complete:
@@ -90,7 +95,7 @@ def calibrate_recorded(
         )
     others = [unit.id for unit in data.units if believed and unit.id not in believed.ids]
     if others:
-        notes.append(f"{skin} does not name {', '.join(others)}: their links are found.")
+        notes.append(f"{files.skin} does not name {', '.join(others)}: their links are found.")
     answer, ahead, witnesses = aligned(model, data) if recorded.joints else (calibrate(model, data), 0.0, ())
     if recorded.joints and np.isfinite(ahead):
         way = "ahead of" if ahead > 0 else "behind"
@@ -101,8 +106,8 @@ def calibrate_recorded(
     console = Console(highlight=False)
     _show(console, answer, notes)
     write({"arm": model.description.name, "clock_ahead_s": ahead, "notes": notes} | plain(answer))
-    if out:
-        console.print(_written(answer, model, believed, out), soft_wrap=True, markup=False)
+    if files.out:
+        console.print(_written(answer, model, believed, files.out), soft_wrap=True, markup=False)
     return int(not all(unit.accepted for unit in answer.units))
 
 
