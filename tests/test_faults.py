@@ -8,12 +8,12 @@ import pytest
 
 from pretouch.desired import twist
 from pretouch.errors import ParameterError
-from pretouch.faults import Report, Watched, begin_watch, examine, robot_of
+from pretouch.faults import Watched, begin_watch, examine, robot_of
 from pretouch.modes import Event
 from pretouch.params import FailureParams
 from pretouch.sensing.sensor import PAPER_SENSOR
 from pretouch.sound import sound_points, sound_touch
-from pretouch.types import Inputs, Payload, RangeReadings, RobotState, SeenPoints, TouchReadings
+from pretouch.types import Inputs, Payload, RangeReadings, Report, RobotState, SeenPoints, TouchReadings
 
 PARAMS = FailureParams()  # state older than 0.05 s, step more than 0.05 s after the last, no force for 0.2 s
 PERIOD = 0.01

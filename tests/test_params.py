@@ -184,10 +184,9 @@ def test_the_order_of_changes_does_not_matter():
         ("paper:approach.rows=firm", "ApproachRestriction.rows is 'firm': choose one of hard, slack, floor"),
         ("paper:detect.d_max_m=nan", "MovingThresholds.d_max_m is nan: it must be finite"),
         ("paper:detect=magic", "There is no Detector called 'magic': choose from .*sequential"),
-        ("paper:detect.cues=touch", "The parameter 'detect.cues' is unknown: choose from f_base_n"),
+        ("paper:detect.touch=on", "The parameter 'detect.touch' is unknown: choose from f_base_n"),
         ("pretouch:react.soft_hold=maybe", "react.soft_hold is 'maybe': write yes or no"),
         ("pretouch:detect.localise=none:detect.localise.force_n=3", "detect.localise is none: choose it first"),
-        ("pretouch:detect.cues=smell", "There is no Cue called 'smell': choose from touch"),
     ],
 )
 def test_a_variation_that_cannot_be_is_refused(name, words):

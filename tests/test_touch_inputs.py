@@ -119,7 +119,7 @@ def test_a_touch_alone_is_no_contact_and_is_not_learnt_from(panda_model, feeling
 def test_without_sensors_in_the_skin_or_without_the_switch_no_bit_changes(panda_model, paper_skin, feeling, touched):
     push = push_of(panda_model, feeling, 4, 6.0)
     plain = Course(controller_of(panda_model, paper_skin, OURS), push, None)
-    off = profile("pretouch:detect.cues=none")
+    off = profile("pretouch:detect.touch=none")
     for skin, chosen in ((paper_skin, OURS), (feeling, off)):
         found = Course(controller_of(panda_model, skin, chosen), push, touched)
         assert all(
@@ -155,11 +155,11 @@ def test_a_recording_with_touch_is_recomputed_to_the_bit_and_lacks_what_fits_no_
     assert [k for k in range(60) if kept[k].inputs is None] == [30]
     assert "numbers are none" in kept[30].unreadable
     assert [u.touch for u in kept.runs[0].skin.units] == [u.touch for u in feeling.units]
-    assert run.cycles[-1].after.detector.cues[0].any()
+    assert run.cycles[-1].after.detector.touched.any()
 
 
 def test_another_arm_feels_as_well(tmp_path):
     model, T = RobotModel(custom_arm(tmp_path)), np.eye(4)
     T[:3, 3] = [0.05, 0.0, 0.0]
     skin = Skin([SensorUnit("u", "b", T, touch=TouchPatch())], model)
-    assert len(Run(controller_of(model, skin, OURS)).state.detector.cues[0]) == 1
+    assert len(Run(controller_of(model, skin, OURS)).state.detector.touched) == 1

@@ -152,7 +152,7 @@ def test_near_a_singularity_the_wrench_is_exactly_zero():
 
 def test_at_rest_the_torques_hold_the_arm():
     arm = arm_of()
-    gravity = arm.model.dynamics(arm.report.q, _ZERO).gravity
+    _, gravity = arm.model.mass_matrix_and_bias(arm.report.q, _ZERO, np.zeros(7))
     # but for what the model does not know of masses and payload
     np.testing.assert_allclose(arm.torques.measured, gravity, atol=3.0)
     np.testing.assert_allclose(arm.torques.desired, arm.torques.measured - gravity, atol=0.3)

@@ -139,9 +139,9 @@ def test_the_vendors_library_computes_with_our_model(serve, client, rough):
         skip_for("apt install gcc libc6-dev")
     told, model = served.ask("model", kind=client), RobotModel(robot_named(kind))
     q = np.array(told["q"])
-    dynamics = model.dynamics(q, np.zeros(7))
-    np.testing.assert_allclose(np.reshape(told["gravity"], 7), dynamics.gravity, atol=2e-2 * rough)
-    np.testing.assert_allclose(np.reshape(told["mass"], (7, 7)), dynamics.mass_matrix, atol=2e-3 * rough)
+    mass, gravity = model.mass_matrix_and_bias(q, np.zeros(7), np.zeros(7))
+    np.testing.assert_allclose(np.reshape(told["gravity"], 7), gravity, atol=2e-2 * rough)
+    np.testing.assert_allclose(np.reshape(told["mass"], (7, 7)), mass, atol=2e-3 * rough)
     jacobian = np.reshape(told["jacobian"], (6, 7), order="F")
     np.testing.assert_allclose(jacobian, model.ee_jacobian(model.kinematics(q)), atol=1e-5 * rough)
 

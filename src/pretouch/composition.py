@@ -122,9 +122,7 @@ def changed(value: Any, changes: Mapping[str, str], where: str = "") -> Any:
         now, (kind, _) = getattr(value, name), _without_none(hints[name])
         if "" in tree:
             now = _read(hints[name], tree.pop(""), path, now)
-        if tree and isinstance(now, tuple):
-            now = tuple(changed(item, _of(tree, item), f"{path}.{item.name}") for item in now)
-        elif tree:
+        if tree:
             if not is_dataclass(now):
                 first = next(iter(kind.choices())) if _is_part(kind) else "on"
                 why = f"{path} is none: choose it first, as {path}={first}" if now is None else f"{path} is one value"
@@ -138,11 +136,7 @@ def leaves(params: Any, where: str = "") -> Iterator[tuple[str, object]]:
     """Yield each parameter by its path; a part by its name, before its own parameters."""
     for f in fields(params):
         path, value = (f"{where}.{f.name}" if where else f.name), getattr(params, f.name)
-        if isinstance(value, tuple) and value and all(isinstance(item, Part) for item in value):
-            yield path, _written(value)
-            for item in value:
-                yield from leaves(item, f"{path}.{item.name}")
-        elif is_dataclass(value):
+        if is_dataclass(value):
             if isinstance(value, Part):
                 yield path, value.name
             yield from leaves(value, path)
@@ -179,18 +173,10 @@ def at(value: Any, path: str, where: str = "") -> Any:
     first, _, rest = path.partition(".")
     here, kind = f"{where}.{first}" if where else first, value.__class__
     names_here = hints_of(kind, False) if is_dataclass(value) else {}
-    if isinstance(value, tuple):
-        inner = next((item for item in value if isinstance(item, Part) and item.name == first), None)
-    else:
-        inner = getattr(value, first) if first in names_here else None
+    inner = getattr(value, first) if first in names_here else None
     if inner is None and (rest or first not in names_here):
         raise ParameterError(f"The parameter {here!r} is unknown: there is {', '.join(names_here) or 'no parameters'}.")
     return at(inner, rest, here) if rest else inner
-
-
-def _of(tree: dict[str, str], item: Part) -> dict[str, str]:
-    """Return the changes of one part of several."""
-    return {rest: text for path, text in tree.items() for first, _, rest in [path.partition(".")] if first == item.name}
 
 
 def _read(hint: Any, text: str, where: str, now: object = None) -> Any:
@@ -207,8 +193,7 @@ def _read(hint: Any, text: str, where: str, now: object = None) -> Any:
         return now if now is not None else kind()  # type: ignore[operator]
     if get_origin(kind) is tuple:
         inner = get_args(kind)[0]
-        before = {item.name: item for item in now if isinstance(item, Part)} if isinstance(now, tuple) else {}
-        return () if text in NONE else tuple(_read(inner, one, where, before.get(one)) for one in text.split(","))
+        return () if text in NONE else tuple(_read(inner, one, where) for one in text.split(","))
     if kind is bool:
         if text not in _BOOLEANS:
             raise ParameterError(f"{where} is {text!r}: write yes or no.")
@@ -242,7 +227,7 @@ def _written(value: object) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, tuple):
-        return ",".join(item.name if isinstance(item, Part) else _written(item) for item in value)
+        return ",".join(map(_written, value))
     return f"{value:.12g}" if isinstance(value, Real) and not isinstance(value, int) else str(value)
 
 

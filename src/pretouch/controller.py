@@ -16,7 +16,7 @@ from pretouch.control.joint_box import joint_limits
 from pretouch.control.path import Path, nearest_phase
 from pretouch.decision import Decision
 from pretouch.errors import RobotStateError, SkinError
-from pretouch.faults import Report, Watched, begin_watch, robot_of, take_sent
+from pretouch.faults import Watched, begin_watch, robot_of, take_sent
 from pretouch.line import CHECK, MOVE, line
 from pretouch.line_records import PYTHON, SEQUENTIAL
 from pretouch.line_setup import fixed_of, kinds_of, now_init, remembered_init
@@ -28,7 +28,7 @@ from pretouch.robot.body import Capsules
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.sound import UsualInputs, sound_robot
-from pretouch.types import ControlStep, Inputs, RobotState
+from pretouch.types import ControlStep, Inputs, Report, RobotState
 from pretouch.values import value
 
 
@@ -81,7 +81,6 @@ class Controller:
                 raise SkinError(f"The skin was made for another arm than {model.description.name}: make one for it.")
         self.limits = joint_limits(model, profile.task.position_margin_rad, profile.task.control_period_s)
         self.body = Body(model, skin, self.limits.period, fixtures.planes, fixtures.capsules)
-        self.detector = profile.detect.on(self.body)
         self.kinds, self.most_kg = kinds_of(profile), most_kg(model)
         self.motion_body = MotionBody(model, len(skin), self.limits, profile.task)
         self.approach = profile.approach if self.kinds.approach == PYTHON else None
@@ -109,7 +108,7 @@ class Controller:
         begin_watch(memory.part("watch", Watched), sound)
         memory.put("command", sound.qd_commanded)
         memory.put("rotation_goal", self.model.kinematics(sound.q).rotation[self.model.ee])
-        detector = self.kept_detector(memory, self.detector.init(self.body, learnt))
+        detector = self.kept_detector(memory, self.profile.detect.init(self.body, learnt))
         reaction = self.profile.react.init(self.body, sound.q_commanded)
         return ControllerState(memory, mode_init(), detector, reaction, self._begin_approach, None, False, False)
 
@@ -135,9 +134,9 @@ class Controller:
             here = self.model.kinematics(watch.robot.q).position[self.model.ee]
             memory.put("pace.phase", nearest_phase(self.path, here))
             memory.put("pace.speed", 0.0)
-        detector = self.detector.init(self.body)
+        detector = mine.detect.init(self.body)
         if same_window:
-            detector = self.detector.adopted(before.whole_detector(state), self.body, before.detector)
+            detector = mine.detect.adopted(before.whole_detector(state), self.body, theirs.detect)
         reaction = mine.react.adopted(before.whole_reaction(state), self.body, theirs.react, watch.robot.q_commanded)
         return replace(
             state, memory=memory, detector=self.kept_detector(memory, detector), reaction=reaction,

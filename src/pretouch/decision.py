@@ -11,7 +11,7 @@ from pretouch.contact.reaction import ReactionInputs
 from pretouch.contact.window import Window, add_force
 from pretouch.control.approach import MotionRequest, Restriction, rows_of
 from pretouch.control.commander import Asked, asked_by
-from pretouch.faults import Report, Watched, examine, put_robot
+from pretouch.faults import Watched, examine, put_robot
 from pretouch.line import ASK, MOVE, SEE, line_points, line_within
 from pretouch.line_records import PYTHON, SEQUENTIAL
 from pretouch.modes import CLEAR, Event, QpOutcome, next_mode, outcome_of
@@ -21,7 +21,7 @@ from pretouch.perception.obstacles import silent_units, track_init
 from pretouch.records import Flat
 from pretouch.robot.kinematics import Kinematics
 from pretouch.sound import sound_desired, sound_moving, sound_payload, sound_points, sound_readings, sound_touch
-from pretouch.types import ControlStep, Inputs, Mode, Obstacles, RobotState
+from pretouch.types import ControlStep, Inputs, Mode, Obstacles, Report, RobotState
 
 if TYPE_CHECKING:
     from pretouch.controller import Controller, ControllerState
@@ -150,12 +150,11 @@ class Decision:
             self.stamp, self.kin, robot, window, before.full, self.seen, reacting, self.watched, self.touches,
             self.load.doubted_kg if self.load else 0.0,
         )  # fmt: skip
-        detector = self.controller.detector
-        detection, remembered = detector.step(self.controller.whole_detector(state), self.controller.body, sample)
+        detection, remembered = p.detect.step(self.controller.whole_detector(state), self.controller.body, sample)
         if reacting and p.window.freeze_while_reacting:
             window = before
         memory.fill("window", window)
-        self.now.put("force.filtered", window.newest)
+        self.now.put("filtered_force", window.newest)
         if not detection.armed and p.detect.by_torques and bool(np.isnan(detection.residual).any()):
             self.events.setdefault(Event.NO_FORCE, f"up to {p.failure.force_timeout_s:g} s")
         elif not detection.armed:

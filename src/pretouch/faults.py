@@ -11,20 +11,8 @@ from pretouch.params import FailureParams
 from pretouch.records import Cell, IntCell
 from pretouch.robot.kinematics import below
 from pretouch.sound import FASTEST, STRONGEST, sound_robot, time_of
-from pretouch.types import FloatArray, Inputs, RobotState
+from pretouch.types import FloatArray, Inputs, Report, RobotState
 from pretouch.values import LARGEST, LATEST
-
-
-class Report(NamedTuple):
-    """As `RobotState`; a wrench of NaN is none."""
-
-    stamp: Cell
-    q: Annotated[FloatArray, "n"]
-    qd: Annotated[FloatArray, "n"]
-    q_commanded: Annotated[FloatArray, "n"]
-    qd_commanded: Annotated[FloatArray, "n"]
-    tau_ext: Annotated[FloatArray, "n"]
-    wrench: Annotated[FloatArray, 6]
 
 
 class Watched(NamedTuple):

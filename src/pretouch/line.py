@@ -17,7 +17,7 @@ from pretouch.contact.sequential_step import assess_sample
 from pretouch.contact.virtual_mass import learn_mean
 from pretouch.contact.window import add_sample
 from pretouch.control.approach import Rows, approach_rows
-from pretouch.control.braking import Touch, TouchLimits, braking_rows, inertia_factor
+from pretouch.control.braking import TouchLimits, braking_rows, inertia_factor
 from pretouch.control.motion import move_within
 from pretouch.control.path import advance, follow, reduce_speed, speed_scale
 from pretouch.faults import believable
@@ -102,9 +102,10 @@ def line_points(fixed: Blocks, remembered: Blocks, now: Blocks, points: SeenPoin
     take_points(sight, outside, points, (kin, chain), (stamp[0], robot.stamp[0]), beside)
 
 
-_test = opener(Fixed, "kinds", "force", "test", "no_gain", "mechanism", "notes_path", "sight.sees")
+_detection = opener(Fixed, "kinds", "window", "filtered", "thresholds", "notes_path")
+_test = opener(Fixed, "test", "no_gain", "mechanism", "sight.sees")
 _memory = opener(Remembered, "window", "test", "mass")
-_sample = opener(Now, "robot", "kin", "ee", "seen", "force", "detection")
+_sample = opener(Now, "robot", "kin", "ee", "seen", "filtered_force", "detection")
 
 
 @inlined
@@ -113,15 +114,14 @@ def detect(fixed: Blocks, remembered: Blocks, now: Blocks) -> bool:
 
     Return whether that is to be decided on; else the arm's own motion is learnt.
     """
-    kinds, p, test, no_gain, mechanism, notes_path, sees = _test(fixed)
+    (kinds, p, filtered, thresholds, notes_path), (test, no_gain, mechanism, sees) = _detection(fixed), _test(fixed)
     (window, state, mass), (robot, kin, ee, seen, force, d) = _memory(remembered), _sample(now)
     armed, near = window.samples[0] == len(window.ring), some_of(seen.near, 0, seen.found[0])
-    add_sample(window, robot.wrench[:3], p.window)
-    for i in range(3):
-        force.filtered[i] = window.sums[0, i]
-        force.compared[i] = window.sums[0, i] if p.filtered else robot.wrench[i]
+    add_sample(window, robot.wrench[:3], p)
+    force[:] = window.sums[0]
     if kinds.detect == THRESHOLDS:
-        contact, d.log_likelihood_ratio[0] = compare(window, force.compared, ee, near, p.thresholds, d.bands)
+        compared = force if filtered else robot.wrench[:3]
+        contact, d.log_likelihood_ratio[0] = compare(window, compared, ee, near, thresholds, d.bands)
         d.residual[:] = robot.tau_ext
     else:
         moment = Moment(kin, robot.qd, robot.qd_commanded, robot.tau_ext, near, no_gain, sees, False)
@@ -172,12 +172,12 @@ def move(fixed: Blocks, remembered: Blocks, now: Blocks) -> None:
     elif approach == BRAKING:
         # posture as measured, speeds as commanded: a row tightens from what the arm was sent last
         chain = Chain(kin.anchor, kin.axis, mechanism.arm.moved_by, robot.qd_commanded)
-        touch = Touch(braking.touch, braking.deadband_m_s, request.untouched[0])
+        touch, deadband = braking.touch, braking.deadband_m_s
         if not np.isnan(request.touch_m_s[0]):
             # a touch speed whatever the mass, and no heed of what moves by itself
-            touch = Touch(TouchLimits(np.inf, 1.0, 1.0, request.touch_m_s[0]), np.inf, request.untouched[0])
+            touch, deadband = TouchLimits(np.inf, 1.0, 1.0, request.touch_m_s[0]), np.inf
         L = inertia_factor(braking, kin, mechanism) if count[0] > 0 else np.empty((0, 0))
-        rows = braking_rows(braking, slots, near, chain, L, touch)
+        rows = braking_rows(braking, slots, near, chain, L, touch, deadband, request.untouched[0])
     move_within(motion, robot, (kin, ee, near), request, rows, (free, free), null_velocity, answer)
     command[:] = answer.command
     go_on(fixed, remembered, now)

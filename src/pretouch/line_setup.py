@@ -13,7 +13,6 @@ from pretouch.contact.reaction import DecayingVelocity
 from pretouch.contact.residual_model import sequential_init, sequential_numbers
 from pretouch.contact.sequential_step import sample_test
 from pretouch.contact.sequential_test import SequentialTest
-from pretouch.contact.touch_cue import TouchSensors
 from pretouch.contact.virtual_mass import FreeMass
 from pretouch.contact.window import window_init
 from pretouch.control.approach import (
@@ -24,8 +23,9 @@ from pretouch.control.approach import (
     row_numbers,
 )
 from pretouch.control.braking import braking_numbers, slots_init
-from pretouch.control.motion import MotionNumbers
-from pretouch.faults import Report, Watched
+from pretouch.control.motion import Answer, MotionNumbers
+from pretouch.control.path import OnPath, Pace
+from pretouch.faults import Watched
 from pretouch.line_records import (
     ADMITTANCE,
     BRAKING,
@@ -35,32 +35,24 @@ from pretouch.line_records import (
     PYTHON,
     SEQUENTIAL,
     THRESHOLDS,
-    Answer,
-    Compared,
     Fixed,
-    ForceNumbers,
     Kinds,
     Now,
-    OnPath,
-    Pace,
     Remembered,
-    Seen,
-    Sight,
 )
 from pretouch.params import NullSpaceMotion, OutsidePoints, PerceptionParams, SequentialParams
 from pretouch.perception.external_points import outside_init
-from pretouch.perception.obstacles import track_init
-from pretouch.perception.perceive import Readings
+from pretouch.perception.obstacles import Sight, track_init
+from pretouch.perception.perceive import Readings, Seen
 from pretouch.robot.kinematics import Kinematics
-from pretouch.types import no_obstacles
+from pretouch.types import Report, no_obstacles
 
 
 def kinds_of(profile: Any) -> Kinds:
     """Return which parts of a profile are compiled; a part of one's own is not, also where it extends one that is."""
     detect, approach, react = type(profile.detect), type(profile.approach), type(profile.react)
-    tests = detect is SequentialTest and all(type(cue) is TouchSensors for cue in profile.detect.cues)
     return Kinds(
-        THRESHOLDS if detect is MovingThresholds else SEQUENTIAL if tests else PYTHON,
+        THRESHOLDS if detect is MovingThresholds else SEQUENTIAL if detect is SequentialTest else PYTHON,
         {type(None): NO_ROWS, ApproachRestriction: PAPER, BrakingCurve: BRAKING}.get(approach, PYTHON),
         {DecayingVelocity: DECAY, Admittance: ADMITTANCE}.get(react, PYTHON),
     )
@@ -82,7 +74,7 @@ def fixed_of(controller: Any) -> Fixed:
             0.0 if seen.closing is None else seen.closing.memory_s, 0.0 if skin.exact else seen.spread_sigmas,
             model.capsules, model.body, controller.fixtures.planes, skin.arrays, seen, seen.outside or OutsidePoints(),
         ),
-        ForceNumbers(profile.window, thresholds.compare == "filtered", thresholds),
+        profile.window, thresholds.compare == "filtered", thresholds,
         sequential_numbers(n, limits.period, test), np.ones(len(model.links)),
         kinds.react == ADMITTANCE and profile.react.pinch is not None,
         math.inf if controller.path.closed else controller.path.length,
@@ -126,7 +118,7 @@ def now_init(controller: Any) -> Now:
     return Now(
         zero, _report(n), Readings(of_units, of_units, np.zeros(units, np.int64)),
         Kinematics(np.zeros((links, 3)), np.zeros((links, 3, 3)), np.zeros((n, 3)), np.zeros((n, 3))), three,
-        Seen(of_units, no_obstacles(places), count, count, zero, np.ones(1)), Compared(three, three),
+        Seen(of_units, no_obstacles(places), count, count, zero, np.ones(1)), three,
         sample_test(n), OnPath(zero, three, three, three, zero, zero),
         MotionRequest(three, np.eye(3), np.zeros(n), count, count, count, np.full(1, np.nan), np.full(1, sys.maxsize)),
         Answer(

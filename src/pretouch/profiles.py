@@ -13,7 +13,6 @@ from pretouch.contact.detector import Detector
 from pretouch.contact.moving_thresholds import MovingThresholds
 from pretouch.contact.reaction import DecayingVelocity, Reaction
 from pretouch.contact.sequential_test import SequentialTest
-from pretouch.contact.touch_cue import TouchSensors
 from pretouch.control.approach import ApproachRestriction, BrakingCurve, Restriction
 from pretouch.errors import ParameterError
 from pretouch.params import (
@@ -30,6 +29,7 @@ from pretouch.params import (
     SpeedReduction,
     Tangential,
     TaskParams,
+    TouchSensorParams,
     WindowParams,
 )
 from pretouch.plugins import load, names
@@ -109,7 +109,7 @@ PROFILES: dict[str, Profile] = {
         approach=BrakingCurve(effective_mass=EffectiveMass(), closing_deadband_m_s=0.05, tangential=Tangential()),
         null_space=NullSpaceMotion(),
         window=WindowParams(freeze_while_reacting=True),
-        detect=SequentialTest(cues=(TouchSensors(),), localise=LocalisationParams()),
+        detect=SequentialTest(touch=TouchSensorParams(), localise=LocalisationParams()),
         react=Admittance(
             soft_hold=True, static_friction_nm=3.0, clamp=ClampParams(), pinch=PinchParams(), give_up=GiveUpParams()
         ),

@@ -24,7 +24,7 @@ from pretouch.inputs import TouchStatus as TouchStatus
 from pretouch.modes import Event, ModeState, outcome_of
 from pretouch.modes import Mode as Mode
 from pretouch.modes import QpOutcome as QpOutcome
-from pretouch.records import Flat
+from pretouch.records import Cell, Flat
 from pretouch.values import WHOLE as WHOLE
 from pretouch.values import BoolArray as BoolArray
 from pretouch.values import FloatArray as FloatArray
@@ -72,6 +72,18 @@ def some_of(obstacles: Obstacles, first: int, end: int) -> Obstacles:
         o.unit[m], o.point[m], o.ee_distance[m], o.body_point[m], o.link[m], o.direction[m], o.body_distance[m],
         o.closing_speed[m],
     )  # fmt: skip
+
+
+class Report(NamedTuple):
+    """As `RobotState`; a wrench of NaN is none."""
+
+    stamp: Cell
+    q: Annotated[FloatArray, "n"]
+    qd: Annotated[FloatArray, "n"]
+    q_commanded: Annotated[FloatArray, "n"]
+    qd_commanded: Annotated[FloatArray, "n"]
+    tau_ext: Annotated[FloatArray, "n"]
+    wrench: Annotated[FloatArray, 6]
 
 
 class Thresholds(NamedTuple):
@@ -249,7 +261,7 @@ _PLACES: dict[str, Callable[[Flat], Any]] = {
     for name, path in {
         "stamp": "stamp", "q": "robot.q", "q_commanded": "robot.q_commanded", "ee_position": "ee",
         "path_position": "path.point", "path_phase": "path.phase", "desired_velocity": "request.velocity",
-        "speed_scale": "path.scale", "range_distance": "seen.distance", "filtered_force": "force.filtered",
+        "speed_scale": "path.scale", "range_distance": "seen.distance", "filtered_force": "filtered_force",
         "command": "answer.command",
         "residual": "detection.residual", "evidence": "detection.log_likelihood_ratio",
         "detectable_n": "detection.detectable_n",

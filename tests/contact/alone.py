@@ -1,7 +1,7 @@
 """A detector given one sample after the other with nothing around it, and an arm that stands."""
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -9,7 +9,6 @@ import numpy as np
 from pretouch.contact.detector import Body, Detection, Sample
 from pretouch.contact.scatter import LENGTHS, WindowMeans, means_in_free_motion
 from pretouch.contact.sequential_test import SequentialTest, SequentialTestState
-from pretouch.contact.touch_cue import Cue, Cues
 from pretouch.contact.window import Window, add_force, window_init
 from pretouch.params import MisfitParams
 from pretouch.profiles import Profile
@@ -17,16 +16,6 @@ from pretouch.robot.kinematics import Kinematics
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import FloatArray, Obstacles, RobotState, TouchReadings, no_obstacles
-
-
-@dataclass(frozen=True)
-class Given(Cue):
-    """Says what it is given."""
-
-    said: Cues | None = field(default=None, compare=False)
-
-    def step(self, state: None, body: Body, sample: Sample) -> tuple[Cues | None, None]:
-        return self.said, None
 
 
 @dataclass(frozen=True)
@@ -41,21 +30,18 @@ def body_of(model: RobotModel, profile: Profile, skin: Skin | None = None) -> Bo
     return Body(model, skin or Skin((), model), profile.task.control_period_s)
 
 
-def begun(model: RobotModel, profile: Profile) -> Alone:
-    return Alone(window_init(profile.window.samples), profile.detect.init(body_of(model, profile)))
+def begun(model: RobotModel, profile: Profile, skin: Skin | None = None) -> Alone:
+    return Alone(window_init(profile.window.samples), profile.detect.init(body_of(model, profile, skin)))
 
 
 def feel(
     before: Alone, model: RobotModel, kin: Kinematics, robot: RobotState, obstacles: Obstacles, reacting: bool,
-    profile: Profile, watched: bool = True, cues: Cues | None = None,
+    profile: Profile, watched: bool = True, skin: Skin | None = None, touches: TouchReadings | None = None,
 ) -> tuple[Detection, Alone]:  # fmt: skip
-    """Take in one sample; what units say of a touch is given as it is."""
-    detect, state = profile.detect, before.state
-    if isinstance(detect, SequentialTest):
-        detect, state = replace(detect, cues=(Given(cues),)), replace(state, cues=(None,))
+    """Take in one sample."""
     window = add_force(before.window, None if robot.wrench is None else robot.wrench[:3], profile.window)
-    given = Sample(robot.stamp, kin, robot, window, before.window.full, obstacles, reacting, watched)
-    found, state = detect.step(state, body_of(model, profile), given)
+    given = Sample(robot.stamp, kin, robot, window, before.window.full, obstacles, reacting, watched, touches)
+    found, state = profile.detect.step(before.state, body_of(model, profile, skin), given)
     return found, Alone(before.window if reacting and profile.window.freeze_while_reacting else window, state)
 
 

@@ -11,10 +11,10 @@ from tests.contact.alone import sample, something, standing
 
 from pretouch.contact.detector import Body
 from pretouch.contact.localisation import (
+    NO_CONTACT,
     LocalisationState,
     candidate_poses,
     hidden_candidates,
-    localisation_init,
     localise,
 )
 from pretouch.contact.posterior import Candidates, log_posterior, log_prior
@@ -80,7 +80,7 @@ def said(
     tested = sample_test(N)
     tested.means[:], tested.covariance[:], tested.model_variance[:] = torque, NOISE + np.diag(MODEL_VARIANCE), 1e-4
     tested.samples[0], tested.log_likelihood_ratio[0] = 32, ratio
-    felt, state = sample(kin, standing(MODEL, torque), obstacles or no_obstacles(), 0.0), state or localisation_init()
+    felt, state = sample(kin, standing(MODEL, torque), obstacles or no_obstacles(), 0.0), state or NO_CONTACT
     for _ in range(steps):
         state = localise(state, BODY, felt, cues or no_cues(len(MODEL.links)), tested, p)
     return state.touched, state

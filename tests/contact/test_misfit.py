@@ -112,7 +112,7 @@ def test_touches_that_no_unit_sees_raise_it_to_the_bound_at_most():
 @pytest.mark.slow
 def test_half_an_hour_of_friction_that_remembers_gives_no_alarm_after_the_first(panda_model: RobotModel):
     """A joint's torque is off by where it last turned round: the corner that the test used to talk itself into."""
-    ours = replace(profile("pretouch").detect, localise=None, cues=())
+    ours = replace(profile("pretouch").detect, localise=None, touch=None)
     before = replace(ours, misfit=None, tails=30.0, memory_s=300.0, bias_floor_nm=0.03)
     assert len(list(islice(alarms(panda_model, before), 5))) == 5
     assert not [at for at in alarms(panda_model, ours) if at > 60.0]

@@ -12,7 +12,7 @@ from tests.contact.alone import feel, sample, something, standing
 from pretouch.contact.detector import Body
 from pretouch.contact.scatter import earned_level, level_init
 from pretouch.contact.sequential import alarm_bound
-from pretouch.contact.touch_cue import Cues, TouchSensors, gain_of, no_cues, surface_areas, together
+from pretouch.contact.touch_cue import Cues, gain_of, surface_areas, touch_cues, untouched
 from pretouch.profiles import profile
 from pretouch.robot.body import Capsules
 from pretouch.robot.model import RobotModel
@@ -20,7 +20,7 @@ from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import TouchPatch
 from pretouch.types import TouchReadings, TouchStatus, no_obstacles
 
-(P,) = profile("pretouch").detect.cues
+P = profile("pretouch").detect.touch
 PERIOD = 0.01
 NOW = 5.0
 
@@ -44,13 +44,13 @@ class Sensors:
 
     def __init__(self, model: RobotModel, skin: Skin) -> None:
         self.body, self.kin = Body(model, skin, PERIOD), model.kinematics(model.description.q_ready)
-        self.robot, self.cue = standing(model), TouchSensors().on(self.body)
-        self.state = self.cue.init(self.body)
+        self.robot, self.state = standing(model), untouched(self.body, P)
 
     def cues(self, readings: TouchReadings | None) -> Cues | None:
+        """What they say; None for nothing."""
         given = sample(self.kin, self.robot, no_obstacles(), NOW, readings)
-        cues, self.state = self.cue.step(self.state, self.body, given)
-        return cues
+        cues, self.state = touch_cues(self.state, self.body, given, P)
+        return cues if len(cues.link) else None
 
 
 def test_the_gain_by_hand():
@@ -149,33 +149,22 @@ def test_a_sensor_that_is_stuck_is_believed_for_ten_seconds_and_comes_back_slowl
     assert len(cues.link) == 1
 
 
-def test_a_cue_counts_for_an_object_that_is_seen_at_its_link_as_well_and_no_cue_changes_no_bit(panda_model):
-    kin, link = panda_model.kinematics(panda_model.description.q_ready), panda_model.link_index("panda_link5")
+def test_a_touch_counts_for_an_object_that_is_seen_at_its_link_and_no_touch_changes_no_bit(panda_model, paper_skin):
+    skin = touching(paper_skin, panda_model)
+    kin, link = panda_model.kinematics(panda_model.description.q_ready), int(skin.link[3])
     at, away = kin.position[link], np.array([0.0, 1.0, 0.0])
     torque = np.asarray(panda_model.jacobian(kin, link, at)[:3].T @ (-9.0 * away))
-    quiet = no_cues(len(panda_model.links))
-    gain = quiet.gain.copy()
-    gain[link] = 50.0
     ours, evidence = profile("pretouch"), []
-    for cues in (None, quiet, quiet._replace(gain=gain)):
-        state = feel_init(panda_model, ours)
+    for felt_by, touched in ((None, None), (skin, ()), (skin, (3,))):
+        state = feel_init(panda_model, ours, felt_by)
         for k in range(5):
             robot, seen = standing(panda_model, torque, stamp=0.02 * k), something(link, at, away, 0.01, 0.5)
-            felt, state = feel(state, panda_model, kin, robot, seen, False, ours, True, cues)
+            touches = None if touched is None else said(7, *touched, stamp=0.02 * k)
+            felt, state = feel(state, panda_model, kin, robot, seen, False, ours, True, felt_by, touches)
         evidence.append(felt.evidence)
     assert evidence[0] == evidence[1]
-    # fifty times the prior of what says most: ln 50 in units of ln A, but for what the other hypotheses add
+    # so many times the prior of what says most: ln G in units of ln A, but for what the other hypotheses add
+    share = np.pi * 0.02**2 / surface_areas(panda_model.capsules, len(panda_model.links))[link]
     bound = alarm_bound(ours.detect, ours.task.control_period_s)
-    gained = np.log(50.0) / earned_level(level_init()[1], bound, ours.detect.slack_nats)
+    gained = np.log(gain_of(share, P)) / earned_level(level_init()[1], bound, ours.detect.slack_nats)
     assert 0.8 * gained < evidence[2] - evidence[1] <= gained * (1 + 1e-9)
-
-
-def test_gains_multiply_and_places_add_up():
-    one = Cues(np.array([1.0, 2.0, 3.0]), np.array([1]), np.array([[0.1, 0.2, 0.3]]), np.array([0.01]))
-    two = Cues(np.array([1.0, 5.0, 0.5]), np.array([2]), np.array([[0.4, 0.5, 0.6]]), np.array([0.02]))
-    both = together(one, no_cues(3), two)
-    assert both.gain == pytest.approx([1.0, 10.0, 1.5])
-    assert both.link.tolist() == [1, 2]
-    assert both.point.tolist() == [[0.1, 0.2, 0.3], [0.4, 0.5, 0.6]]
-    assert both.sigma.tolist() == [0.01, 0.02]
-    assert together(one) is one

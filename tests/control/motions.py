@@ -4,14 +4,14 @@ import numpy as np
 from tests.following_arm import controller_of
 
 from pretouch.decision import move_restricted
-from pretouch.faults import Report, put_robot
+from pretouch.faults import put_robot
 from pretouch.line import MOVE
 from pretouch.modes import CLEAR
 from pretouch.profiles import Profile
 from pretouch.robot.kinematics import Kinematics
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin
-from pretouch.types import ControlStep, FloatArray, Obstacles, RobotState
+from pretouch.types import ControlStep, FloatArray, Obstacles, Report, RobotState
 
 
 class Mover:

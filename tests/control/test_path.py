@@ -7,9 +7,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from tests.following_arm import DT
 
-from pretouch.control.path import Circle, Path, WayPoints, advance, follow, segment
+from pretouch.control.path import Circle, OnPath, Path, WayPoints, advance, follow, segment
 from pretouch.errors import PathError
-from pretouch.line_records import OnPath
 from pretouch.params import TaskParams
 
 CIRCLE = Circle()  # paper, IV-A: radius 0.25 m round (0.5, 0, 0.25)

@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pretouch.control.path import reduce_speed, speed_scale
-from pretouch.line_records import Pace
+from pretouch.control.path import Pace, reduce_speed, speed_scale
 
 D_MAX = 0.8
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from pretouch.control.path import Circle
 from pretouch.controller import Controller
-from pretouch.faults import Report, put_robot
+from pretouch.faults import put_robot
 from pretouch.line import SEE, line_points
 from pretouch.params import PerceptionParams
 from pretouch.perception.obstacles import TrackState
@@ -15,7 +15,7 @@ from pretouch.profiles import PROFILES
 from pretouch.robot.body import Capsules
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.types import Obstacles, RangeReadings, RangeStatus, RobotState, SeenPoints
+from pretouch.types import Obstacles, RangeReadings, RangeStatus, Report, RobotState, SeenPoints
 
 FLOOR = Fixtures(np.array([[0.0, 0.0, 1.0, -0.2]]), no_fixtures().capsules)
 TCP = np.array([0.30689, 0.0, 0.48688])

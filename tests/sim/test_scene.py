@@ -102,7 +102,7 @@ def reduced_mass(model: RobotModel) -> float:
     """Mass of the oscillator that a 0.6 kg hand and the arm make at the fingertip [kg]."""
     q = model.description.q_ready
     J = BELOW @ model.jacobian(model.kinematics(q), model.ee, fingertip(model))[:3]
-    M = model.dynamics(q, np.zeros(model.n)).mass_matrix + 0.1 * np.eye(model.n)
+    M = model.mass_matrix(q) + 0.1 * np.eye(model.n)
     return float(1.0 / (1.0 / 0.6 + J @ np.linalg.solve(M, J)))
 
 

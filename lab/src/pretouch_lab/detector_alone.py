@@ -15,7 +15,7 @@ class DetectorAlone:
     def __init__(self, profile: Profile, model: RobotModel, skin: Skin | None = None) -> None:
         """Take the arm, and its units where the detector reads more of them than what is near."""
         self.body = Body(model, skin or Skin((), model), profile.task.control_period_s)
-        self._detector, self._params = profile.detect.on(self.body), profile.window
+        self._detector, self._params = profile.detect, profile.window
         self.window, self.state = window_init(profile.window.samples), self._detector.init(self.body)
 
     def step(

@@ -83,7 +83,7 @@ def _detect(controller: Controller, robot: RobotState) -> None:
     for push in (0.0, _PUSH_NM):
         report = replace(robot, tau_ext=np.full(len(robot.q), push))
         sample = Sample(0.0, kin, report, state.memory.part("window", Window), True, near)
-        _, memory = controller.detector.step(memory, controller.body, sample)
+        _, memory = controller.profile.detect.step(memory, controller.body, sample)
 
 
 def compile_stages() -> None:

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import field
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -103,10 +103,6 @@ class Detector(Part, group="pretouch.detectors"):
     def reads_touch(self) -> bool:
         """Whether it takes the units' touch readings."""
         return False
-
-    def on(self, body: Body) -> Self:
-        """Return the detector for an arm with all prepared that does not change; by default itself."""
-        return self
 
     def init(self, body: Body, learnt: ResidualModel | None = None) -> Any:
         """Return what is remembered before the first step.

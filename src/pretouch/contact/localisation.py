@@ -101,12 +101,7 @@ class LocalisationState:
     """Its result."""
 
 
-def localisation_init() -> LocalisationState:
-    """Return the state without a contact."""
-    return _NOTHING
-
-
-_NOTHING = LocalisationState(np.zeros(0), 0.0, 0, 0.0, NOT_TOUCHED)
+NO_CONTACT = LocalisationState(np.zeros(0), 0.0, 0, 0.0, NOT_TOUCHED)
 
 
 def localise(
@@ -118,7 +113,7 @@ def localise(
     """
     model, qd, ratio = body.model, sample.robot.qd_commanded, float(tested.log_likelihood_ratio[0])
     if ratio < (1.0 if state.steps == 0 else _OVER):
-        return _NOTHING
+        return NO_CONTACT
     since = state.since + body.period
     if state.steps and since < p.update_s * (1.0 - 1e-9):  # sums of periods are not exact
         return replace(state, since=since)
@@ -137,7 +132,7 @@ def localise(
         tested._replace(samples=np.array([steady])), sample.obstacles, cues, p.numbers,
         (average, fading * state.weight, _independent_part(body.period, p)), touched,
     )  # fmt: skip
-    return _NOTHING if weight < 0.0 else LocalisationState(average, weight, state.steps + 1, 0.0, touched)
+    return NO_CONTACT if weight < 0.0 else LocalisationState(average, weight, state.steps + 1, 0.0, touched)
 
 
 @kernel

@@ -7,14 +7,14 @@ import numpy as np
 
 from pretouch.contact.announced_load import doubted
 from pretouch.contact.detector import Body, Detection, Detector, Sample, no_torques, strongest
-from pretouch.contact.localisation import LocalisationState, localisation_init, localise, most_significant_mean
+from pretouch.contact.localisation import NO_CONTACT, LocalisationState, localise, most_significant_mean
 from pretouch.contact.residual_model import ResidualModel, SequentialState, sequential_init, sequential_numbers
 from pretouch.contact.sequential import Moment
 from pretouch.contact.sequential_step import SampleTest, assess_sample, sample_test
-from pretouch.contact.touch_cue import Cue, Cues, no_cues, together
+from pretouch.contact.touch_cue import Cues, no_cues, touch_cues, untouched
 from pretouch.contact.window import window_init
 from pretouch.errors import ParameterError
-from pretouch.params import LocalisationParams, SequentialParams
+from pretouch.params import LocalisationParams, SequentialParams, TouchSensorParams
 from pretouch.types import NOT_TOUCHED, FloatArray, RobotState, Thresholds, no_obstacles
 from pretouch.values import value
 
@@ -27,16 +27,16 @@ class SequentialTestState:
     """None where the controller keeps it."""
     localisation: LocalisationState | None
     """None where no contact is localised."""
-    cues: tuple[object, ...]
-    """Of each cue."""
+    touched: FloatArray
+    """(M,) how long each of M touch sensors has said that it is touched, see `touch_cues` [s]."""
 
 
 @dataclass(frozen=True)
 class SequentialTest(SequentialParams, Detector, name="sequential"):
     """A test on the torques less their learnt mean in free motion (docs/explanation/detection.md)."""
 
-    cues: tuple[Cue, ...] = ()
-    """What else the units say of a touch."""
+    touch: TouchSensorParams | None = None
+    """How much the units' touch sensors count; none: nothing."""
     localise: LocalisationParams | None = None
     """How the place of a contact is inferred (docs/explanation/localization.md); None: it is not."""
 
@@ -44,36 +44,29 @@ class SequentialTest(SequentialParams, Detector, name="sequential"):
 
     @property
     def reads_touch(self) -> bool:
-        """Whether any cue does."""
-        return len(self.cues) > 0
-
-    def on(self, body: Body) -> "SequentialTest":
-        """Return the test with its cues made for an arm."""
-        return replace(self, cues=tuple(cue.on(body) for cue in self.cues))
+        """Whether touch sensors count."""
+        return self.touch is not None
 
     def init(self, body: Body, learnt: ResidualModel | None = None) -> SequentialTestState:
         """Return what is remembered before the first step."""
         test = sequential_init(body.model.n, self, learnt)
-        return SequentialTestState(test, localisation_init() if self.localise else None, self._cues_init(body))
-
-    def _cues_init(self, body: Body) -> tuple[object, ...]:
-        return tuple(cue.init(body) for cue in self.cues)
+        return SequentialTestState(test, NO_CONTACT if self.localise else None, untouched(body, self.touch))
 
     def step(self, state: SequentialTestState, body: Body, sample: Sample) -> tuple[Detection, SequentialTestState]:
         """Hold one sample of the torques against free motion, and learn from it if nothing can be a contact."""
         location = state.localisation
         # first, for units are heard without torques too: how long a sensor has been stuck counts on
-        cues, remembered = self._heard(state.cues, body, sample)
+        cues, touched = touch_cues(state.touched, body, sample, self.touch)
         blind = no_torques(body, sample)
         if blind is not None:
-            return blind, SequentialTestState(state.test, localisation_init() if location else None, remembered)
+            return blind, SequentialTestState(state.test, NO_CONTACT if location else None, touched)
         before = _test_of(state)
         if sample.doubted_kg:
             before = before._replace(model=doubted(before.model, sample.doubted_kg))
         tested, test = self._assessed(before, body, sample, cues)
         ratio, bands, significant = float(tested.log_likelihood_ratio[0]), Thresholds(*tested.bands), None
         if self.localise:
-            location = localise(location or localisation_init(), body, sample, cues, tested, self.localise)
+            location = localise(location or NO_CONTACT, body, sample, cues, tested, self.localise)
         if ratio >= 1.0:
             significant = most_significant_mean(tested, body.period, self.localise or _USUAL)
         detection = Detection(
@@ -82,7 +75,7 @@ class SequentialTest(SequentialParams, Detector, name="sequential"):
             location.touched if self.localise and location else NOT_TOUCHED, significant,
             float(tested.detectable_n[0]),
         )  # fmt: skip
-        return detection, SequentialTestState(test, location if self.localise else None, remembered)
+        return detection, SequentialTestState(test, location if self.localise else None, touched)
 
     def _assessed(
         self, state: SequentialState, body: Body, sample: Sample, cues: Cues
@@ -100,17 +93,11 @@ class SequentialTest(SequentialParams, Detector, name="sequential"):
         assess_sample(after, now, sequential_numbers(n, body.period, self), body.model.mechanism, results)
         return results, after
 
-    def _heard(self, states: tuple[object, ...], body: Body, sample: Sample) -> tuple[Cues, tuple[object, ...]]:
-        """Return what all cues say together, and what each remembers."""
-        steps = [cue.step(state, body, sample) for cue, state in zip(self.cues, states, strict=True)]
-        heard = [cues for cues, _ in steps if cues is not None] or [no_cues(len(body.model.links))]
-        return together(*heard), tuple(state for _, state in steps)
-
     def adopted(self, state: Any, body: Body, before: Detector) -> SequentialTestState:
-        """Go on from another sequential test's state, with what is known of free motion; other cues begin anew."""
+        """Go on from another sequential test's state; touch sensors that count otherwise begin anew."""
         if not isinstance(before, SequentialTest):
             return self.init(body)
-        return state if self.cues == before.cues else replace(state, cues=self._cues_init(body))
+        return state if self.touch == before.touch else replace(state, touched=untouched(body, self.touch))
 
     def learnt(self, state: SequentialTestState) -> ResidualModel:
         """Return what was learnt of free motion."""

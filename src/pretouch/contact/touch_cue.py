@@ -16,13 +16,11 @@ which fills while it is and empties more slowly while it is not; a unit whose ac
 neither raises a prior nor keeps free motion from being learnt, and contacts are found as without it.
 """
 
-from dataclasses import dataclass
 from functools import cache
-from typing import Any, NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.composition import Part
 from pretouch.contact.detector import Body, Sample
 from pretouch.params import TouchSensorParams
 from pretouch.robot.body import Capsules
@@ -49,35 +47,6 @@ def no_cues(links: int) -> Cues:
     return Cues(np.ones(links), np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros(0))
 
 
-def together(*cues: Cues) -> Cues:
-    """Return what several kinds of units say together, at least one kind: gains multiply, places add up."""
-    if len(cues) == 1:
-        return cues[0]
-    return Cues(
-        # likelihood ratios of sensors that err independently
-        np.prod([c.gain for c in cues], axis=0),
-        np.concatenate([c.link for c in cues]),
-        np.concatenate([c.point for c in cues]),
-        np.concatenate([c.sigma for c in cues]),
-    )
-
-
-class Cue(Part, group="pretouch.cues"):
-    """What the units' touch readings say of a contact. As a detector, it is a frozen dataclass."""
-
-    def on(self, body: Body) -> Self:
-        """Return the cue for an arm with all prepared that does not change; by default itself."""
-        return self
-
-    def init(self, body: Body) -> Any:
-        """Return what is remembered before the first step."""
-        return None
-
-    def step(self, state: Any, body: Body, sample: Sample) -> tuple[Cues | None, Any]:
-        """Return what the units say in one step, None for nothing, and what to remember."""
-        raise NotImplementedError
-
-
 _TOLERANCE_S = 1e-9
 """A reading stamped later than the step by more than this is of a wrong clock, and not believed [s]."""
 
@@ -96,39 +65,37 @@ def surface_areas(capsules: Capsules, links: int) -> FloatArray:
     return np.where(area > 0.0, area, np.inf)  # so that s = 0 and G = 1
 
 
-@dataclass(frozen=True)
-class TouchSensors(TouchSensorParams, Cue, name="touch"):
-    """The units' touch sensors: a contact is likelier on the link of a unit that is touched, and there is where."""
+def untouched(body: Body, p: TouchSensorParams | None) -> FloatArray:
+    """Return the account of each of M touch sensors (M,): how long it said that it was touched [s]."""
+    return np.zeros(0 if p is None else len(body.skin.touching))
 
-    def init(self, body: Body) -> FloatArray:
-        """Return the account of each of M touch sensors (M,): how long it said that it was touched [s]."""
-        return np.zeros(len(body.skin.touching))
 
-    def step(self, state: FloatArray, body: Body, sample: Sample) -> tuple[Cues | None, FloatArray]:
-        """Return what units say of a touch in one step, None where none is believed to be touched.
+def touch_cues(account: FloatArray, body: Body, sample: Sample, p: TouchSensorParams | None) -> tuple[Cues, FloatArray]:
+    """Return what units say of a touch in one step, and their accounts; a contact is likelier where one is touched.
 
-        The touch readings of the sample are of all K units, of known shapes; None of a skin that gave none.
-        """
-        if not len(state):
-            return None, state
-        skin, readings, kin, touched = body.skin, sample.touches, sample.kin, np.zeros(len(state), np.bool_)
-        if readings is not None:
-            age = sample.stamp - readings.stamp[skin.touching]
-            fresh = (age <= self.fresh_s) & (age >= -_TOLERANCE_S)
-            touched = fresh & (readings.status[skin.touching] == TouchStatus.OK) & readings.contact[skin.touching]
-        unit = skin.touching[touched & (state < self.patience_s)]
-        if touched.any() or state.any():
-            # filled by all that is said, believed or not: a sensor that stays stuck is never believed again
-            filled = np.where(touched, state + body.period, state - self.forgiveness * body.period)
-            state = np.clip(filled, 0.0, self.patience_s)
-        if not len(unit):
-            return None, state
-        link, gain = skin.link[unit], np.ones(len(kin.position))
-        radius = np.array([patch.radius_m for k in unit if (patch := skin.units[k].touch) is not None])
-        # s: the patch, taken as flat, of the link's surface
-        share = np.minimum(np.pi * radius**2 / surface_areas(body.model.capsules, len(gain))[link], 1.0)
-        # several touched units of one link count once, by the largest gain
-        np.maximum.at(gain, link, gain_of(share, self))
-        point = kin.position[link] + np.einsum("mij,mj->mi", kin.rotation[link], skin.T_link_sensor[unit, :3, 3])
-        # half the radius of the patch, as of an even distribution over it, and the uncertainty of where the unit is
-        return Cues(gain, link, point, np.hypot(radius / 2, skin.arrays.position_sigma[unit])), state
+    The touch readings of the sample are of all K units, of known shapes; None of a skin that gave none.
+    """
+    links = len(body.model.links)
+    if p is None or not len(account):
+        return no_cues(links), account
+    skin, readings, kin, touched = body.skin, sample.touches, sample.kin, np.zeros(len(account), np.bool_)
+    if readings is not None:
+        age = sample.stamp - readings.stamp[skin.touching]
+        fresh = (age <= p.fresh_s) & (age >= -_TOLERANCE_S)
+        touched = fresh & (readings.status[skin.touching] == TouchStatus.OK) & readings.contact[skin.touching]
+    unit = skin.touching[touched & (account < p.patience_s)]
+    if touched.any() or account.any():
+        # filled by all that is said, believed or not: a sensor that stays stuck is never believed again
+        filled = np.where(touched, account + body.period, account - p.forgiveness * body.period)
+        account = np.clip(filled, 0.0, p.patience_s)
+    if not len(unit):
+        return no_cues(links), account
+    link, gain = skin.link[unit], np.ones(links)
+    radius = np.array([patch.radius_m for k in unit if (patch := skin.units[k].touch) is not None])
+    # s: the patch, taken as flat, of the link's surface
+    share = np.minimum(np.pi * radius**2 / surface_areas(body.model.capsules, links)[link], 1.0)
+    # several touched units of one link count once, by the largest gain
+    np.maximum.at(gain, link, gain_of(share, p))
+    point = kin.position[link] + np.einsum("mij,mj->mi", kin.rotation[link], skin.T_link_sensor[unit, :3, 3])
+    # half the radius of the patch, as of an even distribution over it, and the uncertainty of where the unit is
+    return Cues(gain, link, point, np.hypot(radius / 2, skin.arrays.position_sigma[unit])), account

@@ -11,7 +11,7 @@ from pretouch.control.joint_box import JointLimits
 from pretouch.errors import ParameterError
 from pretouch.params import BrakingParams, RestrictionParams, TaskParams
 from pretouch.records import Cell, IntCell
-from pretouch.robot.kinematics import Kinematics, column
+from pretouch.robot.kinematics import Chain, Kinematics, row_along
 from pretouch.robot.model import RobotModel
 from pretouch.types import WHOLE, BoolArray, FloatArray, IntArray, Number, Obstacles, RobotState
 from pretouch.values import value
@@ -164,20 +164,15 @@ def approach_rows(kin: Kinematics, moved_by: BoolArray, near: Obstacles, p: Rest
     J_c is the Jacobian of the closest body point, d the direction from it to the obstacle; `moved_by` (L, n) says
     which joint moves which link. The parameters are those that `row_numbers` returns.
     """
-    n, count, point, direction = len(kin.anchor), 0, near.body_point, near.direction
+    n, count = len(kin.anchor), 0
+    chain = Chain(kin.anchor, kin.axis, moved_by, np.zeros(n))
     G, h, which = np.empty((len(near.unit), n)), np.empty(len(near.unit)), np.empty(len(near.unit), np.int64)
     for k in range(len(near.unit)):
         limit = approach_limit(near.body_distance[k], p)
         if limit == np.inf:
             continue
         h[count], which[count] = limit, k
-        dx, dy, dz = direction[k, 0], direction[k, 1], direction[k, 2]
-        for j in range(n):
-            G[count, j] = 0.0
-            if moved_by[near.link[k], j]:
-                # d . (a x (p - p_j)), column j of d^T J_c: all joints are hinges
-                x, y, z = column(kin.anchor, kin.axis, j, point[k, 0], point[k, 1], point[k, 2])
-                G[count, j] = dx * x + dy * y + dz * z
+        row_along(chain, near.link[k], near.body_point[k], near.direction[k], G[count])
         count += 1
     return Rows(G[:count], h[:count], which[:count], p.slack_weight)
 

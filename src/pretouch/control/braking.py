@@ -15,7 +15,7 @@ from pretouch.cholesky import factor, forward
 from pretouch.compiled import compiled, inlined, kernel
 from pretouch.control.approach import Rows
 from pretouch.params.pretouch import REGIONS, BrakingParams, EffectiveMass, Tangential
-from pretouch.robot.kinematics import Chain, Kinematics, Mechanism, column, mass_matrix_into
+from pretouch.robot.kinematics import Chain, Kinematics, Mechanism, mass_matrix_into, row_along
 from pretouch.types import BoolArray, FloatArray, IntArray, Obstacles
 
 _TANGENTS = 4  # two directions across the normal, both ways along each
@@ -89,16 +89,6 @@ def braking_numbers(params: BrakingParams, speed: float, period: float) -> Braki
     )  # fmt: skip
 
 
-class Touch(NamedTuple):
-    """What may be touched in a step, and how."""
-
-    limits: TouchLimits
-    deadband_m_s: float
-    """Closing speed of an object below which it counts as still [m/s]."""
-    untouched: int
-    """`Obstacles.unit` from which on an obstacle is not to be touched at any speed."""
-
-
 @compiled
 def braking_cap(distance: float, touch: float, deceleration: float, latency: float, margin: float) -> float:
     """Largest closing speed v [m/s] with v = sqrt(v_c^2 + 2 a max(0, d - v tau - m)): the curve solved for v.
@@ -128,7 +118,8 @@ def inertia_factor(p: BrakingNumbers, kin: Kinematics, mechanism: Mechanism) -> 
 
 @inlined
 def braking_rows(
-    p: BrakingNumbers, slots: Slots, obstacles: Obstacles, chain: Chain, L: FloatArray, touch: Touch
+    p: BrakingNumbers, slots: Slots, obstacles: Obstacles, chain: Chain, L: FloatArray, touch: TouchLimits,
+    deadband: float, untouched: int,
 ) -> Rows:  # fmt: skip
     """Change `slots` by one period, and return rows.
 
@@ -140,9 +131,11 @@ def braking_rows(
         obstacles: M that are near.
         chain: what moves the points.
         L: `inertia_factor`.
-        touch: what may be touched.
+        touch: what a touch may be.
+        deadband: closing speed of an object below which it counts as still [m/s].
+        untouched: `Obstacles.unit` from which on an obstacle is not to be touched at any speed.
     """
-    half, s, distance, touching = len(slots.link) // 2, p.curve, obstacles.body_distance, touch.limits
+    half, s, distance = len(slots.link) // 2, p.curve, obstacles.body_distance
     most, which, seen, count = _MOST_ROWS * half, np.empty(half, np.int64), np.zeros(half, np.bool_), 0
     rows = Rows(np.empty((most, len(chain.qd))), np.empty(most), which, s.slack_weight)
     for m in range(len(obstacles.unit)):
@@ -154,13 +147,13 @@ def braking_rows(
         for i in range(3):
             slots.normal[k, i], slots.point[k, i] = obstacles.direction[m, i], obstacles.body_point[m, i]
         row = rows.G[count]
-        approach = _row(slots.link[k], slots.point[k], obstacles.direction[m], chain, row)
+        approach = row_along(chain, slots.link[k], slots.point[k], obstacles.direction[m], row)
         # the row is n^T J, so the effective mass along the normal comes of it too
-        speed = touch_speed(mass_along(L, row), touching) if len(L) > 0 else touching.speed_max_m_s
-        if k >= touch.untouched:
+        speed = touch_speed(mass_along(L, row), touch) if len(L) > 0 else touch.speed_max_m_s
+        if k >= untouched:
             speed = 0.0
         # an object that goes away allows no more; an infinite deadband leaves its speed out
-        own = max(0.0, obstacles.closing_speed[m] - touch.deadband_m_s)
+        own = max(0.0, obstacles.closing_speed[m] - deadband)
         cap = braking_cap(distance[m], speed, s.deceleration_m_s2, s.latency_s, s.margin_m)
         target = max(cap - own, -s.retreat_max_m_s)
         # the same curve at the rate of tightening: the arm can still come down to it at that rate
@@ -231,7 +224,7 @@ def _fading_rows(p: BrakingNumbers, slots: Slots, seen: BoolArray, chain: Chain,
         if slots.limit[last] >= free and slots.across[last] >= p.fastest_m_s:
             slots.link[last] = -1
             continue
-        approach = _row(slots.link[last], slots.point[last], slots.normal[last], chain, rows.G[count])
+        approach = row_along(chain, slots.link[last], slots.point[last], slots.normal[last], rows.G[count])
         # where the link has sped up along the old normal, this slows it no harder than a row tightens
         rows.h[count] = max(slots.limit[last], approach - s.tighten_m_s2 * p.period_s)
         count += 1
@@ -252,7 +245,7 @@ def _rows_across(p: BrakingNumbers, slots: Slots, chain: Chain, rows: Rows, coun
             sign = 1.0 if t % 2 == 0 else -1.0
             for i in range(3):
                 along[i] = normal[i] + sign * tangents[t // 2, i]
-            speed = _row(slots.link[k], slots.point[k], along, chain, rows.G[count])
+            speed = row_along(chain, slots.link[k], slots.point[k], along, rows.G[count])
             rows.h[count] = max(slots.across[k], speed - p.curve.tighten_m_s2 * p.period_s)
             count += 1
     return count
@@ -280,20 +273,6 @@ def _eased(target: float, last: float, approach: float, p: BrakingNumbers) -> fl
     """Limit between what is aimed at, how far it may loosen from the last, and how hard it may slow the arm."""
     eased = min(target, last + p.curve.loosen_m_s2 * p.period_s)
     return max(eased, approach - p.curve.tighten_m_s2 * p.period_s)  # comes last: it outweighs the target
-
-
-@kernel
-def _row(link: int, point: FloatArray, along: FloatArray, chain: Chain, row: FloatArray) -> float:
-    """Write the row along^T J (n,) of a point (3,) of a link, and return the speed along it [m/s]."""
-    # a hinge moves the point with a x (p - p_j): each entry of the row is the part of that along the direction
-    anchor, axis, moved_by, qd, speed = chain.anchor, chain.axis, chain.moved_by, chain.qd, 0.0
-    for j in range(len(anchor)):
-        row[j] = 0.0
-        if moved_by[link, j]:
-            x, y, z = column(anchor, axis, j, point[0], point[1], point[2])
-            row[j] = along[0] * x + along[1] * y + along[2] * z
-            speed += row[j] * qd[j]
-    return speed
 
 
 @kernel

@@ -1,6 +1,6 @@
 """Joint velocities: the joint limits, and eq. 2 within rows that a restriction wrote."""
 
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -12,12 +12,9 @@ from pretouch.control.penalty import Minimum, Problem, excesses, minimise
 from pretouch.control.task import away, cost_into, twist
 from pretouch.modes import SOLVED
 from pretouch.params import NullSpaceMotion, TaskParams
+from pretouch.records import IntCell
 from pretouch.robot.kinematics import Arm, Kinematics, jacobian_into
-from pretouch.types import FloatArray, Obstacles
-
-if TYPE_CHECKING:
-    from pretouch.faults import Report
-    from pretouch.line_records import Answer
+from pretouch.types import FloatArray, IntArray, Obstacles, Report
 
 
 class MotionNumbers(NamedTuple):
@@ -37,10 +34,26 @@ class MotionNumbers(NamedTuple):
     """How links before the hand move away in the null space of the task; within no distance: they do not."""
 
 
+class Answer(NamedTuple):
+    """The answer of eq. 2, see `QpSolution`."""
+
+    command: Annotated[FloatArray, "n"]
+    velocities: Annotated[FloatArray, 2, 3]
+    """(2, 3) of the end-effector origin, measured and commanded [m/s]."""
+    which: Annotated[IntArray, "M"]
+    limit: Annotated[FloatArray, "M"]
+    slack: Annotated[FloatArray, "M"]
+    multipliers: Annotated[FloatArray, "n + M"]
+    seen: IntCell
+    """Rows that are of obstacles."""
+    ending: IntCell
+    violated: IntCell
+
+
 @kernel
 def move_within(
-    p: MotionNumbers, robot: "Report", scene: tuple[Kinematics, FloatArray, Obstacles], request: MotionRequest,
-    rows: Rows, speeds: tuple[FloatArray, FloatArray], null_velocity: FloatArray, answer: "Answer",
+    p: MotionNumbers, robot: Report, scene: tuple[Kinematics, FloatArray, Obstacles], request: MotionRequest,
+    rows: Rows, speeds: tuple[FloatArray, FloatArray], null_velocity: FloatArray, answer: Answer,
 ) -> None:  # fmt: skip
     """Write the joint velocities of eq. 2 within the joint limits and rows; change the motion in the null space.
 

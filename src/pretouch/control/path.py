@@ -3,17 +3,15 @@
 import math
 from bisect import bisect_right
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import Annotated, NamedTuple, Protocol
 
 import numpy as np
 
 from pretouch.compiled import kernel
 from pretouch.errors import PathError
 from pretouch.params import TaskParams
+from pretouch.records import Cell, IntCell
 from pretouch.types import FloatArray
-
-if TYPE_CHECKING:
-    from pretouch.line_records import OnPath, Pace
 
 
 class Path(Protocol):
@@ -147,8 +145,38 @@ def nearest_phase(path: Path, position: FloatArray) -> float:
     return float(phases[int(np.argmin(away))])
 
 
+class OnPath(NamedTuple):
+    """The path at the phase of the step."""
+
+    phase: Cell
+    """Arc length travelled along the path [m]."""
+    point: Annotated[FloatArray, 3]
+    """(3,) where on it the end-effector should be [m]."""
+    tangent: Annotated[FloatArray, 3]
+    """(3,) unit tangent there."""
+    velocity: Annotated[FloatArray, 3]
+    """(3,) task velocity x_d, before anything slows it [m/s]."""
+    forward: Cell
+    """Its speed along the path, before it is limited [m/s]."""
+    scale: Cell
+    """Factor on the velocity, of eqs. 3 and 4."""
+
+
+class Pace(NamedTuple):
+    """How far along the path the arm is, and how fast it may go."""
+
+    scale: Cell
+    """Factor of eq. 4 when it last fell or kept pace."""
+    cycles: IntCell
+    """Cycles since then."""
+    phase: Cell
+    """Arc length travelled [m]."""
+    speed: Cell
+    """Speed allowed along the path [m/s]."""
+
+
 @kernel
-def follow(path: "OnPath", speed: float, here: FloatArray, p: TaskParams) -> None:
+def follow(path: OnPath, speed: float, here: FloatArray, p: TaskParams) -> None:
     """Write the task velocity x_d: along the path, and towards it, no faster than the speed allowed by now [m/s].
 
     Off the path the forward part shrinks, to nothing at `off_path_m`: the arm first returns to where it left. `here`
@@ -168,7 +196,7 @@ def follow(path: "OnPath", speed: float, here: FloatArray, p: TaskParams) -> Non
 
 
 @kernel
-def advance(phase: float, path: "OnPath", commanded: FloatArray, period: float) -> float:
+def advance(phase: float, path: OnPath, commanded: FloatArray, period: float) -> float:
     """Move the phase [m] on by one period [s] of the forward speed, less what the arm falls short of it, never back.
 
     Slowing or blocking the arm so slows the phase. Motion back to the path is no progress along it, so an arm pushed
@@ -191,7 +219,7 @@ def speed_scale(distance: float, d_max: float) -> float:
 
 
 @kernel
-def reduce_speed(pace: "Pace", fresh: float, l_max: int) -> float:
+def reduce_speed(pace: Pace, fresh: float, l_max: int) -> float:
     """One cycle of eqs. 3 and 4: change what is remembered, and return the factor on the end-effector velocity.
 
     After a loss the factor s + (1 - s) l_obs / l_max of eq. 4 of the paper goes back to full speed in l_max cycles. The

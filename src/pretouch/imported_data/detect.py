@@ -224,7 +224,7 @@ def _for_currents(recording: TorqueRecording, profile: Profile) -> tuple[Profile
 def _judged(r: TorqueRecording, profile: Profile, time: FloatArray, newest: IntArray, first: BoolArray) -> TorqueCourse:
     """Let a detector judge torques at cycles, see `cycles`."""
     body = Body(r.model, Skin((), r.model), profile.task.control_period_s)
-    detector: Detector = profile.detect.on(body)
+    detector = profile.detect
     without = np.asarray(np.isnan(r.tau_ext[newest]).any(axis=1))
     if without.all():
         raise RecordingError(f"{r.place} has no usable torques: give a longer recording without gaps.")

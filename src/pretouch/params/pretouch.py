@@ -194,8 +194,6 @@ class EffectiveMass(Checked):
     body_region: BodyRegion = "face"
     """Which body region's figures the touch speed is for: by default that which gives the least speed, for a unit
     cannot tell what it sees."""
-    region_force_n: NonNegative = 0.0
-    """Allowed force in place of the region's [N]; 0: the region's own, with its factor for a short contact."""
     force_fraction: Fraction = 0.25
     """Part of the allowed force that a touch may reach in the spring model: ours. Half is for what the arm pushes on
     until it has detected the contact, and half of what is left for figures that public copies disagree on."""
@@ -211,7 +209,7 @@ class EffectiveMass(Checked):
     def allowed_force_n(self) -> float:
         """Force that a touch may reach in the spring model [N]."""
         region = REGIONS[self.body_region]
-        return self.force_fraction * (self.region_force_n or region.force_n * region.transient)
+        return self.force_fraction * region.force_n * region.transient
 
 
 @dataclass(frozen=True)

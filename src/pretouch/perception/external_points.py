@@ -7,7 +7,7 @@ is left out, the arm being where it was when the points were measured.
 """
 
 import math
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -15,14 +15,11 @@ from pretouch.compiled import compiled, inlined, kernel
 from pretouch.params import OutsidePoints
 from pretouch.perception.closest import closest, to_axis
 from pretouch.perception.motion_compensation import follow_points
-from pretouch.perception.obstacles import TrackState, speed_factor, track_init
+from pretouch.perception.obstacles import Sight, TrackState, speed_factor, track_init
 from pretouch.records import Cell
 from pretouch.robot.body import Capsules, placed
 from pretouch.robot.kinematics import Chain, Kinematics, dot, point_velocity
 from pretouch.types import FloatArray, IntArray, Obstacles, SeenPoints, no_obstacles
-
-if TYPE_CHECKING:
-    from pretouch.line_records import Sight
 
 FARTHEST = 100.0
 """A coordinate [m] from here on is implausible: another unit, or a broken message."""
@@ -107,7 +104,7 @@ class _Contenders(NamedTuple):
 
 @kernel
 def take_points(
-    sight: "Sight", state: OutsideState, new: SeenPoints, posture: tuple[Kinematics, Chain],
+    sight: Sight, state: OutsideState, new: SeenPoints, posture: tuple[Kinematics, Chain],
     instants: tuple[float, float], fixtures: Capsules,
 ) -> None:  # fmt: skip
     """Choose the points of each link's places, and change those that are kept.
@@ -159,7 +156,7 @@ def take_points(
 
 @inlined
 def _candidates(
-    sight: "Sight", state: OutsideState, new: SeenPoints, now: float, body: Capsules, arm: Capsules
+    sight: Sight, state: OutsideState, new: SeenPoints, now: float, body: Capsules, arm: Capsules
 ) -> _Contenders:
     """The kept points that the arm hides and the new ones that are young enough, each with its nearest link."""
     p, sigmas, tracks = sight.outside, sight.perception.spread_sigmas, state.tracks
@@ -190,7 +187,7 @@ def _candidates(
 
 @inlined
 def _elect(
-    candidates: _Contenders, chosen: IntArray, sight: "Sight", capsules: tuple[Capsules, Capsules, Capsules],
+    candidates: _Contenders, chosen: IntArray, sight: Sight, capsules: tuple[Capsules, Capsules, Capsules],
     placed_for: float, chain: Chain, posed: float,
 ) -> None:  # fmt: skip
     """Write the candidate of each place to `chosen`: of each link the nearest, then the nearest apart from it.

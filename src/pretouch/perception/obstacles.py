@@ -6,10 +6,36 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from pretouch.compiled import compiled, kernel
+from pretouch.params import OutsidePoints, PerceptionParams
+from pretouch.robot.body import Capsules
 from pretouch.robot.kinematics import Kinematics
 from pretouch.sensing.sensor import Cones, Sensors
 from pretouch.sensing.skin import Skin, SkinArrays
 from pretouch.types import BoolArray, FloatArray, IntArray, Number, Obstacles, RangeStatus
+
+
+class Sight(NamedTuple):
+    """What is seen with, and what is known to be there."""
+
+    sees: bool
+    """Whether there are units to see with."""
+    filters: bool
+    """Whether readings are explained by what is known to be there."""
+    margin_m: float
+    """Distance before that from which on a reading is explained by it."""
+    memory_s: float
+    """Memory of the estimates of closing speeds, 0 where there are none."""
+    sigmas: float
+    """How many standard deviations of a unit's place are taken off, 0 where all places are exact."""
+    arm: Capsules
+    """All capsules of the arm."""
+    body: Capsules
+    """Those that joints move."""
+    planes: Annotated[FloatArray, "P", 4]
+    """(P, 4) of fixtures."""
+    skin: SkinArrays
+    perception: PerceptionParams
+    outside: OutsidePoints
 
 
 class TrackState(NamedTuple):

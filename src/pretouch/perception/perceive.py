@@ -1,13 +1,15 @@
 """Perception in one call: readings in, obstacles with their closest body points out."""
 
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from pretouch.compiled import inlined, kernel
 from pretouch.perception.closest import closest
+from pretouch.perception.external_points import OutsideState
 from pretouch.perception.motion_compensation import closing_speeds, follow_points, move_back, reckon
 from pretouch.perception.obstacles import (
+    Sight,
     TrackState,
     bring_nearer,
     give_up,
@@ -22,14 +24,11 @@ from pretouch.perception.obstacles import (
     widen,
 )
 from pretouch.perception.scene_filter import leave_out, plane_return
+from pretouch.records import Cell, IntCell
 from pretouch.robot.body import Capsules, placed
 from pretouch.robot.kinematics import Chain, Kinematics
 from pretouch.sensing.sensor import Sensors
 from pretouch.types import BoolArray, FloatArray, IntArray, Obstacles, some_of
-
-if TYPE_CHECKING:
-    from pretouch.line_records import Seen, Sight
-    from pretouch.perception.external_points import OutsideState
 
 
 class Readings(NamedTuple):
@@ -40,9 +39,25 @@ class Readings(NamedTuple):
     status: Annotated[IntArray, "K"]
 
 
+class Seen(NamedTuple):
+    """What units and others see, and how well they are heard."""
+
+    distance: Annotated[FloatArray, "K"]
+    """(K,) what each reading stands for [m]; NaN where it shows no target."""
+    near: Obstacles
+    found: IntCell
+    """Obstacles that units and outside points show."""
+    all: IntCell
+    """With the nearest of moving fixtures, behind them."""
+    nearest: Cell
+    """Distance of the nearest obstacle from the end-effector origin [m]."""
+    heard: Cell
+    """Factor on the speed for units and outside sources that fall silent."""
+
+
 @kernel
 def perceive(
-    sight: "Sight", memory: tuple[TrackState, "OutsideState"], readings: Readings, seen: "Seen",
+    sight: Sight, memory: tuple[TrackState, OutsideState], readings: Readings, seen: Seen,
     posture: tuple[Kinematics, Chain, FloatArray], instants: tuple[float, float], beside: Capsules,
 ) -> tuple[int, float, float]:  # fmt: skip
     """Locate what the units see (eq. 1), leave out the arm and fixtures, and find the closest body points.
@@ -136,7 +151,7 @@ def _show(
 
 @inlined
 def _take_readings(
-    sight: "Sight", tracks: TrackState, readings: Readings, seen: "Seen", fresh: BoolArray,
+    sight: Sight, tracks: TrackState, readings: Readings, seen: Seen, fresh: BoolArray,
     posture: tuple[Kinematics, Chain, FloatArray], instants: tuple[float, float], beside: Capsules,
 ) -> None:  # fmt: skip
     """Take the readings that are new and show what is not known to be there into the tracks."""

@@ -7,7 +7,7 @@ remembers is {"part": group and name of the part, "value": ...}.
 from dataclasses import is_dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar, cast, get_args, get_origin
+from typing import Any, TypeVar, cast, get_origin
 
 import msgspec
 import numpy as np
@@ -101,15 +101,13 @@ def with_parts(value: Any) -> Any:
     """Return a record to pack, with the name of its part beside what is annotated with `object`."""
     kind: Any = type(value)
     hints = hints_of(kind)
-    if not any(object in (hint, *get_args(hint)) for _, hint in hints):
+    if not any(hint is object for _, hint in hints):
         return value
     fields = {name: _named(hint, getattr(value, name)) for name, hint in hints}
     return fields if is_dataclass(value) else list(fields.values())
 
 
 def _named(hint: Any, value: Any) -> Any:
-    if object in get_args(hint):
-        return [_named(object, item) for item in value]
     if hint is not object or value is None or isinstance(value, _NUMBERS):
         return value
     if isinstance(value, np.ndarray):

@@ -150,10 +150,9 @@ def load_description(path: Path | str) -> RobotDescription:
         path = path / FILE
     way_out = f"give {FILE} or its folder, as `pretouch robot import` writes it"
     data = table_of(path, "robot file", RobotModelError, way_out)
-    n = len(_numbers(path, data, "q_ready", "rad", None))
     table = data.pop("envelope", None)
-    fields = _fields(path, data, _TEXTS, _LISTS, n, "envelope")
-    envelope = {} if table is None else _fields(path, table, ("source",), _ENVELOPE, n)
+    fields = _fields(path, data, _TEXTS, _LISTS, "envelope")
+    envelope = {} if table is None else _fields(path, table, ("source",), _ENVELOPE)
     try:
         if envelope:
             fields["envelope"] = SpeedEnvelope(**envelope)
@@ -179,10 +178,8 @@ def files_digest(arm: RobotDescription) -> str:
     return sha256(description_text(arm).encode() + arm.mjcf.read_bytes()).hexdigest()
 
 
-def _fields(
-    path: Path, table: Any, texts: tuple[str, ...], lists: dict[str, str], n: int, *others: str
-) -> dict[str, Any]:
-    """Return the texts and the lists of n numbers of a table, which has no other keys than these and `others`."""
+def _fields(path: Path, table: Any, texts: tuple[str, ...], lists: dict[str, str], *others: str) -> dict[str, Any]:
+    """Return the texts and the lists of numbers of a table, which has no other keys than these and `others`."""
     if not isinstance(table, dict):
         raise RobotModelError(f"{path}: envelope is {shown(table)}: give a table [envelope].")
     unknown = sorted(set(table) - {*texts, *lists})
@@ -192,17 +189,9 @@ def _fields(
         text = table.get(key)
         if not isinstance(text, str) or (key != "source" and not (text.isprintable() and text)):
             raise RobotModelError(f"{path}: {key} is {shown(text)}: give printable text in quotes.")
-    return {key: table[key] for key in texts} | {
-        key: _numbers(path, table, key, unit, n) for key, unit in lists.items()
-    }
-
-
-def _numbers(path: Path, table: dict[str, Any], key: str, unit: str, n: int | None) -> FloatArray:
-    numbers = table.get(key)
-    ok = isinstance(numbers, list) and len(numbers) > 0 and n in (None, len(numbers))
-    if not ok or not all(type(v) in (int, float) and abs(v) <= _LARGEST for v in numbers or []):
-        count = "" if n is None else f"{n} "
-        raise RobotModelError(
-            f"{path}: {key} is {shown(numbers)}: give a list of {count}finite numbers, one a joint [{unit}]."
-        )
-    return np.array(numbers, dtype=np.float64)
+    for key, unit in lists.items():
+        row = table.get(key)
+        if not isinstance(row, list) or not all(type(v) in (int, float) and abs(v) <= _LARGEST for v in row):
+            way_out = f"give a list of finite numbers, one a joint [{unit}]"
+            raise RobotModelError(f"{path}: {key} is {shown(row)}: {way_out}.")
+    return {key: table[key] for key in texts} | {key: np.array(table[key], np.float64) for key in lists}

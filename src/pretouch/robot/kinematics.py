@@ -133,6 +133,19 @@ def point_velocity(chain: Chain, link: int, x: float, y: float, z: float) -> tup
     return u, v, w
 
 
+@kernel
+def row_along(chain: Chain, link: int, point: FloatArray, along: FloatArray, row: FloatArray) -> float:
+    """Write the row along^T J (n,) of a point (3,) of a link, and return the speed along it [m/s]."""
+    speed = 0.0
+    for j in range(len(row)):
+        row[j] = 0.0
+        if chain.moved_by[link, j]:
+            x, y, z = column(chain.anchor, chain.axis, j, point[0], point[1], point[2])
+            row[j] = along[0] * x + along[1] * y + along[2] * z
+            speed += row[j] * chain.qd[j]
+    return speed
+
+
 @compiled
 def jacobian_into(
     anchor: FloatArray, axis: FloatArray, moved: BoolArray, point: FloatArray, jacobian: FloatArray

@@ -1,7 +1,5 @@
 """Kinematics and dynamics of an arm that MuJoCo reads."""
 
-from dataclasses import dataclass
-
 import mujoco
 import numpy as np
 
@@ -12,25 +10,13 @@ from pretouch.robot.kinematics import Arm, Hinges, Kinematics, Links, Mechanism,
 from pretouch.types import BoolArray, FloatArray, IntArray
 
 
-@dataclass(frozen=True, slots=True)
-class Dynamics:
-    """Link-side dynamics in one state: mass_matrix @ qdd + coriolis + gravity = tau + tau_ext."""
-
-    mass_matrix: FloatArray
-    """(n, n) [kg m^2]."""
-    coriolis: FloatArray
-    """(n,) Coriolis and centrifugal torques C(q, qd) qd [Nm]."""
-    gravity: FloatArray
-    """(n,) torques that hold the arm against gravity [Nm]."""
-
-
 class RobotModel:
     """Poses, Jacobians of any body point, mass matrix, Coriolis and gravity torques of an arm.
 
     Rotor inertia and damping of the MJCF are left out: the joint torque sensors sit on the link side. All answers
     depend on the arguments alone. `kinematics`, Jacobians and `mass_matrix`, all that a controller asks for, may be
-    asked for from any thread. `mass_matrix_and_bias` and `dynamics` work in MuJoCo's memory, the `scratch`: they serve
-    one thread at a time.
+    asked for from any thread. `mass_matrix_and_bias` works in MuJoCo's memory, the `scratch`: it serves one thread at a
+    time.
     """
 
     def __init__(self, description: RobotDescription) -> None:
@@ -149,13 +135,6 @@ class RobotModel:
     def ee_jacobian(self, kin: Kinematics) -> FloatArray:
         """Jacobian (6, n) of the end-effector origin."""
         return self.jacobian(kin, self.ee, kin.position[self.ee])
-
-    def dynamics(self, q: FloatArray, qd: FloatArray) -> Dynamics:
-        """Compute mass matrix, Coriolis and gravity torques at q (n,) [rad] and qd (n,) [rad/s]."""
-        gravity = np.zeros(self.n)
-        mass_matrix, _ = self.mass_matrix_and_bias(q, np.zeros(self.n), gravity)
-        mass_matrix, bias = self.mass_matrix_and_bias(q, qd, np.zeros(self.n))
-        return Dynamics(mass_matrix, bias - gravity, gravity)
 
     def mass_matrix(self, q: FloatArray) -> FloatArray:
         """Compute the mass matrix (n, n) [kg m^2] at q (n,) [rad]."""

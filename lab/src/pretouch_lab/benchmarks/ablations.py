@@ -23,7 +23,7 @@ OFF = {
     "detect": "thresholds",
     "window.freeze_while_reacting": "no",
     "detect.proximity": "none",
-    "detect.cues": "none",
+    "detect.touch": "none",
     "detect.learn": "never",
     "detect.widen_at_turns": "no",
     "detect.misfit": "none",
