@@ -5,7 +5,8 @@ import pytest
 
 from pretouch.recording.run_record import TrueForces
 from pretouch.reporting.contacts import contact_section, touches_of
-from pretouch.reporting.measures import measure, summary
+from pretouch.reporting.motion import nearest_to_body
+from pretouch.reporting.page import measure, summary
 from pretouch.sim.plant import TOUCH_N
 from pretouch.traces import mean_over
 from pretouch.types import Mode
@@ -157,4 +158,5 @@ def test_numbers_of_a_collision_are_those_of_the_physics(panda_model, paper_skin
     assert touch.peak_20ms == pytest.approx(mean_over(size, 20).max())
     assert m.contacts.without_touch == ()
     nearest = min(kept.step.obstacles.body_distance.min(initial=np.inf) for kept in recorded)
-    assert (m.distances.body.distance if m.distances.body else np.inf) == pytest.approx(nearest)
+    body = nearest_to_body(m.course)
+    assert (body.distance if body else np.inf) == pytest.approx(nearest)

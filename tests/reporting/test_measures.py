@@ -1,3 +1,4 @@
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -5,9 +6,10 @@ import pytest
 
 from pretouch.modes import Event
 from pretouch.profiles import profile
-from pretouch.reporting.health import loop_health, unit_health
-from pretouch.reporting.limits import limit_margins, states, violations
-from pretouch.reporting.motion import distances, speeds
+from pretouch.reporting.health import loop_row, unit_row
+from pretouch.reporting.html import bad, number
+from pretouch.reporting.limits import holds_in, limit_rows, mode_section, time_in_modes
+from pretouch.reporting.motion import distance_section, nearest_to_body, speed_section
 from pretouch.reporting.record import gather, least, spread
 from pretouch.robot.description import fr3
 from pretouch.robot.model import RobotModel
@@ -22,8 +24,14 @@ def course_of(model, skin, steps, **more):
     return gather(made.recorded(model, skin, steps, **more))
 
 
+def cells(section):
+    """The cells of each line of the tables of a section, as text."""
+    lines = re.findall(r"<tr>(.*?)</tr>", section)
+    return [re.findall(r"<t[dh][^>]*>(?:<span[^>]*>)?(.*?)(?:</span>)?</t[dh]>", line) for line in lines]
+
+
 def test_small_measures_leave_out_what_is_no_number():
-    assert spread(np.array([np.nan, np.inf])) is None
+    assert np.isnan(spread(np.array([np.nan, np.inf]))).all()
     assert spread(np.array([1.0, np.nan, 3.0, 2.0])).median == 2.0
     assert least(np.array([np.nan, 2.0, 1.0, np.nan])) == (1.0, 2)
     assert least(np.full(3, np.nan)) is None
@@ -43,25 +51,31 @@ def test_distances_are_least_by_unit_by_link_and_in_time(panda_model, paper_skin
         [(0, "panda_link7", 0.2, 0.5)],
     ]
     steps = [made.step(panda_model, stamp=0.01 * i, near=points) for i, points in enumerate(near)]
-    found = distances(course_of(panda_model, paper_skin, steps))
-    assert (found.body.name, found.body.distance, found.body.time) == ("hand_left", 0.09, 0.01)
-    assert (found.ee.distance, found.ee.time) == (0.4, 0.01)
-    assert [u.distance if u else None for u in found.units] == [0.09, None, None, None, None, 0.3, None]
-    assert [(n.name, n.distance) for n in found.links] == [
-        ("panda_hand", 0.09), ("panda_link7", 0.2), ("panda_link4", 0.3)
+    course = course_of(panda_model, paper_skin, steps)
+    assert nearest_to_body(course) == ("hand_left", 0.09, 0.01)
+    facts, units, links = cells(distance_section(course))[:5], cells(distance_section(course))[6:13], 14
+    assert facts == [
+        ["nearest to the body", "0.090 m, shown by hand_left at 0.01 s"],
+        ["nearest to the end-effector&#x27;s origin", "0.400 m at 0.01 s"],
+        ["body nearer than d_crit", "0.01 s"],
+        ["body nearer than d_notice", "0.03 s"],
+        ["end-effector&#x27;s origin nearer than d_max", "0.03 s"],
+    ]
+    assert [unit[1] for unit in units] == ["0.090", "–", "–", "–", "–", "0.300", "–"]
+    assert cells(distance_section(course))[links:] == [
+        ["panda_hand", "0.090", "0.01"], ["panda_link7", "0.200", "0.03"], ["panda_link4", "0.300", "0.00"]
     ]  # fmt: skip
-    assert found.below_crit_s == pytest.approx(0.01)
-    assert found.below_notice_s == pytest.approx(0.03)
-    assert found.within_d_max_s == pytest.approx(0.03)
 
 
 def test_what_outside_sources_saw_counts_for_the_body_and_for_no_unit(panda_model, paper_skin):
     near = [[(0, "panda_hand", 0.5, 0.7), (9, "panda_link4", 0.05, 0.2)], [(22, "panda_link4", 0.06, 0.3)]]
     steps = [made.step(panda_model, stamp=0.01 * i, near=points) for i, points in enumerate(near)]
-    found = distances(course_of(panda_model, paper_skin, steps))
-    assert (found.body.name, found.body.distance) == ("hand_left", 0.5)
-    assert (found.ee.distance, found.links[0].name, found.links[0].distance) == (0.2, "panda_link4", 0.05)
-    assert found.below_crit_s == pytest.approx(0.02)
+    course = course_of(panda_model, paper_skin, steps)
+    assert nearest_to_body(course)[:2] == ("hand_left", 0.5)
+    lines = cells(distance_section(course))
+    assert lines[1][1] == "0.200 m at 0.00 s"
+    assert lines[2] == ["body nearer than d_crit", "0.02 s"]
+    assert lines[14] == ["panda_link4", "0.050", "0.00"]
 
 
 def test_the_nearest_of_several_points_counts_in_whatever_order(panda_model, paper_skin):
@@ -84,14 +98,14 @@ def test_speeds_are_told_by_mode_and_by_what_is_near(panda_model, paper_skin):
         moving(2, 0.2, mode=Mode.REACT, scale=0.1),
         moving(3, 0.2, [(0, "panda_hand", 1.0, 1.2)]),
     ]
-    found = speeds(course_of(panda_model, paper_skin, steps))
-    assert found.all.max == 0.3
-    assert found.near.max == 0.1
-    assert found.free.median == 0.25
-    assert found.by_mode[Mode.REACT].median == 0.2
-    assert found.by_mode[Mode.HOLD] is None
-    assert (found.least_factor, found.median_factor) == (0.4, 1.0)
-    assert found.slowed == pytest.approx(1 / 3)
+    section = speed_section(course_of(panda_model, paper_skin, steps))
+    rows = {name: values for name, *values in cells(section)}
+    assert rows["whole recording"][2] == "0.300"
+    assert rows["anything within d_max"][2] == "0.100"
+    assert rows["TRACK, nothing within d_max"][0] == "0.250"
+    assert rows["REACT"][0] == "0.200"
+    assert rows["HOLD"] == ["–"] * 3
+    assert "had the median 1.00 and the least value 0.40; it was below 0.99 for 33 % of the steps" in section
 
 
 def commanded(model, *commands, stamps=None):
@@ -102,17 +116,17 @@ def commanded(model, *commands, stamps=None):
 def test_commands_are_fractions_of_the_limits(panda_model, paper_skin):
     zero, first = np.zeros(7), np.eye(7)[0]
     steps = commanded(panda_model, zero, 0.15 * first, 0.075 * first)  # 15 rad/s^2 is the limit of joint 1
-    joint = limit_margins(course_of(panda_model, paper_skin, steps))[0]
-    assert joint.acceleration.max == pytest.approx(1.0)
-    assert joint.speed.max == pytest.approx(0.15 / 2.175)
-    assert joint.margin == pytest.approx(panda_model.q_max[0])
-    assert joint.violations == ()
+    rows, exceeded = limit_rows(course_of(panda_model, paper_skin, steps))
+    assert exceeded == []
+    margin = number(panda_model.q_max[0], 3)
+    assert list(rows[0].values())[:5] == ["1", margin, margin, "6.9 %", "6.8 %"]
+    assert rows[0]["acceleration, largest"] == "100.0 %"
 
 
 def test_a_step_that_came_late_had_longer_to_accelerate(panda_model, paper_skin):
     steps = commanded(panda_model, np.zeros(7), 0.3 * np.eye(7)[0], stamps=[0.0, 0.02])
-    joint = limit_margins(course_of(panda_model, paper_skin, steps))[0]
-    assert joint.acceleration.max == pytest.approx(1.0)
+    rows, exceeded = limit_rows(course_of(panda_model, paper_skin, steps))
+    assert (rows[0]["acceleration, largest"], exceeded) == ("100.0 %", [])
 
 
 def test_exceeded_limits_are_named(panda_model, paper_skin):
@@ -120,9 +134,10 @@ def test_exceeded_limits_are_named(panda_model, paper_skin):
     beyond[3] = panda_model.q_max[3] + 0.1
     steps = commanded(panda_model, np.zeros(7), 3.0 * np.eye(7)[1])
     steps[1] = replace(steps[1], q=beyond)
-    joints = limit_margins(course_of(panda_model, paper_skin, steps))
-    assert violations(joints) == ["velocity of joint 2", "acceleration of joint 2", "position of joint 4"]
-    assert joints[3].margin_measured == pytest.approx(-0.1)
+    rows, exceeded = limit_rows(course_of(panda_model, paper_skin, steps))
+    assert exceeded == ["velocity of joint 2", "acceleration of joint 2", "position of joint 4"]
+    assert rows[3]["measured [rad]"] == bad("−0.100")
+    assert rows[1]["acceleration, largest"] == bad("4000.0 %")
 
 
 def test_an_envelope_allows_less_towards_the_end_of_a_range():
@@ -134,8 +149,8 @@ def test_an_envelope_allows_less_towards_the_end_of_a_range():
     outwards, inwards = allowed * np.eye(7)[0], -2.62 * np.eye(7)[0]
     for command in (outwards, inwards):
         steps = [made.step(model, q_commanded=q, command=command)]
-        joint = limit_margins(course_of(model, paper_skin(model), steps))[0]
-        assert joint.speed.max == pytest.approx(1.0)
+        rows, exceeded = limit_rows(course_of(model, paper_skin(model), steps))
+        assert (rows[0]["velocity, largest"], exceeded) == ("100.0 %", [])
 
 
 def test_holds_are_told_by_their_event_not_by_their_sentence(panda_model, paper_skin):
@@ -146,11 +161,11 @@ def test_holds_are_told_by_their_event_not_by_their_sentence(panda_model, paper_
         made.step(panda_model, stamp=0.01 * i, mode=mode, event=event, reason=reason)
         for i, (mode, event, reason) in enumerate(zip(modes, events, said, strict=True))
     ]
-    found = states(course_of(panda_model, paper_skin, steps))
-    assert [(h.sentence, round(h.start, 2), round(h.duration, 2)) for h in found.holds] == [
+    course = course_of(panda_model, paper_skin, steps)
+    assert [(h.sentence, round(h.start, 2), round(h.duration, 2)) for h in holds_in(course)] == [
         (said[0], 0.0, 0.02), (said[2], 0.02, 0.01), (said[4], 0.04, 0.01)
     ]  # fmt: skip
-    assert found.share[Mode.HOLD] == pytest.approx(0.8)
+    assert time_in_modes(course)[Mode.HOLD] == pytest.approx((0.04, 0.8))
 
 
 def test_outcomes_and_slack_are_counted(panda_model, paper_skin):
@@ -159,10 +174,9 @@ def test_outcomes_and_slack_are_counted(panda_model, paper_skin):
         return made.step(panda_model, qp=qp, restricted=np.arange(len(slack)), approach_limit=np.zeros(len(slack)))
 
     steps = [solved(QpOutcome.SOLVED, [0.1, 0.2]), solved(QpOutcome.INFEASIBLE, [0.0]), solved(QpOutcome.SOLVED, [])]
-    found = states(course_of(panda_model, paper_skin, steps))
-    assert found.outcomes[QpOutcome.SOLVED] == 2
-    assert found.outcomes[QpOutcome.INFEASIBLE] == 1
-    assert (found.slack.median, found.slack.max) == (0.1, 0.2)
+    section = mode_section(course_of(panda_model, paper_skin, steps))
+    assert {"solved": "2", "infeasible": "1"}.items() <= dict(line for line in cells(section) if len(line) == 2).items()
+    assert "had the median 0.100, 99 % 0.198 and largest value 0.200 m/s" in section
 
 
 def readings(model, stamps, statuses=None, lengths=None):
@@ -190,13 +204,10 @@ def one_unit(panda_model, paper_skin):
 def test_rate_loss_latency_and_status_of_a_unit(panda_model, one_unit):
     stamps = [0.02 * k for k in range(50) if k not in (10, 11)]  # 50 Hz, two lost
     steps, given = readings(panda_model, stamps)
-    (unit,) = unit_health(course_of(panda_model, one_unit, steps, given=given))
-    assert unit.readings == 48
-    assert unit.rate == pytest.approx(50.0)
-    assert unit.lost == pytest.approx(2 / 49)
-    assert unit.latency.median == pytest.approx(0.02)
-    assert unit.silence == pytest.approx(0.06)
-    assert unit.status == {"OK": 32, "SIGNAL": 16}
+    assert unit_row(course_of(panda_model, one_unit, steps, given=given), 0) == {
+        "unit": "hand_left", "readings": "48", "rate [Hz]": "50.0", "lost": "4.1 %", "latency, median [ms]": "20.0",
+        "99 % [ms]": "20.0", "longest silence [s]": "0.06", "noise [mm]": "–", "status": "OK 32, SIGNAL 16",
+    }  # fmt: skip
 
 
 def test_noise_leaves_a_steady_motion_out(panda_model, one_unit):
@@ -204,17 +215,16 @@ def test_noise_leaves_a_steady_motion_out(panda_model, one_unit):
     stamps = 0.02 * np.arange(2000)
     lengths = 1.0 + 0.01 * stamps + 0.004 * rng.standard_normal(2000)
     steps, given = readings(panda_model, list(stamps), statuses=[0] * 2000, lengths=lengths)
-    (unit,) = unit_health(course_of(panda_model, one_unit, steps, given=given))
-    assert unit.noise == pytest.approx(0.004, rel=0.08)
+    unit = unit_row(course_of(panda_model, one_unit, steps, given=given), 0)
+    assert float(unit["noise [mm]"]) == pytest.approx(4.0, rel=0.08)
 
 
 def test_a_unit_never_heard_is_silent_all_the_time(panda_model, one_unit):
     steps = [made.step(panda_model, units=1, stamp=0.01 * i) for i in range(101)]
     never = RangeReadings(np.array([-np.inf]), np.array([np.nan]), np.array([RangeStatus.NONE], dtype=np.int64))
     given = [made.inputs(panda_model, 1, stamp=s.stamp, readings=never) for s in steps]
-    (unit,) = unit_health(course_of(panda_model, one_unit, steps, given=given))
-    assert (unit.readings, unit.rate, unit.latency, unit.noise) == (0, None, None, None)
-    assert unit.silence == pytest.approx(1.0)
+    unit = unit_row(course_of(panda_model, one_unit, steps, given=given), 0)
+    assert list(unit.values()) == ["hand_left", "0", "–", "–", "–", "–", "1.00", "–", "–"]
 
 
 def test_robot_and_loop(panda_model, paper_skin):
@@ -224,18 +234,17 @@ def test_robot_and_loop(panda_model, paper_skin):
     given[1] = replace(given[1], robot=replace(given[1].robot, wrench=None))
     given[4] = None
     course = course_of(panda_model, paper_skin, steps, given=given)
-    loop = loop_health(course)
-    assert loop.force_missing == 0.25
-    assert loop.age.max == pytest.approx(0.002)
-    assert loop.rate == pytest.approx(3 / 0.05)
-    assert (loop.late, loop.without_inputs) == (1, 1)
-    assert loop.period.max == pytest.approx(0.03)
+    loop = loop_row(course)
+    assert loop["force estimate missing"] == "25.0 %"
+    assert loop["robot states"] == "60.0 Hz; age median 2.0, 99 % 2.0, largest 2.0 ms"
+    assert loop["late steps (by half a period or more)"] == "1"
+    assert loop["steps whose inputs could not be kept"] == bad("1")
+    assert loop["period of the loop"].endswith("largest 30.0 ms")
 
 
 def test_each_step_has_the_parameters_of_its_run(panda_model, paper_skin):
     runs = tuple(made.Run(panda_model, paper_skin, profile(name)) for name in ("paper", "paper-0.5m"))
     near = [(0, "panda_hand", 0.55, 0.7)]
     kept = [made.Kept(i // 10, None, made.step(panda_model, stamp=0.01 * i, near=near)) for i in range(20)]
-    found = distances(gather(made.Recorded(runs, kept)))
-    assert found.below_notice_s == pytest.approx(0.1)
-    assert found.within_d_max_s == pytest.approx(0.1)
+    lines = cells(distance_section(gather(made.Recorded(runs, kept))))
+    assert [line[1] for line in lines[3:5]] == ["0.10 s", "0.10 s"]

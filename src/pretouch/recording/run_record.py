@@ -118,9 +118,9 @@ _AS_THEY_ARE = (
 )  # fmt: skip
 
 
-def columns_of(steps: Sequence[ControlStep]) -> Columns:
-    """Return the arrays of a `RunRecord` that steps with the same units tell alone."""
-    columns: Columns = {name: np.array([getattr(step, name) for step in steps]) for name in _AS_THEY_ARE}
+def columns_of(steps: Sequence[ControlStep], *more: str) -> Columns:
+    """Return the arrays of a `RunRecord` that steps with the same units tell alone, and those of `more` fields."""
+    columns: Columns = {name: np.array([getattr(step, name) for step in steps]) for name in (*_AS_THEY_ARE, *more)}
     return columns | {
         "time": np.array([step.stamp for step in steps]),
         "mode": np.array([MODES.index(step.mode) for step in steps]),

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pretouch.recording.run_record import MODES, TrueForces
-from pretouch.reporting.html import NOTHING, Html, Text, bad, element, joined, number, table, vector
+from pretouch.reporting.html import NOTHING, Html, Row, Text, bad, element, joined, number, table, vector
 from pretouch.reporting.record import RunCourse
 from pretouch.sim.plant import TOUCH_N
 from pretouch.traces import mean_over, spans
@@ -54,7 +54,7 @@ class TrueTouch:
 
 
 @dataclass(frozen=True)
-class DetectedContact:
+class FeltContact:
     """One detected contact and the reaction to it. Base frame."""
 
     time: float
@@ -92,7 +92,7 @@ class ContactMeasures:
     """Detections and true touches in order."""
 
     truth_known: bool
-    detections: tuple[DetectedContact, ...]
+    detections: tuple[FeltContact, ...]
     touches: tuple[TrueTouch, ...]
     unanswered: dict[int, Mode | None]
     """Touches without a detection, by index: what the arm was doing when each began."""
@@ -103,7 +103,7 @@ class ContactMeasures:
         return tuple(self.touches[i] for i, mode in self.unanswered.items() if mode is not Mode.REACT)
 
     @property
-    def without_touch(self) -> tuple[DetectedContact, ...]:
+    def without_touch(self) -> tuple[FeltContact, ...]:
         """Detections without a true touch; none where the truth is not known."""
         return tuple(d for d in self.detections if d.touch is None) if self.truth_known else ()
 
@@ -175,9 +175,9 @@ def _merged(flags: list[tuple[int, int]], time: FloatArray) -> list[tuple[int, i
     return merged
 
 
-def _detections(course: RunCourse, touches: Sequence[TrueTouch]) -> list[DetectedContact]:
+def _detections(course: RunCourse, touches: Sequence[TrueTouch]) -> list[FeltContact]:
     """All detected contacts in order, each with the touch it answers if there is one."""
-    detections: list[DetectedContact] = []
+    detections: list[FeltContact] = []
     answered: set[int | None] = set()
     lasted, steps = course.lasted, [i for i, _, _ in course.contacts]
     for (i, contact, speed), following in zip(course.contacts, [*steps[1:], len(course)], strict=False):
@@ -195,7 +195,7 @@ def _detections(course: RunCourse, touches: Sequence[TrueTouch]) -> list[Detecte
         force, late = course.force[during], course.time[during] >= begun + TRANSIENT_S
         size = np.linalg.norm(np.where(np.isfinite(force), force, np.nan), axis=1)
         detections.append(
-            DetectedContact(
+            FeltContact(
                 time=time,
                 profile=course.runs[course.run[i]].profile.name,
                 force=contact.force,
@@ -250,63 +250,64 @@ def contact_section(course: RunCourse, contacts: ContactMeasures) -> Html:
     return joined(parts)
 
 
-def _detected(course: RunCourse, detections: Sequence[DetectedContact]) -> Html:
+def _detected(course: RunCourse, detections: Sequence[FeltContact]) -> Html:
     if not detections:
         return element("p", "No contact was detected.")
-    columns = [
-        ("no.", lambda row: str(row[0])),
-        ("axes", lambda row: " ".join(axis for axis, hit in zip(AXES, row[1].axes, strict=True) if hit)),
-        ("towards", lambda row: heading(row[1].force)),
-        ("time [s]", lambda row: number(row[1].time, 2)),
-        ("force [N]", lambda row: number(float(np.linalg.norm(row[1].force)), 1)),
-        ("direction x y z", lambda row: vector(_unit(row[1].force), 2)),
-        ("filtered x y z [N]", lambda row: vector(row[1].filtered, 1)),
-        ("raw x y z [N]", lambda row: vector(row[1].raw, 1)),
-        ("peak x y z [N]", lambda row: vector(row[1].peak, 1)),
-        ("reaction [m/s]", lambda row: number(row[1].reaction_speed, 3)),
-        ("lasted [s]", lambda row: number(row[1].reaction_s, 2)),
-        ("moved [s]", lambda row: number(row[1].moved_s, 2) if row[1].moved_s else "held still"),
-    ]
-    if len(course.runs) > 1:
-        columns.append(("profile", lambda row: row[1].profile))
+    rows: list[Row] = []
+    for i, d in enumerate(detections[:_ROWS], 1):
+        rows.append(
+            {
+                "no.": str(i),
+                "axes": " ".join(axis for axis, hit in zip(AXES, d.axes, strict=True) if hit),
+                "towards": heading(d.force),
+                "time [s]": number(d.time, 2),
+                "force [N]": number(float(np.linalg.norm(d.force)), 1),
+                "direction x y z": vector(_unit(d.force), 2),
+                "filtered x y z [N]": vector(d.filtered, 1),
+                "raw x y z [N]": vector(d.raw, 1),
+                "peak x y z [N]": vector(d.peak, 1),
+                "reaction [m/s]": number(d.reaction_speed, 3),
+                "lasted [s]": number(d.reaction_s, 2),
+                "moved [s]": number(d.moved_s, 2) if d.moved_s else "held still",
+                **({"profile": d.profile} if len(course.runs) > 1 else {}),
+            }
+        )
     note = (
         f"{_left_out(len(detections) - _ROWS)}{_FORCE[course.by_thresholds]}; on the arm, base frame. Filtered: value"
         " of eq. 8. Raw: the estimate. Peak: on each axis the estimate farthest from zero during the contact. Held"
         " still: the contact was below what moves the arm."
     )
-    return table(columns, list(enumerate(detections, 1))[:_ROWS], note, 3, "Detected contacts")
+    return table(rows, note, 3, "Detected contacts")
 
 
 def _touched(contacts: ContactMeasures) -> Html:
     if not contacts.touches:
         return element("p", "Nothing truly touched the arm.")
     answers = {d.touch: (i, d) for i, d in reversed(list(enumerate(contacts.detections, 1)))}
-    rows: list[tuple[int, TrueTouch]] = []
+    rows: list[Row] = []
     for i, touch in enumerate(contacts.touches):
-        if len(rows) < (_ROWS if i in answers else _MOST):
-            rows.append((i, touch))
-
-    def answer(i: int) -> Text:
-        return f"contact {answers[i][0]}" if i in answers else _why(contacts.unanswered[i])
-
-    columns = [
-        ("no.", lambda row: str(row[0] + 1)),
-        ("first link", lambda row: row[1].link or NOTHING),
-        ("answered by", lambda row: answer(row[0])),
-        ("time [s]", lambda row: number(row[1].start, 3)),
-        ("duration [s]", lambda row: number(row[1].end - row[1].start, 3)),
-        ("delay [ms]", lambda row: number(answers[row[0]][1].delay if row[0] in answers else None, 0, 1000.0)),
-        ("speed [m/s]", lambda row: number(float(np.linalg.norm(row[1].velocity)), 3)),
-        ("true peak [N]", lambda row: number(row[1].peak, 1)),
-        ("true 20 ms [N]", lambda row: number(row[1].peak_20ms, 1)),
-        (f"held {TRANSIENT_S:g} s [N]", lambda row: number(row[1].held, 1)),
-    ]
+        order, detection = answers.get(i, (0, None))
+        if len(rows) < (_ROWS if detection else _MOST):
+            rows.append(
+                {
+                    "no.": str(i + 1),
+                    "first link": touch.link or NOTHING,
+                    "answered by": f"contact {order}" if detection else _why(contacts.unanswered[i]),
+                    "time [s]": number(touch.start, 3),
+                    "duration [s]": number(touch.end - touch.start, 3),
+                    "delay [ms]": number(detection.delay if detection else None, 0, 1000.0),
+                    "speed [m/s]": number(float(np.linalg.norm(touch.velocity)), 3),
+                    "true peak [N]": number(touch.peak, 1),
+                    "true 20 ms [N]": number(touch.peak_20ms, 1),
+                    f"held {TRANSIENT_S:g} s [N]": number(touch.held, 1),
+                }
+            )
     note = (
         f"{_left_out(len(contacts.touches) - len(rows))}A touch begins as the true force passes 1 N; the delay runs"
         f" from there to the detection. Interruptions of less than {BOUNCE_S:g} s are bounces of one touch. Speed: of"
         " the point of the arm that touched first."
     )
-    return table(columns, rows, note, 3, "True touches (simulation)")
+    return table(rows, note, 3, "True touches (simulation)")
 
 
 def _why(mode: Mode | None) -> Text:
@@ -316,7 +317,7 @@ def _why(mode: Mode | None) -> Text:
     return bad("missed" + (" in HOLD" if mode is Mode.HOLD else ""))
 
 
-def _false(detections: Sequence[DetectedContact]) -> Html:
+def _false(detections: Sequence[FeltContact]) -> Html:
     """Say which detections no touch explains."""
     false = [f"contact {i} at {d.time:.2f} s" for i, d in enumerate(detections, 1) if d.touch is None]
     if not false:

@@ -15,7 +15,6 @@ from matplotlib.figure import Figure
 from pretouch.recording.run_record import MODES
 from pretouch.reporting.contacts import AXES
 from pretouch.reporting.html import Html, element, html
-from pretouch.reporting.limits import acceleration_fraction, position_margin, speed_fraction
 from pretouch.reporting.motion import d_crit, d_notice, within_d_max
 from pretouch.reporting.record import RunCourse
 from pretouch.types import FloatArray, Mode
@@ -214,23 +213,4 @@ def path_figure(course: RunCourse) -> Figure:
         put(low - lacking, high + lacking)
     axes.set(xlabel="y [m]", ylabel="z [m]")
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize="small")
-    return figure
-
-
-def joint_figure(course: RunCourse) -> Figure:
-    """Distance from the position limits by joint; speed and acceleration of the worst joint as fractions."""
-    figure, (top, bottom) = _panels(course, (1.2, 1), 5.2)
-    margin = position_margin(course, course.q_commanded)
-    _lines(top, course.time, margin, [f"joint {j}" for j in range(1, 1 + margin.shape[1])])
-    top.axhline(0.0, color=RED, lw=1.0)
-    top.set_ylabel("to position limit [rad]")
-    _legend(top, 9)
-    fractions = (("acceleration", GREY, acceleration_fraction), ("velocity", BLUE, speed_fraction))
-    for name, colour, fraction in fractions:
-        values = fraction(course)
-        worst = np.where(np.isfinite(values), values, -np.inf).max(axis=1, initial=-np.inf)
-        bottom.plot(course.time, np.where(worst < 0, np.nan, worst), color=colour, lw=0.9, label=name)
-    bottom.axhline(1.0, color=RED, lw=1.0, label="limit")
-    bottom.set_ylabel("fraction of limit")
-    _legend(bottom, 5)
     return figure

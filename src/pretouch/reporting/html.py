@@ -3,12 +3,11 @@
 from collections.abc import Iterable, Sequence
 from html import escape
 from string import Template
-from typing import Any
 
 import numpy as np
 
 from pretouch import __version__
-from pretouch.text_table import Column, TextTable, tabulated
+from pretouch.text_table import TextTable
 
 NOTHING = "–"
 """Stands where there is no number."""
@@ -81,6 +80,8 @@ _COMPONENT = 5
 """Characters of a component of a vector."""
 
 Text = str | Html
+Row = dict[str, Text]
+"""What a row of a table has under each heading."""
 
 
 def html(text: Text) -> Html:
@@ -105,9 +106,11 @@ def bad(text: Text) -> Html:
     return element("span", text, "bad")
 
 
-def table(columns: Sequence[Column], rows: Iterable[Any], note: Text = "", names: int = 1, title: str = "") -> Html:
-    """Make a table of a line a row; the first columns, `names` of them, hold words and the others numbers."""
-    return table_html(tabulated(title, columns, rows, note, names), "h4")
+def table(rows: Sequence[Row], note: Text = "", names: int = 1, title: str = "") -> Html:
+    """Make a table of rows; the first columns, `names` of them, hold words and the others numbers. None of no rows."""
+    if not rows:
+        return Html("")
+    return table_html(TextTable(title, tuple(rows[0]), tuple(tuple(row.values()) for row in rows), note, names), "h4")
 
 
 def table_html(contents: TextTable, heading: str = "h3") -> Html:

@@ -1,13 +1,13 @@
 """How near the commands came to the arm's limits; modes, holds, and how the quadratic programs ended."""
 
-from dataclasses import dataclass
 from itertools import groupby
+from typing import NamedTuple
 
 import numpy as np
 
 from pretouch.recording.run_record import MODES
-from pretouch.reporting.html import Html, Text, bad, element, joined, number, percent, table
-from pretouch.reporting.record import OUTCOMES, Percentiles, RunCourse, least, spread
+from pretouch.reporting.html import Html, Row, Text, bad, element, joined, number, percent, table
+from pretouch.reporting.record import OUTCOMES, RunCourse, least, spread
 from pretouch.types import FloatArray, Mode, QpOutcome
 
 _MOST = 1000.0
@@ -18,57 +18,12 @@ _HOLDS = 30
 """Holds that are listed."""
 
 
-@dataclass(frozen=True)
-class JointMargin:
-    """One joint and its limits."""
-
-    margin: float | None
-    """Least distance of the commanded position from the nearer limit [rad]."""
-    margin_measured: float | None
-    """The same of the measured position [rad]."""
-    speed: Percentiles | None
-    """Command as a fraction of the largest speed the arm allows at that position."""
-    acceleration: Percentiles | None
-    """Change of the command as a fraction of the largest acceleration the arm allows."""
-
-    @property
-    def violations(self) -> tuple[str, ...]:
-        """Which limits were exceeded."""
-        margins = [margin for margin in (self.margin, self.margin_measured) if margin is not None]
-        exceeded = {
-            "position": min(margins, default=0.0) < -_ROUNDING,
-            "velocity": self.speed is not None and self.speed.max > 1 + _ROUNDING,
-            "acceleration": self.acceleration is not None and self.acceleration.max > 1 + _ROUNDING,
-        }
-        return tuple(name for name, beyond in exceeded.items() if beyond)
-
-
-def limit_margins(course: RunCourse) -> tuple[JointMargin, ...]:
-    """Each joint of the arm."""
-    columns = zip(
-        position_margin(course, course.q_commanded).T,
-        position_margin(course, course.q).T,
-        speed_fraction(course).T,
-        acceleration_fraction(course).T,
-        strict=True,
-    )
-    return tuple(
-        JointMargin(_least(commanded), _least(measured), spread(speed), spread(acceleration))
-        for commanded, measured, speed, acceleration in columns
-    )
-
-
-def _least(values: FloatArray) -> float | None:
-    low = least(values)
-    return low and low[0]
-
-
-def position_margin(course: RunCourse, q: FloatArray) -> FloatArray:
+def _position_margin(course: RunCourse, q: FloatArray) -> FloatArray:
     """Distance (S, n) of positions from the nearer limit of each joint [rad], negative beyond it."""
     return np.minimum(q - course.model.q_min, course.model.q_max - q)
 
 
-def speed_fraction(course: RunCourse) -> FloatArray:
+def _speed_fraction(course: RunCourse) -> FloatArray:
     """Commands (S, n) as fractions of what the arm allows there in their direction, no more than `_MOST`."""
     arm, q, command = course.model.description, course.q_commanded, course.command
     allowed, envelope = np.broadcast_to(arm.qd_max, q.shape), arm.envelope
@@ -81,7 +36,7 @@ def speed_fraction(course: RunCourse) -> FloatArray:
     return np.where(command == 0, 0.0, np.minimum(fraction, _MOST))
 
 
-def acceleration_fraction(course: RunCourse) -> FloatArray:
+def _acceleration_fraction(course: RunCourse) -> FloatArray:
     """Changes (S, n) of the command as fractions of what the arm allows in the whole periods they took; first row NaN.
 
     A command is in force for a period. A step that came later, or after cycles that the recording lost, had longer.
@@ -95,24 +50,44 @@ def acceleration_fraction(course: RunCourse) -> FloatArray:
     return fraction
 
 
-def limit_section(joints: tuple[JointMargin, ...]) -> Html:
+def limit_rows(course: RunCourse) -> tuple[list[Row], list[str]]:
+    """Describe each joint beside its limits, and name the limits that were exceeded."""
+    exceeded: list[str] = []
+
+    def marked(what: str, joint: int, text: str, beyond: bool) -> Text:
+        name = f"{what} of joint {joint}"
+        if beyond and name not in exceeded:
+            exceeded.append(name)
+        return bad(text) if name in exceeded else text
+
+    rows: list[Row] = []
+    positions = _position_margin(course, course.q_commanded), _position_margin(course, course.q)
+    fractions = _speed_fraction(course), _acceleration_fraction(course)
+    for j, columns in enumerate(zip(*(values.T for values in (*positions, *fractions)), strict=True), 1):
+        commanded, measured = (low and low[0] for low in map(least, columns[:2]))
+        speed, acceleration = map(spread, columns[2:])
+        beyond = min((margin for margin in (commanded, measured) if margin is not None), default=0.0) < -_ROUNDING
+        fast = speed.max > 1 + _ROUNDING
+        sudden = acceleration.max > 1 + _ROUNDING
+        rows.append(
+            {
+                "joint": str(j),
+                "position margin, commanded [rad]": marked("position", j, number(commanded, 3), beyond),
+                "measured [rad]": marked("position", j, number(measured, 3), beyond),
+                "velocity, largest": marked("velocity", j, percent(speed.max, 1), fast),
+                "velocity, 99 %": percent(speed.p99, 1),
+                "acceleration, largest": marked("acceleration", j, percent(acceleration.max, 1), sudden),
+                "acceleration, 99 %": percent(acceleration.p99, 1),
+            }
+        )
+    return rows, exceeded
+
+
+def limit_section(course: RunCourse) -> Html:
     """Each joint and its limits."""
-    if not any(joint.speed for joint in joints):
+    if not np.isfinite(_speed_fraction(course)).any():
         return element("p", "There are no commands.")
-
-    def marked(joint: JointMargin, name: str, text: str) -> Text:
-        return bad(text) if name in joint.violations else text
-
-    columns = [
-        ("joint", lambda row: str(row[0])),
-        ("position margin, commanded [rad]", lambda row: marked(row[1], "position", number(row[1].margin, 3))),
-        ("measured [rad]", lambda row: marked(row[1], "position", number(row[1].margin_measured, 3))),
-        ("velocity, largest", lambda row: marked(row[1], "velocity", _percent(row[1].speed, "max"))),
-        ("99 %", lambda row: _percent(row[1].speed, "p99")),
-        ("acceleration, largest", lambda row: marked(row[1], "acceleration", _percent(row[1].acceleration, "max"))),
-        ("99 %", lambda row: _percent(row[1].acceleration, "p99")),
-    ]
-    exceeded = violations(joints)
+    rows, exceeded = limit_rows(course)
     verdict: Text = "No position, velocity or acceleration limit of the arm was exceeded."
     if exceeded:
         verdict = bad(f"Exceeded: {', '.join(exceeded)}.")
@@ -120,20 +95,10 @@ def limit_section(joints: tuple[JointMargin, ...]) -> Html:
         "Margin: least distance from the nearer position limit. Velocity and acceleration: joint velocity commands and"
         " their changes over the period, as fractions of what the arm allows at that position."
     )
-    return joined([element("p", verdict), table(columns, enumerate(joints, 1), note)])
+    return joined([element("p", verdict), table(rows, note)])
 
 
-def violations(joints: tuple[JointMargin, ...]) -> list[str]:
-    """Limits that were exceeded, by joint."""
-    return [f"{name} of joint {j}" for j, joint in enumerate(joints, 1) for name in joint.violations]
-
-
-def _percent(values: Percentiles | None, which: str) -> str:
-    return percent(getattr(values, which, None), 1)
-
-
-@dataclass(frozen=True)
-class Hold:
+class Hold(NamedTuple):
     """One stretch of HOLD by one event."""
 
     start: float
@@ -144,27 +109,8 @@ class Hold:
     """Of its first step; what it says of a later one may differ."""
 
 
-@dataclass(frozen=True)
-class States:
-    """Modes and solver of a recording."""
-
-    time: dict[Mode, float]
-    """Time in each mode [s]."""
-    holds: tuple[Hold, ...]
-    outcomes: dict[QpOutcome, int]
-    """Steps by how their quadratic program ended."""
-    slack: Percentiles | None
-    """Largest violation of an approach row in the steps that had any row [m/s]."""
-
-    @property
-    def share(self) -> dict[Mode, float]:
-        """Share of each mode, 0 of a recording without any time."""
-        total = sum(self.time.values())
-        return {mode: lasted / total if total else 0.0 for mode, lasted in self.time.items()}
-
-
-def states(course: RunCourse) -> States:
-    """Modes, holds and solver outcomes of a recording."""
+def holds_in(course: RunCourse) -> list[Hold]:
+    """Return each stretch of HOLD by one event."""
     lasted, holds = course.lasted, list[Hold]()
     holding = course.mode == MODES.index(Mode.HOLD)
     for event, steps in groupby(range(len(course)), key=lambda i: course.event[i] if holding[i] else None):
@@ -172,43 +118,44 @@ def states(course: RunCourse) -> States:
             first, *others = steps
             duration = float(lasted[[first, *others]].sum())
             holds.append(Hold(float(course.time[first]), duration, course.reason[first]))
-    return States(
-        time={mode: float(lasted[course.mode == i].sum()) for i, mode in enumerate(MODES)},
-        holds=tuple(holds),
-        outcomes={outcome: int(np.sum(course.outcome == i)) for i, outcome in enumerate(OUTCOMES)},
-        slack=spread(course.slack[course.restricted > 0]),
-    )
+    return holds
 
 
-def mode_section(s: States) -> Html:
+def time_in_modes(course: RunCourse) -> dict[Mode, tuple[float, float]]:
+    """Return the time in each mode [s], and its share, 0 of a recording without any time."""
+    times = {mode: float(course.lasted[course.mode == i].sum()) for i, mode in enumerate(MODES)}
+    total = sum(times.values())
+    return {mode: (time, time / total if total else 0.0) for mode, time in times.items()}
+
+
+def mode_section(course: RunCourse) -> Html:
     """What the arm was doing, each hold, and how the quadratic programs ended."""
-    modes = [
-        ("mode", lambda mode: mode.name),
-        ("share", lambda mode: percent(s.share[mode], 1)),
-        ("time [s]", lambda mode: number(s.time[mode], 2)),
+    modes: list[Row] = [
+        {"mode": mode.name, "share": percent(share, 1), "time [s]": number(time, 2)}
+        for mode, (time, share) in time_in_modes(course).items()
     ]
-    bad_ends = (QpOutcome.INFEASIBLE, QpOutcome.FAILED)
-    outcomes = [
-        ("quadratic program", lambda end: bad(end.value) if s.outcomes[end] and end in bad_ends else end.value),
-        ("steps", lambda end: str(s.outcomes[end])),
-    ]
-    slack = (
+    outcomes: list[Row] = []
+    for i, end in enumerate(OUTCOMES):
+        count = int(np.sum(course.outcome == i))
+        wrong = count and end in (QpOutcome.INFEASIBLE, QpOutcome.FAILED)
+        outcomes.append({"quadratic program": bad(end.value) if wrong else end.value, "steps": str(count)})
+    slack = spread(course.slack[course.restricted > 0])
+    sentence = (
         "No obstacle restricted the arm (eqs. 5 to 7)."
-        if s.slack is None
+        if np.isnan(slack.max)
         else "Where obstacles restricted the arm (eqs. 5 to 7), the largest violation of an approach limit in a step"
-        f" had the median {s.slack.median:.3f}, 99 % {s.slack.p99:.3f} and largest value {s.slack.max:.3f} m/s."
+        f" had the median {slack.median:.3f}, 99 % {slack.p99:.3f} and largest value {slack.max:.3f} m/s."
     )
-    parts = [
-        element("div", joined([table(modes, Mode), table(outcomes, s.outcomes)]), "columns"),
-        element("p", slack),
+    parts = [element("div", joined([table(modes), table(outcomes)]), "columns"), element("p", sentence)]
+    holds = holds_in(course)
+    rest = holds[_HOLDS:]
+    more = f"{len(rest)} more holds, {sum(hold.duration for hold in rest):.2f} s together." if rest else ""
+    rows = [
+        {
+            "HOLD: reason as first said": hold.sentence,
+            "from [s]": number(hold.start, 2),
+            "lasted [s]": number(hold.duration, 2),
+        }
+        for hold in holds[:_HOLDS]
     ]
-    if s.holds:
-        rest = s.holds[_HOLDS:]
-        more = f"{len(rest)} more holds, {sum(hold.duration for hold in rest):.2f} s together." if rest else ""
-        holds = [
-            ("HOLD: reason as first said", lambda hold: hold.sentence),
-            ("from [s]", lambda hold: number(hold.start, 2)),
-            ("lasted [s]", lambda hold: number(hold.duration, 2)),
-        ]
-        parts.append(table(holds, s.holds[:_HOLDS], more))
-    return joined(parts)
+    return joined([*parts, table(rows, more)])

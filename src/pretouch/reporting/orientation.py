@@ -1,36 +1,23 @@
 """Force limits of body regions beside the recorded forces: for orientation, not conformity."""
 
-from typing import NamedTuple
-
+from pretouch.params.pretouch import REGIONS, BodyRegion
 from pretouch.reporting.contacts import TRANSIENT_S, ContactMeasures
-from pretouch.reporting.html import Html, Text, bad, element, joined, number, percent, table
-
-
-class BodyRegion(NamedTuple):
-    """What a region of the body is said to bear."""
-
-    name: str
-    transient: float | None
-    """Force of a contact of less than 0.5 s [N], None if the source has none."""
-    quasi_static: float
-    """Force of a contact that lasts [N]."""
-
+from pretouch.reporting.html import Html, Row, Text, bad, element, joined, number, percent, table
 
 SOURCE = (
     "ISO/TS 15066:2016, table A.2; transient figures are twice the quasi-static ones but for skull and face, where it"
     " has none"
 )
-REGIONS = (
-    BodyRegion("Skull and forehead", None, 130.0),
-    BodyRegion("Face", None, 65.0),
-    BodyRegion("Chest", 280.0, 140.0),
-    BodyRegion("Abdomen", 220.0, 110.0),
-    BodyRegion("Back and shoulders", 420.0, 210.0),
-    BodyRegion("Upper arms and elbows", 300.0, 150.0),
-    BodyRegion("Forearms and wrists", 320.0, 160.0),
-    BodyRegion("Hands and fingers", 280.0, 140.0),
-)
-"""As `SOURCE` has them; public copies of the table disagree in places."""
+_NAMES: dict[BodyRegion, str] = {
+    "skull": "Skull and forehead",
+    "face": "Face",
+    "chest": "Chest",
+    "abdomen": "Abdomen",
+    "back": "Back and shoulders",
+    "upper-arm": "Upper arms and elbows",
+    "forearm": "Forearms and wrists",
+    "hand": "Hands and fingers",
+}
 
 
 def orientation_section(contacts: ContactMeasures) -> Html:
@@ -48,26 +35,31 @@ def orientation_section(contacts: ContactMeasures) -> Html:
     )
     later = "none" if lasting is None else f"{lasting:.1f} N"
 
-    def shares(region: BodyRegion) -> tuple[float | None, float | None]:
-        transient = peak / region.transient if peak is not None and region.transient else None
-        return transient, lasting / region.quasi_static if lasting is not None else None
-
-    columns = [
-        ("body region", lambda region: region.name),
-        ("transient [N]", lambda region: number(region.transient, 0)),
-        ("of it", lambda region: _marked(shares(region)[0])),
-        ("quasi-static [N]", lambda region: number(region.quasi_static, 0)),
-        ("of it", lambda region: _marked(shares(region)[1])),
-        ("", lambda region: _bar(max((share for share in shares(region) if share is not None), default=None))),
-    ]
+    rows: list[Row] = []
+    for name, region in ((text, REGIONS[key]) for key, text in _NAMES.items()):
+        lasting_n, factor = region.force_n, region.transient
+        transient_n = factor * lasting_n if factor > 1.0 else None  # the source has none for skull and face
+        transient = peak / transient_n if peak is not None and transient_n else None
+        quasi_static = lasting / lasting_n if lasting is not None else None
+        largest = max((share for share in (transient, quasi_static) if share is not None), default=None)
+        rows.append(
+            {
+                "body region": name,
+                "transient [N]": number(transient_n, 0),
+                "of transient": _marked(transient),
+                "quasi-static [N]": number(lasting_n, 0),
+                "of quasi-static": _marked(quasi_static),
+                "": _bar(largest),
+            }
+        )
     note = (
         f"For orientation, not conformity. Figures: {SOURCE}. Public copies of such tables disagree. The transient"
         " figure is held against the largest force, the quasi-static one against the largest 20 ms mean later than"
         f" {TRANSIENT_S:g} s into a contact{here}. Which region would be hit, and over what area, is not known here;"
         f" pressures are not looked at.{unsure}"
     )
-    largest = f"Largest {source}: {number(peak, 1)} N; later than {TRANSIENT_S:g} s into a contact: {later}."
-    return joined([element("p", largest), table(columns, REGIONS, note)])
+    sentence = f"Largest {source}: {number(peak, 1)} N; later than {TRANSIENT_S:g} s into a contact: {later}."
+    return joined([element("p", sentence), table(rows, note)])
 
 
 def _marked(share: float | None) -> Text:

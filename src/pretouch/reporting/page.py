@@ -1,48 +1,68 @@
 """The pages, one HTML file each with all in it: a report of recordings, and what `pretouch detect` found in one."""
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from pretouch.reporting.contacts import contact_section
-from pretouch.reporting.figures import (
-    close_up_figure,
-    force_figure,
-    joint_figure,
-    motion_figure,
-    path_figure,
-    picture,
-    style,
-)
+from pretouch.contact.scatter import HELD_S
+from pretouch.explanation import LOUD_N
+from pretouch.recording.reader import Recorded
+from pretouch.reporting.contacts import ContactMeasures, contact_section, contacts_in
+from pretouch.reporting.figures import close_up_figure, force_figure, motion_figure, path_figure, picture, style
 from pretouch.reporting.health import health_section
-from pretouch.reporting.html import Html, Text, document, element, joined, table_html
-from pretouch.reporting.limits import limit_section, mode_section
-from pretouch.reporting.measures import Measures, compared, comparison, summary
-from pretouch.reporting.motion import distance_section, speed_section
+from pretouch.reporting.html import Html, Row, Text, bad, document, element, joined, number, percent, table, table_html
+from pretouch.reporting.limits import limit_rows, limit_section, mode_section, time_in_modes
+from pretouch.reporting.motion import distance_section, nearest_to_body, speed_section
 from pretouch.reporting.orientation import orientation_section
-from pretouch.reporting.setting import parameter_section, setting_section
+from pretouch.reporting.record import RunCourse, gather, spread
+from pretouch.reporting.setting import parameter_section, setting_section, started
 from pretouch.text_table import TextTable
+from pretouch.types import FloatArray, Mode
 
 _SHADED = "Red: REACT, grey: HOLD."
 
 
-def page(recordings: Iterable[Measures]) -> str:
+@dataclass(frozen=True)
+class Measured:
+    """One recording, measured."""
+
+    title: str
+    """Name of the file, with as much of its folder as tells it from the others."""
+    lacking: str
+    """What is missing of a file that is not complete, as a sentence, or ''."""
+    course: RunCourse
+    contacts: ContactMeasures
+
+
+def measure(recorded: Recorded, title: str) -> Measured:
+    """Measure a recording."""
+    course = gather(recorded)
+    lacking = "" if recorded.complete else recorded.sentence or "The file is not complete."
+    return Measured(title, lacking, course, contacts_in(course))
+
+
+def page(recordings: Iterable[Measured]) -> str:
     """Make the page of one recording or several; of each no more than its text is kept."""
-    title, rows, sections = "", [], []
+    title, rows, sections = "", list[Row](), list[Html]()
     for order, m in enumerate(recordings, 1):
-        rows.append(compared(order, m))
+        rows.append(_compared(order, m))
         with style():
             sections.append(element("section", joined(_recording(m)), anchor=f"recording-{order}"))
         title = m.title
     head = [element("h1", "Pretouch report")]
     if len(rows) > 1:
         title = f"{len(rows)} recordings"
-        head.append(comparison(rows))
+        note = (
+            "Delay, filtered and raw: medians, of forces the norm at the detection. Largest force: the true one where"
+            " it is known (*), else the estimate during a contact."
+        )
+        head.append(table(rows, note, 2))
     return document(f"Pretouch report: {title}", joined([*head, *sections]))
 
 
-def _recording(m: Measures) -> list[Text]:
+def _recording(m: Measured) -> list[Text]:
     """All about one recording."""
     course = m.course
     forces = (
@@ -52,7 +72,6 @@ def _recording(m: Measures) -> list[Text]:
         " What decides is the evidence, made of all joint torques and many samples: a contact from 1 on."
     )
     seen = "Sensed distances from the body, s" if course.proximity_used else "S"
-    fractions = "Distance from position limits, and commands as fractions of the limits."
     return [
         element("h2", m.title),
         summary(m),
@@ -63,18 +82,17 @@ def _recording(m: Measures) -> list[Text]:
         picture(force_figure(course), f"{forces} {_SHADED}"),
         *_strongest(m),
         element("h3", "Distances"),
-        distance_section(course, m.distances),
+        distance_section(course),
         element("h3", "Speed"),
-        speed_section(m.speeds),
+        speed_section(course),
         picture(motion_figure(course), f"{seen}peed of the end-effector, and speed factor. {_SHADED}"),
         picture(path_figure(course), "Path and end-effector seen from the front of the arm (from +x)."),
         element("h3", "Modes and quadratic program"),
-        mode_section(m.states),
+        mode_section(course),
         element("h3", "Limits of the arm"),
-        limit_section(m.joints),
-        picture(joint_figure(course), f"{fractions} {_SHADED}"),
+        limit_section(course),
         element("h3", "Units, robot and loop"),
-        health_section(m.units, m.loop),
+        health_section(course),
         element("h3", "Forces beside limits of body regions: for orientation, not conformity"),
         orientation_section(m.contacts),
         element("h3", "Parameters"),
@@ -82,7 +100,7 @@ def _recording(m: Measures) -> list[Text]:
     ]
 
 
-def _strongest(m: Measures) -> list[Html]:
+def _strongest(m: Measured) -> list[Html]:
     """Show the contact with the largest estimate close up."""
     sizes = np.array([d.peak_norm for d in m.contacts.detections])
     if not np.isfinite(sizes).any():
@@ -91,6 +109,103 @@ def _strongest(m: Measures) -> list[Html]:
     strongest = m.contacts.detections[order]
     figure = close_up_figure(m.course, strongest.time, strongest.force)
     return [picture(figure, f"Contact {order + 1}, the one with the largest force estimate, close up.")]
+
+
+def summary(m: Measured) -> Html:
+    """Say the most important of a recording."""
+    _, exceeded = limit_rows(m.course)
+    shares = {mode: percent(share) for mode, (_, share) in time_in_modes(m.course).items()}
+    sentences: list[Text] = [
+        _what(m.course),
+        _contacts(m.contacts),
+        _detectable(m.course),
+        _forces(m.contacts),
+        _nearest(m.course),
+        f"The arm followed its path for {shares[Mode.TRACK]} of the time, yielded for {shares[Mode.REACT]} and held for"
+        f" {shares[Mode.HOLD]}.",
+        bad(f"Limits of the arm were exceeded: {', '.join(exceeded)}.") if exceeded else "No joint limit was exceeded.",
+        bad(m.lacking) if m.lacking else "",
+    ]
+    return element("p", joined((sentence for sentence in sentences if sentence), " "), "summary")
+
+
+def _what(course: RunCourse) -> str:
+    names, first, seconds = course.profile_names, course.runs[0], float(course.lasted.sum())
+    minutes, rest = divmod(round(seconds), 60)
+    lasted = f"{minutes} min {rest} s" if minutes else f"{seconds:.1f} s"
+    units = f"{len(course.units)} unit{'s' if len(course.units) != 1 else ''}"
+    listed = " and ".join([", ".join(names[:-1]), names[-1]]) if len(names) > 1 else names[0]
+    return (
+        f"{lasted} of {first.model.description.name} with {units}, profile{'s' if len(names) > 1 else ''} {listed},"
+        f" begun {started(first)}."
+    )
+
+
+def _contacts(c: ContactMeasures) -> Text:
+    count, unmoved = len(c.detections), sum(not d.moved_s for d in c.detections)
+    sentence = f"{count or 'No'} contact{'s' if count != 1 else ''} {'were' if count != 1 else 'was'} detected"
+    sentence += f", {unmoved} of which did not move the arm" if unmoved else ""
+    if not c.truth_known:
+        return f"{sentence}; what truly touched is not known."
+    if c.delays:
+        sentence += f", {1000 * float(np.median(c.delays)):.0f} ms (median) after the true touch"
+    wrong = f"; {len(c.missed)} of {len(c.touches)} true touches missed, {len(c.without_touch)} detections without one."
+    return joined([sentence, bad(wrong) if c.missed or c.without_touch else wrong], "")
+
+
+def _detectable(course: RunCourse) -> Text:
+    """Say what force the detector finds, as `ControlStep.detectable_n`."""
+    forces = course.detectable_n[course.armed & ~np.isnan(course.detectable_n)]
+    if not len(forces):
+        return ""
+    half, most = (float(np.quantile(forces, share, method="inverted_cdf")) for share in (0.5, 0.95))
+    sentence = (
+        f"A force that is held on the end-effector for {HELD_S:g} s is found from {half:.0f} N on half of the time, and"
+        f" from {most:.0f} N on 95 % of the time."
+    )
+    return sentence if most <= LOUD_N else bad(sentence)
+
+
+def _forces(c: ContactMeasures) -> str:
+    which = "true force" if c.truth_known else "force estimate during a contact"
+    return f"The largest {which} was {c.peak:.1f} N." if c.peak else ""
+
+
+def _nearest(course: RunCourse) -> str:
+    nearest = nearest_to_body(course)
+    if not course.proximity_used:
+        return "Proximity was not used."
+    if nearest is None:
+        return "Nothing was sensed near the arm."
+    where = f"{nearest.name}, at {nearest.time:.1f} s"
+    return f"The nearest obstacle sensed was {nearest.distance:.3f} m from the body ({where})."
+
+
+def _compared(order: int, m: Measured) -> Row:
+    """Return the row of a recording in the comparison; `order` counts the recordings of the page from 1."""
+    link = Html(f'<a href="#recording-{order}">{element("span", m.title)}</a>')
+    c, body, fastest, modes = m.contacts, nearest_to_body(m.course), spread(m.course.speed), time_in_modes(m.course)
+    return {
+        "recording": joined([link, bad(" (incomplete)")], "") if m.lacking else link,
+        "profiles": ", ".join(m.course.profile_names),
+        "duration [s]": number(float(m.course.lasted.sum()), 1),
+        "contacts": str(len(c.detections)),
+        "missed": str(len(c.missed)) if c.truth_known else "?",
+        "without touch": str(len(c.without_touch)) if c.truth_known else "?",
+        "delay [ms]": number(float(np.median(c.delays)) if c.delays else None, 0, 1000.0),
+        "filtered [N]": number(_median_norm([d.filtered for d in c.detections]), 1),
+        "raw [N]": number(_median_norm([d.raw for d in c.detections]), 1),
+        "largest force [N]": number(c.peak, 1) + ("*" if c.truth_known else ""),
+        "nearest [m]": number(body.distance if body else None, 3),
+        "fastest [m/s]": number(fastest.max, 3),
+        "REACT": percent(modes[Mode.REACT][1]),
+        "HOLD": percent(modes[Mode.HOLD][1]),
+    }
+
+
+def _median_norm(forces: Sequence[FloatArray]) -> float | None:
+    """Median norm [N] of forces (3,) each, None of none."""
+    return float(np.median(np.linalg.norm(np.array(forces), axis=1))) if forces else None
 
 
 def detection_page(

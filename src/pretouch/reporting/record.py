@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import groupby, islice
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -115,8 +116,8 @@ def gather(recorded: Recorded) -> RunCourse:
     model, units = recorded.runs[0].model, len(recorded.runs[0].skin)
     for batch in _batches(recorded):
         blocks.append(_block(batch, model, units))
-        contacts += contacts_of([kept.step for kept in batch], count)
-        truths = [kept.truth for kept in batch if kept.truth is not None]
+        contacts += contacts_of([cycle.step for cycle in batch], count)
+        truths = [cycle.truth for cycle in batch if cycle.truth is not None]
         touches += [(time, model.links[link], velocity) for t in truths for time, link, velocity in t.touches]
         count += len(batch)
     columns = {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
@@ -129,18 +130,16 @@ def gather(recorded: Recorded) -> RunCourse:
 
 def _batches(recorded: Recorded) -> Iterator[list[Kept]]:
     """Cycles of one run each, no more than `_BATCH` at a time."""
-    for _, cycles in groupby(recorded, key=lambda kept: kept.run):
+    for _, cycles in groupby(recorded, key=lambda cycle: cycle.run):
         while batch := list(islice(cycles, _BATCH)):
             yield batch
 
 
 def _block(batch: list[Kept], model: RobotModel, units: int) -> Columns:
     """Arrays of a batch of one run, and what is known of the true forces meanwhile."""
-    steps, truths = [kept.step for kept in batch], [kept.truth for kept in batch if kept.truth is not None]
-    copied = ("q", "q_commanded", "command", "detectable_n")
+    steps, truths = [cycle.step for cycle in batch], [cycle.truth for cycle in batch if cycle.truth is not None]
     return {
-        **columns_of(steps),
-        **{name: np.array([getattr(step, name) for step in steps]) for name in copied},
+        **columns_of(steps, "q", "q_commanded", "command", "detectable_n"),
         "run": np.full(len(batch), batch[0].run),
         "event": np.array([step.event for step in steps], dtype=object),
         "reason": np.array([step.reason for step in steps], dtype=object),
@@ -158,7 +157,7 @@ def _block(batch: list[Kept], model: RobotModel, units: int) -> Columns:
 
 def _near(batch: list[Kept], links: int, units: int) -> Columns:
     """What was sensed, as the least distance of each step by unit and by link, and the nearest point."""
-    seen = [kept.step.obstacles for kept in batch]
+    seen = [cycle.step.obstacles for cycle in batch]
     row = np.repeat(np.arange(len(seen)), [len(o.unit) for o in seen])
     unit = np.concatenate([o.unit for o in seen])
     link = np.concatenate([o.link for o in seen])
@@ -179,7 +178,7 @@ def _near(batch: list[Kept], links: int, units: int) -> Columns:
 
 def _inputs(batch: list[Kept], units: int) -> Columns:
     """What the steps went by; inputs that a controller could not use may hold anything."""
-    inputs = [kept.inputs for kept in batch]
+    inputs = [cycle.inputs for cycle in batch]
     lacking = RangeReadings(np.full(units, np.nan), np.full(units, np.nan), np.full(units, NO_READING))
     readings = [lacking if i is None or not _fit(i.readings, units) else i.readings for i in inputs]
     return {
@@ -196,20 +195,19 @@ def _fit(readings: RangeReadings, units: int) -> bool:
     return all(np.shape(part) == (units,) for part in (readings.stamp, readings.distance, readings.status))
 
 
-@dataclass(frozen=True)
-class Percentiles:
-    """How some numbers are spread."""
+class Percentiles(NamedTuple):
+    """How some numbers are spread; NaN of none."""
 
     median: float
     p99: float
     max: float
 
 
-def spread(values: FloatArray) -> Percentiles | None:
-    """Median, 99 % and largest of the finite ones of some values, None of none."""
+def spread(values: FloatArray) -> Percentiles:
+    """Return median, 99 % and largest of the finite ones of some values."""
     finite = values[np.isfinite(values)]
     if not finite.size:
-        return None
+        return Percentiles(np.nan, np.nan, np.nan)
     median, p99 = np.percentile(finite, [50, 99])
     return Percentiles(float(median), float(p99), float(finite.max()))
 

@@ -8,8 +8,9 @@ from typing import Any
 from pretouch.composition import at, field_docs, leaves
 from pretouch.profiles import PROFILES, Profile
 from pretouch.recording.run import Run
-from pretouch.reporting.html import NOTHING, Html, Text, bad, element, facts, joined, number, table
+from pretouch.reporting.html import NOTHING, Html, Row, Text, bad, element, facts, joined, number, table, table_html
 from pretouch.reporting.record import RunCourse
+from pretouch.text_table import TextTable
 
 _LONGEST = 300
 """Characters of a fact that are shown."""
@@ -46,17 +47,21 @@ def started(run: Run) -> str:
 
 def _runs(course: RunCourse) -> Html:
     """Which profile and path were in force when."""
-    times = [(run, course.time[course.run == i]) for i, run in enumerate(course.runs)]
-    rows = [(run, time) for run, time in times if len(time)]
-    columns = [
-        ("profile", lambda row: row[0].profile.name),
-        ("path", lambda row: described(row[0].path)),
-        ("from [s]", lambda row: number(row[1][0], 2)),
-        ("to [s]", lambda row: number(row[1][-1], 2)),
-        ("steps", lambda row: str(len(row[1]))),
-    ]
+    rows: list[Row] = []
+    for i, run in enumerate(course.runs):
+        time = course.time[course.run == i]
+        if len(time):
+            rows.append(
+                {
+                    "profile": run.profile.name,
+                    "path": described(run.path),
+                    "from [s]": number(time[0], 2),
+                    "to [s]": number(time[-1], 2),
+                    "steps": str(len(time)),
+                }
+            )
     more = len(rows) - _RUNS
-    return table(columns, rows[:_RUNS], f"{more} more changes are left out." if more > 0 else "", 2)
+    return table(rows[:_RUNS], f"{more} more changes are left out." if more > 0 else "", 2)
 
 
 def described(path: object) -> str:
@@ -93,15 +98,13 @@ def parameter_section(course: RunCourse) -> Html:
         usual, value = (own.get(path, NOTHING) for own in (values[0], values[column]))
         return written(value) if value == usual else element("b", written(value), "other")
 
-    def column(i: int) -> tuple[str, Any]:
-        return beside[i].name, lambda path: parameter(path, i)
-
-    columns = [("parameter", lambda path: path), ("unit", units.__getitem__), *map(column, range(len(beside)))]
+    header = "parameter", "unit", *(profile.name for profile in beside)
+    rows = [(path, units[path], *(parameter(path, i) for i in range(len(beside)))) for path in units if path != "name"]
     more = len(profiles) - _PROFILES
     note = "Bold on colour: not the value of the profile paper (Table I of the paper, and what it leaves open)."
     if more > 0:
         note += f" {more} more profiles are left out."
-    return table(columns, [path for path in units if path != "name"], note, 2)
+    return table_html(TextTable("", header, tuple(rows), note))
 
 
 def _unit(profile: Profile, path: str) -> str:
