@@ -151,13 +151,6 @@ def test_joint_torques_are_detected_on_by_pretouch_and_paper(capsys, pushed_arm,
     assert imread(figure).std() > 0.05
 
 
-def test_long_names_of_profiles_are_numbered_in_tables_and_whole_in_numbers(capsys, pushed_arm, tmp_path):
-    name, numbers = "pretouch:detect.slack_nats=0:detect.tails=8", tmp_path / "a.json"
-    Detect(pushed_arm[0], (name,), json=numbers).run()
-    assert f"pretouch (1) is {name}." in capsys.readouterr().out
-    assert json.loads(numbers.read_text())["profiles"][0]["profile"] == name
-
-
 @pytest.mark.slow
 def test_with_a_force_beside_torques_each_can_be_had(capsys, pushed_arm, tmp_path):
     _, moving = pushed_arm

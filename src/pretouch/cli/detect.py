@@ -25,7 +25,7 @@ from pretouch.imported_data.results import Course, DetectorResult
 from pretouch.imported_data.torques import TorqueRecording, torque_recording
 from pretouch.profiles import Profile, at_rate
 from pretouch.profiles import profile as find_profile
-from pretouch.text_table import TextTable
+from pretouch.text_table import TextTable, tabulated
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -35,8 +35,6 @@ ENDINGS = (".png", ".pdf", ".svg", ".html")
 _DOTS_PER_INCH = 150
 _NO = "–"
 _OF_TORQUES = ("joint", "external torque, sigma", "residual, mean", "residual, sigma")
-_LONGEST = 24
-"""Characters of a profile's name that a table has room for."""
 
 
 @dataclass(frozen=True)
@@ -119,8 +117,7 @@ class _Answer:
     """What detectors make of a recording."""
 
     recording: ForceRecording | TorqueRecording
-    results: dict[str, DetectorResult]
-    """By the profiles' names for tables."""
+    results: list[DetectorResult]
     courses: list[Course]
     notes: list[str]
     """Sentences on what was read, and on what detectors made of it."""
@@ -128,7 +125,11 @@ class _Answer:
     @property
     def tables(self) -> list[TextTable]:
         """Contacts, how the detectors fared, and free motion."""
-        return [_contacts(self.results), _detection(self.results), *_free_motion(self.results, self.recording)]
+        return [
+            _contacts(self.results),
+            _detection(self.results),
+            *_free_motion(self.results, self.recording.model.joints),
+        ]
 
     def numbers(self) -> dict[str, Any]:
         """Return what goes into the JSON file."""
@@ -136,7 +137,7 @@ class _Answer:
         return {
             "recording": str(r.place), "arm": r.model.description.name, "assumed": read_from(r), "notes": self.notes,
             "samples": len(r.time), "first_sample_s": r.first_s, "duration_s": r.time[-1], "rate_hz": r.rate,
-            "profiles": list(self.results.values()),
+            "profiles": self.results,
         }  # fmt: skip
 
     def show(self) -> None:
@@ -174,11 +175,11 @@ class _Answer:
         from pretouch.recording.compare import Decisions
 
         title, caption = self.recording.place.name, "joint torques, what free motion does not explain of them, and"
-        figures = [
-            (torque_figure(course, self.recording.model.joints, f"{title}: {name}"),
-             f"{name}: {caption} the evidence. Red: contacts.")
-            for name, course in zip(self.results, self.courses, strict=True) if not isinstance(course, Decisions)
-        ]  # fmt: skip
+        figures = []
+        for result, course in zip(self.results, self.courses, strict=True):
+            if not isinstance(course, Decisions):
+                figure = torque_figure(course, self.recording.model.joints, f"{title}: {result.profile}")
+                figures.append((figure, f"{result.profile}: {caption} the evidence. Red: contacts."))
         if forces := [course for course in self.courses if isinstance(course, Decisions)]:
             where = "at the end-effector by the torques" if figures else "along each axis"
             figures.append((decisions_figure(forces, title), f"Force {where}, thresholds, and contacts."))
@@ -187,21 +188,18 @@ class _Answer:
 
 def _answer(recording: ForceRecording | TorqueRecording, profiles: Sequence[Profile], unused: list[str]) -> _Answer:
     """Run profiles over a recording. One that cannot run is a note, if another can."""
-    results, courses, notes = dict[str, DetectorResult](), list[Course](), [*unused, *sentences(recording.notes)]
+    results, courses, notes = list[DetectorResult](), list[Course](), [*unused, *sentences(recording.notes)]
     failures: list[RecordingError] = []
-    for k, profile in enumerate(profiles, 1):
-        name = profile.name
-        label = name if len(name) <= _LONGEST else f"{name.partition(':')[0]} ({k})"
+    for profile in profiles:
         try:
-            results[label], course = detect(recording, profile)
+            result, course = detect(recording, profile)
         except RecordingError as error:
             failures.append(error)
-            notes.append(f"{name} cannot run: {error}")
-            continue
-        courses.append(course)
-        notes += [sentence for sentence in sentences(results[label].notes) if sentence not in notes]
-        if label != name:
-            notes.append(f"{label} is {name}.")
+            notes.append(f"{profile.name} cannot run: {error}")
+        else:
+            results.append(result)
+            courses.append(course)
+            notes += [text for text in sentences(result.notes) if text not in notes]
     if not results:
         raise failures[0]
     if any(p.perception is not None and not p.detect.by_torques and thresholds_of(p.detect).f_d_n for p in profiles):
@@ -209,8 +207,8 @@ def _answer(recording: ForceRecording | TorqueRecording, profiles: Sequence[Prof
     return _Answer(recording, results, courses, notes)
 
 
-def _contacts(results: dict[str, DetectorResult]) -> TextTable:
-    pairs = sorted(((n, c) for n, r in results.items() for c in r.contacts), key=lambda pair: pair[1].time_s)
+def _contacts(results: list[DetectorResult]) -> TextTable:
+    pairs = sorted(((r.profile, c) for r in results for c in r.contacts), key=lambda pair: pair[1].time_s)
     rows = []
     for name, c in pairs:
         place = np.full(3, np.nan) if c.point_m is None else c.point_m
@@ -226,39 +224,37 @@ def _contacts(results: dict[str, DetectorResult]) -> TextTable:
     return TextTable("Contacts", header, tuple(rows) or (("none", *[""] * 10),), note, 1)
 
 
-def _detection(results: dict[str, DetectorResult]) -> TextTable:
-    rows = [
-        (
-            name, str(len(r.contacts)), f"{r.armed_s:.1f}", f"{r.free_s:.1f}", shown(r.motion_s, 1),
-            shown(r.contacts_per_hour_of_motion, 1), shown(r.torques.largest_evidence, 2) if r.torques else _NO,
-            shown(r.detectable_n, 1),
-        )
-        for name, r in results.items()
-    ]  # fmt: skip
-    header = (
-        "profile", "contacts", "armed [s]", "free [s]", "in motion [s]", "contacts an hour of motion",
-        "evidence without contact", "says it finds [N]",
-    )  # fmt: skip
+def _detection(results: list[DetectorResult]) -> TextTable:
+    columns = [
+        ("profile", lambda r: r.profile),
+        ("contacts", lambda r: str(len(r.contacts))),
+        ("armed [s]", lambda r: shown(r.armed_s, 1)),
+        ("free [s]", lambda r: shown(r.free_s, 1)),
+        ("in motion [s]", lambda r: shown(r.motion_s, 1)),
+        ("contacts an hour of motion", lambda r: shown(r.contacts_per_hour_of_motion, 1)),
+        ("evidence without contact", lambda r: shown(r.torques.largest_evidence, 2) if r.torques else _NO),
+        ("says it finds [N]", lambda r: shown(r.detectable_n, 1)),
+    ]
     note = (
         "A contact is evidence from 1 on. The last is the force at the end-effector that the detector itself says it"
         " finds, in the direction the torques tell least of (median; of the paper's thresholds their distance from the"
         " mean)."
     )
-    return TextTable("Detection", header, tuple(rows), note, 1)
+    return tabulated("Detection", columns, results, note, 1)
 
 
-def _free_motion(results: dict[str, DetectorResult], recording: ForceRecording | TorqueRecording) -> list[TextTable]:
+def _free_motion(results: list[DetectorResult], joints: Sequence[str]) -> list[TextTable]:
     """One table of the forces in free motion, and one of the torques for each profile that goes by them."""
     forces, tables = [], []
-    for name, r in results.items():
+    for r in results:
         if t := r.thresholds:
             for axis, *values in zip("xyz", t.mean_n, t.sigma_n, t.window_sigma_n, t.width_n, strict=True):
-                forces.append((name if axis == "x" else "", axis, *(shown(value, 2) for value in values)))
+                forces.append((r.profile if axis == "x" else "", axis, *(shown(value, 2) for value in values)))
         if s := r.torques:
             columns = s.external_sigma_nm, s.residual_mean_nm, s.residual_sigma_nm
-            rows = zip(recording.model.joints, *([shown(x, 3) for x in column] for column in columns), strict=True)
+            rows = zip(joints, *([shown(x, 3) for x in column] for column in columns), strict=True)
             note = "Outside contacts; the residual is what learnt free motion does not explain."
-            tables.append(TextTable(f"Torques in free motion [Nm], {name}", _OF_TORQUES, tuple(rows), note, 1))
+            tables.append(TextTable(f"Torques in free motion [Nm], {r.profile}", _OF_TORQUES, tuple(rows), note, 1))
     if forces:
         header = ("profile", "along", "mean", "sigma", "sigma in window", "thresholds at +-")
         tables.append(TextTable("Free motion [N]", header, tuple(forces), "Outside contacts and reactions."))

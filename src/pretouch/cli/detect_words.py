@@ -1,6 +1,6 @@
 """What is said of a log of another program and of what detectors made of it: a sentence for each code."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -85,46 +85,45 @@ def read_from(r: ForceRecording | TorqueRecording) -> str:
     )
 
 
-def guidance(results: Mapping[str, DetectorResult]) -> list[str]:
+def guidance(results: Sequence[DetectorResult]) -> list[str]:
     """Say which contacts profiles share, and what contacts mean for an arm that nobody touched."""
-    (first, one), *others = results.items()
+    first, *others = results
     texts = []
-    for name, r in others:
-        pairs = paired(one.contacts, r.contacts)
+    for r in others:
+        pairs = paired(first.contacts, r.contacts)
         both = sum(a is not None and b is not None for a, b in pairs)
         texts.append(
-            f"{first} and {name}: {both} contacts in both, {len(one.contacts) - both} only in {first},"
-            f" {len(r.contacts) - both} only in {name}."
+            f"{first.profile} and {r.profile}: {both} contacts in both, {len(first.contacts) - both} only in"
+            f" {first.profile}, {len(r.contacts) - both} only in {r.profile}."
         )
-    for name, r in results.items():
+    for r in results:
         thresholds = r.thresholds if np.isnan(r.motion_s) else None
-        texts.append(_threshold_guidance(name, r, thresholds) if thresholds else _motion_guidance(name, r))
+        texts.append(f"{r.profile}: {_threshold_guidance(r, thresholds) if thresholds else _motion_guidance(r)}")
     return texts
 
 
-def _threshold_guidance(name: str, r: DetectorResult, t: ThresholdSummary) -> str:
+def _threshold_guidance(r: DetectorResult, t: ThresholdSummary) -> str:
     count, minutes = len(r.contacts), r.armed_s / 60
     if not count:
         return (
-            f"{name}: no contact in {minutes:.1f} min; an F_b below {t.f_base_all_n:.1f} N would have given one (F_b is"
+            f"no contact in {minutes:.1f} min; an F_b below {t.f_base_all_n:.1f} N would have given one (F_b is"
             f" {t.f_base_n:g} N)."
         )
-    contacts = "1 false contact" if count == 1 else f"{count} false contacts"
+    contacts, these = ("1 false contact", "this") if count == 1 else (f"{count} false contacts", "these")
     return (
-        f"{name}: if nobody touched the arm, {contacts} in {minutes:.1f} min; an F_b above {t.f_base_all_n:.1f} N would"
-        f" have given none, one above {t.f_base_free_n:.1f} N none but {'this' if count == 1 else 'these'} (it is"
-        f" {t.f_base_n:g} N)."
+        f"if nobody touched the arm, {contacts} in {minutes:.1f} min; an F_b above {t.f_base_all_n:.1f} N would have"
+        f" given none, one above {t.f_base_free_n:.1f} N none but {these} (it is {t.f_base_n:g} N)."
     )
 
 
-def _motion_guidance(name: str, r: DetectorResult) -> str:
+def _motion_guidance(r: DetectorResult) -> str:
     count = len(r.contacts)
     contacts = f"{count or 'no'} contact{'' if count == 1 else 's'} in {r.armed_s / 60:.1f} min"
     if not r.motion_s:
-        return f"{name}: {contacts}; the arm does not move."
+        return f"{contacts}; the arm does not move."
     return (
-        f"{name}: {contacts}, {r.contacts_in_motion} of them in {r.motion_s / 60:.1f} min of motion; if nobody touched"
-        f" the arm, these are {r.contacts_per_hour_of_motion:.3g} false alarms an hour."
+        f"{contacts}, {r.contacts_in_motion} of them in {r.motion_s / 60:.1f} min of motion; if nobody touched the arm,"
+        f" these are {r.contacts_per_hour_of_motion:.3g} false alarms an hour."
     )
 
 

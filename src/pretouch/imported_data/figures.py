@@ -8,11 +8,8 @@ from matplotlib.figure import Figure
 
 from pretouch.imported_data.results import TorqueCourse
 from pretouch.recording.compare import Decisions
-from pretouch.types import FloatArray
 
 _AXES = "xyz"
-_POINTS = 3000
-"""Stretches of time that a line is drawn in."""
 
 
 def decisions_figure(columns: Sequence[Decisions], title: str) -> Figure:
@@ -58,11 +55,11 @@ def torque_figure(d: TorqueCourse, joints: tuple[str, ...], title: str) -> Figur
     figure = Figure(figsize=(11, 1.3 * n + 3), layout="constrained")
     panels = figure.subplots(n + 1, 1, sharex=True, height_ratios=(*[1.0] * n, 1.6))
     for j, axes in enumerate(panels[:-1]):
-        axes.plot(*_drawn(d.time, d.tau_ext[:, j]), color="0.7", lw=0.7, label="external torque")
-        axes.plot(*_drawn(d.time, d.residual[:, j]), color="tab:blue", lw=0.8, label="less what free motion explains")
+        axes.plot(d.time, d.tau_ext[:, j], color="0.7", lw=0.7, label="external torque")
+        axes.plot(d.time, d.residual[:, j], color="tab:blue", lw=0.8, label="less what free motion explains")
         axes.set_ylabel(f"{joints[j]}\n[Nm]", fontsize="x-small")
     evidence = panels[-1]
-    evidence.plot(*_drawn(d.time, d.evidence), color="black", lw=0.9)
+    evidence.plot(d.time, d.evidence, color="black", lw=0.9)
     evidence.axhline(1.0, color="tab:red", lw=0.8, ls="--", label="a contact from here on")
     evidence.set_ylim(bottom=0.0)
     evidence.set_ylabel("evidence", fontsize="x-small")
@@ -70,32 +67,17 @@ def torque_figure(d: TorqueCourse, joints: tuple[str, ...], title: str) -> Figur
     for k, contact in enumerate(d.contacts):
         for axes in panels:
             label = "contact" if k == 0 and axes is panels[0] else None
-            axes.axvspan(
-                contact.time_s,
-                max(contact.end_s or 0.0, contact.time_s + 0.01),
-                color="tab:red",
-                alpha=0.25,
-                label=label,
-            )
+            end = max(contact.end_s or 0.0, contact.time_s + 0.01)
+            axes.axvspan(contact.time_s, end, color="tab:red", alpha=0.25, label=label)
         if len(d.contacts) <= 40:
             evidence.annotate(
                 contact.link or "", (contact.time_s, 1.0), (1, 2), textcoords="offset points", rotation=90, fontsize=5
             )
     for axes in panels:
+        axes.set_rasterization_zorder(3)  # an hour as lines would be a page of 100 MB
         axes.grid(alpha=0.3)
         axes.tick_params(labelsize="x-small")
     panels[0].legend(fontsize="x-small", loc="upper right", ncols=3)
     evidence.legend(fontsize="x-small", loc="upper right")
     figure.suptitle(title, fontsize="medium")
     return figure
-
-
-def _drawn(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Least and greatest value of each stretch of a long course (S,)."""
-    every = len(time) // _POINTS
-    if every < 2:
-        return time, values
-    count = len(time) // every
-    parts = values[: count * every].reshape(count, every)
-    ends = np.stack([parts.min(axis=1), parts.max(axis=1)], axis=1)
-    return np.repeat(time[: count * every : every], 2), ends.ravel()

@@ -115,18 +115,7 @@ def result_of(
     profile: Profile, course: Course, free: BoolArray, moving: BoolArray | None, detectable: float,
     thresholds: ThresholdSummary | None, torques: TorqueSummary | None, notes: tuple[Note, ...],
 ) -> DetectorResult:  # fmt: skip
-    """Sum up the course of a detector.
-
-    Args:
-        profile: that it is of.
-        course: its cycles.
-        free: (S,) which of them are free motion.
-        moving: (S,) in which of them the arm moves; None where that is not known.
-        detectable: see `DetectorResult.detectable_n`.
-        thresholds: how they fared, of a detector by a force.
-        torques: how they fared, of a detector by torques.
-        notes: what a person should know.
-    """
+    """Sum up a course: (S,) which cycles are `free` motion, and in which the arm is `moving` if that is known."""
     period, judged = profile.task.control_period_s, course.judged
     begins = np.searchsorted(course.time, [c.time_s for c in course.contacts])
     return DetectorResult(
