@@ -3,10 +3,11 @@
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import tyro
@@ -75,8 +76,10 @@ class Replay:
             else:
                 with _progress("Reading", len(recorded)) as advance:
                     events = _events(recorded, advance)
-                console.print(f"{_what_ran(recorded)}: {events.sentence}.", markup=False)
-                numbers |= asdict(events)
+                contacts, holds = _many(events["contacts"], "contact"), _many(events["holds"], "hold")
+                held = f"held for {events['held_share']:.0%} of the time"
+                console.print(f"{_what_ran(recorded)}: {contacts}, {holds} after the start, {held}.", markup=False)
+                numbers |= events
             verdict = None
             if self.verify:
                 prepare(recorded.runs[0].profile)
@@ -87,10 +90,11 @@ class Replay:
                 with _progress("Comparing", len(recorded)) as advance:
                     comparison = compare(recorded, other, advance)
                 _show(console, comparison)
-                contacts = [{"recorded": mine, "other": theirs} for mine, theirs in comparison.pairs]
                 numbers["compared"] = {
-                    "other": comparison.other.name, "contacts": contacts, "left_out": comparison.left_out,
-                }  # fmt: skip
+                    "other": comparison.other.name,
+                    "contacts": [{"recorded": mine, "other": theirs} for mine, theirs in comparison.pairs],
+                    "left_out": comparison.left_out,
+                }
             write(numbers)
             if page and not self.verify:
                 from pretouch.page.replay import show_replay  # needs the extra
@@ -129,34 +133,15 @@ def _what_ran(recorded: Recorded) -> str:
     )
 
 
-@dataclass(frozen=True)
-class _Events:
-    """What happened in a recording."""
-
-    contacts: int
-    holds: int
-    """After the start: the arm begins in HOLD, until its window is full."""
-    held_share: float
-    """Of the time."""
-
-    @property
-    def sentence(self) -> str:
-        """All of it in words."""
-        holds = f"{_many(self.holds, 'hold')} after the start"
-        return f"{_many(self.contacts, 'contact')}, {holds}, held for {self.held_share:.0%} of the time"
-
-
-def _events(recorded: Recorded, advance: Callable[[int], None]) -> _Events:
-    """Count contacts and holds; `advance` gets how many steps were read."""
-    contacts = holds = cycles = 0
-    before: Mode | None = None
-    for i, kept in enumerate(recorded):
-        contacts += kept.step.contact is not None
-        holds += kept.step.mode is Mode.HOLD and before in (Mode.TRACK, Mode.REACT)
-        cycles += kept.step.mode is Mode.HOLD
-        before = kept.step.mode
+def _events(recorded: Recorded, advance: Callable[[int], None]) -> dict[str, Any]:
+    """Count contacts and holds after the start, where each arm is held; `advance` gets how many steps were read."""
+    modes, contacts = list[Mode](), 0
+    for i, cycle in enumerate(recorded):
+        contacts += cycle.step.contact is not None
+        modes.append(cycle.step.mode)
         advance(i + 1)
-    return _Events(contacts, holds, cycles / len(recorded))
+    holds = sum(mode is Mode.HOLD and before is not Mode.HOLD for before, mode in pairwise(modes))
+    return {"contacts": contacts, "holds": holds, "held_share": modes.count(Mode.HOLD) / len(modes)}
 
 
 def _many(count: int, what: str) -> str:

@@ -115,19 +115,19 @@ def compare(recorded: "Recorded", profile: Profile, progress: Callable[[int], No
     others = [_with_profile(c, profile) for c in controllers]
     state: ControllerState | None = None
     last = left_out = 0
-    for i, kept in enumerate(recorded):
+    for i, cycle in enumerate(recorded):
         progress(i + 1)
-        other = others[kept.run]
-        if kept.inputs is not None and state is None:
-            state = _first_state(other, controllers[kept.run], kept.snapshot, kept.inputs.robot)
-        elif kept.inputs is not None and state is not None and kept.run != last:
+        other = others[cycle.run]
+        if cycle.inputs is not None and state is None:
+            state = _first_state(other, controllers[cycle.run], cycle.snapshot, cycle.inputs.robot)
+        elif cycle.inputs is not None and state is not None and cycle.run != last:
             state = other.adopt(state, others[last])
-        if kept.inputs is None or state is None:
+        if cycle.inputs is None or state is None:
             left_out += 1
             continue
-        last = kept.run
-        step, state = other.step(state, kept.inputs)
-        theirs.append(_decision_of(kept.step, recorded.runs[kept.run].profile))
+        last = cycle.run
+        step, state = other.step(state, cycle.inputs)
+        theirs.append(_decision_of(cycle.step, recorded.runs[cycle.run].profile))
         ours.append(_decision_of(step, other.profile))
     if not ours:
         raise RecordingError(f"{recorded.place} has no cycle with a usable robot state: nothing can be compared.")

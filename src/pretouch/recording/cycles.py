@@ -185,12 +185,12 @@ def packed_state(state: ControllerState, anew: bool) -> bytes:
         ) from error
 
 
-def items(kept: KeptCycle) -> Iterator[Item]:
+def items(cycle: KeptCycle) -> Iterator[Item]:
     """Yield the messages of a cycle."""
-    number, time = kept.number, kept.time
-    for topic, data in ((RUN, kept.run), (STATE, kept.state), (INPUTS, kept.inputs)):
+    number, time = cycle.number, cycle.time
+    for topic, data in ((RUN, cycle.run), (STATE, cycle.state), (INPUTS, cycle.inputs)):
         if data is not None:
             yield Item(topic, PACKED, number, time, packed_message(number, data))
-    for topic, result in ((STEP, kept.step), (TRUTH, kept.truth)):
+    for topic, result in ((STEP, cycle.step), (TRUTH, cycle.truth)):
         if result is not None:
             yield Item(topic, TOPICS[topic], number, time, encode(result, number))

@@ -112,8 +112,8 @@ class LastSeconds:
             while (place := self._folder / f"hold-{number}.mcap").exists():
                 number += 1
             recording = Recording(place, controller, self._about)
-            for kept in cycles:
-                recording.write(kept)
+            for packed in cycles:
+                recording.write(packed)
             recording.close()
             self.written.append(place)
             self.trouble = recording.trouble or self.trouble

@@ -203,15 +203,15 @@ def _mjcf(arm: RobotDescription) -> str:
         raise RecordingError(f"The MJCF file {arm.mjcf} cannot be copied into the recording: {error}") from error
 
 
-def _model(kept: _KeptRun) -> RobotModel:
+def _model(record: _KeptRun) -> RobotModel:
     """Make the arm: on the MJCF file of this installation if that says the same, otherwise on the recorded one."""
     folder = FilePath(mkdtemp(prefix="pretouch-"))
     try:
-        (folder / FILE).write_text(kept.robot, encoding="utf-8")
-        (folder / _MJCF).write_text(kept.arm, encoding="utf-8")
+        (folder / FILE).write_text(record.robot, encoding="utf-8")
+        (folder / _MJCF).write_text(record.arm, encoding="utf-8")
         arm = load_description(folder)
         for installed in (panda().mjcf, fr3().mjcf):
-            if installed.read_text(encoding="utf-8") == kept.arm:
+            if installed.read_text(encoding="utf-8") == record.arm:
                 arm = replace(arm, mjcf=installed)
         model = RobotModel(arm)
     except BaseException:
@@ -221,10 +221,10 @@ def _model(kept: _KeptRun) -> RobotModel:
     return model
 
 
-def _unit(kept: _KeptUnit) -> SensorUnit:
+def _unit(record: _KeptUnit) -> SensorUnit:
     return SensorUnit(
-        kept.id, kept.link, kept.T_link_sensor, kept.position_sigma, kept.orientation_sigma, kept.touch,
-        from_table(Sensor, kept.sensor, "sensor"),
+        record.id, record.link, record.T_link_sensor, record.position_sigma, record.orientation_sigma, record.touch,
+        from_table(Sensor, record.sensor, "sensor"),
     )  # fmt: skip
 
 
@@ -239,8 +239,8 @@ def _kept_path(path: Path) -> _KeptPath:
     return _KeptPath(type(path).__name__, numbers, bool(path.closed))
 
 
-def _path(kept: _KeptPath) -> Path:
-    if kept.kind == "Circle":
-        x, y, z, radius, start_angle = kept.numbers.tolist()
+def _path(record: _KeptPath) -> Path:
+    if record.kind == "Circle":
+        x, y, z, radius, start_angle = record.numbers.tolist()
         return Circle((x, y, z), radius, start_angle)
-    return WayPoints(kept.numbers, kept.closed)
+    return WayPoints(record.numbers, record.closed)

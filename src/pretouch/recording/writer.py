@@ -84,16 +84,16 @@ class Recording:
         self.write(packed)
         return packed
 
-    def write(self, kept: KeptCycle) -> None:
+    def write(self, packed: KeptCycle) -> None:
         """Have what is kept of a cycle written, unless nothing is written any more."""
         if self._closed is not None or self.trouble:
             return
-        stamp = kept.step.stamp
+        stamp = packed.step.stamp
         if not self._steps:
             self._first, self._begun_at = stamp, monotonic()
         # a simulation that outruns the clock can wait, a control loop cannot
         wait = stamp - self._first > _FASTER * (monotonic() - self._begun_at)
-        self._disk.put(partial(_all_items, self._topics, kept), wait)
+        self._disk.put(partial(_all_items, self._topics, packed), wait)
         self._steps, self._last = self._steps + 1, stamp
 
     @property
@@ -125,7 +125,7 @@ class Recording:
         self._as_context.close()
 
 
-def _all_items(topics: ViewerTopics, kept: KeptCycle) -> Iterator[Item]:
+def _all_items(topics: ViewerTopics, packed: KeptCycle) -> Iterator[Item]:
     """Yield the messages of a cycle, and what it is to tools that do not know our types."""
-    yield from items(kept)
-    yield from topics.items(inputs_of(kept.inputs).inputs, kept.step, kept.number, kept.time)
+    yield from items(packed)
+    yield from topics.items(inputs_of(packed.inputs).inputs, packed.step, packed.number, packed.time)
