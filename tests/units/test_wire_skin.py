@@ -104,7 +104,7 @@ def test_a_unit_whose_finder_stops_ages_though_it_goes_on_sending_and_a_silent_o
 
 def test_a_unit_without_a_key_and_a_receiver_that_cannot_be_found_are_refused(paper_skin):
     keys = simulated_keys(paper_skin.ids, 0)
-    with pytest.raises(HardwareError, match=r"No key for unit elbow"):
+    with pytest.raises(HardwareError, match=r"There is no key for elbow"):
         Fleet(["elbow"], keys, FleetParams(), 0, ("127.0.0.1", 9))
     with pytest.raises(HardwareError, match=r"The receiver no.such.host.invalid:9 cannot be found"):
         Fleet(paper_skin.ids, keys, FleetParams(), 0, ("no.such.host.invalid", 9))

@@ -101,7 +101,6 @@ def _units(command: Live, skin: Skin) -> Iterator[RealUnits | None]:
     if not units.keys:
         yield None
         return
-    units.check()
     with NetworkSkin(skin.network, load_keys(units.keys), units.units_host, units.units_port) as source:
         heard = "anywhere" if units.units_host == EVERYWHERE else f"{units.units_host} only"
         print(f"Receiving units from {heard}, at UDP port {source.address[1]}.", flush=True)

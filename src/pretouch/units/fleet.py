@@ -21,6 +21,7 @@ from pretouch.sim.range_finder import RangeFinderParams, RangeFinders, RangeSamp
 from pretouch.sim.touch_sensor import Forces, TouchErrors, TouchSample, TouchSensors, no_forces
 from pretouch.sim.under_way import UnderWay
 from pretouch.units.keys import Keys, UnitKey
+from pretouch.units.receiver import keys_of
 from pretouch.units.simulated import SimulatedUnit, UnitParams
 from pretouch.units.wire import KEY_SIZE
 
@@ -117,9 +118,6 @@ class Fleet:
         """
         network = NetworkUnits.of(units)
         ids = self.ids = network.ids
-        missing = [name for name in ids if name not in keys]
-        if missing:
-            raise HardwareError(f"No key for unit {', '.join(missing)}: create keys for all units of the skin.")
         family, self._address = _resolved(address)
         self.receiver = address
         """Name or address, and port, of the receiver."""
@@ -127,8 +125,8 @@ class Fleet:
         rngs = [[np.random.default_rng(s) for s in one.spawn(3)] for one in seeds]
         self._params, self.seed = params, seed
         self.units = tuple(
-            SimulatedUnit(keys[name], params.unit, own, params.imu, _reboots(params.reboot_every_s, own), side)
-            for name, side, (own, _, _) in zip(ids, network.zones, rngs, strict=True)
+            SimulatedUnit(key, params.unit, own, params.imu, _reboots(params.reboot_every_s, own), side)
+            for key, side, (own, _, _) in zip(keys_of(ids, keys), network.zones, rngs, strict=True)
         )
         """In the order of the skin."""
         self._rows = [

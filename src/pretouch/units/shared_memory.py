@@ -7,11 +7,14 @@ and whatever order a processor shows the writes in.
 
 import mmap
 import os
+import pickle
 import struct
 import weakref
 from multiprocessing import reduction
-from typing import Any
+from typing import Any, Generic, TypeVar
 from zlib import crc32
+
+Value = TypeVar("Value")
 
 
 class SharedMemory:
@@ -106,6 +109,23 @@ class Mailbox(_ValueSlots):
                 self._last = number, value
                 break
         return self._last
+
+
+class ObjectMailbox(Generic[Value]):
+    """The newest Python object, for any number of readers."""
+
+    def __init__(self, most: int) -> None:
+        """Make an empty one for objects of at most so many bytes when pickled."""
+        self._box = Mailbox(most)
+
+    def put(self, value: Value) -> None:
+        """Make an object the newest."""
+        self._box.write(pickle.dumps(value))
+
+    def newest(self) -> Value | None:
+        """Return the newest; None before the first."""
+        number, data = self._box.read()
+        return pickle.loads(data) if number else None  # noqa: S301  our own process wrote it
 
 
 class Ring(_ValueSlots):

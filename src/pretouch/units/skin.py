@@ -7,7 +7,6 @@ memory between them has no name that could be left over.
 
 import gc
 import os
-import pickle
 import struct
 import time
 from collections.abc import Sequence
@@ -24,7 +23,7 @@ from pretouch.signals import kept_from_children, leave_to_parent
 from pretouch.types import FloatArray, RangeReadings, TouchReadings
 from pretouch.units.keys import Keys, UnitKey
 from pretouch.units.receiver import SAMPLES_MOST, SkinReceiver, demand_port, keys_of, range_readings, touch_readings
-from pretouch.units.shared_memory import Mailbox, Ring
+from pretouch.units.shared_memory import Mailbox, ObjectMailbox, Ring
 from pretouch.units.unit import NOTHING, Received, UnitTraffic
 from pretouch.units.wire import SAMPLE_MOST, TAG_SIZE, sample_of
 
@@ -60,7 +59,7 @@ class SharedOutputs:
     def __init__(self, units: NetworkUnits) -> None:
         self._nothing = np.tile(NOTHING, (units.rows, 1))
         self._table = Mailbox(self._nothing.nbytes)
-        self._traffic = Mailbox(4096 + sum(2560 + len(id.encode()) for id in units.ids))
+        self.traffic = ObjectMailbox[Traffic](4096 + sum(2560 + len(id.encode()) for id in units.ids))
         self._samples = Ring(SAMPLES_MOST, _RECORD.size + SAMPLE_MOST - TAG_SIZE)
 
     def put(self, receiver: SkinReceiver) -> None:
@@ -68,10 +67,6 @@ class SharedOutputs:
         self._table.write(receiver.table.tobytes())
         for r in receiver.take_samples():
             self._samples.write(_RECORD.pack(r.unit, r.arrival, r.stamp, r.offset, r.bound) + r.sample.body())
-
-    def put_traffic(self, traffic: Traffic) -> None:
-        """Give what was counted."""
-        self._traffic.write(pickle.dumps(traffic))
 
     def table(self) -> FloatArray:
         """Return the newest table (K, 7), as `SkinReceiver.table` has it."""
@@ -81,11 +76,6 @@ class SharedOutputs:
     def take_samples(self) -> list[Received]:
         """Return the samples that came since the last call."""
         return [_received(record) for record in self._samples.take()]
-
-    def traffic(self) -> Traffic | None:
-        """Return the newest counts; None before the first."""
-        number, value = self._traffic.read()
-        return pickle.loads(value) if number else None  # noqa: S301  our own process wrote it
 
 
 def _received(record: bytes) -> Received:
@@ -175,7 +165,7 @@ class NetworkSkin:
 
     def traffic(self) -> Traffic:
         """Return what the receiver has counted, not older than 0.3 s while it lives."""
-        return self._outputs.traffic() or self._no_traffic
+        return self._outputs.traffic.newest() or self._no_traffic
 
 
 def _wait_listening(started: Connection) -> tuple[tuple[str, int], int]:
@@ -221,7 +211,7 @@ def _serve(
             now = time.monotonic()
             if now >= report_at:
                 report_at = now + _TRAFFIC_PERIOD_S
-                outputs.put_traffic(Traffic(receiver.units, receiver.rejected, receiver.unsent))
+                outputs.traffic.put(Traffic(receiver.units, receiver.rejected, receiver.unsent))
                 if os.getppid() != parent:
                     return
             if not receiver.behind:

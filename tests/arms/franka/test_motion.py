@@ -74,7 +74,7 @@ def test_commands_of_another_request_end_it(bench: Bench) -> None:
     bench.mailboxes.send_command(ArmCommand(2, ArmRequest.MOVE, time.monotonic() + 1000.0, [0.2] * 7))
     bench.run(1000)
     assert bench.finished
-    assert bench.mailboxes.newest_feedback().answered == 1
+    assert bench.mailboxes.feedback.newest().answered == 1
 
 
 def test_a_set_point_that_is_old_but_not_stale_still_counts(bench: Bench) -> None:
@@ -93,7 +93,7 @@ def test_a_set_point_that_is_none_ends_the_motion_at_rest_and_later_ones_do_not_
     bench.run(1000)
     assert bench.finished
     assert bench.motion.trouble.startswith("The arm was brought to rest, because joint 1 was to move at ")
-    assert bench.mailboxes.newest_feedback().trouble == bench.motion.trouble
+    assert bench.mailboxes.feedback.newest().trouble == bench.motion.trouble
 
 
 @pytest.mark.parametrize("asked_for", [ArmRequest.WAIT, ArmRequest.END, ArmRequest.QUIT])
@@ -123,5 +123,5 @@ def test_lost_states_are_counted(bench: Bench) -> None:
     bench.motion.answer(bench.arm.state(), 4e-3)
     assert (lost, line.lost_states, line.longest_gap, line.cycles) == (0, 3, 4e-3, cycles + 1)
     assert "3 lost (0.99 %), longest gap 4 ms" in str(line)
-    bench.mailboxes.put_report(line)
-    assert str(bench.mailboxes.report()) == str(line)
+    bench.mailboxes.report.put(line)
+    assert str(bench.mailboxes.report.newest()) == str(line)

@@ -63,14 +63,14 @@ class Program:
     def look(self, at: int) -> list[Feedback | None]:
         """Note the feedback before the state with a number."""
         feedback: list[Feedback | None] = []
-        self.steps[at] = lambda: feedback.append(self.mailboxes.newest_feedback())
+        self.steps[at] = lambda: feedback.append(self.mailboxes.feedback.newest())
         return feedback
 
     def run(self) -> Feedback:
         """Serve until the command to quit; return the last feedback."""
         task = ProcessSettings("robot", "panda", self.limits, None, FrankaParams(), None, os.getppid())
         ArmServer(self.client, task, self.mailboxes).serve()  # type: ignore[arg-type]
-        feedback = self.mailboxes.newest_feedback()
+        feedback = self.mailboxes.feedback.newest()
         assert feedback is not None
         return feedback
 

@@ -134,7 +134,7 @@ class FrankaArm:
     @property
     def communication(self) -> Communication:
         """How well the process kept up, in the motions that have ended."""
-        return self._mailboxes.report()
+        return self._mailboxes.report.newest() or Communication()
 
     def report(self) -> str:
         """Say that, in lines; '' if no motion has ended."""
@@ -208,7 +208,7 @@ class FrankaArm:
             )
 
     def _feedback(self) -> Feedback:
-        feedback = self._mailboxes.newest_feedback()
+        feedback = self._mailboxes.feedback.newest()
         if feedback is None:
             raise RobotError(f"No state has come from the arm at {self._address}: check its network cable.")
         return feedback

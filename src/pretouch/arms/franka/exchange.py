@@ -1,6 +1,5 @@
 """What program and process of an arm exchange in shared memory: commands, feedback, and how well the line kept up."""
 
-import pickle
 import struct
 from dataclasses import dataclass, field
 from enum import IntEnum
@@ -8,7 +7,7 @@ from enum import IntEnum
 from pretouch.arms.franka.limiter import PERIOD_S
 from pretouch.arms.franka.state import JOINTS, FrankaState
 from pretouch.loop import Durations, spread_table
-from pretouch.units.shared_memory import Mailbox
+from pretouch.units.shared_memory import Mailbox, ObjectMailbox
 from pretouch.values import value
 
 _COMMAND = struct.Struct(f"<qqd{JOINTS}d")
@@ -105,8 +104,8 @@ class Mailboxes:
     """Mailboxes in both directions. Passed to a spawned process, they are the same mailboxes there."""
 
     def __init__(self) -> None:
-        self._commands, self._feedback = Mailbox(_COMMAND.size), Mailbox(_MOST)
-        self._report = Mailbox(_MOST)
+        self._commands, self.feedback = Mailbox(_COMMAND.size), ObjectMailbox[Feedback](_MOST)
+        self.report = ObjectMailbox[Communication](_MOST)
         self._number, self._command = 0, ArmCommand(0, ArmRequest.WAIT, 0.0, [0.0] * JOINTS)
 
     def send_command(self, command: ArmCommand) -> None:
@@ -120,21 +119,3 @@ class Mailboxes:
             request_number, request, stamp, *qd = _COMMAND.unpack(data)
             self._number, self._command = number, ArmCommand(request_number, ArmRequest(request), stamp, qd)
         return self._command
-
-    def send_feedback(self, feedback: Feedback) -> None:
-        """Make a state the newest one."""
-        self._feedback.write(pickle.dumps(feedback))
-
-    def newest_feedback(self) -> Feedback | None:
-        """Return the newest state; None before the first."""
-        number, data = self._feedback.read()
-        return pickle.loads(data) if number else None  # noqa: S301  our own process wrote it
-
-    def put_report(self, report: Communication) -> None:
-        """Make a report the newest one."""
-        self._report.write(pickle.dumps(report))
-
-    def report(self) -> Communication:
-        """Return the newest report."""
-        number, data = self._report.read()
-        return pickle.loads(data) if number else Communication()  # noqa: S301  our own process wrote it

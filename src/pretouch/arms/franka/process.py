@@ -79,7 +79,7 @@ class VelocityMotion:
         command = self._mailboxes.newest_command()
         velocity = self._limiter.step(state, self._target(command, now))
         finished = self._ending and self._limiter.at_rest and max(map(abs, state.dq_d.tolist())) < _ARRIVED_RAD_S
-        self._mailboxes.send_feedback(Feedback(now, self._number, True, self.trouble, state))
+        self._mailboxes.feedback.put(Feedback(now, self._number, True, self.trouble, state))
         self._communication.reseeds += self._limiter.lost
         self._communication.answered(since, state.success_rate, time.monotonic() - now)
         return np.array(velocity), finished
@@ -151,7 +151,7 @@ class ArmServer:
                 break
             if command.number > self._answered:
                 self._execute(command)
-                self._mailboxes.put_report(self._communication)
+                self._mailboxes.report.put(self._communication)
             try:
                 self._state, self._stamp = self._client.read(), time.monotonic()
             except RobotError as error:
@@ -164,7 +164,7 @@ class ArmServer:
 
     def _send_feedback(self) -> None:
         """Pass on the state there is while no motion runs."""
-        self._mailboxes.send_feedback(Feedback(self._stamp, self._answered, False, self._trouble, self._state))
+        self._mailboxes.feedback.put(Feedback(self._stamp, self._answered, False, self._trouble, self._state))
 
     def _execute(self, command: ArmCommand) -> None:
         self._trouble = ""
@@ -178,7 +178,7 @@ class ArmServer:
                 self._client.recover()
         except RobotError as error:
             self._trouble = str(error)
-        feedback = self._mailboxes.newest_feedback()
+        feedback = self._mailboxes.feedback.newest()
         if feedback is not None:  # the motion's last state: there may be no other
             self._state, self._stamp = feedback.state, feedback.stamp
         # what was asked during a motion ended it, and is not to be done at some later time

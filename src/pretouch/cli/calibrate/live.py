@@ -62,7 +62,6 @@ class CalibrateArm(Generic[A]):
             raise CalibrationError("--out is missing: name the skin file to write.")
         if not (self.units.keys or self.connection.brings_units):
             raise HardwareError("The arm brings no sensor units: give the file of their keys with --keys.")
-        self.units.check()
         beside = (out.with_name(f"{out.stem}-calibration-{n}.mcap") for n in count(1))
         place = self.record or next(one for one in beside if not one.exists())
         self.files.check([self.units.keys], place)

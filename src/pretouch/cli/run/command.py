@@ -81,7 +81,6 @@ def check_options(command: Run[Any]) -> None:
         raise HardwareError("The arm brings no sensor units: give the file of their keys with --keys, or --no-skin.")
     if robot.no_learnt and (robot.learnt or robot.learn_anew):
         raise RobotError("--no-learnt does not go with --learnt and --learn-anew: leave one or the other out.")
-    units.check()
     if not 0.0 <= command.task.seconds < float("inf"):
         raise ParameterError(f"--seconds is {command.task.seconds:g}: give 0 or more.")
 

@@ -40,8 +40,7 @@ class UnitOptions:
     units_port: int = PORT
     """UDP port to receive units at."""
 
-    def check(self) -> None:
-        """Refuse an address that is none: a HardwareError."""
+    def __post_init__(self) -> None:
         if not self.units_host:
             raise HardwareError("--units-host is empty: give 127.0.0.1, or 0.0.0.0 for every address of this machine.")
 
