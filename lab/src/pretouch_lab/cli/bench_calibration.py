@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from pretouch.calibration.motion.limits import PlanParams
+from pretouch.cli.options import JsonFile
 from pretouch.errors import CalibrationError
 
 if TYPE_CHECKING:  # the help is to need none of the heavy packages
@@ -21,8 +22,7 @@ class Calibration:
     motion: PlanParams = field(default_factory=PlanParams)
     arm: str = "panda"
     """panda, fr3, or the folder of an imported arm."""
-    json: str = ""
-    """File for the numbers, or - for standard output: text then goes to standard error."""
+    json: JsonFile = None
     seed: int = 0
     """Decides all that is random."""
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import tyro
 
-from pretouch.cli.options import Words
+from pretouch.cli.options import JsonFile, Words
 
 
 @dataclass(frozen=True)
@@ -22,8 +22,7 @@ class Real:
     """Of the sets, each by its name, with `arms` as `pretouch robot import` wrote them."""
     detectors: Words = ()
     """Profiles, separated by commas; by default fixed, observer, paper and pretouch."""
-    json: str = ""
-    """File for the rows, or - for standard output: text then goes to standard error."""
+    json: JsonFile = None
 
     def run(self) -> None:
         """Play what is there, with tables and rows."""

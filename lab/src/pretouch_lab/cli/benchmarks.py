@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from pretouch.cli.options import Words
+from pretouch.cli.options import JsonFile, Words
 from pretouch.errors import PretouchError
 
 if TYPE_CHECKING:  # the help is to need none of the heavy packages
@@ -133,8 +133,7 @@ class Both(BenchOptions):
     --out.
     """
 
-    json: str = ""
-    """File for the numbers, or - for standard output: text then goes to standard error."""
+    json: JsonFile = None
 
     def run(self) -> None:
         """Run both, with tables and numbers."""

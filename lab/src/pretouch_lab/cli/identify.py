@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import tyro
 
+from pretouch.cli.options import JsonFile
+
 if TYPE_CHECKING:  # the help is to need none of the heavy packages
     from pretouch.robot.model import RobotModel
     from pretouch_lab.identification.identify import Identified
@@ -33,8 +35,7 @@ class Identify:
     """TOML file for the arm, for --world of `live`, `reproduce` and `bench`."""
     figure: str = ""
     """Figure to write, ending in .png, .pdf or .svg: what is explained over time, and the autocorrelation."""
-    json: str = ""
-    """File for the numbers, or - for standard output: text then goes to standard error."""
+    json: JsonFile = None
 
     def run(self) -> None:
         """Identify the arm, and show and write what was found."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import tyro
 
-from pretouch.cli.options import Words
+from pretouch.cli.options import JsonFile, Words
 from pretouch.errors import ExperimentError
 
 if TYPE_CHECKING:  # the help is to need none of the heavy packages
@@ -46,8 +46,7 @@ class Sweep:
     """Processes; by default one for each processor."""
     out: str = ""
     """Folder for everything; by default runs/sweep."""
-    json: str = ""
-    """File for the numbers, or - for standard output: text then goes to standard error."""
+    json: JsonFile = None
 
     def run(self) -> None:
         """Play what is missing, with table, indices and figure."""
