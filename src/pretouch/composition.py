@@ -12,7 +12,7 @@ from functools import cache
 from itertools import pairwise
 from numbers import Real
 from types import MappingProxyType, NoneType, UnionType
-from typing import Any, ClassVar, Literal, Union, get_args, get_origin
+from typing import Any, ClassVar, Literal, Self, Union, get_args, get_origin
 
 from pretouch.checks import Checked, hints_of
 from pretouch.errors import ParameterError
@@ -48,6 +48,11 @@ class Part(Checked):
                 both = f"{other.__qualname__} and {cls.__qualname__}"
                 raise ParameterError(f"{both} have the name {name!r}: rename one.")
             cls.name, cls.known[name] = name, cls
+
+    @classmethod
+    def of_kind(cls, part: object) -> Self:
+        """Return a part if it is one of this class, or else one with default parameters."""
+        return part if isinstance(part, cls) else cls()
 
     @classmethod
     def choices(cls) -> tuple[str, ...]:

@@ -35,12 +35,18 @@ CHECK, SEE, DETECT, ASK, MOVE = range(5)
 """Stages of a step."""
 
 
+_belief, _watch = opener(Fixed, "qd_max", "failure"), opener(Remembered, "watch", "command")
+_report = opener(Now, "stamp", "robot")
+
+
 @entry
 def line(fixed: Blocks, remembered: Blocks, now: Blocks, beside: Capsules, first: int, last: int) -> bool:
     """Take the stages from the first to the last; from `CHECK` on, return False where something is to be decided."""
     alone = first == CHECK
-    if alone and not believe(fixed, remembered, now):
-        return False
+    if alone:
+        (qd_max, failure), (watch, command), (stamp, robot) = _belief(fixed), _watch(remembered), _report(now)
+        if not believable(stamp[0], robot, watch, command, qd_max, failure):
+            return False
     if first <= SEE <= last and see(fixed, remembered, now, beside) < 1.0 and alone:
         return False
     if first <= DETECT <= last and detect(fixed, remembered, now) and alone:
@@ -50,17 +56,6 @@ def line(fixed: Blocks, remembered: Blocks, now: Blocks, beside: Capsules, first
     if first <= MOVE <= last:
         move(fixed, remembered, now)
     return True
-
-
-_belief, _watch = opener(Fixed, "qd_max", "failure"), opener(Remembered, "watch", "command")
-_report = opener(Now, "stamp", "robot")
-
-
-@inlined
-def believe(fixed: Blocks, remembered: Blocks, now: Blocks) -> bool:
-    """Say whether the arm's report is as usual."""
-    (qd_max, failure), (watch, command), (stamp, robot) = _belief(fixed), _watch(remembered), _report(now)
-    return believable(stamp[0], robot, watch, command, qd_max, failure)
 
 
 _sight, _tracks = opener(Fixed, "hinges", "mechanism.arm", "sight"), opener(Remembered, "tracks", "outside")

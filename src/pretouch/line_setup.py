@@ -8,23 +8,21 @@ import numpy as np
 
 from pretouch.contact.admittance import Admittance
 from pretouch.contact.clamp import clamp_init
-from pretouch.contact.moving_thresholds import MovingThresholds, thresholds_of
+from pretouch.contact.moving_thresholds import MovingThresholds
 from pretouch.contact.reaction import DecayingVelocity
 from pretouch.contact.residual_model import sequential_init, sequential_numbers
-from pretouch.contact.sequential_step import sample_test
+from pretouch.contact.scatter import LENGTHS
 from pretouch.contact.sequential_test import SequentialTest
 from pretouch.contact.virtual_mass import FreeMass
 from pretouch.contact.window import window_init
 from pretouch.control.approach import (
     ApproachRestriction,
     BrakingCurve,
-    MotionRequest,
-    of_table_i,
     row_numbers,
 )
 from pretouch.control.braking import braking_numbers, slots_init
-from pretouch.control.motion import Answer, MotionNumbers
-from pretouch.control.path import OnPath, Pace
+from pretouch.control.motion import MotionNumbers
+from pretouch.control.path import Pace
 from pretouch.faults import Watched
 from pretouch.line_records import (
     ADMITTANCE,
@@ -43,9 +41,8 @@ from pretouch.line_records import (
 from pretouch.params import NullSpaceMotion, OutsidePoints, PerceptionParams, SequentialParams
 from pretouch.perception.external_points import outside_init
 from pretouch.perception.obstacles import Sight, track_init
-from pretouch.perception.perceive import Readings, Seen
-from pretouch.robot.kinematics import Kinematics
-from pretouch.types import Report, no_obstacles
+from pretouch.records import zeros
+from pretouch.types import no_obstacles
 
 
 def kinds_of(profile: Any) -> Kinds:
@@ -62,8 +59,7 @@ def fixed_of(controller: Any) -> Fixed:
     """Return what does not change from step to step."""
     model, skin, profile, limits = controller.model, controller.skin, controller.profile, controller.limits
     kinds, n, t, see, failure = controller.kinds, model.n, profile.task, profile.perception, profile.failure
-    seen, thresholds = see or PerceptionParams(), thresholds_of(profile.detect)
-    braking = profile.approach if kinds.approach == BRAKING else BrakingCurve()
+    seen, thresholds = see or PerceptionParams(), MovingThresholds.of_kind(profile.detect)
     # nothing is nearer than -inf, so nothing moves away
     away = profile.null_space or NullSpaceMotion().numbers._replace(distance_m=-math.inf)
     test = profile.detect if kinds.detect == SEQUENTIAL else SequentialParams()
@@ -79,7 +75,8 @@ def fixed_of(controller: Any) -> Fixed:
         kinds.react == ADMITTANCE and profile.react.pinch is not None,
         math.inf if controller.path.closed else controller.path.length,
         0.0 if profile.slow is None else profile.slow.d_max_m,
-        row_numbers(of_table_i(profile.approach)), braking_numbers(braking, t.speed_m_s, limits.period),
+        row_numbers(ApproachRestriction.of_kind(profile.approach)),
+        braking_numbers(BrakingCurve.of_kind(profile.approach), t.speed_m_s, limits.period),
         MotionNumbers(
             model.mechanism.arm, t, t.orientation == "hold", failure.solver_iterations, limits.table, model.q_mid, away
         ),
@@ -91,18 +88,13 @@ def _places(controller: Any) -> int:
     return len(controller.skin) + controller.outside_places + len(controller.model.parts)
 
 
-def _report(n: int) -> Report:
-    none = np.zeros(n)
-    return Report(np.zeros(1), none, none, none, none, none, np.zeros(6))
-
-
 def remembered_init(controller: Any) -> Remembered:
     """Return what is remembered before the first step, but for what the arm reports and a detector knows already."""
     n, profile, period, kinds = controller.model.n, controller.profile, controller.limits.period, controller.kinds
     sent, none = int(profile.failure.state_timeout_s / period) + 2, np.zeros(n)
     zero, cycles = np.zeros(1), np.zeros(1, np.int64)
     return Remembered(
-        Watched(zero, zero, _report(n), cycles, np.zeros(sent), np.zeros((sent, n))),
+        zeros(Watched, n=n, S=sent),
         track_init(len(controller.skin)), outside_init(controller.outside_places), window_init(profile.window.samples),
         sequential_init(n if kinds.detect == SEQUENTIAL else 0, SequentialParams()),
         FreeMass(np.zeros((2, n)), cycles, none, clamp_init(none).path, zero), Pace(np.ones(1), cycles, zero, zero),
@@ -112,17 +104,10 @@ def remembered_init(controller: Any) -> Remembered:
 
 def now_init(controller: Any) -> Now:
     """Return what a step begins with."""
-    n, links, units, places = controller.model.n, len(controller.model.links), len(controller.skin), _places(controller)
-    zero, count, three = np.zeros(1), np.zeros(1, np.int64), np.zeros(3)
-    of_units, rows = np.zeros(units), np.zeros(places)
-    return Now(
-        zero, _report(n), Readings(of_units, of_units, np.zeros(units, np.int64)),
-        Kinematics(np.zeros((links, 3)), np.zeros((links, 3, 3)), np.zeros((n, 3)), np.zeros((n, 3))), three,
-        Seen(of_units, no_obstacles(places), count, count, zero, np.ones(1)), three,
-        sample_test(n), OnPath(zero, three, three, three, zero, zero),
-        MotionRequest(three, np.eye(3), np.zeros(n), count, count, count, np.full(1, np.nan), np.full(1, sys.maxsize)),
-        Answer(
-            np.zeros(n), np.zeros((2, 3)), np.zeros(places, np.int64), rows, rows, np.zeros(n + places), count, count,
-            count,
-        ),
-    )  # fmt: skip
+    model, places = controller.model, _places(controller)
+    now = zeros(Now, n=model.n, L=len(model.links), K=len(controller.skin), M=places, W=len(LENGTHS))
+    return now._replace(
+        seen=now.seen._replace(near=no_obstacles(places), heard=np.ones(1)),
+        detection=now.detection._replace(detectable_n=np.full(1, np.nan)),
+        request=now.request._replace(goal=np.eye(3), touch_m_s=np.full(1, np.nan), untouched=np.full(1, sys.maxsize)),
+    )

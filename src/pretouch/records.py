@@ -156,6 +156,15 @@ class Flat:
         return self.blocks[kind][at].reshape(shape)
 
 
+def zeros(record: Any, **sizes: int) -> Any:
+    """Return a record of zeros, with these sizes of its dimensions."""
+    if hints := _hints(record):
+        return record(*(zeros(hint, **sizes) for hint in hints.values()))
+    array, *dimensions = get_args(record)
+    shape = [sum(sizes[name] for name in d.split(" + ")) if isinstance(d, str) else d for d in dimensions]
+    return np.zeros(shape, BLOCK_TYPES[_KINDS[array]])
+
+
 def opener(record: type, *paths: str) -> Callable[[Blocks], Any]:
     """Return what makes views of fields of a record, or of records in it, from its blocks, in Python and compiled.
 

@@ -18,9 +18,11 @@ from pretouch.contact.localisation import (
     localise,
 )
 from pretouch.contact.posterior import Candidates, log_posterior, log_prior
-from pretouch.contact.sequential_step import sample_test
+from pretouch.contact.scatter import LENGTHS
+from pretouch.contact.sequential_step import SampleTest
 from pretouch.contact.touch_cue import Cues, gain_of, no_cues, surface_areas
 from pretouch.params import LocalisationParams, TouchSensorParams
+from pretouch.records import zeros
 from pretouch.robot.body import placed
 from pretouch.robot.description import panda
 from pretouch.robot.kinematics import Kinematics
@@ -77,7 +79,7 @@ def said(
     kin: Kinematics, torque: FloatArray, obstacles: Obstacles | None = None, cues: Cues | None = None, steps: int = 1,
     ratio: float = 5.0, p: LocalisationParams = P, state: LocalisationState | None = None,
 ) -> tuple[Touched, LocalisationState]:  # fmt: skip
-    tested = sample_test(N)
+    tested = zeros(SampleTest, n=N, W=len(LENGTHS))
     tested.means[:], tested.covariance[:], tested.model_variance[:] = torque, NOISE + np.diag(MODEL_VARIANCE), 1e-4
     tested.samples[0], tested.log_likelihood_ratio[0] = 32, ratio
     felt, state = sample(kin, standing(MODEL, torque), obstacles or no_obstacles(), 0.0), state or NO_CONTACT
@@ -96,7 +98,7 @@ PATCH = TouchPatch()
 
 
 def touched(kin: Kinematics, c: int) -> Cues:
-    """What a unit at a candidate says while it is touched, as `TouchSensors` has it."""
+    """What a unit at a candidate says while it is touched, as `touch_cues` has it."""
     link, gain = SURFACE.link[c], np.ones(len(MODEL.links))
     share = np.array([np.pi * PATCH.radius_m**2 / surface_areas(MODEL.capsules, len(MODEL.links))[link]])
     gain[link] = gain_of(share, TouchSensorParams())[0]

@@ -15,7 +15,7 @@ from pretouch.cli.detect_words import guidance, read_from, sentences, shown
 from pretouch.cli.options import JsonFile, Numbers, OptionalFile, Words
 from pretouch.cli.tables import show
 from pretouch.cli.writing import check_writable, numbers_to, unwritable_said
-from pretouch.contact.moving_thresholds import thresholds_of
+from pretouch.contact.moving_thresholds import MovingThresholds
 from pretouch.errors import ParameterError, RecordingError
 from pretouch.extras import FIGURES
 from pretouch.imported_data.detect import detect
@@ -202,7 +202,10 @@ def _answer(recording: ForceRecording | TorqueRecording, profiles: Sequence[Prof
             notes += [text for text in sentences(result.notes) if text not in notes]
     if not results:
         raise failures[0]
-    if any(p.perception is not None and not p.detect.by_torques and thresholds_of(p.detect).f_d_n for p in profiles):
+    if any(
+        p.perception is not None and not p.detect.by_torques and MovingThresholds.of_kind(p.detect).f_d_n
+        for p in profiles
+    ):
         notes.append("Without a skin no obstacle is known, so eq. 11 lowers no threshold.")
     return _Answer(recording, results, courses, notes)
 

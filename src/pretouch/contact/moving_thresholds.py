@@ -114,11 +114,6 @@ class MovingThresholds(ThresholdParams, Detector, name="thresholds"):
         return self.f_base_n + self.f_std_n
 
 
-def thresholds_of(detector: Detector) -> MovingThresholds:
-    """Return the thresholds of a detector, or the paper's of one that has none."""
-    return detector if isinstance(detector, MovingThresholds) else MovingThresholds()
-
-
 @compiled
 def compare(
     window: Window, compared: FloatArray, ee: FloatArray, near: Obstacles, p: ThresholdParams, parts: FloatArray

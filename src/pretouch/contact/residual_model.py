@@ -23,8 +23,8 @@ import numpy as np
 from pretouch.compiled import compiled, kernel
 from pretouch.contact.scatter import LONGEST, level_init, scatter_init
 from pretouch.contact.sequential import MOST, Moment, alarm_bound
-from pretouch.params import MisfitParams, ProximityPriorParams, SequentialParams
-from pretouch.records import IntCell
+from pretouch.params import ProximityPriorParams, SequentialParams
+from pretouch.records import IntCell, zeros
 from pretouch.robot.kinematics import Kinematics, Mechanism, jacobian_into, mass_matrix_into, rotate
 from pretouch.types import FloatArray, IntArray
 
@@ -44,7 +44,6 @@ class SequentialNumbers(NamedTuple):
 
     p: SequentialParams
     near: ProximityPriorParams
-    misfit: MisfitParams
     period: float
     """Of control [s]."""
     delay: float
@@ -57,7 +56,8 @@ class SequentialNumbers(NamedTuple):
     """How many objects near add a hypothesis."""
     settle: int
     """Samples after which what lasts is learnt, 0 for never."""
-    learns_misfit: bool
+    misfit_s: float
+    """Memory of how windows' means vary, 0 where that is not learnt [s]."""
     prior: Annotated[FloatArray, "f"]
     """(f,) variances of the weights before anything is learnt [Nm^2]."""
 
@@ -125,18 +125,9 @@ def prior_of(n: int, p: SequentialParams) -> FloatArray:
 
 def residual_init(n: int, p: SequentialParams) -> ResidualModel:
     """Return the model that has learnt nothing: zero mean, wide spread."""
-    f, size = features_of(n), block_size(n)
     spread = np.stack([np.full(n, p.velocity_prior_rad_s2**2), np.full(n, p.torque_prior_nm**2)])
-    return ResidualModel(
-        weights=np.zeros((n, f)), covariance=np.tile(np.diag(prior_of(n, p)), (n, 1, 1)),
-        spread=np.stack([spread, spread]), seen=np.zeros(2), speed=np.zeros(n),
-        queue=np.zeros((QUEUE, size)), block=np.zeros(size),
-        filled=np.zeros(1, np.int64), waiting=np.zeros(1, np.int64),
-    )  # fmt: skip
-
-
-_NO_MISFIT, _NO_PROXIMITY = MisfitParams(), ProximityPriorParams()
-"""In the place of those that are switched off: no number of them counts."""
+    none: ResidualModel = zeros(ResidualModel, n=n, f=features_of(n), Q=QUEUE, b=block_size(n))
+    return none._replace(covariance=np.tile(np.diag(prior_of(n, p)), (n, 1, 1)), spread=np.stack([spread, spread]))
 
 
 def sequential_init(n: int, p: SequentialParams, learnt: ResidualModel | None = None) -> SequentialState:
@@ -150,11 +141,12 @@ def sequential_init(n: int, p: SequentialParams, learnt: ResidualModel | None = 
 
 def sequential_numbers(n: int, period: float, p: SequentialParams) -> SequentialNumbers:
     """Return what compiled code takes of the parameters, of n joints and a control period [s]."""
-    misfit, near = p.misfit or _NO_MISFIT, p.proximity or _NO_PROXIMITY
+    near = p.proximity or ProximityPriorParams()  # without objects no number of it counts
     return SequentialNumbers(
-        p.numbers, near.numbers, misfit.numbers, period, math.exp(-p.observer_gain_1_s * period),
+        p.numbers, near.numbers, period, math.exp(-p.observer_gain_1_s * period),
         alarm_bound(p, period), ("never", "watched", "always").index(p.learn), MOST if p.proximity else 0,
-        round(p.relearn_after_s / period) if p.learn != "never" else 0, p.misfit is not None, prior_of(n, p),
+        round(p.relearn_after_s / period) if p.learn != "never" else 0, p.misfit.memory_s if p.misfit else 0.0,
+        prior_of(n, p),
     )  # fmt: skip
 
 

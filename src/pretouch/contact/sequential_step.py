@@ -78,14 +78,6 @@ class SampleTest(NamedTuple):
     """Whether it is being found out if the residual is a load or a step of an estimate."""
 
 
-def sample_test(n: int) -> SampleTest:
-    """Return room for what a sample of n joints says."""
-    return SampleTest(
-        np.zeros(n), np.zeros(1), np.full(1, np.nan), np.zeros(3), np.zeros((6, 3)), np.zeros((len(LENGTHS), n)),
-        np.zeros(1, np.int64), np.zeros((n, n)), np.zeros(n), np.zeros(1, np.int64),
-    )  # fmt: skip
-
-
 @compiled
 def assess_sample(
     state: SequentialState, now: Moment, numbers: SequentialNumbers, mechanism: Mechanism, results: SampleTest
@@ -114,7 +106,7 @@ def assess_sample(
     # nothing may be learnt, with somebody near, does not count.
     regime = 0 if settled * numbers.period >= _SETTLED_S else 1
     scatter, level = np.zeros((0, n + 2, n)), max(1.0, numbers.bound - p.slack_nats)
-    if numbers.learns_misfit:
+    if numbers.misfit_s > 0.0:
         scatter, level = state.scatter[regime], earned_level(state.level[regime], numbers.bound, p.slack_nats)
     means = means_in_free_motion(results.means, whole, covariance, results.model_variance, scatter)
     log_r, window, which = judge(means, contacts, p.contact_gain, p.tails)
@@ -128,7 +120,7 @@ def assess_sample(
     # nothing is learnt while anything that is seen could be what is measured
     clear = len(distance) == 0 or distance[nearest_of(distance, 1)[0]] >= p.clear_m
     alone = clear and (numbers.learns == 2 or (numbers.learns == 1 and now.watched))
-    if numbers.learns_misfit and alone and not now.reacting and whole == len(LENGTHS):
+    if numbers.misfit_s > 0.0 and alone and not now.reacting and whole == len(LENGTHS):
         learn_level(log_r, state.level[regime])
     _learn(state, now.reacting, numbers, sample, means, J_ee, alone, evidence >= p.suspect)
 
@@ -159,15 +151,15 @@ def _learn(
     model, p, period, at, full = state.model, numbers.p, numbers.period, state.at[0], means.whole == len(LENGTHS)
     # What was gathered before a contact is suspected may be its beginning: it is thrown away, not learnt. Where misfit
     # is learnt it only counts less: a spread without what it does not expect shrinks, and expects less and less.
-    lost = (suspected and not numbers.learns_misfit) or reacting or not alone
+    lost = (suspected and numbers.misfit_s == 0.0) or reacting or not alone
     state.calm[0] = 0 if lost else min(state.calm[0] + 1, CALM)
     # learnt also where a contact is suspected: an alarm at a reversal would otherwise come at each of them
     if p.widen_at_turns and alone and not reacting and full:
         learn_turning(at, means, period / p.memory_s, state.turning)
-    if numbers.learns_misfit and alone and not reacting:
-        learn_scatter(at, means, p.tails, period / numbers.misfit.memory_s)
+    if numbers.misfit_s > 0.0 and alone and not reacting:
+        learn_scatter(at, means, p.tails, period / numbers.misfit_s)
     if state.calm[0] >= CALM:
-        add_to_block(model, sample, means.scatter[-1, -1] if numbers.learns_misfit else np.zeros(0), p)
+        add_to_block(model, sample, means.scatter[-1, -1] if numbers.misfit_s > 0.0 else np.zeros(0), p)
         queue_block(model, numbers)
     else:
         model.filled[0] = model.waiting[0] = 0

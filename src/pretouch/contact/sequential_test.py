@@ -9,12 +9,14 @@ from pretouch.contact.announced_load import doubted
 from pretouch.contact.detector import Body, Detection, Detector, Sample, no_torques, strongest
 from pretouch.contact.localisation import NO_CONTACT, LocalisationState, localise, most_significant_mean
 from pretouch.contact.residual_model import ResidualModel, SequentialState, sequential_init, sequential_numbers
+from pretouch.contact.scatter import LENGTHS
 from pretouch.contact.sequential import Moment
-from pretouch.contact.sequential_step import SampleTest, assess_sample, sample_test
+from pretouch.contact.sequential_step import SampleTest, assess_sample
 from pretouch.contact.touch_cue import Cues, no_cues, touch_cues, untouched
 from pretouch.contact.window import window_init
 from pretouch.errors import ParameterError
 from pretouch.params import LocalisationParams, SequentialParams, TouchSensorParams
+from pretouch.records import zeros
 from pretouch.types import NOT_TOUCHED, FloatArray, RobotState, Thresholds, no_obstacles
 from pretouch.values import value
 
@@ -81,7 +83,8 @@ class SequentialTest(SequentialParams, Detector, name="sequential"):
         self, state: SequentialState, body: Body, sample: Sample, cues: Cues
     ) -> tuple[SampleTest, SequentialState]:
         """Return what a sample says, and the state after it."""
-        robot, results, n = sample.robot, sample_test(body.model.n), body.model.n
+        robot, n = sample.robot, body.model.n
+        results = zeros(SampleTest, n=n, W=len(LENGTHS))
         # while a unit is touched free motion is not learnt, whatever the test says
         watched = sample.watched and not len(cues.link)
         model = ResidualModel._make(part.copy() for part in state.model)

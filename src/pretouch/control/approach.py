@@ -182,11 +182,6 @@ class ApproachRestriction(RestrictionParams, Restriction, name="paper"):
     """Restricting the body's approach to obstacles, as in the paper (eqs. 5-7); compiled in `line`."""
 
 
-def of_table_i(part: Restriction | None) -> ApproachRestriction:
-    """Return a profile's restriction if it is of eqs. 5-7, else one with the values of Table I."""
-    return part if isinstance(part, ApproachRestriction) else ApproachRestriction()
-
-
 def notice_m(part: Restriction | None) -> float:
     """Return from which body distance on a restriction allows everything [m]: its own, or Table I's."""
     return float(getattr(part, "d_notice_m", ApproachRestriction.d_notice_m))

@@ -7,7 +7,7 @@ import numpy as np
 
 from pretouch.composition import changed
 from pretouch.contact.detector import Body, Detection, Detector, Sample
-from pretouch.contact.moving_thresholds import thresholds_of
+from pretouch.contact.moving_thresholds import MovingThresholds
 from pretouch.contact.reaction import DecayingVelocity
 from pretouch.contact.window import Window, add_force, window_init
 from pretouch.errors import RecordingError
@@ -84,7 +84,7 @@ def _by_force(r: ForceRecording, p: Profile) -> tuple[DetectorResult, Decisions]
             f" {p.window.samples * period:g} s to fill: give a longer recording."
         )
     free = free_cycles(d.judged & ~d.reacting, d)
-    summary = _summary(d, free, thresholds_of(p.detect).f_base_n)
+    summary = _summary(d, free, MovingThresholds.of_kind(p.detect).f_base_n)
     moving = None if r.moving is None else r.moving[newest]
     notes = (*_slower(r.rate, p), *_without(r.time, d, p))
     return result_of(p, d, free, moving, float(summary.width_n.max()), summary, None, notes), d
@@ -111,7 +111,7 @@ def cycles(time: FloatArray, period: float, gap_s: float, hold: bool) -> tuple[F
 def _decided(ticks: FloatArray, force: FloatArray, profile: Profile) -> Decisions:
     """Detect without obstacles; as in the controller, nothing is a contact while a reaction would be under way."""
     p, decisions, nowhere, nothing = profile, list[Decision](), np.zeros(3), no_obstacles()
-    answer, thresholds = DecayingVelocity.of(p.react, p.task.control_period_s), thresholds_of(p.detect)
+    answer, thresholds = DecayingVelocity.of(p.react, p.task.control_period_s), MovingThresholds.of_kind(p.detect)
     window, mode, react = window_init(p.window.samples), mode_init(), answer.init()
     for time, sample in zip(ticks.tolist(), force, strict=True):
         force_now = None if np.isnan(sample[0]) else sample

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from viser import ArrowsHandle, SceneNodeHandle, ViserServer
 
-from pretouch.contact.moving_thresholds import thresholds_of
+from pretouch.contact.moving_thresholds import MovingThresholds
 from pretouch.explanation import binding
 from pretouch.page import palette
 from pretouch.page.arm import SHADELESS, Arm, expectation, in_levels, quaternions
@@ -123,7 +123,7 @@ class Scene:
         """Draw one instant, and return what a commander asked in it."""
         step, world = frame.step, self._world
         kin = world.model.kinematics(step.q)
-        expected = expectation(step.obstacles, len(world.skin), thresholds_of(world.profile.detect))
+        expected = expectation(step.obstacles, len(world.skin), MovingThresholds.of_kind(world.profile.detect))
         self._arm.place(kin)
         self._arm.paint(in_levels(expected), now)
         silent = frame.late(world.profile.sight.silent_after_s)

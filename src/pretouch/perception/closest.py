@@ -110,12 +110,9 @@ def beside(
     """
     stamps = readings.stamp[(readings.stamp <= now) & (readings.stamp >= now - persistence)]
     a, b = moving.at(float(stamps.max(initial=-np.inf)) if len(stamps) else moving.stamp)
-    return Capsules(
-        np.concatenate([still.link, np.zeros(len(a), np.int64)]),
-        np.concatenate([still.a, a]),
-        np.concatenate([still.b, b]),
-        np.concatenate([still.radius, moving.radius]),
-    )
+    link = np.concatenate([still.link, np.zeros(len(a), np.int64)])
+    radius = np.concatenate([still.radius, moving.radius])
+    return Capsules(link, np.vstack([still.a, a]), np.vstack([still.b, b]), radius)
 
 
 def near_moving(moving: MovingFixtures, model: RobotModel, kin: Kinematics, now: float, first: int) -> Obstacles:

@@ -112,15 +112,6 @@ def bounds(capsules: Capsules) -> FloatArray:
 
 
 @kernel
-def to_spheres(point: FloatArray, k: int, spheres: FloatArray, gap2: FloatArray) -> None:
-    """Write the squared distance (C,) of point[k] from the middle of each sphere [m^2]."""
-    x, y, z = point[k, 0], point[k, 1], point[k, 2]
-    for c in range(len(gap2)):
-        u, v, w = spheres[0, c] - x, spheres[1, c] - y, spheres[2, c] - z
-        gap2[c] = u * u + v * v + w * w
-
-
-@kernel
 def leave_out(
     shows: BoolArray, fresh: BoolArray, distance: FloatArray, ends: FloatArray, aside: float, sensors: Sensors,
     capsules: Capsules, cones: Cones,
@@ -156,8 +147,10 @@ def capsule_return(
     position, rotation, link, own = sensors.position, sensors.rotation, capsules.link, sensors.link[k]
     edge, rays = cones.edge[cones.kind[k]], cones.rays[cones.kind[k]]
     cos, sin = edge[0], edge[1]
-    far2 = np.empty(len(link))
-    to_spheres(position, k, spheres, far2)
+    far2, x, y, z = np.empty(len(link)), position[k, 0], position[k, 1], position[k, 2]
+    for c in range(len(link)):  # apart from the loop below: the processor does four turns at once
+        u, v, w = spheres[0, c] - x, spheres[1, c] - y, spheres[2, c] - z
+        far2[c] = u * u + v * v + w * w
     bx, by, bz = rotation[k, 0, 2], rotation[k, 1, 2], rotation[k, 2, 2]
     start = position[k, 0] * bx + position[k, 1] * by + position[k, 2] * bz
     least = np.inf

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.control.approach import notice_m, of_table_i
+from pretouch.control.approach import ApproachRestriction, notice_m
 from pretouch.recording.run_record import MODES
 from pretouch.reporting.html import Html, element, facts, joined, number, percent, table
 from pretouch.reporting.record import RunCourse, least, spread
@@ -40,7 +40,7 @@ def nearest_to_body(course: RunCourse) -> LeastDistance | None:
 
 def d_crit(course: RunCourse) -> FloatArray:
     """Distance from the body (S,) below which nothing may come nearer [m]."""
-    return course.of_runs(lambda run: of_table_i(run.profile.approach).d_crit_m)
+    return course.of_runs(lambda run: ApproachRestriction.of_kind(run.profile.approach).d_crit_m)
 
 
 def d_notice(course: RunCourse) -> FloatArray:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pretouch.contact.moving_thresholds import thresholds_of
+from pretouch.contact.moving_thresholds import MovingThresholds
 from pretouch.controller import Controller
 from pretouch.errors import RobotError
 from pretouch.ports import Arm, Clock, Robot, Skin
@@ -207,7 +207,7 @@ def _rest(controller: Controller, seen: Standstill) -> Iterator[Finding]:
 
 
 def _force(controller: Controller, seen: Standstill) -> Iterator[Finding]:
-    threshold = thresholds_of(controller.profile.detect)
+    threshold = MovingThresholds.of_kind(controller.profile.detect)
     if seen.missing_share > MISSING_SHARE:
         yield _fault(
             "no force",

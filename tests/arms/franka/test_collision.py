@@ -8,9 +8,10 @@ from pretouch.arms.franka.limits import BIAS_N, collision_behavior, largest_thre
 from pretouch.contact.detector import Body
 from pretouch.contact.residual_model import sequential_init, sequential_numbers
 from pretouch.contact.sequential import Moment
-from pretouch.contact.sequential_step import assess_sample, sample_test
+from pretouch.contact.sequential_step import SampleTest, assess_sample
 from pretouch.errors import ParameterError
 from pretouch.profiles import PROFILES, profile
+from pretouch.records import zeros
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import no_obstacles
@@ -64,7 +65,8 @@ def evidence(model: RobotModel, force: np.ndarray) -> float:
     q, speed, p = model.description.q_ready, np.full(7, 0.3), PROFILES["pretouch"].detect
     kin, state = model.kinematics(q), sequential_init(model.n, p)
     state = state._replace(model=state.model._replace(speed=speed))
-    torque, gain, results = model.ee_jacobian(kin)[:3].T @ force, np.ones(len(model.links)), sample_test(model.n)
+    torque, gain = model.ee_jacobian(kin)[:3].T @ force, np.ones(len(model.links))
+    results = zeros(SampleTest, n=model.n, W=6)
     now = Moment(kin, speed, speed, torque, no_obstacles(), gain, False, False)
     assess_sample(state, now, sequential_numbers(model.n, 0.01, p), model.mechanism, results)
     return float(results.log_likelihood_ratio[0])

@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 
 from pretouch.contact.detector import Detection
-from pretouch.contact.moving_thresholds import thresholds_of
+from pretouch.contact.moving_thresholds import MovingThresholds
 from pretouch.profiles import Profile, profile
 from pretouch.types import FloatArray
 from pretouch_lab.benchmarks.ablations import ablations
@@ -32,7 +32,7 @@ class Baseline:
     @property
     def default(self) -> float:
         """Return the value of the sweep that the profile itself has."""
-        return thresholds_of(self.profile.detect).f_base_n if self.sweep == "f_base_n" else 1.0
+        return MovingThresholds.of_kind(self.profile.detect).f_base_n if self.sweep == "f_base_n" else 1.0
 
     def statistic(self, found: Detection, filtered: FloatArray, wrench: FloatArray | None) -> float:
         """Return the largest value of the sweep at which a step would still be an alarm; -inf where none would.
@@ -48,7 +48,7 @@ class Baseline:
         if wrench is None:
             return -np.inf
         limits = found.thresholds
-        params = thresholds_of(self.profile.detect)
+        params = MovingThresholds.of_kind(self.profile.detect)
         force = filtered if params.compare == "filtered" else wrench[:3]
         return float(np.max(np.maximum(force - limits.upper, limits.lower - force))) + params.f_base_n
 
