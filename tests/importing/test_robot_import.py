@@ -1,6 +1,5 @@
 """A robot's file becomes a folder that everything else takes, and nothing is lost on the way."""
 
-from unittest.mock import Mock
 from xml.etree import ElementTree as ET
 
 import mujoco
@@ -117,13 +116,6 @@ def test_a_folder_that_is_there_is_refused(imported, tmp_path):
     out.rmdir()
     write_folder(imported, out)
     assert sorted(p.name for p in out.iterdir()) == ["arm.xml", "robot.toml"]
-
-
-def test_an_import_that_is_cut_short_leaves_nothing(imported, tmp_path, monkeypatch):
-    monkeypatch.setattr("pretouch.importing.robot_import.description_text", Mock(side_effect=KeyboardInterrupt))
-    with pytest.raises(KeyboardInterrupt):
-        write_folder(imported, tmp_path / "arm")
-    assert list(tmp_path.iterdir()) == []
 
 
 def assert_pointing_down(model, ready):

@@ -137,11 +137,6 @@ class Problem:
         differences = self.base.moved(x).differences(self.motion, self.measured) / self.noise
         return np.concatenate([differences.reshape(-1), (x - self.expected) / _PRIOR])
 
-    @property
-    def equal(self) -> FloatArray:
-        """Weights of residuals that count alike."""
-        return np.ones(6 * len(self.motion.w) + UNKNOWNS)
-
     def weights(self, x: FloatArray) -> FloatArray:
         """Roots of the weights by which a large residual counts in proportion to its size only (soft L1)."""
         weights = (1.0 + self.residuals(x) ** 2) ** -0.25
@@ -206,7 +201,7 @@ def fit(
     problem = Problem(motion, measured, begin, noise)
     x = np.concatenate([np.zeros(6), begin.rest])
     for _ in range(_REWEIGHTINGS if robust else 1):
-        weights = problem.weights(x) if robust else problem.equal
+        weights = problem.weights(x) if robust else np.ones(6 * len(motion.w) + UNKNOWNS)
         # MINPACK: beside other programs the threads of LAPACK, which other methods call, cost ten times as much
         x = least_squares(
             lambda x, w=weights: w * problem.residuals(x), x, lambda x, w=weights: w[:, None] * problem.jacobian(x),

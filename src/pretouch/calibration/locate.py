@@ -27,17 +27,12 @@ class Located:
     """(6, 6) of rotation vector in the sensor frame [rad] and position in the link frame [m]."""
     noise: FloatArray
     """(6,) root mean square of what is not explained, each sensor's the same for its axes [rad/s, m/s^2]."""
-    assumed_late: float
-    """By how much its clock was taken as late; what is left is in the estimate [s]."""
+    late: float
+    """By how much the unit's clock is late [s]."""
     known: BoolArray
     """(N,) at which of the arm's instants both sides were measured."""
     used: BoolArray
     """(N,) at which of them the model explains what was measured."""
-
-    @property
-    def late(self) -> float:
-        """By how much the unit's clock is late [s]."""
-        return self.assumed_late + self.estimate.late
 
     @property
     def pose(self) -> FloatArray:
@@ -80,7 +75,7 @@ def locate(arm: ArmMotion, signal: ImuSignal, link: int, late: float) -> Located
     here, measured = here.at(inliers), Measured(measured.values[inliers], measured.rates[inliers])
     found, noise = _final(found, here, measured, noise)
     C = 0.5 * (found.covariance + found.covariance.T)
-    return Located(link, found.estimate, C[:6, :6], noise, assumed, known, used)
+    return Located(link, found.estimate, C[:6, :6], noise, assumed + found.estimate.late, known, used)
 
 
 def explained(estimate: Estimate, motion: LinkMotion, measured: Measured) -> BoolArray:

@@ -60,8 +60,6 @@ class LinkBody:
     """Of the link."""
     rods: FloatArray
     """(K, 7), see `distances`."""
-    fitted: bool
-    """Whether they stand for other shapes; otherwise the file has them so."""
     sticks_out: float
     """How far the surface sticks out of the capsules at most [m], at its vertices and `_SAMPLES` points between."""
     stands_over: float
@@ -125,7 +123,7 @@ def link_body(name: str, outside: Outside, own: FloatArray | None, most: int = M
     if cover and own is None:
         rods = covering(rods, outside.on)
     over = (outside.height - _distance(rods, outside.around)).max(initial=0.0)
-    return LinkBody(name, rods, own is None, max(0.0, float(_distance(rods, outside.on).max())), float(over))
+    return LinkBody(name, rods, max(0.0, float(_distance(rods, outside.on).max())), float(over))
 
 
 def own_capsules(shapes: tuple[Shape, ...]) -> FloatArray | None:

@@ -69,26 +69,21 @@ def _hinges(link: Link) -> int:
 
 
 def _last_moved(robot: Robot) -> int:
-    """Return the last link that an arm's hinge moves; several arms are a RobotModelError that names their ends."""
+    """Return the link that most of an arm's hinges move, or the last one before a whole arm ends in equal branches.
+
+    Several arms are a RobotModelError that names their ends.
+    """
     hinges = [_hinges(link) for link in robot.links]
-    longest, end = hinges.copy(), list(range(len(hinges)))  # of each link's branches: their hinges, and the last link
-    for i in reversed(range(1, len(hinges))):
-        parent = robot.links[i].parent
-        if longest[i] and hinges[parent] + longest[i] > longest[parent]:
-            longest[parent], end[parent] = hinges[parent] + longest[i], end[i]
-    at, before = 0, hinges[0]
-    while branches := [i for i, link in enumerate(robot.links) if link.parent == at and longest[i]]:
-        best = max(branches, key=lambda i: longest[i])
-        rivals = [i for i in branches if longest[i] == longest[best]]
-        if len(branches) > 1 and before >= _ARM_JOINTS:
-            return at
-        if len(rivals) > 1:
-            names = ", ".join(robot.links[end[i]].name for i in rivals)
-            raise RobotModelError(
-                f"{robot.name} has {len(rivals)} arms, or one that branches: choose one by --ee, such as {names}."
-            )
-        at, before = best, before + hinges[best]
-    return at
+    ways = [robot.ancestors(i) for i in range(len(hinges))]
+    moving = [sum(hinges[i] for i in way) for way in ways]
+    ends = [i for i, own in enumerate(hinges) if own and moving[i] == max(moving)]
+    last = [0, *(i for i in range(len(hinges)) if hinges[i] and all(i in ways[end] for end in ends))][-1]
+    if len(ends) > 1 and moving[last] < _ARM_JOINTS:
+        names = ", ".join(robot.links[i].name for i in ends)
+        raise RobotModelError(
+            f"{robot.name} has {len(ends)} arms, or one that branches: choose one by --ee, such as {names}."
+        )
+    return last
 
 
 def _likely_ends(robot: Robot, last: int) -> list[int]:

@@ -1,6 +1,5 @@
 """From a robot's file to everything that the rest of the package takes: the folder of an arm."""
 
-import shutil
 import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -96,16 +95,12 @@ def check_free(folder: Path) -> None:
 
 
 def write_folder(imported: Imported, folder: Path) -> None:
-    """Write an arm's folder, whole or not at all; one that is there is a RobotModelError."""
+    """Write an arm's folder; one that is there is a RobotModelError."""
     check_free(folder)
     try:
         folder.mkdir(parents=True)
-        try:
-            (folder / MJCF).write_text(imported.mjcf_text, encoding="utf-8")
-            (folder / FILE).write_text(description_text(imported.model.description), encoding="utf-8")
-        except BaseException:
-            shutil.rmtree(folder, ignore_errors=True)
-            raise
+        (folder / MJCF).write_text(imported.mjcf_text, encoding="utf-8")
+        (folder / FILE).write_text(description_text(imported.model.description), encoding="utf-8")
     except OSError as error:
         raise RobotModelError(
             f"The folder {folder} cannot be written: {error.strerror}: give another --out."
