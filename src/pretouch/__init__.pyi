@@ -52,7 +52,7 @@ from pretouch.recording.last_seconds import LastSeconds as LastSeconds
 from pretouch.recording.reader import open_recording as open_recording
 from pretouch.recording.verify import verify as verify
 from pretouch.recording.writer import Recording as Recording
-from pretouch.reporting.page import measure as measure
+from pretouch.reporting.measures import measure as measure
 from pretouch.robot.description import RobotDescription as RobotDescription
 from pretouch.robot.description import fr3 as fr3
 from pretouch.robot.description import panda as panda

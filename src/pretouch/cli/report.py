@@ -11,6 +11,7 @@ from pretouch.cli.writing import check_outputs, unwritable_said
 from pretouch.errors import RecordingError
 from pretouch.extras import FIGURES
 from pretouch.recording.reader import open_recording
+from pretouch.reporting.measures import measure
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,7 @@ class WriteReport:
             raise RecordingError("No recording is given: give at least one file.")
         FIGURES.need("A report")
         check_outputs([("report", self.out)], self.files, self.replace)
-        from pretouch.reporting.page import measure, page  # needs the extra
+        from pretouch.reporting.page import page  # needs the extra
 
         titled = zip(self.files, titles(self.files), strict=True)
         text = page(measure(open_recording(place), title) for place, title in titled)

@@ -16,7 +16,8 @@ from pretouch.page.frame import DrivenMotion, Frame, World
 from pretouch.page.panel import PERIOD_S, ActionQueue, Status, add_button, add_view_boxes, put, style_page, when_changed
 from pretouch.page.plots import SPAN_S, History, Plots
 from pretouch.page.scene import Scene
-from pretouch.recording.reader import Kept, Recorded, Run
+from pretouch.recording.reader import Kept, Recorded
+from pretouch.recording.run import Run
 from pretouch.recording.simulation import surroundings
 from pretouch.types import ControlStep, FloatArray, Mode
 

@@ -21,8 +21,6 @@ from pretouch.recording.simulation import Truth
 from pretouch.types import ControlStep, FloatArray, Inputs, IntArray, RobotState
 from pretouch.values import value
 
-__all__ = ["Kept", "Recorded", "Run", "open_recording"]
-
 _NUMBER = struct.Struct("<Q")
 """Number of the step, first in each of our messages, behind the encapsulation header."""
 _STAMP = struct.Struct("<d")

@@ -166,13 +166,10 @@ def touches_of(truth: TrueForces | None) -> list[TrueTouch]:
 
 def _merged(flags: list[tuple[int, int]], time: FloatArray) -> list[tuple[int, int]]:
     """Join spans with less than `BOUNCE_S` between them."""
-    merged: list[tuple[int, int]] = []
-    for first, past in flags:
-        if merged and time[first] - time[merged[-1][1] - 1] < BOUNCE_S:
-            merged[-1] = (merged[-1][0], past)
-        else:
-            merged.append((first, past))
-    return merged
+    first, past = np.array(flags, dtype=np.int64).reshape(-1, 2).T
+    apart = time[first[1:]] - time[past[:-1] - 1] >= BOUNCE_S
+    begins, ends = np.append(True, apart)[: len(first)], np.append(apart, True)[: len(past)]
+    return list(zip(first[begins].tolist(), past[ends].tolist(), strict=True))
 
 
 def _detections(course: RunCourse, touches: Sequence[TrueTouch]) -> list[FeltContact]:

@@ -1,22 +1,21 @@
 """The pages, one HTML file each with all in it: a report of recordings, and what `pretouch detect` found in one."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from pretouch.contact.scatter import HELD_S
 from pretouch.explanation import LOUD_N
-from pretouch.recording.reader import Recorded
-from pretouch.reporting.contacts import ContactMeasures, contact_section, contacts_in
+from pretouch.reporting.contacts import ContactMeasures, contact_section
 from pretouch.reporting.figures import close_up_figure, force_figure, motion_figure, path_figure, picture, style
 from pretouch.reporting.health import health_section
 from pretouch.reporting.html import Html, Row, Text, bad, document, element, joined, number, percent, table, table_html
-from pretouch.reporting.limits import limit_rows, limit_section, mode_section, time_in_modes
+from pretouch.reporting.limits import limit_section, mode_section, time_in_modes
+from pretouch.reporting.measures import Measures
 from pretouch.reporting.motion import distance_section, nearest_to_body, speed_section
 from pretouch.reporting.orientation import orientation_section
-from pretouch.reporting.record import RunCourse, gather, spread
+from pretouch.reporting.record import RunCourse, spread
 from pretouch.reporting.setting import parameter_section, setting_section, started
 from pretouch.text_table import TextTable
 from pretouch.types import FloatArray, Mode
@@ -24,26 +23,7 @@ from pretouch.types import FloatArray, Mode
 _SHADED = "Red: REACT, grey: HOLD."
 
 
-@dataclass(frozen=True)
-class Measured:
-    """One recording, measured."""
-
-    title: str
-    """Name of the file, with as much of its folder as tells it from the others."""
-    lacking: str
-    """What is missing of a file that is not complete, as a sentence, or ''."""
-    course: RunCourse
-    contacts: ContactMeasures
-
-
-def measure(recorded: Recorded, title: str) -> Measured:
-    """Measure a recording."""
-    course = gather(recorded)
-    lacking = "" if recorded.complete else recorded.sentence or "The file is not complete."
-    return Measured(title, lacking, course, contacts_in(course))
-
-
-def page(recordings: Iterable[Measured]) -> str:
+def page(recordings: Iterable[Measures]) -> str:
     """Make the page of one recording or several; of each no more than its text is kept."""
     title, rows, sections = "", list[Row](), list[Html]()
     for order, m in enumerate(recordings, 1):
@@ -62,7 +42,7 @@ def page(recordings: Iterable[Measured]) -> str:
     return document(f"Pretouch report: {title}", joined([*head, *sections]))
 
 
-def _recording(m: Measured) -> list[Text]:
+def _recording(m: Measures) -> list[Text]:
     """All about one recording."""
     course = m.course
     forces = (
@@ -100,7 +80,7 @@ def _recording(m: Measured) -> list[Text]:
     ]
 
 
-def _strongest(m: Measured) -> list[Html]:
+def _strongest(m: Measures) -> list[Html]:
     """Show the contact with the largest estimate close up."""
     sizes = np.array([d.peak_norm for d in m.contacts.detections])
     if not np.isfinite(sizes).any():
@@ -111,9 +91,8 @@ def _strongest(m: Measured) -> list[Html]:
     return [picture(figure, f"Contact {order + 1}, the one with the largest force estimate, close up.")]
 
 
-def summary(m: Measured) -> Html:
+def summary(m: Measures) -> Html:
     """Say the most important of a recording."""
-    _, exceeded = limit_rows(m.course)
     shares = {mode: percent(share) for mode, (_, share) in time_in_modes(m.course).items()}
     sentences: list[Text] = [
         _what(m.course),
@@ -123,7 +102,9 @@ def summary(m: Measured) -> Html:
         _nearest(m.course),
         f"The arm followed its path for {shares[Mode.TRACK]} of the time, yielded for {shares[Mode.REACT]} and held for"
         f" {shares[Mode.HOLD]}.",
-        bad(f"Limits of the arm were exceeded: {', '.join(exceeded)}.") if exceeded else "No joint limit was exceeded.",
+        bad(f"Limits of the arm were exceeded: {', '.join(m.exceeded)}.")
+        if m.exceeded
+        else "No joint limit was exceeded.",
         bad(m.lacking) if m.lacking else "",
     ]
     return element("p", joined((sentence for sentence in sentences if sentence), " "), "summary")
@@ -181,7 +162,7 @@ def _nearest(course: RunCourse) -> str:
     return f"The nearest obstacle sensed was {nearest.distance:.3f} m from the body ({where})."
 
 
-def _compared(order: int, m: Measured) -> Row:
+def _compared(order: int, m: Measures) -> Row:
     """Return the row of a recording in the comparison; `order` counts the recordings of the page from 1."""
     link = Html(f'<a href="#recording-{order}">{element("span", m.title)}</a>')
     c, body, fastest, modes = m.contacts, nearest_to_body(m.course), spread(m.course.speed), time_in_modes(m.course)

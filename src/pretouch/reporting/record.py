@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from pretouch.contact.moving_thresholds import MovingThresholds
 from pretouch.explanation import answers
-from pretouch.recording.reader import Kept, Recorded, Run
+from pretouch.recording.reader import Kept, Recorded
+from pretouch.recording.run import Run
 from pretouch.recording.run_record import Columns, RunRecord, TrueForces, columns_of, contacts_of
 from pretouch.robot.model import RobotModel
 from pretouch.types import BoolArray, FloatArray, IntArray, QpOutcome, RangeReadings
