@@ -92,7 +92,6 @@ def test_a_rate_is_that_of_the_detector(capsys, tmp_path):
         ({"rate": 10.0}, ParameterError, "The rate is 10 Hz"),
         ({"out": Path("a.gif")}, RecordingError, "a.gif has an unknown format"),
         ({"out": Path("/dev/null/a.png")}, PretouchError, "/dev/null/a.png cannot be written"),
-        ({"file": Path("gone.csv")}, RecordingError, "The recording gone.csv does not exist"),
     ],
 )
 def test_bad_input_is_one_sentence_and_nothing_is_printed(capsys, file, given, error, words):

@@ -134,16 +134,6 @@ def test_the_address_is_said_before_the_recording_is_read(whole, page, begun, mo
         Replay(whole).run()
 
 
-@pytest.mark.parametrize("name", ["gone.mcap", "text.mcap", "empty.mcap"])
-def test_what_is_no_recording_is_one_sentence(capsys, tmp_path, name):
-    if not name.startswith("gone"):
-        (tmp_path / name).write_text("time_s\n" if name.startswith("text") else "")
-    with pytest.raises(RecordingError, match=name) as error:
-        Replay(tmp_path / name, page=False).run()
-    assert "\n" not in str(error.value)
-    assert capsys.readouterr().out == ""
-
-
 def test_an_unknown_profile_is_said_before_the_file_is_read(tmp_path):
     with pytest.raises(ParameterError, match="'brave' is unknown"):
         Replay(tmp_path / "gone.mcap", profile="brave", page=False).run()

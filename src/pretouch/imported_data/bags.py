@@ -13,17 +13,16 @@ from rosbags.typesys import Stores, get_typestore
 
 from pretouch.errors import RecordingError
 from pretouch.imported_data.log import Choice, Log, Note, arm_of, check_steps_back, interpolated, joint_places, listed
-from pretouch.recording.ros import READ_WITH, UNIT_SAMPLE
+from pretouch.recording.ros import JOINT_STATE, READ_WITH, UNIT_SAMPLE, WRENCH
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray, IntArray
 from pretouch.values import value
 
-_WRENCH, _JOINTS = "geometry_msgs/msg/WrenchStamped", "sensor_msgs/msg/JointState"
 _STATES = ("franka_msgs/msg/FrankaState", "franka_msgs/msg/FrankaRobotState")
 """Of franka_ros and of franka_ros2."""
 _EXTERNAL = "external_joint_torques"
 """Last part of the topic on which franka_ros2 publishes external torques, as efforts."""
-_FIELDS = {_WRENCH: ("force", "torque"), _JOINTS: ("q", "dq", "effort")}
+_FIELDS = {WRENCH: ("force", "torque"), JOINT_STATE: ("q", "dq", "effort")}
 _STATE_FIELDS = ("q", "dq", "dq_d", "tau_ext")
 _LATE_NS = 500_000_000
 """How far a stamp may lie before an earlier one [ns]: messages overtake each other by less."""
@@ -42,9 +41,9 @@ class Bag:
         with self._opened() as reader:
             self._types = {c.topic: c.msgtype for c in reader.connections if c.msgcount}
             types = set(self._types.values())
-            kinds = {"force"} if _WRENCH in types else set()
-            kinds |= {"q"} if types & {_JOINTS, *_STATES} else set()
-            if self._of(*_STATES) or any(name.endswith(_EXTERNAL) for name in self._of(_JOINTS)):
+            kinds = {"force"} if WRENCH in types else set()
+            kinds |= {"q"} if types & {JOINT_STATE, *_STATES} else set()
+            if self._of(*_STATES) or any(name.endswith(_EXTERNAL) for name in self._of(JOINT_STATE)):
                 kinds.add("tau_ext")
             elif "force" not in kinds and self._has_efforts(reader):  # beside a force, efforts may be anything
                 kinds.add("tau")
@@ -52,7 +51,7 @@ class Bag:
 
     def force(self, posture: bool) -> Log:
         """Read the force, and perhaps positions; see `LogFile`."""
-        wrenches = self._of(_WRENCH)
+        wrenches = self._of(WRENCH)
         name = self._one(wrenches, wrenches, "geometry_msgs/WrenchStamped", self._choice.wrench, "--wrench")
         if not posture:
             return self._read(name)[0]
@@ -60,7 +59,7 @@ class Bag:
 
     def torques(self) -> Log:
         """Read joint torques and positions; see `LogFile`."""
-        able = self._of(_JOINTS, *_STATES)
+        able = self._of(JOINT_STATE, *_STATES)
         external = [name for name in able if name.endswith(_EXTERNAL)]
         what = "sensor_msgs/JointState, FrankaState or FrankaRobotState"
         best = external or self._of(*_STATES) or able
@@ -97,7 +96,7 @@ class Bag:
 
     def _has_efforts(self, reader: AnyReader) -> bool:
         """Whether one of the first messages of joint states has positions and efforts of as many joints."""
-        joints = [c for c in reader.connections if c.msgcount and c.msgtype == _JOINTS]
+        joints = [c for c in reader.connections if c.msgcount and c.msgtype == JOINT_STATE]
         for count, (connection, _, raw) in enumerate(reader.messages(joints) if joints else ()):
             message: Any = reader.deserialize(raw, connection.msgtype)
             if len(message.position) and len(message.effort) == len(message.position):
@@ -108,7 +107,7 @@ class Bag:
 
     def _position_topic(self, torques: str) -> str:
         """Topic of joint positions, other than that of torques which has none."""
-        able = [name for name in self._of(_JOINTS) if name != torques] or self._of(*_STATES)
+        able = [name for name in self._of(JOINT_STATE) if name != torques] or self._of(*_STATES)
         best = [name for name in able if "desired" not in name and not name.endswith(_EXTERNAL)] or able
         option = "--joints (--topic of `pretouch skin calibrate`)"
         return self._one(best, able, "sensor_msgs/JointState", self._choice.joints, option)
@@ -175,7 +174,7 @@ class _Topic:
     def __init__(self, name: str, kind: str) -> None:
         self.name, self.frame = name, ""
         self.fields = _FIELDS.get(kind, _STATE_FIELDS)
-        self._parts = {_WRENCH: _wrench, _JOINTS: _joint_state}.get(kind, _franka_state)
+        self._parts = {WRENCH: _wrench, JOINT_STATE: _joint_state}.get(kind, _franka_state)
         self._groups: dict[tuple[str, ...], tuple[array[int], array[int], array[float]]] = {}
 
     @property

@@ -79,12 +79,11 @@ class ViewerTopics:
             if wrench is not None and wrench.shape == (6,):
                 torque = wrench[3:]
             yield from self._ranges(inputs.readings, sequence, time)
-        joints = messages().make(JOINT_STATE, at, self._joints, step.q, qd, effort)
-        yield _item("/joint_states", JOINT_STATE, sequence, time, joints)
+        yield item("/joint_states", JOINT_STATE, sequence, time, at, self._joints, step.q, qd, effort)
         if step.force[0] == step.force[0]:
-            pair = messages().xyz("Vector3", step.force), messages().xyz("Vector3", torque)
-            wrench = messages().make(WRENCH, at, messages().make("geometry_msgs/msg/Wrench", *pair))
-            yield _item("/wrench", WRENCH, sequence, time, wrench)
+            vectors = messages().xyz("Vector3", step.force), messages().xyz("Vector3", torque)
+            both = messages().make("geometry_msgs/msg/Wrench", *vectors)
+            yield item("/wrench", WRENCH, sequence, time, at, both)
         yield from self._drawings(step, sequence, time)
 
     def _ranges(self, readings: RangeReadings, sequence: int, time: int) -> Iterator[Item]:
@@ -102,37 +101,35 @@ class ViewerTopics:
     def _drawings(self, step: ControlStep, sequence: int, time: int) -> Iterator[Item]:
         """Yield what is to be drawn of a step; nothing so soon after another."""
         if self._drawn is None:
-            yield _item("/tf_static", TRANSFORMS, sequence, time, self._sensors(time))
-            yield _item("/markers/scene", MARKERS, sequence, time, self._standing(time))
+            yield item("/tf_static", TRANSFORMS, sequence, time, self._sensors(time))
+            yield item("/markers/scene", MARKERS, sequence, time, self._standing(time))
         elif 0 <= time - self._drawn < _PERIOD_NS:
             return
         self._drawn = time
         if np.isfinite(step.q).all():
-            yield _item("/tf", TRANSFORMS, sequence, time, self._frames(step.q, time))
-        yield _item("/markers", MARKERS, sequence, time, self._sensed(step, time))
+            yield item("/tf", TRANSFORMS, sequence, time, self._frames(step.q, time))
+        yield item("/markers", MARKERS, sequence, time, self._sensed(step, time))
 
-    def _frames(self, q: FloatArray, time: int) -> Any:
+    def _frames(self, q: FloatArray, time: int) -> list[Any]:
         kin, links, at = self._model.kinematics(q), self._model.links, divmod(time, 10**9)
         poses = zip(links[1:], kin.position[1:], kin.rotation[1:], strict=True)
-        frames = [messages().transform(at, links[0], link, p, R) for link, p, R in poses]
-        return messages().make(TRANSFORMS, frames)
+        return [messages().transform(at, links[0], link, p, R) for link, p, R in poses]
 
-    def _sensors(self, time: int) -> Any:
+    def _sensors(self, time: int) -> list[Any]:
         at, units = divmod(time, 10**9), self._skin.units
         poses = [(unit.link, unit.id, unit.T_link_sensor) for unit in units]
-        frames = [messages().transform(at, link, name, T[:3, 3], T[:3, :3]) for link, name, T in poses]
-        return messages().make(TRANSFORMS, frames)
+        return [messages().transform(at, link, name, T[:3, 3], T[:3, :3]) for link, name, T in poses]
 
-    def _sensed(self, step: ControlStep, time: int) -> Any:
+    def _sensed(self, step: ControlStep, time: int) -> list[Any]:
         """Sensed points as spheres, and the closest pairs as lines."""
         seen, at = step.obstacles, header(time, self._base)
         pairs = np.stack([seen.body_point, seen.point], axis=1).reshape(-1, 3)
-        return messages().make(MARKERS, [
+        return [
             messages().marker(at, _SENSED, points=seen.point, ns="sensed", frame_locked=True),
             messages().marker(at, _CLOSEST, points=pairs, ns="closest", frame_locked=True),
-        ])  # fmt: skip
+        ]
 
-    def _standing(self, time: int) -> Any:
+    def _standing(self, time: int) -> list[Any]:
         """The path, the arm's capsules in the frames of their links, and boxes around it."""
         base = header(time, self._base)
         markers = [messages().marker(base, _PATH, points=self._path, ns="path", frame_locked=True)]
@@ -140,7 +137,7 @@ class ViewerTopics:
         for i, box in enumerate(self._boxes):
             look = _CUBE, tuple(2 * box.half_size), _BROWN
             markers.append(messages().marker(base, look, box.center, ns="box", id=i, frame_locked=True))
-        return messages().make(MARKERS, markers)
+        return markers
 
 
 def range_item(
@@ -150,12 +147,13 @@ def range_item(
     at = header(nanoseconds(stamp, time), unit_id)
     seen_m = _single(distance) if status in _MEASURED else math.inf
     sees = sensor.angle, sensor.nearest_m, sensor.farthest_m
-    message = messages().make(RANGE, at, _INFRARED, *sees, seen_m, _ACCURACY_M**2)
-    return _item(f"/skin/{topic_name(unit_id)}/range", RANGE, sequence, time, message)
+    topic = f"/skin/{topic_name(unit_id)}/range"
+    return item(topic, RANGE, sequence, time, at, _INFRARED, *sees, seen_m, _ACCURACY_M**2)
 
 
-def _item(topic: str, kind: str, sequence: int, time: int, message: Any) -> Item:
-    return Item(topic, kind, sequence, time, messages().encoded(kind, message))
+def item(topic: str, kind: str, sequence: int, time: int, *fields: Any) -> Item:
+    """Return a message of these fields, logged at an instant [ns]."""
+    return Item(topic, kind, sequence, time, messages().encoded(kind, messages().make(kind, *fields)))
 
 
 def _capsule_markers(capsules: Capsules, links: tuple[str, ...], time: int) -> list[Any]:

@@ -6,14 +6,14 @@ from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 
 from pretouch.errors import RecordingError
 from pretouch.recording.disk import Disk, Item
 from pretouch.recording.ros import DIAGNOSTICS, IMU, JOINT_STATE, RANGE, UNIT_SAMPLE, messages
-from pretouch.recording.viewer_topics import header, nanoseconds, range_item, topic_name
+from pretouch.recording.viewer_topics import header, item, nanoseconds, range_item, topic_name
 from pretouch.types import FloatArray
 from pretouch.units.unit import Received, imu_batch
 from pretouch.units.watch import WatchUpdate
@@ -105,7 +105,7 @@ def _sample_items(unit: str, time: int, heard: Received) -> Iterator[Item]:
     sample, topic = heard.sample, f"/skin/{topic_name(unit)}"
     times = heard.arrival, heard.stamp, heard.offset, heard.bound
     datagram = np.frombuffer(sample.body(), np.uint8)
-    yield _item(f"{topic}/sample", UNIT_SAMPLE, time, (sample.sequence, unit, *times, datagram), sample.sequence)
+    yield item(f"{topic}/sample", UNIT_SAMPLE, sample.sequence, time, sample.sequence, unit, *times, datagram)
     if sample.flags & Flag.RANGE_NEW and heard.stamp == heard.stamp:
         distance = sample.range_mm / 1000
         yield range_item(unit, sample.sequence, time, heard.stamp, distance, sample.range_status)
@@ -115,7 +115,7 @@ def _sample_items(unit: str, time: int, heard: Received) -> Iterator[Item]:
     for stamp, a, w in zip(batch.stamp.tolist(), batch.acceleration, batch.angular_velocity, strict=True):
         at = nanoseconds(stamp, time)
         vectors = messages().xyz("Vector3", w), nothing, messages().xyz("Vector3", a), nothing
-        yield _item(f"{topic}/imu", IMU, at, (header(at, unit), turn, _UNKNOWN, *vectors))
+        yield item(f"{topic}/imu", IMU, 0, at, header(at, unit), turn, _UNKNOWN, *vectors)
 
 
 def _joint_items(
@@ -127,7 +127,7 @@ def _joint_items(
         time = nanoseconds(t, instead)
         velocity = nothing if qd is None else np.array(qd[i], dtype=np.float64)
         row = np.array(q[i], dtype=np.float64)
-        yield _item("/joint_states", JOINT_STATE, time, (header(time, ""), texts, row, velocity, nothing))
+        yield item("/joint_states", JOINT_STATE, 0, time, header(time, ""), texts, row, velocity, nothing)
 
 
 def _health_items(time: int, update: WatchUpdate) -> Iterator[Item]:
@@ -139,8 +139,4 @@ def _health_items(time: int, update: WatchUpdate) -> Iterator[Item]:
         numbers = {name: str(value) for name, value in asdict(unit).items() if name not in ("unit", "traffic")}
         values = [make("diagnostic_msgs/msg/KeyValue", *pair) for pair in numbers.items()]
         statuses.append(make("diagnostic_msgs/msg/DiagnosticStatus", level, unit.unit, text, unit.unit, values))
-    yield _item("/diagnostics", DIAGNOSTICS, time, (header(time, ""), statuses))
-
-
-def _item(topic: str, kind: str, time: int, fields: tuple[Any, ...], sequence: int = 0) -> Item:
-    return Item(topic, kind, sequence, time, messages().encoded(kind, messages().make(kind, *fields)))
+    yield item("/diagnostics", DIAGNOSTICS, 0, time, header(time, ""), statuses)
