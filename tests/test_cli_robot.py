@@ -75,12 +75,11 @@ def test_misuse_is_one_sentence(tmp_path, capsys, more, sentence):
 @pytest.mark.parametrize(
     ("name", "old", "new", "sentence"),
     [
-        ("arm.xml", 'name="base_0" size="', 'name="base_0" size="0.7 0.1" friction="',
-         "overlap by"),
+        ("arm.xml", 'name="base_0" size="', 'name="base_0" size="0.7 0.1" friction="', "overlap by"),
         ("robot.toml", '"tool0"', '"hand"', "ee_body: The link 'hand' is unknown: choose from base"),
         ("robot.toml", "1.2", "9.2", "q_ready is [0.0, 0.3, 9.2, 0.0, 1.6, 0.0]: give 6 joint positions"),
     ],
-)  # fmt: skip
+)
 def test_an_arm_that_is_not_in_order_is_refused_with_the_file_and_the_key(
     arm, tmp_path, capsys, name, old, new, sentence
 ):

@@ -72,7 +72,7 @@ def at_begin(monkeypatch, seconds, then):
         (("--no-learnt", "--learn-anew"), "--no-learnt does not go with"),
         (("--arm", "ur5"), "There is no arm 'ur5'"),
     ],
-)  # fmt: skip
+)
 def test_what_does_not_fit_together_is_refused_in_a_sentence(words, said, capsys):
     assert cli.main(["run", *words]) == 2
     assert said in " ".join(capsys.readouterr().err.split())

@@ -44,7 +44,7 @@ def calibrate(*words):
         (("simulated", "--out", "s.toml", "--seed", "-1"), "--seed is -1"),
         (("simulated", "--out", "s.toml", "--record", "/dev/null/x.mcap"), "x.mcap cannot be written"),
     ],
-)  # fmt: skip
+)
 def test_what_makes_no_sense_is_said_in_one_sentence(tmp_path, monkeypatch, capsys, words, said):
     monkeypatch.chdir(tmp_path)
     assert calibrate(*words) == 2

@@ -23,9 +23,9 @@ def test_torques_of_another_arm_are_scaled_by_its_limits():
     found, own = plant_params_of(six), PlantParams()
     found.check_joints(6)
     # base and hand are those of the Panda, its third joint is left out
-    assert found.torque_noise_nm == pytest.approx([2 * own.torque_noise_nm[k] for k in (0, 1, 2)] + [
-        2 * own.torque_noise_nm[k] for k in (4, 5, 6)
-    ])  # fmt: skip
+    assert found.torque_noise_nm == pytest.approx(
+        [2 * own.torque_noise_nm[k] for k in (0, 1, 2)] + [2 * own.torque_noise_nm[k] for k in (4, 5, 6)]
+    )
     assert found.stiffness_nm_rad == tuple(own.stiffness_nm_rad[k] for k in (0, 1, 2, 4, 5, 6))
 
 

@@ -67,9 +67,7 @@ def test_a_new_unit_is_given_its_key_and_begins_anew(mpremote, tmp_path, passwor
     }  # fmt: skip
     assert json.loads((folder / "mode.json").read_text()) == 0o600
     connect, device, cp, source, target, plus, reset = json.loads((folder / "command.json").read_text())
-    assert (connect, device, cp, target, plus, reset) == (
-        "connect", "/dev/ttyACM7", "cp", ":config.json", "+", "reset"
-    )  # fmt: skip
+    assert (connect, device, cp, target, plus, reset) == ("connect", "/dev/ttyACM7", "cp", ":config.json", "+", "reset")
     assert not Path(source).exists()
     said = "".join(capsys.readouterr())
     assert "hand-1 is number 1 with the key " + key.fingerprint in said

@@ -81,9 +81,7 @@ def _along(geoms: Geoms, geom: int, origin: FloatArray, ray: FloatArray, normal:
     if kind == _HFIELD:
         return mj_rayHfield(geoms.model, geoms.data, geom, start, along, there)
     position, rotation, size = geoms.position[geom], geoms.rotation[geom], geoms.size[geom]
-    return mju_rayGeom(
-        position.ctypes.data, rotation.ctypes.data, size.ctypes.data, start, along, kind, there
-    )  # fmt: skip
+    return mju_rayGeom(position.ctypes.data, rotation.ctypes.data, size.ctypes.data, start, along, kind, there)
 
 
 @kernel

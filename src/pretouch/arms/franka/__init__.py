@@ -81,7 +81,7 @@ def _recover(arm: "FrankaArm", yes: bool) -> None:
     """Let an arm that has stopped by itself recover; a person is asked first, for it may move a little."""
     from pretouch.session.terminal import require_yes, say
 
-    if not arm.reflex:
+    if arm.state().mode != "reflex":
         say(f"{arm.name} does not need to recover.")
         return
     if not yes:

@@ -26,7 +26,6 @@ _STATE_MOST_S = 0.5
 """Age at which a state says nothing about the arm any more [s]."""
 _LOOK_S = 0.001
 _NAMES: dict[Kind, str] = {"panda": "Panda", "fr3": "FR3"}
-_REFLEX = "reflex"
 
 
 class FrankaArm:
@@ -123,13 +122,8 @@ class FrankaArm:
         try:
             check_ready(state, self._address)
         except RobotError as error:
-            return (str(error), "Run with --recover.") if state.mode == _REFLEX else (str(error),)
+            return (str(error), "Run with --recover.") if state.mode == "reflex" else (str(error),)
         return ()
-
-    @property
-    def reflex(self) -> bool:
-        """Whether the arm has stopped by itself and must recover."""
-        return self.state().mode == _REFLEX
 
     @property
     def communication(self) -> Communication:
