@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from reprlib import Repr
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -41,6 +42,8 @@ _PARTS = (("touch", TouchReadings), ("points", SeenPoints), ("payload", Payload)
 """What inputs may have beside the arm's state and the readings."""
 _SHOWN = 500
 """Characters of what cannot be kept that are."""
+_REPR = Repr()  # answers for objects whose own repr fails, too
+_REPR.maxother = _SHOWN
 
 
 @value
@@ -159,11 +162,7 @@ def packed_inputs(inputs: Inputs, points_at: int = -1) -> bytes:
 
 def _described(inputs: object, error: Exception) -> str:
     """Describe inputs that cannot be kept, in one line of limited length."""
-    try:
-        text = f"{error}: {inputs!r}"
-    except Exception:  # a repr may do anything
-        text = f"{error}: a {type(inputs).__name__}"
-    return text[:_SHOWN].encode("utf-8", "backslashreplace").decode()
+    return f"{error}: {_REPR.repr(inputs)}"[:_SHOWN].encode("utf-8", "backslashreplace").decode()
 
 
 def inputs_of(data: bytes) -> KeptInputs:
