@@ -3,6 +3,7 @@
 import struct
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -221,6 +222,31 @@ def test_a_state_of_another_version_is_refused_with_what_differs(run):
         unpacked(KeptState, data.replace(b"reaction", b"reacsion"))
     with pytest.raises(RecordingError, match="cannot be read"):
         unpacked(KeptState, data[:-9])
+
+
+class Listed(NamedTuple):
+    """What a part might remember, or a part of that."""
+
+    parts: tuple[object, ...]
+
+
+class Around(NamedTuple):
+    inner: Listed | None
+
+
+@pytest.mark.parametrize(
+    ("remembered", "words"),
+    [
+        ((1.0,), "remembers a tuple, which a recording cannot hold: let it remember a number"),
+        (Listed((np.zeros(2), np.ones(3))), "remembers a Listed with `object` within parts, which"),
+        (Listed((Contact(np.zeros(3), np.zeros(3, bool)),)), "a Listed with `object` within parts, which"),
+        (Around(None), "remembers an? Around with `object` within inner, which"),
+        (Thresholds(*np.zeros((6, 3))), "No named part of a profile has Thresholds as its `State`: name the class"),
+    ],
+)
+def test_what_a_part_remembers_and_no_recording_can_hold_is_named(run, remembered, words):
+    with pytest.raises(RecordingError, match=words):
+        packed_state(replace(run.cycles[-1].before, reaction=remembered), False)
 
 
 MIRRORED = {Obstacles: "Obstacles", Contact: "Contact", QpSolution: "QpSolution", Touched: "Touched",

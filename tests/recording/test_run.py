@@ -38,19 +38,27 @@ def test_paths_of_ours_are_made_again_to_the_bit(controller, tmp_path, path):
         assert same(made.tangent(phase), path.tangent(phase))
 
 
-def test_a_path_of_another_class_is_drawn_and_has_to_be_given_to_go_on(controller, tmp_path):
+@pytest.mark.parametrize(
+    ("length", "begins"),
+    [pytest.param(1.0, 0.0, id="moves"), pytest.param(1.0, 0.4, id="dwells"), pytest.param(0.0, 0.0, id="stands")],
+)
+def test_a_path_of_another_class_is_drawn_and_has_to_be_given_to_go_on(controller, tmp_path, length, begins):
     model = controller.model
     start = model.kinematics(model.description.q_ready).position[model.ee]
+
+    def point(phase: float) -> np.ndarray:
+        along = np.clip(phase - begins, 0.0, length)
+        return start + np.array([0.0, 0.5 * along * np.cos(along), 0.1 * along])
+
     path = SimpleNamespace(
-        length=1.0, closed=False, tangent=lambda phase: np.array([0.0, np.cos(phase), np.sin(phase)]),
-        point=lambda phase: start + np.array([0.0, 0.5 * phase * np.cos(phase), 0.1 * phase]),
-    )  # fmt: skip
+        length=length, closed=False, tangent=lambda phase: np.array([0.0, np.cos(phase), np.sin(phase)]), point=point
+    )
     recorded_run(tmp_path / "a.mcap", controller_of(controller.model, controller.skin, path=path), 40)
     recorded = open_recording(tmp_path / "a.mcap")
     near = recorded.runs[0].path
     assert near.closed is False
     for share in (0.0, 0.2, 0.55, 1.0):
-        assert np.linalg.norm(near.points - path.point(share), axis=1).min() < 2e-3
+        assert np.linalg.norm(near.points - path.point(share * length), axis=1).min() < 2e-3
     with pytest.raises(RecordingError, match=r"class SimpleNamespace.*run\.controller\(path=\.\.\.\)"):
         verify(recorded)
     verdict = verify(recorded, path=path)

@@ -1,6 +1,7 @@
 """Recordings recomputed: bit for bit here, within a tolerance elsewhere, and the first difference found."""
 
 from dataclasses import replace
+from unittest.mock import Mock
 
 import msgspec
 import numpy as np
@@ -10,10 +11,12 @@ from pretouch.contact.window import window_init
 from pretouch.control.path import segment
 from pretouch.loop import Cycle
 from pretouch.recording import verify as verifying
+from pretouch.recording import writer
 from pretouch.recording.reader import open_recording
 from pretouch.recording.ros import packed_data, packed_message
 from pretouch.recording.verify import differing, verify
 from pretouch.recording.writer import Recording
+from pretouch.robot.model import RobotModel
 from pretouch.types import Mode
 from tests.following_arm import SHORT, controller_of
 from tests.fuzz.machine import Course, Machine
@@ -81,8 +84,9 @@ def test_inputs_that_could_not_be_kept_are_skipped_and_the_rest_is_recomputed(co
     assert "3 steps have inputs that could not be kept" in verdict.sentence
 
 
-def test_a_change_of_profile_and_path_is_followed(controller, tmp_path):
-    run = Run(controller)
+def test_a_change_of_profile_and_path_is_followed(controller, tmp_path, monkeypatch):
+    run, models = Run(controller), Mock(wraps=RobotModel)
+    monkeypatch.setattr(writer, "RobotModel", models)
     with Recording(tmp_path / "a.mcap", controller, {"command": "test"}) as recording:
         for i in range(90):
             if i in (30, 60):
@@ -92,6 +96,7 @@ def test_a_change_of_profile_and_path_is_followed(controller, tmp_path):
                 run.state, run.controller = other.adopt(run.state, run.controller), other
                 recording.change(other)
             recording.record(run.turn())
+    assert models.call_count == 1, "the arm stays"
     recorded = open_recording(tmp_path / "a.mcap")
     assert [kept.run for kept in recorded] == [0] * 30 + [1] * 30 + [2] * 30
     assert [(each.profile.name, each.sequence) for each in recorded.runs] == [(SHORT.name, 0), ("p30", 30), ("p60", 60)]

@@ -7,7 +7,7 @@ remembers is {"part": group and name of the part, "value": ...}.
 from dataclasses import is_dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar, cast, get_origin
+from typing import Any, TypeVar, cast, get_args, get_origin
 
 import msgspec
 import numpy as np
@@ -112,12 +112,27 @@ def _named(hint: Any, value: Any) -> Any:
         return value
     if isinstance(value, np.ndarray):
         return {"part": "", "value": value}
-    if not is_record(type(value)):
+    kind = type(value)
+    if (unnamed := _unnamed(kind)) or not is_record(kind):
         raise RecordingError(
-            f"A part of the profile remembers a {type(value).__name__}, which a recording cannot hold: let it"
+            f"A part of the profile remembers a {kind.__name__}{unnamed}, which a recording cannot hold: let it"
             " remember a number, an array of numbers, or a class of such fields, named as `State` of the part."
         )
     return {"part": _owner(type(value)), "value": with_parts(value)}
+
+
+@cache
+def _unnamed(kind: Any) -> str:
+    """Say in which field of a class `object` stands within another type, where no part's name can stand beside it."""
+    within = [(name, hint) for name, hint in (hints_of(kind) if is_record(kind) else ()) if hint is not object]
+    return next((f" with `object` within {name}" for name, hint in within if _holds_object(hint, (kind,))), "")
+
+
+def _holds_object(hint: Any, above: tuple[Any, ...]) -> bool:
+    """Whether a type is `object`, or has it within; not where a class holds itself again."""
+    if is_record(hint) and hint not in above:
+        return any(_holds_object(inner, (*above, hint)) for _, inner in hints_of(hint))
+    return hint is object or any(_holds_object(inner, above) for inner in get_args(hint))
 
 
 def _owner(state: type) -> str:

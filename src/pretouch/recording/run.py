@@ -40,6 +40,8 @@ _LIBRARIES = ("numpy", "numba", "mujoco-core", "scipy")
 """Those whose numbers a result rests on."""
 _SAMPLES = 400
 """Points kept of a path whose class is not ours, to draw it by."""
+_APART_M = 1e-5
+"""Points nearer to each other are one [m]: way-points must not coincide."""
 Result = TypeVar("Result")
 
 
@@ -136,7 +138,7 @@ class Run:
 
     @cached_property
     def path(self) -> Path:
-        """The path it followed; one of another class than ours is near it, for drawings."""
+        """The path it followed; of another class than ours, points of it, for drawings: of one that stands, 1 mm."""
         return _sound(lambda: _path(self._kept.path))
 
     def controller(self, path: Path | None = None) -> Controller:
@@ -235,8 +237,19 @@ def _kept_path(path: Path) -> _KeptPath:
         numbers = path.points
     else:
         phases = np.linspace(0.0, path.length, _SAMPLES, endpoint=not path.closed)
-        numbers = np.array([path.point(phase) for phase in phases.tolist()], dtype=np.float64)
+        numbers = _apart(np.array([path.point(phase) for phase in phases.tolist()], dtype=np.float64))
     return _KeptPath(type(path).__name__, numbers, bool(path.closed))
+
+
+def _apart(points: FloatArray) -> FloatArray:
+    """Leave out of a path's samples (W, 3) [m] those where it stands still; make one point a segment of 1 mm."""
+    corners = [points[0]]
+    for point in points[1:]:
+        if np.linalg.norm(point - corners[-1]) > _APART_M:
+            corners.append(point)
+    while len(corners) > 1 and np.linalg.norm(corners[-1] - corners[0]) <= _APART_M:  # a closed one goes back there
+        corners.pop()
+    return np.array(corners if len(corners) > 1 else [points[0], points[0] + [0.0, 0.0, 1e-3]])
 
 
 def _path(record: _KeptPath) -> Path:

@@ -56,6 +56,7 @@ class Recording:
         """
         self.place, self._about = Path(place), about or {}
         self._cycles = Cycles(controller, self._about)
+        self._model = RobotModel(controller.model.description)
         self._show(controller)
         self._disk = Disk(self.place)
         self._steps = 0
@@ -71,7 +72,9 @@ class Recording:
 
     def _show(self, controller: Controller) -> None:
         """Make what tools see that do not know our types, in the thread: one model serves one thread."""
-        self._topics = ViewerTopics(controller, self._about, RobotModel(controller.model.description))
+        if self._model.description is not controller.model.description:
+            self._model = RobotModel(controller.model.description)
+        self._topics = ViewerTopics(controller, self._about, self._model)
 
     def record(self, cycle: Cycle, truth: Truth | None = None) -> None:
         """Keep one turn of the loop, and what only a simulation knows. Of the disk's troubles it raises none."""
