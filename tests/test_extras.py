@@ -5,6 +5,7 @@ import subprocess
 import sys
 import tomllib
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -121,14 +122,25 @@ def test_the_sentence_names_make_in_a_clone_and_pip_of_the_folder_in_another_env
 
 
 @pytest.mark.parametrize(
-    ("maker", "pip"), [("pip", "/v/python -m pip install"), ("uv", "uv pip install --python /v/python")]
+    ("there", "origin", "pip", "beside"),
+    [
+        (["pip"], None, "/v/python -m pip install", ""),
+        (["pip"], "https://b/pretouch-0.2.0-py3-none-any.whl", "/v/python -m pip install", ""),
+        (["pip"], "file:///a%20b/pretouch-0.2.0-py3-none-any.whl", "/v/python -m pip install", "--find-links '/a b' "),
+        (["pretouch_fci"], None, "uv pip install --python /v/python", ""),
+    ],
 )
-def test_a_hint_is_for_what_made_the_environment(monkeypatch, tmp_path, maker, pip):
-    monkeypatch.setattr(extras, "find_spec", lambda name: object() if maker == "pip" else None)
+def test_a_hint_is_for_what_made_the_environment(monkeypatch, tmp_path, there, origin, pip, beside):
+    own = SimpleNamespace(read_text=lambda name: origin and json.dumps({"url": origin}))
+    monkeypatch.setattr(extras, "find_spec", lambda name: object() if name in there else None)
+    monkeypatch.setattr(extras, "distribution", lambda name: own)
+    monkeypatch.setattr(extras, "version", lambda name: "0.2.0")
     monkeypatch.setattr(extras, "_CLONE", tmp_path)
     monkeypatch.setattr(sys, "executable", "/v/python")
     assert LIVE.command == f"{pip} 'pretouch[live]'"
-    assert extras.install_command(extras.LAB) == f"{pip} 'pretouch-lab'"
+    assert extras.install_command(extras.LAB) == f"{pip} {beside}'pretouch-lab==0.2.0'"
+    if "pretouch_fci" in there:
+        assert extras.install_command(extras.FCI, "test") == f"{pip} 'pretouch-fci[test]'"
 
 
 @pytest.mark.parametrize("extra", EXTRAS, ids=lambda extra: extra.name)

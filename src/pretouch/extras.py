@@ -1,10 +1,13 @@
 """What is installed only where it is wanted: which modules an extra brings, and what to run where they are missing."""
 
+import json
 import shlex
 import sys
 from dataclasses import dataclass
+from importlib.metadata import distribution, version
 from importlib.util import find_spec
 from pathlib import Path
+from urllib.parse import unquote, urlsplit
 
 from pretouch.errors import MissingExtraError
 
@@ -56,16 +59,26 @@ UNITS = Extra("units", ("mpremote",), "units")
 def install_command(owner: str, extra: str = "", target: str = "setup") -> str:
     """Return the command that installs a distribution, or an extra of it, where this Python is.
 
-    In a clone that is a target of make, or pip of the folder in an environment other than the clone's own.
+    In a clone that is a target of make, or pip of the folder in an environment other than the clone's own. A
+    distribution beside this one that is missing is looked for beside the wheel of Pretouch too.
     """
     python = shlex.quote(sys.executable)
     pip = f"{python} -m pip install" if find_spec("pip") else f"uv pip install --python {python}"
     if not (_CLONE / "lab" / "pyproject.toml").is_file():
-        return f"{pip} {_quoted(owner, extra)}"
+        if owner not in _FOLDERS or find_spec(owner.replace("-", "_")):
+            return f"{pip} {_quoted(owner, extra)}"
+        return f"{pip} {_find_links()}{_quoted(owner, extra, '==' + version('pretouch'))}"
     if Path(sys.prefix) != _CLONE / ".venv":
         return f"{pip} -e {_quoted(_CLONE / _FOLDERS.get(owner, ''), extra)}"
     return f"make {'' if Path.cwd() == _CLONE else f'-C {shlex.quote(str(_CLONE))} '}{target}"
 
 
-def _quoted(what: object, extra: str) -> str:
-    return f"'{what}{f'[{extra}]' if extra else ''}'"
+def _find_links() -> str:
+    """Return the option that names the folder which Pretouch was installed from; '' where that was an index."""
+    text = distribution("pretouch").read_text("direct_url.json") or '{"url": ""}'
+    scheme, _, path, *_ = urlsplit(json.loads(text)["url"])
+    return f"--find-links {shlex.quote(str(Path(unquote(path)).parent))} " if scheme == "file" else ""
+
+
+def _quoted(what: object, extra: str, release: str = "") -> str:
+    return f"'{what}{f'[{extra}]' if extra else ''}{release}'"
