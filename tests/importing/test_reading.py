@@ -141,13 +141,15 @@ def test_a_chain_that_branches_is_refused_with_the_ends_of_its_branches(tmp_path
     assert "jl1, jr1" in whole.remarks[-1]
 
 
-def test_limits_that_are_missing_are_assumed_with_a_sentence(tmp_path):
-    found = arm(tmp_path, six_axis(changed={1: {"kind": "continuous", "limit": ""}}))
-    limits = limits_of(found)
+@pytest.mark.parametrize("limit", ["", '<limit lower="-2" upper="2"/>'])
+def test_limits_that_are_missing_are_assumed_with_a_sentence(tmp_path, limit):
+    found = arm(tmp_path, six_axis(changed={1: {"kind": "continuous", "limit": limit}}))
+    limits, unused = limits_of(found), "The position limits of joint1 are not used: it is continuous."
+    assert (unused in found.remarks) is bool(limit)
     assert limits.q_max[0] == pytest.approx(2 * np.pi)
     assert limits.qd_max.tolist() == [1.0, 2.0, 2.0, 2.0, 2.0, 2.0]
     said = " ".join(limits.remarks)
-    for part in ("no position limits of joint1: -2 pi to 2 pi", "give each a lower and an upper one",
+    for part in ("no usable position limits of joint1: -2 pi to 2 pi", "give each a lower and an upper one",
                  "velocity limit of joint1: 1 rad/s", "acceleration limit of all joints",
                  "give --qdd-max", "torque limit of joint1: 50 Nm"):  # fmt: skip
         assert part in said
@@ -197,6 +199,8 @@ def test_a_package_is_found_in_the_path_given(tmp_path):
     file = written(tmp_path / "here", mesh_arm("package://my_arm/a.stl"))
     with pytest.raises(RobotModelError, match="give --package-path the folder that holds the package my_arm"):
         link_of(read_robot(file)).surface()
+    with pytest.raises(RobotModelError, match=r"The mesh a{300}\.stl was not found: put it at"):
+        link_of(read_robot(written(tmp_path, mesh_arm(f"{'a' * 300}.stl")))).surface()
     for folder in (tmp_path / "elsewhere", tmp_path / "elsewhere" / "my_arm"):
         assert len(link_of(read_robot(file, (folder,))).surface().faces) == 1
     with pytest.raises(RobotModelError, match=r"The package path .* is not a folder"):

@@ -170,8 +170,8 @@ def limits_of(
 
     if endless := [joint.name for joint in arm.joints if joint.limits is None]:
         remarks.append(
-            f"The file has no position limits of {among(endless)}: -2 pi to 2 pi is assumed; give each a lower and an"
-            " upper one there, or correct the range in arm.xml."
+            f"The file has no usable position limits of {among(endless)}: -2 pi to 2 pi is assumed; give each a lower"
+            " and an upper one there, or correct the range in arm.xml."
         )
     ranges = np.array([joint.limits or (-_ENDLESS, _ENDLESS) for joint in arm.joints])
     speed, torque = [joint.velocity for joint in arm.joints], [joint.effort for joint in arm.joints]

@@ -1,6 +1,7 @@
 """Mesh files: where those are that a URDF names, and their triangles, read by trimesh."""
 
 import warnings
+from contextlib import suppress
 from io import BytesIO
 from pathlib import Path
 from urllib.parse import unquote
@@ -30,8 +31,9 @@ def find_mesh(uri: str, file: Path, folders: tuple[Path, ...]) -> Path:
         places = [folder / name for folder in around] + [folder / rest for folder in around if folder.name == package]
         way_out = f"give --package-path the folder that holds the package {package}"
     for place in places:
-        if place.is_file():
-            return place
+        with suppress(OSError, ValueError):  # a name may be too long, or none
+            if place.is_file():
+                return place
     raise RobotModelError(f"The mesh {uri} was not found: {way_out}.")
 
 

@@ -201,6 +201,8 @@ def _prepare_joint(joint: ET.Element, beside: Beside) -> None:
     low, high, speed = (float(limit.get(key, 0.0)) for key in ("lower", "upper", "velocity"))
     if 0 < abs(speed) < LARGEST:
         beside.velocity[name] = abs(speed)
+    if joint.get("type") == "continuous" and (low or high):
+        beside.remarks.append(f"The position limits of {name} are not used: it is continuous.")
     endless = joint.get("type") == "continuous" or not max(abs(low), abs(high)) < LARGEST
     if endless or not low < high:
         if not endless:
