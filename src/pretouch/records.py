@@ -9,6 +9,7 @@ for all arms, skins and profiles. Compiled code opens the blocks as the named tu
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import is_dataclass
 from functools import cache, partial, reduce
+from operator import attrgetter
 from typing import Annotated, Any, NamedTuple, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -81,12 +82,6 @@ def _leaves(part: _Part, path: str = "") -> Iterator[tuple[str, _Part]]:
             yield path + name, inner
 
 
-def _at(record: Any, path: str) -> Any:
-    for name in path.split("."):
-        record = getattr(record, name)
-    return record
-
-
 class Flat:
     """A record in flat blocks, whose fields are looked up by their path."""
 
@@ -101,7 +96,7 @@ class Flat:
         """Lay out a record; a dimension has one size in all fields of the record that names it, else: ValueError."""
         places, sizes, table, known = dict[str, Place](), [0, 0, 0], list[int](), dict[tuple[str, str], int]()
         for path, (_, _, kind, _, dimensions) in _leaves(_tree(type(record), [0])):
-            shape, owner = np.shape(_at(record, path)), path.rpartition(".")[0]
+            shape, owner = np.shape(attrgetter(path)(record)), path.rpartition(".")[0]
             named = zip(dimensions, shape, strict=False)
             sized = tuple(known.setdefault((owner, d), s) if isinstance(d, str) else d for d, s in named)
             if sized != shape or len(dimensions) != len(shape):
@@ -113,7 +108,7 @@ class Flat:
         blocks: Any = (*map(np.empty, sizes, BLOCK_TYPES), np.array(table, np.int64))
         flat = cls(blocks, places)
         for path in places:
-            flat.put(path, _at(record, path))
+            flat.put(path, attrgetter(path)(record))
         return flat
 
     def copy(self) -> "Flat":
@@ -141,8 +136,7 @@ class Flat:
 
     def fill(self, path: str, value: Any) -> None:
         """Write a record in the record."""
-        record: type = type(value)
-        for name, hint in _hints(record).items():
+        for name, hint in _hints(type(value)).items():
             (self.fill if _hints(hint) else self.put)(f"{path}.{name}", getattr(value, name))
 
     def take(self, other: "Flat", names: Sequence[str]) -> None:
@@ -158,11 +152,18 @@ class Flat:
 
 def zeros(record: Any, **sizes: int) -> Any:
     """Return a record of zeros, with these sizes of its dimensions."""
+    return _maker(record, **sizes)()
+
+
+@cache
+def _maker(record: Any, **sizes: int) -> Callable[[], Any]:
+    """Return what makes a record of zeros: a step has no time to work out the shapes each time."""
     if hints := _hints(record):
-        return record(*(zeros(hint, **sizes) for hint in hints.values()))
+        makers = [_maker(hint, **sizes) for hint in hints.values()]
+        return lambda: record(*[make() for make in makers])
     array, *dimensions = get_args(record)
-    shape = [sum(sizes[name] for name in d.split(" + ")) if isinstance(d, str) else d for d in dimensions]
-    return np.zeros(shape, BLOCK_TYPES[_KINDS[array]])
+    shape = tuple(sum(sizes[name] for name in d.split(" + ")) if isinstance(d, str) else d for d in dimensions)
+    return partial(np.zeros, shape, BLOCK_TYPES[_KINDS[array]])
 
 
 def opener(record: type, *paths: str) -> Callable[[Blocks], Any]:
