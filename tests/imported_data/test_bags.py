@@ -158,7 +158,7 @@ def test_what_is_wrong_with_joints_is_said_in_one_sentence(tmp_path, panda_model
         ("parts", states(MOVING[:, :4], PANDA[:4]) + states(MOVING[:, 4:], PANDA[4:]), "No message on /joint_states"),
         ("nan", states(np.full((9, 7), np.nan)), "has joint states without a position for each joint"),
         ("far", states(100 * MOVING), "out of its range of .* check the unit and the arm"),
-        ("short", states(MOVING, (*PANDA, "finger_joint1")), "without a position for each joint: name another"),
+        ("short", states(MOVING, (*PANDA, "finger_joint1")), "names 8 joints and has 7 values: record as many"),
     ):
         with pytest.raises(RecordingError, match=words) as error:
             read_joints(write_bag(tmp_path / name, messages), panda_model)

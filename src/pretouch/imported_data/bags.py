@@ -176,6 +176,7 @@ class _Topic:
         self.fields = _FIELDS.get(kind, _STATE_FIELDS)
         self._parts = {WRENCH: _wrench, JOINT_STATE: _joint_state}.get(kind, _franka_state)
         self._groups: dict[tuple[str, ...], tuple[array[int], array[int], array[float]]] = {}
+        self._unequal: dict[tuple[str, ...], int] = {}
 
     @property
     def names(self) -> list[str]:
@@ -190,6 +191,8 @@ class _Topic:
         logged.append(time)
         header.append(message.header.stamp.sec * 10**9 + message.header.stamp.nanosec)
         for part in parts:
+            if len(part) not in (0, len(names)):
+                self._unequal[names] = len(part)
             values.extend(part if len(part) == len(names) else [np.nan] * len(names))
 
     def rows(self, place: Path, model: RobotModel | None) -> _Rows:
@@ -200,6 +203,11 @@ class _Topic:
         for group, (logged, header, values) in self._groups.items():
             if not set(order) <= set(group):
                 continue
+            if group in self._unequal:
+                raise RecordingError(
+                    f"A message on {self.name} of {place} names {len(group)} joints and has {self._unequal[group]}"
+                    " values: record as many, or choose another topic."
+                )
             table = np.array(values).reshape(len(logged), len(self.fields), len(group))
             parts.append((np.array(logged), np.array(header), table[:, :, [group.index(name) for name in order]]))
         if not parts:
