@@ -157,6 +157,8 @@ def test_zones_of_more_units_than_a_step_can_take_are_refused(panda_model, paper
     eight = [replace(paper_skin.units[0], id=str(k), sensor=VL53L5CX(zones=8)) for k in range(33)]
     with pytest.raises(SkinError, match="has 2112 units, each zone counted: give at most 2048"):
         Skin(eight, panda_model)
+    with pytest.raises(SkinError, match="Unit 0/0 is a zone: give the whole unit"):
+        Skin(Skin(eight[:1], panda_model).units, panda_model)
 
 
 @pytest.mark.parametrize("zone", [16, -1, "0", True, 1.0])

@@ -66,10 +66,9 @@ class Skin:
     """
 
     def __init__(self, units: Sequence[SensorUnit], model: RobotModel) -> None:
-        count = sum(unit.sensor.zones**2 for unit in units)
-        if count > _MOST_UNITS:
-            raise SkinError(f"The skin has {count} units, each zone counted: give at most {_MOST_UNITS}.")
         self.units = tuple(zone for unit in units for zone in zones_of(unit))
+        if len(self.units) > _MOST_UNITS:
+            raise SkinError(f"The skin has {len(self.units)} units, each zone counted: give at most {_MOST_UNITS}.")
         ids = [unit.id for unit in self.units]
         twice = sorted({i for i in ids if ids.count(i) > 1})
         if twice:
