@@ -261,6 +261,14 @@ def test_a_stamp_that_is_none_is_named_though_a_position_jumps_too(panda_model, 
     assert "RobotState.stamp" in said[-1].reason
 
 
+@pytest.mark.parametrize("field", ["q", "qd", "q_commanded", "qd_commanded", "wrench"])
+def test_complex_numbers_of_an_arm_are_a_named_hold(panda_model, arm, field):
+    arm.told = lambda robot: replace(robot, **{field: getattr(robot, field) + 0.5j})
+    said = turned(controller(panda_model, "paper"), arm, 5)
+    assert said[-1].mode is Mode.HOLD
+    assert "of numbers" in said[5].reason
+
+
 @pytest.mark.parametrize("value", [1e308, -1e308, 0.5j])
 def test_readings_with_such_stamps_are_named_or_not_used(panda_model, paper_skin, value):
     arm = Liar(panda_model, len(paper_skin))

@@ -7,11 +7,14 @@ import pytest
 
 from pretouch.params import GiveUpParams
 from pretouch.profiles import PROFILES, Profile, profile
+from pretouch.recording.cycles import KeptState, packed_state
+from pretouch.recording.packing import unpacked
 from pretouch.robot.body import placed
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, Mode
 from tests.following_arm import DT, Arm
+from tests.fuzz.invariants import same
 from tests.golden.script import Script
 from tests.golden.streams import CROOK_NM, FOLDING, HAND, Stream, controller, model
 
@@ -292,3 +295,11 @@ def test_the_paper_does_not_look_at_joint_torques(panda_model, paper_skin, name:
         two = other.feel(rng.normal(0, 20, 7), force=force)
         np.testing.assert_array_equal(one.command, two.command)
         assert (one.mode, one.reason) == (two.mode, two.reason)
+
+
+def test_the_state_of_a_clamp_is_recorded_to_the_bit(arm: Pushed):
+    caught(arm)
+    arm.run(3)
+    kept = unpacked(KeptState, packed_state(arm.state, False))
+    assert same(kept, KeptState(False, arm.state))
+    assert kept.state.reaction.clamp.torque > 0

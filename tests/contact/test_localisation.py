@@ -311,3 +311,22 @@ def test_a_touch_whose_place_is_hidden_still_counts_by_its_link():
     on = SURFACE.link == link
     odds = made[on].sum() / made[~on].sum() / (evenly[on].sum() / evenly[~on].sum())
     assert odds == pytest.approx(cues.gain[link], rel=1e-3)
+
+
+@pytest.mark.slow
+def test_a_false_touch_takes_few_pushes_on_link_2_that_the_torques_put_there():
+    # two torques contradict little; counted by the gain of its link too, a false touch takes a quarter of them
+    lost = right = 0
+    rng = np.random.default_rng(5)
+    for seed in range(120):
+        kin = posture(seed)
+        free = np.flatnonzero(exposed(kin))
+        c = int(rng.choice(free[SURFACE.link[free] == MODEL.link_index("panda_link2")]))
+        false = int(rng.choice(free[SURFACE.link[free] != SURFACE.link[c]]))
+        torque = noisy(torques(kin, (c, 40.0)), seed)
+        alone, _ = said(kin, torque)
+        if MODEL.rigid[alone.link[0]] == SURFACE.body[c]:
+            told, _ = said(kin, torque, cues=touched(kin, false))
+            right, lost = right + 1, lost + (MODEL.rigid[told.link[0]] != SURFACE.body[c])
+    assert right >= 60
+    assert lost <= right / 8

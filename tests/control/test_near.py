@@ -91,6 +91,18 @@ def test_towards_a_wall_the_arm_keeps_the_braking_curve_and_comes_to_touch(panda
     assert len(steps) * DT < 0.9 + 1.6
 
 
+def test_when_sight_is_lost_the_arm_speeds_up_no_faster_than_rows_loosen(panda_model: RobotModel, paper_skin: Skin):
+    arm = on_its_way(panda_model, paper_skin)
+    steps = run_into_a_wall(arm, 100)
+    before = hand_speed(arm, steps[-1])[1]
+    assert before < 0.15
+    for _ in range(40):
+        after = hand_speed(arm, arm.step())[1]
+        assert after - before < A.loosen_m_s2 * DT + 0.002
+        before = after
+    assert before > 0.25
+
+
 def test_a_push_away_from_an_obstacle_is_followed_at_once(panda_model: RobotModel, paper_skin: Skin):
     arm = on_its_way(panda_model, paper_skin)
     y = arm.ee()[1] + 0.13
@@ -117,6 +129,17 @@ def test_near_a_thing_beside_it_the_arm_does_not_slide_past_at_full_speed(panda_
     cap = ACROSS.speed_m_s + d / ACROSS.distance_m * (0.3 - ACROSS.speed_m_s)
     assert d < 0.07
     assert speeds["pretouch"] < cap + 0.01
+
+
+def test_on_a_blocked_path_the_phase_waits(panda_model: RobotModel, paper_skin: Skin):
+    arm = on_its_way(panda_model, paper_skin)
+    arm.run(60, seen={LEFT: 0.0})
+    begun = arm.state.phase
+    step = arm.run(200, seen={LEFT: 0.0})[-1]
+    assert step.mode is Mode.TRACK
+    assert step.path_phase - begun < 0.15
+    steps = arm.run(100)
+    assert steps[-1].reason == "Moving as asked."
 
 
 def test_the_null_space_moves_the_elbow_away_and_the_hand_stays(panda_model: RobotModel):

@@ -236,3 +236,8 @@ def test_a_model_that_would_be_misunderstood_is_refused_in_one_sentence(tmp_path
     with pytest.raises(RobotModelError, match=message) as caught:
         _one_joint_arm(tmp_path, joint, geom)
     assert "\n" not in str(caught.value)
+
+
+def test_an_unknown_end_effector_is_refused():
+    with pytest.raises(RobotModelError, match="link 'gripper' is unknown"):
+        RobotModel(replace(panda(), ee_body="gripper"))
