@@ -136,7 +136,7 @@ class Flat:
 
     def fill(self, path: str, value: Any) -> None:
         """Write a record in the record."""
-        for name, hint in _hints(type(value)).items():
+        for name, hint in _hints(value.__class__).items():
             (self.fill if _hints(hint) else self.put)(f"{path}.{name}", getattr(value, name))
 
     def take(self, other: "Flat", names: Sequence[str]) -> None:

@@ -50,18 +50,9 @@ def wholes(count: int) -> st.SearchStrategy[np.ndarray]:
     return npst.arrays(np.int64, count)
 
 
-@st.composite
-def robots(draw: st.DrawFn) -> RobotState:
-    lengths = st.integers(0, 8)
-    parts = [draw(rows(draw(lengths))) for _ in range(5)]
-    return RobotState(draw(NAN_TOO), *parts, draw(st.none() | rows(6) | rows(0) | rows(7)))
-
-
-@st.composite
-def all_inputs(draw: st.DrawFn) -> Inputs:
-    lengths = st.integers(0, 8)
-    readings = RangeReadings(draw(rows(draw(lengths))), draw(rows(draw(lengths))), draw(wholes(draw(lengths))))
-    return Inputs(draw(NAN_TOO), draw(robots()), readings, draw(st.booleans()))
+ROW, WHOLE = st.integers(0, 8).flatmap(rows), st.integers(0, 8).flatmap(wholes)
+ROBOTS = st.builds(RobotState, NAN_TOO, ROW, ROW, ROW, ROW, ROW, st.none() | rows(6) | rows(0) | rows(7))
+INPUTS = st.builds(Inputs, NAN_TOO, ROBOTS, st.builds(RangeReadings, ROW, ROW, WHOLE), st.booleans())
 
 
 @st.composite
@@ -94,7 +85,7 @@ def places(draw: st.DrawFn) -> Touched:
     return Touched(draw(wholes(c)), draw(rows(c, 3)), draw(rows(c, 3)), draw(rows(c)), draw(rows(c)))
 
 
-@given(all_inputs(), st.integers(-1, 2**62))
+@given(INPUTS, st.integers(-1, 2**62))
 def test_inputs_come_back_to_the_bit_whatever_their_lengths(inputs, points_at):
     assert same(inputs_of(packed_inputs(inputs, points_at)), KeptInputs(inputs, points_at, ""))
 
@@ -225,13 +216,12 @@ def test_a_state_of_another_version_is_refused_with_what_differs(run):
 
 
 class Listed(NamedTuple):
-    """What a part might remember, or a part of that."""
-
     parts: tuple[object, ...]
 
 
-class Around(NamedTuple):
-    inner: Listed | None
+class Chained(NamedTuple):
+    here: object
+    rest: "Chained | None"
 
 
 @pytest.mark.parametrize(
@@ -240,7 +230,7 @@ class Around(NamedTuple):
         ((1.0,), "remembers a tuple, which a recording cannot hold: let it remember a number"),
         (Listed((np.zeros(2), np.ones(3))), "remembers a Listed with `object` within parts, which"),
         (Listed((Contact(np.zeros(3), np.zeros(3, bool)),)), "a Listed with `object` within parts, which"),
-        (Around(None), "remembers an? Around with `object` within inner, which"),
+        (Chained(1.0, None), "remembers a Chained with `object` within rest, which"),
         (Thresholds(*np.zeros((6, 3))), "No named part of a profile has Thresholds as its `State`: name the class"),
     ],
 )

@@ -1,7 +1,7 @@
 """An arm imported or checked on the command line: the report of what was read, fitted and assumed."""
 
 import re
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -25,8 +25,8 @@ _NEGLIGIBLE = 0.001
 """What sticks out less is not spoken of [m]."""
 
 
-@dataclass(frozen=True)
-class ImportArm:
+@dataclass(frozen=True, kw_only=True)
+class ImportArm(ImportOptions):
     """Read your own arm from a URDF or MJCF file: fit capsules to its links, and write a description of it.
 
     Look at what is printed: all that the file does not say is assumed, with a sentence for each.
@@ -37,10 +37,6 @@ class ImportArm:
     such as ur5e_mj_description."""
     out: OptionalFile = None
     """Folder to write robot.toml and arm.xml to; by default the arm's name."""
-    ee: str = ""
-    """Link whose origin is the end-effector; by default the most likely one."""
-    name: str = ""
-    """Name of the arm; by default the file's."""
     package_path: Paths = ()
     """Folders that hold the ROS packages of package:// paths, separated by commas; those above the file are
     searched in any case."""
@@ -52,23 +48,16 @@ class ImportArm:
     """Joint torque limits [Nm]; by default the file's."""
     ready: Numbers = ()
     """Usual start posture [rad], one position per joint, separated by commas; by default one is searched for."""
-    capsules: int = 3
-    """Largest number of capsules per link."""
-    cover: bool = False
-    """Enlarge the capsules until no surface sticks out of them: the arm then keeps more distance than necessary."""
     json: JsonFile = None
 
     def run(self) -> None:
         """Import an arm, print what came of it, and write its folder."""
-        file, packages = Path(self.file), self.package_path
+        file, options, folder = Path(self.file), self, self.out
         if is_description(self.file):
             file, package = described(self.file)
-            packages = (*packages, package)
-        own = {one.name: getattr(self, one.name) for one in fields(ImportOptions) if one.name != "packages"}
-        options = ImportOptions(**own, packages=packages)
-        folder = self.out
+            options = replace(self, package_path=(*self.package_path, package))
         if not folder:  # of the arm's name: letters, digits, dashes and dots only
-            name = self.name or read_robot(file, options.packages).name
+            name = self.name or read_robot(file, options.package_path).name
             folder = Path(re.sub(r"[^A-Za-z0-9_.-]+", "-", name).strip("-.")[:60] or "arm")
         check_free(folder)
         with numbers_to(self.json) as write:

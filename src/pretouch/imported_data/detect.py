@@ -224,7 +224,6 @@ def _for_currents(recording: TorqueRecording, profile: Profile) -> tuple[Profile
 def _judged(r: TorqueRecording, profile: Profile, time: FloatArray, newest: IntArray, first: BoolArray) -> TorqueCourse:
     """Let a detector judge torques at cycles, see `cycles`."""
     body = Body(r.model, Skin((), r.model), profile.task.control_period_s)
-    detector = profile.detect
     without = np.asarray(np.isnan(r.tau_ext[newest]).any(axis=1))
     if without.all():
         raise RecordingError(f"{r.place} has no usable torques: give a longer recording without gaps.")
@@ -234,8 +233,8 @@ def _judged(r: TorqueRecording, profile: Profile, time: FloatArray, newest: IntA
         sample = _sample(r, i, float(time[cycle]), window, profile)
         window, waiting = sample.window, waiting or bool(first[cycle])
         if state is None or (waiting and not without[cycle]):
-            state, waiting = _begun(detector, body, state, r.qd_commanded[i]), bool(without[cycle])
-        detection, state = detector.step(state, body, sample)
+            state, waiting = _begun(profile.detect, body, state, r.qd_commanded[i]), bool(without[cycle])
+        detection, state = profile.detect.step(state, body, sample)
         _follow(contacts, r.model, sample.stamp, detection)
         detections.append(replace(detection, significant=None))
     columns = {name: np.array([getattr(d, name) for d in detections])

@@ -136,8 +136,7 @@ class Table:
         table = np.where(np.isfinite(table), table, np.nan) * factors
         timed = np.isfinite(table[:, 0])
         notes = [Note("no_time", {"count": int((~timed).sum())})] if not timed.all() else []
-        unused = [name for i, name in enumerate(self._names) if i not in used]
-        if unused:
+        if unused := [name for i, name in enumerate(self._names) if i not in used]:
             notes.append(Note("unused", {"names": listed(unused)}))
         time = self._instants(table[timed, 0], rows[timed])
         ends = np.cumsum([1, *map(len, places.values())])

@@ -26,17 +26,30 @@ def arm_file(name: str, arm: Arm, limits: Limits, bodies: tuple[LinkBody, ...]) 
     spec = mujoco.MjSpec()
     spec.compiler.degree = False
     spec.modelname, spec.option.timestep, spec.option.integrator = name, 0.001, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    placed, estimates = [spec.worldbody], list[str]()
+    model, placed, estimates = arm.robot.model, [spec.worldbody], list[str]()
     for i, link in enumerate(links):
         if i:
             within, quaternion = np.linalg.solve(T[link.parent], T[i]), np.zeros(4)
             mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(within[:3, :3]).ravel())
             placed.append(placed[link.parent].add_body(name=link.name, pos=within[:3, 3], quat=quaternion))
         for joint in (joint for joint in link.joints if joint in arm.joints):
-            _add_joint(placed[i], arm, limits, arm.joints.index(joint))
+            j = arm.joints.index(joint)
+            placed[i].add_joint(
+                name=joint.name,
+                type=mujoco.mjtJoint.mjJNT_HINGE,
+                axis=model.jnt_axis[joint.index],
+                pos=model.jnt_pos[joint.index],
+                ref=float(model.qpos0[model.jnt_qposadr[joint.index]]),
+                range=[limits.q_min[j], limits.q_max[j]],
+                actfrcrange=[-float(limits.tau_max[j]), float(limits.tau_max[j])],
+            )
         density = _set_inertial(placed[i], arm, i, rods.get(link.name), estimates)
-        if link.name in rods:
-            _add_capsules(placed[i], link.name, rods[link.name], density)
+        for k, rod in enumerate(rods.get(link.name, ())):
+            capsule = placed[i].add_geom(
+                name=f"{link.name}_{k}", type=mujoco.mjtGeom.mjGEOM_CAPSULE, size=[rod[6], 0, 0]
+            )
+            capsule.fromto, capsule.density = rod[:6], density
+            capsule.contype, capsule.conaffinity, capsule.group = 1, 2, 3
     remarks = []
     if heavy := [f"{link.name} ({link.mass:g} kg)" for link in links if link.mass > _LARGEST_MASS]:
         remarks.append(f"Implausible masses, correct them in the file: {', '.join(heavy)}.")
@@ -64,26 +77,6 @@ def _poses(arm: Arm) -> FloatArray:
     T = np.tile(np.eye(4), (model.nbody, 1, 1))
     T[:, :3, :3], T[:, :3, 3] = data.xmat.reshape(-1, 3, 3), data.xpos
     return T
-
-
-def _add_joint(body: mujoco.MjsBody, arm: Arm, limits: Limits, j: int) -> None:
-    joint, model, torque = arm.joints[j], arm.robot.model, float(limits.tau_max[j])
-    body.add_joint(
-        name=joint.name,
-        type=mujoco.mjtJoint.mjJNT_HINGE,
-        axis=model.jnt_axis[joint.index],
-        pos=model.jnt_pos[joint.index],
-        ref=float(model.qpos0[model.jnt_qposadr[joint.index]]),
-        range=[limits.q_min[j], limits.q_max[j]],
-        actfrcrange=[-torque, torque],
-    )
-
-
-def _add_capsules(body: mujoco.MjsBody, link: str, rods: FloatArray, density: float) -> None:
-    for k, rod in enumerate(rods):
-        capsule = body.add_geom(name=f"{link}_{k}", type=mujoco.mjtGeom.mjGEOM_CAPSULE, size=[rod[6], 0, 0])
-        capsule.fromto, capsule.density = rod[:6], density
-        capsule.contype, capsule.conaffinity, capsule.group = 1, 2, 3
 
 
 def _set_inertial(body: mujoco.MjsBody, arm: Arm, i: int, rods: FloatArray | None, estimates: list[str]) -> float:

@@ -103,12 +103,10 @@ def bodies_of(arm: Arm, most: int = MOST, cover: bool = False) -> tuple[tuple[Li
                 f"The link {link.name} is {size:.4g} m long: if its meshes are in millimetres, give them the scale"
                 ' "0.001 0.001 0.001" in the file.'
             )
-    visual = [link.name for link in surfaces if not link.collision]
-    bare = [link.name for link in jointed if not link.shapes]
     remarks = []
-    if visual:
+    if visual := [link.name for link in surfaces if not link.collision]:
         remarks.append(f"Without collision geometry, so fitted to the visual geometry: {', '.join(visual)}.")
-    if bare:
+    if bare := [link.name for link in jointed if not link.shapes]:
         remarks.append(f"Without any geometry, so without a capsule: {', '.join(bare)}.")
     bodies = (
         link_body(link.name, outside_of(surface), own_capsules(link.shapes), most, cover)

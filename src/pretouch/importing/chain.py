@@ -14,8 +14,6 @@ _GRIPPER, _FINGER = ("gripper", "finger", "jaw"), ("finger", "jaw")
 """What a finger's joint, or its link, is called; a link called gripper may be the arm's last."""
 _NAMES = ("tcp", "tool", "grasp", "ee", "eef", "effector", "tip")
 """What an end-effector's frame is called, the surest first."""
-
-
 _ENDLESS = 2 * np.pi
 _SPEED, _ACCELERATION, _TORQUE = 1.0, 5.0, 50.0
 """Where nothing is known: slow, gentle and middling [rad/s, rad/s^2, Nm]."""

@@ -18,15 +18,15 @@ from pretouch.robot.model import RobotModel
 MJCF = "arm.xml"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class ImportOptions:
-    """What can be said of a robot beside its file."""
+    """What can be said of a robot beside its file: options of `pretouch robot import`."""
 
     ee: str = ""
-    """Link that is the end-effector; by default the likeliest one."""
+    """Link whose origin is the end-effector; by default the most likely one."""
     name: str = ""
     """Name of the arm; by default the file's."""
-    packages: tuple[Path, ...] = ()
+    package_path: tuple[Path, ...] = ()
     """Folders that hold ROS packages."""
     qd_max: tuple[float, ...] = ()
     """Joint velocity limits [rad/s]: one for all, or one for each."""
@@ -37,13 +37,9 @@ class ImportOptions:
     ready: tuple[float, ...] = ()
     """Usual posture to start from [rad]; by default one is searched for."""
     capsules: int = MOST
-    """Capsules for one link at most."""
+    """Largest number of capsules per link."""
     cover: bool = False
-    """Whether capsules are enlarged until no surface sticks out of them."""
-
-    def __post_init__(self) -> None:
-        if not 1 <= self.capsules <= 10:
-            raise RobotModelError(f"--capsules is {self.capsules}: give 1 to 10 for one link.")
+    """Enlarge the capsules until no surface sticks out of them: the arm then keeps more distance than necessary."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +57,9 @@ class Imported:
 
 def import_robot(file: Path, options: ImportOptions) -> Imported:
     """Read an arm, fit capsules, and propose what the file does not hold. Foreseeable misuse is a RobotModelError."""
-    arm = arm_of(read_robot(file, options.packages), options.ee)
+    if not 1 <= options.capsules <= 10:
+        raise RobotModelError(f"--capsules is {options.capsules}: give 1 to 10 for one link.")
+    arm = arm_of(read_robot(file, options.package_path), options.ee)
     limits = limits_of(arm, options.qd_max, options.qdd_max, options.tau_max)
     if options.ready:
         check_posture(np.array(options.ready), limits.q_min, limits.q_max, "--ready")

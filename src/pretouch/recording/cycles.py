@@ -143,7 +143,8 @@ class Cycles:
             return packed_inputs(inputs, self._points_at if points is not None else -1), True
         except Exception as error:  # inputs may be anything, with any behaviour
             self._points = None
-            return packed(KeptInputs(None, -1, _described(inputs, error))), False
+            sentence = f"{error}: {_REPR.repr(inputs)}"[:_SHOWN].encode("utf-8", "backslashreplace").decode()
+            return packed(KeptInputs(None, -1, sentence)), False
 
 
 def packed_inputs(inputs: Inputs, points_at: int = -1) -> bytes:
@@ -158,11 +159,6 @@ def packed_inputs(inputs: Inputs, points_at: int = -1) -> bytes:
     if not isinstance(robot.tau_ext, np.ndarray):  # such are no torques to a step either
         inputs = replace(inputs, robot=replace(robot, tau_ext=np.zeros(0)))
     return packed(KeptInputs(inputs, points_at))
-
-
-def _described(inputs: object, error: Exception) -> str:
-    """Describe inputs that cannot be kept, in one line of limited length."""
-    return f"{error}: {_REPR.repr(inputs)}"[:_SHOWN].encode("utf-8", "backslashreplace").decode()
 
 
 def inputs_of(data: bytes) -> KeptInputs:

@@ -104,12 +104,6 @@ def chunks(file: BinaryIO, contents: Contents) -> Iterator[tuple[int, list[Messa
         contents.complete = True
 
 
-def read_messages(file: BinaryIO, contents: Contents) -> Iterator[Message]:
-    """Yield the messages in the whole chunks of a file, in order."""
-    for _, messages in chunks(file, contents):
-        yield from messages
-
-
 def indexed_chunks(file: BinaryIO, contents: Contents) -> list[ChunkIndex]:
     """Return what the index at the end of a file says of each chunk, in order; nothing where there is none."""
     try:

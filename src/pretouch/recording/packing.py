@@ -45,7 +45,10 @@ def custom(hint: Any, plain: Any) -> Any:
     Numbers in a list come as an array too. `object` is what a part remembers.
     """
     if hint is object:
-        return _part(plain)
+        if not isinstance(plain, dict):
+            return plain
+        kind = _state_of(plain["part"]) if plain["part"] else np.ndarray
+        return msgspec.convert(plain["value"], kind, dec_hook=custom)
     if hint is Flat:
         f, i, b, table = (np.frombuffer(bytearray(data), kind) for data, kind in zip(plain, _BLOCKS, strict=True))
         return Flat((f, i, b, table))
@@ -60,14 +63,6 @@ def custom(hint: Any, plain: Any) -> Any:
     if array.dtype.kind not in "biuf":
         raise ValueError("numbers are none")
     return array
-
-
-def _part(plain: Any) -> Any:
-    """Return what a part of the profile remembers."""
-    if not isinstance(plain, dict):
-        return plain
-    kind = _state_of(plain["part"]) if plain["part"] else np.ndarray
-    return msgspec.convert(plain["value"], kind, dec_hook=custom)
 
 
 _ENCODER = msgspec.msgpack.Encoder(enc_hook=_plain)
@@ -112,27 +107,22 @@ def _named(hint: Any, value: Any) -> Any:
         return value
     if isinstance(value, np.ndarray):
         return {"part": "", "value": value}
-    kind = type(value)
-    if (unnamed := _unnamed(kind)) or not is_record(kind):
+    kind: Any = type(value)
+    buried = [name for name, own in hints_of(kind) if _buries(own)] if is_record(kind) else []
+    if buried or not is_record(kind):
+        within = f" with `object` within {buried[0]}" if buried else ""
         raise RecordingError(
-            f"A part of the profile remembers a {kind.__name__}{unnamed}, which a recording cannot hold: let it"
+            f"A part of the profile remembers a {kind.__name__}{within}, which a recording cannot hold: let it"
             " remember a number, an array of numbers, or a class of such fields, named as `State` of the part."
         )
-    return {"part": _owner(type(value)), "value": with_parts(value)}
+    return {"part": _owner(kind), "value": with_parts(value)}
 
 
 @cache
-def _unnamed(kind: Any) -> str:
-    """Say in which field of a class `object` stands within another type, where no part's name can stand beside it."""
-    within = [(name, hint) for name, hint in (hints_of(kind) if is_record(kind) else ()) if hint is not object]
-    return next((f" with `object` within {name}" for name, hint in within if _holds_object(hint, (kind,))), "")
-
-
-def _holds_object(hint: Any, above: tuple[Any, ...]) -> bool:
-    """Whether a type is `object`, or has it within; not where a class holds itself again."""
-    if is_record(hint) and hint not in above:
-        return any(_holds_object(inner, (*above, hint)) for _, inner in hints_of(hint))
-    return hint is object or any(_holds_object(inner, above) for inner in get_args(hint))
+def _buries(hint: Any, above: tuple[Any, ...] = ()) -> bool:
+    """Whether `object` stands within a type: no part's name can stand beside it there."""
+    inner = [own for _, own in hints_of(hint)] if is_record(hint) and hint not in above else get_args(hint)
+    return any(one is object or _buries(one, (*above, hint)) for one in inner)
 
 
 def _owner(state: type) -> str:

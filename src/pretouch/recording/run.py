@@ -224,10 +224,7 @@ def _model(record: _KeptRun) -> RobotModel:
 
 
 def _unit(record: _KeptUnit) -> SensorUnit:
-    return SensorUnit(
-        record.id, record.link, record.T_link_sensor, record.position_sigma, record.orientation_sigma, record.touch,
-        from_table(Sensor, record.sensor, "sensor"),
-    )  # fmt: skip
+    return SensorUnit(**vars(record) | {"sensor": from_table(Sensor, record.sensor, "sensor")})
 
 
 def _kept_path(path: Path) -> _KeptPath:
@@ -236,20 +233,15 @@ def _kept_path(path: Path) -> _KeptPath:
     elif type(path) is WayPoints:
         numbers = path.points
     else:
-        phases = np.linspace(0.0, path.length, _SAMPLES, endpoint=not path.closed)
-        numbers = _apart(np.array([path.point(phase) for phase in phases.tolist()], dtype=np.float64))
+        corners = list[FloatArray]()
+        for phase in np.linspace(0.0, path.length, _SAMPLES, endpoint=not path.closed).tolist():
+            point, neighbours = path.point(phase), (*corners[-1:], *corners[: int(path.closed)])
+            if all(np.linalg.norm(point - other) > _APART_M for other in neighbours):
+                corners.append(point)
+        if len(corners) == 1:  # it stands: a millimetre is drawn
+            corners.append(corners[0] + np.array([0.0, 0.0, 1e-3]))
+        numbers = np.array(corners, dtype=np.float64)
     return _KeptPath(type(path).__name__, numbers, bool(path.closed))
-
-
-def _apart(points: FloatArray) -> FloatArray:
-    """Leave out of a path's samples (W, 3) [m] those where it stands still; make one point a segment of 1 mm."""
-    corners = [points[0]]
-    for point in points[1:]:
-        if np.linalg.norm(point - corners[-1]) > _APART_M:
-            corners.append(point)
-    while len(corners) > 1 and np.linalg.norm(corners[-1] - corners[0]) <= _APART_M:  # a closed one goes back there
-        corners.pop()
-    return np.array(corners if len(corners) > 1 else [points[0], points[0] + [0.0, 0.0, 1e-3]])
 
 
 def _path(record: _KeptPath) -> Path:

@@ -62,7 +62,8 @@ class ViewerTopics:
         import scipy.spatial.transform  # noqa: F401  now, not while a loop runs: it takes a fifth of a second
 
         self._model, self._skin = model, controller.skin
-        self._path = _sampled(controller)
+        phases = np.linspace(0.0, controller.path.length, _PATH_POINTS)
+        self._path = np.array([controller.path.point(phase) for phase in phases.tolist()], dtype=np.float64)
         self._boxes = surroundings(about).boxes
         self._base, self._joints = model.links[0], list(model.joints)
         self._newest = np.full(len(controller.skin), -np.inf)
@@ -173,11 +174,6 @@ def _capsule_markers(capsules: Capsules, links: tuple[str, ...], time: int) -> l
             messages().marker(at, *shape, ns="arm", id=3 * i + k, frame_locked=True) for k, shape in enumerate(shapes)
         ]
     return markers
-
-
-def _sampled(controller: Controller) -> FloatArray:
-    phases = np.linspace(0.0, controller.path.length, _PATH_POINTS)
-    return np.array([controller.path.point(phase) for phase in phases.tolist()], dtype=np.float64)
 
 
 def _fitting(array: FloatArray, like: FloatArray) -> FloatArray:

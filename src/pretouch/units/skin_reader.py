@@ -2,6 +2,7 @@
 
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from pretouch.calibration.stamps import ImuCounters
 from pretouch.errors import RecordingError
-from pretouch.recording.mcap_file import Contents, open_mcap, read_messages
+from pretouch.recording.mcap_file import Contents, chunks, open_mcap
 from pretouch.recording.ros import JOINT_STATE, UNIT_SAMPLE, check_version, decoded
 from pretouch.sensing.unit import LARGEST_COUNT, counts_of
 from pretouch.traces import ImuTrace, JointTrace
@@ -74,7 +75,7 @@ def read_skin(place: Path) -> SkinTrace:
     samples: dict[str, list[Received]] = {}
     states: list[Any] = []
     with open_mcap(place, way_out) as file:
-        for message in read_messages(file, contents):
+        for message in chain.from_iterable(messages for _, messages in chunks(file, contents)):
             if message.kind == JOINT_STATE:
                 states.append(decoded(JOINT_STATE, message.data))
             elif message.kind == UNIT_SAMPLE:
