@@ -9,7 +9,7 @@ import pytest
 from hypothesis import settings
 from tests.needs import NEEDS
 
-from pretouch.robot.description import panda
+from pretouch.robot.description import fr3, panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing import skin
 
@@ -20,6 +20,11 @@ settings.load_profile("pretouch")
 @pytest.fixture(scope="session")
 def panda_model() -> RobotModel:
     return RobotModel(panda())
+
+
+@pytest.fixture(scope="session")
+def fr3_model() -> RobotModel:
+    return RobotModel(fr3())
 
 
 @pytest.fixture(scope="session")

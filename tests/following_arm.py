@@ -79,3 +79,10 @@ class Arm:
 
     def run(self, cycles: int, **given: object) -> list[ControlStep]:
         return [self.step(**given) for _ in range(cycles)]
+
+
+def on_its_way(model: RobotModel, skin: Skin, profile: Profile = PAPER) -> Arm:
+    """An arm on its way along its path at full speed."""
+    arm = Arm(model, skin, profile)
+    arm.run(150)
+    return arm

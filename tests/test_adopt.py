@@ -12,7 +12,7 @@ from pretouch.profiles import PROFILES, Profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import Mode
-from tests.following_arm import DT, PAPER, Arm
+from tests.following_arm import DT, PAPER, Arm, on_its_way
 
 PUSH = (0.0, 40.0, 0.0)
 
@@ -20,9 +20,7 @@ PUSH = (0.0, 40.0, 0.0)
 @pytest.fixture
 def arm(panda_model: RobotModel, paper_skin: Skin) -> Arm:
     """An arm under the paper's profile, on its way along a line at full speed."""
-    arm = Arm(panda_model, paper_skin)
-    arm.run(150)
-    return arm
+    return on_its_way(panda_model, paper_skin)
 
 
 def switch(arm: Arm, profile: Profile | None = None, path: Path | None = None) -> None:
@@ -35,8 +33,7 @@ def switch(arm: Arm, profile: Profile | None = None, path: Path | None = None) -
 
 
 def test_an_equal_controller_goes_on_as_if_nothing_had_been(arm: Arm, panda_model: RobotModel, paper_skin: Skin):
-    other = Arm(panda_model, paper_skin)
-    other.run(150)
+    other = on_its_way(panda_model, paper_skin)
     switch(arm, replace(PAPER))
     for mine, theirs in zip(arm.run(50, seen={0: 0.3}), other.run(50, seen={0: 0.3}), strict=True):
         np.testing.assert_array_equal(mine.command, theirs.command)

@@ -11,7 +11,7 @@ from pretouch.profiles import PROFILES
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, Inputs, Mode
-from tests.following_arm import PAPER, Arm
+from tests.following_arm import PAPER, Arm, on_its_way
 
 LEFT, RIGHT = 0, 1  # units of the paper's skin that look along +y and -y in the ready posture
 
@@ -19,9 +19,7 @@ LEFT, RIGHT = 0, 1  # units of the paper's skin that look along +y and -y in the
 @pytest.fixture
 def arm(panda_model: RobotModel, paper_skin: Skin) -> Arm:
     """An arm under the paper's profile, on its way along the path at full speed."""
-    arm = Arm(panda_model, paper_skin)
-    arm.run(150)
-    return arm
+    return on_its_way(panda_model, paper_skin)
 
 
 def speed(arm: Arm, step: ControlStep) -> np.ndarray:
@@ -82,8 +80,7 @@ def test_after_a_reaction_the_arm_returns_gently(arm: Arm):
 @pytest.mark.parametrize(("name", "tracks"), [("paper", 18), ("pretouch", 0)])
 @pytest.mark.parametrize("torques", [None, "many", np.full(7, np.nan), np.zeros(3), np.full(7, 1e9)])
 def test_without_a_force_estimate_the_arm_holds_and_says_for_how_long(panda_model, paper_skin, name, tracks, torques):
-    arm = Arm(panda_model, paper_skin, PROFILES[name])
-    arm.run(150)
+    arm = on_its_way(panda_model, paper_skin, PROFILES[name])
     step = arm.run(40, change=lambda robot: replace(robot, tau_ext=torques))[-1]
     assert np.isnan(step.residual).all()
     assert (step.mode is Mode.TRACK) is (name == "paper"), "which needs the wrench alone"
@@ -97,8 +94,7 @@ def test_without_a_force_estimate_the_arm_holds_and_says_for_how_long(panda_mode
 
 
 def test_a_blind_arm_needs_no_readings(panda_model: RobotModel, paper_skin: Skin):
-    arm = Arm(panda_model, paper_skin, PROFILES["blind"])
-    arm.run(150)
+    arm = on_its_way(panda_model, paper_skin, PROFILES["blind"])
     step, _ = arm.controller.step(arm.state, Inputs(arm.time, arm.robot(), None))
     assert step.mode is Mode.TRACK
     assert len(step.obstacles.unit) == 0

@@ -11,7 +11,7 @@ from pretouch.profiles import profile
 from pretouch.recording.cycles import KeptState, packed_state
 from pretouch.recording.packing import unpacked
 from pretouch.types import Mode
-from tests.following_arm import PAPER, Arm
+from tests.following_arm import PAPER, Arm, on_its_way
 from tests.fuzz.invariants import same
 
 
@@ -37,9 +37,7 @@ class Rise(Reaction, name="rise"):
 
 @pytest.fixture
 def arm(panda_model, paper_skin) -> Arm:
-    arm = Arm(panda_model, paper_skin, replace(PAPER, react=profile("paper:react=rise:react.cycles=20").react))
-    arm.run(150)
-    return arm
+    return on_its_way(panda_model, paper_skin, replace(PAPER, react=profile("paper:react=rise:react.cycles=20").react))
 
 
 def test_a_reaction_of_somebody_else_moves_the_arm_as_long_as_it_says(arm: Arm):
@@ -57,8 +55,7 @@ def test_a_reaction_of_somebody_else_moves_the_arm_as_long_as_it_says(arm: Arm):
 @pytest.mark.parametrize("name", ["rise", "pretouch"])
 def test_its_state_is_recorded_and_another_profile_goes_on_without_it(arm: Arm, panda_model, paper_skin, name: str):
     if name == "pretouch":
-        arm = Arm(panda_model, paper_skin, profile(name))
-        arm.run(150)
+        arm = on_its_way(panda_model, paper_skin, profile(name))
     arm.run(6, force=(0.0, 40.0, 0.0))
     assert arm.state.mode.mode is Mode.REACT
     assert same(unpacked(KeptState, packed_state(arm.state, False)), KeptState(False, arm.state))

@@ -11,8 +11,6 @@ import pytest
 from fci.tests.conftest import RawClient, arm_of
 
 from pretouch.cli import main
-from pretouch.robot.description import fr3
-from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin
 from pretouch.units.keys import Keys, save_keys
 from pretouch.units.receiver import SkinReceiver
@@ -48,8 +46,8 @@ def test_it_says_where_it_listens_and_ends_in_order_on_sigterm(tmp_path):
     assert float(rows[40]["force_y_N"]) == 10.0
 
 
-def test_its_units_are_heard_in_real_time(tmp_path):
-    skin = paper_skin(RobotModel(fr3()))
+def test_its_units_are_heard_in_real_time(tmp_path, fr3_model):
+    skin = paper_skin(fr3_model)
     keys = Keys().with_new(skin.ids)
     save_keys(keys, tmp_path / "keys.toml")
     with SkinReceiver(skin.ids, keys) as receiver:

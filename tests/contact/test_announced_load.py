@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.following_arm import DT, Arm, controller_of
+from tests.following_arm import DT, controller_of, on_its_way
 from tests.recording.runs import Run, assert_replays
 
 from pretouch.contact.announced_load import announced, doubted, kept_free, most_kg, without_load, wrench_of
@@ -169,8 +169,7 @@ def test_an_array_is_taken_for_the_centre():
     ids=["heavy", "a number"],
 )
 def test_an_arm_holds_on_a_payload_it_cannot_carry_and_goes_on_without_it(panda_model, paper_skin, payload, said):
-    arm = Arm(panda_model, paper_skin, PRETOUCH)
-    arm.run(150)
+    arm = on_its_way(panda_model, paper_skin, PRETOUCH)
 
     step = arm.step(payload=payload)
     assert step.mode is Mode.HOLD

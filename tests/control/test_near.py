@@ -8,14 +8,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.control.motions import Mover
-from tests.following_arm import DT, Arm
+from tests.following_arm import DT, Arm, on_its_way
 
 from pretouch.control.approach import Restricted, rows_of
 from pretouch.control.braking import braking_cap
 from pretouch.control.joint_box import joint_limits
 from pretouch.errors import ParameterError
 from pretouch.perception.closest import closest_points
-from pretouch.profiles import PROFILES, Profile, profile
+from pretouch.profiles import PROFILES, profile
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
 from pretouch.types import ControlStep, Mode, QpOutcome, RobotState
@@ -25,12 +25,6 @@ LEFT = 0
 """The unit of the paper's skin that looks along +y in the ready posture, the way the arm goes."""
 A = PRETOUCH.approach
 ACROSS = A.tangential
-
-
-def on_its_way(model: RobotModel, skin: Skin, params: Profile = PRETOUCH) -> Arm:
-    arm = Arm(model, skin, params)
-    arm.run(150)
-    return arm
 
 
 def hand_speed(arm: Arm, step: ControlStep) -> np.ndarray:
@@ -73,7 +67,7 @@ def test_rows_of_a_wrong_shape_are_refused(shape: tuple[int, int]):
 
 
 def test_towards_a_wall_the_arm_keeps_the_braking_curve_and_comes_to_touch(panda_model: RobotModel, paper_skin: Skin):
-    arm = on_its_way(panda_model, paper_skin)
+    arm = on_its_way(panda_model, paper_skin, PRETOUCH)
     steps = run_into_a_wall(arm, 600)
     near = [s for s in steps if len(s.restricted)]
     for before, step in pairwise(near):
@@ -92,7 +86,7 @@ def test_towards_a_wall_the_arm_keeps_the_braking_curve_and_comes_to_touch(panda
 
 
 def test_when_sight_is_lost_the_arm_speeds_up_no_faster_than_rows_loosen(panda_model: RobotModel, paper_skin: Skin):
-    arm = on_its_way(panda_model, paper_skin)
+    arm = on_its_way(panda_model, paper_skin, PRETOUCH)
     steps = run_into_a_wall(arm, 100)
     before = hand_speed(arm, steps[-1])[1]
     assert before < 0.15
@@ -104,7 +98,7 @@ def test_when_sight_is_lost_the_arm_speeds_up_no_faster_than_rows_loosen(panda_m
 
 
 def test_a_push_away_from_an_obstacle_is_followed_at_once(panda_model: RobotModel, paper_skin: Skin):
-    arm = on_its_way(panda_model, paper_skin)
+    arm = on_its_way(panda_model, paper_skin, PRETOUCH)
     y = arm.ee()[1] + 0.13
     for _ in range(60):
         arm.step(seen={LEFT: max(to_wall(arm, y), 0.0)})
@@ -132,14 +126,13 @@ def test_near_a_thing_beside_it_the_arm_does_not_slide_past_at_full_speed(panda_
 
 
 def test_on_a_blocked_path_the_phase_waits(panda_model: RobotModel, paper_skin: Skin):
-    arm = on_its_way(panda_model, paper_skin)
+    arm = on_its_way(panda_model, paper_skin, PRETOUCH)
     arm.run(60, seen={LEFT: 0.0})
     begun = arm.state.phase
     step = arm.run(200, seen={LEFT: 0.0})[-1]
     assert step.mode is Mode.TRACK
     assert step.path_phase - begun < 0.15
-    steps = arm.run(100)
-    assert steps[-1].reason == "Moving as asked."
+    assert arm.run(100)[-1].reason == "Moving as asked."
 
 
 def test_the_null_space_moves_the_elbow_away_and_the_hand_stays(panda_model: RobotModel):
@@ -187,7 +180,7 @@ def touch(arm: Arm, y: float, cycles: int = 300) -> float:
 
 @pytest.mark.parametrize("ahead", [0.07, 0.03])
 def test_what_appears_just_ahead_at_full_speed_is_touched_no_faster_than_the_rest(panda_model, paper_skin, ahead):
-    arm = on_its_way(panda_model, paper_skin)
+    arm = on_its_way(panda_model, paper_skin, PRETOUCH)
     assert touch(arm, wall_ahead(arm, ahead)) <= A.touch_speed_max_m_s + 0.005
 
 
@@ -207,7 +200,7 @@ def test_a_unit_that_falls_silent_near_a_thing_lets_the_arm_go_no_faster_towards
 
 
 def test_before_a_hand_that_comes_the_standing_arm_retreats_slowly_and_rests_when_it_stops(panda_model, paper_skin):
-    arm = on_its_way(panda_model, paper_skin)
+    arm = on_its_way(panda_model, paper_skin, PRETOUCH)
     arm.run(300)
     y, stop, speeds = wall_ahead(arm, 0.6), wall_ahead(arm, 0.12), []
     for _ in range(350):
@@ -222,20 +215,20 @@ def test_before_a_hand_that_comes_the_standing_arm_retreats_slowly_and_rests_whe
 
 
 def test_below_the_sensors_minimum_nothing_is_kept_once_the_unit_says_it_is_gone(panda_model, paper_skin):
-    arm = on_its_way(panda_model, paper_skin)
+    arm = on_its_way(panda_model, paper_skin, PRETOUCH)
     y = wall_ahead(arm, 0.2)
     while to_wall(arm, y) > 0.02:
         step = arm.step(seen={LEFT: max(to_wall(arm, y), 0.0)})
     assert hand_speed(arm, step)[1] < 0.12
     assert hand_speed(arm, arm.run(50)[-1])[1] > 0.25
     # and what a unit says is there for ever, dirt on it, leaves the arm the touch speed
-    arm = on_its_way(panda_model, paper_skin)
+    arm = on_its_way(panda_model, paper_skin, PRETOUCH)
     assert hand_speed(arm, arm.run(150, seen={LEFT: 0.0})[-1])[1] > 0.02
 
 
 @pytest.mark.parametrize(("one", "other"), [(0.08, 0.4), (0.06, 0.12)])
 def test_readings_that_jump_between_two_surfaces_leave_the_arm_calm(panda_model, paper_skin, one, other):
-    arm, speeds = on_its_way(panda_model, paper_skin), []
+    arm, speeds = on_its_way(panda_model, paper_skin, PRETOUCH), []
     for i in range(70):
         speeds.append(hand_speed(arm, arm.step(seen={LEFT: other if i // 2 % 2 else one}))[1])
     assert np.abs(np.diff(speeds)).max() <= A.tighten_m_s2 * DT + 1e-6
@@ -244,7 +237,7 @@ def test_readings_that_jump_between_two_surfaces_leave_the_arm_calm(panda_model,
 
 
 def test_with_things_on_all_sides_the_arm_creeps_and_the_problem_is_solved(panda_model, paper_skin):
-    arm = on_its_way(panda_model, paper_skin)
+    arm = on_its_way(panda_model, paper_skin, PRETOUCH)
     steps = arm.run(100, seen=dict.fromkeys(range(7), 0.02))
     assert {s.qp.outcome for s in steps} == {QpOutcome.SOLVED}
     assert np.linalg.norm(hand_speed(arm, steps[-1])) < 2 * A.touch_speed_max_m_s

@@ -22,7 +22,6 @@ from pretouch.importing.chain import arm_of
 from pretouch.importing.read import read_robot
 from pretouch.params import SequentialParams
 from pretouch.profiles import profile
-from pretouch.recording.reader import open_recording
 from pretouch.robot.description import description_text, load_description, panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import load_skin, paper_skin, skin_file
@@ -38,7 +37,7 @@ from tests.fuzz.mutations import Change, changed, changes
 from tests.imported_data.files import STORE1, pushed, wrenches, write_bag1, write_csv
 from tests.imported_data.joint_files import Moving
 from tests.importing.made import six_axis
-from tests.recording.runs import recorded_run
+from tests.recording.runs import read_whole, recorded_run
 from tests.units.fake_unit import KEYS, Bench
 from tests.units.test_skin_recording import record
 
@@ -83,7 +82,7 @@ def parsers(folder: Path) -> Iterator[dict[str, Parser]]:
     model = RobotModel(panda())
     recorded_run(folder / "whole.mcap", controller_of(model, paper_skin(model)), 8)
     found = {
-        "recording": _of_file(folder, "a.mcap", _read_whole, (folder / "whole.mcap").read_bytes()),
+        "recording": _of_file(folder, "a.mcap", read_whole, (folder / "whole.mcap").read_bytes()),
         "recording of units": _of_file(folder, "b.mcap", read_skin, _units_recorded(folder / "units.mcap")),
         **_of_tables(folder, model),
         "URDF": _of_file(folder, "arm.urdf", lambda p: arm_of(read_robot(p)), six_axis().encode(), words=TAGS),
@@ -107,13 +106,6 @@ def _units_recorded(place: Path) -> bytes:
         for number in range(10):
             record(recording, number)
     return place.read_bytes()
-
-
-def _read_whole(place: Path) -> None:
-    recorded = open_recording(place)
-    for _ in recorded:
-        pass
-    _ = recorded.runs[0].profile, recorded.stamps()
 
 
 # tables and bags

@@ -52,16 +52,12 @@ def test_an_arm_is_imported_by_its_name(package, tmp_path, capsys):
     [
         ("raise OSError('git: no route to host')", "could not bring it: git: no route to host"),
         ("PACKAGE_PATH = '/there'", "could not bring it: .* no attribute 'MJCF_PATH'"),
+        ("import sixerr_description", "could not bring it: No module named"),
     ],
 )
 def test_what_the_package_cannot_bring_is_said(package, text, sentence):
     with pytest.raises(RobotModelError, match=sentence):
         described(named(package, text))
-
-
-def test_an_unknown_name_is_said(package):
-    with pytest.raises(RobotModelError, match="could not bring it: No module named"):
-        described("sixerr_description")
 
 
 def test_without_the_package_it_is_said_how_to_get_it(monkeypatch):

@@ -97,23 +97,6 @@ def test_limits_that_no_joint_has_are_named(tmp_path):
     assert not any("Implausible" in r for r in limits_of(arm(tmp_path, six_axis())).remarks)
 
 
-def two_arms():
-    parts = [link("torso")]
-    for side in "lr":
-        for k in range(5):
-            parts.append(link(f"{side}{k}"))
-            parts.append(joint(f"{side}j{k}", f"{side}{k - 1}" if k else "torso", f"{side}{k}", axis=f"0 {k % 2} 1"))
-    return f"<robot name='two'>{''.join(parts)}</robot>"
-
-
-def test_of_two_arms_one_has_to_be_chosen(tmp_path):
-    with pytest.raises(RobotModelError, match="has 2 arms, or one that branches: choose one by --ee, such as l4, r4"):
-        arm(tmp_path, two_arms())
-    chosen = arm(tmp_path, two_arms(), "r4")
-    assert [j.name for j in chosen.joints] == [f"rj{k}" for k in range(5)]
-    assert "lj0, lj1" in chosen.remarks[0]
-
-
 def test_damping_and_friction_of_a_urdf_are_left_out_with_a_sentence(tmp_path):
     dynamics = {2: {"more": '<dynamics damping="10" friction="1"/>'}, 3: {"more": '<dynamics damping="0"/>'}}
     (sentence,) = arm(tmp_path, six_axis(changed=dynamics)).remarks
@@ -121,14 +104,21 @@ def test_damping_and_friction_of_a_urdf_are_left_out_with_a_sentence(tmp_path):
 
 
 def branching(before, after):
-    """A robot whose only chain splits in two."""
-    parts, last = [link("base")], "base"
-    for name, begin, count in (("t", "base", before), ("l", f"t{before}", after), ("r", f"t{before}", after)):
-        last = begin
+    """A robot whose only chain splits in two; two arms where there is nothing before."""
+    parts, fork = [link("base")], f"t{before}" if before else "base"
+    for name, last, count in (("t", "base", before), ("l", fork, after), ("r", fork, after)):
         for k in range(1, count + 1):
             parts += [link(f"{name}{k}"), joint(f"j{name}{k}", last, f"{name}{k}", axis=f"0 {k % 2} 1")]
             last = f"{name}{k}"
     return f"<robot name='split'>{''.join(parts)}</robot>"
+
+
+def test_of_two_arms_one_has_to_be_chosen(tmp_path):
+    with pytest.raises(RobotModelError, match="has 2 arms, or one that branches: choose one by --ee, such as l5, r5"):
+        arm(tmp_path, branching(0, 5))
+    chosen = arm(tmp_path, branching(0, 5), "r5")
+    assert [j.name for j in chosen.joints] == [f"jr{k}" for k in range(1, 6)]
+    assert "jl1, jl2" in chosen.remarks[0]
 
 
 def test_a_chain_that_branches_is_refused_with_the_ends_of_its_branches(tmp_path):

@@ -14,7 +14,7 @@ from pretouch.importing.robot_import import ImportOptions, import_robot, write_f
 from pretouch.page.room import HAND_FORCE_N, LiveSettings, Mouse, at_depth, live_path, settings_for
 from pretouch.page.simulation import LiveSimulation
 from pretouch.profiles import profile
-from pretouch.robot.description import fr3, robot_named
+from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import LIVE_SKIN, load_skin, skin_for
 from pretouch.sim.plant_params import plant_params_of
@@ -25,17 +25,15 @@ HAND, SCENE = HandSpec(), SceneSpec(hand=HandSpec())
 EYE = np.array([1.75, 0.95, 0.85])
 
 
-def test_a_panda_and_an_fr3_have_the_room_as_it_is(panda_model):
-    assert settings_for(panda_model, LiveSettings()) == LiveSettings()
-    assert settings_for(RobotModel(fr3()), LiveSettings()) == LiveSettings()
+def test_a_panda_and_an_fr3_have_the_room_as_it_is(panda_model, fr3_model):
+    assert settings_for(panda_model, LiveSettings()) == settings_for(fr3_model, LiveSettings()) == LiveSettings()
 
 
-def test_the_fr3_has_the_live_skin_of_the_panda(panda_model):
-    theirs, model = load_skin(LIVE_SKIN, panda_model), RobotModel(fr3())
-    skin = load_skin(LIVE_SKIN.with_name("fr3_live.toml"), model)
+def test_the_fr3_has_the_live_skin_of_the_panda(panda_model, fr3_model):
+    theirs, skin = load_skin(LIVE_SKIN, panda_model), load_skin(LIVE_SKIN.with_name("fr3_live.toml"), fr3_model)
     assert skin.ids == theirs.ids
     np.testing.assert_array_equal(skin.T_link_sensor, theirs.T_link_sensor)
-    assert [model.links[i].removeprefix("fr3") for i in skin.link] == [
+    assert [fr3_model.links[i].removeprefix("fr3") for i in skin.link] == [
         panda_model.links[i].removeprefix("panda") for i in theirs.link
     ]
 

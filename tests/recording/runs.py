@@ -19,6 +19,9 @@ from pretouch.robot.description import RobotDescription
 from pretouch.types import ControlStep, Inputs, RangeReadings, RobotState
 from tests.fuzz.invariants import same
 
+Change = Callable[[int, Inputs], Inputs]
+"""Changes the inputs of the cycle of a number."""
+
 
 @dataclass
 class Run:
@@ -71,20 +74,31 @@ def custom_arm(folder: Path) -> RobotDescription:
     return RobotDescription("two", place, "b", 2.1 * two, 3.3 * two, 9.0 * two, 0.1 * two, "a test")
 
 
-def recorded_run(place: Path, controller: Controller, cycles: int, seed: int = 0) -> Run:
-    """Turn a controller, record it, and close the file."""
-    run = Run(controller, seed)
-    with Recording(place, controller, {"seed": seed}) as recording:
-        for _ in range(cycles):
-            recording.record(run.turn())
+def record(run: Run, place: Path, cycles: int, change: Change = lambda _, inputs: inputs, about: Any = None) -> Run:
+    """Record a run as it turns, with the inputs changed, and close the file."""
+    with Recording(place, run.controller, about) as recording:
+        for k in range(cycles):
+            recording.record(run.turn(lambda inputs, k=k: change(k, inputs)))
     return run
 
 
-def assert_replays(run: Run, folder: Path, change: Callable[[int, Inputs], Inputs], cycles: int) -> Recorded:
+def recorded_run(place: Path, controller: Controller, cycles: int) -> Run:
+    """Turn a controller, record it, and close the file."""
+    return record(Run(controller), place, cycles)
+
+
+def read_whole(place: Path) -> Recorded:
+    """Open a recording, and read all of it."""
+    recorded = open_recording(place)
+    for _ in recorded:
+        pass
+    _ = recorded.runs[0].profile, recorded.stamps()
+    return recorded
+
+
+def assert_replays(run: Run, folder: Path, change: Change, cycles: int) -> Recorded:
     """Record a run whose inputs are changed: they are read back to the bit, but for nonsense, and so is each step."""
-    with Recording(folder / "a.mcap", run.controller) as recording:
-        for k in range(cycles):
-            recording.record(run.turn(lambda inputs, k=k: change(k, inputs)))
+    record(run, folder / "a.mcap", cycles, change)
     recorded = open_recording(folder / "a.mcap")
     for kept, cycle in zip(recorded, run.cycles, strict=True):
         assert kept.inputs is None or same(kept.inputs, cycle.inputs)

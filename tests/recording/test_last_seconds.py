@@ -26,21 +26,21 @@ def going_on(inputs):
     return replace(inputs, resume=False)
 
 
-def resumed(inputs):
-    return replace(inputs, resume=True)
+def broken_at(cycle):
+    return lambda i, inputs: broken(inputs) if i == cycle else going_on(inputs)
 
 
-def held(controller, folder, cycles, at, **more):
-    """A run that latches at one of its cycles, and what is kept of it."""
+def held(controller, folder, cycles, change, **more):
+    """A run whose inputs are changed, by the cycle's number, and what is kept of it."""
     run = Run(controller)
     with LastSeconds(controller, folder, **more) as kept:
         for i in range(cycles):
-            kept.record(run.turn(broken if i == at else going_on))
+            kept.record(run.turn(lambda inputs, i=i: change(i, inputs)))
     return run, kept
 
 
 def test_a_latched_hold_leaves_its_last_seconds(controller, tmp_path):
-    run, kept = held(controller, tmp_path / "holds", 660, 650, seconds=2.0)
+    run, kept = held(controller, tmp_path / "holds", 660, broken_at(650), seconds=2.0)
     assert kept.written == [tmp_path / "holds" / "hold-1.mcap"]
     assert kept.trouble == ""
     recorded = open_recording(kept.written[0])
@@ -57,22 +57,16 @@ def test_a_latched_hold_leaves_its_last_seconds(controller, tmp_path):
 def test_what_is_felt_and_seen_from_outside_is_kept_too(panda_model, paper_skin, tmp_path):
     feeling = Skin([replace(unit, touch=TouchPatch()) for unit in paper_skin.units], panda_model)
     controller = controller_of(panda_model, feeling, profile("pretouch"))
-    run, kept = Run(controller), LastSeconds(controller, tmp_path / "holds", seconds=1.0)
     source = SeenPoints(0.0, np.zeros(1), np.array([[0.6, 0.2, 0.5]]), np.array([0.01]))
-    for i in range(220):
 
-        def given(inputs, i=i):
-            nonlocal source
-            if i % 3 == 0:
-                source = SeenPoints(inputs.stamp, np.full(1, inputs.stamp), source.point.copy(), source.sigma)
-            touch = TouchReadings(
-                np.full(7, inputs.stamp), np.arange(7) == i % 7, np.full(7, 2.0), np.zeros(7, np.int64)
-            )
-            inputs = replace(inputs, touch=touch, points=source)
-            return broken(inputs) if i == 210 else going_on(inputs)
+    def given(i, inputs):
+        nonlocal source
+        if i % 3 == 0:
+            source = SeenPoints(inputs.stamp, np.full(1, inputs.stamp), source.point.copy(), source.sigma)
+        touch = TouchReadings(np.full(7, inputs.stamp), np.arange(7) == i % 7, np.full(7, 2.0), np.zeros(7, np.int64))
+        return broken_at(210)(i, replace(inputs, touch=touch, points=source))
 
-        kept.record(run.turn(given))
-    kept.close()
+    run, kept = held(controller, tmp_path / "holds", 220, given, seconds=1.0)
     recorded = open_recording(kept.written[0])
     for part in ("touch", "points"):
         assert same(getattr(recorded[50].inputs, part), getattr(run.cycles[50].inputs, part)), part
@@ -80,18 +74,17 @@ def test_what_is_felt_and_seen_from_outside_is_kept_too(panda_model, paper_skin,
 
 
 def test_a_hold_that_clears_by_itself_leaves_nothing(controller, tmp_path):
-    run, kept = Run(controller), LastSeconds(controller, tmp_path)
-    silent = lambda inputs: replace(inputs, readings=replace(inputs.readings, stamp=np.full(7, -1.0)))  # noqa: E731
-    for i in range(60):
-        kept.record(run.turn(silent if i >= 20 else lambda inputs: inputs))
-    kept.close()
+    def silent(i, inputs):
+        return replace(inputs, readings=replace(inputs.readings, stamp=np.full(7, -1.0))) if i >= 20 else inputs
+
+    run, kept = held(controller, tmp_path, 60, silent)
     assert run.cycles[-1].step.mode is Mode.HOLD
     assert kept.written == []
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_run_that_ends_with_the_very_step_that_latches_is_kept(controller, tmp_path):
-    held(controller, tmp_path, 30, 29)
+    held(controller, tmp_path, 30, broken_at(29))
     assert len(open_recording(tmp_path / "hold-1.mcap")) == 30
 
 
@@ -99,7 +92,7 @@ def test_each_hold_has_a_file_but_no_more_than_a_few(controller, tmp_path):
     (tmp_path / "hold-1.mcap").write_text("dear")
     run, kept = Run(controller), LastSeconds(controller, tmp_path, most=2)
     for i in range(100):
-        kept.record(run.turn(broken if i % 20 == 10 else resumed))
+        kept.record(run.turn(broken if i % 20 == 10 else lambda inputs: replace(inputs, resume=True)))
         for thread in kept._writing:
             thread.join()
     kept.close()
@@ -141,6 +134,6 @@ def test_inputs_that_fit_no_message_and_arrays_used_again_are_no_trouble(control
 
 def test_a_folder_that_cannot_be_made_is_one_sentence_and_raises_nothing(controller, tmp_path):
     (tmp_path / "file").touch()
-    _, kept = held(controller, tmp_path / "file" / "folder", 12, 10)
+    _, kept = held(controller, tmp_path / "file" / "folder", 12, broken_at(10))
     assert kept.written == []
     assert "were not saved" in kept.trouble

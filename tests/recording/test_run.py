@@ -13,7 +13,6 @@ from pretouch.perception.scene_filter import Fixtures
 from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify
 from pretouch.robot.body import Capsules
-from pretouch.robot.description import fr3
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.sensor import VL53L5CX
 from pretouch.sensing.skin import Skin, paper_skin
@@ -108,12 +107,11 @@ def test_zones_uncertain_places_and_touch_sensors_are_made_again_to_the_bit(tmp_
     assert verify(recorded).agrees
 
 
-def test_the_envelope_of_an_arm_is_made_again(tmp_path):
-    model = RobotModel(fr3())
-    recorded_run(tmp_path / "a.mcap", controller_of(model, paper_skin(model)), 1)
+def test_the_envelope_of_an_arm_is_made_again(tmp_path, fr3_model):
+    recorded_run(tmp_path / "a.mcap", controller_of(fr3_model, paper_skin(fr3_model)), 1)
     made = open_recording(tmp_path / "a.mcap").runs[0].model.description
-    assert same(made.envelope, model.description.envelope)
-    assert made.mjcf == model.description.mjcf
+    assert same(made.envelope, fr3_model.description.envelope)
+    assert made.mjcf == fr3_model.description.mjcf
 
 
 @pytest.mark.parametrize("source", ["", "two\nlines"])

@@ -21,7 +21,7 @@ from pretouch.types import Mode
 from tests.following_arm import SHORT, controller_of
 from tests.fuzz.machine import Course, Machine
 from tests.fuzz.worlds import any_world
-from tests.recording.runs import Run, changed, recorded_run, steps_changed
+from tests.recording.runs import Run, changed, record, recorded_run, steps_changed
 
 
 @pytest.fixture(scope="module")
@@ -73,11 +73,9 @@ def test_whatever_comes_in_is_recomputed_bit_for_bit(seed, tmp_path):
 
 
 def test_inputs_that_could_not_be_kept_are_skipped_and_the_rest_is_recomputed(controller, tmp_path):
-    run = Run(controller)
-    with Recording(tmp_path / "a.mcap", controller) as recording:
-        for i in range(60):
-            recording.record(run.turn(lambda inputs, i=i: replace(inputs, robot=None) if i in (20, 21, 40) else inputs))
-    verdict = verify(open_recording(tmp_path / "a.mcap"))
+    place, gone = tmp_path / "a.mcap", (20, 21, 40)
+    record(Run(controller), place, 60, lambda i, inputs: replace(inputs, robot=None) if i in gone else inputs)
+    verdict = verify(open_recording(place))
     assert verdict.agrees, verdict.sentence
     assert verdict.checked == 57
     assert verdict.skipped == {"inputs that could not be kept": 3}

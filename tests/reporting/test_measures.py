@@ -11,8 +11,6 @@ from pretouch.reporting.html import bad, number
 from pretouch.reporting.limits import holds_in, limit_rows, mode_section, time_in_modes
 from pretouch.reporting.motion import distance_section, nearest_to_body, speed_section
 from pretouch.reporting.record import gather, least, spread
-from pretouch.robot.description import fr3
-from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, paper_skin
 from pretouch.types import Mode, QpOutcome, QpSolution, RangeReadings, RangeStatus
 from tests.reporting import made
@@ -140,16 +138,14 @@ def test_exceeded_limits_are_named(panda_model, paper_skin):
     assert rows[1]["acceleration, largest"] == bad("4000.0 %")
 
 
-def test_an_envelope_allows_less_towards_the_end_of_a_range():
-    model = RobotModel(fr3())
-    q = model.description.q_ready.copy()
-    envelope = model.description.envelope
+def test_an_envelope_allows_less_towards_the_end_of_a_range(fr3_model):
+    q, envelope = fr3_model.description.q_ready.copy(), fr3_model.description.envelope
     q[0] = envelope.q_upper[0] - 0.1
     allowed = np.sqrt(envelope.slope[0] * 0.1) - envelope.offset[0]
     outwards, inwards = allowed * np.eye(7)[0], -2.62 * np.eye(7)[0]
     for command in (outwards, inwards):
-        steps = [made.step(model, q_commanded=q, command=command)]
-        rows, exceeded = limit_rows(course_of(model, paper_skin(model), steps))
+        steps = [made.step(fr3_model, q_commanded=q, command=command)]
+        rows, exceeded = limit_rows(course_of(fr3_model, paper_skin(fr3_model), steps))
         assert (rows[0]["velocity, largest"], exceeded) == ("100.0 %", [])
 
 

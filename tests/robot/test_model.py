@@ -29,11 +29,6 @@ def _q(model: RobotModel, fraction: np.ndarray) -> np.ndarray:
     return model.q_min + fraction * (model.q_max - model.q_min)
 
 
-@pytest.fixture(scope="module")
-def fr3_model() -> RobotModel:
-    return RobotModel(fr3())
-
-
 @pytest.fixture(scope="module", params=[panda, fr3], ids=lambda arm: arm.__name__)
 def bare(request):
     """An arm, and the same MJCF for MuJoCo's own answers, without rotor inertia, damping and constraints."""
@@ -199,10 +194,12 @@ def test_answers_depend_on_the_arguments_alone(panda_model, disturbance):
 # Models that are refused
 
 
-def test_an_unknown_link_is_answered_with_those_there_are(panda_model):
+def test_an_unknown_link_or_end_effector_is_answered_with_those_there_are(panda_model):
     assert panda_model.links[panda_model.link_index("panda_link5")] == "panda_link5"
     with pytest.raises(RobotModelError, match=r"link 'elbow' is unknown: choose from panda_link0, .*panda_hand_tcp\."):
         panda_model.link_index("elbow")
+    with pytest.raises(RobotModelError, match="link 'gripper' is unknown"):
+        RobotModel(replace(panda(), ee_body="gripper"))
 
 
 def _one_joint_arm(path: Path, joint: str, geom: str = '<geom type="capsule" size="0.1 0.2"/>') -> RobotModel:
@@ -236,8 +233,3 @@ def test_a_model_that_would_be_misunderstood_is_refused_in_one_sentence(tmp_path
     with pytest.raises(RobotModelError, match=message) as caught:
         _one_joint_arm(tmp_path, joint, geom)
     assert "\n" not in str(caught.value)
-
-
-def test_an_unknown_end_effector_is_refused():
-    with pytest.raises(RobotModelError, match="link 'gripper' is unknown"):
-        RobotModel(replace(panda(), ee_body="gripper"))

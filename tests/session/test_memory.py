@@ -18,8 +18,6 @@ from pretouch.profiles import PROFILES
 from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify
 from pretouch.recording.writer import Recording
-from pretouch.robot.description import fr3
-from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin as skin_of_arm
 from pretouch.session.memory import (
     FreeMotion,
@@ -191,14 +189,13 @@ def test_a_named_file_that_cannot_be_used_is_refused_and_never_written_over(tmp_
         begun(ModelFile("panda at here", tmp_path / "skin.toml", True), arm, relearn=relearn)
 
 
-def test_a_named_file_may_be_of_another_robot_of_the_kind_but_not_of_another_kind(file, arm):
+def test_a_named_file_may_be_of_another_robot_of_the_kind_but_not_of_another_kind(file, arm, fr3_model):
     learnt(file, arm)
     named = ModelFile("panda at 172.16.0.9", file.path, True)
     found = begun(named, arm)
     assert found.begin is not None
     assert "of panda at 172.16.0.2" in found.sentence
-    model = RobotModel(fr3())
-    other = Arm(model, skin_of_arm(model), PROFILE)
+    other = Arm(fr3_model, skin_of_arm(fr3_model), PROFILE)
     with pytest.raises(RobotModelError, match="arm = 'panda'"):
         begun(named, other)
 

@@ -1,10 +1,7 @@
 """Random skins: a unit a link, on its surface."""
 
 import numpy as np
-import pytest
 
-from pretouch.robot.description import fr3
-from pretouch.robot.model import RobotModel
 from pretouch.sim.random_skin import HEIGHT, random_skin
 
 LINKS = ("link2", "link3", "link4", "link5", "link6", "link7", "hand")
@@ -15,11 +12,6 @@ def height(model, link: int, point: np.ndarray) -> float:
     own = model.capsules.of_links(np.array([link]))
     axis = own.a[:, None] + np.linspace(0, 1, 2001)[None, :, None] * (own.b - own.a)[:, None]
     return float((np.linalg.norm(axis - point, axis=2).min(axis=1) - own.radius).min())
-
-
-@pytest.fixture(scope="module")
-def fr3_model() -> RobotModel:
-    return RobotModel(fr3())
 
 
 def test_there_is_a_unit_on_each_link_from_the_second_to_the_hand(panda_model, fr3_model):

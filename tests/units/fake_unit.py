@@ -103,6 +103,11 @@ class Bench:
             (by or self.socket).sendto(datagram, self.receiver.address)
         return self.receiver.receive()
 
+    def wait(self, seconds: float) -> None:
+        """Let time go by in which no unit says anything."""
+        self.now += seconds
+        self.receiver.receive()
+
     def answers(self, by: socket.socket | None = None) -> list[bytes]:
         """Return what came back."""
         came = []

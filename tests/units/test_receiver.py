@@ -68,8 +68,7 @@ def test_a_late_reading_of_which_a_better_bound_is_known_does_not_replace_a_newe
     bench.now += 0.02
     bench.send(unit.sample(bench.now, range_mm=300))
     while not bench.deliver():
-        bench.now += 0.01
-        bench.receiver.receive()
+        bench.wait(0.01)
     assert bench.send(unit.sample(bench.now, flags=0)) == 1
     assert bench.receiver.units[0].bound < 0.04
     assert bench.send(late) == 1
@@ -97,8 +96,7 @@ def test_readings_go_on_when_a_good_bound_drops_out_of_the_window(bench):
 def test_silence_lets_readings_grow_old_and_is_named(bench):
     bench.join()
     stamp = bench.receiver.readings().stamp.copy()
-    bench.now += 5.0
-    bench.receiver.receive()
+    bench.wait(5.0)
     assert [unit.state for unit in bench.receiver.units] == ["silent"] * 2
     np.testing.assert_array_equal(bench.receiver.readings().stamp, stamp)
 
@@ -109,11 +107,9 @@ def test_a_unit_greets_until_a_second_after_its_last_hello(bench):
         bench.now += 0.9
         bench.send(bench.units[0].hello(bench.now))
         assert traffic.state == "greeting"
-    bench.now += 0.9
-    bench.receiver.receive()
+    bench.wait(0.9)
     assert traffic.state == "greeting"
-    bench.now += 0.2
-    bench.receiver.receive()
+    bench.wait(0.2)
     assert traffic.state == "silent"
     bench.send(bench.units[0].hello(bench.now))
     assert traffic.state == "greeting"
@@ -190,8 +186,7 @@ def test_an_address_nothing_can_be_sent_to_is_counted(bench, monkeypatch):
     bench.join()
     endpoint = bench.receiver._endpoints[0]
     endpoint.address = ("255.255.255.255", 9)  # needs a permission the socket has not
-    bench.now += 1.0
-    bench.receiver.receive()
+    bench.wait(1.0)
     assert bench.receiver.unsent == 1
 
 

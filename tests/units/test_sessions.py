@@ -133,13 +133,11 @@ def test_a_unit_that_asks_again_gets_the_same_session_and_a_greater_number(bench
 def test_a_session_is_offered_for_five_seconds(bench):
     unit = bench.units[0]
     bench.greet(unit)
-    bench.now += 5.1
-    bench.receiver.receive()
+    bench.wait(5.1)
     assert bench.send(unit.sample(bench.now)) == 0
     unit.leave()
     bench.greet(unit)
-    bench.now += 4.0
-    bench.receiver.receive()
+    bench.wait(4.0)
     assert bench.send(unit.sample(bench.now)) == 1
 
 

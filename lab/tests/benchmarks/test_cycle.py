@@ -10,7 +10,6 @@ import pytest
 from pretouch.controller import Controller
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import at_rate, profile
-from pretouch.robot.description import fr3
 from pretouch.robot.model import RobotModel
 from pretouch.types import Inputs, Mode
 from pretouch_lab.benchmarks import cycle
@@ -93,9 +92,8 @@ def test_the_arm_moves_restricted_and_never_touches(panda_model: RobotModel, poi
     assert all(step.contact is None for step in steps)
 
 
-def test_any_arm_has_one():
-    model = RobotModel(fr3())
-    work = Workload(model, 7, FAST, 0)
+def test_any_arm_has_one(fr3_model: RobotModel):
+    work = Workload(fr3_model, 7, FAST, 0)
     assert {unit.link for unit in work.skin.units} <= {f"fr3_link{k}" for k in range(2, 9)} | {"fr3_hand"}
     assert np.isfinite(work.inputs().readings.distance).all()
 
