@@ -16,34 +16,37 @@ PERIOD = 1 / 30
 
 
 def test_of_one_kind_only_the_newest_waits_and_in_its_own_place():
-    actions, done = ActionQueue(), []
+    actions = ActionQueue()
     for i in range(1000):
-        actions.put(lambda i=i: done.append(i), "hand")
+        actions.put(lambda i=i: i, "hand")
         if i == 500:
-            actions.put(lambda: done.append(-1))
+            actions.put(lambda: -1)
     assert len(actions) == 2
-    for action in actions.take():
-        action.run()
-    assert done == [-1, 999]
+    assert [action.run() for action in actions.take()] == [-1, 999]
     assert actions.take() == []
 
 
 def test_what_has_to_settle_waits_until_nothing_newer_came_for_so_long():
-    actions, done = ActionQueue(), []
-
-    def tick(now: float) -> None:
-        for action in actions.take(now):
-            action.run()
-
+    actions = ActionQueue()
     for i, now in enumerate((0.0, 0.7, 1.4)):
-        actions.put(lambda i=i: done.append(i), "number", settle=0.8)
-        tick(now)
-    tick(2.1)
-    assert done == []
+        actions.put(lambda i=i: i, "number", settle=0.8)
+        assert actions.take(now) == []
+    assert actions.take(2.1) == []
     assert actions.is_waiting("number")
-    tick(2.2)
-    assert done == [2]
+    assert [action.run() for action in actions.take(2.2)] == [2]
     assert not actions.is_waiting("number")
+
+
+def test_something_else_asked_for_ends_the_wait_of_what_came_before_and_quiet_things_do_not():
+    actions = ActionQueue()
+    actions.put(lambda: "typed", "number", settle=0.8)
+    actions.put(lambda: "hand", "hand", quiet=True)
+    assert [action.run() for action in actions.take(0.0)] == ["hand"]
+    actions.put(lambda: "button")
+    actions.put(lambda: "typed later", "other number", settle=0.8)
+    assert [action.run() for action in actions.take(0.1)] == ["typed", "button"]
+    assert actions.is_waiting("other number")
+    assert [action.run() for action in actions.take()] == ["typed later"]
 
 
 def test_nothing_is_lost_between_threads():

@@ -174,11 +174,16 @@ class ActionQueue:
             return kind in self._waiting
 
     def take(self, now: float = math.inf) -> list[QueuedAction]:
-        """Return what is due at a time of the loop [s], in order; without one, all."""
+        """Return what is due at a time of the loop [s], in order; without one, all.
+
+        An action that has to settle is also due if a person asked for something else afterwards.
+        """
         with self._lock:
             for action in self._waiting.values():
                 action.due = now + action.settle if action.due is None else action.due
-            due = {key: action for key, action in self._waiting.items() if (action.due or 0.0) <= now}
+            last = max((i for i, one in enumerate(self._waiting.values()) if not (one.settle or one.quiet)), default=0)
+            items = enumerate(self._waiting.items())
+            due = {key: one for i, (key, one) in items if i < last or (one.due or 0.0) <= now}
             self._waiting = {key: action for key, action in self._waiting.items() if key not in due}
         return list(due.values())
 
