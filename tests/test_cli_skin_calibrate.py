@@ -3,6 +3,7 @@
 import csv
 import re
 import socket
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -69,10 +70,11 @@ def test_files_that_are_there_are_not_written_over_unasked(tmp_path, capsys):
         ("--recording", "x.mcap", "--json", there),
         ("simulated", "--out", there),
         ("simulated", "--out", tmp_path / "s.toml", "--json", there),
-        ("simulated", "--out", tmp_path / "s.toml", "--record", there),
     ):
         assert calibrate(*words) == 2
         assert f"{there} exists already: give another name, or --replace." in capsys.readouterr().err
+    assert calibrate("simulated", "--out", tmp_path / "s.toml", "--record", there, "--replace") == 2
+    assert capsys.readouterr().err == f"The recording {there} exists already: give another file to --record.\n"
     assert there.read_text() == "mine"
 
 
@@ -120,18 +122,14 @@ def test_the_arm_does_not_move_without_a_persons_word(tmp_path, capsys, monkeypa
         assert "The arm needs the space x" in told.out
         assert "While the arm moves, nobody may be within its reach" in told.out
         assert "The arm was not moved: answer y to allow it." in told.err
-
-    def nobody(_question):
-        raise EOFError
-
-    monkeypatch.setattr("builtins.input", nobody)
+    monkeypatch.setattr("builtins.input", Mock(side_effect=EOFError))
     assert calibrate("simulated", *files) == 2
     assert "There is no terminal to ask for permission to move the arm: give --yes." in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
 
 
 def test_the_way_to_the_start_is_part_of_what_is_asked_about(panda_model, tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(arm, "SimulatedArm", elsewhere)
+    monkeypatch.setattr(arm, "SimulatedArm", lambda model, q, *words: SimulatedArm(model, q + ASIDE, *words))
     questions = []
     monkeypatch.setattr("builtins.input", lambda question: questions.append(question) or "n")
     files = ("--out", tmp_path / "s.toml")
@@ -144,10 +142,6 @@ def test_the_way_to_the_start_is_part_of_what_is_asked_about(panda_model, tmp_pa
     ends = capsule_ends(panda_model, kinematics_of(panda_model, (panda_model.description.q_ready + ASIDE)[None]))
     assert float(told[3]) < (ends - body.radius[:, None, None])[..., 1].min() + 0.01
     assert float(told[3]) < float(re.search(r"The arm needs the space .*, y (\S+) to", said)[1])
-
-
-def elsewhere(model, q, *words):
-    return SimulatedArm(model, q + ASIDE, *words)
 
 
 def test_the_motion_is_written_for_another_driver_and_then_the_room_it_takes(

@@ -7,6 +7,7 @@ import sys
 import time
 from contextlib import contextmanager, suppress
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from pretouch.arms.simulated import Simulated
 from pretouch.calibration.motion.follow import plan_controller
 from pretouch.calibration.motion.plan import Plan
 from pretouch.cli.calibrate import live
+from pretouch.errors import RecordingError
 from pretouch.sensing.skin import load_skin
 from pretouch.session.run import Ending, go
 from pretouch.signals import Terminated, ends_raise, exit_code, noted_in_motion
@@ -50,8 +52,9 @@ class Units(NetworkSkin):
         return Traffic((), {}, 0)
 
 
-def ended(model, recording, units=None):
+def ended(model, units=None, trouble="", joints=lambda *_: None):
     """Let an arm follow a plan while that is recorded; return how it ended, and where it was."""
+    recording = SimpleNamespace(joints=joints, add=lambda *_: None, trouble=trouble)
     q, ending = model.description.q_ready, Ending()
     arm, plan = FollowingArm(q), Plan(np.array([0.0, 1.0]), np.array([q, q + 0.05]))
     measurements = live.Measurements(recording, units or Units(), (), model.joints)
@@ -62,9 +65,7 @@ def ended(model, recording, units=None):
 
 def test_joint_states_are_recorded_as_the_controller_has_them(panda_model):
     rows = []
-    ending, arm = ended(
-        panda_model, SimpleNamespace(joints=lambda *row: rows.append(row), add=lambda *_: None, trouble="")
-    )
+    ending, arm = ended(panda_model, joints=lambda *row: rows.append(row))
     assert ending == Ending()
     stamps, q = (np.concatenate(column) for column in list(zip(*rows, strict=True))[:2])
     assert np.all(np.diff(stamps) > 0.0)
@@ -74,11 +75,10 @@ def test_joint_states_are_recorded_as_the_controller_has_them(panda_model):
 
 
 def test_a_receiver_that_ends_and_a_full_disk_stop_the_arm(panda_model):
-    full = SimpleNamespace(joints=lambda *_: None, add=lambda *_: None, trouble="The disk is full.")
-    assert ended(panda_model, full)[0].stopped == "The disk is full."
-    well, dead = SimpleNamespace(joints=lambda *_: None, add=lambda *_: None, trouble=""), Units()
+    assert ended(panda_model, trouble="The disk is full.")[0].stopped == "The disk is full."
+    dead = Units()
     dead.alive = False
-    assert "The receiver of the units has ended" in ended(panda_model, well, dead)[0].stopped
+    assert "The receiver of the units has ended" in ended(panda_model, dead)[0].stopped
 
 
 def test_the_signal_that_came_first_ends_the_command_whatever_comes_while_others_are_heard_again(monkeypatch):
@@ -111,20 +111,28 @@ def at_once(monkeypatch, paper_skin):
     monkeypatch.setattr(live, "skin_for", lambda *_: paper_skin)
     monkeypatch.setattr(live.UnitWatch, "wait", lambda *_: None)
     monkeypatch.setattr(live, "_plans", lambda *_: [])
-    monkeypatch.setattr(live, "_move", lambda *_: print("It moves."))
 
 
-def test_how_to_calibrate_from_the_recording_is_said_before_the_motion(at_once, tmp_path, monkeypatch, capsys):
+@pytest.mark.parametrize(
+    ("error", "early", "code"),
+    [(RecordingError("A bad disk."), False, 2), (KeyboardInterrupt(), False, 130), (None, True, 1), (None, False, 0)],
+)
+def test_how_to_calibrate_from_the_recording_is_said_before_the_motion_and_after_a_failure(
+    at_once, tmp_path, monkeypatch, capsys, error, early, code
+):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(live, "calibrate_recorded", lambda *_: 0)
+    monkeypatch.setattr(live, "_move", lambda *_: print("It moves.") or early)
+    monkeypatch.setattr(live, "calibrate_recorded", Mock(side_effect=error, return_value=0))
     for there in ("skin.toml", "skin-calibration-1.mcap"):
         (tmp_path / there).touch()
-    assert cli.main(["skin", "calibrate", *FILES, "--json", "numbers", "--skin", "skin.toml", "--replace"]) == 0
-    before, _ = capsys.readouterr().out.split("It moves.\n")
-    assert before.endswith(
-        "All measurements are recorded in skin-calibration-2.mcap. To calibrate from it: pretouch skin calibrate"
-        " --recording skin-calibration-2.mcap --skin skin.toml --out skin.toml --json numbers --replace --arm panda\n"
+    assert cli.main(["skin", "calibrate", *FILES, "--json", "numbers", "--skin", "skin.toml", "--replace"]) == code
+    command = (
+        "To calibrate from it: pretouch skin calibrate --recording skin-calibration-2.mcap --skin skin.toml"
+        " --out skin.toml --json numbers --replace --arm panda\n"
     )
+    before, after = capsys.readouterr().out.split("It moves.\n")
+    assert before.endswith(f"All measurements are recorded in skin-calibration-2.mcap. {command}")
+    assert after == (f"The measurements are in skin-calibration-2.mcap. {command}" if code else "")
 
 
 @pytest.mark.alone
@@ -148,9 +156,7 @@ def test_the_units_of_an_arm_that_moves_here_and_now_are_found(panda_model, pape
 def test_a_motion_that_is_interrupted_leaves_its_recording_and_says_how_to_go_on(tmp_path, number, code):
     process = started(tmp_path, "calibrate", *FILES)
     assert process.stdout
-    for line in process.stdout:
-        if line.startswith("Waiting"):
-            break
+    assert any(line.startswith("Waiting") for line in process.stdout)
     time.sleep(8.0)
     process.send_signal(number)
     out, err = process.communicate(timeout=30)

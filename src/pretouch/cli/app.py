@@ -2,7 +2,8 @@
 
 A command is a dataclass whose docstrings are the help and whose `run()` does it. `run()` returns the exit code; with
 None it is 0, or that of the signal which ended the command. Where its options depend on what its first word names,
-`of_words(words)` returns the class, the words that are left, and those in front of them, and `of_all()` one for all.
+`of_words(words)` returns the class, the words that are left, and those in front of them; `of_all()`, if it is there,
+the class whose options a shell completes.
 """
 
 from collections.abc import Iterable, Sequence

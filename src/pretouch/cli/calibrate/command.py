@@ -2,12 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from pretouch.arms import arm_class
 from pretouch.calibration.motion.limits import MotionLimits, PlanParams
 from pretouch.calibration.motion.planner import plan_motion
-from pretouch.cli.calibrate.live import CalibrateArm
 from pretouch.cli.calibrate.recorded import CalibrationFiles, Recorded, calibrate_recorded
 from pretouch.cli.options import OptionalFile, split_arm
 from pretouch.cli.writing import check_outputs, numbers_to, unwritable_said
@@ -37,12 +37,9 @@ class Calibrate:
         name, others = split_arm(words)
         if len(others) == len(words):
             return Calibrate, words, "skin calibrate"
-        return CalibrateArm[arm_class(name)], others, f"skin calibrate {name}"  # type: ignore[misc]
+        from pretouch.cli.calibrate.live import CalibrateArm  # a help on the other options does not wait for this
 
-    @staticmethod
-    def of_all() -> Any:
-        """Return the command without an arm."""
-        return Calibrate
+        return CalibrateArm[arm_class(name)], others, f"skin calibrate {name}"  # type: ignore[misc]
 
     def run(self) -> int:
         """Calibrate, and show and write the answer; or write the motion."""
@@ -60,19 +57,18 @@ class Calibrate:
             wrong, mode = ("of the motion", "--recording") if recording else ("of a recording, or --out", "--plan")
             raise CalibrationError(f"Options {wrong} do not go with {mode}: leave them out.")
         if self.plan:
-            self._write_motion()
+            self._write_motion(self.plan)
             return 0
         files.check([recording, self.recorded.joints])
         with numbers_to(files.json) as write:
             return calibrate_recorded(RobotModel(robot_named(files.arm)), self.recorded, files, write)
 
-    def _write_motion(self) -> None:
-        check_outputs([("motion", self.plan)], [], self.files.replace)
+    def _write_motion(self, place: Path) -> None:
+        check_outputs([("motion", place)], [], self.files.replace)
         model = RobotModel(robot_named(self.files.arm))
         print("The motion is being planned.", flush=True)
         plan = plan_motion(model, self.motion)
-        if self.plan:
-            with unwritable_said("file", self.plan):  # first, for nobody may read on what is printed
-                plan.save(self.plan)
+        with unwritable_said("file", place):  # first, for nobody may read on what is printed
+            plan.save(place)
         print(MotionLimits(model, self.motion).report(plan))
-        print(f"Motion: {self.plan}. Keep everybody out of the arm's reach while it runs.", flush=True)
+        print(f"Motion: {place}. Keep everybody out of the arm's reach while it runs.", flush=True)

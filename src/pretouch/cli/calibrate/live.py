@@ -66,9 +66,16 @@ class CalibrateArm(Generic[A]):
         place = self.record or next(one for one in beside if not one.exists())
         self.files.check([self.units.keys], place)
         model = RobotModel(self.connection.described(robot_named(self.files.arm)))
+        code = None
         with numbers_to(self.files.json) as write:
-            early = self._moved(model, place)
-            return 1 if early else calibrate_recorded(model, Recorded(place), self.files, write)
+            try:
+                if not self._moved(model, place):
+                    code = calibrate_recorded(model, Recorded(place), self.files, write)
+            finally:
+                if code is None and place.exists():
+                    with suppress(OSError):  # the terminal may be gone
+                        print(f"The measurements are in {place}. {self._again(place)}", flush=True)
+        return 1 if code is None else code
 
     def _again(self, place: Path) -> str:
         """Say how to calibrate from the recording alone."""

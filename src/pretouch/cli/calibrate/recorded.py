@@ -43,7 +43,7 @@ class Recorded:
     """From what was recorded while the arm made a calibration motion."""
 
     recording: OptionalFile = None
-    """Recording of the units, by `pretouch skin monitor --record`, or of a run with real units."""
+    """Recording of the units, by `pretouch skin monitor --record` or by `pretouch skin calibrate NAME`."""
     joints: OptionalFile = None
     """Joint states, if they are not in the recording: a CSV file (time_s,q1_rad,...), an MCAP file or a bag, with any
     clock."""
@@ -68,9 +68,10 @@ class CalibrationFiles:
 
     def check(self, inputs: Iterable[Path | None], record: Path | None = None) -> None:
         """Refuse what could not be written, or is another input or output file too; --out may be --skin."""
+        if record and record.exists():  # whatever --replace says: a recording is never written over
+            raise CalibrationError(f"The recording {record} exists already: give another file to --record.")
         read = [*inputs, *([] if self.skin and self.out and same_file(self.skin, self.out) else [self.skin])]
-        outputs = ("skin file", self.out), ("file", self.json), ("recording", record)
-        check_outputs(outputs, read, self.replace)
+        check_outputs([("skin file", self.out), ("file", self.json), ("recording", record)], read, self.replace)
 
 
 def calibrate_recorded(
