@@ -6,7 +6,7 @@ from xml.etree.ElementTree import Element, SubElement, tostring
 
 import mujoco
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy  # its parts load when they are first used: a quarter of a second that a help does not wait
 
 from pretouch.robot.kinematics import Kinematics
 from pretouch.robot.model import RobotModel
@@ -171,8 +171,8 @@ def _add_joint(robot: Element, model: RobotModel, mj: mujoco.MjModel, link: int,
     joint = SubElement(robot, "joint", name=f"joint{number}", type="revolute" if moves else "fixed")
     SubElement(joint, "parent", link=f"link{number - 1}")
     SubElement(joint, "child", link=f"link{number}")
-    angles = Rotation.from_quat(mj.body_quat[link], scalar_first=True).as_euler("xyz")  # about fixed axes
-    SubElement(joint, "origin", xyz=_text(mj.body_pos[link]), rpy=_text(angles))
+    rotation = scipy.spatial.transform.Rotation.from_quat(mj.body_quat[link], scalar_first=True)
+    SubElement(joint, "origin", xyz=_text(mj.body_pos[link]), rpy=_text(rotation.as_euler("xyz")))  # about fixed axes
     if not moves:
         return
     j, d = int(mj.body_jntadr[link]), model.description

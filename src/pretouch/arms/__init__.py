@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from pretouch.session.push import Direction
     from pretouch.types import FloatArray, RobotState
 
-# options and their help are shown without what takes a second to import
+# an arm's options are defined without what only moving it needs
 
 GROUP = "pretouch.arms"
 DEFAULT = "simulated"

@@ -8,7 +8,7 @@ Its greatest value over all lags tells the clocks' difference.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.fft import irfft, next_fast_len, rfft
+import scipy  # see `signals`
 
 from pretouch.types import BoolArray, FloatArray
 
@@ -38,9 +38,9 @@ def align(
         most: largest lag to consider, either way [s].
     """
     a, b = _centred(turning, turned), _centred(sensed, sensing)
-    length = next_fast_len(len(a) + len(b), real=True)
-    fa, fb = rfft(a, length, axis=0), rfft(b, length, axis=0)
-    cross = irfft(fa.conj()[:, :, None] * fb[:, None, :], length, axis=0)
+    length = scipy.fft.next_fast_len(len(a) + len(b), real=True)
+    fa, fb = scipy.fft.rfft(a, length, axis=0), scipy.fft.rfft(b, length, axis=0)
+    cross = scipy.fft.irfft(fa.conj()[:, :, None] * fb[:, None, :], length, axis=0)
     # energies of both where they overlap: without them, short overlaps would never win
     energy = np.sqrt(_overlap((a**2).sum(axis=1), sensing, length) * _overlap(turned, (b**2).sum(axis=1), length))
     lags = np.arange(length)
@@ -65,8 +65,8 @@ def _centred(signal: FloatArray, known: BoolArray) -> FloatArray:
 
 def _overlap(first: FloatArray | BoolArray, second: FloatArray | BoolArray, length: int) -> FloatArray:
     """Sums of products at all lags (length,)."""
-    product = rfft(np.asarray(first, np.float64), length).conj() * rfft(np.asarray(second, np.float64), length)
-    return np.maximum(irfft(product, length), 0.0)
+    a, b = (scipy.fft.rfft(np.asarray(values, np.float64), length) for values in (first, second))
+    return np.maximum(scipy.fft.irfft(a.conj() * b, length), 0.0)
 
 
 def _peak(values: FloatArray, i: int) -> float:

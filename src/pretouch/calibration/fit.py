@@ -15,8 +15,7 @@ would move units by millimetres.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares
-from scipy.spatial.transform import Rotation
+import scipy  # see `signals`
 
 from pretouch.calibration.link_motion import LinkMotion, skew
 from pretouch.calibration.signals import Measured
@@ -81,8 +80,9 @@ class Estimate:
 
     def moved(self, x: FloatArray) -> "Estimate":
         """Return the estimate that differs from this one by x (23,): the pose by x on the manifold, the rest is x."""
+        turn = scipy.spatial.transform.Rotation.from_rotvec(x[TURN])
         return Estimate(
-            self.R @ Rotation.from_rotvec(x[TURN]).as_matrix(), self.p + x[PLACE], x[ACC_BIAS], x[GYRO_BIAS],
+            self.R @ turn.as_matrix(), self.p + x[PLACE], x[ACC_BIAS], x[GYRO_BIAS],
             x[ACC_SCALE], x[GYRO_SCALE], float(x[CLOCK]), float(x[LAG]),
             x[UPWARDS],
         )  # fmt: skip
@@ -203,7 +203,7 @@ def fit(
     for _ in range(_REWEIGHTINGS if robust else 1):
         weights = problem.weights(x) if robust else np.ones(6 * len(motion.w) + UNKNOWNS)
         # MINPACK: beside other programs the threads of LAPACK, which other methods call, cost ten times as much
-        x = least_squares(
+        x = scipy.optimize.least_squares(
             lambda x, w=weights: w * problem.residuals(x), x, lambda x, w=weights: w[:, None] * problem.jacobian(x),
             x_scale="jac", method="lm",
         ).x  # fmt: skip

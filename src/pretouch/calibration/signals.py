@@ -3,8 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import CubicSpline
-from scipy.signal import firwin, oaconvolve
+import scipy  # its parts load when they are first used: half a second that a help does not wait
 
 from pretouch.calibration.values import CUTOFF_HZ, LONGEST_GAP_S, UnitData
 from pretouch.traces import on_grid
@@ -27,10 +26,10 @@ def times(begin: float, end: float) -> FloatArray:
 def smooth(stamp: FloatArray, signal: FloatArray, at: FloatArray) -> FloatArray:
     """Low-pass a signal (M, c), sampled at increasing instants (M,) [s]; returns (F, c) at `at`, from `times`."""
     n = round(HALF_S / FINE_S)
-    kernel = firwin(2 * n + 1, CUTOFF_HZ, fs=1 / FINE_S, window=("kaiser", 8.0))
-    between = CubicSpline(stamp, signal, axis=0)(np.clip(at, stamp[0], stamp[-1]))
+    kernel = scipy.signal.firwin(2 * n + 1, CUTOFF_HZ, fs=1 / FINE_S, window=("kaiser", 8.0))
+    between = scipy.interpolate.CubicSpline(stamp, signal, axis=0)(np.clip(at, stamp[0], stamp[-1]))
     padded = np.pad(between, ((n, n), (0, 0)), mode="edge")
-    return np.asarray(oaconvolve(padded, kernel[:, None], mode="valid", axes=0))
+    return np.asarray(scipy.signal.oaconvolve(padded, kernel[:, None], mode="valid", axes=0))
 
 
 def rate_of_change(signal: FloatArray) -> FloatArray:

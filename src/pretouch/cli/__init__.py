@@ -14,7 +14,7 @@ from pretouch.cli.app import COMMANDS, SHELLS, Command, command_class, command_n
 from pretouch.errors import PluginError, PretouchError, UsageError
 from pretouch.signals import Terminated, ends_raise, exit_code
 
-# the rest of the package takes a second to import: only the commands that run something do
+# a command's module takes up to a second to import: of all commands, only the one that is named is loaded
 
 _USAGE, _INTERRUPTED, _PIPE = 2, 130, 141
 _CONFIG = (tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes)

@@ -10,8 +10,6 @@ import tyro
 from pretouch.cli.writing import check_outputs, unwritable_said
 from pretouch.errors import RecordingError
 from pretouch.extras import FIGURES
-from pretouch.recording.reader import open_recording
-from pretouch.reporting.measures import measure
 
 
 @dataclass(frozen=True)
@@ -29,8 +27,13 @@ class WriteReport:
         """Write the page."""
         if not self.files:
             raise RecordingError("No recording is given: give at least one file.")
+        places = [place.resolve() for place in self.files]
+        if twice := next((place for place in places if places.count(place) > 1), None):
+            raise RecordingError(f"The recording {twice} is given more than once: give each once.")
         FIGURES.need("A report")
         check_outputs([("report", self.out)], self.files, self.replace)
+        from pretouch.recording.reader import open_recording  # a help does not wait for this
+        from pretouch.reporting.measures import measure
         from pretouch.reporting.page import page  # needs the extra
 
         titled = zip(self.files, titles(self.files), strict=True)

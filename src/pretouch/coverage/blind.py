@@ -3,8 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
+import scipy  # its parts load when they are first used: a quarter of a second that a help does not wait
 
 from pretouch.coverage.measure import Coverage
 from pretouch.coverage.ways import Ways
@@ -51,9 +50,9 @@ def blind_spots(ways: Ways, coverage: Coverage) -> tuple[BlindSpot, ...]:
     spots = list[BlindSpot]()
     for one in np.unique(side[blind]):
         here = blind[side[blind] == one]
-        tree = cKDTree(surface.point[here])
+        tree = scipy.spatial.cKDTree(surface.point[here])
         near = tree.sparse_distance_matrix(tree, _NEIGHBOURS * float(np.sqrt(surface.area[here].max())))
-        count, patch = connected_components(near, directed=False)
+        count, patch = scipy.sparse.csgraph.connected_components(near, directed=False)
         spots += [_spot(ways, coverage, here[patch == i]) for i in range(count)]
     return tuple(sorted(spots, key=lambda spot: -spot.area_m2))
 

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
+import scipy  # its parts load when they are first used: a quarter of a second that a help does not wait
 
 from pretouch.errors import RecordingError
 from pretouch.imported_data.log import TORQUES, Choice, ImportedRecording, Log, Note, check_reach
@@ -180,9 +180,9 @@ def smoothed(time: FloatArray, values: FloatArray) -> FloatArray:
     means = values.copy()
     for piece in pieces(time):
         count = piece.stop - piece.start
-        samples = round(_OVER_S * (count - 1) / max(time[piece.stop - 1] - time[piece.start], 1e-9)) if count > 1 else 1
+        size = min(max(1, round(_OVER_S * (count - 1) / max(time[piece.stop - 1] - time[piece.start], 1e-9))), count)
         for _ in range(2):  # twice: a triangle, whose derivative does not jump
-            means[piece] = uniform_filter1d(means[piece], max(1, min(samples, count)), axis=0, mode="nearest")
+            means[piece] = scipy.ndimage.uniform_filter1d(means[piece], size, axis=0, mode="nearest")
     return means
 
 

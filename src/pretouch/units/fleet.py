@@ -20,10 +20,9 @@ from pretouch.sim.plant import Plant
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders, RangeSample
 from pretouch.sim.touch_sensor import Forces, TouchErrors, TouchSample, TouchSensors, no_forces
 from pretouch.sim.under_way import UnderWay
-from pretouch.units.keys import Keys, UnitKey
+from pretouch.units.keys import KEY_SIZE, Keys, UnitKey
 from pretouch.units.receiver import keys_of
 from pretouch.units.simulated import SimulatedUnit, UnitParams
-from pretouch.units.wire import KEY_SIZE
 
 Measured = TypeVar("Measured", RangeSample, ImuSample, TouchSample)
 Item = TypeVar("Item")

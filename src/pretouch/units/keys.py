@@ -15,8 +15,8 @@ import tomli_w
 from pretouch.atomic_write import atomic_write
 from pretouch.errors import HardwareError
 from pretouch.toml_files import parse_toml
-from pretouch.units.wire import KEY_SIZE
 
+KEY_SIZE = 32
 _LAST_NUMBER = 0xFFFF
 _NO_SECRET = 10**9
 """A number below this is no key, which must not get into logs."""

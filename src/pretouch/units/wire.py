@@ -26,7 +26,6 @@ MAGIC = b"PT"
 VERSION = 1
 TAG_SIZE = 16
 CHALLENGE_SIZE = NONCE_SIZE = 8
-KEY_SIZE = 32
 
 PREFIX = struct.Struct("<2sBBH")
 """Magic, version, kind, number of the unit."""

@@ -7,7 +7,7 @@ from pretouch.calibration.motion.limits import PlanParams
 from pretouch.cli.options import JsonFile
 from pretouch.errors import CalibrationError
 
-if TYPE_CHECKING:  # the help is to need none of the heavy packages
+if TYPE_CHECKING:  # the help needs the motion's parameters, but nothing that simulates
     from pretouch_lab.studies.calibration.study import Study
 
 
