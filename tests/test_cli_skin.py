@@ -125,9 +125,8 @@ def test_a_posture_tells_whether_units_agree_with_the_model(panda_model, paper_s
     assert code == 1
     said = capsys.readouterr().out
     assert "fault: hand_back reports 0.90 m where the model has the arm" in said
-    assert (
-        said.split("Nothing was received")[0].count("where the model has the arm") == 2
-    )  # when it came, and at the end
+    # when it came, and at the end
+    assert said.split("Nothing was received")[0].count("where the model has the arm") == 2
 
 
 def test_a_terminal_shows_a_table_that_changes(keys, port, tmp_path, capsys, monkeypatch):
@@ -186,10 +185,10 @@ def test_bad_input_ends_with_one_sentence_and_code_2(keys, port, tmp_path, capsy
     assert said.out == ""
 
 
-def started(*args):
+def started(*words):
     return subprocess.Popen(
-        [sys.executable, "-m", "pretouch.cli", *args], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-        cwd=ROOT, env={**os.environ, "PYTHONUNBUFFERED": "1"},
+        [sys.executable, "-m", "pretouch.cli", "skin", *map(str, words)], stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE, text=True, cwd=ROOT, env={**os.environ, "PYTHONUNBUFFERED": "1"},
     )  # fmt: skip
 
 
@@ -198,13 +197,9 @@ def started(*args):
 def test_a_monitor_that_is_ended_leaves_its_recording(keys, port, tmp_path, number, code):
     place = tmp_path / "units.mcap"
     with Desk(keys, port) as desk:
-        process = started(
-            "skin", "monitor", "--keys", str(tmp_path / "keys.toml"), "--port", str(port), "--record", str(place)
-        )
+        process = started("monitor", "--keys", tmp_path / "keys.toml", "--port", port, "--record", place)
         assert process.stdout
-        for line in process.stdout:
-            if line.startswith("2 s"):
-                break
+        assert any(line.startswith("2 s") for line in process.stdout)
         time.sleep(0.5)
         process.send_signal(number)
         sent = desk.fleet.units[0]._sequence
@@ -273,9 +268,7 @@ def test_a_simulation_that_makes_no_sense_is_refused(tmp_path, capsys, more, wor
 @pytest.mark.slow
 def test_simulated_units_are_heard_by_the_monitor_with_the_keys_that_were_made(tmp_path, port, capsys):
     place = tmp_path / "keys.toml"
-    simulation = started(
-        "skin", "simulate", "--keys", str(place), "--port", str(port), "--silenced", "hand_left", "--loss", "0.2"
-    )
+    simulation = started("simulate", "--keys", place, "--port", port, "--silenced", "hand_left", "--loss", "0.2")
     try:
         assert simulation.stdout
         assert "Made keys for 7 units" in simulation.stdout.readline()

@@ -23,7 +23,7 @@ def test_numbers_figure_and_a_skin_with_more_units(tmp_path, capsys, panda_model
     assert load_skin(skin, panda_model).ids[-2:] == ("suggested_1", "suggested_2")
     assert figure.read_bytes().startswith(b"\x89PNG")
     found = json.loads(numbers.read_text())
-    assert found["asked"]["params"]["warning_m"] == pytest.approx(0.373)
+    assert found["asked"]["approach"]["warning_m"] == pytest.approx(0.373)
     assert found["links"][-1]["name"] == "whole arm"
     for what in ("links", "met"):
         assert found["after"][what][-1]["ways"] > found["before"][what][-1]["ways"] > 0

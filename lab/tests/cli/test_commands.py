@@ -47,6 +47,7 @@ def run(capsys, *args):
         ("identify x.csv --arm nowhere", "nowhere"),
         ("identify x.csv --figure x.gif", "no ending that says its format"),
         ("bench cycle --points 7,0", "The number of points is 0: give 1 to 10000"),
+        ("bench cycle --points=", "The number of points is missing: give 1 to 10000"),
         ("bench cycle --rate 10", "The rate is 10 Hz"),
         ("bench cycle --rate nan", "The rate is nan Hz: give more than 20 and up to 10000 Hz"),
         ("bench cycle --cycles 0", "The number of cycles is 0"),

@@ -42,7 +42,7 @@ class MeasureCoverage:
     """panda, fr3, or the folder of an imported arm."""
     workspace: str = "paths"
     """Postures to average over: circle, line, paths (both of the paper's), or joints (their whole range)."""
-    params: CoverageParams = field(default_factory=CoverageParams)
+    approach: CoverageParams = field(default_factory=CoverageParams)
     floor: float = -0.2
     """Height of the floor in the base frame [m]."""
     postures: int = 50
@@ -72,7 +72,8 @@ class MeasureCoverage:
             source = None
         skin = load_skin(source, model) if source else Skin([], model)
         self._check_outputs(source)
-        setting = Setting(model, floor_and_pedestal(self.floor), self.params, self.workspace, self.postures, self.seed)
+        fixed = floor_and_pedestal(self.floor)
+        setting = Setting(model, fixed, self.approach, self.workspace, self.postures, self.seed)
         with numbers_to(self.json) as write:
             write({"asked": self} | _measured(self, setting, skin))
 
@@ -92,8 +93,7 @@ class MeasureCoverage:
             )
         if self.figure:
             FIGURES.need("A figure")
-        outputs = ("skin file", self.out), ("figure", self.figure), ("file", self.json)
-        check_outputs(outputs, [source], self.replace)
+        check_outputs([("skin file", self.out), ("figure", self.figure), ("file", self.json)], [source], self.replace)
 
 
 def _measured(command: MeasureCoverage, setting: Setting, skin: Skin) -> dict[str, Any]:

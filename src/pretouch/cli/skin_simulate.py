@@ -2,7 +2,6 @@
 
 from contextlib import closing
 from dataclasses import dataclass, field
-from functools import partial
 from math import inf
 from pathlib import Path
 
@@ -12,14 +11,13 @@ from pretouch.errors import ParameterError
 from pretouch.profiles import profile as find_profile
 from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
-from pretouch.sensing.skin import Skin, skin_for
+from pretouch.sensing.skin import skin_for
+from pretouch.session.terminal import say
 from pretouch.sim.imu import ImuParams
 from pretouch.sim.paper_scenes import assumptions, placement_for
 from pretouch.units import HOST, PORT
 from pretouch.units.fleet import ChannelParams, Fleet, FleetParams, NetworkParams
 from pretouch.units.keys import Keys, load_keys, save_keys
-
-_say = partial(print, flush=True)
 
 
 @dataclass(frozen=True)
@@ -36,7 +34,8 @@ class Simulate:
     """Name or address of the receiver."""
     port: int = PORT
     """UDP port of the receiver."""
-    up: ChannelParams = field(default_factory=ChannelParams)
+    channel: ChannelParams = field(default_factory=ChannelParams)
+    """Loss and delay of datagrams to the receiver; on the way back as many are lost, and the delay is shorter."""
     reboot_every: float = 0.0
     """Time between two reboots of each unit [s]; 0: none."""
     silenced: Words = ()
@@ -56,25 +55,17 @@ class Simulate:
         """Simulate until interrupted, or for the given time."""
         if self.seed < 0 or not 0.0 <= self.duration < inf:
             raise ParameterError(f"--seed is {self.seed}, --duration {self.duration:g} s: give 0 or more of both.")
-        up = self.up
+        up = self.channel
         down = ChannelParams(up.loss, 0.15 * up.delay_s, 0.3 * up.jitter_s, jitter_shape=2.0)
         params = FleetParams(network=NetworkParams(up, down), imu=ImuParams(), reboot_every_s=self.reboot_every)
         model, profile, end = RobotModel(robot_named(self.arm)), find_profile(self.profile), self.duration or inf
         skin, placement = skin_for(model, self.skin), placement_for(model)
         for sentence in assumptions(model, placement):
-            _say(sentence)
-        keys = keys_for(self.keys, skin)
+            say(sentence)
+        keys = load_keys(self.keys) if self.keys.exists() else Keys().with_new(skin.network.ids)
+        if not self.keys.exists():
+            save_keys(keys, self.keys)
+            say(f"Made keys for {len(keys)} units: {self.keys}")
         with closing(Fleet(skin.network, keys, params, self.seed, (self.host, self.port))) as fleet:
             fleet.set_faults(self.silenced, self.stuck)
-            path = placement.path("circle", -1.0)
-            run(model, skin, fleet, path, profile, self.hand, lambda now: now >= end, _say)
-
-
-def keys_for(place: Path, skin: Skin) -> Keys:
-    """Return the keys of a file, made for the skin's units if it is not there."""
-    if place.exists():
-        return load_keys(place)
-    keys = Keys().with_new(skin.network.ids)
-    save_keys(keys, place)
-    _say(f"Made keys for {len(keys)} units: {place}")
-    return keys
+            run(model, skin, fleet, placement.path("circle", -1.0), profile, self.hand, lambda now: now >= end, say)

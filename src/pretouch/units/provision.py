@@ -33,7 +33,7 @@ _LIMITS = {
 
 @dataclass(frozen=True)
 class Network:
-    """Where a unit sends, and what it carries: what cannot be is a HardwareError."""
+    """Where a unit sends, and what it carries; values that no unit can have are refused."""
 
     ssid: str
     """Name of the Wi-Fi network (2.4 GHz)."""

@@ -24,8 +24,8 @@ def bench_cycle(points: tuple[int, ...], request: CycleRequest, json: Path | Non
     What was measured before something ended the run is shown and written all the same.
     """
     wrong = [n for n in points if not 1 <= n <= LARGEST_SKIN]
-    if wrong:
-        raise ExperimentError(f"The number of points is {wrong[0]}: give 1 to {LARGEST_SKIN}.")
+    if wrong or not points:
+        raise ExperimentError(f"The number of points is {wrong[0] if wrong else 'missing'}: give 1 to {LARGEST_SKIN}.")
     check_wishes(request.priority, request.cpu)
     with numbers_to(json) as write:
         _measure(points, request, write)

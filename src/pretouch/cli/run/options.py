@@ -34,7 +34,7 @@ class UnitOptions:
     """Where the sensor units are heard."""
 
     keys: OptionalFile = None
-    """File of the keys of units that are received over the network; without it, the units that the arm brings."""
+    """File of the keys of units that are received over the network; without it, the arm's own or simulated ones."""
     units_host: str = HOST
     """Address to receive units at; real ones need 0.0.0.0, which is every address of this machine."""
     units_port: int = PORT
