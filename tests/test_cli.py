@@ -139,6 +139,12 @@ def test_the_overview_fits_a_screen_and_has_each_command_once():
     assert any(line.startswith("Added") and " mine " in line for line in lines)
 
 
+@pytest.mark.parametrize(("words", "name"), [("skin keys", "numba"), ("report", "numba"), ("detect", "scipy.ndimage")])
+def test_a_help_loads_no_library_that_the_command_alone_needs(words, name):
+    command = [sys.executable, "-X", "importtime", "-m", "pretouch.cli", *words.split(), "--help"]
+    assert f" {name}\n" not in subprocess.run(command, capture_output=True, text=True, check=True).stderr
+
+
 def test_the_overview_leaves_out_what_is_not_installed():
     said = overview(OWN, {})
     assert " demo " not in said

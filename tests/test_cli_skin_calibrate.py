@@ -132,8 +132,7 @@ def test_the_way_to_the_start_is_part_of_what_is_asked_about(panda_model, tmp_pa
     monkeypatch.setattr(arm, "SimulatedArm", lambda model, q, *words: SimulatedArm(model, q + ASIDE, *words))
     questions = []
     monkeypatch.setattr("builtins.input", lambda question: questions.append(question) or "n")
-    files = ("--out", tmp_path / "s.toml")
-    assert calibrate("simulated", *files, "--duration-s", 45) == 2
+    assert calibrate("simulated", "--out", tmp_path / "s.toml", "--duration-s", 45) == 2
     said = capsys.readouterr().out
     told = re.search(r"moving to its start takes (\d+) s and needs the space x (\S+) to .*, y (\S+) to", said)
     assert told
