@@ -22,6 +22,8 @@ FAULTS = [
     "jump", "distance", "stamp", "dead",
 ]  # fmt: skip
 LATCHING = FAULTS[:4] + FAULTS[6:11]
+NO_VALUE = {"no wrench", "stale", "backwards", "jump", "dead"}
+"""Faults that are the same whatever number is given."""
 
 
 class Arm(following_arm.Arm):
@@ -76,8 +78,10 @@ def spoiled(inputs: Inputs, fault: str, value: float = np.nan) -> Inputs:
     return weather.spoiled(inputs, fault, value)
 
 
-@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, -1e15, 1e306])
-@pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.parametrize(
+    ("fault", "value"),
+    [(fault, value) for fault in FAULTS for value in (np.nan, *(() if fault in NO_VALUE else (np.inf, -1e15, 1e306)))],
+)
 def test_one_fault_that_lasts(arm: Arm, fault: str, value: float):
     arm.run(60)
     assert np.linalg.norm(arm.qd) > 0.05

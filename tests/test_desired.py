@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pretouch import desired, loop
+from pretouch import desired
 from pretouch.control.commander import _nearer, rotation_about
 from pretouch.desired import Desired, DesiredKind
 from pretouch.errors import ParameterError
@@ -16,46 +16,20 @@ from pretouch.profiles import profile
 from pretouch.recording.verify import verify
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch.types import ControlStep, Inputs, Mode
-from tests.following_arm import controller_of
+from pretouch.types import Inputs, Mode
+from tests.following_arm import DT, Arm, controller_of
 from tests.recording.runs import Run, assert_replays
-from tests.test_loop import DT, World
 
 
-class Commanded:
-    """An arm that follows its commands, driven by a commander: asks(time, arm) for each step."""
+class Commanded(Arm):
+    """An arm that follows its commands, driven by a commander: asks(time, arm) for each step; push(time) is felt."""
 
-    def __init__(self, model: RobotModel, asks, seconds=4.0, arm=World, name="paper"):
-        self.model = model
-        self.control = controller_of(model, Skin([], model), profile(name))
-        self.arm = arm(model, 0)
-        self.begin = model.kinematics(self.arm.read().q)
-        self.steps: list[ControlStep] = []
-        self.cycles: list[loop.Cycle] = []
-        state = self.control.init(self.arm.read())
-        while True:
-            now = self.arm.tick()
-            options = loop.Options(desired=lambda now=now: asks(now, self))
-            cycle = loop.turn(self.control, state, self.arm, self.arm.skin(), now, options)
-            state = cycle.after
-            self.steps.append(cycle.step)
-            self.cycles.append(cycle)
-            if now > seconds:
-                break
-
-    @property
-    def end(self):
-        return self.model.kinematics(self.arm.read().q)
-
-
-class Pushed(World):
-    """An arm that something pushes."""
-
-    push = np.zeros(3)
-
-    def read(self):
-        state = super().read()
-        return replace(state, wrench=state.wrench + np.r_[self.push, np.zeros(3)])
+    def __init__(self, model: RobotModel, asks, seconds=4.0, name="paper", push=lambda _: (0.0, 0.0, 0.0)):
+        super().__init__(model, Skin([], model), profile(name))
+        self.begin, self.cycles = model.kinematics(self.q), []
+        while self.time <= seconds:
+            self.cycles.append(self.turn(push(self.time), desired=asks(self.time, self)))
+        self.steps = [cycle.step for cycle in self.cycles]
 
 
 TURN = rotation_about(np.array([0.0, 0.0, 1.0]), 0.3)
@@ -98,14 +72,14 @@ def test_a_pose_and_joint_positions_are_reached_and_kept(panda_model):
         return desired.pose(now, T)
 
     run = Commanded(panda_model, asks=to_pose, seconds=9.0)
-    begin, end, ee = run.begin, run.end, panda_model.ee
+    begin, end, ee = run.begin, panda_model.kinematics(run.q), panda_model.ee
     np.testing.assert_allclose(end.position[ee] - begin.position[ee], (0.05, 0.1, -0.05), atol=2e-3)
     np.testing.assert_allclose(end.rotation[ee], TURN @ begin.rotation[ee], atol=0.02)
     assert max(np.linalg.norm(step.ee_velocity) for step in run.steps) < 0.31
 
     q = panda_model.description.q_ready + 0.1
     joints = Commanded(panda_model, asks=lambda now, _: desired.joint_positions(now, q), seconds=8.0)
-    np.testing.assert_allclose(joints.arm.read().q, q, atol=2e-3)
+    np.testing.assert_allclose(joints.q, q, atol=2e-3)
 
 
 def test_a_horizon_of_positions_is_followed_in_time(panda_model):
@@ -124,7 +98,7 @@ def test_a_motion_that_goes_stale_brings_the_arm_to_rest_says_so_and_is_taken_up
 
     run = Commanded(panda_model, asks=asks)
     stale = [step for step in run.steps if "desired motion ended" in step.reason]
-    assert stale[0].stamp == pytest.approx(2.0 + run.control.profile.failure.desired_timeout_s, abs=2 * DT)
+    assert stale[0].stamp == pytest.approx(2.0 + run.controller.profile.failure.desired_timeout_s, abs=2 * DT)
     assert stale[0].mode is Mode.HOLD
     assert np.abs(stale[-1].command).max() < 1e-9
     change = np.abs(np.diff([step.command for step in run.steps], axis=0))
@@ -203,12 +177,11 @@ def test_while_the_arm_yields_its_orientation_is_held_and_not_turned_to_what_is_
     far, ee = rotation_about(np.array([0.0, 0.0, 1.0]), 1.5), panda_model.ee
 
     def asks(now, run):
-        run.arm.push = np.array([0.0, 40.0, 0.0]) * (3.0 < now < 3.3)
         T = np.eye(4)
         T[:3, 3], T[:3, :3] = run.begin.position[ee], far @ run.begin.rotation[ee]
         return desired.pose(now, T) if now > 2.9 else desired.twist(now, np.zeros(3))
 
-    run = Commanded(panda_model, asks=asks, seconds=4.0, arm=Pushed)
+    run = Commanded(panda_model, asks, push=lambda now: (0.0, 40.0 * (3.0 < now < 3.3), 0.0))
     yielding = [k for k, step in enumerate(run.steps) if step.mode is Mode.REACT]
     assert len(yielding) > 20
     goals = {run.cycles[k].after.memory.get("rotation_goal").tobytes() for k in yielding}

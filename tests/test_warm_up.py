@@ -34,8 +34,10 @@ def recorded(controller: Controller, monkeypatch: pytest.MonkeyPatch) -> list[Co
     return steps
 
 
-@pytest.mark.parametrize("name", ["paper", "blind", "paper:approach.rows=hard", "paper:detect.compare=raw", "pretouch"])
-@pytest.mark.parametrize("rate", [100.0, 1000.0])
+@pytest.mark.parametrize(
+    ("name", "rate"),
+    [("paper", 1000.0), ("blind", 100.0), ("paper:approach.rows=hard", 100.0), ("pretouch", 1000.0)],
+)
 def test_a_warm_up_sees_every_mode(panda_model, paper_skin, robot: RobotState, monkeypatch, name: str, rate: float):
     controller = controller_of(panda_model, paper_skin, at_rate(profile(name), rate))
     steps = recorded(controller, monkeypatch)
@@ -79,7 +81,7 @@ def loaded():
     return found
 
 model = RobotModel(panda())
-controller = Controller(model, paper_skin(model), no_fixtures(), Circle(), at_rate(profile(sys.argv[2]), 1000.0))
+controller = Controller(model, paper_skin(model), no_fixtures(), Circle(), at_rate(profile("paper"), 1000.0))
 q, qd, now, units = model.description.q_ready, np.zeros(7), 0.0, len(controller.skin)
 
 def robot(push=0.0):
@@ -101,11 +103,10 @@ sys.exit(f"compiled in the loop: {new}" if new else 0)
 """
 
 
-@pytest.mark.parametrize(
-    ("how", "name"), [("warm", "paper"), ("warm", "paper:approach.rows=hard"), ("warm", "blind"), ("cold", "paper")]
-)
-def test_nothing_is_compiled_after_a_warm_up(how: str, name: str):
-    done = subprocess.run([sys.executable, "-c", PROBE, how, name], capture_output=True, text=True)
+@pytest.mark.parametrize("how", ["warm", "cold"])
+def test_nothing_is_compiled_after_a_warm_up(how: str):
+    # one profile for all: which parts it has are numbers to what is compiled
+    done = subprocess.run([sys.executable, "-c", PROBE, how], capture_output=True, text=True)
     assert done.returncode == (0 if how == "warm" else 1), done.stderr
     if how == "cold":
         assert done.stderr.startswith("compiled in the loop")

@@ -5,9 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from hypothesis.extra.numpy import arrays
 
 from pretouch.contact.admittance import Admittance
 from pretouch.contact.reaction import DecayingVelocity, reaction_velocity
@@ -58,8 +55,7 @@ def test_a_full_window_filters_with_its_last_statistics_and_its_last_value():
     np.testing.assert_allclose(np.sort(state.ring[:, 1]), [0.0, 0.0, 0.5, 0.95])
 
 
-@pytest.mark.parametrize("samples", [2, 7, 100])
-@pytest.mark.parametrize("offset", [0.0, 1e4, -1e4])
+@pytest.mark.parametrize(("samples", "offset"), [(2, 0.0), (7, 1e4), (100, -1e4)])
 def test_statistics_equal_numpy_over_thousands_of_samples(samples: int, offset: float):
     rng = np.random.default_rng([7, samples])
     state, ring = window_init(samples), deque(maxlen=samples)
@@ -128,14 +124,3 @@ def test_without_an_arm_an_answer_lasts_as_long_as_the_reaction_or_that_of_the_p
     assert DecayingVelocity.of(short, 0.001) is short
     assert DecayingVelocity.of(Admittance(), 0.01) == DecayingVelocity()
     assert DecayingVelocity.of(Admittance(), 0.001).decay_cycles == 2000
-
-
-@given(arrays(np.float64, 3, elements=st.floats(-1e4, 1e4)))
-@settings(max_examples=200)
-def test_velocity_points_along_the_force_within_the_bound(force: np.ndarray):
-    velocity = reaction_velocity(force, 0.03, 0.3)
-    speed, size = np.linalg.norm(velocity), np.linalg.norm(force)
-    assert speed <= 0.3 * (1 + 1e-12)
-    # parallel, and never against the push: v . F = |v| |F|
-    assert velocity @ force >= speed * size * (1 - 1e-9)
-    np.testing.assert_allclose(speed, min(0.3, 0.03 * size), rtol=1e-9, atol=1e-15)
