@@ -43,7 +43,7 @@ def test_a_profile_that_takes_no_points_and_one_without_a_source_do_the_same_to_
         points = seen(beside.time, beside.ee() + np.array([0.0, 0.2, 0.0])) if given else None
         assert same(plain.step(), beside.step(points=points))
     mine, other = plain.state.memory, beside.state.memory
-    assert same(replace(plain.state, memory=other, quick=beside.state.quick), beside.state)
+    assert same(replace(plain.state, memory=other), beside.state)
     assert same(*(tuple(map(of_units, memory.part("slots", Slots))) for memory in (mine, other)))
     assert all(
         same(mine.get(path), other.get(path)) for path in mine.places if not path.startswith(("slots.", "outside."))

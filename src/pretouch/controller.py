@@ -48,8 +48,6 @@ class ControllerState:
     """What was announced of a load; None before anything was."""
     calm: bool
     """Whether the next step may be one call."""
-    quick: bool
-    """Whether the step before was."""
 
     @property
     def phase(self) -> float:
@@ -107,10 +105,11 @@ class Controller:
         memory = self._begin.copy()
         begin_watch(memory.part("watch", Watched), sound)
         memory.put("command", sound.qd_commanded)
+        memory.get("mass.path")[:] = sound.q_commanded
         memory.put("rotation_goal", self.model.kinematics(sound.q).rotation[self.model.ee])
         detector = self.kept_detector(memory, self.profile.detect.init(self.body, learnt))
         reaction = self.profile.react.init(self.body, sound.q_commanded)
-        return ControllerState(memory, mode_init(), detector, reaction, self._begin_approach, None, False, False)
+        return ControllerState(memory, mode_init(), detector, reaction, self._begin_approach, None, False)
 
     def adopt(self, state: ControllerState, before: "Controller") -> ControllerState:
         """Go on from a state of another controller of the same arm and skin, with this one's profile and path.
@@ -125,11 +124,14 @@ class Controller:
             raise RobotStateError("The state is that of a controller for another arm or skin: begin with init().")
         same_window = mine.window.samples == theirs.window.samples and type(mine.detect) is type(theirs.detect)
         same_points = self.outside_places == before.outside_places
-        parts = ["watch", "tracks", "pace", "command", "rotation_goal", "mass"] + ["outside"] * same_points
+        parts = ["watch", "tracks", "pace", "command", "rotation_goal"] + ["outside"] * same_points
         parts += ["window"] * same_window + ["null_velocity"] * (mine.null_space == theirs.null_space)
+        parts += ["mass"] * (type(mine.react) is type(theirs.react))
         memory.take(remembered, parts + ["slots"] * (mine.approach == theirs.approach and same_points))
         watch = memory.part("watch", Watched)
         take_sent(watch, remembered.part("watch", Watched))
+        if "mass" not in parts:
+            memory.get("mass.path")[:] = watch.robot.q_commanded
         if self.path is not before.path:
             here = self.model.kinematics(watch.robot.q).position[self.model.ee]
             memory.put("pace.phase", nearest_phase(self.path, here))
@@ -137,11 +139,11 @@ class Controller:
         detector = mine.detect.init(self.body)
         if same_window:
             detector = mine.detect.adopted(before.whole_detector(state), self.body, theirs.detect)
-        reaction = mine.react.adopted(before.whole_reaction(state), self.body, theirs.react, watch.robot.q_commanded)
+        reaction = mine.react.adopted(state.reaction, self.body, theirs.react, watch.robot.q_commanded)
         return replace(
             state, memory=memory, detector=self.kept_detector(memory, detector), reaction=reaction,
             approach=state.approach if mine.approach == theirs.approach else self._begin_approach,
-            calm=False, quick=False,
+            calm=False,
         )  # fmt: skip
 
     def step(self, state: ControllerState, inputs: Inputs) -> tuple[ControlStep, ControllerState]:
@@ -154,7 +156,7 @@ class Controller:
                 self.put_path(now, remembered.get("pace.phase"))
                 if self.take(memory, now, self.beside, CHECK, MOVE) and now.get("answer.ending") == SOLVED:
                     return ControlStep.of(now, CLEAR), ControllerState(
-                        memory, CLEAR, state.detector, state.reaction, state.approach, None, True, True
+                        memory, CLEAR, state.detector, state.reaction, state.approach, None, True
                     )
                 memory = remembered.copy()
         step, after = Decision(self, state, memory).taken(inputs)
@@ -182,11 +184,6 @@ class Controller:
             return state
         memory.fill("test", state.test)
         return replace(state, test=None)
-
-    def whole_reaction(self, state: ControllerState) -> Any:
-        """Return all that the reaction remembers."""
-        memory = self.with_places(state.memory)
-        return self.profile.react.caught_up(state.reaction, memory) if state.quick else state.reaction
 
     def with_places(self, memory: Flat) -> Flat:
         """Return what is remembered with the places of its fields, which a recording does not have."""

@@ -8,6 +8,7 @@ import numpy as np
 from pretouch.contact.announced_load import announced, kept_free, without_load
 from pretouch.contact.detector import Detection, Sample
 from pretouch.contact.reaction import ReactionInputs
+from pretouch.contact.virtual_mass import VirtualMass
 from pretouch.contact.window import Window, add_force
 from pretouch.control.approach import MotionRequest, Restriction, rows_of
 from pretouch.control.commander import Asked, asked_by
@@ -55,11 +56,16 @@ class Decision:
         )  # fmt: skip
         load = self.load and kept_free(self.load, self.robot.tau_ext, detection.residual)
         detector = self.controller.kept_detector(self.memory, detector)
-        rests = self.profile.react.keep_free(reaction, self.memory)
-        calm = rests and mode == CLEAR and detection.contact is None and not self._has_source and load is None
+        calm = (
+            self.profile.react.is_over(reaction)
+            and mode == CLEAR
+            and detection.contact is None
+            and not self._has_source
+            and load is None
+        )
         return step, {
             "mode": mode, "detector": detector, "reaction": reaction, "approach": approach, "load": load,
-            "calm": calm and self._is_compiled(detector), "quick": False,
+            "calm": calm and self._is_compiled(detector),
         }  # fmt: skip
 
     def _is_compiled(self, detector: Any) -> bool:
@@ -168,9 +174,9 @@ class Decision:
         phase, goal = memory.get("pace.phase"), memory.get("rotation_goal").copy()
         noticed = ReactionInputs(
             mode, self.kin, self.robot, detection, near_of(now, "seen.all"), missed, memory.get("command").copy(),
-            phase, resume,
+            phase, resume, memory.part("mass", VirtualMass),
         )  # fmt: skip
-        answers, reaction = p.react.sense(controller.whole_reaction(self.state), controller.body, noticed)
+        answers, reaction = p.react.sense(self.state.reaction, controller.body, noticed)
         self.mode = next_mode(mode, self.events | answers, resume)
         contact = detection.contact if self.mode.mode is Mode.REACT is not mode.mode else None
 

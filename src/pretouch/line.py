@@ -125,7 +125,7 @@ def detect(fixed: Blocks, remembered: Blocks, now: Blocks) -> bool:
     if contact or not armed:
         return True
     if kinds.react == ADMITTANCE:
-        learn_mean(mass.mean, mass.samples, d.residual, test.period, mass.torque)
+        learn_mean(mass, d.residual, test.period)
         if notes_path:
             note_place(mass.path, mass.marked, robot.q_commanded, test.period)
     return False

@@ -4,7 +4,7 @@ from typing import Annotated, NamedTuple
 
 from pretouch.contact.residual_model import SequentialNumbers, SequentialState
 from pretouch.contact.sequential_step import SampleTest
-from pretouch.contact.virtual_mass import FreeMass
+from pretouch.contact.virtual_mass import VirtualMass
 from pretouch.contact.window import Window
 from pretouch.control.approach import MotionRequest
 from pretouch.control.braking import BrakingNumbers, Slots
@@ -72,7 +72,7 @@ class Remembered(NamedTuple):
     outside: OutsideState
     window: Window
     test: SequentialState
-    mass: FreeMass
+    mass: VirtualMass
     pace: Pace
     slots: Slots
     null_velocity: Annotated[FloatArray, "n"]

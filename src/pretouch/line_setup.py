@@ -7,13 +7,12 @@ from typing import Any
 import numpy as np
 
 from pretouch.contact.admittance import Admittance
-from pretouch.contact.clamp import clamp_init
 from pretouch.contact.moving_thresholds import MovingThresholds
 from pretouch.contact.reaction import DecayingVelocity
 from pretouch.contact.residual_model import sequential_init, sequential_numbers
 from pretouch.contact.scatter import LENGTHS
 from pretouch.contact.sequential_test import SequentialTest
-from pretouch.contact.virtual_mass import FreeMass
+from pretouch.contact.virtual_mass import mass_init
 from pretouch.contact.window import window_init
 from pretouch.control.approach import (
     ApproachRestriction,
@@ -97,7 +96,7 @@ def remembered_init(controller: Any) -> Remembered:
         zeros(Watched, n=n, S=sent),
         track_init(len(controller.skin)), outside_init(controller.outside_places), window_init(profile.window.samples),
         sequential_init(n if kinds.detect == SEQUENTIAL else 0, SequentialParams()),
-        FreeMass(np.zeros((2, n)), cycles, none, clamp_init(none).path, zero), Pace(np.ones(1), cycles, zero, zero),
+        mass_init(n, Admittance.of_kind(profile.react)), Pace(np.ones(1), cycles, zero, zero),
         slots_init(_places(controller) if kinds.approach == BRAKING else 0), none, none, np.eye(3),
     )  # fmt: skip
 

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from pretouch.contact.virtual_mass import (
     BRAKES_S,
     VirtualMass,
-    begun,
+    begin,
     dead_band,
-    learnt,
+    learn_mean,
     mass_init,
     within_reach,
     yield_to,
@@ -36,6 +36,12 @@ def axes_of(q: np.ndarray):
 
 
 READY = axes_of(MODEL.description.q_ready)
+
+
+def begun(params, axes, torque, before, band) -> VirtualMass:
+    state = mass_init(N, params)
+    begin(state, axes, torque, before, band, params)
+    return state
 
 
 def yielded(state: VirtualMass, torque, command, band, params, axes=READY) -> VirtualMass:
@@ -83,7 +89,7 @@ def test_a_torque_within_the_dead_band_moves_nothing():
 def test_a_torque_is_told_from_its_mean_in_free_motion():
     state = mass_init(N, NO_LAG)
     for _ in range(5):
-        state = learnt(state, np.full(N, 3.0), DT, NO_LAG)
+        learn_mean(state, np.full(N, 3.0), DT)
     np.testing.assert_allclose(state.mean, 3.0)
     np.testing.assert_allclose(after(state, np.full(N, 3.0) + only(2, 6.0)).torque, only(2, 6.0))
 
@@ -91,16 +97,16 @@ def test_a_torque_is_told_from_its_mean_in_free_motion():
 def test_what_has_lasted_for_60_ms_is_hardly_in_the_mean():
     state = mass_init(N, P)
     for _ in range(1000):
-        state = learnt(state, np.zeros(N), DT, P)
+        learn_mean(state, np.zeros(N), DT)
     for _ in range(6):
-        state = learnt(state, np.full(N, 10.0), DT, P)
+        learn_mean(state, np.full(N, 10.0), DT)
     assert 0 < state.mean[1].max() < 0.1
 
 
 def test_a_contact_begins_at_the_damper_s_speed_as_far_as_the_start_energy_goes():
-    weak = begun(mass_init(N, P), READY, only(3, 3.0), np.zeros(N), BAND, P)
+    weak = begun(P, READY, only(3, 3.0), np.zeros(N), BAND)
     np.testing.assert_allclose(weak.velocity, only(3, 2.0 / 20.0))
-    strong = begun(mass_init(N, P), READY, only(3, -60.0), np.zeros(N), BAND, P)
+    strong = begun(P, READY, only(3, -60.0), np.zeros(N), BAND)
     # 1/2 M v^2 = 0.2 J
     np.testing.assert_allclose(strong.velocity, only(3, -math.sqrt(0.2)))
 
@@ -160,7 +166,7 @@ def test_it_takes_energy_and_gives_none_whatever_is_pushed(pushes, bias, seed, a
     rng, keep = np.random.default_rng(seed), math.exp(-DT / P.lag_s)
     noise = 0.5 / ((1 + keep) / (1 - keep))  # with the bias within the dead band
     state, command, estimate = (
-        begun(mass_init(N, P), READY, np.zeros(N), np.zeros(N), BAND, P),
+        begun(P, READY, np.zeros(N), np.zeros(N), BAND),
         np.zeros(N),
         np.zeros(N),
     )
@@ -188,7 +194,7 @@ def test_it_takes_energy_and_gives_none_whatever_is_pushed(pushes, bias, seed, a
 @given(st.lists(st.floats(-40, 40), min_size=N, max_size=N))
 def test_a_push_never_moves_the_arm_towards_who_pushes(torque):
     """The power that the person gives is never negative, on whatever link: it is torque times joint velocity."""
-    state = begun(mass_init(N, NO_LAG), READY, np.array(torque), np.zeros(N), BAND, NO_LAG)
+    state = begun(NO_LAG, READY, np.array(torque), np.zeros(N), BAND)
     for _ in range(5):
         assert np.all(state.velocity * torque >= 0)
         state = after(state, torque)
@@ -239,7 +245,7 @@ def test_a_push_of_4_nm_moves_a_joint_within_half_a_second_and_under_a_bias_it_s
 def test_noise_of_one_sample_begins_no_motion():
     torque = np.array([9.0, -6.0, 4.0, 0.0, 0.0, 3.0, 2.0])
     before = np.array([7.0, 1.0, 2.0, 0.0, 0.0, 2.9, 2.0])
-    started = begun(mass_init(N, OURS), READY, torque, before, OURS_BAND, OURS)
+    started = begun(OURS, READY, torque, before, OURS_BAND)
     # the lesser of both beyond the band, where it is more than 0.85 times the friction
     np.testing.assert_array_equal(np.flatnonzero(started.velocity), [0, 5])
     assert started.velocity[0] / started.velocity[5] == pytest.approx((7.0 - 2.24) / (2.9 - 0.74))
@@ -260,7 +266,7 @@ def test_a_noisy_and_biased_estimate_moves_nobody_who_pushes_back():
         for _ in range(16):
             torque = keep * torque + (1 - keep) * (J.T @ force)
             samples.append(torque + bias + M @ (0.48 * rng.standard_normal(N)))
-        state = begun(mass_init(N, OURS), axes, samples[4], samples[3], OURS_BAND, OURS)
+        state = begun(OURS, axes, samples[4], samples[3], OURS_BAND)
         for sample in samples[5:]:
             assert force @ J @ state.velocity >= 0.0
             state = yielded(state, sample, state.velocity, OURS_BAND, OURS, axes)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from pretouch.contact.clamp import caught_between, clamp_init, clamped, note_place, opened
+from pretouch.contact.virtual_mass import MARKS
 from pretouch.params import ClampParams
 
 P = ClampParams()
@@ -101,7 +102,7 @@ def test_it_does_not_open_into_what_pushes_it():
 
 def come(cycles: int = 60):
     """The path of an arm that has turned a joint by 0.01 rad in each cycle, and where it is."""
-    path, marked = clamp_init(Q).path.copy(), np.zeros(1)
+    path, marked = np.tile(Q, (MARKS, 1)), np.zeros(1)
     for k in range(cycles):
         note_place(path, marked, 0.01 * (k + 1) * WAY, DT)
     return path, 0.01 * cycles * WAY
@@ -109,7 +110,7 @@ def come(cycles: int = 60):
 
 def test_the_arm_opens_the_way_it_came_and_does_not_close_again_what_has_been_opened_already():
     path, q = come()
-    begun = caught_between(replace(clamp_init(q), path=path, came=1.0 * WAY), "one and other", 50.0, 6.0 * WAY)
+    begun = caught_between(replace(clamp_init(q), came=1.0 * WAY), path, "one and other", 50.0, 6.0 * WAY)
     # where it was caught, and four places of the way farther back
     for at in (q, q - 0.22 * WAY):
         way, state = opened(begun, -6.0 * WAY, at, DT, P)

@@ -29,20 +29,17 @@ from pretouch.contact.repeated_contact import (
 )
 from pretouch.contact.virtual_mass import (
     Axes,
-    FreeMass,
     VirtualMass,
-    begun,
+    begin,
     dead_band,
     fastest_point,
-    learnt,
-    learnt_mass,
-    mass_init,
+    learn_mean,
+    settle,
     within_reach,
     yield_to,
 )
 from pretouch.modes import Event, ModeState
 from pretouch.params import AdmittanceParams, ClampParams
-from pretouch.records import Flat
 from pretouch.robot.body import placed
 from pretouch.robot.kinematics import Kinematics, below
 from pretouch.types import FloatArray, Mode
@@ -54,9 +51,8 @@ Doing = Literal["task", "learn", "react", "soft", "still"]
 
 @value
 class AdmittanceState:
-    """Memory of the admittance."""
+    """Memory of the admittance beside its virtual mass."""
 
-    mass: VirtualMass
     clamp: ClampState
     place: RepeatedContactState
     origin: FloatArray | None = None
@@ -74,31 +70,30 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
 
     def init(self, body: Body, q: FloatArray) -> AdmittanceState:
         """Return the state without a contact, at joint positions (n,) [rad]."""
-        return AdmittanceState(mass_init(len(q), self), clamp_init(q), repeated_contact_init())
+        return AdmittanceState(clamp_init(q), repeated_contact_init())
 
     def sense(
         self, state: AdmittanceState, body: Body, inputs: ReactionInputs
     ) -> tuple[dict[Event, str], AdmittanceState]:
         """Let the virtual mass move, look for clamps, count places; name what the reaction is at."""
         doing, near = self._doing(inputs.mode, inputs.detection.armed), self._near(inputs)
-        mass, clamp, moved = self._moved(state, doing, body, inputs), state.clamp, 0.0
-        q, dt = inputs.robot.q_commanded, body.period
+        mass, clamp, moved, q, dt = inputs.mass, state.clamp, 0.0, inputs.robot.q_commanded, body.period
+        self._move_mass(clamp, doing, body, inputs)
         if doing == "react" and state.origin is not None:
             # a soft hold has no such bound: who frees somebody, or guides the arm out, may have to move it farther
-            velocity, moved = within_reach(_axes(body, inputs.kin), mass.velocity, state.origin, self.reach_m)
-            mass = mass._replace(velocity=velocity)
+            mass.velocity[:], moved = within_reach(_axes(body, inputs.kin), mass.velocity, state.origin, self.reach_m)
         # a clamp that is found stands: the arm opens out of it, and no other is looked for
         if doing == "react" and not clamp.torque:
             if self.clamp is not None:
                 clamp = clamped(clamp, mass.torque, mass.velocity, q, dt, self.clamp)
             clamp = self._pinched(clamp, body, inputs)
         elif doing == "task" and self.pinch is not None:
-            path, marked = clamp.path.copy(), np.array([clamp.marked])
-            note_place(path, marked, q, dt)
-            clamp = replace(clamp, path=path, marked=float(marked[0]))
+            note_place(mass.path, mass.marked, q, dt)
+        if inputs.resume:
+            clamp, mass.path[:], mass.marked[0] = clamp_init(q), q, 0.0
         # what the tank holds beyond its start is the least energy that the contact has given
         place = self._placed(state.place, doing, mass.tank[0] - self.start_energy_j, near, dt, inputs)
-        state = AdmittanceState(mass, clamp_init(q) if inputs.resume else clamp, place, state.origin, moved)
+        state = AdmittanceState(clamp, place, state.origin, moved)
         return self._events(state, doing, near, inputs), state
 
     def move(
@@ -110,36 +105,24 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
         doing = self._doing(mode, inputs.detection.armed)
         if doing not in ("react", "soft"):
             return None, state
-        qd, kin = state.mass.velocity, inputs.kin
+        qd, kin = inputs.mass.velocity.copy(), inputs.kin
         opens = doing == "react" and state.clamp.torque > 0 and not state.clamp.open
         if opens:
             # also what is caught between links, where no other clamp is looked for
             p = self.clamp or ClampParams()
-            back, clamp = opened(state.clamp, state.mass.torque, inputs.robot.q_commanded, body.period, p)
+            back, clamp = opened(state.clamp, inputs.mass.torque, inputs.robot.q_commanded, body.period, p)
             fastest = fastest_point(_axes(body, kin), back)
             qd = back * min(1.0, p.open_m_s / fastest) if fastest > 0 else back  # never beyond the place in one period
-            state = replace(state, clamp=clamp, mass=state.mass._replace(velocity=np.zeros(len(qd))))
+            state, inputs.mass.velocity[:] = replace(state, clamp=clamp), 0.0
         if doing == "soft" and not qd.any():
             return None, state
         # a pushed arm touches nothing that it sees; one that is caught is between two objects, and must get out
         touch_speed = (self.clamp or ClampParams()).open_m_s if opens else 0.0
         return ReactionMotion(body.model.ee_jacobian(kin)[:3] @ qd, qd, touch_speed), state
 
-    def caught_up(self, state: AdmittanceState, memory: Flat) -> AdmittanceState:
-        """Return the state with the mean torque of free motion and the places that the task went through."""
-        free, clamp = memory.part("mass", FreeMass), state.clamp
-        if self.pinch is not None:
-            clamp = replace(clamp, path=free.path, marked=float(free.marked[0]))
-        mass = learnt_mass(free.mean, free.samples, free.torque, self)
-        return replace(state, mass=mass, clamp=clamp, moved=0.0)
-
-    def keep_free(self, state: AdmittanceState, memory: Flat) -> bool:
-        """Leave the same in the memory; return whether there is neither a clamp nor a place given up."""
-        mass, clamp = state.mass, state.clamp
-        free = FreeMass(mass.mean, mass.samples, mass.torque, clamp.path, np.array([clamp.marked]))
-        for name, number in zip(free._fields, free, strict=True):
-            memory.put(f"mass.{name}", number)
-        return not clamp.torque and not state.place.contacts
+    def is_over(self, state: AdmittanceState) -> bool:
+        """Whether there is neither a clamp nor a place given up."""
+        return not state.clamp.torque and not state.place.contacts
 
     def announced(self, period: float) -> str:
         """Say how fast the arm goes with a push, and when it goes on."""
@@ -160,22 +143,19 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
         """Whether something is seen near the body, or may be missed."""
         return inputs.unseen or any(distance < self.near_m for distance in inputs.obstacles.body_distance.tolist())
 
-    def _moved(self, state: AdmittanceState, doing: Doing, body: Body, inputs: ReactionInputs) -> VirtualMass:
+    def _move_mass(self, clamp: ClampState, doing: Doing, body: Body, inputs: ReactionInputs) -> None:
         """Let the mass learn in free motion, and yield to the external torque in a reaction or a soft hold."""
-        mass, clamp, detection, dt = state.mass, state.clamp, inputs.detection, body.period
+        mass, detection, residual = inputs.mass, inputs.detection, _residual(inputs)
         if doing == "learn" or (doing == "task" and detection.contact is None):
-            return learnt(mass, _residual(mass, inputs), dt, self)
-        if doing not in ("react", "soft"):
-            return mass
-        residual, band = _residual(mass, inputs), dead_band(body.model.description.tau_max, self)
-        mass = VirtualMass._make(part.copy() for part in mass)
-        yield_to(
-            mass, residual, inputs.command, band, _axes(body, inputs.kin), self.numbers, dt, detection.evidence >= 1.0
-        )  # fmt: skip
-        if doing == "soft" and clamp.torque:
-            # out of the clamp it may be moved, not back into it
-            mass.velocity[mass.velocity * clamp.course > 0] = 0.0
-        return mass
+            learn_mean(mass, residual, body.period)
+            settle(mass, self)
+        elif doing in ("react", "soft"):
+            band, axes = dead_band(body.model.description.tau_max, self), _axes(body, inputs.kin)
+            contact = detection.evidence >= 1.0
+            yield_to(mass, residual, inputs.command, band, axes, self.numbers, body.period, contact)
+            if doing == "soft" and clamp.torque:
+                # out of the clamp it may be moved, not back into it
+                mass.velocity[mass.velocity * clamp.course > 0] = 0.0
 
     def _placed(
         self, place: RepeatedContactState, doing: Doing, energy: float, near: bool, dt: float, inputs: ReactionInputs
@@ -195,12 +175,13 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
         """Begin to move with the contact that was found; one the arm brought about in its task counts for its place."""
         model, kin, command = body.model, inputs.kin, inputs.command
         doing = self._doing(inputs.mode, inputs.detection.armed)
-        torque = _residual(state.mass, inputs) - state.mass.mean[1]
+        torque = _residual(inputs) - inputs.mass.mean[1]
         band = dead_band(model.description.tau_max, self)
         # The torque before the onset: the last sample, or in a soft hold the filtered torque. A stiff hold remembers
         # none, and the sample stands for itself.
-        before = {"soft": state.mass.steady[0], "still": torque}.get(doing, state.mass.torque)
-        mass, place, contact = begun(state.mass, _axes(body, kin), torque, before, band, self), state.place, None
+        before = {"soft": inputs.mass.steady[0], "still": torque}.get(doing, inputs.mass.torque)
+        begin(inputs.mass, _axes(body, kin), torque, before, band, self)
+        place, contact = state.place, None
         if doing == "task":
             contact = inputs.detection.contact
         if contact is not None and self.give_up is not None:
@@ -212,10 +193,8 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
             place = replace(place, counted=False)
         # only the arm's own task closes a gap on something: without a motion there is no self-clamping to be found
         came = command if doing == "task" else np.zeros(len(torque))
-        clamp = replace(clamp_init(inputs.robot.q_commanded), path=state.clamp.path, came=came)
-        return AdmittanceState(
-            mass, self._pinched(clamp, body, inputs), place, np.array(placed(model.body, kin)[1:3]), 0.0
-        )  # fmt: skip
+        clamp = self._pinched(replace(clamp_init(inputs.robot.q_commanded), came=came), body, inputs)
+        return AdmittanceState(clamp, place, np.array(placed(model.body, kin)[1:3]), 0.0)
 
     def _pinched(self, clamp: ClampState, body: Body, inputs: ReactionInputs) -> ClampState:
         """Look for something caught between two links, or one and a fixture, as long as a contact is detected."""
@@ -226,22 +205,22 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
         pinch = find_self_clamp(body.model, inputs.kin, torque, covariance, clamp.came, p)
         if pinch is not None:
             one, other, force = pinch
-            return caught_between(clamp, f"{names[one]} and {names[other]}", force, torque)
+            return caught_between(clamp, inputs.mass.path, f"{names[one]} and {names[other]}", force, torque)
         if presses_on_fixture(body, inputs.kin, touched, clamp.came, p):
             force = float(np.linalg.norm(touched.force[0]))
-            return caught_between(clamp, f"{names[touched.link[0]]} and a fixture", force, torque)
+            return caught_between(clamp, inputs.mass.path, f"{names[touched.link[0]]} and a fixture", force, torque)
         return clamp
 
     def _events(self, state: AdmittanceState, doing: Doing, near: bool, inputs: ReactionInputs) -> dict[Event, str]:
         """Name a contact that moves the arm, what the reaction is at, and what the arm gave up."""
-        mass, clamp, place = state.mass, state.clamp, state.place
+        mass, clamp, place = inputs.mass, state.clamp, state.place
         # an arm that holds softly sticks to static friction
         sticks = doing == "soft" and self.static_friction_nm > 0 and not mass.sliding.any()
         events = {} if sticks else contact_event(inputs.detection)
         # one of these at most, the first that holds; giving up is reported beside it
         if clamp.torque:
             events[Event.CLAMPED if clamp.open else Event.OPENING] = _caught(clamp)
-        elif doing == "react" and self._waits(state, near, inputs.detection.lasting):
+        elif doing == "react" and self._waits(state.place, near, inputs):
             until = ", once nothing is seen near it" if near and not given_up(place, self.give_up) else ""
             at_reach = state.moved > _FAR * self.reach_m
             far = f"; it is {state.moved:.2f} m away, and goes no farther" if at_reach else ""
@@ -259,15 +238,15 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
             )
         return events
 
-    def _waits(self, state: AdmittanceState, near: bool, lasting: bool) -> bool:
+    def _waits(self, place: RepeatedContactState, near: bool, inputs: ReactionInputs) -> bool:
         """Whether the arm still yields, or waits for more of the push, or for what presses or is near to go.
 
         For what is near it waits only where it will go on; it waits too while it is being found out if the residual
         is a load (`Detection.lasting`).
         """
-        quiet = state.mass.quiet[0]
-        waits_for = (near and not given_up(state.place, self.give_up)) or self._presses(state.mass)
-        return lasting or quiet < self.quiet_s or (waits_for and quiet < self.patience_s)
+        quiet = inputs.mass.quiet[0]
+        waits_for = (near and not given_up(place, self.give_up)) or self._presses(inputs.mass)
+        return inputs.detection.lasting or quiet < self.quiet_s or (waits_for and quiet < self.patience_s)
 
     def _presses(self, mass: VirtualMass) -> bool:
         """Whether an arm that static friction holds has detected a contact of late."""
@@ -279,10 +258,10 @@ def _axes(body: Body, kin: Kinematics) -> Axes:
     return kin, body.model.moved_by, body.model.body
 
 
-def _residual(mass: VirtualMass, inputs: ReactionInputs) -> FloatArray:
+def _residual(inputs: ReactionInputs) -> FloatArray:
     """Return the external torques (n,) [Nm]; without an estimate, those of free motion, which drive nothing."""
     residual = inputs.detection.residual
-    return residual if below(residual, np.inf) else mass.mean[1]
+    return residual if below(residual, np.inf) else inputs.mass.mean[1].copy()
 
 
 def _caught(clamp: ClampState) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 
 from pretouch.compiled import compiled
 from pretouch.contact.detector import Body
+from pretouch.contact.virtual_mass import MARKS
 from pretouch.params import ClampParams, PinchParams
 from pretouch.robot.body import placed
 from pretouch.robot.kinematics import Kinematics, below
@@ -20,10 +21,8 @@ from pretouch.robot.postures import nearest_points
 from pretouch.types import FloatArray, Touched
 from pretouch.values import value
 
-_MARKS = 12
-"""Places kept of the path the arm came."""
 _APART_S = 0.05
-"""Time between two of them [s]."""
+"""Time between two places of the path the arm came [s]."""
 
 
 @value
@@ -41,7 +40,7 @@ class ClampState:
     turned: float
     """Time since the last of them [s]."""
     trail: FloatArray
-    """(M, n) joint positions commanded on the path, newest first [rad]."""
+    """(M, n) joint positions commanded since the contact, newest first, or on the way to it [rad]."""
     marked: float
     """Time since the newest was noted [s]."""
     torque: float
@@ -50,8 +49,6 @@ class ClampState:
     """Time for which the arm has opened [s]."""
     open: bool
     """Whether it has."""
-    path: FloatArray
-    """(M, n) as `trail`, of the path before the contact [rad]."""
     came: FloatArray
     """(n,) joint velocities with which the arm came to the contact [rad/s]."""
     between: str
@@ -62,8 +59,8 @@ class ClampState:
 
 def clamp_init(q: FloatArray) -> ClampState:
     """Return the state of an arm that has met nothing, at joint positions (n,) [rad]."""
-    there, none = np.tile(q, (_MARKS, 1)), np.zeros(len(q))
-    return ClampState(none, np.inf, 0.0, 0, np.inf, there, 0.0, 0.0, 0.0, False, there, none, "", 0.0)
+    there, none = np.tile(q, (MARKS, 1)), np.zeros(len(q))
+    return ClampState(none, np.inf, 0.0, 0, np.inf, there, 0.0, 0.0, 0.0, False, none, "", 0.0)
 
 
 @compiled
@@ -82,10 +79,13 @@ def note_place(path: FloatArray, marked: FloatArray, q: FloatArray, dt: float) -
         path[0] = q
 
 
-def caught_between(state: ClampState, between: str, force: float, torque: FloatArray) -> ClampState:
-    """Take what is caught between two objects, and turns the joints (n,) [Nm], for a clamp: out of it the arm opens."""
+def caught_between(state: ClampState, path: FloatArray, between: str, force: float, torque: FloatArray) -> ClampState:
+    """Take what is caught between two objects, and turns the joints (n,) [Nm], for a clamp.
+
+    Out of it the arm opens along its path (M, n) [rad] before the contact.
+    """
     size = float(np.abs(torque).max())
-    return replace(state, torque=size, trail=state.path, between=between, force=force, opposed=0.0)
+    return replace(state, torque=size, trail=path.copy(), between=between, force=force, opposed=0.0)
 
 
 def clamped(

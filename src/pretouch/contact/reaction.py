@@ -8,9 +8,9 @@ import numpy as np
 from pretouch.checks import Positive, PositiveCount
 from pretouch.composition import Part
 from pretouch.contact.detector import Body, Detection
+from pretouch.contact.virtual_mass import VirtualMass
 from pretouch.modes import Event, ModeState
 from pretouch.params import TaskParams
-from pretouch.records import Flat
 from pretouch.robot.kinematics import Kinematics
 from pretouch.types import Contact, FloatArray, Mode, Obstacles, RobotState
 from pretouch.values import value
@@ -34,6 +34,8 @@ class ReactionInputs:
     """Arc length of the task along its path [m]."""
     resume: bool
     """Whether a person asks to go on."""
+    mass: VirtualMass
+    """That of the reaction `admittance`, which writes to it: compiled code learns its mean in free motion."""
 
 
 @value
@@ -78,12 +80,8 @@ class Reaction(Part, group="pretouch.reactions"):
         """
         raise NotImplementedError
 
-    def caught_up(self, state: Any, memory: Flat) -> Any:
-        """Return the state after steps that were one compiled call each, by what these left in the memory."""
-        return state
-
-    def keep_free(self, state: Any, memory: Flat) -> bool:
-        """Leave in the memory what compiled steps go on from; return whether they may, for there is no contact."""
+    def is_over(self, state: Any) -> bool:
+        """Whether nothing is left of a contact, so that compiled steps may go on, which leave this state as it is."""
         return False
 
     def adopted(self, state: Any, body: Body, before: "Reaction", q: FloatArray) -> Any:
@@ -195,8 +193,8 @@ class DecayingVelocity(Reaction, name="decay"):
             state = self.begun(contact.force)
         return ReactionMotion(state.decayed(self.decay_cycles)), state.advanced()
 
-    def keep_free(self, state: DecayState, memory: Flat) -> bool:
-        """Return whether no reaction is under way: nothing else is remembered."""
+    def is_over(self, state: DecayState) -> bool:
+        """Whether no reaction is under way: nothing else is remembered."""
         return not self.active(state)
 
     def adopted(self, state: DecayState, body: Body, before: Reaction, q: FloatArray) -> DecayState:

@@ -13,55 +13,62 @@ import numpy as np
 
 from pretouch.compiled import compiled, kernel
 from pretouch.params import AdmittanceParams
-from pretouch.records import Cell, IntCell
+from pretouch.records import Cell, IntCell, zeros
 from pretouch.robot.body import Capsules, placed
 from pretouch.robot.kinematics import Chain, Kinematics, dot, point_velocity
-from pretouch.types import BoolArray, FloatArray, IntArray
+from pretouch.types import BoolArray, FloatArray
 
 Axes = tuple[Kinematics, BoolArray, Capsules]
 """Posture of an arm, which joints move a link (L, n), and the capsules of its body."""
 
 
+MARKS = 12
+"""Places that are remembered of the path the arm came."""
+
+
 class VirtualMass(NamedTuple):
-    """The virtual mass of n joints, and what is remembered of the torque that moves it."""
-
-    mean: FloatArray
-    """(2, n) residual torque filtered once and twice [Nm]; the latter is the mean in free motion."""
-    samples: IntArray
-    """(1,) how many samples the mean holds."""
-    torque: FloatArray
-    """(n,) last residual less the mean [Nm]."""
-    velocity: FloatArray
-    """(n,) of the virtual mass [rad/s]."""
-    side: FloatArray
-    """(n,) sign of the torque that last drove each joint in this reaction, 0 for none."""
-    tank: FloatArray
-    """(1,) energy taken from the push and not given back, with the start value [J]."""
-    steady: FloatArray
-    """(2, n) torque filtered once and twice, without most of its noise [Nm]."""
-    sliding: FloatArray
-    """(n,) 1 of a joint that a push has torn loose from static friction, 0 of one that sticks."""
-    quiet: FloatArray
-    """(1,) time since a torque moved a joint or kept it moving [s]."""
-    no_contact: FloatArray
-    """(1,) time since the detector found a contact [s]."""
-    since: FloatArray
-    """(1,) time since the contact that began a reaction [s], infinite without one."""
-
-
-class FreeMass(NamedTuple):
-    """What the virtual mass learns in free motion, and the places that the task went through."""
+    """The virtual mass of n joints, what is remembered of the torque that moves it, and the way of the task."""
 
     mean: Annotated[FloatArray, 2, "n"]
+    """(2, n) residual torque filtered once and twice [Nm]; the latter is the mean in free motion."""
     samples: IntCell
+    """How many samples the mean holds."""
     torque: Annotated[FloatArray, "n"]
+    """(n,) last residual less the mean [Nm]."""
+    velocity: Annotated[FloatArray, "n"]
+    """(n,) of the virtual mass [rad/s]."""
+    side: Annotated[FloatArray, "n"]
+    """(n,) sign of the torque that last drove each joint in this reaction, 0 for none."""
+    tank: Cell
+    """Energy taken from the push and not given back, with the start value [J]."""
+    steady: Annotated[FloatArray, 2, "n"]
+    """(2, n) torque filtered once and twice, without most of its noise [Nm]."""
+    sliding: Annotated[FloatArray, "n"]
+    """(n,) 1 of a joint that a push has torn loose from static friction, 0 of one that sticks."""
+    quiet: Cell
+    """Time since a torque moved a joint or kept it moving [s]."""
+    no_contact: Cell
+    """Time since the detector found a contact [s]."""
+    since: Cell
+    """Time since the contact that began a reaction [s], infinite without one."""
     path: Annotated[FloatArray, "M", "n"]
+    """(M, n) joint positions commanded on the path before the contact, newest first [rad]."""
     marked: Cell
+    """Time since the newest was noted [s]."""
 
 
 def mass_init(n: int, params: AdmittanceParams) -> VirtualMass:
     """Return the state of n joints at rest, before the first sample."""
-    return learnt_mass(np.zeros((2, n)), np.zeros(1, np.int64), np.zeros(n), params)
+    mass: VirtualMass = zeros(VirtualMass, n=n, M=MARKS)
+    settle(mass, params)
+    return mass
+
+
+def settle(mass: VirtualMass, params: AdmittanceParams) -> None:
+    """Forget a reaction: nothing has pushed the mass, and it stands."""
+    for part in (mass.velocity, mass.side, mass.steady, mass.sliding, mass.quiet, mass.no_contact):
+        part[:] = 0.0
+    mass.tank[0], mass.since[0] = params.start_energy_j, math.inf
 
 
 def dead_band(torque_limit: FloatArray, params: AdmittanceParams) -> FloatArray:
@@ -69,41 +76,26 @@ def dead_band(torque_limit: FloatArray, params: AdmittanceParams) -> FloatArray:
     return params.dead_band_nm + params.dead_band_fraction * torque_limit
 
 
-def learnt(state: VirtualMass, residual: FloatArray, dt: float, params: AdmittanceParams) -> VirtualMass:
-    """Let a sample of free motion into the mean.
+@compiled
+def learn_mean(mass: VirtualMass, residual: FloatArray, dt: float) -> None:
+    """Let a sample (n,) of free motion into the mean.
 
     Of two filters in a row the second takes in little of what has only begun: of a torque that has lasted for 60 ms
     less than one part in a hundred.
     """
-    mean, samples, torque = state.mean.copy(), state.samples.copy(), np.empty(len(residual))
-    learn_mean(mean, samples, residual, dt, torque)
-    return learnt_mass(mean, samples, torque, params)
-
-
-def learnt_mass(mean: FloatArray, samples: IntArray, torque: FloatArray, params: AdmittanceParams) -> VirtualMass:
-    """Return the state in free motion, with its mean, samples in it (1,), and last torque beyond it."""
-    none, zero = np.zeros(len(torque)), np.zeros(1)
-    return VirtualMass(
-        mean, samples, torque, none, none, np.array([params.start_energy_j]), np.zeros(mean.shape), none, zero, zero,
-        np.array([math.inf]),
-    )  # fmt: skip
-
-
-@compiled
-def learn_mean(mean: FloatArray, samples: IntArray, residual: FloatArray, dt: float, torque: FloatArray) -> None:
-    """Let a sample into the mean (2, n) of so many samples (1,), and write what of the sample (n,) it leaves."""
     # the mean of all samples at first, an exponential one from T / dt samples on
+    mean, samples = mass.mean, mass.samples
     weight = max(1.0 - math.exp(-dt / _MEAN_S), 1.0 / (samples[0] + 1))
     samples[0] = min(samples[0] + 1, 1_000_000)
     for j in range(len(residual)):
         mean[0, j] += weight * (residual[j] - mean[0, j])
         mean[1, j] += weight * (mean[0, j] - mean[1, j])
-        torque[j] = residual[j] - mean[1, j]
+        mass.torque[j] = residual[j] - mean[1, j]
 
 
-def begun(
-    state: VirtualMass, axes: Axes, torque: FloatArray, before: FloatArray, band: FloatArray, params: AdmittanceParams
-) -> VirtualMass:
+def begin(
+    mass: VirtualMass, axes: Axes, torque: FloatArray, before: FloatArray, band: FloatArray, params: AdmittanceParams
+) -> None:
     """Begin a reaction: at the speed that the torque (n,) [Nm] would keep up, as far as the start energy allows.
 
     With static friction a joint begins only where the torque measured `before` (n,) [Nm] says the same, and at the
@@ -119,11 +111,9 @@ def begun(
     if energy > params.start_energy_j:
         velocity = velocity * math.sqrt(params.start_energy_j / energy)
     velocity = velocity * min(1.0, params.speed_max_m_s / max(fastest_point(axes, velocity), _LEAST_M_S))
-    side, zero = np.sign(drive), np.zeros(1)
-    return VirtualMass(
-        state.mean, state.samples, torque, velocity, side, np.array([params.start_energy_j]),
-        np.stack((torque, lesser)), np.abs(side), zero, zero, zero,
-    )  # fmt: skip
+    settle(mass, params)
+    mass.torque[:], mass.velocity[:], mass.side[:] = torque, velocity, np.sign(drive)
+    mass.steady[0], mass.steady[1], mass.sliding[:], mass.since[0] = torque, lesser, np.abs(mass.side), 0.0
 
 
 _MEAN_S = 0.5
