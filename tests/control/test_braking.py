@@ -16,11 +16,10 @@ from pretouch.control.braking import (
     braking_rows,
     mass_along,
     slots_init,
-    tangents_of,
     touch_speed,
 )
 from pretouch.params.pretouch import REGIONS, BrakingParams, EffectiveMass, Tangential
-from pretouch.robot.kinematics import Chain
+from pretouch.robot.kinematics import Chain, tangents_of
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray, no_obstacles
 

@@ -18,6 +18,7 @@ from pretouch.contact.scatter import LENGTHS
 from pretouch.contact.sequential_step import SampleTest
 from pretouch.contact.touch_cue import Cues
 from pretouch.params import LocalisationParams
+from pretouch.perception.closest import to_axis
 from pretouch.robot.body import Capsules, Surface, placed
 from pretouch.robot.kinematics import Kinematics, rotate
 from pretouch.types import NOT_TOUCHED, BoolArray, FloatArray, IntArray, Obstacles, Touched
@@ -158,15 +159,7 @@ def hidden_candidates(
     for c in range(len(point)):
         hidden[c] = False
         for k in range(len(radius)):
-            if capsule_body[k] == body[c]:
-                continue
-            ux, uy, uz = b[k, 0] - a[k, 0], b[k, 1] - a[k, 1], b[k, 2] - a[k, 2]
-            x, y, z = point[c, 0] - a[k, 0], point[c, 1] - a[k, 1], point[c, 2] - a[k, 2]
-            # distance to the axis: r - t u with t = r.u / u.u clipped to the segment, 0 for a ball
-            length2 = ux * ux + uy * uy + uz * uz
-            t = 0.0 if length2 == 0.0 else min(1.0, max(0.0, (x * ux + y * uy + z * uz) / length2))
-            x, y, z = x - t * ux, y - t * uy, z - t * uz
-            if x * x + y * y + z * z < radius[k] * radius[k]:
+            if capsule_body[k] != body[c] and to_axis(point, c, a, b, k)[1] < radius[k]:
                 hidden[c] = True
                 break
 

@@ -20,7 +20,7 @@ from pretouch.compiled import kernel
 from pretouch.contact.touch_cue import Cues
 from pretouch.params import LocalisationParams
 from pretouch.robot.body import SPACING_M, Surface
-from pretouch.robot.kinematics import Kinematics, jacobian_into
+from pretouch.robot.kinematics import Kinematics, jacobian_into, tangents_of
 from pretouch.types import BoolArray, FloatArray, Obstacles, Touched
 
 _NEVER = 1e-12
@@ -194,14 +194,8 @@ def _wrench_information(
 @kernel
 def _unit_wrenches(normal: FloatArray, lever: FloatArray, u: FloatArray) -> None:
     """Write the wrenches (3, 6) of unit forces inwards and in two directions across, `lever` (3,) from the origin."""
-    x, y, z = normal[0], normal[1], normal[2]
-    u[0, 0], u[0, 1], u[0, 2] = -x, -y, -z
-    # two directions across a unit vector, without a case that is singular (Duff et al. 2017)
-    sign = 1.0 if z >= 0.0 else -1.0
-    a = -1.0 / (sign + z)
-    b = x * y * a
-    u[1, 0], u[1, 1], u[1, 2] = 1.0 + sign * x * x * a, sign * b, -sign * x
-    u[2, 0], u[2, 1], u[2, 2] = b, sign + y * y * a, -y
+    u[0, 0], u[0, 1], u[0, 2] = -normal[0], -normal[1], -normal[2]
+    tangents_of(normal, u[1:])
     # moments m = lever x f
     for k in range(3):
         u[k, 3] = lever[1] * u[k, 2] - lever[2] * u[k, 1]

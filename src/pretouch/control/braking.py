@@ -15,7 +15,7 @@ from pretouch.cholesky import factor, forward
 from pretouch.compiled import compiled, inlined, kernel
 from pretouch.control.approach import Rows
 from pretouch.params.pretouch import REGIONS, BrakingParams, EffectiveMass, Tangential
-from pretouch.robot.kinematics import Chain, Kinematics, Mechanism, mass_matrix_into, row_along
+from pretouch.robot.kinematics import Chain, Kinematics, Mechanism, mass_matrix_into, row_along, tangents_of
 from pretouch.types import BoolArray, FloatArray, IntArray, Obstacles
 
 _TANGENTS = 4  # two directions across the normal, both ways along each
@@ -249,23 +249,6 @@ def _rows_across(p: BrakingNumbers, slots: Slots, chain: Chain, rows: Rows, coun
             rows.h[count] = max(slots.across[k], speed - p.curve.tighten_m_s2 * p.period_s)
             count += 1
     return count
-
-
-@compiled
-def tangents_of(normal: FloatArray, tangents: FloatArray) -> None:
-    """Write two unit vectors (2, 3) across a unit vector (3,) and across each other."""
-    x, y, z = normal[0], normal[1], normal[2]
-    # across the base axis that is least along the normal, so that it never vanishes
-    if abs(x) <= abs(y) and abs(x) <= abs(z):
-        u, v, w = 0.0, z, -y
-    elif abs(y) <= abs(z):
-        u, v, w = -z, 0.0, x
-    else:
-        u, v, w = y, -x, 0.0
-    size = np.sqrt(u * u + v * v + w * w)
-    u, v, w = u / size, v / size, w / size
-    tangents[0, 0], tangents[0, 1], tangents[0, 2] = u, v, w
-    tangents[1, 0], tangents[1, 1], tangents[1, 2] = y * w - z * v, z * u - x * w, x * v - y * u
 
 
 @kernel

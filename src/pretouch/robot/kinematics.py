@@ -213,6 +213,23 @@ def dot(a: FloatArray, b: FloatArray) -> float:
 
 
 @compiled
+def tangents_of(normal: FloatArray, tangents: FloatArray) -> None:
+    """Write two unit vectors (2, 3) across a unit vector (3,) and across each other."""
+    x, y, z = normal[0], normal[1], normal[2]
+    # across the base axis that is least along the normal, so that it never vanishes
+    if abs(x) <= abs(y) and abs(x) <= abs(z):
+        u, v, w = 0.0, z, -y
+    elif abs(y) <= abs(z):
+        u, v, w = -z, 0.0, x
+    else:
+        u, v, w = y, -x, 0.0
+    size = np.sqrt(u * u + v * v + w * w)
+    u, v, w = u / size, v / size, w / size
+    tangents[0, 0], tangents[0, 1], tangents[0, 2] = u, v, w
+    tangents[1, 0], tangents[1, 1], tangents[1, 2] = y * w - z * v, z * u - x * w, x * v - y * u
+
+
+@compiled
 def below(numbers: FloatArray, bound: float) -> bool:
     """Whether all numbers (k,) are smaller than a bound in size; one that is NaN is not."""
     for number in numbers:  # noqa: SIM110  compiled code knows no generators
