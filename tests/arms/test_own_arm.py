@@ -3,11 +3,12 @@
 import re
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from pretouch import cli, plugins
-from pretouch.arms import arm_class, arm_names
+from pretouch.arms import OpenedArm, arm_class, arm_names
 from pretouch.errors import PluginError
 from pretouch.recording.reader import open_recording
 from pretouch.session.memory import ConfirmedRobots
@@ -53,9 +54,9 @@ def test_its_options_are_in_its_help_alone(capsys):
         assert ("Serial device of its driver." in capsys.readouterr().out) == ("mine" in words)
 
 
-def test_without_keys_an_arm_that_brings_no_units_is_refused(capsys):
-    assert cli.main(["run", "mine"]) == 2
-    assert "The arm brings no sensor units: give the file of their keys with --keys" in capsys.readouterr().err
+def test_a_commander_of_whom_nothing_is_said_before_the_arm_moves_is_refused():
+    with pytest.raises(PluginError, match=r"^a has a commander: say in OpenedArm\.announced what that lets"):
+        OpenedArm(SimpleNamespace(name="a"), commander=lambda: None)
 
 
 def test_an_entry_point_that_is_no_arm_is_refused_by_name():

@@ -100,6 +100,10 @@ class OpenedArm:
     announced: str = ""
     """What a commander lets the arm do, to be said before it moves."""
 
+    def __post_init__(self) -> None:
+        if self.commander and not self.announced:
+            raise PluginError(f"{self.arm.name} has a commander: say in OpenedArm.announced what that lets the arm do.")
+
 
 class ArmOptions(ABC):
     """Base of an arm's options."""
