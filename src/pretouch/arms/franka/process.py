@@ -164,7 +164,8 @@ class ArmServer:
 
     def _send_feedback(self) -> None:
         """Pass on the state there is while no motion runs."""
-        self._mailboxes.feedback.put(Feedback(self._stamp, self._answered, False, self._trouble, self._state))
+        trouble = self._trouble[:2000]  # what a library says may be of any length
+        self._mailboxes.feedback.put(Feedback(self._stamp, self._answered, False, trouble, self._state))
 
     def _execute(self, command: ArmCommand) -> None:
         self._trouble = ""
