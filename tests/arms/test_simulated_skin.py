@@ -13,7 +13,6 @@ from pretouch.arms.simulated import skin
 from pretouch.arms.simulated.arm import SimulatedArm, ThreadedArm
 from pretouch.arms.simulated.skin import VisitingHand, run
 from pretouch.control.path import Circle
-from pretouch.errors import HardwareError
 from pretouch.params import FailureParams
 from pretouch.profiles import Profile
 from pretouch.sim.imu import ImuParams
@@ -90,11 +89,6 @@ def test_a_receiver_that_does_not_answer_is_named_once():
         printer.record(cycle)
     named = [i for i, line in enumerate(said) if line.startswith("No answer from desk:29470: ")]
     assert [i - k for k, i in enumerate(named)] == [3, 14]  # after the lines of so many seconds
-
-
-def test_a_unit_there_is_not_cannot_be_silenced(fleet_to):
-    with pytest.raises(HardwareError, match=r"Unknown unit elbow: choose from hand_left"):
-        fleet_to(NOBODY).set_faults({"elbow"}, ())
 
 
 def test_the_hand_comes_and_goes():

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from pretouch.errors import ParameterError
+from pretouch.types import RangeStatus
 from pretouch.units.findings import findings
 from pretouch.units.health import Counts, HealthParams, unit_health
 from pretouch.units.wire import NO_FORCE, Flag, TouchPart
@@ -75,6 +76,12 @@ WARNINGS = [
     (lambda: found(heard(), Counts(500, 0, 1), reset=3), "reboot", "its watchdog ended a hang"),
 ]
 CASES = [("fault", *case) for case in FAULTS] + [("warning", *case) for case in WARNINGS]
+
+
+def test_each_status_is_that_of_a_sensor_that_works_or_of_one_that_failed():
+    well = {"OK", "NO_WRAP_CHECK", "MERGED", "MIN_RANGE", "MIN_CLIPPED", "SIGMA", "SIGNAL", "OUT_OF_BOUNDS", "WRAPPED"}
+    failed = {status.name for status in RangeStatus if found(heard(range_status=int(status)))}
+    assert (failed & well, failed | well) == (set(), {status.name for status in RangeStatus})
 
 
 @pytest.mark.parametrize(("level", "make", "what", "words"), CASES)

@@ -87,16 +87,17 @@ def test_a_place_that_holds_no_file_is_an_error_of_ours(tmp_path, place, read, w
     assert os.listdir(tmp_path) == ["folder"]
 
 
-def test_a_key_that_stands_in_the_place_of_the_number_is_not_shown(tmp_path):
+def test_a_key_that_stands_in_another_place_is_not_shown(tmp_path):
     path = tmp_path / "keys.toml"
     path.write_text(f"[hand]\nnumber = '{'ab' * 32}'\nkey = '03'")
     path.chmod(0o600)
     with pytest.raises(HardwareError) as caught:
         load_keys(path)
     assert "abab" not in str(caught.value)
-    with pytest.raises(HardwareError) as caught:
-        unit(number=b"k" * 32)
-    assert "kkk" not in str(caught.value)
+    for place in ("number", "id"):
+        with pytest.raises(HardwareError) as caught:
+            unit(**{place: b"k" * 32})
+        assert "kkk" not in str(caught.value)
 
 
 def test_a_file_of_another_owner_is_refused(tmp_path, monkeypatch):
@@ -113,12 +114,13 @@ def test_two_units_of_one_name_are_refused():
 
 
 @pytest.mark.parametrize(
-    "wrong",
-    [{"id": ""}, {"id": "a\ud800"}, {"id": "a\n"}, {"number": 65536}, {"number": 1.0}, {"key": b""}],
+    ("field", "values"),
+    [("id", ["", "a\ud800", "a\n", 5]), ("number", [65536, 1.0]), ("key", [b"", "k" * 32])],
 )
-def test_a_unit_that_cannot_be_is_refused(wrong):
-    with pytest.raises(HardwareError):
-        unit(**wrong)
+def test_a_unit_that_cannot_be_is_refused(field, values):
+    for value in values:
+        with pytest.raises(HardwareError):
+            unit(**{field: value})
 
 
 def test_no_key_shows_in_print():

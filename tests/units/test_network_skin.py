@@ -18,8 +18,8 @@ from pretouch.units.skin import NetworkSkin
 from tests.units.fake_unit import IDS, KEYS, FakeUnit
 
 SHARED = Path("/dev/shm")  # noqa: S108  where named shared memory would lie
-ALONE = """
-import multiprocessing, sys
+PROGRAM = """
+import multiprocessing, sys, time
 sys.path.insert(0, {tests!r})
 from pretouch.errors import HardwareError
 from pretouch.units.skin import NetworkSkin
@@ -27,26 +27,27 @@ from tests.units.fake_unit import IDS, KEYS
 
 def start():
     try:
-        NetworkSkin(IDS, KEYS)
+        skin = NetworkSkin(IDS, KEYS)
+        print(skin.pid, flush=True)
+        time.sleep(600)
     except HardwareError as error:
         print(error, flush=True)
 
 if __name__ == "__main__":
-    process = multiprocessing.get_context("spawn").Process(target=start, daemon=True)
-    process.start()
-    process.join()
+    if "daemonic" in sys.argv:
+        process = multiprocessing.get_context("spawn").Process(target=start, daemon=True)
+        process.start()
+        process.join()
+    else:
+        start()
 """
-PROGRAM = """
-import os, sys, time
-sys.path.insert(0, {tests!r})
-from pretouch.units.skin import NetworkSkin
-from tests.units.fake_unit import IDS, KEYS
 
-if __name__ == "__main__":
-    skin = NetworkSkin(IDS, KEYS)
-    print(skin.pid, flush=True)
-    time.sleep(600)
-"""
+
+@pytest.fixture
+def script(tmp_path):
+    place = tmp_path / "program.py"
+    place.write_text(PROGRAM.format(tests=str(Path(__file__).parents[2])))
+    return str(place)
 
 
 @pytest.fixture
@@ -157,10 +158,9 @@ def test_what_is_no_port_is_told_before_anything_starts(port, monkeypatch):
         NetworkSkin(IDS, KEYS, port=port)
 
 
-def test_a_daemonic_process_is_told_that_it_may_start_none(tmp_path):
-    script = tmp_path / "program.py"
-    script.write_text(ALONE.format(tests=str(Path(__file__).parents[2])))
-    done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, timeout=60, check=True)
+def test_a_daemonic_process_is_told_that_it_may_start_none(script):
+    command = [sys.executable, script, "daemonic"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
     assert "daemonic process" in done.stdout
     assert done.stderr == ""
 
@@ -202,14 +202,9 @@ def test_the_receivers_process_does_not_heed_ctrl_c(skin, player):
 
 
 @pytest.fixture
-def program(tmp_path):
-    script = tmp_path / "program.py"
-    script.write_text(PROGRAM.format(tests=str(Path(__file__).parents[2])))
-    before = set(SHARED.iterdir())
-    parent = subprocess.Popen(
-        [sys.executable, str(script)],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
-    )  # fmt: skip
+def program(script):
+    before, pipe = set(SHARED.iterdir()), subprocess.PIPE
+    parent = subprocess.Popen([sys.executable, script], stdout=pipe, stderr=pipe, text=True, start_new_session=True)
     child = int(parent.stdout.readline())
     yield parent, child
     parent.kill()

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pretouch.units.session import PENDING_MOST
-from pretouch.units.wire import SAMPLE_LEAST, Hello, Mac, decode_beacon
+from pretouch.units.wire import SAMPLE_LEAST, Flag, Hello, Mac, decode_beacon
 from tests.units.fake_unit import KEYS, PLAIN, FakeUnit, imu_taken
 
 
@@ -77,13 +77,15 @@ def test_each_flipped_bit_of_a_beacon_makes_it_worthless(bench):
 def test_every_other_length_is_refused(bench):
     bench.join()
     sample, hello = bench.units[0].sample(bench.now), bench.units[0].hello(bench.now)
-    for whole in (sample, hello):
+    flags, zones = int(Flag.RANGE_NEW | Flag.ZONES), bytes([2, 0]) + bytes(5 * 4)
+    zoned = bench.units[0].sample(bench.now, flags=flags, zones=zones)
+    for whole in (sample, zoned, hello):
         for size in range(len(whole)):
             assert bench.send(whole[:size]) == 0
         for more in (1, 12, 300, 1990, 5000):
             assert bench.send(whole + bytes(more)) == 0
     assert bench.answers() == []
-    assert bench.send(sample) == 1
+    assert [bench.send(sample), bench.send(zoned)] == [1, 1]
 
 
 def test_samples_without_any_imu_and_of_the_most_are_taken(bench):

@@ -100,13 +100,6 @@ def test_zones_that_repeat_are_stuck_and_one_that_changes_is_not(bench):
         assert bench.receiver.readings().status[:4].tolist() == [wanted] * 4
 
 
-def test_cut_datagrams_with_zones_change_nothing(bench):
-    whole = bench.units[0].sample(bench.now, flags=ZONED, zones=zones(2, 100, 200, 300, 400))
-    assert not any(bench.send(whole[:cut]) for cut in range(len(whole)))
-    assert set(bench.receiver.readings().status) == {RangeStatus.NONE}
-    assert bench.send(whole) == 1
-
-
 def test_samples_with_zones_come_through_shared_memory_however_large(bench):
     outputs = SharedOutputs(UNITS)
     zoned, plain = bench.units

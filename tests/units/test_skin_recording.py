@@ -98,9 +98,12 @@ def test_ranges_come_back_as_arrays(place):
     assert np.allclose(unit.range.sigma, 0.003)
 
 
-def read_back(place, received) -> SkinTrace:
+def read_back(place, received, *joints) -> SkinTrace:
+    """Record samples of a unit, and states of joints in parts: (stamp, q, qd, names)."""
     with SkinRecording(place) as recording:
         recording.add(received, ["hand/1"])
+        for part in joints:
+            recording.joints(*part)
     return read_skin(place)
 
 
@@ -214,22 +217,12 @@ def test_samples_of_another_version_are_refused(place, tmp_path):
 
 
 NAMES = ("panda_joint1", "panda_joint2")
-STAMP = 100.0 + np.arange(200) / 1000
+STAMP, FEW = 100.0 + np.arange(200) / 1000, [heard(number) for number in range(1, 6)]
 Q = np.random.default_rng(0).normal(size=(200, 2))
 
 
-def with_joints(place, *parts):
-    """Record units, and states of joints in parts: (stamp, q, qd, names)."""
-    with SkinRecording(place) as recording:
-        for number in range(1, 6):
-            record(recording, number)
-        for part in parts:
-            recording.joints(*part)
-    return read_skin(place)
-
-
 def test_the_usual_tools_read_states_of_joints(tmp_path):
-    with_joints(tmp_path / "a.mcap", (STAMP, Q, 0.1 * Q, NAMES))
+    read_back(tmp_path / "a.mcap", FEW, (STAMP, Q, 0.1 * Q, NAMES))
     with AnyReader([tmp_path / "a.mcap"]) as reader:
         (connection,) = (c for c in reader.connections if c.topic == "/joint_states")
         assert (connection.msgtype, connection.msgcount) == ("sensor_msgs/msg/JointState", 200)
@@ -245,8 +238,8 @@ def test_the_usual_tools_read_states_of_joints(tmp_path):
 def test_states_of_joints_are_sorted_and_what_is_no_number_or_came_twice_is_left_out(tmp_path):
     q = Q.copy()
     q[5] = np.nan
-    trace = with_joints(
-        tmp_path / "a.mcap", (STAMP[100:], q[100:], None, NAMES), (STAMP[:101], q[:101] + 1.0, None, NAMES)
+    trace = read_back(
+        tmp_path / "a.mcap", FEW, (STAMP[100:], q[100:], None, NAMES), (STAMP[:101], q[:101] + 1.0, None, NAMES)
     )
     np.testing.assert_array_equal(trace.joints.q, np.delete(np.vstack([q[:101] + 1.0, q[101:]]), 5, axis=0))
     np.testing.assert_allclose(trace.joints.stamp, np.delete(STAMP, 5), atol=1e-9)
@@ -254,7 +247,7 @@ def test_states_of_joints_are_sorted_and_what_is_no_number_or_came_twice_is_left
 
 def test_joints_of_another_arm_in_the_same_file_are_refused(tmp_path):
     with pytest.raises(RecordingError, match="states of the joints a, b and of panda_joint1, panda_joint2"):
-        with_joints(tmp_path / "a.mcap", (STAMP, Q, None, NAMES), (STAMP, Q, None, ("a", "b")))
+        read_back(tmp_path / "a.mcap", FEW, (STAMP, Q, None, NAMES), (STAMP, Q, None, ("a", "b")))
 
 
 @pytest.mark.parametrize(

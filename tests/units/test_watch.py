@@ -1,18 +1,23 @@
 """Units watched, over real sockets."""
 
 import itertools
+import re
 import time
 
 import pytest
 
+from pretouch.control.path import Circle
+from pretouch.controller import Controller
 from pretouch.errors import HardwareError
 from pretouch.loop import MonotonicClock
 from pretouch.perception.scene_filter import no_fixtures
+from pretouch.profiles import PROFILES
+from pretouch.session.may_move import StandingArm, refusals
 from pretouch.units.fleet import simulated_keys
 from pretouch.units.health import HealthParams
-from pretouch.units.model_check import ModelCheck
 from pretouch.units.skin import NetworkSkin
 from pretouch.units.watch import UnitWatch
+from tests.session.arms import FollowingArm
 from tests.units.desk import Desk
 
 
@@ -25,18 +30,26 @@ def units(paper_skin):
 
 
 @pytest.mark.slow
-def test_units_that_are_well_are_found_well_and_one_that_falls_silent_is_named(units, panda_model, paper_skin):
-    agree = ModelCheck(panda_model, paper_skin, no_fixtures())
-    watch, clock = UnitWatch(units[1], 0.1, agree, lambda: panda_model.description.q_ready), MonotonicClock(0.01)
-    watch.wait(clock, 20.0, 1.0)
-    assert not [finding.sentence for finding in watch.judge()[1] if finding.level == "fault"]
+@pytest.mark.parametrize(
+    ("fault", "said"),
+    [("", "^$"), ("silent", "^hand_front has sent nothing for"), ("stuck", "^hand_front repeats 0.* its range finder")],
+)
+def test_a_unit_that_fails_after_it_was_heard_refuses_a_run_and_one_that_is_well_does_not(
+    units, panda_model, paper_skin, monkeypatch, fault, said
+):
+    wait = UnitWatch.wait
 
-    units[0][2].silent = True
-    end = time.monotonic() + 1.0
-    while clock.tick() < end:
-        watch.take()
-    faults = [finding for finding in watch.judge()[1] if finding.level == "fault" and finding.what != "machine"]
-    assert [finding.sentence.startswith("hand_front has sent nothing for") for finding in faults] == [True]
+    def spoil(watch, clock):
+        wait(watch, clock, 20.0, 1.0)
+        units[0][2].silent, units[0][2].stuck = fault == "silent", fault == "stuck"
+
+    monkeypatch.setattr(UnitWatch, "wait", spoil)
+    controller = Controller(panda_model, paper_skin, no_fixtures(), Circle(), PROFILES["blind"])
+    arm = FollowingArm(panda_model.description.q_ready)
+    standing = StandingArm(arm, units[1], controller, -0.2, MonotonicClock(0.01), approach=True)
+    refused = refusals(finding for finding in standing.check()[1] if finding.what != "machine")
+    assert re.search(said, " ".join(refused))
+    assert len(refused) == bool(fault)
 
 
 def test_a_machine_too_slow_to_simulate_is_named_in_place_of_units(units, monkeypatch):

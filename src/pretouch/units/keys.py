@@ -34,17 +34,15 @@ class UnitKey:
     """32 random bytes that only the unit and its receiver know."""
 
     def __post_init__(self) -> None:
-        if not self.id or not self.id.isprintable():
-            raise HardwareError(
-                f"The name of a unit is {self.id!r}: give it a printable name, the one in the skin file."
-            )
+        if not (isinstance(self.id, str) and self.id and self.id.isprintable()):
+            name = repr(self.id) if isinstance(self.id, str) else "no text"  # but a key, which must not get into logs
+            raise HardwareError(f"The name of a unit is {name}: give it a printable name, the one in the skin file.")
         if type(self.number) is not int or not 1 <= self.number <= _LAST_NUMBER:
             value = self.number if isinstance(self.number, int) and abs(self.number) < _NO_SECRET else "none"
             raise HardwareError(f"The number of unit {self.id} is {value}: choose 1 to {_LAST_NUMBER}.")
-        if len(self.key) != KEY_SIZE:
-            raise HardwareError(
-                f"The key of unit {self.id} is {len(self.key)} bytes, not {KEY_SIZE} bytes: make one with new_key()."
-            )
+        if not isinstance(self.key, bytes) or len(self.key) != KEY_SIZE:
+            size = f"{len(self.key)} bytes" if isinstance(self.key, bytes) else "no bytes"
+            raise HardwareError(f"The key of unit {self.id} is {size}, not {KEY_SIZE} bytes: make one with new_key().")
 
     def __repr__(self) -> str:
         """Without the key: it must not get into logs."""
@@ -57,7 +55,7 @@ class UnitKey:
 
 
 class Keys(dict[str, UnitKey]):
-    """Keys of units by name; two with the same name, number or key are a HardwareError."""
+    """Keys of units by name, which nobody changes; two of one name, number or key are a HardwareError."""
 
     def __init__(self, units: Iterable[UnitKey] = ()) -> None:
         super().__init__()

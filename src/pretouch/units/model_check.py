@@ -50,7 +50,7 @@ class ModelCheck:
         """Compare the readings that are new with what the posture q (n,) [rad] predicts.
 
         Readings and posture must be of the same instant to within some 50 ms; standing or slow arms are best. It takes
-        0.2 ms for seven units: call it 10 times a second or so, outside the control loop.
+        0.2 ms for seven units: call it up to 25 times a second, outside the control loop.
         """
         fresh = readings.stamp > self._used
         self._used = np.maximum(self._used, readings.stamp)
