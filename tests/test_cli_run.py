@@ -155,11 +155,13 @@ def test_a_damaged_note_of_confirmed_robots_is_found_before_the_checks(tmp_path,
 
 
 def test_a_recording_that_fails_in_the_middle_is_told_at_once_and_by_the_exit_code(capsys, monkeypatch):
+    notes = iter([["It is old."], ["It is old.", "It was late."]])
+    monkeypatch.setattr("pretouch.arms.simulated.OpenedArm", partial(OpenedArm, notes=lambda: next(notes)))
     at_begin(monkeypatch, 0.2, lambda _: monkeypatch.setattr(Recording, "trouble", "The disk is full."))
     assert cli.main([*BLIND, "--seconds", "1", "--yes", "--record", "a.mcap"]) == 1
     said = capsys.readouterr().out
     assert -1 < said.find("The disk is full.") < said.find("The arm is at rest.")
-    assert said.count("The disk is full.") == 2
+    assert [said.count(part) for part in ("The disk is full.", "It is old.", "It was late.")] == [2, 1, 1]
     assert "ended early" not in said
 
 

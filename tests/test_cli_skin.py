@@ -1,7 +1,6 @@
 """`pretouch skin`: units watched, recorded, simulated, and given keys."""
 
 import json
-import os
 import re
 import resource
 import signal
@@ -185,10 +184,10 @@ def test_bad_input_ends_with_one_sentence_and_code_2(keys, port, tmp_path, capsy
     assert said.out == ""
 
 
-def started(*words):
+def started(*words, folder=ROOT):
     return subprocess.Popen(
-        [sys.executable, "-m", "pretouch.cli", "skin", *map(str, words)], stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE, text=True, cwd=ROOT, env={**os.environ, "PYTHONUNBUFFERED": "1"},
+        [sys.executable, "-u", "-m", "pretouch.cli", "skin", *map(str, words)], cwd=folder, text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
     )  # fmt: skip
 
 
@@ -251,7 +250,7 @@ def test_the_key_of_a_lost_unit_is_revoked_or_replaced_and_the_others_stay(tmp_p
     ("more", "words"),
     [
         (("--port", "0"), "The receiver's port is 0"),
-        (("--stuck", "elbow"), "Unknown unit elbow"),
+        (("--stuck", "elbow"), "Unknown unit elbow: choose from hand_left"),
         (("--skin", "/nowhere.toml"), "/nowhere.toml cannot be read"),
         (("--duration", "-2"), "-2"),
         (("--seed", "-1"), "--seed is -1"),

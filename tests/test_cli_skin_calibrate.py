@@ -115,6 +115,7 @@ def test_a_port_that_is_taken_is_said_before_anything_is_planned(paper_skin, tmp
 @pytest.mark.slow
 def test_the_arm_does_not_move_without_a_persons_word(tmp_path, capsys, monkeypatch):
     files = ("--out", tmp_path / "s.toml")
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True, raising=False)
     for answer in ("", "n", "maybe"):
         monkeypatch.setattr("builtins.input", lambda question, answer=answer: answer)
         assert calibrate("simulated", *files) == 2
@@ -122,7 +123,8 @@ def test_the_arm_does_not_move_without_a_persons_word(tmp_path, capsys, monkeypa
         assert "The arm needs the space x" in told.out
         assert "While the arm moves, nobody may be within its reach" in told.out
         assert "The arm was not moved: answer y to allow it." in told.err
-    monkeypatch.setattr("builtins.input", Mock(side_effect=EOFError))
+
+    monkeypatch.setattr("sys.stdin.isatty", lambda: False, raising=False)
     assert calibrate("simulated", *files) == 2
     assert "There is no terminal to ask for permission to move the arm: give --yes." in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
@@ -131,6 +133,7 @@ def test_the_arm_does_not_move_without_a_persons_word(tmp_path, capsys, monkeypa
 def test_the_way_to_the_start_is_part_of_what_is_asked_about(panda_model, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(arm, "SimulatedArm", lambda model, q, *words: SimulatedArm(model, q + ASIDE, *words))
     questions = []
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True, raising=False)
     monkeypatch.setattr("builtins.input", lambda question: questions.append(question) or "n")
     assert calibrate("simulated", "--out", tmp_path / "s.toml", "--duration-s", 45) == 2
     said = capsys.readouterr().out

@@ -2,8 +2,6 @@
 
 import re
 import signal
-import subprocess
-import sys
 import time
 from contextlib import contextmanager, suppress
 from types import SimpleNamespace
@@ -18,23 +16,17 @@ from pretouch.arms.simulated import Simulated
 from pretouch.calibration.motion.follow import plan_controller
 from pretouch.calibration.motion.plan import Plan
 from pretouch.cli.calibrate import live
-from pretouch.errors import RecordingError
+from pretouch.errors import RecordingError, RobotError
 from pretouch.sensing.skin import load_skin
 from pretouch.session.run import Ending, go
 from pretouch.signals import Terminated, ends_raise, exit_code, noted_in_motion
 from pretouch.units.skin import NetworkSkin, Traffic
 from pretouch.units.skin_reader import read_skin
 from tests.calibrated_arm import assert_same_places
-from tests.session.arms import FollowingArm
+from tests.session.arms import AT_REST, FollowingArm
+from tests.test_cli_skin import started
 
 FILES = ("simulated", "--out", "skin.toml", "--yes")
-
-
-def started(folder, *words):
-    return subprocess.Popen(
-        [sys.executable, "-m", "pretouch.cli", "skin", *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-        text=True, cwd=folder,
-    )  # fmt: skip
 
 
 class Units(NetworkSkin):
@@ -66,7 +58,7 @@ def ended(model, units=None, trouble="", joints=lambda *_: None):
 def test_joint_states_are_recorded_as_the_controller_has_them(panda_model):
     rows = []
     ending, arm = ended(panda_model, joints=lambda *row: rows.append(row))
-    assert ending == Ending()
+    assert ending == AT_REST
     stamps, q = (np.concatenate(column) for column in list(zip(*rows, strict=True))[:2])
     assert np.all(np.diff(stamps) > 0.0)
     assert {row[3] for row in rows} == {panda_model.joints}
@@ -79,6 +71,16 @@ def test_a_receiver_that_ends_and_a_full_disk_stop_the_arm(panda_model):
     dead = Units()
     dead.alive = False
     assert "The receiver of the units has ended" in ended(panda_model, dead)[0].stopped
+
+
+def test_nothing_is_said_of_rest_where_the_arm_is_lost_between_two_motions(panda_model, capsys):
+    q, measurements = panda_model.description.q_ready, SimpleNamespace(record=lambda _: None)
+    arm, plan = FollowingArm(q), Plan(np.array([0.0, 0.2]), np.array([q, q + 0.002]))
+    measurements.recording, arm.gone = SimpleNamespace(close=lambda: "It is recorded."), True
+    with pytest.raises(RobotError, match="No state has come"):
+        live._move(OpenedArm(arm), panda_model, [plan, plan], measurements)
+    assert arm.begun == 1
+    assert capsys.readouterr().out.splitlines() == [*["The arm moves for 0 s."] * 2, "It is recorded."]
 
 
 def test_the_signal_that_came_first_ends_the_command_whatever_comes_while_others_are_heard_again(monkeypatch):
@@ -138,7 +140,7 @@ def test_how_to_calibrate_from_the_recording_is_said_before_the_motion_and_after
 @pytest.mark.alone
 @pytest.mark.slow
 def test_the_units_of_an_arm_that_moves_here_and_now_are_found(panda_model, paper_skin, tmp_path):
-    process = started(tmp_path, "calibrate", *FILES, "--duration-s", "35")
+    process = started("calibrate", *FILES, "--duration-s", "35", folder=tmp_path)
     out, err = process.communicate(timeout=200)
     assert process.returncode == 0, out + err
     assert "Skin file: skin.toml has 7 units where they were found." in out
@@ -154,7 +156,7 @@ def test_the_units_of_an_arm_that_moves_here_and_now_are_found(panda_model, pape
 @pytest.mark.slow
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_motion_that_is_interrupted_leaves_its_recording_and_says_how_to_go_on(tmp_path, number, code):
-    process = started(tmp_path, "calibrate", *FILES)
+    process = started("calibrate", *FILES, folder=tmp_path)
     assert process.stdout
     assert any(line.startswith("Waiting") for line in process.stdout)
     time.sleep(8.0)

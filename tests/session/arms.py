@@ -5,9 +5,11 @@ import time
 import numpy as np
 
 from pretouch.errors import RobotError
+from pretouch.session.run import Ending
 from pretouch.types import RobotState
 
 DT = 0.01
+AT_REST = Ending(rest_unknown="")
 
 
 class PushedArm:

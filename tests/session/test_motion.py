@@ -11,16 +11,17 @@ from pretouch import realtime
 from pretouch.calibration.motion.plan import Plan
 from pretouch.control.path import segment
 from pretouch.controller import Controller
+from pretouch.errors import RobotError
 from pretouch.loop import MonotonicClock
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.ports import NoUnits
 from pretouch.profiles import PROFILES
 from pretouch.sensing.skin import Skin
 from pretouch.session.may_move import StandingArm
-from pretouch.session.run import Ending, follow, go
+from pretouch.session.run import Ending, execute, follow, go
 from pretouch.signals import Terminated, ends_raise
 from pretouch.types import Mode
-from tests.session.arms import FollowingArm
+from tests.session.arms import AT_REST, FollowingArm
 
 
 @pytest.fixture
@@ -64,7 +65,7 @@ def fast(arm):
 
 def test_a_run_begins_and_ends_at_rest(controller, arm, panda_model):
     keeper = Keeper()
-    assert followed(controller, arm, keeper) == Ending()
+    assert followed(controller, arm, keeper) == AT_REST
     assert keeper.steps[-1].mode is Mode.TRACK
     assert fast(arm) > 0.05
     assert not arm.commands[-1].any()
@@ -78,7 +79,7 @@ def test_an_exception_in_the_recorder_brings_the_arm_to_rest_and_is_said(control
         raise ZeroDivisionError("by a recorder")
 
     ending = followed(controller, arm, Keeper(60, fail))
-    assert ending == Ending(stopped="ZeroDivisionError: by a recorder")
+    assert ending == Ending("ZeroDivisionError: by a recorder", "")
     assert fast(arm) > 0.05
     assert not arm.commands[-1].any()
     assert arm.ended == 1
@@ -99,7 +100,7 @@ def test_a_signal_is_raised_after_the_arm_has_come_to_rest(controller, arm, numb
 
 
 def test_ctrl_z_does_not_stop_a_program_whose_arm_moves(controller, arm):
-    assert followed(controller, arm, Keeper(20, lambda: os.kill(os.getpid(), signal.SIGTSTP)), 40) == Ending()
+    assert followed(controller, arm, Keeper(20, lambda: os.kill(os.getpid(), signal.SIGTSTP)), 40) == AT_REST
 
 
 def test_an_arm_that_takes_no_more_commands_is_said_and_its_motion_ended(controller, arm):
@@ -117,12 +118,29 @@ def test_an_arm_whose_motion_cannot_be_ended_is_looked_at(controller, arm, stand
     )
 
 
+def test_of_an_arm_that_is_lost_before_it_is_commanded_nothing_is_said_but_after_its_way_that_it_may_move(
+    controller, arm
+):
+    clock, options, ending = MonotonicClock(0.01), realtime.Options(tell=lambda _: None), Ending()
+    standing, arm.gone = StandingArm(arm, NoUnits(), controller, 0.0, clock), True
+    way = Plan(np.array([0.0, 0.2]), np.array([arm.q, arm.q]))
+    execute(standing, way, 1.0, Keeper(), clock, options, ending)
+    assert ending.sentences() == (
+        "The arm may not be at rest: No state has come. Check it, and press the user stop.",
+        "The run ended early: The arm did not reach the start of its path. No state has come.",
+    )
+    ending = Ending()
+    with pytest.raises(RobotError, match="No state has come"):
+        execute(standing, None, 1.0, Keeper(), clock, options, ending)
+    assert ending.sentences() == ()
+
+
 def test_an_arm_goes_along_a_plan_and_a_signal_stops_it(controller, panda_model):
     q = panda_model.description.q_ready
     plan = Plan(np.array([0.0, 1.5]), np.array([q, q + 0.1]))
     arm, ending = FollowingArm(q), Ending()
     go(arm, controller, plan, ending)
-    assert ending == Ending()
+    assert ending == AT_REST
     assert np.allclose(arm.q, q + 0.1, atol=0.01)
     assert not arm.commands[-1].any()
 

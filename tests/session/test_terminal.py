@@ -7,18 +7,17 @@ import threading
 from pretouch.session.terminal import BackgroundPrinter, EnterKey
 
 
-def test_enter_is_heard_once_and_other_keys_are_not():
+def test_enter_is_heard_once_and_other_keys_are_not_and_a_terminal_that_goes_away_raises_nothing():
     ours, theirs = pty.openpty()
-    try:
-        enter = EnterKey(theirs)
-        assert enter.possible
+    enter = EnterKey(theirs)
+    assert enter.possible
+    assert not enter()
+    os.write(ours, b"abc\n")
+    assert any(enter() for _ in range(10_000))
+    assert not enter()
+    for side in (ours, theirs):
+        os.close(side)
         assert not enter()
-        os.write(ours, b"abc\n")
-        assert any(enter() for _ in range(10_000))
-        assert not enter()
-    finally:
-        os.close(ours)
-        os.close(theirs)
 
 
 def test_without_a_terminal_nobody_presses_enter(tmp_path):
@@ -28,15 +27,6 @@ def test_without_a_terminal_nobody_presses_enter(tmp_path):
         enter = EnterKey(file.fileno())
         assert not enter.possible
         assert not enter()
-
-
-def test_a_terminal_that_goes_away_raises_nothing():
-    ours, theirs = pty.openpty()
-    enter = EnterKey(theirs)
-    os.close(ours)
-    assert not enter()
-    os.close(theirs)
-    assert not enter()
 
 
 def test_a_terminal_that_takes_nothing_does_not_keep_the_caller_waiting():

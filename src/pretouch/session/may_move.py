@@ -294,15 +294,13 @@ class StandingArm:
         Units that are not heard, and states that cannot be used, are an error at once.
         """
         self.demand_fit()
-        c, wrong = self.controller, tuple[Finding, ...]()
+        c, units = self.controller, None
         if isinstance(self.skin, NetworkSkin):
             agree = ModelCheck(c.model, c.skin, c.fixtures)
             units = UnitWatch(self.skin, _LOOK_S, agree, lambda: self.arm.read().q, self.left_out)
             units.wait(self.clock)
-            seen = watch(self.arm, self.clock, c.limits.qd_max, WATCH_S, units.take)
-            _, wrong = units.judge()
-        else:
-            seen = watch(self.arm, self.clock, c.limits.qd_max, WATCH_S)
+        seen = watch(self.arm, self.clock, c.limits.qd_max, WATCH_S, units.take if units else lambda: None)
+        wrong = units.judge()[1] if units else ()
         start = () if self.approach else check_start(c, seen.newest.q)
         return seen, (*check(c, seen, self.floor), *start, *wrong)
 

@@ -47,20 +47,25 @@ class Ending:
 
     stopped: str = ""
     """Why it ended early, as a sentence; '' if it did not."""
-    rest_unknown: str = ""
-    """Why the arm may not be at rest, as a sentence; '' if it is."""
+    rest_unknown: str | None = None
+    """Why the arm may not be at rest, as a sentence; '' if it is, None if nobody has brought it to rest or looked."""
 
     @property
     def early(self) -> bool:
         """Whether it did not end as asked."""
         return bool(self.stopped or self.rest_unknown)
 
+    def failed(self, arm: Arm, error: Exception) -> None:
+        """Note an error after which nobody knows whether the arm is at rest, and look whether it is."""
+        self.stopped = self.stopped or error_text(error)
+        self.rest_unknown = "" if _is_at_rest(arm) else error_text(error)
+
     def sentences(self) -> tuple[str, ...]:
         """Say it."""
-        rest = "The arm is at rest."
+        rest = "The arm is at rest." if self.rest_unknown == "" else ""
         if self.rest_unknown:
             rest = f"The arm may not be at rest: {self.rest_unknown} Check it, and press the user stop."
-        return (rest, f"The run ended early: {self.stopped}") if self.stopped else (rest,)
+        return tuple(filter(None, (rest, f"The run ended early: {self.stopped}" if self.stopped else "")))
 
 
 class RecorderGroup:
@@ -211,7 +216,7 @@ def execute(
                 q = np.array(standing.arm.read().q)
                 ending.stopped = " ".join(refusals(check_start(standing.controller, q)))
             except PretouchError as error:
-                ending.stopped = error_text(error)
+                ending.failed(standing.arm, error)
         if ending.early:
             ending.stopped = f"The arm did not reach the start of its path. {ending.stopped}"
             return
@@ -221,7 +226,7 @@ def execute(
     except PretouchError as error:  # before the arm took the controller's commands
         if way is None:
             raise
-        ending.stopped = error_text(error)
+        ending.failed(standing.arm, error)
 
 
 class _Until:
@@ -253,6 +258,7 @@ def go(
     What the arm follows, and what ends it early, is `calibration.motion.follow`'s. `controller` gives arm and rate,
     `left_out` the time that this machine was too slow to simulate the arm so far [s].
     """
+    ending.rest_unknown = None
     blind = plan_controller(controller.model, np.array(arm.read().q), controller.profile)
     realtime.warm_up(blind, arm.read())
     commander = PlanCommander(blind, way, time.monotonic, left_out)
@@ -281,7 +287,7 @@ def follow(
 
     Everything is compiled before the arm takes commands. A signal is raised after the arm has come to rest.
     """
-    arm, controller = standing.arm, standing.controller
+    arm, controller, ending.rest_unknown = standing.arm, standing.controller, None
     realtime.warm_up(controller, arm.read())
 
     def move(signals: list[int]) -> str:
@@ -305,9 +311,9 @@ def _run_motion(arm: Arm, move: Callable[[list[int]], str], ending: Ending) -> N
         finally:
             try:
                 arm.end()
+                ending.rest_unknown = ""
             except Exception as error:
-                ending.stopped = ending.stopped or error_text(error)
-                ending.rest_unknown = "" if _is_at_rest(arm) else error_text(error)
+                ending.failed(arm, error)
 
 
 def _is_at_rest(arm: Arm) -> bool:

@@ -28,6 +28,7 @@ from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import skin_for
 from pretouch.session.run import Ending, go
+from pretouch.session.terminal import require_yes
 from pretouch.types import RobotState
 from pretouch.units.skin import NetworkSkin
 from pretouch.units.skin_recording import SkinRecording
@@ -106,7 +107,9 @@ class CalibrateArm(Generic[A]):
                 )
             plans = _plans(opened.arm, model, self.motion)
             if not self.yes:
-                _ask(sum(plan.duration for plan in plans))
+                print("While the arm moves, nobody may be within its reach, and nothing in the space given above.")
+                question = f"Let it move for {sum(plan.duration for plan in plans):.0f} s?"
+                require_yes(question, "The arm was not moved")
             if against := opened.arm.unfit():
                 raise RobotError(" ".join(against))
             print("Waiting for the units.", flush=True)
@@ -131,17 +134,6 @@ def _plans(arm: Arm, model: RobotModel, params: PlanParams) -> list[Plan]:
     room = limits.room(way)
     print(f"Before that, moving to its start takes {way.duration:.0f} s and needs the space {room} m.", flush=True)
     return [way, plan]
-
-
-def _ask(duration: float) -> None:
-    """Have a person let the arm move for a time [s]; CalibrationError if none does."""
-    print("While the arm moves, nobody may be within its reach, and nothing in the space given above.", flush=True)
-    try:
-        answer = input(f"Let it move for {duration:.0f} s? [y/N] ")
-    except EOFError:
-        raise CalibrationError("There is no terminal to ask for permission to move the arm: give --yes.") from None
-    if answer.strip().lower() not in ("y", "yes"):
-        raise CalibrationError("The arm was not moved: answer y to allow it.")
 
 
 class Measurements:

@@ -119,7 +119,8 @@ def _run(command: Run[Any], write: Callable[[Any], None]) -> int:
             learnt = free_motion(command.robot, controller, opened.free_motion_id or opened.arm.name)
             clock, approach = MonotonicClock(controller.limits.period), command.task.approach
             standing = StandingArm(opened.arm, skin, controller, setup.floor, clock, approach, opened.left_out)
-            rest = _checked(standing, opened.notes())
+            notes = opened.notes()
+            rest = _checked(standing, notes)
             if confirmed and not command.robot.confirm_push:
                 say("The force sign of this robot was confirmed before; --confirm-push repeats it.")
             else:
@@ -128,7 +129,7 @@ def _run(command: Run[Any], write: Callable[[Any], None]) -> int:
                     remembered.add(opened.identity)
                 say("The force sign is confirmed: the robot reports the force on the arm, in the base frame.")
             way = _allowed_way(command, standing, opened, rest)
-            return _executed(command, standing, opened, way, learnt, last, write)
+            return _executed(command, standing, opened, way, learnt, notes, last, write)
         finally:
             last.enter_context(noted_in_motion())  # until arm and units are closed
 
@@ -187,6 +188,7 @@ def _executed(
     opened: OpenedArm,
     way: Plan | None,
     learnt: FreeMotion | None,
+    notes_before: Sequence[str],
     last: ExitStack,
     write: Callable[[Any], None],
 ) -> int:
@@ -219,7 +221,8 @@ def _executed(
             lines = list(ending.sentences())
             if reporter.summary.steps:
                 lines += [*reporter.summary.sentences(clock.period), str(clock.timing())]
-            lines += filter(None, (standing.arm.report(), *(output.notes if output else ()), *files.close()))
+            notes = [note for note in opened.notes() if note not in notes_before]
+            lines += filter(None, (standing.arm.report(), *notes, *(output.notes if output else ()), *files.close()))
             say("\n".join(lines))
             write({"summary": reporter.summary, "ending": ending, "timing": clock.timing()})
     return int(ending.early or bool(files.trouble))

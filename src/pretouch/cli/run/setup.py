@@ -134,12 +134,10 @@ def free_motion(options: RobotOptions, controller: Controller, robot: str) -> Fr
 def heard_units(where: UnitOptions, skin: Skin, opened: OpenedArm) -> Iterator[SkinPort]:
     """Hear the units of a skin: over the network where there are keys, or else those that the arm brings."""
     with ExitStack() as stack:
-        units: SkinPort | None = NoUnits()
+        units: SkinPort | None = opened.skin if len(skin) else NoUnits()
         if len(skin) and where.keys:
             receiver = NetworkSkin(skin.network, load_keys(where.keys), where.units_host, where.units_port)
             units = stack.enter_context(receiver)
-        elif len(skin):
-            units = opened.skin
         if units is None:
             raise HardwareError(f"{opened.arm.name} brings no sensor units: give the file of their keys with --keys.")
         if isinstance(units, NetworkSkin):
