@@ -29,10 +29,8 @@ def run(panda_model, paper_skin, node, arm):
     x, y, z = panda_model.kinematics(panda_model.description.q_ready).position[panda_model.ee]
     path = segment((x, y, z), (x, y + 0.4, z))
     controller = Controller(panda_model, paper_skin, no_fixtures(), path, PROFILES["paper"])
-    with (
-        Ros2Robot(ArmParams("by-robot", "base"), panda_model, node) as robot,
-        Ros2Skin(SkinParams(), paper_skin, node) as units,
-    ):
+    units = Ros2Skin(SkinParams(), paper_skin, node)
+    with Ros2Robot(ArmParams("by-robot", "base"), panda_model, node) as robot:
         robot.wait(10)
         units.wait(10)
         yield SimpleNamespace(robot=robot, until=partial(turned, controller, robot, units))

@@ -28,7 +28,6 @@ from pretouch.types import ControlStep, Mode
 from pretouch_ros2.commander import Ros2Commander
 from pretouch_ros2.joints import JointReading
 from pretouch_ros2.messages import TWIST
-from pretouch_ros2.node import Ros2Node
 from pretouch_ros2.params import ArmParams, Asked, CommanderParams
 from pretouch_ros2.robot import Ros2Robot
 
@@ -115,10 +114,13 @@ def test_a_clock_that_differs_is_named_unless_ros_has_its_own(panda_model, off):
     assert (own.refused, own.stamp.tolist()) == ("", [5.0])
 
 
-def test_a_message_that_only_comes_again_goes_stale(panda_model):
+def test_a_message_that_only_comes_again_goes_stale_and_a_clock_set_back_is_named(panda_model):
     told, message = Told(panda_model, "twist"), twist((0.1, 0, 0))
     first = told(message)
     assert told(message, 6.0).stamp.tolist() == first.stamp.tolist()
+    back = [told(twist((0.1, 0, 0), at=time() - 30.0 + k / 50), 6.0 + k / 50) for k in range(10)][-1]
+    assert back.refused.startswith("/pretouch/twist is stamped no later than before, so it is not used: see whether")
+    assert told.commander.notes == (f"{back.refused}.",)
 
 
 def test_two_that_ask_at_once_are_refused_until_one_has_been_silent(panda_model):
@@ -162,25 +164,13 @@ def test_whatever_a_message_holds_is_taken_or_said(panda_model, asked):
         assert wrong or np.isfinite(found.number).all()
 
 
-def driven(
-    model: RobotModel, node: Ros2Node, params: CommanderParams, done: Callable[[ControlStep], bool]
-) -> list[ControlStep]:
-    """Let a commander drive an arm whose torques are heard too; `done` is given each step."""
-    arm = ArmParams("by-robot", "base", torques="/external_joint_torques")
-    with Ros2Robot(arm, model, node) as robot:
-        robot.wait(10)
-        commander = Ros2Commander(params, robot, model, node)
-        x, y, z = model.kinematics(robot.read().q).position[model.ee].tolist()
-        chosen = profile("pretouch:perception=none:failure.state_timeout_s=1")
-        controller = Controller(model, Skin((), model), no_fixtures(), segment((x, y, z), (x, y + 0.4, z)), chosen)
-        robot.begin()
-        return turned(controller, robot, NoUnits(), done, desired=commander)
-
-
 def test_a_twist_drives_the_arm_by_its_torques_and_what_goes_wrong_holds_it_and_says_so(
     panda_model, arm, node, other, third
 ):
     topic, asked, said = "/pretouch/twist", {"frame": "panda_link0", "at": 0.0}, []
+    x, y, z = panda_model.kinematics(panda_model.description.q_ready).position[panda_model.ee]
+    path, chosen = segment((x, y, z), (x, y + 0.4, z)), profile("pretouch:perception=none:failure.state_timeout_s=1")
+    controller = Controller(panda_model, Skin((), panda_model), no_fixtures(), path, chosen)
     want, moved, held = "", 0, 0
 
     def made() -> Any:
@@ -190,7 +180,7 @@ def test_a_twist_drives_the_arm_by_its_torques_and_what_goes_wrong_holds_it_and_
         opened.enter_context(publishing(other, topic, TWIST, made))
         stages = iter([
             (lambda: asked.update(frame="camera"), "in the frame 'camera'"),
-            (lambda: asked.update(at=-30.0), "The desired motion ended"),
+            (lambda: asked.update(at=-30.0), "is stamped no later than before"),
             (lambda: opened.enter_context(publishing(third, topic, TWIST, made)), "several programs ask on"),
         ])  # fmt: skip
 
@@ -209,7 +199,12 @@ def test_a_twist_drives_the_arm_by_its_torques_and_what_goes_wrong_holds_it_and_
             want, moved, held = "", 0, 0
             return len(said) == 3
 
-        steps = driven(panda_model, node, CommanderParams("twist"), done)
+        params = ArmParams("by-robot", "base", torques="/external_joint_torques")
+        robot = opened.enter_context(Ros2Robot(params, panda_model, node))
+        robot.wait(10)
+        commander = Ros2Commander(CommanderParams("twist"), robot, panda_model, node)
+        robot.begin()
+        steps = turned(controller, robot, NoUnits(), done, desired=commander)
     assert "the arm goes on when it can" in said[0]
     assert len(said) == 3
     assert np.isfinite(steps[-1].residual).all()  # of external torques

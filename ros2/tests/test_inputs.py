@@ -84,6 +84,15 @@ def test_only_what_is_newer_than_what_its_writer_said_before_is_new(told, expect
     assert [stamps.instant(header(stamp), received, writer) for stamp, received, writer in told] == expected
 
 
+def test_a_source_whose_stamps_are_not_newer_is_named_until_one_is():
+    stamps, notes = SourceStamps(), []
+    for stamp in (10, 5, 5, 11, 1e6, *range(12, 23), 1e6 + 1):  # one repeats, then one from the future mutes others
+        stamps.instant(header(stamp), 1.0, 7)
+        notes.append(stamps.not_newer("/joint_states"))
+    assert [bool(note) for note in notes] == [False] * 15 + [True, False]
+    assert "/joint_states is stamped no later than before, so it is not used: see whether its source" in notes[-2]
+
+
 def test_writers_that_publish_at_once_are_noticed_and_one_that_follows_another_is_not():
     stamps = SourceStamps()
     for k in range(3):

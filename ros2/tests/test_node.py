@@ -85,19 +85,19 @@ def test_an_arm_that_is_not_there_is_named_with_what_there_is(node, other, panda
 
 
 def test_units_that_are_not_there_are_named(node, other, paper_skin):
-    with Ros2Skin(SkinParams("/ranges"), paper_skin, node) as units:
-        publisher = other.publisher("/ranges", RANGE)
-        assert other.wait_for(lambda: publisher.subscribers == 1, 10)
-        for name in [*paper_skin.ids[1:], "stranger"]:
-            publisher.publish(measured_range(1, name, 0.5))
-        with pytest.raises(
-            HardwareError, match=rf"No reading was received from {paper_skin.ids[0]} on /ranges, only from stranger"
-        ):
-            units.wait(1.0)
-        readings = units.read()
-        assert readings.stamp[0] == -np.inf
-        assert np.isfinite(readings.stamp[1:]).all()
-        assert (readings.distance[1:] == 0.5).all()
+    units = Ros2Skin(SkinParams("/ranges"), paper_skin, node)
+    publisher = other.publisher("/ranges", RANGE)
+    assert other.wait_for(lambda: publisher.subscribers == 1, 10)
+    for name in [*paper_skin.ids[1:], "stranger"]:
+        publisher.publish(measured_range(1, name, 0.5))
+    with pytest.raises(
+        HardwareError, match=rf"No reading was received from {paper_skin.ids[0]} on /ranges, only from stranger"
+    ):
+        units.wait(1.0)
+    readings = units.read()
+    assert readings.stamp[0] == -np.inf
+    assert np.isfinite(readings.stamp[1:]).all()
+    assert (readings.distance[1:] == 0.5).all()
 
 
 def test_a_unit_for_which_several_publish_is_silent_and_named_and_strangers_take_little_memory(
@@ -107,23 +107,23 @@ def test_a_unit_for_which_several_publish_is_silent_and_named_and_strangers_take
         publishers[by].publish(measured_range(number, name, distance))
 
     ours = paper_skin.ids[0]
-    with Ros2Skin(SkinParams("/ranges"), paper_skin, node) as units:
-        publishers = {by: by.publisher("/ranges", RANGE) for by in (other, third)}
-        assert all(by.wait_for(lambda one=one: one.subscribers == 1, 10) for by, one in publishers.items())
-        say(other, ours, 1, 0.25)
-        assert node.wait_for(lambda: units.read().distance[0] == 0.25, 5)
-        assert units.notes == ()
-        for number in range(2, 5):
-            say(other, ours, number, 0.25)
-            say(third, ours, number, 3.0)
-        assert node.wait_for(lambda: units.read().stamp[0] == -np.inf, 5)
-        assert units.notes == (f"Several publishers send as {ours}: run only one; until then the unit is silent.",)
-        for number in range(100):
-            say(other, f"{number}" + 1000 * "x", number, 0.5)
-        say(other, paper_skin.ids[1], 1000, 0.5)
-        assert node.wait_for(lambda: units.read().distance[1] == 0.5, 5)
-        assert len(units._unknown) <= 64
-        assert max(map(len, units._unknown)) <= 80
+    units = Ros2Skin(SkinParams("/ranges"), paper_skin, node)
+    publishers = {by: by.publisher("/ranges", RANGE) for by in (other, third)}
+    assert all(by.wait_for(lambda one=one: one.subscribers == 1, 10) for by, one in publishers.items())
+    say(other, ours, 1, 0.25)
+    assert node.wait_for(lambda: units.read().distance[0] == 0.25, 5)
+    assert units.notes == ()
+    for number in range(2, 5):
+        say(other, ours, number, 0.25)
+        say(third, ours, number, 3.0)
+    assert node.wait_for(lambda: units.read().stamp[0] == -np.inf, 5)
+    assert units.notes == (f"Several publishers send as {ours}: run only one; until then the unit is silent.",)
+    for number in range(100):
+        say(other, f"{number}" + 1000 * "x", number, 0.5)
+    say(other, paper_skin.ids[1], 1000, 0.5)
+    assert node.wait_for(lambda: units.read().distance[1] == 0.5, 5)
+    assert len(units._unknown) <= 64
+    assert max(map(len, units._unknown)) <= 80
 
 
 @pytest.mark.slow

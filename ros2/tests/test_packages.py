@@ -1,8 +1,9 @@
-"""The packages for a ROS 2 workspace: messages are ours, launch files start what is there, parameters are known."""
+"""The distribution, and the packages for a ROS 2 workspace: launch files start what is there, with known parameters."""
 
 import re
 import runpy
 import sys
+import tomllib
 from collections import defaultdict
 from functools import partial
 from pathlib import Path
@@ -15,14 +16,18 @@ from rich.console import Console
 from ruamel.yaml import YAML
 
 from pretouch import __version__, cli
+from pretouch.arms import GROUP, arm_class
 from pretouch.cli.run.command import Run, check_options
+from pretouch.extras import ROS2
 from pretouch.profiles import PROFILES
 from pretouch.recording.ros import OWN, own_definition
 from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
+from pretouch_ros2.arm import Ros2
 from pretouch_ros2.params import CommanderParams
 
 ROOT = Path(__file__).parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 BRINGUP = ROOT / "pretouch_bringup"
 OPTIONS = sorted((BRINGUP / "config").glob("fr3_*.yaml"))
 LAUNCHES = sorted((BRINGUP / "launch").glob("*.launch.py"))
@@ -30,6 +35,17 @@ LAUNCHES = sorted((BRINGUP / "launch").glob("*.launch.py"))
 
 def yaml(path: Path) -> Any:
     return YAML(typ="safe", pure=True).load(path.read_text())
+
+
+def test_it_is_of_the_products_version_and_needs_that():
+    assert PROJECT["version"] == __version__
+    assert f"pretouch=={__version__}" in PROJECT["dependencies"]
+
+
+def test_its_arm_is_the_one_the_product_names():
+    assert PROJECT["name"] == ROS2.distribution
+    assert list(PROJECT["entry-points"][GROUP]) == ["ros2"]
+    assert arm_class("ros2") is Ros2
 
 
 def test_the_messages_are_those_of_recordings():

@@ -122,31 +122,25 @@ class Course:
         return float(found[self.times[2:] >= begin].max())
 
 
-@pytest.mark.parametrize("release", RELEASES)
-@pytest.mark.parametrize("rate", [1000, 250, 100])
-def test_with_one_clock_messages_leave_no_trace_in_the_motion(release, rate):
-    course = Course(release, swing, 3.0, rate)
+@pytest.mark.parametrize(
+    "about",
+    [
+        *({"release": release, "rate": rate} for release in RELEASES for rate in (1000, 250, 100)),
+        *({"skew": skew} for skew in (-0.01, -0.005, 0.003, 0.005)),  # clocks may differ by milliseconds
+        *({"lag": lag} for lag in (0.01, 0.03)),  # and an arm may be behind its commands
+    ],
+)
+def test_with_one_clock_messages_leave_no_trace_in_the_motion(about):
+    course = Course(**{"release": "4.21", **about}, wish=swing, until=3.0)
     assert not course.tripped
     assert course.acceleration(MOVES) < OWN
     assert np.abs(course.speed()).max() > 0.75
-
-
-@pytest.mark.parametrize("skew", [-0.01, -0.005, 0.003, 0.005])
-def test_clocks_may_differ_by_milliseconds(skew):
-    assert Course("4.21", swing, 3.0, skew=skew).acceleration(MOVES) < OWN
 
 
 @pytest.mark.parametrize(("release", "low", "high"), [("4.17", 0.0, 1.0), ("humble", 50, 200), ("4.21", 50, 200)])
 def test_without_one_clock_some_releases_jerk_at_each_message(release, low, high):
     course = Course(release, swing, 3.0, params=replace(PARAMS, shared_clock=False))
     assert low < course.acceleration(MOVES) < high
-
-
-@pytest.mark.parametrize("lag", [0.01, 0.03])
-def test_an_arm_that_is_behind_its_commands_moves_as_well(lag):
-    course = Course("4.21", swing, 3.0, lag=lag)
-    assert not course.tripped
-    assert course.acceleration(MOVES) < OWN
 
 
 @pytest.mark.parametrize("release", RELEASES)

@@ -11,8 +11,8 @@ from time import monotonic, sleep
 
 import numpy as np
 import pytest
-from ros2.tests.arm_peer import speeds, velocities
-from ros2.tests.asking import publishing, twist
+from ros2.tests.arm_peer import ArmPeer, speeds, velocities
+from ros2.tests.asking import NAMES, publishing, trajectory, twist
 
 from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify
@@ -20,7 +20,7 @@ from pretouch.robot.description import panda
 from pretouch.session.memory import ConfirmedRobots
 from pretouch.session.push import DIRECTIONS
 from pretouch_ros2.arm import identity
-from pretouch_ros2.messages import TWIST
+from pretouch_ros2.messages import TRAJECTORY, TWIST
 from pretouch_ros2.params import ArmParams, NodeParams
 
 # two processes in real time: alone, lest another test takes the arm's time and it is rightly found not to follow
@@ -80,7 +80,21 @@ def test_a_run_checks_yields_to_a_push_and_ends_at_rest(domain, tmp_path, arm):
     assert speeds(log)[-50:].max() < 1e-9
 
 
-@pytest.mark.parametrize("ending", [signal.SIGKILL, signal.SIGSTOP], ids=["killed", "frozen"])
+killed_or_frozen = pytest.mark.parametrize("ending", [signal.SIGKILL, signal.SIGSTOP], ids=["killed", "frozen"])
+
+
+def ended(run: subprocess.Popen[str], arm: ArmPeer, ending: signal.Signals) -> tuple[np.ndarray, int, float]:
+    """End the program; return what the arm was commanded, in which row that was, and how long it then moved [s]."""
+    run.send_signal(ending)
+    instant = monotonic()
+    sleep(1.0)
+    log = arm.stop()
+    moving = speeds(log) > 1e-6
+    assert not moving[-300:].any()
+    return log, int(np.searchsorted(log[:, 0], instant)), log[1:, 0][moving][-1] - instant
+
+
+@killed_or_frozen
 def test_a_run_that_is_killed_or_frozen_in_motion_leaves_the_arm_at_rest(domain, tmp_path, arm, ending):
     confirmed(domain, tmp_path)
     with running(domain, tmp_path, "--seconds", "30") as run:
@@ -88,17 +102,28 @@ def test_a_run_that_is_killed_or_frozen_in_motion_leaves_the_arm_at_rest(domain,
         arm.tell("push 0 0 20")
         lines_until(run, "REACT")
         sleep(0.2)
-        run.send_signal(ending)
-        ended = monotonic()
-        sleep(1.0)
-        log = arm.stop()
-    fast, time = speeds(log), log[1:, 0]
-    assert fast[time < ended][-50:].max() > 0.05  # samples, not a time: a busy machine may log none for a while
-    assert time[fast > 1e-6][-1] - ended < 0.4 + LATE_S
-    assert not (fast[-300:] > 1e-6).any()
-    braking = slice(np.searchsorted(time, ended + 0.1), None)
+        log, at_end, moved = ended(run, arm, ending)
+    assert speeds(log)[at_end - 50 : at_end].max() > 0.05  # samples: a busy machine may log none for a while
+    assert moved < 0.4 + LATE_S
+    braking = slice(np.searchsorted(log[1:, 0], log[at_end, 0] + 0.1), None)
     acceleration = np.abs(np.diff(velocities(log)[braking], axis=0)) / 1e-3 / panda().qdd_max
     assert np.percentile(acceleration, 99) < 1.1
+
+
+@killed_or_frozen
+def test_at_speed_it_is_at_rest_as_soon_as_it_can_brake(domain, tmp_path, arm, other, ending):
+    params, fast = ArmParams("by-robot", "base"), trajectory(NAMES, (0.0, 0.8 * np.array([1, -1, 1, 1, 1, 1, 1])))
+    confirmed(domain, tmp_path)
+    with running(domain, tmp_path, "--seconds", "60", "--desired", "trajectory") as run:
+        lines_until(run, "was received on /pretouch/joint_trajectory yet")
+        with publishing(other, "/pretouch/joint_trajectory", TRAJECTORY, lambda: fast):
+            lines_until(run, "TRACK")
+            sleep(0.5)
+            log, at_end, moved = ended(run, arm, ending)
+    qd = np.abs(velocities(log))
+    assert qd[at_end - 20 : at_end].min(axis=1).max() > 0.75
+    braking = float((qd[at_end - 20 : at_end + 20].max(axis=0) / panda().qdd_max).max())
+    assert moved < params.ahead_s + params.hold_s + braking + LATE_S
 
 
 def test_a_commander_drives_by_the_profile_pretouch_after_pushes_that_torques_confirm(domain, tmp_path, arm, other):

@@ -1,7 +1,7 @@
 """An arm on ROS 2 for `pretouch run`."""
 
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar, Literal
 
@@ -67,13 +67,14 @@ class Ros2(ArmOptions):
                 params = CommanderParams(self.desired, self.desired_topic, self.arm.shared_clock, self.base_frame)
                 commander = Ros2Commander(params, robot, setup.model, node)
             if setup.units:
-                skin = stack.enter_context(Ros2Skin(SkinParams(self.ranges), setup.skin, node))
+                skin = Ros2Skin(SkinParams(self.ranges), setup.skin, node)
                 skin.wait(_PATIENCE_S)
+            output_params = OutputParams(base_frame=self.base_frame)
             sources = [source for source in (robot, skin, commander) if source is not None]
             yield OpenedArm(
                 robot, robot_known, skin,
                 notes=lambda: tuple(note for source in sources for note in source.notes),
-                output=lambda controller: Ros2Output(OutputParams(base_frame=self.base_frame), controller, node),
+                output=lambda controller: closing(Ros2Output(output_params, controller, node)),
                 free_motion_id=robot_known.key, commander=commander, announced=commander.announced if commander else "",
             )  # fmt: skip
 

@@ -58,13 +58,15 @@ class Ros2Commander:
     @property
     def notes(self) -> tuple[str, ...]:
         """What a person should know of what came, a sentence each."""
-        return (self._heard.unreadable,) if self._heard.unreadable else ()
+        return tuple(filter(None, (self._heard.unreadable, self._stamps.not_newer(self.params.heard_on))))
 
     def __call__(self) -> Desired:
         """Return what is asked for now."""
         topic, newest = self.params.heard_on, self._newest
         if self._stamps.together():
             return desired.refused(0.0, f"several programs ask on {topic}: run only one")
+        if old := self._stamps.not_newer(topic):
+            return desired.refused(0.0, old.removesuffix("."))
         if newest is None:
             kind = self.kind.replace("/msg/", "/")
             return desired.refused(0.0, f"no {kind} was received on {topic} yet: start what publishes it")

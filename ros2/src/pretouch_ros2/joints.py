@@ -60,9 +60,8 @@ class Joints:
         if stamp is None:
             return
         q = np.array(message.position, dtype=np.float64)[places]
-        qd = None
-        if len(message.velocity) == len(message.position):
-            qd = np.array(message.velocity, dtype=np.float64)[places]
+        complete = len(message.velocity) == len(message.position)
+        qd = np.array(message.velocity, dtype=np.float64)[places] if complete else None
         self.differentiated = qd is None or not np.isfinite(qd).all()
         self.newest = JointReading(stamp, q, self._difference(stamp, q) if qd is None or self.differentiated else qd)
 

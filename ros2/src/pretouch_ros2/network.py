@@ -23,7 +23,7 @@ _BY_ASKING = (
 
 
 _DOMAINS: dict[int, tuple[str, Domain]] = {}
-"""Configuration and domain by its number: DDS has one network a domain and process, which all nodes share."""
+"""Configuration and domain by its number: DDS has one network a domain, which a process keeps to its end."""
 
 
 def domain_of(params: NodeParams, environment: Mapping[str, str] = os.environ) -> int:
@@ -82,4 +82,4 @@ def _configure(number: int, xml: str) -> None:
     if number not in _DOMAINS:
         _DOMAINS[number] = xml, Domain(number, xml)
     if _DOMAINS[number][0] != xml:
-        raise RobotError(f"Domain {number} is in use by this program with another interface: use one for both.")
+        raise RobotError(f"Domain {number} was joined by this program with another interface: use one for both.")

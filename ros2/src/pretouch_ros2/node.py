@@ -185,11 +185,9 @@ class Ros2Node:
     def wait_for(self, there: Callable[[], bool], timeout: float) -> bool:
         """Wait until something is there, for so long at most [s]; say whether it is."""
         end = monotonic() + timeout
-        while not there():
-            if monotonic() >= end:
-                return False
+        while not (is_there := there()) and monotonic() < end:
             sleep(_POLL_S)
-        return True
+        return is_there
 
     def close(self) -> None:
         """Leave the domain."""

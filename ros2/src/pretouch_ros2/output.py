@@ -3,7 +3,6 @@
 from queue import SimpleQueue
 from threading import Thread
 from time import monotonic, time_ns
-from typing import Self
 
 from pretouch.controller import Controller
 from pretouch.loop import Cycle
@@ -74,12 +73,6 @@ class Ros2Output:
         """Publish what waits, and end."""
         self._queue.put(None)
         self._thread.join()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def _work(self) -> None:
         while (item := self._queue.get()) is not None:

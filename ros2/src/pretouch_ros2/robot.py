@@ -38,8 +38,7 @@ class Ros2Robot:
             )
         if params.hold_s < period:
             raise RobotError(f"hold_s is {params.hold_s:g} s: give at least the control period, {period:g} s.")
-        self.params, self._node = params, node
-        self._model = model
+        self.params, self._node, self._model = params, node, model
         self._joints = Joints(params.joint_names or model.joints, SourceStamps(params.shared_clock))
         self._wrench = Wrench(params, SourceStamps(params.shared_clock))
         self._states = node.subscribe(params.joint_states, JOINT_STATE, self._joints.take)
@@ -48,6 +47,8 @@ class Ros2Robot:
         self._efforts = (
             [node.subscribe(params.torques, self._torques.kind, self._torques.take)] if params.torques else []
         )
+        stamps = self._joints.stamps, self._wrench.stamps, self._torques.stamps
+        self._stamps = tuple(zip((params.joint_states, params.wrench, params.torques), stamps, strict=True))
         self._commands = TrajectoryCommands(params, model, self._joints.names, node, period)
         self._tick = self._tick_before = -math.inf
         self._lost, self._ended = "", False
@@ -66,6 +67,7 @@ class Ros2Robot:
     def notes(self) -> tuple[str, ...]:
         """What a person should know of what came, a sentence each."""
         p, sentences = self.params, [self._wrench.warning]
+        sentences += [stamps.not_newer(topic) for topic, stamps in self._stamps]
         sentences += [heard.unreadable for heard in (self._states, self._wrenches, *self._efforts)]
         if self._joints.differentiated:
             sentences.append(f"{p.joint_states} has no velocities: they are computed from the positions.")
@@ -175,9 +177,8 @@ class Ros2Robot:
                 f"Another program publishes on {p.command_topic}: only one program may command the arm, so end it, or"
                 " wait 10 s if it was killed."
             )
-        sources = (self._joints, p.joint_states), (self._wrench, p.wrench), (self._torques, p.torques)
-        for source, topic in sources:
-            if source.stamps.together():
+        for topic, stamps in self._stamps:
+            if stamps.together():
                 return f"Several publishers send on {topic}: run only one, or give each its own topic."
         return ""
 

@@ -2,7 +2,7 @@
 
 import math
 from functools import partial
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
@@ -53,11 +53,11 @@ class Ros2Skin:
     @property
     def notes(self) -> tuple[str, ...]:
         """What a person should know of what came, a sentence each."""
-        several = [name for name, stamps in zip(self._ids, self._stamps, strict=True) if stamps.together()]
-        conflicts = [
-            f"Several publishers send as {name}: run only one; until then the unit is silent." for name in several
-        ]
-        return (*(s.unreadable for s in self._subscriptions if s.unreadable), *conflicts)
+        sentences = [subscription.unreadable for subscription in self._subscriptions]
+        for name, stamps in zip(self._ids, self._stamps, strict=True):
+            several = f"Several publishers send as {name}: run only one; until then the unit is silent."
+            sentences += [several if stamps.together() else stamps.not_newer(name)]
+        return tuple(filter(None, sentences))
 
     def read(self) -> RangeReadings:
         """Return the newest reading of each unit, stamped with when it was received by the monotonic clock.
@@ -70,12 +70,6 @@ class Ros2Skin:
             np.array([distance for _, distance, _ in newest]),
             np.array([status for _, _, status in newest], dtype=np.int64),
         )
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Nothing is held that the node does not end."""
 
     def _topics(self) -> list[str]:
         topics = [self.params.topic.replace(UNIT, topic_name(name)) for name in self._ids]

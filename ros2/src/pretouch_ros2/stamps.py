@@ -15,6 +15,8 @@ _TOGETHER_S = 0.5
 """Writers that were heard within this time publish at once [s]."""
 _WRITERS = 8
 """Writers that are remembered: those that were heard last."""
+_NOT_NEWER_MOST = 10
+"""Messages in a row that may be no newer before a person is told: now and then one comes twice."""
 
 
 @dataclass
@@ -34,6 +36,7 @@ class SourceStamps:
         """Take whether the stamps are of this machine's time of day; and that [s]."""
         self._shared, self._now = shared_clock, now
         self._writers: dict[int, _Writer] = {}
+        self._not_newer = 0
         self.behind: float | None = None
         """How far stamps are behind this machine's time of day when they come, at best [s]; None: there are none."""
 
@@ -51,11 +54,20 @@ class SourceStamps:
         if stamp == 0:
             return received
         if stamp <= entry.newest:
+            self._not_newer += 1
             return None
-        entry.newest = stamp
+        entry.newest, self._not_newer = stamp, 0
         behind = self._now() - stamp
         self.behind = behind if self.behind is None else min(behind, self.behind, key=abs)
         return received - max(behind, 0.0) if self._shared else received
+
+    def not_newer(self, name: str) -> str:
+        """Say that all that comes of a name is dropped by now, as a sentence, or ''."""
+        sentence = (
+            f"{name} is stamped no later than before, so it is not used: see whether its source repeats itself, or set"
+            " its clock by NTP and start the run again."
+        )
+        return sentence if self._not_newer > _NOT_NEWER_MOST else ""
 
     def together(self) -> bool:
         """Whether several writers publish at once."""
