@@ -3,7 +3,6 @@
 import csv
 import re
 import socket
-from unittest.mock import Mock
 
 import numpy as np
 import pytest

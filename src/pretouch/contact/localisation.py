@@ -18,8 +18,7 @@ from pretouch.contact.scatter import LENGTHS
 from pretouch.contact.sequential_step import SampleTest
 from pretouch.contact.touch_cue import Cues
 from pretouch.params import LocalisationParams
-from pretouch.perception.closest import to_axis
-from pretouch.robot.body import Capsules, Surface, placed
+from pretouch.robot.body import Capsules, Surface, placed, to_axis
 from pretouch.robot.kinematics import Kinematics, rotate
 from pretouch.types import NOT_TOUCHED, BoolArray, FloatArray, IntArray, Obstacles, Touched
 from pretouch.values import value

@@ -3,7 +3,7 @@
 import numpy as np
 
 from pretouch.compiled import compiled, kernel
-from pretouch.robot.body import Capsules, placed
+from pretouch.robot.body import Capsules, placed, to_axis
 from pretouch.robot.kinematics import Kinematics
 from pretouch.robot.model import RobotModel
 from pretouch.robot.postures import nearest_points
@@ -87,18 +87,6 @@ def _nearest_capsules(capsules: Capsules, point: FloatArray, distance: FloatArra
     for k in range(count):
         distance[k] = least[k]
     return nearest
-
-
-@kernel
-def to_axis(point: FloatArray, k: int, a: FloatArray, b: FloatArray, c: int) -> tuple[float, float]:
-    """Where on the segment from a[c] to b[c] point[k] is closest, from 0 to 1, and how far from it [m]."""
-    ux, uy, uz = b[c, 0] - a[c, 0], b[c, 1] - a[c, 1], b[c, 2] - a[c, 2]
-    x, y, z = point[k, 0] - a[c, 0], point[k, 1] - a[c, 1], point[k, 2] - a[c, 2]
-    length2 = ux * ux + uy * uy + uz * uz
-    # the foot of the perpendicular, brought into the segment; a ball has no axis
-    along = 0.0 if length2 == 0 else min(1.0, max(0.0, (x * ux + y * uy + z * uz) / length2))
-    x, y, z = x - along * ux, y - along * uy, z - along * uz
-    return along, np.sqrt(x * x + y * y + z * z)
 
 
 def beside(

@@ -13,11 +13,11 @@ import numpy as np
 
 from pretouch.compiled import compiled, inlined, kernel
 from pretouch.params import OutsidePoints
-from pretouch.perception.closest import closest, to_axis
+from pretouch.perception.closest import closest
 from pretouch.perception.motion_compensation import follow_points
 from pretouch.perception.obstacles import Sight, TrackState, speed_factor, track_init
 from pretouch.records import Cell
-from pretouch.robot.body import Capsules, placed
+from pretouch.robot.body import Capsules, placed, to_axis
 from pretouch.robot.kinematics import Chain, Kinematics, dot, point_velocity
 from pretouch.types import FloatArray, IntArray, Obstacles, SeenPoints, no_obstacles
 

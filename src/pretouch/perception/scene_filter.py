@@ -7,8 +7,7 @@ import numpy as np
 
 from pretouch.compiled import compiled, inlined, kernel
 from pretouch.errors import FixtureError
-from pretouch.perception.closest import to_axis
-from pretouch.robot.body import Capsules, no_capsules, placed
+from pretouch.robot.body import Capsules, no_capsules, placed, to_axis
 from pretouch.robot.kinematics import Kinematics, dot
 from pretouch.sensing.sensor import Cones, Sensors
 from pretouch.types import BoolArray, FloatArray

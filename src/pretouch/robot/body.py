@@ -5,7 +5,7 @@ from typing import Annotated, NamedTuple
 import mujoco
 import numpy as np
 
-from pretouch.compiled import compiled
+from pretouch.compiled import compiled, kernel
 from pretouch.errors import RobotModelError
 from pretouch.robot.kinematics import Kinematics
 from pretouch.types import BoolArray, FloatArray, IntArray
@@ -69,11 +69,23 @@ def capsules_of(model: mujoco.MjModel) -> Capsules:
 def from_axes(points: FloatArray, a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Where on axes a to b (C, 3) points (P, 3) are nearest, 0 to 1 (P, C), and the ways from there (P, C, 3) [m].
 
-    `perception.closest.to_axis` is the same for compiled code.
+    `to_axis` is the same for compiled code.
     """
     axis, rel = b - a, points[:, None] - a
     part = np.clip((rel * axis).sum(axis=2) / np.maximum((axis**2).sum(axis=1), 1e-12), 0.0, 1.0)
     return part, rel - part[:, :, None] * axis
+
+
+@kernel
+def to_axis(point: FloatArray, k: int, a: FloatArray, b: FloatArray, c: int) -> tuple[float, float]:
+    """Where on the segment from a[c] to b[c] point[k] is closest, from 0 to 1, and how far from it [m]."""
+    ux, uy, uz = b[c, 0] - a[c, 0], b[c, 1] - a[c, 1], b[c, 2] - a[c, 2]
+    x, y, z = point[k, 0] - a[c, 0], point[k, 1] - a[c, 1], point[k, 2] - a[c, 2]
+    length2 = ux * ux + uy * uy + uz * uz
+    # the foot of the perpendicular, brought into the segment; a ball has no axis
+    along = 0.0 if length2 == 0 else min(1.0, max(0.0, (x * ux + y * uy + z * uz) / length2))
+    x, y, z = x - along * ux, y - along * uy, z - along * uz
+    return along, np.sqrt(x * x + y * y + z * z)
 
 
 SPACING_M = 0.025
