@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pretouch.coverage.measure import Setting, coverage_of, covered
+from pretouch.coverage.measure import Setting, covered
 from pretouch.coverage.params import CoverageParams
 from pretouch.coverage.ways import seen_by, ways_met
 from pretouch.perception.scene_filter import no_fixtures
@@ -83,6 +83,6 @@ def test_a_skin_is_measured_along_its_path_or_in_any_direction(panda_model, pape
         tip = np.flatnonzero(panda_model.moved_by.all(axis=1)[met.surface.link])
         fast = met.way[:, tip][met.free[:, tip]]
         assert np.all(np.abs(fast[:, 0]) < 0.02) == (workspace == "circle"), "the circle lies across x"
-        (one, _), (other, _) = (coverage_of(found, paper_skin) for found in (met, setting.met()))
+        one, other = (covered(found, seen_by(found, paper_skin)) for found in (met, setting.met()))
         assert one.links == other.links
         assert 0.0 < one.arm.ways < 0.6

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from pretouch.coverage.figure import coverage_figure
-from pretouch.coverage.measure import Setting, coverage_of
+from pretouch.coverage.measure import Setting, covered
 from pretouch.coverage.params import CoverageParams
+from pretouch.coverage.ways import seen_by
 from pretouch.coverage.workspace import postures
 from pretouch.errors import ExperimentError
 from pretouch.robot.postures import capsule_ends, ever_apart, kinematics_of, self_distances
@@ -15,7 +16,7 @@ ROOM = fixtures(SceneSpec())
 
 
 def drawn(model, workspace, count=6):
-    return postures(model, ROOM, workspace, count, np.random.default_rng(1)).q
+    return postures(model, ROOM, workspace, count, np.random.default_rng(1))[0]
 
 
 def hands(model, q):
@@ -30,7 +31,7 @@ def test_the_hand_is_on_the_path_all_along_it(panda_model):
     assert np.diff(turn).max() < 2 * 2 * np.pi / 8
     both = hands(panda_model, drawn(panda_model, "paths", 6))
     assert np.sum(np.isclose(both[:, 0], 0.4, atol=1e-5)) == 3, "half of them on the line"
-    along = postures(panda_model, ROOM, "circle", 8, np.random.default_rng(1)).along
+    _, along = postures(panda_model, ROOM, "circle", 8, np.random.default_rng(1))
     out = hand - np.array([0.5, 0.0, 0.25])
     np.testing.assert_allclose(along, np.cross([1.0, 0.0, 0.0], out) / 0.25, atol=1e-4)
 
@@ -49,11 +50,9 @@ def test_one_posture_is_none_of_a_workspace(panda_model):
 
 def test_the_same_seed_gives_the_same_numbers_and_the_figure_can_be_drawn(panda_model, paper_skin):
     setting = Setting(panda_model, ROOM, CoverageParams(), "circle", 4, 1000)
-    (one, _), (other, _) = (coverage_of(setting.ways(), paper_skin) for _ in range(2))
+    one, other, fresh = (covered(ways, seen_by(ways, paper_skin)) for ways in map(setting.ways, (0, 0, 1)))
     assert one.links == other.links
-    ways = setting.ways(1)
-    fresh, _ = coverage_of(ways, paper_skin)
     assert fresh.arm.ways != one.arm.ways
-    figure = coverage_figure(ways, fresh, paper_skin, frozenset({"hand_left"}))
+    figure = coverage_figure(setting.ways(1), fresh, paper_skin, frozenset({"hand_left"}))
     assert f"{100 * fresh.arm.ways:.0f} % of the paths" in figure.get_suptitle()
     assert len(figure.axes) == 4

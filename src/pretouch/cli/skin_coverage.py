@@ -13,7 +13,7 @@ from pretouch.cli.tables import show
 from pretouch.cli.writing import check_outputs, numbers_to, unwritable_said
 from pretouch.coverage import measure
 from pretouch.coverage.blind import BLIND, blind_spots
-from pretouch.coverage.measure import Setting, coverage_of, covered
+from pretouch.coverage.measure import Setting, covered
 from pretouch.coverage.params import CoverageParams
 from pretouch.coverage.suggest import Suggestions, candidates, suggest
 from pretouch.coverage.ways import Ways, seen_by
@@ -100,8 +100,9 @@ def _measured(command: MeasureCoverage, setting: Setting, skin: Skin) -> dict[st
     """Measure, print and draw; return the numbers."""
     ways, met = setting.ways(), setting.met()
     console = Console(highlight=False)
-    shares, sees = coverage_of(ways, skin)
-    both, new = (shares, coverage_of(met, skin)[0]), frozenset[str]()
+    sees = seen_by(ways, skin)
+    shares, new = covered(ways, sees), frozenset[str]()
+    both = shares, covered(met, seen_by(met, skin))
     spots = blind_spots(ways, shares)
     show(console, [_link_table(setting, *both), *([_unit_table(skin, ways, sees)] if len(skin) else [])])
     total = 1e4 * sum(spot.area_m2 for spot in spots)

@@ -73,5 +73,5 @@ def _spot(ways: Ways, coverage: Coverage, points: IntArray) -> BlindSpot:
         _SIDES[int(_axis(in_base[None])[0])] if np.linalg.norm(in_base) > _STEADY else "",
         float(area.sum()),
         center,
-        float(coverage.seen[:, points].sum() / coverage.free[:, points].sum()),
+        float(coverage.seen[points].sum() / coverage.free[points].sum()),
     )

@@ -5,11 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from pretouch.coverage.params import CoverageParams
-from pretouch.coverage.ways import Ways, seen_by, ways_met, ways_to
+from pretouch.coverage.ways import Ways, ways_met, ways_to
 from pretouch.coverage.workspace import postures
 from pretouch.perception.scene_filter import Fixtures
 from pretouch.robot.model import RobotModel
-from pretouch.sensing.skin import Skin
 from pretouch.types import BoolArray, FloatArray
 
 COVERED = 0.5
@@ -33,12 +32,12 @@ class LinkShare:
 
 @dataclass(frozen=True, eq=False)
 class Coverage:
-    """What a skin sees in time, by posture and surface point."""
+    """What a skin sees in time, by surface point."""
 
     free: FloatArray
-    """(S, P) weight of the ways to each point in each posture."""
+    """(P,) weight of the ways to each point, in all postures."""
     seen: FloatArray
-    """(S, P) weight of those on which the ball is seen in time."""
+    """(P,) weight of those on which the ball is seen in time."""
     links: tuple[LinkShare, ...]
     """Each link that something can come to, in the arm's order."""
     arm: LinkShare
@@ -46,23 +45,24 @@ class Coverage:
     @property
     def point_share(self) -> FloatArray:
         """Share of the ways to each point that are seen (P,), NaN where nothing can come."""
-        free = self.free.sum(axis=0)
-        return np.divide(self.seen.sum(axis=0), free, out=np.full(len(free), np.nan), where=free > 0)
+        return np.divide(self.seen, self.free, out=np.full(len(self.free), np.nan), where=self.free > 0)
 
 
 def covered(ways: Ways, sees: BoolArray) -> Coverage:
     """Bring together, by point and by link, what each of B mounted units (B, S, W) sees in time."""
     surface, seen = ways.surface, np.where(np.logical_or.reduce(sees), ways.weight, 0.0)
     count, names = len(surface.link), ways.model.links
-    free, seen = (np.array([np.bincount(ways.point, row, count) for row in some]) for some in (ways.weight, seen))
-    reached = free.sum(axis=0) > 0
+    free, seen = (
+        np.bincount(ways.point, weight.sum(axis=0), count).astype(np.float64) for weight in (ways.weight, seen)
+    )
+    reached = free > 0
 
     def shares(name: str, points: BoolArray) -> LinkShare:
-        f, s, area = free[:, points], seen[:, points], float(surface.area[points].sum())
+        f, s, area = free[points], seen[points], float(surface.area[points].sum())
         if not points.any():
             return LinkShare(name, 0.0, float("nan"), float("nan"))
         # each point weighs as its area: points differ a little in what they stand for
-        weight, good = surface.area[points] / area, s.sum(axis=0) >= COVERED * f.sum(axis=0)
+        weight, good = surface.area[points] / area, s >= COVERED * f
         return LinkShare(name, area, float((weight * s).sum() / (weight * f).sum()), float((weight * good).sum()))
 
     links = (shares(names[i], (surface.link == i) & reached) for i in np.unique(surface.link[reached]))
@@ -83,21 +83,15 @@ class Setting:
     def ways(self, sample: int = 0) -> Ways:
         """Draw the ways; another `sample` has other postures and directions."""
         rng = np.random.default_rng([self.seed, 51, sample])
-        q = postures(self.model, self.room, self.workspace, self.postures, rng).q
+        q, _ = postures(self.model, self.room, self.workspace, self.postures, rng)
         point = np.repeat(np.arange(len(self.model.surface.link)), _EACH)
         return ways_to(self.model, self.room, self.params, q, point, rng)
 
     def met(self, sample: int = 0) -> Ways:
         """Draw what stands in the arm's way, its hand on its path, either way along it, or in any direction."""
         rng = np.random.default_rng([self.seed, 52, sample])
-        at = postures(self.model, self.room, self.workspace, self.postures, rng)
+        q, along = postures(self.model, self.room, self.workspace, self.postures, rng)
         to = rng.normal(size=(self.postures, 3))
-        if at.along is not None:
-            to = np.sign(to[:, :1]) * at.along
-        return ways_met(self.model, self.room, self.params, at.q, to / np.linalg.norm(to, axis=1, keepdims=True))
-
-
-def coverage_of(ways: Ways, skin: Skin) -> tuple[Coverage, BoolArray]:
-    """Return what a skin sees, and which of its mounted units (B, S, W) see each way in time."""
-    seen = seen_by(ways, skin)
-    return covered(ways, seen), seen
+        if along is not None:
+            to = np.sign(to[:, :1]) * along
+        return ways_met(self.model, self.room, self.params, q, to / np.linalg.norm(to, axis=1, keepdims=True))

@@ -1,7 +1,5 @@
 """The postures that coverage is averaged over: on the paper's paths, or in the joints' whole range."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from pretouch.errors import ExperimentError
@@ -16,38 +14,27 @@ _DRAWN = 40
 """Postures drawn at most for each that is wanted: many meet the arm itself or the floor."""
 
 
-@dataclass(frozen=True, eq=False)
-class Postures:
-    """S postures of a workspace."""
+def postures(
+    model: RobotModel, room: Fixtures, workspace: str, count: int, rng: np.random.Generator
+) -> tuple[FloatArray, FloatArray | None]:
+    """Draw postures of a workspace (S, n) [rad], and unit tangents of the hand's path there (S, 3), base frame.
 
-    q: FloatArray
-    """(S, n) joint positions [rad]."""
-    along: FloatArray | None = None
-    """(S, 3) unit tangents of the hand's path, base frame; None where it has none."""
-
-
-def postures(model: RobotModel, room: Fixtures, workspace: str, count: int, rng: np.random.Generator) -> Postures:
-    """Draw `count` postures of a workspace.
-
-    `circle` and `line` are the paper's, `paths` both, the hand upright; `joints` is the whole range of the joints,
-    where the arm is clear of itself and of the room. Raises ExperimentError for anything else, and where the arm cannot
-    be.
+    `circle` and `line` are the paper's paths, `paths` both, the hand upright; `joints` is the whole range of the
+    joints, where the arm is clear of itself and of the room, and has no path: None. Raises ExperimentError for anything
+    else, and where the arm cannot be.
     """
     if count < 2:
         raise ExperimentError(f"The number of postures is {count}: give at least 2.")
     if workspace == "joints":
-        return Postures(_anywhere(model, room, count, rng))
+        return _anywhere(model, room, count, rng), None
     if workspace not in KINDS:
         raise ExperimentError(f"The workspace is {workspace!r}: give {', '.join(KINDS)}.")
     place = placement_for(model)
-    names = ("circle", "line") if workspace == "paths" else (workspace,)
-    parts = np.array_split((np.arange(count) + rng.uniform(size=count)) / count, len(names))
-    q, along = list[FloatArray](), list[FloatArray]()
-    for path, part in zip((place.path(name, 1.0) for name in names), parts, strict=True):
-        phases = part * len(names) % 1.0 * path.length
-        q += [brought_to(model, path.point(phase)) for phase in phases]
-        along += [path.tangent(phase) for phase in phases]
-    return Postures(np.array(q), np.array(along))
+    paths = [place.path(name, 1.0) for name in (("circle", "line") if workspace == "paths" else (workspace,))]
+    parts = np.array_split((np.arange(count) + rng.uniform(size=count)) / count, len(paths))
+    at = [(path, p * len(paths) % 1.0 * path.length) for path, part in zip(paths, parts, strict=True) for p in part]
+    q = np.array([brought_to(model, path.point(phase)) for path, phase in at])
+    return q, np.array([path.tangent(phase) for path, phase in at])
 
 
 def _anywhere(model: RobotModel, room: Fixtures, count: int, rng: np.random.Generator) -> FloatArray:
