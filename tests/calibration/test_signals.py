@@ -5,9 +5,9 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from pretouch.calibration.alignment import align
-from pretouch.calibration.signals import FINE_S, ImuSignal, gaps, outside, rate_of_change, saturated, smooth, times
+from pretouch.calibration.signals import ImuSignal, rate_of_change, saturated, smooth, times
 from pretouch.calibration.values import UnitData
-from pretouch.traces import ImuTrace, on_grid
+from pretouch.traces import ImuTrace
 
 STEP = 0.04
 TIME = np.arange(0, 40, STEP)
@@ -90,25 +90,6 @@ def test_the_rate_of_change_is_exact_for_slow_signals():
     wave = np.column_stack([np.sin(6 * at), at**3])
     expected = np.column_stack([6 * np.cos(6 * at), 3 * at**2])
     assert rate_of_change(wave)[2:-2] == pytest.approx(expected[2:-2], abs=1e-6)
-
-
-def test_between_instants_it_is_linear_and_at_the_ends_it_stays():
-    fine = times(10.0, 10.004)
-    values = np.array([[1.0, 0.0], [3.0, 0.0], [2.0, 5.0]])
-    at = np.array([9.0, 10.0, 10.001, 10.003, 11.0])
-    found = on_grid(at, fine[0], FINE_S, values)
-    assert found[:, 0] == pytest.approx([1.0, 1.0, 2.0, 2.5, 2.0], abs=1e-4)
-
-
-def test_gaps_are_where_samples_are_far_apart_and_outside_the_measured_time():
-    found = gaps(np.array([1.0, 1.01, 1.2, 1.21]), 0.05)
-    assert found.tolist() == [[-np.inf, 1.0], [1.01, 1.2], [1.21, np.inf]]
-
-
-def test_outside_keeps_its_margin():
-    at = np.arange(0, 10, 1.0)
-    free = outside(at, np.array([[-np.inf, 0.5], [4.2, 4.4], [9.0, np.inf]]), 1.0)
-    assert np.flatnonzero(free).tolist() == [2, 3, 6, 7]
 
 
 def unit(stamp, acceleration, rate, **limits):

@@ -14,6 +14,7 @@ from pretouch.calibration.findings import (
     share_findings,
     unknown_finding,
 )
+from pretouch.calibration.fit import ACC_BIAS, ACC_SCALE, GYRO_BIAS, GYRO_SCALE
 from pretouch.calibration.identify import Identified, Identifier
 from pretouch.calibration.joint_noise import JointNoise
 from pretouch.calibration.link_motion import ArmMotion
@@ -85,15 +86,15 @@ def _wrong_link(model: RobotModel, unit: UnitData, identified: Identified) -> li
 
 
 def _place(model: RobotModel, located: Located, link: int, T: FloatArray, covariance: FloatArray) -> Place:
-    e = located.estimate
+    errors = located.estimate.errors
     return Place(
         link=model.links[link],
         T_link_sensor=T,
         covariance=covariance,
-        acceleration_bias=e.acceleration_bias,
-        angular_velocity_bias=e.angular_velocity_bias,
-        acceleration_scale=e.acceleration_scale,
-        angular_velocity_scale=e.angular_velocity_scale,
+        acceleration_bias=errors[ACC_BIAS],
+        angular_velocity_bias=errors[GYRO_BIAS],
+        acceleration_scale=errors[ACC_SCALE],
+        angular_velocity_scale=errors[GYRO_SCALE],
         clock_offset=located.late,
         acceleration_residual=float(located.noise[3]),
         angular_velocity_residual=float(located.noise[0]),

@@ -75,9 +75,21 @@ def checked_joints(model: RobotModel, joints: JointTrace) -> tuple[JointTrace, t
             " stamped where it is measured."
         )
         findings.append(Finding("joints_left_out", sentence, False))
+    long = np.diff(gaps(clean.stamp, LONGEST_GAP_S)[1:-1], axis=1)
+    if len(long):
+        sentence = (
+            f"Gaps in the joint states: {len(long)}, {long.sum():.2f} s in all. Samples of units around them were left"
+            " out: record all states."
+        )
+        findings.append(Finding("joints_missing", sentence, False))
     moved = _moved(clean.q)
-    still = JointTrace(clean.stamp, np.where(moved, clean.q, np.median(clean.q, axis=0)))
-    return still, (*findings, *_missing(clean.stamp), *_standing(model, moved))
+    if not moved.all():
+        sentence = (
+            f"{', '.join(np.array(model.joints)[~moved])} did not move, so the links on either side cannot be"
+            " distinguished, and units beyond are located less well. Move every joint."
+        )
+        findings.append(Finding("joints_stood", sentence, False))
+    return JointTrace(clean.stamp, np.where(moved, clean.q, np.median(clean.q, axis=0))), tuple(findings)
 
 
 def _check_order(stamp: FloatArray) -> None:
@@ -146,17 +158,6 @@ def _check_rate(joints: JointTrace) -> None:
         )
 
 
-def _missing(stamp: FloatArray) -> tuple[Finding, ...]:
-    long = np.diff(gaps(stamp, LONGEST_GAP_S)[1:-1], axis=1)
-    if not len(long):
-        return ()
-    sentence = (
-        f"Gaps in the joint states: {len(long)}, {long.sum():.2f} s in all. Samples of units around them were left out:"
-        " record all states."
-    )
-    return (Finding("joints_missing", sentence, False),)
-
-
 def _moved(q: FloatArray) -> BoolArray:
     """Tell which joints moved (n,). CalibrationError if none did."""
     low, high = np.percentile(q, (1.0, 99.0), axis=0)
@@ -167,18 +168,6 @@ def _moved(q: FloatArray) -> BoolArray:
             " calibration motion while units and joints are recorded."
         )
     return moved
-
-
-def _standing(model: RobotModel, moved: BoolArray) -> tuple[Finding, ...]:
-    """Say which joints did not move (n,), and what follows for the links."""
-    if moved.all():
-        return ()
-    names = ", ".join(np.array(model.joints)[~moved])
-    sentence = (
-        f"{names} did not move, so the links on either side cannot be distinguished, and units beyond are located less"
-        " well. Move every joint."
-    )
-    return (Finding("joints_stood", sentence, False),)
 
 
 def checked_unit(unit: UnitData) -> tuple[UnitData, list[Finding]]:
@@ -204,18 +193,14 @@ def checked_unit(unit: UnitData) -> tuple[UnitData, list[Finding]]:
         findings.append(Finding("too_little", sentence, True))
     if not any(finding.refused for finding in findings):
         cut = saturated(clean)
-        findings += _saturated(clean, cut) + (_stuck(clean.imu, cut) or _gravity(clean.imu))
+        if cut.any():
+            sentence = (
+                f"{cut.mean():.1%} of its samples are at the end of its range and were left out, with what is around"
+                " them: set a larger range, or move more slowly."
+            )
+            findings.append(Finding("saturated", sentence, False))
+        findings += _stuck(clean.imu, cut) or _gravity(clean.imu)
     return clean, findings
-
-
-def _saturated(unit: UnitData, cut: BoolArray) -> list[Finding]:
-    if not cut.any():
-        return []
-    sentence = (
-        f"{cut.mean():.1%} of its samples are at the end of its range and were left out, with what is around them: set"
-        " a larger range, or move more slowly."
-    )
-    return [Finding("saturated", sentence, False)]
 
 
 def _stuck(imu: ImuTrace, cut: BoolArray) -> list[Finding]:

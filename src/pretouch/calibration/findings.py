@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from pretouch.calibration.fit import ACC_SCALE, GYRO_SCALE
 from pretouch.calibration.link_motion import ArmMotion
 from pretouch.calibration.locate import Located
 from pretouch.calibration.observability import Axis, observability
@@ -73,8 +74,8 @@ def _slipped(arm: ArmMotion, located: Located) -> list[Finding]:
 
 def scale_findings(located: Located) -> list[Finding]:
     """Name errors of the IMU's scales that are too large to be its own."""
-    findings, e = [], located.estimate
-    for sensor, scale in (("accelerometer", e.acceleration_scale), ("gyroscope", e.angular_velocity_scale)):
+    findings, errors = [], located.estimate.errors
+    for sensor, scale in (("accelerometer", errors[ACC_SCALE]), ("gyroscope", errors[GYRO_SCALE])):
         axis = int(np.argmax(np.abs(scale)))
         if abs(scale[axis]) > _UNUSUAL * SCALE_ERROR:
             way_out = "correct its sign" if scale[axis] < -1 else "check its range"

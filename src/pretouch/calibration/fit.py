@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy  # see `signals`
 
-from pretouch.calibration.link_motion import LinkMotion, skew
+from pretouch.calibration.link_motion import LinkMotion
 from pretouch.calibration.signals import Measured
 from pretouch.calibration.values import GRAVITY, RATE_HZ, SCALE_ERROR
 from pretouch.types import FloatArray
@@ -55,66 +55,42 @@ class Estimate:
     """(3, 3) R_link_sensor."""
     p: FloatArray
     """(3,) position in the link frame [m]."""
-    acceleration_bias: FloatArray
-    """(3,) [m/s^2]."""
-    angular_velocity_bias: FloatArray
-    """(3,) [rad/s]."""
-    acceleration_scale: FloatArray
-    """(3,) error of each axis' scale."""
-    angular_velocity_scale: FloatArray
-    """(3,) error of each axis' scale."""
-    late: float
-    """By how much the clock is late, beyond what was assumed [s]."""
-    lag: float
-    """By how much the accelerometer is later than the gyroscope [s]."""
-    gravity: FloatArray
-    """(3,) proper acceleration of what is at rest, base frame [m/s^2]."""
-
-    @property
-    def rest(self) -> FloatArray:
-        """All unknowns but the pose (17,), in the order of the fit."""
-        return np.concatenate([
-            self.acceleration_bias, self.angular_velocity_bias, [self.late, self.lag], self.acceleration_scale,
-            self.angular_velocity_scale, self.gravity,
-        ])  # fmt: skip
+    errors: FloatArray
+    """(23,) the unknowns, by the slices above; those of the pose are 0."""
 
     def moved(self, x: FloatArray) -> "Estimate":
         """Return the estimate that differs from this one by x (23,): the pose by x on the manifold, the rest is x."""
-        turn = scipy.spatial.transform.Rotation.from_rotvec(x[TURN])
-        return Estimate(
-            self.R @ turn.as_matrix(), self.p + x[PLACE], x[ACC_BIAS], x[GYRO_BIAS],
-            x[ACC_SCALE], x[GYRO_SCALE], float(x[CLOCK]), float(x[LAG]),
-            x[UPWARDS],
-        )  # fmt: skip
+        R, p = self.R @ scipy.spatial.transform.Rotation.from_rotvec(x[TURN]).as_matrix(), self.p + x[PLACE]
+        return Estimate(R, p, np.append(np.zeros(6), x[6:]))
 
     def specific_force(self, motion: LinkMotion) -> FloatArray:
         """Proper acceleration (N, 3) at the IMU, link frame [m/s^2]."""
-        return motion.a + motion.lever @ self.p + motion.R_link_base @ self.gravity
+        return motion.a + motion.lever @ self.p + motion.R_link_base @ self.errors[UPWARDS]
 
     def expected(self, motion: LinkMotion) -> FloatArray:
         """What the IMU should measure (N, 6), but for the clock."""
-        gyro = (motion.w @ self.R) * (1 + self.angular_velocity_scale) + self.angular_velocity_bias
-        force = self.specific_force(motion) @ self.R
-        return np.hstack([gyro, force * (1 + self.acceleration_scale) + self.acceleration_bias])
+        e = self.errors
+        gyro = (motion.w @ self.R) * (1 + e[GYRO_SCALE]) + e[GYRO_BIAS]
+        return np.hstack([gyro, self.specific_force(motion) @ self.R * (1 + e[ACC_SCALE]) + e[ACC_BIAS]])
 
     def differences(self, motion: LinkMotion, measured: Measured) -> FloatArray:
         """Model less measurement (N, 6) [rad/s, m/s^2], the clock's error taken off."""
-        late = np.repeat((self.late, self.late + self.lag), 3)
+        late = np.repeat((self.errors[CLOCK], self.errors[CLOCK] + self.errors[LAG]), 3)
         return self.expected(motion) - measured.values - late * measured.rates
 
 
-def start(motion: LinkMotion, measured: Measured, gravity: float) -> Estimate:
+def start(motion: LinkMotion, measured: Measured) -> Estimate:
     """Find an estimate in closed form: R from angular velocities (Kabsch), then p and biases, which are linear."""
     w, values = motion.w, measured.values
     U, _, Vt = np.linalg.svd((w - w.mean(axis=0)).T @ (values[:, :3] - values[:, :3].mean(axis=0)))
     R = U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt
     # R values = a + R_link_base g + L p + R b, with priors so that what a motion does not tell stays small
     left = np.concatenate([motion.lever, np.broadcast_to(np.eye(3), motion.lever.shape)], axis=2).reshape(-1, 6)
-    right = (values[:, 3:] @ R.T - motion.a - gravity * motion.R_link_base[:, :, 2]).reshape(-1)
+    right = (values[:, 3:] @ R.T - motion.a - GRAVITY * motion.R_link_base[:, :, 2]).reshape(-1)
     found = np.linalg.solve(left.T @ left + np.diag([1e-2] * 3 + [1e-3] * 3), left.T @ right)
-    none = np.zeros(3)
-    bias = values[:, :3].mean(axis=0) - w.mean(axis=0) @ R
-    return Estimate(R, found[:3], found[3:] @ R, bias, none, none, 0.0, 0.0, np.array([0.0, 0.0, gravity]))
+    errors = np.append(np.zeros(UNKNOWNS - 1), GRAVITY)
+    errors[ACC_BIAS], errors[GYRO_BIAS] = found[3:] @ R, values[:, :3].mean(axis=0) - w.mean(axis=0) @ R
+    return Estimate(R, found[:3], errors)
 
 
 _PRIOR = np.concatenate([
@@ -149,9 +125,9 @@ class Problem:
         e = self.base.moved(x)
         J = np.zeros((N, 6, UNKNOWNS))
         turned = motion.w @ e.R, e.specific_force(motion) @ e.R
-        scales = 1 + np.concatenate([e.angular_velocity_scale, e.acceleration_scale])
+        scales = 1 + np.concatenate([e.errors[GYRO_SCALE], e.errors[ACC_SCALE]])
         for half, v in enumerate(turned):
-            J[:, 3 * half : 3 * half + 3, TURN] = skew(v) @ _right_jacobian(x[TURN])
+            J[:, 3 * half : 3 * half + 3, TURN] = _skew(v) @ _right_jacobian(x[TURN])
         J[:, 3:, PLACE] = e.R.T @ motion.lever
         J[:, 3:, UPWARDS] = e.R.T @ motion.R_link_base
         J *= scales[:, None]
@@ -165,12 +141,19 @@ class Problem:
         return np.vstack([J.reshape(-1, UNKNOWNS), np.diag(1 / _PRIOR)])
 
 
+def _skew(v: FloatArray) -> FloatArray:
+    """Matrices (..., 3, 3) of the cross product with vectors (..., 3) from the left."""
+    x, y, z = v[..., 0], v[..., 1], v[..., 2]
+    o = np.zeros_like(x)
+    return np.stack([o, -z, y, z, o, -x, -y, x, o], axis=-1).reshape(*v.shape[:-1], 3, 3)
+
+
 def _right_jacobian(turn: FloatArray) -> FloatArray:
     """Right Jacobian (3, 3) of the rotations at a rotation vector (3,) [rad]."""
     angle = float(np.linalg.norm(turn))
     if angle < 1e-6:
-        return np.eye(3) - 0.5 * skew(turn)
-    K = skew(turn / angle)
+        return np.eye(3) - 0.5 * _skew(turn)
+    K = _skew(turn / angle)
     return np.eye(3) - (1 - np.cos(angle)) / angle * K + (1 - np.sin(angle) / angle) * K @ K
 
 
@@ -185,10 +168,7 @@ class Fit:
     """(6,) standard deviation of what the model does not explain [rad/s, m/s^2], by axis."""
 
 
-def fit(
-    motion: LinkMotion, measured: Measured, begin: Estimate, noise: FloatArray,
-    robust: bool = False,
-) -> Fit:  # fmt: skip
+def fit(motion: LinkMotion, measured: Measured, begin: Estimate, noise: FloatArray, robust: bool = False) -> Fit:
     """Find the most likely estimate.
 
     Args:
@@ -199,7 +179,7 @@ def fit(
         robust: let large differences count less.
     """
     problem = Problem(motion, measured, begin, noise)
-    x = np.concatenate([np.zeros(6), begin.rest])
+    x = begin.errors
     for _ in range(_REWEIGHTINGS if robust else 1):
         weights = problem.weights(x) if robust else np.ones(6 * len(motion.w) + UNKNOWNS)
         # MINPACK: beside other programs the threads of LAPACK, which other methods call, cost ten times as much
@@ -210,13 +190,12 @@ def fit(
     estimate = begin.moved(x)
     spread = np.sqrt(np.mean(estimate.differences(motion, measured) ** 2, axis=0))
     # the unknowns on the manifold at the answer, not at the start
-    J = Problem(motion, measured, estimate, noise).jacobian(np.concatenate([np.zeros(6), x[6:]]))
-    per_block = max(1, round(_BLOCK_S * RATE_HZ))
-    return Fit(estimate, _covariance(J, problem.residuals(x), per_block), spread)
+    J = Problem(motion, measured, estimate, noise).jacobian(estimate.errors)
+    return Fit(estimate, _covariance(J, problem.residuals(x)), spread)
 
 
-def _covariance(J: FloatArray, residuals: FloatArray, per_block: int) -> FloatArray:
-    """Covariance (23, 23) that holds for errors that depend on each other within blocks of so many instants.
+def _covariance(J: FloatArray, residuals: FloatArray) -> FloatArray:
+    """Covariance (23, 23) that holds for errors that depend on each other within blocks of `_BLOCK_S`.
 
     The usual (J^T J)^-1 takes every residual as independent, and is far too small for errors that a motion repeats. Few
     blocks may agree by chance, so the fewer there are, the more of the usual is added.
@@ -224,7 +203,7 @@ def _covariance(J: FloatArray, residuals: FloatArray, per_block: int) -> FloatAr
     data = len(residuals) - UNKNOWNS
     N = data // 6
     scores = np.einsum("nik,ni->nk", J[:data].reshape(N, 6, UNKNOWNS), residuals[:data].reshape(N, 6))
-    blocks = np.add.reduceat(scores, np.arange(0, N, per_block), axis=0)
+    blocks = np.add.reduceat(scores, np.arange(0, N, round(_BLOCK_S * RATE_HZ)), axis=0)
     prior = J[data:]
     H, count = J.T @ J, len(blocks)
     inverse = np.linalg.inv(H)

@@ -60,39 +60,32 @@ class Identifier:
         """Find the link of a unit whose data passed all checks of its own."""
         signal = ImuSignal(unit)
         given = None if unit.link is None else self.arm.model.link_index(unit.link)
-        stamps = self._own_stamps(unit)
-        if not enough(self.arm, signal.usable(stamps)):
+        begin, end = unit.imu.stamp[[0, -1]]
+        own = begin + self._step * np.arange(int((end - begin) / self._step))
+        if not enough(self.arm, signal.usable(own)):
             return Identified(findings=[_TOO_LITTLE])
-        matches = self._matches(signal, self.arm.time, CLOCK_ERROR_S)
-        best = max(match.likeness for _, match in matches)
         findings: list[Finding] = []
-        if best < _LIKENESS:
-            matches = self._matches(signal, stamps, np.inf)
-            _, wide = max(matches, key=lambda one: one[1].likeness)
-            if wide.likeness < _LIKENESS:
-                return Identified(findings=[_fits_none(best)])
-            best = wide.likeness
-            findings.append(_clock(wide.late))
-        close = [(body, match) for body, match in matches if match.likeness >= best - _CLOSE]
+        matches = self._matches(signal, self.arm.time, CLOCK_ERROR_S)
+        if matches[0][1].likeness < _LIKENESS:
+            near, matches = matches[0][1], self._matches(signal, own, np.inf)
+            if matches[0][1].likeness < _LIKENESS:
+                return Identified(findings=[_fits_none(near.likeness)])
+            findings.append(_clock(matches[0][1].late))
+        close = [(body, match) for body, match in matches if match.likeness >= matches[0][1].likeness - _CLOSE]
         return self._chosen(signal, close, given, findings)
 
-    def _own_stamps(self, unit: UnitData) -> FloatArray:
-        begin, end = unit.imu.stamp[0], unit.imu.stamp[-1]
-        return begin + self._step * np.arange(int((end - begin) / self._step))
-
     def _matches(self, signal: ImuSignal, stamps: FloatArray, most: float) -> list[_Match]:
-        """Return how well a unit fits each body, and how late its clock then is."""
+        """Return how well a unit fits each body, and how late its clock then is, the best first."""
         sensed, sensing = signal.at(stamps).values[:, :3], signal.usable(stamps)
         matches = []
         for body in self._turning:
             found = align(self.arm.link(body[0]).w, self.arm.usable, sensed, sensing, self._step, most)
             late = found.late + float(stamps[0] - self.arm.time[0])
             matches.append((body, Alignment(late, found.likeness)))
-        return matches
+        return sorted(matches, key=lambda one: -one[1].likeness)
 
     def _chosen(self, signal: ImuSignal, close: list[_Match], given: int | None, findings: list[Finding]) -> Identified:
         """Choose among matches that are about as good."""
-        close.sort(key=lambda one: -one[1].likeness)
         first, match = close[0]
         known = known_instants(self.arm, signal, match.late)
         if not enough(self.arm, known):

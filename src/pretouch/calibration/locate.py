@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pretouch.calibration.fit import Estimate, Fit, fit, start
+from pretouch.calibration.fit import CLOCK, Estimate, Fit, fit, start
 from pretouch.calibration.link_motion import ArmMotion, LinkMotion
 from pretouch.calibration.signals import ImuSignal, Measured
-from pretouch.calibration.values import GRAVITY, SHORTEST_S, TOLERATED_ACCELERATION, TOLERATED_ANGULAR_VELOCITY
+from pretouch.calibration.values import SHORTEST_S, TOLERATED_ACCELERATION, TOLERATED_ANGULAR_VELOCITY
 from pretouch.types import BoolArray, FloatArray
 
 _OUTLIER_FACTOR = 6.0
@@ -62,10 +62,10 @@ def locate(arm: ArmMotion, signal: ImuSignal, link: int, late: float) -> Located
         if not enough(arm, known):
             return None
         here, measured = motion.at(known), signal.at(arm.time[known] + late)
-        found = fit(here, measured, estimate or start(here, measured, GRAVITY), noise, robust=True)
+        found = fit(here, measured, estimate or start(here, measured), noise, robust=True)
         estimate, assumed = found.estimate, late
-        late += estimate.late
-        if abs(estimate.late) < _SETTLED_S:
+        late += estimate.errors[CLOCK]
+        if abs(estimate.errors[CLOCK]) < _SETTLED_S:
             break
     inliers = explained(found.estimate, here, measured)
     used = known.copy()
@@ -74,8 +74,8 @@ def locate(arm: ArmMotion, signal: ImuSignal, link: int, late: float) -> Located
         inliers, used = np.ones_like(inliers), known
     here, measured = here.at(inliers), Measured(measured.values[inliers], measured.rates[inliers])
     found, noise = _final(found, here, measured, noise)
-    C = 0.5 * (found.covariance + found.covariance.T)
-    return Located(link, found.estimate, C[:6, :6], noise, assumed + found.estimate.late, known, used)
+    C, late = 0.5 * (found.covariance + found.covariance.T), assumed + float(found.estimate.errors[CLOCK])
+    return Located(link, found.estimate, C[:6, :6], noise, late, known, used)
 
 
 def explained(estimate: Estimate, motion: LinkMotion, measured: Measured) -> BoolArray:
