@@ -92,8 +92,8 @@ def plan_to_start(model: RobotModel, q: FloatArray, path: ArmPath, floor: float)
         goal = brought_to(model, path.point(0.0))
         if np.abs(goal - q).max() < 1e-3:
             return None
-        params = PlanParams(speed_share=_SHARE, acceleration_share=_SHARE, speed_m_s=_SPEED_M_S, floor_m=floor)
-        return approach(model, q, Plan(np.array([0.0, 1.0]), np.array([goal, goal])), params)
+        params = PlanParams(speed_share=_SHARE, speed_m_s=_SPEED_M_S, floor_m=floor)
+        return approach(model, q, goal, params)
     except (CalibrationError, ExperimentError) as error:
         raise RobotError(f"No motion to the start of the path was found: {error}") from error
 

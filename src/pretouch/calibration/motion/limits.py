@@ -12,7 +12,6 @@ from pretouch.robot.model import RobotModel
 from pretouch.robot.postures import capsule_ends, kinematics_of, self_distances
 from pretouch.types import BoolArray, FloatArray
 
-Share = Annotated[float, Check(low=0.0, high=1.0, open_low=True)]
 RATE_HZ = 50.0
 """Instants a second at which a motion is looked at [Hz]."""
 _USED = 0.98
@@ -26,21 +25,18 @@ that is steady, and some more."""
 class PlanParams(Checked):
     """What a motion for calibration consists of, and what it keeps to. Figures without a source are ours."""
 
-    duration_s: Annotated[float, Check(low=0.0, open_low=True, high=90.0)] = 60.0
-    """Duration of all of it [s]."""
-    poses: Annotated[int, Check(low=1, high=30)] = 6
-    """Postures in which the arm stands for a while, beside its start."""
-    swings: Annotated[int, Check(low=1, high=10)] = 3
-    """In how many of them it then swings: all joints at once, by two sines each."""
+    poses: Annotated[int, Check(low=1, high=10)] = 4
+    """Postures in which the arm stands for a while, beside its start, and then swings: all joints at once, by two sines
+    each."""
+    swing_s: Annotated[float, Check(low=5.0, high=30.0)] = 10.0
+    """Duration of each swing [s]."""
     reach_rad: Positive = 0.5
     """Furthest from its position at the start [rad] a joint is where the arm stands: less, and the arm needs less room.
     Swings go beyond."""
     margin_rad: NonNegative = 0.1
     """Distance kept from joint limits, and from where a speed envelope lets a joint no longer move [rad]."""
-    speed_share: Share = 0.5
-    """Share of the joint velocity limits that is used."""
-    acceleration_share: Share = 0.5
-    """Share of the joint acceleration limits that is used."""
+    speed_share: Annotated[float, Check(low=0.0, high=1.0, open_low=True)] = 0.5
+    """Share of the joint velocity and acceleration limits that is used."""
     speed_m_s: Positive = 0.7
     """Largest speed of any part of the arm [m/s]."""
     clearance_m: NonNegative = 0.03
@@ -70,19 +66,14 @@ class MotionLimits:
                 f" {model.joints[narrowest]}, {high[narrowest] - low[narrowest]:.3g} rad: choose a smaller margin_rad."
             )
         self.qd_max: FloatArray = params.speed_share * arm.qd_max
-        self.qdd_max: FloatArray = params.acceleration_share * arm.qdd_max
+        self.qdd_max: FloatArray = params.speed_share * arm.qdd_max
         self._moving: BoolArray = np.isin(model.capsules.link, model.body.link)
 
-    def distances(self, ends: FloatArray) -> FloatArray:
+    def _distances(self, ends: FloatArray) -> FloatArray:
         """Distances (S, P + 1) [m] of the pairs of `RobotModel.apart`, then of the lowest moving part and the floor."""
         lowest = ends[..., 2][:, self._moving].min(axis=2) - self.model.capsules.radius[self._moving]
         height = lowest.min(axis=1, keepdims=True) - self.params.floor_m
         return np.hstack([self_distances(self.model, ends), height])
-
-    def free(self, q: FloatArray) -> BoolArray:
-        """Which postures (S,) of S (S, n) [rad] are within the joints' ranges and keep clear of arm and floor."""
-        ends = capsule_ends(self.model, kinematics_of(self.model, q))
-        return self._in_range(q) & (self.distances(ends).min(axis=1) >= self.params.clearance_m)
 
     def _in_range(self, q: FloatArray) -> BoolArray:
         return np.all((q >= self.q_min) & (q <= self.q_max), axis=1)
@@ -115,7 +106,7 @@ class MotionLimits:
         velocity, acceleration = self.use(samples)
         if max(velocity, acceleration) > 1.0:
             return f"it needs {max(velocity, acceleration):.2f} times the allowed speed or acceleration"
-        distances = self.distances(self._ends(samples))
+        distances = self._distances(self._ends(samples))
         nearest = distances.min(axis=0) - _BEND * np.abs(np.diff(distances, 2, axis=0)).max(axis=0, initial=0.0)
         pair = int(np.argmin(nearest))
         if nearest[pair] >= self.params.clearance_m:
@@ -135,12 +126,12 @@ class MotionLimits:
     def report(self, plan: Plan) -> str:
         """Say how long a motion takes, how fast it is and how much room it needs, to be read before the arm moves."""
         samples = plan.sampled(RATE_HZ)
-        ends, standing = self._ends(samples), sum(end - begin for begin, end in plan.still)
-        distances = self.distances(ends).min(axis=0)
+        ends = self._ends(samples)
+        distances = self._distances(ends).min(axis=0)
         return (
-            f"{plan.duration:.0f} s, {standing:.0f} s of them at rest; parts move at up to"
-            f" {point_speed(ends, samples.time):.2f} m/s.\nThe arm needs the space {self.room(plan)} m (base frame) and"
-            f" comes within {distances[:-1].min():.3f} m of itself and {distances[-1]:.3f} m of the floor."
+            f"{plan.duration:.0f} s; parts move at up to {point_speed(ends, samples.time):.2f} m/s.\nThe arm needs the"
+            f" space {self.room(plan)} m (base frame) and comes within {distances[:-1].min():.3f} m of itself and"
+            f" {distances[-1]:.3f} m of the floor."
         )
 
 

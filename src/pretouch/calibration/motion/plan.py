@@ -1,11 +1,11 @@
 """The motion by which units are calibrated, as a value: postures to stand in, ways between them, and swings."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from pretouch.types import FloatArray, IntArray
+from pretouch.types import FloatArray
 from pretouch.values import value
 
 
@@ -40,10 +40,6 @@ class Swing:
         a = (-self.amplitude * rate**2 * np.sin(angle)).sum(axis=1)
         w, w1, w2 = window[:, None], slope[:, None], bend[:, None]
         return np.stack([w * x, w1 * x + w * v, w2 * x + 2.0 * w1 * v + w * a])
-
-    def scaled(self, factor: float) -> "Swing":
-        """Return the swing with its amplitudes times a factor."""
-        return replace(self, amplitude=self.amplitude * factor)
 
 
 @value
@@ -90,17 +86,6 @@ class Plan:
         """How long it takes [s]."""
         return float(self.knots[-1])
 
-    @property
-    def still(self) -> tuple[tuple[float, float], ...]:
-        """Intervals in which the arm stands [s]."""
-        swung = [(swing.begin, swing.begin + swing.duration) for swing in self.swings]
-        spans = zip(self.knots[:-1].tolist(), self.knots[1:].tolist(), np.diff(self.postures, axis=0), strict=True)
-        return tuple(
-            (begin, end)
-            for begin, end, change in spans
-            if not change.any() and not any(first < end and begin < last for first, last in swung)
-        )
-
     def at(self, time: float) -> tuple[FloatArray, FloatArray]:
         """Joint positions [rad] and velocities [rad/s], (n,) each, at a time since the beginning [s].
 
@@ -124,7 +109,8 @@ class Plan:
 
     def _states(self, time: FloatArray) -> FloatArray:
         """Joint positions, velocities and accelerations (3, T, n) at instants (T,) [s]."""
-        span = _span_of(self.knots, time)
+        # the first and the last span reach to the ends of time
+        span = np.clip(np.searchsorted(self.knots, time, side="right") - 1, 0, len(self.knots) - 2)
         length, change = np.diff(self.knots)[span], np.diff(self.postures, axis=0)[span]
         way = _smooth_step((time - self.knots[span]) / length)
         states = np.stack([(way[i] / length**i)[:, None] * change for i in range(3)])
@@ -134,11 +120,6 @@ class Plan:
             if during.any():
                 states[:, during] += swing.states(time[during])
         return states
-
-
-def _span_of(knots: FloatArray, time: FloatArray) -> IntArray:
-    """Index (T,) of the knot before each instant; the first and the last span reach to the ends of time."""
-    return np.clip(np.searchsorted(knots, time, side="right") - 1, 0, len(knots) - 2)
 
 
 def _smooth_step(part: FloatArray) -> FloatArray:

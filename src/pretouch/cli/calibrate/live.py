@@ -130,7 +130,7 @@ def _plans(arm: Arm, model: RobotModel, params: PlanParams) -> list[Plan]:
     print(limits.report(plan), flush=True)
     if np.abs(q - plan.start).max() <= START_RAD / 2:
         return [plan]
-    way = approach(model, q, plan, params)
+    way = approach(model, q, plan.start, params)
     room = limits.room(way)
     print(f"Before that, moving to its start takes {way.duration:.0f} s and needs the space {room} m.", flush=True)
     return [way, plan]
