@@ -5,9 +5,8 @@ import pytest
 
 from pretouch.recording.run_record import TrueForces
 from pretouch.reporting.contacts import contact_section, touches_of
-from pretouch.reporting.measures import measure
 from pretouch.reporting.motion import nearest_to_body
-from pretouch.reporting.page import summary
+from pretouch.reporting.page import measure, summary
 from pretouch.sim.plant import TOUCH_N
 from pretouch.traces import mean_over
 from pretouch.types import Mode
@@ -85,10 +84,8 @@ def pushed(panda_model, paper_skin):
 
 def test_a_detection_tells_force_axes_delay_and_reaction(pushed):
     first = pushed.contacts.detections[0]
-    assert first.time == 0.55
-    assert list(first.axes) == [False, True, False]
-    assert list(first.filtered) == [1.0, -9.0, 6.0]
-    assert list(first.raw) == [0.0, -20.0, 3.0]
+    assert (first.step, first.time) == (55, 0.55)
+    assert list(first.contact.axes) == [False, True, False]
     assert list(first.peak) == [0.0, -25.0, 3.0]
     assert first.peak_norm == pytest.approx(np.hypot(25.0, 3.0))
     assert first.delay == pytest.approx(0.05)
@@ -153,8 +150,8 @@ def test_numbers_of_a_collision_are_those_of_the_physics(panda_model, paper_skin
     assert touch.velocity[1] == pytest.approx(plant.touches[0].velocity[1])
     assert push * touch.velocity[1] < 0.0
     assert detection.delay == pytest.approx(answer.stamp - start)
-    assert detection.filtered[1] == pytest.approx(answer.filtered_force[1])
-    assert detection.raw[1] == pytest.approx(answer.force[1])
+    assert m.course.filtered_force[detection.step, 1] == pytest.approx(answer.filtered_force[1])
+    assert m.course.force[detection.step, 1] == pytest.approx(answer.force[1])
     assert m.contacts.peak == pytest.approx(size.max())
     assert touch.peak_20ms == pytest.approx(mean_over(size, 20).max())
     assert m.contacts.without_touch == ()

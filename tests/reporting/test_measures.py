@@ -8,8 +8,15 @@ from pretouch.modes import Event
 from pretouch.profiles import profile
 from pretouch.reporting.health import loop_row, unit_row
 from pretouch.reporting.html import bad, number
-from pretouch.reporting.limits import holds_in, limit_rows, mode_section, time_in_modes
-from pretouch.reporting.motion import distance_section, nearest_to_body, speed_section
+from pretouch.reporting.motion import (
+    distance_section,
+    holds_in,
+    limit_rows,
+    mode_section,
+    nearest_to_body,
+    speed_section,
+    time_in_modes,
+)
 from pretouch.reporting.record import gather, least, spread
 from pretouch.sensing.skin import Skin, paper_skin
 from pretouch.types import Mode, QpOutcome, QpSolution, RangeReadings, RangeStatus

@@ -21,7 +21,7 @@ def test_torques_of_another_arm_are_scaled_by_its_limits():
         panda(), q_ready=np.zeros(6), qd_max=np.ones(6), qdd_max=np.ones(6), tau_max=np.array([174.0] * 3 + [24.0] * 3)
     )
     found, own = plant_params_of(six), PlantParams()
-    found.check_joints(6)
+    found.check_joints(6, 9)
     # base and hand are those of the Panda, its third joint is left out
     assert found.torque_noise_nm == pytest.approx(
         [2 * own.torque_noise_nm[k] for k in (0, 1, 2)] + [2 * own.torque_noise_nm[k] for k in (4, 5, 6)]
@@ -93,7 +93,7 @@ def test_what_is_known_changes_no_other_draw():
 
 
 def test_what_is_known_of_another_arm_is_refused():
-    with pytest.raises(ParameterError, match="stiffness_nm_rad has 6 values, the arm 7 joints"):
+    with pytest.raises(ParameterError, match="stiffness_nm_rad has 6 values, and 7 are needed"):
         plant(stiffness_nm_rad=(1000.0,) * 6)
     with pytest.raises(ParameterError, match="mass_factors has 3 values"):
         plant(mass_factors=(1.0, 1.0, 1.0))

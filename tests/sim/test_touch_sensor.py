@@ -1,7 +1,6 @@
 """Simulated touch sensors: forces laid on the arm and contacts with things, and the faults they have."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +12,7 @@ from pretouch.sim.hand import Hand, HandGoal
 from pretouch.sim.plant import Plant, PointForce
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.scene import HandSpec, SceneSpec
-from pretouch.sim.touch_sensor import SimulatedTouchSkin, TouchErrors, TouchSensors
+from pretouch.sim.touch_sensor import TouchErrors, TouchSensors
 from pretouch.types import TouchStatus
 
 UNIT = 0
@@ -147,11 +146,3 @@ def test_the_same_seed_gives_the_same_readings(pressed):
 
     assert readings(4) == readings(4)
     assert readings(4) != readings(5)
-
-
-def test_beside_range_finders_they_are_one_skin(pressed):
-    _, sensors, _ = pressed()
-    readings = object()
-    both = SimulatedTouchSkin(SimpleNamespace(read=lambda: readings), sensors)
-    assert both.read() is readings
-    assert both.touch().status[1] == TouchStatus.NONE

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from tests.sim.test_plant import NONE, PERFECT, record
+from tests.sim.test_plant import PERFECT, record
 
 from pretouch.errors import ParameterError
 from pretouch.robot.model import RobotModel
-from pretouch.sim.physics import Drives, Friction, Simulation, TorqueSensors, drive, sensed
+from pretouch.sim.physics import begin_step, end_step
 from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.randomisation import drawn, world_set
@@ -28,51 +28,50 @@ def at_rest(model: RobotModel, params: PlantParams) -> FloatArray:
     return np.mean([state.tau_ext for state in record(plant(model, params), 1.0)[50:]], axis=0)
 
 
-def lost(speeds: FloatArray, **given: float) -> FloatArray:
-    """Friction of one joint at some speeds one millisecond after the other [Nm]."""
-    numbers = {"bristle_nm": 0.3, "bristle_rad": 0.002, "stribeck": 0.0, "stribeck_rad_s": 0.05, "load": 0.0} | given
-    cold = np.array([numbers.pop("cold", 0.0)])
-    one, none = np.ones(1), np.zeros(1)
-    friction = Friction(none, one, none, np.zeros(1), **numbers, cold=cold)
-    drives, taken = Drives(np.zeros(1), np.zeros(1), 0.001, 1.0, none, none, none, 90.0 * one), []
+def lost(model: RobotModel, speeds: FloatArray, cold: float = 0.0, **errors: float) -> FloatArray:
+    """Friction of a joint at some speeds one millisecond after the other, as it carries 5 Nm [Nm]."""
+    arm, taken = plant(model, replace(PERFECT, **{"bristle_nm": 0.3} | errors))._arm, []
+    arm.impedance[:], arm.bias[:], arm.cold[:] = 0.0, 5.0, cold
     for speed in speeds:
-        world = Simulation(0, 0, np.zeros(1), np.array([speed]), none, np.zeros(1), none)
-        taken.append(drive(none, 5.0 * one, world, drives, friction, rigid_sensors())[1][0])
+        arm.world.qd[:] = speed
+        taken.append(begin_step(arm)[1][0])
     return np.array(taken)
 
 
-def rigid_sensors(turn: float = 0.0) -> TorqueSensors:
-    """Sensors of one joint that do not err; its spring turns by so much in a step [rad]."""
-    none = np.zeros(1)
-    return TorqueSensors(none, none, np.ones(1), none, 0.0, none.copy(), 0.0, 0.0, 0.0, np.zeros((2, 1)), turn, 0.05)
-
-
-def test_friction_remembers_where_a_joint_came_from_until_it_has_turned_far_enough():
+def test_friction_remembers_where_a_joint_came_from_until_it_has_turned_far_enough(panda_model: RobotModel):
     forth, back = np.full(50, 0.5), np.full(50, -0.5)
-    after = lost(np.concatenate([forth, back, np.zeros(100)]))
+    after = lost(panda_model, np.concatenate([forth, back, np.zeros(100)]))
     assert_allclose(after[49], 0.3, atol=1e-3)
     assert after[50] > 0.1  # half a milliradian back it still holds
     assert_allclose(after[99], -0.3, atol=1e-3)
     assert_allclose(after[100:], after[99])  # a joint at rest keeps what it has
 
 
-def test_friction_is_larger_where_a_joint_barely_slides_under_load_and_in_the_cold():
-    slow = np.full(20_000, 0.002)
-    assert_allclose(lost(slow, stribeck=0.5)[-1], 0.3 * 1.5, rtol=0.01)
-    assert_allclose(lost(np.full(200, 1.0), stribeck=0.5)[-1], 0.3, rtol=0.01)
-    assert_allclose(lost(np.full(200, 1.0), cold=0.5)[-1], 0.45, rtol=0.01)
-    assert_allclose(lost(np.full(200, 1.0), load=0.02)[-1], 0.3 + 0.02 * 5.0, rtol=0.01)
+@pytest.mark.parametrize(
+    ("speed", "errors", "newton_metres"),
+    [
+        (0.002, {"stribeck": 0.5}, 0.3 * 1.5),
+        (1.0, {"stribeck": 0.5}, 0.3),
+        (1.0, {"cold": 0.5}, 0.45),
+        (1.0, {"load_friction": 0.02}, 0.3 + 0.02 * 5.0),
+    ],
+)
+def test_friction_is_larger_where_a_joint_barely_slides_under_load_and_in_the_cold(
+    panda_model: RobotModel, speed, errors, newton_metres
+):
+    assert_allclose(lost(panda_model, np.full(int(40.0 / speed), speed), **errors)[-1], newton_metres, rtol=0.01)
 
 
 @pytest.mark.parametrize("speed", [1e-6, 10.0, 1e4])
-def test_bristles_stay_within_their_bounds_at_any_speed(speed):
-    found = lost(np.tile([speed, -speed, -speed, speed], 300), stribeck=0.6)
+def test_bristles_stay_within_their_bounds_at_any_speed(panda_model: RobotModel, speed):
+    found = lost(panda_model, np.tile([speed, -speed, -speed, speed], 300), stribeck=0.6)
     assert np.abs(found).max() <= 0.3 * 1.6 + 1e-12
 
 
-def test_a_joint_on_a_spring_rings_at_its_frequency_and_settles_at_the_torque():
-    none, sensors = np.zeros(1), rigid_sensors(turn=2 * np.pi * 15.0 * 0.001)
-    rung = np.array([sensed(np.full(1, 2.0), none, none, none, none, sensors)[0] for _ in range(3000)])
+def test_a_joint_on_a_spring_rings_at_its_frequency_and_settles_at_the_torque(panda_model: RobotModel):
+    arm, none = plant(panda_model, replace(PERFECT, ring_hz=15.0, ring_damping=0.05))._arm, np.zeros(7)
+    arm.world.qdd[:], arm.spring[:] = 0.0, 0.0
+    rung = np.array([(end_step(arm, np.full(7, 2.0), none, none, none), arm.spring[0, 0])[1] for _ in range(3000)])
     assert rung.max() > 3.5  # a step overshoots by exp(-pi d): 0.85
     crossings = np.flatnonzero(np.diff(np.sign(rung[:400] - 2.0)))
     assert_allclose(np.diff(crossings).mean(), 1000 / 15 / 2, rtol=0.03)
@@ -131,4 +130,3 @@ def test_every_arm_of_the_hard_world_moves_without_coming_apart(panda_model: Rob
         states = record(arm, 1.0)
         assert_allclose(states[-1].q - states[0].q, 0.2, atol=0.05)
         assert max(np.abs(state.tau_ext).max() for state in states) < 40.0
-    assert PlantParams().torque_noise_nm != NONE

@@ -216,4 +216,4 @@ def _with_touch(setup: Setup, plant: Plant, units: RangeFinders) -> ports.Skin:
     """Return the units with their touch sensors, where the skin has such."""
     if not len(setup.skin.touching):
         return units
-    return SimulatedTouchSkin(units, TouchSensors(plant, setup.skin, TouchErrors(), setup.seed))
+    return SimulatedTouchSkin(units.read, TouchSensors(plant, setup.skin, TouchErrors(), setup.seed).touch)

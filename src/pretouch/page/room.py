@@ -16,7 +16,7 @@ from pretouch.robot.model import RobotModel
 from pretouch.robot.postures import brought_to
 from pretouch.sensing.skin import Skin
 from pretouch.sim.hand import Hand, HandGoal, PersonArm
-from pretouch.sim.paper_scenes import FACE_M, Placement, Side, board_beside, placement_for
+from pretouch.sim.paper_scenes import FACE_M, Placement, board_beside, placement_for
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.plant_params import PlantParams, plant_params_of
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
@@ -175,7 +175,7 @@ class Room:
         q, hand = brought_to(model, path.point(0.0)), HandSpec(stiffness=settings.stiffness)
         boxes: tuple[Box, ...] = ()
         if settings.object != "none":
-            side: Side = "+y" if settings.object == "board +y" else "-y"
+            side = settings.object.removeprefix("board ")
             face, met_by = settings.placement.face(FACE_M, side), settings.placement.hand(side)
             boxes = (board_beside(path, side, settings.stiffness, face, hand=met_by),)
         scene = SceneSpec(boxes=boxes, hand=hand)
@@ -186,7 +186,7 @@ class Room:
         self.units: UnitPort = self._simulated or cast(RealUnits, real)
         if self._simulated and len(skin.touching):
             touch = TouchSensors(self.plant, skin, TouchErrors(), settings.seed)
-            self.units = SimulatedTouchSkin(self._simulated, touch)
+            self.units = SimulatedTouchSkin(self._simulated.read, touch.touch)
         self.hand = Hand(self.plant, self.mouse, PersonArm(speed_max=HAND_SPEED_M_S))
         self.clock = PlantClock(self.plant, settings.profile.task.control_period_s)
         self.stiffness = self._next_stiffness = settings.stiffness

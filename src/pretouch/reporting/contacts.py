@@ -1,17 +1,16 @@
 """Detected contacts, held against what truly touched, which only a simulation knows."""
 
-from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from pretouch.recording.run_record import MODES, TrueForces
-from pretouch.reporting.html import NOTHING, Html, Row, Text, bad, element, joined, number, table, vector
+from pretouch.reporting.html import MOST_ROWS, NOTHING, Html, Row, Text, bad, element, joined, number, table, vector
 from pretouch.reporting.record import RunCourse
 from pretouch.sim.plant import TOUCH_N
 from pretouch.traces import mean_over, spans
-from pretouch.types import BoolArray, FloatArray, Mode
+from pretouch.types import Contact, FloatArray, Mode
 
 BOUNCE_S = 0.1
 """Touches with less than this between them are one [s]."""
@@ -22,9 +21,8 @@ MEAN_S = 0.02
 GRACE_S = 0.2
 """A detection this long after a touch still answers it [s]: the estimate lags, and the value of eq. 8 more."""
 AXES = "xyz"
-_ROWS = 40
-"""Contacts and touches that are listed; touches that were not answered are listed up to `_MOST`."""
-_MOST = 200
+_LISTED = 40
+"""Detections without a touch that the sentence about them names."""
 _FORCE = {
     True: "Force: norm of the estimate above the window's mean",
     False: "Force: at the end-effector, as the joint torques beyond those of free motion tell it; the contact may be"
@@ -57,18 +55,13 @@ class TrueTouch:
 class FeltContact:
     """One detected contact and the reaction to it. Base frame."""
 
+    step: int
+    """Index of the control step that detected it."""
     time: float
-    """[s]"""
-    profile: str
-    """Name of the profile that detected it."""
-    force: FloatArray
-    """(3,) F_ext of eq. 12: the reading above the window's mean, or what explains the torques best [N]."""
-    axes: BoolArray
-    """(3,) axes whose threshold or band was crossed, or came nearest to it."""
-    filtered: FloatArray
-    """(3,) value of eq. 8 at the detection [N]."""
-    raw: FloatArray
-    """(3,) estimate at the detection [N]."""
+    """Of that [s]."""
+    contact: Contact
+    """Force of eq. 12: the reading above the window's mean, or what explains the torques best; and the axes whose
+    threshold or band was crossed, or came nearest to it."""
     peak: FloatArray
     """(3,) on each axis the estimate that was farthest from zero during the contact [N]."""
     peak_norm: float
@@ -140,51 +133,37 @@ def touches_of(truth: TrueForces | None) -> list[TrueTouch]:
         return []
     time, force = truth.time, np.linalg.norm(truth.force, axis=1)
     samples = max(1, round(MEAN_S / max(float(np.median(np.diff(time))), 1e-9)))
-    mean, begun = mean_over(force, samples), [instant for instant, _, _ in truth.touches]
-    touches, before = list[TrueTouch](), -np.inf
-    for first, past in _merged(spans(force > TOUCH_N), time):
-        start, end = float(time[first]), float(time[past - 1])
+    mean, touches, begun = mean_over(force, samples), list[TrueTouch](), list(truth.touches)
+    joined_spans = list[list[int]]()
+    for first, past in spans(force > TOUCH_N):
+        if joined_spans and time[first] - time[joined_spans[-1][1] - 1] < BOUNCE_S:
+            joined_spans[-1][1] = past
+        else:
+            joined_spans.append([first, past])
+    for first, past in joined_spans:
+        start, end, link, velocity = float(time[first]), float(time[past - 1]), "", np.full(3, np.nan)
         late = int(np.searchsorted(time, start + TRANSIENT_S))
-        # the last contact that began after the touch before, and by now
-        last = bisect_right(begun, start + 1e-9) - 1
-        begins_here = last >= 0 and begun[last] > before
-        _, link, velocity = truth.touches[last] if begins_here else (start, "", np.full(3, np.nan))
-        touches.append(
-            TrueTouch(
-                start,
-                end,
-                peak=float(force[first:past].max()),
-                peak_20ms=float(mean[max(first - samples + 1, 0) : past].max(initial=0.0)),
-                held=float(mean[late:past].max(initial=0.0)) if late < past else float("nan"),
-                link=link,
-                velocity=velocity,
-            )
-        )
-        before = end
+        before = touches[-1].end if touches else -np.inf
+        while begun and begun[0][0] <= start + 1e-9:  # the last contact that began after the touch before, and by now
+            instant, name, of_point = begun.pop(0)
+            if instant > before:
+                link, velocity = name, of_point
+        peak, peak_20ms = force[first:past].max(), mean[max(first - samples + 1, 0) : past].max(initial=0.0)
+        held = float(mean[late:past].max(initial=0.0)) if late < past else float("nan")
+        touches.append(TrueTouch(start, end, float(peak), float(peak_20ms), held, link, velocity))
     return touches
-
-
-def _merged(flags: list[tuple[int, int]], time: FloatArray) -> list[tuple[int, int]]:
-    """Join spans with less than `BOUNCE_S` between them."""
-    first, past = np.array(flags, dtype=np.int64).reshape(-1, 2).T
-    apart = time[first[1:]] - time[past[:-1] - 1] >= BOUNCE_S
-    begins, ends = np.append(True, apart)[: len(first)], np.append(apart, True)[: len(past)]
-    return list(zip(first[begins].tolist(), past[ends].tolist(), strict=True))
 
 
 def _detections(course: RunCourse, touches: Sequence[TrueTouch]) -> list[FeltContact]:
     """All detected contacts in order, each with the touch it answers if there is one."""
-    detections: list[FeltContact] = []
-    answered: set[int | None] = set()
+    detections, answered = list[FeltContact](), set[int | None]()
     lasted, steps = course.lasted, [i for i, _, _ in course.contacts]
     for (i, contact, speed), following in zip(course.contacts, [*steps[1:], len(course)], strict=False):
-        time, end = float(course.time[i]), _reaction_end(course, i)
-        under_way = [k for k, touch in enumerate(touches) if touch.start <= time <= touch.end + GRACE_S]
-        touch = under_way[-1] if under_way else None
-        first = touch is not None and touch not in answered
-        answered.add(touch)
-        begun = touches[touch].start if first and touch is not None else time
-        over = touches[touch].end + GRACE_S if touch is not None else time
+        other = np.flatnonzero(course.mode[i:] != MODES.index(Mode.REACT))
+        time, end = float(course.time[i]), max(i + int(other[0]), i + 1) if len(other) else len(course)
+        touch = max((k for k, one in enumerate(touches) if one.start <= time <= one.end + GRACE_S), default=None)
+        begun = time if touch is None or touch in answered else touches[touch].start
+        over = time if touch is None else touches[touch].end + GRACE_S
         during = slice(
             int(np.searchsorted(course.time, begun)),
             min(max(end, int(np.searchsorted(course.time, over, side="right"))), following),
@@ -193,12 +172,9 @@ def _detections(course: RunCourse, touches: Sequence[TrueTouch]) -> list[FeltCon
         size = np.linalg.norm(np.where(np.isfinite(force), force, np.nan), axis=1)
         detections.append(
             FeltContact(
+                step=i,
                 time=time,
-                profile=course.runs[course.run[i]].profile.name,
-                force=contact.force,
-                axes=contact.axes,
-                filtered=course.filtered_force[i],
-                raw=course.force[i],
+                contact=contact,
                 peak=_farthest(force),
                 peak_norm=float(np.fmax.reduce(size, initial=np.nan)),
                 held_norm=float(np.fmax.reduce(size[late], initial=np.nan)),
@@ -206,16 +182,11 @@ def _detections(course: RunCourse, touches: Sequence[TrueTouch]) -> list[FeltCon
                 reaction_s=float(lasted[i:end].sum()),
                 moved_s=float(lasted[i:end][course.answering[i:end]].sum()),
                 touch=touch,
-                delay=time - begun if first else None,
+                delay=None if touch is None or touch in answered else time - begun,
             )
         )
+        answered.add(touch)
     return detections
-
-
-def _reaction_end(course: RunCourse, first: int) -> int:
-    """Index one past the last step of the reaction that begins in a step."""
-    other = np.flatnonzero(course.mode[first:] != MODES.index(Mode.REACT))
-    return max(first + int(other[0]), first + 1) if len(other) else len(course)
 
 
 def _mode_at(course: RunCourse, time: float) -> Mode | None:
@@ -250,29 +221,27 @@ def contact_section(course: RunCourse, contacts: ContactMeasures) -> Html:
 def _detected(course: RunCourse, detections: Sequence[FeltContact]) -> Html:
     if not detections:
         return element("p", "No contact was detected.")
-    rows: list[Row] = []
-    for i, d in enumerate(detections[:_ROWS], 1):
-        rows.append(
-            {
-                "no.": str(i),
-                "axes": " ".join(axis for axis, hit in zip(AXES, d.axes, strict=True) if hit),
-                "towards": heading(d.force),
-                "time [s]": number(d.time, 2),
-                "force [N]": number(float(np.linalg.norm(d.force)), 1),
-                "direction x y z": vector(_unit(d.force), 2),
-                "filtered x y z [N]": vector(d.filtered, 1),
-                "raw x y z [N]": vector(d.raw, 1),
-                "peak x y z [N]": vector(d.peak, 1),
-                "reaction [m/s]": number(d.reaction_speed, 3),
-                "lasted [s]": number(d.reaction_s, 2),
-                "moved [s]": number(d.moved_s, 2) if d.moved_s else "held still",
-                **({"profile": d.profile} if len(course.runs) > 1 else {}),
-            }
-        )
+    rows: list[Row] = [
+        {
+            "no.": str(order),
+            "axes": " ".join(axis for axis, hit in zip(AXES, d.contact.axes, strict=True) if hit),
+            "time [s]": number(d.time, 2),
+            "force [N]": number(float(np.linalg.norm(d.contact.force)), 1),
+            "force x y z [N]": vector(d.contact.force, 1),
+            "filtered x y z [N]": vector(course.filtered_force[d.step], 1),
+            "raw x y z [N]": vector(course.force[d.step], 1),
+            "peak x y z [N]": vector(d.peak, 1),
+            "reaction [m/s]": number(d.reaction_speed, 3),
+            "lasted [s]": number(d.reaction_s, 2),
+            "moved [s]": number(d.moved_s, 2) if d.moved_s else "held still",
+            **({"profile": course.runs[course.run[d.step]].profile.name} if len(course.runs) > 1 else {}),
+        }
+        for order, d in enumerate(detections, 1)
+    ]
     note = (
-        f"{_left_out(len(detections) - _ROWS)}{_FORCE[course.by_thresholds]}; on the arm, base frame. Filtered: value"
-        " of eq. 8. Raw: the estimate. Peak: on each axis the estimate farthest from zero during the contact. Held"
-        " still: the contact was below what moves the arm."
+        f"{_FORCE[course.by_thresholds]}; on the arm, base frame. Filtered: value of eq. 8. Raw: the estimate. Peak: on"
+        " each axis the estimate farthest from zero during the contact. Held still: the contact was below what moves"
+        " the arm."
     )
     return table(rows, note, 3, "Detected contacts")
 
@@ -280,29 +249,28 @@ def _detected(course: RunCourse, detections: Sequence[FeltContact]) -> Html:
 def _touched(contacts: ContactMeasures) -> Html:
     if not contacts.touches:
         return element("p", "Nothing truly touched the arm.")
-    answers = {d.touch: (i, d) for i, d in reversed(list(enumerate(contacts.detections, 1)))}
+    answers = {d.touch: (f"contact {i}", d.delay) for i, d in reversed(list(enumerate(contacts.detections, 1)))}
     rows: list[Row] = []
-    for i, touch in enumerate(contacts.touches):
-        order, detection = answers.get(i, (0, None))
-        if len(rows) < (_ROWS if detection else _MOST):
-            rows.append(
-                {
-                    "no.": str(i + 1),
-                    "first link": touch.link or NOTHING,
-                    "answered by": f"contact {order}" if detection else _why(contacts.unanswered[i]),
-                    "time [s]": number(touch.start, 3),
-                    "duration [s]": number(touch.end - touch.start, 3),
-                    "delay [ms]": number(detection.delay if detection else None, 0, 1000.0),
-                    "speed [m/s]": number(float(np.linalg.norm(touch.velocity)), 3),
-                    "true peak [N]": number(touch.peak, 1),
-                    "true 20 ms [N]": number(touch.peak_20ms, 1),
-                    f"held {TRANSIENT_S:g} s [N]": number(touch.held, 1),
-                }
-            )
+    many = len(contacts.touches) > MOST_ROWS  # then those without an answer come first
+    for i, touch in sorted(enumerate(contacts.touches), key=lambda one: many and one[0] in answers):
+        answer, delay = answers[i] if i in answers else (_why(contacts.unanswered[i]), None)
+        rows.append(
+            {
+                "no.": str(i + 1),
+                "first link": touch.link or NOTHING,
+                "answered by": answer,
+                "time [s]": number(touch.start, 3),
+                "duration [s]": number(touch.end - touch.start, 3),
+                "delay [ms]": number(delay, 0, 1000.0),
+                "speed [m/s]": number(float(np.linalg.norm(touch.velocity)), 3),
+                "true peak [N]": number(touch.peak, 1),
+                "true 20 ms [N]": number(touch.peak_20ms, 1),
+                f"held {TRANSIENT_S:g} s [N]": number(touch.held, 1),
+            }
+        )
     note = (
-        f"{_left_out(len(contacts.touches) - len(rows))}A touch begins as the true force passes 1 N; the delay runs"
-        f" from there to the detection. Interruptions of less than {BOUNCE_S:g} s are bounces of one touch. Speed: of"
-        " the point of the arm that touched first."
+        "A touch begins as the true force passes 1 N; the delay runs from there to the detection. Interruptions of less"
+        f" than {BOUNCE_S:g} s are bounces of one touch. Speed: of the point of the arm that touched first."
     )
     return table(rows, note, 3, "True touches (simulation)")
 
@@ -319,24 +287,7 @@ def _false(detections: Sequence[FeltContact]) -> Html:
     false = [f"contact {i} at {d.time:.2f} s" for i, d in enumerate(detections, 1) if d.touch is None]
     if not false:
         return element("p", "Every detection answers a true touch.") if detections else Html("")
-    listed = ", ".join(false[:_ROWS]) + (" ..." if len(false) > _ROWS else "")
+    listed = ", ".join(false[:_LISTED]) + (" ..." if len(false) > _LISTED else "")
     return element(
         "p", bad(f"Detections without a touch under way or over for less than {GRACE_S:g} s: {len(false)} ({listed}).")
     )
-
-
-def _left_out(count: int) -> str:
-    return f"{count} more are left out here; all count in the summary. " if count > 0 else ""
-
-
-def _unit(force: FloatArray) -> FloatArray:
-    norm = float(np.linalg.norm(force))
-    return force / norm if norm > 0 else np.full(3, np.nan)
-
-
-def heading(force: FloatArray) -> str:
-    """Base axis that a force points along most, with its sign."""
-    if not np.all(np.isfinite(force)) or not np.any(force):
-        return NOTHING
-    axis = int(np.abs(force).argmax())
-    return ("+" if force[axis] > 0 else "−") + AXES[axis]

@@ -158,8 +158,9 @@ def motion_figure(course: RunCourse) -> Figure:
     heights, height = ((1.5, 1, 0.6), 7.6) if course.proximity_used else ((1, 0.6), 4.6)
     figure, (*above, speed, factor) = _panels(course, heights, height)
     for axes in above:
-        names = [_plain(name) for name in course.units]
-        _lines(axes, course.time, course.body_distance, names)
+        for k, name in enumerate(course.units):
+            colour, dashes = _LINES[k % len(_LINES)]
+            axes.plot(course.time, course.body_distance[:, k], color=colour, ls=dashes, lw=1.1, label=_plain(name))
         axes.plot(course.time, d_notice(course), color=INK, lw=0.9, ls=(0, (1, 3)), label="d_notice")
         axes.plot(course.time, d_crit(course), color=RED, lw=0.9, ls=(0, (1, 3)), label="d_crit")
         axes.axhline(0.0, color=INK, lw=0.8)
@@ -177,13 +178,6 @@ def _plain(name: str) -> str:
     """Write a name from a file so that Matplotlib shows it as it is: no formula, and not hidden."""
     plain = name.replace("\\", "\\\\").replace("$", r"\$") if "$" in name else name
     return f" {plain}" if plain.startswith("_") else plain
-
-
-def _lines(axes: Axes, time: FloatArray, values: FloatArray, names: Sequence[str]) -> None:
-    """Draw each column of values (S, K)."""
-    for k, name in enumerate(names):
-        colour, dashes = _LINES[k % len(_LINES)]
-        axes.plot(time, values[:, k], color=colour, ls=dashes, lw=1.1, label=name)
 
 
 def path_figure(course: RunCourse) -> Figure:

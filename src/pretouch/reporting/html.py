@@ -76,6 +76,8 @@ a { color: inherit; } footer { border-top: 1px solid var(--line); margin-top: 2.
 
 _FIGURE_SPACE = "\u2007"
 """As wide as a digit."""
+MOST_ROWS = 200
+"""Of a table: those of an hour would hide all else."""
 _COMPONENT = 5
 """Characters of a component of a vector."""
 
@@ -107,10 +109,17 @@ def bad(text: Text) -> Html:
 
 
 def table(rows: Sequence[Row], note: Text = "", names: int = 1, title: str = "") -> Html:
-    """Make a table of rows; the first columns, `names` of them, hold words and the others numbers. None of no rows."""
+    """Make a table of rows; the first columns, `names` of them, hold words and the others numbers. None of no rows.
+
+    Of very many rows the last are left out, and the note says so.
+    """
     if not rows:
         return Html("")
-    return table_html(TextTable(title, tuple(rows[0]), tuple(tuple(row.values()) for row in rows), note, names), "h4")
+    more = len(rows) - MOST_ROWS
+    if more > 0:
+        note = joined([f"{more} more are left out here; all count in the summary.", note], " ")
+    lines = tuple(tuple(row.values()) for row in rows[:MOST_ROWS])
+    return table_html(TextTable(title, tuple(rows[0]), lines, note, names), "h4")
 
 
 def table_html(contents: TextTable, heading: str = "h3") -> Html:

@@ -1,6 +1,6 @@
 """Force limits of body regions beside the recorded forces: for orientation, not conformity."""
 
-from pretouch.params.pretouch import REGIONS, BodyRegion
+from pretouch.params.pretouch import REGIONS
 from pretouch.reporting.contacts import TRANSIENT_S, ContactMeasures
 from pretouch.reporting.html import Html, Row, Text, bad, element, joined, number, percent, table
 
@@ -8,48 +8,32 @@ SOURCE = (
     "ISO/TS 15066:2016, table A.2; transient figures are twice the quasi-static ones but for skull and face, where it"
     " has none"
 )
-_NAMES: dict[BodyRegion, str] = {
-    "skull": "Skull and forehead",
-    "face": "Face",
-    "chest": "Chest",
-    "abdomen": "Abdomen",
-    "back": "Back and shoulders",
-    "upper-arm": "Upper arms and elbows",
-    "forearm": "Forearms and wrists",
-    "hand": "Hands and fingers",
-}
 
 
 def orientation_section(contacts: ContactMeasures) -> Html:
     """The largest forces beside what regions of the body are said to bear."""
     peak, lasting = contacts.peak, contacts.held
-    source, here, unsure = (
-        ("true force, as the simulation knows it", "", "")
-        if contacts.truth_known
-        else (
-            "force estimate during detected contacts",
-            " (here of the estimate as it is)",
+    source, here, unsure = "true force, as the simulation knows it", "", ""
+    if not contacts.truth_known:
+        source, here = "force estimate during detected contacts", " (here of the estimate as it is)"
+        unsure = (
             " The estimate has a bandwidth of about 10 Hz and understates the peaks of impacts, and contacts that were"
-            " not detected are not in it.",
+            " not detected are not in it."
         )
-    )
-    later = "none" if lasting is None else f"{lasting:.1f} N"
-
     rows: list[Row] = []
-    for name, region in ((text, REGIONS[key]) for key, text in _NAMES.items()):
-        lasting_n, factor = region.force_n, region.transient
-        transient_n = factor * lasting_n if factor > 1.0 else None  # the source has none for skull and face
+    for name, region in REGIONS.items():
+        # the source has no transient figure for skull and face
+        transient_n = region.transient * region.force_n if region.transient > 1.0 else None
         transient = peak / transient_n if peak is not None and transient_n else None
-        quasi_static = lasting / lasting_n if lasting is not None else None
-        largest = max((share for share in (transient, quasi_static) if share is not None), default=None)
+        quasi_static = lasting / region.force_n if lasting is not None else None
         rows.append(
             {
-                "body region": name,
+                "body region": name.replace("-", " ").capitalize(),
                 "transient [N]": number(transient_n, 0),
                 "of transient": _marked(transient),
-                "quasi-static [N]": number(lasting_n, 0),
+                "quasi-static [N]": number(region.force_n, 0),
                 "of quasi-static": _marked(quasi_static),
-                "": _bar(largest),
+                "": _bar(max((share for share in (transient, quasi_static) if share is not None), default=None)),
             }
         )
     note = (
@@ -58,6 +42,7 @@ def orientation_section(contacts: ContactMeasures) -> Html:
         f" {TRANSIENT_S:g} s into a contact{here}. Which region would be hit, and over what area, is not known here;"
         f" pressures are not looked at.{unsure}"
     )
+    later = "none" if lasting is None else f"{lasting:.1f} N"
     sentence = f"Largest {source}: {number(peak, 1)} N; later than {TRANSIENT_S:g} s into a contact: {later}."
     return joined([element("p", sentence), table(rows, note)])
 

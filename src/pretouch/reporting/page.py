@@ -1,26 +1,55 @@
 """The pages, one HTML file each with all in it: a report of recordings, and what `pretouch detect` found in one."""
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from pretouch.contact.scatter import HELD_S
 from pretouch.explanation import LOUD_N
-from pretouch.reporting.contacts import ContactMeasures, contact_section
+from pretouch.recording.reader import Recorded
+from pretouch.reporting.contacts import ContactMeasures, contact_section, contacts_in
 from pretouch.reporting.figures import close_up_figure, force_figure, motion_figure, path_figure, picture, style
 from pretouch.reporting.health import health_section
 from pretouch.reporting.html import Html, Row, Text, bad, document, element, joined, number, percent, table, table_html
-from pretouch.reporting.limits import limit_section, mode_section, time_in_modes
-from pretouch.reporting.measures import Measures
-from pretouch.reporting.motion import distance_section, nearest_to_body, speed_section
+from pretouch.reporting.motion import (
+    distance_section,
+    limit_rows,
+    limit_section,
+    mode_section,
+    nearest_to_body,
+    speed_section,
+    time_in_modes,
+)
 from pretouch.reporting.orientation import orientation_section
-from pretouch.reporting.record import RunCourse, spread
+from pretouch.reporting.record import RunCourse, gather, spread
 from pretouch.reporting.setting import parameter_section, setting_section, started
 from pretouch.text_table import TextTable
 from pretouch.types import FloatArray, Mode
 
 _SHADED = "Red: REACT, grey: HOLD."
+
+
+@dataclass(frozen=True)
+class Measures:
+    """One recording, measured."""
+
+    title: str
+    """Name of the file, with as much of its folder as tells it from the others."""
+    lacking: str
+    """What is missing of a file that is not complete, as a sentence, or ''."""
+    course: RunCourse
+    contacts: ContactMeasures
+    exceeded: list[str]
+    """Limits of the arm that were exceeded, as "velocity of joint 2"."""
+
+
+def measure(recorded: Recorded, title: str) -> Measures:
+    """Measure a recording."""
+    course = gather(recorded)
+    lacking = "" if recorded.complete else recorded.sentence or "The file is not complete."
+    return Measures(title, lacking, course, contacts_in(course), limit_rows(course)[1])
 
 
 def page(recordings: Iterable[Measures]) -> str:
@@ -87,7 +116,7 @@ def _strongest(m: Measures) -> list[Html]:
         return []
     order = int(np.nanargmax(sizes))
     strongest = m.contacts.detections[order]
-    figure = close_up_figure(m.course, strongest.time, strongest.force)
+    figure = close_up_figure(m.course, strongest.time, strongest.contact.force)
     return [picture(figure, f"Contact {order + 1}, the one with the largest force estimate, close up.")]
 
 
@@ -166,6 +195,7 @@ def _compared(order: int, m: Measures) -> Row:
     """Return the row of a recording in the comparison; `order` counts the recordings of the page from 1."""
     link = Html(f'<a href="#recording-{order}">{element("span", m.title)}</a>')
     c, body, fastest, modes = m.contacts, nearest_to_body(m.course), spread(m.course.speed), time_in_modes(m.course)
+    steps = [d.step for d in c.detections]
     return {
         "recording": joined([link, bad(" (incomplete)")], "") if m.lacking else link,
         "profiles": ", ".join(m.course.profile_names),
@@ -174,8 +204,8 @@ def _compared(order: int, m: Measures) -> Row:
         "missed": str(len(c.missed)) if c.truth_known else "?",
         "without touch": str(len(c.without_touch)) if c.truth_known else "?",
         "delay [ms]": number(float(np.median(c.delays)) if c.delays else None, 0, 1000.0),
-        "filtered [N]": number(_median_norm([d.filtered for d in c.detections]), 1),
-        "raw [N]": number(_median_norm([d.raw for d in c.detections]), 1),
+        "filtered [N]": number(_median_norm(m.course.filtered_force[steps]), 1),
+        "raw [N]": number(_median_norm(m.course.force[steps]), 1),
         "largest force [N]": number(c.peak, 1) + ("*" if c.truth_known else ""),
         "nearest [m]": number(body.distance if body else None, 3),
         "fastest [m/s]": number(fastest.max, 3),
@@ -184,9 +214,9 @@ def _compared(order: int, m: Measures) -> Row:
     }
 
 
-def _median_norm(forces: Sequence[FloatArray]) -> float | None:
-    """Median norm [N] of forces (3,) each, None of none."""
-    return float(np.median(np.linalg.norm(np.array(forces), axis=1))) if forces else None
+def _median_norm(forces: FloatArray) -> float | None:
+    """Median norm [N] of forces (N, 3), None of none."""
+    return float(np.median(np.linalg.norm(forces, axis=1))) if len(forces) else None
 
 
 def detection_page(

@@ -114,19 +114,19 @@ class RunCourse(RunRecord):
 def gather(recorded: Recorded) -> RunCourse:
     """Read all cycles of a recording."""
     blocks, contacts, touches, count = list[Columns](), [], [], 0
+    times, forces = list[FloatArray](), list[FloatArray]()
     model, units = recorded.runs[0].model, len(recorded.runs[0].skin)
     for batch in _batches(recorded):
-        blocks.append(_block(batch, model, units))
+        blocks.append(_block(batch, len(model.links), units))
         contacts += contacts_of([cycle.step for cycle in batch], count)
-        truths = [cycle.truth for cycle in batch if cycle.truth is not None]
-        touches += [(time, model.links[link], velocity) for t in truths for time, link, velocity in t.touches]
         count += len(batch)
+        if truths := [cycle.truth for cycle in batch if cycle.truth is not None]:
+            times.append(np.concatenate([truth.time for truth in truths]))
+            forces.append(np.concatenate([truth.force for truth in truths]))
+            touches += [(time, model.links[link], velocity) for t in truths for time, link, velocity in t.touches]
     columns = {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
-    truth = TrueForces(columns.pop("true_time"), columns.pop("true_force"), tuple(touches))
-    with_truth = columns.pop("truth_known").any()
-    return RunCourse(
-        runs=tuple(recorded.runs), contacts=tuple(contacts), truth=truth if with_truth else None, **columns
-    )
+    truth = TrueForces(np.concatenate(times), np.concatenate(forces), tuple(touches)) if times else None
+    return RunCourse(runs=tuple(recorded.runs), contacts=tuple(contacts), truth=truth, **columns)
 
 
 def _batches(recorded: Recorded) -> Iterator[list[Kept]]:
@@ -136,9 +136,9 @@ def _batches(recorded: Recorded) -> Iterator[list[Kept]]:
             yield batch
 
 
-def _block(batch: list[Kept], model: RobotModel, units: int) -> Columns:
-    """Arrays of a batch of one run, and what is known of the true forces meanwhile."""
-    steps, truths = [cycle.step for cycle in batch], [cycle.truth for cycle in batch if cycle.truth is not None]
+def _block(batch: list[Kept], links: int, units: int) -> Columns:
+    """Arrays of a batch of one run."""
+    steps = [cycle.step for cycle in batch]
     return {
         **columns_of(steps, "q", "q_commanded", "command", "detectable_n"),
         "run": np.full(len(batch), batch[0].run),
@@ -148,10 +148,7 @@ def _block(batch: list[Kept], model: RobotModel, units: int) -> Columns:
         "restricted": np.array([len(step.restricted) for step in steps]),
         "outcome": np.array([OUTCOMES.index(step.qp.outcome) for step in steps]),
         "slack": np.array([np.max(step.qp.slack, initial=0.0) for step in steps]),
-        "truth_known": np.array([bool(truths)]),
-        "true_time": np.concatenate([np.zeros(0), *(truth.time for truth in truths)]),
-        "true_force": np.vstack([np.zeros((0, 3)), *(truth.force for truth in truths)]),
-        **_near(batch, len(model.links), units),
+        **_near(batch, links, units),
         **_inputs(batch, units),
     }
 

@@ -14,8 +14,6 @@ from pretouch.text_table import TextTable
 
 _LONGEST = 300
 """Characters of a fact that are shown."""
-_RUNS = 30
-"""Stretches of one profile and path that are listed."""
 _PROFILES = 6
 """Profiles that are shown side by side."""
 
@@ -60,8 +58,7 @@ def _runs(course: RunCourse) -> Html:
                     "steps": str(len(time)),
                 }
             )
-    more = len(rows) - _RUNS
-    return table(rows[:_RUNS], f"{more} more changes are left out." if more > 0 else "", 2)
+    return table(rows, names=2)
 
 
 def described(path: object) -> str:

@@ -1,15 +1,12 @@
 """Model of an electrode in a simulated room: the field lines that end on what is near, each by how far that is."""
 
-from typing import NamedTuple
-
 import mujoco
 import numpy as np
 
 from pretouch.compiled import compiled
 from pretouch.sensing.sensor import Capacitive, cone_rays
-from pretouch.sensing.skin import Skin
 from pretouch.sim.rays import Geoms, cast, placed, turned
-from pretouch.types import FloatArray, IntArray, RangeStatus
+from pretouch.types import FloatArray, RangeStatus
 
 ELECTRODE_M = 0.03
 """Size of the electrode: at this distance its signal of a wall is half of that of a touch [m]. Ours."""
@@ -24,31 +21,23 @@ _FELT = 4.0
 LEAST = _FELT * float(np.hypot(NOISE, DRIFT))
 RINGS = 8
 """217 field lines: a fist at 18 cm has seven."""
-_STREAM = 64
+STREAM = 64
 """Number of the random stream of drift."""
 
 _OK, _SIGNAL, _MIN_RANGE = (int(s) for s in (RangeStatus.OK, RangeStatus.SIGNAL, RangeStatus.MIN_RANGE))
 
 
-class Electrode(NamedTuple):
-    """Where an electrode sits, and its field lines."""
-
-    body: int
-    T_body: FloatArray
-    """(4, 4)"""
-    rays: FloatArray
-    """(N, 3) unit vectors, sensor frame."""
-
-
 @compiled
-def field(electrode: Electrode, position: FloatArray, rotation: FloatArray, geoms: Geoms, farthest: float) -> float:
+def field(
+    body: int, T_body: FloatArray, rays: FloatArray, position: FloatArray, rotation: FloatArray, geoms: Geoms,
+    farthest: float,
+) -> float:  # fmt: skip
     """Signal of an electrode without noise, 1 at the touch of a grounded wall.
 
-    Each field line that meets something adds cos(a) e / (e + d), with a its angle to the axis, d its length and e the
-    electrode's size: together that of a plate before a wall. `position` (L, 3) [m] and `rotation` (L, 9) are of the
-    bodies.
+    It sits at T_body (4, 4) on a body, with field lines along the unit vectors `rays` (N, 3), sensor frame. Each that
+    meets something adds cos(a) e / (e + d), with a its angle to the axis, d its length and e the electrode's size:
+    together that of a plate before a wall. `position` (L, 3) [m] and `rotation` (L, 9) are of the bodies.
     """
-    body, T_body, rays = electrode
     origin, R = placed(position[body], rotation[body], T_body)
     lines = turned(R, rays)
     distance, normal, met = cast(origin, lines, geoms, body, farthest)
@@ -63,37 +52,28 @@ def field(electrode: Electrode, position: FloatArray, rotation: FloatArray, geom
     return total / all_of_it
 
 
-class Electrodes:
-    """The electrodes among the units of a skin, in a simulated room. Each has a baseline of its own that drifts."""
+class Electrode:
+    """One in a simulated room, with a baseline of its own that drifts."""
 
-    def __init__(self, skin: Skin, bodies: IntArray, data: mujoco.MjData, geoms: Geoms, seed: int) -> None:
-        """Mount those of a skin whose units sit on such bodies (K,) of MuJoCo's."""
-        self._units = {k: unit.sensor for k, unit in enumerate(skin.units) if isinstance(unit.sensor, Capacitive)}
-        self._mounted = {
-            k: Electrode(int(bodies[k]), skin.T_link_sensor[k], cone_rays(RINGS, sensor.angle))
-            for k, sensor in self._units.items()
-        }
-        self._room = data.xpos, data.xmat, geoms
-        self._rng = np.random.default_rng([seed, _STREAM])
-        self._drift = dict.fromkeys(self._units, 0.0)
-        self._last = dict.fromkeys(self._units, -np.inf)
+    def __init__(
+        self, sensor: Capacitive, body: int, T_body: FloatArray, data: mujoco.MjData, geoms: Geoms,
+        rng: np.random.Generator,
+    ) -> None:  # fmt: skip
+        """Mount it at T_body (4, 4) on one of MuJoCo's bodies; `rng` says how it drifts."""
+        rays = cone_rays(RINGS, sensor.angle)
+        self._sensor, self._rng = sensor, rng
+        self._room = body, T_body, rays, data.xpos, data.xmat, geoms, sensor.farthest_m
+        self._drift, self._last = 0.0, -np.inf
 
-    def __contains__(self, unit: int) -> bool:
-        return unit in self._units
-
-    def measure(self, unit: int, time: float, draw: float) -> tuple[float, int, float, float]:
+    def measure(self, time: float, draw: float) -> tuple[float, int, float, float]:
         """Return distance [m], status, its standard deviation [m], and the signal, as a unit tells them by its map.
 
         `draw` is normal.
         """
-        sensor = self._units[unit]
-        clean = field(self._mounted[unit], *self._room, sensor.farthest_m)
-        remembered = float(np.exp((self._last[unit] - time) / DRIFT_S))  # Ornstein and Uhlenbeck; 0 at first
-        self._drift[unit] = (
-            remembered * self._drift[unit] + DRIFT * np.sqrt(1.0 - remembered**2) * self._rng.standard_normal()
-        )
-        self._last[unit] = time
-        return told(sensor, clean + self._drift[unit] + NOISE * draw)
+        remembered = float(np.exp((self._last - time) / DRIFT_S))  # Ornstein and Uhlenbeck; 0 at first
+        drawn = DRIFT * np.sqrt(1.0 - remembered**2) * self._rng.standard_normal()
+        self._drift, self._last = remembered * self._drift + drawn, time
+        return told(self._sensor, field(*self._room) + self._drift + NOISE * draw)
 
 
 def told(sensor: Capacitive, signal: float) -> tuple[float, int, float, float]:

@@ -78,6 +78,7 @@ class _Bodies(NamedTuple):
 class _ImusOnLinks(NamedTuple):
     """Where K sensors sit, how they err, gyroscope first, and what they keep from one physics step to the next."""
 
+    bodies: _Bodies
     link: IntArray  # (K,)
     root: IntArray  # (K,) first body of the tree that the link is in: `center` is that of its tree
     T_link_sensor: FloatArray  # (K, 4, 4)
@@ -90,14 +91,7 @@ class _ImusOnLinks(NamedTuple):
     dt: float  # physics step [s]
     filtered: FloatArray  # (K, 6) what the low-pass gives [rad/s, m/s^2], NaN before the first step
     due: FloatArray  # (K,) when the next sample is taken [s]
-
-
-class _Samples(NamedTuple):
-    """Memory for the M samples of a step."""
-
-    unit: IntArray  # (M,)
-    time: FloatArray  # (M,) [s]
-    counts: IntArray  # (M, 6)
+    samples: FloatArray  # (M, 8) those of a step: sensor, when [s], and six counts
 
 
 class Imus:
@@ -111,8 +105,8 @@ class Imus:
         self, plant: Plant, skin: Skin, params: ImuParams, seed: int, send: Callable[[ImuSample], None]
     ) -> None:
         """Mount the sensors; the seed decides errors, rates, phases and noise."""
-        self._plant, self._send, self._first = plant, send, skin.first
-        link = skin.link[skin.first]
+        self._plant, self._send, self._first = plant, send, skin.first.tolist()
+        data, link = plant.mj_data, skin.link[skin.first]
         rng, count, dt = np.random.default_rng([seed, 5]), len(skin.mounted), plant.params.period_s
         self.rate: FloatArray = params.rate_hz * (1.0 + params.rate_error * rng.uniform(-1, 1, count))
         """(B,) true rate of each sensor [Hz]."""
@@ -124,21 +118,19 @@ class Imus:
         bandwidth = np.repeat((params.angular_rate_bandwidth_hz, params.acceleration_bandwidth_hz), 3)
         follow = 1.0 - np.exp(-2 * np.pi * bandwidth * dt)
         most = count * (int(dt * self.rate.max(initial=0.0)) + 2)
-        self._samples = _Samples(np.zeros(most, np.int64), np.zeros(most), np.zeros((most, 6), np.int64))
         root = plant.mj_model.body_rootid[link].astype(np.int64)
-        data = plant.mj_data
         # views into the simulation's memory, taken once
-        self._bodies = _Bodies(data.xpos, data.xmat, data.subtree_com, data.cvel, data.cacc)
+        bodies = _Bodies(data.xpos, data.xmat, data.subtree_com, data.cvel, data.cacc)
         self._imus = _ImusOnLinks(
-            link, root, skin.T_link_board[skin.first], self.rate, mix, bias, noise, imu_counts(params), follow, dt,
-            np.full((count, 6), np.nan), due,
+            bodies, link, root, skin.T_link_board[skin.first], self.rate, mix, bias, noise, imu_counts(params), follow,
+            dt, np.full((count, 6), np.nan), due, np.zeros((most, 8)),
         )  # fmt: skip
         self._qvel, self._last_qvel = data.qvel, data.qvel.copy()
         plant.before_each_step(self._sample)
 
     def _sample(self, time: float) -> None:
         """Take the samples due by one step before `time`: what MuJoCo derives from a state is one step behind it."""
-        plant, samples, most = self._plant, self._samples, len(self._samples.unit)
+        plant, most = self._plant, len(self._imus.samples)
         if self._drawn + most > len(self._draws):
             self._draws, self._drawn = self._rng.standard_normal((max(_DRAWS, most), 6)), 0
         dt, qvel = plant.params.period_s, self._qvel.copy()
@@ -147,10 +139,10 @@ class Imus:
         mujoco.mj_comVel(plant.mj_model, plant.mj_data)
         mujoco.mj_rnePostConstraint(plant.mj_model, plant.mj_data)
         self._qvel[:] = self._last_qvel = qvel
-        count = _take(time - dt, self._draws[self._drawn :], self._bodies, self._imus, samples)
+        count = _take(time - dt, self._draws[self._drawn :], self._imus)
         self._drawn += count
-        for unit, instant, counts in zip(*(part[:count] for part in samples), strict=True):
-            self._send(ImuSample(int(self._first[unit]), float(instant), counts.copy()))
+        for unit, instant, *counts in self._imus.samples[:count].tolist():
+            self._send(ImuSample(self._first[int(unit)], instant, np.array(counts, dtype=np.int64)))
 
 
 def imu_counts(params: ImuParams) -> FloatArray:
@@ -171,15 +163,15 @@ def _errors(params: ImuParams, count: int, rng: np.random.Generator) -> tuple[Fl
 
 
 @compiled
-def _take(now: float, draws: FloatArray, bodies: _Bodies, imus: _ImusOnLinks, samples: _Samples) -> int:
+def _take(now: float, draws: FloatArray, imus: _ImusOnLinks) -> int:
     """Follow the motion to `now`, one physics step after the last call [s], and take what samples are due.
 
-    Writes `samples`, and returns how many they are; `draws` (D, 6) are normal, a row for each sample.
+    Writes the samples, and returns how many they are; `draws` (D, 6) are normal, a row for each sample.
     """
-    filtered, due = imus.filtered, imus.due
+    filtered, due, samples = imus.filtered, imus.due, imus.samples
     count, sensed, before = 0, np.zeros(6), np.zeros(6)
     for k in range(len(due)):
-        true = _true(bodies, imus.link[k], imus.root[k], imus.T_link_sensor[k])
+        true = _true(imus, k)
         for i in range(6):
             begun = not np.isnan(filtered[k, i])
             before[i] = filtered[k, i] if begun else true[i]
@@ -195,22 +187,23 @@ def _take(now: float, draws: FloatArray, bodies: _Bodies, imus: _ImusOnLinks, sa
                 for j in range(3):
                     value += imus.mix[k, kind, i % 3, j] * sensed[3 * kind + j]
                 # beyond full scale the counts stay at the ends of 16 bits
-                samples.counts[count, i] = int(min(max(np.round(value / imus.lsb[i]), -32768.0), 32767.0))
-            samples.unit[count], samples.time[count] = k, due[k]
+                samples[count, 2 + i] = min(max(np.round(value / imus.lsb[i]), -32768.0), 32767.0)
+            samples[count, 0], samples[count, 1] = k, due[k]
             count += 1
             due[k] += 1.0 / imus.rate[k]
     return count
 
 
 @kernel
-def _true(bodies: _Bodies, link: int, root: int, T_link_sensor: FloatArray) -> FloatArray:
+def _true(imus: _ImusOnLinks, k: int) -> FloatArray:
     """True angular velocity and proper acceleration (6,) of a sensor, in its own frame.
 
     MuJoCo gives each body's velocity and acceleration as those of its point at `center` (3,), turning first, along
     the base frame's axes; the acceleration has gravity taken off, and lacks the part from the velocity's own turning.
     """
+    bodies, link = imus.bodies, imus.link[k]
     cvel, cacc = bodies.velocity[link], bodies.acceleration[link]
-    arm, R = placed(bodies.position[link] - bodies.center[root], bodies.rotation[link], T_link_sensor)
+    arm, R = placed(bodies.position[link] - bodies.center[imus.root[k]], bodies.rotation[link], imus.T_link_sensor[k])
     w, alpha = cvel[:3], cacc[:3]
     velocity = cvel[3:] + cross(w, arm)
     # a spatial acceleration is how the velocity changes at a point fixed in space; a point that moves with the body has

@@ -5,7 +5,6 @@ And how paths, board and person are brought into the reach of another arm than a
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Literal, cast
 
 import numpy as np
 
@@ -18,8 +17,6 @@ from pretouch.sim.hand import FACES, Push, against
 from pretouch.sim.plant_params import assumed_plant
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
 from pretouch.types import FloatArray
-
-Side = Literal["-y", "+y"]
 
 FACE_M = 0.25
 """Distance of the board's face from the plane y = 0 [m]."""
@@ -40,15 +37,12 @@ class HandSide:
 
 
 PANDA_SIDE = HandSide()
-
-
-def sign_of(side: Side) -> float:
-    """Sign of y on a side."""
-    return 1.0 if side == "+y" else -1.0
+SIGNS = {"-y": -1.0, "+y": 1.0}
+"""Sign of y by the side of the base that a board stands on."""
 
 
 def board_beside(
-    path: Path, side: Side, stiffness: float, face: float = FACE_M, aside: float = 0.0, above: float = 0.0,
+    path: Path, side: str, stiffness: float, face: float = FACE_M, aside: float = 0.0, above: float = 0.0,
     hand: HandSide = PANDA_SIDE,
 ) -> Box:  # fmt: skip
     """Return a board, 0.3 m by 0.24 m, where the robot's hand on a path first meets its plane.
@@ -57,24 +51,20 @@ def board_beside(
 
     Args:
         path: of the end-effector; one that never comes near the board's plane is a PathError.
-        side: on which side of the base the board stands.
+        side: on which side of the base the board stands, of `SIGNS`.
         stiffness: of the board [N/m].
         face: distance of its face from the plane y = 0 [m].
         aside: by how much it is moved along x [m].
         above: by how much it is moved along z [m].
         hand: where the side of the hand is that meets it.
     """
-    sign = sign_of(side)
+    sign = SIGNS[side]
     ahead = map(path.point, np.linspace(0.0, path.length, 2000))
     meeting = next((p for p in ahead if sign * p[1] >= face - hand.aside), None)
     if meeting is None:
         raise PathError(f"The path never comes to the board at y = {sign * face:g} m: choose another path or side.")
-    center = (
-        meeting[0] + _OUTWARDS_M + aside,
-        sign * (face + _HALF_SIZE_M[1]),
-        meeting[2] + hand.above + above,
-    )
-    return Box("object", center, _HALF_SIZE_M, stiffness)
+    x, z = meeting[0] + _OUTWARDS_M + aside, meeting[2] + hand.above + above
+    return Box("object", (x, sign * (face + _HALF_SIZE_M[1]), z), _HALF_SIZE_M, stiffness)
 
 
 _LINE_END_Y, _LINE_X, _LINE_Z = 0.5, 0.4, 0.5
@@ -121,11 +111,11 @@ class Placement:
             self.point(_LINE_X, -_LINE_END_Y * sign, _LINE_Z), self.point(_LINE_X, _LINE_END_Y * sign, _LINE_Z)
         )
 
-    def hand(self, side: Side) -> HandSide:
+    def hand(self, side: str) -> HandSide:
         """Return where the hand is met on a side."""
         return self.left if side == "+y" else self.right
 
-    def face(self, face: float, side: Side) -> float:
+    def face(self, face: float, side: str) -> float:
         """Return the distance of a board's face from the plane y = 0 [m] at which it is met where the paper's is."""
         return self.scale * face + (self.hand(side).aside - self.scale * PANDA_SIDE.aside)
 
@@ -176,17 +166,16 @@ _UNMOVED = Placement()
 
 def static_path(trajectory: str, side: str, placement: Placement = _UNMOVED) -> Path:
     """Return the paper's path, begun on the side away from the object so that the arm runs into it at speed."""
-    return placement.path(trajectory, sign_of(cast(Side, side)))
+    return placement.path(trajectory, SIGNS[side])
 
 
 def static_scene(trajectory: str, side: str, stiffness: float, seed: int, placement: Placement = _UNMOVED) -> SceneSpec:
     """Return a board on one side, at another place with each seed."""
-    rng, on = np.random.default_rng([seed, 10]), cast(Side, side)
+    rng = np.random.default_rng([seed, 10])
     face = FACE_M + _FACE_SPREAD_M * rng.uniform(-1, 1)
     aside, above = _CENTER_SPREAD_M * rng.uniform(-1, 1, 2)
-    way = static_path(trajectory, side, placement)
-    board = board_beside(way, on, stiffness, placement.face(face, on), aside, above, placement.hand(on))
-    return SceneSpec(boxes=(board,))
+    way, hand = static_path(trajectory, side, placement), placement.hand(side)
+    return SceneSpec((board_beside(way, side, stiffness, placement.face(face, side), aside, above, hand),))
 
 
 def person_scene(hand: HandSpec, placement: Placement) -> SceneSpec:
@@ -205,7 +194,6 @@ def dynamic_pushes(seed: int) -> tuple[Push, ...]:
     return tuple(planned)
 
 
-_SIDES: tuple[Side, Side] = ("+y", "-y")
 _SCALES = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4)
 """What is tried, the paper's own size first."""
 _PATHS = (("circle", -1.0), ("circle", 1.0), ("line", -1.0), ("line", 1.0))
@@ -237,7 +225,7 @@ def placement_for(model: RobotModel) -> Placement:
             f"{model.description.name} has {model.n} joints ({', '.join(model.joints)}): to follow the paths with its"
             f" hand upright an arm needs {_JOINTS}. If its file has more, import it again with another --ee."
         )
-    left, right = (hand_side(model, side) for side in _SIDES)
+    right, left = (hand_side(model, side) for side in SIGNS)
     reasons = dict[str, None]()
     for scale in _SCALES:
         placement = Placement(scale, left=left, right=right)
@@ -288,7 +276,7 @@ def _visited(model: RobotModel, placement: Placement, postures: FloatArray) -> P
     return replace(placement, beside=(beside[0], beside[1]), inside=(inside[0], inside[1]))
 
 
-def hand_side(model: RobotModel, side: Side) -> HandSide:
+def hand_side(model: RobotModel, side: str) -> HandSide:
     """Return where the arm's hand, all that its last joint moves, is widest on a side, posture as in q_ready."""
     kin = model.kinematics(model.description.q_ready)
     hand = model.body.of_links(np.flatnonzero(model.moved_by.all(axis=1)))
@@ -296,7 +284,7 @@ def hand_side(model: RobotModel, side: Side) -> HandSide:
         return HandSide(0.02, 0.0)
     ends = [kin.position[hand.link] + np.einsum("kij,kj->ki", kin.rotation[hand.link], end) for end in (hand.a, hand.b)]
     away = np.concatenate(ends) - kin.position[model.ee]
-    out = sign_of(side) * away[:, 1] + np.tile(hand.radius, 2)
+    out = SIGNS[side] * away[:, 1] + np.tile(hand.radius, 2)
     widest = int(np.argmax(out))
     return HandSide(max(float(out[widest]), 0.02), float(away[widest, 2]))
 

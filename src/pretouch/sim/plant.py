@@ -1,23 +1,257 @@
 """The simulated arm behind its joint velocity interface: 1 kHz physics, joint impedance, sensors, observer."""
 
 from bisect import bisect_left
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Iterator
 from itertools import accumulate, repeat
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
 
 from pretouch.errors import ParameterError
 from pretouch.robot.model import RobotModel
-from pretouch.sim.arm_in_world import TOUCH_N as TOUCH_N
-from pretouch.sim.arm_in_world import ArmInWorld
-from pretouch.sim.arm_in_world import PointForce as PointForce
-from pretouch.sim.arm_in_world import Touch as Touch
-from pretouch.sim.physics import take_steps
-from pretouch.sim.plant_params import PlantParams
-from pretouch.sim.scene import SceneSpec, build, stiffen
+from pretouch.sim.observer import wrench_from_torques
+from pretouch.sim.physics import ArmMemory, NominalModel, Simulation, take_steps
+from pretouch.sim.plant_params import Joints, PlantParams
+from pretouch.sim.scene import CONTACTS, ArmError, SceneSpec, build, stiffen
 from pretouch.sim.under_way import ROUNDING_S
-from pretouch.types import FloatArray
+from pretouch.types import FloatArray, RobotState
+
+TOUCH_N = 1.0
+"""True force above which there is a contact [N]."""
+_NO_FORCE = np.zeros(3)
+
+
+class Touch(NamedTuple):
+    """The beginning of a contact of the arm, after none."""
+
+    time: float
+    """[s]"""
+    link: int
+    """Index of the link that touches."""
+    velocity: FloatArray
+    """(3,) velocity of the touching point of the link before the contact [m/s], the arm's own base frame."""
+
+
+class PointForce(NamedTuple):
+    """A force on the arm at a point of it, frame of the world."""
+
+    link: int
+    """Index of the link it acts on."""
+    point: FloatArray
+    """(3,) where [m]."""
+    force: FloatArray
+    """(3,) on the arm [N]."""
+
+
+class ArmInWorld:
+    """One arm of a kind in a MuJoCo world: the port `Robot`.
+
+    The control law and the observer use the nominal model and what the sensors say; the physics has other masses,
+    a payload, joint friction, and contacts. What a real arm's owner cannot know is under `true_...`. Where nothing
+    else is said, vectors are in the world's frame, which is the base frame of the arm that the world was built of.
+    """
+
+    mj_model: mujoco.MjModel
+    mj_data: mujoco.MjData
+    time: float
+    """[s]"""
+
+    def __init__(self, model: RobotModel, params: PlantParams, seed: int) -> None:
+        """Draw an arm: the seed decides its errors and its noise."""
+        params.check_joints(model.n, len(model.links))
+        self.model, self.params, self._n = model, params, model.n
+        rng = np.random.default_rng([seed, 1])
+        self._rng, self._wander = np.random.default_rng([seed, 2]), np.random.default_rng([seed, 3])
+        self._drift = np.zeros(model.n)
+        mass_factor = _known(params.mass_factors, 1.0 + params.mass_error * rng.uniform(-1, 1, len(model.links)))
+        payload = params.payload_max_kg * rng.uniform()
+        self.error = ArmError(params, mass_factor, payload if params.payload_kg is None else params.payload_kg)
+        self.offset_nm = _known(params.offsets_nm, np.array(params.torque_offset_nm) * rng.uniform(-1, 1, self._n))
+        """Errors (n,) of the torque sensors that stay [Nm], which a real arm's owner cannot know."""
+        self._ripple_phase = _known(params.ripple_phases_rad, rng.uniform(0, 2 * np.pi, self._n))
+
+    def before_each_step(self, call: Callable[[float], float | None]) -> None:
+        """Have `call(time)` run before each physics step: hands and sensors are driven so.
+
+        It may return until when it has nothing to do [s]. While nobody has, steps are taken in one go.
+        """
+        raise NotImplementedError
+
+    def _enter(self, mj_model: mujoco.MjModel, mj_data: mujoco.MjData, joint: int, body: int, q: FloatArray) -> None:
+        """Take the place of the arm whose first joint and world link have these indices; it is at q (n,) [rad]."""
+        self.mj_model, self.mj_data, self.first_body = mj_model, mj_data, body
+        """`first_body` is the index in MuJoCo's of what is link 0 of the arm: its links follow."""
+        moving = np.flatnonzero(self.model.moved_by.any(axis=1))
+        self._geom_link = mj_model.geom_bodyid - body
+        """Of which link each geom is, of other things -1."""
+        self._geom_link[~np.isin(self._geom_link, moving)] = -1
+        # views into the simulation's memory, taken once: MuJoCo's attribute look-ups cost as much as the arithmetic
+        self.link_position, self.link_rotation = mj_data.xpos[body:], mj_data.xmat.reshape(-1, 3, 3)[body:]
+        """(L', 3) origins [m] and (L', 3, 3) orientations of the links, then of whatever else moves."""
+        own = slice(joint, joint + self._n)
+        mj_data.qpos[own] = q
+        mujoco.mj_forward(mj_model, mj_data)
+        self.stiffness = np.array(self.params.stiffness_nm_rad)
+        """Of the joint impedance (n,) [Nm/rad]; `set_stiffness` changes it."""
+        self._arm = self._memory(own)
+        self._measured_q, self._measured_qd, self._q_d, self._qd_set, _ = self._arm.report
+        self._err = self._arm.offset
+        delay = round(self.params.state_delay_s / self.params.period_s)
+        self._states = deque([(self.time, self._arm.report.copy())], 1 + delay)
+        self._late_commands: deque[tuple[float, FloatArray]] = deque()
+        self.true_force = _NO_FORCE
+        """(3,) sum of the contact forces on the arm by everything else [N], at the last physics step."""
+        self.true_log: list[tuple[float, FloatArray]] = []
+        """(time, true_force) of every physics step since the log was last taken."""
+        self.touches: list[Touch] = []
+        """Each beginning of a contact since then."""
+        mujoco.mj_forward(mj_model, mj_data)
+
+    def _memory(self, own: slice) -> ArmMemory:
+        """Put together what physics steps take: `own` are the arm's joints among MuJoCo's."""
+        p, data, zero = self.params, self.mj_data, np.zeros(self._n)
+        q = data.qpos[own].copy()
+        mass, bias = self.model.mass_matrix_and_bias(q, zero, zero.copy())
+        # at rest the impedance settles where it holds what the model does not know; start there, not with a jerk
+        q_d = q + (data.qfrc_bias[own] - bias) / self.stiffness
+        keep = float(np.exp(-2 * np.pi * p.torque_noise_hz * p.period_s))
+        # what is added to coloured noise at each step, so that its variance stays that of the sensor
+        self._torque_noise = np.array(p.torque_noise_nm) * np.sqrt(1 - keep**2)
+        counted = int(self.mj_model.sensor(CONTACTS).adr[0])
+        nominal, scratch = self.model.scratch
+        return ArmMemory(
+            p=p.numbers,
+            world=Simulation(
+                self.mj_model._address, data._address, data.qpos[own], data.qvel[own], data.qacc[own],
+                data.qfrc_applied[own], data.sensordata[counted : counted + 1],
+            ),
+            nominal=NominalModel(nominal._address, scratch._address, scratch.qpos, scratch.qvel),
+            report=np.array([q, zero, q_d, zero, zero]),
+            qd_d=zero.copy(),
+            follow=1.0 - float(np.exp(-2 * np.pi * p.set_point_hz * p.period_s)),
+            impedance=np.vstack([self._spring_and_damper(mass), zero]),
+            tau_max=self.model.description.tau_max,
+            friction=np.array([p.friction_f1_nm, p.friction_f2_s_rad, p.friction_f3_rad_s]),
+            bristle=zero.copy(),
+            cold=np.array([p.cold_friction]),
+            offset=self.offset_nm.copy(),
+            ripple=np.array([p.ripple_nm, p.ripple_cycles, self._ripple_phase]),
+            noise=zero.copy(),
+            keep=keep,
+            spring=np.stack([bias, zero]),
+            turn=2 * np.pi * p.ring_hz * p.period_s,
+            bias=bias,
+            integral=zero.copy(),
+            mass_matrix=mass,
+            qd_before=zero.copy(),
+        )  # fmt: skip
+
+    def take_log(self) -> tuple[list[tuple[float, FloatArray]], list[Touch]]:
+        """Return `true_log` and `touches`, and begin both anew: in a run without an end they would fill the memory."""
+        log, self.true_log, self.touches = (self.true_log, self.touches), [], []
+        return log
+
+    @property
+    def touching(self) -> bool:
+        """Whether any two things touch, the arm or not."""
+        return bool(self.mj_data.ncon)
+
+    # the port Robot
+
+    def read(self) -> RobotState:
+        """Return what the arm's interface reports now."""
+        p = self.params
+        time, report = self._states[0] if p.state_delay_s else (self.time, self._arm.report.copy())
+        q, qd, q_d, qd_set, tau_ext = report
+        kin = self.model.kinematics(q)
+        wrench = wrench_from_torques(self.model.ee_jacobian(kin), tau_ext, p.wrench_damping, p.singular_value_min)
+        late = p.stamp_jitter_s * self._wander.uniform() if p.stamp_jitter_s else 0.0
+        return RobotState(time + late, q, qd, q_d, qd_set, tau_ext, wrench)
+
+    def command(self, qd: FloatArray) -> None:
+        """Take joint velocities (n,) [rad/s] as the set-point."""
+        if self.params.command_delay_s:
+            self._late_commands.append((self.time + self.params.command_delay_s, np.array(qd, dtype=np.float64)))
+        else:
+            self._qd_set[:] = qd
+
+    # its drives, for an interface that lets a client set them
+
+    @property
+    def desired(self) -> tuple[FloatArray, FloatArray]:
+        """Positions [rad] and velocities [rad/s] (n,) that the motion generator asks for."""
+        return self._q_d, self._arm.qd_d
+
+    def drive_by(self, tau: FloatArray) -> None:
+        """Have torques (n,) beyond gravity's [Nm] act in the next physics steps in place of the joint impedance."""
+        _, gravity = self.model.mass_matrix_and_bias(self._measured_q, np.zeros(self._n), np.empty(self._n))
+        # the drives add what the model says of Coriolis torques, too, which a commanded torque has to itself
+        self._arm.impedance[:2], self._arm.impedance[2] = 0.0, tau + gravity - self._arm.bias
+
+    def begin_at(self, q: FloatArray) -> None:
+        """Have the motion generator ask for q (n,) [rad], near where the arm is, at once and at rest."""
+        self._q_d[:], self._arm.qd_d[:] = q, 0.0
+
+    def hold(self) -> None:
+        """Have the joint impedance act again, where the arm is, within its limits, and with the velocities it has."""
+        self._arm.impedance[:2], self._arm.impedance[2] = self._spring_and_damper(self._arm.mass_matrix), 0.0
+        self._q_d[:] = np.clip(self._measured_q, self.model.q_min, self.model.q_max)
+        self._arm.qd_d[:] = self._measured_qd
+
+    def set_stiffness(self, stiffness: FloatArray) -> None:
+        """Give the joint impedance another stiffness (n,) [Nm/rad], with the same damping ratio."""
+        self.stiffness = stiffness.copy()
+        self._arm.impedance[:2] = self._spring_and_damper(self._arm.mass_matrix)
+
+    def _spring_and_damper(self, mass_matrix: FloatArray) -> FloatArray:
+        inertia = np.diag(mass_matrix) + self.params.armature_kg_m2
+        return np.array([self.stiffness, 2.0 * self.params.damping_ratio * np.sqrt(self.stiffness * inertia)])
+
+    def _note_contacts(self, times: list[float]) -> None:
+        """Note what touched in steps that ended at these instants [s]: nothing, but for the last of them."""
+        touched = self.true_force is not _NO_FORCE
+        self.true_force = sum((one.force for one in self.contact_forces()), start=_NO_FORCE)
+        self.true_log += zip(times[:-1], repeat(_NO_FORCE))
+        self.true_log.append((self.time, self.true_force))
+        if self.true_force is not _NO_FORCE and not (touched and len(times) == 1):
+            _, contact, link, _ = next(self._on_the_arm())
+            kin = self.model.kinematics(self._arm.world.q)
+            jacobian = self.model.jacobian(kin, link, self._in_base(contact.pos.copy()))
+            self.touches.append(Touch(self.time, link, jacobian[:3] @ self._arm.qd_before))
+
+    def _age(self, duration: float) -> None:
+        """Let the arm warm up and its sensors drift (Ornstein-Uhlenbeck) for a time [s]."""
+        p = self.params
+        self._arm.cold[0] = p.cold_friction * np.exp(-self.time / p.warm_up_s)
+        if p.drift_nm:
+            keep = np.exp(-duration / p.drift_s)
+            drawn = p.drift_nm * np.sqrt(1.0 - keep**2) * self._wander.standard_normal(self._n)
+            self._drift = keep * self._drift + drawn
+            self._err[:] = self.offset_nm + self._drift
+
+    def _in_base(self, point: FloatArray) -> FloatArray:
+        """Return a point (3,) of the world in the arm's own base frame [m]."""
+        return point
+
+    def contact_forces(self) -> list[PointForce]:
+        """Return the forces of all contacts of the arm with anything else, at the last physics step."""
+        forces, wrench = [], np.zeros(6)
+        for number, contact, link, sign in self._on_the_arm():
+            mujoco.mj_contactForce(self.mj_model, self.mj_data, number, wrench)
+            force = sign * (contact.frame.reshape(3, 3).T @ wrench[:3])
+            forces.append(PointForce(link, contact.pos.copy(), force))
+        return forces
+
+    def _on_the_arm(self) -> Iterator[tuple[int, Any, int, int]]:
+        """Each contact of the arm: its number, itself, the arm's link, and the sign its force has on the arm."""
+        for number in range(self.mj_data.ncon):
+            contact = self.mj_data.contact[number]
+            for geom, sign in ((int(contact.geom2), 1), (int(contact.geom1), -1)):  # MuJoCo's acts on the second
+                if (link := int(self._geom_link[geom])) >= 0:
+                    yield number, contact, link, sign
+                    break
 
 
 class Plant(ArmInWorld):
@@ -59,9 +293,7 @@ class Plant(ArmInWorld):
         while done < steps:
             first, until = done, self._prepare_step()
             last = bisect_left(times, until, first + 1, steps)
-            done += take_steps(
-                self._qd_set, velocity_noise[first:last], torque_noise[first:last], past[first:last], self._arm
-            )
+            done += take_steps(velocity_noise[first:last], torque_noise[first:last], past[first:last], self._arm)
             self.time = times[done]
             if p.state_delay_s:
                 self._states.extend(zip(times[first + 1 : done + 1], past[first:done], strict=True))
@@ -76,7 +308,7 @@ class Plant(ArmInWorld):
                 self._idle_until[i] = -np.inf if idle is None else idle
         until, late = min(self._idle_until, default=np.inf), self._late_commands
         while late and late[0][0] <= time + ROUNDING_S:
-            self._qd_set = late.popleft()[1]
+            self._qd_set[:] = late.popleft()[1]
         return min(until, late[0][0] - 2 * ROUNDING_S) if late else until  # too early does no harm
 
     def grip(self, load_kg: float) -> None:
@@ -86,6 +318,11 @@ class Plant(ArmInWorld):
                 "This arm has nothing at its TCP that could grip: give PlantParams.payload_kg above 0."
             )
         self.mj_model.body("payload").mass[:] = self.error.payload + load_kg
+
+
+def _known(values: Joints, drawn: FloatArray) -> FloatArray:
+    """What is known of one arm takes the place of what was drawn; the draws are the same either way."""
+    return np.array(values) if values else drawn
 
 
 class PlantClock:

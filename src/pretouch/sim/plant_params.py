@@ -102,37 +102,25 @@ class PlantParams(Checked):
     """Phase of each joint's ripple, of one known arm [rad]; none: drawn."""
     mass_factors: Joints = ()
     """Factor on mass and inertia of each link, of one known arm, in the order of `RobotModel.links`; none: drawn."""
-    payload_kg: float | None = None
+    payload_kg: NonNegative | None = None
     """The unknown mass at the TCP of one known arm [kg]; None: drawn up to `payload_max_kg`."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         for name in (*_SCALED, *_KEPT, *_KNOWN):
-            values = getattr(self, name)
-            if not all(map(is_number, values)):
-                raise ParameterError(f"PlantParams.{name} is {values}: give finite numbers.")
-        problem = None if self.payload_kg is None else Check(low=0.0).problem(self.payload_kg)
-        if problem:
-            raise ParameterError(f"PlantParams.payload_kg is {self.payload_kg}: it {problem}.")
-        for name in ("mass_factors", "stiffness_nm_rad", "torque_noise_nm"):
-            if any(value < 0.0 for value in getattr(self, name)):
-                raise ParameterError(f"PlantParams.{name} is {getattr(self, name)}: none may be below 0.")
+            values, low = getattr(self, name), 0.0 if name in _NEVER_BELOW_0 else -np.inf
+            if not all(is_number(value) and value >= low for value in values):
+                limit = ", none below 0" if low == 0.0 else ""
+                raise ParameterError(f"PlantParams.{name} is {values}: give finite numbers{limit}.")
 
-    def check_joints(self, n: int, links: int | None = None) -> None:
+    def check_joints(self, n: int, links: int) -> None:
         """Raise ParameterError unless there is one value for each of n joints, and of what is known of each link."""
-        for name in (*_SCALED, *_KEPT):
-            count = len(getattr(self, name))
-            if count != n:
+        for name in (*_SCALED, *_KEPT, *_KNOWN):
+            count, number = len(getattr(self, name)), links if name == "mass_factors" else n
+            if count != number and (count or name not in _KNOWN):
                 raise ParameterError(
-                    f"PlantParams.{name} has {count} values, the arm {n} joints: take plant_params_of(description)."
-                )
-        counts = {"offsets_nm": n, "ripple_phases_rad": n, "mass_factors": links}
-        for name, number in counts.items():
-            count = len(getattr(self, name))
-            if count and number is not None and count != number:
-                raise ParameterError(
-                    f"PlantParams.{name} has {count} values, and {number} are needed: it is of another arm, so identify"
-                    " this one, or leave it out."
+                    f"PlantParams.{name} has {count} values, and {number} are needed: it is of another arm, so take"
+                    " plant_params_of(description), or identify this one."
                 )
 
 
@@ -141,6 +129,7 @@ _SCALED = ("friction_f1_nm", "torque_noise_nm", "torque_offset_nm", "ripple_nm")
 _KNOWN = ("offsets_nm", "ripple_phases_rad", "mass_factors")
 """Of one known arm, or empty."""
 _KEPT = ("stiffness_nm_rad", "friction_f2_s_rad", "friction_f3_rad_s", "ripple_cycles")
+_NEVER_BELOW_0 = ("mass_factors", "stiffness_nm_rad", "torque_noise_nm")
 
 
 def plant_params_of(arm: RobotDescription) -> PlantParams:

@@ -78,17 +78,14 @@ def misplaced(skin: Skin, model: RobotModel, error: Misplacement, seed: int) -> 
     believed = [
         _believed(unit, model, error, np.random.default_rng([seed, 13, k])) for k, unit in enumerate(skin.mounted)
     ]
-    units = [_telling(unit, error) if error.told else unit for unit, _ in believed]
+    units = [unit for unit, _ in believed]
+    if error.told:  # along, and about, one axis of an error that may point anywhere
+        position, turn = (
+            error.position_mm / 1000 / np.sqrt(3.0),
+            float(np.radians(error.orientation_deg)) / np.sqrt(3.0),
+        )
+        units = [replace(unit, position_sigma=position, orientation_sigma=turn) for unit in units]
     return Skin(units, model), sum(refused for _, refused in believed)
-
-
-def _telling(unit: SensorUnit, error: Misplacement) -> SensorUnit:
-    """Return a unit with the deviation along, and about, one axis of an error that may point anywhere."""
-    return replace(
-        unit,
-        position_sigma=error.position_mm / 1000 / np.sqrt(3.0),
-        orientation_sigma=float(np.radians(error.orientation_deg)) / np.sqrt(3.0),
-    )
 
 
 def _believed(

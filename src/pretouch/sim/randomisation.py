@@ -2,14 +2,14 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from hashlib import sha256
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 from zlib import crc32
 
 import numpy as np
-from msgspec import UNSET, Struct, UnsetType, ValidationError, convert
+from msgspec import Struct, ValidationError, convert
 
 from pretouch.checks import is_number
 from pretouch.errors import ParameterError
@@ -24,28 +24,22 @@ SETS = ("nominal", "realistic", "stress", "hard")
 """Sets that come with the package."""
 _STREAM = 51
 """Number of the random stream of worlds; a field has a stream of its own in it."""
-_RANGES = ("uniform", "log_uniform", "normal")
-_FIELDS = {
-    "plant": tuple(field.name for field in fields(PlantParams)),
-    "ranging": tuple(field.name for field in fields(RangeFinderParams)),
-    "misplaced": ("position_mm", "orientation_deg"),
-}
-"""Tables of a file, and the fields that each may have."""
+_PARTS = {"plant": PlantParams, "ranging": RangeFinderParams, "misplaced": Misplacement}
+"""Tables of a file: what their fields are of."""
+_WAYS = ("value", "uniform", "log_uniform")
 
 Params = TypeVar("Params", PlantParams, RangeFinderParams)
 
 
 class FieldSpread(Struct, frozen=True, forbid_unknown_fields=True):
-    """How one field is drawn, in one of four ways."""
+    """How one field is drawn, in one of three ways."""
 
-    value: Any = UNSET
+    value: Any = None
     """It has this value."""
-    uniform: tuple[float, float] | UnsetType = UNSET
+    uniform: tuple[float, float] | None = None
     """Ends of a range."""
-    log_uniform: tuple[float, float] | UnsetType = UNSET
+    log_uniform: tuple[float, float] | None = None
     """Ends of a range above 0."""
-    normal: tuple[float, float] | UnsetType = UNSET
-    """Mean and standard deviation."""
     times: bool = False
     """Whether the number drawn is a factor on the usual value."""
     each: bool = False
@@ -55,38 +49,28 @@ class FieldSpread(Struct, frozen=True, forbid_unknown_fields=True):
     """Of what was identified, for who reads the file."""
 
     def __post_init__(self) -> None:
-        if sum(getattr(self, way) is not UNSET for way in ("value", *_RANGES)) != 1:
-            raise ValueError(f"give one of value, {', '.join(_RANGES)}")
-        if self.way != "value":
-            low, high = self.numbers
-            if not np.isfinite(self.numbers).all() or (self.way != "normal" and low > high):
-                raise ValueError(f"{self.way} is {self.numbers}: give two numbers, the lower first")
-            if self.way == "log_uniform" and low <= 0.0:
-                raise ValueError(f"log_uniform is {self.numbers}: give two numbers, the lower first and above 0")
+        if sum(getattr(self, way) is not None for way in _WAYS) != 1:
+            raise ValueError(f"give one of {', '.join(_WAYS)}")
+        if self.ends is not None and not (-math.inf < self.ends[0] <= self.ends[1] < math.inf):
+            raise ValueError(f"the range is {self.ends}: give two numbers, the lower first")
+        if self.log_uniform is not None and self.log_uniform[0] <= 0.0:
+            raise ValueError(f"log_uniform is {self.log_uniform}: give two numbers, the lower first and above 0")
 
     @property
-    def way(self) -> str:
-        """Name of the way."""
-        return next((way for way in _RANGES if getattr(self, way) is not UNSET), "value")
-
-    @property
-    def numbers(self) -> Any:
-        """The value, the ends of the range, or mean and standard deviation."""
-        return getattr(self, self.way)
+    def ends(self) -> tuple[float, float] | None:
+        """Of the range, or None of a value."""
+        return self.uniform or self.log_uniform
 
     def draw(self, field: str, seed: int, count: int) -> FloatArray:
         """Draw `count` numbers for a field, in a range."""
         rng = np.random.default_rng([seed, _STREAM, crc32(field.encode())])
-        first, second = self.numbers
-        if self.way == "normal":
-            return rng.normal(first, second, count)
-        if self.way == "log_uniform":
-            return np.exp(rng.uniform(math.log(first), math.log(second), count))
-        return rng.uniform(first, second, count)
+        if self.log_uniform is not None:
+            low, high = map(math.log, self.log_uniform)
+            return np.exp(rng.uniform(low, high, count))
+        return rng.uniform(*(self.uniform or (0.0, 0.0)), count)
 
 
-@dataclass(frozen=True)
-class WorldSet:
+class WorldSet(NamedTuple):
     """A set of worlds."""
 
     name: str
@@ -97,8 +81,7 @@ class WorldSet:
     """SHA-256 of the file."""
 
 
-@dataclass(frozen=True)
-class DrawnWorld:
+class DrawnWorld(NamedTuple):
     """One arm with its sensors: what a seed draws of a set. Delays of state and commands are fields of the plant."""
 
     plant: PlantParams
@@ -134,12 +117,12 @@ def world_set(name: str) -> WorldSet:
 def _spreads(place: Path, table: dict[str, Any]) -> Iterator[tuple[str, FieldSpread]]:
     """How the fields of a file's tables are drawn."""
     for part, entries in table.items():
-        if part not in _FIELDS or not isinstance(entries, dict):
-            raise ParameterError(f"{place} has an unknown table {part!r}: use about, {', '.join(_FIELDS)}.")
+        if part not in _PARTS or not isinstance(entries, dict):
+            raise ParameterError(f"{place} has an unknown table {part!r}: use about, {', '.join(_PARTS)}.")
+        names = [field.name for field in fields(_PARTS[part])]
         for name, entry in entries.items():
-            if name not in _FIELDS[part]:
-                names = ", ".join(_FIELDS[part])
-                raise ParameterError(f"{place} has an unknown field {part}.{name}: choose from {names}.")
+            if name not in names:
+                raise ParameterError(f"{place} has an unknown field {part}.{name}: choose from {', '.join(names)}.")
             try:
                 yield f"{part}.{name}", convert(entry if isinstance(entry, dict) else {"value": entry}, FieldSpread)
             except ValidationError as error:
@@ -151,39 +134,32 @@ def drawn(chosen: WorldSet, seed: int, usual: PlantParams | None = None) -> Draw
 
     `usual` is the arm that factors are of; None: the Panda's. A draw that is no possible arm is a ParameterError.
     """
-    plant, ranging = PlantParams() if usual is None else usual, RangeFinderParams()
-    values: dict[str, dict[str, Any]] = {"plant": {}, "ranging": {}, "misplaced": {}}
+    world = DrawnWorld(usual or PlantParams(), RangeFinderParams(), Misplacement())
+    values: dict[str, dict[str, Any]] = {part: {} for part in _PARTS}
     for field, spread in chosen.spreads.items():
         part, name = field.split(".")
-        of = {"plant": plant, "ranging": ranging, "misplaced": None}[part]
-        values[part][name] = _value(field, spread, seed, getattr(of, name) if of is not None else 0.0)
+        values[part][name] = _value(field, spread, seed, getattr(getattr(world, part), name))
     try:
-        return DrawnWorld(
-            replace(plant, **values["plant"]),
-            replace(ranging, **values["ranging"]),
-            Misplacement(**values["misplaced"]),
-        )
+        return DrawnWorld(*(replace(usual_one, **values[part]) for part, usual_one in world._asdict().items()))
     except ParameterError as error:
         raise ParameterError(f"The world {chosen.name}, seed {seed}: {error}") from error
 
 
 def _value(field: str, spread: FieldSpread, seed: int, usual: Any) -> Any:
     """Draw a field's value, of the form that its usual one has."""
-    if spread.way == "value":
-        value = spread.value
-        if isinstance(usual, tuple):
-            if not isinstance(value, list) or not all(map(is_number, value)):
-                raise ParameterError(f"{field} is {value!r}: give a list of numbers, one a joint.")
-            return tuple(map(float, value))
-        if not isinstance(usual, float | None):
-            return value
-        if not is_number(value):
+    value = spread.value
+    if spread.ends is None and isinstance(usual, tuple):
+        if not isinstance(value, list) or not all(map(is_number, value)):
+            raise ParameterError(f"{field} is {value!r}: give a list of numbers, one a joint.")
+        return tuple(map(float, value))
+    if spread.ends is None:
+        if isinstance(usual, float | None) and not is_number(value):
             raise ParameterError(f"{field} is {value!r}: give a number.")
-        return float(value)
+        return float(value) if isinstance(usual, float | None) else value
     if usual is None and spread.times:
         raise ParameterError(f"{field} has no usual value that it could be a factor on: leave out times.")
     if isinstance(usual, tuple):
         numbers = np.broadcast_to(spread.draw(field, seed, len(usual) if spread.each else 1), len(usual))
-        return tuple(float(n) for n in (numbers * np.array(usual) if spread.times else numbers))
+        return tuple((numbers * np.array(usual) if spread.times else numbers).tolist())
     number = float(spread.draw(field, seed, 1)[0])
     return number * float(usual) if spread.times else number

@@ -9,10 +9,10 @@ import numpy as np
 from pretouch.checks import Check, Checked, Fraction, NonNegative, Positive
 from pretouch.compiled import compiled, kernel
 from pretouch.errors import ParameterError
-from pretouch.sensing.sensor import Sensor, cone_rays
+from pretouch.sensing.sensor import Capacitive, Sensor, cone_rays
 from pretouch.sensing.skin import Skin
-from pretouch.sim.arm_in_world import ArmInWorld
-from pretouch.sim.capacitive import Electrodes
+from pretouch.sim.capacitive import STREAM, Electrode
+from pretouch.sim.plant import ArmInWorld
 from pretouch.sim.rays import Geoms, cast, geoms_of, placed, turned
 from pretouch.sim.under_way import ROUNDING_S, UnderWay
 from pretouch.types import FloatArray, IntArray, RangeReadings, RangeStatus
@@ -98,65 +98,61 @@ class RangeFinders:
         With `send`, that is handed each measurement as it is made and has to bring it to where it is read: latency,
         jitter and dropout are not these sensors' then, and `read` tells nothing. They measure the same either way.
         """
-        self._plant, self._skin, self._params = plant, skin, params
+        self._plant, self._skin, self.params = plant, skin, params
         count, data, rays = len(skin), plant.mj_data, 1 + 3 * params.rings * (params.rings + 1)
         cones = np.array([cone_rays(params.rings, unit.sensor.angle) for unit in skin.units]).reshape(count, rays, 3)
         self._rng = np.random.default_rng([seed, 3])
         self._send, self._light = send, np.random.default_rng([seed, 4])
         offset = params.offset_max_m * self._rng.uniform(-1, 1, count)
         bodies, geoms = plant.first_body + skin.link, geoms_of(plant.mj_model, data)
+        # a flat wall square to the beam is read at its distance, as by a calibrated sensor: rays at an angle meet it
+        # farther away by 1 / cos, and with strength cos^3, which is slant, and the distance squared
+        flat_wall = (cones[:, :, 2] ** 3).sum(axis=1) / (cones[:, :, 2] ** 2).sum(axis=1)
         kinds = [(u.sensor.ranging(params.mode).distance_max_m, u.sensor.nearest_m, u.sensor.noise) for u in skin.units]
         farthest, nearest, noise = np.array(kinds, dtype=np.float64).reshape(count, 3).T.copy()
         self._finders = _Finders(
-            data.xpos, data.xmat, bodies, skin.T_link_sensor, cones, offset, farthest, nearest,
-            _flat_wall(cones[:, :, 2]), noise,
-        )  # fmt: skip
-        self._geoms, self._errors = geoms, _errors(params)
-        self._electrodes = Electrodes(skin, bodies, data, geoms, seed)
-        boards: dict[str, list[int]] = {}
-        for unit, board in enumerate(skin.boards):
-            boards.setdefault(board, []).append(unit)
-        self._boards = [tuple(units) for units in boards.values()]
-        periods = [params.period_of(skin.units[units[0]].sensor) for units in self._boards]
-        self._due: list[float] = self._rng.uniform(0, periods, len(periods)).tolist()
+            data.xpos, data.xmat, bodies, skin.T_link_sensor, cones, offset, farthest, nearest, flat_wall, noise
+        )
+        self._geoms, drift = geoms, np.random.default_rng([seed, STREAM])
+        self._electrodes = {
+            k: Electrode(unit.sensor, int(bodies[k]), skin.T_link_sensor[k], data, geoms, drift)
+            for k, unit in enumerate(skin.units)
+            if isinstance(unit.sensor, Capacitive)
+        }
+        self._boards: list[list[int]] = [np.flatnonzero(skin.board == one).tolist() for one in range(len(skin.mounted))]
+        self._periods = [params.period_of(unit.sensor) for unit in skin.mounted]
+        self._due: list[float] = self._rng.uniform(0, self._periods, len(self._periods)).tolist()
         self._sent = UnderWay[tuple[int, float, float, int]]()
-        self._stamp = np.full(count, -np.inf)
-        self._distance = np.zeros(count)
-        self._status = np.full(count, RangeStatus.NONE, dtype=np.int64)
+        none = np.full(count, RangeStatus.NONE, dtype=np.int64)
+        self._newest = RangeReadings(np.full(count, -np.inf), np.zeros(count), none)
         self.silenced: set[int] = set()
         """Indices of units that no longer send."""
         plant.before_each_step(self._sample)
 
-    @property
-    def params(self) -> RangeFinderParams:
-        """How they err."""
-        return self._params
-
     def change(self, params: RangeFinderParams) -> None:
         """Err in another way from the next measurement on; what was settled when they were mounted has to stay."""
         for name in ("mode", "rings", "offset_max_m"):
-            if getattr(params, name) != getattr(self._params, name):
+            if getattr(params, name) != getattr(self.params, name):
                 raise ParameterError(
                     f"RangeFinderParams.{name} cannot change while the sensors run: create them again."
                 )
-        self._params, self._errors = params, _errors(params)
+        self.params, self._periods = params, [params.period_of(unit.sensor) for unit in self._skin.mounted]
 
     def read(self) -> RangeReadings:
         """Return the newest reading of each unit that has arrived by now."""
+        newest = self._newest
         for unit, stamp, distance, status in self._sent.arrived(self._plant.time + ROUNDING_S):
-            if stamp > self._stamp[unit]:
-                self._stamp[unit], self._distance[unit], self._status[unit] = stamp, distance, status
-        return RangeReadings(self._stamp.copy(), self._distance.copy(), self._status.copy())
+            if stamp > newest.stamp[unit]:
+                newest.stamp[unit], newest.distance[unit], newest.status[unit] = stamp, distance, status
+        return RangeReadings(newest.stamp.copy(), newest.distance.copy(), newest.status.copy())
 
     def _sample(self, time: float) -> float:
-        p, rng = self._params, self._rng
+        p, rng = self.params, self._rng
         for board, due in enumerate(self._due):
             if due > time:
                 continue
-            zones = self._boards[board]
-            period = p.period_of(self._skin.units[zones[0]].sensor)
-            self._due[board] = due + period * (1.0 + p.period_jitter * rng.standard_normal())
-            measured = [(unit, self._measured(unit, time, rng.standard_normal())) for unit in zones]
+            self._due[board] = due + self._periods[board] * (1.0 + p.period_jitter * rng.standard_normal())
+            measured = [(unit, self._measured(unit, time, rng.standard_normal())) for unit in self._boards[board]]
             arrival = time + p.latency_s + rng.exponential(p.jitter_s)
             lost = rng.random() < p.dropout
             for unit, (distance, status, sigma, strength) in measured:
@@ -171,8 +167,8 @@ class RangeFinders:
     def _measured(self, unit: int, time: float, draw: float) -> tuple[float, int, float, float]:
         """Return distance [m], status, standard deviation [m], and strength of a measurement; `draw` is normal."""
         if unit in self._electrodes:
-            return self._electrodes.measure(unit, time, draw)
-        return _measure(unit, draw, self._errors, self._finders, self._geoms)
+            return self._electrodes[unit].measure(time, draw)
+        return _measure(unit, draw, self.params.numbers, self._finders, self._geoms)
 
 
 _SIGNAL_LIMIT_MCPS = 1.024
@@ -195,34 +191,9 @@ def _light(strength: float, rng: np.random.Generator) -> tuple[float, float, flo
     return signal, ambient, _SPADS * share
 
 
-def _flat_wall(cosines: FloatArray) -> FloatArray:
-    """Factor (K,) that makes a flat wall square to the beam read at its distance, as a calibrated sensor does.
-
-    Rays at an angle, by their cosines (K, N), meet it farther away by 1 / cos, and with strength cos^3: slant, and the
-    distance squared.
-    """
-    return np.asarray((cosines**3).sum(axis=1) / (cosines**2).sum(axis=1))
-
-
 _OK, _SIGMA, _SIGNAL, _MIN_RANGE = (
     int(s) for s in (RangeStatus.OK, RangeStatus.SIGMA, RangeStatus.SIGNAL, RangeStatus.MIN_RANGE)
 )
-
-
-class _Errors(NamedTuple):
-    """As of `RangeFinderParams`."""
-
-    reflectance: float
-    reflectance_limit: float
-    slant_power: float
-    merge_m: float
-    noise_floor_m: float
-    noise_rate: float
-    sigma_limit_m: float
-
-
-def _errors(params: RangeFinderParams) -> _Errors:
-    return _Errors(*(getattr(params, name) for name in _Errors._fields))
 
 
 class _Finders(NamedTuple):
@@ -236,13 +207,13 @@ class _Finders(NamedTuple):
     offset: FloatArray  # (K,) constant errors [m]
     distance_max: FloatArray  # (K,) farthest target [m]
     nearest: FloatArray  # (K,) [m]
-    calibration: FloatArray  # (K,) of `_flat_wall`
+    calibration: FloatArray  # (K,) factor that makes a flat wall read at its distance
     noise: FloatArray  # (K,) times that of the VL53L1X
 
 
 @compiled
 def _measure(
-    unit: int, draw: float, errors: _Errors, finders: _Finders, geoms: Geoms
+    unit: int, draw: float, p: RangeFinderParams, finders: _Finders, geoms: Geoms
 ) -> tuple[float, int, float, float]:
     """Measure with a sensor; `draw` is normal. Return distance [m], status, standard deviation [m], and strength.
 
@@ -254,7 +225,7 @@ def _measure(
     origin, R = placed(finders.position[link], finders.rotation[link], finders.T_link_sensor[unit])
     rays = turned(R, finders.cone[unit])
     distance, normal, _ = cast(origin, rays, geoms, link, distance_max)
-    brightness, count = errors.reflectance / errors.reflectance_limit, len(distance)
+    brightness, count = p.reflectance / p.reflectance_limit, len(distance)
     strength = np.zeros(count)
     for i in range(count):
         if 0.0 <= distance[i] <= distance_max:
@@ -263,18 +234,18 @@ def _measure(
             slant = abs(outwards)
             if outwards > 0:
                 distance[i] = 0.0
-            if errors.slant_power != 1.0:
-                slant = slant**errors.slant_power
+            if p.slant_power != 1.0:
+                slant = slant**p.slant_power
             ratio = distance_max / max(distance[i], 0.01)  # 10 mm: no return is infinitely strong
             strength[i] = brightness * slant * ratio * ratio / count
-    total, mean = _nearest_group(distance, strength, errors.merge_m)
+    total, mean = _nearest_group(distance, strength, p.merge_m)
     if total == 0.0:
         return 0.0, _SIGNAL, 0.0, sum(strength)
     mean *= finders.calibration[unit] / total
     # shot noise: with a share of the light that a target filling the cone would return, 1 / sqrt(share) times the noise
     full = brightness * (distance_max / max(mean, 0.01)) ** 2
-    sigma = errors.noise_floor_m + errors.noise_rate * mean * np.sqrt(max(1.0, full / total))
-    trusted = sigma <= errors.sigma_limit_m
+    sigma = p.noise_floor_m + p.noise_rate * mean * np.sqrt(max(1.0, full / total))
+    trusted = sigma <= p.sigma_limit_m
     sigma *= finders.noise[unit]
     measured = max(0.0, mean + finders.offset[unit] + sigma * draw)
     if not trusted:

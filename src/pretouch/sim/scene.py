@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -137,19 +136,19 @@ def build(model: RobotModel, spec: SceneSpec, error: ArmError) -> mujoco.MjModel
     Each moving capsule touches floor, boxes and hand, and those of a second arm; the hand also touches all that stands
     still, but in a world.
     """
-    mj, own = _arm(model, error)
+    mj, moving, still = _arm(model, error)
     mj.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-    second = _ArmGeoms([], []) if spec.second is None else _add_second(mj, spec, spec.second)
+    moving_2, still_2 = ([], []) if spec.second is None else _add_second(mj, spec, spec.second)
     if spec.world:  # behind the arms, whose joints are found by their numbers
         attach_world(mj, spec.world)
-    pedestal = [] if spec.world else ["pedestal"]
+    else:
+        still.append("pedestal")
     stiffness = _add_objects(mj, spec)
-    pairs = [(link, thing) for link in own.moving + second.moving for thing in stiffness]
-    pairs += [(link, other) for link in own.moving for other in second.moving + second.still]
-    pairs += [(still, link) for still in [*own.still, *pedestal] for link in second.moving]
+    pairs = [(link, thing) for link in moving + moving_2 for thing in stiffness]
+    pairs += [(link, other) for link in moving for other in moving_2 + still_2]
+    pairs += [(thing, link) for thing in still for link in moving_2]
     if spec.hand:
-        still = [*own.still, *pedestal, *second.still, *stiffness]
-        pairs += [(thing, "hand") for thing in still if thing != "hand"]
+        pairs += [(thing, "hand") for thing in [*still, *still_2, *stiffness] if thing != "hand"]
     for one, other in pairs:
         mj.add_pair(
             geomname1=one, geomname2=other, condim=3, friction=[0.5, 0.5, 0.005, 0.0001, 0.0001],
@@ -162,37 +161,28 @@ def build(model: RobotModel, spec: SceneSpec, error: ArmError) -> mujoco.MjModel
     if spec.second:
         _err(built, body_before_second(built), spec.second.error.mass_factor)
     mujoco.mj_setConst(built, mujoco.MjData(built))
-    for geom in second.moving + second.still:
-        stiffen(built, geom, ARM_STIFFNESS, spec.damping_ratio)
-    for thing, of_it in stiffness.items():
+    for thing, of_it in (dict.fromkeys(moving_2 + still_2, ARM_STIFFNESS) | stiffness).items():
         stiffen(built, thing, of_it, spec.damping_ratio)
     return built
 
 
-class _ArmGeoms(NamedTuple):
-    """Names of an arm's geoms."""
-
-    moving: list[str]
-    still: list[str]
-
-
-def _arm(model: RobotModel, error: ArmError) -> tuple[mujoco.MjSpec, _ArmGeoms]:
-    """Return an arm without its actuators and with what it carries."""
+def _arm(model: RobotModel, error: ArmError) -> tuple[mujoco.MjSpec, list[str], list[str]]:
+    """Return an arm without its actuators and with what it carries; and the names of its geoms that move, and not."""
     mj = mujoco.MjSpec.from_file(str(model.description.mjcf))
     for actuator in list(mj.actuators):
         mj.delete(actuator)
     for joint in mj.joints:
         joint.armature = error.params.armature_kg_m2
         joint.damping = np.zeros_like(joint.damping)
-    arm = [geom.name for geom in mj.geoms if model.moved_by[model.link_index(geom.parent.name)].any()]
-    base = [geom.name for geom in mj.geoms if geom.name not in arm]
+    moving = [geom.name for geom in mj.geoms if model.moved_by[model.link_index(geom.parent.name)].any()]
+    still = [geom.name for geom in mj.geoms if geom.name not in moving]
     if error.payload > 0:
         body = mj.body(model.description.ee_body).add_body(name="payload")
         body.mass, body.inertia = error.payload, np.full(3, 1e-5)
         body.explicitinertial = True
     if error.params.cable_n_m:
         _add_cable(mj, model, error.params)
-    return mj, _ArmGeoms(arm, base)
+    return mj, moving, still
 
 
 def _err(built: mujoco.MjModel, world: int, mass_factor: FloatArray) -> None:
@@ -202,17 +192,15 @@ def _err(built: mujoco.MjModel, world: int, mass_factor: FloatArray) -> None:
     built.body_inertia[links] *= mass_factor[1:, None]
 
 
-def _add_second(mj: mujoco.MjSpec, spec: SceneSpec, second: SecondArmSpec) -> _ArmGeoms:
-    """Stand another arm in the scene, on its pedestal."""
-    arm, geoms = _arm(second.model, second.error)
+def _add_second(mj: mujoco.MjSpec, spec: SceneSpec, second: SecondArmSpec) -> tuple[list[str], list[str]]:
+    """Stand another arm in the scene, on its pedestal; return the names of its geoms that move, and that do not."""
+    arm, moving, still = _arm(second.model, second.error)
     x, y, z = second.base.position
     half = second.base.yaw / 2
     frame = mj.worldbody.add_frame(pos=[x, y, z], quat=[np.cos(half), 0.0, 0.0, np.sin(half)])
     mj.attach(arm, prefix=_SECOND, frame=frame)
     _add_pedestal(mj, f"{_SECOND}pedestal", spec, (x, y, z))
-    return _ArmGeoms(
-        [_SECOND + name for name in geoms.moving], [*(_SECOND + name for name in geoms.still), f"{_SECOND}pedestal"]
-    )
+    return [_SECOND + name for name in moving], [_SECOND + name for name in [*still, "pedestal"]]
 
 
 _SECOND = "second_"

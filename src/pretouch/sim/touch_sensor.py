@@ -7,10 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from pretouch.checks import Checked, Fraction, NonNegative, Positive
-from pretouch.ports import Skin as SkinPort
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import TouchPatch
-from pretouch.sim.arm_in_world import ArmInWorld, PointForce
+from pretouch.sim.plant import ArmInWorld, PointForce
 from pretouch.sim.under_way import ROUNDING_S, UnderWay
 from pretouch.types import RangeReadings, TouchReadings, TouchStatus
 
@@ -95,18 +94,18 @@ class TouchSensors:
         """
         self._plant, self._params, self._laid, self._send = plant, params, laid, send
         self._rng = np.random.default_rng([seed, 5])
-        units = [(int(k), touch) for k in skin.touching if (touch := skin.units[k].touch) is not None]
-        self._patches: list[tuple[int, TouchPatch]] = units
-        self._link, self._T, count = skin.link, skin.T_link_sensor, len(units)
+        self._patches = [(int(k), touch) for k in skin.touching if (touch := skin.units[k].touch) is not None]
+        self._link, self._T, count = skin.link, skin.T_link_sensor, len(self._patches)
         self._gain = 1.0 + params.gain_error * self._rng.uniform(-1, 1, count)
         self._due: list[float] = self._rng.uniform(0, params.period_s, count).tolist()
         self._last = np.full(count, -np.inf)
         self._passed, self._before, self._on = np.zeros(count), np.zeros(count), np.zeros(count, np.bool_)
         self._time = plant.time
         self._sent = UnderWay[tuple[int, float, bool, float]]()
-        self._stamp, self._contact = np.full(len(skin), -np.inf), np.zeros(len(skin), np.bool_)
-        self._force = np.full(len(skin), np.nan)
-        self._status = np.full(len(skin), int(TouchStatus.NONE), dtype=np.int64)
+        none = np.full(len(skin), int(TouchStatus.NONE), dtype=np.int64)
+        self._newest = TouchReadings(
+            np.full(len(skin), -np.inf), np.zeros(len(skin), np.bool_), np.full(len(skin), np.nan), none
+        )
         self.silenced: set[int] = set()
         """Indices of units that no longer send."""
         self.stuck: set[int] = set()
@@ -115,11 +114,12 @@ class TouchSensors:
 
     def touch(self) -> TouchReadings:
         """Return the newest reading of each unit that has arrived by now."""
+        newest = self._newest
         for unit, stamp, contact, force in self._sent.arrived(self._plant.time + ROUNDING_S):
-            if stamp > self._stamp[unit]:
-                self._stamp[unit], self._contact[unit], self._force[unit] = stamp, contact, force
-                self._status[unit] = TouchStatus.OK
-        return TouchReadings(self._stamp.copy(), self._contact.copy(), self._force.copy(), self._status.copy())
+            if stamp > newest.stamp[unit]:
+                newest.stamp[unit], newest.contact[unit], newest.force[unit] = stamp, contact, force
+                newest.status[unit] = TouchStatus.OK
+        return TouchReadings(newest.stamp.copy(), newest.contact.copy(), newest.force.copy(), newest.status.copy())
 
     def _sample(self, time: float) -> None:
         forces = self._plant.contact_forces() + self._laid(time)
@@ -166,16 +166,9 @@ class TouchSensors:
             self._sent.send(arrival, (unit, time, bool(self._on[i]), reported))
 
 
+@dataclass(frozen=True)
 class SimulatedTouchSkin:
-    """The port `Skin` of a simulated arm, with `touch`: range finders, or another skin, and touch sensors."""
+    """The port `TouchSkin` of a simulated arm: what range finders, or another skin, read, and what touch sensors do."""
 
-    def __init__(self, ranges: SkinPort, sensors: TouchSensors) -> None:
-        self._ranges, self._sensors = ranges, sensors
-
-    def read(self) -> RangeReadings:
-        """Return the newest range of each unit."""
-        return self._ranges.read()
-
-    def touch(self) -> TouchReadings:
-        """Return the newest touch reading of each unit."""
-        return self._sensors.touch()
+    read: Callable[[], RangeReadings]
+    touch: Callable[[], TouchReadings]

@@ -5,9 +5,8 @@ from collections.abc import Callable
 import numpy as np
 
 from pretouch.robot.model import RobotModel
-from pretouch.sim.arm_in_world import ArmInWorld
 from pretouch.sim.physics import begin_step, end_step
-from pretouch.sim.plant import Plant
+from pretouch.sim.plant import ArmInWorld, Plant
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.scene import BasePose, SecondArmSpec, body_before_second
 from pretouch.sim.under_way import ROUNDING_S
@@ -52,25 +51,21 @@ class SecondArm(ArmInWorld):
         """Measure what the last physics step made of the arm, where time has passed since: `read` does it too."""
         if self._torques is None or self._first.time == self.time:
             return
-        p, n = self.params, self._n
-        draws, past = self._rng.standard_normal((2, n)), np.empty((5, n))
+        p, draws = self.params, self._rng.standard_normal((2, self._n))
         self._age(p.period_s)
         self.time = self._first.time
-        end_step(
-            self._qd_set, *self._torques, p.velocity_noise_rad_s * draws[0], self._torque_noise * draws[1], past,
-            self._arm,
-        )  # fmt: skip
+        end_step(self._arm, *self._torques, p.velocity_noise_rad_s * draws[0], self._torque_noise * draws[1])
         self._torques = None
         if p.state_delay_s:
-            self._states.append((self.time, past))
+            self._states.append((self.time, self._arm.report.copy()))
         self._note_contacts([self.time])
 
     def _begin(self, time: float) -> None:
         """Drive the arm in the step that begins now."""
         self.catch_up()
         while self._late_commands and self._late_commands[0][0] <= time + ROUNDING_S:
-            self._qd_set = self._late_commands.popleft()[1]
-        self._torques = begin_step(self._qd_set, self._arm)
+            self._qd_set[:] = self._late_commands.popleft()[1]
+        self._torques = begin_step(self._arm)
 
     def _in_base(self, point: FloatArray) -> FloatArray:
         T = self._base.T

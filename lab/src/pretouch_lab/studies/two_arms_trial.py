@@ -12,9 +12,8 @@ from pretouch.controller import Controller
 from pretouch.loop import Options, turn
 from pretouch.profiles import Profile
 from pretouch.robot.postures import brought_to
-from pretouch.sim.arm_in_world import ArmInWorld
 from pretouch.sim.hand import Hand, HandGoal, PersonArm
-from pretouch.sim.plant import Plant, PlantClock
+from pretouch.sim.plant import ArmInWorld, Plant, PlantClock
 from pretouch.sim.range_finder import RangeFinders
 from pretouch.sim.scene import BasePose, HandSpec, SceneSpec, fixtures
 from pretouch.types import ControlStep, FloatArray, MovingFixtures, RobotState
