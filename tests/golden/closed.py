@@ -17,7 +17,7 @@ from pretouch.profiles import profile
 from pretouch.robot.postures import brought_to
 from pretouch.sensing.skin import Skin
 from pretouch.sim.hand import Hand, Pusher
-from pretouch.sim.paper_scenes import Placement, dynamic_pushes, person_scene, static_path, static_scene
+from pretouch.sim.paper_scenes import dynamic_pushes, static_path, static_scene
 from pretouch.sim.plant import Plant, PlantClock
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.random_skin import random_skin
@@ -65,7 +65,7 @@ def static(name: str, trajectory: str, side: str) -> dict[int, Values]:
 
 def dynamic(name: str) -> dict[int, Values]:
     """Be pushed by the paper's person."""
-    person, scene = Pusher(model(), dynamic_pushes(SEED)), person_scene(HandSpec(), Placement())
+    person, scene = Pusher(model(), dynamic_pushes(SEED)), SceneSpec(hand=HandSpec())
     return simulated(scene, static_path("circle", "-y"), name, 20.0, person)
 
 

@@ -56,12 +56,6 @@ class Recorded:
     complete: bool = True
     sentence: str = ""
 
-    def __len__(self):
-        return len(self.kept)
-
-    def __iter__(self):
-        return iter(self.kept)
-
     def __getitem__(self, i):
         return self.kept[i]
 

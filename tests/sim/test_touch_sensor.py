@@ -125,11 +125,9 @@ def test_hysteresis_keeps_a_touch_until_well_below_the_smallest_force(pressed):
     assert course == [False, True, True, False, False]
 
 
-def test_a_stuck_sensor_says_so_and_a_silenced_one_says_nothing(pressed):
+def test_a_silenced_sensor_says_nothing(pressed):
     plant, sensors, _ = pressed()
-    sensors.stuck.add(UNIT)
     plant.advance(0.1)
-    assert sensors.touch().contact[UNIT]
     sensors.silenced.add(UNIT)
     last = sensors.touch().stamp[UNIT]
     plant.advance(0.1)

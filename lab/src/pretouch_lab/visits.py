@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pretouch.robot.model import RobotModel
-from pretouch.sim.hand import FREE_N, HOME, LEAD_S, OUTWARDS, HandGoal, point_on_arm, robot_hand, way_round
+from pretouch.sim.hand import FREE_N, HOME, LEAD_S, HandGoal, point_on_arm, robot_hand, way_round
 from pretouch.sim.plant import Plant
 from pretouch.types import FloatArray
 
@@ -31,8 +31,6 @@ class Visitor:
 
     model: RobotModel
     visits: tuple[Visit, ...]
-    ahead: float = 0.0
-    """How much farther from the base than from a Panda's the person stays [m]."""
 
     def __post_init__(self) -> None:
         self._robot = robot_hand(self.model)
@@ -47,5 +45,5 @@ class Visitor:
                 clear = np.linalg.norm(palm - visit.place) > _CLEAR_M
                 wanted = visit.arrive <= time < visit.leave
                 self._inside = wanted and (self._inside or bool(clear))
-                return HandGoal(visit.place if self._inside else way_round(hand, outside, self.ahead), FREE_N)
-        return HandGoal(way_round(hand, HOME + self.ahead * OUTWARDS, self.ahead), FREE_N)
+                return HandGoal(visit.place if self._inside else way_round(hand, outside), FREE_N)
+        return HandGoal(way_round(hand, HOME), FREE_N)

@@ -1,4 +1,3 @@
-import numpy as np
 import pytest
 from tests.other_arm import copied_panda
 from tests.recording.runs import custom_arm
@@ -7,19 +6,16 @@ from pretouch.control.path import Circle
 from pretouch.errors import ExperimentError
 from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
-from pretouch.sim.hand import way_round
 from pretouch.sim.paper_scenes import (
     PANDA_SIDE,
     HandSide,
     Placement,
     assumptions,
     hand_side,
-    person_scene,
     placement_for,
     static_path,
     static_scene,
 )
-from pretouch.sim.scene import HandSpec
 
 
 def test_the_panda_has_the_papers_paths(panda_model):
@@ -37,47 +33,38 @@ def test_an_arm_of_too_few_joints_is_refused_with_its_joints(tmp_path):
 def test_of_a_simulated_arm_it_is_said_what_is_assumed(panda_model, tmp_path):
     assert assumptions(panda_model, Placement()) == ()
     other = RobotModel(robot_named(str(copied_panda(tmp_path))))
-    paths, plant = assumptions(other, Placement(0.8, 0.1))
-    assert paths.startswith("The paper's paths for panda: 0.8 times as large, moved by +0.10 m in x")
+    paths, plant = assumptions(other, Placement(0.8))
+    assert paths.startswith("The paper's paths for panda: 0.8 times as large and as far from the base")
     assert "hand" not in paths
     assert assumptions(other, Placement()) == (plant,)
 
 
-def test_another_arm_has_them_scaled_and_moved():
-    placement = Placement(0.8, -0.1, 0.15, left=HandSide(0.05, 0.01))
+def test_another_arm_has_them_scaled():
+    placement = Placement(0.8, left=HandSide(0.05, 0.01))
     circle = static_path("circle", "+y", placement)
-    assert circle.center == pytest.approx((0.3, 0.0, 0.35))
+    assert circle.center == pytest.approx((0.4, 0.0, 0.2))
     assert circle.radius == pytest.approx(0.2)
     # the hand is as far out when it meets the board's face, in terms of the circle, as the Panda's
     meets = placement.face(0.25, "+y") - 0.05
     assert meets / 0.2 == pytest.approx((0.25 - PANDA_SIDE.aside) / 0.25)
-    assert "0.8 times as large, moved by -0.10 m in x and +0.15 m in z" in placement.sentence("mine")
+    assert "0.8 times as large" in placement.sentence("mine")
 
 
 def test_what_stands_beside_the_circle_keeps_its_distance_from_it_and_what_is_within_is_scaled():
     assert Placement().moved(0.5, -0.8, 0.3) == (0.5, -0.8, 0.3)
-    placement = Placement(0.8, -0.1, 0.15)
-    assert placement.moved(0.5, -0.8, 0.3) == pytest.approx((0.3, -0.75, 0.39))
-    assert placement.moved(0.5, 0.1, 0.3) == pytest.approx((0.3, 0.08, 0.39))
-
-
-def test_people_keep_away_from_an_arm_that_reaches_farther():
-    far = Placement(1.4)
-    assert far.ahead == pytest.approx(0.2)
-    assert Placement(0.8).ahead == 0.0
-    assert person_scene(HandSpec(), far).hand.start == pytest.approx((1.4, 0.0, 0.8))
-    hand = np.array([0.7, -0.8, 0.4])
-    assert way_round(hand, np.array([0.7, 0.8, 0.4]), far.ahead).tolist() == pytest.approx([1.35, -0.8, 0.4])
+    placement = Placement(0.8)
+    assert placement.moved(0.5, -0.8, 0.3) == pytest.approx((0.4, -0.75, 0.24))
+    assert placement.moved(0.5, 0.1, 0.3) == pytest.approx((0.4, 0.08, 0.24))
 
 
 def test_a_persons_hand_is_as_high_as_the_side_of_the_robots():
-    placement = Placement(0.8, 0.0, 0.0, HandSide(0.05, 0.01), HandSide(0.05, -0.08), (0.37, 0.36), (0.29, 0.28))
+    placement = Placement(0.8, HandSide(0.05, 0.01), HandSide(0.05, -0.08), (0.37, 0.36), (0.29, 0.28))
     assert placement.visited("beside", -1.0) == pytest.approx((0.4, -0.37, 0.2 - 0.08 - 0.057 + 0.05))
     assert placement.visited("inside", 1.0) == pytest.approx((0.4, 0.28, 0.2 + 0.01 - 0.057 + 0.05))
 
 
 def test_the_board_stands_where_the_hand_meets_it():
-    placement = Placement(0.8, 0.0, 0.0, left=HandSide(0.05, 0.01))
+    placement = Placement(0.8, left=HandSide(0.05, 0.01))
     board = static_scene("line", "+y", 25e3, 0, placement).boxes[0]
     face = board.center[1] - board.half_size[1]
     assert 0.8 * (0.25 - 0.05 - PANDA_SIDE.aside) + 0.05 <= face <= 0.8 * (0.3 - PANDA_SIDE.aside) + 0.05

@@ -186,6 +186,7 @@ class Room:
         self.units: UnitPort = self._simulated or cast(RealUnits, real)
         if self._simulated and len(skin.touching):
             touch = TouchSensors(self.plant, skin, TouchErrors(), settings.seed)
+            touch.silenced = self._simulated.silenced
             self.units = SimulatedTouchSkin(self._simulated.read, touch.touch)
         self.hand = Hand(self.plant, self.mouse, PersonArm(speed_max=HAND_SPEED_M_S))
         self.clock = PlantClock(self.plant, settings.profile.task.control_period_s)
@@ -209,7 +210,8 @@ class Room:
         if unknown:
             units = ", ".join(unit.id for unit in self._skin.mounted)
             raise ParameterError(f"Unknown unit {', '.join(unknown)}: choose from {units}.")
-        self._simulated.silenced = {i for i, name in enumerate(self._skin.boards) if name in faults.silenced}
+        self._simulated.silenced.clear()
+        self._simulated.silenced.update(i for i, name in enumerate(self._skin.boards) if name in faults.silenced)
         sound, factor, latency = self._nominal, faults.noise_factor, self._nominal.latency_s + faults.latency_s
         floor, rate = factor * sound.noise_floor_m, factor * sound.noise_rate
         self._simulated.change(replace(sound, noise_floor_m=floor, noise_rate=rate, latency_s=latency))

@@ -243,7 +243,7 @@ def _detected(course: RunCourse, detections: Sequence[FeltContact]) -> Html:
         " each axis the estimate farthest from zero during the contact. Held still: the contact was below what moves"
         " the arm."
     )
-    return table(rows, note, 3, "Detected contacts")
+    return table(rows, note, 2, "Detected contacts")
 
 
 def _touched(contacts: ContactMeasures) -> Html:

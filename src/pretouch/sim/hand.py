@@ -51,7 +51,7 @@ class Hand:
 
     def __init__(self, plant: Plant, script: HandScript, arm: PersonArm = USUAL_ARM) -> None:
         """Attach to a plant whose scene has a hand; `arm` is what moves it."""
-        self._plant, self._script, self._arm = plant, script, arm
+        self._plant, self._script, self._arm, self._dt = plant, script, arm, plant.params.period_s
         body = plant.mj_model.body("hand")
         dof, data = int(plant.mj_model.body_dofadr[body.id]), plant.mj_data
         # views into the simulation's memory, taken once
@@ -72,9 +72,9 @@ class Hand:
         return self._velocity.copy()
 
     def _drive(self, time: float) -> None:
-        position, dt = self.position, self._plant.params.period_s
+        position = self.position
         goal = self._script.goal(time, position, self._plant)
-        self._goal, self._force[:] = _spring(self._goal, goal, position, self._velocity, dt, self._arm)
+        self._goal, self._force[:] = _spring(self._goal, goal, position, self._velocity, self._dt, self._arm)
 
 
 @compiled
@@ -103,8 +103,8 @@ def point_on_arm(plant: Plant, link: int, offset: FloatArray) -> FloatArray:
     return plant.link_position[link] + plant.link_rotation[link] @ offset
 
 
-HOME, OUTWARDS = np.array([1.2, 0.0, 0.8]), np.array([1.0, 0.0, 0.0])
-"""Where the person's hand rests [m], and the direction away from the base."""
+HOME = np.array([1.2, 0.0, 0.8])
+"""Where the person's hand rests [m]."""
 _AISLE_X_M = 1.15
 """Plane in front of the Panda's reach in which a hand changes sides, so that it meets the arm only on purpose [m]."""
 _STAND_OFF_M = 0.5
@@ -120,16 +120,13 @@ _PATIENCE_S = 5.0
 """Time after which a person who has not touched the arm gives up [s]."""
 
 
-def way_round(hand: FloatArray, goal: FloatArray, ahead: float = 0.0) -> FloatArray:
-    """Next point (3,) [m] on a way from hand to goal (3,) [m] that does not cross the arm.
-
-    The hand changes sides farther from the base by `ahead` [m] than where the Panda's reach ends.
-    """
+def way_round(hand: FloatArray, goal: FloatArray) -> FloatArray:
+    """Next point (3,) [m] on a way from hand to goal (3,) [m] that does not cross the arm."""
     x, y, z = hand.tolist()
-    aside, aisle = abs(y - goal[1]), _AISLE_X_M + ahead
-    if x < aisle - 0.1:
-        return goal if aside < 0.35 else np.array([aisle, y, z])
-    return np.array([aisle, goal[1], goal[2]]) if aside > 0.1 else goal
+    aside = abs(y - goal[1])
+    if x < _AISLE_X_M - 0.1:
+        return goal if aside < 0.35 else np.array([_AISLE_X_M, y, z])
+    return np.array([_AISLE_X_M, goal[1], goal[2]]) if aside > 0.1 else goal
 
 
 @dataclass(frozen=True)
@@ -198,11 +195,10 @@ class Pusher:
     pushes: tuple[Push, ...]
     contacts: list[tuple[float, float] | None] = field(default_factory=list)
     """(touch, release) [s] of each push so far, None for one that never touched."""
-    ahead: float = 0.0
-    """How much farther from the base than from a Panda's the person stays [m]."""
 
     def __post_init__(self) -> None:
         self._robot = robot_hand(self.model)
+        self._ahead_of_palm = [self._robot.beside(push.inwards) for push in self.pushes]
         self._touch: float | None = None
         self._release = -np.inf
         self._direction = np.zeros(3)
@@ -215,16 +211,16 @@ class Pusher:
         number, withdrawing = len(self.contacts), time < self._release + 1.0
         over = number == len(self.pushes)
         if not withdrawing and (over or time < self.pushes[number].start - LEAD_S):
-            return HandGoal(way_round(hand, HOME + self.ahead * OUTWARDS, self.ahead), FREE_N)
+            return HandGoal(way_round(hand, HOME), FREE_N)
         robot = self._robot
         palm = point_on_arm(plant, robot.link, robot.palm)
         if withdrawing:
             return HandGoal(palm - _STAND_OFF_M * self._direction, FREE_N)
         push = self.pushes[number]
         if self._touch is None:
-            self._direction = point_on_arm(plant, robot.link, robot.beside(push.inwards)) - palm
+            self._direction = point_on_arm(plant, robot.link, self._ahead_of_palm[number]) - palm
         if time < push.start:
-            return HandGoal(way_round(hand, palm - _STAND_OFF_M * self._direction, self.ahead), FREE_N)
+            return HandGoal(way_round(hand, palm - _STAND_OFF_M * self._direction), FREE_N)
         self._watch(time, push, plant)
         ahead = _SPEED_M_S * (time - push.start) - _STAND_OFF_M
         return HandGoal(palm + min(ahead, _STAND_OFF_M) * self._direction, push.force)

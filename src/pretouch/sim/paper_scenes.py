@@ -15,7 +15,7 @@ from pretouch.robot.model import RobotModel
 from pretouch.robot.postures import brought_to, capsule_ends, kinematics_of, segment_distance, self_distances
 from pretouch.sim.hand import FACES, Push, against
 from pretouch.sim.plant_params import assumed_plant
-from pretouch.sim.scene import Box, HandSpec, SceneSpec
+from pretouch.sim.scene import Box, SceneSpec
 from pretouch.types import FloatArray
 
 FACE_M = 0.25
@@ -82,13 +82,9 @@ _LASTING_S = (0.2, 0.5)
 
 @dataclass(frozen=True)
 class Placement:
-    """Where the paper's paths are for an arm: p = scale * p_paper + (shift_x, 0, shift_z), in the base frame."""
+    """Where the paper's paths are for an arm: p = scale * p_paper, in the base frame."""
 
     scale: float = 1.0
-    shift_x: float = 0.0
-    """[m]"""
-    shift_z: float = 0.0
-    """[m]"""
     left: HandSide = PANDA_SIDE
     """Where the hand meets a board at +y."""
     right: HandSide = PANDA_SIDE
@@ -101,7 +97,7 @@ class Placement:
 
     def point(self, x: float, y: float, z: float) -> tuple[float, float, float]:
         """Return where a point of the paper is for this arm [m]."""
-        return self.scale * x + self.shift_x, self.scale * y, self.scale * z + self.shift_z
+        return self.scale * x, self.scale * y, self.scale * z
 
     def path(self, trajectory: str, sign: float) -> Path:
         """Return the paper's circle or line, begun on the side away from a board on the side `sign` (1: +y)."""
@@ -128,12 +124,7 @@ class Placement:
             return x, y, z
         inner = min(abs(y), _RADIUS_M)
         aside = float(np.copysign(self.scale * inner + abs(y) - inner, y))
-        return self.scale * x + self.shift_x, aside, self.scale * z + self.shift_z
-
-    @property
-    def ahead(self) -> float:
-        """How much farther from the base than at the paper's paths people keep [m]."""
-        return max(0.0, self.point(*_CENTER)[0] - _CENTER[0])
+        return self.scale * x, aside, self.scale * z
 
     def visited(self, place: str, sign: float) -> tuple[float, float, float]:
         """Return where a person's hand is held `beside` the circle or `inside` it, on the side `sign` (1: +y) [m]."""
@@ -145,8 +136,8 @@ class Placement:
     def paths_sentence(self, arm: str) -> str:
         """Say what was done to the paper's paths."""
         return (
-            f"The paper's paths for {arm}: {self.scale:.3g} times as large, moved by {self.shift_x:+.2f} m in x and"
-            f" {self.shift_z:+.2f} m in z; the board is met on the same part of them."
+            f"The paper's paths for {arm}: {self.scale:.3g} times as large and as far from the base; the board is met"
+            " on the same part of them."
         )
 
     def sentence(self, arm: str) -> str:
@@ -176,12 +167,6 @@ def static_scene(trajectory: str, side: str, stiffness: float, seed: int, placem
     aside, above = _CENTER_SPREAD_M * rng.uniform(-1, 1, 2)
     way, hand = static_path(trajectory, side, placement), placement.hand(side)
     return SceneSpec((board_beside(way, side, stiffness, placement.face(face, side), aside, above, hand),))
-
-
-def person_scene(hand: HandSpec, placement: Placement) -> SceneSpec:
-    """Return a room with a person's hand, which sets out from beyond the arm's reach."""
-    x, y, z = hand.start
-    return SceneSpec(hand=replace(hand, start=(x + placement.ahead, y, z)))
 
 
 def dynamic_pushes(seed: int) -> tuple[Push, ...]:
@@ -231,7 +216,7 @@ def placement_for(model: RobotModel) -> Placement:
         placement = Placement(scale, left=left, right=right)
         try:
             around = [_followed(model, placement.path(name, sign)) for name, sign in _PATHS]
-        except _NotFollowed as reason:
+        except ExperimentError as reason:
             reasons[str(reason)] = None
         else:
             return _visited(model, placement, np.concatenate(around[:2]))
@@ -259,10 +244,9 @@ def _visited(model: RobotModel, placement: Placement, postures: FloatArray) -> P
     ends = capsule_ends(model, kinematics_of(model, postures))
     moved = np.isin(model.capsules.link, model.body.link)
     a, b, radius = ends[:, moved][:, :, 0], ends[:, moved][:, :, 1], model.capsules.radius[moved]
-    beside, inside = list[float](), list[float]()
-    for sign in (-1.0, 1.0):
+    aside, places = _STEP_M * np.arange(_STEPS, 0.0, -1.0), list[tuple[float, float]]()
+    for sign in SIGNS.values():
         x, _, z = placement.visited("beside", sign)
-        aside = _STEP_M * np.arange(_STEPS, 0.0, -1.0)
         at = np.column_stack([np.full(len(aside), x), sign * aside, np.full(len(aside), z)])[:, None, None]
         free = (segment_distance(a, b, at, at) - radius).min(axis=(1, 2))
         if not (free < _INSIDE_M).any():
@@ -270,10 +254,11 @@ def _visited(model: RobotModel, placement: Placement, postures: FloatArray) -> P
                 f"There is no place for a person's hand in the way of {model.description.name}'s hand on the circle, at"
                 f" x = {x:.2f} m and z = {z:.2f} m: look at the capsules of its last links in arm.xml."
             )
-        for places, clear in ((beside, _BESIDE_M), (inside, _INSIDE_M)):
-            # from the side as far in as nothing of the arm is nearer
-            places.append(float(aside[max(int(np.argmax(free < clear)) - 1, 0)]))
-    return replace(placement, beside=(beside[0], beside[1]), inside=(inside[0], inside[1]))
+        # from the side as far in as nothing of the arm is nearer
+        beside, inside = (aside[max(int(np.argmax(free < clear)) - 1, 0)] for clear in (_BESIDE_M, _INSIDE_M))
+        places.append((float(beside), float(inside)))
+    (right, right_in), (left, left_in) = places
+    return replace(placement, beside=(right, left), inside=(right_in, left_in))
 
 
 def hand_side(model: RobotModel, side: str) -> HandSide:
@@ -289,14 +274,10 @@ def hand_side(model: RobotModel, side: str) -> HandSide:
     return HandSide(max(float(out[widest]), 0.02), float(away[widest, 2]))
 
 
-class _NotFollowed(Exception):
-    """Why an arm cannot follow a path."""
-
-
 def _followed(model: RobotModel, path: Path) -> FloatArray:
-    """Return postures (S, n) in which an arm follows a path with its hand upright."""
+    """Return postures (S, n) in which an arm follows a path with its hand upright, or raise why it cannot."""
     points = [path.point(phase) for phase in np.linspace(0.0, path.length, _PLACES)]
-    out_of_reach = _NotFollowed("the hand does not get everywhere without a singularity or a joint limit")
+    out_of_reach = ExperimentError("the hand does not get everywhere without a singularity or a joint limit")
     try:
         postures = np.array([brought_to(model, point) for point in points])
     except ExperimentError as error:
@@ -318,11 +299,11 @@ def _check_room(model: RobotModel, postures: FloatArray) -> None:
     if between.min(initial=np.inf) <= _CLEAR_M:
         nearest = model.apart[apart][int(between.min(axis=0).argmin())]
         links = " and ".join(model.links[model.capsules.link[c]] for c in nearest)
-        raise _NotFollowed(f"{links} come within {1000 * _CLEAR_M:.0f} mm of each other")
+        raise ExperimentError(f"{links} come within {1000 * _CLEAR_M:.0f} mm of each other")
     moved = np.isin(model.capsules.link, model.body.link)
     heights = ends[1:, moved][..., 2] - model.capsules.radius[moved, None]
     if heights.min(initial=np.inf) <= SceneSpec().floor_height + _CLEAR_M:
-        raise _NotFollowed("the arm meets the floor")
+        raise ExperimentError("the arm meets the floor")
 
 
 def _check_torques(model: RobotModel, postures: FloatArray) -> None:
@@ -331,4 +312,6 @@ def _check_torques(model: RobotModel, postures: FloatArray) -> None:
     part = np.abs(weight).max(axis=0) / model.description.tau_max
     weakest = int(part.argmax())
     if part[weakest] > _HELD:
-        raise _NotFollowed(f"{model.joints[weakest]} needs more than {100 * _HELD:.0f} % of its torque to hold the arm")
+        raise ExperimentError(
+            f"{model.joints[weakest]} needs more than {100 * _HELD:.0f} % of its torque to hold the arm"
+        )

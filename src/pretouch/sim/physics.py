@@ -68,13 +68,15 @@ STIFFNESS, DAMPING, FEED_FORWARD = range(3)
 
 
 @entry
-def take_steps(velocity_noise: FloatArray, torque_noise: FloatArray, past: FloatArray, arm: ArmMemory) -> int:
-    """Take S physics steps, or fewer: up to the first after which something touches. Return how many.
+def take_steps(
+    first: int, last: int, velocity_noise: FloatArray, torque_noise: FloatArray, past: FloatArray, arm: ArmMemory
+) -> int:
+    """Take some of S physics steps: from one to before another, or to the first after which something touches.
 
-    The noise is (S, n), [rad/s] and [Nm]. Into `past` (S, 5, n) comes the arm's report after each step; (0, 5, n):
-    nowhere.
+    Returns the number of the next. The noise is (S, n), [rad/s] and [Nm]. Into `past` (S, 5, n) comes the arm's report
+    after each step; (0, 5, n): nowhere.
     """
-    for step in range(len(velocity_noise)):
+    for step in range(first, last):
         tau, lost = begin_step(arm)
         mj_step(arm.world.model, arm.world.data)
         end_step(arm, tau, lost, velocity_noise[step], torque_noise[step])
@@ -82,7 +84,7 @@ def take_steps(velocity_noise: FloatArray, torque_noise: FloatArray, past: Float
             past[step] = arm.report
         if arm.world.contacts[0] > 0.0:
             return step + 1
-    return len(velocity_noise)
+    return last
 
 
 @compiled

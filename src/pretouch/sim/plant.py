@@ -212,7 +212,8 @@ class ArmInWorld:
     def _note_contacts(self, times: list[float]) -> None:
         """Note what touched in steps that ended at these instants [s]: nothing, but for the last of them."""
         touched = self.true_force is not _NO_FORCE
-        self.true_force = sum((one.force for one in self.contact_forces()), start=_NO_FORCE)
+        forces = self.contact_forces() if self.mj_data.ncon else []
+        self.true_force = sum((one.force for one in forces), start=_NO_FORCE)
         self.true_log += zip(times[:-1], repeat(_NO_FORCE))
         self.true_log.append((self.time, self.true_force))
         if self.true_force is not _NO_FORCE and not (touched and len(times) == 1):
@@ -293,7 +294,7 @@ class Plant(ArmInWorld):
         while done < steps:
             first, until = done, self._prepare_step()
             last = bisect_left(times, until, first + 1, steps)
-            done += take_steps(velocity_noise[first:last], torque_noise[first:last], past[first:last], self._arm)
+            done = take_steps(first, last, velocity_noise, torque_noise, past, self._arm)
             self.time = times[done]
             if p.state_delay_s:
                 self._states.extend(zip(times[first + 1 : done + 1], past[first:done], strict=True))

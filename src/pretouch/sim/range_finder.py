@@ -147,28 +147,25 @@ class RangeFinders:
         return RangeReadings(newest.stamp.copy(), newest.distance.copy(), newest.status.copy())
 
     def _sample(self, time: float) -> float:
-        p, rng = self.params, self._rng
-        for board, due in enumerate(self._due):
-            if due > time:
+        p, rng, due = self.params, self._rng, list[tuple[int, float, float, bool]]()
+        for board in [board for board, due_at in enumerate(self._due) if due_at <= time]:
+            self._due[board] += self._periods[board] * (1.0 + p.period_jitter * rng.standard_normal())
+            units, draws = self._boards[board], rng.standard_normal(len(self._boards[board])).tolist()
+            arrival, lost = time + p.latency_s + rng.exponential(p.jitter_s), rng.random() < p.dropout
+            due += [(unit, draw, arrival, lost) for unit, draw in zip(units, draws, strict=True)]
+        optical = [one[:2] for one in due if one[0] not in self._electrodes]
+        ranges = iter(_measure(np.array(optical).reshape(-1, 2), p.numbers, self._finders, self._geoms).tolist())
+        for unit, draw, arrival, lost in due:
+            electrode = self._electrodes.get(unit)
+            distance, status, sigma, strength = electrode.measure(time, draw) if electrode else next(ranges)
+            if unit in self.silenced:
                 continue
-            self._due[board] = due + self._periods[board] * (1.0 + p.period_jitter * rng.standard_normal())
-            measured = [(unit, self._measured(unit, time, rng.standard_normal())) for unit in self._boards[board]]
-            arrival = time + p.latency_s + rng.exponential(p.jitter_s)
-            lost = rng.random() < p.dropout
-            for unit, (distance, status, sigma, strength) in measured:
-                if unit in self.silenced:
-                    continue
-                if self._send:
-                    self._send(RangeSample(unit, time, distance, status, sigma, *_light(strength, self._light)))
-                elif not lost:
-                    self._sent.send(arrival, (unit, time, distance, status))
+            if self._send:
+                light = _light(strength, self._light)
+                self._send(RangeSample(unit, time, distance, int(status), sigma, *light))
+            elif not lost:
+                self._sent.send(arrival, (unit, time, distance, int(status)))
         return min(self._due, default=np.inf)
-
-    def _measured(self, unit: int, time: float, draw: float) -> tuple[float, int, float, float]:
-        """Return distance [m], status, standard deviation [m], and strength of a measurement; `draw` is normal."""
-        if unit in self._electrodes:
-            return self._electrodes[unit].measure(time, draw)
-        return _measure(unit, draw, self.params.numbers, self._finders, self._geoms)
 
 
 _SIGNAL_LIMIT_MCPS = 1.024
@@ -212,7 +209,20 @@ class _Finders(NamedTuple):
 
 
 @compiled
-def _measure(
+def _measure(units: FloatArray, p: RangeFinderParams, finders: _Finders, geoms: Geoms) -> FloatArray:
+    """Measure with N sensors at once: (N, 2) are their numbers, and a normal draw for each.
+
+    Returns (N, 4): distance [m], status, standard deviation [m], and strength.
+    """
+    measured = np.empty((len(units), 4))
+    for row in range(len(units)):
+        distance, status, sigma, strength = _measured(int(units[row, 0]), units[row, 1], p, finders, geoms)
+        measured[row, 0], measured[row, 1], measured[row, 2], measured[row, 3] = distance, status, sigma, strength
+    return measured
+
+
+@kernel
+def _measured(
     unit: int, draw: float, p: RangeFinderParams, finders: _Finders, geoms: Geoms
 ) -> tuple[float, int, float, float]:
     """Measure with a sensor; `draw` is normal. Return distance [m], status, standard deviation [m], and strength.

@@ -108,8 +108,6 @@ class TouchSensors:
         )
         self.silenced: set[int] = set()
         """Indices of units that no longer send."""
-        self.stuck: set[int] = set()
-        """Indices of units that say they are touched, whatever touches them."""
         plant.before_each_step(self._sample)
 
     def touch(self) -> TouchReadings:
@@ -152,8 +150,6 @@ class TouchSensors:
         falling, self._before[i] = force < self._before[i], force
         force *= self._gain[i] * (1.0 + (p.hysteresis if falling else 0.0))
         force += (p.noise_floor_n + p.noise * force) * rng.standard_normal()
-        if unit in self.stuck:
-            force = max(force, 2.0 * patch.force_min_n)
         force = round(min(max(force, 0.0), p.most_n) / p.step_n) * p.step_n
         self._on[i] = force >= patch.force_min_n * (p.release if self._on[i] else 1.0)
         arrival, lost = time + p.latency_s + rng.exponential(p.jitter_s), rng.random() < p.dropout

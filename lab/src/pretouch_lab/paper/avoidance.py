@@ -7,8 +7,8 @@ import numpy as np
 from pretouch.perception.closest import closest_points
 from pretouch.profiles import profile
 from pretouch.robot.model import RobotModel
-from pretouch.sim.paper_scenes import Placement, person_scene
-from pretouch.sim.scene import HandSpec
+from pretouch.sim.paper_scenes import Placement
+from pretouch.sim.scene import HandSpec, SceneSpec
 from pretouch.types import FloatArray
 from pretouch_lab.cell import Cell, Context, Grid
 from pretouch_lab.experiment import Experiment, Picture, Sources
@@ -48,9 +48,9 @@ def visits(place: str, seed: int, placement: Placement = _UNMOVED) -> tuple[Visi
 
 def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
     """Run one trial; return its row of results and what it left behind."""
-    hand, where = HandSpec(), context.placement
-    person = Visitor(context.model, visits(str(cell.where["place"]), seed, where), where.ahead)
-    setup = context.setup(cell, seed, person_scene(hand, where), where.path("circle", -1.0), hand=person)
+    where = context.placement
+    person = Visitor(context.model, visits(str(cell.where["place"]), seed, where))
+    setup = context.setup(cell, seed, SceneSpec(hand=HandSpec()), where.path("circle", -1.0), hand=person)
     record = play(setup, lambda step, _: step.stamp >= _DURATION_S)
     steps = record.steps
     off = [float(np.linalg.norm(s.ee_position - s.path_position)) for s in steps]
@@ -58,7 +58,7 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
         **cell.row(seed),
         "contact": record.first_contact() is not None,
         "true_peak_n": rounded(float(np.linalg.norm(record.true_force, axis=1).max())),
-        "least_gap_m": rounded(float(gaps(record, context.model, hand.radius).min()), 4),
+        "least_gap_m": rounded(float(gaps(record, context.model, HandSpec.radius).min()), 4),
         "deviation_m": rounded(max(off), 4),
         "least_speed_scale": rounded(min(s.speed_scale for s in steps)),
         "largest_slack_m_s": rounded(max(float(s.qp.slack.max(initial=0.0)) for s in steps), 4),

@@ -4,8 +4,8 @@ import numpy as np
 
 from pretouch.profiles import profile
 from pretouch.sim.hand import Push, Pusher
-from pretouch.sim.paper_scenes import dynamic_pushes, person_scene
-from pretouch.sim.scene import HandSpec
+from pretouch.sim.paper_scenes import dynamic_pushes
+from pretouch.sim.scene import HandSpec, SceneSpec
 from pretouch.traces import mean_over
 from pretouch.types import ControlStep, FloatArray
 from pretouch_lab.cell import Cell, Context, Grid
@@ -35,9 +35,8 @@ def cells(grid: Grid) -> list[Cell]:
 
 def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
     """Run one trial; return its row of results and what it left behind."""
-    hand, where = HandSpec(), context.placement
-    person = Pusher(context.model, dynamic_pushes(seed), ahead=where.ahead)
-    setup = context.setup(cell, seed, person_scene(hand, where), where.path("circle", -1.0), hand=person)
+    person, path = Pusher(context.model, dynamic_pushes(seed)), context.placement.path("circle", -1.0)
+    setup = context.setup(cell, seed, SceneSpec(hand=HandSpec()), path, hand=person)
     record = play(setup, lambda step, _: step.stamp >= _DURATION_S)
     true = np.linalg.norm(record.true_force, axis=1)
     beginnings, spans = record.beginnings(), [span for span in person.contacts if span is not None]
@@ -49,7 +48,7 @@ def trial(cell: Cell, seed: int, context: Context) -> tuple[Row, Record]:
         "side": None,
         "profile": cell.profile,
         **cell.where,
-        "stiffness_n_per_m": hand.stiffness,
+        "stiffness_n_per_m": HandSpec.stiffness,
         "seed": seed,
         "contact": bool(spans),
         "impact_speed_m_s": None,

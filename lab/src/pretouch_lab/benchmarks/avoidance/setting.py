@@ -12,7 +12,7 @@ from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, load_skin, paper_skin, skin_for
 from pretouch.sim.hand import HandScript, PersonArm
-from pretouch.sim.paper_scenes import Placement, person_scene, placement_for, static_path, static_scene
+from pretouch.sim.paper_scenes import Placement, placement_for, static_path, static_scene
 from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams, plant_params_of
 from pretouch.sim.random_skin import Misplacement, misplaced
@@ -142,8 +142,7 @@ def _visiting(given: Table, seed: int, name: str) -> _Placed:
     at = np.array([given["x_m"], side * given["y_m"], given["z_m"]]) + off
     spec = HandSpec(given["radius_m"], given["mass_kg"], given["contact_stiffness_n_m"])
     visit = Visit(given["arrive_s"], given["leave_s"], at + given["spread_m"] * rng.uniform(-1, 1, 3))
-    scene = person_scene(spec, where)
-    return _Placed(scene, lambda hand: Ball(hand, spec.radius), Visitor(arm(name), (visit,), where.ahead))
+    return _Placed(SceneSpec(hand=spec), lambda hand: Ball(hand, spec.radius), Visitor(arm(name), (visit,)))
 
 
 def _walking(given: Table, seed: int, where: Placement) -> _Placed:
