@@ -1,5 +1,7 @@
 """The live page's room: where a pointer may lead the hand, and what it is like for other arms."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -11,12 +13,13 @@ from tests.other_arm import copied_panda
 from pretouch.control.path import Circle
 from pretouch.errors import ParameterError
 from pretouch.importing.robot_import import ImportOptions, import_robot, write_folder
-from pretouch.page.room import HAND_FORCE_N, LiveSettings, Mouse, at_depth, live_path, settings_for
+from pretouch.page.room import HAND_FORCE_N, Faults, LiveSettings, Mouse, Room, at_depth, live_path, settings_for
 from pretouch.page.simulation import LiveSimulation
 from pretouch.profiles import profile
 from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
-from pretouch.sensing.skin import LIVE_SKIN, load_skin, skin_for
+from pretouch.sensing.skin import LIVE_SKIN, Skin, load_skin, skin_for
+from pretouch.sensing.unit import TouchPatch
 from pretouch.sim.plant_params import plant_params_of
 from pretouch.sim.scene import HandSpec, SceneSpec
 from pretouch.types import Mode
@@ -45,6 +48,15 @@ def test_an_unknown_arm_of_a_pandas_size_gets_a_pandas_circle(tmp_path):
     assert isinstance(circle, Circle)
     assert circle.radius == pytest.approx(0.25, rel=0.02)
     assert settings.plant == plant_params_of(model.description)
+
+
+def test_a_silenced_unit_sends_no_touches_either(panda_model, paper_skin):
+    one, *others = (replace(unit, touch=TouchPatch()) for unit in paper_skin.units[:2])
+    settings = LiveSettings(faults=Faults(silenced=frozenset({one.id})))
+    room = Room(settings, live_path(settings), panda_model, Skin([one, *others], panda_model))
+    for _ in range(10):
+        room.tick()
+    assert np.isfinite(room.units.touch().stamp).tolist() == [False, True]
 
 
 @pytest.mark.slow

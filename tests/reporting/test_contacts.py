@@ -136,8 +136,7 @@ def test_without_truth_the_peak_is_that_of_the_estimate(panda_model, paper_skin)
     assert contacts.without_touch == contacts.missed == ()
 
 
-@pytest.mark.parametrize(("side", "push"), [("-y", 1.0), ("+y", -1.0)])
-@pytest.mark.parametrize("profile", ["blind", "paper"])
+@pytest.mark.parametrize(("profile", "side", "push"), [("blind", "-y", 1.0), ("paper", "+y", -1.0)])
 def test_numbers_of_a_collision_are_those_of_the_physics(panda_model, paper_skin, profile, side, push):
     recorded, plant = made.played(panda_model, paper_skin, profile, side, seconds=8.0, until_reaction=1.0)
     time, force = np.array([t for t, _ in plant.true_log]), np.array([f for _, f in plant.true_log])

@@ -1,6 +1,7 @@
 """The command, on files that the recorder wrote."""
 
 import os
+from dataclasses import replace
 
 import pytest
 
@@ -16,15 +17,13 @@ from pretouch.reporting.health import health_section
 from pretouch.reporting.motion import limit_section, mode_section
 from pretouch.reporting.page import measure
 from pretouch.sim.scene import SceneSpec, fixtures
-from tests.reporting import made
 
 
 @pytest.fixture(scope="module")
-def folder(panda_model, paper_skin, tmp_path_factory):
+def folder(touched, panda_model, paper_skin, tmp_path_factory):
     """A folder with a recording of a trial whose profile changes after 3 s, and what was recorded."""
     place = tmp_path_factory.mktemp("recordings")
-    played, _ = made.played(panda_model, paper_skin, "blind", seconds=6.0)
-    played.runs[0].profile = profile("blind")
+    played = replace(touched, runs=(replace(touched.runs[0], profile=profile("blind")),))
     fixed, path = fixtures(SceneSpec()), played.runs[0].path
     before = Controller(panda_model, paper_skin, fixed, path, profile("blind"))
     state = before.init(played[0].inputs.robot)
@@ -37,9 +36,9 @@ def folder(panda_model, paper_skin, tmp_path_factory):
     return place, played
 
 
-def written(files, out, replace=False):
+def written(files, out, overwrite=False):
     """The page that the command writes."""
-    WriteReport(tuple(files), out, replace).run()
+    WriteReport(tuple(files), out, overwrite).run()
     return out.read_text()
 
 
@@ -86,13 +85,13 @@ def test_what_is_wrong_with_a_request_is_one_sentence(folder, tmp_path):
     with pytest.raises(RecordingError, match="is given more than once"):
         written([trial, trial.parent / "." / "trial.mcap"], out)
     with pytest.raises(ExperimentError, match="is also another input or output file: give another name"):
-        written([trial], trial, replace=True)
+        written([trial], trial, overwrite=True)
     with pytest.raises(ExperimentError, match="cannot be written"):
         written([trial], tmp_path)
     out.write_text("notes of my own")
     with pytest.raises(ExperimentError, match="exists already: give another name, or --replace"):
         written([trial], out)
-    assert "</html>" in written([trial], out, replace=True)
+    assert "</html>" in written([trial], out, overwrite=True)
 
 
 def test_a_name_that_is_no_text_can_be_reported(folder, tmp_path):

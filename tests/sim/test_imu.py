@@ -119,8 +119,8 @@ def test_noise_has_the_density_of_the_data_sheet(panda_model, paper_skin):
     quiet = Rig(panda_model, paper_skin, ImuParams(
         scale_error=0.0, misalignment_deg=0.0, acceleration_noise_ug=0.0, angular_rate_noise_mdps=0.0
     ))  # fmt: skip
-    rig.plant.advance(10.0)
-    quiet.plant.advance(10.0)
+    rig.plant.advance(4.0)
+    quiet.plant.advance(4.0)
     rate_density, acceleration_density = [], []
     for unit, true in enumerate(rig.imus.rate):
         (_, rate, acceleration), (_, rate_0, acceleration_0) = rig.of(unit), quiet.of(unit)

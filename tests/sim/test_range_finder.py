@@ -15,7 +15,7 @@ from pretouch.sim.scene import Box, SceneSpec
 from pretouch.types import RangeStatus
 
 
-@pytest.mark.parametrize("distance", [0.06, 0.2, 0.5, 1.0, 1.2])
+@pytest.mark.parametrize("distance", [0.06, 0.5, 1.2])
 def test_a_wall_is_read_at_its_distance_on_average(rig, distance):
     readings = rig(wall(distance), units=30, offset_max_m=0.0).collect(1.0)
     assert len(readings["distance"]) > 1400
@@ -132,7 +132,7 @@ def test_a_reading_that_was_overtaken_is_dropped(rig):
 def test_readings_are_lost_at_the_dropout_rate(rig, probability):
     stamps = []
     for dropout in (0.0, probability):
-        readings = rig(wall(0.5), units=40, dropout=dropout, jitter_s=1e-6).collect(2.0)
+        readings = rig(wall(0.5), units=40, dropout=dropout, jitter_s=1e-6).collect(1.0)
         stamps.append(set(zip(readings["unit"], readings["stamp"], strict=True)))
     sent, received = stamps
     assert received < sent

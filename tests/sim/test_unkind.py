@@ -9,7 +9,7 @@ from tests.sim.test_plant import PERFECT, record
 
 from pretouch.errors import ParameterError
 from pretouch.robot.model import RobotModel
-from pretouch.sim.physics import begin_step, end_step
+from pretouch.sim.physics import BIAS, SPRING, begin_step, end_step
 from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.randomisation import drawn, world_set
@@ -31,7 +31,7 @@ def at_rest(model: RobotModel, params: PlantParams) -> FloatArray:
 def lost(model: RobotModel, speeds: FloatArray, cold: float = 0.0, **errors: float) -> FloatArray:
     """Friction of a joint at some speeds one millisecond after the other, as it carries 5 Nm [Nm]."""
     arm, taken = plant(model, replace(PERFECT, **{"bristle_nm": 0.3} | errors))._arm, []
-    arm.impedance[:], arm.bias[:], arm.cold[:] = 0.0, 5.0, cold
+    arm.impedance[:], arm.state[BIAS], arm.cold[:] = 0.0, 5.0, cold
     for speed in speeds:
         arm.world.qd[:] = speed
         taken.append(begin_step(arm)[1][0])
@@ -70,8 +70,8 @@ def test_bristles_stay_within_their_bounds_at_any_speed(panda_model: RobotModel,
 
 def test_a_joint_on_a_spring_rings_at_its_frequency_and_settles_at_the_torque(panda_model: RobotModel):
     arm, none = plant(panda_model, replace(PERFECT, ring_hz=15.0, ring_damping=0.05))._arm, np.zeros(7)
-    arm.world.qdd[:], arm.spring[:] = 0.0, 0.0
-    rung = np.array([(end_step(arm, np.full(7, 2.0), none, none, none), arm.spring[0, 0])[1] for _ in range(3000)])
+    arm.world.qdd[:], arm.state[SPRING] = 0.0, 0.0
+    rung = np.array([(end_step(arm, np.full(7, 2.0), none, none, none), arm.state[SPRING, 0])[1] for _ in range(3000)])
     assert rung.max() > 3.5  # a step overshoots by exp(-pi d): 0.85
     crossings = np.flatnonzero(np.diff(np.sign(rung[:400] - 2.0)))
     assert_allclose(np.diff(crossings).mean(), 1000 / 15 / 2, rtol=0.03)

@@ -149,8 +149,8 @@ def touches_of(truth: TrueForces | None) -> list[TrueTouch]:
             if instant > before:
                 link, velocity = name, of_point
         peak, peak_20ms = force[first:past].max(), mean[max(first - samples + 1, 0) : past].max(initial=0.0)
-        held = float(mean[late:past].max(initial=0.0)) if late < past else float("nan")
-        touches.append(TrueTouch(start, end, float(peak), float(peak_20ms), held, link, velocity))
+        lasting = float(mean[late:past].max(initial=0.0)) if late < past else float("nan")
+        touches.append(TrueTouch(start, end, float(peak), float(peak_20ms), lasting, link, velocity))
     return touches
 
 

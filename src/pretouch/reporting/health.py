@@ -2,20 +2,7 @@
 
 import numpy as np
 
-from pretouch.reporting.html import (
-    NOTHING,
-    Html,
-    Row,
-    Text,
-    bad,
-    element,
-    facts,
-    joined,
-    number,
-    percent,
-    table,
-    vector,
-)
+from pretouch.reporting.html import NOTHING, Html, Row, Text, bad, element, facts, joined, number, percent, table
 from pretouch.reporting.record import NO_READING, RunCourse, spread
 from pretouch.types import BoolArray, FloatArray, RangeStatus
 
@@ -79,7 +66,10 @@ def loop_row(course: RunCourse) -> Row:
     return {
         "robot states": f"{number(rate, 1)} Hz; age {age}",
         "force estimate missing": percent(missing, 1),
-        "noise of the force estimate x y z (median of the detector's σ)": Html(vector(sigma, 2) + " N"),
+        "noise of the force estimate x y z (median of the detector's σ)": " ".join(
+            number(axis, 2) for axis in sigma.tolist()
+        )
+        + " N",
         "period of the loop": _milliseconds(gaps),
         "late steps (by half a period or more)": str(np.sum(gaps >= 1.5 * period)),
         "steps whose inputs could not be kept": without if with_inputs.all() else bad(without),

@@ -40,11 +40,9 @@ $body
 )
 
 _STYLE = """
-:root { --ink: #1f2933; --soft: #616e7c; --line: #dde3e9; --ground: #fff; --other: #fdf3d8; --bad: #c53030;
-  --bar: #7b93ab; }
+:root { --ink: #1f2933; --soft: #616e7c; --line: #dde3e9; --ground: #fff; --other: #fdf3d8; --bad: #c53030; }
 @media screen and (prefers-color-scheme: dark) {
-  :root { --ink: #e4e7eb; --soft: #9aa5b1; --line: #3a4653; --ground: #171c22; --other: #4a3d16; --bad: #fc8181;
-    --bar: #829ab1; }
+  :root { --ink: #e4e7eb; --soft: #9aa5b1; --line: #3a4653; --ground: #171c22; --other: #4a3d16; --bad: #fc8181; }
   figure img { filter: invert(.9) hue-rotate(180deg); }
 }
 body { font: 15px/1.5 system-ui, sans-serif; color: var(--ink); background: var(--ground); margin: 0; }
@@ -63,14 +61,12 @@ th { font-weight: 600; } thead th { vertical-align: bottom; color: var(--soft); 
 .columns { display: flex; flex-wrap: wrap; gap: 0 3rem; }
 .vector { white-space: pre; } .note, figcaption, footer { color: var(--soft); font-size: .82rem; max-width: 52rem; }
 .bad { color: var(--bad); font-weight: 600; } .other { background: var(--other); padding: 0 .3rem; }
-.bar { width: 9rem; height: .55rem; margin-top: .35rem; background: var(--line); }
-.bar div { height: 100%; background: var(--bar); } .over div { background: var(--bad); }
 figure { margin: 1rem 0; } figure img { max-width: 100%; height: auto; background: #fff; }
 a { color: inherit; } footer { border-top: 1px solid var(--line); margin-top: 2.5rem; padding-top: .5rem; }
 @media print {
   body { font-size: 10pt; } main { max-width: none; margin: 0; } section { break-before: page; }
   section:first-of-type { break-before: auto; } figure, tr { break-inside: avoid; } h3 { break-after: avoid; }
-  .bar div { print-color-adjust: exact; } .scroll { overflow: visible; }
+  .scroll { overflow: visible; }
 }
 """
 

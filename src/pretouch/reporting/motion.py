@@ -1,4 +1,4 @@
-"""How near what was sensed came to the body, how fast the arm went, how near its limits, and in which modes."""
+"""How near what was sensed came to the body, how fast the arm went, and how near commands and forces came to limits."""
 
 from collections.abc import Sequence
 from itertools import groupby
@@ -7,13 +7,19 @@ from typing import NamedTuple
 import numpy as np
 
 from pretouch.control.approach import ApproachRestriction, notice_m
+from pretouch.params.pretouch import REGIONS
 from pretouch.recording.run_record import MODES
+from pretouch.reporting.contacts import TRANSIENT_S, ContactMeasures
 from pretouch.reporting.html import Html, Row, Text, bad, element, facts, joined, number, percent, table
 from pretouch.reporting.record import OUTCOMES, RunCourse, least, spread
 from pretouch.types import BoolArray, FloatArray, Mode, QpOutcome
 
 _SLOWED = 0.99
 """Speed factor below which the arm counts as slowed."""
+_SOURCE = (
+    "ISO/TS 15066:2016, table A.2; transient figures are twice the quasi-static ones but for skull and face, where it"
+    " has none"
+)
 _MOST = 1000.0
 """Fraction that stands for more, as of a command where the arm allows none."""
 _ROUNDING = 1e-9
@@ -27,13 +33,14 @@ class LeastDistance(NamedTuple):
     distance: float
     """[m], infinite where there is none."""
     time: float
-    """[s]"""
+    """[s], NaN where there is none."""
 
 
 def _nearest(course: RunCourse, names: Sequence[str], distances: FloatArray) -> list[LeastDistance]:
     """Return the least distance of each column (S, N) of distances [m], by its name."""
-    lows = [least(values) or (np.inf, 0) for values in distances.T]
-    return [LeastDistance(name, low, float(course.time[at])) for name, (low, at) in zip(names, lows, strict=True)]
+    time = np.append(course.time, np.nan)
+    lows = [least(values) or (np.inf, -1) for values in distances.T]
+    return [LeastDistance(name, low, float(time[at])) for name, (low, at) in zip(names, lows, strict=True)]
 
 
 def nearest_to_body(course: RunCourse) -> LeastDistance | None:
@@ -79,12 +86,8 @@ def distance_section(course: RunCourse) -> Html:
     ]
 
     def least_table(name: str, distance: str, columns: list[LeastDistance]) -> Html:
-        times = [number(one.time if np.isfinite(one.distance) else None, 2) for one in columns]
         return table(
-            [
-                {name: one.name, distance: number(one.distance, 3), "at [s]": time}
-                for one, time in zip(columns, times, strict=True)
-            ]
+            [{name: one.name, distance: number(one.distance, 3), "at [s]": number(one.time, 2)} for one in columns]
         )
 
     units = _nearest(course, course.units, course.body_distance)
@@ -267,3 +270,43 @@ def mode_section(course: RunCourse) -> Html:
         for hold in holds_in(course)
     ]
     return joined([*parts, table(rows)])
+
+
+def orientation_section(contacts: ContactMeasures) -> Html:
+    """The largest forces beside what regions of the body are said to bear."""
+    peak, lasting = contacts.peak, contacts.held
+    source, here, unsure = "true force, as the simulation knows it", "", ""
+    if not contacts.truth_known:
+        source, here = "force estimate during detected contacts", " (here of the estimate as it is)"
+        unsure = (
+            " The estimate has a bandwidth of about 10 Hz and understates the peaks of impacts, and contacts that were"
+            " not detected are not in it."
+        )
+    rows: list[Row] = []
+    for name, region in REGIONS.items():
+        # the source has no transient figure for skull and face
+        transient_n = region.transient * region.force_n if region.transient > 1.0 else None
+        transient = peak / transient_n if peak is not None and transient_n else None
+        quasi_static = lasting / region.force_n if lasting is not None else None
+        rows.append(
+            {
+                "body region": name.replace("-", " ").capitalize(),
+                "transient [N]": number(transient_n, 0),
+                "of transient": _marked(transient),
+                "quasi-static [N]": number(region.force_n, 0),
+                "of quasi-static": _marked(quasi_static),
+            }
+        )
+    note = (
+        f"For orientation, not conformity. Figures: {_SOURCE}. Public copies of such tables disagree. The transient"
+        " figure is held against the largest force, the quasi-static one against the largest 20 ms mean later than"
+        f" {TRANSIENT_S:g} s into a contact{here}. Which region would be hit, and over what area, is not known here;"
+        f" pressures are not looked at.{unsure}"
+    )
+    later = "none" if lasting is None else f"{lasting:.1f} N"
+    sentence = f"Largest {source}: {number(peak, 1)} N; later than {TRANSIENT_S:g} s into a contact: {later}."
+    return joined([element("p", sentence), table(rows, note)])
+
+
+def _marked(share: float | None) -> Text:
+    return bad(percent(share)) if share is not None and share > 1 else percent(share)

@@ -9,20 +9,11 @@ from matplotlib.figure import Figure
 from pretouch.contact.scatter import HELD_S
 from pretouch.explanation import LOUD_N
 from pretouch.recording.reader import Recorded
+from pretouch.reporting import motion
 from pretouch.reporting.contacts import ContactMeasures, contact_section, contacts_in
 from pretouch.reporting.figures import close_up_figure, force_figure, motion_figure, path_figure, picture, style
 from pretouch.reporting.health import health_section
 from pretouch.reporting.html import Html, Row, Text, bad, document, element, joined, number, percent, table, table_html
-from pretouch.reporting.motion import (
-    distance_section,
-    limit_rows,
-    limit_section,
-    mode_section,
-    nearest_to_body,
-    speed_section,
-    time_in_modes,
-)
-from pretouch.reporting.orientation import orientation_section
 from pretouch.reporting.record import RunCourse, gather, spread
 from pretouch.reporting.setting import parameter_section, setting_section, started
 from pretouch.text_table import TextTable
@@ -49,7 +40,7 @@ def measure(recorded: Recorded, title: str) -> Measures:
     """Measure a recording."""
     course = gather(recorded)
     lacking = "" if recorded.complete else recorded.sentence or "The file is not complete."
-    return Measures(title, lacking, course, contacts_in(course), limit_rows(course)[1])
+    return Measures(title, lacking, course, contacts_in(course), motion.limit_rows(course)[1])
 
 
 def page(recordings: Iterable[Measures]) -> str:
@@ -91,19 +82,19 @@ def _recording(m: Measures) -> list[Text]:
         picture(force_figure(course), f"{forces} {_SHADED}"),
         *_strongest(m),
         element("h3", "Distances"),
-        distance_section(course),
+        motion.distance_section(course),
         element("h3", "Speed"),
-        speed_section(course),
+        motion.speed_section(course),
         picture(motion_figure(course), f"{seen}peed of the end-effector, and speed factor. {_SHADED}"),
         picture(path_figure(course), "Path and end-effector seen from the front of the arm (from +x)."),
         element("h3", "Modes and quadratic program"),
-        mode_section(course),
+        motion.mode_section(course),
         element("h3", "Limits of the arm"),
-        limit_section(course),
+        motion.limit_section(course),
         element("h3", "Units, robot and loop"),
         health_section(course),
         element("h3", "Forces beside limits of body regions: for orientation, not conformity"),
-        orientation_section(m.contacts),
+        motion.orientation_section(m.contacts),
         element("h3", "Parameters"),
         parameter_section(course),
     ]
@@ -122,7 +113,7 @@ def _strongest(m: Measures) -> list[Html]:
 
 def summary(m: Measures) -> Html:
     """Say the most important of a recording."""
-    shares = {mode: percent(share) for mode, (_, share) in time_in_modes(m.course).items()}
+    shares = {mode: percent(share) for mode, (_, share) in motion.time_in_modes(m.course).items()}
     sentences: list[Text] = [
         _what(m.course),
         _contacts(m.contacts),
@@ -182,7 +173,7 @@ def _forces(c: ContactMeasures) -> str:
 
 
 def _nearest(course: RunCourse) -> str:
-    nearest = nearest_to_body(course)
+    nearest = motion.nearest_to_body(course)
     if not course.proximity_used:
         return "Proximity was not used."
     if nearest is None:
@@ -194,7 +185,12 @@ def _nearest(course: RunCourse) -> str:
 def _compared(order: int, m: Measures) -> Row:
     """Return the row of a recording in the comparison; `order` counts the recordings of the page from 1."""
     link = Html(f'<a href="#recording-{order}">{element("span", m.title)}</a>')
-    c, body, fastest, modes = m.contacts, nearest_to_body(m.course), spread(m.course.speed), time_in_modes(m.course)
+    c, body, fastest, modes = (
+        m.contacts,
+        motion.nearest_to_body(m.course),
+        spread(m.course.speed),
+        motion.time_in_modes(m.course),
+    )
     steps = [d.step for d in c.detections]
     return {
         "recording": joined([link, bad(" (incomplete)")], "") if m.lacking else link,

@@ -71,14 +71,12 @@ def described(path: object) -> str:
     return f"{type(path).__name__}: {', '.join(values)}"
 
 
-def written(value: object, depth: int = 6) -> str:
-    """Write a parameter, or whatever JSON holds, down to some depth."""
-    if isinstance(value, dict | list | tuple) and not depth:
-        return "..."
+def written(value: object) -> str:
+    """Write a parameter, or whatever JSON holds."""
     if isinstance(value, dict):
-        return "; ".join(f"{name}: {written(part, depth - 1)}" for name, part in value.items())
+        return "; ".join(f"{name}: {written(part)}" for name, part in value.items())
     if isinstance(value, list | tuple):
-        return f"({', '.join(written(part, depth - 1) for part in value)})"
+        return f"({', '.join(map(written, value))})"
     if value is None or isinstance(value, bool):
         return {None: "none", True: "yes", False: "no"}[value]
     return f"{value:.6g}".replace("-", "−") if isinstance(value, float) else str(value)

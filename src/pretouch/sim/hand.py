@@ -74,22 +74,22 @@ class Hand:
     def _drive(self, time: float) -> None:
         position = self.position
         goal = self._script.goal(time, position, self._plant)
-        self._goal, self._force[:] = _spring(self._goal, goal, position, self._velocity, self._dt, self._arm)
+        _pull(self._goal, self._force, goal, position, self._velocity, self._dt, self._arm)
 
 
 @compiled
-def _spring(
-    last: FloatArray, goal: HandGoal, x: FloatArray, v: FloatArray, dt: float, arm: PersonArm
-) -> tuple[FloatArray, FloatArray]:
-    """Move the spring's far end (3,) [m], which was at `last` a step before, and return it with the force on the hand.
+def _pull(
+    last: FloatArray, force: FloatArray, goal: HandGoal, x: FloatArray, v: FloatArray, dt: float, arm: PersonArm
+) -> None:
+    """Move the spring's far end (3,) [m], which was at `last` a step before; write it and the force on the hand (3,).
 
-    The force is (3,) [N]; x [m] and v [m/s] (3,) are the hand's position and velocity.
+    The force is in N; x [m] and v [m/s] (3,) are the hand's position and velocity.
     """
     at = last + _shortened(goal.position - last, arm.speed_max * dt)
     # never farther ahead than the largest force stretches the spring: a person who lets go pulls back at once
     at = x + _shortened(at - x, goal.force_max / arm.stiffness)
-    force = arm.stiffness * (at - x) + arm.damping * ((at - last) / dt - v)
-    return at, _shortened(force, goal.force_max)
+    pull = arm.stiffness * (at - x) + arm.damping * ((at - last) / dt - v)
+    force[:], last[:] = _shortened(pull, goal.force_max), at
 
 
 @kernel

@@ -12,7 +12,7 @@ import numpy as np
 from pretouch.errors import ParameterError
 from pretouch.robot.model import RobotModel
 from pretouch.sim.observer import wrench_from_torques
-from pretouch.sim.physics import ArmMemory, NominalModel, Simulation, take_steps
+from pretouch.sim.physics import BIAS, QD_BEFORE, QD_D, SPRING, ArmMemory, NominalModel, Simulation, take_steps
 from pretouch.sim.plant_params import Joints, PlantParams
 from pretouch.sim.scene import CONTACTS, ArmError, SceneSpec, build, stiffen
 from pretouch.sim.under_way import ROUNDING_S
@@ -121,6 +121,8 @@ class ArmInWorld:
         self._torque_noise = np.array(p.torque_noise_nm) * np.sqrt(1 - keep**2)
         counted = int(self.mj_model.sensor(CONTACTS).adr[0])
         nominal, scratch = self.model.scratch
+        state = np.zeros((8, self._n))
+        state[SPRING] = state[BIAS] = bias
         return ArmMemory(
             p=p.numbers,
             world=Simulation(
@@ -128,24 +130,19 @@ class ArmInWorld:
                 data.qfrc_applied[own], data.sensordata[counted : counted + 1],
             ),
             nominal=NominalModel(nominal._address, scratch._address, scratch.qpos, scratch.qvel),
-            report=np.array([q, zero, q_d, zero, zero]),
-            qd_d=zero.copy(),
             follow=1.0 - float(np.exp(-2 * np.pi * p.set_point_hz * p.period_s)),
-            impedance=np.vstack([self._spring_and_damper(mass), zero]),
-            tau_max=self.model.description.tau_max,
-            friction=np.array([p.friction_f1_nm, p.friction_f2_s_rad, p.friction_f3_rad_s]),
-            bristle=zero.copy(),
-            cold=np.array([p.cold_friction]),
-            offset=self.offset_nm.copy(),
-            ripple=np.array([p.ripple_nm, p.ripple_cycles, self._ripple_phase]),
-            noise=zero.copy(),
             keep=keep,
-            spring=np.stack([bias, zero]),
             turn=2 * np.pi * p.ring_hz * p.period_s,
-            bias=bias,
-            integral=zero.copy(),
+            figures=np.array([
+                self.model.description.tau_max, p.friction_f1_nm, p.friction_f2_s_rad, p.friction_f3_rad_s,
+                p.ripple_nm, p.ripple_cycles, self._ripple_phase,
+            ]),
+            impedance=np.vstack([self._spring_and_damper(mass), zero]),
+            offset=self.offset_nm.copy(),
+            cold=np.array([p.cold_friction]),
+            report=np.array([q, zero, q_d, zero, zero]),
+            state=state,
             mass_matrix=mass,
-            qd_before=zero.copy(),
         )  # fmt: skip
 
     def take_log(self) -> tuple[list[tuple[float, FloatArray]], list[Touch]]:
@@ -182,23 +179,23 @@ class ArmInWorld:
     @property
     def desired(self) -> tuple[FloatArray, FloatArray]:
         """Positions [rad] and velocities [rad/s] (n,) that the motion generator asks for."""
-        return self._q_d, self._arm.qd_d
+        return self._q_d, self._arm.state[QD_D]
 
     def drive_by(self, tau: FloatArray) -> None:
         """Have torques (n,) beyond gravity's [Nm] act in the next physics steps in place of the joint impedance."""
         _, gravity = self.model.mass_matrix_and_bias(self._measured_q, np.zeros(self._n), np.empty(self._n))
         # the drives add what the model says of Coriolis torques, too, which a commanded torque has to itself
-        self._arm.impedance[:2], self._arm.impedance[2] = 0.0, tau + gravity - self._arm.bias
+        self._arm.impedance[:2], self._arm.impedance[2] = 0.0, tau + gravity - self._arm.state[BIAS]
 
     def begin_at(self, q: FloatArray) -> None:
         """Have the motion generator ask for q (n,) [rad], near where the arm is, at once and at rest."""
-        self._q_d[:], self._arm.qd_d[:] = q, 0.0
+        self._q_d[:], self._arm.state[QD_D] = q, 0.0
 
     def hold(self) -> None:
         """Have the joint impedance act again, where the arm is, within its limits, and with the velocities it has."""
         self._arm.impedance[:2], self._arm.impedance[2] = self._spring_and_damper(self._arm.mass_matrix), 0.0
         self._q_d[:] = np.clip(self._measured_q, self.model.q_min, self.model.q_max)
-        self._arm.qd_d[:] = self._measured_qd
+        self._arm.state[QD_D] = self._measured_qd
 
     def set_stiffness(self, stiffness: FloatArray) -> None:
         """Give the joint impedance another stiffness (n,) [Nm/rad], with the same damping ratio."""
@@ -220,7 +217,7 @@ class ArmInWorld:
             _, contact, link, _ = next(self._on_the_arm())
             kin = self.model.kinematics(self._arm.world.q)
             jacobian = self.model.jacobian(kin, link, self._in_base(contact.pos.copy()))
-            self.touches.append(Touch(self.time, link, jacobian[:3] @ self._arm.qd_before))
+            self.touches.append(Touch(self.time, link, jacobian[:3] @ self._arm.state[QD_BEFORE]))
 
     def _age(self, duration: float) -> None:
         """Let the arm warm up and its sensors drift (Ornstein-Uhlenbeck) for a time [s]."""
@@ -284,7 +281,7 @@ class Plant(ArmInWorld):
     def advance(self, duration: float) -> None:
         """Let time pass [s], in whole physics steps."""
         p, n = self.params, self._n
-        steps, done = round(duration / p.period_s), 0
+        steps, done, noted = round(duration / p.period_s), 0, 0
         draws = self._rng.standard_normal((steps, 2, n))
         velocity_noise = p.velocity_noise_rad_s * draws[:, 0]
         torque_noise = self._torque_noise * draws[:, 1]
@@ -297,8 +294,10 @@ class Plant(ArmInWorld):
             done = take_steps(first, last, velocity_noise, torque_noise, past, self._arm)
             self.time = times[done]
             if p.state_delay_s:
-                self._states.extend(zip(times[first + 1 : done + 1], past[first:done], strict=True))
-            self._note_contacts(times[first + 1 : done + 1])
+                self._states.extend((times[step + 1], past[step]) for step in range(first, done))
+            if done == steps or self._arm.world.contacts[0] or self.true_force is not _NO_FORCE:
+                self._note_contacts(times[noted + 1 : done + 1])
+                noted = done
 
     def _prepare_step(self) -> float:
         """Do what is due before the next physics step, and return up to when nothing else will be [s]."""

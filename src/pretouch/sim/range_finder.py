@@ -108,10 +108,11 @@ class RangeFinders:
         # a flat wall square to the beam is read at its distance, as by a calibrated sensor: rays at an angle meet it
         # farther away by 1 / cos, and with strength cos^3, which is slant, and the distance squared
         flat_wall = (cones[:, :, 2] ** 3).sum(axis=1) / (cones[:, :, 2] ** 2).sum(axis=1)
-        kinds = [(u.sensor.ranging(params.mode).distance_max_m, u.sensor.nearest_m, u.sensor.noise) for u in skin.units]
-        farthest, nearest, noise = np.array(kinds, dtype=np.float64).reshape(count, 3).T.copy()
+        kinds = np.empty((count, 3))
+        for k, sensor in enumerate(unit.sensor for unit in skin.units):
+            kinds[k] = sensor.ranging(params.mode).distance_max_m, sensor.nearest_m, sensor.noise
         self._finders = _Finders(
-            data.xpos, data.xmat, bodies, skin.T_link_sensor, cones, offset, farthest, nearest, flat_wall, noise
+            data.xpos, data.xmat, bodies, skin.T_link_sensor, cones, np.column_stack([offset, flat_wall, kinds])
         )
         self._geoms, drift = geoms, np.random.default_rng([seed, STREAM])
         self._electrodes = {
@@ -201,11 +202,9 @@ class _Finders(NamedTuple):
     link: IntArray  # (K,)
     T_link_sensor: FloatArray  # (K, 4, 4)
     cone: FloatArray  # (K, N, 3) unit vectors of the rays, sensor frame
-    offset: FloatArray  # (K,) constant errors [m]
-    distance_max: FloatArray  # (K,) farthest target [m]
-    nearest: FloatArray  # (K,) [m]
-    calibration: FloatArray  # (K,) factor that makes a flat wall read at its distance
-    noise: FloatArray  # (K,) times that of the VL53L1X
+    # (K, 5) constant error [m], factor that makes a flat wall read at its distance, farthest target [m], nearest [m],
+    # times the noise of the VL53L1X
+    figures: FloatArray
 
 
 @compiled
@@ -231,7 +230,8 @@ def _measured(
     distance and the cosine of incidence. It is relative to a target that is just detected: one that fills the cone, at
     `distance_max`, square to the beam, of `reflectance_limit`, has 1 in all.
     """
-    link, distance_max = finders.link[unit], finders.distance_max[unit]
+    link, figures = finders.link[unit], finders.figures[unit]
+    offset, calibration, distance_max, noise = figures[0], figures[1], figures[2], figures[4]
     origin, R = placed(finders.position[link], finders.rotation[link], finders.T_link_sensor[unit])
     rays = turned(R, finders.cone[unit])
     distance, normal, _ = cast(origin, rays, geoms, link, distance_max)
@@ -251,16 +251,16 @@ def _measured(
     total, mean = _nearest_group(distance, strength, p.merge_m)
     if total == 0.0:
         return 0.0, _SIGNAL, 0.0, sum(strength)
-    mean *= finders.calibration[unit] / total
+    mean *= calibration / total
     # shot noise: with a share of the light that a target filling the cone would return, 1 / sqrt(share) times the noise
     full = brightness * (distance_max / max(mean, 0.01)) ** 2
     sigma = p.noise_floor_m + p.noise_rate * mean * np.sqrt(max(1.0, full / total))
     trusted = sigma <= p.sigma_limit_m
-    sigma *= finders.noise[unit]
-    measured = max(0.0, mean + finders.offset[unit] + sigma * draw)
+    sigma *= noise
+    measured = max(0.0, mean + offset + sigma * draw)
     if not trusted:
         return measured, _SIGMA, sigma, total
-    if measured < finders.nearest[unit]:
+    if measured < figures[3]:
         return measured, _MIN_RANGE, sigma, total
     return measured, _OK, sigma, total
 

@@ -101,7 +101,7 @@ class TouchSensors:
         self._last = np.full(count, -np.inf)
         self._passed, self._before, self._on = np.zeros(count), np.zeros(count), np.zeros(count, np.bool_)
         self._time = plant.time
-        self._sent = UnderWay[tuple[int, float, bool, float]]()
+        self._sent = UnderWay[TouchSample]()
         none = np.full(len(skin), int(TouchStatus.NONE), dtype=np.int64)
         self._newest = TouchReadings(
             np.full(len(skin), -np.inf), np.zeros(len(skin), np.bool_), np.full(len(skin), np.nan), none
@@ -155,11 +155,11 @@ class TouchSensors:
         arrival, lost = time + p.latency_s + rng.exponential(p.jitter_s), rng.random() < p.dropout
         if unit in self.silenced:
             return
-        reported = force if patch.measures_force else np.nan
+        sample = TouchSample(unit, time, bool(self._on[i]), force if patch.measures_force else np.nan)
         if self._send:
-            self._send(TouchSample(unit, time, bool(self._on[i]), reported))
+            self._send(sample)
         elif not lost:
-            self._sent.send(arrival, (unit, time, bool(self._on[i]), reported))
+            self._sent.send(arrival, sample)
 
 
 @dataclass(frozen=True)
