@@ -9,8 +9,9 @@ from pretouch.modes import Event
 from pretouch.profiles import profile
 from pretouch.reporting.contacts import contact_section
 from pretouch.reporting.html import bad, number, percent, table
+from pretouch.reporting.measures import measure
 from pretouch.reporting.motion import limit_section, orientation_section
-from pretouch.reporting.page import measure, page, summary
+from pretouch.reporting.page import page, summary
 from pretouch.reporting.record import gather
 from pretouch.reporting.setting import parameter_section, setting_section
 from pretouch.sensing.skin import Skin

@@ -14,8 +14,8 @@ from pretouch.profiles import profile
 from pretouch.recording.reader import open_recording
 from pretouch.recording.writer import Recording
 from pretouch.reporting.health import health_section
+from pretouch.reporting.measures import measure
 from pretouch.reporting.motion import limit_section, mode_section
-from pretouch.reporting.page import measure
 from pretouch.sim.scene import SceneSpec, fixtures
 
 

@@ -33,7 +33,8 @@ class WriteReport:
         FIGURES.need("A report")
         check_outputs([("report", self.out)], self.files, self.replace)
         from pretouch.recording.reader import open_recording  # a help does not wait for this
-        from pretouch.reporting.page import measure, page  # need the extra
+        from pretouch.reporting.measures import measure
+        from pretouch.reporting.page import page  # needs the extra
 
         titled = zip(self.files, titles(self.files), strict=True)
         text = page(measure(open_recording(place), title) for place, title in titled)

@@ -1,46 +1,24 @@
 """The pages, one HTML file each with all in it: a report of recordings, and what `pretouch detect` found in one."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from pretouch.contact.scatter import HELD_S
 from pretouch.explanation import LOUD_N
-from pretouch.recording.reader import Recorded
 from pretouch.reporting import motion
-from pretouch.reporting.contacts import ContactMeasures, contact_section, contacts_in
+from pretouch.reporting.contacts import ContactMeasures, contact_section
 from pretouch.reporting.figures import close_up_figure, force_figure, motion_figure, path_figure, picture, style
 from pretouch.reporting.health import health_section
 from pretouch.reporting.html import Html, Row, Text, bad, document, element, joined, number, percent, table, table_html
-from pretouch.reporting.record import RunCourse, gather, spread
+from pretouch.reporting.measures import Measures
+from pretouch.reporting.record import RunCourse, spread
 from pretouch.reporting.setting import parameter_section, setting_section, started
 from pretouch.text_table import TextTable
 from pretouch.types import FloatArray, Mode
 
 _SHADED = "Red: REACT, grey: HOLD."
-
-
-@dataclass(frozen=True)
-class Measures:
-    """One recording, measured."""
-
-    title: str
-    """Name of the file, with as much of its folder as tells it from the others."""
-    lacking: str
-    """What is missing of a file that is not complete, as a sentence, or ''."""
-    course: RunCourse
-    contacts: ContactMeasures
-    exceeded: list[str]
-    """Limits of the arm that were exceeded, as "velocity of joint 2"."""
-
-
-def measure(recorded: Recorded, title: str) -> Measures:
-    """Measure a recording."""
-    course = gather(recorded)
-    lacking = "" if recorded.complete else recorded.sentence or "The file is not complete."
-    return Measures(title, lacking, course, contacts_in(course), motion.limit_rows(course)[1])
 
 
 def page(recordings: Iterable[Measures]) -> str:
