@@ -99,7 +99,7 @@ def test_names_in_the_notation_exist():
                 "pretouch.types", "pretouch.params", "pretouch.control.path",
                 "pretouch.control.approach", "pretouch.contact.window",
                 "pretouch.contact.residual_model", "pretouch.contact.moving_thresholds",
-                "pretouch.contact.sequential_test", "pretouch.contact.reaction",
+                "pretouch.contact.sequential_test", "pretouch.contact.reaction", "pretouch.sensing.skin",
             )  # fmt: skip
             owners = [vars(importlib.import_module(m)).get(owner) for m in modules]
             assert any(name in o.__annotations__ or hasattr(o, name) for o in owners if o), f"{owner}.{name}"
