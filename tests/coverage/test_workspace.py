@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from pretouch.coverage.figure import coverage_figure
-from pretouch.coverage.measure import Setting, covered
+from pretouch.coverage.measure import Setting, covered, postures
 from pretouch.coverage.params import CoverageParams
 from pretouch.coverage.ways import seen_by
-from pretouch.coverage.workspace import postures
 from pretouch.errors import ExperimentError
 from pretouch.robot.postures import capsule_ends, ever_apart, kinematics_of, self_distances
 from pretouch.sim.scene import SceneSpec, fixtures

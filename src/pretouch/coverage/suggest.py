@@ -17,8 +17,8 @@ from pretouch.perception.scene_filter import expected_range
 from pretouch.robot.body import surface_of
 from pretouch.robot.kinematics import tangents_of
 from pretouch.robot.model import RobotModel
-from pretouch.sensing.sensor import PAPER_SENSOR, Sensor, cones_of
-from pretouch.sensing.skin import Skin, SkinArrays
+from pretouch.sensing.sensor import PAPER_SENSOR, Sensor
+from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit
 from pretouch.types import BoolArray, FloatArray
 
@@ -63,16 +63,13 @@ def candidates(ways: Ways, skin: Skin, sensor: Sensor = PAPER_SENSOR) -> tuple[S
     model = ways.model
     kin = model.kinematics(model.description.q_ready)
     at = surface_of(model.body, model.moved_by, kin, _SPACING_M)
-    poses = np.array([_looking(*place) for place in zip(at.point, at.normal, strict=True)])
-    exact, cones = np.zeros(len(poses)), cones_of([PAPER_SENSOR] * len(poses))
-    sensors = placed_sensors(SkinArrays(at.link, poses, exact, exact, cones), kin)
-    of_no_link = sensors._replace(link=np.full(len(poses), -1, np.int64))
-    view = expected_range(kin, of_no_link, cones, model.capsules, ways.room)
-    units = (
-        SensorUnit(f"place {i}", model.links[at.link[i]], poses[i], sensor=sensor)
-        for i in np.flatnonzero(view > _CLEAR_M)
-    )
-    return tuple(unit for unit in units if _fits(unit, model) and not _beside(unit, skin))
+    places = zip(at.link.tolist(), at.point, at.normal, strict=True)
+    units = [SensorUnit(f"place {i}", model.links[link], _looking(*rest)) for i, (link, *rest) in enumerate(places)]
+    units = [unit for unit in units if _fits(unit, model) and not _beside(unit, skin)]
+    beams = Skin(units, model)
+    of_no_link = placed_sensors(beams.arrays, kin)._replace(link=np.full(len(units), -1, np.int64))
+    view = expected_range(kin, of_no_link, beams.cones, model.capsules, ways.room)
+    return tuple(replace(units[i], sensor=sensor) for i in np.flatnonzero(view > _CLEAR_M))
 
 
 def suggest(ways: Sequence[Ways], skin: Skin, count: int, places: tuple[SensorUnit, ...] | None = None) -> Suggestions:
