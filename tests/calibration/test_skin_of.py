@@ -23,8 +23,8 @@ def found(panda_model, good):
 
 def test_a_skin_carries_places_and_their_uncertainties(panda_model, found, pair, tmp_path):
     made = skin_of(found, panda_model)
-    assert (made.located, made.kept, made.left_out) == (pair.ids, (), ())
-    save_skin(made.skin, tmp_path / "skin.toml")
+    assert made.ids == pair.ids
+    save_skin(made, tmp_path / "skin.toml")
     for unit, calibrated in zip(load_skin(tmp_path / "skin.toml", panda_model).units, found.units, strict=True):
         assert unit.T_link_sensor == pytest.approx(calibrated.place.T_link_sensor, abs=1e-9)
         assert unit.position_sigma == calibrated.place.position_sigma
@@ -34,32 +34,32 @@ def test_a_skin_carries_places_and_their_uncertainties(panda_model, found, pair,
 
 def test_a_unit_that_is_refused_stays_where_the_skin_had_it_or_is_left_out(panda_model, good, pair):
     found = calibrate(panda_model, on_the_table(good, "on_panda_link4"))
-    alone = skin_of(found, panda_model)
-    assert (alone.skin.ids, alone.left_out) == (("on_panda_hand",), ("on_panda_link4",))
+    assert skin_of(found, panda_model).ids == ("on_panda_hand",)
     kept = skin_of(found, panda_model, pair)
-    assert (kept.skin.ids, kept.kept, kept.located) == (pair.ids, ("on_panda_link4",), ("on_panda_hand",))
-    assert kept.skin.units[0] is pair.units[0]
+    assert kept.ids == pair.ids
+    assert kept.units[0] is pair.units[0]
+    assert kept.units[1] is not pair.units[1]
 
 
 def test_a_unit_that_is_calibrated_keeps_its_sensors(panda_model, found, pair):
     first = replace(pair.units[0], touch=TouchPatch(radius_m=0.03), sensor=VL53L5CX())
     made = skin_of(found, panda_model, Skin([first, pair.units[1]], panda_model))
-    assert made.located == pair.ids
-    assert [unit.touch for unit in made.skin.mounted] == [TouchPatch(radius_m=0.03), None]
-    assert [unit.sensor.zones for unit in made.skin.mounted] == [4, 1]
+    assert [unit.touch for unit in made.mounted] == [TouchPatch(radius_m=0.03), None]
+    assert [unit.sensor.zones for unit in made.mounted] == [4, 1]
 
 
 def test_units_that_were_not_calibrated_stay(panda_model, found, whole_skin):
     made = skin_of(found, panda_model, whole_skin)
-    assert made.skin.ids == whole_skin.ids
-    assert made.located == ("on_panda_link4", "on_panda_hand")
-    assert len(made.kept) == 5
+    assert made.ids == whole_skin.ids
+    moved = [one.id for one, other in zip(made.units, whole_skin.units, strict=True) if one is not other]
+    assert moved == ["on_panda_link4", "on_panda_hand"]
 
 
-def test_without_any_unit_there_is_no_skin(panda_model, good):
+def test_without_any_unit_there_is_no_skin(panda_model, good, pair):
     found = calibrate(panda_model, on_the_table(on_the_table(good, "on_panda_link4"), "on_panda_hand"))
-    with pytest.raises(CalibrationError, match="no skin can be made"):
-        skin_of(found, panda_model)
+    for keep in (None, pair):
+        with pytest.raises(CalibrationError, match="no skin can be made"):
+            skin_of(found, panda_model, keep)
 
 
 def test_a_unit_a_little_inside_its_capsule_is_moved_out_and_less_certain(panda_model, moving_arm, pair):
@@ -69,7 +69,7 @@ def test_a_unit_a_little_inside_its_capsule_is_moved_out_and_less_certain(panda_
     (finding,) = found.units[0].findings
     assert (finding.kind, finding.refused) == ("inside", False)
     assert "3.0 mm inside the capsules" in finding.sentence
-    (unit,) = skin_of(found, panda_model).skin.units
+    (unit,) = skin_of(found, panda_model).units
     assert unit.position_sigma == pytest.approx(0.003, abs=3e-4)
     assert np.linalg.norm(unit.T_link_sensor[:3, 3] - deep.T_link_sensor[:3, 3]) == pytest.approx(0.003, abs=5e-4)
 

@@ -1,6 +1,6 @@
 """From measured joint positions and IMU data to where each unit sits, one straight line; and to a skin."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -102,43 +102,19 @@ def _place(model: RobotModel, located: Located, link: int, T: FloatArray, covari
     )
 
 
-@dataclass(frozen=True, eq=False)
-class CalibratedSkin:
-    """A skin, and what became of each unit: ids."""
+def skin_of(calibration: Calibration, model: RobotModel, keep: Skin | None = None) -> Skin:
+    """Make a skin of all accepted units; the others stay as in the skin before, where it has them.
 
-    skin: Skin
-    located: tuple[str, ...]
-    """Units whose place was found."""
-    kept: tuple[str, ...]
-    """Units that stay where the skin before had them, found wanting or not calibrated."""
-    left_out: tuple[str, ...]
-    """Units that were found wanting, and that no skin had before."""
-
-
-def skin_of(calibration: Calibration, model: RobotModel, keep: Skin | None = None) -> CalibratedSkin:
-    """Make a skin of all units whose place can be trusted; the others stay as in the skin before, where it has them.
-
-    Raises CalibrationError if the skin has no unit.
+    Where a unit is says nothing of its sensors: they stay too. Raises CalibrationError if no unit was accepted.
     """
-    calibrated = {unit.id: unit for unit in calibration.units}
-    old = {unit.id: unit for unit in keep.mounted} if keep else {}
-    located = {
-        name: _sensor_unit(name, unit.place, model, calibration.orientation_floor)
-        for name, unit in calibrated.items()
-        if unit.place and unit.accepted
-    }
-    for name in located.keys() & old.keys():  # where a unit is says nothing of its sensors
-        located[name] = replace(located[name], touch=old[name].touch, sensor=old[name].sensor)
-    names = list(dict.fromkeys((*old, *calibrated)))
-    units = [(old | located)[name] for name in names if name in old or name in located]
-    if not units:
+    units = {unit.id: unit for unit in keep.mounted} if keep else {}
+    if not any(unit.accepted for unit in calibration.units):
         raise CalibrationError("No unit was located reliably, so no skin can be made: see the findings of each unit.")
-    return CalibratedSkin(
-        Skin(units, model),
-        tuple(name for name in names if name in located),
-        tuple(name for name in names if name in old and name not in located),
-        tuple(name for name in names if name not in old and name not in located),
-    )
+    for unit in calibration.units:
+        if unit.place and unit.accepted:
+            found, old = _sensor_unit(unit.id, unit.place, model, calibration.orientation_floor), units.get(unit.id)
+            units[unit.id] = replace(found, touch=old.touch, sensor=old.sensor) if old else found
+    return Skin(tuple(units.values()), model)
 
 
 def _sensor_unit(name: str, place: Place, model: RobotModel, orientation_floor: float) -> SensorUnit:

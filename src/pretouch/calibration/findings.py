@@ -1,11 +1,12 @@
-"""What is to be said of a unit once its place is known, and how it sits on the surface of its link."""
+"""What is to be said of a unit once its place is found: what of it is not known, and how the unit sits on its link."""
+
+from dataclasses import dataclass
 
 import numpy as np
 
-from pretouch.calibration.fit import ACC_SCALE, GYRO_SCALE
+from pretouch.calibration.fit import ACC_SCALE, GYRO_SCALE, PLACE, TURN
 from pretouch.calibration.link_motion import ArmMotion
 from pretouch.calibration.locate import Located
-from pretouch.calibration.observability import Axis, observability
 from pretouch.calibration.values import (
     LEAST_SWING_RAD,
     SCALE_ERROR,
@@ -18,6 +19,12 @@ from pretouch.robot.model import RobotModel
 from pretouch.sensing.unit import seat
 from pretouch.types import FloatArray
 
+_POSITION_SIGMA_M = 0.01
+"""An answer with a larger standard deviation of its position, in any direction, is refused [m]."""
+_ORIENTATION_SIGMA_DEG = 2.0
+"""An answer with a larger standard deviation of its orientation, about any axis, is refused [degrees]."""
+_SAME = 0.9
+"""Share of a direction that lies in what is not known, from which on it is named as not known."""
 _UNUSUAL = 5.0
 """Standard deviations, as assumed, from which on an error of a scale is not its own."""
 _MANY = 0.05
@@ -92,7 +99,7 @@ def unknown_finding(arm: ArmMotion, link: int, T: FloatArray, covariance: FloatA
     kin, last = model.kinematics(model.q_mid), int(np.flatnonzero(moving)[-1])
     R = kin.rotation[link]
     axis = Axis(model.joints[last], R.T @ (kin.anchor[last] - kin.position[link]), R.T @ kin.axis[last])
-    unknown, known = observability(covariance, T, axis)
+    unknown = unknown_directions(covariance, T, axis)
     if not unknown:
         return []
     swing: FloatArray = np.ptp(arm.q[arm.usable], axis=0)
@@ -106,8 +113,85 @@ def unknown_finding(arm: ArmMotion, link: int, T: FloatArray, covariance: FloatA
         way_out = f"Move {names} more."
     if moving.sum() == 1:
         way_out = f"{axis.joint} alone moves {model.links[link]}, so no motion can determine it: measure it by hand."
-    rest = f" Known: {', and '.join(known)}." if known else ""
-    return [Finding("unobservable", f"Not known: {', and '.join(unknown)}.{rest} {way_out}", True)]
+    return [Finding("unobservable", f"Not known: {', and '.join(unknown)}. {way_out}", True)]
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Axis of the last joint that moves a link, in the link's frame."""
+
+    joint: str
+    point: FloatArray
+    """(3,) [m]."""
+    direction: FloatArray
+    """(3,) unit vector."""
+
+
+def unknown_directions(covariance: FloatArray, T_link_sensor: FloatArray, axis: Axis) -> tuple[str, ...]:
+    """Say in words what of a pose is not known as well as it has to be.
+
+    Args:
+        covariance: (6, 6) of rotation vector in the sensor frame [rad] and position in the link frame [m].
+        T_link_sensor: (4, 4) the pose.
+        axis: of the last joint that moves the link.
+    """
+    turned = np.eye(6)
+    turned[TURN, TURN] = T_link_sensor[:3, :3]
+    limit = np.repeat((np.deg2rad(_ORIENTATION_SIGMA_DEG), _POSITION_SIGMA_M), 3)
+    scaled = turned @ covariance @ turned.T / np.outer(limit, limit)
+    span, freedoms = _joint_freedoms(scaled, T_link_sensor[:3, 3] - axis.point, axis, limit)
+    return (*freedoms, *_directions(scaled, span, limit))
+
+
+def _joint_freedoms(
+    scaled: FloatArray, r: FloatArray, axis: Axis, limit: FloatArray
+) -> tuple[FloatArray, tuple[str, ...]]:
+    """Take what a joint's axis leaves open out of what is not known.
+
+    A turn about an axis moves the unit too: rotation and position are looked at together, in parts of their limits.
+
+    Returns:
+        (6, k) orthonormal columns: what else is not known; and the joint's own freedoms in words.
+    """
+    none = np.zeros(3)
+    freedoms = {
+        f"where it sits along the axis of {axis.joint}": np.concatenate([none, axis.direction]),
+        f"its angle about the axis of {axis.joint}": np.concatenate([axis.direction, np.cross(axis.direction, r)]),
+    }
+    variance, vectors = np.linalg.eigh(scaled)
+    span, words = vectors[:, variance > 1.0], []
+    for name, freedom in freedoms.items():
+        unit = freedom / limit / np.linalg.norm(freedom / limit)
+        if np.sum((unit @ span) ** 2) > _SAME:
+            words.append(name)
+            left, size, _ = np.linalg.svd(span - np.outer(unit, unit @ span), full_matrices=False)
+            span = left[:, size > 0.5]
+    return span, tuple(words)
+
+
+def _directions(scaled: FloatArray, span: FloatArray, limit: FloatArray) -> list[str]:
+    """Name the directions of position and orientation in what is spanned (6, k) that are beyond their limits."""
+    rest = span @ (span.T @ scaled @ span) @ span.T
+    words = []
+    for part, name, factor, si in (
+        (PLACE, "its position along", 1e3, "mm"),
+        (TURN, "its orientation about", np.rad2deg(1.0), "degrees"),
+    ):
+        variance, vectors = np.linalg.eigh(rest[part, part])
+        for value, direction in zip(variance, vectors.T, strict=True):
+            if value > 1.0:
+                size = factor * np.sqrt(value) * limit[part][0]
+                words.append(f"{name} {_in_words(direction)} of the link (sigma {size:.3g} {si})")
+    return words
+
+
+def _in_words(direction: FloatArray) -> str:
+    """Write a direction (3,), as an axis' name where it is one."""
+    largest = int(np.argmax(np.abs(direction)))
+    if abs(direction[largest]) > 0.98:
+        return "xyz"[largest]
+    x, y, z = direction * np.sign(direction[largest])
+    return f"({x:.2f}, {y:.2f}, {z:.2f})"
 
 
 def mounting_findings(model: RobotModel, link: int, T: FloatArray) -> list[Finding]:

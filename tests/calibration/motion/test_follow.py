@@ -46,7 +46,7 @@ def test_the_simulated_arm_follows_within_two_milliradians_and_ends_at_rest(pand
     assert np.abs(off).max() < 2e-3
     assert np.ptp([s.q for s in states], axis=0).min() > 0.1
     plant.advance(0.3)
-    np.testing.assert_allclose(plant.read().q, plan.end, atol=2e-3)
+    np.testing.assert_allclose(plant.read().q, plan.postures[-1], atol=2e-3)
     steps = np.diff([cycle.step.command for cycle in kept], axis=0) / 0.01
     assert np.all(np.abs(steps) <= 1.001 * panda_model.description.qdd_max)
 
@@ -85,7 +85,7 @@ def test_time_that_a_simulation_leaves_out_is_none_of_the_plans(panda_model: Rob
     assert commander.stopped == ""
     speeds = [np.abs(cycle.step.command).max() for cycle in kept if 4.9 < cycle.inputs.robot.stamp < 5.2]
     assert max(speeds) > 0.5
-    assert kept[-1].step.q == pytest.approx(plan.end, abs=5e-3)
+    assert kept[-1].step.q == pytest.approx(plan.postures[-1], abs=5e-3)
 
 
 def test_a_push_ends_the_motion_at_rest(panda_model: RobotModel):

@@ -69,15 +69,6 @@ class MotionLimits:
         self.qdd_max: FloatArray = params.speed_share * arm.qdd_max
         self._moving: BoolArray = np.isin(model.capsules.link, model.body.link)
 
-    def _distances(self, ends: FloatArray) -> FloatArray:
-        """Distances (S, P + 1) [m] of the pairs of `RobotModel.apart`, then of the lowest moving part and the floor."""
-        lowest = ends[..., 2][:, self._moving].min(axis=2) - self.model.capsules.radius[self._moving]
-        height = lowest.min(axis=1, keepdims=True) - self.params.floor_m
-        return np.hstack([self_distances(self.model, ends), height])
-
-    def _in_range(self, q: FloatArray) -> BoolArray:
-        return np.all((q >= self.q_min) & (q <= self.q_max), axis=1)
-
     def use(self, samples: PlanSamples) -> tuple[float, float]:
         """Largest shares of what is allowed that a motion uses: of a velocity, and of an acceleration. 1 is all."""
         speed = np.abs(samples.qd) / self._speed_at(samples)
@@ -97,16 +88,20 @@ class MotionLimits:
         allowed = np.maximum(0.0, np.sqrt(envelope.slope * np.maximum(distance, 0.0)) - envelope.offset)
         return np.minimum(self.qd_max, self.params.speed_share * allowed + 1e-9)
 
-    def broken(self, plan: Plan, rate: float = RATE_HZ) -> str | None:
+    def broken(self, plan: Plan) -> str | None:
         """Say which limit a motion does not keep, as a clause, or None."""
-        samples = plan.sampled(rate)
-        if not np.all(self._in_range(samples.q)):
-            joint = int(np.argmax(np.maximum(self.q_min - samples.q, samples.q - self.q_max).max(axis=0)))
-            return f"{self.model.joints[joint]} comes closer to its limit than {self.params.margin_rad:g} rad"
+        samples = plan.sampled(RATE_HZ)
+        beyond = np.maximum(self.q_min - samples.q, samples.q - self.q_max).max(axis=0)
+        if beyond.max() > 0.0:
+            joint = self.model.joints[int(beyond.argmax())]
+            return f"{joint} comes closer to its limit than {self.params.margin_rad:g} rad"
         velocity, acceleration = self.use(samples)
         if max(velocity, acceleration) > 1.0:
             return f"it needs {max(velocity, acceleration):.2f} times the allowed speed or acceleration"
-        distances = self._distances(self._ends(samples))
+        ends = self._ends(samples)
+        lowest = ends[..., 2][:, self._moving].min(axis=2) - self.model.capsules.radius[self._moving]
+        height = lowest.min(axis=1, keepdims=True) - self.params.floor_m
+        distances = np.hstack([self_distances(self.model, ends), height])
         nearest = distances.min(axis=0) - _BEND * np.abs(np.diff(distances, 2, axis=0)).max(axis=0, initial=0.0)
         pair = int(np.argmin(nearest))
         if nearest[pair] >= self.params.clearance_m:
@@ -126,12 +121,10 @@ class MotionLimits:
     def report(self, plan: Plan) -> str:
         """Say how long a motion takes, how fast it is and how much room it needs, to be read before the arm moves."""
         samples = plan.sampled(RATE_HZ)
-        ends = self._ends(samples)
-        distances = self._distances(ends).min(axis=0)
+        speed = point_speed(self._ends(samples), samples.time)
         return (
-            f"{plan.duration:.0f} s; parts move at up to {point_speed(ends, samples.time):.2f} m/s.\nThe arm needs the"
-            f" space {self.room(plan)} m (base frame) and comes within {distances[:-1].min():.3f} m of itself and"
-            f" {distances[-1]:.3f} m of the floor."
+            f"{plan.duration:.0f} s; parts move at up to {speed:.2f} m/s.\nThe arm needs the space {self.room(plan)} m"
+            " (base frame)."
         )
 
 

@@ -77,11 +77,6 @@ class Plan:
         return self.postures[0]
 
     @property
-    def end(self) -> FloatArray:
-        """Posture (n,) it ends in [rad]."""
-        return self.postures[-1]
-
-    @property
     def duration(self) -> float:
         """How long it takes [s]."""
         return float(self.knots[-1])

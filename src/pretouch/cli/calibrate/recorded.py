@@ -209,12 +209,11 @@ def _written(answer: Calibration, model: RobotModel, believed: Skin | None, out:
         skin = skin_of(answer, model, believed)
     except CalibrationError as error:
         return f"{error} {out} is not written."
-    if not skin.located:
-        return f"No unit was located well enough, so {out} is not written."
-    save_skin(skin.skin, out)
-    parts = [f"Skin file: {out} has {len(skin.located)} units where they were found."]
-    if skin.kept:
-        parts.append(f"Kept as before, without calibration: {', '.join(skin.kept)}.")
-    if skin.left_out:
-        parts.append(f"Left out: {', '.join(skin.left_out)}.")
+    save_skin(skin, out)
+    ids, located = [unit.id for unit in skin.mounted], [unit.id for unit in answer.units if unit.accepted]
+    parts = [f"Skin file: {out} has {len(located)} units where they were found."]
+    if kept := [name for name in ids if name not in located]:
+        parts.append(f"Kept as before, without calibration: {', '.join(kept)}.")
+    if left_out := [unit.id for unit in answer.units if unit.id not in ids]:
+        parts.append(f"Left out: {', '.join(left_out)}.")
     return " ".join(parts)
