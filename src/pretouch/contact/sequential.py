@@ -259,10 +259,16 @@ def nearness(distance: float, closing: float, near: float, horizon: float) -> fl
 @kernel
 def nearest_of(distance: FloatArray, most: int) -> IntArray:
     """Indices of the smallest distances (K,), at most so many, the nearest first."""
-    nearest, left = np.empty(min(most, len(distance)), np.int64), distance.copy()
-    for i in range(len(nearest)):
-        nearest[i] = np.argmin(left)
-        left[nearest[i]] = np.inf
+    nearest, count = np.empty(min(most, len(distance)), np.int64), 0
+    for k in range(len(distance) if len(nearest) else 0):
+        i = min(count, len(nearest) - 1)
+        if count == len(nearest) and not distance[k] < distance[nearest[i]]:
+            continue
+        while i > 0 and distance[k] < distance[nearest[i - 1]]:
+            nearest[i] = nearest[i - 1]
+            i -= 1
+        nearest[i] = k
+        count = min(count + 1, len(nearest))
     return nearest
 
 
