@@ -7,7 +7,9 @@ from functools import cache
 import numpy as np
 
 from pretouch.contact.admittance import Admittance
+from pretouch.contact.moving_thresholds import MovingThresholds
 from pretouch.contact.reaction import Reaction
+from pretouch.contact.sequential_test import SequentialTest
 from pretouch.control.approach import ApproachRestriction, notice_m
 from pretouch.modes import Event, ModeState
 from pretouch.params import ClampParams
@@ -84,9 +86,10 @@ def check_touched(touched: Touched) -> None:
     assert ((touched.probability > 0.0) & (touched.probability <= 1.0 + 1e-9)).all()
 
 
-def check_finite(step: ControlStep, believed: RobotState) -> None:
+def check_finite(step: ControlStep, believed: RobotState, p: Profile) -> None:
     """Every number is finite but for what is documented to be NaN."""
     unknown = MAY_BE_NAN if np.isfinite(step.residual).any() else MAY_BE_NAN | {"residual", *Thresholds._fields}
+    unknown = unknown if isinstance(p.detect, MovingThresholds | SequentialTest) else unknown | {*Thresholds._fields}
     numbers = [array.ravel() for name, array in arrays_of(step) if name not in unknown]
     assert np.isfinite(np.concatenate(numbers)).all()
     wrench = believed.wrench

@@ -126,7 +126,7 @@ class Course:
     def _check(self, step: ControlStep, believed: RobotState) -> None:
         p, model = self.world.profile, self.other
         invariants.check_command(step, believed, p, model)
-        invariants.check_finite(step, believed)
+        invariants.check_finite(step, believed, p)
         invariants.check_braking(step, believed, p, model)
         invariants.check_obstacles(step, len(self.world.skin))
         invariants.check_speed_scale(step, p)
