@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from pretouch.sim.hand import Hand, HandGoal, PersonArm, point_on_arm
+from pretouch.sim.hand import Hand, HandGoal, PersonArm
 from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
@@ -95,17 +95,6 @@ def test_a_hand_that_pushes_to_the_left_puts_a_force_to_the_left_on_the_arm(plan
     assert plant.true_force == pytest.approx(plant.mj_data.qfrc_applied[-3:], abs=0.5)  # at rest
     after = np.mean(each_step(plant, 0.3, lambda: plant.read().wrench), axis=0)
     assert (after - before)[:3] == pytest.approx(plant.true_force, abs=1.5)
-
-
-def test_a_point_on_the_arm_moves_with_its_link(panda_model, plant_with_hand):
-    plant, offset = plant_with_hand(FREE), np.array([0.02, -0.05, 0.1])
-    link = panda_model.link_index("panda_link5")
-    for speed in (0.3, 0.0):
-        plant.command(np.full(7, speed))
-        plant.advance(0.5)
-    kin = panda_model.kinematics(plant.read().q)
-    expected = kin.position[link] + kin.rotation[link] @ offset
-    assert point_on_arm(plant, link, offset) == pytest.approx(expected, abs=1e-5)
 
 
 # Touches

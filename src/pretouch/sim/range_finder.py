@@ -154,11 +154,10 @@ class RangeFinders:
             units, draws = self._boards[board], rng.standard_normal(len(self._boards[board])).tolist()
             arrival, lost = time + p.latency_s + rng.exponential(p.jitter_s), rng.random() < p.dropout
             due += [(unit, draw, arrival, lost) for unit, draw in zip(units, draws, strict=True)]
-        optical = [one[:2] for one in due if one[0] not in self._electrodes]
-        ranges = iter(_measure(np.array(optical).reshape(-1, 2), p.numbers, self._finders, self._geoms).tolist())
-        for unit, draw, arrival, lost in due:
-            electrode = self._electrodes.get(unit)
-            distance, status, sigma, strength = electrode.measure(time, draw) if electrode else next(ranges)
+        measured = _measure(np.array(due).reshape(-1, 4), p.numbers, self._finders, self._geoms).tolist()
+        for (unit, draw, arrival, lost), (distance, status, sigma, strength) in zip(due, measured, strict=True):
+            if unit in self._electrodes:
+                distance, status, sigma, strength = self._electrodes[unit].measure(time, draw)
             if unit in self.silenced:
                 continue
             if self._send:
@@ -209,7 +208,7 @@ class _Finders(NamedTuple):
 
 @compiled
 def _measure(units: FloatArray, p: RangeFinderParams, finders: _Finders, geoms: Geoms) -> FloatArray:
-    """Measure with N sensors at once: (N, 2) are their numbers, and a normal draw for each.
+    """Measure with N sensors at once: (N, 4) are their numbers, a normal draw for each, and more.
 
     Returns (N, 4): distance [m], status, standard deviation [m], and strength.
     """
