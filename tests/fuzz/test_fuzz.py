@@ -124,7 +124,7 @@ def told(course, step, *wrong):
         lambda c, s, r: invariants.check_rows(replace(s, approach_limit=s.approach_limit + 1e-6), SHORT, c.other),
         lambda c, s, r: invariants.check_rows(replace(s, restricted=s.restricted[1:]), SHORT, c.other),
         lambda c, s, r: invariants.check_speed_scale(replace(s, speed_scale=1.0), SHORT),
-        lambda c, s, r: invariants.check_finite(replace(s, ee_velocity=s.ee_velocity * np.inf), r),
+        lambda c, s, r: invariants.check_finite(replace(s, ee_velocity=s.ee_velocity * np.inf), r, SHORT),
         lambda c, s, r: invariants.check_shapes(replace(s, q=s.q[:6]), 7, 7),
         lambda c, s, r: invariants.check_shapes(replace(s, command=s.command.astype(np.float32)), 7, 7),
         lambda c, s, r: told(c, replace(s, mode=Mode.HOLD)),
