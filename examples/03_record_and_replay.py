@@ -27,7 +27,7 @@ with TemporaryDirectory() as folder:
             recording.record(pt.Cycle(inputs, state, step, after))
             state, qd = after, step.command
             q = q + qd * control.limits.period
-    print(recording.close().sentence)
+    print(recording.close())
 
     recorded = pt.open_recording(place)
     speed = max(float(np.linalg.norm(kept.step.ee_velocity)) for kept in recorded)

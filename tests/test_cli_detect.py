@@ -88,7 +88,6 @@ def test_a_rate_is_that_of_the_detector(capsys, tmp_path):
         ({"profiles": ()}, ParameterError, "No profile is given"),
         ({"gains": (1.0, 0.0)}, ParameterError, "--gains is 1,0"),
         ({"gains": (1.0, math.inf)}, ParameterError, "--gains is 1,inf"),
-        ({"gains": (1.0, -2.0)}, ParameterError, "--gains is 1,-2"),
         ({"rate": 10.0}, ParameterError, "The rate is 10 Hz"),
         ({"out": Path("a.gif")}, RecordingError, "a.gif has an unknown format"),
         ({"out": Path("/dev/null/a.png")}, PretouchError, "/dev/null/a.png cannot be written"),

@@ -17,9 +17,9 @@ from pretouch.arms.simulated.arm import ThreadedArm
 from pretouch.cli.run.command import Run
 from pretouch.cli.run.options import RobotOptions, SkinOptions, TaskOptions
 from pretouch.cli.run.setup import run_setup
+from pretouch.recording.disk import Disk
 from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify
-from pretouch.recording.writer import Recording
 from pretouch.session.memory import Identity
 from pretouch.session.push import GuidedPush
 from pretouch.types import Mode
@@ -157,7 +157,8 @@ def test_a_damaged_note_of_confirmed_robots_is_found_before_the_checks(tmp_path,
 def test_a_recording_that_fails_in_the_middle_is_told_at_once_and_by_the_exit_code(capsys, monkeypatch):
     notes = iter([["It is old."], ["It is old.", "It was late."]])
     monkeypatch.setattr("pretouch.arms.simulated.OpenedArm", partial(OpenedArm, notes=lambda: next(notes)))
-    at_begin(monkeypatch, 0.2, lambda _: monkeypatch.setattr(Recording, "trouble", "The disk is full."))
+    full = property(lambda disk: "The disk is full.", lambda disk, text: None)
+    at_begin(monkeypatch, 0.2, lambda _: monkeypatch.setattr(Disk, "trouble", full, raising=False))
     assert cli.main([*BLIND, "--seconds", "1", "--yes", "--record", "a.mcap"]) == 1
     said = capsys.readouterr().out
     assert -1 < said.find("The disk is full.") < said.find("The arm is at rest.")

@@ -48,9 +48,9 @@ from pretouch.profiles import PROFILES as PROFILES
 from pretouch.profiles import Profile as Profile
 from pretouch.profiles import at_rate as at_rate
 from pretouch.profiles import profile as profile
-from pretouch.recording.last_seconds import LastSeconds as LastSeconds
 from pretouch.recording.reader import open_recording as open_recording
 from pretouch.recording.verify import verify as verify
+from pretouch.recording.writer import LastSeconds as LastSeconds
 from pretouch.recording.writer import Recording as Recording
 from pretouch.reporting.measures import measure as measure
 from pretouch.robot.description import RobotDescription as RobotDescription

@@ -42,14 +42,6 @@ def test_bags_of_ros_2_are_read_as_folder_and_as_file(tmp_path, plugin, as_file)
     assert recording.source == "/wrench"
 
 
-def test_the_sign_is_what_was_said_and_is_kept(tmp_path):
-    bag = write_bag(tmp_path / "bag", wrenches(FORCE))
-    on, by = force_of(bag, sign="on-robot"), force_of(bag, sign="by-robot")
-    np.testing.assert_array_equal(on.force, FORCE)
-    np.testing.assert_array_equal(by.force, -FORCE)
-    assert (on.by_robot, by.by_robot) == (False, True)
-
-
 @pytest.mark.parametrize(
     ("sign", "zeros", "code"),
     [
@@ -57,12 +49,14 @@ def test_the_sign_is_what_was_said_and_is_kept(tmp_path):
         ("on-robot", "missing", "zeros_missing"), ("by-robot", "kept", "zeros_kept"),
     ],
 )  # fmt: skip
-def test_wrenches_of_zeros_only_are_no_estimate_where_the_robot_says_so(tmp_path, sign, zeros, code):
+def test_the_sign_is_what_was_said_and_six_zeros_are_no_estimate_where_the_robot_says_so(tmp_path, sign, zeros, code):
     messages = wrenches(FORCE)
     stamp = messages[7][1] - 300_000
     messages[7] = ("/wrench", stamp + 300_000, wrench(stamp, (0, 0, 0), (0, 0, 0)))
     messages[9] = ("/wrench", messages[9][1], wrench(messages[9][1] - 300_000, (0, 0, 0), (0, 0, 1)))
     recording = force_of(write_bag(tmp_path / "bag", messages), sign=sign, zeros=zeros)
+    assert recording.by_robot is (sign == "by-robot")
+    np.testing.assert_array_equal(recording.force[20:], -FORCE[20:] if recording.by_robot else FORCE[20:])
     gone = np.flatnonzero(np.isnan(recording.force).any(axis=1))
     assert gone.tolist() == ([7] if code == "zeros_missing" else [])
     assert [(note.code, note.values["count"]) for note in recording.notes] == [(code, 1)]

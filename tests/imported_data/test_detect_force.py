@@ -42,6 +42,7 @@ def controlled(panda_model, paper_skin):
     return run
 
 
+SOON = ((1.7, 0.6, (0.0, 40.0, 0.0)), (4.7, 0.5, (-45.0, 0.0, 10.0)), (7.7, 0.8, (0.0, 0.0, -35.0)))
 LASTS = ((2.0, 4.0, (0.0, 60.0, 0.0)),)
 """A push that is found again after each reaction."""
 
@@ -49,12 +50,12 @@ LASTS = ((2.0, 4.0, (0.0, 60.0, 0.0)),)
 @pytest.mark.parametrize(
     ("name", "pushes"),
     [
-        ("paper", PUSHES), ("blind", PUSHES), ("paper:detect.compare=raw", PUSHES),
-        ("blind:window.samples=150", PUSHES), ("paper:react.decay_cycles=20", LASTS),
+        ("paper", SOON), ("paper:detect.compare=raw", SOON), ("blind:window.samples=150", SOON),
+        ("paper:react.decay_cycles=20", LASTS),
     ],
 )  # fmt: skip
 def test_a_controller_given_the_same_forces_decides_the_same(of_force, controlled, name, pushes):
-    force, p = pushed(14.0, pushes), profile(name)
+    force, p = pushed(9.0, pushes), profile(name)
     found, (steps, cycles) = decided(of_force(force), p), controlled(force, p)
     assert len(cycles) >= 3
     assert [round((c.time_s - 0.005) * 100) for c in found.contacts] == cycles
@@ -83,7 +84,7 @@ def test_of_faster_data_the_newest_sample_of_each_cycle_is_taken(of_force):
 
 
 def test_slower_data_are_held_and_the_way_out_is_named(of_force, controlled):
-    force = pushed(14.0, PUSHES, rate=25.0)
+    force = pushed(9.0, SOON, rate=25.0)
     imported = of_force(force, 25.0)
     found = decided(imported, PAPER)
     np.testing.assert_array_equal(found.force[:100:4], force[:25])

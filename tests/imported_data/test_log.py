@@ -1,7 +1,6 @@
 """Samples in time, joints by their names, and what cannot be opened."""
 
 import os
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -67,13 +66,6 @@ def test_between_samples_that_are_near_values_are_linear_and_elsewhere_unknown(l
     holds()
 
 
-def test_a_log_of_joints_keeps_them_in_order_with_their_time(log):
-    both = replace(log([3, 1, 2]), arrays={"q": np.array([[3.0], [1.0], [2.0]])})
-    ordered = both.in_order("q")
-    assert ordered.arrays["q"][:, 0].tolist() == [1.0, 2.0, 3.0]
-    assert ordered.notes[0].values["what"] == "Joints"
-
-
 NUMBERED = tuple(f"joint_{j}" for j in range(1, 8))
 
 
@@ -81,10 +73,8 @@ NUMBERED = tuple(f"joint_{j}" for j in range(1, 8))
     "names",
     [
         PANDA,
-        tuple(name.upper() for name in PANDA),
         tuple(f"left_{name}" for name in PANDA),
         tuple(f"fr3_joint{j}" for j in range(1, 8)),
-        tuple(f"q{j}" for j in range(1, 8)),
         tuple(f"lbr_joint_{j}" for j in range(7)),
         tuple(f"joint{j}/position" for j in range(1, 8)),
     ],
@@ -133,7 +123,6 @@ def test_positions_out_of_the_arms_range_are_refused_and_degrees_are_named(panda
         ("folder", {}, "has no metadata.yaml"),
         ("pipe.csv", {}, "is no file"),
         ("a.csv", {"wrench": "/w"}, "is a table and has no topics"),
-        ("a.csv", {"torques": "/t"}, "is a table and has no topics"),
         ("a.csv", {}, "is empty"),
         ("a.mcap", {}, "cannot be read as a bag or MCAP file"),
         ("a.parquet", {}, "cannot be read as a Parquet file"),

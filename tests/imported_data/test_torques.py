@@ -11,7 +11,7 @@ from pyarrow import parquet
 
 from pretouch.errors import ParameterError, RecordingError
 from pretouch.imported_data.detect import detect
-from pretouch.imported_data.log import Choice, mapping_of
+from pretouch.imported_data.log import Choice
 from pretouch.imported_data.reading import open_log
 from pretouch.imported_data.tables import renamed
 from pretouch.imported_data.torques import observed, torque_recording
@@ -147,17 +147,12 @@ def test_a_log_of_libfranka_is_read_as_it_is(tmp_path, short):
     assert recording.sources == ("tau_ext_hat_filtered[0]", "q[0]")
 
 
-def test_columns_of_other_names_are_mapped_one_by_one_or_by_a_pattern_or_by_a_file(tmp_path, short):
+def test_columns_of_other_names_are_mapped_one_by_one_or_by_a_pattern(tmp_path, short):
     columns = short.columns(("pos_*", short.q), ("vel.*", short.qd), ("effort[*]", short.tau_ext))
     columns["t"] = columns.pop("time_s")
     file = write_csv(tmp_path / "a.csv", columns)
     text = "t=time_s, pos_*=q*_rad, vel.*=dq*_rad_s, effort[*]=tau_ext*_Nm"
-    by_text = read_torques(file, Choice(columns=text))
-    np.testing.assert_allclose(by_text.tau_ext, short.tau_ext)
-    toml = tmp_path / "columns.toml"
-    toml.write_text("\n".join(f'"{a}" = "{b}"' for a, b in mapping_of(text)))
-    by_file = read_torques(file, Choice(columns=str(toml)))
-    np.testing.assert_allclose(by_file.q, by_text.q)
+    np.testing.assert_allclose(read_torques(file, Choice(columns=text)).tau_ext, short.tau_ext)
 
 
 @pytest.mark.parametrize("named", ["q{}_rad", "panda_joint{}_rad"])
@@ -171,15 +166,14 @@ def test_joints_may_be_numbered_from_zero_and_positions_named(tmp_path, short, n
 
 
 def test_numbers_of_joints_in_a_pattern_begin_at_one_or_zero():
-    assert renamed(Path("a"), ["x_0", "x_1", "y"], (("x_*", "q*_rad"),)) == ["q1_rad", "q2_rad", "y"]
-    assert renamed(Path("a"), ["x_1", "x_2"], (("x_*", "q*_rad"),)) == ["q1_rad", "q2_rad"]
+    assert renamed(Path("a"), ["x_0", "x_1", "y"], "x_*=q*_rad") == ["q1_rad", "q2_rad", "y"]
+    assert renamed(Path("a"), ["x_1", "x_2"], "x_*=q*_rad") == ["q1_rad", "q2_rad"]
 
 
 @pytest.mark.parametrize(
     ("columns", "error", "words"),
     [
-        ("tau_J_0", ParameterError, "--columns has 'tau_J_0' for '': write THEIRS=OURS"),
-        ("gone.toml", ParameterError, "gone.toml cannot be read"),
+        ("tau_J_0", ParameterError, "--columns has 'tau_J_0': write THEIRS=OURS"),
         ("nothing=q1_rad", RecordingError, "has no column 'nothing'"),
         ("no_*=q*_rad", RecordingError, r"has no column 'no_\*'"),
     ],

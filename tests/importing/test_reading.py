@@ -8,8 +8,7 @@ from tests.importing.made import BOX, joint, link, six_axis, written
 
 from pretouch.errors import MissingExtraError, RobotModelError
 from pretouch.importing.chain import arm_of, limits_of
-from pretouch.importing.meshes import read_mesh
-from pretouch.importing.read import read_robot
+from pretouch.importing.read import read_mesh, read_robot
 
 
 def link_of(robot, name="base"):
@@ -35,18 +34,14 @@ def arm(folder, text, ee=""):
             "cannot be read",
         ),
         (f"<robot name='r'>{link('a')}{link('a')}</robot>", "repeated URDF name"),
-        (f"<robot name='r'>{link('a')}{joint('j', 'a', 'nowhere')}</robot>", "parent or child missing Element 'joint'"),
         (six_axis(changed={2: {"kind": "screw"}}), "invalid joint type in URDF joint definition"),
-        (six_axis(changed={2: {"axis": "0 0 0"}}), "axis too small in joint Element name 'joint2'"),
         (six_axis(changed={2: {"xyz": "0 nan 0"}}), "joint2: xyz of <origin> is '0 nan 0': give finite numbers"),
         (six_axis(changed={2: {"xyz": "0 9 0"}}), "joint2: xyz of <origin> is '0 9 0': .* millimetres"),
-        (six_axis(changed={2: {"more": '<dynamics friction="much"/>'}}), "bad format in attribute 'friction' Element"),
         (six_axis(changed={2: {"limit": '<limit lower="low"/>'}}), "could not convert string to float: 'low'"),
         (six_axis(changed={2: {"limit": '<limit velocity="1"/>'}}), "joint2 has the range 0 to 0, but only .* limit"),
         (six_axis(changed={4: {"kind": "prismatic"}}), "joint4 is prismatic, but only hinges .* --ee, such as link3"),
         (six_axis(changed={4: {"more": '<mimic joint="joint3"/>'}}), "The joint joint4 mimics another one.*--ee"),
         (six_axis().replace("0.08 0.08 0.2", "0 1 1", 1), "size 0 must be positive in geom"),
-        (six_axis().replace('<box size="0.08 0.08 0.2"/>', "<cone/>", 1), "geometry specification not found"),
     ],
 )
 def test_a_broken_urdf_is_refused_in_one_sentence(tmp_path, text, sentence):
@@ -72,7 +67,7 @@ def test_the_tool_frame_is_taken_for_the_end_effector(tmp_path):
     found = arm(tmp_path, six_axis(link("camera", inertial="") + joint("c", "link6", "camera", "fixed")))
     assert found.robot.links[found.ee].name == "tool0"
     assert [j.name for j in found.joints] == [f"joint{k}" for k in range(1, 7)]
-    assert "choose another one with --ee: camera" in found.remarks[0]
+    assert "choose another one with --ee: camera" in found.robot.remarks[0]
 
 
 @pytest.mark.parametrize(("joint_name", "link_name"), [("jointGripper", "mover"), ("j7", "upper_jaw")])
@@ -80,7 +75,7 @@ def test_a_single_finger_is_fixed_unless_asked_for(tmp_path, joint_name, link_na
     more = link(link_name, BOX) + joint(joint_name, "link6", link_name, axis="0 1 0")
     found = arm(tmp_path, six_axis(more))
     assert [j.name for j in found.joints] == [f"joint{k}" for k in range(1, 7)]
-    assert any(f"fixed at 0 or at the nearest limit: {joint_name}." in r for r in found.remarks)
+    assert any(f"fixed at 0 or at the nearest limit: {joint_name}." in r for r in found.robot.remarks)
     assert [j.name for j in arm(tmp_path, six_axis(more), link_name).joints][-1] == joint_name
 
 
@@ -91,16 +86,13 @@ def test_a_last_link_called_gripper_is_the_arms(tmp_path):
 
 def test_limits_that_no_joint_has_are_named(tmp_path):
     huge = '<limit lower="-900000" upper="900000" velocity="900" effort="9e5"/>'
-    limits = limits_of(arm(tmp_path, six_axis(changed={3: {"limit": huge}})))
+    found = arm(tmp_path, six_axis(changed={3: {"limit": huge}}))
+    limits_of(found)
     for what, value in (("position", "900000 rad"), ("velocity", "900 rad/s"), ("torque", "900000 Nm")):
-        assert any(r.startswith(f"Implausible {what} limits") and f"joint3 ({value})" in r for r in limits.remarks)
-    assert not any("Implausible" in r for r in limits_of(arm(tmp_path, six_axis())).remarks)
-
-
-def test_damping_and_friction_of_a_urdf_are_left_out_with_a_sentence(tmp_path):
-    dynamics = {2: {"more": '<dynamics damping="10" friction="1"/>'}, 3: {"more": '<dynamics damping="0"/>'}}
-    (sentence,) = arm(tmp_path, six_axis(changed=dynamics)).remarks
-    assert sentence == "Armature, damping, friction and springs of the joints are left out: joint2."
+        assert any(r.startswith(f"Implausible {what} limits") and f"joint3 ({value})" in r for r in found.robot.remarks)
+    sound = arm(tmp_path, six_axis())
+    limits_of(sound)
+    assert not any("Implausible" in r for r in sound.robot.remarks)
 
 
 def branching(before, after):
@@ -118,7 +110,7 @@ def test_of_two_arms_one_has_to_be_chosen(tmp_path):
         arm(tmp_path, branching(0, 5))
     chosen = arm(tmp_path, branching(0, 5), "r5")
     assert [j.name for j in chosen.joints] == [f"jr{k}" for k in range(1, 6)]
-    assert "jl1, jl2" in chosen.remarks[0]
+    assert "jl1, jl2" in chosen.robot.remarks[0]
 
 
 def test_a_chain_that_branches_is_refused_with_the_ends_of_its_branches(tmp_path):
@@ -128,17 +120,17 @@ def test_a_chain_that_branches_is_refused_with_the_ends_of_its_branches(tmp_path
     # two fingers of a whole arm are no branches to choose from
     whole = arm(tmp_path, branching(6, 1))
     assert [j.name for j in whole.joints] == [f"jt{k}" for k in range(1, 7)]
-    assert "jl1, jr1" in whole.remarks[-1]
+    assert "jl1, jr1" in whole.robot.remarks[-1]
 
 
 @pytest.mark.parametrize("limit", ["", '<limit lower="-2" upper="2"/>'])
 def test_limits_that_are_missing_are_assumed_with_a_sentence(tmp_path, limit):
     found = arm(tmp_path, six_axis(changed={1: {"kind": "continuous", "limit": limit}}))
     limits, unused = limits_of(found), "The position limits of joint1 are not used: it is continuous."
-    assert (unused in found.remarks) is bool(limit)
+    assert (unused in found.robot.remarks) is bool(limit)
     assert limits.q_max[0] == pytest.approx(2 * np.pi)
     assert limits.qd_max.tolist() == [1.0, 2.0, 2.0, 2.0, 2.0, 2.0]
-    said = " ".join(limits.remarks)
+    said = " ".join(found.robot.remarks)
     for part in ("no usable position limits of joint1: -2 pi to 2 pi", "give each a lower and an upper one",
                  "velocity limit of joint1: 1 rad/s", "acceleration limit of all joints",
                  "give --qdd-max", "torque limit of joint1: 50 Nm"):  # fmt: skip
@@ -201,14 +193,12 @@ def test_a_package_is_found_in_the_path_given(tmp_path):
     ("name", "content", "sentence"),
     [
         ("a.stl", b"", "or is truncated"),
-        ("a.stl", b"\0" * 80 + (2**32 - 1).to_bytes(4, "little") + b"\0" * 50, "or is truncated"),
         ("a.stl", b"version https://git-lfs.github.com/spec/v1\n", "or is truncated"),
         ("a.stl", ASCII_STL[:-12].encode(), "or is truncated"),
         ("a.stl", ASCII_STL.replace("0 50 0", "0 50 zero").encode(), "is damaged: .* could not be read to its end"),
         ("a.stl", ASCII_STL.replace("0 50 0", "0 50").encode(), "is damaged: incorrect number of vertices"),
         ("a.stl", ASCII_STL.replace("0 50 0", "50 0 0").encode(), "no triangle with an area"),
         ("a.stl", ASCII_STL.replace("100", "nan").encode(), "finite corners"),
-        ("a.obj", b"v 0 0 0\nf a b c\n", "is damaged: invalid literal"),
         ("a.obj", b"v 0 0 0\nf 1 2 3\n", "is damaged: index 1 is out of bounds"),
         ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 0 1 2\n", "is damaged: its faces do not count"),
         ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\nv 9 9 9\n", "from 1 onwards: save it anew"),

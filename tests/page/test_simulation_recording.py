@@ -10,7 +10,6 @@ from pretouch.page.simulation import LiveSimulation
 from pretouch.profiles import PROFILES, profile
 from pretouch.recording.reader import open_recording
 from pretouch.recording.verify import verify
-from pretouch.recording.writer import Recording
 from pretouch.types import Mode
 
 
@@ -49,7 +48,7 @@ def test_each_step_is_kept_with_what_only_the_simulation_knows_and_is_recomputed
     for mine, theirs in zip(steps, switched(other), strict=True):
         np.testing.assert_array_equal(mine.command, theirs.command)
     assert session.recording is None
-    assert closed.steps == len(steps)
+    assert f"{len(steps)} control steps" in closed
     recorded = open_recording(place)
     assert len(recorded) == len(steps)
     assert [run.profile.perception is not None for run in recorded.runs] == [True, False, True, True]
@@ -82,7 +81,7 @@ def test_a_reset_ends_the_recording_and_says_so(session, tmp_path):
     assert session.recording is None
     assert "holds 20 control steps" in session.notice
     assert len(open_recording(tmp_path / "live.mcap")) == 20
-    assert session.stop_recording() is None
+    assert session.stop_recording() == ""
 
 
 def test_another_recording_ends_the_one_before(session, tmp_path):
@@ -103,7 +102,7 @@ def test_a_place_that_cannot_be_written_is_refused_and_the_session_goes_on(sessi
 def test_a_recording_in_trouble_ends_with_its_sentence_and_the_session_goes_on(session, tmp_path, monkeypatch):
     session.start_recording(tmp_path / "live.mcap")
     session.advance(0.1)
-    monkeypatch.setattr(Recording, "trouble", "The disk is full.")
+    monkeypatch.setattr(session.recording._disk, "trouble", "The disk is full.")
     assert len(session.advance(0.1)) == 10
     assert session.notice == "The disk is full."
     assert session.recording is None

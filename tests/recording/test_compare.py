@@ -17,7 +17,7 @@ from tests.imported_data.files import pushed
 from tests.reference.contact import Touch
 
 PAPER, BLIND = PROFILES["paper"], PROFILES["blind"]
-PUSHES = ((2.0, 0.6, (0.0, 40.0, 0.0)), (5.0, 0.5, (-25.0, 0.0, 3.0)))
+FORCE = pushed(5.4, ((1.5, 0.6, (0.0, 40.0, 0.0)), (4.5, 0.5, (-25.0, 0.0, 3.0))))
 
 
 class Recorded(Arm):
@@ -45,15 +45,23 @@ def arm(panda_model, paper_skin, tmp_path):
     return Recorded(panda_model, paper_skin, tmp_path / "run.mcap")
 
 
-def played(arm, force=None, seen=None):
-    for sample in pushed(7.0, PUSHES) if force is None else force:
+def played(arm, force, seen=None):
+    for sample in force:
         arm.turn(sample, seen)
     arm.recording.close()
     return open_recording(arm.recording.place)
 
 
-def test_the_same_profile_decides_exactly_what_was_recorded(arm):
-    found = compare(played(arm, seen={0: 0.25}), PAPER)
+@pytest.fixture(scope="module")
+def run(panda_model, paper_skin, tmp_path_factory):
+    """An arm that was pushed beside an obstacle, and its recording."""
+    arm = Recorded(panda_model, paper_skin, tmp_path_factory.mktemp("pushed") / "run.mcap")
+    return arm, played(arm, FORCE, seen={0: 0.25})
+
+
+def test_the_same_profile_decides_exactly_what_was_recorded(run):
+    arm, recorded = run
+    found = compare(recorded, PAPER)
     assert len(found.recorded.contacts) == 2
     assert [(c.time_s, *c.force_n) for c in found.other.contacts] == [
         (c.time_s, *c.force_n) for c in found.recorded.contacts
@@ -66,11 +74,10 @@ def test_the_same_profile_decides_exactly_what_was_recorded(arm):
     assert found.left_out == 0
 
 
-def test_another_profile_decides_what_the_plain_detector_does(arm):
-    force = pushed(7.0, PUSHES)
-    found = compare(played(arm, force, seen={0: 0.25}), profile("blind:window.samples=60"))
+def test_another_profile_decides_what_the_plain_detector_does(run):
+    found = compare(run[1], profile("blind:window.samples=60"))
     touch = Touch(BLIND.detect, replace(BLIND.window, samples=60))
-    limits = [touch.feel(sample, np.zeros(3), no_obstacles())[0] for sample in force]
+    limits = [touch.feel(sample, np.zeros(3), no_obstacles())[0] for sample in FORCE]
     np.testing.assert_allclose(found.other.upper, [t.upper for t in limits], atol=1e-9)
     np.testing.assert_allclose(found.other.lower, [t.lower for t in limits], atol=1e-9)
     assert found.other.name == "blind:window.samples=60"
@@ -79,56 +86,53 @@ def test_another_profile_decides_what_the_plain_detector_does(arm):
     )
 
 
-def test_a_contact_that_only_one_finds_is_told_apart(arm):
-    deaf = profile("paper:detect.f_base_n=20")
-    found = compare(played(arm), deaf)
-    assert [round(c.time_s, 1) for c in found.recorded.contacts] == [2.1, 5.2]
-    assert [round(c.time_s, 1) for c in found.other.contacts] == [2.2]
+def test_a_contact_that_only_one_finds_is_told_apart(run):
+    found = compare(run[1], profile("blind:detect.f_base_n=20"))
+    assert [round(c.time_s, 1) for c in found.recorded.contacts] == [1.6, 4.7]
     (recorded, other), alone = found.pairs
     assert other.time_s > recorded.time_s
     assert alone == (found.recorded.contacts[1], None)
 
 
+def test_a_profile_for_another_rate_is_brought_to_that_of_the_run(run):
+    found = compare(run[1], at_rate(PAPER, 1000.0))
+    np.testing.assert_allclose(found.other.upper, found.recorded.upper, atol=1e-9)
+
+
 def test_it_goes_on_through_a_change_of_profile(arm):
-    force = pushed(7.0, PUSHES)
-    for sample in force[:400]:
+    for sample in FORCE[:400]:
         arm.turn(sample)
     arm.switch(replace(BLIND, detect=replace(BLIND.detect, f_base_n=30.0)))
-    found = compare(played(arm, force[400:]), PAPER)
-    assert len(found.recorded.time) == len(found.other.time) == 700
-    assert [round(c.time_s, 1) for c in found.recorded.contacts] == [2.1]
-    assert [round(c.time_s, 1) for c in found.other.contacts] == [2.1, 5.2]
+    found = compare(played(arm, FORCE[400:]), PAPER)
+    assert len(found.recorded.time) == len(found.other.time) == len(FORCE)
+    assert [round(c.time_s, 1) for c in found.recorded.contacts] == [1.6]
+    assert [round(c.time_s, 1) for c in found.other.contacts] == [1.6, 4.7]
     assert found.recorded.name == "paper, blind"
 
 
 def test_a_recording_that_begins_with_a_full_window_is_not_filled_anew(arm):
-    for sample in pushed(3.0, ()):
+    for sample in pushed(1.2, ()):
         arm.turn(sample)
     second = Recording(arm.recording.place.with_name("later.mcap"), arm.controller)
     arm.recording.close()
     arm.recording = second
-    found = compare(played(arm, pushed(1.0, (), seed=8)), BLIND)
+    found = compare(played(arm, pushed(0.5, (), seed=8)), BLIND)
     assert found.other.armed.all()
     np.testing.assert_array_equal(found.recorded.upper, found.other.upper)
 
 
-def test_a_profile_for_another_rate_is_brought_to_that_of_the_run(arm):
-    found = compare(played(arm), at_rate(PAPER, 1000.0))
-    np.testing.assert_allclose(found.other.upper, found.recorded.upper, atol=1e-9)
-
-
-def test_cycles_without_inputs_are_left_out_and_counted(arm):
-    for i, sample in enumerate(pushed(7.0, PUSHES)):
-        arm.turn(sample, change=lambda robot, i=i: None if i == 300 else robot)
+def test_cycles_without_inputs_are_left_out_and_counted_and_without_any_nothing_can_be_compared(arm):
+    arm.turn((0, 0, 0), change=lambda robot: None)
+    alone = arm.recording
+    arm.recording = Recording(alone.place.with_name("more.mcap"), arm.controller)
+    alone.close()
+    with pytest.raises(RecordingError, match="no cycle with a usable robot state"):
+        compare(open_recording(alone.place), PAPER)
+    for i in range(20):
+        arm.turn((0, 0, 0), change=lambda robot, i=i: None if i == 9 else robot)
     found = compare(played(arm, ()), PAPER)
     assert found.left_out == 1
-    assert len(found.other.time) == 699
-
-
-def test_a_recording_without_a_usable_cycle_is_refused(arm):
-    arm.turn((0, 0, 0), change=lambda robot: None)
-    with pytest.raises(RecordingError, match="no cycle with a usable robot state"):
-        compare(played(arm, ()), PAPER)
+    assert len(found.other.time) == 19
 
 
 def at(*times):

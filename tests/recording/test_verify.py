@@ -28,7 +28,7 @@ from tests.recording.runs import Run, changed, record, recorded_run, steps_chang
 def place(controller, tmp_path_factory):
     """A recorded run, which nobody writes to."""
     place = tmp_path_factory.mktemp("run") / "a.mcap"
-    recorded_run(place, controller, 400)
+    recorded_run(place, controller, 320)
     return place
 
 
@@ -42,9 +42,9 @@ def test_a_run_is_recomputed_bit_for_bit(made):
     verdict = verify(made, done.append)
     assert verdict.agrees
     assert verdict.exact
-    assert (verdict.steps, verdict.checked, verdict.skipped, verdict.differing) == (400, 400, {}, 0)
-    assert verdict.sentence == "All 400 steps were recomputed and are the same bit for bit."
-    assert done == list(range(1, 401))
+    assert (verdict.steps, verdict.checked, verdict.skipped, verdict.differing) == (320, 320, {}, 0)
+    assert verdict.sentence == "All 320 steps were recomputed and are the same bit for bit."
+    assert done == list(range(1, 321))
 
 
 class RecordedCourse(Course):
@@ -60,7 +60,7 @@ class RecordedCourse(Course):
         return step
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", [0, 2, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 3, 4, 5))])
 def test_whatever_comes_in_is_recomputed_bit_for_bit(seed, tmp_path):
     machine = Machine(seed)
     course = RecordedCourse(machine, any_world(machine.rng, machine.models[seed % 2]))
@@ -179,7 +179,7 @@ def test_steps_that_are_missing_are_passed_to_the_next_snapshot(place, tmp_path)
     assert not verdict.agrees
     assert verdict.skipped == {"gone missing": 10, "no snapshot before": second - 60}
     assert "10 steps have gone missing" in verdict.sentence
-    assert verdict.checked == 390 - (second - 60)
+    assert verdict.checked == 310 - (second - 60)
 
 
 def test_inputs_that_are_missing_are_no_inputs_that_could_not_be_kept(place, tmp_path):

@@ -26,7 +26,7 @@ from tests.recording.runs import Run, record
 @pytest.fixture(scope="module")
 def made(controller, tmp_path_factory) -> tuple[Path, Run]:
     place = tmp_path_factory.mktemp("made") / "run.mcap"
-    return place, record(Run(controller), place, 700, about={"seed": 0})
+    return place, record(Run(controller), place, 330, about={"seed": 0})
 
 
 def test_all_cycles_come_back_to_the_bit(made):
@@ -45,10 +45,8 @@ def test_all_cycles_come_back_to_the_bit(made):
 
 
 def test_snapshots_come_with_the_first_cycle_and_every_three_seconds(made):
-    recorded = open_recording(made[0])
-    times = [kept.step.stamp for kept in recorded if kept.snapshot is not None]
-    assert times == pytest.approx([0.0, 3.0, 6.0], abs=0.025)
-    assert [kept.anew for kept in recorded if kept.snapshot is not None] == [True, False, False]
+    snapshots = [(kept.step.stamp, kept.anew) for kept in open_recording(made[0]) if kept.snapshot is not None]
+    assert snapshots == [(0.0, True), (pytest.approx(3.0, abs=0.025), False)]
 
 
 def test_the_official_reader_opens_it_with_all_checksums(made):
@@ -67,7 +65,7 @@ def test_the_official_reader_opens_it_with_all_checksums(made):
     assert counts["/wrench"] == len(run.cycles)
     assert counts["/pretouch/run"] == counts["/tf_static"] == counts["/markers/scene"] == 1
     assert counts["/skin/hand_left/range"] == len(run.cycles) // 2
-    assert 0 < counts["/tf"] == counts["/markers"] <= 30 * 7
+    assert 0 < counts["/tf"] == counts["/markers"] <= 30 * 3.3
     assert summary is not None
     assert summary.statistics is not None
     assert summary.statistics.message_count == counts.total()
@@ -156,8 +154,8 @@ def test_boxes_of_the_scene_and_the_arm_are_drawn(controller, tmp_path):
 @pytest.mark.parametrize(
     ("facts", "said"),
     [
-        *(({"scene": {"boxes": boxes}}, "half_size")
-          for boxes in ([{"center": [0, 0, 0]}], [{"center": [0, 0], "half_size": [1, 1, 1]}], 3, ["box"])),
+        ({"scene": {"boxes": [{"center": [0, 0, 0]}]}}, "half_size"),
+        ({"scene": {"boxes": [{"center": [0, 0], "half_size": [1, 1, 1]}]}}, "half_size"),
         ({"what": {1, 2}}, "JSON"),
     ],
 )  # fmt: skip
@@ -197,9 +195,8 @@ def test_closing_twice_says_the_same_and_later_cycles_are_left_out(controller, t
     recording.record(run.turn())
     closed = recording.close()
     recording.record(run.turn())
-    assert recording.close() is closed
-    assert (closed.steps, closed.duration_s) == (2, 0.01)
-    assert "2 control steps" in closed.sentence
+    assert recording.close() == closed
+    assert "2 control steps, 0.0 s, in" in closed
     assert len(open_recording(tmp_path / "a.mcap")) == 2
 
 
@@ -212,11 +209,20 @@ def test_a_recording_without_a_step_says_so(controller, tmp_path):
         assert not list(make_reader(file).iter_messages())
 
 
-def test_signals_are_handled_as_before_once_it_is_closed(controller, tmp_path):
-    before = signal.getsignal(signal.SIGTERM), signal.getsignal(signal.SIGHUP)
-    with Recording(tmp_path / "a.mcap", controller), pytest.raises(SystemExit):
-        signal.raise_signal(signal.SIGTERM)
-    assert (signal.getsignal(signal.SIGTERM), signal.getsignal(signal.SIGHUP)) == before
+@pytest.mark.parametrize(
+    ("number", "error"),
+    [(signal.SIGTERM, SystemExit), (signal.SIGHUP, SystemExit), (signal.SIGINT, KeyboardInterrupt)],
+)
+def test_a_signal_leaves_a_whole_file_and_is_handled_as_before_once_it_is_closed(controller, tmp_path, number, error):
+    before, run = signal.getsignal(number), Run(controller)
+    recording = Recording(tmp_path / "a.mcap", controller)
+    recording.record(run.turn())
+    with pytest.raises(error), recording:
+        signal.raise_signal(number)
+    assert signal.getsignal(number) == before
+    recorded = open_recording(tmp_path / "a.mcap")
+    assert recorded.complete
+    assert len(recorded) == 1
 
 
 @given(st.floats(), st.integers(0, 10**18))

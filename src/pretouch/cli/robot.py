@@ -13,7 +13,7 @@ from pretouch.cli.tables import show
 from pretouch.cli.writing import numbers_to
 from pretouch.errors import RobotModelError
 from pretouch.importing.capsules import LinkBody
-from pretouch.importing.read import described, is_description, read_robot
+from pretouch.importing.read import described, read_robot
 from pretouch.importing.ready import Ready, check_posture, never_apart, rated
 from pretouch.importing.robot_import import ImportOptions, check_free, import_robot, write_folder
 from pretouch.robot.description import FILE, load_description
@@ -53,8 +53,8 @@ class ImportArm(ImportOptions):
     def run(self) -> None:
         """Import an arm, print what came of it, and write its folder."""
         file, options, folder = Path(self.file), self, self.out
-        if is_description(self.file):
-            file, package = described(self.file)
+        if named := described(self.file):
+            file, package = named
             options = replace(self, package_path=(*self.package_path, package))
         if not folder:  # of the arm's name: letters, digits, dashes and dots only
             name = self.name or read_robot(file, options.package_path).name

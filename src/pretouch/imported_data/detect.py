@@ -1,5 +1,6 @@
 """Detectors on a recorded force or recorded joint torques, cycle by cycle as in the controller, without a skin."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -134,16 +135,20 @@ def _decided(ticks: FloatArray, force: FloatArray, profile: Profile) -> Decision
 
 def _summary(d: Decisions, free: BoolArray, f_base: float) -> ThresholdSummary:
     beyond, widths = np.maximum(d.compared - d.upper, d.lower - d.compared).max(axis=1), d.upper - d.lower
-    some, nothing = bool(free.any()), np.full(3, np.nan)
     return ThresholdSummary(
-        mean_n=d.force[free].mean(axis=0) if some else nothing,
-        sigma_n=d.force[free].std(axis=0) if some else nothing,
-        window_sigma_n=np.median(d.sigma[free], axis=0) if some else nothing,
-        width_n=np.median(widths[free] / 2, axis=0) if some else nothing,
+        mean_n=_over(free, np.mean, d.force),
+        sigma_n=_over(free, np.std, d.force),
+        window_sigma_n=_over(free, np.median, d.sigma),
+        width_n=_over(free, np.median, widths / 2),
         f_base_n=f_base,
-        f_base_free_n=f_base + float(beyond[free].max()) if some else np.nan,
-        f_base_all_n=f_base + float(beyond[d.judged].max()) if d.judged.any() else np.nan,
+        f_base_free_n=f_base + float(_over(free, np.max, beyond)),
+        f_base_all_n=f_base + float(_over(d.judged, np.max, beyond)),
     )
+
+
+def _over(cycles: BoolArray, statistic: Callable[..., FloatArray], values: FloatArray) -> FloatArray:
+    """Return a statistic of values (S, ...) over some cycles (S,), NaN over none."""
+    return statistic(values[cycles], axis=0) if cycles.any() else np.full(values.shape[1:], np.nan)
 
 
 def _slower(rate: float, profile: Profile) -> list[Note]:
@@ -197,13 +202,13 @@ def _by_torques(r: TorqueRecording, profile: Profile) -> tuple[DetectorResult, T
     lengths = [((c.end_s or c.time_s) - c.time_s, c.time_s) for c in course.contacts]
     if lengths and max(lengths)[0] > _LONG_S:
         notes.append(Note("long", dict(zip(("seconds", "time"), max(lengths), strict=True)) | {"profile": name}))
-    residual, tau_ext, nothing = course.residual[free], course.tau_ext[free], np.full(r.model.n, np.nan)
-    some = bool(free.any())
     summary = TorqueSummary(
-        residual.mean(axis=0) if some else nothing, residual.std(axis=0) if some else nothing,
-        tau_ext.std(axis=0) if some else nothing, float(course.evidence[free].max()) if some else np.nan,
-    )  # fmt: skip
-    detectable = float(np.median(course.detectable_n[free])) if some else np.nan
+        _over(free, np.mean, course.residual),
+        _over(free, np.std, course.residual),
+        _over(free, np.std, course.tau_ext),
+        float(_over(free, np.max, course.evidence)),
+    )
+    detectable = float(_over(free, np.median, course.detectable_n))
     return result_of(profile, course, free, _moving(r, newest), detectable, None, summary, tuple(notes)), course
 
 

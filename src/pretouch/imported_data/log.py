@@ -8,10 +8,9 @@ from typing import Literal, Protocol
 
 import numpy as np
 
-from pretouch.errors import ParameterError, RecordingError
+from pretouch.errors import RecordingError
 from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
-from pretouch.toml_files import parse_toml
 from pretouch.types import FloatArray, IntArray
 from pretouch.values import value
 
@@ -48,34 +47,11 @@ class Choice:
     arm: str | RobotModel = "auto"
     """The arm, or its name or the folder it was imported to; auto: by the names of its joints, otherwise a Panda."""
     columns: str = ""
-    """Columns of other names, THEIRS=OURS separated by commas, or FILE.toml: tau_J_0=tau1_Nm; tau_J_*=tau*_Nm is all
-    joints."""
+    """Columns of other names, THEIRS=OURS separated by commas: tau_J_0=tau1_Nm; tau_J_*=tau*_Nm is all joints."""
     gains: tuple[float, ...] = ()
     """Torque of each joint by its motor's current [Nm/A]."""
     payload: float = 0.0
     """Load at the end-effector that the arm's model does not have [kg]: for measured torques."""
-
-
-def mapping_of(text: str) -> tuple[tuple[str, str], ...]:
-    """Read a mapping: pairs THEIRS=OURS separated by commas, or the name of a TOML file of such pairs.
-
-    ParameterError for what is neither.
-    """
-    if text.endswith(".toml"):
-        try:
-            pairs = tuple(parse_toml(Path(text).read_bytes()).items())
-        except (OSError, ValueError) as error:
-            raise ParameterError(f"The columns {text} cannot be read ({error}): give a file of TOML.") from error
-    else:
-        parts = (part.rpartition("=") for part in text.split(",") if part.strip())
-        pairs = tuple((theirs.strip(), ours.strip()) for theirs, _, ours in parts)
-    for theirs, ours in pairs:
-        if not (theirs and ours and isinstance(ours, str)):
-            raise ParameterError(
-                f"--columns has {ours!r} for {theirs!r}: write THEIRS=OURS, as tau_J_0=tau1_Nm, or FILE.toml of lines"
-                ' "THEIRS" = "OURS".'
-            )
-    return pairs
 
 
 @value

@@ -4,13 +4,13 @@ import csv
 import math
 import re
 from array import array
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pretouch.errors import RecordingError
+from pretouch.errors import ParameterError, RecordingError
 from pretouch.imported_data.log import (
     PARQUET,
     TORQUES,
@@ -21,7 +21,6 @@ from pretouch.imported_data.log import (
     check_steps_back,
     joint_places,
     listed,
-    mapping_of,
 )
 from pretouch.types import FloatArray, IntArray
 from pretouch.values import value
@@ -86,9 +85,7 @@ class Table:
             raise RecordingError(f"{place} is a table and has no topics: leave out the option that names one.")
         self._place, self._choice = place, choice
         self._parquet = _parquet(place) if place.suffix.lower() == PARQUET else None
-        self._names = renamed(
-            place, _header(place) if self._parquet is None else list(self._parquet), mapping_of(choice.columns)
-        )
+        self._names = renamed(place, _header(place) if self._parquet is None else list(self._parquet), choice.columns)
         self._columns = _columns([name.lower() for name in self._names])
         self.kinds = frozenset(column.kind for column in self._columns.values())
 
@@ -304,13 +301,17 @@ def _floats(place: Path, name: str, column: Any) -> FloatArray:
     return np.asarray(column.cast(pa.float64(), safe=False).to_numpy(), dtype=np.float64)
 
 
-def renamed(place: Path, names: list[str], mapping: Sequence[tuple[str, str]]) -> list[str]:
-    """Return columns' names with those of a mapping in place of theirs; RecordingError for one that is not there.
+def renamed(place: Path, names: list[str], mapping: str) -> list[str]:
+    """Return columns' names with those of a mapping in place of theirs: pairs THEIRS=OURS separated by commas.
 
-    `*` is the number of a joint, from 0 or 1 on: where there is a column with 0, they count from 0.
+    `*` is the number of a joint, from 0 or 1 on: where there is a column with 0, they count from 0. ParameterError for
+    what is no pair, RecordingError for a column that is not there.
     """
     columns = list(names)
-    for theirs, ours in mapping:
+    for pair in filter(None, map(str.strip, mapping.split(","))):
+        theirs, _, ours = (part.strip() for part in pair.rpartition("="))
+        if not (theirs and ours):
+            raise ParameterError(f"--columns has {pair!r}: write THEIRS=OURS, as tau_J_0=tau1_Nm.")
         numbers = _numbers(names, theirs) if "*" in theirs else {names.index(theirs): ""} if theirs in names else {}
         if not numbers:
             raise RecordingError(f"{place} has no column {theirs!r} (it has {listed(names)}): change --columns.")

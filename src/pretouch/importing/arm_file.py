@@ -16,8 +16,8 @@ _LARGEST_MASS = 500.0
 """What no link of an arm has [kg]."""
 
 
-def arm_file(name: str, arm: Arm, limits: Limits, bodies: tuple[LinkBody, ...]) -> tuple[str, tuple[str, ...]]:
-    """Return the MJCF of an arm, numbers to six digits, and a sentence for each mass or inertia that is estimated.
+def arm_file(name: str, arm: Arm, limits: Limits, bodies: tuple[LinkBody, ...]) -> str:
+    """Return the MJCF of an arm, numbers to six digits.
 
     A link without any inertial has that of its capsules, if a joint moves it and nothing that is fixed to it has a
     mass. One with a mass alone has the inertia of its capsules.
@@ -50,11 +50,10 @@ def arm_file(name: str, arm: Arm, limits: Limits, bodies: tuple[LinkBody, ...]) 
             )
             capsule.fromto, capsule.density = rod[:6], density
             capsule.contype, capsule.conaffinity, capsule.group = 1, 2, 3
-    remarks = []
     if heavy := [f"{link.name} ({link.mass:g} kg)" for link in links if link.mass > _LARGEST_MASS]:
-        remarks.append(f"Implausible masses, correct them in the file: {', '.join(heavy)}.")
+        arm.robot.remarks.append(f"Implausible masses, correct them in the file: {', '.join(heavy)}.")
     if estimates:
-        remarks.append(
+        arm.robot.remarks.append(
             f"Without a mass or inertia that is possible, so estimated at {DENSITY:g} kg/m^3: {', '.join(estimates)}."
             " Simulated forces are only as accurate as that: give each its mass and inertia in the file."
         )
@@ -62,7 +61,7 @@ def arm_file(name: str, arm: Arm, limits: Limits, bodies: tuple[LinkBody, ...]) 
         spec.compile()
     except ValueError as error:
         raise RobotModelError(f"{name} is no arm that MuJoCo takes: {' '.join(str(error).split())}.") from error
-    return spec.to_xml(), tuple(remarks)
+    return spec.to_xml()
 
 
 def _poses(arm: Arm) -> FloatArray:
@@ -104,13 +103,11 @@ def _set_inertial(body: mujoco.MjsBody, arm: Arm, i: int, rods: FloatArray | Non
 
 def _needs_mass(arm: Arm, link: int) -> bool:
     """Whether a joint of the arm moves the link and neither it nor what is fixed to it has a mass."""
-    links, masses = arm.robot.links, arm.robot.beside.mass
-    moved = [any(joint in arm.joints for joint in one.joints) for one in links]
-    fixed = {link}
+    links, masses, fixed = arm.robot.links, arm.robot.beside.mass, {link}
     for i in range(link + 1, len(links)):
-        if links[i].parent in fixed and not moved[i]:
+        if links[i].parent in fixed and not arm.moves(i):
             fixed.add(i)
-    return moved[link] and not any(links[i].mass > 0 or masses.get(links[i].name, 0.0) > 0 for i in fixed)
+    return arm.moves(link) and not any(links[i].mass > 0 or masses.get(links[i].name, 0.0) > 0 for i in fixed)
 
 
 def _volume(rods: FloatArray) -> float:

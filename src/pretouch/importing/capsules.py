@@ -80,22 +80,20 @@ class Outside:
     """(Q, 3) point of the surface nearest to each: no motors or the like within a shell [m]."""
 
 
-def bodies_of(arm: Arm, most: int = MOST, cover: bool = False) -> tuple[tuple[LinkBody, ...], tuple[str, ...]]:
-    """Return the capsules of all links that have a surface, and a sentence for each thing that was assumed.
+def bodies_of(arm: Arm, most: int = MOST, cover: bool = False) -> tuple[LinkBody, ...]:
+    """Return the capsules of all links that have a surface.
 
     Args:
         arm: the arm.
         most: capsules for one link at most.
         cover: whether fitted capsules are enlarged until no surface sticks out of them.
     """
-    links = arm.robot.links
+    robot = arm.robot
     # every mesh is read before the first link is fitted: what is wrong with one is said at once
-    surfaces = {link: link.surface() for link in links if link.shapes}
-    jointed = [link for link in links if any(joint in arm.joints for joint in link.joints)]
-    moving = [link for link in surfaces if any(links[i] in jointed for i in arm.robot.ancestors(links.index(link)))]
-    if not moving:
+    surfaces = {link: link.surface() for link in robot.links if link.shapes}
+    if not any(link.shapes and any(map(arm.moves, robot.ancestors(i))) for i, link in enumerate(robot.links)):
         raise RobotModelError(
-            f"No moving link of {arm.robot.name} has any geometry: give the links <collision> or <visual> shapes."
+            f"No moving link of {robot.name} has any geometry: give the links <collision> or <visual> shapes."
         )
     for link, surface in surfaces.items():
         if (size := float(surface.extents.max())) > _LARGEST:
@@ -103,16 +101,14 @@ def bodies_of(arm: Arm, most: int = MOST, cover: bool = False) -> tuple[tuple[Li
                 f"The link {link.name} is {size:.4g} m long: if its meshes are in millimetres, give them the scale"
                 ' "0.001 0.001 0.001" in the file.'
             )
-    remarks = []
-    if visual := [link.name for link in surfaces if not link.collision]:
-        remarks.append(f"Without collision geometry, so fitted to the visual geometry: {', '.join(visual)}.")
-    if bare := [link.name for link in jointed if not link.shapes]:
-        remarks.append(f"Without any geometry, so without a capsule: {', '.join(bare)}.")
-    bodies = (
+    if visual := [link.name for link in surfaces if link.visual]:
+        robot.remarks.append(f"Without collision geometry, so fitted to the visual geometry: {', '.join(visual)}.")
+    if bare := [link.name for i, link in enumerate(robot.links) if arm.moves(i) and not link.shapes]:
+        robot.remarks.append(f"Without any geometry, so without a capsule: {', '.join(bare)}.")
+    return tuple(
         link_body(link.name, outside_of(surface), own_capsules(link.shapes), most, cover)
         for link, surface in surfaces.items()
     )
-    return tuple(bodies), tuple(remarks)
 
 
 def link_body(name: str, outside: Outside, own: FloatArray | None, most: int = MOST, cover: bool = False) -> LinkBody:

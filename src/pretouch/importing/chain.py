@@ -30,8 +30,10 @@ class Arm:
     """Index of the end-effector's link."""
     joints: tuple[Joint, ...]
     """The n joints from base to end-effector."""
-    remarks: tuple[str, ...]
-    """What was chosen or fixed, a sentence each."""
+
+    def moves(self, link: int) -> bool:
+        """Whether one of its joints moves a link against its parent."""
+        return any(joint in self.joints for joint in self.robot.links[link].joints)
 
 
 def arm_of(robot: Robot, ee: str = "") -> Arm:
@@ -40,21 +42,20 @@ def arm_of(robot: Robot, ee: str = "") -> Arm:
     Raises RobotModelError where there is no such chain, or where several arms leave the choice open.
     """
     end, *others = [robot.index(ee)] if ee else _likely_ends(robot, _last_moved(robot))
-    remarks = list(robot.beside.remarks)
     if others:
         names = ", ".join(robot.links[i].name for i in others)
-        remarks.append(
+        robot.remarks.append(
             f"The end-effector is assumed to be {robot.links[end].name}; choose another one with --ee: {names}."
         )
     joints = tuple(joint for i in robot.ancestors(end) for joint in robot.links[i].joints)
     _check_chain(robot, end, joints)
     fixed = [joint.name for link in robot.links for joint in link.joints if joint not in joints]
     if fixed:
-        remarks.append(
+        robot.remarks.append(
             f"Joints off the arm, fixed at 0 or at the nearest limit: {', '.join(fixed)}. Set the positions of fingers"
             " in the file, or give the link that a joint moves as --ee if it is one of the arm's."
         )
-    return Arm(robot, end, joints, tuple(remarks))
+    return Arm(robot, end, joints)
 
 
 def _hinges(link: Link) -> int:
@@ -139,15 +140,13 @@ class Limits:
     """(n,) [rad/s^2]."""
     tau_max: FloatArray
     """(n,) [Nm]."""
-    remarks: tuple[str, ...]
-    """What was assumed, a sentence each."""
 
 
 def limits_of(
     arm: Arm, qd_max: tuple[float, ...] = (), qdd_max: tuple[float, ...] = (), tau_max: tuple[float, ...] = ()
 ) -> Limits:
     """Return an arm's limits; those given, one for all joints or one for each, take the place of the file's."""
-    n, remarks = len(arm.joints), list[str]()
+    n, remarks = len(arm.joints), arm.robot.remarks
 
     def among(names: list[str]) -> str:
         return "all joints" if len(names) == n else ", ".join(names)
@@ -187,4 +186,4 @@ def limits_of(
                 f"Implausible {what} limits, perhaps of another unit, correct them in the file or robot.toml:"
                 f" {', '.join(beyond)}."
             )
-    return Limits(ranges[:, 0], ranges[:, 1], speeds, accelerations, torques, tuple(remarks))
+    return Limits(ranges[:, 0], ranges[:, 1], speeds, accelerations, torques)

@@ -1,17 +1,21 @@
-"""Reading of a robot's URDF or MJCF file by MuJoCo, and of what MuJoCo does not take of a URDF."""
+"""Reading of a robot's URDF or MJCF file by MuJoCo, of what MuJoCo does not take of a URDF, and of mesh files."""
 
 import re
+import warnings
+from contextlib import suppress
 from functools import partial
 from importlib import import_module
+from io import BytesIO
 from pathlib import Path
+from urllib.parse import unquote
 from xml.etree import ElementTree as ET
 
 import mujoco
 import numpy as np
-from trimesh import Trimesh
+from trimesh import Trimesh, load_scene
 
 from pretouch.errors import RobotModelError
-from pretouch.importing.meshes import find_mesh, read_mesh
+from pretouch.extras import MESHES
 from pretouch.importing.tree import LARGEST, NO_MASS, SOLIDS, Beside, Robot, Shape, pose
 from pretouch.types import FloatArray
 
@@ -30,19 +34,17 @@ _LARGEST_M = 5.0
 _NARROW = 0.1
 """Ranges of all joints below which they are taken for degrees, taken for radians, taken for degrees [rad]."""
 _PACKAGE = "robot_descriptions"
+_MESHES = (".stl", ".obj", ".dae")
 
 
-def is_description(name: str) -> bool:
-    """Whether a name is no file's or folder's, but like those of the package robot_descriptions, as ur5_description."""
-    return re.fullmatch("[a-z][a-z0-9_]*_description", name) is not None and not Path(name).exists()
+def described(name: str) -> tuple[Path, Path] | None:
+    """Return the URDF or MJCF file of a robot by its name, as ur5_description, and the folder with its ROS package.
 
-
-def described(name: str) -> tuple[Path, Path]:
-    """Return the URDF or MJCF file of a robot by its name, and the folder that holds its ROS package.
-
-    The package robot_descriptions of PyPI has them, and fetches each by git. It is not required: where it is not
-    installed, does not know the name, or cannot fetch the files, a RobotModelError says so.
+    None for other names, and those of files. The package robot_descriptions of PyPI fetches each robot by git. Where
+    it is not installed, does not know the name, or cannot fetch the files, a RobotModelError says so.
     """
+    if Path(name).exists() or not re.fullmatch("[a-z][a-z0-9_]*_description", name):
+        return None
     try:
         module = import_module(f"{_PACKAGE}.{name}")
         file = Path(getattr(module, "URDF_PATH", None) or module.MJCF_PATH)
@@ -84,7 +86,7 @@ def read_robot(file: Path, folders: tuple[Path, ...] = ()) -> Robot:
         reason = " ".join(str(error).split()).rstrip(".")
         raise RobotModelError(f"The file {file} cannot be read: {reason}: correct it.") from error
     name = spec.modelname if root.tag == "mujoco" else root.get("name")
-    _note_left_out(model, beside)
+    _note_left_out(model, beside.remarks)
     return Robot(name or file.stem, model, beside)
 
 
@@ -103,24 +105,18 @@ def _root(file: Path) -> ET.Element:
     return root
 
 
-def _note_left_out(model: mujoco.MjModel, beside: Beside) -> None:
+def _note_left_out(model: mujoco.MjModel, remarks: list[str]) -> None:
     """Say what an arm will be without, and which ranges are odd."""
     if model.neq:
-        beside.remarks.append(f"{model.neq} couplings, of joints that mimic others or of bodies, are left out.")
+        remarks.append(f"{model.neq} couplings, of joints that mimic others or of bodies, are left out.")
     if others := int((~np.isin(model.geom_type, SOLIDS) & (model.geom_bodyid > 0)).sum()):
-        beside.remarks.append(f"{others} shapes that are planes, height fields or the like are left out.")
+        remarks.append(f"{others} shapes that are planes, height fields or the like are left out.")
     limited = model.jnt_range[model.jnt_limited.astype(bool)]
     if len(limited) and np.ptp(limited, axis=1).max() < _NARROW:
-        beside.remarks.append(
+        remarks.append(
             f"All joints have ranges below {_NARROW:g} rad: if they are radians in the file, its <compiler> needs"
             ' angle="radian".'
         )
-    values = model.dof_armature + model.dof_damping.reshape(model.nv, -1).sum(axis=1) + model.dof_frictionloss
-    joints = {int(model.dof_jntid[dof]) for dof in np.flatnonzero(values)}
-    joints |= {int(j) for j in np.flatnonzero(model.jnt_stiffness.reshape(model.njnt, -1).any(axis=1))}
-    if joints:
-        names = ", ".join(model.joint(j).name or f"joint{j + 1}" for j in sorted(joints))
-        beside.remarks.append(f"Armature, damping, friction and springs of the joints are left out: {names}.")
 
 
 def _urdf(root: ET.Element, beside: Beside, file: Path, folders: tuple[Path, ...]) -> mujoco.MjSpec:
@@ -149,7 +145,7 @@ def _urdf(root: ET.Element, beside: Beside, file: Path, folders: tuple[Path, ...
 
 
 def _scaled_mesh(uri: str, scale: FloatArray, file: Path, folders: tuple[Path, ...]) -> Trimesh:
-    return read_mesh(find_mesh(uri, file, folders)).apply_scale(scale)
+    return read_mesh(_find_mesh(uri, file, folders)).apply_scale(scale)
 
 
 def _prepare_shapes(link: ET.Element, uris: list[str]) -> None:
@@ -219,3 +215,61 @@ def _check_finite(root: ET.Element) -> None:
                 if element.tag != "limit" and {"nan", "inf", "-inf"}.intersection(text.lower().split()):
                     name = owner.get("name")
                     raise RobotModelError(f"{name}: {key} of <{element.tag}> is {text!r}: give finite numbers.")
+
+
+def _find_mesh(uri: str, file: Path, folders: tuple[Path, ...]) -> Path:
+    """Return the mesh file that a URDF names: relative to it, by absolute path, or in a ROS package.
+
+    The package `p` of package://p/rest is looked for as the folder `p` in `folders`, or one of them, then in the folder
+    of the URDF and in each above it. A mesh that is not found is a RobotModelError.
+    """
+    scheme, _, name = unquote(uri).replace("\\", "/").rpartition("://")
+    near = file.resolve().parent
+    places = [near / (name.removeprefix("localhost") if scheme == "file" else name)]
+    way_out = f"put it at {places[0]}, where the URDF says"
+    if scheme in ("package", "model"):
+        package, _, rest = name.partition("/")
+        around = [*folders, near, *near.parents]
+        places = [folder / name for folder in around] + [folder / rest for folder in around if folder.name == package]
+        way_out = f"give --package-path the folder that holds the package {package}"
+    for place in places:
+        with suppress(OSError, ValueError):  # a name may be too long, or none
+            if place.is_file():
+                return place
+    raise RobotModelError(f"The mesh {uri} was not found: {way_out}.")
+
+
+def read_mesh(path: Path) -> Trimesh:
+    """Read a mesh file, as its suffix says, in metres. What is wrong with it is a RobotModelError that names it.
+
+    Nothing but the file itself is read: no materials or textures beside it.
+    """
+    suffix = path.suffix.lower()
+    if suffix not in _MESHES:
+        raise RobotModelError(f"The mesh {path} has an unknown format: use {', '.join(_MESHES)}.")
+    if suffix == ".dae":
+        MESHES.need(f"The mesh {path}, a COLLADA file,")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            warnings.filterwarnings("error", "string or file could not be read")  # NumPy would leave the rest out
+            data = path.read_bytes()
+            if suffix == ".obj":
+                _check_obj(data)
+            scene = load_scene(BytesIO(data), suffix[1:], process=False)
+            mesh = (scene.convert_units("meters") if scene.units else scene).to_mesh()
+    except Exception as error:  # whatever a library makes of a broken file
+        reason = " ".join(str(error).split())[:200] or type(error).__name__
+        raise RobotModelError(f"The mesh {path} is damaged: {reason}.") from error
+    if not len(mesh.faces) or not np.isfinite(mesh.triangles).all() or not np.any(mesh.triangles_cross):
+        raise RobotModelError(
+            f"The mesh {path} holds no triangle with an area and finite corners, or is truncated: give a complete file."
+        )
+    return mesh
+
+
+def _check_obj(data: bytes) -> None:
+    """Refuse corners counted backwards or from 0: trimesh 5.2 takes them for other ones."""
+    faces = (line.split()[1:] for line in data.splitlines() if line.startswith(b"f "))
+    if any(int(corner.split(b"/")[0]) < 1 for face in faces for corner in face):
+        raise ValueError("its faces do not count their corners from 1 onwards: save it anew by another program")

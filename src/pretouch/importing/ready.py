@@ -89,8 +89,8 @@ def rated(model: RobotModel, q: FloatArray, apart: BoolArray | None = None) -> R
     return Ready(q, float(np.prod(values)) if model.n >= 6 else 0.0, float(values[-1]), clear, nearest)
 
 
-def proposed(model: RobotModel) -> tuple[Ready, tuple[str, ...]]:
-    """Search for a good posture. Where none has its hand in front and pointing down, a sentence says so."""
+def proposed(model: RobotModel, remarks: list[str]) -> Ready:
+    """Search for a good posture. Where none has its hand in front and pointing down, a remark says so."""
     reach, (low, high) = reach_of(model), _near_middle(model, 0.8)
     hand, apart = np.array([_IN_FRONT * reach, 0.0, _HEIGHT * reach]), ever_apart(model, _CLEAR)
 
@@ -106,12 +106,13 @@ def proposed(model: RobotModel) -> tuple[Ready, tuple[str, ...]]:
         postures = [rated(model, q, apart) for q in reached if q is not None and _room(model, q) > _MARGIN]
         best = max(postures, key=partial(_grade, model), default=None)
         if best and _grade(model, best)[0]:
-            return best, ()
-    postures = [rated(model, low + u * (high - low), apart) for u in spread(_ANYWHERE, model.n)]
-    return max(postures, key=partial(_grade, model)), (
+            return best
+    remarks.append(
         "No posture was found with the hand in front of the base and pointing down, so another one was used: give"
-        " yours with --ready, or as q_ready in robot.toml.",
+        " yours with --ready, or as q_ready in robot.toml."
     )
+    postures = [rated(model, low + u * (high - low), apart) for u in spread(_ANYWHERE, model.n)]
+    return max(postures, key=partial(_grade, model))
 
 
 def _grade(model: RobotModel, ready: Ready) -> tuple[bool, float, bool, float]:

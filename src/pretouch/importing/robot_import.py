@@ -59,20 +59,20 @@ def import_robot(file: Path, options: ImportOptions) -> Imported:
     """Read an arm, fit capsules, and propose what the file does not hold. Foreseeable misuse is a RobotModelError."""
     if not 1 <= options.capsules <= 10:
         raise RobotModelError(f"--capsules is {options.capsules}: give 1 to 10 for one link.")
-    arm = arm_of(read_robot(file, options.package_path), options.ee)
+    robot = read_robot(file, options.package_path)
+    arm = arm_of(robot, options.ee)
     limits = limits_of(arm, options.qd_max, options.qdd_max, options.tau_max)
     if options.ready:
         check_posture(np.array(options.ready), limits.q_min, limits.q_max, "--ready")
-    bodies, about_bodies = bodies_of(arm, options.capsules, options.cover)
-    name = options.name or arm.robot.name
-    text, about_inertials = arm_file(name, arm, limits, bodies)
+    bodies, name = bodies_of(arm, options.capsules, options.cover), options.name or robot.name
+    text = arm_file(name, arm, limits, bodies)
     with tempfile.TemporaryDirectory(prefix="pretouch-") as folder:
         mjcf = Path(folder) / MJCF
         mjcf.write_text(text, encoding="utf-8")
         description = RobotDescription(
             name,
             mjcf,
-            arm.robot.links[arm.ee].name,
+            robot.links[arm.ee].name,
             limits.qd_max,
             limits.qdd_max,
             limits.tau_max,
@@ -80,10 +80,9 @@ def import_robot(file: Path, options: ImportOptions) -> Imported:
             f"imported from {file.name}",
         )
         model = RobotModel(description)
-        ready, about_ready = (rated(model, np.array(options.ready)), ()) if options.ready else proposed(model)
+        ready = rated(model, np.array(options.ready)) if options.ready else proposed(model, robot.remarks)
         model = RobotModel(replace(description, q_ready=ready.q))
-    remarks = (*arm.remarks, *limits.remarks, *about_bodies, *about_inertials, *about_ready)
-    return Imported(text, model, bodies, ready, remarks)
+    return Imported(text, model, bodies, ready, tuple(robot.remarks))
 
 
 def check_free(folder: Path) -> None:

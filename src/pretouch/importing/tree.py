@@ -87,13 +87,10 @@ class Link:
     joints: tuple[Joint, ...]
     mass: float
     """[kg]; 0 if the file gives none."""
-    collision: tuple[Shape, ...]
-    visual: tuple[Shape, ...]
-
-    @property
-    def shapes(self) -> tuple[Shape, ...]:
-        """Collision shapes, or visual ones where there are none."""
-        return self.collision or self.visual
+    shapes: tuple[Shape, ...]
+    """Collision shapes, or visual ones where there are none."""
+    visual: bool
+    """Whether they are visual ones."""
 
     def surface(self) -> Trimesh:
         """Return the triangles of all shapes, link frame."""
@@ -125,6 +122,11 @@ class Robot:
     model: mujoco.MjModel
     beside: Beside
 
+    @property
+    def remarks(self) -> list[str]:
+        """What is left out or assumed, a sentence each: every stage of an import adds its own."""
+        return self.beside.remarks
+
     @cached_property
     def links(self) -> tuple[Link, ...]:
         """All links; the index of one is that of its body in the model."""
@@ -151,14 +153,15 @@ class Robot:
         solids = [g for g in geoms if m.geom_type[g] in SOLIDS]
         shapes = [(bool(m.geom_contype[g] or m.geom_conaffinity[g]), self._shape(g)) for g in solids]
         shapes += self.beside.meshes.get(name, [])
-        first = m.body_jntadr[body]
+        visual = not any(collides for collides, _ in shapes)
+        first, mass = m.body_jntadr[body], float(m.body_mass[body])
         return Link(
             name,
             int(m.body_parentid[body]) if body else -1,
             tuple(self._joint(j) for j in range(first, first + m.body_jntnum[body])),
-            float(m.body_mass[body]) if m.body_mass[body] > NO_MASS else 0.0,
-            tuple(shape for collides, shape in shapes if collides),
-            tuple(shape for collides, shape in shapes if not collides),
+            mass if mass > NO_MASS else 0.0,
+            tuple(shape for collides, shape in shapes if collides or visual),
+            visual,
         )
 
     def _joint(self, j: int) -> Joint:

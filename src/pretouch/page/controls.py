@@ -254,8 +254,7 @@ def toggle_recording(simulation: LiveSimulation) -> None:
     A RecordingError says why none can be begun.
     """
     if simulation.recording is not None:
-        closed = simulation.stop_recording()
-        simulation.notice = closed.sentence if closed else ""
+        simulation.notice = simulation.stop_recording()
         return
     try:
         RECORDINGS.mkdir(parents=True, exist_ok=True)

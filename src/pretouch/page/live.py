@@ -185,6 +185,5 @@ def serve_live(
                     slow = page.pace.slow
                     say(page.pace.sentence() or "The machine keeps up with real time again.")
         finally:
-            closed = simulation.stop_recording()
-            if closed:
-                say(closed.sentence)
+            if sentence := simulation.stop_recording():
+                say(sentence)

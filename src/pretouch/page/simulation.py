@@ -30,7 +30,7 @@ from pretouch.sim.tcp_push import Pushes, TcpPush
 from pretouch.types import ControlStep, FloatArray
 
 if TYPE_CHECKING:
-    from pretouch.recording.writer import Closed, Recording
+    from pretouch.recording.writer import Recording
 
 
 def nobody(now: float) -> Desired | None:
@@ -85,9 +85,7 @@ class LiveSimulation:
     def _begin(self, settings: LiveSettings) -> None:
         path = live_path(settings)
         room = Room(settings, path, self.model, self._true_skin, self.real)
-        closed = self.stop_recording()
-        if closed:
-            self.notice = closed.sentence
+        self.notice = self.stop_recording() or self.notice
         self.settings = settings
         """As it is set by now: what a reset begins with."""
         self.controller = Controller(self.model, self.skin, fixtures(room.scene), path, settings.profile)
@@ -207,10 +205,10 @@ class LiveSimulation:
         self.stop_recording()
         self.recording = begun
 
-    def stop_recording(self) -> "Closed | None":
-        """End the recording and say what is in it; None if there was none."""
+    def stop_recording(self) -> str:
+        """End the recording and say what is in it; '' if there was none."""
         recording, self.recording = self.recording, None
-        return recording.close() if recording else None
+        return recording.close() if recording else ""
 
     def _replace_controller(self, settings: LiveSettings) -> None:
         """Let a controller with other settings take over."""

@@ -1,5 +1,6 @@
 """A recording's file and the thread that writes it, so that no disk makes a control loop wait."""
 
+import atexit
 import errno
 import os
 import threading
@@ -46,7 +47,7 @@ Job = Callable[[], Iterable[Item]]
 class Disk:
     """Takes what makes messages at once, and writes these in a thread of its own.
 
-    A chunk holds whole cycles: the reader counts on it.
+    A chunk holds whole cycles: the reader counts on it. The file is ended by `close`, or with the program.
     """
 
     def __init__(self, place: Path) -> None:
@@ -63,18 +64,17 @@ class Disk:
         """Bytes of messages in the chunk that is being filled, and the latest time in it [ns]."""
         self._written: int | None = None
         """Latest time in the file [ns]."""
-        try:
-            self._writer.start("ros2", LIBRARY)
-            self._file.flush()
-        except OSError as error:
-            with suppress(OSError):
-                self._file.close()
-            place.unlink()
-            raise _refused(place, error) from error
         self.trouble = ""
         """Why nothing more is written, as a sentence, or ''."""
+        self._closed = False
         self._thread = threading.Thread(target=self._work, name=f"recording {place.name}", daemon=True)
         self._thread.start()
+        atexit.register(self.close)
+
+    @property
+    def over(self) -> bool:
+        """Whether nothing more is written."""
+        return self._closed or bool(self.trouble)
 
     def put(self, job: Job, wait: bool = False) -> None:
         """Hand over what makes the messages of a cycle, in the thread; with `wait`, let that catch up first."""
@@ -85,20 +85,20 @@ class Disk:
             self.trouble = f"The recording {self._place} ended early, because the disk is too slow: use a faster one."
         self._queue.put(job)
 
-    def close(self) -> None:
-        """Write what waits, end the file, and stop."""
+    def close(self, content: str = "") -> str:
+        """Write what waits, end the file, and say that it holds the content, or what went wrong."""
+        self._closed = True
         self._queue.put(None)
         self._thread.join()
-
-    def size(self) -> int:
-        """Return the size of the file [B]; 0 if somebody took it away."""
-        try:
-            return self._place.stat().st_size
-        except OSError:
-            return 0
+        atexit.unregister(self.close)
+        size = 0
+        with suppress(OSError):  # somebody may have taken it away
+            size = self._place.stat().st_size
+        return self.trouble or f"{self._place} holds {content}, in {size / 1e6:.1f} MB."
 
     def _work(self) -> None:
         try:
+            self._writer.start("ros2", LIBRARY)
             self._write_all()
             self._flush()
             self._writer.finish()

@@ -18,7 +18,7 @@ from pretouch.recording.packing import unpacked
 from pretouch.recording.ros import LIBRARY, READ_WITH, UNIT_SAMPLE, check_version, packed_data, value_of
 from pretouch.recording.run import Run
 from pretouch.recording.simulation import Truth
-from pretouch.types import ControlStep, FloatArray, Inputs, IntArray, RobotState
+from pretouch.types import ControlStep, FloatArray, Inputs, IntArray
 from pretouch.values import value
 
 _NUMBER = struct.Struct("<Q")
@@ -131,14 +131,6 @@ class Recorded:
 
     def __iter__(self) -> Iterator[Kept]:
         return (self[i] for i in range(len(self)))
-
-    def robot_states(self) -> Iterator[RobotState]:
-        """Yield the robot's state of each step whose inputs were kept."""
-        for number in self._numbers.tolist():
-            data = self._get(INPUTS, number)
-            inputs = None if data is None else inputs_of(packed_data(data)).inputs
-            if inputs is not None:
-                yield inputs.robot
 
     def step(self, i: int) -> ControlStep:
         """Return a step alone."""

@@ -132,7 +132,7 @@ def prepare(*kinds: str) -> None:
     """Make the code that encodes types, and all of ours: the first message would wait for it."""
     messages().prepare(*kinds)
     for name in OWN:
-        _getters(own(name))
+        _fields(own(name))
 
 
 def own(name: str) -> str:
@@ -200,42 +200,39 @@ def _own_name(kind: type) -> str:
 
 
 def _message(kind: str, value: Any, sequence: int = 0) -> Any:
-    return messages().types[kind](*[sequence if name == "sequence" else get(value) for name, get in _getters(kind)])
+    """Return the message of a value; `sequence` is the number of its step."""
+    parts = []
+    for name, what, of in _fields(kind):
+        part: Any = sequence if what == "sequence" else getattr(value, name)
+        if what == "array":
+            if part.dtype != of:
+                raise ValueError(f"{name} is an array of {part.dtype}, not {of}")
+            part = part.reshape(-1)
+        elif what == "has":
+            part = part is not None
+        elif what == "message":
+            part = messages().types[of](**messages().blank(of)) if part is None else _message(of, part)
+        elif what == "string" and isinstance(part, Enum):
+            part = part.value
+        parts.append(part)
+    return messages().types[kind](*parts)
 
 
 @cache
-def _getters(kind: str) -> tuple[tuple[str, Callable[[Any], Any]], ...]:
-    """Return names of the fields of a message, and what takes each from a value."""
-    return tuple((name, _getter(name, *described)) for name, described in messages().store.fielddefs[kind][1])
-
-
-def _getter(name: str, node: Nodetype, of: Any) -> Callable[[Any], Any]:
-    get = attrgetter(name)
-    if name.startswith("has_"):
-        part = attrgetter(name.removeprefix("has_"))
-        return lambda value: part(value) is not None
-    if node == Nodetype.NAME:
-
-        def inner(value: Any) -> Any:
-            part = get(value)
-            return messages().types[of](**messages().blank(of)) if part is None else _message(of, part)
-
-        return inner
-    if node == Nodetype.BASE:
-        return get if of[0] != "string" else lambda value: _text(get(value))
-    dtype = np.dtype(of[0][1][0])
-
-    def row(value: Any) -> Any:
-        array = get(value)
-        if array.dtype != dtype:
-            raise ValueError(f"{name} is an array of {array.dtype}, not {dtype}")
-        return array.reshape(-1)
-
-    return row
-
-
-def _text(text: str | Enum) -> str:
-    return text.value if isinstance(text, Enum) else text
+def _fields(kind: str) -> tuple[tuple[str, str, Any], ...]:
+    """Return of each field of a message the value's field that it is of, what it is, and its type or dtype."""
+    fields = list[tuple[str, str, Any]]()
+    of: Any
+    for name, (node, of) in messages().store.fielddefs[kind][1]:
+        if name.startswith("has_"):
+            fields.append((name.removeprefix("has_"), "has", None))
+        elif node == Nodetype.NAME:
+            fields.append((name, "message", of))
+        elif node == Nodetype.BASE:
+            fields.append((name, "sequence" if name == "sequence" else of[0], None))
+        else:
+            fields.append((name, "array", np.dtype(of[0][1][0])))
+    return tuple(fields)
 
 
 @cache

@@ -233,14 +233,11 @@ def _kept_path(path: Path) -> _KeptPath:
     elif type(path) is WayPoints:
         numbers = path.points
     else:
-        corners = list[FloatArray]()
-        for phase in np.linspace(0.0, path.length, _SAMPLES, endpoint=not path.closed).tolist():
-            point, neighbours = path.point(phase), (*corners[-1:], *corners[: int(path.closed)])
-            if all(np.linalg.norm(point - other) > _APART_M for other in neighbours):
-                corners.append(point)
-        if len(corners) == 1:  # it stands: a millimetre is drawn
-            corners.append(corners[0] + np.array([0.0, 0.0, 1e-3]))
-        numbers = np.array(corners, dtype=np.float64)
+        phases = np.linspace(0.0, path.length, _SAMPLES, endpoint=not path.closed)
+        points = np.array([path.point(phase) for phase in phases.tolist()], dtype=np.float64)
+        numbers = points[np.append(True, np.linalg.norm(np.diff(points, axis=0), axis=1) > _APART_M)]
+        if len(numbers) == 1:  # it stands: a millimetre is drawn
+            numbers = numbers + np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1e-3]])
     return _KeptPath(type(path).__name__, numbers, bool(path.closed))
 
 

@@ -60,10 +60,8 @@ def differing(recorded: Any, recomputed: Any, exact: bool, field: str = "") -> I
     elif isinstance(a, tuple) and len(a) == len(b):
         for i, (one, other) in enumerate(zip(a, b, strict=True)):
             yield from differing(one, other, exact, f"{field}[{i}]")
-    elif isinstance(a, np.ndarray):
-        yield from _in_arrays(a, b, exact, field)
-    elif isinstance(a, float):
-        yield from _in_arrays(np.array(a), np.array(float(b)), exact, field)
+    elif isinstance(a, float | np.ndarray):
+        yield from _in_arrays(np.asarray(a), np.asarray(b), exact, field)
     elif a != b:
         yield Difference(field, a.value if isinstance(a, Enum) else a, b.value if isinstance(b, Enum) else b, math.inf)
 

@@ -18,8 +18,7 @@ from pretouch.controller import Controller
 from pretouch.errors import CalibrationError, ExperimentError, HardwareError, PretouchError, RobotError
 from pretouch.loop import Cycle, MonotonicClock, Recorder
 from pretouch.ports import Arm, NoUnits, Skin
-from pretouch.recording.last_seconds import LastSeconds
-from pretouch.recording.writer import Recording
+from pretouch.recording.writer import LastSeconds, Recording
 from pretouch.robot.model import RobotModel
 from pretouch.robot.postures import brought_to
 from pretouch.session.may_move import StandingArm, check_start, refusals, vector
@@ -152,7 +151,7 @@ class RunFiles:
         self.last_seconds.close()
         sentences += [f"The last seconds before a HOLD: {place}" for place in self.last_seconds.written]
         sentences += [self.last_seconds.trouble] if self.last_seconds.trouble else []
-        return (*sentences, self.recording.close().sentence) if self.recording else tuple(sentences)
+        return (*sentences, self.recording.close()) if self.recording else tuple(sentences)
 
 
 @contextmanager

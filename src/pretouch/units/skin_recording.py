@@ -1,11 +1,9 @@
 """What sensor units send, recorded without a controller: one MCAP file for the usual viewers and for calibration."""
 
-import atexit
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 import numpy as np
@@ -38,9 +36,7 @@ class SkinRecording:
         """Datagrams in it."""
         self._time = 0
         messages().prepare(UNIT_SAMPLE, RANGE, IMU, JOINT_STATE, DIAGNOSTICS)
-        self._sentence = ""
         self._disk = Disk(self.place)
-        atexit.register(self.close)
 
     @property
     def trouble(self) -> str:
@@ -67,7 +63,7 @@ class SkinRecording:
                     f"The joint {what} have the shape {rows.shape}: give {shape}, a row for each instant and a column"
                     " for each joint's name."
                 )
-        if not self._sentence and not self.trouble:
+        if not self._disk.over:
             self._disk.put(partial(_joint_items, self._time, stamp, q, qd, names))
 
     def health(self, update: WatchUpdate) -> None:
@@ -77,26 +73,19 @@ class SkinRecording:
 
     def _advance(self, stamp: float) -> bool:
         """Go on to an instant; False if nothing more is written."""
-        if self._sentence or self.trouble:
+        if self._disk.over:
             return False
         self._time = nanoseconds(stamp, self._time)
         return True
 
     def close(self) -> str:
         """End the file, and say what it holds; a second time says the same again."""
-        if not self._sentence:
-            self._disk.close()
-            size = self._disk.size() / 1e6
-            self._sentence = self.trouble or f"{self.place} holds {self.samples} samples, in {size:.1f} MB."
-            atexit.unregister(self.close)
-        return self._sentence
+        return self._disk.close(f"{self.samples} samples")
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
 

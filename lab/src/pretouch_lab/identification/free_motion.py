@@ -41,15 +41,15 @@ def read_free_motion(
         samples, said = _of_table(log, -1.0 if sign == "by-robot" else 1.0, gain)
     else:
         recorded = open_recording(place)
-        arm, kept = recorded.runs[0].model, list(recorded.robot_states())
+        arm, robot_states = recorded.runs[0].model, [cycle.inputs.robot for cycle in recorded if cycle.inputs]
         if model is not None and model.description.name != arm.description.name:
             raise RecordingError(
                 f"{place} is of {arm.description.name}, and --arm is {model.description.name}: leave out --arm."
             )
-        if not kept:
+        if not robot_states:
             raise RecordingError(f"{place} holds no state of the robot: give another recording.")
-        states = ([r.stamp for r in kept], [r.q for r in kept], [r.qd for r in kept], [r.tau_ext for r in kept])
-        received = ArmSamples(*(np.array(column) for column in states))
+        names = ("stamp", "q", "qd", "tau_ext")
+        received = ArmSamples(*(np.array([getattr(state, name) for state in robot_states]) for name in names))
         samples = received.at(np.append(True, np.diff(received.stamp) > 0.0))  # a repeated state counts once
         said = f"{place}: states of {arm.description.name} as the controller had them"
     if samples.q.shape[1] == arm.n:  # `identify` says it otherwise
