@@ -59,8 +59,10 @@ micropython:
 	@mkdir -p build/micropython && cp firmware/package.json build/micropython/
 	npm install --prefix build/micropython --no-package-lock --no-audit --no-fund --silent
 
+# how many examples properties are tried with; EXAMPLES=nightly for four times as many
+EXAMPLES ?= pretouch
 # what a test run says at its end: the fifty slowest tests, and what was skipped for which extra
-PYTEST := $(BIN)/pytest --durations=50 --durations-min=1
+PYTEST := $(BIN)/pytest --durations=50 --durations-min=1 --hypothesis-profile=$(EXAMPLES)
 
 test: setup
 	$(PYTEST) -n 2 --dist worksteal -m "not slow" --list-skipped=build/skipped

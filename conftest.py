@@ -13,7 +13,8 @@ from pretouch.robot.description import fr3, panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing import skin
 
-settings.register_profile("pretouch", deadline=None, derandomize=True, database=None, max_examples=100)
+settings.register_profile("pretouch", deadline=None, derandomize=True, database=None, max_examples=25)
+settings.register_profile("nightly", settings.get_profile("pretouch"), max_examples=100)
 settings.load_profile("pretouch")
 
 

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -8,6 +8,7 @@ from pretouch.calibration.alignment import align
 from pretouch.calibration.signals import ImuSignal, rate_of_change, saturated, smooth, times
 from pretouch.calibration.values import UnitData
 from pretouch.traces import ImuTrace
+from tests.examples import examples
 
 STEP = 0.04
 TIME = np.arange(0, 40, STEP)
@@ -25,7 +26,7 @@ def turning(time, seed=0):
 ALL = np.ones(len(TIME), bool)
 
 
-@settings(max_examples=30, deadline=None)
+@examples(30, least=10)
 @given(st.floats(-0.45, 0.45), st.integers(0, 1000))
 def test_the_lag_is_found_whatever_the_rotation_and_the_bias(late, seed):
     R = Rotation.random(random_state=seed).as_matrix()

@@ -4,11 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from pretouch.calibration.stamps import ImuCounters, instants, retimed
 from pretouch.traces import ImuTrace
+from tests.examples import examples
 
 NOMINAL = 416
 
@@ -81,7 +82,7 @@ def joined(*parts: Heard) -> Heard:
     st.integers(0, 2**31), st.floats(0.96, 1.04), st.floats(-50e-6, 50e-6), st.floats(0.0, 0.5),
     st.integers(0, 2**32 - 1), st.floats(-3e5, -1.0),
 )  # fmt: skip
-@settings(max_examples=30)
+@examples(30, least=10)
 def test_instants_are_true_to_a_tenth_of_a_period_whatever_is_lost(seed, rate, drift, loss, first, booted):
     rng = np.random.default_rng(seed)
     heard = lossy(rng, unit(rng, 20.0, NOMINAL * rate, first=first, drift=drift, booted=booted), loss)
@@ -187,7 +188,7 @@ def test_too_little_to_tell_a_rate_is_not_known(batches):
 
 
 @given(st.integers(0, 2**31), st.integers(2, 60))
-@settings(max_examples=200)
+@examples(200)
 def test_junk_gives_an_array_of_the_right_length_and_no_warning(seed, batches):
     rng = np.random.default_rng(seed)
     count = rng.integers(0, 33, batches)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.examples import examples
 
 from pretouch.contact.virtual_mass import (
     BRAKES_S,
@@ -159,6 +160,7 @@ PUSHES = st.lists(
 )
 
 
+@examples(100, least=50)
 @pytest.mark.slow
 @given(PUSHES, st.floats(-0.4, 0.4), st.integers(0, 2**31), st.floats(0.5, 15.0))
 def test_it_takes_energy_and_gives_none_whatever_is_pushed(pushes, bias, seed, acceleration):
@@ -191,6 +193,7 @@ def test_it_takes_energy_and_gives_none_whatever_is_pushed(pushes, bias, seed, a
     assert np.abs(command).max() < 0.05
 
 
+@examples(100, least=50)
 @given(st.lists(st.floats(-40, 40), min_size=N, max_size=N))
 def test_a_push_never_moves_the_arm_towards_who_pushes(torque):
     """The power that the person gives is never negative, on whatever link: it is torque times joint velocity."""
@@ -313,6 +316,7 @@ def test_beyond_the_bound_the_way_back_is_free_and_the_way_on_is_not():
     assert np.array_equal(back, -TURN)
 
 
+@examples(100, least=50)
 @given(st.lists(st.floats(-0.6, 0.6), min_size=7, max_size=7), st.lists(st.floats(-2, 2), min_size=7, max_size=7))
 def test_no_joint_turns_round_and_no_end_is_faster_away_than_is_allowed(turned, qd):
     dt = 1e-6

@@ -4,10 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from tests.contact.alone import sample, something, standing
+from tests.examples import examples
 
 from pretouch.contact.detector import Body
 from pretouch.contact.localisation import (
@@ -264,7 +265,7 @@ def test_a_touch_tells_the_place_on_links_of_which_torques_tell_little(link, mos
 OUTER = [int(SURFACE.body[SURFACE.link == MODEL.link_index(f"panda_{name}")][0]) for name in ("link5", "link6", "hand")]
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(st.integers(0, 10_000), st.sampled_from(OUTER), st.integers(0, 10_000), st.integers(0, 10_000),
        st.sampled_from([20.0, 30.0, 60.0]))  # fmt: skip
 def test_torques_that_contradict_a_false_touch_win(seed, where, one, other, newtons):

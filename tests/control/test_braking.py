@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
+from tests.examples import examples
 
 from pretouch.cholesky import factor
 from pretouch.control.braking import (
@@ -189,6 +190,7 @@ def test_another_closest_link_adds_a_row_and_the_first_fades():
     assert h[0] == pytest.approx(TOUCH + 2 * LOOSEN * DT)
 
 
+@examples(100, least=50)
 @given(
     st.lists(st.tuples(st.booleans(), st.integers(1, 2), st.floats(-0.05, 0.7), st.floats(-2, 2)), max_size=60),
     st.booleans(),

@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from tests.examples import examples
 
 from pretouch.control.joint_box import (
     JointLimits,
@@ -76,7 +77,7 @@ def test_viable_speed_by_numbers():
 
 
 @given(st.floats(1e-6, 5.0), st.floats(1.0, 20.0), st.sampled_from(PERIODS))
-@settings(max_examples=300)
+@examples(300)
 def test_viable_speed_stops_exactly_at_the_limit(distance: float, acceleration: float, period: float):
     speed, travelled = viable_speed(distance, acceleration, period), 0.0
     while speed > 0:
@@ -130,7 +131,7 @@ def test_the_viable_speed_is_the_largest_from_which_full_braking_keeps_the_envel
 @example(0.01, 0.3, 9.0, 10.0, 0.01)  # the distance is offset^2 / slope: the envelope's own end
 @example(0.5, 0.3, 20.0, 10.0, 0.01)  # the envelope is just as steep as the brakes
 @example(0.5, 0.0, np.nextafter(20.0, 30.0), 10.0, 0.01)
-@settings(max_examples=500)
+@examples(500)
 def test_the_viable_speed_is_continuous_and_falls_towards_the_end(distance, offset, slope, acceleration, period):
     def at(d: float) -> float:
         return viable_speed_in_envelope(d, offset, slope, acceleration, period)
@@ -261,7 +262,7 @@ singular = st.sampled_from([0.0, 1.0, -1.0, 1 + 1e-12, 1 - 1e-12, -1 - 1e-12, 1.
 
 
 @given(arrays(np.float64, 7, elements=singular), arrays(np.float64, 7, elements=singular), st.sampled_from(PERIODS))
-@settings(max_examples=500)
+@examples(500)
 def test_the_box_is_sound_from_any_state(at: np.ndarray, fast: np.ndarray, period: float):
     limits = joint_limits(FR3, 0.01, period)
     q = FR3.q_mid + at * (limits.q_max - FR3.q_mid)

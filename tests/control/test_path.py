@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from tests.examples import examples
 from tests.following_arm import DT
 
 from pretouch.control.path import Circle, OnPath, Path, WayPoints, advance, follow, segment
@@ -103,11 +104,12 @@ def test_along_and_back_to_the_path_by_numbers(speed: float, position: tuple, ve
 
 
 @given(arrays(np.float64, 3, elements=st.floats(-2, 2)), st.floats(0, 10), st.floats(0, 0.3))
-@settings(max_examples=200)
+@examples(200)
 def test_the_task_is_never_faster_than_allowed_by_now(position: np.ndarray, phase: float, speed: float):
     on_path = followed(CIRCLE, phase, speed, position)
     assert 0 <= on_path.forward[0] <= speed
-    assert np.linalg.norm(on_path.velocity) <= speed * (1 + 1e-12)
+    # squares of speeds far below 1e-150 m/s are no normal numbers
+    assert np.linalg.norm(on_path.velocity) <= speed * (1 + 1e-12) + 1e-150
 
 
 @pytest.mark.parametrize(
@@ -136,7 +138,7 @@ def test_the_way_back_to_the_path_is_no_way_along_it_by_numbers():
 
 @pytest.mark.parametrize("path", [CIRCLE, segment((0.0, 0.0, 0.0), (0.0, 9.0, 0.0))])
 @given(away=arrays(np.float64, 3, elements=st.floats(-0.3, 0.3)), slowed=st.floats(0.2, 1.0))
-@settings(max_examples=30)
+@examples(30, least=10)
 def test_wherever_it_was_pushed_the_arm_comes_back_and_goes_on(path: Path, away: np.ndarray, slowed: float):
     phase, speed, position = 0.0, 0.0, path.point(0.0) + away
     for _ in range(2500):  # 0.5 m at a fifth of 0.3 m/s is 8 s, and then as long again

@@ -6,10 +6,11 @@ from itertools import product
 import daqp
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 from tests.control.programs import answered
+from tests.examples import examples
 from tests.reference.problems import TOUCH, facing_rows, grazed, problem, stiff_row
 from tests.reference.qp import Problem, kkt_residual
 from tests.reference.qp import solve as solve_exactly
@@ -200,7 +201,7 @@ def hard(kind: str, seed: int) -> Problem:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@settings(max_examples=200, deadline=None)
+@examples(200)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_hard_rows_are_answered_as_daqp_does(kind: str, seed: int):
     p = hard(kind, seed)

@@ -4,8 +4,9 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from tests.examples import examples
 
 from pretouch.control.path import Pace, reduce_speed, speed_scale
 
@@ -79,7 +80,7 @@ readings = st.lists(st.one_of(st.just(np.inf), st.floats(0.0, 1.2)), min_size=2,
 
 
 @given(readings)
-@settings(max_examples=300)
+@examples(300)
 def test_the_factor_rises_no_faster_than_the_fading(distances: list[float]):
     out = scales(distances)
     assert all(0.0 <= scale <= 1.0 for scale in out)
@@ -88,7 +89,7 @@ def test_the_factor_rises_no_faster_than_the_fading(distances: list[float]):
 
 
 @given(st.lists(st.floats(0.0, 1.0), min_size=2, max_size=30))
-@settings(max_examples=300)
+@examples(300)
 def test_each_factor_is_the_fresh_one_or_on_its_way_up_to_it(fresh: list[float]):
     out = faded(fresh)
     for (before, after), factor in zip(pairwise([1.0, *out]), fresh, strict=True):

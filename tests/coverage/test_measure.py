@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from pretouch.coverage.measure import covered
@@ -13,6 +13,7 @@ from pretouch.coverage.ways import seen_by, ways_to
 from pretouch.sensing.sensor import VL53L1X
 from pretouch.sim.scene import SceneSpec, fixtures
 from tests.coverage.made import HEIGHT, ROOM, arm, below_it, skin, unit_at
+from tests.examples import examples
 
 BRIGHT = CoverageParams(range_m=10.0, reflectance_limit=1e-3)
 
@@ -95,7 +96,7 @@ def found_by(model, worn, few, params):
     return made, seen_by(made, worn)
 
 
-@settings(max_examples=25)
+@examples(25, least=10)
 @given(
     st.floats(0.01, 0.6), st.floats(0.05, 0.4), st.floats(0.001, 0.08), st.floats(10.0, 60.0), st.floats(0.5, 2.0),
     st.sampled_from(["object_speed_m_s", "arm_speed_m_s", "latency_s", "rate_hz", "range_m", "deceleration_m_s2"]),

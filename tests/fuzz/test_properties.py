@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from pretouch.control.approach import ApproachRestriction
@@ -15,6 +15,7 @@ from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin
 from pretouch.types import Inputs, RangeReadings, RangeStatus
+from tests.examples import examples
 from tests.fuzz.machine import Course, Machine
 from tests.fuzz.weather import STATUS
 from tests.fuzz.worlds import World
@@ -87,7 +88,7 @@ moments = st.tuples(
 
 
 @given(profiles, postures, speeds, st.lists(moments, min_size=1, max_size=8))
-@settings(max_examples=150)
+@examples(150, least=75)
 def test_any_posture_and_any_numbers(profile, q, qd, sequence):
     arm = begun(profile, q, qd)
     for seen, wrench, late, spoils, resume in sequence:

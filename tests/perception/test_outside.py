@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from tests.examples import examples
 from tests.perception.watcher import FLOOR, TCP, readings_of
 from tests.perception.watcher import Watcher as Eyes
 
@@ -121,7 +122,7 @@ def test_a_point_that_is_none_is_left_out_and_the_others_stay(watcher, spoil):
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(0, 300))
-@settings(max_examples=30)
+@examples(30, least=10)
 def test_of_any_points_the_nearest_of_each_link_are_kept(panda_model, seed, count):
     rng = np.random.default_rng(seed)
     points = rng.uniform([-0.8, -0.8, 0.0], [1.0, 0.8, 1.2], (count, 3))

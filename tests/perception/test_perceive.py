@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.examples import examples
 from tests.perception.watcher import HAND_LEFT, PARAMS, TCP, Watcher, readings_of
 
 from pretouch.perception.obstacles import silent_units
@@ -104,6 +105,7 @@ statuses = st.just(0) | st.sampled_from([int(s) for s in RangeStatus]) | st.inte
 messages = st.lists(st.tuples(stamps, distances, statuses), min_size=7, max_size=7)
 
 
+@examples(100, least=50)
 @given(steps=st.lists(messages, min_size=1, max_size=4))
 def test_whatever_arrives_obstacles_are_whole(panda_model, paper_skin, steps):
     watcher = Watcher(panda_model, paper_skin)
@@ -170,6 +172,7 @@ def test_a_failure_now_and_then_is_no_silence(watcher):
         assert _go_on(watcher, 9.02 + 0.1 * cycle, 0.08, RangeStatus.SYNC) == (1.0, "")
 
 
+@examples(100, least=50)
 @given(ages=st.lists(st.floats(-0.1, 0.5), min_size=7, max_size=7))
 def test_the_arm_stands_exactly_when_a_unit_is_named(panda_model, paper_skin, ages):
     watcher = Watcher(panda_model, paper_skin)
