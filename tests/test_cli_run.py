@@ -33,7 +33,7 @@ BLIND = ("run", "--no-skin", "--profile", "blind", "--path", "hold")
 def _state_of_its_own(tmp_path, monkeypatch):
     """A folder of its own, in which the force sign counts as confirmed: pushes take seconds."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
-    monkeypatch.setattr("pretouch.session.may_move.WATCH_S", 1.0)
+    monkeypatch.setattr("pretouch.session.may_move.WATCH_S", 0.5)
     monkeypatch.setattr(GuidedPush, "confirm", lambda *_: None)
     monkeypatch.chdir(tmp_path)
 

@@ -122,16 +122,27 @@ def test_an_object_is_grasped_and_loads_the_arm_the_same_each_time(franka_server
     np.testing.assert_array_equal(truths[0].q, truths[1].q)
 
 
-def test_it_stands_where_the_test_wants_it_to(franka_server, connected):
-    wanted = [-0.1, -0.5, 0.1, -2.0, 0.0, 1.6, 0.7]
-    server = franka_server(start=",".join(map(str, wanted)))
-    np.testing.assert_allclose(connected(server, "panda").state()["q"], wanted, atol=2e-2)
+_START = -0.1, -0.5, 0.1, -2.0, 0.0, 1.6, 0.7
 
 
-def test_the_user_stop_ends_a_motion(franka_server, connected):
+@pytest.fixture(scope="module")
+def standing():
+    """A server whose arm stands at `_START`."""
+    with testing.FrankaServer(start=",".join(map(str, _START))) as server:
+        yield server
+
+
+def test_it_stands_where_the_test_wants_it_to(standing, connected):
+    np.testing.assert_allclose(connected(standing, "panda").state()["q"], _START, atol=2e-2)
+
+
+def test_in_a_motion_the_truth_is_not_told_and_the_user_stop_ends_it(franka_server, connected, monkeypatch):
     server = franka_server()
     client = connected(server, "panda")
     state = client.turn(client.begun(), _STILL)
+    monkeypatch.setattr(testing, "_ANSWERS_S", 0.2)
+    with pytest.raises(RobotError, match=r"does not answer within 0\.2 s: is it in a motion\?"):
+        _ = server.truth
     server.press_stop()
     state = client.turn(state, _STILL)  # the command that was due is followed
     assert client.turn(state, _STILL)["robot_mode"] == 5
@@ -140,18 +151,12 @@ def test_the_user_stop_ends_a_motion(franka_server, connected):
     client.state_where(lambda s: s["robot_mode"] == 1)
 
 
-def test_in_a_motion_the_truth_is_not_told_and_that_is_said(franka_server, connected, monkeypatch):
-    server = franka_server()
-    client = connected(server, "panda")
-    client.turn(client.begun(), _STILL)
-    monkeypatch.setattr(testing, "_ANSWERS_S", 0.2)
-    with pytest.raises(RobotError, match=r"does not answer within 0\.2 s: is it in a motion\?"):
-        _ = server.truth
-
-
-def test_each_option_of_the_command_is_one_of_the_fixture(franka_server):
+def test_each_option_of_the_command_is_one_of_the_fixture_and_a_server_that_has_gone_is_said(franka_server):
     server = franka_server(lockstep=False, push=["0:0,5,0", "1:0,5,0"], start="path", patience=3)
     assert server.said == (f"Listening at {server.host}:{PORT} (FCI 5, real time), gripper at port 1338.",)
+    server.close()
+    with pytest.raises(RobotError, match="has ended"):
+        server.push((0, 1, 0))
 
 
 def test_what_cannot_be_served_is_an_error_that_says_why(franka_server):
@@ -159,14 +164,10 @@ def test_what_cannot_be_served_is_an_error_that_says_why(franka_server):
         franka_server(scenes="static")
 
 
-def test_what_is_no_push_and_a_server_that_has_gone_are_said(franka_server):
-    server = franka_server()
+def test_what_is_no_push_is_said(standing):
     for wrong in ((0, np.nan, 0), (0, 2000, 0), (0, 1)):
         with pytest.raises(ParameterError, match="The push is "):
-            server.push(wrong)
-    server.close()
-    with pytest.raises(RobotError, match="has ended"):
-        server.push((0, 1, 0))
+            standing.push(wrong)
 
 
 _INNER = """
@@ -253,12 +254,11 @@ def test_the_example_of_the_readme_passes_and_finds_a_program_that_goes_on(pytes
     pytester.runpytest_subprocess("-p", "pretouch_fci.pytest_plugin", "-W", "error").assert_outcomes(failed=1)
 
 
-def test_guided_by_hand_the_arm_goes_where_it_is_pushed(franka_server):
-    server = franka_server()
-    server.guide()
-    server.push((0, 15, 0), seconds=0.3)
-    server.guide(pressed=False)
-    truth = server.truth
+def test_guided_by_hand_the_arm_goes_where_it_is_pushed(standing):
+    standing.guide()
+    standing.push((0, 15, 0), seconds=0.3)
+    standing.guide(pressed=False)
+    truth = standing.truth
     assert truth.force[:, 1].max() == 15
     assert truth.q[-1, 0] - truth.q[0, 0] > 0.05
     # let go, it brakes

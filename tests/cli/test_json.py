@@ -80,6 +80,7 @@ def test_a_dash_is_one_document_on_standard_output_and_text_beside_it(files, cap
     monkeypatch.chdir(files)
     monkeypatch.setenv("XDG_STATE_HOME", str(files))
     monkeypatch.setattr(GuidedPush, "confirm", lambda *_: None)
+    monkeypatch.setattr("pretouch.session.may_move.WATCH_S", 0.5)
     code = cli.main([*words.split(), "--json", "-"])
     said = capsys.readouterr()
     assert code == int("monitor" in words)  # no unit is heard

@@ -85,10 +85,10 @@ def test_a_page_that_is_open_for_long_keeps_no_more_and_more(clock, monkeypatch)
     server = clock.page._server
     monkeypatch.setattr(server, "get_clients", lambda: {0: None})
     messages = server._websock_server._broadcast_buffer.message_from_id
-    clock.turn(6.0)
+    clock.turn(3.0)
     after_a_while = len(messages)
-    clock.turn(4.0)
-    assert len(messages) < after_a_while + 0.5 * 4.0 / PERIOD_S
+    clock.turn(3.0)
+    assert len(messages) < after_a_while + 0.5 * 3.0 / PERIOD_S
 
 
 def test_each_recording_gets_a_file_of_its_own_that_is_named(clock, simulation, tmp_path, monkeypatch):

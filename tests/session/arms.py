@@ -34,7 +34,7 @@ class PushedArm:
 
 
 class FollowingArm:
-    """Follows its commands exactly, in real time: the port `Arm`."""
+    """Follows its commands exactly, in the machine's time: the port `Arm`."""
 
     name = "arm of a test"
 

@@ -24,6 +24,14 @@ from pretouch.types import Mode
 from tests.session.arms import AT_REST, FollowingArm
 
 
+@pytest.fixture(autouse=True)
+def _passing_time(monkeypatch):
+    """Let time pass when somebody waits, and only then: how fast the machine is does not matter."""
+    passed = [100.0]
+    monkeypatch.setattr("time.monotonic", lambda: sum(passed))
+    monkeypatch.setattr("time.sleep", passed.append)
+
+
 @pytest.fixture
 def arm(panda_model):
     return FollowingArm(panda_model.description.q_ready)

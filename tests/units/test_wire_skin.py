@@ -48,9 +48,9 @@ def test_the_wire_is_deterministic_bit_for_bit(plant, paper_skin):
     runs = []
     for seed in (5, 5, 6):
         arm = plant(WALL)
-        params = FleetParams(network(loss=0.2, overtaken=0.1, doubled=0.1), imu=ImuParams(), reboot_every_s=3.0)
+        params = FleetParams(network(loss=0.2, overtaken=0.1, doubled=0.1), imu=ImuParams(), reboot_every_s=1.5)
         with WireSkin(arm, paper_skin, RangeFinderParams(), params, seed) as skin:
-            told = watched(arm, skin, 4.0)
+            told = watched(arm, skin, 2.0)
             counted = [(u.accepted, u.lost, u.replayed, u.sessions, u.offset) for u in skin.receiver.units]
             imu = [(batch.unit, batch.index, batch.stamp.tobytes()) for batch in imu_taken(skin.receiver)]
         runs.append((*(told[key].tobytes() for key in ("stamp", "distance", "status")), counted, imu))
@@ -58,7 +58,7 @@ def test_the_wire_is_deterministic_bit_for_bit(plant, paper_skin):
     assert runs[0][0] != runs[2][0], "another seed takes another course"
 
 
-@pytest.mark.parametrize("loss", [0.0, 0.1, 0.3])
+@pytest.mark.parametrize("loss", [0.0, pytest.param(0.1, marks=pytest.mark.slow), 0.3])
 def test_the_receiver_counts_what_the_network_lost(plant, paper_skin, loss):
     arm = plant()
     with WireSkin(arm, paper_skin, RangeFinderParams(), FleetParams(network(loss)), 0) as skin:
