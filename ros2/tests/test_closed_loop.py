@@ -16,7 +16,7 @@ from pretouch.errors import RobotError
 from pretouch.perception.scene_filter import no_fixtures
 from pretouch.profiles import PROFILES
 from pretouch.types import ControlStep, Mode
-from pretouch_ros2.params import ArmParams, SkinParams
+from pretouch_ros2.params import ArmParams
 from pretouch_ros2.robot import Ros2Robot
 from pretouch_ros2.skin import Ros2Skin
 
@@ -29,7 +29,7 @@ def run(panda_model, paper_skin, node, arm):
     x, y, z = panda_model.kinematics(panda_model.description.q_ready).position[panda_model.ee]
     path = segment((x, y, z), (x, y + 0.4, z))
     controller = Controller(panda_model, paper_skin, no_fixtures(), path, PROFILES["paper"])
-    units = Ros2Skin(SkinParams(), paper_skin, node)
+    units = Ros2Skin(paper_skin, node)
     with Ros2Robot(ArmParams("by-robot", "base"), panda_model, node) as robot:
         robot.wait(10)
         units.wait(10)

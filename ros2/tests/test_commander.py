@@ -26,9 +26,9 @@ from pretouch.sensing.skin import Skin
 from pretouch.sound import sound_desired
 from pretouch.types import ControlStep, Mode
 from pretouch_ros2.commander import Ros2Commander
-from pretouch_ros2.joints import JointReading
+from pretouch_ros2.inputs import JointReading
 from pretouch_ros2.messages import TWIST
-from pretouch_ros2.params import ArmParams, Asked, CommanderParams
+from pretouch_ros2.params import ArmParams, Asked
 from pretouch_ros2.robot import Ros2Robot
 
 R = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
@@ -39,17 +39,17 @@ Q = np.array([0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785])
 class Told:
     """A commander that is handed messages as the node's thread would."""
 
-    def __init__(self, model: RobotModel, asked: Asked, **settings: Any) -> None:
+    def __init__(self, model: RobotModel, asked: Asked, shared_clock: bool = True, **settings: Any) -> None:
         self._take: Callable[[Any, float, int], None]
         self.heard = SimpleNamespace(unreadable="")
         robot: Any = SimpleNamespace(
-            params=ArmParams("on-robot", "base"),
+            params=ArmParams("on-robot", "base", shared_clock=shared_clock),
             joints=NAMES,
             orientation=lambda: R,
             measured=lambda: JointReading(0.0, Q, SLOW),
         )
         node: Any = SimpleNamespace(subscribe=self._subscribe)
-        self.commander = Ros2Commander(CommanderParams(asked, **settings), robot, model, node)
+        self.commander = Ros2Commander(asked, robot, model, node, **settings)
 
     def _subscribe(self, topic: str, kind: str, take: Callable[[Any, float, int], None]) -> Any:
         self._take = take
@@ -146,7 +146,7 @@ def test_what_the_arm_is_told_is_no_commander(panda_model):
     with pytest.raises(RobotError, match="is where the arm's commands go: ask on another topic"):
         Told(panda_model, "trajectory", topic="/joint_trajectory_controller/joint_trajectory")
     with pytest.raises(ParameterError, match="give the full name of a topic"):
-        CommanderParams("twist", "1st")
+        Told(panda_model, "twist", topic="1st")
 
 
 @pytest.mark.parametrize("asked", ["twist", "trajectory"])
@@ -202,7 +202,7 @@ def test_a_twist_drives_the_arm_by_its_torques_and_what_goes_wrong_holds_it_and_
         params = ArmParams("by-robot", "base", torques="/external_joint_torques")
         robot = opened.enter_context(Ros2Robot(params, panda_model, node))
         robot.wait(10)
-        commander = Ros2Commander(CommanderParams("twist"), robot, panda_model, node)
+        commander = Ros2Commander("twist", robot, panda_model, node)
         robot.begin()
         steps = turned(controller, robot, NoUnits(), done, desired=commander)
     assert "the arm goes on when it can" in said[0]

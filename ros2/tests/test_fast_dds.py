@@ -15,11 +15,9 @@ import numpy as np
 import pytest
 from tests.needs import skip_for
 
-from pretouch_ros2.estimates import TorqueEstimate
-from pretouch_ros2.messages import FRANKA_STATE, JOINT_STATE, RANGE, TRAJECTORY, TWIST, WRENCH
+from pretouch_ros2.messages import JOINT_STATE, RANGE, TRAJECTORY, TWIST, WRENCH
 from pretouch_ros2.node import Ros2Node
-from pretouch_ros2.params import ArmParams, NodeParams
-from pretouch_ros2.stamps import SourceStamps
+from pretouch_ros2.params import NodeParams
 
 HERE = Path(__file__).parent
 LAYOUTS = {
@@ -116,28 +114,6 @@ def test_what_fast_dds_publishes_is_read_and_it_reads_what_is_published(fast_pee
     assert process.returncode == 0
     lines = [line.strip() for line in printed.splitlines()]
     assert all(same(a, b) for a, b in zip(lines, LINES[kind], strict=True)), lines
-
-
-def test_the_torques_in_a_state_of_franka_are_read_and_what_follows_them_is_not(fast_peer, node, domain):
-    efforts = [0.5, -1.25, 3.0]
-    joints = LAYOUTS[JOINT_STATE]
-    layout = f"ius{'d' * 26}{joints * 3}{'d' * 14}{joints}[d]dsb"
-    words = ["7 8 :fr3_link0", *["1"] * 26, *["0 0 :l 1 :j 1 0.5 0 0"] * 3, *["2"] * 14,
-             "7 8 :fr3_link0 3 :a :b :c 3 0 0 0 3 0 0 0 3", *map(str, efforts), "2 0.1 0.2 9.5 :more 1"]  # fmt: skip
-    torques = TorqueEstimate(ArmParams("by-robot", "base", torques="/arm/robot_state"), ("c", "a", "b"), SourceStamps())
-    assert torques.kind == FRANKA_STATE
-    read: list[list[float]] = []
-
-    def take(message: Any, received: float, writer: int) -> None:
-        torques.take(message, received, writer)
-        read.append(torques.read(received).tolist())
-
-    subscription = node.subscribe("/topic", FRANKA_STATE, take)
-    with peer(fast_peer, domain, FRANKA_STATE, "pub", "best", layout=layout) as process:
-        assert node.wait_for(lambda: subscription.publishers == 1, 20)
-        process.communicate(" ".join(words) + "\n", timeout=30)
-    assert node.wait_for(lambda: bool(read), 5), subscription.unreadable
-    assert read == [[-3.0, -0.5, 1.25]]
 
 
 @pytest.mark.parametrize("distribution", ["humble", "jazzy"])

@@ -9,11 +9,9 @@ import pytest
 from ros2.tests.asking import MESSAGES, header, joint_state, measured_range
 from scipy.spatial.transform import Rotation
 
-from pretouch.errors import RobotError
 from pretouch.types import RangeStatus
-from pretouch_ros2.estimates import TorqueEstimate, Wrench
-from pretouch_ros2.joints import Joints
-from pretouch_ros2.messages import FRANKA_STATE, WRENCH
+from pretouch_ros2.inputs import Joints, TorqueEstimate, Wrench
+from pretouch_ros2.messages import WRENCH
 from pretouch_ros2.params import ArmParams
 from pretouch_ros2.skin import status_of
 from pretouch_ros2.stamps import SourceStamps
@@ -186,14 +184,6 @@ def test_torques_of_others_or_too_few_are_none_and_zeros_neither_where_they_mean
     kept = TorqueEstimate(ArmParams("on-robot", "base", torques="/tau"), NAMES, SourceStamps())
     kept.take(joint_state(3, "abc", tau=[0, 0, 0]), 5.2, 1)
     assert not kept.read(5.2).any()
-
-
-def test_only_the_beginning_of_a_state_of_franka_is_read_and_half_of_it_is_refused():
-    data = MESSAGES.encoded(FRANKA_STATE, MESSAGES.types[FRANKA_STATE](**MESSAGES.blank(FRANKA_STATE)))
-    assert MESSAGES.decoded(FRANKA_STATE, data + b"more").tau_ext_hat_filtered.name == []
-    for cut in (0, 1, 4, len(data) // 2):
-        with pytest.raises(RobotError, match="is not a franka_msgs/msg/FrankaRobotState"):
-            MESSAGES.decoded(FRANKA_STATE, data[:cut])
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import pytest
 from rosbags.interfaces import Nodetype
 
 from pretouch.errors import RobotError
-from pretouch_ros2.messages import JOINT_STATE, MARKERS, RANGE, TRAJECTORY, USED, Messages
+from pretouch_ros2.messages import JOINT_STATE, RANGE, TRAJECTORY, TRANSFORMS, USED, Messages
 from pretouch_ros2.params import Distribution
 
 DISTRIBUTIONS = get_args(Distribution)
@@ -98,9 +98,9 @@ def test_a_range_of_another_layout_is_refused_and_names_the_way_out(sender, rece
 @pytest.mark.parametrize("cut", [0, 3, 4, 11, 40])
 def test_a_message_cut_off_is_refused(cut):
     messages = messages_of("jazzy")
-    ours, _ = Drawn(messages, 3).pair(MARKERS)
-    with pytest.raises(RobotError, match="is not a visualization_msgs/msg/MarkerArray of jazzy"):
-        messages.decoded(MARKERS, messages.encoded(MARKERS, ours)[:cut])
+    ours, _ = Drawn(messages, 3).pair(TRANSFORMS)
+    with pytest.raises(RobotError, match="is not a tf2_msgs/msg/TFMessage of jazzy"):
+        messages.decoded(TRANSFORMS, messages.encoded(TRANSFORMS, ours)[:cut])
 
 
 def test_the_hash_of_a_type_is_that_of_ros():

@@ -11,7 +11,7 @@ from ros2.tests.asking import joint_state, measured_range
 from pretouch.errors import HardwareError, RobotError
 from pretouch_ros2.messages import JOINT_STATE, RANGE, TEXT, WRENCH
 from pretouch_ros2.node import Ros2Node
-from pretouch_ros2.params import ArmParams, NodeParams, SkinParams, seconds
+from pretouch_ros2.params import ArmParams, NodeParams, seconds
 from pretouch_ros2.robot import Ros2Robot
 from pretouch_ros2.skin import Ros2Skin
 
@@ -85,7 +85,7 @@ def test_an_arm_that_is_not_there_is_named_with_what_there_is(node, other, panda
 
 
 def test_units_that_are_not_there_are_named(node, other, paper_skin):
-    units = Ros2Skin(SkinParams("/ranges"), paper_skin, node)
+    units = Ros2Skin(paper_skin, node, "/ranges")
     publisher = other.publisher("/ranges", RANGE)
     assert other.wait_for(lambda: publisher.subscribers == 1, 10)
     for name in [*paper_skin.ids[1:], "stranger"]:
@@ -107,7 +107,7 @@ def test_a_unit_for_which_several_publish_is_silent_and_named_and_strangers_take
         publishers[by].publish(measured_range(number, name, distance))
 
     ours = paper_skin.ids[0]
-    units = Ros2Skin(SkinParams("/ranges"), paper_skin, node)
+    units = Ros2Skin(paper_skin, node, "/ranges")
     publishers = {by: by.publisher("/ranges", RANGE) for by in (other, third)}
     assert all(by.wait_for(lambda one=one: one.subscribers == 1, 10) for by, one in publishers.items())
     say(other, ours, 1, 0.25)

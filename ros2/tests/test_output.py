@@ -12,15 +12,13 @@ from tests.following_arm import DT, Arm
 from pretouch.loop import Cycle
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
-from pretouch_ros2.messages import CLOUD, DIAGNOSTICS, MARKERS, STATUS, TEXT, TRANSFORMS, WRENCH
+from pretouch_ros2.messages import CLOUD, DIAGNOSTICS, STATUS, TEXT, TRANSFORMS, WRENCH
 from pretouch_ros2.node import Ros2Node
 from pretouch_ros2.output import Ros2Output
-from pretouch_ros2.params import OutputParams
 
 TOPICS = {
-    "/pretouch/obstacles": CLOUD, "/pretouch/markers": MARKERS, "/pretouch/force": WRENCH,
-    "/pretouch/contact": WRENCH, "/pretouch/mode": TEXT, "/pretouch/limited": STATUS, "/diagnostics": DIAGNOSTICS,
-    "/tf_static": TRANSFORMS,
+    "/pretouch/obstacles": CLOUD, "/pretouch/force": WRENCH, "/pretouch/contact": WRENCH, "/pretouch/mode": TEXT,
+    "/pretouch/limited": STATUS, "/diagnostics": DIAGNOSTICS, "/tf_static": TRANSFORMS,
 }  # fmt: skip
 LATCHED = ("/pretouch/mode", "/tf_static")
 
@@ -45,9 +43,9 @@ class Listener:
 class Published(Arm):
     """An arm that follows its commands, whose turns are published."""
 
-    def __init__(self, model: RobotModel, skin: Skin, node: Ros2Node, **params: Any) -> None:
+    def __init__(self, model: RobotModel, skin: Skin, node: Ros2Node) -> None:
         super().__init__(model, skin)
-        self.output = Ros2Output(OutputParams(**params), self.controller, node)
+        self.output = Ros2Output(self.controller, node)
 
     def turn(self, *given: Any, **more: Any) -> Cycle:
         cycle = super().turn(*given, **more)
@@ -60,9 +58,9 @@ def listener(other):
     return Listener(other)
 
 
-@pytest.fixture(params=[{"diagnostics_hz": 10.0}], ids=[""])
-def published(request, panda_model, paper_skin, node, listener):
-    published = Published(panda_model, paper_skin, node, **request.param)
+@pytest.fixture
+def published(panda_model, paper_skin, node, listener):
+    published = Published(panda_model, paper_skin, node)
     # what is sent before both sides have found each other is lost
     assert listener.node.wait_for(lambda: all(one.publishers for one in listener.subscriptions.values()), 10)
     assert node.wait_for(lambda: all(publisher.subscribers for publisher in node._publishers), 10)
@@ -93,10 +91,6 @@ def test_a_step_is_published_by_standard_messages(published, listener, panda_mod
         "by": "hold", "share": "0.000", "unit": "", "link": "", "joint": "",
     }  # fmt: skip
     assert (limited.level, limited.message) == (1, step.reason)
-    spheres, lines, _, words = listener.last("/pretouch/markers").markers
-    assert [(p.x, p.y, p.z) for p in spheres.points] == [pytest.approx(tuple(p)) for p in step.obstacles.point]
-    assert len(lines.points) == 4
-    assert words.text == "HOLD"
 
 
 def test_units_lie_where_the_skin_has_them(published, listener, paper_skin):
@@ -136,8 +130,7 @@ def test_a_silent_unit_is_an_error_in_the_diagnostics(published, listener, paper
     assert units[1].message == "received 0.50 s ago"
 
 
-@pytest.mark.parametrize("published", [{"rate_hz": 20.0}], indirect=True)
-def test_steps_are_published_at_the_rate_that_was_asked_for(published, listener):
+def test_steps_are_published_at_their_own_rate(published, listener):
     for _ in range(50):
         published.turn()
         sleep(DT)

@@ -24,7 +24,7 @@ from pretouch.recording.ros import OWN, own_definition
 from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch_ros2.arm import Ros2
-from pretouch_ros2.params import CommanderParams
+from pretouch_ros2.commander import TOPICS
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
@@ -152,7 +152,7 @@ def test_a_joystick_asks_on_the_topic_in_a_known_frame_often_enough(monkeypatch)
     launch = Launch(monkeypatch)
     launch.run(BRINGUP / "launch" / "joystick.launch.py")
     joy, teleop = launch.made["Node"]
-    assert teleop["remappings"] == [("cmd_vel", CommanderParams("twist").heard_on)]
+    assert teleop["remappings"] == [("cmd_vel", TOPICS["twist"])]
     config = yaml(BRINGUP / "config" / "joystick.yaml")
     settings = config[teleop["name"]]["ros__parameters"]
     assert settings["publish_stamped_twist"] is True
@@ -166,6 +166,6 @@ def test_a_joystick_asks_on_the_topic_in_a_known_frame_often_enough(monkeypatch)
 def test_moveit_servo_sends_velocities_to_the_topic_often_enough():
     servo = yaml(BRINGUP / "config" / "moveit_servo.yaml")["/**"]["ros__parameters"]["moveit_servo"]
     assert servo["command_out_type"] == "trajectory_msgs/JointTrajectory"
-    assert servo["command_out_topic"] == CommanderParams("trajectory").heard_on
+    assert servo["command_out_topic"] == TOPICS["trajectory"]
     assert servo["publish_joint_velocities"] is True
     assert 3 * servo["publish_period"] < PROFILES["pretouch"].failure.desired_timeout_s

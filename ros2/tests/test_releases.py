@@ -15,7 +15,7 @@ from ros2.tests.spline import Release, Spline
 from pretouch.errors import RobotError
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
-from pretouch_ros2.joints import JointReading
+from pretouch_ros2.inputs import JointReading
 from pretouch_ros2.messages import Messages
 from pretouch_ros2.params import ArmParams
 from pretouch_ros2.trajectory_commands import TrajectoryCommands, parts_of_day

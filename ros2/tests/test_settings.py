@@ -5,7 +5,7 @@ import pytest
 from pretouch.errors import ParameterError, RobotError
 from pretouch_ros2.network import check_range, domain_of
 from pretouch_ros2.node import Ros2Node
-from pretouch_ros2.params import ArmParams, NodeParams, OutputParams, SkinParams
+from pretouch_ros2.params import ArmParams, NodeParams, check_topic
 
 
 @pytest.mark.parametrize(
@@ -21,8 +21,7 @@ from pretouch_ros2.params import ArmParams, NodeParams, OutputParams, SkinParams
         (lambda: ArmParams("on-robot", "base", settle_s=1e-6), "must be at least 0.2"),
         (lambda: ArmParams("on-robot", "base", wrench_timeout_s=1e5), "must be at most 0.5"),
         (lambda: ArmParams("on-robot", "base", ahead_s=0.1), "must be at most 0.05"),
-        (lambda: SkinParams("/skin/{unit}/range here"), "give the full name of a topic"),
-        (lambda: OutputParams(rate_hz=0.0), "must be greater than 0"),
+        (lambda: check_topic("Ros2Skin", "topic", "/skin/u/range here"), "give the full name of a topic"),
         (lambda: NodeParams(interface="lo; rm"), "give an address or name of an interface"),
         (lambda: NodeParams(domain=233), "must be at most 232"),
         (lambda: NodeParams("lunar"), "choose one of foxy"),  # type: ignore[arg-type]

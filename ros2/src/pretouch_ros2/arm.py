@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 
 from pretouch.arms import ArmOptions, ArmSetup, OpenedArm
 from pretouch.errors import ParameterError
-from pretouch_ros2.params import ArmParams, CommanderParams, NodeParams, OutputParams, SkinParams
+from pretouch_ros2.params import ArmParams, NodeParams
 
 if TYPE_CHECKING:
     from pretouch.session.memory import Identity
@@ -21,7 +21,7 @@ class Ros2(ArmOptions):
 
     arm: ArmParams
     node: NodeParams = field(default_factory=NodeParams)
-    ranges: str = SkinParams().topic
+    ranges: str = "/skin/{unit}/range"
     """Topic of the units' ranges; {unit} stands for the id of each."""
     desired: Literal["", "twist", "trajectory"] = ""
     """The arm follows a commander in place of a path: a TwistStamped, or the velocities of a JointTrajectory."""
@@ -64,17 +64,15 @@ class Ros2(ArmOptions):
             robot.wait(_PATIENCE_S)
             commander = skin = None
             if self.desired:
-                params = CommanderParams(self.desired, self.desired_topic, self.arm.shared_clock, self.base_frame)
-                commander = Ros2Commander(params, robot, setup.model, node)
+                commander = Ros2Commander(self.desired, robot, setup.model, node, self.desired_topic, self.base_frame)
             if setup.units:
-                skin = Ros2Skin(SkinParams(self.ranges), setup.skin, node)
+                skin = Ros2Skin(setup.skin, node, self.ranges)
                 skin.wait(_PATIENCE_S)
-            output_params = OutputParams(base_frame=self.base_frame)
             sources = [source for source in (robot, skin, commander) if source is not None]
             yield OpenedArm(
                 robot, robot_known, skin,
                 notes=lambda: tuple(note for source in sources for note in source.notes),
-                output=lambda controller: closing(Ros2Output(output_params, controller, node)),
+                output=lambda controller: closing(Ros2Output(controller, node, self.base_frame)),
                 free_motion_id=robot_known.key, commander=commander, announced=commander.announced if commander else "",
             )  # fmt: skip
 

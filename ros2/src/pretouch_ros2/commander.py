@@ -12,11 +12,13 @@ from pretouch.errors import RobotError
 from pretouch.robot.model import RobotModel
 from pretouch_ros2.messages import TRAJECTORY, TWIST
 from pretouch_ros2.node import Ros2Node
-from pretouch_ros2.params import CommanderParams, seconds
+from pretouch_ros2.params import Asked, check_topic, seconds
 from pretouch_ros2.robot import SHARED_S, Ros2Robot
 from pretouch_ros2.stamps import SourceStamps
 
 _KINDS = {"twist": TWIST, "trajectory": TRAJECTORY}
+TOPICS: dict[Asked, str] = {"twist": "/pretouch/twist", "trajectory": "/pretouch/joint_trajectory"}
+"""Where each is asked for, unless somebody says otherwise."""
 _POINTS_MOST = 1000
 _AHEAD_S = 1.0
 """How far ahead trajectories may begin [s]: MoveIt Servo leaves room for its latency."""
@@ -34,23 +36,37 @@ class Ros2Commander:
     Before anything was asked, and while two programs ask, it asks for nothing, which holds the arm and says why.
     """
 
-    def __init__(self, params: CommanderParams, robot: Ros2Robot, model: RobotModel, node: Ros2Node) -> None:
-        """Take the settings, the arm and its model, and the node."""
-        if params.heard_on == robot.params.command_topic:
-            raise RobotError(f"{params.heard_on} is where the arm's commands go: ask on another topic.")
-        self.params, self._robot, self._node = params, robot, node
-        self.kind = _KINDS[params.asked]
-        self._base = (*_resting_links(model), *filter(None, [params.base_frame]))
+    def __init__(
+        self, asked: Asked, robot: Ros2Robot, model: RobotModel, node: Ros2Node, topic: str = "", base_frame: str = ""
+    ) -> None:
+        """Hear what is asked for on a topic.
+
+        Args:
+            asked: twist: geometry_msgs/TwistStamped; trajectory: the velocities of trajectory_msgs/JointTrajectory, as
+                MoveIt Servo sends.
+            robot: the arm.
+            model: of it.
+            node: that hears the topic.
+            topic: '': as of `TOPICS`.
+            base_frame: further name of the base frame, beside the model's own.
+        """
+        self.topic = topic or TOPICS[asked]
+        check_topic("Ros2Commander", "topic", self.topic)
+        if self.topic == robot.params.command_topic:
+            raise RobotError(f"{self.topic} is where the arm's commands go: ask on another topic.")
+        self._robot, self.kind = robot, _KINDS[asked]
+        self._base = (*_resting_links(model), *filter(None, [base_frame]))
         self._ee = model.links[model.ee]
-        self._stamps = SourceStamps(params.shared_clock)
+        self._shared = robot.params.shared_clock
+        self._stamps = SourceStamps(self._shared)
         self._newest: tuple[Desired, bool] | None = None
-        self._heard = node.subscribe(params.heard_on, self.kind, self._take)
+        self._heard = node.subscribe(self.topic, self.kind, self._take)
 
     @property
     def announced(self) -> str:
         """Say what the arm will do, before it moves."""
         return (
-            f"The arm does what is asked on {self.params.heard_on} ({self.kind.replace('/msg/', '/')}), wherever it"
+            f"The arm does what is asked on {self.topic} ({self.kind.replace('/msg/', '/')}), wherever it"
             " reaches and as fast as its joints may; it holds while nothing is asked. It keeps clear of what its units"
             " see, but not of floor, table or itself."
         )
@@ -58,11 +74,11 @@ class Ros2Commander:
     @property
     def notes(self) -> tuple[str, ...]:
         """What a person should know of what came, a sentence each."""
-        return tuple(filter(None, (self._heard.unreadable, self._stamps.not_newer(self.params.heard_on))))
+        return tuple(filter(None, (self._heard.unreadable, self._stamps.not_newer(self.topic))))
 
     def __call__(self) -> Desired:
         """Return what is asked for now."""
-        topic, newest = self.params.heard_on, self._newest
+        topic, newest = self.topic, self._newest
         if self._stamps.together():
             return desired.refused(0.0, f"several programs ask on {topic}: run only one")
         if old := self._stamps.not_newer(topic):
@@ -87,13 +103,13 @@ class Ros2Commander:
             read = self._twist if self.kind == TWIST else self._trajectory
             self._newest = read(message, instant)
         except _UnfitError as unfit:
-            self._newest = desired.refused(received, str(unfit)), False
+            self._newest = desired.refused(received, f"on {self.topic} {unfit}"), False
 
     def _check_clock(self) -> None:
         behind, ahead = self._stamps.behind, _AHEAD_S if self.kind == TRAJECTORY else SHARED_S
-        if self.params.shared_clock and behind is not None and not -ahead < behind < SHARED_S:
+        if self._shared and behind is not None and not -ahead < behind < SHARED_S:
             raise _UnfitError(
-                f"the stamps on {self.params.heard_on} are {behind:.3g} s behind this machine's time of day: set the"
+                f"the stamps are {behind:.3g} s behind this machine's time of day: set the"
                 " clocks by NTP, or say that ROS has its own clock"
             )
 
@@ -102,9 +118,7 @@ class Ros2Commander:
         frame = message.header.frame_id
         if frame not in (*self._base, self._ee):
             frames = ", ".join((*self._base, self._ee))
-            raise _UnfitError(
-                f"on {self.params.heard_on} twists are in the frame {frame[:_SHOWN]!r}: give one of {frames}"
-            )
+            raise _UnfitError(f"twists are in the frame {frame[:_SHOWN]!r}: give one of {frames}")
         v, w = message.twist.linear, message.twist.angular
         return desired.twist(instant, (v.x, v.y, v.z), (w.x, w.y, w.z)), frame == self._ee
 
@@ -114,21 +128,18 @@ class Ros2Commander:
         other = next((pair for pair in zip_longest(ours, names, fillvalue="") if pair[0] != pair[1]), None)
         if other is not None:
             raise _UnfitError(
-                f"on {self.params.heard_on} the joint {other[1][:_SHOWN]!r} is in the place of {other[0]!r}: give"
+                f"the joint {other[1][:_SHOWN]!r} is in the place of {other[0]!r}: give"
                 f" {', '.join(ours)}, in this order"
             )
         if not 0 < len(points) <= _POINTS_MOST:
-            raise _UnfitError(
-                f"on {self.params.heard_on} a trajectory has {len(points)} points: give 1 to {_POINTS_MOST}"
-            )
+            raise _UnfitError(f"a trajectory has {len(points)} points: give 1 to {_POINTS_MOST}")
         for point in points:
             if len(point.velocities) != len(ours):
                 raise _UnfitError(
-                    f"on {self.params.heard_on} {len(point.velocities)} joint velocities are asked for: give"
-                    f" {len(ours)}, of {', '.join(ours)}"
+                    f"{len(point.velocities)} joint velocities are asked for: give {len(ours)}, of {', '.join(ours)}"
                 )
         stamp = seconds(message.header.stamp.sec, message.header.stamp.nanosec)
-        ahead = max(stamp - wall_clock(), 0.0) if self.params.shared_clock and stamp else 0.0
+        ahead = max(stamp - wall_clock(), 0.0) if self._shared and stamp else 0.0
         times = [seconds(point.time_from_start.sec, point.time_from_start.nanosec) for point in points]
         velocities = np.array([point.velocities for point in points])
         return desired.joint_velocities(instant + ahead + np.array(times), velocities), False

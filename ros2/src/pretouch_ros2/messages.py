@@ -10,13 +10,11 @@ from typing import Any
 from cyclonedds.idl import IdlStruct, make_idl_struct
 from cyclonedds.idl import types as idl
 from rosbags.interfaces import Nodetype
-from rosbags.typesys import get_types_from_msg
 
 from pretouch.errors import RobotError
 from pretouch.recording import ros
 from pretouch.recording.ros import DIAGNOSTICS as DIAGNOSTICS
 from pretouch.recording.ros import JOINT_STATE as JOINT_STATE
-from pretouch.recording.ros import MARKERS as MARKERS
 from pretouch.recording.ros import RANGE as RANGE
 from pretouch.recording.ros import TRANSFORMS as TRANSFORMS
 from pretouch.recording.ros import WRENCH as WRENCH
@@ -27,18 +25,8 @@ CLOUD = "sensor_msgs/msg/PointCloud2"
 TEXT = "std_msgs/msg/String"
 STATUS = "diagnostic_msgs/msg/DiagnosticStatus"
 TWIST = "geometry_msgs/msg/TwistStamped"
-FRANKA_STATE = "franka_msgs/msg/FrankaRobotState"
-USED = (
-    JOINT_STATE, WRENCH, RANGE, TRAJECTORY, CLOUD, TEXT, TRANSFORMS, MARKERS, DIAGNOSTICS, STATUS,
-    TWIST,
-)  # fmt: skip
-"""All standard types on our topics."""
-_FRANKA = (
-    "std_msgs/Header header\ngeometry_msgs/Vector3[4] cartesian\nfloat64[14] joint\n"
-    "sensor_msgs/JointState measured\nsensor_msgs/JointState desired\nsensor_msgs/JointState motor\n"
-    "float64[7] ddq_d\nfloat64[7] dtau_j\nsensor_msgs/JointState tau_ext_hat_filtered\n"
-)
-"""How a FrankaRobotState begins, bytes alike: its end differs by release, and is not read."""
+USED = (JOINT_STATE, WRENCH, RANGE, TRAJECTORY, CLOUD, TEXT, TRANSFORMS, DIAGNOSTICS, STATUS, TWIST)
+"""All types on our topics."""
 
 _BASE: dict[str, Any] = {
     "bool": bool, "byte": idl.uint8, "octet": idl.uint8, "char": idl.uint8, "int8": idl.int8, "uint8": idl.uint8,
@@ -67,18 +55,13 @@ class Messages(ros.Messages):
     def __init__(self, distribution: Distribution) -> None:
         super().__init__(distribution)
         self.distribution = distribution
-        self.store.register(get_types_from_msg(_FRANKA, FRANKA_STATE))
         self.idl_type = cache(self._idl_type)
         self.wire_type = cache(self._wire_type)
-        self.prepare(*USED, FRANKA_STATE)
+        self.prepare(*USED)
 
     def decoded(self, kind: str, data: bytes) -> Any:
         """Return the message that bytes hold; those of another type or distribution are a RobotError."""
         try:
-            if kind == FRANKA_STATE:  # more follows than is read
-                definition = self.store.get_msgdef(kind)
-                read = definition.deserialize_cdr_le if data[1] else definition.deserialize_cdr_be
-                return read(data[4:], 0, definition.cls, self.store)[0]
             return self.store.deserialize_cdr(data, kind)
         except Exception as error:  # any bytes may come from a network
             raise RobotError(
@@ -87,8 +70,8 @@ class Messages(ros.Messages):
             ) from error
 
     def type_hash(self, kind: str) -> str:
-        """Return the hash of a type that rmw sends along since Iron; '' of one that is only known in part."""
-        return "" if kind == FRANKA_STATE else self.store.hash_rihs01(kind)
+        """Return the hash of a type that rmw sends along since Iron."""
+        return self.store.hash_rihs01(kind)
 
     def _wire_type(self, kind: str) -> Any:
         """Class of a type's messages for DDS, which know their type and hold `cdr`: rosbags takes half the time."""

@@ -7,11 +7,16 @@ from time import monotonic, time_ns
 from pretouch.controller import Controller
 from pretouch.loop import Cycle
 from pretouch.types import Mode
-from pretouch_ros2.messages import CLOUD, DIAGNOSTICS, MARKERS, STATUS, TEXT, TRANSFORMS, WRENCH
+from pretouch_ros2.messages import CLOUD, DIAGNOSTICS, STATUS, TEXT, TRANSFORMS, WRENCH
 from pretouch_ros2.node import Ros2Node
-from pretouch_ros2.params import OutputParams
 from pretouch_ros2.step_messages import Stamp, StepMessages
 
+_TOPICS = "/pretouch"
+"""What our topics begin with."""
+_PERIOD_S = 0.04
+"""Least time between two steps that are published; contacts and changes of the mode always are [s]."""
+_DIAGNOSTICS_S = 1.0
+"""The same of /diagnostics [s]."""
 _WAITING_MOST = 16
 """Steps that may wait to be published; more are left out."""
 
@@ -23,10 +28,10 @@ class Ros2Output:
     a step was taken.
     """
 
-    def __init__(self, params: OutputParams, controller: Controller, node: Ros2Node) -> None:
-        self._step_messages = StepMessages(controller, node.messages, params.base_frame)
+    def __init__(self, controller: Controller, node: Ros2Node, base_frame: str = "") -> None:
+        """Take whose steps are published, the node, and the name of the base frame; '': the model's first link."""
+        self._step_messages = StepMessages(controller, node.messages, base_frame)
         self._messages = node.messages
-        self._period, self._diagnostics_period = 1 / params.rate_hz, 1 / params.diagnostics_hz
         self._next = self._next_diagnostics = 0.0
         self._mode: Mode | None = None
         self._published: Mode | None = None
@@ -35,13 +40,11 @@ class Ros2Output:
         self.failure = ""
         """Why nothing is published any more, as a sentence, or ''."""
         self._queue: SimpleQueue[tuple[Cycle, Stamp] | None] = SimpleQueue()
-        begin = params.namespace.rstrip("/")
-        self._cloud = node.publisher(f"{begin}/obstacles", CLOUD)
-        self._markers = node.publisher(f"{begin}/markers", MARKERS)
-        self._force = node.publisher(f"{begin}/force", WRENCH)
-        self._contact = node.publisher(f"{begin}/contact", WRENCH)
-        self._mode_text = node.publisher(f"{begin}/mode", TEXT, latched=True, depth=1)
-        self._limited = node.publisher(f"{begin}/limited", STATUS)
+        self._cloud = node.publisher(f"{_TOPICS}/obstacles", CLOUD)
+        self._force = node.publisher(f"{_TOPICS}/force", WRENCH)
+        self._contact = node.publisher(f"{_TOPICS}/contact", WRENCH)
+        self._mode_text = node.publisher(f"{_TOPICS}/mode", TEXT, latched=True, depth=1)
+        self._limited = node.publisher(f"{_TOPICS}/limited", STATUS)
         self._diagnostics = node.publisher("/diagnostics", DIAGNOSTICS)
         units = node.publisher("/tf_static", TRANSFORMS, latched=True, depth=1)
         units.publish(self._step_messages.units(_now()))
@@ -56,7 +59,7 @@ class Ros2Output:
         if now < self._next and step.contact is None and step.mode is self._mode:
             return
         if now >= self._next:
-            self._next = now + self._period
+            self._next = now + _PERIOD_S
         self._mode = step.mode
         if self._queue.qsize() >= _WAITING_MOST:
             self.dropped += 1
@@ -89,12 +92,11 @@ class Ros2Output:
         self._force.publish(step_messages.wrench(step.force, at))
         self._limited.publish(step_messages.limited(step))
         self._cloud.publish(step_messages.cloud(step, at))
-        self._markers.publish(step_messages.markers(step, at))
         self._mode_text.publish(self._messages.make(TEXT, f"{step.mode.name}: {step.reason}"))
         now, changed = monotonic(), step.mode is not self._published
         self._published = step.mode
         if changed or now >= self._next_diagnostics:
-            self._next_diagnostics = now + self._diagnostics_period
+            self._next_diagnostics = now + _DIAGNOSTICS_S
             self._diagnostics.publish(step_messages.diagnostics(cycle, at))
 
 

@@ -17,8 +17,6 @@ Asked = Literal["twist", "trajectory"]
 LOOPBACK = "127.0.0.1"
 ENVIRONMENT = "environment"
 """The interface that leaves the network to Cyclone DDS and its CYCLONEDDS_URI."""
-UNIT = "{unit}"
-"""Stands in a topic for the id of a sensor unit."""
 _TOPIC = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 
 
@@ -59,8 +57,7 @@ class ArmParams(Checked):
     wrench: str = "/wrench"
     """Topic of geometry_msgs/WrenchStamped."""
     torques: str = ""
-    """Topic whose efforts are external joint torques, of the wrench's sign: sensor_msgs/JointState, or, where its name
-    ends in robot_state, franka_msgs/FrankaRobotState; '': there is none."""
+    """Topic of sensor_msgs/JointState whose efforts are external joint torques, of the wrench's sign; '': none."""
     wrench_timeout_s: Annotated[float, Check(low=0.0, high=0.5, open_low=True)] = 0.05
     """Age of a wrench, and of torques, from which they are no estimate any more [s]."""
     shared_clock: bool = True
@@ -96,62 +93,6 @@ class ArmParams(Checked):
     def zeros_missing(self) -> bool:
         """Whether a wrench of zeros only is none."""
         return self.zeros == "missing" or (self.zeros == "auto" and self.sign == "by-robot")
-
-
-@dataclass(frozen=True)
-class CommanderParams(Checked):
-    """A commander behind a topic, whom the arm follows in place of a path."""
-
-    asked: Asked
-    """twist: geometry_msgs/TwistStamped. trajectory: the velocities of trajectory_msgs/JointTrajectory, as MoveIt Servo
-    sends."""
-    topic: str = ""
-    """Its topic; '': /pretouch/twist or /pretouch/joint_trajectory."""
-    shared_clock: bool = True
-    """See `ArmParams`."""
-    base_frame: str = ""
-    """Further name of the base frame, beside the model's own."""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_topic("CommanderParams", "topic", self.heard_on)
-
-    @property
-    def heard_on(self) -> str:
-        """Topic of what is asked."""
-        return self.topic or ("/pretouch/twist" if self.asked == "twist" else "/pretouch/joint_trajectory")
-
-
-@dataclass(frozen=True)
-class SkinParams(Checked):
-    """Sensor units behind topics of sensor_msgs/Range."""
-
-    topic: str = f"/skin/{UNIT}/range"
-    """Topic of each unit, or without `{unit}` one topic for all, on which frame_id is the unit's id."""
-    shared_clock: bool = False
-    """See `ArmParams`."""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_topic("SkinParams", "topic", self.topic.replace(UNIT, "u"))
-
-
-@dataclass(frozen=True)
-class OutputParams(Checked):
-    """What to publish of the controller's steps."""
-
-    rate_hz: Annotated[float, Check(low=0.0, high=100.0, open_low=True)] = 25.0
-    """Steps published each second, at most; contacts and changes of the mode always are [Hz]."""
-    diagnostics_hz: Annotated[float, Check(low=0.0, high=10.0, open_low=True)] = 1.0
-    """Rate of /diagnostics [Hz]."""
-    namespace: str = "/pretouch"
-    """What our topics begin with."""
-    base_frame: str = ""
-    """Name of the base frame; '': the model's first link."""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_topic("OutputParams", "namespace", self.namespace)
 
 
 def check_topic(owner: str, name: str, topic: str) -> None:

@@ -9,8 +9,7 @@ import numpy as np
 from pretouch.errors import RobotError
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray, RobotState
-from pretouch_ros2.estimates import TorqueEstimate, Wrench
-from pretouch_ros2.joints import JointReading, Joints
+from pretouch_ros2.inputs import JointReading, Joints, TorqueEstimate, Wrench
 from pretouch_ros2.messages import JOINT_STATE, TRAJECTORY, WRENCH
 from pretouch_ros2.node import Ros2Node
 from pretouch_ros2.params import ArmParams
@@ -44,9 +43,7 @@ class Ros2Robot:
         self._states = node.subscribe(params.joint_states, JOINT_STATE, self._joints.take)
         self._wrenches = node.subscribe(params.wrench, WRENCH, self._wrench.take)
         self._torques = TorqueEstimate(params, self._joints.names, SourceStamps(params.shared_clock))
-        self._efforts = (
-            [node.subscribe(params.torques, self._torques.kind, self._torques.take)] if params.torques else []
-        )
+        self._efforts = [node.subscribe(params.torques, JOINT_STATE, self._torques.take)] if params.torques else []
         stamps = self._joints.stamps, self._wrench.stamps, self._torques.stamps
         self._stamps = tuple(zip((params.joint_states, params.wrench, params.torques), stamps, strict=True))
         self._commands = TrajectoryCommands(params, model, self._joints.names, node, period)
@@ -205,7 +202,7 @@ class Ros2Robot:
             return _no_publisher(p.wrench, WRENCH, "wrench", self._node.topics(WRENCH))
         if p.torques and not self._torques.received_any:
             if not self._torques.others:
-                return _no_publisher(p.torques, self._torques.kind, "torques", self._node.topics(self._torques.kind))
+                return _no_publisher(p.torques, JOINT_STATE, "torques", self._node.topics(JOINT_STATE))
             return f"{p.torques} has efforts of {', '.join(self._torques.others)}, not of {', '.join(joints.names)}."
         if self._commands.publisher.subscribers:
             return ""

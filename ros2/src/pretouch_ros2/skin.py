@@ -12,11 +12,14 @@ from pretouch.sensing import skin as skins
 from pretouch.types import RangeReadings, RangeStatus
 from pretouch_ros2.messages import RANGE
 from pretouch_ros2.node import Ros2Node
-from pretouch_ros2.params import UNIT, SkinParams
+from pretouch_ros2.params import check_topic
 from pretouch_ros2.stamps import SourceStamps
 
 _NOTHING = (-math.inf, 0.0, RangeStatus.NONE)
 """Stamp, distance and status of a unit that is not heard."""
+RANGES = "/skin/{unit}/range"
+"""Topic of each unit."""
+_UNIT = "{unit}"
 _UNKNOWN_MOST, _SHOWN = 64, 80
 """Names of other units that are kept, and their letters."""
 
@@ -24,17 +27,22 @@ _UNKNOWN_MOST, _SHOWN = 64, 80
 class Ros2Skin:
     """Sensor units behind topics; a unit that is not heard is silent, which the controller names."""
 
-    def __init__(self, params: SkinParams, skin: skins.Skin, node: Ros2Node) -> None:
-        self._ids, self._node, self.params = skin.ids, node, params
-        self._stamps = [SourceStamps(params.shared_clock) for _ in skin.ids]
+    def __init__(self, skin: skins.Skin, node: Ros2Node, topic: str = RANGES, shared_clock: bool = False) -> None:
+        """Take the units, the node, the topic of each, and whether stamps of headers count (see `ArmParams`).
+
+        Without `{unit}` it is one topic for all, on which frame_id is the unit's id.
+        """
+        check_topic("Ros2Skin", "topic", topic.replace(_UNIT, "u"))
+        self._ids, self._node, self._topic = skin.ids, node, topic
+        self._stamps = [SourceStamps(shared_clock) for _ in skin.ids]
         self._newest: list[tuple[float, float, RangeStatus]] = [_NOTHING for _ in skin.ids]
         self._unknown: set[str] = set()
-        if UNIT in params.topic:
+        if _UNIT in topic:
             self._subscriptions = [
-                node.subscribe(topic, RANGE, partial(self._take, i)) for i, topic in enumerate(self._topics())
+                node.subscribe(own, RANGE, partial(self._take, i)) for i, own in enumerate(self._topics())
             ]
         else:
-            self._subscriptions = [node.subscribe(params.topic, RANGE, self._take_any)]
+            self._subscriptions = [node.subscribe(topic, RANGE, self._take_any)]
 
     def wait(self, timeout: float = 5.0) -> None:
         """Wait until each unit was heard, for so long at most [s]; those that were not are a HardwareError."""
@@ -46,7 +54,7 @@ class Ros2Skin:
             there = ", ".join(self._node.topics(RANGE)) or "none"
             beside = f", only from {', '.join(sorted(self._unknown))}" if self._unknown else ""
             raise HardwareError(
-                f"No reading was received from {', '.join(silent())} on {self.params.topic}{beside}: set the"
+                f"No reading was received from {', '.join(silent())} on {self._topic}{beside}: set the"
                 f" topic to fit those of sensor_msgs/Range ({there}). {' '.join(self.notes)}".strip()
             )
 
@@ -72,7 +80,7 @@ class Ros2Skin:
         )
 
     def _topics(self) -> list[str]:
-        topics = [self.params.topic.replace(UNIT, topic_name(name)) for name in self._ids]
+        topics = [self._topic.replace(_UNIT, topic_name(name)) for name in self._ids]
         twice = {topic for topic in topics if topics.count(topic) > 1}
         if twice:
             raise HardwareError(f"Several units would share {', '.join(sorted(twice))}: give them different ids.")

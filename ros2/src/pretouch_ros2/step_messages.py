@@ -8,9 +8,8 @@ import numpy as np
 from pretouch.controller import Controller
 from pretouch.explanation import Limit
 from pretouch.loop import Cycle
-from pretouch.recording.ros import Look
 from pretouch.types import ControlStep, FloatArray, Mode, RangeReadings, RangeStatus
-from pretouch_ros2.messages import CLOUD, DIAGNOSTICS, MARKERS, STATUS, TRANSFORMS, WRENCH, Messages
+from pretouch_ros2.messages import CLOUD, DIAGNOSTICS, STATUS, TRANSFORMS, WRENCH, Messages
 
 Stamp = tuple[int, int]
 """Seconds and nanoseconds."""
@@ -18,12 +17,6 @@ _POINT = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("distance", "<f4")
 """An obstacle: position [m], distance from the body's surface [m], and index of the unit in the skin."""
 _FLOAT32, _UINT32 = 7, 6
 """Codes of sensor_msgs/PointField."""
-_ARROW, _LINES, _SPHERES, _TEXT = 0, 5, 7, 9
-"""Codes of visualization_msgs/Marker."""
-_RED, _BLUE, _WHITE = (0.84, 0.19, 0.15, 1.0), (0.27, 0.46, 0.71, 1.0), (1.0, 1.0, 1.0, 1.0)
-_NEWTONS_A_METRE = 100.0
-_MARKER_S = 0.5
-"""Time after which RViz drops a marker that is not renewed [s]."""
 _OK, _WARN, _ERROR = 0, 1, 2
 _LEVEL = {Mode.TRACK: _OK, Mode.REACT: _OK, Mode.HOLD: _WARN}
 
@@ -63,20 +56,6 @@ class StepMessages:
         frames = [self._m.transform(at, self._links[link], name, T[:3, 3], T[:3, :3]) for link, name, T in places]
         return self._m.make(TRANSFORMS, frames)
 
-    def markers(self, step: ControlStep, at: Stamp) -> Any:
-        """Obstacles, lines to their closest points on the body, the force, and the mode in words."""
-        ee, seen = step.ee_position, step.obstacles
-        lines = np.stack([seen.body_point, seen.point], axis=1).reshape(-1, 3)
-        force = np.nan_to_num(step.force) / _NEWTONS_A_METRE
-        above = ee + np.array([0.0, 0.0, 0.3])
-        parts = [
-            self._marker(0, (_SPHERES, (0.04, 0.04, 0.04), _BLUE), at, points=seen.point),
-            self._marker(1, (_LINES, (0.005, 0.0, 0.0), _BLUE), at, points=lines),
-            self._marker(2, (_ARROW, (0.01, 0.02, 0.0), _RED), at, points=np.stack([ee, ee + force])),
-            self._marker(3, (_TEXT, (0.0, 0.0, 0.04), _WHITE), at, position=above, text=step.mode.name),
-        ]
-        return self._m.make(MARKERS, parts)
-
     def limited(self, step: ControlStep) -> Any:
         """What keeps the arm from what is asked, for who asks: `ControlStep.limited` by name."""
         of = step.limited
@@ -113,7 +92,3 @@ class StepMessages:
 
     def _header(self, at: Stamp) -> Any:
         return self._m.header(at, self.base)
-
-    def _marker(self, number: int, look: Look, at: Stamp, **more: Any) -> Any:
-        lifetime = self._m.make("builtin_interfaces/msg/Duration", 0, int(_MARKER_S * 1e9))
-        return self._m.marker(self._header(at), look, ns="pretouch", id=number, lifetime=lifetime, **more)

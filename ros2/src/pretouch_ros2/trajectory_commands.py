@@ -9,7 +9,7 @@ import numpy as np
 from pretouch.errors import RobotError
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray
-from pretouch_ros2.joints import JointReading
+from pretouch_ros2.inputs import JointReading
 from pretouch_ros2.messages import TRAJECTORY
 from pretouch_ros2.node import Ros2Node
 from pretouch_ros2.params import ArmParams, parts
