@@ -160,7 +160,9 @@ def measure(duration: float, keys: Keys, kind: str | None, priority: int | None,
     """
     context = multiprocessing.get_context("spawn")
     stop, sent = context.Event(), context.Value("q", 0)
-    with NetworkSkin(tuple(keys), keys, priority=priority) as skin:
+    with NetworkSkin(tuple(keys), keys) as skin:
+        if priority is not None:
+            os.sched_setscheduler(skin.pid, os.SCHED_FIFO, os.sched_param(priority))
         others = [context.Process(target=send_samples, args=(keys, skin.address, stop), daemon=True)]
         if kind:
             others.append(context.Process(target=flood, args=(kind, rate, keys, skin.address, stop, sent), daemon=True))

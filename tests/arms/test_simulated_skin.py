@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from pretouch.arms.simulated import arm as arms
-from pretouch.arms.simulated import skin
 from pretouch.arms.simulated.arm import SimulatedArm, ThreadedArm
 from pretouch.arms.simulated.skin import VisitingHand, run
 from pretouch.control.path import Circle
@@ -18,7 +17,7 @@ from pretouch.profiles import Profile
 from pretouch.sim.imu import ImuParams
 from pretouch.sim.plant import Plant
 from pretouch.sim.scene import SceneSpec
-from pretouch.types import Mode, RobotState
+from pretouch.types import RobotState
 from pretouch.units.fleet import Fleet, FleetParams, simulated_keys
 from pretouch.units.receiver import SkinReceiver
 from pretouch.units.simulated import UnitParams
@@ -76,19 +75,6 @@ def test_it_ends_in_order_and_says_how_it_went_each_second(fleet_to, panda_model
     assert 2.0 < time.monotonic() - begin < 30.0
     assert len(said) == 2
     assert all("0 of 7 units in session" in line for line in said)
-
-
-def test_a_receiver_that_does_not_answer_is_named_once():
-    units, said = [SimpleNamespace(in_session=False, silent=False)], []
-    fleet = SimpleNamespace(ids=["a"], units=units, sent=0, lost=0, receiver=("desk", 29470))
-    arm = SimpleNamespace(now=0.0, left_out=0.0, fleet=fleet)
-    cycle = SimpleNamespace(step=SimpleNamespace(ee_velocity=np.zeros(3), mode=Mode.TRACK))
-    printer = skin._StatusPrinter(arm, said.append)
-    for second in range(1, 20):
-        arm.now, units[0].in_session = float(second), 8 <= second < 12
-        printer.record(cycle)
-    named = [i for i, line in enumerate(said) if line.startswith("No answer from desk:29470: ")]
-    assert [i - k for k, i in enumerate(named)] == [3, 14]  # after the lines of so many seconds
 
 
 def test_the_hand_comes_and_goes():

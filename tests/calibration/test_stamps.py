@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pretouch.calibration.stamps import ImuCounters, instants, retimed
+from pretouch.calibration.stamps import ImuCounters, by_time, instants
 from pretouch.traces import ImuTrace
 from tests.examples import examples
 
@@ -166,14 +166,14 @@ def test_samples_that_a_unit_lost_and_miscounted_are_counted_by_its_clock(wrong,
     assert np.abs(heard.error())[away].max() < 5e-4
 
 
-def test_what_is_not_known_is_nan_and_left_out_when_retimed():
+def test_what_is_not_known_is_nan_and_left_out_when_put_in_order():
     rng = np.random.default_rng(12)
     heard = unit(rng)
     heard.batches["offset"][:100] = np.nan
     found = instants(ImuCounters(**heard.batches))
     np.testing.assert_array_equal(np.isnan(found), heard.batch < 100)
     values = rng.normal(size=(len(heard.true), 3))
-    trace = retimed(ImuTrace(heard.true, values, -values), found)
+    trace = by_time(ImuTrace(found, values, -values))
     np.testing.assert_array_equal(trace.acceleration, values[heard.batch >= 100])
     np.testing.assert_array_equal(trace.angular_velocity, -values[heard.batch >= 100])
     assert np.all(np.diff(trace.stamp) > 0)

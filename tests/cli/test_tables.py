@@ -12,8 +12,8 @@ from pretouch.cli.skin_monitor import table
 from pretouch.cli.tables import show
 from pretouch.text_table import TextTable
 from pretouch.types import RangeStatus
-from pretouch.units.health import Counts, unit_health
-from tests.units.traffic import NOW, heard, traffic
+from pretouch.units.health import unit_health
+from tests.units.traffic import BEFORE, NOW, heard, traffic
 
 WORDS = st.text("abcdefgh_ \n", max_size=60).map(str.strip)
 NUMBERS = st.floats(-1e6, 1e6).map("{:.4g}".format) | st.sampled_from(["", "-", "0.123 ± 0.004", "1.2 (0.9 to 1.4)"])
@@ -60,7 +60,7 @@ def test_headings_are_wrapped_and_words_are_broken_for_numbers_to_stand_side_by_
 
 def unit(state="live", **changes):
     """A unit with the widest numbers there are."""
-    widest = unit_health(heard(), NOW, traffic(id="hand_right", state=state, bound=0.01234), Counts(500))
+    widest = unit_health(heard(), NOW, traffic(id="hand_right", state=state, bound=0.01234), BEFORE)
     return replace(widest, latency_s=0.1042, loss=1.0, temperature_c=-20.1, **changes)
 
 

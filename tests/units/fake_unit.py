@@ -1,12 +1,14 @@
 """A sensor unit's side of the wire in a few lines, and a wire without delays to a receiver's real socket."""
 
 import socket
-from dataclasses import replace
+from dataclasses import astuple, replace
+from typing import NamedTuple
 
 from pretouch.sensing.unit import NetworkUnits
+from pretouch.types import FloatArray
 from pretouch.units.keys import Keys, UnitKey
 from pretouch.units.receiver import SkinReceiver
-from pretouch.units.unit import ImuBatch, imu_batch
+from pretouch.units.unit import imu_batch
 from pretouch.units.wire import Beacon, Flag, Hello, Mac, Sample, decode_beacon, session_mac
 
 KEYS = Keys(UnitKey(f"unit {n}", n, bytes([n]) * 32) for n in (3, 4, 5))
@@ -20,9 +22,20 @@ PLAIN = Sample(
 )  # fmt: skip
 
 
+class ImuBatch(NamedTuple):
+    """IMU samples of one datagram."""
+
+    unit: int
+    index: int
+    stamp: FloatArray
+    acceleration: FloatArray
+    angular_velocity: FloatArray
+
+
 def imu_taken(receiver: SkinReceiver) -> list[ImuBatch]:
     """IMU samples since the last call."""
-    return [batch for received in receiver.take_samples() if (batch := imu_batch(received))]
+    heard = [(one, imu_batch(one)) for one in receiver.take_samples()]
+    return [ImuBatch(one.unit, one.sample.imu_index, *astuple(batch)) for one, batch in heard if batch]
 
 
 class FakeUnit:

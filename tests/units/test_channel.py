@@ -49,14 +49,6 @@ def test_a_datagram_held_up_is_overtaken_and_one_is_doubled_as_often_as_asked_fo
     assert len(numbers) - len(set(numbers)) == pytest.approx(1000, abs=100)
 
 
-def test_a_seed_decides_the_course():
-    lossy = ChannelParams(loss=0.2, overtaken=0.1, doubled=0.1)
-    (a, x), (b, y), (_, z) = course(lossy, 500), course(lossy, 500), course(lossy, 500, seed=1)
-    assert x == y
-    assert np.array_equal(a, b)
-    assert x != z
-
-
 @pytest.mark.parametrize(
     ("given", "said"),
     [({"loss": 1.5}, "ChannelParams.loss is 1.5"), ({"delay_s": -0.1}, "ChannelParams.delay_s")],

@@ -9,9 +9,9 @@ import pytest
 from pretouch.errors import ParameterError
 from pretouch.types import RangeStatus
 from pretouch.units.findings import findings
-from pretouch.units.health import Counts, HealthParams, unit_health
+from pretouch.units.health import HealthParams, unit_health
 from pretouch.units.wire import NO_FORCE, Flag, TouchPart
-from tests.units.traffic import NOW, heard, traffic
+from tests.units.traffic import BEFORE, NOW, counts, heard, traffic
 
 LIMITS = HealthParams()
 WELL = int(Flag.RANGE_NEW)
@@ -20,7 +20,7 @@ SILENT = {"state": "silent", "last_arrival": NOW - 2.0}
 
 
 def found(samples, counted=None, machine_late=0.0, **known):
-    unit = unit_health(samples, NOW, traffic(**known), counted or Counts(500))
+    unit = unit_health(samples, NOW, traffic(**(counted or {}), **known), BEFORE)
     return findings([unit], LIMITS, machine_late)
 
 
@@ -43,7 +43,7 @@ FAULTS = [
     (lambda: found(heard(until=NOW - 2.0), **SILENT), "silent", "nothing for 2.0 s (limit 0.3 s)"),
     (lambda: found(heard(range_mm=312), stuck=True), "stuck", "repeats 0.312 m"),
     (lambda: found(heard(flags=lambda n: WELL * (n % 10 == 0))), "rate", "readings a second (limit 10)"),
-    (lambda: found(heard(), Counts(340, 160)), "loss", "loses 32% of its samples"),
+    (lambda: found(heard(), counts(340, 160)), "loss", "loses 32% of its samples"),
     (lambda: found(without_clock(), bound=np.inf), "clock", "clock has been unknown for 10 s (limit 2 s)"),
     (lambda: found(heard(range_status=10)), "status", "fails in 100% of its readings (500 SYNC; limit 50%)"),
     (lambda: found(heard(battery_mv=3250)), "battery", "at 3.25 V (limit 3.3 V)"),
@@ -51,12 +51,12 @@ FAULTS = [
 ]
 WARNINGS = [
     (lambda: found(heard(flags=lambda n: WELL * (n % 2))), "rate", "readings a second (limit 34)"),
-    (lambda: found(heard(), Counts(400, 100)), "loss", "loses 20% of its samples"),
-    (lambda: found(heard(), Counts(424, 76)), "loss", "loses 15.2% of its samples in transmission (limit 15%)"),
+    (lambda: found(heard(), counts(400, 100)), "loss", "loses 20% of its samples"),
+    (lambda: found(heard(), counts(424, 76)), "loss", "loses 15.2% of its samples in transmission (limit 15%)"),
     (lambda: found(heard(latency=0.07)), "latency", "in the median 70 ms (limit 50 ms)"),
     (lambda: found(heard(), bound=0.02), "clock", "known only to within 20.0 ms (limit 10 ms)"),
     (lambda: found(heard(), bound=0.01004), "clock", "known only to within 10.04 ms (limit 10 ms)"),
-    (lambda: found(heard(), Counts(500, 0, 0, 2)), "clock jump", "jumped 2 times"),
+    (lambda: found(heard(), counts(500, 0, 0, 2)), "clock jump", "jumped 2 times"),
     (lambda: found(heard(range_sigma=80)), "sigma", "own error at 20 mm (limit 15 mm)"),
     (lambda: found(heard(range_sigma=61)), "sigma", "at 15.2 mm (limit 15 mm)"),
     (lambda: found(heard(range_mm=wide)), "noise", "from reading to reading (limit 20 mm)"),
@@ -73,7 +73,7 @@ WARNINGS = [
     (lambda: found(heard(imu_index=lambda n: 2 * n, imu_count=2)), "imu rate", "gives 100 IMU"),
     (lambda: found(heard(imu_count=0)), "imu rate", "gives 0 IMU samples a second (limit 375)"),
     (lambda: found(heard(imu_index=lambda n: 10 * n)), "imu loss", "loses 20% of its IMU"),
-    (lambda: found(heard(), Counts(500, 0, 1), reset=3), "reboot", "its watchdog ended a hang"),
+    (lambda: found(heard(), counts(500, 0, 1), reset=3), "reboot", "its watchdog ended a hang"),
 ]
 CASES = [("fault", *case) for case in FAULTS] + [("warning", *case) for case in WARNINGS]
 
@@ -114,13 +114,13 @@ def test_what_is_well_or_too_early_to_judge_is_not_named(make):
 
 def test_rate_and_clock_are_not_judged_while_the_window_holds_a_reboot():
     slow = heard(flags=lambda n: WELL * (n % 2))
-    assert [f.what for f in found(slow, Counts(500, 0, 1), bound=0.02)] == ["reboot"]
+    assert [f.what for f in found(slow, counts(500, 0, 1), bound=0.02)] == ["reboot"]
     assert [f.what for f in found(slow, bound=0.02)] == ["rate", "clock"]
 
 
 def test_a_healthy_unit_on_a_lossy_network_is_not_warned_of_again_and_again():
     samples, lost = heard(), np.random.default_rng(1).binomial(500, 0.1, size=200)
-    assert not [n for n in lost if found(samples, Counts(500 - n, n))]
+    assert not [n for n in lost if found(samples, counts(500 - n, n))]
 
 
 def test_faults_come_before_warnings():
@@ -130,8 +130,8 @@ def test_faults_come_before_warnings():
 
 def test_a_machine_that_is_late_is_named_first_and_its_units_not_blamed():
     slow = heard(flags=lambda n: WELL * (n % 10 == 0), range_sigma=80, latency=0.07)
-    assert {f.what for f in found(slow, Counts(340, 160), 0.5)} == {"rate", "loss", "latency", "sigma"}
-    machine, sigma = found(slow, Counts(340, 160), 1.26)
+    assert {f.what for f in found(slow, counts(340, 160), 0.5)} == {"rate", "loss", "latency", "sigma"}
+    machine, sigma = found(slow, counts(340, 160), 1.26)
     assert (machine.unit, machine.level, machine.what) == ("this machine", "fault", "machine")
     assert machine.sentence.startswith(
         "This machine is late, by 1.3 s of the last 10 s (limit 0.5 s), so that hand-1 cannot be judged: close other"

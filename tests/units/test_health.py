@@ -6,14 +6,14 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from pretouch.units.health import Counts, Lateness, UnitWindow, unit_health
+from pretouch.units.health import Lateness, UnitWindow, unit_health
 from pretouch.units.unit import UnitTraffic
 from pretouch.units.wire import NO_TEMPERATURE, Flag
-from tests.units.traffic import NOW, heard, traffic
+from tests.units.traffic import BEFORE, NOW, counts, heard, traffic
 
 
 def health(samples, counted=None, **known):
-    return unit_health(samples, NOW, traffic(**known), counted or Counts(500))
+    return unit_health(samples, NOW, traffic(**(counted or {}), **known), BEFORE)
 
 
 def test_a_unit_that_is_well_has_the_numbers_it_was_given():
@@ -69,7 +69,7 @@ def test_what_a_unit_counts_begins_anew_with_a_reboot():
     after = heard(
         seconds=3.0, time_us=lambda n: 20_000 * (n - 29_000), imu_index=lambda n: 8 * (n - 29_000), bus_errors=2
     )
-    unit = health([*before, *after], Counts(450, 0, 1))
+    unit = health([*before, *after], counts(450, 0, 1))
     assert unit.reboots == 1
     assert unit.bus_errors == 0
     assert unit.imu_rate_hz == pytest.approx(400.0)
@@ -99,7 +99,7 @@ def test_what_a_unit_cannot_tell_is_not_known():
     unit = health(heard(battery_mv=0, temperature_cdeg=NO_TEMPERATURE))
     assert math.isnan(unit.battery_v)
     assert math.isnan(unit.temperature_c)
-    nothing = unit_health([], NOW, UnitTraffic("hand-1", 7))
+    nothing = unit_health([], NOW, BEFORE, BEFORE)
     assert nothing.silent_s == math.inf
     assert math.isnan(nothing.rate_hz)
     assert nothing.statuses == {}

@@ -1,4 +1,4 @@
-"""Units that disagree with the model: misplaced, swapped, covered."""
+"""Units that disagree with the model: misplaced, swapped."""
 
 from dataclasses import replace
 
@@ -85,24 +85,6 @@ def test_the_same_reading_counts_once(panda_model, paper_skin, wall, q):
     for _ in range(200):
         check.take(q, readings(len(paper_skin), 1.0, 0.9))
     assert check.findings() == ()
-
-
-def swinging(q, count, reach):
-    return [q + np.array([reach * np.sin(0.1 * i), *np.zeros(6)]) for i in range(count)]
-
-
-@pytest.mark.parametrize("report", [(0.05, RangeStatus.OK), (0.0, RangeStatus.MIN_RANGE)])
-def test_a_covered_lens_is_named_once_the_unit_has_moved(panda_model, paper_skin, q, report):
-    (finding,) = checked(panda_model, paper_skin, no_fixtures(), [report] * 120, swinging(q, 120, 0.5))
-    assert (finding.unit, finding.level, finding.what) == (paper_skin.ids[UNIT], "fault", "covered")
-    assert "its window is covered" in finding.sentence
-
-
-def test_something_near_is_no_covered_lens_while_the_arm_stands_or_if_it_ever_goes(panda_model, paper_skin, q):
-    near = [(0.05, RangeStatus.OK)] * 120
-    assert checked(panda_model, paper_skin, no_fixtures(), near, [q] * 120) == ()
-    near[60] = 0.5, RangeStatus.OK
-    assert checked(panda_model, paper_skin, no_fixtures(), near, swinging(q, 120, 0.5)) == ()
 
 
 def simulated(model, worn, thought, q):

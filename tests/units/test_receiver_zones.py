@@ -11,7 +11,7 @@ from pretouch.sensing.unit import NetworkUnits
 from pretouch.types import RangeStatus
 from pretouch.units.findings import findings
 from pretouch.units.health import HealthParams, UnitWindow
-from pretouch.units.skin import SharedOutputs
+from pretouch.units.skin import SharedOutputs, Traffic
 from pretouch.units.wire import Flag, TouchPart
 from tests.units.fake_unit import IDS, Bench, imu_taken
 
@@ -101,7 +101,7 @@ def test_zones_that_repeat_are_stuck_and_one_that_changes_is_not(bench):
 
 
 def test_samples_with_zones_come_through_shared_memory_however_large(bench):
-    outputs = SharedOutputs(UNITS)
+    outputs = SharedOutputs(UNITS, Traffic((), {}, 0))
     zoned, plain = bench.units
     eight = b"\x08\x00" + bytes(5 * 64)
     for datagram in (
@@ -114,4 +114,4 @@ def test_samples_with_zones_come_through_shared_memory_however_large(bench):
         outputs.put(bench.receiver)
         (back,) = outputs.take_samples()
         np.testing.assert_equal(asdict(back), asdict(arrival))  # of zones that do not fit the stamp is NaN
-    assert outputs.table()[:4, 1] == pytest.approx([0.1, 0.2, 0.3, 0.4])
+    assert outputs.table.read()[:4, 1] == pytest.approx([0.1, 0.2, 0.3, 0.4])

@@ -34,6 +34,15 @@ def heard(seconds: float = 10.0, latency: float = 0.015, until: float = NOW, **c
     return arrived
 
 
+BEFORE = UnitTraffic("hand-1", 7)
+"""What it knew before it heard of the unit."""
+
+
+def counts(accepted: int = 500, lost: int = 0, reboots: int = 0, clock_jumps: int = 0) -> dict[str, int]:
+    """What a receiver has counted, as changes of `traffic`."""
+    return {"accepted": accepted, "lost": lost, "reboots": reboots, "clock_jumps": clock_jumps}
+
+
 def traffic(**changes) -> UnitTraffic:
     """What a receiver knows of the unit when all is well."""
     well = UnitTraffic(

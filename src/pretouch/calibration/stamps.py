@@ -74,10 +74,10 @@ def instants(batches: ImuCounters) -> FloatArray:
     return instant
 
 
-def retimed(imu: ImuTrace, instant: FloatArray) -> ImuTrace:
-    """Return samples at instants (M,) [s] found for them, by time; without those whose instants are not known."""
-    order = np.argsort(instant, kind="stable")[: np.count_nonzero(np.isfinite(instant))]
-    return ImuTrace(instant[order], imu.acceleration[order], imu.angular_velocity[order])
+def by_time(imu: ImuTrace) -> ImuTrace:
+    """Return samples by time; without those whose stamps are NaN."""
+    order = np.argsort(imu.stamp, kind="stable")[: np.count_nonzero(np.isfinite(imu.stamp))]
+    return ImuTrace(imu.stamp[order], imu.acceleration[order], imu.angular_velocity[order])
 
 
 def _clocks(

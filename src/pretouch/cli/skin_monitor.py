@@ -75,7 +75,7 @@ class Monitor:
     port: int = PORT
     """UDP port to listen at."""
     record: OptionalFile = None
-    """Recording to write: all samples as received, ranges, IMU and diagnostics."""
+    """Recording to write: all samples as received, ranges and IMU."""
     duration: float = 0.0
     """Time to watch [s]; 0: until Ctrl-C. The exit code is then 1 if a unit is faulty at the end."""
     once: bool = False
@@ -156,8 +156,6 @@ def _shown(
             second += _SECOND_S * full
             if recording:
                 recording.add(update.heard, [unit.unit for unit in update.units])
-                if full:
-                    recording.health(update)
             if live:
                 notes = _nothing_received(receiver)
                 if recording:

@@ -1,7 +1,7 @@
 """The arm moves: slowly to where its path begins, then under the controller. However it ends, it is to end at rest."""
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -67,19 +67,14 @@ class Ending:
         return tuple(filter(None, (rest, f"The run ended early: {self.stopped}" if self.stopped else "")))
 
 
-class RecorderGroup:
-    """Several recorders as one, or none."""
-
-    def __init__(self, recorders: Sequence[Recorder] = ()) -> None:
-        self._recorders = recorders
+class NoRecorder:
+    """Keeps nothing."""
 
     def record(self, cycle: Cycle) -> None:
-        """Keep one turn of the loop."""
-        for recorder in self._recorders:
-            recorder.record(cycle)
+        """Take one turn of the loop."""
 
 
-NO_RECORDER = RecorderGroup()
+NO_RECORDER = NoRecorder()
 
 
 def plan_to_start(model: RobotModel, q: FloatArray, path: ArmPath, floor: float) -> Plan | None:
@@ -130,28 +125,42 @@ def announcement(controller: Controller, seconds: float, way: Plan | None, asks:
     return tuple(filter(None, (first, asks or where, profile.react.announced(controller.limits.period), lasting, stop)))
 
 
-@dataclass(frozen=True)
 class RunFiles:
     """What records a run: a recording, if one is asked for, and the last seconds before each HOLD that latches."""
 
-    recorder: Recorder
-    """To be given each cycle."""
-    recording: Recording | None
-    last_seconds: LastSeconds
-    learnt: FreeMotion | None
+    def __init__(
+        self,
+        recording: Recording | None,
+        last_seconds: LastSeconds,
+        tell: Callable[[str], None],
+        learnt: FreeMotion | None,
+        further: Recorder | None,
+    ) -> None:
+        """Take the files, and the others as `open_run_files`."""
+        self._recording, self._last_seconds, self._tell, self._learnt = recording, last_seconds, tell, learnt
+        self._recorders: list[Recorder] = [one for one in (last_seconds, learnt, further) if one]
+        self._notified = False
+
+    def record(self, cycle: Cycle) -> None:
+        """Keep one turn of the loop; that the recording fails is said once."""
+        for recorder in self._recorders:
+            recorder.record(cycle)
+        if self.trouble and not self._notified:
+            self._notified = True
+            self._tell(self.trouble)
 
     @property
     def trouble(self) -> str:
         """Why the recording that was asked for is not whole, as a sentence, or ''."""
-        return self.recording.trouble if self.recording else ""
+        return self._recording.trouble if self._recording else ""
 
     def close(self) -> tuple[str, ...]:
         """Finish the files; return a sentence on each."""
-        sentences = list(self.learnt.save()) if self.learnt else []
-        self.last_seconds.close()
-        sentences += [f"The last seconds before a HOLD: {place}" for place in self.last_seconds.written]
-        sentences += [self.last_seconds.trouble] if self.last_seconds.trouble else []
-        return (*sentences, self.recording.close()) if self.recording else tuple(sentences)
+        sentences, last = list(self._learnt.save()) if self._learnt else [], self._last_seconds
+        last.close()
+        sentences += [f"The last seconds before a HOLD: {place}" for place in last.written]
+        sentences += [last.trouble] if last.trouble else []
+        return (*sentences, self._recording.close()) if self._recording else tuple(sentences)
 
 
 @contextmanager
@@ -177,22 +186,7 @@ def open_run_files(
     with ExitStack() as stack:
         recording = stack.enter_context(Recording(place, controller, about)) if place else None
         last = stack.enter_context(LastSeconds(controller, folder, recording, about=about))
-        supervisor = _RecordingSupervisor(recording, tell) if recording else None
-        recorders = [one for one in (last, learnt, further, supervisor) if one]
-        yield RunFiles(RecorderGroup(recorders), recording, last, learnt)
-
-
-class _RecordingSupervisor:
-    """Reports once that the recording fails."""
-
-    def __init__(self, recording: Recording, tell: Callable[[str], None]) -> None:
-        self._recording, self._tell, self._notified = recording, tell, False
-
-    def record(self, cycle: Cycle) -> None:
-        """Check the recording."""
-        if not self._notified and self._recording.trouble:
-            self._notified = True
-            self._tell(self._recording.trouble)
+        yield RunFiles(recording, last, tell, learnt, further)
 
 
 def execute(

@@ -97,8 +97,6 @@ class FleetParams(Checked):
     """How units keep their time and their sessions."""
     imu: ImuParams | None = None
     """How their IMUs err; None, and they have none."""
-    touch: TouchErrors = field(default_factory=TouchErrors)
-    """How the touch sensors err of units that have one by the skin file."""
     reboot_every_s: NonNegative = 0.0
     """Time from each reboot of a unit to its next one, the first at a random part of it [s]; 0: none."""
 
@@ -118,8 +116,6 @@ class Fleet:
         network = NetworkUnits.of(units)
         ids = self.ids = network.ids
         family, self._address = _resolved(address)
-        self.receiver = address
-        """Name or address, and port, of the receiver."""
         seeds = np.random.SeedSequence([seed, 6]).spawn(len(ids))
         rngs = [[np.random.default_rng(s) for s in one.spawn(3)] for one in seeds]
         self._params, self.seed = params, seed
@@ -169,7 +165,7 @@ class Fleet:
 
         finders = RangeFinders(plant, skin, ranging or RangeFinderParams(), self.seed, handed_to(self.take_range))
         if len(skin.touching):
-            TouchSensors(plant, skin, self._params.touch, self.seed, laid, handed_to(self.take_touch))
+            TouchSensors(plant, skin, TouchErrors(), self.seed, laid, handed_to(self.take_touch))
         if self._params.imu is not None:
             Imus(plant, skin, self._params.imu, self.seed, handed_to(self.take_imu))
         return finders

@@ -3,9 +3,8 @@
 import math
 from collections import Counter, deque
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 
@@ -90,18 +89,6 @@ _BUS_ERROR = int(Flag.RANGE_BUS_ERROR | Flag.IMU_BUS_ERROR)
 _OK = int(RangeStatus.OK)
 _FEW = 5
 """Fewer readings than this tell no noise."""
-
-
-class Counts(NamedTuple):
-    """What a receiver has counted of a unit."""
-
-    accepted: int = 0
-    lost: int = 0
-    reboots: int = 0
-    clock_jumps: int = 0
-
-
-NO_COUNTS = Counts()
 
 
 @dataclass(frozen=True)
@@ -192,12 +179,12 @@ class UnitWindow:
         """Take the window's length [s]."""
         self._length = length
         self._heard: deque[Received] = deque()
-        self._counts: deque[tuple[float, Counts]] = deque()
+        self._counts: deque[tuple[float, UnitTraffic]] = deque()
 
     def take(self, now: float, heard: Iterable[Received], traffic: UnitTraffic) -> None:
         """Take in what was heard since the last time, and what the receiver has counted by now [s]."""
         self._heard.extend(heard)
-        self._counts.append((now, Counts(traffic.accepted, traffic.lost, traffic.reboots, traffic.clock_jumps)))
+        self._counts.append((now, replace(traffic)))
         while self._heard and self._heard[0].arrival <= now - self._length:
             self._heard.popleft()
         while len(self._counts) > 1 and self._counts[1][0] <= now - self._length:
@@ -205,18 +192,17 @@ class UnitWindow:
 
     def health(self, now: float, traffic: UnitTraffic) -> UnitHealth:
         """Return how the unit is at an instant [s]."""
-        ends = (self._counts[0][1], self._counts[-1][1]) if self._counts else (NO_COUNTS, NO_COUNTS)
-        return unit_health(list(self._heard), now, traffic, Counts(*(b - a for a, b in zip(*ends, strict=True))))
+        return unit_health(list(self._heard), now, traffic, self._counts[0][1] if self._counts else traffic)
 
 
-def unit_health(heard: Sequence[Received], now: float, traffic: UnitTraffic, counted: Counts = NO_COUNTS) -> UnitHealth:
+def unit_health(heard: Sequence[Received], now: float, traffic: UnitTraffic, before: UnitTraffic) -> UnitHealth:
     """Make numbers of what was heard.
 
     Args:
         heard: the unit's samples within the window, as they came.
         now: instant [s].
         traffic: what the receiver knows of it.
-        counted: what the receiver counted within the window.
+        before: what it knew as the window began.
     """
     fresh = [h for h in heard if h.sample.flags & _NEW]
     good = np.array([h.sample.range_mm / 1000 if h.sample.range_status == _OK else np.nan for h in fresh])
@@ -227,7 +213,8 @@ def unit_health(heard: Sequence[Received], now: float, traffic: UnitTraffic, cou
     last = boot[-1] if boot else None
     newest = fresh[-1] if fresh else None
     imu_rate_hz, imu_loss = _imu(boot)
-    sent = counted.accepted + counted.lost
+    lost = traffic.lost - before.lost
+    sent = traffic.accepted - before.accepted + lost
     flags = [s.flags for s in boot]
     touch = [part for s in boot if (part := touch_part(s)) is not None]
     return UnitHealth(
@@ -237,7 +224,7 @@ def unit_health(heard: Sequence[Received], now: float, traffic: UnitTraffic, cou
         silent_s=now - traffic.last_arrival,
         gap_s=max((b - a for a, b in pairwise(sorted(h.arrival for h in heard))), default=0.0),
         rate_hz=len(fresh) / heard_s if heard_s > 0 else math.nan,
-        loss=counted.lost / sent if sent else math.nan,
+        loss=lost / sent if sent else math.nan,
         latency_s=float(np.median(ages)) if len(ages) else math.nan,
         latency_late_s=float(np.percentile(ages, 95)) if len(ages) else math.nan,
         distance_m=newest.sample.range_mm / 1000 if newest else math.nan,
@@ -254,8 +241,8 @@ def unit_health(heard: Sequence[Received], now: float, traffic: UnitTraffic, cou
         range_late=sum(bool(f & _LATE) for f in flags),
         imu_rate_hz=imu_rate_hz,
         imu_loss=imu_loss,
-        reboots=counted.reboots,
-        clock_jumps=counted.clock_jumps,
+        reboots=traffic.reboots - before.reboots,
+        clock_jumps=traffic.clock_jumps - before.clock_jumps,
         touched=float(np.mean([p.contact != 0 for p in touch])) if touch else math.nan,
         touch_failed=float(np.mean([p.status != TouchStatus.OK for p in touch])) if touch else 0.0,
     )

@@ -10,51 +10,47 @@ import sys
 import tempfile
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Annotated, Literal
 
 from pretouch.atomic_write import atomic_write
-from pretouch.errors import HardwareError
+from pretouch.checks import Check, Checked
+from pretouch.errors import HardwareError, ParameterError
 from pretouch.units import PORT
 from pretouch.units.keys import UnitKey
 
 COPY_S = 60.0
 """How long copying may take [s]."""
 _SSID_MOST, _PASSWORD_LEAST, _PASSWORD_MOST = 32, 8, 63
-SENSORS = ("vl53l1x", "vl53l5cx", "vl53l7cx")
-"""Range finders that the firmware knows; the first has no zones."""
-_LIMITS = {
-    "port": (1, 0xFFFF),
-    "battery_full_mv": (0, 20_000),
-    "touch_ohm": (0, 1_000_000),
-    "touch_least_mn": (1, 100_000),
-    "touch_mn_per_us": (1, 10_000),
-}
-"""Least and most of what is a number."""
 
 
 @dataclass(frozen=True)
-class Network:
+class Network(Checked):
     """Where a unit sends, and what it carries; values that no unit can have are refused."""
 
     ssid: str
     """Name of the Wi-Fi network (2.4 GHz)."""
     host: str
     """IPv4 address of this machine in that network."""
-    port: int = PORT
+    port: Annotated[int, Check(low=1, high=0xFFFF)] = PORT
     """UDP port of the receiver."""
-    battery_full_mv: int = 0
+    battery_full_mv: Annotated[int, Check(low=0, high=20_000)] = 0
     """Battery voltage at the full scale of the unit's converter [mV] (docs/how-to/wiring.md); 0: no battery."""
-    touch_ohm: int = 0
+    touch_ohm: Annotated[int, Check(low=0, high=1_000_000)] = 0
     """Resistor from the touch sensor's pin to ground [ohm] (docs/how-to/wiring.md); 0: no touch sensor."""
-    touch_least_mn: int = 500
+    touch_least_mn: Annotated[int, Check(low=1, high=100_000)] = 500
     """Smallest force that counts as a touch [mN]: `force_min_n` of the skin file."""
-    touch_mn_per_us: int = 10
+    touch_mn_per_us: Annotated[int, Check(low=1, high=10_000)] = 10
     """Force by the touch sensor's conductance [mN/uS]: of the FSR 402 about 10, to be calibrated."""
-    sensor: str = SENSORS[0]
-    """Range finder of the unit: vl53l1x, vl53l5cx or vl53l7cx (docs/how-to/flashing.md)."""
-    zones: int = 4
-    """Zones along each side of its range finder, 4 or 8, if it has some."""
+    sensor: Literal["vl53l1x", "vl53l5cx", "vl53l7cx"] = "vl53l1x"
+    """Range finder of the unit (docs/how-to/flashing.md); a VL53L1X has no zones."""
+    zones: Literal[4, 8] = 4
+    """Zones along each side of its range finder, if it has some."""
 
     def __post_init__(self) -> None:
+        try:
+            super().__post_init__()
+        except ParameterError as error:  # of which a command line makes more than a sentence
+            raise HardwareError(str(error)) from None
         if not 1 <= _size(self.ssid, "network's name") <= _SSID_MOST or "\0" in self.ssid:
             raise HardwareError(f"The network's name {self.ssid!r} is not valid: give 1 to {_SSID_MOST} bytes.")
         try:
@@ -67,14 +63,6 @@ class Network:
             raise HardwareError(
                 f"A unit cannot send to {self.host}: give the address this machine has in the unit's network."
             )
-        if self.sensor not in SENSORS or self.zones not in (4, 8):
-            raise HardwareError(
-                f"The unit's sensor is {self.sensor!r} with {self.zones} zones along a side: choose from"
-                f" {', '.join(SENSORS)}, and 4 or 8."
-            )
-        for name, (least, most) in _LIMITS.items():
-            if not least <= getattr(self, name) <= most:
-                raise HardwareError(f"The unit's {name} is {getattr(self, name)}: give {least} to {most}.")
 
 
 def configuration(key: UnitKey, network: Network, password: str) -> str:
@@ -86,7 +74,7 @@ def configuration(key: UnitKey, network: Network, password: str) -> str:
             " an open network."
         )
     values = {"unit": key.number, "key": key.key.hex(), **asdict(network), "password": password}
-    if network.sensor == SENSORS[0]:
+    if network.sensor == "vl53l1x":
         values["zones"] = 1
     return json.dumps(values, ensure_ascii=False) + "\n"  # units join no halves of \u escapes
 

@@ -87,45 +87,32 @@ class _ValueSlots:
         return _FIRST + number % self._slots * self._stride
 
 
-class Mailbox(_ValueSlots):
-    """The newest value, for any number of readers."""
+class Mailbox(_ValueSlots, Generic[Value]):
+    """The newest Python object, for any number of readers."""
 
-    def __init__(self, most: int) -> None:
-        """Make an empty one for values of at most so many bytes."""
+    def __init__(self, most: int, first: Value) -> None:
+        """Make one for objects of at most so many bytes when pickled; `first` is the newest until another one is."""
         super().__init__(_SLOTS, most)
-        self._last: tuple[int, bytes] = (0, b"")
+        self._last = 0, first
 
-    def read(self) -> tuple[int, bytes]:
-        """Return number and bytes of the newest value; 0 and b"" before the first.
+    def put(self, value: Value) -> None:
+        """Make an object the newest."""
+        self.write(pickle.dumps(value))
 
-        A reader that the writer overtakes again and again gets the last value it had got whole.
+    def read(self) -> Value:
+        """Return the newest: the same object until there is another one.
+
+        A reader that the writer overtakes again and again gets the last one it had got whole.
         """
         for _ in range(_TRIES):
             number = self.newest
             if number == self._last[0]:
                 break
-            value = self.value(number)
-            if value is not None:
-                self._last = number, value
+            data = self.value(number)
+            if data is not None:
+                self._last = number, pickle.loads(data)  # noqa: S301  our own process wrote it
                 break
-        return self._last
-
-
-class ObjectMailbox(Generic[Value]):
-    """The newest Python object, for any number of readers."""
-
-    def __init__(self, most: int) -> None:
-        """Make an empty one for objects of at most so many bytes when pickled."""
-        self._box = Mailbox(most)
-
-    def put(self, value: Value) -> None:
-        """Make an object the newest."""
-        self._box.write(pickle.dumps(value))
-
-    def newest(self) -> Value | None:
-        """Return the newest; None before the first."""
-        number, data = self._box.read()
-        return pickle.loads(data) if number else None  # noqa: S301  our own process wrote it
+        return self._last[1]
 
 
 class Ring(_ValueSlots):

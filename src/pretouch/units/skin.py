@@ -23,7 +23,7 @@ from pretouch.signals import kept_from_children, leave_to_parent
 from pretouch.types import FloatArray, RangeReadings, TouchReadings
 from pretouch.units.keys import Keys, UnitKey
 from pretouch.units.receiver import SAMPLES_MOST, SkinReceiver, demand_port, keys_of, range_readings, touch_readings
-from pretouch.units.shared_memory import Mailbox, ObjectMailbox, Ring
+from pretouch.units.shared_memory import Mailbox, Ring
 from pretouch.units.unit import NOTHING, Received, UnitTraffic
 from pretouch.units.wire import SAMPLE_MOST, TAG_SIZE, sample_of
 
@@ -38,6 +38,8 @@ _TRAFFIC_PERIOD_S = 0.2
 """Time between two accounts of the traffic [s]."""
 _WAIT_S = 0.05
 """Longest wait for a datagram [s]."""
+_PICKLED = 1024
+"""More than what is pickled with the numbers of an array [B]."""
 _RECORD = struct.Struct("<Hdddd")
 """Index of the unit; arrival, stamp, offset, bound; then the datagram without its tag."""
 
@@ -56,22 +58,19 @@ class Traffic:
 class SharedOutputs:
     """Where a receiver puts what it has; as an argument of a process that is being spawned it is the same there."""
 
-    def __init__(self, units: NetworkUnits) -> None:
-        self._nothing = np.tile(NOTHING, (units.rows, 1))
-        self._table = Mailbox(self._nothing.nbytes)
-        self.traffic = ObjectMailbox[Traffic](4096 + sum(2560 + len(id.encode()) for id in units.ids))
+    def __init__(self, units: NetworkUnits, traffic: Traffic) -> None:
+        """Make them for units that have measured nothing, and of which so much is counted."""
+        nothing = np.tile(NOTHING, (units.rows, 1))
+        self.table = Mailbox[FloatArray](nothing.nbytes + _PICKLED, nothing)
+        """The newest table (K, 7), as `SkinReceiver.table` has it."""
+        self.traffic = Mailbox(4096 + sum(2560 + len(id.encode()) for id in units.ids), traffic)
         self._samples = Ring(SAMPLES_MOST, _RECORD.size + SAMPLE_MOST - TAG_SIZE)
 
     def put(self, receiver: SkinReceiver) -> None:
         """Give what a receiver has: its table, and the samples that it accepted."""
-        self._table.write(receiver.table.tobytes())
+        self.table.put(receiver.table)
         for r in receiver.take_samples():
             self._samples.write(_RECORD.pack(r.unit, r.arrival, r.stamp, r.offset, r.bound) + r.sample.body())
-
-    def table(self) -> FloatArray:
-        """Return the newest table (K, 7), as `SkinReceiver.table` has it."""
-        number, value = self._table.read()
-        return np.frombuffer(value).reshape(-1, len(NOTHING)) if number else self._nothing
 
     def take_samples(self) -> list[Received]:
         """Return the samples that came since the last call."""
@@ -95,26 +94,20 @@ class NetworkSkin:
         keys: Keys,
         host: str = "127.0.0.1",
         port: int = 0,
-        *,
-        priority: int | None = None,
     ) -> None:
-        """Start a `SkinReceiver`; one that cannot listen, or not have its priority, is a HardwareError.
-
-        The priority is of its process in the scheduling class SCHED_FIFO, 1 to 99, below that of the control loop; None
-        leaves the class as it is.
-        """
+        """Start a `SkinReceiver`; one that cannot listen is a HardwareError."""
         network = NetworkUnits.of(units)
         keyed = keys_of(network.ids, keys)
         demand_port(host, port)
         if current_process().daemon:
             raise HardwareError("A daemonic process cannot start a receiver: create this process with daemon=False.")
         self._owner = os.getpid()
-        self._outputs = SharedOutputs(network)
         sides = zip(keyed, network.zones, strict=True)
-        self._no_traffic = Traffic(tuple(UnitTraffic(unit.id, unit.number, zones=side) for unit, side in sides), {}, 0)
+        nothing = tuple(UnitTraffic(unit.id, unit.number, zones=side) for unit, side in sides)
+        self._outputs = SharedOutputs(network, Traffic(nothing, {}, 0))
         context = get_context("spawn")
         ours, theirs = context.Pipe(duplex=False)
-        arguments = (self._owner, (network, keyed, host, port), priority, self._outputs, theirs)
+        arguments = (self._owner, (network, keyed, host, port), self._outputs, theirs)
         self._process = context.Process(target=_serve, args=arguments, daemon=True)
         with kept_from_children():
             self._process.start()
@@ -153,11 +146,11 @@ class NetworkSkin:
 
     def read(self) -> RangeReadings:
         """Return the newest reading of each unit and zone, stamped with the earliest instant it can be of."""
-        return range_readings(self._outputs.table())
+        return range_readings(self._outputs.table.read())
 
     def touch(self) -> TouchReadings | None:
         """Return the newest touch reading of each unit; None while no unit has sent one."""
-        return touch_readings(self._outputs.table())
+        return touch_readings(self._outputs.table.read())
 
     def take_samples(self) -> list[Received]:
         """Return the samples accepted since the last call, in their order of arrival: the newest `SAMPLES_MOST`."""
@@ -165,7 +158,7 @@ class NetworkSkin:
 
     def traffic(self) -> Traffic:
         """Return what the receiver has counted, not older than 0.3 s while it lives."""
-        return self._outputs.traffic.newest() or self._no_traffic
+        return self._outputs.traffic.read()
 
 
 def _wait_listening(started: Connection) -> tuple[tuple[str, int], int]:
@@ -186,7 +179,6 @@ def _wait_listening(started: Connection) -> tuple[tuple[str, int], int]:
 def _serve(
     parent: int,
     listening: tuple[NetworkUnits, tuple[UnitKey, ...], str, int],
-    priority: int | None,
     outputs: SharedOutputs,
     started: Connection,
 ) -> None:
@@ -194,7 +186,6 @@ def _serve(
     leave_to_parent()
     network, keyed, host, port = listening
     try:
-        _set_priority(priority)
         receiver = SkinReceiver(network, Keys(keyed), host, port)
     except HardwareError as error:
         started.send(str(error))
@@ -216,15 +207,3 @@ def _serve(
                     return
             if not receiver.behind:
                 time.sleep(_SHORT_PAUSE_S if receiver.taken > _MANY else _PAUSE_S)
-
-
-def _set_priority(priority: int | None) -> None:
-    if priority is None:
-        return
-    try:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
-    except (AttributeError, OSError) as error:
-        raise HardwareError(
-            f"The receiver's process could not get the real-time priority {priority} ({error}): raise the limit"
-            " `rtprio` (docs/how-to/realtime.md), or run without a priority."
-        ) from None

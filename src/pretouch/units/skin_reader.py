@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pretouch.calibration.stamps import ImuCounters
+from pretouch.calibration.stamps import ImuCounters, instants
 from pretouch.errors import RecordingError
 from pretouch.recording.mcap_file import Contents, chunks, open_mcap
 from pretouch.recording.ros import JOINT_STATE, UNIT_SAMPLE, check_version, decoded
@@ -46,9 +46,7 @@ class UnitTrace:
     """Its datagrams, in the order in which they came; `unit` is the index of the unit in the recording."""
     range: RangeTrace
     imu: ImuTrace
-    """In the order of the datagrams, at stamps spaced by the nominal rate; NaN where the unit's clock was not known."""
-    counters: ImuCounters
-    """Of the same samples."""
+    """In the order of the datagrams; stamps are NaN where nothing tells them, see `calibration.stamps.instants`."""
     acceleration_max: float
     """Largest that the accelerometer could tell [m/s^2]; inf without a sample."""
     angular_velocity_max: float
@@ -104,15 +102,12 @@ def _unit(heard: list[Received]) -> UnitTrace:
         with suppress(ValueError):  # full scales that the sensor does not have
             batches.append((one, *imu_values(one.sample.imu, one.sample.imu_scale)))
     used = [one for one, *_ in batches if one.sample.imu_count]
-    index, count, time_us, age_us, rate = (
-        _column(used, name) for name in ("imu_index", "imu_count", "time_us", "imu_age_us", "imu_rate_hz")
-    )
-    counters = ImuCounters(index, count, time_us, age_us, _times(used, "offset"), _times(used, "bound"))
+    index, count, time, age = (_column(used, name) for name in ("imu_index", "imu_count", "time_us", "imu_age_us"))
+    stamp = instants(ImuCounters(index, count, time, age, _times(used, "offset"), _times(used, "bound")))
     scales = [counts_of(one.sample.imu_scale) for one in used]
     full = [LARGEST_COUNT * min(lsb) for lsb in zip(*scales, strict=True)] or [np.inf, np.inf]
-    stamp = _nominal(counters, rate.astype(np.float64))
     values = (np.concatenate([np.zeros((0, 3)), *(batch[k] for batch in batches)]) for k in (1, 2))
-    return UnitTrace(heard, _ranges(heard), ImuTrace(stamp, *values), counters, *full)
+    return UnitTrace(heard, _ranges(heard), ImuTrace(stamp, *values), *full)
 
 
 def _column(heard: list[Received], name: str) -> IntArray:
@@ -128,14 +123,6 @@ def _ranges(heard: list[Received]) -> RangeTrace:
     stamp, bound, arrival = (_times(fresh, name) for name in ("stamp", "bound", "arrival"))
     distance, status, sigma = (_column(fresh, f"range_{name}") for name in ("mm", "status", "sigma"))
     return RangeTrace(stamp, bound, arrival, distance / 1000, status, sigma / 4000)
-
-
-def _nominal(counters: ImuCounters, rate: FloatArray) -> FloatArray:
-    """Stamps (M,) [s] of samples that came at nominal rates (B,) [Hz]; NaN where nothing tells them."""
-    newest = 1e-6 * (counters.time_us - counters.imu_age_us) + counters.offset
-    period = np.divide(1.0, rate, out=np.full_like(rate, np.nan), where=rate > 0)
-    left = np.repeat(np.cumsum(counters.count), counters.count) - np.arange(counters.count.sum()) - 1
-    return np.repeat(newest, counters.count) - left * np.repeat(period, counters.count)
 
 
 def _joints(place: Path, states: list[Any]) -> tuple[JointTrace | None, tuple[str, ...]]:

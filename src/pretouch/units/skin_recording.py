@@ -1,7 +1,6 @@
 """What sensor units send, recorded without a controller: one MCAP file for the usual viewers and for calibration."""
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import Self
@@ -10,15 +9,12 @@ import numpy as np
 
 from pretouch.errors import RecordingError
 from pretouch.recording.disk import Disk, Item
-from pretouch.recording.ros import DIAGNOSTICS, IMU, JOINT_STATE, RANGE, UNIT_SAMPLE, messages
+from pretouch.recording.ros import IMU, JOINT_STATE, RANGE, UNIT_SAMPLE, messages
 from pretouch.recording.viewer_topics import header, item, nanoseconds, range_item, topic_name
 from pretouch.types import FloatArray
 from pretouch.units.unit import Received, imu_batch
-from pretouch.units.watch import WatchUpdate
 from pretouch.units.wire import Flag
 
-_LEVELS = {"warning": 1, "fault": 2}
-"""As diagnostic_msgs/DiagnosticStatus has them."""
 _UNKNOWN = np.array([-1.0, *np.zeros(8)])
 """Covariance that says a quantity is not there (sensor_msgs/Imu)."""
 
@@ -35,7 +31,7 @@ class SkinRecording:
         self.samples = 0
         """Datagrams in it."""
         self._time = 0
-        messages().prepare(UNIT_SAMPLE, RANGE, IMU, JOINT_STATE, DIAGNOSTICS)
+        messages().prepare(UNIT_SAMPLE, RANGE, IMU, JOINT_STATE)
         self._disk = Disk(self.place)
 
     @property
@@ -46,7 +42,8 @@ class SkinRecording:
     def add(self, heard: Iterable[Received], ids: Sequence[str]) -> None:
         """Add datagrams of the units of these ids, in their order in the skin. Nobody may change them from here on."""
         for one in heard:
-            if self._advance(one.arrival):
+            if not self._disk.over:
+                self._time = nanoseconds(one.arrival, self._time)
                 self.samples += 1
                 self._disk.put(partial(_sample_items, ids[one.unit], self._time, one))
 
@@ -65,18 +62,6 @@ class SkinRecording:
                 )
         if not self._disk.over:
             self._disk.put(partial(_joint_items, self._time, stamp, q, qd, names))
-
-    def health(self, update: WatchUpdate) -> None:
-        """Add how the units are."""
-        if self._advance(update.time):
-            self._disk.put(partial(_health_items, self._time, update))
-
-    def _advance(self, stamp: float) -> bool:
-        """Go on to an instant; False if nothing more is written."""
-        if self._disk.over:
-            return False
-        self._time = nanoseconds(stamp, self._time)
-        return True
 
     def close(self) -> str:
         """End the file, and say what it holds; a second time says the same again."""
@@ -117,15 +102,3 @@ def _joint_items(
         velocity = nothing if qd is None else np.array(qd[i], dtype=np.float64)
         row = np.array(q[i], dtype=np.float64)
         yield item("/joint_states", JOINT_STATE, 0, time, header(time, ""), texts, row, velocity, nothing)
-
-
-def _health_items(time: int, update: WatchUpdate) -> Iterator[Item]:
-    make, statuses = messages().make, []
-    for unit in update.units:
-        findings = [finding for finding in update.findings if finding.unit == unit.unit]
-        level = max((_LEVELS[finding.level] for finding in findings), default=0)
-        text = " ".join(finding.sentence for finding in findings) or "Nothing is wrong."
-        numbers = {name: str(value) for name, value in asdict(unit).items() if name not in ("unit", "traffic")}
-        values = [make("diagnostic_msgs/msg/KeyValue", *pair) for pair in numbers.items()]
-        statuses.append(make("diagnostic_msgs/msg/DiagnosticStatus", level, unit.unit, text, unit.unit, values))
-    yield item("/diagnostics", DIAGNOSTICS, 0, time, header(time, ""), statuses)

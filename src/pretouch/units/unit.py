@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 
+from pretouch.traces import ImuTrace
 from pretouch.types import FloatArray, IntArray, RangeStatus, TouchStatus
 from pretouch.units.clock import UnitClock
 from pretouch.units.keys import UnitKey
@@ -98,25 +99,12 @@ class Received:
     sample: Sample
 
 
-@dataclass(slots=True)
-class ImuBatch:
-    """Consecutive IMU samples of one unit, sensor frame."""
+def imu_batch(received: Received) -> ImuTrace | None:
+    """Return the IMU samples that came with a sample; None if there are none, no instant, or no such scale or rate.
 
-    unit: int
-    """Index in the `NetworkUnits` of the skin."""
-    stamp: FloatArray
-    """(M,) instants [s]: the newest is the earliest it can have been; the others lie before it by the nominal period,
-    which a sensor keeps to some per cent."""
-    acceleration: FloatArray
-    """(M, 3) specific force [m/s^2]."""
-    angular_velocity: FloatArray
-    """(M, 3) [rad/s]."""
-    index: int
-    """Number of the first of them since the unit's reset; a gap to the batch before shows what was lost."""
-
-
-def imu_batch(received: Received) -> ImuBatch | None:
-    """Return the IMU samples that came with a sample; None if there are none, no instant, or no such scale or rate."""
+    The newest is stamped with the earliest instant it can be of; the others lie before it by the nominal period, which
+    a sensor keeps to some per cent.
+    """
     sample = received.sample
     if not sample.imu_count or not sample.imu_rate_hz or math.isnan(received.offset):
         return None
@@ -126,7 +114,7 @@ def imu_batch(received: Received) -> ImuBatch | None:
         return None
     newest = 1e-6 * (sample.time_us - sample.imu_age_us) + received.offset - received.bound
     stamp = newest + np.arange(1 - sample.imu_count, 1) / sample.imu_rate_hz
-    return ImuBatch(received.unit, stamp, acceleration, angular_velocity, sample.imu_index)
+    return ImuTrace(stamp, acceleration, angular_velocity)
 
 
 class StuckDetector:

@@ -31,7 +31,7 @@ class Bench:
 
     def command(self, qd: float, age: float = -1000.0, request: ArmRequest = ArmRequest.MOVE, number: int = 1) -> None:
         """Have all joints wanted to move so fast [rad/s]; one from the future stays fresh."""
-        self.mailboxes.send_command(ArmCommand(number, request, time.monotonic() - age, [qd] * 7))
+        self.mailboxes.commands.put(ArmCommand(number, request, time.monotonic() - age, [qd] * 7))
 
     def run(self, states: int) -> None:
         for _ in range(states):
@@ -87,7 +87,7 @@ def test_none_or_a_wrong_set_point_ends_the_motion_at_rest_and_later_ones_do_not
     bench.run(1000)
     assert bench.finished
     assert words in bench.motion.trouble
-    assert bench.mailboxes.feedback.newest().trouble == bench.motion.trouble
+    assert bench.mailboxes.feedback.read().trouble == bench.motion.trouble
 
 
 @pytest.mark.parametrize(
@@ -107,7 +107,7 @@ def test_it_ends_at_rest_when_asked_to_for_another_request_and_when_the_program_
     bench.run(1000)
     assert bench.finished
     assert bench.motion.trouble == ""
-    assert bench.mailboxes.feedback.newest().answered == 1
+    assert bench.mailboxes.feedback.read().answered == 1
 
 
 def test_it_does_not_end_before_the_arm_says_that_it_rests(bench: Bench) -> None:
@@ -124,7 +124,7 @@ def test_lost_states_are_counted(bench: Bench) -> None:
     assert (lost, line.lost_states, line.longest_gap, line.cycles) == (0, 3, 4e-3, cycles + 1)
     assert "3 lost (0.99 %), longest gap 4 ms" in str(line)
     bench.mailboxes.report.put(line)
-    assert str(bench.mailboxes.report.newest()) == str(line)
+    assert str(bench.mailboxes.report.read()) == str(line)
 
 
 # what the process does with its commands, which a script sends
@@ -168,21 +168,21 @@ class Program:
 
     def command(self, at: int, number: int, request: ArmRequest, speed: float = 0.0) -> None:
         """From the state with a number on, want this."""
-        self.steps[at] = lambda: self.mailboxes.send_command(
+        self.steps[at] = lambda: self.mailboxes.commands.put(
             ArmCommand(number, request, time.monotonic() + 1000.0, [speed] * 7)
         )
 
     def look(self, at: int) -> list[Feedback | None]:
         """Note the feedback before the state with a number."""
         feedback: list[Feedback | None] = []
-        self.steps[at] = lambda: feedback.append(self.mailboxes.feedback.newest())
+        self.steps[at] = lambda: feedback.append(self.mailboxes.feedback.read())
         return feedback
 
     def run(self) -> Feedback:
         """Serve until the command to quit; return the last feedback."""
         task = ProcessSettings("robot", "panda", self.limits, None, FrankaParams(), None, os.getppid())
         ArmServer(self.client, task, self.mailboxes).serve()  # type: ignore[arg-type]
-        feedback = self.mailboxes.feedback.newest()
+        feedback = self.mailboxes.feedback.read()
         assert feedback is not None
         return feedback
 

@@ -128,7 +128,7 @@ class FrankaArm:
     @property
     def communication(self) -> Communication:
         """How well the process kept up, in the motions that have ended."""
-        return self._mailboxes.report.newest() or Communication()
+        return self._mailboxes.report.read()
 
     def report(self) -> str:
         """Say that, in lines; '' if no motion has ended."""
@@ -171,7 +171,7 @@ class FrankaArm:
             raise RobotError(trouble)
 
     def _send(self, request: ArmRequest, qd: list[float]) -> None:
-        self._mailboxes.send_command(ArmCommand(self._number, request, time.monotonic(), qd))
+        self._mailboxes.commands.put(ArmCommand(self._number, request, time.monotonic(), qd))
 
     def _wait(self, answered: Callable[[Feedback], bool], what: str) -> None:
         until = time.monotonic() + _ANSWER_S
@@ -202,7 +202,7 @@ class FrankaArm:
             )
 
     def _feedback(self) -> Feedback:
-        feedback = self._mailboxes.feedback.newest()
+        feedback = self._mailboxes.feedback.read()
         if feedback is None:
             raise RobotError(f"No state has come from the arm at {self._address}: check its network cable.")
         return feedback

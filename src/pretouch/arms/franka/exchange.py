@@ -1,16 +1,14 @@
 """What program and process of an arm exchange in shared memory: commands, feedback, and how well the line kept up."""
 
-import struct
 from dataclasses import dataclass, field
 from enum import IntEnum
 
 from pretouch.arms.franka.limiter import PERIOD_S
 from pretouch.arms.franka.state import JOINTS, FrankaState
 from pretouch.loop import Durations, spread_table
-from pretouch.units.shared_memory import Mailbox, ObjectMailbox
+from pretouch.units.shared_memory import Mailbox
 from pretouch.values import value
 
-_COMMAND = struct.Struct(f"<qqd{JOINTS}d")
 _MOST = 65_536
 """Most bytes of feedback, of which a state takes 2000 and the vendor's error names 4000, and of a report, 12 000."""
 
@@ -104,18 +102,5 @@ class Mailboxes:
     """Mailboxes in both directions. Passed to a spawned process, they are the same mailboxes there."""
 
     def __init__(self) -> None:
-        self._commands, self.feedback = Mailbox(_COMMAND.size), ObjectMailbox[Feedback](_MOST)
-        self.report = ObjectMailbox[Communication](_MOST)
-        self._number, self._command = 0, ArmCommand(0, ArmRequest.WAIT, 0.0, [0.0] * JOINTS)
-
-    def send_command(self, command: ArmCommand) -> None:
-        """Make a command the newest one."""
-        self._commands.write(_COMMAND.pack(command.number, command.request, command.stamp, *command.qd))
-
-    def newest_command(self) -> ArmCommand:
-        """Return the newest command: the same object until there is another one; WAIT before the first."""
-        number, data = self._commands.read()
-        if number != self._number:
-            request_number, request, stamp, *qd = _COMMAND.unpack(data)
-            self._number, self._command = number, ArmCommand(request_number, ArmRequest(request), stamp, qd)
-        return self._command
+        self.commands = Mailbox(_MOST, ArmCommand(0, ArmRequest.WAIT, 0.0, [0.0] * JOINTS))
+        self.feedback, self.report = Mailbox[Feedback | None](_MOST, None), Mailbox(_MOST, Communication())

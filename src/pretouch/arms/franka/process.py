@@ -76,7 +76,7 @@ class VelocityMotion:
     def answer(self, state: FrankaState, since: float) -> tuple[FloatArray, bool]:
         """Return joint velocities (7,) [rad/s] and whether the motion is finished, `since` [s] after the last state."""
         now = time.monotonic()
-        command = self._mailboxes.newest_command()
+        command = self._mailboxes.commands.read()
         velocity = self._limiter.step(state, self._target(command, now))
         finished = self._ending and self._limiter.at_rest and max(map(abs, state.dq_d.tolist())) < _ARRIVED_RAD_S
         self._mailboxes.feedback.put(Feedback(now, self._number, True, self.trouble, state))
@@ -146,7 +146,7 @@ class ArmServer:
     def serve(self) -> None:
         """Carry out commands until it is time to quit."""
         while not self._is_over():
-            command = self._mailboxes.newest_command()
+            command = self._mailboxes.commands.read()
             if command.request is ArmRequest.QUIT:
                 break
             if command.number > self._answered:
@@ -179,12 +179,12 @@ class ArmServer:
                 self._client.recover()
         except RobotError as error:
             self._trouble = str(error)
-        feedback = self._mailboxes.feedback.newest()
+        feedback = self._mailboxes.feedback.read()
         if feedback is not None:  # the motion's last state: there may be no other
             self._state, self._stamp = feedback.state, feedback.stamp
         # what was asked during a motion ended it, and is not to be done at some later time
         self._answered = (
-            self._mailboxes.newest_command().number if command.request is ArmRequest.MOVE else command.number
+            self._mailboxes.commands.read().number if command.request is ArmRequest.MOVE else command.number
         )
 
     def _is_over(self) -> bool:

@@ -25,8 +25,6 @@ from pretouch.types import FloatArray
 from pretouch.units.fleet import Fleet
 
 _SAY_S = 1.0
-_ANSWER_S = 3.0
-"""Time without any unit in session after which it is said that nobody answers [s]: a session takes 0.1 s to begin."""
 
 
 class VisitingHand:
@@ -50,35 +48,17 @@ class _StatusPrinter:
     def __init__(self, arm: SimulatedArm, say: Callable[[str], None]) -> None:
         self._arm, self._fleet, self._say = arm, arm.fleet, say
         self._next, self._sent = _SAY_S, 0
-        self._answered, self._named = 0.0, False
 
     def record(self, cycle: Cycle) -> None:
         """Print the status of an arm and its units, when it is due."""
-        if self._arm.now >= self._next:
-            self._next += _SAY_S
-            step = cycle.step
-            self._say(self._line(f"{step.mode.value:5}  {np.linalg.norm(step.ee_velocity):.2f} m/s"))
-            self._name_receiver()
-
-    def _name_receiver(self) -> None:
-        """Say once that a receiver does not answer."""
-        now, sending = self._arm.now, [unit for unit in self._fleet.units if not unit.silent]
-        if not sending or any(unit.in_session for unit in sending):
-            self._answered, self._named = now, False
-        elif not self._named and now - self._answered >= _ANSWER_S:
-            self._named = True
-            host, port = self._fleet.receiver
-            self._say(
-                f"No answer from {host}:{port}: start `pretouch skin monitor` there with the same keys, or check"
-                " address and firewall."
-            )
-
-    def _line(self, doing: str) -> str:
-        fleet = self._fleet
+        if self._arm.now < self._next:
+            return
+        self._next += _SAY_S
+        step, fleet = cycle.step, self._fleet
         silent = [name for name, unit in zip(fleet.ids, fleet.units, strict=True) if not unit.in_session]
         sent, self._sent = fleet.sent - self._sent, fleet.sent
         parts = [
-            f"{self._arm.now:7.1f} s  {doing}",
+            f"{self._arm.now:7.1f} s  {step.mode.value:5}  {np.linalg.norm(step.ee_velocity):.2f} m/s",
             f"{sent} datagrams",
             f"{len(fleet.ids) - len(silent)} of {len(fleet.ids)} units in session",
         ]
@@ -88,7 +68,7 @@ class _StatusPrinter:
             parts.append(f"{fleet.lost} could not be sent")
         if self._arm.left_out:
             parts.append(f"this machine is too slow by {self._arm.left_out:.1f} s")
-        return "; ".join(parts)
+        self._say("; ".join(parts))
 
 
 def run(
@@ -111,7 +91,7 @@ def run(
         profile: parameters of the controller.
         hand: whether a person's hand comes and goes.
         done: is asked at each step, with the time since the begin [s].
-        say: is handed a line each second, and a sentence when nobody answers.
+        say: is handed a line each second.
     """
     scene = SceneSpec(hand=HandSpec(start=VisitingHand.away)) if hand else SceneSpec()
     arm = SimulatedArm(model, brought_to(model, path.point(0.0)), skin, fleet, scene, profile.task.control_period_s)

@@ -9,7 +9,7 @@ import numpy as np
 from rich.console import Console
 
 from pretouch.calibration.calibrate import calibrate, skin_of
-from pretouch.calibration.stamps import instants, retimed
+from pretouch.calibration.stamps import by_time
 from pretouch.calibration.values import CLOCK_ERROR_S, Calibration, CalibrationData, UnitCalibration, UnitData
 from pretouch.cli.detect_words import sentences
 from pretouch.cli.options import JsonFile, OptionalFile
@@ -144,7 +144,7 @@ def _units(measured: SkinTrace, believed: Skin | None) -> tuple[UnitData, ...]:
             units.append(UnitData(name, _NO_IMU, links.get(name)))
             continue
         unit = heard[name]
-        imu = retimed(unit.imu, instants(unit.counters))
+        imu = by_time(unit.imu)
         units.append(UnitData(name, imu, links.get(name), unit.acceleration_max, unit.angular_velocity_max))
     return tuple(units)
 

@@ -204,7 +204,7 @@ def _executed(
         output = stack.enter_context(opened.output(controller))
         opening = open_run_files(standing, command.record, Path(command.holds), tell, learnt, output)
         files = stack.enter_context(opening)
-        reporter = ProgressReporter(files.recorder, tell, latched, controller)
+        reporter = ProgressReporter(files, tell, latched, controller)
         options = Options(
             enter,
             learnt.begin if learnt else None,
