@@ -113,7 +113,7 @@ house: setup
 bench: setup
 	@for file in benchmarks/*.py; do $(BIN)/python $$file || exit 1; done
 
-# about a quarter of an hour: sets up an environment for each peer, measures, and writes the tables of docs/results/peers.md
+# about a quarter of an hour: sets up an environment for each peer, measures, and writes the table of docs/explanation/peers.md
 peers: setup
 	$(BIN)/python -m benchmarks.peers --set-up --runs 2 --docs
 

@@ -32,7 +32,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--runs", type=int, default=1, help="repeat the whole measurement, with new processes")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures to a file")
-    parser.add_argument("--docs", action="store_true", help="put the tables into docs/results/peers.md")
+    parser.add_argument("--docs", action="store_true", help="put the first table into docs/explanation/peers.md")
     return parser.parse_args()
 
 
@@ -71,7 +71,7 @@ def main() -> int:
     if args.json:
         args.json.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
     if args.docs:
-        report.into(ROOT / "docs" / "results" / "peers.md", found)
+        report.into(ROOT / "docs" / "explanation" / "peers.md", found)
     return 1 if found["disagreements"] else 0
 
 

@@ -1,4 +1,4 @@
-"""Tables of the results, for the terminal and for docs/results/peers.md."""
+"""Tables of the results for the terminal, and the first of them for docs/explanation/peers.md."""
 
 import platform
 from collections.abc import Iterator
@@ -81,20 +81,20 @@ def show(report: dict[str, Any]) -> None:
 
 
 def into(document: Path, report: dict[str, Any]) -> None:
-    """Replace what stands between the two marks of a Markdown document by the tables."""
+    """Replace what stands between the two marks of a Markdown document by the first table."""
     before, _, rest = document.read_text(encoding="utf-8").partition(_BEGIN)
     _, found, after = rest.partition(_END)
     if not found:
-        raise SystemExit(f"{document} has no place for the tables: put {_BEGIN} and {_END} there.")
+        raise SystemExit(f"{document} has no place for the table: put {_BEGIN} and {_END} there.")
     document.write_text(f"{before}{_BEGIN}\n{_markdown(report)}\n{_END}{after}", encoding="utf-8")
 
 
 def _markdown(report: dict[str, Any]) -> str:
     parts = [f"Measured on: {report['machine']}. {report['plan']}"]
-    for title, head, body in _tables(report):
-        rule = ["---", *["---:"] * (len(head) - 1)]
-        lines = ["| " + " | ".join(line) + " |" for line in (head, rule, *body)]
-        parts.append(f"**{title}**\n\n" + "\n".join(lines))
+    title, head, body = next(_tables(report))
+    rule = ["---", *["---:"] * (len(head) - 1)]
+    lines = ["| " + " | ".join(line) + " |" for line in (head, rule, *body)]
+    parts.append(f"**{title}**\n\n" + "\n".join(lines))
     versions = "\n".join(
         f"- {module}: " + ", ".join(f"{name} {number}" for name, number in found.items())
         for module, found in report["versions"].items()

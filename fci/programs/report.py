@@ -1,4 +1,4 @@
-"""The table of the results, for docs/results/programs.md."""
+"""The tables of the results, for docs/results/programs.md."""
 
 from pathlib import Path
 from typing import Any
@@ -11,35 +11,34 @@ BEGIN, END = "<!-- programs: generated, begin -->", "<!-- programs: generated, e
 
 
 def into(document: Path, known: dict[str, Any], found: dict[str, Any]) -> None:
-    """Replace what stands between the two marks of a Markdown document by a table for each set."""
+    """Replace what stands between the two marks of a Markdown document by the tables."""
     before, _, rest = document.read_text(encoding="utf-8").partition(BEGIN)
     _, mark, after = rest.partition(END)
     if not mark:
         raise SystemExit(f"{document} has no place for the tables: put {BEGIN} and {END} there.")
-    tables = "\n".join(markdown(table, 3) for table in tables_of(known, found))
+    tables = "\n".join(markdown(table, 2) for table in tables_of(known, found))
     atomic_write(document, f"{before}{BEGIN}\n\n{tables}\n{END}{after}")
 
 
-def tables_of(known: dict[str, Any], found: dict[str, Any]) -> list[TextTable]:
-    """Make a table of each set that was run: a program a row, a server a column, and below it how many run."""
-    made = []
-    for one in known["set"]:
-        rows = found.get(one["title"], {})
-        servers = [name for name in known["server"] if any(name in row for row in rows.values())]
-        if servers:
-            body = tuple((name, *(_cell(row.get(server)) for server in servers)) for name, row in rows.items())
-            counts = (f"{server} {_count(rows, server)}" for server in servers)
-            made.append(
-                TextTable(one["title"], ("program", *servers), body, f"Of {len(rows)} run: {', '.join(counts)}.")
-            )
-    return made
+def tables_of(known: dict[str, Any], found: dict[str, Any]) -> tuple[TextTable, TextTable]:
+    """Make two tables with a server a column: how many programs of each set run, and which do not."""
+    servers = [name for name in known["server"] if any(name in row for rows in found.values() for row in rows.values())]
+    counts: list[tuple[str, ...]] = []
+    failures: list[tuple[str, ...]] = []
+    for title in (one["title"] for one in known["set"] if one["title"] in found):
+        rows = found[title]
+        counts.append((title, *(_count(rows, server) for server in servers)))
+        failures += [
+            (program, title.partition(",")[0], *verdicts)
+            for program, row in rows.items()
+            if set(verdicts := [row.get(server, {"verdict": "–"})["verdict"] for server in servers]) - {"runs", "–"}
+        ]
+    return (
+        TextTable("How many run", ("set", *servers), tuple(counts), "Of those that were tried with that server."),
+        TextTable("Which do not run", ("program", "of", *servers), tuple(failures), "All others run wherever tried."),
+    )
 
 
-def _cell(played: dict[str, Any] | None) -> str:
-    if played is None:
-        return "–"
-    return played["verdict"] if played["verdict"] == "runs" else f"{played['verdict']}: {played['why']}"
-
-
-def _count(rows: dict[str, Any], server: str) -> int:
-    return sum(row.get(server, {}).get("verdict") == "runs" for row in rows.values())
+def _count(rows: dict[str, Any], server: str) -> str:
+    verdicts = [row[server]["verdict"] for row in rows.values() if server in row]
+    return f"{verdicts.count('runs')} of {len(verdicts)}" if verdicts else "–"

@@ -63,14 +63,14 @@ def test_the_table_has_a_column_for_each_server_that_was_tried(tmp_path):
     title = KNOWN["set"][0]["title"]
     ran, failed = {"verdict": "runs", "why": ""}, {"verdict": "fails", "why": "x"}
     found = {title: {"echo": {"pretouch": ran, "franka-sim": failed}}}
-    (table,) = report.tables_of(KNOWN, found)
-    assert table.header == ("program", "pretouch", "franka-sim")
-    assert table.rows == (("echo", "runs", "fails: x"),)
-    assert table.note == "Of 1 run: pretouch 1, franka-sim 0."
+    counts, failures = report.tables_of(KNOWN, found)
+    assert counts.header == ("set", "pretouch", "franka-sim")
+    assert counts.rows == ((title, "1 of 1", "0 of 1"),)
+    assert failures.rows == (("echo", title.partition(",")[0], "runs", "fails"),)
     document = tmp_path / "programs.md"
     document.write_text(f"before\n{report.BEGIN}\nold\n{report.END}\nafter\n")
     report.into(document, KNOWN, found)
     text = document.read_text()
     assert (text[:7], text[-7:]) == ("before\n", "\nafter\n")
-    assert "| echo | runs | fails: x |" in text
+    assert f"| echo | {title.partition(',')[0]} | runs | fails |" in text
     assert "old" not in text

@@ -1,5 +1,5 @@
 """Faults of the arm's side, one run each in real time against `serve-fci`: what the controller does, how soon, and how
-it goes on. `python -m fci.tests.driver.arm_faults --docs docs` writes the table."""
+it goes on. `python -m fci.tests.driver.arm_faults` prints the table of docs/results/shield.md."""
 
 import argparse
 import re
@@ -251,7 +251,7 @@ def play(folder: Path, name: str) -> Seen:
 
 _ABOUT = f"""# Faults of the arm's side
 
-Made by `python -m fci.tests.driver.arm_faults --docs docs`: `paper` on its circle, in real time through the
+Made by `python -m fci.tests.driver.arm_faults`: `paper` on its circle, in real time through the
 vendor's library, against `pretouch serve-fci`. A fault begins after {FAULT_S:g} s and lasts {LASTS_S:g} s; a person
 resumes after {RESUME_S:g} s. *Noticed*: until the HOLD or the error that names it. *Rest*: until the arm rests, up to
 0.1 s too long.
@@ -286,15 +286,11 @@ def _row(name: str, fault: Fault, seen: Seen) -> str:
 def main() -> None:
     """Play all of them."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--docs", type=Path)
     parser.add_argument("--only", default="")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         found = {name: play(Path(folder), name) for name in FAULTS if given.only in name}
-    text = document(found)
-    print(text)
-    if given.docs:
-        (given.docs / "results" / "faults.md").write_text(text)
+    print(document(found))
 
 
 if __name__ == "__main__":
