@@ -6,7 +6,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: setup demo live franka learn ros2 units meshes browser docs micropython test test-quick test-contracts test-skipped test-slow soak golden golden-values lint house bench peers \
+.PHONY: setup demo live franka learn cluster ros2 units meshes browser docs micropython test test-quick test-contracts test-skipped test-slow soak golden golden-values lint house bench peers \
 	format wheel clean
 
 setup: $(STAMP)
@@ -32,6 +32,10 @@ franka: setup
 # Gymnasium, for the environment of the lab
 learn: setup
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e './lab[learn]'
+
+# dask, for trials on the workers of its scheduler
+cluster: setup
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e './lab[cluster]'
 
 # what writes to sensor units over USB
 units: setup
@@ -69,13 +73,13 @@ test: setup
 
 # imports, a trial, a recording and its replay, the page's start: whether another Python works
 test-quick: setup
-	$(PYTEST) -n 2 -m "not slow" tests/test_compiled.py tests/test_controller.py lab/tests/paper/test_avoidance.py \
+	$(PYTEST) -n 2 -m "not slow" tests/test_compiled.py tests/test_controller.py lab/tests/experiments/test_avoidance.py \
 		tests/recording/test_writer.py tests/test_cli_replay.py tests/page/test_serve_live.py
 
 # the files in which the last `make test` skipped something, with the real libraries, and the page in a browser
 test-contracts: setup
 	@test ! -s build/skipped || $(PYTEST) -n 2 --dist worksteal -m "not slow" \
-		--skip-only="make meshes,make learn" $$(cat build/skipped)
+		--skip-only="make meshes,make learn,make cluster" $$(cat build/skipped)
 	$(PYTEST) -n 2 --dist worksteal -m "not alone" --skip-only= tests/page/test_page_in_browser.py
 
 # the same files once all that they need is installed: nothing may be skipped now

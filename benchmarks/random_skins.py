@@ -23,9 +23,8 @@ from pretouch.robot.model import RobotModel
 from pretouch.sensing.sensor import sensor_called
 from pretouch.sensing.skin import Skin
 from pretouch.sim.scene import GhostSpec, SceneSpec, fixtures
-from pretouch_lab.cell import Cell, Context
-from pretouch_lab.studies.coverage.approaching import PARKED, ApproachingObstacles
-from pretouch_lab.studies.coverage.study import COUNT, results
+from pretouch_lab.experiment import Context
+from pretouch_lab.experiments.coverage import COUNT, PARKED, ApproachingObstacles, results
 from pretouch_lab.trial import play
 
 FIRST_SEED = 1000
@@ -40,9 +39,12 @@ def blind_share(model: RobotModel, skin: Skin, seed: int) -> float:
     approaching = ApproachingObstacles(model, skin, params, COUNT, seed)
     parked = (float(PARKED[0]), float(PARKED[1]), float(PARKED[2]))
     setup = Context(model, skin).setup(
-        Cell("coverage", "pretouch"), seed, SceneSpec(ghost=GhostSpec(params.object_radius_m, parked)), Circle(),
+        {"profile": "pretouch"},
+        seed,
+        SceneSpec(ghost=GhostSpec(params.object_radius_m, parked)),
+        Circle(),
         prepare=approaching.attach,
-    )  # fmt: skip
+    )
     record = play(setup, lambda step, _: step.stamp >= approaching.end)
     found = results(approaching.came, record, params)
     return float(found["blind"] / found["came"])

@@ -1,6 +1,6 @@
 import pytest
 
-from pretouch_lab.cell import Context
+from pretouch_lab.experiment import Context
 
 
 @pytest.fixture(scope="session")

@@ -10,10 +10,12 @@ from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.range_finder import RangeFinderParams
 from pretouch_lab.benchmarks.avoidance.run import AvoidanceBench
 from pretouch_lab.benchmarks.detection.campaign import DetectionBench
-from pretouch_lab.campaign import Request
 from pretouch_lab.cli.benchmarks import BenchOptions
 from pretouch_lab.domain_randomisation import Parts, digest_of, folder_part, randomised, sentence
-from pretouch_lab.paper import static
+from pretouch_lab.experiment import arguments, context_of
+from pretouch_lab.experiments import static
+from pretouch_lab.options import Options
+from pretouch_lab.run import open_run
 
 MODEL = RobotModel(panda())
 PARTS = Parts(PlantParams(), RangeFinderParams(), paper_skin(MODEL), None)
@@ -39,18 +41,16 @@ def test_a_world_changes_arm_sensors_and_what_is_believed_of_the_skin():
 
 
 def test_the_nominal_world_plays_as_the_usual_one():
-    request = Request(("static",), 1, first_seed=1003)
-    context, cell = request.context(), request.trials()[0][0]
+    context, cell = context_of("", "", ""), static.cells(Options())[0]
     usual, _ = static.trial(cell, 1003, context)
     assert static.trial(cell, 1003, replace(context, world="nominal"))[0] == usual
     assert static.trial(cell, 1003, replace(context, world="realistic"))[0] != usual
 
 
 def test_runs_of_two_worlds_do_not_share_a_folder(tmp_path):
-    usual, other = Request(("static",), 1), Request(("static",), 1, world="stress")
-    usual.open(tmp_path / "a")
-    with pytest.raises(ExperimentError, match="holds a run with world = None, not 'stress'"):
-        other.open(tmp_path / "a")
+    open_run(tmp_path / "a", arguments("static", Options()))
+    with pytest.raises(ExperimentError, match="holds a run with world = '', not 'stress'"):
+        open_run(tmp_path / "a", arguments("static", Options(world="stress")))
     for kind in (DetectionBench, AvoidanceBench):
         kind(tmp_path / kind.name, world="stress").open()
         with pytest.raises(ExperimentError, match="holds a run with world = 'stress', not ''"):
@@ -60,11 +60,10 @@ def test_runs_of_two_worlds_do_not_share_a_folder(tmp_path):
 def test_a_world_file_that_changed_is_another_world(tmp_path):
     place = tmp_path / "mine.toml"
     place.write_text("[plant.mass_error]\nvalue = 0.1\n")
-    request = Request(("static",), 1, world=str(place))
-    request.open(tmp_path / "run")
+    open_run(tmp_path / "run", arguments("static", Options(world=str(place))))
     place.write_text("[plant.mass_error]\nvalue = 0.2\n")
-    with pytest.raises(ExperimentError, match="the world's file has changed"):
-        request.open(tmp_path / "run")
+    with pytest.raises(ExperimentError, match="holds a run with world_sha256 = "):
+        open_run(tmp_path / "run", arguments("static", Options(world=str(place))))
 
 
 def test_folders_are_named_by_their_world():

@@ -17,7 +17,6 @@ from pretouch_lab import trial
 from pretouch_lab.benchmarks.detection.arm import AWAY, Alone, path_of, record, sensing_of
 from pretouch_lab.benchmarks.detection.motions import motion_of
 from pretouch_lab.benchmarks.localization.motion import WanderingController
-from pretouch_lab.cell import Cell
 
 pytestmark = pytest.mark.slow
 GRIPPED, PUT_DOWN = 25.0, 28.0
@@ -54,7 +53,7 @@ def steps_of(context, monkeypatch):
 
         monkeypatch.setattr(trial, "Controller", announcing(Controller, said))
         arm = replace(PlantParams(), payload_kg=0.05)
-        setup = context.setup(Cell("", "pretouch"), seed, SceneSpec(), Circle(), plant=arm, prepare=prepare)
+        setup = context.setup({"profile": "pretouch"}, seed, SceneSpec(), Circle(), plant=arm, prepare=prepare)
         return trial.play(setup, lambda step, _: step.stamp >= end).steps
 
     return played

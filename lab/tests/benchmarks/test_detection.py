@@ -34,7 +34,7 @@ from pretouch_lab.benchmarks.detection.replay import REST, begun, replay
 from pretouch_lab.benchmarks.detection.results import delays, rate, resolution
 from pretouch_lab.benchmarks.detection.stream import StreamRecorder, load_stream, save_stream
 from pretouch_lab.benchmarks.detection.tables import reached
-from pretouch_lab.ghost import Ghost
+from pretouch_lab.replay import Ghost
 
 HAND = 10
 PAPER = Baseline("paper", "paper", "f_base_n")

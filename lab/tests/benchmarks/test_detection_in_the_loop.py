@@ -12,11 +12,10 @@ from pretouch.types import Mode
 from pretouch_lab.baselines.detection import BASELINES
 from pretouch_lab.benchmarks.detection.arm import AWAY, Alone, path_of, record, sensing_of
 from pretouch_lab.benchmarks.detection.replay import replay
-from pretouch_lab.cell import Cell
 from pretouch_lab.trial import play
 
 pytestmark = pytest.mark.slow
-PRETOUCH = Cell("", "pretouch")
+PRETOUCH = {"profile": "pretouch"}
 
 
 def test_a_simulated_arm_is_quiet_alone_and_feels_pushes(context):

@@ -3,9 +3,9 @@ import pytest
 from pretouch_lab.benchmarks.avoidance.losses import losses
 from pretouch_lab.benchmarks.avoidance.paired import paired
 from pretouch_lab.benchmarks.bench import EMPTY
-from pretouch_lab.benchmarks.bounds import median_bounds, share_below
 from pretouch_lab.benchmarks.front import front_table
 from pretouch_lab.benchmarks.goals import goal_table, goals
+from pretouch_lab.table import median_bounds, share_below
 
 MEASURES = ("peak_estimate_n", "true_peak_20ms_n", "clamping_force_n", "first_contact_s", "cycle_time_s")
 

@@ -12,12 +12,12 @@ from tests.imported_data.joint_files import Moving
 from pretouch import cli
 from pretouch.errors import ExperimentError
 from pretouch.recording.compare import DetectedContact
-from pretouch_lab.benchmarks.bounds import rate_bounds
 from pretouch_lab.benchmarks.real import bench
 from pretouch_lab.benchmarks.real.bench import Work, halves, parted, play
 from pretouch_lab.benchmarks.real.external import Stream, corrected, stream_of
 from pretouch_lab.benchmarks.real.judge import Said, Tally, tally
 from pretouch_lab.benchmarks.real.sets import SETS, Run, sets_in
+from pretouch_lab.table import rate_bounds
 
 FRANKA, UR10E, GLOVE = SETS[0], SETS[3], SETS[4]
 PUSH = (3.0, 0.5, "panda_link5", (0.0, 30.0, 0.0))

@@ -1,14 +1,15 @@
 import json
 import re
 import shlex
+from dataclasses import replace
 
 import pytest
 
 from pretouch import cli
-from pretouch.atomic_write import write_json
 from pretouch.errors import ExperimentError
 from pretouch_lab.cli import bench_cycle
 from pretouch_lab.cli.commands import new_folder
+from pretouch_lab.experiments import static
 
 
 def run(capsys, *args):
@@ -22,23 +23,23 @@ def run(capsys, *args):
         ("reproduce statik", "The experiment 'statik' is unknown: choose from static, avoidance, dynamic,"),
         ("reproduce static --profiles paper,brave", "The profile 'brave' is unknown"),
         ("reproduce static --profiles paper:react.decay=3", "The parameter 'react.decay' is unknown"),
-        ("reproduce static --profiles paper,paper", "The profiles are paper,paper: name each wanted one once"),
+        ("reproduce static --profiles paper,paper", "The profiles are paper, paper: name each wanted one once"),
         ("reproduce static --profiles ''", "The profiles are none"),
         ("reproduce static --restrictions off,firm", "'firm' is unknown: choose from off, hard, slack, floor"),
         ("reproduce static --stiffness 0", "The stiffness is 0 N/m"),
         ("reproduce static --stiffness 25000,nan", "The stiffness is nan N/m"),
-        ("reproduce static --stiffness ''", "The stiffnesses are none N/m: name each"),
+        ("reproduce static --stiffness ''", "The stiffnesses are none: name each"),
         ("reproduce static --stiffness 25000,25000.0", "name each wanted one once"),
         ("reproduce static --skin /nowhere.toml", "/nowhere.toml cannot be read"),
         ("reproduce static --record some", "The choice of trials to record 'some' is unknown"),
         ("reproduce static --world strange", "not one of nominal, realistic, stress"),
         ("reproduce static --out OUT --json /dev/null/x.json", "/dev/null/x.json cannot be written"),
-        ("reproduce static --out OUT --json OUT", "written .Is a directory.: give another file"),
+        ("reproduce static --out OUT --json OUT", "out is also another input or output file: give"),
         (f"reproduce static --out OUT --json {'x' * 256}", "written .File name too long.: give another file"),
         ("reproduce two-arms --profiles blind", "There is nothing to run: two-arms is about proximity"),
         ("reproduce between --arm fr3", "'between' is laid out for the Panda: with --arm, choose static, avoidance"),
         ("demo --seeds 0", "The number of seeds is 0: give at least 1"),
-        ("figure square", "The figure 'square' is unknown: choose from circle, interaction"),
+        ("figure square", "The figure 'square' is unknown: choose from force-difference, circle"),
         ("figure circle --seed -1", "The seed is -1"),
         ("figure circle --profile brave", "The profile 'brave' is unknown"),
         ("figure circle --out figure.jpg", "no ending that says its format: use .png, .pdf, .svg"),
@@ -88,77 +89,67 @@ def run(capsys, *args):
 def test_bad_input_ends_with_one_sentence_and_code_2(capsys, tmp_path, monkeypatch, text, words):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("pretouch_lab.engine.run_jobs", None)  # what is not refused ends there
+    monkeypatch.setattr("pretouch_lab.run._played", None)
     code, said = run(capsys, *(str(tmp_path / "out") if arg == "OUT" else arg for arg in shlex.split(text)))
     assert code == 2
     assert re.search(words, said.err)
     assert said.err.count("\n") == 1
     assert said.out == ""
-    assert {file.name for file in tmp_path.rglob("*.*")} <= {"run.json"}
+    assert {file.name for file in tmp_path.rglob("*.*")} <= {"run.json", "rows.jsonl"}
 
 
-@pytest.mark.parametrize("name", ["run.json", "trials/x.json", "recordings/a/b.json", "trials", "../link/run.json"])
+@pytest.mark.parametrize("name", ["run.json", "rows.jsonl", "tables.md", "../link/run.json"])
 def test_the_runs_own_files_are_not_overwritten(capsys, tmp_path, name):
     out = tmp_path / "out"
     (tmp_path / "link").symlink_to(out)
-    code, said = run(capsys, "reproduce", "static", "--out", str(out), "--json", str(out / name))
+    code, text = run(capsys, "reproduce", "static", "--out", str(out), "--json", str(out / name))
     assert code == 2
-    assert "would take the place of the run's own" in said.err
-    assert said.err.count("\n") == 1
+    assert "is also another input or output file: give another name" in text.err
+    assert text.err.count("\n") == 1
     assert not out.exists()
 
 
 @pytest.mark.parametrize("error", [RuntimeError("crash"), ExperimentError("full"), KeyboardInterrupt()])
-def test_finished_trials_are_kept_whatever_ends_a_run(capsys, tmp_path, monkeypatch, error):
-    def play(tasks, _out, _progress):
-        tasks[0].file.parent.mkdir(parents=True, exist_ok=True)
-        write_json(tasks[0].about, tasks[0].file)
-        raise error
+def test_what_ends_a_run_is_said_with_how_far_it_came(capsys, tmp_path, monkeypatch, error):
+    def play(cell, seed, _context):
+        if cell["side"] == "+y":
+            raise error
+        return {}, None
 
-    monkeypatch.setattr("pretouch_lab.cli.campaigns.run_tasks", play)
-    monkeypatch.setattr("pretouch_lab.cli.campaigns.summarise", len)
-    args = ("reproduce", "static", "--out", str(tmp_path))
+    monkeypatch.setattr(static, "EXPERIMENT", replace(static.EXPERIMENT, trial=play))
+    args = ("reproduce", "static", "--out", str(tmp_path), "--processes", "1")
     if isinstance(error, RuntimeError):
         with pytest.raises(RuntimeError, match="crash"):
             cli.main(list(args))
     else:
-        code, said = run(capsys, *args)
+        code, text = run(capsys, *args)
         assert code == (2 if isinstance(error, ExperimentError) else 130)
-        assert "full\n" in said.err or "the 1 finished trials are in" in said.err
-    assert len(json.loads((tmp_path / "results.json").read_text())["trials"]) == 1
-
-
-def test_results_that_cannot_be_written_at_the_end_are_said(capsys, tmp_path, monkeypatch):
-    def full(_value, _path):
-        raise OSError(28, "No space left on device")
-
-    def play(_tasks, _out, _progress):
-        monkeypatch.setattr("pretouch_lab.cli.campaigns.write_json", full)
-
-    monkeypatch.setattr("pretouch_lab.cli.campaigns.run_tasks", play)
-    code, said = run(capsys, "reproduce", "static", "--out", str(tmp_path))
-    assert code == 2
-    assert "results.json cannot be written (No space left on device)" in said.err
+        words = f"Stopped: 2 of 96 rows are in {tmp_path / 'rows.jsonl'}; the same command with --out"
+        assert ("full\n" if isinstance(error, ExperimentError) else words) in text.err
+    assert len((tmp_path / "rows.jsonl").read_text().splitlines()) == 2
 
 
 @pytest.mark.slow
 def test_a_run_writes_what_it_says(capsys, tmp_path):
     out, numbers = tmp_path / "out", tmp_path / "numbers.json"
     args = ("reproduce", "static", "--seeds", "1", "--out", str(out), "--json", str(numbers))
-    code, said = run(capsys, *args)
+    code, text = run(capsys, *args)
     assert code == 0
-    for words in ("Static object", "circle", "line", "ratio", str(out / "tables.md"), str(numbers)):
-        assert words in said.out
+    for words in ("Static object", "circle", "line", "Times smaller", str(out / "tables.md"), str(numbers)):
+        assert words in text.out
+    tables = (out / "tables.md").read_text()
+    assert len(re.findall("^## ", tables, flags=re.MULTILINE)) == 2
+    assert re.findall(r"^!\[.+\]\((.+)\)$", tables, flags=re.MULTILINE) == ["static.png"]
     assert (out / "static.png").exists()
     results = json.loads(numbers.read_text())
-    assert len(results["trials"]) == 8
-    assert len(results["summary"]["static"]["cells"]) == 8
-    ratios = results["summary"]["static"]["ratios"]
-    assert [r["of"] for r in ratios] == ["blind/paper"] * 4
-    assert all(r["peak_estimate_n"]["median"] > 1 for r in ratios)
-    assert max(len(line) for line in said.out.splitlines() if str(tmp_path) not in line) <= 80
-    code, said = run(capsys, *args[:-4], "--out", str(out), "--stiffness", "2000")
+    assert len(results["rows"]) == len((out / "rows.jsonl").read_text().splitlines()) == 8
+    assert [len(table["rows"]) for table in results["tables"]] == [8, 4]
+    assert max(len(line) for line in text.out.splitlines() if str(tmp_path) not in line) <= 80
+    (out / "recordings" / next((out / "recordings").iterdir()).name).write_bytes(b"damaged")
+    assert run(capsys, *args)[0] == 0, "the figure is left out"
+    code, text = run(capsys, *args[:-4], "--out", str(out), "--stiffness", "2000")
     assert code == 2
-    assert "holds a run with stiffness = [25000.0], not [2000.0]" in said.err
+    assert "holds a run with stiffness = [25000.0], not [2000.0]" in text.err
 
 
 def test_a_new_demo_gets_a_new_folder(tmp_path, monkeypatch):

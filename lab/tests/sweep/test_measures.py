@@ -2,9 +2,8 @@ import json
 
 import pytest
 
-from pretouch_lab.cell import Cell
 from pretouch_lab.engine import run_tasks
-from pretouch_lab.paper import static
+from pretouch_lab.experiments import static
 from pretouch_lab.sweep.design import sweep_of
 from pretouch_lab.sweep.play import opened, play_cells
 from pretouch_lab.sweep.setting import built
@@ -15,7 +14,7 @@ def test_a_cell_of_the_static_experiment_is_its_trial(context):
     what = measure("static")
     found = what.run(built(what.profile, what.scene, {}, 1000), None)
     where = {"trajectory": "circle", "side": "-y", "stiffness_n_per_m": 25_000.0, "restrictions": "off"}
-    row, _ = static.trial(Cell("static", "paper", where), 1000, context)
+    row, _ = static.trial(where | {"profile": "paper"}, 1000, context)
     assert found["true_peak_n"] == row["true_peak_n"] > 5.0
     assert found["delay_s"] == row["detection_delay_s"] > 0.0
     assert set(found) == set(what.metrics)

@@ -11,7 +11,7 @@ from pretouch.text_table import TextTable, markdown
 from pretouch_lab.benchmarks.scenario_files import SeedRange, checksums
 from pretouch_lab.domain_randomisation import digest_of
 from pretouch_lab.engine import Progress, Task, open_folder, run_tasks
-from pretouch_lab.rows import Row
+from pretouch_lab.run import Row
 
 EMPTY: Row = dict.fromkeys(
     (

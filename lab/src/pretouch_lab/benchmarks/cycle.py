@@ -21,7 +21,7 @@ from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.types import IntArray, Mode
 from pretouch_lab.benchmarks.workload import UNIT_RATE, Workload
-from pretouch_lab.rows import Row
+from pretouch_lab.run import Row
 
 _SETTLE = 500
 """Cycles after the force window is full in which the arm gets up to speed."""

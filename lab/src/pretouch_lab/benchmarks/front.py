@@ -1,9 +1,9 @@
 """The one table that says why, for the first page: blind, paper and pretouch, from the numbers of both benchmarks."""
 
 from pretouch.text_table import TextTable, tabulated
-from pretouch_lab.benchmarks.bounds import short
 from pretouch_lab.benchmarks.goals import find
-from pretouch_lab.rows import Row
+from pretouch_lab.run import Row
+from pretouch_lab.table import short
 
 _SHOWN = ("blind", "paper", "pretouch")
 """Baselines of the closed loop, and detectors of the same names."""

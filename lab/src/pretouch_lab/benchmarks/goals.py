@@ -5,9 +5,9 @@ from textwrap import fill
 
 from pretouch.text_table import TextTable
 from pretouch_lab.benchmarks.ablations import BASE
-from pretouch_lab.benchmarks.bounds import share_below, short
 from pretouch_lab.benchmarks.scenario_files import scenario
-from pretouch_lab.rows import Row
+from pretouch_lab.run import Row
+from pretouch_lab.table import share_below, short
 
 PEAK_ESTIMATE, TRUE_PEAK, SOONER, SHORTER = 5.0, 4.0, 2.0, 0.3
 """Times the peaks are to be smaller and the first contact sooner; part by which a turn is to be shorter."""

@@ -13,7 +13,7 @@ from pretouch.errors import ExperimentError
 from pretouch.realtime import check_wishes
 from pretouch_lab.benchmarks.cycle import CycleRequest, about, measure
 from pretouch_lab.benchmarks.workload import LARGEST_SKIN
-from pretouch_lab.rows import Row
+from pretouch_lab.run import Row
 
 _SPREAD = {"median": "median_us", "99 %": "p99_us", "99.9 %": "p999_us", "largest": "max_us"}
 

@@ -1,6 +1,8 @@
 """`pretouch bench detection`, `avoidance`, `localization`, `shield` and `both`: their docstrings are the help."""
 
 import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -145,12 +147,20 @@ class Both(BenchOptions):
 
 def run_bench(bench: "Bench", json: str) -> None:
     """Run what is missing of a benchmark, and show and write what came out."""
-    from pretouch_lab.cli.campaigns import results_to
-
     bench.open()
     with results_to(json, bench.out) as (json_file, write):
         _play(bench, json_file)
         write(_report(bench, json_file))
+
+
+@contextmanager
+def results_to(json: str, folder: Path) -> Iterator[tuple[Path, Callable[[Any], None]]]:
+    """Give the file for the results, results.json in a folder unless --json names one, and what writes them for '-'."""
+    from pretouch.cli.writing import STANDARD_OUTPUT, numbers_to
+
+    printed = json == STANDARD_OUTPUT
+    with numbers_to(json if printed else "") as write:
+        yield Path(json) if json and not printed else folder / "results.json", write
 
 
 def _play(bench: "Bench", json_file: Path) -> None:

@@ -1,14 +1,31 @@
 """`pretouch demo`, `reproduce` and `figure`: their docstrings are the help."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
+from functools import partial
+from io import BytesIO
 from itertools import count
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import tyro
 
-from pretouch.cli.options import Numbers, Words
+from pretouch.cli.options import JsonFile
+from pretouch_lab.options import Options, Playing
+
+if TYPE_CHECKING:  # the help is to need none of the heavy packages
+    from matplotlib.figure import Figure as DrawnFigure
+
+    from pretouch_lab.run import Row
 
 _DEMONSTRATED = ("blind", "paper", "pretouch")
+_PROFILES = (*Options.profiles, "slowing-only", "thresholds-only", "paper-0.5m")
+_STIFFNESS = (2_000.0, 25_000.0, 75_000.0, 300_000.0)
+_MODES = ("hard", "slack", "floor")
+_STUDIES = {"between": 12, "mounting": 6, "coverage": 4, "two-arms": 3}
+"""Studies beside the paper's experiments, each with its number of seeds."""
+_ENDINGS = (".png", ".pdf", ".svg")
+Part = tuple[str, str, Options]
+"""A folder's name, an experiment, and which of its trials are kept there."""
 
 
 @dataclass(frozen=True)
@@ -18,89 +35,112 @@ class Demo:
     seeds: int = 4
     """Trials of each cell of the static experiment; the other two take one."""
     out: str = ""
-    """Folder for results, tables and figures; by default a new one under runs/."""
-    json: str = ""
-    """File for all trials and their summary; by default results.json in the folder. -: also to standard output, and
-    text to standard error."""
+    """Folder for rows, tables and figures; by default a new one under runs/."""
+    json: JsonFile = None
 
     def run(self) -> None:
-        """Play it, with results, tables and figures."""
+        """Play it, with rows, tables and figures."""
         from pretouch.cli.warm_up import prepare
         from pretouch.profiles import profile
-        from pretouch_lab.campaign import Request
-        from pretouch_lab.cli.campaigns import run_all
+        from pretouch_lab.experiment import check
 
-        out = Path(self.out) if self.out else new_folder("demo")
-        few = Request(("avoidance", "dynamic"), seeds=1, profiles=_DEMONSTRATED)
-        many = Request(("static",), seeds=self.seeds, profiles=_DEMONSTRATED)
-        prepare(profile("pretouch"))  # each worker would compile the same, and the bar would stand still
+        one, many = (Options(seeds, profiles=_DEMONSTRATED) for seeds in (1, self.seeds))
+        check(many, ("static",))
         # the long trials first, so that the bar moves on in small steps towards the end
-        run_all([(few, out / "people"), (many, out / "static")], out, self.json)
+        parts = [(name, name, one) for name in ("avoidance", "dynamic")]
+        how = Playing(self.out or str(new_folder("demo")), self.json)
+        prepare(profile("pretouch"))  # each worker would compile the same, and the bar would stand still
+        reproduce([*parts, ("static", "static", many)], Path(how.out), how)
 
 
 @dataclass(frozen=True)
-class Reproduce:
-    """Run the paper's experiments in full. A run that was stopped goes on where it was, with the same parameters."""
+class Reproduce(Playing, Options):
+    """Run the paper's experiments in full. A run that was stopped goes on where it was, with the same options."""
 
     experiment: tyro.conf.Positional[str] = "all"
     """static (paper IV-A), avoidance (IV-B), dynamic (IV-C), between (its close-up), one of the studies, or all,
     which takes about half an hour on two processors."""
-    seeds: int = 12
-    """Trials of each cell; each seed is another arm with other errors, noise and geometry."""
-    first_seed: int = 0
-    """The first of them; only seed 0 is recorded and drawn unasked."""
-    profiles: Words = ("blind", "paper")
-    """Profiles to compare, separated by commas. PROFILE:GROUP.FIELD=VALUE is one with another parameter. With `all`
-    the studies have their own."""
-    restrictions: Words = ()
-    """off, hard, slack or floor, or several of them; by default off in the static experiment and slack in others."""
-    stiffness: Numbers = (25000.0,)
-    """Contact stiffness of the static object [N/m], or several, separated by commas."""
-    skin: str = ""
-    """Skin file; by default the seven units that come with the package."""
-    arm: str = ""
-    """Name of an arm, or the folder of an imported one, for static, avoidance and dynamic; by default the Panda. The
-    paper's paths and places are scaled and moved into its reach, and the skin is the arm's own."""
-    world: str = ""
-    """Set of simulated arms, sensors and delays: nominal, realistic, stress, or a TOML file, of which each trial's seed
-    draws its own; by default the usual ones."""
-    record: str = "first"
-    """first: record the trials of the first seed of which figures are drawn; all: record every trial."""
-    out: str = ""
-    """Folder for results, recordings, tables and figures; by default runs/reproduce-EXPERIMENT."""
-    json: str = ""
-    """File for all trials and their summary; by default results.json in the folder. -: also to standard output, and
-    text to standard error."""
 
     def run(self) -> None:
-        """Run the experiments, with results, recordings, tables and figures."""
+        """Run the experiments, with rows, recordings, tables and figures."""
         from pretouch.sim.plant_params import assumed_plant
-        from pretouch_lab.campaign import Request
-        from pretouch_lab.cli.campaigns import run_all
         from pretouch_lab.domain_randomisation import folder_part
-        from pretouch_lab.paper.whole import whole_paper
-        from pretouch_lab.registry import EXPERIMENTS
+        from pretouch_lab.experiment import NAMES, check, context_of
 
-        everything = self.experiment == "all"
-        request = Request(
-            experiments=tuple(EXPERIMENTS) if everything else (self.experiment,),
-            seeds=self.seeds,
-            profiles=self.profiles,
-            restrictions=self.restrictions,
-            stiffness=self.stiffness,
-            skin=self.skin or None,
-            record=self.record,
-            arm=self.arm or None,
-            first_seed=self.first_seed,
-            world=self.world or None,
-        )
-        if request.arm and not everything:
-            context = request.context()
+        options = Options(**{each.name: getattr(self, each.name) for each in fields(Options)})
+        parts = whole_paper(options) if self.experiment == "all" else [("", self.experiment, options)]
+        check(options, NAMES if self.experiment == "all" else (self.experiment,))
+        if options.arm:
+            context = context_of(options.arm, options.skin, options.world)
             print(context.placement.sentence(context.model.description.name))
             print(assumed_plant(context.model.description))
-        out = Path(self.out or f"runs/reproduce-{self.experiment}{folder_part(self.world)}")
-        runs = [(part, out / name) for name, part in whole_paper(request)] if everything else [(request, out)]
-        run_all(runs, out, self.json)
+        reproduce(parts, self.folder(f"reproduce-{self.experiment}{folder_part(self.world)}"), self)
+
+
+def whole_paper(options: Options) -> list[Part]:
+    """Return all parts of `pretouch reproduce all`.
+
+    A study has no more seeds than `options`, nor than its own number. Profiles, restrictions and stiffnesses that are
+    given replace those of the paper's three experiments; where they are the defaults, these are varied as well.
+    """
+    profiles = _PROFILES if options.profiles == Options.profiles else options.profiles
+    stiffness = _STIFFNESS if options.stiffness == Options.stiffness else options.stiffness
+    whole = replace(options, profiles=profiles)
+    parts = [("static", "static", replace(whole, stiffness=stiffness))]
+    parts += [(name, name, whole) for name in ("avoidance", "dynamic")]
+    if not options.restrictions and "paper" in profiles:
+        parts.append(("restrictions", "static", replace(options, profiles=("paper",), restrictions=_MODES)))
+    study = Options(skin=options.skin, world=options.world, first_seed=options.first_seed)
+    return parts + [(name, name, replace(study, seeds=min(options.seeds, n))) for name, n in _STUDIES.items()]
+
+
+def reproduce(parts: list[Part], folder: Path, how: Playing) -> None:
+    """Play the parts of a run that are not there yet, and show and write tables and figures of all of them."""
+    from pretouch.cli.writing import numbers_to
+    from pretouch_lab.cli.playing import check_json, numbers_of, played, report
+    from pretouch_lab.experiment import arguments, check, experiment, play
+    from pretouch_lab.run import open_run
+
+    for _, name, options in parts:
+        check(options, (name,))
+    plays = [experiment(name).plays(options) for _, name, options in parts]
+    check_json(how, [folder / where for where, _, _ in parts])
+    with numbers_to(how.json) as write:
+        for where, name, options in parts:
+            open_run(folder / where, arguments(name, options))
+        rows: dict[str, list[Row]] = {}
+        for (where, name, options), own in zip(parts, plays, strict=True):
+            trial = partial(play, name, options, folder / where)
+            rows[name] = rows.get(name, []) + played(where or name, trial, own, folder / where, how)
+        tables = [table for name, own in rows.items() for table in experiment(name).tables(own)]
+        figures = [each for part in parts for each in _figure_of(*part, folder, rows[part[1]])]
+        report(tables, figures, folder)
+        write(numbers_of([{"experiment": name, **row} for name, own in rows.items() for row in own], tables))
+
+
+def _figure_of(
+    where: str, name: str, options: Options, folder: Path, rows: "list[Row]"
+) -> "list[tuple[str, str, DrawnFigure]]":
+    """Draw a part's figure of the recordings of its first seed, if it has one and they can be read."""
+    from pretouch.errors import PretouchError
+    from pretouch_lab.experiment import context_of, experiment, recording_file
+    from pretouch_lab.trial import read_trace
+
+    what = experiment(name)
+    names = list(what.cells(options)[0])
+    if what.drawing is None or where == "restrictions":
+        return []
+    traces: list[tuple[dict[str, Any], Any]] = []
+    try:
+        for row in what.drawing.shown([row for row in rows if row["seed"] == 0]):
+            cell = {key: row[key] for key in names}
+            traces.append((cell, read_trace(recording_file(folder / where, cell, 0))[0]))
+    except PretouchError:
+        pass
+    if not traces:
+        return []
+    units = context_of(options.arm, options.skin, options.world).skin.ids
+    return [(name, what.drawing.text, what.drawing.draw(traces, units))]
 
 
 @dataclass(frozen=True)
@@ -118,10 +158,42 @@ class Figure:
 
     def run(self) -> None:
         """Draw the figure."""
-        from pretouch_lab.cli.figure import draw_figure
-
         out = Path(self.out or f"{self.name}.png")
-        print(f"Figure: {draw_figure(self.name, out, self.profile, self.seed)}")
+        draw_figure(self.name, out, self.profile, self.seed)
+        print(f"Figure: {out}")
+
+
+def draw_figure(name: str, out: Path, profile: str = "paper", seed: int = 0) -> None:
+    """Draw one of the paper's figures into a file; whatever is wrong is said before anything is played."""
+    from rich.console import Console
+
+    from pretouch.cli.writing import check_writable, unwritable_said
+    from pretouch.errors import ExperimentError
+    from pretouch.profiles import profile as profile_named
+    from pretouch_lab.experiment import NAMES, context_of, experiment
+    from pretouch_lab.trial import trace_of
+
+    drawings = {own.drawing.name: (own, own.drawing) for own in map(experiment, NAMES) if own.drawing}
+    if name not in drawings:
+        raise ExperimentError(f"The figure {name!r} is unknown: choose from {', '.join(drawings)}.")
+    if seed < 0:
+        raise ExperimentError(f"The seed is {seed}: give 0 or more.")
+    what, drawing = drawings[name]
+    if profile_named(profile).perception is None and drawing.beside:
+        raise ExperimentError(f"The figure {name} cannot show {profile}, which has no proximity: name another.")
+    if out.suffix not in _ENDINGS:
+        raise ExperimentError(f"The figure {out} has no ending that says its format: use {', '.join(_ENDINGS)}.")
+    check_writable("figure", out)
+    console, context, traces = Console(stderr=True, highlight=False, soft_wrap=True), context_of("", "", ""), []
+    for cell in drawing.shown(what.cells(Options(profiles=(*drawing.beside, profile)))):
+        console.print(f"Playing {', '.join(map(str, cell.values()))} with seed {seed}.", markup=False)
+        record = what.trial(cell, seed, context)[1]
+        if record is not None:
+            traces.append((cell, trace_of(record)))
+    image = BytesIO()
+    drawing.draw(traces, context.skin.ids).savefig(image, format=out.suffix[1:], dpi=150)
+    with unwritable_said("figure", out):
+        out.write_bytes(image.getvalue())
 
 
 def new_folder(name: str) -> Path:

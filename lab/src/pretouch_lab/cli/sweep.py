@@ -94,7 +94,6 @@ def _written(run: "Run", metrics: tuple[str, ...], out: Path) -> dict[str, Any]:
     from pretouch.atomic_write import write_json
     from pretouch.cli.tables import show
     from pretouch_lab.engine import failure_said
-    from pretouch_lab.experiment import Picture, draw
     from pretouch_lab.sweep.figure import sweep_figure
     from pretouch_lab.sweep.indices import indices, tables
     from pretouch_lab.sweep.play import write_table
@@ -109,7 +108,7 @@ def _written(run: "Run", metrics: tuple[str, ...], out: Path) -> dict[str, Any]:
     write_table(run, out / f"{name}.csv")
     with failure_said(out):
         write_json(numbers, out / f"{name}.json")
-        draw([Picture(name, run.sweep.measure.text, sweep_figure(run.sweep, found, metrics))], out)
+        sweep_figure(run.sweep, found, metrics).savefig(out / f"{name}.png", dpi=120)
     console.print(f"Written: {out / name}.csv, .json and .png", soft_wrap=True, markup=False)
     return numbers
 

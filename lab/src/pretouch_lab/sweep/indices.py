@@ -7,9 +7,10 @@ import numpy as np
 
 from pretouch.text_table import Column, TextTable, tabulated
 from pretouch.types import FloatArray
-from pretouch_lab.rows import Row, rounded
+from pretouch_lab.run import Row
 from pretouch_lab.sweep.design import SEED, Sweep, problem
 from pretouch_lab.sweep.play import Run
+from pretouch_lab.table import rounded
 
 _RESAMPLES = 500
 _DRAWN_WITH = 2021

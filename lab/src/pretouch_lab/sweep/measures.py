@@ -9,9 +9,9 @@ from pretouch.control.approach import ApproachRestriction
 from pretouch.errors import ExperimentError
 from pretouch.profiles import Profile
 from pretouch_lab.benchmarks.detection.arm import model
-from pretouch_lab.cell import Cell, Context
-from pretouch_lab.paper import avoidance, dynamic, static
-from pretouch_lab.rows import Row
+from pretouch_lab.experiment import Context
+from pretouch_lab.experiments import avoidance, dynamic, static
+from pretouch_lab.run import Row
 from pretouch_lab.sweep.setting import Setting
 
 Numbers = dict[str, float | None]
@@ -72,17 +72,15 @@ class DynamicScene(Checked):
     """The pushes of paper IV-C: the seed says all of them."""
 
 
-def _played(setting: Setting, trial: Callable[[Cell, int, Context], tuple[Row, Any]], cell: Cell) -> Row:
+def _played(setting: Setting, trial: Callable[[Row, int, Context], tuple[Row, Any]], where: Row) -> Row:
     context = Context(model(), setting.skin, plant=setting.plant, ranging=setting.sensing)
-    return trial(cell, setting.seed, context)[0]
+    return trial(where | {"profile": setting.profile_text}, setting.seed, context)[0]
 
 
 def _static(setting: Setting, _: None) -> Numbers:
     scene = cast(StaticScene, setting.scene)
-    where: dict[str, str | float] = {
-        "trajectory": scene.trajectory, "side": scene.side, "stiffness_n_per_m": scene.stiffness_n_m,
-    }  # fmt: skip
-    row = _played(setting, static.trial, Cell("static", setting.profile_text, where))
+    where = {"trajectory": scene.trajectory, "side": scene.side, "stiffness_n_per_m": scene.stiffness_n_m}
+    row = _played(setting, static.trial, where)
     return {
         "peak_estimate_n": row["peak_estimate_n"],
         "true_peak_n": row["true_peak_n"],
@@ -97,13 +95,13 @@ def _static(setting: Setting, _: None) -> Numbers:
 
 def _avoidance(setting: Setting, _: None) -> Numbers:
     place = cast(AvoidanceScene, setting.scene).place
-    row = _played(setting, avoidance.trial, Cell("avoidance", setting.profile_text, {"place": place}))
+    row = _played(setting, avoidance.trial, {"place": place})
     names = ("least_gap_m", "true_peak_n", "deviation_m", "travelled_m", "contact", "false_detections")
     return {name: float(row[name]) for name in names}
 
 
 def _dynamic(setting: Setting, _: None) -> Numbers:
-    row = _played(setting, dynamic.trial, Cell("dynamic", setting.profile_text))
+    row = _played(setting, dynamic.trial, {})
     contacts = row["contacts"]
     return {
         "peak_estimate_n": row["peak_estimate_n"],

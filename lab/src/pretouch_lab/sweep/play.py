@@ -16,7 +16,7 @@ from pretouch.errors import PretouchError
 from pretouch.extras import Extra
 from pretouch.types import FloatArray
 from pretouch_lab.engine import Task, failure_said
-from pretouch_lab.rows import Row
+from pretouch_lab.run import Row
 from pretouch_lab.sweep.design import SEED, Point, Sweep, points
 from pretouch_lab.sweep.setting import Values, built, world_digest
 from pretouch_lab.sweep.streams import measure

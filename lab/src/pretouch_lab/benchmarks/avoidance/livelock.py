@@ -8,7 +8,8 @@ from pretouch.control.path import Path
 from pretouch.types import BoolArray, FloatArray
 from pretouch_lab.benchmarks.avoidance.measures import started
 from pretouch_lab.benchmarks.avoidance.setting import Setting
-from pretouch_lab.rows import Row, rounded
+from pretouch_lab.run import Row
+from pretouch_lab.table import rounded
 from pretouch_lab.trial import Record
 
 _EVERY = 10

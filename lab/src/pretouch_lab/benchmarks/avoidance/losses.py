@@ -2,7 +2,8 @@
 
 from pretouch.text_table import TextTable
 from pretouch_lab.benchmarks.ablations import BASE
-from pretouch_lab.rows import Row, grouped
+from pretouch_lab.run import Row
+from pretouch_lab.table import grouped
 
 _LESS = (
     ("true_peak_20ms_n", "true 20 ms [N]", 1.0, 1),

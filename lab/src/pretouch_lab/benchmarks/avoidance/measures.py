@@ -12,7 +12,8 @@ from pretouch.traces import mean_over
 from pretouch.types import ControlStep, FloatArray, Mode, QpOutcome
 from pretouch_lab.benchmarks.avoidance.obstacle import Truth
 from pretouch_lab.benchmarks.avoidance.setting import Setting
-from pretouch_lab.rows import Row, peak, rounded
+from pretouch_lab.run import Row
+from pretouch_lab.table import peak, rounded
 from pretouch_lab.trial import Record
 
 _CLAMP_S = 0.5

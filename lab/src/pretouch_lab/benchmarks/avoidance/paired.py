@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from pretouch_lab.benchmarks.bounds import finite, median_bounds
-from pretouch_lab.rows import Row, grouped
+from pretouch_lab.run import Row
+from pretouch_lab.table import finite, grouped, median_bounds
 
 FORCES = ("peak_estimate_n", "true_peak_20ms_n", "clamping_force_n")
 TIMES = ("first_contact_s", "cycle_time_s")

@@ -17,7 +17,7 @@ from pretouch_lab.benchmarks.avoidance.tables import tables
 from pretouch_lab.benchmarks.avoidance.trial import keep_trial
 from pretouch_lab.benchmarks.bench import Bench, Found
 from pretouch_lab.engine import Task, rows_of
-from pretouch_lab.rows import Row
+from pretouch_lab.run import Row
 
 
 @dataclass(frozen=True)

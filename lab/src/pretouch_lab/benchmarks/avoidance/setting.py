@@ -22,8 +22,8 @@ from pretouch.types import ControlStep, FloatArray
 from pretouch_lab.benchmarks.avoidance.obstacle import Ball, Cuboid, Shape, Walker
 from pretouch_lab.benchmarks.avoidance.scenario import Scenario, Table
 from pretouch_lab.benchmarks.scenario_files import scenario_path
+from pretouch_lab.experiments.avoidance import Visit, Visitor
 from pretouch_lab.trial import Setup
-from pretouch_lab.visits import Visit, Visitor
 
 PANDA = "panda"
 """The arm that the scenarios are laid out for."""

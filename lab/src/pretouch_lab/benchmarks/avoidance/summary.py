@@ -8,7 +8,8 @@ import numpy as np
 from pretouch_lab.benchmarks.ablations import BASE, WITHOUT
 from pretouch_lab.benchmarks.avoidance.paired import paired
 from pretouch_lab.benchmarks.bench import EMPTY, Bench
-from pretouch_lab.rows import Row, grouped, rounded
+from pretouch_lab.run import Row
+from pretouch_lab.table import grouped, rounded
 
 SPREAD = (
     "least_distance_m", "true_peak_20ms_n", "true_peak_n", "clamping_force_n", "peak_estimate_n", "impact_speed_m_s",

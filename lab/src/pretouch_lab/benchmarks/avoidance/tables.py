@@ -5,7 +5,8 @@ from collections.abc import Callable
 from pretouch.text_table import TextTable, tabulated
 from pretouch_lab.benchmarks.avoidance.losses import losses
 from pretouch_lab.benchmarks.avoidance.scenario import scenarios
-from pretouch_lab.rows import Row, grouped
+from pretouch_lab.run import Row
+from pretouch_lab.table import grouped
 from pretouch_lab.tables import plain, share, with_spread
 
 _NOTE = (

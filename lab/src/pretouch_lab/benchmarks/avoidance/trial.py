@@ -14,7 +14,7 @@ from pretouch_lab.benchmarks.avoidance.livelock import livelocks
 from pretouch_lab.benchmarks.avoidance.obstacle import Truth, truth_of
 from pretouch_lab.benchmarks.avoidance.scenario import Scenario, scenarios
 from pretouch_lab.benchmarks.avoidance.setting import PANDA, Setting, setting
-from pretouch_lab.rows import Row
+from pretouch_lab.run import Row
 from pretouch_lab.trial import Record, play
 
 _D_MAX_M = 0.8

@@ -24,7 +24,7 @@ from pretouch.types import FloatArray
 from pretouch_lab.benchmarks.detection.stream import PROFILE, Stream, StreamRecorder
 from pretouch_lab.benchmarks.scenario_files import scenario, scenario_path
 from pretouch_lab.domain_randomisation import Parts, randomised
-from pretouch_lab.ghost import Ghost
+from pretouch_lab.replay import Ghost
 from pretouch_lab.trial import SETTLE_S
 
 AWAY = np.array([0.0, 0.0, 4.0])

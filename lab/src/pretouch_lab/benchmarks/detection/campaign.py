@@ -23,7 +23,7 @@ from pretouch_lab.benchmarks.detection.results import (
 from pretouch_lab.benchmarks.detection.tables import detection_tables
 from pretouch_lab.benchmarks.scenario_files import scenario
 from pretouch_lab.engine import Task, rows_of
-from pretouch_lab.rows import Row
+from pretouch_lab.run import Row
 
 _CONTACT_S = 3.5
 """Time a contact takes with the gap after it, about [s]."""

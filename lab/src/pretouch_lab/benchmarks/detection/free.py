@@ -24,7 +24,7 @@ from pretouch_lab.benchmarks.detection.arm import (
 )
 from pretouch_lab.benchmarks.detection.stream import Stream, save_stream
 from pretouch_lab.benchmarks.scenario_files import SeedRange, numbered, scenario
-from pretouch_lab.ghost import Ghost
+from pretouch_lab.replay import Ghost
 
 _HAND_SIDE_M = 0.102
 """How far the arm's hand reaches out to the side of its origin [m]."""

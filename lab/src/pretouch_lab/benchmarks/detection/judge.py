@@ -17,7 +17,8 @@ from pretouch_lab.benchmarks.detection.hard import HardCell
 from pretouch_lab.benchmarks.detection.replay import REST, Replayed, replay
 from pretouch_lab.benchmarks.detection.stream import Stream, load_stream
 from pretouch_lab.benchmarks.scenario_files import scenario
-from pretouch_lab.rows import Row, rounded
+from pretouch_lab.run import Row
+from pretouch_lab.table import rounded
 
 PERIOD_S = TaskParams().control_period_s
 BUSY = -1.0

@@ -12,7 +12,7 @@ from pretouch.types import NOT_TOUCHED, BoolArray, FloatArray, Touched, TouchRea
 from pretouch_lab.baselines.detection import Baseline
 from pretouch_lab.benchmarks.detection.first_motion import FirstMotion
 from pretouch_lab.benchmarks.detection.stream import Stream
-from pretouch_lab.detector_alone import DetectorAlone
+from pretouch_lab.replay import DetectorAlone
 
 NOTHING = no_obstacles()
 """What a profile without proximity is shown."""

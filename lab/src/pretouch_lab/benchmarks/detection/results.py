@@ -8,10 +8,10 @@ import numpy as np
 
 from pretouch_lab.baselines.detection import BASELINES, Baseline, ablated
 from pretouch_lab.benchmarks.bench import EMPTY
-from pretouch_lab.benchmarks.bounds import dispersion_of, median_bounds, rate_bounds
 from pretouch_lab.benchmarks.detection.judge import BUSY, sweep_values
 from pretouch_lab.benchmarks.scenario_files import scenario
-from pretouch_lab.rows import Row, rounded
+from pretouch_lab.run import Row
+from pretouch_lab.table import dispersion_of, median_bounds, rate_bounds, rounded
 
 GOAL_FREE, GOAL_CONTACTS = "free: goal", "contacts: goal"
 """Scenarios of the goals: the usual arm at the goal's speed, whoever is near; contacts the goals of delay are set for,

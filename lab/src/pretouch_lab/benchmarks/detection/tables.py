@@ -2,11 +2,11 @@
 
 from pretouch.text_table import TextTable, tabulated
 from pretouch_lab.benchmarks.ablations import BASE, WITHOUT
-from pretouch_lab.benchmarks.bounds import short
 from pretouch_lab.benchmarks.detection.results import ABLATED_CONTACTS, ABLATED_FREE, GOAL_CONTACTS, GOAL_FREE
 from pretouch_lab.benchmarks.goals import find
 from pretouch_lab.benchmarks.scenario_files import scenario
-from pretouch_lab.rows import Row
+from pretouch_lab.run import Row
+from pretouch_lab.table import short
 
 
 def detection_tables(results: Row) -> list[TextTable]:

@@ -10,7 +10,7 @@ from pretouch_lab.benchmarks.bench import Bench, Found, said
 from pretouch_lab.benchmarks.localization.contacts import TouchedCell, duration_s, record_touched, touched_cells
 from pretouch_lab.benchmarks.localization.judge import WITHOUT, judge_touched
 from pretouch_lab.engine import Task, rows_of
-from pretouch_lab.rows import Row
+from pretouch_lab.run import Row
 
 _RECORDING_COST, _REPLAY_COST = 0.075, 0.02
 """Processor time of a second of simulation, and of one replayed [s]."""

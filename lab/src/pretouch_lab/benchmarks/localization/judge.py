@@ -18,8 +18,9 @@ from pretouch_lab.benchmarks.detection.stream import Stream, load_stream
 from pretouch_lab.benchmarks.localization.contacts import TouchedCell
 from pretouch_lab.benchmarks.localization.limit import position_limit
 from pretouch_lab.benchmarks.scenario_files import scenario
-from pretouch_lab.detector_alone import DetectorAlone
-from pretouch_lab.rows import Row, rounded
+from pretouch_lab.replay import DetectorAlone
+from pretouch_lab.run import Row
+from pretouch_lab.table import rounded
 
 PROFILE = "pretouch"
 WITHOUT = ("none", "none, nothing learnt")

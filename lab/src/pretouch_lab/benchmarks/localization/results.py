@@ -6,7 +6,8 @@ import numpy as np
 
 from pretouch.text_table import TextTable, tabulated
 from pretouch_lab.benchmarks.scenario_files import scenario
-from pretouch_lab.rows import Row, rounded
+from pretouch_lab.run import Row
+from pretouch_lab.table import rounded
 from pretouch_lab.tables import plain
 
 

@@ -10,7 +10,7 @@ from pretouch.text_table import TextTable, tabulated
 from pretouch_lab.benchmarks.real.external import Stream, corrected, model_of, stream_of
 from pretouch_lab.benchmarks.real.judge import Tally, said_of, tally
 from pretouch_lab.benchmarks.real.sets import SETS, Run
-from pretouch_lab.rows import Row
+from pretouch_lab.run import Row
 
 DETECTORS = ("fixed", "observer", "paper", "pretouch")
 TABLES = {

@@ -10,9 +10,9 @@ from pretouch.imported_data.detect import MOVING_RAD_S, detect
 from pretouch.profiles import Profile
 from pretouch.recording.compare import DetectedContact
 from pretouch.types import BoolArray, FloatArray
-from pretouch_lab.benchmarks.bounds import rate_bounds
 from pretouch_lab.benchmarks.real.external import Stream
-from pretouch_lab.rows import Row
+from pretouch_lab.run import Row
+from pretouch_lab.table import rate_bounds
 
 _AFTER_S = 0.1
 """Time after a contact in which an alarm still counts as found, and none as false [s]."""

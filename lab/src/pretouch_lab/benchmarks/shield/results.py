@@ -6,7 +6,8 @@ from math import sqrt
 from pretouch.text_table import TextTable, tabulated
 from pretouch_lab.benchmarks.shield.measures import TOLERANCE
 from pretouch_lab.benchmarks.shield.trial import CLOSE_M, SAME_M, SEEN_S, seen_in_time, speed_bound
-from pretouch_lab.rows import Row, grouped, rounded
+from pretouch_lab.run import Row
+from pretouch_lab.table import grouped, rounded
 from pretouch_lab.tables import plain, share
 
 _COUNTS = ("steps", "exceptions", "non_finite", "limit_violations")

@@ -12,7 +12,7 @@ from pretouch_lab.benchmarks.scenario_files import SeedRange
 from pretouch_lab.benchmarks.shield.results import guarantees, rows_of_cells, tables_of
 from pretouch_lab.benchmarks.shield.trial import FILTERS, SCENES, TouchCell, tried
 from pretouch_lab.engine import Task, rows_of
-from pretouch_lab.rows import Row
+from pretouch_lab.run import Row
 
 _CHUNK = 25
 """Trials of a task at most."""

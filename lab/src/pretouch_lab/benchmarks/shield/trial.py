@@ -19,7 +19,8 @@ from pretouch_lab.benchmarks.avoidance.setting import Setting, setting
 from pretouch_lab.benchmarks.scenario_files import SeedRange, scenario, seed_of
 from pretouch_lab.benchmarks.shield.commanders import AtPerson, Commander, Situation, Tracking
 from pretouch_lab.benchmarks.shield.measures import asked_velocity, breaks_limits
-from pretouch_lab.rows import Row, rounded
+from pretouch_lab.run import Row
+from pretouch_lab.table import rounded
 from pretouch_lab.trial import Record, play
 
 FILTERS: dict[str, Profile] = {

@@ -8,7 +8,7 @@ from pretouch.calibration.values import Place
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.unit import SensorUnit
 from pretouch.types import FloatArray
-from pretouch_lab.rows import Row
+from pretouch_lab.run import Row
 
 _TURN, _SHIFT = slice(0, 3), slice(3, 6)
 

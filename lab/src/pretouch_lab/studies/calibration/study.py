@@ -14,7 +14,7 @@ from pretouch.robot.description import RobotDescription
 from pretouch.robot.model import RobotModel
 from pretouch.sim.random_skin import random_skin
 from pretouch_lab.engine import run_jobs
-from pretouch_lab.rows import Row
+from pretouch_lab.run import Row
 from pretouch_lab.studies.calibration.errors import NOT_FOUND, place_row
 from pretouch_lab.studies.calibration.simulated import clock_errors, simulate
 

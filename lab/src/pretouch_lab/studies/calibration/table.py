@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from pretouch.text_table import TextTable, tabulated
-from pretouch_lab.rows import Row
+from pretouch_lab.run import Row
 from pretouch_lab.studies.calibration.study import Study
 
 ALL = "all"

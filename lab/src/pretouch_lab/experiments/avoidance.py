@@ -1,0 +1,185 @@
+"""Paper IV-B: a person holds a hand beside the circle or into it, on one side and then on the other."""
+
+from dataclasses import dataclass
+from itertools import product
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pretouch.perception.closest import closest_points
+from pretouch.profiles import profile
+from pretouch.robot.model import RobotModel
+from pretouch.sim.hand import FREE_N, HOME, LEAD_S, HandGoal, point_on_arm, robot_hand, way_round
+from pretouch.sim.paper_scenes import Placement
+from pretouch.sim.plant import Plant
+from pretouch.sim.scene import HandSpec, SceneSpec
+from pretouch.text_table import TextTable
+from pretouch.types import FloatArray
+from pretouch_lab.experiment import (
+    Context,
+    Drawing,
+    Experiment,
+    Trace,
+    controller_named,
+    controllers,
+    first_sensing,
+    main,
+)
+from pretouch_lab.options import Options
+from pretouch_lab.run import Row
+from pretouch_lab.table import Column, rounded, summary, table
+from pretouch_lab.trial import Record, play
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+NAME = "avoidance"
+DEFAULT_RESTRICTIONS = "slack"
+
+_DURATION_S = 40.0
+_VISITS_S = ((4.0, 14.0), (20.0, 30.0))
+PLACES = ("beside", "inside")
+"""Where the person's hand is: 3 cm clear of the robot's on the free circle, or half of it in its way."""
+_SPREAD_M = 0.03
+_UNMOVED = Placement()
+_CLEAR_M = 0.4
+"""Distance of the robot's hand at which a person dares to come in [m]."""
+
+
+@dataclass(frozen=True)
+class Visit:
+    """A hand held at a place for a while."""
+
+    arrive: float
+    """[s]"""
+    leave: float
+    """[s]"""
+    place: FloatArray
+    """(3,) [m]"""
+
+
+@dataclass
+class Visitor:
+    """Holds a hand up beside the path, then takes it away. Comes in while the robot's hand is elsewhere."""
+
+    model: RobotModel
+    visits: tuple[Visit, ...]
+
+    def __post_init__(self) -> None:
+        self._robot = robot_hand(self.model)
+        self._inside = False
+
+    def goal(self, time: float, hand: FloatArray, plant: Plant) -> HandGoal:
+        """Be at the place of the visit under way, or at home; come and go from the far side of the place."""
+        for visit in self.visits:
+            if visit.arrive - LEAD_S <= time < visit.leave + 1.0:
+                outside = visit.place + np.array([0.0, np.sign(visit.place[1]) * 0.4, 0.0])
+                palm = point_on_arm(plant, self._robot.link, self._robot.palm)
+                clear = np.linalg.norm(palm - visit.place) > _CLEAR_M
+                due = visit.arrive <= time < visit.leave
+                self._inside = due and (self._inside or bool(clear))
+                return HandGoal(visit.place if self._inside else way_round(hand, outside), FREE_N)
+        return HandGoal(way_round(hand, HOME), FREE_N)
+
+
+def cells(options: Options) -> list[Row]:
+    """A cell for each place of the hand and each controller."""
+    return [
+        {"place": place, **controller}
+        for place, controller in product(PLACES, controllers(options, DEFAULT_RESTRICTIONS))
+    ]
+
+
+def visits(place: str, seed: int, placement: Placement = _UNMOVED) -> tuple[Visit, ...]:
+    """One visit on each side of the circle, at a place that the seed varies by a few centimetres."""
+    rng = np.random.default_rng([seed, 12])
+    return tuple(
+        Visit(arrive, leave, np.array(placement.visited(place, side)) + _SPREAD_M * rng.uniform(-1, 1, 3))
+        for (arrive, leave), side in zip(_VISITS_S, (-1.0, 1.0), strict=True)
+    )
+
+
+def trial(cell: Row, seed: int, context: Context) -> tuple[Row, Record]:
+    """Run one trial; return what is measured and what it left behind."""
+    where = context.placement
+    person = Visitor(context.model, visits(cell["place"], seed, where))
+    setup = context.setup(cell, seed, SceneSpec(hand=HandSpec()), where.path("circle", -1.0), hand=person)
+    record = play(setup, lambda step, _: step.stamp >= _DURATION_S)
+    steps = record.steps
+    off = [float(np.linalg.norm(s.ee_position - s.path_position)) for s in steps]
+    row = {
+        "contact": record.first_contact() is not None,
+        "true_peak_n": rounded(float(np.linalg.norm(record.true_force, axis=1).max())),
+        "least_gap_m": rounded(float(gaps(record, context.model, HandSpec.radius).min()), 4),
+        "deviation_m": rounded(max(off), 4),
+        "least_speed_scale": rounded(min(s.speed_scale for s in steps)),
+        "largest_slack_m_s": rounded(max(float(s.qp.slack.max(initial=0.0)) for s in steps), 4),
+        "travelled_m": rounded(steps[-1].path_phase),
+        "false_detections": sum(
+            record.first_contact(after=s.stamp - 0.5) is None
+            or (record.first_contact(after=s.stamp - 0.5) or 0.0) > s.stamp
+            for s in record.reactions()
+        ),
+        "held": record.held(),
+    }
+    return row, record
+
+
+def gaps(record: Record, model: RobotModel, radius: float) -> FloatArray:
+    """Distance (S,) [m] between the person's hand, a ball of a radius [m], and the arm at each control step."""
+    unit, aside, found = np.zeros(1, np.int64), np.array([[0.0, 0.0, 1.0]]), []
+    for step, hand in zip(record.steps, record.hand_position, strict=True):
+        kin = model.kinematics(step.q)
+        nearest = closest_points(kin, model.body, step.ee_position, unit, hand[None], aside)
+        found.append(float(nearest.body_distance[0]) - radius)
+    return np.array(found)
+
+
+_COLUMNS = (
+    Column("hand", "place"),
+    Column("profile", "controller"),
+    Column("contact", "contact", of="trials"),
+    Column("true\n[N]", "true_peak_n", 1),
+    Column("least\ngap [m]", "least_gap_m", 3),
+    Column("off path\n[m]", "deviation_m", 3),
+    Column("least\nspeed", "least_speed_scale", 2),
+    Column("way\n[m]", "travelled_m", 2),
+    Column("false", "false_detections"),
+)
+_MEASURES = ("true_peak_n", "least_gap_m", "deviation_m", "least_speed_scale", "travelled_m")
+
+
+def tables(rows: list[Row]) -> list[TextTable]:
+    """Show what a hand beside the path or in it changes."""
+    groups = summary(controller_named(rows), ("place", "controller"), _MEASURES, ("contact", "false_detections"))
+    note = (
+        "Beside is 3 cm clear of the robot's hand on its free path, inside half of the person's hand is in its way."
+        " Contact: trials with contact. True: peak of the true force. Gap: between the person's hand and the arm,"
+        " negative in contact. Least speed: factor of eqs. 3 and 4. Way: travelled along the path in 40 s."
+    )
+    return [table("A person holds a hand beside the path or into it: medians", _COLUMNS, groups, note, names=2)]
+
+
+def shown_cells(rows: list[Row]) -> list[Row]:
+    """Choose the trial of the figure: one with the hand beside the path."""
+    return first_sensing([row for row in rows if row["place"] == "beside"])
+
+
+def draw(traces: list[Trace], _units: tuple[str, ...]) -> "Figure":
+    """Draw the end-effector's path."""
+    from pretouch_lab.experiments.figures import circle
+
+    (cell, trace), *_ = traces
+    return circle(trace, profile(cell["profile"]))
+
+
+EXPERIMENT = Experiment(
+    NAME,
+    cells,
+    trial,
+    tables,
+    Drawing("circle", "End-effector path with a hand beside it", shown_cells, draw),
+    any_arm=True,
+)
+if __name__ == "__main__":
+    main(NAME)

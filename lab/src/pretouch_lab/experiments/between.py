@@ -1,0 +1,180 @@
+"""Paper V-C, threshold close-up: a person stands on one side of the circle and pushes the arm from the other."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pretouch.control.path import Circle
+from pretouch.profiles import profile
+from pretouch.sim.hand import FACES, Push, Pusher, against
+from pretouch.sim.scene import Box, HandSpec, SceneSpec
+from pretouch.text_table import TextTable
+from pretouch.types import ControlStep
+from pretouch_lab.experiment import (
+    Context,
+    Drawing,
+    Experiment,
+    Trace,
+    controller_named,
+    controllers,
+    first_sensing,
+    main,
+)
+from pretouch_lab.run import Row
+from pretouch_lab.table import Column, rounded, summary, table
+from pretouch_lab.trial import Record, play
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+NAME = "between"
+DEFAULT_RESTRICTIONS = "slack"
+
+_DURATION_S = 12.0
+_REACH_M = 0.25
+"""The circle's end-effector comes this far in y [m]."""
+_BEYOND_M = (0.3, 0.4)
+"""Distance of the body's surface from there [m]."""
+_BODY_HALF_SIZE_M = (0.2, 0.12, 0.75)
+"""Half the size of a person's trunk and legs [m]; they stand on the floor."""
+_BODY_STIFFNESS_N_PER_M = 25_000.0
+"""Contact stiffness of a chest [N/m] (ISO/TS 15066, annex A)."""
+_ASIDE_M = 0.05
+"""The seed moves the body along x by up to this [m]."""
+_START_S = (5.0, 7.0)
+"""When the person reaches for the arm [s]."""
+_FACE = FACES[0]
+"""The right face of the robot's hand is pushed: along +y of the base."""
+_FORCE_N = (15.0, 30.0)
+_LASTING_S = (0.2, 0.5)
+_NOTICE_S = 0.3
+"""A reaction up to this long after the release still answers the push [s]."""
+_REBOUND_S = 3.0
+"""A later reaction up to this long after the release is the push's echo [s]."""
+_Y = 1
+_WIDTHS = ("upper_free_n", "upper_least_n", "lower_free_n", "lower_least_n")
+
+
+def interaction(seed: int) -> tuple[Box, Push]:
+    """Where the body stands at +y, and how the hand pushes from -y: both vary with the seed."""
+    rng = np.random.default_rng([seed, 61])
+    face = _REACH_M + rng.uniform(*_BEYOND_M)
+    center = (
+        0.5 + _ASIDE_M * rng.uniform(-1, 1),
+        face + _BODY_HALF_SIZE_M[1],
+        SceneSpec.floor_height + _BODY_HALF_SIZE_M[2],
+    )
+    inwards = against(_FACE, rng)
+    push = Push(rng.uniform(*_START_S), inwards, rng.uniform(*_FORCE_N), rng.uniform(*_LASTING_S))
+    return Box("body", center, _BODY_HALF_SIZE_M, _BODY_STIFFNESS_N_PER_M), push
+
+
+def trial(cell: Row, seed: int, context: Context) -> tuple[Row, Record]:
+    """Run one trial; return what is measured and what it left behind."""
+    body, push = interaction(seed)
+    person = Pusher(context.model, (push,))
+    setup = context.setup(cell, seed, SceneSpec(boxes=(body,), hand=HandSpec()), Circle(), hand=person)
+    record = play(setup, lambda step, _: step.stamp >= _DURATION_S)
+    touched = person.contacts[0] if person.contacts else None
+    row = {
+        "body_m": rounded(body.center[_Y] - body.half_size[_Y]),
+        "push_n": rounded(push.force),
+        "push_s": rounded(push.duration),
+        **results(record, touched),
+    }
+    return row, record
+
+
+def results(record: Record, touched: tuple[float, float] | None) -> Row:
+    """Numbers of one trial; `touched` are touch and release [s] of the push, None if it never touched.
+
+    Widths of the band are T_u - mu and mu - T_l of the three axes [N].
+    """
+    touch, release = touched or (np.inf, np.inf)
+    before = [s for s in record.steps if s.armed and s.stamp < touch]
+    lowered = [s for s in before if lowered_on_both_sides(s)]
+    answer = next((s for s in record.reactions() if touch <= s.stamp <= release + _NOTICE_S), None)
+    period = float(np.median(np.diff(record.times())))
+    return {
+        "contact": touched is not None,
+        **widths(before),
+        "both_lowered": bool(lowered),
+        "both_lowered_s": rounded(period * len(lowered)),
+        "both_lowered_at_touch": lowered_on_both_sides(before[-1]) if touched and before else None,
+        "detected": answer is not None,
+        "detection_delay_s": None if answer is None else rounded(answer.stamp - touch, 4),
+        "filtered_at_detection_n": None if answer is None else rounded(float(answer.filtered_force[_Y])),
+        "raw_at_detection_n": None if answer is None else rounded(float(answer.force[_Y])),
+        "false_detections": sum(not touch <= s.stamp <= release + _REBOUND_S for s in record.reactions()),
+        "held": record.held(),
+    }
+
+
+def widths(steps: list[ControlStep]) -> dict[str, list[float | None]]:
+    """Least width of the band above and below the mean of each axis [N], and its median while that bound is free.
+
+    A bound is free while nothing sensed lowers it; None where it never is.
+    """
+    if not steps:
+        return {name: [None] * 3 for name in _WIDTHS}
+    limits = [s.thresholds for s in steps]
+    made: dict[str, list[float | None]] = {}
+    for name, width, lowered in (
+        ("upper", np.array([t.upper - t.mean for t in limits]), np.array([t.obstacle_negative for t in limits])),
+        ("lower", np.array([t.mean - t.lower for t in limits]), np.array([t.obstacle_positive for t in limits])),
+    ):
+        free = [width[lowered[:, axis] == 0, axis] for axis in range(3)]
+        made[f"{name}_free_n"] = [rounded(np.median(values)) if len(values) else None for values in free]
+        made[f"{name}_least_n"] = [rounded(value) for value in width.min(axis=0)]
+    return made
+
+
+def lowered_on_both_sides(step: ControlStep) -> bool:
+    """Whether objects on both sides narrow the band along y from above and from below."""
+    return bool(step.thresholds.obstacle_positive[_Y] > 0 and step.thresholds.obstacle_negative[_Y] > 0)
+
+
+_COLUMNS = (
+    Column("profile", "controller"),
+    *(Column(f"T_{name[0]}\n{name.split('_')[1]}", f"{name}_y", 1) for name in _WIDTHS),
+    Column("both\never", "both_lowered", of="trials"),
+    Column("both at\ntouch", "both_lowered_at_touch", of="contact"),
+    Column("detected", "detected", of="contact"),
+    Column("delay\n[ms]", "detection_delay_s", 0, 1000.0),
+    Column("filtered\n[N]", "filtered_at_detection_n", 1),
+    Column("false", "false_detections"),
+)
+_TOTALS = ("contact", "detected", "both_lowered", "both_lowered_at_touch", "false_detections")
+
+
+def tables(rows: list[Row]) -> list[TextTable]:
+    """Show how far the band along y was narrowed from both sides before the push, and which pushes were detected."""
+    along_y = [row | {f"{name}_y": row[name][_Y] for name in _WIDTHS} for row in controller_named(rows)]
+    spreads = (*(f"{name}_y" for name in _WIDTHS), "detection_delay_s", "filtered_at_detection_n")
+    note = (
+        "T_u: upper threshold above the window's mean along y; T_l: lower threshold below it. Free: median while"
+        " nothing sensed lowers that bound, in trials where it ever is free. Least: before the push. Both: trials in"
+        " which objects narrowed the band from above and below at once, ever before the push and when it touched."
+        " Detected: of the pushes that touched. Filtered (eq. 8): along y, at detection."
+    )
+    groups = summary(along_y, ("controller",), spreads, _TOTALS)
+    return [table("A person stands at +y and pushes the arm from -y: medians, thresholds in N", _COLUMNS, groups, note)]
+
+
+def draw(traces: list[Trace], units: tuple[str, ...]) -> "Figure":
+    """Draw distances and thresholds about the first touch."""
+    from pretouch_lab.experiments.figures import close_up
+
+    (cell, trace), *_ = traces
+    return close_up(trace, units, profile(cell["profile"]))
+
+
+EXPERIMENT = Experiment(
+    NAME,
+    lambda options: controllers(options, DEFAULT_RESTRICTIONS),
+    trial,
+    tables,
+    Drawing("close-up", "Distances and thresholds with objects on both sides", first_sensing, draw),
+)
+if __name__ == "__main__":
+    main(NAME)

@@ -1,0 +1,271 @@
+"""The paper's figures, drawn from the courses of trials."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from pretouch.contact.moving_thresholds import MovingThresholds
+from pretouch.contact.sequential_test import SequentialTest
+from pretouch.params import ProximityPriorParams
+from pretouch.profiles import Profile
+from pretouch.profiles import profile as find_profile
+from pretouch.recording.run_record import RunRecord
+from pretouch.sim.plant import TOUCH_N
+from pretouch.traces import spans
+from pretouch.types import BoolArray, FloatArray
+
+BLIND, SENSING, OURS = "tab:blue", "tab:red", "tab:green"
+AXES = "xyz"
+Y = 1
+"""The axis the paper's figures show."""
+_SLOWED = 0.99
+_UNITS = (
+    ("black", "-", ""), ("tab:blue", "--", ""), ("tab:orange", "-", "o"), ("tab:green", ":", "s"),
+    ("tab:red", "-.", ""), ("tab:purple", "--", "^"), ("tab:gray", "-", ""),
+)  # fmt: skip
+"""Colour, line and marker of each unit; more units than these begin again."""
+_MARKS = 60
+"""Markers along a line over the whole of a trace."""
+
+
+def shade(axes: Axes, time: FloatArray, flags: BoolArray, colour: str, hatch: str = "", label: str = "") -> None:
+    """Shade the spans of time (S,) [s] in which flags (S,) hold; a hatch tells it from others in grey."""
+    for i, (start, end) in enumerate(spans(flags)):
+        axes.axvspan(
+            time[start], time[min(end, len(time) - 1)], facecolor=(colour, 0.15), edgecolor=(colour, 0.4), lw=0,
+            hatch=hatch, label=label if i == 0 else None, zorder=0,
+        )  # fmt: skip
+
+
+def near(trace: RunRecord, d_max: float) -> BoolArray:
+    """Whether anything sensed in each step (S,) is within d_max [m] of the end-effector's origin."""
+    distance = np.linalg.norm(trace.sensed_point - trace.ee_position[:, None], axis=2)
+    return np.any(distance < d_max, axis=1)
+
+
+def slowed(trace: RunRecord) -> BoolArray:
+    """Whether the arm is slowed in each step (S,)."""
+    return trace.speed_scale < _SLOWED
+
+
+def touching(trace: RunRecord) -> BoolArray:
+    """Whether something truly touches the arm in each step (S,)."""
+    return np.linalg.norm(trace.true_force, axis=1) > TOUCH_N
+
+
+def distances(axes: Axes, trace: RunRecord, units: tuple[str, ...]) -> None:
+    """Draw the distance each unit reads."""
+    for k, unit in enumerate(units):
+        colour, style, marker = _UNITS[k % len(_UNITS)]
+        axes.plot(
+            trace.time, trace.range_distance[:, k], style, color=colour, lw=1.2, marker=marker, ms=4,
+            markevery=max(1, len(trace.time) // _MARKS), label=unit.replace("_", " "),
+        )  # fmt: skip
+    axes.set_ylabel("distance read [m]")
+
+
+def force_with_thresholds(axes: Axes, trace: RunRecord, axis: int, profile: Profile) -> None:
+    """Draw the force estimate along an axis, the value of eq. 8 and the moving thresholds.
+
+    Of a detector without thresholds, the bands in which one sample alone is no contact.
+    """
+    paper = isinstance(profile.detect, MovingThresholds)
+    bounds = "thresholds" if paper else "bands of one sample"
+    axes.plot(trace.time, trace.upper[:, axis], color="black", lw=1, label=bounds)
+    axes.plot(trace.time, trace.lower[:, axis], color="black", lw=1)
+    axes.plot(trace.time, trace.force[:, axis], color="0.7", lw=0.8, label="estimate")
+    if paper:
+        axes.plot(
+            trace.time, trace.filtered_force[:, axis], color="tab:blue", lw=1.8, ls=(0, (4, 1)), label="value of eq. 8"
+        )
+    found, force = trace.detected, trace.filtered_force if paper else trace.force
+    axes.plot(trace.time[found], force[found, axis], "v", color="tab:red", mec="black", ms=8, label="detected")
+    axes.set_ylabel(f"force along {AXES[axis]} [N]")
+
+
+_OFF_PATH_M = 0.01
+_POINTS = 12
+"""One in so many sensed points is drawn."""
+
+
+def circle(trace: RunRecord, profile: Profile) -> Figure:
+    """End-effector path: free, avoiding what is sensed (red), recovering (green); and its course in time."""
+    figure = Figure(figsize=(9, 9), layout="constrained")
+    plane, course, aside = figure.subplots(3, 1, height_ratios=[1.9, 0.8, 0.6])
+    off = np.linalg.norm(trace.ee_position - trace.path_position, axis=1)
+    disturbed = slowed(trace) | (off > _OFF_PATH_M)
+    avoiding = disturbed & near(trace, profile.d_max_m)
+    recovering = disturbed & ~avoiding
+    _plane(plane, trace, avoiding, recovering, profile)
+    course.plot(trace.time, np.linalg.norm(trace.ee_velocity, axis=1), color="black", lw=1, label="speed [m/s]")
+    course.plot(trace.time, trace.speed_scale, color="tab:orange", ls="--", lw=1.5, label="speed factor, eqs. 3 and 4")
+    course.set(ylabel="speed [m/s], factor", ylim=(0.0, 1.35), xlim=(trace.time[0], trace.time[-1]))
+    aside.plot(trace.time, 1000 * off, color="black", lw=1)
+    aside.set(xlabel="time [s]", ylabel="off the path [mm]", xlim=(trace.time[0], trace.time[-1]))
+    for axes in (course, aside):
+        shade(axes, trace.time, avoiding, "tab:red", label="avoidance")
+        shade(axes, trace.time, recovering, "tab:green", "////", label="recovery")
+        axes.grid(alpha=0.3)
+    course.legend(loc="upper right", ncols=4, fontsize="small")
+    return figure
+
+
+def _plane(axes: Axes, trace: RunRecord, avoiding: BoolArray, recovering: BoolArray, profile: Profile) -> None:
+    """Draw path, end-effector and sensed points in the plane of the circle."""
+    ee = trace.ee_position
+    axes.plot(*trace.path_position[:, 1:].T, color="tab:blue", lw=7, alpha=0.3, label="path")
+    axes.plot(*_where(ee, ~avoiding & ~recovering), color="black", lw=0.8, label="free")
+    axes.plot(*_where(ee, avoiding), color="tab:red", lw=2.2, zorder=4, label="avoidance")
+    axes.plot(*_where(ee, recovering), color="tab:green", lw=2.2, ls=(0, (2, 1)), zorder=3, label="recovery")
+    within = np.linalg.norm(trace.sensed_point - ee[:, None], axis=2) < profile.d_max_m
+    points = trace.sensed_point[within & avoiding[:, None]][::_POINTS]
+    axes.plot(*points[:, 1:].T, "o", color="limegreen", mec="black", mew=0.4, ms=4, ls="", label="sensed objects")
+    axes.set_aspect("equal")
+    axes.set(
+        xlabel="y [m]", ylabel="z [m]", title=f"End-effector while a hand comes on either side, profile {profile.name}"
+    )
+    axes.legend(loc="center", fontsize="small")
+    axes.grid(alpha=0.3)
+
+
+def _where(position: FloatArray, flags: BoolArray) -> tuple[FloatArray, FloatArray]:
+    """Split into y and z (S,) [m] where flags hold, NaN elsewhere, so that a line drawn of them is broken there."""
+    kept = np.where(flags[:, None], position, np.nan)
+    return kept[:, 1], kept[:, 2]
+
+
+def interaction(trace: RunRecord, units: tuple[str, ...], profile: Profile) -> Figure:
+    """Distances with the activation line, force along y with moving thresholds, end-effector velocity along y."""
+    figure = Figure(figsize=(10, 8.4), layout="constrained")
+    top, middle, bottom = figure.subplots(3, 1, sharex=True)
+    distances(top, trace, units)
+    d_max = profile.d_max_m
+    if profile.slow is not None or isinstance(profile.detect, MovingThresholds):
+        top.axhline(d_max, color="black", ls=":", lw=2.5, label=f"activation, d_max {d_max:g} m")
+    top.set(ylim=(0.0, 1.4), title=f"Three pushes in thirty seconds, profile {profile.name}")
+    force_with_thresholds(middle, trace, Y, profile)
+    _name_pushes(middle, trace)
+    bottom.plot(trace.time, trace.ee_velocity[:, Y], color="black", lw=1, label="end-effector")
+    bottom.set(ylabel=f"velocity along {AXES[Y]} [m/s]", xlabel="time [s]", xlim=(trace.time[0], trace.time[-1]))
+    for axes in (top, middle, bottom):
+        shade(axes, trace.time, slowed(trace) & ~trace.reacting, "tab:blue", label="slowed")
+        shade(axes, trace.time, trace.reacting | touching(trace), "tab:red", "////", label="contact and reaction")
+        axes.grid(alpha=0.3)
+    top.legend(loc="upper right", fontsize="x-small", ncols=5)
+    middle.legend(loc="upper right", fontsize="x-small", ncols=6)
+    bottom.legend(loc="upper right", fontsize="x-small", ncols=3)
+    return figure
+
+
+def _name_pushes(axes: Axes, trace: RunRecord) -> None:
+    """Say at the foot of the panel which way each push went, as only one axis of the force is drawn."""
+    low, high = axes.get_ylim()
+    axes.set_ylim(low - 0.15 * (high - low), high + 0.2 * (high - low))
+    last = -np.inf
+    for start, end in spans(touching(trace)):
+        force = trace.true_force[start:end].mean(axis=0)
+        if trace.time[start] > last + 1.0 and np.abs(force).max() > TOUCH_N:
+            axis = int(np.abs(force).argmax())
+            text = f"pushed {'-+'[int(force[axis] > 0)]}{AXES[axis]}"
+            axes.text(trace.time[start], low - 0.1 * (high - low), text, fontsize="small", ha="center", va="center")
+        last = float(trace.time[end - 1])
+
+
+_BEFORE_S, _AFTER_S = 4.0, 2.5
+
+
+def close_up(trace: RunRecord, units: tuple[str, ...], profile: Profile) -> Figure:
+    """Distances with the region that matters, and force along y with thresholds, about the first touch."""
+    figure = Figure(figsize=(9, 6.4), layout="constrained")
+    top, bottom = figure.subplots(2, 1, sharex=True)
+    distances(top, trace, units)
+    detector, near = profile.detect, ProximityPriorParams()
+    paper = isinstance(detector, MovingThresholds)
+    if isinstance(detector, SequentialTest):
+        near = detector.proximity or near
+    d_max, name = (detector.d_max_m, "d_max") if isinstance(detector, MovingThresholds) else (near.distance_m, "near")
+    top.axhspan(0.0, d_max, facecolor="gold", alpha=0.18, zorder=0)
+    top.axhline(d_max, color="black", ls=":", lw=2.5, label=f"{name} {d_max:g} m")
+    top.annotate("region of interest", (0.01, d_max), (0, -5), ("axes fraction", "data"), "offset points", va="top")
+    top.set(ylim=(0.0, 1.4), title=f"Objects on both sides of the robot's hand, profile {profile.name}")
+    force_with_thresholds(bottom, trace, Y, profile)
+    if paper:
+        without = trace.upper + trace.obstacle_negative, trace.lower - trace.obstacle_positive
+        bottom.plot(trace.time, without[0][:, Y], color="black", ls=":", label="thresholds without F_obs")
+        bottom.plot(trace.time, without[1][:, Y], color="black", ls=":")
+    both = (trace.obstacle_positive[:, Y] > 0) & (trace.obstacle_negative[:, Y] > 0)
+    for axes in (top, bottom):
+        shade(axes, trace.time, both, "tab:red", label="both bounds lowered")
+        shade(axes, trace.time, touching(trace), "black", "////", label="touched")
+        axes.grid(alpha=0.3)
+    bottom.set(xlabel="time [s]", xlim=_window(trace))
+    top.legend(loc="upper right", fontsize="x-small", ncols=5)
+    bottom.legend(loc="upper left", fontsize="x-small", ncols=2)
+    return figure
+
+
+def _window(trace: RunRecord) -> tuple[float, float]:
+    """First and last instant to show [s]: about the first touch, or all where there is none."""
+    touched = np.flatnonzero(touching(trace))
+    if len(touched) == 0:
+        return float(trace.time[0]), float(trace.time[-1])
+    at = float(trace.time[touched[0]])
+    return at - _BEFORE_S, at + _AFTER_S
+
+
+_TRAJECTORIES, _SIDES = ("circle", "line"), ("-y", "+y")
+
+
+def force_difference(traces: Mapping[tuple[str, str, str], RunRecord], profiles: Sequence[str]) -> Figure:
+    """Force along y with the band between the thresholds, before and after contact.
+
+    Blind is blue, the first of the others red, the second green.
+    `traces` by (trajectory, side, profile); `profiles` are one or two to show beside `blind`.
+    """
+    shown = [name for name in dict.fromkeys(("blind", *profiles)) if any(key[2] == name for key in traces)]
+    others = [name for name in profiles if name != "blind"]
+    styles = {"blind": (BLIND, "...."), **dict(zip(others, ((SENSING, ""), (OURS, "")), strict=False))}
+    figure = Figure(figsize=(10, 6.8), layout="constrained")
+    panels = figure.subplots(2, 2, sharex=True, sharey=True)
+    for row, trajectory in enumerate(_TRAJECTORIES):
+        for column, side in enumerate(_SIDES):
+            axes: Axes = panels[row, column]
+            for name in shown:
+                trace = traces.get((trajectory, side, name))
+                if trace is not None:
+                    _force(axes, trace, -1.0 if side == "+y" else 1.0, name, *styles[name])
+            axes.set_title(f"{trajectory}, object at {side}")
+            axes.set_xlim(-1.0, 0.6)
+            axes.grid(alpha=0.3)
+    if panels[0, 0].lines:
+        panels[0, 0].legend(loc="upper left", fontsize="small")
+    figure.supxlabel("time from first touch [s]")
+    figure.supylabel("force along y, away from the object [N]")
+    figure.suptitle(f"Contact with a static object: force estimate and contact thresholds, {_listed(shown)}")
+    return figure
+
+
+def _force(axes: Axes, trace: RunRecord, push: float, name: str, colour: str, hatch: str) -> None:
+    """Draw the estimate and its detection; of a detector by thresholds, these until then and the value of eq. 8 too."""
+    style, filtered, marker = ("--", ":", "o") if hatch else ("-", "-.", "s")
+    touched = np.flatnonzero(touching(trace))
+    if len(touched) == 0:
+        return
+    time = trace.time - trace.time[touched[0]]
+    found = np.flatnonzero(trace.detected & (time >= 0))
+    before = time <= (time[found[0]] if len(found) else time[-1])
+    if isinstance(find_profile(name).detect, MovingThresholds):
+        axes.fill_between(
+            time[before], push * trace.lower[before, Y], push * trace.upper[before, Y], facecolor=(colour, 0.15),
+            edgecolor=(colour, 0.5), lw=0.8, ls=style, hatch=hatch, label=f"{name}: between thresholds",
+        )  # fmt: skip
+        axes.plot(time, push * trace.filtered_force[:, Y], color=colour, ls=filtered, lw=1.2, label=f"{name}: eq. 8")
+    axes.plot(time, push * trace.force[:, Y], color=colour, ls=style, label=f"{name}: estimate")
+    axes.plot(time[found], push * trace.force[found, Y], marker, color=colour, mec="black", label=f"{name}: detected")
+
+
+def _listed(names: Sequence[str]) -> str:
+    *first, last = names or [""]
+    return f"{', '.join(first)} and {last}" if first else last

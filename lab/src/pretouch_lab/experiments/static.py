@@ -1,0 +1,261 @@
+"""Paper IV-A: the arm runs into a large static object, on a circle and on a line, from either side."""
+
+from collections.abc import Callable
+from itertools import product
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pretouch.sim.paper_scenes import static_path, static_scene
+from pretouch.sim.plant import Plant
+from pretouch.text_table import TextTable
+from pretouch.traces import mean_over
+from pretouch.types import ControlStep
+from pretouch_lab.experiment import Context, Drawing, Experiment, Trace, controllers, main
+from pretouch_lab.options import Options
+from pretouch_lab.run import Row
+from pretouch_lab.table import Column, peak, ratios, rounded, summary, table
+from pretouch_lab.trial import Record, play
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+NAME = "static"
+DEFAULT_RESTRICTIONS = "off"
+"""The paper "purposefully allows contact"; at Table I's values its restrictions forbid it."""
+TRAJECTORIES = ("circle", "line")
+SIDES = ("-y", "+y")
+
+_TIME_LIMIT_S = 40.0
+_AFTER_DETECTION_S = 1.0
+
+
+def cells(options: Options) -> list[Row]:
+    """All combinations of stiffness, trajectory, side and controller."""
+    return [
+        {"trajectory": trajectory, "side": side, "stiffness_n_per_m": stiffness, **controller}
+        for stiffness, trajectory, side, controller in product(
+            options.stiffness, TRAJECTORIES, SIDES, controllers(options, DEFAULT_RESTRICTIONS)
+        )
+    ]
+
+
+def trial(cell: Row, seed: int, context: Context) -> tuple[Row, Record]:
+    """Run one trial; return what is measured and what it left behind."""
+    trajectory, side, where = cell["trajectory"], cell["side"], context.placement
+    scene = static_scene(trajectory, side, cell["stiffness_n_per_m"], seed, where)
+    record = play(context.setup(cell, seed, scene, static_path(trajectory, side, where)), done_after_contact())
+    return results(record, -1.0 if side == "+y" else 1.0, context.model.links), record
+
+
+def done_after_contact() -> Callable[[ControlStep, Plant], bool]:
+    """End a while after the first reaction that a true contact caused, or at the time limit."""
+    detected: list[float] = []
+
+    def done(step: ControlStep, plant: Plant) -> bool:
+        if plant.touches and not detected and step.contact is not None:
+            detected.append(step.stamp)
+        over = bool(detected) and step.stamp >= detected[0] + _AFTER_DETECTION_S
+        return over or step.stamp >= _TIME_LIMIT_S
+
+    return done
+
+
+def results(record: Record, push: float, links: tuple[str, ...]) -> Row:
+    """Numbers of one trial; `push` is the sign of the force along y by which the object pushes the arm.
+
+    The impact speed is the true closing speed of the point of the arm that touches first.
+    """
+    touch = record.first_contact()
+    reactions = record.reactions()
+    row: Row = {
+        "contact": touch is not None,
+        "touched_link": None,
+        **dict.fromkeys(MEASURES),
+        "least_sensed_m": least_sensed(record),
+        "false_detections": sum(touch is None or s.stamp < touch for s in reactions),
+        "held": record.held(),
+    }
+    if touch is None:
+        return row
+    times, along = record.times(), push * record.forces()[:, 1]
+    true = np.linalg.norm(record.true_force, axis=1)
+    first = record.touches[0]
+    row["touched_link"] = links[first.link]
+    row["impact_speed_m_s"] = rounded(-push * float(first.velocity[1]), 4)
+    row["peak_estimate_n"] = rounded(peak(along[(times >= touch) & np.isfinite(along)]))
+    row["true_peak_n"] = rounded(peak(true))
+    row["true_peak_20ms_n"] = rounded(peak(mean_over(true, 20)))
+    detection = next((s for s in reactions if s.stamp >= touch), None)
+    if detection is not None:
+        row["detection_delay_s"] = rounded(detection.stamp - touch, 4)
+        row["filtered_at_detection_n"] = rounded(push * float(detection.filtered_force[1]))
+        row["raw_at_detection_n"] = rounded(push * float(detection.force[1]))
+    return row
+
+
+def least_sensed(record: Record) -> float | None:
+    """Least distance [m] of anything sensed from the arm's surface, None if nothing was sensed."""
+    least = min((float(s.obstacles.body_distance.min(initial=np.inf)) for s in record.steps), default=np.inf)
+    return rounded(least, 4) if np.isfinite(least) else None
+
+
+_FORCES = (
+    Column("impact\n[m/s]", "impact_speed_m_s", 3, band=True),
+    Column("delay\n[ms]", "detection_delay_s", 0, 1000.0, band=True),
+    Column("filtered\n[N]", "filtered_at_detection_n", 1, band=True),
+    Column("raw\n[N]", "raw_at_detection_n", 1, band=True),
+    Column("peak\n[N]", "peak_estimate_n", 1, band=True),
+    Column("true\n20 ms", "true_peak_20ms_n", 1, band=True),
+    Column("true\n[N]", "true_peak_n", 1, band=True),
+)
+MEASURES = tuple(column.key for column in _FORCES)
+_RATIOS = tuple(
+    Column(c.heading.split("\n")[0], f"{c.key}_ratio", 2, band=True) for c in _FORCES if "delay" not in c.key
+)
+_MEANING = {
+    "slowing-only": "slowing-only: eqs. 3-4 without F_obs.",
+    "thresholds-only": "thresholds-only: F_obs without eqs. 3-4.",
+    "paper-0.5m": "paper-0.5m: objects count within the 0.5 m of the paper's text instead of Table I's 0.8 m.",
+    "pretouch": "pretouch: slower where it has to be to brake in time, and contacts detected by the joint torques.",
+}
+_SHOWN_STIFFNESS = 25_000.0
+_UNSAID = ("off", "braking")
+"""Restriction modes that the title does not name: without rows, and the one `pretouch` always has."""
+
+
+def tables(rows: list[Row]) -> list[TextTable]:
+    """Show each place at one stiffness with ratios to `blind`, then what stiffness, profile and restrictions change."""
+    same = ("trajectory", "side", "stiffness_n_per_m", "seed")
+    every = [
+        row
+        | {
+            "detected": row["detection_delay_s"] is not None,
+            "where": f"{row['trajectory']} {row['side']}",
+            "object": f"{row['stiffness_n_per_m'] / 1000:g} N/mm",
+        }
+        for row in ratios(rows, {"profile": "blind"}, same, MEASURES, inverse=True)
+    ]
+    stiffness, mode, shown = shown_controllers(every)
+    named = [row for row in every if row["restrictions"] == mode[row["profile"]]]
+    made = _places([r for r in named if r["profile"] in shown and r["stiffness_n_per_m"] == stiffness])
+    profiles = {row["profile"] for row in every}
+    if len({row["object"] for row in every}) > 1 or len(profiles) > 2:
+        by_object = _summary(named, "profile", "object")
+        made += [
+            table(
+                "Static object, by stiffness and by what proximity is used for: all four places together",
+                (Column("profile\nobject", "profile", second="object"), *_FORCES),
+                by_object,
+                " ".join(text for name, text in _MEANING.items() if name in profiles),
+            ),
+            *_smaller("all four places together", "object", by_object),
+        ]
+    if len({(row["profile"], row["restrictions"]) for row in every}) > len(profiles):
+        sensing = [row for row in every if row["profile"] != "blind" and row["stiffness_n_per_m"] == stiffness]
+        made.append(
+            table(
+                f"Static object, {stiffness / 1000:g} N/mm, by restriction mode: all four places together",
+                _BY_MODE,
+                _summary(sensing, "profile", "restrictions"),
+                "Hit: trials with contact. Least: nearest that anything sensed came to the arm's surface in 40 s or"
+                " until contact, by what was sensed.",
+            )
+        )
+    return made
+
+
+_BY_MODE = (
+    Column("profile\nmode", "profile", second="restrictions"),
+    Column("hit", "contact", of="trials"),
+    Column("least\n[m]", "least_sensed_m", 3, band=True),
+    *_FORCES[:-1],
+)
+
+
+def _summary(rows: list[Row], *by: str) -> list[Row]:
+    spreads = (*MEASURES, *(f"{name}_ratio" for name in MEASURES), "least_sensed_m")
+    return summary(rows, by, spreads, ("contact", "detected", "false_detections"))
+
+
+def _places(rows: list[Row]) -> list[TextTable]:
+    """Show each place of the object at one stiffness and the ratios there."""
+    at_place = _summary(rows, "profile", "where", "object")
+    others = [mode for mode in dict.fromkeys(row["restrictions"] for row in rows) if mode not in _UNSAID]
+    title = "".join([f"Static object, {rows[0]['object']}", *(f", {mode} restrictions" for mode in others)])
+    return [
+        table(
+            f"{title}: medians, 10-90 % below",
+            (
+                Column("profile\nwhere", "profile", second="where"),
+                *_FORCES,
+                Column("detected", "detected", of="contact"),
+            ),
+            at_place,
+            "Impact: closing speed of the point that touches first. Delay: from the true force passing 1 N. Filtered"
+            " (eq. 8) and raw: the estimate at detection. Peak: of the estimate. True: peak of the true force, of its"
+            " 20 ms mean and of itself. Detected: of all contacts. False detections:"
+            f" {sum(row['false_detections'] for row in at_place)}.",
+        ),
+        *_smaller("at each place", "where", at_place),
+    ]
+
+
+def _smaller(where: str, second: str, groups: list[Row]) -> list[TextTable]:
+    """Show how many times smaller than those of `blind` speeds and forces are, if there is any to compare."""
+    compared = [row for row in groups if row["profile"] != "blind" and row["true_peak_n_ratio"]]
+    if not compared:
+        return []
+    note = "The paper finds forces about two times smaller with proximity; which force is meant decides the number."
+    columns = (Column("profile", "profile", second=second), *_RATIOS)
+    return [table(f"Times smaller than without proximity, {where}: medians, 10-90 % below", columns, compared, note)]
+
+
+def shown_controllers(rows: list[Row]) -> tuple[float, dict[str, str], list[str]]:
+    """Choose of many cells what to show in detail.
+
+    Returns:
+        A stiffness [N/m], the restriction mode of each profile (`off` if it has cells with that), and the names of one
+        to three profiles, `blind` first and `pretouch` last.
+    """
+    stiffnesses, profiles = (list(dict.fromkeys(row[key] for row in rows)) for key in ("stiffness_n_per_m", "profile"))
+    others = [name for name in profiles if name not in ("blind", "pretouch")]
+    shown = [name for name in ("blind", *others[:1], "pretouch") if name in profiles]
+    mode: dict[str, str] = {}
+    for row in rows:
+        if row["restrictions"] == "off" or row["profile"] not in mode:
+            mode[row["profile"]] = row["restrictions"]
+    stiffness = _SHOWN_STIFFNESS if _SHOWN_STIFFNESS in stiffnesses else stiffnesses[0]
+    return stiffness, mode, shown if "blind" in profiles else profiles[:1]
+
+
+def shown_cells(rows: list[Row]) -> list[Row]:
+    """Choose the trials of the figure: each place with up to three profiles."""
+    stiffness, mode, shown = shown_controllers(rows)
+    return [
+        row
+        for row in rows
+        if row["stiffness_n_per_m"] == stiffness
+        and row["profile"] in shown
+        and row["restrictions"] == mode[row["profile"]]
+    ]
+
+
+def draw(traces: list[Trace], _units: tuple[str, ...]) -> "Figure":
+    """Draw force and thresholds at each place."""
+    from pretouch_lab.experiments.figures import force_difference
+
+    by_place = {(cell["trajectory"], cell["side"], cell["profile"]): trace for cell, trace in traces}
+    return force_difference(by_place, list(dict.fromkeys(cell["profile"] for cell, _ in traces)))
+
+
+EXPERIMENT = Experiment(
+    NAME,
+    cells,
+    trial,
+    tables,
+    Drawing("force-difference", "Force and contact thresholds at the static object", shown_cells, draw, ("blind",)),
+    any_arm=True,
+)
+if __name__ == "__main__":
+    main(NAME)

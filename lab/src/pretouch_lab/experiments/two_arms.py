@@ -1,0 +1,311 @@
+"""Two arms that reach over one table with a person between: blind to each other, seen by the skin alone, or told."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from itertools import product
+
+import mujoco
+import numpy as np
+
+from pretouch.arms.other_arm import OtherArm
+from pretouch.control.path import WayPoints
+from pretouch.controller import Controller
+from pretouch.loop import Options as LoopOptions
+from pretouch.loop import turn
+from pretouch.profiles import Profile, profile
+from pretouch.robot.postures import brought_to, nearest_points
+from pretouch.sim.hand import Hand, HandGoal, PersonArm
+from pretouch.sim.plant import TOUCH_N, ArmInWorld, Plant, PlantClock
+from pretouch.sim.range_finder import RangeFinders
+from pretouch.sim.scene import BasePose, HandSpec, SceneSpec, fixtures
+from pretouch.text_table import TextTable
+from pretouch.types import ControlStep, FloatArray, MovingFixtures, RobotState
+from pretouch_lab.experiment import Context, Experiment, controllers, main
+from pretouch_lab.options import Options
+from pretouch_lab.run import Row
+from pretouch_lab.second_arm import SecondArm
+from pretouch_lab.table import Column, peak, rounded, summary, table
+from pretouch_lab.trial import SETTLE_S, Record
+
+NAME = "two-arms"
+DEFAULT_RESTRICTIONS = "slack"
+KNOWS = ("blind", "seen", "told")
+"""What each arm has of the other: units that see through it; units that take it for anything else; or its reported
+state, by which it is a fixture that moves."""
+_DURATION_S = 40.0
+_APART_S = 0.2
+"""A touch that begins sooner after the last one is the same [s]."""
+_OF_IT_M = 0.1
+"""A sensed point this near to the other arm, and no nearer to the person, shows the arm [m]: offset and noise of the
+units, and the beam's width."""
+APART = BasePose((1.1, 0.0, 0.0), np.pi)
+"""Where the second arm stands: across the table, face to face with the first."""
+BACK: FloatArray = np.asarray(np.linalg.inv(APART.T))
+"""Where the first stands in the base frame of the second (4, 4)."""
+_HOME_M, _REACH_M = np.array([0.35, 0.35, 0.35]), np.array([0.58, 0.0, 0.25])
+"""Where each arm comes from and what it reaches for, in its own base frame but for the sign of home's y: in the world
+both come from +y, and reach over the middle by 3 cm."""
+_RESTS_M = np.array([0.55, -0.8, 0.45])
+"""Where the person's hand waits."""
+_AIM_M = np.array([0.55, 0.0, 0.3])
+"""What it reaches for, within `_SPREAD_M`."""
+_SPREAD_M = 0.08
+_EVERY_S, _STAYS_S, _REACHING_S = 7.0, 1.5, 1.6
+"""Time between two visits, how long the hand stays, and how long it is on its way."""
+_FREE_N = 60.0
+"""Force a person moves the free hand with [N], as in the other experiments."""
+_SPEED_M_S = 0.5
+
+
+@dataclass
+class Reaches:
+    """A person who reaches between the arms again and again, whatever they do."""
+
+    begin: float
+    """When the first visit begins [s]."""
+    aims: FloatArray
+    """(V, 3) what each visit reaches for [m]."""
+
+    def goal(self, time: float, hand: FloatArray, plant: Plant) -> HandGoal:
+        """Reach, stay and withdraw, each visit with its own aim."""
+        visit, since = divmod(time - self.begin, _EVERY_S)
+        inside = time >= self.begin and visit < len(self.aims) and since < _REACHING_S + _STAYS_S
+        return HandGoal(self.aims[int(visit)] if inside else _RESTS_M, _FREE_N)
+
+
+def reaches(rng: np.random.Generator, duration: float) -> Reaches:
+    """Draw the visits of a trial."""
+    count = int(duration / _EVERY_S) + 1
+    return Reaches(5.0 + 3.0 * rng.uniform(), _AIM_M + _SPREAD_M * rng.uniform(-1, 1, (count, 3)))
+
+
+def way(side: float, share: float) -> WayPoints:
+    """Return the way from home to what is reached for and back, begun at a share of the way there."""
+    home, reach = _HOME_M * [1.0, side, 1.0], _REACH_M
+    points = [home, reach] if share == 0.0 else [home + share * (reach - home), reach, home]
+    return WayPoints(np.array(points), closed=True)
+
+
+@dataclass
+class Felt:
+    """What touched what, before each physics step."""
+
+    time: list[float] = field(default_factory=list)
+    arms_n: list[float] = field(default_factory=list)
+    """Force between the arms [N]."""
+    person_n: list[float] = field(default_factory=list)
+    """The larger of both arms' forces on the person [N]."""
+
+    def attach(self, first: Plant, second: SecondArm) -> None:
+        """Measure before each physics step."""
+        mj, data, wrench = first.mj_model, first.mj_data, np.zeros(6)
+        hand, bodies = int(mj.body("hand").id), np.arange(mj.nbody)
+        # 1 and 2 for the bodies of the arms, 0 for everything else
+        owner = np.where((bodies > 0) & (bodies < len(first.model.links)), 1, 0)
+        owner[second.first_body + 1 : second.first_body + len(second.model.links)] = 2
+
+        def measure(time: float) -> None:
+            between, on_person = np.zeros(3), np.zeros((3, 3))
+            for i in range(data.ncon):
+                contact = data.contact[i]
+                one, other = (int(mj.geom_bodyid[geom]) for geom in (contact.geom1, contact.geom2))
+                mujoco.mj_contactForce(mj, data, i, wrench)
+                force = contact.frame.reshape(3, 3).T @ wrench[:3]
+                if owner[one] and owner[other]:
+                    between += force if owner[one] < owner[other] else -force
+                elif hand in (one, other):
+                    on_person[owner[one] or owner[other]] += force if other == hand else -force
+            self.time.append(time)
+            self.arms_n.append(float(np.linalg.norm(between)))
+            self.person_n.append(float(np.linalg.norm(on_person[1:], axis=1).max()))
+
+        first.before_each_step(measure)
+
+
+@dataclass
+class Side:
+    """One of the two arms with its controller, and what it did."""
+
+    arm: ArmInWorld
+    units: RangeFinders
+    controller: Controller
+    other: OtherArm
+    """The arm across, seen from this one's base."""
+    reported: Callable[[], RobotState]
+    """Gives the newest state of that arm."""
+    told: bool
+    """Whether the controller is told."""
+    steps: list[ControlStep] = field(default_factory=list)
+    across: list[MovingFixtures] = field(default_factory=list)
+    """Where the other arm was at each step."""
+
+    def __post_init__(self) -> None:
+        self.robot = self.arm.read()
+        self._state = self.controller.init(self.robot)
+
+    def turn(self, tick: float) -> None:
+        """Let one control cycle pass at a tick [s], in which the other is known by its newest state."""
+        there = self.other.at(self.reported())
+        told = there if self.told else None
+        cycle = turn(self.controller, self._state, self.arm, self.units, tick, LoopOptions(moving=lambda: told))
+        self._state, self.robot = cycle.after, cycle.inputs.robot
+        self.steps.append(cycle.step)
+        self.across.append(there)
+
+
+@dataclass(frozen=True)
+class Played:
+    """What a trial left behind."""
+
+    sides: tuple[Side, Side]
+    felt: Felt
+    hand: FloatArray
+    """(S, 3) centre of the person's hand at each control step [m], base frame of the first arm."""
+
+
+def play(context: Context, profile: Profile, knows: str, seed: int, duration: float) -> Played:
+    """Run a trial; `knows` is what each arm has of the other: `blind`, `seen` or `told`."""
+    model, rng = context.model, np.random.default_rng([seed, 61])
+    ways = way(1.0, 0.0), way(-1.0, float(rng.uniform()))
+    person = reaches(rng, duration)
+    x, y, z = _RESTS_M.tolist()
+    second = SecondArm(model, APART, context.arm, seed + 1_000_000)
+    scene = SceneSpec(hand=HandSpec(start=(x, y, z)), second=second.spec)
+    first = Plant(model, scene, context.arm, brought_to(model, ways[0].point(0.0)), seed)
+    second.join(first, brought_to(model, ways[1].point(0.0)))
+    hand = Hand(first, person, PersonArm(speed_max=_SPEED_M_S))
+    felt = Felt()
+    felt.attach(first, second)
+    arms: tuple[ArmInWorld, ArmInWorld] = (first, second)
+    units = [
+        _mounted(arm, across, context, seed + 1_000_000 * i, knows == "blind")
+        for i, (arm, across) in enumerate(zip(arms, arms[::-1], strict=True))
+    ]
+    first.advance(SETTLE_S)
+    known, poses = fixtures(scene), (APART.T, BACK)
+    sides: list[Side] = []
+    for i, arm in enumerate(arms):
+        reported = _reported(sides, 1 - i)
+        other = OtherArm(model, poses[i], reported, known.capsules)
+        controller = Controller(model, context.skin, known, ways[i], profile)
+        sides.append(Side(arm, units[i], controller, other, reported, knows == "told"))
+    clock, hands = PlantClock(first, profile.task.control_period_s), []
+    while first.time < duration:
+        tick = clock.tick()
+        for side in sides:
+            side.turn(tick)
+        hands.append(hand.position.copy())
+    return Played((sides[0], sides[1]), felt, np.array(hands))
+
+
+def _reported(sides: list[Side], which: int) -> Callable[[], RobotState]:
+    return lambda: sides[which].robot
+
+
+def _mounted(arm: ArmInWorld, across: ArmInWorld, context: Context, seed: int, blind: bool) -> RangeFinders:
+    """Mount the units on an arm; blind ones see through the arm across, as through all that is transparent."""
+    mj = arm.mj_model
+    links = np.arange(across.first_body + 1, across.first_body + len(across.model.links))
+    of_it = np.isin(mj.geom_bodyid, links)
+    before = mj.geom_rgba[of_it, 3].copy()
+    if blind:
+        mj.geom_rgba[of_it, 3] = 0.0
+    units = RangeFinders(arm, context.skin, context.ranging, seed)
+    mj.geom_rgba[of_it, 3] = before
+    return units
+
+
+def cells(options: Options) -> list[Row]:
+    """Each profile that senses, blind to the other arm, with its skin alone, and told of it."""
+    return [
+        {"knows": knows, **controller}
+        for controller, knows in product(controllers(options, DEFAULT_RESTRICTIONS), KNOWS)
+        if profile(controller["profile"]).perception
+    ]
+
+
+def trial(cell: Row, seed: int, context: Context) -> tuple[Row, Record | None]:
+    """Run one trial; return what is measured."""
+    own = context.profile(cell)
+    played = play(context, own, cell["knows"], seed, _DURATION_S)
+    return results(played, own.task.speed_m_s * (_DURATION_S - played.sides[0].steps[0].stamp)), None
+
+
+def results(played: Played, asked: float) -> Row:
+    """Numbers of one trial, in which each arm was asked for a way of so many metres."""
+    time, arms, person = (np.array(part) for part in (played.felt.time, played.felt.arms_n, played.felt.person_n))
+    done = [side.steps[-1].path_phase / asked for side in played.sides]
+    hands = played.hand, _seen_from(BACK, played.hand)
+    return {
+        "arms": touches(time, arms),
+        "arms_peak_n": rounded(peak(arms), 1),
+        "person": touches(time, person),
+        "person_peak_n": rounded(peak(person), 1),
+        "done": rounded(float(np.mean(done)), 4),
+        "least_done": rounded(min(done), 4),
+        "taken_fraction": rounded(
+            float(np.mean([shows_other(side, hand) for side, hand in zip(played.sides, hands, strict=True)])), 4
+        ),
+        "reactions": sum(step.contact is not None for side in played.sides for step in side.steps),
+    }
+
+
+def touches(time: FloatArray, force: FloatArray) -> int:
+    """Count the touches in forces (T,) [N] at instants (T,) [s]."""
+    touching = time[force > TOUCH_N]
+    return int(len(touching) > 0) + int((np.diff(touching) > _APART_S).sum())
+
+
+def shows_other(side: Side, hand: FloatArray) -> float:
+    """Share of the steps in which a unit shows the other arm as an obstacle; `hand` (S, 3) is the person's [m]."""
+    units, found = len(side.controller.skin), 0
+    for step, across, at in zip(side.steps, side.across, hand, strict=True):
+        point = step.obstacles.point[step.obstacles.unit < units]
+        if len(point):
+            on_axis, of_point = nearest_points(across.a[None], across.b[None], point[:, None], point[:, None])
+            from_arm = (np.linalg.norm(on_axis - of_point, axis=-1) - across.radius).min(axis=1)
+            from_hand = np.linalg.norm(point - at, axis=1) - HandSpec.radius
+            found += bool(((from_arm < _OF_IT_M) & (from_arm < from_hand)).any())
+    return found / len(side.steps)
+
+
+def _seen_from(T: FloatArray, points: FloatArray) -> FloatArray:
+    """Bring points (S, 3) [m] into another frame by its pose T (4, 4)."""
+    return np.asarray(points @ T[:3, :3].T + T[:3, 3])
+
+
+_MEASURES = ("arms_peak_n", "person_peak_n", "done", "least_done", "taken_fraction", "reactions")
+_COLUMNS = (
+    Column("profile", "profile"),
+    Column("other arm", "knows"),
+    Column("arms\ntouch", "arms_touched", of="trials"),
+    Column("touches", "arms"),
+    Column("peak\n[N]", "arms_peak_n", 0),
+    Column("person\ntouched", "person_touched", of="trials"),
+    Column("touches", "person"),
+    Column("peak\n[N]", "person_peak_n", 0),
+    Column("way\n[%]", "done", 0, 100.0),
+    Column("slower\n[%]", "least_done", 0, 100.0),
+    Column("taken\n[%]", "taken_fraction", 1, 100.0),
+    Column("reactions", "reactions", 0),
+)
+
+
+def tables(rows: list[Row]) -> list[TextTable]:
+    """Show what touched what, and how much of the way was done."""
+    flagged = [row | {"arms_touched": row["arms"] > 0, "person_touched": row["person"] > 0} for row in rows]
+    totals = ("arms", "person", "arms_touched", "person_touched")
+    groups = summary(flagged, ("profile", "restrictions", "knows"), _MEASURES, totals)
+    note = (
+        "Blind: the units see through the other arm. Seen: they take it for anything that comes near. Told: its"
+        " reported joint positions make it a fixture that moves. Arms touch, person touched: trials with such a touch;"
+        " touches: in all trials together; peak: the largest force of a trial. Way: of what is asked in"
+        f" {_DURATION_S:g} s, the mean of both arms, and the slower of them. Taken: share of the steps in which a unit"
+        " shows the other arm as an obstacle. Reactions: to contacts, of both arms."
+    )
+    return [table("Two arms over one table, a person between: medians over the seeds", _COLUMNS, groups, note, 2)]
+
+
+EXPERIMENT = Experiment(NAME, cells, trial, tables)
+if __name__ == "__main__":
+    main(NAME)

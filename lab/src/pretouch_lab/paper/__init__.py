@@ -1,1 +1,0 @@
-"""The paper's three experiments, its claims, and its figures."""

@@ -1,1 +1,0 @@
-"""What the paper says of its method, measured: noise, anticipation, sensitivity."""

@@ -1,0 +1,264 @@
+"""Plays in any executor: a function of a cell and a seed gives a row, a line of a file that a later run continues.
+
+A folder holds `run.json`, which says of what its rows are (version, commit, arguments), and `rows.jsonl`, a row in each
+line. What is there is not played again; what another version or other arguments began is refused.
+"""
+
+import fcntl
+import json
+import os
+import shutil
+import signal
+import subprocess
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
+from contextlib import contextmanager
+from dataclasses import asdict, is_dataclass
+from itertools import islice
+from multiprocessing import active_children, get_context, parent_process
+from pathlib import Path
+from threading import Thread
+from typing import IO, Any
+
+from pretouch import __version__
+from pretouch.atomic_write import write_json
+from pretouch.errors import ExperimentError
+from pretouch.extras import Extra
+from pretouch.signals import kept_from_children, leave_to_parent, noted
+
+CLUSTER = Extra("cluster", ("distributed",), "cluster", "pretouch-lab")
+ROWS, RUN = "rows.jsonl", "run.json"
+_CONNECT_S = 10.0
+"""How long a scheduler has to answer [s]."""
+
+Row = dict[str, Any]
+"""What one play or several came to: plain values by their names."""
+Cell = Any
+"""What tells plays from others but the seed: a mapping, or a frozen dataclass, of plain values. All cells of a run have
+the same names."""
+Play = tuple[Cell, int]
+"""A cell and a seed."""
+
+
+def plays_of(cells: Iterable[Cell], seeds: Iterable[int]) -> list[Play]:
+    """Return all cells with each seed, seed by seed, so that a stopped run has some of each cell."""
+    every = list(cells)
+    return [(cell, seed) for seed in seeds for cell in every]
+
+
+def run(
+    trial: Callable[[Cell, int], Row],
+    plays: Iterable[Play],
+    out: Path,
+    executor: Executor | None = None,
+    at_once: int = os.cpu_count() or 1,
+    done: Callable[[], None] = lambda: None,
+) -> list[Row]:
+    """Play what is not in a folder yet, and return the rows of all plays, in their order.
+
+    Args:
+        trial: gives a row for a cell and a seed. A function of a module, or a `partial` of one, as it goes to workers.
+        plays: cells with their seeds, in the order in which they are begun.
+        out: the folder. However the run ends, rows of finished plays are in its `rows.jsonl`.
+        executor: plays them; None: this process, one after the other.
+        at_once: how many plays the executor has at a time.
+        done: called after each play.
+
+    Raises:
+        ExperimentError: for a worker that was killed, and for rows that cannot be read or written.
+    """
+    every = [(_plain(cell), cell, seed) for cell, seed in plays]
+    with _rows_in(out, tuple(every[0][0]) if every else ()) as (file, rows):
+        left = [(cell, seed) for names, cell, seed in every if _key(names, seed) not in rows]
+        for cell, seed, measured in _played(trial, left, executor, at_once):
+            line = json.dumps({**_plain(cell), "seed": seed, **measured}, allow_nan=False)
+            file.write(line.encode() + b"\n")
+            file.flush()
+            rows[_key(_plain(cell), seed)] = json.loads(line)
+            done()
+    return [rows[_key(names, seed)] for names, _, seed in every]
+
+
+def missing(plays: Iterable[Play], out: Path) -> int:
+    """Count the plays that are not in a folder yet."""
+    every = [(_plain(cell), seed) for cell, seed in plays]
+    with _rows_in(out, tuple(every[0][0]) if every else ()) as (_, rows):
+        return sum(_key(*each) not in rows for each in every)
+
+
+def _plain(cell: Cell) -> Row:
+    return asdict(cell) if is_dataclass(cell) and not isinstance(cell, type) else dict(cell)
+
+
+def _key(cell: Row, seed: int) -> str:
+    return json.dumps([cell, seed], sort_keys=True)
+
+
+@contextmanager
+def _rows_in(out: Path, names: tuple[str, ...]) -> Iterator[tuple[IO[bytes], dict[str, Row]]]:
+    """Open a folder's rows to read them and to append more: no other run may have them open.
+
+    A last line that was not written whole, by a process that was killed, is taken away.
+    """
+    place = out / ROWS
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        with place.open("a+b") as file:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise ExperimentError(f"Another run writes to {place}: let it end, or give another --out.") from None
+            file.seek(0)
+            *lines, torn = file.read().split(b"\n")
+            file.truncate(file.tell() - len(torn))
+            yield file, dict(_read(number, line, names, place) for number, line in enumerate(lines, 1))
+    except OSError as error:
+        raise ExperimentError(
+            f"Rows could not be kept in {out} ({error.strerror or error}): remove the cause, and the same command with"
+            " the same --out goes on; or give another --out."
+        ) from error
+
+
+def _read(number: int, line: bytes, names: tuple[str, ...], place: Path) -> tuple[str, Row]:
+    try:
+        row = json.loads(line)
+        return _key({name: row[name] for name in names}, row["seed"]), row
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
+        raise ExperimentError(
+            f"Line {number} of {place} is damaged ({error!r}): take the line out, or give another --out."
+        ) from error
+
+
+def _played(
+    trial: Callable[[Cell, int], Row], plays: list[Play], executor: Executor | None, at_once: int
+) -> Iterator[tuple[Cell, int, Row]]:
+    """Give each play with what it came to, as it comes."""
+    if executor is None:
+        for cell, seed in plays:
+            yield cell, seed, trial(cell, seed)
+        return
+    waiting = iter(plays)
+    running: dict[Future[Row], Play] = {}
+    try:
+        with noted(signal.SIGINT), kept_from_children():  # so that Ctrl-C finds no process half imported
+            running = {executor.submit(trial, *play): play for play in islice(waiting, at_once)}
+        while running:
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                measured = future.result()
+                cell, seed = running.pop(future)
+                yield cell, seed, measured
+                running |= {executor.submit(trial, *play): play for play in islice(waiting, 1)}
+    except BrokenExecutor as error:
+        played = " or ".join(f"{_plain(cell)} with seed {seed}" for cell, seed in running.values())
+        raise ExperimentError(
+            f"A worker process was killed, for want of memory perhaps, while it played {played}. All finished plays are"
+            " kept: the same command with the same --out goes on."
+        ) from error
+    finally:
+        for future in running:
+            future.cancel()
+
+
+@contextmanager
+def workers(processes: int | None = None, scheduler: str = "") -> Iterator[tuple[Executor | None, int]]:
+    """Give an executor, and how many plays it takes at once: `run(..., *workers)`.
+
+    Args:
+        processes: worker processes of this machine; None: one for each processor; 1: this process itself.
+        scheduler: address of a dask scheduler, `tcp://HOST:PORT`, whose workers play instead. They need this package in
+            the same version, and the folder of the results where streams or recordings are kept in it.
+    """
+    if processes is not None and processes < 1:
+        raise ExperimentError(f"The number of processes is {processes}: give 1 or more.")
+    if scheduler:
+        with _cluster(scheduler) as cluster:
+            yield cluster
+        return
+    count = processes or os.cpu_count() or 1
+    if count == 1:
+        yield None, 1
+        return
+    pool = ProcessPoolExecutor(count, mp_context=get_context("spawn"), initializer=_start)
+    try:
+        yield pool, count
+    except BaseException:
+        for process in active_children():
+            process.terminate()
+        pool.shutdown(wait=True, cancel_futures=True)
+        raise
+    pool.shutdown()
+
+
+@contextmanager
+def _cluster(scheduler: str) -> Iterator[tuple[Executor, int]]:
+    CLUSTER.need("--scheduler")
+    from distributed import Client, KilledWorker
+
+    try:
+        client = Client(scheduler, timeout=_CONNECT_S)
+    except (OSError, ValueError) as error:
+        raise ExperimentError(
+            f"No dask scheduler answers at {scheduler} ({error}): start one by `dask scheduler`, or leave it out."
+        ) from error
+    with client:
+        try:
+            # two for each thread, so that none waits while a row is on its way
+            yield client.get_executor(), 2 * sum(client.nthreads().values())
+        except KilledWorker as error:
+            raise ExperimentError(
+                f"A worker of the cluster was killed ({error}): the same command with the same --out goes on."
+            ) from error
+
+
+def _start() -> None:
+    """Leave Ctrl-C to the parent, which ends the workers in order; and do not outlive it if it is killed."""
+    leave_to_parent()
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
+
+
+def open_run(out: Path, arguments: Mapping[str, Any]) -> None:
+    """Make a folder for rows, or take one up that a run with the same arguments began.
+
+    Raises ExperimentError for a folder that cannot be used, or that other arguments, another version or another commit
+    of this package began.
+    """
+    wanted = json.loads(json.dumps({"version": __version__, "commit": commit(), **arguments}))
+    place = out / RUN
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        if not place.exists():
+            write_json(wanted, place)
+            return
+        before = json.loads(place.read_text(encoding="utf-8"))
+        if not isinstance(before, dict):
+            raise ValueError("it holds no object")
+    except OSError as error:
+        raise ExperimentError(f"The folder {out} cannot be used: {error.strerror}: give another --out.") from error
+    except (ValueError, RecursionError) as error:
+        raise ExperimentError(f"The file {place} is damaged ({error}): give another --out.") from error
+    other = [
+        f"{name} = {before.get(name)!r}, not {wanted.get(name)!r}"
+        for name in dict.fromkeys([*before, *wanted])
+        if before.get(name) != wanted.get(name)
+    ]
+    if other:
+        raise ExperimentError(
+            f"The folder {out} holds a run with {'; '.join(other)}: give another --out, or the arguments of that run."
+        )
+
+
+def commit() -> str | None:
+    """Return the commit of the clone that this package is in; None where it is in none."""
+    git, folder = shutil.which("git"), Path(__file__).parent
+    if git is None or not any((parent / ".git").exists() for parent in folder.parents):
+        return None
+    answer = subprocess.run([git, "rev-parse", "HEAD"], cwd=folder, capture_output=True, text=True, check=False)  # noqa: S603
+    return answer.stdout.strip() or None

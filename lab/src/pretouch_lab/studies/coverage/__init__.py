@@ -1,1 +1,0 @@
-"""Coverage of a skin: the postures it is averaged over, and the study that holds it against the simulation."""

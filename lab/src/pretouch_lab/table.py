@@ -1,0 +1,167 @@
+"""Rows as tables: groups, quantiles, exact bounds, ratios to a baseline, and columns that are declared as values."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.stats import binomtest, chi2, quantile_test
+
+from pretouch.text_table import TextTable
+from pretouch.types import FloatArray
+from pretouch_lab.run import Row
+
+
+def rounded(value: float, digits: int = 3) -> float:
+    """Round for a table; what is dropped is far below any error of the measure."""
+    return round(float(value), digits)
+
+
+def peak(values: FloatArray) -> float:
+    """Largest value, 0 of none."""
+    return float(values.max(initial=0.0))
+
+
+def spread(values: Iterable[float | None]) -> Row | None:
+    """Return median and 10-90 % of what is not None; None of none.
+
+    What did not end is infinite: quantiles are then the nearest of the values, and an infinite one is written None.
+    """
+    some = np.array([value for value in values if value is not None], np.float64)
+    if not len(some):
+        return None
+    quantiles = np.percentile(some, [50, 10, 90], method="nearest" if np.isinf(some).any() else "linear")
+    median, low, high = map(finite, quantiles)
+    return {"median": median, "p10": low, "p90": high, "n": len(some)}
+
+
+def finite(value: float) -> float | None:
+    """Return a number as JSON may hold it: what never ended is None."""
+    return rounded(value, 4) if np.isfinite(value) else None
+
+
+def grouped(rows: Iterable[Row], by: Sequence[str]) -> list[tuple[Row, list[Row]]]:
+    """Return rows that share the values of some names, each group with those values, in the order of their first."""
+    groups: dict[tuple[Any, ...], list[Row]] = {}
+    for row in rows:
+        groups.setdefault(tuple(row.get(name) for name in by), []).append(row)
+    return [(dict(zip(by, key, strict=True)), group) for key, group in groups.items()]
+
+
+def summary(rows: Iterable[Row], by: Sequence[str], spreads: Sequence[str], totals: Sequence[str] = ()) -> list[Row]:
+    """Return a row for each group: `trials`, spreads of measures, sums of counts and of flags. None counts in none."""
+    return [
+        {
+            **key,
+            "trials": len(group),
+            **{name: spread(row[name] for row in group) for name in spreads},
+            **{name: sum(row[name] or 0 for row in group) for name in totals},
+        }
+        for key, group in grouped(rows, by)
+    ]
+
+
+def ratios(
+    rows: Iterable[Row], to: Mapping[str, Any], same: Sequence[str], measures: Sequence[str], inverse: bool = False
+) -> list[Row]:
+    """Return rows with `NAME_ratio`: each measure as a part of that of its twin, None where either is None or zero.
+
+    Args:
+        rows: of trials.
+        to: values that tell the twins from the others.
+        same: names whose values a row and its twin share, the seed among them.
+        measures: names of what is compared.
+        inverse: how many times smaller than the twin's a measure is, in place of its part.
+    """
+    every = list(rows)
+    twins = {tuple(row[name] for name in same): row for row in every if to.items() <= row.items()}
+
+    def ratio(row: Row, twin: Row | None, name: str) -> float | None:
+        if twin is None or not row[name] or not twin[name]:
+            return None
+        return float(twin[name] / row[name] if inverse else row[name] / twin[name])
+
+    return [
+        row | {f"{name}_ratio": ratio(row, twins.get(tuple(row[key] for key in same)), name) for name in measures}
+        for row in every
+    ]
+
+
+def median_bounds(values: Sequence[float]) -> tuple[float, float]:
+    """95 % bounds on a median: those of the sorted values between which it lies, whatever they are distributed like."""
+    interval = quantile_test(values, p=0.5).confidence_interval(0.95)
+    low, high = float(interval.low), float(interval.high)
+    # of fewer than six values no two are sure to have it between them: their range is the most there is to say
+    return min(values) if np.isnan(low) else low, max(values) if np.isnan(high) else high
+
+
+def share_below(events: int, of: int) -> float:
+    """95 % upper bound on a share of which so many of so many were counted (Clopper and Pearson)."""
+    return float(binomtest(events, of).proportion_ci(0.95, "exact").high) if of else 1.0
+
+
+def rate_bounds(events: float, hours: float, dispersion: float = 1.0) -> tuple[float, float]:
+    """95 % bounds on a rate [1/h] of which `events` were counted in some hours: exact for a Poisson count (Garwood).
+
+    Where counts scatter `dispersion` times as much as Poisson counts do, so many events tell as much as one.
+    """
+    effective, time = events / dispersion, hours / dispersion
+    low = chi2.ppf(0.025, 2 * effective) / 2 if effective else 0.0
+    return float(low / time), float(chi2.ppf(0.975, 2 * effective + 2) / 2 / time)
+
+
+def dispersion_of(counts: Sequence[int]) -> float:
+    """Variance of counts by their mean, 1 for Poisson counts and taken as 1 where it is less or unknown."""
+    mean = float(np.mean(counts)) if counts else 0.0
+    return max(1.0, float(np.var(counts, ddof=1)) / mean) if len(counts) > 1 and mean > 0 else 1.0
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column of a table: which value of a row it shows, and how."""
+
+    heading: str
+    """With the unit."""
+    key: str
+    """Name of the value: a text, a number, or a `spread`, of which the median is shown."""
+    digits: int | None = None
+    """Behind the point; None: the value as it is."""
+    factor: float = 1.0
+    band: bool = False
+    """Whether 10-90 % of a spread stand below its median."""
+    of: str = ""
+    """Name of the whole that it is a count of."""
+    second: str = ""
+    """Name of a text that stands below it."""
+
+    def text(self, row: Row) -> str:
+        """Return its cell of a row: a dash for what there is not, `>` for what did not end."""
+        value = row[self.key]
+        shown = "-" if value is None else self._spread(value) if isinstance(value, dict) else self._number(value)
+        return shown + (f"/{row[self.of]}" if self.of else "") + (f"\n{row[self.second]}" if self.second else "")
+
+    def _spread(self, value: Row) -> str:
+        middle = self._number(value["median"])
+        if not self.band or (value["n"] == 1 and value["median"] is None):
+            return middle
+        high = value["p90"]
+        few = self.digits if high is None else 0 if self.factor * high >= 10 else min(self.digits or 0, 2)
+        return f"{middle}\n{self._number(value['p10'], few)}-{self._number(high, few)}"
+
+    def _number(self, value: Any, digits: int | None = None) -> str:
+        if value is None:
+            return ">"
+        digits = self.digits if digits is None else digits
+        # no minus before a zero
+        return str(value) if digits is None else f"{round(self.factor * value, digits) + 0.0:.{digits}f}"
+
+
+def table(title: str, columns: Sequence[Column], rows: Iterable[Row], note: str = "", names: int = 1) -> TextTable:
+    """Write each row in each column; the first `names` columns hold names."""
+    cells = tuple(tuple(column.text(row) for column in columns) for row in rows)
+    return TextTable(title, tuple(column.heading for column in columns), cells, note, names)
+
+
+def short(value: float) -> str:
+    """Write a number with two digits that count."""
+    return f"{value:.2g}" if value < 9.95 else f"{value:.0f}"

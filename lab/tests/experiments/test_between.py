@@ -1,0 +1,110 @@
+import json
+
+import numpy as np
+import pytest
+from lab.tests.width import width
+from tests.limits import assert_within_limits
+
+from pretouch.profiles import profile
+from pretouch_lab.experiments import between
+from pretouch_lab.experiments.figures import close_up
+from pretouch_lab.trial import trace_of
+
+MODES = {"blind": "off", "paper": "slack"}
+
+
+@pytest.fixture(scope="module")
+def trials(context):
+    cells = {name: {"profile": name, "restrictions": mode} for name, mode in MODES.items()}
+    trials = {name: between.trial(cell, 100, context) for name, cell in cells.items()}
+    return {name: (cells[name] | row, record) for name, (row, record) in trials.items()}
+
+
+def test_objects_on_both_sides_narrow_the_band_from_above_and_below(trials):
+    row, record = trials["paper"]
+    assert row["both_lowered"]
+    assert row["both_lowered_at_touch"]
+    # F_b + F_sigma is at least 10 N: narrower is nearness
+    assert row["upper_least_n"][1] < 8.0
+    assert row["lower_least_n"][1] < 9.5
+    assert row["upper_free_n"][1] > 10.0
+    limits = [s.thresholds for s in record.steps]
+    both = [t.obstacle_positive[1] > 0 and t.obstacle_negative[1] > 0 for t in limits]
+    assert 0 < row["both_lowered_s"] <= 0.01 * sum(both) + 1e-9
+
+
+def test_the_push_is_felt_and_goes_away_from_the_hand(trials):
+    row, record = trials["paper"]
+    assert row["contact"]
+    assert row["detected"]
+    assert 0 < row["detection_delay_s"] < row["push_s"] + 0.3
+    assert 6.0 < row["filtered_at_detection_n"] < row["raw_at_detection_n"]
+    hardest = record.true_force[np.linalg.norm(record.true_force, axis=1).argmax()]
+    assert hardest[1] > 0.8 * np.linalg.norm(hardest)
+
+
+def test_blind_narrows_nothing(trials, panda_model):
+    row, record = trials["blind"]
+    assert row["contact"]
+    assert not row["both_lowered"]
+    assert min(*row["upper_least_n"], *row["lower_least_n"]) >= 10.0
+    assert all(np.all(s.thresholds.obstacle_positive == 0) for s in record.steps)
+    for _, each in trials.values():
+        assert_within_limits(each, panda_model)
+
+
+def test_widths_are_those_of_the_steps(trials):
+    steps = trials["paper"][1].steps[200:230]
+    found = between.widths(steps)
+    for axis in range(3):
+        upper = [s.thresholds.upper[axis] - s.thresholds.mean[axis] for s in steps]
+        free = [w for w, s in zip(upper, steps, strict=True) if s.thresholds.obstacle_negative[axis] == 0]
+        assert found["upper_least_n"][axis] == pytest.approx(min(upper), abs=6e-4)
+        assert found["upper_free_n"][axis] == (pytest.approx(np.median(free), abs=6e-4) if free else None)
+    assert between.widths([]) == {name: [None, None, None] for name in found}
+
+
+def test_a_push_that_never_touched_has_no_results(trials):
+    row = between.results(trials["blind"][1], None)
+    assert row["contact"] is row["detected"] is False
+    assert row["detection_delay_s"] is row["both_lowered_at_touch"] is None
+    assert row["false_detections"] == len(trials["blind"][1].reactions())
+
+
+def test_body_and_hand_are_on_opposite_sides_and_move_with_the_seed():
+    planned = [between.interaction(seed) for seed in range(20)]
+    for body, push in planned:
+        assert 0.55 <= body.center[1] - body.half_size[1] <= 0.65
+        assert body.center[2] - body.half_size[2] == pytest.approx(-0.2)
+        assert push.inwards[1] < -0.9
+        assert 15.0 <= push.force <= 30.0
+        assert 5.0 <= push.start <= 7.0
+    assert len({body.center for body, _ in planned}) == len({push.force for _, push in planned}) == 20
+
+
+def test_summary_and_table_count_what_the_rows_say(trials):
+    rows = [json.loads(json.dumps(row, allow_nan=False)) for row, _ in trials.values()]
+    (table,) = between.tables([*rows, {**rows[1], "detected": False, "detection_delay_s": None}])
+    assert [row[0] for row in table.rows] == ["blind", "paper"]
+    assert table.rows[1][2] == f"{rows[1]['upper_least_n'][1]:.1f}"
+    assert table.rows[0][5:7] == ("0/1", "0/1")
+    assert table.rows[1][5:9] == ("2/2", "2/2", "1/2", f"{1000 * rows[1]['detection_delay_s']:.0f}")
+    assert width(table) <= 80
+
+
+def test_a_trace_has_what_each_unit_showed_and_the_close_up_the_touch_and_both_bounds(trials, paper_skin):
+    row, record = trials["paper"]
+    trace = trace_of(record)
+    for step, points in zip(record.steps[::20], trace.sensed_point[::20], strict=True):
+        shown = np.full((7, 3), np.nan)
+        shown[step.obstacles.unit] = step.obstacles.point
+        np.testing.assert_array_equal(points, shown)
+    top, bottom = close_up(trace, paper_skin.ids, profile("paper")).axes
+    low, high = bottom.get_xlim()
+    touch = next(s.stamp for s in record.reactions()) - row["detection_delay_s"]
+    assert low == pytest.approx(touch - 4.0, abs=0.02)
+    assert high == pytest.approx(touch + 2.5, abs=0.02)
+    drawn = {line.get_label(): line.get_ydata() for line in bottom.lines}
+    np.testing.assert_array_equal(drawn["thresholds"], trace.upper[:, 1])
+    np.testing.assert_array_equal(drawn["thresholds without F_obs"], trace.upper[:, 1] + trace.obstacle_negative[:, 1])
+    assert "both bounds lowered" in [patch.get_label() for patch in top.patches]

@@ -1,0 +1,158 @@
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from pretouch import cli
+from pretouch.profiles import profile
+from pretouch.recording.run_record import MODES, RunRecord, TrueForces
+from pretouch.types import Contact, Mode
+from pretouch_lab import trial
+from pretouch_lab.cli.commands import draw_figure
+from pretouch_lab.experiments import between, figures
+from pretouch_lab.experiments.figures import circle, close_up, force_difference, interaction
+
+S, UNITS = 400, tuple("abcdefg")
+PAPER = profile("paper")
+TOUCHED, DETECTED = slice(300, 320), 305
+
+
+def made_trace() -> RunRecord:
+    """Four seconds at rest at y = 0.2: an object at y = 0.6 from 1 s to 2 s, and a push of 20 N along +y at 3 s."""
+    zeros = np.zeros((S, 3))
+    points = np.full((S, 7, 3), np.nan)
+    points[100:200, 1] = [0.5, 0.6, 0.3]
+    ranges = np.where(np.isfinite(points[:, :, 0]), 0.3, np.nan)
+    scale, true, reacting = np.ones(S), zeros.copy(), np.zeros(S, bool)
+    scale[100:200], scale[200:250] = 0.5, 0.8
+    true[TOUCHED, 1] = 20.0
+    reacting[DETECTED:350] = True
+    place = np.tile([0.5, 0.2, 0.3], (S, 1))
+    thresholds = np.broadcast_to(np.array([8.0, -9.0, 0.0, 0.0, 1.0, 2.0])[:, None], (S, 6, 3))
+    found = Contact(np.array([0.0, 20.0, 0.0]), np.array([False, True, False]))
+    return RunRecord(
+        time=0.01 * np.arange(S), mode=np.where(reacting, MODES.index(Mode.REACT), MODES.index(Mode.TRACK)),
+        ee_position=place, ee_velocity=zeros, path_position=place, speed_scale=scale, range_distance=ranges,
+        sensed_point=points, force=true, filtered_force=0.5 * true, thresholds=thresholds, armed=np.ones(S, bool),
+        evidence=np.zeros(S), contacts=((DETECTED, found, 0.1),), truth=TrueForces(0.01 * np.arange(S), true),
+    )  # fmt: skip
+
+
+@cache
+def drawn():
+    trace = made_trace()
+    pairs = {(t, s, p): trace for t in ("circle", "line") for s in ("-y", "+y") for p in ("blind", "paper")}
+    return {
+        "circle": circle(trace, PAPER),
+        "interaction": interaction(trace, UNITS, PAPER),
+        "close-up": close_up(trace, UNITS, PAPER),
+        "force-difference": force_difference(pairs, ["paper"]),
+    }
+
+
+def line(axes, label):
+    return next(found for found in axes.lines if found.get_label() == label)
+
+
+@pytest.mark.parametrize("name", ["circle", "interaction", "close-up", "force-difference"])
+def test_every_axis_says_its_unit(name):
+    figure = drawn()[name]
+    said = [figure.get_supxlabel(), figure.get_supylabel()] if figure.get_supxlabel() else []
+    for axes in figure.axes if not said else []:
+        said += [axes.get_ylabel(), *([axes.get_xlabel()] if axes.get_xlabel() else [])]
+    assert said
+    assert all("[" in words for words in said)
+
+
+def test_runs_of_flags():
+    assert figures.spans(np.array([False, True, True, False, True])) == [(1, 3), (4, 5)]
+    assert figures.spans(np.zeros(3, bool)) == []
+
+
+def test_what_is_near_counts_from_the_end_effector():
+    # 0.4 m from the end-effector's origin
+    assert figures.near(made_trace(), 0.41).nonzero()[0].tolist() == list(range(100, 200))
+    assert not figures.near(made_trace(), 0.39).any()
+
+
+def test_the_circle_is_red_while_something_is_sensed_and_green_until_it_is_free():
+    plane = drawn()["circle"].axes[0]
+    shown = {
+        name: np.flatnonzero(np.isfinite(line(plane, name).get_xdata())) for name in ("free", "avoidance", "recovery")
+    }
+    assert shown["avoidance"].tolist() == list(range(100, 200))
+    assert shown["recovery"].tolist() == list(range(200, 250))
+    assert shown["free"].tolist() == [*range(100), *range(250, S)]
+    objects = line(plane, "sensed objects")
+    assert set(zip(objects.get_xdata(), objects.get_ydata(), strict=True)) == {(0.6, 0.3)}
+    assert line(plane, "avoidance").get_color() == "tab:red"
+    assert line(plane, "recovery").get_color() == "tab:green"
+
+
+def test_the_interaction_shades_slowed_and_touched_spans_and_names_the_push():
+    top, middle, bottom = drawn()["interaction"].axes
+    for axes in (top, middle, bottom):
+        spans = {patch.get_label(): (patch.get_x(), patch.get_width()) for patch in axes.patches}
+        assert spans["slowed"] == pytest.approx((1.0, 1.5))
+        assert spans["contact and reaction"] == pytest.approx((3.0, 0.5))
+    assert [text.get_text() for text in middle.texts] == ["pushed +y"]
+    assert line(top, "activation, d_max 0.8 m").get_ydata() == [0.8, 0.8]
+    assert line(middle, "detected").get_xdata() == pytest.approx([3.05])
+
+
+def test_the_close_up_of_a_trace_without_a_touch_shows_all_of_it():
+    trace = replace(made_trace(), truth=None)
+    assert close_up(trace, UNITS, PAPER).axes[1].get_xlim() == (0.0, 3.99)
+
+
+def test_the_force_difference_counts_from_the_touch_away_from_the_object():
+    against, along = (drawn()["force-difference"].axes[i] for i in (1, 0))
+    for axes, sign in ((along, 1.0), (against, -1.0)):
+        estimate = line(axes, "blind: estimate")
+        assert estimate.get_xdata()[300] == 0.0
+        assert estimate.get_ydata()[300] == sign * 20.0
+        assert line(axes, "paper: detected").get_xdata() == pytest.approx([0.05])
+    assert force_difference({}, ["paper"]).axes[0].lines[:] == []
+    alone = force_difference({("circle", "-y", "blind"): made_trace()}, ["blind"])
+    assert alone.get_suptitle().endswith("thresholds, blind")
+    assert len(alone.axes[0].get_legend_handles_labels()[1]) <= 4
+
+
+def test_a_figure_is_written_here_by_its_name_of_trials_that_are_played_and_told(tmp_path, monkeypatch, capsys):
+    played = []
+
+    def play(cell, seed, _context):
+        played.append((cell, seed))
+        return {}, cell
+
+    monkeypatch.setattr(between, "EXPERIMENT", replace(between.EXPERIMENT, trial=play))
+    monkeypatch.setattr(trial, "trace_of", lambda _record: made_trace())
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["figure", "close-up", "--profile", "paper-0.5m", "--seed", "4"]) == 0
+    text = capsys.readouterr()
+    assert text.err == "Playing paper-0.5m, slack with seed 4.\n"
+    assert text.out == "Figure: close-up.png\n"
+    assert [path.name for path in tmp_path.iterdir()] == ["close-up.png"]
+    assert played == [({"profile": "paper-0.5m", "restrictions": "slack"}, 4)]
+    draw_figure("close-up", tmp_path / "x.svg")
+    assert "<svg" in (tmp_path / "x.svg").read_text()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["circle", "interaction", "close-up", "force-difference"])
+def test_each_figure_is_drawn_from_trials_it_plays(tmp_path, name):
+    draw_figure(name, tmp_path / "x.png", seed=102)
+    with Image.open(tmp_path / "x.png") as picture:
+        assert np.asarray(picture.convert("L")).std() > 10
+
+
+def test_figures_of_a_detector_without_thresholds_show_none():
+    ours = profile("pretouch")
+    for figure in (interaction(made_trace(), UNITS, ours), close_up(made_trace(), UNITS, ours)):
+        labels = [text for axes in figure.axes for text in axes.get_legend_handles_labels()[1]]
+        assert "bands of one sample" in labels
+        assert not {"thresholds", "thresholds without F_obs", "value of eq. 8"} & set(labels)
+        force = next(axes for axes in figure.axes if "force" in axes.get_ylabel())
+        assert line(force, "detected").get_ydata().tolist() == [20.0]

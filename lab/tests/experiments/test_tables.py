@@ -1,0 +1,111 @@
+"""The tables of the paper's three experiments, by rows by hand."""
+
+from lab.tests.width import width
+
+from pretouch_lab.experiment import controller_named
+from pretouch_lab.experiments import avoidance, dynamic, static
+from pretouch_lab.experiments.static import shown_controllers
+
+
+def static_row(profile, seed, peak, **changes):
+    return {
+        "trajectory": "circle",
+        "side": "-y",
+        "stiffness_n_per_m": 25e3,
+        "profile": profile,
+        "restrictions": "off",
+        "seed": seed,
+        "contact": True,
+        **dict.fromkeys(static.MEASURES, 40.0),
+        "impact_speed_m_s": 0.2,
+        "detection_delay_s": 0.05,
+        "peak_estimate_n": peak,
+        "least_sensed_m": 0.05,
+        "false_detections": 0,
+    } | changes
+
+
+def missed(profile, seed, **changes):
+    return static_row(profile, seed, None, contact=False, **dict.fromkeys(static.MEASURES), **changes)
+
+
+def test_the_static_table_shows_medians_and_ratios_to_the_trial_of_the_same_seed():
+    rows = [static_row("blind", 0, 80.0), static_row("blind", 1, 90.0), static_row("paper", 0, 20.0)]
+    rows += [static_row("paper", 1, 30.0), missed("paper", 2)]
+    places, smaller = static.tables(rows)
+    assert [row[0] for row in places.rows] == ["blind\ncircle -y", "paper\ncircle -y"]
+    assert places.rows[0][1:3] == ("0.200\n0.20-0.20", "50\n50-50")
+    assert [row[5] for row in places.rows] == ["85.0\n81-89", "25.0\n21-29"], "what is missing is not averaged"
+    assert [row[-1] for row in places.rows] == ["2/2", "2/2"]
+    assert smaller.rows == (
+        ("paper\ncircle -y", *["1.00\n1.00-1.00"] * 3, "3.50\n3.10-3.90", *["1.00\n1.00-1.00"] * 2),
+    )
+
+
+def test_ratios_are_of_the_same_place_and_stiffness_and_pooled_by_stiffness():
+    places = [("circle", "-y", 2e3), ("circle", "-y", 25e3), ("line", "-y", 25e3)]
+    rows = []
+    for i, (trajectory, side, stiffness) in enumerate(places):
+        where = {"trajectory": trajectory, "side": side, "stiffness_n_per_m": stiffness}
+        rows += [static_row("blind", 0, 20.0 * (i + 2), **where), static_row("paper", 0, 20.0, **where)]
+    at_place, smaller, pooled, pooled_smaller = static.tables(rows)
+    assert len(at_place.rows) == 4
+    assert [row[4] for row in smaller.rows] == ["3.00\n3.00-3.00", "4.00\n4.00-4.00"]
+    assert [row[0] for row in pooled.rows] == ["blind\n2 N/mm", "paper\n2 N/mm", "blind\n25 N/mm", "paper\n25 N/mm"]
+    assert [row[4] for row in pooled_smaller.rows] == ["2.00\n2.00-2.00", "3.50\n3.10-3.90"]
+
+
+def test_more_of_a_grid_is_shown_in_more_tables():
+    rows = [static_row(name, 0, 20.0) for name in ("blind", "paper", "slowing-only")]
+    rows.append(missed("paper", 0, restrictions="hard"))
+    made = static.tables(rows)
+    places, _, by_use, _, by_mode = made
+    assert [row[0].split("\n")[0] for row in places.rows] == ["blind", "paper"]
+    assert [row[0].split("\n")[0] for row in by_use.rows] == ["blind", "paper", "slowing-only"]
+    assert [row[:2] for row in by_mode.rows] == [
+        ("paper\noff", "1/1"),
+        ("slowing-only\noff", "1/1"),
+        ("paper\nhard", "0/1"),
+    ]
+    for table in made:
+        assert width(table) <= 80
+        assert all(len(row) == len(table.header) for row in table.rows)
+    (table,) = static.tables(rows[3:])
+    assert "hard restrictions" in table.title
+    assert table.rows[0][-1] == "0/0"
+
+
+def test_blind_one_other_with_restrictions_off_and_pretouch_are_shown_in_detail_and_several_modes_are_named():
+    def cell(profile, restrictions, stiffness=25e3):
+        return {"profile": profile, "restrictions": restrictions, "stiffness_n_per_m": stiffness}
+
+    many = [cell("paper", "hard"), cell("paper", "off"), cell("slowing-only", "off"), cell("blind", "off")]
+    modes = {"paper": "off", "slowing-only": "off", "blind": "off"}
+    assert shown_controllers(many) == (25e3, modes, ["blind", "paper"])
+    three = shown_controllers([*many, cell("pretouch", "braking"), cell("other", "off")])
+    assert three[2] == ["blind", "paper", "pretouch"]
+    assert shown_controllers([cell("blind", "off", 2e3)])[::2] == (2e3, ["blind"])
+    cells = [cell("paper", "hard"), cell("paper", "slack"), cell("blind", "off")]
+    assert shown_controllers(cells[1::-1])[1:] == ({"paper": "slack"}, ["paper"])
+    assert [each["controller"] for each in controller_named(cells)] == ["paper\nhard", "paper\nslack", "blind"]
+    chosen = static.shown_cells([static_row("blind", 0, 1.0), static_row("paper", 0, 1.0, restrictions="hard")])
+    assert [row["profile"] for row in chosen] == ["blind", "paper"]
+
+
+def test_pushes_of_all_trials_are_pooled():
+    push = {"detected": True, "delay_s": 0.06, "direction_error_deg": 4.0, "reaction_towards_person": False}
+    unfelt = dict.fromkeys(("delay_s", "direction_error_deg")) | {"detected": False, "reaction_towards_person": True}
+    trial = {"profile": "paper", "restrictions": "slack", "peak_estimate_n": 30.0, "false_detections": 1}
+    rows = [trial | {"contacts": [push, unfelt]}, trial | {"contacts": [push | {"delay_s": 0.08}]}]
+    (table,) = dynamic.tables(rows)
+    assert table.rows == (("paper", "2/3", "70", "4.0", "30.0", "1", "2"),)
+
+
+def test_the_table_of_hands_is_by_place_and_profile():
+    row = {"place": "beside", "profile": "paper", "restrictions": "slack", "contact": False, "true_peak_n": 0.0}
+    row |= {"least_gap_m": 0.03, "deviation_m": 0.02, "least_speed_scale": 0.5, "travelled_m": 8.0}
+    rows = [row | {"false_detections": 0}, row | {"place": "inside", "contact": True, "false_detections": 1}]
+    (table,) = avoidance.tables(rows)
+    assert table.rows[0] == ("beside", "paper", "0/1", "0.0", "0.030", "0.020", "0.50", "8.00", "0")
+    assert table.rows[1][:3] == ("inside", "paper", "1/1")
+    assert width(table) <= 80

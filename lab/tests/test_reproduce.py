@@ -1,0 +1,110 @@
+"""What a reproduction is made of: cells, options, recordings, and all of the paper."""
+
+import re
+from dataclasses import replace
+from itertools import product
+
+import pytest
+
+from pretouch import cli
+from pretouch.errors import ExperimentError, SkinError
+from pretouch.sensing.skin import PAPER_SKIN
+from pretouch_lab import experiment as lab_experiment
+from pretouch_lab.cli.commands import whole_paper
+from pretouch_lab.experiment import NAMES, arguments, controllers, experiment, play, recording_file
+from pretouch_lab.experiments import static
+from pretouch_lab.options import Options
+from pretouch_lab.run import open_run
+
+SENSING = [("paper", "slack"), ("pretouch", "braking")]
+CELLS = {
+    "avoidance": ([("blind", "off"), *SENSING], "place", ["beside", "inside"]),
+    "two-arms": (SENSING, "knows", ["blind", "seen", "told"]),
+}
+"""Of some experiments: profiles with restriction modes, and what is varied for each of them."""
+
+
+@pytest.mark.parametrize("name", CELLS)
+def test_cells_are_all_values_for_each_controller_that_the_experiment_is_about(name):
+    cells = experiment(name).cells(Options(profiles=("blind", "paper", "pretouch")))
+    pairs, varied, values = CELLS[name]
+    expected = [(profile, mode, value) for (profile, mode), value in product(pairs, values)]
+    assert sorted((cell["profile"], cell["restrictions"], cell[varied]) for cell in cells) == sorted(expected)
+
+
+def test_each_profile_has_its_modes():
+    def pairs(own, **options):
+        return [tuple(cell.values()) for cell in controllers(Options(**options), own)]
+
+    profiles = ("blind", "paper", "paper:approach.rows=floor")
+    assert pairs("off", profiles=profiles, restrictions=("slack", "hard")) == [
+        ("blind", "off"), ("paper", "slack"), ("paper", "hard"), ("paper:approach.rows=floor", "floor"),
+    ]  # fmt: skip
+    assert pairs("slack", profiles=("paper",)) == [("paper", "slack")]
+
+
+def test_plays_are_all_cells_seed_by_seed_and_their_recordings_differ(tmp_path):
+    odd = ("blind", "paper", "paper:approach.beta=-10", "paper:window.alpha=0.3", "paper:approach.slack_weight=1e+3")
+    for name in NAMES:
+        plays = experiment(name).plays(Options(2, 3, odd, ("off", "hard"), (2e3, 25e3)))
+        assert [seed for _, seed in plays] == [3] * (len(plays) // 2) + [4] * (len(plays) // 2)
+        files = {recording_file(tmp_path, *each).name for each in plays}
+        assert len(files) == len(plays)
+        assert all(re.fullmatch(r"[A-Za-z0-9._-]+", file) for file in files)
+
+
+def test_the_whole_paper_runs_every_experiment_and_no_trial_twice():
+    plays = [
+        (name, str(cell), seed) for _, name, o in whole_paper(Options(2)) for cell, seed in experiment(name).plays(o)
+    ]
+    assert len(plays) == len(set(plays))
+    assert {name for name, _, _ in plays} == set(NAMES)
+    parts = whole_paper(Options(1, profiles=("paper",), restrictions=("slack",), stiffness=(2e3,)))
+    assert len({where for where, _, _ in parts}) == len(parts)
+    cells = [cell for _, name, options in parts if name == "static" for cell in static.cells(options)]
+    found = [(cell["profile"], cell["restrictions"], cell["stiffness_n_per_m"]) for cell in cells]
+    assert found == [("paper", "slack", 2e3)] * 4
+
+
+@pytest.mark.parametrize("own", [True, False])
+def test_a_changed_skin_file_is_noticed(tmp_path, monkeypatch, own):
+    file, out = tmp_path / "skin.toml", tmp_path / "out"
+    file.write_bytes(PAPER_SKIN.read_bytes())
+    monkeypatch.setattr(lab_experiment, "skin_file", lambda _arm: file)
+    options = Options(1, skin=str(file) if own else "")
+    open_run(out, arguments("static", options))
+    open_run(out, arguments("static", options))
+    file.write_bytes(PAPER_SKIN.read_bytes().replace(b"-0.108", b"-0.109"))
+    with pytest.raises(ExperimentError, match=r"holds a run with skin_sha256 = .*: give another --out"):
+        open_run(out, arguments("static", options))
+    file.unlink()
+    with pytest.raises(SkinError, match="cannot be read: No such file"):
+        arguments("static", options)
+
+
+@pytest.mark.parametrize(("record", "kept"), [("first", [0]), ("all", [0, 1])])
+def test_the_trials_that_are_wanted_are_recorded(tmp_path, monkeypatch, record, kept):
+    def played(_cell, seed, context):
+        if context.recording:
+            context.recording.write_text(str(seed))
+        return {"measured": seed}, None
+
+    monkeypatch.setattr(static, "EXPERIMENT", replace(static.EXPERIMENT, trial=played))
+    options = Options(2, record=record)
+    cell = static.cells(options)[0]
+    (tmp_path / "recordings").mkdir()
+    recording_file(tmp_path, cell, 0).with_suffix(".unfinished").write_text("of a killed worker")
+    assert [play("static", options, tmp_path, cell, seed)["measured"] for seed in (0, 1)] == [0, 1]
+    assert [seed for seed in (0, 1) if recording_file(tmp_path, cell, seed).exists()] == kept
+    assert recording_file(tmp_path, cell, 0).read_text() == "0"
+    assert len(list((tmp_path / "recordings").iterdir())) == len(kept)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_each_experiment_can_be_run_alone(name, monkeypatch):
+    words = []
+    monkeypatch.setattr(cli, "main", lambda args: words.append(args) or 3)
+    monkeypatch.setattr("sys.argv", ["python", "--seeds", "1"])
+    with pytest.raises(SystemExit, match="3"):
+        lab_experiment.main(name)
+    assert words == [["reproduce", name, "--seeds", "1"]]
