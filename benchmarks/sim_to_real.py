@@ -28,8 +28,7 @@ from pretouch.types import Obstacles, RobotState
 from pretouch_lab.identification.arm_file import arm_toml
 from pretouch_lab.identification.free_motion import read_free_motion
 from pretouch_lab.identification.identify import identify
-from pretouch_lab.identification.params import usual_of
-from pretouch_lab.identification.samples import ArmSamples
+from pretouch_lab.identification.samples import ArmSamples, usual_of
 from pretouch_lab.replay import DetectorAlone
 from pretouch_lab.trial import Setup, play
 

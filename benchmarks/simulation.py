@@ -19,7 +19,7 @@ from pretouch.sensing.skin import paper_skin
 from pretouch.sim.hand import Pusher
 from pretouch.sim.paper_scenes import dynamic_pushes
 from pretouch.sim.scene import HandSpec, SceneSpec
-from pretouch_lab.benchmarks.workload import Workload
+from pretouch_lab.bench.workload import Workload
 from pretouch_lab.trial import Setup, play
 
 CASES = ((7, False, ""), (32, False, ""), (7, True, ""), (32, True, ""), (7, True, "hard"), (32, True, "hard"))

@@ -2,7 +2,7 @@ import re
 from pathlib import Path
 
 from pretouch_lab.experiment import NAMES
-from pretouch_lab.sweep.streams import MEASURES
+from pretouch_lab.sweep.measures import MEASURES
 
 DOCS = Path(__file__).parents[2] / "docs"
 

@@ -8,10 +8,8 @@ from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.range_finder import RangeFinderParams
-from pretouch_lab.benchmarks.avoidance.run import AvoidanceBench
-from pretouch_lab.benchmarks.detection.campaign import DetectionBench
-from pretouch_lab.cli.benchmarks import BenchOptions
-from pretouch_lab.domain_randomisation import Parts, digest_of, folder_part, randomised, sentence
+from pretouch_lab.cli.benchmarks import BenchOptions, begin
+from pretouch_lab.domain_randomisation import Parts, folder_part, randomised, sentence
 from pretouch_lab.experiment import arguments, context_of
 from pretouch_lab.experiments import static
 from pretouch_lab.options import Options
@@ -24,7 +22,6 @@ PARTS = Parts(PlantParams(), RangeFinderParams(), paper_skin(MODEL), None)
 def test_without_a_world_nothing_changes():
     assert randomised("", 1001, MODEL, PARTS) is PARTS
     assert folder_part("") == sentence("") == ""
-    assert digest_of("") == {}
 
 
 def test_a_world_changes_arm_sensors_and_what_is_believed_of_the_skin():
@@ -51,10 +48,9 @@ def test_runs_of_two_worlds_do_not_share_a_folder(tmp_path):
     open_run(tmp_path / "a", arguments("static", Options()))
     with pytest.raises(ExperimentError, match="holds a run with world = '', not 'stress'"):
         open_run(tmp_path / "a", arguments("static", Options(world="stress")))
-    for kind in (DetectionBench, AvoidanceBench):
-        kind(tmp_path / kind.name, world="stress").open()
-        with pytest.raises(ExperimentError, match="holds a run with world = 'stress', not ''"):
-            kind(tmp_path / kind.name).open()
+    begin(BenchOptions(world="stress"), "detection", tmp_path / "b")
+    with pytest.raises(ExperimentError, match="holds a run with world = 'stress', not ''"):
+        begin(BenchOptions(), "detection", tmp_path / "b")
 
 
 def test_a_world_file_that_changed_is_another_world(tmp_path):

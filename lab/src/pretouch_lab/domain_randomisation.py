@@ -56,11 +56,6 @@ def folder_part(name: str) -> str:
     return f"-{safe}-{sha256(name.encode()).hexdigest()[:6]}"
 
 
-def digest_of(name: str) -> dict[str, str]:
-    """Return the digest of what a name stands for, by the phrase that a run's own file has for it; nothing of none."""
-    return {"the world's file has": world_set(name).digest} if name else {}
-
-
 def sentence(name: str) -> str:
     """Say with which set something was played, or nothing of the usual arm."""
     return (

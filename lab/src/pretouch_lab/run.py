@@ -211,7 +211,7 @@ def _cluster(scheduler: str) -> Iterator[tuple[Executor, int]]:
 
 
 def _start() -> None:
-    """Leave Ctrl-C to the parent, which ends the workers in order; and do not outlive it if it is killed."""
+    """Leave a terminal's signals, Ctrl-Z too, to the parent, which ends the workers; do not outlive it if killed."""
     leave_to_parent()
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     Thread(target=_end_with_parent, daemon=True).start()

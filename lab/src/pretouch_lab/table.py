@@ -128,7 +128,7 @@ class Column:
     """Behind the point; None: the value as it is."""
     factor: float = 1.0
     band: bool = False
-    """Whether 10-90 % of a spread stand below its median."""
+    """Whether 10-90 % of a spread of several values stand below its median."""
     of: str = ""
     """Name of the whole that it is a count of."""
     second: str = ""
@@ -142,7 +142,7 @@ class Column:
 
     def _spread(self, value: Row) -> str:
         middle = self._number(value["median"])
-        if not self.band or (value["n"] == 1 and value["median"] is None):
+        if not self.band or value["n"] == 1:
             return middle
         high = value["p90"]
         few = self.digits if high is None else 0 if self.factor * high >= 10 else min(self.digits or 0, 2)

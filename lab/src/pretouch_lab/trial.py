@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import takewhile
 from pathlib import Path as FilePath
 
@@ -13,7 +13,7 @@ from pretouch.control.path import Path
 from pretouch.controller import Controller
 from pretouch.desired import Desired
 from pretouch.errors import RecordingError
-from pretouch.loop import Cycle, Options, run
+from pretouch.loop import Cycle, Options, Recorder, run
 from pretouch.profiles import Profile
 from pretouch.recording.reader import Recorded, open_recording
 from pretouch.recording.run_record import RunRecord, TrueForces, columns_of, contacts_of
@@ -63,6 +63,10 @@ class Setup:
     """Makes what is asked for a desired motion in each step; none, and the arm follows the path."""
     prepare: Callable[[Plant, RangeFinders], None] | None = None
     """What else is to happen: may have things done before each physics step, to the arm or to its units."""
+    start: FloatArray | None = None
+    """Joint positions (n,) in which it begins [rad]; None: those in which its path does."""
+    controller: Callable[..., Controller] = Controller
+    """Makes its controller, as `Controller` is made."""
 
 
 @dataclass(frozen=True)
@@ -181,27 +185,42 @@ def _recording(setup: Setup, controller: Controller) -> Iterator[Recording | Non
         raise RecordingError(recording.trouble)
 
 
+class Simulation:
+    """The arm of a setup in its scene under its controller: it stands, and its observer's transient is over."""
+
+    def __init__(self, setup: Setup) -> None:
+        """Build it, as its seed draws it of a world if one is named."""
+        own = Parts(setup.plant, setup.ranging, setup.skin, setup.believed)
+        parts = randomised(setup.world, setup.seed, setup.model, own)
+        model, scene = setup.model, setup.scene
+        begin = brought_to(model, setup.path.point(0.0)) if setup.start is None else setup.start
+        self.plant = Plant(model, scene, parts.plant, begin, setup.seed)
+        units = RangeFinders(self.plant, setup.skin, parts.ranging, setup.seed)
+        self.hand = Hand(self.plant, setup.hand, setup.person) if setup.hand else None
+        if setup.prepare:
+            setup.prepare(self.plant, units)
+        believed = setup.skin if parts.believed is None else parts.believed
+        self.controller = setup.controller(model, believed, fixtures(scene), setup.path, setup.profile)
+        self.clock = PlantClock(self.plant, setup.profile.task.control_period_s)
+        self.skin: ports.Skin = units
+        if len(setup.skin.touching):
+            touch = TouchSensors(self.plant, setup.skin, TouchErrors(), setup.seed)
+            self.skin = SimulatedTouchSkin(units.read, touch.touch)
+        self.plant.advance(SETTLE_S)
+
+    def run(self, recorder: Recorder, done: Callable[[ControlStep], bool], options: Options | None = None) -> None:
+        """Turn it until `done` says so of a step."""
+        run(self.controller, self.plant, self.skin, self.clock, recorder, done, options or Options())
+
+
 def play(setup: Setup, done: Callable[[ControlStep, Plant], bool]) -> Record:
     """Run a trial until `done` says so of a step."""
-    parts = randomised(
-        setup.world, setup.seed, setup.model, Parts(setup.plant, setup.ranging, setup.skin, setup.believed)
-    )
-    setup = replace(setup, plant=parts.plant, ranging=parts.ranging, believed=parts.believed)
-    model, scene, profile = setup.model, setup.scene, setup.profile
-    plant = Plant(model, scene, setup.plant, brought_to(model, setup.path.point(0.0)), setup.seed)
-    units = RangeFinders(plant, setup.skin, setup.ranging, setup.seed)
-    hand = Hand(plant, setup.hand, setup.person) if setup.hand else None
-    if setup.prepare:
-        setup.prepare(plant, units)
-    known = setup.skin if setup.believed is None else setup.believed
-    controller = Controller(model, known, fixtures(scene), setup.path, profile)
-    clock = PlantClock(plant, profile.task.control_period_s)
-    sensed = _with_touch(setup, plant, units)
-    plant.advance(SETTLE_S)
-    with _recording(setup, controller) as recording:
-        recorder = _Recorder(plant, hand, recording)
-        options = Options(desired=setup.commander(plant, hand)) if setup.commander else Options()
-        run(controller, plant, sensed, clock, recorder, lambda step: done(step, plant), options)
+    made = Simulation(setup)
+    plant = made.plant
+    with _recording(setup, made.controller) as recording:
+        recorder = _Recorder(plant, made.hand, recording)
+        options = Options(desired=setup.commander(plant, made.hand)) if setup.commander else None
+        made.run(recorder, lambda step: done(step, plant), options)
     return Record(
         recorder.steps,
         np.array([t for t, _ in plant.true_log]),
@@ -210,10 +229,3 @@ def play(setup: Setup, done: Callable[[ControlStep, Plant], bool]) -> Record:
         np.array(recorder.hand_position),
         np.array(recorder.reading_age),
     )
-
-
-def _with_touch(setup: Setup, plant: Plant, units: RangeFinders) -> ports.Skin:
-    """Return the units with their touch sensors, where the skin has such."""
-    if not len(setup.skin.touching):
-        return units
-    return SimulatedTouchSkin(units.read, TouchSensors(plant, setup.skin, TouchErrors(), setup.seed).touch)

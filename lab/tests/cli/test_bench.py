@@ -3,36 +3,49 @@ import json
 import pytest
 
 from pretouch import cli
-from pretouch_lab.benchmarks.bench import Bench
-from pretouch_lab.benchmarks.detection import campaign
-from pretouch_lab.cli import benchmarks
+from pretouch_lab.bench import shield
+from pretouch_lab.cli import benchmarks, playing
 
 
-@pytest.mark.parametrize(
-    ("name", "words"), [("detection", "nothing can be said of false alarms"), ("localization", "Written: ")]
-)
-def test_a_benchmark_writes_numbers_and_tables(monkeypatch, capsys, tmp_path, name, words):
-    monkeypatch.setattr(Bench, "every", lambda _: [])
-    monkeypatch.setattr(Bench, "run", lambda *_: None)
-    monkeypatch.setattr(campaign.DetectionBench, "rows", lambda _: campaign.Rows([], [], []))
-    out = tmp_path / "run"
-    given = ["bench", name, "--quick", "--out", str(out)]
-    assert cli.main([*given, "--seeds", "development"]) == 0
-    assert words in capsys.readouterr().out
-    assert json.loads((out / "results.json").read_text())["about"]["quick"] is True
+def test_a_benchmark_writes_numbers_and_tables_and_a_folder_of_others_is_refused(monkeypatch, capsys, tmp_path):
+    cells = [({"filter": name, "commander": "tracking", "scene": "srdo"}, 1000) for name in ("paper", "none")]
+    monkeypatch.setattr(shield, "plays", lambda *_: cells)
+    monkeypatch.setattr(shield, "play_touch", lambda *_: 1 / 0)
+    out, numbers = tmp_path / "run", tmp_path / "numbers.json"
+    words = ["bench", "shield", "--quick", "--processes", "1", "--out", str(out), "--json", str(numbers)]
+    assert cli.main([*words, "--seeds", "development"]) == 0
+    assert "What holds whoever commands" in capsys.readouterr().out
+    found = json.loads(numbers.read_text())
+    assert found["about"]["quick"] is True
+    assert [(row["filter"], row["exceptions"]) for row in found["rows"]] == [("paper", 1), ("none", 1)]
     assert "development seeds, quick run" in (out / "tables.md").read_text()
-    assert cli.main(given) == 2
+    assert len((out / "rows.jsonl").read_text().splitlines()) == 2
+    assert cli.main(words) == 2
     assert "holds a run with seeds = 'development', not 'published': give another --out" in capsys.readouterr().err
 
 
-def test_bench_both_says_which_goals_were_reached(monkeypatch, capsys, tmp_path):
-    def leave_nothing(bench, _json):
-        bench.out.mkdir(parents=True)
-        nothing = {"about": bench.about(), "rows": [], "paired": [], "families": []}
-        (bench.out / "results.json").write_text(json.dumps(nothing))
+@pytest.mark.parametrize("name", ["localization", "detection", "avoidance"])
+def test_each_benchmark_plays_all_that_it_says(monkeypatch, tmp_path, name):
+    asked = []
 
-    monkeypatch.setattr(benchmarks, "run_bench", leave_nothing)
+    def played(_name, _trial, plays, out, _how):
+        asked.append((len(plays), out.name))
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(playing, "played", played)
+    assert cli.main(["bench", name, "--quick", "--out", str(tmp_path / "run")]) == 130
+    assert asked == [{"localization": (6, "streams"), "detection": (23, "streams"), "avoidance": (132, "run")}[name]]
+
+
+def test_bench_both_says_which_goals_were_reached(monkeypatch, capsys, tmp_path):
+    def nothing(options):
+        name = type(options).__name__.lower()
+        return {"about": options.about(name), "rows": [], "paired": [], "families": []}
+
+    for kind in (benchmarks.Detection, benchmarks.Avoidance):
+        monkeypatch.setattr(kind, "results", nothing)
     out = tmp_path / "run"
+    out.mkdir()
     assert cli.main(["bench", "both", "--quick", "--seeds", "development", "--out", str(out)]) == 0
     assert capsys.readouterr().out.count("not measured") == 14
     text = (out / "tables.md").read_text()

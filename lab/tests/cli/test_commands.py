@@ -7,7 +7,7 @@ import pytest
 
 from pretouch import cli
 from pretouch.errors import ExperimentError
-from pretouch_lab.cli import bench_cycle
+from pretouch_lab.bench import cycle
 from pretouch_lab.cli.commands import new_folder
 from pretouch_lab.experiments import static
 
@@ -88,8 +88,7 @@ def run(capsys, *args):
 )
 def test_bad_input_ends_with_one_sentence_and_code_2(capsys, tmp_path, monkeypatch, text, words):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("pretouch_lab.engine.run_jobs", None)  # what is not refused ends there
-    monkeypatch.setattr("pretouch_lab.run._played", None)
+    monkeypatch.setattr("pretouch_lab.run._played", None)  # what is not refused ends there
     code, said = run(capsys, *(str(tmp_path / "out") if arg == "OUT" else arg for arg in shlex.split(text)))
     assert code == 2
     assert re.search(words, said.err)
@@ -159,7 +158,7 @@ def test_a_new_demo_gets_a_new_folder(tmp_path, monkeypatch):
 
 
 def test_bench_cycle_shows_and_writes_what_it_measured_before_it_was_stopped(capsys, tmp_path, monkeypatch):
-    measure = bench_cycle.measure
+    measure = cycle.measure
 
     def once(points, request, tell):
         if points == 5:
@@ -167,7 +166,7 @@ def test_bench_cycle_shows_and_writes_what_it_measured_before_it_was_stopped(cap
         tell("No priority.")
         return measure(points, request, tell)
 
-    monkeypatch.setattr(bench_cycle, "measure", once)
+    monkeypatch.setattr(cycle, "measure", once)
     file, quick = tmp_path / "cycle.json", ("--cycles", "20", "--rate", "100")
     code, said = run(capsys, "bench", "cycle", "--points", "3,5", *quick, "--json", str(file))
     assert code == 130

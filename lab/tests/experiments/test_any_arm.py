@@ -17,9 +17,8 @@ from pretouch.robot.postures import brought_to
 from pretouch.sim.hand import PALM, robot_hand
 from pretouch.sim.paper_scenes import placement_for
 from pretouch.sim.plant_params import assumed_plant
-from pretouch_lab.benchmarks.avoidance.scenario import scenarios
-from pretouch_lab.benchmarks.avoidance.setting import setting
-from pretouch_lab.benchmarks.avoidance.trial import play_trial
+from pretouch_lab.bench.avoidance import trial
+from pretouch_lab.bench.avoidance_scenes import scenarios, setting
 from pretouch_lab.experiment import Context, context_of
 from pretouch_lab.experiments import avoidance, dynamic
 
@@ -146,5 +145,5 @@ def test_the_scenarios_of_the_avoidance_benchmark_are_set_up_for_it(folder):
     path, person = made_for_it.setup.path, made_for_it.shape(np.zeros(3))
     around = np.array([path.point(s) for s in np.linspace(0, path.length, 400)])
     assert person.closest(around)[0].min() == pytest.approx(0.4, abs=1e-3)
-    row = play_trial(scenarios()["srdo"], "pretouch", 0, arm=folder)
+    row = trial("", folder, {"scenario": "srdo", "contender": "pretouch"}, 0)
     assert row["duration_s"] == pytest.approx(9.0, abs=0.05)

@@ -9,8 +9,7 @@ from pretouch.robot.model import RobotModel
 from pretouch.sim.observer import observe, observer_init
 from pretouch.sim.plant_params import PlantParams
 from pretouch_lab.identification.identify import Identified
-from pretouch_lab.identification.params import usual_of
-from pretouch_lab.identification.samples import ArmSamples
+from pretouch_lab.identification.samples import ArmSamples, usual_of
 
 MODEL = RobotModel(panda())
 PLANT = PlantParams()

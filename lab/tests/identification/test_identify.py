@@ -8,7 +8,7 @@ from lab.tests.identification.made import FRICTION, MODEL, PLANT, USUAL, Made, f
 from pretouch.errors import CalibrationError
 from pretouch.sim.randomisation import drawn, world_set
 from pretouch_lab.identification.arm_file import arm_toml
-from pretouch_lab.identification.columns import friction_parts
+from pretouch_lab.identification.fit import friction_parts
 from pretouch_lab.identification.identify import identify
 
 MADE = Made()

@@ -3,8 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pretouch_lab.identification.motion import moved
 from pretouch_lab.identification.samples import ArmSamples, usable
-from pretouch_lab.identification.stamps import moved
 
 RATES = np.array([0.7, 0.9, 1.1, 1.3])
 

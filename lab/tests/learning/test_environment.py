@@ -6,11 +6,10 @@ from gymnasium.utils.env_checker import check_env
 from pretouch.errors import ParameterError
 from pretouch.profiles import profile
 from pretouch.types import Mode
-from pretouch_lab.benchmarks.avoidance.scenario import scenarios
+from pretouch_lab.bench.avoidance_scenes import scenarios
 from pretouch_lab.learning import REACH
 from pretouch_lab.learning.environment import ALONE, ReachEnv, Reward
-from pretouch_lab.learning.observation import CYCLES
-from pretouch_lab.learning.scene import Scene
+from pretouch_lab.learning.scene import CYCLES, Scene
 
 TOWARDS_Y = np.array([0, 1, 0, 0, 0, 0], np.float32)
 

@@ -4,19 +4,17 @@ Ishigami and Homma (1990): f = sin x1 + A sin^2 x2 + B x3^4 sin x1, each x unifo
 """
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated, cast
 
 import numpy as np
 import pytest
 
 from pretouch.checks import Check, Checked
-from pretouch_lab.engine import run_tasks
-from pretouch_lab.sweep.design import Sweep, sweep_of
-from pretouch_lab.sweep.measures import Measure, Numbers
-from pretouch_lab.sweep.play import Run, opened
-from pretouch_lab.sweep.setting import Setting
-from pretouch_lab.sweep.streams import MEASURES
+from pretouch.types import FloatArray
+from pretouch_lab.run import Row
+from pretouch_lab.sweep.design import Sweep, groups, points, sweep_of, trial, values_of
+from pretouch_lab.sweep.measures import MEASURES, Measure, Numbers
+from pretouch_lab.sweep.parameters import Setting
 
 A, B = 7.0, 0.1
 PI = "-3.141592653589793:3.141592653589793"
@@ -43,9 +41,14 @@ def _run(setting: Setting, _: None) -> Numbers:
 
 
 ISHIGAMI = Measure(
-    "ishigami", "a function whose indices are known", "paper", IshigamiScene(), {"value": "the function's value"},
-    _run, lambda _: 0.002, (),
-)  # fmt: skip
+    "ishigami",
+    "a function whose indices are known",
+    "paper",
+    IshigamiScene(),
+    {"value": "the function's value"},
+    _run,
+    (),
+)
 
 
 def register(patch: pytest.MonkeyPatch) -> None:
@@ -57,9 +60,9 @@ def ishigami(samples: int = 8, design: str = "sobol", arms: int = 1) -> Sweep:
     return sweep_of("ishigami", X, {}, design=design, samples=samples, arms=arms)
 
 
-def opened_ishigami(out: Path, samples: int = 8) -> Run:
-    return opened(ishigami(samples), out)
-
-
-def play(run: Run, out: Path) -> None:
-    run_tasks(run.tasks, out, lambda _: None, processes=1)
+def played(sweep: Sweep) -> tuple[list[Row], dict[str, FloatArray]]:
+    """Return the rows of a sweep's plays, and its numbers by point."""
+    design = points(sweep)
+    grouped = groups(sweep, design)
+    rows = [trial(sweep.measure.name, sweep.profile, *play) for _, play in grouped]
+    return rows, values_of(sweep, len(design), zip(grouped, rows, strict=True))

@@ -5,9 +5,8 @@ import pytest
 from lab.tests.sweep import made
 from lab.tests.sweep.made import A, B
 
+from pretouch_lab.sweep.analysis import indices, sobol_indices, sweep_figure, tables
 from pretouch_lab.sweep.design import points, sweep_of
-from pretouch_lab.sweep.indices import indices, sobol_indices
-from pretouch_lab.sweep.play import opened
 
 PI4 = np.pi**4
 V1 = 0.5 * (1 + B * PI4 / 5) ** 2
@@ -56,12 +55,18 @@ def test_what_does_not_vary_or_is_nowhere_has_no_indices(value):
     assert sobol_indices(sweep, np.full(len(points(sweep)), value))["rows"] == []
 
 
-def test_the_course_over_a_grid(tmp_path):
+def test_the_course_over_a_grid():
     sweep = sweep_of("ishigami", {"scene.x2": made.PI}, {}, design="grid", arms=3)
-    run = opened(sweep, tmp_path)
-    made.play(run, tmp_path)
-    rows = indices(run)["value"]["rows"]
+    rows = indices(sweep, points(sweep), made.played(sweep)[1])["value"]["rows"]
     levels = np.linspace(-np.pi, np.pi, 5)
     assert [row["level"] for row in rows] == pytest.approx(levels)
     assert [row["median"] for row in rows] == pytest.approx([made.value(0.0, x, 0.0) for x in levels], abs=1e-4)
     assert {row["n"] for row in rows} == {3}
+
+
+def test_a_grid_has_a_table_for_each_parameter_and_a_figure():
+    sweep = made.ishigami(design="grid", arms=2)
+    found = indices(sweep, points(sweep), made.played(sweep)[1])
+    shown = tables(sweep, found, ("value",))
+    assert [(table.header[0], len(table.rows)) for table in shown] == [(f"scene.x{i}", 5) for i in (1, 2, 3)]
+    assert len(sweep_figure(sweep, found, ("value",)).axes) == 3

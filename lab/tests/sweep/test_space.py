@@ -3,7 +3,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pretouch.errors import ExperimentError
-from pretouch_lab.sweep.space import dimension
+from pretouch_lab.sweep.parameters import dimension
 
 
 @pytest.mark.parametrize(

@@ -1,23 +1,23 @@
 """`pretouch bench detection`, `avoidance`, `localization`, `shield` and `both`: their docstrings are the help."""
 
-import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from functools import partial
+from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from pretouch.cli.options import JsonFile, Words
-from pretouch.errors import PretouchError
+from pretouch.cli.options import Words
+from pretouch.errors import ExperimentError
+from pretouch_lab.options import Playing
 
 if TYPE_CHECKING:  # the help is to need none of the heavy packages
-    from pretouch_lab.benchmarks.bench import Bench
+    pass
 
 
 @dataclass(frozen=True)
-class BenchOptions:
+class BenchOptions(Playing):
     """Options of the benchmarks that are published."""
 
     quick: bool = False
@@ -27,14 +27,61 @@ class BenchOptions:
     world: str = ""
     """Set of simulated arms, sensors and delays: nominal, realistic, stress, or a TOML file, of which each trial's seed
     draws its own; by default the arms of the published tables. Results of a world are kept in a folder of its own."""
-    out: str = ""
-    """Folder for results and tables; by default runs/bench or runs/bench-NAME, with -quick if it is."""
 
     def folder(self, name: str) -> Path:
-        """Where the results go; `name` is that under runs/."""
+        """Return where the results go."""
         from pretouch_lab.domain_randomisation import folder_part
 
-        return Path(self.out or f"runs/{name}{folder_part(self.world)}{'-quick' if self.quick else ''}")
+        return super().folder(f"{name}{folder_part(self.world)}{'-quick' if self.quick else ''}")
+
+    def about(self, name: str) -> dict[str, Any]:
+        """Return what the numbers say of the run."""
+        from pretouch import __version__
+
+        world = {"world": self.world} if self.world else {}
+        return {"bench": name, "version": __version__, "quick": self.quick, "seeds": self.seeds, **world}
+
+    def below(self, kind: "type[BenchOptions]", folder: Path) -> Any:
+        """Return the options of another benchmark, whose results go below a folder."""
+        shared = {each.name: getattr(self, each.name) for each in fields(BenchOptions)}
+        return kind(**shared | {"out": str(folder), "json": None})
+
+    def run(self) -> None:
+        """Play what is missing, and show and write what came out."""
+        from pretouch.cli.writing import numbers_to
+
+        with numbers_to(self.json) as write:
+            write(self.results())
+
+    def results(self) -> dict[str, Any]:
+        """Play what is missing, show tables, write them, and return the numbers."""
+        raise NotImplementedError
+
+
+def begin(options: BenchOptions, name: str, out: Path, **more: Any) -> None:
+    """Make a folder for a benchmark's results, or take up one that a run with the same options began."""
+    from pretouch.sim.randomisation import world_set
+    from pretouch_lab.bench.scenes import checksums
+    from pretouch_lab.cli.playing import check_json
+    from pretouch_lab.domain_randomisation import sentence
+    from pretouch_lab.run import open_run
+
+    world = {"world_sha256": world_set(options.world).digest} if options.world else {}
+    scenarios = sha256(repr(sorted(checksums().items())).encode()).hexdigest()
+    check_json(options, [out])
+    shared = {"bench": name, "seeds": options.seeds, "world": options.world, "scenarios_sha256": scenarios}
+    open_run(out, shared | world | more)
+    if options.world:
+        print(sentence(options.world))
+
+
+def _finish(out: Path, about: dict[str, Any], tables: list[Any], text: str, **numbers: Any) -> dict[str, Any]:
+    """Show tables and write them with a text; return the numbers."""
+    from pretouch_lab.cli.playing import report
+
+    kind = "quick" if about["quick"] else "full"
+    report(tables, [], out, f"Version {about['version']}, {about['seeds']} seeds, {kind} run. {text}\n")
+    return {"about": about, **numbers, "tables": tables}
 
 
 @dataclass(frozen=True)
@@ -44,15 +91,19 @@ class Detection(BenchOptions):
     About an hour on two processors, with --quick five minutes. A run that was stopped goes on with the same --out.
     """
 
-    json: str = ""
-    """File for the numbers; by default results.json in the folder. -: also to standard output, and
-    text to standard error."""
+    def results(self) -> dict[str, Any]:
+        """See `BenchOptions`."""
+        from pretouch_lab.bench.detection import Streams, arm_cells, plays, stream_plays
+        from pretouch_lab.bench.detection_results import results
+        from pretouch_lab.bench.detection_tables import tables
+        from pretouch_lab.cli.playing import played
 
-    def run(self) -> None:
-        """Run it, with tables and numbers."""
-        from pretouch_lab.benchmarks.detection.campaign import DetectionBench
-
-        run_bench(DetectionBench(self.folder("bench-detection"), self.quick, self.seeds, self.world), self.json)
+        out = self.folder("bench-detection")
+        begin(self, "detection", out, quick=self.quick)
+        cells, streams = arm_cells(self.seeds, self.quick, self.world), Streams(out, self.seeds, self.quick, self.world)
+        played("recording streams", streams.record, stream_plays(cells), out / "streams", self)
+        numbers = results(played("replaying them", streams.judge, plays(cells), out, self))
+        return _finish(out, self.about("detection"), tables(numbers), numbers["resolution"], **numbers)
 
 
 @dataclass(frozen=True)
@@ -63,9 +114,6 @@ class Avoidance(BenchOptions):
     --out.
     """
 
-    json: str = ""
-    """File for the numbers, with a row for each baseline and scenario; by default results.json in the folder.
-    -: also to standard output, and text to standard error."""
     baselines: Annotated[Words, tyro.conf.arg(aliases=["--contenders"])] = ()
     """Baselines, separated by commas: blind, flacco, flacco-surface, ding, ding-near, paper, paper-off, or any
     profile; by default all, and pretouch with each switch off alone."""
@@ -75,18 +123,29 @@ class Avoidance(BenchOptions):
     """Name of an arm, or the folder of an imported one, in a folder of results of its own: give --out. The scenarios'
     paths and obstacles are scaled and moved into its reach, and the skin is the arm's own."""
 
-    def run(self) -> None:
-        """Run it, with tables and numbers."""
+    def results(self) -> dict[str, Any]:
+        """See `BenchOptions`."""
+        from pretouch.robot.description import files_digest
         from pretouch.sim.plant_params import assumed_plant
-        from pretouch_lab.benchmarks.avoidance.run import AvoidanceBench
-        from pretouch_lab.benchmarks.avoidance.setting import PANDA, arm, place
+        from pretouch_lab.bench import avoidance
+        from pretouch_lab.bench.avoidance import tables
+        from pretouch_lab.bench.avoidance_scenes import PANDA, arm, place
+        from pretouch_lab.cli.playing import played
 
-        out, some = self.folder("bench-avoidance"), (self.baselines, self.scenarios)
-        bench = AvoidanceBench(out, self.quick, self.seeds, self.world, *some, self.arm)
+        plays = avoidance.plays(self.seeds, self.quick, self.baselines, self.scenarios, self.arm)
+        out, other = self.folder("bench-avoidance"), {}
         if self.arm != PANDA:
             described = arm(self.arm).description
+            other = {"arm": self.arm, "arm_sha256": files_digest(described)}
             print(place(self.arm).sentence(described.name), assumed_plant(described), sep="\n")
-        run_bench(bench, self.json)
+        begin(self, "avoidance", out, **other)  # a quick run shares its trials with a full one
+        rows = played("avoidance", partial(avoidance.trial, self.world, self.arm), plays, out, self)
+        summary = avoidance.summarise(rows)
+        cells = summary.pop("cells")
+        counts = [cell["trials"] for cell in cells]
+        text = f"{min(counts)} to {max(counts)} trials of each contender in each scenario."
+        shown = tables({"cells": cells, **summary})
+        return _finish(out, self.about("avoidance"), shown, text, rows=avoidance.medians(cells), **summary)
 
 
 @dataclass(frozen=True)
@@ -96,35 +155,40 @@ class Localization(BenchOptions):
     About twenty minutes on two processors, with --quick three. A run that was stopped goes on with the same --out.
     """
 
-    json: str = ""
-    """File for the numbers; by default results.json in the folder. -: also to standard output, and
-    text to standard error."""
+    def results(self) -> dict[str, Any]:
+        """See `BenchOptions`."""
+        from pretouch_lab.bench import localization
+        from pretouch_lab.cli.playing import played
 
-    def run(self) -> None:
-        """Run it, with tables and numbers."""
-        from pretouch_lab.benchmarks.localization.campaign import LocalizationBench
-
+        if self.world:
+            raise ExperimentError(f"The arm of this benchmark is the usual one: leave out --world {self.world}.")
         out = self.folder("bench-localization")
-        run_bench(LocalizationBench(out, self.quick, self.seeds, self.world), self.json)
+        begin(self, "localization", out)
+        streams = localization.stream_plays(self.seeds, self.quick)
+        played("recording streams", partial(localization.record_stream, out), streams, out / "streams", self)
+        rows = played("replaying them", partial(localization.trial, out), localization.plays(streams), out, self)
+        found = localization.results(rows)
+        return _finish(out, self.about("localization"), localization.tables(found), "", rows=found)
 
 
 @dataclass(frozen=True)
 class Shield(BenchOptions):
     """Hold filters between a commander and the arm against each other: what holds whoever commands, and what it costs.
 
-    Wild commanders, and such as drive at a person on purpose. About twenty-five minutes on two processors, with
-    --quick two. A run that was stopped goes on with the same --out.
+    About ten minutes on two processors, with --quick one. A run that was stopped goes on with the same --out.
     """
 
-    json: str = ""
-    """File for the numbers, with a row for each filter and commander; by default results.json in the folder.
-    -: also to standard output, and text to standard error."""
+    def results(self) -> dict[str, Any]:
+        """See `BenchOptions`."""
+        from pretouch_lab.bench import shield
+        from pretouch_lab.cli.playing import played
 
-    def run(self) -> None:
-        """Run it, with tables and numbers."""
-        from pretouch_lab.benchmarks.shield.run import ShieldBench
-
-        run_bench(ShieldBench(self.folder("bench-shield"), self.quick, self.seeds, self.world), self.json)
+        if self.world:
+            raise ExperimentError(f"The arms of this benchmark are the usual ones: leave out --world {self.world}.")
+        out = self.folder("bench-shield")
+        begin(self, "shield", out)
+        found = shield.results(played("shield", shield.trial, shield.plays(self.seeds, self.quick), out, self))
+        return _finish(out, self.about("shield"), shield.tables(found), shield.guarantees(), rows=found)
 
 
 @dataclass(frozen=True)
@@ -135,100 +199,13 @@ class Both(BenchOptions):
     --out.
     """
 
-    json: JsonFile = None
+    def results(self) -> dict[str, Any]:
+        """See `BenchOptions`."""
+        from pretouch_lab.bench.goals import front_table, goal_table
+        from pretouch_lab.cli.playing import report
 
-    def run(self) -> None:
-        """Run both, with tables and numbers."""
-        from pretouch.cli.writing import numbers_to
-
-        with numbers_to(self.json) as write:
-            write(run_both(self))
-
-
-def run_bench(bench: "Bench", json: str) -> None:
-    """Run what is missing of a benchmark, and show and write what came out."""
-    bench.open()
-    with results_to(json, bench.out) as (json_file, write):
-        _play(bench, json_file)
-        write(_report(bench, json_file))
-
-
-@contextmanager
-def results_to(json: str, folder: Path) -> Iterator[tuple[Path, Callable[[Any], None]]]:
-    """Give the file for the results, results.json in a folder unless --json names one, and what writes them for '-'."""
-    from pretouch.cli.writing import STANDARD_OUTPUT, numbers_to
-
-    printed = json == STANDARD_OUTPUT
-    with numbers_to(json if printed else "") as write:
-        yield Path(json) if json and not printed else folder / "results.json", write
-
-
-def _play(bench: "Bench", json_file: Path) -> None:
-    from pretouch.cli.writing import check_writable
-    from pretouch_lab.cli.progress import worked
-    from pretouch_lab.domain_randomisation import sentence
-    from pretouch_lab.engine import missing
-
-    if bench.world:
-        print(sentence(bench.world))
-    check_writable("file", json_file)
-    tasks = bench.every()
-    try:
-        worked(bench.name, tasks, bench.run)
-    except BaseException as error:
-        if not isinstance(error, PretouchError):
-            done = f"{len(tasks) - len(missing(tasks))} of {len(tasks)} pieces of work are there"
-            print(f"Stopped: {done}; the same command with --out {bench.out} goes on.", file=sys.stderr)
-        raise
-
-
-def _report(bench: "Bench", json_file: Path) -> Any:
-    """Show and write what was found, and return its numbers; None where there are none yet."""
-    from rich.console import Console
-
-    from pretouch.atomic_write import write_json
-    from pretouch.cli.tables import show
-    from pretouch.cli.writing import unwritable_said
-
-    found, tables_file = bench.found(), bench.out / "tables.md"
-    if found is None:
-        return None
-    with unwritable_said("file", json_file):
-        write_json(found.json, json_file)
-    with unwritable_said("file", tables_file):
-        tables_file.write_text(found.page(), encoding="utf-8")
-    console = Console(highlight=False)
-    show(console, found.tables)
-    if found.resolution:
-        console.print(found.resolution, soft_wrap=True, markup=False)
-    for place in (json_file, tables_file):
-        console.print(f"Written: {place}", soft_wrap=True, markup=False)
-    return found.json
-
-
-def run_both(command: Both) -> dict[str, Any]:
-    """Run what is missing of both, show what came out of them together, and return the numbers."""
-    import json
-
-    from rich.console import Console
-
-    from pretouch.cli.tables import show
-    from pretouch.cli.writing import unwritable_said
-    from pretouch.text_table import markdown
-    from pretouch_lab.benchmarks.front import front_table
-    from pretouch_lab.benchmarks.goals import goal_table
-
-    out = command.folder("bench")
-    given = {"quick": command.quick, "seeds": command.seeds, "world": command.world}
-    Detection(out=str(out / "detection"), **given).run()  # type: ignore[arg-type]  # of both the same
-    Avoidance(out=str(out / "avoidance"), **given).run()  # type: ignore[arg-type]
-    detection, avoidance = (
-        json.loads((out / name / "results.json").read_text(encoding="utf-8")) for name in ("detection", "avoidance")
-    )
-    made = [goal_table(detection, avoidance), front_table(detection, avoidance)]
-    show(Console(highlight=False), made)
-    tables_file = out / "tables.md"
-    with unwritable_said("file", tables_file):
-        tables_file.write_text("\n\n".join(map(markdown, made)) + "\n", encoding="utf-8")
-    print(f"Written: {tables_file}")
-    return {"detection": detection, "avoidance": avoidance}
+        out = self.folder("bench")
+        detection = self.below(Detection, out / "detection").results()
+        avoidance = self.below(Avoidance, out / "avoidance").results()
+        report([goal_table(detection, avoidance), front_table(detection, avoidance)], [], out)
+        return {"detection": detection, "avoidance": avoidance}

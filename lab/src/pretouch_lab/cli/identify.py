@@ -64,7 +64,7 @@ def _identified(command: Identify, out: Path | None, figure: Path | None) -> dic
     from pretouch_lab.identification.arm_file import arm_toml
     from pretouch_lab.identification.free_motion import read_free_motion
     from pretouch_lab.identification.identify import identify
-    from pretouch_lab.identification.params import usual_of
+    from pretouch_lab.identification.samples import usual_of
 
     samples, model, said = read_free_motion(Path(command.file), _model(command.arm), command.sign)
     found = identify(samples, model, usual_of(plant_params_of(model.description)))
@@ -177,6 +177,6 @@ def _numbers(found: "Identified", model: "RobotModel", source: str) -> dict[str,
 
 
 def _figure(found: "Identified", model: "RobotModel", title: str) -> Any:
-    from pretouch_lab.identification.residual_figure import residual_figure
+    from pretouch_lab.identification.arm_file import residual_figure
 
     return residual_figure(found, model, title)

@@ -1,28 +1,32 @@
 """`pretouch sweep`: any parameters of an experiment, with a table, indices and a figure."""
 
+import csv
 import sys
 from collections import Counter
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import tyro
 
-from pretouch.cli.options import JsonFile, Words
+from pretouch.cli.options import Words
 from pretouch.errors import ExperimentError
+from pretouch_lab.options import Playing
 
 if TYPE_CHECKING:  # the help is to need none of the heavy packages
-    from pretouch_lab.sweep.play import Run
+    from pretouch_lab.sweep.design import Point
+    from pretouch_lab.sweep.design import Sweep as Defined
 
 
 @dataclass(frozen=True)
-class Sweep:
+class Sweep(Playing):
     """Vary parameters of an experiment, and say which matter: over a grid, or by Sobol indices.
 
     A run that was stopped goes on with the same command. Needs the extra `sweep`.
     """
 
-    experiment: tyro.conf.Positional[str]
+    experiment: tyro.conf.Positional[str] = tyro.MISSING
     """static, avoidance, dynamic, free-motion or contacts."""
     vary: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
     """Parameter and range: NAME=LOW:HIGH, NAME=LOW:HIGH:log, or NAME=VALUE,VALUE; for a grid NAME=LOW:HIGH:LEVELS.
@@ -42,11 +46,6 @@ class Sweep:
     """Profile to start from, or PROFILE:GROUP.FIELD=VALUE; by default the experiment's own."""
     seeds: Literal["published", "development"] = "development"
     """Which simulated arms: those of the published tables, or others."""
-    processes: int = 0
-    """Processes; by default one for each processor."""
-    out: str = ""
-    """Folder for everything; by default runs/sweep."""
-    json: JsonFile = None
 
     def run(self) -> None:
         """Play what is missing, with table, indices and figure."""
@@ -58,13 +57,11 @@ class Sweep:
 
 def sweep(command: Sweep) -> dict[str, Any]:
     """Play what is missing, write and show what came out, and return the indices."""
-    from pretouch_lab.cli.progress import worked
-    from pretouch_lab.engine import run_tasks
-    from pretouch_lab.sweep.design import sweep_of
-    from pretouch_lab.sweep.play import opened
+    from pretouch_lab.cli.playing import check_json, played
+    from pretouch_lab.run import open_run
+    from pretouch_lab.sweep.design import SWEEP, groups, points, sweep_of, trial, values_of
+    from pretouch_lab.sweep.parameters import world_digest
 
-    if command.processes < 0:
-        raise ExperimentError(f"The number of processes is {command.processes}: give 1 or more.")
     defined = sweep_of(
         command.experiment, _pairs("vary", command.vary), _pairs("fix", command.fix), command.profile, command.design,
         command.samples, command.arms, command.seeds,
@@ -74,43 +71,49 @@ def sweep(command: Sweep) -> dict[str, Any]:
     if unknown:
         known = ", ".join(defined.measure.metrics)
         raise ExperimentError(f"{command.experiment} does not measure {unknown[0]!r}: choose from {known}.")
-    out = Path(command.out or "runs/sweep")
-    run = opened(defined, out)
-    try:
-        worked("sweep", run.tasks, lambda progress: run_tasks(run.tasks, out, progress, command.processes or None))
-    except BaseException:
-        print(f"Stopped: what was played is in {out}; the same command goes on.", file=sys.stderr)
-        raise
-    for reason, count in Counter(run.failures()).items():
-        print(f"{count} cells failed: {reason} The same command tries them again.", file=sys.stderr)
-    return _written(run, metrics, out)
+    SWEEP.need("A sweep")
+    out, design = command.folder("sweep"), points(defined)
+    grouped = groups(defined, design)
+    worlds = {digest for _, (cell, _) in grouped for values in cell["cells"] if (digest := world_digest(values))}
+    check_json(command, [out])
+    about = {"sweep": command.experiment, "profile": defined.profile, "worlds_sha256": sorted(worlds)}
+    open_run(out, about)
+    play = partial(trial, command.experiment, defined.profile)
+    rows = played("sweep", play, [each for _, each in grouped], out, command)
+    for reason, count in Counter(row["failed"] for row in rows if row["failed"]).items():
+        print(f"{count} cells failed: {reason} Take their lines out of rows.jsonl to try again.", file=sys.stderr)
+    values = values_of(defined, len(design), zip(grouped, rows, strict=True))
+    return _written(defined, design, values, metrics, out)
 
 
-def _written(run: "Run", metrics: tuple[str, ...], out: Path) -> dict[str, Any]:
+def _written(
+    sweep: "Defined", design: "list[Point]", values: dict[str, Any], metrics: tuple[str, ...], out: Path
+) -> dict[str, Any]:
     """Show and write what came out; return the indices."""
-    from rich.console import Console
-
     from pretouch import __version__
-    from pretouch.atomic_write import write_json
-    from pretouch.cli.tables import show
-    from pretouch_lab.engine import failure_said
-    from pretouch_lab.sweep.figure import sweep_figure
-    from pretouch_lab.sweep.indices import indices, tables
-    from pretouch_lab.sweep.play import write_table
+    from pretouch.cli.writing import unwritable_said
+    from pretouch_lab.cli.playing import report
+    from pretouch_lab.sweep.analysis import indices, sweep_figure, tables
+    from pretouch_lab.sweep.design import SEED
 
-    console, found = Console(highlight=False), indices(run)
-    numbers = {
-        "version": __version__, "experiment": run.sweep.measure.name, "profile": run.sweep.profile,
-        "vary": {one.name: one.written for one in run.sweep.vary}, "fixed": run.sweep.fixed, "metrics": found,
-    }  # fmt: skip
-    show(console, tables(run.sweep, found, metrics))
-    name = run.sweep.measure.name
-    write_table(run, out / f"{name}.csv")
-    with failure_said(out):
-        write_json(numbers, out / f"{name}.json")
-        sweep_figure(run.sweep, found, metrics).savefig(out / f"{name}.png", dpi=120)
-    console.print(f"Written: {out / name}.csv, .json and .png", soft_wrap=True, markup=False)
-    return numbers
+    found, name = indices(sweep, design, values), sweep.measure.name
+    report(tables(sweep, found, metrics), [(name, sweep.measure.text, sweep_figure(sweep, found, metrics))], out)
+    place = out / f"{name}.csv"
+    with unwritable_said("file", place), place.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow([*(one.name for one in sweep.vary), SEED, *values])
+        for number, point in enumerate(design):
+            numbers = (column[number] for column in values.values())
+            writer.writerow([*point.values.values(), point.seed, *("" if n != n else n for n in numbers)])
+    print(f"Points: {place}")
+    return {
+        "version": __version__,
+        "experiment": name,
+        "profile": sweep.profile,
+        "vary": {one.name: one.written for one in sweep.vary},
+        "fixed": sweep.fixed,
+        "metrics": found,
+    }
 
 
 def _pairs(option: str, texts: tuple[str, ...]) -> dict[str, str]:

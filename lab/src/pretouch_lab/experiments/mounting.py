@@ -13,7 +13,7 @@ from pretouch.sim.paper_scenes import static_path, static_scene
 from pretouch.sim.random_skin import Misplacement, misplaced
 from pretouch.sim.scene import Box, SceneSpec, fixtures
 from pretouch.text_table import TextTable
-from pretouch_lab.benchmarks.avoidance.obstacle import Cuboid, nearest
+from pretouch_lab.bench.obstacle import Cuboid, nearest
 from pretouch_lab.experiment import Context, Experiment, controllers, main
 from pretouch_lab.experiments import static
 from pretouch_lab.options import Options

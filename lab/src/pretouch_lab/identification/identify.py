@@ -6,13 +6,10 @@ from pretouch.errors import CalibrationError
 from pretouch.robot.model import RobotModel
 from pretouch.types import BoolArray, FloatArray
 from pretouch.values import value
-from pretouch_lab.identification.columns import columns_of
-from pretouch_lab.identification.contacts import free_samples
-from pretouch_lab.identification.fit import OWN, Fit, fit
-from pretouch_lab.identification.noise import Noise, noise_of
-from pretouch_lab.identification.params import IdentifyParams, Usual
-from pretouch_lab.identification.samples import LEAST_S, ArmSamples, usable
-from pretouch_lab.identification.stamps import moved
+from pretouch_lab.identification.fit import OWN, Fit, columns_of, fit
+from pretouch_lab.identification.motion import moved
+from pretouch_lab.identification.noise import Noise, free_samples, noise_of
+from pretouch_lab.identification.samples import LEAST_S, ArmSamples, IdentifyParams, Usual, usable
 
 _ROUNDS = 3
 _MOST_MASS_ERROR = 0.5

@@ -10,10 +10,8 @@ from gymnasium.spaces import Box, Dict
 from pretouch.errors import ParameterError
 from pretouch.profiles import profile
 from pretouch.types import FloatArray
-from pretouch_lab.benchmarks.avoidance.scenario import Scenario, scenarios
-from pretouch_lab.benchmarks.avoidance.setting import arm, skin
-from pretouch_lab.learning.observation import CYCLES, HELD, NEAR_M, ActionKind, Interface, Observation
-from pretouch_lab.learning.scene import Scene
+from pretouch_lab.bench.avoidance_scenes import Scenario, arm, scenarios, skin
+from pretouch_lab.learning.scene import CYCLES, HELD, NEAR_M, ActionKind, Interface, Observation, Scene
 
 PEOPLE = ("person -y", "person +y", "beside", "inside", "walking")
 """Scenes of the avoidance benchmark with people."""

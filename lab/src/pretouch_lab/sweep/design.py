@@ -1,4 +1,4 @@
-"""A sweep: what is varied, and which cells are played.
+"""A sweep: what is varied, which cells are played, and what they came to.
 
 A seed is a simulated arm in a scene: masses, friction, noise, where the board stands. A grid plays each combination
 with the same arms, so that two of its points differ by their parameters alone (common random numbers). For Sobol
@@ -6,7 +6,8 @@ indices the arm is one more column of the design, `seed`: its index says how muc
 was, and no parameter's index holds a part of that.
 """
 
-from collections.abc import Mapping
+import json
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from itertools import product
 from typing import Any, Literal
@@ -14,15 +15,17 @@ from typing import Any, Literal
 import numpy as np
 
 from pretouch.errors import ExperimentError, PretouchError
+from pretouch.extras import Extra
 from pretouch.profiles import profile
-from pretouch_lab.benchmarks.scenario_files import SeedRange
-from pretouch_lab.sweep.measures import Measure
-from pretouch_lab.sweep.setting import Setting, Values, built, current
-from pretouch_lab.sweep.space import Dimension, dimension, read_value
-from pretouch_lab.sweep.streams import measure
+from pretouch.types import FloatArray
+from pretouch_lab.bench.scenes import SeedRange
+from pretouch_lab.run import Play, Row
+from pretouch_lab.sweep.measures import Measure, measure
+from pretouch_lab.sweep.parameters import Dimension, Setting, Values, built, current, dimension, read_value
 
 Design = Literal["grid", "sobol"]
 SEED = "seed"
+SWEEP = Extra("sweep", ("SALib",), "setup", "pretouch-lab")
 LARGEST = 200_000
 """Cells of one sweep."""
 _DRAWN_WITH = 20_211_116
@@ -159,3 +162,41 @@ def problem(columns: list[Dimension]) -> dict[str, Any]:
 def _check_count(count: int) -> None:
     if count > LARGEST:
         raise ExperimentError(f"The sweep has {count} cells, more than {LARGEST}: take fewer samples, levels or arms.")
+
+
+Group = tuple[list[int], Play]
+"""Numbers of points that are played one after the other, as they have a recorded stream in common; and that play."""
+
+
+def groups(sweep: Sweep, cells: list[Point]) -> list[Group]:
+    """Return the points of a design as plays: each of its own, or all of a recorded stream."""
+    shared: dict[str, list[int]] = {}
+    for number, point in enumerate(cells):
+        same = sweep.setting(point).world if sweep.measure.shared else json.dumps([point.values, point.seed])
+        shared.setdefault(same, []).append(number)
+    return [
+        (numbers, ({"cells": [sweep.fixed | cells[n].values for n in numbers]}, cells[numbers[0]].seed))
+        for numbers in shared.values()
+    ]
+
+
+def trial(experiment: str, profile_text: str, cell: Row, seed: int) -> Row:
+    """Play cells that have a stream in common; return their numbers, or why they failed, whatever it was."""
+    what = measure(experiment)
+    try:
+        settings = [built(profile_text, what.scene, values, seed) for values in cell["cells"]]
+        stream = what.shared(settings[0]) if what.shared else None
+        return {"failed": "", "metrics": [what.run(setting, stream) for setting in settings]}
+    except Exception as error:  # it is written down, and the others go on
+        reason = str(error) if isinstance(error, PretouchError) else f"{type(error).__name__}: {error}"
+        return {"failed": reason or type(error).__name__, "metrics": []}
+
+
+def values_of(sweep: Sweep, count: int, played: Iterable[tuple[Group, Row]]) -> dict[str, FloatArray]:
+    """Return each number (count,) that is measured, by the points of the design; NaN where there is none."""
+    found = {name: np.full(count, np.nan) for name in sweep.measure.metrics}
+    for (numbers, _), row in played:
+        for number, metrics in zip(numbers, row["metrics"], strict=not row["failed"]):
+            for name, value in metrics.items():
+                found[name][number] = np.nan if value is None else value
+    return found

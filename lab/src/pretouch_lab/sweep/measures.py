@@ -2,18 +2,27 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal, cast
+from typing import Annotated, Any, Literal, cast
 
-from pretouch.checks import Checked, Positive
-from pretouch.control.approach import ApproachRestriction
+import numpy as np
+
+from pretouch.checks import Check, Checked, NonNegative, Positive
+from pretouch.contact.reaction import DecayingVelocity
 from pretouch.errors import ExperimentError
 from pretouch.profiles import Profile
-from pretouch_lab.benchmarks.detection.arm import model
+from pretouch_lab.bench.contacts import ContactCell, contact_stream, touches_of
+from pretouch_lab.bench.contenders import Contender
+from pretouch_lab.bench.detection import BUSY, PERIOD_S, begun, matched, replay
+from pretouch_lab.bench.free import FreeCell, free_stream
+from pretouch_lab.bench.scenes import Sensing, model
+from pretouch_lab.bench.streams import Stream
 from pretouch_lab.experiment import Context
 from pretouch_lab.experiments import avoidance, dynamic, static
 from pretouch_lab.run import Row
-from pretouch_lab.sweep.setting import Setting
+from pretouch_lab.sweep.parameters import Setting
 
+_HAND_RADIUS_M = 0.05
+_DETECTION = ("window", "detect")
 Numbers = dict[str, float | None]
 """What is measured, by its name; None where there is nothing to measure, as the delay of what was not detected."""
 
@@ -33,13 +42,10 @@ class Measure:
     """What it measures: each number's name, and what it is with its unit."""
     run: Callable[[Setting, Any], Numbers]
     """Measures a setting, given what `shared` made of it."""
-    cost_s: Callable[[Setting], float]
-    """Processor time of `run`, about [s]."""
     groups: tuple[str, ...] | None = None
     """Groups of the profile, or single parameters, that can change something; None: all of them."""
     shared: Callable[[Setting], Any] | None = None
     """Makes what cells with the same `Setting.world` have in common: a recorded stream."""
-    shared_cost_s: Callable[[Setting], float] = lambda _: 0.0
 
     def check(self, name: str) -> None:
         """Refuse a parameter of the profile that cannot change anything here."""
@@ -121,35 +127,156 @@ _PEAKS = {
 _FALSE = {"false_detections": "reactions that nothing caused"}
 
 
-def _static_cost(setting: Setting) -> float:
-    slow = isinstance(setting.profile.approach, ApproachRestriction)
-    return (1.6 if slow else 0.3) + 0.006 * (setting.units or 7)
-
-
 CLOSED_LOOP = (
     Measure(
-        "static", "the arm runs into a board (paper IV-A)", "paper:approach=none", StaticScene(),
+        "static",
+        "the arm runs into a board (paper IV-A)",
+        "paper:approach=none",
+        StaticScene(),
         {
-            **_PEAKS, "delay_s": "time from the touch to the reaction [s]",
-            "impact_speed_m_s": "speed of the touch [m/s]", "contact": "whether it touched the board",
-            "missed": "whether a touch was not detected", **_FALSE,
+            **_PEAKS,
+            "delay_s": "time from the touch to the reaction [s]",
+            "impact_speed_m_s": "speed of the touch [m/s]",
+            "contact": "whether it touched the board",
+            "missed": "whether a touch was not detected",
+            **_FALSE,
         },
-        _static, _static_cost,
+        _static,
     ),
     Measure(
-        "avoidance", "a person's hand beside the circle or in it (paper IV-B)", "paper", AvoidanceScene(),
+        "avoidance",
+        "a person's hand beside the circle or in it (paper IV-B)",
+        "paper",
+        AvoidanceScene(),
         {
-            "least_gap_m": "least true distance from the person's hand [m]", "true_peak_n": _PEAKS["true_peak_n"],
-            "deviation_m": "farthest from the path [m]", "travelled_m": "way along the path [m]",
-            "contact": "whether it touched the hand", **_FALSE,
+            "least_gap_m": "least true distance from the person's hand [m]",
+            "true_peak_n": _PEAKS["true_peak_n"],
+            "deviation_m": "farthest from the path [m]",
+            "travelled_m": "way along the path [m]",
+            "contact": "whether it touched the hand",
+            **_FALSE,
         },
-        _avoidance, lambda _: 2.5,
+        _avoidance,
     ),
     Measure(
-        "dynamic", "a person pushes the arm now and then (paper IV-C)", "paper", DynamicScene(),
-        {**_PEAKS, "delay_s": "median time from a push to the reaction [s]",
-         "missed": "part of the pushes not detected", **_FALSE},
-        _dynamic, lambda _: 2.5,
+        "dynamic",
+        "a person pushes the arm now and then (paper IV-C)",
+        "paper",
+        DynamicScene(),
+        {
+            **_PEAKS,
+            "delay_s": "median time from a push to the reaction [s]",
+            "missed": "part of the pushes not detected",
+            **_FALSE,
+        },
+        _dynamic,
     ),
-)  # fmt: skip
+)
 """Experiments in which the arm reacts: every parameter of the profile may matter."""
+
+
+@dataclass(frozen=True)
+class FreeScene(Checked):
+    """An arm that nothing touches."""
+
+    path: Literal["circle", "line", "rest"] = "circle"
+    speed_m_s: NonNegative = 0.3
+    near: Literal["nothing", "standing", "passing"] = "passing"
+    """Who is near."""
+    warm_up_s: Annotated[float, Check(low=2.0, high=3600.0)] = 5.0
+    """Time in which no alarm counts [s]; detectors that learn need a minute."""
+    counted_s: Annotated[float, Check(low=1.0, high=36_000.0)] = 60.0
+    """Time that counts [s]."""
+
+
+@dataclass(frozen=True)
+class ContactScene(Checked):
+    """An arm that is touched again and again, with forces and durations of the detection benchmark."""
+
+    speed_m_s: NonNegative = 0.3
+    warm_up_s: Annotated[float, Check(low=2.0, high=3600.0)] = 5.0
+    """Time before the first contact [s]; detectors that learn need a minute."""
+    contacts: Annotated[int, Check(low=1, high=1000)] = 10
+
+
+def _sensing(setting: Setting) -> Sensing:
+    return Sensing(setting.skin, setting.skin, setting.sensing, _HAND_RADIUS_M)
+
+
+def _detector(setting: Setting) -> Contender:
+    by_force = not setting.profile.detect.by_torques
+    return Contender("swept", setting.profile_text, "f_base_n" if by_force else "scale")
+
+
+def _free_stream(setting: Setting) -> Stream:
+    scene = cast(FreeScene, setting.scene)
+    cell = FreeCell("swept", scene.path, scene.speed_m_s, scene.near, setting.seed, scene.counted_s)
+    return free_stream(cell, setting.plant, _sensing(setting), scene.warm_up_s)
+
+
+def _free(setting: Setting, stream: Stream) -> Numbers:
+    """Count alarms, and say how far the force came from its threshold, on the axis where it came nearest."""
+    scene, detector = cast(FreeScene, setting.scene), _detector(setting)
+    made = replay(stream, detector, model())
+    counted = made.stamp >= scene.warm_up_s
+    busy = DecayingVelocity.of(setting.profile.react, PERIOD_S).decay_cycles
+    alarms = int(counted[begun(made.alarm, busy)].sum())
+    most = float(made.statistic[counted].max(initial=-np.inf))
+    margin = detector.default - most if detector.sweep == "f_base_n" and np.isfinite(most) else None
+    hours = float(counted.sum()) * PERIOD_S / 3600
+    return {"false_alarms_per_hour": alarms / hours, "alarms": float(alarms), "least_margin_n": margin}
+
+
+def _contact_stream(setting: Setting) -> Stream:
+    scene = cast(ContactScene, setting.scene)
+    cell = ContactCell("swept", "swept", scene.speed_m_s, setting.seed, scene.contacts)
+    return contact_stream(cell, setting.plant, _sensing(setting), scene.warm_up_s)
+
+
+def _contacts(setting: Setting, stream: Stream) -> Numbers:
+    """Delay of what was detected, and how much was missed; what fell into the answer to an earlier alarm is neither."""
+    made = replay(stream, _detector(setting), model())
+    found = [delay for delay, _ in matched(touches_of(stream), made.stamp, made.onsets()) if delay != BUSY]
+    delays = [delay for delay in found if delay is not None]
+    return {
+        "delay_s": float(np.median(delays)) if delays else None,
+        "missed": 1.0 - len(delays) / len(found) if found else None,
+    }
+
+
+ON_STREAMS = (
+    Measure(
+        "free-motion",
+        "an arm that nothing touches, somebody passing",
+        "paper",
+        FreeScene(),
+        {
+            "false_alarms_per_hour": "false alarms an hour [1/h]",
+            "alarms": "false alarms counted",
+            "least_margin_n": "what the force missed of a threshold, at the least [N]; negative with an alarm",
+        },
+        _free,
+        (*_DETECTION, "react.decay_cycles"),
+        _free_stream,
+    ),
+    Measure(
+        "contacts",
+        "an arm that is touched on all links and does not react",
+        "paper",
+        ContactScene(),
+        {"delay_s": "median time from a contact to its alarm [s]", "missed": "part of the contacts not detected"},
+        _contacts,
+        _DETECTION,
+        _contact_stream,
+    ),
+)
+"""Experiments whose arm does nothing: only detection and what it is given matter."""
+MEASURES: dict[str, Measure] = {m.name: m for m in (*CLOSED_LOOP, *ON_STREAMS)}
+"""All experiments that can be swept, by name."""
+
+
+def measure(name: str) -> Measure:
+    """Look an experiment up. Raises ExperimentError."""
+    if name not in MEASURES:
+        raise ExperimentError(f"The experiment {name!r} cannot be swept: choose from {', '.join(MEASURES)}.")
+    return MEASURES[name]

@@ -1,0 +1,227 @@
+"""The calibration of many random skins in simulation: how far units are found from where they sit."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import lru_cache
+from time import perf_counter
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from pretouch.calibration.calibrate import calibrate
+from pretouch.calibration.findings import seen_from
+from pretouch.calibration.motion.follow import PlanCommander, plan_controller
+from pretouch.calibration.motion.plan import Plan
+from pretouch.calibration.values import CalibrationData, Place, UnitData
+from pretouch.errors import ExperimentError
+from pretouch.loop import Cycle, Options, run
+from pretouch.ports import NoUnits
+from pretouch.robot.description import robot_named
+from pretouch.robot.model import RobotModel
+from pretouch.sensing.skin import Skin
+from pretouch.sensing.unit import SensorUnit
+from pretouch.sim.imu import ImuParams, Imus, ImuSample, imu_counts
+from pretouch.sim.plant import Plant, PlantClock
+from pretouch.sim.plant_params import PlantParams
+from pretouch.sim.random_skin import random_skin
+from pretouch.sim.scene import SceneSpec
+from pretouch.text_table import TextTable
+from pretouch.traces import ImuTrace, JointTrace
+from pretouch.types import FloatArray
+from pretouch_lab.run import Cell, Row
+from pretouch_lab.table import Column, grouped, table
+
+_TURN, _SHIFT = slice(0, 3), slice(3, 6)
+NOT_FOUND: Row = dict.fromkeys(
+    (
+        "position_error_m",
+        "orientation_error_deg",
+        "position_sigma_m",
+        "orientation_sigma_deg",
+        "nees_position",
+        "nees_orientation",
+        "nees_pose",
+        "clock_error_s",
+    )
+) | {"link_found": False}
+"""Of a unit without an answer, or with one on another link."""
+DATA_SHEET = ImuParams(misalignment_deg=0.0)
+"""The sensors' own errors. How a board is glued on turns the IMU's frame itself, and no IMU can tell it."""
+CLOCK_ERROR_S = 0.02
+"""Each unit's clock is off by up to this [s]."""
+
+_LARGEST_COUNT = 32767
+
+
+def trial(arm: str, plan: Plan, cell: Cell, seed: int) -> Row:
+    """Calibrate a random skin in simulation: a row for each unit, and how long the calibration took [s].
+
+    Each skin has one unit on each link from the second on; the seed draws skin, arm and sensors.
+    """
+    model = _model(arm)
+    skin = random_skin(model, seed)
+    data = simulate(model, skin, plan, seed)
+    if cell["find_links"]:
+        data = replace(data, units=tuple(replace(unit, link=None) for unit in data.units))
+    begin = perf_counter()
+    answers = calibrate(model, data).units
+    took = perf_counter() - begin
+    units = [
+        {"unit": unit.id, "link": unit.link, "accepted": answer.accepted}
+        | (place_row(model, unit, answer.place, late) if answer.place else NOT_FOUND)
+        for unit, answer, late in zip(skin.units, answers, clock_errors(len(skin), seed).tolist(), strict=True)
+    ]
+    return {"units": units, "compute_s": took}
+
+
+@lru_cache
+def _model(arm: str) -> RobotModel:
+    return RobotModel(robot_named(arm))
+
+
+def pose_error(true: FloatArray, found: FloatArray) -> FloatArray:
+    """Error (6,) of a pose (4, 4): rotation vector in the found frame [rad], position in the link frame [m]."""
+    turn = Rotation.from_matrix(found[:3, :3].T @ true[:3, :3]).as_rotvec()
+    return np.concatenate([turn, true[:3, 3] - found[:3, 3]])
+
+
+def error_row(error: FloatArray) -> Row:
+    """Return the sizes of an error (6,) of `pose_error`."""
+    return {
+        "position_error_m": float(np.linalg.norm(error[_SHIFT])),
+        "orientation_error_deg": float(np.degrees(np.linalg.norm(error[_TURN]))),
+    }
+
+
+def place_row(model: RobotModel, unit: SensorUnit, place: Place, late: float) -> Row:
+    """Compare a calibration's answer with the truth.
+
+    Args:
+        model: the arm.
+        unit: as it truly sits.
+        place: the answer. A link that is fixed to the true one is as good as that: no motion can tell them apart.
+        late: by how much the unit's stamps truly are late [s].
+
+    Returns:
+        Errors, standard deviations, and errors squared and divided by the covariance, whose mean is to be the number of
+        their dimensions: 3 of the position, 3 of the orientation, 6 of both.
+    """
+    true, found = (model.link_index(name) for name in (unit.link, place.link))
+    same = bool(np.array_equal(model.moved_by[true], model.moved_by[found]))
+    if not same:
+        return NOT_FOUND
+    here, covariance = seen_from(model, true, found, place.T_link_sensor, place.covariance)
+    error = pose_error(unit.T_link_sensor, here)
+    return error_row(error) | {
+        "position_sigma_m": place.position_sigma,
+        "orientation_sigma_deg": float(np.degrees(place.orientation_sigma)),
+        "nees_position": _normalised(error, covariance, _SHIFT),
+        "nees_orientation": _normalised(error, covariance, _TURN),
+        "nees_pose": _normalised(error, covariance, slice(0, 6)),
+        "clock_error_s": place.clock_offset - late,
+        "link_found": True,
+    }  # fmt: skip
+
+
+def _normalised(error: FloatArray, covariance: FloatArray, part: slice) -> float:
+    return float(error[part] @ np.linalg.solve(covariance[part, part], error[part]))
+
+
+def simulate(
+    model: RobotModel, skin: Skin, plan: Plan, seed: int, imu: ImuParams = DATA_SHEET,
+    clock_error_s: float = CLOCK_ERROR_S, links_known: bool = True,
+) -> CalibrationData:  # fmt: skip
+    """Let an arm follow a plan, and measure; stamps count from its beginning.
+
+    The seed decides errors of arm, sensors and clocks, and all noise: it gives another skin of as many units the same
+    sensors on the same arm.
+    """
+    plant = Plant(model, SceneSpec(), PlantParams(), plan.start, seed)
+    samples: list[ImuSample] = []
+    Imus(plant, skin, imu, seed, samples.append)
+    joints, begin = followed(plant, model, plan)
+    late = clock_errors(len(skin), seed, clock_error_s) - begin
+    units = tuple(
+        UnitData(unit.id, trace, unit.link if links_known else None, *_full_scale(imu))
+        for unit, trace in zip(skin.units, _traces(samples, imu, late), strict=True)
+    )
+    return CalibrationData(JointTrace(joints.stamp - begin, joints.q), units)
+
+
+def followed(plant: Plant, model: RobotModel, plan: Plan) -> tuple[JointTrace, float]:
+    """Let an arm follow a plan; return the joint positions measured meanwhile, and when it began [s]."""
+    controller = plan_controller(model, plan.start)
+    commander = PlanCommander(controller, plan, lambda: plant.time)
+    states: list[tuple[float, FloatArray]] = []
+
+    class Recorder:
+        def record(self, cycle: Cycle) -> None:
+            if commander.begin is not None:
+                states.append((cycle.inputs.robot.stamp, np.array(cycle.inputs.robot.q)))
+
+    clock = PlantClock(plant, controller.limits.period)
+    run(controller, plant, NoUnits(), clock, Recorder(), commander.done, Options(desired=commander))
+    if commander.stopped or commander.begin is None:
+        raise ExperimentError(f"The simulated arm did not follow the plan to its end. {commander.stopped}")
+    return JointTrace(np.array([stamp for stamp, _ in states]), np.array([q for _, q in states])), commander.begin
+
+
+def clock_errors(count: int, seed: int, most: float = CLOCK_ERROR_S) -> FloatArray:
+    """By how much the stamps of each of so many units are late (K,) [s]."""
+    return np.random.default_rng([seed, 12]).uniform(-most, most, count)
+
+
+def _full_scale(imu: ImuParams) -> tuple[float, float]:
+    """Largest value of accelerometer [m/s^2] and gyroscope [rad/s]."""
+    largest = _LARGEST_COUNT * imu_counts(imu)
+    return float(largest[3]), float(largest[0])
+
+
+def _traces(samples: list[ImuSample], imu: ImuParams, late: FloatArray) -> list[ImuTrace]:
+    unit = np.array([sample.unit for sample in samples])
+    time = np.array([sample.time for sample in samples])
+    values = np.array([sample.counts for sample in samples]).reshape(-1, 6) * imu_counts(imu)
+    return [ImuTrace(time[unit == k] + late[k], values[unit == k, 3:], values[unit == k, :3]) for k in range(len(late))]
+
+
+_COLUMNS = (
+    Column("link", "link"),
+    Column("found", "found", of="units"),
+    Column("place\n[mm]", "position_error_m", 2, 1000.0),
+    Column("most\n[mm]", "position_error_m_most", 2, 1000.0),
+    Column("sigma\n[mm]", "position_sigma_m", 2, 1000.0),
+    Column("turn\n[deg]", "orientation_error_deg", 3),
+    Column("most\n[deg]", "orientation_error_deg_most", 3),
+    Column("sigma\n[deg]", "orientation_sigma_deg", 3),
+    Column("NEES\nplace", "nees_position_mean", 1),
+    Column("NEES\nturn", "nees_orientation_mean", 1),
+    Column("NEES\nboth", "nees_pose_mean", 1),
+    Column("clock\n[ms]", "clock_error_s", 2, 1000.0),
+)
+
+
+def tables(rows: Sequence[Row], motion_s: float) -> list[TextTable]:
+    """Show how far our answers are off, and whether they say so, after a motion of so long [s]."""
+    units = [unit for row in rows for unit in row["units"]]
+    links = [(key["link"], some) for key, some in grouped(units, ("link",))]
+    note = (
+        "Medians; NEES, the error squared over its covariance, are means: 3, 3 and 6 if the covariance is honest."
+        " Sigma: in the worst direction. Clock: error of the found offset, which is up to 20 ms either way. Computing"
+        f" takes {np.median([row['compute_s'] for row in rows]):.1f} s a skin. Sensor errors are the data sheet's; how"
+        " a board is glued on is left out, for no IMU can tell it."
+    )
+    title = (
+        f"Where units sit, found in {motion_s:.0f} s of motion: {len(links)} units on each of {len(rows)} random skins"
+    )
+    return [table(title, _COLUMNS, [_errors(name, some) for name, some in (*links, ("all", units))], note)]
+
+
+def _errors(name: str, units: list[Row]) -> Row:
+    """Median size, largest and mean of each number of some units, None where none has it."""
+    made: Row = {"link": name, "units": len(units), "found": sum(unit["link_found"] for unit in units)}
+    for key in NOT_FOUND:
+        values = np.abs([unit[key] for unit in units if unit[key] is not None])
+        statistics = (np.median, np.max, np.mean)
+        numbers = [float(of(values)) for of in statistics] if len(values) else [None] * 3
+        made |= dict(zip((key, f"{key}_most", f"{key}_mean"), numbers, strict=True))
+    return made

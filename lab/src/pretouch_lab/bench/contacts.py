@@ -1,0 +1,219 @@
+"""Contacts: true forces on the surface of an arm that does not react, brought by a hand that the skin may see."""
+
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+
+from pretouch.robot.body import placed
+from pretouch.robot.postures import brought_to
+from pretouch.sim.plant import Plant, PointForce
+from pretouch.sim.plant_params import PlantParams
+from pretouch.types import FloatArray
+from pretouch_lab.bench.dense_skin import gap, surface
+from pretouch_lab.bench.scenes import SeedRange, Sensing, model, numbered, path_of, scenario
+from pretouch_lab.bench.streams import AWAY, Alone, Stream, record
+
+_TRIES = 400
+_SINK_M = 0.002
+"""How deep the hand may seem to be in the arm where it touches it [m]."""
+
+
+@dataclass(frozen=True)
+class Touching:
+    """One contact: a force that rises, holds and falls, at a point fixed to a link."""
+
+    link: int
+    """Index of the link."""
+    kind: int
+    """Index of the kind in the scenario file."""
+    force_n: float
+    """Largest force [N]."""
+    rise_s: float
+    duration_s: float
+    """From the start of the rise to the end of the fall [s]."""
+    start: float
+    """[s]"""
+    point: FloatArray
+    """(3,) link frame [m]."""
+    normal: FloatArray
+    """(3,) outward unit normal there, link frame."""
+    inwards: FloatArray
+    """(3,) unit vector of the force on the arm, link frame."""
+
+    @property
+    def end(self) -> float:
+        """When the force is gone [s]."""
+        return self.start + self.duration_s
+
+    def size_n(self, time: float) -> float:
+        """Size of the force [N] at a time [s]."""
+        edge = min(time - self.start, self.end - time) / self.rise_s
+        return self.force_n * min(1.0, edge) if edge > 0 else 0.0
+
+    def onset(self, of_n: float) -> float:
+        """When the force passes a size [s]."""
+        return self.start + self.rise_s * of_n / self.force_n
+
+
+@dataclass(frozen=True)
+class ContactCell:
+    """One arm, touched again and again."""
+
+    kind: str
+    sensing: str
+    speed_m_s: float
+    seed: int
+    count: int
+    """Contacts."""
+    world: str = ""
+    """Set of the domain randomisation of which the seed draws one, or none."""
+
+    @property
+    def name(self) -> str:
+        """Name for files."""
+        return f"{self.kind}_{self.sensing}_{self.speed_m_s:g}_{self.seed:04d}"
+
+
+def contact_cells(seeds: SeedRange, quick: bool) -> list[ContactCell]:
+    """Return the cells of the scenario file."""
+    family = scenario("contacts")
+    count = family["contact"]["quick" if quick else "full"]
+    return [
+        ContactCell(cell["kind"], cell["sensing"], cell["speed_m_s"], seed, count)
+        for cell, seed in numbered(family, family["cell"], seeds, quick)
+    ]
+
+
+def plan(cell: ContactCell, hand_radius: float, warm_up_s: float | None = None) -> list[Touching]:
+    """Draw a cell's contacts: the seed says where, how and when.
+
+    The first is after a warm-up [s], the scenario file's unless another is given.
+    """
+    family, rng = scenario("contacts"), np.random.default_rng([cell.seed, 32])
+    chosen, kinds = family["contact"], family["contact"]["kind"]
+    every = [(k, duration) for k, kind in enumerate(kinds) for duration in kind["durations_s"]]
+    at, found = float(family["duration"]["warm_up_s"] if warm_up_s is None else warm_up_s), []
+    q = start_posture()
+    for _ in range(cell.count):
+        k, duration = every[int(rng.integers(len(every)))]
+        name = chosen["links"][int(rng.integers(len(chosen["links"])))]
+        link = model().link_index(f"{model().description.name}_{name}")
+        point, normal = place_on(link, q, hand_radius, rng, family["hand"]["from_m"])
+        inwards = chosen["tilt"] * rng.uniform(-1, 1, 3) - normal
+        force = float(rng.choice(chosen["forces_n"]))
+        touch = Touching(
+            link, k, force, kinds[k]["rise_s"], duration, at, point, normal, inwards / np.linalg.norm(inwards)
+        )  # fmt: skip
+        found.append(touch)
+        at = touch.end + rng.uniform(*family["duration"]["gap_s"])
+    return found
+
+
+def start_posture() -> FloatArray:
+    """Joint positions (n,) in which the paths begin [rad]."""
+    return brought_to(model(), path_of("rest").point(0.0))
+
+
+def place_on(
+    link: int, q: FloatArray, radius: float, rng: np.random.Generator, from_m: float
+) -> tuple[FloatArray, FloatArray]:
+    """Draw a point and normal (3,) of a link's surface that a hand can come to along the normal, link frame.
+
+    That is judged in one posture (n,) [rad]. Where no free place is found, the last one drawn is taken.
+    """
+    kin, arm = model().kinematics(q), model().capsules
+    _, a, b, _ = placed(arm, kin)
+    own = arm.of_links(np.array([link]))
+    for _ in range(_TRIES):
+        c = int(rng.integers(len(own.radius)))
+        foot, normal = surface(own.a[c], own.b[c], rng.uniform(0, 2 * np.pi), rng.uniform())
+        point = foot + own.radius[c] * normal
+        ways = point + np.outer(radius + np.linspace(0.0, from_m, 9), normal)
+        if gap(ways @ kin.rotation[link].T + kin.position[link], a, b, arm.radius).min() > radius - _SINK_M:
+            break
+    return point, normal
+
+
+class Toucher:
+    """Lays planned forces on an arm, and says where the hand is that brings them."""
+
+    def __init__(self, plant: Plant, touches: list[Touching], hand_radius: float) -> None:
+        """Attach to a plant: forces act from then on, whatever the arm does."""
+        hand = scenario("contacts")["hand"]
+        self._plant, self._touches, self._radius = plant, touches, hand_radius
+        self._from, self._speed = hand["from_m"], hand["speed_m_s"]
+        self._way_s = self._from / self._speed
+        self._next = 0
+        self._pushed = 0
+        plant.before_each_step(self._push)
+
+    def _current(self, time: float) -> Touching | None:
+        """Return the contact whose hand is on its way or there, None in between."""
+        while self._next + 1 < len(self._touches) and time >= self._touches[self._next + 1].start - self._way_s:
+            self._next += 1
+        touch = self._touches[self._next] if self._touches else None
+        if touch is None or not touch.start - self._way_s <= time <= touch.end + self._way_s:
+            return None
+        return touch
+
+    def _push(self, time: float) -> None:
+        """Let the force of now act: MuJoCo's applied force acts at a body's centre of mass."""
+        data, touch = self._plant.mj_data, self._current(time)
+        data.xfrc_applied[self._pushed] = 0.0
+        if touch is None or touch.size_n(time) <= 0.0:
+            return
+        self._pushed = touch.link
+        (laid,) = self.forces(time)
+        at, force = laid.point, laid.force
+        wrench = data.xfrc_applied[touch.link]
+        wrench[:3] = force
+        wrench[3:] = np.cross(at - data.xipos[touch.link], force)
+
+    def forces(self, time: float) -> list[PointForce]:
+        """Return the force that acts at a time, for sensors of forces without a contact of the simulation."""
+        touch = self._current(time)
+        if touch is None or touch.size_n(time) <= 0.0:
+            return []
+        rotation = self._plant.link_rotation[touch.link]
+        at = self._plant.link_position[touch.link] + rotation @ touch.point
+        return [PointForce(touch.link, at, touch.size_n(time) * (rotation @ touch.inwards))]
+
+    def hand(self, time: float) -> FloatArray:
+        """Where the hand's centre is at a time (3,) [m], base frame."""
+        touch = self._current(time)
+        if touch is None:
+            return AWAY
+        off = self._speed * max(touch.start - time, time - touch.end, 0.0)
+        rotation, origin = self._plant.link_rotation[touch.link], self._plant.link_position[touch.link]
+        return np.asarray(origin + rotation @ (touch.point + (self._radius + off) * touch.normal))
+
+
+def contact_stream(cell: ContactCell, plant: PlantParams, sensing: Sensing, warm_up_s: float | None = None) -> Stream:
+    """Let an arm be touched and return its stream, with its contacts in it: `touch.NAME` for each field of `Touching`.
+
+    `cell` says how fast, how often and with which seed; `plant` and `sensing` on which arm.
+    """
+    touches = plan(cell, sensing.hand_radius, warm_up_s)
+    path = path_of("circle" if cell.speed_m_s > 0 else "rest")
+    end = touches[-1].end + scenario("contacts")["judged"]["late_s"] + 0.1
+    what = Alone(path, cell.speed_m_s, plant, sensing, sensing.hand_radius, cell.seed, end, cell.world)
+    stream = record(what, lambda plant: Toucher(plant, touches, sensing.hand_radius).hand)
+    return replace(stream, truth=described(touches, sensing.hand_radius))
+
+
+def described(touches: list[Touching], hand_radius: float) -> dict[str, FloatArray]:
+    """Return contacts as arrays for a stream."""
+    names = [f.name for f in fields(Touching)]
+    arrays = {f"touch.{name}": np.array([getattr(touch, name) for touch in touches]) for name in names}
+    return arrays | {"hand_radius": np.array(hand_radius)}
+
+
+def touches_of(stream: Stream) -> list[Touching]:
+    """Return the contacts of a recorded stream."""
+    found = []
+    for i in range(len(stream.truth["touch.start"])):
+        row: dict[str, Any] = {f.name: stream.truth[f"touch.{f.name}"][i] for f in fields(Touching)}
+        row["link"], row["kind"] = int(row["link"]), int(row["kind"])
+        found.append(Touching(**row))
+    return found

@@ -1,0 +1,108 @@
+"""Free motion: arms that nothing touches, some with somebody near, recorded once (`scenarios/free.toml`)."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pretouch.loop import Cycle
+from pretouch.robot.body import placed
+from pretouch.sim.plant import Plant
+from pretouch.sim.plant_params import PlantParams
+from pretouch.types import FloatArray
+from pretouch_lab.bench.dense_skin import gap
+from pretouch_lab.bench.scenes import SeedRange, Sensing, model, numbered, path_of, scenario
+from pretouch_lab.bench.streams import AWAY, Alone, Prepare, Stream, record
+from pretouch_lab.replay import Ghost
+
+_HAND_SIDE_M = 0.102
+"""How far the arm's hand reaches out to the side of its origin [m]."""
+_HAND_FRONT_M = 0.13
+"""How far hand and wrist reach out to the front [m]."""
+_LOOK_EVERY = 10
+
+
+@dataclass(frozen=True)
+class FreeCell:
+    """One arm on one path."""
+
+    kind: str
+    path: str
+    speed_m_s: float
+    near: str
+    """nothing, standing or passing."""
+    seed: int
+    counted_s: float
+    """Time that counts [s], after the warm-up."""
+    world: str = ""
+    """Set of the domain randomisation of which the seed draws one, or none."""
+
+    @property
+    def name(self) -> str:
+        """Name for files."""
+        return f"{self.kind}_{self.path}_{self.speed_m_s:g}_{self.near}_{self.seed:04d}"
+
+
+def free_cells(seeds: SeedRange, quick: bool) -> list[FreeCell]:
+    """Return the cells of the scenario file."""
+    family = scenario("free")
+    counted = float(family["duration"]["quick_s" if quick else "full_s"])
+    return [
+        FreeCell(arm["kind"], arm["path"], arm["speed_m_s"], arm["near"], seed, counted)
+        for arm, seed in numbered(family, family["arm"], seeds, quick)
+    ]
+
+
+def warm_up_s() -> float:
+    """Return the time in which no alarm counts [s]."""
+    return float(scenario("free")["duration"]["warm_up_s"])
+
+
+def free_stream(cell: FreeCell, plant: PlantParams, sensing: Sensing, before_s: float) -> Stream:
+    """Let an arm move that nothing touches, and return its stream; `before_s` [s] come before what counts.
+
+    How near the ghost truly came is in it as `least_gap`. `cell` says on which path, how fast, who is near and with
+    which seed; `plant` and `sensing` say which arm it is.
+    """
+    near = scenario("free")["near"]
+    what = Alone(
+        path_of(cell.path), cell.speed_m_s, plant, sensing, near["radius_m"], cell.seed, before_s + cell.counted_s,
+        cell.world,
+    )  # fmt: skip
+    nearest, steps = [np.inf], [0]
+
+    def look(_plant: Plant, ghost: Ghost, cycle: Cycle) -> None:
+        steps[0] += 1
+        if steps[0] % _LOOK_EVERY == 0:
+            kin, body = model().kinematics(cycle.step.q), model().body
+            _, a, b, _ = placed(body, kin)
+            nearest[0] = min(nearest[0], float(gap(ghost.position[None], a, b, body.radius)[0]) - near["radius_m"])
+
+    stream = record(what, _bystander(cell), look)
+    return replace(stream, truth={"least_gap": np.array(nearest)})
+
+
+def _bystander(cell: FreeCell) -> Prepare:
+    """Return what has somebody stand beside the path, or come and go there; the seed says where."""
+    near, rng = scenario("free")["near"], np.random.default_rng([cell.seed, 31])
+    closest = rng.uniform(*near["gap_m"])
+    side, off = rng.choice([-1.0, 1.0]), rng.uniform(-0.1, 0.1, 2)
+
+    def place(gap_m: float) -> FloatArray:
+        if cell.path == "line":
+            return np.array([0.4 + _HAND_FRONT_M + gap_m + near["radius_m"], 2 * off[0], 0.5 + 0.5 * off[1]])
+        out = side if cell.path == "circle" else 1.0
+        return np.array([0.5 + off[0], out * (0.25 + _HAND_SIDE_M + gap_m + near["radius_m"]), 0.25 + off[1]])
+
+    way = near["passing_from_m"] - closest
+    there_s = way / near["passing_speed_m_s"]
+    cycle_s = near["passing_wait_s"] + 2 * there_s
+
+    def passing(time: float) -> FloatArray:
+        since = time % cycle_s - near["passing_wait_s"]
+        if since < 0:
+            return AWAY
+        part = since / there_s if since < there_s else 2.0 - since / there_s
+        return place(near["passing_from_m"] - part * way)
+
+    standing = AWAY if cell.near == "nothing" else place(closest)
+    return lambda plant: passing if cell.near == "passing" else lambda _time: standing

@@ -1,0 +1,133 @@
+"""Arms as unkind as real ones, in motions other than circle and line: free, or touched (`scenarios/hard.toml`)."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from pretouch.profiles import profile
+from pretouch.robot.body import placed
+from pretouch.sim.plant import Plant
+from pretouch.sim.plant_params import PlantParams
+from pretouch.types import FloatArray
+from pretouch_lab.bench.contacts import Toucher, Touching, described, place_on
+from pretouch_lab.bench.dense_skin import gap
+from pretouch_lab.bench.motions import Motion, WanderingController, motion_of
+from pretouch_lab.bench.scenes import SeedRange, model, numbered, path_of, scenario, sensing_of
+from pretouch_lab.bench.streams import AWAY, PROFILE, Alone, Prepare, Stream, record
+
+WORLD = "hard"
+"""Set of the domain randomisation of which each seed draws its arm."""
+_TRIES = 300
+_LOOKED_AT = 150
+"""Places of a bystander that are drawn, and postures of the motion that each is held against."""
+
+
+@dataclass(frozen=True)
+class HardCell:
+    """One arm in one motion."""
+
+    motion: str
+    near: str
+    """nothing or standing; touched: a hand comes, touches and goes, again and again."""
+    seed: int
+    counted_s: float
+    """Time that counts [s], after the warm-up; of one that is touched about so much."""
+
+    @property
+    def name(self) -> str:
+        """Name for files."""
+        return f"{self.motion}_{self.near}_{self.seed:04d}"
+
+
+def hard_cells(seeds: SeedRange, quick: bool) -> list[HardCell]:
+    """Return the cells of the scenario file."""
+    family = scenario("hard")
+    counted, number = family["duration"]["quick_s" if quick else "full_s"], _touches(quick)
+    touched_s = number * (np.mean(family["contact"]["gap_s"]) + np.mean(family["contact"]["durations_s"]))
+    entries = [*family["cell"], *({**touched, "near": "touched"} for touched in family["touched"])]
+    return [
+        HardCell(entry["motion"], entry["near"], seed, float(touched_s if entry["near"] == "touched" else counted))
+        for entry, seed in numbered(family, entries, seeds, quick)
+    ]
+
+
+def _touches(quick: bool) -> int:
+    return int(scenario("hard")["contact"]["quick" if quick else "full"])
+
+
+def hard_stream(cell: HardCell, quick: bool) -> Stream:
+    """Let an arm move and return its stream: what it carried as `load` of each step, with its contacts if touched."""
+    family, sensing = scenario("hard"), sensing_of("nominal", cell.seed)
+    warm_up = family["duration"]["warm_up_s"]
+    motion = motion_of(cell.motion, cell.seed, warm_up + 2.0 * cell.counted_s)
+    touches = _touched(cell, motion, _touches(quick)) if cell.near == "touched" else []
+    end = touches[-1].end + scenario("contacts")["judged"]["late_s"] + 0.1 if touches else warm_up + cell.counted_s
+    radius = sensing.hand_radius if touches else family["near"]["radius_m"]
+    what = Alone(
+        path_of("rest"), profile(PROFILE).task.speed_m_s, PlantParams(), sensing, radius, cell.seed, end, WORLD,
+        motion.course.at(0.0)[0], partial(WanderingController, motion.course),
+    )  # fmt: skip
+    stream = record(what, _prepared(cell, motion, touches, sensing.hand_radius))
+    truth = {"load": np.array([motion.load(stamp) for stamp in stream.stamp])}
+    return replace(stream, truth=truth | (described(touches, sensing.hand_radius) if touches else {}))
+
+
+def _prepared(cell: HardCell, motion: Motion, touches: list[Touching], hand_radius: float) -> Prepare:
+    """Return what has the arm grip, and a hand touch it or somebody stand beside it."""
+
+    def prepare(plant: Plant) -> Callable[[float], FloatArray]:
+        waiting = list(motion.loads)
+
+        def grip(time: float) -> None:
+            while waiting and waiting[0][0] <= time:
+                plant.grip(waiting.pop(0)[1])
+
+        plant.before_each_step(grip)
+        if touches:
+            return Toucher(plant, touches, hand_radius).hand
+        place = _beside(motion, cell.seed) if cell.near == "standing" else AWAY
+        return lambda _time: place
+
+    return prepare
+
+
+def _beside(motion: Motion, seed: int) -> FloatArray:
+    """Draw a place (3,) [m] for somebody beside a motion: where none is as near as wanted, the best that was drawn."""
+    near, rng, body = scenario("hard")["near"], np.random.default_rng([seed, 62]), model().body
+    times = np.linspace(0.0, float(motion.course.start[-1]), _LOOKED_AT)
+    swept = [placed(body, model().kinematics(motion.course.at(time)[0])) for time in times]
+    low, high = near["gap_m"]
+    best, found = np.inf, AWAY
+    for _ in range(_TRIES):
+        place = rng.uniform([-0.9, -0.9, 0.0], [0.9, 0.9, 1.2])
+        least = min(float(gap(place[None], a, b, body.radius)[0]) for _, a, b, _ in swept) - near["radius_m"]
+        off = max(low - least, least - high, 0.0)
+        if off < best:
+            best, found = off, place
+        if not off:
+            break
+    return found
+
+
+def _touched(cell: HardCell, motion: Motion, number: int) -> list[Touching]:
+    """Draw the contacts of an arm: the seed says where, how and when."""
+    family, rng, arm = scenario("hard"), np.random.default_rng([cell.seed, 63]), model()
+    chosen, hand = family["contact"], scenario("contacts")["hand"]
+    radius, at, found = sensing_of("nominal", cell.seed).hand_radius, float(family["duration"]["warm_up_s"]), []
+    for _ in range(number):
+        link = arm.link_index(f"{arm.description.name}_{chosen['links'][int(rng.integers(len(chosen['links'])))]}")
+        point, normal = place_on(link, motion.course.at(at)[0], radius, rng, hand["from_m"])
+        inwards = chosen["tilt"] * rng.uniform(-1, 1, 3) - normal
+        touch = Touching(
+            link, _PUSH, float(rng.choice(chosen["forces_n"])), chosen["rise_s"],
+            float(rng.choice(chosen["durations_s"])), at, point, normal, inwards / np.linalg.norm(inwards),
+        )  # fmt: skip
+        found.append(touch)
+        at = touch.end + rng.uniform(*chosen["gap_s"])
+    return found
+
+
+_PUSH = 1
+"""The kind of these contacts in contacts.toml."""

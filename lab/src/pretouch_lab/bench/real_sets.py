@@ -1,0 +1,240 @@
+"""Public sets of recordings of real arms: where each comes from, what is read of it, and its external torques.
+
+These are the product's observer's, less what half of the runs says of load and friction.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from zipfile import BadZipFile
+
+import numpy as np
+from scipy.signal import lfilter
+
+from pretouch.errors import ExperimentError
+from pretouch.imported_data.log import Choice, Log
+from pretouch.imported_data.torques import TorqueRecording, observed, torque_recording
+from pretouch.params import SequentialParams
+from pretouch.robot.description import robot_named
+from pretouch.robot.model import RobotModel
+from pretouch.types import BoolArray, FloatArray, IntArray
+from pretouch.values import value
+
+_APART_S = 1.0
+"""Time laid between runs [s]: more than what the observer and a contact's end take."""
+_COULOMB_RAD_S = 0.05
+"""Width of a joint's turning, over which Coulomb friction changes its sign [rad/s]."""
+_SHARED_NM = 1e-9
+"""Below it a load shows in no torque [Nm^2]."""
+
+
+@value
+class Run:
+    """One recording: N samples of n joints, in the order of time."""
+
+    name: str
+    time: FloatArray
+    """(N,) [s]."""
+    q: FloatArray
+    """(N, n) [rad]."""
+    qd: FloatArray
+    """(N, n) [rad/s]."""
+    torque: FloatArray
+    """(N, n) that drives the joints, gravity in it [Nm]."""
+    label: IntArray
+    """(N,) 1 in a contact, 0 in free motion, -1 where that is not sure."""
+    joints: tuple[int, ...] = ()
+    """Numbers, from 1, of the joints that move the touched link as the last one; () where the link is not named."""
+
+    @property
+    def touched(self) -> bool:
+        """Whether it has a contact."""
+        return bool((self.label == 1).any())
+
+
+@dataclass(frozen=True)
+class RealSet:
+    """A set by its name."""
+
+    name: str
+    arm: str
+    """panda, or the name of a folder of `arms`."""
+    place: str
+    """Its files under the folder of all sets, as a pattern."""
+    source: str
+    read: Callable[[list[Path]], list[Run]]
+    of_currents: bool = False
+    """Whether motor currents were measured, with the friction of the gears in them."""
+
+    def files(self, folder: Path) -> list[Path]:
+        """Its files that are there."""
+        return sorted(folder.glob(self.place))
+
+    def arm_of(self, folder: Path) -> str:
+        """The arm as `robot_named` takes it."""
+        return self.arm if self.arm == "panda" else str(folder / "arms" / self.arm)
+
+
+_BY_NAME = {"2link": (2,), "3link": (3,), "wrist": (4, 5, 6)}
+"""What the names of the UR10e's runs say of the touched link, as numbers of joints."""
+_GLOVE = {"q": "q", "qd": "dq", "torque": "tau_J"}
+"""Columns, less the number of the joint from 0."""
+
+
+def _of_arrays(files: list[Path]) -> list[Run]:
+    """Read a file of NumPy arrays t, q, dq, tau and run, with label, ok and run_name where it has them."""
+    try:
+        with np.load(files[0], allow_pickle=False) as stored:
+            data = {name: stored[name] for name in stored.files}
+    except (ValueError, OSError, BadZipFile) as error:
+        raise ExperimentError(f"{files[0]} is no file of NumPy arrays ({error}): get it again.") from error
+    if missing := {"t", "q", "dq", "tau", "run"} - set(data):
+        raise ExperimentError(f"{files[0]} has no {', '.join(sorted(missing))}: get it again, or take it away.")
+    label = data.get("label", np.zeros(len(data["t"]), np.int64))
+    found = []
+    for number in np.unique(data["run"]):
+        # what the logger missed is interpolated in the file: left out, so that the observer steps over it
+        own = (data["run"] == number) & data.get("ok", np.True_)
+        name = str(data["run_name"][number]) if "run_name" in data else f"run {number}"
+        joints = next((joints for part, joints in _BY_NAME.items() if part in name), ())
+        found.append(_run(name, [data[key][own] for key in ("t", "q", "dq", "tau")], label[own], joints))
+    return found
+
+
+def _of_glove(files: list[Path]) -> list[Run]:
+    """Read tables of contactInterpretation, one a contact place and motion, in a folder for each link.
+
+    The measured torques `tau_J` go through our own observer. The file's external ones, `tau_ext`, are not used: nothing
+    there says whose they are. By two of its files they are by the robot on its environment.
+    """
+    return [_glove_run(file) for file in files]
+
+
+def _glove_run(file: Path) -> Run:
+    with file.open(encoding="utf-8") as lines:
+        names = lines.readline().strip().split(",")
+        wanted = ["time", *(f"{name}{j}" for name in _GLOVE.values() for j in range(7)), "label"]
+        if missing := [name for name in wanted if name not in names]:
+            raise ExperimentError(f"{file} has no column {missing[0]}: get it again, or take it away.")
+        table = np.loadtxt(lines, delimiter=",", usecols=[names.index(name) for name in wanted], ndmin=2)
+    parts = [table[:, 0], *np.split(table[:, 1:-1], len(_GLOVE), axis=1)]
+    link = file.parent.name.removeprefix("link")
+    return _run(f"{file.parent.name}/{file.stem}", parts, table[:, -1], (int(link),) if link.isdecimal() else ())
+
+
+def _run(name: str, parts: list[FloatArray], label: FloatArray, joints: tuple[int, ...]) -> Run:
+    """Leave out what is not finite, and samples that are not later than those before."""
+    time, q, qd, torque = (np.asarray(part, np.float64) for part in parts)
+    finite = np.isfinite(np.column_stack([time, q, qd, torque])).all(axis=1)
+    latest = np.maximum.accumulate(np.where(finite, time, -np.inf))
+    usable = finite & np.append(np.True_, time[1:] > latest[:-1])
+    return Run(name, time[usable], q[usable], qd[usable], torque[usable], label[usable].astype(np.int64), joints)
+
+
+SETS = (
+    RealSet("franka_fast", "panda", "franka_fast.npz", "alisrour97/Franka_experiments", _of_arrays),
+    RealSet("lwr4", "lwr4", "lwr4.npz", "kjyv/FloBaRoID", _of_arrays),
+    RealSet(
+        "rokae_yl", "xmate", "rokae_yl.npz", "YanjunLIU-ac/Dynamic_Parameter_Identification_for_Rokae_xMate", _of_arrays
+    ),
+    RealSet(
+        "ur10e_contact", "ur10e", "ur10e_contact.npz", "shamilmamedov/dynamic_calibration", _of_arrays, of_currents=True
+    ),
+    RealSet(
+        "contactInterpretation", "panda", "contactInterpretation/link*/*.csv",
+        "rezayati/contactInterpretation, the folders dataset/franka_main/labeled_data/link*", _of_glove,
+    ),
+)  # fmt: skip
+"""All sets. None of them is part of this package: their repositories on GitHub state no licence or LGPL-3."""
+
+
+def sets_in(folder: Path) -> tuple[list[RealSet], list[str]]:
+    """Return the sets that a folder holds with their arms, and a sentence for each that is left out for want of one.
+
+    Raises ExperimentError where there is none.
+    """
+    there = [each for each in SETS if each.files(folder)]
+    usable = [each for each in there if each.arm == "panda" or Path(each.arm_of(folder)).is_dir()]
+    said = [
+        f"{each.name} is left out, for {each.arm_of(folder)} is missing: make it with `pretouch robot import`."
+        for each in there if each not in usable
+    ]  # fmt: skip
+    if not usable:
+        known = "; ".join(f"{each.place} (github.com/{each.source})" for each in SETS)
+        raise ExperimentError(" ".join([f"{folder} has no set that can be played. Looked for were {known}.", *said]))
+    return usable, said
+
+
+@value
+class Stream:
+    """Runs one after the other as one recording. M samples of n joints."""
+
+    recording: TorqueRecording
+    label: IntArray
+    """(M,) as of `Run`."""
+    run: IntArray
+    """(M,) which run a sample is of, as its number in the set."""
+    load: FloatArray
+    """(M, n) what a mass of 1 kg at the end-effector changes of the external torques [Nm]."""
+
+    def only(self, runs: Sequence[int]) -> "Stream":
+        """Return some runs, in this order."""
+        parts = [np.flatnonzero(self.run == number) for number in runs]
+        at = np.concatenate(parts)
+        r, begin, time = self.recording, 0.0, []
+        for part in parts:
+            time.append(r.time[part] - r.time[part[0]] + begin)
+            begin = float(time[-1][-1]) + _APART_S
+        kept = replace(
+            r, time=np.concatenate(time), q=r.q[at], qd=r.qd[at], qd_commanded=r.qd_commanded[at], tau_ext=r.tau_ext[at]
+        )
+        return Stream(kept, self.label[at], self.run[at], self.load[at])
+
+    @property
+    def free(self) -> BoolArray:
+        """(M,) whether nobody touches the arm and its torques are known."""
+        return np.asarray((self.label == 0) & np.isfinite(self.recording.tau_ext).all(axis=1))
+
+
+def model_of(real: RealSet, folder: Path) -> RobotModel:
+    """Return the arm of a set."""
+    return RobotModel(robot_named(real.arm_of(folder)))
+
+
+def stream_of(real: RealSet, runs: Sequence[Run], model: RobotModel) -> Stream:
+    """Bring all runs of a set to external torques, as `pretouch detect` does."""
+    begin, time = 0.0, []
+    for run in runs:
+        time.append(run.time - run.time[0] + begin)
+        begin = float(time[-1][-1]) + _APART_S
+    kind = "current" if real.of_currents else "tau"
+    arrays = {"q": [r.q for r in runs], "dq": [r.qd for r in runs], kind: [r.torque for r in runs]}
+    joints = {name: np.concatenate(parts) for name, parts in arrays.items()}
+    stamps = np.round(np.concatenate(time) * 1e9).astype(np.int64)
+    log = Log(Path(real.name), model, stamps, joints, dict.fromkeys(joints, real.name))
+    gains = (1.0,) * model.n if real.of_currents else ()
+    r = torque_recording(log, Choice(gains=gains))
+    loaded = observed(model, r.time, r.q, r.qd, joints[kind], SequentialParams().observer_gain_1_s, 1.0)
+    numbers = np.repeat(np.arange(len(runs)), [len(run.time) for run in runs])
+    return Stream(r, np.concatenate([run.label for run in runs]), numbers, loaded - r.tau_ext)
+
+
+def corrected(stream: Stream, learnt: Sequence[int]) -> Stream:
+    """Take away what the free motion of some runs tells of load, offsets and friction.
+
+    One mass at the end-effector, and for each joint an offset, viscous and Coulomb friction, by least squares. The
+    observer delays friction, so what explains it is delayed alike.
+    """
+    r, gain = stream.recording, SequentialParams().observer_gain_1_s / stream.recording.rate
+    keep, fitted = 1.0 / (1.0 + gain), stream.free & np.isin(stream.run, learnt)
+    friction = np.stack([np.ones_like(r.qd), *(
+        lfilter([1.0 - keep], [1.0, -keep], values, axis=0) for values in (r.qd, np.tanh(r.qd / _COULOMB_RAD_S))
+    )], axis=2)  # fmt: skip
+    x, y, load = friction[fitted], r.tau_ext[fitted], stream.load[fitted]
+    inverse = [np.linalg.pinv(x[:, j]) for j in range(r.model.n)]
+    apart = [np.stack([v[:, j] - x[:, j] @ (inverse[j] @ v[:, j]) for j in range(r.model.n)]) for v in (y, load)]
+    # the mass first, by what friction does not explain of either; then friction by what is left
+    mass = -float((apart[0] * apart[1]).sum() / max((apart[1] ** 2).sum(), _SHARED_NM))
+    left = r.tau_ext + mass * stream.load
+    told = np.stack([friction[:, j] @ (inverse[j] @ left[fitted, j]) for j in range(r.model.n)], axis=1)
+    return replace(stream, recording=replace(r, tau_ext=left - told))

@@ -1,1 +1,0 @@
-"""Contact detectors held against each other: free motion, contacts, and boards that stay where they are."""

@@ -1,1 +1,0 @@
-"""The localisation benchmark: where contacts are said to be, held against where they are."""

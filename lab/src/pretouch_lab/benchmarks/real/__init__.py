@@ -1,1 +1,0 @@
-"""Contact detectors on public recordings of real arms."""

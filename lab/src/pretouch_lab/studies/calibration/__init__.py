@@ -1,1 +1,0 @@
-"""The calibration of the skin in simulation, beside the method of the literature."""

@@ -1,0 +1,255 @@
+"""`pretouch bench real` on fabricated recordings: adapters, halves, correction, the count."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.imported_data.files import write_csv
+from tests.imported_data.joint_files import Moving
+
+from pretouch import cli
+from pretouch.errors import ExperimentError
+from pretouch.recording.compare import DetectedContact
+from pretouch_lab.bench import real as bench
+from pretouch_lab.bench.real import Said, Tally, halves, parted, tally, trial
+from pretouch_lab.bench.real_sets import SETS, Run, Stream, corrected, sets_in, stream_of
+
+FRANKA, UR10E, GLOVE = SETS[0], SETS[3], SETS[4]
+PUSH = (3.0, 0.5, "panda_link5", (0.0, 30.0, 0.0))
+
+
+@pytest.fixture(scope="module")
+def motions(panda_model):
+    """Four free motions with a load of 1.5 kg, unlike each other in their noise alone."""
+    return [Moving(panda_model, 6.0, rate=250.0, payload=1.5, seed=seed) for seed in range(4)]
+
+
+def arrays(motions, **more):
+    """What a file of arrays holds of motions."""
+    kinds = {"t": "time", "q": "q", "dq": "qd", "tau": "driving"}
+    joined = {name: np.concatenate([getattr(m, kind) for m in motions]) for name, kind in kinds.items()}
+    return joined | {"run": np.repeat(np.arange(len(motions)), [len(m.time) for m in motions])} | more
+
+
+def run_of(motion):
+    return Run("made", motion.time, motion.q, motion.qd, motion.driving, np.zeros(len(motion.time), np.int64), ())
+
+
+@pytest.fixture(scope="module")
+def stream(motions, panda_model):
+    return stream_of(FRANKA, [run_of(motion) for motion in motions], panda_model)
+
+
+def test_a_file_of_arrays_is_read_run_by_run_without_what_the_logger_missed(tmp_path, motions):
+    n = len(motions[0].time)
+    ok, label = np.ones(2 * n, np.bool_), np.zeros(2 * n, np.int8)
+    ok[10:20], label[n + 50 : n + 60], label[n + 60 : n + 70] = False, 1, -1
+    given = arrays(motions[:2], ok=ok, label=label, run_name=np.array(["free", "collision_wrist"]))
+    given["tau"][30] = np.nan
+    np.savez(tmp_path / "a.npz", **given)
+    free, wrist = UR10E.read([tmp_path / "a.npz"])
+    assert (len(free.time), free.joints, free.touched) == (n - 11, (), False)
+    assert np.isfinite(free.torque).all()
+    np.testing.assert_array_equal(wrist.q, motions[1].q)
+    np.testing.assert_array_equal(np.flatnonzero(wrist.label == -1), np.arange(60, 70))
+    assert (wrist.joints, wrist.touched) == ((4, 5, 6), True)
+    (tmp_path / "c.npz").write_bytes(b"no archive")
+    with pytest.raises(ExperimentError, match=r"c\.npz is no file of NumPy arrays .*: get it again"):
+        UR10E.read([tmp_path / "c.npz"])
+    np.savez(tmp_path / "b.npz", t=given["t"], q=given["q"])
+    with pytest.raises(ExperimentError, match=r"b\.npz has no dq, run, tau: get it again"):
+        UR10E.read([tmp_path / "b.npz"])
+
+
+def glove_csv(file, motion, label):
+    """Write a motion as contactInterpretation has it: each state twice, columns of which some are not read."""
+    columns = {"index": np.arange(len(motion.time)), "time": motion.time}
+    kinds = ("tau_J", motion.driving), ("tau_ext", -motion.external), ("q", motion.q), ("dq", motion.qd)
+    columns |= {f"{kind}{j}": values[:, j] for kind, values in kinds for j in range(7)}
+    columns["label"] = label
+    file.parent.mkdir(parents=True, exist_ok=True)
+    write_csv(file, columns)
+
+
+def touching(motion):
+    return ((motion.time >= PUSH[0]) & (motion.time < PUSH[0] + PUSH[1])).astype(int)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory, panda_model, motions):
+    """A set of free motion, and one of contacts on link 5 whose last run nobody touches."""
+    made = tmp_path_factory.mktemp("sets")
+    np.savez(made / "franka_fast.npz", **arrays(motions))
+    for name, pushes in (("e1", (PUSH,)), ("e2", (PUSH,)), ("e3", (PUSH,)), ("e4", ())):
+        motion = Moving(panda_model, 6.0, pushes, rate=200.0, seed=int(name[1]))
+        touched = touching(motion) * (len(pushes) > 0)
+        glove_csv(made / "contactInterpretation" / "link5" / f"{name}.csv", motion, touched)
+    return made
+
+
+def test_a_table_of_the_glove_gives_measured_torques_its_label_and_its_folders_link(folder):
+    first, *_, last = GLOVE.read(GLOVE.files(folder))
+    assert (first.name, first.joints, first.touched, last.touched) == ("link5/e1", (5,), True, False)
+    np.testing.assert_allclose(first.time[first.label == 1][[0, -1]], [3.0, 3.495], atol=1e-9)
+    # gravity is in the second joint of measured torques, and in no external one
+    assert np.abs(first.torque[:, 1]).max() > 10.0
+    file = folder.parent / "link1" / "x.csv"
+    file.parent.mkdir()
+    file.write_text("index,time,q0\n1,0.0,0.1\n")
+    with pytest.raises(ExperimentError, match="has no column q1: get it again"):
+        GLOVE.read([file])
+
+
+@pytest.mark.parametrize("count", range(2, 8))
+def test_no_run_is_judged_by_what_was_learnt_from_it_and_each_is_judged_once(count):
+    for learn, judge in halves(count):
+        assert learn
+        assert not set(learn) & set(judge)
+    assert sorted(run for _, judge in halves(count) for run in judge) == list(range(count))
+
+
+def test_a_single_recording_is_cut_so_that_its_halves_are_judged_apart(motions):
+    first, second = parted([run_of(motions[0])])
+    assert first.time[-1] < second.time[0]
+    assert len(first.time) + len(second.time) == len(motions[0].time)
+    assert parted([first, second]) == [first, second]
+
+
+def test_what_is_learnt_does_not_depend_on_the_runs_that_are_judged(stream):
+    judge, other = [1, 3], np.isin(stream.run, [1, 3])
+    spoilt = stream.recording.tau_ext.copy()
+    spoilt[other] += np.random.default_rng(0).normal(0.0, 30.0, spoilt[other].shape)
+    changed = replace(stream, recording=replace(stream.recording, tau_ext=spoilt))
+    for left, right in ((stream, changed), (changed, stream)):
+        fitted = [corrected(s, [0, 2]).only([0, 2]).recording.tau_ext for s in (left, right)]
+        np.testing.assert_array_equal(*fitted)
+    own = [corrected(s, judge).only(judge).recording.tau_ext for s in (stream, changed)]
+    assert not np.array_equal(own[0], own[1], equal_nan=True)
+
+
+def test_each_detector_is_shown_corrections_of_the_other_half_alone(folder, monkeypatch):
+    fitted, judged = [], []
+
+    def fit(given, runs):
+        fitted.append(set(runs))
+        return corrected(given, runs)
+
+    def count(given, said, runs, joints):
+        judged.append((set(fitted[-1]), set(runs), [int(number) for number in dict.fromkeys(given.run.tolist())]))
+        return tally(given, said, runs, joints)
+
+    monkeypatch.setattr(bench, "corrected", fit)
+    monkeypatch.setattr(bench, "tally", count)
+    trial(folder, {"set": "franka_fast", "detector": "fixed"}, 0)
+    assert len(judged) == 2
+    for learn, runs, order in judged:
+        assert not learn & runs
+        assert set(order[:2]) == learn  # a detector that learns has heard the other half before
+        assert set(order[2:]) == runs
+
+
+def test_load_and_friction_of_one_half_explain_the_other(stream):
+    free = stream.free & np.isin(stream.run, [1, 3])
+    before, after = (s.recording.tau_ext[free] for s in (stream, corrected(stream, [0, 2])))
+    # 1.5 kg at half a metre and more, and friction of 0.5 Nm and more
+    assert np.sqrt((before**2).mean(axis=0)).max() > 5.0
+    # what is left is mostly noise: 5 mrad/s of velocity by 60 1/s and 1.5 kg m^2 is 0.45 Nm
+    assert np.sqrt((after**2).mean(axis=0)).max() < 0.6
+    assert np.abs(after.mean(axis=0)).max() < 0.1
+
+
+def test_a_tally_has_its_rate_and_bounds():
+    row = Tally(motion_s=1800.0, false_alarms=1).row()
+    assert row["per_hour"] == 2.0
+    assert row["per_hour_high"] == pytest.approx(11.143, abs=1e-3)
+    assert Tally().row()["per_hour"] is None
+
+
+def alarm(time, end, link="panda_link5"):
+    return DetectedContact(time, np.zeros(3), "", link or None, np.zeros(3), end, 1.0, 2.0)
+
+
+def test_alarms_are_counted_by_hand(stream):
+    """One run of 6 s: not sure from 1.9 to 2 s, touched from 2 to 2.2 s and, as one with it, from 2.4 to 2.5 s."""
+    one = stream.only([1, 0])
+    time, label = one.recording.time, np.zeros(len(one.recording.time), np.int64)
+    for begin, end, kind in ((1.9, 2.0, -1), (2.0, 2.2, 1), (2.4, 2.5, 1), (4.0, 4.3, 1), (5.0, 5.2, -1)):
+        label[np.searchsorted(time, begin) : np.searchsorted(time, end)] = kind
+    labelled = replace(one, label=label)
+    cycles = np.concatenate([np.arange(0.005, 6.0, 0.01), np.arange(7.005, time[-1], 0.01)])
+    armed = cycles > 1.0
+
+    def counted(*alarms):
+        return tally(labelled, Said(alarms, cycles, armed), [1], [(), (5,)])
+
+    nothing = counted()
+    assert (nothing.contacts, nothing.found, nothing.busy, nothing.false_alarms) == (2, 0, 0, 0)
+    # armed from 1 s to the end at 6 s, less 1.9 to 2.6, 4 to 4.4 and 5 to 5.3 s
+    assert nothing.motion_s == pytest.approx(5.0 - 0.7 - 0.4 - 0.3, abs=0.05)
+    both = counted(alarm(2.05, 2.5), alarm(4.1, 4.3, "panda_link4"), alarm(5.1, 5.1), alarm(7.5, 8.0))
+    assert (both.found, both.contacts, both.false_alarms) == (2, 2, 0)  # one not sure, one of a run not judged
+    np.testing.assert_allclose(both.delays_s, [0.05, 0.1], atol=0.005)
+    assert (both.links_right, both.links_said) == (1, 2)
+    early = counted(alarm(1.5, 2.1), alarm(4.39, 4.4, ""))
+    assert (early.false_alarms, early.busy, early.found, early.contacts) == (1, 1, 1, 1)
+    assert early.links_said == 0
+    assert counted(alarm(0.5, 0.6)).false_alarms == 0  # not armed
+    total = both + early
+    assert (total.found, total.contacts, total.busy, len(total.delays_s)) == (3, 3, 1, 3)
+
+
+def real(*words):
+    return cli.main(["bench", "real", *map(str, words)])
+
+
+@pytest.mark.slow
+def test_the_whole_command_writes_a_row_for_each_set_table_and_detector(folder, tmp_path, capsys):
+    (folder / "lwr4.npz").write_bytes(b"")
+    place = tmp_path / "rows.json"
+    assert real(folder, "--detectors", "pretouch,fixed", "--json", place, "--out", tmp_path / "out") == 0
+    told = json.loads(place.read_text())
+    said = capsys.readouterr()
+    assert "lwr4 is left out, for" in said.err
+    kinds = ("free", "contacts")
+    rows = {(row["set"], kind, row["detector"]): row[kind] for row in told["rows"] for kind in kinds if kind in row}
+    sets = [("franka_fast", "free"), ("contactInterpretation", "free"), ("contactInterpretation", "contacts")]
+    assert set(rows) == {(*each, detector) for each in sets for detector in ("pretouch", "fixed")}
+    row = rows["contactInterpretation", "contacts", "pretouch"]
+    assert (row["found"], row["contacts"], row["link_right"], row["false_alarms"]) == (3, 3, 3, 0)
+    assert 0.0 < row["median_delay_ms"] < 100.0
+    assert rows["franka_fast", "free", "pretouch"]["contacts"] == 0
+
+
+def test_a_folder_without_a_set_says_what_was_looked_for_and_where_it_comes_from(tmp_path, capsys):
+    for given in (tmp_path, tmp_path / "nowhere"):
+        assert real(given) == 2
+        said = capsys.readouterr().err
+        assert said.count("\n") == 1
+        assert f"{given} has no set that can be played" in said
+        assert all(each.place in said and each.source in said for each in SETS)
+    (tmp_path / "ur10e_contact.npz").write_bytes(b"")
+    with pytest.raises(ExperimentError, match=r"ur10e_contact is left out, for .*arms/ur10e is missing"):
+        sets_in(tmp_path)
+    (tmp_path / "arms" / "ur10e").mkdir(parents=True)
+    assert sets_in(tmp_path) == ([UR10E], [])
+    assert real(tmp_path, "--detectors", "nobody") == 2
+    assert "nobody" in capsys.readouterr().err
+
+
+def test_streams_keep_their_runs_apart(stream):
+    some = stream.only([2, 0])
+    assert isinstance(some, Stream)
+    change = np.flatnonzero(np.diff(some.run))
+    assert some.run[change].tolist() == [2]
+    assert np.diff(some.recording.time)[change] == pytest.approx(1.0)
+    assert np.isnan(some.recording.tau_ext[change + 1]).all()
+
+
+def test_currents_are_read_as_such(motions, panda_model):
+    of_currents = replace(UR10E, arm="panda")
+    assert of_currents.arm_of(Path("x")) == "panda"
+    assert UR10E.arm_of(Path("x")) == "x/arms/ur10e"
+    made = stream_of(of_currents, [run_of(motions[0])], panda_model)
+    assert made.recording.kind == "current"
