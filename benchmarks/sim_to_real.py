@@ -28,7 +28,7 @@ from pretouch.types import Obstacles, RobotState
 from pretouch_lab.identification.arm_file import arm_toml
 from pretouch_lab.identification.free_motion import read_free_motion
 from pretouch_lab.identification.identify import identify
-from pretouch_lab.identification.samples import ArmSamples, usual_of
+from pretouch_lab.identification.samples import ArmSamples
 from pretouch_lab.replay import DetectorAlone
 from pretouch_lab.trial import Setup, play
 
@@ -115,7 +115,7 @@ def study(world: str, seed: int, seconds: float) -> dict[str, object]:
         place = Path(folder)
         real = drawn(world_set(world), seed).plant
         samples, plant = recorded(real, seed, seconds, place / "real.mcap")
-        found = identify(samples, MODEL, usual_of(PlantParams()))
+        found = identify(samples, MODEL, PlantParams())
         (place / "arm.toml").write_text(arm_toml(found, MODEL, "real.mcap"))
         same = drawn(world_set(str(place / "arm.toml")), seed).plant
         arms = {
@@ -148,7 +148,7 @@ def swung(seed: int, world: str, seconds: float, roughly: bool) -> dict[str, obj
         state = plant.read()
         rows.append((state.stamp, state.q, state.qd, state.tau_ext))
     samples = ArmSamples(*(np.array(column) for column in zip(*rows, strict=True)))
-    found = identify(rough(samples, seed) if roughly else samples, MODEL, usual_of(PlantParams()))
+    found = identify(rough(samples, seed) if roughly else samples, MODEL, PlantParams())
     return {"world": world, "seed": seed, "deviations": deviations(found, plant), "notes": list(found.notes)}
 
 

@@ -15,7 +15,6 @@ from pretouch.desired import Desired
 from pretouch.errors import RecordingError
 from pretouch.loop import Cycle, Options, Recorder, run
 from pretouch.profiles import Profile
-from pretouch.recording.reader import Recorded, open_recording
 from pretouch.recording.run_record import RunRecord, TrueForces, columns_of, contacts_of
 from pretouch.recording.simulation import Truth, truth_of
 from pretouch.recording.writer import Recording
@@ -122,29 +121,10 @@ def _first_velocity(steps: list[ControlStep]) -> FloatArray:
     return next((s.reaction_velocity for s in going if s.reaction_velocity.any()), np.zeros(3))
 
 
-def record_of(recorded: Recorded) -> Record:
-    """What a recorded trial left behind."""
-    kept = list(recorded)
-    truths = [cycle.truth for cycle in kept if cycle.truth is not None]
-    return Record(
-        [cycle.step for cycle in kept],
-        np.concatenate([np.zeros(0), *(t.time for t in truths)]),
-        np.vstack([np.zeros((0, 3)), *(t.force for t in truths)]),
-        [Touch(*touch) for t in truths for touch in t.touches],
-        np.array([np.full(3, np.nan) if cycle.truth is None else cycle.truth.hand for cycle in kept]),
-    )
-
-
 def trace_of(record: Record) -> RunRecord:
     """Return what a trial left behind as arrays."""
     truth, contacts = TrueForces(record.true_time, record.true_force), tuple(contacts_of(record.steps))
     return RunRecord(**columns_of(record.steps), contacts=contacts, truth=truth)
-
-
-def read_trace(place: FilePath) -> tuple[RunRecord, tuple[str, ...]]:
-    """Read a recorded trial, and the names of its units; RecordingError for what is no recording."""
-    recorded = open_recording(place)
-    return trace_of(record_of(recorded)), recorded.runs[0].skin.ids
 
 
 class _Recorder:

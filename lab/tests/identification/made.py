@@ -9,11 +9,11 @@ from pretouch.robot.model import RobotModel
 from pretouch.sim.observer import observe, observer_init
 from pretouch.sim.plant_params import PlantParams
 from pretouch_lab.identification.identify import Identified
-from pretouch_lab.identification.samples import ArmSamples, usual_of
+from pretouch_lab.identification.samples import ArmSamples
 
 MODEL = RobotModel(panda())
 PLANT = PlantParams()
-USUAL = usual_of(PLANT)
+USUAL = PLANT
 FRICTION = 0.8 * np.array(PLANT.friction_f1_nm)
 """What is not compensated of it in an arm as made below [Nm]."""
 

@@ -123,8 +123,9 @@ def _figure_of(
 ) -> "list[tuple[str, str, DrawnFigure]]":
     """Draw a part's figure of the recordings of its first seed, if it has one and they can be read."""
     from pretouch.errors import PretouchError
+    from pretouch.recording.reader import open_recording
+    from pretouch.reporting.record import gather
     from pretouch_lab.experiment import context_of, experiment, recording_file
-    from pretouch_lab.trial import read_trace
 
     what = experiment(name)
     names = list(what.cells(options)[0])
@@ -134,7 +135,7 @@ def _figure_of(
     try:
         for row in what.drawing.shown([row for row in rows if row["seed"] == 0]):
             cell = {key: row[key] for key in names}
-            traces.append((cell, read_trace(recording_file(folder / where, cell, 0))[0]))
+            traces.append((cell, gather(open_recording(recording_file(folder / where, cell, 0)))))
     except PretouchError:
         pass
     if not traces:

@@ -64,10 +64,9 @@ def _identified(command: Identify, out: Path | None, figure: Path | None) -> dic
     from pretouch_lab.identification.arm_file import arm_toml
     from pretouch_lab.identification.free_motion import read_free_motion
     from pretouch_lab.identification.identify import identify
-    from pretouch_lab.identification.samples import usual_of
 
     samples, model, said = read_free_motion(Path(command.file), _model(command.arm), command.sign)
-    found = identify(samples, model, usual_of(plant_params_of(model.description)))
+    found = identify(samples, model, plant_params_of(model.description))
     if figure:
         image = BytesIO()
         _figure(found, model, command.file).savefig(image, format=figure.suffix[1:], dpi=120)

@@ -19,11 +19,12 @@ from scipy.signal import lfilter
 
 from pretouch.contact.residual_model import PLAIN, features_into, features_of
 from pretouch.robot.model import RobotModel
+from pretouch.sim.plant_params import PlantParams
 from pretouch.traces import on_grid
 from pretouch.types import BoolArray, FloatArray
 from pretouch.values import value
 from pretouch_lab.identification.motion import GRID_S, Motion
-from pretouch_lab.identification.samples import IdentifyParams, Usable, Usual, joint_scale
+from pretouch_lab.identification.samples import Usable, joint_scale
 
 _FINE_S = 0.001
 """Spacing at which friction and ripple are low-passed [s]."""
@@ -32,6 +33,17 @@ _REMEMBERED_S = 0.2
 OWN = 6
 """Numbers of a joint: offset, friction, ln F2, F3, both parts of the ripple."""
 _ROUNDS = 20
+_TAILS = 5.0
+"""Degrees of freedom of the Student distribution of what is left [1]: an outlier counts little."""
+BLOCK_S = 1.0
+"""Length of the blocks that are taken as independent [s]: ten times what an observer remembers, and more."""
+_OFFSET_NM, _FRICTION_NM, _RIPPLE_NM = 3.0, 1.0, 0.5
+"""Standard deviations before anything is known, wide: of an offset, of the friction that the interface does not
+compensate, and of each part of a joint's ripple [Nm]."""
+_STEEPNESS, _ASYMMETRY_RAD_S = 0.5, 0.04
+"""Of the logarithm of F2 about the usual one [1], and of F3 [rad/s]."""
+_MASS, _PAYLOAD_KG = 0.1, 0.5
+"""Of the relative error of each link's mass [1], and of the unknown payload [kg]."""
 _SETTLED = 1e-2
 """A fit is done when no number moves by more than this part of what was known before [1]."""
 _REACH = 1.0
@@ -185,12 +197,12 @@ class Fit:
 
 
 def fit(
-    found: Usable, columns: Columns, used: BoolArray, usual: Usual, cycles: FloatArray, p: IdentifyParams,
+    found: Usable, columns: Columns, used: BoolArray, usual: PlantParams, cycles: FloatArray,
     payload: bool = True,
 ) -> Fit:  # fmt: skip
     """Find all parts from the samples that are used (N,); without `payload` that stays 0."""
     n = found.samples.q.shape[1]
-    start, priors = _begin(n, usual, p, payload)
+    start, priors = _begin(n, usual, payload)
     theta, gain = start.copy(), usual.observer_gain_1_s
     kicks = bool(columns.kick.any())
     precision = np.diag(priors**-2.0)
@@ -199,7 +211,7 @@ def fit(
         X, expected = design(found, columns, carried, theta, gain, cycles)
         left = found.samples.tau - expected - theta[-1] * columns.kick
         scale = joint_scale(left[used])
-        weight = (p.tails + 1.0) / (p.tails + (left / scale) ** 2) / scale**2 * used[:, None]
+        weight = (_TAILS + 1.0) / (_TAILS + (left / scale) ** 2) / scale**2 * used[:, None]
         H, g = precision.copy(), precision @ (start - theta)
         for j in range(n):
             weighted = X[:, j] * weight[:, j, None]
@@ -220,21 +232,20 @@ def fit(
     X, expected = design(found, columns, carried, theta, gain, cycles)
     kicked = theta[-1] * columns.kick
     score = (found.samples.tau - expected - kicked) * weight
-    covariance = _sandwich(H, precision, _block_scores(found, X, score, p.block_s))
+    covariance = _sandwich(H, precision, _block_scores(found, X, score))
     errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     return Fit(theta, errors, priors, gain, expected, kicked, scale)
 
 
-def _begin(n: int, usual: Usual, p: IdentifyParams, payload: bool) -> tuple[FloatArray, FloatArray]:
+def _begin(n: int, usual: PlantParams, payload: bool) -> tuple[FloatArray, FloatArray]:
     """Return what is believed before, and its standard deviations."""
     own, spread = np.zeros((n, OWN)), np.zeros((n, OWN))
     own[:, 1] = (1.0 - usual.friction_compensated) * np.array(usual.friction_f1_nm)
     own[:, 2], own[:, 3] = np.log(usual.friction_f2_s_rad), np.array(usual.friction_f3_rad_s)
     spread[:] = (
-        p.offset_prior_nm, p.friction_prior_nm, p.steepness_prior, p.asymmetry_prior_rad_s, p.ripple_prior_nm,
-        p.ripple_prior_nm,
+        _OFFSET_NM, _FRICTION_NM, _STEEPNESS, _ASYMMETRY_RAD_S, _RIPPLE_NM, _RIPPLE_NM,
     )  # fmt: skip
-    shared = np.array([p.mass_prior] * n + [p.payload_prior_kg if payload else 1e-6, 1e4])
+    shared = np.array([_MASS] * n + [_PAYLOAD_KG if payload else 1e-6, 1e4])
     start = np.concatenate([own.ravel(), np.zeros(n + 1), [usual.observer_gain_1_s]])
     return start, np.concatenate([spread.ravel(), shared])
 
@@ -267,10 +278,10 @@ def design(
     return X, X @ linear
 
 
-def _block_scores(found: Usable, X: FloatArray, score: FloatArray, block_s: float) -> FloatArray:
+def _block_scores(found: Usable, X: FloatArray, score: FloatArray) -> FloatArray:
     """Scores (B, p) of blocks."""
     time = found.samples.stamp
-    block = ((time - time[0]) / block_s).astype(np.int64)
+    block = ((time - time[0]) / BLOCK_S).astype(np.int64)
     each = np.einsum("ijp,ij->ip", X, score)
     total = np.zeros((int(block.max()) + 1, X.shape[2]))
     np.add.at(total, block, each)

@@ -4,14 +4,17 @@ import numpy as np
 
 from pretouch.errors import CalibrationError
 from pretouch.robot.model import RobotModel
+from pretouch.sim.plant_params import PlantParams
 from pretouch.types import BoolArray, FloatArray
 from pretouch.values import value
 from pretouch_lab.identification.fit import OWN, Fit, columns_of, fit
 from pretouch_lab.identification.motion import moved
 from pretouch_lab.identification.noise import Noise, free_samples, noise_of
-from pretouch_lab.identification.samples import LEAST_S, ArmSamples, IdentifyParams, Usual, usable
+from pretouch_lab.identification.samples import LEAST_S, ArmSamples, usable
 
 _ROUNDS = 3
+_KNOWN = 0.5
+"""A number is identified where its standard error is below this part of what was known before [1]."""
 _MOST_MASS_ERROR = 0.5
 """A link whose mass seems to be off by more than this, beyond doubt, is another arm's [1]."""
 
@@ -35,12 +38,12 @@ class Identified:
     notes: tuple[str, ...]
     seconds: float
     """Free motion that was used [s]."""
-    p: IdentifyParams
-    usual: Usual
+    usual: PlantParams
+    """The arm as it is taken to be without a recording."""
 
     def known(self) -> BoolArray:
         """Which of the fit's numbers (p,) the recording tells: the error is well below what was believed before."""
-        return np.asarray(self.fit.errors < self.p.known_share * self.fit.priors)
+        return np.asarray(self.fit.errors < _KNOWN * self.fit.priors)
 
     def ripple(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Amplitudes (n,) [Nm], their standard errors, and phases [rad], as the plant has them."""
@@ -49,9 +52,8 @@ class Identified:
         return amplitude, np.hypot(errors[:, 4], errors[:, 5]) / np.sqrt(2.0), np.arctan2(own[:, 5], own[:, 4])
 
 
-def identify(samples: ArmSamples, model: RobotModel, usual: Usual, p: IdentifyParams | None = None) -> Identified:
+def identify(samples: ArmSamples, model: RobotModel, usual: PlantParams) -> Identified:
     """Identify an arm. CalibrationError for a recording that cannot tell, with what is missing."""
-    p = p or IdentifyParams()
     if samples.q.shape[1] != model.n or samples.tau.shape[1] != model.n:
         raise CalibrationError(
             f"The recording has {samples.q.shape[1]} joints and {samples.tau.shape[1]} torques, and"
@@ -68,8 +70,8 @@ def identify(samples: ArmSamples, model: RobotModel, usual: Usual, p: IdentifyPa
             f" left: record {LEAST_S:g} s or more along smooth paths, or slower."
         )
     for _ in range(_ROUNDS):
-        fitted = fit(found, columns, used, usual, cycles, p)
-        free, spans = free_samples(found, fitted, p)
+        fitted = fit(found, columns, used, usual, cycles)
+        free, spans = free_samples(found, fitted)
         again = settled & free
         if np.array_equal(again, used):
             break
@@ -77,7 +79,7 @@ def identify(samples: ArmSamples, model: RobotModel, usual: Usual, p: IdentifyPa
     notes = [*found.notes]
     payload = OWN * model.n + model.n
     if fitted.numbers[payload] < 0.0:
-        fitted = fit(found, columns, used, usual, cycles, p, payload=False)
+        fitted = fit(found, columns, used, usual, cycles, payload=False)
         notes.append("The payload comes out below zero: it is kept at 0, and the masses of the links take the rest.")
     seconds = float(used.sum()) * found.period
     if seconds < LEAST_S:
@@ -93,10 +95,10 @@ def identify(samples: ArmSamples, model: RobotModel, usual: Usual, p: IdentifyPa
             f"{len(spans)} spans look like contacts and are left out (seconds from the first sample): {listed}"
             f"{' and more' if len(spans) > 8 else ''}."
         )
-    noise = noise_of(found, columns, fitted, used, usual, p)
+    noise = noise_of(found, columns, fitted, used, usual)
     s = found.samples
     return Identified(
-        fitted, noise, s.stamp, s.q, s.tau, used, spans, tuple(notes), seconds, p, usual
+        fitted, noise, s.stamp, s.q, s.tau, used, spans, tuple(notes), seconds, usual
     )  # fmt: skip
 
 

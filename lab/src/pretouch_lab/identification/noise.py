@@ -7,11 +7,18 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from pretouch.errors import CalibrationError
+from pretouch.sim.plant_params import PlantParams
 from pretouch.types import BoolArray, FloatArray
 from pretouch.values import value
-from pretouch_lab.identification.fit import Columns, Fit
-from pretouch_lab.identification.samples import IdentifyParams, Usable, Usual, joint_scale
+from pretouch_lab.identification.fit import BLOCK_S, Columns, Fit
+from pretouch_lab.identification.samples import Usable, joint_scale
 
+_CONTACT_SIGMAS, _CONTACT_S = 6.0, 0.15
+"""A mean over so long [s], so many of its own robust deviations off, is taken for a contact."""
+_MARGIN_S = 0.5
+"""What is left out before and after a contact as well [s]."""
+_MOST_CONTACTS = 0.3
+"""Of a recording in which more than this part looks like contacts nothing is identified."""
 LAGS = 20
 """Lags of the autocorrelation that are kept."""
 _FITTED = 10
@@ -20,30 +27,30 @@ _LEAST_VELOCITY_RAD_S = 1e-5
 """Least noise of measured velocities that is reported [rad/s]."""
 
 
-def free_samples(found: Usable, fitted: Fit, p: IdentifyParams) -> tuple[BoolArray, tuple[tuple[float, float], ...]]:
+def free_samples(found: Usable, fitted: Fit) -> tuple[BoolArray, tuple[tuple[float, float], ...]]:
     """Say which samples (N,) are of free motion, and from when to when [s] something else is.
 
-    What a contact does lasts longer than noise: means over `contact_s` are compared with how far such means usually
+    What a contact does lasts longer than noise: means over `_CONTACT_S` are compared with how far such means usually
     are off. CalibrationError if too much looks like that.
     """
     s = found.samples
     left = s.tau - fitted.expected
-    means = smoothed(found, left, p.contact_s)
+    means = smoothed(found, left, _CONTACT_S)
     inside = np.zeros(len(s.stamp), np.bool_)
     for a, b in found.segments:
         inside[a:b] = True
     off = np.abs(means - np.median(means[inside], axis=0))
-    far: BoolArray = np.any(off > p.contact_sigmas * joint_scale(means[inside]), axis=1)
+    far: BoolArray = np.any(off > _CONTACT_SIGMAS * joint_scale(means[inside]), axis=1)
     used, spans = inside.copy(), []
     for a, b in found.segments:
         times = s.stamp[a:b][far[a:b]]
-        for group in np.split(times, np.flatnonzero(np.diff(times) > 2.0 * p.contact_margin_s) + 1):
+        for group in np.split(times, np.flatnonzero(np.diff(times) > 2.0 * _MARGIN_S) + 1):
             if len(group):
-                begin, end = group[0] - p.contact_margin_s, group[-1] + p.contact_margin_s
+                begin, end = group[0] - _MARGIN_S, group[-1] + _MARGIN_S
                 spans.append((float(begin), float(end)))
                 used &= (s.stamp < begin) | (s.stamp > end)
     share = 1.0 - float(used.sum()) / max(int(inside.sum()), 1)
-    if share > p.contact_share:
+    if share > _MOST_CONTACTS:
         raise CalibrationError(
             f"{100 * share:.0f} % of the recording looks like contacts: nothing may touch the arm while it is"
             " identified. Record free motion, or cut the contacts out."
@@ -89,14 +96,14 @@ class Noise:
     """Of one lag [s]."""
 
 
-def noise_of(found: Usable, columns: Columns, fitted: Fit, used: BoolArray, usual: Usual, p: IdentifyParams) -> Noise:
+def noise_of(found: Usable, columns: Columns, fitted: Fit, used: BoolArray, usual: PlantParams) -> Noise:
     """Take the noise apart."""
     total = found.samples.tau - fitted.expected
     left = total - fitted.kicked
-    blocks = _blocks(found, left, used, p.block_s)
+    blocks = _blocks(found, left, used, BLOCK_S)
     if len(blocks) < _LEAST_BLOCKS:
         raise CalibrationError(
-            f"There are {len(blocks)} stretches of {p.block_s:g} s without a break: the noise needs {_LEAST_BLOCKS}."
+            f"There are {len(blocks)} stretches of {BLOCK_S:g} s without a break: the noise needs {_LEAST_BLOCKS}."
             " Record longer, along smoother paths, with nothing touching the arm."
         )
     covariance = blocks.mean(axis=0)
@@ -115,7 +122,7 @@ def noise_of(found: Usable, columns: Columns, fitted: Fit, used: BoolArray, usua
         velocity_rad_s=velocity, velocity_error_rad_s=1.17 * velocity / np.sqrt(2.0 * noise.size),
         gain_1_s=_gain_of(covariance, found.period, usual), gain_error_1_s=float(_jackknife(gains)),
         correlation=np.atleast_2d(np.corrcoef(total[used].T)),
-        autocorrelation=_normalised(_blocks(found, total, used, p.block_s).mean(axis=0)),
+        autocorrelation=_normalised(_blocks(found, total, used, BLOCK_S).mean(axis=0)),
         left_autocorrelation=_normalised(covariance), period_s=found.period,
     )  # fmt: skip
 
@@ -143,7 +150,9 @@ def _blocks(found: Usable, left: FloatArray, used: BoolArray, block_s: float) ->
     return np.array(rows)
 
 
-def _torque_noise(variance: FloatArray, velocity: float, columns: Columns, fitted: Fit, usual: Usual) -> FloatArray:
+def _torque_noise(
+    variance: FloatArray, velocity: float, columns: Columns, fitted: Fit, usual: PlantParams
+) -> FloatArray:
     """Standard deviation (n,) [Nm] of the torque sensors' noise that leaves such a variance behind the observer.
 
     A first-order noise of corner a through the discrete low-pass of the observer, alpha = K dt / (1 + K dt), keeps the
@@ -164,7 +173,7 @@ def _torque_noise(variance: FloatArray, velocity: float, columns: Columns, fitte
     return np.sqrt(np.maximum(variance - own, 0.0) / part)
 
 
-def _gain_of(covariance: FloatArray, period: float, usual: Usual) -> float:
+def _gain_of(covariance: FloatArray, period: float, usual: PlantParams) -> float:
     """Gain [1/s] whose low-pass of first-order noise has the joints' autocorrelation, all joints counting alike."""
     rho, lag = _normalised(covariance)[1 : _FITTED + 1].mean(axis=1), period * np.arange(1, _FITTED + 1)
     a = 2.0 * np.pi * usual.torque_noise_hz
