@@ -81,9 +81,6 @@ class Record:
     """Each beginning of a contact of the arm."""
     hand_position: FloatArray
     """(S, 3) centre of the hand at each control step [m], NaN without a hand."""
-    reading_age: FloatArray | None = None
-    """(S, K) age of each unit's newest reading at each control step [s], infinite before its first; None if it was
-    read from a recording."""
 
     def times(self) -> FloatArray:
         """Instants (S,) of the control steps [s]."""
@@ -135,11 +132,9 @@ class _Recorder:
         self._forces = self._touches = 0
         self.steps: list[ControlStep] = []
         self.hand_position: list[FloatArray] = []
-        self.reading_age: list[FloatArray] = []
 
     def record(self, cycle: Cycle) -> None:
         self.steps.append(cycle.step)
-        self.reading_age.append(cycle.step.stamp - cycle.inputs.readings.stamp)
         self.hand_position.append(self._hand.position.copy() if self._hand else np.full(3, np.nan))
         if self._recording:
             self._recording.record(cycle, self._truth())
@@ -207,5 +202,4 @@ def play(setup: Setup, done: Callable[[ControlStep, Plant], bool]) -> Record:
         np.array([f for _, f in plant.true_log]),
         plant.touches,
         np.array(recorder.hand_position),
-        np.array(recorder.reading_age),
     )

@@ -1,6 +1,5 @@
 from pretouch_lab.bench.avoidance import losses, paired
 from pretouch_lab.bench.goals import front_table, goal_table, goals
-from pretouch_lab.bench.scenes import EMPTY
 
 MEASURES = ("peak_estimate_n", "true_peak_20ms_n", "clamping_force_n", "first_contact_s", "cycle_time_s")
 
@@ -44,12 +43,12 @@ def measured(**changes):
     felt = {"median_delay_s": 0.03, "contacts": 90, "missed": 0, "p95_delay_s": 0.05, "towards": 0}
     felt["median_bounds_s"] = [0.01, 0.03]
     rows = [
-        {**EMPTY, "contender": "pretouch", "scenario": f"free: {name}", "false_alarms_per_hour": 0.4, "hours": 5.0,
+        {"contender": "pretouch", "scenario": f"free: {name}", "false_alarms_per_hour": 0.4, "hours": 5.0,
          "low_per_hour": 0.05, "high_per_hour": 1.4, "false_alarms": 2}
         for name in ("goal", "goal, nobody near", "goal, somebody standing", "goal, somebody passing")
     ]  # fmt: skip
     rows += [
-        {**EMPTY, "contender": "pretouch", "scenario": f"contacts: {name}", "seen": seen, **felt}
+        {"contender": "pretouch", "scenario": f"contacts: {name}", "seen": seen, **felt}
         for name in ("goal", "all") for seen in (True, False)
     ]  # fmt: skip
     spread = {"median": 5.0, "p10": 4.0, "p90": 6.0}

@@ -3,7 +3,6 @@
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 
@@ -13,14 +12,13 @@ from pretouch.text_table import TextTable
 from pretouch_lab.bench import avoidance_measures as measures
 from pretouch_lab.bench.avoidance_scenes import PANDA, Scenario, Setting, place, scenarios, setting
 from pretouch_lab.bench.contenders import ABLATED, ABLATED_IN, ABLATED_SEEDS, AVOIDANCE, BASE, WITHOUT, profile_text
-from pretouch_lab.bench.obstacle import Truth, truth_of
-from pretouch_lab.bench.scenes import EMPTY, SeedRange
+from pretouch_lab.bench.obstacle import truth_of
+from pretouch_lab.bench.scenes import SeedRange
 from pretouch_lab.run import Cell, Play, Row
 from pretouch_lab.table import Column, finite, grouped, median_bounds, spread, table
 from pretouch_lab.trial import Record, play
 
 _D_MAX_M = 0.8
-_COURSE_EVERY = 5
 FORCES = ("peak_estimate_n", "true_peak_20ms_n", "clamping_force_n")
 TIMES = ("first_contact_s", "cycle_time_s")
 FAMILIES = ("static", "person")
@@ -29,15 +27,13 @@ REFERENCES = ("blind", "paper", "paper-off")
 SPREAD = (
     "least_distance_m", "true_peak_20ms_n", "true_peak_n", "clamping_force_n", "peak_estimate_n", "impact_speed_m_s",
     "first_contact_s", "tracking_rms_m", "off_path_max_m", "speed_m_s", "jerk_max_rad_s3", "jerk_max_per_second_rad_s3",
-    "jerk_rms_rad_s3", "manipulability_ee_least", "manipulability_point", "mobility_point_m", "seen_fraction", "held_s",
+    "jerk_rms_rad_s3", "seen_fraction", "held_s",
     "livelock_s",
 )  # fmt: skip
 """Measures of which median and 10-90 % over the seeds are given; a trial without one is left out."""
 TOTALS = (
     "holds", "livelocks", "reactions", "false_reactions", "towards_person", "solver_failures", "infeasible",
 )  # fmt: skip
-_MEDIANS = ("peak_estimate_n", "true_peak_20ms_n", "first_contact_s", "cycle_time_s")
-"""Keys all benchmarks share, of which the rows have the median over the seeds."""
 _NOTE = (
     "Medians over the seeds, 10-90 % below. hit: trials with contact. least: least true distance of the surfaces."
     " impact: closing speed of the point that touches first. estimate: peak of the force estimate along the contact."
@@ -133,29 +129,12 @@ def measured(record: Record, made: Setting, scenario: Scenario) -> Row:
         **measures.contact(record, truth, params["obstacle"].get("d_max_m", _D_MAX_M)),
         **measures.tracking(record, setup.path.length, held),
         **measures.smoothness(record, setup.profile.task.control_period_s),
-        **measures.dexterity(record, truth, setup.model),
         **measures.holds(record),
         **measures.reactions(record),
         **measures.seen(record, truth, made),
         **measures.livelocks(record, made, params.get("livelock")),
         "timed": "turns" in params,
         "duration_s": round(record.steps[-1].stamp, 3),
-        "course": course(record, truth),
-    }
-
-
-def course(record: Record, truth: Truth) -> dict[str, list[float]]:
-    """Distance and force over time, thinned out, for the figures."""
-    force = np.linalg.norm(record.true_force, axis=1)
-    chosen = range(0, len(record.steps), _COURSE_EVERY)
-    times = [record.steps[i].stamp for i in chosen]
-    edges = np.searchsorted(record.true_time, [times[0] - 0.05, *times])
-    largest = [float(force[a:b].max(initial=0.0)) for a, b in pairwise(edges)]
-    return {
-        "time_s": [round(t, 3) for t in times],
-        "distance_m": [round(float(truth.distance[i]), 4) for i in chosen],
-        "force_n": [round(f, 2) for f in largest],
-        "way_m": [round(record.steps[i].path_phase, 4) for i in chosen],
     }
 
 
@@ -202,19 +181,6 @@ def _cell(key: Row, group: list[Row]) -> Row:
         **{name: sum(row[name] or 0 for row in group) for name in TOTALS},
         "hold_events": dict(events),
     }
-
-
-def medians(cells: list[Row]) -> list[Row]:
-    """Return one row a cell with the keys all benchmarks share, medians over the seeds, then this benchmark's own."""
-    return [
-        {
-            **EMPTY,
-            **cell,
-            **{name: cell[name]["median"] if cell[name] else None for name in _MEDIANS},
-            "spread": {name: cell[name] for name in _MEDIANS},
-        }
-        for cell in cells
-    ]
 
 
 def paired(rows: list[Row]) -> list[Row]:

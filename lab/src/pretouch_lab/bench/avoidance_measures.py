@@ -7,8 +7,6 @@ from typing import Any
 import numpy as np
 
 from pretouch.control.path import Path
-from pretouch.control.task import manipulability
-from pretouch.robot.model import RobotModel
 from pretouch.sim.plant import TOUCH_N
 from pretouch.traces import mean_over
 from pretouch.types import BoolArray, ControlStep, FloatArray, Mode, QpOutcome
@@ -29,8 +27,6 @@ _NEAR_M = 0.6
 _SAME_M = 0.15
 """A sensed point this near to the obstacle's surface shows it [m]."""
 _BEGINNING_S = 0.5
-_EVERY = 5
-"""Control steps between two at which manipulability is worked out."""
 _LOOK_EVERY = 10
 """Control steps between two that are looked at for livelocks."""
 
@@ -130,27 +126,6 @@ def smoothness(record: Record, period: float) -> Row:
             float(np.median([largest[i : i + second].max() for i in range(0, len(largest), second)])), 1
         ),
         "jerk_rms_rad_s3": rounded(float(np.sqrt((jerk**2).mean())), 1),
-    }
-
-
-def dexterity(record: Record, truth: Truth, model: RobotModel) -> Row:
-    """Least manipulability of the end-effector, and medians of those of the body point nearest to the obstacle.
-
-    A point on the first two links has none in three directions, so its mobility along the direction d to the obstacle,
-    |d^T J_c| [m], is given too.
-    """
-    of_ee, of_point, along = [], [], []
-    for step, near in list(zip(record.steps, truth.nearest, strict=True))[::_EVERY]:
-        kin = model.kinematics(step.q)
-        of_ee.append(manipulability(model.ee_jacobian(kin)[:3]))
-        if near.distance < _NEAR_M:
-            J_c = model.jacobian(kin, near.link, near.point)[:3]
-            of_point.append(manipulability(J_c))
-            along.append(float(np.linalg.norm(near.direction @ J_c)))
-    return {
-        "manipulability_ee_least": rounded(min(of_ee), 4),
-        "manipulability_point": rounded(float(np.median(of_point)), 4) if of_point else None,
-        "mobility_point_m": rounded(float(np.median(along)), 4) if along else None,
     }
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from pretouch_lab.bench.contenders import DETECTORS, Contender, ablated
 from pretouch_lab.bench.detection import BUSY, FAMILIES, sweep_values
-from pretouch_lab.bench.scenes import EMPTY, scenario
+from pretouch_lab.bench.scenes import scenario
 from pretouch_lab.run import Row
 from pretouch_lab.table import dispersion_of, median_bounds, rate_bounds, rounded
 
@@ -124,7 +124,7 @@ def delays(found: list[float | None]) -> Row:
 def free_rows(arms: list[Row], contenders: Sequence[Contender], groups: Groups) -> list[Row]:
     """Return the false alarms of each contender in each group of arms there are hours of."""
     return [
-        {**EMPTY, "contender": contender.name, "scenario": name}
+        {"contender": contender.name, "scenario": name}
         | rate([row["alarms"] for row in some], sum(row["hours"] for row in some))
         for contender in contenders
         for name, where in groups.items()
@@ -135,7 +135,7 @@ def free_rows(arms: list[Row], contenders: Sequence[Contender], groups: Groups) 
 def contact_rows(contacts: list[Row], contenders: Sequence[Contender], groups: Groups) -> list[Row]:
     """Return delays and misses of each contender in each group of contacts, seen and not seen by the skin."""
     return [
-        {**EMPTY, "contender": contender.name, "scenario": name, "seen": seen}
+        {"contender": contender.name, "scenario": name, "seen": seen}
         | delays([contact["delay_s"] for contact in some])
         | {"towards": sum(bool(contact["towards"]) for contact in some)}
         for contender in contenders

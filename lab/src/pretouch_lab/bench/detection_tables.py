@@ -1,18 +1,18 @@
 """The detection benchmark as tables of finished text, for the terminal and the document."""
 
-from pretouch.text_table import TextTable, tabulated
+from pretouch.text_table import TextTable
 from pretouch_lab.bench.contenders import BASE, WITHOUT
 from pretouch_lab.bench.detection_results import ABLATED_CONTACTS, ABLATED_FREE, GOAL_CONTACTS, GOAL_FREE
 from pretouch_lab.bench.goals import find
 from pretouch_lab.bench.scenes import scenario
 from pretouch_lab.run import Row
-from pretouch_lab.table import short
+from pretouch_lab.table import Column, short, table
 
 
 def tables(results: Row) -> list[TextTable]:
     """Return all tables of what `results` of the JSON file says."""
     rows, curves = results["rows"], results["curves"]
-    names = _names(rows)
+    names = list(dict.fromkeys(row["contender"] for row in rows))
     ablated = [name for name in names if name.startswith(WITHOUT)]
     whole = [name for name in names if name not in ablated]
     made = [
@@ -36,34 +36,44 @@ def tables(results: Row) -> list[TextTable]:
             " contacts whose torques exceed three standard deviations of that arm's free motion.",
         ),
     ]
-    return [table for table in made if table.rows]
+    return [each for each in made if each.rows]
 
 
-def _names(rows: list[Row]) -> list[str]:
-    return list(dict.fromkeys(row["contender"] for row in rows))
+_COLUMNS = (
+    Column("detector", "detector"),
+    Column("false\n[1/h]", "rate"),
+    Column("seen\nmedian, 95 % [ms]", "seen"),
+    Column("missed", "seen_missed"),
+    Column("unseen\nmedian, 95 % [ms]", "unseen"),
+    Column("missed", "unseen_missed"),
+)
+_JUDGED = (*_COLUMNS, Column("towards\nperson", "towards"), Column("goals\nreached", "reached"))
+
+
+def _texts(name: str, free: Row | None, seen: Row | None, unseen: Row | None) -> Row:
+    """What each column says of a detector."""
+    return {
+        "detector": name,
+        "rate": _rate(free),
+        "seen": _delay(seen),
+        "seen_missed": _missed(seen),
+        "unseen": _delay(unseen),
+        "unseen_missed": _missed(unseen),
+    }
 
 
 def _goals(
     rows: list[Row], names: list[str], title: str, where: tuple[str, str] = (GOAL_FREE, GOAL_CONTACTS), note: str = ""
 ) -> TextTable:
     goal = scenario("contacts")["goal"]
-    found = [
-        (name, find(rows, name, where[0]), *(find(rows, name, where[1], of) for of in (True, False))) for name in names
-    ]
-    columns = (
-        ("detector", lambda row: row[0]),
-        ("false\n[1/h]", lambda row: _rate(row[1])),
-        ("seen\nmedian, 95 % [ms]", lambda row: _delay(row[2])),
-        ("missed", lambda row: _missed(row[2])),
-        ("unseen\nmedian, 95 % [ms]", lambda row: _delay(row[3])),
-        ("missed", lambda row: _missed(row[3])),
-        ("towards\nperson", lambda row: _towards(*row[2:])),
-        ("goals\nreached", lambda row: reached(*row[1:])),
-    )
-    return tabulated(
+    lines = []
+    for name in names:
+        of = find(rows, name, where[0]), *(find(rows, name, where[1], seen) for seen in (True, False))
+        lines.append(_texts(name, *of) | {"towards": _towards(*of[1:]), "reached": reached(*of)})
+    return table(
         title,
-        columns[:-1] if where[0].startswith("hard") else columns,  # hard arms have goals of their own
-        found,
+        _JUDGED[:-1] if where[0].startswith("hard") else _JUDGED,  # hard arms have goals of their own
+        lines,
         f"Goals: at most {goal['false_alarms_per_hour']:g} false alarm an hour in free motion at"
         f" {goal['speed_m_s']:g} m/s, with or without somebody near; median delay at most"
         f" {1000 * goal['seen_delay_s']:g} ms for contacts the skin saw and {1000 * goal['unseen_delay_s']:g} ms for"
@@ -72,7 +82,6 @@ def _goals(
         " a rate: 95 % bounds. Delay: from the true force passing 1 N, of what was detected. Towards person: the"
         " touched point would begin to move against the force on it, of all detected: none is the goal. Reached: as"
         f" measured here, whatever the bounds.{note}",
-        1,
     )
 
 
@@ -97,27 +106,18 @@ def _equal(curves: list[Row], names: list[str]) -> TextTable:
         if point.get("false_alarms_per_hour", limit + 1.0) <= limit:
             kept.setdefault(point["contender"], point)
 
-    def at(name: str) -> str:
+    lines = []
+    for name in names:
         point = kept.get(name, {})
-        return f"{point['f_base_n']:g} N" if "f_base_n" in point else f"x {point['scale']:g}" if point else "none"
-
-    columns = (
-        ("detector", str),
-        ("at", at),
-        ("false\n[1/h]", lambda name: _rate(kept.get(name))),
-        ("seen\nmedian, 95 % [ms]", lambda name: _delay(kept.get(name, {}).get("seen"))),
-        ("missed", lambda name: _missed(kept.get(name, {}).get("seen"))),
-        ("unseen\nmedian, 95 % [ms]", lambda name: _delay(kept.get(name, {}).get("unseen"))),
-        ("missed", lambda name: _missed(kept.get(name, {}).get("unseen"))),
-    )
-    return tabulated(
+        at = f"{point['f_base_n']:g} N" if "f_base_n" in point else f"x {point['scale']:g}" if point else "none"
+        lines.append(_texts(name, point or None, point.get("seen"), point.get("unseen")) | {"at": at})
+    return table(
         "The same with as many false alarms as allowed",
-        columns,
-        names,
+        (_COLUMNS[0], Column("at", "at"), *_COLUMNS[1:]),
+        lines,
         f"Each detector at the smallest value of its swept parameter at which it has at most {limit:g} false alarm an"
         " hour: the base force F_b, or a factor on the evidence that makes an alarm. Chosen with hindsight on the same"
         " streams, so it flatters all of them alike.",
-        1,
     )
 
 

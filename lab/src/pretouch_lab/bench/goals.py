@@ -82,8 +82,8 @@ def goal_table(detection: Row, avoidance: Row) -> TextTable:
 
 def find(rows: list[Row], baseline: str, name: str, seen: bool | None = None) -> Row | None:
     """Return a baseline's row of a scenario, None if there is none."""
-    where = {"contender": baseline, "scenario": name, "seen": seen}
-    return next((row for row in rows if all(row[key] == value for key, value in where.items())), None)
+    where = {"contender": baseline, "scenario": name} | ({} if seen is None else {"seen": seen})
+    return next((row for row in rows if where.items() <= row.items()), None)
 
 
 def _false_alarms(rows: list[Row]) -> list[Goal]:

@@ -26,13 +26,6 @@ FOLDER = Path(str(files("pretouch_lab.bench") / "scenarios"))
 CHECKSUMS = "CHECKSUMS"
 """File in the folder with a line `DIGEST  NAME` (SHA-256) for each of the others, as `sha256sum` writes it."""
 
-EMPTY: dict[str, Any] = dict.fromkeys(
-    (
-        "contender", "scenario", "seen", "false_alarms_per_hour", "median_delay_s", "p95_delay_s", "missed", "contacts",
-        "peak_estimate_n", "true_peak_20ms_n", "first_contact_s", "cycle_time_s",
-    )
-)  # fmt: skip
-"""A row of a benchmark's JSON file, of which nothing is known."""
 SeedRange = Literal["published", "development"]
 """Seeds for the published tables, and others to develop detectors with."""
 

@@ -145,7 +145,7 @@ class Avoidance(BenchOptions):
         counts = [cell["trials"] for cell in cells]
         text = f"{min(counts)} to {max(counts)} trials of each contender in each scenario."
         shown = tables({"cells": cells, **summary})
-        return _finish(out, self.about("avoidance"), shown, text, rows=avoidance.medians(cells), **summary)
+        return _finish(out, self.about("avoidance"), shown, text, rows=cells, **summary)
 
 
 @dataclass(frozen=True)
