@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.stats import binomtest, chi2, quantile_test
 
 from pretouch.text_table import TextTable
 from pretouch.types import FloatArray
@@ -89,6 +88,8 @@ def ratios(
 
 def median_bounds(values: Sequence[float]) -> tuple[float, float]:
     """95 % bounds on a median: those of the sorted values between which it lies, whatever they are distributed like."""
+    from scipy.stats import quantile_test  # half a second, which workers that only play do without
+
     interval = quantile_test(values, p=0.5).confidence_interval(0.95)
     low, high = float(interval.low), float(interval.high)
     # of fewer than six values no two are sure to have it between them: their range is the most there is to say
@@ -97,6 +98,8 @@ def median_bounds(values: Sequence[float]) -> tuple[float, float]:
 
 def share_below(events: int, of: int) -> float:
     """95 % upper bound on a share of which so many of so many were counted (Clopper and Pearson)."""
+    from scipy.stats import binomtest
+
     return float(binomtest(events, of).proportion_ci(0.95, "exact").high) if of else 1.0
 
 
@@ -105,6 +108,8 @@ def rate_bounds(events: float, hours: float, dispersion: float = 1.0) -> tuple[f
 
     Where counts scatter `dispersion` times as much as Poisson counts do, so many events tell as much as one.
     """
+    from scipy.stats import chi2
+
     effective, time = events / dispersion, hours / dispersion
     low = chi2.ppf(0.025, 2 * effective) / 2 if effective else 0.0
     return float(low / time), float(chi2.ppf(0.975, 2 * effective + 2) / 2 / time)
