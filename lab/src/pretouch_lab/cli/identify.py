@@ -39,63 +39,54 @@ class Identify:
 
     def run(self) -> None:
         """Identify the arm, and show and write what was found."""
-        identify_arm(self)
+        from pretouch.cli.writing import check_writable, numbers_to
+        from pretouch.errors import RecordingError
 
-
-def identify_arm(command: Identify) -> None:
-    """Read, identify, show, and write what is asked for."""
-    from pretouch.cli.writing import check_writable, numbers_to
-    from pretouch.errors import RecordingError
-
-    out, figure = (Path(text) if text else None for text in (command.out, command.figure))
-    if figure and figure.suffix not in (".png", ".pdf", ".svg"):
-        raise RecordingError(f"The figure {figure} has no ending that says its format: use .png, .pdf or .svg.")
-    for what, place in (("file", out), ("figure", figure)):
-        if place:
-            check_writable(what, place)
-    with numbers_to(command.json) as write:
-        write(_identified(command, out, figure))
+        out, figure = (Path(text) if text else None for text in (self.out, self.figure))
+        if figure and figure.suffix not in (".png", ".pdf", ".svg"):
+            raise RecordingError(f"The figure {figure} has no ending that says its format: use .png, .pdf or .svg.")
+        for what, place in (("file", out), ("figure", figure)):
+            if place:
+                check_writable(what, place)
+        with numbers_to(self.json) as write:
+            write(_identified(self, out, figure))
 
 
 def _identified(command: Identify, out: Path | None, figure: Path | None) -> dict[str, Any]:
     from pretouch.atomic_write import atomic_write
     from pretouch.cli.writing import unwritable_said
+    from pretouch.robot.description import robot_named
+    from pretouch.robot.model import RobotModel
     from pretouch.sim.plant_params import plant_params_of
-    from pretouch_lab.identification.arm_file import arm_toml
+    from pretouch_lab.identification.arm_file import arm_toml, residual_figure
     from pretouch_lab.identification.free_motion import read_free_motion
     from pretouch_lab.identification.identify import identify
 
-    samples, model, said = read_free_motion(Path(command.file), _model(command.arm), command.sign)
+    arm = RobotModel(robot_named(command.arm)) if command.arm else None
+    samples, model, source = read_free_motion(Path(command.file), arm, command.sign)
     found = identify(samples, model, plant_params_of(model.description))
     if figure:
         image = BytesIO()
-        _figure(found, model, command.file).savefig(image, format=figure.suffix[1:], dpi=120)
+        residual_figure(found, model, command.file).savefig(image, format=figure.suffix[1:], dpi=120)
         with unwritable_said("figure", figure):
             figure.write_bytes(image.getvalue())
     if out:
         with unwritable_said("file", out):
             atomic_write(out, arm_toml(found, model, Path(command.file).name))
-    _show(found, model, said)
+    _show(found, model, source)
     for what, place in (("Arm", out), ("Figure", figure)):
         if place:
             print(f"{what}: {place}")
     return _numbers(found, model, command.file)
 
 
-def _model(arm: str) -> "RobotModel | None":
-    from pretouch.robot.description import robot_named
-    from pretouch.robot.model import RobotModel
-
-    return RobotModel(robot_named(arm)) if arm else None
-
-
-def _show(found: "Identified", model: "RobotModel", said: str) -> None:
+def _show(found: "Identified", model: "RobotModel", source: str) -> None:
     from rich.console import Console
 
     from pretouch.cli.tables import PlainTable
 
     console = Console(highlight=False, soft_wrap=True)
-    console.print(f"{said}. {found.seconds:.0f} s of free motion are used.", markup=False)
+    console.print(f"{source}. {found.seconds:.0f} s of free motion are used.", markup=False)
     for note in found.notes:
         console.print(note, markup=False)
     columns = [
@@ -173,9 +164,3 @@ def _numbers(found: "Identified", model: "RobotModel", source: str) -> dict[str,
         "observer_gain_by_autocorrelation_1_s": [noise.gain_1_s, noise.gain_error_1_s],
         "correlation": noise.correlation, "lag_s": noise.period_s, "autocorrelation": noise.autocorrelation,
     }  # fmt: skip
-
-
-def _figure(found: "Identified", model: "RobotModel", title: str) -> Any:
-    from pretouch_lab.identification.arm_file import residual_figure
-
-    return residual_figure(found, model, title)
