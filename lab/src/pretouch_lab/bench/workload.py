@@ -10,6 +10,7 @@ from pretouch.control.path import Circle
 from pretouch.errors import ExperimentError
 from pretouch.importing.ready import reach_of
 from pretouch.profiles import Profile
+from pretouch.robot.body import Capsules, from_axes, placed
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.sensor import PAPER_SENSOR
@@ -63,8 +64,9 @@ class Workload:
         rng = np.random.default_rng(seed)
         self._model, self._period = model, profile.task.control_period_s
         self._q, self._qd, self._cycle = model.description.q_ready.copy(), np.zeros(model.n), 0
-        body = _Body.at(model, self._q)
-        self.path = Circle(center=tuple(body.hand - [0.0, _CIRCLE, 0.0]), radius=_CIRCLE)
+        kin = model.kinematics(self._q)
+        body, hand = placed(model.capsules, kin), kin.position[model.ee]
+        self.path = Circle(center=tuple(hand - [0.0, _CIRCLE, 0.0]), radius=_CIRCLE)
         around = np.array([self.path.point(s) for s in np.linspace(0, self.path.length, 32)])
         wider = reach_of(model) / reach_of(RobotModel(panda()))
         self._room = _Room(_spheres(rng, body, around), wider * _ROOM_CENTER, wider * _ROOM_RADIUS)
@@ -94,7 +96,8 @@ class Workload:
 
     def clearance(self) -> float:
         """Distance from the arm to the nearest sphere [m]."""
-        return float(_Body.at(self._model, self._q).distance(self._room.spheres).min()) - _SPHERE_RADIUS
+        body = placed(self._model.capsules, self._model.kinematics(self._q))
+        return float(_distance(self._room.spheres, body).min()) - _SPHERE_RADIUS
 
     def _ranges(self, units: IntArray) -> FloatArray:
         """Distance (k,) [m] along the beams of some units to the nearest sphere or the wall."""
@@ -104,30 +107,9 @@ class Workload:
         return self._room.ranges(origin, np.einsum("kij,kj->ki", R, T[:, :3, 2]))
 
 
-@dataclass(frozen=True)
-class _Body:
-    """The arm's capsules in one posture, base frame."""
-
-    link: IntArray
-    a: FloatArray
-    b: FloatArray
-    radius: FloatArray
-    hand: FloatArray
-    """(3,) end-effector origin."""
-
-    @staticmethod
-    def at(model: RobotModel, q: FloatArray) -> "_Body":
-        kin, body = model.kinematics(q), model.capsules
-        R, p = kin.rotation[body.link], kin.position[body.link]
-        a, b = (p + np.einsum("cij,cj->ci", R, end) for end in (body.a, body.b))
-        return _Body(body.link, a, b, body.radius, kin.position[model.ee])
-
-    def distance(self, points: FloatArray) -> FloatArray:
-        """Signed distance (P, C) [m] from each point (P, 3) to each capsule."""
-        axis, to = self.b - self.a, points[:, None] - self.a
-        along = np.clip((to * axis).sum(-1) / np.maximum((axis * axis).sum(-1), 1e-12), 0.0, 1.0)
-        gap: FloatArray = np.linalg.norm(to - along[..., None] * axis, axis=-1) - self.radius
-        return gap
+def _distance(points: FloatArray, body: Capsules) -> FloatArray:
+    """Signed distance (P, C) [m] from each point (P, 3) to each capsule."""
+    return np.asarray(np.linalg.norm(from_axes(points, body.a, body.b)[1], axis=2) - body.radius)
 
 
 @dataclass(frozen=True)
@@ -151,20 +133,20 @@ class _Room:
         return np.minimum(sphere, wall)
 
 
-def _spheres(rng: np.random.Generator, body: _Body, around: FloatArray) -> FloatArray:
+def _spheres(rng: np.random.Generator, body: Capsules, around: FloatArray) -> FloatArray:
     """Centres (S, 3) [m] of spheres round the arm, none near the way (P, 3) of its hand."""
     low, high = np.minimum(body.a, body.b).min(axis=0) - 1.0, np.maximum(body.a, body.b).max(axis=0) + 1.0
     found: list[FloatArray] = []
     while len(found) < _SPHERES:
         center = rng.uniform(low, high)
-        clear = float(body.distance(center[None]).min()) - _SPHERE_RADIUS
+        clear = float(_distance(center[None], body).min()) - _SPHERE_RADIUS
         passed = float(np.linalg.norm(around - center, axis=1).min()) - _SPHERE_RADIUS - _HAND
         if _CLEAR[0] <= min(clear, passed) and clear <= _CLEAR[1]:
             found.append(center)
     return np.array(found)
 
 
-def _skin(rng: np.random.Generator, model: RobotModel, units: int, body: _Body, room: _Room) -> Skin:
+def _skin(rng: np.random.Generator, model: RobotModel, units: int, body: Capsules, room: _Room) -> Skin:
     """Units on all links in turn that look away from the arm, and at something near in the posture of `body`."""
     kin = model.kinematics(model.description.q_ready)
     first = int(np.argmax(model.moved_by.sum(axis=1) >= _JOINTS_BEFORE))
@@ -188,14 +170,14 @@ def _skin(rng: np.random.Generator, model: RobotModel, units: int, body: _Body, 
     return Skin(found, model)
 
 
-def _places(rng: np.random.Generator, body: _Body, link: int) -> Iterator[FloatArray]:
+def _places(rng: np.random.Generator, body: Capsules, link: int) -> Iterator[FloatArray]:
     """Draw poses (4, 4) just above the capsules of a link, base frame: as many as are tried before the next link."""
     capsules = np.flatnonzero(body.link == link)
     for _ in range(_TRIES if len(capsules) else 0):
         yield _outwards(rng, body, int(rng.choice(capsules)))
 
 
-def _outwards(rng: np.random.Generator, body: _Body, c: int) -> FloatArray:
+def _outwards(rng: np.random.Generator, body: Capsules, c: int) -> FloatArray:
     """Draw a pose (4, 4) just above a capsule, base frame: z points away from its axis."""
     axis = body.b[c] - body.a[c]
     z = np.cross(axis, rng.normal(size=3))
@@ -207,12 +189,12 @@ def _outwards(rng: np.random.Generator, body: _Body, c: int) -> FloatArray:
     return T
 
 
-def _sees_past(body: _Body, link: int, p: FloatArray, beam: FloatArray, seen: float) -> bool:
+def _sees_past(body: Capsules, link: int, p: FloatArray, beam: FloatArray, seen: float) -> bool:
     """Whether a unit lies outside the arm, and no other link reaches into its cone as far as it sees."""
-    if float(body.distance(p[None]).min()) < 0.5 * _ABOVE:
+    if float(_distance(p[None], body).min()) < 0.5 * _ABOVE:
         return False
     along = np.linspace(0.0, seen, 16)
-    others = body.distance(p + along[:, None] * beam)[:, body.link != link]
+    others = _distance(p + along[:, None] * beam, body)[:, body.link != link]
     return bool(np.all(others > along[:, None] * np.tan(PAPER_SENSOR.angle / 2)))
 
 
