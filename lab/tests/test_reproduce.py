@@ -73,7 +73,7 @@ def test_a_changed_skin_file_is_noticed(tmp_path, monkeypatch, own):
     monkeypatch.setattr(lab_experiment, "skin_file", lambda _arm: file)
     options = Options(1, skin=str(file) if own else "")
     open_run(out, arguments("static", options))
-    open_run(out, arguments("static", options))
+    open_run(out, arguments("static", replace(options, seeds=2)))  # more of the same
     file.write_bytes(PAPER_SKIN.read_bytes().replace(b"-0.108", b"-0.109"))
     with pytest.raises(ExperimentError, match=r"holds a run with skin_sha256 = .*: give another --out"):
         open_run(out, arguments("static", options))

@@ -217,7 +217,8 @@ def arguments(name: str, options: Options) -> Row:
         digests["arm_sha256"] = files_digest(arm)
     if options.world:
         digests["world_sha256"] = world_set(options.world).digest
-    own = {each.name: getattr(options, each.name) for each in fields(Options)}
+    # rows say their seeds, so that a folder may be given more of them
+    own = {each.name: getattr(options, each.name) for each in fields(Options) if "seed" not in each.name}
     return {"experiment": name, **own, **digests}
 
 
