@@ -25,7 +25,7 @@ class Options:
     """Skin file; by default the seven units that come with the package."""
     arm: str = ""
     """Name of an arm, or the folder of an imported one, for static, avoidance and dynamic; by default the Panda. The
-    paper's paths and places are scaled and moved into its reach, and the skin is the arm's own."""
+    paper's paths and places are scaled into its reach, and the skin is the arm's own."""
     world: str = ""
     """Set of simulated arms, sensors and delays: nominal, realistic, stress, or a TOML file, of which each trial's seed
     draws its own; by default the usual ones."""

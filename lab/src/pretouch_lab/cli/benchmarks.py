@@ -4,16 +4,13 @@ from dataclasses import dataclass, fields
 from functools import partial
 from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import tyro
 
 from pretouch.cli.options import Words
 from pretouch.errors import ExperimentError
 from pretouch_lab.options import Playing
-
-if TYPE_CHECKING:  # the help is to need none of the heavy packages
-    pass
 
 
 @dataclass(frozen=True)
@@ -121,7 +118,7 @@ class Avoidance(BenchOptions):
     """Scenarios, separated by commas; by default all."""
     arm: str = "panda"
     """Name of an arm, or the folder of an imported one, in a folder of results of its own: give --out. The scenarios'
-    paths and obstacles are scaled and moved into its reach, and the skin is the arm's own."""
+    paths and obstacles are scaled into its reach, and the skin is the arm's own."""
 
     def results(self) -> dict[str, Any]:
         """See `BenchOptions`."""

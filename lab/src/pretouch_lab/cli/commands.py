@@ -97,7 +97,7 @@ def whole_paper(options: Options) -> list[Part]:
 def reproduce(parts: list[Part], folder: Path, how: Playing) -> None:
     """Play the parts of a run that are not there yet, and show and write tables and figures of all of them."""
     from pretouch.cli.writing import numbers_to
-    from pretouch_lab.cli.playing import check_json, numbers_of, played, report
+    from pretouch_lab.cli.playing import check_json, played, report
     from pretouch_lab.experiment import arguments, check, experiment, play
     from pretouch_lab.run import open_run
 
@@ -115,7 +115,8 @@ def reproduce(parts: list[Part], folder: Path, how: Playing) -> None:
         tables = [table for name, own in rows.items() for table in experiment(name).tables(own)]
         figures = [each for part in parts for each in _figure_of(*part, folder, rows[part[1]])]
         report(tables, figures, folder)
-        write(numbers_of([{"experiment": name, **row} for name, own in rows.items() for row in own], tables))
+        numbered = [{"experiment": name, **row} for name, own in rows.items() for row in own]
+        write({"rows": numbered, "tables": tables})
 
 
 def _figure_of(

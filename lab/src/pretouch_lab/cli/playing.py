@@ -5,7 +5,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 
@@ -77,8 +77,3 @@ def report(tables: list[TextTable], figures: list[tuple[str, str, "Figure"]], fo
         parts = [*([text] if text else []), *(markdown(each, 2) for each in tables), *pictures]
         place.write_text("\n".join(parts), encoding="utf-8")
     console.print(f"Tables and figures: {place}", soft_wrap=True, markup=False)
-
-
-def numbers_of(rows: list[Row], tables: list[TextTable], **about: Any) -> dict[str, Any]:
-    """Return what --json writes of a run: the rows of its plays, and its tables as text."""
-    return {**about, "rows": rows, "tables": tables}

@@ -76,7 +76,7 @@ def sweep_of(
 
     Args:
         experiment: name of a `Measure`.
-        vary: range of each parameter that is varied, as `space.dimension` reads it.
+        vary: range of each parameter that is varied, as `dimension` reads it.
         fix: value of each one that is something else throughout.
         profile_text: profile to start from; empty: the experiment's own.
         design: all combinations, or Saltelli's for Sobol indices.
