@@ -81,15 +81,23 @@ class FirstMotion:
         return qd if self._moves else None
 
 
-class Ghost:
-    """Puts the ghost of a plant's scene where a function of time says, before each physics step."""
+Place = FloatArray | Callable[[float], FloatArray]
+"""Where something is (3,) [m], base frame; as a function of time [s] if it moves."""
 
-    def __init__(self, plant: Plant, place: Callable[[float], FloatArray]) -> None:
-        """Attach to a plant whose scene has a ghost; `place(time)` returns its centre (3,) [m], base frame."""
+
+class Ghost:
+    """Puts the ghost of a plant's scene into its place, before each physics step where that moves."""
+
+    def __init__(self, plant: Plant, place: Place) -> None:
+        """Attach to a plant whose scene has a ghost, of which the place is the centre."""
         body = plant.mj_model.body("ghost")
         # a view into the simulation's memory, taken once
-        self._at, self._place = plant.mj_data.mocap_pos[int(plant.mj_model.body_mocapid[body.id])], place
-        plant.before_each_step(self._move)
+        self._at = plant.mj_data.mocap_pos[int(plant.mj_model.body_mocapid[body.id])]
+        if isinstance(place, np.ndarray):
+            self._at[:] = place
+        else:
+            self._place = place
+            plant.before_each_step(self._move)
 
     @property
     def position(self) -> FloatArray:

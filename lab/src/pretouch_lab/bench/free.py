@@ -105,4 +105,4 @@ def _bystander(cell: FreeCell) -> Prepare:
         return place(near["passing_from_m"] - part * way)
 
     standing = AWAY if cell.near == "nothing" else place(closest)
-    return lambda plant: passing if cell.near == "passing" else lambda _time: standing
+    return lambda plant: passing if cell.near == "passing" else standing

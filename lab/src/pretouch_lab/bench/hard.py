@@ -1,6 +1,5 @@
 """Arms as unkind as real ones, in motions other than circle and line: free, or touched (`scenarios/hard.toml`)."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -16,6 +15,7 @@ from pretouch_lab.bench.dense_skin import gap
 from pretouch_lab.bench.motions import Motion, WanderingController, motion_of
 from pretouch_lab.bench.scenes import SeedRange, model, numbered, path_of, scenario, sensing_of
 from pretouch_lab.bench.streams import AWAY, PROFILE, Alone, Prepare, Stream, record
+from pretouch_lab.replay import Place
 
 WORLD = "hard"
 """Set of the domain randomisation of which each seed draws its arm."""
@@ -77,18 +77,18 @@ def hard_stream(cell: HardCell, quick: bool) -> Stream:
 def _prepared(cell: HardCell, motion: Motion, touches: list[Touching], hand_radius: float) -> Prepare:
     """Return what has the arm grip, and a hand touch it or somebody stand beside it."""
 
-    def prepare(plant: Plant) -> Callable[[float], FloatArray]:
+    def prepare(plant: Plant) -> Place:
         waiting = list(motion.loads)
 
-        def grip(time: float) -> None:
+        def grip(time: float) -> float:
             while waiting and waiting[0][0] <= time:
                 plant.grip(waiting.pop(0)[1])
+            return waiting[0][0] if waiting else np.inf
 
         plant.before_each_step(grip)
         if touches:
             return Toucher(plant, touches, hand_radius).hand
-        place = _beside(motion, cell.seed) if cell.near == "standing" else AWAY
-        return lambda _time: place
+        return _beside(motion, cell.seed) if cell.near == "standing" else AWAY
 
     return prepare
 

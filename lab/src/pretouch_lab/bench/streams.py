@@ -21,7 +21,7 @@ from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.scene import GhostSpec, SceneSpec
 from pretouch.types import FloatArray, IntArray, Mode, Obstacles, RobotState, no_obstacles
 from pretouch_lab.bench.scenes import Sensing, model
-from pretouch_lab.replay import Ghost
+from pretouch_lab.replay import Ghost, Place
 from pretouch_lab.trial import Setup, Simulation
 
 PROFILE = "paper:detect.f_base_n=1000:slow=none:approach=none:perception.closing=on:perception.self_aside_m=0.005"
@@ -157,8 +157,8 @@ class Alone:
     """Makes its controller, as `Controller` is made."""
 
 
-Prepare = Callable[[Plant], Callable[[float], FloatArray]]
-"""Has things done to an arm before each physics step, and returns where the ghost is at a time: (3,) [m]."""
+Prepare = Callable[[Plant], Place]
+"""Has things done to an arm before each physics step, and returns where the ghost is."""
 
 
 def record(
