@@ -3,6 +3,7 @@
 import csv
 import re
 import socket
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -115,8 +116,8 @@ def test_a_port_that_is_taken_is_said_before_anything_is_planned(paper_skin, tmp
 def test_the_arm_does_not_move_without_a_persons_word(tmp_path, capsys, monkeypatch):
     files = ("--out", tmp_path / "s.toml")
     monkeypatch.setattr("sys.stdin.isatty", lambda: True, raising=False)
-    for answer in ("", "n", "maybe"):
-        monkeypatch.setattr("builtins.input", lambda question, answer=answer: answer)
+    for answer in ("", "n", "maybe", EOFError):
+        monkeypatch.setattr("builtins.input", Mock(side_effect=[answer]))
         assert calibrate("simulated", *files) == 2
         told = capsys.readouterr()
         assert "The arm needs the space x" in told.out

@@ -84,11 +84,19 @@ def test_only_what_is_newer_than_what_its_writer_said_before_is_new(told, expect
 
 def test_a_source_whose_stamps_are_not_newer_is_named_until_one_is():
     stamps, notes = SourceStamps(), []
-    for stamp in (10, 5, 5, 11, 1e6, *range(12, 23), 1e6 + 1):  # one repeats, then one from the future mutes others
-        stamps.instant(header(stamp), 1.0, 7)
+    told = (10, 5, 5, 11, 1e6, *range(12, 23), 1e6 + 1)  # one repeats, then one from the future mutes others
+    for received, stamp in zip(np.arange(len(told)) * 0.06, told, strict=True):
+        stamps.instant(header(stamp), received, 7)
         notes.append(stamps.not_newer("/joint_states"))
     assert [bool(note) for note in notes] == [False] * 15 + [True, False]
     assert "/joint_states is stamped no later than before, so it is not used: see whether its source" in notes[-2]
+
+
+def test_a_repeater_that_sends_each_message_often_is_as_fresh_as_its_source():
+    stamps = SourceStamps()
+    for k in range(500):  # 250 Hz of a source of 20 Hz
+        stamps.instant(header(1 + k // 12), 0.004 * k, 7)
+        assert not stamps.not_newer("/twist")
 
 
 def test_writers_that_publish_at_once_are_noticed_and_one_that_follows_another_is_not():

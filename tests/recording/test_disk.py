@@ -52,6 +52,12 @@ def test_a_full_disk_leaves_its_whole_chunks_and_a_sentence(controller, tmp_path
     assert verify(recorded).agrees
 
 
+def test_a_disk_that_is_full_already_is_refused_before_anything_moves(controller, tmp_path):
+    with pytest.raises(RecordingError, match=r"a\.mcap cannot be written: File too large: give another name or folder"):
+        filled(tmp_path / "a.mcap", controller, 0, 0)
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_disk_without_room_for_anything_is_one_sentence(controller, tmp_path):
     _, recording = filled(tmp_path / "a.mcap", controller, 50, 4096)
     assert "it holds nothing" in recording.trouble

@@ -15,8 +15,8 @@ _TOGETHER_S = 0.5
 """Writers that were heard within this time publish at once [s]."""
 _WRITERS = 8
 """Writers that are remembered: those that were heard last."""
-_NOT_NEWER_MOST = 10
-"""Messages in a row that may be no newer before a person is told: now and then one comes twice."""
+_NOT_NEWER_MOST, _NOT_NEWER_S = 10, 0.5
+"""Messages in a row that may be no newer, and for how long [s], before a person is told: a repeater is no fault."""
 
 
 @dataclass
@@ -36,7 +36,7 @@ class SourceStamps:
         """Take whether the stamps are of this machine's time of day; and that [s]."""
         self._shared, self._now = shared_clock, now
         self._writers: dict[int, _Writer] = {}
-        self._not_newer = 0
+        self._not_newer, self._newer_at, self._heard_at = 0, 0.0, 0.0
         self.behind: float | None = None
         """How far stamps are behind this machine's time of day when they come, at best [s]; None: there are none."""
 
@@ -51,12 +51,13 @@ class SourceStamps:
         at = header.stamp  # type: ignore[attr-defined]
         stamp = seconds(at.sec, at.nanosec)
         entry = self._known(writer, received)
+        self._heard_at = received
         if stamp == 0:
             return received
         if stamp <= entry.newest:
             self._not_newer += 1
             return None
-        entry.newest, self._not_newer = stamp, 0
+        entry.newest, self._not_newer, self._newer_at = stamp, 0, received
         behind = self._now() - stamp
         self.behind = behind if self.behind is None else min(behind, self.behind, key=abs)
         return received - max(behind, 0.0) if self._shared else received
@@ -67,7 +68,8 @@ class SourceStamps:
             f"{name} is stamped no later than before, so it is not used: see whether its source repeats itself, or set"
             " its clock by NTP and start the run again."
         )
-        return sentence if self._not_newer > _NOT_NEWER_MOST else ""
+        lasts = self._heard_at - self._newer_at > _NOT_NEWER_S
+        return sentence if lasts and self._not_newer > _NOT_NEWER_MOST else ""
 
     def together(self) -> bool:
         """Whether several writers publish at once."""

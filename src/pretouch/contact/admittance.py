@@ -146,8 +146,9 @@ class Admittance(AdmittanceParams, Reaction, name="admittance"):
     def _move_mass(self, clamp: ClampState, doing: Doing, body: Body, inputs: ReactionInputs) -> None:
         """Let the mass learn in free motion, and yield to the external torque in a reaction or a soft hold."""
         mass, detection, residual = inputs.mass, inputs.detection, _residual(inputs)
-        if doing == "learn" or (doing == "task" and detection.contact is None):
-            learn_mean(mass, residual, body.period)
+        if doing in ("learn", "task"):
+            if doing == "learn" or detection.contact is None:
+                learn_mean(mass, residual, body.period)
             settle(mass, self)
         elif doing in ("react", "soft"):
             band, axes = dead_band(body.model.description.tau_max, self), _axes(body, inputs.kin)

@@ -64,6 +64,14 @@ class Disk:
         """Bytes of messages in the chunk that is being filled, and the latest time in it [ns]."""
         self._written: int | None = None
         """Latest time in the file [ns]."""
+        try:  # a disk that is full already is no trouble of later, when the arm moves
+            self._writer.start("ros2", LIBRARY)
+            self._file.flush()
+        except OSError as error:
+            with suppress(OSError):  # what failed to be written fails again
+                self._file.close()
+            place.unlink()
+            raise _refused(place, error) from error
         self.trouble = ""
         """Why nothing more is written, as a sentence, or ''."""
         self._closed = False
@@ -98,7 +106,6 @@ class Disk:
 
     def _work(self) -> None:
         try:
-            self._writer.start("ros2", LIBRARY)
             self._write_all()
             self._flush()
             self._writer.finish()

@@ -85,5 +85,8 @@ def require_yes(question: str, otherwise: str) -> None:
     """Have a person say yes; a RobotError with `otherwise` if none does."""
     if not sys.stdin.isatty():
         raise RobotError("There is no terminal to ask for permission to move the arm: give --yes.")
-    if input(f"{question} [y/N] ").strip().lower() not in ("y", "yes"):
+    answer = ""
+    with suppress(EOFError):  # Ctrl-D is no answer
+        answer = input(f"{question} [y/N] ")
+    if answer.strip().lower() not in ("y", "yes"):
         raise RobotError(f"{otherwise}: answer y to allow it.")

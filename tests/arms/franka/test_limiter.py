@@ -112,6 +112,7 @@ def test_a_set_point_that_is_none_is_named(limits: MotionLimits, joint: int, val
     wanted[joint] = value
     assert words in refusal(wanted, limits)
     assert refusal(limits.qd_max.tolist(), limits) == ""
+    assert "6 joint velocities were asked for" in refusal(wanted[:6], limits)
 
 
 def test_a_controller_is_told_the_acceleration_that_is_used(panda_model: RobotModel) -> None:

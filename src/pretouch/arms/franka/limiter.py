@@ -123,6 +123,8 @@ def _ends(
 
 def refusal(wanted: list[float], limits: MotionLimits) -> str:
     """Say what keeps a set-point [rad/s] from being one, or ''."""
+    if len(wanted) != len(limits.qd_max):
+        return f"{len(wanted)} joint velocities were asked for, but it has {len(limits.qd_max)} joints"
     for i, (v, most) in enumerate(zip(wanted, limits.qd_max.tolist(), strict=True)):
         if not math.isfinite(v):
             return f"joint {i + 1} was to move at {v} rad/s, which is not finite"
