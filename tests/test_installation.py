@@ -69,7 +69,7 @@ def test_each_hint_works_in_an_installation_from_a_wheel(built: Path):
         "report gone.mcap": "gone.mcap cannot be read",
         "run franka --ip 127.0.0.1 --no-skin --profile blind --seconds 1": "127.0.0.1",
         "figure nothing": "nothing",
-        "serve-fci --seed -1": "--seed is -1",
+        "serve-fci --seed -1": "ServeFci.seed is -1",
     }
     for words, otherwise in asked.items():
         command = (str(built / "user/bin/pretouch"), *words.split())
