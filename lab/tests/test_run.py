@@ -78,13 +78,16 @@ def test_a_damaged_line_is_named_and_left_as_it_is(tmp_path, line):
     assert (tmp_path / ROWS).read_bytes() == content
 
 
-def test_rows_of_what_raises_are_not_kept_and_those_before_are(tmp_path):
+@pytest.mark.parametrize(
+    ("measured", "match"), [({"value": {1}}, "'b'.*seed 3 is not of plain values"), ({"name": 1}, "measures 'name'")]
+)
+def test_what_cannot_be_a_row_is_not_kept_and_those_before_are(tmp_path, measured, match):
     def fails(cell, seed):
-        return {"value": 1.0 if cell["name"] == "a" else float("nan")}
+        return {"value": float("inf")} if cell["name"] == "a" else measured
 
-    with pytest.raises(ValueError, match="JSON"):
+    with pytest.raises(ExperimentError, match=match):
         run(fails, plays_of(CELLS, (3,)), tmp_path)
-    assert missing(plays_of(CELLS, (3,)), tmp_path) == 1
+    assert [json.loads(line)["value"] for line in (tmp_path / ROWS).read_text().splitlines()] == [None]
 
 
 def test_a_second_run_in_the_same_folder_is_refused_and_one_that_cannot_be_written_is_named(tmp_path):
@@ -93,7 +96,9 @@ def test_a_second_run_in_the_same_folder_is_refused_and_one_that_cannot_be_writt
             run(played, [(cell, seed)], tmp_path)
         return {}
 
-    run(again, [(CELLS[0], 1)], tmp_path)
+    assert len(run(again, [(CELLS[0], 1)] * 2, tmp_path)) == 2, "the same play is played once"
+    with pytest.raises(FileNotFoundError):
+        run(lambda *_: {"text": (tmp_path / "missing").read_text()}, [(CELLS[1], 1)], tmp_path)
     with pytest.raises(ExperimentError, match=r"Rows could not be kept in .*Not a directory"):
         run(played, [(CELLS[0], 1)], tmp_path / ROWS / "below")
 
@@ -134,7 +139,7 @@ def test_worker_processes_play_and_a_killed_one_is_named_with_what_it_played(tmp
         workers(2) as pool,
     ):
         run(killed, [(CELLS[0], 6), (CELLS[1], 7)], tmp_path, *pool)
-    assert missing([(CELLS[0], 6)], tmp_path) in (0, 1)
+    assert missing([(CELLS[1], 7)], tmp_path) == 1
     with pytest.raises(ExperimentError, match="number of processes is 0"), workers(0):
         pass
 

@@ -11,7 +11,15 @@ import shutil
 import signal
 import subprocess
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    CancelledError,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    wait,
+)
 from contextlib import contextmanager
 from dataclasses import asdict, is_dataclass
 from itertools import islice
@@ -22,6 +30,7 @@ from typing import IO, Any
 
 from pretouch import __version__
 from pretouch.atomic_write import write_json
+from pretouch.cli.writing import plain
 from pretouch.errors import ExperimentError
 from pretouch.extras import Extra
 from pretouch.signals import kept_from_children, leave_to_parent, noted
@@ -58,22 +67,24 @@ def run(
 
     Args:
         trial: gives a row for a cell and a seed. A function of a module, or a `partial` of one, as it goes to workers.
-        plays: cells with their seeds, in the order in which they are begun.
+        plays: cells with their seeds, in the order in which they are begun; the same one is played once.
         out: the folder. However the run ends, rows of finished plays are in its `rows.jsonl`.
         executor: plays them; None: this process, one after the other.
         at_once: how many plays the executor has at a time.
         done: called after each play.
 
     Raises:
-        ExperimentError: for a worker that was killed, and for rows that cannot be read or written.
+        ExperimentError: for a worker that was killed, for rows that cannot be read or written, and for what a trial
+            gives that cannot be one.
     """
     every = [(_plain(cell), cell, seed) for cell, seed in plays]
     with _rows_in(out, tuple(every[0][0]) if every else ()) as (file, rows):
-        left = [(cell, seed) for names, cell, seed in every if _key(names, seed) not in rows]
-        for cell, seed, measured in _played(trial, left, executor, at_once):
-            line = json.dumps({**_plain(cell), "seed": seed, **measured}, allow_nan=False)
-            file.write(line.encode() + b"\n")
-            file.flush()
+        left = {key: (cell, seed) for names, cell, seed in every if (key := _key(names, seed)) not in rows}
+        for cell, seed, measured in _played(trial, list(left.values()), executor, at_once):
+            line = _line(_plain(cell), seed, measured)
+            with _kept_in(out):
+                file.write(line.encode() + b"\n")
+                file.flush()
             rows[_key(_plain(cell), seed)] = json.loads(line)
             done()
     return [rows[_key(names, seed)] for names, _, seed in every]
@@ -94,6 +105,31 @@ def _key(cell: Row, seed: int) -> str:
     return json.dumps([cell, seed], sort_keys=True)
 
 
+def _line(cell: Row, seed: int, measured: Row) -> str:
+    """Write a row; numbers that are not finite are null, as JSON has none."""
+    own = cell | {"seed": seed}
+    if other := [name for name in own if name in measured and measured[name] != own[name]]:
+        raise ExperimentError(
+            f"The trial of {cell} with seed {seed} measures {other[0]!r}, a name of the cell: give it another."
+        )
+    try:
+        return json.dumps(plain(own | measured), allow_nan=False)
+    except (TypeError, ValueError) as error:
+        raise ExperimentError(f"The row of {cell} with seed {seed} is not of plain values: {error}.") from error
+
+
+@contextmanager
+def _kept_in(out: Path) -> Iterator[None]:
+    """Say which folder it is where rows cannot be read or written."""
+    try:
+        yield
+    except OSError as error:
+        raise ExperimentError(
+            f"Rows could not be kept in {out} ({error.strerror or error}): remove the cause, and the same command with"
+            " the same --out goes on; or give another --out."
+        ) from error
+
+
 @contextmanager
 def _rows_in(out: Path, names: tuple[str, ...]) -> Iterator[tuple[IO[bytes], dict[str, Row]]]:
     """Open a folder's rows to read them and to append more: no other run may have them open.
@@ -101,9 +137,11 @@ def _rows_in(out: Path, names: tuple[str, ...]) -> Iterator[tuple[IO[bytes], dic
     A last line that was not written whole, by a process that was killed, is taken away.
     """
     place = out / ROWS
-    try:
+    with _kept_in(out):
         out.mkdir(parents=True, exist_ok=True)
-        with place.open("a+b") as file:
+        file = place.open("a+b")
+    try:
+        with _kept_in(out):
             try:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
@@ -111,12 +149,10 @@ def _rows_in(out: Path, names: tuple[str, ...]) -> Iterator[tuple[IO[bytes], dic
             file.seek(0)
             *lines, torn = file.read().split(b"\n")
             file.truncate(file.tell() - len(torn))
-            yield file, dict(_read(number, line, names, place) for number, line in enumerate(lines, 1))
-    except OSError as error:
-        raise ExperimentError(
-            f"Rows could not be kept in {out} ({error.strerror or error}): remove the cause, and the same command with"
-            " the same --out goes on; or give another --out."
-        ) from error
+        yield file, dict(_read(number, line, names, place) for number, line in enumerate(lines, 1))
+    finally:
+        with _kept_in(out):
+            file.close()
 
 
 def _read(number: int, line: bytes, names: tuple[str, ...], place: Path) -> tuple[str, Row]:
@@ -193,6 +229,7 @@ def workers(processes: int | None = None, scheduler: str = "") -> Iterator[tuple
 def _cluster(scheduler: str) -> Iterator[tuple[Executor, int]]:
     CLUSTER.need("--scheduler")
     from distributed import Client, KilledWorker
+    from distributed.comm import CommClosedError
 
     try:
         client = Client(scheduler, timeout=_CONNECT_S)
@@ -202,11 +239,16 @@ def _cluster(scheduler: str) -> Iterator[tuple[Executor, int]]:
         ) from error
     with client:
         try:
-            # two for each thread, so that none waits while a row is on its way
-            yield client.get_executor(), 2 * sum(client.nthreads().values())
+            # two for each thread, so that none waits while a row is on its way; workers may also come later
+            yield client.get_executor(), max(1, 2 * sum(client.nthreads().values()))
         except KilledWorker as error:
             raise ExperimentError(
                 f"A worker of the cluster was killed ({error}): the same command with the same --out goes on."
+            ) from error
+        except (CancelledError, CommClosedError) as error:
+            raise ExperimentError(
+                f"The scheduler at {scheduler} is gone. All finished plays are kept: start it again, and the same"
+                " command with the same --out goes on."
             ) from error
 
 
@@ -256,9 +298,13 @@ def open_run(out: Path, arguments: Mapping[str, Any]) -> None:
 
 
 def commit() -> str | None:
-    """Return the commit of the clone that this package is in; None where it is in none."""
-    git, folder = shutil.which("git"), Path(__file__).parent
-    if git is None or not any((parent / ".git").exists() for parent in folder.parents):
+    """Return the commit of the clone that this package is in; None where none has it, though one may be around it."""
+    git, file = shutil.which("git"), Path(__file__)
+    if git is None or not any((parent / ".git").exists() for parent in file.parents):
         return None
-    answer = subprocess.run([git, "rev-parse", "HEAD"], cwd=folder, capture_output=True, text=True, check=False)  # noqa: S603
-    return answer.stdout.strip() or None
+    tracked, head = ("ls-files", "--error-unmatch", file.name), ("rev-parse", "HEAD")
+    for arguments in (tracked, head):
+        answer = subprocess.run([git, *arguments], cwd=file.parent, capture_output=True, text=True, check=False)  # noqa: S603
+        if answer.returncode:
+            return None
+    return answer.stdout.strip()
