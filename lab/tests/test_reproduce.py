@@ -50,7 +50,7 @@ def test_plays_are_all_cells_seed_by_seed_and_their_recordings_differ(tmp_path):
         assert [seed for _, seed in plays] == [3] * (len(plays) // 2) + [4] * (len(plays) // 2)
         files = {recording_file(tmp_path, *each).name for each in plays}
         assert len(files) == len(plays)
-        assert all(re.fullmatch(r"[A-Za-z0-9._-]+", file) for file in files)
+        assert all(re.fullmatch(r"[A-Za-z0-9._+-]+", file) for file in files)
 
 
 def test_the_whole_paper_runs_every_experiment_and_no_trial_twice():

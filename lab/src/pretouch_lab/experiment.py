@@ -241,7 +241,7 @@ def play(name: str, options: Options, out: Path, cell: Row, seed: int) -> Row:
 def recording_file(out: Path, cell: Row, seed: int) -> Path:
     """Return where a trial's recording is kept: where two cells' names could become one, a digest tells them apart."""
     exact = "_".join(f"{value:.12g}" if isinstance(value, float) else str(value) for value in cell.values())
-    safe = re.sub(r"[^A-Za-z0-9._-]", "-", exact)
+    safe = re.sub(r"[^A-Za-z0-9._+-]", "-", exact)  # + and - tell sides apart
     name = safe if safe == exact else f"{safe}-{sha256(exact.encode()).hexdigest()[:8]}"
     return out / "recordings" / f"{name}_{seed:04d}.mcap"
 

@@ -197,6 +197,7 @@ def row(position: float, force: float, side: str = "+y", seed: int = 0, told: st
 def test_trials_are_compared_with_their_twin_without_error():
     rows = [row(0.0, 10.0), row(0.0, 20.0, seed=1), row(50.0, 15.0), row(50.0, 40.0, seed=1, told="told")]
     rows += [row(0.0, 5.0, ROOM), row(50.0, 4.0, ROOM), row(50.0, 12.0, side="-y")]
+    rows.append(row(50.0, 4.0, ROOM, seed=1) | {"refused": 9, "drawn": 16})
     forces, room = tables(rows)
     assert [r[:2] for r in forces.rows] == [("none", ""), ("50 mm", ""), ("50 mm", "yes")]
     assert [r[3] for r in forces.rows] == ["2/2", "2/2", "1/1"]
@@ -204,6 +205,6 @@ def test_trials_are_compared_with_their_twin_without_error():
     assert [r[8] for r in forces.rows] == ["1.00", "1.50", "2.00"], "the trial at -y has no twin"
     assert forces.rows[1][-1] == "2"
     assert room.rows[1][5] == "80"
-    assert room.rows[1][-1] == "12", "one of eight poses was drawn again"
+    assert room.rows[1][-1] == "42", "10 of 24 poses were refused"
     assert max(width(table) for table in (forces, room)) <= 80
     assert tables([]) == []

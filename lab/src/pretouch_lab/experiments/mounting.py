@@ -150,8 +150,9 @@ _SPREADS = (
         *_COMPARED,
         *(f"{name}_ratio" for name in _COMPARED),
     ),
-    *("missed_fraction", "obstacle_fraction", "speed_scale", "refused_fraction"),
+    *("missed_fraction", "obstacle_fraction", "speed_scale"),
 )
+_TOTALS = ("contact", "false_detections", "refused", "drawn")
 _ERROR = (
     Column("error", "error"),
     Column("stated", "stated"),
@@ -197,19 +198,14 @@ def tables(rows: list[Row]) -> list[TextTable]:
     """
     same = ("trajectory", "side", "profile", "restrictions", "seed")
     every = [
-        row
-        | {
-            "error": _error(row),
-            "stated": "yes" if row["told"] == "told" else "",
-            "refused_fraction": row["refused"] / row["drawn"],
-        }
+        row | {"error": _error(row), "stated": "yes" if row["told"] == "told" else ""}
         for row in ratios(rows, {"position_mm": 0.0, "orientation_deg": 0.0}, same, _COMPARED)
     ]
     by = ("error", "stated", "profile", "restrictions")
     boards, rooms = (
-        summary((r for r in every if (r["side"] == ROOM) is empty), by, _SPREADS, ("contact", "false_detections"))
-        for empty in (False, True)
+        summary((r for r in every if (r["side"] == ROOM) is empty), by, _SPREADS, _TOTALS) for empty in (False, True)
     )
+    rooms = [row | {"refused_fraction": row["refused"] / row["drawn"]} for row in rooms]
     made = (
         table("Misplaced units, static object: medians of all four places", _BOARDS, boards, _BOARDS_NOTE, 3),
         table("Misplaced units, an empty room: medians", _ROOMS, rooms, _ROOMS_NOTE, 3),
