@@ -44,8 +44,18 @@ class Playing:
     processes: int | None = None
     """Worker processes; by default one for each processor."""
     scheduler: str = ""
-    """Address of a dask scheduler, tcp://HOST:PORT, whose workers play instead. They need the same folder --out."""
+    """Address of a dask scheduler, tcp://HOST:PORT, whose workers play instead. They need the same folder --out
+    and the same files."""
 
     def folder(self, name: str) -> Path:
         """Return where the results go: --out, or a folder under runs/."""
-        return Path(self.out or f"runs/{name}")
+        place = Path(self.out or f"runs/{name}")
+        return place.absolute() if self.scheduler else place
+
+    def input(self, name: str) -> str:
+        """Return a name of an arm, a skin or a world as workers may read it: a scheduler's have another folder."""
+        from pretouch.robot.description import ROBOTS
+        from pretouch.sim.randomisation import SETS
+
+        whole = self.scheduler and name and name not in (*ROBOTS, *SETS)
+        return str(Path(name).absolute()) if whole else name

@@ -143,7 +143,11 @@ class Column:
         """Return its cell of a row: a dash for what there is not, `>` for what did not end."""
         value = row[self.key]
         shown = "-" if value is None else self._spread(value) if isinstance(value, dict) else self._number(value)
-        return shown + (f"/{row[self.of]}" if self.of else "") + (f"\n{row[self.second]}" if self.second else "")
+        return (
+            shown
+            + (f"/{row[self.of]}" if self.of and value is not None else "")
+            + (f"\n{row[self.second]}" if self.second else "")
+        )
 
     def _spread(self, value: Row) -> str:
         middle = self._number(value["median"])

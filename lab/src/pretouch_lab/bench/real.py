@@ -115,7 +115,7 @@ class Tally:
             "per_hour_low": low, "per_hour_high": high,
             "found": self.found, "busy": self.busy, "contacts": self.contacts,
             "median_delay_ms": 1000.0 * float(np.median(self.delays_s)) if self.delays_s else None,
-            "link_right": self.links_right, "link_said": self.links_said,
+            "link_right": self.links_right if self.links_said else None, "link_said": self.links_said,
         }  # fmt: skip
 
 

@@ -5,6 +5,7 @@ These are the product's observer's, less what half of the runs says of load and 
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from hashlib import file_digest, sha256
 from pathlib import Path
 from zipfile import BadZipFile
 
@@ -15,6 +16,7 @@ from pretouch.errors import ExperimentError
 from pretouch.imported_data.log import Choice, Log
 from pretouch.imported_data.torques import TorqueRecording, observed, torque_recording
 from pretouch.params import SequentialParams
+from pretouch.robot import description
 from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.types import BoolArray, FloatArray, IntArray
@@ -163,6 +165,17 @@ def sets_in(folder: Path) -> tuple[list[RealSet], list[str]]:
         known = "; ".join(f"{each.place} (github.com/{each.source})" for each in SETS)
         raise ExperimentError(" ".join([f"{folder} has no set that can be played. Looked for were {known}.", *said]))
     return usable, said
+
+
+def files_digest(sets: Sequence[RealSet], folder: Path) -> str:
+    """Return the SHA-256 of all that is read of some sets: their files and their arms."""
+    whole = sha256()
+    for each in sets:
+        for file in each.files(folder):
+            with file.open("rb") as data:
+                whole.update(f"{file.relative_to(folder)} {file_digest(data, 'sha256').hexdigest()} ".encode())
+        whole.update(description.files_digest(robot_named(each.arm_of(folder))).encode())
+    return whole.hexdigest()
 
 
 @value

@@ -37,7 +37,7 @@ class Real(Playing):
         from pretouch.cli.writing import numbers_to
         from pretouch.profiles import profile
         from pretouch_lab.bench.real import DETECTORS, tables, trial
-        from pretouch_lab.bench.real_sets import sets_in
+        from pretouch_lab.bench.real_sets import files_digest, sets_in
         from pretouch_lab.cli.playing import check_json, played, report
         from pretouch_lab.run import open_run
 
@@ -49,10 +49,11 @@ class Real(Playing):
         out = self.folder("bench-real")
         check_json(self, [out])
         with numbers_to(self.json) as write:
-            open_run(out, {"bench": "real", "sets": str(self.sets.absolute())})
+            folder = self.sets.absolute()
+            open_run(out, {"bench": "real", "sets": str(folder), "files_sha256": files_digest(sets, folder)})
             for sentence in missing:
                 print(sentence, file=sys.stderr)
-            rows = played("recordings", partial(trial, self.sets), plays, out, self)
+            rows = played("recordings", partial(trial, folder), plays, out, self)
             made = tables(rows)
             report(made, [], out)
             sources = {each.name: each.source for each in sets}
@@ -77,7 +78,7 @@ class Calibration(Playing):
         """Run it, with tables and numbers."""
         from pretouch.calibration.motion.planner import plan_motion
         from pretouch.cli.writing import numbers_to
-        from pretouch.robot.description import robot_named
+        from pretouch.robot.description import files_digest, robot_named
         from pretouch.robot.model import RobotModel
         from pretouch_lab.bench.calibration import tables, trial
         from pretouch_lab.cli.playing import check_json, played, report
@@ -90,10 +91,11 @@ class Calibration(Playing):
         out, model = self.folder("bench-calibration"), RobotModel(robot_named(self.arm))
         check_json(self, [out])
         with numbers_to(self.json) as write:
-            open_run(out, {"bench": "calibration", "arm": self.arm, "motion": repr(self.motion)})
+            arm = {"arm": self.arm, "arm_sha256": files_digest(model.description)}
+            open_run(out, {"bench": "calibration", **arm, "motion": repr(self.motion)})
             plan = plan_motion(model, self.motion)
             plays = plays_of([{"find_links": self.find_links}], range(self.seed, self.seed + self.skins))
-            rows = played("skins", partial(trial, self.arm, plan), plays, out, self)
+            rows = played("skins", partial(trial, self.input(self.arm), plan), plays, out, self)
             made = tables(rows, plan.duration)
             report(made, [], out)
             write({"rows": rows, "motion_s": plan.duration, "tables": made})

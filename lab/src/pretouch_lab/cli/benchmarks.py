@@ -65,7 +65,7 @@ def begin(options: BenchOptions, name: str, out: Path, **more: Any) -> None:
 
     world = {"world_sha256": world_set(options.world).digest} if options.world else {}
     scenarios = sha256(repr(sorted(checksums().items())).encode()).hexdigest()
-    check_json(options, [out])
+    check_json(options, [out, out / "streams"])
     shared = {"bench": name, "seeds": options.seeds, "world": options.world, "scenarios_sha256": scenarios}
     open_run(out, shared | world | more)
     if options.world:
@@ -97,7 +97,8 @@ class Detection(BenchOptions):
 
         out = self.folder("bench-detection")
         begin(self, "detection", out, quick=self.quick)
-        cells, streams = arm_cells(self.seeds, self.quick, self.world), Streams(out, self.seeds, self.quick, self.world)
+        cells = arm_cells(self.seeds, self.quick, self.world)
+        streams = Streams(out, self.seeds, self.quick, self.input(self.world))
         played("recording streams", streams.record, stream_plays(cells), out / "streams", self)
         numbers = results(played("replaying them", streams.judge, plays(cells), out, self))
         return _finish(out, self.about("detection"), tables(numbers), numbers["resolution"], **numbers)
@@ -136,7 +137,9 @@ class Avoidance(BenchOptions):
             other = {"arm": self.arm, "arm_sha256": files_digest(described)}
             print(place(self.arm).sentence(described.name), assumed_plant(described), sep="\n")
         begin(self, "avoidance", out, **other)  # a quick run shares its trials with a full one
-        rows = played("avoidance", partial(avoidance.trial, self.world, self.arm), plays, out, self)
+        rows = played(
+            "avoidance", partial(avoidance.trial, self.input(self.world), self.input(self.arm)), plays, out, self
+        )
         summary = avoidance.summarise(rows)
         cells = summary.pop("cells")
         counts = [cell["trials"] for cell in cells]
@@ -199,9 +202,10 @@ class Both(BenchOptions):
     def results(self) -> dict[str, Any]:
         """See `BenchOptions`."""
         from pretouch_lab.bench.goals import front_table, goal_table
-        from pretouch_lab.cli.playing import report
+        from pretouch_lab.cli.playing import check_json, report
 
         out = self.folder("bench")
+        check_json(self, [out, *(out / name for name in ("detection", "detection/streams", "avoidance"))])
         detection = self.below(Detection, out / "detection").results()
         avoidance = self.below(Avoidance, out / "avoidance").results()
         report([goal_table(detection, avoidance), front_table(detection, avoidance)], [], out)

@@ -1,5 +1,6 @@
 """`pretouch demo`, `reproduce` and `figure`: their docstrings are the help."""
 
+import sys
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from io import BytesIO
@@ -104,13 +105,14 @@ def reproduce(parts: list[Part], folder: Path, how: Playing) -> None:
     for _, name, options in parts:
         check(options, (name,))
     plays = [experiment(name).plays(options) for _, name, options in parts]
-    check_json(how, [folder / where for where, _, _ in parts])
+    check_json(how, [folder, *(folder / where for where, _, _ in parts)])
     with numbers_to(how.json) as write:
         for where, name, options in parts:
             open_run(folder / where, arguments(name, options))
         rows: dict[str, list[Row]] = {}
         for (where, name, options), own in zip(parts, plays, strict=True):
-            trial = partial(play, name, options, folder / where)
+            skin, arm, world = map(how.input, (options.skin, options.arm, options.world))
+            trial = partial(play, name, replace(options, skin=skin, arm=arm, world=world), folder / where)
             rows[name] = rows.get(name, []) + played(where or name, trial, own, folder / where, how)
         tables = [table for name, own in rows.items() for table in experiment(name).tables(own)]
         figures = [each for part in parts for each in _figure_of(*part, folder, rows[part[1]])]
@@ -136,9 +138,10 @@ def _figure_of(
     try:
         for row in what.drawing.shown([row for row in rows if row["seed"] == 0]):
             cell = {key: row[key] for key in names}
-            traces.append((cell, gather(open_recording(recording_file(folder / where, cell, 0)))))
-    except PretouchError:
-        pass
+            file = recording_file(folder / where, cell, 0)
+            traces.append((cell, gather(open_recording(file))))
+    except PretouchError as error:
+        print(f"The figure of {where or name} does not show {file}: {error}", file=sys.stderr)
     if not traces:
         return []
     units = context_of(options.arm, options.skin, options.world).skin.ids

@@ -60,7 +60,6 @@ def sweep(command: Sweep) -> dict[str, Any]:
     from pretouch_lab.cli.playing import check_json, played
     from pretouch_lab.run import open_run
     from pretouch_lab.sweep.design import SWEEP, groups, points, sweep_of, trial, values_of
-    from pretouch_lab.sweep.parameters import world_digest
 
     defined = sweep_of(
         command.experiment, _pairs("vary", command.vary), _pairs("fix", command.fix), command.profile, command.design,
@@ -74,10 +73,8 @@ def sweep(command: Sweep) -> dict[str, Any]:
     SWEEP.need("A sweep")
     out, design = command.folder("sweep"), points(defined)
     grouped = groups(defined, design)
-    worlds = {digest for _, (cell, _) in grouped for values in cell["cells"] if (digest := world_digest(values))}
     check_json(command, [out])
-    about = {"sweep": command.experiment, "profile": defined.profile, "worlds_sha256": sorted(worlds)}
-    open_run(out, about)
+    open_run(out, {"sweep": command.experiment, "profile": defined.profile})
     play = partial(trial, command.experiment, defined.profile)
     rows = played("sweep", play, [each for _, each in grouped], out, command)
     for reason, count in Counter(row["failed"] for row in rows if row["failed"]).items():

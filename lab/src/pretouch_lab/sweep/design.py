@@ -21,7 +21,16 @@ from pretouch.types import FloatArray
 from pretouch_lab.bench.scenes import SeedRange
 from pretouch_lab.run import Play, Row
 from pretouch_lab.sweep.measures import Measure, measure
-from pretouch_lab.sweep.parameters import Dimension, Setting, Values, built, current, dimension, read_value
+from pretouch_lab.sweep.parameters import (
+    Dimension,
+    Setting,
+    Values,
+    built,
+    current,
+    dimension,
+    read_value,
+    world_digest,
+)
 
 Design = Literal["grid", "sobol"]
 SEED = "seed"
@@ -169,15 +178,20 @@ Group = tuple[list[int], Play]
 
 
 def groups(sweep: Sweep, cells: list[Point]) -> list[Group]:
-    """Return the points of a design as plays: each of its own, or all of a recorded stream."""
+    """Return the points of a design as plays: each of its own, or all of a recorded stream.
+
+    A cell has digests of the worlds that its values name, so that rows of a file as it was before are not taken for it.
+    """
     shared: dict[str, list[int]] = {}
     for number, point in enumerate(cells):
         same = sweep.setting(point).world if sweep.measure.shared else json.dumps([point.values, point.seed])
         shared.setdefault(same, []).append(number)
-    return [
-        (numbers, ({"cells": [sweep.fixed | cells[n].values for n in numbers]}, cells[numbers[0]].seed))
-        for numbers in shared.values()
-    ]
+    made: list[Group] = []
+    for numbers in shared.values():
+        values = [sweep.fixed | cells[n].values for n in numbers]
+        worlds = sorted({digest for each in values if (digest := world_digest(each))})
+        made.append((numbers, ({"cells": values, "worlds_sha256": worlds}, cells[numbers[0]].seed)))
+    return made
 
 
 def trial(experiment: str, profile_text: str, cell: Row, seed: int) -> Row:
