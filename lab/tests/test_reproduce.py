@@ -13,7 +13,7 @@ from pretouch_lab import experiment as lab_experiment
 from pretouch_lab.cli.commands import whole_paper
 from pretouch_lab.experiment import NAMES, arguments, controllers, experiment, play, recording_file
 from pretouch_lab.experiments import static
-from pretouch_lab.options import Options
+from pretouch_lab.options import Options, Playing
 from pretouch_lab.run import open_run
 
 SENSING = [("paper", "slack"), ("pretouch", "braking")]
@@ -98,6 +98,14 @@ def test_the_trials_that_are_wanted_are_recorded(tmp_path, monkeypatch, record, 
     assert [seed for seed in (0, 1) if recording_file(tmp_path, cell, seed).exists()] == kept
     assert recording_file(tmp_path, cell, 0).read_text() == "0"
     assert len(list((tmp_path / "recordings").iterdir())) == len(kept)
+
+
+def test_a_schedulers_workers_are_told_whole_paths(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    how = Playing("out", scheduler="tcp://127.0.0.1:1")
+    assert how.folder("x") == tmp_path / "out"
+    names = ("", "panda", "realistic", "arm/robot.toml")
+    assert [how.input(name) for name in names] == [*names[:3], str(tmp_path / names[3])]
 
 
 @pytest.mark.parametrize("name", NAMES)

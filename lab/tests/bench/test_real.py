@@ -14,7 +14,7 @@ from pretouch.errors import ExperimentError
 from pretouch.recording.compare import DetectedContact
 from pretouch_lab.bench import real as bench
 from pretouch_lab.bench.real import Said, Tally, halves, parted, tally, trial
-from pretouch_lab.bench.real_sets import SETS, Run, Stream, corrected, sets_in, stream_of
+from pretouch_lab.bench.real_sets import SETS, Run, Stream, corrected, files_digest, sets_in, stream_of
 
 FRANKA, UR10E, GLOVE = SETS[0], SETS[3], SETS[4]
 PUSH = (3.0, 0.5, "panda_link5", (0.0, 30.0, 0.0))
@@ -234,6 +234,9 @@ def test_a_folder_without_a_set_says_what_was_looked_for_and_where_it_comes_from
         sets_in(tmp_path)
     (tmp_path / "arms" / "ur10e").mkdir(parents=True)
     assert sets_in(tmp_path) == ([UR10E], [])
+    file = tmp_path / "franka_fast.npz"
+    digests = [file.write_bytes(content) and files_digest([FRANKA], tmp_path) for content in (b"1", b"2", b"1")]
+    assert (len(set(digests)), digests[0]) == (2, digests[2]), "a file that was replaced is noticed"
     assert real(tmp_path, "--detectors", "nobody") == 2
     assert "nobody" in capsys.readouterr().err
 

@@ -97,15 +97,19 @@ def test_bad_input_ends_with_one_sentence_and_code_2(capsys, tmp_path, monkeypat
     assert {file.name for file in tmp_path.rglob("*.*")} <= {"run.json", "rows.jsonl"}
 
 
-@pytest.mark.parametrize("name", ["run.json", "rows.jsonl", "tables.md", "../link/run.json"])
-def test_the_runs_own_files_are_not_overwritten(capsys, tmp_path, name):
+@pytest.mark.parametrize(
+    ("command", "name"),
+    [("reproduce static", name) for name in ("run.json", "rows.jsonl", "tables.md", "../link/run.json")]
+    + [("reproduce all", "tables.md"), ("bench both", "detection/streams/rows.jsonl")],
+)
+def test_the_runs_own_files_are_not_overwritten(capsys, tmp_path, command, name):
     out = tmp_path / "out"
     (tmp_path / "link").symlink_to(out)
-    code, text = run(capsys, "reproduce", "static", "--out", str(out), "--json", str(out / name))
+    code, text = run(capsys, *command.split(), "--out", str(out), "--json", str(out / name))
     assert code == 2
     assert "is also another input or output file: give another name" in text.err
     assert text.err.count("\n") == 1
-    assert not out.exists()
+    assert not [each for each in out.rglob("*") if each.is_file()]
 
 
 @pytest.mark.parametrize("error", [RuntimeError("crash"), ExperimentError("full"), KeyboardInterrupt()])

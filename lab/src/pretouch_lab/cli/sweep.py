@@ -62,8 +62,8 @@ def sweep(command: Sweep) -> dict[str, Any]:
     from pretouch_lab.sweep.design import SWEEP, groups, points, sweep_of, trial, values_of
 
     defined = sweep_of(
-        command.experiment, _pairs("vary", command.vary), _pairs("fix", command.fix), command.profile, command.design,
-        command.samples, command.arms, command.seeds,
+        command.experiment, _placed(command, "vary", command.vary), _placed(command, "fix", command.fix),
+        command.profile, command.design, command.samples, command.arms, command.seeds,
     )  # fmt: skip
     metrics = command.metrics or tuple(defined.measure.metrics)
     unknown = [name for name in metrics if name not in defined.measure.metrics]
@@ -111,6 +111,17 @@ def _written(
         "fixed": sweep.fixed,
         "metrics": found,
     }
+
+
+def _placed(command: Sweep, option: str, texts: tuple[str, ...]) -> dict[str, str]:
+    """Read NAME=TEXT, with files of worlds as workers may read them."""
+    from pretouch_lab.sweep.parameters import USUAL_WORLD, WORLD
+
+    pairs = _pairs(option, texts)
+    if WORLD in pairs:
+        names = pairs[WORLD].split(",")
+        pairs[WORLD] = ",".join(name if name == USUAL_WORLD else command.input(name) for name in names)
+    return pairs
 
 
 def _pairs(option: str, texts: tuple[str, ...]) -> dict[str, str]:
