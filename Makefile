@@ -108,6 +108,7 @@ lint: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	$(BIN)/python -m tools.house.words
 	PYTHONPATH=ros2/src $(BIN)/lint-imports  # where DDS is not installed
 
 # what the house is like beside what is aimed at; fails where it is beyond what is held

@@ -106,14 +106,14 @@ def _quad(cell: np.ndarray, axis: int, edges: list[np.ndarray], sign: int) -> li
     """Return the corners of a cell's upper face along an axis, seen from outside against the clock."""
     one, two = (axis + 1) % 3, (axis + 2) % 3
     loop = [(0, 0), (1, 0), (1, 1), (0, 1)]
-    made = []
+    corners = []
     for a, b in loop if sign < 0 else reversed(loop):
         corner = [0.0, 0.0, 0.0]
         corner[axis] = edges[axis][cell[axis]]
         corner[one] = edges[one][cell[one] - 1 + a]
         corner[two] = edges[two][cell[two] - 1 + b]
-        made.append(corner)
-    return made
+        corners.append(corner)
+    return corners
 
 
 def main() -> None:
@@ -122,8 +122,8 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     for field in fields(Holder):
         parser.add_argument(f"--{field.name}", type=float, default=field.default, help=f"[mm], {field.default:g}")
-    given = vars(parser.parse_args())
-    folder, holder = given.pop("folder"), Holder(**given)
+    arguments = vars(parser.parse_args())
+    folder, holder = arguments.pop("folder"), Holder(**arguments)
     folder.mkdir(parents=True, exist_ok=True)
     for name, part in (("tray", holder.tray()), ("lid", holder.lid())):
         part.export(folder / f"{name}.stl")

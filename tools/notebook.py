@@ -69,11 +69,11 @@ def page_of(notebook: Path, page: Path) -> str:
 def main(notebook: Path) -> None:
     """Run a notebook and store the outputs in it."""
     cells = cells_of(notebook)
-    made = iter(outputs_of(cells))
+    outputs = iter(outputs_of(cells))
     for number, cell in enumerate(cells):
         cell["id"] = f"cell-{number}"
         if cell["cell_type"] == "code":
-            cell |= {"execution_count": None, "outputs": next(made)}
+            cell |= {"execution_count": None, "outputs": next(outputs)}
     kernel = {"display_name": "Python 3", "language": "python", "name": "python3"}
     about = {"kernelspec": kernel, "language_info": {"name": "python"}}
     book = {"cells": cells, "metadata": about, "nbformat": 4, "nbformat_minor": 5}

@@ -97,7 +97,7 @@ if __name__ == "__main__":
         case ["record", place]:
             record(Path(place))
         case ["draw", source, place]:
-            shown = np.arange(FROM_S, TO_S - 1e-9, 1 / FRAMES_PER_S)
-            write(list(drawn(pt.open_recording(Path(source)), shown)), Path(place))
+            instants = np.arange(FROM_S, TO_S - 1e-9, 1 / FRAMES_PER_S)
+            write(list(drawn(pt.open_recording(Path(source)), instants)), Path(place))
         case _:
             sys.exit(__doc__)

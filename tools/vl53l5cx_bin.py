@@ -19,10 +19,10 @@ def program_of(header: str) -> bytes:
 
 
 def _array(text: str, name: str, size: int) -> bytes:
-    found = re.search(rf"\w+_{name}\s*\[\w*\]\s*=\s*\{{([^}}]*)\}}", text)
-    if not found:
+    match = re.search(rf"\w+_{name}\s*\[\w*\]\s*=\s*\{{([^}}]*)\}}", text)
+    if not match:
         raise ValueError(f"There is no array ..._{name}: give vl53l5cx_buffers.h of ST's driver (STSW-IMG023).")
-    values = bytes(int(word, 0) for word in re.findall(r"\w+", found.group(1)))
+    values = bytes(int(word, 0) for word in re.findall(r"\w+", match.group(1)))
     if len(values) != size:
         raise ValueError(f"The array ..._{name} has {len(values)} bytes, not {size}: take version 2.0 of ST's driver.")
     return values

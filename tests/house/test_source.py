@@ -3,6 +3,7 @@ from pathlib import Path
 
 import pytest
 from tools.house import __main__ as house
+from tools.house import words
 from tools.house.source import Function, Source, import_cycle
 
 TEXT = '''"""A module."""
@@ -34,6 +35,20 @@ def test_lines_functions_and_names_are_counted(tmp_path: Path) -> None:
         Function("p/m.py:wide", 4, 4),
         Function("p/m.py:within", 2, 0),
     ]
+
+
+def test_hard_words_are_named_and_plain_ones_pass(tmp_path: Path, capsys) -> None:
+    (tmp_path / "src" / "later").mkdir(parents=True)
+    for name, text in {
+        "m": '"""Of it."""\ndef f(_told, of, given_by):\n    "Whatever."\n    of.made = of.held(whole=1)\n',
+        "n": 'class A:\n    known: int\n    "Whether."\n    b: int\n    "Whether c, d."\n    c = "What is this?"',
+        "later/o": "seen = 1",
+    }.items():
+        (tmp_path / "src" / f"{name}.py").write_text(text)
+    assert words.main(tmp_path, ("src/later/",)) == 1
+    places = [line.split(": ")[0] for line in capsys.readouterr().out.splitlines()]
+    assert sorted(places) == [f"src/{place}" for place in ("m.py:1", "m.py:2", "m.py:4", "n.py:2", "n.py:5")]
+    assert words.main(tmp_path, ("src/",)) == 0
 
 
 def test_a_circle_of_imports_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

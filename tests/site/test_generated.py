@@ -12,8 +12,8 @@ from pretouch.composition import field_docs
 
 
 def test_every_public_name_is_on_one_page():
-    shown = [name for _, packages in generated.API.values() for name in public_names(packages)]
-    assert sorted(name.rpartition(".")[2] for name in shown) == pretouch.__all__
+    sources = [name for _, packages in generated.API.values() for name in public_names(packages)]
+    assert sorted(name.rpartition(".")[2] for name in sources) == pretouch.__all__
     assert "::: pretouch.controller.Controller\n" in api_page("Controller", ("controller",))
 
 
@@ -54,7 +54,7 @@ def test_a_link_leads_to_a_page_or_to_a_page_of_source(tmp_path):
     )
     assert layout.rebased(root / "docs" / "how-to" / "b.md") == "# B\n[a](../a.md)"
     assert layout.rebased(root / "CONTRIBUTING.md") == "[b](how-to/b.md)"
-    assert layout.shown == {root / "src" / "s.py": tmp_path / "pages" / "source" / "src" / "s.py.md"}
+    assert layout.sources == {root / "src" / "s.py": tmp_path / "pages" / "source" / "src" / "s.py.md"}
 
 
 def test_the_navigation_is_the_indexs():

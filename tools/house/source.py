@@ -1,4 +1,4 @@
-"""What the Python files of a folder are like: size, functions, names, imports."""
+"""Measures of the Python files of a folder: size, functions, names, imports."""
 
 import ast
 from collections import Counter

@@ -28,7 +28,7 @@ def write_pages(pages: Path) -> None:
     shutil.copy(Path(__file__).with_name("iframe-worker.js"), pages / "assets")
     layout = Layout(ROOT, pages, _BESIDE)
     texts = {layout.page_of(document): layout.rebased(document) for document in layout.documents()}
-    texts |= {page: source_page(file, ROOT) for file, page in layout.shown.items()}
+    texts |= {page: source_page(file, ROOT) for file, page in layout.sources.items()}
     for notebook in sorted((ROOT / "docs").rglob("*.ipynb")):
         texts[layout.page_of(notebook)] = page_of(notebook, layout.page_of(notebook))
     texts |= {pages / page: text for page, text in generated_pages().items()}

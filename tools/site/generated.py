@@ -67,9 +67,9 @@ def _commands(words: list[str]) -> Iterator[tuple[str, str]]:
 
 def commands_page() -> str:
     """Return the page of all commands, from their own help."""
-    found = [each for name in command_names() for each in _commands([name])]
-    shown = [f"## pretouch {words}\n\n```text\n{text}\n```\n" for words, text in found]
-    return "\n".join(["# Commands\n\nWhat `--help` says of each.\n", *shown])
+    helps = [each for name in command_names() for each in _commands([name])]
+    sections = [f"## pretouch {words}\n\n```text\n{text}\n```\n" for words, text in helps]
+    return "\n".join(["# Commands\n\nWhat `--help` says of each.\n", *sections])
 
 
 def parameter_sets() -> list[type]:
@@ -82,8 +82,8 @@ def parameter_sets() -> list[type]:
         except ModuleNotFoundError as error:  # of a vendor's library: no parameters are in a module that needs one
             if str(error.name).startswith("pretouch"):
                 raise
-    found = [kind for kind in _below(Checked) if is_dataclass(kind) and not kind.__name__.startswith("_")]
-    own = [kind for kind in found if kind.__module__.startswith("pretouch.")]
+    kinds = [kind for kind in _below(Checked) if is_dataclass(kind) and not kind.__name__.startswith("_")]
+    own = [kind for kind in kinds if kind.__module__.startswith("pretouch.")]
     return sorted({k for k in own if not any(is_dataclass(o) and o in own for o in k.__subclasses__())}, key=str)
 
 
@@ -113,9 +113,9 @@ def parameters_page() -> str:
         text.append("| parameter | default | unit | meaning and source |\n| --- | --- | --- | --- |")
         docs = field_docs(kind)
         for field in fields(kind):
-            said = docs.get(field.name, "")
-            unit = re.search(r" \[([^\]]*)\]", said)
-            meaning = said.replace(unit[0], "", 1) if unit else said
+            doc = docs.get(field.name, "")
+            unit = re.search(r" \[([^\]]*)\]", doc)
+            meaning = doc.replace(unit[0], "", 1) if unit else doc
             row = (f"`{field.name}`", _default(field), unit[1] if unit else "", meaning)
             text.append("| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |")
         text.append("")
@@ -124,5 +124,5 @@ def parameters_page() -> str:
 
 def generated_pages() -> dict[str, str]:
     """Return the text of each generated page."""
-    pages = {f"reference/python-{page}.md": api_page(*given) for page, given in API.items()}
+    pages = {f"reference/python-{page}.md": api_page(*arguments) for page, arguments in API.items()}
     return pages | {"reference/commands.md": commands_page(), "reference/parameters.md": parameters_page()}

@@ -9,12 +9,12 @@ _CODE = re.compile(r"(^```.*?^```$)", re.MULTILINE | re.DOTALL)
 
 
 class Layout:
-    """Where each file of the repository stands on the site: documents as they are, other files as pages of source."""
+    """Place of each file of the repository on the site: documents as they are, other files as pages of source."""
 
     def __init__(self, root: Path, pages: Path, beside: dict[str, str]) -> None:
         self.root, self.pages = root, pages
         self._beside = beside
-        self.shown: dict[Path, Path] = {}
+        self.sources: dict[Path, Path] = {}
         """Files and folders that are linked to and are no documents, and the page that shows each."""
 
     def page_of(self, file: Path) -> Path:
@@ -25,7 +25,7 @@ class Layout:
         if file.is_relative_to(self.root / "docs"):
             page = self.pages / file.relative_to(self.root / "docs")
             return page.with_suffix(".md") if file.suffix == ".ipynb" else page
-        return self.shown.setdefault(file, self.pages / "source" / f"{name}.md")
+        return self.sources.setdefault(file, self.pages / "source" / f"{name}.md")
 
     def documents(self) -> list[Path]:
         """Return the repository's documents."""
@@ -47,8 +47,8 @@ def source_page(file: Path, root: Path) -> str:
     """Return a page that shows a file, or the files of a folder, as they are."""
     files = [file] if file.is_file() else sorted(path for path in file.iterdir() if path.is_file())
     kinds = {".py": "python", ".toml": "toml"}
-    shown = [
+    sections = [
         f"## {path.name}\n\n````{kinds.get(path.suffix, 'text')}\n{path.read_text(encoding='utf-8').rstrip()}\n````\n"
         for path in files
     ]
-    return "\n".join([f"# {file.relative_to(root)}\n", *shown])
+    return "\n".join([f"# {file.relative_to(root)}\n", *sections])

@@ -1,4 +1,4 @@
-"""What stands where in the site's navigation: as the index of the documents lists it."""
+"""The site's navigation, in the order of the documents' index."""
 
 import re
 
