@@ -8,25 +8,42 @@ pylibfranka. Truth and errors are norms over the joints [Nm], means over pushes 
 torques that are told, `change` of what a push changes of them. A sign is the simulator's own: the better one counts.
 """
 
+import argparse
 import subprocess
-import sys
 import time
+from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-import pylibfranka
 
 PUSH_N = 15.0
 _SETTLES_S, _LASTS_S, _READ_S = 6.0, 2.0, 0.5
 """How long the arm stands first, how long a push lasts before it is looked at, and how long it is looked at [s]."""
 _FOLDER = Path(__file__).parent / "pushed"
+_SIMULATORS = sorted(file.stem.removesuffix("_server") for file in _FOLDER.glob("*_server.py"))
+
+
+def _interpreter(pair: str) -> tuple[str, str]:
+    """Return a simulator and its interpreter, of NAME=PYTHON."""
+    name, _, python = pair.partition("=")
+    if name not in _SIMULATORS or not Path(python).is_file():
+        raise argparse.ArgumentTypeError(
+            f"{pair}: give {' or '.join(f'{name}=PYTHON' for name in _SIMULATORS)}, with a path that exists"
+        )
+    return name, python
 
 
 def main() -> None:
     """Push every link along every axis, in each simulator."""
+    parser = argparse.ArgumentParser(prog="python -m fci.programs.forces", description=(__doc__ or "").splitlines()[0])
+    metavar, words = "NAME=PYTHON", "a simulator, and an interpreter that has it"
+    parser.add_argument("simulators", nargs="+", type=_interpreter, metavar=metavar, help=words)
+    simulators = parser.parse_args().simulators
+    if find_spec("pylibfranka") is None:
+        raise SystemExit("The client needs pylibfranka of the extra 'franka': run make franka.")
     print("| simulator | link | truth | error | change | force [N] |\n| --- | --- | --- | --- | --- | --- |")
-    for pair in sys.argv[1:]:
-        name, _, python = pair.partition("=")
+    for name, python in simulators:
         with subprocess.Popen(  # noqa: S603  our own script
             [python, str(_FOLDER / f"{name}_server.py")], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         ) as server:
@@ -37,6 +54,8 @@ def main() -> None:
 
 
 def _measure(name: str, server: subprocess.Popen[str]) -> None:
+    import pylibfranka  # the help does without
+
     assert server.stdin is not None  # noqa: S101  pipes, as asked for
     assert server.stdout is not None  # noqa: S101
     while server.stdout.readline().strip() != "ready":
@@ -61,7 +80,7 @@ def _measure(name: str, server: subprocess.Popen[str]) -> None:
         print(f"| {name} | {at} | {sizes} | {most:.1f} |", flush=True)
 
 
-def _read(robot: pylibfranka.Robot) -> tuple[np.ndarray, np.ndarray]:
+def _read(robot: Any) -> tuple[np.ndarray, np.ndarray]:
     """Let a push last, then take the means of what the robot tells: torques (7,) [Nm] and force (3,) [N]."""
     time.sleep(_LASTS_S)
     until, torques, forces = time.monotonic() + _READ_S, [], []

@@ -6,7 +6,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from fci.programs import report
+from fci.programs import forces, report
 from fci.programs.playing import Played, Program, programs_of, run
 
 KNOWN = tomllib.loads((Path(report.__file__).parent / "programs.toml").read_text(encoding="utf-8"))
@@ -74,3 +74,12 @@ def test_the_table_has_a_column_for_each_server_that_was_tried(tmp_path):
     assert (text[:7], text[-7:]) == ("before\n", "\nafter\n")
     assert f"| echo | {title.partition(',')[0]} | runs | fails |" in text
     assert "old" not in text
+
+
+def test_forces_tells_its_words_and_refuses_a_simulator_that_it_does_not_have(capsys, monkeypatch):
+    for words, status, text in (("--help", 0, "NAME=PYTHON"), (f"gazebo={sys.executable}", 2, "pretouch=PYTHON")):
+        monkeypatch.setattr(sys, "argv", ["forces", words])
+        with pytest.raises(SystemExit) as end:
+            forces.main()
+        assert end.value.code == status
+        assert text in "".join(capsys.readouterr())
