@@ -48,7 +48,7 @@ def test_first_readings_end_on_the_spheres_or_the_wall(panda_model: RobotModel, 
     R, T = kin.rotation[work.skin.link], work.skin.T_link_sensor
     origin = kin.position[work.skin.link] + (R @ T[:, :3, 3, None])[..., 0]
     points = origin + inputs.readings.distance[:, None] * (R @ T[:, :3, 2, None])[..., 0]
-    to_sphere = np.linalg.norm(points[:, None] - work._room.spheres, axis=2) - 0.1
+    to_sphere = np.linalg.norm(points[:, None] - work.spheres, axis=2) - 0.1
     to_wall = np.abs(np.linalg.norm(points - [0.25, 0.0, 0.45], axis=1) - 1.0)
     np.testing.assert_allclose(np.minimum(to_sphere.min(axis=1), to_wall), 0.0, atol=1e-9)
     assert np.all(to_sphere > -1e-9)
@@ -114,7 +114,6 @@ def test_a_row_says_what_was_asked():
         assert spread == sorted(spread)
         assert spread[0] > 0
     assert row["tracking"] == 1.0
-    assert row["travelled_m"] > 0
 
 
 @pytest.mark.usefixtures("short")
@@ -130,7 +129,7 @@ def test_slow_steps_are_overruns_in_wall_time_alone(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(Controller, "step", slow)
     monkeypatch.setattr(cycle, "_SETTLE", 0)
     monkeypatch.setattr(cycle, "warm_up", lambda *_given: None)
-    row = measure(2, CycleRequest(rate=25.0, cycles=10))
+    row = measure(2, CycleRequest(rate_hz=25.0, cycles=10))
     assert row["overruns"] >= 2
     assert row["wall_max_us"] >= 100_000
     assert row["median_us"] < 100_000

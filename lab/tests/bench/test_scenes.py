@@ -7,7 +7,7 @@ from pretouch.errors import ExperimentError
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import load_skin
-from pretouch_lab.bench.dense_skin import UNITS, dense_skin
+from pretouch_lab.bench.dense_skin import UNITS, spread_skin
 from pretouch_lab.bench.scenes import FOLDER, checksums, scenario, scenario_path, seed_of
 
 
@@ -42,7 +42,7 @@ def test_seeds_come_from_the_range_and_no_farther():
 
 def test_the_dense_skin_of_the_scenarios_is_the_one_that_is_made():
     model = RobotModel(panda())
-    made, kept = dense_skin(model), load_skin(scenario_path("dense_skin.toml"), model)
+    made, kept = spread_skin(model, 32), load_skin(scenario_path("dense_skin.toml"), model)
     assert made.ids == kept.ids
     assert len(made) == sum(UNITS.values()) == 32
     np.testing.assert_allclose(made.T_link_sensor, kept.T_link_sensor, atol=1e-9)

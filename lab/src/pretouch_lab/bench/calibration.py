@@ -1,7 +1,6 @@
 """The calibration of many random skins in simulation: how far units are found from where they sit."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import lru_cache
 from time import perf_counter
 
@@ -31,25 +30,24 @@ from pretouch.types import FloatArray
 from pretouch_lab.run import Cell, Row
 from pretouch_lab.table import Column, grouped, table
 
-_TURN, _SHIFT = slice(0, 3), slice(3, 6)
-NOT_FOUND: Row = dict.fromkeys(
-    (
-        "position_error_m",
-        "orientation_error_deg",
-        "position_sigma_m",
-        "orientation_sigma_deg",
-        "nees_position",
-        "nees_orientation",
-        "nees_pose",
-        "clock_error_s",
-    )
-) | {"link_found": False}
+_PARTS = {"position": slice(3, 6), "orientation": slice(0, 3), "pose": slice(0, 6)}
+"""Of an error of a pose: rotation vector, position."""
+NOT_FOUND: Row = {
+    "position_error_m": None,
+    "orientation_error_deg": None,
+    "position_sigma_m": None,
+    "orientation_sigma_deg": None,
+    "nees_position": None,
+    "nees_orientation": None,
+    "nees_pose": None,
+    "clock_error_s": None,
+    "link_found": False,
+}
 """Of a unit without an answer, or with one on another link."""
 DATA_SHEET = ImuParams(misalignment_deg=0.0)
 """The sensors' own errors. How a board is glued on turns the IMU's frame itself, and no IMU can tell it."""
 CLOCK_ERROR_S = 0.02
 """Each unit's clock is off by up to this [s]."""
-
 _LARGEST_COUNT = 32767
 
 
@@ -60,9 +58,7 @@ def trial(arm: str, plan: Plan, cell: Cell, seed: int) -> Row:
     """
     model = _model(arm)
     skin = random_skin(model, seed)
-    data = simulate(model, skin, plan, seed)
-    if cell["find_links"]:
-        data = replace(data, units=tuple(replace(unit, link=None) for unit in data.units))
+    data = simulate(model, skin, plan, seed, links_known=not cell["find_links"])
     begin = perf_counter()
     answers = calibrate(model, data).units
     took = perf_counter() - begin
@@ -79,20 +75,6 @@ def _model(arm: str) -> RobotModel:
     return RobotModel(robot_named(arm))
 
 
-def pose_error(true: FloatArray, found: FloatArray) -> FloatArray:
-    """Error (6,) of a pose (4, 4): rotation vector in the found frame [rad], position in the link frame [m]."""
-    turn = Rotation.from_matrix(found[:3, :3].T @ true[:3, :3]).as_rotvec()
-    return np.concatenate([turn, true[:3, 3] - found[:3, 3]])
-
-
-def error_row(error: FloatArray) -> Row:
-    """Return the sizes of an error (6,) of `pose_error`."""
-    return {
-        "position_error_m": float(np.linalg.norm(error[_SHIFT])),
-        "orientation_error_deg": float(np.degrees(np.linalg.norm(error[_TURN]))),
-    }
-
-
 def place_row(model: RobotModel, unit: SensorUnit, place: Place, late: float) -> Row:
     """Compare a calibration's answer with the truth.
 
@@ -106,31 +88,33 @@ def place_row(model: RobotModel, unit: SensorUnit, place: Place, late: float) ->
         Errors, standard deviations, and errors squared and divided by the covariance, whose mean is to be the number of
         their dimensions: 3 of the position, 3 of the orientation, 6 of both.
     """
-    true, found = (model.link_index(name) for name in (unit.link, place.link))
-    same = bool(np.array_equal(model.moved_by[true], model.moved_by[found]))
-    if not same:
+    true, answered = (model.link_index(name) for name in (unit.link, place.link))
+    if not np.array_equal(model.moved_by[true], model.moved_by[answered]):
         return NOT_FOUND
-    here, covariance = seen_from(model, true, found, place.T_link_sensor, place.covariance)
-    error = pose_error(unit.T_link_sensor, here)
-    return error_row(error) | {
+    T, covariance = seen_from(model, true, answered, place.T_link_sensor, place.covariance)
+    turn = Rotation.from_matrix(T[:3, :3].T @ unit.T_link_sensor[:3, :3]).as_rotvec()
+    error = np.concatenate([turn, unit.T_link_sensor[:3, 3] - T[:3, 3]])
+    nees = {name: float(error[p] @ np.linalg.solve(covariance[p, p], error[p])) for name, p in _PARTS.items()}
+    return {
+        "position_error_m": float(np.linalg.norm(error[_PARTS["position"]])),
+        "orientation_error_deg": float(np.degrees(np.linalg.norm(turn))),
         "position_sigma_m": place.position_sigma,
         "orientation_sigma_deg": float(np.degrees(place.orientation_sigma)),
-        "nees_position": _normalised(error, covariance, _SHIFT),
-        "nees_orientation": _normalised(error, covariance, _TURN),
-        "nees_pose": _normalised(error, covariance, slice(0, 6)),
+        **{f"nees_{name}": value for name, value in nees.items()},
         "clock_error_s": place.clock_offset - late,
         "link_found": True,
-    }  # fmt: skip
-
-
-def _normalised(error: FloatArray, covariance: FloatArray, part: slice) -> float:
-    return float(error[part] @ np.linalg.solve(covariance[part, part], error[part]))
+    }
 
 
 def simulate(
-    model: RobotModel, skin: Skin, plan: Plan, seed: int, imu: ImuParams = DATA_SHEET,
-    clock_error_s: float = CLOCK_ERROR_S, links_known: bool = True,
-) -> CalibrationData:  # fmt: skip
+    model: RobotModel,
+    skin: Skin,
+    plan: Plan,
+    seed: int,
+    imu: ImuParams = DATA_SHEET,
+    clock_error_s: float = CLOCK_ERROR_S,
+    links_known: bool = True,
+) -> CalibrationData:
     """Let an arm follow a plan, and measure; stamps count from its beginning.
 
     The seed decides errors of arm, sensors and clocks, and all noise: it gives another skin of as many units the same
@@ -139,16 +123,19 @@ def simulate(
     plant = Plant(model, SceneSpec(), PlantParams(), plan.start, seed)
     samples: list[ImuSample] = []
     Imus(plant, skin, imu, seed, samples.append)
-    joints, begin = followed(plant, model, plan)
-    late = clock_errors(len(skin), seed, clock_error_s) - begin
-    units = tuple(
-        UnitData(unit.id, trace, unit.link if links_known else None, *_full_scale(imu))
-        for unit, trace in zip(skin.units, _traces(samples, imu, late), strict=True)
-    )
-    return CalibrationData(JointTrace(joints.stamp - begin, joints.q), units)
+    joints, begin = _followed(plant, model, plan)
+    number, time = (np.array([getattr(sample, name) for sample in samples]) for name in ("unit", "time"))
+    values = np.array([sample.counts for sample in samples]).reshape(-1, 6) * imu_counts(imu)
+    largest, late = _LARGEST_COUNT * imu_counts(imu), clock_errors(len(skin), seed, clock_error_s) - begin
+    units = []
+    for k, unit in enumerate(skin.units):
+        own = number == k
+        trace = ImuTrace(time[own] + late[k], values[own, 3:], values[own, :3])
+        units.append(UnitData(unit.id, trace, unit.link if links_known else None, float(largest[3]), float(largest[0])))
+    return CalibrationData(JointTrace(joints.stamp - begin, joints.q), tuple(units))
 
 
-def followed(plant: Plant, model: RobotModel, plan: Plan) -> tuple[JointTrace, float]:
+def _followed(plant: Plant, model: RobotModel, plan: Plan) -> tuple[JointTrace, float]:
     """Let an arm follow a plan; return the joint positions measured meanwhile, and when it began [s]."""
     controller = plan_controller(model, plan.start)
     commander = PlanCommander(controller, plan, lambda: plant.time)
@@ -169,19 +156,6 @@ def followed(plant: Plant, model: RobotModel, plan: Plan) -> tuple[JointTrace, f
 def clock_errors(count: int, seed: int, most: float = CLOCK_ERROR_S) -> FloatArray:
     """By how much the stamps of each of so many units are late (K,) [s]."""
     return np.random.default_rng([seed, 12]).uniform(-most, most, count)
-
-
-def _full_scale(imu: ImuParams) -> tuple[float, float]:
-    """Largest value of accelerometer [m/s^2] and gyroscope [rad/s]."""
-    largest = _LARGEST_COUNT * imu_counts(imu)
-    return float(largest[3]), float(largest[0])
-
-
-def _traces(samples: list[ImuSample], imu: ImuParams, late: FloatArray) -> list[ImuTrace]:
-    unit = np.array([sample.unit for sample in samples])
-    time = np.array([sample.time for sample in samples])
-    values = np.array([sample.counts for sample in samples]).reshape(-1, 6) * imu_counts(imu)
-    return [ImuTrace(time[unit == k] + late[k], values[unit == k, 3:], values[unit == k, :3]) for k in range(len(late))]
 
 
 _COLUMNS = (
@@ -218,10 +192,9 @@ def tables(rows: Sequence[Row], motion_s: float) -> list[TextTable]:
 
 def _errors(name: str, units: list[Row]) -> Row:
     """Median size, largest and mean of each number of some units, None where none has it."""
-    made: Row = {"link": name, "units": len(units), "found": sum(unit["link_found"] for unit in units)}
+    row: Row = {"link": name, "units": len(units), "found": sum(unit["link_found"] for unit in units)}
     for key in NOT_FOUND:
         values = np.abs([unit[key] for unit in units if unit[key] is not None])
-        statistics = (np.median, np.max, np.mean)
-        numbers = [float(of(values)) for of in statistics] if len(values) else [None] * 3
-        made |= dict(zip((key, f"{key}_most", f"{key}_mean"), numbers, strict=True))
-    return made
+        for suffix, of in (("", np.median), ("_most", np.max), ("_mean", np.mean)):
+            row[f"{key}{suffix}"] = float(of(values)) if len(values) else None
+    return row

@@ -5,13 +5,14 @@ import platform
 import resource
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
-from pretouch.controller import Controller, ControllerState
+from pretouch.controller import Controller
 from pretouch.errors import ExperimentError
 from pretouch.loop import MonotonicClock
 from pretouch.perception.scene_filter import no_fixtures
@@ -39,8 +40,7 @@ _PACKAGES = ("pretouch", "numpy", "numba", "mujoco-core")
 class CycleRequest:
     """How to measure."""
 
-    rate: float = 1000.0
-    """[Hz]"""
+    rate_hz: float = 1000.0
     cycles: int = 20_000
     """Measured steps."""
     profile: str = "paper"
@@ -56,9 +56,9 @@ class CycleRequest:
     def __post_init__(self) -> None:
         if not 1 <= self.cycles <= _MOST_CYCLES:
             raise ExperimentError(f"The number of cycles is {self.cycles}: give 1 to {_MOST_CYCLES}.")
-        if not _SLOWEST < self.rate <= _FASTEST:
+        if not _SLOWEST < self.rate_hz <= _FASTEST:
             raise ExperimentError(
-                f"The rate is {self.rate:g} Hz: give more than {_SLOWEST:g} and up to {_FASTEST:g} Hz."
+                f"The rate is {self.rate_hz:g} Hz: give more than {_SLOWEST:g} and up to {_FASTEST:g} Hz."
             )
         if self.seed < 0:
             raise ExperimentError(f"The seed is {self.seed}: give 0 or more.")
@@ -66,7 +66,7 @@ class CycleRequest:
 
     def at_rate(self) -> Profile:
         """Return the profile for the rate."""
-        return at_rate(profile(self.profile), self.rate)
+        return at_rate(profile(self.profile), self.rate_hz)
 
 
 def measure(points: int, request: CycleRequest, tell: Callable[[str], None] = lambda sentence: None) -> Row:
@@ -78,32 +78,31 @@ def measure(points: int, request: CycleRequest, tell: Callable[[str], None] = la
     """
     model, params = RobotModel(robot_named(request.arm)), request.at_rate()
     work, hard, paced = (Workload(model, points, params, request.seed, new) for new in (False, True, False))
-    controller = Controller(model, work.skin, no_fixtures(), work.path, params)
+    controller, clock = (
+        Controller(model, work.skin, no_fixtures(), work.path, params),
+        MonotonicClock(1 / request.rate_hz),
+    )
     warm_up(controller, work.inputs().robot)
     with real_time(request.priority, request.cpu) as missing:
         for sentence in missing:
             tell(sentence)
-        steps = _timed(controller, work, request.cycles, None)
-        all_new = _timed(controller, hard, min(request.cycles, _SHORTER), None)
-        at_rate = _timed(controller, paced, request.cycles, MonotonicClock(1 / request.rate))
-    others = {"all_new": all_new.cpu, "at_rate": at_rate.cpu, "wall": at_rate.wall}
+        steps = _timed(controller, work, request.cycles)
+        all_new = _timed(controller, hard, min(request.cycles, _SHORTER))
+        at_rate = _timed(controller, paced, request.cycles, clock)
+    runs = {"": steps.cpu, "all_new_": all_new.cpu, "at_rate_": at_rate.cpu, "wall_": at_rate.wall}
     return {
         "points": points,
-        **_spread(steps.cpu),
-        "overruns": int((at_rate.wall > 1e9 / request.rate).sum()),
-        **{f"{run}_{name}": value for run, took in others.items() for name, value in _spread(took).items()},
+        **{f"{run}{name}": value for run, took in runs.items() for name, value in _spread(took).items()},
+        "overruns": int((at_rate.wall > 1e9 / request.rate_hz).sum()),
         "cycles": request.cycles,
-        "missed_ticks": at_rate.missed,
+        "missed_ticks": clock.missed,
         "memory_gained_kib": at_rate.gained // 1024,
-        "wake_up_median_us": at_rate.wake_up_us,
         "restricting_median": float(np.median(steps.restricting)),
         "tracking": float(steps.tracking.mean()),
-        "travelled_m": steps.travelled,
     }
 
 
-@dataclass(frozen=True)
-class _Timed:
+class _Timed(NamedTuple):
     """What a run came to."""
 
     cpu: IntArray
@@ -114,84 +113,62 @@ class _Timed:
     """(cycles,) points that restrict."""
     tracking: IntArray
     """(cycles,) 1 where the arm follows its path."""
-    travelled: float
-    """Arc length along the path [m]."""
-    missed: int
-    wake_up_us: float | None
-    """Median of how late the machine woke the loop [us], None if the loop was never early enough to wait."""
     gained: int
-    """Memory that the process holds at the end and did not hold before the first step [B]."""
+    """Memory that the process has at the end and did not have before the first step [B]."""
 
 
-def _settled(controller: Controller, work: Workload) -> ControllerState:
-    """Turn the controller until the arm moves; return its state."""
-    state = controller.init(work.inputs().robot)
-    for _ in range(controller.profile.window.samples + _SETTLE):
-        step, state = controller.step(state, work.inputs())
-        work.move(step.command)
-    return state
-
-
-def _timed(controller: Controller, work: Workload, cycles: int, clock: MonotonicClock | None) -> _Timed:
-    """Time each step, at the ticks of a clock or back to back."""
+def _timed(controller: Controller, work: Workload, cycles: int, clock: MonotonicClock | None = None) -> _Timed:
+    """Time each step once the arm moves, at the ticks of a clock or back to back."""
     # filled: pages that are first written to in the run would count as gained
     cpu, wall, restricting, tracking = np.full((4, cycles), 0)
-    state = _settled(controller, work)
-    held = _resident()
-    begin = state.phase
-    for i in range(cycles):
-        if clock:
+    state = controller.init(work.inputs().robot)
+    for i in range(-controller.profile.window.samples - _SETTLE, cycles):
+        if i == 0:
+            memory = _resident()
+        if clock and i >= 0:
             clock.tick()
         inputs = work.inputs()
         cpu_before, before = time.process_time_ns(), time.perf_counter_ns()
         step, state = controller.step(state, inputs)
         after, cpu_after = time.perf_counter_ns(), time.process_time_ns()
-        cpu[i], wall[i] = cpu_after - cpu_before, after - before
-        restricting[i], tracking[i] = len(step.restricted), step.mode is Mode.TRACK
+        if i >= 0:
+            cpu[i], wall[i] = cpu_after - cpu_before, after - before
+            restricting[i], tracking[i] = len(step.restricted), step.mode is Mode.TRACK
         work.move(step.command)
-    gained = _resident() - held
-    late = clock.timing().wake_up if clock else None
-    wake_up_us = 1e6 * late.median if late and late.max > 0 else None
-    missed = clock.missed if clock else 0
-    return _Timed(cpu, wall, restricting, tracking, state.phase - begin, missed, wake_up_us, gained)
+    return _Timed(cpu, wall, restricting, tracking, _resident() - memory)
 
 
 def _resident() -> int:
-    """Memory that this process holds [B]."""
+    """Memory of this process [B]."""
     return int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1]) * resource.getpagesize()
 
 
 def _spread(took: IntArray) -> dict[str, float]:
-    us = took / 1000
-    median, p99, p999 = map(float, np.percentile(us, [50, 99, 99.9]))
-    return {"median_us": median, "p99_us": p99, "p999_us": p999, "max_us": float(us.max())}
+    names = ("median_us", "p99_us", "p999_us", "max_us")
+    return dict(zip(names, (np.percentile(took, [50, 99, 99.9, 100]) / 1000).tolist(), strict=True))
 
 
 def about(request: CycleRequest) -> Row:
     """Say where and how was measured, for the file of the results."""
     return {
-        "rate_hz": request.rate,
-        "profile": request.profile,
-        "arm": request.arm,
-        "seed": request.seed,
-        "priority": request.priority,
-        "cpu": request.cpu,
+        **asdict(request),
         "readings_hz": UNIT_RATE,
         "python": platform.python_version(),
         "versions": {name: version(name) for name in _PACKAGES},
-        "processor": _processor(),
+        "processor": processor(),
         "processors": os.cpu_count(),
         "system": f"{platform.system()} {platform.release()}",
     }
 
 
-def _processor() -> str:
+def processor() -> str:
+    """Name the processor of this machine."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:
         lines = []
-    named = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    return named[0] if named else platform.processor() or platform.machine()
+    models = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return models[0] if models else platform.processor() or platform.machine()
 
 
 _COLUMNS = (
@@ -209,7 +186,7 @@ _COLUMNS = (
 def tables(rows: list[Row], request: CycleRequest) -> list[TextTable]:
     """Show what steps took, four runs for each number of points."""
     runs = {"CPU": "", "CPU, all new": "all_new_"}
-    runs |= {f"CPU at {request.rate:g} Hz": "at_rate_", f"wall at {request.rate:g} Hz": "wall_"}
+    runs |= {f"CPU at {request.rate_hz:g} Hz": "at_rate_", f"wall at {request.rate_hz:g} Hz": "wall_"}
     lines: list[Row] = [
         {
             "points": "" if prefix else row["points"],
@@ -227,7 +204,7 @@ def tables(rows: list[Row], request: CycleRequest) -> list[TextTable]:
         "CPU: steps back to back, a reading of each unit 50 times a second; all new: every reading in every step; at a"
         " rate: the processor sleeps between steps, and its caches cool. Overruns: steps that took longer than the"
         " period. Restricting: points within reach of eq. 7, median. Memory gained in the run at"
-        f" {request.rate:g} Hz: {gained}."
+        f" {request.rate_hz:g} Hz: {gained}."
     )
     if idle:
         note += f" With {', '.join(idle)} points the arm did not follow its path in every cycle."

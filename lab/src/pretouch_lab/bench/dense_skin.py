@@ -1,24 +1,19 @@
-"""Units spread over the arm. 32 of them are the skin of most scenarios, kept as `scenarios/dense_skin.toml`.
+"""Units spread over the arm. 32 of them are the skin of most scenarios, kept as `scenarios/dense_skin.toml`."""
 
-That was made once by `python -m pretouch_lab.bench.dense_skin FILE`.
-"""
-
-import sys
-from pathlib import Path
+from itertools import product
 
 import numpy as np
 
 from pretouch.errors import ExperimentError
-from pretouch.robot.body import Capsules, from_axes, placed
-from pretouch.robot.description import panda
+from pretouch.robot.body import from_axes, placed
 from pretouch.robot.model import RobotModel
-from pretouch.sensing.skin import Skin, save_skin
+from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit
 from pretouch.types import FloatArray
 
 UNITS = {"link2": 3, "link3": 5, "link4": 5, "link5": 7, "link6": 4, "link7": 2, "hand": 6}
 """Units on each link, of 32."""
-_FIRST = ("hand", "link7", "link6", "link5", "link4", "link3", "link2")
+_FIRST = tuple(reversed(UNITS))
 """Links in the order in which each gets its first unit: from what is likeliest to touch something."""
 _HEIGHT_M = 0.008
 """Height of a range finder above the surface [m]."""
@@ -40,28 +35,23 @@ def gap(points: FloatArray, a: FloatArray, b: FloatArray, radius: FloatArray) ->
     return np.asarray((np.linalg.norm(from_axes(points, a, b)[1], axis=2) - radius).min(axis=1))
 
 
-def dense_skin(model: RobotModel) -> Skin:
-    """Return the skin of 32 units."""
-    return spread_skin(model, sum(UNITS.values()))
-
-
 def units_of(count: int) -> dict[str, int]:
     """How many of so many units sit on each link: one on each first, then in proportion to `UNITS`.
 
     More units are always those of fewer and others. Shares are Webster's: the next unit goes where UNITS / (2 n + 1) is
     largest for the n that are there, so that 32 units are `UNITS` itself.
     """
-    given = dict.fromkeys(UNITS, 0)
+    counts = dict.fromkeys(UNITS, 0)
     for number in range(count):
-        most = max(_FIRST, key=lambda name: UNITS[name] / (2 * given[name] + 1))
-        given[_FIRST[number] if number < len(_FIRST) else most] += 1
-    return given
+        most = max(_FIRST, key=lambda name: UNITS[name] / (2 * counts[name] + 1))
+        counts[_FIRST[number] if number < len(_FIRST) else most] += 1
+    return counts
 
 
 def spread_skin(model: RobotModel, count: int) -> Skin:
     """Spread units over the links of a Panda, on each as far from each other as they can be, each looking off the arm.
 
-    Raises ExperimentError for no unit, and for more than find a place.
+    Raises ExperimentError for no unit, and for more than there are places.
     """
     if count < 1:
         raise ExperimentError(f"The number of units is {count}: give at least 1, or a profile without proximity.")
@@ -73,9 +63,14 @@ def spread_skin(model: RobotModel, count: int) -> Skin:
             raise ExperimentError(
                 f"Of {count} units {number_there} would sit on {name}, where {len(places)} find a place: give fewer."
             )
-        for number, i in enumerate(_spread(places, number_there)):
-            T = np.eye(4)
-            T[:3, :3], T[:3, 3] = _looking(normals[i]), np.round(places[i], 5)
+        chosen = [int(np.argmax(places[:, 2]))]
+        while len(chosen) < number_there:  # the farthest from those before
+            chosen.append(int(np.argmax(np.linalg.norm(places[:, None] - places[chosen], axis=2).min(axis=1))))
+        for number, i in enumerate(chosen[:number_there]):
+            z, T = normals[i], np.eye(4)
+            x = np.cross(z, np.eye(3)[int(np.argmin(np.abs(z)))])
+            x /= np.linalg.norm(x)
+            T[:3, :3], T[:3, 3] = np.column_stack([x, np.cross(z, x), z]), np.round(places[i], 5)
             units.append(SensorUnit(f"{name}_{number + 1}", model.links[link], T))
     return Skin(units, model)
 
@@ -84,37 +79,14 @@ def _candidates(model: RobotModel, link: int) -> tuple[FloatArray, FloatArray]:
     """Places (P, 3) [m] and normals (P, 3) on a link, link frame, whose beams leave the arm in the ready posture."""
     kin, arm = model.kinematics(model.description.q_ready), model.capsules
     _, a, b, _ = placed(arm, kin)
-    own: Capsules = arm.of_links(np.array([link]))
-    rotation, origin = kin.rotation[link], kin.position[link]
     places, normals = [], []
-    for c in range(len(own.radius)):
-        for turn in 2 * np.pi * np.arange(_TURNS) / _TURNS:
-            for part in np.linspace(0.0, 1.0, _PLACES):
-                foot, normal = surface(own.a[c], own.b[c], turn, part)
-                place = foot + (own.radius[c] + _HEIGHT_M) * normal
-                ahead = place + np.outer((0.0, *_CLEAR_M), normal)
-                free = gap(ahead @ rotation.T + origin, a, b, arm.radius)
-                if free[0] > 0.9 * _HEIGHT_M and free[1:].min() > 0.02:
-                    places.append(place)
-                    normals.append(normal)
+    turns, parts = 2 * np.pi * np.arange(_TURNS) / _TURNS, np.linspace(0.0, 1.0, _PLACES)
+    for c, turn, part in product(np.flatnonzero(arm.link == link), turns, parts):
+        foot, normal = surface(arm.a[c], arm.b[c], turn, part)
+        place = foot + (arm.radius[c] + _HEIGHT_M) * normal
+        ahead = place + np.outer((0.0, *_CLEAR_M), normal)
+        free = gap(ahead @ kin.rotation[link].T + kin.position[link], a, b, arm.radius)
+        if free[0] > 0.9 * _HEIGHT_M and free[1:].min() > 0.02:
+            places.append(place)
+            normals.append(normal)
     return np.array(places), np.array(normals)
-
-
-def _spread(places: FloatArray, count: int) -> list[int]:
-    """Indices of so many places, each the farthest from those before."""
-    chosen = [int(np.argmax(places[:, 2]))] if count else []
-    while len(chosen) < count:
-        far = np.linalg.norm(places[:, None] - places[chosen], axis=2).min(axis=1)
-        chosen.append(int(np.argmax(far)))
-    return chosen
-
-
-def _looking(z: FloatArray) -> FloatArray:
-    """Return a rotation (3, 3) whose z axis is given."""
-    x = np.cross(z, np.eye(3)[int(np.argmin(np.abs(z)))])
-    x /= np.linalg.norm(x)
-    return np.column_stack([x, np.cross(z, x), z])
-
-
-if __name__ == "__main__":
-    save_skin(dense_skin(RobotModel(panda())), Path(sys.argv[1]))

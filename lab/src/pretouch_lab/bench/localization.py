@@ -1,26 +1,28 @@
 """Where contacts are said to be, held against where they are: on an arm that wanders, with skins and without."""
 
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
 
+from pretouch.params import LocalisationParams, SequentialParams
 from pretouch.profiles import profile
+from pretouch.robot.body import from_axes
 from pretouch.robot.kinematics import Kinematics
 from pretouch.sim.plant import Plant
 from pretouch.text_table import TextTable
 from pretouch.types import FloatArray, Touched
 from pretouch_lab.bench.contacts import Toucher, Touching, described, place_on, touches_of
-from pretouch_lab.bench.localization_limit import position_limit
 from pretouch_lab.bench.motions import Wandering, WanderingController, wandering
 from pretouch_lab.bench.scenes import SeedRange, model, numbered, path_of, plant_of, scenario, sensing_of
 from pretouch_lab.bench.streams import NOTHING, PROFILE, Alone, Stream, load_stream, record, save_stream
 from pretouch_lab.replay import DetectorAlone
 from pretouch_lab.run import Cell, Play, Row
-from pretouch_lab.table import Column, rounded, table
+from pretouch_lab.table import Column, rounded, summary, table
 
 _TAIL_S = 0.6
 """Time after the last contact [s]."""
@@ -30,8 +32,11 @@ JUDGED = "pretouch"
 WITHOUT = ("none", "none, nothing learnt")
 """Skins of which there is no stream: that of 32 units is replayed as if it saw nothing. Free motion is learnt in the
 warm-up, in which somebody sees to it that nobody is near, or not at all."""
-_BEFORE_S, _AFTER_S = 0.1, 0.2
-"""Time about each contact of which what was said is kept [s]."""
+LINK_M = 0.1
+"""Standard deviation of a place on a link of which nothing is known but the link [m]."""
+SAMPLES = 6
+"""Samples that a window has by the time a contact is judged: 100 ms less what the observer is late."""
+_STEP_M = 1e-4
 
 
 def stream_plays(seeds: SeedRange, quick: bool) -> list[Play]:
@@ -54,7 +59,7 @@ def plays(streams: list[Play]) -> list[Play]:
 
 
 def planned(seed: int) -> tuple[Wandering, list[Touching]]:
-    """Draw an arm's motion and its contacts. The seed says which: with each skin they are the same."""
+    """Draw an arm's motion and its contacts from a seed: with each skin they are the same."""
     family, rng = scenario("localization"), np.random.default_rng([seed, 42])
     course = wandering(seed, 2.0 * (family["duration"]["warm_up_s"] + 3.6 * family["contact"]["number"]))
     touches: list[Touching] = []
@@ -114,78 +119,32 @@ def _stream(out: Path, skin: str, seed: int) -> Stream:
     return stream
 
 
-@dataclass(frozen=True)
-class Said:
-    """What the localiser said about contacts."""
-
-    stamp: FloatArray
-    """(S,) [s]"""
-    touched: list[Touched]
-    """Of each of these steps."""
-    q: FloatArray
-    """(S, n) postures [rad]."""
-    spread: FloatArray
-    """(S, n, n) of a sample of the torques, standing in for that of each step [Nm^2]."""
-    busy: FloatArray
-    """(B,) processor time of steps in which something was localised [s]."""
-
-    def at(self, instant: float) -> int:
-        """Return the last step not later than an instant [s]."""
-        return step_at(self.stamp, instant)
-
-
-def step_at(stamp: FloatArray, instant: float) -> int:
-    """Return the last of steps at these instants (S,) [s] not later than another one [s]."""
-    return max(0, int(np.searchsorted(stamp, instant + 1e-9, side="right")) - 1)
-
-
-def name_of(link: int) -> str:
-    """Name the rigid body of a link by its last link, as `hand` for link 7, flange and hand."""
-    arm = model()
-    named = [scenario("localization")["contact"]["links"], arm.description.name]
-    last = [n for n in named[0] if arm.rigid[arm.link_index(f"{named[1]}_{n}")] == arm.rigid[link]]
-    return str(last[-1])
-
-
 def trial(out: Path, cell: Cell, seed: int) -> Row:
-    """Replay a stream as with the skin that is named, and hold what is said against its contacts."""
+    """Give the profile each step of a stream as with the skin that is named, and judge where it says contacts are.
+
+    Each contact is judged twice: some time after it began, and at its end, by the last step not later than that.
+    """
+    params, arm, blind = profile(JUDGED), model(), cell["skin"] in WITHOUT
     stream = _stream(out, cell["sensing"], seed)
-    touches = touches_of(stream)
-    said = replayed(stream, cell["skin"], touches)
-    busy = np.sort(said.busy) if len(said.busy) else np.array([np.nan])
-    median, p99 = (rounded(float(np.percentile(busy, percent)), 7) for percent in (50, 99))
-    return {"found": [_one(touch, said) for touch in touches], "median_s": median, "p99_s": p99}
-
-
-def replayed(stream: Stream, skin: str, touches: list[Touching]) -> Said:
-    """Give the profile each step of a stream, as with the skin that is named."""
-    params, arm = profile(JUDGED), model()
-    detector, blind = DetectorAlone(params, arm), skin in WITHOUT
-    warm = scenario("localization")["duration"]["warm_up_s"]
-    start, end = (np.array([getattr(touch, name) for touch in touches]) for name in ("start", "end"))
-    start, end = np.sort(start) - _BEFORE_S, np.sort(end) + _AFTER_S
-    stamps, touched, q, spread, busy = [], [], [], [], []
+    touches, detector = touches_of(stream), DetectorAlone(params, arm)
+    learning_s = scenario("localization")["duration"]["warm_up_s"] - 1.0
+    rows: list[Row] = [{"link": name_of(t.link), "force_n": t.force_n, "duration_s": t.duration_s} for t in touches]
+    due = sorted(
+        (t.start + s, k, at) for k, t in enumerate(touches) for at, s in (("", judged_s(t)), ("_end", t.duration_s))
+    )
+    took_s, before = [], None
     for robot, obstacles, _, watched in stream.steps():
-        near = NOTHING if blind else obstacles
-        sees = watched and skin != WITHOUT[1] and (not blind or robot.stamp < warm - 1.0)
-        kin = arm.kinematics(robot.q)
-        begun = time.thread_time()
-        found = detector.step(kin, robot, near, False, sees)
-        taken = time.thread_time() - begun
-        if len(found.touched.link):
-            busy.append(taken)
-        k = int(np.searchsorted(start, robot.stamp, side="right")) - 1
-        if k >= 0 and robot.stamp <= end[k]:
-            stamps.append(robot.stamp)
-            touched.append(found.touched)
-            q.append(robot.q)
-            spread.append(detector.state.test.model.spread)
-    return Said(np.array(stamps), touched, np.array(q), np.array(spread), np.array(busy))
-
-
-def place_of(touch: Touching, kin: Kinematics) -> FloatArray:
-    """Where a contact is in a posture (3,) [m], base frame."""
-    return np.asarray(kin.position[touch.link] + kin.rotation[touch.link] @ touch.point)
+        while due and before is not None and robot.stamp > due[0][0] + 1e-9:
+            _, k, at = due.pop(0)
+            rows[k] |= judged(touches[k], *before, at)
+        sees = watched and cell["skin"] != WITHOUT[1] and (not blind or robot.stamp < learning_s)
+        kin, begin = arm.kinematics(robot.q), time.thread_time()
+        detection = detector.step(kin, robot, NOTHING if blind else obstacles, False, sees)
+        if len(detection.touched.link):
+            took_s.append(time.thread_time() - begin)
+        before = detection.touched, robot.q, detector.state.test.model.spread
+    median, p99 = (rounded(float(np.percentile(took_s or [np.nan], percent)), 7) for percent in (50, 99))
+    return {"contacts": rows, "median_s": median, "p99_s": p99}
 
 
 def judged_s(touch: Touching) -> float:
@@ -193,85 +152,105 @@ def judged_s(touch: Touching) -> float:
     return float(min(scenario("localization")["judged"]["after_s"], touch.duration_s))
 
 
-def place_said(touch: Touching, found: Touched, q: FloatArray, when: str = "") -> Row:
-    """Hold what was said in a posture (n,) [rad] against where the contact was; `when` ends the names of values."""
-    rigid, kin = model().rigid, model().kinematics(q)
-    detected = len(found.link) > 0
-    off = float(np.linalg.norm(found.point[0] - place_of(touch, kin))) if detected else None
-    return {
-        f"detected{when}": detected,
-        f"right{when}": detected and bool(rigid[found.link[0]] == rigid[touch.link]),
-        f"error{when}_m": None if off is None else rounded(off, 5),
-        f"taken_for{when}": name_of(int(found.link[0])) if detected else None,
-        f"sigma{when}_m": rounded(float(found.sigma[0]), 5) if detected else None,
+@cache
+def bodies() -> dict[int, str]:
+    """Name each rigid body by its last link, as `hand` for link 7, flange and hand."""
+    arm = model()
+    links = scenario("localization")["contact"]["links"]
+    return {int(arm.rigid[arm.link_index(f"{arm.description.name}_{name}")]): name for name in links}
+
+
+def name_of(link: int) -> str:
+    """Return the name of the rigid body of a link."""
+    return bodies()[int(model().rigid[link])]
+
+
+def judged(touch: Touching, touched: Touched, q: FloatArray, spread: FloatArray, when: str = "") -> Row:
+    """Hold the place that is reported in a posture (n,) [rad] against that of the contact.
+
+    `spread` is for `position_limit`, `when` ends the names of the values.
+    """
+    rigid, kin, detected = model().rigid, model().kinematics(q), len(touched.link) > 0
+    place = kin.position[touch.link] + kin.rotation[touch.link] @ touch.point
+    row: Row = {
+        "detected": detected,
+        "right": detected and bool(rigid[touched.link[0]] == rigid[touch.link]),
+        "error_m": rounded(float(np.linalg.norm(touched.point[0] - place)), 5) if detected else None,
+        "taken_for": name_of(int(touched.link[0])) if detected else None,
+        "sigma_m": rounded(float(touched.sigma[0]), 5) if detected else None,
+        "limit_m": rounded(position_limit(touch, kin, q, spread), 5),
     }
+    return {f"{name}{when}": value for name, value in row.items()}
 
 
-def said_of(touch: Touching, stamp: FloatArray, touched: Sequence[Touched], q: FloatArray) -> Row:
-    """Hold what S steps said of a contact, at instants (S,) [s] in postures (S, n) [rad], against where it was."""
-    i = step_at(stamp, touch.start + judged_s(touch))
-    return place_said(touch, touched[i], q[i])
+def position_limit(touch: Touching, kin: Kinematics, q: FloatArray, spread: FloatArray) -> float:
+    """Return the least standard deviation of a contact's place without a prior, both directions together [m].
 
+    It is the bound of Cramer and Rao. The unknowns are two coordinates on the surface and the force: into it, and in
+    two directions across. The noise is what free motion was learnt to be, of the mean of so many independent samples;
+    across the surface the force has the spread of `LocalisationParams`. What the torques do not tell at all is bounded
+    by the size of a link.
 
-def _one(touch: Touching, said: Said) -> Row:
-    """Judge one contact, some time after it began and at its end."""
-    row: Row = {"link": name_of(touch.link), "force_n": touch.force_n, "duration_s": touch.duration_s}
-    for when, after in (("", judged_s(touch)), ("_end", touch.duration_s)):
-        i = said.at(touch.start + after)
-        row |= place_said(touch, said.touched[i], said.q[i], when)
-    i = said.at(touch.start + judged_s(touch))
-    limit = position_limit(touch, model().kinematics(said.q[i]), said.q[i], said.spread[i])
-    return row | {"limit_m": rounded(limit, 5)}
+    Args:
+        touch: the contact.
+        kin: the arm's posture.
+        q: (n,) the same [rad].
+        spread: (2, 2, n) what was learnt of free motion, see `ResidualModel`.
+    """
+    p, d, arm = LocalisationParams(), SequentialParams(), model()
+    M, moving = arm.mass_matrix(q), spread[1]
+    S = (M * moving[0]) @ M.T + np.diag(moving[1] + d.noise_floor_nm**2)
+    S = S / SAMPLES + np.diag(np.full(arm.n, d.bias_floor_nm**2))
+    R = kin.rotation[touch.link]
+    normal, force = R @ touch.normal, touch.force_n * (R @ touch.inwards)
+    point = kin.position[touch.link] + R @ touch.point
+    own = arm.capsules.of_links(np.array([touch.link]))
+    # along the axis of the capsule that the point lies on, and round it, where the force turns with the surface
+    off = np.abs(np.linalg.norm(from_axes(touch.point[None], own.a, own.b)[1][0], axis=1) - own.radius)
+    axis = (own.b - own.a)[int(np.argmin(off))]
+    along = R @ axis / np.linalg.norm(axis)
+    around = np.cross(normal, along)
+    turn = np.cross(np.cross(normal, around), force) / own.radius.mean()
+    J, columns = arm.jacobian(kin, touch.link, point)[:3], []
+    for tangent, change in ((along, np.zeros(3)), (around, turn)):
+        ahead = arm.jacobian(kin, touch.link, point + _STEP_M * tangent)[:3].T @ (force + _STEP_M * change)
+        columns.append((ahead - J.T @ force) / _STEP_M)
+    columns += [J.T @ direction for direction in (normal, along, around)]
+    D = np.column_stack(columns)
+    across = 1.0 / (p.friction * touch.force_n) ** 2
+    prior = np.diag([1 / LINK_M**2, 1 / LINK_M**2, 1 / p.force_n**2, across, across])
+    bound = np.linalg.inv(D.T @ np.linalg.solve(S, D) + prior)
+    return float(np.sqrt(bound[0, 0] + bound[1, 1]))
 
 
 def results(replays: list[Row]) -> list[Row]:
     """Return a row for each skin and rigid body."""
-    rows = []
-    for skin in dict.fromkeys(replay["skin"] for replay in replays):
-        own = [replay for replay in replays if replay["skin"] == skin]
-        rate = rounded(1.0 / max(replay["p99_s"] for replay in own), 1)
-        singles = [found for replay in own for found in replay["found"]]
-        for link in sorted({found["link"] for found in singles}, key=_order):
-            rows.append(_of_body(skin, link, [found for found in singles if found["link"] == link], rate))
-    return rows
-
-
-def _order(link: str) -> tuple[bool, str]:
-    return link == "hand", link
-
-
-def _of_body(skin: str, link: str, found: list[Row], rate: float) -> Row:
-    row: Row = {"skin": skin, "link": link, "contacts": len(found)}
-    for when in ("", "_end"):
-        detected = [one for one in found if one[f"detected{when}"]]
-        row |= {
-            f"detected{when}": len(detected),
-            f"right_link{when}": rounded(sum(one[f"right{when}"] for one in found) / len(found), 4),
-            f"median_error{when}_m": _at([one[f"error{when}_m"] for one in detected], 50),
-            f"p90_error{when}_m": _at([one[f"error{when}_m"] for one in detected], 90),
-            f"median_sigma{when}_m": _at([one[f"sigma{when}_m"] for one in detected], 50),
-        }
-    taken = [one["taken_for"] for one in found if one["detected"] and not one["right"]]
-    row["taken_for"] = {name: taken.count(name) for name in sorted(set(taken), key=_order)}
-    return row | {"median_limit_m": _at([one["limit_m"] for one in found], 50), "rate_hz": rate}
-
-
-def _at(values: list[float], percent: float) -> float | None:
-    return rounded(float(np.percentile(values, percent)), 4) if values else None
+    contacts = [{"skin": replay["skin"]} | contact for replay in replays for contact in replay["contacts"]]
+    measures, counts = ("error_m", "error_m_end", "sigma_m", "limit_m"), ("detected", "right", "right_end")
+    rows = summary(contacts, ("skin", "link"), measures, counts)
+    skins, names = list(dict.fromkeys(replay["skin"] for replay in replays)), list(bodies().values())
+    for row in rows:
+        own = [contact for contact in contacts if (contact["skin"], contact["link"]) == (row["skin"], row["link"])]
+        others = Counter(contact["taken_for"] for contact in own if contact["detected"] and not contact["right"])
+        row["taken_for"] = {name: others[name] for name in names if others[name]}
+        row["error_p90_m"] = row["error_m"] and row["error_m"]["p90"]
+        row |= {f"right_share{when}": row[f"right{when}"] / row["trials"] for when in ("", "_end")}
+        row["rate_hz"] = rounded(1.0 / max(r["p99_s"] for r in replays if r["skin"] == row["skin"]), 1)
+    return sorted(rows, key=lambda row: (skins.index(row["skin"]), names.index(row["link"])))
 
 
 _COLUMNS = (
     Column("skin", "skin"),
     Column("body", "link"),
-    Column("contacts", "contacts"),
+    Column("contacts", "trials"),
     Column("detected", "detected"),
-    Column("right\nbody [%]", "right_link", 0, 100.0),
+    Column("right\nbody [%]", "right_share", 0, 100.0),
     Column("taken for", "others"),
-    Column("median\n[cm]", "median_error_m", 1, 100.0),
-    Column("90 %\n[cm]", "p90_error_m", 1, 100.0),
-    Column("limit\n[cm]", "median_limit_m", 1, 100.0),
-    Column("right\nat end [%]", "right_link_end", 0, 100.0),
-    Column("median\nat end [cm]", "median_error_end_m", 1, 100.0),
+    Column("median\n[cm]", "error_m", 1, 100.0),
+    Column("90 %\n[cm]", "error_p90_m", 1, 100.0),
+    Column("limit\n[cm]", "limit_m", 1, 100.0),
+    Column("right\nat end [%]", "right_share_end", 0, 100.0),
+    Column("median\nat end [cm]", "error_m_end", 1, 100.0),
 )
 
 

@@ -4,25 +4,25 @@ Each detector plays each set with its halves crosswise: one half learns, the oth
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 
-from pretouch.errors import RecordingError
 from pretouch.imported_data.detect import MOVING_RAD_S, detect
-from pretouch.profiles import Profile, profile
+from pretouch.imported_data.results import Course
+from pretouch.profiles import profile
 from pretouch.recording.compare import DetectedContact
+from pretouch.robot.description import robot_named
+from pretouch.robot.model import RobotModel
 from pretouch.text_table import TextTable
-from pretouch.types import BoolArray, FloatArray
-from pretouch_lab.bench.real_sets import SETS, Run, Stream, corrected, model_of, stream_of
+from pretouch_lab.bench.real_sets import SETS, Run, Stream, corrected, stream_of
 from pretouch_lab.run import Cell, Row
 from pretouch_lab.table import Column, rate_bounds, table
 
 DETECTORS = ("fixed", "observer", "paper", "pretouch")
 _AFTER_S = 0.1
-"""Time after a contact in which an alarm still counts as found, and none as false [s]."""
+"""Time after a contact in which an alarm still counts as of it, and none as false [s]."""
 _NEAR_S = 0.5
 """Contacts that part for less are one: so long nothing is a new alarm either [s]."""
 
@@ -36,23 +36,23 @@ def halves(count: int) -> tuple[tuple[tuple[int, ...], tuple[int, ...]], ...]:
 def trial(folder: Path, cell: Cell, _seed: int) -> Row:
     """Play a detector on a set: what a row of each table says that the set has something for."""
     runs, whole = _prepared(folder, cell["set"])
-    counts: dict[str, Tally] = {}
+    counts: dict[str, list[Row]] = {name: [] for name in TABLES}
     for learn, judge in halves(len(runs)):
         # what is learnt in the first half by a detector that does so is kept, as from one session to the next
         stream = corrected(whole, learn).only((*learn, *judge))
-        said = said_of(stream, profile(cell["detector"]))
-        for name in TABLES:
-            judged = tuple(number for number in judge if runs[number].touched is (name == "contacts"))
+        result, course = detect(stream.recording, profile(cell["detector"]))
+        for name, some in counts.items():
+            judged = [number for number in judge if runs[number].touched is (name == "contacts")]
             if judged:
-                counts[name] = counts.get(name, Tally()) + tally(stream, said, judged, [run.joints for run in runs])
-    return {name: count.row() for name, count in counts.items()}
+                some.append(tally(stream, result.contacts, course, judged, [run.joints for run in runs]))
+    return {name: total(some) for name, some in counts.items() if some}
 
 
 @lru_cache(maxsize=1)
 def _prepared(folder: Path, name: str) -> tuple[list[Run], Stream]:
     real = next(each for each in SETS if each.name == name)
-    runs, model = parted(real.read(real.files(folder))), model_of(real, folder)
-    return runs, stream_of(real, runs, model)
+    runs = parted(real.read(real.files(folder)))
+    return runs, stream_of(real, runs, RobotModel(robot_named(real.arm_of(folder))))
 
 
 def parted(runs: list[Run]) -> list[Run]:
@@ -60,110 +60,74 @@ def parted(runs: list[Run]) -> list[Run]:
     if len(runs) > 1:
         return runs
     (r,), middle = runs, len(runs[0].time) // 2
-    return [
-        Run(f"{r.name}, {half} half", r.time[part], r.q[part], r.qd[part], r.torque[part], r.label[part], r.joints)
-        for half, part in (("first", slice(middle)), ("second", slice(middle, None)))
-    ]
+    parts = (slice(middle), slice(middle, None))
+    return [Run(r.time[part], r.q[part], r.qd[part], r.torque[part], r.label[part], r.joints) for part in parts]
 
 
-@dataclass(frozen=True)
-class Said:
-    """What a detector said in S cycles."""
+def tally(
+    stream: Stream,
+    alarms: Sequence[DetectedContact],
+    course: Course,
+    judged: Sequence[int],
+    joints: Sequence[tuple[int, ...]],
+) -> Row:
+    """Count over some runs of a stream what `total` adds up; `joints` of each run of the set are as in `Run`.
 
-    alarms: tuple[DetectedContact, ...]
-    time: FloatArray
-    """(S,) [s]."""
-    armed: BoolArray
-    """(S,)."""
-
-
-def said_of(stream: Stream, profile: Profile) -> Said:
-    """Let a detector run over a stream, as `pretouch detect` does."""
-    try:
-        result, course = detect(stream.recording, profile)
-    except RecordingError:  # too short for its window
-        return Said((), np.zeros(0), np.zeros(0, np.bool_))
-    return Said(result.contacts, course.time, course.judged)
-
-
-@dataclass(frozen=True)
-class Tally:
-    """Counts that add up over runs."""
-
-    motion_s: float = 0.0
-    """Free motion in which a contact could be detected [s]."""
-    false_alarms: int = 0
-    found: int = 0
-    busy: int = 0
-    """Contacts that began during an alarm of before: neither found nor missed."""
-    contacts: int = 0
-    delays_s: tuple[float, ...] = ()
-    links_right: int = 0
-    links_said: int = 0
-    """Contacts found on a link that the set names, by a detector that names one."""
-
-    def __add__(self, other: "Tally") -> "Tally":
-        return Tally(*(getattr(self, name) + getattr(other, name) for name in self.__dataclass_fields__))
-
-    def row(self) -> Row:
-        """Return what a table shows."""
-        hours = self.motion_s / 3600.0
-        low, high = rate_bounds(self.false_alarms, hours) if hours else (None, None)
-        return {
-            "motion_s": self.motion_s, "false_alarms": self.false_alarms,
-            "per_hour": self.false_alarms / hours if hours else None,
-            "per_hour_low": low, "per_hour_high": high,
-            "found": self.found, "busy": self.busy, "contacts": self.contacts,
-            "median_delay_ms": 1000.0 * float(np.median(self.delays_s)) if self.delays_s else None,
-            "link_right": self.links_right if self.links_said else None, "link_said": self.links_said,
-        }  # fmt: skip
+    A contact is `busy` that began during an alarm of before: it is neither found nor missed. Links count of contacts
+    on a link that the set names, by a detector that names one.
+    """
+    r, model, own = stream.recording, stream.recording.model, np.isin(stream.run, judged)
+    at = np.searchsorted(r.time, course.time, side="right") - 1
+    free = own[at] & course.judged & (np.abs(r.qd_commanded[at]).max(axis=1) > MOVING_RAD_S)
+    delays_s: list[float] = []
+    busy = missed = right = named = 0
+    for first, touch, last in _spans(stream):
+        begin, end = r.time[first], r.time[last] + _AFTER_S
+        free &= (course.time < begin) | (course.time > end)
+        if touch < 0 or not own[first]:
+            continue
+        alarm = next((alarm for alarm in alarms if begin <= alarm.time_s <= end), None)
+        if alarm is None:
+            during = any(alarm.time_s < begin <= (alarm.end_s or alarm.time_s) for alarm in alarms)
+            busy, missed = busy + during, missed + (not during)
+            continue
+        delays_s.append(alarm.time_s - r.time[touch])
+        if alarm.link and joints[stream.run[first]]:
+            named += 1
+            right += int(model.moved_by[model.link_index(alarm.link)].sum()) in joints[stream.run[first]]
+    return {
+        "motion_s": float(free.sum() * np.median(np.diff(course.time))),
+        "false_alarms": int(free[np.searchsorted(course.time, [alarm.time_s for alarm in alarms])].sum()),
+        "found": len(delays_s),
+        "busy": busy,
+        "contacts": len(delays_s) + missed,
+        "delays_s": delays_s,
+        "link_right": right,
+        "link_said": named,
+    }
 
 
-def tally(stream: Stream, said: Said, judged: Sequence[int], joints: Sequence[tuple[int, ...]]) -> Tally:
-    """Count over some runs of a stream; `joints` names the touched link of each run of the set, as `Run` does."""
-    r, own = stream.recording, np.isin(stream.run, judged)
-    spans = [span for span in _spans(stream) if own[span[0]]]
-    from_to = [(r.time[first], r.time[last] + _AFTER_S) for first, _, last in spans]
-    at = np.searchsorted(r.time, said.time, side="right") - 1
-    free = own[at] & said.armed & (np.abs(r.qd_commanded[at]).max(axis=1) > MOVING_RAD_S)
-    for begin, end in from_to:
-        free &= (said.time < begin) | (said.time > end)
-    count = Tally(
-        motion_s=float(free.sum() * np.median(np.diff(said.time))) if free.any() else 0.0,
-        false_alarms=int(free[np.searchsorted(said.time, [alarm.time_s for alarm in said.alarms])].sum()),
-    )
-    for (first, touch, _), (begin, end) in zip(spans, from_to, strict=True):
-        if touch >= 0:
-            count += _contact(said, (begin, r.time[touch], end), stream, joints[stream.run[first]])
-    return count
-
-
-def _contact(said: Said, times: tuple[float, float, float], stream: Stream, joints: tuple[int, ...]) -> Tally:
-    begin, touch, end = times
-    alarm = next((alarm for alarm in said.alarms if begin <= alarm.time_s <= end), None)
-    if alarm is None:
-        busy = any(alarm.time_s < begin <= (alarm.end_s or alarm.time_s) for alarm in said.alarms)
-        return Tally(busy=int(busy), contacts=int(not busy))
-    model, link = stream.recording.model, alarm.link if joints else None
-    named = link is not None
-    right = link is not None and int(model.moved_by[model.link_index(link)].sum()) in joints
-    return Tally(
-        found=1, contacts=1, delays_s=(alarm.time_s - touch,), links_right=int(right), links_said=int(named)
-    )  # fmt: skip
+def total(counts: Sequence[Row]) -> Row:
+    """Add up counts, with the rate of false alarms, its bounds and the median delay: None where there is none."""
+    row: Row = {name: sum((count[name] for count in counts), start=type(counts[0][name])()) for name in counts[0]}
+    hours, delays_s = row["motion_s"] / 3600.0, row.pop("delays_s")
+    low, high = rate_bounds(row["false_alarms"], hours) if hours else (None, None)
+    return row | {
+        "per_hour": row["false_alarms"] / hours if hours else None,
+        "per_hour_low": low,
+        "per_hour_high": high,
+        "median_delay_ms": 1000.0 * float(np.median(delays_s)) if delays_s else None,
+        "link_right": row["link_right"] if row["link_said"] else None,
+    }
 
 
 def _spans(stream: Stream) -> list[tuple[int, int, int]]:
     """Stretches that are not sure to be free: first sample, first in a contact (-1: none), last sample."""
     label, time, run = stream.label, stream.recording.time, stream.run
-    found: list[tuple[int, int, int]] = []
     some = np.flatnonzero(label)
-    if not len(some):
-        return found
     apart = (np.diff(time[some]) > _NEAR_S) | (np.diff(run[some]) != 0)
-    for part in np.split(some, np.flatnonzero(apart) + 1):
-        touch = part[label[part] == 1]
-        found.append((int(part[0]), int(touch[0]) if len(touch) else -1, int(part[-1])))
-    return found
+    parts = np.split(some, np.flatnonzero(apart) + 1) if len(some) else []
+    return [(int(part[0]), int(next(iter(part[label[part] == 1]), -1)), int(part[-1])) for part in parts]
 
 
 _COMMON = (
@@ -181,18 +145,6 @@ _CONTACTS = (
     Column("delay, median [ms]", "median_delay_ms", 0),
     Column("link right", "link_right", of="link_said"),
 )
-
-
-def tables(rows: Sequence[Row]) -> list[TextTable]:
-    """Write the rows, a table for each kind."""
-    made = []
-    for name, (title, columns, note) in TABLES.items():
-        some = [{"set": row["set"], "detector": row["detector"], **row[name]} for row in rows if name in row]
-        if some:
-            made.append(table(title, columns, some, note, 2))
-    return made
-
-
 TABLES = {
     "free": (
         "Real free motion",
@@ -206,3 +158,11 @@ TABLES = {
         " those that set and detector name.",
     ),
 }
+
+
+def tables(rows: Sequence[Row]) -> list[TextTable]:
+    """Write the rows, a table for each kind that there is."""
+    parts = {name: [{**row, **row[name]} for row in rows if name in row] for name in TABLES}
+    return [
+        table(title, columns, parts[name], note, 2) for name, (title, columns, note) in TABLES.items() if parts[name]
+    ]

@@ -19,7 +19,7 @@ from pretouch.params import SequentialParams
 from pretouch.robot import description
 from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
-from pretouch.types import BoolArray, FloatArray, IntArray
+from pretouch.types import FloatArray, IntArray
 from pretouch.values import value
 
 _APART_S = 1.0
@@ -34,7 +34,6 @@ _SHARED_NM = 1e-9
 class Run:
     """One recording: N samples of n joints, in the order of time."""
 
-    name: str
     time: FloatArray
     """(N,) [s]."""
     q: FloatArray
@@ -79,8 +78,8 @@ class RealSet:
 
 _BY_NAME = {"2link": (2,), "3link": (3,), "wrist": (4, 5, 6)}
 """What the names of the UR10e's runs say of the touched link, as numbers of joints."""
-_GLOVE = {"q": "q", "qd": "dq", "torque": "tau_J"}
-"""Columns, less the number of the joint from 0."""
+_GLOVE = ("time", *(f"{name}{joint}" for name in ("q", "dq", "tau_J") for joint in range(7)), "label")
+"""Columns that are read; joints count from 0."""
 
 
 def _of_arrays(files: list[Path]) -> list[Run]:
@@ -92,15 +91,14 @@ def _of_arrays(files: list[Path]) -> list[Run]:
         raise ExperimentError(f"{files[0]} is no file of NumPy arrays ({error}): get it again.") from error
     if missing := {"t", "q", "dq", "tau", "run"} - set(data):
         raise ExperimentError(f"{files[0]} has no {', '.join(sorted(missing))}: get it again, or take it away.")
-    label = data.get("label", np.zeros(len(data["t"]), np.int64))
-    found = []
+    label, runs = data.get("label", np.zeros(len(data["t"]), np.int64)), []
     for number in np.unique(data["run"]):
         # what the logger missed is interpolated in the file: left out, so that the observer steps over it
         own = (data["run"] == number) & data.get("ok", np.True_)
-        name = str(data["run_name"][number]) if "run_name" in data else f"run {number}"
+        name = str(data["run_name"][number]) if "run_name" in data else ""
         joints = next((joints for part, joints in _BY_NAME.items() if part in name), ())
-        found.append(_run(name, [data[key][own] for key in ("t", "q", "dq", "tau")], label[own], joints))
-    return found
+        runs.append(_run([data[key][own] for key in ("t", "q", "dq", "tau")], label[own], joints))
+    return runs
 
 
 def _of_glove(files: list[Path]) -> list[Run]:
@@ -109,28 +107,26 @@ def _of_glove(files: list[Path]) -> list[Run]:
     The measured torques `tau_J` go through our own observer. The file's external ones, `tau_ext`, are not used: nothing
     there says whose they are. By two of its files they are by the robot on its environment.
     """
-    return [_glove_run(file) for file in files]
+    runs = []
+    for file in files:
+        with file.open(encoding="utf-8") as lines:
+            names = lines.readline().strip().split(",")
+            if missing := [name for name in _GLOVE if name not in names]:
+                raise ExperimentError(f"{file} has no column {missing[0]}: get it again, or take it away.")
+            table = np.loadtxt(lines, delimiter=",", usecols=[names.index(name) for name in _GLOVE], ndmin=2)
+        parts, link = np.split(table, (1, 8, 15, 22), axis=1), file.parent.name.removeprefix("link")
+        joints = (int(link),) if link.isdecimal() else ()
+        runs.append(_run([parts[0][:, 0], *parts[1:4]], table[:, -1], joints))
+    return runs
 
 
-def _glove_run(file: Path) -> Run:
-    with file.open(encoding="utf-8") as lines:
-        names = lines.readline().strip().split(",")
-        wanted = ["time", *(f"{name}{j}" for name in _GLOVE.values() for j in range(7)), "label"]
-        if missing := [name for name in wanted if name not in names]:
-            raise ExperimentError(f"{file} has no column {missing[0]}: get it again, or take it away.")
-        table = np.loadtxt(lines, delimiter=",", usecols=[names.index(name) for name in wanted], ndmin=2)
-    parts = [table[:, 0], *np.split(table[:, 1:-1], len(_GLOVE), axis=1)]
-    link = file.parent.name.removeprefix("link")
-    return _run(f"{file.parent.name}/{file.stem}", parts, table[:, -1], (int(link),) if link.isdecimal() else ())
-
-
-def _run(name: str, parts: list[FloatArray], label: FloatArray, joints: tuple[int, ...]) -> Run:
+def _run(parts: list[FloatArray], label: FloatArray, joints: tuple[int, ...]) -> Run:
     """Leave out what is not finite, and samples that are not later than those before."""
     time, q, qd, torque = (np.asarray(part, np.float64) for part in parts)
     finite = np.isfinite(np.column_stack([time, q, qd, torque])).all(axis=1)
     latest = np.maximum.accumulate(np.where(finite, time, -np.inf))
     usable = finite & np.append(np.True_, time[1:] > latest[:-1])
-    return Run(name, time[usable], q[usable], qd[usable], torque[usable], label[usable].astype(np.int64), joints)
+    return Run(time[usable], q[usable], qd[usable], torque[usable], label[usable].astype(np.int64), joints)
 
 
 SETS = (
@@ -157,14 +153,15 @@ def sets_in(folder: Path) -> tuple[list[RealSet], list[str]]:
     """
     there = [each for each in SETS if each.files(folder)]
     usable = [each for each in there if each.arm == "panda" or Path(each.arm_of(folder)).is_dir()]
-    said = [
+    missing = [
         f"{each.name} is left out, for {each.arm_of(folder)} is missing: make it with `pretouch robot import`."
-        for each in there if each not in usable
-    ]  # fmt: skip
+        for each in there
+        if each not in usable
+    ]
     if not usable:
-        known = "; ".join(f"{each.place} (github.com/{each.source})" for each in SETS)
-        raise ExperimentError(" ".join([f"{folder} has no set that can be played. Looked for were {known}.", *said]))
-    return usable, said
+        every = "; ".join(f"{each.place} (github.com/{each.source})" for each in SETS)
+        raise ExperimentError(" ".join([f"{folder} has no set that can be played. Looked for were {every}.", *missing]))
+    return usable, missing
 
 
 def files_digest(sets: Sequence[RealSet], folder: Path) -> str:
@@ -192,41 +189,30 @@ class Stream:
 
     def only(self, runs: Sequence[int]) -> "Stream":
         """Return some runs, in this order."""
-        parts = [np.flatnonzero(self.run == number) for number in runs]
-        at = np.concatenate(parts)
-        r, begin, time = self.recording, 0.0, []
-        for part in parts:
-            time.append(r.time[part] - r.time[part[0]] + begin)
-            begin = float(time[-1][-1]) + _APART_S
-        kept = replace(
-            r, time=np.concatenate(time), q=r.q[at], qd=r.qd[at], qd_commanded=r.qd_commanded[at], tau_ext=r.tau_ext[at]
-        )
-        return Stream(kept, self.label[at], self.run[at], self.load[at])
-
-    @property
-    def free(self) -> BoolArray:
-        """(M,) whether nobody touches the arm and its torques are known."""
-        return np.asarray((self.label == 0) & np.isfinite(self.recording.tau_ext).all(axis=1))
+        r, parts = self.recording, [np.flatnonzero(self.run == number) for number in runs]
+        at, time = np.concatenate(parts), _laid([r.time[part] for part in parts])
+        some = {name: getattr(r, name)[at] for name in ("q", "qd", "qd_commanded", "tau_ext")}
+        return Stream(replace(r, time=time, **some), self.label[at], self.run[at], self.load[at])
 
 
-def model_of(real: RealSet, folder: Path) -> RobotModel:
-    """Return the arm of a set."""
-    return RobotModel(robot_named(real.arm_of(folder)))
+def _laid(times: Sequence[FloatArray]) -> FloatArray:
+    """Lay runs with their own instants (N,) [s] one after the other, `_APART_S` apart."""
+    begin, laid = 0.0, []
+    for time in times:
+        laid.append(time - time[0] + begin)
+        begin = float(laid[-1][-1]) + _APART_S
+    return np.concatenate(laid)
 
 
 def stream_of(real: RealSet, runs: Sequence[Run], model: RobotModel) -> Stream:
     """Bring all runs of a set to external torques, as `pretouch detect` does."""
-    begin, time = 0.0, []
-    for run in runs:
-        time.append(run.time - run.time[0] + begin)
-        begin = float(time[-1][-1]) + _APART_S
-    kind = "current" if real.of_currents else "tau"
+    kind, gains = ("current", (1.0,) * model.n) if real.of_currents else ("tau", ())
     arrays = {"q": [r.q for r in runs], "dq": [r.qd for r in runs], kind: [r.torque for r in runs]}
     joints = {name: np.concatenate(parts) for name, parts in arrays.items()}
-    stamps = np.round(np.concatenate(time) * 1e9).astype(np.int64)
-    log = Log(Path(real.name), model, stamps, joints, dict.fromkeys(joints, real.name))
-    gains = (1.0,) * model.n if real.of_currents else ()
-    r = torque_recording(log, Choice(gains=gains))
+    stamps = np.round(_laid([run.time for run in runs]) * 1e9).astype(np.int64)
+    r = torque_recording(
+        Log(Path(real.name), model, stamps, joints, dict.fromkeys(joints, real.name)), Choice(gains=gains)
+    )
     loaded = observed(model, r.time, r.q, r.qd, joints[kind], SequentialParams().observer_gain_1_s, 1.0)
     numbers = np.repeat(np.arange(len(runs)), [len(run.time) for run in runs])
     return Stream(r, np.concatenate([run.label for run in runs]), numbers, loaded - r.tau_ext)
@@ -239,15 +225,19 @@ def corrected(stream: Stream, learnt: Sequence[int]) -> Stream:
     observer delays friction, so what explains it is delayed alike.
     """
     r, gain = stream.recording, SequentialParams().observer_gain_1_s / stream.recording.rate
-    keep, fitted = 1.0 / (1.0 + gain), stream.free & np.isin(stream.run, learnt)
-    friction = np.stack([np.ones_like(r.qd), *(
-        lfilter([1.0 - keep], [1.0, -keep], values, axis=0) for values in (r.qd, np.tanh(r.qd / _COULOMB_RAD_S))
-    )], axis=2)  # fmt: skip
-    x, y, load = friction[fitted], r.tau_ext[fitted], stream.load[fitted]
-    inverse = [np.linalg.pinv(x[:, j]) for j in range(r.model.n)]
-    apart = [np.stack([v[:, j] - x[:, j] @ (inverse[j] @ v[:, j]) for j in range(r.model.n)]) for v in (y, load)]
+    keep, joints = 1.0 / (1.0 + gain), range(r.model.n)
+    free = (stream.label == 0) & np.isfinite(r.tau_ext).all(axis=1) & np.isin(stream.run, learnt)
+    turning = (r.qd, np.tanh(r.qd / _COULOMB_RAD_S))
+    delayed = [lfilter([1.0 - keep], [1.0, -keep], values, axis=0) for values in turning]
+    friction = np.stack([np.ones_like(r.qd), *delayed], axis=2)
+    inverse = [np.linalg.pinv(friction[free, j]) for j in joints]
+
+    def explained(torques: FloatArray) -> FloatArray:
+        """What friction tells of torques (M, n) [Nm], by those in free motion."""
+        return np.stack([friction[:, j] @ (inverse[j] @ torques[free, j]) for j in joints], axis=1)
+
     # the mass first, by what friction does not explain of either; then friction by what is left
-    mass = -float((apart[0] * apart[1]).sum() / max((apart[1] ** 2).sum(), _SHARED_NM))
+    torque, load = (whole[free] - explained(whole)[free] for whole in (r.tau_ext, stream.load))
+    mass = -float((torque * load).sum() / max((load**2).sum(), _SHARED_NM))
     left = r.tau_ext + mass * stream.load
-    told = np.stack([friction[:, j] @ (inverse[j] @ left[fitted, j]) for j in range(r.model.n)], axis=1)
-    return replace(stream, recording=replace(r, tau_ext=left - told))
+    return replace(stream, recording=replace(r, tau_ext=left - explained(left)))

@@ -1,8 +1,6 @@
 """Work for a control step: many points near an arm that moves and is restricted by them."""
 
 import itertools
-from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,13 +14,14 @@ from pretouch.robot.model import RobotModel
 from pretouch.sensing.sensor import PAPER_SENSOR
 from pretouch.sensing.skin import Skin
 from pretouch.sensing.unit import SensorUnit
-from pretouch.types import FloatArray, Inputs, IntArray, RangeReadings, RangeStatus, RobotState
+from pretouch.types import FloatArray, Inputs, RangeReadings, RangeStatus, RobotState
 
 LARGEST_SKIN = 10_000
 """Units from which the arm would be covered more than once over."""
+UNIT_RATE = 50.0
+"""Readings of a unit in a second (paper, III-A)."""
 
-_SPHERES = 40
-_SPHERE_RADIUS = 0.1
+_SPHERES, _SPHERE_RADIUS = 40, 0.1
 _ROOM_CENTER, _ROOM_RADIUS = np.array([0.25, 0.0, 0.45]), 1.0
 """The Panda's room is round, and as wide as the arm can reach [m]: every beam ends at a sphere or at its wall."""
 _CLEAR = 0.3, 0.5
@@ -37,20 +36,15 @@ _ABOVE = 0.006
 """Height of a unit above its link [m]."""
 _SEEN = 0.55
 """Largest first reading of a unit [m]: within d_notice of Table I."""
-_FORCE_NOISE = 0.3
-"""Standard deviation of the force estimate [N]."""
-_IN_VAIN = 20
-"""Rounds over all links without a single unit after which there is none to be found."""
-_TRIES = 40
-"""Places on a link that are tried before the next link: some have few that see anything."""
-_DRAWS = 4096
-"""Samples of force noise before they repeat."""
-UNIT_RATE = 50.0
-"""Readings of a unit in a second (paper, III-A)."""
+_FORCE_NOISE, _DRAWS = 0.3, 4096
+"""Standard deviation of the force estimate [N], and its samples before they repeat."""
+_IN_VAIN, _TRIES = 20, 40
+"""Rounds over all links without a single unit after which there is none to be had, and places that are tried on a link
+before the next one: some have few that see anything."""
 
 
 class Workload:
-    """An arm with K units among spheres in a room, on a circle, that does exactly as it is commanded.
+    """An arm with K units among spheres in a round room, on a circle, that does exactly as it is commanded.
 
     Every unit sees something, 50 times a second, each at times of its own; with `all_new` every reading is stamped new
     in every cycle, as no real skin's are. Time is counted in cycles, so a run is the same whatever the machine does
@@ -67,23 +61,25 @@ class Workload:
         kin = model.kinematics(self._q)
         body, hand = placed(model.capsules, kin), kin.position[model.ee]
         self.path = Circle(center=tuple(hand - [0.0, _CIRCLE, 0.0]), radius=_CIRCLE)
-        around = np.array([self.path.point(s) for s in np.linspace(0, self.path.length, 32)])
-        wider = reach_of(model) / reach_of(RobotModel(panda()))
-        self._room = _Room(_spheres(rng, body, around), wider * _ROOM_CENTER, wider * _ROOM_RADIUS)
-        self.skin = _skin(rng, model, units, body, self._room)
+        self._wider = reach_of(model) / reach_of(RobotModel(panda()))
+        self.spheres = _spheres(rng, body, np.array([self.path.point(s) for s in np.linspace(0, self.path.length, 32)]))
+        """(40, 3) centres [m], base frame."""
+        self.skin = self._skin(rng, units, body)
         self._force = np.zeros((_DRAWS, 6))
         self._force[:, :3] = rng.normal(0.0, _FORCE_NOISE, (_DRAWS, 3))
         self._all_new = all_new
         self._phase = rng.uniform(0.0, 1 / UNIT_RATE, units)
-        self._turn = np.full(units, -np.inf)
-        self._distance = np.zeros(units)
+        self._turn, self._distance = np.full(units, -np.inf), np.zeros(units)
 
     def inputs(self) -> Inputs:
         """What the controller is given in this cycle."""
         units, now = len(self.skin), self._cycle * self._period
         turn = np.floor((now - self._phase) * UNIT_RATE)
         due = np.flatnonzero(turn > self._turn)
-        self._turn, self._distance[due] = turn, self._ranges(due)
+        kin, T, link = self._model.kinematics(self._q), self.skin.T_link_sensor[due], self.skin.link[due]
+        R = kin.rotation[link]
+        origin = kin.position[link] + np.einsum("kij,kj->ki", R, T[:, :3, 3])
+        self._turn, self._distance[due] = turn, self._ranges(origin, np.einsum("kij,kj->ki", R, T[:, :3, 2]))
         stamp = np.full(units, now) if self._all_new else np.minimum(self._phase + turn / UNIT_RATE, now)
         readings = RangeReadings(stamp, self._distance.copy(), np.full(units, int(RangeStatus.OK)))
         wrench = self._force[self._cycle % _DRAWS]
@@ -97,14 +93,39 @@ class Workload:
     def clearance(self) -> float:
         """Distance from the arm to the nearest sphere [m]."""
         body = placed(self._model.capsules, self._model.kinematics(self._q))
-        return float(_distance(self._room.spheres, body).min()) - _SPHERE_RADIUS
+        return float(_distance(self.spheres, body).min()) - _SPHERE_RADIUS
 
-    def _ranges(self, units: IntArray) -> FloatArray:
-        """Distance (k,) [m] along the beams of some units to the nearest sphere or the wall."""
-        kin = self._model.kinematics(self._q)
-        R, T = kin.rotation[self.skin.link[units]], self.skin.T_link_sensor[units]
-        origin = kin.position[self.skin.link[units]] + np.einsum("kij,kj->ki", R, T[:, :3, 3])
-        return self._room.ranges(origin, np.einsum("kij,kj->ki", R, T[:, :3, 2]))
+    def _ranges(self, origin: FloatArray, beam: FloatArray) -> FloatArray:
+        """Distance (k,) [m] along rays (k, 3) to the nearest sphere, or from within to the room's wall."""
+        along, half = _crossing(origin, beam, self.spheres, _SPHERE_RADIUS)
+        sphere = np.where((half >= 0) & (along > 0), along - np.sqrt(np.maximum(half, 0.0)), np.inf).min(axis=1)
+        along, half = _crossing(origin, beam, self._wider * _ROOM_CENTER[None], self._wider * _ROOM_RADIUS)
+        wall: FloatArray = (along + np.sqrt(half))[:, 0]
+        return np.minimum(sphere, wall)
+
+    def _skin(self, rng: np.random.Generator, units: int, body: Capsules) -> Skin:
+        """Put units on all links in turn that look away from the arm as it stands, and at something near."""
+        model, kin, skin = self._model, self._model.kinematics(self._q), list[SensorUnit]()
+        first = int(np.argmax(model.moved_by.sum(axis=1) >= _JOINTS_BEFORE))
+        for tried, link in enumerate(itertools.cycle(range(first, len(model.links)))):
+            if len(skin) == units:
+                break
+            if not skin and tried > _IN_VAIN * len(model.links):
+                raise ExperimentError(
+                    f"No unit on {model.description.name} sees past the arm, posture as in q_ready: give another"
+                    " q_ready in robot.toml, more stretched out."
+                )
+            capsules = np.flatnonzero(body.link == link)
+            for _ in range(_TRIES if len(capsules) else 0):
+                T_O_sensor = _outwards(rng, body, int(rng.choice(capsules)))
+                p, beam = T_O_sensor[:3, 3], T_O_sensor[:3, 2]
+                seen = float(self._ranges(p[None], beam[None])[0])
+                if seen <= _SEEN and _sees_past(body, link, p, beam, seen):
+                    T, R = np.eye(4), kin.rotation[link]
+                    T[:3, :3], T[:3, 3] = R.T @ T_O_sensor[:3, :3], R.T @ (p - kin.position[link])
+                    skin.append(SensorUnit(f"unit_{len(skin)}", model.links[link], T))
+                    break
+        return Skin(skin, model)
 
 
 def _distance(points: FloatArray, body: Capsules) -> FloatArray:
@@ -112,69 +133,17 @@ def _distance(points: FloatArray, body: Capsules) -> FloatArray:
     return np.asarray(np.linalg.norm(from_axes(points, body.a, body.b)[1], axis=2) - body.radius)
 
 
-@dataclass(frozen=True)
-class _Room:
-    """What units see: spheres, and a round wall beyond them."""
-
-    spheres: FloatArray
-    """(S, 3) centres [m], base frame."""
-    center: FloatArray
-    """(3,) of the wall [m]."""
-    radius: float
-    """Of the wall [m]."""
-
-    def ranges(self, origin: FloatArray, beam: FloatArray) -> FloatArray:
-        """Distance (k,) [m] along rays (k, 3) to the nearest sphere, or from within to the wall."""
-        along, half = _crossing(origin, beam, self.spheres, _SPHERE_RADIUS)
-        met = (half >= 0) & (along > 0)
-        sphere = np.where(met, along - np.sqrt(np.maximum(half, 0.0)), np.inf).min(axis=1)
-        along, half = _crossing(origin, beam, self.center[None], self.radius)
-        wall: FloatArray = (along + np.sqrt(half))[:, 0]
-        return np.minimum(sphere, wall)
-
-
 def _spheres(rng: np.random.Generator, body: Capsules, around: FloatArray) -> FloatArray:
     """Centres (S, 3) [m] of spheres round the arm, none near the way (P, 3) of its hand."""
     low, high = np.minimum(body.a, body.b).min(axis=0) - 1.0, np.maximum(body.a, body.b).max(axis=0) + 1.0
-    found: list[FloatArray] = []
-    while len(found) < _SPHERES:
+    centers: list[FloatArray] = []
+    while len(centers) < _SPHERES:
         center = rng.uniform(low, high)
         clear = float(_distance(center[None], body).min()) - _SPHERE_RADIUS
         passed = float(np.linalg.norm(around - center, axis=1).min()) - _SPHERE_RADIUS - _HAND
         if _CLEAR[0] <= min(clear, passed) and clear <= _CLEAR[1]:
-            found.append(center)
-    return np.array(found)
-
-
-def _skin(rng: np.random.Generator, model: RobotModel, units: int, body: Capsules, room: _Room) -> Skin:
-    """Units on all links in turn that look away from the arm, and at something near in the posture of `body`."""
-    kin = model.kinematics(model.description.q_ready)
-    first = int(np.argmax(model.moved_by.sum(axis=1) >= _JOINTS_BEFORE))
-    found: list[SensorUnit] = []
-    for tried, link in enumerate(itertools.cycle(range(first, len(model.links)))):
-        if len(found) == units:
-            break
-        if not found and tried > _IN_VAIN * len(model.links):
-            raise ExperimentError(
-                f"No unit on {model.description.name} sees past the arm, posture as in q_ready: give another q_ready in"
-                " robot.toml, more stretched out."
-            )
-        for T_O_sensor in _places(rng, body, link):
-            p, beam = T_O_sensor[:3, 3], T_O_sensor[:3, 2]
-            seen = float(room.ranges(p[None], beam[None])[0])
-            if seen <= _SEEN and _sees_past(body, link, p, beam, seen):
-                T, R = np.eye(4), kin.rotation[link]
-                T[:3, :3], T[:3, 3] = R.T @ T_O_sensor[:3, :3], R.T @ (p - kin.position[link])
-                found.append(SensorUnit(f"unit_{len(found)}", model.links[link], T))
-                break
-    return Skin(found, model)
-
-
-def _places(rng: np.random.Generator, body: Capsules, link: int) -> Iterator[FloatArray]:
-    """Draw poses (4, 4) just above the capsules of a link, base frame: as many as are tried before the next link."""
-    capsules = np.flatnonzero(body.link == link)
-    for _ in range(_TRIES if len(capsules) else 0):
-        yield _outwards(rng, body, int(rng.choice(capsules)))
+            centers.append(center)
+    return np.array(centers)
 
 
 def _outwards(rng: np.random.Generator, body: Capsules, c: int) -> FloatArray:
@@ -191,11 +160,10 @@ def _outwards(rng: np.random.Generator, body: Capsules, c: int) -> FloatArray:
 
 def _sees_past(body: Capsules, link: int, p: FloatArray, beam: FloatArray, seen: float) -> bool:
     """Whether a unit lies outside the arm, and no other link reaches into its cone as far as it sees."""
-    if float(_distance(p[None], body).min()) < 0.5 * _ABOVE:
-        return False
     along = np.linspace(0.0, seen, 16)
     others = _distance(p + along[:, None] * beam, body)[:, body.link != link]
-    return bool(np.all(others > along[:, None] * np.tan(PAPER_SENSOR.angle / 2)))
+    outside = float(_distance(p[None], body).min()) >= 0.5 * _ABOVE
+    return outside and bool(np.all(others > along[:, None] * np.tan(PAPER_SENSOR.angle / 2)))
 
 
 def _crossing(

@@ -149,7 +149,7 @@ def _measure(points: Sequence[int], request: Any, write: Callable[[Any], None]) 
     sentences: list[str] = []
     try:
         for n in points:
-            seconds = request.cycles / request.rate
+            seconds = request.cycles / request.rate_hz
             print(f"{n} points: {request.cycles} cycles, {seconds:.0f} s or more.", file=sys.stderr)
             rows.append(measure(n, request, sentences.append))
     finally:
