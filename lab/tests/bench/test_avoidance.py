@@ -1,23 +1,17 @@
+import pytest
+
+from pretouch.errors import ExperimentError
 from pretouch_lab.bench.avoidance import plays, summarise, tables
 
 
 def row(baseline, seed, scenario="drdo", family="drdo", **measures):
     """A trial without a contact."""
     numbers = dict.fromkeys(
-        (
-            "true_peak_20ms_n", "true_peak_n", "clamping_force_n", "tracking_rms_m", "off_path_max_m",
-            "jerk_max_rad_s3", "jerk_max_per_second_rad_s3", "jerk_rms_rad_s3", "held_s",
-        ),
-        0.0,
-    )  # fmt: skip
-    counts = dict.fromkeys(
-        ("holds", "livelocks", "reactions", "false_reactions", "towards_person", "solver_failures", "infeasible"), 0
+        ("true_peak_20ms_n", "clamping_force_n", "tracking_rms_m", "jerk_rms_rad_s3", "held_s"), 0.0
     )
-    absent = dict.fromkeys(("peak_estimate_n", "impact_speed_m_s", "first_contact_s", "seen_fraction", "cycle_time_s"))
-    usual = {
-        "contact": False, "least_distance_m": 0.1, "speed_m_s": 0.3, "way_m": 3.0, "livelock_s": 0.0, "timed": False,
-        "hold_events": {}, "duration_s": 14.0,
-    }  # fmt: skip
+    counts = dict.fromkeys(("holds", "livelocks", "reactions", "false_reactions", "towards_person"), 0)
+    absent = dict.fromkeys(("peak_estimate_n", "impact_speed_m_s", "first_contact_s", "cycle_time_s"))
+    usual = {"contact": False, "least_distance_m": 0.1, "speed_m_s": 0.3, "livelock_s": 0.0, "timed": False}
     names = {"contender": baseline, "scenario": scenario, "family": family, "seed": seed}
     return {**names, **numbers, **counts, **absent, **usual, **measures}
 
@@ -29,12 +23,6 @@ def test_a_turn_that_was_not_finished_counts_as_longer_than_all():
     assert "7.0\n5.0->" in tables(summarise(rows))[0].rows[0]
 
 
-def test_reasons_of_holds_are_added_up():
-    rows = [row("ding", s, hold_events={"latched": 2}, holds=2) for s in (0, 1)]
-    cell = summarise(rows)["cells"][0]
-    assert (cell["holds"], cell["hold_events"]) == (4, {"latched": 4})
-
-
 def test_tables_say_who_touched():
     rows = [
         row(c, s, contact=c == "ding", true_peak_20ms_n=70.0 * (c == "ding")) for c in ("paper", "ding") for s in (0, 1)
@@ -43,9 +31,23 @@ def test_tables_say_who_touched():
     assert [line[:3] for line in shown.rows] == [("drdo", "paper", "0/2"), ("drdo", "ding", "2/2")]
 
 
+def test_an_ablation_is_beside_pretouch_on_the_same_seeds_and_in_no_other_table():
+    rows = [row("pretouch", s, holds=s) for s in range(4)] + [row("without react", s) for s in (2, 3)]
+    found = summarise(rows)
+    assert [(cell["contender"], cell["trials"], cell["holds"]) for cell in found["cells"]] == [("pretouch", 4, 6)]
+    assert [(c["contender"], c["holds"]) for c in found["ablations"]] == [("pretouch", 5), ("without react", 0)]
+
+
 def test_no_trial_is_played_twice_and_a_quick_run_is_a_small_part():
     every = [(str(cell), seed) for cell, seed in plays("development", quick=False)]
-    assert len(set(every)) == len(every)
+    assert len(set(every)) == len(every) == 1264
     assert {(str(cell), seed) for cell, seed in plays("development", quick=True)} < set(every)
     assert len(plays("development", quick=True)) < len(every) / 5
     assert {cell["contender"] for cell, _ in plays("development", True, ["paper"], ["drdo"])} == {"paper"}
+
+
+def test_what_cannot_be_played_is_refused():
+    with pytest.raises(ExperimentError, match="name each once"):
+        plays("published", True, ["paper", "paper"])
+    with pytest.raises(ExperimentError, match="The scenario 'moon' is unknown: choose from srdo"):
+        plays("published", True, names=["drdo", "moon"])

@@ -1,14 +1,22 @@
+"""Scenarios of the avoidance benchmark, and trials of them."""
+
+import json
+
 import numpy as np
 import pytest
 
 from pretouch.profiles import profile
 from pretouch.sim.plant_params import PlantParams
-from pretouch_lab.bench.avoidance_scenes import FAMILIES, plant_of, scenarios, setting
+from pretouch_lab.bench.avoidance import trial
+from pretouch_lab.bench.avoidance_scenes import FAMILIES, PANDA, plant_of, scenarios, setting
+
+QUICK = [next(s for s in scenarios().values() if s.family == f and s.params["quick"]) for f in FAMILIES]
+PLAYED = [*((scene, "paper") for scene in QUICK), *((scenarios()["drdo"], method) for method in ("flacco", "ding"))]
 
 
 def test_every_family_has_scenarios_under_their_own_names_and_a_variant_changes_what_it_says_alone():
     assert list(dict.fromkeys(s.family for s in scenarios().values())) == list(FAMILIES)
-    assert all(name == scene.name for name, scene in scenarios().items())
+    assert len(scenarios()) == 20
     small = scenarios()["small"].params["obstacle"]
     assert (small["radius_m"], small["mass_kg"]) == (0.02, 0.6)
     assert scenarios()["dark"].params["ranging"] == {"reflectance": 0.05}
@@ -49,3 +57,14 @@ def test_friction_of_all_joints_grows_by_one_factor():
     plant = plant_of({"friction_factor": 1.5, "friction_compensated": 0.0})
     np.testing.assert_allclose(plant.friction_f1_nm, 1.5 * np.array(PlantParams().friction_f1_nm))
     assert plant.friction_compensated == 0.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("scene", "baseline"), PLAYED, ids=lambda given: getattr(given, "name", given))
+def test_a_trial_of_every_family_can_be_played_and_the_published_methods_move_out_of_the_way(scene, baseline):
+    row = trial("", PANDA, {"scenario": scene.name, "contender": baseline}, 1000)
+    json.dumps(row, allow_nan=False)
+    assert not {"solver_failed", "blocked"} & set(row["hold_events"])
+    assert row["duration_s"] <= scene.params["duration_s"] + 0.02
+    if baseline != "paper":
+        assert row["tracking_rms_m"] > 0.05

@@ -8,7 +8,6 @@ from pretouch_lab.bench.contenders import (
     AVOIDANCE,
     BASE,
     OFF,
-    TUNINGS,
     Contender,
     ablated,
     ablations,
@@ -45,6 +44,6 @@ def test_an_unknown_switch_is_an_error_and_not_left_out():
 
 
 def test_contenders_and_their_other_tunings_are_profiles():
-    for name in (*AVOIDANCE, *ABLATED, *TUNINGS):
+    for name in (*AVOIDANCE, *ABLATED):
         assert profile(profile_text(name))
     assert profile(profile_text("paper-off")).approach is None

@@ -3,7 +3,7 @@ import pytest
 
 from pretouch.perception.closest import closest_points
 from pretouch_lab.bench.avoidance_scenes import Walker, travelled
-from pretouch_lab.bench.obstacle import Ball, Cuboid, nearest
+from pretouch_lab.bench.obstacle import Ball, Cuboid, least_distance, nearest
 
 
 def test_a_walker_brakes_to_rest_at_the_end_and_goes_slower_with_no_room_to_brake():
@@ -46,3 +46,16 @@ def test_the_nearest_point_of_the_arm_to_a_ball_is_that_of_the_controllers_own_g
     assert found.distance == pytest.approx(float(other.body_distance[0]) - 0.05, abs=1e-3)
     assert found.link == other.link[0]
     np.testing.assert_allclose(found.direction, other.direction[0], atol=0.05)
+
+
+def test_the_least_distance_of_many_postures_is_that_of_each_alone(panda_model):
+    rng = np.random.default_rng(7)
+    q = panda_model.description.q_ready + 0.3 * rng.standard_normal((30, 7))
+    hands = np.array([0.0, 0.4, 0.5]) + 0.3 * rng.standard_normal((30, 3))
+    box = Cuboid(np.array([0.7, 0.3, 0.5]), np.array([0.1, 0.2, 0.3]))
+    for shape in (lambda hand: Ball(hand, 0.05), lambda _: box):
+        each = [
+            nearest(panda_model.kinematics(a), panda_model.body, shape(b)).distance
+            for a, b in zip(q, hands, strict=True)
+        ]
+        assert least_distance(panda_model, q, shape, hands) == pytest.approx(min(each), abs=1e-12)

@@ -10,14 +10,15 @@ from pretouch_lab.cli import benchmarks, playing
 def test_a_benchmark_writes_numbers_and_tables_and_a_folder_of_others_is_refused(monkeypatch, capsys, tmp_path):
     cells = [({"filter": name, "commander": "tracking", "scene": "srdo"}, 1000) for name in ("paper", "none")]
     monkeypatch.setattr(shield, "plays", lambda *_: cells)
-    monkeypatch.setattr(shield, "play_touch", lambda *_: 1 / 0)
+    measured = {"touches": [], "least_distance_m": 0.1, "steps": 9, "limit_violations": 0, "change_m2_s2": 0.0}
+    monkeypatch.setattr(shield, "trial", lambda *_: measured | {"error_m2": 0.0})
     out, numbers = tmp_path / "run", tmp_path / "numbers.json"
     words = ["bench", "shield", "--quick", "--processes", "1", "--out", str(out), "--json", str(numbers)]
     assert cli.main([*words, "--seeds", "development"]) == 0
     assert "What holds whoever commands" in capsys.readouterr().out
     found = json.loads(numbers.read_text())
     assert found["about"]["quick"] is True
-    assert [(row["filter"], row["exceptions"]) for row in found["rows"]] == [("paper", 1), ("none", 1)]
+    assert [(row["filter"], row["steps"]) for row in found["rows"]] == [("paper", 9), ("none", 9)]
     assert "development seeds, quick run" in (out / "tables.md").read_text()
     assert len((out / "rows.jsonl").read_text().splitlines()) == 2
     assert cli.main(words) == 2

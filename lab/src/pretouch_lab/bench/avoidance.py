@@ -1,39 +1,46 @@
-"""Ways to keep clear of people and objects, held against each other in the same scenes: trials, summaries, tables."""
+"""Ways to keep clear of people and objects, compared in the same scenes: trials, summaries, tables."""
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
+from math import inf, isnan, nan
 
 import numpy as np
 
 from pretouch.errors import ExperimentError
 from pretouch.profiles import profile
 from pretouch.text_table import TextTable
-from pretouch_lab.bench import avoidance_measures as measures
-from pretouch_lab.bench.avoidance_scenes import PANDA, Scenario, Setting, place, scenarios, setting
+from pretouch_lab.bench.avoidance_measures import measured
+from pretouch_lab.bench.avoidance_scenes import scenarios, setting
 from pretouch_lab.bench.contenders import ABLATED, ABLATED_IN, ABLATED_SEEDS, AVOIDANCE, BASE, WITHOUT, profile_text
-from pretouch_lab.bench.obstacle import truth_of
 from pretouch_lab.bench.scenes import SeedRange
 from pretouch_lab.run import Cell, Play, Row
-from pretouch_lab.table import Column, finite, grouped, median_bounds, spread, table
-from pretouch_lab.trial import Record, play
+from pretouch_lab.table import Column, finite, grouped, median_bounds, summary, table
+from pretouch_lab.trial import play
 
-_D_MAX_M = 0.8
-FORCES = ("peak_estimate_n", "true_peak_20ms_n", "clamping_force_n")
-TIMES = ("first_contact_s", "cycle_time_s")
-FAMILIES = ("static", "person")
-"""Families the goals are about."""
-REFERENCES = ("blind", "paper", "paper-off")
-SPREAD = (
-    "least_distance_m", "true_peak_20ms_n", "true_peak_n", "clamping_force_n", "peak_estimate_n", "impact_speed_m_s",
-    "first_contact_s", "tracking_rms_m", "off_path_max_m", "speed_m_s", "jerk_max_rad_s3", "jerk_max_per_second_rad_s3",
-    "jerk_rms_rad_s3", "seen_fraction", "held_s",
+PAIRED = (
+    ("static", "blind", "peak_estimate_n"),
+    ("static", "blind", "true_peak_20ms_n"),
+    ("static", "paper-off", "first_contact_s"),
+    ("person", "paper-off", "cycle_time_s"),
+    ("person", "paper", "cycle_time_s"),
+)
+"""Families with the references and measures that the goals of `pretouch` are about."""
+_SPREAD = (
+    "least_distance_m",
+    "true_peak_20ms_n",
+    "clamping_force_n",
+    "peak_estimate_n",
+    "impact_speed_m_s",
+    "first_contact_s",
+    "cycle_time_s",
+    "tracking_rms_m",
+    "speed_m_s",
+    "jerk_rms_rad_s3",
+    "held_s",
     "livelock_s",
-)  # fmt: skip
+)
 """Measures of which median and 10-90 % over the seeds are given; a trial without one is left out."""
-TOTALS = (
-    "holds", "livelocks", "reactions", "false_reactions", "towards_person", "solver_failures", "infeasible",
-)  # fmt: skip
+_TOTALS = ("contact", "holds", "livelocks", "reactions", "false_reactions", "towards_person")
 _NOTE = (
     "Medians over the seeds, 10-90 % below. hit: trials with contact. least: least true distance of the surfaces."
     " impact: closing speed of the point that touches first. estimate: peak of the force estimate along the contact."
@@ -42,7 +49,7 @@ _NOTE = (
     " before."
 )
 _NAMES = (Column("scenario", "scenario"), Column("contender", "contender"))
-_HIT = Column("hit", "contacts", of="trials")
+_HIT = Column("hit", "contact", of="trials")
 _FORCES = (
     Column("estimate\n[N]", "peak_estimate_n", 1, band=True),
     Column("true\n20 ms", "true_peak_20ms_n", 1, band=True),
@@ -74,166 +81,108 @@ _ABLATED = (
 )
 
 
-def plays(
-    seeds: SeedRange, quick: bool, contenders: Sequence[str] = (), names: Sequence[str] = (), arm: str = PANDA
-) -> list[Play]:
+def plays(seeds: SeedRange, quick: bool, contenders: Sequence[str] = (), names: Sequence[str] = ()) -> list[Play]:
     """Return all trials by scenario, contender and seed.
 
     Args:
         seeds: which range.
         quick: a small part of them.
         contenders: none: all there are, and `pretouch` with each switch off alone in some scenarios.
-        names: scenarios; none: all.
-        arm: name of the arm, or the folder of an imported one.
+        names: of scenarios; none: all.
     """
     if len(set(contenders)) < len(contenders):
         raise ExperimentError(f"The baselines are {', '.join(contenders)}: name each once.")
     for contender in contenders:
         profile_text(contender)
-    if arm != PANDA:
-        place(arm)  # what cannot be placed is said before any process starts
-    for name in names:
-        if name not in scenarios():
-            raise ExperimentError(f"The scenario {name!r} is unknown: choose from {', '.join(scenarios())}.")
-    scenes = [scene for name, scene in scenarios().items() if not names or name in names]
-    whole = [
-        ({"scenario": scene.name, "contender": contender}, seed)
-        for scene in scenes
-        for contender in contenders or AVOIDANCE
-        for seed in scene.seeds(seeds, quick)
-    ]
-    ablated = [
-        ({"scenario": scene.name, "contender": contender}, seed)
-        for scene in scenes
-        if scene.name in ABLATED_IN
-        for contender in (() if contenders else ABLATED)
-        for seed in scene.seeds(seeds, quick)[:ABLATED_SEEDS]
-    ]
-    return whole + ablated
+    if unknown := [name for name in names if name not in scenarios()]:
+        raise ExperimentError(f"The scenario {unknown[0]!r} is unknown: choose from {', '.join(scenarios())}.")
+    every: list[Play] = []
+    for name in (name for name in scenarios() if name in names or not names):
+        drawn = scenarios()[name].seeds(seeds, quick)
+        fewer = drawn[:ABLATED_SEEDS] if name in ABLATED_IN and not contenders else []
+        for chosen, those in ((contenders or AVOIDANCE, drawn), (ABLATED, fewer)):
+            every += [({"scenario": name, "contender": contender}, seed) for contender in chosen for seed in those]
+    return every
 
 
 def trial(world: str, arm: str, cell: Cell, seed: int) -> Row:
     """Play a trial of a contender, as its seed draws it of a set if one is named."""
     scenario = scenarios()[cell["scenario"]]
-    made = setting(scenario, profile(profile_text(cell["contender"])), seed, arm)
-    record = play(replace(made.setup, world=world), made.done)
-    return {"family": scenario.family, **measured(record, made, scenario)}
-
-
-def measured(record: Record, made: Setting, scenario: Scenario) -> Row:
-    """Return all measures of a trial."""
-    setup, params = made.setup, scenario.params
-    truth = truth_of(record, setup.model, map(made.shape, record.hand_position))
-    held = params["path"]["kind"] == "held"
-    return {
-        **measures.contact(record, truth, params["obstacle"].get("d_max_m", _D_MAX_M)),
-        **measures.tracking(record, setup.path.length, held),
-        **measures.smoothness(record, setup.profile.task.control_period_s),
-        **measures.holds(record),
-        **measures.reactions(record),
-        **measures.seen(record, truth, made),
-        **measures.livelocks(record, made, params.get("livelock")),
-        "timed": "turns" in params,
-        "duration_s": round(record.steps[-1].stamp, 3),
-    }
+    scene = setting(scenario, profile(profile_text(cell["contender"])), seed, arm)
+    record = play(replace(scene.setup, world=world), scene.done)
+    return {"family": scenario.family, **measured(record, scene, scenario)}
 
 
 def summarise(rows: list[Row]) -> Row:
-    """Bring trials together.
+    """Summarise trials.
 
     Returns:
-        `cells`, one for each scenario and baseline; `families`, all scenarios of a family together; `ablations`, cells
+        `cells`, one for each scenario and contender; `families`, all scenarios of a family together; `ablations`, cells
         of `pretouch` with each switch off alone and as it is, on the same seeds; `paired`.
     """
-    whole = [row for row in rows if not row["contender"].startswith(WITHOUT)]
+    ended = [row | {"cycle_time_s": _ended(row, "cycle_time_s") if row["timed"] else None} for row in rows]
+    off = [row for row in ended if row["contender"].startswith(WITHOUT)]
+    whole = [row for row in ended if not row["contender"].startswith(WITHOUT)]
+    played = {(row["scenario"], row["seed"]) for row in off}
+    on = [row for row in whole if row["contender"] == BASE and (row["scenario"], row["seed"]) in played]
     return {
-        "cells": _cells(whole, ("scenario", "family", "contender")),
-        "families": _cells(whole, ("family", "contender")),
-        "ablations": _cells(_ablated(rows), ("scenario", "family", "contender")),
+        "cells": summary(whole, ("scenario", "family", "contender"), _SPREAD, _TOTALS),
+        "families": summary(whole, ("family", "contender"), _SPREAD, _TOTALS),
+        "ablations": summary(on + off, ("scenario", "family", "contender"), _SPREAD, _TOTALS),
         "paired": paired(whole),
     }
 
 
-def _cells(rows: list[Row], by: tuple[str, ...]) -> list[Row]:
-    return [_cell(key, group) for key, group in grouped(rows, by)]
-
-
-def _ablated(rows: list[Row]) -> list[Row]:
-    """Return the trials of ablations, and those of `pretouch` in the same scenarios with the same seeds."""
-    off = [row for row in rows if row["contender"].startswith(WITHOUT)]
-    played = {(row["scenario"], row["seed"]) for row in off}
-    return [row for row in rows if row["contender"] == BASE and (row["scenario"], row["seed"]) in played] + off
-
-
-def _cell(key: Row, group: list[Row]) -> Row:
-    """Summarise the trials of one baseline in one scenario."""
-    events: Counter[str] = Counter()
-    for row in group:
-        events.update(row["hold_events"])
-    return {
-        **key,
-        "trials": len(group),
-        "contacts": sum(row["contact"] for row in group),
-        **{name: spread([row[name] for row in group]) for name in SPREAD},
-        "cycle_time_s": spread([np.inf if row["cycle_time_s"] is None else row["cycle_time_s"] for row in group])
-        if group[0]["timed"]
-        else None,
-        **{name: sum(row[name] or 0 for row in group) for name in TOTALS},
-        "hold_events": dict(events),
-    }
+def _ended(row: Row, measure: str) -> float:
+    """Return a time [s], infinite where it did not end."""
+    return inf if row[measure] is None else float(row[measure])
 
 
 def paired(rows: list[Row]) -> list[Row]:
-    """Return for each baseline and reference the median part of the reference's measure that the baseline has.
+    """Return the median part of a reference's measure that `pretouch` has, with 95 % bounds, as `PAIRED` says.
 
-    A family's scenarios and seeds count together, with 95 % bounds on the median. A force counts where the reference
-    touched; a baseline without contact has none of it. A time counts where either came to an end; what did not is
-    infinite, in the result None.
+    A family's scenarios and seeds count together. A force counts where the reference touched; without contact
+    `pretouch` has none of it. A time counts where either came to an end; what did not is infinite, in the result None.
     """
-    found = []
-    for key, group in grouped([row for row in rows if row["family"] in FAMILIES], ("family", "contender")):
-        for reference in REFERENCES:
-            pairs = _pairs(rows, group, reference)
-            for measure in (*FORCES, *TIMES):
-                parts = [part for theirs, mine in pairs if (part := _part(theirs, mine, measure)) is not None]
-                if parts and key["contender"] != reference:
-                    low, high = median_bounds(parts)
-                    middle = np.percentile(parts, 50, method="higher")  # of an infinite value no mean is taken
-                    bounds = {"part": finite(middle), "low": finite(low), "high": finite(high)}
-                    found.append({**key, "reference": reference, "measure": measure, "trials": len(parts)} | bounds)
-    return found
+    every = []
+    for family, reference, measure in PAIRED:
+        of = {(row["scenario"], row["seed"]): row for row in rows if row["contender"] == reference}
+        own = [row for row in rows if row["contender"] == BASE and row["family"] == family]
+        pairs = [(of[key], row) for row in own if (key := (row["scenario"], row["seed"])) in of]
+        parts = [part for theirs, ours in pairs if not isnan(part := _part(theirs, ours, measure))]
+        if parts:
+            low, high = median_bounds(parts)
+            middle = np.percentile(parts, 50, method="higher")  # of an infinite value no mean is taken
+            numbers = {"part": finite(middle), "low": finite(low), "high": finite(high), "trials": len(parts)}
+            every.append({"family": family, "contender": BASE, "reference": reference, "measure": measure} | numbers)
+    return every
 
 
-def _pairs(rows: list[Row], group: list[Row], reference: str) -> list[tuple[Row, Row]]:
-    of = {(row["scenario"], row["seed"]): row for row in rows if row["contender"] == reference}
-    return [(of[where], row) for row in group if (where := (row["scenario"], row["seed"])) in of]
-
-
-def _part(theirs: Row, mine: Row, measure: str) -> float | None:
-    """Return the baseline's measure by the reference's; None where it does not count."""
-    if measure in FORCES:
-        return (mine[measure] or 0.0) / theirs[measure] if theirs["contact"] and theirs[measure] else None
-    if measure == "cycle_time_s" and not mine["timed"]:
-        return None
-    if mine[measure] is None:
-        return None if theirs[measure] is None else np.inf
-    return 0.0 if theirs[measure] is None else mine[measure] / theirs[measure] if theirs[measure] else None
+def _part(theirs: Row, ours: Row, measure: str) -> float:
+    """Return a measure by the reference's; NaN where it does not count."""
+    if measure.endswith("_s"):
+        whole = _ended(theirs, measure)
+        return _ended(ours, measure) / whole if whole else nan
+    return (ours[measure] or 0.0) / theirs[measure] if theirs["contact"] and theirs[measure] else nan
 
 
 def tables(summary: Row) -> list[TextTable]:
     """Return what is lost, each contender in each scenario, a table a family, and ablations."""
     texts = {scene.family: scene.text for scene in scenarios().values()}
-    made = [losses(summary["cells"])]
-    for key, cells in grouped(summary["cells"], ("family",)):
-        family = key["family"]
-        made.append(table(f"{family.capitalize()}: contact and cost", _COLUMNS, cells, f"{texts[family]} {_NOTE}", 2))
     note = (
         "On fewer seeds than the tables above: pretouch here has the same. The switches of detection are in the tables"
         " of contact detection."
     )
     by_scene = [cell for _, cells in grouped(summary["ablations"], ("scenario",)) for cell in cells]
-    made.append(table("Each switch of pretouch off alone, in the closed loop", _ABLATED, by_scene, note, 2))
-    return [each for each in made if each.rows]
+    every = [
+        losses(summary["cells"]),
+        *(
+            table(f"{family.capitalize()}: contact and cost", _COLUMNS, cells, f"{texts[family]} {_NOTE}", 2)
+            for family, cells in ((key["family"], cells) for key, cells in grouped(summary["cells"], ("family",)))
+        ),
+        table("Each switch of pretouch off alone, in the closed loop", _ABLATED, by_scene, note, 2),
+    ]
+    return [each for each in every if each.rows]
 
 
 _LESS = (
@@ -257,16 +206,13 @@ def losses(cells: list[Row]) -> TextTable:
     """Return each measure of each scenario whose median is better for another contender by more than 5 %."""
     lines = []
     for key, group in grouped(cells, ("scenario",)):
-        ours = next((cell for cell in group if cell["contender"] == BASE), None)
-        for column in (*_LESS, *_MORE):
-            better = _better(group, ours, column.key, -1.0 if column in _MORE else 1.0)
-            if ours is None or not better:
-                continue
-            own = column.text(ours)
-            shown = {cell["contender"]: column.text(cell) for cell in better}
-            others = ", ".join(f"{contender} {text}" for contender, text in shown.items() if text != own)
-            if others:
-                lines.append((key["scenario"], column.heading, own, others))
+        for ours in (cell for cell in group if cell["contender"] == BASE):
+            for column in (*_LESS, *_MORE):
+                shown = column.text(ours)
+                better = [cell for cell in _better(group, ours, column) if column.text(cell) != shown]
+                if better:
+                    others = ", ".join(f"{cell['contender']} {column.text(cell)}" for cell in better)
+                    lines.append((key["scenario"], column.heading, shown, others))
     return TextTable(
         "Where others do better than pretouch",
         ("scenario", "median of", "pretouch", "better"),
@@ -276,16 +222,17 @@ def losses(cells: list[Row]) -> TextTable:
     )
 
 
-def _better(group: list[Row], ours: Row | None, name: str, sign: float) -> list[Row]:
-    if ours is None or ours[name] is None:
+def _better(group: list[Row], ours: Row, column: Column) -> list[Row]:
+    """Return the cells that are better than that of `pretouch`, the best first."""
+
+    def cost(cell: Row) -> float:
+        spread = cell[column.key]
+        if spread is None or spread["median"] is None:
+            return inf
+        return float(-spread["median"] if column in _MORE else spread["median"])
+
+    own = cost(ours)
+    if ours[column.key] is None:
         return []
-    own = _value(ours, name)
-    ranked = sorted((cell for cell in group if cell[name] is not None), key=lambda cell: sign * _value(cell, name))
-    return [
-        cell for cell in ranked
-        if sign * (own - _value(cell, name)) > _NOTICED * min(max(abs(own), abs(_value(cell, name))), 1e9)
-    ]  # fmt: skip
-
-
-def _value(cell: Row, name: str) -> float:
-    return float("inf") if cell[name]["median"] is None else float(cell[name]["median"])
+    better = [cell for cell in group if own - cost(cell) > _NOTICED * min(max(abs(own), abs(cost(cell))), 1e9)]
+    return sorted(better, key=cost)

@@ -1,17 +1,17 @@
-"""What one trial comes to: numbers from what truly happened, and from what was commanded."""
+"""What a trial of the avoidance benchmark measures: what truly happened, and what was commanded."""
 
 from collections import Counter
+from collections.abc import Callable
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from pretouch.control.path import Path
 from pretouch.sim.plant import TOUCH_N
 from pretouch.traces import mean_over
-from pretouch.types import BoolArray, ControlStep, FloatArray, Mode, QpOutcome
-from pretouch_lab.bench.avoidance_scenes import Setting
-from pretouch_lab.bench.obstacle import Truth
+from pretouch.types import BoolArray, ControlStep, FloatArray, Mode
+from pretouch_lab.bench.avoidance_scenes import Scenario, Setting
+from pretouch_lab.bench.obstacle import least_distance, nearest
 from pretouch_lab.run import Row
 from pretouch_lab.table import peak, rounded
 from pretouch_lab.trial import Record
@@ -22,13 +22,34 @@ _CAUSE_S = 0.5
 """A reaction this long after a true contact still answers it [s]."""
 _ECHO_S = 3.0
 """A later reaction this long after it is its echo [s]."""
-_NEAR_M = 0.6
-"""Distance within which control points are looked at, and what the skin sees [m]."""
-_SAME_M = 0.15
-"""A sensed point this near to the obstacle's surface shows it [m]."""
+_D_MAX_M = 0.8
+"""Distance of the end-effector from which the first contact counts, where a scenario names no other [m]."""
 _BEGINNING_S = 0.5
 _LOOK_EVERY = 10
-"""Control steps between two that are looked at for livelocks."""
+"""Control steps between two that are examined for livelocks."""
+
+
+def measured(record: Record, setting: Setting, scenario: Scenario) -> Row:
+    """Return all measures of a trial."""
+    setup, params, hands = setting.setup, scenario.params, record.hand_position
+    model, steps, begin = setup.model, record.steps, started(record.steps)
+
+    def towards(i: int) -> FloatArray:
+        return nearest(model.kinematics(steps[i].q), model.body, setting.shape(hands[i])).direction
+
+    from_ee, _ = setting.shape(hands).closest(np.array([s.ee_position for s in steps]))
+    postures = np.array([s.q for s in steps])
+    return {
+        "least_distance_m": rounded(least_distance(model, postures, setting.shape, hands), 4),
+        **contact(record, from_ee <= params["obstacle"].get("d_max_m", _D_MAX_M), towards),
+        **tracking(steps[begin:], 0.0 if params["path"]["kind"] == "held" else setup.path.length),
+        "jerk_rms_rad_s3": jerk(steps[begin:], setup.profile.task.control_period_s),
+        **holds(steps[begin:], setup.profile.task.control_period_s),
+        **reactions(record),
+        **livelocks(record, setting, params.get("livelock")),
+        "timed": "turns" in params,
+        "duration_s": round(steps[-1].stamp, 3),
+    }
 
 
 def started(steps: list[ControlStep]) -> int:
@@ -36,11 +57,13 @@ def started(steps: list[ControlStep]) -> int:
     return next((i for i, s in enumerate(steps) if s.mode is not Mode.HOLD), len(steps))
 
 
-def contact(record: Record, truth: Truth, d_max: float) -> Row:
+def contact(record: Record, near: BoolArray, towards: Callable[[int], FloatArray]) -> Row:
     """First touch, impact speed, and forces.
 
-    The first contact counts from the first step in which the obstacle is within `d_max` [m] of the end-effector's
-    origin. Clamping is the largest mean force over half a second of unbroken contact.
+    Args:
+        record: of the trial, with S steps.
+        near: (S,) whether the obstacle is so near that the first contact counts from then on.
+        towards: gives for a step the direction (3,) from the arm to the obstacle where they are nearest.
     """
     touch, times = record.first_contact(), record.times()
     force = np.linalg.norm(record.true_force, axis=1)
@@ -50,97 +73,75 @@ def contact(record: Record, truth: Truth, d_max: float) -> Row:
         "impact_speed_m_s": None,
         "peak_estimate_n": None,
         "true_peak_20ms_n": rounded(peak(mean_over(force, 20))),
-        "true_peak_n": rounded(peak(force)),
         "clamping_force_n": rounded(clamping(record.true_time, force)),
-        "least_distance_m": rounded(float(truth.distance.min()), 4),
     }
     if touch is None:
         return row
-    near = np.flatnonzero(truth.ee_distance <= d_max)
-    if len(near) and times[near[0]] <= touch:
-        row["first_contact_s"] = rounded(touch - max(float(times[near[0]]), float(times[started(record.steps)])))
+    within = times[near]
+    if len(within) and within[0] <= touch:
+        row["first_contact_s"] = rounded(touch - max(float(within[0]), float(times[started(record.steps)])))
     at = max(0, int(np.searchsorted(times, touch)) - 1)
-    towards = truth.nearest[at].direction
-    estimate = -record.forces() @ towards
+    direction = towards(at)
+    estimate = -record.forces() @ direction
     row["peak_estimate_n"] = rounded(peak(estimate[(times >= touch) & np.isfinite(estimate)]))
     if record.touches:
-        row["impact_speed_m_s"] = rounded(float((record.touches[0].velocity - _speed(record, at)) @ towards), 4)
+        speed = record.touches[0].velocity - _hand_velocity(record, at)
+        row["impact_speed_m_s"] = rounded(float(speed @ direction), 4)
     return row
 
 
-def _speed(record: Record, at: int) -> FloatArray:
+def _hand_velocity(record: Record, at: int) -> FloatArray:
     """Velocity (3,) [m/s] of the person's hand before a step; zero of what stands still."""
     before = max(at - 2, 0)
     moved = record.hand_position[at] - record.hand_position[before]
-    took = record.steps[at].stamp - record.steps[before].stamp
-    return moved / took if took > 0 and np.isfinite(moved).all() else np.zeros(3)
+    duration = record.steps[at].stamp - record.steps[before].stamp
+    return moved / duration if duration > 0 and np.isfinite(moved).all() else np.zeros(3)
 
 
 def clamping(time: FloatArray, force: FloatArray) -> float:
     """Largest mean (N) of a force (T,) [N] over half a second in which it is never below 1 N; 0 if there is none."""
-    if len(time) < 2:
-        return 0.0
-    width = max(1, round(_CLAMP_S / float(time[1] - time[0])))
-    if len(force) < width:
+    width = max(1, round(_CLAMP_S / float(time[1] - time[0]))) if len(time) > 1 else 1
+    if len(force) < max(2, width):
         return 0.0
     unbroken = mean_over((force > TOUCH_N).astype(np.float64), width) > 1.0 - 0.5 / width
     return peak(mean_over(force, width)[unbroken])
 
 
-def tracking(record: Record, length: float, held: bool) -> Row:
-    """Error and progress along the path, from the first step in which the arm does not hold.
+def tracking(steps: list[ControlStep], length: float) -> Row:
+    """Error and progress along a path whose turn has a length [m]; 0 of a hand that is held.
 
-    The cycle time is that of the second turn; None if it was not finished. `length` [m] is that of a turn.
+    The cycle time is that of the second turn; None if it was not finished.
     """
-    steps = record.steps[started(record.steps) :]
-    row: Row = {"tracking_rms_m": None, "off_path_max_m": None, "way_m": None, "speed_m_s": None, "cycle_time_s": None}
+    row: Row = dict.fromkeys(("tracking_rms_m", "speed_m_s", "cycle_time_s"))
     if not steps:
         return row
     off = np.array([np.linalg.norm(s.ee_position - s.path_position) for s in steps])
-    row |= {"tracking_rms_m": rounded(float(np.sqrt((off**2).mean())), 4), "off_path_max_m": rounded(off.max(), 4)}
-    if held:
-        return row
-    phase, time = np.array([s.path_phase for s in steps]), np.array([s.stamp for s in steps])
-    row["way_m"] = rounded(phase[-1] - phase[0])
-    row["speed_m_s"] = rounded((phase[-1] - phase[0]) / max(time[-1] - time[0], 0.01), 4)
-    turns = [np.flatnonzero(phase >= n * length - 1e-9) for n in (1, 2)]
-    if all(map(len, turns)):
-        row["cycle_time_s"] = rounded(time[turns[1][0]] - time[turns[0][0]])
+    row["tracking_rms_m"] = rounded(float(np.sqrt((off**2).mean())), 4)
+    if length:
+        phase, time = np.array([s.path_phase for s in steps]), np.array([s.stamp for s in steps])
+        row["speed_m_s"] = rounded((phase[-1] - phase[0]) / max(time[-1] - time[0], 0.01), 4)
+        first, second = (time[phase >= turns * length - 1e-9] for turns in (1, 2))
+        row["cycle_time_s"] = rounded(second[0] - first[0]) if len(second) else None
     return row
 
 
-def smoothness(record: Record, period: float) -> Row:
-    """Jerk of the commanded joint velocities: largest of all, median over seconds of each second's largest, and rms.
+def jerk(steps: list[ControlStep], period: float) -> float:
+    """Rms jerk of the commanded joint velocities [rad/s^3].
 
-    The first half second after the window is full is left out: every arm begins to move then.
+    The first half second is left out: every arm begins to move then.
     """
-    begin = started(record.steps) + round(_BEGINNING_S / period)
-    commands = np.array([s.command for s in record.steps[begin:]])
-    if len(commands) < 3:
-        return dict.fromkeys(("jerk_max_rad_s3", "jerk_max_per_second_rad_s3", "jerk_rms_rad_s3"), 0.0)
-    jerk = np.diff(commands, n=2, axis=0) / period**2
-    largest, second = np.abs(jerk).max(axis=1), round(1 / period)
-    return {
-        "jerk_max_rad_s3": rounded(largest.max(), 1),
-        "jerk_max_per_second_rad_s3": rounded(
-            float(np.median([largest[i : i + second].max() for i in range(0, len(largest), second)])), 1
-        ),
-        "jerk_rms_rad_s3": rounded(float(np.sqrt((jerk**2).mean())), 1),
-    }
+    commands = np.array([s.command for s in steps[round(_BEGINNING_S / period) :]])
+    third = np.diff(commands, n=2, axis=0) / period**2 if len(commands) > 2 else np.zeros(1)
+    return rounded(float(np.sqrt((third**2).mean())), 1)
 
 
-def holds(record: Record) -> Row:
-    """Holds after the start, with their events, and steps without a solution."""
-    steps = record.steps[started(record.steps) :]
-    held = [s for s in steps if s.mode is Mode.HOLD]
+def holds(steps: list[ControlStep], period: float) -> Row:
+    """Holds after the start, with their events."""
     begun = [b for a, b in pairwise(steps) if b.mode is Mode.HOLD and a.mode is not Mode.HOLD]
-    period = record.steps[1].stamp - record.steps[0].stamp if len(record.steps) > 1 else 0.0
     return {
         "holds": len(begun),
-        "held_s": rounded(len(held) * period),
+        "held_s": rounded(sum(s.mode is Mode.HOLD for s in steps) * period),
         "hold_events": dict(Counter(s.event.value for s in begun)),
-        "solver_failures": sum(s.qp.outcome is QpOutcome.FAILED for s in steps),
-        "infeasible": sum(s.qp.outcome is QpOutcome.INFEASIBLE for s in steps),
     }
 
 
@@ -159,34 +160,23 @@ def reactions(record: Record) -> Row:
     return {"reactions": len(record.reactions()), "false_reactions": int(false), "towards_person": int(towards)}
 
 
-def seen(record: Record, truth: Truth, setting: Setting) -> Row:
-    """Share of the steps with the obstacle within 0.6 m in which the controller knew a point near its surface."""
-    shown = [
-        len(step.obstacles.point) > 0
-        and float(np.abs(setting.shape(hand).closest(step.obstacles.point)[0]).min()) < _SAME_M
-        for step, hand, distance in zip(record.steps, record.hand_position, truth.distance, strict=True)
-        if distance < _NEAR_M
-    ]
-    return {"seen_fraction": rounded(float(np.mean(shown))) if shown else None}
-
-
 def livelocks(record: Record, setting: Setting, limits: dict[str, Any] | None) -> Row:
     """How often and how long [s] the path's phase grows by less than `advance_m` in `within_s` while nothing blocks it.
 
     Nothing blocks it if the obstacle is farther than `clear_m` from the next `ahead_m` of the path all that time.
     """
-    row: Row = {"livelocks": None, "livelock_s": None}
     if limits is None:
-        return row
+        return {"livelocks": None, "livelock_s": None}
     chosen = range(started(record.steps), len(record.steps), _LOOK_EVERY)
     if len(chosen) < 2:
-        return row | {"livelocks": 0, "livelock_s": 0.0}
-    steps = [record.steps[i] for i in chosen]
-    clear = np.array([
-        _clear(setting, record.hand_position[i], step.path_phase, limits) for i, step in zip(chosen, steps, strict=True)
-    ])  # fmt: skip
-    phase, period = np.array([s.path_phase for s in steps]), steps[1].stamp - steps[0].stamp
-    stuck = stuck_for(phase, clear, round(limits["within_s"] / period), limits["advance_m"])
+        return {"livelocks": 0, "livelock_s": 0.0}
+    phase, time = np.array([(record.steps[i].path_phase, record.steps[i].stamp) for i in chosen]).T
+    further = np.linspace(0.0, limits["ahead_m"], 11)
+    ahead = np.array([[setting.setup.path.point(way + s) for s in further] for way in phase])
+    gaps, _ = setting.shape(record.hand_position[chosen, None]).closest(ahead)
+    period = time[1] - time[0]
+    width = round(limits["within_s"] / period)
+    stuck = stuck_for(phase, gaps.min(axis=1) > limits["clear_m"], width, limits["advance_m"])
     begun = np.count_nonzero(stuck[1:] & ~stuck[:-1]) + int(stuck[0])
     return {"livelocks": int(begun), "livelock_s": rounded(float(stuck.sum() * period))}
 
@@ -202,9 +192,3 @@ def stuck_for(phase: FloatArray, clear: BoolArray, width: int, advance: float) -
         if phase[end] - phase[end - width] < advance and clear[span].all():
             stuck[span] = True
     return stuck
-
-
-def _clear(setting: Setting, hand: FloatArray, phase: float, limits: dict[str, Any]) -> bool:
-    path: Path = setting.setup.path
-    ahead = np.array([path.point(phase + s) for s in np.linspace(0.0, limits["ahead_m"], 11)])
-    return bool(setting.shape(hand).closest(ahead)[0].min() > limits["clear_m"])

@@ -1,19 +1,19 @@
 """What the benchmark of avoidance plays: scenarios as their files fix them, and the setting that a seed decides."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cache
+from math import sqrt
 from typing import Any
 
 import numpy as np
 
 from pretouch.control.path import Path, segment
-from pretouch.errors import ExperimentError
 from pretouch.profiles import Profile
 from pretouch.robot.description import robot_named
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin, load_skin, paper_skin, skin_for
-from pretouch.sim.hand import HandGoal, HandScript, PersonArm
+from pretouch.sim.hand import HandGoal, PersonArm
 from pretouch.sim.paper_scenes import Placement, placement_for, static_path, static_scene
 from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams, plant_params_of
@@ -21,15 +21,13 @@ from pretouch.sim.random_skin import Misplacement, misplaced
 from pretouch.sim.range_finder import RangeFinderParams
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
 from pretouch.types import ControlStep, FloatArray
-from pretouch_lab.bench.obstacle import Ball, Cuboid, Shape
+from pretouch_lab.bench.obstacle import Ball, Cuboid, ShapeAt
 from pretouch_lab.bench.scenes import SeedRange, scenario, scenario_path, seed_of
 from pretouch_lab.experiments.avoidance import Visit, Visitor
 from pretouch_lab.trial import Setup
 
 FAMILIES = ("srdo", "drdo", "person", "hand", "static", "sensing", "arm", "walking")
 """Files, less `avoidance-`, in the order in which they are shown."""
-_FAMILY_ONLY = ("family", "text", "source", "seeds", "variant")
-
 Table = dict[str, Any]
 PANDA = "panda"
 """The arm that the scenarios are laid out for."""
@@ -40,7 +38,7 @@ _BRAKING_M_S2 = 4.0
 """How hard one who walks slows down at the end."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Scenario:
     """One scene with all that its file says; trials of it differ by their seed."""
 
@@ -49,58 +47,39 @@ class Scenario:
     text: str
     """What happens, in a sentence."""
     params: Table
-    """The file's keys, with what this scenario has in place of them."""
-    count: int
-    """Trials of each baseline in a full run."""
-    quick: int
-    """Trials of each baseline in a quick run."""
+    """The file's keys, with what this scenario has in place of them; `count` and `quick` are trials of a contender."""
 
     def seeds(self, seeds: SeedRange, quick: bool) -> list[int]:
         """Return the seeds of a run's trials."""
-        return self.first_seeds(seeds, self.quick if quick else self.count)
+        return self.first_seeds(seeds, self.params["quick" if quick else "count"])
 
     def first_seeds(self, seeds: SeedRange, count: int) -> list[int]:
         """Return so many of the seeds of a range."""
-        return [seed_of(_family(self.family), seeds, number) for number in range(count)]
-
-    def __hash__(self) -> int:
-        return hash(self.name)
-
-
-def _family(name: str) -> Table:
-    return scenario(f"avoidance-{name}")
+        return [seed_of(self.params, seeds, number) for number in range(count)]
 
 
 @cache
 def scenarios() -> dict[str, Scenario]:
     """Return all scenarios by their names; a file that was changed since is an ExperimentError."""
-    found: dict[str, Scenario] = {}
+    every: dict[str, Scenario] = {}
     for family in FAMILIES:
-        given = _family(family)
-        shared = {key: value for key, value in given.items() if key not in _FAMILY_ONLY}
-        for variant in given["variant"]:
-            own = {key: value for key, value in variant.items() if key not in ("name", "count", "quick")}
-            params = {**shared, **{key: _over(shared.get(key), value) for key, value in own.items()}}
-            name = variant["name"]
-            if name in found:
-                raise ExperimentError(f"There are two scenarios {name!r}: give each its own name.")
-            found[name] = Scenario(name, given["family"], given["text"], params, variant["count"], variant["quick"])
-    return found
-
-
-def _over(shared: Any, own: Any) -> Any:
-    """Return a variant's value, or its table's entries over the family's."""
-    return {**shared, **own} if isinstance(shared, dict) and isinstance(own, dict) else own
+        shared = scenario(f"avoidance-{family}")
+        for variant in shared.pop("variant"):
+            own = {  # of a table only what the variant names
+                key: shared[key] | value if isinstance(shared.get(key), dict) else value
+                for key, value in variant.items()
+            }
+            every[own["name"]] = Scenario(own["name"], family, shared["text"], shared | own)
+    return every
 
 
 @dataclass(frozen=True)
 class Setting:
-    """All that a trial is made of, but the controller."""
+    """All that a trial is made of."""
 
     setup: Setup
-    """With a profile that is replaced."""
-    shape: Callable[[FloatArray], Shape]
-    """The obstacle, given where the person's hand is (3,) [m]."""
+    shape: ShapeAt
+    """The obstacle, given where the person's hand is."""
     done: Callable[[ControlStep, Plant], bool]
 
 
@@ -127,85 +106,71 @@ def skin(name: str, of: str = PANDA) -> Skin:
 def setting(scenario: Scenario, profile: Profile, seed: int, name: str = PANDA) -> Setting:
     """Make the setting of a trial with the arm of a name."""
     params, model = scenario.params, arm(name)
-    path = path_of(params["path"], place(name))
-    placed = _obstacle(params, seed, name)
-    units = skin(params["skin"], name)
+    path, units = path_of(params["path"], place(name)), skin(params["skin"], name)
     error = params.get("misplaced")
+    shape, scene = _obstacle(params, seed, name)
     setup = Setup(
         model=model,
         skin=units,
         believed=misplaced(units, model, Misplacement(**error), seed)[0] if error else None,
         profile=profile,
-        scene=placed.scene,
         path=path,
         seed=seed,
         plant=plant_of(params.get("plant", {}), plant_params_of(model.description)),
         ranging=RangeFinderParams(**params.get("ranging", {})),
-        hand=placed.hand,
-        person=placed.person,
+        **scene,
     )
-    return Setting(setup, placed.shape, _done(params, path))
+    after, length = params.get("after_contact_s", np.inf), params.get("turns", np.inf) * path.length
+
+    def done(step: ControlStep, plant: Plant) -> bool:
+        touched = plant.touches[0].time if plant.touches else np.inf
+        return bool(step.stamp >= min(params["duration_s"], touched + after) or step.path_phase >= length)
+
+    return Setting(setup, shape, done)
 
 
-def path_of(given: Table, where: Placement = _UNMOVED) -> Path:
-    """Return the path a scenario tells of, where it is for an arm."""
-    if given["kind"] == "held":
-        x, y, z = where.point(*given["point"])
+def path_of(params: Table, where: Placement = _UNMOVED) -> Path:
+    """Return the path that a scenario names, where it is for an arm."""
+    if params["kind"] == "held":
+        x, y, z = where.point(*params["point"])
         return segment((x, y, z), (x, y, z + _HELD_M))
-    if "side" in given:
-        return static_path(given["kind"], given["side"], where)
+    if "side" in params:
+        return static_path(params["kind"], params["side"], where)
     return where.path("circle", -1.0)
 
 
-def plant_of(given: Table, usual: PlantParams = _USUAL) -> PlantParams:
+def plant_of(params: Table, usual: PlantParams = _USUAL) -> PlantParams:
     """Return the arm's errors; `friction_factor` is that of all joints' friction."""
-    own = dict(given)
-    factor = own.pop("friction_factor", 1.0)
+    factor = params.get("friction_factor", 1.0)
+    own = {key: value for key, value in params.items() if key != "friction_factor"}
     return replace(usual, friction_f1_nm=tuple(factor * f for f in usual.friction_f1_nm), **own)
 
 
-@dataclass(frozen=True)
 class Walker:
     """Comes straight from one point to another at a speed, and stays: a script of `pretouch.sim.hand`."""
 
-    begin: FloatArray
-    """(3,) [m]"""
-    end: FloatArray
-    """(3,) [m]"""
-    speed: float
-    """[m/s]"""
-    start: float
-    """[s]"""
-    force_max: float
-    """[N]"""
+    def __init__(self, begin: FloatArray, end: FloatArray, speed: float, start: float, force_max: float) -> None:
+        """Take the points (3,) [m], the speed [m/s], when it starts [s] and its largest force [N]."""
+        self.speed, self.start, self._begin, self._way, self._force = speed, start, begin, end - begin, force_max
+        self._length = float(np.linalg.norm(self._way))
 
     def goal(self, time: float, hand: FloatArray, plant: Plant) -> HandGoal:
         """Return where it wants to be at a time [s]."""
-        way = self.end - self.begin
-        length = float(np.linalg.norm(way))
-        return HandGoal(self.begin + way * (travelled(time - self.start, length, self.speed) / length), self.force_max)
+        share = travelled(time - self.start, self._length, self.speed) / self._length
+        return HandGoal(self._begin + self._way * share, self._force)
 
 
 def travelled(time: float, length: float, speed: float) -> float:
     """Way [m] of one who starts at full speed [m/s] at time 0 [s] and brakes to rest at the end of a length [m]."""
     a = _BRAKING_M_S2
-    speed = min(speed, float(np.sqrt(2 * a * length)))
+    speed = min(speed, sqrt(2 * a * length))
     coasting = length / speed - speed / (2 * a)
     slowing = min(max(time - coasting, 0.0), speed / a)
     return speed * min(max(time, 0.0), coasting) + slowing * (speed - a * slowing / 2)
 
 
-@dataclass(frozen=True)
-class _Placed:
-    """An obstacle in its scene."""
-
-    scene: SceneSpec
-    shape: Callable[[FloatArray], Shape]
-    hand: HandScript | None = None
-    person: PersonArm = field(default_factory=PersonArm)
-
-
-def _obstacle(params: Table, seed: int, name: str) -> _Placed:
+def _obstacle(params: Table, seed: int, name: str) -> tuple[ShapeAt, Table]:
+    """Return an obstacle's surface, and what a `Setup` has of it."""
     given, where = params["obstacle"], place(name)
     stiffness = given["contact_stiffness_n_m"]
     match given["kind"]:
@@ -220,24 +185,24 @@ def _obstacle(params: Table, seed: int, name: str) -> _Placed:
     return _walking(given, seed, where)
 
 
-def _standing(box: Box) -> _Placed:
+def _standing(box: Box) -> tuple[ShapeAt, Table]:
     shape = Cuboid(np.array(box.center), np.array(box.half_size))
-    return _Placed(SceneSpec(boxes=(box,)), lambda _: shape)
+    return lambda _: shape, {"scene": SceneSpec(boxes=(box,))}
 
 
-def _visiting(given: Table, seed: int, name: str) -> _Placed:
+def _visiting(given: Table, seed: int, name: str) -> tuple[ShapeAt, Table]:
     """Place a person who holds a hand beside the path or into it on one side, as in the paper's experiment."""
     rng, where = np.random.default_rng([seed, 21]), place(name)
     side = rng.choice([-1.0, 1.0])
     # as the hands of the paper's experiment are moved, from where this one is for the Panda
     off = np.subtract(where.visited("beside", side), _UNMOVED.visited("beside", side))
     at = np.array([given["x_m"], side * given["y_m"], given["z_m"]]) + off
-    spec = HandSpec(given["radius_m"], given["mass_kg"], given["contact_stiffness_n_m"])
     visit = Visit(given["arrive_s"], given["leave_s"], at + given["spread_m"] * rng.uniform(-1, 1, 3))
-    return _Placed(SceneSpec(hand=spec), lambda hand: Ball(hand, spec.radius), Visitor(arm(name), (visit,)))
+    spec = HandSpec(given["radius_m"], given["mass_kg"], given["contact_stiffness_n_m"])
+    return lambda hand: Ball(hand, spec.radius), {"scene": SceneSpec(hand=spec), "hand": Visitor(arm(name), (visit,))}
 
 
-def _walking(given: Table, seed: int, where: Placement) -> _Placed:
+def _walking(given: Table, seed: int, where: Placement) -> tuple[ShapeAt, Table]:
     """Place a person or a hand that comes straight in and stays; the seed draws speed, time and perhaps the side."""
     rng = np.random.default_rng([seed, 20])
     side = rng.choice([-1.0, 1.0]) if given.get("both_sides") else 1.0
@@ -245,24 +210,8 @@ def _walking(given: Table, seed: int, where: Placement) -> _Placed:
     speed, start = rng.uniform(*given["speed_m_s"]), rng.uniform(*given["start_s"])
     x, y, z = begin.tolist()
     spec = HandSpec(given["radius_m"], given["mass_kg"], given["contact_stiffness_n_m"], (x, y, z))
-    return _Placed(
-        SceneSpec(hand=spec),
-        lambda hand: Ball(hand, spec.radius),
-        Walker(begin, end, speed, start, given["force_max_n"]),
-        PersonArm(2.0 * speed, given["spring_n_m"], given["damping_n_s_m"]),
-    )
-
-
-def _done(params: Table, path: Path) -> Callable[[ControlStep, Plant], bool]:
-    """End at the time limit, a while after the first touch, or after so many turns, as the scenario says."""
-    after, turns = params.get("after_contact_s", np.inf), params.get("turns", np.inf)
-
-    def done(step: ControlStep, plant: Plant) -> bool:
-        touched = plant.touches[0].time if plant.touches else np.inf
-        return (
-            step.stamp >= params["duration_s"]
-            or step.stamp >= touched + after
-            or step.path_phase >= turns * path.length
-        )
-
-    return done
+    return lambda hand: Ball(hand, spec.radius), {
+        "scene": SceneSpec(hand=spec),
+        "hand": Walker(begin, end, speed, start, given["force_max_n"]),
+        "person": PersonArm(2.0 * speed, given["spring_n_m"], given["damping_n_s_m"]),
+    }

@@ -80,20 +80,15 @@ ABLATED = ablations(of_detection=False)
 ABLATED_IN = ("circle +y", "line -y", "person +y")
 """Scenarios in which those are played too, in a full run with `ABLATED_SEEDS` seeds each."""
 ABLATED_SEEDS = 4
-TUNINGS = {
-    "flacco-free": "flacco:task.orientation=free",
-    "ding-free": "ding:task.orientation=free",
-}
-"""Further tunings of the published methods, by name only."""
 
 
 def profile_text(baseline: str) -> str:
     """Return the profile a baseline stands for; other than by its name it may be given as the profile itself."""
-    text = {**AVOIDANCE, **ABLATED, **TUNINGS}.get(baseline, baseline)
+    text = {**AVOIDANCE, **ABLATED}.get(baseline, baseline)
     try:
         profile(text)
     except ParameterError as error:
-        raise ParameterError(f"{error} Baselines are {', '.join([*AVOIDANCE, *TUNINGS])}.") from error
+        raise ParameterError(f"{error} Baselines are {', '.join(AVOIDANCE)}.") from error
     return text
 
 

@@ -1,8 +1,8 @@
-"""Obstacles as surfaces, and how far from them the arm truly is."""
+"""Obstacles as surfaces, and how far from them the arm truly is: no sensor is asked."""
 
-from collections.abc import Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -10,14 +10,12 @@ from pretouch.robot.body import Capsules, placed
 from pretouch.robot.kinematics import Kinematics
 from pretouch.robot.model import RobotModel
 from pretouch.types import FloatArray
-from pretouch_lab.trial import Record
 
 _ALONG = np.linspace(0.0, 1.0, 51)[:, None, None]
-"""Places along a capsule's axis at which its distance from a box is taken."""
+"""Places along a capsule's axis at which its distance is taken: exact to a fiftieth of its length."""
 
 
-@dataclass(frozen=True)
-class Nearest:
+class Nearest(NamedTuple):
     """The true closest points of the arm and an obstacle."""
 
     distance: float
@@ -38,12 +36,16 @@ class Shape(Protocol):
         ...
 
 
+ShapeAt = Callable[[FloatArray], Shape]
+"""An obstacle's surface, given where the person's hand is (..., 3) [m]."""
+
+
 @dataclass(frozen=True)
 class Ball:
-    """A ball."""
+    """A ball, or one at each of several instants."""
 
     center: FloatArray
-    """(3,) [m]"""
+    """(..., 3) [m]"""
     radius: float
     """[m]"""
 
@@ -76,10 +78,7 @@ class Cuboid:
 
 
 def nearest(kin: Kinematics, body: Capsules, shape: Shape) -> Nearest:
-    """Find the closest points of an arm's capsules and an obstacle.
-
-    Exact to a fiftieth of a capsule's length along its axis.
-    """
+    """Find the closest points of an arm's capsules and an obstacle."""
     _, a, b, _ = placed(body, kin)
     along = a + _ALONG * (b - a)
     distance, direction = shape.closest(along)
@@ -89,23 +88,13 @@ def nearest(kin: Kinematics, body: Capsules, shape: Shape) -> Nearest:
     return Nearest(float(gap[place, k]), int(body.link[k]), along[place, k] + body.radius[k] * to, to)
 
 
-@dataclass(frozen=True)
-class Truth:
-    """How near arm and obstacle truly were in the S control steps of a trial: no sensor is asked."""
-
-    nearest: list[Nearest]
-    """True closest points of arm and obstacle at each step."""
-    distance: FloatArray
-    """(S,) distance of the surfaces, negative in contact [m]."""
-    ee_distance: FloatArray
-    """(S,) distance of the obstacle's surface from the end-effector's origin [m]."""
-
-
-def truth_of(record: Record, model: RobotModel, shapes: Iterable[Shape]) -> Truth:
-    """Work out from true joint positions and the obstacle's true place at each step how near they were."""
-    found, of_ee = [], []
-    for step, shape in zip(record.steps, shapes, strict=True):
-        kin = model.kinematics(step.q)
-        found.append(nearest(kin, model.body, shape))
-        of_ee.append(float(shape.closest(kin.position[model.ee])[0]))
-    return Truth(found, np.array([n.distance for n in found]), np.array(of_ee))
+def least_distance(model: RobotModel, q: FloatArray, shape: ShapeAt, hands: FloatArray) -> float:
+    """Return the least of the distances that `nearest` finds in S postures (S, n) [rad], with hands (S, 3) [m]."""
+    body = model.body
+    ends = np.array([placed(body, model.kinematics(posture))[1:3] for posture in q])
+    a, b = ends[:, 0], ends[:, 1]
+    middle = shape(hands[:, None]).closest((a + b) / 2)[0] - body.radius
+    # no place on an axis is farther from its middle than half its length
+    s, c = np.nonzero(middle - np.linalg.norm(b - a, axis=2) / 2 <= middle.min())
+    along = a[s, c] + _ALONG * (b - a)[s, c]
+    return float((shape(hands[s]).closest(along)[0] - body.radius[c]).min())

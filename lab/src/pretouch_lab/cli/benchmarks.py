@@ -130,7 +130,7 @@ class Avoidance(BenchOptions):
         from pretouch_lab.bench.avoidance_scenes import PANDA, arm, place
         from pretouch_lab.cli.playing import played
 
-        plays = avoidance.plays(self.seeds, self.quick, self.baselines, self.scenarios, self.arm)
+        plays = avoidance.plays(self.seeds, self.quick, self.baselines, self.scenarios)
         out, other = self.folder("bench-avoidance"), {}
         if self.arm != PANDA:
             described = arm(self.arm).description
@@ -188,7 +188,7 @@ class Shield(BenchOptions):
         out = self.folder("bench-shield")
         begin(self, "shield", out)
         found = shield.results(played("shield", shield.trial, shield.plays(self.seeds, self.quick), out, self))
-        return _finish(out, self.about("shield"), shield.tables(found), shield.guarantees(), rows=found)
+        return _finish(out, self.about("shield"), shield.tables(found), "", rows=found)
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from pretouch.sim.paper_scenes import static_path, static_scene
 from pretouch.sim.random_skin import Misplacement, misplaced
 from pretouch.sim.scene import Box, SceneSpec, fixtures
 from pretouch.text_table import TextTable
-from pretouch_lab.bench.obstacle import Cuboid, nearest
+from pretouch_lab.bench.obstacle import Cuboid, least_distance
 from pretouch_lab.experiment import Context, Experiment, controllers, main
 from pretouch_lab.experiments import static
 from pretouch_lab.options import Options
@@ -137,8 +137,8 @@ def missed(record: Record, setup: Setup) -> float | None:
 def least_gap(record: Record, model: RobotModel, box: Box) -> float:
     """Least true distance [m] between the arm's surface and a box; negative if they meet."""
     shape = Cuboid(np.array(box.center), np.array(box.half_size))
-    steps = record.steps[::_EVERY]
-    return rounded(min(nearest(model.kinematics(s.q), model.body, shape).distance for s in steps), 4)
+    postures = np.array([s.q for s in record.steps[::_EVERY]])
+    return rounded(least_distance(model, postures, lambda _: shape, record.hand_position[::_EVERY]), 4)
 
 
 _COMPARED = ("true_peak_20ms_n", "travelled_m")
