@@ -12,7 +12,7 @@ from pretouch.cli.app import GROUP, command_class, commands_of
 from pretouch.extras import LAB
 from pretouch_lab.learning import LEARN
 from pretouch_lab.run import CLUSTER
-from pretouch_lab.sweep.design import SWEEP
+from pretouch_lab.sweep import SWEEP
 
 PROJECT = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text())["project"]
 

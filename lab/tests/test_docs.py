@@ -2,7 +2,7 @@ import re
 from pathlib import Path
 
 from pretouch_lab.experiment import NAMES
-from pretouch_lab.sweep.measures import MEASURES
+from pretouch_lab.sweep import EXPERIMENTS
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -21,4 +21,4 @@ def test_every_experiment_and_every_one_that_can_be_swept_is_described():
     text = (DOCS / "reference" / "experiments.md").read_text()
     assert [name for name in NAMES if f"**{name}**" not in text] == []
     text = (DOCS / "how-to" / "sweep.md").read_text()
-    assert [name for name in MEASURES if f"`{name}`" not in text] == []
+    assert [name for name in EXPERIMENTS if f"`{name}`" not in text] == []

@@ -5,18 +5,13 @@ import sys
 from collections import Counter
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Literal
 
 import tyro
 
 from pretouch.cli.options import Words
 from pretouch.errors import ExperimentError
 from pretouch_lab.options import Playing
-
-if TYPE_CHECKING:  # the help is to need none of the heavy packages
-    from pretouch_lab.sweep.design import Point
-    from pretouch_lab.sweep.design import Sweep as Defined
 
 
 @dataclass(frozen=True)
@@ -27,7 +22,7 @@ class Sweep(Playing):
     """
 
     experiment: tyro.conf.Positional[str] = tyro.MISSING
-    """static, avoidance, dynamic, free-motion or contacts."""
+    """static, avoidance or dynamic."""
     vary: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
     """Parameter and range: NAME=LOW:HIGH, NAME=LOW:HIGH:log, or NAME=VALUE,VALUE; for a grid NAME=LOW:HIGH:LEVELS.
     NAME is GROUP.FIELD of the profile, plant.FIELD, plant.kind, plant.world (a set of docs/how-to/sim-to-real.md),
@@ -48,92 +43,48 @@ class Sweep(Playing):
     """Which simulated arms: those of the published tables, or others."""
 
     def run(self) -> None:
-        """Play what is missing, with table, indices and figure."""
-        from pretouch.cli.writing import numbers_to
+        """Play what is missing, with tables and figure."""
+        from pretouch import __version__
+        from pretouch.cli.writing import numbers_to, unwritable_said
+        from pretouch.sim.randomisation import world_set
+        from pretouch_lab.cli.playing import check_json, played, report
+        from pretouch_lab.run import open_run
+        from pretouch_lab.sweep import EXPERIMENTS, SWEEP, found_in, sobol_figure, sweep_of, tables, trial
 
+        vary, fix = self._pairs("vary", self.vary), self._pairs("fix", self.fix)
+        sweep = sweep_of(self.experiment, vary, fix, self.profile, self.design, self.samples, self.arms, self.seeds)
+        metrics = self.metrics or EXPERIMENTS[sweep.experiment].metrics
+        if wrong := [name for name in metrics if name not in EXPERIMENTS[sweep.experiment].metrics]:
+            known = ", ".join(EXPERIMENTS[sweep.experiment].metrics)
+            raise ExperimentError(f"{sweep.experiment} does not measure {wrong[0]!r}: choose from {known}.")
+        SWEEP.need("A sweep")
+        plays, out = sweep.plays(), self.folder("sweep")
+        named = {cell["plant.world"] for cell, _ in plays if "plant.world" in cell}
+        worlds = {name: world_set(name).digest for name in sorted(named)}
+        check_json(self, [out])
         with numbers_to(self.json) as write:
-            write(sweep(self))
+            open_run(out, {"sweep": sweep.experiment, "profile": sweep.profile, "worlds_sha256": worlds})
+            rows = played("sweep", partial(trial, sweep.experiment, sweep.profile), plays, out, self)
+            for reason, count in Counter(row["failed"] for row in rows if row["failed"]).items():
+                again = "Take their lines out of rows.jsonl to try again."
+                print(f"{count} cells failed: {reason} {again}", file=sys.stderr)
+            found, place = found_in(sweep, rows, metrics), out / f"{sweep.experiment}.csv"
+            figures = [(sweep.experiment, "Sobol indices", sobol_figure(found))] if sweep.design == "sobol" else []
+            report(tables(sweep, found, metrics), figures, out)
+            with unwritable_said("file", place), place.open("w", newline="", encoding="utf-8") as file:
+                writer = csv.DictWriter(file, rows[0])
+                writer.writeheader()
+                writer.writerows(rows)
+            print(f"Cells: {place}")
+            about = {"version": __version__, "experiment": sweep.experiment, "profile": sweep.profile}
+            write(about | {"vary": vary, "fixed": fix, "found": found})
 
-
-def sweep(command: Sweep) -> dict[str, Any]:
-    """Play what is missing, write and show what came out, and return the indices."""
-    from pretouch_lab.cli.playing import check_json, played
-    from pretouch_lab.run import open_run
-    from pretouch_lab.sweep.design import SWEEP, groups, points, sweep_of, trial, values_of
-
-    defined = sweep_of(
-        command.experiment, _placed(command, "vary", command.vary), _placed(command, "fix", command.fix),
-        command.profile, command.design, command.samples, command.arms, command.seeds,
-    )  # fmt: skip
-    metrics = command.metrics or tuple(defined.measure.metrics)
-    unknown = [name for name in metrics if name not in defined.measure.metrics]
-    if unknown:
-        known = ", ".join(defined.measure.metrics)
-        raise ExperimentError(f"{command.experiment} does not measure {unknown[0]!r}: choose from {known}.")
-    SWEEP.need("A sweep")
-    out, design = command.folder("sweep"), points(defined)
-    grouped = groups(defined, design)
-    check_json(command, [out])
-    open_run(out, {"sweep": command.experiment, "profile": defined.profile})
-    play = partial(trial, command.experiment, defined.profile)
-    rows = played("sweep", play, [each for _, each in grouped], out, command)
-    for reason, count in Counter(row["failed"] for row in rows if row["failed"]).items():
-        print(f"{count} cells failed: {reason} Take their lines out of rows.jsonl to try again.", file=sys.stderr)
-    values = values_of(defined, len(design), zip(grouped, rows, strict=True))
-    return _written(defined, design, values, metrics, out)
-
-
-def _written(
-    sweep: "Defined", design: "list[Point]", values: dict[str, Any], metrics: tuple[str, ...], out: Path
-) -> dict[str, Any]:
-    """Show and write what came out; return the indices."""
-    from pretouch import __version__
-    from pretouch.cli.writing import unwritable_said
-    from pretouch_lab.cli.playing import report
-    from pretouch_lab.sweep.analysis import indices, sweep_figure, tables
-    from pretouch_lab.sweep.design import SEED
-
-    found, name = indices(sweep, design, values), sweep.measure.name
-    report(tables(sweep, found, metrics), [(name, sweep.measure.text, sweep_figure(sweep, found, metrics))], out)
-    place = out / f"{name}.csv"
-    with unwritable_said("file", place), place.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow([*(one.name for one in sweep.vary), SEED, *values])
-        for number, point in enumerate(design):
-            numbers = (column[number] for column in values.values())
-            writer.writerow([*point.values.values(), point.seed, *("" if n != n else n for n in numbers)])
-    print(f"Points: {place}")
-    return {
-        "version": __version__,
-        "experiment": name,
-        "profile": sweep.profile,
-        "vary": {one.name: one.written for one in sweep.vary},
-        "fixed": sweep.fixed,
-        "metrics": found,
-    }
-
-
-def _placed(command: Sweep, option: str, texts: tuple[str, ...]) -> dict[str, str]:
-    """Read NAME=TEXT, with files of worlds as workers may read them."""
-    from pretouch_lab.sweep.parameters import USUAL_WORLD, WORLD
-
-    pairs = _pairs(option, texts)
-    if WORLD in pairs:
-        names = pairs[WORLD].split(",")
-        pairs[WORLD] = ",".join(name if name == USUAL_WORLD else command.input(name) for name in names)
-    return pairs
-
-
-def _pairs(option: str, texts: tuple[str, ...]) -> dict[str, str]:
-    """Read NAME=TEXT, each name once."""
-    found: dict[str, str] = {}
-    for text in texts:
-        name, given, value = text.partition("=")
-        if not given:
-            raise ExperimentError(
-                f"--{option} {text} has no value: write NAME={'LOW:HIGH' if option == 'vary' else 'VALUE'}."
-            )
-        if name in found:
-            raise ExperimentError(f"--{option} names {name} twice: give one range or one list of values.")
-        found[name] = value
-    return found
+    def _pairs(self, option: str, texts: tuple[str, ...]) -> dict[str, str]:
+        """Read NAME=TEXT, each name once; files of worlds as workers elsewhere may read them."""
+        pairs: dict[str, str] = {}
+        for text in texts:
+            name, equals, value = text.partition("=")
+            if not equals or name in pairs:
+                raise ExperimentError(f"--{option} {text} has no value, or names {name} twice: write NAME=VALUE once.")
+            pairs[name] = ",".join(map(self.input, value.split(","))) if name == "plant.world" else value
+        return pairs
