@@ -40,7 +40,7 @@ def public_names(packages: tuple[str, ...]) -> list[str]:
 
 def api_page(title: str, packages: tuple[str, ...]) -> str:
     """Return the page of some public names, from their docstrings."""
-    top = f"# {title}\n\nNames of `import pretouch as pt`, with units and shapes. [Conventions](conventions.md).\n"
+    top = f"# {title}\n\nFor readers who write programs: the names of `import pretouch as pt`, with units and shapes.\n"
     return "\n".join([top, *(f"::: {name}\n" for name in public_names(packages))])
 
 
@@ -69,7 +69,7 @@ def commands_page() -> str:
     """Return the page of all commands, from their own help."""
     helps = [each for name in command_names() for each in _commands([name])]
     sections = [f"## pretouch {words}\n\n```text\n{text}\n```\n" for words, text in helps]
-    return "\n".join(["# Commands\n\nWhat `--help` says of each.\n", *sections])
+    return "\n".join(["# Commands\n\nFor readers who look up an option: the help of each command.\n", *sections])
 
 
 def parameter_sets() -> list[type]:
@@ -106,7 +106,7 @@ def _default(field: Field[object]) -> str:
 
 def parameters_page() -> str:
     """Return the page of all parameters: default, unit, meaning and source of each."""
-    text = ["# Parameters\n\nAll sets of parameters, from the code. A value without a source is ours.\n"]
+    text = ["# Parameters\n\nFor readers who tune: all sets of parameters, from the code. A value without a source is ours.\n"]
     for kind in parameter_sets():
         about = (kind.__doc__ or "").split("\n\n")[0]
         text.append(f"## {kind.__name__}\n\n{' '.join(about.split())} `{kind.__module__}`\n")
