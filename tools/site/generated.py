@@ -106,7 +106,7 @@ def _default(field: Field[object]) -> str:
 
 def parameters_page() -> str:
     """Return the page of all parameters: default, unit, meaning and source of each."""
-    text = ["# Parameters\n\nFor readers who tune: all sets of parameters, from the code. A value without a source is ours.\n"]
+    text = ["# Parameters\n\nFor readers who tune: all parameters, from the code. A value without a source is ours.\n"]
     for kind in parameter_sets():
         about = (kind.__doc__ or "").split("\n\n")[0]
         text.append(f"## {kind.__name__}\n\n{' '.join(about.split())} `{kind.__module__}`\n")
