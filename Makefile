@@ -115,12 +115,14 @@ lint: setup
 house: setup
 	PYTHONPATH=ros2/src $(BIN)/python -m tools.house
 
+# how fast a simulation is, and what the receiver of sensor units takes
 bench: setup
-	@for file in benchmarks/*.py; do $(BIN)/python $$file || exit 1; done
+	$(BIN)/python -m pretouch_lab.bench.throughput
+	$(BIN)/python -m tests.units.flood
 
-# about a quarter of an hour: sets up an environment for each peer, measures, and writes the table of docs/explanation/peers.md
+# a quarter of an hour: sets up an environment for each peer, measures, and shows the tables of docs/explanation/peers.md
 peers: setup
-	$(BIN)/python -m benchmarks.peers --set-up --runs 2 --docs
+	$(BIN)/python -m lab.peers --set-up
 
 # a wheel with machine code for this Python: an installation of it compiles nothing
 wheel: setup

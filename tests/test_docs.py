@@ -74,11 +74,7 @@ def test_the_index_has_every_document():
 
 def test_documents_that_code_and_messages_name_are_there():
     files = [ROOT / "Makefile", ROOT / "pyproject.toml"]
-    files += [
-        p
-        for top in ("src", "tests", "fci", "lab", "firmware", "examples", "benchmarks")
-        for p in (ROOT / top).rglob("*.*")
-    ]
+    files += [p for top in ("src", "tests", "fci", "lab", "firmware", "examples") for p in (ROOT / top).rglob("*.*")]
     kinds = {".py", ".toml", ".msg", ""}
     named = {
         (path, name)

@@ -1,12 +1,12 @@
-"""A flood of up to 100 000 datagrams a second, with real processes (benchmarks/skin_receiver.py)."""
+"""A flood of up to 100 000 datagrams a second, with real processes."""
 
 import os
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from pretouch.units.keys import Keys, UnitKey, new_key
+from tests.units.flood import KINDS, measure
 
 # Datagrams a second, in the order in which they are tried. A machine that is slow, or busy elsewhere, may lack the
 # processor for flooder and receiver together, which is not the receiver's fault; the units send 1000 a second.
@@ -15,11 +15,8 @@ _RATES = 100_000.0, 100_000.0, 50_000.0, 50_000.0, 25_000.0, 12_500.0
 
 @pytest.mark.slow
 @pytest.mark.alone
-@pytest.mark.parametrize("kind", ["random", "forged", "replayed", "mixed"])
-def test_under_a_flood_less_than_a_hundredth_is_lost_and_nothing_is_20_ms_late(kind, monkeypatch):
-    monkeypatch.syspath_prepend(Path(__file__).parents[2] / "benchmarks")
-    from skin_receiver import measure
-
+@pytest.mark.parametrize("kind", KINDS[1:])
+def test_under_a_flood_less_than_a_hundredth_is_lost_and_nothing_is_20_ms_late(kind):
     keys = Keys(UnitKey(f"unit {n}", n, new_key()) for n in range(1, 21))
     priority = 10 if os.geteuid() == 0 else None
     said = []

@@ -1,16 +1,14 @@
-"""mink: its configuration, tasks, solver loop; obstacle rows as a limit of ours, or its own collision avoidance."""
+"""mink: its configuration, posture task, solver loop; velocity task, joint box and approach rows are ours."""
 
 from importlib.metadata import version
 
 import mink
 import mujoco
 import numpy as np
-from benchmarks.peers.geometry import Array, approach_rows, damping, joint_box
-from benchmarks.peers.problem import TERMS, Problem
+from lab.peers import problem as posed
+from lab.peers.problem import Array, Problem
 
 VERSIONS = {name: version(name) for name in ("mink", "mujoco", "qpsolvers", "daqp", "numpy")}
-POINT_RADIUS = 0.001
-"""Radius of the spheres that stand for points in its own collision avoidance [m]."""
 
 
 class Velocity(mink.Task):
@@ -22,7 +20,7 @@ class Velocity(mink.Task):
 
     def compute_error(self, configuration: mink.Configuration) -> Array:
         """Displacement asked for, with mink's sign."""
-        return -self.target * TERMS.period
+        return -self.target * posed.PERIOD_S
 
     def compute_jacobian(self, configuration: mink.Configuration) -> Array:
         """MuJoCo's Jacobian, which the damping has needed before."""
@@ -38,7 +36,7 @@ class Box(mink.Limit):
 
     def compute_qp_inequalities(self, configuration: mink.Configuration, dt: float) -> mink.Constraint:
         """Bounds on the displacement."""
-        lower, upper = joint_box(self.arm, configuration.q, self.qd, dt)
+        lower, upper = posed.joint_box(self.arm, configuration.q, self.qd)
         return mink.Constraint(G=self.G, h=np.concatenate([upper, -lower]) * dt)
 
 
@@ -52,76 +50,36 @@ class Approach(mink.Limit):
         """Rows on the displacement."""
         data = configuration.data
         rotation, origin = data.xmat[self.bodies].reshape(-1, 3, 3), data.xpos[self.bodies]
-        G, h = approach_rows(self.arm, rotation, origin, self.points, TERMS)
+        G, h = posed.approach_rows(self.arm, rotation, origin, self.points)
         return mink.Constraint(G=G, h=h * dt)
 
 
 class Rows:
     """mink's solver loop on the very problem."""
 
-    native = False
-
     def __init__(self, problem: Problem) -> None:
         self.problem, arm = problem, problem.arm
-        spec = mujoco.MjSpec.from_file(arm.mjcf)
-        if self.native:
-            for k in range(problem.points.shape[1]):
-                body = spec.worldbody.add_body(name=f"point{k}", mocap=True)
-                body.add_geom(name=f"point{k}", type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[POINT_RADIUS, 0, 0],
-                              contype=3, conaffinity=3)  # fmt: skip
-        self.model = spec.compile()
+        self.model = mujoco.MjModel.from_xml_path(arm.mjcf)
         self.configuration = mink.Configuration(self.model)
         self.velocity, self.tcp = Velocity(), self.model.body("panda_hand_tcp").id
         posture = mink.PostureTask(
-            self.model, cost=np.sqrt(TERMS.mid_joint_gain), gain=TERMS.period / TERMS.mid_joint_time
+            self.model, cost=np.sqrt(posed.MID_JOINT_GAIN), gain=posed.PERIOD_S / posed.MID_JOINT_TIME_S
         )
         posture.set_target((arm.q_min + arm.q_max) / 2)
         self.tasks = [self.velocity, posture]
-        self.box = Box(problem)
-        self.limits: list[mink.Limit] = [self.box]
-        if problem.points.shape[1]:
-            self.limits.append(self._avoidance())
-
-    def _avoidance(self) -> mink.Limit:
-        self.approach = Approach(self.problem, self.model.jnt_bodyid.copy())
-        return self.approach
-
-    def _place(self, points: Array) -> None:
-        self.approach.points = points
+        self.box, self.approach = Box(problem), Approach(problem, self.model.jnt_bodyid.copy())
+        self.limits = [self.box, self.approach] if problem.points.shape[1] else [self.box]
 
     def solve(self, s: int) -> Array:
         """Joint velocities (n,) [rad/s] of one snapshot."""
-        p = self.problem
-        if p.points.shape[1]:
-            self._place(p.points[s])
+        p, jacobian = self.problem, np.empty((3, self.model.nv))
+        self.approach.points = p.points[s]
         self.configuration.update(p.q[s])
-        jacobian = np.empty((3, self.model.nv))
         mujoco.mj_jacBody(self.model, self.configuration.data, jacobian, None, self.tcp)
         self.velocity.jacobian, self.velocity.target, self.box.qd = jacobian, p.velocity[s], p.qd[s]
-        mu = damping(jacobian, TERMS)
         # a displacement's tolerance is period times a velocity's, so it must be set the finer
-        return mink.solve_ik(
-            self.configuration, self.tasks, TERMS.period, "daqp", damping=mu, limits=self.limits,
-            primal_tol=1e-9 * TERMS.period,
-        )  # fmt: skip
+        how = {"damping": posed.damping(jacobian), "limits": self.limits, "primal_tol": 1e-9 * posed.PERIOD_S}
+        return mink.solve_ik(self.configuration, self.tasks, posed.PERIOD_S, "daqp", **how)
 
 
-class Native(Rows):
-    """The same task and joint box with mink's own collision avoidance: every capsule against every point."""
-
-    native = True
-
-    def _avoidance(self) -> mink.Limit:
-        geoms = [self.model.geom(g) for g in range(self.model.ngeom)]
-        moved = [g.name for g in geoms if self.model.body_weldid[g.bodyid[0]] and not g.name.startswith("point")]
-        points = [g.name for g in geoms if g.name.startswith("point")]
-        return mink.CollisionAvoidanceLimit(
-            self.model, [(moved, points)], minimum_distance_from_collisions=0.02,
-            collision_detection_distance=TERMS.d_notice,
-        )  # fmt: skip
-
-    def _place(self, points: Array) -> None:
-        self.configuration.data.mocap_pos[:] = points
-
-
-CONTENDERS = {"mink, rows": Rows, "mink, native": Native}
+CONTENDERS = {"mink, rows": Rows}
