@@ -32,7 +32,7 @@ _COMES_TO_REST = 500
 
 @dataclass(frozen=True)
 class ServedSetup:
-    """What is served, and what happens to it."""
+    """Arm that is served, and the events that happen to it."""
 
     model: RobotModel
     kind: RobotKind
@@ -40,13 +40,13 @@ class ServedSetup:
     """(7,) where it stands at first [rad]."""
     scene: SceneSpec
     hand: HandScript | None = None
-    """What the hand of the scene does."""
+    """Motion of the scene's hand."""
     pushes: tuple[TcpPush, ...] = ()
     """Forces at the end-effector; their time begins as the arm has settled."""
     units: UnitsSetup | None = None
     """Its sensor units, if they are switched on."""
     object: GripperObject | None = None
-    """What lies between the fingers of its gripper."""
+    """Object between the fingers of its gripper."""
     seed: int = 0
     """Decides the arm's errors and noise."""
 
@@ -71,12 +71,12 @@ class ServedArm:
             Hand(self.plant, setup.hand)
         self.pushes = Pushes(self.plant, setup.pushes, SETTLE_S)
         self.gripper = Gripper(setup.object)
-        """As it is now: `carry` changes it."""
+        """Present state of the gripper: `carry` changes it."""
         self.mode = RobotMode.IDLE
         self.errors: tuple[str, ...] = ()
-        """What is wrong now, by the vendor's names."""
+        """Present errors, by the vendor's names."""
         self.reflex_reason: tuple[str, ...] = ()
-        """What ended the last motion."""
+        """Errors that ended the last motion."""
         self.motion: Motion | None = None
         self.success_rate = 0.0
         """Fraction of the last commands of the motion that came in time; 0 while none runs."""
@@ -85,7 +85,7 @@ class ServedArm:
         self.cartesian_stiffness = CARTESIAN_STIFFNESS
         """(6,) of the Cartesian impedance, in the stiffness frame [N/m, Nm/rad]."""
         self.guiding_axes = np.ones(JOINTS, np.bool_)
-        """Which axes of the end-effector, and whether the elbow, can be moved by hand in guiding mode."""
+        """Mask of the end-effector's axes, and of the elbow, that can be moved by hand in guiding mode."""
         self._flange, self._announced = inertials(model)[self.frames.flange], self.frames.load
         self._drives: ExternalTorques | CartesianImpedance | None = None
         self._since_motion, self._stop_pressed = _COMES_TO_REST, False
@@ -106,27 +106,27 @@ class ServedArm:
 
     @property
     def moving(self) -> bool:
-        """Whether a motion runs."""
+        """True while a motion runs."""
         return self.motion is not None
 
     @property
     def at_rest(self) -> bool:
-        """Whether no motion runs and the arm has braked."""
+        """True if no motion runs and the arm has braked."""
         return self.motion is None and not self.qd.any()
 
     @property
     def singular(self) -> bool:
-        """Whether it is so near a singularity that it does not know the wrench on its end-effector, either."""
+        """True if it is so near a singularity that it does not know the wrench on its end-effector, either."""
         return self.report.wrench is None
 
     @property
     def settled(self) -> bool:
-        """Whether it no longer swings after a motion, either."""
+        """True if it no longer swings after a motion, either."""
         return self.at_rest and self._since_motion >= _COMES_TO_REST and not self.led
 
     @property
     def led(self) -> bool:
-        """Whether somebody moves it by hand, or is about to."""
+        """True while somebody moves it by hand, or is about to."""
         return self.mode is RobotMode.GUIDING and self.pushes.under_way
 
     @property

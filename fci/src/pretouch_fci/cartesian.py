@@ -78,12 +78,12 @@ class ArmBody(NamedTuple):
 
 
 class _OfEndEffector(MotionKind):
-    """What both kinds of motion of the end-effector have in common."""
+    """Common part of both kinds of motion of the end-effector."""
 
     moves_at_end = f"{_PREFIX}_velocity_discontinuity"
     joints = f"{_PREFIX}_joint"
     field: str
-    """Of a command, beside the elbow."""
+    """Field of a command, beside the elbow."""
     _size: int
     """Numbers in the field."""
 

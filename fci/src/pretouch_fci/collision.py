@@ -21,7 +21,7 @@ _MOVING = 1e-3
 
 
 class CollisionThresholds(NamedTuple):
-    """From where on there is a contact and a collision.
+    """Thresholds of a contact and of a collision.
 
     The first axis tells whether the robot changes its speed or goes steadily; the second has the lower threshold, of a
     contact, and the upper one, of a collision.
@@ -45,7 +45,7 @@ DEFAULT_BEHAVIOR = CollisionThresholds(np.full((2, 2, JOINTS), 20.0), np.full((2
 
 
 class Contacts:
-    """Which joints and directions are in contact, and which in collision; the latter until they are forgotten."""
+    """Joints and directions in contact, and those in collision; the latter until they are reset."""
 
     def __init__(self) -> None:
         self.behavior = DEFAULT_BEHAVIOR
@@ -72,7 +72,7 @@ class Contacts:
 
 
 class SelfCollision:
-    """Whether parts of an arm come into each other. Those that overlap where a motion begins may part."""
+    """Check for self-collision of an arm. Parts that overlap where a motion begins may separate."""
 
     def __init__(self, model: RobotModel) -> None:
         self._model, self._count = model, 0

@@ -64,7 +64,7 @@ class ServeFci(FciOptions):
     hand: bool = False
     """Let a person's hand come and go before the arm, in the empty scene."""
     object: str = ""
-    """What lies between the fingers of the gripper, WIDTH:KG, such as 0.04:0.5 [m, kg]; by default nothing."""
+    """Object between the fingers of the gripper, WIDTH:KG, such as 0.04:0.5 [m, kg]; by default none."""
     units: str = ""
     """HOST:PORT of the receiver of the arm's sensor units; by default they are switched off."""
     keys: str = ""

@@ -29,7 +29,7 @@ class Request:
     """One request of a client."""
 
     name: str
-    """As of `WireInterface.requests`."""
+    """Name, one of `WireInterface.requests`."""
     identifier: int
     body: bytes
 
@@ -123,7 +123,7 @@ class ClientPort:
         self._interface, self._say, self._of = interface, say, of
         self._listening = _listening(host, port)
         self.address: tuple[str, int] = self._listening.getsockname()
-        """Where it listens."""
+        """Address that it listens on."""
         self._udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._udp.bind((self.address[0], 0))
         self._udp.setblocking(False)
@@ -134,7 +134,7 @@ class ClientPort:
 
     @property
     def sockets(self) -> list[socket.socket]:
-        """Where something may come by TCP."""
+        """Sockets that may receive by TCP."""
         client = [] if self._client is None else [self._client.sock]
         return [self._listening, *client, *(waiting.sock for waiting in self._waiting)]
 

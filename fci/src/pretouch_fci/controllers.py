@@ -1,4 +1,4 @@
-"""What acts in place of the drives' own joint impedance: Cartesian impedance, guiding, and torques from outside."""
+"""Controllers in place of the drives' joint impedance: Cartesian impedance, guiding, and external torques."""
 
 import numpy as np
 

@@ -52,7 +52,7 @@ def flange_of(model: RobotModel) -> int:
 
 @dataclass
 class Frames:
-    """Where end-effector and stiffness frame are on the flange, and what the flange carries."""
+    """Poses of end-effector and stiffness frame on the flange, and the load of the flange."""
 
     flange: int
     """Index of the flange's link."""
@@ -65,7 +65,7 @@ class Frames:
     EE_T_K: FloatArray = field(default_factory=lambda: np.eye(4))
     """(4, 4) stiffness frame, in which the external wrench acts, on the end-effector."""
     load: Inertial = field(default_factory=lambda: Inertial(0.0, np.zeros(3), np.zeros((3, 3))))
-    """What the client says that the hand carries, in the flange's frame."""
+    """Load of the hand that the client has set, in the flange's frame."""
 
     @property
     def F_T_EE(self) -> FloatArray:

@@ -15,7 +15,7 @@ _HEAVIEST_KG = 3.0
 
 
 class Outcome(IntEnum):
-    """What became of a command, as answers number it."""
+    """Outcome of a command, as answers number it."""
 
     SUCCESS = 0
     FAIL = 1
@@ -52,9 +52,9 @@ class Course:
     """A command on its way."""
 
     widths: tuple[float, ...]
-    """Where the fingers go, one after another [m]."""
+    """Widths that the fingers move to, one after another [m]."""
     speed: float = _FASTEST_M_S
-    """How fast the distance between them changes [m/s]."""
+    """Rate of change of the distance between them [m/s]."""
     grasp: tuple[float, float] | None = None
     """If it is to grasp: an object is grasped if the fingers end between these widths [m], as the vendor defines."""
 
@@ -93,18 +93,18 @@ class Gripper:
     """The gripper at one instant. It has been homed."""
 
     object: GripperObject | None = None
-    """What lies between its fingers."""
+    """Object between its fingers."""
     width: float = MAX_WIDTH_M
     """Distance between the fingers [m]."""
     grasped: bool = False
-    """Whether an object is grasped, by the distance alone, as the vendor defines it: a grasp whose tolerances include 0
+    """True if an object is grasped, by the distance alone, as the vendor defines it: a grasp whose tolerances include 0
     takes closed fingers for one."""
     course: Course | None = None
     """The command that it follows."""
 
     @property
     def load_kg(self) -> float:
-        """What the arm carries of it beyond itself [kg]."""
+        """Mass that the arm carries beyond the gripper itself [kg]."""
         return self.object.mass if self.grasped and self.object is not None else 0.0
 
     def step(self, seconds: float) -> tuple["Gripper", Outcome | None]:

@@ -31,7 +31,7 @@ class GripperServer(ClientPort):
         self._running: Request | None = None
         self._time_ms = 0
         self.due = math.inf
-        """When it is to be served, though nothing has come [s], of the machine's clock."""
+        """Time to serve it though nothing has arrived [s], by the machine's clock."""
 
     def serve(self, ready: Container[object]) -> None:
         """Serve those sockets at which something has come, and send a state when one is due."""

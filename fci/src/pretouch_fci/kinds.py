@@ -15,12 +15,12 @@ milliseconds old when the command comes, and the arm may still swing."""
 
 
 class JointStep(NamedTuple):
-    """What a command comes to."""
+    """Joint motion that a command results in."""
 
     qd: FloatArray
     """(7,) joint velocities for the next millisecond [rad/s]."""
     errors: tuple[str, ...] = ()
-    """Why it cannot be followed, whatever the joints' limits say."""
+    """Reasons why it cannot be followed, apart from the joints' limits."""
 
 
 class MotionKind(ABC):
@@ -32,7 +32,7 @@ class MotionKind(ABC):
     moves_at_end = "joint_motion_generator_velocity_discontinuity"
     """The error of a motion that ends while it moves."""
     joints = "joint_motion_generator"
-    """What the errors of the joints' limits begin with."""
+    """Prefix of the errors of the joints' limits."""
 
     @property
     def commanded(self) -> FloatArray | None:
@@ -87,7 +87,7 @@ class JointVelocity(MotionKind):
 
 
 class NoMotion(JointVelocity):
-    """None beside the torques of an external controller: the joints are asked for no velocity."""
+    """No motion beside the torques of an external controller: no joint velocity is commanded."""
 
     generator = Generator.NONE
 

@@ -1,4 +1,4 @@
-"""What the robot allows the joints of a motion, by the names of the vendor's errors. Pure."""
+"""Limits of the joints in a motion, by the names of the vendor's errors. Pure."""
 
 from dataclasses import dataclass
 
@@ -82,7 +82,7 @@ class MotionLimits:
         return tuple(name for name, wrong in errors.items() if wrong.any())
 
     def ends_at_rest(self, qd: FloatArray) -> bool:
-        """Whether a motion may end at commanded velocities (n,) [rad/s]: the acceleration limit stops it at once."""
+        """Return True if a motion may end at velocities (n,) [rad/s]: the acceleration limit stops it at once."""
         return bool(np.all(np.abs(qd) <= self.qdd * PERIOD_S))
 
     def braked(self, qd: FloatArray) -> FloatArray:

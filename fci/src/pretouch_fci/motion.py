@@ -29,31 +29,31 @@ _FOLLOWS_S = 0.01
 
 @dataclass(frozen=True, slots=True)
 class Setpoint:
-    """What a command says."""
+    """Values of a command."""
 
     values: FloatArray
-    """What counts of it in this kind of motion."""
+    """Values that this kind of motion uses."""
     finished: bool = False
-    """Whether the motion ends with it."""
+    """True if the motion ends with it."""
     torques: FloatArray = field(default_factory=lambda: np.zeros(JOINTS))
     """(7,) for an external controller [Nm]."""
 
 
 @dataclass(frozen=True, slots=True)
 class MotionEnding:
-    """How a motion ended."""
+    """End of a motion."""
 
     status: str
-    """As of `Protocol.move`."""
+    """Status, one of `Protocol.move`."""
     errors: tuple[str, ...] = ()
-    """Why, if it was a reflex."""
+    """Errors of a reflex."""
 
 
 class Motion:
     """A motion from its request until it ends."""
 
     awaited = True
-    """Whether a command is due in each millisecond."""
+    """True if a command is due in each millisecond."""
 
     def __init__(
         self,
@@ -68,7 +68,7 @@ class Motion:
         self.qd, self.qdd = np.zeros(n), np.zeros(n)
         """Commanded velocities [rad/s] and accelerations [rad/s^2], (n,)."""
         self.begun = False
-        """Whether a command has come."""
+        """True if a command has come."""
         self._lost = 0
         self._received: deque[bool] = deque(maxlen=_COUNTED)
 

@@ -35,7 +35,7 @@ _MOTION_EVERY = 1_000_000
 
 @dataclass(frozen=True)
 class FciOptions(Checked):
-    """Where to serve, and at which pace."""
+    """Address and pace of the server."""
 
     host: str = "127.0.0.1"
     """Address to serve at. Anyone who can reach it can move the simulated arm."""
@@ -44,7 +44,7 @@ class FciOptions(Checked):
     lockstep: bool = False
     """Send each state only after the command for the last one: repeatable, and faster than real time."""
     patience: Positive = 60.0
-    """In lockstep, a command that has not arrived after this time is lost [s]."""
+    """Time after which a command that has not arrived in lockstep is lost [s]."""
     grace: NonNegative = 0.01
     """In real time, extra time beyond its millisecond to wait for a command [s]: this machine may be slow. 0 is as
     strict as the robot."""
@@ -89,7 +89,7 @@ class FciServer(ClientPort):
             super().close()
             raise
         self.gripper_address = self._gripper.address
-        """Where the hand does: at the next port."""
+        """Address of the hand: the next port."""
         self._state = StateDatagram(self.protocol, arm)
         self._handler: RequestHandler | None = None
         self._served = False
@@ -149,7 +149,7 @@ class FciServer(ClientPort):
 
     @property
     def _command_due(self) -> bool:
-        """Whether a client that keeps up answers this state: a first command that is lost upsets libfranka's filter."""
+        """Return True if a client that keeps up answers this state: libfranka's filter needs the first command."""
         motion = self._arm.motion
         return motion is not None and motion.awaited and (motion.begun or self._tick < self._answered_until)
 
@@ -255,6 +255,6 @@ class FciServer(ClientPort):
             self._tick = start - 1
 
     def _settle(self) -> None:
-        """In lockstep, let the arm come to rest between two states: what a client sees then differs in time alone."""
+        """Let the arm come to rest between two states in lockstep: a client sees a difference in time alone."""
         while self._options.lockstep and not self._arm.moving and not self._arm.settled and not self._done():
             self._pass_time(None)

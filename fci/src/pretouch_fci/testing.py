@@ -36,7 +36,7 @@ _numbers = itertools.count()
 
 @dataclass(frozen=True, slots=True)
 class Truth:
-    """What truly happened in each millisecond in which the arm's time passed."""
+    """True motion and forces in each millisecond of the arm's time."""
 
     time: FloatArray
     """(k,) as the states say it [s]: in lockstep the first motion begins at 1000."""
@@ -106,7 +106,7 @@ class FrankaServer:
 
     @property
     def said(self) -> tuple[str, ...]:
-        """What it said so far, line by line, such as why a motion ended."""
+        """Lines that the server has printed so far, such as why a motion ended."""
         if self._log.exists():
             *lines, _ = self._log.read_text(errors="replace").split("\n")
             self._said = tuple(lines)
@@ -114,7 +114,7 @@ class FrankaServer:
 
     @property
     def truth(self) -> Truth:
-        """What truly happened until now. Between motions only: in a motion the server waits for a command."""
+        """True motion and forces until now. Between motions only: in a motion the server waits for a command."""
         seen = len(self.said)
         self._type("time")
         self._wait_for("The arm's time is", _ANSWERS_S, seen)

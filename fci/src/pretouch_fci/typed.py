@@ -1,4 +1,4 @@
-"""What a person types in the terminal while an arm is served, or a program writes: pushes, and the arm's buttons."""
+"""Input of a person or a program in the terminal while an arm is served: pushes, and the arm's buttons."""
 
 import os
 import select
@@ -39,7 +39,7 @@ class TypedPushes:
 
     @property
     def possible(self) -> bool:
-        """Whether there is somebody to listen to."""
+        """True if there is an input to listen to."""
         return self._descriptor >= 0
 
     def take(self) -> bool:

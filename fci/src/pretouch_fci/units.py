@@ -12,7 +12,7 @@ from pretouch.units.keys import Keys
 
 @dataclass(frozen=True)
 class UnitsSetup:
-    """Which units there are, and where they send."""
+    """Sensor units, and the address that they send to."""
 
     skin: Skin
     keys: Keys
@@ -35,7 +35,7 @@ class ServedUnits:
         lossy = NetworkParams(replace(network.up, loss=setup.loss), replace(network.down, loss=setup.loss))
         self._fleet = Fleet(setup.skin.network, setup.keys, FleetParams(lossy, imu=ImuParams()), seed, setup.address)
         self.offset: float | None = None
-        """What their time is ahead of the plant's [s]; None: they measure nothing yet."""
+        """Offset of their time from the plant's [s]; None: they measure nothing yet."""
         self._fleet.mount(plant, setup.skin, lambda time: None if self.offset is None else time + self.offset)
 
     def step(self, clock: Callable[[], float]) -> None:

@@ -27,7 +27,7 @@ RobotKind = Literal["panda", "fr3"]
 
 
 class RobotMode(IntEnum):
-    """What the robot does."""
+    """Mode of the robot."""
 
     OTHER = 0
     IDLE = 1
@@ -138,7 +138,7 @@ class WireInterface:
     """Requests and their answers, in one version."""
 
     name: str
-    """As it is named to people."""
+    """Name for people."""
     version: int
     """Both sides must have the same."""
     header: struct.Struct = HEADER
@@ -169,7 +169,7 @@ class Protocol(WireInterface):
     generators: tuple[Generator, ...]
     """Motion generators that it knows."""
     move: tuple[str, ...]
-    """What becomes of a motion, by the numbers in the answers to the request to move."""
+    """Outcomes of a motion, by the numbers in the answers to the request to move."""
 
 
 PANDA = Protocol(

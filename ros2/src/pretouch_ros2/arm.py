@@ -33,7 +33,7 @@ class Ros2(ArmOptions):
 
     @property
     def commanded(self) -> bool:
-        """Whether a commander is followed."""
+        """True if a commander is followed."""
         return bool(self.desired)
 
     def check(self, setup: ArmSetup) -> None:

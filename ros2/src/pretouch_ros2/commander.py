@@ -1,4 +1,4 @@
-"""What a commander asks of the arm over a topic, as the loop takes it: who is wrong is named, and the arm holds."""
+"""Commands of a commander over a topic, as the loop takes them: a wrong sender is named, and the arm holds."""
 
 from itertools import zip_longest
 from time import time as wall_clock
@@ -27,7 +27,7 @@ _SHOWN = 80
 
 
 class _UnfitError(Exception):
-    """Why a message asks for nothing, as a part of a sentence."""
+    """Reason why a message requests no motion, as a part of a sentence."""
 
 
 class Ros2Commander:
@@ -73,7 +73,7 @@ class Ros2Commander:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What a person should know of what came, a sentence each."""
+        """Remarks on the messages for a person, a sentence each."""
         return tuple(filter(None, (self._heard.unreadable, self._stamps.not_newer(self.topic))))
 
     def __call__(self) -> Desired:

@@ -1,4 +1,4 @@
-"""What the topics of an arm tell: joint states, wrench and external torques, in our order, sign and frame."""
+"""Topics of an arm: joint states, wrench and external torques, in our order, sign and frame."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -23,7 +23,7 @@ class JointReading:
     """Joints at one instant."""
 
     stamp: float
-    """By this machine's monotonic clock [s]."""
+    """Time by this machine's monotonic clock [s]."""
     q: FloatArray
     """(n,) [rad]."""
     qd: FloatArray
@@ -44,11 +44,11 @@ class Joints:
     def __init__(self, names: Sequence[str], stamps: SourceStamps) -> None:
         self.names, self.stamps = tuple(names), stamps
         self.newest: JointReading | None = None
-        """What was measured last."""
+        """Last measurement."""
         self.others: set[str] = set()
         """Joints named in messages that do not have all of ours; some of them, where there are many."""
         self.differentiated = False
-        """Whether the messages have no velocities, so that they are taken from the positions."""
+        """True if the messages have no velocities, so that they are taken from the positions."""
 
     def take(self, message: Any, received: float, writer: int) -> None:
         """Take a message in; one without all of our joints is another device's."""
@@ -110,7 +110,7 @@ class Wrench(_ForceEstimate):
     """Takes in geometry_msgs/WrenchStamped."""
 
     received_any = False
-    """Whether any message came, with an estimate or without."""
+    """True if any message came, with an estimate or without."""
     frame_id = ""
 
     def take(self, message: Any, received: float, writer: int) -> None:
@@ -133,7 +133,7 @@ class Wrench(_ForceEstimate):
 
     @property
     def warning(self) -> str:
-        """What makes the setting of the frame look wrong, as a sentence, or ''."""
+        """Sentence on a frame setting that looks wrong, or ''."""
         looks_ee = self.frame_id.lower().endswith(_EE_FRAMES)
         if looks_ee == (self._params.frame == "ee") or not self.frame_id:
             return ""
@@ -155,7 +155,7 @@ class TorqueEstimate(_ForceEstimate):
 
     @property
     def received_any(self) -> bool:
-        """Whether torques of all of our joints came."""
+        """True if torques of all of our joints came."""
         return self._newest is not None
 
     def take(self, message: Any, received: float, writer: int) -> None:

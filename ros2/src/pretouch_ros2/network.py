@@ -1,4 +1,4 @@
-"""Which domain, and which network, of those that settings and environment name."""
+"""Domain and network from settings and environment."""
 
 import os
 from collections.abc import Mapping

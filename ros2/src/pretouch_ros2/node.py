@@ -69,12 +69,12 @@ class Publisher:
 
     @property
     def key(self) -> UUID:
-        """By which others know it."""
+        """Key by which others know it."""
         return self._writer.guid
 
     @property
     def subscribers(self) -> int:
-        """How many take what is published."""
+        """Number of subscribers."""
         return _count(self._writer.get_matched_subscriptions)
 
 
@@ -109,7 +109,7 @@ class Subscription:
 
     @property
     def unreadable(self) -> str:
-        """What kept the newest message from being read, as a sentence, or ''."""
+        """Reason why the newest message could not be read, as a sentence, or ''."""
         if self._unreadable or self._count or not self.publishers:
             return self._unreadable
         # cyclonedds drops what is too short for its type by itself, and only prints a line
@@ -120,7 +120,7 @@ class Subscription:
 
     @property
     def publishers(self) -> int:
-        """How many publish there."""
+        """Number of publishers."""
         return _count(self._reader.get_matched_publications)
 
 
@@ -141,7 +141,7 @@ class Ros2Node:
         self._waits.attach(self._ends)
         self._ended = False
         self.failure = ""
-        """Why nothing is received any more, as a sentence, or ''."""
+        """Reason why nothing is received any more, as a sentence, or ''."""
         self._publications: dict[UUID, str] = {}
         self._discovered = BuiltinDataReader(self._participant, BuiltinTopicDcpsPublication)
         self._found = ReadCondition(self._discovered, _UNREAD)

@@ -1,4 +1,4 @@
-"""What the controller does, published: a `Recorder` that never keeps the control loop waiting."""
+"""Publisher of the controller's steps: a `Recorder` that never keeps the control loop waiting."""
 
 from queue import SimpleQueue
 from threading import Thread
@@ -38,7 +38,7 @@ class Ros2Output:
         self.dropped = 0
         """Steps left out because the thread was busy."""
         self.failure = ""
-        """Why nothing is published any more, as a sentence, or ''."""
+        """Reason why nothing is published any more, as a sentence, or ''."""
         self._queue: SimpleQueue[tuple[Cycle, Stamp] | None] = SimpleQueue()
         self._cloud = node.publisher(f"{_TOPICS}/obstacles", CLOUD)
         self._force = node.publisher(f"{_TOPICS}/force", WRENCH)
@@ -68,7 +68,7 @@ class Ros2Output:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What a person should know of what was published, a sentence each."""
+        """Remarks on the published messages for a person, a sentence each."""
         dropped = f"{self.dropped} control steps were not published: the machine was busy." if self.dropped else ""
         return tuple(filter(None, (self.failure, dropped)))
 

@@ -22,7 +22,7 @@ _TOPIC = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 
 @dataclass(frozen=True)
 class NodeParams(Checked):
-    """How to reach the others."""
+    """Settings that reach other nodes."""
 
     distribution: Distribution = "jazzy"
     """Release of ROS 2 of the others: sensor_msgs/Range is not the same before Iron and since."""
@@ -45,11 +45,11 @@ class ArmParams(Checked):
     """An arm behind topics."""
 
     sign: Sign
-    """Whether the wrench is on the robot by the environment, as ours, or by the robot, as Franka's O_F_ext_hat_K."""
+    """True if the wrench is on the robot by the environment, as ours, or by the robot, as Franka's O_F_ext_hat_K."""
     frame: Frame
     """Frame the wrench is given in: the arm's base or its end-effector."""
     zeros: Zeros = "auto"
-    """Whether a wrench of six zeros only means that there is no estimate; auto: where the force is by the robot."""
+    """True if a wrench of six zeros only means that there is no estimate; auto: where the force is by the robot."""
     joint_states: str = "/joint_states"
     """Topic of sensor_msgs/JointState."""
     joint_names: tuple[str, ...] = ()
@@ -61,13 +61,13 @@ class ArmParams(Checked):
     wrench_timeout_s: Annotated[float, Check(low=0.0, high=0.5, open_low=True)] = 0.05
     """Age of a wrench, and of torques, from which they are no estimate any more [s]."""
     shared_clock: bool = True
-    """Whether the time of ROS is this machine's time of day, to some milliseconds: then stamps of headers count, and
+    """True if the time of ROS is this machine's time of day, to some milliseconds: then stamps of headers count, and
     trajectories say when they begin. Otherwise what counts is when a message comes, and the arm moves smoothly by
     joint_trajectory_controller 4.17 to 4.20 alone."""
     command_topic: str = "/joint_trajectory_controller/joint_trajectory"
     """Topic of the commands, trajectory_msgs/JointTrajectory that end at rest."""
     hold_s: Annotated[float, Check(low=0.0, high=0.5, open_low=True)] = 0.05
-    """How long a trajectory goes on at the commanded velocity before it brakes, should no other one come [s]."""
+    """Time at the commanded velocity before a trajectory brakes, if no other one comes [s]."""
     ahead_s: Annotated[float, Check(low=0.0, high=0.05)] = 0.01
     """With one clock: how long after a turn of the loop its trajectory begins [s]. A message that takes no longer, less
     a period of the arm's controller, leaves no trace in the motion."""
@@ -91,7 +91,7 @@ class ArmParams(Checked):
 
     @property
     def zeros_missing(self) -> bool:
-        """Whether a wrench of zeros only is none."""
+        """True if a wrench of only zeros means no measurement."""
         return self.zeros == "missing" or (self.zeros == "auto" and self.sign == "by-robot")
 
 

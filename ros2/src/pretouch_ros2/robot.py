@@ -62,7 +62,7 @@ class Ros2Robot:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What a person should know of what came, a sentence each."""
+        """Remarks on the messages for a person, a sentence each."""
         p, sentences = self.params, [self._wrench.warning]
         sentences += [stamps.not_newer(topic) for topic, stamps in self._stamps]
         sentences += [heard.unreadable for heard in (self._states, self._wrenches, *self._efforts)]

@@ -60,7 +60,7 @@ class Ros2Skin:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What a person should know of what came, a sentence each."""
+        """Remarks on the messages for a person, a sentence each."""
         sentences = [subscription.unreadable for subscription in self._subscriptions]
         for name, stamps in zip(self._ids, self._stamps, strict=True):
             several = f"Several publishers send as {name}: run only one; until then the unit is silent."

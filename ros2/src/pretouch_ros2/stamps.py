@@ -1,4 +1,4 @@
-"""When a message was measured, by this machine's monotonic clock; and whether it is new.
+"""Time of a message by this machine's monotonic clock, and a check that it is new.
 
 ROS has another clock than ours, which can be set, be simulated, or be another machine's. So a message counts from when
 it was received, unless the clocks are said to be the same. Whether it is new, its header says: a driver that lost
@@ -21,10 +21,10 @@ _NOT_NEWER_MOST, _NOT_NEWER_S = 10, 0.5
 
 @dataclass
 class _Writer:
-    """What one writer has stamped."""
+    """Stamps of one writer."""
 
     last_received: float
-    """When it was heard last [s]."""
+    """Arrival of its last message [s]."""
     newest: float
     """Its newest stamp [s]."""
 
@@ -38,7 +38,7 @@ class SourceStamps:
         self._writers: dict[int, _Writer] = {}
         self._not_newer, self._newer_at, self._heard_at = 0, 0.0, 0.0
         self.behind: float | None = None
-        """How far stamps are behind this machine's time of day when they come, at best [s]; None: there are none."""
+        """Least delay of stamps against this machine's time of day at their arrival [s]; None: there are no stamps."""
 
     def instant(self, header: object, received: float, writer: int) -> float | None:
         """Return when a message was measured [s], or None if it is not to be used.
@@ -72,7 +72,7 @@ class SourceStamps:
         return sentence if lasts and self._not_newer > _NOT_NEWER_MOST else ""
 
     def together(self) -> bool:
-        """Whether several writers publish at once."""
+        """True if several writers publish at once."""
         instants = sorted(each.last_received for each in tuple(self._writers.values()))
         return len(instants) > 1 and instants[-1] - instants[-2] < _TOGETHER_S
 

@@ -50,14 +50,14 @@ class StepMessages:
         return self._m.make(WRENCH, self._header(at), self._m.make("geometry_msgs/msg/Wrench", *pair))
 
     def units(self, at: Stamp) -> Any:
-        """Where the units sit on their links."""
+        """Poses of the units on their links."""
         skin = self._skin
         places = zip(skin.link, skin.ids, skin.T_link_sensor, strict=True)
         frames = [self._m.transform(at, self._links[link], name, T[:3, 3], T[:3, :3]) for link, name, T in places]
         return self._m.make(TRANSFORMS, frames)
 
     def limited(self, step: ControlStep) -> Any:
-        """What keeps the arm from what is asked, for who asks: `ControlStep.limited` by name."""
+        """Restrictions that limited a requested motion, for its sender: `ControlStep.limited` by name."""
         of = step.limited
         names = {"unit": self._skin.ids, "link": self._links, "joint": self._joints}
         places = {"unit": of.unit, "link": of.link, "joint": of.joint}

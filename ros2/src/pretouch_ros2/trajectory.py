@@ -41,7 +41,7 @@ class StoppingTrajectory:
     qd: FloatArray
     """(m, n) [rad/s], the last 0."""
     first: int = 1
-    """Which of the instants is the first way-point."""
+    """Index of the instant of the first way-point."""
 
     def points(self) -> Iterator["TrajectoryPoint"]:
         """Yield all points, the first at its begin."""
@@ -90,7 +90,7 @@ def stopping_trajectory(
 
 @value
 class TrajectoryPoint:
-    """Where to be, relative to the begin of a trajectory."""
+    """Target at a time relative to the begin of a trajectory."""
 
     time: float
     """[s]; negative: passed already."""
@@ -110,7 +110,7 @@ class _SentTrajectory:
 
 
 class Reference:
-    """What the arm's motion generator is at, reckoned from the trajectories it was sent."""
+    """State of the arm's motion generator, computed from the trajectories it was sent."""
 
     def __init__(self, qdd_max: FloatArray, period: float, hold: float) -> None:
         """Take the limits (n,) [rad/s^2], the control period and how long a velocity is held [s]."""
@@ -119,12 +119,12 @@ class Reference:
 
     @property
     def begun(self) -> bool:
-        """Whether anything was sent."""
+        """True if anything was sent."""
         return bool(self._sent)
 
     @property
     def ends(self) -> float:
-        """When the last trajectory ends [s]; in the past if there is none."""
+        """End of the last trajectory [s]; in the past if there is none."""
         return self._sent[-1].began + float(self._sent[-1].trajectory.time[-1]) if self._sent else -math.inf
 
     def begin(self, q: FloatArray, now: float, settle: float) -> StoppingTrajectory:

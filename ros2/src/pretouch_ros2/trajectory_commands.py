@@ -52,12 +52,12 @@ class TrajectoryCommands:
 
     @property
     def begun(self) -> bool:
-        """Whether anything was sent."""
+        """True if anything was sent."""
         return self._reference.begun
 
     @property
     def ends(self) -> float:
-        """When the last trajectory ends [s]."""
+        """End of the last trajectory [s]."""
         return self._reference.ends + self._ahead
 
     def begin(self, joints: JointReading, now: float) -> float:

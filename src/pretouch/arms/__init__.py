@@ -39,7 +39,7 @@ _ELSEWHERE = {"ros2": extras.ROS2}
 
 @dataclass(frozen=True)
 class ArmSetup:
-    """What an arm is opened with."""
+    """Arguments that open an arm."""
 
     name: str
     """Its model as it was named: `panda`, `fr3`, or the folder of an imported arm."""
@@ -48,7 +48,7 @@ class ArmSetup:
     skin: "skin.Skin"
     """The sensor units on it; none with --no-skin."""
     units: bool
-    """Whether the arm is to bring them: they are there, and do not come over the network."""
+    """True if the arm is to bring them: they are there, and do not come over the network."""
     profile: "Profile"
     """Parameters of the controller that moves it."""
     start: "Callable[[], FloatArray]"
@@ -58,11 +58,11 @@ class ArmSetup:
     priority: int | None
     """Real-time priority of the control loop; None: the process keeps its own."""
     yes: bool
-    """Whether a person has allowed beforehand what would otherwise be asked."""
+    """True if a person has allowed beforehand what would otherwise be asked."""
 
 
 class Output(Protocol):
-    """What else is told of each control step."""
+    """Receiver of each control step beside the recorder."""
 
     def record(self, cycle: "Cycle") -> None:
         """Take one turn of the loop."""
@@ -70,7 +70,7 @@ class Output(Protocol):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What a person should know of that, a sentence each."""
+        """Remarks for a person, a sentence each."""
         ...
 
 
@@ -80,25 +80,25 @@ class OpenedArm:
 
     arm: "Arm"
     identity: "Identity | None" = None
-    """By which its confirmed force sign is remembered; None: it is not."""
+    """Identity by which its confirmed force sign is remembered; None: it is not remembered."""
     skin: "Skin | None" = None
     """Its sensor units, a `NetworkSkin` where their health is to be judged; None: it brings none."""
     push: "Callable[[Direction], None]" = lambda _: None
     """Called as a person is asked to push: a simulated one does."""
     notes: Callable[[], tuple[str, ...]] = lambda: ()
-    """What is to be known of the connection by now, a sentence each."""
+    """Remarks on the connection so far, a sentence each."""
     output: "Callable[[Controller], AbstractContextManager[Output | None]]" = lambda _: nullcontext()
     """Opens what else is told of each control step."""
     free_motion_id: str = ""
-    """What the arm is known by as its free motion is remembered; '': by its name."""
+    """Name under which its free motion is remembered; '': the arm's name."""
     left_out: Callable[[], float] = lambda: 0.0
     """Time that this machine was too slow to simulate it so far [s]."""
     measured: "Callable[[], RobotState] | None" = None
     """Its newest state by the clock of its units, where that of `arm` may be stamped otherwise."""
     commander: "Callable[[], Desired | None] | None" = None
-    """Whom the arm follows, if it is not the path; see `loop.Options.desired`."""
+    """Commander that the arm follows in place of the path; see `loop.Options.desired`."""
     announced: str = ""
-    """What a commander lets the arm do, to be said before it moves."""
+    """Announcement of a commander's motion, printed before the arm moves."""
 
     def __post_init__(self) -> None:
         if self.commander and not self.announced:
@@ -109,13 +109,13 @@ class ArmOptions(ABC):
     """Base of an arm's options."""
 
     simulated: ClassVar[bool] = False
-    """Whether it is no real one: the floor is that of the simulated room, and assumptions on the arm are said."""
+    """True if it is no real one: the floor is that of the simulated room, and assumptions on the arm are said."""
     brings_units: ClassVar[bool] = False
-    """Whether it can bring the sensor units of a skin; otherwise they come over the network."""
+    """True if it can bring the sensor units of a skin; otherwise they come over the network."""
 
     @property
     def commanded(self) -> bool:
-        """Whether it brings a commander, so that no path is followed."""
+        """True if it brings a commander, so that no path is followed."""
         return False
 
     def described(self, description: "RobotDescription") -> "RobotDescription":

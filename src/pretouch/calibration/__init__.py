@@ -1,1 +1,1 @@
-"""Where each sensor unit sits on its link, found from what its IMU measures while the arm moves."""
+"""Pose of each sensor unit on its link, estimated from its IMU while the arm moves."""

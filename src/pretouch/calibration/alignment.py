@@ -1,4 +1,4 @@
-"""How late a unit's clock is, and how well a link's turning explains what its gyroscope measured.
+"""Lag of a unit's clock, and agreement of a link's rotation with the unit's gyroscope.
 
 The cross-covariance of two angular velocities is R^T times the covariance of one of them if they are the same but for a
 rotation R and a constant: its nuclear norm, divided by both norms, is then 1, whatever R and the gyroscope's bias are.
@@ -18,9 +18,9 @@ class Alignment:
     """The best lag for one link."""
 
     late: float
-    """By how much the unit's clock is late [s]."""
+    """Lag of the unit's clock [s]."""
     likeness: float
-    """How much of both angular velocities is the same, 0 to 1."""
+    """Similarity of both angular velocities, 0 to 1."""
 
 
 def align(
@@ -70,7 +70,7 @@ def _overlap(first: FloatArray | BoolArray, second: FloatArray | BoolArray, leng
 
 
 def _peak(values: FloatArray, i: int) -> float:
-    """Where between neighbours the peak of a parabola through them lies, in steps."""
+    """Return the offset of the peak of a parabola through three neighbours, in steps."""
     before, at, after = values[i - 1], values[i], values[(i + 1) % len(values)]
     bend = before - 2 * at + after
     return 0.0 if min(before, after) <= 0.0 or bend >= 0.0 else float(0.5 * (before - after) / bend)

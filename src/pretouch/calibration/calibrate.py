@@ -1,4 +1,4 @@
-"""From measured joint positions and IMU data to where each unit sits, one straight line; and to a skin."""
+"""Calibration in one line: joint positions and IMU data to the pose of each unit, and to a skin."""
 
 from dataclasses import replace
 

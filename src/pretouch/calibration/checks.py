@@ -1,4 +1,4 @@
-"""What can be wrong with what joints and units measured, before it is compared with any link."""
+"""Checks of the joints' and the units' measurements, before they are compared with any link."""
 
 from dataclasses import replace
 

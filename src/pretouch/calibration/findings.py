@@ -1,4 +1,4 @@
-"""What is to be said of a unit once its place is found: what of it is not known, and how the unit sits on its link."""
+"""Findings on a unit whose place is estimated: unobserved directions, and the way it sits on its link."""
 
 from dataclasses import dataclass
 
@@ -229,7 +229,7 @@ def likely_member(model: RobotModel, body: tuple[int, ...], link: int, T: FloatA
     """
 
     def oddity(member: int) -> float:
-        """In metres."""
+        """Return the distance in metres."""
         there, _ = seen_from(model, member, link, T, np.eye(6))
         found = seat(model, member, there[:3, 3])
         if found is None:

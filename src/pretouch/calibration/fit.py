@@ -68,7 +68,7 @@ class Estimate:
         return motion.a + motion.lever @ self.p + motion.R_link_base @ self.errors[UPWARDS]
 
     def expected(self, motion: LinkMotion) -> FloatArray:
-        """What the IMU should measure (N, 6), but for the clock."""
+        """Predict the IMU's measurements (N, 6), but for the clock."""
         e = self.errors
         gyro = (motion.w @ self.R) * (1 + e[GYRO_SCALE]) + e[GYRO_BIAS]
         return np.hstack([gyro, self.specific_force(motion) @ self.R * (1 + e[ACC_SCALE]) + e[ACC_BIAS]])

@@ -1,4 +1,4 @@
-"""Which link a unit sits on: the one whose turning its gyroscope measured."""
+"""Link that a unit sits on: the one whose rotation its gyroscope measured."""
 
 from dataclasses import dataclass, field
 
@@ -35,7 +35,7 @@ _Match = tuple[tuple[int, ...], Alignment]
 
 @dataclass(eq=False)
 class Identified:
-    """What is known of the link a unit sits on."""
+    """Estimate of the link that a unit sits on."""
 
     body: tuple[int, ...] = ()
     """Indices of the links it may sit on, all fixed to each other; none if it fits no link."""

@@ -1,4 +1,4 @@
-"""What noise of joint positions does to a place.
+"""Effect of joint position noise on an estimated place.
 
 Accelerations of the joints, differentiated from noisy positions, look like motion of their own. They shrink the levers
 that a fit finds, in all directions in which the true motion is weak, and the residuals do not show it. By how much is

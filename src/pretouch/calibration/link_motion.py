@@ -1,4 +1,4 @@
-"""How each link moved: what an IMU at its origin, with its axes, would have measured."""
+"""Motion of each link, as an IMU at its origin, with its axes, would have measured it."""
 
 from dataclasses import dataclass
 

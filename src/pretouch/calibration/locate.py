@@ -18,7 +18,7 @@ _SETTLED_S = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class Located:
-    """Where a unit sits if it sits on a link."""
+    """Pose of a unit on the assumption that it sits on a link."""
 
     link: int
     """Index of the link."""
@@ -28,7 +28,7 @@ class Located:
     noise: FloatArray
     """(6,) root mean square of what is not explained, each sensor's the same for its axes [rad/s, m/s^2]."""
     late: float
-    """By how much the unit's clock is late [s]."""
+    """Lag of the unit's clock [s]."""
     known: BoolArray
     """(N,) at which of the arm's instants both sides were measured."""
     used: BoolArray

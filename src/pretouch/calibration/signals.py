@@ -47,7 +47,7 @@ def gaps(stamp: FloatArray, longest: float) -> FloatArray:
 
 
 def outside(at: FloatArray, intervals: FloatArray, margin: float) -> BoolArray:
-    """Which of the instants (N,), in order, are further than a margin [s] from all intervals (G, 2)."""
+    """Mask of the instants (N,), in order, that are farther than a margin [s] from all intervals (G, 2)."""
     free = np.ones(len(at), np.bool_)
     for begin, end in intervals:
         free[np.searchsorted(at, begin - margin) : np.searchsorted(at, end + margin, side="right")] = False
@@ -56,7 +56,7 @@ def outside(at: FloatArray, intervals: FloatArray, margin: float) -> BoolArray:
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """What one IMU measured at N instants, and how fast that changed."""
+    """Measurements of one IMU at N instants, and their derivatives."""
 
     values: FloatArray
     """(N, 6) angular velocity [rad/s], proper acceleration [m/s^2]."""

@@ -1,4 +1,4 @@
-"""When the samples of an IMU were taken, from the numbers and ages that came with them.
+"""Times of an IMU's samples, from the numbers and ages that came with them.
 
 A datagram tells the number of its first sample, how many there are, and how old the newest is by the unit's clock. The
 sensor's own oscillator, some per cent off its nominal rate, makes the samples; the unit's crystal, some millionths off,
@@ -36,7 +36,7 @@ _UNKNOWN_US = 2**32 - 1
 
 @value
 class ImuCounters:
-    """What tells when IMU samples were taken: B batches of one unit, in the order in which they came."""
+    """Counters that date IMU samples: B batches of one unit, in the order of their arrival."""
 
     index: IntArray
     """(B,) number of the first sample of each since the unit's reset."""

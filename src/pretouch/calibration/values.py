@@ -1,4 +1,4 @@
-"""What a calibration is made from, what is assumed, and what it says."""
+"""Data, assumptions and result of a calibration."""
 
 from dataclasses import dataclass
 
@@ -36,7 +36,7 @@ LEAST_SWING_RAD = 0.05
 
 @dataclass(frozen=True, eq=False)
 class UnitData:
-    """What one unit's IMU measured while the arm moved, on a clock of its own."""
+    """Measurements of one unit's IMU while the arm moved, on a clock of its own."""
 
     id: str
     imu: ImuTrace
@@ -50,7 +50,7 @@ class UnitData:
 
 @dataclass(frozen=True, eq=False)
 class CalibrationData:
-    """What was measured while the arm moved."""
+    """Measurements while the arm moved."""
 
     joints: JointTrace
     units: tuple[UnitData, ...]
@@ -63,14 +63,14 @@ class Finding:
     kind: str
     """A word for programs, such as `slipped`."""
     sentence: str
-    """What is wrong and what to do about it."""
+    """Problem and remedy."""
     refused: bool
-    """Whether the unit's place cannot be trusted for it."""
+    """True if the unit's place cannot be trusted for it."""
 
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """Where a unit sits, with the errors of its IMU."""
+    """Pose of a unit, with the errors of its IMU."""
 
     link: str
     T_link_sensor: FloatArray
@@ -86,7 +86,7 @@ class Place:
     angular_velocity_scale: FloatArray
     """(3,) error of each axis' scale."""
     clock_offset: float
-    """By how much the unit's stamps are late [s]; the sensor's own delay, about 1 ms, is part of it."""
+    """Delay of the unit's stamps [s]; it includes the sensor's own delay of about 1 ms."""
     acceleration_residual: float
     """Root mean square of what the model does not explain [m/s^2], after the low-pass."""
     angular_velocity_residual: float
@@ -107,27 +107,27 @@ class Place:
 
 @dataclass(frozen=True, eq=False)
 class UnitCalibration:
-    """What was found of one unit."""
+    """Result for one unit."""
 
     id: str
     place: Place | None
-    """None where nothing can be said at all."""
+    """Estimated place; None where there is no estimate."""
     findings: tuple[Finding, ...] = ()
 
     @property
     def accepted(self) -> bool:
-        """Whether its place can be trusted."""
+        """True if its place can be trusted."""
         return self.place is not None and not any(finding.refused for finding in self.findings)
 
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """What was found of all units."""
+    """Result for all units."""
 
     units: tuple[UnitCalibration, ...]
-    """In the order of the data."""
+    """Results in the order of the data."""
     findings: tuple[Finding, ...] = ()
-    """What is to be known of the joints' data."""
+    """Findings on the joints' data."""
     orientation_floor: float = 0.0
     """Standard deviation, about each axis, of the angle between an IMU's axes and its range finder's [rad]; no IMU can
     tell it."""

@@ -101,7 +101,7 @@ class Detect(Choice):
 
 
 def _by_torques(file: LogFile, choice: Choice, profiles: Sequence[Profile] | None) -> bool:
-    """Whether the detectors run on joint torques: where there are some, unless only thresholds of a force are asked."""
+    """Return True if detectors run on joint torques: where the log has them and not only thresholds are requested."""
     if choice.frame == "ee":
         return False
     if choice.torques or choice.gains or choice.payload:
@@ -114,7 +114,7 @@ def _by_torques(file: LogFile, choice: Choice, profiles: Sequence[Profile] | Non
 
 @dataclass(frozen=True)
 class _Answer:
-    """What detectors make of a recording."""
+    """Results of detectors on a recording."""
 
     recording: ForceRecording | TorqueRecording
     results: list[DetectorResult]

@@ -1,4 +1,4 @@
-"""What is said of a log of another program and of what detectors made of it: a sentence for each code."""
+"""Sentences on a log of another program and on the detectors' results: one for each code."""
 
 from collections.abc import Iterable, Sequence
 

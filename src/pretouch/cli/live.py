@@ -1,4 +1,4 @@
-"""What `pretouch live` does: a simulated arm served as a page."""
+"""The command `pretouch live`: a simulated arm served as a page."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -52,7 +52,7 @@ class Live:
     """Skin file; by default 34 units all over hand, wrist, forearm and elbow, and with --keys the seven of other
     commands; of an imported arm the skin in its folder."""
     opening: bool = True
-    """Whether a hand comes by itself at first, until somebody drags or clicks; never with --keys or --record."""
+    """True if a hand comes by itself at first, until somebody drags or clicks; never with --keys or --record."""
     units: UnitOptions = field(default_factory=UnitOptions)
 
     def run(self) -> None:

@@ -1,4 +1,4 @@
-"""What `pretouch replay` does: a recording told, recomputed, compared, shown."""
+"""The command `pretouch replay`: a recording is summarised, recomputed, compared or shown."""
 
 import sys
 from collections.abc import Callable, Iterator
@@ -41,7 +41,7 @@ class Replay:
     profile: str = ""
     """Profile whose decisions on the same force and range data are shown beside the recorded ones."""
     page: bool = True
-    """Whether to open the page; --no-page only prints."""
+    """Open the page; --no-page only prints."""
     json: JsonFile = None
     host: str = "127.0.0.1"
     """Address to serve the page at. Beyond this machine, whoever has the printed address sees the recording."""

@@ -1,4 +1,4 @@
-"""What `pretouch skin monitor` does: units watched in the terminal, and recorded."""
+"""The command `pretouch skin monitor`: units watched in the terminal, and recorded."""
 
 import math
 import socket
@@ -205,7 +205,7 @@ def _nothing_received(receiver: NetworkSkin) -> list[str]:
 
 @cache
 def only_here(host: str) -> bool:
-    """Whether only what runs on this machine can send to an address of it."""
+    """Return True if only programs on this machine can send to an address."""
     try:
         address = socket.getaddrinfo(host, None, type=socket.SOCK_DGRAM)[0][4][0]
     except (OSError, UnicodeError):

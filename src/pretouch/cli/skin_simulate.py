@@ -1,4 +1,4 @@
-"""What `pretouch skin simulate` does: a simulated skin that sends to a receiver in real time."""
+"""The command `pretouch skin simulate`: a simulated skin that sends to a receiver in real time."""
 
 from contextlib import closing
 from dataclasses import dataclass, field
@@ -43,7 +43,7 @@ class Simulate:
     stuck: Words = ()
     """Names of units whose range finder repeats its first reading, separated by commas."""
     hand: bool = True
-    """Whether a person's hand comes and goes."""
+    """True if a person's hand comes and goes."""
     profile: str = "paper"
     """Profile of the arm's controller, or PROFILE:GROUP.FIELD=VALUE."""
     seed: int = 0

@@ -36,7 +36,7 @@ class PlainTable:
     left: Collection[int] = (0,)
     """Columns that are aligned left, as words are."""
     styles: Iterable[str] = ()
-    """Of each row; those without are plain."""
+    """Style of each row; rows without one are plain."""
 
     def __rich_console__(self, _console: Console, options: ConsoleOptions) -> RenderResult:
         """Draw it as wide as the terminal is."""

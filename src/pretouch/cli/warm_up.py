@@ -1,4 +1,4 @@
-"""What `pretouch warm-up` does, and other commands at their first start: compile a control step, and keep it."""
+"""The command `pretouch warm-up`, and the first start of others: compile a control step, and cache it."""
 
 import gc
 import os

@@ -1,4 +1,4 @@
-"""What commands write: that a file can be written is found out first, and said in a sentence."""
+"""Files that commands write: each is checked to be writable before the work begins."""
 
 import os
 import sys
@@ -65,7 +65,7 @@ def check_free(what: str, place: Path, replace: bool) -> None:
 
 
 def same_file(one: Path, other: Path) -> bool:
-    """Whether `other` is the file `one` by another name, be it there or not, or lies in the folder `one`."""
+    """Return True if `other` is the file `one` by another name, be it there or not, or lies in the folder `one`."""
     if one.exists() and other.exists() and one.samefile(other):
         return True
     first, second = Path(os.path.realpath(one)), Path(os.path.realpath(other))

@@ -95,7 +95,7 @@ class Bag:
         return sorted(name for name, kind in self._types.items() if kind in types)
 
     def _has_efforts(self, reader: AnyReader) -> bool:
-        """Whether one of the first messages of joint states has positions and efforts of as many joints."""
+        """Return True if one of the first messages of joint states has positions and efforts of as many joints."""
         joints = [c for c in reader.connections if c.msgcount and c.msgtype == JOINT_STATE]
         for count, (connection, _, raw) in enumerate(reader.messages(joints) if joints else ()):
             message: Any = reader.deserialize(raw, connection.msgtype)
@@ -158,7 +158,7 @@ class Bag:
 
 @value
 class _Rows:
-    """What is used of a topic, in the order of its recording."""
+    """Rows of a topic, in the order of its recording."""
 
     logged: IntArray
     """(N,) when it was recorded [ns]."""
@@ -169,7 +169,7 @@ class _Rows:
 
 
 class _Topic:
-    """What is read of one topic: messages by the names of the joints that they are of."""
+    """Messages of one topic by the names of their joints."""
 
     def __init__(self, name: str, kind: str) -> None:
         self.name, self.frame = name, ""
@@ -180,7 +180,7 @@ class _Topic:
 
     @property
     def names(self) -> list[str]:
-        """Of all joints."""
+        """Names of all joints."""
         return list(dict.fromkeys(name for names in self._groups for name in names))
 
     def add(self, time: int, message: Any) -> None:

@@ -178,7 +178,7 @@ def _force_of(r: TorqueRecording, period: float) -> ForceRecording:
 
 
 def _moving(r: TorqueRecording, at: IntArray) -> BoolArray:
-    """Whether the arm moves at samples (S,)."""
+    """Mask of the samples (S,) at which the arm moves."""
     return np.abs(r.qd_commanded[at]).max(axis=1) > MOVING_RAD_S
 
 

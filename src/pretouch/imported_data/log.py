@@ -28,15 +28,15 @@ _NUMBERED = re.compile(r"(.*?)(\d{1,2})(\D*)")
 
 @dataclass(frozen=True, kw_only=True)
 class Choice:
-    """What a log does not say of itself: options of `pretouch detect`."""
+    """Facts that a log does not contain: options of `pretouch detect`."""
 
     sign: Literal["auto", "on-robot", "by-robot"] = "auto"
-    """Whether force and external torques are on the robot (by its environment) or by the robot, as Franka's
+    """True if force and external torques are on the robot (by its environment) or by the robot, as Franka's
     O_F_ext_hat_K; auto: on the robot, but for torques by the name tau_ext_hat_filtered."""
     frame: Literal["base", "ee"] = "base"
     """Frame of the force; ee, the end-effector's, needs joint positions of a Panda or FR3."""
     zeros: Literal["auto", "missing", "kept"] = "auto"
-    """Whether six zeros mean no estimate; auto: yes with --sign by-robot."""
+    """True if six zeros mean no estimate; auto: yes with --sign by-robot."""
     wrench: str = ""
     """Topic of the force, if there are several."""
     joints: str = ""
@@ -56,7 +56,7 @@ class Choice:
 
 @value
 class Note:
-    """What a person should know of a log or of a result: a code, and the numbers and names that belong to it."""
+    """Remark for a person on a log or a result: a code with its numbers and names."""
 
     code: str
     values: Mapping[str, float | str]
@@ -75,11 +75,11 @@ class Log:
     """By kind, NaN where there is no value: `force` (N, 3) [N], `torque` (N, 3) [Nm]; of the n joints of the model, in
     its order, `q`, `dq`, `dq_d`, `tau_ext`, `tau` (N, n) [rad, rad/s, Nm] and `current` [A]."""
     sources: dict[str, str]
-    """By kind, the topic or the first column it was taken from."""
+    """Topic or first column that the values come from, by kind."""
     frame_id: str = ""
     """Frame that the log names for the force."""
     by_robot: bool = False
-    """Whether the name of the external torques tells that they are by the robot on its environment."""
+    """True if the name of the external torques tells that they are by the robot on its environment."""
     notes: tuple[Note, ...] = ()
 
     def __len__(self) -> int:
@@ -119,12 +119,12 @@ class Log:
 
 @value
 class ImportedRecording:
-    """What is known of an arm by a log. N samples in the order of time."""
+    """Data of an arm from a log. N samples in the order of time."""
 
     place: Path
     model: RobotModel
     by_robot: bool
-    """Whether force or torques were taken to be by the robot, or to brake it, and turned round."""
+    """True if force or torques were taken to be by the robot, or to brake it, and turned round."""
     first_s: float
     """Instant of the first sample on the recording's clock [s]."""
     time: FloatArray
@@ -141,7 +141,7 @@ class LogFile(Protocol):
     """A log that was opened: a table, or a bag."""
 
     kinds: frozenset[str]
-    """What it surely holds, of the kinds of `Log`."""
+    """Kinds of `Log` that it certainly contains."""
 
     def force(self, posture: bool) -> Log:
         """Read the force, and where asked for the joint positions at its instants."""
@@ -161,7 +161,7 @@ def arm_of(names: Sequence[str], arm: str | RobotModel) -> RobotModel:
 
 
 def joint_places(place: Path, names: Sequence[str], model: RobotModel) -> list[int]:
-    """Where each joint of a model stands among names: by its name, as the end of a name, or by its number.
+    """Find each joint of a model among names: by its name, as the end of a name, or by its number.
 
     Numbers, from 0 or 1 on, count where names differ in them alone, as q1 to q7 do. RecordingError where that is not
     clear.

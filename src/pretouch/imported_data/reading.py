@@ -32,7 +32,7 @@ class ForceRecording(ImportedRecording):
     source: str
     """The topic or column that it was taken from."""
     in_ee: bool
-    """Whether it was taken to be in the end-effector's frame, and turned by the arm's posture."""
+    """True if it was taken to be in the end-effector's frame, and turned by the arm's posture."""
     force: FloatArray
     """(N, 3) on the robot by the environment [N], base frame, NaN where there is no estimate."""
     moving: BoolArray | None = None

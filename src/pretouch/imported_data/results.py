@@ -1,4 +1,4 @@
-"""What detectors make of recordings: numbers for tables and files, and the course of each cycle for figures."""
+"""Results of detectors on recordings: numbers for tables and files, and values of each cycle for figures."""
 
 import numpy as np
 
@@ -14,7 +14,7 @@ NEAR_S = 0.5
 
 @value
 class ThresholdSummary:
-    """How thresholds on a force fared, by axis; NaN without free motion. Base frame."""
+    """Summary of thresholds on a force, by axis; NaN without free motion. Base frame."""
 
     mean_n: FloatArray
     """(3,) of the force in free motion."""
@@ -34,7 +34,7 @@ class ThresholdSummary:
 
 @value
 class TorqueSummary:
-    """How a detector on torques fared in free motion, by joint; NaN without any."""
+    """Summary of a detector on torques in free motion, by joint; NaN without any."""
 
     residual_mean_nm: FloatArray
     """(n,) of what learnt free motion does not explain of the torques."""
@@ -48,7 +48,7 @@ class TorqueSummary:
 
 @value
 class DetectorResult:
-    """What a profile's detector makes of a recording. Times count from the first sample."""
+    """Result of a profile's detector on a recording. Times count from the first sample."""
 
     profile: str
     control_rate_hz: float
@@ -76,7 +76,7 @@ class DetectorResult:
 
 @value
 class TorqueCourse:
-    """What a detector made of torques in S cycles."""
+    """Values of a detector on torques in S cycles."""
 
     time: FloatArray
     """(S,) since the first sample [s]."""

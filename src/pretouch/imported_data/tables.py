@@ -63,17 +63,17 @@ _SHOWN = {
 
 @value
 class _Column:
-    """What a column holds."""
+    """Quantity, unit and joint of a column."""
 
     kind: str
     part: str
-    """Which of it: an axis, or a joint as q1 or by its name; '' of the time."""
+    """Axis, or joint as q1 or by its name; '' for the time."""
     unit: str
-    """In lower case; '' where its name tells none."""
+    """Unit in lower case; '' where its name has none."""
     by_robot: bool = False
-    """Whether its name tells that its torques are by the robot on its environment."""
+    """True if its name tells that its torques are by the robot on its environment."""
     twice: bool = False
-    """Whether its name may come again, as in a log with the commands beside the states."""
+    """True if its name may come again, as in a log with the commands beside the states."""
 
 
 class Table:
@@ -142,7 +142,7 @@ class Table:
         return Log(self._place, model, time, arrays, sources, "", by_robot, tuple(notes))
 
     def _parts(self, kind: str) -> dict[str, int]:
-        """Which column holds each part of a kind; of two that a log may have, the first."""
+        """Return the column of each part of a kind; the first where a log has two."""
         parts: dict[str, int] = {}
         for i, column in self._columns.items():
             if column.kind != kind:
@@ -156,7 +156,7 @@ class Table:
         return parts
 
     def _factor(self, i: int) -> float:
-        """What brings a column to SI."""
+        """Return the factor that brings a column to SI."""
         column, name = self._columns[i], self._names[i]
         units = _UNITS[column.kind]
         for unit, factor in units.items():
@@ -212,7 +212,7 @@ class Table:
 
 
 def _columns(names: list[str]) -> dict[int, _Column]:
-    """What columns hold by their names, in lower case, of those that are of use."""
+    """Return the columns that are used, by their names in lower case."""
     logs = {i: log for i, name in enumerate(names) if (log := _LIBFRANKA.fullmatch(name))}
     first = 1 if any("0" in log.groups() for log in logs.values()) else 0
     columns: dict[int, _Column] = {}
@@ -322,7 +322,7 @@ def renamed(place: Path, names: list[str], mapping: str) -> list[str]:
 
 
 def _numbers(names: list[str], pattern: str) -> dict[int, str]:
-    """Which columns a name with a * fits, and the number that stands for it."""
+    """Return the columns that fit a name with a *, and the number that stands for it."""
     form = re.compile(r"(\d{1,2})".join(re.escape(part) for part in pattern.split("*", 1)))
     fits = {i: form.fullmatch(name) for i, name in enumerate(names)}
     return {i: fit[1] for i, fit in fits.items() if fit}

@@ -38,7 +38,7 @@ class TorqueRecording(ImportedRecording):
     """An arm's motion and the external torques on it. N samples of n joints; NaN where there is no torque."""
 
     kind: str
-    """What the external torques were made of: one of `TORQUES`."""
+    """Source of the external torques: one of `TORQUES`."""
     sources: tuple[str, str]
     """Topics or first columns of the torques and of the positions."""
     q: FloatArray

@@ -102,7 +102,7 @@ def _set_inertial(body: mujoco.MjsBody, arm: Arm, i: int, rods: FloatArray | Non
 
 
 def _needs_mass(arm: Arm, link: int) -> bool:
-    """Whether a joint of the arm moves the link and neither it nor what is fixed to it has a mass."""
+    """Return True if a joint of the arm moves the link and neither it nor a link fixed to it has a mass."""
     links, masses, fixed = arm.robot.links, arm.robot.beside.mass, {link}
     for i in range(link + 1, len(links)):
         if links[i].parent in fixed and not arm.moves(i):

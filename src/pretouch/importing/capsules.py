@@ -57,13 +57,13 @@ class LinkBody:
     """The capsules of one link."""
 
     name: str
-    """Of the link."""
+    """Name of the link."""
     rods: FloatArray
     """(K, 7), see `distances`."""
     sticks_out: float
-    """How far the surface sticks out of the capsules at most [m], at its vertices and `_SAMPLES` points between."""
+    """Greatest distance of the surface outside of the capsules [m], at its vertices and `_SAMPLES` points between."""
     stands_over: float
-    """How far the capsules stand over the surface at most, from places about it [m]."""
+    """Greatest distance of the capsules beyond the surface, from places about it [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,7 +145,7 @@ def outside_of(surface: Trimesh) -> Outside:
 
 
 def _inside(places: FloatArray, points: FloatArray, normals: FloatArray, area: float) -> BoolArray:
-    """Whether a surface is wound round places (Q, 3), by points (N, 3) of it and their normals (Barill et al. 2018).
+    """Mask of the places (Q, 3) inside a surface, by points (N, 3) of it and their normals (Barill et al. 2018).
 
     A shell that is open at its ends is wound round what it holds all the same.
     """

@@ -1,4 +1,4 @@
-"""Which of a robot's joints make the arm, one chain of hinges from the first link to the end-effector; their limits."""
+"""Joints of a robot that make the arm, one chain of hinges from the first link to the end-effector; their limits."""
 
 from dataclasses import dataclass
 
@@ -32,7 +32,7 @@ class Arm:
     """The n joints from base to end-effector."""
 
     def moves(self, link: int) -> bool:
-        """Whether one of its joints moves a link against its parent."""
+        """Return True if one of its joints moves a link against its parent."""
         return any(joint in self.joints for joint in self.robot.links[link].joints)
 
 

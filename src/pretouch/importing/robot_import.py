@@ -1,4 +1,4 @@
-"""From a robot's file to everything that the rest of the package takes: the folder of an arm."""
+"""Import of a robot's file as the folder of an arm, which the rest of the package takes."""
 
 import tempfile
 from dataclasses import dataclass, replace
@@ -20,7 +20,7 @@ MJCF = "arm.xml"
 
 @dataclass(frozen=True, kw_only=True)
 class ImportOptions:
-    """What can be said of a robot beside its file: options of `pretouch robot import`."""
+    """Facts that a robot's file does not contain: options of `pretouch robot import`."""
 
     ee: str = ""
     """Link whose origin is the end-effector; by default the most likely one."""
@@ -52,7 +52,7 @@ class Imported:
     bodies: tuple[LinkBody, ...]
     ready: Ready
     remarks: tuple[str, ...]
-    """What was assumed or left out, a sentence each."""
+    """Assumptions and omissions, a sentence each."""
 
 
 def import_robot(file: Path, options: ImportOptions) -> Imported:

@@ -64,7 +64,7 @@ class Joint:
 
     name: str
     index: int
-    """In the model."""
+    """Index in the model."""
     kind: str
     """hinge, slide or other."""
     limits: tuple[float, float] | None
@@ -74,7 +74,7 @@ class Joint:
     effort: float | None
     """Limit [Nm], if the file has one."""
     coupled: bool
-    """Whether another joint leads it, as `mimic` of a URDF has it."""
+    """True if another joint leads it, as `mimic` of a URDF has it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +90,7 @@ class Link:
     shapes: tuple[Shape, ...]
     """Collision shapes, or visual ones where there are none."""
     visual: bool
-    """Whether they are visual ones."""
+    """True if they are visual ones."""
 
     def surface(self) -> Trimesh:
         """Return the triangles of all shapes, link frame."""
@@ -100,7 +100,7 @@ class Link:
 
 @dataclass(frozen=True, eq=False)
 class Beside:
-    """What a URDF says beside the model that MuJoCo makes of it."""
+    """Facts of a URDF that MuJoCo's model does not contain."""
 
     velocity: dict[str, float] = field(default_factory=dict)
     """Speed limits of joints [rad/s]."""
@@ -111,7 +111,7 @@ class Beside:
     meshes: dict[str, list[tuple[bool, Shape]]] = field(default_factory=dict)
     """Meshes of links, and whether for collision."""
     remarks: list[str] = field(default_factory=list)
-    """What is left out or taken otherwise, a sentence each."""
+    """Omissions and changes, a sentence each."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +124,7 @@ class Robot:
 
     @property
     def remarks(self) -> list[str]:
-        """What is left out or assumed, a sentence each: every stage of an import adds its own."""
+        """Omissions and assumptions, a sentence each: every stage of an import adds its own."""
         return self.beside.remarks
 
     @cached_property

@@ -39,7 +39,7 @@ def quaternions(rotation: FloatArray) -> FloatArray:
 
 
 def expectation(obstacles: Obstacles, units: int, params: ThresholdParams) -> FloatArray:
-    """By how much each of the units (K,) expects contact, from 0 to 1; 0 for one that shows no obstacle."""
+    """Contact that each of the units (K,) expects, from 0 to 1; 0 for one that shows no obstacle."""
     expected = np.zeros(units)
     if len(obstacles.unit):
         graded = obstacle_force(obstacles.body_distance, 1.0, params.d_max_m, params.d_min_m)
@@ -68,7 +68,7 @@ def shares(vertices: FloatArray, normals: FloatArray, origin: FloatArray, beam: 
 
 
 def on_surface(share: FloatArray, expected: FloatArray) -> FloatArray:
-    """By how much contact is expected at each vertex (V,), of shares (V, K) and what the units expect (K,)."""
+    """Contact that is expected at each vertex (V,), from shares (V, K) and the units' expectations (K,)."""
     return 1.0 - np.prod(1.0 - share * expected, axis=1)
 
 

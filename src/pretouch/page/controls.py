@@ -1,4 +1,4 @@
-"""What people may change in a live page. Each control puts an action into the queue; the loop does it."""
+"""Controls of a live page. Each puts an action into the queue; the loop carries it out."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -35,7 +35,7 @@ _CLOCK = 0.1, 1.0
 
 @dataclass
 class ClockState:
-    """How time passes."""
+    """Speed of time, and whether it is paused."""
 
     paused: bool = False
     speed: float = 1.0

@@ -1,4 +1,4 @@
-"""Who may open a page: whoever has its address. No page of somebody else may, nor can anybody share it.
+"""Access to a page: whoever has its address may open it. Other sites' pages may not, and nobody can share it.
 
 viser's server asks nobody where they come from, and opens a tunnel to the outside for whoever asks.
 """
@@ -82,7 +82,7 @@ class GuardedServer(ViserServer):
         return "" if secrets.compare_digest(token.encode(errors="surrogateescape"), self._token) else _ADDRESS
 
     def _is_own(self, host: str) -> bool:
-        """Whether a name is this machine's: one that somebody else chose may lead here, a number may not."""
+        """Return True if a host is this machine's: a name that somebody else chose may lead here, a number may not."""
         try:
             name = urlsplit(f"//{host}").hostname or ""
             return name in self._names or bool(ipaddress.ip_address(name))

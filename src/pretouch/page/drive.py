@@ -29,7 +29,7 @@ class Steering:
 
     def __init__(self) -> None:
         self.attended = False
-        """Whether who steers is there: else what is asked ages, and the arm comes to rest."""
+        """True if who steers is there: else what is asked ages, and the arm comes to rest."""
         self.goal: FloatArray | None = None
         """(4, 4) T_O_ee to go to; None: no motion is asked for."""
         self._stamp = 0.0
@@ -64,7 +64,7 @@ class Drive:
 
     @property
     def on(self) -> bool:
-        """Whether the arm is driven."""
+        """True while the arm is driven."""
         return self._simulation.commander is self.steering
 
     async def _choose_task(self, event: Any) -> None:

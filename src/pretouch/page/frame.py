@@ -1,4 +1,4 @@
-"""What a page shows: the world that stands still, one instant in it, and what was asked of the arm then."""
+"""Data that a page shows: the static world, one instant in it, and the motion requested then."""
 
 from dataclasses import dataclass, replace
 
@@ -18,7 +18,7 @@ from pretouch.types import BoolArray, ControlStep, FloatArray, Inputs
 
 @dataclass(frozen=True)
 class World:
-    """What stays the same from one frame to the next, until a person changes it: then there is another `World`."""
+    """Data that stay the same from one frame to the next; a change by a person makes another `World`."""
 
     model: RobotModel
     skin: Skin
@@ -52,10 +52,10 @@ class Frame:
     age: FloatArray | None = None
     """(K,) time since the newest reading of each unit [s]; None where it is not known."""
     inputs: Inputs | None = None
-    """What the step was given, a commander's wish included; None where it is not known."""
+    """Inputs of the step, with the motion that a commander requested; None where they are unknown."""
 
     def late(self, limit: float) -> BoolArray:
-        """Which units (K,) have given no reading for longer than a time [s]."""
+        """Mask of the units (K,) without a reading for longer than a time [s]."""
         if self.age is None:
             return np.zeros(len(self.step.range_distance), dtype=np.bool_)
         return self.age > limit
@@ -63,7 +63,7 @@ class Frame:
 
 @dataclass(frozen=True, slots=True)
 class DrivenMotion:
-    """What a commander asked for and what was commanded in one step. Base frame."""
+    """Motion that a commander requested and motion that was commanded in one step. Base frame."""
 
     velocities: tuple[FloatArray, FloatArray]
     """(3,) of the end-effector's origin [m/s]: asked for, before anything limits it, and commanded."""

@@ -34,13 +34,13 @@ class LivePage:
         self._world, self._time = simulation.world, simulation.time
         self.pace, self.actions = Pace(), ActionQueue()
         self._pointed: FloatArray | None = None
-        """Where the sliders say that the hand is to be."""
+        """Target of the hand by the sliders."""
         self._visited = False
-        """Whether anybody has opened the page: an opening waits until then."""
+        """True if anybody has opened the page: an opening waits until then."""
         self._companions: Companions | None = None
         """Arms beside the page's own; None: it is alone."""
         self._receiver_ended = False
-        """Whether the receiver of the real units has ended."""
+        """True if the receiver of the real units has ended."""
         style_page(server)
         self.status = Status(server.gui)
         if not simulation.real:

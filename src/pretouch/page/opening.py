@@ -28,7 +28,7 @@ _HOME_M = 0.01
 
 
 class Opening:
-    """Where the hand is to be in each control cycle, until `over`."""
+    """Target of the hand in each control cycle, until `over`."""
 
     def __init__(self, model: RobotModel, skin: Skin, path: Path, scale: float, home: FloatArray) -> None:
         """Begin at time 0, with the hand at `home` (3,) [m], where it also returns to.
@@ -40,7 +40,7 @@ class Opening:
         self._home, self._target, self._last = home, home.copy(), 0.0
         self._reacted: float | None = None
         self.over = False
-        """Whether the hand is back where it set out."""
+        """True if the hand is back where it set out."""
 
     def target(self, step: ControlStep) -> FloatArray:
         """Return where the hand is to be next (3,) [m], after a step of the controller."""

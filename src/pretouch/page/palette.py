@@ -76,7 +76,7 @@ def css(colour: Colour) -> str:
 
 
 def legend() -> str:
-    """What the colours in space mean, as HTML."""
+    """Legend of the colours in space, as HTML."""
     marks = "".join(_mark(name, css(colour), 14, 4, 2) for name, colour in _LINES.items())
     marks += _mark("sensed", css(SENSED), 9, 9, 5) + _mark("closest pair", css(PAIR), 14, 2, 0)
     marks += _mark("silent unit", css(UNIT_SILENT), 8, 8, 1)

@@ -103,7 +103,7 @@ class Pace:
 
     def __init__(self) -> None:
         self.slow = False
-        """Whether the machine was too slow for two seconds, and has not kept up for one since."""
+        """True if the machine was too slow for two seconds, and has not kept up for one since."""
         self.factor = self.updates = 0.0
         """Simulated over real time, and updates a second, of the last window."""
         self._shares = (1.0, 1.0)
@@ -137,15 +137,15 @@ class QueuedAction:
 
     run: Callable[[], object]
     settle: float
-    """How long it waits for a newer one of its kind [s]."""
+    """Time that it waits for a newer action of its kind [s]."""
     quiet: bool
-    """Whether it leaves the notice on the page."""
+    """True if it leaves the notice on the page."""
     due: float | None = None
-    """When it is to be run, in the time of the loop [s]; None before the loop has seen it."""
+    """Time to run it, on the loop's clock [s]; None before the loop has seen it."""
 
 
 class ActionQueue:
-    """What people do, from any thread, until the loop does it between two ticks, in order; the newest of each kind."""
+    """Actions of people, from any thread, for the loop to do in order between two ticks; the newest of each kind."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -169,7 +169,7 @@ class ActionQueue:
             self._waiting[key] = QueuedAction(action, settle, quiet)
 
     def is_waiting(self, kind: str) -> bool:
-        """Whether an action of a kind is still to be done."""
+        """Return True if an action of a kind is still to be done."""
         with self._lock:
             return kind in self._waiting
 

@@ -70,7 +70,7 @@ class History:
         self._samples.append(sample)
 
     def column(self, name: str) -> FloatArray:
-        """What is plotted under a name, one row for each sample; of a single sample two."""
+        """Data of a plot by name, one row for each sample; two rows for a single sample."""
         rows = [sample[name] for sample in self._samples]
         if len(rows) == 1:
             rows.insert(0, rows[0] - SAMPLE_S if name == "time" else rows[0])

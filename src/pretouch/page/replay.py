@@ -31,7 +31,7 @@ _MOST = 60
 
 
 def world_of(run: Run) -> World:
-    """What stood still while a run was recorded; of what it does not say, a page shows nothing."""
+    """Static world of a recorded run; a page shows nothing that the recording does not contain."""
     room, planes = surroundings(run.about), run.fixtures.planes
     flat = planes[np.all(planes[:, :3] == (0.0, 0.0, 1.0), axis=1)]
     floor = -float(flat[0, 3]) if len(flat) else 0.0
@@ -40,7 +40,7 @@ def world_of(run: Run) -> World:
 
 
 def frame_of(cycle: Kept) -> Frame:
-    """What a page draws of a recorded step."""
+    """Frame of a page for a recorded step."""
     truth, inputs, age = cycle.truth, cycle.inputs, None
     if inputs is not None and len(inputs.readings.stamp) == len(cycle.step.range_distance):
         age = cycle.step.stamp - inputs.readings.stamp
@@ -51,14 +51,14 @@ def frame_of(cycle: Kept) -> Frame:
 
 
 class Player:
-    """Where in a recording a page is: plays S steps by their stamps (S,) [s]; S is at least 1."""
+    """Position of a page in a recording: plays S steps by their stamps (S,) [s]; S is at least 1."""
 
     def __init__(self, stamps: FloatArray) -> None:
         self._times = (stamps - stamps[0]).tolist()
         self.duration = self._times[-1]
-        """From the first step to the last [s]."""
+        """Time from the first step to the last [s]."""
         self.time = 0.0
-        """Since the first step [s]."""
+        """Time since the first step [s]."""
         self.playing = False
         self.speed = 1.0
 

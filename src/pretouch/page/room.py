@@ -52,7 +52,7 @@ the place's own depth counts."""
 
 @dataclass(frozen=True)
 class Faults(Checked):
-    """What is wrong with the sensor units."""
+    """Faults of the sensor units."""
 
     silenced: frozenset[str] = frozenset()
     """Ids of the units that no longer send."""
@@ -64,28 +64,28 @@ class Faults(Checked):
 
 @dataclass(frozen=True)
 class LiveSettings(Checked):
-    """What a live session begins with, and begins again with at a reset."""
+    """Settings that a live session starts with, also after a reset."""
 
     profile: Profile = field(default_factory=lambda: PROFILES["paper"])
     """Parameters of the controller, restrictions and speed included."""
     path: PathName = "circle"
     """Path of the end-effector."""
     object: ObjectName = "none"
-    """What stands in its way."""
+    """Object in the way of the arm."""
     stiffness: Stiffness = HandSpec.stiffness
     """Stiffness of what the arm can touch, the person's hand and the object [N/m]."""
     faults: Faults = field(default_factory=Faults)
-    """What is wrong with the sensor units."""
+    """Faults of the sensor units."""
     seed: Annotated[int, Check(low=0)] = 0
     """Decides the arm's errors and all noise."""
     plant: PlantParams = field(default_factory=PlantParams)
     """The kind of simulated arm."""
     ranging: RangeFinderParams = field(default_factory=RangeFinderParams)
-    """How simulated units err without faults."""
+    """Errors of simulated units without faults."""
     hand_start: tuple[float, float, float] = (1.0, 0.5, 0.3)
-    """Where the person's hand begins [m], base frame: in view, and clear of both paths."""
+    """Start of the person's hand [m], base frame: in view, and clear of both paths."""
     placement: Placement = field(default_factory=Placement)
-    """Where the paper's paths are for the arm."""
+    """Placement of the paper's paths for the arm."""
 
 
 def settings_for(model: RobotModel, settings: LiveSettings) -> LiveSettings:

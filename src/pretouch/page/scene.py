@@ -1,4 +1,4 @@
-"""What a page shows in space: the room, the arm, what it senses, does and detects, and a person's hand."""
+"""Scene of a page: the room, the arm, its readings, motion and contacts, and a person's hand."""
 
 import math
 from typing import Any

@@ -25,20 +25,20 @@ _EVERYWHERE = {"0.0.0.0": "localhost", "::": "localhost"}  # noqa: S104  # named
 
 @dataclass(frozen=True)
 class ServeOptions:
-    """Where a page is to be found."""
+    """Address of a page."""
 
     host: str = "127.0.0.1"
     """Address to listen on: by default this machine alone can open the page, 0.0.0.0 lets everybody."""
     port: int = 8080
     """Port to listen on."""
     opened: bool = False
-    """Whether to open the page in this machine's browser."""
+    """Open the page in this machine's browser."""
     token: str = field(default_factory=secrets.token_urlsafe, repr=False)
-    """What an address needs to be answered; another for each start."""
+    """Secret part of the address, without which the server does not answer; new at each start."""
 
 
 def url_of(options: ServeOptions) -> str:
-    """What to type into a browser; whoever has it may use the page."""
+    """Address to open in a browser; whoever has it may use the page."""
     host = _EVERYWHERE.get(options.host, options.host)
     return f"http://{f'[{host}]' if ':' in host else host}:{options.port}/{options.token}/"
 
@@ -53,7 +53,7 @@ def announce(options: ServeOptions, what: str, exposed: str, say: Callable[[str]
 
 
 def browser_here() -> bool:
-    """Whether somebody sits at this machine's terminal and has a screen to open a page on."""
+    """Return True if somebody sits at this machine's terminal and has a screen to open a page on."""
     return sys.stdout.isatty() and not os.environ.keys().isdisjoint({"DISPLAY", "WAYLAND_DISPLAY"})
 
 

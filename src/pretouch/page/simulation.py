@@ -46,11 +46,11 @@ class LiveSimulation:
     """
 
     world: World
-    """What stands still; another object after each change of it."""
+    """Static world; another object after each change."""
     frame: Frame
     """The newest instant."""
     room: Room
-    """What is simulated; another one after a reset."""
+    """Simulated room; another object after a reset."""
 
     def __init__(
         self,
@@ -79,7 +79,7 @@ class LiveSimulation:
         self.opening: Opening | None = None
         """The hand's script under way; None: the hand is a person's."""
         self.commander: Callable[[float], Desired | None] = nobody
-        """What is asked of the arm at an instant [s]; None: the path."""
+        """Motion requested of the arm at an instant [s]; None: the path."""
         self._begin(settings or LiveSettings())
 
     def _begin(self, settings: LiveSettings) -> None:
@@ -87,7 +87,7 @@ class LiveSimulation:
         room = Room(settings, path, self.model, self._true_skin, self.real)
         self.notice = self.stop_recording() or self.notice
         self.settings = settings
-        """As it is set by now: what a reset begins with."""
+        """Present settings, which a reset starts with."""
         self.controller = Controller(self.model, self.skin, fixtures(room.scene), path, settings.profile)
         self.room, self._state = room, self.controller.init(room.plant.read())
         self._boxes = surroundings({"scene": described(room.scene)}).boxes
@@ -137,7 +137,7 @@ class LiveSimulation:
 
     @property
     def hand_target(self) -> FloatArray:
-        """Where the hand is to be (3,) [m], base frame."""
+        """Target of the hand (3,) [m], base frame."""
         return self.room.mouse.target
 
     def move_hand(self, target: FloatArray) -> None:
@@ -238,7 +238,7 @@ class LiveSimulation:
             self.stop_recording()
 
     def _about(self) -> dict[str, Any]:
-        """What a recording should say of the session."""
+        """Description of the session for a recording."""
         settings = self.settings
         return {
             "command": "pretouch live",

@@ -1,4 +1,4 @@
-"""What arm and hand are drawn by: the surfaces of capsules, and those of the Panda's vendor.
+"""Surfaces that draw arm and hand: those of capsules, and those of the Panda's vendor.
 
 The vendor's come from the extra `meshes`, if it is installed, and are made coarse enough for a page.
 """
@@ -94,7 +94,7 @@ def coarse(mesh: Trimesh, cell: float = CELL_M) -> Trimesh:
 
 
 def _vendor_folder() -> Path | None:
-    """Where the package keeps the surfaces; it is no Python package, only files."""
+    """Folder of the surfaces' package; it has only files and is no Python package."""
     try:
         listed = files("example-robot-data") or []
     except PackageNotFoundError:

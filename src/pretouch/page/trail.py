@@ -19,7 +19,7 @@ _PERIOD_S = 0.1
 
 
 class Activity(Enum):
-    """How the arm goes along its path."""
+    """Activity of the arm along its path."""
 
     FOLLOWING = palette.FOLLOWING
     AVOIDING = palette.LIMITING

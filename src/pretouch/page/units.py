@@ -100,7 +100,7 @@ class Units:
         self.points.batched_scales = np.where(seen, _POINT_M, _GONE).astype(np.float32)
 
     def _glowing(self, step: ControlStep) -> tuple[BoolArray, BoolArray]:
-        """Which units (K,) see an obstacle, and whose obstacles keep the arm from what it would do."""
+        """Masks of the units (K,) that see an obstacle, and of those whose obstacles restrict the arm."""
         unit, count = step.obstacles.unit, len(self._skin)  # what other sources see is at no unit
         seeing, limiting = np.zeros((2, count), np.bool_)
         seeing[unit[unit < count]] = True

@@ -1,4 +1,4 @@
-"""What a detector decided cycle by cycle, and what another profile would have decided on the same data."""
+"""Decisions of a detector cycle by cycle, and those of another profile on the same data."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ class DetectedContact:
     """A contact that a detector reported."""
 
     time_s: float
-    """When it was detected."""
+    """Time of the detection."""
     force_n: FloatArray
     """(3,) on the robot, base frame: F_ext of eq. 12, or where the joint torques place the contact."""
     axes: str = ""
@@ -54,7 +54,7 @@ class DetectedContact:
 
 @dataclass(frozen=True, kw_only=True)
 class Decisions(DetectorRecord):
-    """What a detector made of the force in S cycles. Forces on the robot, base frame."""
+    """Decisions of a detector in S cycles. Forces on the robot, base frame."""
 
     name: str
     """The profile."""

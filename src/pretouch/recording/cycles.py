@@ -1,4 +1,4 @@
-"""What a file keeps of a control cycle, to bytes and back, to the bit."""
+"""Encoding of a control cycle to bytes and back, to the bit."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -51,11 +51,11 @@ class KeptInputs:
     """Inputs of a step as they are packed."""
 
     inputs: Inputs | None
-    """None where they cannot be kept."""
+    """Inputs of the step; None where they cannot be recorded."""
     points_at: int = -1
     """Number of the step with which the points of outside sources stand: a set is kept once; -1 without any."""
     unreadable: str = ""
-    """What was given where it cannot be kept."""
+    """Text of inputs that cannot be recorded."""
 
 
 @value
@@ -63,19 +63,19 @@ class KeptState:
     """The controller's state before a step, as it is packed."""
 
     anew: bool
-    """Whether it does not follow from the step before."""
+    """True if it does not follow from the step before."""
     state: ControllerState
 
 
 class KeptCycle(NamedTuple):
-    """What is kept of a cycle: bytes of what others may write to again, and values that nobody changes."""
+    """Record of a cycle: bytes of arrays that others may overwrite, and values that nobody changes."""
 
     number: int
-    """Of the step."""
+    """Number of the step."""
     time: int
     """[ns]"""
     run: bytes | None
-    """What describes the run that begins here."""
+    """Description of the run that begins here."""
     state: bytes | None
     """The state the step began with: from here on a file can begin."""
     inputs: bytes
@@ -109,7 +109,7 @@ class Cycles:
         self._run: bytes | None = packed_run(controller, self._about)
         self._snapshot_due = -math.inf
         self._command: FloatArray | None = None
-        """Of the last step; None where the next one cannot be recomputed from it."""
+        """Command of the last step; None where the next one cannot be recomputed from it."""
 
     def keep(self, cycle: Cycle, truth: Truth | None = None) -> KeptCycle:
         """Return what is kept of the next cycle, and of what only a simulation knows."""
@@ -127,7 +127,7 @@ class Cycles:
         return KeptCycle(number, self._time, run, state, inputs, step, truth)
 
     def _goes_on(self, cycle: Cycle) -> bool:
-        """Whether a cycle began with what the one before left, and that can be recomputed."""
+        """Return True if a cycle began with the state that the one before left, and that can be recomputed."""
         memory, command = cycle.before.memory, self._command
         follows = command is not None and memory.get("watch.stamp") == self._last
         return follows and bool((memory.get("command") == command).all())

@@ -73,7 +73,7 @@ class Disk:
             place.unlink()
             raise _refused(place, error) from error
         self.trouble = ""
-        """Why nothing more is written, as a sentence, or ''."""
+        """Reason why nothing more is written, as a sentence, or ''."""
         self._closed = False
         self._thread = threading.Thread(target=self._work, name=f"recording {place.name}", daemon=True)
         self._thread.start()
@@ -81,7 +81,7 @@ class Disk:
 
     @property
     def over(self) -> bool:
-        """Whether nothing more is written."""
+        """True once nothing more is written."""
         return self._closed or bool(self.trouble)
 
     def put(self, job: Job, wait: bool = False) -> None:

@@ -35,14 +35,14 @@ class Message(NamedTuple):
 
 @dataclass(slots=True)
 class Contents:
-    """What was read of a file beside its messages."""
+    """Contents of a file beside its messages."""
 
     library: str = ""
-    """What wrote it."""
+    """Library that wrote the file."""
     schemas: dict[int, Schema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
     complete: bool = False
-    """Whether the file has its end."""
+    """True if the file has its end."""
 
     def add(self, record: object) -> None:
         """Keep a header, a schema or a channel."""

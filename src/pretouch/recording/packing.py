@@ -120,7 +120,7 @@ def _named(hint: Any, value: Any) -> Any:
 
 @cache
 def _buries(hint: Any, above: tuple[Any, ...] = ()) -> bool:
-    """Whether `object` stands within a type: no part's name can stand beside it there."""
+    """Return True if a type contains `object`: no part's name can be written beside it there."""
     inner = [own for _, own in hints_of(hint)] if is_record(hint) and hint not in above else get_args(hint)
     return any(one is object or _buries(one, (*above, hint)) for one in inner)
 

@@ -34,18 +34,18 @@ class Kept:
     number: int
     """The number it had when it was recorded: where some are missing it is not its place."""
     run: int
-    """Which of the runs made it."""
+    """Index of the run that the step belongs to."""
     inputs: Inputs | None
-    """None if they could not be put into a message."""
+    """Inputs of the step; None if they could not be recorded."""
     unreadable: str
-    """Why there are no inputs, or ''."""
+    """Reason why there are no inputs, or ''."""
     step: ControlStep
     truth: Truth | None
-    """None if there was no simulation."""
+    """True values of a simulation; None without one."""
     snapshot: ControllerState | None
     """The state the step began with, at some steps; `Controller.with_places` tells where fields of its memory lie."""
     anew: bool = False
-    """Whether that state does not follow from the step before."""
+    """True if that state does not follow from the step before."""
 
 
 MISSING_INPUTS = "they are missing"
@@ -78,7 +78,7 @@ class Recorded:
         self.place = place
         self.complete = contents.complete
         self.sentence = "" if self.complete else f"{place}: {_CUT}."
-        """What is missing, or ''."""
+        """Sentence on the missing end of the file, or ''."""
         self._contents, self._spans, self._numbers = contents, spans, numbers
         self._firsts, self._lasts = [span.first for span in spans], [span.last for span in spans]
         self._chunk = lru_cache(_CHUNKS)(self._read)

@@ -260,7 +260,7 @@ def _way(name: str, hint: Any, rows: bool) -> Callable[[Any], Any]:
 
 
 def is_record(hint: Any) -> bool:
-    """Whether a type is a dataclass or a named tuple."""
+    """Return True if a type is a dataclass or a named tuple."""
     return isinstance(hint, type) and (is_dataclass(hint) or hasattr(hint, "_fields"))
 
 

@@ -1,4 +1,4 @@
-"""What made the steps of a recording: arm, skin, surroundings, path, parameters and versions, to bytes and back."""
+"""Description of a recorded run: arm, skin, surroundings, path, parameters and versions, to bytes and back."""
 
 import json
 import platform
@@ -116,7 +116,7 @@ class Run:
         self.versions = run.versions
         """Program, libraries and machine it ran on."""
         self.started = run.started
-        """When it began [s since 1970, UTC]."""
+        """Start of the run [s since 1970, UTC]."""
         self.about: dict[str, JSON] = run.about
         """Facts that the caller gave."""
         self.profile: Profile = _sound(lambda: from_table(Profile, run.profile))
@@ -133,7 +133,7 @@ class Run:
 
     @cached_property
     def fixtures(self) -> Fixtures:
-        """What stood around it."""
+        """Fixtures around the arm."""
         return _sound(lambda: Fixtures(self._kept.planes, self._kept.capsules))
 
     @cached_property

@@ -19,7 +19,7 @@ Columns = dict[str, NDArray[Any]]
 
 @dataclass(frozen=True)
 class TrueForces:
-    """What a simulation knows of the forces on the arm."""
+    """True forces on the arm, from a simulation."""
 
     time: FloatArray
     """(M,) instants of the physics [s]."""
@@ -35,7 +35,7 @@ def _threshold_part(row: int, what: str) -> property:
 
 @dataclass(frozen=True, kw_only=True)
 class DetectorRecord:
-    """What a contact detector was given and compared it with, in S cycles. Forces on the robot, base frame."""
+    """Inputs of a contact detector and its thresholds in S cycles. Forces on the robot, base frame."""
 
     time: FloatArray
     """(S,) [s]."""
@@ -82,7 +82,7 @@ class RunRecord(DetectorRecord):
     contacts: tuple[tuple[int, Contact, float], ...]
     """Detections: index of the step, contact, speed of the reaction [m/s]."""
     truth: TrueForces | None
-    """None where it is not known."""
+    """True forces; None where they are unknown."""
 
     @property
     def speed(self) -> FloatArray:

@@ -1,4 +1,4 @@
-"""What only a simulation knows, and what stood round the arm as far as the facts of a run tell."""
+"""True values of a simulation, and the objects round the arm as far as the facts of a run tell."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -14,7 +14,7 @@ from pretouch.values import value
 
 @value
 class Truth:
-    """What only a simulation knows, of the time since the cycle before. M instants of the physics, T touches."""
+    """True values of a simulation since the cycle before. M instants of the physics, T touches."""
 
     time: FloatArray
     """(M,) instants of the physics [s]."""
@@ -79,9 +79,9 @@ class Surroundings:
 
     boxes: tuple[KnownBox, ...] = ()
     hand_radius_m: float | None = None
-    """None without a hand."""
+    """Radius of the person's hand [m]; None without a hand."""
     floor_height_m: float | None = None
-    """In the base frame, None if nobody gave it."""
+    """Height of the floor in the base frame [m]; None if unknown."""
 
 
 def surroundings(about: Mapping[str, Any]) -> Surroundings:

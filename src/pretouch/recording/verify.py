@@ -29,15 +29,15 @@ class Difference:
     """One number or text that was recomputed otherwise than it was recorded."""
 
     field: str
-    """Where it stands, e.g. `qp.qd[3]`; what the controller remembered before a step begins with `state before`."""
+    """Name of the field, e.g. `qp.qd[3]`; the controller's state before a step begins with `state before`."""
     recorded: Any
     recomputed: Any
     size: float
-    """In the field's unit; infinite for what is no number, or is one in one of them only."""
+    """Size in the field's unit; infinite for a value that is no number, or a number on one side only."""
     number: int = -1
-    """Of the step, from 0."""
+    """Number of the step, from 0."""
     stamp: float = math.nan
-    """Of the step [s]."""
+    """Stamp of the step [s]."""
 
 
 def differing(recorded: Any, recomputed: Any, exact: bool, field: str = "") -> Iterator[Difference]:
@@ -95,12 +95,12 @@ _GONE = "gone missing"
 
 @dataclass
 class Verdict:
-    """What recomputing a recording showed."""
+    """Result of recomputing a recording."""
 
     steps: int
-    """In the recording."""
+    """Number of steps in the recording."""
     elsewhere: str
-    """Where it was made, as a sentence, if not by these versions on a machine like this: then not every bit counts."""
+    """Sentence on a recording by other versions or another machine: bits need not be equal; '' otherwise."""
     checked: int = 0
     """Recomputed and compared."""
     skipped: Counter[str] = field(default_factory=Counter)
@@ -125,12 +125,12 @@ class Verdict:
 
     @property
     def exact(self) -> bool:
-        """Whether every bit was compared."""
+        """True if every bit was compared."""
         return not self.elsewhere
 
     @property
     def agrees(self) -> bool:
-        """Whether there was something to compare, nothing differs, and nothing has gone missing from the file."""
+        """True if there was something to compare, nothing differs, and the file lacks nothing."""
         return self.checked > 0 and self.first is None and not {_MISSING, _GONE} & set(self.skipped)
 
     @property

@@ -1,4 +1,4 @@
-"""What a recording is to tools that do not know our messages: standard topics, transforms and markers."""
+"""Topics for viewers that do not know our messages: standard types, transforms and markers."""
 
 import math
 from collections.abc import Iterator, Mapping

@@ -136,11 +136,11 @@ class LastSeconds:
         self.written: list[Path] = []
         """The files so far; each is finished once `close` has returned."""
         self.trouble = ""
-        """Why a file could not be written, as a sentence, or ''."""
+        """Reason why a file could not be written, as a sentence, or ''."""
         self._controller, self._folder = controller, Path(folder)
         self._seconds, self._about = seconds, dict(about or {})
         self._source: Recording | Cycles | None = recording or Cycles(controller, self._about)
-        """What makes bytes of a cycle; None where it cannot."""
+        """Encoder of cycles; None once it has failed."""
         self._run = b""
         self._ring: deque[KeptCycle] = deque()
         self._begins: deque[KeptCycle] = deque()

@@ -1,1 +1,1 @@
-"""What a recording tells, as a page to keep."""
+"""Report of a recording: one page to keep."""

@@ -58,7 +58,7 @@ class FeltContact:
     step: int
     """Index of the control step that detected it."""
     time: float
-    """Of that [s]."""
+    """Time of the detection [s]."""
     contact: Contact
     """Force of eq. 12: the reading above the window's mean, or what explains the torques best; and the axes whose
     threshold or band was crossed, or came nearest to it."""
@@ -71,9 +71,9 @@ class FeltContact:
     reaction_speed: float
     """At its beginning [m/s]."""
     reaction_s: float
-    """How long the reaction lasted [s]."""
+    """Duration of the reaction [s]."""
     moved_s: float
-    """How long the arm moved in it [s]; 0 of a contact that held it still, for it was below what moves the arm."""
+    """Time that the arm moved in it [s]; 0 of a contact too weak to move the arm, which held still."""
     touch: int | None
     """Index of the true touch it answers."""
     delay: float | None
@@ -276,7 +276,7 @@ def _touched(contacts: ContactMeasures) -> Html:
 
 
 def _why(mode: Mode | None) -> Text:
-    """Why a touch has no detection."""
+    """Reason why a touch has no detection."""
     if mode is Mode.REACT:
         return "none: the arm was yielding already"
     return bad("missed" + (" in HOLD" if mode is Mode.HOLD else ""))

@@ -1,4 +1,4 @@
-"""How well the units, the robot's interface and the loop did their work."""
+"""Health of the units, the robot's interface and the loop."""
 
 import numpy as np
 
@@ -77,7 +77,7 @@ def loop_row(course: RunCourse) -> Row:
 
 
 def _fresh(stamp: FloatArray) -> BoolArray:
-    """Whether each stamp (S,) is finite and another than the last finite one."""
+    """Mask of the stamps (S,) that are finite and differ from the last finite one."""
     finite = np.flatnonzero(np.isfinite(stamp))
     fresh = np.zeros(len(stamp), np.bool_)
     fresh[finite] = np.diff(stamp[finite], prepend=np.nan) != 0

@@ -15,7 +15,7 @@ class Measures:
     title: str
     """Name of the file, with as much of its folder as tells it from the others."""
     lacking: str
-    """What is missing of a file that is not complete, as a sentence, or ''."""
+    """Sentence on the missing part of an incomplete file, or ''."""
     course: RunCourse
     contacts: ContactMeasures
     exceeded: list[str]

@@ -1,4 +1,4 @@
-"""How near what was sensed came to the body, how fast the arm went, and how near commands and forces came to limits."""
+"""Distances of sensed objects, speed of the arm, and margins of commands and forces to their limits."""
 
 from collections.abc import Sequence
 from itertools import groupby
@@ -61,7 +61,7 @@ def d_notice(course: RunCourse) -> FloatArray:
 
 
 def within_d_max(course: RunCourse) -> BoolArray:
-    """Whether anything sensed was within d_max of the end-effector's origin (S,)."""
+    """Mask of the steps (S,) with a sensed point within d_max of the end-effector's origin."""
     return np.asarray(course.ee_distance < course.of_runs(lambda run: run.profile.d_max_m))
 
 
@@ -105,7 +105,7 @@ def distance_section(course: RunCourse) -> Html:
 
 
 def speed_section(course: RunCourse) -> Html:
-    """How fast the end-effector went, and when."""
+    """Speed of the end-effector over time."""
     near, tracking = within_d_max(course), course.mode == MODES.index(Mode.TRACK)
     when = {
         "whole recording": np.ones(len(course), np.bool_),
@@ -220,7 +220,7 @@ class Hold(NamedTuple):
     duration: float
     """[s]"""
     sentence: str
-    """Of its first step; what it says of a later one may differ."""
+    """Sentence of its first step; that of a later step may differ."""
 
 
 def holds_in(course: RunCourse) -> list[Hold]:
@@ -243,7 +243,7 @@ def time_in_modes(course: RunCourse) -> dict[Mode, tuple[float, float]]:
 
 
 def mode_section(course: RunCourse) -> Html:
-    """What the arm was doing, each hold, and how the quadratic programs ended."""
+    """Modes of the arm, each hold, and the status of the quadratic programs."""
     modes: list[Row] = [
         {"mode": mode.name, "share": percent(share, 1), "time [s]": number(time, 2)}
         for mode, (time, share) in time_in_modes(course).items()

@@ -85,7 +85,7 @@ class RunCourse(RunRecord):
 
     @property
     def lasted(self) -> FloatArray:
-        """How long each step (S,) lasted: until the next one; the last as long as is usual [s]."""
+        """Duration of each step (S,) until the next one; the median for the last [s]."""
         if len(self) < 2:
             return np.zeros(len(self))
         steps = np.maximum(np.diff(self.time), 0.0)
@@ -93,12 +93,12 @@ class RunCourse(RunRecord):
 
     @property
     def proximity_used(self) -> bool:
-        """Whether any of the profiles looks at what the units say."""
+        """True if any of the profiles uses the units' readings."""
         return any(run.profile.perception is not None for run in self.runs)
 
     @property
     def by_thresholds(self) -> bool:
-        """Whether any of the profiles detects contacts by the paper's thresholds."""
+        """True if any of the profiles detects contacts by the paper's thresholds."""
         return any(isinstance(run.profile.detect, MovingThresholds) for run in self.runs)
 
     @property
@@ -154,7 +154,7 @@ def _block(batch: list[Kept], links: int, units: int) -> Columns:
 
 
 def _near(batch: list[Kept], links: int, units: int) -> Columns:
-    """What was sensed, as the least distance of each step by unit and by link, and the nearest point."""
+    """Least sensed distance of each step by unit and by link, and the nearest point."""
     seen = [cycle.step.obstacles for cycle in batch]
     row = np.repeat(np.arange(len(seen)), [len(o.unit) for o in seen])
     unit = np.concatenate([o.unit for o in seen])
@@ -175,7 +175,7 @@ def _near(batch: list[Kept], links: int, units: int) -> Columns:
 
 
 def _inputs(batch: list[Kept], units: int) -> Columns:
-    """What the steps went by; inputs that a controller could not use may hold anything."""
+    """Inputs of the steps; those that a controller could not use may hold anything."""
     inputs = [cycle.inputs for cycle in batch]
     lacking = RangeReadings(np.full(units, np.nan), np.full(units, np.nan), np.full(units, NO_READING))
     readings = [lacking if i is None or not _fit(i.readings, units) else i.readings for i in inputs]
@@ -194,7 +194,7 @@ def _fit(readings: RangeReadings, units: int) -> bool:
 
 
 class Percentiles(NamedTuple):
-    """How some numbers are spread; NaN of none."""
+    """Percentiles of some numbers; NaN for none."""
 
     median: float
     p99: float

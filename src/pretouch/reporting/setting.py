@@ -1,4 +1,4 @@
-"""What ran, and with which parameters."""
+"""Setting of a run, and its parameters."""
 
 import re
 from dataclasses import fields, is_dataclass, replace
@@ -19,7 +19,7 @@ _PROFILES = 6
 
 
 def setting_section(course: RunCourse, lacking: str) -> Html:
-    """What ran, when, on which arm; and what is lacking of the file, '' if it is whole."""
+    """Section on profile, time and arm of a run; `lacking` names what the file lacks, '' if it is whole."""
     first = course.runs[0]
     rows: list[tuple[Text, Text]] = [
         ("recording", bad(lacking) if lacking else "complete"),
@@ -36,7 +36,7 @@ def setting_section(course: RunCourse, lacking: str) -> Html:
 
 
 def started(run: Run) -> str:
-    """When a run began, in UTC."""
+    """Start of a run, in UTC."""
     try:
         return datetime.fromtimestamp(run.started, UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
     except (ValueError, OverflowError, OSError):
@@ -44,7 +44,7 @@ def started(run: Run) -> str:
 
 
 def _runs(course: RunCourse) -> Html:
-    """Which profile and path were in force when."""
+    """Profile and path by time."""
     rows: list[Row] = []
     for i, run in enumerate(course.runs):
         time = course.time[course.run == i]

@@ -1,4 +1,4 @@
-"""Whether an arm may be moved: it stands, nothing touches it, its units are well, and it is where its path begins."""
+"""Conditions for moving an arm: it stands, nothing touches it, its units are well, it is where its path begins."""
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
@@ -284,7 +284,7 @@ class StandingArm:
     """Height of what is below the arm, base frame [m]."""
     clock: Clock
     approach: bool = False
-    """Whether the arm is going to the start of its path first."""
+    """True if the arm is going to the start of its path first."""
     left_out: Callable[[], float] = lambda: 0.0
     """Time that this machine was too slow to simulate so far [s], where arm and units are simulated."""
 

@@ -1,4 +1,4 @@
-"""What is remembered of a robot from one run to the next: its confirmed force sign, and its learnt free motion.
+"""Memory of a robot from one run to the next: its confirmed force sign and its learnt free motion.
 
 What is read is held against bounds by physics; after a pause less of free motion is still known.
 """
@@ -47,9 +47,9 @@ class Identity:
     """A robot, and through what it is spoken to: with any of it changed, the push is asked for again."""
 
     kind: str
-    """As `panda`, `fr3`, `ros2`."""
+    """Kind of arm, as `panda`, `fr3`, `ros2`."""
     address: str
-    """Where it is."""
+    """Network address of the arm."""
     connection: str
     """Library, driver settings and versions that lie between."""
 
@@ -73,7 +73,7 @@ class ConfirmedRobots:
         self.path = folder / _SIGN_FILE
 
     def is_confirmed(self, robot: Identity) -> bool:
-        """Whether this robot has been confirmed; a file that cannot be read is a RobotError."""
+        """Return True if this robot has been confirmed; a file that cannot be read is a RobotError."""
         return self._read().get(robot.key) == robot.connection
 
     def add(self, robot: Identity) -> None:
@@ -113,11 +113,11 @@ class _StoredMotion(msgspec.Struct):
     arm: str
     joints: list[str]
     robot: str
-    """Which robot it was learnt of, as `panda at 172.16.0.2`."""
+    """Robot that the model was learnt on, as `panda at 172.16.0.2`."""
     since: float
-    """When that began [s since 1970, UTC]."""
+    """Start of learning [s since 1970, UTC]."""
     saved: float
-    """When it was written [s since 1970, UTC]."""
+    """Time of writing [s since 1970, UTC]."""
     array: dict[str, _StoredArray]
 
 
@@ -205,13 +205,13 @@ def rested(model: ResidualModel, pause_s: float, p: SequentialParams) -> Residua
 
 @dataclass(frozen=True)
 class ModelFile:
-    """Where free motion is saved."""
+    """File that free motion is saved in."""
 
     robot: str
-    """What the robot is known by: kind, address, and the payload set in it."""
+    """Identity of the robot: kind, address, and the payload set in it."""
     path: Path
     named: bool
-    """Whether a person named the file: what cannot be used is then an error, and another robot's is taken."""
+    """True if a person named the file: what cannot be used is then an error, and another robot's is taken."""
 
 
 def model_file_of(robot: str, folder: Path) -> ModelFile:
@@ -224,9 +224,9 @@ class FreeMotion:
     """A recorder that remembers what the controller has learnt, and saves it at the end of a run."""
 
     begin: ResidualModel | None = None
-    """What the controller is to begin with; None: it knows nothing."""
+    """Model that the controller starts with; None: nothing is learnt yet."""
     sentence = "This robot's free motion is not known yet: at first only firm pushes are detected."
-    """What is known."""
+    """Sentence on the model that was loaded."""
 
     def __init__(
         self, file: ModelFile, controller: Controller, relearn: bool = False, now: Callable[[], float] = time.time

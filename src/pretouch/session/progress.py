@@ -1,4 +1,4 @@
-"""What is said of a run: progress messages, its summary, and what became of a push."""
+"""Messages of a run: progress, summary, and the outcome of a push."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field

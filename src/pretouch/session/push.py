@@ -38,7 +38,7 @@ TIMEOUT_S = 60.0
 
 @dataclass(frozen=True)
 class Direction:
-    """Where a person is asked to push the hand."""
+    """Direction in which a person is asked to push the hand."""
 
     axis: tuple[float, float, float]
     """Unit vector, base frame."""
@@ -53,7 +53,7 @@ DIRECTIONS = (
 
 
 class PushVerdict(Enum):
-    """What a push has shown."""
+    """Result of a push."""
 
     AS_ASKED = "as asked"
     OPPOSITE = "opposite"
@@ -79,7 +79,7 @@ class PushEvaluator:
 
     @property
     def pushed(self) -> bool:
-        """Whether somebody pushes."""
+        """True while somebody pushes."""
         return bool(np.linalg.norm(self.force) >= self._least)
 
     def take(self, state: RobotState) -> PushVerdict | None:

@@ -42,16 +42,16 @@ _ALIVE_EVERY = 50
 
 @dataclass
 class Ending:
-    """How a motion ended: written as it does, to be read whatever is raised then."""
+    """End of a motion: written when it ends, and readable whatever is raised then."""
 
     stopped: str = ""
-    """Why it ended early, as a sentence; '' if it did not."""
+    """Reason of an early end, as a sentence; '' if it did not end early."""
     rest_unknown: str | None = None
-    """Why the arm may not be at rest, as a sentence; '' if it is, None if nobody has brought it to rest or looked."""
+    """Reason why the arm may not be at rest, as a sentence; '' if it is at rest, None if nobody has checked."""
 
     @property
     def early(self) -> bool:
-        """Whether it did not end as asked."""
+        """True if it did not end as requested."""
         return bool(self.stopped or self.rest_unknown)
 
     def failed(self, arm: Arm, error: Exception) -> None:
@@ -126,7 +126,7 @@ def announcement(controller: Controller, seconds: float, way: Plan | None, asks:
 
 
 class RunFiles:
-    """What records a run: a recording, if one is asked for, and the last seconds before each HOLD that latches."""
+    """Files of a run: a recording, if requested, and the last seconds before each HOLD that latches."""
 
     def __init__(
         self,
@@ -151,7 +151,7 @@ class RunFiles:
 
     @property
     def trouble(self) -> str:
-        """Why the recording that was asked for is not whole, as a sentence, or ''."""
+        """Reason why the requested recording is incomplete, as a sentence, or ''."""
         return self._recording.trouble if self._recording else ""
 
     def close(self) -> tuple[str, ...]:
@@ -223,14 +223,14 @@ def execute(
 
 
 class _Until:
-    """When a run is over."""
+    """Condition that ends a run."""
 
     def __init__(self, seconds: float, skin: Skin) -> None:
         self._seconds, self._units = seconds, skin if isinstance(skin, NetworkSkin) else None
         self._begin, self._steps = 0.0, 0
 
     def __call__(self, step: ControlStep) -> bool:
-        """Whether this step was the last; a receiver that has ended is a HardwareError."""
+        """Return True if this step was the last; a receiver that has ended is a HardwareError."""
         self._begin = self._begin if self._steps else step.stamp
         self._steps += 1
         if self._units and self._steps % _ALIVE_EVERY == 0 and not self._units.alive:
@@ -310,7 +310,7 @@ def _run_motion(arm: Arm, move: Callable[[list[int]], str], ending: Ending) -> N
 
 
 def _is_at_rest(arm: Arm) -> bool:
-    """Whether an arm whose motion could not be ended is seen to stand, as after a stop of its own."""
+    """Return True if an arm whose motion could not be ended stands, as after a stop of its own."""
     begin = time.monotonic()
     while time.monotonic() < begin + _STAND_S:
         with suppress(Exception):  # whatever it is, the arm is not seen to stand

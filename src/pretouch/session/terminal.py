@@ -47,13 +47,13 @@ class BackgroundPrinter:
 
 
 class EnterKey:
-    """Whether Enter was pressed since the last time it was asked; never, without a terminal."""
+    """True if Enter was pressed since the previous call; never without a terminal."""
 
     def __init__(self, descriptor: int | None = None) -> None:
         """Take the file descriptor to listen at; by default that of the standard input."""
         self._descriptor = _standard_input() if descriptor is None else descriptor
         self.possible = self._descriptor is not None and os.isatty(self._descriptor)
-        """Whether there is a terminal."""
+        """True if there is a terminal."""
 
     def __call__(self) -> bool:
         """Return it without waiting."""

@@ -1,4 +1,4 @@
-"""What a unit's clock is on the host's: bounds on the offset that hold whatever the network does.
+"""Offset of a unit's clock from the host's, as bounds that hold whatever the network does.
 
 A beacon sent at t1 [host] is heard at t2 [unit], not before it was sent: offset >= t1 - t2. A sample made at t3 [unit]
 arrives at t4 [host], not before it was made: offset <= t4 - t3. Late packets make the bounds loose, never wrong.
@@ -27,7 +27,7 @@ class UnitClock:
             window: how long a bound counts [s].
         """
         self.jumps = 0
-        """How often the bounds contradicted each other: the unit's clock jumped, or drifts more than it should."""
+        """Number of contradictions of the bounds: the unit's clock jumped, or drifts more than it should."""
         self._drift, self._window = drift, window
         # (instant, bound as of instant 0): all loosen at one rate, so that their order never changes
         self._lows: deque[tuple[float, float]] = deque(maxlen=_MOST)
@@ -38,7 +38,7 @@ class UnitClock:
         self.high = math.inf
         """Largest offset there can be, as of the newest sample [s]."""
         self.known = False
-        """Whether both bounds are there."""
+        """True if both bounds are there."""
         self.last_reading = -math.inf
         """Instant of the newest reading that was stamped [s], unit's clock."""
         self._last_stamp = -math.inf

@@ -1,4 +1,4 @@
-"""What is wrong with a unit, as sentences: unit, value, limit, and what to do."""
+"""Faults of a unit as sentences: unit, value, limit, and what to do."""
 
 import math
 from collections.abc import Iterable
@@ -59,7 +59,7 @@ def findings(units: Iterable[UnitHealth], params: HealthParams, late: float = 0.
 
 
 class _Findings(list[Finding]):
-    """What is wrong with one unit; each sentence goes on from its name."""
+    """Faults of one unit; each sentence continues after the unit's name."""
 
     def __init__(self, unit: str) -> None:
         super().__init__()
@@ -220,7 +220,7 @@ def _clock(wrong: _Findings, unit: UnitHealth, params: HealthParams) -> None:
 
 
 def _unbroken(unit: UnitHealth, params: HealthParams) -> bool:
-    """Whether the window holds neither a silence nor a reboot."""
+    """Return True if the window contains neither a silence nor a reboot."""
     return unit.gap_s <= params.silent_s and not unit.reboots
 
 

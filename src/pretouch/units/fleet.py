@@ -55,9 +55,9 @@ class NetworkParams(Checked):
     """The network between the units of a skin and their receiver."""
 
     up: ChannelParams = ChannelParams()
-    """From units to receiver: latency and jitter as of `sim.range_finder.RangeFinderParams`."""
+    """Channel from units to receiver: latency and jitter as of `sim.range_finder.RangeFinderParams`."""
     down: ChannelParams = ChannelParams(delay_s=0.0012, jitter_s=0.0012, jitter_shape=2.0)
-    """From receiver to units: a quiet access point, with power saving of the units off."""
+    """Channel from receiver to units: a quiet access point, with power saving of the units off."""
 
 
 class Channel(Generic[Item]):
@@ -67,7 +67,7 @@ class Channel(Generic[Item]):
         self._params, self._rng = params, rng
         self._sent = UnderWay[Item]()
         self.lost = 0
-        """How many were lost so far."""
+        """Number of datagrams lost so far."""
 
     def put(self, item: Item, now: float) -> None:
         """Send a datagram at a time [s]."""
@@ -92,11 +92,11 @@ class FleetParams(Checked):
     """Units, and the network between them and their receiver."""
 
     network: NetworkParams = NetworkParams()
-    """What becomes of datagrams."""
+    """Loss and delay of datagrams."""
     unit: UnitParams = field(default_factory=UnitParams)
-    """How units keep their time and their sessions."""
+    """Clocks and sessions of the units."""
     imu: ImuParams | None = None
-    """How their IMUs err; None, and they have none."""
+    """Errors of their IMUs; None: the units have no IMU."""
     reboot_every_s: NonNegative = 0.0
     """Time from each reboot of a unit to its next one, the first at a random part of it [s]; 0: none."""
 
@@ -123,7 +123,7 @@ class Fleet:
             SimulatedUnit(key, params.unit, own, params.imu, _reboots(params.reboot_every_s, own), side)
             for key, side, (own, _, _) in zip(keys_of(ids, keys), network.zones, rngs, strict=True)
         )
-        """In the order of the skin."""
+        """Units in the order of the skin."""
         self._rows = [
             (unit, zone) for unit, side in zip(self.units, network.zones, strict=True) for zone in range(side**2)
         ]

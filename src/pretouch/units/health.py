@@ -1,4 +1,4 @@
-"""How well a sensor unit does: numbers from what was heard of it in the last seconds."""
+"""Health of a sensor unit: numbers from the datagrams of the last seconds."""
 
 import math
 from collections import Counter, deque
@@ -128,7 +128,7 @@ class UnitHealth:
     bus_errors: int
     """Failed transfers on its bus within the window."""
     restarts: int
-    """How often it initialised a sensor anew within the window."""
+    """Number of times that it initialised a sensor again within the window."""
     clock_unknown_s: float
     """For how long its clock has not been known, within the window [s]; 0 while it is."""
     range_late: int
@@ -148,7 +148,7 @@ class UnitHealth:
 
 
 class Lateness:
-    """By how much this machine was late within the last seconds: what it looks at then seems late too."""
+    """Delay of this machine within the last seconds: a late machine makes its units seem late."""
 
     def __init__(self, every: float, length: float) -> None:
         """Take the time between two looks when it is not late, and the length of the window [s]."""
@@ -173,7 +173,7 @@ class Lateness:
 
 
 class UnitWindow:
-    """What was heard of one unit within the last seconds."""
+    """Datagrams of one unit within the last seconds."""
 
     def __init__(self, length: float) -> None:
         """Take the window's length [s]."""

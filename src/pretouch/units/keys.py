@@ -50,7 +50,7 @@ class UnitKey:
 
     @property
     def fingerprint(self) -> str:
-        """What tells keys apart without showing them: the first 8 hex digits of the SHA-256."""
+        """First 8 hex digits of the SHA-256: they identify a key without revealing it."""
         return sha256(self.key).hexdigest()[:8]
 
 

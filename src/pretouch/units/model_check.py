@@ -1,4 +1,4 @@
-"""Whether what a unit reports agrees with what the model says it must see: the arm itself, and declared fixtures."""
+"""Comparison of a unit's readings with those that the model predicts of the arm itself and declared fixtures."""
 
 from collections import deque
 

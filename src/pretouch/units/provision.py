@@ -25,7 +25,7 @@ _SSID_MOST, _PASSWORD_LEAST, _PASSWORD_MOST = 32, 8, 63
 
 @dataclass(frozen=True)
 class Network(Checked):
-    """Where a unit sends, and what it carries; values that no unit can have are refused."""
+    """Address that a unit sends to, and its sensors; values that no unit can have are refused."""
 
     ssid: str
     """Name of the Wi-Fi network (2.4 GHz)."""

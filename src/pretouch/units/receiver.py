@@ -103,7 +103,7 @@ class SkinReceiver:
         self._by_number = {unit.number: endpoint for unit, endpoint in zip(keyed, self._endpoints, strict=True)}
         self.units: tuple[UnitTraffic, ...] = tuple(endpoint.traffic for endpoint in self._endpoints)
         self.rejected: dict[str, int] = dict.fromkeys(REASONS, 0)
-        """How many datagrams were thrown away, by reason (`REASONS`)."""
+        """Number of rejected datagrams, by reason (`REASONS`)."""
         self.unsent = 0
         """Beacons the system did not take."""
         self.taken = 0
@@ -117,11 +117,11 @@ class SkinReceiver:
         self._poll.register(self._socket, select.POLLIN)
         host, port = self._socket.getsockname()[:2]
         self.address: tuple[str, int] = (host, port)
-        """Where it listens."""
+        """Address that it listens on."""
 
     @property
     def behind(self) -> bool:
-        """Whether the last call of `receive` left datagrams for the next."""
+        """True if the last call of `receive` left datagrams for the next."""
         return self.taken == DRAIN_MOST
 
     @property

@@ -43,7 +43,7 @@ ANSWERS_PER_S = 20.0
 
 
 class ReplayWindow:
-    """Which sequence numbers of a session have been accepted."""
+    """Sequence numbers that a session has accepted."""
 
     def __init__(self) -> None:
         self.newest = 0
@@ -51,7 +51,7 @@ class ReplayWindow:
         """Bit k: the number `newest` - k was accepted; there are none below 1 to miss."""
 
     def admits(self, sequence: int) -> bool:
-        """Whether a number is new: greater than all, or one of the last 64 and not seen yet."""
+        """Return True if a number is new: greater than all, or one of the last 64 that has not been accepted yet."""
         behind = self.newest - sequence
         return behind < 0 or (behind < WIDTH and not self._seen >> behind & 1)
 
@@ -76,7 +76,7 @@ class ReplayWindow:
 
 
 class RateLimiter:
-    """So many a second, and as many at once."""
+    """Limit on the actions a second; as many are allowed at once."""
 
     def __init__(self, rate: float) -> None:
         self.rate = rate
@@ -98,13 +98,13 @@ class Session:
     def __init__(self, key: Mac, hello: Hello, nonce: bytes, now: float) -> None:
         self.hello, self.nonce = hello, nonce
         self.offered = now
-        """When it was offered [s]."""
+        """Time of the offer [s]."""
         self.mac = session_mac(key, hello.challenge, nonce)
         self.window = ReplayWindow()
         self.number = 0
-        """Of the last beacon."""
+        """Number of the last beacon."""
         self.sent: dict[int, float] = {}
-        """When the last 64 beacons were sent [s]."""
+        """Send times of the last 64 beacons [s], by number."""
 
     def beacon(self, key: Mac, now: float) -> bytes:
         """Make the next beacon, to be sent at once."""
@@ -115,7 +115,7 @@ class Session:
 
 
 class UnitLink:
-    """What the receiver knows of one unit's sessions."""
+    """State of the receiver for the sessions of one unit."""
 
     def __init__(self, key: bytes, draw: Callable[[int], bytes]) -> None:
         """Know of no session; `draw` gives so many random bytes."""
@@ -125,7 +125,7 @@ class UnitLink:
         """Sessions on offer by their challenge, the oldest first."""
         self._answers = RateLimiter(ANSWERS_PER_S)
         self.beacon_due = math.inf
-        """When the live session's next beacon is to be sent [s]; never while there is none."""
+        """Send time of the live session's next beacon [s]; infinite while there is no session."""
 
     def hello(self, datagram: memoryview, now: float) -> bytes | str:
         """Return the answer to a datagram that looks like a hello, to be sent at once; or why there is none."""

@@ -18,7 +18,7 @@ Value = TypeVar("Value")
 
 
 class SharedMemory:
-    """So many bytes, zero at first, that two processes share. Passed to a spawned process, it is the same memory there.
+    """Bytes, zero at first, that two processes share. A spawned process that receives it uses the same memory.
 
     It has no name, so it is gone with the last of the two, however they end.
     """

@@ -46,7 +46,7 @@ _BATTERY_MV, _TEMPERATURE_CDEG = 3900, 3100
 
 @dataclass(frozen=True)
 class UnitParams(Checked):
-    """How a simulated unit keeps its time and its session."""
+    """Clock and session of a simulated unit."""
 
     hello_s: Positive = 0.1
     """Mean time between hellos, spread by a quarter either way [s] (firmware)."""
@@ -57,10 +57,10 @@ class UnitParams(Checked):
     longest_s: Positive = 0.025
     """Time from one sample to the next while there is no new range [s] (firmware)."""
     ready_s: NonNegative = 0.01
-    """From the middle of a measurement until the unit has it [s]: half the budget of 15 ms, bus, and a pass of its loop
+    """Time from the middle of a measurement until the unit has it [s]: half the budget of 15 ms, bus, loop
     (firmware's tests: 9 to 12 ms)."""
     boot_s: NonNegative = 2.0
-    """From a reset to the first hello [s]: start of the firmware and joining the network; an assumption."""
+    """Time from a reset to the first hello [s]: start of the firmware and joining the network; an assumption."""
     drift_ppm: NonNegative = 20.0
     """Each unit's clock is fast or slow by up to this [1e-6]: a common crystal."""
     age_max_s: Positive = 600.0
@@ -95,9 +95,9 @@ class SimulatedUnit:
         self._next_reboot = next(self._reboots, np.inf)
         self._imu_scale, self._imu_rate = (0, 0) if imu is None else (_scale(imu), round(imu.rate_hz))
         self.silent = False
-        """Whether it neither sends nor hears: out of power, or out of reach."""
+        """True if it neither sends nor hears: out of power, or out of reach."""
         self.stuck = False
-        """Whether its range finder repeats what it measured last."""
+        """True if its range finder repeats what it measured last."""
         self._forget()
 
     def _forget(self) -> None:
@@ -123,7 +123,7 @@ class SimulatedUnit:
 
     @property
     def in_session(self) -> bool:
-        """Whether it sends samples."""
+        """True while it sends samples."""
         return self._session is not None
 
     def reboot(self, now: float) -> None:

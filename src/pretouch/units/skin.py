@@ -56,7 +56,7 @@ class Traffic:
 
 
 class SharedOutputs:
-    """Where a receiver puts what it has; as an argument of a process that is being spawned it is the same there."""
+    """Shared memory for a receiver's results; a spawned process that takes it as an argument shares it."""
 
     def __init__(self, units: NetworkUnits, traffic: Traffic) -> None:
         """Make them for units that have measured nothing, and of which so much is counted."""
@@ -121,7 +121,7 @@ class NetworkSkin:
 
     @property
     def alive(self) -> bool:
-        """Whether the receiver's process runs; only the process that started it can tell."""
+        """True while the receiver's process runs; only the process that started it can tell."""
         if os.getpid() != self._owner:
             raise HardwareError(f"The receiver belongs to process {self._owner}: query it in that process.")
         return self._process.is_alive()

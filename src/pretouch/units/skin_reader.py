@@ -46,7 +46,7 @@ class UnitTrace:
     """Its datagrams, in the order in which they came; `unit` is the index of the unit in the recording."""
     range: RangeTrace
     imu: ImuTrace
-    """In the order of the datagrams; stamps are NaN where nothing tells them, see `calibration.stamps.instants`."""
+    """Samples in the order of the datagrams; unknown stamps are NaN, see `calibration.stamps.instants`."""
     acceleration_max: float
     """Largest that the accelerometer could tell [m/s^2]; inf without a sample."""
     angular_velocity_max: float
@@ -58,13 +58,13 @@ class SkinTrace:
     """A recording of sensor units. All times are of one clock, but for the units' unknown delays."""
 
     units: dict[str, UnitTrace]
-    """By name, in the order in which they were first heard."""
+    """Units by name, in the order of their first datagrams."""
     joints: JointTrace | None
-    """Where the arm's joints were, if that was recorded."""
+    """Joint positions of the arm, if they were recorded."""
     joint_names: tuple[str, ...]
     """Names of these joints, in the order of the columns."""
     complete: bool
-    """Whether the recording was ended in order."""
+    """True if the recording was ended in order."""
 
 
 def read_skin(place: Path) -> SkinTrace:

@@ -1,4 +1,4 @@
-"""What sensor units send, recorded without a controller: one MCAP file for the usual viewers and for calibration."""
+"""Recording of sensor units without a controller: one MCAP file for the usual viewers and for calibration."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from functools import partial

@@ -39,7 +39,7 @@ NOTHING = (-math.inf, 0.0, float(RangeStatus.NONE), -math.inf, 0.0, math.nan, fl
 
 @dataclass(slots=True)
 class UnitTraffic:
-    """What was heard of one unit: plain numbers, cheap to keep."""
+    """Counts of the datagrams of one unit: plain numbers, cheap to keep."""
 
     id: str
     number: int
@@ -59,11 +59,11 @@ class UnitTraffic:
     firmware: int = 0
     """Version that it sent as its session began: major * 256 + minor."""
     reset: int = Reset.UNKNOWN
-    """Why it last began anew, by what it sent then: a `Reset`."""
+    """Reason of its last restart, as it reported it: a `Reset`."""
     address: Address | None = None
     """Host and port of its last sample."""
     last_arrival: float = -math.inf
-    """When its last sample arrived [s]."""
+    """Arrival of its last sample [s]."""
     last_reading_stamp: float = -math.inf
     """Stamp of its newest reading [s]."""
     offset: float = math.nan
@@ -71,9 +71,9 @@ class UnitTraffic:
     bound: float = math.inf
     """Most the true offset differs from it [s]."""
     clock_jumps: int = 0
-    """How often the unit's clock contradicted itself."""
+    """Number of times that the unit's clock contradicted itself."""
     stuck: bool = False
-    """Whether its readings repeat to the last digit."""
+    """True if its readings repeat to the last digit."""
     zones: int = 1
     """Zones along each side of its sensor, by the skin."""
     zones_told: int = 0
@@ -89,7 +89,7 @@ class Received:
     unit: int
     """Index in the `NetworkUnits` of the skin."""
     arrival: float
-    """When it was taken in [s], host's clock."""
+    """Time at which it was received [s], host's clock."""
     stamp: float
     """Stamp of its range reading [s], the earliest it can have been; NaN if it has none, or it cannot be known."""
     offset: float
@@ -151,7 +151,7 @@ class StuckDetector:
 
 
 class UnitEndpoint:
-    """What is known of one unit. Times in seconds of the host's clock."""
+    """Address, sessions and traffic of one unit. Times in seconds of the host's clock."""
 
     def __init__(self, index: int, unit: UnitKey, zones: int, draw: Callable[[int], bytes], rows: FloatArray) -> None:
         """Know nothing yet of the unit with this index in the `NetworkUnits` of the skin.
@@ -161,7 +161,7 @@ class UnitEndpoint:
         self._reading, self._touch = rows[:, :3], rows[0, 3:]
         self.traffic = UnitTraffic(unit.id, unit.number, zones=zones)
         self.address: Address | None = None
-        """Where its last sample came from, as the socket knows it."""
+        """Address that its last sample came from, as the socket knows it."""
         self._index = index
         self._link = UnitLink(unit.key, draw)
         self._clock = UnitClock(DRIFT, CLOCK_WINDOW_S)

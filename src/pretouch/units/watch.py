@@ -20,17 +20,17 @@ _COMPARE_S = 0.04
 
 @dataclass(frozen=True)
 class WatchUpdate:
-    """What was received since the previous update, and the health of the units."""
+    """Samples since the previous update, and the health of the units."""
 
     time: float
     """Instant, by the receiver's clock [s]."""
     elapsed: float
-    """Since watching began [s]."""
+    """Time since watching began [s]."""
     heard: list[Received]
     units: tuple[UnitHealth, ...]
     findings: tuple[Finding, ...]
     last: bool
-    """Whether the duration is over."""
+    """True if the duration is over."""
 
 
 class UnitWatch:

@@ -66,7 +66,7 @@ _HELLO_LABEL, _BEACON_LABEL, _SESSION_LABEL = b"PT1HELLO", b"PT1BEACN", b"PT1SES
 
 
 class Kind(IntEnum):
-    """What a datagram is."""
+    """Kind of a datagram."""
 
     HELLO = 1
     BEACON = 2
@@ -74,7 +74,7 @@ class Kind(IntEnum):
 
 
 class Flag(IntFlag):
-    """What a sample says of its unit."""
+    """State of a unit, as its sample reports it."""
 
     RANGE_NEW = 1
     """It holds a range measured since the last one."""
@@ -100,7 +100,7 @@ _TOUCH, _ZONES = int(Flag.TOUCH), int(Flag.ZONES)
 
 
 class Reset(IntEnum):
-    """Why a unit began anew."""
+    """Reason of a unit's restart."""
 
     UNKNOWN = 0
     POWER_ON = 1
@@ -146,7 +146,7 @@ class Hello:
     uptime_us: int
 
     def encode(self, key: Mac) -> bytes:
-        """As a datagram under the unit's key."""
+        """Encode as a datagram under the unit's key."""
         hello = HELLO.pack(self.firmware, self.reset, 0, self.challenge, self.uptime_us)
         body = PREFIX.pack(MAGIC, VERSION, Kind.HELLO, self.unit) + hello
         return body + key.tag(_HELLO_LABEL, body)
@@ -171,7 +171,7 @@ class Beacon:
     nonce: bytes
 
     def encode(self, key: Mac, challenge: bytes) -> bytes:
-        """As a datagram under the unit's key, for the unit that sent this challenge."""
+        """Encode as a datagram under the unit's key, for the unit that sent this challenge."""
         body = PREFIX.pack(MAGIC, VERSION, Kind.BEACON, self.unit) + BEACON.pack(self.number, self.nonce)
         return body + key.tag(_BEACON_LABEL, challenge, body)
 
@@ -192,7 +192,7 @@ def decode_beacon(datagram: bytes, key: Mac, challenge: bytes) -> Beacon | None:
 
 @dataclass(slots=True)
 class Sample:
-    """What a unit measured since its last sample. Integers as on the wire; properties in SI units."""
+    """Measurements of a unit since its last sample. Integers as on the wire; properties in SI units."""
 
     unit: int
     flags: int
@@ -204,7 +204,7 @@ class Sample:
     beacon: int
     """Number of the last beacon it heard."""
     beacon_hold_us: int
-    """How long ago it heard it [us]."""
+    """Time since it heard the beacon [us]."""
     battery_mv: int
     """Voltage of its battery [mV]; 0 if it cannot tell."""
     temperature_cdeg: int
@@ -218,7 +218,7 @@ class Sample:
     range_mm: int
     """Distance [mm]."""
     range_age_us: int
-    """From the middle of the measurement to `time_us` [us]."""
+    """Time from the middle of the measurement to `time_us` [us]."""
     range_sigma: int
     """Standard deviation of the distance, estimated by the sensor [mm / 4]."""
     range_signal: int
@@ -237,7 +237,7 @@ class Sample:
     """Number of the first IMU sample in this datagram since the unit began to serve; lost ones are counted, as far as
     known."""
     imu_age_us: int
-    """From the newest IMU sample to `time_us` [us]."""
+    """Time from the newest IMU sample to `time_us` [us]."""
     imu: bytes = b""
     """`imu_count` times `IMU_SAMPLE`."""
     touch: bytes = b""
@@ -246,12 +246,12 @@ class Sample:
     """`ZONES` and each zone's `ZONE` with `Flag.ZONES`, else nothing. The fields of the range are of the nearest."""
 
     def body(self) -> bytes:
-        """As a datagram without its tag: what `sample_of` takes."""
+        """Encode as a datagram without its tag, as `sample_of` takes it."""
         body = PREFIX.pack(MAGIC, VERSION, Kind.SAMPLE, self.unit) + SAMPLE.pack(*_NUMBERS(self))
         return body + self.imu + self.touch + self.zones
 
     def encode(self, session: Mac) -> bytes:
-        """As a datagram of a session."""
+        """Encode as a datagram of a session."""
         body = self.body()
         return body + session.tag(body)
 
@@ -304,21 +304,21 @@ def zones_size(side: int) -> int:
 
 @dataclass(frozen=True, slots=True)
 class TouchPart:
-    """What a sample says of being touched. Integers as on the wire."""
+    """Touch readings of a sample. Integers as on the wire."""
 
     contact: int
     """1 if the unit is touched, 0 if not."""
     status: int
     """A `TouchStatus`."""
     raw: int
-    """What the sensor's converter measured [mV], for calibration; 0 of another sensor."""
+    """Voltage at the sensor's converter [mV], for calibration; 0 of another sensor."""
     force_mn: int
     """Size of the force [mN]; `NO_FORCE` where it is not measured."""
     age_us: int
-    """From the measurement to `Sample.time_us` [us]."""
+    """Time from the measurement to `Sample.time_us` [us]."""
 
     def encode(self) -> bytes:
-        """As it stands in a sample."""
+        """Encode as a part of a sample."""
         return TOUCH.pack(self.contact, self.status, self.raw, self.force_mn, self.age_us)
 
 

@@ -127,7 +127,7 @@ class FrankaArm:
 
     @property
     def communication(self) -> Communication:
-        """How well the process kept up, in the motions that have ended."""
+        """Timing of the process in the motions that have ended."""
         return self._mailboxes.report.read()
 
     def report(self) -> str:
@@ -182,7 +182,7 @@ class FrankaArm:
             time.sleep(_LOOK_S)
 
     def _at_rest(self, feedback: Feedback) -> bool:
-        """Whether a motion has ended; a RobotError where no state tells."""
+        """Return True if a motion has ended; a RobotError where no state tells."""
         if feedback.moving:
             self._demand_fresh(feedback)
         return not feedback.moving

@@ -42,9 +42,9 @@ class Library(NamedTuple):
     module: str
     distribution: str
     version: int
-    """Of the Franka Control Interface that it speaks."""
+    """Version of the Franka Control Interface that it speaks."""
     other: str
-    """What to choose in its place for an arm that speaks another version."""
+    """Library for an arm that speaks another version."""
 
 
 LIBRARIES: dict[Kind, Library] = {
@@ -181,7 +181,7 @@ class FrankaClient:
     """
 
     _failures: tuple[type[Exception], ...] = (RuntimeError,)
-    """What the library raises."""
+    """Exceptions that the library raises."""
 
     def __init__(self, address: str, kind: Kind) -> None:
         """Connect; what stands in the way is a RobotError.

@@ -1,4 +1,4 @@
-"""What program and process of an arm exchange in shared memory: commands, feedback, and how well the line kept up."""
+"""Shared memory between a program and the process of an arm: commands, feedback, and timing of the line."""
 
 from dataclasses import dataclass, field
 from enum import IntEnum
@@ -14,7 +14,7 @@ _MOST = 65_536
 
 
 class ArmRequest(IntEnum):
-    """What the program asks of the arm."""
+    """Request of the program to the arm."""
 
     WAIT = 0
     """Nothing."""
@@ -30,7 +30,7 @@ class ArmRequest(IntEnum):
 
 @value
 class ArmCommand:
-    """What the program sends; the newest one counts."""
+    """Command of the program; the newest one counts."""
 
     number: int
     """Number of the request; a new number asks again."""
@@ -43,14 +43,14 @@ class ArmCommand:
 
 @value
 class Feedback:
-    """What the process reports."""
+    """Report of the process."""
 
     stamp: float
-    """When the state arrived, by `time.monotonic` [s]."""
+    """Arrival of the state, by `time.monotonic` [s]."""
     answered: int
     """Number of the last request that was carried out; a motion counts from its first state on."""
     moving: bool
-    """Whether a motion is running."""
+    """True if a motion is running."""
     trouble: str
     """A sentence on what went wrong with that request, or ''."""
     state: FrankaState
@@ -58,7 +58,7 @@ class Feedback:
 
 @dataclass
 class Communication:
-    """How the line to the arm kept up, in all motions so far."""
+    """Timing of the line to the arm in all motions so far."""
 
     cycles: int = 0
     """States that were answered with a command."""
@@ -67,11 +67,11 @@ class Communication:
     longest_gap: float = 0.0
     """Longest time between two states, by the arm's clock [s]."""
     reseeds: int = 0
-    """How often the arm's desired velocity was not what it had been sent: commands were lost."""
+    """Number of times that the arm's desired velocity differed from the one sent: commands were lost."""
     success_rate: float = 1.0
     """Smallest share of 100 commands in a row that reached the arm in time, once a hundred were sent."""
     stale: int = 0
-    """How often the set-points went stale while the arm moved, so that it was brought to rest."""
+    """Number of times that set-points became stale while the arm moved, so that it was brought to rest."""
     answers: Durations = field(default_factory=Durations)
     """Times from a state to the command for it, in this process [s]."""
     in_motion: int = 0

@@ -1,4 +1,4 @@
-"""From set-points that come every so often to a velocity each millisecond, within the arm's limits."""
+"""Interpolation of set-points to a velocity each millisecond, within the arm's limits."""
 
 import math
 from typing import NamedTuple
@@ -55,12 +55,12 @@ class SetPointLimiter:
         self._input.max_acceleration, self._input.max_jerk = self._acceleration, jerk
         self._input.target_acceleration = [0.0] * JOINTS
         self.lost = False
-        """Whether the arm's desired velocity was not what it had been told, at the last step."""
+        """True if the arm's desired velocity was not what it had been told, at the last step."""
         self._sent: list[float] | None = None
 
     @property
     def at_rest(self) -> bool:
-        """Whether the last velocities were zero, but for rounding."""
+        """True if the last velocities were zero, but for rounding."""
         return self._sent is not None and max(map(abs, self._sent)) < _REST_RAD_S
 
     def step(self, state: FrankaState, wanted: list[float]) -> list[float]:

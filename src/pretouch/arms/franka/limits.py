@@ -67,7 +67,7 @@ Share = Annotated[float, Check(low=0.01, high=0.9)]
 
 @dataclass(frozen=True)
 class LimiterParams(Checked):
-    """How the way from one set-point to the next is made."""
+    """Parameters of the motion from one set-point to the next."""
 
     acceleration_share: Share = 0.4
     """Share of the arm's acceleration limits that is used. The arm's jerk limits undo all its acceleration within one
@@ -85,7 +85,7 @@ class LimiterParams(Checked):
 
 @dataclass(frozen=True)
 class MotionLimits:
-    """What the arm takes, (7,) each."""
+    """Limits that the arm accepts, (7,) each."""
 
     qd_max: FloatArray
     """[rad/s]"""
@@ -131,7 +131,7 @@ class FrankaParams(Checked):
 
 @dataclass(frozen=True)
 class CollisionBehavior:
-    """From where on the arm reports a contact (lower) and stops by itself (upper), in the vendor's order."""
+    """Thresholds at which the arm reports a contact (lower) and stops (upper), in the vendor's order."""
 
     lower_torque: FloatArray
     """(7,) [Nm]"""

@@ -39,7 +39,7 @@ _ARRIVED_RAD_S = 1e-4
 
 @dataclass(frozen=True)
 class ProcessSettings:
-    """What the process is to do."""
+    """Settings of the process that talks to the arm."""
 
     address: str
     kind: Kind
@@ -70,7 +70,7 @@ class VelocityMotion:
         self._command: ArmCommand | None = None
         self._ending = self._stale = False
         self.trouble = ""
-        """Why the motion was ended, if nobody asked for that."""
+        """Reason of an end of the motion that nobody requested."""
         communication.in_motion = 0
 
     def answer(self, state: FrankaState, since: float) -> tuple[FloatArray, bool]:
@@ -188,7 +188,7 @@ class ArmServer:
         )
 
     def _is_over(self) -> bool:
-        """Whether there is nobody left to serve."""
+        """Return True if nobody is left to serve."""
         return self._leaving or os.getppid() != self._settings.parent
 
     def _leave(self, _number: int, _frame: FrameType | None) -> None:

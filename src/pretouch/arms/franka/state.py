@@ -1,4 +1,4 @@
-"""What a Franka arm reports, as the vendor's libraries give it, and the one place where its sign becomes ours."""
+"""State of a Franka arm from the vendor's libraries; the one place where its sign becomes ours."""
 
 import re
 from dataclasses import dataclass, replace
@@ -30,7 +30,7 @@ class FrankaState:
     errors: tuple[str, ...]
     """Errors that are pending, by the vendor's names."""
     last_motion_errors: tuple[str, ...]
-    """What ended the last motion, if it did not end as asked."""
+    """Errors that ended the last motion; empty if it ended as requested."""
     q: FloatArray
     """(7,) measured joint positions [rad]."""
     qd: FloatArray

@@ -102,14 +102,14 @@ class SimulatedArm:
 
 
 class _Newest(NamedTuple):
-    """What the simulation has come to: one value, for another thread reads it."""
+    """Newest state of the simulation: one value, for another thread reads it."""
 
     state: RobotState
     """Stamped with when it was due."""
     left_out: float
     """Time that was left out before it [s]."""
     instant: float
-    """When it was there [s]."""
+    """Time of the state [s]."""
 
 
 class ThreadedArm:

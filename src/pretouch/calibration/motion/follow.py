@@ -73,9 +73,9 @@ class PlanCommander:
         self._last: float | None = None
         self._held, self._settled = 0.0, -np.inf
         self.begin: float | None = None
-        """When the plan began, less the time left out and that of holds [s]; None before."""
+        """Start of the plan, less time left out and holds [s]; None before it starts."""
         self.stopped = ""
-        """Why the motion ended early, as a sentence; '' if it did not."""
+        """Reason of an early end, as a sentence; '' if it did not end early."""
 
     def __call__(self) -> Desired:
         """Ask for the positions of the next moments; to stand before the plan begins."""
@@ -86,7 +86,7 @@ class PlanCommander:
         return desired.joint_positions(instants, [self._plan.at(time)[0] for time in since])
 
     def done(self, step: ControlStep) -> bool:
-        """Whether the motion is over."""
+        """Return True if the motion is over."""
         now = step.stamp - self._left_out()
         since, self._last = now - (now if self._last is None else self._last), now
         if step.mode is Mode.TRACK:

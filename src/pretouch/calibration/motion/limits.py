@@ -1,4 +1,4 @@
-"""What a calibration motion consists of, and whether it keeps to the limits of an arm, to itself and to the floor."""
+"""Parameters of a calibration motion, and its check against limits, self-collision and the floor."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -23,7 +23,7 @@ that is steady, and some more."""
 
 @dataclass(frozen=True)
 class PlanParams(Checked):
-    """What a motion for calibration consists of, and what it keeps to. Figures without a source are ours."""
+    """Parameters of a calibration motion and its margins. Values without a source are ours."""
 
     poses: Annotated[int, Check(low=1, high=10)] = 4
     """Postures in which the arm stands for a while, beside its start, and then swings: all joints at once, by two sines
@@ -48,7 +48,7 @@ class PlanParams(Checked):
 
 
 class MotionLimits:
-    """What the motions of one arm must keep to."""
+    """Limits of the motions of one arm."""
 
     def __init__(self, model: RobotModel, params: PlanParams) -> None:
         """Take an arm; margins that leave a joint nothing of its range are a CalibrationError."""

@@ -78,7 +78,7 @@ class Plan:
 
     @property
     def duration(self) -> float:
-        """How long it takes [s]."""
+        """Duration [s]."""
         return float(self.knots[-1])
 
     def at(self, time: float) -> tuple[FloatArray, FloatArray]:
@@ -118,7 +118,7 @@ class Plan:
 
 
 def _smooth_step(part: FloatArray) -> FloatArray:
-    """From 0 to 1 with the least jerk, at rest before 0 and after 1, and its first two derivatives (3, T)."""
+    """Return the least-jerk step from 0 to 1, at rest before 0 and after 1, and two derivatives (3, T)."""
     s = np.clip(part, 0.0, 1.0)
     return np.stack([
         s**3 * (10.0 - 15.0 * s + 6.0 * s**2), 30.0 * s**2 * (1.0 - s) ** 2, 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s)

@@ -1,1 +1,1 @@
-"""What `pretouch skin calibrate` does."""
+"""The command `pretouch skin calibrate`."""

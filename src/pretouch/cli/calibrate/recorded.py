@@ -1,4 +1,4 @@
-"""From what was recorded while an arm moved to the answer of a calibration: table, sentences, skin file, numbers."""
+"""Calibration from a recording of a moving arm: table, sentences, skin file, numbers."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
@@ -40,7 +40,7 @@ _TEXT = (0, 1, 7)
 
 @dataclass(frozen=True)
 class Recorded:
-    """From what was recorded while the arm made a calibration motion."""
+    """Calibrate from a recording of a calibration motion."""
 
     recording: OptionalFile = None
     """Recording of the units, by `pretouch skin monitor --record` or by `pretouch skin calibrate NAME`."""
@@ -53,7 +53,7 @@ class Recorded:
 
 @dataclass(frozen=True)
 class CalibrationFiles:
-    """What a calibration reads and writes beside what was recorded."""
+    """Files that a calibration reads and writes beside the recording."""
 
     skin: OptionalFile = None
     """Skin file with the units and their assumed links, which are checked; without it, links are identified. Of an arm

@@ -1,1 +1,1 @@
-"""What `pretouch run` does."""
+"""The command `pretouch run`."""

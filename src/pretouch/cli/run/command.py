@@ -1,4 +1,4 @@
-"""What `pretouch run` does, in order: checks, guided push, announcement, motion, report."""
+"""The command `pretouch run`, in order: checks, guided push, announcement, motion, report."""
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack

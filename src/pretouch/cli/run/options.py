@@ -31,7 +31,7 @@ class RobotOptions:
 
 @dataclass(frozen=True)
 class UnitOptions:
-    """Where the sensor units are heard."""
+    """Address that the sensor units send to."""
 
     keys: OptionalFile = None
     """File of the keys of units that are received over the network; without it, the arm's own or simulated ones."""
@@ -57,7 +57,7 @@ class SkinOptions(UnitOptions):
 
 @dataclass(frozen=True)
 class TaskOptions:
-    """What the arm does."""
+    """Task of the arm."""
 
     path: Literal["circle", "line", "hold"] = "circle"
     """circle and line: the paper's paths, started at the nearest point. hold: stay in place, and yield when touched."""

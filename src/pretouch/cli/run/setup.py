@@ -46,9 +46,9 @@ class RunSetup:
     """Height of the floor below the arm, base frame [m]."""
     task: TaskOptions
     placement: Placement
-    """Where the paper's paths are for the arm."""
+    """Placement of the paper's paths for the arm."""
     assumed: tuple[str, ...]
-    """What of the arm and its path had to be assumed, a sentence each."""
+    """Assumptions on the arm and its path, a sentence each."""
 
     def controller(self, q: FloatArray) -> Controller:
         """Return the controller for an arm that stands at q (n,) [rad]."""
