@@ -128,7 +128,7 @@ def test_joint_torques_are_detected_on_by_pretouch_and_paper(capsys, pushed_arm,
     said = capsys.readouterr().out
     assert "arm.csv: 13000 samples in 26.0 s, 500 Hz" in said
     assert "assumed to be on the robot (otherwise --sign by-robot). The arm is assumed to be panda (--arm)." in said
-    assert "pretouch: no skin watches" in said
+    assert "pretouch: without a skin free motion is learnt" in said
     assert "pretouch: 1 contact in 0.4 min, 1 of them in 0.4 min of motion; if nobody touched the arm" in said
     assert f"Page: {page}" in said
     told = json.loads(numbers.read_text())

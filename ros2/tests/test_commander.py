@@ -28,7 +28,7 @@ from pretouch.types import ControlStep, Mode
 from pretouch_ros2.commander import Ros2Commander
 from pretouch_ros2.inputs import JointReading
 from pretouch_ros2.messages import TWIST
-from pretouch_ros2.params import ArmParams, Asked
+from pretouch_ros2.params import ArmParams, Command
 from pretouch_ros2.robot import Ros2Robot
 
 R = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
@@ -37,9 +37,9 @@ Q = np.array([0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785])
 
 
 class Told:
-    """A commander that is handed messages as the node's thread would."""
+    """A commander that receives messages as from the node's thread."""
 
-    def __init__(self, model: RobotModel, asked: Asked, shared_clock: bool = True, **settings: Any) -> None:
+    def __init__(self, model: RobotModel, kind: Command, shared_clock: bool = True, **settings: Any) -> None:
         self._take: Callable[[Any, float, int], None]
         self.heard = SimpleNamespace(unreadable="")
         robot: Any = SimpleNamespace(
@@ -49,7 +49,7 @@ class Told:
             measured=lambda: JointReading(0.0, Q, SLOW),
         )
         node: Any = SimpleNamespace(subscribe=self._subscribe)
-        self.commander = Ros2Commander(asked, robot, model, node, **settings)
+        self.commander = Ros2Commander(kind, robot, model, node, **settings)
 
     def _subscribe(self, topic: str, kind: str, take: Callable[[Any, float, int], None]) -> Any:
         self._take = take
@@ -99,7 +99,7 @@ def test_velocities_of_a_trajectory_hold_from_its_points_on(panda_model):
         (trajectory((*NAMES, "finger"), (0.0, SLOW)), "'finger' is in the place of ''"),
         (trajectory(NAMES), "has 0 points: give 1 to 1000"),
         (trajectory(NAMES, *[(k / 1000, SLOW) for k in range(1001)]), "has 1001 points"),
-        (trajectory(NAMES, (0.0, [])), "0 joint velocities are asked for: give 7, of panda_joint1"),
+        (trajectory(NAMES, (0.0, [])), "0 joint velocities are requested: give 7, of panda_joint1"),
     ],
 )  # fmt: skip
 def test_a_trajectory_of_other_joints_or_without_velocities_is_refused(panda_model, message, said):

@@ -150,7 +150,11 @@ def test_a_commander_drives_by_the_profile_pretouch_after_pushes_that_torques_co
         out, _ = run.communicate(timeout=LIMIT_S)
     out = "".join(said) + out
     assert run.returncode == 0, out
-    for part in ("The force sign is confirmed", "The arm does what is asked on /pretouch/twist", "The arm is at rest."):
+    for part in (
+        "The force sign is confirmed",
+        "The arm follows the commands on /pretouch/twist",
+        "The arm is at rest.",
+    ):
         assert part in out
     assert "keeps its end-effector" not in out
     log = arm.stop()

@@ -34,14 +34,14 @@ def test_a_true_touch_is_from_1_newton_until_it_is_over():
     assert touch.peak == 20.0
     assert touch.peak_20ms == pytest.approx(20.0)
     assert touch.link == "hand"
-    assert np.isnan(touch.held)
+    assert np.isnan(touch.lasting)
 
 
 def test_a_spike_is_much_less_as_a_mean_over_20_ms_and_what_is_held_counts_from_half_a_second_on():
     spike, held = touches_of(truth_of((0.5, 0.505, 100.0), (1.0, 1.3, 100.0), (1.3, 2.0, 30.0)))
     assert (spike.peak, held.peak) == (100.0, 100.0)
     assert spike.peak_20ms == pytest.approx(25.0)
-    assert held.held == pytest.approx(30.0)
+    assert held.lasting == pytest.approx(30.0)
 
 
 def test_bounces_are_one_touch_and_later_ones_another():
@@ -122,7 +122,7 @@ def test_the_force_that_is_found_is_told_where_the_detector_says_it(panda_model,
 
 def test_the_largest_true_force_counts_felt_or_not(pushed):
     assert pushed.contacts.peak == 50.0
-    assert pushed.contacts.held is None
+    assert pushed.contacts.lasting is None
 
 
 def test_without_truth_the_peak_is_that_of_the_estimate(panda_model, paper_skin):

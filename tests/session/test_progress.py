@@ -152,7 +152,7 @@ def test_a_push_of_an_arm_that_holds_says_why_it_holds(step: ControlStep) -> Non
 
 @pytest.mark.parametrize(
     ("velocity", "command", "answer"),
-    [(0.1, 0.1, "the arm moved with it"), (0.0, 0.0, "the arm held still: it was below what moves the arm")],
+    [(0.1, 0.1, "the arm moved with it"), (0.0, 0.0, "the arm held still: the push was too weak to move it")],
 )
 def test_a_push_that_is_detected_says_when_and_what_the_arm_did(
     step: ControlStep, velocity: float, command: float, answer: str

@@ -32,17 +32,17 @@ class CartesianLimits:
     acceleration: tuple[float, float, float]
     jerk: tuple[float, float, float]
 
-    def violated(self, now: FloatArray, wanted: FloatArray) -> tuple[str, ...]:
-        """Return the errors (none: it may be followed) of velocities wanted next.
+    def violated(self, now: FloatArray, command: FloatArray) -> tuple[str, ...]:
+        """Return the errors (none: it may be followed) of the next velocities.
 
         Args:
             now: (2, 7) velocities of end-effector [m/s, rad/s] and elbow [rad/s], and their rates.
-            wanted: (7,) velocities for the next millisecond, likewise.
+            command: (7,) velocities for the next millisecond, likewise.
         """
-        rate = (wanted - now[0]) / PERIOD_S
+        rate = (command - now[0]) / PERIOD_S
         jerk = (rate - now[1]) / PERIOD_S
         checks = (
-            ("velocity_limits_violation", wanted, self.velocity),
+            ("velocity_limits_violation", command, self.velocity),
             ("velocity_discontinuity", rate, self.acceleration),
             ("acceleration_discontinuity", jerk, self.jerk),
         )

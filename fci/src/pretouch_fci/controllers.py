@@ -26,14 +26,14 @@ class ExternalTorques:
         # The vendor does not say what the first may be: here it may be near what holds the arm now, and near nothing.
         self._near = np.stack([before, np.zeros_like(before)])
 
-    def take(self, wanted: FloatArray) -> tuple[str, ...]:
+    def take(self, torques: FloatArray) -> tuple[str, ...]:
         """Take torques (7,) [Nm], or return the errors: too far from those before, or beyond the limits."""
         with np.errstate(over="ignore"):
-            jumps = np.abs(wanted - self._near).min(axis=0) > _TORQUE_RATE_NM_S * PERIOD_S * (1 + SLACK)
-        violations = {"controller_torque_discontinuity": jumps, "tau_j_range_violation": np.abs(wanted) > self._most}
+            jumps = np.abs(torques - self._near).min(axis=0) > _TORQUE_RATE_NM_S * PERIOD_S * (1 + SLACK)
+        violations = {"controller_torque_discontinuity": jumps, "tau_j_range_violation": np.abs(torques) > self._most}
         errors = tuple(name for name, wrong in violations.items() if wrong.any())
         if not errors:
-            self._values, self._near = wanted, wanted[None]
+            self._values, self._near = torques, torques[None]
         return errors
 
     def torques(self) -> FloatArray:

@@ -159,9 +159,7 @@ def _add_inertial(link: Element, body: Inertial) -> None:
     inertial = SubElement(link, "inertial")
     SubElement(inertial, "origin", xyz=_text(body.com), rpy="0 0 0")
     SubElement(inertial, "mass", value=repr(body.mass))
-    moments = {
-        f"i{'xyz'[i]}{'xyz'[j]}": repr(float(body.inertia[i, j])) for i in range(3) for j in range(i, 3)
-    }  # fmt: skip
+    moments = {f"i{'xyz'[i]}{'xyz'[j]}": repr(float(body.inertia[i, j])) for i in range(3) for j in range(i, 3)}
     SubElement(inertial, "inertia", moments)
 
 

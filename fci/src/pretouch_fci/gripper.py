@@ -116,8 +116,8 @@ class Gripper:
         if course is None:
             return self, None
         narrowest = 0.0 if self.object is None else self.object.width
-        wanted, *later = course.widths
-        goal, way = max(wanted, narrowest), course.speed * seconds
+        target, *later = course.widths
+        goal, way = max(target, narrowest), course.speed * seconds
         there = abs(goal - self.width) <= way
         width = goal if there else self.width + math.copysign(way, goal - self.width)
         moved = replace(self, width=width, grasped=self.grasped and width <= narrowest)
@@ -126,7 +126,7 @@ class Gripper:
         if later:
             return replace(moved, course=replace(course, widths=tuple(later))), None
         if course.grasp is None:
-            return replace(moved, course=None), Outcome.SUCCESS if width == wanted else Outcome.UNSUCCESSFUL
+            return replace(moved, course=None), Outcome.SUCCESS if width == target else Outcome.UNSUCCESSFUL
         least, most = course.grasp
         grasped = least < width < most
         return replace(moved, course=None, grasped=grasped), Outcome.SUCCESS if grasped else Outcome.UNSUCCESSFUL

@@ -41,33 +41,33 @@ class MotionLimits:
     """Limits of the speed that depend on the position, if there are any."""
 
     def violated(
-        self, q: FloatArray, qd: FloatArray, qdd: FloatArray, wanted: FloatArray, whose: str = "joint_motion_generator"
+        self, q: FloatArray, qd: FloatArray, qdd: FloatArray, command: FloatArray, whose: str = "joint_motion_generator"
     ) -> tuple[str, ...]:
-        """Return the errors (none: it may be followed) of a velocity wanted next.
+        """Return the errors (none: it may be followed) of the next velocity.
 
         Args:
             q: (n,) commanded positions [rad].
             qd: (n,) commanded velocities [rad/s].
             qdd: (n,) commanded accelerations [rad/s^2].
-            wanted: (n,) velocities for the next millisecond [rad/s].
+            command: (n,) velocities for the next millisecond [rad/s].
             whose: what the names of the errors begin with.
         """
         with np.errstate(over="ignore", invalid="ignore"):
-            acceleration = (wanted - qd) / PERIOD_S
+            acceleration = (command - qd) / PERIOD_S
             jerk = (acceleration - qdd) / PERIOD_S
-            following = q + wanted * PERIOD_S
+            following = q + command * PERIOD_S
         low, high = self.speeds(q)
         # written so that a number that is none is a violation
         within = {
-            "velocity_limits_violation": np.all((wanted >= low) & (wanted <= high)),
+            "velocity_limits_violation": np.all((command >= low) & (command <= high)),
             "velocity_discontinuity": np.all(np.abs(acceleration) <= self.qdd * (1 + SLACK)),
             "acceleration_discontinuity": np.all(np.abs(jerk) <= self.qddd * (1 + SLACK)),
             # a joint that is beyond may go back
             "position_limits_violation": np.all(
-                ((following >= self.q_min) | (wanted >= 0)) & ((following <= self.q_max) | (wanted <= 0))
+                ((following >= self.q_min) | (command >= 0)) & ((following <= self.q_max) | (command <= 0))
             ),
         }
-        return tuple(f"{whose}_{name}" for name, kept in within.items() if not kept)
+        return tuple(f"{whose}_{name}" for name, allowed in within.items() if not allowed)
 
     def left(self, q: FloatArray, qd: FloatArray) -> tuple[str, ...]:
         """Return the errors (none: within) of joints that are measured at q [rad] and qd [rad/s], both (n,).

@@ -77,7 +77,7 @@ def source_of(model: RobotModel) -> str:
     links = [group[0] for group in groups] + [flange]
     parts = [
         combined([moved(bodies[link], kin.rotation[link], kin.position[link]) for link in group]) for group in groups
-    ]  # fmt: skip
+    ]
     tables = {
         "AXIS": kin.axis, "ANCHOR": kin.anchor,
         "HOME_R": kin.rotation[links].reshape(-1, 9), "HOME_P": kin.position[links],

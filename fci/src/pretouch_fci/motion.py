@@ -107,12 +107,12 @@ class Motion:
         self._received.append(False)
         return self._moved(q, self.kind.bridged(q, self.qd, self.qdd))
 
-    def _moved(self, q: FloatArray, asked: JointStep) -> MotionEnding | None:
-        errors = asked.errors or self._limits.violated(q, self.qd, self.qdd, asked.qd, self.kind.joints)
+    def _moved(self, q: FloatArray, step: JointStep) -> MotionEnding | None:
+        errors = step.errors or self._limits.violated(q, self.qd, self.qdd, step.qd, self.kind.joints)
         if errors:
             return MotionEnding("reflex", errors)
-        self.qdd = (asked.qd - self.qd) / PERIOD_S
-        self.qd = asked.qd
+        self.qdd = (step.qd - self.qd) / PERIOD_S
+        self.qd = step.qd
         return None
 
 

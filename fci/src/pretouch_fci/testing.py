@@ -115,9 +115,9 @@ class FrankaServer:
     @property
     def truth(self) -> Truth:
         """True motion and forces until now. Between motions only: in a motion the server waits for a command."""
-        seen = len(self.said)
+        count = len(self.said)
         self._type("time")
-        self._wait_for("The arm's time is", _ANSWERS_S, seen)
+        self._wait_for("The arm's time is", _ANSWERS_S, count)
         _, *lines = self._truth.read_text().splitlines()
         rows = np.array([line.split(",") for line in lines], dtype=np.float64).reshape(-1, 11)
         return Truth(rows[:, 0], rows[:, 1:4], rows[:, 4:])
@@ -143,12 +143,12 @@ class FrankaServer:
         except (BrokenPipeError, ValueError):  # ended by itself, or closed
             raise RobotError(f"The simulated robot has ended: {' '.join(self.said)}") from None
 
-    def _wait_for(self, beginning: str, most: float, seen: int) -> None:
+    def _wait_for(self, beginning: str, most: float, count: int) -> None:
         """Wait for a line with a beginning, behind so many others, up to a time [s]."""
         until = time.monotonic() + most
         while True:
             ended = self._process.poll() is not None
-            lines = self.said[seen:]
+            lines = self.said[count:]
             if any(line.startswith(beginning) for line in lines):
                 return
             if ended or time.monotonic() > until:

@@ -39,7 +39,7 @@ class Ros2(ArmOptions):
     def check(self, setup: ArmSetup) -> None:
         """Refuse a topic of nothing, and a profile that needs torques where there are none."""
         if self.desired_topic and not self.desired:
-            raise ParameterError("--desired-topic needs --desired, which says what is asked there: give both.")
+            raise ParameterError("--desired-topic needs --desired, the kind of its messages: give both.")
         profile = setup.profile
         if (profile.detect.by_torques or profile.react.by_torques) and not self.arm.torques:
             raise ParameterError(

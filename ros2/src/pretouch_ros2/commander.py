@@ -12,13 +12,13 @@ from pretouch.errors import RobotError
 from pretouch.robot.model import RobotModel
 from pretouch_ros2.messages import TRAJECTORY, TWIST
 from pretouch_ros2.node import Ros2Node
-from pretouch_ros2.params import Asked, check_topic, seconds
+from pretouch_ros2.params import Command, check_topic, seconds
 from pretouch_ros2.robot import SHARED_S, Ros2Robot
 from pretouch_ros2.stamps import SourceStamps
 
 _KINDS = {"twist": TWIST, "trajectory": TRAJECTORY}
-TOPICS: dict[Asked, str] = {"twist": "/pretouch/twist", "trajectory": "/pretouch/joint_trajectory"}
-"""Where each is asked for, unless somebody says otherwise."""
+TOPICS: dict[Command, str] = {"twist": "/pretouch/twist", "trajectory": "/pretouch/joint_trajectory"}
+"""Default topic of each kind of request."""
 _POINTS_MOST = 1000
 _AHEAD_S = 1.0
 """How far ahead trajectories may begin [s]: MoveIt Servo leaves room for its latency."""
@@ -31,30 +31,30 @@ class _UnfitError(Exception):
 
 
 class Ros2Commander:
-    """Takes in what is asked; called in the loop, it returns the newest. For `loop.Options(desired=...)`.
+    """Receives requested motions; called in the loop, it returns the newest. For `loop.Options(desired=...)`.
 
-    Before anything was asked, and while two programs ask, it asks for nothing, which holds the arm and says why.
+    Before the first request, and while two programs send requests, it refuses: the arm holds and says why.
     """
 
     def __init__(
-        self, asked: Asked, robot: Ros2Robot, model: RobotModel, node: Ros2Node, topic: str = "", base_frame: str = ""
+        self, kind: Command, robot: Ros2Robot, model: RobotModel, node: Ros2Node, topic: str = "", base_frame: str = ""
     ) -> None:
-        """Hear what is asked for on a topic.
+        """Subscribe to a topic of requests.
 
         Args:
-            asked: twist: geometry_msgs/TwistStamped; trajectory: the velocities of trajectory_msgs/JointTrajectory, as
+            kind: twist: geometry_msgs/TwistStamped; trajectory: the velocities of trajectory_msgs/JointTrajectory, as
                 MoveIt Servo sends.
             robot: the arm.
-            model: of it.
-            node: that hears the topic.
-            topic: '': as of `TOPICS`.
+            model: of the arm.
+            node: subscribes to the topic.
+            topic: '': the default in `TOPICS`.
             base_frame: further name of the base frame, beside the model's own.
         """
-        self.topic = topic or TOPICS[asked]
+        self.topic = topic or TOPICS[kind]
         check_topic("Ros2Commander", "topic", self.topic)
         if self.topic == robot.params.command_topic:
             raise RobotError(f"{self.topic} is where the arm's commands go: ask on another topic.")
-        self._robot, self.kind = robot, _KINDS[asked]
+        self._robot, self.kind = robot, _KINDS[kind]
         self._base = (*_resting_links(model), *filter(None, [base_frame]))
         self._ee = model.links[model.ee]
         self._shared = robot.params.shared_clock
@@ -66,8 +66,8 @@ class Ros2Commander:
     def announced(self) -> str:
         """Say what the arm will do, before it moves."""
         return (
-            f"The arm does what is asked on {self.topic} ({self.kind.replace('/msg/', '/')}), wherever it"
-            " reaches and as fast as its joints may; it holds while nothing is asked. It keeps clear of what its units"
+            f"The arm follows the commands on {self.topic} ({self.kind.replace('/msg/', '/')}) anywhere within its"
+            " reach and up to its joints' speed limits; without commands it holds. It keeps clear of what its units"
             " see, but not of floor, table or itself."
         )
 
@@ -77,7 +77,7 @@ class Ros2Commander:
         return tuple(filter(None, (self._heard.unreadable, self._stamps.not_newer(self.topic))))
 
     def __call__(self) -> Desired:
-        """Return what is asked for now."""
+        """Return the motion that is requested now."""
         topic, newest = self.topic, self._newest
         if self._stamps.together():
             return desired.refused(0.0, f"several programs ask on {topic}: run only one")
@@ -86,13 +86,13 @@ class Ros2Commander:
         if newest is None:
             kind = self.kind.replace("/msg/", "/")
             return desired.refused(0.0, f"no {kind} was received on {topic} yet: start what publishes it")
-        asked, in_ee = newest
+        request, in_ee = newest
         if not in_ee:
-            return asked
+            return request
         R = self._robot.orientation()
         with np.errstate(invalid="ignore"):  # the step names what is no number
-            number = np.hstack([asked.number[:, :3] @ R.T, asked.number[:, 3:] @ R.T])
-        return Desired(asked.kind, asked.stamp, number)
+            number = np.hstack([request.number[:, :3] @ R.T, request.number[:, 3:] @ R.T])
+        return Desired(request.kind, request.stamp, number)
 
     def _take(self, message: Any, received: float, writer: int) -> None:
         instant = self._stamps.instant(message.header, received, writer)
@@ -136,7 +136,7 @@ class Ros2Commander:
         for point in points:
             if len(point.velocities) != len(ours):
                 raise _UnfitError(
-                    f"{len(point.velocities)} joint velocities are asked for: give {len(ours)}, of {', '.join(ours)}"
+                    f"{len(point.velocities)} joint velocities are requested: give {len(ours)}, of {', '.join(ours)}"
                 )
         stamp = seconds(message.header.stamp.sec, message.header.stamp.nanosec)
         ahead = max(stamp - wall_clock(), 0.0) if self._shared and stamp else 0.0

@@ -88,10 +88,10 @@ class _ForceEstimate:
         self._params, self.stamps = params, stamps
         self._newest: tuple[float, FloatArray] | None = None
 
-    def _note(self, message: Any, received: float, writer: int, given: FloatArray) -> None:
+    def _note(self, message: Any, received: float, writer: int, values: FloatArray) -> None:
         stamp = self.stamps.instant(message.header, received, writer)
         if stamp is not None:
-            self._newest = stamp, given
+            self._newest = stamp, values
 
     def _ours(self, now: float) -> FloatArray | None:
         """Return the numbers in our sign, which is on the robot by the environment: the one place where that is done.

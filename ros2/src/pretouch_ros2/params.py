@@ -12,7 +12,7 @@ Distribution = Literal["foxy", "galactic", "humble", "iron", "jazzy", "kilted", 
 Sign = Literal["on-robot", "by-robot"]
 Frame = Literal["base", "ee"]
 Zeros = Literal["auto", "missing", "kept"]
-Asked = Literal["twist", "trajectory"]
+Command = Literal["twist", "trajectory"]
 
 LOOPBACK = "127.0.0.1"
 ENVIRONMENT = "environment"

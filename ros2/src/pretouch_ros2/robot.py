@@ -65,7 +65,7 @@ class Ros2Robot:
         """Remarks on the messages for a person, a sentence each."""
         p, sentences = self.params, [self._wrench.warning]
         sentences += [stamps.not_newer(topic) for topic, stamps in self._stamps]
-        sentences += [heard.unreadable for heard in (self._states, self._wrenches, *self._efforts)]
+        sentences += [source.unreadable for source in (self._states, self._wrenches, *self._efforts)]
         if self._joints.differentiated:
             sentences.append(f"{p.joint_states} has no velocities: they are computed from the positions.")
         if p.shared_clock and self._joints.newest is not None and self._joints.stamps.behind is None:

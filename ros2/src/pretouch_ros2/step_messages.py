@@ -32,11 +32,11 @@ class StepMessages:
 
     def cloud(self, step: ControlStep, at: Stamp) -> Any:
         """Obstacles as a point cloud in the base frame."""
-        seen = step.obstacles
-        points = np.zeros(len(seen.point), dtype=_POINT)
+        obstacles = step.obstacles
+        points = np.zeros(len(obstacles.point), dtype=_POINT)
         for i, name in enumerate("xyz"):
-            points[name] = seen.point[:, i]
-        points["distance"], points["unit"] = seen.body_distance, seen.unit
+            points[name] = obstacles.point[:, i]
+        points["distance"], points["unit"] = obstacles.body_distance, obstacles.unit
         fields = [
             self._m.make("sensor_msgs/msg/PointField", name, of[1], _UINT32 if name == "unit" else _FLOAT32, 1)
             for name, of in (_POINT.fields or {}).items()
@@ -86,9 +86,9 @@ class StepMessages:
             statuses.append(self._status(f"pretouch: unit {name}", level, sentence, name, {"status": status}))
         return statuses
 
-    def _status(self, name: str, level: int, said: str, hardware: str, values: dict[str, str]) -> Any:
+    def _status(self, name: str, level: int, sentence: str, hardware: str, values: dict[str, str]) -> Any:
         pairs = [self._m.make("diagnostic_msgs/msg/KeyValue", *pair) for pair in values.items()]
-        return self._m.make(STATUS, level, name, said, hardware, pairs)
+        return self._m.make(STATUS, level, name, sentence, hardware, pairs)
 
     def _header(self, at: Stamp) -> Any:
         return self._m.header(at, self.base)

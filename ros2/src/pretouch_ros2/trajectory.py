@@ -64,24 +64,24 @@ class StoppingTrajectory:
 
 
 def stopping_trajectory(
-    q: FloatArray, qd: FloatArray, wanted: FloatArray, qdd_max: FloatArray, period: float, hold: float
+    q: FloatArray, qd: FloatArray, velocity: FloatArray, qdd_max: FloatArray, period: float, hold: float
 ) -> StoppingTrajectory:
-    """Go from q and qd (n,) to wanted velocities (n,) [rad/s], hold them, and brake, within `qdd_max` (n,) [rad/s^2].
+    """Go from q and qd (n,) to velocities (n,) [rad/s], hold them, and brake, within `qdd_max` (n,) [rad/s^2].
 
     Args:
         q: [rad].
         qd: [rad/s].
-        wanted: [rad/s].
+        velocity: the velocities to reach [rad/s].
         qdd_max: limits.
         period: time for the change of velocity, unless the limits need a longer one [s].
         hold: when braking begins, unless the change takes longer [s].
     """
-    ramp = max(period, float((np.abs(wanted - qd) / qdd_max).max()))
+    ramp = max(period, float((np.abs(velocity - qd) / qdd_max).max()))
     brake = max(ramp, hold)
-    stops = np.unique(np.ceil(np.abs(wanted) / qdd_max / _FINEST_S) * _FINEST_S)
+    stops = np.unique(np.ceil(np.abs(velocity) / qdd_max / _FINEST_S) * _FINEST_S)
     holds = brake - ramp > _FINEST_S
     time = np.concatenate([[0.0, ramp], [brake] if holds else [], brake + stops[stops > 0]])
-    speed = np.maximum(np.abs(wanted) - qdd_max * np.maximum(time[1:, None] - brake, 0.0), 0.0) * np.sign(wanted)
+    speed = np.maximum(np.abs(velocity) - qdd_max * np.maximum(time[1:, None] - brake, 0.0), 0.0) * np.sign(velocity)
     speed[-1] = 0.0  # and no rounding error of it
     qd = np.vstack([qd, speed])
     steps = (qd[1:] + qd[:-1]) / 2 * np.diff(time)[:, None]
@@ -106,7 +106,7 @@ class _SentTrajectory:
 
     began: float
     trajectory: StoppingTrajectory
-    wanted: FloatArray
+    velocity: FloatArray
 
 
 class Reference:
@@ -135,18 +135,18 @@ class Reference:
         self._sent.append(_SentTrajectory(now, trajectory, still))
         return trajectory
 
-    def command(self, wanted: FloatArray, now: float) -> StoppingTrajectory:
-        """Go on to wanted velocities (n,) [rad/s] from an instant on [s]."""
+    def command(self, velocity: FloatArray, now: float) -> StoppingTrajectory:
+        """Go on to velocities (n,) [rad/s] from an instant on [s]."""
         q, qd = self.motion_at(now)
         self._sent.append(
             _SentTrajectory(
-                now, stopping_trajectory(q, qd, wanted, self._qdd_max, self._period, self._hold), wanted.copy()
+                now, stopping_trajectory(q, qd, velocity, self._qdd_max, self._period, self._hold), velocity.copy()
             )
         )
         return self._sent[-1].trajectory
 
     def passed(self, now: float, past: float) -> tuple[TrajectoryPoint, ...]:
-        """Return what was asked for in a time [s] before an instant [s]: its begin, and each change since."""
+        """Return the requested motion in a time [s] before an instant [s]: its begin, and each change since."""
         begins = [sent.began for sent in self._sent]
         places = [now - past]
         for sent, until in zip(self._sent, [*begins[1:], math.inf], strict=True):
@@ -159,7 +159,7 @@ class Reference:
         return tuple(points)
 
     def motion_at(self, instant: float) -> tuple[FloatArray, FloatArray]:
-        """Return positions [rad] and velocities [rad/s] (n,) that were asked for at an instant [s]."""
+        """Return positions [rad] and velocities [rad/s] (n,) that were requested at an instant [s]."""
         sent = self._active(instant)
         return sent.trajectory.at(instant - sent.began)
 
@@ -168,7 +168,7 @@ class Reference:
         sent = self._active(instant)
         q, qd = sent.trajectory.at(instant - sent.began)
         holds = instant - sent.began <= max(self._hold, float(sent.trajectory.time[1]))
-        return q + qd * self._period / 2, sent.wanted if holds else qd
+        return q + qd * self._period / 2, sent.velocity if holds else qd
 
     def _active(self, instant: float) -> _SentTrajectory:
         for sent in reversed(self._sent):

@@ -171,10 +171,10 @@ class Lag:
         """Return how far (n,) [rad] the arm is from where it usually would be, less what is unknown of its lag."""
         lag = self.seconds
         usual, _ = reference.motion_at(instant - lag)
-        wanted, qd = reference.motion_at(instant)
+        target, qd = reference.motion_at(instant)
         unknown = _LARGEST_LAG_S * np.abs(qd) * _UNKNOWN_RAD2_S2 / (self._moved + _UNKNOWN_RAD2_S2)
         # a lag may be a delay, or that of a filter: they differ by this where the velocity changes
         distance = np.abs(usual - self._offset - q) - unknown - self._qdd_max * lag**2 / 2
-        self._behind = _MEMORY * self._behind + float((wanted - self._offset - q) @ qd)
+        self._behind = _MEMORY * self._behind + float((target - self._offset - q) @ qd)
         self._moved = _MEMORY * self._moved + float(qd @ qd)
         return np.maximum(distance, 0.0)

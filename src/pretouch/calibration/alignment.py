@@ -58,9 +58,9 @@ def align(
     return Alignment(float(lags[best] + _peak(likeness, best)) * step, float(min(likeness[best], 1.0)))
 
 
-def _centred(signal: FloatArray, known: BoolArray) -> FloatArray:
-    mean = signal[known].mean(axis=0) if known.any() else 0.0
-    return np.where(known[:, None], signal - mean, 0.0)
+def _centred(signal: FloatArray, mask: BoolArray) -> FloatArray:
+    mean = signal[mask].mean(axis=0) if mask.any() else 0.0
+    return np.where(mask[:, None], signal - mean, 0.0)
 
 
 def _overlap(first: FloatArray | BoolArray, second: FloatArray | BoolArray, length: int) -> FloatArray:

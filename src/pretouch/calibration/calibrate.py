@@ -112,8 +112,8 @@ def skin_of(calibration: Calibration, model: RobotModel, keep: Skin | None = Non
         raise CalibrationError("No unit was located reliably, so no skin can be made: see the findings of each unit.")
     for unit in calibration.units:
         if unit.place and unit.accepted:
-            found, old = _sensor_unit(unit.id, unit.place, model, calibration.orientation_floor), units.get(unit.id)
-            units[unit.id] = replace(found, touch=old.touch, sensor=old.sensor) if old else found
+            new, old = _sensor_unit(unit.id, unit.place, model, calibration.orientation_floor), units.get(unit.id)
+            units[unit.id] = replace(new, touch=old.touch, sensor=old.sensor) if old else new
     return Skin(tuple(units.values()), model)
 
 

@@ -147,12 +147,12 @@ def _changed(q: FloatArray) -> BoolArray:
 def _check_rate(joints: JointTrace) -> None:
     """Refuse too few states, and changes of them that are too far apart."""
     steps, rate = np.diff(joints.stamp), 1.0 / (_REGULAR * LONGEST_GAP_S)
-    span, known = float(steps.sum()), float(steps[steps <= LONGEST_GAP_S].sum())
+    span, covered = float(steps.sum()), float(steps[steps <= LONGEST_GAP_S].sum())
     news = np.diff(joints.stamp[_changed(joints.q)])
     period = float(np.median(news)) if len(news) else 0.0
-    if known < max(SHORTEST_S, _SPARSE * span) or period > 1.05 / rate:
+    if covered < max(SHORTEST_S, _SPARSE * span) or period > 1.05 / rate:
         raise CalibrationError(
-            f"{len(joints.stamp)} joint states in {span:.3g} s make up {known:.3g} s without gaps, with new positions"
+            f"{len(joints.stamp)} joint states in {span:.3g} s make up {covered:.3g} s without gaps, with new positions"
             f" every {period:.3g} s: at least {SHORTEST_S:g} s at {rate:g} Hz are needed; record 60 s at 100 Hz"
             " or more, on one clock, in seconds."
         )

@@ -46,7 +46,7 @@ surface is worth [m]."""
 def share_findings(arm: ArmMotion, located: Located) -> list[Finding]:
     """Say how much of the run was left out, and what of the rest is not explained."""
     whole = float(arm.usable.sum())
-    missing, outliers = (1 - located.known.sum() / whole), float((located.known & ~located.used).sum()) / whole
+    missing, outliers = (1 - located.instants.sum() / whole), float((located.instants & ~located.used).sum()) / whole
     findings = _slipped(arm, located)
     unusable = missing + outliers > UNUSABLE
     if unusable or (outliers > _MANY and not findings):
@@ -69,7 +69,7 @@ def share_findings(arm: ArmMotion, located: Located) -> list[Finding]:
 def _slipped(arm: ArmMotion, located: Located) -> list[Finding]:
     """Say when a unit ceased to move as its link: where it was found, it is no more."""
     last = np.flatnonzero(located.used)[-1]
-    if located.known[last + 1 :].sum() * (arm.time[1] - arm.time[0]) <= _LONG_S:
+    if located.instants[last + 1 :].sum() * (arm.time[1] - arm.time[0]) <= _LONG_S:
         return []
     since = arm.time[last] - arm.time[0]
     sentence = (
@@ -231,11 +231,11 @@ def likely_member(model: RobotModel, body: tuple[int, ...], link: int, T: FloatA
     def oddity(member: int) -> float:
         """Return the distance in metres."""
         there, _ = seen_from(model, member, link, T, np.eye(6))
-        found = seat(model, member, there[:3, 3])
-        if found is None:
+        place = seat(model, member, there[:3, 3])
+        if place is None:
             return np.inf
-        away = found.height if found.height > 0 else -_INSIDE * found.height
-        return away + _FACING * (1 - float(found.normal @ there[:3, 2]))
+        away = place.height if place.height > 0 else -_INSIDE * place.height
+        return away + _FACING * (1 - float(place.normal @ there[:3, 2]))
 
     best = min(body, key=oddity)
     return best if np.isfinite(oddity(best)) else link

@@ -87,10 +87,10 @@ def start(motion: LinkMotion, measured: Measured) -> Estimate:
     # R values = a + R_link_base g + L p + R b, with priors so that what a motion does not tell stays small
     left = np.concatenate([motion.lever, np.broadcast_to(np.eye(3), motion.lever.shape)], axis=2).reshape(-1, 6)
     right = (values[:, 3:] @ R.T - motion.a - GRAVITY * motion.R_link_base[:, :, 2]).reshape(-1)
-    found = np.linalg.solve(left.T @ left + np.diag([1e-2] * 3 + [1e-3] * 3), left.T @ right)
+    solution = np.linalg.solve(left.T @ left + np.diag([1e-2] * 3 + [1e-3] * 3), left.T @ right)
     errors = np.append(np.zeros(UNKNOWNS - 1), GRAVITY)
-    errors[ACC_BIAS], errors[GYRO_BIAS] = found[3:] @ R, values[:, :3].mean(axis=0) - w.mean(axis=0) @ R
-    return Estimate(R, found[:3], errors)
+    errors[ACC_BIAS], errors[GYRO_BIAS] = solution[3:] @ R, values[:, :3].mean(axis=0) - w.mean(axis=0) @ R
+    return Estimate(R, solution[:3], errors)
 
 
 _PRIOR = np.concatenate([

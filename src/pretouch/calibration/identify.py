@@ -59,7 +59,7 @@ class Identifier:
     def identify(self, unit: UnitData) -> Identified:
         """Find the link of a unit whose data passed all checks of its own."""
         signal = ImuSignal(unit)
-        given = None if unit.link is None else self.arm.model.link_index(unit.link)
+        named = None if unit.link is None else self.arm.model.link_index(unit.link)
         begin, end = unit.imu.stamp[[0, -1]]
         own = begin + self._step * np.arange(int((end - begin) / self._step))
         if not enough(self.arm, signal.usable(own)):
@@ -72,53 +72,53 @@ class Identifier:
                 return Identified(findings=[_fits_none(near.likeness)])
             findings.append(_clock(matches[0][1].late))
         close = [(body, match) for body, match in matches if match.likeness >= matches[0][1].likeness - _CLOSE]
-        return self._chosen(signal, close, given, findings)
+        return self._chosen(signal, close, named, findings)
 
     def _matches(self, signal: ImuSignal, stamps: FloatArray, most: float) -> list[_Match]:
         """Return how well a unit fits each body, and how late its clock then is, the best first."""
         sensed, sensing = signal.at(stamps).values[:, :3], signal.usable(stamps)
         matches = []
         for body in self._turning:
-            found = align(self.arm.link(body[0]).w, self.arm.usable, sensed, sensing, self._step, most)
-            late = found.late + float(stamps[0] - self.arm.time[0])
-            matches.append((body, Alignment(late, found.likeness)))
+            alignment = align(self.arm.link(body[0]).w, self.arm.usable, sensed, sensing, self._step, most)
+            late = alignment.late + float(stamps[0] - self.arm.time[0])
+            matches.append((body, Alignment(late, alignment.likeness)))
         return sorted(matches, key=lambda one: -one[1].likeness)
 
-    def _chosen(self, signal: ImuSignal, close: list[_Match], given: int | None, findings: list[Finding]) -> Identified:
+    def _chosen(self, signal: ImuSignal, close: list[_Match], named: int | None, findings: list[Finding]) -> Identified:
         """Choose among matches that are about as good."""
         first, match = close[0]
-        known = known_instants(self.arm, signal, match.late)
-        if not enough(self.arm, known):
+        instants = known_instants(self.arm, signal, match.late)
+        if not enough(self.arm, instants):
             return Identified(findings=[_TOO_LITTLE])
-        sensed = signal.at(self.arm.time[known] + match.late).values[:, :3]
-        if problem := _gyroscope(self.arm.link(first[0]).w[known], sensed):
+        sensed = signal.at(self.arm.time[instants] + match.late).values[:, :3]
+        if problem := _gyroscope(self.arm.link(first[0]).w[instants], sensed):
             return Identified(first, None, [*findings, problem])
         fitted = []
         for body, match in close:
-            link = given if given is not None and given in body else body[0]
+            link = named if named is not None and named in body else body[0]
             if located := locate(self.arm, signal, link, match.late):
                 fitted.append((body, located))
         if not fitted:
             return Identified(first, None, [_TOO_LITTLE])
         scores = {body: float(located.noise[0] * located.noise[3]) for body, located in fitted}
         alike = [(body, located) for body, located in fitted if scores[body] <= _AMBIGUOUS * min(scores.values())]
-        body, located = min(alike, key=lambda one: (given not in one[0], scores[one[0]]))
+        body, located = min(alike, key=lambda one: (named not in one[0], scores[one[0]]))
         if len(alike) > 1:
             others = [links for links, _ in alike if links != body]
-            findings = [*findings, self._ambiguous(located.link, others, given in body)]
+            findings = [*findings, self._ambiguous(located.link, others, named in body)]
         return Identified(body, located, findings)
 
-    def _ambiguous(self, link: int, others: list[tuple[int, ...]], given: bool) -> Finding:
+    def _ambiguous(self, link: int, others: list[tuple[int, ...]], named: bool) -> Finding:
         model = self.arm.model
         names = " or ".join(model.links[i] for i in (link, *(links[0] for links in others)))
         differ = np.any([model.moved_by[links[0]] != model.moved_by[link] for links in others], axis=0)
         joints = ", ".join(np.array(model.joints)[differ])
         sentence = f"It sits on {names}, which moved alike: move {joints} more, or name the link."
-        if given:
+        if named:
             sentence = (
                 f"It may sit on {names}, which moved alike, so the given link was used: move {joints} more to be sure."
             )
-        return Finding("ambiguous", sentence, not given)
+        return Finding("ambiguous", sentence, not named)
 
 
 def _rms(values: FloatArray) -> float:

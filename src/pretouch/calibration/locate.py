@@ -29,10 +29,10 @@ class Located:
     """(6,) root mean square of what is not explained, each sensor's the same for its axes [rad/s, m/s^2]."""
     late: float
     """Lag of the unit's clock [s]."""
-    known: BoolArray
-    """(N,) at which of the arm's instants both sides were measured."""
+    instants: BoolArray
+    """(N,) mask of the arm's instants at which both sides were measured."""
     used: BoolArray
-    """(N,) at which of them the model explains what was measured."""
+    """(N,) mask of those at which the model explains the measurements."""
 
     @property
     def pose(self) -> FloatArray:
@@ -43,51 +43,51 @@ class Located:
 
 
 def known_instants(arm: ArmMotion, signal: ImuSignal, late: float) -> BoolArray:
-    """Tell at which of the arm's instants (N,) both sides were measured, if the unit's clock is late by so much [s]."""
+    """Mask of the arm's instants (N,) at which both sides were measured, for a lag of the unit's clock [s]."""
     return arm.usable & signal.usable(arm.time + late)
 
 
 def enough(arm: ArmMotion, which: BoolArray) -> bool:
-    """Tell whether instants (N,) are enough to find anything from."""
+    """Return True if instants (N,) are enough for an estimate."""
     return bool(which.sum() * (arm.time[1] - arm.time[0]) >= SHORTEST_S)
 
 
 def locate(arm: ArmMotion, signal: ImuSignal, link: int, late: float) -> Located | None:
-    """Find where on a link a unit sits whose clock is late by about so much [s]; None if too little was measured."""
+    """Locate a unit on a link, from an estimate of its clock's lag [s]; None if too little was measured."""
     motion = arm.link(link)
     noise = np.repeat((TOLERATED_ANGULAR_VELOCITY, TOLERATED_ACCELERATION), 3) / 10
     estimate: Estimate | None = None
     for _ in range(_ROUNDS):
-        known = known_instants(arm, signal, late)
-        if not enough(arm, known):
+        instants = known_instants(arm, signal, late)
+        if not enough(arm, instants):
             return None
-        here, measured = motion.at(known), signal.at(arm.time[known] + late)
-        found = fit(here, measured, estimate or start(here, measured), noise, robust=True)
-        estimate, assumed = found.estimate, late
+        here, measured = motion.at(instants), signal.at(arm.time[instants] + late)
+        solution = fit(here, measured, estimate or start(here, measured), noise, robust=True)
+        estimate, assumed = solution.estimate, late
         late += estimate.errors[CLOCK]
         if abs(estimate.errors[CLOCK]) < _SETTLED_S:
             break
-    inliers = explained(found.estimate, here, measured)
-    used = known.copy()
-    used[known] = inliers
+    inliers = explained(solution.estimate, here, measured)
+    used = instants.copy()
+    used[instants] = inliers
     if not enough(arm, used):
-        inliers, used = np.ones_like(inliers), known
+        inliers, used = np.ones_like(inliers), instants
     here, measured = here.at(inliers), Measured(measured.values[inliers], measured.rates[inliers])
-    found, noise = _final(found, here, measured, noise)
-    C, late = 0.5 * (found.covariance + found.covariance.T), assumed + float(found.estimate.errors[CLOCK])
-    return Located(link, found.estimate, C[:6, :6], noise, late, known, used)
+    solution, noise = _final(solution, here, measured, noise)
+    C, late = 0.5 * (solution.covariance + solution.covariance.T), assumed + float(solution.estimate.errors[CLOCK])
+    return Located(link, solution.estimate, C[:6, :6], noise, late, instants, used)
 
 
 def explained(estimate: Estimate, motion: LinkMotion, measured: Measured) -> BoolArray:
-    """Tell at which instants (N,) the model is near what both sensors measured."""
+    """Mask of the instants (N,) at which the model is near the measurements of both sensors."""
     size = np.linalg.norm(estimate.differences(motion, measured).reshape(-1, 2, 3), axis=2)
     tolerated = np.array([TOLERATED_ANGULAR_VELOCITY, TOLERATED_ACCELERATION])
     return np.all(size <= np.maximum(tolerated, _OUTLIER_FACTOR * np.median(size, axis=0)), axis=1)
 
 
-def _final(found: Fit, motion: LinkMotion, measured: Measured, noise: FloatArray) -> tuple[Fit, FloatArray]:
-    """Fit without robustness, weighted by what each sensor leaves unexplained (6,)."""
+def _final(solution: Fit, motion: LinkMotion, measured: Measured, noise: FloatArray) -> tuple[Fit, FloatArray]:
+    """Fit without robustness, weighted by the residuals of each sensor (6,)."""
     for _ in range(2):
-        found = fit(motion, measured, found.estimate, noise)
-        noise = np.repeat(np.sqrt((found.noise.reshape(2, 3) ** 2).mean(axis=1)), 3)
-    return found, noise
+        solution = fit(motion, measured, solution.estimate, noise)
+        noise = np.repeat(np.sqrt((solution.noise.reshape(2, 3) ** 2).mean(axis=1)), 3)
+    return solution, noise

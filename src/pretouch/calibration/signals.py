@@ -77,11 +77,11 @@ class ImuSignal:
         self._unusable = np.vstack([gaps(imu.stamp, LONGEST_GAP_S), np.column_stack([cut, cut])])
 
     def at(self, stamp: FloatArray) -> Measured:
-        """Return what it measured at instants (N,) of its clock [s]."""
-        return Measured(*(on_grid(stamp, self._fine[0], FINE_S, known) for known in (self._values, self._rates)))
+        """Return its measurements at instants (N,) of its clock [s]."""
+        return Measured(*(on_grid(stamp, self._fine[0], FINE_S, signal) for signal in (self._values, self._rates)))
 
     def usable(self, stamp: FloatArray) -> BoolArray:
-        """Tell at which of the instants (N,), in order, it measured all around, and within its range."""
+        """Mask of the instants (N,), in order, with measurements all around and within its range."""
         return outside(stamp, self._unusable, HALF_S + 0.01)
 
 

@@ -62,8 +62,8 @@ def instants(batches: ImuCounters) -> FloatArray:
     newest, age = batches.index.astype(np.int64) + count - 1, 1e-6 * batches.imu_age_us
     unit, end = 1e-6 * batches.time_us - age, np.cumsum(count)
     instant = np.full(int(count.sum()), np.nan)
-    known = (count > 0) & (batches.imu_age_us < _UNKNOWN_US) & np.isfinite(offset) & np.isfinite(bound)
-    for clock in _clocks(np.flatnonzero(known), newest, unit, offset, bound):
+    dated = (count > 0) & (batches.imu_age_us < _UNKNOWN_US) & np.isfinite(offset) & np.isfinite(bound)
+    for clock in _clocks(np.flatnonzero(dated), newest, unit, offset, bound):
         ahead = _offset(unit[clock], offset[clock], np.maximum(bound[clock], 1e-6))
         for piece in _pieces(clock, newest, unit):
             rough = np.ptp(unit[piece]) / np.ptp(newest[piece])

@@ -220,9 +220,9 @@ def _contacts(results: list[DetectorResult]) -> TextTable:
         rows.append((name, c.link or _NO, *numbers, c.axes or _NO))
     header = ("profile", "link", "time [s]", *(f"{a} [m]" for a in "xyz"), "force x [N]", "y", "z", "norm", "axes")
     note = (
-        "Force on the robot, base frame. By torques, link, place and force are those where the contact stands out most."
-        " By thresholds, it is the force at the end-effector less its mean (eq. 12), with the axes whose threshold it"
-        " crossed."
+        "Force on the robot, base frame. A detector on torques gives link, place and force of its strongest evidence."
+        " A detector on thresholds gives the force at the end-effector less its mean (eq. 12), and the axes whose"
+        " threshold the force crossed."
     )
     return TextTable("Contacts", header, tuple(rows) or (("none", *[""] * 10),), note, 1)
 
@@ -234,14 +234,14 @@ def _detection(results: list[DetectorResult]) -> TextTable:
         ("armed [s]", lambda r: shown(r.armed_s, 1)),
         ("free [s]", lambda r: shown(r.free_s, 1)),
         ("in motion [s]", lambda r: shown(r.motion_s, 1)),
-        ("contacts an hour of motion", lambda r: shown(r.contacts_per_hour_of_motion, 1)),
+        ("contacts per hour of motion", lambda r: shown(r.contacts_per_hour_of_motion, 1)),
         ("evidence without contact", lambda r: shown(r.torques.largest_evidence, 2) if r.torques else _NO),
-        ("says it finds [N]", lambda r: shown(r.detectable_n, 1)),
+        ("detectable [N]", lambda r: shown(r.detectable_n, 1)),
     ]
     note = (
-        "A contact is evidence from 1 on. The last is the force at the end-effector that the detector itself says it"
-        " finds, in the direction the torques tell least of (median; of the paper's thresholds their distance from the"
-        " mean)."
+        "Evidence of 1 or more is a contact. Detectable: force at the end-effector that the detector itself expects to"
+        " detect, in the direction in which the torques are least sensitive (median); for the paper's thresholds, their"
+        " distance from the mean."
     )
     return tabulated("Detection", columns, results, note, 1)
 

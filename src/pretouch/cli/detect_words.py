@@ -28,11 +28,11 @@ _SENTENCES = {
     " {correlation:.2f} at the worst joint: check them.",
     "derived_velocities": "Velocities are those of positions.",
     "no_commands": "There are no commanded velocities (dq_d1_rad_s ...): the measured ones, smoothed, stand in.",
-    "slower": "The data come at {rate:.4g} Hz and the detector of {profile} runs at {own:.4g} Hz: repeated samples look"
-    " like more than they are, and lower sigma; --rate {rate:.4g} runs it at the data's own rate.",
+    "slower": "The data come at {rate:.4g} Hz and the detector of {profile} runs at {own:.4g} Hz: repeated samples"
+    " count several times, and lower sigma; --rate {rate:.4g} runs it at the data's own rate.",
     "cycles_without": "{profile}: {count} of {of} cycles have no force, so nothing is detected in them.",
-    "unwatched": "{profile}: no skin watches, so free motion is learnt from all that does not look like a contact"
-    " (detect.learn=always); a touch that is there from the start is learnt too.",
+    "unwatched": "{profile}: without a skin free motion is learnt from everything that does not look like a contact"
+    " (detect.learn=always), also from a touch at the start.",
     "never_armed": "{profile} was never armed: the recording is shorter than its window, or too near a singularity.",
     "long": "{profile}: the contact at {time:.1f} s lasts {seconds:.0f} s; if nobody leant on the arm, its model or"
     " load is wrong (--arm, --payload, units), or more has to be allowed for (detect.friction_prior_nm,"

@@ -102,6 +102,6 @@ def _units(command: Live, skin: Skin) -> Iterator[RealUnits | None]:
         yield None
         return
     with NetworkSkin(skin.network, load_keys(units.keys), units.units_host, units.units_port) as source:
-        heard = "anywhere" if units.units_host == EVERYWHERE else f"{units.units_host} only"
-        print(f"Receiving units from {heard}, at UDP port {source.address[1]}.", flush=True)
+        senders = "anywhere" if units.units_host == EVERYWHERE else f"{units.units_host} only"
+        print(f"Receiving units from {senders}, at UDP port {source.address[1]}.", flush=True)
         yield RealUnits(source)

@@ -77,8 +77,8 @@ class Replay:
                 with _progress("Reading", len(recorded)) as advance:
                     events = _events(recorded, advance)
                 contacts, holds = _many(events["contacts"], "contact"), _many(events["holds"], "hold")
-                held = f"held for {events['held_share']:.0%} of the time"
-                console.print(f"{_what_ran(recorded)}: {contacts}, {holds} after the start, {held}.", markup=False)
+                holding = f"held for {events['held_share']:.0%} of the time"
+                console.print(f"{_what_ran(recorded)}: {contacts}, {holds} after the start, {holding}.", markup=False)
                 numbers |= events
             verdict = None
             if self.verify:

@@ -97,8 +97,8 @@ def _capsules(bodies: tuple[LinkBody, ...]) -> TextTable:
         ("sticks out\n[mm]", lambda body: f"{1000 * body.sticks_out:.1f}"),
     )
     note = (
-        "By how much the capsules stand over the surface at most, and it sticks out of them: a person may be that much"
-        " closer."
+        "Stand over: greatest distance of the capsules beyond the surface. Sticks out: greatest distance of the surface"
+        " outside of them; a person may be closer by that much."
     )
     return tabulated("Capsules for the links", columns, bodies, note, 1)
 

@@ -98,11 +98,11 @@ class MeasureCoverage:
 
 def _measured(command: MeasureCoverage, setting: Setting, skin: Skin) -> dict[str, Any]:
     """Measure, print and draw; return the numbers."""
-    ways, met = setting.ways(), setting.met()
+    ways, standing = setting.ways(), setting.met()
     console = Console(highlight=False)
     sees = seen_by(ways, skin)
     shares, new = covered(ways, sees), frozenset[str]()
-    both = shares, covered(met, seen_by(met, skin))
+    both = shares, covered(standing, seen_by(standing, skin))
     spots = blind_spots(ways, shares)
     show(console, [_link_table(setting, *both), *([_unit_table(skin, ways, sees)] if len(skin) else [])])
     total = 1e4 * sum(spot.area_m2 for spot in spots)
@@ -114,14 +114,14 @@ def _measured(command: MeasureCoverage, setting: Setting, skin: Skin) -> dict[st
     if command.suggest:
         own = {unit.sensor.label: unit.sensor for unit in skin.mounted}
         places = candidates(ways, skin, sensor_called(command.sensor, "--sensor", own))
-        suggested = suggest((ways, met), skin, command.suggest, places)
+        suggested = suggest((ways, standing), skin, command.suggest, places)
         old, skin, ways = skin, Skin((*skin.mounted, *suggested.units), setting.model), setting.ways(1)
         new = frozenset(unit.id for unit in suggested.units)
         # what the new units add, by ways that they were not chosen by
         fresh, first = (ways, setting.met(1)), len(old.first)
-        seen = [seen_by(one, skin) for one in fresh]
-        before = [covered(one, sees[:first]) for one, sees in zip(fresh, seen, strict=True)]
-        after = [covered(one, sees) for one, sees in zip(fresh, seen, strict=True)]
+        masks = [seen_by(one, skin) for one in fresh]
+        before = [covered(one, sees[:first]) for one, sees in zip(fresh, masks, strict=True)]
+        after = [covered(one, sees) for one, sees in zip(fresh, masks, strict=True)]
         shares = after[0]
         show(console, [_suggestion_table(suggested, before, after)])
         numbers["suggested"] = suggested
@@ -138,24 +138,24 @@ def _measured(command: MeasureCoverage, setting: Setting, skin: Skin) -> dict[st
     return numbers
 
 
-def _numbers(found: measure.Coverage, met: measure.Coverage) -> dict[str, Any]:
-    return {"links": (*found.links, found.arm), "met": (*met.links, met.arm)}
+def _numbers(coming: measure.Coverage, standing: measure.Coverage) -> dict[str, Any]:
+    return {"links": (*coming.links, coming.arm), "met": (*standing.links, standing.arm)}
 
 
-def _link_table(setting: Setting, found: measure.Coverage, met: measure.Coverage) -> TextTable:
+def _link_table(setting: Setting, coming: measure.Coverage, standing: measure.Coverage) -> TextTable:
     """Show the shares of each link and of the arm."""
-    p, meets = setting.params, {one.name: one.ways for one in (*met.links, met.arm)}
+    p, meets = setting.params, {one.name: one.ways for one in (*standing.links, standing.arm)}
     columns = (
         ("link", lambda one: one.name),
         ("area\n[cm^2]", lambda one: f"{1e4 * one.area_m2:.0f}"),
-        ("ways\n[%]", lambda one: f"{100 * one.ways:.1f}"),
+        ("paths\n[%]", lambda one: f"{100 * one.ways:.1f}"),
         ("surface\n[%]", lambda one: f"{100 * one.surface:.1f}"),
         ("met\n[%]", lambda one: f"{100 * meets[one.name]:.1f}" if one.name in meets else "-"),
     )
     return tabulated(
         f"Seen in time: {setting.model.description.name}, {setting.postures} postures of {setting.workspace}",
         columns,
-        (*found.links, found.arm),
+        (*coming.links, coming.arm),
         f"A ball of {100 * p.object_radius_m:g} cm radius approaches a point in a straight line at"
         f" {p.object_speed_m_s:g} m/s, and the arm moves towards it at {p.arm_speed_m_s:g} m/s: it must be seen"
         f" {p.warning_m:.2f} m before contact. Paths: share of the free paths to the surface that are seen in time."
@@ -166,16 +166,16 @@ def _link_table(setting: Setting, found: measure.Coverage, met: measure.Coverage
 
 
 def _unit_table(skin: Skin, ways: Ways, sees: BoolArray) -> TextTable:
-    """Show what each unit sees, and what would be lost without it; `sees` (B, S, W)."""
+    """Show the paths that each unit sees, and those that no other unit sees; `sees` (B, S, W)."""
     weight, alone = ways.share, sees.sum(axis=0) == 1
     columns = (
         ("unit", lambda k: skin.mounted[k].id),
         ("link", lambda k: skin.mounted[k].link),
-        ("ways\n[%]", lambda k: f"{100 * float((weight * sees[k]).sum()):.2f}"),
+        ("paths\n[%]", lambda k: f"{100 * float((weight * sees[k]).sum()):.2f}"),
         ("alone\n[%]", lambda k: f"{100 * float((weight * (sees[k] & alone)).sum()):.2f}"),
     )
     return tabulated(
-        "What each unit sees",
+        "Paths that each unit sees",
         columns,
         range(len(skin.mounted)),
         "Share of all free paths to the arm. Alone: paths that no other unit sees, which would be lost without this"
@@ -186,7 +186,7 @@ def _unit_table(skin: Skin, ways: Ways, sees: BoolArray) -> TextTable:
 def _suggestion_table(
     suggested: Suggestions, before: list[measure.Coverage], after: list[measure.Coverage]
 ) -> TextTable:
-    """Show the places of the new units, and what they change of what comes and of what is met."""
+    """Show the places of the new units, and the coverage before and after."""
     was, now = ([f"{100 * one.arm.ways:.1f} %" for one in both] for both in (before, after))
     columns = (
         ("unit", lambda one: one.unit.id),
@@ -197,12 +197,12 @@ def _suggestion_table(
         ("gain\n[%]", lambda one: f"{100 * one.gain:.2f}"),
     )
     return tabulated(
-        f"{len(suggested.chosen)} more units: {was[0]} before, {now[0]} after; met {was[1]} and {now[1]}",
+        f"{len(suggested.chosen)} more units: paths {was[0]} before and {now[0]} after, met {was[1]} and {now[1]}",
         columns,
         suggested.chosen,
-        f"Chosen one by one from {suggested.candidates} positions, each that which adds most to what comes at"
-        " the arm and to what it meets, which count the same. Gains are measured on the paths used for choosing, before"
-        f" and after on others. No choice of as many could add more than {100 * suggested.most:.1f} %.",
+        f"Units are chosen one by one from {suggested.candidates} positions. Each adds the most to paths and met,"
+        " which have equal weight. Gains are measured on the paths used for the choice, before and after on others."
+        f" No other choice of as many units adds more than {100 * suggested.most:.1f} %.",
     )
 
 

@@ -155,7 +155,7 @@ def _shown(
             full = update.elapsed >= second
             second += _SECOND_S * full
             if recording:
-                recording.add(update.heard, [unit.unit for unit in update.units])
+                recording.add(update.samples, [unit.unit for unit in update.units])
             if live:
                 notes = _nothing_received(receiver)
                 if recording:

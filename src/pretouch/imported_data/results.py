@@ -102,9 +102,9 @@ Course = Decisions | TorqueCourse
 """What a detector made of each cycle."""
 
 
-def free_cycles(judged: BoolArray, course: Course) -> BoolArray:
+def free_cycles(ready: BoolArray, course: Course) -> BoolArray:
     """Return which of the cycles (S,) in which a contact could be detected are not near one in time."""
-    free = judged.copy()
+    free = ready.copy()
     for c in course.contacts:
         end = c.time_s if c.end_s is None else c.end_s + NEAR_S
         free &= (course.time < c.time_s - NEAR_S) | (course.time > end)
@@ -116,12 +116,12 @@ def result_of(
     thresholds: ThresholdSummary | None, torques: TorqueSummary | None, notes: tuple[Note, ...],
 ) -> DetectorResult:  # fmt: skip
     """Sum up a course: (S,) which cycles are `free` motion, and in which the arm is `moving` if that is known."""
-    period, judged = profile.task.control_period_s, course.judged
+    period, ready = profile.task.control_period_s, course.judged
     begins = np.searchsorted(course.time, [c.time_s for c in course.contacts])
     return DetectorResult(
         profile=profile.name, control_rate_hz=1.0 / period, contacts=course.contacts,
-        armed_s=float(judged.sum() * period), free_s=float(free.sum() * period),
-        motion_s=np.nan if moving is None else float((judged & moving).sum() * period),
+        armed_s=float(ready.sum() * period), free_s=float(free.sum() * period),
+        motion_s=np.nan if moving is None else float((ready & moving).sum() * period),
         contacts_in_motion=0 if moving is None else int(moving[begins].sum()), detectable_n=detectable,
         thresholds=thresholds, torques=torques, notes=notes,
     )  # fmt: skip

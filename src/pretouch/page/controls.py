@@ -41,7 +41,7 @@ class ClockState:
     speed: float = 1.0
     """Simulated over real time."""
     single: int = 0
-    """Control cycles that are to pass one by one, paused or not."""
+    """Number of control cycles to run one by one, paused or not."""
 
 
 def with_name(variant: Profile, base: str) -> Profile:

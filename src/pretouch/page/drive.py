@@ -17,8 +17,8 @@ TASKS = ("follow the path", "drive yourself")
 REACH_M = 1.2
 """Largest coordinate of a target [m]."""
 _HOW = (
-    "<div id='driving' style='padding:0 12px 8px;font-size:12px;line-height:1.35'>Drag the target at the hand. Blue is"
-    " asked, green is allowed.</div>"
+    "<div id='driving' style='padding:0 12px 8px;font-size:12px;line-height:1.35'>Drag the target at the hand. Blue:"
+    " requested motion. Green: allowed motion.</div>"
 )
 _STEP_M = 0.003
 """How far the hand moves before the target that waits at it follows [m]."""
@@ -53,7 +53,7 @@ class Drive:
     def __init__(self, server: ViserServer, simulation: LiveSimulation, actions: ActionQueue) -> None:
         self._server, self._simulation, self._actions = server, simulation, actions
         self.steering, self._driver = Steering(), -1
-        task = server.gui.add_dropdown("Task", TASKS, hint="Driven, the arm does what you ask, as far as it may.")
+        task = server.gui.add_dropdown("Task", TASKS, hint="The arm follows your target, within its limits.")
         task.on_update(self._choose_task)
         self._how = server.gui.add_html(_HOW, visible=False)
         limits = (-REACH_M, REACH_M)

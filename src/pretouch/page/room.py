@@ -123,8 +123,8 @@ class Mouse:
 
     def point(self, eye: FloatArray, place: FloatArray, model: RobotModel, q: FloatArray) -> None:
         """Point to what a person sees at a place (3,) [m] from an `eye` (3,) [m], as `move` does; see `at_depth`."""
-        seen = _place("The hand's target", place)
-        self.move(at_depth(model, q, _place("The camera's position", eye), seen))
+        pointed = _place("The hand's target", place)
+        self.move(at_depth(model, q, _place("The camera's position", eye), pointed))
 
     def goal(self, time: float, hand: FloatArray, plant: Plant) -> HandGoal:
         """Go straight there, whatever is in the way."""

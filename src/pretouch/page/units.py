@@ -87,17 +87,17 @@ class Units:
             points = points_of_units(step.obstacles, len(reading))
         else:
             points = locate(*placed_sensors(self._skin.arrays, kin)[:2], reading)
-        seen = np.isfinite(points[:, 0])
+        sensing = np.isfinite(points[:, 0])
         # a unit that sees the floor, or the arm itself, senses nothing
-        lengths = np.where(seen, np.round(reading, 2), _IDLE_M).astype(np.float32)
-        opacities = np.where(seen, _CLEAR, _FAINT).astype(np.float32)
+        lengths = np.where(sensing, np.round(reading, 2), _IDLE_M).astype(np.float32)
+        opacities = np.where(sensing, _CLEAR, _FAINT).astype(np.float32)
         for boards, handle in self._plates:
             handle.batched_colors = plates[boards]
         for units, handle in self._cones:
             handle.batched_colors, handle.batched_scales = cones[units], lengths[units]
             handle.batched_opacities = opacities[units]
         self.points.batched_positions = np.nan_to_num(points).astype(np.float32)
-        self.points.batched_scales = np.where(seen, _POINT_M, _GONE).astype(np.float32)
+        self.points.batched_scales = np.where(sensing, _POINT_M, _GONE).astype(np.float32)
 
     def _glowing(self, step: ControlStep) -> tuple[BoolArray, BoolArray]:
         """Masks of the units (K,) that see an obstacle, and of those whose obstacles restrict the arm."""

@@ -123,10 +123,10 @@ class ViewerTopics:
 
     def _sensed(self, step: ControlStep, time: int) -> list[Any]:
         """Sensed points as spheres, and the closest pairs as lines."""
-        seen, at = step.obstacles, header(time, self._base)
-        pairs = np.stack([seen.body_point, seen.point], axis=1).reshape(-1, 3)
+        obstacles, at = step.obstacles, header(time, self._base)
+        pairs = np.stack([obstacles.body_point, obstacles.point], axis=1).reshape(-1, 3)
         return [
-            messages().marker(at, _SENSED, points=seen.point, ns="sensed", frame_locked=True),
+            messages().marker(at, _SENSED, points=obstacles.point, ns="sensed", frame_locked=True),
             messages().marker(at, _CLOSEST, points=pairs, ns="closest", frame_locked=True),
         ]
 
@@ -143,7 +143,7 @@ class ViewerTopics:
 
 def range_item(
     unit_id: str, sequence: int, time: int, stamp: float, distance: float, status: int, sensor: Sensor = PAPER_SENSOR
-) -> Item:  # fmt: skip
+) -> Item:
     """Return a unit's reading measured at a stamp [s], logged at an instant [ns]: distance [m] and `RangeStatus`."""
     at = header(nanoseconds(stamp, time), unit_id)
     seen_m = _single(distance) if status in _MEASURED else math.inf

@@ -1,4 +1,4 @@
-"""Detected contacts, held against what truly touched, which only a simulation knows."""
+"""Detected contacts beside the true touches of a simulation."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -43,7 +43,7 @@ class TrueTouch:
     """Largest true force [N]."""
     peak_20ms: float
     """Largest 20 ms mean of the true force [N]."""
-    held: float
+    lasting: float
     """Largest 20 ms mean that begins 0.5 s after the touch or later [N], NaN if it was over by then."""
     link: str
     """Link that touched first, '' where that is not known."""
@@ -66,7 +66,7 @@ class FeltContact:
     """(3,) on each axis the estimate that was farthest from zero during the contact [N]."""
     peak_norm: float
     """Largest norm of the estimate during the contact [N]."""
-    held_norm: float
+    lasting: float
     """Largest norm of the estimate later than 0.5 s into the contact [N]."""
     reaction_speed: float
     """At its beginning [m/s]."""
@@ -113,9 +113,10 @@ class ContactMeasures:
         return _largest([d.peak_norm for d in self.detections])
 
     @property
-    def held(self) -> float | None:
+    def lasting(self) -> float | None:
         """Largest force later than 0.5 s into a contact [N], from the same source as the peak; None if none lasted."""
-        return _largest([t.held for t in self.touches] if self.truth_known else [d.held_norm for d in self.detections])
+        lasting = self.touches if self.truth_known else self.detections
+        return _largest([one.lasting for one in lasting])
 
 
 def contacts_in(course: RunCourse) -> ContactMeasures:
@@ -177,7 +178,7 @@ def _detections(course: RunCourse, touches: Sequence[TrueTouch]) -> list[FeltCon
                 contact=contact,
                 peak=_farthest(force),
                 peak_norm=float(np.fmax.reduce(size, initial=np.nan)),
-                held_norm=float(np.fmax.reduce(size[late], initial=np.nan)),
+                lasting=float(np.fmax.reduce(size[late], initial=np.nan)),
                 reaction_speed=speed,
                 reaction_s=float(lasted[i:end].sum()),
                 moved_s=float(lasted[i:end][course.answering[i:end]].sum()),
@@ -265,7 +266,7 @@ def _touched(contacts: ContactMeasures) -> Html:
                 "speed [m/s]": number(float(np.linalg.norm(touch.velocity)), 3),
                 "true peak [N]": number(touch.peak, 1),
                 "true 20 ms [N]": number(touch.peak_20ms, 1),
-                f"held {TRANSIENT_S:g} s [N]": number(touch.held, 1),
+                f"held {TRANSIENT_S:g} s [N]": number(touch.lasting, 1),
             }
         )
     note = (

@@ -274,7 +274,7 @@ def mode_section(course: RunCourse) -> Html:
 
 def orientation_section(contacts: ContactMeasures) -> Html:
     """The largest forces beside what regions of the body are said to bear."""
-    peak, lasting = contacts.peak, contacts.held
+    peak, lasting = contacts.peak, contacts.lasting
     source, here, unsure = "true force, as the simulation knows it", "", ""
     if not contacts.truth_known:
         source, here = "force estimate during detected contacts", " (here of the estimate as it is)"

@@ -49,7 +49,7 @@ def _recording(m: Measures) -> list[Text]:
         else "Force on the arm by axis, base frame, with the bands in which one sample of it alone would be no contact."
         " What decides is the evidence, made of all joint torques and many samples: a contact from 1 on."
     )
-    seen = "Sensed distances from the body, s" if course.proximity_used else "S"
+    prefix = "Sensed distances from the body, s" if course.proximity_used else "S"
     return [
         element("h2", m.title),
         summary(m),
@@ -63,7 +63,7 @@ def _recording(m: Measures) -> list[Text]:
         motion.distance_section(course),
         element("h3", "Speed"),
         motion.speed_section(course),
-        picture(motion_figure(course), f"{seen}peed of the end-effector, and speed factor. {_SHADED}"),
+        picture(motion_figure(course), f"{prefix}peed of the end-effector, and speed factor. {_SHADED}"),
         picture(path_figure(course), "Path and end-effector seen from the front of the arm (from +x)."),
         element("h3", "Modes and quadratic program"),
         motion.mode_section(course),

@@ -155,19 +155,19 @@ def _block(batch: list[Kept], links: int, units: int) -> Columns:
 
 def _near(batch: list[Kept], links: int, units: int) -> Columns:
     """Least sensed distance of each step by unit and by link, and the nearest point."""
-    seen = [cycle.step.obstacles for cycle in batch]
-    row = np.repeat(np.arange(len(seen)), [len(o.unit) for o in seen])
-    unit = np.concatenate([o.unit for o in seen])
-    link = np.concatenate([o.link for o in seen])
-    body = np.concatenate([o.body_distance for o in seen])
-    ee = np.concatenate([o.ee_distance for o in seen])
-    point = np.concatenate([o.point for o in seen]).reshape(-1, 3)
-    by_unit = np.full((len(seen), units), np.nan)
-    by_link = np.full((len(seen), links), np.nan)
+    obstacles = [cycle.step.obstacles for cycle in batch]
+    row = np.repeat(np.arange(len(obstacles)), [len(o.unit) for o in obstacles])
+    unit = np.concatenate([o.unit for o in obstacles])
+    link = np.concatenate([o.link for o in obstacles])
+    body = np.concatenate([o.body_distance for o in obstacles])
+    ee = np.concatenate([o.ee_distance for o in obstacles])
+    point = np.concatenate([o.point for o in obstacles]).reshape(-1, 3)
+    by_unit = np.full((len(obstacles), units), np.nan)
+    by_link = np.full((len(obstacles), links), np.nan)
     own = unit < units  # what outside sources see is of no unit
     np.fmin.at(by_unit, (row[own], unit[own]), body[own])
     np.fmin.at(by_link, (row, link), body)
-    nearest, where = np.full(len(seen), np.nan), np.full((len(seen), 3), np.nan)
+    nearest, where = np.full(len(obstacles), np.nan), np.full((len(obstacles), 3), np.nan)
     farthest_first = np.argsort(-ee, kind="stable")  # of several entries for a row the last one stays
     farthest_first = farthest_first[np.isfinite(ee[farthest_first])]
     nearest[row[farthest_first]], where[row[farthest_first]] = ee[farthest_first], point[farthest_first]

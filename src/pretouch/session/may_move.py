@@ -167,19 +167,19 @@ def _fault(what: str, sentence: str) -> Finding:
     return Finding("the arm", "fault", what, sentence)
 
 
-def check(controller: Controller, seen: Standstill, floor: float) -> tuple[Finding, ...]:
-    """Return what there is to know of an arm that was watched, for a controller that is to move it.
+def check(controller: Controller, rest: Standstill, floor: float) -> tuple[Finding, ...]:
+    """Return the findings on an arm that was watched, for a controller that is to move it.
 
     Args:
-        controller: its model, path and profile count.
-        seen: the arm, standing.
-        floor: height of what is below it, base frame [m].
+        controller: gives model, path and profile.
+        rest: measurements of the arm at rest.
+        floor: height of the floor, base frame [m].
     """
     return (
-        *_limits(controller, seen.newest.q),
-        *_rest(controller, seen),
-        *_force(controller, seen),
-        *_torques(controller, seen),
+        *_limits(controller, rest.newest.q),
+        *_rest(controller, rest),
+        *_force(controller, rest),
+        *_torques(controller, rest),
         *_floor(controller, floor),
     )
 
@@ -195,8 +195,8 @@ def _limits(controller: Controller, q: FloatArray) -> Iterator[Finding]:
             yield Finding("the arm", "warning", "limits", f"{where}: it can hardly move in that direction.")
 
 
-def _rest(controller: Controller, seen: Standstill) -> Iterator[Finding]:
-    moved = np.ptp(seen.q, axis=0)
+def _rest(controller: Controller, rest: Standstill) -> Iterator[Finding]:
+    moved = np.ptp(rest.q, axis=0)
     joint = int(np.argmax(moved))
     if moved[joint] > DRIFT_RAD:
         yield _fault(
@@ -206,40 +206,40 @@ def _rest(controller: Controller, seen: Standstill) -> Iterator[Finding]:
         )
 
 
-def _force(controller: Controller, seen: Standstill) -> Iterator[Finding]:
+def _force(controller: Controller, rest: Standstill) -> Iterator[Finding]:
     threshold = MovingThresholds.of_kind(controller.profile.detect)
-    if seen.missing_share > MISSING_SHARE:
+    if rest.missing_share > MISSING_SHARE:
         yield _fault(
             "no force",
-            f"The robot gives no force estimate in {100 * seen.missing_share:.0f}% of its states, because it is near a"
+            f"The robot gives no force estimate in {100 * rest.missing_share:.0f}% of its states, because it is near a"
             " singularity: guide it to another posture.",
         )
-    if seen.missing_share == 1.0:
+    if rest.missing_share == 1.0:
         return
-    force, most = seen.rest_wrench[:3], BIAS_SHARE * threshold.f_base_n
+    force, most = rest.rest_wrench[:3], BIAS_SHARE * threshold.f_base_n
     if np.abs(force).max() > most:
         yield _fault(
             "bias",
             f"At rest the robot measures a force of {vector(force)} N (limit {most:g} N on an axis): set the mass of"
             " its hand and load, and check that nothing touches the arm.",
         )
-    if seen.noise.max() > threshold.sigma_max_n:
+    if rest.noise.max() > threshold.sigma_max_n:
         yield _fault(
             "noise",
-            f"The force at rest has a standard deviation of {seen.noise.max():.1f} N (limit {threshold.sigma_max_n:g}"
+            f"The force at rest has a standard deviation of {rest.noise.max():.1f} N (limit {threshold.sigma_max_n:g}"
             " N): check that nothing shakes the arm, and that its mounting is firm.",
         )
     most = DISTURBANCE_SHARE * threshold.f_base_n
-    if seen.disturbance > most:
+    if rest.disturbance > most:
         yield _fault(
             "touched",
-            f"During the checks the force changed by {seen.disturbance:.1f} N (limit {most:g} N): do not touch the arm"
+            f"During the checks the force changed by {rest.disturbance:.1f} N (limit {most:g} N): do not touch the arm"
             " yet.",
         )
 
 
-def _torques(controller: Controller, seen: Standstill) -> Iterator[Finding]:
-    profile, missing = controller.profile, float(np.mean(~np.isfinite(seen.tau_ext).all(axis=1)))
+def _torques(controller: Controller, rest: Standstill) -> Iterator[Finding]:
+    profile, missing = controller.profile, float(np.mean(~np.isfinite(rest.tau_ext).all(axis=1)))
     if (profile.detect.by_torques or profile.react.by_torques) and missing > MISSING_SHARE:
         yield _fault(
             "no torques",
@@ -299,10 +299,10 @@ class StandingArm:
             agree = ModelCheck(c.model, c.skin, c.fixtures)
             units = UnitWatch(self.skin, _LOOK_S, agree, lambda: self.arm.read().q, self.left_out)
             units.wait(self.clock)
-        seen = watch(self.arm, self.clock, c.limits.qd_max, WATCH_S, units.take if units else lambda: None)
+        rest = watch(self.arm, self.clock, c.limits.qd_max, WATCH_S, units.take if units else lambda: None)
         wrong = units.judge()[1] if units else ()
-        start = () if self.approach else check_start(c, seen.newest.q)
-        return seen, (*check(c, seen, self.floor), *start, *wrong)
+        start = () if self.approach else check_start(c, rest.newest.q)
+        return rest, (*check(c, rest, self.floor), *start, *wrong)
 
     def recheck(self, checked: Standstill) -> FloatArray:
         """Return where the arm is by now (n,) [rad]; RobotError if that is not where it was checked, or may not move.

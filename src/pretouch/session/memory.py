@@ -148,8 +148,8 @@ def load_learnt(path: Path, arm: RobotModel, p: SequentialParams) -> tuple[Resid
         if array is None or array.shape != list(shape) or len(array.values) != np.prod(shape):
             raise RobotModelError(f"{path}: {name} is not of the shape {shape}: {_ANEW}.")
         arrays.append(np.array(array.values).reshape(shape))
-    weights, covariance, spread, seen = arrays
-    learnt = fresh._replace(weights=weights, covariance=covariance, spread=spread, seen=seen)
+    weights, covariance, spread, count = arrays
+    learnt = fresh._replace(weights=weights, covariance=covariance, spread=spread, seen=count)
     try:
         check_learnt(learnt, arm)
     except ParameterError as error:
@@ -194,9 +194,9 @@ def rested(model: ResidualModel, pause_s: float, p: SequentialParams) -> Residua
     of it, for what the arm holds may be another. The links' masses stay what they are.
     """
     n = len(model.weights)
-    prior, gone = prior_of(n, p), -math.expm1(-max(pause_s, 0.0) / _COOLING_S)
+    prior, lost = prior_of(n, p), -math.expm1(-max(pause_s, 0.0) / _COOLING_S)
     share = np.zeros(len(prior))
-    share[:PLAIN], share[-1] = _DRIFT**2 * gone, gone
+    share[:PLAIN], share[-1] = _DRIFT**2 * lost, lost
     left = np.sqrt(1.0 - share)
     # scaled from both sides, by which it stays positive definite: of each variance a share is replaced by the prior's
     covariance = model.covariance * (left[:, None] * left) + np.diag(share * prior)

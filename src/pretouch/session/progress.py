@@ -155,6 +155,6 @@ class PushOutcome:
     def _sentence(self) -> str:
         push = f"The push of {self._size:.0f} N"
         if self._detected is not None:
-            answer = "the arm moved with it" if self._moved else "the arm held still: it was below what moves the arm"
+            answer = "the arm moved with it" if self._moved else "the arm held still: the push was too weak to move it"
             return f"{push} was detected after {self._detected:.2f} s, and {answer}."
         return f"{push}{self._before}." if self._before else f"{push} was not detected: {lacked(self._nearest)}."

@@ -40,14 +40,14 @@ def field(
     """
     origin, R = placed(position[body], rotation[body], T_body)
     lines = turned(R, rays)
-    distance, normal, met = cast(origin, lines, geoms, body, farthest)
+    distance, normal, struck = cast(origin, lines, geoms, body, farthest)
     total, all_of_it = 0.0, 0.0
     for i in range(len(rays)):
         all_of_it += rays[i, 2]
         if 0.0 <= distance[i] <= farthest:
             outwards = lines[i, 0] * normal[i, 0] + lines[i, 1] * normal[i, 1] + lines[i, 2] * normal[i, 2]
             away = 0.0 if outwards > 0.0 else distance[i]  # it began inside what presses on the electrode
-            of_it = 1.0 if geoms.body[met[i]] > 0 else DIELECTRIC
+            of_it = 1.0 if geoms.body[struck[i]] > 0 else DIELECTRIC
             total += of_it * rays[i, 2] * ELECTRODE_M / (ELECTRODE_M + away)
     return total / all_of_it
 

@@ -20,8 +20,8 @@ for _file in Path(mujoco.__file__).parent.iterdir():
 _ADDRESS, _NUMBER = types.intp, types.intc
 
 
-def _declared(name: str, returned: types.Type, *given: types.Type) -> Any:
-    return types.ExternalFunction(name, returned(*given))
+def _declared(name: str, returned: types.Type, *arguments: types.Type) -> Any:
+    return types.ExternalFunction(name, returned(*arguments))
 
 
 def _in_place(name: str, *more: types.Type) -> Callable[..., None]:

@@ -93,7 +93,7 @@ def cast(
     And which geom (N,) that is. The distance is -1 where they meet nothing. Not met are geoms of the body `without` and
     those that are all farther than `farthest` [m].
     """
-    nearest, normal, met = np.full(len(rays), -1.0), np.zeros_like(rays), np.zeros(len(rays), np.int64)
+    nearest, normal, struck = np.full(len(rays), -1.0), np.zeros_like(rays), np.zeros(len(rays), np.int64)
     to, there = np.empty(3), np.empty(3)
     for geom in geoms.seen:
         if geoms.body[geom] == without:
@@ -111,6 +111,6 @@ def cast(
                 continue
             distance = _along(geoms, geom, origin, rays[k], there)
             if distance >= 0.0 and (distance < nearest[k] or nearest[k] < 0.0):
-                nearest[k], met[k] = distance, geom
+                nearest[k], struck[k] = distance, geom
                 normal[k] = there
-    return nearest, normal, met
+    return nearest, normal, struck

@@ -53,19 +53,19 @@ class UnitClock:
         """Most the true offset can differ from `offset` [s]."""
         return 0.5 * (self.high - self.low)
 
-    def update(self, made: float, arrival: float, sent: float | None, hold: float) -> bool:
-        """Take in a sample; return False if it contradicts what was known, which is forgotten then.
+    def update(self, sampled: float, arrival: float, sent: float | None, hold: float) -> bool:
+        """Take in a sample; return False if it contradicts the bounds, which are then reset.
 
         Args:
-            made: when the sample was made [s], unit's clock.
-            arrival: when it arrived, or later [s], host's clock.
-            sent: when the beacon it echoes was sent, or earlier [s], host's clock; None if that is not known.
-            hold: for how long the unit had heard that beacon [s].
+            sampled: time of the sample [s], unit's clock.
+            arrival: time of its arrival, or later [s], host's clock.
+            sent: time at which the echoed beacon was sent, or earlier [s], host's clock; None if unknown.
+            hold: time since the unit received that beacon [s].
         """
-        newest = self._newest = max(self._newest, made)
-        _insert(self._highs, made, self._drift * made - (arrival - made))
+        newest = self._newest = max(self._newest, sampled)
+        _insert(self._highs, sampled, self._drift * sampled - (arrival - sampled))
         if sent is not None:
-            echoed = made - hold
+            echoed = sampled - hold
             _insert(self._lows, echoed, sent - echoed - TICK + self._drift * echoed)
         self.high = self._drift * newest - self._highs[0][1]
         if not self._lows:

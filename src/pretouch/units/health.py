@@ -181,9 +181,9 @@ class UnitWindow:
         self._heard: deque[Received] = deque()
         self._counts: deque[tuple[float, UnitTraffic]] = deque()
 
-    def take(self, now: float, heard: Iterable[Received], traffic: UnitTraffic) -> None:
-        """Take in what was heard since the last time, and what the receiver has counted by now [s]."""
-        self._heard.extend(heard)
+    def take(self, now: float, samples: Iterable[Received], traffic: UnitTraffic) -> None:
+        """Take in the samples since the last call, and the counts of the receiver by now [s]."""
+        self._heard.extend(samples)
         self._counts.append((now, replace(traffic)))
         while self._heard and self._heard[0].arrival <= now - self._length:
             self._heard.popleft()
@@ -191,25 +191,25 @@ class UnitWindow:
             self._counts.popleft()
 
     def health(self, now: float, traffic: UnitTraffic) -> UnitHealth:
-        """Return how the unit is at an instant [s]."""
+        """Return the health of the unit at an instant [s]."""
         return unit_health(list(self._heard), now, traffic, self._counts[0][1] if self._counts else traffic)
 
 
-def unit_health(heard: Sequence[Received], now: float, traffic: UnitTraffic, before: UnitTraffic) -> UnitHealth:
-    """Make numbers of what was heard.
+def unit_health(samples: Sequence[Received], now: float, traffic: UnitTraffic, before: UnitTraffic) -> UnitHealth:
+    """Compute the health of a unit from its samples.
 
     Args:
-        heard: the unit's samples within the window, as they came.
+        samples: the unit's samples within the window, in the order of arrival.
         now: instant [s].
-        traffic: what the receiver knows of it.
-        before: what it knew as the window began.
+        traffic: counts of the receiver by now.
+        before: counts at the begin of the window.
     """
-    fresh = [h for h in heard if h.sample.flags & _NEW]
+    fresh = [h for h in samples if h.sample.flags & _NEW]
     good = np.array([h.sample.range_mm / 1000 if h.sample.range_status == _OK else np.nan for h in fresh])
     ages = np.array([h.arrival - h.stamp for h in fresh if math.isfinite(h.stamp)])
     sigmas = [h.sample.range_sigma / 4000 for h in fresh if h.sample.range_status == _OK]
-    heard_s = now - heard[0].arrival if heard else 0.0
-    boot = _since_reboot([h.sample for h in heard])
+    heard_s = now - samples[0].arrival if samples else 0.0
+    boot = _since_reboot([h.sample for h in samples])
     last = boot[-1] if boot else None
     newest = fresh[-1] if fresh else None
     imu_rate_hz, imu_loss = _imu(boot)
@@ -222,7 +222,7 @@ def unit_health(heard: Sequence[Received], now: float, traffic: UnitTraffic, bef
         traffic=traffic,
         heard_s=heard_s,
         silent_s=now - traffic.last_arrival,
-        gap_s=max((b - a for a, b in pairwise(sorted(h.arrival for h in heard))), default=0.0),
+        gap_s=max((b - a for a, b in pairwise(sorted(h.arrival for h in samples))), default=0.0),
         rate_hz=len(fresh) / heard_s if heard_s > 0 else math.nan,
         loss=lost / sent if sent else math.nan,
         latency_s=float(np.median(ages)) if len(ages) else math.nan,
@@ -237,7 +237,7 @@ def unit_health(heard: Sequence[Received], now: float, traffic: UnitTraffic, bef
         # its count ends at 65535, its flags do not
         bus_errors=max(last.bus_errors - boot[0].bus_errors, sum(bool(f & _BUS_ERROR) for f in flags)) if last else 0,
         restarts=sum(bool(f & _RESTARTED) for f in flags),
-        clock_unknown_s=_clock_unknown(heard, now, traffic),
+        clock_unknown_s=_clock_unknown(samples, now, traffic),
         range_late=sum(bool(f & _LATE) for f in flags),
         imu_rate_hz=imu_rate_hz,
         imu_loss=imu_loss,
@@ -253,11 +253,11 @@ def status_name(code: int) -> str:
     return RangeStatus(code).name if code in RangeStatus._value2member_map_ else str(code)
 
 
-def _clock_unknown(heard: Sequence[Received], now: float, traffic: UnitTraffic) -> float:
-    """Return for how long [s] a unit's clock has not been known."""
-    if math.isfinite(traffic.bound) or not heard:
+def _clock_unknown(samples: Sequence[Received], now: float, traffic: UnitTraffic) -> float:
+    """Return the time [s] for which a unit's clock has been unknown."""
+    if math.isfinite(traffic.bound) or not samples:
         return 0.0
-    return now - max((h.arrival for h in heard if math.isfinite(h.bound)), default=heard[0].arrival)
+    return now - max((h.arrival for h in samples if math.isfinite(h.bound)), default=samples[0].arrival)
 
 
 def _since_reboot(samples: Sequence[Sample]) -> list[Sample]:

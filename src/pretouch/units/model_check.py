@@ -51,10 +51,10 @@ class ModelCheck:
         if not fresh.any():
             return
         farthest = self._certain_return(q, fresh)
-        seen = np.where(np.isnan(distance), np.inf, distance)
+        measurement = np.where(np.isnan(distance), np.inf, distance)
         for k in np.flatnonzero(fresh).tolist():
             if farthest[k] <= REACH_M:
-                self._tests[k].append((float(seen[k]), float(farthest[k])))
+                self._tests[k].append((float(measurement[k]), float(farthest[k])))
 
     def _certain_return(self, q: FloatArray, tested: BoolArray) -> FloatArray:
         """Distance (K,) [m] by which all inner rays of a tested sensor have ended, infinite where one goes on."""
@@ -79,11 +79,11 @@ class ModelCheck:
         """Return what disagrees by now, in the order of the skin."""
         wrong = []
         for unit, tests in zip(self._skin.ids, self._tests, strict=True):
-            missed = [(seen, predicted) for seen, predicted in tests if seen > predicted + MARGIN_M]
+            missed = [(reading, predicted) for reading, predicted in tests if reading > predicted + MARGIN_M]
             if len(tests) < TESTS or len(missed) < SHARE * TESTS:
                 continue
-            seen, predicted = np.median(np.array(missed), axis=0)
-            report = f"{seen:.2f} m" if np.isfinite(seen) else "nothing"
+            reading, predicted = np.median(np.array(missed), axis=0)
+            report = f"{reading:.2f} m" if np.isfinite(reading) else "nothing"
             sentence = (
                 f"{unit} reports {report} where the model has the arm or a fixture at {predicted:.2f} m, in"
                 f" {len(missed)} of {TESTS} readings: check its pose in the skin file, its window, and the positions of"

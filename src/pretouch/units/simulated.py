@@ -150,17 +150,17 @@ class SimulatedUnit:
 
     def _touch_part(self, now: float) -> bytes:
         """Return its touch reading, if it has one."""
-        seen = self._touch
-        if seen is None:
+        touch = self._touch
+        if touch is None:
             return b""
-        force = NO_FORCE if np.isnan(seen.force) else round(1e3 * seen.force)
-        return TouchPart(int(seen.contact), TouchStatus.OK, 0, force, self._since(seen.time, now)).encode()
+        force = NO_FORCE if np.isnan(touch.force) else round(1e3 * touch.force)
+        return TouchPart(int(touch.contact), TouchStatus.OK, 0, force, self._since(touch.time, now)).encode()
 
     def _zones_part(self) -> bytes:
         """Return the zones of a new range, if it has some."""
         if self._zones == 1 or not self._range_new:
             return b""
-        rows = [(_field(seen.distance, 1e3), _field(seen.sigma, 4e3), seen.status) for seen in self._range]
+        rows = [(_field(zone.distance, 1e3), _field(zone.sigma, 4e3), zone.status) for zone in self._range]
         return ZONES.pack(self._zones, 0) + np.array(rows, ZONE).tobytes()
 
     def _look_at_range(self, now: float) -> None:
@@ -271,13 +271,13 @@ class SimulatedUnit:
         first, count = self._fifo_first, min(len(self._fifo), IMU_MOST)
         imu = [self._fifo.popleft() for _ in range(count)]
         self._fifo_first += count
-        seen = min(self._range, key=lambda zone: (zone.status not in _SHOWS, zone.distance), default=_nothing(now))
+        zone = min(self._range, key=lambda one: (one.status not in _SHOWS, one.distance), default=_nothing(now))
         return Sample(
             unit=self.key.number, flags=int(flags), sequence=0, time_us=self._own(now), beacon=0, beacon_hold_us=0,
             battery_mv=_BATTERY_MV, temperature_cdeg=_TEMPERATURE_CDEG, bus_errors=0, range_stream=self._stream,
-            range_status=seen.status, range_mm=_field(seen.distance, 1e3), range_age_us=self._since(seen.time, now),
-            range_sigma=_field(seen.sigma, 4e3), range_signal=_field(seen.signal, 128.0),
-            range_ambient=_field(seen.ambient, 128.0), range_spads=_field(seen.spads, 256.0),
+            range_status=zone.status, range_mm=_field(zone.distance, 1e3), range_age_us=self._since(zone.time, now),
+            range_sigma=_field(zone.sigma, 4e3), range_signal=_field(zone.signal, 128.0),
+            range_ambient=_field(zone.ambient, 128.0), range_spads=_field(zone.spads, 256.0),
             imu_count=count, imu_scale=self._imu_scale, imu_rate_hz=self._imu_rate, imu_index=first,
             imu_age_us=self._since(imu[-1].time, now) if imu else 0,
             imu=b"".join(IMU_SAMPLE.pack(*sample.counts) for sample in imu), touch=touch, zones=zones,

@@ -84,7 +84,7 @@ def read_skin(place: Path) -> SkinTrace:
     if not samples:
         raise RecordingError(f"{place} holds no samples of sensor units: {way_out}.")
     joints, names = _joints(place, states)
-    return SkinTrace({unit: _unit(heard) for unit, heard in samples.items()}, joints, names, contents.complete)
+    return SkinTrace({unit: _unit(received) for unit, received in samples.items()}, joints, names, contents.complete)
 
 
 def _received(place: Path, message: Any, ids: list[str]) -> Received:
@@ -96,9 +96,9 @@ def _received(place: Path, message: Any, ids: list[str]) -> Received:
     return Received(unit, message.arrival, message.stamp, message.offset, message.bound, sample)
 
 
-def _unit(heard: list[Received]) -> UnitTrace:
+def _unit(samples: list[Received]) -> UnitTrace:
     batches = []
-    for one in heard:
+    for one in samples:
         with suppress(ValueError):  # full scales that the sensor does not have
             batches.append((one, *imu_values(one.sample.imu, one.sample.imu_scale)))
     used = [one for one, *_ in batches if one.sample.imu_count]
@@ -107,19 +107,19 @@ def _unit(heard: list[Received]) -> UnitTrace:
     scales = [counts_of(one.sample.imu_scale) for one in used]
     full = [LARGEST_COUNT * min(lsb) for lsb in zip(*scales, strict=True)] or [np.inf, np.inf]
     values = (np.concatenate([np.zeros((0, 3)), *(batch[k] for batch in batches)]) for k in (1, 2))
-    return UnitTrace(heard, _ranges(heard), ImuTrace(stamp, *values), *full)
+    return UnitTrace(samples, _ranges(samples), ImuTrace(stamp, *values), *full)
 
 
-def _column(heard: list[Received], name: str) -> IntArray:
-    return np.array([getattr(one.sample, name) for one in heard], dtype=np.uint64).astype(np.int64)
+def _column(samples: list[Received], name: str) -> IntArray:
+    return np.array([getattr(one.sample, name) for one in samples], dtype=np.uint64).astype(np.int64)
 
 
-def _times(heard: list[Received], name: str) -> FloatArray:
-    return np.array([getattr(one, name) for one in heard], dtype=np.float64)
+def _times(samples: list[Received], name: str) -> FloatArray:
+    return np.array([getattr(one, name) for one in samples], dtype=np.float64)
 
 
-def _ranges(heard: list[Received]) -> RangeTrace:
-    fresh = [one for one in heard if one.sample.flags & Flag.RANGE_NEW]
+def _ranges(samples: list[Received]) -> RangeTrace:
+    fresh = [one for one in samples if one.sample.flags & Flag.RANGE_NEW]
     stamp, bound, arrival = (_times(fresh, name) for name in ("stamp", "bound", "arrival"))
     distance, status, sigma = (_column(fresh, f"range_{name}") for name in ("mm", "status", "sigma"))
     return RangeTrace(stamp, bound, arrival, distance / 1000, status, sigma / 4000)

@@ -39,9 +39,9 @@ class SkinRecording:
         """'' or, once nothing more can be written, a sentence that says why and what the file holds."""
         return self._disk.trouble
 
-    def add(self, heard: Iterable[Received], ids: Sequence[str]) -> None:
+    def add(self, samples: Iterable[Received], ids: Sequence[str]) -> None:
         """Add datagrams of the units of these ids, in their order in the skin. Nobody may change them from here on."""
-        for one in heard:
+        for one in samples:
             if not self._disk.over:
                 self._time = nanoseconds(one.arrival, self._time)
                 self.samples += 1
@@ -74,16 +74,16 @@ class SkinRecording:
         self.close()
 
 
-def _sample_items(unit: str, time: int, heard: Received) -> Iterator[Item]:
+def _sample_items(unit: str, time: int, received: Received) -> Iterator[Item]:
     """Yield a datagram as it came, and its range and IMU samples, each with a known time, for viewers."""
-    sample, topic = heard.sample, f"/skin/{topic_name(unit)}"
-    times = heard.arrival, heard.stamp, heard.offset, heard.bound
+    sample, topic = received.sample, f"/skin/{topic_name(unit)}"
+    times = received.arrival, received.stamp, received.offset, received.bound
     datagram = np.frombuffer(sample.body(), np.uint8)
     yield item(f"{topic}/sample", UNIT_SAMPLE, sample.sequence, time, sample.sequence, unit, *times, datagram)
-    if sample.flags & Flag.RANGE_NEW and heard.stamp == heard.stamp:
+    if sample.flags & Flag.RANGE_NEW and received.stamp == received.stamp:
         distance = sample.range_mm / 1000
-        yield range_item(unit, sample.sequence, time, heard.stamp, distance, sample.range_status)
-    if (batch := imu_batch(heard)) is None:
+        yield range_item(unit, sample.sequence, time, received.stamp, distance, sample.range_status)
+    if (batch := imu_batch(received)) is None:
         return
     turn, nothing = messages().make("geometry_msgs/msg/Quaternion", 0.0, 0.0, 0.0, 1.0), np.zeros(9)
     for stamp, a, w in zip(batch.stamp.tolist(), batch.acceleration, batch.angular_velocity, strict=True):

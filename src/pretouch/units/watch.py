@@ -26,7 +26,7 @@ class WatchUpdate:
     """Instant, by the receiver's clock [s]."""
     elapsed: float
     """Time since watching began [s]."""
-    heard: list[Received]
+    samples: list[Received]
     units: tuple[UnitHealth, ...]
     findings: tuple[Finding, ...]
     last: bool
@@ -79,12 +79,12 @@ class UnitWatch:
         now = time.monotonic()
         self._look_due = now + self._every
         self._lateness.look(now, self._left_out())
-        heard = self.units.take_samples()
-        for one in heard:
+        samples = self.units.take_samples()
+        for one in samples:
             self._arrivals[one.unit] = one.arrival
         for k, (window, traffic) in enumerate(zip(self._windows, self._traffic(), strict=True)):
-            window.take(now, [one for one in heard if one.unit == k], traffic)
-        return heard
+            window.take(now, [one for one in samples if one.unit == k], traffic)
+        return samples
 
     def judge(self) -> tuple[tuple[UnitHealth, ...], tuple[Finding, ...]]:
         """Return the health of each unit by now, and what is wrong."""
@@ -122,9 +122,9 @@ class UnitWatch:
             while (left := due - time.monotonic()) > 0:
                 time.sleep(min(left, _COMPARE_S))
                 self._compare()
-            heard = self._look()
+            samples = self._look()
             now = time.monotonic()
-            yield WatchUpdate(now, now - begun, heard, *self.judge(), now >= begun + duration)
+            yield WatchUpdate(now, now - begun, samples, *self.judge(), now >= begun + duration)
 
     def _traffic(self) -> list[UnitTraffic]:
         """Return what was counted, older than the samples by up to 0.3 s but for the newest arrivals."""

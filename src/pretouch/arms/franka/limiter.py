@@ -63,8 +63,8 @@ class SetPointLimiter:
         """True if the last velocities were zero, but for rounding."""
         return self._sent is not None and max(map(abs, self._sent)) < _REST_RAD_S
 
-    def step(self, state: FrankaState, wanted: list[float]) -> list[float]:
-        """Return the velocities (7,) [rad/s] to command in answer to a state, on the way to those wanted."""
+    def step(self, state: FrankaState, velocity: list[float]) -> list[float]:
+        """Return the velocities (7,) [rad/s] to command in answer to a state, on the way to the requested ones."""
         at, now, changing = state.q_d.tolist(), state.dq_d.tolist(), state.ddq_d.tolist()
         if not all(map(math.isfinite, (*at, *now, *changing))):
             raise RobotError(
@@ -87,7 +87,7 @@ class SetPointLimiter:
             ]
         self._input.target_velocity = [
             high.at_most(min(v, most), high.zero - q) if v > 0.0 else -low.at_most(min(-v, most), q - low.zero)
-            for v, q, most, (low, high) in zip(wanted, at, self._speed, self._ends, strict=True)
+            for v, q, most, (low, high) in zip(velocity, at, self._speed, self._ends, strict=True)
         ]
         try:
             self._ruckig.update(self._input, self._output)
@@ -121,11 +121,11 @@ def _ends(
     return ends
 
 
-def refusal(wanted: list[float], limits: MotionLimits) -> str:
+def refusal(velocity: list[float], limits: MotionLimits) -> str:
     """Say what keeps a set-point [rad/s] from being one, or ''."""
-    if len(wanted) != len(limits.qd_max):
-        return f"{len(wanted)} joint velocities were asked for, but it has {len(limits.qd_max)} joints"
-    for i, (v, most) in enumerate(zip(wanted, limits.qd_max.tolist(), strict=True)):
+    if len(velocity) != len(limits.qd_max):
+        return f"{len(velocity)} joint velocities were asked for, but it has {len(limits.qd_max)} joints"
+    for i, (v, most) in enumerate(zip(velocity, limits.qd_max.tolist(), strict=True)):
         if not math.isfinite(v):
             return f"joint {i + 1} was to move at {v} rad/s, which is not finite"
         if abs(v) > most * _ROUNDING:

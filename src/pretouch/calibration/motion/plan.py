@@ -120,6 +120,6 @@ class Plan:
 def _smooth_step(part: FloatArray) -> FloatArray:
     """Return the least-jerk step from 0 to 1, at rest before 0 and after 1, and two derivatives (3, T)."""
     s = np.clip(part, 0.0, 1.0)
-    return np.stack([
-        s**3 * (10.0 - 15.0 * s + 6.0 * s**2), 30.0 * s**2 * (1.0 - s) ** 2, 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s)
-    ])  # fmt: skip
+    return np.stack(
+        [s**3 * (10.0 - 15.0 * s + 6.0 * s**2), 30.0 * s**2 * (1.0 - s) ** 2, 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s)]
+    )

@@ -137,13 +137,13 @@ def _joints(model: RobotModel, measured: SkinTrace, recorded: Recorded) -> tuple
 def _units(measured: SkinTrace, believed: Skin | None) -> tuple[UnitData, ...]:
     """Return the units of the skin in its order, then others that have an IMU; a link that nobody names is None."""
     links = {unit.id: unit.link for unit in believed.units} if believed else {}
-    heard = {name: unit for name, unit in measured.units.items() if len(unit.imu.stamp)}
+    traces = {name: unit for name, unit in measured.units.items() if len(unit.imu.stamp)}
     units = []
-    for name in dict.fromkeys((*links, *heard)):
-        if name not in heard:
+    for name in dict.fromkeys((*links, *traces)):
+        if name not in traces:
             units.append(UnitData(name, _NO_IMU, links.get(name)))
             continue
-        unit = heard[name]
+        unit = traces[name]
         imu = by_time(unit.imu)
         units.append(UnitData(name, imu, links.get(name), unit.acceleration_max, unit.angular_velocity_max))
     return tuple(units)
@@ -212,8 +212,8 @@ def _written(answer: Calibration, model: RobotModel, believed: Skin | None, out:
     save_skin(skin, out)
     ids, located = [unit.id for unit in skin.mounted], [unit.id for unit in answer.units if unit.accepted]
     parts = [f"Skin file: {out} has {len(located)} units where they were found."]
-    if kept := [name for name in ids if name not in located]:
-        parts.append(f"Kept as before, without calibration: {', '.join(kept)}.")
+    if unlocated := [name for name in ids if name not in located]:
+        parts.append(f"Kept as before, without calibration: {', '.join(unlocated)}.")
     if left_out := [unit.id for unit in answer.units if unit.id not in ids]:
         parts.append(f"Left out: {', '.join(left_out)}.")
     return " ".join(parts)
