@@ -178,15 +178,14 @@ def _add_joint(robot: Element, model: RobotModel, mj: mujoco.MjModel, link: int,
     low, high = float(model.q_min[j]), float(model.q_max[j])
     if d.envelope is not None:
         low, high = float(d.envelope.q_lower[j]), float(d.envelope.q_upper[j])
-    SubElement(
-        joint, "limit", lower=repr(low), upper=repr(high), velocity=repr(float(d.qd_max[j])),
-        effort=repr(float(d.tau_max[j])),
-    )  # fmt: skip
+    SubElement(joint, "limit", _attributes(lower=low, upper=high, velocity=d.qd_max[j], effort=d.tau_max[j]))
     if d.envelope is not None:
-        SubElement(
-            joint, "position_based_velocity_limits", velocity_offset=repr(float(d.envelope.offset[j])),
-            deceleration_limit=repr(float(d.envelope.slope[j] / 2)),
-        )  # fmt: skip
+        limits = _attributes(velocity_offset=d.envelope.offset[j], deceleration_limit=d.envelope.slope[j] / 2)
+        SubElement(joint, "position_based_velocity_limits", limits)
+
+
+def _attributes(**numbers: float) -> dict[str, str]:
+    return {name: repr(float(number)) for name, number in numbers.items()}
 
 
 def _text(numbers: FloatArray) -> str:

@@ -114,13 +114,16 @@ class RequestHandler:
     """Serves the requests of one client. Raises Disconnected when the client has disconnected."""
 
     def __init__(
-        self, client: Connection, protocol: Protocol, arm: ServedArm, state: StateDatagram,
-        settle: Callable[[], None], begins: Callable[[], None], say: Callable[[str], None],
-    ) -> None:  # fmt: skip
-        """Serve a client.
-
-        `settle` is called where the arm is to come to rest before it goes on, and `begins` before a motion begins.
-        """
+        self,
+        client: Connection,
+        protocol: Protocol,
+        arm: ServedArm,
+        state: StateDatagram,
+        settle: Callable[[], None],
+        begins: Callable[[], None],
+        say: Callable[[str], None],
+    ) -> None:
+        """Serve a client; `settle` is called where the arm must come to rest first, `begins` before each motion."""
         self._client, self._protocol, self._arm, self._state = client, protocol, arm, state
         self._settle, self._begins, self._say = settle, begins, say
         self._move: int | None = None

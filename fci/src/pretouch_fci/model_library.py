@@ -79,11 +79,14 @@ def source_of(model: RobotModel) -> str:
         combined([moved(bodies[link], kin.rotation[link], kin.position[link]) for link in group]) for group in groups
     ]
     tables = {
-        "AXIS": kin.axis, "ANCHOR": kin.anchor,
-        "HOME_R": kin.rotation[links].reshape(-1, 9), "HOME_P": kin.position[links],
-        "MASS": np.array([part.mass for part in parts]), "COM": np.array([part.com for part in parts]),
+        "AXIS": kin.axis,
+        "ANCHOR": kin.anchor,
+        "HOME_R": kin.rotation[links].reshape(-1, 9),
+        "HOME_P": kin.position[links],
+        "MASS": np.array([part.mass for part in parts]),
+        "COM": np.array([part.com for part in parts]),
         "INERTIA": np.array([part.inertia.ravel() for part in parts]),
-    }  # fmt: skip
+    }
     return "\n".join([*(_table(name, values) for name, values in tables.items()), _FUNCTIONS.read_text("utf-8")])
 
 

@@ -90,12 +90,8 @@ class StateDatagram:
 
 def by_robot_at(wrench: FloatArray, at: FloatArray, to: FloatArray) -> FloatArray:
     """Return the wrench (6,) by the robot on its environment about `to` (3,) [m], of one on the robot about `at`."""
-    lever = at - to
-    moment = np.array([
-        lever[1] * wrench[2] - lever[2] * wrench[1],
-        lever[2] * wrench[0] - lever[0] * wrench[2],
-        lever[0] * wrench[1] - lever[1] * wrench[0],
-    ])  # fmt: skip
+    (x, y, z), (fx, fy, fz) = at - to, wrench[:3]
+    moment = np.array([y * fz - z * fy, z * fx - x * fz, x * fy - y * fx])
     return np.concatenate([0.0 - wrench[:3], 0.0 - wrench[3:] - moment])
 
 

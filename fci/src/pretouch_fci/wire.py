@@ -62,68 +62,68 @@ class ControllerMode(IntEnum):
     NONE = 3
 
 
-ERRORS = (
-    "joint_position_limits_violation", "cartesian_position_limits_violation", "self_collision_avoidance_violation",
-    "joint_velocity_violation", "cartesian_velocity_violation", "force_control_safety_violation", "joint_reflex",
-    "cartesian_reflex", "max_goal_pose_deviation_violation", "max_path_pose_deviation_violation",
-    "cartesian_velocity_profile_safety_violation", "joint_position_motion_generator_start_pose_invalid",
-    "joint_motion_generator_position_limits_violation", "joint_motion_generator_velocity_limits_violation",
-    "joint_motion_generator_velocity_discontinuity", "joint_motion_generator_acceleration_discontinuity",
-    "cartesian_position_motion_generator_start_pose_invalid", "cartesian_motion_generator_elbow_limit_violation",
-    "cartesian_motion_generator_velocity_limits_violation", "cartesian_motion_generator_velocity_discontinuity",
-    "cartesian_motion_generator_acceleration_discontinuity", "cartesian_motion_generator_elbow_sign_inconsistent",
-    "cartesian_motion_generator_start_elbow_invalid", "force_controller_desired_force_tolerance_violation",
-    "start_elbow_sign_inconsistent", "communication_constraints_violation", "power_limit_violation",
-    "cartesian_motion_generator_joint_position_limits_violation",
-    "cartesian_motion_generator_joint_velocity_limits_violation",
-    "cartesian_motion_generator_joint_velocity_discontinuity",
-    "cartesian_motion_generator_joint_acceleration_discontinuity",
-    "cartesian_position_motion_generator_invalid_frame", "controller_torque_discontinuity",
-    "joint_p2p_insufficient_torque_for_planning", "tau_j_range_violation", "instability_detection",
-    "joint_move_in_wrong_direction", "cartesian_spline_violation", "joint_via_plan_limit_violation",
-    "base_acceleration_initialization_timeout", "base_acceleration_invalid_reading",
-)  # fmt: skip
+_ERRORS = """
+joint_position_limits_violation cartesian_position_limits_violation self_collision_avoidance_violation
+joint_velocity_violation cartesian_velocity_violation force_control_safety_violation joint_reflex cartesian_reflex
+max_goal_pose_deviation_violation max_path_pose_deviation_violation cartesian_velocity_profile_safety_violation
+joint_position_motion_generator_start_pose_invalid joint_motion_generator_position_limits_violation
+joint_motion_generator_velocity_limits_violation joint_motion_generator_velocity_discontinuity
+joint_motion_generator_acceleration_discontinuity cartesian_position_motion_generator_start_pose_invalid
+cartesian_motion_generator_elbow_limit_violation cartesian_motion_generator_velocity_limits_violation
+cartesian_motion_generator_velocity_discontinuity cartesian_motion_generator_acceleration_discontinuity
+cartesian_motion_generator_elbow_sign_inconsistent cartesian_motion_generator_start_elbow_invalid
+force_controller_desired_force_tolerance_violation start_elbow_sign_inconsistent communication_constraints_violation
+power_limit_violation cartesian_motion_generator_joint_position_limits_violation
+cartesian_motion_generator_joint_velocity_limits_violation cartesian_motion_generator_joint_velocity_discontinuity
+cartesian_motion_generator_joint_acceleration_discontinuity cartesian_position_motion_generator_invalid_frame
+controller_torque_discontinuity joint_p2p_insufficient_torque_for_planning tau_j_range_violation instability_detection
+joint_move_in_wrong_direction cartesian_spline_violation joint_via_plan_limit_violation
+base_acceleration_initialization_timeout base_acceleration_invalid_reading
+"""
+ERRORS = tuple(_ERRORS.split())
 """Names of the errors, in the order of the flags in a state."""
 
-_STATE = (
-    ("O_T_EE", 16), ("O_T_EE_d", 16), ("F_T_EE", 16), ("EE_T_K", 16), ("F_T_NE", 16), ("NE_T_EE", 16),
-    ("m_ee", 1), ("I_ee", 9), ("F_x_Cee", 3), ("m_load", 1), ("I_load", 9), ("F_x_Cload", 3), ("elbow", 2),
-    ("elbow_d", 2), ("tau_J", 7), ("tau_J_d", 7), ("dtau_J", 7), ("q", 7), ("q_d", 7), ("dq", 7), ("dq_d", 7),
-    ("ddq_d", 7), ("joint_contact", 7), ("cartesian_contact", 6), ("joint_collision", 7), ("cartesian_collision", 6),
-    ("tau_ext_hat_filtered", 7), ("O_F_ext_hat_K", 6), ("K_F_ext_hat_K", 6), ("O_dP_EE_d", 6), ("O_ddP_O", 3),
-    ("elbow_c", 2), ("delbow_c", 2), ("ddelbow_c", 2), ("O_T_EE_c", 16), ("O_dP_EE_c", 6), ("O_ddP_EE_c", 6),
-    ("theta", 7), ("dtheta", 7),
-)  # fmt: skip
+_STATE = """
+message_id:<u8 O_T_EE:16f O_T_EE_d:16f F_T_EE:16f EE_T_K:16f F_T_NE:16f NE_T_EE:16f m_ee:f I_ee:9f F_x_Cee:3f m_load:f
+I_load:9f F_x_Cload:3f elbow:2f elbow_d:2f tau_J:7f tau_J_d:7f dtau_J:7f q:7f q_d:7f dq:7f dq_d:7f ddq_d:7f
+joint_contact:7f cartesian_contact:6f joint_collision:7f cartesian_collision:6f tau_ext_hat_filtered:7f
+O_F_ext_hat_K:6f K_F_ext_hat_K:6f O_dP_EE_d:6f O_ddP_O:3f elbow_c:2f delbow_c:2f ddelbow_c:2f O_T_EE_c:16f
+O_dP_EE_c:6f O_ddP_EE_c:6f theta:7f dtheta:7f
+"""
+_ACCELEROMETERS = "accelerometer_top:(6,3)f accelerometer_bottom:(6,3)f"
+_FLAGS = """
+motion_generator_mode:u1 controller_mode:u1 errors:41u1 reflex_reason:41u1 robot_mode:u1
+control_command_success_rate:f
+"""
+_COMMAND = """
+message_id:<u8 q_c:7<f8 dq_c:7<f8 O_T_EE_c:16<f8 O_dP_EE_c:6<f8 elbow_c:2<f8 valid_elbow:u1
+motion_generation_finished:u1 tau_J_d:7<f8
+"""
+"""Fields of the datagrams as NAME:TYPE, in their order; f is the real number of the protocol."""
 
 
-def _state(real: str, accelerometers: bool) -> np.dtype[np.void]:
-    fields: list[tuple[str, str, tuple[int, ...]]] = [("message_id", "<u8", ())]
-    fields += [(name, real, () if count == 1 else (count,)) for name, count in _STATE]
-    if accelerometers:
-        fields += [("accelerometer_top", real, (6, 3)), ("accelerometer_bottom", real, (6, 3))]
-    flags = (len(ERRORS),)
-    fields += [
-        ("motion_generator_mode", "u1", ()), ("controller_mode", "u1", ()), ("errors", "u1", flags),
-        ("reflex_reason", "u1", flags), ("robot_mode", "u1", ()), ("control_command_success_rate", real, ()),
-    ]  # fmt: skip
-    return np.dtype(fields)
+def _layout(fields: str, real: str = "<f8") -> np.dtype[np.void]:
+    """Return the structured type of a datagram."""
+    names_and_types = (field.split(":") for field in fields.split())
+    return np.dtype([(name, of.replace("f", real) if "<" not in of else of) for name, of in names_and_types])
 
-
-_COMMAND = [
-    ("message_id", "<u8", ()), ("q_c", "<f8", (7,)), ("dq_c", "<f8", (7,)), ("O_T_EE_c", "<f8", (16,)),
-    ("O_dP_EE_c", "<f8", (6,)), ("elbow_c", "<f8", (2,)), ("valid_elbow", "u1", ()),
-    ("motion_generation_finished", "u1", ()), ("tau_J_d", "<f8", (7,)),
-]  # fmt: skip
 
 MOVE = struct.Struct("<II6d")
 """Begins the body of the request to move: controller, motion generator, and how far the motion may leave its path and
 its goal. The FR3's goes on with whether the robot interpolates by itself between few commands, and velocities for it.
 """
 _COMMON = {
-    "Connect": CONNECT.size, "StopMove": 0, "SetCollisionBehavior": 8 * 52, "SetJointImpedance": 8 * JOINTS,
-    "SetCartesianImpedance": 8 * 6, "SetGuidingMode": 7, "SetEEToK": 8 * 16, "SetNEToEE": 8 * 16, "SetLoad": 8 * 13,
+    "Connect": CONNECT.size,
+    "StopMove": 0,
+    "SetCollisionBehavior": 8 * 52,
+    "SetJointImpedance": 8 * JOINTS,
+    "SetCartesianImpedance": 8 * 6,
+    "SetGuidingMode": 7,
+    "SetEEToK": 8 * 16,
+    "SetNEToEE": 8 * 16,
+    "SetLoad": 8 * 13,
     "AutomaticErrorRecovery": 0,
-}  # fmt: skip
+}
 """Sizes of the bodies of requests [B] that are the same in both protocols."""
 
 
@@ -172,41 +172,41 @@ class Protocol(WireInterface):
     """Outcomes of a motion, by the numbers in the answers to the request to move."""
 
 
+_PANDA_REQUESTS = """
+Connect Move StopMove GetCartesianLimit SetCollisionBehavior SetJointImpedance SetCartesianImpedance SetGuidingMode
+SetEEToK SetNEToEE SetLoad SetFilters AutomaticErrorRecovery LoadModelLibrary
+"""
+_PANDA_OUTCOMES = "success,started,preempted,not possible,singular,invalid,reflex,emergency,input error,aborted"
 PANDA = Protocol(
     version=5,
     kind="panda",
-    state=_state("<f8", accelerometers=False),
-    command=np.dtype(_COMMAND),
-    requests=(
-        "Connect", "Move", "StopMove", "GetCartesianLimit", "SetCollisionBehavior", "SetJointImpedance",
-        "SetCartesianImpedance", "SetGuidingMode", "SetEEToK", "SetNEToEE", "SetLoad", "SetFilters",
-        "AutomaticErrorRecovery", "LoadModelLibrary",
-    ),
+    state=_layout(_STATE + _FLAGS),
+    command=_layout(_COMMAND),
+    requests=tuple(_PANDA_REQUESTS.split()),
     sizes={**_COMMON, "Move": MOVE.size, "GetCartesianLimit": 4, "SetFilters": 8 * 5, "LoadModelLibrary": 2},
     generators=tuple(Generator)[: Generator.NONE],
-    move=(
-        "success", "started", "preempted", "not possible", "singular", "invalid", "reflex", "emergency",
-        "input error", "aborted",
-    ),
-)  # fmt: skip
+    move=tuple(_PANDA_OUTCOMES.split(",")),
+)
 """Panda, libfranka 0.9."""
 
+_FR3_REQUESTS = """
+Connect Move StopMove SetCollisionBehavior SetJointImpedance SetCartesianImpedance SetGuidingMode SetEEToK SetNEToEE
+SetLoad AutomaticErrorRecovery GetRobotModel
+"""
+_FR3_OUTCOMES = (
+    "success,started,preempted,preempted by safety,rejected by safety,not possible,singular,invalid,reflex,emergency,"
+    "input error,aborted"
+)
 FR3 = Protocol(
     version=10,
     kind="fr3",
-    state=_state("<f4", accelerometers=True),
-    command=np.dtype([*_COMMAND, ("torque_command_finished", "u1", ())]),
-    requests=(
-        "Connect", "Move", "StopMove", "SetCollisionBehavior", "SetJointImpedance", "SetCartesianImpedance",
-        "SetGuidingMode", "SetEEToK", "SetNEToEE", "SetLoad", "AutomaticErrorRecovery", "GetRobotModel",
-    ),
+    state=_layout(_STATE + _ACCELEROMETERS + _FLAGS, "<f4"),
+    command=_layout(_COMMAND + "torque_command_finished:u1"),
+    requests=tuple(_FR3_REQUESTS.split()),
     sizes={**_COMMON, "Move": MOVE.size + 1 + 8 * JOINTS, "GetRobotModel": 0},
     generators=tuple(Generator),
-    move=(
-        "success", "started", "preempted", "preempted by safety", "rejected by safety", "not possible", "singular",
-        "invalid", "reflex", "emergency", "input error", "aborted",
-    ),
-)  # fmt: skip
+    move=tuple(_FR3_OUTCOMES.split(",")),
+)
 """FR3, libfranka 0.18 and later."""
 
 GRASP = struct.Struct("<5d")

@@ -70,11 +70,15 @@ class Ros2(ArmOptions):
                 skin.wait(_PATIENCE_S)
             sources = [source for source in (robot, skin, commander) if source is not None]
             yield OpenedArm(
-                robot, robot_known, skin,
+                robot,
+                robot_known,
+                skin,
                 notes=lambda: tuple(note for source in sources for note in source.notes),
                 output=lambda controller: closing(Ros2Output(controller, node, self.base_frame)),
-                free_motion_id=robot_known.key, commander=commander, announced=commander.announced if commander else "",
-            )  # fmt: skip
+                free_motion_id=robot_known.key,
+                commander=commander,
+                announced=commander.announced if commander else "",
+            )
 
 
 def identity(node: NodeParams, arm: ArmParams) -> "Identity":

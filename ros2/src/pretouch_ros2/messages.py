@@ -28,11 +28,12 @@ TWIST = "geometry_msgs/msg/TwistStamped"
 USED = (JOINT_STATE, WRENCH, RANGE, TRAJECTORY, CLOUD, TEXT, TRANSFORMS, DIAGNOSTICS, STATUS, TWIST)
 """All types on our topics."""
 
-_BASE: dict[str, Any] = {
-    "bool": bool, "byte": idl.uint8, "octet": idl.uint8, "char": idl.uint8, "int8": idl.int8, "uint8": idl.uint8,
-    "int16": idl.int16, "uint16": idl.uint16, "int32": idl.int32, "uint32": idl.uint32, "int64": idl.int64,
-    "uint64": idl.uint64, "float32": idl.float32, "float64": idl.float64, "string": str,
-}  # fmt: skip
+_NUMBERS = "int8 uint8 int16 uint16 int32 uint32 int64 uint64 float32 float64"
+_BASE: dict[str, Any] = {name: getattr(idl, name) for name in _NUMBERS.split()} | {
+    **dict.fromkeys(("byte", "octet", "char"), idl.uint8),
+    "bool": bool,
+    "string": str,
+}
 _ARRAY: Any = idl.array
 _SEQUENCE: Any = idl.sequence
 

@@ -217,14 +217,14 @@ class Ros2Node:
         return self._topics[name, kind]
 
     def _qos(self, kind: str, *, reliable: bool, latched: bool, depth: int) -> Qos:
+        sure = Policy.Reliability.Reliable(duration(milliseconds=_BLOCKED_MS))
         policies = [
-            Policy.Reliability.Reliable(duration(milliseconds=_BLOCKED_MS)) if reliable
-            else Policy.Reliability.BestEffort,
+            sure if reliable else Policy.Reliability.BestEffort,
             Policy.Durability.TransientLocal if latched else Policy.Durability.Volatile,
             Policy.History.KeepLast(depth),
             Policy.DataRepresentation(use_cdrv0_representation=True, use_xcdrv2_representation=False),
             Policy.Userdata(f"typehash={self.messages.type_hash(kind)};".encode()),
-        ]  # fmt: skip
+        ]
         if latched:
             policies.append(Policy.DurabilityService(0, Policy.History.KeepLast(depth), -1, -1, -1))
         return Qos(*policies)

@@ -68,13 +68,8 @@ def stopping_trajectory(
 ) -> StoppingTrajectory:
     """Go from q and qd (n,) to velocities (n,) [rad/s], hold them, and brake, within `qdd_max` (n,) [rad/s^2].
 
-    Args:
-        q: [rad].
-        qd: [rad/s].
-        velocity: the velocities to reach [rad/s].
-        qdd_max: limits.
-        period: time for the change of velocity, unless the limits need a longer one [s].
-        hold: when braking begins, unless the change takes longer [s].
+    The change of velocity takes `period` [s], unless the limits need longer; braking begins at `hold` [s], or when the
+    change is complete.
     """
     ramp = max(period, float((np.abs(velocity - qd) / qdd_max).max()))
     brake = max(ramp, hold)

@@ -129,11 +129,10 @@ class TrajectoryCommands:
         if self._params.shared_clock:
             first = min(points[0].time, 0.0)
             begin = parts_of_day(began + self._ahead + first)
-        messages = [
-            make("trajectory_msgs/msg/JointTrajectoryPoint", p.q, p.qd, nothing, nothing,
-                 make("builtin_interfaces/msg/Duration", *parts(p.time - first)))
-            for p in points
-        ]  # fmt: skip
+        messages = []
+        for p in points:
+            since = make("builtin_interfaces/msg/Duration", *parts(p.time - first))
+            messages.append(make("trajectory_msgs/msg/JointTrajectoryPoint", p.q, p.qd, nothing, nothing, since))
         self.publisher.publish(make(TRAJECTORY, self._messages.header(begin, ""), self._names, messages))
 
 

@@ -14,9 +14,12 @@ class OtherArm:
     """Tells where another arm is by the newest state that it reported: what `loop.Options.moving` asks."""
 
     def __init__(
-        self, model: RobotModel, T_O_other: FloatArray, reported: Callable[[], RobotState | None],
+        self,
+        model: RobotModel,
+        T_O_other: FloatArray,
+        reported: Callable[[], RobotState | None],
         standing: Capsules | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Know an arm.
 
         Args:
@@ -42,10 +45,8 @@ class OtherArm:
         speeds = (velocities(model, kin, state.qd, link, end) @ R.T for end in (a, b))
         rest = np.zeros((len(still.radius), 3))
         va, vb = (np.concatenate([speed, rest]) for speed in speeds)
-        return MovingFixtures(
-            state.stamp, np.concatenate([a, still.a]) @ R.T + t, np.concatenate([b, still.b]) @ R.T + t,
-            np.concatenate([model.capsules.radius, still.radius]), va, vb,
-        )  # fmt: skip
+        a, b = np.concatenate([a, still.a]) @ R.T + t, np.concatenate([b, still.b]) @ R.T + t
+        return MovingFixtures(state.stamp, a, b, np.concatenate([model.capsules.radius, still.radius]), va, vb)
 
 
 def velocities(model: RobotModel, kin: Kinematics, qd: FloatArray, link: IntArray, point: FloatArray) -> FloatArray:

@@ -127,7 +127,5 @@ def _sensor_unit(name: str, place: Place, model: RobotModel, orientation_floor: 
     if outside is not None:
         sigma = float(np.hypot(sigma, np.linalg.norm(outside - T[:3, 3])))
         T[:3, 3] = outside
-    return SensorUnit(
-        name, place.link, T, min(sigma, LARGEST_POSITION_SIGMA),
-        min(float(np.hypot(place.orientation_sigma, orientation_floor)), LARGEST_ORIENTATION_SIGMA),
-    )  # fmt: skip
+    turned = min(float(np.hypot(place.orientation_sigma, orientation_floor)), LARGEST_ORIENTATION_SIGMA)
+    return SensorUnit(name, place.link, T, min(sigma, LARGEST_POSITION_SIGMA), turned)

@@ -93,11 +93,11 @@ def start(motion: LinkMotion, measured: Measured) -> Estimate:
     return Estimate(R, solution[:3], errors)
 
 
-_PRIOR = np.concatenate([
-    POSE_PRIOR, np.full(3, _ACCELERATION_BIAS), np.full(3, _ANGULAR_VELOCITY_BIAS),
-    [np.inf, _DELAY_DIFFERENCE_S], np.full(6, SCALE_ERROR),
-    np.full(2, GRAVITY * np.deg2rad(_LEAN_DEG)), [_GRAVITY_ERROR],
-])  # fmt: skip
+_BIASES = np.repeat([_ACCELERATION_BIAS, _ANGULAR_VELOCITY_BIAS], 3)
+_LEAN = np.full(2, GRAVITY * np.deg2rad(_LEAN_DEG))
+_PRIOR = np.array(
+    [*POSE_PRIOR, *_BIASES, np.inf, _DELAY_DIFFERENCE_S, *np.full(6, SCALE_ERROR), *_LEAN, _GRAVITY_ERROR]
+)
 """Standard deviations (23,) of the unknowns before anything is measured."""
 
 
@@ -108,10 +108,10 @@ class Problem:
         self.motion, self.measured, self.base, self.noise = motion, measured, base, noise
         self.expected = np.append(np.zeros(UNKNOWNS - 1), GRAVITY)
 
-    def residuals(self, x: FloatArray) -> FloatArray:
-        """Differences from data and priors (6 N + 23,), each divided by its standard deviation."""
+    def residuals(self, x: FloatArray, weights: FloatArray | float = 1.0) -> FloatArray:
+        """Differences from data and priors (6 N + 23,), each divided by its standard deviation, weighted."""
         differences = self.base.moved(x).differences(self.motion, self.measured) / self.noise
-        return np.concatenate([differences.reshape(-1), (x - self.expected) / _PRIOR])
+        return weights * np.concatenate([differences.reshape(-1), (x - self.expected) / _PRIOR])
 
     def weights(self, x: FloatArray) -> FloatArray:
         """Roots of the weights by which a large residual counts in proportion to its size only (soft L1)."""
@@ -119,7 +119,7 @@ class Problem:
         weights[-UNKNOWNS:] = 1.0
         return weights
 
-    def jacobian(self, x: FloatArray) -> FloatArray:
+    def jacobian(self, x: FloatArray, weights: FloatArray | float = 1.0) -> FloatArray:
         """Return their derivatives (6 N + 23, 23)."""
         motion, N = self.motion, len(self.motion.w)
         e = self.base.moved(x)
@@ -138,7 +138,7 @@ class Problem:
         J[:, :, CLOCK] = -self.measured.rates
         J[:, 3:, LAG] = -self.measured.rates[:, 3:]
         J /= self.noise[:, None]
-        return np.vstack([J.reshape(-1, UNKNOWNS), np.diag(1 / _PRIOR)])
+        return np.reshape(weights, (-1, 1)) * np.vstack([J.reshape(-1, UNKNOWNS), np.diag(1 / _PRIOR)])
 
 
 def _skew(v: FloatArray) -> FloatArray:
@@ -183,10 +183,8 @@ def fit(motion: LinkMotion, measured: Measured, begin: Estimate, noise: FloatArr
     for _ in range(_REWEIGHTINGS if robust else 1):
         weights = problem.weights(x) if robust else np.ones(6 * len(motion.w) + UNKNOWNS)
         # MINPACK: beside other programs the threads of LAPACK, which other methods call, cost ten times as much
-        x = scipy.optimize.least_squares(
-            lambda x, w=weights: w * problem.residuals(x), x, lambda x, w=weights: w[:, None] * problem.jacobian(x),
-            x_scale="jac", method="lm",
-        ).x  # fmt: skip
+        options = {"x_scale": "jac", "method": "lm", "args": (weights,)}
+        x = scipy.optimize.least_squares(problem.residuals, x, problem.jacobian, **options).x
     estimate = begin.moved(x)
     spread = np.sqrt(np.mean(estimate.differences(motion, measured) ** 2, axis=0))
     # the unknowns on the manifold at the answer, not at the start

@@ -135,10 +135,16 @@ class _Answer:
         """Return what goes into the JSON file."""
         r = self.recording
         return {
-            "recording": str(r.place), "arm": r.model.description.name, "assumed": read_from(r), "notes": self.notes,
-            "samples": len(r.time), "first_sample_s": r.first_s, "duration_s": r.time[-1], "rate_hz": r.rate,
+            "recording": str(r.place),
+            "arm": r.model.description.name,
+            "assumed": read_from(r),
+            "notes": self.notes,
+            "samples": len(r.time),
+            "first_sample_s": r.first_s,
+            "duration_s": r.time[-1],
+            "rate_hz": r.rate,
             "profiles": self.results,
-        }  # fmt: skip
+        }
 
     def show(self) -> None:
         """Print sentences and tables."""

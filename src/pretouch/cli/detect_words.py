@@ -52,10 +52,13 @@ def sentence(note: Note) -> str:
     count = int(note.values.get("count", 0))
     one = count == 1
     words = {
-        "rows": "1 row" if one else f"{count} rows", "have": "has" if one else "have", "were": "was" if one else "were",
-        "samples": "1 sample is" if one else f"{count} samples are", "times": "once" if one else f"{count} times",
+        "rows": "1 row" if one else f"{count} rows",
+        "have": "has" if one else "have",
+        "were": "was" if one else "were",
+        "samples": "1 sample is" if one else f"{count} samples are",
+        "times": "once" if one else f"{count} times",
         "gaps": "A gap" if one else f"{count} gaps",
-    }  # fmt: skip
+    }
     return _SENTENCES[note.code].format(**words | dict(note.values))
 
 

@@ -115,10 +115,14 @@ def _described(recorded: Recorded) -> dict[str, object]:
     """Return what a recording is of, for JSON."""
     stamps, run = recorded.stamps(), recorded.runs[0]
     return {
-        "recording": str(recorded.place), "complete": recorded.complete, "arm": run.model.description.name,
-        "profiles": [run.profile.name for run in recorded.runs], "units": [unit.id for unit in run.skin.mounted],
-        "steps": len(recorded), "duration_s": stamps[-1] - stamps[0],
-    }  # fmt: skip
+        "recording": str(recorded.place),
+        "complete": recorded.complete,
+        "arm": run.model.description.name,
+        "profiles": [run.profile.name for run in recorded.runs],
+        "units": [unit.id for unit in run.skin.mounted],
+        "steps": len(recorded),
+        "duration_s": stamps[-1] - stamps[0],
+    }
 
 
 def _what_ran(recorded: Recorded) -> str:
@@ -162,10 +166,8 @@ def _show(console: Console, comparison: Comparison) -> None:
     if comparison.left_out:
         left_out = f"{_many(comparison.left_out, 'step')} left out, without usable inputs in the recording."
         console.print(left_out, markup=False)
-    console.print(
-        "Detector only: both use the recorded motion of the arm, which another profile would have changed.\n",
-        style="dim", markup=False,
-    )  # fmt: skip
+    note = "Detector only: both use the recorded motion of the arm, which another profile would have changed.\n"
+    console.print(note, style="dim", markup=False)
 
 
 def _cells(contact: DetectedContact | None) -> tuple[str, str, str]:

@@ -249,10 +249,8 @@ def _joined(logs: Sequence[Log], gap_s: float) -> Log:
     """Return the first of two logs with the positions and velocities of the other one at its instants."""
     log, joints = logs[0], _with_positions(logs[1]).in_order("q")
     at = {kind: interpolated(joints, kind, log.time, gap_s) for kind in ("q", "dq") if kind in joints.arrays}
-    return replace(
-        log, arrays=log.arrays | at, sources=log.sources | dict.fromkeys(at, joints.sources["q"]),
-        notes=(*log.notes, *joints.notes),
-    )  # fmt: skip
+    sources = log.sources | dict.fromkeys(at, joints.sources["q"])
+    return replace(log, arrays=log.arrays | at, sources=sources, notes=(*log.notes, *joints.notes))
 
 
 def _with_positions(log: Log) -> Log:

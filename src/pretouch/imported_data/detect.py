@@ -88,7 +88,7 @@ def _by_force(r: ForceRecording, p: Profile) -> tuple[DetectorResult, Decisions]
     summary = _summary(d, free, MovingThresholds.of_kind(p.detect).f_base_n)
     moving = None if r.moving is None else r.moving[newest]
     notes = (*_slower(r.rate, p), *_without(r.time, d, p))
-    return result_of(p, d, free, moving, float(summary.width_n.max()), summary, None, notes), d
+    return result_of(p, d, free, moving, float(summary.width_n.max()), summary, notes), d
 
 
 def cycles(time: FloatArray, period: float, gap_s: float, hold: bool) -> tuple[FloatArray, IntArray, BoolArray]:
@@ -209,7 +209,7 @@ def _by_torques(r: TorqueRecording, profile: Profile) -> tuple[DetectorResult, T
         float(_over(free, np.max, course.evidence)),
     )
     detectable = float(_over(free, np.median, course.detectable_n))
-    return result_of(profile, course, free, _moving(r, newest), detectable, None, summary, tuple(notes)), course
+    return result_of(profile, course, free, _moving(r, newest), detectable, summary, tuple(notes)), course
 
 
 def _for_currents(recording: TorqueRecording, profile: Profile) -> tuple[Profile, list[Note]]:
@@ -242,8 +242,8 @@ def _judged(r: TorqueRecording, profile: Profile, time: FloatArray, newest: IntA
         detection, state = profile.detect.step(state, body, sample)
         _follow(contacts, r.model, sample.stamp, detection)
         detections.append(replace(detection, significant=None))
-    columns = {name: np.array([getattr(d, name) for d in detections])
-               for name in ("residual", "evidence", "detectable_n", "armed")}  # fmt: skip
+    names = ("residual", "evidence", "detectable_n", "armed")
+    columns = {name: np.array([getattr(d, name) for d in detections]) for name in names}
     return TorqueCourse(time=time, tau_ext=r.tau_ext[newest], contacts=tuple(contacts), **columns)
 
 
@@ -275,10 +275,8 @@ def _follow(contacts: list[DetectedContact], model: RobotModel, time: float, d: 
     touched, best = d.touched, last.evidence or 0.0
     # the place gathers what all samples say: it is surest late, when the evidence may have passed its peak
     if len(touched.link) and touched.probability[0] > (last.probability or 0.0):
-        last = replace(
-            last, link=model.links[touched.link[0]], point_m=touched.point[0], force_n=touched.force[0],
-            probability=float(touched.probability[0]),
-        )  # fmt: skip
+        link, probability = model.links[touched.link[0]], float(touched.probability[0])
+        last = replace(last, link=link, point_m=touched.point[0], force_n=touched.force[0], probability=probability)
     elif last.link is None and d.contact is not None and d.evidence > best:
         last = replace(last, force_n=d.contact.force)
     contacts[-1] = replace(last, end_s=time, evidence=max(best, d.evidence))

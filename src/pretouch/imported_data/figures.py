@@ -42,10 +42,8 @@ def _panel(axes: Axes, d: Decisions, axis: int) -> None:
         crossed = _AXES[axis] in contact.axes
         label = "contact (filled: this axis)" if i == 0 else None
         axes.axvline(contact.time_s, color="tab:red", lw=1, ls="-" if crossed else ":")
-        axes.plot(
-            contact.time_s, d.compared[d.time == contact.time_s, axis][0], "v", color="tab:red", mec="black", ms=7,
-            mfc="tab:red" if crossed else "white", label=label,
-        )  # fmt: skip
+        force, fill = d.compared[d.time == contact.time_s, axis][0], "tab:red" if crossed else "white"
+        axes.plot(contact.time_s, force, "v", color="tab:red", mec="black", ms=7, mfc=fill, label=label)
     axes.grid(alpha=0.3)
 
 

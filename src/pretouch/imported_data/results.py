@@ -112,16 +112,27 @@ def free_cycles(ready: BoolArray, course: Course) -> BoolArray:
 
 
 def result_of(
-    profile: Profile, course: Course, free: BoolArray, moving: BoolArray | None, detectable: float,
-    thresholds: ThresholdSummary | None, torques: TorqueSummary | None, notes: tuple[Note, ...],
-) -> DetectorResult:  # fmt: skip
+    profile: Profile,
+    course: Course,
+    free: BoolArray,
+    moving: BoolArray | None,
+    detectable: float,
+    summary: ThresholdSummary | TorqueSummary,
+    notes: tuple[Note, ...],
+) -> DetectorResult:
     """Sum up a course: (S,) which cycles are `free` motion, and in which the arm is `moving` if that is known."""
     period, ready = profile.task.control_period_s, course.judged
     begins = np.searchsorted(course.time, [c.time_s for c in course.contacts])
     return DetectorResult(
-        profile=profile.name, control_rate_hz=1.0 / period, contacts=course.contacts,
-        armed_s=float(ready.sum() * period), free_s=float(free.sum() * period),
+        profile=profile.name,
+        control_rate_hz=1.0 / period,
+        contacts=course.contacts,
+        armed_s=float(ready.sum() * period),
+        free_s=float(free.sum() * period),
         motion_s=np.nan if moving is None else float((ready & moving).sum() * period),
-        contacts_in_motion=0 if moving is None else int(moving[begins].sum()), detectable_n=detectable,
-        thresholds=thresholds, torques=torques, notes=notes,
-    )  # fmt: skip
+        contacts_in_motion=0 if moving is None else int(moving[begins].sum()),
+        detectable_n=detectable,
+        thresholds=summary if isinstance(summary, ThresholdSummary) else None,
+        torques=summary if isinstance(summary, TorqueSummary) else None,
+        notes=notes,
+    )

@@ -72,15 +72,15 @@ class Decisions(DetectorRecord):
 
 def decisions_of(name: str, cycles: Sequence[Decision]) -> Decisions:
     """Return the decisions of one or more cycles as arrays."""
-    time, force, compared, limits, armed, reacting, contacts = zip(*cycles, strict=True)
-    return Decisions(
-        name=name, time=np.array(time), force=np.array(force), compared=np.array(compared),
-        thresholds=np.array(limits), armed=np.array(armed), reacting=np.array(reacting),
-        contacts=tuple(
-            DetectedContact(t, c.force, "".join(axis for axis, crossed in zip("xyz", c.axes, strict=True) if crossed))
-            for t, c in zip(time, contacts, strict=True) if c is not None
-        ),
-    )  # fmt: skip
+    time, *columns, contacts = zip(*cycles, strict=True)
+    names = ("force", "compared", "thresholds", "armed", "reacting")
+    arrays = {part: np.array(column) for part, column in zip(names, columns, strict=True)}
+    detected = tuple(
+        DetectedContact(t, c.force, "".join(axis for axis, crossed in zip("xyz", c.axes, strict=True) if crossed))
+        for t, c in zip(time, contacts, strict=True)
+        if c is not None
+    )
+    return Decisions(name=name, time=np.array(time), contacts=detected, **arrays)
 
 
 def _decision_of(step: ControlStep, profile: Profile) -> Decision:

@@ -37,8 +37,13 @@ SNAPSHOT_S = 3.0
 RUN, INPUTS, STATE, STEP, TRUTH = (f"/pretouch/{name}" for name in ("run", "inputs", "state", "step", "truth"))
 TOPICS = {RUN: PACKED, INPUTS: PACKED, STATE: PACKED, STEP: own("Step"), TRUTH: own("Truth")}
 """Type of the messages on each of our topics."""
-_PARTS = (("touch", TouchReadings), ("points", SeenPoints), ("payload", Payload), ("desired", Desired),
-          ("moving", MovingFixtures))  # fmt: skip
+_PARTS = {
+    "touch": TouchReadings,
+    "points": SeenPoints,
+    "payload": Payload,
+    "desired": Desired,
+    "moving": MovingFixtures,
+}
 """What inputs may have beside the arm's state and the readings."""
 _SHOWN = 500
 """Characters of what cannot be kept that are."""
@@ -152,7 +157,7 @@ def packed_inputs(inputs: Inputs, points_at: int = -1) -> bytes:
     robot = inputs.robot
     if type(robot) is not RobotState or type(inputs.readings) is not RangeReadings:
         raise TypeError("the arm's state or the readings are none")
-    for name, kind in _PARTS:
+    for name, kind in _PARTS.items():
         part = getattr(inputs, name)
         if part is not None and type(part) is not kind:
             raise TypeError(f"{name} is a {type(part).__name__}")

@@ -161,11 +161,10 @@ def packed_run(controller: Controller, about: Mapping[str, JSON]) -> bytes:
         _KeptUnit(u.id, u.link, u.T_link_sensor, u.position_sigma, u.orientation_sigma, u.touch, as_table(u.sensor))
         for u in controller.skin.mounted
     ]
-    return packed(_KeptRun(
-        time.time(), versions(), _as_json(about), _as_json(as_table(controller.profile)),
-        description_text(model.description, _MJCF), _mjcf(model.description), tuple(units), fixtures.planes,
-        fixtures.capsules, _kept_path(controller.path),
-    ))  # fmt: skip
+    facts, profile, path = _as_json(about), _as_json(as_table(controller.profile)), _kept_path(controller.path)
+    arm = description_text(model.description, _MJCF), _mjcf(model.description)
+    around = fixtures.planes, fixtures.capsules
+    return packed(_KeptRun(time.time(), versions(), facts, profile, *arm, tuple(units), *around, path))
 
 
 def _as_json(table: Mapping[str, JSON]) -> dict[str, JSON]:

@@ -112,15 +112,16 @@ class RunRecord(DetectorRecord):
         return np.asarray((summed[edges] - summed[starts]) / np.maximum(edges - starts, 1)[:, None])
 
 
-_AS_THEY_ARE = (
-    "ee_position", "ee_velocity", "path_position", "speed_scale", "range_distance", "force", "filtered_force",
-    "evidence", "armed",
-)  # fmt: skip
+_AS_THEY_ARE = """
+ee_position ee_velocity path_position speed_scale range_distance force filtered_force evidence armed
+"""
 
 
 def columns_of(steps: Sequence[ControlStep], *more: str) -> Columns:
     """Return the arrays of a `RunRecord` that steps with the same units tell alone, and those of `more` fields."""
-    columns: Columns = {name: np.array([getattr(step, name) for step in steps]) for name in (*_AS_THEY_ARE, *more)}
+    columns: Columns = {
+        name: np.array([getattr(step, name) for step in steps]) for name in (*_AS_THEY_ARE.split(), *more)
+    }
     return columns | {
         "time": np.array([step.stamp for step in steps]),
         "mode": np.array([MODES.index(step.mode) for step in steps]),

@@ -22,10 +22,8 @@ from pretouch.types import FloatArray, Mode
 INK, BLUE, RED, GREEN, AMBER, GREY = "#1f2933", "#2b6cb0", "#c53030", "#2f855a", "#b7791f", "#a0aab4"
 _SHADES = {Mode.REACT: (RED, 0.16), Mode.HOLD: (GREY, 0.28)}
 _COLOURS = {Mode.TRACK: INK, Mode.REACT: RED, Mode.HOLD: GREY}
-_LINES = (
-    (BLUE, "-"), (AMBER, "--"), (GREEN, "-."), (INK, ":"), ("#805ad5", "-"), ("#b83280", "--"), ("#0b7285", "-."),
-    (GREY, "-"),
-)  # fmt: skip
+_LINE_COLOURS = (BLUE, AMBER, GREEN, INK, "#805ad5", "#b83280", "#0b7285", GREY)
+_LINES = tuple(zip(_LINE_COLOURS, ("-", "--", "-.", ":", "-", "--", "-.", "-"), strict=True))
 """Colour and style of each of several lines; more lines than these begin again."""
 _SWITCHES = 12
 """More changes of the profile than this are not drawn."""
@@ -76,10 +74,8 @@ def _panels(course: RunCourse, heights: Sequence[float], height: float) -> tuple
             if flags.any():
                 until = flags | np.append(False, flags[:-1])  # a mode lasts until the next step
                 whole = axes.get_xaxis_transform()
-                axes.fill_between(
-                    course.time, 0.0, 1.0, where=until, transform=whole, facecolor=colour, lw=0, zorder=0,
-                    label=mode.name,
-                )  # fmt: skip
+                style: Any = {"transform": whole, "facecolor": colour, "lw": 0, "zorder": 0, "label": mode.name}
+                axes.fill_between(course.time, 0.0, 1.0, where=until, **style)
         for time in switches if len(switches) <= _SWITCHES else ():
             axes.axvline(time, color=INK, lw=0.8, ls=(0, (1, 2)))
     panels[-1].set_xlabel("time [s]")
@@ -96,10 +92,8 @@ def _frame(axes: Axes, course: RunCourse) -> None:
 def _legend(axes: Axes, columns: int) -> None:
     """Put what a panel shows above it."""
     if axes.get_legend_handles_labels()[0]:
-        axes.legend(
-            loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, fontsize="small", frameon=False,
-            borderaxespad=0.1, columnspacing=1.2, handlelength=1.8,
-        )  # fmt: skip
+        style: Any = {"ncols": columns, "fontsize": "small", "frameon": False, "columnspacing": 1.2}
+        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.1, handlelength=1.8, **style)
 
 
 def force_figure(course: RunCourse) -> Figure:

@@ -168,13 +168,7 @@ def _fault(what: str, sentence: str) -> Finding:
 
 
 def check(controller: Controller, rest: Standstill, floor: float) -> tuple[Finding, ...]:
-    """Return the findings on an arm that was watched, for a controller that is to move it.
-
-    Args:
-        controller: gives model, path and profile.
-        rest: measurements of the arm at rest.
-        floor: height of the floor, base frame [m].
-    """
+    """Return the findings on an arm at rest that a controller is to move, over a floor at a height [m], base frame."""
     return (
         *_limits(controller, rest.newest.q),
         *_rest(controller, rest),

@@ -196,13 +196,9 @@ class UnitWindow:
 
 
 def unit_health(samples: Sequence[Received], now: float, traffic: UnitTraffic, before: UnitTraffic) -> UnitHealth:
-    """Compute the health of a unit from its samples.
+    """Compute the health of a unit at an instant [s] from its samples in the window, in the order of their arrival.
 
-    Args:
-        samples: the unit's samples within the window, in the order of arrival.
-        now: instant [s].
-        traffic: counts of the receiver by now.
-        before: counts at the begin of the window.
+    `traffic` are the counts of the receiver by now, `before` those at the begin of the window.
     """
     fresh = [h for h in samples if h.sample.flags & _NEW]
     good = np.array([h.sample.range_mm / 1000 if h.sample.range_status == _OK else np.nan for h in fresh])

@@ -95,12 +95,9 @@ class UnitWatch:
         return health, (*wrong, *(self._check.findings() if self._check else ()))
 
     def wait(self, clock: Clock, patience: float = 20.0, steady: float = 3.0) -> None:
-        """Wait until all units have been heard for a while without a break; those that are not are a HardwareError.
+        """Wait until all units have been received for `steady` [s] without a break: their clocks are known by then.
 
-        Args:
-            clock: gives the ticks.
-            patience: how long to wait for one of them [s].
-            steady: for how long all must be heard [s]: their clocks are known by then.
+        A unit that is not received within `patience` [s] is a HardwareError.
         """
         begin = since = clock.tick()
         while (now := clock.tick()) - since < steady:
