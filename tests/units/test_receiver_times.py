@@ -136,5 +136,5 @@ def test_beacons_are_sent_during_a_flood_that_fills_a_call(monkeypatch):
 
         bench.receiver._clock = ticking
         bench.receiver.receive()
-        assert bench.receiver.taken == 1500
+        assert bench.receiver.received == 1500
         assert len([d for d in bench.answers() if decode_beacon(d, bench.units[0].mac, bench.units[0].challenge)]) >= 4

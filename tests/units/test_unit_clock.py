@@ -59,7 +59,7 @@ def test_the_truth_is_within_the_bounds_and_no_stamp_is_later_and_newer_readings
         newest = max(newest, made)
         true = newest - wire.unit(newest)
         assert clock.low <= true <= clock.high + 1e-9
-        if clock.known:
+        if clock.bounded:
             assert abs(clock.offset - true) <= clock.bound + 1e-9
             for age in (0.0, 0.02, 5.0):
                 assert clock.earliest(wire.unit(made) - age) <= made - age * (1 - DRIFT) + 1e-9
@@ -91,7 +91,7 @@ def test_after_a_jump_it_recovers(jump, forward, seed):
             wire.unit(made) + (shift if jumped else 0.0), arrival, sent if mixed >= 0 else None, max(mixed, 0.0)
         )
     assert clock.jumps >= 1
-    assert clock.known
+    assert clock.bounded
     assert clock.low <= made - (wire.unit(made) + shift) + 1e-9
     assert made - (wire.unit(made) + shift) - 1e-9 <= clock.high
     assert clock.bound < 0.02
@@ -100,7 +100,7 @@ def test_after_a_jump_it_recovers(jump, forward, seed):
 def test_nothing_is_known_before_an_echo():
     clock = UnitClock(DRIFT, 10.0)
     assert clock.update(5.0, 100.0, None, 0.0)
-    assert not clock.known
+    assert not clock.bounded
     assert math.isnan(clock.offset)
     assert clock.earliest(5.0) == -math.inf
 
@@ -127,7 +127,7 @@ def test_what_a_beacon_told_allows_for_the_resolution_of_the_units_clock():
     clock = UnitClock(DRIFT, 10.0)
     clock.update(5.0, 100.0, 100.0, 0.0)
     assert clock.low == pytest.approx(95.0 - TICK, abs=1e-9)
-    assert clock.known
+    assert clock.bounded
 
 
 @pytest.mark.parametrize(

@@ -315,7 +315,7 @@ class JointTorques:
         self.measured, self.rate, self.desired = np.zeros(n), np.zeros(n), np.zeros(n)
         """(n,) torques on the side of the links [Nm] and their rate of change [Nm/s]; those asked for beyond gravity
         [Nm]."""
-        self._known = False
+        self._sampled = False
         plant.before_each_step(self._keep)
 
     def _keep(self, _time: float) -> None:
@@ -328,8 +328,8 @@ class JointTorques:
         lost = self._lost(self._before)
         motor = self._applied + lost
         measured = motor - p.armature_kg_m2 * self._qdd - p.friction_compensated * lost
-        self.rate = (measured - self.measured) / p.period_s if self._known else self._still
-        self.measured, self._known = measured, True
+        self.rate = (measured - self.measured) / p.period_s if self._sampled else self._still
+        self.measured, self._sampled = measured, True
         self.desired = motor - gravity if tau is None else tau
 
     def _lost(self, qd: FloatArray) -> FloatArray:

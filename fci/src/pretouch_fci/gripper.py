@@ -11,7 +11,7 @@ MAX_WIDTH_M = 0.08
 _FASTEST_M_S = 0.1
 """Each finger moves at up to 50 mm/s, by the same: so fast does the distance change [m/s]."""
 _HEAVIEST_KG = 3.0
-"""What the Panda and the FR3 carry, by theirs [kg]."""
+"""Payload of the Panda and the FR3, by their data sheets [kg]."""
 
 
 class Outcome(IntEnum):

@@ -31,7 +31,7 @@ class AnswerStatus(IntEnum):
 
 
 _WHILE_MOVING = frozenset({"SetCollisionBehavior"})
-"""What can be set while a motion runs."""
+"""Requests that are accepted while a motion runs."""
 _CARTESIAN_LIMIT = bytes(8 * 3) + np.eye(4).tobytes() + b"\0"
 """A virtual wall: size, pose, and that it is not active."""
 

@@ -28,7 +28,7 @@ _FIRST_WAITS_S = (0.25, 0.75)
 """In lockstep, how long the first state of a motion, and each that follows, stands without an answer [s]: the vendor's
 clients answer the second one, and give up after a second without a state."""
 _ANSWERED = 6
-"""Of the first so many states of a motion, libfranka answers one: those before it has waited for."""
+"""Number of first states of a motion of which libfranka answers one: it has waited for those before."""
 _MOTION_EVERY = 1_000_000
 """In lockstep, each motion begins at a multiple of this [ms], so that its times do not depend on the time before it."""
 

@@ -58,7 +58,7 @@ class FrankaServer:
         """
         self.host = _free_address()
         """Its address; the port is the only one that the vendor's libraries know."""
-        self._said: tuple[str, ...] = ()
+        self._lines: tuple[str, ...] = ()
         self._folder = TemporaryDirectory()
         self._truth, self._log = (Path(self._folder.name) / name for name in ("truth.csv", "said.txt"))
         ours = {"host": self.host, "stdin": True, "truth": self._truth}
@@ -109,8 +109,8 @@ class FrankaServer:
         """Lines that the server has printed so far, such as why a motion ended."""
         if self._log.exists():
             *lines, _ = self._log.read_text(errors="replace").split("\n")
-            self._said = tuple(lines)
-        return self._said
+            self._lines = tuple(lines)
+        return self._lines
 
     @property
     def truth(self) -> Truth:
@@ -133,7 +133,7 @@ class FrankaServer:
             process.wait()
         if process.stdin is not None:
             process.stdin.close()
-        self._said = self.said  # the last that it said
+        self._lines = self.said  # the last that it said
         self._folder.cleanup()
 
     def _type(self, line: str) -> None:

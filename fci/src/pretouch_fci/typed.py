@@ -17,7 +17,7 @@ _BUTTONS: dict[str, Callable[[ServedArm], None]] = {
     "guide": ServedArm.press_guiding,
     "let go": lambda arm: arm.press_guiding(False),
 }
-"""What is typed for the user stop and the buttons at the flange."""
+"""Words for the user stop and the buttons at the flange."""
 HELP = (
     "Type +x, -x, +y, -y, +z or -z and Enter to push the hand, or a force such as 0,15,0 [N]; stop presses the user"
     " stop, release releases it; guide presses the buttons at the flange, let go releases them; time tells the arm's"

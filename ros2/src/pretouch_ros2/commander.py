@@ -60,7 +60,7 @@ class Ros2Commander:
         self._shared = robot.params.shared_clock
         self._stamps = SourceStamps(self._shared)
         self._newest: tuple[Desired, bool] | None = None
-        self._heard = node.subscribe(self.topic, self.kind, self._take)
+        self._source = node.subscribe(self.topic, self.kind, self._take)
 
     @property
     def announced(self) -> str:
@@ -74,7 +74,7 @@ class Ros2Commander:
     @property
     def notes(self) -> tuple[str, ...]:
         """Remarks on the messages for a person, a sentence each."""
-        return tuple(filter(None, (self._heard.unreadable, self._stamps.not_newer(self.topic))))
+        return tuple(filter(None, (self._source.unreadable, self._stamps.not_newer(self.topic))))
 
     def __call__(self) -> Desired:
         """Return the motion that is requested now."""

@@ -144,8 +144,8 @@ class Ros2Node:
         """Reason why nothing is received any more, as a sentence, or ''."""
         self._publications: dict[UUID, str] = {}
         self._discovered = BuiltinDataReader(self._participant, BuiltinTopicDcpsPublication)
-        self._found = ReadCondition(self._discovered, _UNREAD)
-        self._waits.attach(self._found)
+        self._discovery = ReadCondition(self._discovered, _UNREAD)
+        self._waits.attach(self._discovery)
         self._thread = Thread(target=self._receive, name="ros2", daemon=True)
         self._thread.start()
 
@@ -197,7 +197,7 @@ class Ros2Node:
         self._ends.set(True)
         self._thread.join()
         # cyclonedds ends what is no longer referred to: readers and writers before what they stand on
-        del self._waits, self._ends, self._found, self._discovered
+        del self._waits, self._ends, self._discovery, self._discovered
         for publisher in self._publishers:
             publisher.close()
         for subscription in self._subscriptions:
@@ -233,7 +233,7 @@ class Ros2Node:
         try:
             while not self._ended:
                 self._waits.wait(duration(seconds=1))
-                if self._found.triggered:
+                if self._discovery.triggered:
                     self._discover()
                 with self._lock:
                     subscriptions = tuple(self._subscriptions)

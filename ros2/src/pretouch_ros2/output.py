@@ -12,7 +12,7 @@ from pretouch_ros2.node import Ros2Node
 from pretouch_ros2.step_messages import Stamp, StepMessages
 
 _TOPICS = "/pretouch"
-"""What our topics begin with."""
+"""Prefix of our topics."""
 _PERIOD_S = 0.04
 """Least time between two steps that are published; contacts and changes of the mode always are [s]."""
 _DIAGNOSTICS_S = 1.0

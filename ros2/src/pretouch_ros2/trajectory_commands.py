@@ -48,7 +48,7 @@ class TrajectoryCommands:
         self._lag = Lag(model.description.qdd_max)
         self._ahead = params.ahead_s if params.shared_clock else 0.0
         self._settled = self._anew = -math.inf
-        self._astray, self._known = False, False
+        self._astray, self._located = False, False
 
     @property
     def begun(self) -> bool:
@@ -78,7 +78,7 @@ class TrajectoryCommands:
         reference = self._reference
         if not np.any([qd, reference.motion_at(now)[1], reference.motion_at(now - _PAST_S)[1]]):
             return
-        self._known = False
+        self._located = False
         passed = reference.passed(now, _PAST_S) if self._params.shared_clock else ()
         trajectory = reference.command(qd, now)
         self._publish((*passed, *trajectory.points()) if passed else trajectory.way_points(), now)
@@ -99,8 +99,8 @@ class TrajectoryCommands:
         stray = self._lag.stray(reference, instant, joints.q)
         if now < reference.ends + self._ahead + _LINGERS_S:
             self._astray |= bool(stray.max() > self._params.stray_rad)
-        elif not self._known and not self._astray:
-            self._known = True
+        elif not self._located and not self._astray:
+            self._located = True
             self._lag.rest(reference, instant, joints.q)
         elif self._astray or stray.max() > self._params.stray_rad:
             if now < self._anew + _AGAIN_S:
@@ -110,7 +110,7 @@ class TrajectoryCommands:
 
     def _settle(self, q: FloatArray, now: float) -> None:
         """Bring the arm gently to rest at q (n,) [rad]."""
-        self._settled, self._known = now + self._params.settle_s, False
+        self._settled, self._located = now + self._params.settle_s, False
         self._publish(self._reference.begin(q, now, self._params.settle_s).way_points(), now)
 
     def _elsewhere(self, joint: int, joints: JointReading, instant: float) -> str:

@@ -24,8 +24,8 @@ from pretouch.types import FloatArray
 
 TURN, PLACE, ACC_BIAS, GYRO_BIAS, CLOCK, LAG = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12), 12, 13
 ACC_SCALE, GYRO_SCALE, UPWARDS = slice(14, 17), slice(17, 20), slice(20, 23)
-"""Of the unknowns: rotation in the sensor frame [rad], position in the link frame [m], biases, lateness of the clock
-and lag of the accelerometer [s], errors of scale, and what holds against gravity, in the base frame [m/s^2]."""
+"""Slices of the unknowns: rotation in the sensor frame [rad], position in the link frame [m], biases, lags of clock and
+accelerometer [s], errors of scale, and the acceleration against gravity, in the base frame [m/s^2]."""
 UNKNOWNS = 23
 _ACCELERATION_BIAS = 0.4
 """Standard deviation of the accelerometer's constant error, before anything is measured [m/s^2]: 40 mg (LSM6DS3

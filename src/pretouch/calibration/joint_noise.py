@@ -18,7 +18,7 @@ from pretouch.traces import JointTrace, on_grid
 from pretouch.types import FloatArray
 
 _EVERY = 10
-"""Of the arm's instants, one in so many is looked at."""
+"""Step between the arm's instants that are used."""
 _ASIDE = 1 / 3
 """Variance of the pull in every direction, as a share of its square: of errors that noise makes, those across the
 expected one are smaller, but count for more where the motion is strong."""

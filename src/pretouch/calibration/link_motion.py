@@ -12,7 +12,7 @@ from pretouch.traces import JointTrace
 from pretouch.types import BoolArray, FloatArray
 
 _AROUND = np.arange(-2, 3)
-"""Of an instant's derivatives: differences, of fourth order, of the postures two steps before to two after it."""
+"""Steps about an instant for its derivatives: differences of fourth order of the postures."""
 _FIRST = np.array([1.0, -8.0, 0.0, 8.0, -1.0]) / (12 * FINE_S)
 _SECOND = np.array([-1.0, 16.0, -30.0, 16.0, -1.0]) / (12 * FINE_S**2)
 

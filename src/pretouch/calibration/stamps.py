@@ -18,8 +18,8 @@ from pretouch.values import value
 _STEADY_S = 10.0
 """Time over which the sensor's rate is taken as constant [s]; it changes by 0.1 % in half a minute of warming up."""
 _SHORTEST_S, _FEWEST, _DRIFT_TOLD_S = 1.0, 5, 10.0
-"""What was heard for less time [s], or in no more datagrams, tells no rate; for less than the last, no drift that the
-offset's errors would not hide [s]."""
+"""Least time [s] and number of datagrams for a rate, and least time for a drift that the offset's errors do not
+hide [s]."""
 _GAP_S = 0.5
 """A unit from which nothing came for so long may have lost samples itself [s]: it counts them by the nominal rate."""
 _DRIFT, _SLACK_S = 2e-4, 1e-3

@@ -22,7 +22,7 @@ from pretouch.sensing.skin import OWN_SKIN, load_skin
 from pretouch.text_table import TextTable, tabulated
 
 _NEGLIGIBLE = 0.001
-"""What sticks out less is not spoken of [m]."""
+"""Least distance outside of the capsules that is mentioned [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)

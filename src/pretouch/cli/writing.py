@@ -15,7 +15,7 @@ from pretouch.atomic_write import json_text, write_json
 from pretouch.errors import ExperimentError
 
 STANDARD_OUTPUT = "-"
-"""What --json takes for the standard output."""
+"""Argument of --json for the standard output."""
 
 
 @contextmanager

@@ -19,7 +19,7 @@ from pretouch.types import FloatArray, IntArray
 from pretouch.values import value
 
 _STATES = ("franka_msgs/msg/FrankaState", "franka_msgs/msg/FrankaRobotState")
-"""Of franka_ros and of franka_ros2."""
+"""States of franka_ros and of franka_ros2."""
 _EXTERNAL = "external_joint_torques"
 """Last part of the topic on which franka_ros2 publishes external torques, as efforts."""
 _FIELDS = {WRENCH: ("force", "torque"), JOINT_STATE: ("q", "dq", "effort")}

@@ -39,12 +39,12 @@ MOVING_RAD_S = 0.02
 _SLOWER = 0.95
 """Share of the detector's rate below which data count as slower."""
 _DAMPING, _SINGULAR = 0.01, 0.02
-"""Of the least squares by which a robot's interface makes a wrench of torques, and the smallest singular value of the
+"""Damping of the least squares by which an interface makes a wrench of torques, and least singular value of the
 Jacobian at which it does."""
 _LONG_S = 15.0
 """Time from which on a contact is doubted [s]."""
 _OF_CURRENTS = {"friction_prior_nm": 0.1, "offset_prior_nm": 0.03, "torque_prior_nm": 0.02}
-"""What is not known of torques by currents, as parts of the usual torque limit of a joint [1]; by the UR10e's."""
+"""Uncertainty of torques from currents, as shares of a joint's usual torque limit [1]; from the UR10e."""
 
 
 def detect(recording: ForceRecording | TorqueRecording, profile: Profile) -> tuple[DetectorResult, Course]:

@@ -99,7 +99,7 @@ class TorqueCourse:
 
 
 Course = Decisions | TorqueCourse
-"""What a detector made of each cycle."""
+"""Values of a detector in each cycle."""
 
 
 def free_cycles(ready: BoolArray, course: Course) -> BoolArray:

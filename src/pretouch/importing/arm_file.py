@@ -9,11 +9,11 @@ from pretouch.importing.chain import Arm, Limits
 from pretouch.types import FloatArray
 
 DENSITY = 1000.0
-"""Of a link whose mass is unknown, over its capsules: MuJoCo's own [kg/m^3]."""
+"""Density of a link of unknown mass, over its capsules: MuJoCo's default [kg/m^3]."""
 _LEAST_MASS, _LEAST_INERTIA = 1e-3, 1e-6
-"""Of a moved link of which nothing is known [kg, kg m^2]."""
+"""Mass and inertia of a moved link without any data [kg, kg m^2]."""
 _LARGEST_MASS = 500.0
-"""What no link of an arm has [kg]."""
+"""Mass that no link of an arm exceeds [kg]."""
 
 
 def arm_file(name: str, arm: Arm, limits: Limits, bodies: tuple[LinkBody, ...]) -> str:

@@ -11,14 +11,14 @@ from pretouch.types import FloatArray
 _ARM_JOINTS = 6
 """Where a chain with as many joints branches, it ends in fingers; one with fewer has several arms."""
 _GRIPPER, _FINGER = ("gripper", "finger", "jaw"), ("finger", "jaw")
-"""What a finger's joint, or its link, is called; a link called gripper may be the arm's last."""
+"""Names of a finger's joint or link; a link named gripper may be the arm's last."""
 _NAMES = ("tcp", "tool", "grasp", "ee", "eef", "effector", "tip")
-"""What an end-effector's frame is called, the surest first."""
+"""Names of an end-effector's frame, the surest first."""
 _ENDLESS = 2 * np.pi
 _SPEED, _ACCELERATION, _TORQUE = 1.0, 5.0, 50.0
 """Where nothing is known: slow, gentle and middling [rad/s, rad/s^2, Nm]."""
 _LARGEST_POSITION, _LARGEST_SPEED, _LARGEST_TORQUE = 4 * np.pi, 50.0, 5000.0
-"""What no joint of an arm has [rad, rad/s, Nm]."""
+"""Limits that no joint of an arm exceeds [rad, rad/s, Nm]."""
 
 
 @dataclass(frozen=True, eq=False)

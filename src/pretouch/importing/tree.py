@@ -16,7 +16,7 @@ _KINDS = {int(mujoco.mjtJoint.mjJNT_HINGE): "hinge", int(mujoco.mjtJoint.mjJNT_S
 LARGEST = 1e6
 """From here on a limit stands for none."""
 NO_MASS = 1e-12
-"""What a link without mass has in the model [kg, kg m^2]: MuJoCo moves none without."""
+"""Mass and inertia in the model of a link without mass [kg, kg m^2]: MuJoCo moves no link without."""
 _TURN = 48
 """Corners of a circle: its polygon is less than 0.3 % of the radius off."""
 

@@ -30,7 +30,7 @@ SETTLE_S = 0.2
 _UNDER_M = 0.0015
 """How deep the plain surface lies under the coloured one [m]: a page too slow to read one in time shows the other."""
 SHADELESS: dict[str, Any] = {"cast_shadow": False, "receive_shadow": False}
-"""Of all things in the scene: shadows would cost a phone more than they show."""
+"""Options of all objects in the scene: shadows would cost a phone more than they show."""
 
 
 def quaternions(rotation: FloatArray) -> FloatArray:

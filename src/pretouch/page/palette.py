@@ -13,9 +13,9 @@ UNIT: Colour = (52, 63, 78)
 UNIT_SILENT: Colour = (214, 40, 57)
 CONE: Colour = (84, 150, 214)
 SEEING: Colour = (242, 150, 40)
-"""Of a unit, and of its cone, that sees an obstacle."""
+"""Colour of a unit that sees an obstacle, and of its cone."""
 LIMITING: Colour = (214, 40, 57)
-"""Of one whose obstacle, and of a pair whose nearness, keeps the arm from what it would do."""
+"""Colour of a unit whose obstacle restricts the arm, and of a pair of points that does."""
 SENSED: Colour = (38, 166, 91)
 PATH: Colour = (49, 104, 196)
 RECOVERING: Colour = (38, 166, 91)
@@ -25,10 +25,10 @@ FOLLOWING: Colour = (110, 121, 136)
 PAIR: Colour = (132, 168, 142)
 FORCE: Colour = (232, 119, 34)
 ASKED: Colour = (49, 104, 196)
-"""Of the velocity that a commander asked for."""
+"""Colour of the velocity that a commander requests."""
 TRUE_FORCE: Colour = (38, 44, 54)
 PLACE: Colour = (190, 24, 120)
-"""Of the forces at the places where the arm is said to be touched."""
+"""Colour of the forces at the estimated places of contact."""
 HAND: Colour = (232, 178, 146)
 CUFF: Colour = (58, 92, 148)
 BOARD: Colour = (201, 176, 140)

@@ -21,7 +21,7 @@ SAMPLES = int(SPAN_S / SAMPLE_S)
 PERIOD_S = 0.125
 """Time between two updates of a page [s]."""
 FORCE_N = 15.0
-"""What the axes of force reach to at least, up and down [N]."""
+"""Least range of the force axes, up and down [N]."""
 _ROUNDING_S = 1e-6
 _NOTHING_M = 9.0
 """Where a unit that shows nothing is drawn [m]: out of sight."""

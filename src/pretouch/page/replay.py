@@ -25,7 +25,7 @@ _SEARCH_S, _SEARCH_PLAYING_S = 0.015, 0.005
 """Time spent on searching for events between two updates, at rest and while it plays [s]."""
 _AT_ONCE = 8
 _STRIDE = 4
-"""Of the steps before a place jumped to, each how manieth is drawn."""
+"""Step between drawn steps before a position that is jumped to."""
 _MOST = 60
 """Steps drawn in one update: played faster than that, some are left out."""
 

@@ -28,11 +28,11 @@ PathName = Literal["circle", "line"]
 """The paper's two paths; the line is run there and back."""
 
 ObjectName = Literal["none", "board -y", "board +y"]
-"""What stands in the arm's way: nothing, or the static experiment's board on one side."""
+"""Object in the arm's way: none, or the static experiment's board on one side."""
 
 Stiffness = Annotated[float, Check(low=3_000.0, high=150_000.0)]
-"""Of a contact with the arm [N/m]. On a softer one a hand that pushes hard sinks through a thin link; a stiffer one of
-a hand of 0.6 kg swings too quickly for physics in steps of 1 ms."""
+"""Stiffness of a contact with the arm [N/m]. On a softer one a hand that pushes hard sinks through a thin link; with a
+stiffer one a hand of 0.6 kg swings too quickly for physics in steps of 1 ms."""
 
 _SETTLE_S = 0.2
 """Time the arm stands before the controller starts [s]: the observer's transient is over."""

@@ -26,7 +26,7 @@ ARROW_M_PER_N, ARROW_MOST_M, ARROW_LEAST_N = 0.012, 0.45, 6.0
 ARROW_LEAST_M_S = 0.01
 """Speed below which no arrow of a velocity is drawn, which is 1 m long for each m/s [m/s]."""
 PARTS = ("cones", "points", "pairs", "path", "trail", "forces")
-"""What can be shown and hidden."""
+"""Parts that can be shown and hidden."""
 
 
 class Scene:
@@ -68,7 +68,7 @@ class Scene:
         self._shows_pairs = self._shows_forces = True
         self._ee = scene.add_frame(f"{root}/ee", show_axes=False)
         self._force = self._arrow(f"{root}/ee/force", palette.FORCE)
-        self._asked = self._arrow(f"{root}/ee/asked", palette.ASKED, 0.004)
+        self._requested = self._arrow(f"{root}/ee/asked", palette.ASKED, 0.004)
         self._allowed = self._arrow(f"{root}/ee/allowed", palette.RECOVERING, 0.008)
         goal: dict[str, Any] = {"axes_length": 0.1, "axes_radius": 0.004, "origin_radius": 0.012}
         self._goal = scene.add_frame(f"{root}/goal", origin_color=palette.ASKED, **goal, visible=False)
@@ -143,7 +143,7 @@ class Scene:
         if goal is not None:
             self._goal.position, self._goal.wxyz = goal[:3, 3], quaternions(goal[:3, :3])
         velocity, allowed = (None, None) if motion is None else motion.velocities
-        _point(self._asked, velocity, ARROW_LEAST_M_S)
+        _point(self._requested, velocity, ARROW_LEAST_M_S)
         _point(self._allowed, allowed, ARROW_LEAST_M_S)
 
     def _draw_pairs(self, step: ControlStep) -> None:

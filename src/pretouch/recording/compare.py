@@ -21,7 +21,7 @@ SAME_CONTACT_S = 0.3
 """Two detectors' contacts within this time of each other [s] are one."""
 
 Decision = tuple[float, FloatArray, FloatArray, Thresholds, bool, bool, Contact | None]
-"""Of a cycle: its instant [s], the force (3,) and what was held against the thresholds (3,) [N], the thresholds,
+"""Decision of a cycle: its instant [s], the force (3,) and the force less its mean (3,) [N], the thresholds,
 whether the force window was full, whether a reaction was under way, and the contact that began."""
 
 

@@ -44,7 +44,7 @@ _PARTS = {
     "desired": Desired,
     "moving": MovingFixtures,
 }
-"""What inputs may have beside the arm's state and the readings."""
+"""Optional parts of inputs beside the arm's state and the readings."""
 _SHOWN = 500
 """Characters of what cannot be kept that are."""
 _REPR = Repr()  # answers for objects whose own repr fails, too

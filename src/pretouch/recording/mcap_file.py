@@ -19,7 +19,7 @@ _MAGIC = b"\x89MCAP0\r\n"
 _LARGEST = 1 << 26
 """A record of more bytes is damage: our chunks have 0.3 MB, those of other tools some 10 MB."""
 _DAMAGE = (McapError, ZstdError, struct.error, ValueError, KeyError, OverflowError, RuntimeError, MemoryError, OSError)
-"""What the library and its decompressors raise for bytes that are cut off or damaged: RuntimeError is lz4's, OSError a
+"""Errors of the library and its decompressors for bytes cut off or damaged: RuntimeError is lz4's, OSError a
 file shorter than its last record, or a disk that cannot read on."""
 _Kind = TypeVar("_Kind")
 

@@ -20,14 +20,14 @@ from pretouch.recording.mcap_file import Contents
 from pretouch.types import FloatArray
 
 LIBRARY = f"pretouch {pretouch.__version__}"
-"""What a file says it was written by."""
+"""Name of the library in a file's header."""
 PACKAGE = "pretouch_msgs"
 OWN = ("Contact", "Obstacles", "QpSolution", "Thresholds", "Touched", "Step", "Truth", "Packed", "UnitSample")
 """Our types, each after those that it holds; each has a file in `msg/`."""
 PACKED, UNIT_SAMPLE = f"{PACKAGE}/msg/Packed", f"{PACKAGE}/msg/UnitSample"
 """Types of what is MessagePack, and of datagrams."""
 READ_WITH = "read it with pretouch.units.skin_reader.read_skin, or open it in Foxglove"
-"""What can be done with a recording of sensor units, as the end of a sentence."""
+"""Advice on a recording of sensor units, as the end of a sentence."""
 JOINT_STATE, WRENCH = "sensor_msgs/msg/JointState", "geometry_msgs/msg/WrenchStamped"
 RANGE, IMU = "sensor_msgs/msg/Range", "sensor_msgs/msg/Imu"
 TRANSFORMS, MARKERS = "tf2_msgs/msg/TFMessage", "visualization_msgs/msg/MarkerArray"

@@ -33,7 +33,7 @@ from pretouch.source_digest import source_digest
 from pretouch.types import FloatArray
 
 JSON = Any
-"""What JSON can hold: None, bool, numbers, text, and lists and dicts with text keys of these."""
+"""Values of JSON: None, bool, numbers, text, and lists and dicts with text keys of these."""
 
 _MJCF = "arm.xml"
 _LIBRARIES = ("numpy", "numba", "mujoco-core", "scipy")
@@ -112,7 +112,7 @@ class Run:
     def __init__(self, sequence: int, data: bytes) -> None:
         """Take the number of the first step it made, and what `packed_run` returned."""
         run = unpacked(_KeptRun, data)
-        self._kept, self.sequence = run, sequence
+        self._run, self.sequence = run, sequence
         self.versions = run.versions
         """Program, libraries and machine it ran on."""
         self.started = run.started
@@ -124,31 +124,31 @@ class Run:
     @cached_property
     def model(self) -> RobotModel:
         """The arm."""
-        return _sound(lambda: _model(self._kept))
+        return _sound(lambda: _model(self._run))
 
     @cached_property
     def skin(self) -> Skin:
         """The sensor units on it."""
-        return _sound(lambda: Skin([_unit(unit) for unit in self._kept.units], self.model))
+        return _sound(lambda: Skin([_unit(unit) for unit in self._run.units], self.model))
 
     @cached_property
     def fixtures(self) -> Fixtures:
         """Fixtures around the arm."""
-        return _sound(lambda: Fixtures(self._kept.planes, self._kept.capsules))
+        return _sound(lambda: Fixtures(self._run.planes, self._run.capsules))
 
     @cached_property
     def path(self) -> Path:
         """The path it followed; of another class than ours, points of it, for drawings: of one that stands, 1 mm."""
-        return _sound(lambda: _path(self._kept.path))
+        return _sound(lambda: _path(self._run.path))
 
     def controller(self, path: Path | None = None) -> Controller:
         """Make the controller again, on the model, skin and fixtures of this run.
 
         A path of another class than ours is not in the recording: give it, or it is a RecordingError.
         """
-        if path is None and self._kept.path.kind not in (Circle.__name__, WayPoints.__name__):
+        if path is None and self._run.path.kind not in (Circle.__name__, WayPoints.__name__):
             raise RecordingError(
-                f"The path of the run is of the class {self._kept.path.kind}, which a recording cannot hold: give it,"
+                f"The path of the run is of the class {self._run.path.kind}, which a recording cannot hold: give it,"
                 " as run.controller(path=...) or verify(recorded, path=...)."
             )
         return _sound(lambda: Controller(self.model, self.skin, self.fixtures, path or self.path, self.profile))

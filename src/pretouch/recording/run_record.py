@@ -11,7 +11,7 @@ from pretouch.perception.obstacles import points_of_units
 from pretouch.types import BoolArray, Contact, ControlStep, FloatArray, IntArray, Mode
 
 MODES = tuple(Mode)
-"""What the numbers in `RunRecord.mode` stand for."""
+"""Modes by the numbers in `RunRecord.mode`."""
 
 Columns = dict[str, NDArray[Any]]
 """Arrays by the names of the fields that they are of."""

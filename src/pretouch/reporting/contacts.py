@@ -28,7 +28,7 @@ _FORCE = {
     False: "Force: at the end-effector, as the joint torques beyond those of free motion tell it; the contact may be"
     " elsewhere. Axes: where that passes the band of one sample, or is nearest to it",
 }
-"""What a contact's force is, by whether the paper's thresholds detect it."""
+"""Meaning of a contact's force, by whether the paper's thresholds detect it."""
 
 
 @dataclass(frozen=True)

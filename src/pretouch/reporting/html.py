@@ -73,13 +73,13 @@ a { color: inherit; } footer { border-top: 1px solid var(--line); margin-top: 2.
 _FIGURE_SPACE = "\u2007"
 """As wide as a digit."""
 MOST_ROWS = 200
-"""Of a table: those of an hour would hide all else."""
+"""Most rows of a table: those of an hour would hide all else."""
 _COMPONENT = 5
 """Characters of a component of a vector."""
 
 Text = str | Html
 Row = dict[str, Text]
-"""What a row of a table has under each heading."""
+"""Cells of a row by their heading."""
 
 
 def html(text: Text) -> Html:

@@ -23,7 +23,7 @@ _SOURCE = (
 _MOST = 1000.0
 """Fraction that stands for more, as of a command where the arm allows none."""
 _ROUNDING = 1e-9
-"""What a fraction may exceed 1 by, or a margin lie below 0 [rad], as nothing but rounding."""
+"""Excess of a fraction over 1, or of a margin below 0 [rad], that is rounding."""
 
 
 class LeastDistance(NamedTuple):

@@ -17,7 +17,7 @@ from pretouch.robot.model import RobotModel
 from pretouch.types import BoolArray, FloatArray, IntArray, QpOutcome, RangeReadings
 
 OUTCOMES = tuple(QpOutcome)
-"""What the numbers in `RunCourse.outcome` stand for."""
+"""Outcomes by the numbers in `RunCourse.outcome`."""
 NO_READING = -1
 """Stands in `RunCourse.reading_status` where there is no reading."""
 _BATCH = 4096

@@ -31,7 +31,7 @@ from pretouch.types import FloatArray
 _SIGN_FILE, _FOLDER, _UNUSABLE = "force-sign.json", "free-motion", ".unusable"
 _FORMAT = 1
 _LASTING = ("weights", "covariance", "spread", "seen")
-"""What is saved of a model of free motion."""
+"""Fields of a model of free motion that are saved."""
 _LATEST = 253_402_300_800.0
 """The year 10 000 [s since 1970]."""
 _ANEW = "let the arm learn its free motion again"

@@ -58,7 +58,7 @@ class ProgressReporter:
         self._answered = True
         self._nearest: ControlStep | None = None
         self._kind: tuple[Mode, Event | Doing | None, bool] | None = None
-        self._line_due = self._said = self._near_due = -np.inf
+        self._line_due = self._line_time = self._near_due = -np.inf
         self._examples: dict[Event, str] = {}
         self.summary = RunSummary()
 
@@ -79,8 +79,8 @@ class ProgressReporter:
         if kind == self._kind:
             if step.stamp >= self._line_due:
                 self._say(step, account.sentence)
-        elif self._kind is None or kind[0] is not self._kind[0] or step.stamp >= self._said + _AGAIN_S:
-            self._kind, self._said = kind, step.stamp
+        elif self._kind is None or kind[0] is not self._kind[0] or step.stamp >= self._line_time + _AGAIN_S:
+            self._kind, self._line_time = kind, step.stamp
             self._say(step, account.sentence)
 
     def _count_answer(self, step: ControlStep) -> None:

@@ -29,7 +29,7 @@ from pretouch.units.skin import NetworkSkin
 
 _SPEED_M_S = 0.15
 _SHARE = 0.2
-"""Of the joints' limits, on the way to the start."""
+"""Share of the joints' limits that is used on the way to the start."""
 _PLACES = 200
 """Places of the path, for the room that it takes."""
 _STAND_S, _LOOK_S = 1.0, 0.01

@@ -37,7 +37,7 @@ class UnitClock:
         """Least offset there can be, as of the newest sample [s]."""
         self.high = math.inf
         """Largest offset there can be, as of the newest sample [s]."""
-        self.known = False
+        self.bounded = False
         """True if both bounds are there."""
         self.last_reading = -math.inf
         """Instant of the newest reading that was stamped [s], unit's clock."""
@@ -46,7 +46,7 @@ class UnitClock:
     @property
     def offset(self) -> float:
         """Middle of the bounds [s]; NaN while one is missing."""
-        return 0.5 * (self.low + self.high) if self.known else math.nan
+        return 0.5 * (self.low + self.high) if self.bounded else math.nan
 
     @property
     def bound(self) -> float:
@@ -73,7 +73,7 @@ class UnitClock:
             return True
         self.low = self._lows[0][1] - self._drift * newest
         if self.low <= self.high:
-            self.known = True
+            self.bounded = True
             _expire(self._lows, newest - self._window)
             _expire(self._highs, newest - self._window)
             return True
@@ -85,7 +85,7 @@ class UnitClock:
         """Know nothing again; what was counted stays."""
         self._lows.clear()
         self._highs.clear()
-        self._newest, self.low, self.high, self.known = -math.inf, -math.inf, math.inf, False
+        self._newest, self.low, self.high, self.bounded = -math.inf, -math.inf, math.inf, False
         self.last_reading = self._last_stamp = -math.inf
 
     def earliest(self, instant: float) -> float:

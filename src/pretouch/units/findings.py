@@ -36,7 +36,7 @@ class Finding:
 
 
 _OF_TIME = frozenset({"rate", "range late", "loss", "imu rate", "imu loss", "latency", "clock"})
-"""What a machine that is late makes of units that are well."""
+"""Findings that a late machine causes although the units are well."""
 
 
 def findings(units: Iterable[UnitHealth], params: HealthParams, late: float = 0.0) -> tuple[Finding, ...]:

@@ -178,21 +178,21 @@ class UnitWindow:
     def __init__(self, length: float) -> None:
         """Take the window's length [s]."""
         self._length = length
-        self._heard: deque[Received] = deque()
+        self._samples: deque[Received] = deque()
         self._counts: deque[tuple[float, UnitTraffic]] = deque()
 
     def take(self, now: float, samples: Iterable[Received], traffic: UnitTraffic) -> None:
         """Take in the samples since the last call, and the counts of the receiver by now [s]."""
-        self._heard.extend(samples)
+        self._samples.extend(samples)
         self._counts.append((now, replace(traffic)))
-        while self._heard and self._heard[0].arrival <= now - self._length:
-            self._heard.popleft()
+        while self._samples and self._samples[0].arrival <= now - self._length:
+            self._samples.popleft()
         while len(self._counts) > 1 and self._counts[1][0] <= now - self._length:
             self._counts.popleft()
 
     def health(self, now: float, traffic: UnitTraffic) -> UnitHealth:
         """Return the health of the unit at an instant [s]."""
-        return unit_health(list(self._heard), now, traffic, self._counts[0][1] if self._counts else traffic)
+        return unit_health(list(self._samples), now, traffic, self._counts[0][1] if self._counts else traffic)
 
 
 def unit_health(samples: Sequence[Received], now: float, traffic: UnitTraffic, before: UnitTraffic) -> UnitHealth:

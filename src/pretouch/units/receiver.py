@@ -24,7 +24,7 @@ REASONS = ("size", "format", "unit", "tag", "replayed", "no session", "too many 
 a sequence number seen already or long past; a sample of a unit without session; more hellos than are answered; a hello
 of the very session that is live."""
 _SO_RCVBUFFORCE = 33
-"""Of Linux, which Python has no name for."""
+"""Option of Linux that Python has no name for."""
 _HEAD = struct.Struct("<4sHHI")
 """Magic, version and kind as one; number of the unit; and, of a sample, flags and sequence."""
 _SAMPLE = MAGIC + bytes([VERSION, Kind.SAMPLE])
@@ -106,7 +106,7 @@ class SkinReceiver:
         """Number of rejected datagrams, by reason (`REASONS`)."""
         self.unsent = 0
         """Beacons the system did not take."""
-        self.taken = 0
+        self.received = 0
         """Datagrams that the last call of `receive` took in, genuine or not."""
         self._arrivals: deque[Received] = deque(maxlen=SAMPLES_MOST)
         self._clock, self._next_beacon_check = clock, -np.inf
@@ -122,7 +122,7 @@ class SkinReceiver:
     @property
     def behind(self) -> bool:
         """True if the last call of `receive` left datagrams for the next."""
-        return self.taken == DRAIN_MOST
+        return self.received == DRAIN_MOST
 
     @property
     def buffer_bytes(self) -> int:
@@ -183,7 +183,7 @@ class SkinReceiver:
             try:
                 size, address = take(buffer)
             except BlockingIOError:
-                self.taken = k
+                self.received = k
                 return accepted, k > 0
             except OSError as error:  # news of an earlier beacon that found nobody
                 if error.errno in (errno.EBADF, errno.ENOTSOCK):
@@ -196,7 +196,7 @@ class SkinReceiver:
                 self.rejected[reason] += 1
             if not k % _CHECK_EVERY:
                 self._send_due_beacons()
-        self.taken = DRAIN_MOST
+        self.received = DRAIN_MOST
         return accepted, True
 
     def _take_in(self, datagram: memoryview, size: int, address: Address, now: float) -> str | None:

@@ -26,7 +26,7 @@ WIDTH = 64
 """Sequence numbers that may arrive out of order."""
 _ALL = (1 << WIDTH) - 1
 _CHALLENGE = slice(PREFIX.size + 4, PREFIX.size + 4 + CHALLENGE_SIZE)
-"""Of a hello."""
+"""Challenge in a hello."""
 _REMEMBERED = 64
 """Beacons of a session whose instants are kept."""
 _ROUNDING_S = 1e-9
@@ -47,32 +47,32 @@ class ReplayWindow:
 
     def __init__(self) -> None:
         self.newest = 0
-        self._seen = _ALL
+        self._accepted = _ALL
         """Bit k: the number `newest` - k was accepted; there are none below 1 to miss."""
 
     def admits(self, sequence: int) -> bool:
         """Return True if a number is new: greater than all, or one of the last 64 that has not been accepted yet."""
         behind = self.newest - sequence
-        return behind < 0 or (behind < WIDTH and not self._seen >> behind & 1)
+        return behind < 0 or (behind < WIDTH and not self._accepted >> behind & 1)
 
     def take(self, sequence: int) -> int:
         """Mark a number that is admitted; return how many were given up as lost by it."""
         ahead = sequence - self.newest
         if ahead <= 0:
-            self._seen |= 1 << -ahead
+            self._accepted |= 1 << -ahead
             return 0
         self.newest = sequence
         if ahead == 1:
-            lost = 1 - (self._seen >> WIDTH - 1)
+            lost = 1 - (self._accepted >> WIDTH - 1)
         else:
             dropped = min(ahead, WIDTH)
-            lost = dropped - (self._seen >> WIDTH - dropped).bit_count() + ahead - dropped
-        self._seen = (self._seen << min(ahead, WIDTH) | 1) & _ALL
+            lost = dropped - (self._accepted >> WIDTH - dropped).bit_count() + ahead - dropped
+        self._accepted = (self._accepted << min(ahead, WIDTH) | 1) & _ALL
         return lost
 
     def missing(self) -> int:
         """Return how many of the last 64 numbers have not come (yet)."""
-        return WIDTH - self._seen.bit_count()
+        return WIDTH - self._accepted.bit_count()
 
 
 class RateLimiter:

@@ -124,11 +124,11 @@ class Ring(_ValueSlots):
     def __init__(self, slots: int, most: int) -> None:
         """Make an empty one for so many values of at most so many bytes each."""
         super().__init__(slots, most)
-        self._taken = 0
+        self._read = 0
 
     def take(self) -> list[bytes]:
         """Return what was written since the last call, oldest first."""
         newest = self.newest
-        numbers = range(max(self._taken, newest - self._slots) + 1, newest + 1)
-        self._taken = newest
+        numbers = range(max(self._read, newest - self._slots) + 1, newest + 1)
+        self._read = newest
         return [value for value in map(self.value, numbers) if value is not None]

@@ -119,7 +119,7 @@ class SimulatedUnit:
         self._session: Mac | None = None
         self._challenge, self._nonce = self._rng.bytes(CHALLENGE_SIZE), b""
         self._sequence = self._beacon = 0
-        self._heard = -np.inf
+        self._beacon_time = -np.inf
 
     @property
     def in_session(self) -> bool:
@@ -209,7 +209,7 @@ class SimulatedUnit:
             self._session, self._nonce = session_mac(self._mac, self._challenge, beacon.nonce), beacon.nonce
         elif beacon.nonce != self._nonce or beacon.number <= self._beacon:
             return
-        self._beacon, self._heard = beacon.number, now
+        self._beacon, self._beacon_time = beacon.number, now
 
     def tick(self, now: float) -> list[bytes]:
         """Do what is due at a time [s], and return the datagrams to send."""
@@ -218,7 +218,7 @@ class SimulatedUnit:
             self._next_reboot = next(self._reboots, np.inf)
         if now < self._up:
             return []
-        if self._session is not None and (now - self._heard > self._params.silence_s or self._sequence == _LAST):
+        if self._session is not None and (now - self._beacon_time > self._params.silence_s or self._sequence == _LAST):
             self._leave()
             self._next_hello = now
         sample = self._cycle(now)
@@ -230,7 +230,7 @@ class SimulatedUnit:
             return []
         self._sequence += 1
         sample.sequence, sample.beacon = self._sequence, self._beacon
-        sample.beacon_hold_us = self._since(self._heard, now)
+        sample.beacon_hold_us = self._since(self._beacon_time, now)
         return [sample.encode(self._session)]
 
     def _greet(self, now: float) -> list[bytes]:

@@ -206,4 +206,4 @@ def _serve(
                 if os.getppid() != parent:
                     return
             if not receiver.behind:
-                time.sleep(_SHORT_PAUSE_S if receiver.taken > _MANY else _PAUSE_S)
+                time.sleep(_SHORT_PAUSE_S if receiver.received > _MANY else _PAUSE_S)

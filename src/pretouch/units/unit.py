@@ -260,7 +260,7 @@ class UnitEndpoint:
         if newest:
             traffic.stuck = self._stuck.update(sample, now)
         stamp = clock.stamp(instant)
-        if not clock.known:
+        if not clock.bounded:
             return math.nan
         if newest and stamp > traffic.last_reading_stamp:
             traffic.last_reading_stamp = stamp
@@ -277,7 +277,7 @@ class UnitEndpoint:
     def _take_touch(self, sample: Sample) -> None:
         """Keep a touch reading if it is the newest whose instant is known."""
         part = touch_part(sample)
-        if part is None or not self._clock.known:
+        if part is None or not self._clock.bounded:
             return
         stamp = self._clock.earliest(1e-6 * (sample.time_us - part.age_us))
         if stamp > self._touch[0]:

@@ -45,7 +45,7 @@ ZONES = struct.Struct("<BB")
 """Behind those in a sample with `Flag.ZONES`: zones along a side, and 0. A `ZONE` for each of them follows, in the
 order of `pretouch.sensing.skin.Skin`."""
 ZONE = np.dtype([("mm", "<u2"), ("sigma", "<u2"), ("status", "u1")])
-"""What a zone measured: as `range_mm`, `range_sigma` and `range_status` of a `Sample`."""
+"""Measurement of a zone: as `range_mm`, `range_sigma` and `range_status` of a `Sample`."""
 IMU_MOST = 32
 """Most IMU samples in a datagram."""
 

@@ -31,7 +31,7 @@ _LAG_S = 0.03
 _START_S = 120.0
 """Longest time it may take to begin [s]: everything may have to be compiled first."""
 _PUSH_N, _PUSH_AFTER_S, _PUSH_S = 14.0, 0.5, 1.5
-"""What a simulated person does when asked to push the hand."""
+"""Push of a simulated person who is asked to push the hand."""
 
 
 class SimulatedArm:

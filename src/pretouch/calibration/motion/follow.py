@@ -71,7 +71,7 @@ class PlanCommander:
         self._plan, self._now, self._left_out, self._names = plan, now, left_out, controller.model.joints
         self._ahead = controller.limits.period * np.arange(-1, _AHEAD - 1)
         self._last: float | None = None
-        self._held, self._settled = 0.0, -np.inf
+        self._paused_s, self._settled = 0.0, -np.inf
         self.begin: float | None = None
         """Start of the plan, less time left out and holds [s]; None before it starts."""
         self.stopped = ""
@@ -90,17 +90,17 @@ class PlanCommander:
         now = step.stamp - self._left_out()
         since, self._last = now - (now if self._last is None else self._last), now
         if step.mode is Mode.TRACK:
-            self._held = 0.0
+            self._paused_s = 0.0
             if self.begin is None:
                 self.begin = now
                 self.stopped = self._astray(step.q, 0.0, START_RAD, "The arm is not where the plan begins")
             elif now > self._settled:
                 self.stopped = self._astray(step.q, now - self.begin, _STRAY_RAD, "The arm has left the plan")
         else:
-            self._held += since
+            self._paused_s += since
             if self.begin is not None:
                 self.begin, self._settled = self.begin + since, now + _SETTLE_S
-            if step.mode is Mode.REACT or step.latched or self._held > _PATIENCE_S:
+            if step.mode is Mode.REACT or step.latched or self._paused_s > _PATIENCE_S:
                 self.stopped = step.reason
         over = self.begin is not None and now >= self.begin + self._plan.duration
         return over or bool(self.stopped)

@@ -37,7 +37,7 @@ from pretouch.units.watch import UnitWatch
 _LOOK_S = 0.1
 """Time between two looks at the units before the motion [s]."""
 _AFTER_S = 0.5
-"""What was measured up to the end of a motion has arrived then [s]."""
+"""Time after a motion until all of its measurements have arrived [s]."""
 
 
 @dataclass(frozen=True)
