@@ -11,7 +11,7 @@ import pytest
 from pretouch import cli
 from pretouch.arms.simulated import arm
 from pretouch.arms.simulated.arm import SimulatedArm
-from pretouch.calibration.motion.limits import MotionLimits
+from pretouch.calibration.motion.limits import PlanLimits
 from pretouch.imported_data.reading import read_joints
 from pretouch.robot.postures import capsule_ends, kinematics_of
 from pretouch.units.fleet import simulated_keys
@@ -150,9 +150,9 @@ def test_the_way_to_the_start_is_part_of_what_is_asked_about(panda_model, tmp_pa
 def test_the_motion_is_written_for_another_driver_and_then_the_room_it_takes(
     panda_model, tmp_path, capsys, monkeypatch
 ):
-    place, report = tmp_path / "motion.csv", MotionLimits.report
+    place, report = tmp_path / "motion.csv", PlanLimits.report
     # though nobody reads on: a closed pipe ends the command
-    monkeypatch.setattr(MotionLimits, "report", lambda *given: place.stat().st_size and report(*given))
+    monkeypatch.setattr(PlanLimits, "report", lambda *given: place.stat().st_size and report(*given))
     assert calibrate("--plan", place, "--poses", 2) == 0
     said = capsys.readouterr().out
     assert said.index(" s; parts move") < said.index("The arm needs the space") < said.index("Keep everybody out of")

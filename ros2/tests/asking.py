@@ -13,10 +13,10 @@ import numpy as np
 from pretouch import loop
 from pretouch.controller import Controller
 from pretouch.types import ControlStep
-from pretouch_ros2.messages import JOINT_STATE, RANGE, TRAJECTORY, TWIST, Messages
+from pretouch_ros2.messages import JOINT_STATE, RANGE, TRAJECTORY, TWIST, WireMessages
 from pretouch_ros2.node import Ros2Node
 
-MESSAGES = Messages("jazzy")
+MESSAGES = WireMessages("jazzy")
 NAMES = tuple(f"panda_joint{i}" for i in range(1, 8))
 SLOW = np.full(7, 0.05)
 

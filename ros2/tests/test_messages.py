@@ -8,7 +8,7 @@ import pytest
 from rosbags.interfaces import Nodetype
 
 from pretouch.errors import RobotError
-from pretouch_ros2.messages import JOINT_STATE, RANGE, TRAJECTORY, TRANSFORMS, USED, Messages
+from pretouch_ros2.messages import JOINT_STATE, RANGE, TRAJECTORY, TRANSFORMS, USED, WireMessages
 from pretouch_ros2.params import Distribution
 
 DISTRIBUTIONS = get_args(Distribution)
@@ -17,14 +17,14 @@ SPANS = {"int8": 7, "uint8": 8, "byte": 7, "octet": 7, "char": 8, "int16": 15, "
 
 
 @cache
-def messages_of(distribution: Distribution) -> Messages:
-    return Messages(distribution)
+def messages_of(distribution: Distribution) -> WireMessages:
+    return WireMessages(distribution)
 
 
 class Drawn:
     """Draws messages of any type: as rosbags has them, and as cyclonedds has them."""
 
-    def __init__(self, messages: Messages, seed: int) -> None:
+    def __init__(self, messages: WireMessages, seed: int) -> None:
         self.messages, self.rng = messages, np.random.default_rng(seed)
 
     def pair(self, kind: str) -> tuple[Any, Any]:

@@ -16,13 +16,13 @@ from pretouch.errors import RobotError
 from pretouch.robot.description import panda
 from pretouch.robot.model import RobotModel
 from pretouch_ros2.inputs import JointReading
-from pretouch_ros2.messages import Messages
+from pretouch_ros2.messages import WireMessages
 from pretouch_ros2.params import ArmParams
 from pretouch_ros2.trajectory_commands import TrajectoryCommands, parts_of_day
 
 MODEL = RobotModel(panda())
 A, V, Q = MODEL.description.qdd_max, MODEL.description.qd_max, MODEL.description.q_ready
-MESSAGES = Messages("jazzy")
+MESSAGES = WireMessages("jazzy")
 PARAMS = ArmParams("on-robot", "base")
 PERIOD = 0.01
 SETTLED = 1.0

@@ -13,7 +13,7 @@ from pretouch.page.arm import (
     LEVELS,
     SETTLE_S,
     SPREAD_M,
-    Arm,
+    ArmBody,
     coloured,
     expectation,
     in_levels,
@@ -30,7 +30,7 @@ PERIOD = 1 / 30
 
 @pytest.fixture
 def arm(fake, panda_model, paper_skin):
-    return Arm(fake, panda_model, paper_skin, capsule_surfaces(panda_model))
+    return ArmBody(fake, panda_model, paper_skin, capsule_surfaces(panda_model))
 
 
 def test_units_colour_the_links_that_move_as_one_with_theirs(panda_model, paper_skin):

@@ -35,7 +35,7 @@ _numbers = itertools.count()
 
 
 @dataclass(frozen=True, slots=True)
-class Truth:
+class TrueMotion:
     """True motion and forces in each millisecond of the arm's time."""
 
     time: FloatArray
@@ -113,14 +113,14 @@ class FrankaServer:
         return self._lines
 
     @property
-    def truth(self) -> Truth:
+    def truth(self) -> TrueMotion:
         """True motion and forces until now. Between motions only: in a motion the server waits for a command."""
         count = len(self.said)
         self._type("time")
         self._wait_for("The arm's time is", _ANSWERS_S, count)
         _, *lines = self._truth.read_text().splitlines()
         rows = np.array([line.split(",") for line in lines], dtype=np.float64).reshape(-1, 11)
-        return Truth(rows[:, 0], rows[:, 1:4], rows[:, 4:])
+        return TrueMotion(rows[:, 0], rows[:, 1:4], rows[:, 4:])
 
     def close(self) -> None:
         """End it, whatever its client does."""

@@ -50,7 +50,7 @@ def _held(cls: type[Any], data: bytes, *_: Any, **__: Any) -> Any:
     return message
 
 
-class Messages(ros.Messages):
+class WireMessages(ros.Messages):
     """Makes, encodes and decodes the messages of one distribution."""
 
     def __init__(self, distribution: Distribution) -> None:

@@ -26,7 +26,7 @@ from cyclonedds.topic import Topic
 from cyclonedds.util import duration
 
 from pretouch.errors import RobotError
-from pretouch_ros2.messages import Messages
+from pretouch_ros2.messages import WireMessages
 from pretouch_ros2.network import participant
 from pretouch_ros2.params import NodeParams
 
@@ -50,7 +50,7 @@ def _count(matched: Callable[[], list[int]]) -> int:
 class Publisher:
     """Publishes messages of one type on one topic."""
 
-    def __init__(self, kind: str, topic: str, writer: DataWriter[Any], messages: Messages) -> None:
+    def __init__(self, kind: str, topic: str, writer: DataWriter[Any], messages: WireMessages) -> None:
         self.kind, self.topic = kind, topic
         self._writer, self._messages = writer, messages
 
@@ -82,7 +82,7 @@ class Subscription:
     """Hands on what is published on one topic, in the node's own thread."""
 
     def __init__(
-        self, kind: str, topic: str, reader: DataReader[Any], messages: Messages, on_message: OnMessage
+        self, kind: str, topic: str, reader: DataReader[Any], messages: WireMessages, on_message: OnMessage
     ) -> None:
         self.kind, self.topic = kind, topic
         self._reader, self._messages, self._on_message = reader, messages, on_message
@@ -130,7 +130,7 @@ class Ros2Node:
     def __init__(self, params: NodeParams) -> None:
         """Join a domain. A RobotError says what keeps it from that."""
         self.params = params
-        self.messages = Messages(params.distribution)
+        self.messages = WireMessages(params.distribution)
         self._participant = participant(params)
         self._topics: dict[tuple[str, str], Topic[Any]] = {}
         self._publishers: list[Publisher] = []

@@ -9,7 +9,7 @@ from pretouch.controller import Controller
 from pretouch.explanation import Limit
 from pretouch.loop import Cycle
 from pretouch.types import ControlStep, FloatArray, Mode, RangeReadings, RangeStatus
-from pretouch_ros2.messages import CLOUD, DIAGNOSTICS, STATUS, TRANSFORMS, WRENCH, Messages
+from pretouch_ros2.messages import CLOUD, DIAGNOSTICS, STATUS, TRANSFORMS, WRENCH, WireMessages
 
 Stamp = tuple[int, int]
 """Seconds and nanoseconds."""
@@ -24,7 +24,7 @@ _LEVEL = {Mode.TRACK: _OK, Mode.REACT: _OK, Mode.HOLD: _WARN}
 class StepMessages:
     """Makes messages of the steps of one controller."""
 
-    def __init__(self, controller: Controller, messages: Messages, base_frame: str) -> None:
+    def __init__(self, controller: Controller, messages: WireMessages, base_frame: str) -> None:
         self._m = messages
         self._skin, self._sight = controller.skin, controller.profile.sight
         self.base = base_frame or controller.model.links[0]

@@ -19,7 +19,7 @@ from pretouch.calibration.identify import Identified, Identifier
 from pretouch.calibration.joint_noise import JointNoise
 from pretouch.calibration.link_motion import ArmMotion
 from pretouch.calibration.locate import Located
-from pretouch.calibration.values import Calibration, CalibrationData, Finding, Place, UnitCalibration, UnitData
+from pretouch.calibration.values import Calibration, CalibrationData, Place, Remark, UnitCalibration, UnitData
 from pretouch.errors import CalibrationError
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import Skin
@@ -75,14 +75,14 @@ def _calibrated(identifier: Identifier, noise: JointNoise, unit: UnitData) -> Un
     return UnitCalibration(unit.id, _place(model, located, link, T, covariance), (*findings, *doubts))
 
 
-def _wrong_link(model: RobotModel, unit: UnitData, identified: Identified) -> list[Finding]:
+def _wrong_link(model: RobotModel, unit: UnitData, identified: Identified) -> list[Remark]:
     """Say which link the data of a unit fit that is said to sit on another one."""
     if unit.link is None or not identified.body or model.link_index(unit.link) in identified.body:
         return []
     covered = [link for link in identified.body if link in model.capsules.link]
     fitting = " or ".join(model.links[link] for link in covered or identified.body)
     sentence = f"It is said to sit on {unit.link}, but its data fit {fitting}: correct its link, or move it."
-    return [Finding("wrong_link", sentence, True)]
+    return [Remark("wrong_link", sentence, True)]
 
 
 def _place(model: RobotModel, located: Located, link: int, T: FloatArray, covariance: FloatArray) -> Place:

@@ -12,7 +12,7 @@ from pretouch.calibration.values import (
     LONGEST_GAP_S,
     SHORTEST_S,
     UNUSABLE,
-    Finding,
+    Remark,
     UnitData,
 )
 from pretouch.errors import CalibrationError
@@ -48,7 +48,7 @@ def mistaken(sensor: str, scale: float) -> str:
     return cause if abs(scale / factor - 1) < 0.1 else "check its units, range and axes"
 
 
-def checked_joints(model: RobotModel, joints: JointTrace) -> tuple[JointTrace, tuple[Finding, ...]]:
+def checked_joints(model: RobotModel, joints: JointTrace) -> tuple[JointTrace, tuple[Remark, ...]]:
     """Return joint positions at increasing instants, and what is to be known of them.
 
     Joints that did not move are at rest in them: their noise would pass for a motion. Raises CalibrationError for what
@@ -74,21 +74,21 @@ def checked_joints(model: RobotModel, joints: JointTrace) -> tuple[JointTrace, t
             " before, or have nearly the stamp of the next one, and were left out: record each measurement once,"
             " stamped where it is measured."
         )
-        findings.append(Finding("joints_left_out", sentence, False))
+        findings.append(Remark("joints_left_out", sentence, False))
     long = np.diff(gaps(clean.stamp, LONGEST_GAP_S)[1:-1], axis=1)
     if len(long):
         sentence = (
             f"Gaps in the joint states: {len(long)}, {long.sum():.2f} s in all. Samples of units around them were left"
             " out: record all states."
         )
-        findings.append(Finding("joints_missing", sentence, False))
+        findings.append(Remark("joints_missing", sentence, False))
     moved = _moved(clean.q)
     if not moved.all():
         sentence = (
             f"{', '.join(np.array(model.joints)[~moved])} did not move, so the links on either side cannot be"
             " distinguished, and units beyond are located less well. Move every joint."
         )
-        findings.append(Finding("joints_stood", sentence, False))
+        findings.append(Remark("joints_stood", sentence, False))
     return JointTrace(clean.stamp, np.where(moved, clean.q, np.median(clean.q, axis=0))), tuple(findings)
 
 
@@ -170,7 +170,7 @@ def _moved(q: FloatArray) -> BoolArray:
     return moved
 
 
-def checked_unit(unit: UnitData) -> tuple[UnitData, list[Finding]]:
+def checked_unit(unit: UnitData) -> tuple[UnitData, list[Remark]]:
     """Return a unit's data at increasing instants, and what is wrong with it; what is refused cannot be used at all."""
     imu, findings = unit.imu, []
     values = np.column_stack([imu.stamp, imu.acceleration, imu.angular_velocity])
@@ -183,14 +183,14 @@ def checked_unit(unit: UnitData) -> tuple[UnitData, list[Finding]]:
             f"{np.mean(~keep):.1%} of its samples are not finite, or not later than those before, and were left out:"
             " check their source, and whether the unit restarted."
         )
-        findings.append(Finding("left_out", sentence, bool(np.mean(~keep) > UNUSABLE)))
+        findings.append(Remark("left_out", sentence, bool(np.mean(~keep) > UNUSABLE)))
     span, rate = float(np.ptp(clean.imu.stamp)) if keep.any() else 0.0, 4.0 * CUTOFF_HZ
     if span < SHORTEST_S or keep.sum() < (1.0 - UNUSABLE) * rate * span:
         sentence = (
             f"It has {keep.sum()} samples in {span:.3g} s: at least {SHORTEST_S:g} s at {rate:g} Hz are needed,"
             " of one run. Check that it is switched on and has an IMU, and its connection."
         )
-        findings.append(Finding("too_little", sentence, True))
+        findings.append(Remark("too_little", sentence, True))
     if not any(finding.refused for finding in findings):
         cut = saturated(clean)
         if cut.any():
@@ -198,12 +198,12 @@ def checked_unit(unit: UnitData) -> tuple[UnitData, list[Finding]]:
                 f"{cut.mean():.1%} of its samples are at the end of its range and were left out, with what is around"
                 " them: set a larger range, or move more slowly."
             )
-            findings.append(Finding("saturated", sentence, False))
+            findings.append(Remark("saturated", sentence, False))
         findings += _stuck(clean.imu, cut) or _gravity(clean.imu)
     return clean, findings
 
 
-def _stuck(imu: ImuTrace, cut: BoolArray) -> list[Finding]:
+def _stuck(imu: ImuTrace, cut: BoolArray) -> list[Remark]:
     """Find axes whose value stays the same for long while another one varies: they are stuck, or cut off there."""
     values = np.hstack([imu.angular_velocity, imu.acceleration])
     stuck = []
@@ -218,14 +218,14 @@ def _stuck(imu: ImuTrace, cut: BoolArray) -> list[Finding]:
     if not stuck:
         return []
     way_out = "restart the unit, or replace it; if its range ends there, set a larger one"
-    return [Finding("stuck", f"While others vary, {', '.join(stuck)}: {way_out}.", True)]
+    return [Remark("stuck", f"While others vary, {', '.join(stuck)}: {way_out}.", True)]
 
 
-def _gravity(imu: ImuTrace) -> list[Finding]:
+def _gravity(imu: ImuTrace) -> list[Remark]:
     """Find an accelerometer that does not measure gravity, which a calibration motion hardly adds to."""
     gravity = float(np.median(np.linalg.norm(imu.acceleration, axis=1)))
     if 0.7 < gravity / GRAVITY < 1.4:
         return []
     cause = mistaken("accelerometer", gravity / GRAVITY)
     sentence = f"Its accelerometer measures {gravity:.4g} m/s^2 where gravity is 9.81: {cause}."
-    return [Finding("gravity", sentence, True)]
+    return [Remark("gravity", sentence, True)]

@@ -13,7 +13,7 @@ from pretouch.calibration.values import (
     TOLERATED_ACCELERATION,
     TOLERATED_ANGULAR_VELOCITY,
     UNUSABLE,
-    Finding,
+    Remark,
 )
 from pretouch.robot.model import RobotModel
 from pretouch.sensing.unit import seat
@@ -43,7 +43,7 @@ _INSIDE, _FACING = 3.0, 0.02
 surface is worth [m]."""
 
 
-def share_findings(arm: ArmMotion, located: Located) -> list[Finding]:
+def share_findings(arm: ArmMotion, located: Located) -> list[Remark]:
     """Say how much of the run was left out, and what of the rest is not explained."""
     whole = float(arm.usable.sum())
     missing, outliers = (1 - located.instants.sum() / whole), float((located.instants & ~located.used).sum()) / whole
@@ -54,7 +54,7 @@ def share_findings(arm: ArmMotion, located: Located) -> list[Finding]:
             f"During {outliers:.0%} of the run it did not move with its link, and during {missing:.0%} it measured"
             f" nothing or was out of range. That was left out (limit {UNUSABLE:.0%}): check whether it is loose."
         )
-        findings.append(Finding("unusable" if unusable else "outliers", sentence, unusable))
+        findings.append(Remark("unusable" if unusable else "outliers", sentence, unusable))
     turning, acceleration = float(located.noise[0]), float(located.noise[3])
     if turning > TOLERATED_ANGULAR_VELOCITY or acceleration > TOLERATED_ACCELERATION:
         sentence = (
@@ -62,11 +62,11 @@ def share_findings(arm: ArmMotion, located: Located) -> list[Finding]:
             f" {TOLERATED_ANGULAR_VELOCITY:g} rad/s and {TOLERATED_ACCELERATION:g} m/s^2). Check that it"
             " is fastened, and that scales and axes of both sensors are right."
         )
-        findings.append(Finding("unexplained", sentence, True))
+        findings.append(Remark("unexplained", sentence, True))
     return findings
 
 
-def _slipped(arm: ArmMotion, located: Located) -> list[Finding]:
+def _slipped(arm: ArmMotion, located: Located) -> list[Remark]:
     """Say when a unit ceased to move as its link: where it was found, it is no more."""
     last = np.flatnonzero(located.used)[-1]
     if located.instants[last + 1 :].sum() * (arm.time[1] - arm.time[0]) <= _LONG_S:
@@ -76,10 +76,10 @@ def _slipped(arm: ArmMotion, located: Located) -> list[Finding]:
         f"It slipped, or came off: from {since:.1f} s after the first joint state on, it did not move with its link."
         " Fasten it and calibrate again."
     )
-    return [Finding("slipped", sentence, True)]
+    return [Remark("slipped", sentence, True)]
 
 
-def scale_findings(located: Located) -> list[Finding]:
+def scale_findings(located: Located) -> list[Remark]:
     """Name errors of the IMU's scales that are too large to be its own."""
     findings, errors = [], located.estimate.errors
     for sensor, scale in (("accelerometer", errors[ACC_SCALE]), ("gyroscope", errors[GYRO_SCALE])):
@@ -89,11 +89,11 @@ def scale_findings(located: Located) -> list[Finding]:
             sentence = (
                 f"The scale of its {sensor} {'xyz'[axis]} seems to be {1 + scale[axis]:.2f} instead of 1: {way_out}."
             )
-            findings.append(Finding("scale", sentence, True))
+            findings.append(Remark("scale", sentence, True))
     return findings
 
 
-def unknown_finding(arm: ArmMotion, link: int, T: FloatArray, covariance: FloatArray) -> list[Finding]:
+def unknown_finding(arm: ArmMotion, link: int, T: FloatArray, covariance: FloatArray) -> list[Remark]:
     """Say what of a place, T_link_sensor (4, 4) with its covariance (6, 6), is not known, and what to do."""
     model, moving = arm.model, arm.model.moved_by[link]
     kin, last = model.kinematics(model.q_mid), int(np.flatnonzero(moving)[-1])
@@ -113,7 +113,7 @@ def unknown_finding(arm: ArmMotion, link: int, T: FloatArray, covariance: FloatA
         way_out = f"Move {names} more."
     if moving.sum() == 1:
         way_out = f"{axis.joint} alone moves {model.links[link]}, so no motion can determine it: measure it by hand."
-    return [Finding("unobservable", f"Not known: {', and '.join(unknown)}. {way_out}", True)]
+    return [Remark("unobservable", f"Not known: {', and '.join(unknown)}. {way_out}", True)]
 
 
 @dataclass(frozen=True)
@@ -194,7 +194,7 @@ def _in_words(direction: FloatArray) -> str:
     return f"({x:.2f}, {y:.2f}, {z:.2f})"
 
 
-def mounting_findings(model: RobotModel, link: int, T: FloatArray) -> list[Finding]:
+def mounting_findings(model: RobotModel, link: int, T: FloatArray) -> list[Remark]:
     """Say what is odd about where a unit sits and looks, T_link_sensor (4, 4)."""
     below, name = seat(model, link, T[:3, 3]), model.links[link]
     if below is None:
@@ -204,7 +204,7 @@ def mounting_findings(model: RobotModel, link: int, T: FloatArray) -> list[Findi
         refused = below.height < -_DEEPEST or moved_out(model, link, T[:3, 3]) is None
         way_out = "check its link and the arm's model" if refused else "in the skin file it is moved out, less certain"
         sentence = f"It lies {-1000 * below.height:.1f} mm inside the capsules of {name}: {way_out}."
-        findings.append(Finding("inside", sentence, refused))
+        findings.append(Remark("inside", sentence, refused))
     facing = float(below.normal @ T[:3, 2])
     if facing < _INWARDS:
         tilt = np.rad2deg(np.arccos(np.clip(facing, -1.0, 1.0)))
@@ -212,7 +212,7 @@ def mounting_findings(model: RobotModel, link: int, T: FloatArray) -> list[Findi
             f"Its beam (z axis) points into {name}, {tilt:.0f} degrees away from outwards: turn the board over, or give"
             " the IMU's data in the axes of the range finder."
         )
-        findings.append(Finding("inwards", sentence, True))
+        findings.append(Remark("inwards", sentence, True))
     return findings
 
 

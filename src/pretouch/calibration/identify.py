@@ -9,7 +9,7 @@ from pretouch.calibration.checks import mistaken
 from pretouch.calibration.link_motion import ArmMotion
 from pretouch.calibration.locate import Located, enough, known_instants, locate
 from pretouch.calibration.signals import ImuSignal
-from pretouch.calibration.values import CLOCK_ERROR_S, LEAST_SWING_RAD, SHORTEST_S, Finding, UnitData
+from pretouch.calibration.values import CLOCK_ERROR_S, LEAST_SWING_RAD, SHORTEST_S, Remark, UnitData
 from pretouch.errors import CalibrationError
 from pretouch.types import FloatArray
 
@@ -23,7 +23,7 @@ _SCALE = 0.1
 """By how much a gyroscope's scale may be off at first sight."""
 
 
-_TOO_LITTLE = Finding(
+_TOO_LITTLE = Remark(
     "too_little",
     f"Less than {SHORTEST_S:g} s remain with both its samples and joint states free of gaps and within range: record"
     " again.",
@@ -40,7 +40,7 @@ class Identified:
     body: tuple[int, ...] = ()
     """Indices of the links it may sit on, all fixed to each other; none if it fits no link."""
     located: Located | None = None
-    findings: list[Finding] = field(default_factory=list)
+    findings: list[Remark] = field(default_factory=list)
 
 
 class Identifier:
@@ -64,7 +64,7 @@ class Identifier:
         own = begin + self._step * np.arange(int((end - begin) / self._step))
         if not enough(self.arm, signal.usable(own)):
             return Identified(findings=[_TOO_LITTLE])
-        findings: list[Finding] = []
+        findings: list[Remark] = []
         matches = self._matches(signal, self.arm.time, CLOCK_ERROR_S)
         if matches[0][1].likeness < _LIKENESS:
             near, matches = matches[0][1], self._matches(signal, own, np.inf)
@@ -84,7 +84,7 @@ class Identifier:
             matches.append((body, Alignment(late, alignment.likeness)))
         return sorted(matches, key=lambda one: -one[1].likeness)
 
-    def _chosen(self, signal: ImuSignal, close: list[_Match], named: int | None, findings: list[Finding]) -> Identified:
+    def _chosen(self, signal: ImuSignal, close: list[_Match], named: int | None, findings: list[Remark]) -> Identified:
         """Choose among matches that are about as good."""
         first, match = close[0]
         instants = known_instants(self.arm, signal, match.late)
@@ -108,7 +108,7 @@ class Identifier:
             findings = [*findings, self._ambiguous(located.link, others, named in body)]
         return Identified(body, located, findings)
 
-    def _ambiguous(self, link: int, others: list[tuple[int, ...]], named: bool) -> Finding:
+    def _ambiguous(self, link: int, others: list[tuple[int, ...]], named: bool) -> Remark:
         model = self.arm.model
         names = " or ".join(model.links[i] for i in (link, *(links[0] for links in others)))
         differ = np.any([model.moved_by[links[0]] != model.moved_by[link] for links in others], axis=0)
@@ -118,7 +118,7 @@ class Identifier:
             sentence = (
                 f"It may sit on {names}, which moved alike, so the given link was used: move {joints} more to be sure."
             )
-        return Finding("ambiguous", sentence, not named)
+        return Remark("ambiguous", sentence, not named)
 
 
 def _rms(values: FloatArray) -> float:
@@ -126,31 +126,31 @@ def _rms(values: FloatArray) -> float:
     return float(np.sqrt(((values - values.mean(axis=0)) ** 2).sum(axis=1).mean()))
 
 
-def _gyroscope(w: FloatArray, sensed: FloatArray) -> Finding | None:
+def _gyroscope(w: FloatArray, sensed: FloatArray) -> Remark | None:
     """Find a wrong scale or mirrored axes by a link's turning and what was sensed of it, (N, 3) each [rad/s]."""
     scale = _rms(sensed) / max(_rms(w), 1e-9)
     if abs(scale - 1) > _SCALE:
         sentence = f"Its gyroscope measures {scale:.3g} times what its link turned: {mistaken('gyroscope', scale)}."
-        return Finding("gyroscope_scale", sentence, True)
+        return Remark("gyroscope_scale", sentence, True)
     U, size, Vt = np.linalg.svd((w - w.mean(axis=0)).T @ (sensed - sensed.mean(axis=0)))
     if size[2] > 0.01 * size[0] and np.linalg.det(U @ Vt) < 0:
         sentence = "Its gyroscope's axes are mirrored: one has the wrong sign, or two are swapped; correct them."
-        return Finding("mirrored", sentence, True)
+        return Remark("mirrored", sentence, True)
     return None
 
 
-def _fits_none(best: float) -> Finding:
+def _fits_none(best: float) -> Remark:
     sentence = (
         f"It fits no link of this arm: at most {best:.0%} of its rotation matches a link (at least"
         f" {_LIKENESS:.0%} needed). Check that its data are of this run and arm, that a joint moves its link, and"
         " that it does not swing or slip on it."
     )
-    return Finding("no_link", sentence, True)
+    return Remark("no_link", sentence, True)
 
 
-def _clock(late: float) -> Finding:
+def _clock(late: float) -> Remark:
     sentence = (
         f"Its clock is {'late' if late > 0 else 'early'} by {abs(late):.3f} s, more than {CLOCK_ERROR_S:g} s:"
         " check that its data are of this run, then correct the stamps."
     )
-    return Finding("clock", sentence, True)
+    return Remark("clock", sentence, True)

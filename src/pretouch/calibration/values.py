@@ -57,7 +57,7 @@ class CalibrationData:
 
 
 @dataclass(frozen=True)
-class Finding:
+class Remark:
     """Something that is to be known of a unit's data, or of the joints'."""
 
     kind: str
@@ -112,7 +112,7 @@ class UnitCalibration:
     id: str
     place: Place | None
     """Estimated place; None where there is no estimate."""
-    findings: tuple[Finding, ...] = ()
+    findings: tuple[Remark, ...] = ()
 
     @property
     def accepted(self) -> bool:
@@ -126,7 +126,7 @@ class Calibration:
 
     units: tuple[UnitCalibration, ...]
     """Results in the order of the data."""
-    findings: tuple[Finding, ...] = ()
+    findings: tuple[Remark, ...] = ()
     """Findings on the joints' data."""
     orientation_floor: float = 0.0
     """Standard deviation, about each axis, of the angle between an IMU's axes and its range finder's [rad]; no IMU can

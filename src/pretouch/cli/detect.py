@@ -113,7 +113,7 @@ def _by_torques(file: LogFile, choice: Choice, profiles: Sequence[Profile] | Non
 
 
 @dataclass(frozen=True)
-class _Answer:
+class _Results:
     """Results of detectors on a recording."""
 
     recording: ForceRecording | TorqueRecording
@@ -192,7 +192,7 @@ class _Answer:
         return figures
 
 
-def _answer(recording: ForceRecording | TorqueRecording, profiles: Sequence[Profile], unused: list[str]) -> _Answer:
+def _answer(recording: ForceRecording | TorqueRecording, profiles: Sequence[Profile], unused: list[str]) -> _Results:
     """Run profiles over a recording. One that cannot run is a note, if another can."""
     results, courses, notes = list[DetectorResult](), list[Course](), [*unused, *sentences(recording.notes)]
     failures: list[RecordingError] = []
@@ -213,7 +213,7 @@ def _answer(recording: ForceRecording | TorqueRecording, profiles: Sequence[Prof
         for p in profiles
     ):
         notes.append("Without a skin no obstacle is known, so eq. 11 lowers no threshold.")
-    return _Answer(recording, results, courses, notes)
+    return _Results(recording, results, courses, notes)
 
 
 def _contacts(results: list[DetectorResult]) -> TextTable:

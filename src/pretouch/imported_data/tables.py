@@ -62,7 +62,7 @@ _SHOWN = {
 
 
 @value
-class _Column:
+class _TableColumn:
     """Quantity, unit and joint of a column."""
 
     kind: str
@@ -211,28 +211,28 @@ class Table:
         return time
 
 
-def _columns(names: list[str]) -> dict[int, _Column]:
+def _columns(names: list[str]) -> dict[int, _TableColumn]:
     """Return the columns that are used, by their names in lower case."""
     logs = {i: log for i, name in enumerate(names) if (log := _LIBFRANKA.fullmatch(name))}
     first = 1 if any("0" in log.groups() for log in logs.values()) else 0
-    columns: dict[int, _Column] = {}
+    columns: dict[int, _TableColumn] = {}
     for i, name in enumerate(names):
         if log := logs.get(i):
             kind = _OTHERWISE.get(log[1], log[1])
             unit = next(iter(_UNITS[kind])).lower()
-            columns[i] = _Column(kind, f"q{int(log[2] or log[3]) + first}", unit, log[1] == _BY_ROBOT, twice=True)
+            columns[i] = _TableColumn(kind, f"q{int(log[2] or log[3]) + first}", unit, log[1] == _BY_ROBOT, twice=True)
         elif ours := _OURS.fullmatch(name):
             kind, number, axis, unit = _OTHERWISE.get(ours[1], ours[1]), ours[2], ours[3], ours[4] or ""
             if bool(axis) == (kind in ("force", "torque")) and bool(number) == (
                 kind not in ("time", "force", "torque")
             ):
-                columns[i] = _Column(kind, axis or (f"q{int(number)}" if number else ""), unit)
+                columns[i] = _TableColumn(kind, axis or (f"q{int(number)}" if number else ""), unit)
         elif joint := _JOINT.fullmatch(name):
-            columns[i] = _Column("q", joint[1], joint[2])
+            columns[i] = _TableColumn("q", joint[1], joint[2])
     if logs and not any(column.kind == "time" and column.unit for column in columns.values()):
         # libfranka logs milliseconds: of `duration` up to 0.8, of `time` with the names of its newer logs
         clock = "time" if any(log[0].startswith("state.") for log in logs.values()) else "duration"
-        columns |= {i: _Column("time", "", "ms") for i, name in enumerate(names) if name == clock}
+        columns |= {i: _TableColumn("time", "", "ms") for i, name in enumerate(names) if name == clock}
     return columns
 
 

@@ -5,7 +5,7 @@ import numpy as np
 
 from pretouch.errors import RobotModelError
 from pretouch.importing.capsules import LinkBody
-from pretouch.importing.chain import Arm, Limits
+from pretouch.importing.chain import ArmChain, Limits
 from pretouch.types import FloatArray
 
 DENSITY = 1000.0
@@ -16,7 +16,7 @@ _LARGEST_MASS = 500.0
 """Mass that no link of an arm exceeds [kg]."""
 
 
-def arm_file(name: str, arm: Arm, limits: Limits, bodies: tuple[LinkBody, ...]) -> str:
+def arm_file(name: str, arm: ArmChain, limits: Limits, bodies: tuple[LinkBody, ...]) -> str:
     """Return the MJCF of an arm, numbers to six digits.
 
     A link without any inertial has that of its capsules, if a joint moves it and nothing that is fixed to it has a
@@ -64,7 +64,7 @@ def arm_file(name: str, arm: Arm, limits: Limits, bodies: tuple[LinkBody, ...]) 
     return spec.to_xml()
 
 
-def _poses(arm: Arm) -> FloatArray:
+def _poses(arm: ArmChain) -> FloatArray:
     """Poses of all links (L, 4, 4), the arm's joints where the file draws them and all others fixed."""
     model = arm.robot.model
     data = mujoco.MjData(model)
@@ -78,7 +78,7 @@ def _poses(arm: Arm) -> FloatArray:
     return T
 
 
-def _set_inertial(body: mujoco.MjsBody, arm: Arm, i: int, rods: FloatArray | None, estimates: list[str]) -> float:
+def _set_inertial(body: mujoco.MjsBody, arm: ArmChain, i: int, rods: FloatArray | None, estimates: list[str]) -> float:
     """Give a body the inertial of its link; return the density of its capsules [kg/m^3] where it has none.
 
     A mass or inertia that is estimated is added to `estimates`.
@@ -101,7 +101,7 @@ def _set_inertial(body: mujoco.MjsBody, arm: Arm, i: int, rods: FloatArray | Non
     return DENSITY
 
 
-def _needs_mass(arm: Arm, link: int) -> bool:
+def _needs_mass(arm: ArmChain, link: int) -> bool:
     """Return True if a joint of the arm moves the link and neither it nor a link fixed to it has a mass."""
     links, masses, fixed = arm.robot.links, arm.robot.beside.mass, {link}
     for i in range(link + 1, len(links)):

@@ -11,7 +11,7 @@ from trimesh import Trimesh
 from trimesh.sample import sample_surface
 
 from pretouch.errors import RobotModelError
-from pretouch.importing.chain import Arm
+from pretouch.importing.chain import ArmChain
 from pretouch.importing.tree import Shape
 from pretouch.robot.body import from_axes
 from pretouch.robot.postures import spread
@@ -80,7 +80,7 @@ class Outside:
     """(Q, 3) point of the surface nearest to each: no motors or the like within a shell [m]."""
 
 
-def bodies_of(arm: Arm, most: int = MOST, cover: bool = False) -> tuple[LinkBody, ...]:
+def bodies_of(arm: ArmChain, most: int = MOST, cover: bool = False) -> tuple[LinkBody, ...]:
     """Return the capsules of all links that have a surface.
 
     Args:

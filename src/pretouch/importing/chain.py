@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pretouch.errors import RobotModelError
-from pretouch.importing.tree import Joint, Link, Robot
+from pretouch.importing.tree import Joint, Link, RobotTree
 from pretouch.types import FloatArray
 
 _ARM_JOINTS = 6
@@ -22,10 +22,10 @@ _LARGEST_POSITION, _LARGEST_SPEED, _LARGEST_TORQUE = 4 * np.pi, 50.0, 5000.0
 
 
 @dataclass(frozen=True, eq=False)
-class Arm:
+class ArmChain:
     """One arm of a robot: all other joints are fixed, at 0 or the nearest limit."""
 
-    robot: Robot
+    robot: RobotTree
     ee: int
     """Index of the end-effector's link."""
     joints: tuple[Joint, ...]
@@ -36,7 +36,7 @@ class Arm:
         return any(joint in self.joints for joint in self.robot.links[link].joints)
 
 
-def arm_of(robot: Robot, ee: str = "") -> Arm:
+def arm_of(robot: RobotTree, ee: str = "") -> ArmChain:
     """Choose the chain to an end-effector, or the likeliest one; fix all joints off it.
 
     Raises RobotModelError where there is no such chain, or where several arms leave the choice open.
@@ -55,7 +55,7 @@ def arm_of(robot: Robot, ee: str = "") -> Arm:
             f"Joints off the arm, fixed at 0 or at the nearest limit: {', '.join(fixed)}. Set the positions of fingers"
             " in the file, or give the link that a joint moves as --ee if it is one of the arm's."
         )
-    return Arm(robot, end, joints)
+    return ArmChain(robot, end, joints)
 
 
 def _hinges(link: Link) -> int:
@@ -67,7 +67,7 @@ def _hinges(link: Link) -> int:
     )
 
 
-def _last_moved(robot: Robot) -> int:
+def _last_moved(robot: RobotTree) -> int:
     """Return the link that most of an arm's hinges move, or the last one before a whole arm ends in equal branches.
 
     Several arms are a RobotModelError that names their ends.
@@ -85,7 +85,7 @@ def _last_moved(robot: Robot) -> int:
     return last
 
 
-def _likely_ends(robot: Robot, last: int) -> list[int]:
+def _likely_ends(robot: RobotTree, last: int) -> list[int]:
     """Return the ends of what is fixed to a link, itself if nothing is: the likeliest end-effector first."""
     ends, waiting = list[int](), [last]
     while waiting:
@@ -101,7 +101,7 @@ def _likely_ends(robot: Robot, last: int) -> list[int]:
     return sorted(ends, key=rank)
 
 
-def _check_chain(robot: Robot, end: int, joints: tuple[Joint, ...]) -> None:
+def _check_chain(robot: RobotTree, end: int, joints: tuple[Joint, ...]) -> None:
     """Refuse what is no chain of hinges each of which moves by itself and has limits."""
     if not joints:
         moved = ", ".join(link.name for link in robot.links[1:] if link.joints) or "none, for no joint moves one"
@@ -143,7 +143,7 @@ class Limits:
 
 
 def limits_of(
-    arm: Arm, qd_max: tuple[float, ...] = (), qdd_max: tuple[float, ...] = (), tau_max: tuple[float, ...] = ()
+    arm: ArmChain, qd_max: tuple[float, ...] = (), qdd_max: tuple[float, ...] = (), tau_max: tuple[float, ...] = ()
 ) -> Limits:
     """Return an arm's limits; those given, one for all joints or one for each, take the place of the file's."""
     n, remarks = len(arm.joints), arm.robot.remarks

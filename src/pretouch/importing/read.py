@@ -16,7 +16,7 @@ from trimesh import Trimesh, load_scene
 
 from pretouch.errors import RobotModelError
 from pretouch.extras import MESHES
-from pretouch.importing.tree import LARGEST, NO_MASS, SOLIDS, Beside, Robot, Shape, pose
+from pretouch.importing.tree import LARGEST, NO_MASS, SOLIDS, Beside, RobotTree, Shape, pose
 from pretouch.types import FloatArray
 
 _COMPILER = {
@@ -59,7 +59,7 @@ def described(name: str) -> tuple[Path, Path] | None:
     return file, package.parent
 
 
-def read_robot(file: Path, folders: tuple[Path, ...] = ()) -> Robot:
+def read_robot(file: Path, folders: tuple[Path, ...] = ()) -> RobotTree:
     """Read a robot from a URDF or MJCF file. What is wrong with it is a RobotModelError that names it.
 
     Meshes of a URDF are found and read when they are needed.
@@ -87,7 +87,7 @@ def read_robot(file: Path, folders: tuple[Path, ...] = ()) -> Robot:
         raise RobotModelError(f"The file {file} cannot be read: {reason}: correct it.") from error
     name = spec.modelname if root.tag == "mujoco" else root.get("name")
     _note_left_out(model, beside.remarks)
-    return Robot(name or file.stem, model, beside)
+    return RobotTree(name or file.stem, model, beside)
 
 
 def _root(file: Path) -> ET.Element:

@@ -115,7 +115,7 @@ class Beside:
 
 
 @dataclass(frozen=True, eq=False)
-class Robot:
+class RobotTree:
     """A robot: its links, each after its parent; the first is MuJoCo's world."""
 
     name: str

@@ -129,7 +129,7 @@ class PaintedLink:
             self._back.glb_data = self._painted()
 
 
-class Arm:
+class ArmBody:
     """The links of an arm, to be moved and coloured."""
 
     def __init__(

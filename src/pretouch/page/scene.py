@@ -9,7 +9,7 @@ from viser import ArrowsHandle, SceneNodeHandle, ViserServer
 from pretouch.contact.moving_thresholds import MovingThresholds
 from pretouch.explanation import binding
 from pretouch.page import palette
-from pretouch.page.arm import SHADELESS, Arm, expectation, in_levels, quaternions
+from pretouch.page.arm import SHADELESS, ArmBody, expectation, in_levels, quaternions
 from pretouch.page.frame import DrivenMotion, Frame, World, driven_motion
 from pretouch.page.person import Drag, PersonHand
 from pretouch.page.surfaces import capsule_surfaces, vendor_surfaces
@@ -47,7 +47,7 @@ class Scene:
             _draw_room(server, world.floor_height)
         surfaces, self.notice = vendor_surfaces(world.model)
         """Sentence on what the arm is drawn by, where it is not the vendor's surfaces."""
-        self._arm = Arm(scene, world.model, world.skin, surfaces or capsule_surfaces(world.model), root)
+        self._arm = ArmBody(scene, world.model, world.skin, surfaces or capsule_surfaces(world.model), root)
         self.units = Units(scene, world.skin, world.model.links, root)
         self.trail = Trail(scene, root)
         if world.floor_height < -0.01:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pretouch.arms.franka.limits import MotionLimits
+from pretouch.arms.franka.limits import FrankaLimits
 from pretouch.arms.franka.state import FrankaState
 
 DT = 1e-3
@@ -17,7 +17,7 @@ def state(**changed) -> FrankaState:
 class CheckingArm:
     """The vendor's rules, written down once more: velocity, acceleration, jerk, position and the FR3's envelope."""
 
-    def __init__(self, limits: MotionLimits, q: np.ndarray) -> None:
+    def __init__(self, limits: FrankaLimits, q: np.ndarray) -> None:
         self.limits, self.q = limits, q
         self.qd, self.qdd = np.zeros(7), np.zeros(7)
         self.time = 0.0
@@ -49,5 +49,5 @@ class CheckingArm:
             assert np.all(self.qd >= -down - 1e-12)
 
 
-def middle(limits: MotionLimits) -> np.ndarray:
+def middle(limits: FrankaLimits) -> np.ndarray:
     return (limits.q_min + limits.q_max) / 2

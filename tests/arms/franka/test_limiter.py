@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 
 from pretouch.arms.franka.limiter import SetPointLimiter, refusal
-from pretouch.arms.franka.limits import LimiterParams, MotionLimits, motion_limits, planned
+from pretouch.arms.franka.limits import FrankaLimits, LimiterParams, motion_limits, planned
 from pretouch.errors import RobotError
 from pretouch.robot.model import RobotModel
 from tests.arms.franka.made import CheckingArm, middle
 
 
 @pytest.fixture(params=["panda", "fr3"])
-def limits(request: pytest.FixtureRequest, panda_model: RobotModel, fr3_model: RobotModel) -> MotionLimits:
+def limits(request: pytest.FixtureRequest, panda_model: RobotModel, fr3_model: RobotModel) -> FrankaLimits:
     return motion_limits(panda_model if request.param == "panda" else fr3_model, request.param)
 
 
-def test_any_staircase_of_set_points_keeps_all_limits(limits: MotionLimits) -> None:
+def test_any_staircase_of_set_points_keeps_all_limits(limits: FrankaLimits) -> None:
     draw = np.random.default_rng(1)
     arm, limiter = CheckingArm(limits, middle(limits)), SetPointLimiter(limits, LimiterParams())
     wanted = np.zeros(7)
@@ -31,7 +31,7 @@ def test_any_staircase_of_set_points_keeps_all_limits(limits: MotionLimits) -> N
 @pytest.mark.parametrize("by", [1.0, -1.0])
 @pytest.mark.parametrize("steps", [0, 1, 300])
 def test_a_false_report_of_what_is_commanded_is_an_error_and_no_step(
-    limits: MotionLimits, steps: int, by: float
+    limits: FrankaLimits, steps: int, by: float
 ) -> None:
     arm, limiter = CheckingArm(limits, middle(limits)), SetPointLimiter(limits, LimiterParams())
     wanted = (0.1 * limits.qd_max).tolist()
@@ -44,7 +44,7 @@ def test_a_false_report_of_what_is_commanded_is_an_error_and_no_step(
 
 
 @pytest.mark.parametrize(("lost", "of"), [(3, 50), (15, 200)])
-def test_lost_commands_break_no_limit(limits: MotionLimits, lost: int, of: int) -> None:
+def test_lost_commands_break_no_limit(limits: FrankaLimits, lost: int, of: int) -> None:
     draw = np.random.default_rng(2)
     arm, limiter = CheckingArm(limits, middle(limits)), SetPointLimiter(limits, LimiterParams())
     wanted, noticed = np.zeros(7), 0
@@ -57,7 +57,7 @@ def test_lost_commands_break_no_limit(limits: MotionLimits, lost: int, of: int) 
     assert noticed > 20_000 / of
 
 
-def test_a_command_that_comes_a_millisecond_late_and_is_still_taken_breaks_no_limit(limits: MotionLimits) -> None:
+def test_a_command_that_comes_a_millisecond_late_and_is_still_taken_breaks_no_limit(limits: FrankaLimits) -> None:
     arm, limiter = CheckingArm(limits, middle(limits)), SetPointLimiter(limits, LimiterParams())
     for k in range(4000):
         wanted = 0.2 * limits.qd_max * (-1) ** (k // 300)
@@ -69,7 +69,7 @@ def test_a_command_that_comes_a_millisecond_late_and_is_still_taken_breaks_no_li
             arm.take(command)
 
 
-def test_the_way_to_rest_ends_exactly_at_rest(limits: MotionLimits) -> None:
+def test_the_way_to_rest_ends_exactly_at_rest(limits: FrankaLimits) -> None:
     arm, limiter = CheckingArm(limits, middle(limits)), SetPointLimiter(limits, LimiterParams())
     assert not limiter.at_rest
     for _ in range(500):
@@ -81,7 +81,7 @@ def test_the_way_to_rest_ends_exactly_at_rest(limits: MotionLimits) -> None:
     assert np.abs(arm.qd).max() < 1e-9
 
 
-def test_without_a_loss_nothing_is_begun_anew(limits: MotionLimits) -> None:
+def test_without_a_loss_nothing_is_begun_anew(limits: FrankaLimits) -> None:
     arm, limiter = CheckingArm(limits, middle(limits)), SetPointLimiter(limits, LimiterParams())
     for _ in range(500):
         state = arm.state()
@@ -93,7 +93,7 @@ def test_without_a_loss_nothing_is_begun_anew(limits: MotionLimits) -> None:
 @pytest.mark.parametrize("joint", [0, 6])
 @pytest.mark.parametrize("name", ["q_d", "dq_d", "ddq_d"])
 def test_an_arm_that_reports_no_numbers_in_a_motion_is_an_error_with_a_sentence(
-    limits: MotionLimits, name: str, joint: int
+    limits: FrankaLimits, name: str, joint: int
 ) -> None:
     arm, limiter = CheckingArm(limits, middle(limits)), SetPointLimiter(limits, LimiterParams())
     for _ in range(200):
@@ -107,7 +107,7 @@ def test_an_arm_that_reports_no_numbers_in_a_motion_is_an_error_with_a_sentence(
     ("joint", "value", "words"),
     [(0, np.nan, "joint 1 was to move at nan"), (6, -np.inf, "joint 7 was"), (3, 2.7, "limit ")],
 )
-def test_a_set_point_that_is_none_is_named(limits: MotionLimits, joint: int, value: float, words: str) -> None:
+def test_a_set_point_that_is_none_is_named(limits: FrankaLimits, joint: int, value: float, words: str) -> None:
     wanted = [0.0] * 7
     wanted[joint] = value
     assert words in refusal(wanted, limits)

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pretouch.calibration.motion.limits import MotionLimits, PlanParams
+from pretouch.calibration.motion.limits import PlanLimits, PlanParams
 from pretouch.calibration.motion.plan import Plan, Swing
 from pretouch.calibration.motion.planner import approach, plan_motion
 from pretouch.errors import CalibrationError, ParameterError
@@ -137,7 +137,7 @@ def test_the_report_says_what_time_and_room_are_needed(panda_model: RobotModel):
     words = re.fullmatch(
         r"\d\d s; parts move at up to (\S+) m/s\.\n"
         r"The arm needs the space x (\S+) to (\S+), y (\S+) to (\S+), z (\S+) to (\S+) m \(base frame\)\.",
-        MotionLimits(panda_model, PlanParams()).report(plan),
+        PlanLimits(panda_model, PlanParams()).report(plan),
     )
     speed, *box = map(float, words.groups())
     tcp = kinematics_of(panda_model, plan.sampled(20.0).q).position[:, panda_model.ee]

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from ruckig import ControlInterface, InputParameter, OutputParameter, Ruckig, RuckigError, Synchronization
 
-from pretouch.arms.franka.limits import LimiterParams, MotionLimits
+from pretouch.arms.franka.limits import FrankaLimits, LimiterParams
 from pretouch.arms.franka.state import JOINTS, FrankaState
 from pretouch.errors import RobotError
 
@@ -41,7 +41,7 @@ class SetPointLimiter:
     that an FR3 allows where it is. That is a second guard: the controller's joint box is the first.
     """
 
-    def __init__(self, limits: MotionLimits, params: LimiterParams) -> None:
+    def __init__(self, limits: FrankaLimits, params: LimiterParams) -> None:
         self._limits, self._params = limits, params
         self._speed = [params.speed_share * v for v in limits.qd_max.tolist()]
         self._acceleration = [params.acceleration_share * a for a in limits.qdd_max.tolist()]
@@ -102,7 +102,7 @@ class SetPointLimiter:
 
 
 def _ends(
-    limits: MotionLimits, margin: float, acceleration: list[float], jerk: list[float]
+    limits: FrankaLimits, margin: float, acceleration: list[float], jerk: list[float]
 ) -> list[tuple[_RangeEnd, _RangeEnd]]:
     """Lower and upper end of each joint's range.
 
@@ -121,7 +121,7 @@ def _ends(
     return ends
 
 
-def refusal(velocity: list[float], limits: MotionLimits) -> str:
+def refusal(velocity: list[float], limits: FrankaLimits) -> str:
     """Say what keeps a set-point [rad/s] from being one, or ''."""
     if len(velocity) != len(limits.qd_max):
         return f"{len(velocity)} joint velocities were asked for, but it has {len(limits.qd_max)} joints"

@@ -84,7 +84,7 @@ class LimiterParams(Checked):
 
 
 @dataclass(frozen=True)
-class MotionLimits:
+class FrankaLimits:
     """Limits that the arm accepts, (7,) each."""
 
     qd_max: FloatArray
@@ -101,13 +101,13 @@ class MotionLimits:
     """Speed limits that depend on the position."""
 
 
-def motion_limits(model: RobotModel, kind: str) -> MotionLimits:
+def motion_limits(model: RobotModel, kind: str) -> FrankaLimits:
     """Return the limits of an arm; `kind` is "panda" or "fr3".
 
     Accelerations are the vendor's: those of the model may be what a controller is told (`planned`).
     """
     arm = model.description
-    return MotionLimits(arm.qd_max, _ARMS[kind]().qdd_max, JERK[kind], model.q_min, model.q_max, arm.envelope)
+    return FrankaLimits(arm.qd_max, _ARMS[kind]().qdd_max, JERK[kind], model.q_min, model.q_max, arm.envelope)
 
 
 def planned(description: RobotDescription, params: LimiterParams) -> RobotDescription:

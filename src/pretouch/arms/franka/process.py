@@ -24,7 +24,7 @@ import numpy as np
 from pretouch.arms.franka.connection import FrankaClient, Kind
 from pretouch.arms.franka.exchange import ArmCommand, ArmRequest, Communication, Feedback, Mailboxes
 from pretouch.arms.franka.limiter import SetPointLimiter, refusal
-from pretouch.arms.franka.limits import CollisionBehavior, FrankaParams, MotionLimits
+from pretouch.arms.franka.limits import CollisionBehavior, FrankaLimits, FrankaParams
 from pretouch.arms.franka.state import JOINTS, FrankaState
 from pretouch.errors import PretouchError, RobotError
 from pretouch.realtime import real_time
@@ -43,7 +43,7 @@ class ProcessSettings:
 
     address: str
     kind: Kind
-    limits: MotionLimits
+    limits: FrankaLimits
     behavior: CollisionBehavior | None
     params: FrankaParams
     priority: int | None

@@ -47,7 +47,7 @@ class PlanParams(Checked):
     """Another number, another motion: of use where the room does not allow the one that was planned."""
 
 
-class MotionLimits:
+class PlanLimits:
     """Limits of the motions of one arm."""
 
     def __init__(self, model: RobotModel, params: PlanParams) -> None:

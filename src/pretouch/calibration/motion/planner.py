@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pretouch.calibration.motion.limits import MotionLimits, PlanParams
+from pretouch.calibration.motion.limits import PlanLimits, PlanParams
 from pretouch.calibration.motion.plan import Plan, Swing
 from pretouch.errors import CalibrationError
 from pretouch.robot.model import RobotModel
@@ -45,7 +45,7 @@ def plan_motion(model: RobotModel, params: PlanParams = PlanParams(), start: Flo
     """
     from scipy.stats.qmc import Sobol  # takes a third of a second, and a plan may never be asked for
 
-    limits, start = MotionLimits(model, params), model.description.q_ready if start is None else start
+    limits, start = PlanLimits(model, params), model.description.q_ready if start is None else start
     _check_start(limits, start)
     sobol = Sobol(5 * model.n, scramble=False)
     sobol.fast_forward(_FIRST + _DRAWN * params.variant)
@@ -78,7 +78,7 @@ def approach(model: RobotModel, q: FloatArray, goal: FloatArray, params: PlanPar
     It may come as near to the joints' limits as the arm itself may; `params` give speeds, clearance and floor. Raises
     CalibrationError where something is in the way: the arm is then to be moved by hand to where nothing is.
     """
-    limits = MotionLimits(model, replace(params, margin_rad=0.0))
+    limits = PlanLimits(model, replace(params, margin_rad=0.0))
     _check_start(limits, q)
     length = _way(limits, q, goal)
     if length is None:
@@ -89,7 +89,7 @@ def approach(model: RobotModel, q: FloatArray, goal: FloatArray, params: PlanPar
     return _straight(q, goal, length)
 
 
-def _check_start(limits: MotionLimits, start: FloatArray) -> None:
+def _check_start(limits: PlanLimits, start: FloatArray) -> None:
     """Refuse a posture (n,) [rad] that the arm may not stand in."""
     n = limits.model.n
     if start.shape != (n,) or not np.all(np.isfinite(start)):
@@ -105,7 +105,7 @@ def _straight(begin: FloatArray, end: FloatArray, duration: float) -> Plan:
     return Plan(np.array([0.0, duration]), np.array([begin, end]))
 
 
-def _way(limits: MotionLimits, begin: FloatArray, end: FloatArray) -> float | None:
+def _way(limits: PlanLimits, begin: FloatArray, end: FloatArray) -> float | None:
     """Duration of the way between two postures (n,) [s], or None where something is in it."""
     length = _SHORTEST_WAY_S
     for _ in range(3):  # an envelope's part in it changes with the duration, so it takes some rounds
@@ -117,7 +117,7 @@ def _way(limits: MotionLimits, begin: FloatArray, end: FloatArray) -> float | No
     return None if limits.broken(_straight(begin, end, length)) else length
 
 
-def _swing(limits: MotionLimits, posture: FloatArray, draw: FloatArray, begin: float) -> Swing | None:
+def _swing(limits: PlanLimits, posture: FloatArray, draw: FloatArray, begin: float) -> Swing | None:
     """Make the swing about a posture, as wide as the limits allow; None where there is no room."""
     n, duration = len(posture), limits.params.swing_s
     weight, phase = np.split(draw.reshape(4, n), 2)

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from pretouch.arms import arm_class
-from pretouch.calibration.motion.limits import MotionLimits, PlanParams
+from pretouch.calibration.motion.limits import PlanLimits, PlanParams
 from pretouch.calibration.motion.planner import plan_motion
-from pretouch.cli.calibrate.recorded import CalibrationFiles, Recorded, calibrate_recorded
+from pretouch.cli.calibrate.recorded import CalibrateRecording, CalibrationFiles, calibrate_recorded
 from pretouch.cli.options import OptionalFile, split_arm
 from pretouch.cli.writing import check_outputs, numbers_to, unwritable_said
 from pretouch.errors import CalibrationError
@@ -24,7 +24,7 @@ class Calibrate:
     The exit code is 1 if a unit was refused.
     """
 
-    recorded: Recorded = field(default_factory=Recorded)
+    recorded: CalibrateRecording = field(default_factory=CalibrateRecording)
     motion: PlanParams = field(default_factory=PlanParams)
     plan: OptionalFile = None
     """CSV file to write the motion to, for your own driver (time_s, q1_rad to qn_rad, qd1_rad_s to qdn_rad_s),
@@ -52,7 +52,7 @@ class Calibrate:
                 " `pretouch skin calibrate simulated`."
             )
         if (recording and moved) or (
-            self.plan and (self.recorded != Recorded() or files.skin or files.out or files.json)
+            self.plan and (self.recorded != CalibrateRecording() or files.skin or files.out or files.json)
         ):
             wrong, mode = ("of the motion", "--recording") if recording else ("of a recording, or --out", "--plan")
             raise CalibrationError(f"Options {wrong} do not go with {mode}: leave them out.")
@@ -70,5 +70,5 @@ class Calibrate:
         plan = plan_motion(model, self.motion)
         with unwritable_said("file", place):  # first, for nobody may read on what is printed
             plan.save(place)
-        print(MotionLimits(model, self.motion).report(plan))
+        print(PlanLimits(model, self.motion).report(plan))
         print(f"Motion: {place}. Keep everybody out of the arm's reach while it runs.", flush=True)

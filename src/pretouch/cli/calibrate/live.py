@@ -12,10 +12,10 @@ import numpy as np
 
 from pretouch.arms import ArmSetup, OpenedArm
 from pretouch.calibration.motion.follow import START_RAD, plan_controller
-from pretouch.calibration.motion.limits import MotionLimits, PlanParams
+from pretouch.calibration.motion.limits import PlanLimits, PlanParams
 from pretouch.calibration.motion.plan import Plan
 from pretouch.calibration.motion.planner import approach, plan_motion
-from pretouch.cli.calibrate.recorded import CalibrationFiles, Recorded, calibrate_recorded
+from pretouch.cli.calibrate.recorded import CalibrateRecording, CalibrationFiles, calibrate_recorded
 from pretouch.cli.options import OptionalFile
 from pretouch.cli.run.options import A, UnitOptions
 from pretouch.cli.run.setup import heard_units
@@ -71,7 +71,7 @@ class CalibrateArm(Generic[A]):
         with numbers_to(self.files.json) as write:
             try:
                 if not self._moved(model, place):
-                    code = calibrate_recorded(model, Recorded(place), self.files, write)
+                    code = calibrate_recorded(model, CalibrateRecording(place), self.files, write)
             finally:
                 if code is None and place.exists():
                     with suppress(OSError):  # the terminal may be gone
@@ -126,7 +126,7 @@ class CalibrateArm(Generic[A]):
 def _plans(arm: Arm, model: RobotModel, params: PlanParams) -> list[Plan]:
     """Return the motion, after a motion to its start if the arm is elsewhere, and print the space for both."""
     print("The motion is being planned.", flush=True)
-    plan, limits, q = plan_motion(model, params), MotionLimits(model, params), np.array(arm.read().q)
+    plan, limits, q = plan_motion(model, params), PlanLimits(model, params), np.array(arm.read().q)
     print(limits.report(plan), flush=True)
     if np.abs(q - plan.start).max() <= START_RAD / 2:
         return [plan]

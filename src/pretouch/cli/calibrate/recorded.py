@@ -39,7 +39,7 @@ _TEXT = (0, 1, 7)
 
 
 @dataclass(frozen=True)
-class Recorded:
+class CalibrateRecording:
     """Calibrate from a recording of a calibration motion."""
 
     recording: OptionalFile = None
@@ -75,7 +75,7 @@ class CalibrationFiles:
 
 
 def calibrate_recorded(
-    model: RobotModel, recorded: Recorded, files: CalibrationFiles, write: Callable[[Any], None]
+    model: RobotModel, recorded: CalibrateRecording, files: CalibrationFiles, write: Callable[[Any], None]
 ) -> int:
     """Calibrate from recordings, show the answer and `write` it; return 1 if a unit was refused, or else 0."""
     recording = recorded.recording or Path()
@@ -112,7 +112,7 @@ def calibrate_recorded(
     return int(not all(unit.accepted for unit in answer.units))
 
 
-def _joints(model: RobotModel, measured: SkinTrace, recorded: Recorded) -> tuple[JointTrace, list[str]]:
+def _joints(model: RobotModel, measured: SkinTrace, recorded: CalibrateRecording) -> tuple[JointTrace, list[str]]:
     """Return the joint positions in the order of the model, and what is to be said of them."""
     if recorded.joints:
         trace, log = read_joints(recorded.joints, model, recorded.topic)
