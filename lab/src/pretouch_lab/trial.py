@@ -60,7 +60,7 @@ class Setup:
     as they are."""
     commander: Callable[[Plant, Hand | None], Callable[[], Desired | None]] | None = None
     """Makes what is asked for a desired motion in each step; none, and the arm follows the path."""
-    prepare: Callable[[Plant, RangeFinders], None] | None = None
+    prepare: Callable[[Plant, RangeFinders], object] | None = None
     """What else is to happen: may have things done before each physics step, to the arm or to its units."""
     start: FloatArray | None = None
     """Joint positions (n,) in which it begins [rad]; None: those in which its path does."""

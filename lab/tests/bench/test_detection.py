@@ -20,18 +20,19 @@ from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import GhostSpec, SceneSpec, fixtures
 from pretouch.types import Contact, RobotState, Thresholds, no_obstacles
-from pretouch_lab.bench import contacts, detection, free
+from pretouch_lab.bench import contacts, detection
+from pretouch_lab.bench import free as free_motion
 from pretouch_lab.bench.contacts import ContactCell, Toucher, Touching, contact_cells, plan
 from pretouch_lab.bench.contenders import DETECTORS, Contender, ablated
-from pretouch_lab.bench.detection import BUSY, REST, Streams, begun, matched, plays, replay, stream_plays, sweep_values
+from pretouch_lab.bench.detection import BUSY, matched, plays, rows_of, sweep_values, towards, trial
 from pretouch_lab.bench.detection_results import delays, rate, results
 from pretouch_lab.bench.detection_tables import reached, tables
-from pretouch_lab.bench.free import FreeCell, free_cells
+from pretouch_lab.bench.free import FreeCell, free_cells, free_stream
 from pretouch_lab.bench.hard import hard_cells
-from pretouch_lab.bench.scenes import model
+from pretouch_lab.bench.replays import REST, Steps, alarms_of, begun
+from pretouch_lab.bench.scenes import model, sensing_of
 from pretouch_lab.bench.streams import AWAY, StreamRecorder, load_stream, save_stream
-from pretouch_lab.replay import FirstMotion, Ghost
-from pretouch_lab.run import run as run_plays
+from pretouch_lab.replay import DetectorAlone, FirstMotion, Ghost
 
 HAND = 10
 PAPER = Contender("paper", "paper", "f_base_n")
@@ -67,9 +68,8 @@ def test_a_kept_stream_is_what_the_controller_was_given_and_a_replay_finds_what_
         np.testing.assert_array_equal(obstacles.point, steps[i].obstacles.point)
         assert watched or i < 10  # no unit has been heard when the arm begins
         np.testing.assert_array_equal(kept.obstacle_points(i), steps[i].obstacles.point)
-    assert stream.reacting.any()
     assert any(len(step.obstacles.unit) for step in steps)
-    made = replay(kept, baseline, model())
+    made = Steps(kept, model()).replay(baseline)
     felt = [i for i, step in enumerate(steps) if step.contact is not None]
     assert felt
     assert made.onsets() == felt
@@ -80,10 +80,32 @@ def test_a_kept_stream_is_what_the_controller_was_given_and_a_replay_finds_what_
         np.testing.assert_array_equal(made.statistic[armed], [steps[i].evidence for i in armed])
 
 
+@pytest.mark.parametrize(
+    "name", ["blind", "paper", "paper-raw", "fixed", "observer", "pretouch", "without detect.learn"]
+)
+def test_alarms_of_a_whole_stream_are_those_of_its_steps_one_by_one(name):
+    contender = next(one for one in (*DETECTORS, *ablated()) if one.name == name)
+    _, stream = touched("blind")
+    stream = replace(stream, reacting=np.zeros_like(stream.reacting))
+    for i in (40, 260, 261):  # an arm in a singular posture has no estimate of the force
+        stream.robot["wrench"][i] = np.nan
+    alone, steps = DetectorAlone(contender.profile, model()), Steps(stream, model())
+    made, alarms = alarms_of(steps, contender), 0
+    for i, (robot, obstacles, _, watched, kin) in enumerate(steps.each):
+        sees = contender.profile.perception is not None
+        detection = alone.step(kin, robot, obstacles if sees else no_obstacles(), False, sees and watched)
+        assert made.alarm[i] == (detection.contact is not None)
+        np.testing.assert_allclose(made.statistic[i], contender.statistic(detection, alone.window.newest, robot.wrench))
+        if made.alarm[i] and contender.profile.detect.name != "sequential":
+            np.testing.assert_allclose(made.force[i], detection.contact.force, rtol=1e-12)
+        alarms += made.alarm[i]
+    assert alarms
+
+
 @pytest.mark.parametrize("name", ["paper", "pretouch"])
 def test_the_first_motion_of_an_answer_is_with_the_push(name):
     _, stream = touched(name)
-    made = replay(stream, Contender(name, name, "scale"), model())
+    made = Steps(stream, model()).replay(Contender(name, name, "scale"))
     moving = np.flatnonzero(np.isfinite(made.motion).all(axis=1))
     assert len(moving) == len(made.onsets()) == 1
     kin = model().kinematics(stream.robot["q"][moving[0]])
@@ -91,10 +113,10 @@ def test_the_first_motion_of_an_answer_is_with_the_push(name):
     point = kin.position[HAND] + kin.rotation[HAND] @ touch.point
     velocity = model().jacobian(kin, HAND, point)[:3] @ made.motion[moving[0]]
     assert velocity @ (kin.rotation[HAND] @ touch.inwards) > 0.02
-    assert detection._towards((0.05, made.onsets()[0]), touch, stream, made) is False
+    assert towards((0.05, made.onsets()[0]), touch, stream, made) is False
     away = replace(made, motion=-made.motion)
-    assert detection._towards((0.05, made.onsets()[0]), touch, stream, away) is True
-    assert detection._towards((0.05, moving[0] + 1), touch, stream, made) is False, "nothing moves"
+    assert towards((0.05, made.onsets()[0]), touch, stream, away) is True
+    assert towards((0.05, moving[0] + 1), touch, stream, made) is False, "nothing moves"
     if name == "paper":
         push = reaction_velocity(made.force[moving[0]], profile(name).react.compliance_m_s_n, 0.3)
         np.testing.assert_allclose(model().ee_jacobian(kin)[:3] @ made.motion[moving[0]], push, atol=1e-9)
@@ -130,11 +152,11 @@ def felt(torque):
 def test_the_sweep_of_one_replay_is_what_each_value_would_find_itself():
     _, stream = touched("paper")
     for text in ("paper", "paper:detect.compare=raw", "blind"):
-        made = replay(stream, Contender(text, text, "f_base_n"), model())
+        made = Steps(stream, model()).replay(Contender(text, text, "f_base_n"))
         assert made.onsets() == made.onsets(10.0)
         for value in (6.0, 14.0):
             own = Contender("own", f"{text}:detect.f_base_n={value}", "f_base_n")
-            assert made.onsets(value) == replay(stream, own, model()).onsets()
+            assert made.onsets(value) == Steps(stream, model()).replay(own).onsets()
 
 
 def test_an_alarm_is_answered_before_another_one_counts():
@@ -247,22 +269,17 @@ def test_every_baseline_is_a_profile_with_its_own_value_on_its_curve():
         assert baseline.default in sweep_values(baseline)
 
 
-def test_a_run_leaves_rows_for_every_detector(tmp_path, monkeypatch):
-    for module in (free, detection):
-        monkeypatch.setattr(module, "warm_up_s", lambda: 1.5)
-    cells = {
-        "free": [FreeCell("nominal", "circle", 0.3, "standing", 1000, 1.0)],
-        "contacts": [ContactCell("nominal", "seven", 0.3, 1000, 1)],
-        "hard": [],
-    }
-    arms = {(family, cell.name): cell for family, some in cells.items() for cell in some}
-    monkeypatch.setattr(detection, "_by_name", lambda *_: arms)
+def test_a_run_leaves_rows_for_every_detector(monkeypatch):
+    monkeypatch.setattr(detection, "warm_up_s", lambda: 1.5)
+    free, seven = (
+        FreeCell("nominal", "circle", 0.3, "standing", 1000, 1.0),
+        ContactCell("nominal", "seven", 0.3, 1000, 1),
+    )
+    every = {("free", free.name): free, ("contacts", seven.name): seven}
+    monkeypatch.setattr(detection, "arms", lambda *_: every)
     monkeypatch.setattr(contacts, "plan", lambda *_: [touching(1.8)])
-    streams = Streams(tmp_path, "development", True)
-    assert len(run_plays(streams.record, stream_plays(cells), tmp_path / "streams")) == 2
-    (file, _) = sorted((tmp_path / "streams").glob("*.npz"))
-    file.write_bytes(b"damaged")  # it is recorded again
-    rows = run_plays(streams.judge, plays(cells), tmp_path)
+    rows = rows_of([cell | trial("development", True, "", cell, seed) for cell, seed in plays(every)])
+    assert [row["family"] for row in rows[:2]] == ["free", "free"]
     assert len(rows) == 2 * len(DETECTORS) + len(ablated())  # the contacts are not those that ablations are given
     contact = next(row for row in rows if row["family"] == "contacts")["contacts"][0]
     assert contact["delay_s"] < 0.2
@@ -274,6 +291,17 @@ def test_a_run_leaves_rows_for_every_detector(tmp_path, monkeypatch):
         "0.00028 h of free motion. No false alarm in the 0.00028 h at the goal's speed means fewer than"
     )
     assert results([])["resolution"].endswith("nothing can be said of false alarms.")
+
+
+def test_arms_that_nobody_is_near_move_alike_without_units(monkeypatch):
+    free = FreeCell("nominal", "circle", 0.3, "nothing", 1000, 1.0)
+    made = free_stream(free, PlantParams(), sensing_of("seven", 1000), 0.0)
+    monkeypatch.setattr(free_motion, "_bystander", lambda _: lambda _: AWAY)
+    seen = free_stream(replace(free, near="standing"), PlantParams(), sensing_of("seven", 1000), 0.0)
+    assert not seen.count.any()
+    np.testing.assert_array_equal(made.watched, seen.watched)
+    for name, numbers in made.robot.items():
+        np.testing.assert_array_equal(numbers, seen.robot[name])
 
 
 @pytest.mark.parametrize(("change", "expected"), [

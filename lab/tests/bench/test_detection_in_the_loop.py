@@ -10,7 +10,7 @@ from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.scene import SceneSpec
 from pretouch.types import Mode
 from pretouch_lab.bench.contenders import DETECTORS
-from pretouch_lab.bench.detection import replay
+from pretouch_lab.bench.replays import Steps, alarms_of
 from pretouch_lab.bench.scenes import path_of, sensing_of
 from pretouch_lab.bench.streams import AWAY, Alone, record
 from pretouch_lab.trial import play
@@ -92,4 +92,4 @@ def test_an_arm_that_turns_round_hard_with_an_unknown_load_gives_no_alarm(panda_
     plant = replace(PlantParams(), payload_max_kg=0.5, friction_compensated=0.0)
     alone = Alone(path_of("line"), 0.3, plant, sensing_of("seven", 1112), 0.15, 1112, 120.0)
     stream = record(alone, lambda _: lambda _: AWAY)
-    assert not replay(stream, DETECTORS[-1], panda_model).onsets()
+    assert not alarms_of(Steps(stream, panda_model), DETECTORS[-1]).onsets()

@@ -48,12 +48,8 @@ def test_the_dense_skin_of_the_scenarios_is_the_one_that_is_made():
     np.testing.assert_allclose(made.T_link_sensor, kept.T_link_sensor, atol=1e-9)
 
 
-def test_free_motion_lasts_ten_hours_most_of_them_at_the_goal_s_speed():
+def test_free_motion_at_the_goal_s_speed_is_long_enough_to_show_that_the_goal_is_reached():
     free, goal = scenario("free"), scenario("contacts")["goal"]
-
-    def hours(fast: bool) -> float:
-        arms = [arm["full"] for arm in free["arm"] if (arm["speed_m_s"] == goal["speed_m_s"]) is fast]
-        return sum(arms) * free["duration"]["full_s"] / 3600
-
-    assert hours(True) + hours(False) >= 10.0
-    assert hours(True) > hours(False)
+    arms = [arm for arm in free["arm"] if arm["kind"] == "nominal" and arm["speed_m_s"] == goal["speed_m_s"]]
+    hours = sum(arm["full"] for arm in arms) * free["duration"]["full_s"] / 3600
+    assert 3.689 / hours <= goal["false_alarms_per_hour"]  # chi-squared with two degrees: 97.5 % are below 7.378

@@ -157,18 +157,15 @@ class Toucher:
             return None
         return touch
 
-    def _push(self, time: float) -> None:
-        """Let the force of now act: MuJoCo's applied force acts at a body's centre of mass."""
-        data, touch = self._plant.mj_data, self._current(time)
+    def _push(self, time: float) -> float:
+        """Let the force of now act, and return when there is the next: MuJoCo's acts at a body's centre of mass."""
+        data, forces = self._plant.mj_data, self.forces(time)
         data.xfrc_applied[self._pushed] = 0.0
-        if touch is None or touch.size_n(time) <= 0.0:
-            return
-        self._pushed = touch.link
-        (laid,) = self.forces(time)
-        at, force = laid.point, laid.force
-        wrench = data.xfrc_applied[touch.link]
-        wrench[:3] = force
-        wrench[3:] = np.cross(at - data.xipos[touch.link], force)
+        if not forces:
+            return min((touch.start for touch in self._touches[self._next :] if touch.start >= time), default=np.inf)
+        ((self._pushed, at, force),) = forces
+        data.xfrc_applied[self._pushed] = *force, *np.cross(at - data.xipos[self._pushed], force)
+        return time
 
     def forces(self, time: float) -> list[PointForce]:
         """Return the force that acts at a time, for sensors of forces without a contact of the simulation."""

@@ -50,6 +50,8 @@ OFF = {
 
 _DETECTION = ("window", "detect")
 """Parts of the profile that streams show."""
+_UNSHOWN = ("window.freeze_while_reacting", "detect.touch")
+"""But these: no arm reacts in a stream, and none has touch sensors."""
 
 
 def ablations(*, of_detection: bool) -> dict[str, str]:
@@ -147,4 +149,5 @@ def ablated() -> tuple[Contender, ...]:
     return tuple(
         Contender(name, text, "f_base_n" if name == f"{WITHOUT}detect" else "scale")
         for name, text in ablations(of_detection=True).items()
+        if name.removeprefix(WITHOUT) not in _UNSHOWN
     )

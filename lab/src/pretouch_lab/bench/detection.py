@@ -1,191 +1,98 @@
-"""Contact detectors held against each other: each is given the recorded streams, and its alarms are judged.
+"""Contact detectors held against each other: each is given the same arms, simulated once, and its alarms are judged.
 
 In free motion alarms are counted; on arms that are touched they are matched with the contacts that caused them.
 """
 
-from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Iterable
+from dataclasses import asdict, replace
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pretouch.contact.reaction import DecayingVelocity
-from pretouch.params import TaskParams
-from pretouch.robot.model import RobotModel
-from pretouch.sensing.skin import Skin
-from pretouch.types import NOT_TOUCHED, BoolArray, FloatArray, Touched, TouchReadings
+from pretouch.types import FloatArray
 from pretouch_lab.bench.contacts import ContactCell, Touching, contact_cells, contact_stream, touches_of
 from pretouch_lab.bench.contenders import DETECTORS, Contender, ablated
 from pretouch_lab.bench.free import FreeCell, free_cells, free_stream, warm_up_s
 from pretouch_lab.bench.hard import HardCell, hard_cells, hard_stream
+from pretouch_lab.bench.replays import PERIOD_S, REST, Replayed, Steps, alarms_of
 from pretouch_lab.bench.scenes import SeedRange, model, plant_of, scenario, sensing_of
-from pretouch_lab.bench.streams import NOTHING, Stream, load_stream, save_stream
-from pretouch_lab.replay import DetectorAlone, FirstMotion
+from pretouch_lab.bench.streams import Stream
 from pretouch_lab.run import Cell, Play, Row
 from pretouch_lab.table import rounded
 
 FAMILIES = ("free", "contacts", "hard")
 ABLATED_ARMS = 2
 """Arms of each path and neighbour in free motion that ablations are given."""
-REST = DecayingVelocity().decay_cycles
-"""Control cycles for which an alarm is answered, and no other is looked for."""
-PERIOD_S = TaskParams().control_period_s
 BUSY = -1.0
 """In place of a delay: an earlier alarm was still being answered when the contact began."""
-Touches = Callable[[int], TouchReadings | None]
-"""Gives what the units' touch sensors said in a step, by its number."""
 Match = tuple[float | None, int | None]
 """Delay [s] of the first alarm a contact caused, and the step of that alarm: (None, None) of a missed contact, (BUSY,
 None) where an earlier alarm was still being answered."""
-ArmCell = FreeCell | ContactCell | HardCell
-
-
-def arm_cells(seeds: SeedRange, quick: bool, world: str = "") -> dict[str, list[ArmCell]]:
-    """Return the arms of each family; those of the family hard have a world of their own, and with another are none."""
-    return {
-        "free": [replace(cell, world=world) for cell in free_cells(seeds, quick)],
-        "contacts": [replace(cell, world=world) for cell in contact_cells(seeds, quick)],
-        "hard": [] if world else [*hard_cells(seeds, quick)],
-    }
-
-
-def stream_plays(cells: dict[str, list[ArmCell]]) -> list[Play]:
-    """Return the streams to record, the long ones of contacts first."""
-    return [
-        ({"family": family, "name": cell.name}, cell.seed) for family in reversed(FAMILIES) for cell in cells[family]
-    ]
-
-
-def plays(cells: dict[str, list[ArmCell]]) -> list[Play]:
-    """Return the replays: each stream with each detector that it is given to."""
-    return [
-        ({"family": family, "name": cell.name, "contender": contender.name}, cell.seed)
-        for family in FAMILIES
-        for cell in cells[family]
-        for contender in _contenders(cell, cells["free"])
-    ]
-
-
-def _contenders(cell: ArmCell, free: list[ArmCell]) -> tuple[Contender, ...]:
-    """Return the detectors that are given an arm's stream: ablations only what the goals are about."""
-    if isinstance(cell, HardCell):
-        return DETECTORS
-    whole = cell.kind == "nominal" and cell.speed_m_s == scenario("contacts")["goal"]["speed_m_s"]
-    if isinstance(cell, FreeCell):
-        same = [c for c in free if isinstance(c, FreeCell) and _where(c) == _where(cell)]
-        whole = whole and cell in same[:ABLATED_ARMS]
-    else:
-        whole = whole and cell.sensing == "nominal"
-    return (*DETECTORS, *ablated()) if whole else DETECTORS
-
-
-def _where(cell: FreeCell) -> tuple[str, str, float, str]:
-    return cell.kind, cell.path, cell.speed_m_s, cell.near
-
-
-@dataclass(frozen=True)
-class Streams:
-    """The streams of a run, in its folder."""
-
-    out: Path
-    seeds: SeedRange
-    quick: bool
-    world: str = ""
-
-    def cell(self, family: str, name: str) -> ArmCell:
-        """Return an arm by the name of its cell."""
-        return _by_name(self.seeds, self.quick, self.world)[family, name]
-
-    def stream(self, family: str, name: str) -> Stream:
-        """Return the stream of an arm, recorded now where none can be read."""
-        arm = self.cell(family, name)
-        file = self.out / "streams" / f"{family}_{name}.npz"
-        stored = load_stream(file)
-        if stored is not None:
-            return stored
-        if isinstance(arm, FreeCell):
-            stream = free_stream(arm, plant_of(arm.kind), sensing_of("seven", arm.seed), warm_up_s())
-        elif isinstance(arm, ContactCell):
-            stream = contact_stream(arm, plant_of(arm.kind), sensing_of(arm.sensing, arm.seed))
-        else:
-            stream = hard_stream(arm, self.quick)
-        save_stream(stream, file)
-        return stream
-
-    def record(self, cell: Cell, _seed: int) -> Row:
-        """Record the stream of one arm, before several detectors are given it."""
-        return {"steps": len(self.stream(cell["family"], cell["name"]).count)}
-
-    def judge(self, cell: Cell, _seed: int) -> Row:
-        """Give one arm's stream to one detector, and judge its alarms."""
-        arm, stream = self.cell(cell["family"], cell["name"]), self.stream(cell["family"], cell["name"])
-        contender = next(c for c in (*DETECTORS, *ablated()) if c.name == cell["contender"])
-        touched = isinstance(arm, ContactCell) or (isinstance(arm, HardCell) and arm.near == "touched")
-        return asdict(arm) | (judged_contacts(stream, contender) if touched else judged_free(stream, contender))
+Arm = FreeCell | ContactCell | HardCell
 
 
 @cache
-def _by_name(seeds: SeedRange, quick: bool, world: str) -> dict[tuple[str, str], ArmCell]:
-    cells = arm_cells(seeds, quick, world)
-    return {(family, cell.name): cell for family, some in cells.items() for cell in some}
+def arms(seeds: SeedRange, quick: bool, world: str = "") -> dict[tuple[str, str], Arm]:
+    """Return the arms by family and name; those of the family hard have a world of their own: with another are none."""
+    cells: dict[str, Iterable[Arm]] = {
+        "free": [replace(cell, world=world) for cell in free_cells(seeds, quick)],
+        "contacts": [replace(cell, world=world) for cell in contact_cells(seeds, quick)],
+        "hard": [] if world else hard_cells(seeds, quick),
+    }
+    return {(family, cell.name): cell for family in FAMILIES for cell in cells[family]}
 
 
-@dataclass(frozen=True)
-class Replayed:
-    """What a detector made of S steps."""
-
-    stamp: FloatArray
-    """(S,) [s]."""
-    alarm: BoolArray
-    """(S,) whether a contact was found."""
-    force: FloatArray
-    """(S, 3) force it was taken for [N], NaN where none was found."""
-    motion: FloatArray
-    """(S, n) joint velocities with which the arm would begin to move in answer to an alarm [rad/s], else NaN."""
-    statistic: FloatArray
-    """(S,) see `Contender.statistic`."""
-    touched: list[Touched]
-    """Where the arm was said to be touched in each of these steps."""
-
-    def onsets(self, value: float | None = None) -> list[int]:
-        """Return the steps at which an alarm begins; with another value of the sweep than the detector's, if given."""
-        return begun(self.alarm if value is None else self.statistic > value)
+def plays(every: dict[tuple[str, str], Arm]) -> list[Play]:
+    """Return the arms to play, the long ones of contacts first."""
+    order = sorted(every, key=lambda key: -FAMILIES.index(key[0]))
+    return [({"family": family, "name": name}, every[family, name].seed) for family, name in order]
 
 
-def begun(alarm: BoolArray, rest: int = REST) -> list[int]:
-    """Steps at which an alarm begins, given those (S,) with one: each is answered for `rest` steps."""
-    at, found, i = np.flatnonzero(alarm), [], 0
-    while i < len(at):
-        found.append(int(at[i]))
-        i = int(np.searchsorted(at, at[i] + rest))
-    return found
+def trial(seeds: SeedRange, quick: bool, world: str, cell: Cell, _seed: int) -> Row:
+    """Simulate an arm, and give what it said to one detector after the other."""
+    every = arms(seeds, quick, world)
+    arm = every[cell["family"], cell["name"]]
+    stream, judge = streamed(arm, quick), judged_contacts if is_touched(arm) else judged_free
+    steps = Steps(stream, model())
+    judged = [{"contender": one.name, **judge(steps, one)} for one in contenders_of(arm, every.values())]
+    return {"arm": asdict(arm), "detectors": judged}
 
 
-def replay(
-    stream: Stream, contender: Contender, model: RobotModel, touch: Touches = lambda step: None,
-    skin: Skin | None = None,
-) -> Replayed:  # fmt: skip
-    """Give a detector each step of a stream, from its beginning, and what units said of a touch."""
-    params = contender.profile
-    sees = params.perception is not None
-    detector, steps = DetectorAlone(params, model, skin), len(stream.count)
-    alarm, statistic = np.zeros(steps, np.bool_), np.empty(steps)
-    force, touched = np.full((steps, 3), np.nan), [NOT_TOUCHED] * steps
-    motion, first = np.full((steps, model.n), np.nan), FirstMotion(model, params, stream.robot["q"][0], REST)
-    for i, (robot, obstacles, reacting, watched) in enumerate(stream.steps()):
-        near = obstacles if sees else NOTHING
-        kin = model.kinematics(robot.q)
-        found = detector.step(kin, robot, near, reacting, sees and watched, touch(i))
-        touched[i] = found.touched
-        statistic[i] = contender.statistic(found, detector.window.newest, robot.wrench)
-        if found.contact is not None:
-            alarm[i], force[i] = True, found.contact.force
-        begins = first.step(kin, robot, found, near)
-        if begins is not None:
-            motion[i] = begins
-    return Replayed(stream.stamp, alarm, force, motion, statistic, touched)
+def rows_of(played: list[Row]) -> list[Row]:
+    """Return a row for each arm and detector."""
+    return [
+        {"family": row["family"], "name": row["name"], **row["arm"], **one}
+        for row in sorted(played, key=lambda row: FAMILIES.index(row["family"]))
+        for one in row["detectors"]
+    ]
+
+
+def streamed(arm: Arm, quick: bool) -> Stream:
+    """Let an arm run, and return its stream."""
+    if isinstance(arm, FreeCell):
+        return free_stream(arm, plant_of(arm.kind), sensing_of("seven", arm.seed), warm_up_s())
+    if isinstance(arm, ContactCell):
+        return contact_stream(arm, plant_of(arm.kind), sensing_of(arm.sensing, arm.seed))
+    return hard_stream(arm, quick)
+
+
+def is_touched(arm: Arm) -> bool:
+    """Whether contacts are laid on an arm."""
+    return isinstance(arm, ContactCell) or (isinstance(arm, HardCell) and arm.near == "touched")
+
+
+def contenders_of(arm: Arm, every: Iterable[Arm]) -> tuple[Contender, ...]:
+    """Return the detectors that are given an arm: ablations only what the goals are about."""
+    if isinstance(arm, HardCell) or arm.kind != "nominal" or arm.speed_m_s != scenario("contacts")["goal"]["speed_m_s"]:
+        return DETECTORS
+    if isinstance(arm, FreeCell):
+        free = [other for other in every if isinstance(other, FreeCell)]
+        alike = [other for other in free if replace(arm, seed=other.seed) == other]
+        whole = arm in alike[:ABLATED_ARMS]
+    else:
+        whole = arm.sensing == "nominal"
+    return (*DETECTORS, *ablated()) if whole else DETECTORS
 
 
 def sweep_values(contender: Contender) -> list[float]:
@@ -193,33 +100,26 @@ def sweep_values(contender: Contender) -> list[float]:
     return [float(value) for value in scenario("free")["curve"][contender.sweep]]
 
 
-def judged_free(stream: Stream, contender: Contender) -> Row:
+def judged_free(steps: Steps, contender: Contender) -> Row:
     """Count a detector's alarms in free motion after the warm-up, as it is and at each value of its sweep."""
-    made = replay(stream, contender, model())
-    counted = made.stamp >= warm_up_s()
-
-    def alarms(onsets: list[int]) -> int:
-        return int(counted[onsets].sum())
-
-    return {
-        "hours": float(counted.sum()) * PERIOD_S / 3600,
-        "alarms": alarms(made.onsets()),
-        "sweep": [alarms(made.onsets(value)) for value in sweep_values(contender)],
-    }
+    replayed, counted = alarms_of(steps, contender), steps.stream.stamp >= warm_up_s()
+    onsets = [replayed.onsets(value) for value in (None, *sweep_values(contender))]
+    alarms, *swept = (int(counted[at].sum()) for at in onsets)
+    return {"hours": float(counted.sum()) * PERIOD_S / 3600, "alarms": alarms, "sweep": swept}
 
 
-def judged_contacts(stream: Stream, contender: Contender) -> Row:
+def judged_contacts(steps: Steps, contender: Contender) -> Row:
     """Match a detector's alarms with the contacts of a stream, as it is and at each value of its sweep."""
-    made = replay(stream, contender, model())
+    stream, replayed = steps.stream, steps.replay(contender)
     touches = touches_of(stream)
-    found = matched(touches, made.stamp, made.onsets())
-    swept = [matched(touches, made.stamp, made.onsets(value)) for value in sweep_values(contender)]
+    matches = matched(touches, stream.stamp, replayed.onsets())
+    swept = [matched(touches, stream.stamp, replayed.onsets(value)) for value in sweep_values(contender)]
     noise = quiet_spread(stream, touches[0].start)
     contacts = [
         {
             **about(touch, stream, noise),
-            "delay_s": _delay(found[k]),
-            "towards": _towards(found[k], touch, stream, made),
+            "delay_s": _delay(matches[k]),
+            "towards": towards(matches[k], touch, stream, replayed),
             "sweep_s": [_delay(at[k]) for at in swept],
         }
         for k, touch in enumerate(touches)
@@ -230,21 +130,21 @@ def judged_contacts(stream: Stream, contender: Contender) -> Row:
 def matched(touches: list[Touching], stamp: FloatArray, onsets: list[int]) -> list[Match]:
     """Match alarms, by the steps at which they begin, with contacts.
 
-    A contact has the first alarm from its onset until some time after its end; both are said by the scenario file.
+    A contact has the first alarm from its onset until some time after its end; both are in the scenario file.
     """
     judged = scenario("contacts")["judged"]
     at = stamp[onsets]
-    found: list[Match] = []
+    matches: list[Match] = []
     for touch in touches:
         onset = touch.onset(judged["onset_n"])
         first = int(np.searchsorted(at, onset, side="right"))
         if first > 0 and at[first - 1] > onset - REST * PERIOD_S:
-            found.append((BUSY, None))
+            matches.append((BUSY, None))
         elif first < len(at) and at[first] <= touch.end + judged["late_s"]:
-            found.append((float(at[first]) - onset, onsets[first]))
+            matches.append((float(at[first]) - onset, onsets[first]))
         else:
-            found.append((None, None))
-    return found
+            matches.append((None, None))
+    return matches
 
 
 def quiet_spread(stream: Stream, until: float) -> FloatArray:
@@ -268,9 +168,8 @@ def about(touch: Touching, stream: Stream, noise: FloatArray) -> dict[str, Any]:
     away = np.linalg.norm(stream.obstacle_points(step) - hand, axis=1).min(initial=np.inf) - radius
     jacobian = model().jacobian(kin, touch.link, origin + rotation @ touch.point)[:3]
     torque = np.abs(jacobian.T @ (touch.force_n * (rotation @ touch.inwards)))
-    name = model().links[touch.link].removeprefix(f"{model().description.name}_")
     return {
-        "link": name,
+        "link": model().links[touch.link].removeprefix(f"{model().description.name}_"),
         "kind": kinds[touch.kind]["name"],
         "force_n": touch.force_n,
         "duration_s": touch.duration_s,
@@ -283,15 +182,15 @@ def _delay(match: Match) -> float | None:
     return None if match[0] is None else rounded(match[0], 4)
 
 
-def _towards(match: Match, touch: Touching, stream: Stream, made: Replayed) -> bool | None:
+def towards(match: Match, touch: Touching, stream: Stream, replayed: Replayed) -> bool | None:
     """Whether the touched point would begin to move against the force on it, towards the person."""
     if match[1] is None:
         return None
-    moving = np.flatnonzero(np.isfinite(made.motion[match[1] : match[1] + REST, 0]))
+    moving = np.flatnonzero(np.isfinite(replayed.motion[match[1] : match[1] + REST, 0]))
     if not len(moving):
         return False
     step = match[1] + int(moving[0])
     kin = model().kinematics(stream.robot["q"][step])
     rotation = kin.rotation[touch.link]
     there = model().jacobian(kin, touch.link, kin.position[touch.link] + rotation @ touch.point)[:3]
-    return bool((rotation @ touch.inwards) @ there @ made.motion[step] < 0.0)
+    return bool((rotation @ touch.inwards) @ there @ replayed.motion[step] < 0.0)

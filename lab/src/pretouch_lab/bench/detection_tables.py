@@ -24,8 +24,8 @@ def tables(results: Row) -> list[TextTable]:
             "Each switch of pretouch's detection off alone",
             (ABLATED_FREE, ABLATED_CONTACTS),
             " On a part of the streams: free motion of at most two arms of each path and neighbour, and the contacts at"
-            " the goal's speed; pretouch here has the same. Nothing reacts in them, so that freeze_while_reacting"
-            " changes nothing.",
+            " the goal's speed; pretouch here has the same. Nothing reacts in them and no arm has touch"
+            " sensors, so that freeze_while_reacting and touch are not here.",
         ),
         _goals(
             rows,

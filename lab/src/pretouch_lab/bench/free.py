@@ -1,24 +1,18 @@
 """Free motion: arms that nothing touches, some with somebody near, recorded once (`scenarios/free.toml`)."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from pretouch.loop import Cycle
-from pretouch.robot.body import placed
-from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams
 from pretouch.types import FloatArray
-from pretouch_lab.bench.dense_skin import gap
-from pretouch_lab.bench.scenes import SeedRange, Sensing, model, numbered, path_of, scenario
+from pretouch_lab.bench.scenes import SeedRange, Sensing, numbered, path_of, scenario
 from pretouch_lab.bench.streams import AWAY, Alone, Prepare, Stream, record
-from pretouch_lab.replay import Ghost
 
 _HAND_SIDE_M = 0.102
 """How far the arm's hand reaches out to the side of its origin [m]."""
 _HAND_FRONT_M = 0.13
 """How far hand and wrist reach out to the front [m]."""
-_LOOK_EVERY = 10
 
 
 @dataclass(frozen=True)
@@ -60,25 +54,14 @@ def warm_up_s() -> float:
 def free_stream(cell: FreeCell, plant: PlantParams, sensing: Sensing, before_s: float) -> Stream:
     """Let an arm move that nothing touches, and return its stream; `before_s` [s] come before what counts.
 
-    How near the ghost truly came is in it as `least_gap`. `cell` says on which path, how fast, who is near and with
-    which seed; `plant` and `sensing` say which arm it is.
+    `cell` says on which path, how fast, who is near and with which seed; `plant` and `sensing` say which arm it is.
     """
-    near = scenario("free")["near"]
+    seen = None if cell.near == "nothing" else sensing
     what = Alone(
-        path_of(cell.path), cell.speed_m_s, plant, sensing, near["radius_m"], cell.seed, before_s + cell.counted_s,
-        cell.world,
+        path_of(cell.path), cell.speed_m_s, plant, seen, scenario("free")["near"]["radius_m"], cell.seed,
+        before_s + cell.counted_s, cell.world,
     )  # fmt: skip
-    nearest, steps = [np.inf], [0]
-
-    def look(_plant: Plant, ghost: Ghost, cycle: Cycle) -> None:
-        steps[0] += 1
-        if steps[0] % _LOOK_EVERY == 0:
-            kin, body = model().kinematics(cycle.step.q), model().body
-            _, a, b, _ = placed(body, kin)
-            nearest[0] = min(nearest[0], float(gap(ghost.position[None], a, b, body.radius)[0]) - near["radius_m"])
-
-    stream = record(what, _bystander(cell), look)
-    return replace(stream, truth={"least_gap": np.array(nearest)})
+    return record(what, _bystander(cell))
 
 
 def _bystander(cell: FreeCell) -> Prepare:

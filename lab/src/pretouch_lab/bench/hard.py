@@ -1,5 +1,6 @@
 """Arms as unkind as real ones, in motions other than circle and line: free, or touched (`scenarios/hard.toml`)."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -14,7 +15,7 @@ from pretouch_lab.bench.contacts import Toucher, Touching, described, place_on
 from pretouch_lab.bench.dense_skin import gap
 from pretouch_lab.bench.motions import Motion, WanderingController, motion_of
 from pretouch_lab.bench.scenes import SeedRange, model, numbered, path_of, scenario, sensing_of
-from pretouch_lab.bench.streams import AWAY, PROFILE, Alone, Prepare, Stream, record
+from pretouch_lab.bench.streams import AWAY, PROFILE, Alone, Stream, record, record_moved
 from pretouch_lab.replay import Place
 
 WORLD = "hard"
@@ -58,39 +59,41 @@ def _touches(quick: bool) -> int:
 
 
 def hard_stream(cell: HardCell, quick: bool) -> Stream:
-    """Let an arm move and return its stream: what it carried as `load` of each step, with its contacts if touched."""
+    """Let an arm move and return its stream, with its contacts if it is touched.
+
+    With nobody near it has no units: the few readings that they would make of the arm itself are left out.
+    """
     family, sensing = scenario("hard"), sensing_of("nominal", cell.seed)
-    warm_up = family["duration"]["warm_up_s"]
-    motion = motion_of(cell.motion, cell.seed, warm_up + 2.0 * cell.counted_s)
+    start = float(family["duration"]["warm_up_s"])
+    motion = motion_of(cell.motion, cell.seed, start + 2.0 * cell.counted_s)
     touches = _touched(cell, motion, _touches(quick)) if cell.near == "touched" else []
-    end = touches[-1].end + scenario("contacts")["judged"]["late_s"] + 0.1 if touches else warm_up + cell.counted_s
-    radius = sensing.hand_radius if touches else family["near"]["radius_m"]
     what = Alone(
-        path_of("rest"), profile(PROFILE).task.speed_m_s, PlantParams(), sensing, radius, cell.seed, end, WORLD,
+        path_of("rest"), profile(PROFILE).task.speed_m_s, PlantParams(), None if cell.near == "nothing" else sensing,
+        sensing.hand_radius if touches else family["near"]["radius_m"], cell.seed,
+        touches[-1].end + scenario("contacts")["judged"]["late_s"] + 0.1 if touches else start + cell.counted_s, WORLD,
         motion.course.at(0.0)[0], partial(WanderingController, motion.course),
     )  # fmt: skip
-    stream = record(what, _prepared(cell, motion, touches, sensing.hand_radius))
-    truth = {"load": np.array([motion.load(stamp) for stamp in stream.stamp])}
-    return replace(stream, truth=truth | (described(touches, sensing.hand_radius) if touches else {}))
-
-
-def _prepared(cell: HardCell, motion: Motion, touches: list[Touching], hand_radius: float) -> Prepare:
-    """Return what has the arm grip, and a hand touch it or somebody stand beside it."""
 
     def prepare(plant: Plant) -> Place:
-        waiting = list(motion.loads)
-
-        def grip(time: float) -> float:
-            while waiting and waiting[0][0] <= time:
-                plant.grip(waiting.pop(0)[1])
-            return waiting[0][0] if waiting else np.inf
-
-        plant.before_each_step(grip)
+        plant.before_each_step(_gripping(plant, motion))
         if touches:
-            return Toucher(plant, touches, hand_radius).hand
+            return Toucher(plant, touches, sensing.hand_radius).hand
         return _beside(motion, cell.seed) if cell.near == "standing" else AWAY
 
-    return prepare
+    stream = record(what, prepare) if what.sensing else record_moved(what, prepare, motion.course.command)
+    return replace(stream, truth=described(touches, sensing.hand_radius) if touches else {})
+
+
+def _gripping(plant: Plant, motion: Motion) -> Callable[[float], float]:
+    """Return what has the arm grip and put down its loads when it is time."""
+    waiting = list(motion.loads)
+
+    def grip(time: float) -> float:
+        while waiting and waiting[0][0] <= time:
+            plant.grip(waiting.pop(0)[1])
+        return waiting[0][0] if waiting else np.inf
+
+    return grip
 
 
 def _beside(motion: Motion, seed: int) -> FloatArray:

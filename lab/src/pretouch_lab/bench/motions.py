@@ -1,7 +1,7 @@
 """Motions other than circle and line, as courses of the joints; and an arm that follows one, whatever touches it."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -44,19 +44,10 @@ class Wandering:
         along = s**3 * (10.0 - 15.0 * s + 6.0 * s * s)
         return self.q[k] + along * way, 30.0 * (s * (1.0 - s)) ** 2 / float(self.duration[k]) * way
 
-
-def wandering(seed: int, until: float) -> Wandering:
-    """Draw the motion of an arm for so long [s]; the seed says which."""
-    chosen, rng = scenario("localization")["motion"], np.random.default_rng([seed, 41])
-    q, start, duration, at = [posture(rng, None)], [], [], 1.0
-    while at < until:
-        after = posture(rng, q[-1])
-        fastest = float(np.abs(after - q[-1]).max())
-        start.append(at)
-        duration.append(PEAK * fastest / rng.uniform(*chosen["speed_rad_s"]))
-        at += duration[-1] + rng.uniform(*chosen["rest_s"])
-        q.append(after)
-    return Wandering(np.array(q), np.array(start), np.array(duration))
+    def command(self, time: float, q_commanded: FloatArray) -> FloatArray:
+        """Return joint velocities (n,) [rad/s] at a time [s] that keep commanded positions (n,) [rad] on the course."""
+        q, qd = self.at(time)
+        return qd + _PULL_1_S * (q - q_commanded)
 
 
 def posture(rng: np.random.Generator, before: FloatArray | None) -> FloatArray:
@@ -99,11 +90,10 @@ class WanderingController(Controller):
     def step(self, state: ControllerState, inputs: Inputs) -> tuple[ControlStep, ControllerState]:
         """Run one control cycle and command the course in place of what it decided."""
         step, after = super().step(state, inputs)
-        q, qd = self.course.at(inputs.stamp)
-        command = qd + _PULL_1_S * (q - after.robot.q_commanded)
-        memory = after.memory.copy()
-        memory.put("command", command)
-        return replace(step, command=command), replace(after, memory=memory)
+        command = self.course.command(inputs.stamp, after.memory.get("watch.robot.q_commanded"))
+        after.memory.put("command", command)  # of this very step: nobody else has it yet
+        object.__setattr__(step, "command", command)
+        return step, after
 
 
 @dataclass(frozen=True)
@@ -125,6 +115,11 @@ def motion_of(name: str, seed: int, until: float) -> Motion:
     if name in ("pick-and-place", "untold-load"):
         return _pick_and_place(scenario("hard")["motion"][name], rng, until)
     return Motion(_course(scenario("hard")["motion"][name], _NEXT[name], rng, until))
+
+
+def wandering(seed: int, until: float) -> Wandering:
+    """Draw the motion of an arm that wanders, for so long [s]; the seed says which."""
+    return _course(scenario("localization")["motion"], _anywhere, np.random.default_rng([seed, 41]), until)
 
 
 Next = Callable[[FloatArray, dict[str, Any], Rng], list[FloatArray]]

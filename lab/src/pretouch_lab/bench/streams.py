@@ -15,9 +15,12 @@ from pretouch.atomic_write import atomic_replacement
 from pretouch.control.path import Path as TaskPath
 from pretouch.controller import Controller
 from pretouch.loop import Cycle
+from pretouch.params import TaskParams
 from pretouch.profiles import profile
+from pretouch.sensing.skin import Skin
 from pretouch.sim.plant import Plant
 from pretouch.sim.plant_params import PlantParams
+from pretouch.sim.range_finder import RangeFinderParams, RangeFinders
 from pretouch.sim.scene import GhostSpec, SceneSpec
 from pretouch.types import FloatArray, IntArray, Mode, Obstacles, RobotState, no_obstacles
 from pretouch_lab.bench.scenes import Sensing, model
@@ -80,34 +83,42 @@ class Stream:
 class StreamRecorder:
     """Keeps of each turn of the loop what detection is given; the plant's own log is thrown away as it comes."""
 
-    def __init__(self, plant: Plant, look: Callable[[Cycle], None] = lambda cycle: None) -> None:
+    def __init__(self, plant: Plant, look: Callable[[Cycle], None] | None = None) -> None:
         """Take the plant, and what else is to be called with each cycle."""
         self._plant, self._look = plant, look
         self._patience = profile(PROFILE).sight.slow_after_s
-        self._robot: list[RobotState] = []
+        self._robot: list[FloatArray] = []
         self._obstacles: list[Obstacles] = []
-        self._reacting: list[bool] = []
-        self._watched: list[bool] = []
+        self._flags: list[tuple[bool, bool]] = []
 
     def record(self, cycle: Cycle) -> None:
         """Keep one turn of the loop."""
         self._plant.take_log()
-        self._robot.append(cycle.after.robot)
-        self._obstacles.append(cycle.step.obstacles)
-        self._reacting.append(cycle.before.mode.mode is Mode.REACT)
-        heard = cycle.after.memory.get("tracks.heard")
-        self._watched.append(len(heard) > 0 and cycle.step.stamp - float(heard.min()) <= self._patience)
-        self._look(cycle)
+        memory = cycle.after.memory
+        # the fields of the state that was believed lie one behind the other: one copy, for a look-up costs as much
+        begin, end = (memory.places[f"watch.robot.{name}"].at for name in ("stamp", "wrench"))
+        self._robot.append(memory.blocks[0][begin.start : end.stop].copy())
+        near = cycle.step.obstacles
+        self._obstacles.append(near if len(near.unit) else NOTHING)
+        heard = memory.get("tracks.heard")
+        watched = cycle.step.stamp - float(heard.min(initial=np.inf)) <= self._patience
+        self._flags.append((cycle.before.mode.mode is Mode.REACT, watched))
+        if self._look:
+            self._look(cycle)
 
     def stream(self, truth: dict[str, FloatArray] | None = None) -> Stream:
         """Return all that was kept."""
-        robot = {name: np.array([getattr(state, name) for state in self._robot]) for name in _ROBOT if name != "wrench"}
-        nothing = np.full(6, np.nan)
-        robot["wrench"] = np.array([nothing if s.wrench is None else s.wrench for s in self._robot])
         near = {name: np.concatenate([getattr(o, name) for o in self._obstacles]) for name in _OBSTACLES}
         count = np.array([len(o.unit) for o in self._obstacles], dtype=np.int64)
-        reacting, watched = (np.array(flags, dtype=np.float64) for flags in (self._reacting, self._watched))
-        return Stream(robot, reacting, watched, count, near, truth or {})
+        reacting, watched = np.array(self._flags, dtype=np.float64).T
+        return Stream(_fields_of(self._robot), reacting.copy(), watched.copy(), count, near, truth or {})
+
+
+def _fields_of(rows: list[FloatArray]) -> dict[str, FloatArray]:
+    """Return states of the robot, each the numbers of its fields one behind the other, field by field."""
+    n, every = model().n, np.array(rows)
+    fields = np.split(every, np.cumsum([1, n, n, n, n, n]), axis=1)
+    return dict(zip(_ROBOT, (fields[0][:, 0].copy(), *(part.copy() for part in fields[1:])), strict=True))
 
 
 def save_stream(stream: Stream, path: Path) -> None:
@@ -135,6 +146,10 @@ def load_stream(path: Path) -> Stream | None:
         return None
 
 
+Prepare = Callable[[Plant], Place]
+"""Has things done to an arm before each physics step, and returns where the ghost is."""
+
+
 @dataclass(frozen=True)
 class Alone:
     """An arm that is left to itself but for what `prepare` has done to it."""
@@ -143,7 +158,8 @@ class Alone:
     speed_m_s: float
     """Speed along the path [m/s]; 0 stands."""
     plant: PlantParams
-    sensing: Sensing
+    sensing: Sensing | None
+    """None: it has no units, for there is nobody near whom they could see."""
     ghost_radius: float
     """[m]"""
     seed: int
@@ -156,35 +172,57 @@ class Alone:
     controller: Callable[..., Controller] = Controller
     """Makes its controller, as `Controller` is made."""
 
+    def simulation(self, prepare: Callable[[Plant, RangeFinders], object]) -> Simulation:
+        """Build it."""
+        own, sensing, start = profile(PROFILE), self.sensing, (float(AWAY[0]), float(AWAY[1]), float(AWAY[2]))
+        return Simulation(
+            Setup(
+                model(),
+                sensing.skin if sensing else Skin((), model()),
+                replace(own, task=replace(own.task, speed_m_s=self.speed_m_s or _RETURN_M_S)),
+                SceneSpec(ghost=GhostSpec(self.ghost_radius, start)),
+                self.path,
+                self.seed,
+                believed=None if sensing is None or sensing.believed is sensing.skin else sensing.believed,
+                plant=self.plant,
+                ranging=sensing.ranging if sensing else RangeFinderParams(),
+                world=self.world,
+                prepare=prepare,
+                start=self.start,
+                controller=self.controller,
+            )
+        )
 
-Prepare = Callable[[Plant], Place]
-"""Has things done to an arm before each physics step, and returns where the ghost is."""
+    def is_over(self, stamp: float) -> bool:
+        """Whether the step at an instant [s] is the last one."""
+        return stamp >= self.end_s - 0.5 * TaskParams().control_period_s
 
 
-def record(
-    what: Alone, prepare: Prepare, look: Callable[[Plant, Ghost, Cycle], None] = lambda plant, ghost, cycle: None
-) -> Stream:
+def record(what: Alone, prepare: Prepare, look: Callable[[Plant, Ghost, Cycle], None] | None = None) -> Stream:
     """Let an arm run until its end and return its stream; `look(plant, ghost, cycle)` sees each cycle."""
-    own, sensing = profile(PROFILE), what.sensing
-    task = replace(own.task, speed_m_s=what.speed_m_s or _RETURN_M_S)
-    start = (float(AWAY[0]), float(AWAY[1]), float(AWAY[2]))
     ghosts: list[Ghost] = []
-    setup = Setup(
-        model(),
-        sensing.skin,
-        replace(own, task=task),
-        SceneSpec(ghost=GhostSpec(what.ghost_radius, start)),
-        what.path,
-        what.seed,
-        believed=None if sensing.believed is sensing.skin else sensing.believed,
-        plant=what.plant,
-        ranging=sensing.ranging,
-        world=what.world,
-        prepare=lambda plant, _: ghosts.append(Ghost(plant, prepare(plant))),
-        start=what.start,
-        controller=what.controller,
-    )
-    made = Simulation(setup)
-    recorder = StreamRecorder(made.plant, lambda cycle: look(made.plant, ghosts[0], cycle))
-    made.run(recorder, lambda step: step.stamp >= what.end_s - 0.5 * task.control_period_s)
+    simulation = what.simulation(lambda plant, _: ghosts.append(Ghost(plant, prepare(plant))))
+    plant = simulation.plant
+    recorder = StreamRecorder(plant, (lambda cycle: look(plant, ghosts[0], cycle)) if look else None)
+    simulation.run(recorder, lambda step: what.is_over(step.stamp))
     return recorder.stream()
+
+
+def record_moved(what: Alone, prepare: Prepare, command: Callable[[float, FloatArray], FloatArray]) -> Stream:
+    """Let an arm without units run with no controller, a quarter of the time, and return its stream.
+
+    `command(time, q_commanded)` is its joint velocities (n,) [rad/s] at a time [s], given (n,) [rad].
+    """
+    simulation = what.simulation(lambda plant, _: Ghost(plant, prepare(plant)))
+    plant, rows, stamp = simulation.plant, list[FloatArray](), -np.inf
+    plant.read()  # as a controller does before its first step: each reading is of another delay
+    while not what.is_over(stamp):
+        tick, state = simulation.clock.tick(), plant.read()
+        stamp = max(tick, state.stamp)
+        plant.command(command(stamp, state.q_commanded))
+        plant.take_log()
+        wrench = np.full(6, np.nan) if state.wrench is None else state.wrench
+        parts = (state.q, state.qd, state.q_commanded, state.qd_commanded, state.tau_ext, wrench)
+        rows.append(np.concatenate(((state.stamp,), *parts)))
+    steps, nothing = len(rows), {name: getattr(NOTHING, name) for name in _OBSTACLES}
+    return Stream(_fields_of(rows), np.zeros(steps), np.ones(steps), np.zeros(steps, np.int64), nothing)

@@ -90,17 +90,16 @@ class Detection(BenchOptions):
 
     def results(self) -> dict[str, Any]:
         """See `BenchOptions`."""
-        from pretouch_lab.bench.detection import Streams, arm_cells, plays, stream_plays
+        from pretouch_lab.bench import detection
         from pretouch_lab.bench.detection_results import results
         from pretouch_lab.bench.detection_tables import tables
         from pretouch_lab.cli.playing import played
 
         out = self.folder("bench-detection")
         begin(self, "detection", out, quick=self.quick)
-        cells = arm_cells(self.seeds, self.quick, self.world)
-        streams = Streams(out, self.seeds, self.quick, self.input(self.world))
-        played("recording streams", streams.record, stream_plays(cells), out / "streams", self)
-        numbers = results(played("replaying them", streams.judge, plays(cells), out, self))
+        which = self.seeds, self.quick, self.input(self.world)
+        rows = played("detection", partial(detection.trial, *which), detection.plays(detection.arms(*which)), out, self)
+        numbers = results(detection.rows_of(rows))
         return _finish(out, self.about("detection"), tables(numbers), numbers["resolution"], **numbers)
 
 
@@ -205,7 +204,7 @@ class Both(BenchOptions):
         from pretouch_lab.cli.playing import check_json, report
 
         out = self.folder("bench")
-        check_json(self, [out, *(out / name for name in ("detection", "detection/streams", "avoidance"))])
+        check_json(self, [out, *(out / name for name in ("detection", "avoidance"))])
         detection = self.below(Detection, out / "detection").results()
         avoidance = self.below(Avoidance, out / "avoidance").results()
         report([goal_table(detection, avoidance), front_table(detection, avoidance)], [], out)

@@ -1,0 +1,183 @@
+"""Detectors given the steps of a stream: with their answers to alarms, or their alarms alone in one compiled pass."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from pretouch.compiled import entry, kernel
+from pretouch.contact.moving_thresholds import MovingThresholds, compare
+from pretouch.contact.reaction import DecayingVelocity, reaction_velocity
+from pretouch.contact.residual_model import SequentialNumbers, SequentialState, sequential_init, sequential_numbers
+from pretouch.contact.scatter import LENGTHS
+from pretouch.contact.sequential import Moment, force_map_into
+from pretouch.contact.sequential_step import SampleTest, assess_sample
+from pretouch.contact.sequential_test import SequentialTest
+from pretouch.contact.touch_cue import no_cues
+from pretouch.contact.window import Window, add_sample, window_init
+from pretouch.params import TaskParams, ThresholdParams, WindowParams
+from pretouch.records import zeros
+from pretouch.robot.kinematics import Hinges, Kinematics, Mechanism, place
+from pretouch.robot.model import RobotModel
+from pretouch.types import BoolArray, FloatArray, IntArray, Obstacles, RobotState, some_of
+from pretouch_lab.baselines.fixed_bounds import FixedBounds
+from pretouch_lab.bench.contenders import Contender
+from pretouch_lab.bench.streams import NOTHING, Stream
+from pretouch_lab.replay import DetectorAlone, FirstMotion
+
+REST = DecayingVelocity().decay_cycles
+"""Control cycles for which an alarm is answered, and no other is looked for."""
+PERIOD_S = TaskParams().control_period_s
+
+
+@dataclass(frozen=True)
+class Replayed:
+    """What a detector made of S steps."""
+
+    stamp: FloatArray
+    """(S,) [s]."""
+    alarm: BoolArray
+    """(S,) whether a contact was detected."""
+    force: FloatArray
+    """(S, 3) force it was taken for [N], NaN where none was detected."""
+    motion: FloatArray
+    """(S, n) joint velocities with which the arm would begin to move in answer to an alarm [rad/s], else NaN."""
+    statistic: FloatArray
+    """(S,) see `Contender.statistic`."""
+
+    def onsets(self, value: float | None = None) -> list[int]:
+        """Return the steps at which an alarm begins; with another value of the sweep than the detector's, if given."""
+        return begun(self.alarm if value is None else self.statistic > value)
+
+
+def begun(alarm: BoolArray, rest: int = REST) -> list[int]:
+    """Steps at which an alarm begins, given those (S,) with one: each is answered for `rest` steps."""
+    at, onsets, i = np.flatnonzero(alarm), [], 0
+    while i < len(at):
+        onsets.append(int(at[i]))
+        i = int(np.searchsorted(at, at[i] + rest))
+    return onsets
+
+
+@dataclass(frozen=True)
+class Steps:
+    """The steps of a stream, worked out once for all detectors."""
+
+    stream: Stream
+    model: RobotModel
+
+    @cached_property
+    def each(self) -> list[tuple[RobotState, Obstacles, bool, bool, Kinematics]]:
+        """As the controller had them: robot, obstacles, whether it reacted, whether a skin watched, and posture."""
+        return [(*step, self.model.kinematics(step[0].q)) for step in self.stream.steps()]
+
+    def replay(self, contender: Contender) -> Replayed:
+        """Give a detector each step, from the beginning, of an arm that never reacts; and answer its alarms."""
+        params, model, react = contender.profile, self.model, contender.profile.react
+        if isinstance(react, DecayingVelocity):
+            replayed = alarms_of(self, contender)
+            for at in replayed.onsets():
+                # eq. 12 by the least joint velocities, as eq. 2 has it far from limits and singularities
+                least = np.linalg.pinv(model.ee_jacobian(self.each[at][-1])[:3])
+                push = reaction_velocity(replayed.force[at], react.compliance_m_s_n, react.speed_max_m_s)
+                replayed.motion[at] = least @ push
+            return replayed
+        sees, steps = params.perception is not None, len(self.stream.count)
+        detector, first = DetectorAlone(params, model), FirstMotion(model, params, self.stream.robot["q"][0], REST)
+        alarm, statistic, force = np.zeros(steps, np.bool_), np.empty(steps), np.full((steps, 3), np.nan)
+        motion = np.full((steps, model.n), np.nan)
+        for i, (robot, obstacles, reacting, watched, kin) in enumerate(self.each):
+            near = obstacles if sees else NOTHING
+            detection = detector.step(kin, robot, near, reacting, sees and watched)
+            statistic[i] = contender.statistic(detection, detector.window.newest, robot.wrench)
+            if detection.contact is not None:
+                alarm[i], force[i] = True, detection.contact.force
+            begins = first.step(kin, robot, detection, near)
+            if begins is not None:
+                motion[i] = begins
+        return Replayed(self.stream.stamp, alarm, force, motion, statistic)
+
+
+def alarms_of(steps: Steps, contender: Contender) -> Replayed:
+    """Replay a stream of an arm that never reacts, but for `Replayed.motion`: compiled, a hundredth of the time."""
+    stream, model, params = steps.stream, steps.model, contender.profile
+    robot, detect, sees = stream.robot, params.detect, params.perception is not None
+    count, valid = len(stream.count), np.isfinite(robot["wrench"][:, 0])
+    armed = np.cumsum(valid) - valid >= params.window.samples
+    statistic, force = np.full(count, -np.inf), np.full((count, 3), np.nan)
+    near, number = Obstacles(**stream.obstacles), stream.count if sees else np.zeros_like(stream.count)
+    if isinstance(detect, MovingThresholds):
+        alarm, window = np.zeros(count, np.bool_), window_init(params.window.samples)
+        _by_thresholds(
+            model.hinges, model.ee, robot["q"], robot["wrench"], near, number, detect.numbers, params.window.numbers,
+            detect.compare == "filtered", window, alarm, statistic, force,
+        )  # fmt: skip
+    elif isinstance(detect, FixedBounds):
+        force, share = robot["wrench"][:, :3].copy(), (np.abs(robot["tau_ext"]) / detect.bounds(model.n)).max(axis=1)
+        statistic = np.fmax(share, np.sqrt((force * force).sum(axis=1)) / detect.force_n)
+        alarm = statistic >= 1.0
+        for at in np.flatnonzero(alarm & ~valid):
+            force_map_into(model.ee_jacobian(model.kinematics(robot["q"][at])), inverse := np.empty((3, model.n)))
+            force[at] = inverse @ robot["tau_ext"][at]
+    elif isinstance(detect, SequentialTest):
+        begin = sequential_init(model.n, detect)
+        # parts of the first state are one array
+        state = SequentialState._make((begin.model, *(part.copy() for part in begin[1:])))
+        _by_sequential_test(
+            model.hinges, model.mechanism, (robot["q"], robot["qd"], robot["qd_commanded"], robot["tau_ext"]), near,
+            number, (stream.watched > 0.0) & sees, no_cues(len(model.links)).gain, state,
+            sequential_numbers(model.n, params.task.control_period_s, detect),
+            zeros(SampleTest, n=model.n, W=len(LENGTHS)), statistic,
+        )  # fmt: skip
+        alarm = statistic >= 1.0
+    else:
+        raise TypeError(f"the detector {detect.name} has no compiled pass")
+    nothing = np.full((count, model.n), np.nan)
+    return Replayed(stream.stamp, alarm & armed, force, nothing, np.where(armed, statistic, -np.inf))
+
+
+@entry
+def _by_thresholds(
+    hinges: Hinges, ee: int, q: FloatArray, wrench: FloatArray, obstacles: Obstacles, number: IntArray,
+    thresholds: ThresholdParams, p: WindowParams, filtered: bool, window: Window, alarm: BoolArray,
+    statistic: FloatArray, force: FloatArray,
+) -> None:  # fmt: skip
+    """Write alarms (S,), the largest base forces (S,) at which they would still be such, and F_ext (S, 3), eqs. 8-12.
+
+    A step without an estimate of the force, NaN, is none for the window either.
+    """
+    kin, parts, end = _unplaced(hinges), np.empty((6, 3)), 0
+    for i in range(len(q)):
+        end += number[i]
+        if np.isnan(wrench[i, 0]):
+            continue
+        place(hinges, q[i], kin)
+        add_sample(window, wrench[i, :3], p)
+        compared = window.sums[0] if filtered else wrench[i, :3]
+        near = some_of(obstacles, end - number[i], end)
+        alarm[i], _ = compare(window, compared, kin.position[ee], near, thresholds, parts)
+        statistic[i] = np.max(np.maximum(compared - parts[0], parts[1] - compared)) + thresholds.f_base_n
+        force[i] = compared - parts[2]
+
+
+@entry
+def _by_sequential_test(
+    hinges: Hinges, mechanism: Mechanism, robot: tuple[FloatArray, FloatArray, FloatArray, FloatArray],
+    obstacles: Obstacles, number: IntArray, watched: BoolArray, gain: FloatArray, state: SequentialState,
+    numbers: SequentialNumbers, results: SampleTest, statistic: FloatArray,
+) -> None:  # fmt: skip
+    """Write the evidence (S,) of a test that begins with a state; the robot's are q, qd, qd_commanded and tau_ext."""
+    (q, qd, qd_commanded, tau_ext), kin, end = robot, _unplaced(hinges), 0
+    for i in range(len(q)):
+        end += number[i]
+        place(hinges, q[i], kin)
+        near = some_of(obstacles, end - number[i], end)
+        now = Moment(kin, qd[i], qd_commanded[i], tau_ext[i], near, gain, watched[i], False)
+        assess_sample(state, now, numbers, mechanism, results)
+        statistic[i] = results.log_likelihood_ratio[0]
+
+
+@kernel
+def _unplaced(hinges: Hinges) -> Kinematics:
+    links, n = len(hinges.parent), len(hinges.joint)
+    return Kinematics(np.empty((links, 3)), np.empty((links, 3, 3)), np.empty((n, 3)), np.empty((n, 3)))
