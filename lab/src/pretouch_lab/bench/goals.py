@@ -1,6 +1,6 @@
 """The goals set for `pretouch` before it was built, with what was reached; and the one table that says why."""
 
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
 from textwrap import fill
 
 from pretouch.text_table import TextTable, tabulated
@@ -9,12 +9,14 @@ from pretouch_lab.bench.scenes import scenario
 from pretouch_lab.run import Row
 from pretouch_lab.table import share_below, short
 
-PEAK_ESTIMATE, TRUE_PEAK, SOONER, SHORTER = 5.0, 4.0, 2.0, 0.3
-"""Times the peaks are to be smaller and the first contact sooner; part by which a turn is to be shorter."""
-
-_SHOWN = ("blind", "paper", "pretouch")
-"""Baselines of the closed loop, and detectors of the same names."""
-
+PARTS = (
+    ("peak_estimate_n", "blind", 5.0, "peak of the estimate at least {:g} times smaller than of blind"),
+    ("true_peak_20ms_n", "blind", 4.0, "true 20 ms peak at least {:g} times smaller than of blind"),
+    ("first_contact_s", "paper-off", 2.0, "first contact at least {:g} times sooner than paper-off"),
+)
+"""At boards: a measure, the reference, how many times smaller it is to be, and the goal."""
+SHORTER = 0.3
+"""Part by which a turn is to be shorter."""
 _FRONT_NOTE = (
     "Simulated, medians. The board has 25 N/mm, and units see it; its force is the highest for 20 ms. Pushes: the"
     " contacts of the goals, of 15 N and more for 100 ms and more on the links 3 to 7 and the hand, whose torques"
@@ -36,24 +38,8 @@ _DEFINED = (
     " without contact the force is 0 N and the time endless. First contact: from the board being within 0.8 m of the"
     " end-effector. A turn: the second one. Forces beside the person: true 20 ms peak, 90 % of the trials below it."
 )
-
-
-@dataclass(frozen=True)
-class Goal:
-    """One goal."""
-
-    text: str
-    measured: str
-    bounds: str
-    """95 % bounds of what was measured."""
-    reached: bool | None
-    """None: nothing was measured."""
-
-    @property
-    def row(self) -> tuple[str, ...]:
-        """Cells of the table."""
-        verdict = {True: "reached", False: "not reached", None: "not measured"}
-        return fill(self.text, _WIDTH), verdict[self.reached], fill(self.measured, _WIDTH), self.bounds
+Goal = tuple[str, bool | None, str, str]
+"""A goal, whether it was reached, what was measured, and 95 % bounds of that; None: nothing was measured."""
 
 
 def goals(detection: Row, avoidance: Row) -> list[Goal]:
@@ -62,22 +48,24 @@ def goals(detection: Row, avoidance: Row) -> list[Goal]:
         *_false_alarms(detection["rows"]),
         *(goal for seen in (True, False) for goal in _contacts(detection["rows"], seen)),
         _towards(detection["rows"], avoidance["rows"]),
-        *_boards(avoidance["paired"]),
-        *_person(avoidance),
+        *(_board(pair(avoidance["paired"], "static", part[1], part[0]), *part[2:]) for part in PARTS),
+        *(_turn(avoidance, reference) for reference in ("paper-off", "paper")),
     ]
 
 
 def goal_table(detection: Row, avoidance: Row) -> TextTable:
     """Return the goals as a table."""
-    abouts = [part["about"] for part in (detection, avoidance)]
+    verdict = {True: "reached", False: "not reached", None: "not measured"}
     kinds = ", ".join(
-        f"{about['bench']} {'quick' if about['quick'] else 'full'}, {about['seeds']} seeds" for about in abouts
+        f"{about['bench']} {'quick' if about['quick'] else 'full'}, {about['seeds']} seeds"
+        for about in (detection["about"], avoidance["about"])
     )
-    return TextTable(
-        "The goals of pretouch", ("goal", "", "measured", "95 % bounds"),
-        tuple(one.row for one in goals(detection, avoidance)),
-        f"{kinds}. Reached: the measured value reaches it, whatever its bounds. {_DEFINED}", 2,
-    )  # fmt: skip
+    rows = tuple(
+        (fill(text, _WIDTH), verdict[reached], fill(measured, _WIDTH), bounds)
+        for text, reached, measured, bounds in goals(detection, avoidance)
+    )
+    note = f"{kinds}. Reached: the measured value reaches it, whatever its bounds. {_DEFINED}"
+    return TextTable("The goals of pretouch", ("goal", "", "measured", "95 % bounds"), rows, note, 2)
 
 
 def find(rows: list[Row], baseline: str, name: str, seen: bool | None = None) -> Row | None:
@@ -86,149 +74,132 @@ def find(rows: list[Row], baseline: str, name: str, seen: bool | None = None) ->
     return next((row for row in rows if where.items() <= row.items()), None)
 
 
-def _false_alarms(rows: list[Row]) -> list[Goal]:
+def pair(paired: list[Row], family: str, reference: str, measure: str) -> Row | None:
+    """Return how `BASE` compares with a reference, None if it was not measured."""
+    where = {"family": family, "contender": BASE, "reference": reference, "measure": measure}
+    return next((row for row in paired if where.items() <= row.items()), None)
+
+
+def _unmeasured(text: str) -> Goal:
+    return text, None, "-", "-"
+
+
+def _false_alarms(rows: list[Row]) -> Iterator[Goal]:
     limit = scenario("contacts")["goal"]["false_alarms_per_hour"]
-    near = {"goal": "all", "goal, nobody near": "nobody near", "goal, somebody standing": "somebody standing near",
-            "goal, somebody passing": "somebody passing"}  # fmt: skip
-    found = []
-    for name, text in near.items():
-        row, wanted = find(rows, BASE, f"free: {name}"), f"at most {limit:g} false alarm an hour at 0.3 m/s: {text}"
-        found.append(Goal(wanted, "-", "-", None) if row is None else Goal(
-            wanted, f"{short(row['false_alarms_per_hour'])}/h ({row['false_alarms']} in {row['hours']:.2g} h)",
-            f"{short(row['low_per_hour'])} to {short(row['high_per_hour'])}/h", row["false_alarms_per_hour"] <= limit,
-        ))  # fmt: skip
-    return found
+    near = {"": "all", ", nobody near": "nobody near", ", somebody standing": "somebody standing near",
+            ", somebody passing": "somebody passing"}  # fmt: skip
+    for name, who in near.items():
+        text, row = f"at most {limit:g} false alarm an hour at 0.3 m/s: {who}", find(rows, BASE, f"free: goal{name}")
+        if row is None:
+            yield _unmeasured(text)
+            continue
+        rate, low, high = (short(row[key]) for key in ("false_alarms_per_hour", "low_per_hour", "high_per_hour"))
+        measured = f"{rate}/h ({row['false_alarms']} in {row['hours']:.2g} h)"
+        yield text, row["false_alarms_per_hour"] <= limit, measured, f"{low} to {high}/h"
 
 
 def _contacts(rows: list[Row], seen: bool) -> list[Goal]:
     word = "seen" if seen else "unseen"
     limit, row = scenario("contacts")["goal"][f"{word}_delay_s"], find(rows, BASE, "contacts: goal", seen)
-    texts = f"median delay at most {1000 * limit:g} ms, {word} by the skin", f"none of those missed, {word}"
+    delay, missed = f"median delay at most {1000 * limit:g} ms, {word} by the skin", f"none of those missed, {word}"
     if row is None or not row["contacts"]:
-        return [Goal(text, "-", "-", None) for text in texts]
-    missed, of = row["missed"], row["contacts"]
-    none_detected = row["median_delay_s"] is None
-    low, high = (0.0, 0.0) if none_detected else row["median_bounds_s"]
-    return [
-        Goal(texts[0], "none detected", "-", False) if none_detected else Goal(
-            texts[0], f"{1000 * row['median_delay_s']:.0f} ms (95 % below {1000 * row['p95_delay_s']:.0f} ms)",
-            f"{1000 * low:.0f} to {1000 * high:.0f} ms", row["median_delay_s"] <= limit,
-        ),
-        Goal(texts[1], f"{missed} of {of}", f"at most {100 * share_below(missed, of):.1f} %", missed == 0),
-    ]  # fmt: skip
+        return [_unmeasured(delay), _unmeasured(missed)]
+    lost, of, median = row["missed"], row["contacts"], row["median_delay_s"]
+    first: Goal = (delay, False, "none detected", "-")
+    if median is not None:
+        low, high = (1000 * bound for bound in row["median_bounds_s"])
+        measured = f"{1000 * median:.0f} ms (95 % below {1000 * row['p95_delay_s']:.0f} ms)"
+        first = (delay, median <= limit, measured, f"{low:.0f} to {high:.0f} ms")
+    return [first, (missed, lost == 0, f"{lost} of {of}", _at_most(lost, of))]
+
+
+def _at_most(events: int, of: int) -> str:
+    return f"at most {100 * share_below(events, of):.1f} %"
 
 
 def _towards(streams: list[Row], played: list[Row]) -> Goal:
+    text, own = "never a reaction towards the person", [row for row in played if row["contender"] == BASE]
     both = [row for seen in (True, False) if (row := find(streams, BASE, "contacts: all", seen))]
     against, of = sum(row["towards"] for row in both), sum(row["contacts"] - row["missed"] for row in both)
-    own = [row for row in played if row["contender"] == BASE]
     moved, reactions = sum(row["towards_person"] for row in own), sum(row["reactions"] for row in own)
     if not of + reactions:
-        return Goal("never a reaction towards the person", "-", "-", None)
-    return Goal(
-        "never a reaction towards the person",
-        f"{against} of {of} contacts detected, {moved} of {reactions} reactions in the closed loop",
-        f"at most {100 * share_below(against + moved, of + reactions):.1f} %", against + moved == 0,
-    )  # fmt: skip
+        return _unmeasured(text)
+    measured = f"{against} of {of} contacts detected, {moved} of {reactions} reactions in the closed loop"
+    return text, against + moved == 0, measured, _at_most(against + moved, of + reactions)
 
 
-def pair(paired: list[Row], family: str, reference: str, measure: str) -> Row | None:
-    """Return how `BASE` compares with a reference, None if it was not measured."""
-    where = {"family": family, "contender": BASE, "reference": reference, "measure": measure}
-    return next((row for row in paired if all(row[key] == value for key, value in where.items())), None)
-
-
-def _times(part: float | None) -> str:
-    return "0" if part is None else "more than all" if part == 0.0 else f"{1 / part:.3g}"
-
-
-def _boards(paired: list[Row]) -> list[Goal]:
-    wanted = (
-        ("peak_estimate_n", "blind", PEAK_ESTIMATE, "peak of the estimate at least {:g} times smaller than of blind"),
-        ("true_peak_20ms_n", "blind", TRUE_PEAK, "true 20 ms peak at least {:g} times smaller than of blind"),
-        ("first_contact_s", "paper-off", SOONER, "first contact at least {:g} times sooner than paper-off"),
+def _board(row: Row | None, times: float, text: str) -> Goal:
+    if row is None:
+        return _unmeasured(text.format(times))
+    part, low, high = (
+        "0" if row[key] is None else f"{1 / row[key]:.3g}" if row[key] else "more than all"
+        for key in ("part", "low", "high")
     )
-    found = []
-    for measure, reference, times, text in wanted:
-        row = pair(paired, "static", reference, measure)
-        found.append(Goal(text.format(times), "-", "-", None) if row is None else Goal(
-            text.format(times), f"{_times(row['part'])} times ({row['trials']} trials)",
-            f"{_times(row['high'])} to {_times(row['low'])} times",
-            row["part"] is not None and row["part"] <= 1 / times,
-        ))  # fmt: skip
-    return found
+    reached = row["part"] is not None and row["part"] <= 1 / times
+    return text.format(times), reached, f"{part} times ({row['trials']} trials)", f"{high} to {low} times"
 
 
-def _person(avoidance: Row) -> list[Goal]:
+def _turn(avoidance: Row, reference: str) -> Goal:
+    text = f"turn beside a person at least {100 * SHORTER:g} % shorter than {reference}'s, forces not larger"
+    row = pair(avoidance["paired"], "person", reference, "cycle_time_s")
     force = {
-        cell["contender"]: cell["true_peak_20ms_n"]["p90"] for cell in avoidance["families"]
+        cell["contender"]: cell["true_peak_20ms_n"]["p90"]
+        for cell in avoidance["families"]
         if cell["family"] == "person" and cell["true_peak_20ms_n"]
-    }  # fmt: skip
-    found = []
-    for reference in ("paper-off", "paper"):
-        text = f"turn beside a person at least {100 * SHORTER:g} % shorter than {reference}'s, forces not larger"
-        row = pair(avoidance["paired"], "person", reference, "cycle_time_s")
-        if row is None or BASE not in force or reference not in force:
-            found.append(Goal(text, "-", "-", None))
-            continue
-        shorter = [f"{100 * (1 - part):.0f}" if part is not None else "endlessly less" for part in
-                   (row["part"], row["high"], row["low"])]  # fmt: skip
-        found.append(Goal(
-            text, f"{shorter[0]} % ({row['trials']} trials); {force[BASE]:.1f} N and {force[reference]:.1f} N",
-            f"{shorter[1]} to {shorter[2]} %",
-            row["part"] is not None and row["part"] <= 1 - SHORTER and force[BASE] <= force[reference],
-        ))  # fmt: skip
-    return found
+    }
+    if row is None or not {BASE, reference} <= force.keys():
+        return _unmeasured(text)
+    shorter, high, low = (
+        "endlessly less" if row[key] is None else f"{100 * (1 - row[key]):.0f}" for key in ("part", "high", "low")
+    )
+    reached = row["part"] is not None and row["part"] <= 1 - SHORTER and force[BASE] <= force[reference]
+    measured = f"{shorter} % ({row['trials']} trials); {force[BASE]:.1f} N and {force[reference]:.1f} N"
+    return text, reached, measured, f"{high} to {low} %"
 
 
 def front_table(detection: Row, avoidance: Row) -> TextTable:
     """Return the table of the first page: blind, paper and pretouch; what was not measured is a dash."""
     cells = {(cell["family"], cell["contender"]): cell for cell in avoidance["families"]}
-    shown = [name for name in _SHOWN if ("static", name) in cells and ("person", name) in cells]
+    shown = [name for name in ("blind", "paper", BASE) if {("static", name), ("person", name)} <= cells.keys()]
 
-    def contacts(name: str, which: str = "goal") -> list[Row]:
+    def contacts(name: str, which: str) -> list[Row]:
         rows = (find(detection["rows"], name, f"contacts: {which}", seen) for seen in (True, False))
         return [row for row in rows if row is not None]
 
     def delay(name: str) -> str:
-        delays = [row["median_delay_s"] for row in contacts(name)]
+        delays = [row["median_delay_s"] for row in contacts(name, "goal")]
         return " / ".join("none" if delay is None else f"{1000 * delay:.0f} ms" for delay in delays) or "-"
 
-    def missed(rows: list[Row]) -> str:
-        return f"{sum(row['missed'] for row in rows)} of {sum(row['contacts'] for row in rows)}" if rows else "-"
+    def missed(which: str) -> Callable[[str], str]:
+        def text(name: str) -> str:
+            rows = contacts(name, which)
+            return f"{sum(row['missed'] for row in rows)} of {sum(row['contacts'] for row in rows)}" if rows else "-"
+
+        return text
 
     def force(name: str) -> str:
         cell = cells["static", name]
-        return "keeps away" if cell["first_contact_s"] is None else f"{_value(cell, 'true_peak_20ms_n')} N"
+        return "keeps away" if cell["first_contact_s"] is None else f"{_median(cell['true_peak_20ms_n'])} N"
 
-    def turn(name: str) -> str:
-        return f"{_value(cells['person', name], 'cycle_time_s')} s"
+    def alarms(near: str) -> Callable[[str], str]:
+        def text(name: str) -> str:
+            row = find(detection["rows"], name, f"free: goal, {near}")
+            return "-" if row is None else short(row["false_alarms_per_hour"])
 
-    def alarms(name: str, near: str) -> str:
-        row = find(detection["rows"], name, f"free: goal, {near}")
-        return "-" if row is None else short(row["false_alarms_per_hour"])
+        return text
 
     columns = (
         ("", str),
         ("force on a board\nin its way", force),
         ("a push is noticed after\n(seen / not seen)", delay),
-        ("pushes not\nnoticed", lambda name: missed(contacts(name))),
-        ("contacts of all\nkinds not noticed", lambda name: missed(contacts(name, "all"))),
-        ("a turn beside\na person", turn),
-        ("false alarms an hour,\nnobody near", lambda name: alarms(name, "nobody near")),
-        ("the same, somebody\nstands near", lambda name: alarms(name, "somebody standing")),
+        ("pushes not\nnoticed", missed("goal")),
+        ("contacts of all\nkinds not noticed", missed("all")),
+        ("a turn beside\na person", lambda name: f"{_median(cells['person', name]['cycle_time_s'])} s"),
+        ("false alarms an hour,\nnobody near", alarms("nobody near")),
+        ("the same, somebody\nstands near", alarms("somebody standing")),
     )
-    return tabulated(
-        "What happens when it touches something",
-        columns,
-        shown,
-        _FRONT_NOTE,
-        1,
-    )
+    return tabulated("What happens when it touches something", columns, shown, _FRONT_NOTE, 1)
 
 
-def _value(cell: Row, key: str) -> str:
-    spread = cell[key]
-    if spread is None:
-        return "-"
-    return ">" if spread["median"] is None else f"{spread['median']:.1f}"
+def _median(spread: Row | None) -> str:
+    return "-" if spread is None else ">" if spread["median"] is None else f"{spread['median']:.1f}"
