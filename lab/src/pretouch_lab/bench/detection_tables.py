@@ -2,42 +2,18 @@
 
 from pretouch.text_table import TextTable
 from pretouch_lab.bench.contenders import BASE, WITHOUT
-from pretouch_lab.bench.detection_results import ABLATED_CONTACTS, ABLATED_FREE, GOAL_CONTACTS, GOAL_FREE
+from pretouch_lab.bench.detection_results import (
+    ABLATED_CONTACTS,
+    ABLATED_FREE,
+    GOAL_CONTACTS,
+    GOAL_FREE,
+    HARD,
+    HARD_CONTACTS,
+)
 from pretouch_lab.bench.goals import find
 from pretouch_lab.bench.scenes import scenario
 from pretouch_lab.run import Row
 from pretouch_lab.table import Column, short, table
-
-
-def tables(results: Row) -> list[TextTable]:
-    """Return all tables of what `results` of the JSON file says."""
-    rows, curves = results["rows"], results["curves"]
-    names = list(dict.fromkeys(row["contender"] for row in rows))
-    ablated = [name for name in names if name.startswith(WITHOUT)]
-    whole = [name for name in names if name not in ablated]
-    made = [
-        _goals(rows, whole, "Contact detection: the goals"),
-        _equal(curves, whole),
-        _goals(
-            [row for row in rows if row["scenario"] in (ABLATED_FREE, ABLATED_CONTACTS)],
-            [BASE, *ablated] if ablated else [],
-            "Each switch of pretouch's detection off alone",
-            (ABLATED_FREE, ABLATED_CONTACTS),
-            " On a part of the streams: free motion of at most two arms of each path and neighbour, and the contacts at"
-            " the goal's speed; pretouch here has the same. Nothing reacts in them and no arm has touch"
-            " sensors, so that freeze_while_reacting and touch are not here.",
-        ),
-        _goals(
-            rows,
-            whole,
-            "Arms as unkind as real ones",
-            ("hard: all", "hard, touched: all"),
-            " The world hard: friction that remembers, gears that shake, joints that ring, drift, cables, delays;"
-            " contacts whose torques exceed three standard deviations of that arm's free motion.",
-        ),
-    ]
-    return [each for each in made if each.rows]
-
 
 _COLUMNS = (
     Column("detector", "detector"),
@@ -47,7 +23,47 @@ _COLUMNS = (
     Column("unseen\nmedian, 95 % [ms]", "unseen"),
     Column("missed", "unseen_missed"),
 )
-_JUDGED = (*_COLUMNS, Column("towards\nperson", "towards"), Column("goals\nreached", "reached"))
+_TOWARDS, _REACHED = Column("towards\nperson", "towards"), Column("goals\nreached", "reached")
+
+
+def tables(results: Row) -> list[TextTable]:
+    """Return all tables of what `results` of the JSON file says."""
+    goal, rows = scenario("contacts")["goal"], results["rows"]
+    names = list(dict.fromkeys(row["contender"] for row in rows))
+    ablated = [name for name in names if name.startswith(WITHOUT)]
+    whole = [name for name in names if name not in ablated]
+    note = (
+        f"Goals: at most {goal['false_alarms_per_hour']:g} false alarm an hour in free motion at"
+        f" {goal['speed_m_s']:g} m/s, with or without somebody near; median delay at most"
+        f" {1000 * goal['seen_delay_s']:g} ms for contacts the skin saw and {1000 * goal['unseen_delay_s']:g} ms for"
+        f" others, none missed, of those of {goal['force_n']:g} N and more lasting {1000 * goal['duration_s']:g} ms and"
+        " more on the links 3 to 7 and the hand, whose torques exceed three standard deviations of free motion's. Below"
+        " a rate: 95 % bounds. Delay: from the true force passing 1 N, of what was detected. Towards person: the"
+        " touched point would begin to move against the force on it, of all detected: none is the goal. Reached: as"
+        " measured here, whatever the bounds."
+    )
+    judged, hard = (*_COLUMNS, _TOWARDS, _REACHED), (*_COLUMNS, _TOWARDS)  # hard arms have goals of their own
+    compared = [BASE, *ablated] if ablated else []
+    every = [
+        table("Contact detection: the goals", judged, _judged(rows, whole, GOAL_FREE, GOAL_CONTACTS), note),
+        _equal(results["curves"], whole),
+        table(
+            "Each switch of pretouch's detection off alone",
+            judged,
+            _judged(rows, compared, ABLATED_FREE, ABLATED_CONTACTS),
+            f"{note} On a part of the streams: free motion of at most two arms of each path and neighbour, and the"
+            " contacts at the goal's speed; pretouch here has the same. Nothing reacts in them and no arm has touch"
+            " sensors, so that freeze_while_reacting and touch are not here.",
+        ),
+        table(
+            "Arms as unkind as real ones",
+            hard,
+            _judged(rows, whole, HARD, HARD_CONTACTS),
+            f"{note} The world hard: friction that remembers, gears that shake, joints that ring, drift, cables,"
+            " delays; contacts whose torques exceed three standard deviations of that arm's free motion.",
+        ),
+    ]
+    return [each for each in every if each.rows]
 
 
 def _texts(name: str, free: Row | None, seen: Row | None, unseen: Row | None) -> Row:
@@ -62,53 +78,48 @@ def _texts(name: str, free: Row | None, seen: Row | None, unseen: Row | None) ->
     }
 
 
-def _goals(
-    rows: list[Row], names: list[str], title: str, where: tuple[str, str] = (GOAL_FREE, GOAL_CONTACTS), note: str = ""
-) -> TextTable:
-    goal = scenario("contacts")["goal"]
+def _judged(rows: list[Row], names: list[str], free: str, contacts: str) -> list[Row]:
+    """Return what the table of the goals says of each detector, in scenarios of free motion and of contacts."""
     lines = []
     for name in names:
-        of = find(rows, name, where[0]), *(find(rows, name, where[1], seen) for seen in (True, False))
-        lines.append(_texts(name, *of) | {"towards": _towards(*of[1:]), "reached": reached(*of)})
-    return table(
-        title,
-        _JUDGED[:-1] if where[0].startswith("hard") else _JUDGED,  # hard arms have goals of their own
-        lines,
-        f"Goals: at most {goal['false_alarms_per_hour']:g} false alarm an hour in free motion at"
-        f" {goal['speed_m_s']:g} m/s, with or without somebody near; median delay at most"
-        f" {1000 * goal['seen_delay_s']:g} ms for contacts the skin saw and {1000 * goal['unseen_delay_s']:g} ms for"
-        f" others, none missed, of those of {goal['force_n']:g} N and more lasting {1000 * goal['duration_s']:g} ms and"
-        " more on the links 3 to 7 and the hand, whose torques exceed three standard deviations of free motion's. Below"
-        " a rate: 95 % bounds. Delay: from the true force passing 1 N, of what was detected. Towards person: the"
-        " touched point would begin to move against the force on it, of all detected: none is the goal. Reached: as"
-        f" measured here, whatever the bounds.{note}",
-    )
+        alarms, seen, unseen = (
+            find(rows, name, free),
+            find(rows, name, contacts, True),
+            find(rows, name, contacts, False),
+        )
+        there = [row for row in (seen, unseen) if row]
+        detected, against = (
+            sum(row["contacts"] - row["missed"] for row in there),
+            sum(row["towards"] for row in there),
+        )
+        judged = {"towards": f"{against}/{detected}", "reached": reached(alarms, seen, unseen)}
+        lines.append(_texts(name, alarms, seen, unseen) | judged)
+    return lines
 
 
 def reached(free: Row | None, seen: Row | None, unseen: Row | None) -> str:
     """Name the goals that a detector reached: its rate of false alarms, delays of what was seen or not, direction."""
     goal = scenario("contacts")["goal"]
-    found = ["rate"] if free and free["false_alarms_per_hour"] <= goal["false_alarms_per_hour"] else []
+    names = ["rate"] if free and free["false_alarms_per_hour"] <= goal["false_alarms_per_hour"] else []
     for name, row in (("seen", seen), ("unseen", unseen)):
         if row and row["contacts"] and not row["missed"] and row["median_delay_s"] <= goal[f"{name}_delay_s"]:
-            found.append(name)
+            names.append(name)
     there = [row for row in (seen, unseen) if row]
     if there and not any(row["towards"] for row in there):
-        found.append("direction")
-    return "\n".join(found) or "none"
+        names.append("direction")
+    return "\n".join(names) or "none"
 
 
 def _equal(curves: list[Row], names: list[str]) -> TextTable:
     """Each detector with the value of its sweep at which it keeps the goal of false alarms, and what it has then."""
     limit = scenario("contacts")["goal"]["false_alarms_per_hour"]
-    kept: dict[str, Row] = {}
+    quiet: dict[str, Row] = {}
     for point in curves:
         if point.get("false_alarms_per_hour", limit + 1.0) <= limit:
-            kept.setdefault(point["contender"], point)
-
+            quiet.setdefault(point["contender"], point)
     lines = []
     for name in names:
-        point = kept.get(name, {})
+        point = quiet.get(name, {})
         at = f"{point['f_base_n']:g} N" if "f_base_n" in point else f"x {point['scale']:g}" if point else "none"
         lines.append(_texts(name, point or None, point.get("seen"), point.get("unseen")) | {"at": at})
     return table(
@@ -129,20 +140,12 @@ def _rate(row: Row | None) -> str:
 
 
 def _delay(row: Row | None) -> str:
-    return f"{_ms(row['median_delay_s'])}, {_ms(row['p95_delay_s'])}" if row and row["contacts"] else "-"
+    if row is None or not row["contacts"]:
+        return "-"
+    return ", ".join("-" if row[key] is None else f"{1000 * row[key]:.0f}" for key in ("median_delay_s", "p95_delay_s"))
 
 
 def _missed(row: Row | None) -> str:
     if row is None or not row["contacts"]:
         return "-"
     return f"{row['missed']}/{row['contacts']}" + (f"\n{row['busy']} busy" if row["busy"] else "")
-
-
-def _towards(*rows: Row | None) -> str:
-    there = [row for row in rows if row]
-    detected = sum(row["contacts"] - row["missed"] for row in there)
-    return f"{sum(row['towards'] for row in there)}/{detected}"
-
-
-def _ms(value: float | None) -> str:
-    return "-" if value is None else f"{1000 * value:.0f}"
