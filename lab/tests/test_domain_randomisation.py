@@ -8,7 +8,8 @@ from pretouch.robot.model import RobotModel
 from pretouch.sensing.skin import paper_skin
 from pretouch.sim.plant_params import PlantParams
 from pretouch.sim.range_finder import RangeFinderParams
-from pretouch_lab.cli.benchmarks import BenchOptions, begin
+from pretouch_lab.cli import benchmarks
+from pretouch_lab.cli.bench import Detection
 from pretouch_lab.domain_randomisation import Parts, folder_part, randomised, sentence
 from pretouch_lab.experiment import arguments, context_of
 from pretouch_lab.experiments import static
@@ -48,9 +49,10 @@ def test_runs_of_two_worlds_do_not_share_a_folder(tmp_path):
     open_run(tmp_path / "a", arguments("static", Options()))
     with pytest.raises(ExperimentError, match="holds a run with world = '', not 'stress'"):
         open_run(tmp_path / "a", arguments("static", Options(world="stress")))
-    begin(BenchOptions(world="stress"), "detection", tmp_path / "b")
+    out = str(tmp_path / "b")
+    benchmarks._folder(Detection(out=out, world="stress"), "detection")
     with pytest.raises(ExperimentError, match="holds a run with world = 'stress', not ''"):
-        begin(BenchOptions(), "detection", tmp_path / "b")
+        benchmarks._folder(Detection(out=out), "detection")
 
 
 def test_a_world_file_that_changed_is_another_world(tmp_path):
@@ -62,7 +64,8 @@ def test_a_world_file_that_changed_is_another_world(tmp_path):
         open_run(tmp_path / "run", arguments("static", Options(world=str(place))))
 
 
-def test_folders_are_named_by_their_world():
-    assert BenchOptions(world="stress", quick=True).folder("bench").name == "bench-stress-quick"
-    assert BenchOptions().folder("bench").name == "bench"
+def test_folders_are_named_by_their_world(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert benchmarks._folder(Detection(world="stress", quick=True), "detection").name == "bench-detection-stress-quick"
+    assert benchmarks._folder(Detection(), "detection").name == "bench-detection"
     assert folder_part("here/arm.toml") != folder_part("there/arm.toml")

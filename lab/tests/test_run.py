@@ -8,7 +8,6 @@ import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import partial
 
 import pytest
@@ -23,15 +22,6 @@ CELLS = [{"name": "a", "factor": 2.0}, {"name": "b", "factor": 0.5}]
 
 def played(cell, seed):
     return {"value": cell["factor"] * seed}
-
-
-@dataclass(frozen=True)
-class Place:
-    name: str
-
-
-def named(cell, seed):
-    return {"whole": f"{cell.name}{seed}"}
 
 
 def killed(cell, seed):
@@ -49,7 +39,6 @@ def test_rows_are_of_all_plays_in_their_order_and_lines_of_a_file(tmp_path):
         ("b", 4, 2.0),
     ]
     assert [json.loads(line) for line in (tmp_path / ROWS).read_text().splitlines()] == rows
-    assert run(named, [(Place("x"), 1)], tmp_path / "other") == [{"name": "x", "seed": 1, "whole": "x1"}]
 
 
 @pytest.mark.parametrize("torn", [0, 5])

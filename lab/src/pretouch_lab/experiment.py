@@ -31,7 +31,7 @@ from pretouch_lab.options import Options
 from pretouch_lab.run import Play, Row, plays_of
 from pretouch_lab.trial import Record, Setup
 
-if TYPE_CHECKING:  # workers that only play trials need none of it
+if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 NAMES = ("static", "avoidance", "dynamic", "between", "mounting", "coverage", "two-arms")
@@ -49,15 +49,20 @@ class Drawing:
     """An experiment's figure."""
 
     name: str
-    """As `pretouch figure` takes it."""
+    """As `pretouch figure` takes it; a function of `experiments.figures` has the same."""
     text: str
     """What it shows."""
-    shown: Callable[[list[Row]], list[Row]]
+    cells: Callable[[list[Row]], list[Row]]
     """Chooses of cells, or of rows of their trials, those that it shows."""
-    draw: Callable[[list[Trace], tuple[str, ...]], "Figure"]
-    """Draws these, given the names of the skin's units."""
     beside: tuple[str, ...] = ()
     """Profiles that it shows beside a profile with proximity."""
+
+    def draw(self, traces: list[Trace], units: tuple[str, ...]) -> "Figure":
+        """Draw traces, given the names of the skin's units."""
+        from pretouch_lab.experiments import figures  # workers that only play trials need no Matplotlib
+
+        figure: Figure = getattr(figures, self.name.replace("-", "_"))(traces, units)
+        return figure
 
 
 @dataclass(frozen=True)
@@ -232,7 +237,7 @@ def play(name: str, options: Options, out: Path, cell: Row, seed: int) -> Row:
         for file in (place, unfinished):  # of a worker that was killed, or whose row was torn
             file.unlink(missing_ok=True)
         context = replace(context, recording=unfinished)
-    row = what.trial(cell, seed, context)[0]
+    row = what.trial(cell, seed, context)[0] | ({"world": options.world} if options.world else {})
     if unfinished.exists():  # some trials play nothing
         os.replace(unfinished, place)
     return row

@@ -10,18 +10,10 @@ import os
 import shutil
 import signal
 import subprocess
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from concurrent.futures import (
-    FIRST_COMPLETED,
-    BrokenExecutor,
-    CancelledError,
-    Executor,
-    Future,
-    ProcessPoolExecutor,
-    wait,
-)
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent import futures
+from concurrent.futures import CancelledError, Executor, Future
 from contextlib import contextmanager
-from dataclasses import asdict, is_dataclass
 from itertools import islice
 from multiprocessing import active_children, get_context, parent_process
 from pathlib import Path
@@ -42,11 +34,12 @@ _CONNECT_S = 10.0
 
 Row = dict[str, Any]
 """What one play or several came to: plain values by their names."""
-Cell = Any
-"""What tells plays from others but the seed: a mapping, or a frozen dataclass, of plain values. All cells of a run have
-the same names."""
+Cell = Row
+"""What tells plays from others but the seed: all cells of a run have the same names."""
 Play = tuple[Cell, int]
 """A cell and a seed."""
+Trial = Callable[[Cell, int], Row]
+"""Gives a row for a cell and a seed. A function of a module, or a `partial` of one, as it goes to workers."""
 
 
 def plays_of(cells: Iterable[Cell], seeds: Iterable[int]) -> list[Play]:
@@ -56,8 +49,8 @@ def plays_of(cells: Iterable[Cell], seeds: Iterable[int]) -> list[Play]:
 
 
 def run(
-    trial: Callable[[Cell, int], Row],
-    plays: Iterable[Play],
+    trial: Trial,
+    plays: Sequence[Play],
     out: Path,
     executor: Executor | None = None,
     at_once: int = os.cpu_count() or 1,
@@ -66,7 +59,7 @@ def run(
     """Play what is not in a folder yet, and return the rows of all plays, in their order.
 
     Args:
-        trial: gives a row for a cell and a seed. A function of a module, or a `partial` of one, as it goes to workers.
+        trial: plays a cell with a seed.
         plays: cells with their seeds, in the order in which they are begun; the same one is played once.
         out: the folder. However the run ends, rows of finished plays are in its `rows.jsonl`.
         executor: plays them; None: this process, one after the other.
@@ -77,31 +70,25 @@ def run(
         ExperimentError: for a worker that was killed, for rows that cannot be read or written, and for what a trial
             gives that cannot be one.
     """
-    every = [(_plain(cell), cell, seed) for cell, seed in plays]
-    with _rows_in(out, tuple(every[0][0]) if every else ()) as (file, rows):
-        left = {key: (cell, seed) for names, cell, seed in every if (key := _key(names, seed)) not in rows}
+    with _rows_in(out, plays) as (file, rows):
+        left = {key: play for play in plays if (key := _key(*play)) not in rows}
         for cell, seed, measured in _played(trial, list(left.values()), executor, at_once):
-            line = _line(_plain(cell), seed, measured)
+            line = _line(cell, seed, measured)
             with _kept_in(out):
                 file.write(line.encode() + b"\n")
                 file.flush()
-            rows[_key(_plain(cell), seed)] = json.loads(line)
+            rows[_key(cell, seed)] = json.loads(line)
             done()
-    return [rows[_key(names, seed)] for names, _, seed in every]
+    return [rows[_key(*play)] for play in plays]
 
 
-def missing(plays: Iterable[Play], out: Path) -> int:
+def missing(plays: Sequence[Play], out: Path) -> int:
     """Count the plays that are not in a folder yet."""
-    every = [(_plain(cell), seed) for cell, seed in plays]
-    with _rows_in(out, tuple(every[0][0]) if every else ()) as (_, rows):
-        return sum(_key(*each) not in rows for each in every)
+    with _rows_in(out, plays) as (_, rows):
+        return sum(_key(*play) not in rows for play in plays)
 
 
-def _plain(cell: Cell) -> Row:
-    return asdict(cell) if is_dataclass(cell) and not isinstance(cell, type) else dict(cell)
-
-
-def _key(cell: Row, seed: int) -> str:
+def _key(cell: Cell, seed: int) -> str:
     return json.dumps([cell, seed], sort_keys=True)
 
 
@@ -131,12 +118,12 @@ def _kept_in(out: Path) -> Iterator[None]:
 
 
 @contextmanager
-def _rows_in(out: Path, names: tuple[str, ...]) -> Iterator[tuple[IO[bytes], dict[str, Row]]]:
-    """Open a folder's rows to read them and to append more: no other run may have them open.
+def _rows_in(out: Path, plays: Sequence[Play]) -> Iterator[tuple[IO[bytes], dict[str, Row]]]:
+    """Open a folder's rows of such plays to read them and to append more: no other run may have them open.
 
     A last line that was not written whole, by a process that was killed, is taken away.
     """
-    place = out / ROWS
+    place, names = out / ROWS, tuple(plays[0][0]) if plays else ()
     with _kept_in(out):
         out.mkdir(parents=True, exist_ok=True)
         file = place.open("a+b")
@@ -166,7 +153,7 @@ def _read(number: int, line: bytes, names: tuple[str, ...], place: Path) -> tupl
 
 
 def _played(
-    trial: Callable[[Cell, int], Row], plays: list[Play], executor: Executor | None, at_once: int
+    trial: Trial, plays: list[Play], executor: Executor | None, at_once: int
 ) -> Iterator[tuple[Cell, int, Row]]:
     """Give each play with what it came to, as it comes."""
     if executor is None:
@@ -179,13 +166,13 @@ def _played(
         with noted(signal.SIGINT), kept_from_children():  # so that Ctrl-C finds no process half imported
             running = {executor.submit(trial, *play): play for play in islice(waiting, at_once)}
         while running:
-            for future in wait(running, return_when=FIRST_COMPLETED).done:
+            for future in futures.wait(running, return_when=futures.FIRST_COMPLETED).done:
                 measured = future.result()
                 cell, seed = running.pop(future)
                 yield cell, seed, measured
                 running |= {executor.submit(trial, *play): play for play in islice(waiting, 1)}
-    except BrokenExecutor as error:
-        played = " or ".join(f"{_plain(cell)} with seed {seed}" for cell, seed in running.values())
+    except futures.BrokenExecutor as error:
+        played = " or ".join(f"{cell} with seed {seed}" for cell, seed in running.values())
         raise ExperimentError(
             f"A worker process was killed, for want of memory perhaps, while it played {played}. All finished plays are"
             " kept: the same command with the same --out goes on."
@@ -214,7 +201,7 @@ def workers(processes: int | None = None, scheduler: str = "") -> Iterator[tuple
     if count == 1:
         yield None, 1
         return
-    pool = ProcessPoolExecutor(count, mp_context=get_context("spawn"), initializer=_start)
+    pool = futures.ProcessPoolExecutor(count, mp_context=get_context("spawn"), initializer=_start)
     try:
         yield pool, count
     except BaseException:

@@ -171,6 +171,15 @@ def table(title: str, columns: Sequence[Column], rows: Iterable[Row], note: str 
     return TextTable(title, tuple(column.heading for column in columns), cells, note, names)
 
 
+def medians(
+    title: str, columns: Sequence[Column], rows: Iterable[Row], by: Sequence[str], note: str = "", names: int = 1
+) -> TextTable:
+    """Group rows of trials by names, and write medians of the columns that have digits and sums of the others."""
+    spreads = [column.key for column in columns if column.digits is not None]
+    counts = {key for column in columns if column.digits is None for key in (column.key, column.of)}
+    return table(title, columns, summary(rows, by, spreads, [*counts - {"", "trials", *by}]), note, names)
+
+
 def short(value: float) -> str:
     """Write a number with two digits that count."""
     return f"{value:.2g}" if value < 9.95 else f"{value:.0f}"

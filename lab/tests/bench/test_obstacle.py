@@ -1,7 +1,9 @@
+import mujoco
 import numpy as np
 import pytest
 
 from pretouch.perception.closest import closest_points
+from pretouch.robot.description import panda
 from pretouch_lab.bench.avoidance_scenes import Walker, travelled
 from pretouch_lab.bench.obstacle import Ball, Cuboid, least_distance, nearest
 
@@ -59,3 +61,23 @@ def test_the_least_distance_of_many_postures_is_that_of_each_alone(panda_model):
             for a, b in zip(q, hands, strict=True)
         ]
         assert least_distance(panda_model, q, shape, hands) == pytest.approx(min(each), abs=1e-12)
+
+
+def test_the_nearest_point_of_the_arm_to_a_box_is_that_of_mujoco(panda_model):
+    """Both shapes are convex, and MuJoCo finds their distance in another way."""
+    center, half_size = (0.5, 0.35, 0.4), (0.15, 0.02, 0.12)
+    spec = mujoco.MjSpec.from_file(str(panda().mjcf))
+    box = mujoco.mjtGeom.mjGEOM_BOX
+    spec.worldbody.add_geom(name="object", type=box, pos=center, size=half_size, contype=1, conaffinity=1)
+    model = spec.compile()
+    data, rng, target = mujoco.MjData(model), np.random.default_rng(8), model.geom("object").id
+    moved = {panda_model.links[i] for i in panda_model.body.link}
+    geoms = [g for g in range(model.ngeom) if model.body(int(model.geom_bodyid[g])).name in moved]
+    shape = Cuboid(np.array(center), np.array(half_size))
+    for _ in range(20):
+        q = rng.uniform(panda_model.q_min, panda_model.q_max)
+        data.qpos[: panda_model.n] = q
+        mujoco.mj_kinematics(model, data)
+        expected = min(mujoco.mj_geomDistance(model, data, g, target, 2.0, None) for g in geoms)
+        ours = nearest(panda_model.kinematics(q), panda_model.body, shape).distance
+        assert ours == pytest.approx(expected, abs=1e-3) or (ours < 0 and expected < 0)

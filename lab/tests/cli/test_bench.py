@@ -1,10 +1,11 @@
 import json
+from functools import partial
 
 import pytest
 
 from pretouch import cli
 from pretouch_lab.bench import shield
-from pretouch_lab.cli import benchmarks, playing
+from pretouch_lab.cli import benchmarks
 
 
 def test_a_benchmark_writes_numbers_and_tables_and_a_folder_of_others_is_refused(monkeypatch, capsys, tmp_path):
@@ -33,18 +34,18 @@ def test_each_benchmark_plays_all_that_it_says(monkeypatch, tmp_path, name):
         asked.append((len(plays), out.name))
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(playing, "played", played)
+    monkeypatch.setattr(benchmarks, "played", played)
     assert cli.main(["bench", name, "--quick", "--out", str(tmp_path / "run")]) == 130
     assert asked == [{"localization": (6, "streams"), "detection": (23, "run"), "avoidance": (132, "run")}[name]]
 
 
 def test_bench_both_says_which_goals_were_reached(monkeypatch, capsys, tmp_path):
-    def nothing(options):
-        name = type(options).__name__.lower()
-        return {"about": options.about(name), "rows": [], "paired": [], "families": []}
+    def nothing(name, options):
+        about = {"bench": name, "quick": options.quick, "seeds": options.seeds}
+        return {"about": about, "rows": [], "paired": [], "families": []}
 
-    for kind in (benchmarks.Detection, benchmarks.Avoidance):
-        monkeypatch.setattr(kind, "results", nothing)
+    for name in ("detection", "avoidance"):
+        monkeypatch.setattr(benchmarks, name, partial(nothing, name))
     out = tmp_path / "run"
     out.mkdir()
     assert cli.main(["bench", "both", "--quick", "--seeds", "development", "--out", str(out)]) == 0

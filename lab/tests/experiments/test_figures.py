@@ -6,16 +6,14 @@ import pytest
 from PIL import Image
 
 from pretouch import cli
-from pretouch.profiles import profile
 from pretouch.recording.run_record import MODES, RunRecord, TrueForces
 from pretouch.types import Contact, Mode
-from pretouch_lab import trial
-from pretouch_lab.cli.commands import draw_figure
+from pretouch_lab.cli import reproducing
+from pretouch_lab.cli.reproducing import draw_figure
 from pretouch_lab.experiments import between, figures
 from pretouch_lab.experiments.figures import circle, close_up, force_difference, interaction
 
 S, UNITS = 400, tuple("abcdefg")
-PAPER = profile("paper")
 TOUCHED, DETECTED = slice(300, 320), 305
 
 
@@ -40,16 +38,17 @@ def made_trace() -> RunRecord:
     )  # fmt: skip
 
 
+def traces(profile="paper", **changes):
+    return [({"profile": profile}, replace(made_trace(), **changes))]
+
+
 @cache
 def drawn():
-    trace = made_trace()
-    pairs = {(t, s, p): trace for t in ("circle", "line") for s in ("-y", "+y") for p in ("blind", "paper")}
-    return {
-        "circle": circle(trace, PAPER),
-        "interaction": interaction(trace, UNITS, PAPER),
-        "close-up": close_up(trace, UNITS, PAPER),
-        "force-difference": force_difference(pairs, ["paper"]),
-    }
+    places = [{"trajectory": t, "side": s} for t in ("circle", "line") for s in ("-y", "+y")]
+    pairs = [(place | {"profile": name}, made_trace()) for place in places for name in ("blind", "paper")]
+    figures = {"circle": circle, "interaction": interaction, "close-up": close_up}
+    figures = {name: draw(traces(), UNITS) for name, draw in figures.items()}
+    return figures | {"force-difference": force_difference(pairs, UNITS)}
 
 
 def line(axes, label):
@@ -103,8 +102,7 @@ def test_the_interaction_shades_slowed_and_touched_spans_and_names_the_push():
 
 
 def test_the_close_up_of_a_trace_without_a_touch_shows_all_of_it():
-    trace = replace(made_trace(), truth=None)
-    assert close_up(trace, UNITS, PAPER).axes[1].get_xlim() == (0.0, 3.99)
+    assert close_up(traces(truth=None), UNITS).axes[1].get_xlim() == (0.0, 3.99)
 
 
 def test_the_force_difference_counts_from_the_touch_away_from_the_object():
@@ -114,8 +112,8 @@ def test_the_force_difference_counts_from_the_touch_away_from_the_object():
         assert estimate.get_xdata()[300] == 0.0
         assert estimate.get_ydata()[300] == sign * 20.0
         assert line(axes, "paper: detected").get_xdata() == pytest.approx([0.05])
-    assert force_difference({}, ["paper"]).axes[0].lines[:] == []
-    alone = force_difference({("circle", "-y", "blind"): made_trace()}, ["blind"])
+    assert force_difference([], UNITS).axes[0].lines[:] == []
+    alone = force_difference([({"trajectory": "circle", "side": "-y", "profile": "blind"}, made_trace())], UNITS)
     assert alone.get_suptitle().endswith("thresholds, blind")
     assert len(alone.axes[0].get_legend_handles_labels()[1]) <= 4
 
@@ -128,7 +126,7 @@ def test_a_figure_is_written_here_by_its_name_of_trials_that_are_played_and_told
         return {}, cell
 
     monkeypatch.setattr(between, "EXPERIMENT", replace(between.EXPERIMENT, trial=play))
-    monkeypatch.setattr(trial, "trace_of", lambda _record: made_trace())
+    monkeypatch.setattr(reproducing, "trace_of", lambda _record: made_trace())
     monkeypatch.chdir(tmp_path)
     assert cli.main(["figure", "close-up", "--profile", "paper-0.5m", "--seed", "4"]) == 0
     text = capsys.readouterr()
@@ -149,8 +147,7 @@ def test_each_figure_is_drawn_from_trials_it_plays(tmp_path, name):
 
 
 def test_figures_of_a_detector_without_thresholds_show_none():
-    ours = profile("pretouch")
-    for figure in (interaction(made_trace(), UNITS, ours), close_up(made_trace(), UNITS, ours)):
+    for figure in (draw(traces("pretouch"), UNITS) for draw in (interaction, close_up)):
         labels = [text for axes in figure.axes for text in axes.get_legend_handles_labels()[1]]
         assert "bands of one sample" in labels
         assert not {"thresholds", "thresholds without F_obs", "value of eq. 8"} & set(labels)

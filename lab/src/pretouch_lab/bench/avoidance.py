@@ -110,7 +110,8 @@ def trial(world: str, arm: str, cell: Cell, seed: int) -> Row:
     scenario = scenarios()[cell["scenario"]]
     scene = setting(scenario, profile(profile_text(cell["contender"])), seed, arm)
     record = play(replace(scene.setup, world=world), scene.done)
-    return {"family": scenario.family, **measured(record, scene, scenario)}
+    own = {"family": scenario.family} | ({"world": world} if world else {})
+    return own | measured(record, scene, scenario)
 
 
 def summarise(rows: list[Row]) -> Row:

@@ -1,22 +1,93 @@
-"""`pretouch bench`: its docstrings are the help."""
+"""`pretouch bench`: its docstrings are the help. What each benchmark does stands in `benchmarks`."""
 
-import sys
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any, Literal
 
 import tyro
 
 from pretouch.calibration.motion.limits import PlanParams
 from pretouch.cli.options import Counts, JsonFile, Words
-from pretouch.errors import CalibrationError, ExperimentError
-from pretouch_lab.cli.benchmarks import Avoidance, Both, Detection, Localization, Shield
 from pretouch_lab.options import Playing
 
-if TYPE_CHECKING:  # the help is to need none of the heavy packages
-    from pretouch_lab.run import Row
+
+def _run(options: Any) -> None:
+    """Run a benchmark, and write its numbers if a file is given."""
+    from pretouch.cli.writing import numbers_to
+    from pretouch_lab.cli import benchmarks  # heavy packages, which the help does without
+
+    with numbers_to(options.json) as write:
+        write(getattr(benchmarks, type(options).__name__.lower())(options))
+
+
+@dataclass(frozen=True)
+class Published(Playing):
+    """Options of the benchmarks that are published."""
+
+    quick: bool = False
+    """A small part of it; it says what it cannot tell."""
+    seeds: Literal["published", "development"] = "published"
+    """Which simulated arms: those of the published tables, or others to develop with."""
+
+
+@dataclass(frozen=True)
+class InWorlds(Published):
+    """Options of those that can be played with other simulated arms and sensors."""
+
+    world: str = ""
+    """Set of simulated arms, sensors and delays: nominal, realistic, stress, or a TOML file, of which each trial's seed
+    draws its own; by default the arms of the published tables. Results of a world are kept in a folder of its own."""
+
+
+@dataclass(frozen=True)
+class Detection(InWorlds):
+    """Hold contact detectors against each other: delay against false alarms, what they miss, forces on a board.
+
+    About an hour on two processors, with --quick five minutes. A run that was stopped goes on with the same --out.
+    """
+
+
+@dataclass(frozen=True)
+class Avoidance(InWorlds):
+    """How near arms come to people and objects, with what forces, and what it costs to keep clear of them.
+
+    About half an hour on two processors, with --quick three minutes. A run that was stopped goes on with the same
+    --out.
+    """
+
+    baselines: Annotated[Words, tyro.conf.arg(aliases=["--contenders"])] = ()
+    """Baselines, separated by commas: blind, flacco, flacco-surface, ding, ding-near, paper, paper-off, or any
+    profile; by default all, and pretouch with each switch off alone."""
+    scenarios: Words = ()
+    """Scenarios, separated by commas; by default all."""
+    arm: str = "panda"
+    """Name of an arm, or the folder of an imported one, in a folder of results of its own: give --out. The scenarios'
+    paths and obstacles are scaled into its reach, and the skin is the arm's own."""
+
+
+@dataclass(frozen=True)
+class Localization(Published):
+    """Hold where contacts are said to be against where they are: links, places, two at once; with skins and without.
+
+    About twenty minutes on two processors, with --quick three. A run that was stopped goes on with the same --out.
+    """
+
+
+@dataclass(frozen=True)
+class Shield(Published):
+    """Hold filters between a commander and the arm against each other: what holds whoever commands, and what it costs.
+
+    About ten minutes on two processors, with --quick one. A run that was stopped goes on with the same --out.
+    """
+
+
+@dataclass(frozen=True)
+class Both(InWorlds):
+    """Run the benchmarks detection and avoidance, and say which goals were reached.
+
+    About an hour and a half on two processors, with --quick ten minutes. A run that was stopped goes on with the same
+    --out.
+    """
 
 
 @dataclass(frozen=True)
@@ -29,35 +100,8 @@ class Real(Playing):
 
     sets: tyro.conf.Positional[Path] = field(kw_only=True)
     """Folder of the sets, each by its name, with `arms` as `pretouch robot import` wrote them."""
-    detectors: Words = ()
-    """Profiles, separated by commas; by default fixed, observer, paper and pretouch."""
-
-    def run(self) -> None:
-        """Play what is there, with tables and rows."""
-        from pretouch.cli.writing import numbers_to
-        from pretouch.profiles import profile
-        from pretouch_lab.bench.real import DETECTORS, tables, trial
-        from pretouch_lab.bench.real_sets import files_digest, sets_in
-        from pretouch_lab.cli.playing import check_json, played, report
-        from pretouch_lab.run import open_run
-
-        detectors = self.detectors or DETECTORS
-        for name in detectors:
-            profile(name)  # an hour later would be late
-        sets, missing = sets_in(self.sets)
-        plays = [({"set": each.name, "detector": name}, 0) for each in sets for name in detectors]
-        out = self.folder("bench-real")
-        check_json(self, [out])
-        with numbers_to(self.json) as write:
-            folder = self.sets.absolute()
-            open_run(out, {"bench": "real", "sets": str(folder), "files_sha256": files_digest(sets, folder)})
-            for sentence in missing:
-                print(sentence, file=sys.stderr)
-            rows = played("recordings", partial(trial, folder), plays, out, self)
-            made = tables(rows)
-            report(made, [], out)
-            sources = {each.name: each.source for each in sets}
-            write({"sets": sources, "left_out": missing, "rows": rows, "tables": made})
+    detectors: Words = ("fixed", "observer", "paper", "pretouch")
+    """Profiles, separated by commas."""
 
 
 @dataclass(frozen=True)
@@ -73,32 +117,6 @@ class Calibration(Playing):
     """panda, fr3, or the folder of an imported arm."""
     seed: int = 0
     """Decides all that is random."""
-
-    def run(self) -> None:
-        """Run it, with tables and numbers."""
-        from pretouch.calibration.motion.planner import plan_motion
-        from pretouch.cli.writing import numbers_to
-        from pretouch.robot.description import files_digest, robot_named
-        from pretouch.robot.model import RobotModel
-        from pretouch_lab.bench.calibration import tables, trial
-        from pretouch_lab.cli.playing import check_json, played, report
-        from pretouch_lab.run import open_run, plays_of
-
-        if self.skins < 1:
-            raise CalibrationError(f"The number of skins is {self.skins}: give at least 1.")
-        if self.seed < 0:
-            raise CalibrationError(f"The seed is {self.seed}: it must be at least 0.")
-        out, model = self.folder("bench-calibration"), RobotModel(robot_named(self.arm))
-        check_json(self, [out])
-        with numbers_to(self.json) as write:
-            arm = {"arm": self.arm, "arm_sha256": files_digest(model.description)}
-            open_run(out, {"bench": "calibration", **arm, "motion": repr(self.motion)})
-            plan = plan_motion(model, self.motion)
-            plays = plays_of([{"find_links": self.find_links}], range(self.seed, self.seed + self.skins))
-            rows = played("skins", partial(trial, self.input(self.arm), plan), plays, out, self)
-            made = tables(rows, plan.duration)
-            report(made, [], out)
-            write({"rows": rows, "motion_s": plan.duration, "tables": made})
 
 
 @dataclass(frozen=True)
@@ -121,47 +139,6 @@ class Cycle:
     cpu: int | None = None
     """Number of the processor to stay on; by default the system decides."""
 
-    def run(self) -> None:
-        """Measure, show, and write the numbers if a file is given."""
-        from pretouch.cli.writing import numbers_to
-        from pretouch.realtime import check_wishes
-        from pretouch_lab.bench.cycle import CycleRequest
-        from pretouch_lab.bench.workload import LARGEST_SKIN
-
-        request = CycleRequest(self.rate, self.cycles, self.profile, self.priority, self.cpu, arm=self.arm)
-        wrong = [n for n in self.points if not 1 <= n <= LARGEST_SKIN]
-        if wrong or not self.points:
-            found = wrong[0] if wrong else "missing"
-            raise ExperimentError(f"The number of points is {found}: give 1 to {LARGEST_SKIN}.")
-        check_wishes(self.priority, self.cpu)
-        with numbers_to(self.json) as write:
-            _measure(self.points, request, write)
-
-
-def _measure(points: Sequence[int], request: Any, write: Callable[[Any], None]) -> None:
-    """Measure with each number of points; what was measured before something ended it is shown and written too."""
-    from rich.console import Console
-
-    from pretouch.cli.tables import show
-    from pretouch_lab.bench.cycle import about, measure, tables
-
-    rows: list[Row] = []
-    sentences: list[str] = []
-    try:
-        for n in points:
-            seconds = request.cycles / request.rate_hz
-            print(f"{n} points: {request.cycles} cycles, {seconds:.0f} s or more.", file=sys.stderr)
-            rows.append(measure(n, request, sentences.append))
-    finally:
-        if rows:
-            missing = list(dict.fromkeys(sentences))
-            # first, for the terminal may be gone
-            write({"about": {**about(request), "missing": missing, "asked": points}, "rows": rows})
-            show(Console(highlight=False), tables(rows, request))
-            print(*missing, sep="\n")
-        if len(rows) < len(points):
-            print(f"Stopped: {len(rows)} of {len(points)} numbers of points were measured.", file=sys.stderr)
-
 
 @dataclass(frozen=True)
 class Bench:
@@ -178,6 +155,6 @@ class Bench:
         | Annotated[Real, tyro.conf.subcommand("real")]
     )
 
-    def run(self) -> int | None:
+    def run(self) -> None:
         """Run the benchmark."""
-        return self.what.run()
+        _run(self.what)

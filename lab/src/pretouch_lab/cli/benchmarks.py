@@ -1,211 +1,170 @@
-"""`pretouch bench detection`, `avoidance`, `localization`, `shield` and `both`: their docstrings are the help."""
+"""What the benchmarks of `pretouch bench` do: play what is missing, show and write tables, and return the numbers."""
 
-from dataclasses import dataclass, fields
+import sys
+from dataclasses import fields
 from functools import partial
 from hashlib import sha256
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any
 
-import tyro
+from rich.console import Console
 
-from pretouch.cli.options import Words
-from pretouch.errors import ExperimentError
-from pretouch_lab.options import Playing
-
-
-@dataclass(frozen=True)
-class BenchOptions(Playing):
-    """Options of the benchmarks that are published."""
-
-    quick: bool = False
-    """A small part of it; it says what it cannot tell."""
-    seeds: Literal["published", "development"] = "published"
-    """Which simulated arms: those of the published tables, or others to develop with."""
-    world: str = ""
-    """Set of simulated arms, sensors and delays: nominal, realistic, stress, or a TOML file, of which each trial's seed
-    draws its own; by default the arms of the published tables. Results of a world are kept in a folder of its own."""
-
-    def folder(self, name: str) -> Path:
-        """Return where the results go."""
-        from pretouch_lab.domain_randomisation import folder_part
-
-        return super().folder(f"{name}{folder_part(self.world)}{'-quick' if self.quick else ''}")
-
-    def about(self, name: str) -> dict[str, Any]:
-        """Return what the numbers say of the run."""
-        from pretouch import __version__
-
-        world = {"world": self.world} if self.world else {}
-        return {"bench": name, "version": __version__, "quick": self.quick, "seeds": self.seeds, **world}
-
-    def below(self, kind: "type[BenchOptions]", folder: Path) -> Any:
-        """Return the options of another benchmark, whose results go below a folder."""
-        shared = {each.name: getattr(self, each.name) for each in fields(BenchOptions)}
-        return kind(**shared | {"out": str(folder), "json": None})
-
-    def run(self) -> None:
-        """Play what is missing, and show and write what came out."""
-        from pretouch.cli.writing import numbers_to
-
-        with numbers_to(self.json) as write:
-            write(self.results())
-
-    def results(self) -> dict[str, Any]:
-        """Play what is missing, show tables, write them, and return the numbers."""
-        raise NotImplementedError
+from pretouch import __version__
+from pretouch.calibration.motion.planner import plan_motion
+from pretouch.cli.tables import show
+from pretouch.errors import CalibrationError, ExperimentError
+from pretouch.profiles import profile
+from pretouch.realtime import check_wishes
+from pretouch.robot.description import files_digest, robot_named
+from pretouch.robot.model import RobotModel
+from pretouch.sim.plant_params import assumed_plant
+from pretouch.sim.randomisation import world_set
+from pretouch.text_table import TextTable
+from pretouch_lab.bench import avoidance as avoiding
+from pretouch_lab.bench import calibration as calibrating
+from pretouch_lab.bench import cycle as timing
+from pretouch_lab.bench import detection as detecting
+from pretouch_lab.bench import localization as locating
+from pretouch_lab.bench import real as recorded
+from pretouch_lab.bench import shield as shielding
+from pretouch_lab.bench.avoidance_scenes import PANDA, arm, place
+from pretouch_lab.bench.detection_results import results
+from pretouch_lab.bench.detection_tables import tables
+from pretouch_lab.bench.goals import front_table, goal_table
+from pretouch_lab.bench.real_sets import files_digest as sets_digest
+from pretouch_lab.bench.real_sets import sets_in
+from pretouch_lab.bench.scenes import checksums
+from pretouch_lab.bench.workload import LARGEST_SKIN
+from pretouch_lab.cli import bench
+from pretouch_lab.cli.playing import begin, check_numbers, played, report
+from pretouch_lab.domain_randomisation import folder_part, sentence
+from pretouch_lab.run import Row, plays_of
 
 
-def begin(options: BenchOptions, name: str, out: Path, **more: Any) -> None:
-    """Make a folder for a benchmark's results, or take up one that a run with the same options began."""
-    from pretouch.sim.randomisation import world_set
-    from pretouch_lab.bench.scenes import checksums
-    from pretouch_lab.cli.playing import check_json
-    from pretouch_lab.domain_randomisation import sentence
-    from pretouch_lab.run import open_run
-
-    world = {"world_sha256": world_set(options.world).digest} if options.world else {}
+def _folder(options: bench.Published, name: str, **more: Any) -> Path:
+    """Make the folder of a published benchmark's results, or take up one that a run with the same options began."""
+    world = options.world if isinstance(options, bench.InWorlds) else ""
+    out = options.folder(f"bench-{name}{folder_part(world)}{'-quick' if options.quick else ''}")
     scenarios = sha256(repr(sorted(checksums().items())).encode()).hexdigest()
-    check_json(options, [out, out / "streams"])
-    shared = {"bench": name, "seeds": options.seeds, "world": options.world, "scenarios_sha256": scenarios}
-    open_run(out, shared | world | more)
-    if options.world:
-        print(sentence(options.world))
+    about = {"bench": name, "seeds": options.seeds, "world": world, "scenarios_sha256": scenarios, **more}
+    begin(options, out, about | ({"world_sha256": world_set(world).digest} if world else {}))
+    if world:
+        print(sentence(world))
+    return out
 
 
-def _finish(out: Path, about: dict[str, Any], tables: list[Any], text: str, **numbers: Any) -> dict[str, Any]:
-    """Show tables and write them with a text; return the numbers."""
-    from pretouch_lab.cli.playing import report
-
-    kind = "quick" if about["quick"] else "full"
-    report(tables, [], out, f"Version {about['version']}, {about['seeds']} seeds, {kind} run. {text}\n")
-    return {"about": about, **numbers, "tables": tables}
-
-
-@dataclass(frozen=True)
-class Detection(BenchOptions):
-    """Hold contact detectors against each other: delay against false alarms, what they miss, forces on a board.
-
-    About an hour on two processors, with --quick five minutes. A run that was stopped goes on with the same --out.
-    """
-
-    def results(self) -> dict[str, Any]:
-        """See `BenchOptions`."""
-        from pretouch_lab.bench import detection
-        from pretouch_lab.bench.detection_results import results
-        from pretouch_lab.bench.detection_tables import tables
-        from pretouch_lab.cli.playing import played
-
-        out = self.folder("bench-detection")
-        begin(self, "detection", out, quick=self.quick)
-        which = self.seeds, self.quick, self.input(self.world)
-        rows = played("detection", partial(detection.trial, *which), detection.plays(detection.arms(*which)), out, self)
-        numbers = results(detection.rows_of(rows))
-        return _finish(out, self.about("detection"), tables(numbers), numbers["resolution"], **numbers)
+def _finished(
+    options: bench.Published, name: str, out: Path, tables: list[TextTable], text: str = "", **numbers: Any
+) -> dict[str, Any]:
+    """Show tables and write them with a text; return the numbers with what they say of the run."""
+    kind, world = "quick" if options.quick else "full", getattr(options, "world", "")
+    about = {"bench": name, "version": __version__, "quick": options.quick, "seeds": options.seeds}
+    report(tables, [], out, f"Version {__version__}, {options.seeds} seeds, {kind} run. {text}\n")
+    return {"about": about | ({"world": world} if world else {}), **numbers, "tables": tables}
 
 
-@dataclass(frozen=True)
-class Avoidance(BenchOptions):
-    """How near arms come to people and objects, with what forces, and what it costs to keep clear of them.
-
-    About half an hour on two processors, with --quick three minutes. A run that was stopped goes on with the same
-    --out.
-    """
-
-    baselines: Annotated[Words, tyro.conf.arg(aliases=["--contenders"])] = ()
-    """Baselines, separated by commas: blind, flacco, flacco-surface, ding, ding-near, paper, paper-off, or any
-    profile; by default all, and pretouch with each switch off alone."""
-    scenarios: Words = ()
-    """Scenarios, separated by commas; by default all."""
-    arm: str = "panda"
-    """Name of an arm, or the folder of an imported one, in a folder of results of its own: give --out. The scenarios'
-    paths and obstacles are scaled into its reach, and the skin is the arm's own."""
-
-    def results(self) -> dict[str, Any]:
-        """See `BenchOptions`."""
-        from pretouch.robot.description import files_digest
-        from pretouch.sim.plant_params import assumed_plant
-        from pretouch_lab.bench import avoidance
-        from pretouch_lab.bench.avoidance import tables
-        from pretouch_lab.bench.avoidance_scenes import PANDA, arm, place
-        from pretouch_lab.cli.playing import played
-
-        plays = avoidance.plays(self.seeds, self.quick, self.baselines, self.scenarios)
-        out, other = self.folder("bench-avoidance"), {}
-        if self.arm != PANDA:
-            described = arm(self.arm).description
-            other = {"arm": self.arm, "arm_sha256": files_digest(described)}
-            print(place(self.arm).sentence(described.name), assumed_plant(described), sep="\n")
-        begin(self, "avoidance", out, **other)  # a quick run shares its trials with a full one
-        rows = played(
-            "avoidance", partial(avoidance.trial, self.input(self.world), self.input(self.arm)), plays, out, self
-        )
-        summary = avoidance.summarise(rows)
-        cells = summary.pop("cells")
-        counts = [cell["trials"] for cell in cells]
-        text = f"{min(counts)} to {max(counts)} trials of each contender in each scenario."
-        shown = tables({"cells": cells, **summary})
-        return _finish(out, self.about("avoidance"), shown, text, rows=cells, **summary)
+def detection(options: bench.Detection) -> dict[str, Any]:
+    """See its options."""
+    out = _folder(options, "detection", quick=options.quick)
+    which = options.seeds, options.quick, options.input(options.world)
+    trials = detecting.plays(detecting.arms(*which))
+    numbers = results(detecting.rows_of(played("detection", partial(detecting.trial, *which), trials, out, options)))
+    return _finished(options, "detection", out, tables(numbers), numbers["resolution"], **numbers)
 
 
-@dataclass(frozen=True)
-class Localization(BenchOptions):
-    """Hold where contacts are said to be against where they are: links, places, two at once; with skins and without.
-
-    About twenty minutes on two processors, with --quick three. A run that was stopped goes on with the same --out.
-    """
-
-    def results(self) -> dict[str, Any]:
-        """See `BenchOptions`."""
-        from pretouch_lab.bench import localization
-        from pretouch_lab.cli.playing import played
-
-        if self.world:
-            raise ExperimentError(f"The arm of this benchmark is the usual one: leave out --world {self.world}.")
-        out = self.folder("bench-localization")
-        begin(self, "localization", out)
-        streams = localization.stream_plays(self.seeds, self.quick)
-        played("recording streams", partial(localization.record_stream, out), streams, out / "streams", self)
-        rows = played("replaying them", partial(localization.trial, out), localization.plays(streams), out, self)
-        found = localization.results(rows)
-        return _finish(out, self.about("localization"), localization.tables(found), "", rows=found)
+def avoidance(options: bench.Avoidance) -> dict[str, Any]:
+    """See its options."""
+    trials = avoiding.plays(options.seeds, options.quick, options.baselines, options.scenarios)
+    other: Row = {}
+    if options.arm != PANDA:
+        described = arm(options.arm).description
+        other = {"arm": options.arm, "arm_sha256": files_digest(described)}
+        print(place(options.arm).sentence(described.name), assumed_plant(described), sep="\n")
+    out = _folder(options, "avoidance", **other)  # a quick run shares its trials with a full one
+    trial = partial(avoiding.trial, options.input(options.world), options.input(options.arm))
+    summary = avoiding.summarise(played("avoidance", trial, trials, out, options))
+    shown, cells = avoiding.tables(summary), summary.pop("cells")
+    counts = [cell["trials"] for cell in cells]
+    text = f"{min(counts)} to {max(counts)} trials of each contender in each scenario."
+    return _finished(options, "avoidance", out, shown, text, rows=cells, **summary)
 
 
-@dataclass(frozen=True)
-class Shield(BenchOptions):
-    """Hold filters between a commander and the arm against each other: what holds whoever commands, and what it costs.
-
-    About ten minutes on two processors, with --quick one. A run that was stopped goes on with the same --out.
-    """
-
-    def results(self) -> dict[str, Any]:
-        """See `BenchOptions`."""
-        from pretouch_lab.bench import shield
-        from pretouch_lab.cli.playing import played
-
-        if self.world:
-            raise ExperimentError(f"The arms of this benchmark are the usual ones: leave out --world {self.world}.")
-        out = self.folder("bench-shield")
-        begin(self, "shield", out)
-        found = shield.results(played("shield", shield.trial, shield.plays(self.seeds, self.quick), out, self))
-        return _finish(out, self.about("shield"), shield.tables(found), "", rows=found)
+def localization(options: bench.Localization) -> dict[str, Any]:
+    """See its options."""
+    out = _folder(options, "localization")
+    streams = locating.stream_plays(options.seeds, options.quick)
+    played("recording streams", partial(locating.record_stream, out), streams, out / "streams", options)
+    replays = played("replaying them", partial(locating.trial, out), locating.plays(streams), out, options)
+    rows = locating.results(replays)
+    return _finished(options, "localization", out, locating.tables(rows), rows=rows)
 
 
-@dataclass(frozen=True)
-class Both(BenchOptions):
-    """Run the benchmarks detection and avoidance, and say which goals were reached.
+def shield(options: bench.Shield) -> dict[str, Any]:
+    """See its options."""
+    out, trials = _folder(options, "shield"), shielding.plays(options.seeds, options.quick)
+    rows = shielding.results(played("shield", shielding.trial, trials, out, options))
+    return _finished(options, "shield", out, shielding.tables(rows), rows=rows)
 
-    About an hour and a half on two processors, with --quick ten minutes. A run that was stopped goes on with the same
-    --out.
-    """
 
-    def results(self) -> dict[str, Any]:
-        """See `BenchOptions`."""
-        from pretouch_lab.bench.goals import front_table, goal_table
-        from pretouch_lab.cli.playing import check_json, report
+def both(options: bench.Both) -> dict[str, Any]:
+    """See its options."""
+    out = options.folder(f"bench{folder_part(options.world)}{'-quick' if options.quick else ''}")
+    check_numbers(options, out)
+    shared = {each.name: getattr(options, each.name) for each in fields(bench.InWorlds)} | {"json": None}
+    detected = detection(bench.Detection(**shared | {"out": str(out / "detection")}))
+    avoided = avoidance(bench.Avoidance(**shared | {"out": str(out / "avoidance")}))
+    report([goal_table(detected, avoided), front_table(detected, avoided)], [], out)
+    return {"detection": detected, "avoidance": avoided}
 
-        out = self.folder("bench")
-        check_json(self, [out, *(out / name for name in ("detection", "avoidance"))])
-        detection = self.below(Detection, out / "detection").results()
-        avoidance = self.below(Avoidance, out / "avoidance").results()
-        report([goal_table(detection, avoidance), front_table(detection, avoidance)], [], out)
-        return {"detection": detection, "avoidance": avoidance}
+
+def real(options: bench.Real) -> dict[str, Any]:
+    """See its options."""
+    for name in options.detectors:
+        profile(name)  # an hour later would be late
+    sets, left_out = sets_in(options.sets)
+    trials = [({"set": each.name, "detector": name}, 0) for each in sets for name in options.detectors]
+    out, folder = options.folder("bench-real"), options.sets.absolute()
+    begin(options, out, {"bench": "real", "sets": str(folder), "files_sha256": sets_digest(sets, folder)})
+    for sentence_of_set in left_out:
+        print(sentence_of_set, file=sys.stderr)
+    rows = played("recordings", partial(recorded.trial, folder), trials, out, options)
+    shown = recorded.tables(rows)
+    report(shown, [], out)
+    return {"sets": {each.name: each.source for each in sets}, "left_out": left_out, "rows": rows, "tables": shown}
+
+
+def calibration(options: bench.Calibration) -> dict[str, Any]:
+    """See its options."""
+    if options.skins < 1:
+        raise CalibrationError(f"The number of skins is {options.skins}: give at least 1.")
+    if options.seed < 0:
+        raise CalibrationError(f"The seed is {options.seed}: it must be at least 0.")
+    out, model = options.folder("bench-calibration"), RobotModel(robot_named(options.arm))
+    described = {"arm": options.arm, "arm_sha256": files_digest(model.description)}
+    begin(options, out, {"bench": "calibration", **described, "motion": repr(options.motion)})
+    plan = plan_motion(model, options.motion)
+    trials = plays_of([{"find_links": options.find_links}], range(options.seed, options.seed + options.skins))
+    rows = played("skins", partial(calibrating.trial, options.input(options.arm), plan), trials, out, options)
+    shown = calibrating.tables(rows, plan.duration)
+    report(shown, [], out)
+    return {"rows": rows, "motion_s": plan.duration, "tables": shown}
+
+
+def cycle(options: bench.Cycle) -> dict[str, Any]:
+    """See its options."""
+    how = options.rate, options.cycles, options.profile, options.priority, options.cpu
+    request = timing.CycleRequest(*how, arm=options.arm)
+    if not options.points or not 1 <= min(options.points) <= max(options.points) <= LARGEST_SKIN:
+        numbers = ", ".join(map(str, options.points)) or "none"
+        raise ExperimentError(f"The numbers of points are {numbers}: give 1 to {LARGEST_SKIN}.")
+    check_wishes(options.priority, options.cpu)
+    rows: list[Row] = []
+    sentences: list[str] = []
+    for points in options.points:
+        seconds = request.cycles / request.rate_hz
+        print(f"{points} points: {request.cycles} cycles, {seconds:.0f} s or more.", file=sys.stderr)
+        rows.append(timing.measure(points, request, sentences.append))
+    missing = list(dict.fromkeys(sentences))
+    show(Console(highlight=False), timing.tables(rows, request))
+    print(*missing, sep="\n")
+    return {"about": {**timing.about(request), "missing": missing, "asked": options.points}, "rows": rows}

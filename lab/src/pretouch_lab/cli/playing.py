@@ -2,47 +2,41 @@
 
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
 from pretouch.cli.tables import show
-from pretouch.cli.writing import check_outputs, unwritable_said
-from pretouch.errors import PretouchError
+from pretouch.cli.writing import STANDARD_OUTPUT, unwritable_said
+from pretouch.errors import ExperimentError, PretouchError
 from pretouch.text_table import TextTable, markdown
 from pretouch_lab.options import Playing
-from pretouch_lab.run import ROWS, RUN, Cell, Play, Row, missing, run, workers
+from pretouch_lab.run import ROWS, RUN, Play, Row, Trial, missing, open_run, run, workers
 
 if TYPE_CHECKING:  # most commands draw nothing
     from matplotlib.figure import Figure
 
 TABLES = "tables.md"
-Advance = Callable[[], None]
-"""Called after each of so many pieces of work."""
+DrawnFigure = tuple[str, str, "Figure"]
+"""Its name, and what it shows."""
 
 
 @contextmanager
-def bar(name: str, total: int, done: int = 0) -> Iterator[Advance]:
-    """Show a bar with the time it took and still takes."""
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
+def bar(name: str, total: int, done: int = 0) -> Iterator[Callable[[], None]]:
+    """Show a bar with the time it took and still takes; give what moves it on by a piece of work."""
+    from rich import progress
 
-    columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn()
-    with Progress(*columns, TimeElapsedColumn(), TimeRemainingColumn(), console=Console(stderr=True)) as shown:
+    columns = progress.TextColumn("{task.description}"), progress.BarColumn(), progress.MofNCompleteColumn()
+    times = progress.TimeElapsedColumn(), progress.TimeRemainingColumn()
+    with progress.Progress(*columns, *times, console=Console(stderr=True)) as shown:
         task = shown.add_task(name, total=total, completed=done)
         yield lambda: shown.advance(task)
 
 
-def played(name: str, trial: Callable[[Cell, int], Row], plays: Sequence[Play], out: Path, how: Playing) -> list[Row]:
+def played(name: str, trial: Trial, plays: Sequence[Play], out: Path, how: Playing) -> list[Row]:
     """Play what is missing in a folder, with a bar; say where the rows are if something ends it."""
     left = missing(plays, out)
     if not left:
@@ -58,16 +52,25 @@ def played(name: str, trial: Callable[[Cell, int], Row], plays: Sequence[Play], 
         raise
 
 
-def check_json(how: Playing, folders: Iterable[Path]) -> None:
-    """Refuse a file for the numbers that cannot be written, or in the place of one that a run keeps for itself."""
-    if how.json:
-        own = [folder / name for folder in folders for name in (ROWS, RUN, TABLES)]
-        with unwritable_said("file", how.json):  # a name too long, for one
-            check_outputs([("file", how.json)], own, replace=True)
+def begin(how: Playing, out: Path, arguments: Mapping[str, Any]) -> None:
+    """Make a folder for rows, or take one up that a run with the same arguments began, unless --json is in its way."""
+    check_numbers(how, out)
+    open_run(out, arguments)
 
 
-def report(tables: list[TextTable], figures: list[tuple[str, str, "Figure"]], folder: Path, text: str = "") -> None:
-    """Show tables, and write them with figures, each with its name and what it shows, into a folder."""
+def check_numbers(how: Playing, out: Path) -> None:
+    """Refuse a file for the numbers in the place of one that a run keeps in its folder: none of them ends in .json."""
+    if how.json and str(how.json) != STANDARD_OUTPUT:
+        place = how.json.resolve()
+        if place.is_relative_to(out.resolve()) and (place.suffix != ".json" or place.name == RUN):
+            raise ExperimentError(
+                f"The file {how.json} is in {out}, where the run keeps its own: give a name that ends in .json, but not"
+                f" {RUN}, or another folder."
+            )
+
+
+def report(tables: list[TextTable], figures: list[DrawnFigure], folder: Path, text: str = "") -> None:
+    """Show tables, and write them with figures into a folder."""
     console, place = Console(highlight=False), folder / TABLES
     show(console, tables)
     with unwritable_said("file", place):

@@ -47,8 +47,7 @@ class Sweep(Playing):
         from pretouch import __version__
         from pretouch.cli.writing import numbers_to, unwritable_said
         from pretouch.sim.randomisation import world_set
-        from pretouch_lab.cli.playing import check_json, played, report
-        from pretouch_lab.run import open_run
+        from pretouch_lab.cli.playing import begin, played, report
         from pretouch_lab.sweep import EXPERIMENTS, SWEEP, found_in, sobol_figure, sweep_of, tables, trial
 
         vary, fix = self._pairs("vary", self.vary), self._pairs("fix", self.fix)
@@ -61,9 +60,8 @@ class Sweep(Playing):
         plays, out = sweep.plays(), self.folder("sweep")
         named = {cell["plant.world"] for cell, _ in plays if "plant.world" in cell}
         worlds = {name: world_set(name).digest for name in sorted(named)}
-        check_json(self, [out])
         with numbers_to(self.json) as write:
-            open_run(out, {"sweep": sweep.experiment, "profile": sweep.profile, "worlds_sha256": worlds})
+            begin(self, out, {"sweep": sweep.experiment, "profile": sweep.profile, "worlds_sha256": worlds})
             rows = played("sweep", partial(trial, sweep.experiment, sweep.profile), plays, out, self)
             for reason, count in Counter(row["failed"] for row in rows if row["failed"]).items():
                 again = "Take their lines out of rows.jsonl to try again."

@@ -2,12 +2,10 @@
 
 from dataclasses import dataclass
 from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pretouch.perception.closest import closest_points
-from pretouch.profiles import profile
 from pretouch.robot.model import RobotModel
 from pretouch.sim.hand import FREE_N, HOME, LEAD_S, HandGoal, point_on_arm, robot_hand, way_round
 from pretouch.sim.paper_scenes import Placement
@@ -15,26 +13,11 @@ from pretouch.sim.plant import Plant
 from pretouch.sim.scene import HandSpec, SceneSpec
 from pretouch.text_table import TextTable
 from pretouch.types import FloatArray
-from pretouch_lab.experiment import (
-    Context,
-    Drawing,
-    Experiment,
-    Trace,
-    controller_named,
-    controllers,
-    first_sensing,
-    main,
-)
+from pretouch_lab.experiment import Context, Drawing, Experiment, controller_named, controllers, first_sensing, main
 from pretouch_lab.options import Options
 from pretouch_lab.run import Row
-from pretouch_lab.table import Column, rounded, summary, table
+from pretouch_lab.table import Column, medians, rounded
 from pretouch_lab.trial import Record, play
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-NAME = "avoidance"
-DEFAULT_RESTRICTIONS = "slack"
 
 _DURATION_S = 40.0
 _VISITS_S = ((4.0, 14.0), (20.0, 30.0))
@@ -84,10 +67,7 @@ class Visitor:
 
 def cells(options: Options) -> list[Row]:
     """A cell for each place of the hand and each controller."""
-    return [
-        {"place": place, **controller}
-        for place, controller in product(PLACES, controllers(options, DEFAULT_RESTRICTIONS))
-    ]
+    return [{"place": place, **controller} for place, controller in product(PLACES, controllers(options, "slack"))]
 
 
 def visits(place: str, seed: int, placement: Placement = _UNMOVED) -> tuple[Visit, ...]:
@@ -116,9 +96,7 @@ def trial(cell: Row, seed: int, context: Context) -> tuple[Row, Record]:
         "largest_slack_m_s": rounded(max(float(s.qp.slack.max(initial=0.0)) for s in steps), 4),
         "travelled_m": rounded(steps[-1].path_phase),
         "false_detections": sum(
-            record.first_contact(after=s.stamp - 0.5) is None
-            or (record.first_contact(after=s.stamp - 0.5) or 0.0) > s.stamp
-            for s in record.reactions()
+            (record.first_contact(after=s.stamp - 0.5) or np.inf) > s.stamp for s in record.reactions()
         ),
         "held": record.held(),
     }
@@ -127,12 +105,12 @@ def trial(cell: Row, seed: int, context: Context) -> tuple[Row, Record]:
 
 def gaps(record: Record, model: RobotModel, radius: float) -> FloatArray:
     """Distance (S,) [m] between the person's hand, a ball of a radius [m], and the arm at each control step."""
-    unit, aside, found = np.zeros(1, np.int64), np.array([[0.0, 0.0, 1.0]]), []
-    for step, hand in zip(record.steps, record.hand_position, strict=True):
-        kin = model.kinematics(step.q)
-        nearest = closest_points(kin, model.body, step.ee_position, unit, hand[None], aside)
-        found.append(float(nearest.body_distance[0]) - radius)
-    return np.array(found)
+    unit, aside = np.zeros(1, np.int64), np.array([[0.0, 0.0, 1.0]])
+    distances = [
+        closest_points(model.kinematics(step.q), model.body, step.ee_position, unit, hand[None], aside).body_distance[0]
+        for step, hand in zip(record.steps, record.hand_position, strict=True)
+    ]
+    return np.array(distances) - radius
 
 
 _COLUMNS = (
@@ -146,18 +124,17 @@ _COLUMNS = (
     Column("way\n[m]", "travelled_m", 2),
     Column("false", "false_detections"),
 )
-_MEASURES = ("true_peak_n", "least_gap_m", "deviation_m", "least_speed_scale", "travelled_m")
 
 
 def tables(rows: list[Row]) -> list[TextTable]:
     """Show what a hand beside the path or in it changes."""
-    groups = summary(controller_named(rows), ("place", "controller"), _MEASURES, ("contact", "false_detections"))
     note = (
         "Beside is 3 cm clear of the robot's hand on its free path, inside half of the person's hand is in its way."
         " Contact: trials with contact. True: peak of the true force. Gap: between the person's hand and the arm,"
         " negative in contact. Least speed: factor of eqs. 3 and 4. Way: travelled along the path in 40 s."
     )
-    return [table("A person holds a hand beside the path or into it: medians", _COLUMNS, groups, note, names=2)]
+    title = "A person holds a hand beside the path or into it: medians"
+    return [medians(title, _COLUMNS, controller_named(rows), ("place", "controller"), note, names=2)]
 
 
 def shown_cells(rows: list[Row]) -> list[Row]:
@@ -165,21 +142,7 @@ def shown_cells(rows: list[Row]) -> list[Row]:
     return first_sensing([row for row in rows if row["place"] == "beside"])
 
 
-def draw(traces: list[Trace], _units: tuple[str, ...]) -> "Figure":
-    """Draw the end-effector's path."""
-    from pretouch_lab.experiments.figures import circle
-
-    (cell, trace), *_ = traces
-    return circle(trace, profile(cell["profile"]))
-
-
-EXPERIMENT = Experiment(
-    NAME,
-    cells,
-    trial,
-    tables,
-    Drawing("circle", "End-effector path with a hand beside it", shown_cells, draw),
-    any_arm=True,
-)
+_FIGURE = Drawing("circle", "End-effector path with a hand beside it", shown_cells)
+EXPERIMENT = Experiment("avoidance", cells, trial, tables, _FIGURE, any_arm=True)
 if __name__ == "__main__":
-    main(NAME)
+    main(EXPERIMENT.name)

@@ -1,34 +1,17 @@
 """Paper V-C, threshold close-up: a person stands on one side of the circle and pushes the arm from the other."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from pretouch.control.path import Circle
-from pretouch.profiles import profile
 from pretouch.sim.hand import FACES, Push, Pusher, against
 from pretouch.sim.scene import Box, HandSpec, SceneSpec
 from pretouch.text_table import TextTable
 from pretouch.types import ControlStep
-from pretouch_lab.experiment import (
-    Context,
-    Drawing,
-    Experiment,
-    Trace,
-    controller_named,
-    controllers,
-    first_sensing,
-    main,
-)
+from pretouch_lab.experiment import Context, Drawing, Experiment, controller_named, controllers, first_sensing, main
+from pretouch_lab.options import Options
 from pretouch_lab.run import Row
-from pretouch_lab.table import Column, rounded, summary, table
+from pretouch_lab.table import Column, medians, rounded
 from pretouch_lab.trial import Record, play
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-NAME = "between"
-DEFAULT_RESTRICTIONS = "slack"
 
 _DURATION_S = 12.0
 _REACH_M = 0.25
@@ -52,7 +35,11 @@ _NOTICE_S = 0.3
 _REBOUND_S = 3.0
 """A later reaction up to this long after the release is the push's echo [s]."""
 _Y = 1
-_WIDTHS = ("upper_free_n", "upper_least_n", "lower_free_n", "lower_least_n")
+
+
+def cells(options: Options) -> list[Row]:
+    """A cell for each controller."""
+    return controllers(options, "slack")
 
 
 def interaction(seed: int) -> tuple[Box, Push]:
@@ -86,10 +73,7 @@ def trial(cell: Row, seed: int, context: Context) -> tuple[Row, Record]:
 
 
 def results(record: Record, touched: tuple[float, float] | None) -> Row:
-    """Numbers of one trial; `touched` are touch and release [s] of the push, None if it never touched.
-
-    Widths of the band are T_u - mu and mu - T_l of the three axes [N].
-    """
+    """Numbers of one trial; `touched` are touch and release [s] of the push, None if it never touched."""
     touch, release = touched or (np.inf, np.inf)
     before = [s for s in record.steps if s.armed and s.stamp < touch]
     lowered = [s for s in before if lowered_on_both_sides(s)]
@@ -97,7 +81,6 @@ def results(record: Record, touched: tuple[float, float] | None) -> Row:
     period = float(np.median(np.diff(record.times())))
     return {
         "contact": touched is not None,
-        **widths(before),
         "both_lowered": bool(lowered),
         "both_lowered_s": rounded(period * len(lowered)),
         "both_lowered_at_touch": lowered_on_both_sides(before[-1]) if touched and before else None,
@@ -110,25 +93,6 @@ def results(record: Record, touched: tuple[float, float] | None) -> Row:
     }
 
 
-def widths(steps: list[ControlStep]) -> dict[str, list[float | None]]:
-    """Least width of the band above and below the mean of each axis [N], and its median while that bound is free.
-
-    A bound is free while nothing sensed lowers it; None where it never is.
-    """
-    if not steps:
-        return {name: [None] * 3 for name in _WIDTHS}
-    limits = [s.thresholds for s in steps]
-    made: dict[str, list[float | None]] = {}
-    for name, width, lowered in (
-        ("upper", np.array([t.upper - t.mean for t in limits]), np.array([t.obstacle_negative for t in limits])),
-        ("lower", np.array([t.mean - t.lower for t in limits]), np.array([t.obstacle_positive for t in limits])),
-    ):
-        free = [width[lowered[:, axis] == 0, axis] for axis in range(3)]
-        made[f"{name}_free_n"] = [rounded(np.median(values)) if len(values) else None for values in free]
-        made[f"{name}_least_n"] = [rounded(value) for value in width.min(axis=0)]
-    return made
-
-
 def lowered_on_both_sides(step: ControlStep) -> bool:
     """Whether objects on both sides narrow the band along y from above and from below."""
     return bool(step.thresholds.obstacle_positive[_Y] > 0 and step.thresholds.obstacle_negative[_Y] > 0)
@@ -136,7 +100,6 @@ def lowered_on_both_sides(step: ControlStep) -> bool:
 
 _COLUMNS = (
     Column("profile", "controller"),
-    *(Column(f"T_{name[0]}\n{name.split('_')[1]}", f"{name}_y", 1) for name in _WIDTHS),
     Column("both\never", "both_lowered", of="trials"),
     Column("both at\ntouch", "both_lowered_at_touch", of="contact"),
     Column("detected", "detected", of="contact"),
@@ -144,37 +107,19 @@ _COLUMNS = (
     Column("filtered\n[N]", "filtered_at_detection_n", 1),
     Column("false", "false_detections"),
 )
-_TOTALS = ("contact", "detected", "both_lowered", "both_lowered_at_touch", "false_detections")
 
 
 def tables(rows: list[Row]) -> list[TextTable]:
-    """Show how far the band along y was narrowed from both sides before the push, and which pushes were detected."""
-    along_y = [row | {f"{name}_y": row[name][_Y] for name in _WIDTHS} for row in controller_named(rows)]
-    spreads = (*(f"{name}_y" for name in _WIDTHS), "detection_delay_s", "filtered_at_detection_n")
+    """Show in how many trials the band was narrowed from both sides, and which pushes were detected."""
     note = (
-        "T_u: upper threshold above the window's mean along y; T_l: lower threshold below it. Free: median while"
-        " nothing sensed lowers that bound, in trials where it ever is free. Least: before the push. Both: trials in"
-        " which objects narrowed the band from above and below at once, ever before the push and when it touched."
-        " Detected: of the pushes that touched. Filtered (eq. 8): along y, at detection."
+        "Both: trials in which objects narrowed the band along y from above and below at once, ever before the push and"
+        " when it touched. Detected: of the pushes that touched. Filtered (eq. 8): along y, at detection."
     )
-    groups = summary(along_y, ("controller",), spreads, _TOTALS)
-    return [table("A person stands at +y and pushes the arm from -y: medians, thresholds in N", _COLUMNS, groups, note)]
+    title = "A person stands at +y and pushes the arm from -y: medians"
+    return [medians(title, _COLUMNS, controller_named(rows), ("controller",), note)]
 
 
-def draw(traces: list[Trace], units: tuple[str, ...]) -> "Figure":
-    """Draw distances and thresholds about the first touch."""
-    from pretouch_lab.experiments.figures import close_up
-
-    (cell, trace), *_ = traces
-    return close_up(trace, units, profile(cell["profile"]))
-
-
-EXPERIMENT = Experiment(
-    NAME,
-    lambda options: controllers(options, DEFAULT_RESTRICTIONS),
-    trial,
-    tables,
-    Drawing("close-up", "Distances and thresholds with objects on both sides", first_sensing, draw),
-)
+_FIGURE = Drawing("close-up", "Distances and thresholds with objects on both sides", first_sensing)
+EXPERIMENT = Experiment("between", cells, trial, tables, _FIGURE)
 if __name__ == "__main__":
-    main(NAME)
+    main(EXPERIMENT.name)

@@ -10,10 +10,10 @@ from itertools import product
 import numpy as np
 
 from pretouch.control.path import Circle
-from pretouch.coverage.measure import Setting, covered
+from pretouch.coverage.measure import Setting
 from pretouch.coverage.params import CoverageParams
 from pretouch.coverage.suggest import candidates, suggest
-from pretouch.coverage.ways import Ways, seen_by, ways_to
+from pretouch.coverage.ways import seen_by, ways_to
 from pretouch.errors import ExperimentError
 from pretouch.profiles import profile
 from pretouch.robot.model import RobotModel
@@ -27,10 +27,9 @@ from pretouch_lab.experiment import Context, Experiment, main
 from pretouch_lab.options import Options
 from pretouch_lab.replay import Ghost
 from pretouch_lab.run import Row
-from pretouch_lab.table import Column, grouped, rounded, share_below, table
+from pretouch_lab.table import Column, share_below, summary, table
 from pretouch_lab.trial import Record, play
 
-NAME = "coverage"
 SKINS = ("own", "suggested", "random")
 MORE = 8
 """Units that are added."""
@@ -43,8 +42,6 @@ _NEAR_M = 0.1
 """A sensed point so near the ball's surface shows the ball [m]."""
 _DRIVES_S = 0.016
 """Time from a command to a motion [s]: the drives' set-point filter (`BrakingParams.latency_s`)."""
-_FAST_M_S = 0.1
-"""Speed of the arm towards what it meets that is counted as fast [m/s]."""
 _POSTURES = 40
 START_S, EVERY_S = 2.0, 2.5
 """When the first one sets out, and how long after it the next [s]."""
@@ -60,16 +57,12 @@ class ApproachingObstacle:
     link: int
     center: FloatArray
     """(3,) centre of the ball at the contact, link frame [m]."""
-    normal: FloatArray
-    """(3,) of the surface there, link frame."""
     way: FloatArray
     """(3,) unit vector to where it comes from, link frame."""
     foreseen: bool
     """Whether coverage says that it is seen in time, with the arm standing as it does when it sets out."""
     track: dict[int, tuple[float, FloatArray]] = field(default_factory=dict)
     """Way left [m] and centre (3,) [m] by the number of the physics step."""
-    touch_m_s: float | None = None
-    """Speed of the arm's surface towards it when they meet [m/s]; None if the trial ended before."""
 
 
 class ApproachingObstacles:
@@ -98,8 +91,6 @@ class ApproachingObstacles:
         left = self._params.way_m - self._params.closing_m_s * (time - START_S - number * EVERY_S)
         R, p = self._plant.link_rotation[obstacle.link], self._plant.link_position[obstacle.link]
         if left <= 0.0:
-            if obstacle.touch_m_s is None:
-                obstacle.touch_m_s = self._speed(obstacle, np.array(R), np.array(p))
             return PARKED
         center: FloatArray = p + R @ (obstacle.center + left * obstacle.way)
         obstacle.track[round(time / self._plant.params.period_s)] = (left, center)
@@ -116,18 +107,10 @@ class ApproachingObstacles:
                 continue
             i = int(np.argmax(ways.free[0]))
             sees = seen_by(ways, self._skin)[:, 0, i]
-            link, point, normal = int(surface.link[drawn[i]]), surface.point[drawn[i]], surface.normal[drawn[i]]
+            link, center = int(surface.link[drawn[i]]), surface.point[drawn[i]] + r * surface.normal[drawn[i]]
             along = ways.postures[0].rotation[link].T @ ways.way[0, i]
-            return ApproachingObstacle(link, point + r * normal, normal, along, bool(sees.any()))
+            return ApproachingObstacle(link, center, along, bool(sees.any()))
         raise ExperimentError("Nothing can come at the arm where it stands: make the ways shorter.")
-
-    def _speed(self, obstacle: ApproachingObstacle, R: FloatArray, p: FloatArray) -> float:
-        """Speed [m/s] of the arm's surface towards the ball where they meet."""
-        data, n = self._plant.mj_data, self._model.n
-        kin = self._model.kinematics(data.qpos[:n].copy())
-        at = p + R @ (obstacle.center - self._params.object_radius_m * obstacle.normal)
-        velocity = self._model.jacobian(kin, obstacle.link, at)[:3] @ data.qvel[:n]
-        return float(velocity @ (R @ obstacle.normal))
 
 
 def cells(options: Options) -> list[Row]:
@@ -137,19 +120,18 @@ def cells(options: Options) -> list[Row]:
 
 
 @lru_cache(maxsize=4)
-def _prepared(model: RobotModel, skin: Skin) -> tuple[Ways, tuple[SensorUnit, ...], tuple[SensorUnit, ...]]:
-    """Return fresh ways on the circle, all places for units, and the best of them, chosen by other ways."""
-    setting = Setting(model, fixtures(SceneSpec()), CoverageParams(), "circle", _POSTURES)
-    ways = setting.ways()
+def _places(model: RobotModel, skin: Skin) -> tuple[tuple[SensorUnit, ...], tuple[SensorUnit, ...]]:
+    """Return all places for units, and those of them that help most on the circle."""
+    ways = Setting(model, fixtures(SceneSpec()), CoverageParams(), "circle", _POSTURES).ways()
     places = candidates(ways, skin)
-    return setting.ways(1), places, suggest((ways,), skin, MORE, places).units
+    return places, suggest((ways,), skin, MORE, places).units
 
 
 def skin_of(kind: str, model: RobotModel, skin: Skin, seed: int) -> Skin:
     """Return one of `SKINS`; units put anywhere are others for each seed."""
     if kind == "own":
         return skin
-    _, places, best = _prepared(model, skin)
+    places, best = _places(model, skin)
     if kind == "suggested":
         return Skin((*skin.mounted, *best), model)
     drawn = np.random.default_rng([seed, 53]).choice(len(places), MORE, replace=False)
@@ -175,30 +157,16 @@ def trial(cell: Row, seed: int, context: Context) -> tuple[Row, Record]:
         prepare=approaching.attach,
     )
     record = play(setup, lambda step, _: step.stamp >= approaching.end)
-    row = results(approaching.came, record, params)
-    return row | {"predicted": _predicted(model, context.skin, skin)}, record
-
-
-def _predicted(model: RobotModel, own: Skin, skin: Skin) -> float | None:
-    """Share of the ways, over the whole circle, that coverage says are not seen in time."""
-    ways = _prepared(model, own)[0]
-    seen = seen_by(ways, skin)
-    return rounded(1.0 - covered(ways, seen).arm.ways)
+    return results(approaching.came, record, params), record
 
 
 def results(came: list[ApproachingObstacle], record: Record, params: CoverageParams) -> Row:
     """Numbers of one trial."""
     points = {round(step.stamp / 0.001): step.obstacles.point for step in record.steps}
-    blind = [not seen_in_time(obstacle, points, params) for obstacle in came]
-    towards = [obstacle.touch_m_s for obstacle in came if obstacle.touch_m_s is not None]
-    foreseen = [obstacle.foreseen for obstacle in came]
     return {
         "came": len(came),
-        "blind": sum(blind),
-        "foreseen_blind": len(came) - sum(foreseen),
-        "agree": sum(b != f for b, f in zip(blind, foreseen, strict=True)),
-        "fast": sum(v > _FAST_M_S for v in towards),
-        "towards_m_s": rounded(float(np.mean(np.maximum(towards, 0.0)))) if towards else None,
+        "blind": sum(not seen_in_time(obstacle, points, params) for obstacle in came),
+        "foreseen_blind": sum(not obstacle.foreseen for obstacle in came),
     }
 
 
@@ -217,17 +185,12 @@ def seen_in_time(obstacle: ApproachingObstacle, points: dict[int, FloatArray], p
     return False
 
 
-_TOTALS = ("came", "blind", "foreseen_blind", "agree", "fast")
 _COLUMNS = (
     Column("profile\narm", "profile", second="arm"),
     Column("skin", "skin"),
     Column("blind", "blind", of="came"),
     Column("blind\n[%]", "blind_share", 0, 100.0, second="bounds"),
-    Column("foreseen\n[%]", "foreseen_blind_share", 0, 100.0),
-    Column("circle\n[%]", "predicted", 0, 100.0),
-    Column("agree\n[%]", "agree_share", 0, 100.0),
-    Column("fast\n[%]", "fast_share", 0, 100.0),
-    Column("towards\n[mm/s]", "towards_m_s", 0, 1000.0),
+    Column("foreseen\n[%]", "foreseen_share", 0, 100.0),
 )
 
 
@@ -236,31 +199,19 @@ def tables(rows: list[Row]) -> list[TextTable]:
     note = (
         "A ball comes straight at random points of the surface. Blind: no sensed point within 0.1 m of it while there"
         " was way left to brake, 95 % bounds below (Clopper and Pearson). Foreseen: what coverage says of the same"
-        " ways, the arm standing as when each set out; agree: cases in which both say the same. Circle: what it says of"
-        " the whole circle. Fast: the arm's surface goes towards the ball at more than"
-        f" {_FAST_M_S:g} m/s when they meet. Towards: the mean of that, 0 where it goes away."
+        " ways, the arm standing as when each set out."
     )
     title = f"Contacts that no unit saw in time: the skin, with {MORE} suggested units, with {MORE} anywhere"
-    groups = [_counted(key, group) for key, group in grouped(rows, ("arm", "skin", "profile"))]
-    return [table(title, _COLUMNS, groups, note, names=2)]
+    groups = summary(rows, ("arm", "skin", "profile"), (), ("came", "blind", "foreseen_blind"))
+    return [table(title, _COLUMNS, [group | _shares(group) for group in groups], note, names=2)]
 
 
-def _counted(key: Row, group: list[Row]) -> Row:
-    """Counts of a cell over its seeds, as shares too."""
-    total = {name: sum(row[name] for row in group) for name in _TOTALS}
-    came, blind = total["came"], total["blind"]
-    towards = [row["towards_m_s"] for row in group if row["towards_m_s"] is not None]
-    low, high = 1.0 - share_below(came - blind, came), share_below(blind, came)
-    return {
-        **key,
-        **total,
-        **{f"{name}_share": total[name] / came for name in _TOTALS},
-        "bounds": f"{100 * low:.0f}-{100 * high:.0f}",
-        "predicted": float(np.mean([row["predicted"] for row in group])),
-        "towards_m_s": float(np.mean(towards)) if towards else None,
-    }
+def _shares(group: Row) -> Row:
+    came, blind = group["came"], group["blind"]
+    bounds = f"{100 - 100 * share_below(came - blind, came):.0f}-{100 * share_below(blind, came):.0f}"
+    return {"blind_share": blind / came, "foreseen_share": group["foreseen_blind"] / came, "bounds": bounds}
 
 
-EXPERIMENT = Experiment(NAME, cells, trial, tables)
+EXPERIMENT = Experiment("coverage", cells, trial, tables)
 if __name__ == "__main__":
-    main(NAME)
+    main(EXPERIMENT.name)

@@ -1,41 +1,29 @@
 """Paper IV-C: thirty seconds with a person who pushes the moving arm three times from different directions."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from pretouch.profiles import profile
 from pretouch.sim.hand import Push, Pusher
 from pretouch.sim.paper_scenes import dynamic_pushes
 from pretouch.sim.scene import HandSpec, SceneSpec
 from pretouch.text_table import TextTable
 from pretouch.traces import mean_over
 from pretouch.types import ControlStep, FloatArray
-from pretouch_lab.experiment import (
-    Context,
-    Drawing,
-    Experiment,
-    Trace,
-    controller_named,
-    controllers,
-    first_sensing,
-    main,
-)
+from pretouch_lab.experiment import Context, Drawing, Experiment, controller_named, controllers, first_sensing, main
+from pretouch_lab.options import Options
 from pretouch_lab.run import Row
 from pretouch_lab.table import Column, peak, rounded, summary, table
 from pretouch_lab.trial import Record, play
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-NAME = "dynamic"
-DEFAULT_RESTRICTIONS = "slack"
 
 _DURATION_S = 30.0
 _NOTICE_S = 0.3
 """A reaction up to this long after the release still answers the push [s]."""
 _REBOUND_S = 3.0
 """A later reaction up to this long after the release is the push's echo [s]."""
+
+
+def cells(options: Options) -> list[Row]:
+    """A cell for each controller."""
+    return controllers(options, "slack")
 
 
 def trial(cell: Row, seed: int, context: Context) -> tuple[Row, Record]:
@@ -150,21 +138,7 @@ def tables(rows: list[Row]) -> list[TextTable]:
     return [table("A person pushes the moving arm: medians", _COLUMNS, groups, note)]
 
 
-def draw(traces: list[Trace], units: tuple[str, ...]) -> "Figure":
-    """Draw distances, force and velocity."""
-    from pretouch_lab.experiments.figures import interaction
-
-    (cell, trace), *_ = traces
-    return interaction(trace, units, profile(cell["profile"]))
-
-
-EXPERIMENT = Experiment(
-    NAME,
-    lambda options: controllers(options, DEFAULT_RESTRICTIONS),
-    trial,
-    tables,
-    Drawing("interaction", "Distances, force with thresholds, velocity over thirty seconds", first_sensing, draw),
-    any_arm=True,
-)
+_FIGURE = Drawing("interaction", "Distances, force with thresholds, velocity over thirty seconds", first_sensing)
+EXPERIMENT = Experiment("dynamic", cells, trial, tables, _FIGURE, any_arm=True)
 if __name__ == "__main__":
-    main(NAME)
+    main(EXPERIMENT.name)

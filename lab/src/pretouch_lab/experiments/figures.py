@@ -1,6 +1,6 @@
 """The paper's figures, drawn from the courses of trials."""
 
-from collections.abc import Mapping, Sequence
+from itertools import product
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,6 +15,7 @@ from pretouch.recording.run_record import RunRecord
 from pretouch.sim.plant import TOUCH_N
 from pretouch.traces import spans
 from pretouch.types import BoolArray, FloatArray
+from pretouch_lab.experiment import Trace
 
 BLIND, SENSING, OURS = "tab:blue", "tab:red", "tab:green"
 AXES = "xyz"
@@ -90,8 +91,9 @@ _POINTS = 12
 """One in so many sensed points is drawn."""
 
 
-def circle(trace: RunRecord, profile: Profile) -> Figure:
+def circle(traces: list[Trace], _units: tuple[str, ...]) -> Figure:
     """End-effector path: free, avoiding what is sensed (red), recovering (green); and its course in time."""
+    trace, profile = _first(traces)
     figure = Figure(figsize=(9, 9), layout="constrained")
     plane, course, aside = figure.subplots(3, 1, height_ratios=[1.9, 0.8, 0.6])
     off = np.linalg.norm(trace.ee_position - trace.path_position, axis=1)
@@ -101,15 +103,21 @@ def circle(trace: RunRecord, profile: Profile) -> Figure:
     _plane(plane, trace, avoiding, recovering, profile)
     course.plot(trace.time, np.linalg.norm(trace.ee_velocity, axis=1), color="black", lw=1, label="speed [m/s]")
     course.plot(trace.time, trace.speed_scale, color="tab:orange", ls="--", lw=1.5, label="speed factor, eqs. 3 and 4")
-    course.set(ylabel="speed [m/s], factor", ylim=(0.0, 1.35), xlim=(trace.time[0], trace.time[-1]))
+    course.set(ylabel="speed [m/s], factor", ylim=(0.0, 1.35))
     aside.plot(trace.time, 1000 * off, color="black", lw=1)
-    aside.set(xlabel="time [s]", ylabel="off the path [mm]", xlim=(trace.time[0], trace.time[-1]))
+    aside.set(xlabel="time [s]", ylabel="off the path [mm]")
     for axes in (course, aside):
+        axes.set_xlim(trace.time[0], trace.time[-1])
         shade(axes, trace.time, avoiding, "tab:red", label="avoidance")
         shade(axes, trace.time, recovering, "tab:green", "////", label="recovery")
         axes.grid(alpha=0.3)
     course.legend(loc="upper right", ncols=4, fontsize="small")
     return figure
+
+
+def _first(traces: list[Trace]) -> tuple[RunRecord, Profile]:
+    (cell, trace), *_ = traces
+    return trace, find_profile(cell["profile"])
 
 
 def _plane(axes: Axes, trace: RunRecord, avoiding: BoolArray, recovering: BoolArray, profile: Profile) -> None:
@@ -136,8 +144,9 @@ def _where(position: FloatArray, flags: BoolArray) -> tuple[FloatArray, FloatArr
     return kept[:, 1], kept[:, 2]
 
 
-def interaction(trace: RunRecord, units: tuple[str, ...], profile: Profile) -> Figure:
+def interaction(traces: list[Trace], units: tuple[str, ...]) -> Figure:
     """Distances with the activation line, force along y with moving thresholds, end-effector velocity along y."""
+    trace, profile = _first(traces)
     figure = Figure(figsize=(10, 8.4), layout="constrained")
     top, middle, bottom = figure.subplots(3, 1, sharex=True)
     distances(top, trace, units)
@@ -174,10 +183,12 @@ def _name_pushes(axes: Axes, trace: RunRecord) -> None:
 
 
 _BEFORE_S, _AFTER_S = 4.0, 2.5
+"""How much of the time about the first touch is shown [s]."""
 
 
-def close_up(trace: RunRecord, units: tuple[str, ...], profile: Profile) -> Figure:
+def close_up(traces: list[Trace], units: tuple[str, ...]) -> Figure:
     """Distances with the region that matters, and force along y with thresholds, about the first touch."""
+    trace, profile = _first(traces)
     figure = Figure(figsize=(9, 6.4), layout="constrained")
     top, bottom = figure.subplots(2, 1, sharex=True)
     distances(top, trace, units)
@@ -215,35 +226,27 @@ def _window(trace: RunRecord) -> tuple[float, float]:
     return at - _BEFORE_S, at + _AFTER_S
 
 
-_TRAJECTORIES, _SIDES = ("circle", "line"), ("-y", "+y")
+def force_difference(traces: list[Trace], _units: tuple[str, ...]) -> Figure:
+    """Force along y with the band between the thresholds, before and after contact, at each place of the object.
 
-
-def force_difference(traces: Mapping[tuple[str, str, str], RunRecord], profiles: Sequence[str]) -> Figure:
-    """Force along y with the band between the thresholds, before and after contact.
-
-    Blind is blue, the first of the others red, the second green.
-    `traces` by (trajectory, side, profile); `profiles` are one or two to show beside `blind`.
+    Blind is blue, the first of the other profiles red, the second green.
     """
-    shown = [name for name in dict.fromkeys(("blind", *profiles)) if any(key[2] == name for key in traces)]
-    others = [name for name in profiles if name != "blind"]
+    names = list(dict.fromkeys(cell["profile"] for cell, _ in traces))
+    others = [name for name in names if name != "blind"]
     styles = {"blind": (BLIND, "...."), **dict(zip(others, ((SENSING, ""), (OURS, "")), strict=False))}
     figure = Figure(figsize=(10, 6.8), layout="constrained")
     panels = figure.subplots(2, 2, sharex=True, sharey=True)
-    for row, trajectory in enumerate(_TRAJECTORIES):
-        for column, side in enumerate(_SIDES):
-            axes: Axes = panels[row, column]
-            for name in shown:
-                trace = traces.get((trajectory, side, name))
-                if trace is not None:
-                    _force(axes, trace, -1.0 if side == "+y" else 1.0, name, *styles[name])
-            axes.set_title(f"{trajectory}, object at {side}")
-            axes.set_xlim(-1.0, 0.6)
-            axes.grid(alpha=0.3)
+    for axes, (trajectory, side) in zip(panels.flat, product(("circle", "line"), ("-y", "+y")), strict=True):
+        for cell, trace in traces:
+            if (cell["trajectory"], cell["side"]) == (trajectory, side):
+                _force(axes, trace, -1.0 if side == "+y" else 1.0, cell["profile"], *styles[cell["profile"]])
+        axes.set(title=f"{trajectory}, object at {side}", xlim=(-1.0, 0.6))
+        axes.grid(alpha=0.3)
     if panels[0, 0].lines:
         panels[0, 0].legend(loc="upper left", fontsize="small")
     figure.supxlabel("time from first touch [s]")
     figure.supylabel("force along y, away from the object [N]")
-    figure.suptitle(f"Contact with a static object: force estimate and contact thresholds, {_listed(shown)}")
+    figure.suptitle(f"Contact with a static object: force estimate and contact thresholds, {', '.join(names)}")
     return figure
 
 
@@ -264,8 +267,3 @@ def _force(axes: Axes, trace: RunRecord, push: float, name: str, colour: str, ha
         axes.plot(time, push * trace.filtered_force[:, Y], color=colour, ls=filtered, lw=1.2, label=f"{name}: eq. 8")
     axes.plot(time, push * trace.force[:, Y], color=colour, ls=style, label=f"{name}: estimate")
     axes.plot(time[found], push * trace.force[found, Y], marker, color=colour, mec="black", label=f"{name}: detected")
-
-
-def _listed(names: Sequence[str]) -> str:
-    *first, last = names or [""]
-    return f"{', '.join(first)} and {last}" if first else last

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,16 +10,12 @@ from pretouch.sim.plant import Plant
 from pretouch.text_table import TextTable
 from pretouch.traces import mean_over
 from pretouch.types import ControlStep
-from pretouch_lab.experiment import Context, Drawing, Experiment, Trace, controllers, main
+from pretouch_lab.experiment import Context, Drawing, Experiment, controllers, main
 from pretouch_lab.options import Options
 from pretouch_lab.run import Row
-from pretouch_lab.table import Column, peak, ratios, rounded, summary, table
+from pretouch_lab.table import Column, medians, peak, ratios, rounded
 from pretouch_lab.trial import Record, play
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-NAME = "static"
 DEFAULT_RESTRICTIONS = "off"
 """The paper "purposefully allows contact"; at Table I's values its restrictions forbid it."""
 TRAJECTORIES = ("circle", "line")
@@ -110,105 +105,53 @@ _FORCES = (
     Column("true\n[N]", "true_peak_n", 1, band=True),
 )
 MEASURES = tuple(column.key for column in _FORCES)
+_SHOWN_STIFFNESS = 25_000.0
+_PROFILE = Column("profile\nobject", "profile", second="object")
+_BY_OBJECT = (_PROFILE, *_FORCES, Column("detected", "detected", of="contact"))
+_BY_OBJECT_NOTE = (
+    "Impact: closing speed of the point that touches first. Delay: from the true force passing 1 N. Filtered (eq. 8)"
+    " and raw: the estimate at detection. Peak: of the estimate. True: peak of the true force, of its 20 ms mean and of"
+    " itself. Detected: of all contacts. slowing-only: eqs. 3-4 without F_obs. thresholds-only: F_obs without eqs. 3-4."
+    " paper-0.5m: objects count within the 0.5 m of the paper's text instead of Table I's 0.8 m. pretouch: slower where"
+    " it has to be to brake in time, and contacts detected by the joint torques. False detections: "
+)
 _RATIOS = tuple(
     Column(c.heading.split("\n")[0], f"{c.key}_ratio", 2, band=True) for c in _FORCES if "delay" not in c.key
 )
-_MEANING = {
-    "slowing-only": "slowing-only: eqs. 3-4 without F_obs.",
-    "thresholds-only": "thresholds-only: F_obs without eqs. 3-4.",
-    "paper-0.5m": "paper-0.5m: objects count within the 0.5 m of the paper's text instead of Table I's 0.8 m.",
-    "pretouch": "pretouch: slower where it has to be to brake in time, and contacts detected by the joint torques.",
-}
-_SHOWN_STIFFNESS = 25_000.0
-_UNSAID = ("off", "braking")
-"""Restriction modes that the title does not name: without rows, and the one `pretouch` always has."""
-
-
-def tables(rows: list[Row]) -> list[TextTable]:
-    """Show each place at one stiffness with ratios to `blind`, then what stiffness, profile and restrictions change."""
-    same = ("trajectory", "side", "stiffness_n_per_m", "seed")
-    every = [
-        row
-        | {
-            "detected": row["detection_delay_s"] is not None,
-            "where": f"{row['trajectory']} {row['side']}",
-            "object": f"{row['stiffness_n_per_m'] / 1000:g} N/mm",
-        }
-        for row in ratios(rows, {"profile": "blind"}, same, MEASURES, inverse=True)
-    ]
-    stiffness, mode, shown = shown_controllers(every)
-    named = [row for row in every if row["restrictions"] == mode[row["profile"]]]
-    made = _places([r for r in named if r["profile"] in shown and r["stiffness_n_per_m"] == stiffness])
-    profiles = {row["profile"] for row in every}
-    if len({row["object"] for row in every}) > 1 or len(profiles) > 2:
-        by_object = _summary(named, "profile", "object")
-        made += [
-            table(
-                "Static object, by stiffness and by what proximity is used for: all four places together",
-                (Column("profile\nobject", "profile", second="object"), *_FORCES),
-                by_object,
-                " ".join(text for name, text in _MEANING.items() if name in profiles),
-            ),
-            *_smaller("all four places together", "object", by_object),
-        ]
-    if len({(row["profile"], row["restrictions"]) for row in every}) > len(profiles):
-        sensing = [row for row in every if row["profile"] != "blind" and row["stiffness_n_per_m"] == stiffness]
-        made.append(
-            table(
-                f"Static object, {stiffness / 1000:g} N/mm, by restriction mode: all four places together",
-                _BY_MODE,
-                _summary(sensing, "profile", "restrictions"),
-                "Hit: trials with contact. Least: nearest that anything sensed came to the arm's surface in 40 s or"
-                " until contact, by what was sensed.",
-            )
-        )
-    return made
-
-
+_RATIOS_NOTE = "The paper finds forces about two times smaller with proximity; which force is meant decides the number."
 _BY_MODE = (
     Column("profile\nmode", "profile", second="restrictions"),
     Column("hit", "contact", of="trials"),
     Column("least\n[m]", "least_sensed_m", 3, band=True),
     *_FORCES[:-1],
 )
+_BY_MODE_NOTE = (
+    "Hit: trials with contact. Least: nearest that anything sensed came to the arm's surface in 40 s or until contact,"
+    " by what was sensed."
+)
 
 
-def _summary(rows: list[Row], *by: str) -> list[Row]:
-    spreads = (*MEASURES, *(f"{name}_ratio" for name in MEASURES), "least_sensed_m")
-    return summary(rows, by, spreads, ("contact", "detected", "false_detections"))
-
-
-def _places(rows: list[Row]) -> list[TextTable]:
-    """Show each place of the object at one stiffness and the ratios there."""
-    at_place = _summary(rows, "profile", "where", "object")
-    others = [mode for mode in dict.fromkeys(row["restrictions"] for row in rows) if mode not in _UNSAID]
-    title = "".join([f"Static object, {rows[0]['object']}", *(f", {mode} restrictions" for mode in others)])
-    return [
-        table(
-            f"{title}: medians, 10-90 % below",
-            (
-                Column("profile\nwhere", "profile", second="where"),
-                *_FORCES,
-                Column("detected", "detected", of="contact"),
-            ),
-            at_place,
-            "Impact: closing speed of the point that touches first. Delay: from the true force passing 1 N. Filtered"
-            " (eq. 8) and raw: the estimate at detection. Peak: of the estimate. True: peak of the true force, of its"
-            " 20 ms mean and of itself. Detected: of all contacts. False detections:"
-            f" {sum(row['false_detections'] for row in at_place)}.",
-        ),
-        *_smaller("at each place", "where", at_place),
+def tables(rows: list[Row]) -> list[TextTable]:
+    """Show forces by profile and stiffness, their ratios to `blind`, and what restrictions of the approach change."""
+    same = ("trajectory", "side", "stiffness_n_per_m", "seed")
+    every = [
+        row | {"detected": row["detection_delay_s"] is not None, "object": f"{row['stiffness_n_per_m'] / 1000:g} N/mm"}
+        for row in ratios(rows, {"profile": "blind"}, same, MEASURES, inverse=True)
     ]
-
-
-def _smaller(where: str, second: str, groups: list[Row]) -> list[TextTable]:
-    """Show how many times smaller than those of `blind` speeds and forces are, if there is any to compare."""
-    compared = [row for row in groups if row["profile"] != "blind" and row["true_peak_n_ratio"]]
-    if not compared:
-        return []
-    note = "The paper finds forces about two times smaller with proximity; which force is meant decides the number."
-    columns = (Column("profile", "profile", second=second), *_RATIOS)
-    return [table(f"Times smaller than without proximity, {where}: medians, 10-90 % below", columns, compared, note)]
+    stiffness, mode, _ = shown_controllers(every)
+    named = [row for row in every if row["restrictions"] == mode[row["profile"]]]
+    compared = [row for row in named if row["profile"] != "blind" and row["true_peak_n_ratio"]]
+    by_object, by_mode, where = ("profile", "object"), ("profile", "restrictions"), "all four places together"
+    title, note = f"Static object, {where}: medians, 10-90 % below", f"{sum(r['false_detections'] for r in named)}."
+    made = [medians(title, _BY_OBJECT, named, by_object, _BY_OBJECT_NOTE + note)]
+    if compared:
+        title = f"Times smaller than without proximity, {where}: medians, 10-90 % below"
+        made.append(medians(title, (_PROFILE, *_RATIOS), compared, by_object, _RATIOS_NOTE))
+    if len({(row["profile"], row["restrictions"]) for row in every}) > len(mode):
+        sensing = [row for row in every if row["profile"] != "blind" and row["stiffness_n_per_m"] == stiffness]
+        title = f"Static object, {stiffness / 1000:g} N/mm, by restriction mode: {where}"
+        made.append(medians(title, _BY_MODE, sensing, by_mode, _BY_MODE_NOTE))
+    return made
 
 
 def shown_controllers(rows: list[Row]) -> tuple[float, dict[str, str], list[str]]:
@@ -218,15 +161,15 @@ def shown_controllers(rows: list[Row]) -> tuple[float, dict[str, str], list[str]
         A stiffness [N/m], the restriction mode of each profile (`off` if it has cells with that), and the names of one
         to three profiles, `blind` first and `pretouch` last.
     """
-    stiffnesses, profiles = (list(dict.fromkeys(row[key] for row in rows)) for key in ("stiffness_n_per_m", "profile"))
-    others = [name for name in profiles if name not in ("blind", "pretouch")]
-    shown = [name for name in ("blind", *others[:1], "pretouch") if name in profiles]
+    stiffnesses = [row["stiffness_n_per_m"] for row in rows]
     mode: dict[str, str] = {}
     for row in rows:
         if row["restrictions"] == "off" or row["profile"] not in mode:
             mode[row["profile"]] = row["restrictions"]
+    others = [name for name in mode if name not in ("blind", "pretouch")]
+    shown = [name for name in ("blind", *others[:1], "pretouch") if name in mode]
     stiffness = _SHOWN_STIFFNESS if _SHOWN_STIFFNESS in stiffnesses else stiffnesses[0]
-    return stiffness, mode, shown if "blind" in profiles else profiles[:1]
+    return stiffness, mode, shown if "blind" in mode else list(mode)[:1]
 
 
 def shown_cells(rows: list[Row]) -> list[Row]:
@@ -241,21 +184,7 @@ def shown_cells(rows: list[Row]) -> list[Row]:
     ]
 
 
-def draw(traces: list[Trace], _units: tuple[str, ...]) -> "Figure":
-    """Draw force and thresholds at each place."""
-    from pretouch_lab.experiments.figures import force_difference
-
-    by_place = {(cell["trajectory"], cell["side"], cell["profile"]): trace for cell, trace in traces}
-    return force_difference(by_place, list(dict.fromkeys(cell["profile"] for cell, _ in traces)))
-
-
-EXPERIMENT = Experiment(
-    NAME,
-    cells,
-    trial,
-    tables,
-    Drawing("force-difference", "Force and contact thresholds at the static object", shown_cells, draw, ("blind",)),
-    any_arm=True,
-)
+_FIGURE = Drawing("force-difference", "Force and contact thresholds at the static object", shown_cells, ("blind",))
+EXPERIMENT = Experiment("static", cells, trial, tables, _FIGURE, any_arm=True)
 if __name__ == "__main__":
-    main(NAME)
+    main(EXPERIMENT.name)

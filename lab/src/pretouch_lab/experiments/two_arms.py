@@ -1,7 +1,7 @@
 """Two arms that reach over one table with a person between: blind to each other, seen by the skin alone, or told."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import product
 
 import mujoco
@@ -13,31 +13,26 @@ from pretouch.controller import Controller
 from pretouch.loop import Options as LoopOptions
 from pretouch.loop import turn
 from pretouch.profiles import Profile, profile
-from pretouch.robot.postures import brought_to, nearest_points
+from pretouch.robot.postures import brought_to
 from pretouch.sim.hand import Hand, HandGoal, PersonArm
 from pretouch.sim.plant import TOUCH_N, ArmInWorld, Plant, PlantClock
 from pretouch.sim.range_finder import RangeFinders
 from pretouch.sim.scene import BasePose, HandSpec, SceneSpec, fixtures
 from pretouch.text_table import TextTable
-from pretouch.types import ControlStep, FloatArray, MovingFixtures, RobotState
+from pretouch.types import ControlStep, FloatArray, RobotState
 from pretouch_lab.experiment import Context, Experiment, controllers, main
 from pretouch_lab.options import Options
 from pretouch_lab.run import Row
 from pretouch_lab.second_arm import SecondArm
-from pretouch_lab.table import Column, peak, rounded, summary, table
+from pretouch_lab.table import Column, medians, peak, rounded
 from pretouch_lab.trial import SETTLE_S, Record
 
-NAME = "two-arms"
-DEFAULT_RESTRICTIONS = "slack"
 KNOWS = ("blind", "seen", "told")
 """What each arm has of the other: units that see through it; units that take it for anything else; or its reported
 state, by which it is a fixture that moves."""
 _DURATION_S = 40.0
 _APART_S = 0.2
 """A touch that begins sooner after the last one is the same [s]."""
-_OF_IT_M = 0.1
-"""A sensed point this near to the other arm, and no nearer to the person, shows the arm [m]: offset and noise of the
-units, and the beam's width."""
 APART = BasePose((1.1, 0.0, 0.0), np.pi)
 """Where the second arm stands: across the table, face to face with the first."""
 BACK: FloatArray = np.asarray(np.linalg.inv(APART.T))
@@ -129,41 +124,22 @@ class Side:
     arm: ArmInWorld
     units: RangeFinders
     controller: Controller
-    other: OtherArm
-    """The arm across, seen from this one's base."""
-    reported: Callable[[], RobotState]
-    """Gives the newest state of that arm."""
-    told: bool
-    """Whether the controller is told."""
+    options: LoopOptions
+    """What the controller is told of the other arm."""
     steps: list[ControlStep] = field(default_factory=list)
-    across: list[MovingFixtures] = field(default_factory=list)
-    """Where the other arm was at each step."""
 
     def __post_init__(self) -> None:
         self.robot = self.arm.read()
         self._state = self.controller.init(self.robot)
 
     def turn(self, tick: float) -> None:
-        """Let one control cycle pass at a tick [s], in which the other is known by its newest state."""
-        there = self.other.at(self.reported())
-        told = there if self.told else None
-        cycle = turn(self.controller, self._state, self.arm, self.units, tick, LoopOptions(moving=lambda: told))
+        """Let one control cycle pass at a tick [s]."""
+        cycle = turn(self.controller, self._state, self.arm, self.units, tick, self.options)
         self._state, self.robot = cycle.after, cycle.inputs.robot
         self.steps.append(cycle.step)
-        self.across.append(there)
 
 
-@dataclass(frozen=True)
-class Played:
-    """What a trial left behind."""
-
-    sides: tuple[Side, Side]
-    felt: Felt
-    hand: FloatArray
-    """(S, 3) centre of the person's hand at each control step [m], base frame of the first arm."""
-
-
-def play(context: Context, profile: Profile, knows: str, seed: int, duration: float) -> Played:
+def play(context: Context, profile: Profile, knows: str, seed: int, duration: float) -> tuple[list[Side], Felt]:
     """Run a trial; `knows` is what each arm has of the other: `blind`, `seen` or `told`."""
     model, rng = context.model, np.random.default_rng([seed, 61])
     ways = way(1.0, 0.0), way(-1.0, float(rng.uniform()))
@@ -173,33 +149,28 @@ def play(context: Context, profile: Profile, knows: str, seed: int, duration: fl
     scene = SceneSpec(hand=HandSpec(start=(x, y, z)), second=second.spec)
     first = Plant(model, scene, context.arm, brought_to(model, ways[0].point(0.0)), seed)
     second.join(first, brought_to(model, ways[1].point(0.0)))
-    hand = Hand(first, person, PersonArm(speed_max=_SPEED_M_S))
+    Hand(first, person, PersonArm(speed_max=_SPEED_M_S))
     felt = Felt()
     felt.attach(first, second)
     arms: tuple[ArmInWorld, ArmInWorld] = (first, second)
-    units = [
-        _mounted(arm, across, context, seed + 1_000_000 * i, knows == "blind")
-        for i, (arm, across) in enumerate(zip(arms, arms[::-1], strict=True))
-    ]
+    units = [_mounted(arms[i], arms[1 - i], context, seed + 1_000_000 * i, knows == "blind") for i in (0, 1)]
     first.advance(SETTLE_S)
-    known, poses = fixtures(scene), (APART.T, BACK)
     sides: list[Side] = []
-    for i, arm in enumerate(arms):
-        reported = _reported(sides, 1 - i)
-        other = OtherArm(model, poses[i], reported, known.capsules)
-        controller = Controller(model, context.skin, known, ways[i], profile)
-        sides.append(Side(arm, units[i], controller, other, reported, knows == "told"))
-    clock, hands = PlantClock(first, profile.task.control_period_s), []
+    for i, T in enumerate((APART.T, BACK)):
+        across = OtherArm(model, T, partial(_reported, sides, 1 - i), fixtures(scene).capsules)
+        controller = Controller(model, context.skin, fixtures(scene), ways[i], profile)
+        options = LoopOptions(moving=across) if knows == "told" else LoopOptions()
+        sides.append(Side(arms[i], units[i], controller, options))
+    clock = PlantClock(first, profile.task.control_period_s)
     while first.time < duration:
         tick = clock.tick()
         for side in sides:
             side.turn(tick)
-        hands.append(hand.position.copy())
-    return Played((sides[0], sides[1]), felt, np.array(hands))
+    return sides, felt
 
 
-def _reported(sides: list[Side], which: int) -> Callable[[], RobotState]:
-    return lambda: sides[which].robot
+def _reported(sides: list[Side], number: int) -> RobotState:
+    return sides[number].robot
 
 
 def _mounted(arm: ArmInWorld, across: ArmInWorld, context: Context, seed: int, blind: bool) -> RangeFinders:
@@ -219,7 +190,7 @@ def cells(options: Options) -> list[Row]:
     """Each profile that senses, blind to the other arm, with its skin alone, and told of it."""
     return [
         {"knows": knows, **controller}
-        for controller, knows in product(controllers(options, DEFAULT_RESTRICTIONS), KNOWS)
+        for controller, knows in product(controllers(options, "slack"), KNOWS)
         if profile(controller["profile"]).perception
     ]
 
@@ -227,26 +198,24 @@ def cells(options: Options) -> list[Row]:
 def trial(cell: Row, seed: int, context: Context) -> tuple[Row, Record | None]:
     """Run one trial; return what is measured."""
     own = context.profile(cell)
-    played = play(context, own, cell["knows"], seed, _DURATION_S)
-    return results(played, own.task.speed_m_s * (_DURATION_S - played.sides[0].steps[0].stamp)), None
+    sides, felt = play(context, own, cell["knows"], seed, _DURATION_S)
+    return results(sides, felt, own.task.speed_m_s * (_DURATION_S - sides[0].steps[0].stamp)), None
 
 
-def results(played: Played, asked: float) -> Row:
+def results(sides: list[Side], felt: Felt, asked_m: float) -> Row:
     """Numbers of one trial, in which each arm was asked for a way of so many metres."""
-    time, arms, person = (np.array(part) for part in (played.felt.time, played.felt.arms_n, played.felt.person_n))
-    done = [side.steps[-1].path_phase / asked for side in played.sides]
-    hands = played.hand, _seen_from(BACK, played.hand)
+    time, arms, person = (np.array(part) for part in (felt.time, felt.arms_n, felt.person_n))
+    done = [side.steps[-1].path_phase / asked_m for side in sides]
+    arm_touches, person_touches = touches(time, arms), touches(time, person)
     return {
-        "arms": touches(time, arms),
+        "arms": arm_touches,
+        "arms_touched": arm_touches > 0,
         "arms_peak_n": rounded(peak(arms), 1),
-        "person": touches(time, person),
+        "person": person_touches,
+        "person_touched": person_touches > 0,
         "person_peak_n": rounded(peak(person), 1),
         "done": rounded(float(np.mean(done)), 4),
         "least_done": rounded(min(done), 4),
-        "taken_fraction": rounded(
-            float(np.mean([shows_other(side, hand) for side, hand in zip(played.sides, hands, strict=True)])), 4
-        ),
-        "reactions": sum(step.contact is not None for side in played.sides for step in side.steps),
     }
 
 
@@ -256,25 +225,6 @@ def touches(time: FloatArray, force: FloatArray) -> int:
     return int(len(touching) > 0) + int((np.diff(touching) > _APART_S).sum())
 
 
-def shows_other(side: Side, hand: FloatArray) -> float:
-    """Share of the steps in which a unit shows the other arm as an obstacle; `hand` (S, 3) is the person's [m]."""
-    units, found = len(side.controller.skin), 0
-    for step, across, at in zip(side.steps, side.across, hand, strict=True):
-        point = step.obstacles.point[step.obstacles.unit < units]
-        if len(point):
-            on_axis, of_point = nearest_points(across.a[None], across.b[None], point[:, None], point[:, None])
-            from_arm = (np.linalg.norm(on_axis - of_point, axis=-1) - across.radius).min(axis=1)
-            from_hand = np.linalg.norm(point - at, axis=1) - HandSpec.radius
-            found += bool(((from_arm < _OF_IT_M) & (from_arm < from_hand)).any())
-    return found / len(side.steps)
-
-
-def _seen_from(T: FloatArray, points: FloatArray) -> FloatArray:
-    """Bring points (S, 3) [m] into another frame by its pose T (4, 4)."""
-    return np.asarray(points @ T[:3, :3].T + T[:3, 3])
-
-
-_MEASURES = ("arms_peak_n", "person_peak_n", "done", "least_done", "taken_fraction", "reactions")
 _COLUMNS = (
     Column("profile", "profile"),
     Column("other arm", "knows"),
@@ -286,26 +236,21 @@ _COLUMNS = (
     Column("peak\n[N]", "person_peak_n", 0),
     Column("way\n[%]", "done", 0, 100.0),
     Column("slower\n[%]", "least_done", 0, 100.0),
-    Column("taken\n[%]", "taken_fraction", 1, 100.0),
-    Column("reactions", "reactions", 0),
 )
 
 
 def tables(rows: list[Row]) -> list[TextTable]:
     """Show what touched what, and how much of the way was done."""
-    flagged = [row | {"arms_touched": row["arms"] > 0, "person_touched": row["person"] > 0} for row in rows]
-    totals = ("arms", "person", "arms_touched", "person_touched")
-    groups = summary(flagged, ("profile", "restrictions", "knows"), _MEASURES, totals)
     note = (
         "Blind: the units see through the other arm. Seen: they take it for anything that comes near. Told: its"
         " reported joint positions make it a fixture that moves. Arms touch, person touched: trials with such a touch;"
         " touches: in all trials together; peak: the largest force of a trial. Way: of what is asked in"
-        f" {_DURATION_S:g} s, the mean of both arms, and the slower of them. Taken: share of the steps in which a unit"
-        " shows the other arm as an obstacle. Reactions: to contacts, of both arms."
+        f" {_DURATION_S:g} s, the mean of both arms, and the slower of them."
     )
-    return [table("Two arms over one table, a person between: medians over the seeds", _COLUMNS, groups, note, 2)]
+    title = "Two arms over one table, a person between: medians over the seeds"
+    return [medians(title, _COLUMNS, rows, ("profile", "restrictions", "knows"), note, 2)]
 
 
-EXPERIMENT = Experiment(NAME, cells, trial, tables)
+EXPERIMENT = Experiment("two-arms", cells, trial, tables)
 if __name__ == "__main__":
-    main(NAME)
+    main(EXPERIMENT.name)

@@ -1,0 +1,141 @@
+"""What `pretouch reproduce`, `demo` and `figure` do: play what is missing, show and write tables and figures."""
+
+import sys
+from dataclasses import replace
+from functools import partial
+from io import BytesIO
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from pretouch.cli.warm_up import prepare
+from pretouch.cli.writing import check_writable, numbers_to, unwritable_said
+from pretouch.errors import ExperimentError, PretouchError
+from pretouch.profiles import profile
+from pretouch.recording.reader import open_recording
+from pretouch.reporting.record import gather
+from pretouch.sim.plant_params import assumed_plant
+from pretouch_lab.cli.playing import DrawnFigure, begin, check_numbers, played, report
+from pretouch_lab.experiment import NAMES, arguments, check, context_of, experiment, play, recording_file
+from pretouch_lab.options import Options, Playing
+from pretouch_lab.run import Row
+from pretouch_lab.trial import trace_of
+
+_DEMONSTRATED = ("blind", "paper", "pretouch")
+_PROFILES = (*Options.profiles, "slowing-only", "thresholds-only", "paper-0.5m")
+_STIFFNESS = (2_000.0, 25_000.0, 75_000.0, 300_000.0)
+_MODES = ("hard", "slack", "floor")
+_STUDIES = {"between": 12, "mounting": 6, "coverage": 4, "two-arms": 3}
+"""Studies beside the paper's experiments, each with its number of seeds."""
+_ENDINGS = (".png", ".pdf", ".svg")
+Part = tuple[str, str, Options]
+"""A folder's name, an experiment, and which of its trials are kept there."""
+
+
+def demonstrate(seeds: int, out: str, json: Path | None) -> None:
+    """Play a small part of the paper's three experiments."""
+    one, many = (Options(number, profiles=_DEMONSTRATED) for number in (1, seeds))
+    check(many, ("static",))
+    # the long trials first, so that the bar moves on in small steps towards the end
+    parts = [("avoidance", "avoidance", one), ("dynamic", "dynamic", one), ("static", "static", many)]
+    how = Playing(out or str(new_folder("demo")), json)
+    prepare(profile("pretouch"))  # each worker would compile the same, and the bar would stand still
+    reproduce(parts, Path(how.out), how)
+
+
+def new_folder(name: str) -> Path:
+    """Return a folder under runs/ that is not there yet."""
+    return next(path for n in count(1) if not (path := Path("runs") / f"{name}-{n}").exists())
+
+
+def whole_paper(options: Options) -> list[Part]:
+    """Return all parts of `pretouch reproduce all`.
+
+    A study has no more seeds than `options`, nor than its own number. Profiles, restrictions and stiffnesses that are
+    given replace those of the paper's three experiments; where they are the defaults, these are varied as well.
+    """
+    profiles = _PROFILES if options.profiles == Options.profiles else options.profiles
+    stiffness = _STIFFNESS if options.stiffness == Options.stiffness else options.stiffness
+    whole = replace(options, profiles=profiles)
+    parts = [("static", "static", replace(whole, stiffness=stiffness))]
+    parts += [(name, name, whole) for name in ("avoidance", "dynamic")]
+    if not options.restrictions and "paper" in profiles:
+        parts.append(("restrictions", "static", replace(options, profiles=("paper",), restrictions=_MODES)))
+    study = Options(skin=options.skin, world=options.world, first_seed=options.first_seed)
+    return parts + [(name, name, replace(study, seeds=min(options.seeds, n))) for name, n in _STUDIES.items()]
+
+
+def sentences(options: Options) -> list[str]:
+    """Say what is assumed of another arm."""
+    if not options.arm:
+        return []
+    context = context_of(options.arm, options.skin, options.world)
+    described = context.model.description
+    return [context.placement.sentence(described.name), assumed_plant(described)]
+
+
+def reproduce(parts: list[Part], folder: Path, how: Playing) -> None:
+    """Play the parts of a run that are not there yet, and show and write tables and figures of all of them."""
+    for _, name, options in parts:
+        check(options, (name,))
+    plays = [experiment(name).plays(options) for _, name, options in parts]
+    with numbers_to(how.json) as write:
+        check_numbers(how, folder)
+        for where, name, options in parts:
+            begin(how, folder / where, arguments(name, options))
+        rows: dict[str, list[Row]] = {}
+        for (where, name, options), own in zip(parts, plays, strict=True):
+            skin, arm, world = map(how.input, (options.skin, options.arm, options.world))
+            trial = partial(play, name, replace(options, skin=skin, arm=arm, world=world), folder / where)
+            rows[name] = rows.get(name, []) + played(where or name, trial, own, folder / where, how)
+        tables = [table for name, own in rows.items() for table in experiment(name).tables(own)]
+        figures = [each for part in parts for each in _figure_of(*part, folder, rows[part[1]])]
+        report(tables, figures, folder)
+        write({"rows": [{"experiment": name, **row} for name, own in rows.items() for row in own], "tables": tables})
+
+
+def _figure_of(where: str, name: str, options: Options, folder: Path, rows: list[Row]) -> list[DrawnFigure]:
+    """Draw a part's figure of the recordings of its first seed, if it has one and they can be read."""
+    what = experiment(name)
+    names = list(what.cells(options)[0])
+    if what.drawing is None or where == "restrictions":
+        return []
+    traces: list[tuple[Row, Any]] = []
+    try:
+        for row in what.drawing.cells([row for row in rows if row["seed"] == 0]):
+            cell = {key: row[key] for key in names}
+            file = recording_file(folder / where, cell, 0)
+            traces.append((cell, gather(open_recording(file))))
+    except PretouchError as error:
+        print(f"The figure of {where or name} does not show {file}: {error}", file=sys.stderr)
+    if not traces:
+        return []
+    units = context_of(options.arm, options.skin, options.world).skin.ids
+    return [(name, what.drawing.text, what.drawing.draw(traces, units))]
+
+
+def draw_figure(name: str, out: Path, profile_name: str = "paper", seed: int = 0) -> None:
+    """Draw one of the paper's figures into a file; whatever is wrong is said before anything is played."""
+    drawings = {own.drawing.name: (own, own.drawing) for own in map(experiment, NAMES) if own.drawing}
+    if name not in drawings:
+        raise ExperimentError(f"The figure {name!r} is unknown: choose from {', '.join(drawings)}.")
+    if seed < 0:
+        raise ExperimentError(f"The seed is {seed}: give 0 or more.")
+    what, drawing = drawings[name]
+    if profile(profile_name).perception is None and drawing.beside:
+        raise ExperimentError(f"The figure {name} cannot show {profile_name}, which has no proximity: name another.")
+    if out.suffix not in _ENDINGS:
+        raise ExperimentError(f"The figure {out} has no ending that says its format: use {', '.join(_ENDINGS)}.")
+    check_writable("figure", out)
+    console, context, traces = Console(stderr=True, highlight=False, soft_wrap=True), context_of("", "", ""), []
+    for cell in drawing.cells(what.cells(Options(profiles=(*drawing.beside, profile_name)))):
+        console.print(f"Playing {', '.join(map(str, cell.values()))} with seed {seed}.", markup=False)
+        record = what.trial(cell, seed, context)[1]
+        if record is not None:
+            traces.append((cell, trace_of(record)))
+    image = BytesIO()
+    drawing.draw(traces, context.skin.ids).savefig(image, format=out.suffix[1:], dpi=150)
+    with unwritable_said("figure", out):
+        out.write_bytes(image.getvalue())
