@@ -180,5 +180,5 @@ def test_bench_cycle_shows_and_writes_what_it_measured(capsys, tmp_path, monkeyp
     about, (row,) = json.loads(file.read_text()).values()
     assert (about["rate_hz"], about["asked"], about["missing"]) == (100, [3], ["No priority."])
     assert about["versions"]["numba"]
-    assert list(row)[:6] == ["points", "median_us", "p99_us", "p999_us", "max_us", "overruns"]
+    assert {"median_us", "p99_us", "p999_us", "max_us", "overruns"} < set(row)
     assert row["points"] == 3
